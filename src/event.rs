@@ -1,0 +1,38 @@
+//! The core's only input words. Hosts, MIDI files and devices are translated into these at the door.
+
+use crate::units::SoundingNote;
+
+/// Something the player does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event {
+    /// A key or fingering goes down. `velocity` 0..=1.
+    NoteOn {
+        /// Sounding pitch.
+        note: SoundingNote,
+        /// How hard, 0..=1. Makes the breath until a breath source moves; afterwards it only shapes the tongue.
+        velocity: f32,
+    },
+    /// A key comes up.
+    NoteOff {
+        /// Sounding pitch.
+        note: SoundingNote,
+    },
+    /// Breath from any source, 0..=1 of the full-scale mouth pressure (`Settings::breath_full_kpa`). The first one makes breath *live*.
+    Breath(f32),
+    /// Pitch bend, cents; limited to what the bore's tuning delay can do.
+    Bend {
+        /// Cents above the note.
+        cents: f32,
+    },
+    /// Everything up, breath to zero, state cleared.
+    Panic,
+}
+
+/// An event and when it happens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Timed<E> {
+    /// Sample index from the start of the block (or of the file, where a whole score is meant).
+    pub at: usize,
+    /// What happens.
+    pub event: E,
+}

@@ -1,0 +1,107 @@
+//! What a player can set, in the units a player uses. Plain numbers; clamped once, at the door.
+
+/// How notes are held in tune.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Tuning {
+    /// One trim per note, right at gamma 0.5: pitch moves with dynamics as the bore makes it.
+    #[default]
+    Natural,
+    /// The trim follows the breath so that each note stays in tune from gamma 0.45 to 0.9.
+    Tempered,
+}
+
+/// Everything that can be set while playing. `Default` is the reference clarinet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Mouth pressure at full breath, kPa, 2..=20. Default 6, the reference reed's closing pressure.
+    pub breath_full_kpa: f32,
+    /// Breath noise, 0 (none) ..=1 (much). Default 0.3, by ear.
+    pub noise: f32,
+    /// Time for the tongue to let go of the reed, ms, 1..=20. Default 2.
+    pub tongue_ms: f32,
+    /// Time for fingers to move between slurred notes, ms, 5..=15. Default 8.
+    pub legato_ms: f32,
+    /// Reed strength as on the box, 1.5..=5; 2.5 is the reference (closing pressure 6 kPa). Scales the stiffness.
+    pub strength: f32,
+    /// Lip position: tip opening relative to the reference, 0.6..=1.4. Below 1 bites.
+    pub lip: f32,
+    /// Embouchure parameter zeta of the reference reed, 0.05..=0.9. Default 0.3. Flow strength.
+    pub zeta: f32,
+    /// Lip damping relative to the embouchure rule, 0.2..=2. Default 1. Low values squeak.
+    pub damping: f32,
+    /// Curve of the lay, 0 (sharp, the seed's closure) ..=0.5. Default 0.4.
+    pub lay: f32,
+    /// The seed's H, dimensionless rest opening, 1..=5. Default sqrt(27)/2.
+    pub reed_h: f32,
+    /// The seed's k, dimensionless stiffness, 0.1..=2. Default 27/(4 H^3). Ignored while `coupled`.
+    pub reed_k: f32,
+    /// The seed's coupling: k = 27/(4 H^3), so that peak flow stays 1.
+    pub coupled: bool,
+    /// The seed's amplitude A of the flow, 0..=2. Default 1.
+    pub reed_a: f32,
+    /// Pitch of A4, Hz, 430..=450.
+    pub a4_hz: f32,
+    /// How notes are held in tune.
+    pub tuning: Tuning,
+    /// Air temperature, Celsius, 10..=40. The player compensates: it changes how, not what pitch, the bore plays.
+    pub temperature_c: f32,
+    /// Nonlinear flow loss of open holes, 0..=4. Default 2; 0 removes the loss and with it most of the clarion.
+    pub vent_loss: f32,
+    /// Output gain, dB, -60..=24. At 0 dB, 1 Pa at 1 m is -6 dBFS.
+    pub gain_db: f32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            breath_full_kpa: 6.0,
+            noise: 0.3,
+            tongue_ms: 2.0,
+            legato_ms: 8.0,
+            strength: 2.5,
+            lip: 1.0,
+            zeta: 0.3,
+            damping: 1.0,
+            lay: 0.4,
+            reed_h: 2.598_076_2,
+            reed_k: 0.384_900_18,
+            coupled: true,
+            reed_a: 1.0,
+            a4_hz: 440.0,
+            tuning: Tuning::Natural,
+            temperature_c: 25.0,
+            vent_loss: 2.0,
+            gain_db: 0.0,
+        }
+    }
+}
+
+impl Settings {
+    /// The same settings with every number inside its range; a non-finite number becomes its default.
+    pub fn clamped(self) -> Self {
+        let d = Self::default();
+        let fix = |x: f32, low: f32, high: f32, default: f32| {
+            if x.is_finite() { x.clamp(low, high) } else { default }
+        };
+        Self {
+            breath_full_kpa: fix(self.breath_full_kpa, 2.0, 20.0, d.breath_full_kpa),
+            noise: fix(self.noise, 0.0, 1.0, d.noise),
+            tongue_ms: fix(self.tongue_ms, 1.0, 20.0, d.tongue_ms),
+            legato_ms: fix(self.legato_ms, 5.0, 15.0, d.legato_ms),
+            strength: fix(self.strength, 1.5, 5.0, d.strength),
+            lip: fix(self.lip, 0.6, 1.4, d.lip),
+            zeta: fix(self.zeta, 0.05, 0.9, d.zeta),
+            damping: fix(self.damping, 0.2, 2.0, d.damping),
+            lay: fix(self.lay, 0.0, 0.5, d.lay),
+            reed_h: fix(self.reed_h, 1.0, 5.0, d.reed_h),
+            reed_k: fix(self.reed_k, 0.1, 2.0, d.reed_k),
+            coupled: self.coupled,
+            reed_a: fix(self.reed_a, 0.0, 2.0, d.reed_a),
+            a4_hz: fix(self.a4_hz, 430.0, 450.0, d.a4_hz),
+            tuning: self.tuning,
+            temperature_c: fix(self.temperature_c, 10.0, 40.0, d.temperature_c),
+            vent_loss: fix(self.vent_loss, 0.0, 4.0, d.vent_loss),
+            gain_db: fix(self.gain_db, -60.0, 24.0, d.gain_db),
+        }
+    }
+}

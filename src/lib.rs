@@ -1,0 +1,6 @@
+//! Chalumeau: a clarinet you play by touch.
+
+pub mod analysis;
+pub mod event;
+pub mod instrument;
+pub mod units;

@@ -1,0 +1,138 @@
+//! Words every floor shares: the air in the bore, and notes as they sound and as they are written.
+//!
+//! Everything inside the instrument is in SI units. Files, MIDI and hosts speak *sounding* pitch; fingering charts
+//! are *written*. The two are different types so that they cannot be mixed up: on a B flat clarinet a written C4
+//! sounds B flat 3, two semitones lower.
+
+use std::fmt;
+
+/// The state of the air in the bore at one temperature (50 % relative humidity, 400 ppm CO2).
+///
+/// Values at 25 C follow Ernoult, Inria report RR-9500 (2023), as used by openwind 0.12.4. Away from 25 C the speed of
+/// sound follows the square root of absolute temperature, density its inverse, viscosity and conductivity the power
+/// laws T^0.76 and T^0.85 (fits to dry air near room temperature, good to 0.5 % from 0 to 40 C).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Air {
+    /// Temperature, degrees Celsius.
+    pub temperature_c: f64,
+    /// Speed of sound, m/s.
+    pub c: f64,
+    /// Density, kg/m3.
+    pub rho: f64,
+    /// Dynamic viscosity, Pa s.
+    pub mu: f64,
+    /// Thermal conductivity, W/(m K).
+    pub kappa: f64,
+    /// Specific heat at constant pressure, J/(kg K).
+    pub cp: f64,
+    /// Ratio of specific heats.
+    pub gamma: f64,
+}
+
+impl Air {
+    /// Air at a temperature in degrees Celsius.
+    pub fn at(temperature_c: f64) -> Self {
+        let ratio = (temperature_c + 273.15) / 298.15;
+        Self {
+            temperature_c,
+            c: 347.132_409_179_073_4 * ratio.sqrt(),
+            rho: 1.177_296_156_486_458 / ratio,
+            mu: 1.844_514_355_756_439e-5 * ratio.powf(0.76),
+            kappa: 0.025_932_154_153_163_91 * ratio.powf(0.85),
+            cp: 1_014.699_561_359_552_6,
+            gamma: 1.400_530_054_789_436_2,
+        }
+    }
+
+    /// Characteristic impedance `rho c / (pi r^2)` of a tube of radius `radius_m`, Pa s/m3.
+    pub fn z_c(&self, radius_m: f64) -> f64 {
+        self.rho * self.c / (std::f64::consts::PI * radius_m * radius_m)
+    }
+}
+
+impl Default for Air {
+    fn default() -> Self {
+        Self::at(25.0)
+    }
+}
+
+/// Radius of the bore that every dimensionless figure (zeta, |Z|/Zc) refers to, m.
+pub const REFERENCE_RADIUS_M: f64 = 7.45e-3;
+
+/// A note as MIDI, files and hosts know it: MIDI number of the pitch that sounds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SoundingNote(pub u8);
+
+/// A note as the player reads it and the fingering chart names it: MIDI number of the written pitch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct WrittenNote(pub u8);
+
+impl SoundingNote {
+    /// Equal-tempered frequency, Hz, for the given A4.
+    pub fn frequency_hz(self, a4_hz: f64) -> f64 {
+        a4_hz * ((f64::from(self.0) - 69.0) / 12.0).exp2()
+    }
+
+    /// The note to read for this pitch on an instrument that sounds `transposition` semitones below what is written
+    /// (B flat clarinet: 2), or `None` outside MIDI's 0..=127.
+    pub fn written(self, transposition: i8) -> Option<WrittenNote> {
+        let midi = i16::from(self.0) + i16::from(transposition);
+        u8::try_from(midi).ok().filter(|&midi| midi < 128).map(WrittenNote)
+    }
+}
+
+impl WrittenNote {
+    /// The pitch that sounds, see [`SoundingNote::written`].
+    pub fn sounding(self, transposition: i8) -> Option<SoundingNote> {
+        let midi = i16::from(self.0) - i16::from(transposition);
+        u8::try_from(midi).ok().filter(|&midi| midi < 128).map(SoundingNote)
+    }
+}
+
+fn name(midi: u8, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    const NAMES: [&str; 12] = ["C", "C#", "D", "D#", "E", "F", "F#", "G", "G#", "A", "A#", "B"];
+    write!(f, "{}{}", NAMES[usize::from(midi % 12)], i16::from(midi / 12) - 1)
+}
+
+impl fmt::Display for SoundingNote {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        name(self.0, f)
+    }
+}
+
+impl fmt::Display for WrittenNote {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        name(self.0, f)
+    }
+}
+
+/// Interval from `from_hz` up to `to_hz`, cents.
+pub fn cents(to_hz: f64, from_hz: f64) -> f64 {
+    1200.0 * (to_hz / from_hz).log2()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn written_is_two_above_sounding_on_a_b_flat_clarinet() {
+        assert_eq!(SoundingNote(69).written(2), Some(WrittenNote(71)));
+        assert_eq!(WrittenNote(60).sounding(2), Some(SoundingNote(58)));
+        assert_eq!(SoundingNote(127).written(2), None);
+        assert_eq!(WrittenNote(1).sounding(2), None);
+        assert_eq!(WrittenNote(60).to_string(), "C4");
+    }
+
+    #[test]
+    fn a4_is_a4() {
+        assert_eq!(SoundingNote(69).frequency_hz(442.0), 442.0);
+        assert!((cents(SoundingNote(70).frequency_hz(440.0), 440.0) - 100.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn air_warms_three_cents_a_kelvin() {
+        let rise = cents(Air::at(26.0).c, Air::at(25.0).c);
+        assert!((2.8..3.0).contains(&rise), "{rise}");
+    }
+}
