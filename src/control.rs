@@ -1,0 +1,3 @@
+//! What controllers send, made into events. Nothing here knows the instrument behind them.
+
+pub mod midi;
