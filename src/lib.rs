@@ -4,4 +4,5 @@ pub mod analysis;
 pub mod control;
 pub mod event;
 pub mod instrument;
+pub mod reed;
 pub mod units;

@@ -1,0 +1,169 @@
+//! The quasi-static flow law of the reed, as the seed explored it and as physics corrects it.
+//!
+//! For a pressure difference `p >= 0` (mouth minus mouthpiece, over the reference closing pressure) the flow is
+//! `u = A (H sqrt(p) - p^1.5 / k)` until the reed closes at `p_c = H k`, and 0 beyond. For `p < 0` the air flows back
+//! and the reed is pushed *open*: `u = -A (H sqrt|p| + |p|^1.5 / k)`. The notebook's form multiplies the forward law by
+//! the sign of `p` and so closes the reed at `p = -H k`, where a real one stands at twice its opening; a test below
+//! shows the difference. (Wilson & Beavers 1974 for the Bernoulli valve; the seed's tables for the arithmetic.)
+//!
+//! | seed | here | meaning |
+//! |---|---|---|
+//! | H | `h` | rest opening, dimensionless; reference sqrt(27)/2 |
+//! | k | `k` | stiffness, dimensionless; reference 27/(4 H^3) |
+//! | A | `a` | amplitude of the flow, 1 |
+//! | x_A, x_B | `ReedTables` | sqrt(p), p^1.5 |
+
+use crate::reed::tables::ReedTables;
+
+/// The seed's H: sqrt(27)/2 makes closure fall on 1 when k follows from it.
+pub const H_INIT: f64 = 2.598_076_211_353_316;
+/// The seed's k: 27/(4 H^3) makes the peak flow 1.
+pub const K_INIT: f64 = 0.384_900_179_459_750_5;
+
+/// The reed's flow law in the seed's dimensionless numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReedLaw {
+    h: f64,
+    k: f64,
+    a: f64,
+}
+
+/// Why a law cannot be.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum ReedError {
+    /// H outside its range.
+    #[error("H (rest opening) must lie in 0.5..10, got {0}; the reference is sqrt(27)/2 = 2.598")]
+    H(f64),
+    /// k outside its range.
+    #[error("k (stiffness) must lie in 0.01..20, got {0}; the reference is 27/(4 H^3) = 0.3849")]
+    K(f64),
+    /// A outside its range.
+    #[error("A (amplitude) must lie in 0..10, got {0}; the reference is 1")]
+    A(f64),
+}
+
+impl ReedLaw {
+    /// Free H, k and A: peak flow `A sqrt(4 H^3 k / 27)` at `H k / 3`, closure at `H k`.
+    pub fn free(h: f64, k: f64, a: f64) -> Result<Self, ReedError> {
+        if !(0.5..=10.0).contains(&h) {
+            return Err(ReedError::H(h));
+        }
+        if !(0.01..=20.0).contains(&k) {
+            return Err(ReedError::K(k));
+        }
+        if !(0.0..=10.0).contains(&a) {
+            return Err(ReedError::A(a));
+        }
+        Ok(Self { h, k, a })
+    }
+
+    /// k follows from H so that the peak flow stays A: `k = 27 / (4 H^3)`.
+    pub fn coupled(h: f64, a: f64) -> Result<Self, ReedError> {
+        Self::free(h, coupled_k(h), a)
+    }
+
+    /// Rest opening H, dimensionless.
+    pub fn h(self) -> f64 {
+        self.h
+    }
+
+    /// Stiffness k, dimensionless.
+    pub fn k(self) -> f64 {
+        self.k
+    }
+
+    /// Amplitude A.
+    pub fn a(self) -> f64 {
+        self.a
+    }
+
+    /// Closing pressure `H k` over the reference closing pressure.
+    pub fn closing(self) -> f64 {
+        self.h * self.k
+    }
+
+    /// Where the flow peaks, `H k / 3`.
+    pub fn peak_at(self) -> f64 {
+        self.closing() / 3.0
+    }
+
+    /// Peak flow `A sqrt(4 H^3 k / 27)`.
+    pub fn peak_flow(self) -> f64 {
+        self.a * (4.0 * self.h.powi(3) * self.k / 27.0).sqrt()
+    }
+
+    /// Flow at pressure difference `p`, read from the tables. Real-time safe.
+    pub fn flow(self, tables: &ReedTables, p: f64) -> f64 {
+        let (x_a, x_b) = tables.at(p.abs());
+        if p < 0.0 {
+            -self.a * (self.h * x_a + x_b / self.k)
+        } else if p < self.closing() {
+            self.a * (self.h * x_a - x_b / self.k)
+        } else {
+            0.0
+        }
+    }
+}
+
+impl Default for ReedLaw {
+    fn default() -> Self {
+        Self { h: H_INIT, k: K_INIT, a: 1.0 }
+    }
+}
+
+/// `27 / (4 H^3)`.
+pub fn coupled_k(h: f64) -> f64 {
+    27.0 / (h.powi(3) * 4.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seed_constants_are_the_notebooks() {
+        assert_eq!(27.0_f64.sqrt() / 2.0, H_INIT);
+        assert_eq!(27.0 / (H_INIT.powi(3) * 4.0), K_INIT);
+        assert!((ReedLaw::default().closing() - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn coupled_keeps_the_peak_free_moves_it() {
+        let tables = ReedTables::seed();
+        for h in [1.5, 2.0, H_INIT, 3.0, 5.0] {
+            let law = ReedLaw::coupled(h, 1.0).unwrap();
+            assert!((law.peak_flow() - 1.0).abs() < 1e-12);
+            assert!((law.flow(tables, law.peak_at()) - 1.0).abs() < 1e-4, "h {h}");
+        }
+        let law = ReedLaw::free(2.0, 0.4, 1.5).unwrap();
+        assert!((law.flow(tables, law.peak_at()) - 1.5 * (4.0 * 8.0 * 0.4_f64 / 27.0).sqrt()).abs() < 1e-5);
+        assert_eq!(law.flow(tables, 0.8), 0.0);
+        assert!(law.flow(tables, 0.799) > 0.0);
+    }
+
+    #[test]
+    fn notebooks_sign_form_errs_for_negative_pressure() {
+        let (law, tables) = (ReedLaw::default(), ReedTables::seed());
+        let notebook = |p: f64| (law.h() * p.abs().sqrt() - p.abs().powf(1.5) / law.k()) * p.signum();
+        // Physics: at p = -1 the reed stands at twice its rest opening, u = -(H + 1/k). The notebook closes it.
+        assert!((law.flow(tables, -1.0) + law.h() + 1.0 / law.k()).abs() < 1e-12);
+        assert!(notebook(-1.0).abs() < 1e-12);
+        assert!((law.flow(tables, 0.5) - notebook(0.5)).abs() < 1e-6, "they agree where the notebook is right");
+    }
+
+    #[test]
+    fn table_error_is_below_two_thousandths_of_the_peak() {
+        let (law, tables) = (ReedLaw::default(), ReedTables::seed());
+        let worst = (0..100_000)
+            .map(|n| f64::from(n) / 100_000.0)
+            .map(|p| (law.flow(tables, p) - (law.h() * p.sqrt() - p.powf(1.5) / law.k())).abs())
+            .fold(0.0, f64::max);
+        assert!(worst < 8e-4, "{worst:e}");
+    }
+
+    #[test]
+    fn wrong_numbers_are_named() {
+        assert_eq!(ReedLaw::free(f64::NAN, 0.4, 1.0).unwrap_err().to_string().contains("NaN"), true);
+        assert!(ReedLaw::free(2.0, 0.0, 1.0).is_err() && ReedLaw::free(2.0, 0.4, -1.0).is_err());
+    }
+}

@@ -1,0 +1,218 @@
+//! The moving reed at the end of the bore: one closed-form solve a sample, no iteration.
+//!
+//! The reed is a damped oscillator driven by the pressure difference, `e'' / w_r^2 + q e' / w_r + e = r p + F`, where
+//! `e` is its closing in units of the reference rest opening, `r = k_ref / k` its compliance and `F` the tongue. Its
+//! position is known when the flow is wanted, so flow and pressure follow from a quadratic (as Guillemain, Kergomard &
+//! Voinier 2005 do): with `B` the opening and `X` the pressure difference at zero flow, `p + kappa zeta B sqrt(p) = X`.
+//! The result is then corrected once by what the tables say there, so that the sound hears the very entries the knob
+//! feels: `u = zeta (x_a[p] (B + r p) - r x_b[p])`, the table's quasi-static law plus inertia, which for exact tables
+//! is `zeta B sqrt(p)`.
+//!
+//! The lay rounds the closure: the opening is linear until `lay` before contact and then a parabola, zero at `lay`
+//! beyond. The closing pressure p_M is therefore the *extrapolated* one. With `lay` 0 the corner is averaged over one
+//! sample, which removes most of its aliasing and is the same parabola with half-width |v| T / 2.
+//!
+//! Pressures over the reference closing pressure P, flows over P / Zc, Zc of a 7.45 mm bore.
+
+use crate::reed::law::{K_INIT, ReedLaw};
+use crate::reed::tables::ReedTables;
+
+/// Largest opening, over the rest opening: a reed pushed away from the mouthpiece is stopped by the lip (by judgement).
+const MAX_OPENING: f64 = 2.0;
+/// A force the tongue presses with that holds the reed shut at any playing pressure, over P (lattice study, section 5).
+pub const TONGUE_FORCE: f64 = 1.6;
+
+/// What the reed is like during one control tick, at one sample rate.
+#[derive(Clone, Copy, Debug)]
+pub struct ReedCoeffs {
+    /// Sample period, s.
+    period: f64,
+    /// Flow strength zeta A, over P / Zc.
+    strength: f64,
+    /// Closing displacement, 1 for the reference reed.
+    closing: f64,
+    /// Compliance over the reference, k_ref / k.
+    compliance: f64,
+    /// Half-width of the closure's parabola, over the rest opening.
+    lay: f64,
+    /// Acceleration per force and sample: T w_r^2.
+    drive: f64,
+    /// 1 / (1 + q w_r T).
+    damp: f64,
+    /// Flow the reed's own motion makes, per speed: V / (S c), s.
+    swept: f64,
+}
+
+impl ReedCoeffs {
+    /// Coefficients for a law (with `zeta` of the reference reed), a resonance and a damping, at `rate_hz`.
+    ///
+    /// `swept_s` is the equivalent volume of the reference reed over (bore section times speed of sound), seconds.
+    pub fn new(law: ReedLaw, zeta: f64, lay: f64, resonance_hz: f64, damping: f64, swept_s: f64, rate_hz: f64) -> Self {
+        let period = 1.0 / rate_hz;
+        // w_r T stays below 1, well inside the integrator's stability limit of 2.
+        let angular = std::f64::consts::TAU * resonance_hz.min(0.15 * rate_hz);
+        Self {
+            period,
+            strength: zeta * law.a(),
+            closing: law.h() * K_INIT,
+            compliance: K_INIT / law.k(),
+            lay,
+            drive: period * angular * angular,
+            damp: 1.0 / (1.0 + damping * angular * period),
+            swept: swept_s,
+        }
+    }
+}
+
+/// The reed's position and speed, and what last came through it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ReedState {
+    /// Closing displacement over the reference rest opening: 0 at rest, 1 shut.
+    pub closing: f64,
+    /// Its speed, 1/s.
+    pub speed: f64,
+    /// Flow through the channel in the last sample, over P / Zc.
+    pub flow: f64,
+    /// Opening in the last sample, over the rest opening.
+    pub opening: f64,
+    /// Pressure in the mouthpiece in the last sample, over P.
+    pub p_mouthpiece: f64,
+}
+
+impl ReedState {
+    /// One sample: takes mouth pressure, the wave arriving from the bore, extra flow (noise) and the tongue's force,
+    /// and gives the wave leaving into the bore. `kappa` is 1 over the admittance of the first bore cell.
+    /// Real-time safe; `zeta kappa B` may be anything, the solution is unique. [audio thread]
+    #[inline(always)]
+    pub fn tick(
+        &mut self,
+        reed: &ReedCoeffs,
+        tables: &ReedTables,
+        kappa: f64,
+        p_mouth: f64,
+        p_minus: f64,
+        noise: f64,
+        tongue: f64,
+    ) -> f64 {
+        let rest = reed.closing;
+        let gap = 1.0 - self.closing / rest;
+        let half = reed.lay.max(0.5 * reed.period * self.speed.abs() / rest).max(1e-9);
+        let opening = if gap >= half {
+            gap.min(MAX_OPENING)
+        } else if gap <= -half {
+            0.0
+        } else {
+            (gap + half) * (gap + half) / (4.0 * half)
+        };
+        let b = rest * opening;
+        let x = p_mouth - 2.0 * p_minus - kappa * (reed.swept * self.speed + noise);
+        let magnitude = x.abs();
+        let half_load = 0.5 * kappa * reed.strength * b;
+        let load = (half_load * half_load + magnitude).sqrt();
+        let root = load - half_load;
+        let p = root * root;
+        let (x_a, x_b) = tables.at(p);
+        let r = reed.compliance;
+        let sign = if x < 0.0 { -1.0 } else { 1.0 };
+        // Forward the quasi-static reed closes with p, backward it opens: hence the sign inside.
+        // A shut reed passes nothing, not even the tables' interpolation error.
+        let table_flow = if b > 0.0 { reed.strength * (x_a * (b + sign * r * p) - sign * r * x_b) } else { 0.0 };
+        let exact_flow = reed.strength * b * root;
+        let slope = if load > 0.0 { root / load } else { 0.0 };
+        let p = sign * (p - kappa * (table_flow - exact_flow) * slope).max(0.0);
+        self.p_mouthpiece = p_mouth - p;
+        self.flow = sign * table_flow;
+        self.opening = opening;
+        self.speed = (self.speed + reed.drive * (r * p + tongue - self.closing)) * reed.damp;
+        self.closing += reed.period * self.speed;
+        self.p_mouthpiece - p_minus
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn quasi_static(zeta: f64) -> ReedCoeffs {
+        ReedCoeffs::new(ReedLaw::default(), zeta, 0.0, 2_200.0, 0.8, 0.0, 96_000.0)
+    }
+
+    /// The solve leaves p = X - kappa u to rounding, for any state and both corners.
+    #[test]
+    fn flow_and_pressure_agree_whatever_comes() {
+        let tables = ReedTables::seed();
+        let mut seed = 1_u64;
+        let mut random = move || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        for _ in 0..1_000_000 {
+            let reed = quasi_static(0.95 * random());
+            let mut state = ReedState { closing: 3.0 * random() - 1.0, speed: 0.0, ..Default::default() };
+            let (gamma, p_minus, closing) = (3.0 * random(), 2.0 * (2.0 * random() - 1.0), state.closing);
+            let p_plus = state.tick(&reed, tables, 1.0, gamma, p_minus, 0.0, 0.0);
+            let p = gamma - (p_plus + p_minus);
+            // Continuity at the tip: u = p_plus - p_minus, and u is the law at that pressure difference.
+            let b = (1.0 - closing).clamp(0.0, MAX_OPENING);
+            let exact = reed.strength * b * p.abs().sqrt().copysign(p);
+            let residual = (p_plus - p_minus - exact).abs();
+            // The tables' own interpolation error is all that is left.
+            let bound = if p.abs() < 1.0 && b > 0.0 { reed.strength * (3.0e-4 * (b + p.abs()) + 7e-7) } else { 0.0 };
+            assert!(residual <= bound + 1e-12, "{residual:e} at p {p}, b {b}");
+        }
+    }
+
+    #[test]
+    fn closed_reed_passes_nothing_and_reflects_everything() {
+        let mut state = ReedState { closing: 1.5, ..Default::default() };
+        let p_plus = state.tick(&quasi_static(0.3), ReedTables::seed(), 1.0, 2.0, 0.25, 0.0, TONGUE_FORCE);
+        assert_eq!((state.flow, state.opening), (0.0, 0.0));
+        assert!((p_plus - 0.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn curved_lay_keeps_rest_opening_and_slope() {
+        for lay in [0.1, 0.4, 0.5] {
+            let reed = ReedCoeffs { lay, ..quasi_static(0.3) };
+            let opening = |closing: f64| {
+                let mut state = ReedState { closing, ..Default::default() };
+                state.tick(&reed, ReedTables::seed(), 1.0, 0.5, 0.0, 0.0, 0.0);
+                state.opening
+            };
+            assert_eq!(opening(0.0), 1.0);
+            assert!((opening(0.1) - 0.9).abs() < 1e-12);
+            assert!((opening(1.0) - lay / 4.0).abs() < 1e-12, "not yet shut at the extrapolated closing pressure");
+            assert!(opening(1.0 + lay) < 1e-30);
+        }
+    }
+
+    #[test]
+    fn one_table_entry_is_heard_felt_and_exported() {
+        let seed = ReedTables::seed();
+        let mut bent = seed.clone();
+        bent.x_a[1_800] *= 1.01;
+        bent.x_b[1_800] *= 1.01;
+        let sound = |tables: &ReedTables| {
+            let mut state = ReedState { closing: 0.5, ..Default::default() };
+            state.tick(&quasi_static(0.3), tables, 1.0, 0.5 + 0.3 * 0.5 * 0.5_f64.sqrt(), 0.0, 0.0, 0.0)
+        };
+        let law = ReedLaw::default();
+        assert!((sound(&bent) - sound(seed)).abs() > 1e-4, "audio");
+        assert!((law.flow(&bent, 0.5) - law.flow(seed, 0.5)).abs() > 1e-3, "torque law");
+        let header = crate::reed::header::pressure_table_values;
+        assert_ne!(header(&bent), header(seed), "header");
+    }
+
+    #[test]
+    fn free_reed_rings_at_its_resonance() {
+        let reed = ReedCoeffs::new(ReedLaw::default(), 0.0, 0.4, 1_500.0, 0.02, 0.0, 96_000.0);
+        let mut state = ReedState { closing: 0.2, ..Default::default() };
+        let (mut crossings, mut last) = (0, state.closing);
+        for _ in 0..9_600 {
+            state.tick(&reed, ReedTables::seed(), 1.0, 0.0, 0.0, 0.0, 0.0);
+            crossings += i32::from(last < 0.0 && state.closing >= 0.0);
+            last = state.closing;
+        }
+        assert!((148..=151).contains(&crossings), "{crossings}");
+    }
+}

@@ -1,0 +1,107 @@
+//! The pressure tables shared by sound, touch and firmware.
+//!
+//! 3601 entries over one turn of the knob in tenths of a degree times ten: index `i` stands for the pressure difference
+//! `x = i / 3600` of a full-scale (closing) pressure. `x_a = sqrt(x)` and `x_b = x^1.5` are what the flow law
+//! `u = H x_a - x_b / k` needs. The grid is built as `i * (1/3600)` with the last entry exactly 1, which is how numpy's
+//! `linspace` does it; `i / 3600` would differ in the last bit of 29 entries.
+
+use std::sync::LazyLock;
+
+/// Index of the last table entry.
+pub const LAST: usize = 3600;
+
+/// Pressure tables over 0..=1 of the reference closing pressure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReedTables {
+    /// Pressure difference, 0..=1.
+    pub x: Box<[f64; LAST + 1]>,
+    /// Square root of the pressure difference.
+    pub x_a: Box<[f64; LAST + 1]>,
+    /// Pressure difference to the power 1.5.
+    pub x_b: Box<[f64; LAST + 1]>,
+    /// Sign of the pressure difference: 0 at index 0, 1 elsewhere.
+    pub sgn: Box<[i8; LAST + 1]>,
+}
+
+static SEED: LazyLock<ReedTables> = LazyLock::new(ReedTables::build);
+
+impl ReedTables {
+    /// The one set everything reads. The first call allocates; call it before audio starts.
+    pub fn seed() -> &'static Self {
+        &SEED
+    }
+
+    fn build() -> Self {
+        let step = 1.0 / LAST as f64;
+        let (mut x, mut sgn) = (Box::new([0.0; LAST + 1]), Box::new([1; LAST + 1]));
+        for (i, x) in x.iter_mut().enumerate() {
+            *x = i as f64 * step;
+        }
+        x[LAST] = 1.0;
+        sgn[0] = 0;
+        let x_a = Box::new(x.map(f64::sqrt));
+        let mut x_b = x.clone();
+        for (x_b, x_a) in x_b.iter_mut().zip(x_a.iter()) {
+            *x_b *= x_a;
+        }
+        Self { x, x_a, x_b, sgn }
+    }
+
+    /// `(x_a, x_b)` at any pressure difference `p >= 0`, in units of the reference closing pressure. Real-time safe.
+    ///
+    /// Between entries linear; in the first cell, where a square root starts vertically, the first entry scaled by
+    /// the law's own shape (exact for the unperturbed tables); beyond the last entry the same formula goes on.
+    /// Error of `x_a` at most 3.0e-4 (in the second cell, falling as p^-1.5), of `x_b` at most 7e-7: both tested.
+    #[inline(always)]
+    pub fn at(&self, p: f64) -> (f64, f64) {
+        let position = p * LAST as f64;
+        if position < 1.0 {
+            let root = position.max(0.0).sqrt();
+            return (self.x_a[1] * root, self.x_b[1] * position.max(0.0) * root);
+        }
+        if position >= LAST as f64 {
+            let root = p.sqrt();
+            return (self.x_a[LAST] * root, self.x_b[LAST] * p * root);
+        }
+        let i = (position as usize).min(LAST - 1);
+        let t = position - i as f64;
+        (self.x_a[i] + t * (self.x_a[i + 1] - self.x_a[i]), self.x_b[i] + t * (self.x_b[i + 1] - self.x_b[i]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grid_is_linspace_to_the_bit() {
+        let tables = ReedTables::seed();
+        let differing = (0..=LAST).filter(|&i| tables.x[i] != i as f64 / LAST as f64).count();
+        assert_eq!(differing, 29, "i * (1/3600) differs from i/3600 in 29 entries");
+        assert_eq!(tables.x[LAST], 1.0);
+        // Printed by the notebook.
+        assert_eq!(format!("{:.8e}", tables.x_a[1]), "1.66666667e-2");
+        assert_eq!(format!("{:.8e}", tables.x_b[2]), "1.30945700e-5");
+        assert_eq!(format!("{:.8e}", tables.x_a[LAST - 2]), "9.99722184e-1");
+        assert_eq!(format!("{:.8e}", tables.x_b[LAST - 2]), "9.99166782e-1");
+        assert_eq!((tables.sgn[0], tables.sgn[1], tables.sgn[LAST]), (0, 1, 1));
+    }
+
+    #[test]
+    fn interpolation_error_is_bounded_from_the_root_to_beyond_the_table() {
+        let tables = ReedTables::seed();
+        let (mut worst_a, mut worst_b, mut worst_first) = (0.0_f64, 0.0_f64, 0.0_f64);
+        for n in 0..400_000 {
+            let p = f64::from(n) / 200_000.0; // 0..2
+            let (a, b) = tables.at(p);
+            let (error_a, error_b) = ((a - p.sqrt()).abs(), (b - p * p.sqrt()).abs());
+            if p < 1.0 / LAST as f64 {
+                worst_first = worst_first.max(error_a);
+            }
+            (worst_a, worst_b) = (worst_a.max(error_a), worst_b.max(error_b));
+        }
+        assert!(worst_first < 1e-15, "{worst_first:e}");
+        assert!(worst_a < 3.0e-4, "{worst_a:e}");
+        assert!(worst_b < 7e-7, "{worst_b:e}");
+    }
+}
