@@ -1,0 +1,51 @@
+//! Holds one note and prints a checksum of its samples, nothing else: the program to count instructions of.
+//!
+//! `cargo run --release --no-default-features --example instructions -- SECONDS [RATE]`
+//!
+//! Written C4 at breath 0.5 of full scale. What a sample costs is the difference of two run lengths, so that building
+//! the instrument cancels; `benches/peers/run.sh` does that under callgrind and by the thread's CPU time, which is
+//! printed where Linux tells it.
+
+use std::error::Error;
+
+use chalumeau::event::Event;
+use chalumeau::instrument::Clarinet;
+use chalumeau::units::WrittenNote;
+
+/// Samples per call, as a host at a common setting would ask for.
+const BLOCK: usize = 64;
+
+/// CPU time of this thread so far, ns; `None` where the kernel does not tell.
+fn thread_cpu_ns() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    text.split_whitespace().next()?.parse().ok()
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let seconds: f64 = arguments.next().ok_or("usage: instructions SECONDS [RATE]")?.parse()?;
+    let rate_hz: f64 = arguments.next().as_deref().unwrap_or("48000").parse()?;
+    let blocks = (seconds * rate_hz / BLOCK as f64).round() as usize;
+
+    let mut clarinet = Clarinet::built_in(rate_hz)?;
+    let note = WrittenNote(60).sounding(2).ok_or("no such note")?;
+    clarinet.apply(Event::Breath(0.5));
+    clarinet.apply(Event::NoteOn { note, velocity: 0.8 });
+
+    let mut block = [0.0; BLOCK];
+    let mut checksum = 0_u32;
+    let start = thread_cpu_ns();
+    for _ in 0..blocks {
+        clarinet.render(&mut block);
+        checksum = block.iter().fold(checksum, |sum, sample| sum.rotate_left(5) ^ sample.to_bits());
+    }
+    let end = thread_cpu_ns();
+
+    let samples = blocks * BLOCK;
+    print!("chalumeau samples {samples} checksum {checksum:08x}");
+    match start.zip(end) {
+        Some((start, end)) if samples > 0 => println!(" ns_per_sample {:.2}", (end - start) / samples as f64),
+        _ => println!(),
+    }
+    Ok(())
+}
