@@ -2,7 +2,10 @@
 
 pub mod analysis;
 pub mod control;
+pub mod dsp;
 pub mod event;
 pub mod instrument;
+#[cfg(feature = "plugin")]
+pub mod plugin;
 pub mod reed;
 pub mod units;

@@ -1,0 +1,162 @@
+//! The instrument as a CLAP and VST3 plugin.
+//!
+//! This module only translates: parameters to settings, host events to the instrument's, one voice to two equal
+//! channels. Notes are sounding pitch, as everywhere outside the instrument. What is heard depends on the events and
+//! their sample positions alone, not on the host's blocks, and is what the offline renderer writes. There is no editor
+//! yet; hosts show their own.
+
+pub mod identity;
+mod params;
+mod translate;
+
+use std::sync::Arc;
+
+use nice_plug::prelude::*;
+
+pub use params::{BreathParams, ChalumeauParams, EmbouchureParams, NoiseParams};
+pub use params::{OutputParams, ReedParams, SCHEMA, TuningChoice, TuningParams};
+
+use crate::event::{Event, Timed};
+use crate::instrument::{Clarinet, Settings};
+use translate::Translator;
+
+/// The plugin: parameters, and between `activate` and `deactivate` a clarinet.
+#[derive(Default)]
+pub struct Chalumeau {
+    params: Arc<ChalumeauParams>,
+    /// With the rate it was built for.
+    clarinet: Option<(f32, Clarinet)>,
+    /// What the clarinet has been given.
+    settings: Settings,
+    translator: Translator,
+    /// Where *Breath* was last; at rest until it moves.
+    breath: f32,
+    panic: bool,
+}
+
+impl Plugin for Chalumeau {
+    const NAME: &'static str = identity::NAME;
+    const VENDOR: &'static str = identity::VENDOR;
+    const URL: &'static str = identity::URL;
+    const EMAIL: &'static str = identity::EMAIL;
+    const VERSION: &'static str = identity::VERSION;
+    const AUDIO_IO_LAYOUTS: &'static [AudioIOLayout] =
+        &[AudioIOLayout { main_output_channels: NonZeroU32::new(2), ..AudioIOLayout::const_default() }];
+    const MIDI_INPUT: MidiConfig = MidiConfig::MidiCCs;
+    const SAMPLE_ACCURATE_AUTOMATION: bool = true;
+    /// Some hosts send every MIDI controller of every channel (2080) at once; beyond the capacity the wrapper allocates.
+    const INPUT_EVENT_CAPACITY: usize = 4096;
+
+    type Editor = ();
+    type SysExMessage = ();
+    type BackgroundTask = ();
+
+    fn params(&self) -> Arc<dyn Params> {
+        self.params.clone()
+    }
+
+    fn filter_state(state: &mut PluginState) {
+        params::mend(state);
+    }
+
+    fn activate(
+        &mut self,
+        _layout: &AudioIOLayout,
+        config: &BufferConfig,
+        context: &mut impl ActivateContext<Self>,
+    ) -> bool {
+        if self.clarinet.as_ref().is_none_or(|(rate_hz, _)| *rate_hz != config.sample_rate) {
+            match Clarinet::built_in(f64::from(config.sample_rate)) {
+                Ok(clarinet) => self.clarinet = Some((config.sample_rate, clarinet)),
+                Err(reason) => {
+                    nice_error!("cannot play: {reason}");
+                    return false;
+                }
+            }
+        }
+        self.settings = self.params.settings();
+        if let Some((_, clarinet)) = &mut self.clarinet {
+            clarinet.set_settings(&self.settings);
+            context.set_latency_samples(clarinet.latency_samples());
+        }
+        self.reset();
+        true
+    }
+
+    fn reset(&mut self) {
+        self.translator.reset();
+        self.breath = 0.0;
+        self.panic = self.params.output.panic.value();
+        if let Some((_, clarinet)) = &mut self.clarinet {
+            clarinet.reset();
+        }
+    }
+
+    fn process(
+        &mut self,
+        buffer: &mut Buffer,
+        _aux: &mut AuxiliaryBuffers,
+        context: &mut impl ProcessContext<Self>,
+    ) -> ProcessStatus {
+        let [out, copies @ ..] = buffer.as_slice() else { return ProcessStatus::Normal };
+        let Some((_, clarinet)) = &mut self.clarinet else {
+            return ProcessStatus::Error("not activated");
+        };
+
+        let settings = self.params.settings();
+        if settings != self.settings {
+            clarinet.set_settings(&settings);
+            self.settings = settings;
+        }
+        let moved = moved(&self.params, &mut self.panic, &mut self.breath);
+        let api = context.plugin_api();
+        let translator = &mut self.translator;
+        let played = std::iter::from_fn(|| context.next_event())
+            .flat_map(|event| translator.translate(event, api).into_iter().flatten());
+        clarinet.render_events(moved.into_iter().flatten().chain(played), out);
+
+        for copy in copies {
+            copy.copy_from_slice(out);
+        }
+        if clarinet.is_silent() { ProcessStatus::Normal } else { ProcessStatus::KeepAlive }
+    }
+
+    fn deactivate(&mut self) {
+        self.reset();
+    }
+}
+
+/// What the parameters that act by moving have done since the last block. Real-time safe.
+fn moved(params: &ChalumeauParams, panic: &mut bool, breath: &mut f32) -> [Option<Timed<Event>>; 2] {
+    let pressed = params.output.panic.value();
+    let panicked = !std::mem::replace(panic, pressed) && pressed;
+    let blown = params.breath.breath.value();
+    let breathed = std::mem::replace(breath, blown) != blown;
+    [panicked.then_some(Event::Panic), breathed.then_some(Event::Breath(blown))]
+        .map(|event| event.map(|event| Timed { at: 0, event }))
+}
+
+impl ClapPlugin for Chalumeau {
+    const CLAP_ID: &'static str = identity::CLAP_ID;
+    const CLAP_DESCRIPTION: Option<&'static str> = Some(identity::DESCRIPTION);
+    const CLAP_MANUAL_URL: Option<&'static str> = None;
+    const CLAP_SUPPORT_URL: Option<&'static str> = None;
+    const CLAP_FEATURES: &'static [ClapFeature] =
+        &[ClapFeature::Instrument, ClapFeature::Synthesizer, ClapFeature::Stereo];
+}
+
+impl Vst3Plugin for Chalumeau {
+    const VST3_CLASS_ID: [u8; 16] = identity::VST3_CLASS_ID;
+    const VST3_SUBCATEGORIES: &'static [Vst3SubCategory] =
+        &[Vst3SubCategory::Instrument, Vst3SubCategory::Synth, Vst3SubCategory::Stereo];
+}
+
+mod export {
+    // A plugin's entry points are C functions: the macros below are the one place for that.
+    #![allow(unsafe_code)]
+
+    use super::Chalumeau;
+
+    nice_plug::nice_export_clap!(Chalumeau);
+    nice_plug::nice_export_vst3!(Chalumeau);
+}

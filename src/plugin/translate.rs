@@ -1,0 +1,201 @@
+//! The host's events become the instrument's: the only place that knows both vocabularies.
+//!
+//! MIDI goes through the decoder that the offline renderer uses, with the raw integers the host's 0..=1 values came
+//! from, so that both hear the same. Note expressions have no MIDI form: pressure and expression blow, tuning bends on
+//! top of the wheel until the next note. Left out: volume, pan, vibrato, brightness, program change.
+
+use nice_plug::midi::Key;
+use nice_plug::prelude::*;
+
+use crate::control::midi::MidiDecoder;
+use crate::event::{Event, Timed};
+
+/// What has to be remembered between host events. Real-time safe throughout.
+#[derive(Clone, Debug, Default)]
+pub struct Translator {
+    midi: MidiDecoder,
+    wheel_cents: f32,
+    /// From the tuning expression of the current note.
+    tuning_cents: f32,
+    /// Whether a note expression has blown yet. Some hosts send a zero with each note; a zero alone is not a move.
+    expression_live: bool,
+}
+
+impl Translator {
+    /// Forgets controllers, bends and breath sources.
+    pub fn reset(&mut self) {
+        *self = Self::default();
+    }
+
+    /// At most two events, in order: a note that ends a tuning expression brings a bend with it.
+    pub fn translate<S>(&mut self, event: NoteEvent<S>, api: PluginApi) -> [Option<Timed<Event>>; 2] {
+        let at = event.timing() as usize;
+        let mut bend = None;
+        let main = match event {
+            NoteEvent::NoteOn { channel, key: Key::Number(key), velocity, .. } => {
+                if self.tuning_cents != 0.0 {
+                    self.tuning_cents = 0.0;
+                    bend = Some(self.bend());
+                }
+                // The framework has made note-offs of MIDI's zero velocities; a zero that is left is a very soft note.
+                self.midi.note_on(channel.number().unwrap_or(0), key, raw7(velocity).max(1))
+            }
+            NoteEvent::NoteOff { channel, key: Key::Number(key), .. }
+            | NoteEvent::Choke { channel, key: Key::Number(key), .. } => {
+                self.midi.note_off(channel.number().unwrap_or(0), key)
+            }
+            NoteEvent::NoteOff { key: Key::Wildcard, .. } | NoteEvent::Choke { key: Key::Wildcard, .. } => {
+                Some(Event::Panic)
+            }
+            NoteEvent::MidiCC { channel, cc, value, .. } => {
+                let event = self.midi.controller(channel, cc, raw7(value));
+                self.with_tuning(event)
+            }
+            NoteEvent::MidiChannelPressure { channel, pressure, .. } => {
+                self.midi.pressure(channel, raw7(pressure))
+            }
+            NoteEvent::MidiPitchBend { channel, value, .. } => {
+                let event = self.midi.bend(channel, raw14(value));
+                self.with_tuning(event)
+            }
+            NoteEvent::PolyTuning { tuning, .. } if tuning.is_finite() => {
+                self.tuning_cents = 100.0 * tuning;
+                Some(self.bend())
+            }
+            NoteEvent::PolyPressure { pressure, .. } => self.breathe(pressure),
+            // The framework's VST3 wrapper (0.4.2) takes expression for brightness and brightness for expression.
+            NoteEvent::PolyExpression { expression, .. } if api != PluginApi::Vst3 => {
+                self.breathe(expression)
+            }
+            NoteEvent::PolyBrightness { brightness, .. } if api == PluginApi::Vst3 => {
+                self.breathe(brightness)
+            }
+            _ => None,
+        };
+        [bend, main].map(|event| event.map(|event| Timed { at, event }))
+    }
+
+    fn bend(&self) -> Event {
+        Event::Bend { cents: self.wheel_cents + self.tuning_cents }
+    }
+
+    /// Keeps the wheel in mind and adds the tuning expression to it.
+    fn with_tuning(&mut self, event: Option<Event>) -> Option<Event> {
+        let Some(Event::Bend { cents }) = event else { return event };
+        self.wheel_cents = cents;
+        Some(self.bend())
+    }
+
+    fn breathe(&mut self, unit: f32) -> Option<Event> {
+        self.expression_live |= unit > 0.0;
+        self.expression_live.then_some(Event::Breath(unit.clamp(0.0, 1.0)))
+    }
+}
+
+/// The data byte a host's 0..=1 value was made from.
+fn raw7(value: f32) -> u8 {
+    (value * 127.0).round().clamp(0.0, 127.0) as u8
+}
+
+/// The same for the bend wheel. A host's plain 0.5 rounds to the centre too.
+fn raw14(value: f32) -> u16 {
+    (value * 16383.0).round().clamp(0.0, 16383.0) as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use nice_plug::midi::{Channel, VoiceID};
+
+    use super::*;
+    use crate::units::SoundingNote;
+
+    type Host = NoteEvent<()>;
+
+    fn one(translator: &mut Translator, event: Host) -> Option<Event> {
+        translator.translate(event, PluginApi::Clap)[1].map(|timed| timed.event)
+    }
+
+    fn midi(translator: &mut Translator, bytes: [u8; 3]) -> Option<Event> {
+        one(translator, Host::from_midi(0, &bytes).expect("a channel message"))
+    }
+
+    #[test]
+    fn every_data_byte_arrives_as_it_was_sent() {
+        for raw in 0..=127u8 {
+            assert_eq!(raw7(f32::from(raw) / 127.0), raw);
+        }
+        for raw in 0..=16383u16 {
+            assert_eq!(raw14(f32::from(raw) / 16383.0), raw);
+            assert_eq!(raw14((f64::from(raw) / 16383.0) as f32), raw);
+        }
+    }
+
+    #[test]
+    fn a_wheel_at_rest_bends_by_nothing() {
+        let mut translator = Translator::default();
+        assert_eq!(midi(&mut translator, [0xE0, 0, 64]), Some(Event::Bend { cents: 0.0 }));
+        let half = Host::MidiPitchBend { timing: 0, channel: 0, value: 0.5 };
+        assert_eq!(one(&mut translator, half), Some(Event::Bend { cents: 0.0 }));
+    }
+
+    #[test]
+    fn plugin_and_renderer_hear_the_same_midi() {
+        let mut translator = Translator::default();
+        let mut decoder = MidiDecoder::new();
+        for value in 0..=127u8 {
+            assert_eq!(midi(&mut translator, [0xB3, 2, value]), decoder.controller(3, 2, value));
+            assert_eq!(
+                midi(&mut translator, [0xE3, value, 127 - value]),
+                decoder.bend(3, u16::from(127 - value) << 7 | u16::from(value))
+            );
+            assert_eq!(midi(&mut translator, [0x93, value, 90]), decoder.note_on(3, value, 90));
+            assert_eq!(midi(&mut translator, [0x83, value, 90]), decoder.note_off(3, value));
+        }
+        let mut translator = Translator::default();
+        assert_eq!(midi(&mut translator, [0xD0, 64, 0]), MidiDecoder::new().pressure(0, 64));
+    }
+
+    #[test]
+    fn tuning_adds_to_the_wheel_until_the_next_note() {
+        let mut translator = Translator::default();
+        let (voice_id, channel, key) = (VoiceID::Wildcard, Channel::Number(0), Key::Number(60));
+        midi(&mut translator, [0xE0, 127, 127]);
+        let tuning = Host::PolyTuning { timing: 0, voice_id, channel, key, tuning: -0.5 };
+        assert_eq!(one(&mut translator, tuning), Some(Event::Bend { cents: 150.0 }));
+        let note = Host::NoteOn { timing: 7, voice_id, channel, key, velocity: 1.0 };
+        let note_on = Event::NoteOn { note: SoundingNote(60), velocity: 1.0 };
+        assert_eq!(
+            translator.translate(note, PluginApi::Clap),
+            [
+                Some(Timed { at: 7, event: Event::Bend { cents: 200.0 } }),
+                Some(Timed { at: 7, event: note_on })
+            ]
+        );
+        assert_eq!(translator.translate(note, PluginApi::Clap)[0], None);
+    }
+
+    #[test]
+    fn a_resting_expression_does_not_take_the_breath() {
+        let mut translator = Translator::default();
+        let (voice_id, channel, key) = (VoiceID::Wildcard, Channel::Number(0), Key::Number(60));
+        let press = |pressure| Host::PolyPressure { timing: 0, voice_id, channel, key, pressure };
+        assert_eq!(one(&mut translator, press(0.0)), None);
+        assert_eq!(one(&mut translator, press(0.6)), Some(Event::Breath(0.6)));
+        assert_eq!(one(&mut translator, press(0.0)), Some(Event::Breath(0.0)));
+        let express = Host::PolyExpression { timing: 0, voice_id, channel, key, expression: 2.0 };
+        assert_eq!(one(&mut translator, express), Some(Event::Breath(1.0)));
+    }
+
+    #[test]
+    fn a_wildcard_ends_everything() {
+        let mut translator = Translator::default();
+        let off = Host::NoteOff {
+            timing: 0,
+            voice_id: VoiceID::Wildcard,
+            channel: Channel::Wildcard,
+            key: Key::Wildcard,
+            velocity: 0.0,
+        };
+        assert_eq!(one(&mut translator, off), Some(Event::Panic));
+    }
+}
