@@ -8,4 +8,6 @@ pub mod instrument;
 #[cfg(feature = "plugin")]
 pub mod plugin;
 pub mod reed;
+#[cfg(feature = "cli")]
+pub mod render;
 pub mod units;

@@ -1,0 +1,159 @@
+//! New files that appear whole or not at all.
+//!
+//! Everything is written to a temporary file beside the target and takes its name only at the end; dropping it on the
+//! way leaves nothing behind. A file that is there already stays, unless it was to be replaced.
+
+use std::fs;
+use std::io;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
+
+/// Why a file cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    /// Not to be replaced.
+    #[error("{} exists already; choose another name or add --force to replace it", .0.display())]
+    Exists(PathBuf),
+    /// A directory or a device.
+    #[error("{} is not a regular file; give the name of a file to write", .0.display())]
+    NotAFile(PathBuf),
+    /// No place for it.
+    #[error("directory {} does not exist; create it or choose another place", .0.display())]
+    NoDirectory(PathBuf),
+    /// The system refuses.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The target.
+        path: PathBuf,
+        /// The system's reason.
+        source: io::Error,
+    },
+}
+
+/// A file on its way.
+pub struct NewFile {
+    path: PathBuf,
+    force: bool,
+    temp: BufWriter<NamedTempFile>,
+}
+
+impl NewFile {
+    /// Opens a temporary file beside `path`; refuses early what would fail at the end.
+    pub fn create(path: &Path, force: bool) -> Result<Self, OutputError> {
+        // A link is followed: what it points to is replaced, not the link.
+        let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        match fs::metadata(&path) {
+            Ok(there) if !there.is_file() => return Err(OutputError::NotAFile(path)),
+            Ok(_) if !force => return Err(OutputError::Exists(path)),
+            _ => {}
+        }
+        let Some(name) = path.file_name() else { return Err(OutputError::NotAFile(path)) };
+        let directory = match path.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        if !directory.exists() {
+            return Err(OutputError::NoDirectory(directory.to_owned()));
+        }
+        let mut prefix = name.to_owned();
+        prefix.push(".");
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(&prefix).suffix(".part");
+        // As any new file: the user's mask decides, not the private mode of temporary files.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        match builder.tempfile_in(directory) {
+            Ok(temp) => Ok(Self { temp: BufWriter::new(temp), path, force }),
+            // The message of `tempfile` repeats the temporary name, which says nothing to the user.
+            Err(error) => Err(OutputError::Write { source: plain(error), path }),
+        }
+    }
+
+    /// Where it will be.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Gives the file its name.
+    pub fn keep(self) -> Result<(), OutputError> {
+        let Self { path, force, temp } = self;
+        let written = temp.into_inner().map_err(io::IntoInnerError::into_error);
+        let kept = written.and_then(|temp| {
+            let persisted = if force { temp.persist(&path) } else { temp.persist_noclobber(&path) };
+            persisted.map_err(|e| e.error)
+        });
+        match kept {
+            Ok(_) => Ok(()),
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Err(OutputError::Exists(path)),
+            Err(source) => Err(OutputError::Write { path, source }),
+        }
+    }
+}
+
+/// The system's error without what a library has added.
+fn plain(error: io::Error) -> io::Error {
+    match error.raw_os_error() {
+        Some(code) => io::Error::from_raw_os_error(code),
+        None => io::Error::from(error.kind()),
+    }
+}
+
+impl io::Write for NewFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.temp.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.temp.flush()
+    }
+}
+
+impl io::Seek for NewFile {
+    fn seek(&mut self, to: io::SeekFrom) -> io::Result<u64> {
+        self.temp.seek(to)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    fn names(directory: &Path) -> Vec<String> {
+        fs::read_dir(directory).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
+    }
+
+    #[test]
+    fn a_dropped_file_leaves_nothing() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut file = NewFile::create(&directory.path().join("x"), false).unwrap();
+        file.write_all(b"half").unwrap();
+        drop(file);
+        assert!(names(directory.path()).is_empty());
+    }
+
+    #[test]
+    fn an_existing_file_stays_unless_replaced() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("x");
+        let early = NewFile::create(&path, false).unwrap();
+        fs::write(&path, "old").unwrap();
+        assert!(matches!(NewFile::create(&path, false), Err(OutputError::Exists(_))));
+        assert!(matches!(early.keep(), Err(OutputError::Exists(_))), "not even when it came later");
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        let mut file = NewFile::create(&path, true).unwrap();
+        file.write_all(b"new").unwrap();
+        file.keep().unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert_eq!(names(directory.path()), ["x"]);
+    }
+
+    #[test]
+    fn no_device_or_directory_is_replaced() {
+        let directory = tempfile::tempdir().unwrap();
+        assert!(matches!(NewFile::create(directory.path(), true), Err(OutputError::NotAFile(_))));
+        let missing = directory.path().join("no/x");
+        assert!(matches!(NewFile::create(&missing, true), Err(OutputError::NoDirectory(_))));
+    }
+}

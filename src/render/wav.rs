@@ -1,0 +1,149 @@
+//! Samples into a WAV file: 16 or 24 bit integers, rounded to nearest without dither, or 32 bit floats as they are.
+
+use crate::render::output::NewFile;
+use hound::{SampleFormat, WavSpec, WavWriter};
+use std::io::BufWriter;
+
+/// How a sample is stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Depth {
+    /// 16 bit integer.
+    Int16,
+    /// 24 bit integer.
+    Int24,
+    /// 32 bit float; nothing is rounded or clipped.
+    Float32,
+}
+
+/// What a WAV file cannot hold.
+#[derive(Debug, thiserror::Error)]
+pub enum WavError {
+    /// Sizes in the header have 32 bits.
+    #[error(
+        "{seconds:.0} s at this rate and depth need {gigabytes:.1} GB, a WAV file holds 4; render less, at a lower rate or fewer bits"
+    )]
+    TooLong {
+        /// Length asked for.
+        seconds: f64,
+        /// Its size.
+        gigabytes: f64,
+    },
+    /// The disk refuses.
+    #[error("cannot write the WAV file: {0}")]
+    Write(#[from] hound::Error),
+}
+
+/// What went into a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Level {
+    /// Largest magnitude, full scale 1.
+    pub peak: f32,
+    /// Samples beyond full scale, cut (never for floats).
+    pub clipped: u64,
+}
+
+/// A WAV file being written; each sample goes to every channel.
+pub struct WavFile<'a> {
+    writer: WavWriter<BufWriter<&'a mut NewFile>>,
+    depth: Depth,
+    channels: u16,
+    level: Level,
+}
+
+impl<'a> WavFile<'a> {
+    /// Writes a header for `samples` samples per channel, which must fit.
+    pub fn new(
+        file: &'a mut NewFile,
+        rate: u32,
+        depth: Depth,
+        channels: u16,
+        samples: usize,
+    ) -> Result<Self, WavError> {
+        let (bits_per_sample, sample_format) = match depth {
+            Depth::Int16 => (16, SampleFormat::Int),
+            Depth::Int24 => (24, SampleFormat::Int),
+            Depth::Float32 => (32, SampleFormat::Float),
+        };
+        let bytes = samples as f64 * f64::from(channels) * f64::from(bits_per_sample / 8);
+        if bytes > f64::from(u32::MAX) - 4096.0 {
+            return Err(WavError::TooLong {
+                seconds: samples as f64 / f64::from(rate),
+                gigabytes: bytes / 1e9,
+            });
+        }
+        let spec = WavSpec { channels, sample_rate: rate, bits_per_sample, sample_format };
+        let writer = WavWriter::new(BufWriter::new(file), spec)?;
+        Ok(Self { writer, depth, channels, level: Level::default() })
+    }
+
+    /// Appends one block.
+    pub fn write(&mut self, block: &[f32]) -> Result<(), WavError> {
+        for &sample in block {
+            self.level.peak = self.level.peak.max(sample.abs());
+            for _ in 0..self.channels {
+                match self.depth {
+                    Depth::Int16 => self.writer.write_sample(round(sample, 32_767.0))?,
+                    Depth::Int24 => self.writer.write_sample(round(sample, 8_388_607.0))?,
+                    Depth::Float32 => self.writer.write_sample(sample)?,
+                }
+            }
+            self.level.clipped += u64::from(self.depth != Depth::Float32 && sample.abs() > 1.0);
+        }
+        Ok(())
+    }
+
+    /// Completes the header.
+    pub fn finish(self) -> Result<Level, WavError> {
+        self.writer.finalize()?;
+        Ok(self.level)
+    }
+}
+
+/// Nearest integer, full scale to full scale.
+fn round(sample: f32, full_scale: f64) -> i32 {
+    (f64::from(sample).clamp(-1.0, 1.0) * full_scale).round() as i32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn written(depth: Depth, channels: u16) -> (Level, hound::WavReader<std::io::BufReader<std::fs::File>>) {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("x.wav");
+        let mut file = NewFile::create(&path, false).unwrap();
+        let mut wav = WavFile::new(&mut file, 48_000, depth, channels, 4).unwrap();
+        wav.write(&[0.5, -1.0]).unwrap();
+        wav.write(&[1.5, 0.0]).unwrap();
+        let level = wav.finish().unwrap();
+        file.keep().unwrap();
+        (level, hound::WavReader::open(&path).unwrap())
+    }
+
+    #[test]
+    fn integers_round_and_clipping_is_counted() {
+        let (level, mut reader) = written(Depth::Int16, 2);
+        assert_eq!(level, Level { peak: 1.5, clipped: 1 });
+        let samples: Vec<i32> = reader.samples().map(Result::unwrap).collect();
+        assert_eq!(samples, [16_384, 16_384, -32_767, -32_767, 32_767, 32_767, 0, 0]);
+        let (_, mut reader) = written(Depth::Int24, 1);
+        let samples: Vec<i32> = reader.samples().map(Result::unwrap).collect();
+        assert_eq!(samples, [4_194_304, -8_388_607, 8_388_607, 0]);
+    }
+
+    #[test]
+    fn floats_stay_as_they_are() {
+        let (level, mut reader) = written(Depth::Float32, 1);
+        assert_eq!(level, Level { peak: 1.5, clipped: 0 });
+        let samples: Vec<f32> = reader.samples().map(Result::unwrap).collect();
+        assert_eq!(samples, [0.5, -1.0, 1.5, 0.0]);
+    }
+
+    #[test]
+    fn four_gigabytes_are_too_much() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut file = NewFile::create(&directory.path().join("x.wav"), false).unwrap();
+        let refused = WavFile::new(&mut file, 48_000, Depth::Float32, 2, 600_000_000).map(|_| ());
+        assert!(matches!(refused, Err(WavError::TooLong { .. })));
+    }
+}
