@@ -1,0 +1,3 @@
+//! Signal processing that knows no physics: sample-rate conversion for the output.
+
+pub mod resampler;
