@@ -2,8 +2,6 @@
 
 pub mod analysis;
 pub mod bore;
-#[cfg(feature = "cli")]
-pub mod cli;
 pub mod control;
 pub mod dsp;
 pub mod event;
