@@ -2,6 +2,8 @@
 
 pub mod analysis;
 pub mod bore;
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod control;
 pub mod dsp;
 pub mod event;
