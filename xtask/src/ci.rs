@@ -1,3 +1,128 @@
-pub fn run(_: &[String]) -> anyhow::Result<()> {
+//! Everything that must pass before a change is kept, in one command. Steps go on after a failure, so that one run
+//! tells all; the summary says which ones failed and how long each took.
+
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+
+use crate::machine::{self, ALSA, CC, GL, GLIB, PKG_CONFIG, Package, VENV};
+use crate::{COMMANDS, bundle};
+
+/// DawDreamer's version is pinned: a new one may host differently.
+const PYTHON_PACKAGES: &[&str] = &["dawdreamer==0.9.0", "numpy<3"];
+
+type Step = (&'static str, fn() -> Result<()>);
+
+const STEPS: &[Step] = &[
+    ("system packages", packages),
+    ("format", || cargo("fmt --all --check")),
+    ("clippy, core", || cargo("clippy --no-default-features --features cli --all-targets -- -D warnings")),
+    ("clippy, all features", || cargo("clippy --all-features --all-targets -- -D warnings")),
+    ("clippy, xtask", || cargo("clippy -p xtask --all-targets -- -D warnings")),
+    ("tests, core", || cargo("test --no-default-features --features cli --no-fail-fast")),
+    ("tests, all features", || cargo("test --all-features --lib --bins --no-fail-fast")),
+    ("documentation", documentation),
+    ("generated files", generated),
+    ("bundle", || bundle::run(&[])),
+    ("tests, xtask and its MIDI reader", || cargo("test -p xtask --lib --bins")),
+    ("CLAP in clack-host", || cargo("test -p xtask --test clap --no-fail-fast")),
+    ("CLAP with allocation checks", clap_checked),
+    ("VST3 in vst3-host", || cargo("test -p xtask --test vst3 --no-fail-fast")),
+    ("VST3 in DawDreamer", dawdreamer),
+    ("benches build", || cargo("bench --no-default-features --features cli --no-run")),
+];
+
+/// `cargo xtask ci [word..]`: all steps, or those whose name contains one of the words.
+pub fn run(words: &[String]) -> Result<()> {
+    let chosen: Vec<_> = STEPS
+        .iter()
+        .filter(|(name, _)| words.is_empty() || words.iter().any(|word| name.contains(word)))
+        .collect();
+    if chosen.is_empty() {
+        let names: Vec<_> = STEPS.iter().map(|(name, _)| *name).collect();
+        bail!("no step is called {words:?}; the steps are: {}", names.join("; "));
+    }
+    let began = Instant::now();
+    let mut report = Vec::new();
+    for (index, (name, step)) in chosen.iter().enumerate() {
+        println!("\n=== {}/{} {name}", index + 1, chosen.len());
+        let started = Instant::now();
+        let result = step();
+        if let Err(error) = &result {
+            println!("FAILED: {error:#}");
+        }
+        println!("=== {name}: {}", spoken(started.elapsed()));
+        report.push((name, result.is_ok(), started.elapsed()));
+    }
+    println!();
+    for (name, passed, took) in &report {
+        println!("{:>10}  {}  {name}", spoken(*took), if *passed { "passed" } else { "FAILED" });
+    }
+    let failed = report.iter().filter(|(_, passed, _)| !passed).count();
+    let passed = report.len() - failed;
+    println!("ci: {passed} steps passed, {failed} failed, {}", spoken(began.elapsed()));
+    if failed > 0 { bail!("{failed} of {} steps failed", report.len()) } else { Ok(()) }
+}
+
+fn spoken(time: Duration) -> String {
+    let seconds = time.as_secs_f64();
+    if seconds < 60.0 {
+        format!("{seconds:.1} s")
+    } else {
+        format!("{} m {:02.0} s", (seconds / 60.0).floor(), (seconds % 60.0).floor())
+    }
+}
+
+fn cargo(words: &str) -> Result<()> {
+    machine::run(machine::cargo().args(words.split(' ')))
+}
+
+fn packages() -> Result<()> {
+    let needed: &[&Package] =
+        if cfg!(target_os = "linux") { &[&CC, &PKG_CONFIG, &ALSA, &VENV, &GL, &GLIB] } else { &[] };
+    machine::provide(needed)
+}
+
+fn documentation() -> Result<()> {
+    machine::run(
+        machine::cargo().args(["doc", "--no-deps", "--all-features"]).env("RUSTDOCFLAGS", "-D warnings"),
+    )
+}
+
+/// Every chore that can compare what it would write with what is there.
+fn generated() -> Result<()> {
+    for command in COMMANDS.iter().filter(|command| command.checks) {
+        println!("{} --check", command.name);
+        (command.run)(&["--check".to_owned()]).with_context(|| command.name)?;
+    }
     Ok(())
+}
+
+/// The same tests on a debug build, where the framework aborts on any allocation while processing.
+fn clap_checked() -> Result<()> {
+    cargo("build --all-features --lib")?;
+    let library = format!("{}chalumeau{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+    let library = machine::target().join("debug").join(library);
+    let tests = ["test", "-p", "xtask", "--test", "clap", "--no-fail-fast"];
+    machine::run(machine::cargo().args(tests).env("CHALUMEAU_CLAP", library))
+}
+
+fn dawdreamer() -> Result<()> {
+    let venv = machine::target().join("venv");
+    let bin = venv.join(if cfg!(windows) { "Scripts" } else { "bin" });
+    let python = bin.join("python");
+    if !imports(&python, "dawdreamer, numpy") {
+        let system = if cfg!(windows) { "python" } else { "python3" };
+        machine::run(Command::new(system).args(["-m", "venv"]).arg(&venv))?;
+        let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
+        machine::run(Command::new(&python).args(pip).args(PYTHON_PACKAGES))?;
+    }
+    let script = machine::root().join("xtask/tests/vst3_in_dawdreamer.py");
+    machine::run(Command::new(&python).arg(script).arg(bundle::vst3()?))
+}
+
+fn imports(python: &Path, modules: &str) -> bool {
+    machine::works(&python.to_string_lossy(), &["-c", &format!("import {modules}")])
 }

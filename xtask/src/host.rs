@@ -135,7 +135,7 @@ impl Plugin {
         let mut all = Vec::new();
         for index in 0..params.count(&handle) {
             let mut buffer = ParamInfoBuffer::new();
-            let info = params.get_info(&mut handle, index, &mut buffer).context("no such parameter")?;
+            let info = params.get_info(&handle, index, &mut buffer).context("no such parameter")?;
             all.push(Param {
                 id: info.id,
                 name: String::from_utf8_lossy(info.name).into_owned(),
@@ -195,14 +195,14 @@ impl Plugin {
         let mut handle = self.instance.plugin_handle();
         let state: PluginState = handle.get_extension().context("no state")?;
         let mut bytes = Vec::new();
-        state.save(&mut handle, &mut bytes)?;
+        state.save(&handle, &mut bytes)?;
         Ok(bytes)
     }
 
     pub fn restore(&mut self, mut bytes: &[u8]) -> Result<()> {
         let mut handle = self.instance.plugin_handle();
         let state: PluginState = handle.get_extension().context("no state")?;
-        Ok(state.load(&mut handle, &mut bytes)?)
+        Ok(state.load(&handle, &mut bytes)?)
     }
 
     pub fn latency(&mut self) -> Result<u32> {

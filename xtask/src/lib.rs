@@ -6,3 +6,34 @@ pub mod demo;
 pub mod host;
 pub mod machine;
 pub mod midi;
+
+/// One chore.
+pub struct Command {
+    pub name: &'static str,
+    pub about: &'static str,
+    pub run: fn(&[String]) -> anyhow::Result<()>,
+    /// Understands `--check`: compares instead of writing. `ci` runs all of these.
+    pub checks: bool,
+}
+
+/// All of them, in the order of the help text.
+pub const COMMANDS: &[Command] = &[
+    Command {
+        name: "demo",
+        about: "build the plugin, play the example melody through it, write sound, picture and a table of cents",
+        run: demo::run,
+        checks: false,
+    },
+    Command {
+        name: "ci",
+        about: "everything that must pass before a change is kept; with words, only the steps they name",
+        run: ci::run,
+        checks: false,
+    },
+    Command {
+        name: "bundle",
+        about: "build Chalumeau.clap and Chalumeau.vst3 into target/bundled; takes cargo build's options",
+        run: bundle::run,
+        checks: false,
+    },
+];

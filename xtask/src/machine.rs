@@ -52,6 +52,11 @@ pub fn works(program: &str, args: &[&str]) -> bool {
         .is_ok_and(|status| status.success())
 }
 
+/// Whether the dynamic linker finds a library, asked through Python, which is needed for DawDreamer anyway.
+fn loads(library: &str) -> bool {
+    works("python3", &["-c", &format!("import ctypes; ctypes.CDLL('{library}')")])
+}
+
 /// A system package (Debian's name) and how to tell that it is there.
 pub struct Package {
     pub name: &'static str,
@@ -68,6 +73,12 @@ pub const VENV: Package = Package {
     present: || works("python3", &["-c", "import ensurepip, venv"]),
     purpose: "the DawDreamer tests",
 };
+/// For DawDreamer.
+pub const GL: Package =
+    Package { name: "libgl1", present: || loads("libGL.so.1"), purpose: "the DawDreamer tests" };
+/// For DawDreamer.
+pub const GLIB: Package =
+    Package { name: "libglib2.0-0", present: || loads("libglib-2.0.so.0"), purpose: "the DawDreamer tests" };
 /// For `chalumeau-standalone`.
 pub const PKG_CONFIG: Package = Package {
     name: "pkg-config",

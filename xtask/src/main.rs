@@ -1,37 +1,36 @@
 use std::process::ExitCode;
 
-use anyhow::{Result, bail};
-
-const HELP: &str = "\
-Chores of Chalumeau: cargo xtask <command>
-
-  demo        build the plugin, play the example melody through it, write sound, picture and a table of cents
-  ci          everything that must pass before a change is kept
-  bundle      build Chalumeau.clap and Chalumeau.vst3 into target/bundled; takes cargo build's options
-
-demo and ci install the system packages they need with apt-get, or name them where there is none.
-";
+use anyhow::{Context, Result};
+use xtask::COMMANDS;
 
 fn main() -> ExitCode {
     let mut args = std::env::args().skip(1);
     let command = args.next().unwrap_or_default();
-    match run(&command, args.collect()) {
+    match run(&command, &args.collect::<Vec<_>>()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("{command}: {error:#}");
+            eprintln!("xtask {command}: {error:#}");
             ExitCode::FAILURE
         }
     }
 }
 
-fn run(command: &str, args: Vec<String>) -> Result<()> {
-    xtask::machine::enter_workspace()?;
-    match command {
-        "" | "help" | "-h" | "--help" => print!("{HELP}"),
-        "bundle" => xtask::bundle::run(&args)?,
-        "ci" => xtask::ci::run(&args)?,
-        "demo" => xtask::demo::run(&args)?,
-        unknown => bail!("no such command; choose one of these:\n\n{HELP}given: {unknown}"),
+fn run(name: &str, args: &[String]) -> Result<()> {
+    if matches!(name, "" | "help" | "-h" | "--help") {
+        print!("{}", help());
+        return Ok(());
     }
-    Ok(())
+    let command = COMMANDS.iter().find(|command| command.name == name);
+    let command = command.with_context(|| format!("no such chore\n\n{}", help()))?;
+    xtask::machine::enter_workspace()?;
+    (command.run)(args)
+}
+
+fn help() -> String {
+    let mut text = "Chores of Chalumeau: cargo xtask <chore> [arguments]\n\n".to_owned();
+    for command in COMMANDS {
+        let check = if command.checks { " [--check]" } else { "" };
+        text += &format!("  {:<26}{}\n", format!("{}{check}", command.name), command.about);
+    }
+    text + "\ndemo and ci install the system packages they need with apt-get, or name them where there is none.\n"
 }

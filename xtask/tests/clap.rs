@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use chalumeau::analysis::pitch::fundamental_hz;
+use chalumeau::analysis::to_f64;
 use chalumeau::event::{Event, Timed};
 use chalumeau::instrument::{Clarinet, Settings};
 use chalumeau::units::SoundingNote;
@@ -172,28 +174,11 @@ fn the_wheel_bends() {
     };
     let plain = play(&[At(0, breath(80)), At(0, on(60))], SECOND);
     assert!(bent(0, 64) == plain, "the centre bends by nothing, not by a little");
-    let hz = |samples: &[f32]| pitch_hz(&samples[SECOND / 2..]);
+    let hz = |samples: &[f32]| fundamental_hz(&to_f64(&samples[SECOND / 2..]), RATE).unwrap();
     let up = 1200.0 * (hz(&bent(0, 80)) / hz(&plain)).log2();
     let down = 1200.0 * (hz(&bent(0, 48)) / hz(&plain)).log2();
     // A quarter of two semitones; how far a bore follows is its own affair.
     assert!(up > 10.0 && down < -10.0, "{up} {down} cents");
-}
-
-/// Frequency by the lag at which the sound is most like itself, good to one sample of the period.
-fn pitch_hz(samples: &[f32]) -> f64 {
-    let lag = (40..800)
-        .max_by(|&a, &b| {
-            let alike = |lag: usize| -> f64 {
-                let n = samples.len() - 800;
-                let dot = |a: &[f32], b: &[f32]| {
-                    a.iter().zip(b).map(|(&x, &y)| f64::from(x) * f64::from(y)).sum::<f64>()
-                };
-                dot(&samples[..n], &samples[lag..lag + n])
-            };
-            alike(a).total_cmp(&alike(b))
-        })
-        .unwrap();
-    RATE / lag as f64
 }
 
 #[test]
