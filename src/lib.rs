@@ -3,6 +3,7 @@
 pub mod analysis;
 pub mod control;
 pub mod dsp;
+pub mod bore;
 pub mod event;
 pub mod instrument;
 #[cfg(feature = "plugin")]

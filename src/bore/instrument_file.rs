@@ -1,0 +1,676 @@
+//! The instrument as a file: bore, tone holes and fingering chart as a maker measures them and a player reads them.
+//!
+//! The file is TOML in millimetres and diameters (`docs/instrument-file.md`); here everything is metres and radii. The
+//! bore is a chain of straight cones from the reed tip, holes are circular, and a fingering is a set of open holes, one
+//! fingering a note. Pads above open holes, undercutting and the shape of the mouthpiece chamber are left out.
+//! Reading never panics: whatever a program can see to be wrong is refused with the place, the value given and what
+//! would be right. The built-in clarinet and its credits are in `data/b_flat_clarinet.toml`.
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::path::PathBuf;
+
+use serde::Deserialize;
+
+use crate::units::WrittenNote;
+
+/// Most tone holes a file may have; a full Boehm clarinet has 24.
+pub const MAX_HOLES: usize = 40;
+/// Most cones a bore may be made of.
+pub const MAX_SEGMENTS: usize = 256;
+/// The registers a fingering may name, low to high.
+pub const REGISTERS: [&str; 4] = ["chalumeau", "throat", "clarion", "altissimo"];
+
+/// Cones that meet within this distance are taken as touching, m.
+const CONTACT_M: f64 = 1e-6;
+
+/// One instrument: Design, in the words of the house. SI units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InstrumentFile {
+    /// What a player calls it.
+    pub name: String,
+    /// Where the measurements come from.
+    pub source: String,
+    /// Semitones it sounds below what is written, -12..=36 (B flat clarinet: 2).
+    pub transposition: i8,
+    /// Volume of air that moves with the reed, in parallel with the bore at the tip, m3, 0..=2e-5 (clarinet: 1.2e-6).
+    pub reed_volume_m3: f64,
+    /// The main bore from the reed tip (x = 0) to the end of the bell; contiguous.
+    pub bore: Vec<BoreSegment>,
+    /// Tone holes, ordered from the reed to the bell, at most [`MAX_HOLES`].
+    pub holes: Vec<ToneHole>,
+    /// Fingerings, ordered from the lowest note to the highest, at least one, one a note.
+    pub fingerings: Vec<Fingering>,
+}
+
+/// A straight cone of the main bore. `x` is measured from the reed tip.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BoreSegment {
+    /// Part of the instrument it belongs to, e.g. `barrel`.
+    pub part: String,
+    /// Upstream end, m.
+    pub x_start_m: f64,
+    /// Downstream end, m, above `x_start_m`.
+    pub x_end_m: f64,
+    /// Radius at the upstream end, m, 0 < r < 0.1.
+    pub r_start_m: f64,
+    /// Radius at the downstream end, m, 0 < r < 0.1.
+    pub r_end_m: f64,
+}
+
+/// How a hole is closed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HoleKind {
+    /// Covered by a finger.
+    Finger,
+    /// Covered by a pad at rest; a key opens it.
+    KeyClosed,
+    /// Covered by a pad that stands open at rest; a key or ring closes it.
+    PadOpen,
+}
+
+/// A circular tone hole or vent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ToneHole {
+    /// Unique name without spaces, as fingerings use it.
+    pub name: String,
+    /// How it is closed.
+    pub kind: HoleKind,
+    /// Position of its centre, m from the reed tip, inside the bore.
+    pub x_m: f64,
+    /// Radius of the hole, m, at most that of the bore there.
+    pub radius_m: f64,
+    /// Chimney height from the wall of the bore to the outside, m, above 0.
+    pub chimney_m: f64,
+    /// Whether it is a register hole (speaker vent).
+    pub register: bool,
+    /// Free text.
+    pub description: String,
+}
+
+/// How one note is fingered.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fingering {
+    /// The note it plays.
+    pub written: WrittenNote,
+    /// One of [`REGISTERS`].
+    pub register: String,
+    /// Which impedance peak sounds, 1 for the lowest, 1..=12.
+    pub mode: usize,
+    /// Whether each hole is open, `[hole]` in the order of [`InstrumentFile::holes`].
+    pub open: Vec<bool>,
+    /// What the fingers do, for a reader.
+    pub fingers: String,
+}
+
+/// Why a text is not an instrument. Lengths are given as in the file, in millimetres.
+#[derive(Debug, thiserror::Error)]
+pub enum InstrumentError {
+    /// The file could not be read.
+    #[error("cannot read {}: {error}", path.display())]
+    Read {
+        /// The path asked for.
+        path: PathBuf,
+        /// What the system said.
+        error: std::io::Error,
+    },
+    /// Not TOML, a missing or unknown key, or a value of the wrong kind; line and column are in the message.
+    #[error("not an instrument file: {0}")]
+    Syntax(#[from] toml::de::Error),
+    /// A number out of range.
+    #[error("{place}: {field} is {given}; it must be {expected}")]
+    Value {
+        /// Segment, hole, fingering or `the file`.
+        place: String,
+        /// Key in the file.
+        field: &'static str,
+        /// Value as it stands in the file.
+        given: f64,
+        /// The range, in words, and a guess at a mistaken unit.
+        expected: &'static str,
+    },
+    /// A word that is not one of those allowed, or an empty or spaced name.
+    #[error("{place}: {field} is {given:?}; it must be {expected}")]
+    Word {
+        /// Segment, hole, fingering or `the file`.
+        place: String,
+        /// Key in the file.
+        field: &'static str,
+        /// Text as it stands in the file.
+        given: String,
+        /// What would be right.
+        expected: String,
+    },
+    /// Too many or too few entries of a list.
+    #[error("there are {given} {what} entries; there must be {least} to {most}")]
+    Count {
+        /// Key in the file.
+        what: &'static str,
+        /// Number found.
+        given: usize,
+        /// Fewest allowed.
+        least: usize,
+        /// Most allowed.
+        most: usize,
+    },
+    /// A cone does not start where the one before ends.
+    #[error(
+        "{place}: x_start_mm is {given_mm}, {} the cone before it; it must be {expected_mm}",
+        if given_mm < expected_mm { "overlapping" } else { "leaving a gap after" }
+    )]
+    NotContiguous {
+        /// The cone.
+        place: String,
+        /// Its start, mm.
+        given_mm: f64,
+        /// The end of the one before (0 for the first), mm.
+        expected_mm: f64,
+    },
+    /// A hole outside the bore.
+    #[error("{place}: x_mm is {given_mm}; the bore runs from 0 to {length_mm} and a hole must be inside it")]
+    HoleOffBore {
+        /// The hole.
+        place: String,
+        /// Its position, mm.
+        given_mm: f64,
+        /// Length of the bore, mm.
+        length_mm: f64,
+    },
+    /// A hole wider than the bore it opens.
+    #[error(
+        "{place}: diameter_mm is {given_mm}; the bore there is {bore_mm} wide and a hole must not be wider"
+    )]
+    HoleTooWide {
+        /// The hole.
+        place: String,
+        /// Its diameter, mm.
+        given_mm: f64,
+        /// Diameter of the bore there, mm.
+        bore_mm: f64,
+    },
+    /// Two holes of one name, two fingerings of one note, or one hole twice in a fingering.
+    #[error("{place}: {what} {name} appears twice; each must appear once")]
+    Duplicate {
+        /// The second of them.
+        place: String,
+        /// `hole` or `written`.
+        what: &'static str,
+        /// The repeated name.
+        name: String,
+    },
+}
+
+/// The file as it is written, millimetres and diameters.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawFile {
+    name: String,
+    #[serde(default)]
+    source: String,
+    transposition_semitones: i64,
+    reed_volume_mm3: f64,
+    bore: Vec<RawSegment>,
+    #[serde(default)]
+    hole: Vec<RawHole>,
+    #[serde(default)]
+    fingering: Vec<RawFingering>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawSegment {
+    #[serde(default)]
+    part: String,
+    x_start_mm: f64,
+    x_end_mm: f64,
+    diameter_start_mm: f64,
+    diameter_end_mm: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawHole {
+    name: String,
+    kind: HoleKind,
+    x_mm: f64,
+    diameter_mm: f64,
+    chimney_mm: f64,
+    #[serde(default)]
+    register: bool,
+    #[serde(default)]
+    description: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawFingering {
+    written: String,
+    register: String,
+    mode: u32,
+    open: String,
+    #[serde(default)]
+    fingers: String,
+}
+
+impl InstrumentFile {
+    /// Reads and checks the text of an instrument file. Never panics. Allocates.
+    pub fn parse(text: &str) -> Result<Self, InstrumentError> {
+        let raw: RawFile = toml::from_str(text)?;
+        within("the file", "transposition_semitones", raw.transposition_semitones as f64, &TRANSPOSITION)?;
+        within("the file", "reed_volume_mm3", raw.reed_volume_mm3, &REED_VOLUME)?;
+        if raw.name.trim().is_empty() {
+            return Err(word("the file", "name", &raw.name, "the name of the instrument"));
+        }
+        count("bore", raw.bore.len(), 1, MAX_SEGMENTS)?;
+        count("hole", raw.hole.len(), 0, MAX_HOLES)?;
+        count("fingering", raw.fingering.len(), 1, 128)?;
+        let mut file = Self {
+            name: raw.name,
+            source: raw.source,
+            transposition: raw.transposition_semitones as i8,
+            reed_volume_m3: raw.reed_volume_mm3 / 1e9,
+            bore: segments(raw.bore)?,
+            holes: Vec::new(),
+            fingerings: Vec::new(),
+        };
+        file.holes = file.tone_holes(raw.hole)?;
+        file.fingerings = file.chart(raw.fingering)?;
+        Ok(file)
+    }
+
+    /// Reads and checks a file, see [`parse`](Self::parse).
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, InstrumentError> {
+        let path = path.as_ref();
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| InstrumentError::Read { path: path.to_path_buf(), error })?;
+        Self::parse(&text)
+    }
+
+    /// The text of the built-in B flat clarinet, a template for others.
+    pub fn built_in_text() -> &'static str {
+        include_str!("../../data/b_flat_clarinet.toml")
+    }
+
+    /// The built-in B flat clarinet: 24 holes, written E3 to C#7.
+    pub fn built_in() -> Self {
+        // PANIC: the text is a constant of this program and a test below parses it.
+        Self::parse(Self::built_in_text()).expect("the built-in instrument is valid")
+    }
+
+    /// Length of the bore from reed tip to bell, m.
+    pub fn length_m(&self) -> f64 {
+        self.bore.last().map_or(0.0, |segment| segment.x_end_m)
+    }
+
+    /// Radius of the bore at `x_m` from the reed tip, m. At a step: that of the upstream side. Beyond the ends: that of
+    /// the nearest end. 0 for an instrument without a bore.
+    pub fn radius_at(&self, x_m: f64) -> f64 {
+        let segment = self.bore.iter().find(|segment| x_m <= segment.x_end_m).or(self.bore.last());
+        segment.map_or(0.0, |segment| {
+            let along = (x_m - segment.x_start_m) / (segment.x_end_m - segment.x_start_m);
+            segment.r_start_m + (segment.r_end_m - segment.r_start_m) * along.clamp(0.0, 1.0)
+        })
+    }
+
+    /// How a note is fingered, if the chart has it.
+    pub fn fingering(&self, written: WrittenNote) -> Option<&Fingering> {
+        self.fingerings.iter().find(|fingering| fingering.written == written)
+    }
+
+    /// Index of a hole by name.
+    pub fn hole(&self, name: &str) -> Option<usize> {
+        self.holes.iter().position(|hole| hole.name == name)
+    }
+
+    /// The lowest note of the chart; MIDI note 0 for an instrument made by hand without one.
+    pub fn lowest(&self) -> WrittenNote {
+        self.fingerings.iter().map(|fingering| fingering.written).min().unwrap_or(WrittenNote(0))
+    }
+
+    /// The highest note of the chart; MIDI note 0 for an instrument made by hand without one.
+    pub fn highest(&self) -> WrittenNote {
+        self.fingerings.iter().map(|fingering| fingering.written).max().unwrap_or(WrittenNote(0))
+    }
+
+    fn tone_holes(&self, raw: Vec<RawHole>) -> Result<Vec<ToneHole>, InstrumentError> {
+        let mut holes: Vec<ToneHole> = Vec::with_capacity(raw.len());
+        for (index, hole) in raw.into_iter().enumerate() {
+            let place = format!("hole {} ({})", index + 1, hole.name);
+            if hole.name.is_empty() || hole.name.contains(char::is_whitespace) {
+                return Err(word(&place, "name", &hole.name, "one word, as the fingerings use it"));
+            }
+            if holes.iter().any(|other| other.name == hole.name) {
+                return Err(InstrumentError::Duplicate { place, what: "hole", name: hole.name });
+            }
+            within(&place, "x_mm", hole.x_mm, &POSITION)?;
+            within(&place, "diameter_mm", hole.diameter_mm, &HOLE_DIAMETER)?;
+            within(&place, "chimney_mm", hole.chimney_mm, &CHIMNEY)?;
+            let (x_m, length_m) = (hole.x_mm / 1e3, self.length_m());
+            if !(x_m > CONTACT_M && x_m < length_m - CONTACT_M) {
+                let (given_mm, length_mm) = (hole.x_mm, in_mm(length_m));
+                return Err(InstrumentError::HoleOffBore { place, given_mm, length_mm });
+            }
+            let (radius_m, bore_radius_m) = (hole.diameter_mm / 2e3, self.radius_at(x_m));
+            if radius_m > bore_radius_m {
+                let (given_mm, bore_mm) = (hole.diameter_mm, in_mm(2.0 * bore_radius_m));
+                return Err(InstrumentError::HoleTooWide { place, given_mm, bore_mm });
+            }
+            holes.push(ToneHole {
+                name: hole.name,
+                kind: hole.kind,
+                x_m,
+                radius_m,
+                chimney_m: hole.chimney_mm / 1e3,
+                register: hole.register,
+                description: hole.description,
+            });
+        }
+        holes.sort_by(|a, b| a.x_m.total_cmp(&b.x_m));
+        Ok(holes)
+    }
+
+    fn chart(&self, raw: Vec<RawFingering>) -> Result<Vec<Fingering>, InstrumentError> {
+        let index: HashMap<&str, usize> =
+            self.holes.iter().enumerate().map(|(hole, design)| (design.name.as_str(), hole)).collect();
+        let mut chart: Vec<Fingering> = Vec::with_capacity(raw.len());
+        for (number, fingering) in raw.into_iter().enumerate() {
+            let place = format!("fingering {} ({})", number + 1, fingering.written);
+            let Some(written) = note(&fingering.written) else {
+                let expected = "a note like E3, F#4 or Bb4, from C-1 to G9";
+                return Err(word(&place, "written", &fingering.written, expected));
+            };
+            if written.sounding(self.transposition).is_none() {
+                let expected = "a note that sounds between C-1 and G9 after transposition";
+                return Err(word(&place, "written", &fingering.written, expected));
+            }
+            if chart.iter().any(|other| other.written == written) {
+                return Err(InstrumentError::Duplicate { place, what: "written", name: written.to_string() });
+            }
+            if !REGISTERS.contains(&fingering.register.as_str()) {
+                let expected = format!("one of {}", REGISTERS.join(", "));
+                return Err(word(&place, "register", &fingering.register, &expected));
+            }
+            within(&place, "mode", f64::from(fingering.mode), &MODE)?;
+            let mut open = vec![false; self.holes.len()];
+            for name in fingering.open.split_whitespace() {
+                let Some(&hole) = index.get(name) else {
+                    let known: Vec<&str> = self.holes.iter().map(|hole| hole.name.as_str()).collect();
+                    let expected = format!("names of holes out of: {}", known.join(" "));
+                    return Err(word(&place, "open", name, &expected));
+                };
+                if std::mem::replace(&mut open[hole], true) {
+                    return Err(InstrumentError::Duplicate { place, what: "hole", name: name.to_owned() });
+                }
+            }
+            let mode = fingering.mode as usize;
+            chart.push(Fingering {
+                written,
+                register: fingering.register,
+                mode,
+                open,
+                fingers: fingering.fingers,
+            });
+        }
+        chart.sort_by_key(|fingering| fingering.written);
+        Ok(chart)
+    }
+}
+
+/// A range of the file format: the bounds, the bound in words, and units a wrong size suggests.
+struct Range {
+    least: f64,
+    most: f64,
+    expected: &'static str,
+    /// Below this and above 0 the message is `small` instead: a mistaken unit.
+    small_below: f64,
+    small: &'static str,
+}
+
+const fn range(
+    least: f64,
+    most: f64,
+    expected: &'static str,
+    small_below: f64,
+    small: &'static str,
+) -> Range {
+    Range { least, most, expected, small_below, small }
+}
+
+const TRANSPOSITION: Range = range(-12.0, 36.0, "-12 to 36 semitones (B flat clarinet: 2)", -13.0, "");
+const REED_VOLUME: Range = range(
+    0.0,
+    20_000.0,
+    "0 to 20000 mm3 (clarinet: 1200)",
+    20.0,
+    "in mm3, 0 to 20000 (clarinet: 1200); this looks like cm3 (1 cm3 = 1000 mm3) or m3",
+);
+// 3 m is a little more than a contrabass clarinet.
+const POSITION: Range = range(0.0, 3_000.0, "0 to 3000 mm", 0.0, "");
+const BORE_LENGTH: Range = range(
+    20.0,
+    3_000.0,
+    "20 to 3000 mm for the last cone",
+    20.0,
+    "in mm, 20 to 3000 for the last cone; this looks like metres (1 m = 1000 mm) or centimetres",
+);
+const BORE_DIAMETER: Range = range(
+    1.0,
+    199.999,
+    "1 mm to below 200 mm",
+    0.1,
+    "in mm, 1 to below 200; this looks like metres (0.015 m = 15 mm)",
+);
+const HOLE_DIAMETER: Range =
+    range(0.2, 60.0, "0.2 to 60 mm", 0.1, "in mm, 0.2 to 60; this looks like metres (0.008 m = 8 mm)");
+const CHIMNEY: Range =
+    range(0.2, 100.0, "0.2 to 100 mm", 0.1, "in mm, 0.2 to 100; this looks like metres (0.007 m = 7 mm)");
+const MODE: Range = range(1.0, 12.0, "1 to 12, the number of the impedance peak that sounds", 0.0, "");
+
+fn within(place: &str, field: &'static str, given: f64, range: &Range) -> Result<(), InstrumentError> {
+    let looks_small = given > 0.0 && given < range.small_below;
+    if (range.least..=range.most).contains(&given) && !looks_small {
+        return Ok(());
+    }
+    let expected = if looks_small { range.small } else { range.expected };
+    Err(InstrumentError::Value { place: place.to_owned(), field, given, expected })
+}
+
+fn count(what: &'static str, given: usize, least: usize, most: usize) -> Result<(), InstrumentError> {
+    if (least..=most).contains(&given) {
+        Ok(())
+    } else {
+        Err(InstrumentError::Count { what, given, least, most })
+    }
+}
+
+fn word(place: &str, field: &'static str, given: &str, expected: &str) -> InstrumentError {
+    InstrumentError::Word {
+        place: place.to_owned(),
+        field,
+        given: given.to_owned(),
+        expected: expected.to_owned(),
+    }
+}
+
+/// Metres as a message shows them: millimetres to the nearest 0.1 micrometre.
+fn in_mm(metres: f64) -> f64 {
+    (metres * 1e7).round() / 1e4
+}
+
+fn segments(raw: Vec<RawSegment>) -> Result<Vec<BoreSegment>, InstrumentError> {
+    let places: Vec<String> = raw
+        .iter()
+        .enumerate()
+        .map(|(index, segment)| format!("bore segment {} ({})", index + 1, segment.part))
+        .collect();
+    if let (Some(last), Some(place)) = (raw.last(), places.last()) {
+        within(place, "x_end_mm", last.x_end_mm, &BORE_LENGTH)?;
+    }
+    let mut bore: Vec<BoreSegment> = Vec::with_capacity(raw.len());
+    let mut end_mm = 0.0;
+    for (segment, place) in raw.into_iter().zip(places) {
+        within(&place, "x_start_mm", segment.x_start_mm, &POSITION)?;
+        within(&place, "x_end_mm", segment.x_end_mm, &POSITION)?;
+        within(&place, "diameter_start_mm", segment.diameter_start_mm, &BORE_DIAMETER)?;
+        within(&place, "diameter_end_mm", segment.diameter_end_mm, &BORE_DIAMETER)?;
+        if (segment.x_start_mm - end_mm).abs() > CONTACT_M * 1e3 {
+            let given_mm = segment.x_start_mm;
+            return Err(InstrumentError::NotContiguous { place, given_mm, expected_mm: end_mm });
+        }
+        if segment.x_end_mm - end_mm < 0.01 {
+            let expected = "at least 0.01 mm beyond x_start_mm";
+            return Err(InstrumentError::Value {
+                place,
+                field: "x_end_mm",
+                given: segment.x_end_mm,
+                expected,
+            });
+        }
+        bore.push(BoreSegment {
+            part: segment.part,
+            x_start_m: end_mm / 1e3,
+            x_end_m: segment.x_end_mm / 1e3,
+            r_start_m: segment.diameter_start_mm / 2e3,
+            r_end_m: segment.diameter_end_mm / 2e3,
+        });
+        end_mm = segment.x_end_mm;
+    }
+    Ok(bore)
+}
+
+/// A note by name: letter, `#` or `b`, octave with middle C as C4.
+fn note(name: &str) -> Option<WrittenNote> {
+    let mut rest = name.chars();
+    let letter = match rest.next()? {
+        'C' => 0,
+        'D' => 2,
+        'E' => 4,
+        'F' => 5,
+        'G' => 7,
+        'A' => 9,
+        'B' => 11,
+        _ => return None,
+    };
+    let rest = rest.as_str();
+    let (accidental, octave) = match (rest.strip_prefix('#'), rest.strip_prefix('b')) {
+        (Some(octave), _) => (1, octave),
+        (_, Some(octave)) => (-1, octave),
+        _ => (0, rest),
+    };
+    let octave: i8 = octave.parse().ok().filter(|octave| (-1..=9).contains(octave))?;
+    u8::try_from(12 * (i16::from(octave) + 1) + letter + accidental)
+        .ok()
+        .filter(|&midi| midi < 128)
+        .map(WrittenNote)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn built_in_clarinet_is_a_whole_chart() {
+        let file = InstrumentFile::built_in();
+        assert_eq!((file.bore.len(), file.holes.len(), file.fingerings.len()), (63, 24, 46));
+        assert_eq!((file.lowest().to_string(), file.highest().to_string()), ("E3".into(), "C#7".into()));
+        let modes: Vec<usize> =
+            [52, 70, 71, 84, 85].map(|midi| file.fingering(WrittenNote(midi)).unwrap().mode).into();
+        assert_eq!(modes, [1, 1, 2, 2, 3]);
+        assert_eq!(file.holes.iter().filter(|hole| hole.register).count(), 1);
+        assert_eq!((file.transposition, file.reed_volume_m3), (2, 1.2e-6));
+        assert!(file.fingering(WrittenNote(51)).is_none());
+    }
+
+    #[test]
+    fn radius_at_a_step_is_that_of_the_upstream_side() {
+        let file = InstrumentFile::built_in();
+        assert!((file.radius_at(0.118_687) - 0.007_505_1).abs() < 1e-12);
+        assert!((file.radius_at(0.118_687 + 1e-9) - 0.007_605_1).abs() < 1e-9);
+        assert_eq!((file.radius_at(-1.0), file.radius_at(9.0)), (0.0052, 0.0295));
+    }
+
+    #[test]
+    fn notes_are_read_as_players_write_them() {
+        let midi = |name| note(name).map(|note| note.0);
+        assert_eq!(
+            [midi("E3"), midi("Bb4"), midi("A#4"), midi("C-1"), midi("G9")],
+            [52, 70, 70, 0, 127].map(Some)
+        );
+        assert!(
+            ["", "H3", "e3", "G#9", "Cb-1", "C", "C##4", "C400", "Cé"].map(midi).iter().all(Option::is_none)
+        );
+    }
+
+    /// Each fault, planted in the built-in file, is refused with its place and a remedy.
+    #[test]
+    fn messages_say_where_what_and_how() {
+        let cases = [
+            ("name = \"B", "nome = \"B", "line 14"),
+            (
+                "reed_volume_mm3 = 1200.0",
+                "reed_volume_mm3 = 1.2",
+                "the file: reed_volume_mm3 is 1.2; it must be in mm3, 0 to 20000 (clarinet: 1200); this looks like cm3",
+            ),
+            ("transposition_semitones = 2", "transposition_semitones = 200", "-12 to 36 semitones"),
+            (
+                "x_start_mm = 39.787",
+                "x_start_mm = 40",
+                "bore segment 2 (mouthpiece): x_start_mm is 40, leaving a gap after the cone before it; it must be 39.787",
+            ),
+            ("x_start_mm = 39.787", "x_start_mm = 39", "overlapping the cone before it; it must be 39.787"),
+            (
+                "diameter_start_mm = 13.8,",
+                "diameter_start_mm = 0.0138,",
+                "bore segment 2 (mouthpiece): diameter_start_mm is 0.0138; it must be in mm, 1 to below 200; this looks like metres",
+            ),
+            ("diameter_start_mm = 13.8,", "diameter_start_mm = nan,", "diameter_start_mm is NaN"),
+            ("x_end_mm = 667.587", "x_end_mm = 0.667", "looks like metres"),
+            (
+                "x_mm = 155.787",
+                "x_mm = 855.787",
+                "hole 1 (REG): x_mm is 855.787; the bore runs from 0 to 667.587",
+            ),
+            (
+                "diameter_mm = 3.167",
+                "diameter_mm = 31.67",
+                "hole 1 (REG): diameter_mm is 31.67; the bore there is 14.9366 wide",
+            ),
+            ("chimney_mm = 12.6", "chimney_mm = 0.0126", "this looks like metres (0.007 m = 7 mm)"),
+            ("name = \"TRILL4_B\"", "name = \"REG\"", "hole 2 (REG): hole REG appears twice"),
+            (
+                "open = \"E_PAD\"",
+                "open = \"E_PAT\"",
+                "fingering 2 (F3): open is \"E_PAT\"; it must be names of holes out of: REG TRILL4_B",
+            ),
+            ("open = \"E_PAD\"", "open = \"E_PAD E_PAD\"", "fingering 2 (F3): hole E_PAD appears twice"),
+            ("written = \"F3\"", "written = \"E3\"", "fingering 2 (E3): written E3 appears twice"),
+            ("written = \"F3\"", "written = \"H3\"", "a note like E3"),
+            (
+                "register = \"chalumeau\"",
+                "register = \"low\"",
+                "one of chalumeau, throat, clarion, altissimo",
+            ),
+            ("mode = 1", "mode = 0", "fingering 1 (E3): mode is 0; it must be 1 to 12"),
+        ];
+        for (from, to, expected) in cases {
+            let text = InstrumentFile::built_in_text().replacen(from, to, 1);
+            assert_ne!(text, InstrumentFile::built_in_text(), "{from} is not in the file");
+            let message = InstrumentFile::parse(&text).unwrap_err().to_string();
+            assert!(message.contains(expected), "{from} -> {to}: {message}");
+        }
+        assert!(InstrumentFile::load("no/such/file").unwrap_err().to_string().contains("no/such/file"));
+    }
+
+    #[test]
+    fn holes_and_fingerings_may_come_in_any_order() {
+        let text = "name='tube'\ntransposition_semitones=0\nreed_volume_mm3=0\n\
+            bore=[{x_start_mm=0,x_end_mm=500,diameter_start_mm=15,diameter_end_mm=15}]\n\
+            hole=[{name='b',kind='finger',x_mm=400,diameter_mm=8,chimney_mm=7},{name='a',kind='pad-open',x_mm=300,diameter_mm=8,chimney_mm=7}]\n\
+            fingering=[{written='G4',register='throat',mode=1,open='b'},{written='C4',register='throat',mode=1,open=''}]\n";
+        let file = InstrumentFile::parse(text).unwrap();
+        assert_eq!((file.hole("a"), file.hole("b")), (Some(0), Some(1)));
+        assert_eq!(file.fingering(WrittenNote(67)).unwrap().open, [false, true]);
+        assert_eq!(file.lowest(), WrittenNote(60));
+    }
+}
