@@ -16,7 +16,10 @@ use chalumeau::units::WrittenNote;
 const BLOCK: usize = 64;
 
 /// CPU time of this thread so far, ns; `None` where the kernel does not tell.
+///
+/// The kernel brings the figure up to date at its own ticks, or when the thread leaves the processor: hence the nap.
 fn thread_cpu_ns() -> Option<f64> {
+    std::thread::sleep(std::time::Duration::from_micros(100));
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     text.split_whitespace().next()?.parse().ok()
 }

@@ -1,0 +1,365 @@
+//! The fundamental of a tone, found without a hint and refined to a small part of a cent.
+//!
+//! Finding: the autocorrelation of a Hann-windowed slice over that of its window (P. Boersma, Accurate short-term analysis
+//! of the fundamental frequency, IFA Proceedings 17, 1993), interpolated to a quarter sample; the shortest lag whose peak
+//! is about as high as the highest wins. Refining: each of eight harmonics is watched through short Blackman-Harris
+//! windows; its phase against the expected one, unwrapped, is fitted by a line, all harmonics together and weighted by
+//! their power. Vibrato and drift give the mean. Hz and seconds; 50..2500 Hz.
+
+use crate::analysis::{BLACKMAN_HARRIS, cosine_window, parabola, rms, transform, without_mean};
+use num_complex::Complex64;
+use realfft::RealFftPlanner;
+use std::f64::consts::PI;
+
+/// Lowest fundamental looked for, Hz.
+pub const LOWEST_HZ: f64 = 50.0;
+/// Highest fundamental looked for, Hz.
+pub const HIGHEST_HZ: f64 = 2500.0;
+
+/// Below this peak of the autocorrelation there is no pitch; the counterpart of 0.3 in YIN's difference function.
+const VOICED: f64 = 0.7;
+/// How much of the missing periodicity a shorter lag may add before it counts as worse: noise lowers all peaks alike.
+const WORSE_RATIO: f64 = 1.2;
+/// Missing periodicity forgiven in any case. A third harmonic 20 dB above the fundamental would leave 0.015 at a third
+/// of the period.
+const WORSE_BY: f64 = 0.008;
+/// Steps of the interpolated autocorrelation per sample.
+const FINE: usize = 4;
+/// Harmonics watched while refining.
+const HARMONICS: usize = 8;
+/// Length of the refining windows, periods: neighbouring harmonics lie far outside the main lobe of 4 bins.
+const WINDOW_PERIODS: f64 = 16.0;
+/// A weaker harmonic than this, relative to the strongest, has no say, power ratio (-40 dB).
+const HEARD: f64 = 1e-4;
+/// Quieter than this is silence, rms.
+const SILENCE: f64 = 1e-12;
+
+/// One moment of a [`pitch_track`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackPoint {
+    /// Centre of the window, s.
+    pub t_s: f64,
+    /// Fundamental, Hz; `None` where there is none.
+    pub hz: Option<f64>,
+    /// Root mean square over the window, mean included.
+    pub rms: f64,
+}
+
+/// Fundamental of a steady tone, 50..2500 Hz, or `None` if the slice has no period.
+///
+/// Found in the last second, refined over the whole slice: on steady tones of 0.3 s and more within 0.1 cent. Slices
+/// under 10 periods are not refined (some cents).
+pub fn fundamental_hz(samples: &[f64], rate_hz: f64) -> Option<f64> {
+    let tail = &samples[samples.len().saturating_sub(rate_hz as usize)..];
+    let coarse = coarse_hz(&mut RealFftPlanner::new(), tail, rate_hz)?;
+    Some(refine_hz(samples, rate_hz, coarse).unwrap_or(coarse))
+}
+
+/// Fundamental of a tone known to lie within 50 cents of `near_hz`, or `None` if nothing is there or the slice is
+/// shorter than 10 periods.
+pub fn refine_hz(samples: &[f64], rate_hz: f64, near_hz: f64) -> Option<f64> {
+    if rms(samples) < SILENCE {
+        return None;
+    }
+    let samples = without_mean(samples);
+    let mut hz = near_hz;
+    for _ in 0..6 {
+        let step = correction_hz(&samples, rate_hz, hz)?;
+        hz += step;
+        if !(0.97..=1.03).contains(&(hz / near_hz)) {
+            return None;
+        }
+        if step.abs() < 1e-7 * hz {
+            break;
+        }
+    }
+    Some(hz)
+}
+
+/// Normalised autocorrelation at the period of `f0_hz`: 1 for a perfectly periodic tone, 0 for noise, and 0 for a slice
+/// of less than two periods.
+///
+/// The shifted copy is interpolated by a 64-point windowed sinc, good to 1e-6 below 0.4 of the rate.
+pub fn periodicity(samples: &[f64], rate_hz: f64, f0_hz: f64) -> f64 {
+    const HALF: usize = 32;
+    let period = rate_hz / f0_hz;
+    let (whole, part) = (period.floor() as usize, period.fract());
+    if samples.len() < 2 * whole + 2 * HALF {
+        return 0.0;
+    }
+    let samples = without_mean(samples);
+    // Taps stand at whole + 1 - HALF ..= whole + HALF after the sample compared.
+    let window: Vec<f64> = cosine_window(2 * HALF * 64, &BLACKMAN_HARRIS).collect();
+    let taps: Vec<f64> = (0..2 * HALF)
+        .map(|tap| {
+            let x = tap as f64 + 1.0 - HALF as f64 - part;
+            let sinc = if x.abs() < 1e-12 { 1.0 } else { (PI * x).sin() / (PI * x) };
+            let place = ((x + HALF as f64) * 64.0) as usize;
+            sinc * window[place.min(window.len() - 1)]
+        })
+        .collect();
+    let first = (HALF - 1).saturating_sub(whole);
+    let last = samples.len() - whole - HALF;
+    let (mut both, mut here, mut there) = (0.0, 0.0, 0.0);
+    for n in first..last {
+        let at = n + whole + 1 - HALF;
+        let shifted: f64 = samples[at..at + 2 * HALF].iter().zip(&taps).map(|(x, tap)| x * tap).sum();
+        both += samples[n] * shifted;
+        here += samples[n] * samples[n];
+        there += shifted * shifted;
+    }
+    if here * there > 0.0 { both / (here * there).sqrt() } else { 0.0 }
+}
+
+/// Pitch and level every `hop_s` through windows of 60 ms (three periods of the lowest note), for plots: some cents.
+pub fn pitch_track(samples: &[f64], rate_hz: f64, hop_s: f64) -> Vec<TrackPoint> {
+    let window = (0.06 * rate_hz).round() as usize;
+    let mut planner = RealFftPlanner::new();
+    let hop = (hop_s * rate_hz).max(1.0);
+    (0..)
+        .map(|frame| (f64::from(frame) * hop).round() as usize)
+        .take_while(|start| start + window <= samples.len())
+        .map(|start| {
+            let frame = &samples[start..start + window];
+            TrackPoint {
+                t_s: (start as f64 + 0.5 * window as f64) / rate_hz,
+                hz: coarse_hz(&mut planner, frame, rate_hz),
+                rms: rms(frame),
+            }
+        })
+        .collect()
+}
+
+/// The shortest of the good periods by autocorrelation.
+fn coarse_hz(planner: &mut RealFftPlanner<f64>, samples: &[f64], rate_hz: f64) -> Option<f64> {
+    let len = samples.len();
+    let longest = ((rate_hz / LOWEST_HZ * 1.02) as usize).min(len / 3);
+    let shortest = (rate_hz / HIGHEST_HZ * 0.98) as usize;
+    if longest <= shortest + 2 || rms(samples) < SILENCE {
+        return None;
+    }
+    let centred = without_mean(samples);
+    let windowed: Vec<f64> =
+        centred.iter().zip(cosine_window(len, &[0.5, 0.5])).map(|(x, window)| x * window).collect();
+    let size = (len + longest + 8).next_power_of_two();
+    let mut power: Vec<Complex64> =
+        transform(planner, &windowed, size).iter().map(|x| Complex64::from(x.norm_sqr())).collect();
+    power.resize(FINE * size / 2 + 1, Complex64::default());
+    let plan = planner.plan_fft_inverse(FINE * size);
+    let mut correlation = plan.make_output_vec();
+    // PANIC: lengths are the plan's own, and the power spectrum is real at zero and at half the rate.
+    plan.process(&mut power, &mut correlation).unwrap();
+    if correlation[0] <= 0.0 {
+        return None;
+    }
+    let normalised = |step: usize| {
+        let lag = step as f64 / (FINE * len) as f64;
+        let turn = 2.0 * PI * lag;
+        let window = (1.0 - lag) * (2.0 / 3.0 + turn.cos() / 3.0) + turn.sin() / (2.0 * PI);
+        correlation[step] / correlation[0] / window
+    };
+    let peaks: Vec<(f64, f64)> = (FINE * shortest..=FINE * longest)
+        .filter_map(|step| {
+            let (left, middle, right) = (normalised(step - 1), normalised(step), normalised(step + 1));
+            let (offset, height) = parabola(left, middle, right)?;
+            Some(((step as f64 + offset) / FINE as f64, height))
+        })
+        .collect();
+    let best = peaks.iter().fold(0.0, |best: f64, &(_, height)| best.max(height));
+    if best < VOICED {
+        return None;
+    }
+    let enough = 1.0 - (WORSE_RATIO * (1.0 - best).max(0.0) + WORSE_BY);
+    let (lag, _) = peaks.into_iter().find(|&(_, height)| height >= enough)?;
+    Some(rate_hz / lag)
+}
+
+/// What to add to `hz`: slope of the phases of its harmonics, by weighted least squares.
+fn correction_hz(samples: &[f64], rate_hz: f64, hz: f64) -> Option<f64> {
+    let period = rate_hz / hz;
+    let len = samples.len();
+    let window_len = (WINDOW_PERIODS * period).min(len as f64 * 2.0 / 3.0) as usize;
+    if (len as f64) < 10.0 * period || period < 2.0 {
+        return None;
+    }
+    let frames = (((len - window_len) as f64 / (2.0 * period)) as usize + 1).max(4);
+    let starts: Vec<usize> = (0..frames).map(|frame| frame * (len - window_len) / (frames - 1)).collect();
+    let window: Vec<f64> = cosine_window(window_len, &BLACKMAN_HARRIS).collect();
+    let harmonics = HARMONICS.min((0.45 * period) as usize);
+    let mut seen = vec![Vec::with_capacity(frames); harmonics];
+    let mut windowed = vec![0.0; window_len];
+    for &start in &starts {
+        for ((to, x), w) in windowed.iter_mut().zip(&samples[start..]).zip(&window) {
+            *to = x * w;
+        }
+        for (seen, harmonic) in seen.iter_mut().zip(1..) {
+            let step = -2.0 * PI * f64::from(harmonic) * hz / rate_hz;
+            let mut sum = Complex64::default();
+            let (mut turn, turn_step) =
+                (Complex64::cis((step * start as f64) % (2.0 * PI)), Complex64::cis(step));
+            for x in &windowed {
+                sum += turn * x;
+                turn *= turn_step;
+            }
+            seen.push(sum);
+        }
+    }
+    let power = |seen: &[Complex64]| seen.iter().map(Complex64::norm_sqr).sum::<f64>();
+    let strongest = seen.iter().map(|seen| power(seen)).fold(0.0, f64::max);
+    if strongest <= 0.0 {
+        return None;
+    }
+    let (mut numerator, mut denominator) = (0.0, 0.0);
+    for (seen, harmonic) in seen.iter().zip(1..).filter(|(seen, _)| power(seen) >= HEARD * strongest) {
+        let mut phase = seen[0].arg();
+        let phases: Vec<f64> = (seen.iter())
+            .map(|x| {
+                let turn = x.arg() - phase;
+                phase += turn - 2.0 * PI * (turn / (2.0 * PI)).round();
+                phase
+            })
+            .collect();
+        let total = power(seen);
+        let mean = |of: &dyn Fn(usize) -> f64| {
+            seen.iter().enumerate().map(|(k, x)| x.norm_sqr() * of(k)).sum::<f64>() / total
+        };
+        let (t_mean, phase_mean) = (mean(&|k| starts[k] as f64), mean(&|k| phases[k]));
+        let harmonic = f64::from(harmonic);
+        for (k, x) in seen.iter().enumerate() {
+            let t = starts[k] as f64 - t_mean;
+            numerator += harmonic * x.norm_sqr() * t * (phases[k] - phase_mean);
+            denominator += harmonic * harmonic * x.norm_sqr() * t * t;
+        }
+    }
+    (denominator > 0.0).then(|| numerator / denominator * rate_hz / (2.0 * PI))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::synthetic::{CLARINET_DB, glide, mix, noise, tone};
+    use crate::units::cents;
+
+    /// Detuned notes from the lowest E to the top of the altissimo, 0.3 s, three rates.
+    #[test]
+    fn clarinet_tones_are_found_within_a_hundredth_of_a_cent() {
+        for rate_hz in [44_100.0, 48_000.0, 96_000.0] {
+            for f0_hz in [52.3, 146.832, 147.9, 233.08, 349.7, 466.16, 701.3, 1174.66, 1661.2, 2451.0] {
+                let count = ((0.45 * rate_hz / f0_hz) as usize).min(12);
+                let samples = tone(f0_hz, rate_hz, 0.3, &CLARINET_DB[..count]);
+                let heard_hz = fundamental_hz(&samples, rate_hz).unwrap();
+                let error = cents(heard_hz, f0_hz);
+                assert!(error.abs() < 0.01, "{f0_hz} Hz at {rate_hz}: {error} cents");
+            }
+        }
+    }
+
+    #[test]
+    fn noise_at_minus_60_db_costs_less_than_a_twentieth_of_a_cent() {
+        for f0_hz in [147.0, 440.0, 1500.0] {
+            let clean = tone(f0_hz, 44_100.0, 0.3, &CLARINET_DB);
+            let noisy = mix(&clean, &noise(1e-3 * rms(&clean), clean.len()));
+            let error = cents(fundamental_hz(&noisy, 44_100.0).unwrap(), f0_hz);
+            assert!(error.abs() < 0.05, "{f0_hz}: {error} cents");
+        }
+    }
+
+    #[test]
+    fn octave_survives_a_weak_fundamental_and_noise() {
+        for fundamental_db in [0.0, -10.0, -16.0, -20.0] {
+            for noise_db in [-60.0, -30.0, -15.0] {
+                for f0_hz in [147.3, 311.0, 622.0, 1318.0] {
+                    let mut levels_db = CLARINET_DB;
+                    levels_db[0] = fundamental_db;
+                    let clean = tone(f0_hz, 44_100.0, 0.5, &levels_db);
+                    let level = rms(&clean) * 10f64.powf(noise_db / 20.0);
+                    let noisy = mix(&clean, &noise(level, clean.len()));
+                    let heard_hz = fundamental_hz(&noisy, 44_100.0).unwrap();
+                    assert!(
+                        cents(heard_hz, f0_hz).abs() < 3.0,
+                        "{f0_hz} at {fundamental_db} dB, noise {noise_db} dB: {heard_hz}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn sine_is_its_own_fundamental() {
+        for f0_hz in [55.0, 150.0, 987.65, 2489.0] {
+            let heard_hz = fundamental_hz(&tone(f0_hz, 48_000.0, 0.5, &[-20.0]), 48_000.0).unwrap();
+            assert!(cents(heard_hz, f0_hz).abs() < 0.01, "{f0_hz}: {heard_hz}");
+        }
+    }
+
+    /// 5 Hz, +-20 cents, two seconds: ten whole cycles, so the mean is the centre.
+    #[test]
+    fn vibrato_gives_its_centre() {
+        let deviation_hz = 440.0 * (20.0 / 1200.0 * 2f64.ln());
+        let cycles = |t: f64| 440.0 * t - deviation_hz / (10.0 * PI) * ((10.0 * PI * t).cos() - 1.0);
+        let samples = glide(cycles, 44_100.0, 2.0, &CLARINET_DB);
+        let error = cents(fundamental_hz(&samples, 44_100.0).unwrap(), 440.0);
+        assert!(error.abs() < 1.5, "{error} cents");
+        let track = pitch_track(&samples, 44_100.0, 0.01);
+        let highest = track.iter().filter_map(|point| point.hz).fold(0.0, f64::max);
+        let swing = cents(highest, 440.0);
+        assert!((15.0..22.0).contains(&swing), "{swing} cents");
+    }
+
+    #[test]
+    fn neither_noise_nor_silence_has_a_pitch() {
+        assert_eq!(fundamental_hz(&noise(0.1, 44_100), 44_100.0), None);
+        assert_eq!(fundamental_hz(&vec![0.0; 44_100], 44_100.0), None);
+        assert_eq!(fundamental_hz(&vec![0.5; 44_100], 44_100.0), None);
+        assert_eq!(fundamental_hz(&[], 44_100.0), None);
+    }
+
+    #[test]
+    fn refinement_recovers_from_a_third_of_a_semitone() {
+        for f0_hz in [147.0, 700.0] {
+            let samples = tone(f0_hz, 48_000.0, 0.3, &CLARINET_DB);
+            for off_cents in [-33.0, -5.0, 5.0, 33.0] {
+                let near_hz = f0_hz * (off_cents / 1200.0 * 2f64.ln()).exp();
+                let error = cents(refine_hz(&samples, 48_000.0, near_hz).unwrap(), f0_hz);
+                assert!(error.abs() < 0.01, "{f0_hz}, off by {off_cents}: {error} cents");
+            }
+        }
+    }
+
+    #[test]
+    fn periodicity_is_one_less_the_share_of_noise() {
+        for f0_hz in [147.3, 1234.5] {
+            let clean = tone(f0_hz, 48_000.0, 0.5, &CLARINET_DB);
+            let lost = 1.0 - periodicity(&clean, 48_000.0, f0_hz);
+            assert!(lost.abs() < 1e-6, "{f0_hz}: {lost}");
+            let noisy = mix(&clean, &noise(0.1 * rms(&clean), clean.len()));
+            let lost = 1.0 - periodicity(&noisy, 48_000.0, f0_hz);
+            assert!((0.007..0.013).contains(&lost), "{f0_hz}: {lost}");
+            assert!(periodicity(&clean, 48_000.0, 1.37 * f0_hz) < 0.8);
+        }
+        assert!(periodicity(&noise(1.0, 48_000), 48_000.0, 200.0).abs() < 0.05);
+    }
+
+    #[test]
+    fn track_sees_the_note_begin_and_change() {
+        let mut samples = vec![0.0; 9600];
+        samples.extend(tone(196.0, 48_000.0, 0.5, &CLARINET_DB));
+        samples.extend(tone(294.0, 48_000.0, 0.5, &CLARINET_DB));
+        let track = pitch_track(&samples, 48_000.0, 0.01);
+        for point in &track {
+            let expected_hz = match point.t_s {
+                t if t < 0.16 => None,
+                t if (0.24..0.66).contains(&t) => Some(196.0),
+                t if t > 0.74 => Some(294.0),
+                _ => continue,
+            };
+            match (point.hz, expected_hz) {
+                (Some(hz), Some(expected_hz)) => {
+                    assert!(cents(hz, expected_hz).abs() < 5.0, "{point:?}");
+                    assert!(point.rms > 0.1);
+                }
+                (hz, expected_hz) => assert_eq!(hz, expected_hz, "{point:?}"),
+            }
+        }
+    }
+}
