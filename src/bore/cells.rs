@@ -16,7 +16,7 @@ const TOP: (usize, f64) = (7, 0.1);
 const BELL: (usize, f64) = (9, 0.6);
 
 /// One cylinder.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Cell {
     /// One-way delay, half samples, at least 1 (2 beside a step).
     pub ticks: u32,
@@ -25,7 +25,7 @@ pub struct Cell {
 }
 
 /// A bore as the lattice wants it, at one rate.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Cells {
     /// Sample rate, Hz.
     pub rate_hz: f64,
