@@ -1,6 +1,9 @@
 //! Chalumeau: a clarinet you play by touch.
 
 pub mod analysis;
+pub mod bore;
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod control;
 pub mod dsp;
 pub mod bore;

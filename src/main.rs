@@ -1,3 +1,7 @@
 //! The command line of Chalumeau.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    chalumeau::cli::main()
+}

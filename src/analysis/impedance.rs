@@ -62,7 +62,7 @@ impl Impedance {
 
     /// `Z(f) / Zc`, exact at any frequency from 0 to half the rate.
     pub fn at(&self, f_hz: f64) -> Complex64 {
-        self.from_reflectance(reflectance(&self.response, self.rate_hz, f_hz))
+        self.behind(reflectance(&self.response, self.rate_hz, f_hz))
     }
 
     /// Spacing of [`grid`](Self::grid), Hz.
@@ -72,14 +72,14 @@ impl Impedance {
 
     /// `Z / Zc` at 0, `bin_hz`, 2 `bin_hz` .. half the rate, for plots.
     pub fn grid(&self) -> impl Iterator<Item = Complex64> {
-        self.bins.iter().map(|&r| self.from_reflectance(r))
+        self.bins.iter().map(|&r| self.behind(r))
     }
 
     /// First `count` maxima of |Z| from 60 Hz to 6 kHz, lowest first, each placed exactly.
     pub fn peaks(&self, count: usize) -> Vec<Peak> {
         let first = (SEARCH_HZ.0 / self.bin_hz).ceil() as usize;
         let last = ((SEARCH_HZ.1 / self.bin_hz) as usize).min(self.bins.len().saturating_sub(2));
-        let size = |bin: usize| self.from_reflectance(self.bins[bin]).norm_sqr();
+        let size = |bin: usize| self.behind(self.bins[bin]).norm_sqr();
         (first.max(1)..=last)
             .filter(|&bin| size(bin - 1) < size(bin) && size(bin) >= size(bin + 1))
             .take(count)
@@ -102,7 +102,7 @@ impl Impedance {
         2.0 * slope / (1.0 - r * r)
     }
 
-    fn from_reflectance(&self, r: Complex64) -> Complex64 {
+    fn behind(&self, r: Complex64) -> Complex64 {
         (1.0 + r) / (1.0 - r) / self.y_tip
     }
 }

@@ -663,6 +663,13 @@ mod tests {
     }
 
     #[test]
+    fn the_example_of_the_manual_is_an_instrument() {
+        let manual = include_str!("../../docs/instrument-file.md");
+        let example = manual.split("```toml").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+        assert_eq!(InstrumentFile::parse(example).unwrap().lowest().to_string(), "F#3");
+    }
+
+    #[test]
     fn holes_and_fingerings_may_come_in_any_order() {
         let text = "name='tube'\ntransposition_semitones=0\nreed_volume_mm3=0\n\
             bore=[{x_start_mm=0,x_end_mm=500,diameter_start_mm=15,diameter_end_mm=15}]\n\

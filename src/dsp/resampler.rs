@@ -43,8 +43,8 @@ const PARTS_PER_HZ: f64 = 1000.0;
 /// Pull-model sample-rate converter, one channel. See the module's head for its figures.
 ///
 /// The host asks for samples; [`inputs_needed`](Self::inputs_needed) says how many of the instrument's samples that
-/// takes, and [`process`](Self::process) turns exactly those into exactly the ones asked for. Output does not depend on how the
-/// calls are cut. Equal rates pass through untouched, without latency.
+/// takes, and [`process`](Self::process) turns exactly those into exactly the ones asked for. Output does not depend
+/// on how the calls are cut. Equal rates pass through untouched, without latency.
 #[derive(Clone, Debug)]
 pub struct Resampler {
     /// `out / in = l / m` in lowest terms.
@@ -69,7 +69,8 @@ impl Resampler {
     /// Converter from `in_hz` to `out_hz`, each held to 1000..=1 000 000 Hz and rounded to a thousandth of a hertz.
     /// Allocates.
     pub fn new(in_hz: f64, out_hz: f64) -> Self {
-        let parts = |hz: f64| (hz.max(1e3).min(1e6) * PARTS_PER_HZ).round() as u64;
+        // The cast turns NaN into 0, the last step that into the lowest rate.
+        let parts = |hz: f64| ((hz.clamp(1e3, 1e6) * PARTS_PER_HZ).round() as u64).max(1_000_000);
         let (input, output) = (parts(in_hz), parts(out_hz));
         let common = gcd(input, output);
         let (l, m) = (output / common, input / common);
@@ -132,7 +133,7 @@ impl Resampler {
 
     /// Most input samples any `outputs` output samples can consume: the size of the caller's buffer.
     pub fn inputs_needed_at_most(&self, outputs: usize) -> usize {
-        ((self.l - 1 + outputs as u64 * self.m) / self.l) as usize
+        (outputs as u64 * self.m).div_ceil(self.l) as usize
     }
 
     /// Fills `out` from `input`, of which there must be [`inputs_needed`](Self::inputs_needed)`(out.len())`; missing
@@ -406,6 +407,17 @@ mod tests {
                 assert!(shared > 8000);
                 assert_eq!(parts[..shared], whole[..shared], "{in_hz} -> {out_hz}, blocks of {}", cut[0]);
             }
+        }
+    }
+
+    #[test]
+    fn nonsense_rates_are_held_to_the_range() {
+        for (in_hz, out_hz) in [(f64::NAN, 48e3), (96e3, f64::INFINITY), (0.0, -1.0)] {
+            let mut resampler = Resampler::new(in_hz, out_hz);
+            let input = vec![0.5; resampler.inputs_needed(100)];
+            let mut out = vec![0.0; 100];
+            resampler.process(&input, &mut out);
+            assert!(out.iter().all(|y| y.is_finite()));
         }
     }
 

@@ -1,0 +1,104 @@
+//! The command line: arguments in, files and tables out. Measures and plays nothing itself.
+//!
+//! Each subcommand is one file. Tables go to standard output or a file as CSV: the header first, then lines beginning
+//! with `#` that say what was measured, then data. A mistake of the user ends with exit code 2, a message that says what
+//! was given and what would be right, and no file; a reader that closes the pipe early is no mistake.
+
+mod args;
+mod impedance;
+mod reed;
+mod render;
+mod settings;
+mod table;
+mod threshold;
+
+use crate::bore::instrument_file::InstrumentError;
+use crate::reed::law::ReedError;
+use crate::render::breath::BreathError;
+use crate::render::midi_file::MidiFileError;
+use crate::render::output::OutputError;
+use crate::render::score::ScoreError;
+use crate::render::wav::WavError;
+use clap::{Parser, Subcommand};
+use std::io;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+const EXAMPLES: &str = "\
+Examples:
+  chalumeau render examples/melody.mid --out melody.wav
+  chalumeau render --written C4 --gamma 0.5 --seconds 1.5 --out c4.wav
+  chalumeau impedance --all --peaks 8 --csv peaks.csv
+  chalumeau threshold --all --zeta 0.3
+
+Notes are MIDI numbers (60) or names (C4, F#5, Bb3). The player of a B flat clarinet reads
+*written* notes, which sound two semitones lower. Mouth pressure is given as gamma: the pressure
+in the mouth over the pressure that shuts the reed. Below about 1/3 nothing sounds; near 0.5 the
+reed begins to beat against the lay; at 1 it is held shut and the note chokes.";
+
+/// A clarinet you play by touch: reed, bore with real tone holes, sound.
+#[derive(Parser)]
+#[command(name = "chalumeau", version, after_help = EXAMPLES, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Render(Box<render::Render>),
+    Impedance(impedance::Impedance),
+    Threshold(threshold::Threshold),
+    Reed(reed::Reed),
+}
+
+/// Why a command ended early.
+#[derive(Debug, thiserror::Error)]
+enum Failure {
+    #[error("cannot read {}: {source}", path.display())]
+    Read { path: PathBuf, source: io::Error },
+    #[error("{}: {source}", path.display())]
+    MidiFile { path: PathBuf, source: MidiFileError },
+    #[error("{}: {source}", path.display())]
+    BreathFile { path: PathBuf, source: BreathError },
+    #[error("{}: {source}", path.display())]
+    InstrumentFile { path: PathBuf, source: InstrumentError },
+    #[error(transparent)]
+    Breath(#[from] BreathError),
+    #[error(transparent)]
+    Score(#[from] ScoreError),
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    #[error(transparent)]
+    Wav(#[from] WavError),
+    #[error(transparent)]
+    Reed(#[from] ReedError),
+    #[error("cannot write the table: {0}")]
+    Table(#[from] io::Error),
+    #[error("{0}")]
+    Usage(String),
+}
+
+impl Failure {
+    /// `chalumeau reed --table | head` has done what it should.
+    fn is_closed_pipe(&self) -> bool {
+        matches!(self, Self::Table(e) if e.kind() == io::ErrorKind::BrokenPipe)
+    }
+}
+
+/// Reads the arguments and does what they say.
+pub fn main() -> ExitCode {
+    let done = match Cli::parse().command {
+        Command::Render(command) => command.run(),
+        Command::Impedance(command) => command.run(),
+        Command::Threshold(command) => command.run(),
+        Command::Reed(command) => command.run(),
+    };
+    match done {
+        Err(failure) if !failure.is_closed_pipe() => {
+            eprintln!("error: {failure}");
+            ExitCode::from(2)
+        }
+        _ => ExitCode::SUCCESS,
+    }
+}

@@ -1,0 +1,117 @@
+//! `chalumeau impedance`: what the bore answers to the reed, curve or peaks.
+
+use crate::bore::transfer_matrix::TransferMatrix;
+use crate::cli::Failure;
+use crate::cli::args::{AirArg, InstrumentArg, NotesArg, within};
+use crate::cli::table::TableArgs;
+use clap::Args;
+use clap::ValueEnum;
+
+/// Longest curve, points.
+const POINTS_MAX: f64 = 1e6;
+
+const EXAMPLES: &str = "\
+Examples:
+  chalumeau impedance --written F4 --csv f4.csv          the curve, 20 Hz to 4 kHz
+  chalumeau impedance --all --peaks 8                    eight resonances of every fingering
+  chalumeau impedance --written 52 --from 100 --to 200 --step 0.1 --reed-volume";
+
+/// Where the answer comes from.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Model {
+    /// Transfer matrices with exact wall losses: the reference
+    Tmm,
+}
+
+/// Input impedance of a fingering at the reed: a curve, or its peaks
+///
+/// Values are over Zc = rho c / S of a 7.45 mm bore. A clarinet sounds near a peak of its impedance; the register key
+/// spoils the first one so that the second sounds, a twelfth higher. The reed itself adds a little volume that lowers the
+/// peaks; it is left out unless --reed-volume is given.
+///
+/// Columns: f_hz,re_z_over_zc,im_z_over_zc, or with --peaks written_midi,n,f_hz,mag_over_zc,q.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Impedance {
+    #[command(flatten)]
+    notes: NotesArg,
+    /// Table of the first N peaks instead of the curve, 1..30
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=30))]
+    peaks: Option<u8>,
+    /// Where the answer comes from
+    #[arg(long, value_enum, default_value_t = Model::Tmm)]
+    model: Model,
+    /// Put the reed's equivalent volume in parallel, as when the clarinet is played
+    #[arg(long)]
+    reed_volume: bool,
+    /// First frequency of the curve, Hz
+    #[arg(long, value_name = "HZ", default_value = "20", value_parser = |s: &str| within(s, 1.0, 20_000.0))]
+    from: f64,
+    /// Last frequency of the curve, Hz
+    #[arg(long, value_name = "HZ", default_value = "4000", value_parser = |s: &str| within(s, 1.0, 20_000.0))]
+    to: f64,
+    /// Step of the curve, Hz
+    #[arg(long, value_name = "HZ", default_value = "1", value_parser = |s: &str| within(s, 0.001, 1_000.0))]
+    step: f64,
+    #[command(flatten)]
+    air: AirArg,
+    #[command(flatten)]
+    instrument: InstrumentArg,
+    #[command(flatten)]
+    table: TableArgs,
+}
+
+impl Impedance {
+    pub fn run(&self) -> Result<(), Failure> {
+        let file = self.instrument.load()?;
+        let notes = self.notes.notes(&file)?;
+        let (air, volume_m3) = (self.air.air(), if self.reed_volume { file.reed_volume_m3 } else { 0.0 });
+        let steps = ((self.to - self.from) / self.step + 1e-9).floor();
+        if self.peaks.is_none() {
+            if self.notes.one().is_none() {
+                let right = "add --peaks 8 for a table of all notes, or choose one note with --written";
+                return Err(Failure::Usage(format!("--all without --peaks would be many curves; {right}")));
+            }
+            if !(0.0..=POINTS_MAX).contains(&steps) {
+                return Err(Failure::Usage(format!(
+                    "--from {} --to {} --step {} is {} points; expected 1 to {POINTS_MAX}, with --to above --from",
+                    self.from,
+                    self.to,
+                    self.step,
+                    steps + 1.0
+                )));
+            }
+        }
+        let model = TransferMatrix::new(&file, air);
+        let about = format!(
+            "{}; transfer matrices, {} C, reed volume {} m3, Zc {:.6e} Pa s/m3",
+            file.name,
+            air.temperature_c,
+            volume_m3,
+            air.z_c(crate::units::REFERENCE_RADIUS_M)
+        );
+        let header = if self.peaks.is_some() {
+            "written_midi,n,f_hz,mag_over_zc,q"
+        } else {
+            "f_hz,re_z_over_zc,im_z_over_zc"
+        };
+        let mut table = self.table.open(header)?;
+        table.comment(format_args!("{about}"))?;
+        for fingering in notes.into_iter().filter_map(|written| file.fingering(written)) {
+            if let Some(count) = self.peaks {
+                let peaks = model.peaks(&fingering.open, volume_m3, usize::from(count));
+                for (n, peak) in (1..).zip(peaks) {
+                    let (written, f_hz, mag, q) = (fingering.written.0, peak.f_hz, peak.mag_over_zc, peak.q);
+                    table.line(format_args!("{written},{n},{f_hz:.4},{mag:.6},{q:.4}"))?;
+                }
+            } else {
+                for step in 0..=steps as u32 {
+                    let f_hz = self.from + f64::from(step) * self.step;
+                    let z = model.impedance(f_hz, &fingering.open, volume_m3);
+                    table.line(format_args!("{},{:.8},{:.8}", (f_hz * 1e6).round() / 1e6, z.re, z.im))?;
+                }
+            }
+        }
+        table.finish()
+    }
+}

@@ -1,0 +1,71 @@
+//! CSV tables, to standard output or a new file.
+
+use crate::cli::Failure;
+use crate::render::output::NewFile;
+use clap::Args;
+use std::fmt;
+use std::io;
+use std::io::{BufWriter, StdoutLock, Write};
+use std::path::{Path, PathBuf};
+
+/// Where a table goes.
+#[derive(Args)]
+pub struct TableArgs {
+    /// Where to write the table; - is standard output
+    #[arg(long, value_name = "FILE", default_value = "-")]
+    csv: PathBuf,
+    /// Replace an existing file
+    #[arg(long)]
+    force: bool,
+}
+
+impl TableArgs {
+    pub fn open(&self, header: &str) -> Result<Table, Failure> {
+        Table::open(&self.csv, self.force, header)
+    }
+}
+
+enum Sink {
+    Stdout(BufWriter<StdoutLock<'static>>),
+    File(NewFile),
+}
+
+/// A table being written; a file appears with [`finish`](Table::finish).
+pub struct Table {
+    sink: Sink,
+}
+
+impl Table {
+    /// Opens `path` (`-`: standard output) and writes the column names.
+    pub fn open(path: &Path, force: bool, header: &str) -> Result<Self, Failure> {
+        let sink = if path == Path::new("-") {
+            Sink::Stdout(BufWriter::new(io::stdout().lock()))
+        } else {
+            Sink::File(NewFile::create(path, force)?)
+        };
+        let mut table = Self { sink };
+        table.line(format_args!("{header}"))?;
+        Ok(table)
+    }
+
+    /// A line for readers, not for programs.
+    pub fn comment(&mut self, text: fmt::Arguments) -> Result<(), Failure> {
+        self.line(format_args!("# {text}"))
+    }
+
+    /// One line of data.
+    pub fn line(&mut self, text: fmt::Arguments) -> Result<(), Failure> {
+        Ok(match &mut self.sink {
+            Sink::Stdout(out) => writeln!(out, "{text}"),
+            Sink::File(file) => writeln!(file, "{text}"),
+        }?)
+    }
+
+    /// Writes what is left and gives a file its name.
+    pub fn finish(self) -> Result<(), Failure> {
+        match self.sink {
+            Sink::Stdout(mut out) => Ok(out.flush()?),
+            Sink::File(file) => Ok(file.keep()?),
+        }
+    }
+}

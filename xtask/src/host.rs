@@ -1,0 +1,272 @@
+//! A small CLAP host: loads one plugin in process and plays to it what a test or the demo says.
+
+use std::ffi::CString;
+use std::path::Path;
+
+use anyhow::{Context, Result, anyhow, bail};
+use clack_extensions::latency::PluginLatency;
+use clack_extensions::params::{ParamInfoBuffer, PluginParams};
+use clack_extensions::state::{HostState, HostStateImpl, PluginState};
+pub use clack_host::events::event_types::NoteExpressionType;
+use clack_host::events::event_types::{
+    MidiEvent, NoteExpressionEvent, NoteOffEvent, NoteOnEvent, ParamValueEvent,
+};
+use clack_host::prelude::*;
+
+/// Something said to the plugin at a sample position, counted from the start of playing.
+#[derive(Clone, Copy, Debug)]
+pub struct At(pub usize, pub Say);
+
+/// What a CLAP host can say.
+#[derive(Clone, Copy, Debug)]
+pub enum Say {
+    /// A MIDI 1 channel message.
+    Midi([u8; 3]),
+    /// A CLAP note, key and velocity 0..=1.
+    NoteOn(u16, f64),
+    /// Its end.
+    NoteOff(u16),
+    /// A note expression of a key.
+    Express(u16, NoteExpressionType, f64),
+    /// A parameter moves; its plain CLAP value.
+    Set(ClapId, f64),
+}
+
+/// A parameter as the plugin describes it.
+#[derive(Clone, Debug)]
+pub struct Param {
+    pub id: ClapId,
+    pub name: String,
+    pub module: String,
+    pub min: f64,
+    pub max: f64,
+    pub default: f64,
+}
+
+/// Left and right.
+pub type Stereo = [Vec<f32>; 2];
+
+pub struct Shared;
+pub struct Main;
+pub struct Host;
+
+impl SharedHandler<'_> for Shared {
+    fn request_restart(&self) {}
+    fn request_process(&self) {}
+    fn request_callback(&self) {}
+}
+
+impl MainThreadHandler<'_> for Main {}
+
+impl HostStateImpl for Main {
+    fn mark_dirty(&self) {}
+}
+
+impl HostHandlers for Host {
+    type Shared<'a> = Shared;
+    type MainThread<'a> = Main;
+    type AudioProcessor<'a> = ();
+
+    fn declare_extensions(builder: &mut HostExtensions<Self>, _: &Shared) {
+        builder.register::<HostState>();
+    }
+}
+
+/// One loaded plugin.
+pub struct Plugin {
+    // Before the library it comes from, so that it is dropped first.
+    instance: PluginInstance<Host>,
+    entry: PluginEntry,
+}
+
+impl Plugin {
+    /// Loads the first plugin of a CLAP library.
+    pub fn load(path: &Path) -> Result<Self> {
+        // SAFETY: the file is the plugin this project has just built.
+        let entry = unsafe { PluginEntry::load(path) }
+            .with_context(|| format!("cannot load {} as a CLAP", path.display()))?;
+        let id: CString = {
+            let factory = entry.get_plugin_factory().context("the library has no plugin factory")?;
+            let first = factory.plugin_descriptors().next().context("the library holds no plugin")?;
+            first.id().context("the plugin has no id")?.to_owned()
+        };
+        let info = HostInfo::new("Chalumeau xtask", "Chalumeau", "", env!("CARGO_PKG_VERSION"))?;
+        let instance = PluginInstance::new(|_| Shared, |_| Main, &entry, &id, &info)?;
+        Ok(Self { instance, entry })
+    }
+
+    /// Id and name, as the library states them.
+    pub fn identity(&self) -> Result<(String, String)> {
+        let factory = self.entry.get_plugin_factory().context("the library has no plugin factory")?;
+        let first = factory.plugin_descriptors().next().context("the library holds no plugin")?;
+        let text = |words: Option<&std::ffi::CStr>| words.unwrap_or_default().to_string_lossy().into_owned();
+        Ok((text(first.id()), text(first.name())))
+    }
+
+    /// Activates the plugin for blocks of up to `block` samples, lets `body` play, and deactivates it.
+    pub fn session<R>(
+        &mut self,
+        rate_hz: f64,
+        block: usize,
+        body: impl FnOnce(&mut Session) -> R,
+    ) -> Result<R> {
+        let frames = u32::try_from(block)?;
+        let config =
+            PluginAudioConfiguration { sample_rate: rate_hz, min_frames_count: 1, max_frames_count: frames };
+        let stopped = self.instance.activate(|_, _| (), config)?;
+        let processor = match stopped.start_processing() {
+            Ok(processor) => processor,
+            Err(_) => bail!("the plugin does not start at {rate_hz} Hz"),
+        };
+        let mut session = Session { processor, block };
+        let result = body(&mut session);
+        self.instance.deactivate(session.processor.stop_processing());
+        Ok(result)
+    }
+
+    /// A fresh activation that plays `said`, in order of time, for `samples` samples in blocks of `block`.
+    pub fn play(&mut self, rate_hz: f64, block: usize, said: &[At], samples: usize) -> Result<Stereo> {
+        self.session(rate_hz, block, |session| session.play(said, samples))?
+    }
+
+    pub fn params(&mut self) -> Result<Vec<Param>> {
+        let mut handle = self.instance.plugin_handle();
+        let params: PluginParams = handle.get_extension().context("no parameters")?;
+        let mut all = Vec::new();
+        for index in 0..params.count(&handle) {
+            let mut buffer = ParamInfoBuffer::new();
+            let info = params.get_info(&mut handle, index, &mut buffer).context("no such parameter")?;
+            all.push(Param {
+                id: info.id,
+                name: String::from_utf8_lossy(info.name).into_owned(),
+                module: String::from_utf8_lossy(info.module).into_owned(),
+                min: info.min_value,
+                max: info.max_value,
+                default: info.default_value,
+            });
+        }
+        Ok(all)
+    }
+
+    /// The parameter of that name.
+    pub fn param(&mut self, name: &str) -> Result<Param> {
+        self.params()?
+            .into_iter()
+            .find(|param| param.name == name)
+            .with_context(|| format!("no parameter {name}"))
+    }
+
+    pub fn value(&mut self, id: ClapId) -> Result<f64> {
+        let handle = self.instance.plugin_handle();
+        let params: PluginParams = handle.get_extension().context("no parameters")?;
+        params.get_value(&handle, id).context("no such parameter")
+    }
+
+    /// Sets a parameter of a plugin that is not active.
+    pub fn set(&mut self, id: ClapId, value: f64) -> Result<()> {
+        let mut handle = self.instance.inactive_plugin_handle().context("the plugin is active")?;
+        let params: PluginParams = handle.get_extension().context("no parameters")?;
+        let mut said = EventBuffer::new();
+        said.push(&ParamValueEvent::new(0, id, Pckn::match_all(), value));
+        let mut answered = EventBuffer::new();
+        params.flush(
+            &mut handle,
+            &InputEvents::from_buffer(&said),
+            &mut OutputEvents::from_buffer(&mut answered),
+        );
+        Ok(())
+    }
+
+    pub fn text(&mut self, id: ClapId, value: f64) -> Result<String> {
+        let handle = self.instance.plugin_handle();
+        let params: PluginParams = handle.get_extension().context("no parameters")?;
+        let mut buffer = [0; 128];
+        let text = params.value_to_text(&handle, id, value, &mut buffer).map_err(|_| anyhow!("no text"))?;
+        Ok(String::from_utf8_lossy(text).into_owned())
+    }
+
+    pub fn read_text(&mut self, id: ClapId, text: &str) -> Result<Option<f64>> {
+        let handle = self.instance.plugin_handle();
+        let params: PluginParams = handle.get_extension().context("no parameters")?;
+        Ok(params.text_to_value(&handle, id, &CString::new(text)?))
+    }
+
+    pub fn save(&mut self) -> Result<Vec<u8>> {
+        let mut handle = self.instance.plugin_handle();
+        let state: PluginState = handle.get_extension().context("no state")?;
+        let mut bytes = Vec::new();
+        state.save(&mut handle, &mut bytes)?;
+        Ok(bytes)
+    }
+
+    pub fn restore(&mut self, mut bytes: &[u8]) -> Result<()> {
+        let mut handle = self.instance.plugin_handle();
+        let state: PluginState = handle.get_extension().context("no state")?;
+        Ok(state.load(&mut handle, &mut bytes)?)
+    }
+
+    pub fn latency(&mut self) -> Result<u32> {
+        let handle = self.instance.plugin_handle();
+        let latency: PluginLatency = handle.get_extension().context("no latency")?;
+        Ok(latency.get(&handle))
+    }
+}
+
+/// A plugin between activation and deactivation.
+pub struct Session {
+    processor: StartedPluginAudioProcessor<Host>,
+    block: usize,
+}
+
+impl Session {
+    /// Plays on from where the last call ended; positions count from there.
+    pub fn play(&mut self, said: &[At], samples: usize) -> Result<Stereo> {
+        let mut heard = [vec![0.0; samples], vec![0.0; samples]];
+        let mut said = said.iter().peekable();
+        let mut ports = AudioPorts::with_capacity(2, 1);
+        let mut no_ports = AudioPorts::with_capacity(0, 0);
+        for start in (0..samples).step_by(self.block) {
+            let end = samples.min(start + self.block);
+            let mut events = EventBuffer::new();
+            while let Some(At(at, say)) = said.next_if(|At(at, _)| *at < end) {
+                push(&mut events, u32::try_from(at.saturating_sub(start))?, *say);
+            }
+            let mut answered = EventBuffer::new();
+            let no_input = no_ports.with_input_buffers(std::iter::empty::<
+                AudioPortBuffer<
+                    std::iter::Empty<InputChannel<'_, f32>>,
+                    std::iter::Empty<InputChannel<'_, f64>>,
+                >,
+            >());
+            let mut out = ports.with_output_buffers([AudioPortBuffer {
+                latency: 0,
+                channels: AudioPortBufferType::f32_output_only(heard.iter_mut().map(|c| &mut c[start..end])),
+            }]);
+            self.processor.process(
+                &no_input,
+                &mut out,
+                &InputEvents::from_buffer(&events),
+                &mut OutputEvents::from_buffer(&mut answered),
+                Some(start as u64),
+                None,
+            )?;
+        }
+        Ok(heard)
+    }
+
+    /// As when a host's transport jumps.
+    pub fn reset(&mut self) {
+        self.processor.reset();
+    }
+}
+
+fn push(events: &mut EventBuffer, at: u32, say: Say) {
+    let of = |key: u16| Pckn::new(0u16, 0u16, key, clack_host::events::Match::<u32>::All);
+    match say {
+        Say::Midi(bytes) => events.push(&MidiEvent::new(at, 0, bytes)),
+        Say::NoteOn(key, velocity) => events.push(&NoteOnEvent::new(at, of(key), velocity)),
+        Say::NoteOff(key) => events.push(&NoteOffEvent::new(at, of(key), 0.0)),
+        Say::Express(key, kind, value) => events.push(&NoteExpressionEvent::new(at, of(key), kind, value)),
+        Say::Set(id, value) => events.push(&ParamValueEvent::new(at, id, Pckn::match_all(), value)),
+    };
+}

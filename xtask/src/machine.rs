@@ -1,0 +1,118 @@
+//! The machine underneath: folders, programs, system packages.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, bail};
+
+/// The workspace, whichever folder the command was called from.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
+}
+
+/// Makes the workspace the current folder.
+pub fn enter_workspace() -> Result<()> {
+    std::env::set_current_dir(root()).with_context(|| format!("cannot enter {}", root().display()))
+}
+
+/// Where cargo builds to.
+pub fn target() -> PathBuf {
+    match std::env::var_os("CARGO_TARGET_DIR") {
+        Some(folder) => root().join(folder),
+        None => root().join("target"),
+    }
+}
+
+/// The cargo that runs this.
+pub fn cargo() -> Command {
+    Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+}
+
+/// Runs a command to its end; anything but success is an error that names it.
+pub fn run(command: &mut Command) -> Result<()> {
+    let name = described(command);
+    let status = command.status().with_context(|| format!("cannot start `{name}`"))?;
+    if status.success() { Ok(()) } else { bail!("`{name}` failed: {status}") }
+}
+
+/// Program and arguments, as one would type them.
+pub fn described(command: &Command) -> String {
+    let words = std::iter::once(command.get_program()).chain(command.get_args());
+    words.map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ")
+}
+
+/// Whether a program can be started and says so itself.
+pub fn works(program: &str, args: &[&str]) -> bool {
+    Command::new(program)
+        .args(args)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status()
+        .is_ok_and(|status| status.success())
+}
+
+/// A system package (Debian's name) and how to tell that it is there.
+pub struct Package {
+    pub name: &'static str,
+    pub present: fn() -> bool,
+    /// What it is for, said when it cannot be installed.
+    pub purpose: &'static str,
+}
+
+/// For cargo itself: crates with C parts, and linking.
+pub const CC: Package = Package { name: "gcc", present: || works("cc", &["--version"]), purpose: "linking" };
+/// For the pip that fetches DawDreamer.
+pub const VENV: Package = Package {
+    name: "python3-venv",
+    present: || works("python3", &["-c", "import ensurepip, venv"]),
+    purpose: "the DawDreamer tests",
+};
+/// For `chalumeau-standalone`.
+pub const PKG_CONFIG: Package = Package {
+    name: "pkg-config",
+    present: || works("pkg-config", &["--version"]),
+    purpose: "finding ALSA for chalumeau-standalone",
+};
+/// For `chalumeau-standalone`.
+pub const ALSA: Package = Package {
+    name: "libasound2-dev",
+    present: || works("pkg-config", &["--exists", "alsa"]) || !cfg!(target_os = "linux"),
+    purpose: "sound and MIDI in chalumeau-standalone",
+};
+
+/// Installs what is missing with apt-get, or names it.
+pub fn provide(packages: &[&Package]) -> Result<()> {
+    let missing: Vec<_> = packages.iter().filter(|package| !(package.present)()).collect();
+    if missing.is_empty() {
+        return Ok(());
+    }
+    let names: Vec<_> = missing.iter().map(|package| package.name).collect();
+    let purposes: Vec<_> =
+        missing.iter().map(|package| format!("{} (for {})", package.name, package.purpose)).collect();
+    let purposes = purposes.join(", ");
+    if !works("apt-get", &["--version"]) {
+        bail!("missing, and no apt-get to install it with: {purposes}; the names are Debian's");
+    }
+    println!("installing {purposes}");
+    apt(&["update"])
+        .and_then(|()| apt(&[&["install", "-y", "--no-install-recommends"], &names[..]].concat()))?;
+    match missing.iter().find(|package| !(package.present)()) {
+        Some(package) => bail!("{} was installed but does not work", package.name),
+        None => Ok(()),
+    }
+}
+
+fn apt(args: &[&str]) -> Result<()> {
+    let root = Command::new("id").arg("-u").output().is_ok_and(|id| id.stdout.trim_ascii() == b"0");
+    let mut command = if root {
+        Command::new("apt-get")
+    } else {
+        let mut sudo = Command::new("sudo");
+        sudo.arg("apt-get");
+        sudo
+    };
+    // Another apt may hold the lock for a while.
+    command.args(["-q", "-o", "DPkg::Lock::Timeout=500"]).args(args).env("DEBIAN_FRONTEND", "noninteractive");
+    run(&mut command).context("install the packages named above by hand, then try again")
+}

@@ -1,0 +1,375 @@
+//! The bundled CLAP, as a host sees and hears it. `cargo xtask bundle` first; CHALUMEAU_CLAP names another file.
+
+use std::path::PathBuf;
+
+use chalumeau::event::{Event, Timed};
+use chalumeau::instrument::{Clarinet, Settings};
+use chalumeau::units::SoundingNote;
+use xtask::host::{At, NoteExpressionType, Plugin, Say, Stereo};
+
+const RATE: f64 = 48_000.0;
+const SECOND: usize = 48_000;
+const BLOCKS: [usize; 5] = [1, 17, 64, 512, 4096];
+
+fn plugin() -> Plugin {
+    let path = match std::env::var_os("CHALUMEAU_CLAP") {
+        // Tests run in xtask/, names are given from the root.
+        Some(path) => xtask::machine::root().join(PathBuf::from(path)),
+        None => xtask::bundle::clap().unwrap(),
+    };
+    Plugin::load(&path).unwrap()
+}
+
+fn play(said: &[At], samples: usize) -> Vec<f32> {
+    let [left, right] = plugin().play(RATE, 512, said, samples).unwrap();
+    assert!(left == right, "both channels carry the same voice");
+    left
+}
+
+/// What the instrument itself makes of the same events.
+fn offline(settings: Settings, events: &[(usize, Event)], samples: usize) -> Vec<f32> {
+    let mut clarinet = Clarinet::built_in(RATE).unwrap();
+    clarinet.set_settings(&settings);
+    let mut out = vec![0.0; samples];
+    clarinet.render_events(events.iter().map(|&(at, event)| Timed { at, event }), &mut out);
+    out
+}
+
+fn on(key: u8) -> Say {
+    Say::Midi([0x90, key, 100])
+}
+
+fn off(key: u8) -> Say {
+    Say::Midi([0x80, key, 0])
+}
+
+fn breath(value: u8) -> Say {
+    Say::Midi([0xB0, 2, value])
+}
+
+fn note_on(key: u8) -> Event {
+    Event::NoteOn { note: SoundingNote(key), velocity: 100.0 / 127.0 }
+}
+
+fn level_db(samples: &[f32]) -> f64 {
+    let power: f64 = samples.iter().map(|&x| f64::from(x).powi(2)).sum();
+    10.0 * (power / samples.len() as f64).max(1e-30).log10()
+}
+
+/// A phrase that uses everything at positions that fall anywhere in a block.
+fn phrase(plugin: &mut Plugin) -> Vec<At> {
+    let (gain, zeta) = (plugin.param("Gain").unwrap(), plugin.param("Embouchure zeta").unwrap());
+    let mut said = vec![At(0, breath(0)), At(311, on(58)), At(20_000, Say::Midi([0xE0, 0, 32]))];
+    said.extend((0..100).map(|step| At(320 + 97 * step, breath(step as u8))));
+    said.extend([
+        At(9_999, on(62)),
+        At(10_000, off(58)),
+        At(15_001, Say::Set(gain.id, 0.9 * gain.default)),
+        At(15_500, Say::Set(zeta.id, 0.5)),
+        At(24_001, on(70)),
+        At(24_002, off(62)),
+        At(30_000, Say::Midi([0xE0, 0, 64])),
+        At(33_333, breath(20)),
+        At(40_000, off(70)),
+        At(40_001, breath(0)),
+    ]);
+    said.sort_by_key(|At(at, _)| *at);
+    said
+}
+
+#[test]
+fn the_library_says_who_it_is() {
+    let plugin = plugin();
+    assert_eq!(plugin.identity().unwrap(), ("chalumeau.clarinet".to_owned(), "Chalumeau".to_owned()));
+}
+
+#[test]
+fn an_event_acts_at_its_sample() {
+    for at in [612, 613, 4095, 4096, 4097] {
+        let heard = play(&[At(at, on(60))], SECOND / 4);
+        assert!(heard[..at].iter().all(|&x| x == 0.0), "silent before the note at {at}");
+        assert!(heard == offline(Settings::default(), &[(at, note_on(60))], SECOND / 4), "note at {at}");
+    }
+    assert_ne!(play(&[At(612, on(60))], SECOND / 4), play(&[At(613, on(60))], SECOND / 4));
+}
+
+#[test]
+fn block_size_is_inaudible() {
+    let said = phrase(&mut plugin());
+    let whole: Stereo = plugin().play(RATE, SECOND, &said, SECOND).unwrap();
+    assert!(level_db(&whole[0]) > -60.0, "the phrase sounds");
+    for block in BLOCKS {
+        let heard = plugin().play(RATE, block, &said, SECOND).unwrap();
+        assert!(heard == whole, "blocks of {block}");
+    }
+}
+
+#[test]
+fn the_first_key_sounds_by_its_velocity() {
+    let [soft, loud] = [30, 120].map(|velocity| play(&[At(0, Say::Midi([0x90, 58, velocity]))], SECOND));
+    let (soft, loud) = (level_db(&soft[SECOND / 2..]), level_db(&loud[SECOND / 2..]));
+    assert!(loud > -40.0, "{loud} dB");
+    assert!(loud > soft + 3.0, "{soft} dB, {loud} dB");
+}
+
+#[test]
+fn breath_comes_from_controllers_and_pressure() {
+    for source in [[0xB0, 2], [0xB0, 11], [0xD0, 0]] {
+        let blow = |value: u8| match source {
+            [0xD0, _] => Say::Midi([0xD0, value, 0]),
+            [status, cc] => Say::Midi([status, cc, value]),
+        };
+        let said = [At(0, blow(0)), At(10, on(58)), At(SECOND / 4, blow(90)), At(SECOND, blow(0))];
+        let heard = play(&said, 2 * SECOND + SECOND / 4);
+        assert!(level_db(&heard[..SECOND / 4]) < -100.0, "{source:x?}: no breath, no sound");
+        assert!(level_db(&heard[SECOND / 2..SECOND]) > -40.0, "{source:x?}: breath sounds");
+        let after = heard[2 * SECOND..].iter().fold(0.0f32, |peak, x| peak.max(x.abs()));
+        assert!(after < 1e-6, "{source:x?}: {after} a second after the breath");
+        let blown = |value: u8| Event::Breath(f32::from(value) / 127.0);
+        let events = [(0, blown(0)), (10, note_on(58)), (SECOND / 4, blown(90)), (SECOND, blown(0))];
+        assert!(heard == offline(Settings::default(), &events, heard.len()), "{source:x?}");
+    }
+}
+
+#[test]
+fn the_breath_parameter_blows_when_it_moves() {
+    let id = plugin().param("Breath").unwrap().id;
+    let events = [(0, note_on(58)), (4800, Event::Breath(0.5)), (24_000, Event::Breath(0.0))];
+    let said = [
+        At(0, on(58)),
+        At(4800, Say::Set(id, 0.5)),
+        At(14_000, Say::Set(id, 0.5)),
+        At(24_000, Say::Set(id, 0.0)),
+    ];
+    let heard = play(&said, SECOND);
+    assert!(heard == offline(Settings::default(), &events, SECOND));
+}
+
+#[test]
+fn note_expressions_blow_and_bend() {
+    let said = [
+        At(0, Say::NoteOn(58, 100.0 / 127.0)),
+        At(0, Say::Express(58, NoteExpressionType::Pressure, 0.0)),
+        At(9_000, Say::Express(58, NoteExpressionType::Pressure, 0.6)),
+        At(18_000, Say::Express(58, NoteExpressionType::Tuning, -0.25)),
+        At(30_000, Say::Express(58, NoteExpressionType::Expression, 0.5)),
+        At(40_000, Say::NoteOff(58)),
+    ];
+    let events = [
+        (0, note_on(58)),
+        (9_000, Event::Breath(0.6)),
+        (18_000, Event::Bend { cents: -25.0 }),
+        (30_000, Event::Breath(0.5)),
+        (40_000, Event::NoteOff { note: SoundingNote(58) }),
+    ];
+    assert!(play(&said, SECOND) == offline(Settings::default(), &events, SECOND));
+}
+
+#[test]
+fn the_wheel_bends() {
+    let bent = |low: u8, high: u8| {
+        play(&[At(0, Say::Midi([0xE0, low, high])), At(0, breath(80)), At(0, on(60))], SECOND)
+    };
+    let plain = play(&[At(0, breath(80)), At(0, on(60))], SECOND);
+    assert!(bent(0, 64) == plain, "the centre bends by nothing, not by a little");
+    let hz = |samples: &[f32]| pitch_hz(&samples[SECOND / 2..]);
+    let up = 1200.0 * (hz(&bent(0, 80)) / hz(&plain)).log2();
+    let down = 1200.0 * (hz(&bent(0, 48)) / hz(&plain)).log2();
+    // A quarter of two semitones; how far a bore follows is its own affair.
+    assert!(up > 10.0 && down < -10.0, "{up} {down} cents");
+}
+
+/// Frequency by the lag at which the sound is most like itself, good to one sample of the period.
+fn pitch_hz(samples: &[f32]) -> f64 {
+    let lag = (40..800)
+        .max_by(|&a, &b| {
+            let alike = |lag: usize| -> f64 {
+                let n = samples.len() - 800;
+                let dot = |a: &[f32], b: &[f32]| {
+                    a.iter().zip(b).map(|(&x, &y)| f64::from(x) * f64::from(y)).sum::<f64>()
+                };
+                dot(&samples[..n], &samples[lag..lag + n])
+            };
+            alike(a).total_cmp(&alike(b))
+        })
+        .unwrap();
+    RATE / lag as f64
+}
+
+#[test]
+fn default_values_from_a_host_change_nothing() {
+    let mut plugin = plugin();
+    let mut said: Vec<_> =
+        plugin.params().unwrap().iter().map(|param| At(0, Say::Set(param.id, param.default))).collect();
+    said.extend([At(0, breath(70)), At(0, on(62))]);
+    let heard = plugin.play(RATE, 512, &said, SECOND / 2).unwrap();
+    let events = [(0, Event::Breath(70.0 / 127.0)), (0, note_on(62))];
+    assert!(heard[0] == offline(Settings::default(), &events, SECOND / 2));
+}
+
+#[test]
+fn every_controller_at_once_does_no_harm() {
+    let said: Vec<_> = (0..16u8)
+        .flat_map(|channel| (0..128u8).map(move |cc| At(100, Say::Midi([0xB0 | channel, cc, 64]))))
+        .chain([At(200, breath(80)), At(200, on(60))])
+        .collect();
+    let heard = play(&said, SECOND);
+    assert!(heard.iter().all(|x| x.is_finite()));
+    assert!(level_db(&heard[SECOND / 2..]) > -40.0);
+}
+
+#[test]
+fn panic_silences_once_and_then_lets_play() {
+    let id = plugin().param("Panic").unwrap().id;
+    let said = [
+        At(0, breath(80)),
+        At(0, on(60)),
+        At(24_000, Say::Set(id, 1.0)),
+        At(30_000, breath(80)),
+        At(30_000, on(62)),
+        At(60_000, Say::Set(id, 0.0)),
+        At(70_000, Say::Set(id, 1.0)),
+    ];
+    let blown = Event::Breath(80.0 / 127.0);
+    let events = [
+        (0, blown),
+        (0, note_on(60)),
+        (24_000, Event::Panic),
+        (30_000, blown),
+        (30_000, note_on(62)),
+        (70_000, Event::Panic),
+    ];
+    assert!(play(&said, 2 * SECOND) == offline(Settings::default(), &events, 2 * SECOND));
+}
+
+#[test]
+fn reset_is_a_new_beginning() {
+    let said = phrase(&mut plugin());
+    let mut plugin = plugin();
+    let (first, second) = plugin
+        .session(RATE, 256, |session| {
+            let first = session.play(&said[..60], 12_345).unwrap();
+            session.reset();
+            let _ = session.play(&[At(5, on(65)), At(5, Say::Midi([0xE0, 0, 100]))], 7_777).unwrap();
+            session.reset();
+            (first, session.play(&said[..60], 12_345).unwrap())
+        })
+        .unwrap();
+    assert!(first == second);
+}
+
+#[test]
+fn text_reads_both_ways() {
+    let mut plugin = plugin();
+    for param in plugin.params().unwrap() {
+        for step in 0..=40 {
+            let value = param.min + (param.max - param.min) * f64::from(step) / 40.0;
+            let text = plugin.text(param.id, value).unwrap();
+            let back = plugin
+                .read_text(param.id, &text)
+                .unwrap()
+                .unwrap_or_else(|| panic!("{}: {text}", param.name));
+            assert_eq!(plugin.text(param.id, back).unwrap(), text, "{}", param.name);
+        }
+        let default = plugin.text(param.id, param.default).unwrap();
+        let back = plugin.read_text(param.id, &default).unwrap().unwrap();
+        assert!((back - param.default).abs() < 1e-3, "{}: {default}", param.name);
+        assert!(!param.module.is_empty(), "{} belongs to a group", param.name);
+    }
+}
+
+#[test]
+fn state_makes_the_round_trip() {
+    let mut plugin = plugin();
+    for (index, param) in plugin.params().unwrap().into_iter().enumerate() {
+        let unit = 0.15 + 0.7 * (index as f64 * 0.618).fract();
+        plugin.set(param.id, param.min + unit * (param.max - param.min)).unwrap();
+    }
+    let saved = plugin.save().unwrap();
+    let mut other = self::plugin();
+    other.restore(&saved).unwrap();
+    assert_eq!(String::from_utf8_lossy(&other.save().unwrap()), String::from_utf8_lossy(&saved));
+    for param in plugin.params().unwrap() {
+        assert_eq!(plugin.value(param.id).unwrap(), other.value(param.id).unwrap(), "{}", param.name);
+    }
+    let said = [At(0, breath(90)), At(0, on(60))];
+    assert!(plugin.play(RATE, 64, &said, 20_000).unwrap() == other.play(RATE, 64, &said, 20_000).unwrap());
+}
+
+/// The framework writes eight bytes of length, then JSON.
+fn state_of(json: &str) -> Vec<u8> {
+    let mut bytes = (json.len() as u64).to_le_bytes().to_vec();
+    bytes.extend(json.bytes());
+    bytes
+}
+
+#[test]
+fn a_broken_state_is_refused_and_changes_nothing() {
+    let mut plugin = plugin();
+    let zeta = plugin.param("Embouchure zeta").unwrap();
+    plugin.set(zeta.id, 0.7).unwrap();
+    let before = plugin.save().unwrap();
+    let mut cut = before.clone();
+    cut.truncate(before.len() / 2);
+    let rubbish =
+        [b"".to_vec(), b"rubbish!rubbish!".to_vec(), cut, state_of("{\"params\":7}"), state_of("nothing")];
+    for bytes in rubbish {
+        assert!(plugin.restore(&bytes).is_err(), "{}", String::from_utf8_lossy(&bytes));
+        assert_eq!(plugin.save().unwrap(), before);
+    }
+}
+
+#[test]
+fn a_strange_state_is_mended() {
+    let mut plugin = plugin();
+    let zeta = plugin.param("Embouchure zeta").unwrap();
+    let a4 = plugin.param("A4").unwrap();
+    plugin.set(zeta.id, 0.9).unwrap();
+    let json = r#"{"version":"9","params":{"a4":{"f32":9999.0},"zeta":{"bool":true},"later":{"i32":3}},"fields":{"schema":"77"}}"#;
+    plugin.restore(&state_of(json)).unwrap();
+    assert_eq!(plugin.value(a4.id).unwrap(), a4.max, "clamped");
+    let value = plugin.value(zeta.id).unwrap();
+    assert_eq!(plugin.text(zeta.id, value).unwrap(), "0.300", "default");
+    let mut fresh = self::plugin();
+    let reference = fresh.save().unwrap();
+    fresh.restore(&state_of(r#"{"version":"","params":{},"fields":{}}"#)).unwrap();
+    assert_eq!(fresh.save().unwrap(), reference, "an empty state is the reference clarinet");
+}
+
+#[test]
+fn latency_is_the_instruments() {
+    let mut plugin = plugin();
+    for rate in [44_100.0, 48_000.0, 88_200.0, 96_000.0, 192_000.0] {
+        plugin.session(rate, 512, |_| ()).unwrap();
+        assert_eq!(
+            plugin.latency().unwrap(),
+            Clarinet::built_in(rate).unwrap().latency_samples(),
+            "{rate} Hz"
+        );
+    }
+}
+
+#[test]
+fn a_rate_out_of_reach_is_refused() {
+    let mut plugin = plugin();
+    assert!(plugin.session(8_000.0, 512, |_| ()).is_err());
+    plugin.play(RATE, 512, &[At(0, on(60))], 100).unwrap();
+}
+
+#[test]
+fn the_melody_is_the_renderers_bit_for_bit() {
+    let file = std::fs::read(xtask::machine::root().join("examples/melody.mid")).unwrap();
+    let score = chalumeau::render::midi_file::read(&file, 48_000).unwrap().with_tail(0.5, 48_000);
+    let mut clarinet = Clarinet::built_in(RATE).unwrap();
+    let mut rendered = Vec::new();
+    chalumeau::render::play(&mut clarinet, &score, 512, |block| {
+        rendered.extend_from_slice(block);
+        Ok::<_, std::convert::Infallible>(())
+    })
+    .unwrap();
+    let said = xtask::midi::messages(&file, 48_000).unwrap();
+    for block in BLOCKS {
+        let [left, right] = plugin().play(RATE, block, &said, score.samples).unwrap();
+        assert!(left == rendered && right == rendered, "blocks of {block}");
+    }
+}

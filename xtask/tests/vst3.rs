@@ -1,0 +1,256 @@
+//! The bundled VST3, as a host sees and hears it. `cargo xtask bundle` first; CHALUMEAU_VST3 names another bundle.
+
+use std::path::PathBuf;
+
+use chalumeau::event::{Event, Timed};
+use chalumeau::instrument::{Clarinet, Settings};
+use chalumeau::units::SoundingNote;
+use vst3_host::prelude::*;
+use vst3_host::{AudioBuffers, MidiChannel, MidiEvent};
+use xtask::host::{At, Say};
+
+const RATE: f64 = 48_000.0;
+const SECOND: usize = 48_000;
+const CHANNEL: MidiChannel = MidiChannel::Ch1;
+
+struct Loaded {
+    plugin: Plugin,
+    // Outlives the plugin.
+    _host: Vst3Host,
+}
+
+fn load(block: usize) -> Loaded {
+    let path = match std::env::var_os("CHALUMEAU_VST3") {
+        Some(path) => xtask::machine::root().join(PathBuf::from(path)),
+        None => xtask::bundle::vst3().unwrap(),
+    };
+    let mut host = Vst3Host::builder().sample_rate(RATE).block_size(block).build().unwrap();
+    let plugin = host.load_plugin(&path).unwrap();
+    Loaded { plugin, _host: host }
+}
+
+/// What is said at a sample position: MIDI, or a parameter's name and 0..=1.
+#[derive(Clone, Copy, Debug)]
+enum Word {
+    Midi(MidiEvent),
+    Set(&'static str, f64),
+}
+
+fn on(note: u8) -> Word {
+    Word::Midi(MidiEvent::NoteOn { channel: CHANNEL, note, velocity: 100 })
+}
+
+fn off(note: u8) -> Word {
+    Word::Midi(MidiEvent::NoteOff { channel: CHANNEL, note, velocity: 0 })
+}
+
+fn cc(controller: u8, value: u8) -> Word {
+    Word::Midi(MidiEvent::ControlChange { channel: CHANNEL, controller, value })
+}
+
+fn bend(value: u16) -> Word {
+    Word::Midi(MidiEvent::PitchBend { channel: CHANNEL, value })
+}
+
+fn pressure(pressure: u8) -> Word {
+    Word::Midi(MidiEvent::ChannelAftertouch { channel: CHANNEL, pressure })
+}
+
+/// Plays on from where the last call ended.
+fn play_on(loaded: &mut Loaded, block: usize, said: &[(usize, Word)], samples: usize) -> Vec<f32> {
+    let mut heard = Vec::new();
+    let mut said = said.iter().peekable();
+    while heard.len() < samples {
+        let start = heard.len();
+        let length = block.min(samples - start);
+        while let Some(&(at, word)) = said.next_if(|(at, _)| *at < start + length) {
+            let at = (at - start) as i32;
+            match word {
+                Word::Midi(event) => loaded.plugin.send_midi_event_at(event, at).unwrap(),
+                Word::Set(name, value) => {
+                    let id = loaded.plugin.find_parameter(name).unwrap().id;
+                    loaded.plugin.set_parameter_at(id, value, at).unwrap();
+                }
+            }
+        }
+        let mut buffers = AudioBuffers::new(0, 2, length, RATE);
+        loaded.plugin.process_audio(&mut buffers).unwrap();
+        assert!(buffers.outputs[0] == buffers.outputs[1], "both channels carry the same voice");
+        heard.extend_from_slice(&buffers.outputs[0][..length]);
+    }
+    heard
+}
+
+fn play(block: usize, said: &[(usize, Word)], samples: usize) -> Vec<f32> {
+    let mut loaded = load(block);
+    loaded.plugin.start_processing().unwrap();
+    play_on(&mut loaded, block, said, samples)
+}
+
+fn offline(events: &[(usize, Event)], samples: usize) -> Vec<f32> {
+    let mut clarinet = Clarinet::built_in(RATE).unwrap();
+    clarinet.set_settings(&Settings::default());
+    let mut out = vec![0.0; samples];
+    clarinet.render_events(events.iter().map(|&(at, event)| Timed { at, event }), &mut out);
+    out
+}
+
+fn note_on(key: u8) -> Event {
+    Event::NoteOn { note: SoundingNote(key), velocity: 100.0 / 127.0 }
+}
+
+#[test]
+fn an_event_acts_at_its_sample() {
+    for at in [612, 613, 1023, 1024, 1025] {
+        let heard = play(512, &[(at, on(60))], SECOND / 4);
+        assert!(heard == offline(&[(at, note_on(60))], SECOND / 4), "note at {at}");
+    }
+}
+
+#[test]
+fn controllers_pressure_and_wheel_reach_the_instrument() {
+    let said = [
+        (0, pressure(60)),
+        (700, on(58)),
+        (9_001, pressure(90)),
+        (15_000, bend(4096)),
+        (20_000, cc(11, 70)),
+        (26_000, cc(2, 80)),
+        (26_100, cc(11, 0)),
+        (30_000, bend(8192)),
+        (33_000, off(58)),
+    ];
+    let breath = |value: f32| Event::Breath(value / 127.0);
+    let events = [
+        (0, breath(60.0)),
+        (700, note_on(58)),
+        (9_001, breath(90.0)),
+        (15_000, Event::Bend { cents: -100.0 }),
+        (20_000, breath(70.0)),
+        (26_000, breath(80.0)),
+        (30_000, Event::Bend { cents: 0.0 }),
+        (33_000, Event::NoteOff { note: SoundingNote(58) }),
+    ];
+    assert!(play(512, &said, SECOND) == offline(&events, SECOND));
+}
+
+#[test]
+fn block_size_is_inaudible() {
+    let mut said = vec![
+        (0, cc(2, 0)),
+        (311, on(58)),
+        (15_001, Word::Set("Gain", 0.6)),
+        (15_500, Word::Set("Embouchure zeta", 0.5)),
+    ];
+    said.extend((0..100).map(|step| (320 + 97 * step, cc(2, step as u8))));
+    said.extend([
+        (9_999, on(62)),
+        (10_000, off(58)),
+        (20_000, bend(4000)),
+        (24_001, on(70)),
+        (40_000, off(70)),
+    ]);
+    said.sort_by_key(|(at, _)| *at);
+    let whole = play(SECOND, &said, SECOND);
+    assert!(whole.iter().any(|x| x.abs() > 1e-3), "the phrase sounds");
+    for block in [1, 17, 64, 512, 4096] {
+        assert!(play(block, &said, SECOND) == whole, "blocks of {block}");
+    }
+}
+
+#[test]
+fn starting_again_is_a_new_beginning() {
+    let said = [(0, cc(2, 80)), (5, on(60)), (3_000, bend(0))];
+    let mut loaded = load(256);
+    loaded.plugin.start_processing().unwrap();
+    let first = play_on(&mut loaded, 256, &said, 12_345);
+    loaded.plugin.stop_processing().unwrap();
+    loaded.plugin.start_processing().unwrap();
+    assert!(play_on(&mut loaded, 256, &said, 12_345) == first);
+}
+
+#[test]
+fn parameters_have_names_units_and_text() {
+    let loaded = load(512);
+    let all = loaded.plugin.get_parameters().unwrap();
+    // Behind them the framework hides one parameter for each MIDI controller of each channel.
+    let ours: Vec<_> = all.iter().filter(|param| !param.name.starts_with("MIDI")).collect();
+    assert_eq!(ours.len(), 20, "{:?}", ours.iter().map(|param| &param.name).collect::<Vec<_>>());
+    for (name, text) in
+        [("Full breath", "6.00"), ("A4", "440.0"), ("Reed coupled", "Coupled"), ("Tuning", "Natural")]
+    {
+        let param = loaded.plugin.find_parameter(name).unwrap();
+        let shown = loaded.plugin.format_parameter(param.id, param.value).unwrap();
+        assert!(shown.starts_with(text), "{name}: {shown}");
+    }
+}
+
+#[test]
+fn state_makes_the_round_trip() {
+    let mut loaded = load(64);
+    loaded.plugin.start_processing().unwrap();
+    play_on(
+        &mut loaded,
+        64,
+        &[(0, Word::Set("Embouchure zeta", 0.625)), (0, Word::Set("Reed coupled", 0.0))],
+        64,
+    );
+    let saved = loaded.plugin.save_state().unwrap();
+    let mut other = load(64);
+    other.plugin.load_state(&saved).unwrap();
+    let value = |loaded: &Loaded, name| loaded.plugin.find_parameter(name).unwrap().value;
+    assert!((value(&other, "Embouchure zeta") - 0.625).abs() < 1e-6);
+    assert_eq!(value(&other, "Reed coupled"), 0.0);
+    assert_eq!(other.plugin.save_state().unwrap(), saved);
+}
+
+#[test]
+fn a_broken_state_changes_nothing() {
+    let mut loaded = load(64);
+    let before = loaded.plugin.save_state().unwrap();
+    // Whether the host reports it differs; that nothing changes must not.
+    let _ = loaded.plugin.load_state(b"rubbish! rubbish! rubbish!");
+    let mut cut = before.clone();
+    cut.truncate(before.len() / 2);
+    let _ = loaded.plugin.load_state(&cut);
+    assert_eq!(loaded.plugin.save_state().unwrap(), before);
+}
+
+#[test]
+fn latency_is_the_instruments() {
+    assert_eq!(load(512).plugin.latency_samples(), Clarinet::built_in(RATE).unwrap().latency_samples());
+}
+
+#[test]
+fn the_melody_is_the_renderers() {
+    let file = std::fs::read(xtask::machine::root().join("examples/melody.mid")).unwrap();
+    let score = chalumeau::render::midi_file::read(&file, 48_000).unwrap().with_tail(0.5, 48_000);
+    let mut clarinet = Clarinet::built_in(RATE).unwrap();
+    let mut rendered = Vec::new();
+    chalumeau::render::play(&mut clarinet, &score, 512, |block| {
+        rendered.extend_from_slice(block);
+        Ok::<_, std::convert::Infallible>(())
+    })
+    .unwrap();
+    let said: Vec<_> = xtask::midi::messages(&file, 48_000)
+        .unwrap()
+        .into_iter()
+        .filter_map(|At(at, say)| match say {
+            Say::Midi([status, a, b]) => Some((at, Word::Midi(event(status, a, b)?))),
+            _ => None,
+        })
+        .collect();
+    assert!(play(512, &said, score.samples) == rendered);
+}
+
+fn event(status: u8, a: u8, b: u8) -> Option<MidiEvent> {
+    let channel = MidiChannel::from_index(status & 15)?;
+    Some(match status & 0xF0 {
+        0x80 => MidiEvent::NoteOff { channel, note: a, velocity: b },
+        0x90 => MidiEvent::NoteOn { channel, note: a, velocity: b },
+        0xB0 => MidiEvent::ControlChange { channel, controller: a, value: b },
+        0xD0 => MidiEvent::ChannelAftertouch { channel, pressure: a },
+        0xE0 => MidiEvent::PitchBend { channel, value: u16::from(b) << 7 | u16::from(a) },
+        _ => return None,
+    })
+}
