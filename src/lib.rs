@@ -6,7 +6,6 @@ pub mod bore;
 pub mod cli;
 pub mod control;
 pub mod dsp;
-pub mod bore;
 pub mod event;
 pub mod instrument;
 #[cfg(feature = "plugin")]
