@@ -1,0 +1,320 @@
+//! The command line as a user and a script meet it: each kind of mistake, and the tables others read.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use tempfile::TempDir;
+
+#[path = "../examples/make_melody.rs"]
+mod make_melody;
+
+const MELODY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/melody.mid");
+
+fn chalumeau<A: AsRef<OsStr>>(directory: &Path, args: impl IntoIterator<Item = A>) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_chalumeau"))
+        .current_dir(directory)
+        .args(args)
+        .stdin(Stdio::null())
+        .output()
+        .unwrap()
+}
+
+fn words(line: &str) -> impl Iterator<Item = &str> {
+    line.split_whitespace()
+}
+
+fn names(directory: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        fs::read_dir(directory).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+/// Runs a command that must be refused: exit code 2, each of `says` in the message, no file written.
+#[track_caller]
+fn refused(directory: &TempDir, line: &str, says: &[&str]) {
+    let before = names(directory.path());
+    let output = chalumeau(directory.path(), words(line));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{line}: {message}");
+    for say in says {
+        assert!(message.contains(say), "{line}: expected {say:?} in {message:?}");
+    }
+    assert!(!message.contains("panicked"), "{line}: {message}");
+    assert_eq!(names(directory.path()), before, "{line} left a file behind");
+}
+
+#[track_caller]
+fn succeeds(directory: &Path, line: &str) -> String {
+    let output = chalumeau(directory, words(line));
+    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn damaged_midi_is_refused_where_it_breaks() {
+    let d = tempfile::tempdir().unwrap();
+    let melody = fs::read(MELODY).unwrap();
+    fs::write(d.path().join("cut.mid"), &melody[..melody.len() / 2]).unwrap();
+    refused(&d, "render cut.mid --out x.wav", &["cut.mid", "ends at byte", "whole file"]);
+    fs::write(d.path().join("text.mid"), "once upon a time").unwrap();
+    refused(&d, "render text.mid --out x.wav", &["text.mid", "should begin with MThd", "\"once\""]);
+    fs::write(d.path().join("empty.mid"), "").unwrap();
+    refused(&d, "render empty.mid --out x.wav", &["it is empty"]);
+    let mut broken = melody.clone();
+    let notes = broken.windows(2).position(|w| w == [0xB0, 2]).unwrap();
+    broken[notes] = 0xF5;
+    fs::write(d.path().join("broken.mid"), broken).unwrap();
+    refused(&d, "render broken.mid --out x.wav", &["track 2 is damaged", "at byte"]);
+    let mut patterns = melody;
+    patterns[9] = 2;
+    fs::write(d.path().join("patterns.mid"), patterns).unwrap();
+    refused(&d, "render patterns.mid --out x.wav", &["format 2", "save it as format 0 or 1"]);
+}
+
+#[test]
+fn missing_files_are_named() {
+    let d = tempfile::tempdir().unwrap();
+    refused(&d, "render none.mid --out x.wav", &["cannot read none.mid"]);
+    refused(&d, "render --written 60 --breath none.csv --out x.wav", &["cannot read none.csv"]);
+    refused(&d, "impedance --all --peaks 8 --instrument none.toml", &["cannot read none.toml"]);
+}
+
+#[test]
+fn instrument_files_are_refused_by_field() {
+    let d = tempfile::tempdir().unwrap();
+    let good = include_str!("../data/b_flat_clarinet.toml");
+    for (wrong, says) in [
+        (
+            good.replacen("transposition_semitones = 2", "transposition_semitones = 99", 1),
+            "transposition_semitones is 99",
+        ),
+        (good.replacen("reed_volume_mm3", "reed_volume", 1), "reed_volume"),
+        (
+            good.replacen("diameter_start_mm = 10.4", "diameter_start_mm = -10.4", 1),
+            "diameter_start_mm is -10.4",
+        ),
+        ("name = ".to_owned(), "not an instrument file"),
+    ] {
+        fs::write(d.path().join("mine.toml"), wrong).unwrap();
+        for command in ["impedance --all --peaks 1", "threshold --all"] {
+            refused(&d, &format!("{command} --instrument mine.toml --csv x.csv"), &["mine.toml", says]);
+        }
+    }
+}
+
+#[test]
+fn breath_files_are_refused_by_line() {
+    let d = tempfile::tempdir().unwrap();
+    for (text, says) in [
+        ("t_s,gamma\n0,0.5\n1,loud\n", "line 3: gamma must be a number, got \"loud\""),
+        ("# breath\n\n0,0.5\n0,0.6\n", "line 4: t_s must grow from line to line"),
+        ("0;0.5\n", "line 1: expected two columns t_s,gamma, got \"0;0.5\""),
+        ("0,0.5\n1,5\n", "line 2: gamma must lie in 0..3"),
+        ("t_s,gamma\n", "no data"),
+    ] {
+        fs::write(d.path().join("breath.csv"), text).unwrap();
+        refused(&d, "render --written 60 --breath breath.csv --out x.wav", &["breath.csv", says]);
+    }
+}
+
+#[test]
+fn numbers_out_of_range_say_what_would_be_right() {
+    let d = tempfile::tempdir().unwrap();
+    let note = "render --written 60 --out x.wav";
+    for (option, says) in [
+        ("--gamma 3.5", "must lie in 0..3"),
+        ("--gamma nan", "must lie in 0..3"),
+        ("--gamma soft", "must be a number in 0..3"),
+        ("--rate 8000", "22050..=384000"),
+        ("--bits 20", "possible values: 16, 24, 32f"),
+        ("--channels 3", "1..=2"),
+        ("--seconds 0", "must lie in 0.01..3600"),
+        ("--zeta 1", "must lie in 0.05..0.9"),
+        ("--lay 1", "must lie in 0..0.5"),
+        ("--strength 9", "must lie in 1.5..5"),
+        ("--a4 415", "must lie in 430..450"),
+        ("--temperature 50", "must lie in 10..40"),
+        ("--gain-db -90", "must lie in -60..24"),
+        ("--breath ramp:0:1", "ramp:FROM:TO:SECONDS"),
+        ("--breath ramp:0:9:1", "gamma must lie in 0..3"),
+        ("--crescendo 0.5", "FROM:TO"),
+        ("--gamma 0.5 --crescendo 0.4:0.5", "cannot be used with"),
+        ("--gamma 2 --breath-full 6", "needs 12.0 kPa"),
+        ("--gamma 2 --strength 5", "below gamma 1.67"),
+        ("--probe x.wav", "give them different names"),
+        ("--probe-every 0 --probe p.csv", "1..=1000000"),
+        ("--sounding 58", "cannot be used with"),
+    ] {
+        refused(&d, &format!("{note} {option}"), &[says]);
+    }
+    refused(&d, "render --out x.wav", &["--written", "--scale"]);
+    refused(
+        &d,
+        "render --written 40 --out x.wav",
+        &["written 40 (E2) has no fingering", "52 (E3) to 97 (C#7)"],
+    );
+    refused(&d, "render --written H4 --out x.wav", &["0..127", "E3"]);
+    refused(&d, "render --scale 40:60 --out x.wav", &["written 40"]);
+    refused(&d, "render --scale 60 --out x.wav", &["E3:C6"]);
+    refused(&d, "render --written 60", &["--out"]);
+    refused(&d, "impedance --all", &["--peaks 8"]);
+    refused(&d, "impedance --written 60 --from 100 --to 50 --csv x.csv", &["--to above --from"]);
+    refused(&d, "impedance --written 60 --step 0.001 --from 1 --to 20000 --csv x.csv", &["points"]);
+    refused(&d, "impedance --peaks 8", &["--all"]);
+    refused(&d, "threshold --all --zeta 2", &["must lie in 0.05..0.9"]);
+    refused(&d, "reed", &["--table"]);
+    refused(&d, "reed --law --H 99", &["must lie in 0.5..10"]);
+    refused(&d, "hum", &["unrecognized subcommand 'hum'"]);
+}
+
+#[test]
+fn places_that_cannot_be_written_are_refused() {
+    let d = tempfile::tempdir().unwrap();
+    fs::write(d.path().join("file"), "").unwrap();
+    fs::create_dir(d.path().join("directory")).unwrap();
+    refused(&d, "render --written 60 --out none/x.wav", &["directory none does not exist"]);
+    refused(&d, "render --written 60 --out directory --force", &["directory is not a regular file"]);
+    refused(&d, "render --written 60 --out -", &["cannot go to standard output"]);
+    refused(&d, "reed --table --csv none/x.csv", &["directory none does not exist"]);
+    // Also true for root, to whom no directory is closed.
+    refused(&d, "render --written 60 --out file/x.wav", &["cannot write file/x.wav"]);
+    refused(
+        &d,
+        "render --written 60 --seconds 0.1 --out x.wav --probe file/x.csv",
+        &["cannot write file/x.csv"],
+    );
+}
+
+#[test]
+fn existing_files_are_kept_unless_forced() {
+    let d = tempfile::tempdir().unwrap();
+    let path = d.path().join("x.wav");
+    fs::write(&path, "old").unwrap();
+    refused(&d, "render --written 60 --seconds 0.1 --out x.wav", &["x.wav exists already", "--force"]);
+    refused(&d, "reed --table --csv x.wav", &["x.wav exists already"]);
+    fs::write(d.path().join("p.csv"), "old").unwrap();
+    refused(&d, "render --written 60 --seconds 0.1 --out y.wav --probe p.csv", &["p.csv exists already"]);
+    assert_eq!(fs::read(&path).unwrap(), b"old");
+    succeeds(d.path(), "render --written 60 --seconds 0.1 --out x.wav --force");
+    assert!(fs::read(&path).unwrap().starts_with(b"RIFF"));
+    assert_eq!(names(d.path()), ["p.csv", "x.wav"]);
+}
+
+#[test]
+fn two_renders_are_identical() {
+    let d = tempfile::tempdir().unwrap();
+    let line = "--breath ramp:0:1:0.5 --seconds 1 --rate 44100 --bits 24 --probe-every 50";
+    for name in ["a", "b"] {
+        succeeds(d.path(), &format!("render --written 60 {line} --out {name}.wav --probe {name}.csv"));
+    }
+    for end in ["wav", "csv"] {
+        let file = |name: &str| fs::read(d.path().join(format!("{name}.{end}"))).unwrap();
+        assert!(file("a") == file("b"), "{end}");
+    }
+}
+
+#[test]
+fn a_wav_file_is_as_long_and_deep_as_asked() {
+    let d = tempfile::tempdir().unwrap();
+    for (bits, stored) in [("16", 16), ("24", 24), ("32f", 32)] {
+        let line = "render --written 60 --gamma 0.5 --seconds 0.5 --no-noise --rate 44100 --channels 2";
+        succeeds(d.path(), &format!("{line} --bits {bits} --out {bits}.wav"));
+        let wav = hound::WavReader::open(d.path().join(format!("{bits}.wav"))).unwrap();
+        assert_eq!((wav.spec().bits_per_sample, wav.spec().channels), (stored, 2));
+        assert_eq!((wav.spec().sample_rate, wav.duration()), (44_100, 22_050));
+    }
+    succeeds(d.path(), "render --scale E3:G3 --seconds 0.1 --out scale.wav");
+    assert_eq!(hound::WavReader::open(d.path().join("scale.wav")).unwrap().duration(), 19_200 + 48_000);
+}
+
+/// Header first, comments marked, every data line with as many numbers as the header has names.
+#[track_caller]
+fn table(text: &str, header: &str) -> Vec<Vec<f64>> {
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some(header));
+    lines
+        .filter(|line| !line.starts_with('#'))
+        .map(|line| {
+            let row: Vec<f64> = line.split(',').map(|field| field.parse().unwrap()).collect();
+            assert_eq!(row.len(), header.split(',').count(), "{line}");
+            row
+        })
+        .collect()
+}
+
+#[test]
+fn tables_keep_their_contract() {
+    let d = tempfile::tempdir().unwrap();
+    let reed = table(&succeeds(d.path(), "reed --table --csv -"), "i,p,x_a,x_b,sgn");
+    assert_eq!(reed.len(), 3601);
+    for (i, row) in reed.iter().enumerate() {
+        // Digits that read back to the same bits.
+        let p = if i == 3600 { 1.0 } else { i as f64 * (1.0 / 3600.0) };
+        assert_eq!(row[..3], [i as f64, p, p.sqrt()]);
+        assert_eq!((row[3], row[4]), (p * p.sqrt(), f64::from(u8::from(i > 0))));
+    }
+    let peaks = succeeds(d.path(), "impedance --all --peaks 8 --model tmm --csv -");
+    let peaks = table(&peaks, "written_midi,n,f_hz,mag_over_zc,q");
+    assert_eq!(peaks.len(), 46 * 8);
+    assert_eq!((peaks[0][0], peaks[0][1]), (52.0, 1.0));
+    assert!((peaks[0][2] - 148.518).abs() < 0.1, "{:?}", peaks[0]);
+    let curve =
+        table(&succeeds(d.path(), "impedance --written 65 --csv -"), "f_hz,re_z_over_zc,im_z_over_zc");
+    assert_eq!((curve[0][0], curve[3980][0], curve.len()), (20.0, 4000.0, 3981));
+    let on = table(&succeeds(d.path(), "threshold --all --zeta 0.3 --csv -"), "written_midi,gamma_on");
+    assert_eq!(on.len(), 46);
+    assert!(on.iter().all(|row| row[1] > 1.0 / 3.0 && row[1] < 0.6), "{on:?}");
+}
+
+#[test]
+fn the_probe_has_units_and_time() {
+    let d = tempfile::tempdir().unwrap();
+    succeeds(d.path(), "render --written 60 --seconds 0.2 --out x.wav --probe p.csv --probe-every 96");
+    let text = fs::read_to_string(d.path().join("p.csv")).unwrap();
+    let rows = table(&text, "t_s,gamma,opening_unit,flow_m3s,p_mouthpiece_pa,p_radiated_pa");
+    assert!(text.lines().nth(1).unwrap().contains("Pa at 1 m"));
+    assert!(rows.len() >= 100);
+    assert!(rows.iter().enumerate().all(|(i, row)| (row[0] - i as f64 * 0.001).abs() < 1e-6));
+}
+
+#[test]
+fn a_table_goes_to_a_file_whole() {
+    let d = tempfile::tempdir().unwrap();
+    let printed = succeeds(d.path(), "threshold --written F4");
+    succeeds(d.path(), "threshold --written F4 --csv x.csv");
+    assert_eq!(fs::read_to_string(d.path().join("x.csv")).unwrap(), printed);
+}
+
+#[test]
+fn a_closed_pipe_is_no_mistake() {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_chalumeau"))
+        .args(["reed", "--table"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success());
+    assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn the_example_melody_is_what_its_program_writes() {
+    let mut written = Vec::new();
+    make_melody::melody().write_std(&mut written).unwrap();
+    assert!(written == fs::read(MELODY).unwrap(), "run: cargo run --example make_melody");
+}
+
+#[test]
+fn the_example_melody_plays() {
+    let d = tempfile::tempdir().unwrap();
+    let out = d.path().join("melody.wav");
+    let output = chalumeau(d.path(), ["render".as_ref(), MELODY.as_ref(), "--out".as_ref(), out.as_os_str()]);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && !message.contains("warning"), "{message}");
+    let seconds = f64::from(hound::WavReader::open(out).unwrap().duration()) / 48_000.0;
+    assert!((20.0..35.0).contains(&seconds), "{seconds} s");
+}
