@@ -1,7 +1,15 @@
 //! Reed and bore married: the voice, how a player articulates, and what comes out at the host's rate.
 
 mod clarinet;
+pub mod embouchure;
+pub mod held;
+pub mod model;
+pub mod player;
 mod settings;
+pub mod tuning;
+pub mod voice;
 
 pub use clarinet::{Clarinet, Probe};
+pub use model::{BuildError, Model};
 pub use settings::{Settings, Tuning};
+pub use voice::Voice;

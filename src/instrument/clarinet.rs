@@ -1,16 +1,36 @@
-//! The whole instrument at the host's sample rate. (Interface first: the voice behind it is still a sine.)
+//! The whole instrument at the host's sample rate: events in, samples out.
+//!
+//! The voice runs at its internal rate on a fixed control grid; host samples are pulled from it, so output does not
+//! depend on how the host cuts its blocks.
 
+use std::sync::Arc;
+
+use crate::dsp::resampler::Resampler;
 use crate::event::{Event, Timed};
-use crate::instrument::Settings;
+use crate::instrument::embouchure::embouchure;
+use crate::instrument::model::{BuildError, Model};
+use crate::instrument::player::Player;
+use crate::instrument::settings::Settings;
+use crate::instrument::voice::{TICK, Voice};
+use crate::reed::ReedCoeffs;
+use crate::reed::ReedLaw;
+use crate::reed::ReedTables;
+
+/// Full scale per pascal at 1 m: 1 Pa is -6 dBFS.
+const FULL_SCALE_PER_PA: f64 = 0.501_187_233_627_272_2;
+/// Above this the limiter bends, full scale 1: nothing the instrument plays by itself comes near.
+const LIMITER_KNEE: f32 = 0.9;
+/// Host samples rendered in one go.
+const CHUNK: usize = 64;
 
 /// One moment of the inside of the instrument, at the internal rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Probe {
-    /// Mouth pressure over the closing pressure.
+    /// Mouth pressure over the reference closing pressure (the reed's own with the default reed).
     pub gamma: f64,
     /// Reed opening over the rest opening, 0 closed, 1 at rest.
     pub opening: f64,
-    /// Volume flow into the bore, m3/s.
+    /// Volume flow through the reed channel, m3/s.
     pub flow_m3s: f64,
     /// Pressure in the mouthpiece, Pa.
     pub p_mouthpiece_pa: f64,
@@ -18,47 +38,71 @@ pub struct Probe {
     pub p_radiated_pa: f64,
 }
 
-/// A playable clarinet: events in, samples out.
+/// A playable clarinet.
 pub struct Clarinet {
-    host_rate: f64,
-    phase: f64,
-    hz: f64,
-    gate: f64,
-    settings: Settings,
+    model: Arc<Model>,
+    player: Player,
+    voice: Voice<f32>,
+    resampler: Resampler,
+    /// Internal samples already made but not yet pulled.
+    spare: [f32; TICK],
+    spare_from: usize,
+    inner: Box<[f32]>,
+    gain: f32,
+    gain_wanted: f32,
+    gain_step: f32,
+    /// Samples of silence put out since the player came to rest.
+    quiet: u32,
+    resets: u64,
 }
 
 impl Clarinet {
     /// The built-in B flat clarinet at a host rate of 22.05..=384 kHz. Allocates.
-    pub fn built_in(host_rate_hz: f64) -> Result<Self, String> {
-        if !(22_050.0..=384_000.0).contains(&host_rate_hz) {
-            return Err(format!("sample rate must lie in 22050..384000 Hz, got {host_rate_hz}"));
+    pub fn built_in(host_rate_hz: f64) -> Result<Self, BuildError> {
+        Ok(Self::new(Arc::new(Model::built_in(host_rate_hz)?), host_rate_hz))
+    }
+
+    /// Any instrument, made ready for this host rate by [`Model`]. Allocates.
+    pub fn new(model: Arc<Model>, host_rate_hz: f64) -> Self {
+        let lip = embouchure(model.lowest_hz, model.lowest_hz);
+        let (swept, rate) = (model.swept_s, model.coeffs.rate_hz);
+        let reed = ReedCoeffs::new(ReedLaw::default(), 0.3, 0.4, lip.resonance_hz, lip.damping, swept, rate);
+        let voice = Voice::new(&model.coeffs, &model.air, ReedTables::seed(), reed);
+        let resampler = Resampler::new(rate, host_rate_hz);
+        let inner = vec![0.0; resampler.inputs_needed_at_most(CHUNK)].into_boxed_slice();
+        let gain = gain_of(&Settings::default());
+        Self {
+            model,
+            player: Player::default(),
+            voice,
+            resampler,
+            spare: [0.0; TICK],
+            spare_from: TICK,
+            inner,
+            gain,
+            gain_wanted: gain,
+            // A change of gain takes 20 ms per factor of one.
+            gain_step: (1.0 / (0.02 * host_rate_hz)) as f32,
+            quiet: 0,
+            resets: 0,
         }
-        Ok(Self { host_rate: host_rate_hz, phase: 0.0, hz: 440.0, gate: 0.0, settings: Settings::default() })
     }
 
     /// Takes new settings; heard from the next control tick on. Real-time safe.
     pub fn set_settings(&mut self, settings: &Settings) {
-        self.settings = settings.clamped();
+        self.player.set_settings(settings);
+        self.gain_wanted = gain_of(self.player.settings());
     }
 
     /// What the player does now. Real-time safe.
     pub fn apply(&mut self, event: Event) {
-        match event {
-            Event::NoteOn { note, velocity } => {
-                self.hz = note.frequency_hz(f64::from(self.settings.a4_hz));
-                self.gate = f64::from(velocity);
-            }
-            Event::NoteOff { .. } | Event::Panic => self.gate = 0.0,
-            Event::Breath(_) | Event::Bend { .. } => {}
-        }
+        self.player.apply(event, &self.model, &mut self.voice);
+        self.quiet = 0;
     }
 
     /// Overwrites `out` with the next samples, mono. Real-time safe.
     pub fn render(&mut self, out: &mut [f32]) {
-        for sample in out {
-            self.phase = (self.phase + self.hz / self.host_rate).fract();
-            *sample = (0.1 * self.gate * (self.phase * std::f64::consts::TAU).sin()) as f32;
-        }
+        self.render_with(out, &mut None);
     }
 
     /// Renders one block with its events, which must be in order of time. Real-time safe.
@@ -75,33 +119,114 @@ impl Clarinet {
 
     /// As [`render`](Self::render), calling `probe` once per internal sample, in order of time.
     pub fn render_probed(&mut self, out: &mut [f32], probe: &mut dyn FnMut(Probe)) {
-        self.render(out);
-        out.iter().for_each(|_| probe(Probe::default()));
+        self.voice.set_probing(true);
+        self.render_with(out, &mut Some(probe));
+        self.voice.set_probing(false);
+    }
+
+    fn render_with(&mut self, out: &mut [f32], probe: &mut Option<&mut dyn FnMut(Probe)>) {
+        for out in out.chunks_mut(CHUNK) {
+            let needed = self.resampler.inputs_needed(out.len()).min(self.inner.len());
+            for at in 0..needed {
+                if self.spare_from == TICK {
+                    let drive = self.player.tick(&self.model, &mut self.voice);
+                    self.spare = *self.voice.tick(&drive);
+                    self.spare_from = 0;
+                    if let (Some(probe), Some(probes)) = (probe.as_mut(), self.voice.probes()) {
+                        probes.iter().for_each(|&moment| probe(moment));
+                    }
+                }
+                self.inner[at] = self.spare[self.spare_from];
+                self.spare_from += 1;
+            }
+            self.resampler.process(&self.inner[..needed], out);
+            for sample in &mut *out {
+                let step = (self.gain_wanted - self.gain) * self.gain_step;
+                self.gain = if step.abs() < 1e-9 { self.gain_wanted } else { self.gain + step };
+                *sample = limited(*sample * self.gain);
+            }
+            if out.iter().sum::<f32>().is_finite() {
+                let audible = out.iter().any(|sample| sample.abs() > 1e-7);
+                self.quiet = if audible || !self.player.is_resting() { 0 } else { self.quiet.saturating_add(1) };
+            } else {
+                out.fill(0.0);
+                self.voice.reset();
+                self.resampler.reset();
+                self.resets += 1;
+            }
+        }
     }
 
     /// Silence, and every state as new; settings stay. Real-time safe.
     pub fn reset(&mut self) {
-        self.gate = 0.0;
-        self.phase = 0.0;
+        self.player.reset();
+        self.voice.reset();
+        self.voice.lattice_mut().glide_delay(0.0, 0);
+        for hole in 0..self.model.coeffs.holes() {
+            self.voice.lattice_mut().set_opening(hole, 0.0);
+        }
+        self.resampler.reset();
+        self.spare_from = TICK;
+        self.gain = self.gain_wanted;
+        self.quiet = 0;
     }
 
     /// Delay of the output filter, host samples.
     pub fn latency_samples(&self) -> u32 {
-        0
+        self.resampler.latency_out_samples().round() as u32
     }
 
     /// Sample rate of the lattice, Hz: 96 000, or 88 200 for hosts of the 44.1 kHz family.
     pub fn internal_rate_hz(&self) -> f64 {
-        96_000.0
+        self.model.coeffs.rate_hz
+    }
+
+    /// The instrument that is played.
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
     }
 
     /// True when nothing moves any more and no breath comes: the host may sleep.
     pub fn is_silent(&self) -> bool {
-        self.gate == 0.0
+        self.quiet > 64
     }
 
     /// How often a non-finite state had to be reset since the start.
     pub fn resets(&self) -> u64 {
-        0
+        self.resets + self.voice.resets()
+    }
+
+    /// The voice inside, to be disturbed by tests.
+    #[doc(hidden)]
+    pub fn voice_mut(&mut self) -> &mut Voice<f32> {
+        &mut self.voice
+    }
+}
+
+fn gain_of(settings: &Settings) -> f32 {
+    (FULL_SCALE_PER_PA * 10.0_f64.powf(f64::from(settings.gain_db) / 20.0)) as f32
+}
+
+/// Untouched below the knee, never beyond full scale above it.
+fn limited(sample: f32) -> f32 {
+    let over = sample.abs() - LIMITER_KNEE;
+    if over > 0.0 {
+        (LIMITER_KNEE + (1.0 - LIMITER_KNEE) * (over / (1.0 - LIMITER_KNEE)).tanh()).copysign(sample)
+    } else {
+        sample
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::limited;
+
+    #[test]
+    fn limiter_is_transparent_below_and_bounded_above() {
+        assert_eq!(limited(0.89), 0.89);
+        assert_eq!(limited(-0.5), -0.5);
+        for over in [0.95, 1.0, 10.0, 1e30, f32::INFINITY] {
+            assert!(limited(over) <= 1.0 && limited(-over) >= -1.0);
+        }
     }
 }

@@ -1,0 +1,113 @@
+//! A note held by a blowing machine: constant fingering and lip, breath from a ramp or behind a tongue.
+//!
+//! What tuning, thresholds and the tests of physics play; a musician plays through [`player`](super::player).
+
+use crate::instrument::embouchure::embouchure;
+use crate::instrument::model::Model;
+use crate::instrument::voice::{Drive, TICK, Voice};
+use crate::reed::ReedCoeffs;
+use crate::reed::ReedLaw;
+use crate::reed::ReedTables;
+use crate::reed::motion::TONGUE_FORCE;
+
+/// How a held note begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Start {
+    /// Mouth pressure rises over so many ms.
+    Ramp(f64),
+    /// The tongue holds the reed while breath rises, and lets go in so many ms.
+    Tongued(f64),
+}
+
+/// How long the machine's tongue holds the reed before it lets go, s.
+pub const TONGUE_HOLD_S: f64 = 0.020;
+
+/// A held note.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeldNote {
+    /// Index of the fingering in the instrument file.
+    pub fingering: usize,
+    /// Mouth pressure over the closing pressure.
+    pub gamma: f64,
+    /// Embouchure parameter.
+    pub zeta: f64,
+    /// Half-width of the lay's knee.
+    pub lay: f64,
+    /// Damping over the embouchure rule's.
+    pub damping: f64,
+    /// Jet loss K.
+    pub jet_loss: f64,
+    /// Breath noise, 0..=1.
+    pub noise: f64,
+    /// Tuning delay, rows.
+    pub rows: f64,
+    /// How it begins.
+    pub start: Start,
+}
+
+impl HeldNote {
+    /// A note at a mouth pressure, everything else as the reference clarinet has it, without noise.
+    pub fn new(model: &Model, fingering: usize, gamma: f64) -> Self {
+        Self {
+            fingering,
+            gamma,
+            zeta: 0.3,
+            lay: 0.4,
+            damping: 1.0,
+            jet_loss: 2.0,
+            noise: 0.0,
+            rows: model.tuning.notes[fingering].natural,
+            start: Start::Ramp(20.0),
+        }
+    }
+
+    /// The reed this note is played with.
+    pub fn reed(&self, model: &Model) -> ReedCoeffs {
+        let lip = embouchure(model.notes_hz[self.fingering], model.lowest_hz);
+        let law = ReedLaw::default();
+        let damping = lip.damping * self.damping;
+        ReedCoeffs::new(law, self.zeta, self.lay, lip.resonance_hz, damping, model.swept_s, model.coeffs.rate_hz)
+    }
+
+    /// A silent voice fingered and ready for this note.
+    pub fn voice<F: crate::bore::lattice::Real>(&self, model: &Model) -> Voice<F> {
+        let mut voice = Voice::new(&model.coeffs, &model.air, ReedTables::seed(), self.reed(model));
+        for (hole, &open) in model.file.fingerings[self.fingering].open.iter().enumerate() {
+            voice.lattice_mut().set_opening(hole, f64::from(u8::from(open)));
+        }
+        voice.lattice_mut().set_jet_loss(self.jet_loss);
+        voice.lattice_mut().glide_delay(self.rows, 0);
+        voice
+    }
+
+    /// Mouth pressure and tongue force at `t` seconds.
+    pub fn breath(&self, t: f64) -> (f64, f64) {
+        match self.start {
+            Start::Ramp(ms) => (self.gamma * (t / (1e-3 * ms)).min(1.0), 0.0),
+            Start::Tongued(ms) => {
+                let let_go = ((t - TONGUE_HOLD_S) / (1e-3 * ms)).clamp(0.0, 1.0);
+                (self.gamma * (t / (0.5 * TONGUE_HOLD_S)).min(1.0), TONGUE_FORCE * (1.0 - let_go))
+            }
+        }
+    }
+
+    /// Plays for `seconds`; `heard` gets the radiated pressure (Pa at 1 m) and the voice after each control tick.
+    pub fn play(&self, model: &Model, seconds: f64, mut heard: impl FnMut(&[f32; TICK], &Voice<f32>)) {
+        let mut voice: Voice<f32> = self.voice(model);
+        let reed = self.reed(model);
+        let rate = model.coeffs.rate_hz;
+        let ticks = (seconds * rate / TICK as f64).round() as usize;
+        for tick in 0..ticks {
+            let (p_mouth, tongue) = self.breath((tick + 1) as f64 * TICK as f64 / rate);
+            let out = *voice.tick(&Drive { p_mouth, tongue, noise: self.noise, reed });
+            heard(&out, &voice);
+        }
+    }
+
+    /// The radiated pressure from `from_s` to `to_s`, at the internal rate.
+    pub fn radiated(&self, model: &Model, from_s: f64, to_s: f64) -> Vec<f64> {
+        let mut all = Vec::with_capacity((to_s * model.coeffs.rate_hz) as usize + TICK);
+        self.play(model, to_s, |out, _| all.extend(out.iter().map(|&x| f64::from(x))));
+        all.split_off(((from_s * model.coeffs.rate_hz) as usize).min(all.len()))
+    }
+}

@@ -1,0 +1,312 @@
+//! The player: turns notes, breath and settings into holes, lip, tongue and mouth pressure, tick by tick.
+//!
+//! Keys without a breath source are blown by their velocity. As soon as any breath arrives, breath alone makes the
+//! loudness and velocity only hardens the tongue. Notes that overlap are slurred (the holes move, the tongue stays
+//! away); a note after a gap is tongued: the tongue holds the reed while the breath rises behind it, and lets go.
+
+use crate::event::Event;
+use crate::instrument::embouchure::embouchure;
+use crate::instrument::model::{Model, P_REF_PA};
+use crate::instrument::settings::Settings;
+use crate::instrument::voice::{Drive, TICK, Voice};
+use crate::reed::ReedCoeffs;
+use crate::reed::ReedLaw;
+use crate::reed::law::coupled_k;
+use crate::reed::motion::TONGUE_FORCE;
+use crate::units::{Air, SoundingNote, cents};
+
+/// Keys that can be held at once; more push the oldest out.
+const STACK: usize = 16;
+/// How long the tongue holds the reed before a tongued note, s: long enough for the breath to rise behind it.
+const TONGUE_HOLD_S: f64 = 0.008;
+/// How fast the tongue reaches the reed to stop a note, s.
+const TONGUE_STOP_S: f64 = 0.005;
+/// Time constants of the breath, s: rising behind the tongue, following a controller, ending.
+const BREATH_RISE_S: f64 = 0.002;
+const BREATH_FOLLOW_S: f64 = 0.005;
+const BREATH_END_S: f64 = 0.012;
+/// Breath by velocity, gamma: just above the threshold .. loud (by ear).
+const VELOCITY_GAMMA: (f64, f64) = (0.43, 0.85);
+/// A slur of an octave or more, or into the altissimo, is helped by a dip of the breath, as players do: depth, length.
+const DIP: (f64, f64) = (0.3, 0.025);
+/// A note is over when its breath is below this share of the closing pressure.
+const NO_BREATH: f64 = 1e-6;
+
+/// Where the tongue is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Tongue {
+    /// Away from the reed.
+    Away,
+    /// Holding the reed for so many more seconds before a note.
+    Holding(f64),
+    /// Letting go, share 1 .. 0.
+    Leaving(f64),
+    /// Pressing to stop a note, share 0 .. 1.
+    Stopping(f64),
+}
+
+/// What the player is doing.
+#[derive(Clone, Debug)]
+pub struct Player {
+    settings: Settings,
+    held: [SoundingNote; STACK],
+    held_count: usize,
+    velocity: f64,
+    /// Fingering in place, if any note was ever played.
+    fingering: Option<usize>,
+    /// Control ticks until the holes have arrived.
+    gliding: u32,
+    breath_live: bool,
+    breath: f64,
+    gamma: f64,
+    tongue: Tongue,
+    bend_cents: f64,
+    dip: f64,
+    rows: f64,
+    rows_set: bool,
+}
+
+impl Default for Player {
+    fn default() -> Self {
+        Self {
+            settings: Settings::default(),
+            held: [SoundingNote(0); STACK],
+            held_count: 0,
+            velocity: 0.0,
+            fingering: None,
+            gliding: 0,
+            breath_live: false,
+            breath: 0.0,
+            gamma: 0.0,
+            tongue: Tongue::Away,
+            bend_cents: 0.0,
+            dip: 0.0,
+            rows: 0.0,
+            rows_set: false,
+        }
+    }
+}
+
+impl Player {
+    /// New settings; heard from the next tick on.
+    pub fn set_settings(&mut self, settings: &Settings) {
+        self.settings = settings.clamped();
+    }
+
+    /// The settings in use.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// As new; settings stay.
+    pub fn reset(&mut self) {
+        *self = Self { settings: self.settings, ..Self::default() };
+    }
+
+    /// What the player is told. Real-time safe.
+    pub fn apply<F: crate::bore::lattice::Real>(&mut self, event: Event, model: &Model, voice: &mut Voice<F>) {
+        match event {
+            Event::NoteOn { note, velocity } => self.note_on(note, velocity, model, voice),
+            Event::NoteOff { note } => self.note_off(note, model, voice),
+            Event::Breath(breath) => {
+                self.breath_live = true;
+                self.breath = f64::from(if breath.is_finite() { breath.clamp(0.0, 1.0) } else { 0.0 });
+            }
+            Event::Bend { cents } => {
+                self.bend_cents = f64::from(if cents.is_finite() { cents.clamp(-4_800.0, 4_800.0) } else { 0.0 });
+            }
+            Event::Panic => {
+                self.reset();
+                voice.reset();
+            }
+        }
+    }
+
+    fn note_on<F: crate::bore::lattice::Real>(
+        &mut self,
+        note: SoundingNote,
+        velocity: f32,
+        model: &Model,
+        voice: &mut Voice<F>,
+    ) {
+        // A note the instrument does not have is no note.
+        let Some(fingering) = model.fingering_for(note) else { return };
+        let slurred = self.held_count > 0;
+        self.release(note);
+        if self.held_count == STACK {
+            self.held.copy_within(1.., 0);
+            self.held_count -= 1;
+        }
+        self.held[self.held_count] = note;
+        self.held_count += 1;
+        self.velocity = f64::from(if velocity.is_finite() { velocity.clamp(0.0, 1.0) } else { 0.5 });
+        if !slurred {
+            self.tongue = Tongue::Holding(TONGUE_HOLD_S);
+        }
+        self.finger(fingering, slurred, model, voice);
+    }
+
+    fn note_off<F: crate::bore::lattice::Real>(&mut self, note: SoundingNote, model: &Model, voice: &mut Voice<F>) {
+        let sounding = self.held_count > 0 && self.held[self.held_count - 1] == note;
+        self.release(note);
+        if !sounding {
+            return;
+        }
+        match self.held_count.checked_sub(1).and_then(|last| model.fingering_for(self.held[last])) {
+            Some(fingering) => self.finger(fingering, true, model, voice),
+            None => self.tongue = Tongue::Stopping(0.0),
+        }
+    }
+
+    fn release(&mut self, note: SoundingNote) {
+        if let Some(at) = self.held[..self.held_count].iter().position(|&held| held == note) {
+            self.held.copy_within(at + 1..self.held_count, at);
+            self.held_count -= 1;
+        }
+    }
+
+    /// Moves the fingers; slurred they take their time, behind the tongue they are quick.
+    fn finger<F: crate::bore::lattice::Real>(
+        &mut self,
+        fingering: usize,
+        slurred: bool,
+        model: &Model,
+        voice: &mut Voice<F>,
+    ) {
+        let tick_s = TICK as f64 / model.coeffs.rate_hz;
+        if let (true, Some(from)) = (slurred, self.fingering) {
+            let leap = cents(model.notes_hz[fingering], model.notes_hz[from]).abs() > 1_150.0;
+            let (old, new) = (model.registers[from], model.registers[fingering]);
+            if leap || (old != new && old.max(new) > 2) {
+                self.dip = DIP.1;
+            }
+        }
+        let ms = if slurred { f64::from(self.settings.legato_ms) } else { 5.0 };
+        let ticks = ((1e-3 * ms / tick_s).round() as u32).max(1);
+        self.gliding = if self.fingering.is_some() { ticks } else { 0 };
+        self.fingering = Some(fingering);
+        for (hole, &open) in model.file.fingerings[fingering].open.iter().enumerate() {
+            let opening = f64::from(u8::from(open));
+            if self.gliding == 0 {
+                voice.lattice_mut().set_opening(hole, opening);
+            } else {
+                voice.lattice_mut().glide_opening(hole, opening, ticks as usize * TICK);
+            }
+        }
+    }
+
+    /// True while nothing is held and the breath has gone.
+    pub fn is_resting(&self) -> bool {
+        self.gamma < NO_BREATH && (self.held_count == 0 || (self.breath_live && self.breath == 0.0))
+    }
+
+    /// The law the reed has under the present settings: strength is stiffness, the lip sets the opening.
+    fn law(&self) -> (ReedLaw, f64) {
+        let settings = &self.settings;
+        let seed_h = f64::from(settings.reed_h);
+        let seed_k = if settings.coupled { coupled_k(seed_h) } else { f64::from(settings.reed_k) };
+        // A box strength is about 20 % stiffer per half number (makers' charts, by judgement).
+        let strength = 1.2_f64.powf(2.0 * (f64::from(settings.strength) - 2.5));
+        let h = (seed_h * f64::from(settings.lip)).clamp(0.5, 10.0);
+        let k = (seed_k * strength).clamp(0.01, 20.0);
+        let law = ReedLaw::free(h, k, f64::from(settings.reed_a)).unwrap_or_default();
+        (law, f64::from(settings.zeta))
+    }
+
+    /// Advances one control tick: moves holes and delay, and says how the reed is driven. Real-time safe.
+    pub fn tick<F: crate::bore::lattice::Real>(&mut self, model: &Model, voice: &mut Voice<F>) -> Drive {
+        let tick_s = TICK as f64 / model.coeffs.rate_hz;
+        let settings = self.settings;
+        let (law, zeta) = self.law();
+        let closing = law.closing();
+        let fingering = self.fingering.unwrap_or(0);
+
+        if self.gliding > 0 {
+            self.gliding -= 1;
+            if self.gliding == 0 {
+                for (hole, &open) in model.file.fingerings[fingering].open.iter().enumerate() {
+                    voice.lattice_mut().set_opening(hole, f64::from(u8::from(open)));
+                }
+            }
+        }
+
+        // Breath.
+        let playing = self.held_count > 0;
+        let wanted = match (playing, self.breath_live) {
+            (false, _) => 0.0,
+            (true, true) => self.breath * 1e3 * f64::from(settings.breath_full_kpa) / (P_REF_PA * closing),
+            (true, false) => {
+                let (soft, loud) = VELOCITY_GAMMA;
+                soft + (loud - soft) * self.velocity
+            }
+        };
+        let (wanted, dipping) = if self.dip > 0.0 { (wanted * DIP.0, true) } else { (wanted, false) };
+        self.dip -= tick_s;
+        let time_s = if !playing {
+            BREATH_END_S
+        } else if matches!(self.tongue, Tongue::Holding(_)) || dipping {
+            BREATH_RISE_S
+        } else {
+            BREATH_FOLLOW_S
+        };
+        self.gamma += (wanted - self.gamma) * (1.0 - (-tick_s / time_s).exp());
+        if wanted == 0.0 && self.gamma < NO_BREATH {
+            self.gamma = 0.0;
+        }
+
+        // Tongue.
+        let (tongue, share) = match self.tongue {
+            Tongue::Away => (Tongue::Away, 0.0),
+            Tongue::Holding(left) if left > tick_s => (Tongue::Holding(left - tick_s), 1.0),
+            Tongue::Holding(_) => (Tongue::Leaving(1.0), 1.0),
+            Tongue::Leaving(share) => {
+                // Velocity hardens the tongue when the breath is live: up to twice as quick as set.
+                let hard = if self.breath_live { 0.5 + self.velocity } else { 1.0 };
+                let share = share - tick_s * hard / (1e-3 * f64::from(settings.tongue_ms));
+                if share > 0.0 { (Tongue::Leaving(share), share) } else { (Tongue::Away, 0.0) }
+            }
+            Tongue::Stopping(share) => {
+                let share = (share + tick_s / TONGUE_STOP_S).min(1.0);
+                if self.gamma == 0.0 && share == 1.0 { (Tongue::Away, 0.0) } else { (Tongue::Stopping(share), share) }
+            }
+        };
+        self.tongue = tongue;
+
+        // Lip and tuning.
+        let lip = embouchure(model.notes_hz[fingering], model.lowest_hz);
+        let reed = ReedCoeffs::new(
+            law,
+            zeta,
+            f64::from(settings.lay),
+            lip.resonance_hz,
+            lip.damping * f64::from(settings.damping),
+            model.swept_s,
+            model.coeffs.rate_hz,
+        );
+        voice.lattice_mut().set_jet_loss(f64::from(settings.vent_loss));
+        let offset = self.bend_cents
+            + cents(f64::from(settings.a4_hz), 440.0)
+            + cents(Air::at(f64::from(settings.temperature_c)).c, model.air.c);
+        let sensitivity = model.tuning.notes.get(fingering).map_or(1.0, |note| note.sensitivity);
+        let rows = model.tuning.rows(fingering, settings.tuning, self.gamma)
+            + sensitivity * model.rows_for_cents(fingering, offset);
+        // The delay follows within the time the fingers take; the first note has it at once.
+        if self.rows_set {
+            let time_s = 0.5e-3 * f64::from(settings.legato_ms);
+            self.rows += (rows - self.rows) * (1.0 - (-tick_s / time_s).exp());
+            voice.lattice_mut().glide_delay(self.rows, TICK);
+        } else {
+            self.rows = rows;
+            self.rows_set = self.fingering.is_some();
+            voice.lattice_mut().glide_delay(self.rows, 0);
+        }
+
+        Drive {
+            p_mouth: self.gamma * closing,
+            tongue: TONGUE_FORCE * closing * share,
+            noise: f64::from(settings.noise),
+            reed,
+        }
+    }
+}
+

@@ -1,0 +1,245 @@
+//! One reed on one bore, at the internal rate: the thing that sounds. It knows pressures and holes, not notes.
+
+use std::sync::Arc;
+
+use crate::bore::lattice::{Lattice, LatticeCoeffs, Real, Tip};
+use crate::instrument::clarinet::Probe;
+use crate::instrument::model::P_REF_PA;
+use crate::reed::ReedCoeffs;
+use crate::reed::ReedState;
+use crate::reed::ReedTables;
+use crate::units::{Air, REFERENCE_RADIUS_M};
+
+/// Samples of one control tick: everything a player moves, moves on this grid, counted from reset.
+pub const TICK: usize = 16;
+/// Ticks between two flushes of states too small to hear.
+const FLUSH_TICKS: u32 = 8;
+/// Breath noise at `noise` = 1: rms of the noise flow over the mean flow it rides on (by ear and by level: -40 dB under
+/// a mezzo-forte fundamental at the default 0.3).
+const NOISE_FLOW: f64 = 0.06;
+/// Corners of the noise band, Hz: turbulence in the channel is broad around a few kHz (physics notes, by judgement).
+const NOISE_BAND_HZ: (f64, f64) = (600.0, 5_000.0);
+
+/// What the player's breath, lip and tongue do during one control tick. Pressures over the reference closing pressure.
+#[derive(Clone, Copy, Debug)]
+pub struct Drive {
+    /// Mouth pressure reached at the end of the tick.
+    pub p_mouth: f64,
+    /// Force of the tongue on the reed reached at the end of the tick.
+    pub tongue: f64,
+    /// Breath noise, 0..=1.
+    pub noise: f64,
+    /// The reed under the lip.
+    pub reed: ReedCoeffs,
+}
+
+/// A sounding reed and bore. `F` is `f32` to play, `f64` to prove.
+pub struct Voice<F = f32> {
+    lattice: Lattice<F>,
+    mouth: Mouth,
+    ticks: u32,
+    resets: u64,
+}
+
+/// Everything at the reed end, and the ear outside.
+struct Mouth {
+    tables: &'static ReedTables,
+    reed: ReedCoeffs,
+    state: ReedState,
+    kappa: f64,
+    p_mouth: f64,
+    p_mouth_glide: f64,
+    tongue: f64,
+    tongue_glide: f64,
+    noise: f64,
+    random: u64,
+    noise_low: f64,
+    noise_band: f64,
+    noise_corners: (f64, f64),
+    last_flow: f64,
+    /// Radiated pressure at 1 m per change of flow, Pa.
+    loudness: f64,
+    out: [f32; TICK],
+    probes: Option<[Probe; TICK]>,
+    at: usize,
+    flow_unit: f64,
+}
+
+/// Seed of the breath noise: any constant; renders repeat.
+const NOISE_SEED: u64 = 0x9E37_79B9_7F4A_7C15;
+
+impl Mouth {
+    /// White noise, uniform with unit variance (xorshift64*, Vigna 2016).
+    #[inline(always)]
+    fn white(&mut self) -> f64 {
+        let mut x = self.random;
+        x ^= x >> 12;
+        x ^= x << 25;
+        x ^= x >> 27;
+        self.random = x;
+        let bits = x.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11;
+        (bits as f64 * (2.0 / (1_u64 << 53) as f64) - 1.0) * 1.732_050_807_568_877_2
+    }
+}
+
+impl<F: Real> Tip<F> for Mouth {
+    #[inline(always)]
+    fn reflect(&mut self, p_minus: F) -> F {
+        self.p_mouth += self.p_mouth_glide;
+        self.tongue += self.tongue_glide;
+        let mut noise = 0.0;
+        if self.noise > 0.0 {
+            let white = self.white();
+            self.noise_low += self.noise_corners.1 * (white - self.noise_low);
+            self.noise_band += self.noise_corners.0 * (self.noise_low - self.noise_band);
+            // Turbulence rides on the jet: no flow, no noise.
+            noise = self.noise * self.state.flow.abs() * (self.noise_low - self.noise_band);
+        }
+        let p_plus = self.state.tick(
+            &self.reed,
+            self.tables,
+            self.kappa,
+            self.p_mouth,
+            p_minus.wide(),
+            noise,
+            self.tongue,
+        );
+        F::of(p_plus)
+    }
+
+    #[inline(always)]
+    fn radiated(&mut self, flow: F) {
+        let flow = flow.wide();
+        let pressure = (flow - self.last_flow) * self.loudness;
+        self.last_flow = flow;
+        let at = self.at & (TICK - 1);
+        self.out[at] = pressure as f32;
+        if let Some(probes) = &mut self.probes {
+            probes[at] = Probe {
+                gamma: self.p_mouth,
+                opening: self.state.opening,
+                flow_m3s: self.state.flow * self.flow_unit,
+                p_mouthpiece_pa: self.state.p_mouthpiece * P_REF_PA,
+                p_radiated_pa: pressure,
+            };
+        }
+        self.at += 1;
+    }
+}
+
+impl<F: Real> Voice<F> {
+    /// A silent voice. Allocates.
+    pub fn new(coeffs: &Arc<LatticeCoeffs>, air: &Air, tables: &'static ReedTables, reed: ReedCoeffs) -> Self {
+        let rate = coeffs.rate_hz;
+        let flow_unit = P_REF_PA / air.z_c(REFERENCE_RADIUS_M);
+        let corner = |hz: f64| 1.0 - (-std::f64::consts::TAU * hz / rate).exp();
+        Self {
+            lattice: Lattice::new(coeffs),
+            mouth: Mouth {
+                tables,
+                reed,
+                state: ReedState::default(),
+                kappa: 1.0 / coeffs.tip_admittance(),
+                p_mouth: 0.0,
+                p_mouth_glide: 0.0,
+                tongue: 0.0,
+                tongue_glide: 0.0,
+                noise: 0.0,
+                random: NOISE_SEED,
+                noise_low: 0.0,
+                noise_band: 0.0,
+                noise_corners: (corner(NOISE_BAND_HZ.0), corner(NOISE_BAND_HZ.1)),
+                last_flow: 0.0,
+                loudness: air.rho / (4.0 * std::f64::consts::PI) * flow_unit * rate,
+                out: [0.0; TICK],
+                probes: None,
+                at: 0,
+                flow_unit,
+            },
+            ticks: 0,
+            resets: 0,
+        }
+    }
+
+    /// The bore, for openings and delay.
+    pub fn lattice_mut(&mut self) -> &mut Lattice<F> {
+        &mut self.lattice
+    }
+
+    /// The bore.
+    pub fn lattice(&self) -> &Lattice<F> {
+        &self.lattice
+    }
+
+    /// Keeps the plain code path, see [`Lattice::without_avx2`].
+    pub fn without_avx2(mut self) -> Self {
+        self.lattice = self.lattice.without_avx2();
+        self
+    }
+
+    /// Starts or stops recording the inside of the instrument.
+    pub fn set_probing(&mut self, on: bool) {
+        self.mouth.probes = on.then(|| [Probe::default(); TICK]);
+    }
+
+    /// The probes of the last tick, if they are on.
+    pub fn probes(&self) -> Option<&[Probe; TICK]> {
+        self.mouth.probes.as_ref()
+    }
+
+    /// One control tick: the radiated pressure at 1 m, Pa. Real-time safe. [audio thread]
+    ///
+    /// A state that is no longer finite is reset to silence and counted; nothing here can fail.
+    pub fn tick(&mut self, drive: &Drive) -> &[f32; TICK] {
+        let mouth = &mut self.mouth;
+        mouth.reed = drive.reed;
+        mouth.p_mouth_glide = (drive.p_mouth - mouth.p_mouth) / TICK as f64;
+        mouth.tongue_glide = (drive.tongue - mouth.tongue) / TICK as f64;
+        mouth.noise = drive.noise * NOISE_FLOW;
+        mouth.at = 0;
+        self.lattice.run(TICK, mouth);
+        (mouth.p_mouth, mouth.tongue) = (drive.p_mouth, drive.tongue);
+        self.ticks = self.ticks.wrapping_add(1);
+        if self.ticks.is_multiple_of(FLUSH_TICKS) {
+            self.lattice.flush();
+        }
+        let state = self.mouth.state;
+        if !(self.mouth.out.iter().sum::<f32>() + (state.closing + state.speed + state.p_mouthpiece) as f32).is_finite() {
+            self.reset();
+            self.resets += 1;
+        }
+        &self.mouth.out
+    }
+
+    /// Silence, noise generator and tick counter included; openings and delay stay. Real-time safe.
+    pub fn reset(&mut self) {
+        self.lattice.reset();
+        let mouth = &mut self.mouth;
+        mouth.state = ReedState::default();
+        (mouth.p_mouth, mouth.p_mouth_glide, mouth.tongue, mouth.tongue_glide) = (0.0, 0.0, 0.0, 0.0);
+        (mouth.noise_low, mouth.noise_band, mouth.last_flow) = (0.0, 0.0, 0.0);
+        mouth.random = NOISE_SEED;
+        mouth.out = [0.0; TICK];
+        self.ticks = 0;
+    }
+
+    /// How often a non-finite state was reset.
+    pub fn resets(&self) -> u64 {
+        self.resets
+    }
+
+    /// Pressure in the mouthpiece in the last sample, over the reference closing pressure.
+    pub fn p_mouthpiece(&self) -> f64 {
+        self.mouth.state.p_mouthpiece
+    }
+
+    /// The reed as it stands.
+    pub fn reed(&self) -> ReedState {
+        self.mouth.state
+    }
+
+    /// For tests: the reed as it stands, to be disturbed.
+    pub fn reed_mut(&mut self) -> &mut ReedState {
+        &mut self.mouth.state
+    }
+}
