@@ -11,6 +11,7 @@ mod render;
 mod settings;
 mod table;
 mod threshold;
+mod tune;
 
 use crate::bore::instrument_file::InstrumentError;
 use crate::reed::law::ReedError;
@@ -30,6 +31,7 @@ Examples:
   chalumeau render --written C4 --gamma 0.5 --seconds 1.5 --out c4.wav
   chalumeau impedance --all --peaks 8 --csv peaks.csv
   chalumeau threshold --all --zeta 0.3
+  chalumeau tune --rate 48000 --gamma 0.5
 
 Notes are MIDI numbers (60) or names (C4, F#5, Bb3). The player of a B flat clarinet reads
 *written* notes, which sound two semitones lower. Mouth pressure is given as gamma: the pressure
@@ -49,6 +51,7 @@ enum Command {
     Render(Box<render::Render>),
     Impedance(impedance::Impedance),
     Threshold(threshold::Threshold),
+    Tune(Box<tune::Tune>),
     Reed(reed::Reed),
 }
 
@@ -92,6 +95,7 @@ pub fn main() -> ExitCode {
         Command::Render(command) => command.run(),
         Command::Impedance(command) => command.run(),
         Command::Threshold(command) => command.run(),
+        Command::Tune(command) => command.run(),
         Command::Reed(command) => command.run(),
     };
     match done {

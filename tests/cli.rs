@@ -162,7 +162,10 @@ fn numbers_out_of_range_say_what_would_be_right() {
     refused(&d, "impedance --all", &["--peaks 8"]);
     refused(&d, "impedance --written 60 --from 100 --to 50 --csv x.csv", &["--to above --from"]);
     refused(&d, "impedance --written 60 --step 0.001 --from 1 --to 20000 --csv x.csv", &["points"]);
-    refused(&d, "impedance --peaks 8", &["--all"]);
+    refused(&d, "impedance", &["--peaks 8"]);
+    refused(&d, "impedance --written 40 --peaks 8", &["written 40 (E2) has no fingering"]);
+    refused(&d, "tune --gamma 9", &["must lie in 0..3"]);
+    refused(&d, "tune --written 40", &["written 40 (E2) has no fingering"]);
     refused(&d, "threshold --all --zeta 2", &["must lie in 0.05..0.9"]);
     refused(&d, "reed", &["--table"]);
     refused(&d, "reed --law --H 99", &["must lie in 0.5..10"]);
@@ -266,6 +269,9 @@ fn tables_keep_their_contract() {
     let on = table(&succeeds(d.path(), "threshold --all --zeta 0.3 --csv -"), "written_midi,gamma_on");
     assert_eq!(on.len(), 46);
     assert!(on.iter().all(|row| row[1] > 1.0 / 3.0 && row[1] < 0.6), "{on:?}");
+    let tune = "tune --written 60 --rate 48000 --gamma 0.5 --csv -";
+    let tune = table(&succeeds(d.path(), tune), "written_midi,f_hz,cents,register_ok");
+    assert!((tune[0][1] - 233.08).abs() < 2.0 && tune[0][3] == 1.0, "{tune:?}");
 }
 
 #[test]

@@ -40,9 +40,9 @@ impl AirArg {
 
 /// Which notes: the whole fingering chart or one of it.
 #[derive(Args)]
-#[group(id = "notes", required = true, multiple = false)]
+#[group(id = "notes", multiple = false)]
 pub struct NotesArg {
-    /// Every note of the fingering chart
+    /// Every note of the fingering chart (the default)
     #[arg(long)]
     all: bool,
     /// One written note: a MIDI number (65) or a name (F4)

@@ -69,8 +69,10 @@ impl Impedance {
         let steps = ((self.to - self.from) / self.step + 1e-9).floor();
         if self.peaks.is_none() {
             if self.notes.one().is_none() {
-                let right = "add --peaks 8 for a table of all notes, or choose one note with --written";
-                return Err(Failure::Usage(format!("--all without --peaks would be many curves; {right}")));
+                let right = "add --peaks 8 for the peaks of all notes, or choose one note with --written";
+                return Err(Failure::Usage(format!(
+                    "one curve for each note would be too much for a table; {right}"
+                )));
             }
             if !(0.0..=POINTS_MAX).contains(&steps) {
                 return Err(Failure::Usage(format!(

@@ -6,13 +6,12 @@ use crate::cli::args::{check_fingering, note, within};
 use crate::cli::settings::SettingsArgs;
 use crate::cli::table::Table;
 use crate::event::{Event, Timed};
-use crate::instrument::{Clarinet, Probe, Settings};
+use crate::instrument::{Clarinet, Probe};
 use crate::render as player;
 use crate::render::breath::BreathCurve;
 use crate::render::breath::GAMMA_MAX;
 use crate::render::midi_file;
 use crate::render::output::NewFile;
-use crate::render::score;
 use crate::render::score::Score;
 use crate::render::wav::{Depth, Level, WavFile};
 use crate::units::{SoundingNote, WrittenNote};
@@ -23,9 +22,6 @@ use std::path::{Path, PathBuf};
 
 /// Samples per block; any number gives the same sound.
 const BLOCK: usize = 512;
-
-/// Most mouth pressure the instrument's settings know, kPa.
-const BREATH_FULL_MAX_KPA: f32 = 20.0;
 
 /// Gamma where nothing else is said: a full, easy tone.
 const GAMMA_DEFAULT: f32 = 0.5;
@@ -128,7 +124,7 @@ impl Render {
     pub fn run(&self) -> Result<(), Failure> {
         let file = InstrumentFile::built_in();
         let curve = self.curve()?;
-        let settings = self.settings(curve.as_ref())?;
+        let settings = self.settings.blown_by(curve.as_ref())?;
         let mut score = self.score(&file)?;
         if let Some(curve) = &curve {
             score = score.blown(curve, &settings, self.rate);
@@ -136,7 +132,7 @@ impl Render {
         // A single note lasts as long as was asked; a melody gets time to fade.
         let one_note = self.written.is_some() || self.sounding.is_some();
         score = score.with_tail(self.tail.unwrap_or(if one_note { 0.0 } else { 1.0 }), self.rate);
-        let mut clarinet = Clarinet::built_in(f64::from(self.rate)).map_err(Failure::Usage)?;
+        let mut clarinet = Clarinet::built_in(f64::from(self.rate)).map_err(|error| Failure::Usage(error.to_string()))?;
         clarinet.set_settings(&settings);
 
         self.refuse_same_file()?;
@@ -195,28 +191,6 @@ impl Render {
             Ok(curve) => Ok(Some(curve)),
             Err(source) => Err(Failure::BreathFile { path, source }),
         }
-    }
-
-    /// Full breath must reach the largest gamma: it is raised for it unless the user has chosen it.
-    fn settings(&self, curve: Option<&BreathCurve>) -> Result<Settings, Failure> {
-        let mut settings = self.settings.settings();
-        let Some(gamma_max) = curve.map(BreathCurve::gamma_max) else { return Ok(settings) };
-        let closing_kpa = score::closing_kpa(&settings);
-        let needed_kpa = gamma_max * closing_kpa;
-        if needed_kpa <= settings.breath_full_kpa {
-            return Ok(settings);
-        }
-        let limit_kpa =
-            if self.settings.breath_full_given() { settings.breath_full_kpa } else { BREATH_FULL_MAX_KPA };
-        if needed_kpa > limit_kpa {
-            return Err(Failure::Usage(format!(
-                "gamma {gamma_max} needs {needed_kpa:.1} kPa with this reed, but full breath is {limit_kpa} kPa; \
-                 stay below gamma {:.2}, or take a softer reed or more --breath-full (up to {BREATH_FULL_MAX_KPA})",
-                limit_kpa / closing_kpa
-            )));
-        }
-        settings.breath_full_kpa = needed_kpa;
-        Ok(settings)
     }
 
     fn score(&self, file: &InstrumentFile) -> Result<Score, Failure> {
@@ -317,7 +291,7 @@ fn warn_of_missing_fingerings(events: &[Timed<Event>], file: &InstrumentFile) {
 }
 
 /// Seen on a terminal only.
-fn progress(samples: usize) -> ProgressBar {
+pub fn progress(samples: usize) -> ProgressBar {
     let bar = ProgressBar::new(samples as u64);
     match ProgressStyle::with_template("{bar:40} {percent:>3} %  {elapsed} (left: {eta})") {
         Ok(style) => bar.with_style(style),

@@ -1,8 +1,14 @@
 //! The player's settings as arguments.
 
+use crate::cli::Failure;
 use crate::cli::args::within_f32;
 use crate::instrument::{Settings, Tuning};
+use crate::render::breath::BreathCurve;
+use crate::render::score;
 use clap::Args;
+
+/// Most mouth pressure the instrument's settings know, kPa.
+const BREATH_FULL_MAX_KPA: f32 = 20.0;
 
 /// What a player can set; what is not given stays as the reference clarinet has it.
 #[derive(Args)]
@@ -65,7 +71,7 @@ pub struct SettingsArgs {
 }
 
 impl SettingsArgs {
-    pub fn settings(&self) -> Settings {
+    fn settings(&self) -> Settings {
         let d = Settings::default();
         Settings {
             breath_full_kpa: self.breath_full.unwrap_or(d.breath_full_kpa),
@@ -89,8 +95,30 @@ impl SettingsArgs {
         }
     }
 
-    /// Whether full breath was chosen by the user.
-    pub fn breath_full_given(&self) -> bool {
-        self.breath_full.is_some()
+    /// Whether the user has chosen an amount of breath noise.
+    pub fn noise_given(&self) -> bool {
+        self.noise.is_some()
+    }
+
+    /// Settings whose full breath reaches the curve's largest gamma: raised for it unless the user has chosen it.
+    pub fn blown_by(&self, curve: Option<&BreathCurve>) -> Result<Settings, Failure> {
+        let mut settings = self.settings();
+        let Some(gamma_max) = curve.map(BreathCurve::gamma_max) else { return Ok(settings) };
+        let closing_kpa = score::closing_kpa(&settings);
+        let needed_kpa = gamma_max * closing_kpa;
+        if needed_kpa <= settings.breath_full_kpa {
+            return Ok(settings);
+        }
+        let limit_kpa =
+            if self.breath_full.is_some() { settings.breath_full_kpa } else { BREATH_FULL_MAX_KPA };
+        if needed_kpa > limit_kpa {
+            return Err(Failure::Usage(format!(
+                "gamma {gamma_max} needs {needed_kpa:.1} kPa with this reed, but full breath is {limit_kpa} kPa; \
+                 stay below gamma {:.2}, or take a softer reed or more --breath-full (up to {BREATH_FULL_MAX_KPA})",
+                limit_kpa / closing_kpa
+            )));
+        }
+        settings.breath_full_kpa = needed_kpa;
+        Ok(settings)
     }
 }

@@ -1,0 +1,124 @@
+//! `chalumeau tune`: plays every note and measures its pitch.
+
+use crate::analysis::pitch;
+use crate::bore::instrument_file::InstrumentFile;
+use crate::cli::Failure;
+use crate::cli::args::{NotesArg, within};
+use crate::cli::render::progress;
+use crate::cli::settings::SettingsArgs;
+use crate::cli::table::TableArgs;
+use crate::instrument::{Clarinet, Settings};
+use crate::render;
+use crate::render::breath::{BreathCurve, GAMMA_MAX};
+use crate::render::score::Score;
+use crate::units::{SoundingNote, WrittenNote, cents};
+use clap::Args;
+use std::convert::Infallible;
+use std::thread;
+
+/// Time for a note to become steady, then to be measured, s.
+const SETTLE_S: f64 = 0.8;
+const MEASURE_S: f64 = 0.6;
+
+/// Further than this from its pitch a note is another one, cents. Wide, for breath and reeds that bend a note much.
+const OWN_CENTS: f64 = 80.0;
+
+const EXAMPLES: &str = "\
+Examples:
+  chalumeau tune --rate 48000 --gamma 0.5
+  chalumeau tune --gamma 0.8 --tempered --csv loud.csv
+  chalumeau tune --written G5 --strength 3.5";
+
+/// Play every note steadily and measure its pitch
+///
+/// Each note is tongued, held (without breath noise unless --noise is given) and measured when steady. Cents are against equal temperament at --a4.
+/// register_ok is 1 when the note asked for sounds, 0 when another does (a clarion note that falls down a twelfth, a
+/// squeak) or none; a note that does not sound has nan.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Tune {
+    #[command(flatten)]
+    notes: NotesArg,
+    /// Mouth pressure over closing pressure, 0..3
+    #[arg(long, value_name = "G", default_value = "0.5", value_parser = |s: &str| within(s, 0.0, f64::from(GAMMA_MAX)))]
+    gamma: f64,
+    /// Sample rate, Hz, 22050..384000
+    #[arg(long, value_name = "HZ", default_value = "48000", value_parser = clap::value_parser!(u32).range(22_050..=384_000))]
+    rate: u32,
+    #[command(flatten)]
+    table: TableArgs,
+    #[command(flatten)]
+    settings: SettingsArgs,
+}
+
+impl Tune {
+    pub fn run(&self) -> Result<(), Failure> {
+        let file = InstrumentFile::built_in();
+        let notes = self.notes.notes(&file)?;
+        let curve = BreathCurve::constant(self.gamma as f32);
+        let mut settings = self.settings.blown_by(Some(&curve))?;
+        if !self.settings.noise_given() {
+            settings.noise = 0.0;
+        }
+        let rate = self.rate;
+        let mut table = self.table.open("written_midi,f_hz,cents,register_ok")?;
+        table.comment(format_args!(
+            "{}; gamma {}, {rate} Hz, A4 = {} Hz; tongued, measured from {SETTLE_S} s on",
+            file.name, self.gamma, settings.a4_hz
+        ))?;
+        let bar = progress(notes.len());
+        let measured = |written: WrittenNote| {
+            let heard = measure(written, &file, &curve, &settings, rate);
+            bar.inc(1);
+            heard
+        };
+        let workers = thread::available_parallelism().map_or(1, usize::from);
+        let share = notes.len().div_ceil(workers).max(1);
+        let heard: Vec<Result<Option<(f64, f64)>, Failure>> = thread::scope(|scope| {
+            let measured = &measured;
+            let shares: Vec<_> = notes
+                .chunks(share)
+                .map(|notes| {
+                    scope.spawn(move || notes.iter().map(|&note| measured(note)).collect::<Vec<_>>())
+                })
+                .collect();
+            shares
+                .into_iter()
+                .flat_map(|share| share.join().unwrap_or_else(|e| std::panic::resume_unwind(e)))
+                .collect()
+        });
+        bar.finish_and_clear();
+        for (WrittenNote(written), heard) in notes.into_iter().zip(heard) {
+            match heard? {
+                Some((f_hz, cents)) => {
+                    let register_ok = u8::from(cents.abs() <= OWN_CENTS);
+                    table.line(format_args!("{written},{f_hz:.5},{cents:.3},{register_ok}"))?;
+                }
+                None => table.line(format_args!("{written},nan,nan,0"))?,
+            }
+        }
+        table.finish()
+    }
+}
+
+/// Frequency of a note, Hz, and its distance from where it should be, cents; `None` if it does not sound.
+fn measure(
+    written: WrittenNote,
+    file: &InstrumentFile,
+    curve: &BreathCurve,
+    settings: &Settings,
+    rate: u32,
+) -> Result<Option<(f64, f64)>, Failure> {
+    let sounding = written.sounding(file.transposition).unwrap_or(SoundingNote(written.0));
+    let mut clarinet = Clarinet::built_in(f64::from(rate)).map_err(Failure::Usage)?;
+    clarinet.set_settings(settings);
+    let score = Score::note(sounding, SETTLE_S + MEASURE_S, rate).blown(curve, settings, rate);
+    let mut samples: Vec<f64> = Vec::with_capacity(score.samples);
+    let Ok(()) = render::play(&mut clarinet, &score, 4096, |block| {
+        samples.extend(block.iter().map(|&sample| f64::from(sample)));
+        Ok::<_, Infallible>(())
+    });
+    let steady = &samples[samples.len().min((SETTLE_S * f64::from(rate)) as usize)..];
+    let heard = pitch::fundamental_hz(steady, f64::from(rate));
+    Ok(heard.map(|f_hz| (f_hz, cents(f_hz, sounding.frequency_hz(f64::from(settings.a4_hz))))))
+}
