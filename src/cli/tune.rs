@@ -110,7 +110,7 @@ fn measure(
     rate: u32,
 ) -> Result<Option<(f64, f64)>, Failure> {
     let sounding = written.sounding(file.transposition).unwrap_or(SoundingNote(written.0));
-    let mut clarinet = Clarinet::built_in(f64::from(rate)).map_err(Failure::Usage)?;
+    let mut clarinet = Clarinet::built_in(f64::from(rate)).map_err(|error| Failure::Usage(error.to_string()))?;
     clarinet.set_settings(settings);
     let score = Score::note(sounding, SETTLE_S + MEASURE_S, rate).blown(curve, settings, rate);
     let mut samples: Vec<f64> = Vec::with_capacity(score.samples);
