@@ -1,3 +1,204 @@
-pub fn run(_: &[String]) -> anyhow::Result<()> {
+//! The example melody through the bundled plugin: sound, a picture, a table, and whether it is the renderer's sound.
+
+use std::convert::Infallible;
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use chalumeau::analysis::pitch::{fundamental_hz, refine_hz};
+use chalumeau::analysis::spectrum::rms_dbfs;
+use chalumeau::analysis::to_f64;
+use chalumeau::event::Event;
+use chalumeau::instrument::Clarinet;
+use chalumeau::render;
+use chalumeau::render::score::Score;
+use chalumeau::units::{SoundingNote, cents};
+
+use crate::host::Plugin;
+use crate::{bundle, machine, midi, picture};
+
+const RATE: u32 = 48_000;
+const BLOCK: usize = 512;
+/// Time for the last note to die away, s.
+const TAIL_S: f64 = 1.0;
+/// What the default settings tune to.
+const A4_HZ: f64 = 440.0;
+/// A B flat clarinet sounds two semitones lower than written.
+const TRANSPOSITION: i8 = 2;
+
+/// A note as it is heard: from its key to the next one's, or to its own release.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sounding {
+    pub note: SoundingNote,
+    pub from: usize,
+    pub to: usize,
+}
+
+/// `cargo xtask demo`.
+pub fn run(_: &[String]) -> Result<()> {
+    machine::provide(&[&machine::CC])?;
+    println!("building the plugin");
+    bundle::run(&[])?;
+
+    let file = machine::root().join("examples/melody.mid");
+    let bytes = std::fs::read(&file).with_context(|| format!("cannot read {}", file.display()))?;
+    let score = render::midi_file::read(&bytes, RATE)?.with_tail(TAIL_S, RATE);
+    let said = midi::messages(&bytes, RATE)?;
+
+    let clap = bundle::clap()?;
+    println!("\nplaying {} through {}", shown(&file), shown(&clap));
+    let started = Instant::now();
+    let mut plugin = Plugin::load(&clap)?;
+    let [left, right] = plugin.play(f64::from(RATE), BLOCK, &said, score.samples)?;
+    let took = started.elapsed().as_secs_f64();
+    let seconds = score.seconds(RATE);
+    println!("{seconds:.1} s of music in {took:.2} s, {:.0} times real time on one core", seconds / took);
+
+    let rendered = rendered(&score)?;
+    println!("{}", comparison(&left, &right, &rendered));
+
+    let folder = machine::target().join("demo");
+    std::fs::create_dir_all(&folder)?;
+    let (wav, png) = (folder.join("melody.wav"), folder.join("melody.png"));
+    write_wav(&wav, &left, &right)?;
+
+    let samples = to_f64(&left);
+    let notes = soundings(&score);
+    println!("\n{}", table(&samples, &notes));
+    picture::write(&png, &samples, f64::from(RATE), &notes, &score, A4_HZ)?;
+
+    println!("sound    {}\npicture  {}\n", shown(&wav), shown(&png));
+    println!("To play it in a DAW, copy the bundles from {}:", shown(&machine::target().join("bundled")));
+    println!("{}", bundle::HOMES);
     Ok(())
+}
+
+fn rendered(score: &Score) -> Result<Vec<f32>> {
+    let mut clarinet = Clarinet::built_in(f64::from(RATE)).map_err(|reason| anyhow::anyhow!("{reason}"))?;
+    let mut all = Vec::with_capacity(score.samples);
+    let done = render::play(&mut clarinet, score, BLOCK, |block| {
+        all.extend_from_slice(block);
+        Ok::<_, Infallible>(())
+    });
+    match done {
+        Ok(()) => Ok(all),
+    }
+}
+
+fn comparison(left: &[f32], right: &[f32], rendered: &[f32]) -> String {
+    let equal =
+        |a: &[f32], b: &[f32]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
+    if equal(left, rendered) && equal(right, rendered) {
+        return format!("the offline renderer makes the same {} samples, bit for bit", rendered.len());
+    }
+    let apart = left.iter().zip(rendered).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    let first = left.iter().zip(rendered).position(|(a, b)| a.to_bits() != b.to_bits());
+    format!("NOT the offline renderer's samples: first difference at {first:?}, largest {apart:e}")
+}
+
+/// Last key wins; when it comes up, the one held before it is heard again.
+pub fn soundings(score: &Score) -> Vec<Sounding> {
+    let (mut held, mut all): (Vec<SoundingNote>, Vec<Sounding>) = (Vec::new(), Vec::new());
+    let mut now: Option<(SoundingNote, usize)> = None;
+    for event in &score.events {
+        match event.event {
+            Event::NoteOn { note, .. } => {
+                held.retain(|&other| other != note);
+                held.push(note);
+            }
+            Event::NoteOff { note } => held.retain(|&other| other != note),
+            Event::Panic => held.clear(),
+            Event::Breath(_) | Event::Bend { .. } => continue,
+        }
+        let next = held.last().copied();
+        if next == now.map(|(note, _)| note) && !matches!(event.event, Event::NoteOn { .. }) {
+            continue;
+        }
+        if let Some((note, from)) = now.filter(|&(_, from)| from < event.at) {
+            all.push(Sounding { note, from, to: event.at });
+        }
+        now = next.map(|note| (note, event.at));
+    }
+    all
+}
+
+fn table(samples: &[f64], notes: &[Sounding]) -> String {
+    let mut text =
+        " bar time   sounds  written   length       Hz    cents   level\n".replace(" bar time", "   at");
+    let mut heard = Vec::new();
+    for &Sounding { note, from, to } in notes {
+        let rate = f64::from(RATE);
+        // The steady part: after the attack or the slur, before the release.
+        let (first, last) = (from + (to - from) * 3 / 10, to - (to - from) / 10);
+        let middle = &samples[first.min(samples.len())..last.min(samples.len())];
+        let wanted = note.frequency_hz(A4_HZ);
+        let hz = refine_hz(middle, rate, wanted).or_else(|| fundamental_hz(middle, rate));
+        let written = note.written(TRANSPOSITION).map_or_else(String::new, |written| written.to_string());
+        let (at_s, length_s) = (from as f64 / rate, (to - from) as f64 / rate);
+        text += &format!("{at_s:5.2}   {:>6}  {written:>7}  {length_s:5.2} s", note.to_string());
+        match hz {
+            Some(hz) => {
+                let off = cents(hz, wanted);
+                heard.push(off);
+                text += &format!("  {hz:7.2}  {off:+7.1}");
+            }
+            None => text += "   no pitch        ",
+        }
+        text += &format!("  {:6.1}\n", rms_dbfs(middle));
+    }
+    if heard.is_empty() {
+        return text + "no note has a pitch\n";
+    }
+    let mean = heard.iter().map(|cents| cents.abs()).sum::<f64>() / heard.len() as f64;
+    let worst = heard.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+    text + &format!(
+        "{} of {} notes have a pitch; from equal temperament at A4 = {A4_HZ} Hz: mean {mean:.1} cents, largest {worst:+.1}\n",
+        heard.len(),
+        notes.len()
+    )
+}
+
+fn write_wav(path: &Path, left: &[f32], right: &[f32]) -> Result<()> {
+    let spec = hound::WavSpec {
+        channels: 2,
+        sample_rate: RATE,
+        bits_per_sample: 32,
+        sample_format: hound::SampleFormat::Float,
+    };
+    let mut wav = hound::WavWriter::create(path, spec)?;
+    for (&l, &r) in left.iter().zip(right) {
+        wav.write_sample(l)?;
+        wav.write_sample(r)?;
+    }
+    Ok(wav.finalize()?)
+}
+
+/// A path as one would type it from here.
+fn shown(path: &Path) -> String {
+    path.strip_prefix(machine::root()).unwrap_or(path).display().to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chalumeau::event::Timed;
+
+    #[test]
+    fn the_last_key_is_the_note_heard() {
+        let on = |at, key| Timed { at, event: Event::NoteOn { note: SoundingNote(key), velocity: 1.0 } };
+        let off = |at, key| Timed { at, event: Event::NoteOff { note: SoundingNote(key) } };
+        let events = vec![
+            on(0, 60),
+            on(10, 62),
+            off(12, 60),
+            off(20, 62),
+            on(30, 64),
+            on(40, 65),
+            off(50, 65),
+            off(60, 64),
+        ];
+        let heard: Vec<_> =
+            soundings(&Score { events, samples: 99 }).iter().map(|s| (s.note.0, s.from, s.to)).collect();
+        assert_eq!(heard, [(60, 0, 10), (62, 10, 20), (64, 30, 40), (65, 40, 50), (64, 50, 60)]);
+    }
 }

@@ -130,7 +130,7 @@ impl Plugin {
     }
 
     pub fn params(&mut self) -> Result<Vec<Param>> {
-        let mut handle = self.instance.plugin_handle();
+        let handle = self.instance.plugin_handle();
         let params: PluginParams = handle.get_extension().context("no parameters")?;
         let mut all = Vec::new();
         for index in 0..params.count(&handle) {
@@ -192,7 +192,7 @@ impl Plugin {
     }
 
     pub fn save(&mut self) -> Result<Vec<u8>> {
-        let mut handle = self.instance.plugin_handle();
+        let handle = self.instance.plugin_handle();
         let state: PluginState = handle.get_extension().context("no state")?;
         let mut bytes = Vec::new();
         state.save(&handle, &mut bytes)?;
@@ -200,7 +200,7 @@ impl Plugin {
     }
 
     pub fn restore(&mut self, mut bytes: &[u8]) -> Result<()> {
-        let mut handle = self.instance.plugin_handle();
+        let handle = self.instance.plugin_handle();
         let state: PluginState = handle.get_extension().context("no state")?;
         Ok(state.load(&handle, &mut bytes)?)
     }

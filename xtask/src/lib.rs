@@ -6,6 +6,7 @@ pub mod demo;
 pub mod host;
 pub mod machine;
 pub mod midi;
+pub mod picture;
 
 /// One chore.
 pub struct Command {

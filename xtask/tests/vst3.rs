@@ -1,6 +1,7 @@
 //! The bundled VST3, as a host sees and hears it. `cargo xtask bundle` first; CHALUMEAU_VST3 names another bundle.
 
 use std::path::PathBuf;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use chalumeau::event::{Event, Timed};
 use chalumeau::instrument::{Clarinet, Settings};
@@ -13,20 +14,34 @@ const RATE: f64 = 48_000.0;
 const SECOND: usize = 48_000;
 const CHANNEL: MidiChannel = MidiChannel::Ch1;
 
+/// VST3 knows one main thread; the tests take turns at being it.
+static MAIN_THREAD: Mutex<()> = Mutex::new(());
+
 struct Loaded {
     plugin: Plugin,
-    // Outlives the plugin.
+    // Both outlive the plugin.
     _host: Vst3Host,
+    _turn: Option<MutexGuard<'static, ()>>,
+}
+
+fn turn() -> MutexGuard<'static, ()> {
+    MAIN_THREAD.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn load(block: usize) -> Loaded {
+    let turn = turn();
+    Loaded { _turn: Some(turn), ..load_beside(block) }
+}
+
+/// For a second plugin in the same test.
+fn load_beside(block: usize) -> Loaded {
     let path = match std::env::var_os("CHALUMEAU_VST3") {
         Some(path) => xtask::machine::root().join(PathBuf::from(path)),
         None => xtask::bundle::vst3().unwrap(),
     };
     let mut host = Vst3Host::builder().sample_rate(RATE).block_size(block).build().unwrap();
     let plugin = host.load_plugin(&path).unwrap();
-    Loaded { plugin, _host: host }
+    Loaded { plugin, _host: host, _turn: None }
 }
 
 /// What is said at a sample position: MIDI, or a parameter's name and 0..=1.
@@ -196,7 +211,7 @@ fn state_makes_the_round_trip() {
         64,
     );
     let saved = loaded.plugin.save_state().unwrap();
-    let mut other = load(64);
+    let mut other = load_beside(64);
     other.plugin.load_state(&saved).unwrap();
     let value = |loaded: &Loaded, name| loaded.plugin.find_parameter(name).unwrap().value;
     assert!((value(&other, "Embouchure zeta") - 0.625).abs() < 1e-6);
@@ -218,7 +233,10 @@ fn a_broken_state_changes_nothing() {
 
 #[test]
 fn latency_is_the_instruments() {
-    assert_eq!(load(512).plugin.latency_samples(), Clarinet::built_in(RATE).unwrap().latency_samples());
+    let mut loaded = load(512);
+    // VST3 hosts ask once the plugin is active; before that it knows no sample rate.
+    loaded.plugin.start_processing().unwrap();
+    assert_eq!(loaded.plugin.latency_samples(), Clarinet::built_in(RATE).unwrap().latency_samples());
 }
 
 #[test]
