@@ -14,6 +14,7 @@ mod threshold;
 mod tune;
 
 use crate::bore::instrument_file::InstrumentError;
+use crate::instrument::BuildError;
 use crate::reed::law::ReedError;
 use crate::render::breath::BreathError;
 use crate::render::midi_file::MidiFileError;
@@ -66,6 +67,10 @@ enum Failure {
     BreathFile { path: PathBuf, source: BreathError },
     #[error("{}: {source}", path.display())]
     InstrumentFile { path: PathBuf, source: InstrumentError },
+    #[error("{}: {source}", path.display())]
+    Instrument { path: PathBuf, source: BuildError },
+    #[error(transparent)]
+    Build(#[from] BuildError),
     #[error(transparent)]
     Breath(#[from] BreathError),
     #[error(transparent)]

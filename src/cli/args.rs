@@ -2,9 +2,11 @@
 
 use crate::bore::instrument_file::{InstrumentError, InstrumentFile};
 use crate::cli::Failure;
+use crate::instrument::Model;
 use crate::units::{Air, WrittenNote};
 use clap::Args;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Which instrument.
 #[derive(Args)]
@@ -22,6 +24,16 @@ impl InstrumentArg {
             source => Failure::InstrumentFile { path: path.clone(), source },
         })
     }
+
+    /// The instrument ready to play at a host rate. An instrument file takes seconds: its bore is fitted to the lattice.
+    pub fn model(&self, file: InstrumentFile, host_rate_hz: u32) -> Result<Arc<Model>, Failure> {
+        let rate_hz = f64::from(host_rate_hz);
+        let Some(path) = &self.instrument else { return Ok(Arc::new(Model::built_in(rate_hz)?)) };
+        match Model::from_file(file, rate_hz) {
+            Ok(model) => Ok(Arc::new(model)),
+            Err(source) => Err(Failure::Instrument { path: path.clone(), source }),
+        }
+    }
 }
 
 /// Which air.
@@ -35,6 +47,11 @@ pub struct AirArg {
 impl AirArg {
     pub fn air(&self) -> Air {
         Air::at(self.temperature)
+    }
+
+    /// Whether it is the air the lattice is made for.
+    pub fn is_reference(&self) -> bool {
+        self.air() == Air::default()
     }
 }
 

@@ -1,11 +1,16 @@
 //! `chalumeau impedance`: what the bore answers to the reed, curve or peaks.
 
-use crate::bore::transfer_matrix::TransferMatrix;
+use crate::bore::instrument_file::InstrumentFile;
+use crate::bore::transfer_matrix::{Peak, TransferMatrix, find_peaks};
 use crate::cli::Failure;
 use crate::cli::args::{AirArg, InstrumentArg, NotesArg, within};
 use crate::cli::table::TableArgs;
-use clap::Args;
-use clap::ValueEnum;
+use crate::instrument;
+use crate::units::{Air, REFERENCE_RADIUS_M};
+use clap::{Args, ValueEnum};
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// Longest curve, points.
 const POINTS_MAX: f64 = 1e6;
@@ -19,6 +24,8 @@ Examples:
 /// Where the answer comes from.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Model {
+    /// The lattice that sounds, at 48 kHz (96 kHz inside)
+    Lattice,
     /// Transfer matrices with exact wall losses: the reference
     Tmm,
 }
@@ -39,7 +46,7 @@ pub struct Impedance {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=30))]
     peaks: Option<u8>,
     /// Where the answer comes from
-    #[arg(long, value_enum, default_value_t = Model::Tmm)]
+    #[arg(long, value_enum, default_value_t = Model::Lattice)]
     model: Model,
     /// Put the reed's equivalent volume in parallel, as when the clarinet is played
     #[arg(long)]
@@ -84,13 +91,14 @@ impl Impedance {
                 )));
             }
         }
-        let model = TransferMatrix::new(&file, air);
+        let bore = self.bore(&file)?;
         let about = format!(
-            "{}; transfer matrices, {} C, reed volume {} m3, Zc {:.6e} Pa s/m3",
+            "{}; {}, {} C, reed volume {} m3, Zc {:.6e} Pa s/m3",
             file.name,
+            if self.model == Model::Tmm { "transfer matrices" } else { "lattice at 96 kHz" },
             air.temperature_c,
             volume_m3,
-            air.z_c(crate::units::REFERENCE_RADIUS_M)
+            air.z_c(REFERENCE_RADIUS_M)
         );
         let header = if self.peaks.is_some() {
             "written_midi,n,f_hz,mag_over_zc,q"
@@ -101,7 +109,7 @@ impl Impedance {
         table.comment(format_args!("{about}"))?;
         for fingering in notes.into_iter().filter_map(|written| file.fingering(written)) {
             if let Some(count) = self.peaks {
-                let peaks = model.peaks(&fingering.open, volume_m3, usize::from(count));
+                let peaks = bore.peaks(&fingering.open, volume_m3, usize::from(count));
                 for (n, peak) in (1..).zip(peaks) {
                     let (written, f_hz, mag, q) = (fingering.written.0, peak.f_hz, peak.mag_over_zc, peak.q);
                     table.line(format_args!("{written},{n},{f_hz:.4},{mag:.6},{q:.4}"))?;
@@ -109,11 +117,54 @@ impl Impedance {
             } else {
                 for step in 0..=steps as u32 {
                     let f_hz = self.from + f64::from(step) * self.step;
-                    let z = model.impedance(f_hz, &fingering.open, volume_m3);
+                    let z = bore.impedance(f_hz, &fingering.open, volume_m3);
                     table.line(format_args!("{},{:.8},{:.8}", (f_hz * 1e6).round() / 1e6, z.re, z.im))?;
                 }
             }
         }
         table.finish()
     }
+
+    fn bore(&self, file: &InstrumentFile) -> Result<Bore, Failure> {
+        if self.model == Model::Tmm {
+            return Ok(Bore::Tmm(TransferMatrix::new(file, self.air.air())));
+        }
+        if !self.air.is_reference() {
+            let right = "leave --temperature out or add --model tmm";
+            return Err(Failure::Usage(format!("the lattice is made for air of 25 C; {right}")));
+        }
+        Ok(Bore::Lattice(self.instrument.model(file.clone(), 48_000)?))
+    }
+}
+
+enum Bore {
+    Tmm(TransferMatrix),
+    Lattice(Arc<instrument::Model>),
+}
+
+impl Bore {
+    fn impedance(&self, f_hz: f64, open: &[bool], volume_m3: f64) -> Complex64 {
+        match self {
+            Self::Tmm(model) => model.impedance(f_hz, open, volume_m3),
+            Self::Lattice(model) => beside_reed(lattice(model, f_hz, open), f_hz, volume_m3, &model.air),
+        }
+    }
+
+    fn peaks(&self, open: &[bool], volume_m3: f64, count: usize) -> Vec<Peak> {
+        match self {
+            Self::Tmm(model) => model.peaks(open, volume_m3, count),
+            Self::Lattice(_) => find_peaks(|f_hz| self.impedance(f_hz, open, volume_m3), count),
+        }
+    }
+}
+
+fn lattice(model: &instrument::Model, f_hz: f64, open: &[bool]) -> Complex64 {
+    let opening: Vec<f64> = open.iter().map(|&open| f64::from(u8::from(open))).collect();
+    model.coeffs.impedance(f_hz, &opening)
+}
+
+/// Z/Zc with a volume in parallel.
+fn beside_reed(z: Complex64, f_hz: f64, volume_m3: f64, air: &Air) -> Complex64 {
+    let compliance = volume_m3 / (air.rho * air.c * air.c);
+    z / (1.0 + z * Complex64::I * TAU * f_hz * compliance * air.z_c(REFERENCE_RADIUS_M))
 }

@@ -2,10 +2,11 @@
 
 use crate::bore::instrument_file::InstrumentFile;
 use crate::cli::Failure;
-use crate::cli::args::{check_fingering, note, within};
+use crate::cli::args::{InstrumentArg, check_fingering, note, within};
 use crate::cli::settings::SettingsArgs;
 use crate::cli::table::Table;
 use crate::event::{Event, Timed};
+use crate::instrument::model::internal_rate_hz;
 use crate::instrument::{Clarinet, Probe};
 use crate::render as player;
 use crate::render::breath::BreathCurve;
@@ -111,6 +112,8 @@ pub struct Render {
     force: bool,
 
     #[command(flatten)]
+    instrument: InstrumentArg,
+    #[command(flatten)]
     settings: SettingsArgs,
 }
 
@@ -122,7 +125,7 @@ fn interval(text: &str) -> Result<(u8, u8), String> {
 
 impl Render {
     pub fn run(&self) -> Result<(), Failure> {
-        let file = InstrumentFile::built_in();
+        let file = self.instrument.load()?;
         let curve = self.curve()?;
         let settings = self.settings.blown_by(curve.as_ref())?;
         let mut score = self.score(&file)?;
@@ -132,13 +135,15 @@ impl Render {
         // A single note lasts as long as was asked; a melody gets time to fade.
         let one_note = self.written.is_some() || self.sounding.is_some();
         score = score.with_tail(self.tail.unwrap_or(if one_note { 0.0 } else { 1.0 }), self.rate);
-        let mut clarinet = Clarinet::built_in(f64::from(self.rate)).map_err(|error| Failure::Usage(error.to_string()))?;
-        clarinet.set_settings(&settings);
-
         self.refuse_same_file()?;
         let mut out = NewFile::create(&self.out, self.force)?;
-        let mut probe =
-            self.probe.as_deref().map(|path| ProbeTable::open(path, self, &clarinet)).transpose()?;
+        let mut probe = self.probe.as_deref().map(|path| ProbeTable::open(path, self)).transpose()?;
+
+        let model = self.instrument.model(file, self.rate)?;
+        let mut clarinet = Clarinet::new(model, f64::from(self.rate));
+        clarinet.set_settings(&settings);
+        // As a host does before it plays: the settings are in place from the first sample.
+        clarinet.reset();
         let depth = match self.bits {
             Bits::Int16 => Depth::Int16,
             Bits::Int24 => Depth::Int24,
@@ -269,7 +274,7 @@ impl Render {
     }
 }
 
-/// Notes no fingering can play are left to the instrument, but not silently.
+/// Notes no fingering can play stay silent, but not unsaid.
 fn warn_of_missing_fingerings(events: &[Timed<Event>], file: &InstrumentFile) {
     let missing = |event: &Timed<Event>| match event.event {
         Event::NoteOn { note, .. } => {
@@ -283,7 +288,7 @@ fn warn_of_missing_fingerings(events: &[Timed<Event>], file: &InstrumentFile) {
         let sounds =
             |note: WrittenNote| note.sounding(file.transposition).map(|n| n.to_string()).unwrap_or_default();
         eprintln!(
-            "warning: {count} notes have no fingering; this instrument sounds {} to {} (written {low} to {high})",
+            "warning: {count} notes have no fingering and stay silent; this instrument sounds {} to {} (written {low} to {high})",
             sounds(low),
             sounds(high)
         );
@@ -309,10 +314,10 @@ struct ProbeTable {
 }
 
 impl ProbeTable {
-    fn open(path: &Path, render: &Render, clarinet: &Clarinet) -> Result<Self, Failure> {
+    fn open(path: &Path, render: &Render) -> Result<Self, Failure> {
         let header = "t_s,gamma,opening_unit,flow_m3s,p_mouthpiece_pa,p_radiated_pa";
         let mut table = Table::open(path, render.force, header)?;
-        let rate_hz = clarinet.internal_rate_hz();
+        let rate_hz = internal_rate_hz(f64::from(render.rate));
         table.comment(format_args!(
             "s, mouth over closing pressure, opening over rest opening, m3/s, Pa, Pa at 1 m; {rate_hz} Hz / {}",
             render.probe_every

@@ -1,19 +1,19 @@
 //! `chalumeau tune`: plays every note and measures its pitch.
 
 use crate::analysis::pitch;
-use crate::bore::instrument_file::InstrumentFile;
 use crate::cli::Failure;
-use crate::cli::args::{NotesArg, within};
+use crate::cli::args::{InstrumentArg, NotesArg, within};
 use crate::cli::render::progress;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::table::TableArgs;
-use crate::instrument::{Clarinet, Settings};
+use crate::instrument::{Clarinet, Model, Settings};
 use crate::render;
 use crate::render::breath::{BreathCurve, GAMMA_MAX};
 use crate::render::score::Score;
 use crate::units::{SoundingNote, WrittenNote, cents};
 use clap::Args;
 use std::convert::Infallible;
+use std::sync::Arc;
 use std::thread;
 
 /// Time for a note to become steady, then to be measured, s.
@@ -46,6 +46,8 @@ pub struct Tune {
     #[arg(long, value_name = "HZ", default_value = "48000", value_parser = clap::value_parser!(u32).range(22_050..=384_000))]
     rate: u32,
     #[command(flatten)]
+    instrument: InstrumentArg,
+    #[command(flatten)]
     table: TableArgs,
     #[command(flatten)]
     settings: SettingsArgs,
@@ -53,7 +55,7 @@ pub struct Tune {
 
 impl Tune {
     pub fn run(&self) -> Result<(), Failure> {
-        let file = InstrumentFile::built_in();
+        let file = self.instrument.load()?;
         let notes = self.notes.notes(&file)?;
         let curve = BreathCurve::constant(self.gamma as f32);
         let mut settings = self.settings.blown_by(Some(&curve))?;
@@ -61,20 +63,22 @@ impl Tune {
             settings.noise = 0.0;
         }
         let rate = self.rate;
+        let name = file.name.clone();
         let mut table = self.table.open("written_midi,f_hz,cents,register_ok")?;
         table.comment(format_args!(
             "{}; gamma {}, {rate} Hz, A4 = {} Hz; tongued, measured from {SETTLE_S} s on",
-            file.name, self.gamma, settings.a4_hz
+            name, self.gamma, settings.a4_hz
         ))?;
+        let model = self.instrument.model(file, rate)?;
         let bar = progress(notes.len());
         let measured = |written: WrittenNote| {
-            let heard = measure(written, &file, &curve, &settings, rate);
+            let heard = measure(written, &model, &curve, &settings, rate);
             bar.inc(1);
             heard
         };
         let workers = thread::available_parallelism().map_or(1, usize::from);
         let share = notes.len().div_ceil(workers).max(1);
-        let heard: Vec<Result<Option<(f64, f64)>, Failure>> = thread::scope(|scope| {
+        let heard: Vec<Option<(f64, f64)>> = thread::scope(|scope| {
             let measured = &measured;
             let shares: Vec<_> = notes
                 .chunks(share)
@@ -89,7 +93,7 @@ impl Tune {
         });
         bar.finish_and_clear();
         for (WrittenNote(written), heard) in notes.into_iter().zip(heard) {
-            match heard? {
+            match heard {
                 Some((f_hz, cents)) => {
                     let register_ok = u8::from(cents.abs() <= OWN_CENTS);
                     table.line(format_args!("{written},{f_hz:.5},{cents:.3},{register_ok}"))?;
@@ -104,14 +108,15 @@ impl Tune {
 /// Frequency of a note, Hz, and its distance from where it should be, cents; `None` if it does not sound.
 fn measure(
     written: WrittenNote,
-    file: &InstrumentFile,
+    model: &Arc<Model>,
     curve: &BreathCurve,
     settings: &Settings,
     rate: u32,
-) -> Result<Option<(f64, f64)>, Failure> {
-    let sounding = written.sounding(file.transposition).unwrap_or(SoundingNote(written.0));
-    let mut clarinet = Clarinet::built_in(f64::from(rate)).map_err(|error| Failure::Usage(error.to_string()))?;
+) -> Option<(f64, f64)> {
+    let sounding = written.sounding(model.file.transposition).unwrap_or(SoundingNote(written.0));
+    let mut clarinet = Clarinet::new(model.clone(), f64::from(rate));
     clarinet.set_settings(settings);
+    clarinet.reset();
     let score = Score::note(sounding, SETTLE_S + MEASURE_S, rate).blown(curve, settings, rate);
     let mut samples: Vec<f64> = Vec::with_capacity(score.samples);
     let Ok(()) = render::play(&mut clarinet, &score, 4096, |block| {
@@ -120,5 +125,5 @@ fn measure(
     });
     let steady = &samples[samples.len().min((SETTLE_S * f64::from(rate)) as usize)..];
     let heard = pitch::fundamental_hz(steady, f64::from(rate));
-    Ok(heard.map(|f_hz| (f_hz, cents(f_hz, sounding.frequency_hz(f64::from(settings.a4_hz))))))
+    heard.map(|f_hz| (f_hz, cents(f_hz, sounding.frequency_hz(f64::from(settings.a4_hz)))))
 }

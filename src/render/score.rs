@@ -2,11 +2,10 @@
 
 use crate::event::{Event, Timed};
 use crate::instrument::Settings;
+use crate::instrument::model::P_REF_PA;
+use crate::reed::law::coupled_k;
 use crate::render::breath::BreathCurve;
 use crate::units::{SoundingNote, WrittenNote};
-
-/// Closing pressure of the reference reed (strength 2.5, lip 1), kPa.
-const REFERENCE_CLOSING_KPA: f32 = 6.0;
 
 /// Silence before a tongued note of a scale, s: the time a tongue takes to touch the reed and leave again, by ear.
 const TONGUE_GAP_S: f64 = 0.03;
@@ -31,16 +30,19 @@ pub enum ScoreError {
     OutsideMidi(WrittenNote),
 }
 
-/// Breath of a mouth pressure of `gamma` closing pressures, 0..=1 of full breath.
-///
-/// The closing pressure is the reference reed's, stiffer in proportion to strength and wider in proportion to lip.
+/// Breath that gives a mouth pressure of `gamma` closing pressures, 0..=1 of full breath.
 pub fn breath_of_gamma(gamma: f32, settings: &Settings) -> f32 {
     gamma * closing_kpa(settings) / settings.breath_full_kpa
 }
 
 /// Pressure that shuts the reed of these settings, kPa.
+///
+/// The law is the one the player blows: the lip scales the rest opening, half a number of strength is 20 % of stiffness.
 pub fn closing_kpa(settings: &Settings) -> f32 {
-    REFERENCE_CLOSING_KPA * settings.strength / Settings::default().strength * settings.lip
+    let h = f64::from(settings.reed_h);
+    let k = if settings.coupled { coupled_k(h) } else { f64::from(settings.reed_k) };
+    let stiffer = 1.2_f64.powf(2.0 * f64::from(settings.strength - 2.5));
+    (1e-3 * P_REF_PA * h * f64::from(settings.lip) * k * stiffer) as f32
 }
 
 impl Score {
@@ -125,6 +127,8 @@ mod tests {
         assert_eq!(breath_of_gamma(0.5, &settings), 0.5);
         let wide = Settings { breath_full_kpa: 12.0, ..settings };
         assert_eq!(breath_of_gamma(1.5, &wide), 0.75);
+        let hard = Settings { strength: 3.5, ..settings };
+        assert!((closing_kpa(&hard) - 6.0 * 1.44).abs() < 1e-4);
     }
 
     #[test]
