@@ -66,6 +66,8 @@ fn half_of_all_notes_are_cleaner_than_90_db() {
     assert!(median <= -90.0, "{median}");
 }
 
+/// In the chalumeau and the throat at every step. In the clarion tone saturates once the reed beats, and the highest
+/// note, a nearly pure one, turns darker: over its whole range the clarion must brighten, not at every step.
 #[test]
 fn more_breath_is_brighter() {
     let model = Arc::new(Model::built_in(RATE_HZ).unwrap());
@@ -75,12 +77,15 @@ fn more_breath_is_brighter() {
         spectrum::centroid_hz(&steady(&model, written, gamma, 0.4), RATE_HZ).unwrap_or(0.0)
     });
     let notes: Vec<(u8, &[f64])> = (52..=84).zip(centroids.chunks(gammas.len())).collect();
-    let rising = notes.iter().filter(|(_, centroids)| centroids.is_sorted_by(|a, b| a < b)).count();
     for (written, centroids) in &notes {
         println!("written {written}: centroid {centroids:.0?} Hz at gamma {gammas:?}");
     }
-    println!("{rising} of {} notes brighten all the way", notes.len());
-    assert!(rising * 10 >= notes.len() * 9, "{rising} of {}", notes.len());
+    let stepwise = |centroids: &[f64]| centroids.is_sorted_by(|a, b| a < b);
+    let rising = notes.iter().filter(|(_, centroids)| stepwise(centroids)).count();
+    let ending_brighter = notes.iter().filter(|(_, centroids)| centroids[3] > centroids[0]).count();
+    println!("of {} notes {rising} brighten at every step, {ending_brighter} from end to end", notes.len());
+    assert!(notes.iter().all(|(written, centroids)| *written > 70 || stepwise(centroids)));
+    assert!(ending_brighter * 10 >= notes.len() * 9);
 }
 
 #[test]
@@ -100,5 +105,6 @@ fn low_notes_sound_their_odd_harmonics() {
         println!("gamma {gamma}: H3 - H2 {odd_db:.1?} dB");
     }
     println!("median H3 - H2 {medians:.1?} dB");
-    assert!(medians.iter().all(|&median| median > 0.0));
+    // Recordings of the same notes: 15, 17, 29 dB from soft to loud.
+    assert!(medians[1] > 15.0 && medians.is_sorted());
 }
