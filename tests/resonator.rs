@@ -367,7 +367,7 @@ fn without_losses_stored_energy_is_constant() {
         let mut cells = model.cells.clone();
         cells.loss_strengths = [0.0; 3];
         cells.end_radius_m = 1e-7;
-        let mut holes = networks(&model.file, &model.air);
+        let mut holes = networks(&model.file, &model.air, &model.cells);
         for hole in &mut holes {
             (hole.r_s, hole.r_p) = (0.0, f64::INFINITY);
         }
@@ -434,7 +434,7 @@ fn moving_delay_is_bounded_and_decays() {
 #[test]
 fn independent_lattice_answers_an_impulse_alike() {
     for model in models() {
-        let holes = networks(&model.file, &model.air);
+        let holes = networks(&model.file, &model.air, &model.cells);
         let mut worst = 0.0_f64;
         for (opening, jets, rows) in [
             (0.0, 0.0, 0.0),
@@ -532,7 +532,7 @@ fn reed_plays_the_same_on_the_independent_lattice() {
         let reed = note.reed(model);
         let samples = model.coeffs.rate_hz as usize;
         let opening = openings(model, note.fingering);
-        let holes = networks(&model.file, &model.air);
+        let holes = networks(&model.file, &model.air, &model.cells);
         let mut bore =
             Oracle::new(&model.cells, &holes, P_REF_PA, &model.air, &opening, note.jet_loss, note.rows);
         let mut slow = Blown::new(&reed, model);
@@ -641,7 +641,7 @@ fn each_hole_opens_smoothly_from_closed_to_open() {
             smallest_step = smallest_step.min(cents(pair[1], pair[0]));
         }
         // A hole with nothing behind its pad: outer network cut off.
-        let mut plugged = networks(&model.file, &model.air);
+        let mut plugged = networks(&model.file, &model.air, &model.cells);
         plugged[hole].r_s = 1e20;
         let plugged = LatticeCoeffs::new(&model.cells, &plugged, P_REF_PA, &model.air);
         let mut all = vec![0.0; model.coeffs.holes()];
