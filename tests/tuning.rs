@@ -118,7 +118,7 @@ fn tempered_notes_stay_in_tune_from_piano_to_forte() {
     println!(
         "tempered E3..C6 max {max:.2} mean {mean:.2} cents; C#6..G#6 max {max_high:.2} mean {mean_high:.2}"
     );
-    let worst: Vec<_> = runs.iter().zip(&off).filter(|(_, off)| !(off.abs() <= 3.0)).collect();
+    let worst: Vec<_> = runs.iter().zip(&off).filter(|(_, off)| off.is_nan() || off.abs() > 3.0).collect();
     assert!(worst.is_empty(), "{worst:?}");
 }
 
