@@ -211,11 +211,9 @@ fn coefficients_and_running_lattice_agree_on_the_reflectance() {
     }
 }
 
-/// The whole curve. Three first peaks are what the cells are fitted for; above the cut-off the curve pays for it. The same
-/// network of lumped holes on an endlessly fine grid stays 0.9 to 1.0 dB (rms to 4 kHz) and 2.3 to 5 dB (to 6 kHz) from the
-/// transfer matrices, unfitted cells at 96 kHz 1.2 to 1.4 dB and 2.9 to 5.5 dB.
+/// The whole curve, not only its peaks: rms 1 dB to 4 kHz, 2 dB to 6 kHz.
 #[test]
-fn impedance_curves_follow_openwind_below_the_cutoff_and_roughly_above() {
+fn impedance_curves_follow_openwind_to_six_kilohertz() {
     for model in models() {
         for midi_note in [52, 65, 71, 84] {
             let opening = openings(model, index_of(model, midi_note));
@@ -242,7 +240,7 @@ fn impedance_curves_follow_openwind_below_the_cutoff_and_roughly_above() {
                 WrittenNote(midi_note),
                 model.coeffs.rate_hz
             );
-            assert!(lowest < 0.3 && low < 1.0 && narrow < 2.6 && wide < 6.5);
+            assert!(lowest < 0.5 && low < 0.5 && narrow < 1.0 && wide < 2.0);
         }
     }
 }

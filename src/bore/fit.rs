@@ -1,9 +1,10 @@
 //! Fits a cut bore to its own transfer matrices, so that rounding to the grid is paid for by the neighbours.
 //!
-//! Free are the radii of all cells, the radius of the end, the strengths of the three loss poles and the vent's resistance, each held near
-//! where it started. Compared are, for every fingering of the file, height and place of the first five impedance
-//! peaks (through the admittance at the true peak, which is linear in both), and for a few fingerings the whole
-//! reflectance from 100 Hz to 5 kHz. Levenberg-Marquardt; the lattice's own frequency response, not an idealisation of it.
+//! Free are the radii of all cells, the radius of the end, strengths and frequencies of the three loss poles, the vent's
+//! resistance and the share of each chimney before its compliance, each held near where it started. Compared are, for
+//! every fingering of the file, height and place of the first five impedance peaks (through the admittance at the true
+//! peak, which is linear in both), and for every third one the level of the whole impedance curve to 6 kHz.
+//! Levenberg-Marquardt on the lattice's own frequency response, not on an idealisation of it.
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, Owned};
