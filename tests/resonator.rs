@@ -424,7 +424,7 @@ fn moving_delay_is_bounded_and_decays() {
             "delay and fingers moving, {rate_hz} Hz: energy at most {most:.4} of the start, {moving:.1e} after 100000 \
              samples, {rest:.1e} and waves {wave:.1e} ten seconds later"
         );
-        assert!(most < 1.5 && moving < 1e-4 && wave < 1e-8);
+        assert!(most < 1.5 && moving < 1e-4 && rest < 1e-12 && wave < 1e-6);
     }
 }
 
@@ -645,7 +645,7 @@ fn each_hole_opens_smoothly_from_closed_to_open() {
         let mut all = vec![0.0; model.coeffs.holes()];
         all[hole] = 1.0;
         ends = ends.max(cents(way[0], first_peak_hz(&plugged, &all)).abs());
-        ends = ends.max(cents(at(0.003), way[0]).abs()).max(cents(at(0.999), way[10]).abs());
+        ends = ends.max(cents(at(0.001), way[0]).abs()).max(cents(at(0.9995), way[10]).abs());
         let open: Vec<bool> = (0..all.len()).map(|other| other == hole).collect();
         let true_hz = matrices.peaks(&open, 0.0, 1)[0].f_hz;
         open_hole.add(cents(way[10], true_hz), model.file.holes[hole].name.clone());
@@ -702,7 +702,7 @@ fn register_key_gives_twelfths() {
 
 /// Where |R|^2 falls through one half, on the reference's grid of 10 Hz; of several falls the nearest to the reference
 /// counts (C#5 dips to about one half 700 Hz before it falls for good). The holes below C#4 and G#5 make such a ripple
-/// just there: at 88.2 kHz it stops at 0.524 instead of 0.5, and those two notes are judged by that.
+/// just there: at 88.2 kHz it stops at 0.525 instead of 0.5, and those two notes are judged by that.
 #[test]
 fn cutoff_below_the_first_open_hole_is_that_of_the_reference() {
     for (model, allowed) in models().iter().zip([0, 2]) {
