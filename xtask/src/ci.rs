@@ -80,8 +80,11 @@ fn cargo(words: &str) -> Result<()> {
 }
 
 fn packages() -> Result<()> {
-    let needed: &[&Package] =
-        if cfg!(target_os = "linux") { &[&CC, &PKG_CONFIG, &ALSA, &JACK, &XCB, &VENV, &GL, &GLIB] } else { &[] };
+    let needed: &[&Package] = if cfg!(target_os = "linux") {
+        &[&CC, &PKG_CONFIG, &ALSA, &JACK, &XCB, &VENV, &GL, &GLIB]
+    } else {
+        &[]
+    };
     machine::provide(needed)
 }
 
