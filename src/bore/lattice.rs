@@ -30,7 +30,7 @@ const ROWS: usize = 32;
 /// Values of one row: 64 waves going down, 64 coming back.
 const STRIDE: usize = 128;
 const RING: usize = ROWS * STRIDE;
-const MASK: u32 = RING as u32 - 1;
+const MASK: u16 = RING as u16 - 1;
 /// Where a lane's returning wave is kept in a row.
 const BACK: usize = 64;
 /// Slot of the wave leaving the reed (among those going down) and of the bell's reflection (among those returning).
@@ -61,6 +61,8 @@ pub trait Real:
     fn wide(self) -> f64;
     /// Absolute value.
     fn magnitude(self) -> Self;
+    /// Whole part of a number that is not negative.
+    fn whole(self) -> u16;
 }
 
 macro_rules! real {
@@ -77,6 +79,10 @@ macro_rules! real {
             #[inline(always)]
             fn magnitude(self) -> Self {
                 self.abs()
+            }
+            #[inline(always)]
+            fn whole(self) -> u16 {
+                self as u16
             }
         }
     };
@@ -264,7 +270,7 @@ type Octet<F> = [F; LANES];
 #[derive(Clone)]
 #[repr(C, align(64))]
 struct Arrivals<F> {
-    offset: [[u32; LANES]; 2],
+    offset: [[u16; LANES]; 2],
     amount: [Octet<F>; 2],
     q: [Octet<F>; 2],
     state: [Octet<F>; 2],
@@ -273,12 +279,12 @@ struct Arrivals<F> {
 impl<F: Real> Arrivals<F> {
     fn idle(slot: usize) -> Self {
         let nothing = [Octet::default(); 2];
-        Self { offset: [[slot as u32; LANES]; 2], amount: nothing, q: nothing, state: nothing }
+        Self { offset: [[slot as u16; LANES]; 2], amount: nothing, q: nothing, state: nothing }
     }
 
     /// Waves arriving at eight junctions on one side, after their cell's loss.
     #[inline(always)]
-    fn gather<const SIDE: usize>(&mut self, ring: &[F; RING], base: u32) -> Octet<F> {
+    fn gather<const SIDE: usize>(&mut self, ring: &[F; RING], base: u16) -> Octet<F> {
         let mut wave = Octet::<F>::default();
         for (wave, offset) in wave.iter_mut().zip(self.offset[SIDE]) {
             *wave = ring[(base.wrapping_add(offset) & MASK) as usize];
@@ -293,15 +299,16 @@ impl<F: Real> Arrivals<F> {
         wave
     }
 
+    #[inline(always)]
     fn flush(&mut self) {
         self.state.iter_mut().flatten().for_each(flush);
     }
 }
 
+/// Written unconditionally: only so do loops over it become vectors.
+#[inline(always)]
 fn flush<F: Real>(x: &mut F) {
-    if x.magnitude() < F::of(TINY) {
-        *x = F::default();
-    }
+    *x = if x.magnitude() < F::of(TINY) { F::default() } else { *x };
 }
 
 /// Writes the waves leaving eight junctions: `pressure` minus what arrived from the other side.
@@ -330,7 +337,7 @@ struct Steps<F> {
 
 impl<F: Real> Steps<F> {
     #[inline(always)]
-    fn tick(&mut self, ring: &mut [F; RING], base: u32, slot: usize) {
+    fn tick(&mut self, ring: &mut [F; RING], base: u16, slot: usize) {
         let left = self.arrivals.gather::<0>(ring, base);
         let right = self.arrivals.gather::<1>(ring, base);
         let mut pressure = Octet::<F>::default();
@@ -351,7 +358,7 @@ struct Holes<F> {
     y_sum: Octet<F>,
     r1: Octet<F>,
     gc: Octet<F>,
-    gc2: Octet<F>,
+    minus_gc2: Octet<F>,
     gl2: Octet<F>,
     outside: Octet<F>,
     rs0: Octet<F>,
@@ -368,7 +375,7 @@ struct Holes<F> {
 impl<F: Real> Holes<F> {
     /// The network of [`tone_hole`](crate::bore::tone_hole) at eight junctions, one sample.
     #[inline(always)]
-    fn tick(&mut self, ring: &mut [F; RING], base: u32, slot: usize) {
+    fn tick(&mut self, ring: &mut [F; RING], base: u16, slot: usize) {
         let left = self.arrivals.gather::<0>(ring, base);
         let right = self.arrivals.gather::<1>(ring, base);
         let one = F::of(1.0);
@@ -397,7 +404,7 @@ impl<F: Real> Holes<F> {
             let outside = a * node;
             let flow = g2 * outside + h2;
             self.outer[k] = self.outer[k] + self.gl2[k] * (outside - rs * flow);
-            self.compliance[k] = -(self.gc2[k] * node + self.compliance[k]);
+            self.compliance[k] = self.minus_gc2[k] * node - self.compliance[k];
             self.inner[k] = -(drop + drop + inner);
             let leaving = a * flow;
             self.radiated[k] = leaving;
@@ -416,15 +423,15 @@ pub struct Lattice<F> {
     holes: Box<[Holes<F>]>,
     hole_lanes: Box<[(usize, usize)]>,
     jets: Box<[f64]>,
-    row: u32,
+    row: u16,
     tip: EndLoss<F>,
     end: EndLoss<F>,
     bell_y: F,
     bell_share: F,
     bell_g2: F,
     bell_state: F,
-    tuned_source: u32,
-    tuned_rows: u32,
+    tuned_source: u16,
+    tuned_rows: u16,
     /// Tuning delay, rows, and its change per row.
     delay: F,
     delay_glide: F,
@@ -433,7 +440,7 @@ pub struct Lattice<F> {
 
 #[derive(Clone, Copy)]
 struct EndLoss<F> {
-    offset: u32,
+    offset: u16,
     amount: F,
     q: F,
     state: F,
@@ -441,7 +448,7 @@ struct EndLoss<F> {
 
 impl<F: Real> EndLoss<F> {
     #[inline(always)]
-    fn take(&mut self, ring: &[F; RING], base: u32) -> F {
+    fn take(&mut self, ring: &[F; RING], base: u16) -> F {
         let wave = ring[(base.wrapping_add(self.offset) & MASK) as usize];
         let difference = wave - self.state;
         let step = self.q * difference;
@@ -450,8 +457,8 @@ impl<F: Real> EndLoss<F> {
     }
 }
 
-fn back_rows(rows: u32, slot: usize) -> u32 {
-    (slot as u32).wrapping_sub(rows * STRIDE as u32)
+fn back_rows(rows: u32, slot: usize) -> u16 {
+    (slot as u16).wrapping_sub(rows as u16 * STRIDE as u16)
 }
 
 impl<F: Real> Lattice<F> {
@@ -470,7 +477,7 @@ impl<F: Real> Lattice<F> {
             y_sum: ones,
             r1: none,
             gc: none,
-            gc2: none,
+            minus_gc2: none,
             gl2: none,
             outside: none,
             rs0: none,
@@ -509,7 +516,7 @@ impl<F: Real> Lattice<F> {
                     lanes.y_sum[k] = F::of(coeffs.admittance[left] + coeffs.admittance[right]);
                     lanes.r1[k] = F::of(hole.r1);
                     lanes.gc[k] = F::of(hole.gc);
-                    lanes.gc2[k] = F::of(2.0 * hole.gc);
+                    lanes.minus_gc2[k] = F::of(-2.0 * hole.gc);
                     lanes.gl2[k] = F::of(2.0 * hole.gl);
                     lanes.outside[k] = F::of(hole.gl + hole.gp);
                     lanes.rs0[k] = F::of(hole.rs);
@@ -519,13 +526,13 @@ impl<F: Real> Lattice<F> {
             };
             arrivals.offset[0][k] = back_rows(down, from_left);
             arrivals.offset[1][k] =
-                if right == tuned { TUNED_SLOT as u32 } else { back_rows(back, from_right) };
+                if right == tuned { TUNED_SLOT as u16 } else { back_rows(back, from_right) };
             for (side, cell) in [left, right].into_iter().enumerate() {
                 arrivals.amount[side][k] = F::of(coeffs.loss[cell].0);
                 arrivals.q[side][k] = F::of(coeffs.loss[cell].1);
             }
         }
-        let end = |cell: usize, offset: u32| EndLoss {
+        let end = |cell: usize, offset: u16| EndLoss {
             offset,
             amount: F::of(coeffs.loss[cell].0),
             q: F::of(coeffs.loss[cell].1),
@@ -551,8 +558,8 @@ impl<F: Real> Lattice<F> {
             bell_share: F::of(1.0 / (bell_y + coeffs.bell.0 + coeffs.bell.1)),
             bell_g2: F::of(2.0 * coeffs.bell.1),
             bell_state: F::default(),
-            tuned_source: (BACK + tuned_right) as u32,
-            tuned_rows: coeffs.rows(tuned).1,
+            tuned_source: (BACK + tuned_right) as u16,
+            tuned_rows: coeffs.rows(tuned).1 as u16,
             delay: F::default(),
             delay_glide: F::default(),
             avx2: has_avx2(),

@@ -196,6 +196,13 @@ impl Clarinet {
         self.resets + self.voice.resets()
     }
 
+    /// Keeps the plain code path, see [`Lattice::without_avx2`](crate::bore::lattice::Lattice::without_avx2).
+    #[doc(hidden)]
+    pub fn without_avx2(mut self) -> Self {
+        self.voice = self.voice.without_avx2();
+        self
+    }
+
     /// The voice inside, to be disturbed by tests.
     #[doc(hidden)]
     pub fn voice_mut(&mut self) -> &mut Voice<f32> {

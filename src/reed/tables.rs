@@ -63,7 +63,7 @@ impl ReedTables {
             let root = p.sqrt();
             return (self.x_a[LAST] * root, self.x_b[LAST] * p * root);
         }
-        let i = (position as usize).min(LAST - 1);
+        let i = (position as u32 as usize).min(LAST - 1);
         let t = position - i as f64;
         (self.x_a[i] + t * (self.x_a[i + 1] - self.x_a[i]), self.x_b[i] + t * (self.x_b[i + 1] - self.x_b[i]))
     }
