@@ -7,6 +7,7 @@ pub mod cli;
 pub mod control;
 pub mod dsp;
 pub mod event;
+pub mod identity;
 pub mod instrument;
 #[cfg(feature = "plugin")]
 pub mod plugin;

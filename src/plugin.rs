@@ -5,7 +5,6 @@
 //! their sample positions alone, not on the host's blocks, and is what the offline renderer writes. There is no editor
 //! yet; hosts show their own.
 
-pub mod identity;
 mod params;
 mod translate;
 
@@ -17,6 +16,7 @@ pub use params::{BreathParams, ChalumeauParams, EmbouchureParams, NoiseParams};
 pub use params::{OutputParams, ReedParams, SCHEMA, TuningChoice, TuningParams};
 
 use crate::event::{Event, Timed};
+use crate::identity;
 use crate::instrument::{Clarinet, Settings};
 use translate::Translator;
 

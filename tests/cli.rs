@@ -234,6 +234,7 @@ fn a_wav_file_is_as_long_and_deep_as_asked() {
         assert_eq!((wav.spec().bits_per_sample, wav.spec().channels), (stored, 2));
         assert_eq!((wav.spec().sample_rate, wav.duration()), (44_100, 22_050));
     }
+    succeeds(d.path(), "render --written 60 --gamma 1 --breath-full 6 --seconds 0.1 --out full.wav");
     succeeds(d.path(), "render --scale E3:G3 --seconds 0.1 --out scale.wav");
     assert_eq!(hound::WavReader::open(d.path().join("scale.wav")).unwrap().duration(), 19_200 + 48_000);
 }

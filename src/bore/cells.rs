@@ -162,6 +162,13 @@ impl Cells {
         let hole_junctions =
             (0..junctions.len()).filter(|&junction| junctions[junction].1.is_some()).collect();
         let end_radius_m = file.bore.last().map_or(REFERENCE_RADIUS_M, |segment| segment.r_end_m);
-        Ok(Self { rate_hz, cells, hole_junctions, end_radius_m, loss_strengths: wall_loss::STRENGTHS, vent_resistance: 1.0 })
+        Ok(Self {
+            rate_hz,
+            cells,
+            hole_junctions,
+            end_radius_m,
+            loss_strengths: wall_loss::STRENGTHS,
+            vent_resistance: 1.0,
+        })
     }
 }

@@ -42,7 +42,10 @@ struct WaveTarget {
 /// Tone-hole networks of a file; viscous resistance taken at 2.4 times the lowest note (350 Hz on the B flat clarinet).
 pub fn networks(file: &InstrumentFile, air: &Air) -> Vec<HoleNetwork> {
     let lowest_hz = lowest_hz(file);
-    file.holes.iter().map(|hole| HoleNetwork::new(hole, file.radius_at(hole.x_m), 2.4 * lowest_hz, air)).collect()
+    file.holes
+        .iter()
+        .map(|hole| HoleNetwork::new(hole, file.radius_at(hole.x_m), 2.4 * lowest_hz, air))
+        .collect()
 }
 
 /// Equal-tempered frequency of the lowest note in the file, A4 = 440 Hz.
@@ -151,12 +154,20 @@ pub fn fit(file: &InstrumentFile, air: &Air, rate_hz: f64) -> Result<Cells, Cell
                 let f_hz = 100.0 * 50.0_f64.powf(f64::from(n) / 49.0);
                 let z = model.impedance(f_hz, &fingering.open, 0.0);
                 let r = (z - 1.0 / tip_y) / (z + 1.0 / tip_y);
-                waves.push(WaveTarget { fingering: index, f_hz, r, weight: if f_hz < 3_000.0 { 2.0 } else { 1.0 } });
+                waves.push(WaveTarget {
+                    fingering: index,
+                    f_hz,
+                    r,
+                    weight: if f_hz < 3_000.0 { 2.0 } else { 1.0 },
+                });
             }
         }
     }
-    let openings =
-        file.fingerings.iter().map(|f| f.open.iter().map(|&open| f64::from(u8::from(open))).collect()).collect();
+    let openings = file
+        .fingerings
+        .iter()
+        .map(|f| f.open.iter().map(|&open| f64::from(u8::from(open))).collect())
+        .collect();
     let parameters = DVector::zeros(start.cells.len() + 5);
     let problem = Problem { start, networks: &networks, air, openings, peaks, waves, parameters };
     let solver = LevenbergMarquardt::new().with_ftol(1e-5).with_xtol(1e-5).with_gtol(1e-9).with_patience(2);

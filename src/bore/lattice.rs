@@ -145,7 +145,8 @@ impl LatticeCoeffs {
             holes: networks
                 .iter()
                 .map(|network| HoleCoeffs {
-                    rs: network.coeffs(rate_hz, air).rs * if network.register { cells.vent_resistance } else { 1.0 },
+                    rs: network.coeffs(rate_hz, air).rs
+                        * if network.register { cells.vent_resistance } else { 1.0 },
                     ..network.coeffs(rate_hz, air)
                 })
                 .collect(),
@@ -362,6 +363,8 @@ struct Holes<F> {
     gl2: Octet<F>,
     outside: Octet<F>,
     rs0: Octet<F>,
+    /// Jet resistance per flow of the open hole, and as it stands.
+    jet_open: Octet<F>,
     jet: Octet<F>,
     opening: Octet<F>,
     glide: Octet<F>,
@@ -373,6 +376,17 @@ struct Holes<F> {
 }
 
 impl<F: Real> Holes<F> {
+    /// A hole opened by `a` passes its jet through `a^2` of its area (its mass, too, is 1 / a^2 of the open one's). Seen
+    /// behind the transformer the loss is then 1 / a^2 of the open hole's: it is what quietens the air column when the
+    /// fingers leave many holes at once. Held below a bound where no air passes anyway.
+    #[inline(always)]
+    fn throttle(&mut self) {
+        for k in 0..LANES {
+            let area = self.opening[k] * self.opening[k];
+            self.jet[k] = self.jet_open[k] / (area + F::of(0.02) * (F::of(1.0) - area));
+        }
+    }
+
     /// The network of [`tone_hole`](crate::bore::tone_hole) at eight junctions, one sample.
     #[inline(always)]
     fn tick(&mut self, ring: &mut [F; RING], base: u16, slot: usize) {
@@ -481,6 +495,7 @@ impl<F: Real> Lattice<F> {
             gl2: none,
             outside: none,
             rs0: none,
+            jet_open: none,
             jet: none,
             opening: none,
             glide: none,
@@ -607,7 +622,7 @@ impl<F: Real> Lattice<F> {
     /// Strength of the jet's loss in all holes: K, 0 (linear) ..= 4; 2 is physical for sharp edges. Real-time safe.
     pub fn set_jet_loss(&mut self, k: f64) {
         for (&(chunk, lane), jet) in self.hole_lanes.iter().zip(&*self.jets) {
-            self.holes[chunk].jet[lane] = F::of(k * jet);
+            self.holes[chunk].jet_open[lane] = F::of(k * jet);
         }
     }
 
@@ -624,7 +639,8 @@ impl<F: Real> Lattice<F> {
         }
     }
 
-    /// Runs `samples` samples with `tip` at the reed end. Real-time safe. [audio thread]
+    /// Runs `samples` samples (a control tick) with `tip` at the reed end; jets of moving holes are brought up to date
+    /// once a call. Real-time safe. [audio thread]
     pub fn run<T: Tip<F>>(&mut self, samples: usize, tip: &mut T) {
         #[cfg(target_arch = "x86_64")]
         if self.avx2 {
@@ -710,6 +726,7 @@ fn run_avx2<F: Real, T: Tip<F>>(lattice: &mut Lattice<F>, samples: usize, tip: &
 
 #[inline(always)]
 fn run_body<F: Real, T: Tip<F>>(lattice: &mut Lattice<F>, samples: usize, tip: &mut T) {
+    lattice.holes.iter_mut().for_each(Holes::throttle);
     let ring = &mut *lattice.ring;
     for _ in 0..samples {
         lattice.row = (lattice.row + 1) & (ROWS as u32 - 1);

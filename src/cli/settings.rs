@@ -105,7 +105,8 @@ impl SettingsArgs {
         let mut settings = self.settings();
         let Some(gamma_max) = curve.map(BreathCurve::gamma_max) else { return Ok(settings) };
         let closing_kpa = score::closing_kpa(&settings);
-        let needed_kpa = gamma_max * closing_kpa;
+        // Less what single precision adds to a closing pressure of 6 kPa.
+        let needed_kpa = gamma_max * closing_kpa * (1.0 - 4.0 * f32::EPSILON);
         if needed_kpa <= settings.breath_full_kpa {
             return Ok(settings);
         }

@@ -15,6 +15,7 @@ use crate::instrument::voice::{TICK, Voice};
 use crate::reed::ReedCoeffs;
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
+use crate::reed::motion::TONGUE_FORCE;
 
 /// Full scale per pascal at 1 m: 1 Pa is -6 dBFS.
 const FULL_SCALE_PER_PA: f64 = 0.501_187_233_627_272_2;
@@ -67,7 +68,8 @@ impl Clarinet {
         let lip = embouchure(model.lowest_hz, model.lowest_hz);
         let (swept, rate) = (model.swept_s, model.coeffs.rate_hz);
         let reed = ReedCoeffs::new(ReedLaw::default(), 0.3, 0.4, lip.resonance_hz, lip.damping, swept, rate);
-        let voice = Voice::new(&model.coeffs, &model.air, ReedTables::seed(), reed);
+        let mut voice = Voice::new(&model.coeffs, &model.air, ReedTables::seed(), reed);
+        voice.hold_reed(TONGUE_FORCE);
         let resampler = Resampler::new(rate, host_rate_hz);
         let inner = vec![0.0; resampler.inputs_needed_at_most(CHUNK)].into_boxed_slice();
         let gain = gain_of(&Settings::default());
@@ -147,7 +149,8 @@ impl Clarinet {
             }
             if out.iter().sum::<f32>().is_finite() {
                 let audible = out.iter().any(|sample| sample.abs() > 1e-7);
-                self.quiet = if audible || !self.player.is_resting() { 0 } else { self.quiet.saturating_add(1) };
+                self.quiet =
+                    if audible || !self.player.is_resting() { 0 } else { self.quiet.saturating_add(1) };
             } else {
                 out.fill(0.0);
                 self.voice.reset();
@@ -161,6 +164,7 @@ impl Clarinet {
     pub fn reset(&mut self) {
         self.player.reset();
         self.voice.reset();
+        self.voice.hold_reed(TONGUE_FORCE);
         self.voice.lattice_mut().glide_delay(0.0, 0);
         for hole in 0..self.model.coeffs.holes() {
             self.voice.lattice_mut().set_opening(hole, 0.0);

@@ -66,7 +66,15 @@ impl HeldNote {
         let lip = embouchure(model.notes_hz[self.fingering], model.lowest_hz);
         let law = ReedLaw::default();
         let damping = lip.damping * self.damping;
-        ReedCoeffs::new(law, self.zeta, self.lay, lip.resonance_hz, damping, model.swept_s, model.coeffs.rate_hz)
+        ReedCoeffs::new(
+            law,
+            self.zeta,
+            self.lay,
+            lip.resonance_hz,
+            damping,
+            model.swept_s,
+            model.coeffs.rate_hz,
+        )
     }
 
     /// A silent voice fingered and ready for this note.

@@ -52,7 +52,9 @@ pub enum BuildError {
     #[error(transparent)]
     Cells(#[from] CellsError),
     /// A generated file of the repository is damaged.
-    #[error("generated data of the built-in instrument: {0}; run `cargo xtask fit-bore` and `cargo xtask tune`")]
+    #[error(
+        "generated data of the built-in instrument: {0}; run `cargo xtask fit-bore` and `cargo xtask tune`"
+    )]
     Data(String),
 }
 
@@ -75,7 +77,9 @@ struct CellsFile {
 
 /// Reads a generated cells file.
 pub fn parse_cells(text: &str) -> Result<Vec<Cells>, BuildError> {
-    toml::from_str::<CellsFile>(text).map(|file| file.bore).map_err(|error| BuildError::Data(error.to_string()))
+    toml::from_str::<CellsFile>(text)
+        .map(|file| file.bore)
+        .map_err(|error| BuildError::Data(error.to_string()))
 }
 
 /// Writes a generated cells file.
@@ -90,7 +94,8 @@ impl Model {
     pub fn built_in(host_rate_hz: f64) -> Result<Self, BuildError> {
         let rate_hz = check(host_rate_hz)?;
         let missing = || BuildError::Data(format!("no cells for {rate_hz} Hz"));
-        let cells = parse_cells(CELLS)?.into_iter().find(|cells| cells.rate_hz == rate_hz).ok_or_else(missing)?;
+        let cells =
+            parse_cells(CELLS)?.into_iter().find(|cells| cells.rate_hz == rate_hz).ok_or_else(missing)?;
         let file = InstrumentFile::built_in();
         let tuning = TuningTable::parse(TUNING, rate_hz, &file)?;
         Ok(Self::assemble(file, cells, tuning))
@@ -124,7 +129,17 @@ impl Model {
             .collect();
         let section = std::f64::consts::PI * REFERENCE_RADIUS_M * REFERENCE_RADIUS_M;
         let swept_s = PhysicalReed::reference().equivalent_volume_m3(&air) / (section * air.c);
-        Self { lowest_hz: fit::lowest_hz(&file), notes_hz, registers, swept_s, coeffs, cells, tuning, air, file }
+        Self {
+            lowest_hz: fit::lowest_hz(&file),
+            notes_hz,
+            registers,
+            swept_s,
+            coeffs,
+            cells,
+            tuning,
+            air,
+            file,
+        }
     }
 
     /// Index of the fingering for a sounding pitch.

@@ -19,8 +19,9 @@ use crate::units::{Air, SoundingNote, cents};
 const STACK: usize = 16;
 /// How long the tongue holds the reed before a tongued note, s: long enough for the breath to rise behind it.
 const TONGUE_HOLD_S: f64 = 0.008;
-/// How fast the tongue reaches the reed to stop a note, s.
+/// How fast the tongue reaches the reed to stop a note, and how softly it lands, s.
 const TONGUE_STOP_S: f64 = 0.005;
+const TONGUE_PRESS_S: f64 = 0.001;
 /// Time constants of the breath, s: rising behind the tongue, following a controller, ending.
 const BREATH_RISE_S: f64 = 0.002;
 const BREATH_FOLLOW_S: f64 = 0.005;
@@ -32,9 +33,11 @@ const DIP: (f64, f64) = (0.3, 0.025);
 /// A note is over when its breath is below this share of the closing pressure.
 const NO_BREATH: f64 = 1e-6;
 
-/// Where the tongue is.
+/// Where the tongue is. Between notes it rests on the reed, so that nothing slams shut when the next one is prepared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Tongue {
+    /// On the reed.
+    Resting,
     /// Away from the reed.
     Away,
     /// Holding the reed for so many more seconds before a note.
@@ -64,6 +67,8 @@ pub struct Player {
     dip: f64,
     rows: f64,
     rows_set: bool,
+    /// Force of the tongue, smoothed so that it never slaps by accident.
+    tongue_force: f64,
 }
 
 impl Default for Player {
@@ -78,11 +83,12 @@ impl Default for Player {
             breath_live: false,
             breath: 0.0,
             gamma: 0.0,
-            tongue: Tongue::Away,
+            tongue: Tongue::Resting,
             bend_cents: 0.0,
             dip: 0.0,
             rows: 0.0,
             rows_set: false,
+            tongue_force: TONGUE_FORCE,
         }
     }
 }
@@ -104,7 +110,12 @@ impl Player {
     }
 
     /// What the player is told. Real-time safe.
-    pub fn apply<F: crate::bore::lattice::Real>(&mut self, event: Event, model: &Model, voice: &mut Voice<F>) {
+    pub fn apply<F: crate::bore::lattice::Real>(
+        &mut self,
+        event: Event,
+        model: &Model,
+        voice: &mut Voice<F>,
+    ) {
         match event {
             Event::NoteOn { note, velocity } => self.note_on(note, velocity, model, voice),
             Event::NoteOff { note } => self.note_off(note, model, voice),
@@ -113,11 +124,13 @@ impl Player {
                 self.breath = f64::from(if breath.is_finite() { breath.clamp(0.0, 1.0) } else { 0.0 });
             }
             Event::Bend { cents } => {
-                self.bend_cents = f64::from(if cents.is_finite() { cents.clamp(-4_800.0, 4_800.0) } else { 0.0 });
+                self.bend_cents =
+                    f64::from(if cents.is_finite() { cents.clamp(-4_800.0, 4_800.0) } else { 0.0 });
             }
             Event::Panic => {
                 self.reset();
                 voice.reset();
+                voice.hold_reed(TONGUE_FORCE);
             }
         }
     }
@@ -146,7 +159,12 @@ impl Player {
         self.finger(fingering, slurred, model, voice);
     }
 
-    fn note_off<F: crate::bore::lattice::Real>(&mut self, note: SoundingNote, model: &Model, voice: &mut Voice<F>) {
+    fn note_off<F: crate::bore::lattice::Real>(
+        &mut self,
+        note: SoundingNote,
+        model: &Model,
+        voice: &mut Voice<F>,
+    ) {
         let sounding = self.held_count > 0 && self.held[self.held_count - 1] == note;
         self.release(note);
         if !sounding {
@@ -256,6 +274,7 @@ impl Player {
 
         // Tongue.
         let (tongue, share) = match self.tongue {
+            Tongue::Resting => (Tongue::Resting, 1.0),
             Tongue::Away => (Tongue::Away, 0.0),
             Tongue::Holding(left) if left > tick_s => (Tongue::Holding(left - tick_s), 1.0),
             Tongue::Holding(_) => (Tongue::Leaving(1.0), 1.0),
@@ -267,10 +286,18 @@ impl Player {
             }
             Tongue::Stopping(share) => {
                 let share = (share + tick_s / TONGUE_STOP_S).min(1.0);
-                if self.gamma == 0.0 && share == 1.0 { (Tongue::Away, 0.0) } else { (Tongue::Stopping(share), share) }
+                (if share < 1.0 { Tongue::Stopping(share) } else { Tongue::Resting }, share)
             }
         };
         self.tongue = tongue;
+        let force = TONGUE_FORCE * closing * share;
+        // Letting go is as quick as asked; pressing takes a moment.
+        let press = 1.0 - (-tick_s / TONGUE_PRESS_S).exp();
+        self.tongue_force = if force < self.tongue_force {
+            force
+        } else {
+            self.tongue_force + press * (force - self.tongue_force)
+        };
 
         // Lip and tuning.
         let lip = embouchure(model.notes_hz[fingering], model.lowest_hz);
@@ -303,10 +330,9 @@ impl Player {
 
         Drive {
             p_mouth: self.gamma * closing,
-            tongue: TONGUE_FORCE * closing * share,
+            tongue: self.tongue_force,
             noise: f64::from(settings.noise),
             reed,
         }
     }
 }
-

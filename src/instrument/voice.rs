@@ -129,7 +129,12 @@ impl<F: Real> Tip<F> for Mouth {
 
 impl<F: Real> Voice<F> {
     /// A silent voice. Allocates.
-    pub fn new(coeffs: &Arc<LatticeCoeffs>, air: &Air, tables: &'static ReedTables, reed: ReedCoeffs) -> Self {
+    pub fn new(
+        coeffs: &Arc<LatticeCoeffs>,
+        air: &Air,
+        tables: &'static ReedTables,
+        reed: ReedCoeffs,
+    ) -> Self {
         let rate = coeffs.rate_hz;
         let flow_unit = P_REF_PA / air.z_c(REFERENCE_RADIUS_M);
         let corner = |hz: f64| 1.0 - (-std::f64::consts::TAU * hz / rate).exp();
@@ -204,11 +209,19 @@ impl<F: Real> Voice<F> {
             self.lattice.flush();
         }
         let state = self.mouth.state;
-        if !(self.mouth.out.iter().sum::<f32>() + (state.closing + state.speed + state.p_mouthpiece) as f32).is_finite() {
+        if !(self.mouth.out.iter().sum::<f32>() + (state.closing + state.speed + state.p_mouthpiece) as f32)
+            .is_finite()
+        {
             self.reset();
             self.resets += 1;
         }
         &self.mouth.out
+    }
+
+    /// Puts the reed where a tongue of this force holds it, without the thump of getting there. Real-time safe.
+    pub fn hold_reed(&mut self, tongue: f64) {
+        self.mouth.state = ReedState { closing: tongue, ..ReedState::default() };
+        self.mouth.tongue = tongue;
     }
 
     /// Silence, noise generator and tick counter included; openings and delay stay. Real-time safe.

@@ -26,7 +26,12 @@ pub fn pressure_table_values(tables: &ReedTables) -> String {
     for (i, sign) in tables.sgn.iter().enumerate() {
         let _ = write!(text, "{}{sign}", if i == 0 { "" } else { ", " });
     }
-    let _ = write!(text, "}};\nconst float H_init = {:?};\nconst float k_init = {:?};\n", law::H_INIT, law::K_INIT);
+    let _ = write!(
+        text,
+        "}};\nconst float H_init = {:?};\nconst float k_init = {:?};\n",
+        law::H_INIT,
+        law::K_INIT
+    );
     text
 }
 

@@ -148,7 +148,10 @@ mod tests {
         // Physics: at p = -1 the reed stands at twice its rest opening, u = -(H + 1/k). The notebook closes it.
         assert!((law.flow(tables, -1.0) + law.h() + 1.0 / law.k()).abs() < 1e-12);
         assert!(notebook(-1.0).abs() < 1e-12);
-        assert!((law.flow(tables, 0.5) - notebook(0.5)).abs() < 1e-6, "they agree where the notebook is right");
+        assert!(
+            (law.flow(tables, 0.5) - notebook(0.5)).abs() < 1e-6,
+            "they agree where the notebook is right"
+        );
     }
 
     #[test]

@@ -47,7 +47,15 @@ impl ReedCoeffs {
     /// Coefficients for a law (with `zeta` of the reference reed), a resonance and a damping, at `rate_hz`.
     ///
     /// `swept_s` is the equivalent volume of the reference reed over (bore section times speed of sound), seconds.
-    pub fn new(law: ReedLaw, zeta: f64, lay: f64, resonance_hz: f64, damping: f64, swept_s: f64, rate_hz: f64) -> Self {
+    pub fn new(
+        law: ReedLaw,
+        zeta: f64,
+        lay: f64,
+        resonance_hz: f64,
+        damping: f64,
+        swept_s: f64,
+        rate_hz: f64,
+    ) -> Self {
         let period = 1.0 / rate_hz;
         // w_r T stays below 1, well inside the integrator's stability limit of 2.
         let angular = std::f64::consts::TAU * resonance_hz.min(0.15 * rate_hz);
@@ -116,7 +124,8 @@ impl ReedState {
         let sign = if x < 0.0 { -1.0 } else { 1.0 };
         // Forward the quasi-static reed closes with p, backward it opens: hence the sign inside.
         // A shut reed passes nothing, not even the tables' interpolation error.
-        let table_flow = if b > 0.0 { reed.strength * (x_a * (b + sign * r * p) - sign * r * x_b) } else { 0.0 };
+        let table_flow =
+            if b > 0.0 { reed.strength * (x_a * (b + sign * r * p) - sign * r * x_b) } else { 0.0 };
         let exact_flow = reed.strength * b * root;
         let slope = if load > 0.0 { root / load } else { 0.0 };
         let p = sign * (p - kappa * (table_flow - exact_flow) * slope).max(0.0);
@@ -157,7 +166,8 @@ mod tests {
             let exact = reed.strength * b * p.abs().sqrt().copysign(p);
             let residual = (p_plus - p_minus - exact).abs();
             // The tables' own interpolation error is all that is left.
-            let bound = if p.abs() < 1.0 && b > 0.0 { reed.strength * (3.0e-4 * (b + p.abs()) + 7e-7) } else { 0.0 };
+            let bound =
+                if p.abs() < 1.0 && b > 0.0 { reed.strength * (3.0e-4 * (b + p.abs()) + 7e-7) } else { 0.0 };
             assert!(residual <= bound + 1e-12, "{residual:e} at p {p}, b {b}");
         }
     }
@@ -181,7 +191,10 @@ mod tests {
             };
             assert_eq!(opening(0.0), 1.0);
             assert!((opening(0.1) - 0.9).abs() < 1e-12);
-            assert!((opening(1.0) - lay / 4.0).abs() < 1e-12, "not yet shut at the extrapolated closing pressure");
+            assert!(
+                (opening(1.0) - lay / 4.0).abs() < 1e-12,
+                "not yet shut at the extrapolated closing pressure"
+            );
             assert!(opening(1.0 + lay) < 1e-30);
         }
     }

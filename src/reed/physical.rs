@@ -21,7 +21,8 @@ impl PhysicalReed {
     /// Those three follow physics of the instrument the geometry was tuned with; the tip opening of 0.5 mm is a common
     /// one, and width, area and stiffness then follow. The width is large because it stands for tip and side slits.
     pub fn reference() -> Self {
-        let (air, closing_pa, zeta, volume_m3, tip_opening_m) = (Air::default(), 6_000.0, 0.3, 1.2e-6, 0.5e-3);
+        let (air, closing_pa, zeta, volume_m3, tip_opening_m) =
+            (Air::default(), 6_000.0, 0.3, 1.2e-6, 0.5e-3);
         let area_m2 = volume_m3 * closing_pa / (air.rho * air.c * air.c * tip_opening_m);
         let stiffness_n_m = closing_pa * area_m2 / tip_opening_m;
         let speed = (2.0 / (air.rho * closing_pa)).sqrt();

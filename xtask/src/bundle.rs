@@ -40,8 +40,8 @@ fn present(path: PathBuf) -> Result<PathBuf> {
     }
 }
 
-/// Where hosts look for plugins of one user, for the reader to copy to.
+/// Where hosts look for plugins.
 pub const HOMES: &str =
     "  Linux    cp target/bundled/Chalumeau.clap ~/.clap/; cp -r target/bundled/Chalumeau.vst3 ~/.vst3/
   macOS    ~/Library/Audio/Plug-Ins/CLAP and ~/Library/Audio/Plug-Ins/VST3
-  Windows  %LOCALAPPDATA%\\Programs\\Common\\CLAP and %LOCALAPPDATA%\\Programs\\Common\\VST3";
+  Windows  %COMMONPROGRAMFILES%\\CLAP and %COMMONPROGRAMFILES%\\VST3";

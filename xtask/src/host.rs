@@ -85,6 +85,9 @@ impl Plugin {
         // SAFETY: the file is the plugin this project has just built.
         let entry = unsafe { PluginEntry::load(path) }
             .with_context(|| format!("cannot load {} as a CLAP", path.display()))?;
+        // A Rust library leaves thread-local destructors behind in every thread that called it; unloading it pulls the
+        // code from under them. Like most hosts, this one never unloads.
+        std::mem::forget(entry.clone());
         let id: CString = {
             let factory = entry.get_plugin_factory().context("the library has no plugin factory")?;
             let first = factory.plugin_descriptors().next().context("the library holds no plugin")?;

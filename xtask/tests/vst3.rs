@@ -1,7 +1,7 @@
 //! The bundled VST3, as a host sees and hears it. `cargo xtask bundle` first; CHALUMEAU_VST3 names another bundle.
 
 use std::path::PathBuf;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 
 use chalumeau::event::{Event, Timed};
 use chalumeau::instrument::{Clarinet, Settings};
@@ -39,8 +39,15 @@ fn load_beside(block: usize) -> Loaded {
         Some(path) => xtask::machine::root().join(PathBuf::from(path)),
         None => xtask::bundle::vst3().unwrap(),
     };
-    let mut host = Vst3Host::builder().sample_rate(RATE).block_size(block).build().unwrap();
-    let plugin = host.load_plugin(&path).unwrap();
+    let load = || {
+        let mut host = Vst3Host::builder().sample_rate(RATE).block_size(block).build().unwrap();
+        let plugin = host.load_plugin(&path).unwrap();
+        (plugin, host)
+    };
+    // One stays loaded for good, so that the library does: see `xtask::host::Plugin::load`.
+    static FIRST: Once = Once::new();
+    FIRST.call_once(|| std::mem::forget(load()));
+    let (plugin, host) = load();
     Loaded { plugin, _host: host, _turn: None }
 }
 

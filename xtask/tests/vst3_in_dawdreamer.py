@@ -91,9 +91,9 @@ def breath_controller_blows():
     path = midi_file([(0, (0xB0, 2, 0)), (10, (0x90, 58, 100)), (500, (0xB0, 2, 90)), (1500, (0xB0, 2, 0))])
     plugin.load_midi(path, all_events=True)
     heard = render(engine, plugin, 3.0)
-    assert level_db(heard[2000:23_000]) < -60, level_db(heard[2000:23_000])  # keys and tongue, no tone
+    assert level_db(heard[6000:23_000]) < -90, level_db(heard[6000:23_000])  # after the thump of keys and tongue
     assert level_db(heard[48_000:70_000]) > -40, level_db(heard[48_000:70_000])
-    assert np.max(np.abs(heard[int(2.6 * RATE) :])) < 1e-6
+    assert level_db(heard[int(2.6 * RATE) :]) < -120, level_db(heard[int(2.6 * RATE) :])
 
 
 def the_wheel_bends():
