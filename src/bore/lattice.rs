@@ -54,6 +54,7 @@ pub trait Real:
     + std::ops::Mul<Output = Self>
     + std::ops::Div<Output = Self>
     + std::ops::Neg<Output = Self>
+    + From<u16>
 {
     /// Rounds from f64.
     fn of(x: f64) -> Self;
@@ -358,6 +359,7 @@ struct Holes<F> {
     y_right: Octet<F>,
     y_sum: Octet<F>,
     r1: Octet<F>,
+    minus_r1: Octet<F>,
     gc: Octet<F>,
     minus_gc2: Octet<F>,
     gl2: Octet<F>,
@@ -372,28 +374,30 @@ struct Holes<F> {
     outer: Octet<F>,
     compliance: Octet<F>,
     inner: Octet<F>,
-    radiated: Octet<F>,
 }
 
 impl<F: Real> Holes<F> {
     /// A hole opened by `a` passes its jet through `a^2` of its area (its mass, too, is 1 / a^2 of the open one's). Seen
     /// behind the transformer the loss is then 1 / a^2 of the open hole's: it is what quietens the air column when the
     /// fingers leave many holes at once. Held below a bound where no air passes anyway.
-    #[inline(always)]
-    fn throttle(&mut self) {
+    ///
+    /// True if a hole is on its way. Seldom called, hence not inlined: it would crowd the loop over samples.
+    #[inline(never)]
+    fn throttle(&mut self) -> bool {
         for k in 0..LANES {
             let area = self.opening[k] * self.opening[k];
             self.jet[k] = self.jet_open[k] / (area + F::of(0.02) * (F::of(1.0) - area));
         }
+        self.glide != Octet::default()
     }
 
-    /// The network of [`tone_hole`](crate::bore::tone_hole) at eight junctions, one sample.
+    /// The network of [`tone_hole`](crate::bore::tone_hole) at eight junctions, one sample; the flows leaving outside.
     #[inline(always)]
-    fn tick(&mut self, ring: &mut [F; RING], base: u16, slot: usize) {
+    fn tick(&mut self, ring: &mut [F; RING], base: u16, slot: usize) -> Octet<F> {
         let left = self.arrivals.gather::<0>(ring, base);
         let right = self.arrivals.gather::<1>(ring, base);
         let one = F::of(1.0);
-        let mut pressure = Octet::<F>::default();
+        let (mut pressure, mut radiated) = (Octet::<F>::default(), Octet::<F>::default());
         for k in 0..LANES {
             let a = self.opening[k] + self.glide[k];
             self.opening[k] = a;
@@ -413,19 +417,20 @@ impl<F: Real> Holes<F> {
             let inner = self.inner[k];
             let source = (self.compliance[k] + a * h2 - gp * inner) * share;
             let p = (self.y_left[k] * left[k] + self.y_right[k] * right[k] - source) * q;
-            let drop = self.r1[k] * (g0 * p + source);
-            let node = p - inner - drop;
+            let rise = self.minus_r1[k] * (g0 * p + source);
+            let node = p - inner + rise;
             let outside = a * node;
             let flow = g2 * outside + h2;
             self.outer[k] = self.outer[k] + self.gl2[k] * (outside - rs * flow);
             self.compliance[k] = self.minus_gc2[k] * node - self.compliance[k];
-            self.inner[k] = -(drop + drop + inner);
+            self.inner[k] = rise + rise - inner;
             let leaving = a * flow;
-            self.radiated[k] = leaving;
+            radiated[k] = leaving;
             self.resistance[k] = self.rs0[k] + self.jet[k] * leaving.magnitude();
             pressure[k] = p;
         }
         leave(ring, base as usize + slot, &pressure, &left, &right);
+        radiated
     }
 }
 
@@ -446,9 +451,11 @@ pub struct Lattice<F> {
     bell_state: F,
     tuned_source: u16,
     tuned_rows: u16,
-    /// Tuning delay, rows, and its change per row.
+    /// Rows the returning wave of the tuned cell takes, and their change per row.
     delay: F,
     delay_glide: F,
+    /// Openings or jets have changed since they were last matched.
+    moved: bool,
     avx2: bool,
 }
 
@@ -490,6 +497,7 @@ impl<F: Real> Lattice<F> {
             y_right: none,
             y_sum: ones,
             r1: none,
+            minus_r1: none,
             gc: none,
             minus_gc2: none,
             gl2: none,
@@ -503,7 +511,6 @@ impl<F: Real> Lattice<F> {
             outer: none,
             compliance: none,
             inner: none,
-            radiated: none,
         };
         let mut holes = vec![idle; coeffs.hole_chunks()];
         let tuned = coeffs.tuned_cell();
@@ -530,6 +537,7 @@ impl<F: Real> Lattice<F> {
                     lanes.y_right[k] = F::of(2.0 * coeffs.admittance[right]);
                     lanes.y_sum[k] = F::of(coeffs.admittance[left] + coeffs.admittance[right]);
                     lanes.r1[k] = F::of(hole.r1);
+                    lanes.minus_r1[k] = F::of(-hole.r1);
                     lanes.gc[k] = F::of(hole.gc);
                     lanes.minus_gc2[k] = F::of(-2.0 * hole.gc);
                     lanes.gl2[k] = F::of(2.0 * hole.gl);
@@ -575,8 +583,9 @@ impl<F: Real> Lattice<F> {
             bell_state: F::default(),
             tuned_source: (BACK + tuned_right) as u16,
             tuned_rows: coeffs.rows(tuned).1 as u16,
-            delay: F::default(),
+            delay: F::of(f64::from(coeffs.rows(tuned).1)),
             delay_glide: F::default(),
+            moved: true,
             avx2: has_avx2(),
         }
     }
@@ -588,7 +597,7 @@ impl<F: Real> Lattice<F> {
         for holes in &mut *self.holes {
             holes.arrivals.state = Default::default();
             holes.resistance = holes.rs0;
-            for state in [&mut holes.outer, &mut holes.compliance, &mut holes.inner, &mut holes.radiated] {
+            for state in [&mut holes.outer, &mut holes.compliance, &mut holes.inner] {
                 *state = Octet::default();
             }
         }
@@ -609,6 +618,7 @@ impl<F: Real> Lattice<F> {
         let (chunk, lane) = self.hole_lanes[hole];
         self.holes[chunk].opening[lane] = F::of(opening.clamp(0.0, 1.0));
         self.holes[chunk].glide[lane] = F::default();
+        self.moved = true;
     }
 
     /// Starts a hole towards an opening that it reaches after `samples`; set it there with
@@ -617,6 +627,7 @@ impl<F: Real> Lattice<F> {
         let (chunk, lane) = self.hole_lanes[hole];
         let from = self.holes[chunk].opening[lane].wide();
         self.holes[chunk].glide[lane] = F::of((opening.clamp(0.0, 1.0) - from) / samples as f64);
+        self.moved = true;
     }
 
     /// Strength of the jet's loss in all holes: K, 0 (linear) ..= 4; 2 is physical for sharp edges. Real-time safe.
@@ -624,13 +635,13 @@ impl<F: Real> Lattice<F> {
         for (&(chunk, lane), jet) in self.hole_lanes.iter().zip(&*self.jets) {
             self.holes[chunk].jet_open[lane] = F::of(k * jet);
         }
+        self.moved = true;
     }
 
     /// Tuning delay, rows of the round trip, clamped to what the cell can give; reached after `samples`, 0 for at once.
     /// Real-time safe.
     pub fn glide_delay(&mut self, rows: f64, samples: usize) {
-        let rows =
-            rows.clamp(1.0 - f64::from(self.tuned_rows), (ROWS - 2) as f64 - f64::from(self.tuned_rows));
+        let rows = (rows + f64::from(self.tuned_rows)).clamp(1.0, (ROWS - 2) as f64);
         if samples == 0 {
             self.delay = F::of(rows);
             self.delay_glide = F::default();
@@ -655,7 +666,7 @@ impl<F: Real> Lattice<F> {
         run_body(self, samples, tip);
     }
 
-    /// Zeroes states too small to hear before they become denormal. Call every hundred samples or so. Real-time safe.
+    /// Zeroes states too small to hear before they become denormal. Call every few hundred samples. Real-time safe.
     pub fn flush(&mut self) {
         self.ring.iter_mut().for_each(flush);
         self.steps.iter_mut().for_each(|steps| steps.arrivals.flush());
@@ -726,19 +737,20 @@ fn run_avx2<F: Real, T: Tip<F>>(lattice: &mut Lattice<F>, samples: usize, tip: &
 
 #[inline(always)]
 fn run_body<F: Real, T: Tip<F>>(lattice: &mut Lattice<F>, samples: usize, tip: &mut T) {
-    lattice.holes.iter_mut().for_each(Holes::throttle);
+    if lattice.moved {
+        lattice.moved = lattice.holes.iter_mut().fold(false, |moving, holes| holes.throttle() | moving);
+    }
     let ring = &mut *lattice.ring;
     for _ in 0..samples {
-        lattice.row = (lattice.row + 1) & (ROWS as u32 - 1);
-        let base = lattice.row * STRIDE as u32;
+        lattice.row = (lattice.row + 1) & (ROWS as u16 - 1);
+        let base = lattice.row * STRIDE as u16;
 
         // The returning wave of the tuned cell, delayed by whole rows and a linear part between two.
         lattice.delay = lattice.delay + lattice.delay_glide;
-        let rows = lattice.delay.wide() + f64::from(lattice.tuned_rows);
-        let whole = rows as u32;
-        let part = F::of(rows - f64::from(whole));
-        let near = lattice.tuned_source.wrapping_add(base).wrapping_sub(whole.wrapping_mul(STRIDE as u32));
-        let (near, far) = (near & MASK, near.wrapping_sub(STRIDE as u32) & MASK);
+        let whole = lattice.delay.whole();
+        let part = lattice.delay - F::from(whole);
+        let near = lattice.tuned_source.wrapping_add(base).wrapping_sub(whole.wrapping_mul(STRIDE as u16));
+        let (near, far) = (near & MASK, near.wrapping_sub(STRIDE as u16) & MASK);
         let wave = ring[near as usize] + part * (ring[far as usize] - ring[near as usize]);
         ring[(base as usize + TUNED_SLOT) & (RING - 1)] = wave;
 
@@ -761,10 +773,10 @@ fn run_body<F: Real, T: Tip<F>>(lattice: &mut Lattice<F>, samples: usize, tip: &
         }
         let mut lanes = Octet::<F>::default();
         for holes in &mut *lattice.holes {
-            holes.tick(ring, base, slot);
+            let radiated = holes.tick(ring, base, slot);
             slot += LANES;
             for k in 0..LANES {
-                lanes[k] = lanes[k] + holes.radiated[k];
+                lanes[k] = lanes[k] + radiated[k];
             }
         }
         for lane in lanes {

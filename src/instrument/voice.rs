@@ -13,7 +13,7 @@ use crate::units::{Air, REFERENCE_RADIUS_M};
 /// Samples of one control tick: everything a player moves, moves on this grid, counted from reset.
 pub const TICK: usize = 16;
 /// Ticks between two flushes of states too small to hear.
-const FLUSH_TICKS: u32 = 8;
+const FLUSH_TICKS: u32 = 32;
 /// Breath noise at `noise` = 1: rms of the noise flow over the mean flow it rides on (by ear and by level: -40 dB under
 /// a mezzo-forte fundamental at the default 0.3).
 const NOISE_FLOW: f64 = 0.06;

@@ -33,8 +33,12 @@ pub struct ReedCoeffs {
     closing: f64,
     /// Compliance over the reference, k_ref / k.
     compliance: f64,
-    /// Half-width of the closure's parabola, over the rest opening.
+    /// 1 / `closing`.
+    per_closing: f64,
+    /// Half-width of the closure's parabola, over the rest opening, never quite 0.
     lay: f64,
+    /// The same, per speed, of the parabola that averages a sharp corner over one sample.
+    averaged: f64,
     /// Acceleration per force and sample: T w_r^2.
     drive: f64,
     /// 1 / (1 + q w_r T).
@@ -57,14 +61,17 @@ impl ReedCoeffs {
         rate_hz: f64,
     ) -> Self {
         let period = 1.0 / rate_hz;
+        let closing = law.h() * K_INIT;
         // w_r T stays below 1, well inside the integrator's stability limit of 2.
         let angular = std::f64::consts::TAU * resonance_hz.min(0.15 * rate_hz);
         Self {
             period,
             strength: zeta * law.a(),
-            closing: law.h() * K_INIT,
+            closing,
+            per_closing: 1.0 / closing,
             compliance: K_INIT / law.k(),
-            lay,
+            lay: lay.max(1e-9),
+            averaged: 0.5 * period / closing,
             drive: period * angular * angular,
             damp: 1.0 / (1.0 + damping * angular * period),
             swept: swept_s,
@@ -103,8 +110,9 @@ impl ReedState {
         tongue: f64,
     ) -> f64 {
         let rest = reed.closing;
-        let gap = 1.0 - self.closing / rest;
-        let half = reed.lay.max(0.5 * reed.period * self.speed.abs() / rest).max(1e-9);
+        let gap = 1.0 - self.closing * reed.per_closing;
+        let averaged = reed.averaged * self.speed.abs();
+        let half = if averaged > reed.lay { averaged } else { reed.lay };
         let opening = if gap >= half {
             gap.min(MAX_OPENING)
         } else if gap <= -half {
