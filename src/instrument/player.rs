@@ -10,8 +10,6 @@ use crate::instrument::model::{Model, P_REF_PA};
 use crate::instrument::settings::Settings;
 use crate::instrument::voice::{Drive, TICK, Voice};
 use crate::reed::ReedCoeffs;
-use crate::reed::ReedLaw;
-use crate::reed::law::coupled_k;
 use crate::reed::motion::TONGUE_FORCE;
 use crate::units::{Air, SoundingNote, cents};
 
@@ -218,24 +216,11 @@ impl Player {
         self.gamma < NO_BREATH && (self.held_count == 0 || (self.breath_live && self.breath == 0.0))
     }
 
-    /// The law the reed has under the present settings: strength is stiffness, the lip sets the opening.
-    fn law(&self) -> (ReedLaw, f64) {
-        let settings = &self.settings;
-        let seed_h = f64::from(settings.reed_h);
-        let seed_k = if settings.coupled { coupled_k(seed_h) } else { f64::from(settings.reed_k) };
-        // A box strength is about 20 % stiffer per half number (makers' charts, by judgement).
-        let strength = 1.2_f64.powf(2.0 * (f64::from(settings.strength) - 2.5));
-        let h = (seed_h * f64::from(settings.lip)).clamp(0.5, 10.0);
-        let k = (seed_k * strength).clamp(0.01, 20.0);
-        let law = ReedLaw::free(h, k, f64::from(settings.reed_a)).unwrap_or_default();
-        (law, f64::from(settings.zeta))
-    }
-
     /// Advances one control tick: moves holes and delay, and says how the reed is driven. Real-time safe.
     pub fn tick<F: crate::bore::lattice::Real>(&mut self, model: &Model, voice: &mut Voice<F>) -> Drive {
         let tick_s = TICK as f64 / model.coeffs.rate_hz;
         let settings = self.settings;
-        let (law, zeta) = self.law();
+        let law = settings.reed_law();
         let closing = law.closing();
         let fingering = self.fingering.unwrap_or(0);
 
@@ -303,7 +288,7 @@ impl Player {
         let lip = embouchure(model.notes_hz[fingering], model.lowest_hz);
         let reed = ReedCoeffs::new(
             law,
-            zeta,
+            f64::from(settings.zeta),
             f64::from(settings.lay),
             lip.resonance_hz,
             lip.damping * f64::from(settings.damping),

@@ -1,5 +1,9 @@
 //! What a player can set, in the units a player uses. Plain numbers; clamped once, at the door.
 
+use crate::instrument::model::P_REF_PA;
+use crate::reed::ReedLaw;
+use crate::reed::law::coupled_k;
+
 /// How notes are held in tune.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Tuning {
@@ -43,7 +47,7 @@ pub struct Settings {
     pub a4_hz: f32,
     /// How notes are held in tune.
     pub tuning: Tuning,
-    /// Air temperature, Celsius, 10..=40. The player compensates: it changes how, not what pitch, the bore plays.
+    /// Air temperature, Celsius, 10..=40. The instrument is tuned at 25; pitch rises by 3 cents a kelvin.
     pub temperature_c: f32,
     /// Nonlinear flow loss of open holes, 0..=4. Default 2; 0 removes the loss and with it most of the clarion.
     pub vent_loss: f32,
@@ -77,6 +81,23 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// The law of the reed under these settings: strength is stiffness, the lip sets the opening. Real-time safe.
+    pub fn reed_law(&self) -> ReedLaw {
+        let settings = self.clamped();
+        let seed_h = f64::from(settings.reed_h);
+        let seed_k = if settings.coupled { coupled_k(seed_h) } else { f64::from(settings.reed_k) };
+        // A box strength is about 20 % stiffer per half number (makers' charts, by judgement).
+        let stiffer = 1.2_f64.powf(2.0 * (f64::from(settings.strength) - 2.5));
+        let h = (seed_h * f64::from(settings.lip)).clamp(0.5, 10.0);
+        let k = (seed_k * stiffer).clamp(0.01, 20.0);
+        ReedLaw::free(h, k, f64::from(settings.reed_a)).unwrap_or_default()
+    }
+
+    /// Closing pressure of the reed under these settings, Pa.
+    pub fn closing_pa(&self) -> f64 {
+        P_REF_PA * self.reed_law().closing()
+    }
+
     /// The same settings with every number inside its range; a non-finite number becomes its default.
     pub fn clamped(self) -> Self {
         let d = Self::default();

@@ -2,8 +2,6 @@
 
 use crate::event::{Event, Timed};
 use crate::instrument::Settings;
-use crate::instrument::model::P_REF_PA;
-use crate::reed::law::coupled_k;
 use crate::render::breath::BreathCurve;
 use crate::units::{SoundingNote, WrittenNote};
 
@@ -36,13 +34,8 @@ pub fn breath_of_gamma(gamma: f32, settings: &Settings) -> f32 {
 }
 
 /// Pressure that shuts the reed of these settings, kPa.
-///
-/// The law is the one the player blows: the lip scales the rest opening, half a number of strength is 20 % of stiffness.
 pub fn closing_kpa(settings: &Settings) -> f32 {
-    let h = f64::from(settings.reed_h);
-    let k = if settings.coupled { coupled_k(h) } else { f64::from(settings.reed_k) };
-    let stiffer = 1.2_f64.powf(2.0 * f64::from(settings.strength - 2.5));
-    (1e-3 * P_REF_PA * h * f64::from(settings.lip) * k * stiffer) as f32
+    (1e-3 * settings.closing_pa()) as f32
 }
 
 impl Score {

@@ -3,6 +3,7 @@
 pub mod bundle;
 pub mod ci;
 pub mod demo;
+pub mod generated;
 pub mod host;
 pub mod machine;
 pub mod midi;
@@ -36,5 +37,23 @@ pub const COMMANDS: &[Command] = &[
         about: "build Chalumeau.clap and Chalumeau.vst3 into target/bundled; takes cargo build's options",
         run: bundle::run,
         checks: false,
+    },
+    Command {
+        name: "firmware-header",
+        about: "write the reed tables as firmware/include/pressure_table_values.h",
+        run: generated::firmware_header,
+        checks: true,
+    },
+    Command {
+        name: "fit-bore",
+        about: "fit the built-in bore's cells to its transfer matrices",
+        run: generated::fit_bore,
+        checks: true,
+    },
+    Command {
+        name: "tune",
+        about: "play every note of the built-in clarinet and find its delay trims",
+        run: generated::tune,
+        checks: true,
     },
 ];
