@@ -268,12 +268,14 @@ impl LatticeCoeffs {
 
 type Octet<F> = [F; LANES];
 
-/// One-pole loss of both waves arriving at eight junctions, and where they come from.
+/// One-pole loss of both waves arriving at eight junctions, and where they come from: `y = x - m (x - s)` with
+/// `m = A (1 - q)`, then `s += q (x - s)`.
 #[derive(Clone)]
 #[repr(C, align(64))]
 struct Arrivals<F> {
     offset: [[u16; LANES]; 2],
-    amount: [Octet<F>; 2],
+    /// m, see above.
+    taken: [Octet<F>; 2],
     q: [Octet<F>; 2],
     state: [Octet<F>; 2],
 }
@@ -281,7 +283,7 @@ struct Arrivals<F> {
 impl<F: Real> Arrivals<F> {
     fn idle(slot: usize) -> Self {
         let nothing = [Octet::default(); 2];
-        Self { offset: [[slot as u16; LANES]; 2], amount: nothing, q: nothing, state: nothing }
+        Self { offset: [[slot as u16; LANES]; 2], taken: nothing, q: nothing, state: nothing }
     }
 
     /// Waves arriving at eight junctions on one side, after their cell's loss.
@@ -291,12 +293,11 @@ impl<F: Real> Arrivals<F> {
         for (wave, offset) in wave.iter_mut().zip(self.offset[SIDE]) {
             *wave = ring[(base.wrapping_add(offset) & MASK) as usize];
         }
-        let (amount, q, state) = (&self.amount[SIDE], &self.q[SIDE], &mut self.state[SIDE]);
+        let (taken, q, state) = (&self.taken[SIDE], &self.q[SIDE], &mut self.state[SIDE]);
         for k in 0..LANES {
             let difference = wave[k] - state[k];
-            let step = q[k] * difference;
-            state[k] = state[k] + step;
-            wave[k] = wave[k] - amount[k] * (difference - step);
+            state[k] = state[k] + q[k] * difference;
+            wave[k] = wave[k] - taken[k] * difference;
         }
         wave
     }
@@ -313,17 +314,13 @@ fn flush<F: Real>(x: &mut F) {
     *x = if x.magnitude() < F::of(TINY) { F::default() } else { *x };
 }
 
-/// Writes the waves leaving eight junctions: `pressure` minus what arrived from the other side.
+/// Writes the waves leaving eight junctions, down the bore and back.
 #[inline(always)]
-fn leave<F: Real>(ring: &mut [F; RING], row: usize, pressure: &Octet<F>, left: &Octet<F>, right: &Octet<F>) {
+fn leave<F: Real>(ring: &mut [F; RING], row: usize, down: &Octet<F>, back: &Octet<F>) {
     let row = row & (RING - 1) & !(LANES - 1);
-    for (side, wave) in [(row, right), (row | BACK, left)] {
-        let mut out = Octet::<F>::default();
-        for k in 0..LANES {
-            out[k] = pressure[k] - wave[k];
-        }
+    for (side, wave) in [(row, down), (row | BACK, back)] {
         if let Some(slots) = ring.get_mut(side..side + LANES) {
-            slots.copy_from_slice(&out);
+            slots.copy_from_slice(wave);
         }
     }
 }
@@ -333,8 +330,8 @@ fn leave<F: Real>(ring: &mut [F; RING], row: usize, pressure: &Octet<F>, left: &
 #[repr(C, align(64))]
 struct Steps<F> {
     arrivals: Arrivals<F>,
-    /// Weight of the left wave, 2 Y_left / (Y_left + Y_right), and of the right one.
-    weight: [Octet<F>; 2],
+    /// Weight of the left wave in the pressure, 2 Y_left / (Y_left + Y_right); 2 less this is that of the right one.
+    weight: Octet<F>,
 }
 
 impl<F: Real> Steps<F> {
@@ -342,11 +339,13 @@ impl<F: Real> Steps<F> {
     fn tick(&mut self, ring: &mut [F; RING], base: u16, slot: usize) {
         let left = self.arrivals.gather::<0>(ring, base);
         let right = self.arrivals.gather::<1>(ring, base);
-        let mut pressure = Octet::<F>::default();
+        let (mut down, mut back) = (Octet::<F>::default(), Octet::<F>::default());
         for k in 0..LANES {
-            pressure[k] = self.weight[0][k] * left[k] + self.weight[1][k] * right[k];
+            let difference = left[k] - right[k];
+            down[k] = right[k] + self.weight[k] * difference;
+            back[k] = down[k] - difference;
         }
-        leave(ring, base as usize + slot, &pressure, &left, &right);
+        leave(ring, base as usize + slot, &down, &back);
     }
 }
 
@@ -391,33 +390,36 @@ impl<F: Real> Holes<F> {
         self.glide != Octet::default()
     }
 
+    #[inline(always)]
+    fn glide(&mut self) {
+        for k in 0..LANES {
+            self.opening[k] = self.opening[k] + self.glide[k];
+        }
+    }
+
     /// The network of [`tone_hole`](crate::bore::tone_hole) at eight junctions, one sample; the flows leaving outside.
     #[inline(always)]
     fn tick(&mut self, ring: &mut [F; RING], base: u16, slot: usize) -> Octet<F> {
         let left = self.arrivals.gather::<0>(ring, base);
         let right = self.arrivals.gather::<1>(ring, base);
         let one = F::of(1.0);
-        let (mut pressure, mut radiated) = (Octet::<F>::default(), Octet::<F>::default());
+        let (mut down, mut back, mut radiated) = (Octet::default(), Octet::default(), Octet::default());
         for k in 0..LANES {
-            let a = self.opening[k] + self.glide[k];
-            self.opening[k] = a;
+            let a = self.opening[k];
             let rs = self.resistance[k];
             let k2 = one / (one + rs * self.outside[k]);
             let g2 = self.outside[k] * k2;
             let gp = self.gc[k] + a * a * g2;
-            // 1 / (1 + gp r1), gp / (1 + gp r1) and 1 / (y_sum + gp / (1 + gp r1)) with one division.
             let w = one + gp * self.r1[k];
-            let t = self.y_sum[k] * w + gp;
-            let r = one / (w * t);
-            let share = t * r;
-            let g0 = gp * share;
-            let q = w * w * r;
 
             let h2 = self.outer[k] * k2;
             let inner = self.inner[k];
-            let source = (self.compliance[k] + a * h2 - gp * inner) * share;
-            let p = (self.y_left[k] * left[k] + self.y_right[k] * right[k] - source) * q;
-            let rise = self.minus_r1[k] * (g0 * p + source);
+            let source = self.compliance[k] + a * h2 - gp * inner;
+            // What both waves bring, y_sum p + (gp p + source) / w, solved for p; what the bore does not take goes
+            // through r1 into the hole.
+            let arriving = self.y_left[k] * left[k] + self.y_right[k] * right[k];
+            let p = (arriving * w - source) / (self.y_sum[k] * w + gp);
+            let rise = self.minus_r1[k] * (arriving - self.y_sum[k] * p);
             let node = p - inner + rise;
             let outside = a * node;
             let flow = g2 * outside + h2;
@@ -427,9 +429,10 @@ impl<F: Real> Holes<F> {
             let leaving = a * flow;
             radiated[k] = leaving;
             self.resistance[k] = self.rs0[k] + self.jet[k] * leaving.magnitude();
-            pressure[k] = p;
+            down[k] = p - right[k];
+            back[k] = p - left[k];
         }
-        leave(ring, base as usize + slot, &pressure, &left, &right);
+        leave(ring, base as usize + slot, &down, &back);
         radiated
     }
 }
@@ -442,10 +445,12 @@ pub struct Lattice<F> {
     holes: Box<[Holes<F>]>,
     hole_lanes: Box<[(usize, usize)]>,
     jets: Box<[f64]>,
-    row: u16,
+    /// Where the present row begins in the ring.
+    base: u16,
     tip: EndLoss<F>,
     end: EndLoss<F>,
     bell_y: F,
+    bell_y2: F,
     bell_share: F,
     bell_g2: F,
     bell_state: F,
@@ -462,7 +467,7 @@ pub struct Lattice<F> {
 #[derive(Clone, Copy)]
 struct EndLoss<F> {
     offset: u16,
-    amount: F,
+    taken: F,
     q: F,
     state: F,
 }
@@ -472,9 +477,8 @@ impl<F: Real> EndLoss<F> {
     fn take(&mut self, ring: &[F; RING], base: u16) -> F {
         let wave = ring[(base.wrapping_add(self.offset) & MASK) as usize];
         let difference = wave - self.state;
-        let step = self.q * difference;
-        self.state = self.state + step;
-        wave - self.amount * (difference - step)
+        self.state = self.state + self.q * difference;
+        wave - self.taken * difference
     }
 }
 
@@ -490,7 +494,7 @@ impl<F: Real> Lattice<F> {
         let ones = [one; LANES];
         let none = Octet::<F>::default();
         let mut steps =
-            vec![Steps { arrivals: Arrivals::idle(IDLE_SLOT), weight: [ones; 2] }; coeffs.step_chunks()];
+            vec![Steps { arrivals: Arrivals::idle(IDLE_SLOT), weight: ones }; coeffs.step_chunks()];
         let idle = Holes {
             arrivals: Arrivals::idle(IDLE_SLOT),
             y_left: none,
@@ -526,8 +530,7 @@ impl<F: Real> Lattice<F> {
             let arrivals = match chunk.checked_sub(steps.len()) {
                 None => {
                     let (y_left, y_right) = (coeffs.admittance[left], coeffs.admittance[right]);
-                    steps[chunk].weight[0][k] = F::of(2.0 * y_left / (y_left + y_right));
-                    steps[chunk].weight[1][k] = F::of(2.0 * y_right / (y_left + y_right));
+                    steps[chunk].weight[k] = F::of(2.0 * y_left / (y_left + y_right));
                     &mut steps[chunk].arrivals
                 }
                 Some(chunk) => {
@@ -551,13 +554,14 @@ impl<F: Real> Lattice<F> {
             arrivals.offset[1][k] =
                 if right == tuned { TUNED_SLOT as u16 } else { back_rows(back, from_right) };
             for (side, cell) in [left, right].into_iter().enumerate() {
-                arrivals.amount[side][k] = F::of(coeffs.loss[cell].0);
-                arrivals.q[side][k] = F::of(coeffs.loss[cell].1);
+                let (amount, q) = coeffs.loss[cell];
+                arrivals.taken[side][k] = F::of(amount * (1.0 - q));
+                arrivals.q[side][k] = F::of(q);
             }
         }
         let end = |cell: usize, offset: u16| EndLoss {
             offset,
-            amount: F::of(coeffs.loss[cell].0),
+            taken: F::of(coeffs.loss[cell].0 * (1.0 - coeffs.loss[cell].1)),
             q: F::of(coeffs.loss[cell].1),
             state: F::default(),
         };
@@ -574,10 +578,11 @@ impl<F: Real> Lattice<F> {
                 .map(|lane| (lane / LANES - coeffs.step_chunks(), lane % LANES))
                 .collect(),
             jets: coeffs.jets.clone().into(),
-            row: 0,
+            base: 0,
             tip: end(0, back_rows(coeffs.rows(0).1, BACK + coeffs.lane_of(0))),
             end: end(junctions, back_rows(coeffs.rows(junctions).0, last_lane)),
             bell_y: F::of(bell_y),
+            bell_y2: F::of(2.0 * bell_y),
             bell_share: F::of(1.0 / (bell_y + coeffs.bell.0 + coeffs.bell.1)),
             bell_g2: F::of(2.0 * coeffs.bell.1),
             bell_state: F::default(),
@@ -604,7 +609,7 @@ impl<F: Real> Lattice<F> {
         self.tip.state = F::default();
         self.end.state = F::default();
         self.bell_state = F::default();
-        self.row = 0;
+        self.base = 0;
     }
 
     /// Use the plain code path even where AVX2 is there (to prove that both give the same bits).
@@ -737,13 +742,17 @@ fn run_avx2<F: Real, T: Tip<F>>(lattice: &mut Lattice<F>, samples: usize, tip: &
 
 #[inline(always)]
 fn run_body<F: Real, T: Tip<F>>(lattice: &mut Lattice<F>, samples: usize, tip: &mut T) {
-    if lattice.moved {
+    let moving = lattice.moved;
+    if moving {
         lattice.moved = lattice.holes.iter_mut().fold(false, |moving, holes| holes.throttle() | moving);
     }
     let ring = &mut *lattice.ring;
     for _ in 0..samples {
-        lattice.row = (lattice.row + 1) & (ROWS as u16 - 1);
-        let base = lattice.row * STRIDE as u16;
+        let base = (lattice.base + STRIDE as u16) & (MASK + 1 - STRIDE as u16);
+        lattice.base = base;
+        if moving {
+            lattice.holes.iter_mut().for_each(Holes::glide);
+        }
 
         // The returning wave of the tuned cell, delayed by whole rows and a linear part between two.
         lattice.delay = lattice.delay + lattice.delay_glide;
@@ -759,8 +768,7 @@ fn run_body<F: Real, T: Tip<F>>(lattice: &mut Lattice<F>, samples: usize, tip: &
 
         // The open end: radiation conductance and mass in parallel.
         let arriving = lattice.end.take(ring, base);
-        let drive = lattice.bell_y * arriving;
-        let p_end = (drive + drive - lattice.bell_state) * lattice.bell_share;
+        let p_end = (lattice.bell_y2 * arriving - lattice.bell_state) * lattice.bell_share;
         lattice.bell_state = lattice.bell_state + lattice.bell_g2 * p_end;
         let reflected = p_end - arriving;
         ring[(base as usize + BACK + END_SLOT) & (RING - 1)] = reflected;

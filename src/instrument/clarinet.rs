@@ -129,7 +129,8 @@ impl Clarinet {
     fn render_with(&mut self, out: &mut [f32], probe: &mut Option<&mut dyn FnMut(Probe)>) {
         for out in out.chunks_mut(CHUNK) {
             let needed = self.resampler.inputs_needed(out.len()).min(self.inner.len());
-            for at in 0..needed {
+            let mut made = 0;
+            while made < needed {
                 if self.spare_from == TICK {
                     let drive = self.player.tick(&self.model, &mut self.voice);
                     self.spare = *self.voice.tick(&drive);
@@ -138,8 +139,11 @@ impl Clarinet {
                         probes.iter().for_each(|&moment| probe(moment));
                     }
                 }
-                self.inner[at] = self.spare[self.spare_from];
-                self.spare_from += 1;
+                let count = (TICK - self.spare_from).min(needed - made);
+                let spare = &self.spare[self.spare_from..self.spare_from + count];
+                self.inner[made..made + count].copy_from_slice(spare);
+                made += count;
+                self.spare_from += count;
             }
             self.resampler.process(&self.inner[..needed], out);
             for sample in &mut *out {

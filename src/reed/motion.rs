@@ -98,6 +98,8 @@ impl ReedState {
     /// One sample: takes mouth pressure, the wave arriving from the bore, extra flow (noise) and the tongue's force,
     /// and gives the wave leaving into the bore. `kappa` is 1 over the admittance of the first bore cell.
     /// Real-time safe; `zeta kappa B` may be anything, the solution is unique. [audio thread]
+    // Called in one place, once a sample: a struct for what comes from four sides would only be taken apart again.
+    #[allow(clippy::too_many_arguments)]
     #[inline(always)]
     pub fn tick(
         &mut self,
@@ -129,16 +131,14 @@ impl ReedState {
         let p = root * root;
         let (x_a, x_b) = tables.at(p);
         let r = reed.compliance;
-        let sign = if x < 0.0 { -1.0 } else { 1.0 };
+        let sign = 1.0_f64.copysign(x);
         // Forward the quasi-static reed closes with p, backward it opens: hence the sign inside.
         // A shut reed passes nothing, not even the tables' interpolation error.
-        let table_flow =
-            if b > 0.0 { reed.strength * (x_a * (b + sign * r * p) - sign * r * x_b) } else { 0.0 };
-        let exact_flow = reed.strength * b * root;
+        let table_flow = if b > 0.0 { x_a * (b + sign * r * p) - sign * r * x_b } else { 0.0 };
         let slope = if load > 0.0 { root / load } else { 0.0 };
-        let p = sign * (p - kappa * (table_flow - exact_flow) * slope).max(0.0);
+        let p = sign * (p - kappa * reed.strength * (table_flow - b * root) * slope).max(0.0);
         self.p_mouthpiece = p_mouth - p;
-        self.flow = sign * table_flow;
+        self.flow = sign * reed.strength * table_flow;
         self.opening = opening;
         self.speed = (self.speed + reed.drive * (r * p + tongue - self.closing)) * reed.damp;
         self.closing += reed.period * self.speed;
