@@ -8,9 +8,11 @@ pub mod header;
 pub mod law;
 pub mod motion;
 pub mod physical;
+pub mod quasi_static;
 pub mod tables;
 
 pub use law::ReedLaw;
 pub use motion::{ReedCoeffs, ReedState};
 pub use physical::PhysicalReed;
+pub use quasi_static::{QuasiStaticReed, QuasiStaticState};
 pub use tables::ReedTables;

@@ -169,6 +169,22 @@ impl LatticeCoeffs {
 
     /// Reflectance at the tip, exactly what [`Lattice`] does with fixed openings and no jets, at `f_hz`.
     pub fn reflectance(&self, f_hz: f64, opening: &[f64], tuning_rows: f64) -> Complex64 {
+        self.looking_down(0, f_hz, opening, tuning_rows)
+    }
+
+    /// Reflectance just above a hole of the hole and all that lies below it, for the wave arriving in the cell above.
+    /// `|R|^2` falling to 1/2 is the cut-off of the tone-hole lattice when `hole` is the first open one.
+    pub fn reflectance_below(&self, f_hz: f64, opening: &[f64], hole: usize) -> Complex64 {
+        let junction = self.hole_junctions[hole];
+        let z1 = Complex64::from_polar(1.0, -std::f64::consts::TAU * f_hz / self.rate_hz);
+        let r = self.looking_down(junction + 1, f_hz, opening, 0.0);
+        let below = self.admittance[junction + 1] * (1.0 - r) / (1.0 + r);
+        let y = below + self.holes[hole].admittance(z1, opening[hole]);
+        (self.admittance[junction] - y) / (self.admittance[junction] + y)
+    }
+
+    /// Reflectance at the upper end of cell `top` of all that lies below.
+    fn looking_down(&self, top: usize, f_hz: f64, opening: &[f64], tuning_rows: f64) -> Complex64 {
         let z1 = Complex64::from_polar(1.0, -std::f64::consts::TAU * f_hz / self.rate_hz);
         let half = Complex64::from_polar(1.0, -std::f64::consts::PI * f_hz / self.rate_hz);
         let filters: [Complex64; 3] = std::array::from_fn(|pole| {
@@ -179,7 +195,7 @@ impl LatticeCoeffs {
         let mut y = self.bell.0 + self.bell.1 * (1.0 + z1) / (1.0 - z1);
         let tuned = self.tuned_cell();
         let mut hole = self.holes.len();
-        for cell in (0..=last).rev() {
+        for cell in (top..=last).rev() {
             let own = self.admittance[cell];
             let low_pass = filters[cell % 3];
             let pass = 1.0 - self.loss[cell].0 * (1.0 - low_pass);
@@ -189,7 +205,7 @@ impl LatticeCoeffs {
                 let part = tuning_rows - whole;
                 r *= z1.powi(whole as i32) * (1.0 - part + part * z1);
             }
-            if cell == 0 {
+            if cell == top {
                 return r;
             }
             y = own * (1.0 - r) / (1.0 + r);
@@ -219,10 +235,14 @@ impl LatticeCoeffs {
         (1.0 - back, (ROWS - 2) as f64 - back)
     }
 
-    /// Rows each cell gives to the wave going down and to the one coming back.
+    /// Rows a cell gives to the wave going down and to the one coming back.
     fn rows(&self, wanted: usize) -> (u32, u32) {
+        self.all_rows().nth(wanted).unwrap_or_default()
+    }
+
+    fn all_rows(&self) -> impl Iterator<Item = (u32, u32)> {
         let mut off = 0.0;
-        for (cell, &ticks) in self.ticks.iter().enumerate() {
+        self.ticks.iter().enumerate().map(move |(cell, &ticks)| {
             let down = if ticks == 1 {
                 // The chunk that is evaluated first passes its wave on within the row.
                 u32::from(self.chunk_of(cell - 1) > self.chunk_of(cell))
@@ -232,11 +252,8 @@ impl LatticeCoeffs {
                 ticks / 2
             };
             off += f64::from(down) - 0.5 * f64::from(ticks);
-            if cell == wanted {
-                return (down, ticks - down);
-            }
-        }
-        (0, 0)
+            (down, ticks - down)
+        })
     }
 
     fn hole_chunks(&self) -> usize {
@@ -703,6 +720,60 @@ impl<F: Real> Lattice<F> {
         self.ring.iter().any(tiny)
             || self.holes.iter().any(|h| h.outer.iter().chain(&h.compliance).chain(&h.inner).any(tiny))
             || self.holes.iter().any(|h| h.arrivals.state.iter().flatten().any(tiny))
+            || self.steps.iter().any(|s| s.arrivals.state.iter().flatten().any(tiny))
+            || [self.tip.state, self.end.state, self.bell_state].iter().any(tiny)
+    }
+
+    /// Energy of everything in the bore, in units of a wave of pressure 1 passing the reference section for one sample;
+    /// `coeffs` are those the lattice was made from. For proofs, not for the audio path.
+    ///
+    /// Waves in flight count with their cell's admittance, and the row that a fractional tuning delay has half read with
+    /// the part still to come. A loss filter holds `Y A (1 - q) / q l^2`; a trapezoidal element of conductance G or
+    /// resistance R with state s holds `s^2 / 4G`, `s^2 / 4R`. Without sources this never grows while the delay rests.
+    pub fn stored_energy(&self, coeffs: &LatticeCoeffs) -> f64 {
+        let last = coeffs.ticks.len() - 1;
+        let tuned = coeffs.tuned_cell();
+        let square = |slot: usize, age: u32| {
+            let wave = self.ring[(self.row.wrapping_sub(age) as usize & (ROWS - 1)) * STRIDE + slot].wide();
+            wave * wave
+        };
+        let mut energy = 0.0;
+        for (cell, (down, back)) in coeffs.all_rows().enumerate() {
+            let from_left = if cell == 0 { END_SLOT } else { coeffs.lane_of(cell - 1) };
+            let from_right = BACK + if cell == last { END_SLOT } else { coeffs.lane_of(cell) };
+            let mut waves: f64 = (0..down).map(|age| square(from_left, age)).sum();
+            if cell == tuned {
+                let rows = self.delay.wide() + f64::from(self.tuned_rows);
+                let whole = rows as u32;
+                waves += (0..whole).map(|age| square(from_right, age)).sum::<f64>();
+                waves += (rows - f64::from(whole)) * square(from_right, whole);
+            } else {
+                waves += (0..back).map(|age| square(from_right, age)).sum::<f64>();
+            }
+            let (amount, q) = coeffs.loss[cell];
+            let at_right = if cell == last { self.end.state } else { self.arrivals(coeffs.lane_of(cell), 0) };
+            let at_left = if cell == 0 { self.tip.state } else { self.arrivals(coeffs.lane_of(cell - 1), 1) };
+            let filters = at_right.wide().powi(2) + at_left.wide().powi(2);
+            energy += coeffs.admittance[cell] * (waves + amount * (1.0 - q) / q * filters);
+        }
+        for (hole, &(chunk, lane)) in coeffs.holes.iter().zip(&*self.hole_lanes) {
+            let state = |of: &Octet<F>| of[lane].wide() * of[lane].wide() / 4.0;
+            let lanes = &self.holes[chunk];
+            energy += state(&lanes.outer) / hole.gl
+                + state(&lanes.compliance) / hole.gc
+                + state(&lanes.inner) / hole.r1;
+        }
+        energy + self.bell_state.wide().powi(2) / (4.0 * coeffs.bell.1)
+    }
+
+    /// State of the loss filter on one side of a junction.
+    fn arrivals(&self, lane: usize, side: usize) -> F {
+        let (chunk, lane) = (lane / LANES, lane % LANES);
+        let arrivals = match chunk.checked_sub(self.steps.len()) {
+            None => &self.steps[chunk].arrivals,
+            Some(chunk) => &self.holes[chunk].arrivals,
+        };
+        arrivals.state[side][lane]
     }
 
     /// Fills every state with `value()`; for tests that start from anything.
@@ -715,12 +786,18 @@ impl<F: Real> Lattice<F> {
                 }
             }
         }
+        for row in 0..ROWS {
+            self.ring[row * STRIDE + END_SLOT] = next();
+            self.ring[row * STRIDE + BACK + END_SLOT] = next();
+        }
         for holes in &mut *self.holes {
             for k in 0..LANES {
                 (holes.outer[k], holes.compliance[k], holes.inner[k]) = (next(), next(), next());
             }
+            holes.arrivals.state.iter_mut().flatten().for_each(|x| *x = next());
         }
-        self.bell_state = next();
+        self.steps.iter_mut().for_each(|s| s.arrivals.state.iter_mut().flatten().for_each(|x| *x = next()));
+        (self.tip.state, self.end.state, self.bell_state) = (next(), next(), next());
     }
 }
 

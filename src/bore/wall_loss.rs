@@ -2,9 +2,10 @@
 //!
 //! In a wide tube the propagation constant is `s/c + K_v sqrt(s) / r` with
 //! `K_v = (1 + (gamma - 1) / sqrt(Pr)) sqrt(mu / rho) / c` (Kirchhoff's asymptote). The root is approximated by three
-//! high-passes and a delay, `sqrt(s) = sum c_k s / (s + p_k) + c_inf s`, within 3.2 % of |sqrt s| from 100 to 3000 Hz.
-//! Each cell gets one pole, dealt in rotation along the bore, and answers for the stretch between the midpoints to its
-//! neighbours of the same pole: a third of the work of three poles everywhere, and within 0.1 dB of it.
+//! high-passes and a delay, `sqrt(s) = sum c_k s / (s + p_k) + c_inf s`, within 5.9 % of |sqrt s| from 100 to 3000 Hz
+//! (worst at 2.1 kHz); the loss itself, its real part, within 4.8 %. Each cell gets one pole, dealt in rotation along the
+//! bore, and answers for the stretch between the midpoints to its neighbours of the same pole: a third of the work of
+//! three poles everywhere, and within 0.1 dB of it.
 
 use crate::units::Air;
 
@@ -54,15 +55,19 @@ mod tests {
     use num_complex::Complex64;
 
     #[test]
-    fn three_poles_follow_the_square_root() {
-        for n in 0..=100 {
-            let f = 100.0 * 30.0_f64.powf(f64::from(n) / 100.0);
+    fn three_poles_follow_the_square_root_within_six_percent() {
+        let (mut worst, mut worst_loss) = (0.0_f64, 0.0_f64);
+        for n in 0..=2_000 {
+            let f = 100.0 * 30.0_f64.powf(f64::from(n) / 2_000.0);
             let s = Complex64::new(0.0, std::f64::consts::TAU * f);
             let poles = POLES_HZ.iter().zip(STRENGTHS);
             let sum: Complex64 = poles.map(|(p, c)| c * s / (s + std::f64::consts::TAU * p)).sum();
-            let error = (sum + DELAY * s - s.sqrt()).norm() / s.norm().sqrt();
-            assert!(error < 0.032, "{f} Hz: {error}");
+            let error = (sum + DELAY * s - s.sqrt()) / s.norm().sqrt();
+            worst = worst.max(error.norm());
+            worst_loss = worst_loss.max(error.re.abs());
         }
+        println!("sqrt(s) by three poles: {worst:.4}, its loss {worst_loss:.4}");
+        assert!(worst < 0.059 && worst_loss < 0.048, "{worst} {worst_loss}");
     }
 
     #[test]
