@@ -733,8 +733,9 @@ impl<F: Real> Lattice<F> {
     pub fn stored_energy(&self, coeffs: &LatticeCoeffs) -> f64 {
         let last = coeffs.ticks.len() - 1;
         let tuned = coeffs.tuned_cell();
+        let row = u32::from(self.base) / STRIDE as u32;
         let square = |slot: usize, age: u32| {
-            let wave = self.ring[(self.row.wrapping_sub(age) as usize & (ROWS - 1)) * STRIDE + slot].wide();
+            let wave = self.ring[(row.wrapping_sub(age) as usize & (ROWS - 1)) * STRIDE + slot].wide();
             wave * wave
         };
         let mut energy = 0.0;
@@ -743,7 +744,7 @@ impl<F: Real> Lattice<F> {
             let from_right = BACK + if cell == last { END_SLOT } else { coeffs.lane_of(cell) };
             let mut waves: f64 = (0..down).map(|age| square(from_left, age)).sum();
             if cell == tuned {
-                let rows = self.delay.wide() + f64::from(self.tuned_rows);
+                let rows = self.delay.wide();
                 let whole = rows as u32;
                 waves += (0..whole).map(|age| square(from_right, age)).sum::<f64>();
                 waves += (rows - f64::from(whole)) * square(from_right, whole);
