@@ -432,11 +432,10 @@ impl<F: Real> Holes<F> {
             let h2 = self.outer[k] * k2;
             let inner = self.inner[k];
             let source = self.compliance[k] + a * h2 - gp * inner;
-            // What both waves bring, y_sum p + (gp p + source) / w, solved for p; what the bore does not take goes
-            // through r1 into the hole.
             let arriving = self.y_left[k] * left[k] + self.y_right[k] * right[k];
             let p = (arriving * w - source) / (self.y_sum[k] * w + gp);
-            let rise = self.minus_r1[k] * (arriving - self.y_sum[k] * p);
+            // The flow into the hole is also arriving - y_sum p, but in single precision that difference is noise.
+            let rise = self.minus_r1[k] / w * (gp * p + source);
             let node = p - inner + rise;
             let outside = a * node;
             let flow = g2 * outside + h2;

@@ -56,7 +56,7 @@ pub struct Resampler {
     phase: u64,
     taps: usize,
     /// `[phase][tap]`, oldest tap first. `l` rows, or `PHASES + 1` when mixed.
-    coeffs: Box<[f32]>,
+    coeffs: Box<[[f32; LANES]]>,
     /// The last inputs in order; when it is full, the last `taps` of them move to its beginning.
     history: Box<[f32]>,
     /// Where the next input is written; the `taps` before it are heard.
@@ -119,7 +119,7 @@ impl Resampler {
             m,
             phase: 0,
             taps,
-            coeffs: coeffs.into_boxed_slice(),
+            coeffs: coeffs.as_chunks().0.into(),
             history: vec![0.0; taps + ROOM].into_boxed_slice(),
             next: taps,
             delay: span / 2.0,
@@ -220,17 +220,18 @@ impl Resampler {
     }
 
     #[inline]
-    fn row(&self, phase: usize) -> &[f32] {
-        &self.coeffs[phase * self.taps..][..self.taps]
+    fn row(&self, phase: usize) -> &[[f32; LANES]] {
+        let chunks = self.taps / LANES;
+        &self.coeffs[phase * chunks..][..chunks]
     }
 }
 
 /// Sum of products in eight lanes, then of the lanes one by one: the same order on every machine. (Added pairwise, the
 /// compiler would split the lanes into pairs.)
 #[inline]
-fn dot(a: &[f32], b: &[f32]) -> f32 {
+fn dot(a: &[f32], b: &[[f32; LANES]]) -> f32 {
     let mut lanes = [0.0f32; LANES];
-    for (a, b) in a.as_chunks::<LANES>().0.iter().zip(b.as_chunks::<LANES>().0) {
+    for (a, b) in a.as_chunks::<LANES>().0.iter().zip(b) {
         for k in 0..LANES {
             lanes[k] += a[k] * b[k];
         }

@@ -147,8 +147,10 @@ impl Clarinet {
             }
             self.resampler.process(&self.inner[..needed], out);
             for sample in &mut *out {
-                let step = (self.gain_wanted - self.gain) * self.gain_step;
-                self.gain = if step.abs() < 1e-9 { self.gain_wanted } else { self.gain + step };
+                if self.gain != self.gain_wanted {
+                    let step = (self.gain_wanted - self.gain) * self.gain_step;
+                    self.gain = if step.abs() < 1e-9 { self.gain_wanted } else { self.gain + step };
+                }
                 *sample = limited(*sample * self.gain);
             }
             if out.iter().sum::<f32>().is_finite() {

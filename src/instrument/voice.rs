@@ -71,26 +71,24 @@ struct Mouth {
 const NOISE_SEED: u64 = 0x9E37_79B9_7F4A_7C15;
 
 impl Mouth {
-    /// White noise, uniform with unit variance: a linear congruential generator (Knuth, The Art of Computer Programming
-    /// 2, 3.3.4: MMIX), whose upper bits are what is heard.
-    #[inline(always)]
-    fn white(&mut self) -> f64 {
-        self.random =
-            self.random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        self.random as i64 as f64 * (1.732_050_807_568_877_2 / (1_u64 << 63) as f64)
-    }
-
-    /// Turbulence for the next tick. Beside the loop over samples, which is crowded.
+    /// Turbulence for the next tick: white noise between two corners. Beside the loop over samples, which is crowded.
+    ///
+    /// White is a linear congruential generator (Knuth, The Art of Computer Programming 2, 3.3.4: MMIX), whose upper
+    /// bits are what is heard, uniform with unit variance.
     fn breathe(&mut self) {
         if self.noise == 0.0 {
             return;
         }
-        for at in 0..TICK {
-            let white = self.white();
-            self.noise_low += self.noise_corners.1 * (white - self.noise_low);
-            self.noise_band += self.noise_corners.0 * (self.noise_low - self.noise_band);
-            self.hiss[at] = self.noise_low - self.noise_band;
+        let (low, high) = self.noise_corners;
+        let unit = high * 1.732_050_807_568_877_2 / (1_u64 << 63) as f64;
+        let (mut random, mut smooth, mut drift) = (self.random, self.noise_low, self.noise_band);
+        for hiss in &mut self.hiss {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            smooth += unit * (random as i64) as f64 - high * smooth;
+            drift += low * (smooth - drift);
+            *hiss = smooth - drift;
         }
+        (self.random, self.noise_low, self.noise_band) = (random, smooth, drift);
     }
 
     /// What a tick's flows sound like: a small source is heard by its change of flow.

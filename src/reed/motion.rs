@@ -117,10 +117,9 @@ impl ReedState {
         let half = if averaged > reed.lay { averaged } else { reed.lay };
         let opening = if gap >= half {
             gap.min(MAX_OPENING)
-        } else if gap <= -half {
-            0.0
         } else {
-            (gap + half) * (gap + half) / (4.0 * half)
+            let knee = (gap + half).max(0.0);
+            knee * knee / (4.0 * half)
         };
         let b = rest * opening;
         let x = p_mouth - 2.0 * p_minus - kappa * (reed.swept * self.speed + noise);
@@ -135,7 +134,7 @@ impl ReedState {
         // Forward the quasi-static reed closes with p, backward it opens: hence the sign inside.
         // A shut reed passes nothing, not even the tables' interpolation error.
         let table_flow = if b > 0.0 { x_a * (b + sign * r * p) - sign * r * x_b } else { 0.0 };
-        let slope = if load > 0.0 { root / load } else { 0.0 };
+        let slope = root / load.max(f64::MIN_POSITIVE);
         let p = sign * (p - kappa * reed.strength * (table_flow - b * root) * slope).max(0.0);
         self.p_mouthpiece = p_mouth - p;
         self.flow = sign * reed.strength * table_flow;
