@@ -319,7 +319,7 @@ impl Fingers {
 /// that pushes at random. The energy inside never rises by more than what went in.
 #[test]
 fn stored_energy_never_grows_by_itself() {
-    let mut random = Random(0x5eed_0f_e4e6_1234);
+    let mut random = Random(0x005e_ed0f_e4e6_1234);
     let (mut worst, mut worst_pushed, mut samples) = (f64::NEG_INFINITY, f64::NEG_INFINITY, 0);
     let mut decay = 0.0_f64;
     for start in 0..40 {

@@ -92,6 +92,13 @@ pub const ALSA: Package = Package {
     purpose: "sound and MIDI in chalumeau-standalone",
 };
 
+/// For the VST3 test host.
+pub const XCB: Package = Package {
+    name: "libxcb1-dev",
+    present: || works("pkg-config", &["--exists", "xcb"]),
+    purpose: "linking the VST3 tests",
+};
+
 /// Installs what is missing with apt-get, or names it.
 pub fn provide(packages: &[&Package]) -> Result<()> {
     let missing: Vec<_> = packages.iter().filter(|package| !(package.present)()).collect();
