@@ -30,7 +30,7 @@ const ROWS: usize = 32;
 /// Values of one row: 64 waves going down, 64 coming back.
 const STRIDE: usize = 128;
 const RING: usize = ROWS * STRIDE;
-const MASK: u32 = RING as u32 - 1;
+const MASK: u16 = RING as u16 - 1;
 /// Where a lane's returning wave is kept in a row.
 const BACK: usize = 64;
 /// Slot of the wave leaving the reed (among those going down) and of the bell's reflection (among those returning).
@@ -54,6 +54,7 @@ pub trait Real:
     + std::ops::Mul<Output = Self>
     + std::ops::Div<Output = Self>
     + std::ops::Neg<Output = Self>
+    + From<u16>
 {
     /// Rounds from f64.
     fn of(x: f64) -> Self;
@@ -61,6 +62,8 @@ pub trait Real:
     fn wide(self) -> f64;
     /// Absolute value.
     fn magnitude(self) -> Self;
+    /// Whole part of a number that is not negative.
+    fn whole(self) -> u16;
 }
 
 macro_rules! real {
@@ -77,6 +80,10 @@ macro_rules! real {
             #[inline(always)]
             fn magnitude(self) -> Self {
                 self.abs()
+            }
+            #[inline(always)]
+            fn whole(self) -> u16 {
+                self as u16
             }
         }
     };
@@ -278,12 +285,14 @@ impl LatticeCoeffs {
 
 type Octet<F> = [F; LANES];
 
-/// One-pole loss of both waves arriving at eight junctions, and where they come from.
+/// One-pole loss of both waves arriving at eight junctions, and where they come from: `y = x - m (x - s)` with
+/// `m = A (1 - q)`, then `s += q (x - s)`.
 #[derive(Clone)]
 #[repr(C, align(64))]
 struct Arrivals<F> {
-    offset: [[u32; LANES]; 2],
-    amount: [Octet<F>; 2],
+    offset: [[u16; LANES]; 2],
+    /// m, see above.
+    taken: [Octet<F>; 2],
     q: [Octet<F>; 2],
     state: [Octet<F>; 2],
 }
@@ -291,48 +300,44 @@ struct Arrivals<F> {
 impl<F: Real> Arrivals<F> {
     fn idle(slot: usize) -> Self {
         let nothing = [Octet::default(); 2];
-        Self { offset: [[slot as u32; LANES]; 2], amount: nothing, q: nothing, state: nothing }
+        Self { offset: [[slot as u16; LANES]; 2], taken: nothing, q: nothing, state: nothing }
     }
 
     /// Waves arriving at eight junctions on one side, after their cell's loss.
     #[inline(always)]
-    fn gather<const SIDE: usize>(&mut self, ring: &[F; RING], base: u32) -> Octet<F> {
+    fn gather<const SIDE: usize>(&mut self, ring: &[F; RING], base: u16) -> Octet<F> {
         let mut wave = Octet::<F>::default();
         for (wave, offset) in wave.iter_mut().zip(self.offset[SIDE]) {
             *wave = ring[(base.wrapping_add(offset) & MASK) as usize];
         }
-        let (amount, q, state) = (&self.amount[SIDE], &self.q[SIDE], &mut self.state[SIDE]);
+        let (taken, q, state) = (&self.taken[SIDE], &self.q[SIDE], &mut self.state[SIDE]);
         for k in 0..LANES {
             let difference = wave[k] - state[k];
-            let step = q[k] * difference;
-            state[k] = state[k] + step;
-            wave[k] = wave[k] - amount[k] * (difference - step);
+            state[k] = state[k] + q[k] * difference;
+            wave[k] = wave[k] - taken[k] * difference;
         }
         wave
     }
 
+    #[inline(always)]
     fn flush(&mut self) {
         self.state.iter_mut().flatten().for_each(flush);
     }
 }
 
+/// Written unconditionally: only so do loops over it become vectors.
+#[inline(always)]
 fn flush<F: Real>(x: &mut F) {
-    if x.magnitude() < F::of(TINY) {
-        *x = F::default();
-    }
+    *x = if x.magnitude() < F::of(TINY) { F::default() } else { *x };
 }
 
-/// Writes the waves leaving eight junctions: `pressure` minus what arrived from the other side.
+/// Writes the waves leaving eight junctions, down the bore and back.
 #[inline(always)]
-fn leave<F: Real>(ring: &mut [F; RING], row: usize, pressure: &Octet<F>, left: &Octet<F>, right: &Octet<F>) {
+fn leave<F: Real>(ring: &mut [F; RING], row: usize, down: &Octet<F>, back: &Octet<F>) {
     let row = row & (RING - 1) & !(LANES - 1);
-    for (side, wave) in [(row, right), (row | BACK, left)] {
-        let mut out = Octet::<F>::default();
-        for k in 0..LANES {
-            out[k] = pressure[k] - wave[k];
-        }
+    for (side, wave) in [(row, down), (row | BACK, back)] {
         if let Some(slots) = ring.get_mut(side..side + LANES) {
-            slots.copy_from_slice(&out);
+            slots.copy_from_slice(wave);
         }
     }
 }
@@ -342,20 +347,22 @@ fn leave<F: Real>(ring: &mut [F; RING], row: usize, pressure: &Octet<F>, left: &
 #[repr(C, align(64))]
 struct Steps<F> {
     arrivals: Arrivals<F>,
-    /// Weight of the left wave, 2 Y_left / (Y_left + Y_right), and of the right one.
-    weight: [Octet<F>; 2],
+    /// Weight of the left wave in the pressure, 2 Y_left / (Y_left + Y_right); 2 less this is that of the right one.
+    weight: Octet<F>,
 }
 
 impl<F: Real> Steps<F> {
     #[inline(always)]
-    fn tick(&mut self, ring: &mut [F; RING], base: u32, slot: usize) {
+    fn tick(&mut self, ring: &mut [F; RING], base: u16, slot: usize) {
         let left = self.arrivals.gather::<0>(ring, base);
         let right = self.arrivals.gather::<1>(ring, base);
-        let mut pressure = Octet::<F>::default();
+        let (mut down, mut back) = (Octet::<F>::default(), Octet::<F>::default());
         for k in 0..LANES {
-            pressure[k] = self.weight[0][k] * left[k] + self.weight[1][k] * right[k];
+            let difference = left[k] - right[k];
+            down[k] = right[k] + self.weight[k] * difference;
+            back[k] = down[k] - difference;
         }
-        leave(ring, base as usize + slot, &pressure, &left, &right);
+        leave(ring, base as usize + slot, &down, &back);
     }
 }
 
@@ -368,8 +375,9 @@ struct Holes<F> {
     y_right: Octet<F>,
     y_sum: Octet<F>,
     r1: Octet<F>,
+    minus_r1: Octet<F>,
     gc: Octet<F>,
-    gc2: Octet<F>,
+    minus_gc2: Octet<F>,
     gl2: Octet<F>,
     outside: Octet<F>,
     rs0: Octet<F>,
@@ -382,60 +390,66 @@ struct Holes<F> {
     outer: Octet<F>,
     compliance: Octet<F>,
     inner: Octet<F>,
-    radiated: Octet<F>,
 }
 
 impl<F: Real> Holes<F> {
     /// A hole opened by `a` passes its jet through `a^2` of its area (its mass, too, is 1 / a^2 of the open one's). Seen
     /// behind the transformer the loss is then 1 / a^2 of the open hole's: it is what quietens the air column when the
     /// fingers leave many holes at once. Held below a bound where no air passes anyway.
-    #[inline(always)]
-    fn throttle(&mut self) {
+    ///
+    /// True if a hole is on its way. Seldom called, hence not inlined: it would crowd the loop over samples.
+    #[inline(never)]
+    fn throttle(&mut self) -> bool {
         for k in 0..LANES {
             let area = self.opening[k] * self.opening[k];
             self.jet[k] = self.jet_open[k] / (area + F::of(0.02) * (F::of(1.0) - area));
         }
+        self.glide != Octet::default()
     }
 
-    /// The network of [`tone_hole`](crate::bore::tone_hole) at eight junctions, one sample.
     #[inline(always)]
-    fn tick(&mut self, ring: &mut [F; RING], base: u32, slot: usize) {
+    fn glide(&mut self) {
+        for k in 0..LANES {
+            self.opening[k] = self.opening[k] + self.glide[k];
+        }
+    }
+
+    /// The network of [`tone_hole`](crate::bore::tone_hole) at eight junctions, one sample; the flows leaving outside.
+    #[inline(always)]
+    fn tick(&mut self, ring: &mut [F; RING], base: u16, slot: usize) -> Octet<F> {
         let left = self.arrivals.gather::<0>(ring, base);
         let right = self.arrivals.gather::<1>(ring, base);
         let one = F::of(1.0);
-        let mut pressure = Octet::<F>::default();
+        let (mut down, mut back, mut radiated) = (Octet::default(), Octet::default(), Octet::default());
         for k in 0..LANES {
-            let a = self.opening[k] + self.glide[k];
-            self.opening[k] = a;
+            let a = self.opening[k];
             let rs = self.resistance[k];
             let k2 = one / (one + rs * self.outside[k]);
             let g2 = self.outside[k] * k2;
             let gp = self.gc[k] + a * a * g2;
-            // 1 / (1 + gp r1), gp / (1 + gp r1) and 1 / (y_sum + gp / (1 + gp r1)) with one division.
             let w = one + gp * self.r1[k];
-            let t = self.y_sum[k] * w + gp;
-            let r = one / (w * t);
-            let share = t * r;
-            let g0 = gp * share;
-            let q = w * w * r;
 
             let h2 = self.outer[k] * k2;
             let inner = self.inner[k];
-            let source = (self.compliance[k] + a * h2 - gp * inner) * share;
-            let p = (self.y_left[k] * left[k] + self.y_right[k] * right[k] - source) * q;
-            let drop = self.r1[k] * (g0 * p + source);
-            let node = p - inner - drop;
+            let source = self.compliance[k] + a * h2 - gp * inner;
+            let arriving = self.y_left[k] * left[k] + self.y_right[k] * right[k];
+            let p = (arriving * w - source) / (self.y_sum[k] * w + gp);
+            // The flow into the hole is also arriving - y_sum p, but in single precision that difference is noise.
+            let rise = self.minus_r1[k] / w * (gp * p + source);
+            let node = p - inner + rise;
             let outside = a * node;
             let flow = g2 * outside + h2;
             self.outer[k] = self.outer[k] + self.gl2[k] * (outside - rs * flow);
-            self.compliance[k] = -(self.gc2[k] * node + self.compliance[k]);
-            self.inner[k] = -(drop + drop + inner);
+            self.compliance[k] = self.minus_gc2[k] * node - self.compliance[k];
+            self.inner[k] = rise + rise - inner;
             let leaving = a * flow;
-            self.radiated[k] = leaving;
+            radiated[k] = leaving;
             self.resistance[k] = self.rs0[k] + self.jet[k] * leaving.magnitude();
-            pressure[k] = p;
+            down[k] = p - right[k];
+            back[k] = p - left[k];
         }
-        leave(ring, base as usize + slot, &pressure, &left, &right);
+        leave(ring, base as usize + slot, &down, &back);
+        radiated
     }
 }
 
@@ -447,42 +461,45 @@ pub struct Lattice<F> {
     holes: Box<[Holes<F>]>,
     hole_lanes: Box<[(usize, usize)]>,
     jets: Box<[f64]>,
-    row: u32,
+    /// Where the present row begins in the ring.
+    base: u16,
     tip: EndLoss<F>,
     end: EndLoss<F>,
     bell_y: F,
+    bell_y2: F,
     bell_share: F,
     bell_g2: F,
     bell_state: F,
-    tuned_source: u32,
-    tuned_rows: u32,
-    /// Tuning delay, rows, and its change per row.
+    tuned_source: u16,
+    tuned_rows: u16,
+    /// Rows the returning wave of the tuned cell takes, and their change per row.
     delay: F,
     delay_glide: F,
+    /// Openings or jets have changed since they were last matched.
+    moved: bool,
     avx2: bool,
 }
 
 #[derive(Clone, Copy)]
 struct EndLoss<F> {
-    offset: u32,
-    amount: F,
+    offset: u16,
+    taken: F,
     q: F,
     state: F,
 }
 
 impl<F: Real> EndLoss<F> {
     #[inline(always)]
-    fn take(&mut self, ring: &[F; RING], base: u32) -> F {
+    fn take(&mut self, ring: &[F; RING], base: u16) -> F {
         let wave = ring[(base.wrapping_add(self.offset) & MASK) as usize];
         let difference = wave - self.state;
-        let step = self.q * difference;
-        self.state = self.state + step;
-        wave - self.amount * (difference - step)
+        self.state = self.state + self.q * difference;
+        wave - self.taken * difference
     }
 }
 
-fn back_rows(rows: u32, slot: usize) -> u32 {
-    (slot as u32).wrapping_sub(rows * STRIDE as u32)
+fn back_rows(rows: u32, slot: usize) -> u16 {
+    (slot as u16).wrapping_sub(rows as u16 * STRIDE as u16)
 }
 
 impl<F: Real> Lattice<F> {
@@ -493,15 +510,16 @@ impl<F: Real> Lattice<F> {
         let ones = [one; LANES];
         let none = Octet::<F>::default();
         let mut steps =
-            vec![Steps { arrivals: Arrivals::idle(IDLE_SLOT), weight: [ones; 2] }; coeffs.step_chunks()];
+            vec![Steps { arrivals: Arrivals::idle(IDLE_SLOT), weight: ones }; coeffs.step_chunks()];
         let idle = Holes {
             arrivals: Arrivals::idle(IDLE_SLOT),
             y_left: none,
             y_right: none,
             y_sum: ones,
             r1: none,
+            minus_r1: none,
             gc: none,
-            gc2: none,
+            minus_gc2: none,
             gl2: none,
             outside: none,
             rs0: none,
@@ -513,7 +531,6 @@ impl<F: Real> Lattice<F> {
             outer: none,
             compliance: none,
             inner: none,
-            radiated: none,
         };
         let mut holes = vec![idle; coeffs.hole_chunks()];
         let tuned = coeffs.tuned_cell();
@@ -529,8 +546,7 @@ impl<F: Real> Lattice<F> {
             let arrivals = match chunk.checked_sub(steps.len()) {
                 None => {
                     let (y_left, y_right) = (coeffs.admittance[left], coeffs.admittance[right]);
-                    steps[chunk].weight[0][k] = F::of(2.0 * y_left / (y_left + y_right));
-                    steps[chunk].weight[1][k] = F::of(2.0 * y_right / (y_left + y_right));
+                    steps[chunk].weight[k] = F::of(2.0 * y_left / (y_left + y_right));
                     &mut steps[chunk].arrivals
                 }
                 Some(chunk) => {
@@ -540,8 +556,9 @@ impl<F: Real> Lattice<F> {
                     lanes.y_right[k] = F::of(2.0 * coeffs.admittance[right]);
                     lanes.y_sum[k] = F::of(coeffs.admittance[left] + coeffs.admittance[right]);
                     lanes.r1[k] = F::of(hole.r1);
+                    lanes.minus_r1[k] = F::of(-hole.r1);
                     lanes.gc[k] = F::of(hole.gc);
-                    lanes.gc2[k] = F::of(2.0 * hole.gc);
+                    lanes.minus_gc2[k] = F::of(-2.0 * hole.gc);
                     lanes.gl2[k] = F::of(2.0 * hole.gl);
                     lanes.outside[k] = F::of(hole.gl + hole.gp);
                     lanes.rs0[k] = F::of(hole.rs);
@@ -551,15 +568,16 @@ impl<F: Real> Lattice<F> {
             };
             arrivals.offset[0][k] = back_rows(down, from_left);
             arrivals.offset[1][k] =
-                if right == tuned { TUNED_SLOT as u32 } else { back_rows(back, from_right) };
+                if right == tuned { TUNED_SLOT as u16 } else { back_rows(back, from_right) };
             for (side, cell) in [left, right].into_iter().enumerate() {
-                arrivals.amount[side][k] = F::of(coeffs.loss[cell].0);
-                arrivals.q[side][k] = F::of(coeffs.loss[cell].1);
+                let (amount, q) = coeffs.loss[cell];
+                arrivals.taken[side][k] = F::of(amount * (1.0 - q));
+                arrivals.q[side][k] = F::of(q);
             }
         }
-        let end = |cell: usize, offset: u32| EndLoss {
+        let end = |cell: usize, offset: u16| EndLoss {
             offset,
-            amount: F::of(coeffs.loss[cell].0),
+            taken: F::of(coeffs.loss[cell].0 * (1.0 - coeffs.loss[cell].1)),
             q: F::of(coeffs.loss[cell].1),
             state: F::default(),
         };
@@ -576,17 +594,19 @@ impl<F: Real> Lattice<F> {
                 .map(|lane| (lane / LANES - coeffs.step_chunks(), lane % LANES))
                 .collect(),
             jets: coeffs.jets.clone().into(),
-            row: 0,
+            base: 0,
             tip: end(0, back_rows(coeffs.rows(0).1, BACK + coeffs.lane_of(0))),
             end: end(junctions, back_rows(coeffs.rows(junctions).0, last_lane)),
             bell_y: F::of(bell_y),
+            bell_y2: F::of(2.0 * bell_y),
             bell_share: F::of(1.0 / (bell_y + coeffs.bell.0 + coeffs.bell.1)),
             bell_g2: F::of(2.0 * coeffs.bell.1),
             bell_state: F::default(),
-            tuned_source: (BACK + tuned_right) as u32,
-            tuned_rows: coeffs.rows(tuned).1,
-            delay: F::default(),
+            tuned_source: (BACK + tuned_right) as u16,
+            tuned_rows: coeffs.rows(tuned).1 as u16,
+            delay: F::of(f64::from(coeffs.rows(tuned).1)),
             delay_glide: F::default(),
+            moved: true,
             avx2: has_avx2(),
         }
     }
@@ -598,14 +618,14 @@ impl<F: Real> Lattice<F> {
         for holes in &mut *self.holes {
             holes.arrivals.state = Default::default();
             holes.resistance = holes.rs0;
-            for state in [&mut holes.outer, &mut holes.compliance, &mut holes.inner, &mut holes.radiated] {
+            for state in [&mut holes.outer, &mut holes.compliance, &mut holes.inner] {
                 *state = Octet::default();
             }
         }
         self.tip.state = F::default();
         self.end.state = F::default();
         self.bell_state = F::default();
-        self.row = 0;
+        self.base = 0;
     }
 
     /// Use the plain code path even where AVX2 is there (to prove that both give the same bits).
@@ -619,6 +639,7 @@ impl<F: Real> Lattice<F> {
         let (chunk, lane) = self.hole_lanes[hole];
         self.holes[chunk].opening[lane] = F::of(opening.clamp(0.0, 1.0));
         self.holes[chunk].glide[lane] = F::default();
+        self.moved = true;
     }
 
     /// Starts a hole towards an opening that it reaches after `samples`; set it there with
@@ -627,6 +648,7 @@ impl<F: Real> Lattice<F> {
         let (chunk, lane) = self.hole_lanes[hole];
         let from = self.holes[chunk].opening[lane].wide();
         self.holes[chunk].glide[lane] = F::of((opening.clamp(0.0, 1.0) - from) / samples as f64);
+        self.moved = true;
     }
 
     /// Strength of the jet's loss in all holes: K, 0 (linear) ..= 4; 2 is physical for sharp edges. Real-time safe.
@@ -634,13 +656,13 @@ impl<F: Real> Lattice<F> {
         for (&(chunk, lane), jet) in self.hole_lanes.iter().zip(&*self.jets) {
             self.holes[chunk].jet_open[lane] = F::of(k * jet);
         }
+        self.moved = true;
     }
 
     /// Tuning delay, rows of the round trip, clamped to what the cell can give; reached after `samples`, 0 for at once.
     /// Real-time safe.
     pub fn glide_delay(&mut self, rows: f64, samples: usize) {
-        let rows =
-            rows.clamp(1.0 - f64::from(self.tuned_rows), (ROWS - 2) as f64 - f64::from(self.tuned_rows));
+        let rows = (rows + f64::from(self.tuned_rows)).clamp(1.0, (ROWS - 2) as f64);
         if samples == 0 {
             self.delay = F::of(rows);
             self.delay_glide = F::default();
@@ -665,7 +687,7 @@ impl<F: Real> Lattice<F> {
         run_body(self, samples, tip);
     }
 
-    /// Zeroes states too small to hear before they become denormal. Call every hundred samples or so. Real-time safe.
+    /// Zeroes states too small to hear before they become denormal. Call every few hundred samples. Real-time safe.
     pub fn flush(&mut self) {
         self.ring.iter_mut().for_each(flush);
         self.steps.iter_mut().for_each(|steps| steps.arrivals.flush());
@@ -710,8 +732,9 @@ impl<F: Real> Lattice<F> {
     pub fn stored_energy(&self, coeffs: &LatticeCoeffs) -> f64 {
         let last = coeffs.ticks.len() - 1;
         let tuned = coeffs.tuned_cell();
+        let row = u32::from(self.base) / STRIDE as u32;
         let square = |slot: usize, age: u32| {
-            let wave = self.ring[(self.row.wrapping_sub(age) as usize & (ROWS - 1)) * STRIDE + slot].wide();
+            let wave = self.ring[(row.wrapping_sub(age) as usize & (ROWS - 1)) * STRIDE + slot].wide();
             wave * wave
         };
         let mut energy = 0.0;
@@ -720,7 +743,7 @@ impl<F: Real> Lattice<F> {
             let from_right = BACK + if cell == last { END_SLOT } else { coeffs.lane_of(cell) };
             let mut waves: f64 = (0..down).map(|age| square(from_left, age)).sum();
             if cell == tuned {
-                let rows = self.delay.wide() + f64::from(self.tuned_rows);
+                let rows = self.delay.wide();
                 let whole = rows as u32;
                 waves += (0..whole).map(|age| square(from_right, age)).sum::<f64>();
                 waves += (rows - f64::from(whole)) * square(from_right, whole);
@@ -796,19 +819,24 @@ fn run_avx2<F: Real, T: Tip<F>>(lattice: &mut Lattice<F>, samples: usize, tip: &
 
 #[inline(always)]
 fn run_body<F: Real, T: Tip<F>>(lattice: &mut Lattice<F>, samples: usize, tip: &mut T) {
-    lattice.holes.iter_mut().for_each(Holes::throttle);
+    let moving = lattice.moved;
+    if moving {
+        lattice.moved = lattice.holes.iter_mut().fold(false, |moving, holes| holes.throttle() | moving);
+    }
     let ring = &mut *lattice.ring;
     for _ in 0..samples {
-        lattice.row = (lattice.row + 1) & (ROWS as u32 - 1);
-        let base = lattice.row * STRIDE as u32;
+        let base = (lattice.base + STRIDE as u16) & (MASK + 1 - STRIDE as u16);
+        lattice.base = base;
+        if moving {
+            lattice.holes.iter_mut().for_each(Holes::glide);
+        }
 
         // The returning wave of the tuned cell, delayed by whole rows and a linear part between two.
         lattice.delay = lattice.delay + lattice.delay_glide;
-        let rows = lattice.delay.wide() + f64::from(lattice.tuned_rows);
-        let whole = rows as u32;
-        let part = F::of(rows - f64::from(whole));
-        let near = lattice.tuned_source.wrapping_add(base).wrapping_sub(whole.wrapping_mul(STRIDE as u32));
-        let (near, far) = (near & MASK, near.wrapping_sub(STRIDE as u32) & MASK);
+        let whole = lattice.delay.whole();
+        let part = lattice.delay - F::from(whole);
+        let near = lattice.tuned_source.wrapping_add(base).wrapping_sub(whole.wrapping_mul(STRIDE as u16));
+        let (near, far) = (near & MASK, near.wrapping_sub(STRIDE as u16) & MASK);
         let wave = ring[near as usize] + part * (ring[far as usize] - ring[near as usize]);
         ring[(base as usize + TUNED_SLOT) & (RING - 1)] = wave;
 
@@ -817,8 +845,7 @@ fn run_body<F: Real, T: Tip<F>>(lattice: &mut Lattice<F>, samples: usize, tip: &
 
         // The open end: radiation conductance and mass in parallel.
         let arriving = lattice.end.take(ring, base);
-        let drive = lattice.bell_y * arriving;
-        let p_end = (drive + drive - lattice.bell_state) * lattice.bell_share;
+        let p_end = (lattice.bell_y2 * arriving - lattice.bell_state) * lattice.bell_share;
         lattice.bell_state = lattice.bell_state + lattice.bell_g2 * p_end;
         let reflected = p_end - arriving;
         ring[(base as usize + BACK + END_SLOT) & (RING - 1)] = reflected;
@@ -831,10 +858,10 @@ fn run_body<F: Real, T: Tip<F>>(lattice: &mut Lattice<F>, samples: usize, tip: &
         }
         let mut lanes = Octet::<F>::default();
         for holes in &mut *lattice.holes {
-            holes.tick(ring, base, slot);
+            let radiated = holes.tick(ring, base, slot);
             slot += LANES;
             for k in 0..LANES {
-                lanes[k] = lanes[k] + holes.radiated[k];
+                lanes[k] = lanes[k] + radiated[k];
             }
         }
         for lane in lanes {

@@ -37,6 +37,8 @@ const ATTENUATION_DB: f64 = 94.0;
 /// What the length formula promises and the stop band does not quite keep at its edge, dB: the window is shaped for
 /// this much less, which moves the edge where it should be.
 const EDGE_DB: f64 = 2.0;
+/// Room for new inputs behind the ones still heard.
+const ROOM: usize = 1024;
 /// Rates are reduced to a fraction after rounding to this part of a hertz.
 const PARTS_PER_HZ: f64 = 1000.0;
 
@@ -54,10 +56,10 @@ pub struct Resampler {
     phase: u64,
     taps: usize,
     /// `[phase][tap]`, oldest tap first. `l` rows, or `PHASES + 1` when mixed.
-    coeffs: Box<[f32]>,
-    /// The last `taps` inputs, written twice, `taps` apart: any window of them is one slice.
+    coeffs: Box<[[f32; LANES]]>,
+    /// The last inputs in order; when it is full, the last `taps` of them move to its beginning.
     history: Box<[f32]>,
-    /// Where the next input is written, below `taps`; also where the oldest one is.
+    /// Where the next input is written; the `taps` before it are heard.
     next: usize,
     /// Group delay of the FIR, input samples.
     delay: f64,
@@ -117,9 +119,9 @@ impl Resampler {
             m,
             phase: 0,
             taps,
-            coeffs: coeffs.into_boxed_slice(),
-            history: vec![0.0; 2 * taps].into_boxed_slice(),
-            next: 0,
+            coeffs: coeffs.as_chunks().0.into(),
+            history: vec![0.0; taps + ROOM].into_boxed_slice(),
+            next: taps,
             delay: span / 2.0,
             pass_hz: lower_hz * (0.5 - TRANSITION / 2.0),
             stop_hz: lower_hz * (0.5 + TRANSITION / 2.0),
@@ -140,27 +142,35 @@ impl Resampler {
     /// samples count as silence, surplus ones are dropped (both refused in debug builds). Real-time safe.
     pub fn process(&mut self, input: &[f32], out: &mut [f32]) {
         debug_assert_eq!(input.len(), self.inputs_needed(out.len()));
-        let mut input = input.iter().copied();
         if self.l == self.m {
-            for out in out {
-                *out = input.next().unwrap_or(0.0);
-            }
+            let shared = input.len().min(out.len());
+            out[..shared].copy_from_slice(&input[..shared]);
+            out[shared..].fill(0.0);
             return;
         }
-        for out in out {
-            self.phase += self.m;
-            while self.phase >= self.l {
-                self.phase -= self.l;
-                self.push(input.next().unwrap_or(0.0));
+        let mut input = input;
+        // Rates differ by 1000 at most, so there is always room for what one output takes.
+        let piece = ((ROOM as u64 * self.l / self.m) as usize).max(1);
+        for out in out.chunks_mut(piece) {
+            let needed = self.inputs_needed(out.len());
+            let (now, later) = input.split_at(needed.min(input.len()));
+            input = later;
+            let mut end = self.take(now, needed);
+            for out in out {
+                self.phase += self.m;
+                while self.phase >= self.l {
+                    self.phase -= self.l;
+                    end += 1;
+                }
+                *out = self.output(end);
             }
-            *out = self.output();
         }
     }
 
     /// Silence, and the position of a new converter. Real-time safe.
     pub fn reset(&mut self) {
         self.phase = 0;
-        self.next = 0;
+        self.next = self.taps;
         self.history.fill(0.0);
     }
 
@@ -182,19 +192,24 @@ impl Resampler {
         self.taps
     }
 
-    #[inline]
-    fn push(&mut self, sample: f32) {
-        self.history[self.next] = sample;
-        self.history[self.next + self.taps] = sample;
-        self.next += 1;
-        if self.next == self.taps {
-            self.next = 0;
+    /// Writes `needed` inputs behind those there are; returns where the new ones begin.
+    fn take(&mut self, input: &[f32], needed: usize) -> usize {
+        if self.next + needed > self.history.len() {
+            self.history.copy_within(self.next - self.taps..self.next, 0);
+            self.next = self.taps;
         }
+        let begin = self.next;
+        self.next += needed;
+        let (given, missing) = self.history[begin..self.next].split_at_mut(input.len());
+        given.copy_from_slice(input);
+        missing.fill(0.0);
+        begin
     }
 
+    /// The output that hears the `taps` inputs before `end`.
     #[inline]
-    fn output(&self) -> f32 {
-        let heard = &self.history[self.next..self.next + self.taps];
+    fn output(&self, end: usize) -> f32 {
+        let heard = &self.history[end - self.taps..end];
         if self.l <= PHASES {
             return dot(heard, self.row(self.phase as usize));
         }
@@ -205,22 +220,23 @@ impl Resampler {
     }
 
     #[inline]
-    fn row(&self, phase: usize) -> &[f32] {
-        &self.coeffs[phase * self.taps..(phase + 1) * self.taps]
+    fn row(&self, phase: usize) -> &[[f32; LANES]] {
+        let chunks = self.taps / LANES;
+        &self.coeffs[phase * chunks..][..chunks]
     }
 }
 
-/// Sum of products in eight lanes, added pairwise at the end: the same order on every machine.
+/// Sum of products in eight lanes, then of the lanes one by one: the same order on every machine. (Added pairwise, the
+/// compiler would split the lanes into pairs.)
 #[inline]
-fn dot(a: &[f32], b: &[f32]) -> f32 {
+fn dot(a: &[f32], b: &[[f32; LANES]]) -> f32 {
     let mut lanes = [0.0f32; LANES];
-    for (a, b) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
-        for ((lane, a), b) in lanes.iter_mut().zip(a).zip(b) {
-            *lane += a * b;
+    for (a, b) in a.as_chunks::<LANES>().0.iter().zip(b) {
+        for k in 0..LANES {
+            lanes[k] += a[k] * b[k];
         }
     }
-    let [a, b, c, d, e, f, g, h] = lanes;
-    ((a + e) + (c + g)) + ((b + f) + (d + h))
+    lanes.iter().sum()
 }
 
 fn gcd(a: u64, b: u64) -> u64 {

@@ -129,7 +129,8 @@ impl Clarinet {
     fn render_with(&mut self, out: &mut [f32], probe: &mut Option<&mut dyn FnMut(Probe)>) {
         for out in out.chunks_mut(CHUNK) {
             let needed = self.resampler.inputs_needed(out.len()).min(self.inner.len());
-            for at in 0..needed {
+            let mut made = 0;
+            while made < needed {
                 if self.spare_from == TICK {
                     let drive = self.player.tick(&self.model, &mut self.voice);
                     self.spare = *self.voice.tick(&drive);
@@ -138,13 +139,18 @@ impl Clarinet {
                         probes.iter().for_each(|&moment| probe(moment));
                     }
                 }
-                self.inner[at] = self.spare[self.spare_from];
-                self.spare_from += 1;
+                let count = (TICK - self.spare_from).min(needed - made);
+                let spare = &self.spare[self.spare_from..self.spare_from + count];
+                self.inner[made..made + count].copy_from_slice(spare);
+                made += count;
+                self.spare_from += count;
             }
             self.resampler.process(&self.inner[..needed], out);
             for sample in &mut *out {
-                let step = (self.gain_wanted - self.gain) * self.gain_step;
-                self.gain = if step.abs() < 1e-9 { self.gain_wanted } else { self.gain + step };
+                if self.gain != self.gain_wanted {
+                    let step = (self.gain_wanted - self.gain) * self.gain_step;
+                    self.gain = if step.abs() < 1e-9 { self.gain_wanted } else { self.gain + step };
+                }
                 *sample = limited(*sample * self.gain);
             }
             if out.iter().sum::<f32>().is_finite() {
@@ -198,6 +204,13 @@ impl Clarinet {
     /// How often a non-finite state had to be reset since the start.
     pub fn resets(&self) -> u64 {
         self.resets + self.voice.resets()
+    }
+
+    /// Keeps the plain code path, see [`Lattice::without_avx2`](crate::bore::lattice::Lattice::without_avx2).
+    #[doc(hidden)]
+    pub fn without_avx2(mut self) -> Self {
+        self.voice = self.voice.without_avx2();
+        self
     }
 
     /// The voice inside, to be disturbed by tests.

@@ -46,10 +46,67 @@ enum Tongue {
     Stopping(f64),
 }
 
+/// What settings, fingering and bend amount to: worked out when one of them changes, not at every tick.
+#[derive(Clone, Copy, Debug)]
+struct Stance {
+    /// Closing pressure of the reed over the reference.
+    closing: f64,
+    reed: ReedCoeffs,
+    /// Delay on top of the note's trim, rows.
+    rows: f64,
+    /// How far delay and breath come towards what is wanted in one tick, 0..1.
+    tuning_step: f64,
+    breath_rise: f64,
+    breath_follow: f64,
+    breath_end: f64,
+}
+
+impl Stance {
+    fn new(settings: &Settings, fingering: usize, bend_cents: f64, model: &Model) -> Self {
+        let law = settings.reed_law();
+        let lip = embouchure(model.notes_hz[fingering], model.lowest_hz);
+        let reed = ReedCoeffs::new(
+            law,
+            f64::from(settings.zeta),
+            f64::from(settings.lay),
+            lip.resonance_hz,
+            lip.damping * f64::from(settings.damping),
+            model.swept_s,
+            model.coeffs.rate_hz,
+        );
+        let offset = bend_cents
+            + cents(f64::from(settings.a4_hz), 440.0)
+            + cents(Air::at(f64::from(settings.temperature_c)).c, model.air.c);
+        let sensitivity = model.tuning.notes.get(fingering).map_or(1.0, |note| note.sensitivity);
+        let step = |time_s: f64| step_towards(tick_s(model), time_s);
+        Self {
+            closing: law.closing(),
+            reed,
+            rows: sensitivity * model.rows_for_cents(fingering, offset),
+            tuning_step: step(0.5e-3 * f64::from(settings.legato_ms)),
+            breath_rise: step(BREATH_RISE_S),
+            breath_follow: step(BREATH_FOLLOW_S),
+            breath_end: step(BREATH_END_S),
+        }
+    }
+}
+
+/// Length of a control tick, s.
+fn tick_s(model: &Model) -> f64 {
+    TICK as f64 / model.coeffs.rate_hz
+}
+
+/// How far a first-order lag of `time_s` comes in `tick_s`, 0..1.
+fn step_towards(tick_s: f64, time_s: f64) -> f64 {
+    1.0 - (-tick_s / time_s).exp()
+}
+
 /// What the player is doing.
 #[derive(Clone, Debug)]
 pub struct Player {
     settings: Settings,
+    /// `None` until the next tick works it out.
+    stance: Option<Stance>,
     held: [SoundingNote; STACK],
     held_count: usize,
     velocity: f64,
@@ -73,6 +130,7 @@ impl Default for Player {
     fn default() -> Self {
         Self {
             settings: Settings::default(),
+            stance: None,
             held: [SoundingNote(0); STACK],
             held_count: 0,
             velocity: 0.0,
@@ -94,7 +152,11 @@ impl Default for Player {
 impl Player {
     /// New settings; heard from the next tick on.
     pub fn set_settings(&mut self, settings: &Settings) {
-        self.settings = settings.clamped();
+        let settings = settings.clamped();
+        if settings != self.settings {
+            self.settings = settings;
+            self.stance = None;
+        }
     }
 
     /// The settings in use.
@@ -124,6 +186,7 @@ impl Player {
             Event::Bend { cents } => {
                 self.bend_cents =
                     f64::from(if cents.is_finite() { cents.clamp(-4_800.0, 4_800.0) } else { 0.0 });
+                self.stance = None;
             }
             Event::Panic => {
                 self.reset();
@@ -189,7 +252,7 @@ impl Player {
         model: &Model,
         voice: &mut Voice<F>,
     ) {
-        let tick_s = TICK as f64 / model.coeffs.rate_hz;
+        let tick_s = tick_s(model);
         if let (true, Some(from)) = (slurred, self.fingering) {
             let leap = cents(model.notes_hz[fingering], model.notes_hz[from]).abs() > 1_150.0;
             let (old, new) = (model.registers[from], model.registers[fingering]);
@@ -201,6 +264,7 @@ impl Player {
         let ticks = ((1e-3 * ms / tick_s).round() as u32).max(1);
         self.gliding = if self.fingering.is_some() { ticks } else { 0 };
         self.fingering = Some(fingering);
+        self.stance = None;
         for (hole, &open) in model.file.fingerings[fingering].open.iter().enumerate() {
             let opening = f64::from(u8::from(open));
             if self.gliding == 0 {
@@ -218,11 +282,15 @@ impl Player {
 
     /// Advances one control tick: moves holes and delay, and says how the reed is driven. Real-time safe.
     pub fn tick<F: crate::bore::lattice::Real>(&mut self, model: &Model, voice: &mut Voice<F>) -> Drive {
-        let tick_s = TICK as f64 / model.coeffs.rate_hz;
+        let tick_s = tick_s(model);
         let settings = self.settings;
-        let law = settings.reed_law();
-        let closing = law.closing();
         let fingering = self.fingering.unwrap_or(0);
+        let stance = self.stance.unwrap_or_else(|| {
+            voice.lattice_mut().set_jet_loss(f64::from(settings.vent_loss));
+            Stance::new(&settings, fingering, self.bend_cents, model)
+        });
+        self.stance = Some(stance);
+        let closing = stance.closing;
 
         if self.gliding > 0 {
             self.gliding -= 1;
@@ -245,14 +313,14 @@ impl Player {
         };
         let (wanted, dipping) = if self.dip > 0.0 { (wanted * DIP.0, true) } else { (wanted, false) };
         self.dip -= tick_s;
-        let time_s = if !playing {
-            BREATH_END_S
+        let step = if !playing {
+            stance.breath_end
         } else if matches!(self.tongue, Tongue::Holding(_)) || dipping {
-            BREATH_RISE_S
+            stance.breath_rise
         } else {
-            BREATH_FOLLOW_S
+            stance.breath_follow
         };
-        self.gamma += (wanted - self.gamma) * (1.0 - (-tick_s / time_s).exp());
+        self.gamma += (wanted - self.gamma) * step;
         if wanted == 0.0 && self.gamma < NO_BREATH {
             self.gamma = 0.0;
         }
@@ -277,35 +345,17 @@ impl Player {
         self.tongue = tongue;
         let force = TONGUE_FORCE * closing * share;
         // Letting go is as quick as asked; pressing takes a moment.
-        let press = 1.0 - (-tick_s / TONGUE_PRESS_S).exp();
-        self.tongue_force = if force < self.tongue_force {
+        self.tongue_force = if force <= self.tongue_force {
             force
         } else {
-            self.tongue_force + press * (force - self.tongue_force)
+            self.tongue_force + step_towards(tick_s, TONGUE_PRESS_S) * (force - self.tongue_force)
         };
 
-        // Lip and tuning.
-        let lip = embouchure(model.notes_hz[fingering], model.lowest_hz);
-        let reed = ReedCoeffs::new(
-            law,
-            f64::from(settings.zeta),
-            f64::from(settings.lay),
-            lip.resonance_hz,
-            lip.damping * f64::from(settings.damping),
-            model.swept_s,
-            model.coeffs.rate_hz,
-        );
-        voice.lattice_mut().set_jet_loss(f64::from(settings.vent_loss));
-        let offset = self.bend_cents
-            + cents(f64::from(settings.a4_hz), 440.0)
-            + cents(Air::at(f64::from(settings.temperature_c)).c, model.air.c);
-        let sensitivity = model.tuning.notes.get(fingering).map_or(1.0, |note| note.sensitivity);
-        let rows = model.tuning.rows(fingering, settings.tuning, self.gamma)
-            + sensitivity * model.rows_for_cents(fingering, offset);
+        // Tuning.
+        let rows = model.tuning.rows(fingering, settings.tuning, self.gamma) + stance.rows;
         // The delay follows within the time the fingers take; the first note has it at once.
         if self.rows_set {
-            let time_s = 0.5e-3 * f64::from(settings.legato_ms);
-            self.rows += (rows - self.rows) * (1.0 - (-tick_s / time_s).exp());
+            self.rows += (rows - self.rows) * stance.tuning_step;
             voice.lattice_mut().glide_delay(self.rows, TICK);
         } else {
             self.rows = rows;
@@ -317,7 +367,7 @@ impl Player {
             p_mouth: self.gamma * closing,
             tongue: self.tongue_force,
             noise: f64::from(settings.noise),
-            reed,
+            reed: stance.reed,
         }
     }
 }

@@ -13,7 +13,7 @@ use crate::units::{Air, REFERENCE_RADIUS_M};
 /// Samples of one control tick: everything a player moves, moves on this grid, counted from reset.
 pub const TICK: usize = 16;
 /// Ticks between two flushes of states too small to hear.
-const FLUSH_TICKS: u32 = 8;
+const FLUSH_TICKS: u32 = 64;
 /// Breath noise at `noise` = 1: rms of the noise flow over the mean flow it rides on (by ear and by level: -40 dB under
 /// a mezzo-forte fundamental at the default 0.3).
 const NOISE_FLOW: f64 = 0.06;
@@ -56,6 +56,8 @@ struct Mouth {
     noise_low: f64,
     noise_band: f64,
     noise_corners: (f64, f64),
+    hiss: [f64; TICK],
+    flows: [f64; TICK],
     last_flow: f64,
     /// Radiated pressure at 1 m per change of flow, Pa.
     loudness: f64,
@@ -69,16 +71,39 @@ struct Mouth {
 const NOISE_SEED: u64 = 0x9E37_79B9_7F4A_7C15;
 
 impl Mouth {
-    /// White noise, uniform with unit variance (xorshift64*, Vigna 2016).
-    #[inline(always)]
-    fn white(&mut self) -> f64 {
-        let mut x = self.random;
-        x ^= x >> 12;
-        x ^= x << 25;
-        x ^= x >> 27;
-        self.random = x;
-        let bits = x.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11;
-        (bits as f64 * (2.0 / (1_u64 << 53) as f64) - 1.0) * 1.732_050_807_568_877_2
+    /// Turbulence for the next tick: white noise between two corners. Beside the loop over samples, which is crowded.
+    ///
+    /// White is a linear congruential generator (Knuth, The Art of Computer Programming 2, 3.3.4: MMIX), whose upper
+    /// bits are what is heard, uniform with unit variance.
+    fn breathe(&mut self) {
+        if self.noise == 0.0 {
+            return;
+        }
+        let (low, high) = self.noise_corners;
+        let unit = high * 1.732_050_807_568_877_2 / (1_u64 << 63) as f64;
+        let (mut random, mut smooth, mut drift) = (self.random, self.noise_low, self.noise_band);
+        for hiss in &mut self.hiss {
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            smooth += unit * (random as i64) as f64 - high * smooth;
+            drift += low * (smooth - drift);
+            *hiss = smooth - drift;
+        }
+        (self.random, self.noise_low, self.noise_band) = (random, smooth, drift);
+    }
+
+    /// What a tick's flows sound like: a small source is heard by its change of flow.
+    fn radiate(&mut self) {
+        let mut before = self.last_flow;
+        for (out, &flow) in self.out.iter_mut().zip(&self.flows) {
+            *out = ((flow - before) * self.loudness) as f32;
+            before = flow;
+        }
+        self.last_flow = before;
+        if let Some(probes) = &mut self.probes {
+            for (probe, &pressure) in probes.iter_mut().zip(&self.out) {
+                probe.p_radiated_pa = f64::from(pressure);
+            }
+        }
     }
 }
 
@@ -87,14 +112,8 @@ impl<F: Real> Tip<F> for Mouth {
     fn reflect(&mut self, p_minus: F) -> F {
         self.p_mouth += self.p_mouth_glide;
         self.tongue += self.tongue_glide;
-        let mut noise = 0.0;
-        if self.noise > 0.0 {
-            let white = self.white();
-            self.noise_low += self.noise_corners.1 * (white - self.noise_low);
-            self.noise_band += self.noise_corners.0 * (self.noise_low - self.noise_band);
-            // Turbulence rides on the jet: no flow, no noise.
-            noise = self.noise * self.state.flow.abs() * (self.noise_low - self.noise_band);
-        }
+        // Turbulence rides on the jet: no flow, no noise.
+        let noise = self.noise * self.state.flow.abs() * self.hiss[self.at & (TICK - 1)];
         let p_plus = self.state.tick(
             &self.reed,
             self.tables,
@@ -109,18 +128,15 @@ impl<F: Real> Tip<F> for Mouth {
 
     #[inline(always)]
     fn radiated(&mut self, flow: F) {
-        let flow = flow.wide();
-        let pressure = (flow - self.last_flow) * self.loudness;
-        self.last_flow = flow;
         let at = self.at & (TICK - 1);
-        self.out[at] = pressure as f32;
+        self.flows[at] = flow.wide();
         if let Some(probes) = &mut self.probes {
             probes[at] = Probe {
                 gamma: self.p_mouth,
                 opening: self.state.opening,
                 flow_m3s: self.state.flow * self.flow_unit,
                 p_mouthpiece_pa: self.state.p_mouthpiece * P_REF_PA,
-                p_radiated_pa: pressure,
+                p_radiated_pa: 0.0,
             };
         }
         self.at += 1;
@@ -154,6 +170,8 @@ impl<F: Real> Voice<F> {
                 noise_low: 0.0,
                 noise_band: 0.0,
                 noise_corners: (corner(NOISE_BAND_HZ.0), corner(NOISE_BAND_HZ.1)),
+                hiss: [0.0; TICK],
+                flows: [0.0; TICK],
                 last_flow: 0.0,
                 loudness: air.rho / (4.0 * std::f64::consts::PI) * flow_unit * rate,
                 out: [0.0; TICK],
@@ -202,7 +220,9 @@ impl<F: Real> Voice<F> {
         mouth.tongue_glide = (drive.tongue - mouth.tongue) / TICK as f64;
         mouth.noise = drive.noise * NOISE_FLOW;
         mouth.at = 0;
+        mouth.breathe();
         self.lattice.run(TICK, mouth);
+        mouth.radiate();
         (mouth.p_mouth, mouth.tongue) = (drive.p_mouth, drive.tongue);
         self.ticks = self.ticks.wrapping_add(1);
         if self.ticks.is_multiple_of(FLUSH_TICKS) {

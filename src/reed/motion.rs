@@ -33,8 +33,12 @@ pub struct ReedCoeffs {
     closing: f64,
     /// Compliance over the reference, k_ref / k.
     compliance: f64,
-    /// Half-width of the closure's parabola, over the rest opening.
+    /// 1 / `closing`.
+    per_closing: f64,
+    /// Half-width of the closure's parabola, over the rest opening, never quite 0.
     lay: f64,
+    /// The same, per speed, of the parabola that averages a sharp corner over one sample.
+    averaged: f64,
     /// Acceleration per force and sample: T w_r^2.
     drive: f64,
     /// 1 / (1 + q w_r T).
@@ -57,14 +61,17 @@ impl ReedCoeffs {
         rate_hz: f64,
     ) -> Self {
         let period = 1.0 / rate_hz;
+        let closing = law.h() * K_INIT;
         // w_r T stays below 1, well inside the integrator's stability limit of 2.
         let angular = std::f64::consts::TAU * resonance_hz.min(0.15 * rate_hz);
         Self {
             period,
             strength: zeta * law.a(),
-            closing: law.h() * K_INIT,
+            closing,
+            per_closing: 1.0 / closing,
             compliance: K_INIT / law.k(),
-            lay,
+            lay: lay.max(1e-9),
+            averaged: 0.5 * period / closing,
             drive: period * angular * angular,
             damp: 1.0 / (1.0 + damping * angular * period),
             swept: swept_s,
@@ -91,6 +98,8 @@ impl ReedState {
     /// One sample: takes mouth pressure, the wave arriving from the bore, extra flow (noise) and the tongue's force,
     /// and gives the wave leaving into the bore. `kappa` is 1 over the admittance of the first bore cell.
     /// Real-time safe; `zeta kappa B` may be anything, the solution is unique. [audio thread]
+    // Called in one place, once a sample: a struct for what comes from four sides would only be taken apart again.
+    #[allow(clippy::too_many_arguments)]
     #[inline(always)]
     pub fn tick(
         &mut self,
@@ -103,14 +112,14 @@ impl ReedState {
         tongue: f64,
     ) -> f64 {
         let rest = reed.closing;
-        let gap = 1.0 - self.closing / rest;
-        let half = reed.lay.max(0.5 * reed.period * self.speed.abs() / rest).max(1e-9);
+        let gap = 1.0 - self.closing * reed.per_closing;
+        let averaged = reed.averaged * self.speed.abs();
+        let half = if averaged > reed.lay { averaged } else { reed.lay };
         let opening = if gap >= half {
             gap.min(MAX_OPENING)
-        } else if gap <= -half {
-            0.0
         } else {
-            (gap + half) * (gap + half) / (4.0 * half)
+            let knee = (gap + half).max(0.0);
+            knee * knee / (4.0 * half)
         };
         let b = rest * opening;
         let x = p_mouth - 2.0 * p_minus - kappa * (reed.swept * self.speed + noise);
@@ -121,16 +130,14 @@ impl ReedState {
         let p = root * root;
         let (x_a, x_b) = tables.at(p);
         let r = reed.compliance;
-        let sign = if x < 0.0 { -1.0 } else { 1.0 };
+        let sign = 1.0_f64.copysign(x);
         // Forward the quasi-static reed closes with p, backward it opens: hence the sign inside.
         // A shut reed passes nothing, not even the tables' interpolation error.
-        let table_flow =
-            if b > 0.0 { reed.strength * (x_a * (b + sign * r * p) - sign * r * x_b) } else { 0.0 };
-        let exact_flow = reed.strength * b * root;
-        let slope = if load > 0.0 { root / load } else { 0.0 };
-        let p = sign * (p - kappa * (table_flow - exact_flow) * slope).max(0.0);
+        let table_flow = if b > 0.0 { x_a * (b + sign * r * p) - sign * r * x_b } else { 0.0 };
+        let slope = root / load.max(f64::MIN_POSITIVE);
+        let p = sign * (p - kappa * reed.strength * (table_flow - b * root) * slope).max(0.0);
         self.p_mouthpiece = p_mouth - p;
-        self.flow = sign * table_flow;
+        self.flow = sign * reed.strength * table_flow;
         self.opening = opening;
         self.speed = (self.speed + reed.drive * (r * p + tongue - self.closing)) * reed.damp;
         self.closing += reed.period * self.speed;

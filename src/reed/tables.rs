@@ -55,16 +55,17 @@ impl ReedTables {
     #[inline(always)]
     pub fn at(&self, p: f64) -> (f64, f64) {
         let position = p * LAST as f64;
-        if position < 1.0 {
+        let cell = position as u32;
+        let i = cell as usize;
+        if i == 0 {
             let root = position.max(0.0).sqrt();
             return (self.x_a[1] * root, self.x_b[1] * position.max(0.0) * root);
         }
-        if position >= LAST as f64 {
+        if i >= LAST {
             let root = p.sqrt();
             return (self.x_a[LAST] * root, self.x_b[LAST] * p * root);
         }
-        let i = (position as usize).min(LAST - 1);
-        let t = position - i as f64;
+        let t = position - f64::from(cell);
         (self.x_a[i] + t * (self.x_a[i + 1] - self.x_a[i]), self.x_b[i] + t * (self.x_b[i + 1] - self.x_b[i]))
     }
 }

@@ -1,0 +1,50 @@
+#!/usr/bin/env bash
+# Fails when the whole instrument costs more instructions per internal sample (96 kHz) than it may.
+#
+#   benches/instructions.sh [RATE]      host rate, default 48000
+#
+# Counted by callgrind as the difference of a 0.5 s and a 1.5 s run of a held note, so that building the instrument
+# cancels. Unlike times, counts repeat on a busy machine. Without valgrind it says so and passes; it installs nothing.
+set -euo pipefail
+export LC_ALL=C
+
+rate=${1:-48000}
+declare -A most=([avx2]=900 [plain]=1600)
+
+if ! command -v valgrind >/dev/null; then
+    echo "instructions not counted: apt-get install valgrind" >&2
+    exit 0
+fi
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+target=${CARGO_TARGET_DIR:-$root/target}
+(cd "$root" && CARGO_TARGET_DIR=$target cargo build --quiet --release --no-default-features --example instructions)
+program=$target/release/examples/instructions
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+
+collected() { # SECONDS avx2|plain -> instructions of the whole run
+    if ! valgrind --tool=callgrind --callgrind-out-file=/dev/null "$program" "$1" "$rate" "$2" >/dev/null 2>"$log"; then
+        cat "$log" >&2
+        return 1
+    fi
+    sed -n 's/.*Collected : \([0-9]*\).*/\1/p' "$log"
+}
+
+paths=(plain)
+# Only where the processor has it; elsewhere both runs would take the plain path.
+if grep -qw avx2 /proc/cpuinfo 2>/dev/null; then
+    paths=(avx2 plain)
+fi
+failed=0
+for path in "${paths[@]}"; do
+    short=$(collected 0.5 "$path")
+    long=$(collected 1.5 "$path")
+    cost=$(((long - short) / 96000))
+    verdict=ok
+    if ((cost > ${most[$path]})); then
+        verdict="too many"
+        failed=1
+    fi
+    echo "$path: $cost instructions per internal sample, at most ${most[$path]}: $verdict"
+done
+exit $failed
