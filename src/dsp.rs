@@ -1,3 +1,4 @@
-//! Signal processing that knows no physics: sample-rate conversion for the output.
+//! Signal processing that knows no physics: sample-rate conversion and the last guard of the output.
 
+pub mod limiter;
 pub mod resampler;
