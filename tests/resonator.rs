@@ -211,11 +211,9 @@ fn coefficients_and_running_lattice_agree_on_the_reflectance() {
     }
 }
 
-/// The whole curve. Three first peaks are what the cells are fitted for; above the cut-off the curve pays for it. The same
-/// network of lumped holes on an endlessly fine grid stays 0.9 to 1.0 dB (rms to 4 kHz) and 2.3 to 5 dB (to 6 kHz) from the
-/// transfer matrices, unfitted cells at 96 kHz 1.2 to 1.4 dB and 2.9 to 5.5 dB.
+/// The whole curve, not only its peaks: rms 1 dB to 4 kHz, 2 dB to 6 kHz.
 #[test]
-fn impedance_curves_follow_openwind_below_the_cutoff_and_roughly_above() {
+fn impedance_curves_follow_openwind_to_six_kilohertz() {
     for model in models() {
         for midi_note in [52, 65, 71, 84] {
             let opening = openings(model, index_of(model, midi_note));
@@ -242,7 +240,7 @@ fn impedance_curves_follow_openwind_below_the_cutoff_and_roughly_above() {
                 WrittenNote(midi_note),
                 model.coeffs.rate_hz
             );
-            assert!(lowest < 0.3 && low < 1.0 && narrow < 2.6 && wide < 6.5);
+            assert!(lowest < 0.5 && low < 0.5 && narrow < 1.0 && wide < 2.0);
         }
     }
 }
@@ -367,7 +365,7 @@ fn without_losses_stored_energy_is_constant() {
         let mut cells = model.cells.clone();
         cells.loss_strengths = [0.0; 3];
         cells.end_radius_m = 1e-7;
-        let mut holes = networks(&model.file, &model.air);
+        let mut holes = networks(&model.file, &model.air, &model.cells);
         for hole in &mut holes {
             (hole.r_s, hole.r_p) = (0.0, f64::INFINITY);
         }
@@ -426,7 +424,7 @@ fn moving_delay_is_bounded_and_decays() {
             "delay and fingers moving, {rate_hz} Hz: energy at most {most:.4} of the start, {moving:.1e} after 100000 \
              samples, {rest:.1e} and waves {wave:.1e} ten seconds later"
         );
-        assert!(most < 1.5 && moving < 1e-4 && wave < 1e-8);
+        assert!(most < 1.5 && moving < 1e-4 && rest < 1e-12 && wave < 1e-6);
     }
 }
 
@@ -434,7 +432,7 @@ fn moving_delay_is_bounded_and_decays() {
 #[test]
 fn independent_lattice_answers_an_impulse_alike() {
     for model in models() {
-        let holes = networks(&model.file, &model.air);
+        let holes = networks(&model.file, &model.air, &model.cells);
         let mut worst = 0.0_f64;
         for (opening, jets, rows) in [
             (0.0, 0.0, 0.0),
@@ -532,7 +530,7 @@ fn reed_plays_the_same_on_the_independent_lattice() {
         let reed = note.reed(model);
         let samples = model.coeffs.rate_hz as usize;
         let opening = openings(model, note.fingering);
-        let holes = networks(&model.file, &model.air);
+        let holes = networks(&model.file, &model.air, &model.cells);
         let mut bore =
             Oracle::new(&model.cells, &holes, P_REF_PA, &model.air, &opening, note.jet_loss, note.rows);
         let mut slow = Blown::new(&reed, model);
@@ -641,13 +639,13 @@ fn each_hole_opens_smoothly_from_closed_to_open() {
             smallest_step = smallest_step.min(cents(pair[1], pair[0]));
         }
         // A hole with nothing behind its pad: outer network cut off.
-        let mut plugged = networks(&model.file, &model.air);
+        let mut plugged = networks(&model.file, &model.air, &model.cells);
         plugged[hole].r_s = 1e20;
         let plugged = LatticeCoeffs::new(&model.cells, &plugged, P_REF_PA, &model.air);
         let mut all = vec![0.0; model.coeffs.holes()];
         all[hole] = 1.0;
         ends = ends.max(cents(way[0], first_peak_hz(&plugged, &all)).abs());
-        ends = ends.max(cents(at(0.003), way[0]).abs()).max(cents(at(0.999), way[10]).abs());
+        ends = ends.max(cents(at(0.001), way[0]).abs()).max(cents(at(0.9995), way[10]).abs());
         let open: Vec<bool> = (0..all.len()).map(|other| other == hole).collect();
         let true_hz = matrices.peaks(&open, 0.0, 1)[0].f_hz;
         open_hole.add(cents(way[10], true_hz), model.file.holes[hole].name.clone());
@@ -704,7 +702,7 @@ fn register_key_gives_twelfths() {
 
 /// Where |R|^2 falls through one half, on the reference's grid of 10 Hz; of several falls the nearest to the reference
 /// counts (C#5 dips to about one half 700 Hz before it falls for good). The holes below C#4 and G#5 make such a ripple
-/// just there: at 88.2 kHz it stops at 0.524 instead of 0.5, and those two notes are judged by that.
+/// just there: at 88.2 kHz it stops at 0.525 instead of 0.5, and those two notes are judged by that.
 #[test]
 fn cutoff_below_the_first_open_hole_is_that_of_the_reference() {
     for (model, allowed) in models().iter().zip([0, 2]) {

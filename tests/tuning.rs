@@ -12,6 +12,7 @@ use chalumeau::event::Event;
 use chalumeau::instrument::Clarinet;
 use chalumeau::instrument::Model;
 use chalumeau::instrument::Settings;
+use chalumeau::instrument::Tuning;
 use chalumeau::instrument::held::HeldNote;
 use chalumeau::instrument::held::Start;
 use chalumeau::instrument::held::TONGUE_HOLD_S;
@@ -34,16 +35,18 @@ struct Keyed {
     written: u8,
     gamma: f32,
     settings: Settings,
+    bend_cents: f32,
 }
 
 impl Keyed {
     fn new(written: u8, gamma: f32) -> Self {
-        Self { written, gamma, settings: Settings { noise: 0.0, ..Settings::default() } }
+        Self { written, gamma, settings: Settings { noise: 0.0, ..Settings::default() }, bend_cents: 0.0 }
     }
 
     fn start(&self, model: &Arc<Model>, host_rate_hz: f64) -> Clarinet {
         let mut clarinet = Clarinet::new(model.clone(), host_rate_hz);
         clarinet.set_settings(&self.settings);
+        clarinet.apply(Event::Bend { cents: self.bend_cents });
         clarinet.apply(Event::Breath(self.gamma * 6.0 / self.settings.breath_full_kpa));
         let note = WrittenNote(self.written).sounding(model.file.transposition).unwrap();
         clarinet.apply(Event::NoteOn { note, velocity: 0.7 });
@@ -81,6 +84,93 @@ fn radiated_notes_are_in_tune_at_every_host_rate() {
         assert!(max <= 2.0, "{rate_hz} Hz: {low:?}");
         assert!(max_high <= 5.0, "{rate_hz} Hz: {high:?}");
     }
+}
+
+#[test]
+fn tempered_notes_stay_in_tune_from_piano_to_forte() {
+    let model = model(48_000.0);
+    let gammas = [0.45, 0.48, 0.5, 0.53, 0.57, 0.6, 0.63, 0.7, 0.75, 0.8, 0.85, 0.9];
+    let runs: Vec<(u8, f64)> = (52..=92).flat_map(|written| gammas.map(|gamma| (written, gamma))).collect();
+    let off = each(&runs, |&(written, gamma)| {
+        let note = fingering(&model, written);
+        let rows = model.tuning.rows(note, Tuning::Tempered, gamma);
+        // Just above the threshold notes take their time.
+        let from_s = if gamma < 0.5 { 0.9 } else { 0.6 };
+        let sound =
+            HeldNote { rows, ..HeldNote::new(&model, note, gamma) }.radiated(&model, from_s, from_s + 0.3);
+        pitch::fundamental_hz(&sound, model.coeffs.rate_hz)
+            .map_or(f64::NAN, |hz| cents(hz, model.notes_hz[note]))
+    });
+    let inside = |low: u8, high: u8| -> Vec<f64> {
+        runs.iter()
+            .zip(&off)
+            .filter(|((written, _), _)| (low..=high).contains(written))
+            .map(|(_, &off)| off)
+            .collect()
+    };
+    for gamma in gammas {
+        let here: Vec<f64> =
+            runs.iter().zip(&off).filter(|((_, at), _)| *at == gamma).map(|(_, &off)| off).collect();
+        let (max, mean) = spread(&here);
+        println!("gamma {gamma}: max {max:.2} mean {mean:.2} cents");
+    }
+    let ((max, mean), (max_high, mean_high)) = (spread(&inside(52, 84)), spread(&inside(85, 92)));
+    println!(
+        "tempered E3..C6 max {max:.2} mean {mean:.2} cents; C#6..G#6 max {max_high:.2} mean {mean_high:.2}"
+    );
+    let worst: Vec<_> = runs.iter().zip(&off).filter(|(_, off)| off.is_nan() || off.abs() > 3.0).collect();
+    assert!(worst.is_empty(), "{worst:?}");
+}
+
+#[test]
+fn a_played_crescendo_stays_in_tune_when_tempered() {
+    let model = model(48_000.0);
+    let runs: Vec<Keyed> = [52, 61, 70, 79, 84]
+        .into_iter()
+        .flat_map(|written| [0.48, 0.6, 0.75, 0.9].map(|gamma| Keyed::new(written, gamma)))
+        .map(|note| Keyed { settings: Settings { tuning: Tuning::Tempered, ..note.settings }, ..note })
+        .collect();
+    let off = each(&runs, |note| note.cents(&model, 48_000.0));
+    let (max, mean) = spread(&off);
+    println!("tempered through the instrument: max {max:.2} mean {mean:.2} cents");
+    assert!(max <= 3.0, "{off:?}");
+}
+
+#[test]
+fn reference_pitch_bend_and_temperature_move_notes_by_what_they_say() {
+    let model = model(48_000.0);
+    let notes = [52, 60, 65, 70, 71, 79, 84];
+    let moved = |what: &str, expected: f64, change: &(dyn Fn(Keyed) -> Keyed + Sync)| {
+        let off = each(&notes, |&written| {
+            change(Keyed::new(written, 0.5)).cents(&model, 48_000.0)
+                - Keyed::new(written, 0.5).cents(&model, 48_000.0)
+        });
+        println!("{what}: expected {expected:+.2}, moved {off:.2?} cents");
+        for (off, written) in off.into_iter().zip(notes) {
+            let note = fingering(&model, written);
+            let trim = model.tuning.notes[note];
+            let rows = trim.natural + trim.sensitivity * model.rows_for_cents(note, expected);
+            if rows < model.coeffs.tuning_range().0 {
+                // The bore cannot be made short enough: the note stops where the delay ends.
+                println!("{what}, written {written}: beyond the delay's range");
+                assert!((0.7 * expected..expected).contains(&off), "{what}, written {written}: {off}");
+            } else {
+                assert!(
+                    (off - expected).abs() <= 3.0,
+                    "{what}, written {written}: {off} instead of {expected}"
+                );
+            }
+        }
+    };
+    let set = |change: &'static (dyn Fn(Settings) -> Settings + Sync)| {
+        move |note: Keyed| Keyed { settings: change(note.settings), ..note }
+    };
+    moved("A4 = 442", cents(442.0, 440.0), &set(&|settings| Settings { a4_hz: 442.0, ..settings }));
+    moved("A4 = 432", cents(432.0, 440.0), &set(&|settings| Settings { a4_hz: 432.0, ..settings }));
+    moved("bend +50", 50.0, &|note: Keyed| Keyed { bend_cents: 50.0, ..note });
+    moved("bend -50", -50.0, &|note: Keyed| Keyed { bend_cents: -50.0, ..note });
+    // 600 log2(293.15 / 298.15): sound is slower in cold air.
+    moved("20 C", -14.6, &set(&|settings| Settings { temperature_c: 20.0, ..settings }));
 }
 
 /// Mouthpiece pressure of a held note, sample by sample.

@@ -35,11 +35,15 @@ pub struct Cells {
     pub hole_junctions: Vec<usize>,
     /// Radius of the open end, m.
     pub end_radius_m: f64,
-    /// Strengths of the three loss poles, see [`wall_loss`].
+    /// Frequencies of the three loss poles, Hz, see [`wall_loss`].
+    pub loss_poles_hz: [f64; 3],
+    /// Their strengths, s^-1/2.
     pub loss_strengths: [f64; 3],
     /// Viscous resistance of register holes over that of [`HoleNetwork`](crate::bore::tone_hole::HoleNetwork), which is
     /// constant where the true one grows with the root of frequency.
     pub vent_resistance: f64,
+    /// Share of each chimney's mass before its compliance: 1/3 would be right for closed holes, nearly 1/2 for open ones.
+    pub chimney_split: f64,
 }
 
 /// Why a bore cannot be put on the grid.
@@ -167,8 +171,10 @@ impl Cells {
             cells,
             hole_junctions,
             end_radius_m,
+            loss_poles_hz: wall_loss::POLES_HZ,
             loss_strengths: wall_loss::STRENGTHS,
             vent_resistance: 1.0,
+            chimney_split: 0.4,
         })
     }
 }

@@ -1,9 +1,10 @@
 //! Fits a cut bore to its own transfer matrices, so that rounding to the grid is paid for by the neighbours.
 //!
-//! Free are the radii of all cells, the radius of the end, the strengths of the three loss poles and the vent's resistance, each held near
-//! where it started. Compared are, for every fingering of the file, height and place of the first five impedance
-//! peaks (through the admittance at the true peak, which is linear in both), and for a few fingerings the whole
-//! reflectance from 100 Hz to 5 kHz. Levenberg-Marquardt; the lattice's own frequency response, not an idealisation of it.
+//! Free are the radii of all cells, the radius of the end, strengths and frequencies of the three loss poles, the vent's
+//! resistance and the share of each chimney before its compliance, each held near where it started. Compared are, for
+//! every fingering of the file, height and place of the first five impedance peaks (through the admittance at the true
+//! peak, which is linear in both), and the level of its whole impedance curve to 6 kHz.
+//! Levenberg-Marquardt on the lattice's own frequency response, not on an idealisation of it.
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, Owned};
@@ -17,7 +18,12 @@ use crate::bore::transfer_matrix::TransferMatrix;
 use crate::units::{Air, SoundingNote};
 
 /// A relative change of a radius or loss that costs as much as two cents on one peak.
-const STIFFNESS: f64 = 0.08;
+const STIFFNESS: f64 = 0.15;
+/// The curve is compared at so many points over these frequencies, Hz; decibels at one point count so much: as little as
+/// keeps the curve of every fingering within 1 dB rms to 4 kHz.
+const CURVE_POINTS: usize = 118;
+const CURVE_HZ: (f64, f64) = (80.0, 6_000.0);
+const CURVE_WEIGHT: f64 = 0.22;
 /// Cents and decibels on one peak that count as one.
 const CENTS: f64 = 2.0;
 const DECIBELS: f64 = 0.4;
@@ -31,20 +37,22 @@ struct PeakTarget {
     weight: f64,
 }
 
-/// Reflectance the lattice should have at one frequency.
-struct WaveTarget {
+/// Impedance the lattice should have at one frequency, peak or not.
+struct CurveTarget {
     fingering: usize,
     f_hz: f64,
-    r: Complex64,
+    z: Complex64,
     weight: f64,
 }
 
 /// Tone-hole networks of a file; viscous resistance taken at 2.4 times the lowest note (350 Hz on the B flat clarinet).
-pub fn networks(file: &InstrumentFile, air: &Air) -> Vec<HoleNetwork> {
+pub fn networks(file: &InstrumentFile, air: &Air, cells: &Cells) -> Vec<HoleNetwork> {
     let lowest_hz = lowest_hz(file);
     file.holes
         .iter()
-        .map(|hole| HoleNetwork::new(hole, file.radius_at(hole.x_m), 2.4 * lowest_hz, air))
+        .map(|hole| {
+            HoleNetwork::new(hole, file.radius_at(hole.x_m), cells.chimney_split, 2.4 * lowest_hz, air)
+        })
         .collect()
 }
 
@@ -55,11 +63,11 @@ pub fn lowest_hz(file: &InstrumentFile) -> f64 {
 
 struct Problem<'a> {
     start: Cells,
-    networks: &'a [HoleNetwork],
+    file: &'a InstrumentFile,
     air: &'a Air,
     openings: Vec<Vec<f64>>,
     peaks: Vec<PeakTarget>,
-    waves: Vec<WaveTarget>,
+    curve: Vec<CurveTarget>,
     parameters: DVector<f64>,
 }
 
@@ -71,16 +79,19 @@ impl Problem<'_> {
             cell.radius_m *= change.exp();
         }
         cells.end_radius_m *= parameters[count].exp();
-        for (strength, change) in cells.loss_strengths.iter_mut().zip(parameters.iter().skip(count + 1)) {
-            *strength *= change.exp();
+        let losses = cells.loss_strengths.iter_mut().chain(&mut cells.loss_poles_hz);
+        for (loss, change) in losses.zip(parameters.iter().skip(count + 1)) {
+            *loss *= change.exp();
         }
-        cells.vent_resistance *= parameters[count + 4].exp();
+        cells.vent_resistance *= parameters[count + 7].exp();
+        cells.chimney_split = (cells.chimney_split + parameters[count + 8]).clamp(0.2, 0.6);
         cells
     }
 
     fn residuals_at(&self, parameters: &DVector<f64>) -> DVector<f64> {
-        let coeffs = LatticeCoeffs::new(&self.cells(parameters), self.networks, 1.0, self.air);
-        let mut out = Vec::with_capacity(2 * (self.peaks.len() + self.waves.len()) + parameters.len());
+        let cells = self.cells(parameters);
+        let coeffs = LatticeCoeffs::new(&cells, &networks(self.file, self.air, &cells), 1.0, self.air);
+        let mut out = Vec::with_capacity(2 * (self.peaks.len() + self.curve.len()) + parameters.len());
         for peak in &self.peaks {
             let z = coeffs.impedance(peak.f_hz, &self.openings[peak.fingering]);
             // Near a peak Y = (1 + 2 j Q df/f) / Z_peak.
@@ -88,15 +99,14 @@ impl Problem<'_> {
             out.push(peak.weight * 1_200.0 / std::f64::consts::LN_2 * error.im / (2.0 * peak.q) / CENTS);
             out.push(peak.weight * 20.0 / std::f64::consts::LN_10 * error.re / DECIBELS);
         }
-        for wave in &self.waves {
-            let error = coeffs.reflectance(wave.f_hz, &self.openings[wave.fingering], 0.0) - wave.r;
-            out.push(wave.weight * error.re);
-            out.push(wave.weight * error.im);
+        for point in &self.curve {
+            let z = coeffs.impedance(point.f_hz, &self.openings[point.fingering]);
+            out.push(point.weight * 20.0 * (z / point.z).norm().log10());
         }
         out.extend(parameters.iter().map(|change| change / STIFFNESS));
-        // The vent's resistance is a stand-in and may move more freely.
-        if let Some(vent) = out.last_mut() {
-            *vent *= 0.2;
+        // Losses, the vent's resistance and the chimneys' split are stand-ins and may move more freely.
+        for loose in out.iter_mut().rev().take(8) {
+            *loose *= 0.2;
         }
         DVector::from_vec(out)
     }
@@ -136,9 +146,7 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
 pub fn fit(file: &InstrumentFile, air: &Air, rate_hz: f64) -> Result<Cells, CellsError> {
     let start = Cells::cut(file, air, rate_hz)?;
     let model = TransferMatrix::new(file, *air);
-    let networks = networks(file, air);
-    let tip_y = (start.cells[0].radius_m / crate::units::REFERENCE_RADIUS_M).powi(2);
-    let (mut peaks, mut waves) = (Vec::new(), Vec::new());
+    let (mut peaks, mut curve) = (Vec::new(), Vec::new());
     for (index, fingering) in file.fingerings.iter().enumerate() {
         let register = if fingering.mode <= 2 { 1.0 } else { 0.5 };
         for (n, peak) in model.peaks(&fingering.open, 0.0, 5).iter().enumerate() {
@@ -149,18 +157,11 @@ pub fn fit(file: &InstrumentFile, air: &Air, rate_hz: f64) -> Result<Cells, Cell
                 peaks.push(PeakTarget { fingering: index, f_hz: peak.f_hz, z, q: peak.q, weight });
             }
         }
-        if index % 4 == 0 {
-            for n in 0..50 {
-                let f_hz = 100.0 * 50.0_f64.powf(f64::from(n) / 49.0);
-                let z = model.impedance(f_hz, &fingering.open, 0.0);
-                let r = (z - 1.0 / tip_y) / (z + 1.0 / tip_y);
-                waves.push(WaveTarget {
-                    fingering: index,
-                    f_hz,
-                    r,
-                    weight: if f_hz < 3_000.0 { 2.0 } else { 1.0 },
-                });
-            }
+        for n in 0..CURVE_POINTS {
+            let f_hz = CURVE_HZ.0 + (CURVE_HZ.1 - CURVE_HZ.0) * (n as f64 + 0.5) / CURVE_POINTS as f64;
+            let z = model.impedance(f_hz, &fingering.open, 0.0);
+            let weight = CURVE_WEIGHT * if f_hz < 4_000.0 { 1.0 } else { 0.3 };
+            curve.push(CurveTarget { fingering: index, f_hz, z, weight });
         }
     }
     let openings = file
@@ -168,8 +169,8 @@ pub fn fit(file: &InstrumentFile, air: &Air, rate_hz: f64) -> Result<Cells, Cell
         .iter()
         .map(|f| f.open.iter().map(|&open| f64::from(u8::from(open))).collect())
         .collect();
-    let parameters = DVector::zeros(start.cells.len() + 5);
-    let problem = Problem { start, networks: &networks, air, openings, peaks, waves, parameters };
+    let parameters = DVector::zeros(start.cells.len() + 9);
+    let problem = Problem { file, start, air, openings, peaks, curve, parameters };
     let solver = LevenbergMarquardt::new().with_ftol(1e-5).with_xtol(1e-5).with_gtol(1e-9).with_patience(2);
     let (problem, _report) = solver.minimize(problem);
     Ok(problem.cells(&problem.parameters))

@@ -132,7 +132,7 @@ impl LatticeCoeffs {
             .into_iter()
             .enumerate()
             .map(|(cell, amount)| {
-                (amount, wall_loss::pole_coefficient(wall_loss::POLES_HZ[cell % 3], rate_hz))
+                (amount, wall_loss::pole_coefficient(cells.loss_poles_hz[cell % 3], rate_hz))
             })
             .collect();
         let radius = cells.end_radius_m;

@@ -20,11 +20,11 @@ pub const END_CORRECTION: f64 = 0.6133;
 /// Design of one hole's network, SI units (acoustic: Pa, m3/s).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HoleNetwork {
-    /// Inner mass and half the chimney, kg/m4.
+    /// Inner mass and the first part of the chimney, kg/m4.
     pub m1: f64,
     /// Chimney compliance, m3/Pa.
     pub c: f64,
-    /// Outer half of the chimney and end correction, kg/m4.
+    /// Outer part of the chimney and end correction, kg/m4.
     pub m2: f64,
     /// Radiation resistance in parallel with `m2`, Pa s/m3.
     pub r_p: f64,
@@ -37,8 +37,9 @@ pub struct HoleNetwork {
 }
 
 impl HoleNetwork {
-    /// Network of a hole on a bore of radius `bore_radius_m`; its viscous resistance is taken at `loss_hz`.
-    pub fn new(hole: &ToneHole, bore_radius_m: f64, loss_hz: f64, air: &Air) -> Self {
+    /// Network of a hole on a bore of radius `bore_radius_m`; its viscous resistance is taken at
+    /// `loss_hz`, and `split` of the chimney lies before the compliance (see [`Cells`](crate::bore::cells::Cells)).
+    pub fn new(hole: &ToneHole, bore_radius_m: f64, split: f64, loss_hz: f64, air: &Air) -> Self {
         let (b, h) = (hole.radius_m, hole.chimney_m);
         let area_m2 = std::f64::consts::PI * b * b;
         let d = b / bore_radius_m;
@@ -49,12 +50,12 @@ impl HoleNetwork {
         let mass = air.rho / area_m2;
         let series = Complex64::new(0.0, omega * mass) / (1.0 - 2.0 * bessel_ratio(z) / z);
         let viscous = series.im / (omega * mass);
-        let m2 = mass * (0.5 * h * (2.0 * viscous - 1.0) + outer);
+        let m2 = mass * (h * (viscous - split) + outer);
         // Resistance of the end in parallel with its own mass is r0 = (0.6133^2 / 0.25) rho c / S; in parallel with the
         // larger m2 the same power is radiated by r0 (m2 / m_end)^2.
         let r_end = END_CORRECTION * END_CORRECTION / 0.25 * air.rho * air.c / area_m2;
         Self {
-            m1: mass * (inner + 0.5 * h),
+            m1: mass * (inner + split * h),
             c: area_m2 * h / (air.rho * air.c * air.c),
             m2,
             r_p: r_end * (m2 / (mass * outer)).powi(2),

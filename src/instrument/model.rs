@@ -111,7 +111,8 @@ impl Model {
     /// From parts.
     pub fn assemble(file: InstrumentFile, cells: Cells, tuning: TuningTable) -> Self {
         let air = Air::default();
-        let coeffs = Arc::new(LatticeCoeffs::new(&cells, &fit::networks(&file, &air), P_REF_PA, &air));
+        let coeffs =
+            Arc::new(LatticeCoeffs::new(&cells, &fit::networks(&file, &air, &cells), P_REF_PA, &air));
         let notes_hz = file
             .fingerings
             .iter()

@@ -6,7 +6,7 @@
 
 use chalumeau::bore::cells::Cells;
 use chalumeau::bore::tone_hole::HoleNetwork;
-use chalumeau::bore::wall_loss::POLES_HZ;
+
 use chalumeau::units::{Air, REFERENCE_RADIUS_M};
 
 /// Ticks a wave is remembered.
@@ -138,7 +138,7 @@ impl Oracle {
             let from = if cell < 3 { 0.0 } else { 0.5 * (middle(cell - 3) + middle(cell)) };
             let to = if cell + 3 < count { 0.5 * (middle(cell) + middle(cell + 3)) } else { upper[count] };
             let amount = 1.0 - (-design.loss_strengths[cell % 3] * (to - from)).exp();
-            let q = 1.0 - (-2.0 * std::f64::consts::PI * POLES_HZ[cell % 3] / rate).exp();
+            let q = 1.0 - (-2.0 * std::f64::consts::PI * design.loss_poles_hz[cell % 3] / rate).exp();
             Loss { amount, q, low: 0.0 }
         };
         let cells: Vec<Cell> = (0..count)

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 
-use crate::machine::{self, ALSA, CC, GL, GLIB, PKG_CONFIG, Package, VENV, XCB};
+use crate::machine::{self, ALSA, CC, GL, GLIB, JACK, PKG_CONFIG, Package, VENV, XCB};
 use crate::{COMMANDS, bundle};
 
 /// DawDreamer's version is pinned: a new one may host differently.
@@ -80,8 +80,11 @@ fn cargo(words: &str) -> Result<()> {
 }
 
 fn packages() -> Result<()> {
-    let needed: &[&Package] =
-        if cfg!(target_os = "linux") { &[&CC, &PKG_CONFIG, &ALSA, &XCB, &VENV, &GL, &GLIB] } else { &[] };
+    let needed: &[&Package] = if cfg!(target_os = "linux") {
+        &[&CC, &PKG_CONFIG, &ALSA, &JACK, &XCB, &VENV, &GL, &GLIB]
+    } else {
+        &[]
+    };
     machine::provide(needed)
 }
 

@@ -92,6 +92,12 @@ pub const ALSA: Package = Package {
     purpose: "sound and MIDI in chalumeau-standalone",
 };
 
+/// For `chalumeau-standalone`: its JACK binding asks pkg-config although it loads the library at run time.
+pub const JACK: Package = Package {
+    name: "libjack-jackd2-dev",
+    present: || works("pkg-config", &["--exists", "jack"]),
+    purpose: "JACK in chalumeau-standalone",
+};
 /// For the VST3 test host.
 pub const XCB: Package = Package {
     name: "libxcb1-dev",
