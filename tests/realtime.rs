@@ -289,8 +289,8 @@ fn moving_fingers_do_not_click() {
     clarinet.set_settings(&settings);
     clarinet.apply(Event::Breath(0.5));
     clarinet.apply(note_on(60));
-    render(&mut clarinet, 0.5, host_hz);
-    let (mut from, mut last, mut worst) = (60_u8, 0.0_f32, 0.0_f32);
+    let settled = render(&mut clarinet, 0.5, host_hz);
+    let (mut from, mut last, mut worst, mut over) = (60_u8, settled[settled.len() - 1], 0.0_f32, 0);
     for _ in 0..200 {
         let to = loop {
             let to = 52 + random.below(33) as u8;
@@ -303,13 +303,15 @@ fn moving_fingers_do_not_click() {
         let sound = render(&mut clarinet, 0.030, host_hz);
         let step = largest_step(&sound).max((sound[0] - last).abs());
         let allowed = steady[usize::from(from - 52)].max(steady[usize::from(to - 52)]);
-        if step / allowed > worst {
-            worst = step / allowed;
-            println!("{from} -> {to}: {worst:.2} of the larger note's own largest step");
+        worst = worst.max(step / allowed);
+        if step > 1.5 * allowed {
+            over += 1;
+            println!("{from} -> {to}: {:.2} of the larger note's own largest step", step / allowed);
         }
         (from, last) = (to, sound[sound.len() - 1]);
     }
-    assert!(worst <= 1.5, "{worst}");
+    println!("worst {worst:.2}, above 1.5: {over} of 200");
+    assert_eq!(over, 0);
 }
 
 #[test]
@@ -379,7 +381,8 @@ fn overblowing_shuts_the_reed_and_letting_up_brings_the_note_back() {
         let gamma = |gamma: f32| Event::Breath(gamma / 4.0);
         clarinet.apply(gamma(0.5));
         clarinet.apply(note_on(written));
-        render(&mut clarinet, 0.5, host_hz);
+        render(&mut clarinet, 0.8, host_hz);
+        let before = pitch::fundamental_hz(&wide(&render(&mut clarinet, 0.5, host_hz)), host_hz).unwrap();
         for up in [true, false] {
             for step in 0..=200 {
                 let way = if up { step } else { 200 - step } as f32 / 200.0;
@@ -394,9 +397,8 @@ fn overblowing_shuts_the_reed_and_letting_up_brings_the_note_back() {
         }
         render(&mut clarinet, 0.5, host_hz);
         let sound = wide(&render(&mut clarinet, 0.5, host_hz));
-        let off =
-            cents(pitch::fundamental_hz(&sound, host_hz).unwrap(), sounding(written).frequency_hz(440.0));
-        assert!(off.abs() < 5.0, "written {written}: {off} cents after the excursion");
+        let off = cents(pitch::fundamental_hz(&sound, host_hz).unwrap(), before);
+        assert!(off.abs() < 0.5, "written {written}: {off} cents after the excursion");
         assert_eq!(clarinet.resets(), 0);
     }
 }
@@ -433,15 +435,17 @@ fn every_host_rate_plays_the_same_instrument() {
                 (hz, levels)
             })
             .collect();
-        let (mut cents_off, mut db_off) = (0.0_f64, 0.0_f64);
+        // Hosts share two internal rates whose cells are fitted each for itself: what is 30 dB down differs a bit more.
+        let (mut cents_off, mut strong_db, mut weak_db) = (0.0_f64, 0.0_f64, 0.0_f64);
         for (hz, levels) in &heard {
             cents_off = cents_off.max(cents(*hz, heard[1].0).abs());
-            for (level, first) in levels.iter().zip(&heard[1].1) {
-                db_off = db_off.max((level - first).abs());
+            for (level, reference) in levels.iter().zip(&heard[1].1) {
+                let most = if *reference > -30.0 { &mut strong_db } else { &mut weak_db };
+                *most = most.max((level - reference).abs());
             }
         }
-        println!("written {written}: largest difference {cents_off:.3} cents, {db_off:.3} dB; {heard:?}");
-        assert!(cents_off < 1.0 && db_off < 1.0, "written {written}: {cents_off} cents, {db_off} dB");
+        println!("written {written}: {cents_off:.3} cents, {strong_db:.2} dB, below -30 dB {weak_db:.2} dB");
+        assert!(cents_off < 1.0 && strong_db < 1.0 && weak_db < 1.5, "written {written}: {heard:?}");
     }
 }
 

@@ -38,12 +38,18 @@ fi
 (cd "$root" && CARGO_TARGET_DIR=$target cargo build --quiet --release --no-default-features --example instructions)
 ours=$target/release/examples/instructions
 
-names=(chalumeau blowhole clarinet)
-play() { # NAME SECONDS
+names=(chalumeau plain blowhole clarinet) # plain: chalumeau without AVX2
+command_of() { # NAME SECONDS
     case $1 in
-    chalumeau) "$ours" "$2" 48000 ;;
-    *) "$scratch/stk" "$1" "$2" 48000 ;;
+    chalumeau) command=("$ours" "$2" 48000) ;;
+    plain) command=("$ours" "$2" 48000 plain) ;;
+    *) command=("$scratch/stk" "$1" "$2" 48000) ;;
     esac
+}
+play() { # NAME SECONDS
+    local command
+    command_of "$1" "$2"
+    "${command[@]}"
 }
 median() { sort -n | awk '{ x[NR] = $1 } END { print NR % 2 ? x[(NR + 1) / 2] : (x[NR / 2] + x[NR / 2 + 1]) / 2 }'; }
 
@@ -65,10 +71,7 @@ done
 if command -v valgrind >/dev/null; then
     collected() { # NAME SECONDS -> instructions of the whole run
         local log=$scratch/$1.$2.log command
-        case $1 in
-        chalumeau) command=("$ours" "$2" 48000) ;;
-        *) command=("$scratch/stk" "$1" "$2" 48000) ;;
-        esac
+        command_of "$1" "$2"
         if ! valgrind --tool=callgrind --callgrind-out-file=/dev/null "${command[@]}" >/dev/null 2>"$log"; then
             cat "$log" >&2
             return 1

@@ -74,8 +74,8 @@ mod tests {
     fn every_pole_covers_the_whole_bore_once() {
         let losses: Vec<f64> = (1..=17).map(|n| f64::from(n) * 1e-4).collect();
         let a = deal(&losses, &STRENGTHS);
-        for pole in 0..3 {
-            let sum: f64 = a.iter().skip(pole).step_by(3).map(|a| -(1.0 - a).ln() / STRENGTHS[pole]).sum();
+        for (pole, strength) in STRENGTHS.iter().enumerate() {
+            let sum: f64 = a.iter().skip(pole).step_by(3).map(|a| -(1.0 - a).ln() / strength).sum();
             assert!((sum - losses.iter().sum::<f64>()).abs() < 1e-15);
         }
     }

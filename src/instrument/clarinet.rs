@@ -21,6 +21,10 @@ use crate::reed::motion::TONGUE_FORCE;
 const FULL_SCALE_PER_PA: f64 = 0.501_187_233_627_272_2;
 /// Above this the limiter bends, full scale 1: nothing the instrument plays by itself comes near.
 const LIMITER_KNEE: f32 = 0.9;
+/// Silence: -120 dBFS.
+const SILENCE: f32 = 1e-6;
+/// Samples of silence after which a resting instrument counts as silent.
+const QUIET_SAMPLES: u32 = 4_096;
 /// Host samples rendered in one go.
 const CHUNK: usize = 64;
 
@@ -154,9 +158,12 @@ impl Clarinet {
                 *sample = limited(*sample * self.gain);
             }
             if out.iter().sum::<f32>().is_finite() {
-                let audible = out.iter().any(|sample| sample.abs() > 1e-7);
-                self.quiet =
-                    if audible || !self.player.is_resting() { 0 } else { self.quiet.saturating_add(1) };
+                let audible = out.iter().any(|sample| sample.abs() > SILENCE);
+                self.quiet = if audible || !self.player.is_resting() {
+                    0
+                } else {
+                    self.quiet.saturating_add(out.len() as u32)
+                };
             } else {
                 out.fill(0.0);
                 self.voice.reset();
@@ -198,7 +205,7 @@ impl Clarinet {
 
     /// True when nothing moves any more and no breath comes: the host may sleep.
     pub fn is_silent(&self) -> bool {
-        self.quiet > 64
+        self.quiet > QUIET_SAMPLES
     }
 
     /// How often a non-finite state had to be reset since the start.

@@ -262,7 +262,8 @@ impl Player {
         }
         let ms = if slurred { f64::from(self.settings.legato_ms) } else { 5.0 };
         let ticks = ((1e-3 * ms / tick_s).round() as u32).max(1);
-        self.gliding = if self.fingering.is_some() { ticks } else { 0 };
+        // One more than the way takes: they are put in place when they have arrived, not a step before.
+        self.gliding = if self.fingering.is_some() { ticks + 1 } else { 0 };
         self.fingering = Some(fingering);
         self.stance = None;
         for (hole, &open) in model.file.fingerings[fingering].open.iter().enumerate() {

@@ -67,7 +67,7 @@ impl Default for Settings {
             zeta: 0.3,
             damping: 1.0,
             lay: 0.4,
-            reed_h: 2.598_076_2,
+            reed_h: 2.598_076,
             reed_k: 0.384_900_18,
             coupled: true,
             reed_a: 1.0,

@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn wrong_numbers_are_named() {
-        assert_eq!(ReedLaw::free(f64::NAN, 0.4, 1.0).unwrap_err().to_string().contains("NaN"), true);
+        assert!(ReedLaw::free(f64::NAN, 0.4, 1.0).unwrap_err().to_string().contains("NaN"));
         assert!(ReedLaw::free(2.0, 0.0, 1.0).is_err() && ReedLaw::free(2.0, 0.4, -1.0).is_err());
     }
 }
