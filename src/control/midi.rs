@@ -183,7 +183,12 @@ impl MidiDecoder {
         Some(state.bend())
     }
 
+    /// A source at rest has not moved yet: hosts that send every controller once at the start do not take the breath away
+    /// from the keys.
     fn breathe(&mut self, source: Source, unit: f32) -> Option<Event> {
+        if source > self.source && unit == 0.0 {
+            return None;
+        }
         self.source = self.source.max(source);
         (source == self.source).then_some(Event::Breath(unit))
     }
@@ -198,6 +203,16 @@ mod tests {
         let mut midi = MidiDecoder::new();
         assert_eq!(midi.note_on(0, 60, 127), Some(Event::NoteOn { note: SoundingNote(60), velocity: 1.0 }));
         assert_eq!(midi.note_on(0, 60, 0), Some(Event::NoteOff { note: SoundingNote(60) }));
+    }
+
+    #[test]
+    fn a_source_at_rest_has_not_moved() {
+        let mut midi = MidiDecoder::new();
+        assert_eq!(midi.controller(0, 2, 0), None);
+        assert_eq!(midi.pressure(0, 0), None);
+        assert_eq!(midi.controller(0, 11, 1), Some(Event::Breath(1.0 / 127.0)));
+        assert_eq!(midi.controller(0, 2, 0), None, "CC2 has yet to move");
+        assert_eq!(midi.controller(0, 11, 0), Some(Event::Breath(0.0)));
     }
 
     #[test]
@@ -216,8 +231,8 @@ mod tests {
     #[test]
     fn fine_breath_rises_with_every_step() {
         let mut midi = MidiDecoder::new();
-        let mut last = -1.0;
-        for value in 0..16384u16 {
+        let mut last = 0.0;
+        for value in 1..16384u16 {
             midi.controller(0, 2, (value >> 7) as u8);
             let Some(Event::Breath(unit)) = midi.controller(0, 34, (value & 127) as u8) else { panic!() };
             assert!(unit > last && unit <= 1.0);
@@ -230,7 +245,7 @@ mod tests {
     fn the_highest_source_that_has_moved_is_heard() {
         let mut midi = MidiDecoder::new();
         assert_eq!(midi.pressure(0, 127), Some(Event::Breath(1.0)));
-        assert_eq!(midi.controller(3, 11, 0), Some(Event::Breath(0.0)));
+        assert_eq!(midi.controller(3, 11, 1), Some(Event::Breath(1.0 / 127.0)));
         assert_eq!(midi.pressure(0, 100), None);
         assert!(midi.controller(0, 2, 10).is_some());
         assert_eq!(midi.controller(3, 11, 80), None);

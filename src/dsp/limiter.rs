@@ -66,8 +66,11 @@ mod tests {
             s += f64::from(x) * phase(n).sin() * 2.0 / tail.len() as f64;
             c += f64::from(x) * phase(n).cos() * 2.0 / tail.len() as f64;
         }
-        let rest: f64 =
-            tail.iter().enumerate().map(|(n, &x)| (f64::from(x) - s * phase(n).sin() - c * phase(n).cos()).powi(2)).sum();
+        let rest: f64 = tail
+            .iter()
+            .enumerate()
+            .map(|(n, &x)| (f64::from(x) - s * phase(n).sin() - c * phase(n).cos()).powi(2))
+            .sum();
         let whole: f64 = tail.iter().map(|&x| f64::from(x).powi(2)).sum();
         assert!(rest / whole < 1e-5, "{}", rest / whole);
     }

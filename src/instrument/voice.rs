@@ -14,9 +14,9 @@ use crate::units::{Air, REFERENCE_RADIUS_M};
 pub const TICK: usize = 16;
 /// Ticks between two flushes of states too small to hear.
 const FLUSH_TICKS: u32 = 64;
-/// Breath noise at `noise` = 1: rms of the noise flow over the mean flow it rides on (by ear and by level: -40 dB under
+/// Breath noise at `noise` = 1: rms of the noise flow over the mean flow it rides on (by level: -40 dB under
 /// a mezzo-forte fundamental at the default 0.3).
-const NOISE_FLOW: f64 = 0.06;
+const NOISE_FLOW: f64 = 0.018;
 /// Below this flow the jet is laminar and quiet: a Reynolds number of 25 in a channel 13 mm wide, about a hundredth of
 /// the flow in a soft note. When the breath has ended, the air left moving in the bore dies away only as 1 / t; it must
 /// not hiss.
