@@ -23,6 +23,10 @@ impl Limiter {
 
     /// Turns down what is too loud; samples must be finite. Real-time safe.
     pub fn process(&mut self, samples: &mut [f32]) {
+        // The usual case. An envelope below the ceiling does nothing, now or later, and need not be followed.
+        if self.envelope <= CEILING && samples.iter().all(|sample| sample.abs() <= CEILING) {
+            return;
+        }
         for sample in samples {
             self.envelope = (self.envelope * self.recovery).max(sample.abs());
             if self.envelope > CEILING {

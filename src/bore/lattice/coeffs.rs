@@ -75,7 +75,7 @@ impl LatticeCoeffs {
         self.holes.len()
     }
 
-    /// Reflectance at the tip, exactly what [`Lattice`] does with fixed openings and no jets, at `f_hz`.
+    /// Reflectance at the tip, exactly what [`Lattice`](super::Lattice) does with fixed openings and no jets, at `f_hz`.
     pub fn reflectance(&self, f_hz: f64, opening: &[f64], tuning_rows: f64) -> Complex64 {
         self.looking_down(0, f_hz, opening, tuning_rows)
     }
