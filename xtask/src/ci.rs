@@ -31,6 +31,7 @@ const STEPS: &[Step] = &[
     ("CLAP with allocation checks", clap_checked),
     ("VST3 in vst3-host", || cargo("test -p xtask --test vst3 --no-fail-fast")),
     ("VST3 in DawDreamer", dawdreamer),
+    ("instructions", || machine::run(&mut Command::new("benches/instructions.sh"))),
     ("benches build", || cargo("bench --no-default-features --features cli --no-run")),
 ];
 
