@@ -106,6 +106,29 @@ impl fmt::Display for WrittenNote {
     }
 }
 
+/// MIDI number of a note by name: letter, `#` or `b`, octave with middle C as C4 (60); `None` if it is no such name.
+pub fn midi_of_name(name: &str) -> Option<u8> {
+    let mut rest = name.chars();
+    let letter = match rest.next()?.to_ascii_uppercase() {
+        'C' => 0,
+        'D' => 2,
+        'E' => 4,
+        'F' => 5,
+        'G' => 7,
+        'A' => 9,
+        'B' => 11,
+        _ => return None,
+    };
+    let rest = rest.as_str();
+    let (accidental, octave) = match (rest.strip_prefix('#'), rest.strip_prefix('b')) {
+        (Some(octave), _) => (1, octave),
+        (_, Some(octave)) => (-1, octave),
+        _ => (0, rest),
+    };
+    let octave: i8 = octave.parse().ok().filter(|octave| (-1..=9).contains(octave))?;
+    u8::try_from(12 * (i16::from(octave) + 1) + letter + accidental).ok().filter(|&midi| midi < 128)
+}
+
 /// Interval from `from_hz` up to `to_hz`, cents.
 pub fn cents(to_hz: f64, from_hz: f64) -> f64 {
     1200.0 * (to_hz / from_hz).log2()
@@ -122,6 +145,20 @@ mod tests {
         assert_eq!(SoundingNote(127).written(2), None);
         assert_eq!(WrittenNote(1).sounding(2), None);
         assert_eq!(WrittenNote(60).to_string(), "C4");
+    }
+
+    #[test]
+    fn names_and_numbers_agree() {
+        for midi in 0..128 {
+            assert_eq!(midi_of_name(&WrittenNote(midi).to_string()), Some(midi));
+        }
+        assert_eq!(
+            (midi_of_name("Bb3"), midi_of_name("c4"), midi_of_name("Cb4")),
+            (Some(58), Some(60), Some(59))
+        );
+        for wrong in ["", "H4", "C", "C#", "C10", "G#9", "Cb-1", "C##4", "C400", "C4 ", "é4"] {
+            assert_eq!(midi_of_name(wrong), None, "{wrong:?}");
+        }
     }
 
     #[test]

@@ -2,8 +2,8 @@
 //!
 //! `tests/reference/README.md` says where the reference comes from. Figures are printed (`--nocapture`) to be quoted.
 
-use std::collections::BTreeMap;
-use std::path::Path;
+#[path = "support/reference.rs"]
+mod reference;
 
 use chalumeau::bore::instrument_file::InstrumentFile;
 use chalumeau::bore::transfer_matrix::TransferMatrix;
@@ -12,25 +12,7 @@ use chalumeau::units::Air;
 use chalumeau::units::WrittenNote;
 use chalumeau::units::cents;
 use num_complex::Complex64;
-
-type Row = BTreeMap<String, String>;
-
-/// Written E3 to C6, the range the tolerances are set for.
-const RANGE: std::ops::RangeInclusive<u8> = 52..=84;
-
-fn rows(name: &str) -> Vec<Row> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference").join(name);
-    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_path(path).unwrap();
-    reader.deserialize().map(Result::unwrap).collect()
-}
-
-fn number(row: &Row, column: &str) -> f64 {
-    row[column].parse().unwrap_or_else(|_| panic!("{column} is {:?}", row[column]))
-}
-
-fn midi(row: &Row) -> u8 {
-    row["written_midi"].parse().unwrap()
-}
+use reference::{RANGE, Spread, midi, number, rows};
 
 fn open(file: &InstrumentFile, midi: u8) -> &[bool] {
     &file.fingering(WrittenNote(midi)).unwrap().open
@@ -44,39 +26,6 @@ fn clarinet() -> (InstrumentFile, TransferMatrix) {
 
 fn decibels(ratio: f64) -> f64 {
     20.0 * ratio.log10()
-}
-
-/// Mean of magnitudes, largest magnitude and its label.
-#[derive(Default)]
-struct Spread {
-    sum: f64,
-    count: usize,
-    max: f64,
-    worst: String,
-}
-
-impl Spread {
-    fn add(&mut self, error: f64, label: String) {
-        self.sum += error.abs();
-        self.count += 1;
-        if error.is_nan() || error.abs() > self.max {
-            (self.max, self.worst) = (error.abs(), label);
-        }
-    }
-
-    fn mean(&self) -> f64 {
-        self.sum / self.count as f64
-    }
-
-    fn print(&self, what: &str) {
-        println!(
-            "{what}: mean {:.4}, max {:.4} ({}), {} values",
-            self.mean(),
-            self.max,
-            self.worst,
-            self.count
-        );
-    }
 }
 
 /// Q as the reference measures it: slope of a line through the phase at the five whole Hz about the peak.

@@ -3,9 +3,9 @@
 //! Figures are printed (`--nocapture`) to be quoted. `tests/reference/README.md` says where the reference comes from.
 
 mod oracle;
+#[path = "support/reference.rs"]
+mod reference;
 
-use std::collections::BTreeMap;
-use std::path::Path;
 use std::sync::OnceLock;
 
 use chalumeau::analysis::impedance::{Impedance, reflectance};
@@ -19,25 +19,7 @@ use chalumeau::reed::{ReedCoeffs, ReedState, ReedTables};
 use chalumeau::units::{REFERENCE_RADIUS_M, WrittenNote, cents};
 use num_complex::Complex64;
 use oracle::Oracle;
-
-type Row = BTreeMap<String, String>;
-
-/// Written E3 to C6, the range the tolerances are set for.
-const RANGE: std::ops::RangeInclusive<u8> = 52..=84;
-
-fn rows(name: &str) -> Vec<Row> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference").join(name);
-    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).from_path(path).unwrap();
-    reader.deserialize().map(Result::unwrap).collect()
-}
-
-fn number(row: &Row, column: &str) -> f64 {
-    row[column].parse().unwrap_or_else(|_| panic!("{column} is {:?}", row[column]))
-}
-
-fn midi(row: &Row) -> u8 {
-    row["written_midi"].parse().unwrap()
-}
+use reference::{RANGE, Row, Spread, midi, number, rows};
 
 /// The built-in clarinet at 96 and 88.2 kHz.
 fn models() -> &'static [Model; 2] {
@@ -84,39 +66,6 @@ impl Random {
 
     fn below(&mut self, count: usize) -> usize {
         (self.unit() * count as f64) as usize
-    }
-}
-
-/// Mean of magnitudes, largest magnitude and its label.
-#[derive(Default)]
-struct Spread {
-    sum: f64,
-    count: usize,
-    max: f64,
-    worst: String,
-}
-
-impl Spread {
-    fn add(&mut self, error: f64, label: String) {
-        self.sum += error.abs();
-        self.count += 1;
-        if error.is_nan() || error.abs() > self.max {
-            (self.max, self.worst) = (error.abs(), label);
-        }
-    }
-
-    fn mean(&self) -> f64 {
-        self.sum / self.count as f64
-    }
-
-    fn print(&self, what: &str) {
-        println!(
-            "{what}: mean {:.4}, max {:.4} ({}), {} values",
-            self.mean(),
-            self.max,
-            self.worst,
-            self.count
-        );
     }
 }
 

@@ -8,11 +8,19 @@
 
 use std::collections::HashMap;
 use std::path::Path;
-use std::path::PathBuf;
 
 use serde::Deserialize;
 
 use crate::units::WrittenNote;
+use crate::units::midi_of_name;
+
+mod error;
+mod limits;
+mod raw;
+
+pub use error::InstrumentError;
+use limits::*;
+use raw::{RawFile, RawFingering, RawHole, RawSegment};
 
 /// Most tone holes a file may have; a full Boehm clarinet has 24.
 pub const MAX_HOLES: usize = 40;
@@ -102,155 +110,6 @@ pub struct Fingering {
     pub open: Vec<bool>,
     /// What the fingers do, for a reader.
     pub fingers: String,
-}
-
-/// Why a text is not an instrument. Lengths are given as in the file, in millimetres.
-#[derive(Debug, thiserror::Error)]
-pub enum InstrumentError {
-    /// The file could not be read.
-    #[error("cannot read {}: {error}", path.display())]
-    Read {
-        /// The path asked for.
-        path: PathBuf,
-        /// What the system said.
-        error: std::io::Error,
-    },
-    /// Not TOML, a missing or unknown key, or a value of the wrong kind; line and column are in the message.
-    #[error("not an instrument file: {0}")]
-    Syntax(#[from] toml::de::Error),
-    /// A number out of range.
-    #[error("{place}: {field} is {given}; it must be {expected}")]
-    Value {
-        /// Segment, hole, fingering or `the file`.
-        place: String,
-        /// Key in the file.
-        field: &'static str,
-        /// Value as it stands in the file.
-        given: f64,
-        /// The range, in words, and a guess at a mistaken unit.
-        expected: &'static str,
-    },
-    /// A word that is not one of those allowed, or an empty or spaced name.
-    #[error("{place}: {field} is {given:?}; it must be {expected}")]
-    Word {
-        /// Segment, hole, fingering or `the file`.
-        place: String,
-        /// Key in the file.
-        field: &'static str,
-        /// Text as it stands in the file.
-        given: String,
-        /// What would be right.
-        expected: String,
-    },
-    /// Too many or too few entries of a list.
-    #[error("there are {given} {what} entries; there must be {least} to {most}")]
-    Count {
-        /// Key in the file.
-        what: &'static str,
-        /// Number found.
-        given: usize,
-        /// Fewest allowed.
-        least: usize,
-        /// Most allowed.
-        most: usize,
-    },
-    /// A cone does not start where the one before ends.
-    #[error(
-        "{place}: x_start_mm is {given_mm}, {} the cone before it; it must be {expected_mm}",
-        if given_mm < expected_mm { "overlapping" } else { "leaving a gap after" }
-    )]
-    NotContiguous {
-        /// The cone.
-        place: String,
-        /// Its start, mm.
-        given_mm: f64,
-        /// The end of the one before (0 for the first), mm.
-        expected_mm: f64,
-    },
-    /// A hole outside the bore.
-    #[error("{place}: x_mm is {given_mm}; the bore runs from 0 to {length_mm} and a hole must be inside it")]
-    HoleOffBore {
-        /// The hole.
-        place: String,
-        /// Its position, mm.
-        given_mm: f64,
-        /// Length of the bore, mm.
-        length_mm: f64,
-    },
-    /// A hole wider than the bore it opens.
-    #[error(
-        "{place}: diameter_mm is {given_mm}; the bore there is {bore_mm} wide and a hole must not be wider"
-    )]
-    HoleTooWide {
-        /// The hole.
-        place: String,
-        /// Its diameter, mm.
-        given_mm: f64,
-        /// Diameter of the bore there, mm.
-        bore_mm: f64,
-    },
-    /// Two holes of one name, two fingerings of one note, or one hole twice in a fingering.
-    #[error("{place}: {what} {name} appears twice; each must appear once")]
-    Duplicate {
-        /// The second of them.
-        place: String,
-        /// `hole` or `written`.
-        what: &'static str,
-        /// The repeated name.
-        name: String,
-    },
-}
-
-/// The file as it is written, millimetres and diameters.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawFile {
-    name: String,
-    #[serde(default)]
-    source: String,
-    transposition_semitones: i64,
-    reed_volume_mm3: f64,
-    bore: Vec<RawSegment>,
-    #[serde(default)]
-    hole: Vec<RawHole>,
-    #[serde(default)]
-    fingering: Vec<RawFingering>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawSegment {
-    #[serde(default)]
-    part: String,
-    x_start_mm: f64,
-    x_end_mm: f64,
-    diameter_start_mm: f64,
-    diameter_end_mm: f64,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawHole {
-    name: String,
-    kind: HoleKind,
-    x_mm: f64,
-    diameter_mm: f64,
-    chimney_mm: f64,
-    #[serde(default)]
-    register: bool,
-    #[serde(default)]
-    description: String,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawFingering {
-    written: String,
-    register: String,
-    mode: u32,
-    open: String,
-    #[serde(default)]
-    fingers: String,
 }
 
 impl InstrumentFile {
@@ -376,7 +235,7 @@ impl InstrumentFile {
         let mut chart: Vec<Fingering> = Vec::with_capacity(raw.len());
         for (number, fingering) in raw.into_iter().enumerate() {
             let place = format!("fingering {} ({})", number + 1, fingering.written);
-            let Some(written) = note(&fingering.written) else {
+            let Some(written) = midi_of_name(&fingering.written).map(WrittenNote) else {
                 let expected = "a note like E3, F#4 or Bb4, from C-1 to G9";
                 return Err(word(&place, "written", &fingering.written, expected));
             };
@@ -415,87 +274,6 @@ impl InstrumentFile {
         chart.sort_by_key(|fingering| fingering.written);
         Ok(chart)
     }
-}
-
-/// A range of the file format: the bounds, the bound in words, and units a wrong size suggests.
-struct Range {
-    least: f64,
-    most: f64,
-    expected: &'static str,
-    /// Below this and above 0 the message is `small` instead: a mistaken unit.
-    small_below: f64,
-    small: &'static str,
-}
-
-const fn range(
-    least: f64,
-    most: f64,
-    expected: &'static str,
-    small_below: f64,
-    small: &'static str,
-) -> Range {
-    Range { least, most, expected, small_below, small }
-}
-
-const TRANSPOSITION: Range = range(-12.0, 36.0, "-12 to 36 semitones (B flat clarinet: 2)", -13.0, "");
-const REED_VOLUME: Range = range(
-    0.0,
-    20_000.0,
-    "0 to 20000 mm3 (clarinet: 1200)",
-    20.0,
-    "in mm3, 0 to 20000 (clarinet: 1200); this looks like cm3 (1 cm3 = 1000 mm3) or m3",
-);
-// 3 m is a little more than a contrabass clarinet.
-const POSITION: Range = range(0.0, 3_000.0, "0 to 3000 mm", 0.0, "");
-const BORE_LENGTH: Range = range(
-    20.0,
-    3_000.0,
-    "20 to 3000 mm for the last cone",
-    20.0,
-    "in mm, 20 to 3000 for the last cone; this looks like metres (1 m = 1000 mm) or centimetres",
-);
-const BORE_DIAMETER: Range = range(
-    1.0,
-    199.999,
-    "1 mm to below 200 mm",
-    0.1,
-    "in mm, 1 to below 200; this looks like metres (0.015 m = 15 mm)",
-);
-const HOLE_DIAMETER: Range =
-    range(0.2, 60.0, "0.2 to 60 mm", 0.1, "in mm, 0.2 to 60; this looks like metres (0.008 m = 8 mm)");
-const CHIMNEY: Range =
-    range(0.2, 100.0, "0.2 to 100 mm", 0.1, "in mm, 0.2 to 100; this looks like metres (0.007 m = 7 mm)");
-const MODE: Range = range(1.0, 12.0, "1 to 12, the number of the impedance peak that sounds", 0.0, "");
-
-fn within(place: &str, field: &'static str, given: f64, range: &Range) -> Result<(), InstrumentError> {
-    let looks_small = given > 0.0 && given < range.small_below;
-    if (range.least..=range.most).contains(&given) && !looks_small {
-        return Ok(());
-    }
-    let expected = if looks_small { range.small } else { range.expected };
-    Err(InstrumentError::Value { place: place.to_owned(), field, given, expected })
-}
-
-fn count(what: &'static str, given: usize, least: usize, most: usize) -> Result<(), InstrumentError> {
-    if (least..=most).contains(&given) {
-        Ok(())
-    } else {
-        Err(InstrumentError::Count { what, given, least, most })
-    }
-}
-
-fn word(place: &str, field: &'static str, given: &str, expected: &str) -> InstrumentError {
-    InstrumentError::Word {
-        place: place.to_owned(),
-        field,
-        given: given.to_owned(),
-        expected: expected.to_owned(),
-    }
-}
-
-/// Metres as a message shows them: millimetres to the nearest 0.1 micrometre.
-fn in_mm(metres: f64) -> f64 {
-    (metres * 1e7).round() / 1e4
 }
 
 fn segments(raw: Vec<RawSegment>) -> Result<Vec<BoreSegment>, InstrumentError> {
@@ -539,32 +317,6 @@ fn segments(raw: Vec<RawSegment>) -> Result<Vec<BoreSegment>, InstrumentError> {
     Ok(bore)
 }
 
-/// A note by name: letter, `#` or `b`, octave with middle C as C4.
-fn note(name: &str) -> Option<WrittenNote> {
-    let mut rest = name.chars();
-    let letter = match rest.next()? {
-        'C' => 0,
-        'D' => 2,
-        'E' => 4,
-        'F' => 5,
-        'G' => 7,
-        'A' => 9,
-        'B' => 11,
-        _ => return None,
-    };
-    let rest = rest.as_str();
-    let (accidental, octave) = match (rest.strip_prefix('#'), rest.strip_prefix('b')) {
-        (Some(octave), _) => (1, octave),
-        (_, Some(octave)) => (-1, octave),
-        _ => (0, rest),
-    };
-    let octave: i8 = octave.parse().ok().filter(|octave| (-1..=9).contains(octave))?;
-    u8::try_from(12 * (i16::from(octave) + 1) + letter + accidental)
-        .ok()
-        .filter(|&midi| midi < 128)
-        .map(WrittenNote)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -588,18 +340,6 @@ mod tests {
         assert!((file.radius_at(0.118_687) - 0.007_505_1).abs() < 1e-12);
         assert!((file.radius_at(0.118_687 + 1e-9) - 0.007_605_1).abs() < 1e-9);
         assert_eq!((file.radius_at(-1.0), file.radius_at(9.0)), (0.0052, 0.0295));
-    }
-
-    #[test]
-    fn notes_are_read_as_players_write_them() {
-        let midi = |name| note(name).map(|note| note.0);
-        assert_eq!(
-            [midi("E3"), midi("Bb4"), midi("A#4"), midi("C-1"), midi("G9")],
-            [52, 70, 70, 0, 127].map(Some)
-        );
-        assert!(
-            ["", "H3", "e3", "G#9", "Cb-1", "C", "C##4", "C400", "Cé"].map(midi).iter().all(Option::is_none)
-        );
     }
 
     /// Each fault, planted in the built-in file, is refused with its place and a remedy.

@@ -3,7 +3,7 @@
 use crate::bore::instrument_file::{InstrumentError, InstrumentFile};
 use crate::cli::Failure;
 use crate::instrument::Model;
-use crate::units::{Air, WrittenNote};
+use crate::units::{Air, WrittenNote, midi_of_name};
 use clap::Args;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -110,33 +110,10 @@ pub fn within_f32(text: &str, low: f64, high: f64) -> Result<f32, String> {
 
 /// A MIDI number or a note name.
 pub fn note(text: &str) -> Result<u8, String> {
-    let midi = text.parse::<i32>().ok().or_else(|| named(text));
-    midi.and_then(|midi| u8::try_from(midi).ok())
-        .filter(|&midi| midi < 128)
+    let number = text.parse::<u8>().ok().filter(|&midi| midi < 128);
+    number
+        .or_else(|| midi_of_name(text))
         .ok_or_else(|| "must be a MIDI number in 0..127 or a name like E3, F#4 or Bb5".to_owned())
-}
-
-/// C4 is 60.
-fn named(text: &str) -> Option<i32> {
-    let mut chars = text.chars();
-    let step = match chars.next()?.to_ascii_uppercase() {
-        'C' => 0,
-        'D' => 2,
-        'E' => 4,
-        'F' => 5,
-        'G' => 7,
-        'A' => 9,
-        'B' => 11,
-        _ => return None,
-    };
-    let rest = chars.as_str();
-    let (shift, octave) = match rest.chars().next()? {
-        '#' => (1, &rest[1..]),
-        'b' => (-1, &rest[1..]),
-        _ => (0, rest),
-    };
-    let octave = octave.parse::<i32>().ok().filter(|octave| (-1..=9).contains(octave))?;
-    Some(12 * (octave + 1) + step + shift)
 }
 
 #[cfg(test)]
