@@ -333,7 +333,7 @@ impl Player {
             Tongue::Holding(left) if left > tick_s => (Tongue::Holding(left - tick_s), 1.0),
             Tongue::Holding(_) => (Tongue::Leaving(1.0), 1.0),
             Tongue::Leaving(share) => {
-                // Velocity hardens the tongue when the breath is live: up to twice as quick as set.
+                // Velocity hardens the tongue when the breath is live: half to one and a half times as quick as set.
                 let hard = if self.breath_live { 0.5 + self.velocity } else { 1.0 };
                 let share = share - tick_s * hard / (1e-3 * f64::from(settings.tongue_ms));
                 if share > 0.0 { (Tongue::Leaving(share), share) } else { (Tongue::Away, 0.0) }
