@@ -30,7 +30,7 @@ const CHUNK: usize = 64;
 /// One moment of the inside of the instrument, at the internal rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Probe {
-    /// Mouth pressure over the reference closing pressure (the reed's own with the default reed).
+    /// Mouth pressure over the closing pressure of the reed as it is set.
     pub gamma: f64,
     /// Reed opening over the rest opening, 0 closed, 1 at rest.
     pub opening: f64,

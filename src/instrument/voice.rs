@@ -137,7 +137,7 @@ impl<F: Real> Tip<F> for Mouth {
         self.flows[at] = flow.wide();
         if let Some(probes) = &mut self.probes {
             probes[at] = Probe {
-                gamma: self.p_mouth,
+                gamma: self.p_mouth / self.reed.closing_pressure(),
                 opening: self.state.opening,
                 flow_m3s: self.state.flow * self.flow_unit,
                 p_mouthpiece_pa: self.state.p_mouthpiece * P_REF_PA,

@@ -77,6 +77,11 @@ impl ReedCoeffs {
             swept: swept_s,
         }
     }
+
+    /// Pressure that closes the reed, extrapolated where the lay is curved, over the reference closing pressure.
+    pub fn closing_pressure(&self) -> f64 {
+        self.closing / self.compliance
+    }
 }
 
 /// The reed's position and speed, and what last came through it.
