@@ -102,6 +102,13 @@ fn cuts(file: &InstrumentFile, from: f64, to: f64, (count, length_weight): (usiz
         .collect()
 }
 
+/// Part of a tick to shift all holes by, so that rounding moves them least against each other: the fit can make up for the
+/// shift itself in the mouthpiece, but not for holes that come closer or part.
+fn grid_shift(holes: impl Iterator<Item = f64> + Clone) -> f64 {
+    let moved = |shift: f64| holes.clone().map(|at| (at + shift - (at + shift).round()).powi(2)).sum::<f64>();
+    (-10..=10).map(|n| 0.05 * f64::from(n)).min_by(|a, b| moved(*a).total_cmp(&moved(*b))).unwrap_or(0.0)
+}
+
 impl Cells {
     /// Cuts a bore for the lattice at `rate_hz`, without any fit: the start of [`fit`](crate::bore::fit).
     pub fn cut(file: &InstrumentFile, air: &Air, rate_hz: f64) -> Result<Self, CellsError> {
@@ -138,18 +145,28 @@ impl Cells {
             }
         }
         let wall = wall_loss::wall_constant(air);
+        // Exact position of each junction and of the end, ticks.
+        let mut exact = 0.0;
+        let (radii, positions): (Vec<f64>, Vec<f64>) = pieces
+            .iter()
+            .map(|(volume, inertance)| {
+                let radius_m = ((volume / inertance).sqrt() / std::f64::consts::PI).sqrt();
+                let length = (volume * inertance).sqrt();
+                exact += length / air.c * (1.0 + wall * air.c * wall_loss::DELAY / radius_m) * 2.0 * rate_hz;
+                (radius_m, exact)
+            })
+            .unzip();
+        let shift = grid_shift(
+            junctions.iter().zip(&positions).filter(|((_, hole), _)| hole.is_some()).map(|(_, &at)| at),
+        );
         let mut cells = Vec::with_capacity(pieces.len());
-        let (mut exact, mut placed) = (0.0, 0_i64);
-        for (index, (volume, inertance)) in pieces.iter().enumerate() {
-            let area = (volume / inertance).sqrt();
-            let radius_m = (area / std::f64::consts::PI).sqrt();
-            let length = (volume * inertance).sqrt();
-            exact += length / air.c * (1.0 + wall * air.c * wall_loss::DELAY / radius_m) * 2.0 * rate_hz;
+        let mut placed = 0_i64;
+        for (index, (radius_m, position)) in radii.into_iter().zip(positions).enumerate() {
             let beside_step = |junction: Option<usize>| {
                 junction.is_none_or(|junction| junctions.get(junction).is_none_or(|(_, hole)| hole.is_none()))
             };
             let least = if beside_step(index.checked_sub(1)) || beside_step(Some(index)) { 2 } else { 1 };
-            let ticks = (exact.round() as i64 - placed).max(least);
+            let ticks = ((position + shift).round() as i64 - placed).max(least);
             placed += ticks;
             cells.push(Cell { ticks: u32::try_from(ticks).unwrap_or(u32::MAX), radius_m });
         }
