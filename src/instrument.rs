@@ -9,7 +9,7 @@ mod settings;
 pub mod tuning;
 pub mod voice;
 
-pub use clarinet::{Clarinet, Probe};
+pub use clarinet::Clarinet;
 pub use model::{BuildError, Model};
 pub use settings::{Settings, Tuning};
-pub use voice::Voice;
+pub use voice::{Probe, Voice};

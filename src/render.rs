@@ -11,7 +11,7 @@ pub mod output;
 pub mod score;
 pub mod wav;
 
-use crate::event::Timed;
+use crate::event::{Event, Timed};
 use crate::instrument::Clarinet;
 use crate::instrument::Probe;
 use crate::render::score::Score;
@@ -21,19 +21,12 @@ pub fn play<E>(
     clarinet: &mut Clarinet,
     score: &Score,
     block: usize,
-    mut each: impl FnMut(&[f32]) -> Result<(), E>,
+    each: impl FnMut(&[f32]) -> Result<(), E>,
 ) -> Result<(), E> {
-    let mut out = vec![0.0; block.max(1)];
-    let mut events = score.events.as_slice();
-    let mut done = 0;
-    while done < score.samples {
-        let out = &mut out[..block.max(1).min(score.samples - done)];
-        let now = take_before(&mut events, done + out.len());
-        clarinet.render_events(now.iter().map(|e| Timed { at: e.at - done, event: e.event }), out);
-        each(out)?;
-        done += out.len();
-    }
-    Ok(())
+    let render = |events: &[Timed<Event>], begun: usize, out: &mut [f32]| {
+        clarinet.render_events(events.iter().map(|e| Timed { at: e.at - begun, event: e.event }), out);
+    };
+    in_blocks(score, block, render, each)
 }
 
 /// As [`play`], with a look inside at every internal sample.
@@ -42,6 +35,26 @@ pub fn play_probed<E>(
     score: &Score,
     block: usize,
     probe: &mut dyn FnMut(Probe),
+    each: impl FnMut(&[f32]) -> Result<(), E>,
+) -> Result<(), E> {
+    let render = |events: &[Timed<Event>], begun: usize, out: &mut [f32]| {
+        let mut done = 0;
+        for event in events {
+            let at = event.at - begun;
+            clarinet.render_probed(&mut out[done..at], probe);
+            clarinet.apply(event.event);
+            done = at;
+        }
+        clarinet.render_probed(&mut out[done..], probe);
+    };
+    in_blocks(score, block, render, each)
+}
+
+/// Cuts a score into blocks: `render` gets the events of one, the sample it begins at, and where to write.
+fn in_blocks<E>(
+    score: &Score,
+    block: usize,
+    mut render: impl FnMut(&[Timed<Event>], usize, &mut [f32]),
     mut each: impl FnMut(&[f32]) -> Result<(), E>,
 ) -> Result<(), E> {
     let mut out = vec![0.0; block.max(1)];
@@ -49,14 +62,7 @@ pub fn play_probed<E>(
     let mut done = 0;
     while done < score.samples {
         let out = &mut out[..block.max(1).min(score.samples - done)];
-        let mut inside = 0;
-        for event in take_before(&mut events, done + out.len()) {
-            let at = event.at - done;
-            clarinet.render_probed(&mut out[inside..at], probe);
-            clarinet.apply(event.event);
-            inside = at;
-        }
-        clarinet.render_probed(&mut out[inside..], probe);
+        render(take_before(&mut events, done + out.len()), done, out);
         each(out)?;
         done += out.len();
     }

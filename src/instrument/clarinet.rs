@@ -12,7 +12,7 @@ use crate::instrument::embouchure::embouchure;
 use crate::instrument::model::{BuildError, Model};
 use crate::instrument::player::Player;
 use crate::instrument::settings::Settings;
-use crate::instrument::voice::{TICK, Voice};
+use crate::instrument::voice::{Probe, TICK, Voice};
 use crate::reed::ReedCoeffs;
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
@@ -26,21 +26,6 @@ const SILENCE: f32 = 1e-6;
 const QUIET_SAMPLES: u32 = 4_096;
 /// Host samples rendered in one go.
 const CHUNK: usize = 64;
-
-/// One moment of the inside of the instrument, at the internal rate.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Probe {
-    /// Mouth pressure over the closing pressure of the reed as it is set.
-    pub gamma: f64,
-    /// Reed opening over the rest opening, 0 closed, 1 at rest.
-    pub opening: f64,
-    /// Volume flow through the reed channel, m3/s.
-    pub flow_m3s: f64,
-    /// Pressure in the mouthpiece, Pa.
-    pub p_mouthpiece_pa: f64,
-    /// Radiated pressure at 1 m, Pa.
-    pub p_radiated_pa: f64,
-}
 
 /// A playable clarinet.
 pub struct Clarinet {

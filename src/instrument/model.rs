@@ -9,10 +9,9 @@ use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::lattice::LatticeCoeffs;
 use crate::instrument::tuning::TuningTable;
 use crate::reed::PhysicalReed;
+use crate::reed::physical::P_REF_PA;
 use crate::units::{Air, REFERENCE_RADIUS_M, SoundingNote};
 
-/// The pressure everything inside is relative to: closing pressure of the reference reed, Pa.
-pub const P_REF_PA: f64 = 6_000.0;
 /// Lowest and highest host rate, Hz.
 pub const HOST_RATES_HZ: (f64, f64) = (22_050.0, 384_000.0);
 

@@ -6,11 +6,12 @@
 
 use crate::event::Event;
 use crate::instrument::embouchure::embouchure;
-use crate::instrument::model::{Model, P_REF_PA};
+use crate::instrument::model::Model;
 use crate::instrument::settings::Settings;
 use crate::instrument::voice::{Drive, TICK, Voice};
 use crate::reed::ReedCoeffs;
 use crate::reed::motion::TONGUE_FORCE;
+use crate::reed::physical::P_REF_PA;
 use crate::units::{Air, SoundingNote, cents};
 
 /// Keys that can be held at once; more push the oldest out.

@@ -1,8 +1,8 @@
 //! What a player can set, in the units a player uses. Plain numbers; clamped once, at the door.
 
-use crate::instrument::model::P_REF_PA;
 use crate::reed::ReedLaw;
 use crate::reed::law::coupled_k;
+use crate::reed::physical::P_REF_PA;
 
 /// How notes are held in tune.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]

@@ -3,11 +3,10 @@
 use std::sync::Arc;
 
 use crate::bore::lattice::{Lattice, LatticeCoeffs, Real, Tip};
-use crate::instrument::clarinet::Probe;
-use crate::instrument::model::P_REF_PA;
 use crate::reed::ReedCoeffs;
 use crate::reed::ReedState;
 use crate::reed::ReedTables;
+use crate::reed::physical::P_REF_PA;
 use crate::units::{Air, REFERENCE_RADIUS_M};
 
 /// Samples of one control tick: everything a player moves, moves on this grid, counted from reset.
@@ -23,6 +22,21 @@ const NOISE_FLOW: f64 = 0.018;
 const LAMINAR_FLOW: f64 = 0.002;
 /// Corners of the noise band, Hz: turbulence in the channel is broad around a few kHz (physics notes, by judgement).
 const NOISE_BAND_HZ: (f64, f64) = (600.0, 5_000.0);
+
+/// One moment of the inside of the instrument, at the internal rate.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Probe {
+    /// Mouth pressure over the closing pressure of the reed as it is set.
+    pub gamma: f64,
+    /// Reed opening over the rest opening, 0 closed, 1 at rest.
+    pub opening: f64,
+    /// Volume flow through the reed channel, m3/s.
+    pub flow_m3s: f64,
+    /// Pressure in the mouthpiece, Pa.
+    pub p_mouthpiece_pa: f64,
+    /// Radiated pressure at 1 m, Pa.
+    pub p_radiated_pa: f64,
+}
 
 /// What the player's breath, lip and tongue do during one control tick. Pressures over the reference closing pressure.
 #[derive(Clone, Copy, Debug)]

@@ -2,6 +2,9 @@
 
 use crate::units::{Air, REFERENCE_RADIUS_M};
 
+/// Closing pressure of the reference reed, Pa: what everything inside is relative to.
+pub const P_REF_PA: f64 = 6_000.0;
+
 /// A reed on its mouthpiece under the player's lip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhysicalReed {
@@ -22,7 +25,7 @@ impl PhysicalReed {
     /// one, and width, area and stiffness then follow. The width is large because it stands for tip and side slits.
     pub fn reference() -> Self {
         let (air, closing_pa, zeta, volume_m3, tip_opening_m) =
-            (Air::default(), 6_000.0, 0.3, 1.2e-6, 0.5e-3);
+            (Air::default(), P_REF_PA, 0.3, 1.2e-6, 0.5e-3);
         let area_m2 = volume_m3 * closing_pa / (air.rho * air.c * air.c * tip_opening_m);
         let stiffness_n_m = closing_pa * area_m2 / tip_opening_m;
         let speed = (2.0 / (air.rho * closing_pa)).sqrt();
