@@ -5,8 +5,11 @@ pub mod bore;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod control;
+#[cfg(feature = "devices")]
+pub mod device;
 pub mod dsp;
 pub mod event;
+pub mod haptics;
 pub mod identity;
 pub mod instrument;
 #[cfg(feature = "plugin")]
@@ -15,3 +18,4 @@ pub mod reed;
 #[cfg(feature = "cli")]
 pub mod render;
 pub mod units;
+pub mod wire;

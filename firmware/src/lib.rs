@@ -1,0 +1,1 @@
+//! The knob's firmware, compiled for this machine.
