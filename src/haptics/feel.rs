@@ -70,8 +70,8 @@ pub struct FeelDesign {
     pub wall_mnm_per_deg: f64,
     /// Spring of the slap region, mNm per degree, 0..=20. Default 0.5.
     pub slap_mnm_per_deg: f64,
-    /// Mark at the threshold, mNm, 0..=100. `None`: none under flow, whose peak is the mark; 8 under pressure, about an
-    /// eighth of the strength, which a hand can just tell on a knob (by judgement).
+    /// Mark at the threshold, mNm, 0..=100. `None`: none under flow, whose peak is the mark; 6 under pressure, a
+    /// tenth of the strength, which a hand can just tell on a knob (by judgement).
     pub detent_mnm: Option<f64>,
     /// Time in which one note's feel gives way to the next, ms, 20..=1000. Default 30.
     pub morph_ms: u16,
@@ -100,7 +100,7 @@ impl Default for FeelDesign {
 impl FeelDesign {
     /// Height of the mark at the threshold, mNm.
     pub fn mark_mnm(&self) -> f64 {
-        self.detent_mnm.unwrap_or(if self.law == Law::Pressure { 8.0 } else { 0.0 })
+        self.detent_mnm.unwrap_or(if self.law == Law::Pressure { 6.0 } else { 0.0 })
     }
 }
 
@@ -138,7 +138,9 @@ pub enum FeelRefused {
     )]
     Slip,
     /// Farther than a knob counts.
-    #[error("{note} would close at {wanted_deg:.0} degrees, the knob goes to {limit_deg:.0}; shorten the travel")]
+    #[error(
+        "{note} would close at {wanted_deg:.0} degrees, the knob goes to {limit_deg:.0}; shorten the travel"
+    )]
     Travel {
         /// Farthest note.
         note: WrittenNote,
@@ -379,8 +381,12 @@ fn note(
         (a_close_deg, p_close),
         (a_off_deg, p_close * sounds_like.gamma_off),
     ]);
-    let landmarks =
-        Landmarks { a_on_deg, a_beat_deg: map.angle_deg(p_close * sounds_like.gamma_beat), a_close_deg, a_off_deg };
+    let landmarks = Landmarks {
+        a_on_deg,
+        a_beat_deg: map.angle_deg(p_close * sounds_like.gamma_beat),
+        a_close_deg,
+        a_off_deg,
+    };
     let (h, k) = (reed.law.h(), reed.law.k());
     let feel = Feel {
         feel_id: 0,

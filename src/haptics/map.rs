@@ -37,8 +37,7 @@ impl AngleMap {
 }
 
 fn along(from: &[f64; KNOTS], to: &[f64; KNOTS], x: f64) -> f64 {
-    // Also catches what is no number.
-    if !(x > 0.0) {
+    if x.is_nan() || x <= 0.0 {
         return 0.0;
     }
     let right = from[1..KNOTS - 1].iter().filter(|&&knot| knot < x).count() + 1;

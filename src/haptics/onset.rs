@@ -65,7 +65,8 @@ pub(super) fn onset(mode: &Mode, reed: &Reed, start: (f64, f64)) -> Option<(f64,
     for _ in 0..STEPS {
         let off = reed.balance(mode, f_hz, gamma)?;
         let (df, dg) = (1e-4 * f_hz, 1e-4 * gamma);
-        let by_f = (reed.balance(mode, f_hz + df, gamma)? - reed.balance(mode, f_hz - df, gamma)?) / (2.0 * df);
+        let by_f =
+            (reed.balance(mode, f_hz + df, gamma)? - reed.balance(mode, f_hz - df, gamma)?) / (2.0 * df);
         let by_gamma =
             (reed.balance(mode, f_hz, gamma + dg)? - reed.balance(mode, f_hz, gamma - dg)?) / (2.0 * dg);
         let determinant = by_f.re * by_gamma.im - by_f.im * by_gamma.re;
