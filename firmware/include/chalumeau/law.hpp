@@ -284,7 +284,7 @@ inline FeelVerdict check_feel(const Feel& feel, const FeelLimits& limits) {
     };
     for (const Field& field : fields) {
         if (!is_finite(field.value)) {
-            return {Refusal::NotFinite, field.value};
+            return {Refusal::NotFinite, 0.0F};  // the wire carries no other number for it
         }
     }
     if (feel.law > 2) {
