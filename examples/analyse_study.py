@@ -1,0 +1,661 @@
+#!/usr/bin/env python3
+"""From the logs of a study to a table, a comparison and plots.
+
+    python analyse_study.py take-*.csv --thresholds haptic.csv --out results
+
+The logs are takes that were recorded with Study on (docs/study.md). Needs numpy and matplotlib. Written to --out:
+
+    summary.csv      one line for each participant, trial and side
+    comparison.csv   coupled against free, paired by trial, with effect size and permutation test
+    paired.png       every trial's two sides, by opening H
+    phase_*.png      torque against angle, one file for each participant
+    timeline_*.png   angle, gamma and torque against time, one file for each trial
+
+Logs are taken in the order given: the last side of a trial is the one that stands last in the last log that has it.
+What each figure means stands in docs/study.md. Exit code 0: done; 2: a file cannot be used, and the message says why.
+"""
+
+import argparse
+import csv
+import dataclasses
+import math
+import pathlib
+import sys
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+NUMBERS = ("t_us", "angle_deg", "torque_mnm", "written_midi", "gamma", "h", "k", "participant", "trial")
+WORDS = ("side", "condition")
+# These may be empty: no note is fingered, no study runs, the reed is not known.
+MAY_BE_EMPTY = ("written_midi", "h", "k", "participant", "trial")
+SIDES = ("A", "B")
+CONDITIONS = ("coupled", "free")
+
+# The seed's reed: H = sqrt(27)/2 and k = 27 / (4 H^3).
+H_REFERENCE = math.sqrt(27) / 2
+K_REFERENCE = 27 / (4 * H_REFERENCE**3)
+# Rows further apart than this are a gap in the link (a knob sends 25 to 1000 rows a second): nothing is counted across.
+GAP_S = 0.1
+# A note's steadiness is looked at in windows of this length, from so long after it speaks or the side was switched:
+# the attack is no unsteadiness. Both by judgement.
+WINDOW_S = 0.5
+SETTLE_S = 0.3
+# Fewest rows in such a window: 10 of the slowest stream, 25 Hz.
+WINDOW_ROWS = 10
+# How long after the onset the overshoot is looked for: about the time of a reaction.
+OVERSHOOT_S = 0.2
+# Up to so many pairs all sign patterns are counted; beyond, so many are drawn.
+EXACT_PAIRS = 16
+DRAWS = 100_000
+
+# Okabe and Ito's colours, told apart by all common kinds of colour vision; shapes and dashes tell them apart in grey.
+STYLE = {"coupled": {"color": "#0072B2", "marker": "o"}, "free": {"color": "#D55E00", "marker": "s"}}
+
+# What is compared: column of the summary, unit, words for plots.
+METRICS = {
+    "gamma_rms": ("1", "unsteadiness of gamma, rms"),
+    "onset_s": ("s", "note to onset, s"),
+    "onset_overshoot": ("1", "overshoot of gamma at onset"),
+    "torque_mean_mnm": ("mNm", "mean of |torque|, mNm"),
+    "power_mw": ("mW", "work against the motor, mW"),
+    "time_s": ("s", "time spent, s"),
+}
+
+
+class BadInput(Exception):
+    """A file that cannot be used; the text says which, where and why."""
+
+
+def read_table(path, needed):
+    """Columns of a CSV file by name in lower case, the numbers of their lines, and nothing else.
+
+    Lines beginning with # are remarks. Raises BadInput.
+    """
+    rows, lines, header = [], [], None
+    try:
+        with open(path, encoding="utf-8-sig", newline="") as file:
+            for line, row in enumerate(csv.reader(file), 1):
+                if not row or row[0].lstrip().startswith("#"):
+                    continue
+                if header is None:
+                    header = [name.strip().lower() for name in row]
+                    missing = [name for name in needed if name not in header]
+                    if missing:
+                        raise BadInput(f"{path}: the first line has no column {', '.join(missing)}")
+                    twice = {name for name in needed if header.count(name) > 1}
+                    if twice:
+                        raise BadInput(f"{path}: the first line has {', '.join(sorted(twice))} twice")
+                elif len(row) < len(header):
+                    raise BadInput(f"{path}: line {line} has {len(row)} cells, the first line has {len(header)}")
+                else:
+                    rows.append(row)
+                    lines.append(line)
+    except OSError as reason:
+        raise BadInput(f"{path}: cannot be read: {reason.strerror}") from reason
+    except UnicodeDecodeError as reason:
+        raise BadInput(f"{path}: is not UTF-8 text (byte {reason.start})") from reason
+    except csv.Error as reason:
+        raise BadInput(f"{path}: is no CSV table: {reason}") from reason
+    if header is None:
+        raise BadInput(f"{path}: is empty; a table begins with the names of its columns")
+    if not rows:
+        raise BadInput(f"{path}: has no rows")
+    columns = list(zip(*rows))
+    return {name: columns[header.index(name)] for name in needed}, lines
+
+
+def numbers(path, name, cells, lines, may_be_empty):
+    """A column as floats, nan where it is empty. Raises BadInput with the line of the first bad cell."""
+    found = np.full(len(cells), np.nan)
+    for row, cell in enumerate(cells):
+        cell = cell.strip()
+        if not cell and may_be_empty:
+            continue
+        try:
+            found[row] = float(cell)
+        except ValueError:
+            pass
+        if not math.isfinite(found[row]):
+            wanted = "a number, or empty" if may_be_empty else "a number"
+            raise BadInput(f"{path}: line {lines[row]}: {name} is `{cell}`; it must be {wanted}")
+    return found
+
+
+@dataclasses.dataclass
+class Piece:
+    """Consecutive rows of one side of one trial, without a gap."""
+
+    participant: int
+    trial: int
+    side: str
+    condition: str
+    t_s: np.ndarray
+    angle_deg: np.ndarray
+    torque_mnm: np.ndarray
+    written: np.ndarray
+    gamma: np.ndarray
+    gamma_on: np.ndarray
+    h: float
+    k: float
+    # False where the piece only goes on after a gap.
+    is_visit: bool
+    # Counts the logs, so that times of two are never subtracted.
+    log: int
+
+
+def read_log(path, log, onset):
+    """The pieces of a log, in order of time. Raises BadInput."""
+    cells, lines = read_table(path, NUMBERS + WORDS)
+    data = {name: numbers(path, name, cells[name], lines, name in MAY_BE_EMPTY) for name in NUMBERS}
+    words = {name: np.array([cell.strip() for cell in cells[name]]) for name in WORDS}
+    back = np.flatnonzero(np.diff(data["t_us"]) < 0)
+    if back.size:
+        raise BadInput(f"{path}: line {lines[back[0] + 1]}: t_us goes back; a log runs forward")
+    # A study is on where the participant is named.
+    on = np.isfinite(data["participant"])
+    if not on.any():
+        raise BadInput(f"{path}: no row belongs to a study; was Study on while the take was recorded?")
+    for name, allowed in (("side", SIDES), ("condition", CONDITIONS)):
+        bad = np.flatnonzero(on & ~np.isin(words[name], allowed))
+        if bad.size:
+            found = words[name][bad[0]]
+            raise BadInput(f"{path}: line {lines[bad[0]]}: {name} is `{found}`; it must be {' or '.join(allowed)}")
+    bad = np.flatnonzero(on & ~np.isfinite(data["trial"]))
+    if bad.size:
+        raise BadInput(f"{path}: line {lines[bad[0]]}: trial is empty, but a participant is named")
+
+    t_s = 1e-6 * (data["t_us"] - data["t_us"][0])
+    key = [(p, n, s, c) for p, n, s, c in zip(data["participant"], data["trial"], words["side"], words["condition"])]
+    changes = np.array([now != before for before, now in zip(key, key[1:])], dtype=bool)
+    cuts = np.flatnonzero(changes | (np.diff(t_s) > GAP_S)) + 1
+    pieces = []
+    for begin, end in zip([0, *cuts], [*cuts, len(t_s)]):
+        if not on[begin] or end - begin < 2:
+            continue
+        rows = slice(begin, end)
+        participant, trial, side, condition = key[begin]
+        h, k, written = data["h"][rows], data["k"][rows], data["written_midi"][rows]
+        pieces.append(
+            Piece(
+                int(participant), int(trial), str(side), str(condition), t_s[rows], data["angle_deg"][rows],
+                data["torque_mnm"][rows], written, data["gamma"][rows], onset.gamma(written, h, k),
+                # Side and parameters change a little apart in time; what most rows have is meant.
+                float(np.median(h)), float(np.median(k)), begin == 0 or bool(changes[begin - 1]), log,
+            )
+        )
+    return pieces
+
+
+class Onset:
+    """gamma_on of a note: from the table of `chalumeau haptic --all --csv`, else 1/3, that of a bore without losses."""
+
+    def __init__(self, path=None):
+        self.losses = {}
+        if path is None:
+            return
+        names = ("written_midi", "gamma_on", "h", "k")
+        cells, lines = read_table(path, names)
+        table = [numbers(path, name, [c.replace("nan", "") for c in cells[name]], lines, True) for name in names]
+        for line, written, gamma, h, k in zip(lines, *table):
+            if not math.isfinite(gamma):
+                continue
+            if not (1 / 3 <= gamma <= 1 and written == int(written) and h > 0 and k > 0):
+                raise BadInput(f"{path}: line {line}: gamma_on of a written note must lie in 1/3..1, its H and k above 0")
+            # sqrt(g) = (b + sqrt(3 + b^2)) / 3 solved for b = Zc / (zeta Zpeak), then over the strength of the
+            # table's reed: what is left is the note's own.
+            root = math.sqrt(gamma)
+            self.losses[int(written)] = (3 * gamma - 1) / (2 * root) * self.strength(h, k)
+        if not self.losses:
+            raise BadInput(f"{path}: has no gamma_on; write it with `chalumeau haptic --all --csv FILE`")
+
+    @staticmethod
+    def strength(h, k):
+        """Flow strength of a reed over the reference's: zeta goes as H / sqrt(H k)."""
+        return h * K_REFERENCE / np.sqrt(h * k)
+
+    def gamma(self, written, h, k):
+        """gamma_on row by row, nan where no note is fingered or the table does not have it."""
+        known = np.isfinite(written)
+        if not self.losses:
+            return np.where(known, 1 / 3, np.nan)
+        # A log that does not tell H and k is taken to be of the reference reed.
+        h, k = np.where(np.isfinite(h), h, H_REFERENCE), np.where(np.isfinite(k), k, K_REFERENCE)
+        notes = np.where(known, written, -1).astype(int)
+        b = np.array([self.losses.get(note, np.nan) for note in notes]) / self.strength(h, k)
+        return ((b + np.sqrt(3 + b * b)) / 3) ** 2
+
+
+@dataclasses.dataclass
+class Notes:
+    """What the notes of one piece say."""
+
+    rms: list
+    onset_s: list
+    overshoot: list
+    silent: int
+
+
+def notes_of(piece):
+    """Steadiness, onsets and notes that never spoke."""
+    found = Notes([], [], [], 0)
+    t, gamma, on, written = piece.t_s, piece.gamma, piece.gamma_on, piece.written
+    changes = np.flatnonzero(np.nan_to_num(np.diff(np.nan_to_num(written, nan=-1.0))) != 0) + 1
+    for begin, end in zip([0, *changes], [*changes, len(t)]):
+        if not math.isfinite(on[begin]):
+            continue
+        above = np.flatnonzero(gamma[begin:end] >= on[begin:end])
+        if not above.size:
+            # One cut off by the end of the piece might have spoken yet.
+            found.silent += begin > 0 and end < len(t)
+            continue
+        speaks = begin + above[0]
+        # Only what began in this piece, below its onset, has an onset here; the rest was slurred or switched into.
+        if begin > 0 and speaks > begin:
+            before, after = gamma[speaks - 1] - on[speaks - 1], gamma[speaks] - on[speaks]
+            share = -before / (after - before)
+            found.onset_s.append(t[speaks - 1] + share * (t[speaks] - t[speaks - 1]) - t[begin])
+            soon = (t >= t[speaks]) & (t <= t[speaks] + OVERSHOOT_S)
+            soon[:speaks], soon[end:] = False, False
+            found.overshoot.append(float(np.max((gamma - on)[soon])))
+        start = t[speaks] + SETTLE_S
+        while start + WINDOW_S <= t[end - 1]:
+            rows = slice(np.searchsorted(t, start), np.searchsorted(t, start + WINDOW_S))
+            start += WINDOW_S
+            held = gamma[rows]
+            if len(held) >= WINDOW_ROWS and np.median(held) >= np.median(on[rows]):
+                found.rms.append(float(np.sqrt(np.mean((held - np.median(held)) ** 2))))
+    return found
+
+
+def median(values):
+    return float(np.median(values)) if len(values) else math.nan
+
+
+def integrals(piece):
+    """Time, s; integral of |torque|, mNm s; work of the hand against the motor, mJ."""
+    dt = np.diff(piece.t_s)
+    torque = 0.5 * (piece.torque_mnm[1:] + piece.torque_mnm[:-1])
+    size = 0.5 * (np.abs(piece.torque_mnm[1:]) + np.abs(piece.torque_mnm[:-1]))
+    # mNm times radians is mJ; the log's torque is the motor's, against which the hand works.
+    work = -torque * np.radians(np.diff(piece.angle_deg))
+    return np.array([dt.sum(), (size * dt).sum(), work.sum()])
+
+
+def by_trial(pieces):
+    """Pieces by participant and trial. Raises BadInput where two orders of a study are mixed."""
+    trials = {}
+    for piece in pieces:
+        trials.setdefault((piece.participant, piece.trial), []).append(piece)
+    for (participant, trial), found in trials.items():
+        meant = {(piece.side, piece.condition) for piece in found}
+        if len({side for side, _ in meant}) < len(meant) or len({condition for _, condition in meant}) < len(meant):
+            raise BadInput(
+                f"participant {participant}, trial {trial}: side and condition do not belong together throughout "
+                f"({', '.join(f'{side} {condition}' for side, condition in sorted(meant))}); "
+                "these are logs of two orders (seeds), analyse each by itself"
+            )
+    return dict(sorted(trials.items()))
+
+
+def summarise(trials, least_s):
+    """One dictionary for each participant, trial and side."""
+    table = []
+    for (participant, trial), pieces in trials.items():
+        spent = {side: sum(integrals(p)[0] for p in pieces if p.side == side) for side in SIDES}
+        tried = all(spent[side] >= least_s for side in SIDES)
+        visits = [piece for piece in pieces if piece.is_visit]
+        switches = sum(
+            now.side != before.side for before, now in zip(visits, visits[1:]) if before.log == now.log
+        )
+        last = pieces[-1]
+        for side in SIDES:
+            own = [piece for piece in pieces if piece.side == side]
+            if not own:
+                continue
+            time_s, torque, work_mj = sum(integrals(piece) for piece in own)
+            notes = [notes_of(piece) for piece in own]
+            rms, onset_s, overshoot = (
+                [value for note in notes for value in getattr(note, name)] for name in ("rms", "onset_s", "overshoot")
+            )
+            table.append(
+                {
+                    "participant": participant,
+                    "trial": trial,
+                    "side": side,
+                    "condition": own[0].condition,
+                    "h": median([piece.h for piece in own]),
+                    "k": median([piece.k for piece in own]),
+                    "time_s": time_s,
+                    "visits": sum(piece.is_visit for piece in own),
+                    "gamma_rms": median(rms),
+                    "gamma_windows": len(rms),
+                    "onset_s": median(onset_s),
+                    "onset_overshoot": median(overshoot),
+                    "onsets": len(onset_s),
+                    "silent_notes": sum(note.silent for note in notes),
+                    "torque_mean_mnm": torque / time_s if time_s else math.nan,
+                    "torque_peak_mnm": max(float(np.max(np.abs(piece.torque_mnm))) for piece in own),
+                    "work_mj": work_mj,
+                    "power_mw": work_mj / time_s if time_s else math.nan,
+                    "switches": switches,
+                    "last_side": last.side,
+                    "last_condition": last.condition,
+                    "compared": "yes" if tried else "no",
+                }
+            )
+    return table
+
+
+def sign_flip_p(differences):
+    """Two-sided p of the mean of paired differences, and how it was found.
+
+    If it made no difference which side was which, each difference could as well have the other sign. p is the share
+    of sign patterns whose mean is at least as far from 0 as the one seen: all of them up to EXACT_PAIRS pairs, else
+    DRAWS at random, the one seen among them. Nothing is assumed about the distribution. With differences of +1 and -1
+    this is the sign test.
+    """
+    d = np.asarray(differences, dtype=float)
+    seen = abs(d.sum()) * (1 - 1e-12)
+    if len(d) <= EXACT_PAIRS:
+        patterns = (np.arange(2 ** len(d))[:, None] >> np.arange(len(d))) & 1
+        return float(np.mean(np.abs((1 - 2 * patterns) @ d) >= seen)), "exact"
+    random, hits = np.random.default_rng(1), 1
+    for _ in range(10):
+        hits += int(np.sum(np.abs(random.choice((-1.0, 1.0), (DRAWS // 10, len(d))) @ d) >= seen))
+    return hits / (DRAWS + 1), f"{DRAWS} draws"
+
+
+def holm(p_values):
+    """Holm's (1979) adjustment for asking several questions of the same data."""
+    order, worst, adjusted = np.argsort(p_values), 0.0, [math.nan] * len(p_values)
+    for rank, index in enumerate(order):
+        worst = max(worst, min(1.0, (len(p_values) - rank) * p_values[index]))
+        adjusted[index] = worst
+    return adjusted
+
+
+def pairs_of(table):
+    """{participant: [(opening, {metric: (coupled, free)})]} of the trials in which both sides were tried."""
+    trials = {}
+    for row in table:
+        if row["compared"] == "yes":
+            trials.setdefault((row["participant"], row["trial"]), {})[row["condition"]] = row
+    pairs = {}
+    for (participant, _), sides in trials.items():
+        coupled, free = sides["coupled"], sides["free"]
+        values = {name: (coupled[name], free[name]) for name in METRICS}
+        ended = coupled["last_condition"]
+        values["preference"] = (float(ended == "coupled"), float(ended == "free"))
+        pairs.setdefault(participant, []).append((round(coupled["h"], 3), values))
+    return pairs
+
+
+def compare(table):
+    """Coupled less free: over participants, and for each participant over trials; all openings, and each."""
+    pairs = pairs_of(table)
+    openings = sorted({h for trials in pairs.values() for h, _ in trials if math.isfinite(h)})
+    scopes = [(f"participant {who}", {n: [trial] for n, trial in enumerate(trials)}) for who, trials in pairs.items()]
+    if len(pairs) > 1:
+        # Trials of one person are not independent: over persons, each counts once, with the mean of its trials.
+        scopes.insert(0, ("participants", pairs))
+    rows = []
+    for scope, units in scopes:
+        for opening in ["all", *openings]:
+            group = []
+            for name in ["preference", *METRICS]:
+                means = []
+                for trials in units.values():
+                    both = [v[name] for h, v in trials if opening in ("all", h) and np.isfinite(v[name]).all()]
+                    if both:
+                        means.append(np.mean(both, axis=0))
+                if not means:
+                    continue
+                coupled, free = np.array(means).T
+                d = coupled - free
+                p, method = sign_flip_p(d)
+                sd = float(np.std(d, ddof=1)) if len(d) > 1 else math.nan
+                group.append(
+                    {
+                        "scope": scope,
+                        "opening_h": opening,
+                        "metric": name,
+                        "unit": METRICS[name][0] if name in METRICS else "share of trials",
+                        "n": len(d),
+                        "coupled": float(coupled.mean()),
+                        "free": float(free.mean()),
+                        "difference": float(d.mean()),
+                        "sd": sd,
+                        "dz": float(d.mean()) / sd if sd > 0 else math.nan,
+                        "p": p,
+                        "p_holm": math.nan,
+                        "test": method,
+                    }
+                )
+            for row, adjusted in zip(group, holm([row["p"] for row in group])):
+                row["p_holm"] = adjusted
+            rows += group
+    return rows
+
+
+def write_csv(path, rows):
+    def cell(value):
+        return ("" if math.isnan(value) else f"{value:.6g}") if isinstance(value, float) else value
+
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows({name: cell(value) for name, value in row.items()} for row in rows)
+
+
+def plot_timeline(path, title, pieces):
+    """Angle, gamma and torque of one trial; grey bands are side B. Time between two logs is left out."""
+    figure, axes = plt.subplots(3, 1, figsize=(10, 7), sharex=True, layout="constrained")
+    offset, last_log, last_end, spans = 0.0, None, 0.0, []
+    for piece in pieces:
+        if piece.log != last_log:
+            offset, last_log = last_end - piece.t_s[0], piece.log
+        t, style = piece.t_s + offset, STYLE[piece.condition]
+        last_end = t[-1]
+        if spans and spans[-1][0] == piece.side:
+            spans[-1][3] = t[-1]
+        else:
+            spans.append([piece.side, piece.condition, t[0], t[-1]])
+        axes[0].plot(t, piece.angle_deg, color=style["color"], lw=1.2)
+        axes[1].plot(t, piece.gamma, color=style["color"], lw=1.2)
+        axes[1].plot(t, piece.gamma_on, color="black", lw=0.9, ls=":")
+        axes[2].plot(t, piece.torque_mnm, color=style["color"], lw=1.2)
+    for axis in axes:
+        for side, _, begin, end in spans:
+            if side == "B":
+                axis.axvspan(begin, end, color="0.88", lw=0, zorder=0)
+        axis.grid(alpha=0.3)
+    whole = max(last_end - spans[0][2], 1e-9)
+    for side, condition, begin, end in spans:
+        # A name where there is room for one.
+        if (end - begin) / whole > 0.08:
+            where = axes[0].get_xaxis_transform()
+            axes[0].text(
+                0.5 * (begin + end), 1.02, f"{side} {condition}", transform=where, ha="center", fontsize=9,
+                color=STYLE[condition]["color"],
+            )
+    axes[0].set_ylabel("angle, degrees")
+    axes[1].set_ylabel("gamma (mouth over\nclosing pressure)")
+    axes[2].set_ylabel("torque of the motor, mNm")
+    axes[2].set_xlabel("time, s")
+    handles = [plt.Line2D([], [], color=STYLE[c]["color"], label=c) for c in CONDITIONS]
+    handles += [plt.Line2D([], [], color="black", ls=":", lw=0.9, label="gamma_on of the note")]
+    handles += [plt.Rectangle((0, 0), 1, 1, color="0.88", label="side B")]
+    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
+    figure.suptitle(title)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def plot_phase(path, participant, trials):
+    """Torque against angle, one field for each opening."""
+    fields = {}
+    for piece in (piece for pieces in trials.values() for piece in pieces if piece.participant == participant):
+        fields.setdefault(round(piece.h, 3) if math.isfinite(piece.h) else None, []).append(piece)
+    columns = min(2, len(fields))
+    lines = -(-len(fields) // columns)
+    figure, axes = plt.subplots(
+        lines, columns, figsize=(5 * columns, 0.8 + 3.6 * lines), sharex=True, sharey=True, squeeze=False,
+        layout="constrained",
+    )
+    for axis in axes.flat[len(fields) :]:
+        axis.set_visible(False)
+    for axis, (h, pieces) in zip(axes.flat, sorted(fields.items(), key=lambda field: field[0] or 0.0)):
+        for piece in pieces:
+            style = STYLE[piece.condition]
+            dashes = "-" if piece.condition == "coupled" else (0, (5, 2))
+            axis.plot(piece.angle_deg, piece.torque_mnm, color=style["color"], lw=0.8, ls=dashes, alpha=0.7)
+        axis.axhline(0, color="0.6", lw=0.8, zorder=0)
+        axis.set_title("H not logged" if h is None else f"H = {h:g}", fontsize=10)
+        axis.grid(alpha=0.3)
+        axis.set_xlabel("angle, degrees")
+        axis.set_ylabel("torque of the motor, mNm")
+    dashes = {"coupled": "-", "free": (0, (5, 2))}
+    handles = [plt.Line2D([], [], color=STYLE[c]["color"], ls=dashes[c], label=c) for c in CONDITIONS]
+    figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
+    figure.suptitle(f"Participant {participant}: torque against angle (the area inside a loop is work lost)")
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def plot_paired(path, pairs):
+    """Each trial's two sides, joined; one field for each metric, one place for each opening. Bars are means."""
+    openings = sorted({h for trials in pairs.values() for h, _ in trials if math.isfinite(h)})
+    place = {h: n for n, h in enumerate(openings)}
+    names = ["preference", *METRICS]
+    figure, axes = plt.subplots(2, 4, figsize=(15, 7.5), layout="constrained")
+    axes.flat[-1].set_visible(False)
+    for axis, name in zip(axes.flat, names):
+        values = {}
+        for trials in pairs.values():
+            for h, metrics in trials:
+                if np.isfinite(metrics[name]).all():
+                    values.setdefault(place.get(h, len(openings)), []).append(metrics[name])
+        axis.set_xticks(range(len(openings) + any(n == len(openings) for n in values)))
+        axis.set_xticklabels([f"{h:g}" for h in openings] + ["?"] * (len(axis.get_xticks()) - len(openings)))
+        axis.set_xlim(-0.5, len(axis.get_xticks()) - 0.5)
+        axis.set_xlabel("opening H")
+        axis.grid(axis="y", alpha=0.3)
+        for n, both in values.items():
+            both = np.array(both)
+            if name == "preference":
+                share = both[:, 0].mean()
+                axis.bar(n, share, 0.6, color=STYLE["coupled"]["color"])
+                axis.bar(n, 1 - share, 0.6, bottom=share, color=STYLE["free"]["color"], hatch="//", edgecolor="white")
+                axis.text(n, 1.02, f"n={len(both)}", ha="center", fontsize=8)
+                continue
+            x = np.array([n - 0.18, n + 0.18])
+            axis.plot(x, both.T, color="0.6", lw=0.8, zorder=1)
+            for which, condition in enumerate(CONDITIONS):
+                style = STYLE[condition]
+                axis.scatter(
+                    np.full(len(both), x[which]), both[:, which], s=24, color=style["color"], marker=style["marker"],
+                    alpha=0.75, zorder=2, linewidths=0,
+                )
+                axis.plot(x[which] + np.array([-0.12, 0.12]), [both[:, which].mean()] * 2, color="black", lw=2, zorder=3)
+        if name == "preference":
+            axis.set_ylim(0, 1.12)
+            axis.axhline(0.5, color="black", lw=0.9, ls=":")
+            axis.set_ylabel("share of trials ended on the side")
+        else:
+            axis.set_ylabel(METRICS[name][1])
+    handles = [plt.Line2D([], [], ls="", **STYLE[c], label=c) for c in CONDITIONS]
+    handles += [plt.Line2D([], [], color="black", lw=2, label="mean"), plt.Line2D([], [], color="0.6", label="one trial")]
+    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
+    trials = sum(map(len, pairs.values()))
+    figure.suptitle(f"Coupled and free k, {trials} trials of {len(pairs)} participant{'s' * (len(pairs) > 1)}")
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def report(rows):
+    """What the comparison says, in words and a table, on standard output."""
+    scope = rows[0]["scope"]
+    chosen = [row for row in rows if row["scope"] == scope and row["opening_h"] == "all"]
+    counted = "participants" if scope == "participants" else f"trials of {scope}"
+    print(f"coupled less free, all openings, n counts {counted}")
+    print(f"{'metric':<17}{'n':>4}{'coupled':>11}{'free':>11}{'difference':>12}{'dz':>8}{'p':>9}{'p Holm':>9}")
+    for row in chosen:
+        numbers_ = f"{row['coupled']:>11.4g}{row['free']:>11.4g}{row['difference']:>12.4g}{row['dz']:>8.2f}"
+        print(f"{row['metric']:<17}{row['n']:>4}{numbers_}{row['p']:>9.4f}{row['p_holm']:>9.4f}")
+    n = max(row["n"] for row in chosen)
+    if 2 ** (1 - n) > 0.05:
+        print(f"{n} pairs cannot give a p below {2.0 ** (1 - n):.3g}, whatever they say")
+    if scope != "participants":
+        print("one participant: this says something about that person only")
+
+
+def main():
+    words, _, rest = __doc__.partition("\n")
+    parser = argparse.ArgumentParser(
+        description=words, epilog=rest, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("takes", nargs="+", metavar="TAKE.csv", help="logs of the study, in order of time")
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder for the results; made if need be")
+    parser.add_argument(
+        "--thresholds", metavar="CSV",
+        help="gamma_on of every note, from `chalumeau haptic --all --zeta Z --csv CSV` [default: 1/3 for all notes]",
+    )
+    parser.add_argument(
+        "--least", type=float, default=2.0, metavar="S",
+        help="trials are compared if each side was held so long, seconds [default: 2]",
+    )
+    parser.add_argument("--no-timelines", action="store_true", help="leave out the plots of single trials")
+    args = parser.parse_args()
+    if not args.least >= 0:
+        parser.error(f"--least must be 0 or more seconds, got {args.least}")
+    try:
+        run(args)
+    except BadInput as reason:
+        print(f"analyse_study: {reason}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def run(args):
+    twice = {path for path in args.takes if args.takes.count(path) > 1}
+    if twice:
+        raise BadInput(f"{min(twice)}: given twice")
+    onset = Onset(args.thresholds)
+    pieces = [piece for log, path in enumerate(args.takes) for piece in read_log(path, log, onset)]
+    trials = by_trial(pieces)
+    table = summarise(trials, args.least)
+    out = pathlib.Path(args.out)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        raise BadInput(f"--out {out}: cannot be made: {reason.strerror}") from reason
+    write_csv(out / "summary.csv", table)
+    participants = sorted({participant for participant, _ in trials})
+    for participant in participants:
+        plot_phase(out / f"phase_p{participant:04}.png", participant, trials)
+    if not args.no_timelines:
+        for (participant, trial), own in trials.items():
+            title = f"Participant {participant}, trial {trial}, H = {own[0].h:g}"
+            plot_timeline(out / f"timeline_p{participant:04}_t{trial:02}.png", title, own)
+    skipped = sorted({(row["participant"], row["trial"]) for row in table if row["compared"] == "no"})
+    print(f"{len(trials)} trials of {len(participants)} participants; {out / 'summary.csv'}")
+    if skipped:
+        named = ", ".join(f"{participant}/{trial}" for participant, trial in skipped)
+        print(f"not compared, less than {args.least:g} s on one side (participant/trial): {named}")
+    if not args.thresholds:
+        print("gamma_on is taken as 1/3 for every note; --thresholds gives each its own")
+    rows = compare(table)
+    if not rows:
+        print("no trial has both sides: nothing to compare")
+        return
+    write_csv(out / "comparison.csv", rows)
+    plot_paired(out / "paired.png", pairs_of(table))
+    report(rows)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,639 @@
+"""The Python programs in examples/, run as a user runs them: python python_examples.py
+
+The study's logs are made here, with figures that are known beforehand. The bridge is met by a second libmapper device on
+the loopback interface.
+"""
+
+import importlib.util
+import itertools
+import math
+import os
+import pathlib
+import random
+import re
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+import libmapper
+import matplotlib.image
+import numpy as np
+from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
+from pythonosc.osc_message_builder import OscMessageBuilder
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+ANALYSE = ROOT / "examples/analyse_study.py"
+BRIDGE = ROOT / "examples/libmapper_bridge.py"
+SCRATCH = pathlib.Path(tempfile.mkdtemp())
+HEADER = "t_us,angle_deg,velocity_deg_s,torque_mnm,written_midi,gamma,feel_id,h,k,participant,trial,side,condition"
+# Generous: two slow cores may have other work.
+PATIENCE_S = 60.0
+
+
+def module(path):
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    found = importlib.util.module_from_spec(spec)
+    sys.modules[path.stem] = found
+    spec.loader.exec_module(found)
+    return found
+
+
+# ---- the study ----
+
+RATE_HZ = 200
+# What the hand of the made-up logs does on either condition: slope of gamma after a note, 1/s; wobble of gamma, peak;
+# torque while turning up, mNm (half of it while turning down).
+HANDS = {"coupled": (1.0, 0.01, 40.0), "free": (0.5, 0.02, 60.0)}
+HOLD = 0.5
+NOTE_AFTER_S = 0.2
+
+
+def visit(t_s, seconds, participant, trial, side, condition, h, hands):
+    """Rows of one stay on a side: a note after 0.2 s, blown up to 0.5 and held; the knob goes to 90 degrees and back."""
+    slope, wobble, torque = hands[condition]
+    k = 27 / (4 * h**3) if condition == "coupled" else 0.3849
+    rows = []
+    for n in range(round(seconds * RATE_HZ)):
+        t = n / RATE_HZ
+        gamma = min(HOLD, max(0.0, slope * (t - NOTE_AFTER_S)))
+        if gamma == HOLD:
+            gamma += wobble * math.sin(2 * math.pi * 10 * t)
+        note = 60 if t >= NOTE_AFTER_S else ""
+        phase = (t + 0.25 / RATE_HZ) % 1.0
+        angle = 180 * min(phase, 1 - phase)
+        size = -torque if phase < 0.5 else -torque / 2
+        rows.append(
+            f"{round(1e6 * (t_s + t))},{angle:.3f},0.0,{size:.1f},{note},{gamma:.6f},1,{h:.5f},{k:.5f},"
+            f"{participant},{trial},{side},{condition}"
+        )
+    return rows
+
+
+def log(name, participant, trials, hands=HANDS, before=()):
+    """Trials: (number, H, condition of A, visits as side and seconds)."""
+    rows, t_s = [HEADER, *before], 5.0
+    for trial, h, a, visits in trials:
+        other = "free" if a == "coupled" else "coupled"
+        for side, seconds in visits:
+            rows += visit(t_s, seconds, participant, trial, side, a if side == "A" else other, h, hands)
+            t_s += seconds
+    path = SCRATCH / name
+    path.write_text("# made by a test\n" + "\n".join(rows) + "\n")
+    return path
+
+
+def analyse(*args):
+    return subprocess.run([sys.executable, ANALYSE, *map(str, args)], capture_output=True, text=True, check=False)
+
+
+def table(path):
+    rows = [line.split(",") for line in path.read_text().splitlines()]
+    return [dict(zip(rows[0], row)) for row in rows[1:]]
+
+
+def near(found, wanted, share, what):
+    assert abs(float(found) - wanted) <= share * abs(wanted), f"{what}: {found}, not {wanted} within {share:.0%}"
+
+
+def eight_trials():
+    """Each opening with either order; every trial ends on the coupled side but the last, on B."""
+    plan = []
+    for n, (h, a) in enumerate(itertools.product((2.0, 2.3, 2.9, 3.3), ("coupled", "free"))):
+        ends = ("A", 3) if a == "coupled" else ("B", 3)
+        plan.append((n + 1, h, a, [("A", 4), ("B", 4), ("A", 4), ("B", 4), ends]))
+    plan[-1] = (8, 3.3, "coupled", [("A", 6), ("B", 6)])
+    return plan
+
+
+def figures_are_those_the_log_was_made_with():
+    out = SCRATCH / "known"
+    told = analyse(log("known.csv", 7, eight_trials()), "--out", out)
+    assert told.returncode == 0, told.stderr
+    summary = table(out / "summary.csv")
+    assert len(summary) == 16
+    for row in summary:
+        slope, wobble, torque = HANDS[row["condition"]]
+        what = f"trial {row['trial']} {row['condition']}"
+        near(row["gamma_rms"], wobble / math.sqrt(2), 0.03, what)
+        near(row["onset_s"], 1 / 3 / slope, 0.01, what)
+        peak = HOLD + wobble if slope == 1.0 else 1 / 3 + 0.2 * slope
+        near(row["onset_overshoot"], peak - 1 / 3, 0.06, what)
+        near(row["torque_mean_mnm"], 0.75 * torque, 0.02, what)
+        near(row["torque_peak_mnm"], torque, 0, what)
+        # Up against all of it, back down with half of it given back: pi/2 rad each way, once a second.
+        near(row["power_mw"], torque / 2 * math.pi / 2, 0.03, what)
+        near(float(row["work_mj"]), float(row["power_mw"]) * float(row["time_s"]), 1e-4, what)
+    first = next(row for row in summary if row["trial"] == "1" and row["side"] == "A")
+    near(first["time_s"], 11, 0.01, "time")
+    assert (first["visits"], first["onsets"], first["switches"]) == ("3", "3", "4"), first
+    assert (first["last_side"], first["last_condition"], first["silent_notes"]) == ("A", "coupled", "0"), first
+    last = next(row for row in summary if row["trial"] == "8")
+    assert (last["switches"], last["last_condition"]) == ("1", "free"), last
+
+
+def comparison_pairs_the_sides_of_a_trial():
+    out = SCRATCH / "known"
+    rows = {(r["scope"], r["opening_h"], r["metric"]): r for r in table(out / "comparison.csv")}
+    preference = rows["participant 7", "all", "preference"]
+    near(preference["coupled"], 7 / 8, 1e-4, "preference")
+    # Eight of nine patterns' tails: 7 or more of 8 heads, both ways.
+    near(preference["p"], 2 * 9 / 256, 1e-4, "p of 7 in 8")
+    unsteady = rows["participant 7", "all", "gamma_rms"]
+    near(unsteady["difference"], -0.01 / math.sqrt(2), 0.03, "difference")
+    near(unsteady["p"], 2 / 256, 1e-4, "p of 8 in 8")
+    assert unsteady["n"] == "8" and unsteady["test"] == "exact" and float(unsteady["dz"]) < -5, unsteady
+    assert rows["participant 7", "3.3", "torque_mean_mnm"]["n"] == "2"
+    assert {h for _, h, _ in rows} == {"all", "2", "2.3", "2.9", "3.3"}
+    assert all(float(r["p_holm"]) >= float(r["p"]) for r in rows.values())
+
+
+def plots_are_drawn():
+    out = SCRATCH / "known"
+    names = {path.name for path in out.glob("*.png")}
+    wanted = {"paired.png", "phase_p0007.png"} | {f"timeline_p0007_t{n:02}.png" for n in range(1, 9)}
+    assert names == wanted, names ^ wanted
+    for name in names:
+        picture = matplotlib.image.imread(out / name)[..., :3]
+        assert picture.shape[0] > 400 and picture.shape[1] > 500, picture.shape
+        # Both conditions are on every picture, in the two colours that all kinds of colour vision tell apart.
+        for colour in ((0x00, 0x72, 0xB2), (0xD5, 0x5E, 0x00)):
+            close = np.abs(255 * picture - colour).max(axis=-1) < 40
+            assert close.sum() > 100, f"{name}: {close.sum()} pixels of {colour}"
+
+
+def persons_are_compared_and_not_their_trials():
+    logs = []
+    for who in range(1, 7):
+        # Five persons are steadier on coupled, one on free.
+        hands = HANDS if who < 6 else {"coupled": HANDS["free"], "free": HANDS["coupled"]}
+        logs.append(log(f"p{who}.csv", who, eight_trials()[:4], hands))
+    out = SCRATCH / "persons"
+    told = analyse(*logs, "--out", out, "--no-timelines")
+    assert told.returncode == 0, told.stderr
+    rows = [r for r in table(out / "comparison.csv") if r["scope"] == "participants" and r["opening_h"] == "all"]
+    unsteady = next(r for r in rows if r["metric"] == "gamma_rms")
+    assert unsteady["n"] == "6", unsteady
+    near(unsteady["p"], 2 * 7 / 64, 1e-4, "p of 5 in 6 with equal differences")
+    assert not list(out.glob("timeline*")) and "n counts participants" in told.stdout
+
+
+def a_gap_and_a_glance_count_for_nothing():
+    lines = log("whole.csv", 3, [(1, 2.0, "free", [("A", 4), ("B", 4)]), (2, 2.0, "free", [("A", 4), ("B", 0.5)])])
+    lines = lines.read_text().splitlines()
+    at = 2 + 2 * RATE_HZ
+    # A second is missing in trial 1, and rows outside the study stand in front.
+    kept = [line for n, line in enumerate(lines) if not at <= n < at + RATE_HZ]
+    kept[2:2] = ["4900000,0.00,0.0,0,,0.00000,1,2.59808,0.38490,,,,"] * 3
+    path = SCRATCH / "gap.csv"
+    path.write_text("\n".join(kept))
+    out = SCRATCH / "gap"
+    told = analyse(path, "--out", out, "--no-timelines")
+    assert told.returncode == 0, told.stderr
+    first = table(out / "summary.csv")[0]
+    near(first["time_s"], 3, 0.01, "time without the gap")
+    assert (first["visits"], first["onsets"], first["compared"]) == ("1", "1", "yes"), first
+    assert [row["compared"] for row in table(out / "summary.csv")] == ["yes", "yes", "no", "no"]
+    assert "3/2" in told.stdout, told.stdout
+
+
+def notes_that_never_speak_are_counted():
+    rows = [HEADER]
+    for n in range(8 * RATE_HZ):
+        t, side = n / RATE_HZ, "AB"[n >= 4 * RATE_HZ]
+        # Half a second of each note; every second one stays below 1/3.
+        part = int(2 * t)
+        note = 60 + part % 3 if t % 0.5 > 0.1 else ""
+        gamma = (0.2 if part % 2 else 0.45) * (t % 0.5 > 0.2)
+        condition = "coupled" if side == "A" else "free"
+        rows.append(f"{round(1e6 * t)},0,0,0,{note},{gamma},1,2.0,0.4,1,1,{side},{condition}")
+    path = SCRATCH / "silent.csv"
+    path.write_text("\n".join(rows))
+    told = analyse(path, "--out", SCRATCH / "silent", "--no-timelines")
+    assert told.returncode == 0, told.stderr
+    # The last note of each side is cut off by the switch or the end: it might have spoken yet.
+    for row in table(SCRATCH / "silent/summary.csv"):
+        assert (row["onsets"], row["silent_notes"]) == ("4", "3"), row
+
+
+def thresholds_follow_the_reed():
+    study = module(ANALYSE)
+    path = SCRATCH / "haptic.csv"
+    head = "written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k\n# zeta 0.3\n"
+    path.write_text(
+        head
+        + "60,0.364955,1.2483,2189.73,112.2803,420.4819,336.8408,18.7134,2.598076,0.3849002\n"
+        + "97,nan,nan,nan,112.2803,420.4819,336.8408,18.7134,2.598076,0.3849002\n"
+    )
+    onset = study.Onset(path)
+    # What `chalumeau haptic --written 60 --H H --k k` itself says.
+    for h, k, wanted in ((3.3, 0.3849, 0.361248), (2.0, 0.3849, 0.369603), (2.0, 0.84375, 0.388727)):
+        near(onset.gamma(np.array([60.0]), np.array([h]), np.array([k]))[0], wanted, 0.002, f"H {h} k {k}")
+    unknown = onset.gamma(np.array([np.nan, 97.0, 60.0]), np.full(3, np.nan), np.full(3, np.nan))
+    assert np.isnan(unknown[:2]).all() and abs(unknown[2] - 0.364955) < 1e-5, unknown
+    out = SCRATCH / "thresholds"
+    plan = [(1, study.H_REFERENCE, "coupled", [("A", 4), ("B", 4)])]
+    told = analyse(log("thresholds.csv", 1, plan), "--thresholds", path, "--out", out, "--no-timelines")
+    assert told.returncode == 0, told.stderr
+    near(table(out / "summary.csv")[0]["onset_s"], 0.364955, 0.005, "time to the note's own onset")
+
+
+def permutation_test_is_right():
+    study = module(ANALYSE)
+    random_ = np.random.default_rng(5)
+    for n in (1, 2, 5, 9):
+        d = random_.normal(0.5, 1, n)
+        patterns = [sum(s * x for s, x in zip(signs, d)) for signs in itertools.product((-1, 1), repeat=n)]
+        wanted = np.mean([abs(total) >= abs(sum(d)) - 1e-12 for total in patterns])
+        assert abs(study.sign_flip_p(d)[0] - wanted) < 1e-12, n
+    d = random_.normal(0.4, 1, study.EXACT_PAIRS)
+    exact, _ = study.sign_flip_p(d)
+    drawn, method = study.sign_flip_p(np.append(d, 0.0))
+    assert "draws" in method and abs(exact - drawn) < 0.01, (exact, drawn)
+    # Where nothing is to be found it is found in at most one of twenty.
+    found = [study.sign_flip_p(random_.normal(0, 1, 9))[0] <= 0.05 for _ in range(2000)]
+    assert 0.03 < np.mean(found) < 0.065, np.mean(found)
+    assert np.allclose(study.holm([0.01, 0.04, 0.03]), [0.03, 0.06, 0.06])
+
+
+def bad_files_are_named_with_the_place():
+    good = log("good.csv", 1, [(1, 2.0, "coupled", [("A", 3), ("B", 3)])])
+    lines = good.read_text().splitlines()
+
+    def changed(name, row, column, text):
+        new = list(lines)
+        cells = new[row].split(",")
+        cells[HEADER.split(",").index(column)] = text
+        new[row] = ",".join(cells)
+        path = SCRATCH / name
+        path.write_text("\n".join(new))
+        return path
+
+    def written(name, text):
+        path = SCRATCH / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return path
+
+    other_seed = log("seed2.csv", 1, [(1, 2.0, "free", [("A", 3), ("B", 3)])])
+    for files, said in (
+        ([SCRATCH / "absent.csv"], "cannot be read"),
+        ([SCRATCH], "cannot be read"),
+        ([written("empty.csv", "")], "is empty"),
+        ([written("header.csv", HEADER)], "no rows"),
+        ([written("columns.csv", "t_us,angle_deg\n0,1\n")], "no column torque_mnm"),
+        ([written("short.csv", f"{HEADER}\n0,1,2\n")], "line 2 has 3 cells"),
+        ([written("binary.csv", b"\x89PNG\r\n\x1a\n\xff\xfe\x00")], "not UTF-8"),
+        ([changed("cell.csv", 9, "gamma", "loud")], "line 10: gamma is `loud`"),
+        ([changed("nan.csv", 9, "torque_mnm", "nan")], "line 10: torque_mnm is `nan`"),
+        ([changed("back.csv", 9, "t_us", "0")], "line 10: t_us goes back"),
+        ([changed("side.csv", 9, "side", "C")], "line 10: side is `C`"),
+        ([changed("condition.csv", 9, "condition", "")], "line 10: condition is ``"),
+        ([changed("trial.csv", 9, "trial", "")], "line 10: trial is empty"),
+        ([written("off.csv", f"{HEADER}\n0,1,0,0,60,0.5,1,2,0.4,,,,\n")], "no row belongs to a study"),
+        ([good, good], "given twice"),
+        ([good, other_seed], "two orders"),
+        ([good, "--thresholds", written("t.csv", "written_midi,gamma_on,h,k\n60,0.1,2,1\n")], "1/3..1"),
+        ([good, "--thresholds", written("u.csv", "written_midi,gamma_on,h,k\n60,nan,2,1\n")], "no gamma_on"),
+    ):
+        told = analyse(*files, "--out", SCRATCH / "bad", "--no-timelines")
+        assert told.returncode == 2 and said in told.stderr and "Traceback" not in told.stderr, (said, told.stderr)
+        assert not (SCRATCH / "bad").exists(), "nothing is written for a log that cannot be used"
+    told = analyse(good, "--out", good)
+    assert told.returncode == 2 and "cannot be made" in told.stderr, told.stderr
+
+
+def help_tells_what_there_is():
+    for program, words in ((ANALYSE, ("--thresholds", "summary.csv")), (BRIDGE, ("--interface", "NOT TRIED ON"))):
+        told = subprocess.run([sys.executable, program, "--help"], capture_output=True, text=True, check=False)
+        assert told.returncode == 0 and all(word in told.stdout for word in words), told.stdout
+
+
+def columns_are_those_the_plugin_writes():
+    study = module(ANALYSE)
+    source = (ROOT / "src/touch/take.rs").read_text()
+    header = re.search(r'HEADER: &str = "(.*?)";', source, re.DOTALL).group(1)
+    header = re.sub(r"\\\s+", "", header)
+    assert header == HEADER and set(study.NUMBERS + study.WORDS) <= set(header.split(",")), header
+
+
+# ---- the bridge ----
+
+
+def loopback():
+    return next(name for _, name in socket.if_nameindex() if name in ("lo", "lo0"))
+
+
+def bundle(**fields):
+    builder = OscBundleBuilder(IMMEDIATELY)
+    for name, value in fields.items():
+        message = OscMessageBuilder(f"/chalumeau/feel/{name}")
+        message.add_arg(value, "f")
+        builder.add_content(message.build())
+    return builder.build().dgram
+
+
+class Knob:
+    """A libmapper device as TorqueTuner's upstream firmware declares it, wrong ranges included."""
+
+    def __init__(self, name):
+        self.graph = libmapper.Graph()
+        self.graph.set_interface(loopback())
+        self.device = libmapper.Device(name, self.graph)
+        self.got = []
+        inputs = (("Scale", 230.0), ("Stretch", 30.0), ("Offset", 1800.0), ("Damping", 1800.0))
+        for signal_name, most in inputs:
+            self.device.add_signal(
+                libmapper.Signal.Direction.INCOMING, signal_name, 1, libmapper.Type.FLOAT, "", -most, most, None, self.heard
+            )
+        self.stop = threading.Event()
+        self.thread = threading.Thread(target=self.run)
+        self.thread.start()
+
+    def heard(self, its, event, instance, value, when):
+        if value is not None:
+            self.got.append((its[libmapper.Property.NAME], value))
+
+    def run(self):
+        while not self.stop.is_set():
+            self.device.poll(10)
+        self.device.free()
+
+    def last(self, name):
+        return next((value for found, value in reversed(list(self.got)) if found == name), None)
+
+    def close(self):
+        self.stop.set()
+        self.thread.join()
+
+
+class Bridge:
+    """The program, its words, and a socket to it."""
+
+    def __init__(self, *args):
+        options = ["--listen", "127.0.0.1:0", "--interface", loopback(), *args]
+        self.process = subprocess.Popen(
+            [sys.executable, "-u", BRIDGE, *options], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
+        self.said = []
+        self.thread = threading.Thread(target=lambda: self.said.extend(iter(self.process.stdout.readline, "")))
+        self.thread.start()
+        wait(lambda: any("feel from" in line for line in self.said), "the bridge to start", self)
+        port = int(re.search(r"feel from .*:(\d+);", "".join(self.said)).group(1))
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.connect(("127.0.0.1", port))
+
+    def send(self, datagram):
+        self.socket.send(datagram)
+
+    def resident_kib(self):
+        status = pathlib.Path(f"/proc/{self.process.pid}/status")
+        return int(re.search(r"VmRSS:\s+(\d+)", status.read_text()).group(1))
+
+    def interrupt(self):
+        self.process.send_signal(signal.SIGINT)
+        code = self.process.wait(PATIENCE_S)
+        self.thread.join()
+        self.socket.close()
+        return code
+
+    def __str__(self):
+        return "the bridge said:\n" + "".join(self.said)
+
+
+def wait(condition, what, bridge, again=lambda: None):
+    end = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end, f"waited in vain for {what}; {bridge}"
+        again()
+        time.sleep(0.05)
+
+
+def close(found, wanted):
+    return found is not None and abs(found - wanted) <= 1e-4 * max(1.0, abs(wanted))
+
+
+PLAYED = {"scale": 60.0, "stretch": 1.5, "offset": -12.0, "damping": 2.0, "H": 2.6, "k": 0.4, "feel_id": 3.0}
+
+
+def mapped(name):
+    """A knob, a bridge mapped to it, and a feel that has arrived."""
+    knob = Knob(name)
+    try:
+        bridge = Bridge("--map", name, "--name", f"{name}Host")
+    except BaseException:
+        knob.close()
+        raise
+    wait(lambda: any("Scale, Stretch, Offset, Damping" in line for line in bridge.said), "the maps", bridge)
+    # The scale rises, and a first value may be lost while a map is being made.
+    arrived = lambda: close(knob.last("Scale"), 12.48)  # noqa: E731
+    wait(arrived, "the scale", bridge, lambda: bridge.send(bundle(**PLAYED)))
+    return knob, bridge
+
+
+def feel_reaches_a_torquetuner_in_its_units():
+    knob, bridge = mapped("ChalumeauTestA")
+    try:
+        # 208 counts for 1 N m: 60 mNm are 12.48; degrees in tenths; 2 mNm s/rad are 2 x 0.208 x 2 pi / 60 a rpm.
+        for name, wanted in (("Stretch", 1.5), ("Offset", -120.0), ("Damping", 2 * 0.208 * 2 * math.pi / 60)):
+            wait(lambda: close(knob.last(name), wanted), name, bridge)
+        scales = [value for name, value in knob.got if name == "Scale"]
+        assert len(scales) > 3 and scales[0] < 6, f"no jump from nothing to 60 mNm: {scales[:5]}"
+        # The same feel again goes out again, for a knob whose mode has changed.
+        count = len(knob.got)
+        wait(lambda: len(knob.got) >= count + 4, "the repetition", bridge, lambda: bridge.send(bundle(**PLAYED)))
+        # Lower comes at once.
+        bridge.send(bundle(scale=20.0))
+        wait(lambda: close(knob.last("Scale"), 4.16), "the lower scale", bridge)
+    finally:
+        code = bridge.interrupt()
+        last = knob.last("Scale"), knob.last("Damping")
+        knob.close()
+    assert code == 0 and last == (0, 0), f"Ctrl-C ends with torque off: {code}, {last}; {bridge}"
+
+
+def silence_switches_torque_off():
+    knob, bridge = mapped("ChalumeauTestB")
+    try:
+        wait(lambda: knob.last("Scale") == 0 and knob.last("Damping") == 0, "torque off", bridge)
+        assert any("no feel for 3 s" in line for line in bridge.said), bridge
+        assert close(knob.last("Stretch"), 1.5), "what makes no torque stays"
+        wait(lambda: close(knob.last("Scale"), 12.48), "the feel back", bridge, lambda: bridge.send(bundle(**PLAYED)))
+    finally:
+        bridge.interrupt()
+        knob.close()
+
+
+def a_knob_that_comes_back_is_mapped_again():
+    knob, bridge = mapped("ChalumeauTestC")
+    try:
+        knob.close()
+        knob = Knob("ChalumeauTestC")
+        arrived = lambda: close(knob.last("Scale"), 12.48)  # noqa: E731
+        wait(arrived, "the scale at the new knob", bridge, lambda: bridge.send(bundle(**PLAYED)))
+    finally:
+        bridge.interrupt()
+        knob.close()
+
+
+def what_is_out_of_range_is_refused_whole():
+    knob, bridge = mapped("ChalumeauTestD")
+    try:
+        for fields, said in (
+            ({"stretch": 3.0, "scale": 160.0}, "scale must lie in 0..100 mNm (--ceiling), got 160"),
+            ({"stretch": 3.0, "offset": 200.0}, "(Offset takes -1800..1800), got 200"),
+            ({"stretch": 3.0, "H": math.nan}, "H must lie in 0.5..10, got nan"),
+            ({"stretch": 3.0, "k": math.inf}, "k must lie in 0.01..20, got inf"),
+        ):
+            def again(fields=fields):
+                bridge.send(bundle(**fields))
+
+            wait(lambda: any(said in line for line in bridge.said), said, bridge, again)
+        bridge.send(bundle(**PLAYED))
+        wait(lambda: close(knob.last("Scale"), 12.48), "the feel", bridge, lambda: bridge.send(bundle(**PLAYED)))
+        stretches = {round(value, 3) for name, value in knob.got if name == "Stretch"}
+        assert stretches == {1.5}, f"nothing of a refused feel is passed on: {stretches}"
+    finally:
+        bridge.interrupt()
+        knob.close()
+
+
+def hostile(random_):
+    """Packets that are not feels: noise, damaged feels, lengths that lie, bundles in bundles."""
+    good = bundle(**PLAYED)
+    head = b"#bundle\0" + struct.pack(">Q", 1)
+    nested = good
+    for _ in range(60):
+        nested = head + struct.pack(">I", len(nested)) + nested
+    yield from (
+        b"", head, head + b"\0", head + struct.pack(">i", -4) + b"/abc", head + struct.pack(">i", -1),
+        head + struct.pack(">I", 0x7FFFFFFF), head + struct.pack(">I", 0) * 500, nested, good + bytes(5000),
+        head + struct.pack(">I", 8) + b"/a\0\0,[[[", b"/chalumeau/feel/scale\0\0\0,s\0\0loud\0\0\0\0",
+        b"/chalumeau/feel/scale\0\0\0,f\0\0", b"/chalumeau/feel/scale\0\0\0", b"/chalumeau/feel/\xff\xfe\0\0,f\0\0\0\0\0\0",
+        b"/chalumeau/feel/scale\0\0\0,T\0\0", b"/chalumeau/feel/scale\0\0\0,ff\0" + bytes(8), b"/other\0\0,f\0\0\0\0\0\0",
+    )
+    while True:
+        kind = random_.random()
+        if kind < 0.3:
+            yield random_.randbytes(random_.randrange(200))
+        elif kind < 0.9:
+            damaged = bytearray(good)
+            for _ in range(random_.randrange(1, 6)):
+                damaged[random_.randrange(len(damaged))] = random_.randrange(256)
+            # A damaged value that still is a feel would be passed on, and rightly so: damage a field that maps to nothing.
+            yield bytes(damaged).replace(b"/chalumeau/feel/s", b"/chalumeau/feel/H").replace(b"/d", b"/x")
+        else:
+            yield good[: random_.randrange(len(good))].replace(b"/feel/", b"/heel/")
+
+
+def packets_of_any_kind_do_no_harm_to_the_decoder():
+    bridge = module(BRIDGE)
+    limits = bridge.limits_for(100.0, bridge.torquetuner(208.0))
+    began, random_ = time.process_time(), random.Random(3)
+    taken = refused = 0
+    for packet in itertools.islice(hostile(random_), 50_000):
+        try:
+            feel = bridge.feel_of(packet, limits)
+        except bridge.Refused:
+            refused += 1
+            continue
+        taken += 1
+        for name, value in feel.items():
+            low, high, _ = limits[name]
+            assert low <= value <= high, (name, value, packet)
+    assert taken > 100 and refused > 10_000, (taken, refused)
+    assert time.process_time() - began < PATIENCE_S, "no packet holds it up"
+
+
+def a_flood_is_survived():
+    knob, bridge = mapped("ChalumeauTestE")
+    try:
+        before_kib = bridge.resident_kib() if sys.platform == "linux" else 0
+        calm = bundle(**PLAYED)
+        random_ = random.Random(4)
+        odd = list(itertools.islice(hostile(random_), 2000))
+        count, lines = len(knob.got), len(bridge.said)
+        began = time.monotonic()
+        for n in range(100_000):
+            try:
+                bridge.send(odd[n % len(odd)] if n % 2 else calm)
+            except OSError:
+                # Packets larger or faster than this system takes.
+                pass
+        seconds = time.monotonic() - began
+        passed_on = (len(knob.got) - count) / seconds
+        wait(lambda: close(knob.last("Scale"), 4.16), "a feel after it", bridge, lambda: bridge.send(bundle(scale=20.0)))
+        print(f"    100,000 packets in {seconds:.1f} s; {passed_on:.0f} values a second passed on", flush=True)
+        # A hundred feels a second at most, four of whose fields are mapped; twice that for what was on its way.
+        assert passed_on < 800, passed_on
+        assert len(bridge.said) - lines < 10 + 2 * (time.monotonic() - began), bridge
+        if sys.platform == "linux":
+            grown_kib = bridge.resident_kib() - before_kib
+            assert grown_kib < 20_000, f"grew by {grown_kib} KiB"
+    finally:
+        code = bridge.interrupt()
+        knob.close()
+    assert code == 0, bridge
+
+
+def what_the_bridge_cannot_do_is_said():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        busy = f"127.0.0.1:{taken.getsockname()[1]}"
+        for args, said in (
+            (["--listen", busy], "cannot listen on"),
+            (["--listen", "9001"], "must be ADDRESS:PORT"),
+            (["--ceiling", "300"], "must lie in 0..250, got 300"),
+            (["--ceiling", "nan"], "must lie in 0..250, got nan"),
+            (["--listen", "127.0.0.1:0", "--interface", "nosuch0"], "--interface nosuch0"),
+        ):
+            told = subprocess.run(
+                [sys.executable, BRIDGE, *args], capture_output=True, text=True, check=False, timeout=PATIENCE_S
+            )
+            assert told.returncode == 2 and said in told.stderr and "Traceback" not in told.stderr, (args, told.stderr)
+
+
+def fields_are_those_that_are_sent():
+    bridge = module(BRIDGE)
+    source = (ROOT / "src/haptics/osc.rs").read_text()
+    sent = re.findall(r'^\s*\("(\w+)", ', source, re.MULTILINE)
+    assert list(bridge.FIELDS) == sent and f'"{bridge.PREFIX}"' in source, sent
+
+
+TESTS = [
+    help_tells_what_there_is,
+    figures_are_those_the_log_was_made_with,
+    comparison_pairs_the_sides_of_a_trial,
+    plots_are_drawn,
+    persons_are_compared_and_not_their_trials,
+    a_gap_and_a_glance_count_for_nothing,
+    notes_that_never_speak_are_counted,
+    thresholds_follow_the_reed,
+    permutation_test_is_right,
+    bad_files_are_named_with_the_place,
+    fields_are_those_that_are_sent,
+    packets_of_any_kind_do_no_harm_to_the_decoder,
+    what_the_bridge_cannot_do_is_said,
+    feel_reaches_a_torquetuner_in_its_units,
+    silence_switches_torque_off,
+    a_knob_that_comes_back_is_mapped_again,
+    what_is_out_of_range_is_refused_whole,
+    a_flood_is_survived,
+    columns_are_those_the_plugin_writes,
+]
+
+os.environ.pop("DISPLAY", None)
+chosen = [test for test in TESTS if len(sys.argv) < 2 or any(word in test.__name__ for word in sys.argv[1:])]
+failed = 0
+for test in chosen:
+    try:
+        test()
+        print(f"test {test.__name__} ... ok", flush=True)
+    except Exception as error:  # each test is to be heard
+        failed += 1
+        print(f"test {test.__name__} ... FAILED: {type(error).__name__} {error}", flush=True)
+print(f"Python examples: {len(chosen) - failed} passed, {failed} failed")
+sys.exit(failed != 0)
