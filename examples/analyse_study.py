@@ -394,8 +394,21 @@ def pairs_of(table):
     return pairs
 
 
+def belongs(h, opening):
+    """Whether a trial at opening `h` belongs to a group of openings."""
+    if opening == "below":
+        return h < H_REFERENCE
+    if opening == "above":
+        return h > H_REFERENCE
+    return opening in ("all", h)
+
+
 def compare(table):
-    """Coupled less free: over participants, and for each participant over trials; all openings, and each."""
+    """Coupled less free: over participants, and for each participant over trials; by openings.
+
+    Below the reference H the coupled reed is the stiffer one, above it the softer: what torque and hand do there may
+    differ in opposite directions and vanish over all openings.
+    """
     pairs = pairs_of(table)
     openings = sorted({h for trials in pairs.values() for h, _ in trials if math.isfinite(h)})
     scopes = [(f"participant {who}", {n: [trial] for n, trial in enumerate(trials)}) for who, trials in pairs.items()]
@@ -404,12 +417,12 @@ def compare(table):
         scopes.insert(0, ("participants", pairs))
     rows = []
     for scope, units in scopes:
-        for opening in ["all", *openings]:
+        for opening in ["all", "below", "above", *openings]:
             group = []
             for name in ["preference", *METRICS]:
                 means = []
                 for trials in units.values():
-                    both = [v[name] for h, v in trials if opening in ("all", h) and np.isfinite(v[name]).all()]
+                    both = [v[name] for h, v in trials if belongs(h, opening) and np.isfinite(v[name]).all()]
                     if both:
                         means.append(np.mean(both, axis=0))
                 if not means:
@@ -418,6 +431,8 @@ def compare(table):
                 d = coupled - free
                 p, method = sign_flip_p(d)
                 sd = float(np.std(d, ddof=1)) if len(d) > 1 else math.nan
+                # Differences that are equal but for rounding have no spread to compare with.
+                has_spread = sd > 1e-9 * np.max(np.abs(d))
                 group.append(
                     {
                         "scope": scope,
@@ -429,7 +444,7 @@ def compare(table):
                         "free": float(free.mean()),
                         "difference": float(d.mean()),
                         "sd": sd,
-                        "dz": float(d.mean()) / sd if sd > 0 else math.nan,
+                        "dz": float(d.mean()) / sd if has_spread else math.nan,
                         "p": p,
                         "p_holm": math.nan,
                         "test": method,
@@ -509,17 +524,25 @@ def plot_phase(path, participant, trials):
     for axis in axes.flat[len(fields) :]:
         axis.set_visible(False)
     for axis, (h, pieces) in zip(axes.flat, sorted(fields.items(), key=lambda field: field[0] or 0.0)):
+        rows = sum(len(piece.t_s) for piece in pieces)
         for piece in pieces:
             style = STYLE[piece.condition]
-            dashes = "-" if piece.condition == "coupled" else (0, (5, 2))
-            axis.plot(piece.angle_deg, piece.torque_mnm, color=style["color"], lw=0.8, ls=dashes, alpha=0.7)
+            axis.plot(piece.angle_deg, piece.torque_mnm, color=style["color"], lw=0.6, alpha=0.35)
+            # Shapes, since lines lie on each other too much for dashes; some 300 in a field.
+            some = slice(None, None, max(1, rows // 300))
+            axis.plot(
+                piece.angle_deg[some], piece.torque_mnm[some], ls="", marker=style["marker"], ms=4, mec=style["color"],
+                mfc=style["color"] if piece.condition == "coupled" else "none", mew=0.9, alpha=0.8,
+            )
         axis.axhline(0, color="0.6", lw=0.8, zorder=0)
         axis.set_title("H not logged" if h is None else f"H = {h:g}", fontsize=10)
         axis.grid(alpha=0.3)
         axis.set_xlabel("angle, degrees")
         axis.set_ylabel("torque of the motor, mNm")
-    dashes = {"coupled": "-", "free": (0, (5, 2))}
-    handles = [plt.Line2D([], [], color=STYLE[c]["color"], ls=dashes[c], label=c) for c in CONDITIONS]
+    handles = [
+        plt.Line2D([], [], **STYLE[c], lw=0.6, mfc=STYLE[c]["color"] if c == "coupled" else "none", label=c)
+        for c in CONDITIONS
+    ]
     figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
     figure.suptitle(f"Participant {participant}: torque against angle (the area inside a loop is work lost)")
     figure.savefig(path, dpi=110)
@@ -564,7 +587,7 @@ def plot_paired(path, pairs):
         if name == "preference":
             axis.set_ylim(0, 1.12)
             axis.axhline(0.5, color="black", lw=0.9, ls=":")
-            axis.set_ylabel("share of trials ended on the side")
+            axis.set_ylabel("share of trials that ended there")
         else:
             axis.set_ylabel(METRICS[name][1])
     handles = [plt.Line2D([], [], ls="", **STYLE[c], label=c) for c in CONDITIONS]
@@ -589,6 +612,7 @@ def report(rows):
     n = max(row["n"] for row in chosen)
     if 2 ** (1 - n) > 0.05:
         print(f"{n} pairs cannot give a p below {2.0 ** (1 - n):.3g}, whatever they say")
+    print(f"by opening (coupled is stiffer below H = {H_REFERENCE:.3f} and softer above): comparison.csv")
     if scope != "participants":
         print("one participant: this says something about that person only")
 

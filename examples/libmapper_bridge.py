@@ -43,6 +43,9 @@ try:
 except ImportError as reason:
     sys.exit(f"libmapper_bridge: {reason}; install it: python -m pip install libmapper python-osc")
 
+# python-osc writes a line for every odd packet, which a flood would turn into another.
+logging.disable(logging.WARNING)
+
 PREFIX = "/chalumeau/feel/"
 # Unit and range of each field, as in docs/protocol.md (friction and detent in mNm here).
 FIELDS = {
@@ -224,17 +227,21 @@ class Wiring:
     def look(self):
         """To be called about once a second."""
         prop = libmapper.Property
-        names = sorted({device[prop.NAME] for device in self.ours.graph.devices() if self.matches(device[prop.NAME])})
+        # A device that has left may stay listed for a while, without signals.
+        devices = {}
+        for theirs in self.ours.graph.signals():
+            device, name = theirs.device()[prop.NAME], theirs[prop.NAME]
+            is_input = theirs[prop.DIRECTION] == libmapper.Signal.Direction.INCOMING
+            if self.matches(device) and is_input and name in self.targets:
+                devices.setdefault(device, {})[name] = theirs
+        names = sorted(devices)
         if not names:
-            self.say(f"waiting for {self.wanted}")
+            self.say(f"waiting for {self.wanted} and its {', '.join(self.targets)}")
             return
         if len(names) > 1:
             self.say(f"--map {self.wanted} may be {' or '.join(names)}: nothing new is mapped; name one of them")
             return
-        found = {}
-        for theirs in self.ours.graph.signals():
-            if theirs.device()[prop.NAME] == names[0] and theirs[prop.DIRECTION] == libmapper.Signal.Direction.INCOMING:
-                found[theirs[prop.NAME]] = theirs
+        found = devices[names[0]]
         mapped = {
             theirs[prop.NAME]
             for own in self.ours.signals.values()
@@ -346,8 +353,6 @@ def arguments():
 
 def main():
     args = arguments()
-    # python-osc writes a line for every odd packet, which a flood would turn into another.
-    logging.disable(logging.CRITICAL)
     stop = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.append(True))
