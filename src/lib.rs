@@ -18,5 +18,6 @@ pub mod plugin;
 pub mod reed;
 #[cfg(feature = "cli")]
 pub mod render;
+pub mod touch;
 pub mod units;
 pub mod wire;
