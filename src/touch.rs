@@ -2,5 +2,7 @@
 //!
 //! This is where the instrument's settings and the feel meet; plugin and command line both play through it.
 
+pub mod blower;
+pub mod feel;
 pub mod study;
 pub mod take;

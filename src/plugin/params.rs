@@ -13,7 +13,7 @@ use crate::instrument::{Settings, Tuning};
 
 pub mod knob;
 
-use knob::Calibration;
+use knob::{Calibration, ReedSource};
 pub use knob::KnobParams;
 use serde::{Serialize, de::DeserializeOwned};
 
@@ -221,7 +221,7 @@ impl ChalumeauParams {
     /// The parameters as the instrument reads them. Real-time safe.
     pub fn settings(&self) -> Settings {
         let Self { breath, embouchure, reed, tuning, noise, output, .. } = self;
-        Settings {
+        let mut settings = Settings {
             breath_full_kpa: settled(&breath.full),
             noise: settled(&noise.noise),
             tongue_ms: settled(&breath.tongue),
@@ -240,7 +240,16 @@ impl ChalumeauParams {
             temperature_c: settled(&tuning.temperature),
             vent_loss: settled(&tuning.vent_loss),
             gain_db: settled(&output.gain),
+        };
+        if let Some((_, trial, side)) = self.knob.study() {
+            settings.reed_h = trial.h as f32;
+            settings.reed_k = trial.condition(side).k(trial.h) as f32;
+            settings.coupled = false;
+        } else if self.knob.k_source.value() != ReedSource::Parameter {
+            // What a controller drives follows nothing else.
+            settings.coupled = false;
         }
+        settings
     }
 
     fn numbers(&self) -> [(&'static str, &FloatParam); 17] {
@@ -315,6 +324,7 @@ pub fn mend(state: &mut PluginState) {
         },
     );
     mend_field(state, "midiport", |text: String| text.chars().take(256).collect());
+    mend_field(state, "take", |text: String| text);
     mend_field(state, "calibration", Calibration::mended);
     // There is one schema so far; a newer one is read as far as its ids are known here.
     state.fields.insert(SCHEMA_FIELD.to_owned(), SCHEMA.to_string());
@@ -419,12 +429,13 @@ mod tests {
         ("order", "Knob", "Physical"),
         ("refnot", "Knob", "72"),
         ("torque", "Knob", "60 mNm"),
-        ("kdamp", "Knob", "0.50 mNm s"),
-        ("kfric", "Knob", "0.0 mNm"),
+        ("kdamp", "Knob", "1.00 mNm s"),
+        ("kfric", "Knob", "1.0 mNm"),
         ("detent", "Knob", "4.0 mNm"),
         ("oscprt", "Knob", "8000"),
         ("oscany", "Knob", "Off"),
         ("rec", "Knob", "Off"),
+        ("replay", "Knob", "Off"),
         ("study", "Knob", "Off"),
         ("part", "Knob", "1"),
         ("seed", "Knob", "1"),
@@ -613,6 +624,6 @@ mod tests {
         assert!(matches!(state.params["trial"], ParamValue::I32(16)));
         assert!(matches!(state.params["ceil"], ParamValue::F32(250.0)));
         assert_eq!(state.fields["serial"], "\"\"", "a path is no serial number");
-        assert!(state.fields["calibration"].contains("60.0"), "{}", state.fields["calibration"]);
+        assert!(state.fields["calibration"].contains("120.0"), "{}", state.fields["calibration"]);
     }
 }

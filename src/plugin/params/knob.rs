@@ -9,7 +9,7 @@ use nice_plug::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{either, number};
-use crate::touch::study::TRIALS;
+use crate::touch::study::{Side, TRIALS, Trial, plan};
 
 /// Most torque a session starts with, mNm; and the most *Arm* can be given (`docs/protocol.md`, safety).
 pub const CEILING_MNM: (f32, f32) = (100.0, 250.0);
@@ -105,7 +105,7 @@ pub struct Calibration {
 
 impl Calibration {
     /// What a hand can turn comfortably, degrees.
-    pub const TRAVEL_DEG: (f64, f64) = (60.0, 1_080.0);
+    pub const TRAVEL_DEG: (f64, f64) = (120.0, 1_080.0);
 
     /// The same inside its ranges.
     pub fn mended(self) -> Self {
@@ -137,6 +137,9 @@ pub struct KnobParams {
     /// Rest and full blow.
     #[persist = "calibration"]
     pub calibration: RwLock<Calibration>,
+    /// The take last recorded, or put here by the user's project: a file's path, empty for none.
+    #[persist = "take"]
+    pub take: RwLock<String>,
     /// Which kind of device. Default off.
     #[id = "knob"]
     pub kind: EnumParam<KnobKind>,
@@ -189,6 +192,9 @@ pub struct KnobParams {
     /// Writes a take while on.
     #[id = "rec"]
     pub record: BoolParam,
+    /// Plays the take instead of a knob, from when it is switched on or the host starts again.
+    #[id = "replay"]
+    pub replay: BoolParam,
     /// H and k come from the trial of a study.
     #[id = "study"]
     pub study: BoolParam,
@@ -231,6 +237,7 @@ impl KnobParams {
             serial: RwLock::default(),
             midi_port: RwLock::default(),
             calibration: RwLock::default(),
+            take: RwLock::default(),
             kind: EnumParam::new("Knob", KnobKind::Off).non_automatable(),
             arm: act("Arm knob"),
             ceiling: number("Torque ceiling", CEILING_MNM.0, 10.0, CEILING_MNM.1, 0, " mNm")
@@ -243,12 +250,13 @@ impl KnobParams {
             order: EnumParam::new("Feel order", OrderChoice::Physical).non_automatable(),
             reference: whole("Feel reference", 72, 52, 97),
             torque: number("Feel torque", 60.0, 0.0, CEILING_MNM.1, 0, " mNm").non_automatable(),
-            damping: number("Feel damping", 0.5, 0.0, 5.0, 2, " mNm s").non_automatable(),
-            friction: number("Feel friction", 0.0, 0.0, 20.0, 1, " mNm").non_automatable(),
+            damping: number("Feel damping", 1.0, 0.0, 20.0, 2, " mNm s").non_automatable(),
+            friction: number("Feel friction", 1.0, 0.0, 20.0, 1, " mNm").non_automatable(),
             detent: number("Feel mark", 4.0, 0.0, 30.0, 1, " mNm").non_automatable(),
             osc_port: whole("OSC port", 8_000, 1_024, 65_535),
             osc_any: act("OSC from network"),
             record: act("Record take"),
+            replay: act("Replay take"),
             study: act("Study"),
             participant: whole("Participant", 1, 1, 9_999),
             seed: whole("Study seed", 1, 1, 9_999),
@@ -263,6 +271,18 @@ impl KnobParams {
                 .with_string_to_value(Arc::new(|_| Some(false)))
                 .non_automatable(),
         }
+    }
+
+    /// Participant, trial and side, while a study is on. Real-time safe.
+    pub fn study(&self) -> Option<(u32, Trial, Side)> {
+        if !self.study.value() {
+            return None;
+        }
+        let whole = |param: &IntParam| u32::try_from(param.value()).unwrap_or(1);
+        let participant = whole(&self.participant);
+        let trials = plan(participant, whole(&self.seed));
+        let trial = *trials.get(whole(&self.trial).saturating_sub(1) as usize)?;
+        Some((participant, trial, if self.side.value() { Side::B } else { Side::A }))
     }
 
     pub(super) fn numbers(&self) -> [(&'static str, &FloatParam); 6] {
@@ -287,7 +307,7 @@ impl KnobParams {
     }
 
     /// Switches, and whether a state keeps them.
-    pub(super) fn switches(&self) -> [(&'static str, &BoolParam, bool); 9] {
+    pub(super) fn switches(&self) -> [(&'static str, &BoolParam, bool); 10] {
         [
             ("arm", &self.arm, false),
             ("takeov", &self.take_over, false),
@@ -295,6 +315,7 @@ impl KnobParams {
             ("blow", &self.blow, false),
             ("oscany", &self.osc_any, true),
             ("rec", &self.record, false),
+            ("replay", &self.replay, true),
             ("study", &self.study, true),
             ("side", &self.side, true),
             ("kstat", &self.status, false),

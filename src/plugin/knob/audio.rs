@@ -1,0 +1,160 @@
+//! What the audio thread does with a knob. Real-time safe throughout. [audio thread]
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use super::{NO_NOTE, Shared};
+use crate::device::KnobReader;
+use crate::event::{Event, Timed};
+use crate::instrument::{Clarinet, Settings};
+use crate::touch::blower::{Blower, Blown, Breath14, GRID};
+use crate::touch::feel::Maps;
+use crate::touch::take::Take;
+
+/// Breath values of one block that are also sent to the host: a block of 8192 samples has 128.
+const MOST_SENT: usize = 8_192 / GRID as usize;
+
+/// Where this block's breath comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// Whatever the host sends.
+    Host,
+    /// A knob in somebody's hand.
+    Knob,
+    /// A take.
+    Take,
+}
+
+/// The audio thread's end.
+pub struct Audio {
+    shared: Arc<Shared>,
+    readers: rtrb::Consumer<KnobReader>,
+    reader: Option<KnobReader>,
+    maps: triple_buffer::Output<Maps>,
+    take: triple_buffer::Output<Option<Arc<Take>>>,
+    blower: Blower,
+    source: Source,
+    sent: [(usize, Breath14); MOST_SENT],
+    sent_count: usize,
+    /// Samples of a take already played.
+    replayed: u64,
+}
+
+/// What of the parameters matters to a block.
+#[derive(Clone, Copy, Debug)]
+pub struct Stage {
+    /// Sample rate, Hz.
+    pub rate_hz: f64,
+    /// A live device is ignored when a file is rendered.
+    pub offline: bool,
+    /// A take plays instead of a device.
+    pub replay: bool,
+    /// Angle of the knob at rest, degrees.
+    pub rest_deg: f64,
+}
+
+impl Audio {
+    pub(super) fn new(
+        shared: Arc<Shared>,
+        readers: rtrb::Consumer<KnobReader>,
+        maps: triple_buffer::Output<Maps>,
+        take: triple_buffer::Output<Option<Arc<Take>>>,
+    ) -> Self {
+        Self {
+            shared,
+            readers,
+            reader: None,
+            maps,
+            take,
+            blower: Blower::default(),
+            source: Source::Host,
+            sent: [(0, Breath14(0)); MOST_SENT],
+            sent_count: 0,
+            replayed: 0,
+        }
+    }
+
+    /// Forgets notes and breath; the link stays.
+    pub fn reset(&mut self) {
+        self.blower.reset();
+        self.source = Source::Host;
+        self.replayed = 0;
+        self.shared.note.store(NO_NOTE, Ordering::Relaxed);
+    }
+
+    /// Renders one block: the host's events, and the breath of knob or take between them.
+    pub fn render(
+        &mut self,
+        clarinet: &mut Clarinet,
+        settings: &Settings,
+        host: impl Iterator<Item = Timed<Event>>,
+        stage: &Stage,
+        out: &mut [f32],
+    ) {
+        if self.reader.is_none() {
+            self.reader = self.readers.pop().ok();
+        }
+        self.sent_count = 0;
+        let samples = out.len();
+        let maps = self.maps.read();
+        let take = self.take.read().as_deref().filter(|_| stage.replay);
+        // The ring is emptied even when nobody listens.
+        let mut reader = self.reader.as_mut();
+        if let Some(reader) = &mut reader {
+            reader.begin_block(samples, stage.rate_hz);
+        }
+        let source = match (&take, &reader) {
+            _ if !maps.is_ready() => Source::Host,
+            (Some(_), _) => Source::Take,
+            (None, Some(reader)) if !stage.offline && reader.pose(0).is_some() => Source::Knob,
+            _ => Source::Host,
+        };
+        let gone = (source == Source::Host && self.source != Source::Host)
+            .then(|| self.blower.fall_silent())
+            .flatten()
+            .map(|breath| Timed { at: 0, event: Event::Breath(breath.unit()) });
+        self.source = source;
+        let full_pa = 1e3 * f64::from(settings.breath_full_kpa);
+        let (sent, sent_count) = (&mut self.sent, &mut self.sent_count);
+        let shared = &self.shared;
+        let closing_pa = settings.closing_pa();
+        let mut heard = |at: usize, breath: Breath14| {
+            let gamma = f64::from(breath.unit()) * full_pa / closing_pa;
+            shared.gamma.store((gamma as f32).to_bits(), Ordering::Relaxed);
+            if let Some(place) = sent.get_mut(*sent_count) {
+                *place = (at, breath);
+                *sent_count += 1;
+            }
+        };
+        match (source, take, reader) {
+            (Source::Take, Some(take), _) => {
+                let begun = self.replayed;
+                let angle = |at: usize| {
+                    Some(take.angle_deg((begun + at as u64) as f64 / stage.rate_hz) - stage.rest_deg)
+                };
+                let events = Blown::new(host, &mut self.blower, maps, full_pa, samples, angle, &mut heard);
+                clarinet.render_events(events, out);
+                self.replayed += samples as u64;
+            }
+            (Source::Knob, _, Some(reader)) => {
+                let slap = reader.take_slap().map(|strength| Timed { at: 0, event: Event::TongueSlap { strength } });
+                let angle = |at: usize| reader.pose(at).map(|pose| f64::from(pose.angle_deg) - stage.rest_deg);
+                let events = Blown::new(host, &mut self.blower, maps, full_pa, samples, angle, &mut heard);
+                clarinet.render_events(slap.into_iter().chain(events), out);
+            }
+            _ => {
+                let blower = &mut self.blower;
+                let host = host.inspect(|event| blower.heed(&event.event));
+                clarinet.render_events(gone.into_iter().chain(host), out);
+            }
+        }
+        self.blower.advance(samples);
+        let note = self.blower.fingered().map_or(NO_NOTE, |note| note.0);
+        self.shared.note.store(note, Ordering::Relaxed);
+    }
+
+    /// The knob's breath of the last block, in order of time, for the host to record.
+    pub fn sent(&self) -> &[(usize, Breath14)] {
+        &self.sent[..self.sent_count]
+    }
+}

@@ -1,0 +1,157 @@
+//! A knob's angle becomes breath, note by note.
+//!
+//! Breath goes out on a grid of samples counted from the start, so that it does not depend on the host's blocks, and in
+//! the steps of a 14-bit controller, so that a host that records it plays the very same breath back.
+
+use crate::control::keys::Keys;
+use crate::control::knob::DeadZone;
+use crate::event::{Event, Timed};
+use crate::touch::feel::Maps;
+use crate::units::SoundingNote;
+
+/// Samples between two values of breath: 1.3 ms at 48 kHz, a quarter of the time the player's breath takes to follow.
+pub const GRID: u64 = 64;
+/// Steps of a 14-bit controller.
+const STEPS: f32 = 16_383.0;
+
+/// Breath as a 14-bit controller sends it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Breath14(pub u16);
+
+impl Breath14 {
+    /// Of full breath, 0..=1, exactly as [`MidiDecoder`](crate::control::midi::MidiDecoder) reads the pair.
+    pub fn unit(self) -> f32 {
+        f32::from(self.0) / STEPS
+    }
+
+    /// Values of the coarse and the fine controller.
+    pub fn bytes(self) -> (u8, u8) {
+        ((self.0 >> 7) as u8 & 127, self.0 as u8 & 127)
+    }
+}
+
+/// Follows the notes and turns angles into breath. Real-time safe throughout.
+#[derive(Clone, Debug, Default)]
+pub struct Blower {
+    keys: Keys,
+    fingered: Option<SoundingNote>,
+    dead_zone: DeadZone,
+    sent: Option<Breath14>,
+    /// Samples since the start.
+    clock: u64,
+}
+
+impl Blower {
+    /// As new.
+    pub fn reset(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Takes notice of what is played.
+    pub fn heed(&mut self, event: &Event) {
+        match *event {
+            Event::NoteOn { note, .. } => {
+                self.keys.press(note);
+                self.fingered = Some(note);
+            }
+            Event::NoteOff { note } => {
+                self.keys.release(note);
+                self.fingered = self.keys.last().or(self.fingered);
+            }
+            Event::Panic => self.keys = Keys::default(),
+            _ => {}
+        }
+    }
+
+    /// The note in the fingers, also after its key has come up.
+    pub fn fingered(&self) -> Option<SoundingNote> {
+        self.fingered
+    }
+
+    /// Samples since the start.
+    pub fn clock(&self) -> u64 {
+        self.clock
+    }
+
+    /// Offset of the first grid point at or after `from` in the block that begins now.
+    pub fn next_point(&self, from: usize) -> usize {
+        let at = self.clock + from as u64;
+        (at.next_multiple_of(GRID) - self.clock) as usize
+    }
+
+    /// The block is over.
+    pub fn advance(&mut self, samples: usize) {
+        self.clock += samples as u64;
+    }
+
+    /// Breath of a knob turned so far from rest, if it is not what was sent last.
+    pub fn blow(&mut self, maps: &Maps, angle_deg: f64, full_pa: f64) -> Option<Breath14> {
+        let angle_deg = self.dead_zone.angle_deg(angle_deg);
+        let unit = maps.pressure_pa(self.fingered, angle_deg) / full_pa;
+        let breath = Breath14((unit.clamp(0.0, 1.0) * f64::from(STEPS)).round() as u16);
+        (self.sent.replace(breath) != Some(breath)).then_some(breath)
+    }
+
+    /// The knob has gone: no breath, if there was any.
+    pub fn fall_silent(&mut self) -> Option<Breath14> {
+        self.sent.take().filter(|&sent| sent != Breath14(0)).map(|_| Breath14(0))
+    }
+}
+
+/// Host events in order of time with the knob's breath between them.
+pub struct Blown<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> {
+    host: std::iter::Peekable<I>,
+    blower: &'a mut Blower,
+    maps: &'a Maps,
+    full_pa: f64,
+    /// Angle from rest at a sample of the block.
+    angle: A,
+    /// Where breath comes next.
+    next: usize,
+    samples: usize,
+    heard: &'a mut dyn FnMut(usize, Breath14),
+}
+
+impl<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Blown<'a, I, A> {
+    /// `angle` gives the angle from rest at a sample of the block, degrees; `heard` is told of every breath.
+    pub fn new(
+        host: I,
+        blower: &'a mut Blower,
+        maps: &'a Maps,
+        full_pa: f64,
+        samples: usize,
+        angle: A,
+        heard: &'a mut dyn FnMut(usize, Breath14),
+    ) -> Self {
+        let next = blower.next_point(0);
+        Self { host: host.peekable(), blower, maps, full_pa, angle, next, samples, heard }
+    }
+}
+
+impl<I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Iterator for Blown<'_, I, A> {
+    type Item = Timed<Event>;
+
+    fn next(&mut self) -> Option<Timed<Event>> {
+        loop {
+            let until = if self.next < self.samples { self.next } else { usize::MAX };
+            if let Some(event) = self.host.next_if(|event| event.at <= until) {
+                self.blower.heed(&event.event);
+                // One breath at a time: while the knob blows, nothing else does.
+                if !matches!(event.event, Event::Breath(_)) {
+                    return Some(event);
+                }
+                continue;
+            }
+            let at = self.next;
+            if at >= self.samples {
+                return None;
+            }
+            self.next = at + GRID as usize;
+            let blown = (self.angle)(at).and_then(|angle| self.blower.blow(self.maps, angle, self.full_pa));
+            if let Some(breath) = blown {
+                (self.heard)(at, breath);
+                return Some(Timed { at, event: Event::Breath(breath.unit()) });
+            }
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! The feel of an instrument as it is set up to play, and what each note's knob angle blows.
+
+use crate::bore::fit;
+use crate::bore::instrument_file::InstrumentFile;
+use crate::haptics::{AngleMap, FeelDesign, FeelRefused, FeelTable, Limits, Lip, PlayedReed, Requirements};
+use crate::instrument::Settings;
+use crate::instrument::embouchure::embouchure;
+use crate::units::{Air, SoundingNote};
+
+/// Pitches there are names for.
+const PITCHES: usize = 128;
+
+/// An instrument, and what its bore asks for every note. Building one takes half a second.
+#[derive(Clone, Debug)]
+pub struct Feels {
+    requirements: Requirements,
+    lips_of: Vec<(f64, f64)>,
+    /// Index of the fingering for each sounding pitch.
+    fingerings: [Option<u8>; PITCHES],
+}
+
+impl Feels {
+    /// Measures an instrument in an air. Allocates; takes half a second.
+    pub fn new(file: &InstrumentFile, air: Air) -> Self {
+        let lowest_hz = fit::lowest_hz(file);
+        let mut fingerings = [None; PITCHES];
+        let mut lips_of = Vec::new();
+        for (index, fingering) in file.fingerings.iter().enumerate() {
+            let sounding = fingering.written.sounding(file.transposition).unwrap_or(SoundingNote(0));
+            if let Some(place) = fingerings.get_mut(usize::from(sounding.0)) {
+                *place = u8::try_from(index).ok();
+            }
+            lips_of.push((sounding.frequency_hz(440.0), lowest_hz));
+        }
+        Self { requirements: Requirements::new(file, air), lips_of, fingerings }
+    }
+
+    /// What the bore asks.
+    pub fn requirements(&self) -> &Requirements {
+        &self.requirements
+    }
+
+    /// The reed as the settings have it played on this instrument.
+    pub fn reed(&self, settings: &Settings) -> PlayedReed {
+        let settings = settings.clamped();
+        let lips = self.lips_of.iter().map(|&(note_hz, lowest_hz)| {
+            let lip = embouchure(note_hz, lowest_hz);
+            Lip { resonance_hz: lip.resonance_hz, damping: lip.damping * f64::from(settings.damping) }
+        });
+        PlayedReed {
+            law: settings.reed_law(),
+            zeta: f64::from(settings.zeta),
+            lay: f64::from(settings.lay),
+            lips: lips.collect(),
+        }
+    }
+
+    /// The feel of every note. Allocates; takes up to 50 ms.
+    pub fn table(
+        &self,
+        settings: &Settings,
+        design: &FeelDesign,
+        limits: &Limits,
+    ) -> Result<FeelTable, FeelRefused> {
+        FeelTable::new(&self.requirements, design, &self.reed(settings), limits)
+    }
+
+    /// Index of the fingering for a sounding pitch. Real-time safe.
+    pub fn fingering(&self, note: SoundingNote) -> Option<usize> {
+        self.fingerings.get(usize::from(note.0)).copied().flatten().map(usize::from)
+    }
+
+    /// The same table by sounding pitch, for the audio thread.
+    pub fn maps(&self, table: &FeelTable) -> Maps {
+        let of = |index: u8| table.note(usize::from(index)).map(|note| note.map);
+        Maps {
+            by_pitch: self.fingerings.map(|fingering| fingering.and_then(of)),
+            otherwise: Some(table.reference().map),
+        }
+    }
+}
+
+/// What each sounding pitch makes of the knob's angle. Plain numbers, to be copied between threads.
+#[derive(Clone, Copy, Debug)]
+pub struct Maps {
+    by_pitch: [Option<AngleMap>; PITCHES],
+    otherwise: Option<AngleMap>,
+}
+
+impl Default for Maps {
+    /// No pitch blows anything.
+    fn default() -> Self {
+        Self { by_pitch: [None; PITCHES], otherwise: None }
+    }
+}
+
+impl Maps {
+    /// Mouth pressure, Pa, with a note fingered (none: as on the reference note) and the knob turned so far from rest.
+    /// Real-time safe.
+    pub fn pressure_pa(&self, note: Option<SoundingNote>, angle_deg: f64) -> f64 {
+        let own = note.and_then(|note| self.by_pitch.get(usize::from(note.0)).copied().flatten());
+        own.or(self.otherwise).map_or(0.0, |map| map.pressure_pa(angle_deg))
+    }
+
+    /// Whether there is anything to play with.
+    pub fn is_ready(&self) -> bool {
+        self.otherwise.is_some()
+    }
+}
