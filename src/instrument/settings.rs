@@ -95,6 +95,9 @@ impl Settings {
 
     /// The same with H and k multiplied by what controllers say; see [`Event::Reed`](crate::event::Event::Reed).
     pub fn with_reed_factors(self, [h, k]: [f32; 2]) -> Self {
+        if [h, k] == [1.0, 1.0] {
+            return self;
+        }
         Self { reed_h: self.reed_h * h, reed_k: self.reed_k * k, ..self }.clamped()
     }
 

@@ -8,11 +8,11 @@
 mod audio;
 mod desk;
 
-use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
-pub use audio::{Audio, Source};
+pub use audio::{Audio, Stage};
 
 use crate::haptics::FeelTable;
 use crate::plugin::params::ChalumeauParams;
@@ -32,6 +32,8 @@ pub struct Shared {
     gamma: AtomicU32,
     /// Factors on H and k from controllers, bits of f32s.
     reed: [AtomicU32; 2],
+    /// Angle of the knob at rest, degrees, bits of an f64.
+    rest_deg: AtomicU64,
     /// The feel in force, with the instrument it is of. Only desk and link lock it.
     feel: Mutex<Option<Arc<(Feels, FeelTable)>>>,
     stop: AtomicBool,
@@ -44,6 +46,7 @@ impl Shared {
             note: AtomicU8::new(NO_NOTE),
             gamma: AtomicU32::new(0),
             reed: [one(), one()],
+            rest_deg: AtomicU64::new(0),
             feel: Mutex::new(None),
             stop: AtomicBool::new(false),
         }

@@ -1,10 +1,9 @@
 //! The feel of an instrument as it is set up to play, and what each note's knob angle blows.
 
-use crate::bore::fit;
 use crate::bore::instrument_file::InstrumentFile;
-use crate::haptics::{AngleMap, FeelDesign, FeelRefused, FeelTable, Limits, Lip, PlayedReed, Requirements};
+use crate::haptics::{AngleMap, FeelDesign, FeelRefused, FeelTable, Limits, Requirements};
 use crate::instrument::Settings;
-use crate::instrument::embouchure::embouchure;
+use crate::instrument::felt::played_reed;
 use crate::units::{Air, SoundingNote};
 
 /// Pitches there are names for.
@@ -14,7 +13,7 @@ const PITCHES: usize = 128;
 #[derive(Clone, Debug)]
 pub struct Feels {
     requirements: Requirements,
-    lips_of: Vec<(f64, f64)>,
+    file: InstrumentFile,
     /// Index of the fingering for each sounding pitch.
     fingerings: [Option<u8>; PITCHES],
 }
@@ -22,37 +21,19 @@ pub struct Feels {
 impl Feels {
     /// Measures an instrument in an air. Allocates; takes half a second.
     pub fn new(file: &InstrumentFile, air: Air) -> Self {
-        let lowest_hz = fit::lowest_hz(file);
         let mut fingerings = [None; PITCHES];
-        let mut lips_of = Vec::new();
         for (index, fingering) in file.fingerings.iter().enumerate() {
             let sounding = fingering.written.sounding(file.transposition).unwrap_or(SoundingNote(0));
             if let Some(place) = fingerings.get_mut(usize::from(sounding.0)) {
                 *place = u8::try_from(index).ok();
             }
-            lips_of.push((sounding.frequency_hz(440.0), lowest_hz));
         }
-        Self { requirements: Requirements::new(file, air), lips_of, fingerings }
+        Self { requirements: Requirements::new(file, air), file: file.clone(), fingerings }
     }
 
     /// What the bore asks.
     pub fn requirements(&self) -> &Requirements {
         &self.requirements
-    }
-
-    /// The reed as the settings have it played on this instrument.
-    pub fn reed(&self, settings: &Settings) -> PlayedReed {
-        let settings = settings.clamped();
-        let lips = self.lips_of.iter().map(|&(note_hz, lowest_hz)| {
-            let lip = embouchure(note_hz, lowest_hz);
-            Lip { resonance_hz: lip.resonance_hz, damping: lip.damping * f64::from(settings.damping) }
-        });
-        PlayedReed {
-            law: settings.reed_law(),
-            zeta: f64::from(settings.zeta),
-            lay: f64::from(settings.lay),
-            lips: lips.collect(),
-        }
     }
 
     /// The feel of every note. Allocates; takes up to 50 ms.
@@ -62,7 +43,7 @@ impl Feels {
         design: &FeelDesign,
         limits: &Limits,
     ) -> Result<FeelTable, FeelRefused> {
-        FeelTable::new(&self.requirements, design, &self.reed(settings), limits)
+        FeelTable::new(&self.requirements, design, &played_reed(&self.file, settings), limits)
     }
 
     /// Index of the fingering for a sounding pitch. Real-time safe.

@@ -3,16 +3,23 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use super::{NO_NOTE, Shared};
+use super::{NO_NOTE, Shared, desk};
+use crate::bore::instrument_file::InstrumentFile;
 use crate::device::KnobReader;
 use crate::event::{Event, Timed};
+use crate::haptics::Limits;
 use crate::instrument::{Clarinet, Settings};
+use crate::plugin::params::ChalumeauParams;
 use crate::touch::blower::{Blower, Blown, Breath14, GRID};
-use crate::touch::feel::Maps;
+use crate::touch::feel::{Feels, Maps};
 use crate::touch::take::Take;
+use crate::units::Air;
 
 /// Breath values of one block that are also sent to the host: a block of 8192 samples has 128.
 const MOST_SENT: usize = 8_192 / GRID as usize;
+
+/// For a replay no motor turns: any feel a knob could have is allowed, mNm.
+const HARD_CEILING_MNM: f64 = 450.0;
 
 /// Where this block's breath comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +45,15 @@ pub struct Audio {
     sent_count: usize,
     /// Samples of a take already played.
     replayed: u64,
+    /// Maps and take as they were loaded before playing began; what the desk has come by since is newer.
+    prepared: Option<Prepared>,
+}
+
+/// What a render needs from its first sample, when there is no time to wait for the desk.
+struct Prepared {
+    maps: Maps,
+    take: Arc<Take>,
+    rest_deg: f64,
 }
 
 /// What of the parameters matters to a block.
@@ -49,8 +65,6 @@ pub struct Stage {
     pub offline: bool,
     /// A take plays instead of a device.
     pub replay: bool,
-    /// Angle of the knob at rest, degrees.
-    pub rest_deg: f64,
 }
 
 impl Audio {
@@ -71,6 +85,31 @@ impl Audio {
             sent: [(0, Breath14(0)); MOST_SENT],
             sent_count: 0,
             replayed: 0,
+            prepared: None,
+        }
+    }
+
+    /// Before playing: a take that shall be replayed is there from the first sample, so that every render of a file is
+    /// the same. Allocates; takes half a second. [main thread]
+    pub fn prepare(&mut self, params: &ChalumeauParams) {
+        self.prepared = None;
+        if !params.knob.replay.value() {
+            return;
+        }
+        let Ok(path) = params.knob.take.read().map(|path| path.clone()) else { return };
+        // A take or feel that cannot be had is worded by the desk; nothing is replayed then.
+        let Ok(take) = desk::load(&path) else { return };
+        let feels = Feels::new(&InstrumentFile::built_in(), Air::default());
+        let limits = Limits { ceiling_mnm: HARD_CEILING_MNM, ..Limits::default() };
+        let Ok(table) = feels.table(&params.settings(), &desk::design(&params.knob), &limits) else { return };
+        let rest_deg = params.knob.calibration.read().map_or(0.0, |calibration| calibration.rest_deg);
+        self.prepared = Some(Prepared { maps: feels.maps(&table), take, rest_deg });
+    }
+
+    /// Tells the feel what controllers make of H and k.
+    pub fn reed(&self, factors: [f32; 2]) {
+        for (place, factor) in self.shared.reed.iter().zip(factors) {
+            place.store(factor.to_bits(), Ordering::Relaxed);
         }
     }
 
@@ -88,7 +127,7 @@ impl Audio {
         clarinet: &mut Clarinet,
         settings: &Settings,
         host: impl Iterator<Item = Timed<Event>>,
-        stage: &Stage,
+        stage: Stage,
         out: &mut [f32],
     ) {
         if self.reader.is_none() {
@@ -96,8 +135,12 @@ impl Audio {
         }
         self.sent_count = 0;
         let samples = out.len();
-        let maps = self.maps.read();
-        let take = self.take.read().as_deref().filter(|_| stage.replay);
+        let (desk_maps, desk_take) = (self.maps.read(), self.take.read());
+        let desk_rest_deg = f64::from_bits(self.shared.rest_deg.load(Ordering::Relaxed));
+        let (maps, take, rest_deg) = match &self.prepared {
+            Some(Prepared { maps, take, rest_deg }) if stage.replay => (maps, Some(&**take), *rest_deg),
+            _ => (desk_maps, desk_take.as_deref().filter(|_| stage.replay), desk_rest_deg),
+        };
         // The ring is emptied even when nobody listens.
         let mut reader = self.reader.as_mut();
         if let Some(reader) = &mut reader {
@@ -130,7 +173,7 @@ impl Audio {
             (Source::Take, Some(take), _) => {
                 let begun = self.replayed;
                 let angle = |at: usize| {
-                    Some(take.angle_deg((begun + at as u64) as f64 / stage.rate_hz) - stage.rest_deg)
+                    Some(take.angle_deg((begun + at as u64) as f64 / stage.rate_hz) - rest_deg)
                 };
                 let events = Blown::new(host, &mut self.blower, maps, full_pa, samples, angle, &mut heard);
                 clarinet.render_events(events, out);
@@ -138,7 +181,7 @@ impl Audio {
             }
             (Source::Knob, _, Some(reader)) => {
                 let slap = reader.take_slap().map(|strength| Timed { at: 0, event: Event::TongueSlap { strength } });
-                let angle = |at: usize| reader.pose(at).map(|pose| f64::from(pose.angle_deg) - stage.rest_deg);
+                let angle = |at: usize| reader.pose(at).map(|pose| f64::from(pose.angle_deg) - rest_deg);
                 let events = Blown::new(host, &mut self.blower, maps, full_pa, samples, angle, &mut heard);
                 clarinet.render_events(slap.into_iter().chain(events), out);
             }

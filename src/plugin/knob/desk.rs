@@ -111,6 +111,8 @@ impl Desk {
     pub(super) fn turn(&mut self) {
         let params = self.params.clone();
         let knob = &params.knob;
+        let rest_deg = knob.calibration.read().map_or(0.0, |calibration| calibration.rest_deg);
+        self.shared.rest_deg.store(rest_deg.to_bits(), Ordering::Relaxed);
         self.choose(knob);
         if self.choice != Choice::Off || knob.replay.value() {
             self.feel(&params);
