@@ -10,6 +10,7 @@ mod impedance;
 mod reed;
 mod render;
 mod settings;
+mod study;
 mod table;
 mod threshold;
 mod tune;
@@ -57,6 +58,7 @@ enum Command {
     Threshold(threshold::Threshold),
     Tune(Box<tune::Tune>),
     Reed(reed::Reed),
+    Study(study::Study),
     Haptic(Box<haptic::Haptic>),
 }
 
@@ -108,6 +110,7 @@ pub fn main() -> ExitCode {
         Command::Threshold(command) => command.run(),
         Command::Tune(command) => command.run(),
         Command::Reed(command) => command.run(),
+        Command::Study(command) => command.run(),
         Command::Haptic(command) => command.run(),
     };
     match done {

@@ -431,7 +431,7 @@ mod tests {
         ("torque", "Knob", "60 mNm"),
         ("kdamp", "Knob", "1.00 mNm s"),
         ("kfric", "Knob", "1.0 mNm"),
-        ("detent", "Knob", "4.0 mNm"),
+        ("detent", "Knob", "6.0 mNm"),
         ("oscprt", "Knob", "8000"),
         ("oscany", "Knob", "Off"),
         ("rec", "Knob", "Off"),

@@ -378,7 +378,7 @@ pub fn design(knob: &KnobParams) -> FeelDesign {
         travel_deg: calibration.travel_deg,
         damping_mnms: f64::from(knob.damping.value()),
         friction_mnm: f64::from(knob.friction.value()),
-        detent_mnm: f64::from(knob.detent.value()),
+        detent_mnm: (knob.law.value() == LawChoice::Pressure).then(|| f64::from(knob.detent.value())),
         ..FeelDesign::default()
     }
 }

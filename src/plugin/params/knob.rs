@@ -180,7 +180,7 @@ pub struct KnobParams {
     /// Friction, mNm.
     #[id = "kfric"]
     pub friction: FloatParam,
-    /// Height of the mark at the threshold, mNm.
+    /// Height of the step at the threshold, mNm; pressure law only, the flow law has its peak there. Default 6.
     #[id = "detent"]
     pub detent: FloatParam,
     /// UDP port for OSC.
@@ -252,7 +252,7 @@ impl KnobParams {
             torque: number("Feel torque", 60.0, 0.0, CEILING_MNM.1, 0, " mNm").non_automatable(),
             damping: number("Feel damping", 1.0, 0.0, 20.0, 2, " mNm s").non_automatable(),
             friction: number("Feel friction", 1.0, 0.0, 20.0, 1, " mNm").non_automatable(),
-            detent: number("Feel mark", 4.0, 0.0, 30.0, 1, " mNm").non_automatable(),
+            detent: number("Feel step", 6.0, 0.0, 30.0, 1, " mNm").non_automatable(),
             osc_port: whole("OSC port", 8_000, 1_024, 65_535),
             osc_any: act("OSC from network"),
             record: act("Record take"),
