@@ -8,6 +8,7 @@ pub mod host;
 pub mod machine;
 pub mod midi;
 pub mod picture;
+pub mod simulator;
 pub mod wire_vectors;
 
 /// One chore.
