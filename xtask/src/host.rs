@@ -249,6 +249,11 @@ impl Session {
         })
     }
 
+    /// Samples played since activation.
+    pub fn played(&self) -> usize {
+        self.played
+    }
+
     /// What the plugin has sent since activation.
     pub fn answers(&self) -> &[(usize, [u8; 3])] {
         &self.answers
