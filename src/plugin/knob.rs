@@ -8,7 +8,7 @@
 mod audio;
 mod desk;
 
-use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
@@ -16,7 +16,8 @@ pub use audio::{Audio, Stage};
 
 use crate::haptics::FeelTable;
 use crate::plugin::params::ChalumeauParams;
-use crate::touch::feel::{Feels, Maps};
+use crate::touch::blower::Hand;
+use crate::touch::feel::Feels;
 use crate::touch::take::Take;
 use crate::units::SoundingNote;
 
@@ -32,8 +33,6 @@ pub struct Shared {
     gamma: AtomicU32,
     /// Factors on H and k from controllers, bits of f32s.
     reed: [AtomicU32; 2],
-    /// Angle of the knob at rest, degrees, bits of an f64.
-    rest_deg: AtomicU64,
     /// The feel in force, with the instrument it is of. Only desk and link lock it.
     feel: Mutex<Option<Arc<(Feels, FeelTable)>>>,
     stop: AtomicBool,
@@ -46,7 +45,6 @@ impl Shared {
             note: AtomicU8::new(NO_NOTE),
             gamma: AtomicU32::new(0),
             reed: [one(), one()],
-            rest_deg: AtomicU64::new(0),
             feel: Mutex::new(None),
             stop: AtomicBool::new(false),
         }
@@ -75,12 +73,12 @@ impl Knob {
     /// Starts the desk; the link follows when the user wants a knob. Allocates.
     pub fn start(params: Arc<ChalumeauParams>) -> (Self, Audio) {
         let shared = Arc::new(Shared::new());
-        let (maps_in, maps) = triple_buffer::triple_buffer(&Maps::default());
+        let (hand_in, hand) = triple_buffer::triple_buffer(&Hand::default());
         let (take_in, take) = triple_buffer::triple_buffer(&None::<Arc<Take>>);
         let (readers_in, readers) = rtrb::RingBuffer::new(1);
-        let desk = desk::Desk::new(params, shared.clone(), readers_in, maps_in, take_in);
+        let desk = desk::Desk::new(params, shared.clone(), readers_in, hand_in, take_in);
         let desk = std::thread::Builder::new().name("chalumeau knob".to_owned()).spawn(move || desk.run());
-        let audio = Audio::new(shared.clone(), readers, maps, take);
+        let audio = Audio::new(shared.clone(), readers, hand, take);
         // Without a thread there is no knob; the instrument plays all the same.
         (Self { shared, desk: desk.ok() }, audio)
     }

@@ -432,6 +432,7 @@ mod tests {
         ("kdamp", "Knob", "1.00 mNm s"),
         ("kfric", "Knob", "1.0 mNm"),
         ("detent", "Knob", "6.0 mNm"),
+        ("curve", "Knob", "1.00"),
         ("oscprt", "Knob", "8000"),
         ("oscany", "Knob", "Off"),
         ("rec", "Knob", "Off"),
@@ -602,7 +603,7 @@ mod tests {
             fields: BTreeMap::from([
                 ("schema".to_owned(), "rubbish".to_owned()),
                 ("serial".to_owned(), "\"/dev/ttyUSB0\"".to_owned()),
-                ("calibration".to_owned(), "{\"rest_deg\":1e99,\"travel_deg\":1.0}".to_owned()),
+                ("calibration".to_owned(), "{\"rest_deg\":1e99,\"travel_deg\":1.0,\"dead_deg\":[1,5]}".to_owned()),
             ]),
         };
         mend(&mut state);

@@ -4,7 +4,7 @@
 //! the steps of a 14-bit controller, so that a host that records it plays the very same breath back.
 
 use crate::control::keys::Keys;
-use crate::control::knob::DeadZone;
+use crate::control::knob::{KnobBreath, KnobDesign};
 use crate::event::{Event, Timed};
 use crate::touch::feel::Maps;
 use crate::units::SoundingNote;
@@ -30,12 +30,25 @@ impl Breath14 {
     }
 }
 
+/// The hand on the knob: how it blows, and whether it feels. Plain numbers, to be copied between threads.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Hand {
+    /// What each note makes of the angle.
+    pub maps: Maps,
+    /// Rest, full blow, dead zone and curve.
+    pub design: KnobDesign,
+    /// The knob feels: angles are taken as they are, because the notes' landmarks lie on them. On one that does not,
+    /// full blow is the reference reed's closure, wherever the player has put it, and the curve bends the way there.
+    pub feels: bool,
+}
+
 /// Follows the notes and turns angles into breath. Real-time safe throughout.
 #[derive(Clone, Debug, Default)]
 pub struct Blower {
     keys: Keys,
     fingered: Option<SoundingNote>,
-    dead_zone: DeadZone,
+    blowing: bool,
+    unfelt: Option<KnobBreath>,
     sent: Option<Breath14>,
     /// Samples since the start.
     clock: u64,
@@ -84,12 +97,30 @@ impl Blower {
         self.clock += samples as u64;
     }
 
-    /// Breath of a knob turned so far from rest, if it is not what was sent last.
-    pub fn blow(&mut self, maps: &Maps, angle_deg: f64, full_pa: f64) -> Option<Breath14> {
-        let angle_deg = self.dead_zone.angle_deg(angle_deg);
-        let unit = maps.pressure_pa(self.fingered, angle_deg) / full_pa;
+    /// Breath of a knob at an angle, if it is not what was sent last.
+    pub fn blow(&mut self, hand: &Hand, angle_deg: f64, full_pa: f64) -> Option<Breath14> {
+        let angle_deg = if hand.feels { self.beyond_rest(hand, angle_deg) } else { self.unfelt(hand, angle_deg) };
+        let unit = hand.maps.pressure_pa(self.fingered, angle_deg) / full_pa;
         let breath = Breath14((unit.clamp(0.0, 1.0) * f64::from(STEPS)).round() as u16);
         (self.sent.replace(breath) != Some(breath)).then_some(breath)
+    }
+
+    /// Angle from rest, 0 inside the dead zone; what lies beyond is not moved, it has been felt there.
+    fn beyond_rest(&mut self, hand: &Hand, angle_deg: f64) -> f64 {
+        let KnobDesign { zero_deg, dead_on_deg, dead_off_deg, .. } = hand.design;
+        let from_rest = angle_deg - zero_deg;
+        // Not a number is no breath.
+        self.blowing = from_rest > if self.blowing { dead_off_deg } else { dead_on_deg };
+        if self.blowing { from_rest } else { 0.0 }
+    }
+
+    /// The share of full blow as an angle on the reference reed's travel.
+    fn unfelt(&mut self, hand: &Hand, angle_deg: f64) -> f64 {
+        if self.unfelt.is_none_or(|knob| *knob.design() != hand.design) {
+            self.unfelt = KnobBreath::new(hand.design).ok();
+        }
+        let travel_deg = hand.design.full_deg - hand.design.zero_deg;
+        self.unfelt.as_mut().map_or(0.0, |knob| travel_deg * f64::from(knob.pressure_unit(angle_deg)))
     }
 
     /// The knob has gone: no breath, if there was any.
@@ -102,9 +133,9 @@ impl Blower {
 pub struct Blown<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> {
     host: std::iter::Peekable<I>,
     blower: &'a mut Blower,
-    maps: &'a Maps,
+    hand: &'a Hand,
     full_pa: f64,
-    /// Angle from rest at a sample of the block.
+    /// Angle at a sample of the block.
     angle: A,
     /// Where breath comes next.
     next: usize,
@@ -113,18 +144,18 @@ pub struct Blown<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option
 }
 
 impl<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Blown<'a, I, A> {
-    /// `angle` gives the angle from rest at a sample of the block, degrees; `heard` is told of every breath.
+    /// `angle` gives the knob's angle at a sample of the block, degrees; `heard` is told of every breath.
     pub fn new(
         host: I,
         blower: &'a mut Blower,
-        maps: &'a Maps,
+        hand: &'a Hand,
         full_pa: f64,
         samples: usize,
         angle: A,
         heard: &'a mut dyn FnMut(usize, Breath14),
     ) -> Self {
         let next = blower.next_point(0);
-        Self { host: host.peekable(), blower, maps, full_pa, angle, next, samples, heard }
+        Self { host: host.peekable(), blower, hand, full_pa, angle, next, samples, heard }
     }
 }
 
@@ -147,7 +178,7 @@ impl<I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Iterator 
                 return None;
             }
             self.next = at + GRID as usize;
-            let blown = (self.angle)(at).and_then(|angle| self.blower.blow(self.maps, angle, self.full_pa));
+            let blown = (self.angle)(at).and_then(|angle| self.blower.blow(self.hand, angle, self.full_pa));
             if let Some(breath) = blown {
                 (self.heard)(at, breath);
                 return Some(Timed { at, event: Event::Breath(breath.unit()) });

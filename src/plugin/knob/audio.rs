@@ -10,8 +10,8 @@ use crate::event::{Event, Timed};
 use crate::haptics::Limits;
 use crate::instrument::{Clarinet, Settings};
 use crate::plugin::params::ChalumeauParams;
-use crate::touch::blower::{Blower, Blown, Breath14, GRID};
-use crate::touch::feel::{Feels, Maps};
+use crate::touch::blower::{Blower, Blown, Breath14, GRID, Hand};
+use crate::touch::feel::Feels;
 use crate::touch::take::Take;
 use crate::units::Air;
 
@@ -37,7 +37,7 @@ pub struct Audio {
     shared: Arc<Shared>,
     readers: rtrb::Consumer<KnobReader>,
     reader: Option<KnobReader>,
-    maps: triple_buffer::Output<Maps>,
+    hand: triple_buffer::Output<Hand>,
     take: triple_buffer::Output<Option<Arc<Take>>>,
     blower: Blower,
     source: Source,
@@ -45,15 +45,14 @@ pub struct Audio {
     sent_count: usize,
     /// Samples of a take already played.
     replayed: u64,
-    /// Maps and take as they were loaded before playing began; what the desk has come by since is newer.
+    /// Hand and take as they were loaded before playing began; what the desk has come by since is newer.
     prepared: Option<Prepared>,
 }
 
 /// What a render needs from its first sample, when there is no time to wait for the desk.
 struct Prepared {
-    maps: Maps,
+    hand: Hand,
     take: Arc<Take>,
-    rest_deg: f64,
 }
 
 /// What of the parameters matters to a block.
@@ -71,14 +70,14 @@ impl Audio {
     pub(super) fn new(
         shared: Arc<Shared>,
         readers: rtrb::Consumer<KnobReader>,
-        maps: triple_buffer::Output<Maps>,
+        hand: triple_buffer::Output<Hand>,
         take: triple_buffer::Output<Option<Arc<Take>>>,
     ) -> Self {
         Self {
             shared,
             readers,
             reader: None,
-            maps,
+            hand,
             take,
             blower: Blower::default(),
             source: Source::Host,
@@ -102,8 +101,8 @@ impl Audio {
         let feels = Feels::new(&InstrumentFile::built_in(), Air::default());
         let limits = Limits { ceiling_mnm: HARD_CEILING_MNM, ..Limits::default() };
         let Ok(table) = feels.table(&params.settings(), &desk::design(&params.knob), &limits) else { return };
-        let rest_deg = params.knob.calibration.read().map_or(0.0, |calibration| calibration.rest_deg);
-        self.prepared = Some(Prepared { maps: feels.maps(&table), take, rest_deg });
+        let hand = Hand { maps: feels.maps(&table), design: desk::calibrated(&params.knob), feels: true };
+        self.prepared = Some(Prepared { hand, take });
     }
 
     /// Tells the feel what controllers make of H and k.
@@ -135,11 +134,10 @@ impl Audio {
         }
         self.sent_count = 0;
         let samples = out.len();
-        let (desk_maps, desk_take) = (self.maps.read(), self.take.read());
-        let desk_rest_deg = f64::from_bits(self.shared.rest_deg.load(Ordering::Relaxed));
-        let (maps, take, rest_deg) = match &self.prepared {
-            Some(Prepared { maps, take, rest_deg }) if stage.replay => (maps, Some(&**take), *rest_deg),
-            _ => (desk_maps, desk_take.as_deref().filter(|_| stage.replay), desk_rest_deg),
+        let (hand, take) = (self.hand.read(), self.take.read());
+        let (hand, take) = match &self.prepared {
+            Some(Prepared { hand, take }) if stage.replay => (hand, Some(&**take)),
+            _ => (hand, take.as_deref().filter(|_| stage.replay)),
         };
         // The ring is emptied even when nobody listens.
         let mut reader = self.reader.as_mut();
@@ -147,7 +145,7 @@ impl Audio {
             reader.begin_block(samples, stage.rate_hz);
         }
         let source = match (&take, &reader) {
-            _ if !maps.is_ready() => Source::Host,
+            _ if !hand.maps.is_ready() => Source::Host,
             (Some(_), _) => Source::Take,
             (None, Some(reader)) if !stage.offline && reader.pose(0).is_some() => Source::Knob,
             _ => Source::Host,
@@ -173,16 +171,16 @@ impl Audio {
             (Source::Take, Some(take), _) => {
                 let begun = self.replayed;
                 let angle = |at: usize| {
-                    Some(take.angle_deg((begun + at as u64) as f64 / stage.rate_hz) - rest_deg)
+                    Some(take.angle_deg((begun + at as u64) as f64 / stage.rate_hz))
                 };
-                let events = Blown::new(host, &mut self.blower, maps, full_pa, samples, angle, &mut heard);
+                let events = Blown::new(host, &mut self.blower, hand, full_pa, samples, angle, &mut heard);
                 clarinet.render_events(events, out);
                 self.replayed += samples as u64;
             }
             (Source::Knob, _, Some(reader)) => {
                 let slap = reader.take_slap().map(|strength| Timed { at: 0, event: Event::TongueSlap { strength } });
-                let angle = |at: usize| reader.pose(at).map(|pose| f64::from(pose.angle_deg) - rest_deg);
-                let events = Blown::new(host, &mut self.blower, maps, full_pa, samples, angle, &mut heard);
+                let angle = |at: usize| reader.pose(at).map(|pose| f64::from(pose.angle_deg));
+                let events = Blown::new(host, &mut self.blower, hand, full_pa, samples, angle, &mut heard);
                 clarinet.render_events(slap.into_iter().chain(events), out);
             }
             _ => {

@@ -7,12 +7,14 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::Shared;
 use crate::bore::instrument_file::InstrumentFile;
+use crate::control::knob::{self, KnobDesign, Taken};
 use crate::device::{Choice, Hooks, KnobLink, KnobReader, LinkStatus};
 use crate::haptics::{FeelDesign, Limits, Order};
 use crate::instrument::Settings;
 use crate::plugin::params::knob::{Calibration, KnobKind, LawChoice, OrderChoice};
 use crate::plugin::params::{ChalumeauParams, KnobParams};
-use crate::touch::feel::{Feels, Maps};
+use crate::touch::blower::Hand;
+use crate::touch::feel::Feels;
 use crate::touch::study::{Side, plan};
 use crate::touch::take::{Marks, Moment, Take, TakeWriter};
 use crate::units::{Air, SoundingNote, WrittenNote};
@@ -41,7 +43,8 @@ pub struct Desk {
     params: Arc<ChalumeauParams>,
     shared: Arc<Shared>,
     readers: rtrb::Producer<KnobReader>,
-    maps: triple_buffer::Input<Maps>,
+    hand_in: triple_buffer::Input<Hand>,
+    hand: Hand,
     take: triple_buffer::Input<Option<Arc<Take>>>,
     feels: Option<Feels>,
     /// What the feel in force was worked out from.
@@ -57,6 +60,8 @@ pub struct Desk {
     switches: Switches,
     quiet_since: Option<Instant>,
     was_armed: bool,
+    calibration: knob::Calibration,
+    began: Instant,
 }
 
 /// Switches as they were seen last.
@@ -74,14 +79,15 @@ impl Desk {
         params: Arc<ChalumeauParams>,
         shared: Arc<Shared>,
         readers: rtrb::Producer<KnobReader>,
-        maps: triple_buffer::Input<Maps>,
+        hand_in: triple_buffer::Input<Hand>,
         take: triple_buffer::Input<Option<Arc<Take>>>,
     ) -> Self {
         Self {
             params,
             shared,
             readers,
-            maps,
+            hand_in,
+            hand: Hand::default(),
             take,
             feels: None,
             made_of: None,
@@ -96,6 +102,8 @@ impl Desk {
             switches: Switches::default(),
             quiet_since: None,
             was_armed: false,
+            calibration: knob::Calibration::default(),
+            began: Instant::now(),
         }
     }
 
@@ -111,14 +119,13 @@ impl Desk {
     pub(super) fn turn(&mut self) {
         let params = self.params.clone();
         let knob = &params.knob;
-        let rest_deg = knob.calibration.read().map_or(0.0, |calibration| calibration.rest_deg);
-        self.shared.rest_deg.store(rest_deg.to_bits(), Ordering::Relaxed);
         self.choose(knob);
         if self.choice != Choice::Off || knob.replay.value() {
             self.feel(&params);
         }
         self.replay(knob);
         let status = self.link.as_ref().map(KnobLink::status);
+        self.place_hand(knob, status.as_ref().is_none_or(|status| status.tier > 0));
         if let Some(status) = &status {
             self.act(knob, status);
         }
@@ -202,7 +209,8 @@ impl Desk {
         let limits = Limits { ceiling_mnm, ..Limits::default() };
         match feels.table(&settings, &design, &limits) {
             Ok(table) => {
-                self.maps.write(feels.maps(&table));
+                self.hand.maps = feels.maps(&table);
+                self.hand_in.write(self.hand);
                 if let Ok(mut feel) = self.shared.feel.lock() {
                     *feel = Some(Arc::new((feels.clone(), table)));
                 }
@@ -210,6 +218,14 @@ impl Desk {
             }
             // The feel before stays, and so does what its angles blow.
             Err(reason) => self.refused = Some(format!("feel unchanged: {reason}")),
+        }
+    }
+
+    fn place_hand(&mut self, knob: &KnobParams, feels: bool) {
+        let design = calibrated(knob);
+        if (self.hand.design, self.hand.feels) != (design, feels) {
+            (self.hand.design, self.hand.feels) = (design, feels);
+            self.hand_in.write(self.hand);
         }
     }
 
@@ -275,31 +291,44 @@ impl Desk {
         if now.rest && !before.rest {
             if status.armed {
                 self.note_to_user = Some("Rest here: switch Arm off first".to_owned());
-            } else if status.tier == 0 {
-                calibrate(knob, |c| c.rest_deg = status.angle_deg);
             } else {
-                link.zero();
-                calibrate(knob, |c| c.rest_deg = 0.0);
+                self.calibration.rest();
             }
         }
         if now.blow && !before.blow {
-            let rest_deg = knob.calibration.read().map_or(0.0, |c| c.rest_deg);
-            let travel_deg = status.angle_deg - rest_deg;
-            let (least, most) = Calibration::TRAVEL_DEG;
-            if (least..=most).contains(&travel_deg) {
-                calibrate(knob, |c| c.travel_deg = travel_deg);
-            } else {
-                self.note_to_user = Some(format!(
-                    "Blow hard here: the knob stands {travel_deg:.0} degrees from rest; turn it {least:.0} to {most:.0}"
-                ));
-            }
+            self.calibration.blow(&calibrated(knob));
         }
         self.switches = now;
     }
 
+    /// One reading for a calibration that is under way.
+    fn calibrate(&mut self, angle_deg: Option<f64>) {
+        let t_s = self.began.elapsed().as_secs_f64();
+        let knob = &self.params.knob;
+        match self.calibration.tick(t_s, angle_deg) {
+            None => {}
+            Some(Err(reason)) => self.note_to_user = Some(reason.to_string()),
+            Some(Ok(taken)) => {
+                let mut design = taken.applied_to(calibrated(knob));
+                if let (Taken::Rest { .. }, Some(link), true) = (taken, &self.link, self.hand.feels) {
+                    // The law's angles are counted from the knob's own zero.
+                    link.zero();
+                    (design.zero_deg, design.full_deg) = (0.0, design.full_deg - design.zero_deg);
+                }
+                if let Ok(mut calibration) = knob.calibration.write() {
+                    *calibration = Calibration::of(&design);
+                }
+                let Calibration { travel_deg, dead_deg, .. } = Calibration::of(&design);
+                self.note_to_user = Some(match taken {
+                    Taken::Rest { .. } => format!("at rest; breath begins {:.1} degrees from here", dead_deg.0),
+                    Taken::Blow { .. } => format!("full blow is {travel_deg:.0} degrees from rest"),
+                });
+            }
+        }
+    }
+
     fn record(&mut self, wanted: bool) {
         if wanted && self.recording.is_none() {
-            while self.rows.1.try_recv().is_ok() {}
             self.recording = match begin_take(&self.params) {
                 Ok(recording) => Some(recording),
                 Err(reason) => {
@@ -309,12 +338,18 @@ impl Desk {
             };
         }
         let marks = marks(&self.params, &self.params.settings().with_reed_factors(self.shared.reed()));
+        let mut heard = false;
         while let Ok(moment) = self.rows.1.try_recv() {
+            heard = true;
+            self.calibrate(Some(moment.angle_deg));
             let Some(recording) = &mut self.recording else { continue };
             match recording.writer.write(&moment, &marks) {
                 Ok(()) => recording.rows += 1,
                 Err(reason) => recording.trouble = Some(reason.to_string()),
             }
+        }
+        if !heard {
+            self.calibrate(None);
         }
         if !wanted && let Some(Recording { writer, path, rows, trouble }) = self.recording.take() {
             self.take_trouble = match (rows, trouble, writer) {
@@ -389,11 +424,10 @@ pub fn load(path: &str) -> Result<Arc<Take>, String> {
     Take::read(file).map(Arc::new).map_err(|reason| format!("take {path}: {reason}"))
 }
 
-fn calibrate(knob: &KnobParams, change: impl FnOnce(&mut Calibration)) {
-    if let Ok(mut calibration) = knob.calibration.write() {
-        change(&mut calibration);
-        *calibration = calibration.mended();
-    }
+/// Rest, full blow, dead zone and curve as the parameters have them.
+pub fn calibrated(knob: &KnobParams) -> KnobDesign {
+    let calibration = knob.calibration.read().map_or_else(|_| Calibration::default(), |c| *c);
+    calibration.design(f64::from(knob.curve.value()))
 }
 
 fn marks(params: &ChalumeauParams, settings: &Settings) -> Marks {

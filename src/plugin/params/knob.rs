@@ -9,6 +9,7 @@ use nice_plug::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{either, number};
+use crate::control::knob::KnobDesign;
 use crate::touch::study::{Side, TRIALS, Trial, plan};
 
 /// Most torque a session starts with, mNm; and the most *Arm* can be given (`docs/protocol.md`, safety).
@@ -94,13 +95,15 @@ pub enum ReedSource {
     Pressure,
 }
 
-/// Where the hand rests and how far it turns.
+/// Where the hand rests and how far it turns, as a state keeps it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     /// Angle of the knob at rest, degrees.
     pub rest_deg: f64,
     /// Angle from rest that is a full blow: the reference reed's closure on the reference note, degrees.
     pub travel_deg: f64,
+    /// How far from rest breath begins, degrees, and ends.
+    pub dead_deg: (f64, f64),
 }
 
 impl Calibration {
@@ -112,16 +115,36 @@ impl Calibration {
         let fix = |x: f64, low: f64, high: f64, default: f64| {
             if x.is_finite() { x.clamp(low, high) } else { default }
         };
+        let d = Self::default();
+        let dead_on = fix(self.dead_deg.0, 0.1, 30.0, d.dead_deg.0);
         Self {
             rest_deg: fix(self.rest_deg, -36_000.0, 36_000.0, 0.0),
-            travel_deg: fix(self.travel_deg, Self::TRAVEL_DEG.0, Self::TRAVEL_DEG.1, 360.0),
+            travel_deg: fix(self.travel_deg, Self::TRAVEL_DEG.0, Self::TRAVEL_DEG.1, d.travel_deg),
+            dead_deg: (dead_on, fix(self.dead_deg.1, 0.0, 0.9 * dead_on, 0.5 * dead_on)),
         }
+    }
+
+    /// As the knob's breath wants it.
+    pub fn design(self, curve: f64) -> KnobDesign {
+        let Self { rest_deg, travel_deg, dead_deg: (dead_on_deg, dead_off_deg) } = self.mended();
+        KnobDesign { zero_deg: rest_deg, full_deg: rest_deg + travel_deg, curve, dead_on_deg, dead_off_deg }
+    }
+
+    /// What a design says, the other way round.
+    pub fn of(design: &KnobDesign) -> Self {
+        Self {
+            rest_deg: design.zero_deg,
+            travel_deg: design.full_deg - design.zero_deg,
+            dead_deg: (design.dead_on_deg, design.dead_off_deg),
+        }
+        .mended()
     }
 }
 
 impl Default for Calibration {
     fn default() -> Self {
-        Self { rest_deg: 0.0, travel_deg: 360.0 }
+        let design = KnobDesign::default();
+        Self { rest_deg: 0.0, travel_deg: 360.0, dead_deg: (design.dead_on_deg, design.dead_off_deg) }
     }
 }
 
@@ -183,6 +206,9 @@ pub struct KnobParams {
     /// Height of the step at the threshold, mNm; pressure law only, the flow law has its peak there. Default 6.
     #[id = "detent"]
     pub detent: FloatParam,
+    /// Exponent of the way from rest to full blow, on knobs that do not feel. Default 1.
+    #[id = "curve"]
+    pub curve: FloatParam,
     /// UDP port for OSC.
     #[id = "oscprt"]
     pub osc_port: IntParam,
@@ -253,6 +279,7 @@ impl KnobParams {
             damping: number("Feel damping", 1.0, 0.0, 20.0, 2, " mNm s").non_automatable(),
             friction: number("Feel friction", 1.0, 0.0, 20.0, 1, " mNm").non_automatable(),
             detent: number("Feel step", 6.0, 0.0, 30.0, 1, " mNm").non_automatable(),
+            curve: number("Knob curve", 1.0, 0.25, 4.0, 2, "").non_automatable(),
             osc_port: whole("OSC port", 8_000, 1_024, 65_535),
             osc_any: act("OSC from network"),
             record: act("Record take"),
@@ -285,7 +312,7 @@ impl KnobParams {
         Some((participant, trial, if self.side.value() { Side::B } else { Side::A }))
     }
 
-    pub(super) fn numbers(&self) -> [(&'static str, &FloatParam); 6] {
+    pub(super) fn numbers(&self) -> [(&'static str, &FloatParam); 7] {
         [
             ("ceil", &self.ceiling),
             ("contr", &self.contrast),
@@ -293,6 +320,7 @@ impl KnobParams {
             ("kdamp", &self.damping),
             ("kfric", &self.friction),
             ("detent", &self.detent),
+            ("curve", &self.curve),
         ]
     }
 
