@@ -5,6 +5,7 @@
 //! was given and what would be right, and no file; a reader that closes the pipe early is no mistake.
 
 mod args;
+mod feel;
 mod haptic;
 mod impedance;
 mod reed;
@@ -24,6 +25,7 @@ use crate::render::breath::BreathError;
 use crate::render::midi_file::MidiFileError;
 use crate::render::score::ScoreError;
 use crate::render::wav::WavError;
+use crate::touch::take::TakeError;
 use clap::{Parser, Subcommand};
 use std::io;
 use std::path::PathBuf;
@@ -69,6 +71,8 @@ enum Failure {
     Read { path: PathBuf, source: io::Error },
     #[error("{}: {source}", path.display())]
     MidiFile { path: PathBuf, source: MidiFileError },
+    #[error("{}: {source}", path.display())]
+    TakeFile { path: PathBuf, source: TakeError },
     #[error("{}: {source}", path.display())]
     BreathFile { path: PathBuf, source: BreathError },
     #[error("{}: {source}", path.display())]

@@ -158,12 +158,20 @@ impl Plugin for Chalumeau {
                 for (cc, byte) in [(2, coarse), (34, fine)] {
                     let value = f32::from(byte) / 127.0;
                     // A host that takes no events loses a recording, not the sound.
-                    let _ = context.try_send_event(NoteEvent::MidiCC { timing: at as u32, channel: 0, cc, value });
+                    let _ = context.try_send_event(NoteEvent::MidiCC {
+                        timing: at as u32,
+                        channel: 0,
+                        cc,
+                        value,
+                    });
                 }
             }
         }
         #[cfg(not(feature = "devices"))]
-        clarinet.render_events(events, out);
+        {
+            let _ = rate_hz;
+            clarinet.render_events(events, out);
+        }
 
         for copy in copies {
             copy.copy_from_slice(out);

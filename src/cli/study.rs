@@ -32,7 +32,9 @@ pub struct Study {
 impl Study {
     pub fn run(&self) -> Result<(), Failure> {
         let mut table = self.table.open("participant,seed,trial,h,a,k_a,b,k_b")?;
-        table.comment(format_args!("k of the coupled side is 27/(4 H^3), of the free side the seed's 0.3849"))?;
+        table.comment(format_args!(
+            "k of the coupled side is 27/(4 H^3), of the free side the seed's 0.3849"
+        ))?;
         for trial in plan(self.participant, self.seed) {
             let [a, b] = [Side::A, Side::B].map(|side| trial.condition(side));
             table.line(format_args!(

@@ -13,8 +13,8 @@ use crate::instrument::{Settings, Tuning};
 
 pub mod knob;
 
-use knob::{Calibration, ReedSource};
 pub use knob::KnobParams;
+use knob::{Calibration, ReedSource};
 use serde::{Serialize, de::DeserializeOwned};
 
 /// Layout of the saved state. 1: ids and units as below.
@@ -603,7 +603,10 @@ mod tests {
             fields: BTreeMap::from([
                 ("schema".to_owned(), "rubbish".to_owned()),
                 ("serial".to_owned(), "\"/dev/ttyUSB0\"".to_owned()),
-                ("calibration".to_owned(), "{\"rest_deg\":1e99,\"travel_deg\":1.0,\"dead_deg\":[1,5]}".to_owned()),
+                (
+                    "calibration".to_owned(),
+                    "{\"rest_deg\":1e99,\"travel_deg\":1.0,\"dead_deg\":[1,5]}".to_owned(),
+                ),
             ]),
         };
         mend(&mut state);

@@ -99,7 +99,8 @@ impl Blower {
 
     /// Breath of a knob at an angle, if it is not what was sent last.
     pub fn blow(&mut self, hand: &Hand, angle_deg: f64, full_pa: f64) -> Option<Breath14> {
-        let angle_deg = if hand.feels { self.beyond_rest(hand, angle_deg) } else { self.unfelt(hand, angle_deg) };
+        let angle_deg =
+            if hand.feels { self.beyond_rest(hand, angle_deg) } else { self.unfelt(hand, angle_deg) };
         let unit = hand.maps.pressure_pa(self.fingered, angle_deg) / full_pa;
         let breath = Breath14((unit.clamp(0.0, 1.0) * f64::from(STEPS)).round() as u16);
         (self.sent.replace(breath) != Some(breath)).then_some(breath)
@@ -182,6 +183,117 @@ impl<I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Iterator 
             if let Some(breath) = blown {
                 (self.heard)(at, breath);
                 return Some(Timed { at, event: Event::Breath(breath.unit()) });
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bore::instrument_file::InstrumentFile;
+    use crate::control::midi::MidiDecoder;
+    use crate::haptics::FeelDesign;
+    use crate::instrument::Settings;
+    use crate::touch::feel::{Feels, NO_MOTOR};
+    use crate::units::Air;
+    use std::sync::LazyLock;
+
+    static HAND: LazyLock<Hand> = LazyLock::new(|| {
+        let feels = Feels::new(&InstrumentFile::built_in(), Air::default());
+        let table = feels.table(&Settings::default(), &FeelDesign::default(), &NO_MOTOR).unwrap();
+        Hand { maps: feels.maps(&table), design: KnobDesign::default(), feels: true }
+    });
+
+    fn note_on(at: usize, note: u8) -> Timed<Event> {
+        Timed { at, event: Event::NoteOn { note: SoundingNote(note), velocity: 0.8 } }
+    }
+
+    /// A phrase of two notes under a turning knob, in blocks of so many samples.
+    fn phrase(block: usize) -> Vec<(usize, Event)> {
+        let host = [note_on(100, 50), note_on(5_000, 69), Timed { at: 5_001, event: Event::Breath(0.9) }];
+        let (mut blower, mut all) = (Blower::default(), Vec::new());
+        for start in (0..9_600).step_by(block) {
+            let samples = block.min(9_600 - start);
+            let here = host.iter().filter(|event| (start..start + samples).contains(&event.at));
+            let here = here.map(|event| Timed { at: event.at - start, event: event.event });
+            let angle = |at: usize| Some(0.04 * (start + at) as f64);
+            let mut ignore = |_, _| {};
+            let events = Blown::new(here, &mut blower, &HAND, 6_000.0, samples, angle, &mut ignore);
+            all.extend(events.map(|event| (start + event.at, event.event)));
+            blower.advance(samples);
+        }
+        all
+    }
+
+    #[test]
+    fn blocks_make_no_difference() {
+        let whole = phrase(9_600);
+        assert!(whole.len() > 100, "{}", whole.len());
+        for block in [1, 17, 64, 511, 4_096] {
+            assert_eq!(phrase(block), whole, "blocks of {block}");
+        }
+        assert!(whole.is_sorted_by_key(|(at, _)| *at));
+    }
+
+    #[test]
+    fn while_the_knob_blows_nothing_else_does() {
+        assert!(!phrase(512).contains(&(5_001, Event::Breath(0.9))));
+    }
+
+    #[test]
+    fn each_note_makes_its_own_pressure_of_the_angle() {
+        let full_pa = 6_000.0;
+        let blown = |note: u8| {
+            let mut blower = Blower::default();
+            blower.heed(&note_on(0, note).event);
+            blower.blow(&HAND, 200.0, full_pa).unwrap().unit()
+        };
+        // Sounding G4 needs less than sounding A5 (clarion): at one angle it is blown harder.
+        assert!(
+            (f64::from(blown(65)) - HAND.maps.pressure_pa(Some(SoundingNote(65)), 200.0) / full_pa).abs()
+                < 1e-4
+        );
+        assert!(blown(65) > blown(69), "{} {}", blown(65), blown(69));
+    }
+
+    #[test]
+    fn rest_is_quiet_though_the_hand_shakes() {
+        let mut blower = Blower::default();
+        let mut sent = 0;
+        for n in 0..1_000 {
+            let tremor_deg = 0.9 * f64::from(n).sin();
+            sent += u32::from(blower.blow(&HAND, tremor_deg, 6_000.0).is_some_and(|breath| breath.0 > 0));
+        }
+        assert_eq!(sent, 0);
+        assert!(blower.blow(&HAND, 3.0, 6_000.0).unwrap().0 > 0);
+        assert!(blower.blow(&HAND, 0.8, 6_000.0).unwrap().0 > 0, "breath ends later than it begins");
+        assert_eq!(blower.blow(&HAND, 0.2, 6_000.0), Some(Breath14(0)));
+        assert_eq!(blower.blow(&HAND, f64::NAN, 6_000.0), None, "what is no angle is no breath");
+        assert_eq!(blower.fall_silent(), None);
+    }
+
+    #[test]
+    fn a_knob_that_feels_nothing_reaches_full_blow_where_the_player_has_put_it() {
+        let hand =
+            Hand { feels: false, design: KnobDesign { full_deg: 180.0, ..KnobDesign::default() }, ..*HAND };
+        let mut blower = Blower::default();
+        let travel = hand.maps.pressure_pa(None, 180.0);
+        let full = blower.blow(&hand, 180.0, 6_000.0).unwrap();
+        assert!((f64::from(full.unit()) - travel / 6_000.0).abs() < 1e-3);
+        assert_eq!(blower.blow(&hand, 500.0, 6_000.0), None, "full is full");
+    }
+
+    #[test]
+    fn a_recording_of_the_controllers_is_the_breath() {
+        let mut midi = MidiDecoder::new();
+        midi.controller(0, 34, 1);
+        for raw in (0..=16_383).step_by(7) {
+            let (coarse, fine) = Breath14(raw).bytes();
+            midi.controller(0, 2, coarse);
+            let event = midi.controller(0, 34, fine);
+            if raw > 0 {
+                assert_eq!(event, Some(Event::Breath(Breath14(raw).unit())), "{raw}");
             }
         }
     }

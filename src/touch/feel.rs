@@ -9,6 +9,13 @@ use crate::units::{Air, SoundingNote};
 /// Pitches there are names for.
 const PITCHES: usize = 128;
 
+/// Where no motor turns, as in a replay, any feel will do.
+pub const NO_MOTOR: Limits = Limits {
+    ceiling_mnm: f64::INFINITY,
+    stiffness_nm_per_rad: f64::INFINITY,
+    push_nm_per_rad: f64::INFINITY,
+};
+
 /// An instrument, and what its bore asks for every note. Building one takes half a second.
 #[derive(Clone, Debug)]
 pub struct Feels {

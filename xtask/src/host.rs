@@ -109,6 +109,23 @@ impl Plugin {
         Ok((text(first.id()), text(first.name())))
     }
 
+    /// Activates the plugin for blocks of up to `block` samples; [`deactivate`](Self::deactivate) takes the session back.
+    pub fn activate(&mut self, rate_hz: f64, block: usize) -> Result<Session> {
+        let frames = u32::try_from(block)?;
+        let config =
+            PluginAudioConfiguration { sample_rate: rate_hz, min_frames_count: 1, max_frames_count: frames };
+        let stopped = self.instance.activate(|_, _| (), config)?;
+        match stopped.start_processing() {
+            Ok(processor) => Ok(Session { processor, block, answers: Vec::new(), played: 0 }),
+            Err(_) => bail!("the plugin does not start at {rate_hz} Hz"),
+        }
+    }
+
+    /// Ends a session.
+    pub fn deactivate(&mut self, session: Session) {
+        self.instance.deactivate(session.processor.stop_processing());
+    }
+
     /// Activates the plugin for blocks of up to `block` samples, lets `body` play, and deactivates it.
     pub fn session<R>(
         &mut self,
@@ -116,17 +133,9 @@ impl Plugin {
         block: usize,
         body: impl FnOnce(&mut Session) -> R,
     ) -> Result<R> {
-        let frames = u32::try_from(block)?;
-        let config =
-            PluginAudioConfiguration { sample_rate: rate_hz, min_frames_count: 1, max_frames_count: frames };
-        let stopped = self.instance.activate(|_, _| (), config)?;
-        let processor = match stopped.start_processing() {
-            Ok(processor) => processor,
-            Err(_) => bail!("the plugin does not start at {rate_hz} Hz"),
-        };
-        let mut session = Session { processor, block, answers: Vec::new(), played: 0 };
+        let mut session = self.activate(rate_hz, block)?;
         let result = body(&mut session);
-        self.instance.deactivate(session.processor.stop_processing());
+        self.deactivate(session);
         Ok(result)
     }
 

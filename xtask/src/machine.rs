@@ -83,11 +83,8 @@ pub const GL: Package =
 pub const GLIB: Package =
     Package { name: "libglib2.0-0", present: || loads("libglib-2.0.so.0"), purpose: "the DawDreamer tests" };
 /// For MIDI devices and `chalumeau-standalone`.
-pub const PKG_CONFIG: Package = Package {
-    name: "pkg-config",
-    present: || works("pkg-config", &["--version"]),
-    purpose: "finding ALSA",
-};
+pub const PKG_CONFIG: Package =
+    Package { name: "pkg-config", present: || works("pkg-config", &["--version"]), purpose: "finding ALSA" };
 /// For MIDI devices and `chalumeau-standalone`.
 pub const ALSA: Package = Package {
     name: "libasound2-dev",

@@ -165,7 +165,12 @@ pub fn write_touch(path: &Path, performance: &Performance, rate_hz: f64) -> Resu
         held.extend([(t, before), (t, gamma)]);
     }
     let panels = [
-        ("Angle of the knob (blue) and threshold of each note (red)", "angle, degrees", knob(1), threshold(1)),
+        (
+            "Angle of the knob (blue) and threshold of each note (red)",
+            "angle, degrees",
+            knob(1),
+            threshold(1),
+        ),
         ("Mouth pressure over closing pressure (blue) and threshold (red)", "gamma", held, threshold(2)),
         ("Torque of the motor, against the hand", "torque, mNm", knob(2), Vec::new()),
     ];
@@ -174,12 +179,19 @@ pub fn write_touch(path: &Path, performance: &Performance, rate_hz: f64) -> Resu
         let (low, high) = (values().fold(0.0, f64::min), values().fold(1e-3, f64::max));
         let room = 0.06 * (high - low);
         let mut chart = frame(area, title).build_cartesian_2d(0.0..seconds, low - room..high + room)?;
-        mesh(&mut chart, y, 6, &|value: &f64| if y == "gamma" { format!("{value:.1}") } else { format!("{value:.0}") }, true)?;
+        mesh(
+            &mut chart,
+            y,
+            6,
+            &|value: &f64| if y == "gamma" { format!("{value:.1}") } else { format!("{value:.0}") },
+            true,
+        )?;
         chart.draw_series(LineSeries::new(marks, PITCH.stroke_width(2)))?;
         chart.draw_series(LineSeries::new(line, BREATH.stroke_width(2)))?;
     }
     let samples: Vec<f64> = performance.left.iter().map(|&x| f64::from(x)).collect();
-    let mut chart = frame(&areas[3], "Sound: peak of each 10 ms").build_cartesian_2d(0.0..seconds, -0.0..1.0)?;
+    let mut chart =
+        frame(&areas[3], "Sound: peak of each 10 ms").build_cartesian_2d(0.0..seconds, -0.0..1.0)?;
     let chunk = (0.01 * rate_hz) as usize;
     let peaks: Vec<f64> =
         samples.chunks(chunk).map(|chunk| chunk.iter().fold(0.0, |peak: f64, x| peak.max(x.abs()))).collect();

@@ -71,5 +71,7 @@ impl Drop for Simulator {
 /// A serial number no other simulator on this machine has, so that tests do not take each other's knobs.
 pub fn serial_number() -> u64 {
     static NEXT: AtomicU32 = AtomicU32::new(1);
-    0x5100_0000_0000_0000 | u64::from(std::process::id()) << 16 | u64::from(NEXT.fetch_add(1, Ordering::Relaxed))
+    0x5100_0000_0000_0000
+        | u64::from(std::process::id()) << 16
+        | u64::from(NEXT.fetch_add(1, Ordering::Relaxed))
 }

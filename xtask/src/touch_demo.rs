@@ -68,15 +68,14 @@ pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -
     let mut plugin = Plugin::load(clap)?;
     connect(&mut plugin, number)?;
     let arm = plugin.param("Arm knob")?.id;
-    let status = plugin.param("Knob status")?.id;
-    let _ = status;
     let played = plugin.session(rate_hz, BLOCK, |session| -> Result<_> {
         wait_until_live(session, rate_hz)?;
         let armed_at = session.played();
         let lead = (LEAD_S * rate_hz) as usize;
         let mut all = vec![At(0, Say::Set(arm, 1.0))];
         // The notes alone: breath is the knob's.
-        let notes = said.iter().filter(|At(_, say)| !matches!(say, Say::Midi([status, ..]) if status & 0xF0 == 0xB0));
+        let notes =
+            said.iter().filter(|At(_, say)| !matches!(say, Say::Midi([status, ..]) if status & 0xF0 == 0xB0));
         all.extend(notes.map(|At(at, say)| At(at + lead, *say)));
         let [left, _] = session.play_live(&all, lead + score.samples, rate_hz)?;
         let first = armed_at + lead;
@@ -99,14 +98,29 @@ pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -
 
 /// Points a plugin at the knob with this serial number, as a saved project does.
 pub fn connect(plugin: &mut Plugin, serial: u64) -> Result<()> {
+    edit(plugin, |state| {
+        state["fields"]["serial"] = format!("\"{serial:016x}\"").into();
+        state["params"]["knob"] = serde_json::json!({ "str": "serial" });
+    })
+}
+
+/// Has a plugin listen to stock firmware on a UDP port.
+pub fn listen(plugin: &mut Plugin, port: u16) -> Result<()> {
+    edit(plugin, |state| {
+        state["params"]["knob"] = serde_json::json!({ "str": "osc" });
+        state["params"]["oscprt"] = serde_json::json!({ "i32": port });
+    })
+}
+
+/// Changes a plugin's state as a project file would.
+pub fn edit(plugin: &mut Plugin, change: impl FnOnce(&mut serde_json::Value)) -> Result<()> {
     let state = plugin.save()?;
-    let (head, json) = state.split_at(8);
-    let mut json: serde_json::Value = serde_json::from_slice(json).context("the plugin's state is no JSON")?;
-    json["fields"]["serial"] = format!("\"{serial:016x}\"").into();
-    json["params"]["knob"] = serde_json::json!({ "str": "serial" });
+    // The wrapper's own frame: eight bytes of length, then JSON.
+    let json = state.get(8..).context("the plugin's state is too short")?;
+    let mut json: serde_json::Value =
+        serde_json::from_slice(json).context("the plugin's state is no JSON")?;
+    change(&mut json);
     let json = serde_json::to_vec(&json)?;
-    // The wrapper's own frame: length, then JSON.
-    debug_assert_eq!(head.len(), 8);
     plugin.restore(&[&(json.len() as u64).to_le_bytes(), json.as_slice()].concat())
 }
 
@@ -199,5 +213,8 @@ fn read_log(path: &Path) -> Result<Vec<[f64; 3]>> {
     });
     let rows: Vec<[f64; 4]> = rows.flatten().collect();
     let armed = rows.iter().find(|row| row[3] > 0.5).context("the knob was never armed")?[0];
-    Ok(rows.iter().map(|[t_us, angle, torque, _]| [1e-6 * (t_us - armed) - LEAD_S, *angle, *torque]).collect())
+    Ok(rows
+        .iter()
+        .map(|[t_us, angle, torque, _]| [1e-6 * (t_us - armed) - LEAD_S, *angle, *torque])
+        .collect())
 }

@@ -7,19 +7,15 @@ use super::{NO_NOTE, Shared, desk};
 use crate::bore::instrument_file::InstrumentFile;
 use crate::device::KnobReader;
 use crate::event::{Event, Timed};
-use crate::haptics::Limits;
 use crate::instrument::{Clarinet, Settings};
 use crate::plugin::params::ChalumeauParams;
 use crate::touch::blower::{Blower, Blown, Breath14, GRID, Hand};
-use crate::touch::feel::Feels;
+use crate::touch::feel::{Feels, NO_MOTOR};
 use crate::touch::take::Take;
 use crate::units::Air;
 
 /// Breath values of one block that are also sent to the host: a block of 8192 samples has 128.
 const MOST_SENT: usize = 8_192 / GRID as usize;
-
-/// For a replay no motor turns: any feel a knob could have is allowed, mNm.
-const HARD_CEILING_MNM: f64 = 450.0;
 
 /// Where this block's breath comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,8 +95,9 @@ impl Audio {
         // A take or feel that cannot be had is worded by the desk; nothing is replayed then.
         let Ok(take) = desk::load(&path) else { return };
         let feels = Feels::new(&InstrumentFile::built_in(), Air::default());
-        let limits = Limits { ceiling_mnm: HARD_CEILING_MNM, ..Limits::default() };
-        let Ok(table) = feels.table(&params.settings(), &desk::design(&params.knob), &limits) else { return };
+        let Ok(table) = feels.table(&params.settings(), &desk::design(&params.knob), &NO_MOTOR) else {
+            return;
+        };
         let hand = Hand { maps: feels.maps(&table), design: desk::calibrated(&params.knob), feels: true };
         self.prepared = Some(Prepared { hand, take });
     }
@@ -170,15 +167,14 @@ impl Audio {
         match (source, take, reader) {
             (Source::Take, Some(take), _) => {
                 let begun = self.replayed;
-                let angle = |at: usize| {
-                    Some(take.angle_deg((begun + at as u64) as f64 / stage.rate_hz))
-                };
+                let angle = |at: usize| Some(take.angle_deg((begun + at as u64) as f64 / stage.rate_hz));
                 let events = Blown::new(host, &mut self.blower, hand, full_pa, samples, angle, &mut heard);
                 clarinet.render_events(events, out);
                 self.replayed += samples as u64;
             }
             (Source::Knob, _, Some(reader)) => {
-                let slap = reader.take_slap().map(|strength| Timed { at: 0, event: Event::TongueSlap { strength } });
+                let slap =
+                    reader.take_slap().map(|strength| Timed { at: 0, event: Event::TongueSlap { strength } });
                 let angle = |at: usize| reader.pose(at).map(|pose| f64::from(pose.angle_deg));
                 let events = Blown::new(host, &mut self.blower, hand, full_pa, samples, angle, &mut heard);
                 clarinet.render_events(slap.into_iter().chain(events), out);

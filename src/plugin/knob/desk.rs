@@ -188,7 +188,10 @@ impl Desk {
                 angle_deg: f64::from(state.angle_deg),
                 velocity_deg_s: f64::from(state.velocity_deg_s),
                 torque_mnm: f64::from(state.torque_mnm),
-                written: shared.note().and_then(|SoundingNote(note)| SoundingNote(note).written(TRANSPOSITION)).map(|WrittenNote(written)| written),
+                written: shared
+                    .note()
+                    .and_then(|SoundingNote(note)| SoundingNote(note).written(TRANSPOSITION))
+                    .map(|WrittenNote(written)| written),
                 gamma: f64::from(shared.gamma()),
                 feel_id: state.feel_id,
             });
@@ -272,7 +275,8 @@ impl Desk {
                 link.arm(now.ceiling_mnm);
                 self.note_to_user = None;
             } else {
-                self.note_to_user = Some("not armed: switch Arm off, wait for the knob, and on again".to_owned());
+                self.note_to_user =
+                    Some("not armed: switch Arm off, wait for the knob, and on again".to_owned());
             }
             self.quiet_since = None;
         } else if !now.arm && before.arm {
@@ -320,7 +324,9 @@ impl Desk {
                 }
                 let Calibration { travel_deg, dead_deg, .. } = Calibration::of(&design);
                 self.note_to_user = Some(match taken {
-                    Taken::Rest { .. } => format!("at rest; breath begins {:.1} degrees from here", dead_deg.0),
+                    Taken::Rest { .. } => {
+                        format!("at rest; breath begins {:.1} degrees from here", dead_deg.0)
+                    }
                     Taken::Blow { .. } => format!("full blow is {travel_deg:.0} degrees from rest"),
                 });
             }
@@ -432,9 +438,9 @@ pub fn calibrated(knob: &KnobParams) -> KnobDesign {
 
 fn marks(params: &ChalumeauParams, settings: &Settings) -> Marks {
     let law = settings.reed_law();
-    let study = params.study().map(|(participant, trial, side)| {
-        (participant, trial.number, side, trial.condition(side))
-    });
+    let study = params
+        .study()
+        .map(|(participant, trial, side)| (participant, trial.number, side, trial.condition(side)));
     Marks { reed: Some((law.h(), law.k())), study }
 }
 
@@ -447,16 +453,26 @@ fn begin_take(params: &ChalumeauParams) -> Result<Recording, String> {
             .join("Chalumeau")
             .join("takes"),
     };
-    std::fs::create_dir_all(&folder)
-        .map_err(|reason| format!("cannot make {}: {reason}; set {TAKES} to another folder", folder.display()))?;
+    std::fs::create_dir_all(&folder).map_err(|reason| {
+        format!("cannot make {}: {reason}; set {TAKES} to another folder", folder.display())
+    })?;
     let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
     let path = (0..1_000)
-        .map(|n| folder.join(if n == 0 { format!("take-{seconds}.csv") } else { format!("take-{seconds}-{n}.csv") }))
+        .map(|n| {
+            folder.join(if n == 0 {
+                format!("take-{seconds}.csv")
+            } else {
+                format!("take-{seconds}-{n}.csv")
+            })
+        })
         .find(|path| !path.exists())
         .ok_or_else(|| format!("{} is full of takes", folder.display()))?;
     let knob = &params.knob;
     let mut remarks = vec![
-        format!("Chalumeau {} take; t_us is the host's clock, angle from the knob's zero", env!("CARGO_PKG_VERSION")),
+        format!(
+            "Chalumeau {} take; t_us is the host's clock, angle from the knob's zero",
+            env!("CARGO_PKG_VERSION")
+        ),
         format!("feel {:?}", design(knob)),
     ];
     if let Some((participant, ..)) = params.study() {
@@ -464,7 +480,11 @@ fn begin_take(params: &ChalumeauParams) -> Result<Recording, String> {
             .iter()
             .map(|trial| format!("{}:H={},A={}", trial.number, trial.h, trial.condition(Side::A).name()))
             .collect();
-        remarks.push(format!("study participant {participant} seed {} order {}", knob.seed.value(), order.join(" ")));
+        remarks.push(format!(
+            "study participant {participant} seed {} order {}",
+            knob.seed.value(),
+            order.join(" ")
+        ));
     }
     let writer = TakeWriter::create(&path, false, &remarks).map_err(|reason| reason.to_string())?;
     Ok(Recording { writer, path, rows: 0, trouble: None })
