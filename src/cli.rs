@@ -8,6 +8,8 @@ mod args;
 mod feel;
 mod haptic;
 mod impedance;
+#[cfg(feature = "devices")]
+mod knob;
 mod reed;
 mod render;
 mod settings;
@@ -61,6 +63,8 @@ enum Command {
     Tune(Box<tune::Tune>),
     Reed(reed::Reed),
     Study(study::Study),
+    #[cfg(feature = "devices")]
+    Knob(Box<knob::Knob>),
     Haptic(Box<haptic::Haptic>),
 }
 
@@ -115,6 +119,8 @@ pub fn main() -> ExitCode {
         Command::Tune(command) => command.run(),
         Command::Reed(command) => command.run(),
         Command::Study(command) => command.run(),
+        #[cfg(feature = "devices")]
+        Command::Knob(command) => command.run(),
         Command::Haptic(command) => command.run(),
     };
     match done {

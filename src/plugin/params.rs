@@ -435,6 +435,7 @@ mod tests {
         ("curve", "Knob", "1.00"),
         ("oscprt", "Knob", "8000"),
         ("oscany", "Knob", "Off"),
+        ("oscfl", "Knob", "0"),
         ("rec", "Knob", "Off"),
         ("replay", "Knob", "Off"),
         ("study", "Knob", "Off"),

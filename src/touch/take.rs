@@ -222,6 +222,11 @@ impl TakeWriter {
         }
     }
 
+    /// Where it will be.
+    pub fn path(&self) -> &Path {
+        self.file.path()
+    }
+
     /// Gives the file its name.
     pub fn keep(self) -> Result<(), OutputError> {
         self.file.keep()

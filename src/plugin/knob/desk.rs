@@ -1,5 +1,6 @@
 //! The desk: follows the parameters and does for the knob what takes time.
 
+use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, mpsc};
@@ -8,7 +9,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use super::Shared;
 use crate::bore::instrument_file::InstrumentFile;
 use crate::control::knob::{self, KnobDesign, Taken};
-use crate::device::{Choice, Hooks, KnobLink, KnobReader, LinkStatus};
+use crate::device::{Choice, Hooks, KnobLink, KnobReader, LinkStatus, Phase, StateSample, serial_number, serial_text};
 use crate::haptics::{FeelDesign, Limits, Order};
 use crate::instrument::Settings;
 use crate::plugin::params::knob::{Calibration, KnobKind, LawChoice, OrderChoice};
@@ -48,7 +49,7 @@ pub struct Desk {
     take: triple_buffer::Input<Option<Arc<Take>>>,
     feels: Option<Feels>,
     /// What the feel in force was worked out from.
-    made_of: Option<(Settings, FeelDesign, f64)>,
+    made_of: Option<(Settings, FeelDesign, Limits)>,
     refused: Option<String>,
     link: Option<KnobLink>,
     choice: Choice,
@@ -72,6 +73,7 @@ struct Switches {
     rest: bool,
     blow: bool,
     ceiling_mnm: u16,
+    feel_port: u16,
 }
 
 impl Desk {
@@ -121,7 +123,8 @@ impl Desk {
         let knob = &params.knob;
         self.choose(knob);
         if self.choice != Choice::Off || knob.replay.value() {
-            self.feel(&params);
+            let status = self.link.as_ref().map(KnobLink::status);
+            self.feel(&params, status.as_ref());
         }
         self.replay(knob);
         let status = self.link.as_ref().map(KnobLink::status);
@@ -134,7 +137,7 @@ impl Desk {
     }
 
     fn choose(&mut self, knob: &KnobParams) {
-        let remembered = knob.serial.read().map_or(None, |text| u64::from_str_radix(&text, 16).ok());
+        let remembered = knob.serial.read().map_or(None, |text| serial_number(&text));
         let wanted = match knob.kind.value() {
             KnobKind::Off => Choice::Off,
             KnobKind::Serial => Choice::Serial { serial: remembered },
@@ -182,7 +185,7 @@ impl Desk {
             Some(index.and_then(|index| table.note(index)).unwrap_or(table.reference()).feel)
         };
         let (shared, rows) = (self.shared.clone(), self.rows.0.clone());
-        let on_state = move |state: &crate::device::StateSample| {
+        let on_state = move |state: &StateSample| {
             let _ = rows.send(Moment {
                 t_us: u64::try_from(state.host_us).unwrap_or(0),
                 angle_deg: f64::from(state.angle_deg),
@@ -200,16 +203,19 @@ impl Desk {
     }
 
     /// Works the feel out anew when something it is made of has changed.
-    fn feel(&mut self, params: &ChalumeauParams) {
+    fn feel(&mut self, params: &ChalumeauParams, status: Option<&LinkStatus>) {
         let settings = params.settings().with_reed_factors(self.shared.reed());
         let design = design(&params.knob);
-        let ceiling_mnm = f64::from(params.knob.ceiling.value());
-        if self.made_of == Some((settings, design, ceiling_mnm)) {
+        let ceiling_mnm = params.knob.ceiling.value().round() as u16;
+        let limits = match status.and_then(|status| status.info.as_ref()) {
+            Some(info) => Limits::of_device(info, ceiling_mnm),
+            None => Limits { ceiling_mnm: f64::from(ceiling_mnm), ..Limits::default() },
+        };
+        if self.made_of == Some((settings, design, limits)) {
             return;
         }
-        self.made_of = Some((settings, design, ceiling_mnm));
+        self.made_of = Some((settings, design, limits));
         let feels = self.feels.get_or_insert_with(|| Feels::new(&InstrumentFile::built_in(), Air::default()));
-        let limits = Limits { ceiling_mnm, ..Limits::default() };
         match feels.table(&settings, &design, &limits) {
             Ok(table) => {
                 self.hand.maps = feels.maps(&table);
@@ -261,9 +267,10 @@ impl Desk {
             rest: knob.rest.value(),
             blow: knob.blow.value(),
             ceiling_mnm: knob.ceiling.value().round() as u16,
+            feel_port: u16::try_from(knob.feel_port.value()).unwrap_or(0),
         };
         let before = &self.switches;
-        if !(status.is_live() && !now.arm) {
+        if !(is_live(status) && !now.arm) {
             if !now.arm {
                 self.quiet_since = None;
             }
@@ -282,8 +289,14 @@ impl Desk {
         } else if !now.arm && before.arm {
             link.disarm();
             self.note_to_user = None;
-        } else if status.armed && now.ceiling_mnm != before.ceiling_mnm {
-            link.set_ceiling(now.ceiling_mnm);
+        } else if status.armed && now.ceiling_mnm < before.ceiling_mnm {
+            link.lower_ceiling(now.ceiling_mnm);
+        } else if status.armed && now.ceiling_mnm > before.ceiling_mnm {
+            self.note_to_user = Some("more torque: switch Arm off and on again".to_owned());
+        }
+        if now.feel_port != before.feel_port {
+            let port = now.feel_port;
+            link.feel_osc((port > 0).then(|| SocketAddr::from((Ipv4Addr::LOCALHOST, port))));
         }
         if self.was_armed && !status.armed && now.arm {
             self.note_to_user = Some("disarmed: switch Arm off and on again".to_owned());
@@ -377,18 +390,20 @@ impl Desk {
     fn say(&self, status: Option<&LinkStatus>) {
         let knob = &self.params.knob;
         if let Some(status) = status
-            && status.is_live()
+            && is_live(status)
             && let (Choice::Serial { .. }, Some(serial)) = (&self.choice, status.serial)
             && let Ok(mut remembered) = knob.serial.write()
         {
-            *remembered = format!("{serial:016x}");
+            *remembered = serial_text(serial);
         }
         let mut words = vec![status.map_or_else(|| "off".to_owned(), |status| status.text.clone())];
         if let Some(recording) = &self.recording {
             words.push(format!("recording, {} rows", recording.rows));
         }
         words.extend([&self.note_to_user, &self.refused, &self.take_trouble].into_iter().flatten().cloned());
-        words.extend(status.and_then(|status| status.last_refusal.clone()));
+        if let Some(status) = status {
+            words.extend([&status.last_refusal, &status.notice].into_iter().flatten().cloned());
+        }
         let text = words.join("; ");
         if let Ok(mut said) = self.params.knob_status.write()
             && *said != text
@@ -422,6 +437,10 @@ pub fn design(knob: &KnobParams) -> FeelDesign {
         detent_mnm: (knob.law.value() == LawChoice::Pressure).then(|| f64::from(knob.detent.value())),
         ..FeelDesign::default()
     }
+}
+
+fn is_live(status: &LinkStatus) -> bool {
+    matches!(status.phase, Phase::Live | Phase::ReadOnly)
 }
 
 /// Reads a take, or says why not.

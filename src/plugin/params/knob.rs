@@ -215,6 +215,9 @@ pub struct KnobParams {
     /// Whether OSC may come from other machines.
     #[id = "oscany"]
     pub osc_any: BoolParam,
+    /// UDP port on this machine that the feel is also sent to, as OSC; 0 for none.
+    #[id = "oscfl"]
+    pub feel_port: IntParam,
     /// Writes a take while on.
     #[id = "rec"]
     pub record: BoolParam,
@@ -282,6 +285,7 @@ impl KnobParams {
             curve: number("Knob curve", 1.0, 0.25, 4.0, 2, "").non_automatable(),
             osc_port: whole("OSC port", 8_000, 1_024, 65_535),
             osc_any: act("OSC from network"),
+            feel_port: whole("Feel OSC port", 0, 0, 65_535),
             record: act("Record take"),
             replay: act("Replay take"),
             study: act("Study"),
@@ -324,10 +328,11 @@ impl KnobParams {
         ]
     }
 
-    pub(super) fn wholes(&self) -> [(&'static str, &IntParam); 5] {
+    pub(super) fn wholes(&self) -> [(&'static str, &IntParam); 6] {
         [
             ("refnot", &self.reference),
             ("oscprt", &self.osc_port),
+            ("oscfl", &self.feel_port),
             ("part", &self.participant),
             ("seed", &self.seed),
             ("trial", &self.trial),
