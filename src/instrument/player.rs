@@ -9,6 +9,7 @@ use crate::event::Event;
 use crate::instrument::embouchure::embouchure;
 use crate::instrument::model::Model;
 use crate::instrument::settings::Settings;
+use crate::instrument::slap::{BREATH_GAMMA, Slap};
 use crate::instrument::voice::{Drive, TICK, Voice};
 use crate::reed::ReedCoeffs;
 use crate::reed::motion::TONGUE_FORCE;
@@ -44,6 +45,8 @@ enum Tongue {
     Leaving(f64),
     /// Pressing to stop a note, share 0 .. 1.
     Stopping(f64),
+    /// Back on the reed after a slap under a key, until there is breath.
+    Damming,
 }
 
 /// What settings, fingering and bend amount to: worked out when one of them changes, not at every tick.
@@ -117,11 +120,13 @@ pub struct Player {
     breath: f64,
     gamma: f64,
     tongue: Tongue,
+    /// A slap that pulls at the reed, whatever else the tongue would do.
+    slap: Option<Slap>,
     bend_cents: f64,
     dip: f64,
     rows: f64,
     rows_set: bool,
-    /// Force of the tongue, smoothed so that it never slaps by accident.
+    /// Force of the tongue, smoothed so that it never slaps by accident; negative while it pulls for a slap.
     tongue_force: f64,
 }
 
@@ -138,6 +143,7 @@ impl Default for Player {
             breath: 0.0,
             gamma: 0.0,
             tongue: Tongue::Resting,
+            slap: None,
             bend_cents: 0.0,
             dip: 0.0,
             rows: 0.0,
@@ -186,6 +192,7 @@ impl Player {
                     f64::from(if cents.is_finite() { cents.clamp(-4_800.0, 4_800.0) } else { 0.0 });
                 self.stance = None;
             }
+            Event::TongueSlap { strength } => self.tongue_slap(strength, model, voice),
             Event::Panic => {
                 self.reset();
                 voice.reset();
@@ -229,6 +236,26 @@ impl Player {
         }
     }
 
+    /// Slaps the fingering in place, or the first one before any note.
+    fn tongue_slap<F: crate::bore::lattice::Real>(
+        &mut self,
+        strength: f32,
+        model: &Model,
+        voice: &mut Voice<F>,
+    ) {
+        let closing = self.stance.map_or(1.0, |stance| stance.closing);
+        let Some(slap) = Slap::begin(strength, self.tongue_force / closing, self.slap) else { return };
+        self.slap = Some(slap);
+        if self.fingering.is_none() {
+            self.finger(0, false, model, voice);
+        }
+        self.tongue = match self.keys.is_empty() {
+            true => Tongue::Resting,
+            false if self.gamma < BREATH_GAMMA => Tongue::Damming,
+            false => Tongue::Away,
+        };
+    }
+
     /// Moves the fingers; slurred they take their time, behind the tongue they are quick.
     fn finger<F: crate::bore::lattice::Real>(
         &mut self,
@@ -263,7 +290,9 @@ impl Player {
 
     /// True while nothing is held and the breath has gone.
     pub fn is_resting(&self) -> bool {
-        self.gamma < NO_BREATH && (self.keys.is_empty() || (self.breath_live && self.breath == 0.0))
+        self.slap.is_none()
+            && self.gamma < NO_BREATH
+            && (self.keys.is_empty() || (self.breath_live && self.breath == 0.0))
     }
 
     /// Advances one control tick: moves holes and delay, and says how the reed is driven. Real-time safe.
@@ -327,14 +356,26 @@ impl Player {
                 let share = (share + tick_s / TONGUE_STOP_S).min(1.0);
                 (if share < 1.0 { Tongue::Stopping(share) } else { Tongue::Resting }, share)
             }
+            Tongue::Damming if self.gamma < BREATH_GAMMA => (Tongue::Damming, 1.0),
+            Tongue::Damming => (Tongue::Leaving(1.0), 1.0),
         };
         self.tongue = tongue;
+        let mut p_mouth = self.gamma * closing;
         let force = TONGUE_FORCE * closing * share;
-        // Letting go is as quick as asked; pressing takes a moment.
-        self.tongue_force = if force <= self.tongue_force {
-            force
-        } else {
-            self.tongue_force + step_towards(tick_s, TONGUE_PRESS_S) * (force - self.tongue_force)
+        let pull = self.slap.as_mut().map(|slap| slap.tick(tick_s));
+        self.tongue_force = match pull {
+            Some(Some(pull)) => {
+                p_mouth = p_mouth * (1.0 - pull.seal) + pull.suction * closing;
+                pull.force * closing
+            }
+            // Off it comes, within one tick: whatever the tongue does next begins at the free reed.
+            Some(None) => {
+                self.slap = None;
+                0.0
+            }
+            // Letting go is as quick as asked; pressing takes a moment.
+            None if force <= self.tongue_force => force,
+            None => self.tongue_force + step_towards(tick_s, TONGUE_PRESS_S) * (force - self.tongue_force),
         };
 
         // Tuning.
@@ -349,11 +390,6 @@ impl Player {
             voice.lattice_mut().glide_delay(self.rows, 0);
         }
 
-        Drive {
-            p_mouth: self.gamma * closing,
-            tongue: self.tongue_force,
-            noise: f64::from(settings.noise),
-            reed: stance.reed,
-        }
+        Drive { p_mouth, tongue: self.tongue_force, noise: f64::from(settings.noise), reed: stance.reed }
     }
 }

@@ -108,7 +108,7 @@ pub fn soundings(score: &Score) -> Vec<Sounding> {
             }
             Event::NoteOff { note } => held.retain(|&other| other != note),
             Event::Panic => held.clear(),
-            Event::Breath(_) | Event::Bend { .. } => continue,
+            Event::Breath(_) | Event::Bend { .. } | Event::TongueSlap { .. } => continue,
         }
         let next = held.last().copied();
         if next == now.map(|(note, _)| note) && !matches!(event.event, Event::NoteOn { .. }) {
