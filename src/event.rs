@@ -31,6 +31,12 @@ pub enum Event {
         /// On k, 0.1..=10; 1 leaves it.
         k: f32,
     },
+    /// The tongue pulls the reed off the mouthpiece and lets it slam: a percussive burst on the fingering in place, with
+    /// or without breath and held keys.
+    TongueSlap {
+        /// How hard, 0..=1; 0 is nothing.
+        strength: f32,
+    },
     /// Everything up, breath to zero, state cleared.
     Panic,
 }

@@ -126,7 +126,7 @@ pub fn soundings(score: &Score) -> Vec<Sounding> {
             }
             Event::NoteOff { note } => held.retain(|&other| other != note),
             Event::Panic => held.clear(),
-            Event::Breath(_) | Event::Bend { .. } | Event::Reed { .. } => continue,
+            Event::Breath(_) | Event::Bend { .. } | Event::Reed { .. } | Event::TongueSlap { .. } => continue,
         }
         let next = held.last().copied();
         if next == now.map(|(note, _)| note) && !matches!(event.event, Event::NoteOn { .. }) {
