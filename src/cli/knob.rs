@@ -94,7 +94,8 @@ impl Knob {
         let note = note.unwrap_or(*table.reference());
         let take = match &self.record {
             Some(path) => {
-                let remarks = [format!("written {} of {}, {:?}", written.0, file.name, self.feel.design(&file)?)];
+                let remarks =
+                    [format!("written {} of {}, {:?}", written.0, file.name, self.feel.design(&file)?)];
                 Some(TakeWriter::create(path, self.force, &remarks)?)
             }
             None => None,
@@ -151,7 +152,11 @@ impl Knob {
                 }
             }
             if live_since.is_none() && began.elapsed() > PATIENCE {
-                return Err(Failure::Usage(format!("no knob after {} s: {}", PATIENCE.as_secs(), status.text)));
+                return Err(Failure::Usage(format!(
+                    "no knob after {} s: {}",
+                    PATIENCE.as_secs(),
+                    status.text
+                )));
             }
             for state in heard.try_iter() {
                 let gamma = note.map.pressure_pa(f64::from(state.angle_deg)) / closing_pa;
@@ -209,7 +214,10 @@ fn show(status: &LinkStatus, note: &NoteFeel, closing_pa: f64, said: &mut String
         let angle = f64::from(angle);
         let gamma = note.map.pressure_pa(angle) / closing_pa;
         let armed = if status.armed { "armed" } else { "not armed" };
-        eprint!("\r\x1b[K{angle:8.1} degrees   gamma {gamma:.3}   threshold at {:.1}   {armed}", note.landmarks.a_on_deg);
+        eprint!(
+            "\r\x1b[K{angle:8.1} degrees   gamma {gamma:.3}   threshold at {:.1}   {armed}",
+            note.landmarks.a_on_deg
+        );
         let _ = std::io::stderr().flush();
     }
 }

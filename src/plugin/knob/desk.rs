@@ -9,7 +9,9 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 use super::Shared;
 use crate::bore::instrument_file::InstrumentFile;
 use crate::control::knob::{self, KnobDesign, Taken};
-use crate::device::{Choice, Hooks, KnobLink, KnobReader, LinkStatus, Phase, StateSample, serial_number, serial_text};
+use crate::device::{
+    Choice, Hooks, KnobLink, KnobReader, LinkStatus, Phase, StateSample, serial_number, serial_text,
+};
 use crate::haptics::{FeelDesign, Limits, Order};
 use crate::instrument::Settings;
 use crate::plugin::params::knob::{Calibration, KnobKind, LawChoice, OrderChoice};
