@@ -33,6 +33,8 @@ const LONGEST: f64 = 0.02;
 /// The search begins at the onset without inertia, but not above this, and a second time here: far below, where
 /// the reed's resonance carries the mode.
 const START: (f64, f64) = (0.9, 0.35);
+/// The search for the upper end of the unstable range begins at this share of the lay's knee beyond closure.
+const SHUT: f64 = 0.8;
 /// The reed's resonance is kept this far below the sample rate, as `reed::motion` keeps it.
 const RESONANCE_TO_RATE: f64 = 0.15;
 
@@ -96,6 +98,12 @@ pub(super) fn onsets<'a>(grid: &'a Grid, reed: &'a Reed) -> impl Iterator<Item =
         let without_inertia = threshold_gamma(height, reed.zeta).min(START.0);
         [without_inertia, START.1].into_iter().filter_map(move |gamma| onset(grid, reed, f_hz, gamma))
     })
+}
+
+/// Where the steady state, blown nearly shut on the curve of the lay, becomes stable again: `gamma` and frequency, from a
+/// mode near `f_hz`. `None` on a sharp lay, where that is closure itself.
+pub(super) fn shut(grid: &Grid, reed: &Reed, f_hz: f64) -> Option<(f64, f64)> {
+    onset(grid, reed, f_hz, 1.0 + SHUT * reed.lay).filter(|&(gamma, _)| gamma > 1.0)
 }
 
 fn onset(grid: &Grid, reed: &Reed, mut f_hz: f64, mut gamma: f64) -> Option<(f64, f64)> {

@@ -274,6 +274,7 @@ impl Requirements {
             return None;
         }
         let (mut first, mut own) = ((gamma_on, f_hz), Some(gamma_on));
+        let mut gamma_off = swing.extinction(zeta, reed.jet_loss * reed.closing_pa());
         if let Some(&lip) = reed.lips.get(fingering) {
             let reed = onset::Reed { zeta, lay: reed.lay, lip, swept_s, rate_hz: self.rate_hz };
             let grid = note.heard.as_ref().unwrap_or(&note.bore);
@@ -282,6 +283,9 @@ impl Requirements {
             starts.sort_by(|a, b| a.0.total_cmp(&b.0));
             first = *starts.first()?;
             let is_own = |&&(_, f_hz): &&(f64, f64)| cents(f_hz, note.note_hz).abs() < OWN_CENTS;
+            if let Some((gamma, _)) = onset::shut(grid, &reed, f_hz) {
+                gamma_off = gamma_off.max(gamma);
+            }
             own = starts.iter().find(is_own).map(|&(gamma, _)| gamma);
         }
         let (gamma_sounding, sounding_hz) = first;
@@ -293,7 +297,7 @@ impl Requirements {
             sounding_hz,
             gamma_own: own,
             gamma_beat: (0.5 * (1.0 + loss * loss)).max(gamma_sounding),
-            gamma_off: swing.extinction(zeta, reed.jet_loss * reed.closing_pa()),
+            gamma_off,
         })
     }
 }
