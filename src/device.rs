@@ -1,1 +1,6 @@
 //! Links to knobs.
+
+pub mod clock;
+pub mod memory;
+pub mod reader;
+pub mod transport;
