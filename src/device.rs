@@ -3,4 +3,6 @@
 pub mod clock;
 pub mod memory;
 pub mod reader;
+pub mod serial;
+pub mod stats;
 pub mod transport;
