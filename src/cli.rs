@@ -5,6 +5,7 @@
 //! was given and what would be right, and no file; a reader that closes the pipe early is no mistake.
 
 mod args;
+mod haptic;
 mod impedance;
 mod reed;
 mod render;
@@ -14,6 +15,7 @@ mod threshold;
 mod tune;
 
 use crate::bore::instrument_file::InstrumentError;
+use crate::haptics::FeelRefused;
 use crate::instrument::BuildError;
 use crate::output::OutputError;
 use crate::reed::law::ReedError;
@@ -33,6 +35,7 @@ Examples:
   chalumeau impedance --all --peaks 8 --csv peaks.csv
   chalumeau threshold --all --zeta 0.3
   chalumeau tune --rate 48000 --gamma 0.5
+  chalumeau haptic --all --contrast 1
 
 Notes are MIDI numbers (60) or names (C4, F#5, Bb3). The player of a B flat clarinet reads
 *written* notes, which sound two semitones lower. Mouth pressure is given as gamma: the pressure
@@ -54,6 +57,7 @@ enum Command {
     Threshold(threshold::Threshold),
     Tune(Box<tune::Tune>),
     Reed(reed::Reed),
+    Haptic(Box<haptic::Haptic>),
 }
 
 /// Why a command ended early.
@@ -81,6 +85,8 @@ enum Failure {
     Wav(#[from] WavError),
     #[error(transparent)]
     Reed(#[from] ReedError),
+    #[error(transparent)]
+    Feel(#[from] FeelRefused),
     #[error("cannot write the table: {0}")]
     Table(#[from] io::Error),
     #[error("{0}")]
@@ -102,6 +108,7 @@ pub fn main() -> ExitCode {
         Command::Threshold(command) => command.run(),
         Command::Tune(command) => command.run(),
         Command::Reed(command) => command.run(),
+        Command::Haptic(command) => command.run(),
     };
     match done {
         Err(failure) if !failure.is_closed_pipe() => {
