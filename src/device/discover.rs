@@ -10,11 +10,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 /// USB identities of the boards that TorqueTuners and their like are built on; `None`: any product of the vendor.
-pub const KNOWN: &[(u16, Option<u16>, &str)] = &[
-    (0x10C4, Some(0xEA60), "CP210x"),
-    (0x1A86, Some(0x55D4), "CH9102"),
-    (0x303A, None, "Espressif"),
-];
+pub const KNOWN: &[(u16, Option<u16>, &str)] =
+    &[(0x10C4, Some(0xEA60), "CP210x"), (0x1A86, Some(0x55D4), "CH9102"), (0x303A, None, "Espressif")];
 
 /// What stands behind a port as far as the system tells.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -61,10 +58,11 @@ impl Candidate {
     }
 }
 
-/// Every port that may have a knob behind it: boards first, simulated knobs after them.
+/// Every port that may have a knob behind it. Simulated knobs come first: they were started on purpose, and answer at
+/// once, where a board that is no knob costs seconds.
 pub fn candidates(places: &Places) -> Vec<Candidate> {
-    let mut found: Vec<Candidate> = boards();
-    found.extend(simulated(places));
+    let mut found = simulated(places);
+    found.extend(boards());
     found
 }
 
@@ -89,8 +87,11 @@ pub fn chip(vid: u16, pid: u16) -> Option<&'static str> {
 fn boards() -> Vec<Candidate> {
     let board = |port: serialport::SerialPortInfo| {
         let SerialPortType::UsbPort(usb) = port.port_type else { return None };
-        let kind =
-            Kind::Usb { id: (usb.vid, usb.pid), chip: chip(usb.vid, usb.pid)?, usb_serial: usb.serial_number };
+        let kind = Kind::Usb {
+            id: (usb.vid, usb.pid),
+            chip: chip(usb.vid, usb.pid)?,
+            usb_serial: usb.serial_number,
+        };
         Some(Candidate { path: port.port_name.into(), kind })
     };
     ports().into_iter().filter_map(board).collect()
@@ -119,7 +120,8 @@ impl Advert {
         let alive = File::create(directory.join(serial_text(serial) + ".alive"))?;
         try_lock_patiently(&alive).map_err(|e| match e {
             TryLockError::WouldBlock => {
-                let text = format!("a simulated knob with serial number {} is running already", serial_text(serial));
+                let text =
+                    format!("a simulated knob with serial number {} is running already", serial_text(serial));
                 io::Error::new(io::ErrorKind::AddrInUse, text)
             }
             TryLockError::Error(e) => e,
@@ -193,7 +195,8 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let places = Places::within(directory.path());
         let knobs = places.knobs().unwrap();
-        fs::write(knobs.join("000000000000c1a2.toml"), "path = '/dev/pts/9'\nname = 'dead'\npid = 1\n").unwrap();
+        fs::write(knobs.join("000000000000c1a2.toml"), "path = '/dev/pts/9'\nname = 'dead'\npid = 1\n")
+            .unwrap();
         fs::write(knobs.join("000000000000c1a2.alive"), "").unwrap();
         fs::write(knobs.join("no-number.toml"), "").unwrap();
         assert_eq!(simulated(&places), []);

@@ -106,7 +106,9 @@ mod tests {
         }
         let value = |bundle: &[OscPacket], field: &str| {
             bundle.iter().find_map(|packet| match packet {
-                OscPacket::Message(m) if m.addr == format!("/chalumeau/feel/{field}") => m.args[0].clone().float(),
+                OscPacket::Message(m) if m.addr == format!("/chalumeau/feel/{field}") => {
+                    m.args[0].clone().float()
+                }
                 _ => None,
             })
         };

@@ -31,7 +31,9 @@ pub struct Holder {
 
 impl Holder {
     fn me(label: &str, port: &str) -> Self {
-        let program = std::env::current_exe().ok().and_then(|path| Some(path.file_name()?.to_string_lossy().into_owned()));
+        let program = std::env::current_exe()
+            .ok()
+            .and_then(|path| Some(path.file_name()?.to_string_lossy().into_owned()));
         Self {
             program: program.unwrap_or_else(|| "a program".into()),
             pid: std::process::id(),
@@ -75,7 +77,8 @@ struct Files {
 impl Files {
     fn of(places: &Places, serial: u64) -> io::Result<Self> {
         let base = places.locks()?.join(serial_text(serial));
-        let [lock, owner, wanted] = ["lock", "owner", "wanted"].map(|extension| base.with_extension(extension));
+        let [lock, owner, wanted] =
+            ["lock", "owner", "wanted"].map(|extension| base.with_extension(extension));
         Ok(Self { lock, owner, wanted })
     }
 
@@ -110,6 +113,7 @@ pub(super) fn try_lock_patiently(file: &File) -> Result<(), TryLockError> {
 /// A knob that is ours until this is dropped.
 #[derive(Debug)]
 pub struct Ownership {
+    serial: u64,
     files: Files,
     _lock: File,
 }
@@ -126,7 +130,12 @@ impl Ownership {
         }
         let _ = fs::remove_file(&files.wanted);
         write(&files.owner, &Holder::me(label, port))?;
-        Ok(Self { files, _lock: lock })
+        Ok(Self { serial, files, _lock: lock })
+    }
+
+    /// Serial number of the knob.
+    pub fn serial(&self) -> u64 {
+        self.serial
     }
 
     /// Who wants the knob, if anybody does. Reads a file: not for every loop.
@@ -160,7 +169,8 @@ pub fn holder_of_port(places: &Places, port: &str) -> Option<(u64, Holder)> {
     let entries = fs::read_dir(places.locks().ok()?).ok()?;
     entries.flatten().find_map(|entry| {
         let path = entry.path();
-        let serial = serial_number(path.file_stem()?.to_str()?).filter(|_| path.extension().is_some_and(|e| e == "owner"))?;
+        let serial = serial_number(path.file_stem()?.to_str()?)
+            .filter(|_| path.extension().is_some_and(|e| e == "owner"))?;
         holder(places, serial).filter(|holder| holder.port == port).map(|holder| (serial, holder))
     })
 }

@@ -75,7 +75,8 @@ fn is_known(name: &str) -> bool {
 /// The port whose name is, or contains, the wanted one; without a wish the first known.
 fn find<T: MidiIO>(io: &T, wanted: Option<&str>) -> Option<(T::Port, String)> {
     let names = |port: &T::Port| io.port_name(port).ok().filter(|name| !name.contains(CLIENT));
-    let named: Vec<_> = io.ports().into_iter().filter_map(|port| names(&port).map(|name| (port, name))).collect();
+    let named: Vec<_> =
+        io.ports().into_iter().filter_map(|port| names(&port).map(|name| (port, name))).collect();
     let exact = named.iter().find(|(_, name)| Some(name.as_str()) == wanted);
     let close = || {
         named.iter().find(|(_, name)| match wanted {
@@ -128,7 +129,10 @@ impl Transport for MidiTransport {
 
     fn poll(&mut self, wait: Duration, sink: &mut dyn FnMut(&[u8])) -> io::Result<()> {
         if self.watch.is_gone() {
-            return Err(io::Error::new(io::ErrorKind::NotConnected, format!("{} is no longer listed", self.name)));
+            return Err(io::Error::new(
+                io::ErrorKind::NotConnected,
+                format!("{} is no longer listed", self.name),
+            ));
         }
         match self.incoming.recv_timeout(wait) {
             Ok(message) => sink(&message),

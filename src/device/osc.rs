@@ -223,10 +223,14 @@ mod tests {
         for name in ["trigger", "angle_discrete", "angle_d,iscrete", "flow", "torque", "speed", "accl"] {
             assert_eq!(heard(&at(name), OscType::Int(0)), Some(Word::Other), "{name}");
         }
-        for addr in ["/Torquetuner_042/Instrument/Angle_Out", "/a/b/c/instrument/angle_out", "/instrument/angle_out"] {
+        for addr in
+            ["/Torquetuner_042/Instrument/Angle_Out", "/a/b/c/instrument/angle_out", "/instrument/angle_out"]
+        {
             assert_eq!(heard(addr, OscType::Int(5)), Some(Word::Angle(5.0)), "{addr}");
         }
-        for addr in ["/TorqueTuner_001/angle_out", "/x/instruments/angle_out", "/x/instrument/angle_out2", "/"] {
+        for addr in
+            ["/TorqueTuner_001/angle_out", "/x/instruments/angle_out", "/x/instrument/angle_out2", "/"]
+        {
             assert_eq!(heard(addr, OscType::Int(5)), None, "{addr}");
         }
         assert_eq!(heard(&at("velocity"), OscType::Float(f32::NAN)), None);
@@ -236,7 +240,8 @@ mod tests {
     fn an_address_without_slash_is_understood_at_every_length() {
         for device in ["Torquetuner_1", "Torquetuner_12", "Torquetuner_123", "Torquetuner_1234"] {
             // The crate encodes any address, but pads it as it is.
-            let datagram = encoder::encode(&message(&format!("{device}/instrument/velocity"), OscType::Float(7.5)));
+            let datagram =
+                encoder::encode(&message(&format!("{device}/instrument/velocity"), OscType::Float(7.5)));
             assert_eq!(words(&datagram.unwrap()), (vec![Word::Velocity(7.5)], 0), "{device}");
         }
     }
@@ -270,7 +275,8 @@ mod tests {
         let many = bundle(vec![message("/x/instrument/angle_out", OscType::Int(1)); 200]);
         let (heard, ignored) = words(&encoder::encode(&many).unwrap()[..4000]);
         assert!(heard.len() <= MESSAGES && ignored >= 1, "{} and {ignored}", heard.len());
-        let good = encoder::encode(&bundle(vec![message("/x/instrument/st", OscType::Float(-1.0)); 3])).unwrap();
+        let good =
+            encoder::encode(&bundle(vec![message("/x/instrument/st", OscType::Float(-1.0)); 3])).unwrap();
         for cut in 0..good.len() {
             read(&good[..cut], |_| {});
             let mut damaged = good.clone();
@@ -278,7 +284,10 @@ mod tests {
             read(&damaged, |_| {});
         }
         for length in [u32::MAX, 1 << 31, 0] {
-            read(&[b"#bundle\0\0\0\0\0\0\0\0\x01".as_slice(), &length.to_be_bytes(), b"/x\0\0"].concat(), |_| {});
+            read(
+                &[b"#bundle\0\0\0\0\0\0\0\0\x01".as_slice(), &length.to_be_bytes(), b"/x\0\0"].concat(),
+                |_| {},
+            );
         }
     }
 }

@@ -165,7 +165,8 @@ impl StockTracker {
         let possible_deg = FASTEST_DEG_S * elapsed_us.min(1_000_000) as f64 * 1e-6 + JUMP_DEG;
         let off = |deg: f64| (deg - self.raw_deg).abs();
         if off(measured_deg) > possible_deg {
-            let wrapped = [WRAP_DEG, -WRAP_DEG].into_iter().find(|wrap| off(measured_deg + wrap) <= possible_deg);
+            let wrapped =
+                [WRAP_DEG, -WRAP_DEG].into_iter().find(|wrap| off(measured_deg + wrap) <= possible_deg);
             if let Some(wrap) = wrapped {
                 self.wraps_deg += wrap;
                 measured_deg += wrap;
@@ -201,7 +202,11 @@ mod tests {
     use super::*;
 
     /// Plays `angle_deg(t)` as the firmware sends it, arrivals up to 10 ms late; returns (time s, shown degrees).
-    fn played(seconds: f64, with_velocity: bool, angle_deg: impl Fn(f64) -> f64) -> (StockTracker, Vec<(f64, f64)>) {
+    fn played(
+        seconds: f64,
+        with_velocity: bool,
+        angle_deg: impl Fn(f64) -> f64,
+    ) -> (StockTracker, Vec<(f64, f64)>) {
         let mut tracker = StockTracker::default();
         let mut shown = Vec::new();
         let mut late = 1u64;
@@ -230,7 +235,10 @@ mod tests {
         let hand = |t: f64| 90.0 - 90.0 * (t * 4.2).cos();
         for (with_velocity, allowed_deg) in [(true, 8.0), (false, 14.0)] {
             let (_, shown) = played(6.0, with_velocity, hand);
-            assert!(shown.windows(2).all(|pair| ((pair[1].0 - pair[0].0) - 0.004).abs() < 1e-6), "every 4 ms");
+            assert!(
+                shown.windows(2).all(|pair| ((pair[1].0 - pair[0].0) - 0.004).abs() < 1e-6),
+                "every 4 ms"
+            );
             let error = |(t, deg): &(f64, f64)| (deg - hand(*t)).abs();
             let worst = shown.iter().filter(|(t, _)| *t > 0.5).map(error).fold(0.0, f64::max);
             assert!(worst < allowed_deg, "velocity sent {with_velocity}: {worst} degrees off");
