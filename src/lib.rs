@@ -17,5 +17,7 @@ pub mod plugin;
 pub mod reed;
 #[cfg(feature = "cli")]
 pub mod render;
+#[cfg(feature = "simulator")]
+pub mod simulator;
 pub mod units;
 pub mod wire;

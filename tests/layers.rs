@@ -22,6 +22,7 @@ const FLOORS: &[(&str, u8)] = &[
     ("instrument", 4),
     ("device", 4),
     ("render", 5),
+    ("simulator", 5),
     ("cli", 6),
     ("editor", 6),
     ("plugin", 7),
