@@ -15,10 +15,10 @@ mod tune;
 
 use crate::bore::instrument_file::InstrumentError;
 use crate::instrument::BuildError;
+use crate::output::OutputError;
 use crate::reed::law::ReedError;
 use crate::render::breath::BreathError;
 use crate::render::midi_file::MidiFileError;
-use crate::render::output::OutputError;
 use crate::render::score::ScoreError;
 use crate::render::wav::WavError;
 use clap::{Parser, Subcommand};

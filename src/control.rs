@@ -1,3 +1,4 @@
 //! What controllers send, made into events. Nothing here knows the instrument behind them.
 
+pub mod keys;
 pub mod midi;

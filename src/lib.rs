@@ -12,6 +12,7 @@ pub mod event;
 pub mod haptics;
 pub mod identity;
 pub mod instrument;
+pub mod output;
 #[cfg(feature = "plugin")]
 pub mod plugin;
 pub mod reed;

@@ -7,7 +7,6 @@
 
 pub mod breath;
 pub mod midi_file;
-pub mod output;
 pub mod score;
 pub mod wav;
 

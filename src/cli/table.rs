@@ -1,7 +1,7 @@
 //! CSV tables, to standard output or a new file.
 
 use crate::cli::Failure;
-use crate::render::output::NewFile;
+use crate::output::NewFile;
 use clap::Args;
 use std::fmt;
 use std::io;

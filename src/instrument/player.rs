@@ -4,6 +4,7 @@
 //! loudness and velocity only hardens the tongue. Notes that overlap are slurred (the holes move, the tongue stays
 //! away); a note after a gap is tongued: the tongue holds the reed while the breath rises behind it, and lets go.
 
+use crate::control::keys::Keys;
 use crate::event::Event;
 use crate::instrument::embouchure::embouchure;
 use crate::instrument::model::Model;
@@ -14,8 +15,6 @@ use crate::reed::motion::TONGUE_FORCE;
 use crate::reed::physical::P_REF_PA;
 use crate::units::{Air, SoundingNote, cents};
 
-/// Keys that can be held at once; more push the oldest out.
-const STACK: usize = 16;
 /// How long the tongue holds the reed before a tongued note, s: long enough for the breath to rise behind it.
 const TONGUE_HOLD_S: f64 = 0.008;
 /// How fast the tongue reaches the reed to stop a note, and how softly it lands, s.
@@ -108,8 +107,7 @@ pub struct Player {
     settings: Settings,
     /// `None` until the next tick works it out.
     stance: Option<Stance>,
-    held: [SoundingNote; STACK],
-    held_count: usize,
+    keys: Keys,
     velocity: f64,
     /// Fingering in place, if any note was ever played.
     fingering: Option<usize>,
@@ -132,8 +130,7 @@ impl Default for Player {
         Self {
             settings: Settings::default(),
             stance: None,
-            held: [SoundingNote(0); STACK],
-            held_count: 0,
+            keys: Keys::default(),
             velocity: 0.0,
             fingering: None,
             gliding: 0,
@@ -206,14 +203,8 @@ impl Player {
     ) {
         // A note the instrument does not have is no note.
         let Some(fingering) = model.fingering_for(note) else { return };
-        let slurred = self.held_count > 0;
-        self.release(note);
-        if self.held_count == STACK {
-            self.held.copy_within(1.., 0);
-            self.held_count -= 1;
-        }
-        self.held[self.held_count] = note;
-        self.held_count += 1;
+        let slurred = !self.keys.is_empty();
+        self.keys.press(note);
         self.velocity = f64::from(if velocity.is_finite() { velocity.clamp(0.0, 1.0) } else { 0.5 });
         if !slurred {
             self.tongue = Tongue::Holding(TONGUE_HOLD_S);
@@ -227,21 +218,14 @@ impl Player {
         model: &Model,
         voice: &mut Voice<F>,
     ) {
-        let sounding = self.held_count > 0 && self.held[self.held_count - 1] == note;
-        self.release(note);
+        let sounding = self.keys.last() == Some(note);
+        self.keys.release(note);
         if !sounding {
             return;
         }
-        match self.held_count.checked_sub(1).and_then(|last| model.fingering_for(self.held[last])) {
+        match self.keys.last().and_then(|last| model.fingering_for(last)) {
             Some(fingering) => self.finger(fingering, true, model, voice),
             None => self.tongue = Tongue::Stopping(0.0),
-        }
-    }
-
-    fn release(&mut self, note: SoundingNote) {
-        if let Some(at) = self.held[..self.held_count].iter().position(|&held| held == note) {
-            self.held.copy_within(at + 1..self.held_count, at);
-            self.held_count -= 1;
         }
     }
 
@@ -279,7 +263,7 @@ impl Player {
 
     /// True while nothing is held and the breath has gone.
     pub fn is_resting(&self) -> bool {
-        self.gamma < NO_BREATH && (self.held_count == 0 || (self.breath_live && self.breath == 0.0))
+        self.gamma < NO_BREATH && (self.keys.is_empty() || (self.breath_live && self.breath == 0.0))
     }
 
     /// Advances one control tick: moves holes and delay, and says how the reed is driven. Real-time safe.
@@ -304,7 +288,7 @@ impl Player {
         }
 
         // Breath.
-        let playing = self.held_count > 0;
+        let playing = !self.keys.is_empty();
         let wanted = match (playing, self.breath_live) {
             (false, _) => 0.0,
             (true, true) => self.breath * 1e3 * f64::from(settings.breath_full_kpa) / (P_REF_PA * closing),

@@ -1,6 +1,6 @@
 //! Samples into a WAV file: 16 or 24 bit integers, rounded to nearest without dither, or 32 bit floats as they are.
 
-use crate::render::output::NewFile;
+use crate::output::NewFile;
 use hound::{SampleFormat, WavSpec, WavWriter};
 use std::io::BufWriter;
 

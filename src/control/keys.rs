@@ -1,0 +1,87 @@
+//! Which of the held keys is heard: the last one; when it comes up, the one held before it. Real-time safe.
+
+use crate::units::SoundingNote;
+
+/// Keys that can be held at once; more push the oldest out.
+const MOST: usize = 16;
+
+/// The held keys, oldest first.
+#[derive(Clone, Copy, Debug)]
+pub struct Keys {
+    held: [SoundingNote; MOST],
+    count: usize,
+}
+
+impl Default for Keys {
+    fn default() -> Self {
+        Self { held: [SoundingNote(0); MOST], count: 0 }
+    }
+}
+
+impl Keys {
+    /// The key that is heard.
+    pub fn last(&self) -> Option<SoundingNote> {
+        self.count.checked_sub(1).map(|last| self.held[last])
+    }
+
+    /// Whether no key is held.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// A key goes down; again, if it was held.
+    pub fn press(&mut self, note: SoundingNote) {
+        self.release(note);
+        if self.count == MOST {
+            self.held.copy_within(1.., 0);
+            self.count -= 1;
+        }
+        self.held[self.count] = note;
+        self.count += 1;
+    }
+
+    /// A key comes up.
+    pub fn release(&mut self, note: SoundingNote) {
+        if let Some(at) = self.held[..self.count].iter().position(|&held| held == note) {
+            self.held.copy_within(at + 1..self.count, at);
+            self.count -= 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn last_key_is_heard_and_gives_way_to_the_one_before() {
+        let mut keys = Keys::default();
+        assert!(keys.is_empty() && keys.last().is_none());
+        for key in 60..63 {
+            keys.press(SoundingNote(key));
+        }
+        keys.press(SoundingNote(60));
+        assert_eq!(keys.last(), Some(SoundingNote(60)));
+        keys.release(SoundingNote(61));
+        keys.release(SoundingNote(60));
+        assert_eq!(keys.last(), Some(SoundingNote(62)));
+        keys.release(SoundingNote(99));
+        keys.release(SoundingNote(62));
+        assert!(keys.is_empty());
+    }
+
+    #[test]
+    fn more_keys_than_fingers_push_the_oldest_out() {
+        let mut keys = Keys::default();
+        for key in 0..40 {
+            keys.press(SoundingNote(key));
+        }
+        assert_eq!(keys.last(), Some(SoundingNote(39)));
+        for key in (25..40).rev() {
+            keys.release(SoundingNote(key));
+        }
+        assert_eq!(keys.last(), Some(SoundingNote(24)));
+        keys.release(SoundingNote(24));
+        assert!(keys.is_empty());
+    }
+}

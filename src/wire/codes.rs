@@ -1,0 +1,160 @@
+//! Codes of EVENT and STATE, with words for people. A later minor version may send others: they stay numbers.
+
+use std::fmt;
+
+/// Why a device has a fault or disarmed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum FaultCode {
+    /// No valid ALIVE in time.
+    Watchdog = 1,
+    /// Faster than 60 rad/s.
+    OverSpeed = 2,
+    /// Three failures of the motor's I2C in a row.
+    I2c = 3,
+    /// Supply too low.
+    BrownOut = 4,
+    /// A number was not finite.
+    NotFinite = 5,
+    /// FREE was received.
+    Free = 6,
+    /// BYE was received.
+    Bye = 7,
+    /// HELLO came with another session.
+    NewSession = 8,
+    /// Another major version.
+    Version = 9,
+}
+
+impl FaultCode {
+    /// All of them, by number.
+    pub const ALL: [Self; 9] = [
+        Self::Watchdog,
+        Self::OverSpeed,
+        Self::I2c,
+        Self::BrownOut,
+        Self::NotFinite,
+        Self::Free,
+        Self::Bye,
+        Self::NewSession,
+        Self::Version,
+    ];
+
+    /// The code of a number; `None` for 0 (no fault) and for codes of a later version.
+    pub fn from_u8(code: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|known| *known as u8 == code)
+    }
+
+    /// A sentence for people.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Watchdog => "the knob no longer heard from this computer",
+            Self::OverSpeed => "the knob turned faster than 60 rad/s",
+            Self::I2c => "the knob's motor board does not answer",
+            Self::BrownOut => "the knob's supply voltage is too low",
+            Self::NotFinite => "the knob met a number that is not finite",
+            Self::Free => "torque was switched off",
+            Self::Bye => "the program that played has left",
+            Self::NewSession => "another program opened the knob",
+            Self::Version => "the knob speaks another version of the protocol",
+        }
+    }
+}
+
+impl fmt::Display for FaultCode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.text())
+    }
+}
+
+/// Why a device refused what it was asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum RefusedCode {
+    /// H k outside its range.
+    HTimesK = 1,
+    /// Restoring slope beyond INFO's `stiffness_limit`.
+    TooStiff = 2,
+    /// Positive feedback beyond INFO's `push_limit`.
+    WouldPush = 3,
+    /// Scale above the ceiling.
+    AboveCeiling = 4,
+    /// A number was not finite.
+    NotFinite = 5,
+    /// A field outside its range.
+    OutOfRange = 6,
+    /// A law the device does not know.
+    LawUnknown = 7,
+    /// Not armed: a fault stands.
+    FaultStands = 8,
+    /// Not armed: the knob is moving.
+    Moving = 9,
+    /// ZERO while armed.
+    ZeroWhileArmed = 10,
+    /// Another session than HELLO's.
+    WrongSession = 11,
+    /// Another major version.
+    Version = 12,
+}
+
+impl RefusedCode {
+    /// All of them, by number.
+    pub const ALL: [Self; 12] = [
+        Self::HTimesK,
+        Self::TooStiff,
+        Self::WouldPush,
+        Self::AboveCeiling,
+        Self::NotFinite,
+        Self::OutOfRange,
+        Self::LawUnknown,
+        Self::FaultStands,
+        Self::Moving,
+        Self::ZeroWhileArmed,
+        Self::WrongSession,
+        Self::Version,
+    ];
+
+    /// The code of a number; `None` for codes of a later version.
+    pub fn from_u8(code: u8) -> Option<Self> {
+        Self::ALL.into_iter().find(|known| *known as u8 == code)
+    }
+
+    /// A sentence for people.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::HTimesK => "H times k is outside the range in which the reed closes",
+            Self::TooStiff => "this feel is stiffer than the knob can hold without shaking",
+            Self::WouldPush => "this feel would push the hand along harder than the knob allows",
+            Self::AboveCeiling => "this feel asks for more torque than the knob allows",
+            Self::NotFinite => "the knob was sent a number that is not finite",
+            Self::OutOfRange => "the knob was sent a number outside its range",
+            Self::LawUnknown => "the knob does not know this law of torque",
+            Self::FaultStands => "not armed: a fault still stands",
+            Self::Moving => "not armed: the knob is moving; hold it still or let it go",
+            Self::ZeroWhileArmed => "the zero cannot be moved while the knob is armed; disarm it first",
+            Self::WrongSession => "another program holds the knob",
+            Self::Version => "the knob speaks another version of the protocol",
+        }
+    }
+}
+
+impl fmt::Display for RefusedCode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.text())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_codes_belong_together() {
+        for code in 0..=255 {
+            assert_eq!(FaultCode::from_u8(code).is_some(), (1..=9).contains(&code), "fault {code}");
+            assert_eq!(RefusedCode::from_u8(code).is_some(), (1..=12).contains(&code), "refused {code}");
+            assert!(FaultCode::from_u8(code).is_none_or(|known| known as u8 == code));
+            assert!(RefusedCode::from_u8(code).is_none_or(|known| known as u8 == code));
+        }
+    }
+}
