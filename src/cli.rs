@@ -6,6 +6,8 @@
 
 mod args;
 mod impedance;
+#[cfg(feature = "simulator")]
+mod knob_sim;
 mod reed;
 mod render;
 mod settings;
@@ -54,6 +56,8 @@ enum Command {
     Threshold(threshold::Threshold),
     Tune(Box<tune::Tune>),
     Reed(reed::Reed),
+    #[cfg(feature = "simulator")]
+    KnobSim(Box<knob_sim::KnobSim>),
 }
 
 /// Why a command ended early.
@@ -81,6 +85,15 @@ enum Failure {
     Wav(#[from] WavError),
     #[error(transparent)]
     Reed(#[from] ReedError),
+    #[cfg(feature = "simulator")]
+    #[error("{}: {source}", path.display())]
+    HandScript { path: PathBuf, source: crate::simulator::script::ScriptError },
+    #[cfg(feature = "simulator")]
+    #[error("cannot write {}: {source}", path.display())]
+    Write { path: PathBuf, source: io::Error },
+    #[cfg(feature = "simulator")]
+    #[error("the simulated knob stopped: {0}")]
+    Knob(io::Error),
     #[error("cannot write the table: {0}")]
     Table(#[from] io::Error),
     #[error("{0}")]
@@ -102,6 +115,8 @@ pub fn main() -> ExitCode {
         Command::Threshold(command) => command.run(),
         Command::Tune(command) => command.run(),
         Command::Reed(command) => command.run(),
+        #[cfg(feature = "simulator")]
+        Command::KnobSim(command) => command.run(),
     };
     match done {
         Err(failure) if !failure.is_closed_pipe() => {
