@@ -5,6 +5,7 @@
 //! was given and what would be right, and no file; a reader that closes the pipe early is no mistake.
 
 mod args;
+mod haptic;
 mod impedance;
 #[cfg(feature = "simulator")]
 mod knob_sim;
@@ -16,6 +17,7 @@ mod threshold;
 mod tune;
 
 use crate::bore::instrument_file::InstrumentError;
+use crate::haptics::FeelRefused;
 use crate::instrument::BuildError;
 use crate::output::OutputError;
 use crate::reed::law::ReedError;
@@ -35,6 +37,7 @@ Examples:
   chalumeau impedance --all --peaks 8 --csv peaks.csv
   chalumeau threshold --all --zeta 0.3
   chalumeau tune --rate 48000 --gamma 0.5
+  chalumeau haptic --all --contrast 1
 
 Notes are MIDI numbers (60) or names (C4, F#5, Bb3). The player of a B flat clarinet reads
 *written* notes, which sound two semitones lower. Mouth pressure is given as gamma: the pressure
@@ -58,6 +61,7 @@ enum Command {
     Reed(reed::Reed),
     #[cfg(feature = "simulator")]
     KnobSim(Box<knob_sim::KnobSim>),
+    Haptic(Box<haptic::Haptic>),
 }
 
 /// Why a command ended early.
@@ -94,6 +98,8 @@ enum Failure {
     #[cfg(feature = "simulator")]
     #[error("the simulated knob stopped: {0}")]
     Knob(io::Error),
+    #[error(transparent)]
+    Feel(#[from] FeelRefused),
     #[error("cannot write the table: {0}")]
     Table(#[from] io::Error),
     #[error("{0}")]
@@ -117,6 +123,7 @@ pub fn main() -> ExitCode {
         Command::Reed(command) => command.run(),
         #[cfg(feature = "simulator")]
         Command::KnobSim(command) => command.run(),
+        Command::Haptic(command) => command.run(),
     };
     match done {
         Err(failure) if !failure.is_closed_pipe() => {

@@ -2,6 +2,7 @@
 
 mod clarinet;
 pub mod embouchure;
+pub mod felt;
 pub mod held;
 pub mod model;
 pub mod player;

@@ -4,8 +4,10 @@
 
 pub mod codes;
 pub mod frame;
+pub mod golden;
 pub mod limits;
 pub mod message;
+pub mod midi;
 mod payload;
 
 pub use codes::{FaultCode, RefusedCode};

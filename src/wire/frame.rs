@@ -29,15 +29,15 @@ const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FrameError {
     /// More bytes than a frame can have: noise, or a zero that was lost.
-    #[error("{given} bytes between two zeros; a frame has at most {MAX_RUN}")]
+    #[error("{given} bytes in a row; no frame is that long")]
     TooLong {
-        /// Bytes between the zeros.
+        /// Bytes that came.
         given: usize,
     },
-    /// COBS announces more bytes than came.
-    #[error("{given} bytes between two zeros that are no whole COBS frame")]
+    /// COBS, or the packing of SysEx, announces more bytes than came.
+    #[error("{given} bytes of a frame that was cut short")]
     CutShort {
-        /// Bytes between the zeros.
+        /// Bytes that came.
         given: usize,
     },
     /// Not even an empty message.

@@ -65,7 +65,7 @@ impl Default for Feel {
             feel_id: 0,
             law: Law::Free,
             morph_ms: 50,
-            h: 2.598_076_2,
+            h: 2.598_076,
             k: 0.384_900_18,
             scale_mnm: 0.0,
             stretch: 1.0,

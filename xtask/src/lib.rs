@@ -8,6 +8,7 @@ pub mod host;
 pub mod machine;
 pub mod midi;
 pub mod picture;
+pub mod wire_vectors;
 
 /// One chore.
 pub struct Command {
@@ -54,6 +55,12 @@ pub const COMMANDS: &[Command] = &[
         name: "tune",
         about: "play every note of the built-in clarinet and find its delay trims",
         run: generated::tune,
+        checks: true,
+    },
+    Command {
+        name: "wire-vectors",
+        about: "write the golden frames of the knob's protocol to firmware/golden",
+        run: wire_vectors::wire_vectors,
         checks: true,
     },
 ];

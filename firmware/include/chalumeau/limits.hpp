@@ -1,0 +1,69 @@
+// The last thing between a law and a motor: the ceiling of the user, of the device, of the compiler, and of heat.
+#pragma once
+
+#include "law.hpp"
+#include "morph.hpp"
+
+namespace chalumeau {
+
+/// 45 Ncm, whatever anybody asks.
+constexpr float HARD_CAP_MNM = 450.0F;
+/// Heat is a mean of the squared torque over this time.
+constexpr float THERMAL_S = 10.0F;
+/// How fast the ceiling sinks to the continuous rating and rises again, mNm/s: not to be felt as a step (judgement).
+constexpr float THERMAL_SLEW = 100.0F;
+/// The rating applies until the mean has fallen to this share of it, so that the ceiling does not flutter.
+constexpr float THERMAL_RELEASE = 0.9F;
+
+class Limits {
+  public:
+    Limits(float device_mnm, float rating_mnm)
+        : device_(least(device_mnm, HARD_CAP_MNM)), rating_(least(rating_mnm, device_)), thermal_(device_) {}
+
+    /// What ARM or ALIVE allows; lower at once, higher at the slew rate of rule 5.
+    void allow(float user_mnm) {
+        user_ = least(user_mnm, device_);
+        now_ = least(now_, user_);
+    }
+
+    void disarm() { now_ = 0.0F; user_ = 0.0F; }
+    /// The soft start takes care of the rise.
+    void arm(float user_mnm) { user_ = now_ = least(user_mnm, device_); }
+
+    /// The torque allowed of the torque wanted, mNm. Call once per tick, with the motor's share of it.
+    float clamp(float wanted, float dt_s) {
+        now_ = least(user_, now_ + SLEW_MNM_PER_S * dt_s);
+        const float ceiling = least(now_, thermal_);
+        limited_ = wanted > ceiling || wanted < -ceiling;
+        return wanted > ceiling ? ceiling : (wanted < -ceiling ? -ceiling : wanted);
+    }
+
+    /// What was really commanded heats the motor.
+    void heat(float torque, float dt_s) {
+        mean_square_ += (torque * torque - mean_square_) * least(1.0F, dt_s / THERMAL_S);
+        const float rated = rating_ * rating_;
+        if (mean_square_ > rated) {
+            hot_ = true;
+        } else if (mean_square_ < THERMAL_RELEASE * THERMAL_RELEASE * rated) {
+            hot_ = false;
+        }
+        const float step = THERMAL_SLEW * dt_s;
+        thermal_ = hot_ ? most(rating_, thermal_ - step) : least(device_, thermal_ + step);
+    }
+
+    bool limited() const { return limited_; }
+    bool hot() const { return hot_ || thermal_ < device_; }
+    float device_mnm() const { return device_; }
+
+  private:
+    float device_;
+    float rating_;
+    float thermal_;
+    float user_ = 0.0F;
+    float now_ = 0.0F;
+    float mean_square_ = 0.0F;
+    bool hot_ = false;
+    bool limited_ = false;
+};
+
+}  // namespace chalumeau

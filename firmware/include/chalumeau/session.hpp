@@ -1,0 +1,145 @@
+// Who may move the motor: session, arming, watchdog, faults and the gain they leave. `docs/protocol.md`, "Session" and
+// "Safety". Times are differences of a microsecond clock that wraps.
+#pragma once
+
+#include "messages.hpp"
+
+namespace chalumeau {
+
+constexpr std::uint32_t WATCHDOG_SERIAL_MS = 80;
+constexpr std::uint32_t WATCHDOG_MIDI_MS = 350;
+constexpr std::uint32_t FADE_MS = 50;
+constexpr std::uint32_t SOFT_START_MS = 250;
+constexpr float ARM_SPEED = 2.0F;    // rad/s, faster than this nobody gets armed
+constexpr float OVER_SPEED = 60.0F;  // rad/s
+
+/// Conditions that stand as long as their reason does; bits of a byte.
+class Standing {
+  public:
+    void set(Cause cause, bool stands) {
+        const auto bit = static_cast<std::uint8_t>(1U << static_cast<unsigned>(cause));
+        bits_ = static_cast<std::uint8_t>(stands ? bits_ | bit : bits_ & ~bit);
+    }
+    bool any() const { return bits_ != 0; }
+    bool has(Cause cause) const { return (bits_ >> static_cast<unsigned>(cause) & 1U) != 0; }
+    Cause first() const {
+        for (std::uint8_t cause = 1; cause < 8; ++cause) {
+            if (has(static_cast<Cause>(cause))) {
+                return static_cast<Cause>(cause);
+            }
+        }
+        return Cause::None;
+    }
+
+  private:
+    std::uint8_t bits_ = 0;
+};
+
+enum class Phase : std::uint8_t { Disarmed, Armed, Fading };
+
+class Session {
+  public:
+    Session(std::uint8_t major, std::uint32_t watchdog_ms) : major_(major), watchdog_us_(watchdog_ms * 1000) {}
+
+    /// A host says hello. Tells what ended by it: None, NewSession or Version.
+    Cause hello(const Hello& hello) {
+        const bool fits = hello.major == major_;
+        const bool same = known_ && hello.session == id_;
+        const bool held = phase_ != Phase::Disarmed;
+        known_ = true;
+        id_ = hello.session;
+        version_fits_ = fits;
+        fresh_ = !same;
+        if (fresh_) {
+            standing.set(Cause::Watchdog, false);  // that was another host's silence
+        }
+        if (!fits && held) {
+            return Cause::Version;
+        }
+        return !same && held ? Cause::NewSession : Cause::None;
+    }
+
+    /// Whether the last HELLO began a session.
+    bool fresh() const { return fresh_; }
+    bool knows(std::uint32_t session) const { return known_ && session == id_; }
+    bool version_fits() const { return version_fits_; }
+    std::uint32_t id() const { return id_; }
+
+    /// Arms, or says why not. `speed` is a magnitude, rad/s.
+    Refusal arm(const Arm& arm, float speed, std::uint32_t now_us) {
+        if (!version_fits_) {
+            return known_ ? Refusal::Version : Refusal::Session;
+        }
+        if (!knows(arm.session)) {
+            return Refusal::Session;
+        }
+        if (standing.any() || phase_ == Phase::Fading) {
+            return Refusal::Fault;
+        }
+        if (phase_ == Phase::Armed) {
+            return Refusal::None;  // a second ARM brings its ceiling, but feeds no watchdog
+        }
+        if (!(speed < ARM_SPEED)) {
+            return Refusal::Moving;
+        }
+        phase_ = Phase::Armed;
+        gain_ = 0.0F;
+        alive_us_ = now_us;
+        return Refusal::None;
+    }
+
+    /// The host lives.
+    void alive(std::uint32_t now_us) {
+        alive_us_ = now_us;
+        standing.set(Cause::Watchdog, false);
+    }
+
+    /// Torque off within this tick.
+    void cut() {
+        phase_ = Phase::Disarmed;
+        gain_ = 0.0F;
+    }
+    void forget() { known_ = false; }
+
+    /// Torque fades from here.
+    void fade() {
+        if (phase_ == Phase::Armed) {
+            phase_ = Phase::Fading;
+        }
+    }
+
+    bool silent(std::uint32_t now_us) const { return phase_ == Phase::Armed && now_us - alive_us_ > watchdog_us_; }
+
+    /// The share of torque this tick may have, 0 to 1. Returns true in the tick a fade ends.
+    bool tick(float dt_s) {
+        if (phase_ == Phase::Armed) {
+            gain_ += dt_s * (1000.0F / static_cast<float>(SOFT_START_MS));
+            gain_ = gain_ > 1.0F ? 1.0F : gain_;
+        } else if (phase_ == Phase::Fading) {
+            gain_ -= dt_s * (1000.0F / static_cast<float>(FADE_MS));
+            if (gain_ <= 0.0F) {
+                cut();
+                return true;
+            }
+        }
+        return false;
+    }
+
+    float gain() const { return gain_; }
+    Phase phase() const { return phase_; }
+
+    Standing standing;
+
+  private:
+    std::uint8_t major_;
+    std::uint32_t watchdog_us_;
+    std::uint32_t id_ = 0;
+    std::uint32_t alive_us_ = 0;
+    bool known_ = false;
+    bool fresh_ = false;
+    bool version_fits_ = false;
+    Phase phase_ = Phase::Disarmed;
+    float gain_ = 0.0F;
+};
+
+}  // namespace chalumeau

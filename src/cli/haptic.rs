@@ -1,0 +1,224 @@
+//! `chalumeau haptic`: what a force-feedback knob should feel for each note.
+
+use crate::bore::instrument_file::InstrumentFile;
+use crate::cli::Failure;
+use crate::cli::args::{AirArg, InstrumentArg, NotesArg, check_fingering, note, within, within_f32};
+use crate::cli::table::TableArgs;
+use crate::haptics::law;
+use crate::haptics::{FeelDesign, FeelTable, Limits, NoteFeel, Order, Requirements};
+use crate::instrument::Settings;
+use crate::instrument::felt::played_reed;
+use crate::reed::ReedTables;
+use crate::units::WrittenNote;
+use crate::wire::message::Law;
+use clap::{Args, ValueEnum};
+
+/// Step of the curve, degrees: one of the knob's encoder.
+const STEP_DEG: f64 = 0.1;
+/// The curve begins in the slap region, degrees.
+const FROM_DEG: f64 = -150.0;
+/// And ends this far behind the wall, degrees.
+const BEHIND_WALL_DEG: f64 = 5.0;
+
+const EXAMPLES: &str = "\
+Examples:
+  chalumeau haptic --all --zeta 0.3 --contrast 1 --csv -
+  chalumeau haptic --written 52 --law flow --curve --csv e3.csv
+  chalumeau haptic --all --H 3 --k 0.3849          a wider reed, as stiff as before
+  chalumeau haptic --all --order covered-holes --contrast 2";
+
+/// Torque laws by name.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum LawArg {
+    /// Rises to the threshold, falls to nothing where the reed shuts
+    Flow,
+    /// A spring with a step at the threshold: easy to hold
+    Pressure,
+}
+
+/// Orders by name.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum OrderArg {
+    /// By the pressure the bore asks
+    Physical,
+    /// The longer the closed tube, the harder
+    CoveredHoles,
+    /// The longer the closed tube, the easier
+    CoveredHolesReversed,
+}
+
+/// What a force-feedback knob should feel for each note
+///
+/// Every note has its own pressure requirement p_req_pa = p_M gamma_on (see `threshold`), above which it sounds, and an
+/// extinction gamma_off above which the shut reed is silent. On the knob they lie at a_on_deg and a_off_deg; at
+/// a_close_deg a resting reed would be shut. Contrast above 1 exaggerates the differences between notes: the angles and
+/// the torque change, the requirement itself does not.
+///
+/// Columns: written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k; a note that cannot
+/// sound has nan for its pressures. With --curve: angle_deg,torque_mnm in steps of 0.1 degrees, at rest, positive
+/// against the breath.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Haptic {
+    #[command(flatten)]
+    notes: NotesArg,
+    /// The torque curve of one note instead of the table
+    #[arg(long)]
+    curve: bool,
+    /// Torque law
+    #[arg(long, value_enum, default_value_t = LawArg::Flow)]
+    law: LawArg,
+    /// Exaggeration of the differences between notes, 1 (physical) ..5
+    #[arg(long, value_name = "X", default_value = "3", value_parser = |s: &str| within(s, 1.0, 5.0))]
+    contrast: f64,
+    /// Which note feels harder
+    #[arg(long, value_enum, default_value_t = OrderArg::Physical)]
+    order: OrderArg,
+    /// Written note that exaggeration leaves alone [default: C5 or, without one, the middle of the chart]
+    #[arg(long, value_name = "NOTE", value_parser = note)]
+    reference: Option<u8>,
+    /// Torque per unit of flow (flow) or at closure (pressure) on the reference note, mNm, 0..450
+    #[arg(long, value_name = "MNM", default_value = "60", value_parser = |s: &str| within(s, 0.0, 450.0))]
+    scale: f64,
+    /// Angle at which the reference reed closes on the reference note, degrees, 120..1080
+    #[arg(long, value_name = "DEG", default_value = "360", value_parser = |s: &str| within(s, 120.0, 1_080.0))]
+    travel: f64,
+    /// Mark at the threshold, mNm, 0..100 [default: none under flow, 6 under pressure]
+    #[arg(long, value_name = "MNM", value_parser = |s: &str| within(s, 0.0, 100.0))]
+    detent: Option<f64>,
+    /// Most torque allowed, mNm, 0..450
+    #[arg(long, value_name = "MNM", default_value = "100", value_parser = |s: &str| within(s, 0.0, 450.0))]
+    ceiling: f64,
+    /// Embouchure: flow strength of the reference reed, 0.05..0.9
+    #[arg(long, value_name = "ZETA", default_value = "0.3", value_parser = |s: &str| within_f32(s, 0.05, 0.9))]
+    zeta: f32,
+    /// Reed strength as on the box, 1.5..5; 2.5 closes at 6 kPa [default: 2.5]
+    #[arg(long, value_name = "N", value_parser = |s: &str| within_f32(s, 1.5, 5.0))]
+    strength: Option<f32>,
+    /// Lip: tip opening over the reference, 0.6 (bites) ..1.4 [default: 1]
+    #[arg(long, value_name = "X", value_parser = |s: &str| within_f32(s, 0.6, 1.4))]
+    lip: Option<f32>,
+    /// Rest opening H of the dimensionless law, 1..5 [default: sqrt(27)/2]
+    #[arg(long = "H", value_name = "H", value_parser = |s: &str| within_f32(s, 1.0, 5.0))]
+    h: Option<f32>,
+    /// Stiffness k of the dimensionless law, 0.1..2 [default: 27/(4 H^3), following H]
+    #[arg(long = "k", value_name = "K", value_parser = |s: &str| within_f32(s, 0.1, 2.0))]
+    k: Option<f32>,
+    #[command(flatten)]
+    air: AirArg,
+    #[command(flatten)]
+    instrument: InstrumentArg,
+    #[command(flatten)]
+    table: TableArgs,
+}
+
+impl Haptic {
+    pub fn run(&self) -> Result<(), Failure> {
+        let file = self.instrument.load()?;
+        let notes = self.notes.notes(&file)?;
+        if self.curve && self.notes.one().is_none() {
+            let right = "choose a note with --written, or leave --curve out for the table of all notes";
+            return Err(Failure::Usage(format!("--curve is for one note; {right}")));
+        }
+        let feel = self.feel(&file)?;
+        let wanted = |feel: &&NoteFeel| notes.contains(&feel.written);
+        if self.curve {
+            return feel.notes().iter().filter(wanted).try_for_each(|note| self.curve(note));
+        }
+        let mut table = self
+            .table
+            .open("written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k")?;
+        table.comment(format_args!(
+            "{}; zeta {}, Contrast {} about {}",
+            file.name,
+            self.zeta,
+            self.contrast,
+            feel.reference().written
+        ))?;
+        for note in feel.notes().iter().filter(wanted) {
+            let asked = note.requirement;
+            let (gamma_on, gamma_off, p_req) = asked.map_or((f64::NAN, f64::NAN, f64::NAN), |asked| {
+                (asked.gamma_on, asked.gamma_off, asked.p_req_pa)
+            });
+            let (a, feel) = (note.landmarks, note.feel);
+            table.line(format_args!(
+                "{},{},{},{},{:.4},{:.4},{:.4},{:.4},{},{}",
+                note.written.0,
+                number(gamma_on, 6),
+                number(gamma_off, 4),
+                number(p_req, 2),
+                a.a_on_deg,
+                a.a_off_deg,
+                a.a_close_deg,
+                feel.scale_mnm,
+                feel.h,
+                feel.k
+            ))?;
+        }
+        table.finish()
+    }
+
+    fn feel(&self, file: &InstrumentFile) -> Result<FeelTable, Failure> {
+        if let Some(reference) = self.reference {
+            check_fingering(file, WrittenNote(reference))?;
+        }
+        let standard = Settings::default();
+        let settings = Settings {
+            zeta: self.zeta,
+            strength: self.strength.unwrap_or(standard.strength),
+            lip: self.lip.unwrap_or(standard.lip),
+            reed_h: self.h.unwrap_or(standard.reed_h),
+            reed_k: self.k.unwrap_or(standard.reed_k),
+            coupled: self.k.is_none(),
+            ..standard
+        };
+        let design = FeelDesign {
+            law: match self.law {
+                LawArg::Flow => Law::Flow,
+                LawArg::Pressure => Law::Pressure,
+            },
+            reference: self.reference.map(WrittenNote),
+            contrast: self.contrast,
+            order: match self.order {
+                OrderArg::Physical => Order::Physical,
+                OrderArg::CoveredHoles => Order::CoveredHoles,
+                OrderArg::CoveredHolesReversed => Order::CoveredHolesReversed,
+            },
+            strength_mnm: self.scale,
+            travel_deg: self.travel,
+            detent_mnm: self.detent,
+            ..FeelDesign::default()
+        };
+        let limits = Limits { ceiling_mnm: self.ceiling, ..Limits::default() };
+        let bore = Requirements::new(file, self.air.air());
+        Ok(FeelTable::new(&bore, &design, &played_reed(file, &settings), &limits)?)
+    }
+
+    fn curve(&self, note: &NoteFeel) -> Result<(), Failure> {
+        let mut table = self.table.open("angle_deg,torque_mnm")?;
+        let a = note.landmarks;
+        table.comment(format_args!(
+            "written {} ({}): threshold {:.2}, beating {:.2}, closure {:.2}, extinction {:.2}, wall {:.2} degrees",
+            note.written.0,
+            note.written,
+            a.a_on_deg,
+            a.a_beat_deg,
+            a.a_close_deg,
+            a.a_off_deg,
+            note.feel.wall_deg
+        ))?;
+        let steps = ((f64::from(note.feel.wall_deg) + BEHIND_WALL_DEG - FROM_DEG) / STEP_DEG) as i32;
+        let first = (FROM_DEG / STEP_DEG) as i32;
+        for step in first..=first + steps {
+            let angle = f64::from(step) / 10.0;
+            let torque = law::torque_mnm(&note.feel, ReedTables::seed(), angle);
+            table.line(format_args!("{angle:.1},{torque:.5}"))?;
+        }
+        table.finish()
+    }
+}
+
+/// A number with so many decimals, or nan.
+fn number(x: f64, decimals: usize) -> String {
+    if x.is_nan() { "nan".to_owned() } else { format!("{x:.decimals$}") }
+}

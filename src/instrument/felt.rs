@@ -1,0 +1,29 @@
+//! The instrument's reed as the knob's side of the house wants to know it.
+
+use crate::bore::fit;
+use crate::bore::instrument_file::InstrumentFile;
+use crate::haptics::{Lip, PlayedReed};
+use crate::instrument::embouchure::embouchure;
+use crate::instrument::settings::Settings;
+use crate::units::SoundingNote;
+
+/// The reed under these settings, lip and law as the sound has them, for every fingering of a file. Allocates.
+pub fn played_reed(file: &InstrumentFile, settings: &Settings) -> PlayedReed {
+    let settings = settings.clamped();
+    let lowest_hz = fit::lowest_hz(file);
+    let lips = file
+        .fingerings
+        .iter()
+        .map(|fingering| {
+            let sounding = fingering.written.sounding(file.transposition).unwrap_or(SoundingNote(0));
+            let lip = embouchure(sounding.frequency_hz(440.0), lowest_hz);
+            Lip { resonance_hz: lip.resonance_hz, damping: lip.damping * f64::from(settings.damping) }
+        })
+        .collect();
+    PlayedReed {
+        law: settings.reed_law(),
+        zeta: f64::from(settings.zeta),
+        lay: f64::from(settings.lay),
+        lips,
+    }
+}
