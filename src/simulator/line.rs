@@ -59,7 +59,9 @@ impl Line {
         if faults.iter().any(|fault| fault.kind == FaultKind::Unplug && fault.is_active(t_s)) {
             self.clear();
         }
-        while let Some((_, piece)) = self.waiting.pop_front_if(|(arrives_s, _)| *arrives_s <= t_s) {
+        while self.waiting.front().is_some_and(|(arrives_s, _)| *arrives_s <= t_s)
+            && let Some((_, piece)) = self.waiting.pop_front()
+        {
             self.waiting_bytes -= piece.len();
             into.extend(piece);
         }

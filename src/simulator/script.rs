@@ -148,7 +148,7 @@ impl Script {
         let numbers = numbers.ok_or_else(bad)?;
         let &[from, to, seconds] = numbers.as_slice() else { return Err(bad()) };
         let is_angle = |deg: f64| deg.abs() <= ANGLE_MAX_DEG;
-        if !is_angle(from) || !is_angle(to) || !(seconds > 0.0 && seconds <= 86_400.0) {
+        if !(is_angle(from) && is_angle(to) && seconds > 0.0 && seconds <= 86_400.0) {
             return Err(bad());
         }
         // The way to the beginning is a hold, so that the crescendo itself starts at rest.

@@ -132,7 +132,7 @@ impl Server {
             }
             self.knob.step();
             self.write()?;
-            if self.pace.done.wrapping_sub(due - period) % CARE_EVERY == 0 {
+            if (self.knob.t_us() / PERIOD_US).is_multiple_of(CARE_EVERY) {
                 self.care()?;
             }
             self.write_log()?;

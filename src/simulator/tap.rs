@@ -19,7 +19,7 @@ impl Tap {
     /// Has heard nothing.
     pub fn new(is_midi: bool) -> Self {
         let listener =
-            if is_midi { Listener::Midi(Box::default()) } else { Listener::Serial(Box::new(Decoder::new())) };
+            if is_midi { Listener::Midi(Box::default()) } else { Listener::Serial(Box::default()) };
         Self { listener, laws: [None; 256] }
     }
 
