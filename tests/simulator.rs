@@ -7,12 +7,15 @@ use chalumeau::simulator::fault::{Fault, FaultKind};
 use chalumeau::simulator::hand::{Hand, HandDesign};
 use chalumeau::simulator::knob::SimulatedKnob;
 use chalumeau::simulator::plant::PlantDesign;
-use chalumeau::simulator::script::Aim;
-use chalumeau::wire::{Feel, Law, Message};
+use chalumeau::simulator::script::{Aim, Script};
+use chalumeau::wire::{EventKind, Feel, Law, Message};
 use chalumeau_firmware::Setup;
 use fastrand::Rng;
 use host::Host;
 use std::collections::BTreeMap;
+
+/// What counts as rest, degrees rms: twice the step of the encoder.
+const REST_DEG: f64 = 0.2;
 
 /// The seed's reed: closes at one turn of stretch 1.
 const H: f32 = 2.598_076_2;
@@ -47,12 +50,17 @@ fn setup(midi: bool, knob_damping_nms: f64) -> Setup {
 
 /// A knob without a hand at an angle, armed with a feel; none if the firmware refuses it.
 fn released(feel: Feel, plant: PlantDesign, angle_deg: f64) -> Option<Host> {
-    let hand = Hand::new(HandDesign::default(), 1);
+    released_by(HandDesign::default(), feel, plant, angle_deg)
+}
+
+/// The same, with a certain hand ready to take hold.
+fn released_by(hand: HandDesign, feel: Feel, plant: PlantDesign, angle_deg: f64) -> Option<Host> {
+    let hand = Hand::new(hand, 1);
     let mut host = Host::new(SimulatedKnob::new(setup(false, plant.viscous_nms), plant, hand, 1), false, 450);
+    host.greet(); // zero is where the knob stood when it started
     host.knob.plant().set(angle_deg.to_radians(), 0.0);
-    host.greet();
     host.send(&Message::Feel(feel));
-    host.run(0.01, |_| {});
+    host.run(0.1, |_| {}); // until its speed is forgotten
     if host.state().feel_id != feel.feel_id {
         return None;
     }
@@ -61,13 +69,29 @@ fn released(feel: Feel, plant: PlantDesign, angle_deg: f64) -> Option<Host> {
     Some(host)
 }
 
-/// Swing about its mean in the last second of four, degrees rms.
+/// Swing within a second about a straight line, degrees rms, once the knob has had time to get where it wants to: a weak
+/// spring against strong damping creeps for minutes, and that is no swing.
 fn unrest_deg(host: &mut Host) -> f64 {
-    host.run(3.0, |_| {});
-    let mut angles = Vec::with_capacity(2000);
-    host.run(1.0, |knob| angles.push(knob.angle_deg()));
-    let mean = angles.iter().sum::<f64>() / angles.len() as f64;
-    (angles.iter().map(|a| (a - mean).powi(2)).sum::<f64>() / angles.len() as f64).sqrt()
+    let mut calm = 0;
+    let mut unrest = 0.0f64;
+    for _ in 0..30 {
+        let mut angles = Vec::with_capacity(2000);
+        host.run(1.0, |knob| angles.push(knob.angle_deg()));
+        unrest = rms_about_line(&angles);
+        calm = if unrest < REST_DEG { calm + 1 } else { 0 };
+        if calm == 2 {
+            break;
+        }
+    }
+    unrest
+}
+
+fn rms_about_line(x: &[f64]) -> f64 {
+    let middle = (x.len() as f64 - 1.0) / 2.0;
+    let mean = x.iter().sum::<f64>() / x.len() as f64;
+    let centred = || x.iter().enumerate().map(|(i, x)| (i as f64 - middle, x - mean));
+    let slope = centred().map(|(t, x)| t * x).sum::<f64>() / centred().map(|(t, _)| t * t).sum::<f64>();
+    (centred().map(|(t, x)| (x - slope * t).powi(2)).sum::<f64>() / x.len() as f64).sqrt()
 }
 
 /// What a study of many settings found.
@@ -89,7 +113,7 @@ impl Findings {
             self.runs += 1;
             let unrest = unrest_deg(&mut host);
             self.worst_deg = self.worst_deg.max(unrest);
-            if unrest >= 0.2 {
+            if unrest >= REST_DEG {
                 let at = host.knob.angle_deg();
                 self.swinging
                     .push(format!("{unrest:.2} deg rms from {start_deg:.0} at {at:.1}: {feel:?} {plant:?}"));
@@ -138,7 +162,7 @@ fn no_allowed_setting_makes_a_released_knob_swing() {
         for law in [Law::Flow, Law::Pressure] {
             for scale_mnm in [30.0, 100.0, 250.0, 450.0] {
                 for stretch in [0.5, 1.0, 3.0, 10.0] {
-                    for (h, k) in [(H, K), (3.0, 0.25), (2.0, 0.843_75), (4.0, 0.2), (1.5, 0.6)] {
+                    for (h, k) in [(H, K), (2.0, 0.843_75), (4.0, 0.2)] {
                         for damping_mnms in [0.0, 5.0] {
                             let feel = Feel { damping_mnms, ..feel(law, scale_mnm, stretch, h, k) };
                             let wall = f64::from(feel.wall_deg);
@@ -157,7 +181,7 @@ fn no_allowed_setting_makes_a_released_knob_swing() {
 fn no_allowed_feel_drawn_by_lot_makes_a_released_knob_swing() {
     let mut rng = Rng::with_seed(1);
     let mut findings = Findings::default();
-    for _ in 0..1500 {
+    for _ in 0..1000 {
         let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
         let (h, k) = (between(0.5, 5.0) as f32, between(0.01f64.ln(), 3.0f64.ln()).exp() as f32);
         let law = if between(0.0, 1.0) < 0.5 { Law::Flow } else { Law::Pressure };
@@ -180,11 +204,58 @@ fn no_allowed_feel_drawn_by_lot_makes_a_released_knob_swing() {
     findings.judge("by lot");
 }
 
+/// Swing of a knob pressed with 40 mNm against a spring of its feel, degrees rms; none if the feel is refused.
+fn pressed_deg(feel: Feel, plant: PlantDesign, angle_deg: f64, damping_nms: f64) -> Option<f64> {
+    let mut host = released_by(HandDesign { damping_nms, ..HandDesign::default() }, feel, plant, angle_deg)?;
+    host.knob.hand().aim(Aim::Force(40.0));
+    Some(unrest_deg(&mut host))
+}
+
+/// A wall, and a pressure law, of a share of the stiffness 2 b / T the firmware accepts; with where to press them.
+fn springs(plant: &PlantDesign, share: f64) -> impl Iterator<Item = (Feel, f64)> {
+    let mnm_per_deg = (1000.0 * share * 2.0 * plant.viscous_nms * 2000.0).to_radians();
+    let base =
+        |scale_mnm, stretch| Feel { damping_mnms: 0.0, ..feel(Law::Pressure, scale_mnm, stretch, H, K) };
+    let wall = Feel { wall_deg: 100.0, wall_mnm_per_deg: mnm_per_deg as f32, ..base(0.0, 1.0) };
+    let law = base(200.0, (1.8 * mnm_per_deg) as f32);
+    [(wall, 101.0), (law, 5.0)].into_iter().filter(|(feel, _)| feel.stretch <= 30.0)
+}
+
+#[test]
+fn every_spring_allowed_is_calm_under_a_finger_and_the_softer_ones_under_a_weight() {
+    // Colgate and Brown: b > K (T/2 + delay). The bus delays by a whole T, so that a load without damping of its own, a
+    // weight, needs K < 2 b / (3 T): a third of the 2 b / T that is accepted. Fingers damp ten times what the knob does.
+    for (who, damping_nms, shares) in [
+        ("finger", 0.01, &[0.1, 0.25, 0.5, 0.75, 0.99][..]),
+        ("light finger", 0.003, &[0.1, 0.25, 0.5, 0.75, 0.99]),
+        ("weight", 0.0, &[0.1, 0.25]),
+        ("weight beyond", 0.0, &[0.33, 0.5, 0.75, 0.99]),
+    ] {
+        let mut tried = 0;
+        for &share in shares {
+            let mut worst = 0.0f64;
+            for plant in knobs() {
+                for (feel, angle_deg) in springs(&plant, share) {
+                    let Some(unrest) = pressed_deg(feel, plant, angle_deg, damping_nms) else { continue };
+                    (worst, tried) = (worst.max(unrest), tried + 1);
+                    let is_promised = who != "weight beyond";
+                    assert!(
+                        unrest < REST_DEG || !is_promised,
+                        "{who}, {share} of 2 b / T: {unrest} deg rms, {feel:?} {plant:?}"
+                    );
+                }
+            }
+            println!("{who}, {share} of 2 b / T: at most {worst:.3} deg rms");
+        }
+        assert!(tried >= 4, "{who} tried nothing");
+    }
+}
+
 #[test]
 fn morph_never_changes_torque_faster_than_the_slew_limit() {
     // A flywheel: what changes is the law, not the angle.
     let flywheel = PlantDesign {
-        inertia_kgm2: 1e3,
+        inertia_kgm2: 1e9,
         encoder_noise_deg: 0.0,
         torque_step_nm: 0.0,
         viscous_nms: 2e-3,
@@ -193,7 +264,7 @@ fn morph_never_changes_torque_faster_than_the_slew_limit() {
     let mut rng = Rng::with_seed(2);
     let (mut fastest, mut largest, mut accepted) = (0.0f64, 0.0f64, 0);
     for angle_deg in [20.0, 60.0, 120.0, 300.0] {
-        let first = feel(Law::Pressure, 200.0, 1.0, H, K);
+        let first = Feel { damping_mnms: 0.0, ..feel(Law::Pressure, 200.0, 1.0, H, K) };
         let mut host = released(first, flywheel, angle_deg).unwrap();
         host.run(0.3, |_| {});
         let mut last = host.knob.command_mnm();
@@ -202,7 +273,7 @@ fn morph_never_changes_torque_faster_than_the_slew_limit() {
             let law = [Law::Free, Law::Flow, Law::Pressure][between(0.0, 2.999) as usize];
             let base =
                 feel(law, between(0.0, 450.0) as f32, between(0.3, 3.0) as f32, H, between(0.1, 0.5) as f32);
-            let next = Feel { feel_id, morph_ms: between(20.0, 100.0) as u16, ..base };
+            let next = Feel { feel_id, damping_mnms: 0.0, morph_ms: between(20.0, 100.0) as u16, ..base };
             host.send(&Message::Feel(next));
             // Some are interrupted by the next, some come to their end.
             let before = host.knob.command_mnm();
@@ -223,7 +294,7 @@ fn morph_never_changes_torque_faster_than_the_slew_limit() {
 
 #[test]
 fn listening_hand_holds_gamma_one_half_under_both_laws() {
-    let mut worst = 0.0f64;
+    let (mut worst, mut held, mut refused) = (0.0f64, 0, 0);
     for law in [Law::Flow, Law::Pressure] {
         for scale_mnm in [50.0, 100.0, 200.0] {
             for stretch in [1.0, 2.0, 4.0] {
@@ -237,7 +308,11 @@ fn listening_hand_holds_gamma_one_half_under_both_laws() {
                 host.greet();
                 host.send(&Message::Feel(feel(law, scale_mnm, stretch, H, K)));
                 host.run(0.05, |_| {});
-                assert_eq!(host.state().feel_id, 1, "{law:?} {scale_mnm} {stretch} is allowed");
+                if host.state().feel_id != 1 {
+                    refused += 1;
+                    continue;
+                }
+                held += 1;
                 host.arm();
                 let closure_deg = 360.0 / f64::from(stretch);
                 host.knob.hand().aim(Aim::Angle(0.5 * closure_deg));
@@ -256,6 +331,8 @@ fn listening_hand_holds_gamma_one_half_under_both_laws() {
             }
         }
     }
+    println!("held {held}, refused {refused}, worst +-{worst:.4}");
+    assert!(held >= 15, "{refused} of 18 settings were refused");
     assert!(worst <= 0.02, "gamma 0.5 +- {worst:.4} with a hand of {:?}", HandDesign::listening());
 }
 
@@ -301,7 +378,7 @@ fn break_it(harm: Harm, midi: bool, seed: u64) -> f64 {
     let mut rng = Rng::with_seed(seed);
     let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
     let plant = PlantDesign { torque_step_nm: 0.0, ..PlantDesign::default() };
-    let mut knob = SimulatedKnob::new(
+    let knob = SimulatedKnob::new(
         setup(midi, plant.viscous_nms),
         plant,
         Hand::new(HandDesign::default(), seed),
@@ -309,21 +386,22 @@ fn break_it(harm: Harm, midi: bool, seed: u64) -> f64 {
     );
     let ceiling_mnm = between(40.0, 250.0).round();
     let law = if between(0.0, 1.0) < 0.5 { Law::Flow } else { Law::Pressure };
-    let played = feel(law, between(60.0, 450.0) as f32, between(0.7, 2.0) as f32, H, K);
+    let played = feel(law, between(60.0, 220.0) as f32, between(0.7, 2.0) as f32, H, K);
     let closure_deg = 360.0 / f64::from(played.stretch);
-    let angle_deg = closure_deg * between(0.1, 0.6);
-    knob.plant().set(angle_deg.to_radians(), 0.0);
-    knob.hand().aim(Aim::Angle(angle_deg));
+    let angle_deg = closure_deg * between(0.2, 0.6);
     let mut host = Host::new(knob, midi, ceiling_mnm as u16);
     let context = format!("{harm:?}, midi {midi}, seed {seed}");
     host.greet();
+    host.knob.plant().set(angle_deg.to_radians(), 0.0);
+    host.knob.hand().aim(Aim::Angle(angle_deg));
     host.send(&Message::Feel(played));
-    host.run(0.05, |_| {});
+    host.run(0.1, |_| {});
+    assert_eq!(host.state().feel_id, 1, "{context}: the feel is allowed");
     host.arm();
     let mut strongest = 0.0f64;
     let mut watch = |knob: &SimulatedKnob| strongest = strongest.max(knob.motor_mnm().abs());
     host.run(between(0.2, 0.6), &mut watch);
-    assert!(host.knob.is_armed() && host.knob.motor_mnm().abs() > 5.0, "{context}: in play");
+    assert!(host.knob.is_armed() && host.knob.motor_mnm().abs() > 4.0, "{context}: in play");
 
     let t_s = host.knob.t_s();
     let fault = |kind| Fault::new(kind, t_s).lasting(HARM_S);
@@ -445,12 +523,12 @@ fn same_seed_gives_the_same_run_to_the_bit() {
 fn slap_of_the_hand_is_told_with_its_speed() {
     let plant = PlantDesign::default();
     let mut hand = Hand::new(HandDesign::default(), 1);
-    hand.follow(chalumeau::simulator::script::Script::slap());
+    hand.follow(Script::slap());
     let mut host = Host::new(SimulatedKnob::new(setup(false, plant.viscous_nms), plant, hand, 1), false, 100);
     host.greet();
     let mut fastest = 0.0f64;
     host.run(2.0, |knob| fastest = fastest.max(knob.velocity_rpm().abs()));
-    let slaps: Vec<f32> = host.events.iter().filter(|e| e.kind as u8 == 1).map(|e| e.value).collect();
+    let slaps: Vec<f32> = host.events.iter().filter(|e| e.kind == EventKind::Slap).map(|e| e.value).collect();
     assert_eq!(slaps.len(), 1, "{:?}", host.events);
     let fastest_rads = fastest * std::f64::consts::TAU / 60.0;
     assert!((f64::from(slaps[0]) / fastest_rads - 1.0).abs() < 0.2, "{} {fastest_rads}", slaps[0]);
