@@ -133,7 +133,8 @@ impl KnobReader {
     pub fn begin_block_at(&mut self, now_us: i64, block_samples: usize, rate_hz: f64) {
         self.drain();
         let block = block_samples as f64 / rate_hz * 1e6;
-        if rate_hz != self.rate_hz || now_us.saturating_sub(self.last_call_us) > AUDIO_PAUSE_US + block as i64 {
+        if rate_hz != self.rate_hz || now_us.saturating_sub(self.last_call_us) > AUDIO_PAUSE_US + block as i64
+        {
             self.timeline.reset();
             self.rate_hz = rate_hz;
         }
@@ -321,6 +322,9 @@ mod tests {
         let (mut writer, mut reader) = ring(Instant::now());
         writer.slap(12.0);
         writer.slap(7.0);
-        assert_eq!([reader.take_slap(), reader.take_slap(), reader.take_slap()], [Some(12.0), Some(7.0), None]);
+        assert_eq!(
+            [reader.take_slap(), reader.take_slap(), reader.take_slap()],
+            [Some(12.0), Some(7.0), None]
+        );
     }
 }

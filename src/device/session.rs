@@ -113,6 +113,7 @@ pub struct Session {
     feeling: Feeling,
     slaps: Slaps,
     info: Option<Info>,
+    info_us: Option<i64>,
     next_alive_us: i64,
     next_slot_us: i64,
     zero_due: bool,
@@ -144,6 +145,7 @@ impl Session {
             feeling: Feeling::default(),
             slaps: Slaps::default(),
             info: None,
+            info_us: None,
             next_alive_us: now_us,
             has_plain_angle: false,
             next_slot_us: now_us,
@@ -176,7 +178,7 @@ impl Session {
 
     /// When the knob was last heard, us.
     pub fn heard_us(&self) -> Option<i64> {
-        self.state.map(|(_, at)| at).max(self.plain.map(|sample| sample.host_us))
+        self.state.map(|(_, at)| at).max(self.plain.map(|sample| sample.host_us)).max(self.info_us)
     }
 
     /// True while the knob says that it is armed and shall be.
@@ -214,9 +216,12 @@ impl Session {
         match &self.info {
             Some(info) if !info.speaks_our_major() => Standing::OtherVersion,
             Some(_) if self.is_heard(now_us) => Standing::Live,
+            Some(_) if self.state.is_none() && self.plain.is_some() => Standing::PlainMidi,
             Some(_) => Standing::Silent,
             None if self.plain.is_some() => Standing::PlainMidi,
-            None => self.greeting.stock_name().map_or(Standing::Greeting, |name| Standing::Stock(name.into())),
+            None => {
+                self.greeting.stock_name().map_or(Standing::Greeting, |name| Standing::Stock(name.into()))
+            }
         }
     }
 
@@ -232,7 +237,9 @@ impl Session {
     pub fn arm(&mut self, ceiling_mnm: u16, further_act: bool, now_us: i64) {
         let why_not = match &self.info {
             None => "not armed: no knob with Chalumeau's firmware has answered",
-            Some(info) if !info.speaks_our_major() => "not armed: the knob speaks another version of the protocol",
+            Some(info) if !info.speaks_our_major() => {
+                "not armed: the knob speaks another version of the protocol"
+            }
             Some(_) if !self.is_heard(now_us) => "not armed: the knob is silent",
             Some(info) => {
                 self.arming.arm(ceiling_mnm, further_act, info, now_us);
@@ -359,7 +366,7 @@ impl Session {
         if std::mem::take(&mut self.rate_due) {
             return Some(Message::Rate(if self.is_slow() { SLOW_RATE_HZ } else { RATE_HZ }));
         }
-        self.feeling.poll(now_us).map(Message::Feel)
+        self.feeling.poll(now_us, self.is_heard(now_us)).map(Message::Feel)
     }
 
     fn say(&mut self, message: &Message, send: &mut dyn FnMut(Wish)) {
@@ -438,9 +445,12 @@ impl Session {
         if let Some(hello_us) = self.greeting.hello_us() {
             self.meter.hello_round_trip_us = u32::try_from(now_us - hello_us).ok();
         }
-        self.rate_due = self.binding == Binding::Serial;
-        self.feeling.forget();
-        self.info = Some(*info);
+        self.info_us = Some(now_us);
+        // Answered again: it was silent, not gone.
+        if self.info.replace(*info).is_none() {
+            self.rate_due = self.binding == Binding::Serial;
+            self.feeling.forget();
+        }
     }
 
     fn hear_state(&mut self, state: &State, now_us: i64, tell: &mut dyn FnMut(Happening)) {
@@ -491,7 +501,8 @@ impl Session {
             EventKind::Limit => {}
             EventKind::Fault => self.notice = Some(format!("fault: {text}")),
             EventKind::Disarmed => {
-                self.notice = (event.code != wire::FaultCode::Free as u8).then(|| format!("disarmed: {text}"));
+                self.notice =
+                    (event.code != wire::FaultCode::Free as u8).then(|| format!("disarmed: {text}"));
             }
             // The codes up to 7 are about FEEL, of which the one refused is named.
             EventKind::Refused if event.code <= wire::RefusedCode::LawUnknown as u8 => {

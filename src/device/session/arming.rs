@@ -50,7 +50,13 @@ pub struct Arming {
 
 impl Default for Arming {
     fn default() -> Self {
-        Self { want: Want::Free, ceiling_mnm: FIRST_CEILING_MNM, next_us: i64::MIN, say_free: false, is_armed: false }
+        Self {
+            want: Want::Free,
+            ceiling_mnm: FIRST_CEILING_MNM,
+            next_us: i64::MIN,
+            say_free: false,
+            is_armed: false,
+        }
     }
 }
 
@@ -162,9 +168,13 @@ pub(super) mod tests {
 
     #[test]
     fn ceiling_is_the_least_of_all() {
-        for (asked, further, device, allowed) in
-            [(100, false, 450, 100), (900, false, 450, 250), (900, true, 450, 450), (900, true, 300, 300), (80, true, 60, 60)]
-        {
+        for (asked, further, device, allowed) in [
+            (100, false, 450, 100),
+            (900, false, 450, 250),
+            (900, true, 450, 450),
+            (900, true, 300, 300),
+            (80, true, 60, 60),
+        ] {
             let mut arming = Arming::default();
             arming.arm(asked, further, &info(device), 0);
             assert_eq!(arming.ceiling_mnm(), allowed, "asked {asked}, device {device}");

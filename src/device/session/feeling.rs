@@ -64,15 +64,15 @@ impl Feeling {
         self.sent = None;
     }
 
-    /// The FEEL to send now.
-    pub fn poll(&mut self, now_us: i64) -> Option<Feel> {
+    /// The FEEL to send now. `hears_echo`: STATE comes, so that a FEEL without an echo was lost.
+    pub fn poll(&mut self, now_us: i64, hears_echo: bool) -> Option<Feel> {
         let wanted = self.wanted?;
         if self.last_us.is_some_and(|at| now_us - at < LEAST_US) {
             return None;
         }
         match &mut self.sent {
             Some(sent) if same(&sent.feel, &wanted) => {
-                let waits_us = if sent.is_echoed || sent.is_refused { AGAIN_US } else { LOST_US };
+                let waits_us = if sent.is_echoed || !hears_echo { AGAIN_US } else { LOST_US };
                 if now_us - sent.latest_us < waits_us || sent.is_refused {
                     return None;
                 }
@@ -83,8 +83,13 @@ impl Feeling {
             _ => {
                 self.feel_id = self.feel_id.wrapping_add(1);
                 let feel = Feel { feel_id: self.feel_id, ..wanted };
-                self.sent =
-                    Some(Sent { feel, first_us: now_us, latest_us: now_us, is_echoed: false, is_refused: false });
+                self.sent = Some(Sent {
+                    feel,
+                    first_us: now_us,
+                    latest_us: now_us,
+                    is_echoed: false,
+                    is_refused: false,
+                });
                 self.last_us = Some(now_us);
                 Some(feel)
             }
@@ -124,7 +129,7 @@ mod tests {
         let mut sent = Vec::new();
         for ms in 0..1000 {
             feeling.want(feel(ms as f32 * 0.1)).unwrap();
-            sent.extend(feeling.poll(ms * 1000).map(|feel| (ms, feel.scale_mnm)));
+            sent.extend(feeling.poll(ms * 1000, true).map(|feel| (ms, feel.scale_mnm)));
         }
         assert_eq!(sent.len(), 100);
         assert!(sent.iter().all(|&(ms, scale)| scale == ms as f32 * 0.1), "none is older than it need be");
@@ -137,7 +142,7 @@ mod tests {
         let mut sent = Vec::new();
         for ms in 0..3000 {
             feeling.want(feel(1.0)).unwrap();
-            if let Some(feel) = feeling.poll(ms * 1000) {
+            if let Some(feel) = feeling.poll(ms * 1000, true) {
                 sent.push((ms, feel.feel_id));
             }
             if ms == 250 {
@@ -152,13 +157,13 @@ mod tests {
     fn what_is_refused_is_not_repeated_and_what_cannot_be_sent_is_said_once() {
         let mut feeling = Feeling::default();
         feeling.want(feel(1.0)).unwrap();
-        let id = feeling.poll(0).unwrap().feel_id;
+        let id = feeling.poll(0, true).unwrap().feel_id;
         assert!(feeling.refused(id) && !feeling.refused(id.wrapping_add(1)));
-        assert_eq!((1..5000).filter_map(|ms| feeling.poll(ms * 1000)).count(), 0);
+        assert_eq!((1..5000).filter_map(|ms| feeling.poll(ms * 1000, true)).count(), 0);
         let reason = feeling.want(feel(451.0)).unwrap_err();
         assert!(reason.contains("scale_mnm") && reason.contains("451"), "{reason}");
         assert_eq!(feeling.want(feel(451.0)), Ok(()), "once");
         feeling.want(feel(2.0)).unwrap();
-        assert_eq!(feeling.poll(6_000_000).unwrap().scale_mnm, 2.0);
+        assert_eq!(feeling.poll(6_000_000, true).unwrap().scale_mnm, 2.0);
     }
 }

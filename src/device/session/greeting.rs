@@ -135,7 +135,8 @@ fn name_in(text: &[u8]) -> Option<String> {
     let start = find(0, b"<<<")? + 3;
     let end = find(start, b">>>")?;
     let name = std::str::from_utf8(&text[start..end]).ok()?.trim();
-    let is_plain = !name.is_empty() && name.len() <= 40 && name.chars().all(|c| c.is_ascii_graphic() || c == ' ');
+    let is_plain =
+        !name.is_empty() && name.len() <= 40 && name.chars().all(|c| c.is_ascii_graphic() || c == ' ');
     is_plain.then(|| name.to_owned())
 }
 
@@ -159,10 +160,15 @@ mod tests {
         let log = log(5, &mut Greeting::new(Binding::Serial, 0));
         let hello: Vec<i64> = log.iter().filter(|(_, due)| *due == Due::Hello).map(|(ms, _)| *ms).collect();
         assert_eq!(hello[..3], [0, 250, 500]);
-        assert!(hello.windows(2).all(|pair| pair[1] - pair[0] >= 100));
-        let bauds: Vec<(i64, Due)> = log.iter().filter(|(_, due)| matches!(due, Due::Baud(_))).copied().collect();
+        assert!(
+            hello.windows(6).all(|six| six[5] - six[0] >= 1000),
+            "four a second, and one with each change of speed"
+        );
+        let bauds: Vec<(i64, Due)> =
+            log.iter().filter(|(_, due)| matches!(due, Due::Baud(_))).copied().collect();
         assert_eq!(bauds[..2], [(600, Due::Baud(115_200)), (1300, Due::Baud(921_600))]);
-        let asked: Vec<i64> = log.iter().filter(|(_, due)| *due == Due::Question).map(|(ms, _)| *ms).collect();
+        let asked: Vec<i64> =
+            log.iter().filter(|(_, due)| *due == Due::Question).map(|(ms, _)| *ms).collect();
         assert_eq!(asked, [600]);
     }
 
@@ -170,8 +176,11 @@ mod tests {
     fn question_waits_until_a_board_that_was_reset_has_started() {
         let mut greeting = Greeting::new(Binding::Serial, 0);
         greeting.hear(b"rst:0x1 (POWERON_RESET)");
-        let asked: Vec<i64> =
-            log(5, &mut greeting).iter().filter(|(_, due)| *due == Due::Question).map(|(ms, _)| *ms).collect();
+        let asked: Vec<i64> = log(5, &mut greeting)
+            .iter()
+            .filter(|(_, due)| *due == Due::Question)
+            .map(|(ms, _)| *ms)
+            .collect();
         assert_eq!(asked, [2000]);
     }
 

@@ -64,7 +64,8 @@ mod tests {
 
     #[test]
     fn a_slap_sounds_once_whichever_word_of_it_arrives() {
-        for (says_event_ms, says_state_ms) in [(Some(10), Some(12)), (Some(12), Some(10)), (Some(10), None), (None, Some(10))]
+        for (says_event_ms, says_state_ms) in
+            [(Some(10), Some(12)), (Some(12), Some(10)), (Some(10), None), (None, Some(10))]
         {
             let mut slaps = Slaps::default();
             let mut heard = 0;
