@@ -1,5 +1,8 @@
 //! The real firmware on a simulated knob, in simulated time: what it does to a hand, and what it does when things break.
 
+#[cfg(unix)]
+#[path = "simulator/command.rs"]
+mod command;
 #[path = "simulator/host.rs"]
 mod host;
 

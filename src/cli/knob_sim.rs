@@ -2,6 +2,7 @@
 
 use crate::cli::Failure;
 use crate::cli::args::within;
+use crate::device::places::Places;
 use crate::simulator::fault::Fault;
 use crate::simulator::hand::{Hand, HandDesign};
 use crate::simulator::knob::SimulatedKnob;
@@ -36,6 +37,9 @@ The first line of standard output says where the knob is: `serial /dev/pts/7`, `
 Faults are KIND@AT[:SECONDS[=STRENGTH]]: drop, corrupt, duplicate, delay, reboot, stall, unplug,
 i2c, brownout, overspeed.";
 
+/// What the knob calls itself.
+const NAME: &str = "TorqueTuner sim";
+
 /// A simulated TorqueTuner running the real firmware, at a serial port of its own
 ///
 /// Knob, friction, encoder, motor board and a hand, 2,000 times a second. It arms only when a host asks, as a real one.
@@ -43,10 +47,6 @@ i2c, brownout, overspeed.";
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct KnobSim {
-    #[command(flatten)]
-    hand: HandArgs,
-    #[command(flatten)]
-    port: PortArgs,
     /// Something that goes wrong, at a time in seconds; may be given more than once
     #[arg(long = "fault", value_name = "KIND@AT[:SECONDS]")]
     faults: Vec<Fault>,
@@ -62,13 +62,16 @@ pub struct KnobSim {
     /// No status line each second
     #[arg(long)]
     quiet: bool,
+    #[command(flatten)]
+    hand: HandArgs,
+    #[command(flatten)]
+    port: PortArgs,
 }
 
 /// What the hand does; without one, nobody holds the knob.
 #[derive(Args)]
-#[command(next_help_heading = "Hand")]
-#[group(id = "deed", multiple = false, args = ["script", "hold", "crescendo", "press", "slap"])]
-struct HandArgs {
+#[group(id = "deed", multiple = false)]
+struct DeedArgs {
     /// CSV: t_s,angle_deg or t_s,force_mnm, then grip (0..1) and button (0 or 1) if wanted
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
@@ -84,6 +87,14 @@ struct HandArgs {
     /// Slaps: out beyond -150 degrees and back
     #[arg(long)]
     slap: bool,
+}
+
+/// The hand and how it is.
+#[derive(Args)]
+#[command(next_help_heading = "Hand")]
+struct HandArgs {
+    #[command(flatten)]
+    deed: DeedArgs,
     /// Again and again
     #[arg(long = "loop", requires = "deed")]
     is_loop: bool,
@@ -115,7 +126,7 @@ struct PortArgs {
     #[arg(long, requires = "osc")]
     misspelt: bool,
     /// A virtual MIDI port instead of a serial one
-    #[arg(long, value_name = "NAME", num_args = 0..=1, default_missing_value = "TorqueTuner sim")]
+    #[arg(long, value_name = "NAME", num_args = 0..=1, default_missing_value = NAME)]
     midi: Option<String>,
     /// Serial number of the device, hexadecimal
     #[arg(long, value_name = "HEX", default_value = "5100000000000001", value_parser = serial_number)]
@@ -130,15 +141,15 @@ fn serial_number(text: &str) -> Result<u64, String> {
 
 impl HandArgs {
     fn script(&self) -> Result<Option<Script>, Failure> {
-        let script = if let Some(path) = &self.script {
+        let script = if let Some(path) = &self.deed.script {
             let file = File::open(path).map_err(|source| Failure::Read { path: path.clone(), source })?;
             let script = Script::read_csv(file);
             Some(script.map_err(|source| Failure::HandScript { path: path.clone(), source })?)
-        } else if let Some(text) = &self.crescendo {
+        } else if let Some(text) = &self.deed.crescendo {
             Some(Script::parse_crescendo(text).map_err(|e| Failure::Usage(e.to_string()))?)
         } else {
-            let deeds = [self.hold.map(Script::hold), self.press.map(Script::press)];
-            deeds.into_iter().flatten().next().or_else(|| self.slap.then(Script::slap))
+            let deeds = [self.deed.hold.map(Script::hold), self.deed.press.map(Script::press)];
+            deeds.into_iter().flatten().next().or_else(|| self.deed.slap.then(Script::slap))
         };
         Ok(script.map(|script| if self.is_loop { script.repeated() } else { script }))
     }
@@ -206,7 +217,7 @@ impl KnobSim {
         } else {
             let setup = Setup {
                 serial: self.port.serial_number,
-                name: "TorqueTuner sim".to_owned(),
+                name: NAME.to_owned(),
                 midi: self.port.midi.is_some(),
                 knob_damping_nms: plant.viscous_nms as f32,
                 counts_per_turn: plant.counts_per_turn,
@@ -215,7 +226,12 @@ impl KnobSim {
             (SimulatedKnob::new(setup, plant, hand, self.seed), self.port.open()?)
         };
         self.faults.iter().for_each(|fault| knob.inject(*fault));
-        Ok(Server::new(knob, port))
+        let mut server = Server::new(knob, port);
+        if server.path().is_some() {
+            let announced = server.announce(Places::default(), self.port.serial_number, NAME);
+            announced.map_err(|e| Failure::Usage(format!("cannot announce the knob: {e}")))?;
+        }
+        Ok(server)
     }
 
     fn say_fixed_port(&self) -> Result<(), Failure> {

@@ -3,7 +3,9 @@
 //! Periods are counted from one start, so nothing drifts: whoever wakes late makes up for it. Only after a stop of more than
 //! 50 ms (a suspended machine) is time lost instead, lest the firmware's watchdog take our sleep for the host's.
 
-use crate::device::transport::Transport;
+use crate::device::discover::Advert;
+use crate::device::places::Places;
+use crate::device::transport::{Binding, Transport};
 use crate::simulator::fault::Fault;
 use crate::simulator::knob::{PERIOD_US, SimulatedKnob};
 use crate::simulator::midi::MidiSplitter;
@@ -83,6 +85,24 @@ pub enum Control {
     Fault(Fault),
 }
 
+/// Where hosts look for knobs, and what they find there while there is a path.
+struct Announcement {
+    places: Places,
+    serial: u64,
+    name: String,
+    advert: Option<Advert>,
+}
+
+impl Announcement {
+    fn update(&mut self, path: Option<&Path>) -> io::Result<()> {
+        // The old one first: a serial number can be announced once at a time.
+        self.advert = None;
+        self.advert =
+            path.map(|path| Advert::publish(&self.places, self.serial, &self.name, path)).transpose()?;
+        Ok(())
+    }
+}
+
 /// A knob at a port.
 pub struct Server {
     /// The knob.
@@ -90,6 +110,7 @@ pub struct Server {
     port: Port,
     pace: Pace,
     log: Option<BufWriter<File>>,
+    announcement: Option<Announcement>,
     splitter: MidiSplitter,
     buffer: Vec<u8>,
 }
@@ -98,7 +119,15 @@ impl Server {
     /// Starts the clock.
     pub fn new(knob: SimulatedKnob, port: Port) -> Self {
         let pace = Pace { start: Instant::now(), done: 0, slipped: 0 };
-        Self { knob, port, pace, log: None, splitter: MidiSplitter::default(), buffer: Vec::new() }
+        Self {
+            knob,
+            port,
+            pace,
+            log: None,
+            announcement: None,
+            splitter: MidiSplitter::default(),
+            buffer: Vec::new(),
+        }
     }
 
     /// Writes the course of things to a CSV file, 500 lines a second.
@@ -109,13 +138,17 @@ impl Server {
         Ok(())
     }
 
+    /// Lets hosts that look for this serial number find the port, as long as the server lives and the cable is in.
+    pub fn announce(&mut self, places: Places, serial: u64, name: &str) -> io::Result<()> {
+        let mut announcement = Announcement { places, serial, name: name.to_owned(), advert: None };
+        announcement.update(path_of(&self.port))?;
+        self.announcement = Some(announcement);
+        Ok(())
+    }
+
     /// What the host opens; none while the cable is out or where there is no path.
     pub fn path(&self) -> Option<&Path> {
-        match &self.port {
-            #[cfg(unix)]
-            Port::Serial(pty) => pty.as_ref().map(Pty::path),
-            _ => None,
-        }
+        path_of(&self.port)
     }
 
     /// Periods lost because the machine stood still.
@@ -172,7 +205,7 @@ impl Server {
             Port::Serial(Some(pty)) => pty.write(&self.buffer)?,
             #[cfg(unix)]
             Port::Midi(midi) => self.splitter.split(&self.buffer, |message| midi.write(message)),
-            Port::Memory(transport) if transport.binding() == crate::device::transport::Binding::Midi => {
+            Port::Memory(transport) if transport.binding() == Binding::Midi => {
                 self.splitter.split(&self.buffer, |message| _ = transport.send(message));
             }
             Port::Memory(transport) if !self.buffer.is_empty() => _ = transport.send(&self.buffer),
@@ -180,10 +213,12 @@ impl Server {
         }
         #[cfg(unix)]
         if let Port::Serial(pty) = &mut self.port {
-            match (self.knob.is_unplugged(), pty.is_some()) {
-                (true, true) => *pty = None,
-                (false, false) => *pty = Some(Pty::open()?),
-                _ => {}
+            let is_unplugged = self.knob.is_unplugged();
+            if is_unplugged == pty.is_some() {
+                *pty = if is_unplugged { None } else { Some(Pty::open()?) };
+                if let Some(announcement) = &mut self.announcement {
+                    announcement.update(path_of(&self.port))?;
+                }
             }
         }
         Ok(())
@@ -251,6 +286,14 @@ impl Server {
             thread::sleep(NAP);
         }
         self.log.as_mut().map_or(Ok(()), Write::flush)
+    }
+}
+
+fn path_of(port: &Port) -> Option<&Path> {
+    match port {
+        #[cfg(unix)]
+        Port::Serial(pty) => pty.as_ref().map(Pty::path),
+        _ => None,
     }
 }
 
