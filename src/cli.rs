@@ -10,6 +10,8 @@ mod haptic;
 mod impedance;
 #[cfg(feature = "devices")]
 mod knob;
+#[cfg(feature = "simulator")]
+mod knob_sim;
 mod reed;
 mod render;
 mod settings;
@@ -65,6 +67,8 @@ enum Command {
     Study(study::Study),
     #[cfg(feature = "devices")]
     Knob(Box<knob::Knob>),
+    #[cfg(feature = "simulator")]
+    KnobSim(Box<knob_sim::KnobSim>),
     Haptic(Box<haptic::Haptic>),
 }
 
@@ -95,6 +99,15 @@ enum Failure {
     Wav(#[from] WavError),
     #[error(transparent)]
     Reed(#[from] ReedError),
+    #[cfg(feature = "simulator")]
+    #[error("{}: {source}", path.display())]
+    HandScript { path: PathBuf, source: crate::simulator::script::ScriptError },
+    #[cfg(feature = "simulator")]
+    #[error("cannot write {}: {source}", path.display())]
+    Write { path: PathBuf, source: io::Error },
+    #[cfg(feature = "simulator")]
+    #[error("the simulated knob stopped: {0}")]
+    Knob(io::Error),
     #[error(transparent)]
     Feel(#[from] FeelRefused),
     #[error("cannot write the table: {0}")]
@@ -121,6 +134,8 @@ pub fn main() -> ExitCode {
         Command::Study(command) => command.run(),
         #[cfg(feature = "devices")]
         Command::Knob(command) => command.run(),
+        #[cfg(feature = "simulator")]
+        Command::KnobSim(command) => command.run(),
         Command::Haptic(command) => command.run(),
     };
     match done {
