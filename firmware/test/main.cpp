@@ -1,4 +1,4 @@
-// Runs the claims. `firmware-tests [word..] [--golden FOLDER] [--fuzz BYTES] [--changes N]`: those whose name contains a
+// Runs the claims. `firmware-tests [word..] [--golden FOLDER] [--fuzz BYTES] [--trials N]`: those whose name contains a
 // word, or all.
 
 #include <cstdint>
@@ -15,8 +15,8 @@ int main(int count, char** arguments) {
             test::options().golden = arguments[++i];
         } else if (word == "--fuzz" && has_value) {
             test::options().fuzz_bytes = std::strtoull(arguments[++i], nullptr, 10);
-        } else if (word == "--changes" && has_value) {
-            test::options().changes = std::strtoul(arguments[++i], nullptr, 10);
+        } else if (word == "--trials" && has_value) {
+            test::options().trials = std::strtoul(arguments[++i], nullptr, 10);
         } else {
             words.push_back(word);
         }

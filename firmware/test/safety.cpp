@@ -397,7 +397,7 @@ CLAIM(rule_5_no_change_of_parameters_moves_torque_faster_than_5_nm_per_s) {
     unsigned long accepted = 0;
     double slowest = 0.0;
     bool moving = false;
-    while (accepted < test::options().changes) {
+    while (accepted < test::options().trials) {
         if (random.below(400) == 0) {
             moving = !moving;
         }

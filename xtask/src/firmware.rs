@@ -51,7 +51,7 @@ pub fn all() -> Result<()> {
             "-fno-omit-frame-pointer",
         ],
     )?;
-    machine::run(Command::new(&sanitized).args(["--fuzz", "3000000", "--changes", "10000"]))?;
+    machine::run(Command::new(&sanitized).args(["--fuzz", "3000000", "--trials", "10000"]))?;
 
     arm(&folder.join("arm.o"), &folder.join("arm.elf"))?;
     cost(&built("tick"))
