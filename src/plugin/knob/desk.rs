@@ -460,6 +460,7 @@ pub fn calibrated(knob: &KnobParams) -> KnobDesign {
 fn marks(params: &ChalumeauParams, settings: &Settings) -> Marks {
     let law = settings.reed_law();
     let study = params
+        .knob
         .study()
         .map(|(participant, trial, side)| (participant, trial.number, side, trial.condition(side)));
     Marks { reed: Some((law.h(), law.k())), study }
@@ -496,7 +497,7 @@ fn begin_take(params: &ChalumeauParams) -> Result<Recording, String> {
         ),
         format!("feel {:?}", design(knob)),
     ];
-    if let Some((participant, ..)) = params.study() {
+    if let Some((participant, ..)) = params.knob.study() {
         let order: Vec<String> = plan(participant, knob.seed.value() as u32)
             .iter()
             .map(|trial| format!("{}:H={},A={}", trial.number, trial.h, trial.condition(Side::A).name()))
