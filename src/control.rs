@@ -1,4 +1,5 @@
 //! What controllers send, made into events. Nothing here knows the instrument behind them.
 
 pub mod keys;
+pub mod knob;
 pub mod midi;

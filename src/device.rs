@@ -1,1 +1,28 @@
-//! Links to knobs.
+//! Links to knobs: the port, the session, the clock between the two, and breath for the audio thread.
+//!
+//! [`KnobLink`] runs one thread per instance; the audio thread holds a [`KnobReader`]. Torque never crosses the link:
+//! the knob computes it from [`Feel`](crate::wire::Feel). Nothing here was ever tried on hardware; see `docs/touch.md`.
+
+pub mod clock;
+pub mod discover;
+pub mod feel_osc;
+pub mod link;
+pub mod lock;
+pub mod memory;
+pub mod midi;
+pub mod osc;
+pub mod places;
+pub mod reader;
+pub mod serial;
+pub mod session;
+pub mod stats;
+pub mod stock;
+pub mod transport;
+
+pub use discover::{Advert, Candidate, candidates};
+pub use link::{Choice, Hooks, KnobLink, LinkStatus, Phase};
+pub use places::{Places, serial_number, serial_text};
+pub use reader::{KnobReader, Pose};
+pub use session::StateSample;
+pub use session::arming::{FIRST_CEILING_MNM, HARD_CEILING_MNM, OFFERED_CEILING_MNM};
+pub use stats::LinkStats;

@@ -95,11 +95,13 @@ pub enum RefusedCode {
     WrongSession = 11,
     /// Another major version.
     Version = 12,
+    /// ARM whose sequence number is not ahead: a line that repeats itself.
+    Repeated = 13,
 }
 
 impl RefusedCode {
     /// All of them, by number.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::HTimesK,
         Self::TooStiff,
         Self::WouldPush,
@@ -112,6 +114,7 @@ impl RefusedCode {
         Self::ZeroWhileArmed,
         Self::WrongSession,
         Self::Version,
+        Self::Repeated,
     ];
 
     /// The code of a number; `None` for codes of a later version.
@@ -134,6 +137,7 @@ impl RefusedCode {
             Self::ZeroWhileArmed => "the zero cannot be moved while the knob is armed; disarm it first",
             Self::WrongSession => "another program holds the knob",
             Self::Version => "the knob speaks another version of the protocol",
+            Self::Repeated => "not armed: the request came twice or out of order; arm again",
         }
     }
 }
@@ -152,7 +156,7 @@ mod tests {
     fn numbers_and_codes_belong_together() {
         for code in 0..=255 {
             assert_eq!(FaultCode::from_u8(code).is_some(), (1..=9).contains(&code), "fault {code}");
-            assert_eq!(RefusedCode::from_u8(code).is_some(), (1..=12).contains(&code), "refused {code}");
+            assert_eq!(RefusedCode::from_u8(code).is_some(), (1..=13).contains(&code), "refused {code}");
             assert!(FaultCode::from_u8(code).is_none_or(|known| known as u8 == code));
             assert!(RefusedCode::from_u8(code).is_none_or(|known| known as u8 == code));
         }

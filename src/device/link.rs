@@ -1,0 +1,164 @@
+//! The link to a knob: one thread that finds it, keeps it, and ends when the [`KnobLink`] is dropped.
+//!
+//! All that crosses to other threads: commands come by a queue, samples leave by the ring of the [`KnobReader`], and what
+//! screens show is a value behind a lock that is held for a copy. The audio thread has the reader and nothing else.
+
+mod connection;
+mod status;
+mod worker;
+
+use crate::device::link::worker::{Command, Worker};
+use crate::device::places::Places;
+use crate::device::reader::{KnobReader, ring};
+use crate::device::session::StateSample;
+use crate::device::transport::Transport;
+use crate::wire::Feel;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::mpsc::{Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::thread::JoinHandle;
+use std::time::Instant;
+
+pub use crate::device::link::status::{LinkStatus, Phase};
+
+/// Which knob to link to.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Choice {
+    /// None.
+    #[default]
+    Off,
+    /// A knob at a serial port: the one with this serial number, else the first that answers behind a known board, or
+    /// simulated.
+    Serial {
+        /// INFO's serial number.
+        serial: Option<u64>,
+    },
+    /// Whatever is at this port, which is opened because the user says so.
+    Path(PathBuf),
+    /// A knob at a MIDI port whose name contains this, else the first that sounds like one.
+    Midi {
+        /// Part of the port's name.
+        name: Option<String>,
+    },
+    /// Unmodified firmware that sends OSC to this port of UDP.
+    Osc {
+        /// Usually 8000.
+        port: u16,
+        /// Listens to the whole network instead of this machine alone.
+        any_address: bool,
+    },
+}
+
+/// What the link asks of and tells its owner, on the link's thread. Both must return at once.
+pub struct Hooks {
+    /// The feel wanted now; asked at most 1 ms apart while a knob is there. The link compares, and sends what changes.
+    pub feel: Box<dyn FnMut() -> Option<Feel> + Send>,
+    /// Every measurement, for recording and study.
+    pub on_state: Box<dyn FnMut(&StateSample) + Send>,
+}
+
+impl Default for Hooks {
+    fn default() -> Self {
+        Self { feel: Box::new(|| None), on_state: Box::new(|_| {}) }
+    }
+}
+
+/// A link to at most one knob. No method waits.
+pub struct KnobLink {
+    /// `None` once dropping: the thread ends when the queue does.
+    commands: Option<Sender<Command>>,
+    status: Arc<Mutex<LinkStatus>>,
+    thread: Option<JoinHandle<()>>,
+    epoch: Instant,
+}
+
+impl KnobLink {
+    /// Begins with [`Choice::Off`]. `label` is what other instances show of this one.
+    pub fn spawn(label: &str, hooks: Hooks) -> (Self, KnobReader) {
+        Self::spawn_in(Places::default(), label, hooks)
+    }
+
+    /// The same with its own directory for locks and announcements.
+    pub fn spawn_in(places: Places, label: &str, hooks: Hooks) -> (Self, KnobReader) {
+        let epoch = Instant::now();
+        let (writer, reader) = ring(epoch);
+        let (commands, queue) = channel();
+        let status = Arc::new(Mutex::new(LinkStatus::default()));
+        let worker = Worker::new(places, label, hooks, queue, status.clone(), writer, epoch);
+        // A system without another thread to give plays without a knob.
+        let thread = thread::Builder::new().name("chalumeau knob".into()).spawn(move || worker.run()).ok();
+        (Self { commands: Some(commands), status, thread, epoch }, reader)
+    }
+
+    /// Links to another knob; the one before is left, disarmed.
+    pub fn choose(&self, choice: Choice) {
+        self.tell(Command::Choose(choice));
+    }
+
+    /// Links to a port that is open already, until it fails; for tests and simulators within the program.
+    pub fn attach(&self, transport: Box<dyn Transport>) {
+        self.tell(Command::Attach(transport));
+    }
+
+    /// Allows torque up to `ceiling_mnm`, at most 250: only ever call it for an act of the user.
+    pub fn arm(&self, ceiling_mnm: u16) {
+        self.tell(Command::Arm { ceiling_mnm, further_act: false });
+    }
+
+    /// Allows torque up to `ceiling_mnm`, at most 450: only ever call it after a second question to the user.
+    pub fn arm_beyond_offer(&self, ceiling_mnm: u16) {
+        self.tell(Command::Arm { ceiling_mnm, further_act: true });
+    }
+
+    /// Lowers the ceiling of an armed knob at once; never raises it.
+    pub fn lower_ceiling(&self, ceiling_mnm: u16) {
+        self.tell(Command::LowerCeiling(ceiling_mnm));
+    }
+
+    /// Torque off.
+    pub fn disarm(&self) {
+        self.tell(Command::Disarm);
+    }
+
+    /// The present position becomes zero. The knob refuses while it is armed.
+    pub fn zero(&self) {
+        self.tell(Command::Zero);
+    }
+
+    /// Asks the instance that has the knob to let go, and takes it.
+    pub fn take_over(&self) {
+        self.tell(Command::TakeOver);
+    }
+
+    /// Also sends the feel as OSC to this address, see [`feel_osc`](crate::device::feel_osc).
+    pub fn feel_osc(&self, to: Option<SocketAddr>) {
+        self.tell(Command::FeelOsc(to));
+    }
+
+    /// How things stand, for screens: never on the audio thread.
+    pub fn status(&self) -> LinkStatus {
+        self.status.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// What all host times count from.
+    pub fn epoch(&self) -> Instant {
+        self.epoch
+    }
+
+    fn tell(&self, command: Command) {
+        if let Some(commands) = &self.commands {
+            let _ = commands.send(command);
+        }
+    }
+}
+
+impl Drop for KnobLink {
+    fn drop(&mut self) {
+        self.commands = None;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join(); // a panicked thread has already been reported
+        }
+    }
+}

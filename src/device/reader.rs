@@ -1,0 +1,330 @@
+//! The knob as the audio thread sees it: breath at a steady delay, whatever the link and the host's callbacks do.
+//!
+//! The link places each sample at the host time at which the knob measured it. The audio thread has a clock of its own,
+//! the count of samples it has rendered; a second [`ClockFit`] maps it to host time, so that callbacks that come late or
+//! in bursts do not shake the breath. Between the two stands a constant delay: one block, because the end of a block is
+//! asked for before it has happened; one period of the knob's samples; and a margin for the link's jitter. Every sample
+//! asked for then lies between two that have arrived, as a rule.
+//!
+//! All of [`KnobReader`] is real-time safe: no lock, no allocation, no system call (`Instant::now` reads the clock the
+//! kernel maps into the process).
+
+use crate::device::clock::ClockFit;
+use rtrb::{Consumer, Producer, RingBuffer};
+use std::time::Instant;
+
+/// Samples under way from link to audio: a second at 1 kHz; the reader drains them each block.
+const RING: usize = 1024;
+
+/// Slaps under way; a hand makes fewer than ten a second.
+const SLAPS: usize = 16;
+
+/// Samples kept for interpolation: half a second at 500 Hz, above the delay at any block size below 0.4 s.
+const KEPT: usize = 256;
+
+/// On top of a block and a period, us. By judgement: the p99 of the jitter of a USB serial line with 1 ms frames.
+const MARGIN_US: i64 = 1_500;
+
+/// How long a knob that has fallen silent still counts as there, us. The firmware's own watchdog takes 80 + 50 ms.
+const STALE_US: i64 = 150_000;
+
+/// How far a late link is bridged by going on at the last velocity, us. At 2 rad/s that is half a degree too far at most.
+const EXTRAPOLATE_US: i64 = 10_000;
+
+/// Callbacks later than this for longer than [`AUDIO_PATIENCE_US`] mean that the host skipped samples, us.
+const AUDIO_SLACK_US: i64 = 5_000;
+
+/// See [`AUDIO_SLACK_US`]; by judgement longer than one burst of callbacks, shorter than a phrase.
+const AUDIO_PATIENCE_US: i64 = 300_000;
+
+/// A pause between callbacks after which the audio timeline begins anew, us.
+const AUDIO_PAUSE_US: i64 = 500_000;
+
+/// Where the knob was, on the host's clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// Host time of the measurement, us since the link's epoch.
+    pub host_us: i64,
+    /// Degrees since zero, positive is blowing.
+    pub angle_deg: f32,
+    /// Degrees per second.
+    pub velocity_deg_s: f32,
+    /// `wire::Flags` as sent; 0 from unmodified firmware.
+    pub flags: u16,
+    /// Time until the next sample as a rule, us.
+    pub period_us: u32,
+}
+
+/// Where the knob is at one sample of sound.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pose {
+    /// Degrees since zero, positive is blowing.
+    pub angle_deg: f32,
+    /// Degrees per second.
+    pub velocity_deg_s: f32,
+}
+
+/// The link's end of the ring.
+pub struct KnobWriter {
+    samples: Producer<Sample>,
+    slaps: Producer<f32>,
+}
+
+impl KnobWriter {
+    /// Hands a sample to the audio thread; with nobody reading it is dropped.
+    pub fn push(&mut self, sample: Sample) {
+        let _ = self.samples.push(sample);
+    }
+
+    /// Hands over a slap with its peak speed, rad/s.
+    pub fn slap(&mut self, speed_rad_s: f32) {
+        let _ = self.slaps.push(speed_rad_s);
+    }
+}
+
+/// The audio thread's end. See the module.
+pub struct KnobReader {
+    samples: Consumer<Sample>,
+    slaps: Consumer<f32>,
+    epoch: Instant,
+    /// Ring of the latest samples; `newest` is where the last one stands.
+    kept: [Sample; KEPT],
+    newest: usize,
+    used: usize,
+    timeline: ClockFit,
+    rate_hz: f64,
+    /// Samples rendered since the timeline began, in microseconds.
+    rendered_us: f64,
+    last_call_us: i64,
+    /// Host time that the first sample of this block stands for.
+    block_us: i64,
+    is_live: bool,
+}
+
+/// Both ends; host times count from `epoch`. Allocates.
+pub fn ring(epoch: Instant) -> (KnobWriter, KnobReader) {
+    let (sample_in, samples) = RingBuffer::new(RING);
+    let (slap_in, slaps) = RingBuffer::new(SLAPS);
+    let reader = KnobReader {
+        samples,
+        slaps,
+        epoch,
+        kept: [Sample::default(); KEPT],
+        newest: 0,
+        used: 0,
+        timeline: ClockFit::new(AUDIO_SLACK_US, AUDIO_PATIENCE_US),
+        rate_hz: 0.0,
+        rendered_us: 0.0,
+        last_call_us: i64::MIN,
+        block_us: 0,
+        is_live: false,
+    };
+    (KnobWriter { samples: sample_in, slaps: slap_in }, reader)
+}
+
+impl KnobReader {
+    /// Begins a block of `block_samples` at `rate_hz`; call it once per block, before [`pose`](Self::pose).
+    pub fn begin_block(&mut self, block_samples: usize, rate_hz: f64) {
+        let now_us = self.epoch.elapsed().as_micros() as i64;
+        self.begin_block_at(now_us, block_samples, rate_hz);
+    }
+
+    /// [`begin_block`](Self::begin_block) at a given host time, us since the epoch.
+    pub fn begin_block_at(&mut self, now_us: i64, block_samples: usize, rate_hz: f64) {
+        self.drain();
+        let block = block_samples as f64 / rate_hz * 1e6;
+        if rate_hz != self.rate_hz || now_us.saturating_sub(self.last_call_us) > AUDIO_PAUSE_US + block as i64
+        {
+            self.timeline.reset();
+            self.rate_hz = rate_hz;
+        }
+        self.last_call_us = now_us;
+        let start_us = self.rendered_us;
+        self.timeline.observe(start_us as i64, now_us);
+        self.rendered_us += block;
+        let newest = self.kept[self.newest];
+        self.is_live = self.used > 0 && now_us - newest.host_us <= STALE_US;
+        let delay_us = block as i64 + i64::from(newest.period_us) + MARGIN_US;
+        self.block_us = self.timeline.local_us(start_us as i64) - delay_us;
+    }
+
+    /// Where the knob was, at the constant delay, for sample `offset` of the block; `None` with no live knob.
+    pub fn pose(&self, offset: usize) -> Option<Pose> {
+        if !self.is_live {
+            return None;
+        }
+        let at_us = self.block_us + (offset as f64 / self.rate_hz * 1e6) as i64;
+        Some(self.pose_at(at_us))
+    }
+
+    /// Peak speed of a slap that has not been taken yet, rad/s.
+    pub fn take_slap(&mut self) -> Option<f32> {
+        self.slaps.pop().ok()
+    }
+
+    /// The latest sample as it came, for a state that has no use for the delay.
+    pub fn latest(&self) -> Option<Sample> {
+        self.is_live.then(|| self.kept[self.newest])
+    }
+
+    fn drain(&mut self) {
+        while let Ok(sample) = self.samples.pop() {
+            let newest = self.kept[self.newest];
+            if self.used > 0 {
+                let step_us = sample.host_us - newest.host_us;
+                if !(-STALE_US..=STALE_US).contains(&step_us) {
+                    self.used = 0; // another knob, or the same after a while: nothing to interpolate from
+                } else if step_us <= 0 {
+                    continue; // the clock fit moved by less than a period
+                }
+            }
+            self.newest = (self.newest + 1) % KEPT;
+            self.kept[self.newest] = sample;
+            self.used = (self.used + 1).min(KEPT);
+        }
+    }
+
+    /// The newest is 0.
+    fn sample(&self, age: usize) -> Sample {
+        self.kept[(self.newest + KEPT - age) % KEPT]
+    }
+
+    /// Requires `used > 0`.
+    fn pose_at(&self, at_us: i64) -> Pose {
+        let newest = self.sample(0);
+        if at_us >= newest.host_us {
+            let ahead_s = (at_us - newest.host_us).min(EXTRAPOLATE_US) as f32 * 1e-6;
+            return Pose {
+                angle_deg: newest.angle_deg + newest.velocity_deg_s * ahead_s,
+                velocity_deg_s: newest.velocity_deg_s,
+            };
+        }
+        let mut after = newest;
+        for age in 1..self.used {
+            let before = self.sample(age);
+            if before.host_us <= at_us {
+                let span_us = (after.host_us - before.host_us) as f32;
+                let part = (at_us - before.host_us) as f32 / span_us;
+                let mix = |a: f32, b: f32| a + part * (b - a);
+                return Pose {
+                    angle_deg: mix(before.angle_deg, after.angle_deg),
+                    velocity_deg_s: mix(before.velocity_deg_s, after.velocity_deg_s),
+                };
+            }
+            after = before;
+        }
+        // Older than all that is kept: the knob has only just come.
+        Pose { angle_deg: after.angle_deg, velocity_deg_s: after.velocity_deg_s }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::clock::DeviceClock;
+
+    struct Dice(u64);
+
+    impl Dice {
+        fn roll(&mut self) -> f64 {
+            self.0 ^= self.0 << 13;
+            self.0 ^= self.0 >> 7;
+            self.0 ^= self.0 << 17;
+            (self.0 >> 11) as f64 / (1u64 << 53) as f64
+        }
+    }
+
+    /// A knob that turns so that its angle in degrees is the true time in ms, over a jittery link into jittery callbacks;
+    /// returns the deviations of the breath's delay from its mean, us, sorted by size.
+    fn delays_us(block: usize, burst: u64, seconds: f64) -> (f64, Vec<f64>) {
+        let (mut writer, mut reader) = ring(Instant::now());
+        let mut clock = DeviceClock::default();
+        let mut dice = Dice(0x2545_F491_4F6C_DD1D);
+        let rate_hz = 48_000.0;
+        let block_us = block as f64 / rate_hz * 1e6;
+        let (mut next_state, mut in_flight) = (0u64, Vec::<(f64, u32, f32)>::new());
+        let mut delays = Vec::new();
+        for call in 0..(seconds * 1e6 / block_us) as u64 {
+            // Callbacks come `burst` at a time, up to 1 ms late.
+            let ideal_us = (call - call % burst + burst) as f64 * block_us;
+            let now_us = ideal_us + 1000.0 * dice.roll() * dice.roll();
+            while (next_state as f64) * 2000.0 < now_us {
+                let true_us = next_state as f64 * 2000.0;
+                let delay = 300.0 - 400.0 * dice.roll().max(1e-9).ln();
+                let t_us = (true_us * (1.0 - 100e-6)) as u32;
+                in_flight.push((true_us + delay, t_us, (true_us * 1e-3) as f32));
+                next_state += 1;
+            }
+            in_flight.sort_by(|a, b| a.0.total_cmp(&b.0));
+            while in_flight.first().is_some_and(|f| f.0 <= now_us) {
+                let (seen_us, t_us, angle_deg) = in_flight.remove(0);
+                clock.observe(t_us, seen_us as i64);
+                writer.push(Sample {
+                    host_us: clock.host_us(t_us).unwrap(),
+                    angle_deg,
+                    velocity_deg_s: 1000.0,
+                    flags: 0,
+                    period_us: 2000,
+                });
+            }
+            reader.begin_block_at(now_us as i64, block, rate_hz);
+            if ideal_us < 2e6 {
+                continue;
+            }
+            for offset in (0..block).step_by(16) {
+                let heard_us = call as f64 * block_us + offset as f64 / rate_hz * 1e6;
+                let pose = reader.pose(offset).expect("a live knob has a pose");
+                delays.push(heard_us - f64::from(pose.angle_deg) * 1000.0);
+            }
+        }
+        let mean = delays.iter().sum::<f64>() / delays.len() as f64;
+        let mut off: Vec<f64> = delays.iter().map(|d| (d - mean).abs()).collect();
+        off.sort_by(f64::total_cmp);
+        (mean, off)
+    }
+
+    #[test]
+    fn breath_jitter_stays_below_1_ms_whatever_the_callbacks_do() {
+        for (block, burst) in [(64, 1), (128, 1), (128, 4), (512, 1)] {
+            let (mean, off) = delays_us(block, burst, 30.0);
+            let p99 = off[off.len() * 99 / 100];
+            assert!(p99 < 1000.0, "blocks of {block} by {burst}: p99 {p99} us about {mean} us");
+        }
+    }
+
+    fn sample(host_us: i64, angle_deg: f32) -> Sample {
+        Sample { host_us, angle_deg, velocity_deg_s: 100.0, flags: 0, period_us: 2000 }
+    }
+
+    #[test]
+    fn a_silent_knob_is_gone_after_150_ms_and_bridged_for_10() {
+        let (mut writer, mut reader) = ring(Instant::now());
+        let mut heard = |ms: i64| {
+            if ms == 1000 || ms == 1400 {
+                writer.push(sample(ms * 1000, 10.0));
+            }
+            reader.begin_block_at(ms * 1000, 480, 48_000.0);
+            reader.pose(0).map(|pose| pose.angle_deg)
+        };
+        for ms in (900..1500).step_by(10) {
+            match (ms, heard(ms)) {
+                (..1000 | 1160..1400, pose) => assert_eq!(pose, None, "{ms} ms"),
+                // The delay is 10 + 2 + 1.5 ms.
+                (1000..1020 | 1400..1420, pose) => assert!(pose.is_some(), "{ms} ms"),
+                (1030..=1150, pose) => assert!((pose.unwrap() - 11.0).abs() < 1e-3, "{ms} ms: {pose:?}"),
+                _ => {}
+            }
+        }
+    }
+
+    #[test]
+    fn slaps_come_once_each_in_order() {
+        let (mut writer, mut reader) = ring(Instant::now());
+        writer.slap(12.0);
+        writer.slap(7.0);
+        assert_eq!(
+            [reader.take_slap(), reader.take_slap(), reader.take_slap()],
+            [Some(12.0), Some(7.0), None]
+        );
+    }
+}

@@ -1,0 +1,519 @@
+//! The host's side of a TTLink session as a machine without ports and clocks: time and bytes in, bytes out.
+//!
+//! What holds at any time: once INFO is there ALIVE goes out at its rate whatever else happens; ARM follows an act of the user and nothing
+//! else; no torque is ever sent, only parameters and a ceiling. Rates, codes and layouts: `docs/protocol.md`.
+
+pub mod arming;
+pub mod feeling;
+pub mod greeting;
+mod slaps;
+
+use crate::device::clock::DeviceClock;
+use crate::device::session::arming::Arming;
+use crate::device::session::feeling::Feeling;
+use crate::device::session::greeting::Greeting;
+use crate::device::session::slaps::Slaps;
+use crate::device::stats::{LinkStats, Meter};
+use crate::device::transport::Binding;
+use crate::wire;
+use crate::wire::midi::{BREATH_MAX, FromKnob, MidiReceiver};
+use crate::wire::{Arm, Event, EventKind, Feel, Info, Message, State, WireStats};
+
+/// Time between two ALIVE on a serial line, us.
+const ALIVE_US: i64 = 20_000;
+/// Time between two ALIVE over MIDI, us.
+const ALIVE_MIDI_US: i64 = 100_000;
+/// Least time between two frames over MIDI, us.
+const MIDI_SLOT_US: i64 = 20_000;
+/// STATE this old no longer says what the knob does, us: a hundred periods, twice the device's own watchdog.
+const SILENCE_US: i64 = 250_000;
+/// The same over MIDI, us: twice the watchdog that MIDI devices declare.
+const SILENCE_MIDI_US: i64 = 800_000;
+/// STATE a second at full speed.
+const RATE_HZ: u16 = 500;
+/// STATE a second at 115200 baud.
+const SLOW_RATE_HZ: u16 = 200;
+/// Time between two angles of a plain MIDI device, us; only the reader's delay depends on it.
+const PLAIN_PERIOD_US: u32 = 10_000;
+/// Two angles further apart than this say nothing of speed, us.
+const PLAIN_GAP_US: i64 = 200_000;
+
+/// One measurement of the knob, for recording and study.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StateSample {
+    /// Host time of the measurement, us since the link's epoch.
+    pub host_us: i64,
+    /// Device clock, us, wraps; from devices without a clock the host's.
+    pub t_us: u32,
+    /// Degrees since zero, positive is blowing.
+    pub angle_deg: f32,
+    /// Degrees per second.
+    pub velocity_deg_s: f32,
+    /// The knob's own command after all limits, mNm; 0 where it is not told.
+    pub torque_mnm: f32,
+    /// Last FEEL accepted.
+    pub feel_id: u8,
+    /// `wire::Flags`.
+    pub flags: u16,
+    /// Time until the next one as a rule, us.
+    pub period_us: u32,
+}
+
+/// What a session tells whoever runs it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Happening {
+    /// Where the knob was.
+    State(StateSample),
+    /// It was slapped, with this peak speed, rad/s.
+    Slap(f32),
+    /// Its button went down (true) or up.
+    Button(bool),
+}
+
+/// What a session wants done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wish<'a> {
+    /// Send these bytes, whole or not at all.
+    Send(&'a [u8]),
+    /// Change the speed of the line.
+    Baud(u32),
+}
+
+/// Where a session stands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Standing {
+    /// No INFO yet.
+    Greeting,
+    /// INFO is there and STATE comes.
+    Live,
+    /// INFO is there; STATE is not yet, or no longer.
+    Silent,
+    /// Another major version: its position is read, it is never armed.
+    OtherVersion,
+    /// Unmodified firmware has told its name.
+    Stock(String),
+    /// Control changes, but no answer to HELLO.
+    PlainMidi,
+}
+
+enum Ears {
+    Stream(Box<wire::Decoder>),
+    Midi(Box<MidiReceiver>),
+}
+
+/// See the module.
+pub struct Session {
+    binding: Binding,
+    number: u32,
+    seq: u8,
+    ears: Ears,
+    opened_us: i64,
+    greeting: Greeting,
+    arming: Arming,
+    feeling: Feeling,
+    slaps: Slaps,
+    info: Option<Info>,
+    info_us: Option<i64>,
+    next_alive_us: i64,
+    next_slot_us: i64,
+    zero_due: bool,
+    rate_due: bool,
+    clock: DeviceClock,
+    state: Option<(State, i64)>,
+    last_event: Option<u8>,
+    plain: Option<StateSample>,
+    has_plain_angle: bool,
+    refusal: Option<String>,
+    notice: Option<String>,
+    meter: Meter,
+}
+
+impl Session {
+    /// Opens a session at `now_us`; `number` is random, so that a knob can tell two openings apart.
+    pub fn new(binding: Binding, number: u32, now_us: i64) -> Self {
+        Self {
+            binding,
+            number,
+            seq: 0,
+            ears: match binding {
+                Binding::Midi => Ears::Midi(Box::default()),
+                Binding::Serial | Binding::Osc => Ears::Stream(Box::default()),
+            },
+            opened_us: now_us,
+            greeting: Greeting::new(binding, now_us),
+            arming: Arming::default(),
+            feeling: Feeling::default(),
+            slaps: Slaps::default(),
+            info: None,
+            info_us: None,
+            next_alive_us: now_us,
+            has_plain_angle: false,
+            next_slot_us: now_us,
+            zero_due: false,
+            rate_due: false,
+            clock: DeviceClock::default(),
+            state: None,
+            last_event: None,
+            plain: None,
+            refusal: None,
+            notice: None,
+            meter: Meter::new(now_us),
+        }
+    }
+
+    /// What the device says of itself.
+    pub fn info(&self) -> Option<&Info> {
+        self.info.as_ref()
+    }
+
+    /// The last STATE.
+    pub fn state(&self) -> Option<&State> {
+        self.state.as_ref().map(|(state, _)| state)
+    }
+
+    /// When it was opened, us.
+    pub fn opened_us(&self) -> i64 {
+        self.opened_us
+    }
+
+    /// When the knob was last heard, us.
+    pub fn heard_us(&self) -> Option<i64> {
+        self.state.map(|(_, at)| at).max(self.plain.map(|sample| sample.host_us)).max(self.info_us)
+    }
+
+    /// True while the knob says that it is armed and shall be.
+    pub fn is_armed(&self) -> bool {
+        self.arming.is_armed()
+    }
+
+    /// What ARM and ALIVE carry, mNm.
+    pub fn ceiling_mnm(&self) -> u16 {
+        self.arming.ceiling_mnm()
+    }
+
+    /// True when the slower speed is in use.
+    pub fn is_slow(&self) -> bool {
+        self.greeting.is_slow()
+    }
+
+    /// Why the knob, or this side, did not do what was wanted; the latest.
+    pub fn refusal(&self) -> Option<&str> {
+        self.refusal.as_deref()
+    }
+
+    /// What the knob reported last of faults and of disarming by itself.
+    pub fn notice(&self) -> Option<&str> {
+        self.notice.as_deref()
+    }
+
+    /// Counts and times. Sorts: not for every loop.
+    pub fn stats(&self) -> LinkStats {
+        LinkStats { wire: self.wire_stats(), skew_ppm: self.clock.skew_ppm() as f32, ..self.meter.picture() }
+    }
+
+    /// Where the session stands at `now_us`.
+    pub fn standing(&self, now_us: i64) -> Standing {
+        match &self.info {
+            Some(info) if !info.speaks_our_major() => Standing::OtherVersion,
+            Some(_) if self.is_heard(now_us) => Standing::Live,
+            Some(_) if self.state.is_none() && self.plain.is_some() => Standing::PlainMidi,
+            Some(_) => Standing::Silent,
+            None if self.plain.is_some() => Standing::PlainMidi,
+            None => {
+                self.greeting.stock_name().map_or(Standing::Greeting, |name| Standing::Stock(name.into()))
+            }
+        }
+    }
+
+    /// The feel that is wanted now; sent when it differs from the one before.
+    pub fn want_feel(&mut self, feel: Feel) {
+        if let Err(reason) = self.feeling.want(feel) {
+            self.refusal = Some(reason);
+        }
+    }
+
+    /// The user allows torque up to `ceiling_mnm`: only ever call it for an act of the user. More than
+    /// [`arming::OFFERED_CEILING_MNM`] needs `further_act`, a second question answered.
+    pub fn arm(&mut self, ceiling_mnm: u16, further_act: bool, now_us: i64) {
+        let why_not = match &self.info {
+            None => "not armed: no knob with Chalumeau's firmware has answered",
+            Some(info) if !info.speaks_our_major() => {
+                "not armed: the knob speaks another version of the protocol"
+            }
+            Some(_) if !self.is_heard(now_us) => "not armed: the knob is silent",
+            Some(info) => {
+                self.arming.arm(ceiling_mnm, further_act, info, now_us);
+                (self.refusal, self.notice) = (None, None);
+                return;
+            }
+        };
+        self.refusal = Some(why_not.into());
+    }
+
+    /// Lowers the ceiling at once; never raises it.
+    pub fn lower_ceiling(&mut self, ceiling_mnm: u16) {
+        self.arming.lower(ceiling_mnm);
+    }
+
+    /// Torque off.
+    pub fn disarm(&mut self, now_us: i64) {
+        self.arming.disarm(now_us);
+    }
+
+    /// The present position becomes zero.
+    pub fn zero(&mut self) {
+        self.zero_due = true;
+    }
+
+    /// The frame to send before closing: torque off, the host leaves.
+    pub fn bye(&mut self, send: &mut dyn FnMut(Wish)) {
+        self.arming.forget();
+        self.say(&Message::Bye { session: self.number }, send);
+    }
+
+    /// Lets time pass and hands over what is to be sent, and slaps of which only the count arrived.
+    pub fn poll(&mut self, now_us: i64, send: &mut dyn FnMut(Wish), tell: &mut dyn FnMut(Happening)) {
+        self.meter.tick(now_us);
+        while let Some(speed) = self.slaps.poll(now_us) {
+            tell(Happening::Slap(speed));
+        }
+        if let Ears::Midi(_) = &self.ears {
+            self.hear_midi(&[], now_us, tell);
+        }
+        if self.info.is_some() && !self.is_heard(now_us) {
+            // It may have started anew; whatever it was, it is not armed by us any more.
+            self.arming.forget();
+        }
+        // Most urgent first: over MIDI only one frame goes out at a time.
+        while self.has_slot(now_us) {
+            match self.next_message(now_us, send) {
+                Some(message) => {
+                    self.next_slot_us = now_us + MIDI_SLOT_US;
+                    self.say(&message, send);
+                }
+                None => break,
+            }
+        }
+    }
+
+    /// Takes in a chunk as it came.
+    pub fn receive(&mut self, now_us: i64, chunk: &[u8], tell: &mut dyn FnMut(Happening)) {
+        if self.info.is_none() {
+            self.greeting.hear(chunk);
+        }
+        match &mut self.ears {
+            Ears::Midi(_) => self.hear_midi(chunk, now_us, tell),
+            Ears::Stream(_) => {
+                for &byte in chunk {
+                    let Ears::Stream(decoder) = &mut self.ears else { return };
+                    if let Some(Ok((_, message))) = decoder.push(byte) {
+                        self.hear(&message, now_us, tell);
+                    }
+                }
+            }
+        }
+    }
+
+    fn is_heard(&self, now_us: i64) -> bool {
+        let silence_us = if self.binding == Binding::Midi { SILENCE_MIDI_US } else { SILENCE_US };
+        self.state.is_some_and(|(_, at)| now_us - at <= silence_us)
+    }
+
+    fn wire_stats(&self) -> WireStats {
+        match &self.ears {
+            Ears::Stream(decoder) => decoder.stats(),
+            Ears::Midi(receiver) => receiver.stats(),
+        }
+    }
+
+    fn has_slot(&self, now_us: i64) -> bool {
+        self.binding != Binding::Midi || now_us >= self.next_slot_us
+    }
+
+    fn next_message(&mut self, now_us: i64, send: &mut dyn FnMut(Wish)) -> Option<Message> {
+        if self.info.as_ref().is_some_and(|info| !info.speaks_our_major()) {
+            return None; // nobody knows what it would make of it
+        }
+        let arm = Arm { session: self.number, ceiling_mnm: self.arming.ceiling_mnm() };
+        match self.arming.poll(now_us) {
+            Some(arming::Due::Free) => return Some(Message::Free),
+            Some(arming::Due::Arm) => return Some(Message::Arm(arm)),
+            None => {}
+        }
+        if self.info.is_some() && now_us >= self.next_alive_us {
+            let period_us = if self.binding == Binding::Midi { ALIVE_MIDI_US } else { ALIVE_US };
+            // Counted from when it was due, so that the rate holds; after a stall from now.
+            self.next_alive_us = (self.next_alive_us + period_us).max(now_us);
+            return Some(Message::Alive(arm));
+        }
+        if self.info.is_none() || !self.is_heard(now_us) {
+            let is_framed = self.wire_stats().frames > 0;
+            while let Some(due) = self.greeting.poll(now_us, is_framed) {
+                match due {
+                    greeting::Due::Baud(baud) => send(Wish::Baud(baud)),
+                    greeting::Due::Question => send(Wish::Send(greeting::QUESTION)),
+                    greeting::Due::Hello => {
+                        let (major, minor) = (wire::MAJOR, wire::MINOR);
+                        return Some(Message::Hello { major, minor, session: self.number });
+                    }
+                }
+            }
+        }
+        self.info.as_ref()?;
+        if std::mem::take(&mut self.zero_due) {
+            return Some(Message::Zero(0));
+        }
+        if std::mem::take(&mut self.rate_due) {
+            return Some(Message::Rate(if self.is_slow() { SLOW_RATE_HZ } else { RATE_HZ }));
+        }
+        self.feeling.poll(now_us, self.is_heard(now_us)).map(Message::Feel)
+    }
+
+    fn say(&mut self, message: &Message, send: &mut dyn FnMut(Wish)) {
+        match self.binding {
+            Binding::Midi => send(Wish::Send(&wire::midi::encode_sysex(message, self.seq))),
+            Binding::Serial | Binding::Osc => send(Wish::Send(&wire::encode(message, self.seq))),
+        }
+        self.seq = self.seq.wrapping_add(1);
+    }
+
+    fn hear_midi(&mut self, bytes: &[u8], now_us: i64, tell: &mut dyn FnMut(Happening)) {
+        let Ears::Midi(receiver) = &mut self.ears else { return };
+        // A block of bytes holds few values; those of one call are taken in after it.
+        let mut heard = Vec::new();
+        if bytes.is_empty() {
+            receiver.poll(now_us as u64, |what| heard.push(what));
+        } else {
+            receiver.feed(bytes, now_us as u64, |what| heard.push(what));
+        }
+        for what in heard {
+            match what {
+                FromKnob::Frame(Ok((_, message))) => self.hear(&message, now_us, tell),
+                FromKnob::Frame(Err(_)) => {}
+                // STATE says it all and better.
+                _ if self.state.is_some() => {}
+                FromKnob::Button(down) => tell(Happening::Button(down)),
+                FromKnob::Angle(tenths) => {
+                    self.has_plain_angle = true;
+                    self.hear_plain(0.1 * tenths as f32, now_us, tell);
+                }
+                // The same position a second time, and only half of it.
+                FromKnob::Breath(_) if self.has_plain_angle => {}
+                FromKnob::Breath(breath) => {
+                    let wall_deg = self.feeling.wanted().unwrap_or_default().wall_deg;
+                    self.hear_plain(f32::from(breath) / f32::from(BREATH_MAX) * wall_deg, now_us, tell);
+                }
+            }
+        }
+    }
+
+    /// An angle without a clock.
+    fn hear_plain(&mut self, angle_deg: f32, now_us: i64, tell: &mut dyn FnMut(Happening)) {
+        let velocity_deg_s = match self.plain {
+            Some(before) if (1..PLAIN_GAP_US).contains(&(now_us - before.host_us)) => {
+                (angle_deg - before.angle_deg) / ((now_us - before.host_us) as f32 * 1e-6)
+            }
+            _ => 0.0,
+        };
+        let sample = StateSample {
+            host_us: now_us,
+            t_us: now_us as u32,
+            angle_deg,
+            velocity_deg_s,
+            period_us: PLAIN_PERIOD_US,
+            ..StateSample::default()
+        };
+        self.plain = Some(sample);
+        self.meter.state(0);
+        tell(Happening::State(sample));
+    }
+
+    fn hear(&mut self, message: &Message, now_us: i64, tell: &mut dyn FnMut(Happening)) {
+        match message {
+            Message::Info(info) => self.hear_info(info, now_us),
+            Message::State(state) => self.hear_state(state, now_us, tell),
+            Message::Event(event) => self.hear_event(event, tell),
+            // What a host says: an echo of our own, or two hosts wired together.
+            _ => {}
+        }
+    }
+
+    fn hear_info(&mut self, info: &Info, now_us: i64) {
+        if info.session != self.number {
+            return; // an answer to somebody else
+        }
+        if let Some(hello_us) = self.greeting.hello_us() {
+            self.meter.hello_round_trip_us = u32::try_from(now_us - hello_us).ok();
+        }
+        self.info_us = Some(now_us);
+        // Answered again: it was silent, not gone.
+        if self.info.replace(*info).is_none() {
+            self.rate_due = self.binding == Binding::Serial;
+            self.feeling.forget();
+        }
+    }
+
+    fn hear_state(&mut self, state: &State, now_us: i64, tell: &mut dyn FnMut(Happening)) {
+        if self.clock.observe(state.t_us, now_us) && self.info.is_some() {
+            self.notice = Some("the knob has started anew; it is disarmed".into());
+            self.arming.disarm(now_us);
+            self.feeling.forget();
+            self.slaps = Slaps::default();
+            self.last_event = None;
+            self.info = None;
+            self.greeting.again(now_us);
+        }
+        let host_us = self.clock.host_us(state.t_us).unwrap_or(now_us);
+        self.meter.state(now_us - host_us);
+        self.state = Some((*state, now_us));
+        self.slaps.state(state.slaps, now_us);
+        if self.arming.hear(state.flags.armed()) && self.notice.is_none() {
+            let why = state.fault_code().map_or("the knob has disarmed", |code| code.text());
+            self.notice = Some(format!("disarmed: {why}"));
+        }
+        if let Some(round_trip_us) = self.feeling.echoed(state.feel_id, now_us) {
+            self.meter.feel_echoed(round_trip_us);
+        }
+        tell(Happening::State(StateSample {
+            host_us,
+            t_us: state.t_us,
+            angle_deg: state.angle_deg() as f32,
+            // 0.1 rpm
+            velocity_deg_s: 0.6 * f32::from(state.velocity),
+            torque_mnm: f32::from(state.torque),
+            feel_id: state.feel_id,
+            flags: state.flags.0,
+            period_us: 1_000_000 / u32::from(if self.is_slow() { SLOW_RATE_HZ } else { RATE_HZ }),
+        }));
+    }
+
+    fn hear_event(&mut self, event: &Event, tell: &mut dyn FnMut(Happening)) {
+        if self.last_event.replace(event.counter) == Some(event.counter) {
+            return;
+        }
+        let text = event.code_text().unwrap_or_default();
+        match event.kind {
+            EventKind::Slap => {
+                self.slaps.event();
+                tell(Happening::Slap(event.value));
+            }
+            EventKind::Button => tell(Happening::Button(event.value > 0.5)),
+            EventKind::Limit => {}
+            EventKind::Fault => self.notice = Some(format!("fault: {text}")),
+            EventKind::Disarmed => {
+                self.notice =
+                    (event.code != wire::FaultCode::Free as u8).then(|| format!("disarmed: {text}"));
+            }
+            // The codes up to 7 are about FEEL, of which the one refused is named.
+            EventKind::Refused if event.code <= wire::RefusedCode::LawUnknown as u8 => {
+                if self.feeling.refused(event.feel_id) {
+                    self.refusal = Some(format!("{text} ({})", event.value));
+                }
+            }
+            EventKind::Refused => {
+                self.arming.forget();
+                self.refusal = Some(text.into());
+            }
+        }
+    }
+}

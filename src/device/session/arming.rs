@@ -1,0 +1,219 @@
+//! When torque is allowed, and how it is taken away.
+//!
+//! ARM follows an act of the user and nothing else. It is said again while it shows no effect, for 200 ms: that is still
+//! the same act. Once the knob has been armed and no longer is, for whatever reason, a new act is needed. A knob that is
+//! armed while nobody wants it so is told FREE until it is not.
+
+use crate::wire::Info;
+
+/// Ceiling a host begins with, mNm. By judgement: well felt, and no hand is held by it.
+pub const FIRST_CEILING_MNM: u16 = 100;
+/// Most that is offered without a further act, mNm. By judgement.
+pub const OFFERED_CEILING_MNM: u16 = 250;
+/// Most there is, mNm: the nominal force of the TorqueTuner, compiled into its firmware as well.
+pub const HARD_CEILING_MNM: u16 = 450;
+
+/// ARM and FREE that show no effect are said again after this much, us.
+const INSIST_US: i64 = 50_000;
+
+/// ARM of one act at most.
+const TRIES: u32 = 4;
+
+/// What is due.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Due {
+    /// Send ARM.
+    Arm,
+    /// Send FREE.
+    Free,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Want {
+    Free,
+    /// Told to arm; not seen armed yet.
+    Arming {
+        tries: u32,
+    },
+    Armed,
+}
+
+/// See the module.
+#[derive(Debug)]
+pub struct Arming {
+    want: Want,
+    ceiling_mnm: u16,
+    next_us: i64,
+    say_free: bool,
+    is_armed: bool,
+}
+
+impl Default for Arming {
+    fn default() -> Self {
+        Self {
+            want: Want::Free,
+            ceiling_mnm: FIRST_CEILING_MNM,
+            next_us: i64::MIN,
+            say_free: false,
+            is_armed: false,
+        }
+    }
+}
+
+impl Arming {
+    /// What ARM and ALIVE carry, mNm.
+    pub fn ceiling_mnm(&self) -> u16 {
+        self.ceiling_mnm
+    }
+
+    /// True while the knob is armed and shall be.
+    pub fn is_armed(&self) -> bool {
+        self.is_armed && self.want == Want::Armed
+    }
+
+    /// The user allows torque. Above [`OFFERED_CEILING_MNM`] only with a `further_act`; the least limit wins, last of all.
+    pub fn arm(&mut self, ceiling_mnm: u16, further_act: bool, info: &Info, now_us: i64) {
+        let offered = if further_act { HARD_CEILING_MNM } else { OFFERED_CEILING_MNM };
+        self.ceiling_mnm = ceiling_mnm.min(offered).min(info.ceiling_mnm).min(HARD_CEILING_MNM);
+        self.want = Want::Arming { tries: 0 };
+        self.next_us = now_us;
+        self.say_free = false;
+    }
+
+    /// Lowers the ceiling; never raises it.
+    pub fn lower(&mut self, ceiling_mnm: u16) {
+        self.ceiling_mnm = self.ceiling_mnm.min(ceiling_mnm);
+    }
+
+    /// The user, or whoever runs this, wants no torque.
+    pub fn disarm(&mut self, now_us: i64) {
+        self.want = Want::Free;
+        self.say_free = true;
+        self.next_us = now_us;
+    }
+
+    /// The knob is gone, or has refused: nothing to say, and a new act needed.
+    pub fn forget(&mut self) {
+        self.want = Want::Free;
+        self.is_armed = false;
+    }
+
+    /// Takes in whether the knob says that it is armed; true when it has disarmed by itself.
+    pub fn hear(&mut self, is_armed: bool) -> bool {
+        let was_armed = std::mem::replace(&mut self.is_armed, is_armed);
+        match self.want {
+            Want::Arming { .. } if is_armed => self.want = Want::Armed,
+            Want::Armed if was_armed && !is_armed => {
+                self.want = Want::Free;
+                return true;
+            }
+            _ => {}
+        }
+        false
+    }
+
+    /// What is due now.
+    pub fn poll(&mut self, now_us: i64) -> Option<Due> {
+        if now_us < self.next_us {
+            return None;
+        }
+        match self.want {
+            Want::Free if self.say_free || self.is_armed => {
+                self.say_free = false;
+                self.next_us = now_us + INSIST_US;
+                Some(Due::Free)
+            }
+            Want::Arming { tries } if tries < TRIES => {
+                self.want = Want::Arming { tries: tries + 1 };
+                self.next_us = now_us + INSIST_US;
+                Some(Due::Arm)
+            }
+            // All tries are through and the last has had its time.
+            Want::Arming { .. } => {
+                self.want = Want::Free;
+                None
+            }
+            Want::Free | Want::Armed => None,
+        }
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::wire::Capabilities;
+
+    pub fn info(ceiling_mnm: u16) -> Info {
+        Info {
+            major: 1,
+            minor: 0,
+            capabilities: Capabilities(Capabilities::FLOW),
+            firmware: (0, 1, 0),
+            name: Info::name_bytes("TorqueTuner"),
+            serial: 0xC1A2,
+            counts_per_turn: 3600,
+            loop_hz: 2000,
+            watchdog_ms: 80,
+            fade_ms: 50,
+            ceiling_mnm,
+            session: 7,
+            stiffness_limit: 8000,
+            push_limit: 500,
+        }
+    }
+
+    fn said(arming: &mut Arming, from_ms: i64, to_ms: i64) -> Vec<Due> {
+        (from_ms..to_ms).filter_map(|ms| arming.poll(ms * 1000)).collect()
+    }
+
+    #[test]
+    fn ceiling_is_the_least_of_all() {
+        for (asked, further, device, allowed) in [
+            (100, false, 450, 100),
+            (900, false, 450, 250),
+            (900, true, 450, 450),
+            (900, true, 300, 300),
+            (80, true, 60, 60),
+        ] {
+            let mut arming = Arming::default();
+            arming.arm(asked, further, &info(device), 0);
+            assert_eq!(arming.ceiling_mnm(), allowed, "asked {asked}, device {device}");
+            arming.lower(50);
+            arming.lower(400);
+            assert_eq!(arming.ceiling_mnm(), 50);
+        }
+    }
+
+    #[test]
+    fn one_act_arms_once() {
+        let mut arming = Arming::default();
+        assert_eq!(said(&mut arming, 0, 100), []);
+        arming.arm(100, false, &info(450), 100_000);
+        assert_eq!(said(&mut arming, 100, 120), [Due::Arm]);
+        assert!(!arming.hear(true));
+        assert!(arming.is_armed());
+        assert_eq!(said(&mut arming, 120, 1000), []);
+        assert!(arming.hear(false), "the knob disarmed by itself");
+        assert_eq!(said(&mut arming, 1000, 3000), [], "and stays so");
+    }
+
+    #[test]
+    fn an_act_without_effect_ends() {
+        let mut arming = Arming::default();
+        arming.arm(100, false, &info(450), 0);
+        assert_eq!(said(&mut arming, 0, 3000), [Due::Arm; 4]);
+        arming.hear(true);
+        assert_eq!(said(&mut arming, 3000, 3001), [Due::Free], "too late: nobody wants it any more");
+    }
+
+    #[test]
+    fn an_armed_knob_nobody_wants_is_freed_until_it_is() {
+        let mut arming = Arming::default();
+        arming.hear(true);
+        assert_eq!(said(&mut arming, 0, 200), [Due::Free; 4]);
+        arming.hear(false);
+        assert_eq!(said(&mut arming, 200, 400), []);
+        arming.disarm(400_000);
+        assert_eq!(said(&mut arming, 400, 600), [Due::Free], "said even if the knob seems free");
+    }
+}
