@@ -28,10 +28,12 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-NUMBERS = ("t_us", "angle_deg", "torque_mnm", "written_midi", "gamma", "h", "k", "participant", "trial")
+NUMBERS = (
+    "t_us", "angle_deg", "torque_mnm", "written_midi", "gamma", "feel_id", "h", "k", "participant", "trial",
+)
 WORDS = ("side", "condition")
 # These may be empty: no note is fingered, no study runs, the reed is not known.
-MAY_BE_EMPTY = ("written_midi", "h", "k", "participant", "trial")
+MAY_BE_EMPTY = ("written_midi", "feel_id", "h", "k", "participant", "trial")
 SIDES = ("A", "B")
 CONDITIONS = ("coupled", "free")
 
@@ -48,6 +50,8 @@ SETTLE_S = 0.3
 WINDOW_ROWS = 10
 # How long after the onset the overshoot is looked for: about the time of a reaction.
 OVERSHOOT_S = 0.2
+# By then a feel has long been sent, accepted and echoed (5 ms, and 100 at most on MIDI).
+FOLLOWS_S = 0.2
 # Up to so many pairs all sign patterns are counted; beyond, so many are drawn.
 EXACT_PAIRS = 16
 DRAWS = 100_000
@@ -139,6 +143,7 @@ class Piece:
     written: np.ndarray
     gamma: np.ndarray
     gamma_on: np.ndarray
+    feel_id: np.ndarray
     h: float
     k: float
     # False where the piece only goes on after a gap.
@@ -183,6 +188,7 @@ def read_log(path, log, onset):
             Piece(
                 int(participant), int(trial), str(side), str(condition), t_s[rows], data["angle_deg"][rows],
                 data["torque_mnm"][rows], written, data["gamma"][rows], onset.gamma(written, h, k),
+                data["feel_id"][rows],
                 # Side and parameters change a little apart in time; what most rows have is meant.
                 float(np.median(h)), float(np.median(k)), begin == 0 or bool(changes[begin - 1]), log,
             )
@@ -285,6 +291,22 @@ def integrals(piece):
     return np.array([dt.sum(), (size * dt).sum(), work.sum()])
 
 
+def feel_followed(pieces):
+    """Whether every switch between the sides brought another feel to the knob; None where that cannot be told.
+
+    The two sides never have the same feel. A knob that goes on echoing the old one has refused the new one, or was
+    never sent it, or is one that takes none.
+    """
+    told = []
+    for before, now in zip(pieces, pieces[1:]):
+        if before.log != now.log or before.side == now.side or now.t_s[-1] - now.t_s[0] < FOLLOWS_S:
+            continue
+        later = now.feel_id[min(np.searchsorted(now.t_s, now.t_s[0] + FOLLOWS_S), len(now.t_s) - 1)]
+        if math.isfinite(before.feel_id[-1]) and math.isfinite(later):
+            told.append(before.feel_id[-1] != later)
+    return all(told) if told else None
+
+
 def by_trial(pieces):
     """Pieces by participant and trial. Raises BadInput where two orders of a study are mixed."""
     trials = {}
@@ -311,7 +333,7 @@ def summarise(trials, least_s):
         switches = sum(
             now.side != before.side for before, now in zip(visits, visits[1:]) if before.log == now.log
         )
-        last = pieces[-1]
+        last, followed = pieces[-1], feel_followed(pieces)
         for side in SIDES:
             own = [piece for piece in pieces if piece.side == side]
             if not own:
@@ -344,6 +366,7 @@ def summarise(trials, least_s):
                     "switches": switches,
                     "last_side": last.side,
                     "last_condition": last.condition,
+                    "feel_followed": "" if followed is None else "yes" if followed else "no",
                     "compared": "yes" if tried else "no",
                 }
             )
@@ -644,6 +667,10 @@ def main():
     return 0
 
 
+def trial_names(keys):
+    return ", ".join(f"{participant}/{trial}" for participant, trial in keys)
+
+
 def run(args):
     twice = {path for path in args.takes if args.takes.count(path) > 1}
     if twice:
@@ -668,8 +695,17 @@ def run(args):
     skipped = sorted({(row["participant"], row["trial"]) for row in table if row["compared"] == "no"})
     print(f"{len(trials)} trials of {len(participants)} participants; {out / 'summary.csv'}")
     if skipped:
-        named = ", ".join(f"{participant}/{trial}" for participant, trial in skipped)
-        print(f"not compared, less than {args.least:g} s on one side (participant/trial): {named}")
+        print(f"not compared, less than {args.least:g} s on one side (participant/trial): {trial_names(skipped)}")
+    stuck = sorted({(row["participant"], row["trial"]) for row in table if row["feel_followed"] == "no"})
+    if stuck:
+        print(
+            f"WARNING: the feel did not follow the switch in {len(stuck)} of {len(trials)} trials (participant/trial): "
+            f"{trial_names(stuck)}\n  the knob refused it (see the plugin's Knob status) or cannot take one; there the "
+            "hand compared nothing"
+        )
+    still = sorted({(row["participant"], row["trial"]) for row in table if row["torque_peak_mnm"] == 0})
+    if still:
+        print(f"WARNING: no torque at all on a side, knob not armed? (participant/trial): {trial_names(still)}")
     if not args.thresholds:
         print("gamma_on is taken as 1/3 for every note; --thresholds gives each its own")
     rows = compare(table)

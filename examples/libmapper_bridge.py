@@ -5,8 +5,8 @@
     python libmapper_bridge.py --interface wlan0 --map TorqueTuner_001    and drive a TorqueTuner
 
 Chalumeau sends each field of a feel as a float to /chalumeau/feel/<field>, all in one bundle, on change and once a
-second. Here every field becomes the output signal feel/<field> of the libmapper device `chalumeau`, with its unit and
-range. Needs libmapper and python-osc.
+second, when the plugin's parameter Feel OSC port is 9001. Here every field becomes the output signal feel/<field> of
+the libmapper device `chalumeau`, with its unit and range. Needs libmapper and python-osc.
 
 --map makes maps to the signals that TorqueTuner's upstream firmware has (the reed firmware has none):
 
@@ -16,12 +16,13 @@ range. Needs libmapper and python-osc.
     feel/damping  mNm s/rad   Damping  counts per rpm      x counts_per_nm / 1000 x 2 pi / 60
 
 NOT TRIED ON HARDWARE; all of this was read from public sources. 208 counts are 1 N m to the moteus board, whose
-firmware cuts torque at 0.1 N m (20.8 counts); on the Mechaduino board 208 counts are 1.8 A, and what torque that makes
+firmware cuts torque at 0.1 N m (20.8 counts); to the Mechaduino board 208 counts are 1.8 A, and what torque that makes
 is not told. The firmware has no reed law: Scale and Stretch act on the curve of the mode it is in, and Offset only when
 a mode begins. In its mode Free, Scale is a constant torque that spins the knob: choose the mode before you start this.
 That firmware has neither watchdog nor torque limit. So here: nothing above --ceiling is sent; Scale rises by at most
 400 mNm a second; when the feel has been silent for 3 seconds, and at the end (Ctrl-C), Scale and Damping go to 0. If
-this program, its machine or the network dies, the knob keeps the last torque: keep its power switch at hand.
+this program, its machine or the network dies, the knob keeps the last torque: keep its power switch at hand. A knob
+that comes back is mapped again; one that vanished without a farewell when libmapper has forgotten it, in half a minute.
 
 A datagram with a value outside its range is refused as a whole, with the reason. Exit code 0: ended by the user; 2: it
 cannot work as asked, and the message says why.
@@ -49,7 +50,6 @@ logging.disable(logging.WARNING)
 PREFIX = "/chalumeau/feel/"
 # Unit and range of each field, as in docs/protocol.md (friction and detent in mNm here).
 FIELDS = {
-    "feel_id": ("", 0, 255),
     "law": ("", 0, 2),
     "morph_ms": ("ms", 20, 1000),
     "H": ("", 0.5, 10),
@@ -61,8 +61,8 @@ FIELDS = {
     "a_off": ("degrees", 0, 36_000),
     "a_beat": ("degrees", 0, 3600),
     "wall": ("degrees", 10, 36_000),
-    "wall_stiffness": ("mNm/degree", 0, 100),
-    "slap": ("mNm/degree", 0, 20),
+    "wall_mnm_per_deg": ("mNm/degree", 0, 100),
+    "slap_mnm_per_deg": ("mNm/degree", 0, 20),
     "damping": ("mNm s/rad", 0, 20),
     "friction": ("mNm", 0, 100),
     "detent": ("mNm", 0, 100),
