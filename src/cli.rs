@@ -5,6 +5,8 @@
 //! was given and what would be right, and no file; a reader that closes the pipe early is no mistake.
 
 mod args;
+#[cfg(feature = "devices")]
+mod doctor;
 mod haptic;
 mod impedance;
 mod reed;
@@ -58,6 +60,8 @@ enum Command {
     Tune(Box<tune::Tune>),
     Reed(reed::Reed),
     Haptic(Box<haptic::Haptic>),
+    #[cfg(feature = "devices")]
+    Doctor(doctor::Doctor),
 }
 
 /// Why a command ended early.
@@ -109,6 +113,8 @@ pub fn main() -> ExitCode {
         Command::Tune(command) => command.run(),
         Command::Reed(command) => command.run(),
         Command::Haptic(command) => command.run(),
+        #[cfg(feature = "devices")]
+        Command::Doctor(command) => command.run(),
     };
     match done {
         Err(failure) if !failure.is_closed_pipe() => {
