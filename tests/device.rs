@@ -315,7 +315,10 @@ fn unmodified_firmware_at_the_serial_port_is_recognised_and_explained() {
         heard
     });
     let link = linked(&places, "test", Choice::Path(path));
-    soon("recognised", || matches!(link.status().phase, Phase::StockSerial(name) if name == "TorqueTuner_001"));
+    soon(
+        "recognised",
+        || matches!(link.status().phase, Phase::StockSerial(name) if name == "TorqueTuner_001"),
+    );
     assert!(link.status().text.contains("choose OSC"), "{}", link.status().text);
     drop(link);
     stop.store(true, Ordering::Relaxed);
@@ -609,7 +612,11 @@ fn over_midi_frames_leave_20_ms_between_them() {
     bench.run(100);
     assert!(!bench.device.firmware.is_armed());
     let closest = bench.sent_at_us.windows(2).map(|pair| pair[1] - pair[0]).min().unwrap();
-    assert!(bench.sent_at_us.len() > 80 && closest >= 20_000, "{closest} us, {} frames", bench.sent_at_us.len());
+    assert!(
+        bench.sent_at_us.len() > 80 && closest >= 20_000,
+        "{closest} us, {} frames",
+        bench.sent_at_us.len()
+    );
 }
 
 /// What `chalumeau doctor` prints, with what is told to it by the environment and its arguments.
@@ -638,7 +645,14 @@ fn doctor_tells_what_answers_and_what_to_do_when_nothing_does() {
 
     let knob = PtyKnob::plug(Some(&places), &Setup::default());
     let found = doctor(&directory, &["--seconds", "2"]);
-    for say in ["simulated: test, 000000005eed0001", "Chalumeau sim", "tier 2", "firmware ", "jitter", "FEEL to its echo"] {
+    for say in [
+        "simulated: test, 000000005eed0001",
+        "Chalumeau sim",
+        "tier 2",
+        "firmware ",
+        "jitter",
+        "FEEL to its echo",
+    ] {
         assert!(found.contains(say), "{say:?} in {found}");
     }
     assert!(!found.contains("not seen") && !found.contains("No knob answers"), "{found}");

@@ -98,7 +98,8 @@ impl Doctor {
         let hooks = Hooks { feel: Box::new(changing), ..Hooks::default() };
         let (link, _reader) = KnobLink::spawn("chalumeau doctor", hooks);
         link.choose(choice);
-        let status = wait(&link, ANSWER, |phase| !matches!(phase, Phase::Off | Phase::Searching | Phase::Waiting));
+        let status =
+            wait(&link, ANSWER, |phase| !matches!(phase, Phase::Off | Phase::Searching | Phase::Waiting));
         if !matches!(status.phase, Phase::Live | Phase::VersionMismatch | Phase::ReadOnly) {
             for line in status.text.split(". ") {
                 writeln!(out, "  {line}")?;
@@ -109,7 +110,11 @@ impl Doctor {
         let status = link.status();
         match &status.info {
             Some(info) => tell_info(out, info)?,
-            None => writeln!(out, "  control changes, no answer to HELLO: tier 0, {}", crate::device::stock::LABEL)?,
+            None => writeln!(
+                out,
+                "  control changes, no answer to HELLO: tier 0, {}",
+                crate::device::stock::LABEL
+            )?,
         }
         tell_link(out, &status)?;
         Ok(status.phase == Phase::Live)
@@ -134,10 +139,24 @@ impl Doctor {
             }
             Phase::Busy(text) | Phase::HeldBy(text) | Phase::Failed(text) => writeln!(out, "  {text}"),
             _ => {
-                writeln!(out, "  nothing heard ({} packets were none of a knob's)", link.status().stats.ignored)?;
-                writeln!(out, "  Join the knob's Wi-Fi (TorqueTuner_001) and give this computer the address")?;
-                writeln!(out, "  192.168.4.2, or set the address of this computer in the knob's configuration,")?;
-                writeln!(out, "  and listen with --any-address. The port is {} as the firmware comes.", osc::PORT)
+                writeln!(
+                    out,
+                    "  nothing heard ({} packets were none of a knob's)",
+                    link.status().stats.ignored
+                )?;
+                writeln!(
+                    out,
+                    "  Join the knob's Wi-Fi (TorqueTuner_001) and give this computer the address"
+                )?;
+                writeln!(
+                    out,
+                    "  192.168.4.2, or set the address of this computer in the knob's configuration,"
+                )?;
+                writeln!(
+                    out,
+                    "  and listen with --any-address. The port is {} as the firmware comes.",
+                    osc::PORT
+                )
             }
         }
     }
@@ -196,7 +215,8 @@ fn list_midi(out: &mut impl Write) -> io::Result<Vec<String>> {
         Ok(all) if all.is_empty() => writeln!(out, "  none")?,
         Ok(all) => {
             for name in all {
-                let is_known = if known.contains(&name) { "" } else { " (does not sound like a knob: not asked)" };
+                let is_known =
+                    if known.contains(&name) { "" } else { " (does not sound like a knob: not asked)" };
                 writeln!(out, "  {name}{is_known}")?;
             }
         }
@@ -212,7 +232,10 @@ fn tell_info(out: &mut impl Write, info: &Info) -> io::Result<()> {
     if info.speaks_our_major() {
         writeln!(out, "  tier 2: position and feel")?;
     } else {
-        writeln!(out, "  another major version than {MAJOR}: position only, never armed; flash the firmware in firmware/")?;
+        writeln!(
+            out,
+            "  another major version than {MAJOR}: position only, never armed; flash the firmware in firmware/"
+        )?;
     }
     writeln!(
         out,
@@ -227,7 +250,8 @@ fn tell_info(out: &mut impl Write, info: &Info) -> io::Result<()> {
 fn tell_link(out: &mut impl Write, status: &LinkStatus) -> io::Result<()> {
     let stats = &status.stats;
     let ms = |us: u32| f64::from(us) * 1e-3;
-    let slow = if status.is_slow { " at 115200 baud: does the cable or its driver not carry 921600?" } else { "" };
+    let slow =
+        if status.is_slow { " at 115200 baud: does the cable or its driver not carry 921600?" } else { "" };
     writeln!(out, "  angle: {:.2} degrees", status.angle_deg.unwrap_or(0.0))?;
     writeln!(out, "  rate: {:.0} positions a second{slow}", stats.rate_hz)?;
     writeln!(out, "  jitter: {:.2} ms p50, {:.2} ms p99", ms(stats.jitter_p50_us), ms(stats.jitter_p99_us))?;

@@ -67,6 +67,21 @@ pub struct Package {
 
 /// For cargo itself: crates with C parts, and linking.
 pub const CC: Package = Package { name: "gcc", present: || works("cc", &["--version"]), purpose: "linking" };
+/// For the knob's firmware, on this machine.
+pub const CXX: Package =
+    Package { name: "g++", present: || works("g++", &["--version"]), purpose: "the knob's firmware" };
+/// For the knob's firmware as a microcontroller sees it.
+pub const ARM_CXX: Package = Package {
+    name: "gcc-arm-none-eabi",
+    present: || works("arm-none-eabi-g++", &["--version"]),
+    purpose: "the firmware's ARM check",
+};
+/// Its headers.
+pub const ARM_LIBRARY: Package = Package {
+    name: "libstdc++-arm-none-eabi-newlib",
+    present: || works("arm-none-eabi-g++", &["-x", "c++", "-include", "new", "-E", "/dev/null"]),
+    purpose: "the firmware's ARM check",
+};
 /// For the pip that fetches DawDreamer.
 pub const VENV: Package = Package {
     name: "python3-venv",
@@ -79,17 +94,14 @@ pub const GL: Package =
 /// For DawDreamer.
 pub const GLIB: Package =
     Package { name: "libglib2.0-0", present: || loads("libglib-2.0.so.0"), purpose: "the DawDreamer tests" };
-/// For `chalumeau-standalone`.
-pub const PKG_CONFIG: Package = Package {
-    name: "pkg-config",
-    present: || works("pkg-config", &["--version"]),
-    purpose: "finding ALSA for chalumeau-standalone",
-};
-/// For `chalumeau-standalone`.
+/// For MIDI devices and `chalumeau-standalone`.
+pub const PKG_CONFIG: Package =
+    Package { name: "pkg-config", present: || works("pkg-config", &["--version"]), purpose: "finding ALSA" };
+/// For MIDI devices and `chalumeau-standalone`.
 pub const ALSA: Package = Package {
     name: "libasound2-dev",
     present: || works("pkg-config", &["--exists", "alsa"]) || !cfg!(target_os = "linux"),
-    purpose: "sound and MIDI in chalumeau-standalone",
+    purpose: "MIDI devices, and sound in chalumeau-standalone",
 };
 
 /// For `chalumeau-standalone`: its JACK binding asks pkg-config although it loads the library at run time.
