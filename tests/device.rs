@@ -581,12 +581,14 @@ fn zero_is_not_moved_under_an_armed_hand() {
     bench.device.counts = 500;
     bench.run(300);
     bench.device.counts = 700;
+    bench.run(10);
     bench.session.zero();
     bench.run(100);
     assert_eq!(bench.session.state().unwrap().angle, 0);
     bench.session.arm(100, false, bench.now_us);
     bench.run(100);
     bench.device.counts = 900;
+    bench.run(10);
     bench.session.zero();
     bench.run(100);
     assert_eq!(bench.session.state().unwrap().angle, 2000, "0.01 degrees");
