@@ -106,7 +106,7 @@ FwVerdict fw_check(const std::uint8_t* payload, float knob_damping_nms, std::uin
     config.ceiling_mnm = ceiling_mnm;
     Feel feel;
     feel.decode(payload, Feel::LENGTH);
-    const FeelVerdict verdict = check_feel(feel, Device(config).allowed());
+    const Verdict verdict = check_feel(feel, Device(config).allowed());
     return FwVerdict{static_cast<std::uint8_t>(verdict.code), verdict.value};
 }
 

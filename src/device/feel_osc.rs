@@ -114,7 +114,7 @@ mod tests {
         };
         assert_eq!(value(&bundles[0], "scale"), Some(90.0));
         assert_eq!(value(&bundles[0], "detent"), Some(2.5));
-        assert_eq!((value(&bundles[0], "H"), value(&bundles[1], "H")), (Some(2.598_076_2), Some(3.0)));
+        assert_eq!((value(&bundles[0], "H"), value(&bundles[1], "H")), (Some(Feel::default().h), Some(3.0)));
         bridge.set_nonblocking(true).unwrap();
         assert!(bridge.recv(&mut buffer).is_err(), "twice and no more: at first and on change");
     }

@@ -7,8 +7,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 
-use crate::machine::{self, ALSA, CC, GL, GLIB, JACK, PKG_CONFIG, Package, VENV, XCB};
-use crate::{COMMANDS, bundle};
+use crate::machine::{
+    self, ALSA, ARM_CXX, ARM_LIBRARY, CC, CXX, GL, GLIB, JACK, PKG_CONFIG, Package, VENV, XCB,
+};
+use crate::{COMMANDS, bundle, firmware};
 
 /// DawDreamer's version is pinned: a new one may host differently.
 const PYTHON_PACKAGES: &[&str] = &["dawdreamer==0.9.0", "numpy<3"];
@@ -25,6 +27,9 @@ const STEPS: &[Step] = &[
     ("tests, all features", || cargo("test --all-features --lib --bins --no-fail-fast")),
     ("documentation", documentation),
     ("generated files", generated),
+    ("tests, firmware's crate", || cargo("test -p chalumeau-firmware")),
+    ("clippy, firmware's crate", || cargo("clippy -p chalumeau-firmware --all-targets -- -D warnings")),
+    ("firmware, host and ARM", firmware::all),
     ("bundle", || bundle::run(&[])),
     ("tests, xtask and its MIDI reader", || cargo("test -p xtask --lib --bins")),
     ("CLAP in clack-host", || cargo("test -p xtask --test clap --no-fail-fast")),
@@ -82,7 +87,7 @@ fn cargo(words: &str) -> Result<()> {
 
 fn packages() -> Result<()> {
     let needed: &[&Package] = if cfg!(target_os = "linux") {
-        &[&CC, &PKG_CONFIG, &ALSA, &JACK, &XCB, &VENV, &GL, &GLIB]
+        &[&CC, &CXX, &ARM_CXX, &ARM_LIBRARY, &PKG_CONFIG, &ALSA, &JACK, &XCB, &VENV, &GL, &GLIB]
     } else {
         &[]
     };

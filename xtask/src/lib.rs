@@ -3,6 +3,7 @@
 pub mod bundle;
 pub mod ci;
 pub mod demo;
+pub mod firmware;
 pub mod generated;
 pub mod host;
 pub mod machine;
@@ -44,6 +45,12 @@ pub const COMMANDS: &[Command] = &[
         about: "write the reed tables as firmware/include/pressure_table_values.h",
         run: generated::firmware_header,
         checks: true,
+    },
+    Command {
+        name: "firmware",
+        about: "the knob's firmware: its claims on this machine, compiled for a microcontroller, cost of a tick",
+        run: firmware::run,
+        checks: false,
     },
     Command {
         name: "fit-bore",

@@ -67,6 +67,21 @@ pub struct Package {
 
 /// For cargo itself: crates with C parts, and linking.
 pub const CC: Package = Package { name: "gcc", present: || works("cc", &["--version"]), purpose: "linking" };
+/// For the knob's firmware, on this machine.
+pub const CXX: Package =
+    Package { name: "g++", present: || works("g++", &["--version"]), purpose: "the knob's firmware" };
+/// For the knob's firmware as a microcontroller sees it.
+pub const ARM_CXX: Package = Package {
+    name: "gcc-arm-none-eabi",
+    present: || works("arm-none-eabi-g++", &["--version"]),
+    purpose: "the firmware's ARM check",
+};
+/// Its headers.
+pub const ARM_LIBRARY: Package = Package {
+    name: "libstdc++-arm-none-eabi-newlib",
+    present: || works("arm-none-eabi-g++", &["-x", "c++", "-include", "new", "-E", "/dev/null"]),
+    purpose: "the firmware's ARM check",
+};
 /// For the pip that fetches DawDreamer.
 pub const VENV: Package = Package {
     name: "python3-venv",

@@ -296,7 +296,7 @@ class Device {
 
     void take_hello(const Frame& frame) {
         Hello hello;
-        if (!hello.decode(frame.payload, frame.length)) {
+        if (!hello.decode(frame.payload, frame.length) || hello.ranges().code != Refusal::None) {
             return;
         }
         const Cause ended = session_.hello(hello);
@@ -317,12 +317,12 @@ class Device {
             return;
         }
         if (!session_.version_fits()) {
-            return refuse(Refusal::Version, static_cast<float>(config_.major), feel.feel_id);
+            return refuse({Refusal::Version, static_cast<float>(config_.major)}, feel.feel_id);
         }
-        const FeelVerdict verdict = check_feel(feel, allowed_);
+        const Verdict verdict = check_feel(feel, allowed_);
         feel_not_finite_ = verdict.code == Refusal::NotFinite;
         if (verdict.code != Refusal::None) {
-            return refuse(verdict.code, verdict.value, feel.feel_id);
+            return refuse(verdict, feel.feel_id);
         }
         adopt(feel);
     }
@@ -343,20 +343,20 @@ class Device {
         if (!arm.decode(frame.payload, frame.length)) {
             return;
         }
-        if (static_cast<float>(arm.ceiling_mnm) > HARD_CAP_MNM) {
-            return refuse(Refusal::Range, static_cast<float>(arm.ceiling_mnm), feel_.feel_id);
+        if (arm.ranges().code != Refusal::None) {
+            return refuse(arm.ranges());
         }
         // A line that repeats an old ARM must not undo a FREE.
         if (frame.repeated) {
-            return refuse(Refusal::Repeated, static_cast<float>(frame.seq), feel_.feel_id);
+            return refuse({Refusal::Repeated, static_cast<float>(frame.seq)});
         }
         const bool was = armed();
         const Refusal why = session_.arm(arm, encoder_.speed(), clock_us_);
         switch (why) {
             case Refusal::None: break;
-            case Refusal::Fault: return refuse(why, static_cast<float>(fault()), feel_.feel_id);
-            case Refusal::Moving: return refuse(why, encoder_.speed(), feel_.feel_id);
-            default: return refuse(why, static_cast<float>(config_.major), feel_.feel_id);
+            case Refusal::Fault: return refuse({why, static_cast<float>(fault())});
+            case Refusal::Moving: return refuse({why, encoder_.speed()});
+            default: return refuse({why, static_cast<float>(config_.major)});
         }
         if (was) {
             limits_.allow(arm.ceiling_mnm);
@@ -369,7 +369,7 @@ class Device {
 
     void take_alive(const Frame& frame) {
         Arm alive;
-        if (!alive.decode(frame.payload, frame.length) || static_cast<float>(alive.ceiling_mnm) > HARD_CAP_MNM ||
+        if (!alive.decode(frame.payload, frame.length) || alive.ranges().code != Refusal::None ||
             !session_.knows(alive.session)) {
             return;  // fifty a second: silence, and with it the watchdog, is the answer
         }
@@ -378,44 +378,47 @@ class Device {
     }
 
     void take_zero(const Frame& frame) {
-        if (frame.length < 4) {
+        Zero zero;
+        if (!zero.decode(frame.payload, frame.length)) {
             return;
         }
-        const std::int32_t angle = Bytes(frame.payload).i32();
-        if (angle < -360000 || angle > 360000) {
-            return refuse(Refusal::Range, static_cast<float>(angle), feel_.feel_id);
+        if (zero.ranges().code != Refusal::None) {
+            return refuse(zero.ranges());
         }
         if (session_.phase() != Phase::Disarmed) {
-            return refuse(Refusal::ZeroWhileArmed, static_cast<float>(angle) * 0.01F, feel_.feel_id);
+            return refuse({Refusal::ZeroWhileArmed, static_cast<float>(zero.angle) * 0.01F});
         }
-        encoder_.call(angle);
+        encoder_.call(zero.angle);
         in_slap_ = false;
     }
 
     void take_rate(const Frame& frame) {
-        if (frame.length < 2) {
+        Rate rate;
+        if (!rate.decode(frame.payload, frame.length)) {
             return;
         }
-        const std::uint16_t hz = Bytes(frame.payload).u16();
-        if (hz < 10 || hz > 1000) {
-            return refuse(Refusal::Range, static_cast<float>(hz), feel_.feel_id);
+        if (rate.ranges().code != Refusal::None) {
+            return refuse(rate.ranges());
         }
-        state_hz_ = hz;
+        state_hz_ = rate.hz;
     }
 
     void take_bye(const Frame& frame) {
-        if (frame.length < 4) {
+        Bye bye;
+        if (!bye.decode(frame.payload, frame.length)) {
             return;
         }
-        if (!session_.knows(Bytes(frame.payload).u32())) {
-            return refuse(Refusal::Session, 0.0F, feel_.feel_id);
+        if (!session_.knows(bye.session)) {
+            return refuse({Refusal::Session, 0.0F});
         }
         cut(Cause::Bye);
         session_.forget();
     }
 
-    void refuse(Refusal why, float value, std::uint8_t feel_id) {
-        send(EventKind::Refused, static_cast<std::uint8_t>(why), feel_id, value);
+    void refuse(Verdict verdict) { refuse(verdict, feel_.feel_id); }
+
+    void refuse(Verdict verdict, std::uint8_t feel_id) {
+        send(EventKind::Refused, static_cast<std::uint8_t>(verdict.code), feel_id, verdict.value);
     }
 
     void send_event(EventKind kind, std::uint8_t code, float value) { send(kind, code, feel_.feel_id, value); }

@@ -239,12 +239,6 @@ class Curve {
     float spring_, slap_edge_, slap_, wall_at_, wall_, mark_at_, mark_, damping_, friction_, inverse_friction_speed_;
 };
 
-/// Why a FEEL is refused, and the number that is to blame.
-struct FeelVerdict {
-    Refusal code = Refusal::None;
-    float value = 0.0F;
-};
-
 /// What a device allows.
 struct FeelLimits {
     float stiffness = 2.0F;    // N m/rad
@@ -252,7 +246,6 @@ struct FeelLimits {
     float ceiling_mnm = 450.0F;
 };
 
-constexpr float CLOSURE_MAX = 10.0F;
 constexpr float CLOSURE_MAX_DEG = 3600.0F;
 constexpr float SLIP_H = 3.67423461F;  // sqrt(27 / 2), written in the notebook's last line for sqrt(27) / 2
 constexpr float SLIP_K = 0.136082763F; // 27 / (4 H^3): with it H k = 0.5
@@ -261,39 +254,10 @@ constexpr float SLIP_NEAR = 1e-4F;     // as near as somebody types it
 inline bool is_near(float a, float b) { return a - b <= SLIP_NEAR * b && b - a <= SLIP_NEAR * b; }
 
 /// Ranges of the protocol, then what would shake or push.
-inline FeelVerdict check_feel(const Feel& feel, const FeelLimits& limits) {
-    struct Field {
-        float value, low, high;
-    };
-    const Field fields[] = {
-        {feel.h, 0.5F, 10.0F},
-        {feel.k, 0.01F, 20.0F},
-        {feel.scale_mnm, 0.0F, 450.0F},
-        {feel.stretch, 0.1F, 30.0F},
-        {feel.offset_deg, -360.0F, 360.0F},
-        {feel.a_on_deg, 0.0F, 3600.0F},
-        {feel.a_off_deg, 0.0F, 36000.0F},
-        {feel.a_beat_deg, 0.0F, 3600.0F},
-        {feel.wall_deg, 10.0F, 36000.0F},
-        {feel.wall_mnm_per_deg, 0.0F, 100.0F},
-        {feel.slap_mnm_per_deg, 0.0F, 20.0F},
-        {feel.damping_mnms, 0.0F, 20.0F},
-        {static_cast<float>(feel.morph_ms), 20.0F, 1000.0F},
-        {static_cast<float>(feel.friction), 0.0F, 1000.0F},
-        {static_cast<float>(feel.detent), 0.0F, 1000.0F},
-    };
-    for (const Field& field : fields) {
-        if (!is_finite(field.value)) {
-            return {Refusal::NotFinite, 0.0F};  // the wire carries no other number for it
-        }
-    }
-    if (feel.law > 2) {
-        return {Refusal::Law, static_cast<float>(feel.law)};
-    }
-    for (const Field& field : fields) {
-        if (field.value < field.low || field.value > field.high) {
-            return {Refusal::Range, field.value};
-        }
+inline Verdict check_feel(const Feel& feel, const FeelLimits& limits) {
+    const Verdict ranges = feel.ranges();
+    if (ranges.code != Refusal::None) {
+        return ranges;
     }
     if (feel.law == static_cast<std::uint8_t>(Law::Free)) {
         return {};
@@ -301,14 +265,9 @@ inline FeelVerdict check_feel(const Feel& feel, const FeelLimits& limits) {
     if (feel.scale_mnm > limits.ceiling_mnm) {
         return {Refusal::Scale, feel.scale_mnm};
     }
-    const float closure = feel.h * feel.k;
-    const bool slip = is_near(feel.h, SLIP_H) && is_near(feel.k, SLIP_K);
-    if (slip || closure > CLOSURE_MAX) {
-        return {Refusal::Closure, closure};
-    }
     const Curve curve(feel);
-    if (curve.closure_deg() > CLOSURE_MAX_DEG) {
-        return {Refusal::Closure, closure};
+    if ((is_near(feel.h, SLIP_H) && is_near(feel.k, SLIP_K)) || curve.closure_deg() > CLOSURE_MAX_DEG) {
+        return {Refusal::Closure, feel.h * feel.k};
     }
     if (curve.stiffness() > limits.stiffness) {
         return {Refusal::Stiffness, curve.stiffness()};

@@ -7,7 +7,7 @@
 namespace chalumeau {
 
 /// 45 Ncm, whatever anybody asks.
-constexpr float HARD_CAP_MNM = 450.0F;
+constexpr float HARD_CAP_MNM = CEILING_MOST_MNM;
 /// Heat is a mean of the squared torque over this time.
 constexpr float THERMAL_S = 10.0F;
 /// How fast the ceiling sinks to the continuous rating and rises again, mNm/s: not to be felt as a step (judgement).

@@ -82,6 +82,22 @@ constexpr std::uint16_t MORPHING = 1U << 6U;
 constexpr std::uint16_t THERMAL = 1U << 7U;
 }  // namespace flag
 
+/// Finite, told from the bits, so that no compiler option (-ffast-math) can remove the question.
+inline bool is_finite(float value) {
+    std::uint32_t bits;
+    std::memcpy(&bits, &value, sizeof bits);
+    return (bits & 0x7F800000U) != 0x7F800000U;
+}
+
+constexpr std::uint16_t CEILING_MOST_MNM = 450;
+constexpr float CLOSURE_MAX = 10.0F;  // most H k
+
+/// Why something is refused, and the number that is to blame.
+struct Verdict {
+    Refusal code = Refusal::None;
+    float value = 0.0F;
+};
+
 /// Little-endian reading; every call site has checked the length.
 class Bytes {
   public:
@@ -152,11 +168,14 @@ struct Hello {
     std::uint8_t minor = PROTOCOL_MINOR;
     std::uint32_t session = 0;
 
-    /// False when too short or without the magic.
+    bool magic = true;
+
+    /// False when too short.
     bool decode(const std::uint8_t* payload, std::size_t length) {
-        if (length < LENGTH || std::memcmp(payload, "TTLK", 4) != 0) {
+        if (length < LENGTH) {
             return false;
         }
+        magic = std::memcmp(payload, "TTLK", 4) == 0;
         Bytes bytes(payload + 4);
         major = bytes.u8();
         minor = bytes.u8();
@@ -164,6 +183,7 @@ struct Hello {
         session = bytes.u32();
         return true;
     }
+    Verdict ranges() const { return magic ? Verdict{} : Verdict{Refusal::Range, 0.0F}; }
     Payload encode() const {
         Payload to;
         to.copy(reinterpret_cast<const std::uint8_t*>("TTLK"), 4).u8(major).u8(minor).u16(0).u32(session);
@@ -192,7 +212,7 @@ struct Feel {
     std::uint16_t friction = 0;
     std::uint16_t detent = 0;
 
-    /// False when too short; ranges are `check_feel`'s business, so that a refusal can name the number.
+    /// False when too short.
     bool decode(const std::uint8_t* payload, std::size_t length) {
         if (length < LENGTH) {
             return false;
@@ -208,6 +228,46 @@ struct Feel {
         friction = bytes.u16();
         detent = bytes.u16();
         return true;
+    }
+    /// Ranges of the protocol.
+    Verdict ranges() const {
+        struct Field {
+            float value, low, high;
+        };
+        const Field fields[] = {
+            {h, 0.5F, 10.0F},
+            {k, 0.01F, 20.0F},
+            {scale_mnm, 0.0F, 450.0F},
+            {stretch, 0.1F, 30.0F},
+            {offset_deg, -360.0F, 360.0F},
+            {a_on_deg, 0.0F, 3600.0F},
+            {a_off_deg, 0.0F, 36000.0F},
+            {a_beat_deg, 0.0F, 3600.0F},
+            {wall_deg, 10.0F, 36000.0F},
+            {wall_mnm_per_deg, 0.0F, 100.0F},
+            {slap_mnm_per_deg, 0.0F, 20.0F},
+            {damping_mnms, 0.0F, 20.0F},
+            {static_cast<float>(morph_ms), 20.0F, 1000.0F},
+            {static_cast<float>(friction), 0.0F, 1000.0F},
+            {static_cast<float>(detent), 0.0F, 1000.0F},
+        };
+        for (const Field& field : fields) {
+            if (!is_finite(field.value)) {
+                return {Refusal::NotFinite, 0.0F};  // the wire carries no other number for it
+            }
+        }
+        if (law > 2) {
+            return {Refusal::Law, static_cast<float>(law)};
+        }
+        for (const Field& field : fields) {
+            if (field.value < field.low || field.value > field.high) {
+                return {Refusal::Range, field.value};
+            }
+        }
+        if (h * k > CLOSURE_MAX) {
+            return {Refusal::Closure, h * k};
+        }
+        return {};
     }
     Payload encode() const {
         Payload to;
@@ -236,9 +296,72 @@ struct Arm {
         ceiling_mnm = bytes.u16();
         return true;
     }
+    Verdict ranges() const {
+        return ceiling_mnm > CEILING_MOST_MNM ? Verdict{Refusal::Range, static_cast<float>(ceiling_mnm)} : Verdict{};
+    }
     Payload encode() const {
         Payload to;
         to.u32(session).u16(ceiling_mnm).u16(0);
+        return to;
+    }
+};
+
+struct Zero {
+    static constexpr std::size_t LENGTH = 4;
+    std::int32_t angle = 0;  // 0.01 degrees
+
+    bool decode(const std::uint8_t* payload, std::size_t length) {
+        if (length < LENGTH) {
+            return false;
+        }
+        angle = Bytes(payload).i32();
+        return true;
+    }
+    Verdict ranges() const {
+        return angle < -360000 || angle > 360000 ? Verdict{Refusal::Range, static_cast<float>(angle)} : Verdict{};
+    }
+    Payload encode() const {
+        Payload to;
+        to.i32(angle);
+        return to;
+    }
+};
+
+struct Rate {
+    static constexpr std::size_t LENGTH = 2;
+    std::uint16_t hz = 0;
+
+    bool decode(const std::uint8_t* payload, std::size_t length) {
+        if (length < LENGTH) {
+            return false;
+        }
+        hz = Bytes(payload).u16();
+        return true;
+    }
+    Verdict ranges() const {
+        return hz < 10 || hz > 1000 ? Verdict{Refusal::Range, static_cast<float>(hz)} : Verdict{};
+    }
+    Payload encode() const {
+        Payload to;
+        to.u16(hz);
+        return to;
+    }
+};
+
+struct Bye {
+    static constexpr std::size_t LENGTH = 4;
+    std::uint32_t session = 0;
+
+    bool decode(const std::uint8_t* payload, std::size_t length) {
+        if (length < LENGTH) {
+            return false;
+        }
+        session = Bytes(payload).u32();
+        return true;
+    }
+    Payload encode() const {
+        Payload to;
+        to.u32(session);
         return to;
     }
 };
@@ -284,6 +407,7 @@ struct Info {
         push_limit = bytes.u16();
         return true;
     }
+    Verdict ranges() const { return serial == 0 ? Verdict{Refusal::Range, 0.0F} : Verdict{}; }
     Payload encode() const {
         Payload to;
         to.u8(major).u8(minor).u16(capabilities).u8(firmware_major).u8(firmware_minor).u16(firmware_patch);
@@ -351,18 +475,17 @@ struct Event {
         value = bytes.f32();
         return true;
     }
+    Verdict ranges() const {
+        if (kind < 1 || kind > 6) {
+            return {Refusal::Range, static_cast<float>(kind)};
+        }
+        return is_finite(value) ? Verdict{} : Verdict{Refusal::NotFinite, 0.0F};
+    }
     Payload encode() const {
         Payload to;
         to.u8(kind).u8(counter).u8(code).u8(feel_id).u32(t_us).f32(value);
         return to;
     }
 };
-
-/// Finite, told from the bits, so that no compiler option (-ffast-math) can remove the question.
-inline bool is_finite(float value) {
-    std::uint32_t bits;
-    std::memcpy(&bits, &value, sizeof bits);
-    return (bits & 0x7F800000U) != 0x7F800000U;
-}
 
 }  // namespace chalumeau

@@ -75,14 +75,16 @@ class MidiDecoder {
   private:
     bool finish(Frame& frame) {
         constexpr std::size_t HEAD = sizeof SYSEX_HEAD - 1;
-        if (foreign_ || length_ < HEAD || std::memcmp(buffer_, SYSEX_HEAD + 1, HEAD) != 0) {
+        // A group is at least the byte of top bits and one more.
+        if (foreign_ || length_ < HEAD || (length_ - HEAD) % 8 == 1 || std::memcmp(buffer_, SYSEX_HEAD + 1, HEAD) != 0) {
             ++reader.counts.junk;
             return false;
         }
+        static_assert(FRAME_MAX == PACKED_MAX - (PACKED_MAX + 7) / 8, "what fits the buffer unpacks to a frame at most");
         std::size_t written = 0;
         for (std::size_t start = HEAD; start < length_; start += 8) {
             const std::uint8_t tops = buffer_[start];
-            for (std::size_t i = 1; i < 8 && start + i < length_ && written < sizeof unpacked_; ++i) {
+            for (std::size_t i = 1; i < 8 && start + i < length_; ++i) {
                 const unsigned top = (static_cast<unsigned>(tops) >> (i - 1)) & 1U;
                 unpacked_[written++] = static_cast<std::uint8_t>(buffer_[start + i] | (top << 7U));
             }

@@ -260,15 +260,10 @@ impl Connection {
             Standing::Stock(name) => return Err(End::Stock(name)),
             // MIDI devices that only send control changes rest for as long as they like.
             Standing::Greeting | Standing::PlainMidi if self.transport.binding() == Binding::Midi => {}
-            Standing::Greeting if session.heard_us().is_none() => {
-                if silent_us > BOOT_US {
-                    return Err(End::NoAnswer);
-                }
-            }
+            _ if session.heard_us().is_none() && silent_us > BOOT_US => return Err(End::NoAnswer),
             _ if session.heard_us().is_some() && silent_us > lost_us => {
                 return Err(End::Gone("the knob is silent".into()));
             }
-            _ if silent_us > BOOT_US => return Err(End::NoAnswer),
             _ => {}
         }
         if let Some(info) = session.info().filter(|_| !self.is_claimed) {

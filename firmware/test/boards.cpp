@@ -1,0 +1,60 @@
+// Frames of the motor boards and their units.
+
+#include "../include/chalumeau/i2c.hpp"
+#include "check.hpp"
+
+using namespace chalumeau;
+
+CLAIM(i2c_frames_have_the_layout_of_both_boards) {
+    std::uint8_t frame[I2C_FRAME];
+    encode_reading(MotorBoard::Mechaduino, {0x0E0F, 1.0F}, frame);
+    const std::uint8_t mec[] = {0x0F, 0x0E, 0, 0, 0, 0, 0x80, 0x3F, 0, 0, 0xDC, 0};
+    CHECK(std::memcmp(frame, mec, sizeof mec) == 0);
+    encode_reading(MotorBoard::Moteus, {0x0E0F, -2.0F}, frame);
+    const std::uint8_t mot[] = {0, 0x0F, 0x0E, 0, 0, 0, 0, 0xC0, 0, 0, 0xDD, 0};
+    CHECK(std::memcmp(frame, mot, sizeof mot) == 0);
+    encode_command({-90, 1.0F, 't'}, frame);
+    const std::uint8_t command[] = {0xA6, 0xFF, 0, 0, 0x80, 0x3F, 't', 0, 0, 0, 0xD8, 0x02};
+    CHECK(std::memcmp(frame, command, sizeof command) == 0);
+}
+
+CLAIM(i2c_frames_come_back_and_any_byte_changed_is_refused) {
+    std::uint8_t frame[I2C_FRAME];
+    for (MotorBoard board : {MotorBoard::Mechaduino, MotorBoard::Moteus}) {
+        for (int angle = 0; angle < 3600; angle += 7) {
+            const float rpm = 0.37F * static_cast<float>(angle) - 650.0F;
+            encode_reading(board, {static_cast<std::int16_t>(angle), rpm}, frame);
+            MotorReading reading;
+            CHECK(decode_reading(board, frame, reading) && reading.angle == angle && reading.rpm == rpm);
+            for (std::size_t i = 0; i < I2C_FRAME; ++i) {
+                frame[i] = static_cast<std::uint8_t>(frame[i] + 1 + angle % 255);
+                CHECK(!decode_reading(board, frame, reading));
+                frame[i] = static_cast<std::uint8_t>(frame[i] - 1 - angle % 255);
+            }
+        }
+    }
+    for (int torque = -450; torque <= 450; ++torque) {
+        encode_command({static_cast<std::int16_t>(torque), 0.0F, 't'}, frame);
+        MotorCommand command;
+        CHECK(decode_command(frame, command) && command.torque_counts == torque && command.mode == 't');
+        frame[6] = 'v';
+        CHECK(!decode_command(frame, command));
+    }
+}
+
+CLAIM(counts_are_the_nearest_and_never_exceed_what_the_board_takes) {
+    const TorqueUnit mechaduino = mechaduino_unit(60.0F);
+    for (const TorqueUnit& unit : {MOTEUS_UNIT, mechaduino}) {
+        for (int i = -4500; i <= 4500; ++i) {
+            const float mnm = 0.1F * static_cast<float>(i);
+            const float back = mnm_of(counts_of(mnm, unit), unit);
+            if (std::fabs(mnm) <= unit.clips_at_mnm) {
+                CHECK(std::fabs(back - mnm) <= 0.5001F * unit.mnm_per_count);
+            } else {
+                CHECK(std::fabs(back) <= unit.clips_at_mnm + 0.5001F * unit.mnm_per_count);
+            }
+        }
+        CHECK(counts_of(NAN, unit) == 0 && counts_of(INFINITY, unit) == 0);
+    }
+    CHECK(counts_of(108.0F, mechaduino) == 208);
+}
