@@ -20,5 +20,6 @@ pub mod reed;
 pub mod render;
 #[cfg(feature = "simulator")]
 pub mod simulator;
+pub mod touch;
 pub mod units;
 pub mod wire;
