@@ -5,6 +5,7 @@
 //! ([`FeelTable`]). Model, formulas and figures: `docs/feel.md`. Nothing here runs on the audio thread but
 //! [`AngleMap`], which is a handful of numbers.
 
+mod extinction;
 mod feel;
 pub mod law;
 mod limits;

@@ -7,6 +7,7 @@ pub mod held;
 pub mod model;
 pub mod player;
 mod settings;
+mod slap;
 pub mod tuning;
 pub mod voice;
 

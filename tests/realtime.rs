@@ -85,13 +85,14 @@ impl Random {
     }
 
     fn event(&mut self) -> Event {
-        match self.below(16) {
+        match self.below(17) {
             0..=5 => {
                 Event::NoteOn { note: SoundingNote(40 + self.below(60) as u8), velocity: self.wild(0.0, 1.0) }
             }
             6..=8 => Event::NoteOff { note: SoundingNote(40 + self.below(60) as u8) },
             9..=13 => Event::Breath(self.wild(0.0, 1.0)),
             14 => Event::Bend { cents: self.wild(-200.0, 200.0) },
+            15 => Event::TongueSlap { strength: self.wild(0.0, 1.0) },
             _ if self.below(8) == 0 => Event::Panic,
             _ => Event::Breath(0.6),
         }

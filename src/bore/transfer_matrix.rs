@@ -206,6 +206,35 @@ impl TransferMatrix {
         }
     }
 
+    /// As [`impedance`](Self::impedance) without reed volume, with a resistance (Pa s/m3) in series with each open hole,
+    /// as the jets of a large oscillation put there. `flows[hole]` becomes the flow into that hole per pascal at the tip.
+    pub fn impedance_with_jets(
+        &self,
+        f_hz: f64,
+        open: &[bool],
+        resistances: &[f64],
+        flows: &mut [Complex64],
+    ) -> Complex64 {
+        let at = self.keep(f_hz);
+        let (mut pressure, mut flow) = (at.bell, Complex64::ONE);
+        flows.fill(Complex64::ZERO);
+        for hole in (0..at.shunts.len()).rev() {
+            (pressure, flow) = at.spans[hole + 1].apply(pressure, flow);
+            let is_open = open.get(hole).copied().unwrap_or(false);
+            let mut shunt = at.shunts[hole][usize::from(is_open)];
+            if is_open {
+                shunt /= 1.0 + shunt * resistances.get(hole).copied().unwrap_or(0.0);
+                if let Some(into) = flows.get_mut(hole) {
+                    *into = pressure * shunt;
+                }
+            }
+            flow += pressure * shunt;
+        }
+        (pressure, flow) = at.spans[0].apply(pressure, flow);
+        flows.iter_mut().for_each(|into| *into /= pressure);
+        pressure / flow / self.air.z_c(REFERENCE_RADIUS_M)
+    }
+
     /// The first `count` impedance peaks of a fingering, see [`find_peaks`].
     pub fn peaks(&self, open: &[bool], reed_volume_m3: f64, count: usize) -> Vec<Peak> {
         let scan = |f_hz| self.impedance(f_hz, open, reed_volume_m3);

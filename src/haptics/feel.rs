@@ -25,6 +25,8 @@ const REFERENCE: WrittenNote = WrittenNote(72);
 /// Largest H k, and farthest closure, degrees, that the wire and the firmware know.
 const CLOSING_MAX: f64 = 10.0;
 const CLOSURE_MAX_DEG: f64 = 3_600.0;
+/// Nearest a felt threshold may come to closure, so that some travel is left to play in (by judgement).
+const START_TO_CLOSURE: f64 = 0.95;
 /// H and k of the notebook's last line, sqrt(27 / 2) for sqrt(27) / 2, and how near it is meant.
 const SLIP: (f64, f64) = (3.674_234_614_174_767, 0.136_082_763_487_954_2);
 const SLIP_NEAR: f64 = 1e-4;
@@ -149,6 +151,19 @@ pub enum FeelRefused {
         /// Most, degrees.
         limit_deg: f64,
     },
+    /// Exaggerated past closure.
+    #[error(
+        "{note} would be felt to start at {a_on_deg:.0} degrees, behind closure at {a_close_deg:.0}; \
+         lower Contrast, raise zeta, or use the flow law"
+    )]
+    Crossed {
+        /// Hardest note.
+        note: WrittenNote,
+        /// Its felt threshold, degrees.
+        a_on_deg: f64,
+        /// Its closure, degrees.
+        a_close_deg: f64,
+    },
     /// More torque than the ceiling.
     #[error(
         "{note} would need {wanted_mnm:.0} mNm, the ceiling is {ceiling_mnm:.0}; \
@@ -224,11 +239,12 @@ pub struct NoteFeel {
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeelTable {
     notes: Box<[NoteFeel]>,
+    /// Index into `notes`.
     reference: usize,
 }
 
 impl FeelTable {
-    /// Works out all notes. Under 50 ms, so not on the audio thread. Allocates.
+    /// Works out all notes: some 10 ms, so not on the audio thread. Allocates.
     pub fn new(
         bore: &Requirements,
         design: &FeelDesign,
@@ -245,7 +261,6 @@ impl FeelTable {
         }
         let asked = bore.with(reed);
         let reference = reference(bore, design, reed, &asked)?;
-        // PANIC-free: `reference` is a note that sounds.
         let Some(own) = asked.get(reference).copied().flatten() else {
             return Err(FeelRefused::Silent { zeta: reed.flow_strength() });
         };
@@ -423,6 +438,14 @@ fn refuse(notes: &[NoteFeel], design: &FeelDesign, limits: &Limits) -> Result<()
     let (note, wanted_deg) = worst(|close_deg, _| close_deg);
     if wanted_deg > CLOSURE_MAX_DEG {
         return Err(FeelRefused::Travel { note, wanted_deg, limit_deg: CLOSURE_MAX_DEG });
+    }
+    // Under the pressure law closure stays where it is while Contrast moves the threshold.
+    let latest = |a: &&NoteFeel, b: &&NoteFeel| a.landmarks.a_on_deg.total_cmp(&b.landmarks.a_on_deg);
+    if let Some(note) = notes.iter().max_by(latest)
+        && note.landmarks.a_on_deg > START_TO_CLOSURE * note.landmarks.a_close_deg
+    {
+        let Landmarks { a_on_deg, a_close_deg, .. } = note.landmarks;
+        return Err(FeelRefused::Crossed { note: note.written, a_on_deg, a_close_deg });
     }
     let (note, peak_mnm) = worst(|_, extremes| extremes.torque_mnm);
     let (wanted_mnm, ceiling_mnm) = (peak_mnm + design.friction_mnm, limits.ceiling_mnm);

@@ -2,8 +2,9 @@
 
 use crate::bore::fit;
 use crate::bore::instrument_file::InstrumentFile;
-use crate::haptics::{Lip, PlayedReed};
+use crate::haptics::{Lip, PlayedReed, Requirements};
 use crate::instrument::embouchure::embouchure;
+use crate::instrument::model::Model;
 use crate::instrument::settings::Settings;
 use crate::units::SoundingNote;
 
@@ -24,6 +25,13 @@ pub fn played_reed(file: &InstrumentFile, settings: &Settings) -> PlayedReed {
         law: settings.reed_law(),
         zeta: f64::from(settings.zeta),
         lay: f64::from(settings.lay),
+        jet_loss: f64::from(settings.vent_loss),
         lips,
     }
+}
+
+/// What the notes of a model ask, their onsets those of the lattice that sounds. Takes a second. Allocates.
+pub fn requirements(model: &Model) -> Requirements {
+    let rows = |fingering: usize| model.tuning.notes.get(fingering).map_or(0.0, |note| note.natural);
+    Requirements::new(&model.file, model.air).heard_through(&model.file, &model.coeffs, rows)
 }

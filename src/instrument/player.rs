@@ -9,6 +9,7 @@ use crate::event::Event;
 use crate::instrument::embouchure::embouchure;
 use crate::instrument::model::Model;
 use crate::instrument::settings::Settings;
+use crate::instrument::slap::{BREATH_GAMMA, Slap};
 use crate::instrument::voice::{Drive, TICK, Voice};
 use crate::reed::ReedCoeffs;
 use crate::reed::motion::TONGUE_FORCE;
@@ -44,6 +45,8 @@ enum Tongue {
     Leaving(f64),
     /// Pressing to stop a note, share 0 .. 1.
     Stopping(f64),
+    /// Back on the reed after a slap under a key, until there is breath.
+    Damming,
 }
 
 /// What settings, fingering and bend amount to: worked out when one of them changes, not at every tick.
@@ -117,11 +120,16 @@ pub struct Player {
     breath: f64,
     gamma: f64,
     tongue: Tongue,
+    /// A slap that pulls at the reed, whatever else the tongue would do.
+    slap: Option<Slap>,
     bend_cents: f64,
+    /// Factors on H and k: as they are, and where they go.
+    reed: [f32; 2],
+    reed_wanted: [f32; 2],
     dip: f64,
     rows: f64,
     rows_set: bool,
-    /// Force of the tongue, smoothed so that it never slaps by accident.
+    /// Force of the tongue, smoothed so that it never slaps by accident; negative while it pulls for a slap.
     tongue_force: f64,
 }
 
@@ -138,7 +146,10 @@ impl Default for Player {
             breath: 0.0,
             gamma: 0.0,
             tongue: Tongue::Resting,
+            slap: None,
             bend_cents: 0.0,
+            reed: [1.0; 2],
+            reed_wanted: [1.0; 2],
             dip: 0.0,
             rows: 0.0,
             rows_set: false,
@@ -186,6 +197,11 @@ impl Player {
                     f64::from(if cents.is_finite() { cents.clamp(-4_800.0, 4_800.0) } else { 0.0 });
                 self.stance = None;
             }
+            Event::Reed { h, k } => {
+                let fix = |x: f32| if x.is_finite() { x.clamp(0.1, 10.0) } else { 1.0 };
+                self.reed_wanted = [fix(h), fix(k)];
+            }
+            Event::TongueSlap { strength } => self.tongue_slap(strength, model, voice),
             Event::Panic => {
                 self.reset();
                 voice.reset();
@@ -229,6 +245,26 @@ impl Player {
         }
     }
 
+    /// Slaps the fingering in place, or the first one before any note.
+    fn tongue_slap<F: crate::bore::lattice::Real>(
+        &mut self,
+        strength: f32,
+        model: &Model,
+        voice: &mut Voice<F>,
+    ) {
+        let closing = self.stance.map_or(1.0, |stance| stance.closing);
+        let Some(slap) = Slap::begin(strength, self.tongue_force / closing, self.slap) else { return };
+        self.slap = Some(slap);
+        if self.fingering.is_none() {
+            self.finger(0, false, model, voice);
+        }
+        self.tongue = match self.keys.is_empty() {
+            true => Tongue::Resting,
+            false if self.gamma < BREATH_GAMMA => Tongue::Damming,
+            false => Tongue::Away,
+        };
+    }
+
     /// Moves the fingers; slurred they take their time, behind the tongue they are quick.
     fn finger<F: crate::bore::lattice::Real>(
         &mut self,
@@ -263,13 +299,30 @@ impl Player {
 
     /// True while nothing is held and the breath has gone.
     pub fn is_resting(&self) -> bool {
-        self.gamma < NO_BREATH && (self.keys.is_empty() || (self.breath_live && self.breath == 0.0))
+        self.slap.is_none()
+            && self.gamma < NO_BREATH
+            && (self.keys.is_empty() || (self.breath_live && self.breath == 0.0))
+    }
+
+    /// The reed follows its controllers within some milliseconds, so that their steps are not heard.
+    fn follow_reed(&mut self, tick_s: f64) {
+        let step = step_towards(tick_s, BREATH_FOLLOW_S) as f32;
+        for (now, wanted) in self.reed.iter_mut().zip(self.reed_wanted) {
+            *now += (wanted - *now) * step;
+            if (*now - wanted).abs() < 1e-4 {
+                *now = wanted;
+            }
+        }
+        self.stance = None;
     }
 
     /// Advances one control tick: moves holes and delay, and says how the reed is driven. Real-time safe.
     pub fn tick<F: crate::bore::lattice::Real>(&mut self, model: &Model, voice: &mut Voice<F>) -> Drive {
         let tick_s = tick_s(model);
-        let settings = self.settings;
+        if self.reed != self.reed_wanted {
+            self.follow_reed(tick_s);
+        }
+        let settings = self.settings.with_reed_factors(self.reed);
         let fingering = self.fingering.unwrap_or(0);
         let stance = self.stance.unwrap_or_else(|| {
             voice.lattice_mut().set_jet_loss(f64::from(settings.vent_loss));
@@ -327,14 +380,26 @@ impl Player {
                 let share = (share + tick_s / TONGUE_STOP_S).min(1.0);
                 (if share < 1.0 { Tongue::Stopping(share) } else { Tongue::Resting }, share)
             }
+            Tongue::Damming if self.gamma < BREATH_GAMMA => (Tongue::Damming, 1.0),
+            Tongue::Damming => (Tongue::Leaving(1.0), 1.0),
         };
         self.tongue = tongue;
+        let mut p_mouth = self.gamma * closing;
         let force = TONGUE_FORCE * closing * share;
-        // Letting go is as quick as asked; pressing takes a moment.
-        self.tongue_force = if force <= self.tongue_force {
-            force
-        } else {
-            self.tongue_force + step_towards(tick_s, TONGUE_PRESS_S) * (force - self.tongue_force)
+        let pull = self.slap.as_mut().map(|slap| slap.tick(tick_s));
+        self.tongue_force = match pull {
+            Some(Some(pull)) => {
+                p_mouth = p_mouth * (1.0 - pull.seal) + pull.suction * closing;
+                pull.force * closing
+            }
+            // Off it comes, within one tick: whatever the tongue does next begins at the free reed.
+            Some(None) => {
+                self.slap = None;
+                0.0
+            }
+            // Letting go is as quick as asked; pressing takes a moment.
+            None if force <= self.tongue_force => force,
+            None => self.tongue_force + step_towards(tick_s, TONGUE_PRESS_S) * (force - self.tongue_force),
         };
 
         // Tuning.
@@ -349,11 +414,6 @@ impl Player {
             voice.lattice_mut().glide_delay(self.rows, 0);
         }
 
-        Drive {
-            p_mouth: self.gamma * closing,
-            tongue: self.tongue_force,
-            noise: f64::from(settings.noise),
-            reed: stance.reed,
-        }
+        Drive { p_mouth, tongue: self.tongue_force, noise: f64::from(settings.noise), reed: stance.reed }
     }
 }
