@@ -21,7 +21,7 @@ use std::collections::BTreeMap;
 const REST_DEG: f64 = 0.2;
 
 /// The seed's reed: closes at one turn of stretch 1.
-const H: f32 = 2.598_076_2;
+const H: f32 = 2.598_076;
 const K: f32 = 0.384_900_2;
 
 fn feel(law: Law, scale_mnm: f32, stretch: f32, h: f32, k: f32) -> Feel {
