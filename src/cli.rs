@@ -5,11 +5,17 @@
 //! was given and what would be right, and no file; a reader that closes the pipe early is no mistake.
 
 mod args;
+mod feel;
 mod haptic;
 mod impedance;
+#[cfg(feature = "devices")]
+mod knob;
+#[cfg(feature = "simulator")]
+mod knob_sim;
 mod reed;
 mod render;
 mod settings;
+mod study;
 mod table;
 mod threshold;
 mod tune;
@@ -23,6 +29,7 @@ use crate::render::breath::BreathError;
 use crate::render::midi_file::MidiFileError;
 use crate::render::score::ScoreError;
 use crate::render::wav::WavError;
+use crate::touch::take::TakeError;
 use clap::{Parser, Subcommand};
 use std::io;
 use std::path::PathBuf;
@@ -57,6 +64,11 @@ enum Command {
     Threshold(threshold::Threshold),
     Tune(Box<tune::Tune>),
     Reed(reed::Reed),
+    Study(study::Study),
+    #[cfg(feature = "devices")]
+    Knob(Box<knob::Knob>),
+    #[cfg(feature = "simulator")]
+    KnobSim(Box<knob_sim::KnobSim>),
     Haptic(Box<haptic::Haptic>),
 }
 
@@ -67,6 +79,8 @@ enum Failure {
     Read { path: PathBuf, source: io::Error },
     #[error("{}: {source}", path.display())]
     MidiFile { path: PathBuf, source: MidiFileError },
+    #[error("{}: {source}", path.display())]
+    TakeFile { path: PathBuf, source: TakeError },
     #[error("{}: {source}", path.display())]
     BreathFile { path: PathBuf, source: BreathError },
     #[error("{}: {source}", path.display())]
@@ -85,6 +99,15 @@ enum Failure {
     Wav(#[from] WavError),
     #[error(transparent)]
     Reed(#[from] ReedError),
+    #[cfg(feature = "simulator")]
+    #[error("{}: {source}", path.display())]
+    HandScript { path: PathBuf, source: crate::simulator::script::ScriptError },
+    #[cfg(feature = "simulator")]
+    #[error("cannot write {}: {source}", path.display())]
+    Write { path: PathBuf, source: io::Error },
+    #[cfg(feature = "simulator")]
+    #[error("the simulated knob stopped: {0}")]
+    Knob(io::Error),
     #[error(transparent)]
     Feel(#[from] FeelRefused),
     #[error("cannot write the table: {0}")]
@@ -108,6 +131,11 @@ pub fn main() -> ExitCode {
         Command::Threshold(command) => command.run(),
         Command::Tune(command) => command.run(),
         Command::Reed(command) => command.run(),
+        Command::Study(command) => command.run(),
+        #[cfg(feature = "devices")]
+        Command::Knob(command) => command.run(),
+        #[cfg(feature = "simulator")]
+        Command::KnobSim(command) => command.run(),
         Command::Haptic(command) => command.run(),
     };
     match done {

@@ -24,6 +24,13 @@ pub enum Event {
         /// Cents above the note.
         cents: f32,
     },
+    /// Controllers open and stiffen the reed: factors on [`Settings`](crate::instrument::Settings)' H and k.
+    Reed {
+        /// On H, 0.1..=10; 1 leaves it.
+        h: f32,
+        /// On k, 0.1..=10; 1 leaves it.
+        k: f32,
+    },
     /// The tongue pulls the reed off the mouthpiece and lets it slam: a percussive burst on the fingering in place, with
     /// or without breath and held keys.
     TongueSlap {

@@ -18,5 +18,8 @@ pub mod plugin;
 pub mod reed;
 #[cfg(feature = "cli")]
 pub mod render;
+#[cfg(feature = "simulator")]
+pub mod simulator;
+pub mod touch;
 pub mod units;
 pub mod wire;

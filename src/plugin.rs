@@ -5,19 +5,23 @@
 //! their sample positions alone, not on the host's blocks, and is what the offline renderer writes. There is no editor
 //! yet; hosts show their own.
 
+#[cfg(feature = "devices")]
+mod knob;
 mod params;
+mod reed_sources;
 mod translate;
 
 use std::sync::Arc;
 
 use nice_plug::prelude::*;
 
-pub use params::{BreathParams, ChalumeauParams, EmbouchureParams, NoiseParams};
+pub use params::{BreathParams, ChalumeauParams, EmbouchureParams, KnobParams, NoiseParams};
 pub use params::{OutputParams, ReedParams, SCHEMA, TuningChoice, TuningParams};
 
 use crate::event::{Event, Timed};
 use crate::identity;
 use crate::instrument::{Clarinet, Settings};
+use reed_sources::ReedSources;
 use translate::Translator;
 
 /// The plugin: parameters, and between `activate` and `deactivate` a clarinet.
@@ -29,6 +33,11 @@ pub struct Chalumeau {
     /// What the clarinet has been given.
     settings: Settings,
     translator: Translator,
+    reed_sources: ReedSources,
+    #[cfg(feature = "devices")]
+    knob: Option<(knob::Knob, knob::Audio)>,
+    /// Whether a file is rendered: nobody holds a knob then.
+    offline: bool,
     /// Where *Breath* was last; at rest until it moves.
     breath: f32,
     panic: bool,
@@ -43,6 +52,8 @@ impl Plugin for Chalumeau {
     const AUDIO_IO_LAYOUTS: &'static [AudioIOLayout] =
         &[AudioIOLayout { main_output_channels: NonZeroU32::new(2), ..AudioIOLayout::const_default() }];
     const MIDI_INPUT: MidiConfig = MidiConfig::MidiCCs;
+    /// A knob's breath, as CC2 and CC34, so that a host can record it.
+    const MIDI_OUTPUT: MidiConfig = MidiConfig::MidiCCs;
     const SAMPLE_ACCURATE_AUTOMATION: bool = true;
     /// Some hosts send every MIDI controller of every channel (2080) at once; beyond the capacity the wrapper allocates.
     const INPUT_EVENT_CAPACITY: usize = 4096;
@@ -74,6 +85,13 @@ impl Plugin for Chalumeau {
                 }
             }
         }
+        self.offline = config.process_mode == ProcessMode::Offline;
+        #[cfg(feature = "devices")]
+        {
+            let params = &self.params;
+            let (_, audio) = self.knob.get_or_insert_with(|| knob::Knob::start(params.clone()));
+            audio.prepare(params);
+        }
         self.settings = self.params.settings();
         if let Some((_, clarinet)) = &mut self.clarinet {
             clarinet.set_settings(&self.settings);
@@ -85,6 +103,11 @@ impl Plugin for Chalumeau {
 
     fn reset(&mut self) {
         self.translator.reset();
+        self.reed_sources.reset();
+        #[cfg(feature = "devices")]
+        if let Some((_, audio)) = &mut self.knob {
+            audio.reset();
+        }
         self.breath = 0.0;
         self.panic = self.params.output.panic.value();
         if let Some((_, clarinet)) = &mut self.clarinet {
@@ -99,7 +122,7 @@ impl Plugin for Chalumeau {
         context: &mut impl ProcessContext<Self>,
     ) -> ProcessStatus {
         let [out, copies @ ..] = buffer.as_slice() else { return ProcessStatus::Normal };
-        let Some((_, clarinet)) = &mut self.clarinet else {
+        let Some((rate_hz, clarinet)) = &mut self.clarinet else {
             return ProcessStatus::Error("not activated");
         };
 
@@ -111,9 +134,44 @@ impl Plugin for Chalumeau {
         let moved = moved(&self.params, &mut self.panic, &mut self.breath);
         let api = context.plugin_api();
         let translator = &mut self.translator;
-        let played = std::iter::from_fn(|| context.next_event())
-            .flat_map(|event| translator.translate(event, api).into_iter().flatten());
-        clarinet.render_events(moved.into_iter().flatten().chain(played), out);
+        let reed_sources = &mut self.reed_sources;
+        let sources = [self.params.knob.h_source.value(), self.params.knob.k_source.value()];
+        let played = std::iter::from_fn(|| context.next_event()).flat_map(|event| {
+            if reed_sources.take(&event, sources) {
+                let at = event.timing() as usize;
+                [None, reed_sources.changed(sources).map(|event| Timed { at, event })]
+            } else {
+                translator.translate(event, api)
+            }
+            .into_iter()
+            .flatten()
+        });
+        let events = moved.into_iter().flatten().chain(played);
+        #[cfg(feature = "devices")]
+        if let Some((_, audio)) = &mut self.knob {
+            let replay = self.params.knob.replay.value();
+            let stage = knob::Stage { rate_hz: f64::from(*rate_hz), offline: self.offline, replay };
+            audio.render(clarinet, &settings, events, stage, out);
+            audio.reed(self.reed_sources.factors(sources));
+            for &(at, breath) in audio.sent() {
+                let (coarse, fine) = breath.bytes();
+                for (cc, byte) in [(2, coarse), (34, fine)] {
+                    let value = f32::from(byte) / 127.0;
+                    // A host that takes no events loses a recording, not the sound.
+                    let _ = context.try_send_event(NoteEvent::MidiCC {
+                        timing: at as u32,
+                        channel: 0,
+                        cc,
+                        value,
+                    });
+                }
+            }
+        }
+        #[cfg(not(feature = "devices"))]
+        {
+            let _ = rate_hz;
+            clarinet.render_events(events, out);
+        }
 
         for copy in copies {
             copy.copy_from_slice(out);

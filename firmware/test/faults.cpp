@@ -121,6 +121,12 @@ CLAIM(fault_3_the_slap_region_does_not_jump_and_its_event_tells_the_peak_speed) 
         CHECK(jump >= 0.0F && jump < 0.07F);
     }
     CHECK(curve.at_rest(-399.0F) == 90.0F);
+    // An origin below zero takes the region with it, so that law and slap spring never work against each other.
+    Feel moved = feel;
+    moved.offset_deg = -150.0F;
+    CHECK(Curve(moved).at_rest(-249.9F) == 0.0F && Curve(moved).at_rest(-251.0F) > 0.5F);
+    moved.offset_deg = 150.0F;
+    CHECK(Curve(moved).at_rest(-99.9F) == 0.0F && Curve(moved).at_rest(-101.0F) > 0.5F);
     // In and out, fast in between.
     test::Bench bench;
     bench.ready(feel, -950);

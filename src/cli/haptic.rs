@@ -2,16 +2,15 @@
 
 use crate::bore::instrument_file::InstrumentFile;
 use crate::cli::Failure;
-use crate::cli::args::{AirArg, InstrumentArg, NotesArg, check_fingering, note, within, within_f32};
+use crate::cli::args::{AirArg, InstrumentArg, NotesArg, within, within_f32};
+use crate::cli::feel::FeelArgs;
 use crate::cli::table::TableArgs;
 use crate::haptics::law;
-use crate::haptics::{FeelDesign, FeelTable, Limits, NoteFeel, Order, Requirements};
+use crate::haptics::{FeelTable, Limits, NoteFeel, Requirements};
 use crate::instrument::Settings;
 use crate::instrument::felt::played_reed;
 use crate::reed::ReedTables;
-use crate::units::WrittenNote;
-use crate::wire::message::Law;
-use clap::{Args, ValueEnum};
+use clap::Args;
 
 /// Step of the curve, degrees: one of the knob's encoder.
 const STEP_DEG: f64 = 0.1;
@@ -26,26 +25,6 @@ Examples:
   chalumeau haptic --written 52 --law flow --curve --csv e3.csv
   chalumeau haptic --all --H 3 --k 0.3849          a wider reed, as stiff as before
   chalumeau haptic --all --order covered-holes --contrast 2";
-
-/// Torque laws by name.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum LawArg {
-    /// Rises to the threshold, falls to nothing where the reed shuts
-    Flow,
-    /// A spring with a step at the threshold: easy to hold
-    Pressure,
-}
-
-/// Orders by name.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum OrderArg {
-    /// By the pressure the bore asks
-    Physical,
-    /// The longer the closed tube, the harder
-    CoveredHoles,
-    /// The longer the closed tube, the easier
-    CoveredHolesReversed,
-}
 
 /// What a force-feedback knob should feel for each note
 ///
@@ -65,27 +44,8 @@ pub struct Haptic {
     /// The torque curve of one note instead of the table
     #[arg(long)]
     curve: bool,
-    /// Torque law
-    #[arg(long, value_enum, default_value_t = LawArg::Flow)]
-    law: LawArg,
-    /// Exaggeration of the differences between notes, 1 (physical) ..5
-    #[arg(long, value_name = "X", default_value = "3", value_parser = |s: &str| within(s, 1.0, 5.0))]
-    contrast: f64,
-    /// Which note feels harder
-    #[arg(long, value_enum, default_value_t = OrderArg::Physical)]
-    order: OrderArg,
-    /// Written note that exaggeration leaves alone [default: C5 or, without one, the middle of the chart]
-    #[arg(long, value_name = "NOTE", value_parser = note)]
-    reference: Option<u8>,
-    /// Torque per unit of flow (flow) or at closure (pressure) on the reference note, mNm, 0..450
-    #[arg(long, value_name = "MNM", default_value = "60", value_parser = |s: &str| within(s, 0.0, 450.0))]
-    scale: f64,
-    /// Angle at which the reference reed closes on the reference note, degrees, 120..1080
-    #[arg(long, value_name = "DEG", default_value = "360", value_parser = |s: &str| within(s, 120.0, 1_080.0))]
-    travel: f64,
-    /// Mark at the threshold, mNm, 0..100 [default: none under flow, 6 under pressure]
-    #[arg(long, value_name = "MNM", value_parser = |s: &str| within(s, 0.0, 100.0))]
-    detent: Option<f64>,
+    #[command(flatten)]
+    feel: FeelArgs,
     /// Most torque allowed, mNm, 0..450
     #[arg(long, value_name = "MNM", default_value = "100", value_parser = |s: &str| within(s, 0.0, 450.0))]
     ceiling: f64,
@@ -132,7 +92,7 @@ impl Haptic {
             "{}; zeta {}, Contrast {} about {}",
             file.name,
             self.zeta,
-            self.contrast,
+            self.feel.contrast(),
             feel.reference().written
         ))?;
         for note in feel.notes().iter().filter(wanted) {
@@ -159,9 +119,6 @@ impl Haptic {
     }
 
     fn feel(&self, file: &InstrumentFile) -> Result<FeelTable, Failure> {
-        if let Some(reference) = self.reference {
-            check_fingering(file, WrittenNote(reference))?;
-        }
         let standard = Settings::default();
         let settings = Settings {
             zeta: self.zeta,
@@ -172,23 +129,7 @@ impl Haptic {
             coupled: self.k.is_none(),
             ..standard
         };
-        let design = FeelDesign {
-            law: match self.law {
-                LawArg::Flow => Law::Flow,
-                LawArg::Pressure => Law::Pressure,
-            },
-            reference: self.reference.map(WrittenNote),
-            contrast: self.contrast,
-            order: match self.order {
-                OrderArg::Physical => Order::Physical,
-                OrderArg::CoveredHoles => Order::CoveredHoles,
-                OrderArg::CoveredHolesReversed => Order::CoveredHolesReversed,
-            },
-            strength_mnm: self.scale,
-            travel_deg: self.travel,
-            detent_mnm: self.detent,
-            ..FeelDesign::default()
-        };
+        let design = self.feel.design(file)?;
         let limits = Limits { ceiling_mnm: self.ceiling, ..Limits::default() };
         let bore = Requirements::new(file, self.air.air());
         Ok(FeelTable::new(&bore, &design, &played_reed(file, &settings), &limits)?)

@@ -3,11 +3,13 @@
 use crate::bore::instrument_file::InstrumentFile;
 use crate::cli::Failure;
 use crate::cli::args::{InstrumentArg, check_fingering, note, within};
+use crate::cli::feel::FeelArgs;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::table::Table;
+use crate::control::knob::KnobDesign;
 use crate::event::{Event, Timed};
 use crate::instrument::model::internal_rate_hz;
-use crate::instrument::{Clarinet, Probe};
+use crate::instrument::{Clarinet, Probe, Settings};
 use crate::output::NewFile;
 use crate::render as player;
 use crate::render::breath::BreathCurve;
@@ -15,7 +17,11 @@ use crate::render::breath::GAMMA_MAX;
 use crate::render::midi_file;
 use crate::render::score::Score;
 use crate::render::wav::{Depth, Level, WavFile};
-use crate::units::{SoundingNote, WrittenNote};
+use crate::touch::blower::{Blower, Blown, Hand};
+use crate::touch::feel::{Feels, NO_MOTOR};
+use crate::touch::take::Take;
+use crate::units::{Air, SoundingNote, WrittenNote};
+
 use clap::{ArgGroup, Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fs;
@@ -35,6 +41,7 @@ Examples:
   chalumeau render --scale E3:C6 --slurred --seconds 0.4 --out scale.wav
   chalumeau render --written G4 --breath ramp:0:1.2:4 --seconds 5 --probe g4.csv --out g4.wav
       From silence over the threshold to a reed held shut, with pressures, flow and opening.
+  chalumeau render melody.mid --replay take.csv --out again.wav
   chalumeau render melody.mid --crescendo 0.4:0.9 --bits 16 --rate 44100 --out loud.wav";
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -55,7 +62,7 @@ enum Bits {
 #[command(after_help = EXAMPLES)]
 #[command(group = ArgGroup::new("what").required(true).args(["midi", "written", "sounding", "scale"]))]
 #[command(group = ArgGroup::new("note").args(["written", "sounding", "scale"]))]
-#[command(group = ArgGroup::new("blown").args(["gamma", "breath", "crescendo"]))]
+#[command(group = ArgGroup::new("blown").args(["gamma", "breath", "crescendo", "replay"]))]
 pub struct Render {
     /// Standard MIDI file, format 0 or 1
     #[arg(value_name = "MIDI")]
@@ -88,6 +95,10 @@ pub struct Render {
     /// Mouth pressure from one gamma to another over the whole length, for example 0.4:0.9
     #[arg(long, value_name = "FROM:TO", help_heading = "Breath (replaces that of a MIDI file)")]
     crescendo: Option<String>,
+    /// Breath from a knob's take: a CSV file with t_us and angle_deg, as the plugin or `chalumeau knob` records it; each
+    /// note makes its own pressure of the angle
+    #[arg(long, value_name = "FILE", help_heading = "Breath (replaces that of a MIDI file)")]
+    replay: Option<PathBuf>,
 
     /// WAV file to write
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
@@ -115,6 +126,8 @@ pub struct Render {
     instrument: InstrumentArg,
     #[command(flatten)]
     settings: SettingsArgs,
+    #[command(flatten)]
+    feel: FeelArgs,
 }
 
 /// Two notes with a colon between them.
@@ -131,6 +144,9 @@ impl Render {
         let mut score = self.score(&file)?;
         if let Some(curve) = &curve {
             score = score.blown(curve, &settings, self.rate);
+        }
+        if let Some(take) = &self.replay {
+            score.events = self.replayed(take, &file, &settings, &score)?;
         }
         // A single note lasts as long as was asked; a melody gets time to fade.
         let one_note = self.written.is_some() || self.sounding.is_some();
@@ -177,7 +193,40 @@ impl Render {
         Ok(())
     }
 
+    /// The events of a score, blown by a take.
+    fn replayed(
+        &self,
+        path: &Path,
+        file: &InstrumentFile,
+        settings: &Settings,
+        score: &Score,
+    ) -> Result<Vec<Timed<Event>>, Failure> {
+        let from = fs::File::open(path).map_err(|source| Failure::Read { path: path.to_owned(), source })?;
+        let take = Take::read(from).map_err(|source| Failure::TakeFile { path: path.to_owned(), source })?;
+        let feels = Feels::new(file, Air::default());
+        let design = self.feel.design(file)?;
+        let table = feels.table(settings, &design, &NO_MOTOR)?;
+        let knob = KnobDesign { full_deg: design.travel_deg, ..KnobDesign::default() };
+        let hand = Hand { maps: feels.maps(&table), design: knob, feels: true };
+        let rate_hz = f64::from(self.rate);
+        let full_pa = 1e3 * f64::from(settings.breath_full_kpa);
+        let events = Blown::new(
+            score.events.iter().copied(),
+            &mut Blower::default(),
+            &hand,
+            full_pa,
+            score.samples,
+            |at| Some(take.angle_deg(at as f64 / rate_hz)),
+            &mut |_, _| {},
+        )
+        .collect();
+        Ok(events)
+    }
+
     fn curve(&self) -> Result<Option<BreathCurve>, Failure> {
+        if self.replay.is_some() {
+            return Ok(None);
+        }
         if let Some(text) = &self.crescendo {
             return Ok(Some(BreathCurve::parse_crescendo(text)?));
         }

@@ -123,6 +123,9 @@ pub struct Player {
     /// A slap that pulls at the reed, whatever else the tongue would do.
     slap: Option<Slap>,
     bend_cents: f64,
+    /// Factors on H and k: as they are, and where they go.
+    reed: [f32; 2],
+    reed_wanted: [f32; 2],
     dip: f64,
     rows: f64,
     rows_set: bool,
@@ -145,6 +148,8 @@ impl Default for Player {
             tongue: Tongue::Resting,
             slap: None,
             bend_cents: 0.0,
+            reed: [1.0; 2],
+            reed_wanted: [1.0; 2],
             dip: 0.0,
             rows: 0.0,
             rows_set: false,
@@ -191,6 +196,10 @@ impl Player {
                 self.bend_cents =
                     f64::from(if cents.is_finite() { cents.clamp(-4_800.0, 4_800.0) } else { 0.0 });
                 self.stance = None;
+            }
+            Event::Reed { h, k } => {
+                let fix = |x: f32| if x.is_finite() { x.clamp(0.1, 10.0) } else { 1.0 };
+                self.reed_wanted = [fix(h), fix(k)];
             }
             Event::TongueSlap { strength } => self.tongue_slap(strength, model, voice),
             Event::Panic => {
@@ -295,10 +304,25 @@ impl Player {
             && (self.keys.is_empty() || (self.breath_live && self.breath == 0.0))
     }
 
+    /// The reed follows its controllers within some milliseconds, so that their steps are not heard.
+    fn follow_reed(&mut self, tick_s: f64) {
+        let step = step_towards(tick_s, BREATH_FOLLOW_S) as f32;
+        for (now, wanted) in self.reed.iter_mut().zip(self.reed_wanted) {
+            *now += (wanted - *now) * step;
+            if (*now - wanted).abs() < 1e-4 {
+                *now = wanted;
+            }
+        }
+        self.stance = None;
+    }
+
     /// Advances one control tick: moves holes and delay, and says how the reed is driven. Real-time safe.
     pub fn tick<F: crate::bore::lattice::Real>(&mut self, model: &Model, voice: &mut Voice<F>) -> Drive {
         let tick_s = tick_s(model);
-        let settings = self.settings;
+        if self.reed != self.reed_wanted {
+            self.follow_reed(tick_s);
+        }
+        let settings = self.settings.with_reed_factors(self.reed);
         let fingering = self.fingering.unwrap_or(0);
         let stance = self.stance.unwrap_or_else(|| {
             voice.lattice_mut().set_jet_loss(f64::from(settings.vent_loss));

@@ -93,6 +93,14 @@ impl Settings {
         ReedLaw::free(h, k, f64::from(settings.reed_a)).unwrap_or_default()
     }
 
+    /// The same with H and k multiplied by what controllers say; see [`Event::Reed`](crate::event::Event::Reed).
+    pub fn with_reed_factors(self, [h, k]: [f32; 2]) -> Self {
+        if [h, k] == [1.0, 1.0] {
+            return self;
+        }
+        Self { reed_h: self.reed_h * h, reed_k: self.reed_k * k, ..self }.clamped()
+    }
+
     /// Closing pressure of the reed under these settings, Pa.
     pub fn closing_pa(&self) -> f64 {
         P_REF_PA * self.reed_law().closing()

@@ -4,12 +4,18 @@
 //! Ids live in saved projects and automation lanes: they are only ever added. Every number has its unit and reads both
 //! ways as text. Ranges are those of [`Settings::clamped`]; a test holds them together.
 
-use std::sync::Arc;
 use std::sync::atomic::AtomicU32;
+use std::sync::{Arc, RwLock};
 
 use nice_plug::prelude::*;
 
 use crate::instrument::{Settings, Tuning};
+
+pub mod knob;
+
+pub use knob::KnobParams;
+use knob::{Calibration, ReedSource};
+use serde::{Serialize, de::DeserializeOwned};
 
 /// Layout of the saved state. 1: ids and units as below.
 pub const SCHEMA: u32 = 1;
@@ -39,6 +45,11 @@ pub struct ChalumeauParams {
     /// Level, and the way out of a stuck note.
     #[nested(group = "Output")]
     pub output: OutputParams,
+    /// The knob and what it feels like.
+    #[nested(group = "Knob")]
+    pub knob: KnobParams,
+    /// How the link to the knob is, in words; written by the link.
+    pub knob_status: Arc<RwLock<String>>,
 }
 
 /// Breath and articulation.
@@ -164,7 +175,10 @@ impl From<TuningChoice> for Tuning {
 impl Default for ChalumeauParams {
     fn default() -> Self {
         let d = Settings::default();
+        let knob_status = Arc::new(RwLock::new("off".to_owned()));
         Self {
+            knob: KnobParams::new(knob_status.clone()),
+            knob_status,
             schema: AtomicU32::new(SCHEMA),
             breath: BreathParams {
                 breath: percent("Breath", 0.0),
@@ -207,7 +221,7 @@ impl ChalumeauParams {
     /// The parameters as the instrument reads them. Real-time safe.
     pub fn settings(&self) -> Settings {
         let Self { breath, embouchure, reed, tuning, noise, output, .. } = self;
-        Settings {
+        let mut settings = Settings {
             breath_full_kpa: settled(&breath.full),
             noise: settled(&noise.noise),
             tongue_ms: settled(&breath.tongue),
@@ -226,7 +240,16 @@ impl ChalumeauParams {
             temperature_c: settled(&tuning.temperature),
             vent_loss: settled(&tuning.vent_loss),
             gain_db: settled(&output.gain),
+        };
+        if let Some((_, trial, side)) = self.knob.study() {
+            settings.reed_h = trial.h as f32;
+            settings.reed_k = trial.condition(side).k(trial.h) as f32;
+            settings.coupled = false;
+        } else if self.knob.k_source.value() != ReedSource::Parameter {
+            // What a controller drives follows nothing else.
+            settings.coupled = false;
         }
+        settings
     }
 
     fn numbers(&self) -> [(&'static str, &FloatParam); 17] {
@@ -260,7 +283,7 @@ pub fn mend(state: &mut PluginState) {
     let params = ChalumeauParams::default();
     let mut old = std::mem::take(&mut state.params);
     let mut keep = |id: &str, value: ParamValue| state.params.insert(id.to_owned(), value);
-    for (id, param) in params.numbers() {
+    for (id, param) in params.numbers().into_iter().chain(params.knob.numbers()) {
         let value = match old.remove(id) {
             Some(ParamValue::F32(value)) if value.is_finite() => {
                 let (low, high) = (param.preview_plain(0.0), param.preview_plain(1.0));
@@ -270,20 +293,53 @@ pub fn mend(state: &mut PluginState) {
         };
         keep(id, ParamValue::F32(value));
     }
-    for (id, param) in [("reedc", &params.reed.coupled), ("panic", &params.output.panic)] {
+    for (id, param) in params.knob.wholes() {
         let value = match old.remove(id) {
-            Some(ParamValue::Bool(value)) => value,
+            Some(ParamValue::I32(value)) => value.clamp(param.preview_plain(0.0), param.preview_plain(1.0)),
+            _ => param.default_plain_value(),
+        };
+        keep(id, ParamValue::I32(value));
+    }
+    let own = [("reedc", &params.reed.coupled, true), ("panic", &params.output.panic, true)];
+    for (id, param, kept) in own.into_iter().chain(params.knob.switches()) {
+        let value = match old.remove(id) {
+            Some(ParamValue::Bool(value)) if kept => value,
             _ => param.default_plain_value(),
         };
         keep(id, ParamValue::Bool(value));
     }
-    let tuning = match old.remove("tune") {
-        Some(ParamValue::String(value)) if value == "nat" || value == "temp" => value,
-        _ => "nat".to_owned(),
-    };
-    keep("tune", ParamValue::String(tuning));
+    let tunings: (&str, &str, &[&str]) = ("tune", "nat", &["nat", "temp"]);
+    for (id, default, all) in [tunings].into_iter().chain(KnobParams::CHOICES) {
+        let value = match old.remove(id) {
+            Some(ParamValue::String(value)) if all.contains(&value.as_str()) => value,
+            _ => default.to_owned(),
+        };
+        keep(id, ParamValue::String(value));
+    }
+    mend_field(
+        state,
+        "serial",
+        |text: String| {
+            if u64::from_str_radix(&text, 16).is_ok() { text } else { String::new() }
+        },
+    );
+    mend_field(state, "midiport", |text: String| text.chars().take(256).collect());
+    mend_field(state, "take", |text: String| text);
+    mend_field(state, "calibration", Calibration::mended);
     // There is one schema so far; a newer one is read as far as its ids are known here.
     state.fields.insert(SCHEMA_FIELD.to_owned(), SCHEMA.to_string());
+}
+
+/// A field as it may be, or as it is by default.
+fn mend_field<T: Default + Serialize + DeserializeOwned>(
+    state: &mut PluginState,
+    id: &str,
+    mended: impl Fn(T) -> T,
+) {
+    let value = state.fields.get(id).and_then(|text| serde_json::from_str(text).ok());
+    if let Ok(text) = serde_json::to_string(&mended(value.unwrap_or_default())) {
+        state.fields.insert(id.to_owned(), text);
+    }
 }
 
 /// A parameter's value. Hosts hand numbers through 0..=1 and back, which costs the last bit: the default survives.
@@ -362,12 +418,48 @@ mod tests {
         ("noise", "Noise", "30.0 %"),
         ("gain", "Output", "0.0 dB"),
         ("panic", "Output", "Off"),
+        ("knob", "Knob", "Off"),
+        ("arm", "Knob", "Off"),
+        ("ceil", "Knob", "100 mNm"),
+        ("takeov", "Knob", "Off"),
+        ("rest", "Knob", "Off"),
+        ("blow", "Knob", "Off"),
+        ("law", "Knob", "Flow"),
+        ("contr", "Knob", "3.00 x"),
+        ("order", "Knob", "Physical"),
+        ("refnot", "Knob", "72"),
+        ("torque", "Knob", "60 mNm"),
+        ("kdamp", "Knob", "1.00 mNm s"),
+        ("kfric", "Knob", "1.0 mNm"),
+        ("detent", "Knob", "6.0 mNm"),
+        ("curve", "Knob", "1.00"),
+        ("oscprt", "Knob", "8000"),
+        ("oscany", "Knob", "Off"),
+        ("oscfl", "Knob", "0"),
+        ("rec", "Knob", "Off"),
+        ("replay", "Knob", "Off"),
+        ("study", "Knob", "Off"),
+        ("part", "Knob", "1"),
+        ("seed", "Knob", "1"),
+        ("trial", "Knob", "1"),
+        ("side", "Knob", "A"),
+        ("hsrc", "Knob", "Parameter"),
+        ("ksrc", "Knob", "Parameter"),
+        ("kstat", "Knob", "off"),
     ];
 
     fn texts(params: &ChalumeauParams) -> BTreeMap<&'static str, String> {
         let text =
             |param: &FloatParam| param.normalized_value_to_string(param.default_normalized_value(), true);
-        let mut all: BTreeMap<_, _> = params.numbers().map(|(id, param)| (id, text(param))).into();
+        let numbers = params.numbers().into_iter().chain(params.knob.numbers());
+        let mut all: BTreeMap<_, _> = numbers.map(|(id, param)| (id, text(param))).collect();
+        all.extend(params.knob.wholes().map(|(id, param)| (id, param.to_string())));
+        all.extend(params.knob.switches().map(|(id, param, _)| (id, param.to_string())));
+        all.insert("knob", params.knob.kind.to_string());
+        all.insert("law", params.knob.law.to_string());
+        all.insert("order", params.knob.order.to_string());
+        all.insert("hsrc", params.knob.h_source.to_string());
+        all.insert("ksrc", params.knob.k_source.to_string());
         all.insert("reedc", params.reed.coupled.to_string());
         all.insert("panic", params.output.panic.to_string());
         all.insert("tune", params.tuning.tuning.to_string());
@@ -502,8 +594,21 @@ mod tests {
                 ("tune".to_owned(), ParamValue::String("just".to_owned())),
                 ("reedc".to_owned(), ParamValue::Bool(false)),
                 ("gone".to_owned(), ParamValue::I32(3)),
+                ("arm".to_owned(), ParamValue::Bool(true)),
+                ("rec".to_owned(), ParamValue::Bool(true)),
+                ("knob".to_owned(), ParamValue::String("osc".to_owned())),
+                ("law".to_owned(), ParamValue::String("strong".to_owned())),
+                ("trial".to_owned(), ParamValue::I32(99)),
+                ("ceil".to_owned(), ParamValue::F32(9e9)),
             ]),
-            fields: BTreeMap::from([("schema".to_owned(), "rubbish".to_owned())]),
+            fields: BTreeMap::from([
+                ("schema".to_owned(), "rubbish".to_owned()),
+                ("serial".to_owned(), "\"/dev/ttyUSB0\"".to_owned()),
+                (
+                    "calibration".to_owned(),
+                    "{\"rest_deg\":1e99,\"travel_deg\":1.0,\"dead_deg\":[1,5]}".to_owned(),
+                ),
+            ]),
         };
         mend(&mut state);
         assert_eq!(state.params.len(), TABLE.len());
@@ -513,5 +618,17 @@ mod tests {
         assert!(matches!(state.params["reedc"], ParamValue::Bool(false)));
         assert!(matches!(&state.params["tune"], ParamValue::String(id) if id == "nat"));
         assert_eq!(state.fields["schema"], SCHEMA.to_string());
+        for id in ["arm", "rec"] {
+            assert!(
+                matches!(state.params[id], ParamValue::Bool(false)),
+                "{id} is never on in a loaded state"
+            );
+        }
+        assert!(matches!(&state.params["knob"], ParamValue::String(id) if id == "osc"));
+        assert!(matches!(&state.params["law"], ParamValue::String(id) if id == "flow"));
+        assert!(matches!(state.params["trial"], ParamValue::I32(16)));
+        assert!(matches!(state.params["ceil"], ParamValue::F32(250.0)));
+        assert_eq!(state.fields["serial"], "\"\"", "a path is no serial number");
+        assert!(state.fields["calibration"].contains("120.0"), "{}", state.fields["calibration"]);
     }
 }

@@ -11,7 +11,7 @@ const PACKAGE: &str = "chalumeau";
 /// `cargo xtask bundle [cargo build options]`; release unless a profile is named.
 pub fn run(args: &[String]) -> Result<()> {
     let mut options: Vec<String> =
-        ["--lib", "--no-default-features", "--features", "plugin"].map(String::from).into();
+        ["--lib", "--no-default-features", "--features", "plugin,devices"].map(String::from).into();
     if !args.iter().any(|arg| arg == "--release" || arg.starts_with("--profile")) {
         options.push("--profile=plugin".to_owned());
     }

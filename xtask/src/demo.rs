@@ -14,8 +14,8 @@ use chalumeau::render;
 use chalumeau::render::score::Score;
 use chalumeau::units::{SoundingNote, cents};
 
-use crate::host::Plugin;
-use crate::{bundle, machine, midi, picture};
+use crate::host::{At, Plugin};
+use crate::{bundle, machine, midi, picture, simulator, touch_demo};
 
 const RATE: u32 = 48_000;
 const BLOCK: usize = 512;
@@ -36,9 +36,14 @@ pub struct Sounding {
 
 /// `cargo xtask demo`.
 pub fn run(_: &[String]) -> Result<()> {
-    machine::provide(&[&machine::CC])?;
-    println!("building the plugin");
+    machine::provide(if cfg!(target_os = "linux") {
+        &[&machine::CC, &machine::CXX, &machine::PKG_CONFIG, &machine::ALSA]
+    } else {
+        &[&machine::CC, &machine::CXX]
+    })?;
+    println!("building the plugin and the simulated knob");
     bundle::run(&[])?;
+    simulator::build()?;
 
     let file = machine::root().join("examples/melody.mid");
     let bytes = std::fs::read(&file).with_context(|| format!("cannot read {}", file.display()))?;
@@ -68,8 +73,21 @@ pub fn run(_: &[String]) -> Result<()> {
     picture::write(&png, &samples, f64::from(RATE), &notes, &score, A4_HZ)?;
 
     println!("sound    {}\npicture  {}\n", shown(&wav), shown(&png));
+    by_knob(&clap, &folder, &score, &said)?;
     println!("To play it in a DAW, copy the bundles from {}:", shown(&machine::target().join("bundled")));
     println!("{}", bundle::HOMES);
+    Ok(())
+}
+
+/// The same melody once more, its breath from a hand on the simulated knob.
+fn by_knob(clap: &Path, folder: &Path, score: &Score, said: &[At]) -> Result<()> {
+    println!("playing it again, {:.0} s, blown by a simulated hand on a simulated knob", score.seconds(RATE));
+    let performance = touch_demo::play(clap, folder, score, said, RATE)?;
+    let (wav, png) = (folder.join("touch.wav"), folder.join("touch.png"));
+    write_wav(&wav, &performance.left, &performance.left)?;
+    println!("\n{}", table(&to_f64(&performance.left), &soundings(score)));
+    picture::write_touch(&png, &performance, f64::from(RATE))?;
+    println!("sound    {}\npicture  {}\n", shown(&wav), shown(&png));
     Ok(())
 }
 
@@ -108,7 +126,7 @@ pub fn soundings(score: &Score) -> Vec<Sounding> {
             }
             Event::NoteOff { note } => held.retain(|&other| other != note),
             Event::Panic => held.clear(),
-            Event::Breath(_) | Event::Bend { .. } | Event::TongueSlap { .. } => continue,
+            Event::Breath(_) | Event::Bend { .. } | Event::Reed { .. } | Event::TongueSlap { .. } => continue,
         }
         let next = held.last().copied();
         if next == now.map(|(note, _)| note) && !matches!(event.event, Event::NoteOn { .. }) {

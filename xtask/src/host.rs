@@ -2,15 +2,18 @@
 
 use std::ffi::CString;
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow, bail};
 use clack_extensions::latency::PluginLatency;
 use clack_extensions::params::{ParamInfoBuffer, PluginParams};
+use clack_extensions::render::{PluginRender, RenderMode};
 use clack_extensions::state::{HostState, HostStateImpl, PluginState};
 pub use clack_host::events::event_types::NoteExpressionType;
 use clack_host::events::event_types::{
     MidiEvent, NoteExpressionEvent, NoteOffEvent, NoteOnEvent, ParamValueEvent,
 };
+use clack_host::events::spaces::CoreEventSpace;
 use clack_host::prelude::*;
 
 /// Something said to the plugin at a sample position, counted from the start of playing.
@@ -106,6 +109,23 @@ impl Plugin {
         Ok((text(first.id()), text(first.name())))
     }
 
+    /// Activates the plugin for blocks of up to `block` samples; [`deactivate`](Self::deactivate) takes the session back.
+    pub fn activate(&mut self, rate_hz: f64, block: usize) -> Result<Session> {
+        let frames = u32::try_from(block)?;
+        let config =
+            PluginAudioConfiguration { sample_rate: rate_hz, min_frames_count: 1, max_frames_count: frames };
+        let stopped = self.instance.activate(|_, _| (), config)?;
+        match stopped.start_processing() {
+            Ok(processor) => Ok(Session { processor, block, answers: Vec::new(), played: 0 }),
+            Err(_) => bail!("the plugin does not start at {rate_hz} Hz"),
+        }
+    }
+
+    /// Ends a session.
+    pub fn deactivate(&mut self, session: Session) {
+        self.instance.deactivate(session.processor.stop_processing());
+    }
+
     /// Activates the plugin for blocks of up to `block` samples, lets `body` play, and deactivates it.
     pub fn session<R>(
         &mut self,
@@ -113,17 +133,9 @@ impl Plugin {
         block: usize,
         body: impl FnOnce(&mut Session) -> R,
     ) -> Result<R> {
-        let frames = u32::try_from(block)?;
-        let config =
-            PluginAudioConfiguration { sample_rate: rate_hz, min_frames_count: 1, max_frames_count: frames };
-        let stopped = self.instance.activate(|_, _| (), config)?;
-        let processor = match stopped.start_processing() {
-            Ok(processor) => processor,
-            Err(_) => bail!("the plugin does not start at {rate_hz} Hz"),
-        };
-        let mut session = Session { processor, block };
+        let mut session = self.activate(rate_hz, block)?;
         let result = body(&mut session);
-        self.instance.deactivate(session.processor.stop_processing());
+        self.deactivate(session);
         Ok(result)
     }
 
@@ -208,6 +220,13 @@ impl Plugin {
         Ok(state.load(&handle, &mut bytes)?)
     }
 
+    /// Tells the plugin whether it plays for somebody or for a file. The plugin must not be active.
+    pub fn set_offline(&mut self, offline: bool) -> Result<()> {
+        let handle = self.instance.plugin_handle();
+        let render: PluginRender = handle.get_extension().context("no render extension")?;
+        Ok(render.set(&handle, if offline { RenderMode::Offline } else { RenderMode::Realtime })?)
+    }
+
     pub fn latency(&mut self) -> Result<u32> {
         let handle = self.instance.plugin_handle();
         let latency: PluginLatency = handle.get_extension().context("no latency")?;
@@ -219,17 +238,50 @@ impl Plugin {
 pub struct Session {
     processor: StartedPluginAudioProcessor<Host>,
     block: usize,
+    /// MIDI the plugin has sent, with the sample it belongs to since activation.
+    answers: Vec<(usize, [u8; 3])>,
+    played: usize,
 }
 
 impl Session {
     /// Plays on from where the last call ended; positions count from there.
     pub fn play(&mut self, said: &[At], samples: usize) -> Result<Stereo> {
+        self.play_blocks(said, samples, |_| ())
+    }
+
+    /// The same at the pace of a sound card of `rate_hz`: a device at the other end has its time.
+    pub fn play_live(&mut self, said: &[At], samples: usize, rate_hz: f64) -> Result<Stereo> {
+        let began = Instant::now();
+        self.play_blocks(said, samples, |start| {
+            let due = began + Duration::from_secs_f64(start as f64 / rate_hz);
+            std::thread::sleep(due.saturating_duration_since(Instant::now()));
+        })
+    }
+
+    /// Samples played since activation.
+    pub fn played(&self) -> usize {
+        self.played
+    }
+
+    /// What the plugin has sent since activation.
+    pub fn answers(&self) -> &[(usize, [u8; 3])] {
+        &self.answers
+    }
+
+    /// Plays, calling `before` with the position of each block.
+    pub fn play_blocks(
+        &mut self,
+        said: &[At],
+        samples: usize,
+        mut before: impl FnMut(usize),
+    ) -> Result<Stereo> {
         let mut heard = [vec![0.0; samples], vec![0.0; samples]];
         let mut said = said.iter().peekable();
         let mut ports = AudioPorts::with_capacity(2, 1);
         let mut no_ports = AudioPorts::with_capacity(0, 0);
         for start in (0..samples).step_by(self.block) {
             let end = samples.min(start + self.block);
+            before(start);
             let mut events = EventBuffer::new();
             while let Some(At(at, say)) = said.next_if(|At(at, _)| *at < end) {
                 push(&mut events, u32::try_from(at.saturating_sub(start))?, *say);
@@ -250,10 +302,17 @@ impl Session {
                 &mut out,
                 &InputEvents::from_buffer(&events),
                 &mut OutputEvents::from_buffer(&mut answered),
-                Some(start as u64),
+                Some((self.played + start) as u64),
                 None,
             )?;
+            for event in &answered {
+                if let Some(CoreEventSpace::Midi(midi)) = event.as_core_event() {
+                    let at = event.header().time() as usize;
+                    self.answers.push((self.played + start + at, midi.data()));
+                }
+            }
         }
+        self.played += samples;
         Ok(heard)
     }
 

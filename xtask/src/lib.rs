@@ -9,6 +9,8 @@ pub mod host;
 pub mod machine;
 pub mod midi;
 pub mod picture;
+pub mod simulator;
+pub mod touch_demo;
 pub mod wire_vectors;
 
 /// One chore.

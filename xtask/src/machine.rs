@@ -94,17 +94,14 @@ pub const GL: Package =
 /// For DawDreamer.
 pub const GLIB: Package =
     Package { name: "libglib2.0-0", present: || loads("libglib-2.0.so.0"), purpose: "the DawDreamer tests" };
-/// For `chalumeau-standalone`.
-pub const PKG_CONFIG: Package = Package {
-    name: "pkg-config",
-    present: || works("pkg-config", &["--version"]),
-    purpose: "finding ALSA for chalumeau-standalone",
-};
-/// For `chalumeau-standalone`.
+/// For MIDI devices and `chalumeau-standalone`.
+pub const PKG_CONFIG: Package =
+    Package { name: "pkg-config", present: || works("pkg-config", &["--version"]), purpose: "finding ALSA" };
+/// For MIDI devices and `chalumeau-standalone`.
 pub const ALSA: Package = Package {
     name: "libasound2-dev",
     present: || works("pkg-config", &["--exists", "alsa"]) || !cfg!(target_os = "linux"),
-    purpose: "sound and MIDI in chalumeau-standalone",
+    purpose: "MIDI devices, and sound in chalumeau-standalone",
 };
 
 /// For `chalumeau-standalone`: its JACK binding asks pkg-config although it loads the library at run time.

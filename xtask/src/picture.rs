@@ -11,9 +11,11 @@ use chalumeau::units::SoundingNote;
 use plotters::prelude::*;
 
 use crate::demo::Sounding;
+use crate::touch_demo::Performance;
 
 const WIDTH: u32 = 1600;
 const HEIGHT: u32 = 1150;
+const TOUCH_HEIGHT: u32 = 1400;
 const HIGHEST_HZ: f64 = 6_000.0;
 /// Samples of a spectrogram column, 85 ms at 48 kHz: harmonics of the lowest note stand apart.
 const COLUMN: usize = 4096;
@@ -36,8 +38,7 @@ pub fn write(
     score: &Score,
     a4_hz: f64,
 ) -> Result<()> {
-    plotters::style::register_font("sans-serif", FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
-        .map_err(|_| anyhow!("the embedded font cannot be read"))?;
+    register_font()?;
     let root = BitMapBackend::new(path, (WIDTH, HEIGHT)).into_drawing_area();
     root.fill(&WHITE)?;
     let (upper, rest) = root.split_vertically(480);
@@ -135,6 +136,76 @@ fn breath(area: &Area<'_>, samples: &[f64], rate_hz: f64, seconds: f64, score: &
     steps.push((seconds, now));
     chart.draw_series(LineSeries::new(steps, BREATH.stroke_width(2)))?;
     Ok(())
+}
+
+/// Draws what a hand did on the knob, and what came of it: angle, mouth pressure, torque, sound.
+pub fn write_touch(path: &Path, performance: &Performance, rate_hz: f64) -> Result<()> {
+    register_font()?;
+    let root = BitMapBackend::new(path, (WIDTH, TOUCH_HEIGHT)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let areas = root.split_evenly((4, 1));
+    let seconds = performance.left.len() as f64 / rate_hz;
+    let within = |t: f64| (0.0..=seconds).contains(&t);
+    // A threshold holds from its note to the next.
+    let threshold = |which: usize| {
+        let mut line = Vec::new();
+        for (index, row) in performance.threshold.iter().enumerate() {
+            let until = performance.threshold.get(index + 1).map_or(seconds, |next| next[0]);
+            line.extend([(row[0], row[which]), (until, row[which])]);
+        }
+        line
+    };
+    let knob = |which: usize| {
+        let rows = performance.knob.iter().filter(|row| within(row[0]));
+        rows.map(|row| (row[0], row[which])).collect::<Vec<_>>()
+    };
+    let mut held: Vec<(f64, f64)> = Vec::new();
+    for &[t, gamma] in performance.gamma.iter().filter(|row| within(row[0])) {
+        let before = held.last().map_or(0.0, |&(_, gamma)| gamma);
+        held.extend([(t, before), (t, gamma)]);
+    }
+    let panels = [
+        (
+            "Angle of the knob (blue) and threshold of each note (red)",
+            "angle, degrees",
+            knob(1),
+            threshold(1),
+        ),
+        ("Mouth pressure over closing pressure (blue) and threshold (red)", "gamma", held, threshold(2)),
+        ("Torque of the motor, against the hand", "torque, mNm", knob(2), Vec::new()),
+    ];
+    for (area, (title, y, line, marks)) in areas.iter().zip(panels) {
+        let values = || line.iter().chain(&marks).map(|&(_, y)| y);
+        let (low, high) = (values().fold(0.0, f64::min), values().fold(1e-3, f64::max));
+        let room = 0.06 * (high - low);
+        let mut chart = frame(area, title).build_cartesian_2d(0.0..seconds, low - room..high + room)?;
+        mesh(
+            &mut chart,
+            y,
+            6,
+            &|value: &f64| if y == "gamma" { format!("{value:.1}") } else { format!("{value:.0}") },
+            true,
+        )?;
+        chart.draw_series(LineSeries::new(marks, PITCH.stroke_width(2)))?;
+        chart.draw_series(LineSeries::new(line, BREATH.stroke_width(2)))?;
+    }
+    let samples: Vec<f64> = performance.left.iter().map(|&x| f64::from(x)).collect();
+    let mut chart =
+        frame(&areas[3], "Sound: peak of each 10 ms").build_cartesian_2d(0.0..seconds, -0.0..1.0)?;
+    let chunk = (0.01 * rate_hz) as usize;
+    let peaks: Vec<f64> =
+        samples.chunks(chunk).map(|chunk| chunk.iter().fold(0.0, |peak: f64, x| peak.max(x.abs()))).collect();
+    let loudest = peaks.iter().copied().fold(1e-9, f64::max);
+    mesh(&mut chart, "of the loudest", 5, &|unit: &f64| format!("{unit:.1}"), true)?;
+    let curve = peaks.iter().enumerate().map(|(index, peak)| (0.01 * index as f64, peak / loudest));
+    chart.draw_series(AreaSeries::new(curve, 0.0, RGBColor(150, 155, 165).filled()))?;
+    root.present()?;
+    Ok(())
+}
+
+fn register_font() -> Result<()> {
+    plotters::style::register_font("sans-serif", FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT)
+        .map_err(|_| anyhow!("the embedded font cannot be read"))
 }
 
 fn frame<'a, 'b>(area: &'a Area<'b>, title: &str) -> ChartBuilder<'a, 'b, BitMapBackend<'b>> {

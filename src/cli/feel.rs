@@ -1,0 +1,87 @@
+//! How a knob shall feel, as arguments.
+
+use crate::bore::instrument_file::InstrumentFile;
+use crate::cli::Failure;
+use crate::cli::args::{check_fingering, note, within};
+use crate::haptics::{FeelDesign, Order};
+use crate::units::WrittenNote;
+use crate::wire::message::Law;
+use clap::{Args, ValueEnum};
+
+/// Torque laws by name.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum LawArg {
+    /// Rises to the threshold, falls to nothing where the reed shuts
+    Flow,
+    /// A spring with a step at the threshold: easy to hold
+    Pressure,
+}
+
+/// Orders by name.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum OrderArg {
+    /// By the pressure the bore asks
+    Physical,
+    /// The longer the closed tube, the harder
+    CoveredHoles,
+    /// The longer the closed tube, the easier
+    CoveredHolesReversed,
+}
+
+/// What of the feel a user chooses.
+#[derive(Args)]
+#[command(next_help_heading = "Feel of the knob")]
+pub struct FeelArgs {
+    /// Torque law
+    #[arg(long, value_enum, default_value_t = LawArg::Flow)]
+    law: LawArg,
+    /// Exaggeration of the differences between notes, 1 (physical) ..5
+    #[arg(long, value_name = "X", default_value = "3", value_parser = |s: &str| within(s, 1.0, 5.0))]
+    contrast: f64,
+    /// Which note feels harder
+    #[arg(long, value_enum, default_value_t = OrderArg::Physical)]
+    order: OrderArg,
+    /// Written note that exaggeration leaves alone [default: C5 or, without one, the middle of the chart]
+    #[arg(long, value_name = "NOTE", value_parser = note)]
+    reference: Option<u8>,
+    /// Torque per unit of flow (flow) or at closure (pressure) on the reference note, mNm, 0..450
+    #[arg(long, value_name = "MNM", default_value = "60", value_parser = |s: &str| within(s, 0.0, 450.0))]
+    scale: f64,
+    /// Angle at which the reference reed closes on the reference note, degrees, 120..1080
+    #[arg(long, value_name = "DEG", default_value = "360", value_parser = |s: &str| within(s, 120.0, 1_080.0))]
+    travel: f64,
+    /// Mark at the threshold, mNm, 0..100 [default: none under flow, 6 under pressure]
+    #[arg(long, value_name = "MNM", value_parser = |s: &str| within(s, 0.0, 100.0))]
+    detent: Option<f64>,
+}
+
+impl FeelArgs {
+    /// The feel these arguments describe, on this instrument.
+    pub fn design(&self, file: &InstrumentFile) -> Result<FeelDesign, Failure> {
+        if let Some(reference) = self.reference {
+            check_fingering(file, WrittenNote(reference))?;
+        }
+        Ok(FeelDesign {
+            law: match self.law {
+                LawArg::Flow => Law::Flow,
+                LawArg::Pressure => Law::Pressure,
+            },
+            reference: self.reference.map(WrittenNote),
+            contrast: self.contrast,
+            order: match self.order {
+                OrderArg::Physical => Order::Physical,
+                OrderArg::CoveredHoles => Order::CoveredHoles,
+                OrderArg::CoveredHolesReversed => Order::CoveredHolesReversed,
+            },
+            strength_mnm: self.scale,
+            travel_deg: self.travel,
+            detent_mnm: self.detent,
+            ..FeelDesign::default()
+        })
+    }
+
+    /// How much the differences between notes are exaggerated.
+    pub fn contrast(&self) -> f64 {
+        self.contrast
+    }
+}

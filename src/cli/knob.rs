@@ -1,0 +1,223 @@
+//! `chalumeau knob`: a knob in the hand without a DAW: watch it, feel a note on it, record a take.
+
+use crate::cli::Failure;
+use crate::cli::args::{InstrumentArg, check_fingering, note, within};
+use crate::cli::feel::FeelArgs;
+use crate::device::{Choice, Hooks, KnobLink, LinkStatus, OFFERED_CEILING_MNM, Phase, StateSample};
+use crate::haptics::{Limits, NoteFeel};
+use crate::instrument::Settings;
+use crate::output::OutputError;
+use crate::touch::feel::Feels;
+use crate::touch::take::{Marks, Moment, TakeWriter};
+use crate::units::{Air, WrittenNote};
+use clap::{ArgGroup, Args};
+use std::io::{IsTerminal, Write};
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+/// How often the line on the screen is written anew.
+const SHOWN_EVERY: Duration = Duration::from_millis(100);
+/// How long to look for a knob before giving up.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+const EXAMPLES: &str = "\
+Examples:
+  chalumeau knob
+      Finds a knob behind a known serial board, real or simulated, and shows angle, gamma and torque.
+  chalumeau knob --written E3 --arm 60
+      The resistance of the lowest note, with at most 60 mNm. Ctrl-C lets go at once.
+  chalumeau knob --written E3 --law pressure --arm 60
+  chalumeau knob --osc 8000
+      A TorqueTuner with its stock firmware.
+  chalumeau knob --seconds 20 --record take.csv
+  chalumeau render melody.mid --replay take.csv --out again.wav";
+
+/// Watch a knob, feel a note on it, record a take
+///
+/// Torque is only made with --arm, never more than it says, and never when the knob's own limits say less; it ends with the
+/// program, whatever ends it. Without --arm the knob turns freely and is read only.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+#[command(group = ArgGroup::new("which").args(["serial", "path", "midi", "osc"]))]
+pub struct Knob {
+    /// The knob with this serial number (hexadecimal) [default: the first that answers]
+    #[arg(long, value_name = "HEX", value_parser = |s: &str| crate::device::serial_number(s).ok_or("must be a serial number such as 5100000000000001"))]
+    serial: Option<u64>,
+    /// Whatever is at this port
+    #[arg(long, value_name = "PORT")]
+    path: Option<PathBuf>,
+    /// A knob at a MIDI port whose name contains this
+    #[arg(long, value_name = "NAME", num_args = 0..=1, default_missing_value = "")]
+    midi: Option<String>,
+    /// Stock firmware sending OSC to this UDP port
+    #[arg(long, value_name = "PORT")]
+    osc: Option<u16>,
+    /// Take OSC from other machines too
+    #[arg(long, requires = "osc")]
+    network: bool,
+    /// Written note whose resistance is felt
+    #[arg(long, value_name = "NOTE", default_value = "C5", value_parser = note)]
+    written: u8,
+    /// Let the knob make torque, at most so many mNm (10..250)
+    #[arg(long, value_name = "MNM", value_parser = |s: &str| within(s, 10.0, f64::from(OFFERED_CEILING_MNM)))]
+    arm: Option<f64>,
+    /// What the position now is called, before anything else: zero
+    #[arg(long)]
+    zero: bool,
+    /// Ends after this time, s
+    #[arg(long, value_name = "S", value_parser = |s: &str| within(s, 0.1, 86_400.0))]
+    seconds: Option<f64>,
+    /// Write the take to this CSV file when done
+    #[arg(long, value_name = "FILE", requires = "seconds")]
+    record: Option<PathBuf>,
+    /// Replace an existing file
+    #[arg(long)]
+    force: bool,
+    #[command(flatten)]
+    instrument: InstrumentArg,
+    #[command(flatten)]
+    feel: FeelArgs,
+}
+
+impl Knob {
+    pub fn run(&self) -> Result<(), Failure> {
+        let file = self.instrument.load()?;
+        let written = WrittenNote(self.written);
+        check_fingering(&file, written)?;
+        let feels = Feels::new(&file, Air::default());
+        let ceiling_mnm = self.arm.unwrap_or(100.0);
+        let limits = Limits { ceiling_mnm, ..Limits::default() };
+        let settings = Settings::default();
+        let table = feels.table(&settings, &self.feel.design(&file)?, &limits)?;
+        let note = table.notes().iter().find(|note| note.written == written).copied();
+        let note = note.unwrap_or(*table.reference());
+        let take = match &self.record {
+            Some(path) => {
+                let remarks =
+                    [format!("written {} of {}, {:?}", written.0, file.name, self.feel.design(&file)?)];
+                Some(TakeWriter::create(path, self.force, &remarks)?)
+            }
+            None => None,
+        };
+
+        let (rows, heard) = channel();
+        let hooks = Hooks {
+            feel: Box::new(move || Some(note.feel)),
+            on_state: Box::new(move |state: &StateSample| {
+                let _ = rows.send(*state);
+            }),
+        };
+        let (link, _reader) = KnobLink::spawn("chalumeau knob", hooks);
+        link.choose(self.choice());
+        self.watch(&link, &heard, &note, settings.closing_pa(), take)
+    }
+
+    fn choice(&self) -> Choice {
+        if let Some(path) = &self.path {
+            return Choice::Path(path.clone());
+        }
+        if let Some(name) = &self.midi {
+            return Choice::Midi { name: (!name.is_empty()).then(|| name.clone()) };
+        }
+        match self.osc {
+            Some(port) => Choice::Osc { port, any_address: self.network },
+            None => Choice::Serial { serial: self.serial },
+        }
+    }
+
+    fn watch(
+        &self,
+        link: &KnobLink,
+        heard: &Receiver<StateSample>,
+        note: &NoteFeel,
+        closing_pa: f64,
+        mut take: Option<TakeWriter>,
+    ) -> Result<(), Failure> {
+        let began = Instant::now();
+        let mut live_since = None;
+        let mut shown = Instant::now();
+        let mut said = String::new();
+        loop {
+            std::thread::sleep(Duration::from_millis(5));
+            let status = link.status();
+            let live = matches!(status.phase, Phase::Live | Phase::ReadOnly);
+            if live && live_since.is_none() {
+                live_since = Some(Instant::now());
+                if self.zero {
+                    link.zero();
+                }
+                if let Some(mnm) = self.arm {
+                    link.arm(mnm.round() as u16);
+                }
+            }
+            if live_since.is_none() && began.elapsed() > PATIENCE {
+                return Err(Failure::Usage(format!(
+                    "no knob after {} s: {}",
+                    PATIENCE.as_secs(),
+                    status.text
+                )));
+            }
+            for state in heard.try_iter() {
+                let gamma = note.map.pressure_pa(f64::from(state.angle_deg)) / closing_pa;
+                if let (Some(take), true) = (&mut take, live_since.is_some()) {
+                    write(take, &state, note, gamma)?;
+                }
+            }
+            if shown.elapsed() >= SHOWN_EVERY {
+                shown = Instant::now();
+                show(&status, note, closing_pa, &mut said);
+            }
+            if let (Some(limit), Some(since)) = (self.seconds, live_since)
+                && since.elapsed().as_secs_f64() >= limit
+            {
+                break;
+            }
+        }
+        if std::io::stderr().is_terminal() {
+            eprintln!();
+        }
+        if let Some(take) = take {
+            take.keep()?;
+        }
+        Ok(())
+    }
+}
+
+fn write(take: &mut TakeWriter, state: &StateSample, note: &NoteFeel, gamma: f64) -> Result<(), OutputError> {
+    let moment = Moment {
+        t_us: u64::try_from(state.host_us).unwrap_or(0),
+        angle_deg: f64::from(state.angle_deg),
+        velocity_deg_s: f64::from(state.velocity_deg_s),
+        torque_mnm: f64::from(state.torque_mnm),
+        written: Some(note.written.0),
+        gamma,
+        feel_id: state.feel_id,
+    };
+    let reed = Some((f64::from(note.feel.h), f64::from(note.feel.k)));
+    take.write(&moment, &Marks { reed, study: None })
+        .map_err(|source| OutputError::Write { path: take.path().to_owned(), source })
+}
+
+/// On a terminal one line that changes; elsewhere a line for each change of the link.
+fn show(status: &LinkStatus, note: &NoteFeel, closing_pa: f64, said: &mut String) {
+    let mut words = status.text.clone();
+    for more in [&status.last_refusal, &status.notice].into_iter().flatten() {
+        words = format!("{words}; {more}");
+    }
+    if words != *said {
+        let fresh = if std::io::stderr().is_terminal() { "\r\x1b[K" } else { "" };
+        eprintln!("{fresh}{words}");
+        *said = words;
+    }
+    if let (Some(angle), true) = (status.angle_deg, std::io::stderr().is_terminal()) {
+        let angle = f64::from(angle);
+        let gamma = note.map.pressure_pa(angle) / closing_pa;
+        let armed = if status.armed { "armed" } else { "not armed" };
+        eprint!(
+            "\r\x1b[K{angle:8.1} degrees   gamma {gamma:.3}   threshold at {:.1}   {armed}",
+            note.landmarks.a_on_deg
+        );
+        let _ = std::io::stderr().flush();
+    }
+}

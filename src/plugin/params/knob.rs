@@ -1,0 +1,366 @@
+//! Parameters of the knob: which one, what it shall feel like, takes and studies.
+//!
+//! None of them can be automated except those that are heard: what moves a motor is the user's to move. Switches that
+//! act (*Arm*, *Take over*, *Rest here*, *Blow hard here*, *Record take*) are never on in a state that is loaded.
+
+use std::sync::{Arc, RwLock};
+
+use nice_plug::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::{either, number};
+use crate::control::knob::KnobDesign;
+use crate::touch::study::{Side, TRIALS, Trial, plan};
+
+/// Most torque a session starts with, mNm; and the most *Arm* can be given (`docs/protocol.md`, safety).
+pub const CEILING_MNM: (f32, f32) = (100.0, 250.0);
+
+/// Which kind of device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Enum)]
+pub enum KnobKind {
+    /// None.
+    #[id = "off"]
+    Off,
+    /// TTLink over a serial port, real or simulated.
+    #[id = "serial"]
+    #[name = "Serial"]
+    Serial,
+    /// TTLink over the device's own MIDI port.
+    #[id = "midi"]
+    #[name = "MIDI port"]
+    Midi,
+    /// What unmodified firmware sends.
+    #[id = "osc"]
+    #[name = "OSC (stock firmware)"]
+    Osc,
+}
+
+/// Torque law.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Enum)]
+pub enum LawChoice {
+    /// The seed's flow.
+    #[id = "flow"]
+    Flow,
+    /// A spring with a step at the threshold.
+    #[id = "press"]
+    Pressure,
+    /// None.
+    #[id = "free"]
+    Free,
+}
+
+/// What makes one note harder than another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Enum)]
+pub enum OrderChoice {
+    /// What the bore asks.
+    #[id = "phys"]
+    #[name = "Physical"]
+    Physical,
+    /// The more holes are covered, the harder.
+    #[id = "cover"]
+    #[name = "Covered holes"]
+    CoveredHoles,
+    /// The more holes are covered, the easier.
+    #[id = "open"]
+    #[name = "Open holes"]
+    OpenHoles,
+}
+
+/// What drives H or k, in sound and in the hand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Enum)]
+pub enum ReedSource {
+    /// The parameter alone.
+    #[id = "param"]
+    #[name = "Parameter"]
+    Parameter,
+    /// CC1.
+    #[id = "cc1"]
+    #[name = "CC1 (wheel)"]
+    Wheel,
+    /// CC16.
+    #[id = "cc16"]
+    #[name = "CC16"]
+    Cc16,
+    /// CC17.
+    #[id = "cc17"]
+    #[name = "CC17"]
+    Cc17,
+    /// CC74, the y of a Linnstrument.
+    #[id = "cc74"]
+    #[name = "CC74 (MPE y)"]
+    Slide,
+    /// Channel or key pressure, the z of a Linnstrument. It then no longer blows.
+    #[id = "press"]
+    #[name = "Pressure (MPE z)"]
+    Pressure,
+}
+
+/// Where the hand rests and how far it turns, as a state keeps it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Calibration {
+    /// Angle of the knob at rest, degrees.
+    pub rest_deg: f64,
+    /// Angle from rest that is a full blow: the reference reed's closure on the reference note, degrees.
+    pub travel_deg: f64,
+    /// How far from rest breath begins, degrees, and ends.
+    pub dead_deg: (f64, f64),
+}
+
+impl Calibration {
+    /// What a hand can turn comfortably, degrees.
+    pub const TRAVEL_DEG: (f64, f64) = (120.0, 1_080.0);
+
+    /// The same inside its ranges.
+    pub fn mended(self) -> Self {
+        let fix = |x: f64, low: f64, high: f64, default: f64| {
+            if x.is_finite() { x.clamp(low, high) } else { default }
+        };
+        let d = Self::default();
+        let dead_on = fix(self.dead_deg.0, 0.1, 30.0, d.dead_deg.0);
+        Self {
+            rest_deg: fix(self.rest_deg, -36_000.0, 36_000.0, 0.0),
+            travel_deg: fix(self.travel_deg, Self::TRAVEL_DEG.0, Self::TRAVEL_DEG.1, d.travel_deg),
+            dead_deg: (dead_on, fix(self.dead_deg.1, 0.0, 0.9 * dead_on, 0.5 * dead_on)),
+        }
+    }
+
+    /// As the knob's breath wants it.
+    pub fn design(self, curve: f64) -> KnobDesign {
+        let Self { rest_deg, travel_deg, dead_deg: (dead_on_deg, dead_off_deg) } = self.mended();
+        KnobDesign { zero_deg: rest_deg, full_deg: rest_deg + travel_deg, curve, dead_on_deg, dead_off_deg }
+    }
+
+    /// What a design says, the other way round.
+    pub fn of(design: &KnobDesign) -> Self {
+        Self {
+            rest_deg: design.zero_deg,
+            travel_deg: design.full_deg - design.zero_deg,
+            dead_deg: (design.dead_on_deg, design.dead_off_deg),
+        }
+        .mended()
+    }
+}
+
+impl Default for Calibration {
+    fn default() -> Self {
+        let design = KnobDesign::default();
+        Self { rest_deg: 0.0, travel_deg: 360.0, dead_deg: (design.dead_on_deg, design.dead_off_deg) }
+    }
+}
+
+/// Which knob, what it feels like, takes and studies.
+#[derive(Params)]
+pub struct KnobParams {
+    /// Serial number of the device last used, hexadecimal, empty for none: never a path, which changes with the socket.
+    #[persist = "serial"]
+    pub serial: RwLock<String>,
+    /// Name of the MIDI port last used, empty for the first that looks like a knob.
+    #[persist = "midiport"]
+    pub midi_port: RwLock<String>,
+    /// Rest and full blow.
+    #[persist = "calibration"]
+    pub calibration: RwLock<Calibration>,
+    /// The take last recorded, or put here by the user's project: a file's path, empty for none.
+    #[persist = "take"]
+    pub take: RwLock<String>,
+    /// Which kind of device. Default off.
+    #[id = "knob"]
+    pub kind: EnumParam<KnobKind>,
+    /// Lets the knob make torque. Off in every state that is loaded, and after anything that disarms the knob it must
+    /// be switched off and on again.
+    #[id = "arm"]
+    pub arm: BoolParam,
+    /// Most torque the user allows, mNm, 10..=250. Default 100.
+    #[id = "ceil"]
+    pub ceiling: FloatParam,
+    /// Takes the knob from the instance that has it.
+    #[id = "takeov"]
+    pub take_over: BoolParam,
+    /// The knob is at rest where it stands.
+    #[id = "rest"]
+    pub rest: BoolParam,
+    /// The knob stands where a full blow shall be.
+    #[id = "blow"]
+    pub blow: BoolParam,
+    /// Torque law. Default flow.
+    #[id = "law"]
+    pub law: EnumParam<LawChoice>,
+    /// Exaggeration of the differences between notes: 1 is physical. Default 3.
+    #[id = "contr"]
+    pub contrast: FloatParam,
+    /// What makes a note harder. Default physical.
+    #[id = "order"]
+    pub order: EnumParam<OrderChoice>,
+    /// Written note that is felt as it is at every contrast, MIDI number.
+    #[id = "refnot"]
+    pub reference: IntParam,
+    /// Torque of the reference note per unit of flow, mNm. Default 60.
+    #[id = "torque"]
+    pub torque: FloatParam,
+    /// Damping beside the knob's own, mNm s/rad.
+    #[id = "kdamp"]
+    pub damping: FloatParam,
+    /// Friction, mNm.
+    #[id = "kfric"]
+    pub friction: FloatParam,
+    /// Height of the step at the threshold, mNm; pressure law only, the flow law has its peak there. Default 6.
+    #[id = "detent"]
+    pub detent: FloatParam,
+    /// Exponent of the way from rest to full blow, on knobs that do not feel. Default 1.
+    #[id = "curve"]
+    pub curve: FloatParam,
+    /// UDP port for OSC.
+    #[id = "oscprt"]
+    pub osc_port: IntParam,
+    /// Whether OSC may come from other machines.
+    #[id = "oscany"]
+    pub osc_any: BoolParam,
+    /// UDP port on this machine that the feel is also sent to, as OSC; 0 for none.
+    #[id = "oscfl"]
+    pub feel_port: IntParam,
+    /// Writes a take while on.
+    #[id = "rec"]
+    pub record: BoolParam,
+    /// Plays the take instead of a knob, from when it is switched on or the host starts again.
+    #[id = "replay"]
+    pub replay: BoolParam,
+    /// H and k come from the trial of a study.
+    #[id = "study"]
+    pub study: BoolParam,
+    /// Participant's number.
+    #[id = "part"]
+    pub participant: IntParam,
+    /// Decides the order of trials.
+    #[id = "seed"]
+    pub seed: IntParam,
+    /// Which trial.
+    #[id = "trial"]
+    pub trial: IntParam,
+    /// Side A or B of the trial.
+    #[id = "side"]
+    pub side: BoolParam,
+    /// What drives H.
+    #[id = "hsrc"]
+    pub h_source: EnumParam<ReedSource>,
+    /// What drives k.
+    #[id = "ksrc"]
+    pub k_source: EnumParam<ReedSource>,
+    /// Says how the link is; its value means nothing.
+    #[id = "kstat"]
+    pub status: BoolParam,
+}
+
+impl KnobParams {
+    /// Defaults, with a place that the link writes its state to, in words.
+    pub fn new(status: Arc<RwLock<String>>) -> Self {
+        let switch = |name: &str, yes: &'static str, no: &'static str| {
+            BoolParam::new(name, false)
+                .with_value_to_string(Arc::new(move |on| if on { yes } else { no }.to_owned()))
+                .with_string_to_value(Arc::new(move |text| either(text, yes, no)))
+        };
+        let act = |name: &str| switch(name, "On", "Off").non_automatable();
+        let whole = |name: &str, default: i32, min: i32, max: i32| {
+            IntParam::new(name, default, IntRange::Linear { min, max }).non_automatable()
+        };
+        Self {
+            serial: RwLock::default(),
+            midi_port: RwLock::default(),
+            calibration: RwLock::default(),
+            take: RwLock::default(),
+            kind: EnumParam::new("Knob", KnobKind::Off).non_automatable(),
+            arm: act("Arm knob"),
+            ceiling: number("Torque ceiling", CEILING_MNM.0, 10.0, CEILING_MNM.1, 0, " mNm")
+                .non_automatable(),
+            take_over: act("Take over knob"),
+            rest: act("Rest here"),
+            blow: act("Blow hard here"),
+            law: EnumParam::new("Feel", LawChoice::Flow).non_automatable(),
+            contrast: number("Feel contrast", 3.0, 1.0, 5.0, 2, " x").non_automatable(),
+            order: EnumParam::new("Feel order", OrderChoice::Physical).non_automatable(),
+            reference: whole("Feel reference", 72, 52, 97),
+            torque: number("Feel torque", 60.0, 0.0, CEILING_MNM.1, 0, " mNm").non_automatable(),
+            damping: number("Feel damping", 1.0, 0.0, 20.0, 2, " mNm s").non_automatable(),
+            friction: number("Feel friction", 1.0, 0.0, 20.0, 1, " mNm").non_automatable(),
+            detent: number("Feel step", 6.0, 0.0, 30.0, 1, " mNm").non_automatable(),
+            curve: number("Knob curve", 1.0, 0.25, 4.0, 2, "").non_automatable(),
+            osc_port: whole("OSC port", 8_000, 1_024, 65_535),
+            osc_any: act("OSC from network"),
+            feel_port: whole("Feel OSC port", 0, 0, 65_535),
+            record: act("Record take"),
+            replay: act("Replay take"),
+            study: act("Study"),
+            participant: whole("Participant", 1, 1, 9_999),
+            seed: whole("Study seed", 1, 1, 9_999),
+            trial: whole("Trial", 1, 1, TRIALS as i32),
+            side: switch("A/B", "B", "A").non_automatable(),
+            h_source: EnumParam::new("H from", ReedSource::Parameter).non_automatable(),
+            k_source: EnumParam::new("k from", ReedSource::Parameter).non_automatable(),
+            status: BoolParam::new("Knob status", false)
+                .with_value_to_string(Arc::new(move |_| {
+                    status.read().map_or_else(|_| String::new(), |text| text.clone())
+                }))
+                .with_string_to_value(Arc::new(|_| Some(false)))
+                .non_automatable(),
+        }
+    }
+
+    /// Participant, trial and side, while a study is on. Real-time safe.
+    pub fn study(&self) -> Option<(u32, Trial, Side)> {
+        if !self.study.value() {
+            return None;
+        }
+        let whole = |param: &IntParam| u32::try_from(param.value()).unwrap_or(1);
+        let participant = whole(&self.participant);
+        let trials = plan(participant, whole(&self.seed));
+        let trial = *trials.get(whole(&self.trial).saturating_sub(1) as usize)?;
+        Some((participant, trial, if self.side.value() { Side::B } else { Side::A }))
+    }
+
+    pub(super) fn numbers(&self) -> [(&'static str, &FloatParam); 7] {
+        [
+            ("ceil", &self.ceiling),
+            ("contr", &self.contrast),
+            ("torque", &self.torque),
+            ("kdamp", &self.damping),
+            ("kfric", &self.friction),
+            ("detent", &self.detent),
+            ("curve", &self.curve),
+        ]
+    }
+
+    pub(super) fn wholes(&self) -> [(&'static str, &IntParam); 6] {
+        [
+            ("refnot", &self.reference),
+            ("oscprt", &self.osc_port),
+            ("oscfl", &self.feel_port),
+            ("part", &self.participant),
+            ("seed", &self.seed),
+            ("trial", &self.trial),
+        ]
+    }
+
+    /// Switches, and whether a state keeps them.
+    pub(super) fn switches(&self) -> [(&'static str, &BoolParam, bool); 10] {
+        [
+            ("arm", &self.arm, false),
+            ("takeov", &self.take_over, false),
+            ("rest", &self.rest, false),
+            ("blow", &self.blow, false),
+            ("oscany", &self.osc_any, true),
+            ("rec", &self.record, false),
+            ("replay", &self.replay, true),
+            ("study", &self.study, true),
+            ("side", &self.side, true),
+            ("kstat", &self.status, false),
+        ]
+    }
+
+    /// Choices: id, default, and what may stand in a state.
+    pub(super) const CHOICES: [(&'static str, &'static str, &'static [&'static str]); 5] = [
+        ("knob", "off", &["off", "serial", "midi", "osc"]),
+        ("law", "flow", &["flow", "press", "free"]),
+        ("order", "phys", &["phys", "cover", "open"]),
+        ("hsrc", "param", &["param", "cc1", "cc16", "cc17", "cc74", "press"]),
+        ("ksrc", "param", &["param", "cc1", "cc16", "cc17", "cc74", "press"]),
+    ];
+}

@@ -1,0 +1,111 @@
+//! A host in simulated time, as plain as the protocol allows: says hello, sends ALIVE, arms when told.
+
+use chalumeau::simulator::knob::SimulatedKnob;
+use chalumeau::wire::midi::{FromKnob, MidiReceiver, encode_sysex};
+use chalumeau::wire::{Arm, Decoder, Event, Info, Message, State, encode};
+
+/// Knob and host on one line.
+pub struct Host {
+    pub knob: SimulatedKnob,
+    pub session: u32,
+    pub is_alive: bool,
+    pub events: Vec<Event>,
+    pub heard_bytes: Vec<u8>,
+    is_midi: bool,
+    ceiling_mnm: u16,
+    seq: u8,
+    tick: u64,
+    serial: Decoder,
+    midi: MidiReceiver,
+    info: Option<Info>,
+    last: State,
+}
+
+impl Host {
+    pub fn new(knob: SimulatedKnob, is_midi: bool, ceiling_mnm: u16) -> Self {
+        Self {
+            knob,
+            session: 0x1234_5678,
+            is_alive: true,
+            events: Vec::new(),
+            heard_bytes: Vec::new(),
+            is_midi,
+            ceiling_mnm,
+            seq: 0,
+            tick: 0,
+            serial: Decoder::new(),
+            midi: MidiReceiver::new(),
+            info: None,
+            last: State::default(),
+        }
+    }
+
+    /// Last STATE heard.
+    pub fn state(&self) -> State {
+        self.last
+    }
+
+    pub fn send(&mut self, message: &Message) {
+        self.seq = self.seq.wrapping_add(1);
+        if self.is_midi {
+            self.knob.send(&encode_sysex(message, self.seq));
+        } else {
+            self.knob.send(&encode(message, self.seq));
+        }
+    }
+
+    /// Says hello and waits for the answer.
+    pub fn greet(&mut self) {
+        self.send(&Message::Hello { major: 1, minor: 0, session: self.session });
+        self.run(0.05, |_| {});
+        assert_eq!(self.info.expect("INFO").session, self.session);
+    }
+
+    /// What the user's act does.
+    pub fn arm(&mut self) {
+        self.send(&Message::Arm(self.arming()));
+        self.run(0.03, |_| {});
+    }
+
+    fn arming(&self) -> Arm {
+        Arm { session: self.session, ceiling_mnm: self.ceiling_mnm }
+    }
+
+    /// Lets time pass; `each` sees the knob after every period.
+    pub fn run(&mut self, seconds: f64, mut each: impl FnMut(&SimulatedKnob)) {
+        let alive_every = if self.is_midi { 200 } else { 40 };
+        for _ in 0..(seconds * 2000.0).round() as u64 {
+            if self.is_alive && self.tick.is_multiple_of(alive_every) {
+                self.send(&Message::Alive(self.arming()));
+            }
+            self.tick += 1;
+            self.knob.step();
+            self.listen();
+            each(&self.knob);
+        }
+    }
+
+    fn listen(&mut self) {
+        let mut bytes = Vec::new();
+        self.knob.receive(&mut bytes);
+        let mut messages = Vec::new();
+        if self.is_midi {
+            self.midi.feed(&bytes, self.knob.t_us(), |heard| {
+                if let FromKnob::Frame(Ok((_, message))) = heard {
+                    messages.push(message);
+                }
+            });
+        } else {
+            messages.extend(self.serial.feed(&bytes).flatten().map(|(_, message)| message));
+        }
+        for message in messages {
+            match message {
+                Message::Info(info) => self.info = Some(info),
+                Message::State(state) => self.last = state,
+                Message::Event(event) => self.events.push(event),
+                _ => {}
+            }
+        }
+        self.heard_bytes.extend(bytes);
+    }
+}

@@ -1,0 +1,77 @@
+//! The simulated knob as a program of its own, started and stopped by whoever plays with it.
+
+use std::io::{BufRead, BufReader};
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use anyhow::{Context, Result, bail};
+
+use crate::machine;
+
+/// Where the command line is built with a simulator in it.
+const FEATURES: &str = "cli,devices,simulator";
+
+/// Builds `chalumeau` with the simulator; the profile is the bundle's, so that little is built twice.
+pub fn build() -> Result<()> {
+    let features = ["--no-default-features", "--features", FEATURES];
+    machine::run(machine::cargo().args(["build", "--bin", "chalumeau", "--profile=plugin"]).args(features))
+}
+
+/// The program that `build` makes.
+pub fn program() -> Result<PathBuf> {
+    let path = machine::target().join("plugin").join(format!("chalumeau{}", std::env::consts::EXE_SUFFIX));
+    if path.exists() { Ok(path) } else { bail!("{} is not there; run `cargo xtask bundle`", path.display()) }
+}
+
+/// A running simulator; it ends when dropped.
+pub struct Simulator {
+    child: Child,
+    /// Its first line: `serial /dev/pts/7` and the like.
+    pub greeting: String,
+}
+
+impl Simulator {
+    /// Starts it with arguments of `chalumeau knob-sim`, and waits until it is there.
+    pub fn start(args: &[&str]) -> Result<Self> {
+        let mut child = Command::new(program()?)
+            .arg("knob-sim")
+            .arg("--quiet")
+            .args(args)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .spawn()
+            .context("cannot start the simulated knob")?;
+        let mut greeting = String::new();
+        let out = child.stdout.take().context("no output of the simulated knob")?;
+        BufReader::new(out).read_line(&mut greeting)?;
+        let simulator = Self { child, greeting: greeting.trim().to_owned() };
+        if simulator.greeting.is_empty() {
+            bail!("the simulated knob ended at once: knob-sim {}", args.join(" "));
+        }
+        Ok(simulator)
+    }
+
+    /// Pulls the plug: the program is gone from one moment to the next.
+    pub fn kill(&mut self) -> Result<()> {
+        self.child.kill()?;
+        self.child.wait()?;
+        Ok(())
+    }
+}
+
+impl Drop for Simulator {
+    fn drop(&mut self) {
+        // It may be gone already, which is as good.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// A serial number no other simulator on this machine has, so that tests do not take each other's knobs.
+pub fn serial_number() -> u64 {
+    static NEXT: AtomicU32 = AtomicU32::new(1);
+    0x5100_0000_0000_0000
+        | u64::from(std::process::id()) << 16
+        | u64::from(NEXT.fetch_add(1, Ordering::Relaxed))
+}

@@ -1,0 +1,213 @@
+//! The bundled CLAP with the simulated knob, in a host, at the pace of a sound card. `cargo xtask bundle` first.
+//!
+//! Everything here is real but the metal and the hand: the firmware's own code, a serial line (pty) or UDP, the plugin's
+//! link, its audio thread. Times are generous: a loaded machine makes these tests slower, not wrong.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use chalumeau::analysis::pitch::fundamental_hz;
+use chalumeau::analysis::to_f64;
+use chalumeau::units::cents;
+use xtask::host::{At, Plugin, Say, Session};
+use xtask::simulator::{Simulator, serial_number};
+use xtask::touch_demo::{connect, wait_until_live};
+
+const RATE: f64 = 48_000.0;
+const SECOND: usize = 48_000;
+const BLOCK: usize = 128;
+/// Sounding D3, written E3, the lowest note.
+const E3: u8 = 50;
+
+fn plugin() -> Plugin {
+    let path = match std::env::var_os("CHALUMEAU_CLAP") {
+        Some(path) => xtask::machine::root().join(PathBuf::from(path)),
+        None => xtask::bundle::clap().unwrap(),
+    };
+    Plugin::load(&path).unwrap()
+}
+
+fn knob(number: u64, hand: &[&str]) -> Simulator {
+    Simulator::start(&[&["--serial-number", &format!("{number:016x}")], hand].concat()).unwrap()
+}
+
+fn on(key: u8) -> Say {
+    Say::Midi([0x90, key, 100])
+}
+
+fn level_db(samples: &[f32]) -> f64 {
+    let power: f64 = samples.iter().map(|&x| f64::from(x).powi(2)).sum();
+    10.0 * (power / samples.len().max(1) as f64).max(1e-30).log10()
+}
+
+/// Last breath the plugin has sent, 0..=1.
+fn breath(session: &Session) -> f64 {
+    let last = |cc: u8| {
+        session.answers().iter().rev().find(|(_, said)| said[1] == cc).map_or(0, |(_, said)| said[2])
+    };
+    f64::from(u16::from(last(2)) << 7 | u16::from(last(34))) / 16_383.0
+}
+
+/// Plays on in steps of a tenth of a second until something holds; how long that took.
+fn play_until(session: &mut Session, what: &str, mut holds: impl FnMut(&mut Session) -> bool) -> Duration {
+    let began = Instant::now();
+    while !holds(session) {
+        assert!(began.elapsed() < Duration::from_secs(30), "{what} did not come about in 30 s");
+        session.play_live(&[], SECOND / 10, RATE).unwrap();
+    }
+    began.elapsed()
+}
+
+#[test]
+fn a_hand_on_the_knob_plays_the_plugin_over_a_serial_line() {
+    let number = serial_number();
+    let _knob = knob(number, &["--hold", "200"]);
+    let mut plugin = plugin();
+    connect(&mut plugin, number).unwrap();
+    let (heard, sent) = plugin
+        .session(RATE, BLOCK, |session| {
+            wait_until_live(session, RATE).unwrap();
+            let [left, _] = session.play_live(&[At(0, on(E3))], 2 * SECOND, RATE).unwrap();
+            (left, breath(session))
+        })
+        .unwrap();
+    let hz = fundamental_hz(&to_f64(&heard[SECOND..]), RATE).expect("a pitch");
+    let off = cents(hz, 146.832);
+    println!("breath {sent:.3}, {hz:.2} Hz, {off:+.1} cents, {:.1} dBFS", level_db(&heard[SECOND..]));
+    assert!(off.abs() < 20.0, "{hz} Hz");
+    assert!((0.4..0.95).contains(&sent), "breath {sent}");
+}
+
+#[test]
+fn offline_a_device_makes_no_difference() {
+    let number = serial_number();
+    let _knob = knob(number, &["--hold", "250"]);
+    let mut plugin = plugin();
+    let said = [At(0, on(60)), At(SECOND / 2, Say::Midi([0xB0, 2, 90])), At(SECOND, on(67))];
+    plugin.set_offline(true).unwrap();
+    let without = plugin.play(RATE, 512, &said, 2 * SECOND).unwrap();
+    plugin.set_offline(false).unwrap();
+    connect(&mut plugin, number).unwrap();
+    plugin.session(RATE, BLOCK, |session| wait_until_live(session, RATE).unwrap()).unwrap();
+    plugin.set_offline(true).unwrap();
+    let (with, answers) = plugin
+        .session(RATE, 512, |session| (session.play(&said, 2 * SECOND).unwrap(), session.answers().len()))
+        .unwrap();
+    assert!(level_db(&with[0]) > -60.0);
+    assert!(with == without, "a live knob is heard in an offline render");
+    assert_eq!(answers, 0);
+}
+
+#[test]
+fn what_the_host_records_is_what_was_played() {
+    let number = serial_number();
+    let _knob = knob(number, &["--crescendo", "100:250:2", "--loop"]);
+    let mut live = plugin();
+    connect(&mut live, number).unwrap();
+    let (heard, recorded) = live
+        .session(RATE, BLOCK, |session| {
+            wait_until_live(session, RATE).unwrap();
+            session.reset();
+            let first = session.played();
+            let [left, _] = session.play_live(&[At(0, on(60))], 2 * SECOND, RATE).unwrap();
+            let said = session.answers().iter().filter(|(at, _)| *at >= first);
+            (left, said.map(|&(at, midi)| At(at - first, Say::Midi(midi))).collect::<Vec<_>>())
+        })
+        .unwrap();
+    assert!(recorded.len() > 200, "{} messages", recorded.len());
+    // The note first, as it was played; then what was recorded.
+    let again = [vec![At(0, on(60))], recorded].concat();
+    let [left, _] = plugin().play(RATE, BLOCK, &again, 2 * SECOND).unwrap();
+    let apart = heard.iter().zip(&left).filter(|(a, b)| a.to_bits() != b.to_bits()).count();
+    println!("{apart} of {} samples differ", heard.len());
+    assert_eq!(apart, 0);
+}
+
+#[test]
+fn a_pulled_cable_silences_and_a_new_one_is_found_disarmed() {
+    let number = serial_number();
+    let mut first = knob(number, &["--hold", "220"]);
+    let mut plugin = plugin();
+    connect(&mut plugin, number).unwrap();
+    let arm = plugin.param("Arm knob").unwrap().id;
+    plugin
+        .session(RATE, BLOCK, |session| {
+            wait_until_live(session, RATE).unwrap();
+            let said = [At(0, on(E3)), At(0, Say::Set(arm, 1.0))];
+            let [left, _] = session.play_live(&said, SECOND, RATE).unwrap();
+            assert!(level_db(&left[SECOND / 2..]) > -60.0);
+            first.kill().unwrap();
+            session.play_live(&[], SECOND, RATE).unwrap();
+            let [left, _] = session.play_live(&[], SECOND / 4, RATE).unwrap();
+            assert!(level_db(&left) < -100.0, "{} dBFS after the cable was pulled", level_db(&left));
+            assert_eq!(breath(session), 0.0);
+            let _second = knob(number, &["--hold", "220"]);
+            let took = play_until(session, "the knob's return", |session| breath(session) > 0.1);
+            println!("back after {:.2} s", took.as_secs_f64());
+            assert!(took < Duration::from_secs(4), "{took:?}");
+        })
+        .unwrap();
+}
+
+#[test]
+fn a_project_remembers_its_knob_by_number_and_never_armed() {
+    let number = serial_number();
+    let _knob = knob(number, &["--hold", "0"]);
+    let mut plugin = plugin();
+    connect(&mut plugin, number).unwrap();
+    let arm = plugin.param("Arm knob").unwrap().id;
+    plugin
+        .session(RATE, BLOCK, |session| {
+            session.play_live(&[], 2 * SECOND, RATE).unwrap();
+            session.play_live(&[At(0, Say::Set(arm, 1.0))], SECOND / 2, RATE).unwrap();
+        })
+        .unwrap();
+    let state = plugin.save().unwrap();
+    let text = String::from_utf8_lossy(&state[8..]).into_owned();
+    assert!(text.contains(&format!("{number:016x}")), "{text}");
+    assert!(!text.contains("/dev/"), "a path in the state");
+    let mut again = self::plugin();
+    again.restore(&state).unwrap();
+    assert_eq!(again.value(arm).unwrap(), 0.0, "armed by loading");
+}
+
+#[test]
+fn two_instances_share_a_knob_by_asking() {
+    let number = serial_number();
+    let _knob = knob(number, &["--hold", "200"]);
+    let (mut first, mut second) = (plugin(), plugin());
+    connect(&mut first, number).unwrap();
+    connect(&mut second, number).unwrap();
+    let take_over = second.param("Take over knob").unwrap().id;
+    let status = second.param("Knob status").unwrap().id;
+    let mut activated = first.activate(RATE, BLOCK).unwrap();
+    wait_until_live(&mut activated, RATE).unwrap();
+    let mut other = second.activate(RATE, BLOCK).unwrap();
+    other.play_live(&[], SECOND, RATE).unwrap();
+    assert!(other.answers().is_empty(), "two instances blow with one knob");
+    let said = second.text(status, 0.0).unwrap();
+    println!("the second says: {said}");
+    assert!(said.to_lowercase().contains("chalumeau"), "{said}");
+    other.play_live(&[At(0, Say::Set(take_over, 1.0))], SECOND / 10, RATE).unwrap();
+    let took = play_until(&mut other, "the take-over", |session| !session.answers().is_empty());
+    println!("taken over after {:.2} s", took.as_secs_f64());
+    second.deactivate(other);
+    first.deactivate(activated);
+}
+
+#[test]
+fn stock_firmware_plays_over_osc() {
+    let port = std::net::UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let _knob = Simulator::start(&["--osc", &format!("127.0.0.1:{port}"), "--hold", "200"]).unwrap();
+    let mut plugin = plugin();
+    xtask::touch_demo::listen(&mut plugin, port).unwrap();
+    let heard = plugin
+        .session(RATE, BLOCK, |session| {
+            wait_until_live(session, RATE).unwrap();
+            let [left, _] = session.play_live(&[At(0, on(E3))], 2 * SECOND, RATE).unwrap();
+            left
+        })
+        .unwrap();
+    let hz = fundamental_hz(&to_f64(&heard[SECOND..]), RATE).expect("a pitch");
+    assert!(cents(hz, 146.832).abs() < 20.0, "{hz} Hz");
+}
