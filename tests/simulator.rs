@@ -378,7 +378,8 @@ const HARM_S: f64 = 0.6;
 fn break_it(harm: Harm, midi: bool, seed: u64) -> f64 {
     let mut rng = Rng::with_seed(seed);
     let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
-    let plant = PlantDesign { torque_step_nm: 0.0, ..PlantDesign::default() };
+    // Damped enough for every feel drawn below to be allowed.
+    let plant = PlantDesign { torque_step_nm: 0.0, viscous_nms: 2e-3, ..PlantDesign::default() };
     let knob = SimulatedKnob::new(
         setup(midi, plant.viscous_nms),
         plant,
