@@ -121,6 +121,12 @@ CLAIM(fault_3_the_slap_region_does_not_jump_and_its_event_tells_the_peak_speed) 
         CHECK(jump >= 0.0F && jump < 0.07F);
     }
     CHECK(curve.at_rest(-399.0F) == 90.0F);
+    // An origin below zero takes the region with it, so that law and slap spring never work against each other.
+    Feel moved = feel;
+    moved.offset_deg = -150.0F;
+    CHECK(Curve(moved).at_rest(-249.9F) == 0.0F && Curve(moved).at_rest(-251.0F) > 0.5F);
+    moved.offset_deg = 150.0F;
+    CHECK(Curve(moved).at_rest(-99.9F) == 0.0F && Curve(moved).at_rest(-101.0F) > 0.5F);
     // In and out, fast in between.
     test::Bench bench;
     bench.ready(feel, -950);
@@ -282,7 +288,7 @@ CLAIM(fault_8_torque_is_mnm_and_a_board_says_what_it_clips) {
     std::printf("    the stock board clips from %.1f to %.1f degrees\n", 0.1 * first, 0.1 * last);
     CHECK(first == 29 && last == 3263);
     // Ours declares its ceiling instead, and refuses a scale beyond it.
-    Config config;
+    Config config = test::damped();
     config.ceiling_mnm = 100;
     test::Bench bench(config);
     bench.run(1);

@@ -192,3 +192,120 @@ pub fn extremes(feel: &Feel) -> Extremes {
         push_nm_per_rad: per_rad * curve.push(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reed::law::{H_INIT, K_INIT};
+
+    /// TorqueTuner's setting, scale in mNm: one turn, nothing on top.
+    fn seed(law: Law, h: f64, k: f64) -> Feel {
+        Feel {
+            feel_id: 0,
+            law,
+            morph_ms: 20,
+            h: h as f32,
+            k: k as f32,
+            scale_mnm: 90.0,
+            stretch: 1.0,
+            offset_deg: 0.0,
+            a_on_deg: 120.0,
+            a_off_deg: 700.0,
+            a_beat_deg: 180.0,
+            wall_deg: 36_000.0,
+            wall_mnm_per_deg: 5.0,
+            slap_mnm_per_deg: 0.5,
+            damping_mnms: 0.0,
+            friction: 0,
+            detent: 0,
+        }
+    }
+
+    #[test]
+    fn flow_is_the_seeds_formula_behind_the_rounded_origin() {
+        let tables = ReedTables::seed();
+        for h in [1.0, 2.0, H_INIT, 4.0] {
+            for k in [0.1, 0.25, K_INIT, 1.0] {
+                let feel = seed(Law::Flow, h, k);
+                let (h, k) = (f64::from(feel.h), f64::from(feel.k));
+                for index in 0..=3600 {
+                    let p = tables.x[index];
+                    let seed = if p < h * k { h * tables.x_a[index] - tables.x_b[index] / k } else { 0.0 };
+                    let torque = torque_mnm(&feel, tables, 0.1 * index as f64);
+                    let rounded = 0.1 * (index as f64) < ROUNDED_DEG;
+                    // What the rounding takes away is at most a third of the root at its end.
+                    let off = if rounded { 0.35 * 90.0 * h * (ROUNDED_DEG / 360.0).sqrt() } else { 1e-3 };
+                    assert!(
+                        (torque - 90.0 * seed).abs() <= off,
+                        "H {h} k {k} index {index}: {torque}, {seed}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn flow_peaks_at_a_third_of_closure_and_is_gone_beyond() {
+        let (feel, tables) = (seed(Law::Flow, H_INIT, K_INIT), ReedTables::seed());
+        let steps = 0..4_000;
+        let peak = steps
+            .clone()
+            .max_by(|&a, &b| {
+                let torque = |step: i32| torque_mnm(&feel, tables, 0.1 * f64::from(step));
+                torque(a).total_cmp(&torque(b))
+            })
+            .unwrap();
+        assert!((peak - 1_200).abs() <= 1, "{peak}");
+        assert_eq!(torque_mnm(&feel, tables, 361.0), 0.0);
+        assert!((closure_deg(&feel) - 360.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn pressure_never_falls_and_steps_up_at_the_threshold() {
+        let feel = Feel { detent: 100, ..seed(Law::Pressure, H_INIT, K_INIT) };
+        let torque = |angle: f64| torque_mnm(&feel, ReedTables::seed(), angle);
+        let mut before = torque(-300.0);
+        for step in -3_000..8_000 {
+            let here = torque(0.1 * f64::from(step));
+            assert!(here >= before - 1e-12, "{step}");
+            before = here;
+        }
+        assert!((torque(126.0) - torque(114.0) - 10.0 - 12.0 * 90.0 / 360.0).abs() < 1e-4);
+        assert!((torque(1_000.0) - 100.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn the_bounds_hold_what_the_curve_does() {
+        let tables = ReedTables::seed();
+        for law in [Law::Flow, Law::Pressure] {
+            for (detent, wall_deg, offset_deg) in [(0, 414.0, 0.0), (80, 414.0, 0.0), (80, 200.0, 20.0)] {
+                let feel = Feel { detent, wall_deg, offset_deg, ..seed(law, H_INIT, K_INIT) };
+                let bounds = extremes(&feel);
+                let (mut most, mut up, mut down) = (0.0_f64, 0.0_f64, 0.0_f64);
+                let mut before = torque_mnm(&feel, tables, -130.0);
+                for step in -13_000..50_000 {
+                    let angle = 0.01 * f64::from(step);
+                    let torque = torque_mnm(&feel, tables, angle);
+                    let slope = 1e-3 * (torque - before) / 0.01_f64.to_radians();
+                    // The tables' polygon and the corner at closure are no slopes of the law.
+                    (up, down) = (up.max(slope), down.max(-slope));
+                    if angle < f64::from(wall_deg) {
+                        most = most.max(torque);
+                    }
+                    before = torque;
+                }
+                assert!(most <= bounds.torque_mnm * 1.000_1, "{law:?}: {most}, {bounds:?}");
+                assert!(up <= bounds.stiffness_nm_per_rad * 1.02, "{law:?}: {up}, {bounds:?}");
+                assert!(down <= bounds.push_nm_per_rad * 1.02 + 1e-3, "{law:?}: {down}, {bounds:?}");
+                assert!(up >= 0.5 * bounds.stiffness_nm_per_rad, "no idle bound: {up}, {bounds:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_free_knob_has_no_torque() {
+        let feel = seed(Law::Free, H_INIT, K_INIT);
+        assert!([-500.0, 0.0, 120.0, 40_000.0].map(|a| torque_mnm(&feel, ReedTables::seed(), a)) == [0.0; 4]);
+        assert_eq!(extremes(&feel), Extremes::default());
+    }
+}

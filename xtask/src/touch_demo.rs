@@ -100,14 +100,14 @@ pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -
 pub fn connect(plugin: &mut Plugin, serial: u64) -> Result<()> {
     edit(plugin, |state| {
         state["fields"]["serial"] = format!("\"{serial:016x}\"").into();
-        state["params"]["knob"] = serde_json::json!({ "str": "serial" });
+        state["params"]["knob"] = serde_json::json!({ "string": "serial" });
     })
 }
 
 /// Has a plugin listen to stock firmware on a UDP port.
 pub fn listen(plugin: &mut Plugin, port: u16) -> Result<()> {
     edit(plugin, |state| {
-        state["params"]["knob"] = serde_json::json!({ "str": "osc" });
+        state["params"]["knob"] = serde_json::json!({ "string": "osc" });
         state["params"]["oscprt"] = serde_json::json!({ "i32": port });
     })
 }

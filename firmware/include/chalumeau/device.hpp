@@ -23,7 +23,7 @@ constexpr std::uint16_t FIRMWARE_PATCH = 0;
 constexpr std::uint16_t STATE_HZ_SERIAL = 500;
 constexpr std::uint16_t STATE_HZ_MIDI = 100;           // SysEx; the controllers carry the breath
 constexpr std::uint32_t CONTROLLER_US = 2000;          // controllers no faster than STATE on serial
-constexpr std::uint32_t TICK_LONGEST_US = 100000;      // a longer pause counts as this: the watchdogs have long fired
+constexpr std::uint32_t TICK_LONGEST_US = 1000000;     // a longer pause counts as this: the watchdogs have long fired
 constexpr std::uint32_t BUTTON_US = 5000;              // contacts bounce for less (judgement)
 constexpr std::uint32_t LIMIT_EVENT_US = 1000000;      // a limit is told once a second at most
 constexpr float SLAP_LEAVES_DEG = 1.0F;                // hysteresis of the slap region's edge
@@ -63,7 +63,9 @@ class Device {
           session_(config.major, config.binding == Binding::Serial ? WATCHDOG_SERIAL_MS : WATCHDOG_MIDI_MS),
           outbox_(config.binding),
           state_hz_(config.binding == Binding::Serial ? STATE_HZ_SERIAL : STATE_HZ_MIDI) {
-        allowed_.stiffness = 2.0F * config.knob_damping_nms / LOOP_S;
+        // Sampling alone allows 2 b / T; a period of delay on the bus leaves a third of it (Colgate and Brown 1994,
+        // b > K (T/2 + delay)); a quarter is calm under any load (docs/simulator.md).
+        allowed_.stiffness = 0.5F * config.knob_damping_nms / LOOP_S;
         allowed_.push = config.push_limit;
         allowed_.ceiling_mnm = limits_.device_mnm();
     }

@@ -20,11 +20,8 @@ class Limits {
     Limits(float device_mnm, float rating_mnm)
         : device_(least(device_mnm, HARD_CAP_MNM)), rating_(least(rating_mnm, device_)), thermal_(device_) {}
 
-    /// What ARM or ALIVE allows; lower at once, higher at the slew rate of rule 5.
-    void allow(float user_mnm) {
-        user_ = least(user_mnm, device_);
-        now_ = least(now_, user_);
-    }
+    /// What ARM or ALIVE allows; lower at once, higher at the slew rate of rule 5: see `clamp`.
+    void allow(float user_mnm) { user_ = least(user_mnm, device_); }
 
     void disarm() { now_ = 0.0F; user_ = 0.0F; }
     /// The soft start takes care of the rise.

@@ -149,8 +149,7 @@ impl Audio {
         };
         let gone = (source == Source::Host && self.source != Source::Host)
             .then(|| self.blower.fall_silent())
-            .flatten()
-            .map(|breath| Timed { at: 0, event: Event::Breath(breath.unit()) });
+            .flatten();
         self.source = source;
         let full_pa = 1e3 * f64::from(settings.breath_full_kpa);
         let (sent, sent_count) = (&mut self.sent, &mut self.sent_count);
@@ -182,6 +181,10 @@ impl Audio {
             _ => {
                 let blower = &mut self.blower;
                 let host = host.inspect(|event| blower.heed(&event.event));
+                let gone = gone.map(|breath| {
+                    heard(0, breath);
+                    Timed { at: 0, event: Event::Breath(breath.unit()) }
+                });
                 clarinet.render_events(gone.into_iter().chain(host), out);
             }
         }
