@@ -178,10 +178,9 @@ class Signals:
                     f"{self.graph.interface}; give one that is up and carries multicast"
                 )
         self.device = libmapper.Device(name, self.graph)
+        outgoing, kind = libmapper.Signal.Direction.OUTGOING, libmapper.Type.FLOAT
         self.signals = {
-            field: self.device.add_signal(
-                libmapper.Signal.Direction.OUTGOING, f"feel/{field}", 1, libmapper.Type.FLOAT, unit, float(low), float(high)
-            )
+            field: self.device.add_signal(outgoing, f"feel/{field}", 1, kind, unit, float(low), float(high))
             for field, (unit, low, high) in FIELDS.items()
         }
         began = time.monotonic()
