@@ -1,11 +1,10 @@
 //! The link to a knob as the plugin uses it, with the real firmware at the other end of a pseudo-terminal.
-#![cfg(unix)]
+//!
+//! Only without the plugin: its framework brings an allocation check of its own.
+#![cfg(all(unix, not(feature = "plugin")))]
 
 #[path = "support/knob.rs"]
 mod knob;
-
-// The plugin's framework brings an allocator of its own.
-#![cfg(not(feature = "plugin"))]
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use chalumeau::device::memory::pair;
