@@ -1,5 +1,7 @@
 //! The link to a knob as the plugin uses it, with the real firmware at the other end of a pseudo-terminal.
-#![cfg(unix)]
+//!
+//! Only without the plugin: its framework brings an allocation check of its own.
+#![cfg(all(unix, not(feature = "plugin")))]
 
 #[path = "support/knob.rs"]
 mod knob;
