@@ -1,5 +1,7 @@
 //! The link to a knob as the plugin uses it, with the real firmware at the other end of a pseudo-terminal.
-#![cfg(unix)]
+//!
+//! Only without the plugin: its framework brings an allocation check of its own.
+#![cfg(all(unix, not(feature = "plugin")))]
 
 #[path = "support/knob.rs"]
 mod knob;
@@ -482,6 +484,7 @@ struct Bench {
     to_knob: Vec<(i64, Message)>,
     sent_at_us: Vec<i64>,
     states: usize,
+    period_us: u32,
 }
 
 impl Bench {
@@ -497,6 +500,7 @@ impl Bench {
             to_knob: Vec::new(),
             sent_at_us: Vec::new(),
             states: 0,
+            period_us: 0,
         }
     }
 
@@ -521,9 +525,11 @@ impl Bench {
         self.device.run_until((self.now_us - self.born_us) as u64);
         let mut answer = self.device.transmit();
         line(&mut answer);
-        let states = &mut self.states;
+        let (states, period_us) = (&mut self.states, &mut self.period_us);
         self.session.receive(self.now_us, &answer, &mut |what| {
-            *states += usize::from(matches!(what, Happening::State(_)));
+            if let Happening::State(state) = what {
+                (*states, *period_us) = (*states + 1, state.period_us);
+            }
         });
     }
 
@@ -548,7 +554,7 @@ fn rates_are_those_of_the_protocol_in_simulated_time() {
     let feels = bench.count(|m| matches!(m, Message::Feel(_)));
     assert!((10..=12).contains(&feels), "{feels} FEEL in 10 s without a change");
     assert!((4980..=5002).contains(&bench.states), "{} STATE in 10 s", bench.states);
-    assert_eq!(bench.session.stats().wire.gaps, 0);
+    assert_eq!((bench.session.stats().wire.gaps, bench.period_us), (0, 2000));
     for ms in 0..1000 {
         bench.session.want_feel(Feel { a_on_deg: ms as f32, ..Feel::default() });
         bench.tick(|_| {});
@@ -658,6 +664,8 @@ fn over_midi_frames_leave_20_ms_between_them() {
         bench.tick(|_| {});
     }
     assert_eq!(bench.session.standing(bench.now_us), Standing::Live);
+    let expected_us = 2_000_000 / bench.states as u32;
+    assert!(bench.period_us.abs_diff(expected_us) <= 500, "{} us, {expected_us}", bench.period_us);
     bench.session.arm(100, false, bench.now_us);
     bench.run(100);
     assert!(bench.session.is_armed());
@@ -715,4 +723,57 @@ fn doctor_tells_what_answers_and_what_to_do_when_nothing_does() {
     live(&owner);
     let held = doctor(&directory, &["--path", knob.path.to_str().unwrap()]);
     assert!(held.contains("in use by Track 1"), "{held}");
+}
+
+/// A JACK server without a sound card, under a name of its own; ends when dropped.
+#[cfg(feature = "midi-jack")]
+struct Children(Vec<std::process::Child>);
+
+#[cfg(feature = "midi-jack")]
+impl Drop for Children {
+    fn drop(&mut self) {
+        for child in self.0.iter_mut().rev() {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+/// `cargo test --no-default-features --features simulator,midi-jack --test device jack` needs jackd.
+#[cfg(feature = "midi-jack")]
+#[test]
+fn over_jack_the_simulated_knob_is_found_felt_and_gone_when_it_ends() {
+    use std::process::Stdio;
+    let (directory, _places) = places();
+    let server = format!("chalumeau-{}", std::process::id());
+    let quiet = |command: &mut Command| {
+        command.env("JACK_DEFAULT_SERVER", &server).env("JACK_NO_START_SERVER", "1");
+        command.env("CHALUMEAU_RUNTIME_DIR", directory.path());
+        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    };
+    let mut jackd = Command::new("jackd");
+    jackd.args(["--no-realtime", "--name", &server, "-d", "dummy", "--period", "256"]);
+    let mut children = Children(vec![quiet(&mut jackd)]);
+    thread::sleep(Duration::from_secs(2));
+    let mut knob = Command::new(env!("CARGO_BIN_EXE_chalumeau"));
+    children.0.push(quiet(knob.args(["knob-sim", "--midi"])));
+    thread::sleep(Duration::from_secs(1));
+    let ask = || {
+        let mut doctor = Command::new(env!("CARGO_BIN_EXE_chalumeau"));
+        doctor.env("JACK_DEFAULT_SERVER", &server).env("CHALUMEAU_RUNTIME_DIR", directory.path());
+        let output = doctor.args(["doctor", "--seconds", "3"]).output().unwrap();
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let found = ask();
+    println!("{found}");
+    for say in ["tier 2", "limp 400 ms after silence", "FEEL to its echo"] {
+        assert!(found.contains(say), "{say:?} in {found}");
+    }
+    assert!(!found.contains("not seen"), "{found}");
+    let mut ended = children.0.pop().unwrap();
+    ended.kill().unwrap();
+    ended.wait().unwrap();
+    thread::sleep(Duration::from_secs(1));
+    let gone = ask();
+    assert!(!gone.contains("tier 2"), "{gone}");
 }

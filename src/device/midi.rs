@@ -107,8 +107,8 @@ impl MidiTransport {
         let refused = |reason: String| MidiError::Refused { name: name.clone(), reason };
         let input = input.connect(&port, "from knob", on_message, ()).map_err(|e| refused(e.to_string()))?;
         let output = MidiOutput::new(CLIENT).map_err(unavailable)?;
-        let output = match find(&output, Some(&partner(&name))) {
-            Some((port, _)) => Some(output.connect(&port, "to knob").map_err(|e| refused(e.to_string()))?),
+        let output = match find_partner(&output, &name, wanted) {
+            Some(port) => Some(output.connect(&port, "to knob").map_err(|e| refused(e.to_string()))?),
             None => None,
         };
         let watch = Watch::begin(name.clone());
@@ -116,10 +116,29 @@ impl MidiTransport {
     }
 }
 
-/// What the other port of a device is called: ALSA appends client and port numbers, which may differ.
-fn partner(name: &str) -> String {
-    let end = name.rfind(' ').filter(|at| name[at + 1..].contains(':'));
-    name[..end.unwrap_or(name.len())].to_owned()
+/// The output port of the device whose input port is called `name`: the one of the same name, else one that `wanted`, or
+/// the sound of its name, makes likely.
+fn find_partner(output: &MidiOutput, name: &str, wanted: Option<&str>) -> Option<midir::MidiOutputPort> {
+    let ports = output.ports();
+    let is_same =
+        |port: &&midir::MidiOutputPort| output.port_name(port).is_ok_and(|other| stem(&other) == stem(name));
+    ports.iter().find(is_same).cloned().or_else(|| Some(find(output, wanted)?.0))
+}
+
+/// A port's name without the numbers that differ between both ports of a device: ALSA's ` 28:0` at the end, JACK's `-01`
+/// after the first of two clients of one name.
+fn stem(name: &str) -> String {
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    let without_alsa = match name.rsplit_once(' ') {
+        Some((rest, numbers)) if numbers.split(':').all(is_number) && numbers.contains(':') => rest,
+        _ => name,
+    };
+    let (client, port) = without_alsa.split_once(':').unwrap_or((without_alsa, ""));
+    let client = match client.rsplit_once('-') {
+        Some((rest, number)) if number.len() == 2 && is_number(number) => rest,
+        _ => client,
+    };
+    format!("{client}:{port}")
 }
 
 impl Transport for MidiTransport {
@@ -207,8 +226,15 @@ mod tests {
     }
 
     #[test]
-    fn the_other_port_is_found_whatever_numbers_alsa_gives() {
-        assert_eq!(partner("TorqueTuner:TorqueTuner MIDI 1 28:0"), "TorqueTuner:TorqueTuner MIDI 1");
-        assert_eq!(partner("TorqueTuner MIDI 1"), "TorqueTuner MIDI 1");
+    fn both_ports_of_a_device_have_one_stem_whatever_numbers_they_are_given() {
+        for (input, output) in [
+            ("TorqueTuner:TorqueTuner MIDI 1 28:0", "TorqueTuner:TorqueTuner MIDI 1 28:1"),
+            ("TorqueTuner sim-01:TorqueTuner sim", "TorqueTuner sim:TorqueTuner sim"),
+            ("TorqueTuner", "TorqueTuner"),
+        ] {
+            assert_eq!(stem(input), stem(output));
+        }
+        assert_ne!(stem("TorqueTuner_001:MIDI 1 28:0"), stem("TorqueTuner_002:MIDI 1 29:0"));
+        assert_ne!(stem("TorqueTuner:MIDI 1 28:0"), stem("TorqueTuner:MIDI 2 28:1"));
     }
 }
