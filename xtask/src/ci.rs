@@ -24,7 +24,9 @@ const STEPS: &[Step] = &[
     ("system packages", packages),
     ("format", || cargo("fmt --all --check")),
     ("clippy, core", || cargo("clippy --no-default-features --features cli --all-targets -- -D warnings")),
-    ("clippy, knob", || cargo("clippy --no-default-features --features simulator --all-targets -- -D warnings")),
+    ("clippy, knob", || {
+        cargo("clippy --no-default-features --features simulator --all-targets -- -D warnings")
+    }),
     ("clippy, all features", || cargo("clippy --all-features --all-targets -- -D warnings")),
     ("clippy, xtask", || cargo("clippy -p xtask --all-targets -- -D warnings")),
     ("tests, core", || cargo("test --no-default-features --features cli --no-fail-fast")),
