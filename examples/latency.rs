@@ -99,17 +99,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let at = |share: f64| {
         delays_ms.get((share * (delays_ms.len().max(1) - 1) as f64) as usize).copied().unwrap_or(f64::NAN)
     };
-    let mean = delays_ms.iter().sum::<f64>() / delays_ms.len() as f64;
-    let spread = (delays_ms.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / delays_ms.len() as f64).sqrt();
     println!(
         "{} points in {seconds} s, blocks of {BLOCK}, grid of {GRID}; {late} of {blocks} blocks began late",
         delays_ms.len()
     );
-    println!(
-        "knob to breath   p50 {:.2} ms, p99 {:.2} ms, jitter (standard deviation) {spread:.2} ms",
-        at(0.5),
-        at(0.99)
-    );
+    println!("knob to breath   p1 {:.2} ms, p50 {:.2} ms, p99 {:.2} ms", at(0.01), at(0.5), at(0.99));
     let heard_ms = breath_to_sound_ms()?;
     println!("breath to sound  {heard_ms:.2} ms");
     println!("knob to sound    p50 {:.2} ms, p99 {:.2} ms", at(0.5) + heard_ms, at(0.99) + heard_ms);
