@@ -68,6 +68,7 @@ pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -
     let mut plugin = Plugin::load(clap)?;
     connect(&mut plugin, number)?;
     let arm = plugin.param("Arm knob")?.id;
+    let status = plugin.param("Knob status")?.id;
     let played = plugin.session(rate_hz, BLOCK, |session| -> Result<_> {
         wait_until_live(session, rate_hz)?;
         let armed_at = session.played();
@@ -83,6 +84,8 @@ pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -
         Ok((left[lead..].to_vec(), breath))
     })?;
     let (left, breath) = played?;
+    let said = plugin.text(status, 0.0)?;
+    println!("the plugin says of its knob: {said}");
     drop(plugin);
     drop(simulator);
 
