@@ -77,8 +77,7 @@ impl Fingers {
         let most = commanded.iter().map(|x| x.1).fold(0.0, f64::max);
         // The highest riser that is clearly below the top.
         let riser = stair_mnm * ((0.97 * most / stair_mnm - 0.5).floor() + 0.5);
-        let crosses =
-            |w: &[(f64, f64)]| w[0].0 + (riser - w[0].1) / (w[1].1 - w[0].1) * (w[1].0 - w[0].0);
+        let crosses = |w: &[(f64, f64)]| w[0].0 + (riser - w[0].1) / (w[1].1 - w[0].1) * (w[1].0 - w[0].0);
         let y = made.windows(2).find(|w| w[0].1 < riser && w[1].1 >= riser).map(crosses)?;
         let z = made.windows(2).rev().find(|w| w[0].1 >= riser && w[1].1 < riser).map(crosses)?;
         Some(Felt {

@@ -90,12 +90,7 @@ impl Player {
     }
 
     /// Lets time pass; `tick` sees the knob after every period, `probe` the inside of the clarinet while it is rendered.
-    pub fn run(
-        &mut self,
-        seconds: f64,
-        mut tick: impl FnMut(&SimulatedKnob),
-        mut probe: impl FnMut(Probe),
-    ) {
+    pub fn run(&mut self, seconds: f64, mut tick: impl FnMut(&SimulatedKnob), mut probe: impl FnMut(Probe)) {
         let until_us = self.now_us() + (1e6 * seconds).round() as i64;
         while self.now_us() < until_us {
             let block_us = (1e6 * self.rendered as f64 / RATE_HZ) as i64;

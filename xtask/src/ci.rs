@@ -106,7 +106,8 @@ fn packages() -> Result<()> {
 
 /// Haptics, links, firmware and simulator together; what the core's tests cover is not run again.
 fn knob() -> Result<()> {
-    let tests = ["device", "simulator", "haptics"].map(|name| format!(" --test {name}")).concat();
+    let tests =
+        ["device", "simulator", "haptics", "closed_loop"].map(|name| format!(" --test {name}")).concat();
     cargo(&format!("test --no-default-features --features simulator --no-fail-fast --lib --bins{tests}"))
 }
 
