@@ -130,7 +130,7 @@ fn clap_checked() -> Result<()> {
     cargo("build --all-features --lib")?;
     let library = format!("{}chalumeau{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     let library = machine::target().join("debug").join(library);
-    let tests = ["test", "-p", "xtask", "--test", "clap", "--no-fail-fast"];
+    let tests = ["test", "-p", "xtask", "--test", "clap", "--test", "knob", "--no-fail-fast"];
     machine::run(machine::cargo().args(tests).env("CHALUMEAU_CLAP", library))
 }
 
