@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use super::{NO_NOTE, Shared, desk};
+use super::{NO_NOTE, Shared, desk, takes};
 use crate::device::KnobReader;
 use crate::event::{Event, Timed};
 use crate::instrument::{Clarinet, Settings};
@@ -91,7 +91,7 @@ impl Audio {
         }
         let Ok(path) = params.knob.take.read().map(|path| path.clone()) else { return };
         // A take or feel that cannot be had is worded by the desk; nothing is replayed then.
-        let Ok(take) = desk::load(&path) else { return };
+        let Ok(take) = takes::load(&path) else { return };
         let Ok(feels) = Feels::built_in() else { return };
         let Ok(table) = feels.table(&params.settings(), &desk::design(&params.knob), &NO_MOTOR) else {
             return;
