@@ -5,6 +5,8 @@
 //! was given and what would be right, and no file; a reader that closes the pipe early is no mistake.
 
 mod args;
+#[cfg(feature = "devices")]
+mod doctor;
 mod feel;
 mod haptic;
 mod impedance;
@@ -70,6 +72,8 @@ enum Command {
     #[cfg(feature = "simulator")]
     KnobSim(Box<knob_sim::KnobSim>),
     Haptic(Box<haptic::Haptic>),
+    #[cfg(feature = "devices")]
+    Doctor(doctor::Doctor),
 }
 
 /// Why a command ended early.
@@ -137,6 +141,8 @@ pub fn main() -> ExitCode {
         #[cfg(feature = "simulator")]
         Command::KnobSim(command) => command.run(),
         Command::Haptic(command) => command.run(),
+        #[cfg(feature = "devices")]
+        Command::Doctor(command) => command.run(),
     };
     match done {
         Err(failure) if !failure.is_closed_pipe() => {

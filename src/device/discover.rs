@@ -177,6 +177,19 @@ mod tests {
     }
 
     #[test]
+    fn udev_rule_names_the_same_boards() {
+        let rules = include_str!("../../packaging/70-chalumeau.rules");
+        let lines: Vec<&str> = rules.lines().filter(|line| line.starts_with("SUBSYSTEM")).collect();
+        assert_eq!(lines.len(), KNOWN.len());
+        for (line, (vid, pid, _)) in lines.iter().zip(KNOWN) {
+            assert!(line.contains(&format!("ATTRS{{idVendor}}==\"{vid:04x}\"")), "{line}");
+            let product = pid.map(|pid| format!("ATTRS{{idProduct}}==\"{pid:04x}\""));
+            assert_eq!(line.contains("idProduct"), product.is_some());
+            assert!(line.contains(&product.unwrap_or_default()), "{line}");
+        }
+    }
+
+    #[test]
     fn a_simulated_knob_is_found_while_it_lives() {
         let directory = tempfile::tempdir().unwrap();
         let places = Places::within(directory.path());

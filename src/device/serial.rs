@@ -194,7 +194,7 @@ fn permission_text(path: &str) -> String {
     let group = std::fs::metadata(path).ok().and_then(|m| group_name(m.gid()));
     let group = group.unwrap_or_else(|| "dialout".into());
     format!(
-        "no permission to open {path}. Either, for all knobs: `sudo cp packaging/99-chalumeau.rules \
+        "no permission to open {path}. Either, for all knobs: `sudo cp packaging/70-chalumeau.rules \
          /etc/udev/rules.d/ && sudo udevadm control --reload && sudo udevadm trigger`, then plug it in again. Or, for \
          your user: `sudo usermod -a -G {group} $USER`, then log out and in"
     )
@@ -241,7 +241,7 @@ mod tests {
     fn permission_is_explained_with_commands_to_paste() {
         let text = permission_text("/dev/null");
         assert!(text.contains("usermod -a -G root $USER"), "the group is the port's own: {text}");
-        assert!(text.contains("99-chalumeau.rules"), "{text}");
+        assert!(text.contains("70-chalumeau.rules"), "{text}");
         assert!(permission_text("/dev/not-there").contains("dialout"));
     }
 

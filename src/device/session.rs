@@ -260,9 +260,13 @@ impl Session {
         self.arming.disarm(now_us);
     }
 
-    /// The present position becomes zero.
+    /// The present position becomes zero; not while the knob is armed.
     pub fn zero(&mut self) {
-        self.zero_due = true;
+        if self.state().is_some_and(|state| state.flags.armed()) {
+            self.refusal = Some(wire::RefusedCode::ZeroWhileArmed.text().into());
+        } else {
+            self.zero_due = true;
+        }
     }
 
     /// The frame to send before closing: torque off, the host leaves.
@@ -511,7 +515,10 @@ impl Session {
                 }
             }
             EventKind::Refused => {
-                self.arming.forget();
+                // Of the rest only this one is not about ARM.
+                if event.code != wire::RefusedCode::ZeroWhileArmed as u8 {
+                    self.arming.forget();
+                }
                 self.refusal = Some(text.into());
             }
         }

@@ -173,8 +173,11 @@ pub fn soon(what: &str, mut holds: impl FnMut() -> bool) -> Duration {
     begun.elapsed()
 }
 
+/// What a link calls with each measurement.
+pub type Record<T> = Box<dyn FnMut(&T) + Send>;
+
 /// A channel for what a hook is told.
-pub fn recorder<T: Copy + Send + 'static>() -> (Box<dyn FnMut(&T) + Send>, Receiver<T>) {
+pub fn recorder<T: Copy + Send + 'static>() -> (Record<T>, Receiver<T>) {
     let (sender, receiver): (Sender<T>, Receiver<T>) = channel();
     let record = move |value: &T| {
         let _ = sender.send(*value);

@@ -1,0 +1,276 @@
+//! `chalumeau doctor`: which knobs there are, what keeps them from answering, and how well they do.
+
+use crate::cli::Failure;
+use crate::cli::args::within;
+use crate::device::discover::{Kind, candidates, chip, ports};
+use crate::device::{Choice, Hooks, KnobLink, LinkStatus, Phase, Places, serial_text};
+use crate::device::{midi, osc};
+use crate::identity::VERSION;
+use crate::wire::{Capabilities, Feel, Info, MAJOR, MINOR};
+use clap::Args;
+use serialport::SerialPortType;
+use std::io;
+use std::io::Write;
+use std::path::PathBuf;
+use std::thread;
+use std::time::{Duration, Instant};
+
+const EXAMPLES: &str = "\
+Examples:
+  chalumeau doctor                            everything that may be a knob
+  chalumeau doctor --path /dev/ttyUSB1        this port, whatever it is
+  chalumeau doctor --osc --any-address        stock firmware, over Wi-Fi
+  chalumeau doctor --seconds 60               a longer look at rate and jitter";
+
+/// A port is given so long to answer; a board that restarts when its port is opened takes 5 s.
+const ANSWER: Duration = Duration::from_secs(7);
+
+/// FEEL changes so often while it is timed.
+const FEEL_EVERY: Duration = Duration::from_millis(50);
+
+/// Which knobs there are, what keeps them from answering, and how well they do
+///
+/// Lists serial and MIDI ports, opens those a knob may be behind (known USB identities and simulated knobs, others only
+/// with --path), and tells what answers, its firmware, rate, jitter and round trip. Nothing is armed: the knob makes no
+/// torque. Without a knob it says what to do next.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Doctor {
+    /// Ask this serial port only, even if its USB identity is not known
+    #[arg(long, value_name = "PORT", conflicts_with = "osc")]
+    path: Option<PathBuf>,
+    /// Listen only for the OSC of unmodified firmware, at this port of UDP
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8000")]
+    osc: Option<u16>,
+    /// With --osc: listen to the whole network instead of this machine alone
+    #[arg(long, requires = "osc")]
+    any_address: bool,
+    /// How long each knob is watched once it answers, s, 1..3600
+    #[arg(long, value_name = "S", default_value_t = 3.0, value_parser = |s: &str| within(s, 1.0, 3600.0))]
+    seconds: f64,
+}
+
+impl Doctor {
+    pub fn run(&self) -> Result<(), Failure> {
+        let mut out = io::stdout().lock();
+        writeln!(out, "Chalumeau {VERSION}, TTLink {MAJOR}.{MINOR}")?;
+        if let Some(port) = self.osc {
+            return Ok(self.ask_osc(&mut out, port)?);
+        }
+        if let Some(path) = &self.path {
+            self.ask(&mut out, Choice::Path(path.clone()))?;
+            return Ok(());
+        }
+        let places = Places::default();
+        list_serial(&mut out, &places)?;
+        let midi = list_midi(&mut out)?;
+        let mut live = 0;
+        for candidate in candidates(&places) {
+            live += u32::from(self.ask(&mut out, Choice::Path(candidate.path))?);
+        }
+        for name in midi {
+            live += u32::from(self.ask(&mut out, Choice::Midi { name: Some(name) })?);
+        }
+        if live == 0 {
+            writeln!(out, "\n{NO_KNOB}")?;
+        }
+        Ok(())
+    }
+
+    /// Links to `choice`, watches it and tells; true if a knob with our firmware answered.
+    fn ask(&self, out: &mut impl Write, choice: Choice) -> io::Result<bool> {
+        let name = match &choice {
+            Choice::Path(path) => path.display().to_string(),
+            Choice::Midi { name } => name.clone().unwrap_or_default(),
+            Choice::Off | Choice::Serial { .. } | Choice::Osc { .. } => String::new(),
+        };
+        writeln!(out, "\n{name}")?;
+        out.flush()?;
+        // Law free: whatever these numbers are, they make no torque, and nothing is armed.
+        let (mut feel, mut changed) = (Feel::default(), Instant::now());
+        let changing = move || {
+            if changed.elapsed() > FEEL_EVERY {
+                changed = Instant::now();
+                feel.a_on_deg = if feel.a_on_deg == 120.0 { 121.0 } else { 120.0 };
+            }
+            Some(feel)
+        };
+        let hooks = Hooks { feel: Box::new(changing), ..Hooks::default() };
+        let (link, _reader) = KnobLink::spawn("chalumeau doctor", hooks);
+        link.choose(choice);
+        let status =
+            wait(&link, ANSWER, |phase| !matches!(phase, Phase::Off | Phase::Searching | Phase::Waiting));
+        if !matches!(status.phase, Phase::Live | Phase::VersionMismatch | Phase::ReadOnly) {
+            for line in status.text.split(". ") {
+                writeln!(out, "  {line}")?;
+            }
+            return Ok(false);
+        }
+        thread::sleep(Duration::from_secs_f64(self.seconds));
+        let status = link.status();
+        match &status.info {
+            Some(info) => tell_info(out, info)?,
+            None => writeln!(
+                out,
+                "  control changes, no answer to HELLO: tier 0, {}",
+                crate::device::stock::LABEL
+            )?,
+        }
+        tell_link(out, &status)?;
+        Ok(status.phase == Phase::Live)
+    }
+
+    fn ask_osc(&self, out: &mut impl Write, port: u16) -> io::Result<()> {
+        let from = if self.any_address { "the whole network" } else { "this machine alone" };
+        writeln!(out, "\nOSC at UDP port {port}, from {from}")?;
+        out.flush()?;
+        let (link, _reader) = KnobLink::spawn("chalumeau doctor", Hooks::default());
+        link.choose(Choice::Osc { port, any_address: self.any_address });
+        let is_told = |phase: &Phase| !matches!(phase, Phase::Off | Phase::Searching | Phase::Waiting);
+        let status = wait(&link, ANSWER.min(Duration::from_secs_f64(self.seconds + 1.0)), is_told);
+        match &status.phase {
+            Phase::ReadOnly => {
+                thread::sleep(Duration::from_secs_f64(self.seconds));
+                let status = link.status();
+                writeln!(out, "  a TorqueTuner's stock firmware: tier 0, {}", crate::device::stock::LABEL)?;
+                writeln!(out, "  angle: {:.1} degrees", status.angle_deg.unwrap_or(0.0))?;
+                writeln!(out, "  rate: {:.0} angles a second (25 are sent)", status.stats.rate_hz)?;
+                writeln!(out, "  ignored: {} messages", status.stats.ignored)
+            }
+            Phase::Busy(text) | Phase::HeldBy(text) | Phase::Failed(text) => writeln!(out, "  {text}"),
+            _ => {
+                writeln!(
+                    out,
+                    "  nothing heard ({} packets were none of a knob's)",
+                    link.status().stats.ignored
+                )?;
+                writeln!(
+                    out,
+                    "  Join the knob's Wi-Fi (TorqueTuner_001) and give this computer the address"
+                )?;
+                writeln!(
+                    out,
+                    "  192.168.4.2, or set the address of this computer in the knob's configuration,"
+                )?;
+                writeln!(
+                    out,
+                    "  and listen with --any-address. The port is {} as the firmware comes.",
+                    osc::PORT
+                )
+            }
+        }
+    }
+}
+
+const NO_KNOB: &str = "\
+No knob answers. What to do next:
+  A knob with a cable   plug it in and run this again; if its port is listed but not known, --path PORT
+  Stock firmware        chalumeau doctor --osc --any-address
+  No knob at all        chalumeau knob-sim, in another terminal, is one
+The whole way, step by step: docs/touch.md";
+
+fn wait(link: &KnobLink, most: Duration, until: impl Fn(&Phase) -> bool) -> LinkStatus {
+    let begun = Instant::now();
+    loop {
+        let status = link.status();
+        if until(&status.phase) || begun.elapsed() > most {
+            return status;
+        }
+        thread::sleep(Duration::from_millis(20));
+    }
+}
+
+fn list_serial(out: &mut impl Write, places: &Places) -> io::Result<()> {
+    writeln!(out, "\nSerial ports")?;
+    let ports = ports();
+    for port in &ports {
+        let what = match &port.port_type {
+            SerialPortType::UsbPort(usb) => {
+                let known = chip(usb.vid, usb.pid).map_or("not known: asked only with --path", |chip| chip);
+                let product = usb.product.as_deref().unwrap_or("");
+                format!("USB {:04x}:{:04x} {product} ({known})", usb.vid, usb.pid)
+            }
+            _ => "no USB device: asked only with --path".into(),
+        };
+        writeln!(out, "  {:<16} {what}", port.port_name)?;
+    }
+    for candidate in candidates(places) {
+        if let Kind::Simulated { serial, name } = &candidate.kind {
+            let path = candidate.path.display().to_string();
+            writeln!(out, "  {path:<16} simulated: {name}, {}", serial_text(*serial))?;
+        }
+    }
+    if ports.is_empty() && candidates(places).is_empty() {
+        writeln!(out, "  none")?;
+    }
+    Ok(())
+}
+
+/// The ports to ask.
+fn list_midi(out: &mut impl Write) -> io::Result<Vec<String>> {
+    writeln!(out, "\nMIDI ports")?;
+    let known = midi::ports(false).unwrap_or_default();
+    match midi::ports(true) {
+        Err(e) => writeln!(out, "  {e}")?,
+        Ok(all) if all.is_empty() => writeln!(out, "  none")?,
+        Ok(all) => {
+            for name in all {
+                let is_known =
+                    if known.contains(&name) { "" } else { " (does not sound like a knob: not asked)" };
+                writeln!(out, "  {name}{is_known}")?;
+            }
+        }
+    }
+    Ok(known)
+}
+
+fn tell_info(out: &mut impl Write, info: &Info) -> io::Result<()> {
+    let (major, minor, patch) = info.firmware;
+    let simulated = if info.capabilities.has(Capabilities::SIMULATED) { ", simulated" } else { "" };
+    writeln!(out, "  {}, serial number {}{simulated}", info.name_text(), serial_text(info.serial))?;
+    writeln!(out, "  firmware {major}.{minor}.{patch}, TTLink {}.{}", info.major, info.minor)?;
+    if info.speaks_our_major() {
+        writeln!(out, "  tier 2: position and feel")?;
+    } else {
+        writeln!(
+            out,
+            "  another major version than {MAJOR}: position only, never armed; flash the firmware in firmware/"
+        )?;
+    }
+    writeln!(
+        out,
+        "  haptic loop {} Hz, {} counts a turn, at most {} mNm, limp {} ms after silence",
+        info.loop_hz,
+        info.counts_per_turn,
+        info.ceiling_mnm,
+        info.watchdog_ms + info.fade_ms
+    )
+}
+
+fn tell_link(out: &mut impl Write, status: &LinkStatus) -> io::Result<()> {
+    let stats = &status.stats;
+    let ms = |us: u32| f64::from(us) * 1e-3;
+    let slow =
+        if status.is_slow { " at 115200 baud: does the cable or its driver not carry 921600?" } else { "" };
+    writeln!(out, "  angle: {:.2} degrees", status.angle_deg.unwrap_or(0.0))?;
+    writeln!(out, "  rate: {:.0} positions a second{slow}", stats.rate_hz)?;
+    writeln!(out, "  jitter: {:.2} ms p50, {:.2} ms p99", ms(stats.jitter_p50_us), ms(stats.jitter_p99_us))?;
+    let wire = &stats.wire;
+    writeln!(
+        out,
+        "  frames: {} received, {} lost, {} twice, {} damaged, {} bytes that were none",
+        wire.frames,
+        wire.lost,
+        wire.duplicates,
+        wire.crc_errors + wire.length_errors + wire.range_errors,
+        wire.skipped_bytes
+    )?;
+    let trip = |us: Option<u32>| us.map_or_else(|| "not seen".into(), |us| format!("{:.1} ms", ms(us)));
+    let (hello, feel) = (trip(stats.hello_round_trip_us), trip(stats.feel_round_trip_us));
+    writeln!(out, "  there and back: HELLO to INFO {hello}, FEEL to its echo {feel}")?;
+    writeln!(out, "  clocks differ by {:.0} ppm", stats.skew_ppm)?;
+    match &status.notice {
+        Some(notice) => writeln!(out, "  {notice}"),
+        None => Ok(()),
+    }
+}
