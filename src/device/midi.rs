@@ -59,12 +59,7 @@ pub struct MidiTransport {
 /// Names of the input ports behind which a knob may be; all of them with `any`.
 pub fn ports(any: bool) -> Result<Vec<String>, MidiError> {
     let input = MidiInput::new(CLIENT).map_err(|e| MidiError::Unavailable(e.to_string()))?;
-    Ok(names(&input).into_iter().filter(|name| any || is_known(name)).collect())
-}
-
-fn names<T: MidiIO>(io: &T) -> Vec<String> {
-    let names = io.ports().iter().filter_map(|port| io.port_name(port).ok()).collect::<Vec<_>>();
-    names.into_iter().filter(|name| !name.contains(CLIENT)).collect()
+    Ok(named(&input).into_iter().map(|(_, name)| name).filter(|name| any || is_known(name)).collect())
 }
 
 fn is_known(name: &str) -> bool {
@@ -72,19 +67,43 @@ fn is_known(name: &str) -> bool {
     KNOWN.iter().any(|known| name.contains(known))
 }
 
-/// The port whose name is, or contains, the wanted one; without a wish the first known.
-fn find<T: MidiIO>(io: &T, wanted: Option<&str>) -> Option<(T::Port, String)> {
-    let names = |port: &T::Port| io.port_name(port).ok().filter(|name| !name.contains(CLIENT));
-    let named: Vec<_> =
-        io.ports().into_iter().filter_map(|port| names(&port).map(|name| (port, name))).collect();
-    let exact = named.iter().find(|(_, name)| Some(name.as_str()) == wanted);
-    let close = || {
-        named.iter().find(|(_, name)| match wanted {
-            Some(wanted) => name.to_lowercase().contains(&wanted.to_lowercase()),
-            None => is_known(name),
-        })
+/// Every port but our own, with its name.
+fn named<T: MidiIO>(io: &T) -> Vec<(T::Port, String)> {
+    let named = |port: T::Port| io.port_name(&port).ok().map(|name| (port, name));
+    io.ports().into_iter().filter_map(named).filter(|(_, name)| !name.contains(CLIENT)).collect()
+}
+
+/// Which of these names is, or contains, the wanted one; without a wish the first known.
+fn choose(names: &[&str], wanted: Option<&str>) -> Option<usize> {
+    let close = |name: &&str| match wanted {
+        Some(wanted) => name.to_lowercase().contains(&wanted.to_lowercase()),
+        None => is_known(name),
     };
-    exact.or_else(close).cloned()
+    names.iter().position(|name| Some(*name) == wanted).or_else(|| names.iter().position(close))
+}
+
+/// Which of these names belongs to the same device as `name`.
+fn choose_partner(names: &[&str], name: &str) -> Option<usize> {
+    let twin = names.iter().position(|other| device(other) == device(name));
+    twin.or_else(|| choose(names, Some(device(name).1)))
+}
+
+fn find<T: MidiIO>(io: &T, choice: impl FnOnce(&[&str]) -> Option<usize>) -> Option<(T::Port, String)> {
+    let mut named = named(io);
+    let names: Vec<&str> = named.iter().map(|(_, name)| name.as_str()).collect();
+    choice(&names).map(|index| named.swap_remove(index))
+}
+
+/// Client and port without what tells two ports of one device apart: ALSA appends the numbers of client and port to the
+/// name (`Knob:Knob MIDI 1 28:0`), JACK a number to the client, as programs open one for each direction
+/// (`Knob-01:Knob`). On other systems a port is its name.
+fn device(name: &str) -> (&str, &str) {
+    let end = name.rfind(' ').filter(|at| name[at + 1..].contains(':'));
+    let name = &name[..end.unwrap_or(name.len())];
+    let Some((client, port)) = name.split_once(':') else { return ("", name) };
+    let is_number = |text: &str| text.len() == 2 && text.bytes().all(|byte| byte.is_ascii_digit());
+    let client = client.rsplit_once('-').filter(|(_, number)| is_number(number)).map_or(client, |(of, _)| of);
+    (client, port)
 }
 
 impl MidiTransport {
@@ -99,7 +118,7 @@ impl MidiTransport {
             Some(name) => MidiError::Missing(format!("called {name}")),
             None => MidiError::Missing("called TorqueTuner or Chalumeau".into()),
         };
-        let (port, name) = find(&input, wanted).ok_or_else(missing)?;
+        let (port, name) = find(&input, |names| choose(names, wanted)).ok_or_else(missing)?;
         let (sender, incoming) = sync_channel(QUEUE);
         let on_message = move |_stamp: u64, bytes: &[u8], _: &mut ()| {
             let _ = sender.try_send(bytes.to_vec());
@@ -107,19 +126,13 @@ impl MidiTransport {
         let refused = |reason: String| MidiError::Refused { name: name.clone(), reason };
         let input = input.connect(&port, "from knob", on_message, ()).map_err(|e| refused(e.to_string()))?;
         let output = MidiOutput::new(CLIENT).map_err(unavailable)?;
-        let output = match find(&output, Some(&partner(&name))) {
+        let output = match find(&output, |names| choose_partner(names, &name)) {
             Some((port, _)) => Some(output.connect(&port, "to knob").map_err(|e| refused(e.to_string()))?),
             None => None,
         };
         let watch = Watch::begin(name.clone());
         Ok(Self { name, incoming, _input: input, output, watch })
     }
-}
-
-/// What the other port of a device is called: ALSA appends client and port numbers, which may differ.
-fn partner(name: &str) -> String {
-    let end = name.rfind(' ').filter(|at| name[at + 1..].contains(':'));
-    name[..end.unwrap_or(name.len())].to_owned()
 }
 
 impl Transport for MidiTransport {
@@ -207,8 +220,30 @@ mod tests {
     }
 
     #[test]
-    fn the_other_port_is_found_whatever_numbers_alsa_gives() {
-        assert_eq!(partner("TorqueTuner:TorqueTuner MIDI 1 28:0"), "TorqueTuner:TorqueTuner MIDI 1");
-        assert_eq!(partner("TorqueTuner MIDI 1"), "TorqueTuner MIDI 1");
+    fn the_other_port_is_found_whatever_the_system_appends() {
+        for (input, outputs, expected) in [
+            (
+                "Knob:Knob MIDI 1 28:0",
+                ["Thru:Thru 14:0", "Knob:Knob MIDI 2 28:1", "Knob:Knob MIDI 1 29:0"],
+                2,
+            ),
+            ("Knob-01:Knob", ["system:midi_playback_1", "Other-01:Other", "Knob:Knob"], 2),
+            ("Knob MIDI 1", ["Synth", "Knob MIDI 1", "Knob MIDI 2"], 1),
+            ("Knob", ["Synth", "2- Knob", "Piano"], 1),
+        ] {
+            assert_eq!(choose_partner(&outputs, input), Some(expected), "{input}");
+        }
+        assert_eq!(choose_partner(&["Synth", "Thru:Thru 14:0"], "Knob:Knob 28:0"), None);
+    }
+
+    #[test]
+    fn the_name_asked_for_goes_before_one_that_contains_it() {
+        let names = ["My TorqueTuner", "TorqueTuner", "Thru"];
+        assert_eq!(choose(&names, Some("TorqueTuner")), Some(1));
+        assert_eq!(choose(&names, Some("thru")), Some(2));
+        assert_eq!(choose(&names, Some("my")), Some(0));
+        assert_eq!(choose(&names, Some("Synth")), None);
+        assert_eq!(choose(&names, None), Some(0));
+        assert_eq!(choose(&["Thru"], None), None);
     }
 }
