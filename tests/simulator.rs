@@ -214,9 +214,9 @@ fn pressed_deg(feel: Feel, plant: PlantDesign, angle_deg: f64, damping_nms: f64)
     Some(unrest_deg(&mut host))
 }
 
-/// A wall, and a pressure law, of a share of the stiffness 2 b / T the firmware accepts; with where to press them.
+/// A wall, and a pressure law, of a share of the stiffness b / (2 T) the firmware accepts; with where to press them.
 fn springs(plant: &PlantDesign, share: f64) -> impl Iterator<Item = (Feel, f64)> {
-    let mnm_per_deg = (1000.0 * share * 2.0 * plant.viscous_nms * 2000.0).to_radians();
+    let mnm_per_deg = (1000.0 * share * 0.5 * plant.viscous_nms * 2000.0).to_radians();
     let base =
         |scale_mnm, stretch| Feel { damping_mnms: 0.0, ..feel(Law::Pressure, scale_mnm, stretch, H, K) };
     let wall = Feel { wall_deg: 100.0, wall_mnm_per_deg: mnm_per_deg as f32, ..base(0.0, 1.0) };
@@ -225,14 +225,13 @@ fn springs(plant: &PlantDesign, share: f64) -> impl Iterator<Item = (Feel, f64)>
 }
 
 #[test]
-fn every_spring_allowed_is_calm_under_a_finger_and_the_softer_ones_under_a_weight() {
+fn every_spring_allowed_is_calm_under_any_load() {
     // Colgate and Brown: b > K (T/2 + delay). The bus delays by a whole T, so that a load without damping of its own, a
-    // weight, needs K < 2 b / (3 T): a third of the 2 b / T that is accepted. Fingers damp ten times what the knob does.
+    // weight, needs K < 2 b / (3 T); b / (2 T) is accepted. Fingers damp ten times what the knob does.
     for (who, damping_nms, shares) in [
         ("finger", 0.01, &[0.1, 0.25, 0.5, 0.75, 0.99][..]),
         ("light finger", 0.003, &[0.1, 0.25, 0.5, 0.75, 0.99]),
-        ("weight", 0.0, &[0.1, 0.25]),
-        ("weight beyond", 0.0, &[0.33, 0.5, 0.75, 0.99]),
+        ("weight", 0.0, &[0.1, 0.25, 0.5, 0.75, 0.99]),
     ] {
         let mut tried = 0;
         for &share in shares {
@@ -241,14 +240,13 @@ fn every_spring_allowed_is_calm_under_a_finger_and_the_softer_ones_under_a_weigh
                 for (feel, angle_deg) in springs(&plant, share) {
                     let Some(unrest) = pressed_deg(feel, plant, angle_deg, damping_nms) else { continue };
                     (worst, tried) = (worst.max(unrest), tried + 1);
-                    let is_promised = who != "weight beyond";
                     assert!(
-                        unrest < REST_DEG || !is_promised,
-                        "{who}, {share} of 2 b / T: {unrest} deg rms, {feel:?} {plant:?}"
+                        unrest < REST_DEG,
+                        "{who}, {share} of b / (2 T): {unrest} deg rms, {feel:?} {plant:?}"
                     );
                 }
             }
-            println!("{who}, {share} of 2 b / T: at most {worst:.3} deg rms");
+            println!("{who}, {share} of b / (2 T): at most {worst:.3} deg rms");
         }
         assert!(tried >= 4, "{who} tried nothing");
     }
@@ -380,7 +378,8 @@ const HARM_S: f64 = 0.6;
 fn break_it(harm: Harm, midi: bool, seed: u64) -> f64 {
     let mut rng = Rng::with_seed(seed);
     let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
-    let plant = PlantDesign { torque_step_nm: 0.0, ..PlantDesign::default() };
+    // Damped enough for every feel drawn below to be allowed.
+    let plant = PlantDesign { torque_step_nm: 0.0, viscous_nms: 2e-3, ..PlantDesign::default() };
     let knob = SimulatedKnob::new(
         setup(midi, plant.viscous_nms),
         plant,

@@ -288,7 +288,7 @@ CLAIM(fault_8_torque_is_mnm_and_a_board_says_what_it_clips) {
     std::printf("    the stock board clips from %.1f to %.1f degrees\n", 0.1 * first, 0.1 * last);
     CHECK(first == 29 && last == 3263);
     // Ours declares its ceiling instead, and refuses a scale beyond it.
-    Config config;
+    Config config = test::damped();
     config.ceiling_mnm = 100;
     test::Bench bench(config);
     bench.run(1);

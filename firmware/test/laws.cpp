@@ -252,10 +252,10 @@ CLAIM(what_would_shake_push_or_exceed_is_refused_with_its_number) {
 CLAIM(walls_of_100_mnm_per_degree_ask_for_a_knob_that_damps_more) {
     Feel feel = test::seed_feel();
     feel.wall_mnm_per_deg = 100.0F;
-    for (float damping : {2e-4F, 5e-4F, 1.4e-3F, 1.5e-3F, 2e-3F}) {
+    for (float damping : {5e-4F, 2e-3F, 5.6e-3F, 5.8e-3F, 8e-3F}) {
         Config config;
         config.knob_damping_nms = damping;
         const bool accepted = check_feel(feel, Device(config).allowed()).code == Refusal::None;
-        CHECK(accepted == (damping > 1.43e-3F));
+        CHECK(accepted == (damping > 5.73e-3F));
     }
 }

@@ -29,7 +29,7 @@ int ticks_to_rest(Bench& bench, int most) {
 }
 
 Config midi_config() {
-    Config config;
+    Config config = test::damped();
     config.binding = Binding::Midi;
     return config;
 }
@@ -119,7 +119,7 @@ CLAIM(nothing_arms_while_the_knob_moves) {
 }
 
 CLAIM(rule_1_silence_of_the_host_fades_torque_within_130_ms_on_serial_and_380_on_midi) {
-    for (const Config& config : {Config{}, midi_config()}) {
+    for (const Config& config : {test::damped(), midi_config()}) {
         const int watchdog = config.binding == Binding::Serial ? 160 : 660;
         Bench bench(config);
         bench.ready(held_feel(), 1200);
@@ -276,7 +276,7 @@ CLAIM(another_major_version_of_either_side_never_arms) {
     host_of_two.feel(held_feel());
     host_of_two.run(200);
     CHECK(host_of_two.device.feel().law == 0 && host_of_two.states > 40);
-    Config config;
+    Config config = test::damped();
     config.major = 2;
     Bench knob_of_two(config);
     knob_of_two.run(1);
@@ -289,10 +289,9 @@ CLAIM(another_major_version_of_either_side_never_arms) {
 CLAIM(rule_4_no_command_exceeds_the_least_of_all_ceilings) {
     test::Random random(6);
     for (int trial = 0; trial < 200; ++trial) {
-        Config config;
+        Config config = test::damped();
         config.ceiling_mnm = static_cast<std::uint16_t>(50 + random.below(600));
-        config.knob_damping_nms = 2e-3F;
-        Bench bench(config);
+            Bench bench(config);
         std::uint16_t user = static_cast<std::uint16_t>(random.below(451));
         Feel feel = held_feel();
         feel.scale_mnm = random.between(0.0F, 450.0F);
@@ -335,8 +334,7 @@ CLAIM(rule_4_a_ceiling_falls_at_once_and_rises_at_5_nm_per_s) {
 }
 
 CLAIM(rule_4_heat_lowers_the_ceiling_to_the_rating_without_a_step_and_lets_go_again) {
-    Config config;
-    config.knob_damping_nms = 2e-3F;
+    Config config = test::damped();
     config.push_limit = 1.0F;
     Bench bench(config);
     Feel feel = held_feel();
@@ -384,8 +382,7 @@ CLAIM(rule_4_heat_goes_on_cooling_while_disarmed) {
 /// nothing faster than 5 N m/s is left.
 CLAIM(rule_5_no_change_of_parameters_moves_torque_faster_than_5_nm_per_s) {
     test::Random random(7);
-    Config config;
-    config.knob_damping_nms = 2e-3F;
+    Config config = test::damped();
     config.push_limit = 10.0F;
     config.rating_mnm = 450;
     Bench bench(config);
@@ -570,7 +567,7 @@ CLAIM(watchdogs_run_on_a_clock_that_stands_still_wraps_or_jumps_back) {
 }
 
 CLAIM(a_stalled_loop_comes_back_without_torque) {
-    for (const Config& config : {Config{}, midi_config()}) {
+    for (const Config& config : {test::damped(), midi_config()}) {
         Bench bench(config);
         bench.ready(held_feel(), 1200);
         bench.t_us += 500000;  // nobody called tick for half a second

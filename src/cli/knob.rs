@@ -9,7 +9,7 @@ use crate::instrument::Settings;
 use crate::output::OutputError;
 use crate::touch::feel::Feels;
 use crate::touch::take::{Marks, Moment, TakeWriter};
-use crate::units::{Air, WrittenNote};
+use crate::units::WrittenNote;
 use clap::{ArgGroup, Args};
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
@@ -85,7 +85,7 @@ impl Knob {
         let file = self.instrument.load()?;
         let written = WrittenNote(self.written);
         check_fingering(&file, written)?;
-        let feels = Feels::new(&file, Air::default());
+        let feels = Feels::new(&*self.instrument.model(file.clone(), 48_000)?);
         let ceiling_mnm = self.arm.unwrap_or(100.0);
         let limits = Limits { ceiling_mnm, ..Limits::default() };
         let settings = Settings::default();

@@ -9,7 +9,7 @@ use crate::cli::table::Table;
 use crate::control::knob::KnobDesign;
 use crate::event::{Event, Timed};
 use crate::instrument::model::internal_rate_hz;
-use crate::instrument::{Clarinet, Probe, Settings};
+use crate::instrument::{Clarinet, Model, Probe, Settings};
 use crate::output::NewFile;
 use crate::render as player;
 use crate::render::breath::BreathCurve;
@@ -20,7 +20,7 @@ use crate::render::wav::{Depth, Level, WavFile};
 use crate::touch::blower::{Blower, Blown, Hand};
 use crate::touch::feel::{Feels, NO_MOTOR};
 use crate::touch::take::Take;
-use crate::units::{Air, SoundingNote, WrittenNote};
+use crate::units::{SoundingNote, WrittenNote};
 
 use clap::{ArgGroup, Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -145,8 +145,9 @@ impl Render {
         if let Some(curve) = &curve {
             score = score.blown(curve, &settings, self.rate);
         }
+        let model = self.instrument.model(file, self.rate)?;
         if let Some(take) = &self.replay {
-            score.events = self.replayed(take, &file, &settings, &score)?;
+            score.events = self.replayed(take, &model, &settings, &score)?;
         }
         // A single note lasts as long as was asked; a melody gets time to fade.
         let one_note = self.written.is_some() || self.sounding.is_some();
@@ -155,7 +156,6 @@ impl Render {
         let mut out = NewFile::create(&self.out, self.force)?;
         let mut probe = self.probe.as_deref().map(|path| ProbeTable::open(path, self)).transpose()?;
 
-        let model = self.instrument.model(file, self.rate)?;
         let mut clarinet = Clarinet::new(model, f64::from(self.rate));
         clarinet.set_settings(&settings);
         // As a host does before it plays: the settings are in place from the first sample.
@@ -197,14 +197,14 @@ impl Render {
     fn replayed(
         &self,
         path: &Path,
-        file: &InstrumentFile,
+        model: &Model,
         settings: &Settings,
         score: &Score,
     ) -> Result<Vec<Timed<Event>>, Failure> {
         let from = fs::File::open(path).map_err(|source| Failure::Read { path: path.to_owned(), source })?;
         let take = Take::read(from).map_err(|source| Failure::TakeFile { path: path.to_owned(), source })?;
-        let feels = Feels::new(file, Air::default());
-        let design = self.feel.design(file)?;
+        let feels = Feels::new(model);
+        let design = self.feel.design(&model.file)?;
         let table = feels.table(settings, &design, &NO_MOTOR)?;
         let knob = KnobDesign { full_deg: design.travel_deg, ..KnobDesign::default() };
         let hand = Hand { maps: feels.maps(&table), design: knob, feels: true };

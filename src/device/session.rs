@@ -243,7 +243,7 @@ impl Session {
             Some(_) if !self.is_heard(now_us) => "not armed: the knob is silent",
             Some(info) => {
                 self.arming.arm(ceiling_mnm, further_act, info, now_us);
-                (self.refusal, self.notice) = (None, None);
+                (self.refusal, self.notice, self.zero_due) = (None, None, false);
                 return;
             }
         };
@@ -262,7 +262,7 @@ impl Session {
 
     /// The present position becomes zero; not while the knob is armed.
     pub fn zero(&mut self) {
-        if self.state().is_some_and(|state| state.flags.armed()) {
+        if self.arming.is_armed() {
             self.refusal = Some(wire::RefusedCode::ZeroWhileArmed.text().into());
         } else {
             self.zero_due = true;
@@ -364,7 +364,9 @@ impl Session {
             }
         }
         self.info.as_ref()?;
-        if std::mem::take(&mut self.zero_due) {
+        // A knob that has just been told FREE may still say that it is armed, and would refuse.
+        let is_free = self.state().is_none_or(|state| !state.flags.armed());
+        if is_free && std::mem::take(&mut self.zero_due) {
             return Some(Message::Zero(0));
         }
         if std::mem::take(&mut self.rate_due) {

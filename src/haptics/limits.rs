@@ -2,8 +2,8 @@
 
 use crate::wire::message::Info;
 
-/// Least a knob's own damping, N m s/rad, and the period of its loop, s: what is assumed before a knob has said.
-const CAUTIOUS: (f64, f64) = (2e-4, 1.0 / 2_000.0);
+/// A knob's own damping, N m s/rad, and the period of its loop, s: our firmware's defaults, assumed before a knob has said.
+const ASSUMED: (f64, f64) = (5e-4, 1.0 / 2_000.0);
 
 /// Limits a feel must keep: a device refuses what exceeds its own, and the host says so before it sends.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,10 +28,10 @@ impl Limits {
 }
 
 impl Default for Limits {
-    /// The first ceiling a user is offered, `2 b / T` of the least damped knob (0.8 N m/rad), and the push our firmware
-    /// accepts.
+    /// The first ceiling a user is offered, and the slopes our firmware accepts: `b / (2 T)` (0.5 N m/rad) towards rest,
+    /// 0.2 N m/rad away from it.
     fn default() -> Self {
-        let (damping, period_s) = CAUTIOUS;
-        Self { ceiling_mnm: 100.0, stiffness_nm_per_rad: 2.0 * damping / period_s, push_nm_per_rad: 0.2 }
+        let (damping, period_s) = ASSUMED;
+        Self { ceiling_mnm: 100.0, stiffness_nm_per_rad: 0.5 * damping / period_s, push_nm_per_rad: 0.2 }
     }
 }

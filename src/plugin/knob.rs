@@ -34,7 +34,7 @@ pub struct Shared {
     /// Factors on H and k from controllers, bits of f32s.
     reed: [AtomicU32; 2],
     /// The feel in force, with the instrument it is of. Only desk and link lock it.
-    feel: Mutex<Option<Arc<(Feels, FeelTable)>>>,
+    feel: Mutex<Option<Arc<(&'static Feels, FeelTable)>>>,
     stop: AtomicBool,
 }
 

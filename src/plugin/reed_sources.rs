@@ -99,7 +99,7 @@ mod tests {
         assert!((h - 1.6).abs() < 1e-6 && (k - 1.6_f32.sqrt()).abs() < 1e-6, "{h} {k}");
         assert!(reed.take(&cc(74, 0), sources));
         assert!(reed.factors(sources)[0] < 1.0 / 1.59);
-        assert_eq!(reed.changed(sources).is_some(), true);
+        assert!(reed.changed(sources).is_some());
         assert_eq!(reed.changed(sources), None);
     }
 

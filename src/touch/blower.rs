@@ -191,16 +191,14 @@ impl<I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Iterator 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bore::instrument_file::InstrumentFile;
     use crate::control::midi::MidiDecoder;
     use crate::haptics::FeelDesign;
     use crate::instrument::Settings;
     use crate::touch::feel::{Feels, NO_MOTOR};
-    use crate::units::Air;
     use std::sync::LazyLock;
 
     static HAND: LazyLock<Hand> = LazyLock::new(|| {
-        let feels = Feels::new(&InstrumentFile::built_in(), Air::default());
+        let feels = Feels::built_in().unwrap();
         let table = feels.table(&Settings::default(), &FeelDesign::default(), &NO_MOTOR).unwrap();
         Hand { maps: feels.maps(&table), design: KnobDesign::default(), feels: true }
     });

@@ -2,9 +2,10 @@
 
 use crate::bore::instrument_file::InstrumentFile;
 use crate::haptics::{AngleMap, FeelDesign, FeelRefused, FeelTable, Limits, Requirements};
-use crate::instrument::Settings;
-use crate::instrument::felt::played_reed;
-use crate::units::{Air, SoundingNote};
+use crate::instrument::felt::{played_reed, requirements};
+use crate::instrument::{BuildError, Model, Settings};
+use crate::units::SoundingNote;
+use std::sync::LazyLock;
 
 /// Pitches there are names for.
 const PITCHES: usize = 128;
@@ -16,7 +17,11 @@ pub const NO_MOTOR: Limits = Limits {
     push_nm_per_rad: f64::INFINITY,
 };
 
-/// An instrument, and what its bore asks for every note. Building one takes half a second.
+/// The built-in clarinet, worked out once for all that play it.
+static BUILT_IN: LazyLock<Result<Feels, BuildError>> =
+    LazyLock::new(|| Model::built_in(48_000.0).map(|model| Feels::new(&model)));
+
+/// An instrument, and what its bore asks for every note. Building one takes a second.
 #[derive(Clone, Debug)]
 pub struct Feels {
     requirements: Requirements,
@@ -26,8 +31,14 @@ pub struct Feels {
 }
 
 impl Feels {
-    /// Measures an instrument in an air. Allocates; takes half a second.
-    pub fn new(file: &InstrumentFile, air: Air) -> Self {
+    /// The built-in clarinet. The first call takes a second.
+    pub fn built_in() -> Result<&'static Self, &'static BuildError> {
+        BUILT_IN.as_ref()
+    }
+
+    /// Asks an instrument for every note, through the lattice that sounds. Allocates; takes a second.
+    pub fn new(model: &Model) -> Self {
+        let file = &model.file;
         let mut fingerings = [None; PITCHES];
         for (index, fingering) in file.fingerings.iter().enumerate() {
             let sounding = fingering.written.sounding(file.transposition).unwrap_or(SoundingNote(0));
@@ -35,7 +46,7 @@ impl Feels {
                 *place = u8::try_from(index).ok();
             }
         }
-        Self { requirements: Requirements::new(file, air), file: file.clone(), fingerings }
+        Self { requirements: requirements(model), file: file.clone(), fingerings }
     }
 
     /// What the bore asks.

@@ -10,7 +10,7 @@ use anyhow::{Context, Result, bail};
 use crate::machine::{
     self, ALSA, ARM_CXX, ARM_LIBRARY, CC, CXX, GL, GLIB, JACK, PKG_CONFIG, Package, VENV, XCB,
 };
-use crate::{COMMANDS, bundle, firmware};
+use crate::{COMMANDS, bundle, firmware, simulator};
 
 /// DawDreamer's version is pinned: a new one may host differently.
 const PYTHON_PACKAGES: &[&str] = &["dawdreamer==0.9.0", "numpy<3"];
@@ -21,9 +21,11 @@ const STEPS: &[Step] = &[
     ("system packages", packages),
     ("format", || cargo("fmt --all --check")),
     ("clippy, core", || cargo("clippy --no-default-features --features cli --all-targets -- -D warnings")),
+    ("clippy, knob", || cargo("clippy --no-default-features --features simulator --all-targets -- -D warnings")),
     ("clippy, all features", || cargo("clippy --all-features --all-targets -- -D warnings")),
     ("clippy, xtask", || cargo("clippy -p xtask --all-targets -- -D warnings")),
     ("tests, core", || cargo("test --no-default-features --features cli --no-fail-fast")),
+    ("tests, knob", knob),
     ("tests, all features", || cargo("test --all-features --lib --bins --no-fail-fast")),
     ("documentation", documentation),
     ("generated files", generated),
@@ -31,9 +33,11 @@ const STEPS: &[Step] = &[
     ("clippy, firmware's crate", || cargo("clippy -p chalumeau-firmware --all-targets -- -D warnings")),
     ("firmware, host and ARM", firmware::all),
     ("bundle", || bundle::run(&[])),
+    ("simulated knob", simulator::build),
     ("tests, xtask and its MIDI reader", || cargo("test -p xtask --lib --bins")),
     ("CLAP in clack-host", || cargo("test -p xtask --test clap --no-fail-fast")),
     ("CLAP with allocation checks", clap_checked),
+    ("CLAP with the simulated knob", || cargo("test -p xtask --test knob --no-fail-fast")),
     ("VST3 in vst3-host", || cargo("test -p xtask --test vst3 --no-fail-fast")),
     ("VST3 in DawDreamer", dawdreamer),
     ("instructions", || machine::run(&mut Command::new("benches/instructions.sh"))),
@@ -92,6 +96,12 @@ fn packages() -> Result<()> {
         &[]
     };
     machine::provide(needed)
+}
+
+/// Haptics, links, firmware and simulator together; what the core's tests cover is not run again.
+fn knob() -> Result<()> {
+    let tests = ["device", "simulator", "haptics"].map(|name| format!(" --test {name}")).concat();
+    cargo(&format!("test --no-default-features --features simulator --no-fail-fast --lib --bins{tests}"))
 }
 
 fn documentation() -> Result<()> {

@@ -5,15 +5,13 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, bail};
-use chalumeau::bore::instrument_file::InstrumentFile;
+use anyhow::{Context, Result, anyhow, bail};
 use chalumeau::control::keys::Keys;
 use chalumeau::event::Event;
 use chalumeau::haptics::{FeelDesign, FeelTable, Limits};
 use chalumeau::instrument::Settings;
 use chalumeau::render::score::Score;
 use chalumeau::touch::feel::Feels;
-use chalumeau::units::Air;
 
 use crate::host::{At, Plugin, Say, Session};
 use crate::simulator::{Simulator, serial_number};
@@ -43,10 +41,10 @@ pub struct Performance {
 
 /// Plays the notes of a score through the plugin, its breath through the knob.
 pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -> Result<Performance> {
-    let feels = Feels::new(&InstrumentFile::built_in(), Air::default());
+    let feels = Feels::built_in().map_err(|reason| anyhow!("{reason}"))?;
     let table = feels.table(&Settings::default(), &FeelDesign::default(), &Limits::default())?;
     let hand = folder.join("hand.csv");
-    std::fs::write(&hand, script(score, &feels, &table, rate))?;
+    std::fs::write(&hand, script(score, feels, &table, rate))?;
     let log = folder.join("knob.csv");
     let number = serial_number();
     let text = |path: &Path| path.to_string_lossy().into_owned();
@@ -92,7 +90,7 @@ pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -
         left,
         knob: read_log(&log)?,
         gamma: breath.into_iter().map(|[t, unit]| [t, unit * full]).collect(),
-        threshold: threshold(score, &feels, &table, rate),
+        threshold: threshold(score, feels, &table, rate),
     })
 }
 

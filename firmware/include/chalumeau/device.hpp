@@ -63,7 +63,9 @@ class Device {
           session_(config.major, config.binding == Binding::Serial ? WATCHDOG_SERIAL_MS : WATCHDOG_MIDI_MS),
           outbox_(config.binding),
           state_hz_(config.binding == Binding::Serial ? STATE_HZ_SERIAL : STATE_HZ_MIDI) {
-        allowed_.stiffness = 2.0F * config.knob_damping_nms / LOOP_S;
+        // Sampling alone allows 2 b / T; a period of delay on the bus leaves a third of it (Colgate and Brown 1994,
+        // b > K (T/2 + delay)); a quarter is calm under any load (docs/simulator.md).
+        allowed_.stiffness = 0.5F * config.knob_damping_nms / LOOP_S;
         allowed_.push = config.push_limit;
         allowed_.ceiling_mnm = limits_.device_mnm();
     }

@@ -241,7 +241,7 @@ class Curve {
 
 /// What a device allows.
 struct FeelLimits {
-    float stiffness = 2.0F;    // N m/rad
+    float stiffness = 0.5F;    // N m/rad
     float push = 0.2F;         // N m/rad
     float ceiling_mnm = 450.0F;
 };

@@ -4,7 +4,6 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use super::{NO_NOTE, Shared, desk};
-use crate::bore::instrument_file::InstrumentFile;
 use crate::device::KnobReader;
 use crate::event::{Event, Timed};
 use crate::instrument::{Clarinet, Settings};
@@ -12,7 +11,6 @@ use crate::plugin::params::ChalumeauParams;
 use crate::touch::blower::{Blower, Blown, Breath14, GRID, Hand};
 use crate::touch::feel::{Feels, NO_MOTOR};
 use crate::touch::take::Take;
-use crate::units::Air;
 
 /// Breath values of one block that are also sent to the host: a block of 8192 samples has 128.
 const MOST_SENT: usize = 8_192 / GRID as usize;
@@ -94,7 +92,7 @@ impl Audio {
         let Ok(path) = params.knob.take.read().map(|path| path.clone()) else { return };
         // A take or feel that cannot be had is worded by the desk; nothing is replayed then.
         let Ok(take) = desk::load(&path) else { return };
-        let feels = Feels::new(&InstrumentFile::built_in(), Air::default());
+        let Ok(feels) = Feels::built_in() else { return };
         let Ok(table) = feels.table(&params.settings(), &desk::design(&params.knob), &NO_MOTOR) else {
             return;
         };

@@ -7,7 +7,6 @@ use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::Shared;
-use crate::bore::instrument_file::InstrumentFile;
 use crate::control::knob::{self, KnobDesign, Taken};
 use crate::device::{
     Choice, Hooks, KnobLink, KnobReader, LinkStatus, Phase, StateSample, serial_number, serial_text,
@@ -20,7 +19,7 @@ use crate::touch::blower::Hand;
 use crate::touch::feel::Feels;
 use crate::touch::study::{Side, plan};
 use crate::touch::take::{Marks, Moment, Take, TakeWriter};
-use crate::units::{Air, SoundingNote, WrittenNote};
+use crate::units::{SoundingNote, WrittenNote};
 use crate::wire::Law;
 
 /// How often the desk looks up.
@@ -49,7 +48,6 @@ pub struct Desk {
     hand_in: triple_buffer::Input<Hand>,
     hand: Hand,
     take: triple_buffer::Input<Option<Arc<Take>>>,
-    feels: Option<Feels>,
     /// What the feel in force was worked out from.
     made_of: Option<(Settings, FeelDesign, Limits)>,
     refused: Option<String>,
@@ -93,7 +91,6 @@ impl Desk {
             hand_in,
             hand: Hand::default(),
             take,
-            feels: None,
             made_of: None,
             refused: None,
             link: None,
@@ -217,13 +214,13 @@ impl Desk {
             return;
         }
         self.made_of = Some((settings, design, limits));
-        let feels = self.feels.get_or_insert_with(|| Feels::new(&InstrumentFile::built_in(), Air::default()));
+        let Ok(feels) = Feels::built_in() else { return };
         match feels.table(&settings, &design, &limits) {
             Ok(table) => {
                 self.hand.maps = feels.maps(&table);
                 self.hand_in.write(self.hand);
                 if let Ok(mut feel) = self.shared.feel.lock() {
-                    *feel = Some(Arc::new((feels.clone(), table)));
+                    *feel = Some(Arc::new((feels, table)));
                 }
                 self.refused = None;
             }
@@ -272,12 +269,10 @@ impl Desk {
             feel_port: u16::try_from(knob.feel_port.value()).unwrap_or(0),
         };
         let before = &self.switches;
-        if !(is_live(status) && !now.arm) {
-            if !now.arm {
-                self.quiet_since = None;
-            }
-        } else if self.quiet_since.is_none() {
-            self.quiet_since = Some(Instant::now());
+        if !is_live(status) {
+            self.quiet_since = None;
+        } else if !now.arm {
+            self.quiet_since.get_or_insert_with(Instant::now);
         }
         if now.arm && !before.arm {
             if self.quiet_since.is_some_and(|since| since.elapsed() >= ARM_AFTER) {
