@@ -18,8 +18,14 @@ pub fn build() -> Result<()> {
     machine::run(machine::cargo().args(["build", "--bin", "chalumeau", "--profile=plugin"]).args(features))
 }
 
-/// The program that `build` makes.
+/// Another program of the same command line, to be used instead.
+pub const PROGRAM: &str = "CHALUMEAU_PROGRAM";
+
+/// The program that `build` makes, unless [`PROGRAM`] names another.
 pub fn program() -> Result<PathBuf> {
+    if let Some(path) = std::env::var_os(PROGRAM) {
+        return Ok(machine::root().join(path));
+    }
     let path = machine::target().join("plugin").join(format!("chalumeau{}", std::env::consts::EXE_SUFFIX));
     if path.exists() { Ok(path) } else { bail!("{} is not there; run `cargo xtask bundle`", path.display()) }
 }
