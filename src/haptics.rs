@@ -11,7 +11,6 @@ pub mod law;
 mod limits;
 mod map;
 mod onset;
-pub mod osc;
 mod requirement;
 
 pub use feel::{FeelDesign, FeelRefused, FeelTable, Landmarks, NoteFeel, Order};

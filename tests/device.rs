@@ -484,6 +484,7 @@ struct Bench {
     to_knob: Vec<(i64, Message)>,
     sent_at_us: Vec<i64>,
     states: usize,
+    period_us: u32,
 }
 
 impl Bench {
@@ -499,6 +500,7 @@ impl Bench {
             to_knob: Vec::new(),
             sent_at_us: Vec::new(),
             states: 0,
+            period_us: 0,
         }
     }
 
@@ -523,9 +525,11 @@ impl Bench {
         self.device.run_until((self.now_us - self.born_us) as u64);
         let mut answer = self.device.transmit();
         line(&mut answer);
-        let states = &mut self.states;
+        let (states, period_us) = (&mut self.states, &mut self.period_us);
         self.session.receive(self.now_us, &answer, &mut |what| {
-            *states += usize::from(matches!(what, Happening::State(_)));
+            if let Happening::State(state) = what {
+                (*states, *period_us) = (*states + 1, state.period_us);
+            }
         });
     }
 
@@ -550,7 +554,7 @@ fn rates_are_those_of_the_protocol_in_simulated_time() {
     let feels = bench.count(|m| matches!(m, Message::Feel(_)));
     assert!((10..=12).contains(&feels), "{feels} FEEL in 10 s without a change");
     assert!((4980..=5002).contains(&bench.states), "{} STATE in 10 s", bench.states);
-    assert_eq!(bench.session.stats().wire.gaps, 0);
+    assert_eq!((bench.session.stats().wire.gaps, bench.period_us), (0, 2000));
     for ms in 0..1000 {
         bench.session.want_feel(Feel { a_on_deg: ms as f32, ..Feel::default() });
         bench.tick(|_| {});
@@ -660,6 +664,8 @@ fn over_midi_frames_leave_20_ms_between_them() {
         bench.tick(|_| {});
     }
     assert_eq!(bench.session.standing(bench.now_us), Standing::Live);
+    let expected_us = 2_000_000 / bench.states as u32;
+    assert!(bench.period_us.abs_diff(expected_us) <= 500, "{} us, {expected_us}", bench.period_us);
     bench.session.arm(100, false, bench.now_us);
     bench.run(100);
     assert!(bench.session.is_armed());

@@ -181,8 +181,9 @@ const LEAP_US: i64 = 1_000_000;
 
 impl Default for DeviceClock {
     fn default() -> Self {
-        // By judgement: no link that is playable delays everything by 50 ms for a second.
-        Self { fit: ClockFit::new(50_000, 1_000_000), last: None }
+        // By judgement: a link on which everything is 4 ms late for as long has another least delay now, or its device has
+        // stood still; to go on with the old one would be to guess where the knob is.
+        Self { fit: ClockFit::new(4_000, 400_000), last: None }
     }
 }
 

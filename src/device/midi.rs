@@ -59,7 +59,12 @@ pub struct MidiTransport {
 /// Names of the input ports behind which a knob may be; all of them with `any`.
 pub fn ports(any: bool) -> Result<Vec<String>, MidiError> {
     let input = MidiInput::new(CLIENT).map_err(|e| MidiError::Unavailable(e.to_string()))?;
-    Ok(named(&input).into_iter().map(|(_, name)| name).filter(|name| any || is_known(name)).collect())
+    Ok(names(&input).into_iter().filter(|name| any || is_known(name)).collect())
+}
+
+fn names<T: MidiIO>(io: &T) -> Vec<String> {
+    let names = io.ports().iter().filter_map(|port| io.port_name(port).ok()).collect::<Vec<_>>();
+    names.into_iter().filter(|name| !name.contains(CLIENT)).collect()
 }
 
 fn is_known(name: &str) -> bool {
@@ -67,43 +72,19 @@ fn is_known(name: &str) -> bool {
     KNOWN.iter().any(|known| name.contains(known))
 }
 
-/// Every port but our own, with its name.
-fn named<T: MidiIO>(io: &T) -> Vec<(T::Port, String)> {
-    let named = |port: T::Port| io.port_name(&port).ok().map(|name| (port, name));
-    io.ports().into_iter().filter_map(named).filter(|(_, name)| !name.contains(CLIENT)).collect()
-}
-
-/// Which of these names is, or contains, the wanted one; without a wish the first known.
-fn choose(names: &[&str], wanted: Option<&str>) -> Option<usize> {
-    let close = |name: &&str| match wanted {
-        Some(wanted) => name.to_lowercase().contains(&wanted.to_lowercase()),
-        None => is_known(name),
+/// The port whose name is, or contains, the wanted one; without a wish the first known.
+fn find<T: MidiIO>(io: &T, wanted: Option<&str>) -> Option<(T::Port, String)> {
+    let names = |port: &T::Port| io.port_name(port).ok().filter(|name| !name.contains(CLIENT));
+    let named: Vec<_> =
+        io.ports().into_iter().filter_map(|port| names(&port).map(|name| (port, name))).collect();
+    let exact = named.iter().find(|(_, name)| Some(name.as_str()) == wanted);
+    let close = || {
+        named.iter().find(|(_, name)| match wanted {
+            Some(wanted) => name.to_lowercase().contains(&wanted.to_lowercase()),
+            None => is_known(name),
+        })
     };
-    names.iter().position(|name| Some(*name) == wanted).or_else(|| names.iter().position(close))
-}
-
-/// Which of these names belongs to the same device as `name`.
-fn choose_partner(names: &[&str], name: &str) -> Option<usize> {
-    let twin = names.iter().position(|other| device(other) == device(name));
-    twin.or_else(|| choose(names, Some(device(name).1)))
-}
-
-fn find<T: MidiIO>(io: &T, choice: impl FnOnce(&[&str]) -> Option<usize>) -> Option<(T::Port, String)> {
-    let mut named = named(io);
-    let names: Vec<&str> = named.iter().map(|(_, name)| name.as_str()).collect();
-    choice(&names).map(|index| named.swap_remove(index))
-}
-
-/// Client and port without what tells two ports of one device apart: ALSA appends the numbers of client and port to the
-/// name (`Knob:Knob MIDI 1 28:0`), JACK a number to the client, as programs open one for each direction
-/// (`Knob-01:Knob`). On other systems a port is its name.
-fn device(name: &str) -> (&str, &str) {
-    let end = name.rfind(' ').filter(|at| name[at + 1..].contains(':'));
-    let name = &name[..end.unwrap_or(name.len())];
-    let Some((client, port)) = name.split_once(':') else { return ("", name) };
-    let is_number = |text: &str| text.len() == 2 && text.bytes().all(|byte| byte.is_ascii_digit());
-    let client = client.rsplit_once('-').filter(|(_, number)| is_number(number)).map_or(client, |(of, _)| of);
-    (client, port)
+    exact.or_else(close).cloned()
 }
 
 impl MidiTransport {
@@ -118,7 +99,7 @@ impl MidiTransport {
             Some(name) => MidiError::Missing(format!("called {name}")),
             None => MidiError::Missing("called TorqueTuner or Chalumeau".into()),
         };
-        let (port, name) = find(&input, |names| choose(names, wanted)).ok_or_else(missing)?;
+        let (port, name) = find(&input, wanted).ok_or_else(missing)?;
         let (sender, incoming) = sync_channel(QUEUE);
         let on_message = move |_stamp: u64, bytes: &[u8], _: &mut ()| {
             let _ = sender.try_send(bytes.to_vec());
@@ -126,13 +107,38 @@ impl MidiTransport {
         let refused = |reason: String| MidiError::Refused { name: name.clone(), reason };
         let input = input.connect(&port, "from knob", on_message, ()).map_err(|e| refused(e.to_string()))?;
         let output = MidiOutput::new(CLIENT).map_err(unavailable)?;
-        let output = match find(&output, |names| choose_partner(names, &name)) {
-            Some((port, _)) => Some(output.connect(&port, "to knob").map_err(|e| refused(e.to_string()))?),
+        let output = match find_partner(&output, &name, wanted) {
+            Some(port) => Some(output.connect(&port, "to knob").map_err(|e| refused(e.to_string()))?),
             None => None,
         };
         let watch = Watch::begin(name.clone());
         Ok(Self { name, incoming, _input: input, output, watch })
     }
+}
+
+/// The output port of the device whose input port is called `name`: the one of the same name, else one that `wanted`, or
+/// the sound of its name, makes likely.
+fn find_partner(output: &MidiOutput, name: &str, wanted: Option<&str>) -> Option<midir::MidiOutputPort> {
+    let ports = output.ports();
+    let is_same =
+        |port: &&midir::MidiOutputPort| output.port_name(port).is_ok_and(|other| stem(&other) == stem(name));
+    ports.iter().find(is_same).cloned().or_else(|| Some(find(output, wanted)?.0))
+}
+
+/// A port's name without the numbers that differ between both ports of a device: ALSA's ` 28:0` at the end, JACK's `-01`
+/// after the first of two clients of one name.
+fn stem(name: &str) -> String {
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    let without_alsa = match name.rsplit_once(' ') {
+        Some((rest, numbers)) if numbers.split(':').all(is_number) && numbers.contains(':') => rest,
+        _ => name,
+    };
+    let (client, port) = without_alsa.split_once(':').unwrap_or((without_alsa, ""));
+    let client = match client.rsplit_once('-') {
+        Some((rest, number)) if number.len() == 2 && is_number(number) => rest,
+        _ => client,
+    };
+    format!("{client}:{port}")
 }
 
 impl Transport for MidiTransport {
@@ -220,30 +226,15 @@ mod tests {
     }
 
     #[test]
-    fn the_other_port_is_found_whatever_the_system_appends() {
-        for (input, outputs, expected) in [
-            (
-                "Knob:Knob MIDI 1 28:0",
-                ["Thru:Thru 14:0", "Knob:Knob MIDI 2 28:1", "Knob:Knob MIDI 1 29:0"],
-                2,
-            ),
-            ("Knob-01:Knob", ["system:midi_playback_1", "Other-01:Other", "Knob:Knob"], 2),
-            ("Knob MIDI 1", ["Synth", "Knob MIDI 1", "Knob MIDI 2"], 1),
-            ("Knob", ["Synth", "2- Knob", "Piano"], 1),
+    fn both_ports_of_a_device_have_one_stem_whatever_numbers_they_are_given() {
+        for (input, output) in [
+            ("TorqueTuner:TorqueTuner MIDI 1 28:0", "TorqueTuner:TorqueTuner MIDI 1 28:1"),
+            ("TorqueTuner sim-01:TorqueTuner sim", "TorqueTuner sim:TorqueTuner sim"),
+            ("TorqueTuner", "TorqueTuner"),
         ] {
-            assert_eq!(choose_partner(&outputs, input), Some(expected), "{input}");
+            assert_eq!(stem(input), stem(output));
         }
-        assert_eq!(choose_partner(&["Synth", "Thru:Thru 14:0"], "Knob:Knob 28:0"), None);
-    }
-
-    #[test]
-    fn the_name_asked_for_goes_before_one_that_contains_it() {
-        let names = ["My TorqueTuner", "TorqueTuner", "Thru"];
-        assert_eq!(choose(&names, Some("TorqueTuner")), Some(1));
-        assert_eq!(choose(&names, Some("thru")), Some(2));
-        assert_eq!(choose(&names, Some("my")), Some(0));
-        assert_eq!(choose(&names, Some("Synth")), None);
-        assert_eq!(choose(&names, None), Some(0));
-        assert_eq!(choose(&["Thru"], None), None);
+        assert_ne!(stem("TorqueTuner_001:MIDI 1 28:0"), stem("TorqueTuner_002:MIDI 1 29:0"));
+        assert_ne!(stem("TorqueTuner:MIDI 1 28:0"), stem("TorqueTuner:MIDI 2 28:1"));
     }
 }

@@ -33,6 +33,8 @@ const SILENCE_MIDI_US: i64 = 800_000;
 const RATE_HZ: u16 = 500;
 /// STATE a second at 115200 baud.
 const SLOW_RATE_HZ: u16 = 200;
+/// STATE further apart than this was lost in between, or the device began anew, us.
+const LONGEST_PERIOD_US: u32 = 50_000;
 /// Time between two angles of a plain MIDI device, us; only the reader's delay depends on it.
 const PLAIN_PERIOD_US: u32 = 10_000;
 /// Two angles further apart than this say nothing of speed, us.
@@ -120,6 +122,7 @@ pub struct Session {
     rate_due: bool,
     clock: DeviceClock,
     state: Option<(State, i64)>,
+    mean_step_us: f32,
     last_event: Option<u8>,
     plain: Option<StateSample>,
     has_plain_angle: bool,
@@ -153,6 +156,7 @@ impl Session {
             rate_due: false,
             clock: DeviceClock::default(),
             state: None,
+            mean_step_us: 1e6 / f32::from(RATE_HZ),
             last_event: None,
             plain: None,
             refusal: None,
@@ -469,6 +473,12 @@ impl Session {
             self.info = None;
             self.greeting.again(now_us);
         }
+        if let Some((before, _)) = &self.state {
+            let step_us = state.t_us.wrapping_sub(before.t_us);
+            if (1..LONGEST_PERIOD_US).contains(&step_us) {
+                self.mean_step_us += (step_us as f32 - self.mean_step_us) / 64.0;
+            }
+        }
         let host_us = self.clock.host_us(state.t_us).unwrap_or(now_us);
         self.meter.state(now_us - host_us);
         self.state = Some((*state, now_us));
@@ -489,8 +499,13 @@ impl Session {
             torque_mnm: f32::from(state.torque),
             feel_id: state.feel_id,
             flags: state.flags.0,
-            period_us: 1_000_000 / u32::from(if self.is_slow() { SLOW_RATE_HZ } else { RATE_HZ }),
+            period_us: self.period_us(),
         }));
+    }
+
+    /// Time between two STATE as a rule. In steps, so that one that is lost does not move the breath.
+    fn period_us(&self) -> u32 {
+        (self.mean_step_us / 500.0).round().max(1.0) as u32 * 500
     }
 
     fn hear_event(&mut self, event: &Event, tell: &mut dyn FnMut(Happening)) {

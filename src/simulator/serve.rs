@@ -279,6 +279,11 @@ impl Server {
         Ok(RunningKnob { stop, worker: Some(worker), control, path })
     }
 
+    /// The knob that is served.
+    pub fn knob(&self) -> &SimulatedKnob {
+        &self.knob
+    }
+
     /// Runs until told to stop, asking `watch` after every nap whether to go on.
     pub fn run(&mut self, mut watch: impl FnMut(&Self) -> bool) -> io::Result<()> {
         while watch(self) {

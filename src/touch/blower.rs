@@ -11,6 +11,9 @@ use crate::units::SoundingNote;
 
 /// Samples between two values of breath: 1.3 ms at 48 kHz, a quarter of the time the player's breath takes to follow.
 pub const GRID: u64 = 64;
+/// Samples in which one note's map gives way to the next's: 30 ms at 48 kHz, as the feel under the hand does. A hand needs
+/// longer; without it a slur over the break would jump.
+const GLIDE: u64 = 1_440;
 /// Steps of a 14-bit controller.
 const STEPS: f32 = 16_383.0;
 
@@ -47,6 +50,9 @@ pub struct Hand {
 pub struct Blower {
     keys: Keys,
     fingered: Option<SoundingNote>,
+    /// The note before it, and when it gave way.
+    before: Option<SoundingNote>,
+    changed_at: u64,
     blowing: bool,
     unfelt: Option<KnobBreath>,
     sent: Option<Breath14>,
@@ -60,19 +66,18 @@ impl Blower {
         *self = Self::default();
     }
 
-    /// Takes notice of what is played.
-    pub fn heed(&mut self, event: &Event) {
-        match *event {
-            Event::NoteOn { note, .. } => {
-                self.keys.press(note);
-                self.fingered = Some(note);
-            }
-            Event::NoteOff { note } => {
-                self.keys.release(note);
-                self.fingered = self.keys.last().or(self.fingered);
-            }
+    /// Takes notice of what is played, at a sample of the block that begins now.
+    pub fn heed(&mut self, event: &Timed<Event>) {
+        match event.event {
+            Event::NoteOn { note, .. } => self.keys.press(note),
+            Event::NoteOff { note } => self.keys.release(note),
             Event::Panic => self.keys = Keys::default(),
-            _ => {}
+            _ => return,
+        }
+        let fingered = self.keys.last().or(self.fingered);
+        if fingered != self.fingered {
+            (self.before, self.fingered) = (self.fingered, fingered);
+            self.changed_at = self.clock + event.at as u64;
         }
     }
 
@@ -97,11 +102,17 @@ impl Blower {
         self.clock += samples as u64;
     }
 
-    /// Breath of a knob at an angle, if it is not what was sent last.
-    pub fn blow(&mut self, hand: &Hand, angle_deg: f64, full_pa: f64) -> Option<Breath14> {
+    /// Breath of a knob at an angle, at a sample of the block that begins now, if it is not what was sent last.
+    pub fn blow(&mut self, hand: &Hand, at: usize, angle_deg: f64, full_pa: f64) -> Option<Breath14> {
         let angle_deg =
             if hand.feels { self.beyond_rest(hand, angle_deg) } else { self.unfelt(hand, angle_deg) };
-        let unit = hand.maps.pressure_pa(self.fingered, angle_deg) / full_pa;
+        let mut pressure_pa = hand.maps.pressure_pa(self.fingered, angle_deg);
+        let since = (self.clock + at as u64).saturating_sub(self.changed_at);
+        if let (Some(before), true) = (self.before, since < GLIDE) {
+            let before_pa = hand.maps.pressure_pa(Some(before), angle_deg);
+            pressure_pa = before_pa + (pressure_pa - before_pa) * since as f64 / GLIDE as f64;
+        }
+        let unit = pressure_pa / full_pa;
         let breath = Breath14((unit.clamp(0.0, 1.0) * f64::from(STEPS)).round() as u16);
         (self.sent.replace(breath) != Some(breath)).then_some(breath)
     }
@@ -167,7 +178,7 @@ impl<I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Iterator 
         loop {
             let until = if self.next < self.samples { self.next } else { usize::MAX };
             if let Some(event) = self.host.next_if(|event| event.at <= until) {
-                self.blower.heed(&event.event);
+                self.blower.heed(&event);
                 // One breath at a time: while the knob blows, nothing else does.
                 if !matches!(event.event, Event::Breath(_)) {
                     return Some(event);
@@ -179,7 +190,8 @@ impl<I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Iterator 
                 return None;
             }
             self.next = at + GRID as usize;
-            let blown = (self.angle)(at).and_then(|angle| self.blower.blow(self.hand, angle, self.full_pa));
+            let blown =
+                (self.angle)(at).and_then(|angle| self.blower.blow(self.hand, at, angle, self.full_pa));
             if let Some(breath) = blown {
                 (self.heard)(at, breath);
                 return Some(Timed { at, event: Event::Breath(breath.unit()) });
@@ -244,8 +256,8 @@ mod tests {
         let full_pa = 6_000.0;
         let blown = |note: u8| {
             let mut blower = Blower::default();
-            blower.heed(&note_on(0, note).event);
-            blower.blow(&HAND, 200.0, full_pa).unwrap().unit()
+            blower.heed(&note_on(0, note));
+            blower.blow(&HAND, 0, 200.0, full_pa).unwrap().unit()
         };
         // Sounding G4 needs less than sounding A5 (clarion): at one angle it is blown harder.
         assert!(
@@ -256,18 +268,34 @@ mod tests {
     }
 
     #[test]
+    fn one_notes_map_gives_way_to_the_next_without_a_jump() {
+        let mut blower = Blower::default();
+        blower.heed(&note_on(0, 65));
+        blower.advance(10_000);
+        let low = blower.blow(&HAND, 0, 200.0, 6_000.0).unwrap().0;
+        blower.heed(&note_on(0, 69));
+        let (mut last, mut largest) = (low, 0);
+        for at in (0..=GLIDE as usize).step_by(GRID as usize) {
+            let now = blower.blow(&HAND, at, 200.0, 6_000.0).map_or(last, |breath| breath.0);
+            (largest, last) = (now.abs_diff(last).max(largest), now);
+        }
+        let all = low.abs_diff(blower.blow(&HAND, 9_999, 200.0, 6_000.0).map_or(last, |breath| breath.0));
+        assert!(all > 500 && u32::from(largest) < u32::from(all) / 15, "{largest} of {all}");
+    }
+
+    #[test]
     fn rest_is_quiet_though_the_hand_shakes() {
         let mut blower = Blower::default();
         let mut sent = 0;
         for n in 0..1_000 {
             let tremor_deg = 0.9 * f64::from(n).sin();
-            sent += u32::from(blower.blow(&HAND, tremor_deg, 6_000.0).is_some_and(|breath| breath.0 > 0));
+            sent += u32::from(blower.blow(&HAND, 0, tremor_deg, 6_000.0).is_some_and(|breath| breath.0 > 0));
         }
         assert_eq!(sent, 0);
-        assert!(blower.blow(&HAND, 3.0, 6_000.0).unwrap().0 > 0);
-        assert!(blower.blow(&HAND, 0.8, 6_000.0).unwrap().0 > 0, "breath ends later than it begins");
-        assert_eq!(blower.blow(&HAND, 0.2, 6_000.0), Some(Breath14(0)));
-        assert_eq!(blower.blow(&HAND, f64::NAN, 6_000.0), None, "what is no angle is no breath");
+        assert!(blower.blow(&HAND, 0, 3.0, 6_000.0).unwrap().0 > 0);
+        assert!(blower.blow(&HAND, 0, 0.8, 6_000.0).unwrap().0 > 0, "breath ends later than it begins");
+        assert_eq!(blower.blow(&HAND, 0, 0.2, 6_000.0), Some(Breath14(0)));
+        assert_eq!(blower.blow(&HAND, 0, f64::NAN, 6_000.0), None, "what is no angle is no breath");
         assert_eq!(blower.fall_silent(), None);
     }
 
@@ -277,9 +305,9 @@ mod tests {
             Hand { feels: false, design: KnobDesign { full_deg: 180.0, ..KnobDesign::default() }, ..*HAND };
         let mut blower = Blower::default();
         let travel = hand.maps.pressure_pa(None, 180.0);
-        let full = blower.blow(&hand, 180.0, 6_000.0).unwrap();
+        let full = blower.blow(&hand, 0, 180.0, 6_000.0).unwrap();
         assert!((f64::from(full.unit()) - travel / 6_000.0).abs() < 1e-3);
-        assert_eq!(blower.blow(&hand, 500.0, 6_000.0), None, "full is full");
+        assert_eq!(blower.blow(&hand, 0, 500.0, 6_000.0), None, "full is full");
     }
 
     #[test]

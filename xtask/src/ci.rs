@@ -1,7 +1,7 @@
 //! Everything that must pass before a change is kept, in one command. Steps go on after a failure, so that one run
 //! tells all; the summary says which ones failed and how long each took.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
@@ -13,7 +13,10 @@ use crate::machine::{
 use crate::{COMMANDS, bundle, firmware, jack, simulator};
 
 /// DawDreamer's version is pinned: a new one may host differently.
-const PYTHON_PACKAGES: &[&str] = &["dawdreamer==0.9.0", "numpy<3"];
+const DAWDREAMER_PACKAGES: &[&str] = &["dawdreamer==0.9.0", "numpy<3"];
+/// What the programs in `examples/` need, pinned for the same reason.
+const EXAMPLE_PACKAGES: &[&str] =
+    &["numpy==2.4.6", "matplotlib==3.11.2", "libmapper==2.6.1", "python-osc==1.10.2"];
 
 type Step = (&'static str, fn() -> Result<()>);
 
@@ -45,6 +48,7 @@ const STEPS: &[Step] = &[
     ("MIDI over JACK", jack::test),
     ("VST3 in vst3-host", || cargo("test -p xtask --test vst3 --no-fail-fast")),
     ("VST3 in DawDreamer", dawdreamer),
+    ("Python examples", python_examples),
     ("instructions", || machine::run(&mut Command::new("benches/instructions.sh"))),
     ("benches build", || cargo("bench --no-default-features --features cli --no-run")),
 ];
@@ -134,17 +138,28 @@ fn clap_checked() -> Result<()> {
 }
 
 fn dawdreamer() -> Result<()> {
-    let venv = machine::target().join("venv");
+    let python = python("venv", "dawdreamer, numpy", DAWDREAMER_PACKAGES)?;
+    let script = machine::root().join("xtask/tests/vst3_in_dawdreamer.py");
+    machine::run(Command::new(&python).arg(script).arg(bundle::vst3()?))
+}
+
+fn python_examples() -> Result<()> {
+    let python = python("venv-examples", "numpy, matplotlib, libmapper, pythonosc", EXAMPLE_PACKAGES)?;
+    machine::run(Command::new(&python).arg(machine::root().join("xtask/tests/python_examples.py")))
+}
+
+/// The Python of a virtual environment in the target folder, which is made if it cannot import `modules` yet.
+fn python(folder: &str, modules: &str, packages: &[&str]) -> Result<PathBuf> {
+    let venv = machine::target().join(folder);
     let bin = venv.join(if cfg!(windows) { "Scripts" } else { "bin" });
     let python = bin.join("python");
-    if !imports(&python, "dawdreamer, numpy") {
+    if !imports(&python, modules) {
         let system = if cfg!(windows) { "python" } else { "python3" };
         machine::run(Command::new(system).args(["-m", "venv"]).arg(&venv))?;
         let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
-        machine::run(Command::new(&python).args(pip).args(PYTHON_PACKAGES))?;
+        machine::run(Command::new(&python).args(pip).args(packages))?;
     }
-    let script = machine::root().join("xtask/tests/vst3_in_dawdreamer.py");
-    machine::run(Command::new(&python).arg(script).arg(bundle::vst3()?))
+    Ok(python)
 }
 
 fn imports(python: &Path, modules: &str) -> bool {

@@ -44,6 +44,12 @@ pub const COMMANDS: &[Command] = &[
         checks: false,
     },
     Command {
+        name: "simulator",
+        about: "build `chalumeau knob-sim` into target/simulator, where demo and tests look for it",
+        run: |_| simulator::build(),
+        checks: false,
+    },
+    Command {
         name: "firmware-header",
         about: "write the reed tables as firmware/include/pressure_table_values.h",
         run: generated::firmware_header,

@@ -10,12 +10,21 @@ use anyhow::{Context, Result, bail};
 use crate::machine;
 
 /// Where the command line is built with a simulator in it.
-const FEATURES: &str = "cli,devices,simulator";
+const FEATURES: &str = "simulator";
 
-/// Builds `chalumeau` with the simulator; the profile is the bundle's, so that little is built twice.
+/// Builds `chalumeau` with the simulator, as the tests of the knob do, and puts it where no other build takes its place.
 pub fn build() -> Result<()> {
     let features = ["--no-default-features", "--features", FEATURES];
-    machine::run(machine::cargo().args(["build", "--bin", "chalumeau", "--profile=plugin"]).args(features))
+    machine::run(machine::cargo().args(["build", "--bin", "chalumeau"]).args(features))?;
+    let path = path();
+    std::fs::create_dir_all(path.parent().context("no folder for the simulator")?)?;
+    let built = machine::target().join("debug").join(path.file_name().context("no name for the simulator")?);
+    std::fs::copy(&built, &path).with_context(|| format!("cannot copy {}", built.display()))?;
+    Ok(())
+}
+
+fn path() -> PathBuf {
+    machine::target().join("simulator").join(format!("chalumeau{}", std::env::consts::EXE_SUFFIX))
 }
 
 /// Another program of the same command line, to be used instead.
@@ -26,8 +35,12 @@ pub fn program() -> Result<PathBuf> {
     if let Some(path) = std::env::var_os(PROGRAM) {
         return Ok(machine::root().join(path));
     }
-    let path = machine::target().join("plugin").join(format!("chalumeau{}", std::env::consts::EXE_SUFFIX));
-    if path.exists() { Ok(path) } else { bail!("{} is not there; run `cargo xtask bundle`", path.display()) }
+    let path = path();
+    if path.exists() {
+        Ok(path)
+    } else {
+        bail!("{} is not there; run `cargo xtask simulator`", path.display())
+    }
 }
 
 /// A running simulator; it ends when dropped.

@@ -24,6 +24,8 @@ const LEAD_S: f64 = 1.0;
 const AHEAD_S: f64 = 0.06;
 /// Step of the hand's script, s.
 const STEP_S: f64 = 0.01;
+/// The hand turns no faster than this, degrees a step: 10 rad/s, far from the knob's over-speed of 60.
+const HASTE_DEG: f64 = 6.0;
 /// How long to wait for the knob, s.
 const PATIENCE_S: u64 = 20;
 
@@ -66,6 +68,7 @@ pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -
     let mut plugin = Plugin::load(clap)?;
     connect(&mut plugin, number)?;
     let arm = plugin.param("Arm knob")?.id;
+    let status = plugin.param("Knob status")?.id;
     let played = plugin.session(rate_hz, BLOCK, |session| -> Result<_> {
         wait_until_live(session, rate_hz)?;
         let armed_at = session.played();
@@ -81,6 +84,8 @@ pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -
         Ok((left[lead..].to_vec(), breath))
     })?;
     let (left, breath) = played?;
+    let said = plugin.text(status, 0.0)?;
+    println!("the plugin says of its knob: {said}");
     drop(plugin);
     drop(simulator);
 
@@ -167,7 +172,7 @@ fn breath_sent(session: &Session, first: usize, rate_hz: f64) -> Vec<[f64; 2]> {
 fn script(score: &Score, feels: &Feels, table: &FeelTable, rate: u32) -> String {
     let full_pa = 1e3 * f64::from(Settings::default().breath_full_kpa);
     let maps = feels.maps(table);
-    let mut text = "t_s,angle_deg\n0,0\n".to_owned();
+    let mut angles = Vec::new();
     let (mut keys, mut breath, mut note, mut next) = (Keys::default(), 0.0, None, 0);
     let mut steps = 0;
     loop {
@@ -189,8 +194,16 @@ fn script(score: &Score, feels: &Feels, table: &FeelTable, rate: u32) -> String 
         let index = note.and_then(|note| feels.fingering(note)).and_then(|index| table.note(index));
         let angle = index.map_or(0.0, |feel| feel.map.angle_deg(breath * full_pa));
         debug_assert!((maps.pressure_pa(note, angle) - breath * full_pa).abs() < 1.0 || note.is_none());
-        let _ = writeln!(text, "{:.3},{angle:.2}", t_s + LEAD_S - AHEAD_S);
+        angles.push(angle);
         steps += 1;
+    }
+    // A hand that has far to go sets out early.
+    for at in (1..angles.len()).rev() {
+        angles[at - 1] = f64::clamp(angles[at - 1], angles[at] - HASTE_DEG, angles[at] + HASTE_DEG);
+    }
+    let mut text = "t_s,angle_deg\n0,0\n".to_owned();
+    for (at, angle) in angles.iter().enumerate() {
+        let _ = writeln!(text, "{:.3},{angle:.2}", at as f64 * STEP_S + LEAD_S - AHEAD_S);
     }
     text
 }

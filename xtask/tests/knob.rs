@@ -10,11 +10,18 @@ use std::time::Duration;
 
 use chalumeau::analysis::pitch::fundamental_hz;
 use chalumeau::analysis::to_f64;
-use chalumeau::units::cents;
+use chalumeau::control::knob::KnobDesign;
+use chalumeau::event::{Event, Timed};
+use chalumeau::haptics::FeelDesign;
+use chalumeau::instrument::{Clarinet, Settings};
+use chalumeau::touch::blower::{Blower, Blown, Hand};
+use chalumeau::touch::feel::{Feels, NO_MOTOR};
+use chalumeau::touch::take::Take;
+use chalumeau::units::{SoundingNote, cents};
 use live::{BLOCK, E3, RATE, SECOND, breath, level_db, on, play_until, plugin};
 use xtask::host::{At, Say};
 use xtask::simulator::{Simulator, serial_number};
-use xtask::touch_demo::{connect, wait_until_live};
+use xtask::touch_demo::{connect, edit, wait_until_live};
 
 fn knob(number: u64, hand: &[&str]) -> Simulator {
     Simulator::start(&[&["--serial-number", &format!("{number:016x}")], hand].concat()).unwrap()
@@ -172,4 +179,82 @@ fn stock_firmware_plays_over_osc() {
         .unwrap();
     let hz = fundamental_hz(&to_f64(&heard[SECOND..]), RATE).expect("a pitch");
     assert!(cents(hz, 146.832).abs() < 20.0, "{hz} Hz");
+}
+
+#[test]
+fn a_take_is_replayed_the_same_by_plugin_and_renderer() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("take.csv");
+    let rows: String = (0..1_000)
+        .map(|n| format!("{},{:.2}\n", 5_000_000 + 2_000 * n, 150.0 + 60.0 * (0.01 * f64::from(n)).sin()))
+        .collect();
+    std::fs::write(&path, format!("# by hand\nt_us,angle_deg\n{rows}")).unwrap();
+    let mut plugin = plugin();
+    edit(&mut plugin, |state| {
+        state["fields"]["take"] = serde_json::to_string(&path.display().to_string()).unwrap().into();
+        state["params"]["replay"] = serde_json::json!({ "bool": true });
+    })
+    .unwrap();
+    plugin.set_offline(true).unwrap();
+    let said = [At(0, on(60)), At(SECOND, on(67))];
+    let first = plugin.play(RATE, 512, &said, 2 * SECOND).unwrap();
+    let second = plugin.play(RATE, 77, &said, 2 * SECOND).unwrap();
+    assert!(first == second, "two bounces of a take differ");
+
+    let feels = Feels::built_in().unwrap();
+    let table = feels.table(&Settings::default(), &FeelDesign::default(), &NO_MOTOR).unwrap();
+    let hand = Hand { maps: feels.maps(&table), design: KnobDesign::default(), feels: true };
+    let take = Take::read(std::fs::File::open(&path).unwrap()).unwrap();
+    let note =
+        |at, key| Timed { at, event: Event::NoteOn { note: SoundingNote(key), velocity: 100.0 / 127.0 } };
+    let mut blower = Blower::default();
+    let mut ignore = |_, _| {};
+    let angle = |at: usize| Some(take.angle_deg(at as f64 / RATE));
+    let notes = [note(0, 60), note(SECOND, 67)].into_iter();
+    let events = Blown::new(notes, &mut blower, &hand, 6_000.0, 2 * SECOND, angle, &mut ignore);
+    let mut rendered = vec![0.0; 2 * SECOND];
+    Clarinet::built_in(RATE).unwrap().render_events(events, &mut rendered);
+    assert!(level_db(&rendered) > -60.0);
+    let apart = rendered.iter().zip(&first[0]).filter(|(a, b)| a.to_bits() != b.to_bits()).count();
+    assert_eq!(apart, 0, "of {} samples", rendered.len());
+}
+
+#[test]
+fn only_the_user_arms_and_then_the_note_resists() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("knob.csv");
+    let number = serial_number();
+    let _knob = knob(number, &["--hold", "110", "--log", &log.to_string_lossy()]);
+    let mut plugin = plugin();
+    connect(&mut plugin, number).unwrap();
+    let arm = plugin.param("Arm knob").unwrap().id;
+    plugin
+        .session(RATE, BLOCK, |session| {
+            // On from the start is no act of the user.
+            session.play_live(&[At(0, Say::Set(arm, 1.0))], SECOND / 10, RATE).unwrap();
+            wait_until_live(session, RATE).unwrap();
+            session.play_live(&[At(0, on(E3))], SECOND, RATE).unwrap();
+            session.play_live(&[At(0, Say::Set(arm, 0.0))], SECOND, RATE).unwrap();
+            session.play_live(&[At(0, Say::Set(arm, 1.0))], 2 * SECOND, RATE).unwrap();
+            session.play_live(&[At(0, Say::Set(arm, 0.0))], SECOND / 2, RATE).unwrap();
+        })
+        .unwrap();
+    drop(plugin);
+    let text = std::fs::read_to_string(&log).unwrap();
+    let rows = text.lines().filter(|line| !line.starts_with('#')).skip(1);
+    // angle, torque, armed
+    let rows: Vec<[f64; 3]> = rows
+        .filter_map(|line| {
+            let cells: Vec<f64> = line.split(',').filter_map(|cell| cell.trim().parse().ok()).collect();
+            (cells.len() >= 6).then(|| [cells[1], cells[3], cells[5]])
+        })
+        .collect();
+    let first = rows.iter().position(|row| row[2] > 0.5).expect("never armed");
+    let armed: Vec<_> = rows[first..].iter().filter(|row| row[2] > 0.5).collect();
+    let seconds = armed.len() as f64 / 500.0;
+    let strongest = armed.iter().map(|row| -row[1]).fold(0.0, f64::max);
+    println!("armed for {seconds:.2} s, at most {strongest:.0} mNm against a hand at 110 degrees");
+    assert!((1.5..2.5).contains(&seconds), "armed for {seconds} s of 2");
+    assert!((20.0..=100.0).contains(&strongest), "{strongest} mNm");
+    assert!(rows[..first].iter().all(|row| row[1].abs() < 0.5), "torque before the user armed");
 }

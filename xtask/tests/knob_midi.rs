@@ -267,3 +267,25 @@ fn an_unplugged_midi_knob_is_found_again_disarmed() {
     }
     plugin.deactivate(session);
 }
+
+#[test]
+#[ignore = "needs a JACK server and a build for it: cargo xtask ci MIDI"]
+fn the_doctor_hears_a_midi_knob_and_misses_it_when_it_is_gone() {
+    let mut knob = MidiKnob::plug();
+    let ask = || {
+        let mut doctor = Command::new(simulator::program().unwrap());
+        let output = doctor.args(["doctor", "--seconds", "3"]).output().unwrap();
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let found = ask();
+    println!("{found}");
+    let serial = format!("{:016x}", knob.number);
+    for say in [&serial, "tier 2", "limp 380 ms after silence", "FEEL to its echo"] {
+        assert!(found.contains(say), "{say:?} in {found}");
+    }
+    assert!(!found.contains("not seen"), "{found}");
+    knob.simulator.kill().unwrap();
+    std::thread::sleep(Duration::from_secs(1));
+    let gone = ask();
+    assert!(!gone.contains(&serial), "{gone}");
+}

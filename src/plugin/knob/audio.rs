@@ -178,7 +178,7 @@ impl Audio {
             }
             _ => {
                 let blower = &mut self.blower;
-                let host = host.inspect(|event| blower.heed(&event.event));
+                let host = host.inspect(|event| blower.heed(event));
                 let gone = gone.map(|breath| {
                     heard(0, breath);
                     Timed { at: 0, event: Event::Breath(breath.unit()) }

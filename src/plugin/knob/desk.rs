@@ -29,6 +29,9 @@ const TURN: Duration = Duration::from_millis(10);
 const ARM_AFTER: Duration = Duration::from_millis(500);
 /// A B flat clarinet sounds two semitones lower than written.
 const TRANSPOSITION: i8 = 2;
+/// Torque of the reference note in a study at most, mNm: with it both sides of every trial are allowed under the first
+/// ceiling at the default contrast (a test below).
+const STUDY_MNM: f64 = 50.0;
 /// Where takes go, for those who want them elsewhere.
 const TAKES: &str = "CHALUMEAU_TAKES";
 
@@ -353,7 +356,11 @@ impl Desk {
                 }
             };
         }
-        let marks = marks(&self.params, &self.params.settings().with_reed_factors(self.shared.reed()));
+        let mut marks = marks(&self.params, &self.params.settings().with_reed_factors(self.shared.reed()));
+        if self.refused.is_some() {
+            // The hand did not follow the sound: such rows are no part of a study.
+            marks.study = None;
+        }
         let mut heard = false;
         while let Ok(moment) = self.rows.1.try_recv() {
             heard = true;
@@ -427,7 +434,10 @@ pub fn design(knob: &KnobParams) -> FeelDesign {
             OrderChoice::CoveredHoles => Order::CoveredHoles,
             OrderChoice::OpenHoles => Order::CoveredHolesReversed,
         },
-        strength_mnm: f64::from(knob.torque.value()),
+        strength_mnm: match knob.study() {
+            Some(_) => f64::from(knob.torque.value()).min(STUDY_MNM),
+            None => f64::from(knob.torque.value()),
+        },
         travel_deg: calibration.travel_deg,
         damping_mnms: f64::from(knob.damping.value()),
         friction_mnm: f64::from(knob.friction.value()),
@@ -505,4 +515,29 @@ fn begin_take(params: &ChalumeauParams) -> Result<Recording, String> {
     }
     let writer = TakeWriter::create(&path, false, &remarks).map_err(|reason| reason.to_string())?;
     Ok(Recording { writer, path, rows: 0, trouble: None })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::touch::study::{Condition, TRIALS};
+
+    #[test]
+    fn both_sides_of_every_trial_can_be_felt_under_the_first_ceiling() {
+        let feels = Feels::built_in().unwrap();
+        for trial in plan(1, 1).iter().chain(&plan(2, 1)) {
+            for condition in [Condition::Coupled, Condition::Free] {
+                let settings = Settings {
+                    reed_h: trial.h as f32,
+                    reed_k: condition.k(trial.h) as f32,
+                    coupled: false,
+                    ..Settings::default()
+                };
+                let design = FeelDesign { strength_mnm: STUDY_MNM, ..FeelDesign::default() };
+                let refused = feels.table(&settings, &design, &Limits::default()).err();
+                assert_eq!(refused, None, "H {} {}", trial.h, condition.name());
+            }
+        }
+        assert_eq!(plan(1, 1).len(), TRIALS);
+    }
 }

@@ -292,7 +292,7 @@ impl KnobParams {
             participant: whole("Participant", 1, 1, 9_999),
             seed: whole("Study seed", 1, 1, 9_999),
             trial: whole("Trial", 1, 1, TRIALS as i32),
-            side: switch("A/B", "B", "A").non_automatable(),
+            side: switch("A/B", "B", "A"),
             h_source: EnumParam::new("H from", ReedSource::Parameter).non_automatable(),
             k_source: EnumParam::new("k from", ReedSource::Parameter).non_automatable(),
             status: BoolParam::new("Knob status", false)
