@@ -18,7 +18,7 @@ pub struct Setup {
     pub serial: u64,
     /// Name it gives, UTF-8; what exceeds 16 bytes is cut.
     pub name: String,
-    /// Speaks the MIDI binding (and waits 350 ms for its host) instead of serial (80 ms).
+    /// Speaks the MIDI binding (and waits 330 ms for its host) instead of serial (80 ms).
     pub midi: bool,
     /// Major version of the protocol; anything but 1 is a mismatch to test.
     pub major: u8,

@@ -48,7 +48,7 @@ CLAIM(hello_is_answered_by_an_info_that_names_the_session_and_declares_the_limit
     other.run(1);
     other.hello(77);
     other.run(1);
-    CHECK(other.info.watchdog_ms == 350);
+    CHECK(other.info.watchdog_ms == 330);
 }
 
 CLAIM(hello_without_the_magic_word_is_nobody) {
@@ -118,9 +118,9 @@ CLAIM(nothing_arms_while_the_knob_moves) {
     CHECK(!bench.device.armed());
 }
 
-CLAIM(rule_1_silence_of_the_host_fades_torque_within_130_ms_on_serial_and_400_on_midi) {
+CLAIM(rule_1_silence_of_the_host_fades_torque_within_130_ms_on_serial_and_380_on_midi) {
     for (const Config& config : {test::damped(), midi_config()}) {
-        const int watchdog = config.binding == Binding::Serial ? 160 : 700;
+        const int watchdog = config.binding == Binding::Serial ? 160 : 660;
         Bench bench(config);
         bench.ready(held_feel(), 1200);
         bench.alive();
@@ -582,7 +582,7 @@ CLAIM(midi_binding_arms_by_sysex_and_speaks_in_controllers) {
     bench.keep_raw = true;
     Feel feel = held_feel();
     bench.ready(feel, 1000);
-    CHECK(bench.device.armed() && bench.info.watchdog_ms == 350 && bench.states > 50);
+    CHECK(bench.device.armed() && bench.info.watchdog_ms == 330 && bench.states > 50);
     // The last controllers heard: breath 100 of 400 degrees, angle 8192 + 1000.
     int values[128];
     std::fill(values, values + 128, -1);

@@ -27,7 +27,7 @@ const ALIVE_MIDI_US: i64 = 100_000;
 const MIDI_SLOT_US: i64 = 20_000;
 /// STATE this old no longer says what the knob does, us: a hundred periods, twice the device's own watchdog.
 const SILENCE_US: i64 = 250_000;
-/// The same over MIDI, us: twice the watchdog that MIDI devices declare.
+/// The same over MIDI, us: twice the 380 ms in which MIDI devices let go.
 const SILENCE_MIDI_US: i64 = 800_000;
 /// STATE a second at full speed.
 const RATE_HZ: u16 = 500;

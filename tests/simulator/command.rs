@@ -218,7 +218,7 @@ fn knob_within_the_program_speaks_midi_and_obeys() {
     let knob = SimulatedKnob::new(setup, PlantDesign::default(), Hand::new(HandDesign::default(), 1), 1);
     let (device, mut host) = memory::pair(Binding::Midi, "a wire");
     let running = Server::new(knob, Port::Memory(Box::new(device))).spawn().unwrap();
-    assert_eq!(greet(&mut host, 9).watchdog_ms, 350);
+    assert_eq!(greet(&mut host, 9).watchdog_ms, 330);
     running.tell(Control::Aim(Aim::Angle(20.0)));
     let (mut receiver, end) = (MidiReceiver::new(), Instant::now() + PATIENCE);
     let mut tenths_deg = 0;

@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 
 use crate::machine::{
-    self, ALSA, ARM_CXX, ARM_LIBRARY, CC, CXX, GL, GLIB, JACK, PKG_CONFIG, Package, VENV, XCB,
+    self, ALSA, ARM_CXX, ARM_LIBRARY, CC, CXX, GL, GLIB, JACK, JACKD, PKG_CONFIG, Package, VENV, XCB,
 };
-use crate::{COMMANDS, bundle, firmware, simulator};
+use crate::{COMMANDS, bundle, firmware, jack, simulator};
 
 /// DawDreamer's version is pinned: a new one may host differently.
 const DAWDREAMER_PACKAGES: &[&str] = &["dawdreamer==0.9.0", "numpy<3"];
@@ -43,6 +43,9 @@ const STEPS: &[Step] = &[
     ("CLAP in clack-host", || cargo("test -p xtask --test clap --no-fail-fast")),
     ("CLAP with allocation checks", clap_checked),
     ("CLAP with the simulated knob", || cargo("test -p xtask --test knob --no-fail-fast")),
+    // Elsewhere there is no JACK that a test could start.
+    #[cfg(target_os = "linux")]
+    ("MIDI over JACK", jack::test),
     ("VST3 in vst3-host", || cargo("test -p xtask --test vst3 --no-fail-fast")),
     ("VST3 in DawDreamer", dawdreamer),
     ("Python examples", python_examples),
@@ -97,7 +100,7 @@ fn cargo(words: &str) -> Result<()> {
 
 fn packages() -> Result<()> {
     let needed: &[&Package] = if cfg!(target_os = "linux") {
-        &[&CC, &CXX, &ARM_CXX, &ARM_LIBRARY, &PKG_CONFIG, &ALSA, &JACK, &XCB, &VENV, &GL, &GLIB]
+        &[&CC, &CXX, &ARM_CXX, &ARM_LIBRARY, &PKG_CONFIG, &ALSA, &JACK, &JACKD, &XCB, &VENV, &GL, &GLIB]
     } else {
         &[]
     };
@@ -131,7 +134,7 @@ fn clap_checked() -> Result<()> {
     cargo("build --all-features --lib")?;
     let library = format!("{}chalumeau{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     let library = machine::target().join("debug").join(library);
-    let tests = ["test", "-p", "xtask", "--test", "clap", "--no-fail-fast"];
+    let tests = ["test", "-p", "xtask", "--test", "clap", "--test", "knob", "--no-fail-fast"];
     machine::run(machine::cargo().args(tests).env("CHALUMEAU_CLAP", library))
 }
 

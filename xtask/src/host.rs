@@ -195,7 +195,7 @@ impl Plugin {
     pub fn text(&mut self, id: ClapId, value: f64) -> Result<String> {
         let handle = self.instance.plugin_handle();
         let params: PluginParams = handle.get_extension().context("no parameters")?;
-        let mut buffer = [0; 128];
+        let mut buffer = [0; 512];
         let text = params.value_to_text(&handle, id, value, &mut buffer).map_err(|_| anyhow!("no text"))?;
         Ok(String::from_utf8_lossy(text).into_owned())
     }

@@ -6,6 +6,7 @@ pub mod demo;
 pub mod firmware;
 pub mod generated;
 pub mod host;
+pub mod jack;
 pub mod machine;
 pub mod midi;
 pub mod picture;

@@ -110,6 +110,12 @@ pub const JACK: Package = Package {
     present: || works("pkg-config", &["--exists", "jack"]),
     purpose: "JACK in chalumeau-standalone",
 };
+/// For MIDI without a sound card.
+pub const JACKD: Package = Package {
+    name: "jackd2",
+    present: || works("jackd", &["--version"]),
+    purpose: "the tests of MIDI over JACK",
+};
 /// For the VST3 test host.
 pub const XCB: Package = Package {
     name: "libxcb1-dev",

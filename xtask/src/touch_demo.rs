@@ -107,6 +107,14 @@ pub fn connect(plugin: &mut Plugin, serial: u64) -> Result<()> {
     })
 }
 
+/// Points a plugin at the knob whose MIDI port has this name.
+pub fn connect_midi(plugin: &mut Plugin, name: &str) -> Result<()> {
+    edit(plugin, |state| {
+        state["fields"]["midiport"] = serde_json::json!(name).to_string().into();
+        state["params"]["knob"] = serde_json::json!({ "string": "midi" });
+    })
+}
+
 /// Has a plugin listen to stock firmware on a UDP port.
 pub fn listen(plugin: &mut Plugin, port: u16) -> Result<()> {
     edit(plugin, |state| {

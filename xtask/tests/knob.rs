@@ -3,8 +3,10 @@
 //! Everything here is real but the metal and the hand: the firmware's own code, a serial line (pty) or UDP, the plugin's
 //! link, its audio thread. Times are generous: a loaded machine makes these tests slower, not wrong.
 
-use std::path::PathBuf;
-use std::time::{Duration, Instant};
+#[path = "support/live.rs"]
+mod live;
+
+use std::time::Duration;
 
 use chalumeau::analysis::pitch::fundamental_hz;
 use chalumeau::analysis::to_f64;
@@ -16,53 +18,13 @@ use chalumeau::touch::blower::{Blower, Blown, Hand};
 use chalumeau::touch::feel::{Feels, NO_MOTOR};
 use chalumeau::touch::take::Take;
 use chalumeau::units::{SoundingNote, cents};
-use xtask::host::{At, Plugin, Say, Session};
+use live::{BLOCK, E3, RATE, SECOND, breath, level_db, on, play_until, plugin};
+use xtask::host::{At, Say};
 use xtask::simulator::{Simulator, serial_number};
 use xtask::touch_demo::{connect, edit, wait_until_live};
 
-const RATE: f64 = 48_000.0;
-const SECOND: usize = 48_000;
-const BLOCK: usize = 128;
-/// Sounding D3, written E3, the lowest note.
-const E3: u8 = 50;
-
-fn plugin() -> Plugin {
-    let path = match std::env::var_os("CHALUMEAU_CLAP") {
-        Some(path) => xtask::machine::root().join(PathBuf::from(path)),
-        None => xtask::bundle::clap().unwrap(),
-    };
-    Plugin::load(&path).unwrap()
-}
-
 fn knob(number: u64, hand: &[&str]) -> Simulator {
     Simulator::start(&[&["--serial-number", &format!("{number:016x}")], hand].concat()).unwrap()
-}
-
-fn on(key: u8) -> Say {
-    Say::Midi([0x90, key, 100])
-}
-
-fn level_db(samples: &[f32]) -> f64 {
-    let power: f64 = samples.iter().map(|&x| f64::from(x).powi(2)).sum();
-    10.0 * (power / samples.len().max(1) as f64).max(1e-30).log10()
-}
-
-/// Last breath the plugin has sent, 0..=1.
-fn breath(session: &Session) -> f64 {
-    let last = |cc: u8| {
-        session.answers().iter().rev().find(|(_, said)| said[1] == cc).map_or(0, |(_, said)| said[2])
-    };
-    f64::from(u16::from(last(2)) << 7 | u16::from(last(34))) / 16_383.0
-}
-
-/// Plays on in steps of a tenth of a second until something holds; how long that took.
-fn play_until(session: &mut Session, what: &str, mut holds: impl FnMut(&mut Session) -> bool) -> Duration {
-    let began = Instant::now();
-    while !holds(session) {
-        assert!(began.elapsed() < Duration::from_secs(30), "{what} did not come about in 30 s");
-        session.play_live(&[], SECOND / 10, RATE).unwrap();
-    }
-    began.elapsed()
 }
 
 #[test]
@@ -109,9 +71,9 @@ fn offline_a_device_makes_no_difference() {
 fn what_the_host_records_is_what_was_played() {
     let number = serial_number();
     let _knob = knob(number, &["--crescendo", "100:250:2", "--loop"]);
-    let mut live = plugin();
-    connect(&mut live, number).unwrap();
-    let (heard, recorded) = live
+    let mut player = plugin();
+    connect(&mut player, number).unwrap();
+    let (heard, recorded) = player
         .session(RATE, BLOCK, |session| {
             wait_until_live(session, RATE).unwrap();
             session.reset();
@@ -173,7 +135,7 @@ fn a_project_remembers_its_knob_by_number_and_never_armed() {
     let text = String::from_utf8_lossy(&state[8..]).into_owned();
     assert!(text.contains(&format!("{number:016x}")), "{text}");
     assert!(!text.contains("/dev/"), "a path in the state");
-    let mut again = self::plugin();
+    let mut again = live::plugin();
     again.restore(&state).unwrap();
     assert_eq!(again.value(arm).unwrap(), 0.0, "armed by loading");
 }
@@ -295,4 +257,22 @@ fn only_the_user_arms_and_then_the_note_resists() {
     assert!((1.5..2.5).contains(&seconds), "armed for {seconds} s of 2");
     assert!((20.0..=100.0).contains(&strongest), "{strongest} mNm");
     assert!(rows[..first].iter().all(|row| row[1].abs() < 0.5), "torque before the user armed");
+}
+
+#[test]
+fn a_slap_of_the_hand_is_a_slap_of_the_tongue() {
+    let number = serial_number();
+    let _knob = knob(number, &["--slap", "--loop"]);
+    let mut plugin = plugin();
+    connect(&mut plugin, number).unwrap();
+    let heard = plugin
+        .session(RATE, BLOCK, |session| {
+            wait_until_live(session, RATE).unwrap();
+            let [left, _] = session.play_live(&[], 4 * SECOND, RATE).unwrap();
+            left
+        })
+        .unwrap();
+    let peak = heard.iter().fold(0.0_f32, |peak, x| peak.max(x.abs()));
+    println!("peak {peak:.3} without a key or breath");
+    assert!(peak > 0.01, "{peak}");
 }

@@ -7,7 +7,7 @@
 namespace chalumeau {
 
 constexpr std::uint32_t WATCHDOG_SERIAL_MS = 80;
-constexpr std::uint32_t WATCHDOG_MIDI_MS = 350;
+constexpr std::uint32_t WATCHDOG_MIDI_MS = 330;  // with the fade 380: the 400 that are promised bear some lateness
 constexpr std::uint32_t FADE_MS = 50;
 constexpr std::uint32_t SOFT_START_MS = 250;
 constexpr float ARM_SPEED = 2.0F;    // rad/s, faster than this nobody gets armed

@@ -1,0 +1,139 @@
+//! MIDI between programs without a sound card: a build of plugin and command line whose midir speaks to JACK, a JACK
+//! server with a dummy driver, and the tests that play a simulated knob's MIDI port through both.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+
+use crate::{machine, simulator};
+
+/// Frames of a JACK period at 48 kHz: a message takes up to two of them, 11 ms.
+const PERIOD_FRAMES: &str = "256";
+
+/// A server that cannot run has ended by then.
+const SETTLED: Duration = Duration::from_millis(500);
+
+/// How long the server may take to answer.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// Builds, starts the server and runs `xtask/tests/knob_midi.rs`.
+pub fn test() -> Result<()> {
+    let Build { plugin, program } = build()?;
+    let server = Server::start()?;
+    let tests =
+        ["test", "-p", "xtask", "--test", "knob_midi", "--", "--ignored", "--nocapture", "--test-threads=1"];
+    let mut command = machine::cargo();
+    command.args(tests).env("CHALUMEAU_CLAP", plugin).env(simulator::PROGRAM, program);
+    machine::run(server.for_clients(&mut command))
+}
+
+/// What the tests load and start.
+struct Build {
+    plugin: PathBuf,
+    program: PathBuf,
+}
+
+/// A debug build with every feature, `midi-jack` among them, as the tests with allocation checks have made it already;
+/// kept aside, because the next build with other features takes its place.
+fn build() -> Result<Build> {
+    let all = ["build", "--all-features", "--lib", "--bin", "chalumeau"];
+    machine::run(machine::cargo().args(all))?;
+    let folder = machine::target().join("midi-jack");
+    fs::create_dir_all(&folder)?;
+    let keep = |name: String| -> Result<PathBuf> {
+        let (from, to) = (machine::target().join("debug").join(&name), folder.join(name));
+        fs::copy(&from, &to).with_context(|| format!("cannot copy {}", from.display()))?;
+        Ok(to)
+    };
+    let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+    Ok(Build {
+        plugin: keep(format!("{prefix}chalumeau{suffix}"))?,
+        program: keep(format!("chalumeau{}", std::env::consts::EXE_SUFFIX))?,
+    })
+}
+
+/// Names for the server; another checkout may be testing at the same time. They are few and always the same, because a
+/// server that ends while clients are dying leaves its entry in JACK's list of eight, which the next one of that name takes.
+const NAMES: [&str; 3] = ["chalumeau-1", "chalumeau-2", "chalumeau-3"];
+
+/// A JACK server with neither sound card nor real-time priority; ends when dropped.
+struct Server {
+    name: &'static str,
+    child: Child,
+}
+
+impl Server {
+    fn start() -> Result<Self> {
+        let mut complaints = String::new();
+        for name in NAMES {
+            match Self::named(name) {
+                Ok(server) => return Ok(server),
+                Err(reason) => complaints += &format!("\n{name}: {reason:#}"),
+            }
+        }
+        bail!("jackd does not run here:{complaints}")
+    }
+
+    fn named(name: &'static str) -> Result<Self> {
+        let log = machine::target().join("midi-jack").join(format!("{name}.log"));
+        let out = fs::File::create(&log)?;
+        let child = Command::new("jackd")
+            .args([
+                "-n",
+                name,
+                "--no-realtime",
+                "--no-mlock",
+                "-d",
+                "dummy",
+                "-r",
+                "48000",
+                "-p",
+                PERIOD_FRAMES,
+            ])
+            .env("JACK_NO_AUDIO_RESERVATION", "1")
+            .stdin(Stdio::null())
+            .stderr(out.try_clone()?)
+            .stdout(out)
+            .spawn()
+            .context("cannot start jackd")?;
+        let mut server = Self { name, child };
+        server.wait(&log)?;
+        Ok(server)
+    }
+
+    /// Until it answers.
+    fn wait(&mut self, log: &Path) -> Result<()> {
+        let began = Instant::now();
+        loop {
+            // First, because one of the same name may answer in place of ours.
+            if self.child.try_wait()?.is_some() || began.elapsed() > PATIENCE {
+                bail!("{}", fs::read_to_string(log).unwrap_or_default().trim());
+            }
+            let mut list = Command::new("jack_lsp");
+            let list = self.for_clients(&mut list).stdout(Stdio::null()).stderr(Stdio::null());
+            if began.elapsed() > SETTLED && list.status().context("cannot start jack_lsp")?.success() {
+                return Ok(());
+            }
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    }
+
+    /// Makes a program, and those it starts, clients of this server and of no other.
+    fn for_clients<'a>(&self, command: &'a mut Command) -> &'a mut Command {
+        command.env("JACK_DEFAULT_SERVER", self.name).env("JACK_NO_START_SERVER", "1")
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        // Asked, it removes its shared memory; std can only kill.
+        let asked = Command::new("kill").arg(self.child.id().to_string()).status();
+        if !asked.is_ok_and(|status| status.success()) {
+            let _ = self.child.kill();
+        }
+        let _ = self.child.wait();
+    }
+}
