@@ -127,7 +127,7 @@ impl Player {
             }
         };
         // The link's thread wakes every millisecond.
-        if now_us as u64 % (2 * PERIOD_US) == 0 {
+        if (now_us as u64).is_multiple_of(2 * PERIOD_US) {
             self.session.poll(now_us, &mut send, &mut tell);
         }
     }
