@@ -42,6 +42,8 @@ pub struct Desk {
     /// What the feel in force was worked out from.
     made_of: Option<(Settings, FeelDesign, Limits)>,
     refused: Option<String>,
+    /// Why the far end of the knob blows no harder, if it does not.
+    short_breath: Option<String>,
     link: Option<KnobLink>,
     choice: Choice,
     rows: (mpsc::Sender<Moment>, mpsc::Receiver<Moment>),
@@ -84,6 +86,7 @@ impl Desk {
             take,
             made_of: None,
             refused: None,
+            short_breath: None,
             link: None,
             choice: Choice::Off,
             rows: mpsc::channel(),
@@ -205,6 +208,13 @@ impl Desk {
             return;
         }
         self.made_of = Some((settings, design, limits));
+        let (full_kpa, closing_kpa) = (f64::from(settings.breath_full_kpa), 1e-3 * settings.closing_pa());
+        // Single precision makes 6 kPa a little less than 6 kPa.
+        self.short_breath = (full_kpa < 0.999 * closing_kpa).then(|| {
+            format!(
+                "this reed shuts at {closing_kpa:.1} kPa: raise Full breath ({full_kpa:.1} kPa) to reach it"
+            )
+        });
         let Ok(feels) = Feels::built_in() else { return };
         match feels.table(&settings, &design, &limits) {
             Ok(table) => {
@@ -393,7 +403,12 @@ impl Desk {
         if let Some(recording) = &self.recording {
             words.push(format!("recording, {} rows", recording.rows));
         }
-        words.extend([&self.note_to_user, &self.refused, &self.take_trouble].into_iter().flatten().cloned());
+        words.extend(
+            [&self.note_to_user, &self.refused, &self.short_breath, &self.take_trouble]
+                .into_iter()
+                .flatten()
+                .cloned(),
+        );
         if let Some(status) = status {
             words.extend([&status.last_refusal, &status.notice].into_iter().flatten().cloned());
         }
