@@ -85,7 +85,7 @@ impl Random {
     }
 
     fn event(&mut self) -> Event {
-        match self.below(17) {
+        match self.below(18) {
             0..=5 => {
                 Event::NoteOn { note: SoundingNote(40 + self.below(60) as u8), velocity: self.wild(0.0, 1.0) }
             }
@@ -93,6 +93,7 @@ impl Random {
             9..=13 => Event::Breath(self.wild(0.0, 1.0)),
             14 => Event::Bend { cents: self.wild(-200.0, 200.0) },
             15 => Event::TongueSlap { strength: self.wild(0.0, 1.0) },
+            16 => Event::Reed { h: self.wild(0.6, 1.6), k: self.wild(0.6, 1.6) },
             _ if self.below(8) == 0 => Event::Panic,
             _ => Event::Breath(0.6),
         }

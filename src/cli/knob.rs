@@ -177,6 +177,17 @@ impl Knob {
         if std::io::stderr().is_terminal() {
             eprintln!();
         }
+        let stats = link.status().stats;
+        eprintln!(
+            "{} positions, {:.0} a second; {} lost, {} damaged, {} twice; jitter p50 {:.2} ms, p99 {:.2} ms",
+            stats.states,
+            stats.rate_hz,
+            stats.wire.lost,
+            stats.wire.crc_errors + stats.wire.length_errors + stats.wire.range_errors,
+            stats.wire.duplicates,
+            1e-3 * f64::from(stats.jitter_p50_us),
+            1e-3 * f64::from(stats.jitter_p99_us),
+        );
         if let Some(take) = take {
             take.keep()?;
         }

@@ -7,7 +7,7 @@ pub mod calibration;
 pub mod slap;
 
 pub use calibration::{Calibration, CalibrationError, Taken};
-pub use slap::SlapDetector;
+pub use slap::slap_strength;
 
 /// Exponent of the curve, from quick at the start to slow at the start (by judgement).
 pub const CURVE: std::ops::RangeInclusive<f64> = 0.25..=4.0;

@@ -7,6 +7,7 @@
 
 mod audio;
 mod desk;
+mod takes;
 
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};

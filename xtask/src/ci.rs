@@ -109,7 +109,8 @@ fn packages() -> Result<()> {
 
 /// Haptics, links, firmware and simulator together; what the core's tests cover is not run again.
 fn knob() -> Result<()> {
-    let tests = ["device", "simulator", "haptics"].map(|name| format!(" --test {name}")).concat();
+    let tests =
+        ["device", "simulator", "haptics", "closed_loop"].map(|name| format!(" --test {name}")).concat();
     cargo(&format!("test --no-default-features --features simulator --no-fail-fast --lib --bins{tests}"))
 }
 
@@ -133,7 +134,7 @@ fn clap_checked() -> Result<()> {
     cargo("build --all-features --lib")?;
     let library = format!("{}chalumeau{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     let library = machine::target().join("debug").join(library);
-    let tests = ["test", "-p", "xtask", "--test", "clap", "--no-fail-fast"];
+    let tests = ["test", "-p", "xtask", "--test", "clap", "--test", "knob", "--no-fail-fast"];
     machine::run(machine::cargo().args(tests).env("CHALUMEAU_CLAP", library))
 }
 

@@ -258,3 +258,21 @@ fn only_the_user_arms_and_then_the_note_resists() {
     assert!((20.0..=100.0).contains(&strongest), "{strongest} mNm");
     assert!(rows[..first].iter().all(|row| row[1].abs() < 0.5), "torque before the user armed");
 }
+
+#[test]
+fn a_slap_of_the_hand_is_a_slap_of_the_tongue() {
+    let number = serial_number();
+    let _knob = knob(number, &["--slap", "--loop"]);
+    let mut plugin = plugin();
+    connect(&mut plugin, number).unwrap();
+    let heard = plugin
+        .session(RATE, BLOCK, |session| {
+            wait_until_live(session, RATE).unwrap();
+            let [left, _] = session.play_live(&[], 4 * SECOND, RATE).unwrap();
+            left
+        })
+        .unwrap();
+    let peak = heard.iter().fold(0.0_f32, |peak, x| peak.max(x.abs()));
+    println!("peak {peak:.3} without a key or breath");
+    assert!(peak > 0.01, "{peak}");
+}

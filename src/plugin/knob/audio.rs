@@ -3,7 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use super::{NO_NOTE, Shared, desk};
+use super::{NO_NOTE, Shared, desk, takes};
+use crate::control::knob::slap_strength;
 use crate::device::KnobReader;
 use crate::event::{Event, Timed};
 use crate::instrument::{Clarinet, Settings};
@@ -91,7 +92,7 @@ impl Audio {
         }
         let Ok(path) = params.knob.take.read().map(|path| path.clone()) else { return };
         // A take or feel that cannot be had is worded by the desk; nothing is replayed then.
-        let Ok(take) = desk::load(&path) else { return };
+        let Ok(take) = takes::load(&path) else { return };
         let Ok(feels) = Feels::built_in() else { return };
         let Ok(table) = feels.table(&params.settings(), &desk::design(&params.knob), &NO_MOTOR) else {
             return;
@@ -170,8 +171,10 @@ impl Audio {
                 self.replayed += samples as u64;
             }
             (Source::Knob, _, Some(reader)) => {
-                let slap =
-                    reader.take_slap().map(|strength| Timed { at: 0, event: Event::TongueSlap { strength } });
+                let slap = reader.take_slap().map(|speed| Timed {
+                    at: 0,
+                    event: Event::TongueSlap { strength: slap_strength(speed) },
+                });
                 let angle = |at: usize| reader.pose(at).map(|pose| f64::from(pose.angle_deg));
                 let events = Blown::new(host, &mut self.blower, hand, full_pa, samples, angle, &mut heard);
                 clarinet.render_events(slap.into_iter().chain(events), out);

@@ -1,12 +1,11 @@
 //! The desk: follows the parameters and does for the knob what takes time.
 
 use std::net::{Ipv4Addr, SocketAddr};
-use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, mpsc};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
-use super::Shared;
+use super::{Shared, takes};
 use crate::control::knob::{self, KnobDesign, Taken};
 use crate::device::{
     Choice, Hooks, KnobLink, KnobReader, LinkStatus, Phase, StateSample, serial_number, serial_text,
@@ -17,8 +16,7 @@ use crate::plugin::params::knob::{Calibration, KnobKind, LawChoice, OrderChoice}
 use crate::plugin::params::{ChalumeauParams, KnobParams};
 use crate::touch::blower::Hand;
 use crate::touch::feel::Feels;
-use crate::touch::study::{Side, plan};
-use crate::touch::take::{Marks, Moment, Take, TakeWriter};
+use crate::touch::take::{Moment, Take};
 use crate::units::{SoundingNote, WrittenNote};
 use crate::wire::Law;
 
@@ -32,16 +30,6 @@ const TRANSPOSITION: i8 = 2;
 /// Torque of the reference note in a study at most, mNm: with it both sides of every trial are allowed under the first
 /// ceiling at the default contrast (a test below).
 const STUDY_MNM: f64 = 50.0;
-/// Where takes go, for those who want them elsewhere.
-const TAKES: &str = "CHALUMEAU_TAKES";
-
-/// A take being written.
-struct Recording {
-    writer: TakeWriter,
-    path: PathBuf,
-    rows: u64,
-    trouble: Option<String>,
-}
 
 /// Everything the desk thread has.
 pub struct Desk {
@@ -54,10 +42,12 @@ pub struct Desk {
     /// What the feel in force was worked out from.
     made_of: Option<(Settings, FeelDesign, Limits)>,
     refused: Option<String>,
+    /// Why the far end of the knob blows no harder, if it does not.
+    short_breath: Option<String>,
     link: Option<KnobLink>,
     choice: Choice,
     rows: (mpsc::Sender<Moment>, mpsc::Receiver<Moment>),
-    recording: Option<Recording>,
+    recording: Option<takes::Recording>,
     take_path: String,
     take_trouble: Option<String>,
     note_to_user: Option<String>,
@@ -96,6 +86,7 @@ impl Desk {
             take,
             made_of: None,
             refused: None,
+            short_breath: None,
             link: None,
             choice: Choice::Off,
             rows: mpsc::channel(),
@@ -217,6 +208,13 @@ impl Desk {
             return;
         }
         self.made_of = Some((settings, design, limits));
+        let (full_kpa, closing_kpa) = (f64::from(settings.breath_full_kpa), 1e-3 * settings.closing_pa());
+        // Single precision makes 6 kPa a little less than 6 kPa.
+        self.short_breath = (full_kpa < 0.999 * closing_kpa).then(|| {
+            format!(
+                "this reed shuts at {closing_kpa:.1} kPa: raise Full breath ({full_kpa:.1} kPa) to reach it"
+            )
+        });
         let Ok(feels) = Feels::built_in() else { return };
         match feels.table(&settings, &design, &limits) {
             Ok(table) => {
@@ -250,7 +248,7 @@ impl Desk {
         }
         self.take_path.clone_from(&path);
         self.take_trouble = None;
-        let take = (!path.is_empty()).then(|| load(&path)).transpose();
+        let take = (!path.is_empty()).then(|| takes::load(&path)).transpose();
         match take {
             Ok(take) => self.take.write(take),
             Err(reason) => {
@@ -348,7 +346,7 @@ impl Desk {
 
     fn record(&mut self, wanted: bool) {
         if wanted && self.recording.is_none() {
-            self.recording = match begin_take(&self.params) {
+            self.recording = match takes::begin(&self.params) {
                 Ok(recording) => Some(recording),
                 Err(reason) => {
                     self.take_trouble = Some(reason);
@@ -356,7 +354,8 @@ impl Desk {
                 }
             };
         }
-        let mut marks = marks(&self.params, &self.params.settings().with_reed_factors(self.shared.reed()));
+        let mut marks =
+            takes::marks(&self.params, &self.params.settings().with_reed_factors(self.shared.reed()));
         if self.refused.is_some() {
             // The hand did not follow the sound: such rows are no part of a study.
             marks.study = None;
@@ -374,7 +373,7 @@ impl Desk {
         if !heard {
             self.calibrate(None);
         }
-        if !wanted && let Some(Recording { writer, path, rows, trouble }) = self.recording.take() {
+        if !wanted && let Some(takes::Recording { writer, path, rows, trouble }) = self.recording.take() {
             self.take_trouble = match (rows, trouble, writer) {
                 (0, ..) => Some("nothing recorded: the knob sent nothing".to_owned()),
                 (_, Some(reason), _) => Some(format!("take lost: {reason}")),
@@ -404,7 +403,12 @@ impl Desk {
         if let Some(recording) = &self.recording {
             words.push(format!("recording, {} rows", recording.rows));
         }
-        words.extend([&self.note_to_user, &self.refused, &self.take_trouble].into_iter().flatten().cloned());
+        words.extend(
+            [&self.note_to_user, &self.refused, &self.short_breath, &self.take_trouble]
+                .into_iter()
+                .flatten()
+                .cloned(),
+        );
         if let Some(status) = status {
             words.extend([&status.last_refusal, &status.notice].into_iter().flatten().cloned());
         }
@@ -450,77 +454,16 @@ fn is_live(status: &LinkStatus) -> bool {
     matches!(status.phase, Phase::Live | Phase::ReadOnly)
 }
 
-/// Reads a take, or says why not.
-pub fn load(path: &str) -> Result<Arc<Take>, String> {
-    let file = std::fs::File::open(path).map_err(|reason| format!("cannot read take {path}: {reason}"))?;
-    Take::read(file).map(Arc::new).map_err(|reason| format!("take {path}: {reason}"))
-}
-
 /// Rest, full blow, dead zone and curve as the parameters have them.
 pub fn calibrated(knob: &KnobParams) -> KnobDesign {
     let calibration = knob.calibration.read().map_or_else(|_| Calibration::default(), |c| *c);
     calibration.design(f64::from(knob.curve.value()))
 }
 
-fn marks(params: &ChalumeauParams, settings: &Settings) -> Marks {
-    let law = settings.reed_law();
-    let study = params
-        .knob
-        .study()
-        .map(|(participant, trial, side)| (participant, trial.number, side, trial.condition(side)));
-    Marks { reed: Some((law.h(), law.k())), study }
-}
-
-fn begin_take(params: &ChalumeauParams) -> Result<Recording, String> {
-    let folder = match std::env::var_os(TAKES) {
-        Some(folder) => PathBuf::from(folder),
-        None => dirs::document_dir()
-            .or_else(dirs::data_dir)
-            .ok_or_else(|| format!("no folder for takes; set {TAKES} to one"))?
-            .join("Chalumeau")
-            .join("takes"),
-    };
-    std::fs::create_dir_all(&folder).map_err(|reason| {
-        format!("cannot make {}: {reason}; set {TAKES} to another folder", folder.display())
-    })?;
-    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
-    let path = (0..1_000)
-        .map(|n| {
-            folder.join(if n == 0 {
-                format!("take-{seconds}.csv")
-            } else {
-                format!("take-{seconds}-{n}.csv")
-            })
-        })
-        .find(|path| !path.exists())
-        .ok_or_else(|| format!("{} is full of takes", folder.display()))?;
-    let knob = &params.knob;
-    let mut remarks = vec![
-        format!(
-            "Chalumeau {} take; t_us is the host's clock, angle from the knob's zero",
-            env!("CARGO_PKG_VERSION")
-        ),
-        format!("feel {:?}", design(knob)),
-    ];
-    if let Some((participant, ..)) = params.knob.study() {
-        let order: Vec<String> = plan(participant, knob.seed.value() as u32)
-            .iter()
-            .map(|trial| format!("{}:H={},A={}", trial.number, trial.h, trial.condition(Side::A).name()))
-            .collect();
-        remarks.push(format!(
-            "study participant {participant} seed {} order {}",
-            knob.seed.value(),
-            order.join(" ")
-        ));
-    }
-    let writer = TakeWriter::create(&path, false, &remarks).map_err(|reason| reason.to_string())?;
-    Ok(Recording { writer, path, rows: 0, trouble: None })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::touch::study::{Condition, TRIALS};
+    use crate::touch::study::{Condition, TRIALS, plan};
 
     #[test]
     fn both_sides_of_every_trial_can_be_felt_under_the_first_ceiling() {

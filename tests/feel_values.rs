@@ -1,0 +1,147 @@
+//! `chalumeau haptic`: the feel of all notes against the reference table, and which note feels harder than which.
+
+#[path = "support/reference.rs"]
+mod reference;
+
+use chalumeau::bore::instrument_file::InstrumentFile;
+use std::collections::BTreeMap;
+use std::process::Command;
+
+const COLUMNS: [&str; 10] = [
+    "written_midi",
+    "gamma_on",
+    "gamma_off",
+    "p_req_pa",
+    "a_on_deg",
+    "a_off_deg",
+    "a_close_deg",
+    "scale_mnm",
+    "h",
+    "k",
+];
+/// The note exaggeration leaves alone: C5.
+const REFERENCE: u8 = 72;
+
+/// One note of the table, by column.
+type Note = BTreeMap<&'static str, f64>;
+
+/// What `chalumeau haptic` says of all notes.
+fn haptic(words: &str) -> BTreeMap<u8, Note> {
+    let arguments = format!("haptic --all --csv - {words}");
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_chalumeau")).args(arguments.split_whitespace()).output().unwrap();
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{words}: {error}");
+    let text = String::from_utf8(output.stdout).unwrap();
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    assert_eq!(lines.next(), Some(COLUMNS.join(",").as_str()));
+    lines
+        .map(|line| {
+            let fields: Vec<f64> = line.split(',').map(|field| field.parse().unwrap()).collect();
+            assert_eq!(fields.len(), COLUMNS.len(), "{line}");
+            let note: Note = COLUMNS.into_iter().zip(fields).collect();
+            (note["written_midi"] as u8, note)
+        })
+        .collect()
+}
+
+/// A column over the reference note's.
+fn over_reference(notes: &BTreeMap<u8, Note>, column: &str) -> BTreeMap<u8, f64> {
+    notes.iter().map(|(&written, note)| (written, note[column] / notes[&REFERENCE][column])).collect()
+}
+
+fn spread(values: &BTreeMap<u8, f64>) -> f64 {
+    values.values().copied().fold(0.0, f64::max) / values.values().copied().fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn physical_feel_is_the_reference_table_for_three_embouchures_under_both_laws() {
+    let mut worst = 0.0_f64;
+    for zeta in ["0.2", "0.3", "0.4"] {
+        let expected = reference::by_written("thresholds_tuned.csv", &format!("gamma_th_zeta{zeta}"));
+        let standard = expected[&REFERENCE];
+        for law in ["flow", "pressure"] {
+            let notes = haptic(&format!("--zeta {zeta} --contrast 1 --law {law}"));
+            assert_eq!(notes.len(), 46);
+            let (angles, torques) = (over_reference(&notes, "a_on_deg"), over_reference(&notes, "scale_mnm"));
+            for (written, note) in &notes {
+                // What it asks, and what the hand is given: the angle and the torque go as the pressure.
+                for (what, found) in [
+                    ("gamma_on", note["gamma_on"]),
+                    ("p_req_pa", note["p_req_pa"] / 6_000.0),
+                    ("a_on_deg", angles[written] * standard),
+                    ("scale_mnm", torques[written] * standard),
+                ] {
+                    let off = found / expected[written] - 1.0;
+                    assert!(off.abs() < 0.02, "zeta {zeta} {law} {written} {what}: {found}, {off}");
+                    worst = worst.max(off.abs());
+                }
+                let (on, close, off) = (note["a_on_deg"], note["a_close_deg"], note["a_off_deg"]);
+                assert!(0.0 < on && on < close && close <= off, "{written}: {on} {close} {off}");
+                assert!((note["h"] * note["k"] - 1.0).abs() < 1e-4, "the reference reed closes at 1");
+                if law == "flow" {
+                    assert!((3.0 * on / close - 1.0).abs() < 1e-4, "the peak lies at a third of closure");
+                }
+            }
+        }
+    }
+    println!("worst {:.2} %", 100.0 * worst);
+}
+
+#[test]
+fn physical_order_is_that_of_the_pressures_and_contrast_widens_it() {
+    let expected = reference::by_written("thresholds_tuned.csv", "gamma_th_zeta0.3");
+    let physical = over_reference(&haptic("--contrast 1"), "a_on_deg");
+    for (a, hard) in &expected {
+        for (b, easy) in &expected {
+            // Closer than the table's own error is no order.
+            if hard / easy > 1.01 {
+                assert!(physical[a] > physical[b], "{a} is harder than {b}");
+            }
+        }
+    }
+    for contrast in [3, 5] {
+        for column in ["a_on_deg", "scale_mnm"] {
+            let wider = over_reference(&haptic(&format!("--contrast {contrast}")), column);
+            for (written, ratio) in &physical {
+                assert!((wider[written] / ratio.powi(contrast) - 1.0).abs() < 1e-3, "{written} {column}");
+            }
+        }
+    }
+}
+
+#[test]
+fn covered_holes_are_harder_the_longer_the_tube_and_easier_when_reversed() {
+    let file = InstrumentFile::built_in();
+    // Length of tube down to the first open hole; register holes are no end of the tube.
+    let lengths: BTreeMap<u8, f64> = file
+        .fingerings
+        .iter()
+        .map(|fingering| {
+            let open = file.holes.iter().zip(&fingering.open).find(|&(hole, &open)| open && !hole.register);
+            (fingering.written.0, open.map_or(file.length_m(), |(hole, _)| hole.x_m))
+        })
+        .collect();
+    let table = |order: &str| haptic(&format!("--contrast 1 --order {order}"));
+    let [physical, covered, reversed] = ["physical", "covered-holes", "covered-holes-reversed"].map(table);
+    let angle = |notes: &BTreeMap<u8, Note>, written: u8| notes[&written]["a_on_deg"];
+    for (&a, long) in &lengths {
+        for (&b, short) in &lengths {
+            if long > short {
+                assert!(angle(&covered, a) > angle(&covered, b), "{a} covers more than {b}");
+                assert!(angle(&reversed, a) < angle(&reversed, b), "{a} covers more than {b}");
+                assert!(covered[&a]["scale_mnm"] > covered[&b]["scale_mnm"]);
+            }
+        }
+    }
+    // The lowest note covers everything, and the clarion above it has the same fingers.
+    assert_eq!(angle(&covered, 52), angle(&covered, 71));
+    // Neither the spread nor what a note asks depends on the order.
+    let spreads = [&physical, &covered, &reversed].map(|notes| spread(&over_reference(notes, "a_on_deg")));
+    assert!(spreads.iter().all(|x| (x / spreads[0] - 1.0).abs() < 1e-4), "{spreads:?}");
+    for (written, note) in &physical {
+        for other in [&covered, &reversed] {
+            assert_eq!(note["p_req_pa"], other[written]["p_req_pa"]);
+        }
+    }
+}
