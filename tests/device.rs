@@ -98,6 +98,8 @@ fn a_simulated_knob_is_found_played_armed_and_left_in_peace() {
     soon("round trips", || link.status().stats.feel_round_trip_us.is_some());
 
     assert_eq!(said(&knob, |m| matches!(m, Message::Arm(_))), 0, "nobody has armed yet");
+    // A knob that is being turned, as this one was, is not armed.
+    soon("rest", || states.try_iter().last().is_some_and(|state| state.velocity_deg_s.abs() < 60.0));
     link.arm(900);
     soon("armed", || knob.is_armed() && link.status().armed);
     assert_eq!(link.status().ceiling_mnm, 250);
@@ -756,6 +758,23 @@ fn no_fault_ever_arms_a_knob() {
         assert_eq!(bench.session.is_armed(), bench.device.firmware.is_armed(), "life {life}");
     }
     assert!(armed_lives == 300 && disarmed_lives > 200, "{armed_lives}, {disarmed_lives}");
+}
+
+#[test]
+fn a_midi_knob_whose_answer_is_late_is_not_taken_for_a_plain_one() {
+    let mut bench = Bench::new(Binding::Midi);
+    for ms in 0..1000 {
+        bench.device.counts += 1;
+        // The first HELLO is lost, and controllers arrive alone.
+        bench.tick(|line| {
+            if ms < 100 && line.first() == Some(&0xF0) {
+                line.clear();
+            }
+        });
+        assert_ne!(bench.session.standing(bench.now_us), Standing::PlainMidi, "{ms} ms");
+        assert!(ms != 100 || bench.states > 0, "its breath is heard all the same");
+    }
+    assert_eq!(bench.session.standing(bench.now_us), Standing::Live);
 }
 
 #[test]
