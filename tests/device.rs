@@ -7,15 +7,30 @@
 mod knob;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use chalumeau::device::memory::pair;
+use chalumeau::analysis::pitch::fundamental_hz;
+use chalumeau::analysis::to_f64;
+use chalumeau::control::knob::KnobDesign;
+use chalumeau::device::memory::{MemoryPort, pair};
 use chalumeau::device::session::{Happening, Session, Standing, Wish};
 use chalumeau::device::transport::{Binding, Transport};
 use chalumeau::device::{Choice, Hooks, KnobLink, Phase, Places, StateSample};
+use chalumeau::event::{Event, Timed};
+use chalumeau::haptics::FeelDesign;
+use chalumeau::instrument::{Clarinet, Settings};
+use chalumeau::simulator::hand::{Hand, HandDesign};
+use chalumeau::simulator::knob::SimulatedKnob;
+use chalumeau::simulator::plant::PlantDesign;
+use chalumeau::simulator::script::Aim;
+use chalumeau::simulator::serve::{Control, Port, Server};
+use chalumeau::touch::blower::{Blower, Blown, Breath14, Hand as Blowing};
+use chalumeau::touch::feel::{Feels, NO_MOTOR};
+use chalumeau::units::{SoundingNote, cents};
 use chalumeau::wire::{Decoder, Feel, Law, Message};
 use chalumeau_firmware::Setup;
 use knob::{Device, PtyKnob, recorder, soon};
 use rosc::{OscMessage, OscPacket, OscType, encoder};
 use serialport::{SerialPort, TTYPort};
+use std::io;
 use std::io::{Read, Write};
 use std::net::UdpSocket;
 use std::path::PathBuf;
@@ -83,6 +98,8 @@ fn a_simulated_knob_is_found_played_armed_and_left_in_peace() {
     soon("round trips", || link.status().stats.feel_round_trip_us.is_some());
 
     assert_eq!(said(&knob, |m| matches!(m, Message::Arm(_))), 0, "nobody has armed yet");
+    // A knob that is being turned, as this one was, is not armed.
+    soon("rest", || states.try_iter().last().is_some_and(|state| state.velocity_deg_s.abs() < 60.0));
     link.arm(900);
     soon("armed", || knob.is_armed() && link.status().armed);
     assert_eq!(link.status().ceiling_mnm, 250);
@@ -473,6 +490,94 @@ fn over_midi_the_same_firmware_is_played_and_felt() {
     assert!(knob.join().unwrap());
 }
 
+/// A MIDI device that sends control changes alone, and hears nothing.
+struct ControllersOnly(MemoryPort);
+
+impl Transport for ControllersOnly {
+    fn binding(&self) -> Binding {
+        self.0.binding()
+    }
+
+    fn poll(&mut self, wait: Duration, sink: &mut dyn FnMut(&[u8])) -> io::Result<()> {
+        self.0.poll(wait, &mut |message| {
+            if message[0] == 0xB0 {
+                sink(message);
+            }
+        })
+    }
+
+    fn send(&mut self, _: &[u8]) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn describe(&self) -> String {
+        self.0.describe()
+    }
+}
+
+/// From the simulated hand to the sound, all in this program: the firmware's MIDI messages, the link, the reader at the
+/// pace of a sound card, breath, clarinet.
+#[test]
+fn over_midi_a_hand_on_the_knob_is_heard_with_and_without_sysex() {
+    const RATE_HZ: f64 = 48_000.0;
+    const BLOCK: usize = 128;
+    let feels = Feels::built_in().unwrap();
+    let table = feels.table(&Settings::default(), &FeelDesign::default(), &NO_MOTOR).unwrap();
+    for is_plain in [false, true] {
+        let (_directory, places) = places();
+        let (device, host) = pair(Binding::Midi, "TorqueTuner MIDI");
+        let setup = Setup { midi: true, ..Setup::default() };
+        let knob = SimulatedKnob::new(setup, PlantDesign::default(), Hand::new(HandDesign::default(), 1), 1);
+        let running = Server::new(knob, Port::Memory(Box::new(device))).spawn().unwrap();
+        running.tell(Control::Aim(Aim::Angle(200.0)));
+        let (link, mut reader) = KnobLink::spawn_in(places, "test", Hooks::default());
+        link.attach(if is_plain { Box::new(ControllersOnly(host)) } else { Box::new(host) });
+        let phase = if is_plain { Phase::ReadOnly } else { Phase::Live };
+        soon("there", || link.status().phase == phase);
+
+        let hand = Blowing { maps: feels.maps(&table), design: KnobDesign::default(), feels: !is_plain };
+        let (mut blower, mut clarinet) = (Blower::default(), Clarinet::built_in(RATE_HZ).unwrap());
+        let full_pa = 1e3 * f64::from(Settings::default().breath_full_kpa);
+        // The lowest note, written E3.
+        let note = Event::NoteOn { note: SoundingNote(50), velocity: 0.8 };
+        let mut host = Some(Timed { at: 0, event: note });
+        let (mut heard, begun) = (Vec::new(), Instant::now());
+        let (mut breath, mut angle_deg) = (0.0, 0.0);
+        // Half a second in tune where the hand stays, however long a busy machine takes to come to it.
+        soon("the note", || {
+            for _ in 0..(0.5 * RATE_HZ) as usize / BLOCK {
+                let due = begun + Duration::from_secs_f64(heard.len() as f64 / RATE_HZ);
+                thread::sleep(due.saturating_duration_since(Instant::now()));
+                reader.begin_block(BLOCK, RATE_HZ);
+                let angle = |at: usize| {
+                    angle_deg = f64::from(reader.pose(at)?.angle_deg);
+                    Some(angle_deg)
+                };
+                let mut blown = |_: usize, value: Breath14| breath = value.unit();
+                let events = Blown::new(
+                    host.take().into_iter(),
+                    &mut blower,
+                    &hand,
+                    full_pa,
+                    BLOCK,
+                    angle,
+                    &mut blown,
+                );
+                let mut block = [0.0; BLOCK];
+                clarinet.render_events(events, &mut block);
+                blower.advance(BLOCK);
+                heard.extend(block);
+            }
+            let hz = fundamental_hz(&to_f64(&heard[heard.len() - 20_000..]), RATE_HZ);
+            (angle_deg - 200.0).abs() < 2.0 && hz.is_some_and(|hz| cents(hz, 146.832).abs() < 20.0)
+        });
+        println!("plain {is_plain}: {angle_deg:.1} degrees, breath {breath:.3} after {:?}", begun.elapsed());
+        assert!((0.4..0.95).contains(&breath), "breath {breath}");
+        drop(link);
+        assert!(running.finish().is_ok());
+    }
+}
+
 /// Firmware and session in simulated time, with a line between them that does what it is told.
 struct Bench {
     session: Session,
@@ -653,6 +758,23 @@ fn no_fault_ever_arms_a_knob() {
         assert_eq!(bench.session.is_armed(), bench.device.firmware.is_armed(), "life {life}");
     }
     assert!(armed_lives == 300 && disarmed_lives > 200, "{armed_lives}, {disarmed_lives}");
+}
+
+#[test]
+fn a_midi_knob_whose_answer_is_late_is_not_taken_for_a_plain_one() {
+    let mut bench = Bench::new(Binding::Midi);
+    for ms in 0..1000 {
+        bench.device.counts += 1;
+        // The first HELLO is lost, and controllers arrive alone.
+        bench.tick(|line| {
+            if ms < 100 && line.first() == Some(&0xF0) {
+                line.clear();
+            }
+        });
+        assert_ne!(bench.session.standing(bench.now_us), Standing::PlainMidi, "{ms} ms");
+        assert!(ms != 100 || bench.states > 0, "its breath is heard all the same");
+    }
+    assert_eq!(bench.session.standing(bench.now_us), Standing::Live);
 }
 
 #[test]

@@ -188,9 +188,14 @@ impl Watch {
         let flags = (stop.clone(), gone.clone());
         let look = move || {
             let (stop, gone) = flags;
+            // One for all looks: to JACK each new one is a change of all its connections.
+            let mut list = None;
             while !stop.load(Ordering::Relaxed) {
                 thread::park_timeout(WATCH);
-                if !ports(true).is_ok_and(|ports| ports.contains(&name)) {
+                list = list.or_else(|| MidiInput::new(CLIENT).ok());
+                // Without a list nothing is known; if MIDI itself has gone the silence tells.
+                let is_missing = |list: &MidiInput| !names(list).contains(&name);
+                if list.as_ref().is_some_and(is_missing) {
                     return gone.store(true, Ordering::Relaxed);
                 }
             }

@@ -37,6 +37,9 @@ const SLOW_RATE_HZ: u16 = 200;
 const LONGEST_PERIOD_US: u32 = 50_000;
 /// Time between two angles of a plain MIDI device, us; only the reader's delay depends on it.
 const PLAIN_PERIOD_US: u32 = 10_000;
+/// A MIDI device that has not answered by then, us, is taken for a plain one: two HELLO and an answer. Its breath is heard
+/// from the first.
+const PLAIN_AFTER_US: i64 = 600_000;
 /// Two angles further apart than this say nothing of speed, us.
 const PLAIN_GAP_US: i64 = 200_000;
 
@@ -220,9 +223,9 @@ impl Session {
         match &self.info {
             Some(info) if !info.speaks_our_major() => Standing::OtherVersion,
             Some(_) if self.is_heard(now_us) => Standing::Live,
-            Some(_) if self.state.is_none() && self.plain.is_some() => Standing::PlainMidi,
+            Some(_) if self.state.is_none() && self.is_plain(now_us) => Standing::PlainMidi,
             Some(_) => Standing::Silent,
-            None if self.plain.is_some() => Standing::PlainMidi,
+            None if self.is_plain(now_us) => Standing::PlainMidi,
             None => {
                 self.greeting.stock_name().map_or(Standing::Greeting, |name| Standing::Stock(name.into()))
             }
@@ -320,6 +323,11 @@ impl Session {
                 }
             }
         }
+    }
+
+    /// Control changes, and time enough for more.
+    fn is_plain(&self, now_us: i64) -> bool {
+        self.plain.is_some() && now_us - self.opened_us > PLAIN_AFTER_US
     }
 
     fn is_heard(&self, now_us: i64) -> bool {

@@ -45,6 +45,13 @@ struct Row {
     feel_id: u8,
 }
 
+impl Row {
+    /// The hand has come where it stays; a knob that is being turned is not armed.
+    fn is_held(&self) -> bool {
+        (self.angle_deg - HAND_DEG).abs() < 1.0
+    }
+}
+
 impl MidiKnob {
     fn plug() -> Self {
         let number = serial_number();
@@ -69,6 +76,11 @@ impl MidiKnob {
 
     fn rows(&self) -> Vec<Row> {
         rows(&self.log)
+    }
+
+    /// Whether the last line of the log says so.
+    fn last(&self, says: impl Fn(&Row) -> bool) -> bool {
+        self.rows().last().is_some_and(says)
     }
 
     /// Waits until the log has told something that is new since now.
@@ -150,23 +162,20 @@ fn feel_reaches_a_midi_knob_and_torque_waits_for_the_user() {
         .session(RATE, BLOCK, |session| {
             wait_until_live(session, RATE).unwrap();
             session.play_live(&[At(0, on(E3))], SECOND, RATE).unwrap();
-            play_until(session, "a feel", |_| knob.rows().last().is_some_and(|row| row.feel_id != 0));
+            play_until(session, "the hand", |_| knob.last(Row::is_held));
+            play_until(session, "a feel", |_| knob.last(|row| row.feel_id != 0));
             let idle = knob.rows();
             assert!(idle.iter().all(|row| !row.armed && row.torque_mnm == 0.0), "torque nobody asked for");
             let lowest = idle.last().unwrap().feel_id;
 
             session.play_live(&[At(0, Say::Set(arm, 1.0))], SECOND / 10, RATE).unwrap();
-            let felt = |row: &Row| row.armed && row.torque_mnm < -5.0;
-            let took = play_until(session, "torque", |_| knob.rows().last().is_some_and(felt));
+            let took = play_until(session, "torque", |_| knob.last(|row| row.armed && row.torque_mnm < -5.0));
             println!("felt {:.2} s after Arm as the log has it", took.as_secs_f64());
             session.play_live(&[At(0, on(72))], SECOND / 10, RATE).unwrap();
-            play_until(session, "another note's feel", |_| {
-                knob.rows().last().is_some_and(|row| row.feel_id != lowest)
-            });
+            play_until(session, "another note's feel", |_| knob.last(|row| row.feel_id != lowest));
 
             session.play_live(&[At(0, Say::Set(arm, 0.0))], SECOND / 10, RATE).unwrap();
-            let limp = |row: &Row| !row.armed && row.torque_mnm == 0.0;
-            play_until(session, "no torque", |_| knob.rows().last().is_some_and(limp));
+            play_until(session, "no torque", |_| knob.last(|row| !row.armed && row.torque_mnm == 0.0));
         })
         .unwrap();
     let strongest = knob.rows().iter().map(|row| -row.torque_mnm).fold(0.0, f64::max);
@@ -179,8 +188,7 @@ fn feel_reaches_a_midi_knob_and_torque_waits_for_the_user() {
 /// The knob's clock at the kill is told by its log: when a line is read, the clock stands there or a little later. Taking it
 /// for exact makes the result rather too long.
 fn torque_after_the_kill_ms(knob: &MidiKnob) -> f64 {
-    // A knob that is being turned is not armed.
-    knob.wait_for("the hand", |row| (row.angle_deg - HAND_DEG).abs() < 1.0);
+    knob.wait_for("the hand", Row::is_held);
     let host = Host::arm(knob);
     knob.wait_for("torque", |row| row.armed && row.torque_mnm < -10.0);
     let seen = knob.rows().len();
@@ -229,13 +237,9 @@ fn an_unplugged_midi_knob_is_found_again_disarmed() {
     let arm = plugin.param("Arm knob").unwrap().id;
     let mut session = plugin.activate(RATE, BLOCK).unwrap();
     wait_until_live(&mut session, RATE).unwrap();
+    play_until(&mut session, "the hand", |_| knob.last(Row::is_held));
     session.play_live(&[At(0, on(E3)), At(0, Say::Set(arm, 1.0))], SECOND, RATE).unwrap();
-    let status = plugin.param("Knob status").unwrap().id;
-    play_until(&mut session, "torque", |_| {
-        let said = plugin.text(status, 0.0).unwrap();
-        println!("DEBUG {}", &said[said.len().saturating_sub(30)..]);
-        knob.rows().last().is_some_and(|row| row.armed)
-    });
+    play_until(&mut session, "torque", |_| knob.last(|row| row.armed));
 
     // So soon that no list of ports has shown the gap, and late enough for all to have noticed.
     for unplugged in [Duration::ZERO, Duration::from_secs(2)] {

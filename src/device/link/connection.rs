@@ -25,8 +25,8 @@ const BOOT_US: i64 = 5_000_000;
 /// soon enough to be back within two seconds.
 const LOST_US: i64 = 500_000;
 
-/// The same over MIDI, us.
-const LOST_MIDI_US: i64 = 2_000_000;
+/// The same over MIDI, us: little more than what makes STATE too old, to be back within two seconds here too.
+const LOST_MIDI_US: i64 = 1_000_000;
 
 /// How often the owner looks whether another instance wants the knob, us.
 const WANTED_US: i64 = 100_000;
