@@ -557,6 +557,9 @@ mod firmware {
     }
 
     /// The host refuses what the knob would refuse, and only that.
+    /// A knob of the firmware's default damping, N m s/rad: b / (2 T) is the default limit.
+    const DAMPING_NMS: f32 = 5e-4;
+
     #[test]
     fn slopes_the_knob_refuses_are_refused_before_they_are_sent() {
         let standard = *table(&FeelDesign::default(), &Settings::default()).unwrap().reference();
@@ -584,8 +587,7 @@ mod firmware {
                             if (share - 1.0).abs() < 1e-3 || feel.check().is_err() {
                                 continue;
                             }
-                            // A knob of the least damping: 2 b / T is the default limit.
-                            let verdict = check_feel(&bytes(&feel), 2e-4);
+                            let verdict = check_feel(&bytes(&feel), DAMPING_NMS);
                             assert_eq!(verdict.is_ok(), share < 1.0, "{feel:?} {extremes:?} {verdict:?}");
                             if share < 1.0 { taken += 1 } else { refused += 1 }
                         }
@@ -602,7 +604,7 @@ mod firmware {
         for law in [Law::Flow, Law::Pressure] {
             for contrast in [1.0, 3.0, 5.0] {
                 for note in table(&design(law, contrast), &Settings::default()).unwrap().notes() {
-                    check_feel(&bytes(&note.feel), 2e-4).unwrap();
+                    check_feel(&bytes(&note.feel), DAMPING_NMS).unwrap();
                 }
             }
         }
@@ -659,7 +661,7 @@ mod command {
             ("haptic --all --curve", "choose a note with --written"),
             ("haptic --written 20", "has no fingering"),
             ("haptic --all --reference 20", "has no fingering"),
-            ("haptic --all --scale 300", "lower the strength"),
+            ("haptic --all --torque 300", "lower the strength"),
             ("haptic --all --contrast 9", "must lie in 1..5"),
             ("haptic --all --law round", "possible values"),
         ] {

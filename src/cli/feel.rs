@@ -46,7 +46,7 @@ pub struct FeelArgs {
     reference: Option<u8>,
     /// Torque per unit of flow (flow) or at closure (pressure) on the reference note, mNm, 0..450
     #[arg(long, value_name = "MNM", default_value = "60", value_parser = |s: &str| within(s, 0.0, 450.0))]
-    scale: f64,
+    torque: f64,
     /// Angle at which the reference reed closes on the reference note, degrees, 120..1080
     #[arg(long, value_name = "DEG", default_value = "360", value_parser = |s: &str| within(s, 120.0, 1_080.0))]
     travel: f64,
@@ -73,7 +73,7 @@ impl FeelArgs {
                 OrderArg::CoveredHoles => Order::CoveredHoles,
                 OrderArg::CoveredHolesReversed => Order::CoveredHolesReversed,
             },
-            strength_mnm: self.scale,
+            strength_mnm: self.torque,
             travel_deg: self.travel,
             detent_mnm: self.detent,
             ..FeelDesign::default()

@@ -2,7 +2,7 @@
 //!
 //! Between datagrams the knob is taken to go on at its velocity, which the firmware sends; without it the velocity is that
 //! of an alpha-beta filter. What a new angle corrects is not jumped to but faded in, so that the breath has no steps. The
-//! prediction ends after [`AHEAD_US`]: a knob that stops between two datagrams is overrun by that much at most.
+//! prediction ends after `AHEAD_US`: a knob that stops between two datagrams is overrun by that much at most.
 //!
 //! The firmware counts from where the knob stood when it was switched on, without bounds, in both directions. Zero is
 //! therefore set here. A jump that no hand can make is a restart: the new position becomes zero, so that it is silent.

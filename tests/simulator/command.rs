@@ -129,7 +129,8 @@ fn host_after_host_is_answered_until_interrupted() {
         let info = greet(&mut port, session);
         assert_eq!((info.serial, info.watchdog_ms), (0xC1A2, 80));
     }
-    let interrupted = Command::new("kill").args(["-INT", &knob.child.id().to_string()]).status().unwrap();
+    let interrupted =
+        Command::new("sh").args(["-c", &format!("kill -INT {}", knob.child.id())]).status().unwrap();
     assert!(interrupted.success());
     assert_eq!(knob.end(), Some(0));
     assert!(!knob.card().exists(), "the announcement is withdrawn");

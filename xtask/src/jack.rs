@@ -130,7 +130,7 @@ impl Server {
 impl Drop for Server {
     fn drop(&mut self) {
         // Asked, it removes its shared memory; std can only kill.
-        let asked = Command::new("kill").arg(self.child.id().to_string()).status();
+        let asked = Command::new("sh").args(["-c", &format!("kill {}", self.child.id())]).status();
         if !asked.is_ok_and(|status| status.success()) {
             let _ = self.child.kill();
         }
