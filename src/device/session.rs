@@ -468,6 +468,11 @@ impl Session {
         if self.info.replace(*info).is_none() {
             self.rate_due = self.binding == Binding::Serial;
             self.feeling.forget();
+            // What had piled up on the line before anybody read it is no loss of this session.
+            match &mut self.ears {
+                Ears::Midi(receiver) => receiver.forget_counts(),
+                Ears::Stream(decoder) => decoder.forget_counts(),
+            }
         }
     }
 

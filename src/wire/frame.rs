@@ -310,6 +310,11 @@ impl Decoder {
     pub fn stats(&self) -> WireStats {
         self.receiver.stats
     }
+
+    /// Counts from zero; what is being read and the sequence go on.
+    pub fn forget_counts(&mut self) {
+        self.receiver.stats = WireStats::default();
+    }
 }
 
 #[cfg(test)]

@@ -266,6 +266,11 @@ impl MidiReceiver {
         self.receiver.stats
     }
 
+    /// Counts from zero; what is being read and the sequence go on.
+    pub fn forget_counts(&mut self) {
+        self.receiver.stats = WireStats::default();
+    }
+
     fn push(&mut self, byte: u8, t_us: u64, sink: &mut impl FnMut(FromKnob)) {
         match byte {
             // Clock and sensing may stand anywhere, inside a SysEx too.
