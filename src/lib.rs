@@ -8,6 +8,8 @@ pub mod control;
 #[cfg(feature = "devices")]
 pub mod device;
 pub mod dsp;
+#[cfg(feature = "editor")]
+pub mod editor;
 pub mod event;
 pub mod haptics;
 pub mod identity;

@@ -15,6 +15,8 @@
 //! | b, a, h: radii of hole and bore, chimney height, m | `radius_m`, `bore_radius_m`, `chimney_m` |
 //! | Z/Zc(7.45 mm) | `over_zc` |
 
+mod standing;
+
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::f64::consts::TAU;

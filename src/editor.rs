@@ -1,0 +1,276 @@
+//! What the plugin's window shows: a pure function of parameters and a snapshot of one moment.
+//!
+//! [`draw`] lays out one calm window: note, pitch and tools on top, the breath meter on the right and keys below, always
+//! in sight, and one view in the middle. It reads [`Snapshot`] and [`Controls`], moves parameters through the latter,
+//! and gives back what is no parameter as [`Action`]s. It never sees a voice, a link or a host; it blocks on nothing and
+//! asks for no repaint of its own. Made for 1100 by 720 points, usable from 700 by 480 on. Design units: points; zoom
+//! belongs to whoever owns the window.
+
+mod blind_view;
+mod breath_view;
+mod chart;
+mod clarinet_view;
+pub mod compare;
+pub mod controls;
+pub mod feel_test;
+mod header;
+pub mod history;
+mod instrument_view;
+mod keyboard;
+mod knob_panel;
+pub mod listener;
+mod meter;
+mod reed_view;
+pub mod snapshot;
+mod sound_view;
+pub mod terms;
+pub mod theme;
+
+use std::path::PathBuf;
+
+use egui::{CentralPanel, Frame, Margin, Panel, Theme, Ui};
+use serde::{Deserialize, Serialize};
+
+pub use compare::Compare;
+pub use controls::{Controls, Look};
+pub use feel_test::FeelTest;
+pub use header::note_name;
+pub use snapshot::Snapshot;
+
+use crate::units::SoundingNote;
+use crate::wire::message::Feel;
+use controls::{Entry, Hands};
+use history::History;
+use keyboard::Keyboard;
+
+/// Size the window opens with, points.
+pub const SIZE: (f32, f32) = (1100.0, 720.0);
+/// Least size that still shows everything, points.
+pub const LEAST_SIZE: (f32, f32) = (700.0, 480.0);
+/// Least and most zoom.
+pub const ZOOM: (f32, f32) = (0.5, 3.0);
+
+/// What the user did that is no parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Action {
+    /// A key goes down.
+    NoteOn {
+        /// Sounding pitch.
+        note: SoundingNote,
+        /// How hard, 0..=1.
+        velocity: f32,
+    },
+    /// A key comes up.
+    NoteOff {
+        /// Sounding pitch.
+        note: SoundingNote,
+    },
+    /// Holes to open, in the order of the instrument's file, whatever is fingered; until [`Action::EndTry`].
+    TryFingering(Vec<bool>),
+    /// Back to the fingering of the note.
+    EndTry,
+    /// A device of the list, by its key.
+    ChooseDevice(String),
+    /// What the knob shall feel like for a test, whatever is played; `None` ends the test.
+    FeelTest(Option<Feel>),
+    /// An instrument of the list.
+    ChooseInstrument(usize),
+    /// An instrument file.
+    OpenInstrument(PathBuf),
+}
+
+/// The views.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Tab {
+    /// The reed at work.
+    #[default]
+    Reed,
+    /// Bore, holes, fingerings.
+    Clarinet,
+    /// Breath and where it comes from.
+    Breath,
+    /// Spectrum and waves.
+    Sound,
+    /// Knob and feel.
+    Knob,
+    /// Which instrument, tuning, output.
+    Instrument,
+}
+
+impl Tab {
+    /// In the order they stand.
+    pub const ALL: [Self; 6] =
+        [Self::Reed, Self::Clarinet, Self::Breath, Self::Sound, Self::Knob, Self::Instrument];
+
+    /// What it says on the tab.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Reed => "Reed",
+            Self::Clarinet => "Clarinet",
+            Self::Breath => "Breath",
+            Self::Sound => "Sound",
+            Self::Knob => "Knob",
+            Self::Instrument => "Instrument",
+        }
+    }
+
+    /// What is there.
+    fn about(self) -> &'static str {
+        match self {
+            Self::Reed => "The reed at work: flow over pressure, and the torque it is felt as",
+            Self::Clarinet => "Bore, tone holes and keys; try fingerings",
+            Self::Breath => "Mouth pressure, where it comes from, calibration",
+            Self::Sound => "Spectrum, waves, pitch",
+            Self::Knob => "The knob: device, arming, what it feels like",
+            Self::Instrument => "Which clarinet, tuning, articulation, output",
+        }
+    }
+}
+
+/// What a project keeps of the window. Whatever a file says is taken into its ranges by [`Kept::mended`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Kept {
+    /// Width and height, points.
+    pub size: (f32, f32),
+    /// Zoom, 0.5..=3.
+    pub zoom: f32,
+    /// Dark theme.
+    pub is_dark: bool,
+    /// The view in front.
+    pub tab: Tab,
+}
+
+impl Default for Kept {
+    fn default() -> Self {
+        Self { size: SIZE, zoom: 1.0, is_dark: true, tab: Tab::Reed }
+    }
+}
+
+impl Kept {
+    /// The same inside its ranges.
+    pub fn mended(self) -> Self {
+        let d = Self::default();
+        let fix = |x: f32, (low, high): (f32, f32), default| if x.is_finite() { x.clamp(low, high) } else { default };
+        Self {
+            size: (
+                fix(self.size.0, (LEAST_SIZE.0, 8_000.0), d.size.0),
+                fix(self.size.1, (LEAST_SIZE.1, 8_000.0), d.size.1),
+            ),
+            zoom: fix(self.zoom, ZOOM, d.zoom),
+            ..self
+        }
+    }
+}
+
+/// Everything the window remembers between frames.
+#[derive(Clone, Debug, Default)]
+pub struct State {
+    /// What a project keeps.
+    pub kept: Kept,
+    history: History,
+    compare: Compare,
+    entry: Option<Entry>,
+    keyboard: Keyboard,
+    reed: reed_view::ReedView,
+    clarinet: clarinet_view::ClarinetView,
+    knob: knob_panel::KnobPanel,
+    instrument: instrument_view::InstrumentView,
+}
+
+impl State {
+    /// With what a project kept.
+    pub fn new(kept: Kept) -> Self {
+        Self { kept: kept.mended(), ..Self::default() }
+    }
+
+    /// A text field has the focus: only then do keys belong to the editor rather than to the host.
+    pub fn wants_keyboard(&self, ctx: &egui::Context) -> bool {
+        self.entry.is_some() || ctx.text_edit_focused()
+    }
+
+    /// Lets go of everything that is held: before the window closes.
+    pub fn close(&mut self) -> Vec<Action> {
+        let mut actions = Vec::new();
+        self.keyboard.release(&mut actions);
+        self.knob.end_test(&mut actions);
+        self.clarinet.end_try(&mut actions);
+        self.entry = None;
+        actions
+    }
+}
+
+/// Draws the window into `ui` and gives back what the user did.
+pub fn draw(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &Snapshot) -> Vec<Action> {
+    let mut actions = Vec::new();
+    let State { kept, history, compare, entry, keyboard, reed, clarinet, knob, instrument } = state;
+    theme::apply(ui, if kept.is_dark { Theme::Dark } else { Theme::Light });
+    let c = theme::Colours::here(ui);
+    let mut hands = Hands { controls, history, entry };
+    let (width, height) = (ui.available_width(), ui.available_height());
+    let is_small = width < 900.0 || height < 560.0;
+    let tab = kept.tab;
+
+    let ground = |x: i8, y: i8| Frame::new().fill(c.ground).inner_margin(Margin::symmetric(x, y));
+    let line = Panel::top("tools").exact_size(if is_small { 44.0 } else { 52.0 }).show_separator_line(false);
+    line.frame(ground(12, 2)).show(ui, |ui| header::tools(ui, kept, compare, &mut hands, snapshot));
+    let line = Panel::top("tabs").exact_size(30.0).show_separator_line(true);
+    line.frame(ground(12, 0)).show(ui, |ui| header::tabs(ui, kept, snapshot));
+    let keys = (0.13 * height).clamp(52.0, 110.0);
+    let line = Panel::bottom("keys").exact_size(keys + 10.0).show_separator_line(false);
+    line.frame(ground(12, 5)).show(ui, |ui| keyboard.draw(ui, snapshot, &mut actions));
+    let line = Panel::right("meter").exact_size(if is_small { 96.0 } else { 112.0 }).show_separator_line(false);
+    line.frame(ground(8, 8)).show(ui, |ui| meter::column(ui, snapshot));
+    CentralPanel::default().frame(ground(8, 8)).show(ui, |ui| {
+        if compare.is_blind() {
+            blind_view::draw(ui, compare, &mut hands);
+            return;
+        }
+        match tab {
+            Tab::Reed => reed.draw(ui, &mut hands, snapshot),
+            Tab::Clarinet => clarinet.draw(ui, snapshot, &mut actions),
+            Tab::Breath => breath_view::draw(ui, &mut hands, snapshot),
+            Tab::Sound => sound_view::draw(ui, &mut hands, snapshot),
+            Tab::Knob => knob.draw(ui, &mut hands, snapshot, &mut actions),
+            Tab::Instrument => instrument.draw(ui, &mut hands, snapshot, &mut actions),
+        }
+    });
+    actions
+}
+
+/// A picture on the left and a column of controls on the right, which scrolls where it is too long.
+fn beside<A>(
+    ui: &mut Ui,
+    id: &'static str,
+    with: &mut A,
+    picture: impl FnOnce(&mut Ui, &mut A),
+    column: impl FnOnce(&mut Ui, &mut A),
+) {
+    let width = (0.26 * ui.available_width()).clamp(186.0, 260.0);
+    let c = theme::Colours::here(ui);
+    let side = Panel::right(egui::Id::new((id, "column"))).exact_size(width).show_separator_line(false);
+    side.frame(theme::panel(c)).show(ui, |ui| {
+        egui::ScrollArea::vertical().id_salt(id).auto_shrink([false, false]).show(ui, |ui| {
+            ui.set_width(ui.available_width() - 4.0);
+            ui.spacing_mut().item_spacing.y = 4.0;
+            column(ui, with);
+        });
+    });
+    let rest = Frame::new().outer_margin(Margin { right: theme::GAP as i8, ..Margin::ZERO });
+    CentralPanel::default().frame(rest).show(ui, |ui| picture(ui, with));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_project_keeps_survives_rubbish() {
+        let kept = Kept { size: (f32::NAN, 1e9), zoom: -3.0, is_dark: false, tab: Tab::Sound }.mended();
+        assert_eq!(kept, Kept { size: (SIZE.0, 8_000.0), zoom: 0.5, is_dark: false, tab: Tab::Sound });
+        let text = toml::to_string(&kept).unwrap();
+        assert_eq!(toml::from_str::<Kept>(&text).unwrap(), kept);
+        assert_eq!(toml::from_str::<Kept>("").unwrap(), Kept::default());
+    }
+}

@@ -1,0 +1,60 @@
+//! The page of a blind comparison: two names, and nothing that would tell which is which.
+
+use egui::{Align2, CornerRadius, FontId, RichText, Role, Sense, Stroke, Ui, WidgetInfo, vec2};
+
+use crate::editor::compare::{Compare, Side};
+use crate::editor::controls::Hands;
+use crate::editor::theme;
+use crate::editor::theme::Colours;
+
+/// Draws the page.
+pub fn draw(ui: &mut Ui, compare: &mut Compare, hands: &mut Hands) {
+    let c = Colours::here(ui);
+    let height = ui.available_height();
+    ui.vertical_centered(|ui| {
+        ui.add_space(0.12 * height);
+        ui.label(RichText::new("Blind comparison").font(FontId::proportional(22.0)));
+        ui.label(RichText::new("Play, change sides as often as you like, decide, then reveal.").color(c.quiet));
+        ui.add_space(0.06 * height);
+        let size = vec2((0.3 * ui.available_width()).min(220.0), (0.3 * height).min(150.0));
+        ui.horizontal(|ui| {
+            ui.add_space(0.5 * (ui.available_width() - 2.0 * size.x - 8.0));
+            for (first, name) in [(true, "X"), (false, "Y")] {
+                let side = compare.behind(first);
+                let is_here = compare.side == side;
+                let (rect, response) = ui.allocate_exact_size(size, Sense::click());
+                let painter = ui.painter();
+                let round = CornerRadius::same(theme::PANEL_RADIUS);
+                let fill = match (is_here, response.hovered()) {
+                    (true, _) => c.accent,
+                    (false, true) => c.hovered,
+                    (false, false) => c.raised,
+                };
+                painter.rect_filled(rect, round, fill);
+                if response.has_focus() {
+                    painter.rect_stroke(rect, round, Stroke::new(2.0, c.ink), egui::StrokeKind::Inside);
+                }
+                let ink = if is_here { c.on_accent } else { c.ink };
+                painter.text(rect.center(), Align2::CENTER_CENTER, name, FontId::proportional(44.0), ink);
+                if compare.is_revealed() {
+                    let told = if side == Side::A { "is A" } else { "is B" };
+                    let at = rect.center_bottom() - vec2(0.0, 10.0);
+                    painter.text(at, Align2::CENTER_BOTTOM, told, theme::heading(), ink);
+                }
+                response.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, is_here, format!("Side {name}")));
+                if response.clicked() {
+                    let values = compare.go(side, hands.setting());
+                    hands.restore(&values);
+                }
+            }
+        });
+        ui.add_space(0.05 * height);
+        if !compare.is_revealed() {
+            if ui.button("Reveal").clicked() {
+                compare.reveal();
+            }
+        } else if ui.button("Done").clicked() {
+            compare.end_blind();
+        }
+    });
+}

@@ -1,0 +1,167 @@
+//! Mouth pressure large, where it comes from, and how it has been.
+
+use egui::{Align2, CornerRadius, FontId, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
+
+use crate::editor::chart;
+use crate::editor::chart::Chart;
+use crate::editor::controls::{Hands, heading, momentary, slider};
+use crate::editor::meter;
+use crate::editor::snapshot::{Snapshot, Source};
+use crate::editor::theme;
+use crate::editor::theme::{Colours, GAP, panel};
+
+/// Draws the view.
+pub fn draw(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
+    crate::editor::beside(ui, "breath", hands, |ui, _| pictures(ui, snapshot), |ui, hands| column(ui, hands, snapshot));
+}
+
+fn pictures(ui: &mut Ui, snapshot: &Snapshot) {
+    let c = Colours::here(ui);
+    let height = ui.available_height();
+    ui.spacing_mut().item_spacing.y = GAP;
+    panel(c).show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        ui.set_height((0.42 * height - 24.0).clamp(96.0, 230.0));
+        gauge(ui, snapshot);
+    });
+    panel(c).show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        ui.set_height(ui.available_height());
+        history(ui, snapshot);
+    });
+}
+
+/// Mouth pressure from left to right.
+fn gauge(ui: &mut Ui, snapshot: &Snapshot) {
+    let c = Colours::here(ui);
+    let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
+    let painter = ui.painter();
+    let full = meter::full_kpa(snapshot);
+    let kpa = snapshot.mouth_kpa.max(0.0);
+    let all = snapshot.marks();
+    let (word, colour) = meter::state(&all, kpa, c);
+    painter.text(rect.left_top() - vec2(0.0, 4.0), Align2::LEFT_TOP, format!("{kpa:.2} kPa"), FontId::proportional(30.0), c.ink);
+    painter.text(rect.left_top() + vec2(128.0, 14.0), Align2::LEFT_TOP, word, theme::heading(), colour);
+    let gamma = if all.closes_kpa > 0.0 { kpa / all.closes_kpa } else { 0.0 };
+    let share = format!("\u{3b3} = {gamma:.2} of closing pressure");
+    painter.text(rect.right_top(), Align2::RIGHT_TOP, share, theme::small(), c.quiet);
+
+    let bar = Rect::from_min_max(pos2(rect.left(), rect.top() + 58.0), pos2(rect.right(), rect.bottom() - 18.0));
+    let x = |kpa: f32| bar.left() + (kpa / full).clamp(0.0, 1.0) * bar.width();
+    let round = CornerRadius::same(theme::SMALL_RADIUS);
+    painter.rect_filled(bar, round, c.raised);
+    let speaks = all.speaks_kpa.unwrap_or(all.closes_kpa);
+    let beats = all.beats_kpa.unwrap_or(all.closes_kpa).max(speaks);
+    let end = all.chokes_kpa.unwrap_or(full).min(full);
+    for (from, to, colour) in [(speaks, beats, c.speaks), (beats, end, c.beats)] {
+        let band = Rect::from_min_max(pos2(x(from), bar.top()), pos2(x(to), bar.bottom()));
+        painter.rect_filled(band, CornerRadius::ZERO, colour.gamma_multiply(0.16));
+    }
+    let air = Rect::from_min_max(bar.min, pos2(x(kpa), bar.bottom()));
+    painter.rect_filled(air.shrink2(vec2(0.0, 0.18 * bar.height())), round, c.breath.gamma_multiply(0.85));
+    painter.vline(x(kpa), bar.y_range(), Stroke::new(2.0, c.ink));
+    let mut end_of_last = f32::NEG_INFINITY;
+    for (at, name, colour) in meter::marks(snapshot, c).into_iter().filter(|mark| mark.0 <= full) {
+        painter.vline(x(at), bar.top() - 4.0..=bar.bottom(), Stroke::new(1.5, colour));
+        let text = format!("{name} {at:.2}");
+        let galley = painter.layout_no_wrap(text, theme::small(), colour);
+        // A second line where the first is taken.
+        let left = (x(at) - 0.5 * galley.size().x).min(bar.right() - galley.size().x).max(bar.left());
+        let y = if left < end_of_last + 6.0 { bar.top() - 30.0 } else { bar.top() - 18.0 };
+        if y > bar.top() - 20.0 {
+            end_of_last = left + galley.size().x;
+        }
+        painter.galley(pos2(left, y), galley, colour);
+    }
+    let step = if full > 12.0 { 2.0 } else { 1.0 };
+    let ticks = (0..=(full / step) as usize).map(|n| n as f32 * step);
+    for at in ticks {
+        painter.vline(x(at), bar.bottom()..=bar.bottom() + 4.0, Stroke::new(1.0, c.quiet));
+        painter.text(pos2(x(at), bar.bottom() + 5.0), Align2::CENTER_TOP, format!("{at:.0}"), theme::small(), c.quiet);
+    }
+    response.widget_info(|| WidgetInfo::labeled(Role::Meter, true, format!("Breath {kpa:.2} kPa, {word}")));
+    response.on_hover_text_at_pointer(meter::LEGEND);
+}
+
+fn history(ui: &mut Ui, snapshot: &Snapshot) {
+    let c = Colours::here(ui);
+    let track = &snapshot.history;
+    let seconds = f64::from(track.step_s) * track.kpa.len().saturating_sub(1) as f64;
+    if track.kpa.len() < 2 {
+        let rect = ui.available_rect_before_wrap();
+        chart::empty(ui, rect, "Blow, and your breath is drawn here.");
+        return;
+    }
+    let full = f64::from(meter::full_kpa(snapshot));
+    let marks = meter::marks(snapshot, c);
+    Chart {
+        id: "breath history",
+        x: (-seconds, 0.0),
+        y: (0.0, full),
+        x_name: "seconds ago",
+        y_name: "mouth pressure, kPa",
+        height: ui.available_height(),
+        label: "Mouth pressure of the last seconds",
+    }
+    .show(ui, |plot| {
+        for (index, (at, name, colour)) in marks.into_iter().enumerate() {
+            let line = egui_plot::HLine::new(name, f64::from(at)).color(colour).width(1.0).id(("mark", index));
+            plot.hline(line.style(egui_plot::LineStyle::dashed_loose()).allow_hover(false));
+        }
+        let points = track.kpa.iter().enumerate();
+        let points = points.map(|(n, &kpa)| [f64::from(track.step_s) * n as f64 - seconds, f64::from(kpa)]);
+        plot.line(chart::curve(points.collect(), c.breath, 2.0).fill(0.0).fill_alpha(0.15).id("breath"));
+    });
+}
+
+fn column(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
+    heading(ui, "Where breath comes from");
+    for source in &snapshot.sources {
+        meter_of(ui, source);
+    }
+    if snapshot.sources.is_empty() {
+        ui.label("No source has said anything yet: keys blow by velocity.");
+    }
+    slider(ui, hands, "breath");
+    heading(ui, "Calibrate");
+    ui.horizontal(|ui| {
+        momentary(ui, hands, "rest", "Rest here");
+        momentary(ui, hands, "blow", "Blow hard here");
+    });
+    slider(ui, hands, "full");
+    slider(ui, hands, "curve");
+    heading(ui, "Articulation");
+    for id in ["tongue", "legato", "noise"] {
+        slider(ui, hands, id);
+    }
+}
+
+fn meter_of(ui: &mut Ui, source: &Source) {
+    let c = Colours::here(ui);
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 28.0), Sense::hover());
+    let painter = ui.painter();
+    let ink = if source.is_live { c.ink } else { c.quiet };
+    let dot = pos2(rect.left() + 5.0, rect.top() + 8.0);
+    if source.is_live {
+        painter.circle_filled(dot, 4.0, c.breath);
+    } else {
+        painter.circle_stroke(dot, 3.5, Stroke::new(1.0, c.quiet));
+    }
+    painter.text(pos2(rect.left() + 15.0, rect.top() + 8.0), Align2::LEFT_CENTER, &source.name, theme::body(), ink);
+    let state = if source.is_seen { format!("{:.0} %", 100.0 * source.value) } else { "not seen".into() };
+    painter.text(pos2(rect.right(), rect.top() + 8.0), Align2::RIGHT_CENTER, &state, theme::small(), c.quiet);
+    let bar = Rect::from_min_max(pos2(rect.left(), rect.bottom() - 8.0), pos2(rect.right(), rect.bottom() - 4.0));
+    painter.rect_filled(bar, CornerRadius::same(2), c.raised);
+    let end = bar.left() + source.value.clamp(0.0, 1.0) * bar.width();
+    let fill = if source.is_live { c.breath } else { c.chokes };
+    painter.rect_filled(Rect::from_min_max(bar.min, pos2(end, bar.bottom())), CornerRadius::same(2), fill);
+    let blows = if source.is_live { ", blows" } else { "" };
+    response.widget_info(|| WidgetInfo::labeled(Role::Meter, true, format!("{}: {state}{blows}", source.name)));
+    response.on_hover_text(if source.is_live {
+        "This one blows. The source that moves takes over."
+    } else if source.is_seen {
+        "It has moved before; move it and it blows."
+    } else {
+        "Nothing has come from it yet."
+    });
+}

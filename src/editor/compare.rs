@@ -1,0 +1,143 @@
+//! Two settings side by side: A, B, and not knowing which.
+//!
+//! A slot holds the values of all parameters that belong to a setting. Changing sides keeps the side that is left as it
+//! was just then. Blind, the sides are called X and Y, which is which is drawn by lot and told by *Reveal* alone, and the
+//! window shows no value that would tell.
+
+use std::collections::hash_map::RandomState;
+use std::hash::{BuildHasher, Hasher};
+
+/// Values of a setting, normalised.
+pub type Values = Vec<(&'static str, f32)>;
+
+/// Which side.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Side {
+    /// The first.
+    #[default]
+    A,
+    /// The second.
+    B,
+}
+
+impl Side {
+    /// The other one.
+    pub fn other(self) -> Self {
+        match self {
+            Self::A => Self::B,
+            Self::B => Self::A,
+        }
+    }
+}
+
+/// Both sides.
+#[derive(Clone, Debug, Default)]
+pub struct Compare {
+    /// The side in force.
+    pub side: Side,
+    /// The values of the side that is not in force; `None` until it was first gone to.
+    resting: Option<Values>,
+    blind: Option<Blind>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Blind {
+    /// X is B.
+    is_crossed: bool,
+    is_revealed: bool,
+}
+
+impl Compare {
+    /// Goes to `side`: what to set, with `now` kept for coming back. Nothing for the side in force. A side never gone to
+    /// begins as a copy.
+    pub fn go(&mut self, side: Side, now: Values) -> Values {
+        if side == self.side {
+            return Vec::new();
+        }
+        self.side = side;
+        let values = self.resting.take().unwrap_or_else(|| now.clone());
+        self.resting = Some(now);
+        values
+    }
+
+    /// Makes the other side a copy of `now`.
+    pub fn copy(&mut self, now: Values) {
+        self.resting = Some(now);
+    }
+
+    /// Whether there is anything to compare.
+    pub fn differs(&self, now: &Values) -> bool {
+        self.resting.as_ref().is_some_and(|resting| resting != now)
+    }
+
+    /// Hides which is which; the lot decides.
+    pub fn hide(&mut self) {
+        self.hide_as(RandomState::new().build_hasher().finish() & 1 == 1);
+    }
+
+    /// Hides which is which with X as B if `is_crossed`.
+    pub fn hide_as(&mut self, is_crossed: bool) {
+        self.blind = Some(Blind { is_crossed, is_revealed: false });
+    }
+
+    /// A blind comparison is on.
+    pub fn is_blind(&self) -> bool {
+        self.blind.is_some()
+    }
+
+    /// Tells which is which.
+    pub fn reveal(&mut self) {
+        if let Some(blind) = &mut self.blind {
+            blind.is_revealed = true;
+        }
+    }
+
+    /// Whether it has been told.
+    pub fn is_revealed(&self) -> bool {
+        self.blind.is_some_and(|blind| blind.is_revealed)
+    }
+
+    /// Ends a blind comparison.
+    pub fn end_blind(&mut self) {
+        self.blind = None;
+    }
+
+    /// The side behind X (`first`) or Y.
+    pub fn behind(&self, first: bool) -> Side {
+        let is_crossed = self.blind.is_some_and(|blind| blind.is_crossed);
+        if first == is_crossed { Side::B } else { Side::A }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_side_keeps_what_was_set_on_it() {
+        let mut compare = Compare::default();
+        assert_eq!(compare.go(Side::A, vec![("lip", 0.1)]), []);
+        assert_eq!(compare.go(Side::B, vec![("lip", 0.1)]), [("lip", 0.1)], "B begins as A");
+        assert_eq!(compare.go(Side::A, vec![("lip", 0.9)]), [("lip", 0.1)]);
+        assert_eq!(compare.go(Side::B, vec![("lip", 0.2)]), [("lip", 0.9)]);
+        compare.copy(vec![("lip", 0.5)]);
+        assert_eq!(compare.go(Side::A, vec![("lip", 0.5)]), [("lip", 0.5)]);
+    }
+
+    #[test]
+    fn blind_names_cover_both_sides_and_the_lot_falls_both_ways() {
+        let mut compare = Compare::default();
+        for is_crossed in [false, true] {
+            compare.hide_as(is_crossed);
+            assert_ne!(compare.behind(true), compare.behind(false));
+            assert_eq!(compare.behind(true) == Side::B, is_crossed);
+            assert!(!compare.is_revealed());
+        }
+        let mut seen = [false; 2];
+        for _ in 0..200 {
+            compare.hide();
+            seen[usize::from(compare.behind(true) == Side::B)] = true;
+        }
+        assert_eq!(seen, [true, true]);
+    }
+}

@@ -1,0 +1,225 @@
+//! The two lines on top: note, pitch, tools; tabs and what the user should know.
+
+use egui::{Align, Align2, CornerRadius, FontId, Layout, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
+
+use crate::editor::compare::Side;
+use crate::editor::controls::Hands;
+use crate::editor::controls::momentary;
+use crate::editor::snapshot::{Level, Snapshot};
+use crate::editor::theme;
+use crate::editor::theme::Colours;
+use crate::editor::{Kept, Tab};
+use crate::editor::compare::Compare;
+
+/// Least and most zoom, and the steps offered.
+pub const ZOOMS: [f32; 8] = [0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0];
+
+/// The name of a pitch as musicians write it, with the flats they use.
+pub fn note_name(midi: u8) -> String {
+    const NAMES: [&str; 12] = ["C", "C#", "D", "Eb", "E", "F", "F#", "G", "Ab", "A", "Bb", "B"];
+    format!("{}{}", NAMES[usize::from(midi % 12)], i16::from(midi / 12) - 1)
+}
+
+/// The upper line.
+pub fn tools(ui: &mut Ui, kept: &mut Kept, compare: &mut Compare, hands: &mut Hands, snapshot: &Snapshot) {
+    let is_wide = ui.available_width() > 900.0;
+    ui.horizontal_centered(|ui| {
+        note(ui, snapshot);
+        needle(ui, snapshot, if is_wide { 150.0 } else { 96.0 });
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            ui.spacing_mut().item_spacing.x = 5.0;
+            ui.spacing_mut().button_padding.x = if is_wide { 8.0 } else { 6.0 };
+            momentary(ui, hands, "panic", "Panic");
+            zoom(ui, kept);
+            let (icon, word) = if kept.is_dark { ("\u{2600}", "Light theme") } else { ("\u{1f319}", "Dark theme") };
+            if named(ui.button(icon), word).on_hover_text(word).clicked() {
+                kept.is_dark = !kept.is_dark;
+            }
+            ui.add_space(4.0);
+            sides(ui, compare, hands, is_wide);
+            ui.add_space(4.0);
+            undo(ui, hands);
+        });
+    });
+}
+
+fn named(response: egui::Response, name: &str) -> egui::Response {
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, name));
+    response
+}
+
+fn note(ui: &mut Ui, snapshot: &Snapshot) {
+    let c = Colours::here(ui);
+    let (rect, response) = ui.allocate_exact_size(vec2(150.0, ui.available_height()), Sense::hover());
+    let written = snapshot.written().map(|note| note_name(note.0));
+    let sounding = snapshot.written().and_then(|note| note.sounding(snapshot.instrument.transposition));
+    let painter = ui.painter();
+    let ink = if snapshot.sounding.is_some() { c.ink } else { c.quiet };
+    let big = written.clone().unwrap_or_else(|| "\u{2013}".into());
+    painter.text(pos2(rect.left(), rect.center().y), Align2::LEFT_CENTER, &big, FontId::proportional(30.0), ink);
+    let x = rect.left() + 62.0;
+    let below = sounding.map_or_else(String::new, |note| format!("sounds {}", note_name(note.0)));
+    painter.text(pos2(x, rect.center().y - 1.0), Align2::LEFT_BOTTOM, &below, theme::small(), c.quiet);
+    let pitch = snapshot.heard.f0_hz.map_or_else(|| "silent".into(), |hz| format!("{hz:.1} Hz"));
+    painter.text(pos2(x, rect.center().y + 1.0), Align2::LEFT_TOP, &pitch, theme::small(), c.quiet);
+    let said = format!("Written {big}, {below}, {pitch}");
+    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &said));
+    response.on_hover_text("The note as it is read, what sounds on this instrument, and the pitch that is heard");
+}
+
+/// Cents above or below the note: a needle over 50 cents each way.
+pub fn needle(ui: &mut Ui, snapshot: &Snapshot, width: f32) {
+    let c = Colours::here(ui);
+    let (rect, response) = ui.allocate_exact_size(vec2(width, 36.0), Sense::hover());
+    let painter = ui.painter();
+    let line_y = rect.bottom() - 9.0;
+    let at = |cents: f32| rect.center().x + (cents / 50.0).clamp(-1.0, 1.0) * (0.5 * rect.width() - 6.0);
+    painter.hline(rect.left()..=rect.right(), line_y, Stroke::new(1.0, c.line));
+    for cents in [-50.0, -40.0, -30.0, -20.0, -10.0, 0.0, 10.0, 20.0, 30.0, 40.0, 50.0_f32] {
+        let height = if cents == 0.0 { 9.0 } else if cents % 50.0 == 0.0 { 7.0 } else { 4.0 };
+        painter.vline(at(cents), line_y - height..=line_y, Stroke::new(1.0, c.quiet));
+    }
+    // Five cents either way: what a listener takes for in tune.
+    let near = Rect::from_min_max(pos2(at(-5.0), line_y), pos2(at(5.0), line_y + 3.0));
+    painter.rect_filled(near, CornerRadius::ZERO, c.speaks);
+    let text = match snapshot.heard.cents {
+        Some(cents) => {
+            let colour = if cents.abs() <= 5.0 { c.speaks } else { c.beats };
+            let x = at(cents);
+            painter.line_segment([pos2(x, line_y - 14.0), pos2(x, line_y + 4.0)], Stroke::new(2.5, colour));
+            painter.circle_filled(pos2(x, line_y - 14.0), 3.0, colour);
+            format!("{cents:+.0} cents")
+        }
+        None => "no pitch".into(),
+    };
+    let place = pos2(rect.right(), rect.top() - 1.0);
+    painter.text(place, Align2::RIGHT_TOP, &text, theme::small(), c.quiet);
+    response.widget_info(|| WidgetInfo::labeled(Role::Meter, true, format!("Pitch: {text}")));
+    response.on_hover_text(format!("How far the sound is from the note at A4 = {:.1} Hz", snapshot.settings.a4_hz));
+}
+
+fn undo(ui: &mut Ui, hands: &mut Hands) {
+    let name = |hands: &Hands, step: Option<&[crate::editor::history::Change]>| {
+        step.map(|step| step.iter().map(|change| hands.name(change.id)).collect::<Vec<_>>().join(", "))
+    };
+    let (undoable, redoable) = (name(hands, hands.history.undoable()), name(hands, hands.history.redoable()));
+    ui.add_enabled_ui(redoable.is_some(), |ui| {
+        let response = named(ui.button("\u{27f3}"), "Redo");
+        let response = response.on_hover_text(format!("Redo {}", redoable.clone().unwrap_or_default()));
+        if response.clicked() {
+            let values = hands.history.redo();
+            hands.restore(&values);
+        }
+    });
+    ui.add_enabled_ui(undoable.is_some(), |ui| {
+        let response = named(ui.button("\u{27f2}"), "Undo");
+        let response = response.on_hover_text(format!("Undo {}", undoable.clone().unwrap_or_default()));
+        if response.clicked() {
+            let values = hands.history.undo();
+            hands.restore(&values);
+        }
+    });
+}
+
+fn sides(ui: &mut Ui, compare: &mut Compare, hands: &mut Hands, is_wide: bool) {
+    if compare.is_blind() {
+        let c = Colours::here(ui);
+        ui.label(egui::RichText::new("blind").color(c.beats));
+        return;
+    }
+    let blind = ui.add_enabled(compare.differs(&hands.setting()), egui::Button::new("Blind"));
+    let blind = blind.on_hover_text("Compare without knowing which is which: A and B become X and Y by lot");
+    if blind.on_disabled_hover_text("Set A and B apart first, then compare them blind").clicked() {
+        compare.hide();
+    }
+    let (text, other) = match compare.side {
+        Side::A if is_wide => ("A to B", "B"),
+        Side::B if is_wide => ("B to A", "A"),
+        Side::A => (">", "B"),
+        Side::B => ("<", "A"),
+    };
+    let copy = named(ui.button(text), &format!("Copy to {other}"));
+    if copy.on_hover_text(format!("Makes {other} the same as what you hear now")).clicked() {
+        compare.copy(hands.setting());
+    }
+    for (side, name) in [(Side::B, "B"), (Side::A, "A")] {
+        let is_here = compare.side == side;
+        let response = ui.selectable_label(is_here, format!(" {name} "));
+        response.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, is_here, format!("Setting {name}")));
+        if response.on_hover_text(format!("Setting {name}: change it, and go back and forth")).clicked() {
+            let values = compare.go(side, hands.setting());
+            hands.restore(&values);
+        }
+    }
+}
+
+fn zoom(ui: &mut Ui, kept: &mut Kept) {
+    let text = format!("{:.0} %", 100.0 * kept.zoom);
+    let list = egui::ComboBox::from_id_salt("zoom").width(64.0).selected_text(&text);
+    let shown = list.show_ui(ui, |ui| {
+        for zoom in ZOOMS {
+            ui.selectable_value(&mut kept.zoom, zoom, format!("{:.0} %", 100.0 * zoom));
+        }
+    });
+    shown.response.widget_info(|| {
+        let mut info = WidgetInfo::labeled(Role::ComboBox, true, "Zoom");
+        info.current_text_value = Some(text.clone());
+        info
+    });
+    shown.response.on_hover_text("Size of everything in this window; kept with the project");
+}
+
+/// The lower line.
+pub fn tabs(ui: &mut Ui, kept: &mut Kept, snapshot: &Snapshot) {
+    let c = Colours::here(ui);
+    let is_wide = ui.available_width() > 900.0;
+    ui.horizontal_centered(|ui| {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        for tab in Tab::ALL {
+            let is_here = kept.tab == tab;
+            let galley = ui.painter().layout_no_wrap(tab.name().to_owned(), theme::body(), c.ink);
+            let size = vec2(galley.size().x + if is_wide { 26.0 } else { 16.0 }, ui.available_height());
+            let (rect, response) = ui.allocate_exact_size(size, Sense::click());
+            let ink = if is_here || response.hovered() { c.ink } else { c.quiet };
+            ui.painter().text(rect.center(), Align2::CENTER_CENTER, tab.name(), theme::body(), ink);
+            if is_here {
+                let under = Rect::from_min_max(pos2(rect.left() + 6.0, rect.bottom() - 3.0), rect.right_bottom() - vec2(6.0, 0.0));
+                ui.painter().rect_filled(under, CornerRadius::same(1), c.accent);
+            }
+            if response.has_focus() {
+                let round = CornerRadius::same(theme::SMALL_RADIUS);
+                ui.painter().rect_stroke(rect.shrink(2.0), round, Stroke::new(1.0, c.accent), egui::StrokeKind::Inside);
+            }
+            response.widget_info(|| WidgetInfo::selected(Role::Tab, true, is_here, tab.name()));
+            if response.clicked() {
+                kept.tab = tab;
+            }
+            response.on_hover_text(tab.about());
+        }
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| status(ui, snapshot));
+    });
+}
+
+fn status(ui: &mut Ui, snapshot: &Snapshot) {
+    let c = Colours::here(ui);
+    let colour = |level| match level {
+        Level::Good => c.speaks,
+        Level::Note => c.breath,
+        Level::Warn => c.danger,
+    };
+    let preparing = snapshot.preparing.as_ref().map(|(what, part)| (Level::Note, format!("{what} {:.0} %", 100.0 * part)));
+    let first = preparing.or_else(|| snapshot.status.first().map(|status| (status.level, status.text.clone())));
+    let Some((level, text)) = first else { return };
+    let width = ui.available_width() - 20.0;
+    let label = egui::Label::new(egui::RichText::new(&text).font(theme::small()).color(c.quiet)).truncate();
+    let galley = ui.painter().layout_no_wrap(text.clone(), theme::small(), c.quiet);
+    let response = ui.add_sized(vec2(width.min(galley.size().x + 4.0), 16.0), label);
+    let (dot, _) = ui.allocate_exact_size(vec2(10.0, 10.0), Sense::hover());
+    ui.painter().circle_filled(dot.center(), 3.5, colour(level));
+    response.on_hover_ui(|ui| {
+        ui.label(&text);
+        for status in snapshot.status.iter().filter(|status| status.text != text) {
+            ui.label(egui::RichText::new(&status.text).color(colour(status.level)));
+        }
+    });
+}

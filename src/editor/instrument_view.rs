@@ -1,0 +1,154 @@
+//! Which clarinet, how it is tuned, how it articulates, how loud it is.
+
+use std::path::PathBuf;
+
+use egui::{Align2, CornerRadius, RichText, Role, Sense, Stroke, TextEdit, Ui, WidgetInfo, vec2};
+
+use crate::editor::Action;
+use crate::editor::controls::{Hands, choice, heading, slider};
+use crate::editor::header::note_name;
+use crate::editor::snapshot::Snapshot;
+use crate::editor::theme;
+use crate::editor::theme::{Colours, GAP, panel};
+
+/// What the view remembers.
+#[derive(Clone, Debug, Default)]
+pub struct InstrumentView {
+    path: String,
+}
+
+impl InstrumentView {
+    /// Draws the view.
+    pub fn draw(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+        let mut with = (self, hands, actions);
+        crate::editor::beside(
+            ui,
+            "instrument",
+            &mut with,
+            |ui, (this, _, actions)| this.left(ui, snapshot, actions),
+            |ui, (_, hands, _)| column(ui, hands),
+        );
+    }
+
+    fn left(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+        let c = Colours::here(ui);
+        ui.spacing_mut().item_spacing.y = GAP;
+        let height = ui.available_height();
+        panel(c).show(ui, |ui| {
+            ui.set_width(ui.available_width());
+            ui.set_height(0.52 * height - 24.0);
+            egui::ScrollArea::vertical().id_salt("instruments").auto_shrink([false, false]).show(ui, |ui| {
+                self.list(ui, snapshot, actions);
+            });
+        });
+        panel(c).show(ui, |ui| {
+            ui.set_width(ui.available_width());
+            ui.set_height(ui.available_height());
+            egui::ScrollArea::vertical().id_salt("facts").auto_shrink([false, false]).show(ui, |ui| facts(ui, snapshot));
+        });
+    }
+
+    fn list(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+        let c = Colours::here(ui);
+        heading(ui, "Instrument");
+        ui.horizontal_wrapped(|ui| {
+            for (index, name) in snapshot.instruments.iter().enumerate() {
+                let is_here = snapshot.chosen == Some(index);
+                if card(ui, c, name, is_here).clicked() && !is_here {
+                    actions.push(Action::ChooseInstrument(index));
+                }
+            }
+        });
+        if let Some((what, part)) = &snapshot.preparing {
+            ui.add(egui::ProgressBar::new(*part).text(what.as_str()).desired_height(16.0).fill(c.accent));
+        }
+        ui.add_space(4.0);
+        ui.label(RichText::new("A file of your own (docs/instrument-file.md)").color(c.quiet));
+        ui.horizontal(|ui| {
+            let width = ui.available_width() - 74.0;
+            let field = TextEdit::singleline(&mut self.path).desired_width(width).hint_text("path of a .toml file");
+            let response = ui.add(field);
+            response.widget_info(|| WidgetInfo::labeled(Role::TextInput, true, "Path of an instrument file"));
+            let is_entered = response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+            let open = ui.add_enabled(!self.path.trim().is_empty(), egui::Button::new("Open"));
+            if open.clicked() || (is_entered && !self.path.trim().is_empty()) {
+                actions.push(Action::OpenInstrument(PathBuf::from(self.path.trim())));
+            }
+        });
+    }
+}
+
+fn card(ui: &mut Ui, c: &Colours, name: &str, is_here: bool) -> egui::Response {
+    let galley = ui.painter().layout_no_wrap(name.to_owned(), theme::body(), c.ink);
+    let size = vec2((galley.size().x + 28.0).max(96.0), 40.0);
+    let (rect, response) = ui.allocate_exact_size(size, Sense::click());
+    let painter = ui.painter();
+    let round = CornerRadius::same(theme::SMALL_RADIUS + 2);
+    let fill = if is_here {
+        c.accent
+    } else if response.hovered() {
+        c.hovered
+    } else {
+        c.raised
+    };
+    painter.rect_filled(rect, round, fill);
+    if response.has_focus() {
+        painter.rect_stroke(rect, round, Stroke::new(2.0, c.ink), egui::StrokeKind::Inside);
+    }
+    let ink = if is_here { c.on_accent } else { c.ink };
+    painter.text(rect.center(), Align2::CENTER_CENTER, name, theme::body(), ink);
+    response.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, is_here, format!("Instrument {name}")));
+    response
+}
+
+fn facts(ui: &mut Ui, snapshot: &Snapshot) {
+    let c = Colours::here(ui);
+    let file = &*snapshot.instrument;
+    heading(ui, &file.name);
+    let down = match file.transposition {
+        0 => "as written".to_owned(),
+        n if n > 0 => format!("{n} semitones below what is written"),
+        n => format!("{} semitones above what is written", -n),
+    };
+    let name = |note: Option<crate::units::SoundingNote>| note.map_or_else(|| "?".into(), |note| note_name(note.0));
+    let transposition = file.transposition;
+    let rows = [
+        ("Sounds", down),
+        (
+            "Compass, written",
+            format!("{} to {}", note_name(file.lowest().0), note_name(file.highest().0)),
+        ),
+        (
+            "Compass, sounding",
+            format!("{} to {}", name(file.lowest().sounding(transposition)), name(file.highest().sounding(transposition))),
+        ),
+        ("Length", format!("{:.1} mm", 1e3 * file.length_m())),
+        ("Holes", file.holes.len().to_string()),
+        ("Fingerings", file.fingerings.len().to_string()),
+        ("Latency", format!("{:.1} ms", snapshot.latency_ms)),
+    ];
+    egui::Grid::new("facts").num_columns(2).spacing([18.0, 5.0]).show(ui, |ui| {
+        for (name, value) in rows {
+            ui.label(RichText::new(name).color(c.quiet));
+            ui.label(value);
+            ui.end_row();
+        }
+    });
+    ui.add_space(4.0);
+    ui.label(RichText::new(&file.source).font(theme::small()).color(c.quiet));
+}
+
+fn column(ui: &mut Ui, hands: &mut Hands) {
+    heading(ui, "Tuning");
+    slider(ui, hands, "a4");
+    choice(ui, hands, "tune");
+    for id in ["temp", "vent"] {
+        slider(ui, hands, id);
+    }
+    heading(ui, "Articulation");
+    for id in ["tongue", "legato", "noise"] {
+        slider(ui, hands, id);
+    }
+    heading(ui, "Output");
+    slider(ui, hands, "gain");
+}

@@ -1,0 +1,216 @@
+//! Keys that play: the compass of the instrument, sounding pitch, higher up on a key is louder.
+//!
+//! Sliding from key to key slurs: the new note goes down before the old one comes up. With the focus on it, arrow keys
+//! choose a note and Space plays it as long as it is held.
+
+use egui::{Align2, Color32, CornerRadius, Event, EventFilter, Key, Pos2, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
+
+use crate::editor::Action;
+use crate::editor::header::note_name;
+use crate::editor::snapshot::Snapshot;
+use crate::editor::theme;
+use crate::editor::theme::Colours;
+use crate::units::SoundingNote;
+
+/// Velocity by keyboard.
+const PLAIN: f32 = 0.75;
+
+/// What the keys remember.
+#[derive(Clone, Debug, Default)]
+pub struct Keyboard {
+    /// The note this window holds down.
+    held: Option<SoundingNote>,
+    /// It is held by the Space bar.
+    by_key: bool,
+    /// The note the arrow keys stand on.
+    chosen: Option<SoundingNote>,
+}
+
+impl Keyboard {
+    /// Draws the keys, and says what they play.
+    pub fn draw(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+        let transposition = snapshot.instrument.transposition;
+        let ends = (snapshot.instrument.lowest().sounding(transposition), snapshot.instrument.highest().sounding(transposition));
+        let (Some(lowest), Some(highest)) = ends else { return };
+        // From a white key to a white key.
+        let from = if is_black(lowest.0) { lowest.0.saturating_sub(1) } else { lowest.0 };
+        let to = if is_black(highest.0) { highest.0 + 1 } else { highest.0 };
+        let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
+        let keys = Keys::new(rect, from, to);
+        let playable = |note: u8| (lowest.0..=highest.0).contains(&note);
+
+        let pointer = response.interact_pointer_pos().filter(|_| response.is_pointer_button_down_on());
+        let wanted = pointer.and_then(|at| keys.at(at)).filter(|(note, _)| playable(*note));
+        if !self.by_key {
+            self.hold(wanted.map(|(note, velocity)| (SoundingNote(note), velocity)), actions);
+        }
+        let chosen = self.chosen.or(snapshot.sounding).map_or((from + to) / 2, |note| note.0).clamp(lowest.0, highest.0);
+        if response.has_focus() {
+            self.keys_pressed(ui, response.id, chosen, (lowest.0, highest.0), actions);
+        } else if self.by_key {
+            self.by_key = false;
+            self.hold(None, actions);
+        }
+
+        let c = Colours::here(ui);
+        let focus = response.has_focus().then_some(chosen);
+        keys.paint(ui, c, snapshot.sounding.map(|note| note.0), self.held.map(|note| note.0), focus, playable);
+        response.widget_info(|| WidgetInfo::labeled(Role::Group, true, format!("Keyboard, {}", note_name(chosen))));
+    }
+
+    /// Lets go of what is held: the window closes, or another view takes the pointer.
+    pub fn release(&mut self, actions: &mut Vec<Action>) {
+        self.by_key = false;
+        self.hold(None, actions);
+    }
+
+    fn hold(&mut self, wanted: Option<(SoundingNote, f32)>, actions: &mut Vec<Action>) {
+        let note = wanted.map(|(note, _)| note);
+        if note == self.held {
+            return;
+        }
+        if let Some((note, velocity)) = wanted {
+            actions.push(Action::NoteOn { note, velocity });
+            self.chosen = Some(note);
+        }
+        if let Some(old) = std::mem::replace(&mut self.held, note) {
+            actions.push(Action::NoteOff { note: old });
+        }
+    }
+
+    fn keys_pressed(&mut self, ui: &Ui, id: egui::Id, chosen: u8, (low, high): (u8, u8), actions: &mut Vec<Action>) {
+        let filter = EventFilter { horizontal_arrows: true, ..EventFilter::default() };
+        ui.memory_mut(|memory| memory.set_focus_lock_filter(id, filter));
+        let (steps, space) = ui.input(|input| {
+            let presses = |key| input.num_presses(key) as i32;
+            let space = input.events.iter().rev().find_map(|event| match event {
+                Event::Key { key: Key::Space, pressed, .. } => Some(*pressed),
+                _ => None,
+            });
+            (presses(Key::ArrowRight) - presses(Key::ArrowLeft), space)
+        });
+        let note = (i32::from(chosen) + steps).clamp(i32::from(low), i32::from(high)) as u8;
+        self.chosen = Some(SoundingNote(note));
+        if let Some(is_down) = space {
+            self.by_key = is_down;
+        }
+        if self.by_key {
+            self.hold(Some((SoundingNote(note), PLAIN)), actions);
+        } else if space == Some(false) {
+            self.hold(None, actions);
+        }
+    }
+}
+
+fn is_black(note: u8) -> bool {
+    matches!(note % 12, 1 | 3 | 6 | 8 | 10)
+}
+
+/// Where the keys are.
+struct Keys {
+    rect: Rect,
+    from: u8,
+    to: u8,
+    white: f32,
+}
+
+impl Keys {
+    fn new(rect: Rect, from: u8, to: u8) -> Self {
+        let whites = (from..=to).filter(|&note| !is_black(note)).count().max(1);
+        Self { rect, from, to, white: rect.width() / whites as f32 }
+    }
+
+    /// The place of a key.
+    fn key(&self, note: u8) -> Rect {
+        let whites = (self.from..note).filter(|&below| !is_black(below)).count() as f32;
+        let left = self.rect.left() + whites * self.white;
+        if is_black(note) {
+            let width = 0.62 * self.white;
+            Rect::from_min_size(pos2(left - 0.5 * width, self.rect.top()), vec2(width, 0.62 * self.rect.height()))
+        } else {
+            Rect::from_min_size(pos2(left, self.rect.top()), vec2(self.white, self.rect.height()))
+        }
+    }
+
+    /// The key under a point, and how far down it: 0..=1.
+    fn at(&self, point: Pos2) -> Option<(u8, f32)> {
+        let notes = || self.from..=self.to;
+        let hit = |note: &u8| self.key(*note).contains(point);
+        let note = notes().filter(|&note| is_black(note)).find(hit).or_else(|| notes().find(|note| !is_black(*note) && hit(note)))?;
+        let key = self.key(note);
+        let down = ((point.y - key.top()) / key.height()).clamp(0.0, 1.0);
+        Some((note, 0.35 + 0.65 * down))
+    }
+
+    fn paint(
+        &self,
+        ui: &Ui,
+        c: &Colours,
+        sounding: Option<u8>,
+        held: Option<u8>,
+        focus: Option<u8>,
+        playable: impl Fn(u8) -> bool,
+    ) {
+        let painter = ui.painter_at(self.rect);
+        for black in [false, true] {
+            for note in (self.from..=self.to).filter(|&note| is_black(note) == black) {
+                let key = self.key(note);
+                let plain = if black { c.ebony } else { c.ivory };
+                let is_down = sounding == Some(note) || held == Some(note);
+                let fill = if is_down {
+                    c.accent
+                } else if playable(note) {
+                    plain
+                } else {
+                    plain.lerp_to_gamma(c.ground, 0.5)
+                };
+                let round = CornerRadius { nw: 0, ne: 0, sw: 3, se: 3 };
+                painter.rect(key.shrink2(vec2(0.5, 0.0)), round, fill, Stroke::new(1.0, c.line), egui::StrokeKind::Inside);
+                if focus == Some(note) {
+                    painter.rect_stroke(key.shrink(2.0), round, Stroke::new(2.0, c.breath), egui::StrokeKind::Inside);
+                }
+                if note % 12 == 0 || (is_down && !black) {
+                    let ink = if is_down { c.on_accent } else { Color32::from_gray(110) };
+                    painter.text(key.center_bottom() - vec2(0.0, 3.0), Align2::CENTER_BOTTOM, note_name(note), theme::small(), ink);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_key_is_where_it_is_drawn() {
+        let keys = Keys::new(Rect::from_min_size(pos2(10.0, 20.0), vec2(800.0, 80.0)), 50, 96);
+        for note in 50..=96 {
+            let key = keys.key(note);
+            // The lower part of a white key, clear of the black ones.
+            let point = if is_black(note) { key.center() } else { key.center_bottom() - vec2(0.0, 4.0) };
+            assert_eq!(keys.at(point).map(|(note, _)| note), Some(note));
+        }
+        assert!((keys.key(96).right() - 810.0).abs() < 1.0);
+        assert_eq!(keys.at(pos2(0.0, 0.0)), None);
+    }
+
+    #[test]
+    fn sliding_slurs_and_letting_go_ends() {
+        let mut keyboard = Keyboard::default();
+        let mut actions = Vec::new();
+        for wanted in [Some((SoundingNote(60), 0.5)), Some((SoundingNote(62), 0.5)), Some((SoundingNote(62), 0.9)), None] {
+            keyboard.hold(wanted, &mut actions);
+        }
+        let note = SoundingNote;
+        assert_eq!(
+            actions,
+            [
+                Action::NoteOn { note: note(60), velocity: 0.5 },
+                Action::NoteOn { note: note(62), velocity: 0.5 },
+                Action::NoteOff { note: note(60) },
+                Action::NoteOff { note: note(62) },
+            ]
+        );
+    }
+}

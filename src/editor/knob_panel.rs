@@ -1,0 +1,283 @@
+//! The knob: which, how it is, arming it, what it feels like, and a page to try it on.
+
+use egui::{Align2, Button, Color32, CornerRadius, FontId, RichText, Role, Sense, Stroke, Ui, WidgetInfo, vec2};
+
+use crate::editor::Action;
+use crate::editor::chart;
+use crate::editor::chart::Chart;
+use crate::editor::controls::{Hands, choice, heading, momentary, segments, slider, switch, teach};
+use crate::editor::feel_test::FeelTest;
+use crate::editor::reed_view::torque_picture;
+use crate::editor::snapshot::{Device, Snapshot};
+use crate::editor::theme;
+use crate::editor::theme::{Colours, GAP, panel};
+use crate::haptics::law;
+use crate::reed::ReedTables;
+
+/// Pages of the panel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Page {
+    #[default]
+    Play,
+    Try,
+    Study,
+}
+
+const PAGES: [(Page, &str); 3] = [(Page::Play, "Feel"), (Page::Try, "Feel test"), (Page::Study, "Takes and studies")];
+
+/// What the panel remembers.
+#[derive(Clone, Debug, Default)]
+pub struct KnobPanel {
+    page: Page,
+    test: Option<FeelTest>,
+}
+
+impl KnobPanel {
+    /// Ends a feel test.
+    pub fn end_test(&mut self, actions: &mut Vec<Action>) {
+        if self.test.take().is_some() {
+            actions.push(Action::FeelTest(None));
+        }
+    }
+
+    /// Draws the panel.
+    pub fn draw(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+        let mut with = (self, hands, actions);
+        crate::editor::beside(
+            ui,
+            "knob",
+            &mut with,
+            |ui, (this, hands, actions)| this.left(ui, hands, snapshot, actions),
+            |ui, (this, hands, _)| column(ui, hands, this.page),
+        );
+    }
+
+    fn left(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+        let c = Colours::here(ui);
+        let (width, height) = (ui.available_width(), ui.available_height());
+        ui.spacing_mut().item_spacing = vec2(GAP, GAP);
+        let top = (0.44 * height).clamp(150.0, 250.0);
+        ui.horizontal_top(|ui| {
+            ui.spacing_mut().item_spacing = vec2(GAP, 4.0);
+            group(ui, c, vec2(0.56 * width - 0.5 * GAP, top), |ui| devices(ui, hands, snapshot, actions));
+            group(ui, c, vec2(0.44 * width - 0.5 * GAP, top), |ui| arming(ui, hands, snapshot));
+        });
+        let names: Vec<String> = PAGES.iter().map(|(_, name)| (*name).to_owned()).collect();
+        let mut page = PAGES.iter().position(|(page, _)| *page == self.page).unwrap_or(0);
+        segments(ui, "Page", &names, &mut page);
+        let page = PAGES[page].0;
+        if page != self.page {
+            self.end_test(actions);
+            self.page = page;
+        }
+        let rest = vec2(width, ui.available_height());
+        group(ui, c, rest, |ui| match self.page {
+            Page::Play => torque_picture(ui, snapshot),
+            Page::Try => self.tests(ui, snapshot, actions),
+            Page::Study => line(ui, snapshot),
+        });
+    }
+
+    fn tests(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+        let c = Colours::here(ui);
+        ui.horizontal_wrapped(|ui| {
+            for test in FeelTest::ALL {
+                let is_on = self.test == Some(test);
+                let response = ui.selectable_label(is_on, test.name());
+                response.widget_info(|| {
+                    WidgetInfo::selected(Role::RadioButton, true, is_on, format!("Feel test: {}", test.name()))
+                });
+                if response.on_hover_text(test.notice()).clicked() && !is_on {
+                    self.test = Some(test);
+                    actions.push(Action::FeelTest(Some(test.feel())));
+                }
+            }
+            let stop = ui.add_enabled(self.test.is_some(), Button::new("End test"));
+            if stop.on_hover_text("Back to the feel of the notes").clicked() {
+                self.end_test(actions);
+            }
+        });
+        let Some(test) = self.test else {
+            let rect = ui.available_rect_before_wrap();
+            chart::empty(ui, rect, "Choose a test, arm the knob, and turn it. Each says what your hand should notice.");
+            return;
+        };
+        let notice = if snapshot.knob.is_armed { c.ink } else { c.quiet };
+        ui.label(RichText::new(test.notice()).color(notice));
+        if !snapshot.knob.is_armed {
+            ui.label(RichText::new("The knob is not armed: nothing is felt yet.").color(c.beats));
+        }
+        let feel = test.feel();
+        let torque = |deg: f64| law::torque_mnm(&feel, ReedTables::seed(), deg);
+        let points: Vec<[f64; 2]> = (-90..=200).map(|n| 2.0 * f64::from(n)).map(|deg| [deg, torque(deg)]).collect();
+        let knob = snapshot.knob.angle_deg.map(f64::from);
+        Chart {
+            id: "feel test",
+            x: (-180.0, 400.0),
+            y: (-60.0, 60.0),
+            x_name: "angle of the knob, degrees",
+            y_name: "torque, mNm",
+            height: ui.available_height(),
+            label: "Torque of the feel test over the angle",
+        }
+        .show(ui, |plot| {
+            plot.line(chart::curve(vec![[-180.0, 0.0], [400.0, 0.0]], c.line, 1.0).id("nothing"));
+            plot.line(chart::curve(points, c.felt, 2.5).id("test"));
+            if let Some(deg) = knob {
+                plot.points(egui_plot::Points::new("knob", [deg, torque(deg)]).radius(5.0).color(c.felt).allow_hover(false));
+            }
+        });
+    }
+}
+
+fn group(ui: &mut Ui, c: &Colours, size: egui::Vec2, draw: impl FnOnce(&mut Ui)) {
+    let frame = panel(c);
+    let inner = size - frame.total_margin().sum();
+    frame.show(ui, |ui| {
+        ui.set_min_size(inner);
+        ui.set_max_size(inner);
+        ui.vertical(draw);
+    });
+}
+
+fn devices(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    let c = Colours::here(ui);
+    let knob = &snapshot.knob;
+    egui::ScrollArea::vertical().id_salt("devices").auto_shrink([false, false]).show(ui, |ui| {
+        choice(ui, hands, "knob");
+        let colour = if knob.is_live { c.speaks } else { c.quiet };
+        ui.horizontal_wrapped(|ui| {
+            let (dot, _) = ui.allocate_exact_size(vec2(10.0, 14.0), Sense::hover());
+            ui.painter().circle_filled(dot.center(), 4.0, colour);
+            ui.label(if knob.text.is_empty() { "no knob chosen" } else { &knob.text });
+        });
+        for device in &knob.devices {
+            device_row(ui, c, device, actions);
+        }
+        if let Some(notice) = &knob.notice {
+            ui.label(RichText::new(notice).color(c.beats));
+        }
+        momentary(ui, hands, "takeov", "Take over the knob");
+    });
+}
+
+fn device_row(ui: &mut Ui, c: &Colours, device: &Device, actions: &mut Vec<Action>) {
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 36.0), Sense::click());
+    let painter = ui.painter_at(rect);
+    let round = CornerRadius::same(theme::SMALL_RADIUS);
+    let fill = if response.hovered() { c.hovered } else { c.raised };
+    painter.rect_filled(rect, round, fill);
+    if device.is_chosen || response.has_focus() {
+        painter.rect_stroke(rect, round, Stroke::new(1.5, c.accent), egui::StrokeKind::Inside);
+    }
+    painter.text(rect.left_top() + vec2(8.0, 4.0), Align2::LEFT_TOP, &device.name, theme::body(), c.ink);
+    let state = if device.is_free { c.quiet } else { c.beats };
+    painter.text(rect.left_bottom() + vec2(8.0, -4.0), Align2::LEFT_BOTTOM, &device.state, theme::small(), state);
+    response.widget_info(|| {
+        let name = format!("Device {}: {}", device.name, device.state);
+        WidgetInfo::selected(Role::RadioButton, true, device.is_chosen, name)
+    });
+    if response.on_hover_text(&device.state).clicked() {
+        actions.push(Action::ChooseDevice(device.key.clone()));
+    }
+}
+
+/// The large button, and what is allowed.
+fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
+    let c = Colours::here(ui);
+    let knob = &snapshot.knob;
+    let is_wanted = hands.step("arm") == 1;
+    let (title, line, fill, ink): (&str, &str, Color32, Color32) = match (knob.is_armed, is_wanted) {
+        (true, _) => ("ARMED", "press to disarm", c.danger, c.panel),
+        (false, true) => ("DISARMED", "the knob let go: press, then arm again", c.raised, c.beats),
+        (false, false) if knob.is_live => ("ARM", "the knob may then push back", c.accent, c.on_accent),
+        (false, false) => ("ARM", "no knob to arm yet", c.raised, c.quiet),
+    };
+    let height = (ui.available_height() - 96.0).clamp(52.0, 84.0);
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::click());
+    let painter = ui.painter();
+    let round = CornerRadius::same(theme::PANEL_RADIUS);
+    let fill = if response.hovered() { fill.lerp_to_gamma(c.ink, 0.10) } else { fill };
+    painter.rect(rect, round, fill, Stroke::new(1.0, c.line), egui::StrokeKind::Inside);
+    if response.has_focus() {
+        painter.rect_stroke(rect.shrink(2.0), round, Stroke::new(2.0, c.ink), egui::StrokeKind::Inside);
+    }
+    painter.text(rect.center() - vec2(0.0, 8.0), Align2::CENTER_CENTER, title, FontId::proportional(24.0), ink);
+    painter.text(rect.center() + vec2(0.0, 16.0), Align2::CENTER_CENTER, line, theme::small(), ink);
+    let name = if is_wanted || knob.is_armed { "Disarm the knob" } else { "Arm the knob" };
+    response.widget_info(|| WidgetInfo::selected(Role::Switch, true, knob.is_armed, name));
+    if response.clicked() {
+        hands.put("arm", f32::from(!(is_wanted || knob.is_armed)));
+    }
+    response.on_hover_ui(|ui| teach(ui, "arm", ""));
+    ui.add_space(4.0);
+    slider(ui, hands, "ceil");
+    let angle = knob.angle_deg.map_or_else(|| "\u{2013}".into(), |deg| format!("{deg:.0}\u{b0}"));
+    let torque = knob.torque_mnm.map_or_else(|| "\u{2013}".into(), |mnm| format!("{mnm:.0} mNm"));
+    ui.label(RichText::new(format!("at {angle}, {torque}")).color(c.quiet));
+}
+
+/// What the line to the knob does.
+fn line(ui: &mut Ui, snapshot: &Snapshot) {
+    let c = Colours::here(ui);
+    let knob = &snapshot.knob;
+    let late = |us: u32| f64::from(us) * 1e-3;
+    let rows = [
+        ("Positions", format!("{:.0} a second", knob.rate_hz), "As many as the device sends; 500 by cable"),
+        (
+            "Jitter",
+            format!("{:.1} ms, worst of a hundred {:.1} ms", late(knob.jitter_us.0), late(knob.jitter_us.1)),
+            "Lateness of positions against a steady clock; taken out by their time stamps",
+        ),
+        (
+            "New feel felt after",
+            knob.round_trip_us.map_or_else(|| "not known".into(), |us| format!("{:.1} ms", late(us))),
+            "From a new note to the knob's echo of its feel",
+        ),
+        ("Frames lost, damaged", format!("{}, {}", knob.lost, knob.damaged), "Damaged ones are refused by their checksum"),
+        ("Times the knob went away", knob.losses.to_string(), "It comes back disarmed"),
+        ("Latency of the sound", format!("{:.1} ms", snapshot.latency_ms), "Of the plugin itself, told to the host"),
+    ];
+    egui::Grid::new("line").num_columns(2).spacing([18.0, 7.0]).show(ui, |ui| {
+        for (name, value, about) in rows {
+            ui.label(RichText::new(name).color(c.quiet)).on_hover_text(about);
+            ui.label(value);
+            ui.end_row();
+        }
+    });
+}
+
+fn column(ui: &mut Ui, hands: &mut Hands, page: Page) {
+    match page {
+        Page::Play | Page::Try => {
+            heading(ui, "Feel");
+            for id in ["law", "order"] {
+                choice(ui, hands, id);
+            }
+            for id in ["contr", "torque", "detent", "kdamp", "kfric", "refnot"] {
+                slider(ui, hands, id);
+            }
+            heading(ui, "Calibrate");
+            ui.horizontal_wrapped(|ui| {
+                momentary(ui, hands, "rest", "Rest here");
+                momentary(ui, hands, "blow", "Blow hard here");
+            });
+            slider(ui, hands, "curve");
+            heading(ui, "OSC");
+            slider(ui, hands, "oscprt");
+            switch(ui, hands, "oscany");
+            slider(ui, hands, "oscfl");
+        }
+        Page::Study => {
+            heading(ui, "Takes");
+            switch(ui, hands, "rec");
+            switch(ui, hands, "replay");
+            heading(ui, "Study");
+            switch(ui, hands, "study");
+            for id in ["part", "seed", "trial"] {
+                slider(ui, hands, id);
+            }
+            switch(ui, hands, "side");
+        }
+    }
+}

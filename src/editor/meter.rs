@@ -1,0 +1,96 @@
+//! The breath meter that is always in sight: mouth pressure as a column of air, with what it does to this note.
+
+use egui::{Align2, Color32, CornerRadius, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
+
+use crate::editor::snapshot::{Marks, Snapshot};
+use crate::editor::theme;
+use crate::editor::theme::Colours;
+
+/// Top of every scale of mouth pressure, kPa: a little above what matters for this reed and note.
+pub fn full_kpa(snapshot: &Snapshot) -> f32 {
+    let marks = snapshot.marks();
+    (1.25 * marks.closes_kpa).max(1.05 * snapshot.settings.breath_full_kpa).max(1.0)
+}
+
+/// What the reed does at a pressure, in a word, and its colour.
+pub fn state(marks: &Marks, kpa: f32, c: &Colours) -> (&'static str, Color32) {
+    let above = |mark: Option<f32>| mark.is_some_and(|mark| kpa >= mark);
+    if kpa < 0.02 {
+        ("at rest", c.quiet)
+    } else if above(marks.chokes_kpa) {
+        ("shut", c.chokes)
+    } else if kpa >= marks.closes_kpa {
+        ("closing", c.closes)
+    } else if above(marks.beats_kpa) {
+        ("beating", c.beats)
+    } else if above(marks.speaks_kpa) {
+        ("sounding", c.speaks)
+    } else {
+        ("below threshold", c.breath)
+    }
+}
+
+/// The marks a scale shows: pressure, word, colour; in order of pressure.
+pub fn marks(snapshot: &Snapshot, c: &Colours) -> Vec<(f32, &'static str, Color32)> {
+    let marks = snapshot.marks();
+    let mut all = vec![(marks.closes_kpa, "closes", c.closes)];
+    all.extend(marks.speaks_kpa.map(|kpa| (kpa, "speaks", c.speaks)));
+    all.extend(marks.beats_kpa.map(|kpa| (kpa, "beats", c.beats)));
+    all.extend(marks.chokes_kpa.map(|kpa| (kpa, "chokes", c.chokes)));
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    all
+}
+
+/// What each mark means, for tool tips.
+pub const LEGEND: &str = "speaks (p_on): the note begins here, coming up or going down.\n\
+    beats: from here the reed touches the lay in each cycle, and the sound turns bright.\n\
+    closes: here the resting reed would be shut.\n\
+    chokes (p_off): above this the reed stays shut and nothing sounds.";
+
+/// The column, as high as its place.
+pub fn column(ui: &mut Ui, snapshot: &Snapshot) {
+    let c = Colours::here(ui);
+    let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
+    let full = full_kpa(snapshot);
+    let kpa = snapshot.mouth_kpa.max(0.0);
+    let marks_of = snapshot.marks();
+    let (word, colour) = state(&marks_of, kpa, c);
+
+    let painter = ui.painter();
+    painter.text(rect.center_top(), Align2::CENTER_TOP, format!("{kpa:.2}"), egui::FontId::proportional(22.0), c.ink);
+    painter.text(rect.center_top() + vec2(0.0, 24.0), Align2::CENTER_TOP, "kPa", theme::small(), c.quiet);
+    painter.text(rect.center_bottom(), Align2::CENTER_BOTTOM, word, theme::small(), colour);
+
+    let scale = Rect::from_min_max(rect.left_top() + vec2(4.0, 44.0), pos2(rect.left() + 26.0, rect.bottom() - 20.0));
+    let y = |kpa: f32| scale.bottom() - (kpa / full).clamp(0.0, 1.0) * scale.height();
+    let round = CornerRadius::same(theme::SMALL_RADIUS);
+    painter.rect_filled(scale, round, c.raised);
+    // Where the note sounds, and where it beats: faint, so that the breath stands out.
+    let speaks = marks_of.speaks_kpa.unwrap_or(marks_of.closes_kpa);
+    let beats = marks_of.beats_kpa.unwrap_or(marks_of.closes_kpa).max(speaks);
+    let end = marks_of.chokes_kpa.unwrap_or(full).min(full);
+    for (from, to, colour) in [(speaks, beats, c.speaks), (beats, end, c.beats)] {
+        let band = Rect::from_min_max(pos2(scale.left(), y(to)), pos2(scale.right(), y(from)));
+        painter.rect_filled(band, CornerRadius::ZERO, colour.gamma_multiply(0.16));
+    }
+    let air = Rect::from_min_max(pos2(scale.left(), y(kpa)), scale.right_bottom());
+    painter.rect_filled(air, round, c.breath.gamma_multiply(0.85));
+    painter.rect_stroke(scale, round, Stroke::new(1.0, c.line), egui::StrokeKind::Inside);
+
+    let mut lowest = f32::INFINITY;
+    for (at, name, colour) in marks(snapshot, c) {
+        if at > full {
+            continue;
+        }
+        painter.hline(scale.left()..=scale.right() + 5.0, y(at), Stroke::new(1.5, colour));
+        // Two lines of text each; pushed up where the one below is in the way.
+        let text_y = y(at).min(lowest - 26.0);
+        lowest = text_y;
+        let place = pos2(scale.right() + 8.0, text_y);
+        painter.text(place, Align2::LEFT_BOTTOM, name, theme::small(), colour);
+        painter.text(place - vec2(0.0, 1.0), Align2::LEFT_TOP, format!("{at:.2}"), theme::small(), c.quiet);
+    }
+    painter.hline(scale.left() - 3.0..=scale.right() + 3.0, y(kpa), Stroke::new(2.0, c.ink));
+    response.widget_info(|| WidgetInfo::labeled(Role::Meter, true, format!("Mouth pressure {kpa:.2} kPa, {word}")));
+    response.on_hover_text_at_pointer(format!("Mouth pressure, kilopascal.\n{LEGEND}"));
+}

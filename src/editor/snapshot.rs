@@ -1,0 +1,241 @@
+//! One moment of everything the editor shows, as plain data.
+//!
+//! Whoever hosts the editor fills it from atomics, triple buffers and rings; tests fill it by hand or by playing the
+//! instrument offline. The editor never sees a voice, a link or a lock. What is missing is shown as missing: every
+//! `Option` and empty list has a look of its own.
+
+use std::sync::Arc;
+
+use crate::bore::instrument_file::{Fingering, InstrumentFile};
+use crate::editor::listener::Heard;
+use crate::haptics::{NoteFeel, Requirement};
+use crate::instrument::Settings;
+use crate::units::{SoundingNote, WrittenNote};
+
+/// See the module.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// The instrument that sounds.
+    pub instrument: Arc<InstrumentFile>,
+    /// Instruments that can be chosen, by name; the chosen one may be none of them.
+    pub instruments: Vec<String>,
+    /// Index into `instruments`.
+    pub chosen: Option<usize>,
+    /// What is being prepared, and how far, 0..=1.
+    pub preparing: Option<(String, f32)>,
+    /// The note that is fingered, if any key is held.
+    pub sounding: Option<SoundingNote>,
+    /// Index into the instrument's fingerings: the one in place, held or last held.
+    pub fingering: usize,
+    /// How far each hole is open, 0..=1, in the order of the file.
+    pub openings: Vec<f32>,
+    /// Mouth pressure, kPa.
+    pub mouth_kpa: f32,
+    /// What this fingering asks under the reed as it is set; `None` if it cannot sound or is not known yet.
+    pub requirement: Option<Requirement>,
+    /// What the parameters say.
+    pub settings: Settings,
+    /// Where breath can come from.
+    pub sources: Vec<Source>,
+    /// The last seconds of mouth pressure.
+    pub history: Track,
+    /// The inside of the mouthpiece, the latest 40 ms.
+    pub scope: Scope,
+    /// The sound that comes out.
+    pub heard: Heard,
+    /// Standing wave of the fingering at the pitch of the note: place, m from the reed, and magnitude over that at the
+    /// reed.
+    pub standing: Vec<(f32, f32)>,
+    /// What the user should know, most important first.
+    pub status: Vec<Status>,
+    /// What the hand feels on this fingering, or why nothing.
+    pub feel: Result<NoteFeel, String>,
+    /// The knob.
+    pub knob: Knob,
+    /// Delay of the plugin, ms.
+    pub latency_ms: f32,
+}
+
+impl Default for Snapshot {
+    fn default() -> Self {
+        let instrument = Arc::new(InstrumentFile::built_in());
+        let openings = vec![0.0; instrument.holes.len()];
+        Self {
+            instrument,
+            instruments: Vec::new(),
+            chosen: None,
+            preparing: None,
+            sounding: None,
+            fingering: 0,
+            openings,
+            mouth_kpa: 0.0,
+            requirement: None,
+            settings: Settings::default(),
+            sources: Vec::new(),
+            history: Track::default(),
+            scope: Scope::default(),
+            heard: Heard::default(),
+            standing: Vec::new(),
+            status: Vec::new(),
+            feel: Err("no knob feel yet".into()),
+            knob: Knob::default(),
+            latency_ms: 0.0,
+        }
+    }
+}
+
+impl Snapshot {
+    /// Closing pressure of the reed, kPa.
+    pub fn closing_kpa(&self) -> f32 {
+        (self.settings.closing_pa() * 1e-3) as f32
+    }
+
+    /// The fingering in place.
+    pub fn fingering(&self) -> Option<&Fingering> {
+        self.instrument.fingerings.get(self.fingering)
+    }
+
+    /// The note as it is written, of the held key or of the fingering in place.
+    pub fn written(&self) -> Option<WrittenNote> {
+        self.sounding
+            .and_then(|note| note.written(self.instrument.transposition))
+            .or_else(|| self.fingering().map(|fingering| fingering.written))
+    }
+
+    /// The pressures that matter for this note.
+    pub fn marks(&self) -> Marks {
+        let closing_kpa = self.closing_kpa();
+        let of = |gamma: f64| gamma as f32 * closing_kpa;
+        Marks {
+            speaks_kpa: self.requirement.map(|r| of(r.gamma_sounding)),
+            beats_kpa: self.requirement.map(|r| of(r.gamma_beat)),
+            closes_kpa: closing_kpa,
+            chokes_kpa: self.requirement.map(|r| of(r.gamma_off)),
+        }
+    }
+}
+
+/// Mouth pressures of the current note, kPa.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Marks {
+    /// The note begins to sound.
+    pub speaks_kpa: Option<f32>,
+    /// The reed begins to touch the lay.
+    pub beats_kpa: Option<f32>,
+    /// The reed at rest would be shut.
+    pub closes_kpa: f32,
+    /// Nothing sounds any more.
+    pub chokes_kpa: Option<f32>,
+}
+
+/// One way breath comes in.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Source {
+    /// As players call it: "CC2 breath", "Knob".
+    pub name: String,
+    /// What it says now, 0..=1.
+    pub value: f32,
+    /// It is the one that blows.
+    pub is_live: bool,
+    /// It has said something since the start.
+    pub is_seen: bool,
+}
+
+/// Values at equal steps of time, oldest first.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Track {
+    /// Between two values, s.
+    pub step_s: f32,
+    /// The values, kPa.
+    pub kpa: Vec<f32>,
+}
+
+/// The inside of the mouthpiece at equal steps, oldest first; all of one length.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scope {
+    /// Values a second.
+    pub rate_hz: f32,
+    /// Pressure in the mouthpiece, kPa.
+    pub mouthpiece_kpa: Vec<f32>,
+    /// Reed opening over the rest opening: 0 closed.
+    pub opening: Vec<f32>,
+    /// Flow through the reed, cm3/s.
+    pub flow_cm3s: Vec<f32>,
+}
+
+impl Scope {
+    /// Indices of the latest whole period at `f0_hz`.
+    pub fn last_period(&self, f0_hz: f32) -> std::ops::Range<usize> {
+        let length = self.mouthpiece_kpa.len().min(self.opening.len()).min(self.flow_cm3s.len());
+        let period = if f0_hz > 0.0 { (self.rate_hz / f0_hz).ceil() as usize + 1 } else { length };
+        length.saturating_sub(period)..length
+    }
+}
+
+/// A line for the user.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Status {
+    /// How much it matters.
+    pub level: Level,
+    /// The line.
+    pub text: String,
+}
+
+/// How much something matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Level {
+    /// All is well.
+    Good,
+    /// Worth knowing.
+    Note,
+    /// Something keeps the user from what they want.
+    Warn,
+}
+
+/// The knob and the line to it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Knob {
+    /// What there is to choose from.
+    pub devices: Vec<Device>,
+    /// Where the link stands, in a line.
+    pub text: String,
+    /// It answers and can be armed.
+    pub is_live: bool,
+    /// It makes torque.
+    pub is_armed: bool,
+    /// Most torque the last arming allowed, mNm.
+    pub ceiling_mnm: f32,
+    /// Position, degrees.
+    pub angle_deg: Option<f32>,
+    /// Torque at that position by the law it follows, mNm.
+    pub torque_mnm: Option<f32>,
+    /// What the knob says of faults, or why something did not happen.
+    pub notice: Option<String>,
+    /// Positions a second.
+    pub rate_hz: f32,
+    /// Lateness of the positions, median and 99th percentile, us.
+    pub jitter_us: (u32, u32),
+    /// From a new feel to its echo, us.
+    pub round_trip_us: Option<u32>,
+    /// Frames lost, and frames damaged, since the port was opened.
+    pub lost: u64,
+    /// See `lost`.
+    pub damaged: u64,
+    /// Times the knob went away.
+    pub losses: u32,
+}
+
+/// One device in the list.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Device {
+    /// What to give back in [`Action::ChooseDevice`](crate::editor::Action::ChooseDevice).
+    pub key: String,
+    /// Name and serial number.
+    pub name: String,
+    /// "ready", "in use by ...", "no permission: ...".
+    pub state: String,
+    /// It is the one in use.
+    pub is_chosen: bool,
+    /// Nothing stands in the way.
+    pub is_free: bool,
+}
