@@ -249,7 +249,7 @@ fn beside<A>(
 ) {
     let width = (0.26 * ui.available_width()).clamp(186.0, 260.0);
     let c = theme::Colours::here(ui);
-    let side = Panel::right(egui::Id::new((id, "column"))).exact_size(width).show_separator_line(false);
+    let side = Panel::right(egui::Id::unique((id, "column"))).exact_size(width).show_separator_line(false);
     side.frame(theme::panel(c)).show(ui, |ui| {
         egui::ScrollArea::vertical().id_salt(id).auto_shrink([false, false]).show(ui, |ui| {
             ui.set_width(ui.available_width() - 4.0);

@@ -180,7 +180,7 @@ fn hole_buttons(area: Rect, holes: usize) -> Vec<Rect> {
 /// What the fingers see: full is covered.
 fn button(ui: &mut Ui, rect: Rect, hole: &ToneHole, opening: f32) -> Response {
     let c = Colours::here(ui);
-    let response = ui.interact(rect, ui.id().with(("hole", &hole.name)), Sense::click());
+    let response = ui.interact(rect, ui.scope_id().with(("hole", &hole.name)), Sense::click());
     let painter = ui.painter();
     let ink = if response.hovered() { c.accent } else { c.ink };
     let radius = 0.5 * rect.width();

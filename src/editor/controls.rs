@@ -304,10 +304,10 @@ fn type_value(ui: &mut Ui, hands: &mut Hands, id: &'static str, rect: Rect) {
     let Some(mut entry) = hands.entry.take() else { return };
     let c = Colours::here(ui);
     let field = TextEdit::singleline(&mut entry.text)
-        .id(egui::Id::new(("value of", id)))
+        .id(egui::Id::unique(("value of", id)))
         .font(theme::body())
         .text_color(if entry.is_wrong { c.danger } else { c.ink })
-        .horizontal_align(egui::Align::RIGHT)
+        .align(egui::Align2::RIGHT_CENTER)
         .desired_width(rect.width());
     let response = ui.put(rect, field);
     let name = hands.name(id);
@@ -466,7 +466,7 @@ pub fn heading(ui: &mut Ui, text: &str) {
 pub fn handle(ui: &mut Ui, name: &str, at: Pos2, text: &str) -> (Response, Option<Pos2>) {
     let c = Colours::here(ui);
     let rect = Rect::from_center_size(at, Vec2::splat(26.0));
-    let response = ui.interact(rect, ui.id().with(("handle", name)), Sense::click_and_drag());
+    let response = ui.interact(rect, ui.scope_id().with(("handle", name)), Sense::click_and_drag());
     // Where the hand is, which need not be where the parameter could follow.
     let hand = response.id.with("hand");
     let mut to = None;

@@ -31,8 +31,8 @@ pub fn tools(ui: &mut Ui, kept: &mut Kept, compare: &mut Compare, hands: &mut Ha
             ui.spacing_mut().button_padding.x = if is_wide { 8.0 } else { 6.0 };
             momentary(ui, hands, "panic", "Panic");
             zoom(ui, kept);
-            let (icon, word) = if kept.is_dark { ("\u{2600}", "Light theme") } else { ("\u{1f319}", "Dark theme") };
-            if named(ui.button(icon), word).on_hover_text(word).clicked() {
+            let word = if kept.is_dark { "Light theme" } else { "Dark theme" };
+            if icon(ui, Icon::Theme, word).on_hover_text(word).clicked() {
                 kept.is_dark = !kept.is_dark;
             }
             ui.add_space(4.0);
@@ -46,6 +46,42 @@ pub fn tools(ui: &mut Ui, kept: &mut Kept, compare: &mut Compare, hands: &mut Ha
 fn named(response: egui::Response, name: &str) -> egui::Response {
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, name));
     response
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Icon {
+    Undo,
+    Redo,
+    Theme,
+}
+
+/// A button with a drawn sign: the fonts at hand have none that all of them share.
+fn icon(ui: &mut Ui, icon: Icon, name: &str) -> egui::Response {
+    let (rect, response) = ui.allocate_exact_size(vec2(28.0, 24.0), Sense::click());
+    let visuals = *ui.style().interact(&response);
+    let ink = if ui.is_enabled() { visuals.fg_stroke.color } else { Colours::here(ui).quiet.gamma_multiply(0.6) };
+    let painter = ui.painter();
+    painter.rect(rect, visuals.corner_radius, visuals.weak_bg_fill, visuals.bg_stroke, egui::StrokeKind::Inside);
+    let centre = rect.center();
+    let stroke = Stroke::new(1.6, ink);
+    let arc = |from: f32, to: f32, radius: f32| -> Vec<egui::Pos2> {
+        (0..=16).map(|n| centre + radius * egui::Vec2::angled(from + (to - from) * n as f32 / 16.0)).collect()
+    };
+    if icon == Icon::Theme {
+        painter.circle_stroke(centre, 6.5, stroke);
+        let half = arc(-std::f32::consts::FRAC_PI_2, std::f32::consts::FRAC_PI_2, 6.5);
+        painter.add(egui::Shape::convex_polygon(half, ink, Stroke::NONE));
+    } else {
+        // Three quarters of a turn, with the arrow at its upper end.
+        let side = if icon == Icon::Undo { -1.0 } else { 1.0 };
+        let mirrored = |point: egui::Pos2| pos2(centre.x + side * (point.x - centre.x), point.y);
+        let turn = arc(-0.35, -4.6, 6.0).into_iter().map(mirrored).collect();
+        painter.add(egui::Shape::line(turn, stroke));
+        let tip = mirrored(centre + vec2(6.6, 2.2));
+        let head = vec![tip, mirrored(centre + vec2(9.2, -3.2)), mirrored(centre + vec2(2.6, -2.4))];
+        painter.add(egui::Shape::convex_polygon(head, ink, Stroke::NONE));
+    }
+    named(response, name)
 }
 
 fn note(ui: &mut Ui, snapshot: &Snapshot) {
@@ -104,7 +140,7 @@ fn undo(ui: &mut Ui, hands: &mut Hands) {
     };
     let (undoable, redoable) = (name(hands, hands.history.undoable()), name(hands, hands.history.redoable()));
     ui.add_enabled_ui(redoable.is_some(), |ui| {
-        let response = named(ui.button("\u{27f3}"), "Redo");
+        let response = icon(ui, Icon::Redo, "Redo");
         let response = response.on_hover_text(format!("Redo {}", redoable.clone().unwrap_or_default()));
         if response.clicked() {
             let values = hands.history.redo();
@@ -112,7 +148,7 @@ fn undo(ui: &mut Ui, hands: &mut Hands) {
         }
     });
     ui.add_enabled_ui(undoable.is_some(), |ui| {
-        let response = named(ui.button("\u{27f2}"), "Undo");
+        let response = icon(ui, Icon::Undo, "Undo");
         let response = response.on_hover_text(format!("Undo {}", undoable.clone().unwrap_or_default()));
         if response.clicked() {
             let values = hands.history.undo();

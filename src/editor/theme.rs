@@ -213,7 +213,7 @@ fn style(theme: Theme) -> Style {
 /// Puts the looks of `theme` into force, here and in popups.
 pub fn apply(ui: &mut Ui, theme: Theme) {
     let ctx: Context = ui.ctx().clone();
-    let id = egui::Id::new("chalumeau looks");
+    let id = egui::Id::unique("chalumeau looks");
     if ctx.data(|data| data.get_temp::<bool>(id)) != Some(true) {
         ctx.set_style_of(Theme::Light, STYLES[0].clone());
         ctx.set_style_of(Theme::Dark, STYLES[1].clone());

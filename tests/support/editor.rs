@@ -1,0 +1,368 @@
+//! A host that is not there, and a moment of the instrument really played: what the editor's tests and pictures show.
+
+#![allow(dead_code)] // each user takes what it needs
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use chalumeau::bore::transfer_matrix::TransferMatrix;
+use chalumeau::editor::controls::{Controls, Look};
+use chalumeau::editor::listener::Listener;
+use chalumeau::editor::snapshot::{Device, Knob, Level, Scope, Snapshot, Source, Status, Track};
+use chalumeau::event::Event;
+use chalumeau::haptics::{FeelDesign, FeelTable, Limits};
+use chalumeau::instrument::{Clarinet, Probe, Settings, Tuning, felt};
+use chalumeau::units::WrittenNote;
+
+/// Name, id, least, most, default, decimals, unit. A choice has its texts instead.
+enum Kind {
+    Number { min: f32, max: f32, default: f32, digits: usize, unit: &'static str },
+    Whole { min: i32, max: i32, default: i32 },
+    Choice { texts: &'static [&'static str], default: usize },
+}
+
+const ON_OFF: &[&str] = &["Off", "On"];
+const SOURCES: &[&str] = &["Parameter", "CC1 (wheel)", "CC16", "CC17", "CC74 (MPE y)", "Pressure (MPE z)"];
+
+fn table() -> Vec<(&'static str, &'static str, Kind)> {
+    let number = |min, max, default, digits, unit| Kind::Number { min, max, default, digits, unit };
+    let whole = |min, max, default| Kind::Whole { min, max, default };
+    let choice = |texts, default| Kind::Choice { texts, default };
+    vec![
+        ("breath", "Breath", number(0.0, 100.0, 0.0, 1, " %")),
+        ("full", "Full breath", number(2.0, 20.0, 6.0, 2, " kPa")),
+        ("tongue", "Tongue", number(1.0, 20.0, 2.0, 1, " ms")),
+        ("legato", "Legato", number(5.0, 15.0, 8.0, 1, " ms")),
+        ("stren", "Reed strength", number(1.5, 5.0, 2.5, 2, "")),
+        ("lip", "Lip opening", number(0.6, 1.4, 1.0, 3, " x")),
+        ("zeta", "Embouchure zeta", number(0.05, 0.9, 0.3, 3, "")),
+        ("damp", "Lip damping", number(0.2, 2.0, 1.0, 2, " x")),
+        ("reedh", "Reed H", number(1.0, 5.0, 2.598_076, 4, "")),
+        ("reedk", "Reed k", number(0.1, 2.0, 0.384_900_18, 4, "")),
+        ("reedc", "Reed coupled", choice(&["Free", "Coupled"], 1)),
+        ("reeda", "Reed A", number(0.0, 2.0, 1.0, 3, "")),
+        ("lay", "Lay curve", number(0.0, 0.5, 0.4, 3, "")),
+        ("a4", "A4", number(430.0, 450.0, 440.0, 1, " Hz")),
+        ("tune", "Tuning", choice(&["Natural", "Tempered"], 0)),
+        ("temp", "Temperature", number(10.0, 40.0, 25.0, 1, " \u{b0}C")),
+        ("vent", "Vent loss", number(0.0, 4.0, 2.0, 2, "")),
+        ("noise", "Breath noise", number(0.0, 100.0, 30.0, 1, " %")),
+        ("gain", "Gain", number(-60.0, 24.0, 0.0, 1, " dB")),
+        ("panic", "Panic", choice(ON_OFF, 0)),
+        ("knob", "Knob", choice(&["Off", "Serial", "MIDI port", "OSC (stock firmware)"], 1)),
+        ("arm", "Arm knob", choice(ON_OFF, 0)),
+        ("ceil", "Torque ceiling", number(10.0, 250.0, 100.0, 0, " mNm")),
+        ("takeov", "Take over knob", choice(ON_OFF, 0)),
+        ("rest", "Rest here", choice(ON_OFF, 0)),
+        ("blow", "Blow hard here", choice(ON_OFF, 0)),
+        ("law", "Feel", choice(&["Flow", "Pressure", "Free"], 0)),
+        ("contr", "Feel contrast", number(1.0, 5.0, 3.0, 2, " x")),
+        ("order", "Feel order", choice(&["Physical", "Covered holes", "Open holes"], 0)),
+        ("refnot", "Feel reference", whole(52, 97, 72)),
+        ("torque", "Feel torque", number(0.0, 250.0, 60.0, 0, " mNm")),
+        ("kdamp", "Feel damping", number(0.0, 20.0, 1.0, 2, " mNm s")),
+        ("kfric", "Feel friction", number(0.0, 20.0, 1.0, 1, " mNm")),
+        ("detent", "Feel step", number(0.0, 30.0, 6.0, 1, " mNm")),
+        ("curve", "Knob curve", number(0.25, 4.0, 1.0, 2, "")),
+        ("oscprt", "OSC port", whole(1_024, 65_535, 8_000)),
+        ("oscany", "OSC from network", choice(ON_OFF, 0)),
+        ("oscfl", "Feel OSC port", whole(0, 65_535, 0)),
+        ("rec", "Record take", choice(ON_OFF, 0)),
+        ("replay", "Replay take", choice(ON_OFF, 0)),
+        ("study", "Study", choice(ON_OFF, 0)),
+        ("part", "Participant", whole(1, 9_999, 1)),
+        ("seed", "Study seed", whole(1, 9_999, 1)),
+        ("trial", "Trial", whole(1, 16, 1)),
+        ("side", "A/B", choice(&["A", "B"], 0)),
+        ("hsrc", "H from", choice(SOURCES, 0)),
+        ("ksrc", "k from", choice(SOURCES, 0)),
+        ("kstat", "Knob status", choice(ON_OFF, 0)),
+    ]
+}
+
+/// What the editor told the host.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Told {
+    Begin(String),
+    Set(String, f32),
+    End(String),
+}
+
+/// A host with plain numbers. Refuses what a host would complain of: a value outside a gesture.
+pub struct Fake {
+    table: Vec<(&'static str, &'static str, Kind)>,
+    ids: Vec<&'static str>,
+    values: RefCell<BTreeMap<String, f32>>,
+    open: RefCell<Vec<String>>,
+    told: RefCell<Vec<Told>>,
+}
+
+impl Default for Fake {
+    fn default() -> Self {
+        let table = table();
+        let ids: Vec<_> = table.iter().map(|(id, ..)| *id).collect();
+        let values = table.iter().map(|(id, _, kind)| ((*id).to_owned(), default(kind))).collect();
+        Self { table, ids, values: RefCell::new(values), open: RefCell::default(), told: RefCell::default() }
+    }
+}
+
+fn default(kind: &Kind) -> f32 {
+    match kind {
+        Kind::Number { min, max, default, .. } => (default - min) / (max - min),
+        Kind::Whole { min, max, default } => (default - min) as f32 / (max - min) as f32,
+        Kind::Choice { texts, default } => *default as f32 / (texts.len() - 1) as f32,
+    }
+}
+
+impl Fake {
+    fn kind(&self, id: &str) -> &Kind {
+        &self.table.iter().find(|(known, ..)| *known == id).unwrap_or_else(|| panic!("no parameter {id}")).2
+    }
+
+    /// Normalised.
+    pub fn value(&self, id: &str) -> f32 {
+        self.values.borrow()[id]
+    }
+
+    /// In its own unit.
+    pub fn plain(&self, id: &str) -> f32 {
+        let value = self.value(id);
+        match self.kind(id) {
+            Kind::Number { min, max, .. } => min + value * (max - min),
+            Kind::Whole { min, max, .. } => (*min as f32 + value * (max - min) as f32).round(),
+            Kind::Choice { texts, .. } => (value * (texts.len() - 1) as f32).round(),
+        }
+    }
+
+    /// As a host's automation moves it.
+    pub fn automate(&self, id: &str, value: f32) {
+        self.values.borrow_mut().insert(id.to_owned(), value);
+    }
+
+    /// What was told since this was last asked.
+    pub fn told(&self) -> Vec<Told> {
+        std::mem::take(&mut self.told.borrow_mut())
+    }
+
+    /// The parameters as the instrument reads them.
+    pub fn settings(&self) -> Settings {
+        let d = Settings::default();
+        Settings {
+            breath_full_kpa: self.plain("full"),
+            noise: 0.01 * self.plain("noise"),
+            tongue_ms: self.plain("tongue"),
+            legato_ms: self.plain("legato"),
+            strength: self.plain("stren"),
+            lip: self.plain("lip"),
+            zeta: self.plain("zeta"),
+            damping: self.plain("damp"),
+            lay: self.plain("lay"),
+            reed_h: self.plain("reedh"),
+            reed_k: self.plain("reedk"),
+            coupled: self.plain("reedc") > 0.5,
+            reed_a: self.plain("reeda"),
+            a4_hz: self.plain("a4"),
+            tuning: if self.plain("tune") > 0.5 { Tuning::Tempered } else { Tuning::Natural },
+            temperature_c: self.plain("temp"),
+            vent_loss: self.plain("vent"),
+            gain_db: self.plain("gain"),
+            ..d
+        }
+    }
+}
+
+impl Controls for Fake {
+    fn ids(&self) -> &[&'static str] {
+        &self.ids
+    }
+
+    fn look(&self, id: &str) -> Option<Look> {
+        let (_, name, kind) = self.table.iter().find(|(known, ..)| *known == id)?;
+        let steps = match kind {
+            Kind::Number { .. } => None,
+            Kind::Whole { min, max, .. } => Some((max - min) as usize),
+            Kind::Choice { texts, .. } => Some(texts.len() - 1),
+        };
+        Some(Look { name: (*name).to_owned(), value: self.value(id), default: default(kind), steps })
+    }
+
+    fn text(&self, id: &str, value: f32) -> String {
+        match self.kind(id) {
+            Kind::Number { min, max, digits, unit, .. } => format!("{:.*}{unit}", *digits, min + value * (max - min)),
+            Kind::Whole { min, max, .. } => format!("{:.0}", *min as f32 + value * (max - min) as f32),
+            Kind::Choice { texts, .. } => texts[(value * (texts.len() - 1) as f32).round() as usize].to_owned(),
+        }
+    }
+
+    fn parse(&self, id: &str, text: &str) -> Option<f32> {
+        let number = |unit: &str| text.trim().trim_end_matches(unit.trim()).trim().replace(',', ".").parse::<f32>().ok();
+        match self.kind(id) {
+            Kind::Number { min, max, unit, .. } => Some(((number(unit)? - min) / (max - min)).clamp(0.0, 1.0)),
+            Kind::Whole { min, max, .. } => Some(((number("")? - *min as f32) / (max - min) as f32).clamp(0.0, 1.0)),
+            Kind::Choice { texts, .. } => {
+                Some(texts.iter().position(|known| *known == text)? as f32 / (texts.len() - 1) as f32)
+            }
+        }
+    }
+
+    fn begin(&self, id: &str) {
+        assert!(!self.open.borrow().iter().any(|open| open == id), "{id} begins twice");
+        self.open.borrow_mut().push(id.to_owned());
+        self.told.borrow_mut().push(Told::Begin(id.to_owned()));
+    }
+
+    fn set(&self, id: &str, value: f32) {
+        assert!(self.open.borrow().iter().any(|open| open == id), "{id} is set outside a gesture");
+        assert!((0.0..=1.0).contains(&value), "{id} {value}");
+        self.values.borrow_mut().insert(id.to_owned(), value);
+        self.told.borrow_mut().push(Told::Set(id.to_owned(), value));
+    }
+
+    fn end(&self, id: &str) {
+        let at = self.open.borrow().iter().position(|open| open == id).unwrap_or_else(|| panic!("{id} ends without begin"));
+        self.open.borrow_mut().remove(at);
+        self.told.borrow_mut().push(Told::End(id.to_owned()));
+    }
+}
+
+const RATE_HZ: f64 = 48_000.0;
+/// Of the breath's history.
+const STEP_S: f64 = 1.0 / 30.0;
+
+/// Plays `written` for five seconds, a swell that settles at `gamma`, and looks at the end of it.
+pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot {
+    let mut clarinet = Clarinet::built_in(RATE_HZ).unwrap();
+    clarinet.set_settings(settings);
+    let model = clarinet.model().clone();
+    let note = written.sounding(model.file.transposition).unwrap();
+    let closing_kpa = 1e-3 * settings.closing_pa();
+    let full_kpa = f64::from(settings.breath_full_kpa);
+    let breath_at = |t: f64| {
+        let swell = if t < 0.4 {
+            0.0
+        } else if t < 2.0 {
+            (t - 0.4) / 1.6 * 1.25 * gamma
+        } else if t < 3.4 {
+            (1.25 - 0.6 * (t - 2.0) / 1.4) * gamma
+        } else {
+            (0.65 + 0.35 * ((t - 3.4) / 0.6).min(1.0)) * gamma
+        };
+        swell * closing_kpa / full_kpa
+    };
+    let block = 160;
+    let blocks = (5.0 * RATE_HZ / block as f64) as usize;
+    let (mut sound, mut probes): (Vec<f32>, Vec<Probe>) = (Vec::new(), Vec::new());
+    clarinet.apply(Event::Breath(0.0));
+    clarinet.apply(Event::NoteOn { note, velocity: 0.8 });
+    for n in 0..blocks {
+        let t = n as f64 * block as f64 / RATE_HZ;
+        clarinet.apply(Event::Breath(breath_at(t) as f32));
+        let mut out = vec![0.0; block];
+        clarinet.render_probed(&mut out, &mut |probe| probes.push(probe));
+        sound.extend(out);
+    }
+    let inner_hz = clarinet.internal_rate_hz();
+    let every = (STEP_S * inner_hz) as usize;
+    let kpa = |probe: &Probe| (probe.gamma * closing_kpa) as f32;
+    let latest = &probes[probes.len() - (0.04 * inner_hz) as usize..];
+    // Every second sample: the screen shows no more.
+    let thin: Vec<&Probe> = latest.iter().step_by(2).collect();
+    let mouth_kpa = kpa(probes.last().unwrap());
+    let wanted_hz = note.frequency_hz(f64::from(settings.a4_hz));
+    let heard = Listener::new(RATE_HZ).hear(&sound, Some(wanted_hz));
+
+    let fingering = model.fingering_for(note).unwrap();
+    let open = &model.file.fingerings[fingering].open;
+    let bore = felt::requirements(&model);
+    let reed = felt::played_reed(&model.file, settings);
+    let limits = Limits { ceiling_mnm: 250.0, stiffness_nm_per_rad: 10.0, push_nm_per_rad: 10.0 };
+    let table = FeelTable::new(&bore, &FeelDesign::default(), &reed, &limits);
+    let feel = table.map_err(|refused| refused.to_string()).and_then(|table| {
+        table.note(fingering).copied().ok_or_else(|| "this note has no feel".to_owned())
+    });
+    let angle_deg = feel.as_ref().ok().map(|feel| feel.map.angle_deg(f64::from(mouth_kpa) * 1e3) as f32);
+    let torque_mnm = feel.as_ref().ok().zip(angle_deg).map(|(feel, deg)| {
+        chalumeau::haptics::law::torque_mnm(&feel.feel, chalumeau::reed::ReedTables::seed(), f64::from(deg)) as f32
+    });
+    let standing = TransferMatrix::new(&model.file, model.air).standing_pressure(wanted_hz, open);
+    let source = |name: &str, value: f32, is_live, is_seen| Source { name: name.into(), value, is_live, is_seen };
+    Snapshot {
+        instrument: Arc::new(model.file.clone()),
+        instruments: ["B flat", "A", "E flat", "C", "Bass"].map(String::from).to_vec(),
+        chosen: Some(0),
+        sounding: Some(note),
+        fingering,
+        openings: open.iter().map(|&open| f32::from(open)).collect(),
+        mouth_kpa,
+        requirement: bore.note(fingering, &reed),
+        settings: *settings,
+        sources: vec![
+            source("Knob", breath_at(5.0) as f32, true, true),
+            source("CC2 breath", 0.0, false, false),
+            source("CC11 expression", 0.62, false, true),
+            source("Channel pressure", 0.0, false, false),
+            source("Breath parameter", 0.0, false, false),
+            source("Velocity", 0.8, false, true),
+        ],
+        history: Track { step_s: STEP_S as f32, kpa: probes.iter().step_by(every).map(kpa).collect() },
+        scope: Scope {
+            rate_hz: (0.5 * inner_hz) as f32,
+            mouthpiece_kpa: thin.iter().map(|probe| (1e-3 * probe.p_mouthpiece_pa) as f32).collect(),
+            opening: thin.iter().map(|probe| probe.opening as f32).collect(),
+            flow_cm3s: thin.iter().map(|probe| (1e6 * probe.flow_m3s) as f32).collect(),
+        },
+        heard,
+        standing: standing.into_iter().map(|(x_m, magnitude)| (x_m as f32, magnitude as f32)).collect(),
+        status: vec![
+            Status { level: Level::Good, text: "TorqueTuner 7f3a at /dev/ttyACM0, armed at 100 mNm".into() },
+            Status { level: Level::Note, text: "Breath from the knob; CC11 has moved before".into() },
+        ],
+        feel,
+        knob: Knob {
+            devices: vec![
+                Device {
+                    key: "7f3a".into(),
+                    name: "TorqueTuner 7f3a".into(),
+                    state: "in use here, /dev/ttyACM0".into(),
+                    is_chosen: true,
+                    is_free: true,
+                },
+                Device {
+                    key: "sim".into(),
+                    name: "Simulated knob 0001".into(),
+                    state: "ready".into(),
+                    is_chosen: false,
+                    is_free: true,
+                },
+                Device {
+                    key: "ttyUSB0".into(),
+                    name: "/dev/ttyUSB0".into(),
+                    state: "no permission: add yourself to the group dialout".into(),
+                    is_chosen: false,
+                    is_free: false,
+                },
+            ],
+            text: "TorqueTuner 7f3a (firmware 1.2.0) at /dev/ttyACM0".into(),
+            is_live: true,
+            is_armed: true,
+            ceiling_mnm: 100.0,
+            angle_deg,
+            torque_mnm,
+            notice: None,
+            rate_hz: 500.0,
+            jitter_us: (140, 610),
+            round_trip_us: Some(3_900),
+            lost: 0,
+            damaged: 0,
+            losses: 0,
+        },
+        latency_ms: 1.3,
+        ..Snapshot::default()
+    }
+}
+
+/// Written C4 at half the closing pressure on the reference clarinet.
+pub fn c4() -> Snapshot {
+    played(WrittenNote(60), 0.5, &Settings::default())
+}
