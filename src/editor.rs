@@ -214,12 +214,12 @@ pub fn draw(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &
 
     let ground = |x: i8, y: i8| Frame::new().fill(c.ground).inner_margin(Margin::symmetric(x, y));
     let line = Panel::top("tools").exact_size(if is_small { 44.0 } else { 52.0 }).show_separator_line(false);
-    line.frame(ground(12, 2)).show(ui, |ui| header::tools(ui, kept, compare, &mut hands, snapshot));
+    line.frame(ground(10, 2)).show(ui, |ui| header::tools(ui, kept, compare, &mut hands, snapshot));
     let line = Panel::top("tabs").exact_size(30.0).show_separator_line(true);
-    line.frame(ground(12, 0)).show(ui, |ui| header::tabs(ui, kept, snapshot));
+    line.frame(ground(2, 0)).show(ui, |ui| header::tabs(ui, kept, snapshot));
     let keys = (0.13 * height).clamp(52.0, 110.0);
     let line = Panel::bottom("keys").exact_size(keys + 10.0).show_separator_line(false);
-    line.frame(ground(12, 5)).show(ui, |ui| keyboard.draw(ui, snapshot, &mut actions));
+    line.frame(ground(8, 5)).show(ui, |ui| keyboard.draw(ui, snapshot, &mut actions));
     let line = Panel::right("meter").exact_size(if is_small { 96.0 } else { 112.0 }).show_separator_line(false);
     line.frame(ground(8, 8)).show(ui, |ui| meter::column(ui, snapshot));
     CentralPanel::default().frame(ground(8, 8)).show(ui, |ui| {

@@ -1,2 +1,80 @@
-#[test]
-fn t() {}
+//! The editor without a window: every control by hand, keys and screen reader; how it looks; what a frame costs.
+
+#[path = "support/editor.rs"]
+mod support;
+
+#[path = "editor/cost.rs"]
+mod cost;
+#[path = "editor/hands.rs"]
+mod hands;
+#[path = "editor/looks.rs"]
+mod looks;
+#[path = "editor/window.rs"]
+mod window;
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::sync::OnceLock;
+
+use chalumeau::editor::snapshot::Snapshot;
+use chalumeau::editor::{Action, Kept, State, Tab, draw};
+use egui_kittest::Harness;
+use support::Fake;
+
+/// A written C4 really played, once for all tests.
+fn c4() -> Snapshot {
+    static PLAYED: OnceLock<Snapshot> = OnceLock::new();
+    PLAYED.get_or_init(support::c4).clone()
+}
+
+/// A window in a test.
+struct Window {
+    harness: Harness<'static, State>,
+    host: Rc<Fake>,
+    snapshot: Rc<RefCell<Snapshot>>,
+    actions: Rc<RefCell<Vec<Action>>>,
+}
+
+impl Window {
+    /// High enough that no column scrolls.
+    fn tall(tab: Tab) -> Self {
+        Self::new(tab, (1100.0, 1500.0))
+    }
+
+    fn new(tab: Tab, size: (f32, f32)) -> Self {
+        let (host, snapshot) = (Rc::new(Fake::default()), Rc::new(RefCell::new(c4())));
+        let actions = Rc::new(RefCell::new(Vec::new()));
+        let (h, s, a) = (host.clone(), snapshot.clone(), actions.clone());
+        let kept = Kept { tab, size, ..Kept::default() };
+        let mut harness = Harness::builder().with_size(egui::vec2(size.0, size.1)).build_ui_state(
+            move |ui, state: &mut State| {
+                // As a plugin does: settings of this very frame.
+                s.borrow_mut().settings = h.settings();
+                let done = draw(ui, state, &*h, &s.borrow());
+                a.borrow_mut().extend(done);
+            },
+            State::new(kept),
+        );
+        harness.run();
+        Self { harness, host, snapshot, actions }
+    }
+
+    /// What was done since this was last asked.
+    fn actions(&self) -> Vec<Action> {
+        std::mem::take(&mut self.actions.borrow_mut())
+    }
+
+    /// Presses at a point, moves by `by` in two steps, lets go.
+    fn drag(&mut self, from: egui::Pos2, by: egui::Vec2) {
+        self.harness.hover_at(from);
+        self.harness.step();
+        self.harness.drag_at(from);
+        self.harness.step();
+        for part in [0.5, 1.0] {
+            self.harness.hover_at(from + part * by);
+            self.harness.step();
+        }
+        self.harness.drop_at(from + by);
+        self.harness.run();
+    }
+}

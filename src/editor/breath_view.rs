@@ -107,6 +107,9 @@ fn history(ui: &mut Ui, snapshot: &Snapshot) {
         for (index, (at, name, colour)) in marks.into_iter().enumerate() {
             let line = egui_plot::HLine::new(name, f64::from(at)).color(colour).width(1.0).id(("mark", index));
             plot.hline(line.style(egui_plot::LineStyle::dashed_loose()).allow_hover(false));
+            if f64::from(at) < full {
+                chart::word(plot, [-seconds, f64::from(at)], Align2::LEFT_BOTTOM, &format!(" {name}"), colour);
+            }
         }
         let points = track.kpa.iter().enumerate();
         let points = points.map(|(n, &kpa)| [f64::from(track.step_s) * n as f64 - seconds, f64::from(kpa)]);

@@ -2,11 +2,14 @@
 //!
 //! Nothing can be dragged or zoomed by accident; what can be dragged is a handle on top.
 
-use egui::{Align2, Color32, Rect, Ui, vec2};
+use egui::{Align2, Color32, Rangef, Rect, Ui, vec2};
 use egui_plot::{AxisHints, GridMark, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotTransform, PlotUi, Text, VLine};
 
 use crate::editor::theme;
 use crate::editor::theme::Colours;
+
+/// Height of the line above a picture, points.
+const NAME_HEIGHT: f32 = 14.0;
 
 /// What a picture shows.
 pub struct Chart<'a> {
@@ -18,9 +21,9 @@ pub struct Chart<'a> {
     pub y: (f64, f64),
     /// Name and unit of the horizontal axis; empty hides its numbers too.
     pub x_name: &'a str,
-    /// Name and unit of the vertical axis, written into the picture's upper left.
+    /// Name and unit of the vertical axis, written above its upper end.
     pub y_name: &'a str,
-    /// Height, points.
+    /// Height with names and numbers, points.
     pub height: f32,
     /// What a screen reader says.
     pub label: &'a str,
@@ -40,7 +43,10 @@ impl Chart<'_> {
     /// Draws the frame and lets `draw` fill it; gives back where things are.
     pub fn show(self, ui: &mut Ui, draw: impl FnOnce(&mut PlotUi<'_>)) -> PlotTransform {
         let c = Colours::here(ui);
-        let axis = |hints: AxisHints<'static>| hints.tick_label_color(c.quiet).tick_label_font(theme::small());
+        let (line, _) = ui.allocate_exact_size(vec2(ui.available_width(), NAME_HEIGHT), egui::Sense::hover());
+        ui.painter().text(line.left_top(), Align2::LEFT_TOP, self.y_name, theme::small(), c.quiet);
+        let height = (self.height - NAME_HEIGHT - ui.spacing().item_spacing.y).max(40.0);
+        let axis = |hints: AxisHints<'static>| hints.tick_label_color(c.quiet).tick_label_font(theme::small()).label_spacing(Rangef::new(4.0, 8.0));
         let has_x = !self.x_name.is_empty();
         let digits = |mark: GridMark, _: &std::ops::RangeInclusive<f64>| tidy(mark.value, mark.step_size);
         let x_axis = axis(AxisHints::new_x()).formatter(digits);
@@ -51,9 +57,10 @@ impl Chart<'_> {
         };
         let y_axis = axis(AxisHints::new_y()).formatter(digits).min_thickness(30.0);
         let (x, y) = (self.x, self.y);
+        let width = ui.available_width();
         let shown = Plot::new(self.id)
-            .height(self.height.max(40.0))
-            .width(ui.available_width())
+            .height(height)
+            .width(width)
             .allow_zoom(false)
             .allow_drag(false)
             .allow_scroll(false)
@@ -64,6 +71,9 @@ impl Chart<'_> {
             .show_background(false)
             .show_axes([has_x, true])
             .show_grid(true)
+            .x_grid_spacer(move |_| ticks(x, ((width / 64.0) as usize).clamp(2, 12)))
+            .y_grid_spacer(move |_| ticks(y, ((height / 34.0) as usize).clamp(2, 10)))
+            .grid_spacing(Rangef::new(4.0, 8.0))
             .grid_color(c.grid)
             .show_x(false)
             .show_y(false)
@@ -81,11 +91,17 @@ impl Chart<'_> {
             });
         let label = self.label.to_owned();
         shown.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &label));
-        let frame = *shown.transform.frame();
-        let painter = ui.painter_at(frame);
-        painter.text(frame.left_top() + vec2(6.0, 4.0), Align2::LEFT_TOP, self.y_name, theme::small(), c.quiet);
         shown.transform
     }
+}
+
+/// At most `count` round values inside `range`, a step of 1, 2 or 5 times a power of ten apart.
+fn ticks((low, high): (f64, f64), count: usize) -> Vec<GridMark> {
+    let rough = (high - low) / count.max(1) as f64;
+    let power = 10_f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0].map(|n| n * power).into_iter().find(|step| *step >= rough).unwrap_or(rough);
+    let inside = (low / step).ceil() as i64..=(high / step).floor() as i64;
+    inside.map(|n| GridMark { value: n as f64 * step, step_size: step }).collect()
 }
 
 /// A number as an axis shows it: no more digits than the step needs.
@@ -97,7 +113,7 @@ fn tidy(value: f64, step: f64) -> String {
 
 /// A curve.
 pub fn curve(points: Vec<[f64; 2]>, colour: Color32, width: f32) -> Line<'static> {
-    Line::new("", PlotPoints::from(points)).color(colour).width(width).allow_hover(false)
+    Line::new("", PlotPoints::from(points)).color(colour).width(width).allow_hover(false).allow_band(false)
 }
 
 /// Vertical dashed lines for `marks`.
@@ -145,4 +161,22 @@ pub fn empty(ui: &Ui, frame: Rect, text: &str) {
 /// A word anywhere.
 pub fn word_at(painter: &egui::Painter, at: egui::Pos2, anchor: Align2, text: &str, colour: Color32) {
     painter.text(at, anchor, text, theme::small(), colour);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_few_and_inside() {
+        for (range, count, wanted) in [
+            ((0.0, 10.0), 10, vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0]),
+            ((-110.0, 0.0), 5, vec![-100.0, -50.0, 0.0]),
+            ((-0.84, 8.4), 4, vec![0.0, 5.0]),
+        ] {
+            let found: Vec<f64> = ticks(range, count).iter().map(|mark| mark.value).collect();
+            assert_eq!(found, wanted);
+        }
+        assert_eq!((tidy(0.30000000004, 0.1), tidy(-0.0, 5.0)), ("0.3".into(), "0".into()));
+    }
 }

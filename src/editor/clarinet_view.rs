@@ -45,7 +45,7 @@ impl ClarinetView {
             self.end_try(actions);
         }
         let height = ui.available_height();
-        let picker = (0.36 * height).clamp(126.0, 190.0);
+        let picker = (0.36 * height).clamp(120.0, 156.0);
         ui.spacing_mut().item_spacing.y = GAP;
         panel(c).show(ui, |ui| {
             ui.set_width(ui.available_width());
@@ -136,15 +136,14 @@ impl ClarinetView {
                     continue;
                 }
                 ui.horizontal_wrapped(|ui| {
-                    let (rect, _) = ui.allocate_exact_size(vec2(66.0, 20.0), Sense::hover());
+                    let (rect, _) = ui.allocate_exact_size(vec2(66.0, 22.0), Sense::hover());
                     ui.painter().text(rect.left_center(), Align2::LEFT_CENTER, register, theme::small(), c.quiet);
                     for (index, fingering) in of_register {
                         let first = file.fingerings.iter().position(|other| other.written == fingering.written);
                         let alternate = if first == Some(index) { "" } else { "'" };
                         let name = format!("{}{alternate}", note_name(fingering.written.0));
                         let is_here = shown == Some(index);
-                        let chip = egui::Button::selectable(is_here, egui::RichText::new(&name).font(theme::small()));
-                        let response = ui.add_sized(vec2(31.0, 20.0), chip);
+                        let response = chip(ui, c, &name, is_here);
                         response.widget_info(|| {
                             WidgetInfo::selected(Role::RadioButton, true, is_here, format!("Fingering {name}"))
                         });
@@ -211,6 +210,24 @@ fn button(ui: &mut Ui, rect: Rect, hole: &ToneHole, opening: f32) -> Response {
     let state = if opening >= 0.5 { "open" } else { "closed" };
     response.widget_info(|| WidgetInfo::selected(Role::Switch, true, opening >= 0.5, format!("Hole {}", hole.name)));
     response.on_hover_cursor(CursorIcon::PointingHand).accessible_name(format!("Hole {}, {state}", hole.name))
+}
+
+/// A small button of the picker.
+fn chip(ui: &mut Ui, c: &Colours, name: &str, is_here: bool) -> Response {
+    let (rect, response) = ui.allocate_exact_size(vec2(38.0, 22.0), Sense::click());
+    let fill = match (is_here, response.hovered()) {
+        (true, _) => c.accent,
+        (false, true) => c.hovered,
+        (false, false) => c.raised,
+    };
+    let round = CornerRadius::same(theme::SMALL_RADIUS);
+    ui.painter().rect_filled(rect, round, fill);
+    if response.has_focus() {
+        ui.painter().rect_stroke(rect, round, Stroke::new(1.5, c.ink), egui::StrokeKind::Inside);
+    }
+    let ink = if is_here { c.on_accent } else { c.ink };
+    ui.painter().text(rect.center(), Align2::CENTER_CENTER, name, theme::small(), ink);
+    response
 }
 
 fn about(ui: &mut Ui, hole: &ToneHole, opening: f32) {
@@ -403,7 +420,10 @@ impl<'a> Body<'a> {
 
     fn paint_hole(&self, painter: &Painter, c: &Colours, hole: &ToneHole, opening: f32, is_hot: bool) {
         let Place { rect, out, .. } = self.hole(hole);
-        painter.rect_filled(rect, CornerRadius::ZERO, c.air.lerp_to_gamma(c.speaks, 0.5 * opening));
+        // The chimney stands in wood, out of the body where it is deeper than the wall.
+        let chimney = rect.expand2(vec2(2.5, 0.0));
+        painter.rect_filled(chimney, CornerRadius::same(1), c.wood);
+        painter.rect_filled(rect, CornerRadius::ZERO, c.air.lerp_to_gamma(c.speaks, 0.6 * opening));
         let outer_y = if out < 0.0 { rect.top() } else { rect.bottom() };
         let lift = 7.0 * opening;
         let width = rect.width() + 5.0;

@@ -351,7 +351,8 @@ pub fn choice(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
     let name = ui.label(egui::RichText::new(&look.name).color(c.quiet));
     name.on_hover_ui(|ui| teach(ui, id, ""));
     let width = |text: &str| ui.painter().layout_no_wrap(text.to_owned(), theme::body(), c.ink).size().x;
-    let needed: f32 = texts.iter().map(|text| width(text) + 14.0).sum();
+    // Cells are equally wide.
+    let needed = texts.iter().map(|text| width(text) + 14.0).fold(0.0, f32::max) * texts.len() as f32;
     let mut chosen = now;
     let response = if needed <= ui.available_width() {
         segments(ui, &look.name, &texts, &mut chosen)

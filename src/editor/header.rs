@@ -124,7 +124,7 @@ pub fn needle(ui: &mut Ui, snapshot: &Snapshot, width: f32) {
             let x = at(cents);
             painter.line_segment([pos2(x, line_y - 14.0), pos2(x, line_y + 4.0)], Stroke::new(2.5, colour));
             painter.circle_filled(pos2(x, line_y - 14.0), 3.0, colour);
-            format!("{cents:+.0} cents")
+            if cents.abs() < 0.5 { "in tune".into() } else { format!("{cents:+.0} cents") }
         }
         None => "no pitch".into(),
     };

@@ -36,7 +36,7 @@ impl InstrumentView {
         let height = ui.available_height();
         panel(c).show(ui, |ui| {
             ui.set_width(ui.available_width());
-            ui.set_height(0.52 * height - 24.0);
+            ui.set_height((0.34 * height - 24.0).max(136.0));
             egui::ScrollArea::vertical().id_salt("instruments").auto_shrink([false, false]).show(ui, |ui| {
                 self.list(ui, snapshot, actions);
             });

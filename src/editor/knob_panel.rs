@@ -23,7 +23,7 @@ enum Page {
     Study,
 }
 
-const PAGES: [(Page, &str); 3] = [(Page::Play, "Feel"), (Page::Try, "Feel test"), (Page::Study, "Takes and studies")];
+const PAGES: [(Page, &str); 3] = [(Page::Play, "Feel"), (Page::Try, "Feel test"), (Page::Study, "Line, takes, studies")];
 
 /// What the panel remembers.
 #[derive(Clone, Debug, Default)]
@@ -193,7 +193,7 @@ fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
         (false, false) if knob.is_live => ("ARM", "the knob may then push back", c.accent, c.on_accent),
         (false, false) => ("ARM", "no knob to arm yet", c.raised, c.quiet),
     };
-    let height = (ui.available_height() - 96.0).clamp(52.0, 84.0);
+    let height = (ui.available_height() - 132.0).clamp(46.0, 84.0);
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::click());
     let painter = ui.painter();
     let round = CornerRadius::same(theme::PANEL_RADIUS);
@@ -214,7 +214,15 @@ fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     slider(ui, hands, "ceil");
     let angle = knob.angle_deg.map_or_else(|| "\u{2013}".into(), |deg| format!("{deg:.0}\u{b0}"));
     let torque = knob.torque_mnm.map_or_else(|| "\u{2013}".into(), |mnm| format!("{mnm:.0} mNm"));
-    ui.label(RichText::new(format!("at {angle}, {torque}")).color(c.quiet));
+    ui.spacing_mut().item_spacing.y = 2.0;
+    let quiet = |text: String| RichText::new(text).font(theme::small()).color(c.quiet);
+    ui.label(quiet(format!("knob at {angle}, {torque}")));
+    let late = |us: u32| 1e-3 * f64::from(us);
+    let (median, worst) = (late(knob.jitter_us.0), late(knob.jitter_us.1));
+    ui.label(quiet(format!("{:.0} positions a second, late by {median:.1} ms, at worst {worst:.1}", knob.rate_hz)));
+    let echo = knob.round_trip_us.map_or_else(|| "?".into(), |us| format!("{:.1} ms", late(us)));
+    let errors = knob.lost + knob.damaged;
+    ui.label(quiet(format!("new feel after {echo}; {errors} errors on the line, away {} times", knob.losses)));
 }
 
 /// What the line to the knob does.
@@ -250,7 +258,7 @@ fn line(ui: &mut Ui, snapshot: &Snapshot) {
 fn column(ui: &mut Ui, hands: &mut Hands, page: Page) {
     match page {
         Page::Play | Page::Try => {
-            heading(ui, "Feel");
+            heading(ui, "What it feels like");
             for id in ["law", "order"] {
                 choice(ui, hands, id);
             }

@@ -120,7 +120,7 @@ fn waves(ui: &mut Ui, snapshot: &Snapshot) {
         y: (-most, most),
         x_name: "",
         y_name: "pressure in the mouthpiece, kPa",
-        height: half - 8.0,
+        height: half - 10.0,
         label: "Pressure in the mouthpiece over time",
     }
     .show(ui, |plot| {
@@ -134,7 +134,7 @@ fn waves(ui: &mut Ui, snapshot: &Snapshot) {
     Chart {
         id: "gap",
         x: (-from, 0.0),
-        y: (-0.1, (1.1 * largest(&scope.opening, 1.0)).max(1.2)),
+        y: (-0.25, (1.1 * largest(&scope.opening, 1.0)).max(1.2)),
         x_name: "ms ago",
         y_name: "reed's gap over that at rest",
         height: ui.available_height(),
@@ -142,7 +142,7 @@ fn waves(ui: &mut Ui, snapshot: &Snapshot) {
     }
     .show(ui, |plot| {
         plot.line(chart::curve(vec![[-from, 0.0], [0.0, 0.0]], c.closes, 1.0).id("shut"));
-        chart::word(plot, [-0.01 * from, 0.0], Align2::RIGHT_BOTTOM, "shut", c.closes);
+        chart::word(plot, [-0.01 * from, 0.0], Align2::RIGHT_TOP, "shut", c.closes);
         plot.line(chart::curve(track(&scope.opening), c.accent, 1.6).fill(0.0).fill_alpha(0.10).id("gap"));
     });
 }

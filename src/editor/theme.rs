@@ -177,6 +177,7 @@ fn style(theme: Theme) -> Style {
     v.popup_shadow = Shadow { offset: [0, 4], blur: 14, spread: 0, color: Color32::from_black_alpha(50) };
     v.extreme_bg_color = c.panel;
     v.faint_bg_color = c.raised;
+    v.text_edit_bg_color = Some(c.ground);
     v.warn_fg_color = c.beats;
     v.error_fg_color = c.danger;
     v.hyperlink_color = c.breath;

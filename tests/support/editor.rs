@@ -4,16 +4,19 @@
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 
 use chalumeau::bore::transfer_matrix::TransferMatrix;
 use chalumeau::editor::controls::{Controls, Look};
 use chalumeau::editor::listener::Listener;
+use chalumeau::editor::{Kept, State, Tab, draw};
 use chalumeau::editor::snapshot::{Device, Knob, Level, Scope, Snapshot, Source, Status, Track};
 use chalumeau::event::Event;
 use chalumeau::haptics::{FeelDesign, FeelTable, Limits};
 use chalumeau::instrument::{Clarinet, Probe, Settings, Tuning, felt};
 use chalumeau::units::WrittenNote;
+use egui_kittest::Harness;
 
 /// Name, id, least, most, default, decimals, unit. A choice has its texts instead.
 enum Kind {
@@ -116,6 +119,14 @@ fn default(kind: &Kind) -> f32 {
 }
 
 impl Fake {
+    /// The same without one parameter.
+    pub fn without(id: &str) -> Self {
+        let mut host = Self::default();
+        host.table.retain(|(known, ..)| *known != id);
+        host.ids.retain(|known| *known != id);
+        host
+    }
+
     fn kind(&self, id: &str) -> &Kind {
         &self.table.iter().find(|(known, ..)| *known == id).unwrap_or_else(|| panic!("no parameter {id}")).2
     }
@@ -128,7 +139,8 @@ impl Fake {
     /// In its own unit.
     pub fn plain(&self, id: &str) -> f32 {
         let value = self.value(id);
-        match self.kind(id) {
+        let Some((.., kind)) = self.table.iter().find(|(known, ..)| *known == id) else { return 0.0 };
+        match kind {
             Kind::Number { min, max, .. } => min + value * (max - min),
             Kind::Whole { min, max, .. } => (*min as f32 + value * (max - min) as f32).round(),
             Kind::Choice { texts, .. } => (value * (texts.len() - 1) as f32).round(),
@@ -147,7 +159,6 @@ impl Fake {
 
     /// The parameters as the instrument reads them.
     pub fn settings(&self) -> Settings {
-        let d = Settings::default();
         Settings {
             breath_full_kpa: self.plain("full"),
             noise: 0.01 * self.plain("noise"),
@@ -167,7 +178,6 @@ impl Fake {
             temperature_c: self.plain("temp"),
             vent_loss: self.plain("vent"),
             gain_db: self.plain("gain"),
-            ..d
         }
     }
 }
@@ -365,4 +375,37 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
 /// Written C4 at half the closing pressure on the reference clarinet.
 pub fn c4() -> Snapshot {
     played(WrittenNote(60), 0.5, &Settings::default())
+}
+
+/// The window as a picture. What a test's frame puts around it is cut off.
+pub fn picture(kept: &Kept, controls: &Fake, snapshot: &Snapshot, scale: f32) -> image::RgbaImage {
+    const FRAME: f32 = 8.0;
+    let size = egui::vec2(kept.size.0 + 2.0 * FRAME, kept.size.1 + 2.0 * FRAME);
+    let mut harness = Harness::builder().with_size(size).with_pixels_per_point(scale).build_ui_state(
+        |ui, state: &mut State| {
+            draw(ui, state, controls, snapshot);
+        },
+        State::new(kept.clone()),
+    );
+    harness.run();
+    let whole = harness.render().unwrap();
+    let px = |points: f32| (points * scale).round() as u32;
+    image::imageops::crop_imm(&whole, px(FRAME), px(FRAME), px(kept.size.0), px(kept.size.1)).to_image()
+}
+
+/// Every view, light and dark, as files in `folder`.
+pub fn pictures(folder: &Path, size: (f32, f32), scales: &[f32], tabs: &[Tab]) {
+    std::fs::create_dir_all(folder).unwrap();
+    let snapshot = c4();
+    for &scale in scales {
+        for is_dark in [false, true] {
+            for &tab in tabs {
+                let kept = Kept { is_dark, tab, size, ..Kept::default() };
+                let theme = if is_dark { "dark" } else { "light" };
+                let name = format!("{}-{theme}-{:.0}.png", tab.name().to_lowercase(), 100.0 * scale);
+                picture(&kept, &Fake::default(), &snapshot, scale).save(folder.join(&name)).unwrap();
+                println!("{}", folder.join(name).display());
+            }
+        }
+    }
 }

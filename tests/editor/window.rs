@@ -1,0 +1,262 @@
+//! The window as a whole: tabs, undo, A/B, keys, holes, knob; whose the keyboard is; when it repaints.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use chalumeau::editor::{Action, FeelTest, Tab};
+use chalumeau::units::SoundingNote;
+use egui::accesskit::Role;
+use egui::{Key, vec2};
+use egui_kittest::kittest::{NodeT, Queryable};
+
+use crate::Window;
+
+fn click(window: &mut Window, label: &str) {
+    window.harness.get_by_label(label).click();
+    window.harness.run();
+}
+
+#[test]
+fn tabs_lead_to_views_and_are_kept() {
+    let mut window = Window::new(Tab::Reed, (1100.0, 720.0));
+    for (tab, shows) in [
+        (Tab::Clarinet, "Fingering C4"),
+        (Tab::Breath, "Rest here"),
+        (Tab::Sound, "Spectrum of the sound"),
+        (Tab::Knob, "Disarm the knob"),
+        (Tab::Instrument, "Instrument Bass"),
+        (Tab::Reed, "Peak of the flow: H"),
+    ] {
+        window.harness.get_by_role_and_label(Role::Tab, tab.name()).click();
+        window.harness.run();
+        window.harness.get_by_label(shows);
+        assert_eq!(window.harness.state().kept.tab, tab);
+    }
+}
+
+#[test]
+fn undo_and_redo_walk_through_gestures() {
+    let mut window = Window::tall(Tab::Reed);
+    for name in ["Lip opening", "Lay curve"] {
+        let at = window.harness.get_by_role_and_label(Role::Slider, name).rect().center();
+        window.drag(at, vec2(-50.0, 0.0));
+    }
+    let (lip, lay) = (window.host.value("lip"), window.host.value("lay"));
+    click(&mut window, "Undo");
+    assert_eq!((window.host.plain("lay"), window.host.value("lip")), (0.4, lip));
+    click(&mut window, "Undo");
+    assert_eq!(window.host.plain("lip"), 1.0);
+    click(&mut window, "Redo");
+    click(&mut window, "Redo");
+    assert_eq!((window.host.value("lip"), window.host.value("lay")), (lip, lay));
+}
+
+#[test]
+fn a_and_b_keep_their_settings_and_blind_hides_them() {
+    let mut window = Window::tall(Tab::Reed);
+    click(&mut window, "Setting B");
+    window.host.automate("lip", 0.9);
+    window.host.automate("arm", 1.0);
+    window.harness.run();
+    click(&mut window, "Setting A");
+    assert_eq!((window.host.value("lip"), window.host.value("arm")), (0.5, 1.0), "arming is no setting");
+    click(&mut window, "Blind");
+    // Nothing tells: no slider, no curve.
+    assert!(window.harness.query_by_label("Lip opening").is_none());
+    let heard: BTreeSet<String> = ["Side X", "Side Y"]
+        .into_iter()
+        .map(|side| {
+            click(&mut window, side);
+            window.host.value("lip").to_string()
+        })
+        .collect();
+    assert_eq!(heard.len(), 2, "X and Y are not the same");
+    click(&mut window, "Reveal");
+    click(&mut window, "Done");
+    window.harness.get_by_label("Lip opening");
+}
+
+#[test]
+fn keys_play_slur_and_let_go() {
+    let mut window = Window::new(Tab::Reed, (1100.0, 720.0));
+    let keys = window.harness.get_by_label_contains("Keyboard").rect();
+    let (first, second) = (keys.left_bottom() + vec2(8.0, -6.0), keys.left_bottom() + vec2(60.0, -6.0));
+    window.drag(first, second - first);
+    let done = window.actions();
+    let notes = |on: bool| -> Vec<SoundingNote> {
+        done.iter()
+            .filter_map(|action| match action {
+                Action::NoteOn { note, .. } if on => Some(*note),
+                Action::NoteOff { note } if !on => Some(*note),
+                _ => None,
+            })
+            .collect()
+    };
+    assert_eq!(notes(true), [SoundingNote(50), SoundingNote(52)]);
+    assert_eq!(notes(false), notes(true));
+    assert!(matches!(done[1], Action::NoteOn { .. }), "a slur: the new note before the old one ends: {done:?}");
+
+    window.harness.get_by_label_contains("Keyboard").focus();
+    window.harness.run();
+    window.harness.key_down(Key::Space);
+    window.harness.run();
+    assert!(matches!(window.actions()[..], [Action::NoteOn { .. }]));
+    let left = window.harness.state_mut().close();
+    assert!(matches!(left[..], [Action::NoteOff { .. }]), "a window that closes lets go: {left:?}");
+}
+
+#[test]
+fn holes_are_tried_and_given_back() {
+    let mut window = Window::new(Tab::Clarinet, (1100.0, 720.0));
+    let file = window.snapshot.borrow().instrument.clone();
+    let open: Vec<bool> = window.snapshot.borrow().openings.iter().map(|&opening| opening > 0.5).collect();
+    let l3 = file.hole("L3").unwrap();
+    window.harness.get_by_label("Hole L3, closed").click();
+    window.harness.run();
+    let mut wanted = open;
+    wanted[l3] = true;
+    assert_eq!(window.actions(), [Action::TryFingering(wanted)]);
+    window.harness.get_by_label("Hole L3, open");
+    click(&mut window, "Fingering G4");
+    let g4 = &file.fingering(chalumeau::units::WrittenNote(67)).unwrap().open;
+    assert_eq!(window.actions(), [Action::TryFingering(g4.clone())]);
+    click(&mut window, "Back to the note");
+    assert_eq!(window.actions(), [Action::EndTry]);
+}
+
+#[test]
+fn the_knob_is_armed_by_the_large_button_alone() {
+    let mut window = Window::tall(Tab::Knob);
+    window.snapshot.borrow_mut().knob.is_armed = false;
+    window.harness.run();
+    click(&mut window, "Arm the knob");
+    assert_eq!(window.host.value("arm"), 1.0);
+    window.snapshot.borrow_mut().knob.is_armed = true;
+    window.harness.run();
+    click(&mut window, "Disarm the knob");
+    assert_eq!(window.host.value("arm"), 0.0);
+    // Undo takes back no arming.
+    assert!(window.harness.get_by_label("Undo").accesskit_node().is_disabled());
+    // A knob that let go by itself: the first press takes the wish back.
+    window.host.automate("arm", 1.0);
+    window.snapshot.borrow_mut().knob.is_armed = false;
+    window.harness.run();
+    click(&mut window, "Disarm the knob");
+    assert_eq!(window.host.value("arm"), 0.0);
+}
+
+#[test]
+fn devices_tests_and_files_are_asked_for() {
+    let mut window = Window::tall(Tab::Knob);
+    window.harness.get_by_label_contains("Device Simulated knob").click();
+    window.harness.run();
+    assert_eq!(window.actions(), [Action::ChooseDevice("sim".into())]);
+    click(&mut window, "Page: Feel test");
+    for test in FeelTest::ALL {
+        click(&mut window, &format!("Feel test: {}", test.name()));
+        assert_eq!(window.actions(), [Action::FeelTest(Some(test.feel()))]);
+    }
+    click(&mut window, "Page: Feel");
+    assert_eq!(window.actions(), [Action::FeelTest(None)], "leaving the page ends the test");
+
+    let mut window = Window::tall(Tab::Instrument);
+    click(&mut window, "Instrument Bass");
+    assert_eq!(window.actions(), [Action::ChooseInstrument(4)]);
+    let field = window.harness.get_by_label("Path of an instrument file");
+    field.focus();
+    field.type_text("mine.toml");
+    window.harness.run();
+    click(&mut window, "Open");
+    assert_eq!(window.actions(), [Action::OpenInstrument(PathBuf::from("mine.toml"))]);
+}
+
+#[test]
+fn keys_belong_to_the_host_unless_text_is_typed() {
+    let mut window = Window::tall(Tab::Reed);
+    let wants = |window: &Window| window.harness.state().wants_keyboard(&window.harness.ctx);
+    assert!(!wants(&window));
+    let at = window.harness.get_by_role_and_label(Role::Slider, "Lip opening").rect();
+    window.drag(at.center(), vec2(20.0, 0.0));
+    assert!(!wants(&window), "a slider in the hand takes no keys");
+    let value = at.right_top() + vec2(-8.0, 9.0);
+    window.harness.drag_at(value);
+    window.harness.drop_at(value);
+    window.harness.run();
+    assert!(wants(&window));
+    window.harness.key_press(Key::Enter);
+    window.harness.run();
+    assert!(!wants(&window), "and gives them back");
+}
+
+#[test]
+fn every_control_is_reached_by_the_tab_key() {
+    for tab in Tab::ALL {
+        let mut window = Window::tall(tab);
+        let is_control = |role: Role| {
+            matches!(role, Role::Slider | Role::Switch | Role::RadioButton | Role::Button | Role::ComboBox | Role::Tab)
+        };
+        let nodes = window.harness.root().children_recursive();
+        let wanted: BTreeSet<String> = nodes
+            .map(|node| node.accesskit_node())
+            .filter(|node| is_control(node.role()) && !node.is_disabled())
+            .filter_map(|node| node.label())
+            .collect();
+        let mut reached = BTreeSet::new();
+        for _ in 0..3 * wanted.len() + 20 {
+            window.harness.key_press(Key::Tab);
+            window.harness.run();
+            let nodes = window.harness.root().children_recursive();
+            let focused = nodes.filter(|node| node.is_focused()).filter_map(|node| node.accesskit_node().label());
+            reached.extend(focused);
+        }
+        let missed: Vec<_> = wanted.difference(&reached).collect();
+        assert!(missed.is_empty(), "{tab:?}: {missed:?}");
+    }
+}
+
+#[test]
+fn an_idle_window_does_not_repaint() {
+    for tab in Tab::ALL {
+        let mut window = Window::new(tab, (1100.0, 720.0));
+        for _ in 0..5 {
+            window.harness.step();
+        }
+        let soonest = window.harness.output().viewport_output.values().map(|output| output.repaint_delay).min();
+        assert!(soonest.unwrap() >= Duration::from_millis(200), "{tab:?} {soonest:?}");
+    }
+}
+
+#[test]
+fn nothing_to_show_is_shown_as_such() {
+    for tab in Tab::ALL {
+        let mut window = Window::new(tab, (700.0, 480.0));
+        *window.snapshot.borrow_mut() = chalumeau::editor::Snapshot::default();
+        window.harness.run();
+        window.harness.get_by_label_contains("Mouth pressure 0.00 kPa");
+    }
+}
+
+#[test]
+fn rubbish_in_a_snapshot_does_no_harm() {
+    for tab in Tab::ALL {
+        let mut window = Window::new(tab, (900.0, 600.0));
+        for value in [f32::NAN, f32::INFINITY, -1e30] {
+            {
+                let mut snapshot = window.snapshot.borrow_mut();
+                snapshot.mouth_kpa = value;
+                snapshot.history.kpa.fill(value);
+                snapshot.scope.flow_cm3s.fill(value);
+                snapshot.scope.mouthpiece_kpa.fill(value);
+                snapshot.heard.cents = Some(value);
+                snapshot.heard.level_db.fill(value);
+                snapshot.openings.fill(value);
+                snapshot.openings.pop();
+                snapshot.standing.iter_mut().for_each(|place| place.1 = value);
+                snapshot.knob.angle_deg = Some(value);
+                snapshot.fingering = 10_000;
+            }
+            window.harness.run();
+        }
+    }
+}
