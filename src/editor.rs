@@ -216,7 +216,7 @@ pub fn draw(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &
     let line = Panel::top("tools").exact_size(if is_small { 44.0 } else { 52.0 }).show_separator_line(false);
     line.frame(ground(10, 2)).show(ui, |ui| header::tools(ui, kept, compare, &mut hands, snapshot));
     let line = Panel::top("tabs").exact_size(30.0).show_separator_line(true);
-    line.frame(ground(2, 0)).show(ui, |ui| header::tabs(ui, kept, snapshot));
+    line.frame(Frame::new().fill(c.ground).inner_margin(Margin { left: 2, right: 10, top: 0, bottom: 0 })).show(ui, |ui| header::tabs(ui, kept, snapshot));
     let keys = (0.13 * height).clamp(52.0, 110.0);
     let line = Panel::bottom("keys").exact_size(keys + 10.0).show_separator_line(false);
     line.frame(ground(8, 5)).show(ui, |ui| keyboard.draw(ui, snapshot, &mut actions));

@@ -46,7 +46,7 @@ impl Window {
         let actions = Rc::new(RefCell::new(Vec::new()));
         let (h, s, a) = (host.clone(), snapshot.clone(), actions.clone());
         let kept = Kept { tab, size, ..Kept::default() };
-        let mut harness = Harness::builder().with_size(egui::vec2(size.0, size.1)).build_ui_state(
+        let mut harness = Harness::builder().with_step_dt(1.0 / 60.0).with_size(egui::vec2(size.0, size.1)).build_ui_state(
             move |ui, state: &mut State| {
                 // As a plugin does: settings of this very frame.
                 s.borrow_mut().settings = h.settings();
@@ -62,6 +62,20 @@ impl Window {
     /// What was done since this was last asked.
     fn actions(&self) -> Vec<Action> {
         std::mem::take(&mut self.actions.borrow_mut())
+    }
+
+    /// Two clicks in a row.
+    fn double_click(&mut self, at: egui::Pos2) {
+        self.harness.hover_at(at);
+        // Clicks from before would make these the second and third.
+        self.harness.run_steps(40);
+        for pressed in [true, false, true, false] {
+            let (button, modifiers) = (egui::PointerButton::Primary, egui::Modifiers::NONE);
+            self.harness.event(egui::Event::PointerButton { pos: at, button, pressed, modifiers });
+            self.harness.step();
+        }
+        self.harness.remove_cursor();
+        self.harness.run();
     }
 
     /// Presses at a point, moves by `by` in two steps, lets go.

@@ -37,11 +37,17 @@ fn gauge(ui: &mut Ui, snapshot: &Snapshot) {
     let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
     let painter = ui.painter();
     let full = meter::full_kpa(snapshot);
-    let kpa = snapshot.mouth_kpa.max(0.0);
+    let kpa = snapshot.mouth_now_kpa();
     let all = snapshot.marks();
     let (word, colour) = meter::state(&all, kpa, c);
-    painter.text(rect.left_top() - vec2(0.0, 4.0), Align2::LEFT_TOP, format!("{kpa:.2} kPa"), FontId::proportional(30.0), c.ink);
-    painter.text(rect.left_top() + vec2(128.0, 14.0), Align2::LEFT_TOP, word, theme::heading(), colour);
+    let number = painter.text(
+        rect.left_top() - vec2(0.0, 6.0),
+        Align2::LEFT_TOP,
+        format!("{kpa:.2} kPa"),
+        FontId::proportional(28.0),
+        c.ink,
+    );
+    painter.text(number.right_center() + vec2(14.0, 2.0), Align2::LEFT_CENTER, word, theme::heading(), colour);
     let gamma = if all.closes_kpa > 0.0 { kpa / all.closes_kpa } else { 0.0 };
     let share = format!("\u{3b3} = {gamma:.2} of closing pressure");
     painter.text(rect.right_top(), Align2::RIGHT_TOP, share, theme::small(), c.quiet);
@@ -53,9 +59,9 @@ fn gauge(ui: &mut Ui, snapshot: &Snapshot) {
     let speaks = all.speaks_kpa.unwrap_or(all.closes_kpa);
     let beats = all.beats_kpa.unwrap_or(all.closes_kpa).max(speaks);
     let end = all.chokes_kpa.unwrap_or(full).min(full);
-    for (from, to, colour) in [(speaks, beats, c.speaks), (beats, end, c.beats)] {
+    for (from, to, colour) in meter::bands(speaks, beats, all.closes_kpa, end, c) {
         let band = Rect::from_min_max(pos2(x(from), bar.top()), pos2(x(to), bar.bottom()));
-        painter.rect_filled(band, CornerRadius::ZERO, colour.gamma_multiply(0.16));
+        painter.rect_filled(band, CornerRadius::ZERO, colour);
     }
     let air = Rect::from_min_max(bar.min, pos2(x(kpa), bar.bottom()));
     painter.rect_filled(air.shrink2(vec2(0.0, 0.18 * bar.height())), round, c.breath.gamma_multiply(0.85));
@@ -67,7 +73,7 @@ fn gauge(ui: &mut Ui, snapshot: &Snapshot) {
         let galley = painter.layout_no_wrap(text, theme::small(), colour);
         // A second line where the first is taken.
         let left = (x(at) - 0.5 * galley.size().x).min(bar.right() - galley.size().x).max(bar.left());
-        let y = if left < end_of_last + 6.0 { bar.top() - 30.0 } else { bar.top() - 18.0 };
+        let y = if left < end_of_last + 6.0 { bar.top() - 28.0 } else { bar.top() - 17.0 };
         if y > bar.top() - 20.0 {
             end_of_last = left + galley.size().x;
         }
@@ -127,7 +133,7 @@ fn column(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     }
     slider(ui, hands, "breath");
     heading(ui, "Calibrate");
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         momentary(ui, hands, "rest", "Rest here");
         momentary(ui, hands, "blow", "Blow hard here");
     });
@@ -155,7 +161,7 @@ fn meter_of(ui: &mut Ui, source: &Source) {
     painter.text(pos2(rect.right(), rect.top() + 8.0), Align2::RIGHT_CENTER, &state, theme::small(), c.quiet);
     let bar = Rect::from_min_max(pos2(rect.left(), rect.bottom() - 8.0), pos2(rect.right(), rect.bottom() - 4.0));
     painter.rect_filled(bar, CornerRadius::same(2), c.raised);
-    let end = bar.left() + source.value.clamp(0.0, 1.0) * bar.width();
+    let end = bar.left() + chart::share(source.value) * bar.width();
     let fill = if source.is_live { c.breath } else { c.chokes };
     painter.rect_filled(Rect::from_min_max(bar.min, pos2(end, bar.bottom())), CornerRadius::same(2), fill);
     let blows = if source.is_live { ", blows" } else { "" };

@@ -49,7 +49,11 @@ impl Chart<'_> {
         let axis = |hints: AxisHints<'static>| hints.tick_label_color(c.quiet).tick_label_font(theme::small()).label_spacing(Rangef::new(4.0, 8.0));
         let has_x = !self.x_name.is_empty();
         let digits = |mark: GridMark, _: &std::ops::RangeInclusive<f64>| tidy(mark.value, mark.step_size);
-        let x_axis = axis(AxisHints::new_x()).formatter(digits);
+        // Time gone by is negative on the axis and told without a sign.
+        let is_ago = self.x_name.ends_with("ago");
+        let x_axis = axis(AxisHints::new_x()).formatter(move |mark, _| {
+            tidy(if is_ago { mark.value.abs() } else { mark.value }, mark.step_size)
+        });
         let x_axis = if has_x {
             x_axis.label(egui::RichText::new(self.x_name).font(theme::small()).color(c.quiet))
         } else {
@@ -72,7 +76,7 @@ impl Chart<'_> {
             .show_axes([has_x, true])
             .show_grid(true)
             .x_grid_spacer(move |_| ticks(x, ((width / 64.0) as usize).clamp(2, 12)))
-            .y_grid_spacer(move |_| ticks(y, ((height / 34.0) as usize).clamp(2, 10)))
+            .y_grid_spacer(move |_| ticks(y, ((height / 30.0) as usize).clamp(3, 10)))
             .grid_spacing(Rangef::new(4.0, 8.0))
             .grid_color(c.grid)
             .show_x(false)
@@ -149,6 +153,21 @@ pub fn names(ui: &Ui, transform: &PlotTransform, marks: &[Mark<'_>]) {
 pub fn word(plot: &mut PlotUi<'_>, at: [f64; 2], anchor: Align2, text: &str, colour: Color32) {
     let text = egui::RichText::new(text).font(theme::small()).color(colour);
     plot.text(Text::new("", PlotPoint::new(at[0], at[1]), text).anchor(anchor).allow_hover(false));
+}
+
+/// What the curves are, in their colours, right-aligned at a height of the picture, 0 (top) ..=1.
+pub fn legend(ui: &Ui, transform: &PlotTransform, height: f32, lines: &[(&str, Color32)]) {
+    let frame = *transform.frame();
+    let painter = ui.painter_at(frame);
+    for (line, (text, colour)) in lines.iter().enumerate() {
+        let at = egui::pos2(frame.right() - 8.0, frame.top() + height * frame.height() + 14.0 * line as f32);
+        painter.text(at, Align2::RIGHT_TOP, text, theme::small(), *colour);
+    }
+}
+
+/// A number from outside as a share: 0..=1, 0 for what is none.
+pub fn share(value: f32) -> f32 {
+    if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 }
 }
 
 /// What stands where there is nothing to show yet.

@@ -22,6 +22,9 @@ use crate::editor::theme::{Colours, GAP, panel};
 const WALL_M: f64 = 7e-3;
 const RIM_M: f64 = 2.5e-3;
 
+/// Least distance of two buttons with their names below, points.
+const NAMED: f32 = 34.0;
+
 /// What the view remembers.
 #[derive(Clone, Debug, Default)]
 pub struct ClarinetView {
@@ -67,6 +70,7 @@ impl ClarinetView {
         let painter = ui.painter_at(area.expand(2.0));
         let body = Body::new(file, area);
         let wave = wave_rect(area, &body);
+        ruler(&painter, c, area, body.scale);
         painter.text(area.left_top(), Align2::LEFT_TOP, "sound pressure along the bore", theme::small(), c.quiet);
         standing(&painter, c, &body, wave, &snapshot.standing);
         body.paint(&painter, c, &snapshot.standing);
@@ -74,10 +78,11 @@ impl ClarinetView {
         for (hole, tone_hole) in file.holes.iter().enumerate() {
             let opening = match &self.tried {
                 Some(tried) => f32::from(tried[hole]),
-                None => snapshot.openings.get(hole).copied().unwrap_or(0.0),
+                None => chart::share(snapshot.openings.get(hole).copied().unwrap_or(0.0)),
             };
             let at = body.hole(tone_hole);
-            let response = button(ui, buttons[hole], tone_hole, opening);
+            let is_named = area.width() >= NAMED * file.holes.len() as f32;
+            let response = button(ui, buttons[hole], tone_hole, opening, is_named);
             let on_bore = ui.interact(at.rect.expand2(vec2(2.0, 6.0)), response.id.with("bore"), Sense::CLICK);
             let is_hot = response.hovered() || on_bore.hovered() || response.has_focus();
             leader(&painter, c, at.foot, buttons[hole], is_hot, opening);
@@ -130,6 +135,8 @@ impl ClarinetView {
         });
         egui::ScrollArea::vertical().id_salt("picker").auto_shrink([false, false]).show(ui, |ui| {
             ui.spacing_mut().item_spacing = vec2(3.0, 4.0);
+            // The longest register on one line.
+            let chip_width = ((ui.available_width() - 72.0) / 14.0 - 3.0).clamp(28.0, 38.0);
             for register in REGISTERS {
                 let of_register = file.fingerings.iter().enumerate().filter(|(_, f)| f.register == register);
                 if of_register.clone().next().is_none() {
@@ -143,7 +150,7 @@ impl ClarinetView {
                         let alternate = if first == Some(index) { "" } else { "'" };
                         let name = format!("{}{alternate}", note_name(fingering.written.0));
                         let is_here = shown == Some(index);
-                        let response = chip(ui, c, &name, is_here);
+                        let response = chip(ui, c, &name, chip_width, is_here);
                         response.widget_info(|| {
                             WidgetInfo::selected(Role::RadioButton, true, is_here, format!("Fingering {name}"))
                         });
@@ -167,7 +174,7 @@ fn wave_rect(area: Rect, body: &Body<'_>) -> Rect {
 fn hole_buttons(area: Rect, holes: usize) -> Vec<Rect> {
     let width = area.width() / holes.max(1) as f32;
     let size = width.min(24.0) - 3.0;
-    let room = if width > 30.0 { 24.0 } else { 2.0 };
+    let room = if width >= NAMED { 24.0 } else { 2.0 };
     (0..holes)
         .map(|hole| {
             let x = area.left() + (hole as f32 + 0.5) * width;
@@ -177,7 +184,7 @@ fn hole_buttons(area: Rect, holes: usize) -> Vec<Rect> {
 }
 
 /// What the fingers see: full is covered.
-fn button(ui: &mut Ui, rect: Rect, hole: &ToneHole, opening: f32) -> Response {
+fn button(ui: &mut Ui, rect: Rect, hole: &ToneHole, opening: f32, is_named: bool) -> Response {
     let c = Colours::here(ui);
     let response = ui.interact(rect, ui.scope_id().with(("hole", &hole.name)), Sense::click());
     let painter = ui.painter();
@@ -201,7 +208,7 @@ fn button(ui: &mut Ui, rect: Rect, hole: &ToneHole, opening: f32) -> Response {
         painter.circle_stroke(rect.center(), radius + 3.0, Stroke::new(1.5, c.accent));
     }
     let (first, second) = hole.name.split_once('_').unwrap_or((&hole.name, ""));
-    if rect.width() > 20.0 {
+    if is_named {
         let font = FontId::proportional(9.0);
         let below = rect.center_bottom() + vec2(0.0, 2.0);
         painter.text(below, Align2::CENTER_TOP, first, font.clone(), c.quiet);
@@ -213,8 +220,8 @@ fn button(ui: &mut Ui, rect: Rect, hole: &ToneHole, opening: f32) -> Response {
 }
 
 /// A small button of the picker.
-fn chip(ui: &mut Ui, c: &Colours, name: &str, is_here: bool) -> Response {
-    let (rect, response) = ui.allocate_exact_size(vec2(38.0, 22.0), Sense::click());
+fn chip(ui: &mut Ui, c: &Colours, name: &str, width: f32, is_here: bool) -> Response {
+    let (rect, response) = ui.allocate_exact_size(vec2(width, 22.0), Sense::click());
     let fill = match (is_here, response.hovered()) {
         (true, _) => c.accent,
         (false, true) => c.hovered,
@@ -257,6 +264,18 @@ fn leader(painter: &Painter, c: &Colours, foot: Pos2, button: Rect, is_hot: bool
     painter.add(Shape::line(vec![foot, knee, button.center_top()], Stroke::new(if is_hot { 1.5 } else { 1.0 }, colour)));
 }
 
+/// How long ten centimetres are here.
+fn ruler(painter: &Painter, c: &Colours, area: Rect, scale: f32) {
+    let (right, y) = (area.right() - 2.0, area.top() + 6.0);
+    let left = right - 0.1 * scale;
+    let stroke = Stroke::new(1.0, c.quiet);
+    painter.hline(left..=right, y, stroke);
+    for x in [left, right] {
+        painter.vline(x, y - 3.0..=y + 3.0, stroke);
+    }
+    painter.text(pos2(left - 6.0, y), Align2::RIGHT_CENTER, "10 cm", theme::small(), c.quiet);
+}
+
 /// The sound pressure, aligned with the bore.
 fn standing(painter: &Painter, c: &Colours, body: &Body<'_>, rect: Rect, wave: &[(f32, f32)]) {
     if rect.height() < 16.0 {
@@ -267,14 +286,14 @@ fn standing(painter: &Painter, c: &Colours, body: &Body<'_>, rect: Rect, wave: &
         chart::word_at(painter, rect.center(), Align2::CENTER_CENTER, "no standing wave known for these holes", c.quiet);
         return;
     }
-    let most = wave.iter().map(|&(_, magnitude)| magnitude).fold(1e-6, f32::max);
+    let most = loudest(wave);
     let point = |&(x_m, magnitude): &(f32, f32)| {
-        pos2(body.x(f64::from(x_m)), rect.bottom() - magnitude / most * (rect.height() - 4.0))
+        pos2(body.x(f64::from(x_m)), rect.bottom() - chart::share(magnitude / most) * (rect.height() - 4.0))
     };
     let mut mesh = Mesh::default();
     for (index, of) in wave.iter().enumerate() {
         let at = point(of);
-        let (fill, clear) = (c.breath.gamma_multiply(0.35 * of.1 / most), Color32::TRANSPARENT);
+        let (fill, clear) = (c.breath.gamma_multiply(0.35 * chart::share(of.1 / most)), Color32::TRANSPARENT);
         mesh.colored_vertex(at, fill);
         mesh.colored_vertex(pos2(at.x, rect.bottom()), clear);
         if index > 0 {
@@ -285,6 +304,11 @@ fn standing(painter: &Painter, c: &Colours, body: &Body<'_>, rect: Rect, wave: &
     }
     painter.add(mesh);
     painter.add(Shape::line(wave.iter().map(point).collect(), Stroke::new(2.0, c.breath)));
+}
+
+/// Largest magnitude.
+fn loudest(wave: &[(f32, f32)]) -> f32 {
+    wave.iter().map(|&(_, magnitude)| magnitude).filter(|x| x.is_finite()).fold(1e-6, f32::max)
 }
 
 /// The body on the screen: one scale both ways.
@@ -341,10 +365,10 @@ impl<'a> Body<'a> {
     }
 
     fn paint(&self, painter: &Painter, c: &Colours, wave: &[(f32, f32)]) {
+        let most = loudest(wave);
         let level = |x_m: f64| {
-            let most = wave.iter().map(|w| w.1).fold(1e-6, f32::max);
             let at = wave.partition_point(|w| f64::from(w.0) < x_m).min(wave.len().saturating_sub(1));
-            wave.get(at).map_or(0.0, |w| w.1 / most)
+            wave.get(at).map_or(0.0, |w| chart::share(w.1 / most))
         };
         let mut wood = Mesh::default();
         let mut air = Mesh::default();

@@ -118,7 +118,7 @@ pub fn needle(ui: &mut Ui, snapshot: &Snapshot, width: f32) {
     // Five cents either way: what a listener takes for in tune.
     let near = Rect::from_min_max(pos2(at(-5.0), line_y), pos2(at(5.0), line_y + 3.0));
     painter.rect_filled(near, CornerRadius::ZERO, c.speaks);
-    let text = match snapshot.heard.cents {
+    let text = match snapshot.heard.cents.filter(|cents| cents.is_finite()) {
         Some(cents) => {
             let colour = if cents.abs() <= 5.0 { c.speaks } else { c.beats };
             let x = at(cents);

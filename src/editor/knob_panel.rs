@@ -56,7 +56,7 @@ impl KnobPanel {
         let c = Colours::here(ui);
         let (width, height) = (ui.available_width(), ui.available_height());
         ui.spacing_mut().item_spacing = vec2(GAP, GAP);
-        let top = (0.44 * height).clamp(150.0, 250.0);
+        let top = (0.44 * height).clamp(126.0, 250.0);
         ui.horizontal_top(|ui| {
             ui.spacing_mut().item_spacing = vec2(GAP, 4.0);
             group(ui, c, vec2(0.56 * width - 0.5 * GAP, top), |ui| devices(ui, hands, snapshot, actions));
@@ -193,7 +193,8 @@ fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
         (false, false) if knob.is_live => ("ARM", "the knob may then push back", c.accent, c.on_accent),
         (false, false) => ("ARM", "no knob to arm yet", c.raised, c.quiet),
     };
-    let height = (ui.available_height() - 132.0).clamp(46.0, 84.0);
+    let has_line = ui.available_height() > 160.0;
+    let height = (ui.available_height() - if has_line { 118.0 } else { 66.0 }).clamp(42.0, 84.0);
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::click());
     let painter = ui.painter();
     let round = CornerRadius::same(theme::PANEL_RADIUS);
@@ -202,21 +203,26 @@ fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     if response.has_focus() {
         painter.rect_stroke(rect.shrink(2.0), round, Stroke::new(2.0, c.ink), egui::StrokeKind::Inside);
     }
-    painter.text(rect.center() - vec2(0.0, 8.0), Align2::CENTER_CENTER, title, FontId::proportional(24.0), ink);
-    painter.text(rect.center() + vec2(0.0, 16.0), Align2::CENTER_CENTER, line, theme::small(), ink);
+    let is_low = height < 60.0;
+    let (up, size) = if is_low { (7.0, 18.0) } else { (8.0, 24.0) };
+    painter.text(rect.center() - vec2(0.0, up), Align2::CENTER_CENTER, title, FontId::proportional(size), ink);
+    let below = rect.center() + vec2(0.0, if is_low { 11.0 } else { 16.0 });
+    painter.text(below, Align2::CENTER_CENTER, line, theme::small(), ink);
     let name = if is_wanted || knob.is_armed { "Disarm the knob" } else { "Arm the knob" };
     response.widget_info(|| WidgetInfo::selected(Role::Switch, true, knob.is_armed, name));
     if response.clicked() {
         hands.put("arm", f32::from(!(is_wanted || knob.is_armed)));
     }
     response.on_hover_ui(|ui| teach(ui, "arm", ""));
-    ui.add_space(4.0);
     slider(ui, hands, "ceil");
     let angle = knob.angle_deg.map_or_else(|| "\u{2013}".into(), |deg| format!("{deg:.0}\u{b0}"));
     let torque = knob.torque_mnm.map_or_else(|| "\u{2013}".into(), |mnm| format!("{mnm:.0} mNm"));
     ui.spacing_mut().item_spacing.y = 2.0;
     let quiet = |text: String| RichText::new(text).font(theme::small()).color(c.quiet);
     ui.label(quiet(format!("knob at {angle}, {torque}")));
+    if !has_line {
+        return;
+    }
     let late = |us: u32| 1e-3 * f64::from(us);
     let (median, worst) = (late(knob.jitter_us.0), late(knob.jitter_us.1));
     ui.label(quiet(format!("{:.0} positions a second, late by {median:.1} ms, at worst {worst:.1}", knob.rate_hz)));

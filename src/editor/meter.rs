@@ -47,12 +47,19 @@ pub const LEGEND: &str = "speaks (p_on): the note begins here, coming up or goin
     closes: here the resting reed would be shut.\n\
     chokes (p_off): above this the reed stays shut and nothing sounds.";
 
+/// What a scale is tinted with: from where, to where, how.
+pub fn bands(speaks: f32, beats: f32, closes: f32, end: f32, c: &Colours) -> [(f32, f32, Color32); 3] {
+    let closes = closes.max(beats).min(end.max(beats));
+    [(speaks, beats, c.speaks), (beats, closes, c.beats), (closes, end.max(closes), c.closes)]
+        .map(|(from, to, colour)| (from, to, colour.gamma_multiply(0.14)))
+}
+
 /// The column, as high as its place.
 pub fn column(ui: &mut Ui, snapshot: &Snapshot) {
     let c = Colours::here(ui);
     let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
     let full = full_kpa(snapshot);
-    let kpa = snapshot.mouth_kpa.max(0.0);
+    let kpa = snapshot.mouth_now_kpa();
     let marks_of = snapshot.marks();
     let (word, colour) = state(&marks_of, kpa, c);
 
@@ -69,9 +76,9 @@ pub fn column(ui: &mut Ui, snapshot: &Snapshot) {
     let speaks = marks_of.speaks_kpa.unwrap_or(marks_of.closes_kpa);
     let beats = marks_of.beats_kpa.unwrap_or(marks_of.closes_kpa).max(speaks);
     let end = marks_of.chokes_kpa.unwrap_or(full).min(full);
-    for (from, to, colour) in [(speaks, beats, c.speaks), (beats, end, c.beats)] {
+    for (from, to, colour) in bands(speaks, beats, marks_of.closes_kpa, end, c) {
         let band = Rect::from_min_max(pos2(scale.left(), y(to)), pos2(scale.right(), y(from)));
-        painter.rect_filled(band, CornerRadius::ZERO, colour.gamma_multiply(0.16));
+        painter.rect_filled(band, CornerRadius::ZERO, colour);
     }
     let air = Rect::from_min_max(pos2(scale.left(), y(kpa)), scale.right_bottom());
     painter.rect_filled(air, round, c.breath.gamma_multiply(0.85));

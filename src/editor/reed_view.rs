@@ -124,7 +124,7 @@ impl ReedView {
     fn flow(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
         let c = Colours::here(ui);
         let picture = Picture::of(&snapshot.settings);
-        let kpa = f64::from(snapshot.mouth_kpa);
+        let kpa = f64::from(snapshot.mouth_now_kpa());
         let wanted = (
             even(1.4 * picture.closure_kpa().max(1.5 * kpa), 2.0),
             even(1.3 * picture.peak()[1].max(0.6 * picture.flow_cm3s), 50.0),
@@ -158,6 +158,11 @@ impl ReedView {
             }
         });
         chart::names(ui, &transform, &marks);
+        if ui.available_width() > 300.0 && transform.frame().height() > 200.0 {
+            let sounding = if is_sounding { "the sounding reed, one period" } else { "the reed is still" };
+            let lines = [("the reed's law", c.accent), (sounding, c.breath), ("circle: the still reed at this breath", c.quiet)];
+            chart::legend(ui, &transform, 0.34, &lines);
+        }
         self.handles(ui, hands, snapshot, &picture, &transform, (right, top));
     }
 
@@ -238,7 +243,7 @@ fn law_curve(plot: &mut PlotUi<'_>, picture: &Picture, right: f64, c: &Colours) 
 /// The last period, and a fainter trace of those before it.
 fn orbit(plot: &mut PlotUi<'_>, snapshot: &Snapshot, period: std::ops::Range<usize>, c: &Colours) {
     let scope = &snapshot.scope;
-    let mouth = f64::from(snapshot.mouth_kpa);
+    let mouth = f64::from(snapshot.mouth_now_kpa());
     let point = |index: usize| {
         [mouth - f64::from(scope.mouthpiece_kpa[index]), f64::from(scope.flow_cm3s[index])]
     };

@@ -90,6 +90,11 @@ impl Snapshot {
         (self.settings.closing_pa() * 1e-3) as f32
     }
 
+    /// Mouth pressure, kPa, whatever stands there: 0..=100.
+    pub fn mouth_now_kpa(&self) -> f32 {
+        if self.mouth_kpa.is_finite() { self.mouth_kpa.clamp(0.0, 100.0) } else { 0.0 }
+    }
+
     /// The fingering in place.
     pub fn fingering(&self) -> Option<&Fingering> {
         self.instrument.fingerings.get(self.fingering)

@@ -3,7 +3,7 @@
 //! A closed pipe favours the odd harmonics, which is why a clarinet's low register sounds hollow; the even ones come with
 //! the beating reed, the bell and the tone holes.
 
-use egui::{Align2, Ui, vec2};
+use egui::{Align2, Ui};
 use egui_plot::Points;
 
 use crate::editor::chart;
@@ -12,7 +12,6 @@ use crate::editor::controls::{Hands, choice, heading, slider};
 use crate::editor::header;
 use crate::editor::listener::FLOOR_DB;
 use crate::editor::snapshot::Snapshot;
-use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
 
 /// Highest harmonic marked.
@@ -87,12 +86,7 @@ fn spectrum(ui: &mut Ui, snapshot: &Snapshot) {
             plot.points(points.color(colour).allow_hover(false));
         }
     });
-    let frame = *transform.frame();
-    let painter = ui.painter_at(frame);
-    for (line, (word, colour)) in [("odd harmonics", c.breath), ("even harmonics", c.even)].into_iter().enumerate() {
-        let at = frame.right_top() + vec2(-8.0, 4.0 + 14.0 * line as f32);
-        painter.text(at, Align2::RIGHT_TOP, word, theme::small(), colour);
-    }
+    chart::legend(ui, &transform, 0.02, &[("odd harmonics", c.breath), ("even harmonics", c.even)]);
 }
 
 fn waves(ui: &mut Ui, snapshot: &Snapshot) {
@@ -112,25 +106,30 @@ fn waves(ui: &mut Ui, snapshot: &Snapshot) {
         values.map(|(n, &value)| [step_ms * n as f64 - from, f64::from(value)]).collect()
     };
     let largest = |values: &[f32], least: f64| values.iter().map(|x| f64::from(x.abs())).fold(least, f64::max);
-    let most = (1.1 * largest(&scope.mouthpiece_kpa, 0.5)).ceil();
-    let half = 0.5 * (ui.available_height() - GAP);
+    let mouth = f64::from(snapshot.mouth_now_kpa());
+    let most = 1.15 * largest(&scope.mouthpiece_kpa, 0.5).max(mouth);
+    // Two pictures where there is room for two.
+    let has_gap = ui.available_height() > 150.0;
+    let height = if has_gap { 0.5 * (ui.available_height() - GAP) - 10.0 } else { ui.available_height() };
     Chart {
         id: "mouthpiece wave",
         x: (-from, 0.0),
         y: (-most, most),
-        x_name: "",
+        x_name: if has_gap { "" } else { "ms ago" },
         y_name: "pressure in the mouthpiece, kPa",
-        height: half - 10.0,
+        height,
         label: "Pressure in the mouthpiece over time",
     }
     .show(ui, |plot| {
-        let mouth = f64::from(snapshot.mouth_kpa);
         plot.line(chart::curve(vec![[-from, mouth], [0.0, mouth]], c.speaks.gamma_multiply(0.8), 1.0).id("mouth"));
         if mouth > 0.05 {
-            chart::word(plot, [-0.01 * from, mouth], Align2::RIGHT_BOTTOM, "mouth", c.speaks);
+            chart::word(plot, [-from, mouth], Align2::LEFT_BOTTOM, " mouth", c.speaks);
         }
         plot.line(chart::curve(track(&scope.mouthpiece_kpa), c.breath, 1.6).id("wave"));
     });
+    if !has_gap {
+        return;
+    }
     Chart {
         id: "gap",
         x: (-from, 0.0),

@@ -73,11 +73,7 @@ fn drags_types_and_resets(window: &mut Window, id: &str) {
     window.harness.run();
     assert_eq!(look(window).value, look(window).default, "{id} does not reset by Ctrl-click");
     window.drag(centre, vec2(way, 0.0));
-    for _ in 0..2 {
-        window.harness.drag_at(centre);
-        window.harness.drop_at(centre);
-    }
-    window.harness.run();
+    window.double_click(centre);
     assert_eq!(look(window).value, look(window).default, "{id} does not reset by a double click");
 
     // By text: what stands at three quarters of the way.
@@ -234,11 +230,7 @@ fn h_and_k_are_taken_by_the_hand() {
     window.harness.run();
     assert!(window.host.plain("reedh") < before);
     let place = at(&window, peak);
-    for _ in 0..2 {
-        window.harness.drag_at(place);
-        window.harness.drop_at(place);
-    }
-    window.harness.run();
+    window.double_click(place);
     assert_eq!(window.host.value("reedh"), window.host.look("reedh").unwrap().default);
 }
 
