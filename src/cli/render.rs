@@ -11,6 +11,7 @@ use crate::event::{Event, Timed};
 use crate::instrument::model::internal_rate_hz;
 use crate::instrument::{Clarinet, Model, Probe, Settings};
 use crate::output::NewFile;
+use crate::reed::physical::P_REF_PA;
 use crate::render as player;
 use crate::render::breath::BreathCurve;
 use crate::render::breath::GAMMA_MAX;
@@ -20,7 +21,7 @@ use crate::render::wav::{Depth, Level, WavFile};
 use crate::touch::blower::{Blower, Blown, Hand};
 use crate::touch::feel::{Feels, NO_MOTOR};
 use crate::touch::take::Take;
-use crate::units::{SoundingNote, WrittenNote};
+use crate::units::{REFERENCE_RADIUS_M, SoundingNote, WrittenNote};
 
 use clap::{ArgGroup, Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -154,7 +155,8 @@ impl Render {
         score = score.with_tail(self.tail.unwrap_or(if one_note { 0.0 } else { 1.0 }), self.rate);
         self.refuse_same_file()?;
         let mut out = NewFile::create(&self.out, self.force)?;
-        let mut probe = self.probe.as_deref().map(|path| ProbeTable::open(path, self)).transpose()?;
+        let mut probe =
+            self.probe.as_deref().map(|path| ProbeTable::open(path, self, &settings, &model)).transpose()?;
 
         let mut clarinet = Clarinet::new(model, f64::from(self.rate));
         clarinet.set_settings(&settings);
@@ -363,13 +365,20 @@ struct ProbeTable {
 }
 
 impl ProbeTable {
-    fn open(path: &Path, render: &Render) -> Result<Self, Failure> {
+    fn open(path: &Path, render: &Render, settings: &Settings, model: &Model) -> Result<Self, Failure> {
         let header = "t_s,gamma,opening_unit,flow_m3s,p_mouthpiece_pa,p_radiated_pa";
         let mut table = Table::open(path, render.force, header)?;
         let rate_hz = internal_rate_hz(f64::from(render.rate));
         table.comment(format_args!(
             "s, mouth over closing pressure, opening over rest opening, m3/s, Pa, Pa at 1 m; {rate_hz} Hz / {}",
             render.probe_every
+        ))?;
+        // With these a reader puts the columns on the axes of the reed law.
+        table.comment(format_args!(
+            "closing pressure {} Pa, reference pressure {P_REF_PA} Pa, zeta {}, Zc {:.6e} Pa s/m3",
+            settings.closing_pa(),
+            settings.zeta,
+            model.air.z_c(REFERENCE_RADIUS_M)
         ))?;
         Ok(Self { table, every: u64::from(render.probe_every), rate_hz, seen: 0, failed: None })
     }
