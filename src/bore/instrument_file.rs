@@ -17,6 +17,7 @@ use crate::units::midi_of_name;
 mod error;
 mod limits;
 mod raw;
+mod text;
 
 pub use error::InstrumentError;
 use limits::*;
@@ -31,6 +32,8 @@ pub const REGISTERS: [&str; 4] = ["chalumeau", "throat", "clarion", "altissimo"]
 
 /// Cones that meet within this distance are taken as touching, m.
 const CONTACT_M: f64 = 1e-6;
+/// What lengths may lose by being written with few digits, m.
+const ROUNDING_M: f64 = 2e-9;
 
 /// One instrument: Design, in the words of the house. SI units.
 #[derive(Clone, Debug, PartialEq)]
@@ -211,7 +214,8 @@ impl InstrumentFile {
                 return Err(InstrumentError::HoleOffBore { place, given_mm, length_mm });
             }
             let (radius_m, bore_radius_m) = (hole.diameter_mm / 2e3, self.radius_at(x_m));
-            if radius_m > bore_radius_m {
+            // A hole as wide as the bore stays so when both are rounded to what a file holds.
+            if radius_m > bore_radius_m + ROUNDING_M {
                 let (given_mm, bore_mm) = (hole.diameter_mm, in_mm(2.0 * bore_radius_m));
                 return Err(InstrumentError::HoleTooWide { place, given_mm, bore_mm });
             }
