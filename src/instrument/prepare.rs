@@ -114,9 +114,19 @@ fn numbers(all: &mut Vec<u8>, numbers: &[f64]) {
 
 /// All of a file that can be heard, for a hash. Names and remarks are left out; a new field must be decided about here.
 fn describe(all: &mut Vec<u8>, file: &InstrumentFile) {
-    let InstrumentFile { name: _, source: _, transposition, reed_volume_m3, bore, holes, fingerings } = file;
+    let InstrumentFile {
+        name: _,
+        source: _,
+        transposition,
+        reed_volume_m3,
+        nominal_radius_m,
+        bore,
+        holes,
+        fingerings,
+    } = file;
     all.extend(transposition.to_le_bytes());
-    numbers(all, &[*reed_volume_m3, bore.len() as f64, holes.len() as f64, fingerings.len() as f64]);
+    numbers(all, &[*reed_volume_m3, *nominal_radius_m]);
+    numbers(all, &[bore.len() as f64, holes.len() as f64, fingerings.len() as f64]);
     for BoreSegment { part: _, x_start_m, x_end_m, r_start_m, r_end_m } in bore {
         numbers(all, &[*x_start_m, *x_end_m, *r_start_m, *r_end_m]);
     }
@@ -161,7 +171,7 @@ impl Prepared {
             && file.fingerings.iter().zip(&self.note).all(|(is, note)| is.written.0 == note.written)
             && self.cells.hole_junctions.len() == file.holes.len();
         let tuning = TuningTable { notes: self.note };
-        fits.then(|| Model::assemble(file.clone(), self.cells, tuning, self.a4_hz, self.scale))
+        fits.then(|| Model::assemble(file.scaled(self.scale), self.cells, tuning, self.a4_hz, self.scale))
     }
 }
 
@@ -339,6 +349,7 @@ mod tests {
         assert!(!changed(|file| file.source.push('.')));
         assert!(changed(|file| file.transposition += 1));
         assert!(changed(|file| file.reed_volume_m3 *= 1.001));
+        assert!(changed(|file| file.nominal_radius_m *= 1.001));
         assert!(changed(|file| file.bore[0].r_end_m *= 1.001));
         assert!(changed(|file| file.holes[1].register = true));
         assert!(changed(|file| file.holes[1].chimney_m *= 1.001));
