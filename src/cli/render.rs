@@ -10,7 +10,6 @@ use crate::reed::physical::P_REF_PA;
 use crate::render as player;
 use crate::render::score::Score;
 use crate::render::wav::{Depth, Level, WavFile};
-use crate::units::REFERENCE_RADIUS_M;
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -183,7 +182,7 @@ impl ProbeTable {
             "closing pressure {} Pa, reference pressure {P_REF_PA} Pa, zeta {}, Zc {:.6e} Pa s/m3",
             prepared.settings.closing_pa(),
             prepared.settings.zeta,
-            prepared.model.air.z_c(REFERENCE_RADIUS_M)
+            prepared.model.air.z_c(prepared.model.file.nominal_radius_m)
         ))?;
         Ok(Self { table, every: u64::from(render.probe_every), rate_hz, seen: 0, failed: None })
     }
