@@ -248,13 +248,8 @@ pub fn fitted(
     on: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Model, BuildError> {
     let (rate_hz, a4_hz) = wanted.checked()?;
-    if on(Progress::Fitting(0.0)).is_break() {
-        return Err(BuildError::Cancelled);
-    }
-    let cells = fit::fit(&wanted.file, &Air::default(), rate_hz)?;
-    if on(Progress::Fitting(1.0)).is_break() {
-        return Err(BuildError::Cancelled);
-    }
+    let cells = fit::fit(&wanted.file, &Air::default(), rate_hz, &mut |share| on(Progress::Fitting(share)))?
+        .ok_or(BuildError::Cancelled)?;
     Ok(untuned(&wanted.file, cells, a4_hz, 1.0))
 }
 
