@@ -94,7 +94,12 @@ impl Wanted {
 
     /// Everything the prepared instrument depends on, and the version of what prepares it.
     pub fn key(&self) -> Result<Key, BuildError> {
+        self.key_of(b"tuned")
+    }
+
+    fn key_of(&self, what: &[u8]) -> Result<Key, BuildError> {
         let mut all = Vec::with_capacity(8_192);
+        all.extend(what);
         all.extend(VERSION.to_le_bytes());
         all.extend(OWN_NUMBERS.as_bytes());
         numbers(&mut all, &[self.internal_rate_hz()?, self.tuned_a4_hz()]);
@@ -234,8 +239,7 @@ pub fn ready(wanted: &Wanted, cache: Option<&Cache>) -> Result<Option<Model>, Bu
         }
     }
     let Some(cache) = cache else { return Ok(None) };
-    let kept = cache.get(&wanted.key()?);
-    Ok(kept.and_then(|text| toml::from_str::<Prepared>(&text).ok()?.model(&wanted.file)))
+    Ok(kept(cache, &wanted.key()?, &wanted.file))
 }
 
 /// The instrument at once: cut, not fitted, untuned. Allocates.
@@ -247,15 +251,46 @@ pub fn rough(wanted: &Wanted) -> Result<Model, BuildError> {
     Ok(untuned(file, cells, a4_hz, scale))
 }
 
-/// The instrument fitted but not tuned. Takes seconds; no cache. Allocates.
-pub fn fitted(
-    wanted: &Wanted,
+/// The bore exactly as the file has it, fitted, for A4 = 440 Hz: to look at, and to play untuned. Takes seconds the first
+/// time. Allocates.
+pub fn bore(
+    file: &InstrumentFile,
+    host_rate_hz: f64,
+    quality: Quality,
+    cache: Option<&Cache>,
     on: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Model, BuildError> {
+    let wanted = Wanted { quality, ..Wanted::new(file.clone(), host_rate_hz) };
+    if let Some(model) = ready(&wanted, cache)?.filter(|model| model.scale == 1.0) {
+        let tuning = TuningTable::untuned(file);
+        return Ok(Model { tuning, ..model });
+    }
+    let (rate_hz, a4_hz) = wanted.checked()?;
+    let key = wanted.key_of(b"as built")?;
+    if let Some(model) = cache.and_then(|cache| kept(cache, &key, file)) {
+        return Ok(model);
+    }
+    let model = fitted_at(file, 1.0, rate_hz, a4_hz, on)?;
+    keep(cache, &key, &model);
+    Ok(model)
+}
+
+/// The instrument fitted but not tuned, its bore scaled for its pitch as far as theory can tell.
+fn fitted(wanted: &Wanted, on: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>) -> Result<Model, BuildError> {
     let (rate_hz, a4_hz) = wanted.checked()?;
     on_or_cancelled(on, Progress::Fitting(0.0))?;
     let scale = scale::by_theory(&wanted.file, &Air::default(), a4_hz);
     fitted_at(&wanted.file, scale, rate_hz, a4_hz, on)
+}
+
+fn kept(cache: &Cache, key: &Key, file: &InstrumentFile) -> Option<Model> {
+    toml::from_str::<Prepared>(&cache.get(key)?).ok()?.model(file)
+}
+
+fn keep(cache: Option<&Cache>, key: &Key, model: &Model) {
+    if let (Some(cache), Ok(text)) = (cache, toml::to_string(&Prepared::of(model))) {
+        cache.put(key, &text);
+    }
 }
 
 fn fitted_at(
@@ -293,9 +328,7 @@ pub fn make(
         return Ok(model);
     }
     let model = anew(wanted, on)?;
-    if let (Some(cache), Ok(text)) = (cache, toml::to_string(&Prepared::of(&model))) {
-        cache.put(&wanted.key()?, &text);
-    }
+    keep(cache, &wanted.key()?, &model);
     Ok(model)
 }
 
