@@ -14,6 +14,7 @@ mod impedance;
 mod knob;
 #[cfg(feature = "simulator")]
 mod knob_sim;
+mod plot;
 mod reed;
 mod render;
 mod settings;
@@ -23,6 +24,7 @@ mod threshold;
 mod tune;
 
 use crate::bore::instrument_file::InstrumentError;
+use crate::figure::draw::DrawError;
 use crate::haptics::FeelRefused;
 use crate::instrument::BuildError;
 use crate::output::OutputError;
@@ -99,6 +101,8 @@ enum Failure {
     Score(#[from] ScoreError),
     #[error(transparent)]
     Output(#[from] OutputError),
+    #[error(transparent)]
+    Draw(#[from] DrawError),
     #[error(transparent)]
     Wav(#[from] WavError),
     #[error(transparent)]
