@@ -9,8 +9,8 @@ use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::lattice::LatticeCoeffs;
 use crate::instrument::tuning::TuningTable;
 use crate::reed::PhysicalReed;
-use crate::reed::physical::P_REF_PA;
-use crate::units::{Air, REFERENCE_RADIUS_M, SoundingNote};
+use crate::reed::physical::{P_REF_PA, REFERENCE_VOLUME_M3};
+use crate::units::{Air, SoundingNote};
 
 /// Lowest and highest host rate, Hz.
 pub const HOST_RATES_HZ: (f64, f64) = (22_050.0, 384_000.0);
@@ -37,7 +37,7 @@ pub struct Model {
     pub notes_hz: Vec<f64>,
     /// Register of each fingering: 1 chalumeau and throat, 2 clarion, 3 altissimo.
     pub registers: Vec<u8>,
-    /// Volume that the reference reed displaces, over section and speed of sound, s.
+    /// Volume that the instrument's reed displaces, over the nominal bore's section and the speed of sound, s.
     pub swept_s: f64,
 }
 
@@ -127,8 +127,10 @@ impl Model {
                 _ => 1,
             })
             .collect();
-        let section = std::f64::consts::PI * REFERENCE_RADIUS_M * REFERENCE_RADIUS_M;
-        let swept_s = PhysicalReed::reference().equivalent_volume_m3(&air) / (section * air.c);
+        let section = std::f64::consts::PI * file.nominal_radius_m * file.nominal_radius_m;
+        // The instrument's own reed, by the ratio to the reference: exactly that of the reference on a B flat clarinet.
+        let larger = file.reed_volume_m3 / REFERENCE_VOLUME_M3;
+        let swept_s = PhysicalReed::reference().equivalent_volume_m3(&air) / (section * air.c) * larger;
         Self {
             lowest_hz: fit::lowest_hz(&file),
             notes_hz,

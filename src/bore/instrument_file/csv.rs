@@ -34,6 +34,8 @@ pub struct ImportDetails {
     pub transposition: Option<i8>,
     /// Volume of air that moves with the reed, mm3.
     pub reed_volume_mm3: f64,
+    /// Bore that zeta and the reed's size refer to, mm; `None`: a B flat clarinet's.
+    pub nominal_diameter_mm: Option<f64>,
 }
 
 /// Why tables are not an instrument.
@@ -141,6 +143,7 @@ impl InstrumentFile {
         words.fingering = Some(fingerings.name.to_owned());
         words.transposition = Word::plain("transposition");
         words.reed_volume.name = "reed volume".to_owned();
+        words.nominal.name = "nominal diameter".to_owned();
         let bore = read_bore(bore, &mut words)?;
         let hole = read_holes(holes, &mut words)?;
         let names: Vec<&str> = hole.iter().map(|hole| hole.value.name.as_str()).collect();
@@ -150,6 +153,7 @@ impl InstrumentFile {
             source: details.source.clone(),
             transposition_semitones: details.transposition.map_or(sounding.unwrap_or(0), i64::from),
             reed_volume_mm3: details.reed_volume_mm3,
+            nominal_diameter_mm: details.nominal_diameter_mm,
             bore,
             hole,
             fingering,

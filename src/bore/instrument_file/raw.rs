@@ -19,6 +19,7 @@ pub(super) struct RawFile {
     pub(super) source: String,
     pub(super) transposition_semitones: i64,
     pub(super) reed_volume_mm3: f64,
+    pub(super) nominal_diameter_mm: Option<f64>,
     pub(super) bore: Vec<Lined<RawSegment>>,
     pub(super) hole: Vec<Lined<RawHole>>,
     pub(super) fingering: Vec<Lined<RawFingering>>,
@@ -33,6 +34,7 @@ impl RawFile {
             source: file.source,
             transposition_semitones: file.transposition_semitones,
             reed_volume_mm3: file.reed_volume_mm3,
+            nominal_diameter_mm: file.nominal_diameter_mm,
             bore: lined(file.bore, text),
             hole: lined(file.hole, text),
             fingering: lined(file.fingering, text),
@@ -64,6 +66,8 @@ struct TomlFile {
     source: String,
     transposition_semitones: i64,
     reed_volume_mm3: f64,
+    #[serde(default)]
+    nominal_diameter_mm: Option<f64>,
     bore: Vec<Spanned<RawSegment>>,
     #[serde(default)]
     hole: Vec<Spanned<RawHole>>,
