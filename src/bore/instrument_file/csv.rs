@@ -10,9 +10,10 @@ use std::path::PathBuf;
 use csv::StringRecord;
 
 use super::raw::{Lined, RawFile, RawFingering, RawHole, RawSegment};
-use super::words::{Unit, Word, Words};
+use super::words::{Place, Unit, Word, Words};
 use super::{HoleKind, InstrumentError, InstrumentFile};
-use crate::units::{WrittenNote, midi_of_name};
+use crate::bore::transfer_matrix::TransferMatrix;
+use crate::units::{Air, WrittenNote, cents, midi_of_name};
 
 /// One table: its name for messages, and its text.
 #[derive(Clone, Copy, Debug)]
@@ -147,18 +148,44 @@ impl InstrumentFile {
         let bore = read_bore(bore, &mut words)?;
         let hole = read_holes(holes, &mut words)?;
         let names: Vec<&str> = hole.iter().map(|hole| hole.value.name.as_str()).collect();
-        let (fingering, sounding) = read_chart(fingerings, &names, details.transposition, &mut words)?;
+        let chart = read_chart(fingerings, &names, details.transposition, &mut words)?;
         let raw = RawFile {
             name: details.name.clone(),
             source: details.source.clone(),
-            transposition_semitones: details.transposition.map_or(sounding.unwrap_or(0), i64::from),
+            transposition_semitones: details
+                .transposition
+                .map_or(chart.transposition.unwrap_or(0), i64::from),
             reed_volume_mm3: details.reed_volume_mm3,
             nominal_diameter_mm: details.nominal_diameter_mm,
             bore,
             hole,
-            fingering,
+            fingering: chart.notes,
         };
-        Ok(Self::from_raw(raw, &words)?)
+        let mut file = Self::from_raw(raw, &words)?;
+        if !chart.has_modes {
+            file.find_altissimo_modes();
+        }
+        Ok(file)
+    }
+
+    /// Gives each altissimo note the peak from the third on that is nearest to it: which one that is depends on the fingering.
+    fn find_altissimo_modes(&mut self) {
+        if self.fingerings.iter().all(|fingering| fingering.register != "altissimo") {
+            return;
+        }
+        let matrix = TransferMatrix::new(self, Air::default());
+        for index in 0..self.fingerings.len() {
+            let fingering = &self.fingerings[index];
+            let Some(sounding) = fingering.written.sounding(self.transposition) else { continue };
+            if fingering.register != "altissimo" {
+                continue;
+            }
+            let wanted_hz = sounding.frequency_hz(440.0);
+            let peaks = matrix.peaks(&fingering.open, self.reed_volume_m3, 12);
+            let off = |mode: &usize| cents(peaks[mode - 1].f_hz, wanted_hz).abs();
+            let nearest = (3..=peaks.len()).min_by(|a, b| off(a).total_cmp(&off(b)));
+            self.fingerings[index].mode = nearest.unwrap_or(3);
+        }
     }
 }
 
@@ -172,17 +199,18 @@ struct Table {
 impl Table {
     fn read(sheet: Sheet<'_>, example: &'static str) -> Result<Self, ImportError> {
         let file = sheet.name.to_owned();
+        let text = sheet.text.trim_start_matches('\u{feff}');
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .flexible(true)
             .trim(csv::Trim::All)
-            .from_reader(sheet.text.trim_start_matches('\u{feff}').as_bytes());
+            .from_reader(text.as_bytes());
         let wrong = |error| ImportError::Table { file: sheet.name.to_owned(), error };
         let columns: Vec<String> = reader.headers().map_err(wrong)?.iter().map(str::to_owned).collect();
         let mut rows = Vec::new();
         for record in reader.records() {
             let record = record.map_err(wrong)?;
-            let line = record.position().map_or(0, csv::Position::line);
+            let line = record.position().map_or(0, |at| line_of_record(text, at.byte() as usize));
             if record.len() != columns.len() {
                 let (given, expected) = (record.len(), columns.len());
                 return Err(ImportError::Fields { file, line, given, expected });
@@ -273,6 +301,19 @@ impl Table {
             self.field(line, length.index, given, "a number, with a point if it is no whole one")
         })
     }
+}
+
+/// Line, from 1, of the record the reader found beginning at `byte`: past the comments and empty lines before it, which the
+/// reader's own count passes over.
+fn line_of_record(text: &str, byte: usize) -> u64 {
+    let bytes = text.as_bytes();
+    let start = byte.min(bytes.len());
+    let before = bytes[..start].iter().filter(|&&byte| byte == b'\n').count();
+    let skipped = bytes[start..]
+        .split(|&byte| byte == b'\n')
+        .take_while(|line| line.starts_with(b"#") || line.iter().all(u8::is_ascii_whitespace))
+        .count();
+    (before + skipped + 1) as u64
 }
 
 /// A column that holds lengths.
@@ -396,6 +437,13 @@ fn read_holes(sheet: Sheet<'_>, words: &mut Words) -> Result<Vec<Lined<RawHole>>
             description: description.map(text).unwrap_or_default().to_owned(),
             name: called,
         };
+        // Before the chart is read, whose columns are named after holes.
+        let what = format!("hole {} ({})", holes.len() + 1, value.name);
+        let place = Place { file: Some(table.file.clone()), line: Some(line), what };
+        if holes.iter().any(|other: &Lined<RawHole>| other.value.name == value.name) {
+            let (place, what) = (place.to_string(), "hole".to_owned());
+            return Err(InstrumentError::Duplicate { place, what, name: value.name }.into());
+        }
         holes.push(Lined { line, value });
     }
     words.hole_name = Word::plain(&table.columns[name]);
@@ -416,13 +464,20 @@ const CHART_COLUMNS: [&str; 9] = [
     "fingers",
 ];
 
-/// The chart, and the transposition its sounding notes show.
+struct Chart {
+    notes: Vec<Lined<RawFingering>>,
+    /// What the sounding notes show, if there are any.
+    transposition: Option<i64>,
+    /// Whether a column says which peaks sound.
+    has_modes: bool,
+}
+
 fn read_chart(
     sheet: Sheet<'_>,
     holes: &[&str],
     wanted: Option<i8>,
     words: &mut Words,
-) -> Result<(Vec<Lined<RawFingering>>, Option<i64>), ImportError> {
+) -> Result<Chart, ImportError> {
     let table = Table::read(sheet, CHART_EXAMPLE)?;
     let (note, midi) = (table.optional(&["written_note"])?, table.optional(&["written_midi"])?);
     let written = match note.or(midi) {
@@ -497,11 +552,11 @@ fn read_chart(
             }
             transposition = Some(lower);
         }
-        let mode = match mode {
+        let sounds_at = match mode {
             Some(index) => text(index).parse::<u32>().map_err(|_| {
                 table.field(line, index, text(index), "1 to 12, the number of the impedance peak that sounds")
             })?,
-            // As a clarinet overblows.
+            // As a clarinet overblows; the altissimo is looked up when the bore is known.
             None => match text(register) {
                 "clarion" => 2,
                 "altissimo" => 3,
@@ -521,14 +576,14 @@ fn read_chart(
         let value = RawFingering {
             written: WrittenNote(plays).to_string(),
             register: text(register).to_owned(),
-            mode,
+            mode: sounds_at,
             open: open.join(" "),
             fingers: fingers.map(text).unwrap_or_default().to_owned(),
         };
         chart.push(Lined { line, value });
     }
     words.written = Word::plain(&table.columns[written]);
-    Ok((chart, transposition))
+    Ok(Chart { notes: chart, transposition, has_modes: mode.is_some() })
 }
 
 #[cfg(test)]
