@@ -15,6 +15,8 @@ mod instrument;
 mod knob;
 #[cfg(feature = "simulator")]
 mod knob_sim;
+mod play;
+mod plot;
 mod reed;
 mod render;
 mod settings;
@@ -25,6 +27,7 @@ mod tune;
 
 use crate::bore::cylinder::CylinderError;
 use crate::bore::instrument_file::{ImportError, InstrumentError};
+use crate::figure::draw::DrawError;
 use crate::haptics::FeelRefused;
 use crate::instrument::BuildError;
 use crate::output::OutputError;
@@ -106,6 +109,8 @@ enum Failure {
     Score(#[from] ScoreError),
     #[error(transparent)]
     Output(#[from] OutputError),
+    #[error(transparent)]
+    Draw(#[from] DrawError),
     #[error(transparent)]
     Wav(#[from] WavError),
     #[error(transparent)]

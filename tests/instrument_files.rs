@@ -174,14 +174,14 @@ fn messages_say_which_line_of_which_table() {
             HOLES,
             "0.155787",
             "0.855787",
-            "holes.csv, line 4: hole 1 (REG): x_m is 0.855787; the bore runs from 0 to 0.667587 m",
+            "holes.csv, line 4: hole 1 (REG): x_m is 0.855787; it must be inside the bore, which runs from 0 to 0.667587 m",
         ),
         (HOLES, "0.155787", "155.787", "this looks like millimetres: 155.787 mm = 0.155787 m"),
         (
             HOLES,
             "0.0015835",
             "0.015835",
-            "hole_radius_m is 0.015835; the radius of the bore there is 0.0074683 m",
+            "hole_radius_m is 0.015835; it must be at most 0.0074683 m, the radius of the bore there",
         ),
         (
             HOLES,

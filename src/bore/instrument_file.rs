@@ -253,14 +253,14 @@ impl InstrumentFile {
             }
             let length_m = self.length_m();
             // First, because then the length of the bore shows which unit was meant.
-            if !(hole.x_mm / 1e3 < length_m - CONTACT_M) {
-                return Err(InstrumentError::HoleOffBore {
+            if hole.x_mm / 1e3 >= length_m - CONTACT_M {
+                let (unit, end) = (words.x.unit(), words.x.given(length_m * 1e3));
+                let guess = words.x.guess(hole.x_mm, |x_mm| (0.05..0.99).contains(&(x_mm / 1e3 / length_m)));
+                return Err(InstrumentError::Value {
                     place: place.to_string(),
                     field: words.x.name.clone(),
                     given: words.x.given(hole.x_mm),
-                    length: words.x.given(length_m * 1e3),
-                    unit: words.x.unit(),
-                    guess: words.x.guess(hole.x_mm, |x_mm| (0.05..0.99).contains(&(x_mm / 1e3 / length_m))),
+                    expected: format!("inside the bore, which runs from 0 to {end} {unit}{guess}"),
                 });
             }
             within(&place, &words.x, hole.x_mm, &HOLE_POSITION)?;
@@ -270,13 +270,17 @@ impl InstrumentFile {
             let (radius_m, bore_radius_m) = (hole.diameter_mm / 2e3, self.radius_at(x_m));
             // A hole as wide as the bore stays so when both are rounded to what a file holds.
             if radius_m > bore_radius_m + ROUNDING_M {
-                return Err(InstrumentError::HoleTooWide {
+                let wide = &words.hole_width;
+                return Err(InstrumentError::Value {
                     place: place.to_string(),
-                    field: words.hole_width.name.clone(),
-                    given: words.hole_width.given(hole.diameter_mm),
-                    bore: words.hole_width.given(2e3 * bore_radius_m),
-                    unit: words.hole_width.unit(),
-                    width: words.hole_width.width(),
+                    field: wide.name.clone(),
+                    given: wide.given(hole.diameter_mm),
+                    expected: format!(
+                        "at most {} {}, the {} of the bore there",
+                        wide.given(2e3 * bore_radius_m),
+                        wide.unit(),
+                        wide.width()
+                    ),
                 });
             }
             holes.push(ToneHole {
@@ -380,7 +384,6 @@ fn segments(raw: Vec<Lined<RawSegment>>, words: &Words) -> Result<Vec<BoreSegmen
                     words.x_end.unit(),
                     words.x_start.name
                 ),
-                guess: String::new(),
             });
         }
         bore.push(BoreSegment {
@@ -481,12 +484,12 @@ mod tests {
             (
                 "x_mm = 155.787",
                 "x_mm = 855.787",
-                "hole 1 (REG): x_mm is 855.787; the bore runs from 0 to 667.587 mm",
+                "hole 1 (REG): x_mm is 855.787; it must be inside the bore, which runs from 0 to 667.587 mm",
             ),
             (
                 "diameter_mm = 3.167",
                 "diameter_mm = 31.67",
-                "hole 1 (REG): diameter_mm is 31.67; the diameter of the bore there is 14.9366 mm",
+                "hole 1 (REG): diameter_mm is 31.67; it must be at most 14.9366 mm, the diameter of the bore there",
             ),
             ("chimney_mm = 12.6", "chimney_mm = 0.0126", "this looks like metres: 0.0126 m = 12.6 mm"),
             ("name = \"TRILL4_B\"", "name = \"REG\"", "hole 2 (REG): hole REG appears twice"),

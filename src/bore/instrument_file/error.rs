@@ -16,8 +16,8 @@ pub enum InstrumentError {
     /// Not TOML, a missing or unknown key, or a value of the wrong kind; line and column are in the message.
     #[error("not an instrument file: {0}")]
     Syntax(#[from] toml::de::Error),
-    /// A number out of range.
-    #[error("{place}: {field} is {given}; it must be {expected}{guess}")]
+    /// A number out of range, a hole off the bore or wider than it.
+    #[error("{place}: {field} is {given}; it must be {expected}")]
     Value {
         /// Segment, hole, fingering or `the file`, with its line.
         place: String,
@@ -25,10 +25,8 @@ pub enum InstrumentError {
         field: String,
         /// Value as it stands in the file.
         given: f64,
-        /// The range, in the file's own unit.
+        /// The range, in the file's own unit, and the unit the number may have been meant in.
         expected: String,
-        /// The unit it may have been meant in, or empty.
-        guess: String,
     },
     /// A word that is not one of those allowed, or an empty or spaced name.
     #[error("{place}: {field} is {given:?}; it must be {expected}")]
@@ -68,42 +66,6 @@ pub enum InstrumentError {
         given: f64,
         /// The end of the one before (0 for the first).
         expected: f64,
-    },
-    /// A hole outside the bore.
-    #[error(
-        "{place}: {field} is {given}; the bore runs from 0 to {length} {unit} and a hole must be inside it{guess}"
-    )]
-    HoleOffBore {
-        /// The hole.
-        place: String,
-        /// Key or column in the file.
-        field: String,
-        /// Its position, in the file's unit.
-        given: f64,
-        /// Length of the bore.
-        length: f64,
-        /// The file's unit.
-        unit: &'static str,
-        /// The unit it may have been meant in, or empty.
-        guess: String,
-    },
-    /// A hole wider than the bore it opens.
-    #[error(
-        "{place}: {field} is {given}; the {width} of the bore there is {bore} {unit} and a hole must not be wider"
-    )]
-    HoleTooWide {
-        /// The hole.
-        place: String,
-        /// Key or column in the file.
-        field: String,
-        /// Its diameter or radius, in the file's unit.
-        given: f64,
-        /// That of the bore there.
-        bore: f64,
-        /// The file's unit.
-        unit: &'static str,
-        /// `diameter` or `radius`.
-        width: &'static str,
     },
     /// Two holes of one name, two fingerings of one note, or one hole twice in a fingering.
     #[error("{place}: {what} {name} appears twice; each must appear once")]

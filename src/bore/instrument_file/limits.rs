@@ -46,18 +46,18 @@ pub(super) fn within(place: &Place, word: &Word, value: f64, range: &Range) -> R
     let unit = word.unit();
     let zero = if range.or_zero { "0, or " } else { "" };
     let expected = format!(
-        "{zero}{} to {}{}{unit}{}",
+        "{zero}{} to {}{}{unit}{}{}",
         word.given(range.least),
         word.given(range.most),
         if unit.is_empty() { "" } else { " " },
-        range.after
+        range.after,
+        word.guess(value, |value| (range.likely.0..=range.likely.1).contains(&value)),
     );
     Err(InstrumentError::Value {
         place: place.to_string(),
         field: word.name.clone(),
         given: word.given(value),
         expected,
-        guess: word.guess(value, |value| (range.likely.0..=range.likely.1).contains(&value)),
     })
 }
 
