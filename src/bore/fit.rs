@@ -107,8 +107,9 @@ pub fn lowest_hz(file: &InstrumentFile) -> f64 {
     file.lowest().sounding(file.transposition).unwrap_or(SoundingNote(50)).frequency_hz(440.0)
 }
 
-/// What hears how much is done, 0..=1, and may end it.
+/// What hears how much is done, 0..=1, and may end it; and the same, kept.
 type OnProgress<'a> = &'a mut (dyn FnMut(f64) -> ControlFlow<()> + 'a);
+type Listener<'a> = Box<dyn FnMut(f64) -> ControlFlow<()> + 'a>;
 
 struct Problem<'a> {
     start: Cells,
@@ -118,7 +119,7 @@ struct Problem<'a> {
     groups: Vec<Group>,
     parameters: DVector<f64>,
     /// Told at every step; the count of them.
-    progress: RefCell<(Box<dyn FnMut(f64) -> ControlFlow<()> + 'a>, i32)>,
+    progress: RefCell<(Listener<'a>, i32)>,
 }
 
 /// Work on pieces of a list on all cores, each with its own part of `out`, split at the boundaries `widths` gives.
