@@ -1,6 +1,9 @@
 //! The bore: its measurements as data, its impedance in the frequency domain, its lattice in the time domain.
 
+pub mod bundled;
 pub mod cells;
+pub mod check;
+pub mod cylinder;
 pub mod fit;
 pub mod instrument_file;
 pub mod lattice;

@@ -152,7 +152,9 @@ impl Kept {
     /// The same inside its ranges.
     pub fn mended(self) -> Self {
         let d = Self::default();
-        let fix = |x: f32, (low, high): (f32, f32), default| if x.is_finite() { x.clamp(low, high) } else { default };
+        let fix = |x: f32, (low, high): (f32, f32), default| {
+            if x.is_finite() { x.clamp(low, high) } else { default }
+        };
         Self {
             size: (
                 fix(self.size.0, (LEAST_SIZE.0, 8_000.0), d.size.0),
@@ -172,6 +174,7 @@ pub struct State {
     history: History,
     compare: Compare,
     entry: Option<Entry>,
+    held: Vec<&'static str>,
     keyboard: Keyboard,
     reed: reed_view::ReedView,
     clarinet: clarinet_view::ClarinetView,
@@ -191,8 +194,10 @@ impl State {
     }
 
     /// Lets go of everything that is held: before the window closes.
-    pub fn close(&mut self) -> Vec<Action> {
+    pub fn close(&mut self, controls: &dyn Controls) -> Vec<Action> {
         let mut actions = Vec::new();
+        let Self { history, entry, held, .. } = self;
+        Hands { controls, history, entry, held }.let_go();
         self.keyboard.release(&mut actions);
         self.knob.end_test(&mut actions);
         self.clarinet.end_try(&mut actions);
@@ -204,10 +209,10 @@ impl State {
 /// Draws the window into `ui` and gives back what the user did.
 pub fn draw(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &Snapshot) -> Vec<Action> {
     let mut actions = Vec::new();
-    let State { kept, history, compare, entry, keyboard, reed, clarinet, knob, instrument } = state;
+    let State { kept, history, compare, entry, held, keyboard, reed, clarinet, knob, instrument } = state;
     theme::apply(ui, if kept.is_dark { Theme::Dark } else { Theme::Light });
     let c = theme::Colours::here(ui);
-    let mut hands = Hands { controls, history, entry };
+    let mut hands = Hands { controls, history, entry, held };
     let (width, height) = (ui.available_width(), ui.available_height());
     let is_small = width < 900.0 || height < 560.0;
     let tab = kept.tab;
@@ -216,11 +221,13 @@ pub fn draw(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &
     let line = Panel::top("tools").exact_size(if is_small { 44.0 } else { 52.0 }).show_separator_line(false);
     line.frame(ground(10, 2)).show(ui, |ui| header::tools(ui, kept, compare, &mut hands, snapshot));
     let line = Panel::top("tabs").exact_size(30.0).show_separator_line(true);
-    line.frame(Frame::new().fill(c.ground).inner_margin(Margin { left: 2, right: 10, top: 0, bottom: 0 })).show(ui, |ui| header::tabs(ui, kept, snapshot));
+    line.frame(Frame::new().fill(c.ground).inner_margin(Margin { left: 2, right: 10, top: 0, bottom: 0 }))
+        .show(ui, |ui| header::tabs(ui, kept, snapshot));
     let keys = (0.13 * height).clamp(52.0, 110.0);
     let line = Panel::bottom("keys").exact_size(keys + 10.0).show_separator_line(false);
     line.frame(ground(8, 5)).show(ui, |ui| keyboard.draw(ui, snapshot, &mut actions));
-    let line = Panel::right("meter").exact_size(if is_small { 96.0 } else { 112.0 }).show_separator_line(false);
+    let line =
+        Panel::right("meter").exact_size(if is_small { 96.0 } else { 112.0 }).show_separator_line(false);
     line.frame(ground(8, 8)).show(ui, |ui| meter::column(ui, snapshot));
     CentralPanel::default().frame(ground(8, 8)).show(ui, |ui| {
         if compare.is_blind() {
@@ -236,6 +243,10 @@ pub fn draw(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &
             Tab::Instrument => instrument.draw(ui, &mut hands, snapshot, &mut actions),
         }
     });
+    // A widget that vanished under the hand, with its view or in a blind comparison, ends nothing itself.
+    if !hands.held.is_empty() && !ui.input(|input| input.pointer.any_down() || input.pointer.any_released()) {
+        hands.let_go();
+    }
     actions
 }
 

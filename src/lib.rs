@@ -11,6 +11,7 @@ pub mod dsp;
 #[cfg(feature = "editor")]
 pub mod editor;
 pub mod event;
+pub mod figure;
 pub mod haptics;
 pub mod identity;
 pub mod instrument;

@@ -46,15 +46,16 @@ impl Window {
         let actions = Rc::new(RefCell::new(Vec::new()));
         let (h, s, a) = (host.clone(), snapshot.clone(), actions.clone());
         let kept = Kept { tab, size, ..Kept::default() };
-        let mut harness = Harness::builder().with_step_dt(1.0 / 60.0).with_size(egui::vec2(size.0, size.1)).build_ui_state(
-            move |ui, state: &mut State| {
-                // As a plugin does: settings of this very frame.
-                s.borrow_mut().settings = h.settings();
-                let done = draw(ui, state, &*h, &s.borrow());
-                a.borrow_mut().extend(done);
-            },
-            State::new(kept),
-        );
+        let mut harness =
+            Harness::builder().with_step_dt(1.0 / 60.0).with_size(egui::vec2(size.0, size.1)).build_ui_state(
+                move |ui, state: &mut State| {
+                    // As a plugin does: settings of this very frame.
+                    s.borrow_mut().settings = h.settings();
+                    let done = draw(ui, state, &*h, &s.borrow());
+                    a.borrow_mut().extend(done);
+                },
+                State::new(kept),
+            );
         harness.run();
         Self { harness, host, snapshot, actions }
     }

@@ -13,13 +13,14 @@
 //! | Zc, characteristic impedance with losses, Pa s/m3 | `z_c` |
 //! | t_i, t_a, inner and series length correction of a hole, m | `inner_m`, `series_m` |
 //! | b, a, h: radii of hole and bore, chimney height, m | `radius_m`, `bore_radius_m`, `chimney_m` |
-//! | Z/Zc(7.45 mm) | `over_zc` |
+//! | Z/Zc of the nominal bore | `over_zc` |
 
 mod standing;
 
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::f64::consts::TAU;
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::PoisonError;
@@ -28,7 +29,6 @@ use num_complex::Complex64;
 
 use crate::bore::instrument_file::InstrumentFile;
 use crate::units::Air;
-use crate::units::REFERENCE_RADIUS_M;
 
 const J: Complex64 = Complex64::new(0.0, 1.0);
 /// Longest cylinder a cone is cut into, m, and its largest change of radius, m. Halving both moves no peak of the
@@ -37,7 +37,7 @@ const PIECE: (f64, f64) = (2.5e-3, 2e-4);
 /// Frequencies kept; 8192 of them take about 25 MB for 24 holes.
 const KEPT: usize = 8192;
 /// Where peaks are looked for, Hz, and the grid of the search: a third of the narrowest resonance of a clarinet.
-const SEARCH_HZ: (f64, f64, f64) = (60.0, 6_000.0, 2.0);
+const SEARCH_HZ: (f64, f64, f64) = (20.0, 6_000.0, 2.0);
 
 /// One instrument in one air: Design for the frequency domain. Shared between threads freely.
 #[derive(Debug)]
@@ -49,6 +49,8 @@ pub struct TransferMatrix {
     spans: Vec<Vec<Piece>>,
     holes: Vec<Hole>,
     bell_radius_m: f64,
+    /// Bore that impedances are over the Zc of, m.
+    nominal_radius_m: f64,
     kept: Mutex<HashMap<u64, Arc<AtFrequency>>>,
 }
 
@@ -103,7 +105,7 @@ struct Matrix {
 pub struct Peak {
     /// Frequency, Hz.
     pub f_hz: f64,
-    /// |Z| there, over Zc of a 7.45 mm bore.
+    /// |Z| there, over Zc of the nominal bore.
     pub mag_over_zc: f64,
     /// Quality factor, `-(f/2) d arg Z / df` at the maximum.
     pub q: f64,
@@ -177,11 +179,12 @@ impl TransferMatrix {
         }
         // A hole past the end, which `InstrumentFile::parse` refuses, sits at the bell.
         spans.resize_with(holes.len() + 1, Vec::new);
-        let bell_radius_m = file.bore.last().map_or(REFERENCE_RADIUS_M, |segment| segment.r_end_m);
-        Self { air, radii_m, spans, holes, bell_radius_m, kept: Mutex::default() }
+        let bell_radius_m = file.bore.last().map_or(file.nominal_radius_m, |segment| segment.r_end_m);
+        let nominal_radius_m = file.nominal_radius_m;
+        Self { air, radii_m, spans, holes, bell_radius_m, nominal_radius_m, kept: Mutex::default() }
     }
 
-    /// Input impedance at the reed tip over Zc of a 7.45 mm bore.
+    /// Input impedance at the reed tip over Zc of the instrument's nominal bore.
     ///
     /// `f_hz` is taken into 0.1 Hz..100 kHz. `open[hole]` in the order of the file, missing ones closed. A reed volume
     /// above 0 (m3) is put in parallel at the tip. The first 8192 different frequencies are kept, so that a grid of
@@ -234,13 +237,49 @@ impl TransferMatrix {
         }
         (pressure, flow) = at.spans[0].apply(pressure, flow);
         flows.iter_mut().for_each(|into| *into /= pressure);
-        pressure / flow / self.air.z_c(REFERENCE_RADIUS_M)
+        pressure / flow / self.air.z_c(self.nominal_radius_m)
     }
 
     /// The first `count` impedance peaks of a fingering, see [`find_peaks`].
     pub fn peaks(&self, open: &[bool], reed_volume_m3: f64, count: usize) -> Vec<Peak> {
         let scan = |f_hz| self.impedance(f_hz, open, reed_volume_m3);
-        maxima(scan, |f_hz| self.loaded(&self.at(f_hz), open, reed_volume_m3), count)
+        maxima(scan, |f_hz| self.between(f_hz, open, reed_volume_m3), count)
+    }
+
+    /// Impedance between the frequencies of the scan, from those kept: a cubic through the four nearest admittances, which
+    /// bend only over the distance of two modes. Within 1e-6 of a peak of any clarinet (see the test).
+    fn between(&self, f_hz: f64, open: &[bool], reed_volume_m3: f64) -> Complex64 {
+        let (lowest, _, step) = SEARCH_HZ;
+        let at = (f_hz - lowest) / step;
+        let (first, part) = ((at.floor() - 1.0).max(0.0), at - (at.floor() - 1.0).max(0.0));
+        (0..4_u8)
+            .map(f64::from)
+            .map(|n| {
+                let others = (0..4_u8).map(f64::from).filter(|&other| other != n);
+                let weight: f64 = others.map(|other| (part - other) / (n - other)).product();
+                weight / self.impedance(lowest + step * (first + n), open, reed_volume_m3)
+            })
+            .sum::<Complex64>()
+            .inv()
+    }
+
+    /// Works out the losses at every frequency that [`peaks`](Self::peaks) may look at, on all cores; `on` hears the share
+    /// done and may end it, then the answer is `None`. Afterwards peaks of any fingering cost little.
+    pub fn prepare_peaks(&self, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Option<()> {
+        let (lowest, highest, step) = SEARCH_HZ;
+        let steps = ((highest - lowest) / step) as usize;
+        let workers = std::thread::available_parallelism().map_or(1, usize::from).min(8);
+        const BATCH: usize = 64;
+        for first in (0..=steps).step_by(BATCH * workers) {
+            std::thread::scope(|scope| {
+                for worker in 0..workers {
+                    let own = (first..=steps).skip(worker).step_by(workers).take(BATCH);
+                    scope.spawn(move || own.for_each(|k| drop(self.keep(lowest + step * k as f64))));
+                }
+            });
+            on(first as f64 / steps as f64).is_continue().then_some(())?;
+        }
+        Some(())
     }
 
     /// The frequency nearest `near_hz` (as an interval, within an octave) where the phase of the impedance falls through
@@ -282,7 +321,7 @@ impl TransferMatrix {
 
     /// Z/Zc at the tip with the reed volume in parallel.
     fn loaded(&self, at: &AtFrequency, open: &[bool], reed_volume_m3: f64) -> Complex64 {
-        let z_c = self.air.z_c(REFERENCE_RADIUS_M);
+        let z_c = self.air.z_c(self.nominal_radius_m);
         let (pressure, flow) = at.above(open, 0);
         let (pressure, mut flow) = at.spans[0].apply(pressure, flow);
         if reed_volume_m3 > 0.0 {
@@ -507,10 +546,10 @@ fn ratio_by_expansion(z: Complex64) -> Complex64 {
     J * (other * minus_1 - plus_1) / (plus_0 + other * minus_0)
 }
 
-/// First `count` maxima of |Z| between 60 Hz and 6 kHz of any impedance function of frequency in Hz, lowest first.
+/// First `count` maxima of |Z| between 20 Hz and 6 kHz of any impedance function of frequency in Hz, lowest first.
 ///
 /// A scan every 2 Hz, then golden section to 0.001 Hz; maxima closer than about 4 Hz are taken as one. `z` is expected in
-/// units of Zc(7.45 mm), as [`TransferMatrix::impedance`] gives it.
+/// units of Zc of the nominal bore, as [`TransferMatrix::impedance`] gives it.
 pub fn find_peaks(z: impl Fn(f64) -> Complex64, count: usize) -> Vec<Peak> {
     maxima(&z, &z, count)
 }
@@ -562,7 +601,7 @@ fn golden(value: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
 /// Mouth pressure over closing pressure at which a quasi-static reed starts to sound.
 ///
 /// From `3 g - 1 = 2 sqrt(g) / (zeta Z1)`: the reed's slope against a mode of height `z_peak_over_zc` (Re Z at the playing
-/// frequency over Zc of 7.45 mm, above 0), with embouchure strength `zeta` in 0..1. Never below 1/3, the lossless bore.
+/// frequency over Zc of the nominal bore, above 0), with embouchure strength `zeta` in 0..1. Never below 1/3, the lossless bore.
 pub fn threshold_gamma(z_peak_over_zc: f64, zeta: f64) -> f64 {
     let b = 1.0 / (zeta * z_peak_over_zc);
     let root = (b + (3.0 + b * b).sqrt()) / 3.0;
@@ -573,7 +612,7 @@ pub fn threshold_gamma(z_peak_over_zc: f64, zeta: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::bore::instrument_file::BoreSegment;
-    use crate::units::cents;
+    use crate::units::{REFERENCE_RADIUS_M, cents};
 
     /// Against mpmath (30 digits).
     #[test]
@@ -610,6 +649,7 @@ mod tests {
             source: String::new(),
             transposition: 0,
             reed_volume_m3: 0.0,
+            nominal_radius_m: REFERENCE_RADIUS_M,
             bore: vec![BoreSegment { part: String::new(), x_start_m, x_end_m, r_start_m, r_end_m }],
             holes: Vec::new(),
             fingerings: Vec::new(),
@@ -626,6 +666,36 @@ mod tests {
             assert!((-30.0..-5.0).contains(&cents(peak.f_hz, lossless)), "{peak:?} {lossless}");
         }
         assert!(model.reflectance_below(10.0, &[], 0).norm() > 0.999);
+    }
+
+    /// Scaled by f, peaks lie at 1/f of the frequency but for wall losses, which go with the inverse root of the size: a
+    /// larger bore is a few cents sharper than that, and its peaks are higher and narrower by about the root of f.
+    #[test]
+    fn scaled_instrument_has_scaled_peaks() {
+        let file = InstrumentFile::built_in();
+        let model = TransferMatrix::new(&file, Air::default());
+        for factor in [0.8, 1.5, 2.0] {
+            let large = TransferMatrix::new(&file.scaled(factor), Air::default());
+            for index in [0, 13, 19, 32] {
+                let open = &file.fingerings[index].open;
+                let (before, after) = (model.peaks(open, 0.0, 2), large.peaks(open, 0.0, 2));
+                assert_eq!(after.len(), 2);
+                for (before, after) in before.iter().zip(&after) {
+                    // Wall losses of quality Q lower a resonance by 1 / 2Q; other losses only make Q smaller.
+                    let walls =
+                        1_200.0 / std::f64::consts::LN_2 / (2.0 * before.q) * (1.0 - factor.powf(-0.5));
+                    let off = cents(after.f_hz * factor, before.f_hz);
+                    assert!(
+                        (0.2..1.3).contains(&(off / walls)),
+                        "{factor} {index}: {off} cents, walls {walls}"
+                    );
+                    let sharper = after.q / before.q / factor.sqrt();
+                    assert!((0.7..1.3).contains(&sharper), "{factor} {index}: Q {} {}", before.q, after.q);
+                    let higher = after.mag_over_zc / before.mag_over_zc / factor.sqrt();
+                    assert!((0.7..1.3).contains(&higher), "{factor} {index}: {before:?} {after:?}");
+                }
+            }
+        }
     }
 
     /// A resonance whose height, frequency and Q are known in closed form.

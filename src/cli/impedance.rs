@@ -3,10 +3,10 @@
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::transfer_matrix::{Peak, TransferMatrix, find_peaks};
 use crate::cli::Failure;
-use crate::cli::args::{AirArg, InstrumentArg, NotesArg, within};
+use crate::cli::args::{AirArg, InstrumentArg, NotesArg, QualityArg, within};
 use crate::cli::table::TableArgs;
 use crate::instrument;
-use crate::units::{Air, REFERENCE_RADIUS_M};
+use crate::units::Air;
 use clap::{Args, ValueEnum};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -24,7 +24,7 @@ Examples:
 /// Where the answer comes from.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Model {
-    /// The lattice that sounds, at 48 kHz (96 kHz inside)
+    /// The lattice that sounds at 48 kHz (96 kHz inside, 192 kHz with --quality high)
     Lattice,
     /// Transfer matrices with exact wall losses: the reference
     Tmm,
@@ -32,7 +32,7 @@ enum Model {
 
 /// Input impedance of a fingering at the reed: a curve, or its peaks
 ///
-/// Values are over Zc = rho c / S of a 7.45 mm bore. A clarinet sounds near a peak of its impedance; the register key
+/// Values are over Zc = rho c / S of the nominal bore, 14.9 mm wide unless the instrument file names another. A clarinet sounds near a peak of its impedance; the register key
 /// spoils the first one so that the second sounds, a twelfth higher. The reed itself adds a little volume that lowers the
 /// peaks; it is left out unless --reed-volume is given.
 ///
@@ -64,6 +64,9 @@ pub struct Impedance {
     air: AirArg,
     #[command(flatten)]
     instrument: InstrumentArg,
+    /// How finely the lattice is cut
+    #[arg(long, value_enum, default_value_t = QualityArg::Live)]
+    quality: QualityArg,
     #[command(flatten)]
     table: TableArgs,
 }
@@ -95,10 +98,14 @@ impl Impedance {
         let about = format!(
             "{}; {}, {} C, reed volume {} m3, Zc {:.6e} Pa s/m3",
             file.name,
-            if self.model == Model::Tmm { "transfer matrices" } else { "lattice at 96 kHz" },
+            match (self.model, self.quality) {
+                (Model::Tmm, _) => "transfer matrices",
+                (Model::Lattice, QualityArg::Live) => "lattice at 96 kHz",
+                (Model::Lattice, QualityArg::High) => "lattice at 192 kHz",
+            },
             air.temperature_c,
             volume_m3,
-            air.z_c(REFERENCE_RADIUS_M)
+            air.z_c(file.nominal_radius_m)
         );
         let header = if self.peaks.is_some() {
             "written_midi,n,f_hz,mag_over_zc,q"
@@ -133,7 +140,7 @@ impl Impedance {
             let right = "leave --temperature out or add --model tmm";
             return Err(Failure::Usage(format!("the lattice is made for air of 25 C; {right}")));
         }
-        Ok(Bore::Lattice(self.instrument.model(file.clone(), 48_000)?))
+        Ok(Bore::Lattice(self.instrument.bore(file, 48_000, self.quality)?))
     }
 }
 
@@ -146,7 +153,10 @@ impl Bore {
     fn impedance(&self, f_hz: f64, open: &[bool], volume_m3: f64) -> Complex64 {
         match self {
             Self::Tmm(model) => model.impedance(f_hz, open, volume_m3),
-            Self::Lattice(model) => beside_reed(lattice(model, f_hz, open), f_hz, volume_m3, &model.air),
+            Self::Lattice(model) => {
+                let z_c = model.air.z_c(model.file.nominal_radius_m);
+                beside_reed(lattice(model, f_hz, open), f_hz, volume_m3, z_c, &model.air)
+            }
         }
     }
 
@@ -163,8 +173,8 @@ fn lattice(model: &instrument::Model, f_hz: f64, open: &[bool]) -> Complex64 {
     model.coeffs.impedance(f_hz, &opening)
 }
 
-/// Z/Zc with a volume in parallel.
-fn beside_reed(z: Complex64, f_hz: f64, volume_m3: f64, air: &Air) -> Complex64 {
+/// Z/Zc with a volume in parallel, `z_c` the Zc.
+fn beside_reed(z: Complex64, f_hz: f64, volume_m3: f64, z_c: f64, air: &Air) -> Complex64 {
     let compliance = volume_m3 / (air.rho * air.c * air.c);
-    z / (1.0 + z * Complex64::I * TAU * f_hz * compliance * air.z_c(REFERENCE_RADIUS_M))
+    z / (1.0 + z * Complex64::I * TAU * f_hz * compliance * z_c)
 }

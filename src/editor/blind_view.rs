@@ -14,7 +14,9 @@ pub fn draw(ui: &mut Ui, compare: &mut Compare, hands: &mut Hands) {
     ui.vertical_centered(|ui| {
         ui.add_space(0.12 * height);
         ui.label(RichText::new("Blind comparison").font(FontId::proportional(22.0)));
-        ui.label(RichText::new("Play, change sides as often as you like, decide, then reveal.").color(c.quiet));
+        ui.label(
+            RichText::new("Play, change sides as often as you like, decide, then reveal.").color(c.quiet),
+        );
         ui.add_space(0.06 * height);
         let size = vec2((0.3 * ui.available_width()).min(220.0), (0.3 * height).min(150.0));
         ui.horizontal(|ui| {
@@ -41,7 +43,9 @@ pub fn draw(ui: &mut Ui, compare: &mut Compare, hands: &mut Hands) {
                     let at = rect.center_bottom() - vec2(0.0, 10.0);
                     painter.text(at, Align2::CENTER_BOTTOM, told, theme::heading(), ink);
                 }
-                response.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, is_here, format!("Side {name}")));
+                response.widget_info(|| {
+                    WidgetInfo::selected(Role::RadioButton, true, is_here, format!("Side {name}"))
+                });
                 if response.clicked() {
                     let values = compare.go(side, hands.setting());
                     hands.restore(&values);

@@ -12,7 +12,13 @@ use crate::editor::theme::{Colours, GAP, panel};
 
 /// Draws the view.
 pub fn draw(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
-    crate::editor::beside(ui, "breath", hands, |ui, _| pictures(ui, snapshot), |ui, hands| column(ui, hands, snapshot));
+    crate::editor::beside(
+        ui,
+        "breath",
+        hands,
+        |ui, _| pictures(ui, snapshot),
+        |ui, hands| column(ui, hands, snapshot),
+    );
 }
 
 fn pictures(ui: &mut Ui, snapshot: &Snapshot) {
@@ -47,12 +53,19 @@ fn gauge(ui: &mut Ui, snapshot: &Snapshot) {
         FontId::proportional(28.0),
         c.ink,
     );
-    painter.text(number.right_center() + vec2(14.0, 2.0), Align2::LEFT_CENTER, word, theme::heading(), colour);
+    painter.text(
+        number.right_center() + vec2(14.0, 2.0),
+        Align2::LEFT_CENTER,
+        word,
+        theme::heading(),
+        colour,
+    );
     let gamma = if all.closes_kpa > 0.0 { kpa / all.closes_kpa } else { 0.0 };
     let share = format!("\u{3b3} = {gamma:.2} of closing pressure");
     painter.text(rect.right_top(), Align2::RIGHT_TOP, share, theme::small(), c.quiet);
 
-    let bar = Rect::from_min_max(pos2(rect.left(), rect.top() + 58.0), pos2(rect.right(), rect.bottom() - 18.0));
+    let bar =
+        Rect::from_min_max(pos2(rect.left(), rect.top() + 58.0), pos2(rect.right(), rect.bottom() - 18.0));
     let x = |kpa: f32| bar.left() + (kpa / full).clamp(0.0, 1.0) * bar.width();
     let round = CornerRadius::same(theme::SMALL_RADIUS);
     painter.rect_filled(bar, round, c.raised);
@@ -83,7 +96,13 @@ fn gauge(ui: &mut Ui, snapshot: &Snapshot) {
     let ticks = (0..=(full / step) as usize).map(|n| n as f32 * step);
     for at in ticks {
         painter.vline(x(at), bar.bottom()..=bar.bottom() + 4.0, Stroke::new(1.0, c.quiet));
-        painter.text(pos2(x(at), bar.bottom() + 5.0), Align2::CENTER_TOP, format!("{at:.0}"), theme::small(), c.quiet);
+        painter.text(
+            pos2(x(at), bar.bottom() + 5.0),
+            Align2::CENTER_TOP,
+            format!("{at:.0}"),
+            theme::small(),
+            c.quiet,
+        );
     }
     response.widget_info(|| WidgetInfo::labeled(Role::Meter, true, format!("Breath {kpa:.2} kPa, {word}")));
     response.on_hover_text_at_pointer(meter::LEGEND);
@@ -111,10 +130,17 @@ fn history(ui: &mut Ui, snapshot: &Snapshot) {
     }
     .show(ui, |plot| {
         for (index, (at, name, colour)) in marks.into_iter().enumerate() {
-            let line = egui_plot::HLine::new(name, f64::from(at)).color(colour).width(1.0).id(("mark", index));
+            let line =
+                egui_plot::HLine::new(name, f64::from(at)).color(colour).width(1.0).id(("mark", index));
             plot.hline(line.style(egui_plot::LineStyle::dashed_loose()).allow_hover(false));
             if f64::from(at) < full {
-                chart::word(plot, [-seconds, f64::from(at)], Align2::LEFT_BOTTOM, &format!(" {name}"), colour);
+                chart::word(
+                    plot,
+                    [-seconds, f64::from(at)],
+                    Align2::LEFT_BOTTOM,
+                    &format!(" {name}"),
+                    colour,
+                );
             }
         }
         let points = track.kpa.iter().enumerate();
@@ -156,16 +182,24 @@ fn meter_of(ui: &mut Ui, source: &Source) {
     } else {
         painter.circle_stroke(dot, 3.5, Stroke::new(1.0, c.quiet));
     }
-    painter.text(pos2(rect.left() + 15.0, rect.top() + 8.0), Align2::LEFT_CENTER, &source.name, theme::body(), ink);
+    painter.text(
+        pos2(rect.left() + 15.0, rect.top() + 8.0),
+        Align2::LEFT_CENTER,
+        &source.name,
+        theme::body(),
+        ink,
+    );
     let state = if source.is_seen { format!("{:.0} %", 100.0 * source.value) } else { "not seen".into() };
     painter.text(pos2(rect.right(), rect.top() + 8.0), Align2::RIGHT_CENTER, &state, theme::small(), c.quiet);
-    let bar = Rect::from_min_max(pos2(rect.left(), rect.bottom() - 8.0), pos2(rect.right(), rect.bottom() - 4.0));
+    let bar =
+        Rect::from_min_max(pos2(rect.left(), rect.bottom() - 8.0), pos2(rect.right(), rect.bottom() - 4.0));
     painter.rect_filled(bar, CornerRadius::same(2), c.raised);
     let end = bar.left() + chart::share(source.value) * bar.width();
     let fill = if source.is_live { c.breath } else { c.chokes };
     painter.rect_filled(Rect::from_min_max(bar.min, pos2(end, bar.bottom())), CornerRadius::same(2), fill);
     let blows = if source.is_live { ", blows" } else { "" };
-    response.widget_info(|| WidgetInfo::labeled(Role::Meter, true, format!("{}: {state}{blows}", source.name)));
+    response
+        .widget_info(|| WidgetInfo::labeled(Role::Meter, true, format!("{}: {state}{blows}", source.name)));
     response.on_hover_text(if source.is_live {
         "This one blows. The source that moves takes over."
     } else if source.is_seen {

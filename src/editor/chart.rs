@@ -3,7 +3,9 @@
 //! Nothing can be dragged or zoomed by accident; what can be dragged is a handle on top.
 
 use egui::{Align2, Color32, Rangef, Rect, Ui, vec2};
-use egui_plot::{AxisHints, GridMark, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotTransform, PlotUi, Text, VLine};
+use egui_plot::{
+    AxisHints, GridMark, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotTransform, PlotUi, Text, VLine,
+};
 
 use crate::editor::theme;
 use crate::editor::theme::Colours;
@@ -46,7 +48,12 @@ impl Chart<'_> {
         let (line, _) = ui.allocate_exact_size(vec2(ui.available_width(), NAME_HEIGHT), egui::Sense::hover());
         ui.painter().text(line.left_top(), Align2::LEFT_TOP, self.y_name, theme::small(), c.quiet);
         let height = (self.height - NAME_HEIGHT - ui.spacing().item_spacing.y).max(40.0);
-        let axis = |hints: AxisHints<'static>| hints.tick_label_color(c.quiet).tick_label_font(theme::small()).label_spacing(Rangef::new(4.0, 8.0));
+        let axis = |hints: AxisHints<'static>| {
+            hints
+                .tick_label_color(c.quiet)
+                .tick_label_font(theme::small())
+                .label_spacing(Rangef::new(4.0, 8.0))
+        };
         let has_x = !self.x_name.is_empty();
         let digits = |mark: GridMark, _: &std::ops::RangeInclusive<f64>| tidy(mark.value, mark.step_size);
         // Time gone by is negative on the axis and told without a sign.
@@ -76,7 +83,7 @@ impl Chart<'_> {
             .show_axes([has_x, true])
             .show_grid(true)
             .x_grid_spacer(move |_| ticks(x, ((width / 64.0) as usize).clamp(2, 12)))
-            .y_grid_spacer(move |_| ticks(y, ((height / 30.0) as usize).clamp(3, 10)))
+            .y_grid_spacer(move |_| ticks(y, ((height / 30.0) as usize).clamp(4, 10)))
             .grid_spacing(Rangef::new(4.0, 8.0))
             .grid_color(c.grid)
             .show_x(false)
@@ -103,7 +110,8 @@ impl Chart<'_> {
 fn ticks((low, high): (f64, f64), count: usize) -> Vec<GridMark> {
     let rough = (high - low) / count.max(1) as f64;
     let power = 10_f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].map(|n| n * power).into_iter().find(|step| *step >= rough).unwrap_or(rough);
+    let step =
+        [1.0, 2.0, 5.0, 10.0].map(|n| n * power).into_iter().find(|step| *step >= rough).unwrap_or(rough);
     let inside = (low / step).ceil() as i64..=(high / step).floor() as i64;
     inside.map(|n| GridMark { value: n as f64 * step, step_size: step }).collect()
 }

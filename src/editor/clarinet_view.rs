@@ -6,8 +6,8 @@
 //! fingered, until *Back to the note*.
 
 use egui::{
-    Align2, Color32, CornerRadius, CursorIcon, FontId, Mesh, Painter, Pos2, Rect, Response, Role, Sense, Shape, Stroke,
-    Ui, WidgetInfo, pos2, vec2,
+    Align2, Color32, CornerRadius, CursorIcon, FontId, Mesh, Painter, Pos2, Rect, Response, Role, Sense,
+    Shape, Stroke, Ui, WidgetInfo, pos2, vec2,
 };
 
 use crate::bore::instrument_file::{HoleKind, InstrumentFile, REGISTERS, ToneHole};
@@ -71,8 +71,15 @@ impl ClarinetView {
         let body = Body::new(file, area);
         let wave = wave_rect(area, &body);
         ruler(&painter, c, area, body.scale);
-        painter.text(area.left_top(), Align2::LEFT_TOP, "sound pressure along the bore", theme::small(), c.quiet);
+        painter.text(
+            area.left_top(),
+            Align2::LEFT_TOP,
+            "sound pressure along the bore",
+            theme::small(),
+            c.quiet,
+        );
         standing(&painter, c, &body, wave, &snapshot.standing);
+        part_names(&painter, c, &body, wave.bottom() + 1.0);
         body.paint(&painter, c, &snapshot.standing);
         let buttons = hole_buttons(area, file.holes.len());
         for (hole, tone_hole) in file.holes.iter().enumerate() {
@@ -83,7 +90,8 @@ impl ClarinetView {
             let at = body.hole(tone_hole);
             let is_named = area.width() >= NAMED * file.holes.len() as f32;
             let response = button(ui, buttons[hole], tone_hole, opening, is_named);
-            let on_bore = ui.interact(at.rect.expand2(vec2(2.0, 6.0)), response.id.with("bore"), Sense::CLICK);
+            let on_bore =
+                ui.interact(at.rect.expand2(vec2(2.0, 6.0)), response.id.with("bore"), Sense::CLICK);
             let is_hot = response.hovered() || on_bore.hovered() || response.has_focus();
             leader(&painter, c, at.foot, buttons[hole], is_hot, opening);
             body.paint_hole(&painter, c, tone_hole, opening, is_hot);
@@ -98,7 +106,11 @@ impl ClarinetView {
 
     fn toggle(&mut self, hole: usize, snapshot: &Snapshot, actions: &mut Vec<Action>) {
         let holes = snapshot.instrument.holes.len();
-        let now = || (0..holes).map(|hole| snapshot.openings.get(hole).is_some_and(|&opening| opening >= 0.5)).collect();
+        let now = || {
+            (0..holes)
+                .map(|hole| snapshot.openings.get(hole).is_some_and(|&opening| opening >= 0.5))
+                .collect()
+        };
         let mut tried: Vec<bool> = self.tried.take().unwrap_or_else(now);
         if let Some(open) = tried.get_mut(hole) {
             *open = !*open;
@@ -118,9 +130,12 @@ impl ClarinetView {
             ui.set_height(22.0);
             let told = match shown.and_then(|index| file.fingerings.get(index)) {
                 Some(fingering) => {
-                    let fingers = if fingering.fingers.trim().is_empty() { "no finger" } else { &fingering.fingers };
-                    let alternates = file.fingerings.iter().filter(|other| other.written == fingering.written).count();
-                    let more = if alternates > 1 { format!(", {alternates} fingerings") } else { String::new() };
+                    let fingers =
+                        if fingering.fingers.trim().is_empty() { "no finger" } else { &fingering.fingers };
+                    let alternates =
+                        file.fingerings.iter().filter(|other| other.written == fingering.written).count();
+                    let more =
+                        if alternates > 1 { format!(", {alternates} fingerings") } else { String::new() };
                     format!("{} {}{more}: {fingers}", note_name(fingering.written.0), fingering.register)
                 }
                 None => "a fingering of your own".into(),
@@ -144,15 +159,27 @@ impl ClarinetView {
                 }
                 ui.horizontal_wrapped(|ui| {
                     let (rect, _) = ui.allocate_exact_size(vec2(66.0, 22.0), Sense::hover());
-                    ui.painter().text(rect.left_center(), Align2::LEFT_CENTER, register, theme::small(), c.quiet);
+                    ui.painter().text(
+                        rect.left_center(),
+                        Align2::LEFT_CENTER,
+                        register,
+                        theme::small(),
+                        c.quiet,
+                    );
                     for (index, fingering) in of_register {
-                        let first = file.fingerings.iter().position(|other| other.written == fingering.written);
+                        let first =
+                            file.fingerings.iter().position(|other| other.written == fingering.written);
                         let alternate = if first == Some(index) { "" } else { "'" };
                         let name = format!("{}{alternate}", note_name(fingering.written.0));
                         let is_here = shown == Some(index);
                         let response = chip(ui, c, &name, chip_width, is_here);
                         response.widget_info(|| {
-                            WidgetInfo::selected(Role::RadioButton, true, is_here, format!("Fingering {name}"))
+                            WidgetInfo::selected(
+                                Role::RadioButton,
+                                true,
+                                is_here,
+                                format!("Fingering {name}"),
+                            )
                         });
                         if response.on_hover_text(format!("{name}: {}", fingering.fingers)).clicked() {
                             self.tried = Some(fingering.open.clone());
@@ -202,7 +229,11 @@ fn button(ui: &mut Ui, rect: Rect, hole: &ToneHole, opening: f32, is_named: bool
     let covered = 1.0 - opening.clamp(0.0, 1.0);
     draw(0.0, c.panel.lerp_to_gamma(ink, covered));
     if hole.kind == HoleKind::PadOpen {
-        painter.circle_stroke(rect.center(), radius - 3.5, Stroke::new(1.0, c.panel.lerp_to_gamma(ink, 1.0 - covered)));
+        painter.circle_stroke(
+            rect.center(),
+            radius - 3.5,
+            Stroke::new(1.0, c.panel.lerp_to_gamma(ink, 1.0 - covered)),
+        );
     }
     if response.has_focus() {
         painter.circle_stroke(rect.center(), radius + 3.0, Stroke::new(1.5, c.accent));
@@ -215,7 +246,9 @@ fn button(ui: &mut Ui, rect: Rect, hole: &ToneHole, opening: f32, is_named: bool
         painter.text(below + vec2(0.0, 10.0), Align2::CENTER_TOP, second, font, c.quiet);
     }
     let state = if opening >= 0.5 { "open" } else { "closed" };
-    response.widget_info(|| WidgetInfo::selected(Role::Switch, true, opening >= 0.5, format!("Hole {}", hole.name)));
+    response.widget_info(|| {
+        WidgetInfo::selected(Role::Switch, true, opening >= 0.5, format!("Hole {}", hole.name))
+    });
     response.on_hover_cursor(CursorIcon::PointingHand).accessible_name(format!("Hole {}, {state}", hole.name))
 }
 
@@ -261,7 +294,10 @@ fn about(ui: &mut Ui, hole: &ToneHole, opening: f32) {
 fn leader(painter: &Painter, c: &Colours, foot: Pos2, button: Rect, is_hot: bool, opening: f32) {
     let knee = pos2(button.center().x, button.top() - 8.0);
     let colour = if is_hot { c.accent } else { c.line.lerp_to_gamma(c.speaks, 0.6 * opening) };
-    painter.add(Shape::line(vec![foot, knee, button.center_top()], Stroke::new(if is_hot { 1.5 } else { 1.0 }, colour)));
+    painter.add(Shape::line(
+        vec![foot, knee, button.center_top()],
+        Stroke::new(if is_hot { 1.5 } else { 1.0 }, colour),
+    ));
 }
 
 /// How long ten centimetres are here.
@@ -276,6 +312,22 @@ fn ruler(painter: &Painter, c: &Colours, area: Rect, scale: f32) {
     painter.text(pos2(left - 6.0, y), Align2::RIGHT_CENTER, "10 cm", theme::small(), c.quiet);
 }
 
+/// Names of the parts, where there is room for them.
+fn part_names(painter: &Painter, c: &Colours, body: &Body<'_>, y: f32) {
+    let mut segments = body.file.bore.iter().peekable();
+    while let Some(first) = segments.next() {
+        let mut end_m = first.x_end_m;
+        while let Some(next) = segments.next_if(|next| next.part == first.part) {
+            end_m = next.x_end_m;
+        }
+        let (left, right) = (body.x(first.x_start_m), body.x(end_m));
+        let galley = painter.layout_no_wrap(first.part.clone(), FontId::proportional(10.0), c.quiet);
+        if galley.size().x < right - left {
+            painter.galley(pos2(0.5 * (left + right - galley.size().x), y), galley, c.quiet);
+        }
+    }
+}
+
 /// The sound pressure, aligned with the bore.
 fn standing(painter: &Painter, c: &Colours, body: &Body<'_>, rect: Rect, wave: &[(f32, f32)]) {
     if rect.height() < 16.0 {
@@ -283,7 +335,13 @@ fn standing(painter: &Painter, c: &Colours, body: &Body<'_>, rect: Rect, wave: &
     }
     painter.hline(rect.x_range(), rect.bottom(), Stroke::new(1.0, c.line));
     if wave.len() < 2 {
-        chart::word_at(painter, rect.center(), Align2::CENTER_CENTER, "no standing wave known for these holes", c.quiet);
+        chart::word_at(
+            painter,
+            rect.center(),
+            Align2::CENTER_CENTER,
+            "no standing wave known for these holes",
+            c.quiet,
+        );
         return;
     }
     let most = loudest(wave);
@@ -360,7 +418,8 @@ impl<'a> Body<'a> {
     /// Radius of the outside, m.
     fn outside_m(&self, x_m: f64, bore_m: f64) -> f64 {
         let beak = (x_m / 0.06).clamp(0.15, 1.0);
-        let from_hole = ((x_m - self.last_hole_m) / (self.length_m - self.last_hole_m).max(1e-6)).clamp(0.0, 1.0);
+        let from_hole =
+            ((x_m - self.last_hole_m) / (self.length_m - self.last_hole_m).max(1e-6)).clamp(0.0, 1.0);
         bore_m + beak * (self.wall_m + (RIM_M - self.wall_m) * from_hole.sqrt())
     }
 
@@ -415,7 +474,8 @@ impl<'a> Body<'a> {
     fn parts(&self, painter: &Painter, c: &Colours) {
         for pair in self.file.bore.windows(2).filter(|pair| pair[0].part != pair[1].part) {
             let x = self.x(pair[0].x_end_m);
-            let out = self.scale * self.outside_m(pair[0].x_end_m, pair[0].r_end_m.max(pair[1].r_start_m)) as f32;
+            let out =
+                self.scale * self.outside_m(pair[0].x_end_m, pair[0].r_end_m.max(pair[1].r_start_m)) as f32;
             for side in [-1.0_f32, 1.0] {
                 let bore = self.scale * pair[0].r_end_m as f32;
                 let ring = Rect::from_two_pos(

@@ -7,8 +7,8 @@
 
 use egui::accesskit::Action as AccessAction;
 use egui::{
-    Align2, CornerRadius, CursorIcon, EventFilter, FontId, Key, Pos2, Rect, Response, Role, Sense, Stroke, TextEdit,
-    Ui, Vec2, WidgetInfo, pos2, vec2,
+    Align2, CornerRadius, CursorIcon, EventFilter, FontId, Key, Pos2, Rect, Response, Role, Sense, Stroke,
+    TextEdit, Ui, Vec2, WidgetInfo, pos2, vec2,
 };
 
 use crate::editor::compare::Values;
@@ -69,13 +69,16 @@ pub struct Hands<'a> {
     pub history: &'a mut History,
     /// The open text field.
     pub entry: &'a mut Option<Entry>,
+    /// Parameters that a hand is on.
+    pub held: &'a mut Vec<&'static str>,
 }
 
 impl Hands<'_> {
     /// A hand is on it.
     pub fn begin(&mut self, id: &'static str) {
-        if let Some(look) = self.controls.look(id) {
+        if let Some(look) = self.controls.look(id).filter(|_| !self.held.contains(&id)) {
             self.controls.begin(id);
+            self.held.push(id);
             if terms::is_setting(id) {
                 self.history.begin(id, look.value);
             }
@@ -84,14 +87,25 @@ impl Hands<'_> {
 
     /// Moves it; only while a hand is on it.
     pub fn set(&mut self, id: &'static str, value: f32) {
-        self.controls.set(id, value.clamp(0.0, 1.0));
+        if self.held.contains(&id) {
+            self.controls.set(id, value.clamp(0.0, 1.0));
+        }
     }
 
     /// The hand is off.
     pub fn end(&mut self, id: &'static str) {
-        if let Some(look) = self.controls.look(id) {
+        if let Some(at) = self.held.iter().position(|held| *held == id) {
+            self.held.remove(at);
             self.controls.end(id);
-            self.history.end(id, look.value);
+            let after = self.controls.look(id).map_or(0.0, |look| look.value);
+            self.history.end(id, after);
+        }
+    }
+
+    /// All hands off: what held them is gone, or the pointer is up.
+    pub fn let_go(&mut self) {
+        for id in self.held.clone() {
+            self.end(id);
         }
     }
 
@@ -133,9 +147,9 @@ impl Hands<'_> {
 
     /// A switch or choice is on its `index`-th step.
     pub fn step(&self, id: &str) -> usize {
-        self.controls.look(id).map_or(0, |look| {
-            (look.value * look.steps.unwrap_or(1) as f32).round() as usize
-        })
+        self.controls
+            .look(id)
+            .map_or(0, |look| (look.value * look.steps.unwrap_or(1) as f32).round() as usize)
     }
 
     /// The name of a parameter.
@@ -152,7 +166,11 @@ pub fn teach(ui: &mut Ui, id: &str, how: &str) {
     ui.label(egui::RichText::new(term.word).strong());
     for (what, text) in [("Sound", term.sound), ("Feel", term.feel)] {
         if !text.is_empty() {
-            ui.label(egui::RichText::new(if term.feel.is_empty() { text.to_owned() } else { format!("{what}: {text}") }));
+            ui.label(egui::RichText::new(if term.feel.is_empty() {
+                text.to_owned()
+            } else {
+                format!("{what}: {text}")
+            }));
         }
     }
     if !how.is_empty() {
@@ -160,7 +178,8 @@ pub fn teach(ui: &mut Ui, id: &str, how: &str) {
     }
 }
 
-const HOW_SLIDER: &str = "Drag; Shift: finer. Double click or Ctrl-click: default. Click the value or Enter: type.";
+const HOW_SLIDER: &str =
+    "Drag; Shift: finer. Double click or Ctrl-click: default. Click the value or Enter: type.";
 /// Height of a slider, name and track together.
 const SLIDER_HEIGHT: f32 = 36.0;
 /// Share of the track an arrow key moves; a hundredth of that with Shift.
@@ -180,7 +199,10 @@ pub fn slider(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
     // One stop of the Tab key a slider: its value opens by Enter.
     let value_response = ui.interact(value_rect, response.id.with("value"), Sense::CLICK);
 
-    let track = Rect::from_min_max(pos2(rect.left() + 6.0, rect.bottom() - 11.0), pos2(rect.right() - 6.0, rect.bottom() - 7.0));
+    let track = Rect::from_min_max(
+        pos2(rect.left() + 6.0, rect.bottom() - 11.0),
+        pos2(rect.right() - 6.0, rect.bottom() - 7.0),
+    );
     let mut value = look.value;
     if !is_typing {
         value = moved_by_pointer(ui, hands, id, &look, &response, track.width()).unwrap_or(value);
@@ -191,7 +213,9 @@ pub fn slider(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
         if is_reset {
             value = look.default;
             hands.put(id, value);
-        } else if value_response.clicked() || (response.clicked() && response.has_focus() && ui.input(pressed_enter)) {
+        } else if value_response.clicked()
+            || (response.clicked() && response.has_focus() && ui.input(pressed_enter))
+        {
             *hands.entry = Some(Entry { id, text: text.clone(), is_wrong: false, is_shown: false });
         }
     }
@@ -201,10 +225,24 @@ pub fn slider(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
 
     paint_slider(ui, c, rect, track, &look, value, &response);
     if is_typing {
-        type_value(ui, hands, id, Rect::from_min_max(pos2(rect.right() - 96.0, rect.top() - 1.0), pos2(rect.right(), rect.top() + 21.0)));
+        type_value(
+            ui,
+            hands,
+            id,
+            Rect::from_min_max(
+                pos2(rect.right() - 96.0, rect.top() - 1.0),
+                pos2(rect.right(), rect.top() + 21.0),
+            ),
+        );
     } else {
         let ink = if value_response.hovered() { c.accent } else { c.ink };
-        ui.painter().text(pos2(rect.right(), rect.top() + 9.0), Align2::RIGHT_CENTER, &text, theme::body(), ink);
+        ui.painter().text(
+            pos2(rect.right(), rect.top() + 9.0),
+            Align2::RIGHT_CENTER,
+            &text,
+            theme::body(),
+            ink,
+        );
     }
     response.widget_info(|| {
         let mut info = WidgetInfo::slider(ui.is_enabled(), f64::from(value), &look.name);
@@ -257,14 +295,22 @@ fn stepped(look: &Look, value: f32) -> f32 {
     }
 }
 
-fn moved_by_keys(ui: &Ui, hands: &mut Hands, id: &'static str, look: &Look, response: &Response) -> Option<f32> {
+fn moved_by_keys(
+    ui: &Ui,
+    hands: &mut Hands,
+    id: &'static str,
+    look: &Look,
+    response: &Response,
+) -> Option<f32> {
     let filter = EventFilter { horizontal_arrows: true, ..EventFilter::default() };
     ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, filter));
     let unit = look.steps.map_or(KEY_STEP, |steps| 1.0 / steps.max(1) as f32);
     let (mut by, mut to) = (0.0, None);
     ui.input(|input| {
         let fine = if input.modifiers.shift && look.steps.is_none() { 0.1 } else { 1.0 };
-        by += unit * fine * (input.num_presses(Key::ArrowRight) as f32 - input.num_presses(Key::ArrowLeft) as f32);
+        by += unit
+            * fine
+            * (input.num_presses(Key::ArrowRight) as f32 - input.num_presses(Key::ArrowLeft) as f32);
         by += unit * input.num_accesskit_action_requests(response.id, AccessAction::Increment) as f32;
         by -= unit * input.num_accesskit_action_requests(response.id, AccessAction::Decrement) as f32;
         if input.key_pressed(Key::Home) {
@@ -345,7 +391,8 @@ pub fn choice(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
     let look = hands.controls.look(id)?;
     let c = Colours::here(ui);
     let steps = look.steps.unwrap_or(1).max(1);
-    let texts: Vec<String> = (0..=steps).map(|step| hands.controls.text(id, step as f32 / steps as f32)).collect();
+    let texts: Vec<String> =
+        (0..=steps).map(|step| hands.controls.text(id, step as f32 / steps as f32)).collect();
     let now = (look.value * steps as f32).round() as usize;
     ui.add_space(1.0);
     let name = ui.label(egui::RichText::new(&look.name).color(c.quiet));
@@ -386,7 +433,10 @@ pub fn segments(ui: &mut Ui, name: &str, texts: &[String], chosen: &mut usize) -
     painter.rect_filled(rect, CornerRadius::same(theme::SMALL_RADIUS + 1), c.raised);
     let width = rect.width() / texts.len().max(1) as f32;
     for (index, text) in texts.iter().enumerate() {
-        let cell = Rect::from_min_size(pos2(rect.left() + index as f32 * width, rect.top()), vec2(width, rect.height()));
+        let cell = Rect::from_min_size(
+            pos2(rect.left() + index as f32 * width, rect.top()),
+            vec2(width, rect.height()),
+        );
         let response = ui.interact(cell, whole.id.with(index), Sense::click());
         if response.clicked() {
             *chosen = index;
@@ -435,9 +485,19 @@ pub fn toggle(ui: &mut Ui, name: &str, is_on: bool) -> Response {
     let round = CornerRadius::same(8);
     painter.rect_filled(track, round, if is_on { c.accent } else { c.raised });
     let x = if is_on { track.right() - 8.0 } else { track.left() + 8.0 };
-    painter.circle(pos2(x, track.center().y), 6.0, c.panel, Stroke::new(1.0, if is_on { c.accent } else { c.quiet }));
+    painter.circle(
+        pos2(x, track.center().y),
+        6.0,
+        c.panel,
+        Stroke::new(1.0, if is_on { c.accent } else { c.quiet }),
+    );
     if response.has_focus() {
-        painter.rect_stroke(track.expand(2.0), CornerRadius::same(10), Stroke::new(1.5, c.accent), egui::StrokeKind::Outside);
+        painter.rect_stroke(
+            track.expand(2.0),
+            CornerRadius::same(10),
+            Stroke::new(1.5, c.accent),
+            egui::StrokeKind::Outside,
+        );
     }
     response.widget_info(|| WidgetInfo::selected(Role::Switch, true, is_on, name));
     response

@@ -37,21 +37,32 @@ impl FeelTest {
     /// What the hand should notice.
     pub fn notice(self) -> &'static str {
         match self {
-            Self::Free => "Turns freely, no torque anywhere. If it pulls, its zero or its motor is not calibrated.",
-            Self::Spring => "Pushes back more the further you turn, up to 40 mNm at one turn, and returns to rest.",
-            Self::Bump => "A bump at 120 degrees, as where a note speaks: light before it, and a little let go after it.",
+            Self::Free => {
+                "Turns freely, no torque anywhere. If it pulls, its zero or its motor is not calibrated."
+            }
+            Self::Spring => {
+                "Pushes back more the further you turn, up to 40 mNm at one turn, and returns to rest."
+            }
+            Self::Bump => {
+                "A bump at 120 degrees, as where a note speaks: light before it, and a little let go after it."
+            }
             Self::Wall => "Free up to 90 degrees, then a soft wall. It should not buzz when you lean on it.",
-            Self::Slap => "Turn back beyond -100 degrees: a spring pulls forwards. Let go, and it snaps, as a tongue slap does.",
+            Self::Slap => {
+                "Turn back beyond -100 degrees: a spring pulls forwards. Let go, and it snaps, as a tongue slap does."
+            }
         }
     }
 
     /// What goes to the knob.
     pub fn feel(self) -> Feel {
-        let plain = Feel { law: Law::Pressure, morph_ms: 200, damping_mnms: 1.0, friction: 10, ..Feel::default() };
+        let plain =
+            Feel { law: Law::Pressure, morph_ms: 200, damping_mnms: 1.0, friction: 10, ..Feel::default() };
         match self {
             Self::Free => Feel { morph_ms: 200, ..Feel::default() },
             Self::Spring => Feel { scale_mnm: 40.0, ..plain },
-            Self::Bump => Feel { law: Law::Flow, scale_mnm: 12.0, detent: 150, wall_mnm_per_deg: 1.0, ..plain },
+            Self::Bump => {
+                Feel { law: Law::Flow, scale_mnm: 12.0, detent: 150, wall_mnm_per_deg: 1.0, ..plain }
+            }
             Self::Wall => Feel { scale_mnm: 0.0, wall_deg: 90.0, wall_mnm_per_deg: 2.0, ..plain },
             Self::Slap => Feel { scale_mnm: 40.0, slap_mnm_per_deg: 0.8, ..plain },
         }

@@ -1,7 +1,10 @@
 //! The two lines on top: note, pitch, tools; tabs and what the user should know.
 
-use egui::{Align, Align2, CornerRadius, FontId, Layout, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
+use egui::{
+    Align, Align2, CornerRadius, FontId, Layout, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2,
+};
 
+use crate::editor::compare::Compare;
 use crate::editor::compare::Side;
 use crate::editor::controls::Hands;
 use crate::editor::controls::momentary;
@@ -9,7 +12,6 @@ use crate::editor::snapshot::{Level, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 use crate::editor::{Kept, Tab};
-use crate::editor::compare::Compare;
 
 /// Least and most zoom, and the steps offered.
 pub const ZOOMS: [f32; 8] = [0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0];
@@ -59,9 +61,16 @@ enum Icon {
 fn icon(ui: &mut Ui, icon: Icon, name: &str) -> egui::Response {
     let (rect, response) = ui.allocate_exact_size(vec2(28.0, 24.0), Sense::click());
     let visuals = *ui.style().interact(&response);
-    let ink = if ui.is_enabled() { visuals.fg_stroke.color } else { Colours::here(ui).quiet.gamma_multiply(0.6) };
+    let ink =
+        if ui.is_enabled() { visuals.fg_stroke.color } else { Colours::here(ui).quiet.gamma_multiply(0.6) };
     let painter = ui.painter();
-    painter.rect(rect, visuals.corner_radius, visuals.weak_bg_fill, visuals.bg_stroke, egui::StrokeKind::Inside);
+    painter.rect(
+        rect,
+        visuals.corner_radius,
+        visuals.weak_bg_fill,
+        visuals.bg_stroke,
+        egui::StrokeKind::Inside,
+    );
     let centre = rect.center();
     let stroke = Stroke::new(1.6, ink);
     let arc = |from: f32, to: f32, radius: f32| -> Vec<egui::Pos2> {
@@ -92,7 +101,13 @@ fn note(ui: &mut Ui, snapshot: &Snapshot) {
     let painter = ui.painter();
     let ink = if snapshot.sounding.is_some() { c.ink } else { c.quiet };
     let big = written.clone().unwrap_or_else(|| "\u{2013}".into());
-    painter.text(pos2(rect.left(), rect.center().y), Align2::LEFT_CENTER, &big, FontId::proportional(30.0), ink);
+    painter.text(
+        pos2(rect.left(), rect.center().y),
+        Align2::LEFT_CENTER,
+        &big,
+        FontId::proportional(30.0),
+        ink,
+    );
     let x = rect.left() + 62.0;
     let below = sounding.map_or_else(String::new, |note| format!("sounds {}", note_name(note.0)));
     painter.text(pos2(x, rect.center().y - 1.0), Align2::LEFT_BOTTOM, &below, theme::small(), c.quiet);
@@ -100,7 +115,8 @@ fn note(ui: &mut Ui, snapshot: &Snapshot) {
     painter.text(pos2(x, rect.center().y + 1.0), Align2::LEFT_TOP, &pitch, theme::small(), c.quiet);
     let said = format!("Written {big}, {below}, {pitch}");
     response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &said));
-    response.on_hover_text("The note as it is read, what sounds on this instrument, and the pitch that is heard");
+    response
+        .on_hover_text("The note as it is read, what sounds on this instrument, and the pitch that is heard");
 }
 
 /// Cents above or below the note: a needle over 50 cents each way.
@@ -112,7 +128,13 @@ pub fn needle(ui: &mut Ui, snapshot: &Snapshot, width: f32) {
     let at = |cents: f32| rect.center().x + (cents / 50.0).clamp(-1.0, 1.0) * (0.5 * rect.width() - 6.0);
     painter.hline(rect.left()..=rect.right(), line_y, Stroke::new(1.0, c.line));
     for cents in [-50.0, -40.0, -30.0, -20.0, -10.0, 0.0, 10.0, 20.0, 30.0, 40.0, 50.0_f32] {
-        let height = if cents == 0.0 { 9.0 } else if cents % 50.0 == 0.0 { 7.0 } else { 4.0 };
+        let height = if cents == 0.0 {
+            9.0
+        } else if cents % 50.0 == 0.0 {
+            7.0
+        } else {
+            4.0
+        };
         painter.vline(at(cents), line_y - height..=line_y, Stroke::new(1.0, c.quiet));
     }
     // Five cents either way: what a listener takes for in tune.
@@ -131,7 +153,10 @@ pub fn needle(ui: &mut Ui, snapshot: &Snapshot, width: f32) {
     let place = pos2(rect.right(), rect.top() - 1.0);
     painter.text(place, Align2::RIGHT_TOP, &text, theme::small(), c.quiet);
     response.widget_info(|| WidgetInfo::labeled(Role::Meter, true, format!("Pitch: {text}")));
-    response.on_hover_text(format!("How far the sound is from the note at A4 = {:.1} Hz", snapshot.settings.a4_hz));
+    response.on_hover_text(format!(
+        "How far the sound is from the note at A4 = {:.1} Hz",
+        snapshot.settings.a4_hz
+    ));
 }
 
 fn undo(ui: &mut Ui, hands: &mut Hands) {
@@ -181,7 +206,9 @@ fn sides(ui: &mut Ui, compare: &mut Compare, hands: &mut Hands, is_wide: bool) {
     for (side, name) in [(Side::B, "B"), (Side::A, "A")] {
         let is_here = compare.side == side;
         let response = ui.selectable_label(is_here, format!(" {name} "));
-        response.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, is_here, format!("Setting {name}")));
+        response.widget_info(|| {
+            WidgetInfo::selected(Role::RadioButton, true, is_here, format!("Setting {name}"))
+        });
         if response.on_hover_text(format!("Setting {name}: change it, and go back and forth")).clicked() {
             let values = compare.go(side, hands.setting());
             hands.restore(&values);
@@ -219,12 +246,20 @@ pub fn tabs(ui: &mut Ui, kept: &mut Kept, snapshot: &Snapshot) {
             let ink = if is_here || response.hovered() { c.ink } else { c.quiet };
             ui.painter().text(rect.center(), Align2::CENTER_CENTER, tab.name(), theme::body(), ink);
             if is_here {
-                let under = Rect::from_min_max(pos2(rect.left() + 6.0, rect.bottom() - 3.0), rect.right_bottom() - vec2(6.0, 0.0));
+                let under = Rect::from_min_max(
+                    pos2(rect.left() + 6.0, rect.bottom() - 3.0),
+                    rect.right_bottom() - vec2(6.0, 0.0),
+                );
                 ui.painter().rect_filled(under, CornerRadius::same(1), c.accent);
             }
             if response.has_focus() {
                 let round = CornerRadius::same(theme::SMALL_RADIUS);
-                ui.painter().rect_stroke(rect.shrink(2.0), round, Stroke::new(1.0, c.accent), egui::StrokeKind::Inside);
+                ui.painter().rect_stroke(
+                    rect.shrink(2.0),
+                    round,
+                    Stroke::new(1.0, c.accent),
+                    egui::StrokeKind::Inside,
+                );
             }
             response.widget_info(|| WidgetInfo::selected(Role::Tab, true, is_here, tab.name()));
             if response.clicked() {
@@ -243,8 +278,12 @@ fn status(ui: &mut Ui, snapshot: &Snapshot) {
         Level::Note => c.breath,
         Level::Warn => c.danger,
     };
-    let preparing = snapshot.preparing.as_ref().map(|(what, part)| (Level::Note, format!("{what} {:.0} %", 100.0 * part)));
-    let first = preparing.or_else(|| snapshot.status.first().map(|status| (status.level, status.text.clone())));
+    let preparing = snapshot
+        .preparing
+        .as_ref()
+        .map(|(what, part)| (Level::Note, format!("{what} {:.0} %", 100.0 * part)));
+    let first =
+        preparing.or_else(|| snapshot.status.first().map(|status| (status.level, status.text.clone())));
     let Some((level, text)) = first else { return };
     let width = ui.available_width() - 20.0;
     let label = egui::Label::new(egui::RichText::new(&text).font(theme::small()).color(c.quiet)).truncate();

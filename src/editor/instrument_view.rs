@@ -44,7 +44,10 @@ impl InstrumentView {
         panel(c).show(ui, |ui| {
             ui.set_width(ui.available_width());
             ui.set_height(ui.available_height());
-            egui::ScrollArea::vertical().id_salt("facts").auto_shrink([false, false]).show(ui, |ui| facts(ui, snapshot));
+            egui::ScrollArea::vertical()
+                .id_salt("facts")
+                .auto_shrink([false, false])
+                .show(ui, |ui| facts(ui, snapshot));
         });
     }
 
@@ -66,7 +69,8 @@ impl InstrumentView {
         ui.label(RichText::new("A file of your own (docs/instrument-file.md)").color(c.quiet));
         ui.horizontal(|ui| {
             let width = ui.available_width() - 74.0;
-            let field = TextEdit::singleline(&mut self.path).desired_width(width).hint_text("path of a .toml file");
+            let field =
+                TextEdit::singleline(&mut self.path).desired_width(width).hint_text("path of a .toml file");
             let response = ui.add(field);
             response.widget_info(|| WidgetInfo::labeled(Role::TextInput, true, "Path of an instrument file"));
             let is_entered = response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
@@ -97,7 +101,8 @@ fn card(ui: &mut Ui, c: &Colours, name: &str, is_here: bool) -> egui::Response {
     }
     let ink = if is_here { c.on_accent } else { c.ink };
     painter.text(rect.center(), Align2::CENTER_CENTER, name, theme::body(), ink);
-    response.widget_info(|| WidgetInfo::selected(Role::RadioButton, true, is_here, format!("Instrument {name}")));
+    response
+        .widget_info(|| WidgetInfo::selected(Role::RadioButton, true, is_here, format!("Instrument {name}")));
     response
 }
 
@@ -110,17 +115,19 @@ fn facts(ui: &mut Ui, snapshot: &Snapshot) {
         n if n > 0 => format!("{n} semitones below what is written"),
         n => format!("{} semitones above what is written", -n),
     };
-    let name = |note: Option<crate::units::SoundingNote>| note.map_or_else(|| "?".into(), |note| note_name(note.0));
+    let name =
+        |note: Option<crate::units::SoundingNote>| note.map_or_else(|| "?".into(), |note| note_name(note.0));
     let transposition = file.transposition;
     let rows = [
         ("Sounds", down),
-        (
-            "Compass, written",
-            format!("{} to {}", note_name(file.lowest().0), note_name(file.highest().0)),
-        ),
+        ("Compass, written", format!("{} to {}", note_name(file.lowest().0), note_name(file.highest().0))),
         (
             "Compass, sounding",
-            format!("{} to {}", name(file.lowest().sounding(transposition)), name(file.highest().sounding(transposition))),
+            format!(
+                "{} to {}",
+                name(file.lowest().sounding(transposition)),
+                name(file.highest().sounding(transposition))
+            ),
         ),
         ("Length", format!("{:.1} mm", 1e3 * file.length_m())),
         ("Holes", file.holes.len().to_string()),

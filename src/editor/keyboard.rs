@@ -3,7 +3,10 @@
 //! Sliding from key to key slurs: the new note goes down before the old one comes up. With the focus on it, arrow keys
 //! choose a note and Space plays it as long as it is held.
 
-use egui::{Align2, Color32, CornerRadius, Event, EventFilter, Key, Pos2, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
+use egui::{
+    Align2, Color32, CornerRadius, Event, EventFilter, Key, Pos2, Rect, Role, Sense, Stroke, Ui, WidgetInfo,
+    pos2, vec2,
+};
 
 use crate::editor::Action;
 use crate::editor::header::note_name;
@@ -30,7 +33,10 @@ impl Keyboard {
     /// Draws the keys, and says what they play.
     pub fn draw(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
         let transposition = snapshot.instrument.transposition;
-        let ends = (snapshot.instrument.lowest().sounding(transposition), snapshot.instrument.highest().sounding(transposition));
+        let ends = (
+            snapshot.instrument.lowest().sounding(transposition),
+            snapshot.instrument.highest().sounding(transposition),
+        );
         let (Some(lowest), Some(highest)) = ends else { return };
         // From a white key to a white key.
         let from = if is_black(lowest.0) { lowest.0.saturating_sub(1) } else { lowest.0 };
@@ -44,7 +50,11 @@ impl Keyboard {
         if !self.by_key {
             self.hold(wanted.map(|(note, velocity)| (SoundingNote(note), velocity)), actions);
         }
-        let chosen = self.chosen.or(snapshot.sounding).map_or((from + to) / 2, |note| note.0).clamp(lowest.0, highest.0);
+        let chosen = self
+            .chosen
+            .or(snapshot.sounding)
+            .map_or((from + to) / 2, |note| note.0)
+            .clamp(lowest.0, highest.0);
         if response.has_focus() {
             self.keys_pressed(ui, response.id, chosen, (lowest.0, highest.0), actions);
         } else if self.by_key {
@@ -54,8 +64,17 @@ impl Keyboard {
 
         let c = Colours::here(ui);
         let focus = response.has_focus().then_some(chosen);
-        keys.paint(ui, c, snapshot.sounding.map(|note| note.0), self.held.map(|note| note.0), focus, playable);
-        response.widget_info(|| WidgetInfo::labeled(Role::Group, true, format!("Keyboard, {}", note_name(chosen))));
+        keys.paint(
+            ui,
+            c,
+            snapshot.sounding.map(|note| note.0),
+            self.held.map(|note| note.0),
+            focus,
+            playable,
+        );
+        response.widget_info(|| {
+            WidgetInfo::labeled(Role::Group, true, format!("Keyboard, {}", note_name(chosen)))
+        });
     }
 
     /// Lets go of what is held: the window closes, or another view takes the pointer.
@@ -78,7 +97,14 @@ impl Keyboard {
         }
     }
 
-    fn keys_pressed(&mut self, ui: &Ui, id: egui::Id, chosen: u8, (low, high): (u8, u8), actions: &mut Vec<Action>) {
+    fn keys_pressed(
+        &mut self,
+        ui: &Ui,
+        id: egui::Id,
+        chosen: u8,
+        (low, high): (u8, u8),
+        actions: &mut Vec<Action>,
+    ) {
         let filter = EventFilter { horizontal_arrows: true, ..EventFilter::default() };
         ui.memory_mut(|memory| memory.set_focus_lock_filter(id, filter));
         let (steps, space) = ui.input(|input| {
@@ -126,7 +152,10 @@ impl Keys {
         let left = self.rect.left() + whites * self.white;
         if is_black(note) {
             let width = 0.62 * self.white;
-            Rect::from_min_size(pos2(left - 0.5 * width, self.rect.top()), vec2(width, 0.62 * self.rect.height()))
+            Rect::from_min_size(
+                pos2(left - 0.5 * width, self.rect.top()),
+                vec2(width, 0.62 * self.rect.height()),
+            )
         } else {
             Rect::from_min_size(pos2(left, self.rect.top()), vec2(self.white, self.rect.height()))
         }
@@ -136,7 +165,10 @@ impl Keys {
     fn at(&self, point: Pos2) -> Option<(u8, f32)> {
         let notes = || self.from..=self.to;
         let hit = |note: &u8| self.key(*note).contains(point);
-        let note = notes().filter(|&note| is_black(note)).find(hit).or_else(|| notes().find(|note| !is_black(*note) && hit(note)))?;
+        let note = notes()
+            .filter(|&note| is_black(note))
+            .find(hit)
+            .or_else(|| notes().find(|note| !is_black(*note) && hit(note)))?;
         let key = self.key(note);
         let down = ((point.y - key.top()) / key.height()).clamp(0.0, 1.0);
         Some((note, 0.35 + 0.65 * down))
@@ -165,13 +197,30 @@ impl Keys {
                     plain.lerp_to_gamma(c.ground, 0.5)
                 };
                 let round = CornerRadius { nw: 0, ne: 0, sw: 3, se: 3 };
-                painter.rect(key.shrink2(vec2(0.5, 0.0)), round, fill, Stroke::new(1.0, c.line), egui::StrokeKind::Inside);
+                painter.rect(
+                    key.shrink2(vec2(0.5, 0.0)),
+                    round,
+                    fill,
+                    Stroke::new(1.0, c.line),
+                    egui::StrokeKind::Inside,
+                );
                 if focus == Some(note) {
-                    painter.rect_stroke(key.shrink(2.0), round, Stroke::new(2.0, c.breath), egui::StrokeKind::Inside);
+                    painter.rect_stroke(
+                        key.shrink(2.0),
+                        round,
+                        Stroke::new(2.0, c.breath),
+                        egui::StrokeKind::Inside,
+                    );
                 }
                 if note % 12 == 0 || (is_down && !black) {
                     let ink = if is_down { c.on_accent } else { Color32::from_gray(110) };
-                    painter.text(key.center_bottom() - vec2(0.0, 3.0), Align2::CENTER_BOTTOM, note_name(note), theme::small(), ink);
+                    painter.text(
+                        key.center_bottom() - vec2(0.0, 3.0),
+                        Align2::CENTER_BOTTOM,
+                        note_name(note),
+                        theme::small(),
+                        ink,
+                    );
                 }
             }
         }
@@ -199,7 +248,12 @@ mod tests {
     fn sliding_slurs_and_letting_go_ends() {
         let mut keyboard = Keyboard::default();
         let mut actions = Vec::new();
-        for wanted in [Some((SoundingNote(60), 0.5)), Some((SoundingNote(62), 0.5)), Some((SoundingNote(62), 0.9)), None] {
+        for wanted in [
+            Some((SoundingNote(60), 0.5)),
+            Some((SoundingNote(62), 0.5)),
+            Some((SoundingNote(62), 0.9)),
+            None,
+        ] {
             keyboard.hold(wanted, &mut actions);
         }
         let note = SoundingNote;

@@ -1,6 +1,8 @@
 //! The knob: which, how it is, arming it, what it feels like, and a page to try it on.
 
-use egui::{Align2, Button, Color32, CornerRadius, FontId, RichText, Role, Sense, Stroke, Ui, WidgetInfo, vec2};
+use egui::{
+    Align2, Button, Color32, CornerRadius, FontId, RichText, Role, Sense, Stroke, Ui, WidgetInfo, vec2,
+};
 
 use crate::editor::Action;
 use crate::editor::chart;
@@ -23,7 +25,8 @@ enum Page {
     Study,
 }
 
-const PAGES: [(Page, &str); 3] = [(Page::Play, "Feel"), (Page::Try, "Feel test"), (Page::Study, "Line, takes, studies")];
+const PAGES: [(Page, &str); 3] =
+    [(Page::Play, "Feel"), (Page::Try, "Feel test"), (Page::Study, "Line, takes, studies")];
 
 /// What the panel remembers.
 #[derive(Clone, Debug, Default)]
@@ -85,7 +88,12 @@ impl KnobPanel {
                 let is_on = self.test == Some(test);
                 let response = ui.selectable_label(is_on, test.name());
                 response.widget_info(|| {
-                    WidgetInfo::selected(Role::RadioButton, true, is_on, format!("Feel test: {}", test.name()))
+                    WidgetInfo::selected(
+                        Role::RadioButton,
+                        true,
+                        is_on,
+                        format!("Feel test: {}", test.name()),
+                    )
                 });
                 if response.on_hover_text(test.notice()).clicked() && !is_on {
                     self.test = Some(test);
@@ -99,7 +107,11 @@ impl KnobPanel {
         });
         let Some(test) = self.test else {
             let rect = ui.available_rect_before_wrap();
-            chart::empty(ui, rect, "Choose a test, arm the knob, and turn it. Each says what your hand should notice.");
+            chart::empty(
+                ui,
+                rect,
+                "Choose a test, arm the knob, and turn it. Each says what your hand should notice.",
+            );
             return;
         };
         let notice = if snapshot.knob.is_armed { c.ink } else { c.quiet };
@@ -109,7 +121,8 @@ impl KnobPanel {
         }
         let feel = test.feel();
         let torque = |deg: f64| law::torque_mnm(&feel, ReedTables::seed(), deg);
-        let points: Vec<[f64; 2]> = (-90..=200).map(|n| 2.0 * f64::from(n)).map(|deg| [deg, torque(deg)]).collect();
+        let points: Vec<[f64; 2]> =
+            (-90..=200).map(|n| 2.0 * f64::from(n)).map(|deg| [deg, torque(deg)]).collect();
         let knob = snapshot.knob.angle_deg.map(f64::from);
         Chart {
             id: "feel test",
@@ -124,7 +137,12 @@ impl KnobPanel {
             plot.line(chart::curve(vec![[-180.0, 0.0], [400.0, 0.0]], c.line, 1.0).id("nothing"));
             plot.line(chart::curve(points, c.felt, 2.5).id("test"));
             if let Some(deg) = knob {
-                plot.points(egui_plot::Points::new("knob", [deg, torque(deg)]).radius(5.0).color(c.felt).allow_hover(false));
+                plot.points(
+                    egui_plot::Points::new("knob", [deg, torque(deg)])
+                        .radius(5.0)
+                        .color(c.felt)
+                        .allow_hover(false),
+                );
             }
         });
     }
@@ -172,7 +190,13 @@ fn device_row(ui: &mut Ui, c: &Colours, device: &Device, actions: &mut Vec<Actio
     }
     painter.text(rect.left_top() + vec2(8.0, 4.0), Align2::LEFT_TOP, &device.name, theme::body(), c.ink);
     let state = if device.is_free { c.quiet } else { c.beats };
-    painter.text(rect.left_bottom() + vec2(8.0, -4.0), Align2::LEFT_BOTTOM, &device.state, theme::small(), state);
+    painter.text(
+        rect.left_bottom() + vec2(8.0, -4.0),
+        Align2::LEFT_BOTTOM,
+        &device.state,
+        theme::small(),
+        state,
+    );
     response.widget_info(|| {
         let name = format!("Device {}: {}", device.name, device.state);
         WidgetInfo::selected(Role::RadioButton, true, device.is_chosen, name)
@@ -205,7 +229,13 @@ fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     }
     let is_low = height < 60.0;
     let (up, size) = if is_low { (7.0, 18.0) } else { (8.0, 24.0) };
-    painter.text(rect.center() - vec2(0.0, up), Align2::CENTER_CENTER, title, FontId::proportional(size), ink);
+    painter.text(
+        rect.center() - vec2(0.0, up),
+        Align2::CENTER_CENTER,
+        title,
+        FontId::proportional(size),
+        ink,
+    );
     let below = rect.center() + vec2(0.0, if is_low { 11.0 } else { 16.0 });
     painter.text(below, Align2::CENTER_CENTER, line, theme::small(), ink);
     let name = if is_wanted || knob.is_armed { "Disarm the knob" } else { "Arm the knob" };
@@ -225,10 +255,16 @@ fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     }
     let late = |us: u32| 1e-3 * f64::from(us);
     let (median, worst) = (late(knob.jitter_us.0), late(knob.jitter_us.1));
-    ui.label(quiet(format!("{:.0} positions a second, late by {median:.1} ms, at worst {worst:.1}", knob.rate_hz)));
+    ui.label(quiet(format!(
+        "{:.0} positions a second, late by {median:.1} ms, at worst {worst:.1}",
+        knob.rate_hz
+    )));
     let echo = knob.round_trip_us.map_or_else(|| "?".into(), |us| format!("{:.1} ms", late(us)));
     let errors = knob.lost + knob.damaged;
-    ui.label(quiet(format!("new feel after {echo}; {errors} errors on the line, away {} times", knob.losses)));
+    ui.label(quiet(format!(
+        "new feel after {echo}; {errors} errors on the line, away {} times",
+        knob.losses
+    )));
 }
 
 /// What the line to the knob does.
@@ -248,9 +284,17 @@ fn line(ui: &mut Ui, snapshot: &Snapshot) {
             knob.round_trip_us.map_or_else(|| "not known".into(), |us| format!("{:.1} ms", late(us))),
             "From a new note to the knob's echo of its feel",
         ),
-        ("Frames lost, damaged", format!("{}, {}", knob.lost, knob.damaged), "Damaged ones are refused by their checksum"),
+        (
+            "Frames lost, damaged",
+            format!("{}, {}", knob.lost, knob.damaged),
+            "Damaged ones are refused by their checksum",
+        ),
         ("Times the knob went away", knob.losses.to_string(), "It comes back disarmed"),
-        ("Latency of the sound", format!("{:.1} ms", snapshot.latency_ms), "Of the plugin itself, told to the host"),
+        (
+            "Latency of the sound",
+            format!("{:.1} ms", snapshot.latency_ms),
+            "Of the plugin itself, told to the host",
+        ),
     ];
     egui::Grid::new("line").num_columns(2).spacing([18.0, 7.0]).show(ui, |ui| {
         for (name, value, about) in rows {

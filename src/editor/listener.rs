@@ -65,7 +65,8 @@ impl Listener {
         let latest = &samples[samples.len().saturating_sub(WINDOW)..];
         let missing = WINDOW - latest.len();
         self.input[..missing].fill(0.0);
-        for ((to, from), window) in self.input[missing..].iter_mut().zip(latest).zip(&self.window[missing..]) {
+        for ((to, from), window) in self.input[missing..].iter_mut().zip(latest).zip(&self.window[missing..])
+        {
             *to = if from.is_finite() { from * window } else { 0.0 };
         }
         // A sine of amplitude 1 has half its height in the bin, and the window half of that.

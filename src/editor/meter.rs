@@ -64,11 +64,18 @@ pub fn column(ui: &mut Ui, snapshot: &Snapshot) {
     let (word, colour) = state(&marks_of, kpa, c);
 
     let painter = ui.painter();
-    painter.text(rect.center_top(), Align2::CENTER_TOP, format!("{kpa:.2}"), egui::FontId::proportional(22.0), c.ink);
+    painter.text(
+        rect.center_top(),
+        Align2::CENTER_TOP,
+        format!("{kpa:.2}"),
+        egui::FontId::proportional(22.0),
+        c.ink,
+    );
     painter.text(rect.center_top() + vec2(0.0, 24.0), Align2::CENTER_TOP, "kPa", theme::small(), c.quiet);
     painter.text(rect.center_bottom(), Align2::CENTER_BOTTOM, word, theme::small(), colour);
 
-    let scale = Rect::from_min_max(rect.left_top() + vec2(4.0, 44.0), pos2(rect.left() + 26.0, rect.bottom() - 20.0));
+    let scale =
+        Rect::from_min_max(rect.left_top() + vec2(4.0, 44.0), pos2(rect.left() + 26.0, rect.bottom() - 20.0));
     let y = |kpa: f32| scale.bottom() - (kpa / full).clamp(0.0, 1.0) * scale.height();
     let round = CornerRadius::same(theme::SMALL_RADIUS);
     painter.rect_filled(scale, round, c.raised);
@@ -98,6 +105,8 @@ pub fn column(ui: &mut Ui, snapshot: &Snapshot) {
         painter.text(place - vec2(0.0, 1.0), Align2::LEFT_TOP, format!("{at:.2}"), theme::small(), c.quiet);
     }
     painter.hline(scale.left() - 3.0..=scale.right() + 3.0, y(kpa), Stroke::new(2.0, c.ink));
-    response.widget_info(|| WidgetInfo::labeled(Role::Meter, true, format!("Mouth pressure {kpa:.2} kPa, {word}")));
+    response.widget_info(|| {
+        WidgetInfo::labeled(Role::Meter, true, format!("Mouth pressure {kpa:.2} kPa, {word}"))
+    });
     response.on_hover_text_at_pointer(format!("Mouth pressure, kilopascal.\n{LEGEND}"));
 }

@@ -19,7 +19,7 @@ use crate::instrument::Settings;
 use crate::reed::law::{K_INIT, coupled_k};
 use crate::reed::physical::P_REF_PA;
 use crate::reed::{ReedLaw, ReedTables};
-use crate::units::{Air, REFERENCE_RADIUS_M};
+use crate::units::Air;
 
 /// Points of a curve.
 const POINTS: usize = 160;
@@ -44,11 +44,11 @@ struct Picture {
 }
 
 impl Picture {
-    fn of(settings: &Settings) -> Self {
+    fn of(settings: &Settings, nominal_radius_m: f64) -> Self {
         let law = settings.reed_law();
         let seed_h = f64::from(settings.reed_h);
         let seed_k = if settings.coupled { coupled_k(seed_h) } else { f64::from(settings.reed_k) };
-        let z_c = Air::at(f64::from(settings.temperature_c)).z_c(REFERENCE_RADIUS_M);
+        let z_c = Air::at(f64::from(settings.temperature_c)).z_c(nominal_radius_m);
         let flow_cm3s = 1e6 * f64::from(settings.zeta) * K_INIT * P_REF_PA / z_c;
         Self { law, lip: law.h() / seed_h, stiffer: law.k() / seed_k, flow_cm3s }
     }
@@ -113,7 +113,11 @@ impl ReedView {
         } else {
             (vec2(width, 0.6 * height - 0.5 * GAP), vec2(width, 0.4 * height - 0.5 * GAP))
         };
-        let layout = if is_wide { egui::Layout::left_to_right(egui::Align::Min) } else { egui::Layout::top_down(egui::Align::Min) };
+        let layout = if is_wide {
+            egui::Layout::left_to_right(egui::Align::Min)
+        } else {
+            egui::Layout::top_down(egui::Align::Min)
+        };
         ui.spacing_mut().item_spacing = vec2(GAP, GAP);
         ui.with_layout(layout, |ui| {
             framed(ui, c, reed, |ui| self.flow(ui, hands, snapshot));
@@ -123,7 +127,7 @@ impl ReedView {
 
     fn flow(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
         let c = Colours::here(ui);
-        let picture = Picture::of(&snapshot.settings);
+        let picture = Picture::of(&snapshot.settings, snapshot.instrument.nominal_radius_m);
         let kpa = f64::from(snapshot.mouth_now_kpa());
         let wanted = (
             even(1.4 * picture.closure_kpa().max(1.5 * kpa), 2.0),
@@ -160,7 +164,11 @@ impl ReedView {
         chart::names(ui, &transform, &marks);
         if ui.available_width() > 300.0 && transform.frame().height() > 200.0 {
             let sounding = if is_sounding { "the sounding reed, one period" } else { "the reed is still" };
-            let lines = [("the reed's law", c.accent), (sounding, c.breath), ("circle: the still reed at this breath", c.quiet)];
+            let lines = [
+                ("the reed's law", c.accent),
+                (sounding, c.breath),
+                ("circle: the still reed at this breath", c.quiet),
+            ];
             chart::legend(ui, &transform, 0.34, &lines);
         }
         self.handles(ui, hands, snapshot, &picture, &transform, (right, top));
@@ -211,12 +219,25 @@ impl ReedView {
             }
             if response.double_clicked() {
                 let ids = ids.iter().filter_map(|id| known(id));
-                let defaults: Vec<_> = ids.filter_map(|id| Some((id, hands.controls.look(id)?.default))).collect();
+                let defaults: Vec<_> =
+                    ids.filter_map(|id| Some((id, hands.controls.look(id)?.default))).collect();
                 hands.put_all(&defaults);
             }
         }
-        peak.on_hover_ui(|ui| teach(ui, "reedh", if is_coupled { "Sideways: H. Up and down: A. Double click: default." } else { "Up and down: H. Double click: default." }));
-        end.on_hover_ui(|ui| teach(ui, if is_coupled { "reedh" } else { "reedk" }, "Sideways. Double click: default."));
+        peak.on_hover_ui(|ui| {
+            teach(
+                ui,
+                "reedh",
+                if is_coupled {
+                    "Sideways: H. Up and down: A. Double click: default."
+                } else {
+                    "Up and down: H. Double click: default."
+                },
+            )
+        });
+        end.on_hover_ui(|ui| {
+            teach(ui, if is_coupled { "reedh" } else { "reedk" }, "Sideways. Double click: default.")
+        });
     }
 }
 
@@ -244,9 +265,8 @@ fn law_curve(plot: &mut PlotUi<'_>, picture: &Picture, right: f64, c: &Colours) 
 fn orbit(plot: &mut PlotUi<'_>, snapshot: &Snapshot, period: std::ops::Range<usize>, c: &Colours) {
     let scope = &snapshot.scope;
     let mouth = f64::from(snapshot.mouth_now_kpa());
-    let point = |index: usize| {
-        [mouth - f64::from(scope.mouthpiece_kpa[index]), f64::from(scope.flow_cm3s[index])]
-    };
+    let point =
+        |index: usize| [mouth - f64::from(scope.mouthpiece_kpa[index]), f64::from(scope.flow_cm3s[index])];
     let last = period.end.checked_sub(1);
     plot.line(chart::curve(period.map(point).collect(), c.breath, 1.8).id("orbit"));
     if let Some(last) = last {
@@ -280,7 +300,8 @@ pub fn torque_picture(ui: &mut Ui, snapshot: &Snapshot) {
     let right = even(1.08 * f64::from(feel.wall_deg).min(1.3 * at.a_close_deg), 60.0);
     let torque = |deg: f64| law::torque_mnm(&feel, ReedTables::seed(), deg);
     let ceiling = f64::from(snapshot.knob.ceiling_mnm);
-    let points: Vec<[f64; 2]> = (0..=POINTS).map(|n| right * n as f64 / POINTS as f64).map(|deg| [deg, torque(deg)]).collect();
+    let points: Vec<[f64; 2]> =
+        (0..=POINTS).map(|n| right * n as f64 / POINTS as f64).map(|deg| [deg, torque(deg)]).collect();
     let wall = f64::from(feel.wall_deg);
     let most = points.iter().filter(|[deg, _]| *deg < wall).map(|[_, mnm]| *mnm).fold(10.0, f64::max);
     let top = even(1.25 * most, 20.0);
@@ -345,30 +366,35 @@ fn column(ui: &mut Ui, hands: &mut Hands) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::units::REFERENCE_RADIUS_M;
+
+    fn of(settings: &Settings) -> Picture {
+        Picture::of(settings, REFERENCE_RADIUS_M)
+    }
 
     #[test]
     fn a_handle_put_somewhere_is_found_there() {
         let close = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-4, "{a} {b}");
         for (strength, lip, zeta) in [(2.5, 1.0, 0.3), (3.5, 0.8, 0.5)] {
             let mut settings = Settings { strength, lip, zeta, ..Settings::default() };
-            let picture = Picture::of(&settings);
+            let picture = of(&settings);
             settings.reed_h = picture.coupled_h(5.0) as f32;
-            close(Picture::of(&settings).closure_kpa(), 5.0);
+            close(of(&settings).closure_kpa(), 5.0);
             settings.coupled = false;
-            settings.reed_k = Picture::of(&settings).free_k(7.5) as f32;
-            close(Picture::of(&settings).closure_kpa(), 7.5);
-            let wanted = 1.1 * Picture::of(&settings).peak()[1];
-            settings.reed_h = Picture::of(&settings).free_h(wanted) as f32;
-            close(Picture::of(&settings).peak()[1], wanted);
-            settings.reed_a = Picture::of(&settings).a(wanted / 2.0) as f32;
-            close(Picture::of(&settings).peak()[1], wanted / 2.0);
+            settings.reed_k = of(&settings).free_k(7.5) as f32;
+            close(of(&settings).closure_kpa(), 7.5);
+            let wanted = 1.1 * of(&settings).peak()[1];
+            settings.reed_h = of(&settings).free_h(wanted) as f32;
+            close(of(&settings).peak()[1], wanted);
+            settings.reed_a = of(&settings).a(wanted / 2.0) as f32;
+            close(of(&settings).peak()[1], wanted / 2.0);
         }
     }
 
     #[test]
     fn the_curve_is_the_reed_of_the_physics_notes() {
         // zeta (1 - 1/3) sqrt(1/3) p_M / Zc at a third of 6 kPa.
-        let picture = Picture::of(&Settings::default());
+        let picture = of(&Settings::default());
         let z_c = Air::default().z_c(REFERENCE_RADIUS_M);
         let wanted = 1e6 * f64::from(0.3_f32) * (2.0 / 3.0) * (1.0_f64 / 3.0).sqrt() * 6_000.0 / z_c;
         assert!((picture.flow(2.0) / wanted - 1.0).abs() < 1e-3, "{} {wanted}", picture.flow(2.0));

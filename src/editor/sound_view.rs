@@ -21,7 +21,13 @@ const COLUMNS: usize = 700;
 
 /// Draws the view.
 pub fn draw(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
-    crate::editor::beside(ui, "sound", hands, |ui, _| pictures(ui, snapshot), |ui, hands| column(ui, hands, snapshot));
+    crate::editor::beside(
+        ui,
+        "sound",
+        hands,
+        |ui, _| pictures(ui, snapshot),
+        |ui, hands| column(ui, hands, snapshot),
+    );
 }
 
 fn pictures(ui: &mut Ui, snapshot: &Snapshot) {
@@ -51,11 +57,16 @@ fn spectrum(ui: &mut Ui, snapshot: &Snapshot) {
     let f0_hz = heard.f0_hz.map(f64::from);
     let bin_hz = f64::from(heard.bin_hz);
     let highest = bin_hz * (heard.level_db.len() - 1) as f64;
-    let right = f0_hz.map_or(6_000.0, |f0_hz| (1e3 * (16.0 * f0_hz / 1e3).ceil()).clamp(3_000.0, 12_000.0)).min(highest);
+    let right = f0_hz
+        .map_or(6_000.0, |f0_hz| (1e3 * (16.0 * f0_hz / 1e3).ceil()).clamp(3_000.0, 12_000.0))
+        .min(highest);
     let level = |hz: f64| {
         let at = (hz / bin_hz).round() as usize;
         let around = at.saturating_sub(2)..=(at + 2).min(heard.level_db.len() - 1);
-        heard.level_db.get(around).map_or(f64::from(FLOOR_DB), |bins| f64::from(bins.iter().copied().fold(FLOOR_DB, f32::max)))
+        heard
+            .level_db
+            .get(around)
+            .map_or(f64::from(FLOOR_DB), |bins| f64::from(bins.iter().copied().fold(FLOOR_DB, f32::max)))
     };
     let transform = Chart {
         id: "spectrum",
@@ -76,12 +87,18 @@ fn spectrum(ui: &mut Ui, snapshot: &Snapshot) {
                 [1e-3 * bin_hz * (n * step) as f64, f64::from(bins.iter().copied().fold(FLOOR_DB, f32::max))]
             })
             .collect();
-        plot.line(chart::curve(line, c.chokes.gamma_multiply(0.8), 1.0).fill(-110.0).fill_alpha(0.06).id("spectrum"));
+        plot.line(
+            chart::curve(line, c.chokes.gamma_multiply(0.8), 1.0)
+                .fill(-110.0)
+                .fill_alpha(0.06)
+                .id("spectrum"),
+        );
         let Some(f0_hz) = f0_hz else { return };
         for is_odd in [true, false] {
             let colour = if is_odd { c.breath } else { c.even };
             let harmonics = (1..=HARMONICS).filter(|k| (k % 2 == 1) == is_odd).map(|k| k as f64 * f0_hz);
-            let points: Vec<[f64; 2]> = harmonics.filter(|hz| *hz < right).map(|hz| [1e-3 * hz, level(hz)]).collect();
+            let points: Vec<[f64; 2]> =
+                harmonics.filter(|hz| *hz < right).map(|hz| [1e-3 * hz, level(hz)]).collect();
             let points = Points::new(if is_odd { "odd" } else { "even" }, points).stems(-110.0).radius(4.0);
             plot.points(points.color(colour).allow_hover(false));
         }
@@ -105,7 +122,8 @@ fn waves(ui: &mut Ui, snapshot: &Snapshot) {
         let values = values.iter().enumerate().step_by(stride);
         values.map(|(n, &value)| [step_ms * n as f64 - from, f64::from(value)]).collect()
     };
-    let largest = |values: &[f32], least: f64| values.iter().map(|x| f64::from(x.abs())).fold(least, f64::max);
+    let largest =
+        |values: &[f32], least: f64| values.iter().map(|x| f64::from(x.abs())).fold(least, f64::max);
     let mouth = f64::from(snapshot.mouth_now_kpa());
     let most = 1.15 * largest(&scope.mouthpiece_kpa, 0.5).max(mouth);
     // Two pictures where there is room for two.
@@ -116,15 +134,14 @@ fn waves(ui: &mut Ui, snapshot: &Snapshot) {
         x: (-from, 0.0),
         y: (-most, most),
         x_name: if has_gap { "" } else { "ms ago" },
-        y_name: "pressure in the mouthpiece, kPa",
+        y_name: "pressure in the mouthpiece, kPa; straight line: in the mouth",
         height,
         label: "Pressure in the mouthpiece over time",
     }
     .show(ui, |plot| {
-        plot.line(chart::curve(vec![[-from, mouth], [0.0, mouth]], c.speaks.gamma_multiply(0.8), 1.0).id("mouth"));
-        if mouth > 0.05 {
-            chart::word(plot, [-from, mouth], Align2::LEFT_BOTTOM, " mouth", c.speaks);
-        }
+        plot.line(
+            chart::curve(vec![[-from, mouth], [0.0, mouth]], c.speaks.gamma_multiply(0.8), 1.0).id("mouth"),
+        );
         plot.line(chart::curve(track(&scope.mouthpiece_kpa), c.breath, 1.6).id("wave"));
     });
     if !has_gap {
@@ -170,7 +187,8 @@ fn column(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
 
 /// Power of the odd over that of the even harmonics, dB.
 fn balance_db(harmonics_db: &[f32]) -> Option<f32> {
-    let power = |from: usize| harmonics_db.iter().skip(from).step_by(2).map(|db| 10_f32.powf(0.1 * db)).sum::<f32>();
+    let power =
+        |from: usize| harmonics_db.iter().skip(from).step_by(2).map(|db| 10_f32.powf(0.1 * db)).sum::<f32>();
     (harmonics_db.len() >= 2).then(|| 10.0 * (power(0) / power(1).max(1e-12)).log10())
 }
 

@@ -1,12 +1,17 @@
 //! How the editor looks: two sets of colours with the same meanings, type sizes, and the few distances used everywhere.
 //!
-//! The curves' colours are those of Okabe and Ito (Color Universal Design, 2008), told apart by readers with any kind of
-//! colour vision; darkened on paper, lightened on the dark ground. Each has one meaning in every view: blue is breath,
+//! The curves' colours are those of the figures ([`palette`](crate::figure::palette): Okabe and Ito, told apart by readers
+//! with any kind of colour vision), darkened a little on paper, where they are also text, and lightened on the dark
+//! ground. Each has one meaning in every view: blue is breath,
 //! green where a note speaks, orange where the reed beats, vermilion where it closes, purple what the hand feels.
 
 use std::sync::{Arc, LazyLock};
 
-use egui::{Color32, Context, CornerRadius, FontFamily, FontId, Margin, Shadow, Stroke, Style, TextStyle, Theme, Ui};
+use egui::{
+    Color32, Context, CornerRadius, FontFamily, FontId, Margin, Shadow, Stroke, Style, TextStyle, Theme, Ui,
+};
+
+use crate::figure::palette::{Colour, Rgb};
 
 /// Colours by meaning.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,65 +68,78 @@ const fn rgb(hex: u32) -> Color32 {
     Color32::from_rgb((hex >> 16) as u8, (hex >> 8) as u8, hex as u8)
 }
 
-static LIGHT: Colours = Colours {
-    ground: rgb(0xf3_f0ea),
-    panel: rgb(0xfd_fcfa),
-    raised: rgb(0xe9_e4db),
-    hovered: rgb(0xdf_d8cc),
-    line: rgb(0xd5_cec2),
-    grid: rgb(0xea_e6df),
-    ink: rgb(0x22_262e),
-    quiet: rgb(0x5e_6068),
-    accent: rgb(0x9a_6a12),
-    on_accent: rgb(0xff_ffff),
-    breath: rgb(0x00_72b2),
-    speaks: rgb(0x00_8060),
-    beats: rgb(0xb8_7600),
-    closes: rgb(0xc8_5000),
-    felt: rgb(0x9c_4a80),
-    chokes: rgb(0x78_7d86),
-    even: rgb(0xd0_8a10),
-    danger: rgb(0xb3_2318),
-    wood: rgb(0x4a_3a32),
-    metal: rgb(0xa9_adb4),
-    air: rgb(0xfb_f6ea),
-    ivory: rgb(0xff_fefb),
-    ebony: rgb(0x2b_2725),
-};
+/// A colour of the figures between black (-1), itself (0) and white (1).
+fn toned(colour: Colour, tone: f32) -> Color32 {
+    let Rgb(r, g, b) = colour.rgb();
+    let end = if tone < 0.0 { 0.0 } else { 255.0 };
+    let mix = |x: u8| (f32::from(x) + tone.abs() * (end - f32::from(x))).round() as u8;
+    Color32::from_rgb(mix(r), mix(g), mix(b))
+}
 
-static DARK: Colours = Colours {
-    ground: rgb(0x15_1618),
-    panel: rgb(0x1d_1e21),
-    raised: rgb(0x2c_2d31),
-    hovered: rgb(0x39_3a3f),
-    line: rgb(0x3a_3b40),
-    grid: rgb(0x2a_2b2f),
-    ink: rgb(0xec_e9e3),
-    quiet: rgb(0xa6_a39d),
-    accent: rgb(0xe0_b060),
-    on_accent: rgb(0x1c_160a),
-    breath: rgb(0x5c_b8ee),
-    speaks: rgb(0x3c_c79b),
-    beats: rgb(0xf0_b030),
-    closes: rgb(0xff_8248),
-    felt: rgb(0xe0_8fc4),
-    chokes: rgb(0x9a_9ea6),
-    even: rgb(0xf0_b84a),
-    danger: rgb(0xff_6a5a),
-    wood: rgb(0x5a_473c),
-    metal: rgb(0x9a_9ea6),
-    air: rgb(0x24_2320),
-    ivory: rgb(0xd8_d3c9),
-    ebony: rgb(0x26_2422),
-};
+static COLOURS: LazyLock<[Colours; 2]> = LazyLock::new(|| [light(), dark()]);
+
+/// Paper. Curves are also text here, so the lighter ones are darkened until small words read.
+fn light() -> Colours {
+    Colours {
+        ground: rgb(0xf3_f0ea),
+        panel: rgb(0xfd_fcfa),
+        raised: rgb(0xe9_e4db),
+        hovered: rgb(0xdf_d8cc),
+        line: rgb(0xd5_cec2),
+        grid: rgb(0xea_e6df),
+        ink: toned(Colour::Ink, 0.0),
+        quiet: rgb(0x5e_6068),
+        accent: rgb(0x9a_6a12),
+        on_accent: rgb(0xff_ffff),
+        breath: toned(Colour::Blue, 0.0),
+        speaks: toned(Colour::Green, -0.12),
+        beats: toned(Colour::Orange, -0.20),
+        closes: toned(Colour::Vermilion, -0.10),
+        felt: toned(Colour::Purple, -0.12),
+        chokes: toned(Colour::Grey, 0.0),
+        even: toned(Colour::Orange, 0.0),
+        danger: rgb(0xb3_2318),
+        wood: rgb(0x4a_3a32),
+        metal: rgb(0xa9_adb4),
+        air: rgb(0xfb_f6ea),
+        ivory: rgb(0xff_fefb),
+        ebony: rgb(0x2b_2725),
+    }
+}
+
+/// Grenadilla.
+fn dark() -> Colours {
+    Colours {
+        ground: rgb(0x15_1618),
+        panel: rgb(0x1d_1e21),
+        raised: rgb(0x2c_2d31),
+        hovered: rgb(0x39_3a3f),
+        line: rgb(0x3a_3b40),
+        grid: rgb(0x2a_2b2f),
+        ink: rgb(0xec_e9e3),
+        quiet: rgb(0xa6_a39d),
+        accent: rgb(0xe0_b060),
+        on_accent: rgb(0x1c_160a),
+        breath: toned(Colour::Sky, 0.22),
+        speaks: toned(Colour::Green, 0.32),
+        beats: toned(Colour::Orange, 0.25),
+        closes: toned(Colour::Vermilion, 0.28),
+        felt: toned(Colour::Purple, 0.38),
+        chokes: toned(Colour::Grey, 0.25),
+        even: toned(Colour::Orange, 0.30),
+        danger: rgb(0xff_6a5a),
+        wood: rgb(0x5a_473c),
+        metal: rgb(0x9a_9ea6),
+        air: rgb(0x24_2320),
+        ivory: rgb(0xd8_d3c9),
+        ebony: rgb(0x26_2422),
+    }
+}
 
 impl Colours {
     /// Those of a theme.
     pub fn of(theme: Theme) -> &'static Self {
-        match theme {
-            Theme::Light => &LIGHT,
-            Theme::Dark => &DARK,
-        }
+        &COLOURS[usize::from(theme == Theme::Dark)]
     }
 
     /// Those in force where `ui` draws.

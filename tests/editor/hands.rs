@@ -14,7 +14,10 @@ const SLIDERS: &[(Tab, &[&str])] = &[
     (Tab::Reed, &["stren", "lip", "zeta", "damp", "reedh", "reeda", "lay"]),
     (Tab::Breath, &["breath", "full", "curve", "tongue", "legato", "noise"]),
     (Tab::Sound, &["a4", "noise", "zeta", "lay", "vent", "gain"]),
-    (Tab::Knob, &["ceil", "contr", "torque", "detent", "kdamp", "kfric", "refnot", "curve", "oscprt", "oscfl"]),
+    (
+        Tab::Knob,
+        &["ceil", "contr", "torque", "detent", "kdamp", "kfric", "refnot", "curve", "oscprt", "oscfl"],
+    ),
     (Tab::Instrument, &["a4", "temp", "vent", "tongue", "legato", "noise", "gain"]),
 ];
 /// On the last page of the knob's panel.
@@ -66,7 +69,10 @@ fn drags_types_and_resets(window: &mut Window, id: &str) {
     let dragged = look(window).value;
     assert!((dragged - before) * way > 0.0, "{id} does not drag: {before} {dragged}");
     let told = window.host.told();
-    assert!(matches!(&told[0], Told::Begin(of) if of == id) && matches!(told.last(), Some(Told::End(of)) if of == id));
+    assert!(
+        matches!(&told[0], Told::Begin(of) if of == id)
+            && matches!(told.last(), Some(Told::End(of)) if of == id)
+    );
 
     // To its default, both ways.
     window.harness.get_by_role_and_label(Role::Slider, &name).click_modifiers(Modifiers::COMMAND);
@@ -238,7 +244,8 @@ fn h_and_k_are_taken_by_the_hand() {
 fn wrong_text_is_kept_until_it_is_right_and_leaving_it_changes_nothing() {
     let mut window = Window::tall(Tab::Reed);
     let open = |window: &mut Window| {
-        let at = window.harness.get_by_role_and_label(Role::Slider, "Lip opening").rect().right_top() + vec2(-8.0, 9.0);
+        let at = window.harness.get_by_role_and_label(Role::Slider, "Lip opening").rect().right_top()
+            + vec2(-8.0, 9.0);
         window.harness.drag_at(at);
         window.harness.drop_at(at);
         window.harness.run();

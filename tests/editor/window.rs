@@ -11,6 +11,7 @@ use egui::{Key, vec2};
 use egui_kittest::kittest::{NodeT, Queryable};
 
 use crate::Window;
+use crate::support::Told;
 
 fn click(window: &mut Window, label: &str) {
     window.harness.get_by_label(label).click();
@@ -95,15 +96,102 @@ fn keys_play_slur_and_let_go() {
     };
     assert_eq!(notes(true), [SoundingNote(50), SoundingNote(52)]);
     assert_eq!(notes(false), notes(true));
-    assert!(matches!(done[1], Action::NoteOn { .. }), "a slur: the new note before the old one ends: {done:?}");
+    assert!(
+        matches!(done[1], Action::NoteOn { .. }),
+        "a slur: the new note before the old one ends: {done:?}"
+    );
 
     window.harness.get_by_label_contains("Keyboard").focus();
     window.harness.run();
     window.harness.key_down(Key::Space);
     window.harness.run();
     assert!(matches!(window.actions()[..], [Action::NoteOn { .. }]));
-    let left = window.harness.state_mut().close();
+    let left = {
+        let host = window.host.clone();
+        window.harness.state_mut().close(&*host)
+    };
     assert!(matches!(left[..], [Action::NoteOff { .. }]), "a window that closes lets go: {left:?}");
+}
+
+#[test]
+fn what_vanishes_under_the_hand_is_let_go() {
+    let mut window = Window::tall(Tab::Reed);
+    window.host.told();
+    let at = window.harness.get_by_role_and_label(Role::Slider, "Lip opening").rect().center();
+    for hold in [at, at + vec2(30.0, 0.0)] {
+        window.harness.hover_at(hold);
+        if hold == at {
+            window.harness.drag_at(at);
+        }
+        window.harness.step();
+    }
+    window.harness.state_mut().kept.tab = Tab::Sound;
+    window.harness.step();
+    window.harness.drop_at(at);
+    window.harness.run_steps(3);
+    assert!(matches!(window.host.told().last(), Some(Told::End(id)) if id == "lip"));
+    // And it is one step to take back.
+    click(&mut window, "Undo");
+    assert_eq!(window.host.plain("lip"), 1.0);
+
+    // So is a window that closes.
+    window.harness.state_mut().kept.tab = Tab::Reed;
+    window.harness.run();
+    window.harness.hover_at(at);
+    window.harness.drag_at(at);
+    window.harness.step();
+    window.harness.hover_at(at + vec2(30.0, 0.0));
+    window.harness.step();
+    let host = window.host.clone();
+    window.harness.state_mut().close(&*host);
+    assert!(matches!(host.told().last(), Some(Told::End(id)) if id == "lip"));
+}
+
+/// Pages that no tab shows by itself, for people: `EDITOR_PICTURES=FOLDER`.
+#[test]
+#[ignore = "writes pictures for people"]
+fn pictures_of_pages() {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    let folder =
+        folder.join(std::env::var("EDITOR_PICTURES").unwrap_or_else(|_| "target/editor-pages".into()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let save = |window: &mut Window, name: &str| {
+        let picture = (0..6).find_map(|_| window.harness.render().ok()).unwrap();
+        picture.save(folder.join(format!("{name}.png"))).unwrap();
+    };
+    let mut window = Window::new(Tab::Knob, (1100.0, 720.0));
+    click(&mut window, "Page: Feel test");
+    click(&mut window, "Feel test: Threshold");
+    save(&mut window, "feel-test");
+    click(&mut window, "Page: Line, takes, studies");
+    save(&mut window, "line");
+    let mut window = Window::new(Tab::Clarinet, (1100.0, 720.0));
+    click(&mut window, "Hole L3, closed");
+    window.harness.get_by_label("Hole L3, open").hover();
+    window.harness.run_steps(60);
+    save(&mut window, "trying");
+    let mut window = Window::new(Tab::Reed, (1100.0, 720.0));
+    window.harness.get_by_role_and_label(Role::Slider, "Embouchure zeta").hover();
+    window.harness.run_steps(60);
+    save(&mut window, "tool-tip");
+    click(&mut window, "Setting B");
+    window.host.automate("lip", 0.9);
+    window.harness.run();
+    let at = window.harness.get_by_role_and_label(Role::Slider, "Reed strength").rect();
+    let value = at.right_top() + vec2(-8.0, 9.0);
+    window.harness.drag_at(value);
+    window.harness.drop_at(value);
+    window.harness.run();
+    save(&mut window, "typing");
+    window.harness.key_press(Key::Escape);
+    window.harness.run();
+    click(&mut window, "Blind");
+    click(&mut window, "Side Y");
+    save(&mut window, "blind");
+    let mut window = Window::new(Tab::Reed, (1100.0, 720.0));
+    *window.snapshot.borrow_mut() = chalumeau::editor::Snapshot::default();
+    window.harness.run();
+    save(&mut window, "nothing");
 }
 
 #[test]
@@ -194,7 +282,10 @@ fn every_control_is_reached_by_the_tab_key() {
     for tab in Tab::ALL {
         let mut window = Window::tall(tab);
         let is_control = |role: Role| {
-            matches!(role, Role::Slider | Role::Switch | Role::RadioButton | Role::Button | Role::ComboBox | Role::Tab)
+            matches!(
+                role,
+                Role::Slider | Role::Switch | Role::RadioButton | Role::Button | Role::ComboBox | Role::Tab
+            )
         };
         let nodes = window.harness.root().children_recursive();
         let wanted: BTreeSet<String> = nodes
@@ -207,7 +298,8 @@ fn every_control_is_reached_by_the_tab_key() {
             window.harness.key_press(Key::Tab);
             window.harness.run();
             let nodes = window.harness.root().children_recursive();
-            let focused = nodes.filter(|node| node.is_focused()).filter_map(|node| node.accesskit_node().label());
+            let focused =
+                nodes.filter(|node| node.is_focused()).filter_map(|node| node.accesskit_node().label());
             reached.extend(focused);
         }
         let missed: Vec<_> = wanted.difference(&reached).collect();
@@ -222,7 +314,8 @@ fn an_idle_window_does_not_repaint() {
         for _ in 0..5 {
             window.harness.step();
         }
-        let soonest = window.harness.output().viewport_output.values().map(|output| output.repaint_delay).min();
+        let soonest =
+            window.harness.output().viewport_output.values().map(|output| output.repaint_delay).min();
         assert!(soonest.unwrap() >= Duration::from_millis(200), "{tab:?} {soonest:?}");
     }
 }

@@ -10,8 +10,8 @@ use std::sync::Arc;
 use chalumeau::bore::transfer_matrix::TransferMatrix;
 use chalumeau::editor::controls::{Controls, Look};
 use chalumeau::editor::listener::Listener;
-use chalumeau::editor::{Kept, State, Tab, draw};
 use chalumeau::editor::snapshot::{Device, Knob, Level, Scope, Snapshot, Source, Status, Track};
+use chalumeau::editor::{Kept, State, Tab, draw};
 use chalumeau::event::Event;
 use chalumeau::haptics::{FeelDesign, FeelTable, Limits};
 use chalumeau::instrument::{Clarinet, Probe, Settings, Tuning, felt};
@@ -199,17 +199,27 @@ impl Controls for Fake {
 
     fn text(&self, id: &str, value: f32) -> String {
         match self.kind(id) {
-            Kind::Number { min, max, digits, unit, .. } => format!("{:.*}{unit}", *digits, min + value * (max - min)),
+            Kind::Number { min, max, digits, unit, .. } => {
+                format!("{:.*}{unit}", *digits, min + value * (max - min))
+            }
             Kind::Whole { min, max, .. } => format!("{:.0}", *min as f32 + value * (max - min) as f32),
-            Kind::Choice { texts, .. } => texts[(value * (texts.len() - 1) as f32).round() as usize].to_owned(),
+            Kind::Choice { texts, .. } => {
+                texts[(value * (texts.len() - 1) as f32).round() as usize].to_owned()
+            }
         }
     }
 
     fn parse(&self, id: &str, text: &str) -> Option<f32> {
-        let number = |unit: &str| text.trim().trim_end_matches(unit.trim()).trim().replace(',', ".").parse::<f32>().ok();
+        let number = |unit: &str| {
+            text.trim().trim_end_matches(unit.trim()).trim().replace(',', ".").parse::<f32>().ok()
+        };
         match self.kind(id) {
-            Kind::Number { min, max, unit, .. } => Some(((number(unit)? - min) / (max - min)).clamp(0.0, 1.0)),
-            Kind::Whole { min, max, .. } => Some(((number("")? - *min as f32) / (max - min) as f32).clamp(0.0, 1.0)),
+            Kind::Number { min, max, unit, .. } => {
+                Some(((number(unit)? - min) / (max - min)).clamp(0.0, 1.0))
+            }
+            Kind::Whole { min, max, .. } => {
+                Some(((number("")? - *min as f32) / (max - min) as f32).clamp(0.0, 1.0))
+            }
             Kind::Choice { texts, .. } => {
                 Some(texts.iter().position(|known| *known == text)? as f32 / (texts.len() - 1) as f32)
             }
@@ -230,7 +240,12 @@ impl Controls for Fake {
     }
 
     fn end(&self, id: &str) {
-        let at = self.open.borrow().iter().position(|open| open == id).unwrap_or_else(|| panic!("{id} ends without begin"));
+        let at = self
+            .open
+            .borrow()
+            .iter()
+            .position(|open| open == id)
+            .unwrap_or_else(|| panic!("{id} ends without begin"));
         self.open.borrow_mut().remove(at);
         self.told.borrow_mut().push(Told::End(id.to_owned()));
     }
@@ -288,15 +303,17 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
     let reed = felt::played_reed(&model.file, settings);
     let limits = Limits { ceiling_mnm: 250.0, stiffness_nm_per_rad: 10.0, push_nm_per_rad: 10.0 };
     let table = FeelTable::new(&bore, &FeelDesign::default(), &reed, &limits);
-    let feel = table.map_err(|refused| refused.to_string()).and_then(|table| {
-        table.note(fingering).copied().ok_or_else(|| "this note has no feel".to_owned())
-    });
+    let feel = table
+        .map_err(|refused| refused.to_string())
+        .and_then(|table| table.note(fingering).copied().ok_or_else(|| "this note has no feel".to_owned()));
     let angle_deg = feel.as_ref().ok().map(|feel| feel.map.angle_deg(f64::from(mouth_kpa) * 1e3) as f32);
     let torque_mnm = feel.as_ref().ok().zip(angle_deg).map(|(feel, deg)| {
-        chalumeau::haptics::law::torque_mnm(&feel.feel, chalumeau::reed::ReedTables::seed(), f64::from(deg)) as f32
+        chalumeau::haptics::law::torque_mnm(&feel.feel, chalumeau::reed::ReedTables::seed(), f64::from(deg))
+            as f32
     });
     let standing = TransferMatrix::new(&model.file, model.air).standing_pressure(wanted_hz, open);
-    let source = |name: &str, value: f32, is_live, is_seen| Source { name: name.into(), value, is_live, is_seen };
+    let source =
+        |name: &str, value: f32, is_live, is_seen| Source { name: name.into(), value, is_live, is_seen };
     Snapshot {
         instrument: Arc::new(model.file.clone()),
         instruments: ["B flat", "A", "E flat", "C", "Bass"].map(String::from).to_vec(),

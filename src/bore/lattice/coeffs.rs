@@ -7,13 +7,20 @@ use super::{LANES, ROWS};
 use crate::bore::cells::Cells;
 use crate::bore::tone_hole::{HoleCoeffs, HoleNetwork};
 use crate::bore::wall_loss;
-use crate::units::{Air, REFERENCE_RADIUS_M};
+use crate::units::Air;
+
+/// Chunks of eight lanes that so many tone holes take: two neighbours never share one, unless there is only one hole.
+pub fn hole_chunks(holes: usize) -> usize {
+    holes.div_ceil(LANES).max(usize::from(holes > 1) + usize::from(holes > 0))
+}
 
 /// Everything of a lattice that playing does not change.
 #[derive(Clone, Debug)]
 pub struct LatticeCoeffs {
     /// Sample rate, Hz.
     pub rate_hz: f64,
+    /// Radius of the bore whose admittance all others are over, m.
+    pub nominal_radius_m: f64,
     pub(super) ticks: Vec<u32>,
     /// Admittance of each cell over the reference.
     pub(super) admittance: Vec<f64>,
@@ -43,23 +50,25 @@ impl LatticeCoeffs {
                 (amount, wall_loss::pole_coefficient(cells.loss_poles_hz[cell % 3], rate_hz))
             })
             .collect();
+        let nominal_radius_m = cells.nominal_radius_m;
         let radius = cells.end_radius_m;
-        let z_end = air.z_c(radius) / air.z_c(REFERENCE_RADIUS_M);
+        let z_end = air.z_c(radius) / air.z_c(nominal_radius_m);
         let end = crate::bore::tone_hole::END_CORRECTION;
         Self {
             rate_hz,
+            nominal_radius_m,
             ticks: cells.cells.iter().map(|cell| cell.ticks).collect(),
-            admittance: cells.cells.iter().map(|cell| (cell.radius_m / REFERENCE_RADIUS_M).powi(2)).collect(),
+            admittance: cells.cells.iter().map(|cell| (cell.radius_m / nominal_radius_m).powi(2)).collect(),
             loss,
             holes: networks
                 .iter()
-                .map(|network| HoleCoeffs {
-                    rs: network.coeffs(rate_hz, air).rs
-                        * if network.register { cells.vent_resistance } else { 1.0 },
-                    ..network.coeffs(rate_hz, air)
+                .map(|network| {
+                    let coeffs = network.coeffs(rate_hz, nominal_radius_m, air);
+                    let vent = if network.register { cells.vent_resistance } else { 1.0 };
+                    HoleCoeffs { rs: coeffs.rs * vent, ..coeffs }
                 })
                 .collect(),
-            jets: networks.iter().map(|network| network.jet(p_ref_pa, air)).collect(),
+            jets: networks.iter().map(|network| network.jet(p_ref_pa, nominal_radius_m, air)).collect(),
             hole_junctions: cells.hole_junctions.clone(),
             bell: (0.25 / (end * end) / z_end, air.c / (2.0 * rate_hz * end * radius * z_end)),
         }
@@ -73,6 +82,11 @@ impl LatticeCoeffs {
     /// Number of tone holes.
     pub fn holes(&self) -> usize {
         self.holes.len()
+    }
+
+    /// Whether the tone holes of another lattice are the same.
+    pub fn same_holes(&self, other: &Self) -> bool {
+        self.holes == other.holes
     }
 
     /// Reflectance at the tip, exactly what [`Lattice`](super::Lattice) does with fixed openings and no jets, at `f_hz`.
@@ -137,10 +151,18 @@ impl LatticeCoeffs {
         (1..=end).max_by_key(|&cell| (self.ticks[cell], std::cmp::Reverse(cell))).unwrap_or(1)
     }
 
-    /// Range of the tuning delay, rows of the round trip.
+    /// Range of the tuning delay, rows of the round trip: the tuned cell's returning wave may take from one row to at least
+    /// twice as many as it does.
     pub fn tuning_range(&self) -> (f64, f64) {
         let back = f64::from(self.rows(self.tuned_cell()).1);
-        (1.0 - back, (ROWS - 2) as f64 - back)
+        (1.0 - back, f64::from(self.ring_rows() - 2) - back)
+    }
+
+    /// Rows the ring needs: for the longest cell, and for twice the tuned one's returning wave.
+    pub(super) fn ring_rows(&self) -> u32 {
+        let longest = self.all_rows().map(|(down, back)| down.max(back)).max().unwrap_or_default();
+        let tuned = 2 * self.rows(self.tuned_cell()).1;
+        (longest.max(tuned) + 3).next_power_of_two().clamp(ROWS.0, ROWS.1)
     }
 
     /// Rows a cell gives to the wave going down and to the one coming back.
@@ -165,10 +187,7 @@ impl LatticeCoeffs {
     }
 
     pub(super) fn hole_chunks(&self) -> usize {
-        self.holes
-            .len()
-            .div_ceil(LANES)
-            .max(usize::from(self.holes.len() > 1) + usize::from(!self.holes.is_empty()))
+        hole_chunks(self.holes.len())
     }
 
     pub(super) fn step_chunks(&self) -> usize {

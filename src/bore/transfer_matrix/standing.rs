@@ -72,7 +72,8 @@ mod tests {
             assert!(wave[0].0.abs() < 1e-12 && (wave[0].1 - 1.0).abs() < 1e-12);
             // Minima well inside the bore, away from the open end.
             let inside: Vec<_> = wave.iter().filter(|&&(x_m, _)| x_m < 0.8 * file.length_m()).collect();
-            let minima = inside.windows(3).filter(|w| w[1].1 < w[0].1 && w[1].1 < w[2].1 && w[1].1 < 0.3).count();
+            let minima =
+                inside.windows(3).filter(|w| w[1].1 < w[0].1 && w[1].1 < w[2].1 && w[1].1 < 0.3).count();
             assert_eq!(minima, nodes, "{midi}");
             assert!(wave.last().unwrap().1 < 0.3, "{midi}: little pressure at the bell");
         }
