@@ -216,6 +216,7 @@ pub fn draw(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &
     let (width, height) = (ui.available_width(), ui.available_height());
     let is_small = width < 900.0 || height < 560.0;
     let tab = kept.tab;
+    let is_blind = compare.is_blind();
 
     let ground = |x: i8, y: i8| Frame::new().fill(c.ground).inner_margin(Margin::symmetric(x, y));
     let line = Panel::top("tools").exact_size(if is_small { 44.0 } else { 52.0 }).show_separator_line(false);
@@ -228,9 +229,9 @@ pub fn draw(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &
     line.frame(ground(8, 5)).show(ui, |ui| keyboard.draw(ui, snapshot, &mut actions));
     let line =
         Panel::right("meter").exact_size(if is_small { 96.0 } else { 112.0 }).show_separator_line(false);
-    line.frame(ground(8, 8)).show(ui, |ui| meter::column(ui, snapshot));
+    line.frame(ground(8, 8)).show(ui, |ui| meter::column(ui, snapshot, !is_blind));
     CentralPanel::default().frame(ground(8, 8)).show(ui, |ui| {
-        if compare.is_blind() {
+        if is_blind {
             blind_view::draw(ui, compare, &mut hands);
             return;
         }

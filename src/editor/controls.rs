@@ -355,7 +355,8 @@ fn type_value(ui: &mut Ui, hands: &mut Hands, id: &'static str, rect: Rect) {
         .text_color(if entry.is_wrong { c.danger } else { c.ink })
         .align(egui::Align2::RIGHT_CENTER)
         .desired_width(rect.width());
-    let response = ui.put(rect, field);
+    // In a place of its own: `put` here would move what follows.
+    let response = ui.new_child(egui::UiBuilder::new().max_rect(rect)).put(rect, field);
     let name = hands.name(id);
     response.widget_info(|| WidgetInfo::labeled(Role::TextInput, true, format!("{name}, value")));
     if !entry.is_shown {

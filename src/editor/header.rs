@@ -40,7 +40,10 @@ pub fn tools(ui: &mut Ui, kept: &mut Kept, compare: &mut Compare, hands: &mut Ha
             ui.add_space(4.0);
             sides(ui, compare, hands, is_wide);
             ui.add_space(4.0);
-            undo(ui, hands);
+            // Undo would tell what was set, and on which side.
+            if !compare.is_blind() {
+                undo(ui, hands);
+            }
         });
     });
 }

@@ -6,6 +6,9 @@ use crate::editor::snapshot::{Marks, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
+/// Top of the scale of a blind comparison, kPa: the same for every setting.
+const BLIND_FULL_KPA: f32 = 10.0;
+
 /// Top of every scale of mouth pressure, kPa: a little above what matters for this reed and note.
 pub fn full_kpa(snapshot: &Snapshot) -> f32 {
     let marks = snapshot.marks();
@@ -54,14 +57,14 @@ pub fn bands(speaks: f32, beats: f32, closes: f32, end: f32, c: &Colours) -> [(f
         .map(|(from, to, colour)| (from, to, colour.gamma_multiply(0.14)))
 }
 
-/// The column, as high as its place.
-pub fn column(ui: &mut Ui, snapshot: &Snapshot) {
+/// The column, as high as its place. Without the marks where they would tell one setting from another.
+pub fn column(ui: &mut Ui, snapshot: &Snapshot, has_marks: bool) {
     let c = Colours::here(ui);
     let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
-    let full = full_kpa(snapshot);
+    let full = if has_marks { full_kpa(snapshot) } else { BLIND_FULL_KPA };
     let kpa = snapshot.mouth_now_kpa();
     let marks_of = snapshot.marks();
-    let (word, colour) = state(&marks_of, kpa, c);
+    let (word, colour) = if has_marks { state(&marks_of, kpa, c) } else { ("", c.quiet) };
 
     let painter = ui.painter();
     painter.text(
@@ -83,7 +86,9 @@ pub fn column(ui: &mut Ui, snapshot: &Snapshot) {
     let speaks = marks_of.speaks_kpa.unwrap_or(marks_of.closes_kpa);
     let beats = marks_of.beats_kpa.unwrap_or(marks_of.closes_kpa).max(speaks);
     let end = marks_of.chokes_kpa.unwrap_or(full).min(full);
-    for (from, to, colour) in bands(speaks, beats, marks_of.closes_kpa, end, c) {
+    for (from, to, colour) in
+        bands(speaks, beats, marks_of.closes_kpa, end, c).into_iter().filter(|_| has_marks)
+    {
         let band = Rect::from_min_max(pos2(scale.left(), y(to)), pos2(scale.right(), y(from)));
         painter.rect_filled(band, CornerRadius::ZERO, colour);
     }
@@ -93,7 +98,7 @@ pub fn column(ui: &mut Ui, snapshot: &Snapshot) {
 
     let mut lowest = f32::INFINITY;
     for (at, name, colour) in marks(snapshot, c) {
-        if at > full {
+        if at > full || !has_marks {
             continue;
         }
         painter.hline(scale.left()..=scale.right() + 5.0, y(at), Stroke::new(1.5, colour));

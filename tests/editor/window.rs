@@ -65,6 +65,8 @@ fn a_and_b_keep_their_settings_and_blind_hides_them() {
     click(&mut window, "Blind");
     // Nothing tells: no slider, no curve.
     assert!(window.harness.query_by_label("Lip opening").is_none());
+    assert!(window.harness.query_by_label("Undo").is_none());
+    window.harness.get_by_label("Mouth pressure 3.00 kPa, ");
     let heard: BTreeSet<String> = ["Side X", "Side Y"]
         .into_iter()
         .map(|side| {
