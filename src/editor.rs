@@ -9,6 +9,7 @@
 mod blind_view;
 mod breath_view;
 mod chart;
+mod clarinet_body;
 mod clarinet_view;
 pub mod compare;
 pub mod controls;
@@ -21,10 +22,12 @@ mod knob_panel;
 pub mod listener;
 mod meter;
 mod reed_view;
+mod slider;
 pub mod snapshot;
 mod sound_view;
 pub mod terms;
 pub mod theme;
+mod widgets;
 
 use std::path::PathBuf;
 

@@ -1,0 +1,221 @@
+//! The slider: drags relative to where it stands (Shift: ten times finer), goes to its default by a double click or
+//! Ctrl-click, takes typed text by a click on its value or Enter, and moves by arrow keys when it has the focus.
+
+use egui::accesskit::Action as AccessAction;
+use egui::{
+    Align2, CornerRadius, CursorIcon, EventFilter, Key, Rect, Response, Role, Sense, Stroke, TextEdit, Ui,
+    WidgetInfo, pos2, vec2,
+};
+
+use crate::editor::controls::{Entry, Hands, Look, teach};
+use crate::editor::theme;
+use crate::editor::theme::Colours;
+
+const HOW_SLIDER: &str =
+    "Drag; Shift: finer. Double click or Ctrl-click: default. Click the value or Enter: type.";
+/// Height of a slider, name and track together.
+const SLIDER_HEIGHT: f32 = 36.0;
+/// Share of the track an arrow key moves; a hundredth of that with Shift.
+const KEY_STEP: f32 = 0.01;
+
+/// A named slider as wide as its place. Nothing where there is no such parameter.
+pub fn slider(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Response> {
+    let look = hands.controls.look(id)?;
+    let c = Colours::here(ui);
+    let width = ui.available_width().max(60.0);
+    let (rect, mut response) = ui.allocate_exact_size(vec2(width, SLIDER_HEIGHT), Sense::click_and_drag());
+    let text = hands.controls.text(id, look.value);
+    let galley = ui.painter().layout_no_wrap(text.clone(), theme::body(), c.ink);
+    let value_size = galley.size() + vec2(10.0, 4.0);
+    let value_rect = Rect::from_min_size(pos2(rect.right() - value_size.x + 5.0, rect.top()), value_size);
+    let is_typing = hands.entry.as_ref().is_some_and(|entry| entry.id == id);
+    // One stop of the Tab key a slider: its value opens by Enter.
+    let value_response = ui.interact(value_rect, response.id.with("value"), Sense::CLICK);
+
+    let track = Rect::from_min_max(
+        pos2(rect.left() + 6.0, rect.bottom() - 11.0),
+        pos2(rect.right() - 6.0, rect.bottom() - 7.0),
+    );
+    let mut value = look.value;
+    if !is_typing {
+        value = moved_by_pointer(ui, hands, id, &look, &response, track.width()).unwrap_or(value);
+        if response.has_focus() {
+            value = moved_by_keys(ui, hands, id, &look, &response).unwrap_or(value);
+        }
+        let is_reset = response.double_clicked() || (response.clicked() && ui.input(|i| i.modifiers.command));
+        if is_reset {
+            value = look.default;
+            hands.put(id, value);
+        } else if value_response.clicked()
+            || (response.clicked() && response.has_focus() && ui.input(pressed_enter))
+        {
+            *hands.entry = Some(Entry { id, text: text.clone(), is_wrong: false, is_shown: false });
+        }
+    }
+    if value != look.value {
+        response.mark_changed();
+    }
+
+    paint_slider(ui, c, rect, track, &look, value, &response);
+    if is_typing {
+        type_value(
+            ui,
+            hands,
+            id,
+            Rect::from_min_max(
+                pos2(rect.right() - 96.0, rect.top() - 1.0),
+                pos2(rect.right(), rect.top() + 21.0),
+            ),
+        );
+    } else {
+        let ink = if value_response.hovered() { c.accent } else { c.ink };
+        ui.painter().text(
+            pos2(rect.right(), rect.top() + 9.0),
+            Align2::RIGHT_CENTER,
+            &text,
+            theme::body(),
+            ink,
+        );
+    }
+    response.widget_info(|| {
+        let mut info = WidgetInfo::slider(ui.is_enabled(), f64::from(value), &look.name);
+        info.current_text_value = Some(text.clone());
+        info
+    });
+    value_response.on_hover_cursor(CursorIcon::Text);
+    let response = response.on_hover_and_drag_cursor(CursorIcon::ResizeHorizontal);
+    Some(response.on_hover_ui(|ui| teach(ui, id, HOW_SLIDER)))
+}
+
+fn pressed_enter(input: &egui::InputState) -> bool {
+    input.key_pressed(Key::Enter)
+}
+
+fn moved_by_pointer(
+    ui: &Ui,
+    hands: &mut Hands,
+    id: &'static str,
+    look: &Look,
+    response: &Response,
+    width: f32,
+) -> Option<f32> {
+    // Where the hand would be on a track without steps: else a stepped slider never leaves its step.
+    let exact = response.id.with("exact");
+    if response.drag_started() {
+        hands.begin(id);
+        ui.data_mut(|data| data.insert_temp(exact, look.value));
+    }
+    let mut value = None;
+    if response.dragged() && response.drag_delta().x != 0.0 {
+        let fine = if ui.input(|i| i.modifiers.shift) { 0.1 } else { 1.0 };
+        let from = ui.data(|data| data.get_temp::<f32>(exact)).unwrap_or(look.value);
+        let to = (from + fine * response.drag_delta().x / width).clamp(0.0, 1.0);
+        ui.data_mut(|data| data.insert_temp(exact, to));
+        let to = stepped(look, to);
+        hands.set(id, to);
+        value = Some(to);
+    }
+    if response.drag_stopped() {
+        hands.end(id);
+    }
+    value
+}
+
+fn stepped(look: &Look, value: f32) -> f32 {
+    match look.steps {
+        Some(steps) if steps > 0 => (value * steps as f32).round() / steps as f32,
+        _ => value,
+    }
+}
+
+fn moved_by_keys(
+    ui: &Ui,
+    hands: &mut Hands,
+    id: &'static str,
+    look: &Look,
+    response: &Response,
+) -> Option<f32> {
+    let filter = EventFilter { horizontal_arrows: true, ..EventFilter::default() };
+    ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, filter));
+    let unit = look.steps.map_or(KEY_STEP, |steps| 1.0 / steps.max(1) as f32);
+    let (mut by, mut to) = (0.0, None);
+    ui.input(|input| {
+        let fine = if input.modifiers.shift && look.steps.is_none() { 0.1 } else { 1.0 };
+        by += unit
+            * fine
+            * (input.num_presses(Key::ArrowRight) as f32 - input.num_presses(Key::ArrowLeft) as f32);
+        by += unit * input.num_accesskit_action_requests(response.id, AccessAction::Increment) as f32;
+        by -= unit * input.num_accesskit_action_requests(response.id, AccessAction::Decrement) as f32;
+        if input.key_pressed(Key::Home) {
+            to = Some(0.0);
+        } else if input.key_pressed(Key::End) {
+            to = Some(1.0);
+        } else if input.key_pressed(Key::Delete) || input.key_pressed(Key::Backspace) {
+            to = Some(look.default);
+        }
+    });
+    let value = to.or((by != 0.0).then(|| (look.value + by).clamp(0.0, 1.0)))?;
+    hands.put(id, value);
+    Some(value)
+}
+
+fn paint_slider(ui: &Ui, c: &Colours, rect: Rect, track: Rect, look: &Look, value: f32, response: &Response) {
+    let painter = ui.painter();
+    let name = if response.hovered() || response.has_focus() { c.ink } else { c.quiet };
+    painter.text(pos2(rect.left(), rect.top() + 9.0), Align2::LEFT_CENTER, &look.name, theme::body(), name);
+    let at = |unit: f32| track.left() + unit.clamp(0.0, 1.0) * track.width();
+    let round = CornerRadius::same(2);
+    painter.rect_filled(track, round, c.raised);
+    painter.rect_filled(Rect::from_min_max(track.min, pos2(at(value), track.bottom())), round, c.accent);
+    // Where the default is.
+    painter.vline(at(look.default), track.top() - 3.0..=track.top() - 0.5, Stroke::new(1.0, c.quiet));
+    let is_held = response.dragged() || response.has_focus();
+    let radius = if is_held || response.hovered() { 7.0 } else { 6.0 };
+    let centre = pos2(at(value), track.center().y);
+    painter.circle(centre, radius, c.panel, Stroke::new(2.0, c.accent));
+    if response.has_focus() {
+        painter.circle_stroke(centre, radius + 3.0, Stroke::new(1.0, c.accent));
+    }
+}
+
+/// The text field over a value. Enter takes it, Escape leaves it, and so does a click elsewhere.
+fn type_value(ui: &mut Ui, hands: &mut Hands, id: &'static str, rect: Rect) {
+    let Some(mut entry) = hands.entry.take() else { return };
+    let c = Colours::here(ui);
+    let field = TextEdit::singleline(&mut entry.text)
+        .id(egui::Id::unique(("value of", id)))
+        .font(theme::body())
+        .text_color(if entry.is_wrong { c.danger } else { c.ink })
+        .align(egui::Align2::RIGHT_CENTER)
+        .desired_width(rect.width());
+    // In a place of its own: `put` here would move what follows.
+    let response = ui.new_child(egui::UiBuilder::new().max_rect(rect)).put(rect, field);
+    let name = hands.name(id);
+    response.widget_info(|| WidgetInfo::labeled(Role::TextInput, true, format!("{name}, value")));
+    if !entry.is_shown {
+        entry.is_shown = true;
+        response.request_focus();
+        select_all(ui, response.id, entry.text.chars().count());
+    }
+    let is_left = response.lost_focus();
+    let is_taken = is_left && ui.input(pressed_enter);
+    if is_taken {
+        match hands.controls.parse(id, &entry.text) {
+            Some(value) => hands.put(id, value),
+            None => {
+                entry.is_wrong = true;
+                response.request_focus();
+                *hands.entry = Some(entry);
+            }
+        }
+    } else if !is_left {
+        *hands.entry = Some(entry);
+    }
+}
+
+fn select_all(ui: &Ui, id: egui::Id, chars: usize) {
+    use egui::text::{CCursor, CCursorRange};
+    let mut state = egui::text_edit::TextEditState::load(ui.ctx(), id).unwrap_or_default();
+    state.cursor.set_char_range(Some(CCursorRange::two(CCursor::new(0), CCursor::new(chars))));
+    state.store(ui.ctx(), id);
+}

@@ -1,0 +1,210 @@
+//! The other widgets: choices, switches, buttons that act, headings, handles in pictures, and tool tips that teach.
+
+use egui::{
+    Align2, CornerRadius, CursorIcon, EventFilter, FontId, Key, Pos2, Rect, Response, Role, Sense, Stroke,
+    Ui, Vec2, WidgetInfo, pos2, vec2,
+};
+
+use crate::editor::controls::Hands;
+use crate::editor::terms;
+use crate::editor::theme;
+use crate::editor::theme::Colours;
+
+/// The tool tip of a parameter: the word, what it does to sound and feel, how to move it.
+pub fn teach(ui: &mut Ui, id: &str, how: &str) {
+    let c = Colours::here(ui);
+    let Some(term) = terms::of(id) else { return };
+    ui.set_max_width(300.0);
+    ui.label(egui::RichText::new(term.word).strong());
+    for (what, text) in [("Sound", term.sound), ("Feel", term.feel)] {
+        if !text.is_empty() {
+            ui.label(egui::RichText::new(if term.feel.is_empty() {
+                text.to_owned()
+            } else {
+                format!("{what}: {text}")
+            }));
+        }
+    }
+    if !how.is_empty() {
+        ui.label(egui::RichText::new(how).font(theme::small()).color(c.quiet));
+    }
+}
+
+/// A row of choices side by side under a name; a list to open where they would not fit.
+pub fn choice(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Response> {
+    let look = hands.controls.look(id)?;
+    let c = Colours::here(ui);
+    let steps = look.steps.unwrap_or(1).max(1);
+    let texts: Vec<String> =
+        (0..=steps).map(|step| hands.controls.text(id, step as f32 / steps as f32)).collect();
+    let now = (look.value * steps as f32).round() as usize;
+    ui.add_space(1.0);
+    let name = ui.label(egui::RichText::new(&look.name).color(c.quiet));
+    name.on_hover_ui(|ui| teach(ui, id, ""));
+    let width = |text: &str| ui.painter().layout_no_wrap(text.to_owned(), theme::body(), c.ink).size().x;
+    // Cells are equally wide.
+    let needed = texts.iter().map(|text| width(text) + 14.0).fold(0.0, f32::max) * texts.len() as f32;
+    let mut chosen = now;
+    let response = if needed <= ui.available_width() {
+        segments(ui, &look.name, &texts, &mut chosen)
+    } else {
+        let list = egui::ComboBox::from_id_salt(("choice", id)).width(ui.available_width() - 8.0);
+        let list = list.selected_text(texts.get(now).cloned().unwrap_or_default());
+        let response = list.show_ui(ui, |ui| {
+            for (step, text) in texts.iter().enumerate() {
+                ui.selectable_value(&mut chosen, step, text);
+            }
+        });
+        let text = texts.get(now).cloned().unwrap_or_default();
+        response.response.widget_info(|| {
+            let mut info = WidgetInfo::labeled(Role::ComboBox, true, &look.name);
+            info.current_text_value = Some(text.clone());
+            info
+        });
+        response.response
+    };
+    if chosen != now {
+        hands.put(id, chosen as f32 / steps as f32);
+    }
+    Some(response.on_hover_ui(|ui| teach(ui, id, "")))
+}
+
+/// Buttons in one frame, of which one is down.
+pub fn segments(ui: &mut Ui, name: &str, texts: &[String], chosen: &mut usize) -> Response {
+    let c = Colours::here(ui);
+    let (rect, whole) = ui.allocate_exact_size(vec2(ui.available_width(), 24.0), Sense::hover());
+    let painter = ui.painter().clone();
+    painter.rect_filled(rect, CornerRadius::same(theme::SMALL_RADIUS + 1), c.raised);
+    let width = rect.width() / texts.len().max(1) as f32;
+    for (index, text) in texts.iter().enumerate() {
+        let cell = Rect::from_min_size(
+            pos2(rect.left() + index as f32 * width, rect.top()),
+            vec2(width, rect.height()),
+        );
+        let response = ui.interact(cell, whole.id.with(index), Sense::click());
+        if response.clicked() {
+            *chosen = index;
+        }
+        let is_chosen = *chosen == index;
+        let inner = cell.shrink(2.0);
+        let round = CornerRadius::same(theme::SMALL_RADIUS);
+        if is_chosen {
+            painter.rect_filled(inner, round, c.accent);
+        } else if response.hovered() {
+            painter.rect_filled(inner, round, c.hovered);
+        }
+        if response.has_focus() {
+            painter.rect_stroke(inner, round, Stroke::new(1.5, c.ink), egui::StrokeKind::Inside);
+        }
+        let ink = if is_chosen { c.on_accent } else { c.ink };
+        painter.text(cell.center(), Align2::CENTER_CENTER, text, theme::body(), ink);
+        response.widget_info(|| {
+            WidgetInfo::selected(Role::RadioButton, true, is_chosen, format!("{name}: {text}"))
+        });
+    }
+    whole
+}
+
+/// A switch with its name.
+pub fn switch(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Response> {
+    let look = hands.controls.look(id)?;
+    let is_on = look.value >= 0.5;
+    let mut response = toggle(ui, &look.name, is_on);
+    if response.clicked() {
+        let value = if ui.input(|i| i.modifiers.command) { look.default } else { f32::from(!is_on) };
+        hands.put(id, value);
+        response.mark_changed();
+    }
+    Some(response.on_hover_ui(|ui| teach(ui, id, "Click: on, off.")))
+}
+
+/// The picture and the hand of a switch.
+pub fn toggle(ui: &mut Ui, name: &str, is_on: bool) -> Response {
+    let c = Colours::here(ui);
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 24.0), Sense::click());
+    let painter = ui.painter();
+    let ink = if response.hovered() { c.ink } else { c.quiet };
+    painter.text(pos2(rect.left(), rect.center().y), Align2::LEFT_CENTER, name, theme::body(), ink);
+    let track = Rect::from_center_size(pos2(rect.right() - 16.0, rect.center().y), vec2(30.0, 16.0));
+    let round = CornerRadius::same(8);
+    painter.rect_filled(track, round, if is_on { c.accent } else { c.raised });
+    let x = if is_on { track.right() - 8.0 } else { track.left() + 8.0 };
+    painter.circle(
+        pos2(x, track.center().y),
+        6.0,
+        c.panel,
+        Stroke::new(1.0, if is_on { c.accent } else { c.quiet }),
+    );
+    if response.has_focus() {
+        painter.rect_stroke(
+            track.expand(2.0),
+            CornerRadius::same(10),
+            Stroke::new(1.5, c.accent),
+            egui::StrokeKind::Outside,
+        );
+    }
+    response.widget_info(|| WidgetInfo::selected(Role::Switch, true, is_on, name));
+    response
+}
+
+/// A button that is on while it is held: what it stands for happens once.
+pub fn momentary(ui: &mut Ui, hands: &mut Hands, id: &'static str, text: &str) -> Option<Response> {
+    hands.controls.look(id)?;
+    let response = ui.button(text);
+    if response.clicked() {
+        hands.begin(id);
+        hands.set(id, 1.0);
+        hands.set(id, 0.0);
+        hands.end(id);
+    }
+    Some(response.on_hover_ui(|ui| teach(ui, id, "")))
+}
+
+/// A heading between controls.
+pub fn heading(ui: &mut Ui, text: &str) {
+    let c = Colours::here(ui);
+    ui.add_space(4.0);
+    ui.label(egui::RichText::new(text).font(FontId::proportional(12.0)).color(c.accent).strong());
+}
+
+/// A handle in a picture: its response, and where a hand takes it this frame.
+pub fn handle(ui: &mut Ui, name: &str, at: Pos2, text: &str) -> (Response, Option<Pos2>) {
+    let c = Colours::here(ui);
+    let rect = Rect::from_center_size(at, Vec2::splat(26.0));
+    let response = ui.interact(rect, ui.scope_id().with(("handle", name)), Sense::click_and_drag());
+    // Where the hand is, which need not be where the parameter could follow.
+    let hand = response.id.with("hand");
+    let mut to = None;
+    if response.drag_started() {
+        ui.data_mut(|data| data.insert_temp(hand, at));
+    }
+    if response.dragged() && response.drag_delta() != Vec2::ZERO {
+        let place = ui.data(|data| data.get_temp::<Pos2>(hand)).unwrap_or(at) + response.drag_delta();
+        ui.data_mut(|data| data.insert_temp(hand, place));
+        to = Some(place);
+    }
+    if response.has_focus() {
+        let filter = EventFilter { horizontal_arrows: true, vertical_arrows: true, ..EventFilter::default() };
+        ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, filter));
+        let by = ui.input(|input| {
+            let presses = |key| input.num_presses(key) as f32;
+            let fine = if input.modifiers.shift { 0.5 } else { 4.0 };
+            fine * vec2(
+                presses(Key::ArrowRight) - presses(Key::ArrowLeft),
+                presses(Key::ArrowDown) - presses(Key::ArrowUp),
+            )
+        });
+        if by != Vec2::ZERO {
+            to = Some(at + by);
+        }
+    }
+    let is_held = response.hovered() || response.dragged() || response.has_focus();
+    let radius = if is_held { 10.0 } else { 9.0 };
+    ui.painter().circle(at, radius, c.panel, Stroke::new(2.0, c.accent));
+    ui.painter().text(at, Align2::CENTER_CENTER, text, theme::small(), c.ink);
+    if response.has_focus() {
+        ui.painter().circle_stroke(at, radius + 3.0, Stroke::new(1.0, c.accent));
+    }
+    response.widget_info(|| WidgetInfo::labeled(Role::Slider, true, name));
+    (response.on_hover_and_drag_cursor(CursorIcon::Grab), to)
+}
