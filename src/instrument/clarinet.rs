@@ -17,8 +17,10 @@ use crate::reed::ReedCoeffs;
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
 use crate::reed::motion::TONGUE_FORCE;
+use crate::units::REFERENCE_RADIUS_M;
 
-/// Full scale per pascal at 1 m: 1 Pa is -6 dBFS.
+/// Full scale per pascal at 1 m from a B flat clarinet: 1 Pa is -6 dBFS. A larger instrument is heard from further away, in
+/// proportion to its nominal bore: two that differ only in size are equally loud, and a bass does not live in the limiter.
 const FULL_SCALE_PER_PA: f64 = 0.501_187_233_627_272_2;
 /// Silence: -120 dBFS.
 const SILENCE: f32 = 1e-6;
@@ -38,6 +40,7 @@ pub struct Clarinet {
     spare: [f32; TICK],
     spare_from: usize,
     inner: Box<[f32]>,
+    full_scale_per_pa: f64,
     gain: f32,
     gain_wanted: f32,
     gain_step: f32,
@@ -61,7 +64,8 @@ impl Clarinet {
         voice.hold_reed(TONGUE_FORCE);
         let resampler = Resampler::new(rate, host_rate_hz);
         let inner = vec![0.0; resampler.inputs_needed_at_most(CHUNK)].into_boxed_slice();
-        let gain = gain_of(&Settings::default());
+        let full_scale_per_pa = FULL_SCALE_PER_PA * (REFERENCE_RADIUS_M / model.file.nominal_radius_m);
+        let gain = gain_of(&Settings::default(), full_scale_per_pa);
         Self {
             model,
             player: Player::default(),
@@ -71,6 +75,7 @@ impl Clarinet {
             spare: [0.0; TICK],
             spare_from: TICK,
             inner,
+            full_scale_per_pa,
             gain,
             gain_wanted: gain,
             // A change of gain takes 20 ms per factor of one.
@@ -83,7 +88,7 @@ impl Clarinet {
     /// Takes new settings; heard from the next control tick on. Real-time safe.
     pub fn set_settings(&mut self, settings: &Settings) {
         self.player.set_settings(settings);
-        self.gain_wanted = gain_of(self.player.settings());
+        self.gain_wanted = gain_of(self.player.settings(), self.full_scale_per_pa);
     }
 
     /// What the player does now. Real-time safe.
@@ -217,6 +222,6 @@ impl Clarinet {
     }
 }
 
-fn gain_of(settings: &Settings) -> f32 {
-    (FULL_SCALE_PER_PA * 10.0_f64.powf(f64::from(settings.gain_db) / 20.0)) as f32
+fn gain_of(settings: &Settings, full_scale_per_pa: f64) -> f32 {
+    (full_scale_per_pa * 10.0_f64.powf(f64::from(settings.gain_db) / 20.0)) as f32
 }
