@@ -161,12 +161,25 @@ impl Sheet {
         let mut bytes = Vec::new();
         let mut encoder = gif::Encoder::new(&mut bytes, width, height, &[]).map_err(DrawError::backend)?;
         encoder.set_repeat(gif::Repeat::Infinite).map_err(DrawError::backend)?;
+        let mut before: Vec<u8> = Vec::new();
         for figure in frames {
             let pixels = rgb(figure, size)?;
+            // Only what has changed: the rest of the frame before stays.
+            let (left, top, across, down) = changed(&before, &pixels, size);
+            let part: Vec<u8> = (top..top + down)
+                .flat_map(|y| {
+                    let start = 3 * (y * size.width + left) as usize;
+                    &pixels[start..start + 3 * across as usize]
+                })
+                .copied()
+                .collect();
             // 10: the middle of the encoder's scale from good (1) to fast (30) choice of colours.
-            let mut frame = gif::Frame::from_rgb_speed(width, height, &pixels, 10);
+            let mut frame = gif::Frame::from_rgb_speed(across as u16, down as u16, &part, 10);
+            (frame.left, frame.top) = (left as u16, top as u16);
+            frame.dispose = gif::DisposalMethod::Keep;
             frame.delay = (100.0 * frame_s).round().clamp(2.0, 6_000.0) as u16;
             encoder.write_frame(&frame).map_err(DrawError::backend)?;
+            before = pixels;
             drawn();
         }
         drop(encoder);
@@ -178,6 +191,23 @@ impl Sheet {
         self.file.write_all(bytes).map_err(|reason| DrawError::Write { path, reason })?;
         Ok(self.file.keep()?)
     }
+}
+
+/// Left, top, width and height of what differs between two bitmaps; one pixel if nothing does, all if there is no
+/// `before`.
+fn changed(before: &[u8], now: &[u8], size: Size) -> (u32, u32, u32, u32) {
+    if before.len() != now.len() {
+        return (0, 0, size.width, size.height);
+    }
+    let (mut left, mut right, mut top, mut bottom) = (size.width, 0, size.height, 0);
+    for (index, (a, b)) in before.chunks_exact(3).zip(now.chunks_exact(3)).enumerate() {
+        if a != b {
+            let (x, y) = (index as u32 % size.width, index as u32 / size.width);
+            (left, right) = (left.min(x), right.max(x));
+            (top, bottom) = (top.min(y), bottom.max(y));
+        }
+    }
+    if left > right { (0, 0, 1, 1) } else { (left, top, right - left + 1, bottom - top + 1) }
 }
 
 /// The figure as a bitmap, three bytes a pixel, row by row.
