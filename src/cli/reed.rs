@@ -65,6 +65,7 @@ enum Which {
 enum Format {
     Png,
     Svg,
+    Json,
 }
 
 /// The reed's pressure tables, flow against pressure, or figures of it
@@ -104,11 +105,11 @@ pub struct Reed {
 #[derive(Args)]
 #[command(next_help_heading = "Figures")]
 struct Drawing {
-    /// A new .png or .svg file (.gif for the sweep), or a directory that exists
+    /// A new .png or .svg file (.json for what it shows, .gif for the sweep), or a directory that exists
     #[arg(long, value_name = "PATH", requires = "figure")]
     out: Option<PathBuf>,
     /// Kind of file made in a directory
-    #[arg(long, value_enum, value_name = "KIND", default_value = "png")]
+    #[arg(long, value_enum, value_name = "KIND", default_value = "png", requires = "figure")]
     format: Format,
     /// Size of a figure, pixels, 400..4000 each way, as 1600x1000 [default: what it needs]
     #[arg(long, value_name = "WxH", requires = "figure")]
@@ -117,7 +118,7 @@ struct Drawing {
     #[arg(long, value_name = "NOTE", default_value = "C4", value_parser = note)]
     written: u8,
     /// Mouth pressure of the orbit over closing pressure, 0..3
-    #[arg(long, value_name = "G", default_value = "0.6", value_parser = |s: &str| within(s, 0.0, 3.0))]
+    #[arg(long, value_name = "G", default_value = "0.8", value_parser = |s: &str| within(s, 0.0, 3.0))]
     gamma: f64,
     /// Embouchure of the orbit: flow strength of the reed, 0.05..0.9
     #[arg(long, value_name = "ZETA", default_value = "0.3", value_parser = |s: &str| within(s, 0.05, 0.9))]
@@ -156,6 +157,7 @@ impl Drawing {
                 (Which::Sweep, _) => "gif",
                 (_, Format::Png) => "png",
                 (_, Format::Svg) => "svg",
+                (_, Format::Json) => "json",
             };
             path.push(format!("reed-{}.{ending}", which.name()));
         }

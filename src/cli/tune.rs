@@ -98,7 +98,8 @@ impl Tune {
             let mut rounds = [(settings.tuning, heard), beside].map(|(tuning, heard)| round(tuning, &notes, &heard));
             rounds.sort_by(|a, b| a.name.cmp(&b.name));
             let note = format!(
-                "gamma {}, A4 = {} Hz, strength {}, zeta {}, {} Celsius; each note tongued, measured from {SETTLE_S} s on",
+                "gamma {}, A4 = {} Hz, strength {}, zeta {}, {} Celsius; each note tongued, measured from {SETTLE_S} s on. \
+                 Natural drifts with the breath as the bore does, tempered is held in tune.",
                 self.gamma, settings.a4_hz, settings.strength, settings.zeta, settings.temperature_c
             );
             tune::figure(&name, &note, &rounds)
@@ -109,8 +110,8 @@ impl Tune {
 /// One round for the figure.
 fn round(tuning: Tuning, notes: &[WrittenNote], heard: &[Option<(f64, f64)>]) -> Round {
     let name = match tuning {
-        Tuning::Natural => "natural: drifts with the breath as the bore does",
-        Tuning::Tempered => "tempered: held in tune",
+        Tuning::Natural => "natural",
+        Tuning::Tempered => "tempered",
     };
     let heard = heard.iter().map(|heard| match *heard {
         Some((_, cents)) if cents.abs() <= OWN_CENTS => Heard::Own(cents),

@@ -32,7 +32,7 @@ pub struct Ramp {
     pub ends: Option<f64>,
 }
 
-/// Levels below this are noise, over closing pressure, for the logarithmic axis.
+/// Levels below this, over closing pressure, are left out on the logarithmic axis.
 const FLOOR: f64 = 1e-5;
 
 impl Ramp {
@@ -44,7 +44,11 @@ impl Ramp {
             way.iter().map(|point| (point[0], point[which])).collect()
         };
         let both = |panel: Panel, which: usize, floor: f64| {
-            let over = |way: &Way| along(way, which).into_iter().map(move |(gamma, y)| (gamma, y.max(floor)));
+            let over = |way: &Way| {
+                along(way, which)
+                    .into_iter()
+                    .map(move |(gamma, y)| (gamma, if y < floor { f64::NAN } else { y }))
+            };
             panel.with(Line::new("breath growing", over(&self.up)).width(3.0)).with(
                 Line::new("breath fading", over(&self.down))
                     .colour(Colour::Vermilion)

@@ -1,4 +1,4 @@
-//! Figures on paper: PNG, SVG or an animated GIF, by the file's extension.
+//! Figures on paper: PNG, SVG or an animated GIF, by the file's extension; or their data as JSON.
 //!
 //! Shapes are drawn by the backends of plotters; where axes, words and legends stand is decided here, so that nothing
 //! covers data and the same figure looks the same in every format. Files appear whole or not at all.
@@ -105,6 +105,7 @@ enum Format {
     Png,
     Svg,
     Gif,
+    Json,
 }
 
 impl Format {
@@ -113,6 +114,7 @@ impl Format {
             "png" => Some(Self::Png),
             "svg" => Some(Self::Svg),
             "gif" => Some(Self::Gif),
+            "json" => Some(Self::Json),
             _ => None,
         }
     }
@@ -126,13 +128,16 @@ pub struct Sheet {
 }
 
 impl Sheet {
-    /// For one figure: a `.png` or an `.svg`, in its own size unless one is given.
+    /// For one figure: a `.png`, an `.svg` or its data as `.json`, in its own size unless one is given.
     pub fn still(path: &Path, force: bool, size: Option<Size>) -> Result<Self, DrawError> {
         match Format::of(path) {
-            Some(format @ (Format::Png | Format::Svg)) => {
+            Some(format @ (Format::Png | Format::Svg | Format::Json)) => {
                 Ok(Self { file: NewFile::create(path, force)?, format, size })
             }
-            _ => Err(DrawError::Extension { path: path.to_owned(), wanted: ".png or .svg" }),
+            _ => Err(DrawError::Extension {
+                path: path.to_owned(),
+                wanted: ".png or .svg (or .json for its data)",
+            }),
         }
     }
 
@@ -148,6 +153,7 @@ impl Sheet {
     pub fn draw(self, figure: &Figure) -> Result<(), DrawError> {
         let bytes = match self.format {
             Format::Svg => svg(figure, self.size)?.into_bytes(),
+            Format::Json => serde_json::to_vec_pretty(figure).map_err(DrawError::backend)?,
             Format::Png | Format::Gif => png(figure, self.size)?,
         };
         self.keep(&bytes)
@@ -286,7 +292,7 @@ pub fn svg(figure: &Figure, size: Option<Size>) -> Result<String, DrawError> {
     ))
 }
 
-/// Draws `figure` into a new file, `.png` or `.svg`.
+/// Draws `figure` into a new file, `.png`, `.svg` or `.json`.
 pub fn write(figure: &Figure, path: &Path, size: Option<Size>, force: bool) -> Result<(), DrawError> {
     Sheet::still(path, force, size)?.draw(figure)
 }

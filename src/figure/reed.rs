@@ -4,9 +4,7 @@
 //! `u = A (H sqrt(p) - p^1.5 / k)`; see [`crate::reed::law`]. Curves are read from the tables sound and knob share.
 
 use crate::figure::palette::Colour;
-use crate::figure::{
-    Anchor, Axis, Dash, Direction, Figure, Line, Mark, Panel, Points, SecondAxis, Span, Text,
-};
+use crate::figure::{Axis, Dash, Direction, Figure, Line, Mark, Panel, Points, SecondAxis, Span};
 use crate::reed::law::{H_INIT, K_INIT, ReedError};
 use crate::reed::{PhysicalReed, ReedLaw, ReedTables};
 use crate::units::Air;
@@ -89,11 +87,14 @@ fn unit() -> Result<Figure, ReedError> {
         Axis::linear("pressure difference p, over the closing pressure").range(-0.1, 1.0),
         Axis::linear(FLOW),
     )
-    .with(Mark::new(Direction::X, 1.0 / 3.0, "1/3: peak of the flow, oscillation can begin"))
+    .with(Mark::new(
+        Direction::X,
+        1.0 / 3.0,
+        format!("1/3: peak of {:.4}, oscillation can begin", law.peak_flow()),
+    ))
     .with(Mark::new(Direction::X, 1.0, "1: closed"))
     .with(Line::new("u = sqrt|p| (1 \u{2212} p) sgn(p)", curve(law, -0.1, 1.0)).width(3.5))
-    .with(Points::new("", [peak(law)]).size(7.0))
-    .with(Text::new(1.0 / 3.0, law.peak_flow(), format!("{:.4}", law.peak_flow())).anchor(Anchor::Above));
+    .with(Points::new("", [peak(law)]).size(7.0));
     Ok(Figure::new("Flow through the reed, with opening, stiffness and closing pressure 1")
         .note("Bernoulli through a slit that pressure closes. Below 0 the air flows back and pushes the reed open.")
         .panel(panel))
@@ -123,7 +124,7 @@ fn families(laws: &[(String, ReedLaw)], emphasised: usize, low: f64, high: f64, 
         let colour = Colour::of_family(index, count);
         let width = if index == emphasised { 4.0 } else { 2.5 };
         panel
-            .with(Line::new(name, curve(*law, low, high)).colour(colour).width(width))
+            .with(Line::new(name, curve(*law, low, high.min(law.closing()))).colour(colour).width(width))
             .with(Points::new("", [peak(*law)]).colour(colour).size(6.0))
     })
 }
@@ -161,7 +162,7 @@ fn coupled() -> Result<Figure, ReedError> {
         .collect::<Result<Vec<_>, ReedError>>()?;
     let panel =
         Panel::new("", Axis::linear(PRESSURE).range(-0.1, 2.1), Axis::linear(FLOW).range(-1.75, 1.15))
-            .with(Mark::new(Direction::Y, 1.0, "1").colour(Colour::Ink));
+            .with(Mark::new(Direction::Y, 1.0, "peak 1").colour(Colour::Ink));
     Ok(Figure::new("Opening and stiffness coupled, k = 27 / (4 H\u{00b3}): the peak stays 1")
         .note("A = 1. Where it peaks and closes moves: H is a stretch of the pressure axis. H = sqrt(27)/2 = 2.598 closes at 1.")
         .panel(families(&laws, 3, -0.1, 2.1, panel)))
@@ -238,7 +239,7 @@ fn physical(air: &Air) -> Figure {
             Axis::linear("pressure difference, kPa").range(1e-3 * from, 1e-3 * to),
             Axis::linear("flow, l/s"),
         )
-        .right(SecondAxis::times(1e-3 / 1e-6, "flow, cm\u{00b3}/s"))
+        .right(SecondAxis::times(1e-3, "flow, m\u{00b3}/s"))
     };
     let reeds = |panel: Panel, reeds: Vec<(String, PhysicalReed)>| {
         let count = reeds.len();
@@ -287,7 +288,7 @@ pub fn sweep(frames: usize) -> Result<Vec<Figure>, ReedError> {
             let law = ReedLaw::coupled(h, 1.0)?;
             let panel =
                 Panel::new("", Axis::linear(PRESSURE).range(-0.03, 1.0), Axis::linear(FLOW).range(-1.0, 1.2))
-                    .with(Mark::new(Direction::Y, 1.0, "1").colour(Colour::Ink))
+                    .with(Mark::new(Direction::Y, 1.0, "peak 1").colour(Colour::Ink))
                     .with(
                         Line::new(format!("H = {h:.2}, k = {:.3}", law.k()), curve(law, -0.03, 1.0))
                             .width(4.0),
@@ -365,7 +366,7 @@ impl Orbit {
         )
         .weight(1.5)
         .top(SecondAxis::times(1.0 / kpa, "over the closing pressure"))
-        .with(Mark::new(Direction::X, kpa / 3.0, "1/3: peak, lowest threshold"))
+        .with(Mark::new(Direction::X, kpa / 3.0, "1/3: peak"))
         .with(
             Mark::new(Direction::X, kpa * self.gamma, format!("gamma {:.2}: mouth", self.gamma))
                 .colour(Colour::Green),
@@ -375,7 +376,7 @@ impl Orbit {
                 of: Direction::X,
                 from: kpa * (1.0 - self.lay),
                 to: kpa * (1.0 + self.lay),
-                name: "reed rolls onto the lay (standing still)".to_owned(),
+                name: "reed rolls onto the curved lay".to_owned(),
                 colour: Colour::Grey,
             });
         }

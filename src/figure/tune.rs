@@ -31,16 +31,18 @@ pub fn figure(instrument: &str, note: &str, rounds: &[Round]) -> Figure {
         Heard::Own(cents) => Some(*cents),
         _ => None,
     });
-    let (low, high) = own.fold((-10.0_f64, 10.0_f64), |(low, high), cents| (low.min(cents), high.max(cents)));
+    let (low, high) = own.fold((-6.0_f64, 6.0_f64), |(low, high), cents| (low.min(cents), high.max(cents)));
     let failed =
         rounds.iter().flat_map(|round| &round.notes).any(|(_, heard)| !matches!(heard, Heard::Own(_)));
     let room = 0.06 * (high - low);
-    let edge = low - room;
+    // One line of marks for each round, below the notes.
+    let rows = rounds.len() as f64;
+    let edge = low - if failed { rows * room } else { room };
     let mut panel = Panel::new(
         "",
         Axis::notes("written note"),
         Axis::linear("cents from equal temperament")
-            .range(if failed { edge - room } else { edge }, high + room),
+            .range(edge - if failed { room } else { 0.0 }, high + room),
     )
     .with(Span {
         of: Direction::Y,
@@ -55,12 +57,13 @@ pub fn figure(instrument: &str, note: &str, rounds: &[Round]) -> Figure {
         (Colour::Vermilion, Dash::Dashed, Shape::Diamond),
         (Colour::Green, Dash::Dotted, Shape::TriangleUp),
     ];
-    for (round, (colour, dash, shape)) in rounds.iter().zip(looks.into_iter().cycle()) {
+    for ((row, round), (colour, dash, shape)) in rounds.iter().enumerate().zip(looks.into_iter().cycle()) {
+        let level = low - (row + 1) as f64 * room;
         let cents = |heard: &Heard| if let Heard::Own(cents) = heard { *cents } else { f64::NAN };
         let points = || round.notes.iter().map(|(written, heard)| (f64::from(*written), cents(heard)));
         let at_edge = |which: fn(&Heard) -> bool| {
             let notes = round.notes.iter().filter(move |(_, heard)| which(heard));
-            notes.map(|(written, _)| (f64::from(*written), edge)).collect::<Vec<_>>()
+            notes.map(|(written, _)| (f64::from(*written), level)).collect::<Vec<_>>()
         };
         let worst = points().map(|(_, cents)| cents).filter(|cents| cents.is_finite());
         let worst = worst.map(f64::abs).fold(0.0, f64::max);
@@ -98,7 +101,7 @@ mod tests {
         let figure = figure("test", "", &[Round { name: "natural".to_owned(), notes }]);
         let panel = &figure.panels[0];
         let [low, high] = panel.y.range.unwrap();
-        assert!((-15.0..-10.0).contains(&low) && high < 15.0, "{low} {high}");
+        assert!((-9.0..-6.0).contains(&low) && high < 9.0, "{low} {high}");
         let mut marks = Vec::new();
         for layer in &panel.layers {
             match layer {
