@@ -2,7 +2,7 @@
 
 use crate::bore::transfer_matrix::{TransferMatrix, threshold_gamma};
 use crate::cli::Failure;
-use crate::cli::args::{InstrumentArg, check_fingering, note, within};
+use crate::cli::args::{PlayedArgs, check_fingering, note, within};
 use crate::cli::plot::PlotArgs;
 use crate::cli::render::progress;
 use crate::cli::settings::SettingsArgs;
@@ -41,7 +41,7 @@ pub struct Bifurcation {
     #[arg(long, value_name = "HZ", default_value = "48000", value_parser = clap::value_parser!(u32).range(22_050..=384_000))]
     rate: u32,
     #[command(flatten)]
-    instrument: InstrumentArg,
+    instrument: PlayedArgs,
     #[command(flatten)]
     table: TableArgs,
     #[command(flatten)]
@@ -81,7 +81,7 @@ impl Bifurcation {
             .filter(|&(_, height)| height > 0.0)
             .map(|(_, height)| threshold_gamma(height, zeta));
         let name = file.name.clone();
-        let model = self.instrument.model(file, self.rate)?;
+        let model = self.instrument.model(file, self.rate, settings.a4_hz)?;
         let bar = progress((2.0 * self.seconds * f64::from(self.rate)) as usize);
         let found = bifurcation::measure(
             &model,

@@ -1,7 +1,7 @@
 //! `chalumeau reed`: the tables and the flow law that sound, knob and firmware share, and their figures.
 
 use crate::cli::Failure;
-use crate::cli::args::{InstrumentArg, check_fingering, note, within};
+use crate::cli::args::{PlayedArgs, check_fingering, note, within};
 use crate::cli::render::progress;
 use crate::cli::table::TableArgs;
 use crate::figure::draw::{Sheet, Size};
@@ -124,7 +124,7 @@ struct Drawing {
     #[arg(long, value_name = "ZETA", default_value = "0.3", value_parser = |s: &str| within(s, 0.05, 0.9))]
     zeta: f64,
     #[command(flatten)]
-    instrument: InstrumentArg,
+    instrument: PlayedArgs,
 }
 
 impl Which {
@@ -212,7 +212,7 @@ impl Drawing {
             let settings =
                 Settings { zeta: self.zeta as f32, noise: 0.0, breath_full_kpa, ..Settings::default() };
             let name = file.name.clone();
-            let model = self.instrument.model(file, RATE)?;
+            let model = self.instrument.model(file, RATE, settings.a4_hz)?;
             let period = orbit::period(&model, &settings, sounding, self.gamma as f32, RATE).ok_or_else(|| {
                 Failure::Usage(format!(
                     "written {written} does not sound at gamma {} and zeta {}; `chalumeau threshold` and `chalumeau \
