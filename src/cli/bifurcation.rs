@@ -22,9 +22,8 @@ Examples:
 ///
 /// Gamma (mouth pressure over closing pressure) runs from 0 to --to and back, --seconds each way. direction is 1 growing
 /// and -1 fading, rms that of the pressure in the mouthpiece over the closing pressure, shut the part of the time the
-/// reed is shut. Comments say where the note begins, beats, chokes, returns and ends: it begins later than it ends because
-/// a moving breath overtakes the threshold before the note has grown, and it chokes later than it returns because a
-/// sounding reed holds itself open.
+/// reed is shut. Comments say where the note begins, beats, chokes, returns and ends. Up and down differ because a moving
+/// breath overtakes a threshold before the note has grown or died; what stays with more --seconds is hysteresis proper.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Bifurcation {

@@ -68,8 +68,8 @@ impl Ramp {
                 amplitude.layers.push(Span { of: Direction::X, from, to, name, colour }.into());
             }
         };
-        band(self.returns, self.chokes, "sounds only if it sounded before: choked or playing", Colour::Grey);
-        band(self.ends, self.begins, "begins late, ends early", Colour::Sky);
+        band(self.returns, self.chokes, "growing breath still plays, fading breath not yet", Colour::Grey);
+        band(self.ends, self.begins, "fading breath still plays, growing breath not yet", Colour::Sky);
         for (at, name, colour) in [
             (self.threshold, "linear threshold", Colour::Ink),
             (self.begins, "begins", Colour::Blue),

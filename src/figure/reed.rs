@@ -249,7 +249,7 @@ fn physical(air: &Air) -> Figure {
             let same = (reed.stiffness_n_m - reference.stiffness_n_m).abs() < 1e-9
                 && (reed.tip_opening_m - reference.tip_opening_m).abs() < 1e-12;
             panel
-                .with(Line::new(name, curve(&reed, from, to)).colour(colour).width(if same {
+                .with(Line::new(name, curve(&reed, from, reed.closing_pa())).colour(colour).width(if same {
                     4.0
                 } else {
                     2.5
@@ -368,7 +368,7 @@ impl Orbit {
         .top(SecondAxis::times(1.0 / kpa, "over the closing pressure"))
         .with(Mark::new(Direction::X, kpa / 3.0, "1/3: peak"))
         .with(
-            Mark::new(Direction::X, kpa * self.gamma, format!("gamma {:.2}: mouth", self.gamma))
+            Mark::new(Direction::X, kpa * self.gamma, format!("gamma {:.2}: mouth pressure", self.gamma))
                 .colour(Colour::Green),
         );
         if self.lay > 0.0 {

@@ -198,6 +198,11 @@ mod tests {
         assert!((0.4..0.6).contains(&beats) && beats > begins, "{changes:?}");
         assert!(ends < begins, "a ramp overtakes the threshold: {changes:?}");
         assert_eq!((changes.chokes, changes.returns), (None, None));
+        let slow = measure(&model, &settings, SoundingNote(50), 0.8, 12.0, 48_000, |_| {}).changes();
+        assert!(
+            slow.begins.unwrap() < begins && slow.ends.unwrap() > ends,
+            "slower, less: {slow:?} {changes:?}"
+        );
         let top = found.up.last().unwrap();
         assert!((0.7..=0.8).contains(&top.gamma) && top.rms > 0.4, "{top:?}");
     }

@@ -3,6 +3,7 @@
 use crate::analysis::pitch;
 use crate::instrument::{Clarinet, Model, Settings};
 use crate::render;
+use crate::render::bifurcation::SOUNDS;
 use crate::render::breath::BreathCurve;
 use crate::render::score::Score;
 use crate::units::SoundingNote;
@@ -55,6 +56,13 @@ pub fn period(
     };
     let Ok(()) = render::play_probed(&mut clarinet, &score, 4096, &mut probe, |_| Ok::<_, Infallible>(()));
     let pressure: Vec<f64> = moments.iter().map(|moment| moment[0]).collect();
+    // What still rings from the tongue is periodic too.
+    let count = pressure.len().max(1) as f64;
+    let mean = pressure.iter().sum::<f64>() / count;
+    let rms = (pressure.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / count).sqrt();
+    if rms < SOUNDS * closing_pa {
+        return None;
+    }
     let f_hz = pitch::fundamental_hz(&pressure, inner_hz)?;
     let count = (inner_hz / f_hz).round() as usize;
     // Within the note: at its very end the tongue comes back.
