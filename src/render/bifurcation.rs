@@ -186,16 +186,17 @@ mod tests {
     }
 
     #[test]
-    fn a_low_note_begins_above_a_third_and_beats_near_one_half() {
+    fn a_low_note_begins_above_a_third_and_beats_near_one_half_on_a_sharp_lay() {
         let model = Arc::new(Model::built_in(48_000.0).unwrap());
-        let settings = Settings { breath_full_kpa: 20.0, ..Settings::default() };
+        let settings = Settings { breath_full_kpa: 20.0, lay: 0.0, ..Settings::default() };
         let mut samples = 0;
         let found = measure(&model, &settings, SoundingNote(50), 0.8, 4.0, 48_000, |block| samples += block);
         assert_eq!(samples, 8 * 48_000);
         let changes = found.changes();
         let (begins, beats, ends) = (changes.begins.unwrap(), changes.beats.unwrap(), changes.ends.unwrap());
-        assert!((0.34..0.45).contains(&begins), "{changes:?}");
-        assert!((0.4..0.6).contains(&beats) && beats > begins, "{changes:?}");
+        assert!((1.0 / 3.0..0.5).contains(&begins), "{changes:?}");
+        // Raman's string without losses: 1/2.
+        assert!((0.44..0.52).contains(&beats) && beats > begins, "{changes:?}");
         assert!(ends < begins, "a ramp overtakes the threshold: {changes:?}");
         assert_eq!((changes.chokes, changes.returns), (None, None));
         let slow = measure(&model, &settings, SoundingNote(50), 0.8, 12.0, 48_000, |_| {}).changes();
