@@ -5,6 +5,7 @@
 //! was given and what would be right, and no file; a reader that closes the pipe early is no mistake.
 
 mod args;
+mod bore;
 #[cfg(feature = "devices")]
 mod doctor;
 mod feel;
@@ -22,6 +23,7 @@ mod study;
 mod table;
 mod threshold;
 mod tune;
+mod watch;
 
 use crate::bore::instrument_file::InstrumentError;
 use crate::haptics::FeelRefused;
@@ -43,6 +45,7 @@ Examples:
   chalumeau render examples/melody.mid --out melody.wav
   chalumeau render --written C4 --gamma 0.5 --seconds 1.5 --out c4.wav
   chalumeau impedance --all --peaks 8 --csv peaks.csv
+  chalumeau bore --written C5 --plot c5.svg
   chalumeau threshold --all --zeta 0.3
   chalumeau tune --rate 48000 --gamma 0.5
   chalumeau haptic --all --contrast 1
@@ -63,7 +66,8 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Render>),
-    Impedance(impedance::Impedance),
+    Impedance(Box<impedance::Impedance>),
+    Bore(Box<bore::Bore>),
     Threshold(threshold::Threshold),
     Tune(Box<tune::Tune>),
     Reed(reed::Reed),
@@ -133,6 +137,7 @@ pub fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Render(command) => command.run(),
         Command::Impedance(command) => command.run(),
+        Command::Bore(command) => command.run(),
         Command::Threshold(command) => command.run(),
         Command::Tune(command) => command.run(),
         Command::Reed(command) => command.run(),
