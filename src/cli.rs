@@ -19,6 +19,7 @@ mod play;
 mod plot;
 mod reed;
 mod render;
+mod report;
 mod settings;
 mod study;
 mod table;
@@ -28,6 +29,7 @@ mod watch;
 
 use crate::bore::instrument_file::InstrumentError;
 use crate::figure::draw::DrawError;
+use crate::figure::report::ReportError;
 use crate::haptics::FeelRefused;
 use crate::instrument::BuildError;
 use crate::output::OutputError;
@@ -68,6 +70,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Render>),
+    Report(Box<report::Report>),
     Impedance(Box<impedance::Impedance>),
     Bore(Box<bore::Bore>),
     Threshold(threshold::Threshold),
@@ -108,6 +111,8 @@ enum Failure {
     Output(#[from] OutputError),
     #[error(transparent)]
     Draw(#[from] DrawError),
+    #[error("{}: {source}", path.display())]
+    Report { path: PathBuf, source: ReportError },
     #[error(transparent)]
     Wav(#[from] WavError),
     #[error(transparent)]
@@ -140,6 +145,7 @@ impl Failure {
 pub fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Render(command) => command.run(),
+        Command::Report(command) => command.run(),
         Command::Impedance(command) => command.run(),
         Command::Bore(command) => command.run(),
         Command::Threshold(command) => command.run(),

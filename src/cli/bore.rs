@@ -67,7 +67,7 @@ impl Bore {
             ))?;
         }
         table.finish()?;
-        plot.draw(|| figure::bore::profile(&file, fingering, &[]))
+        plot.draw(|| figure::bore::profile(&file, fingering))
     }
 
     fn fingering<'a>(&self, file: &'a InstrumentFile) -> Result<Option<&'a Fingering>, Failure> {

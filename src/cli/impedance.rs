@@ -83,22 +83,21 @@ impl Impedance {
         let notes = self.notes.notes(&file)?;
         let (air, volume_m3) = (self.air.air(), if self.reed_volume { file.reed_volume_m3 } else { 0.0 });
         let steps = ((self.to - self.from) / self.step + 1e-9).floor();
-        if self.peaks.is_none() {
-            if self.notes.one().is_none() {
-                let right = "add --peaks 8 for the peaks of all notes, or choose one note with --written";
-                return Err(Failure::Usage(format!(
-                    "one curve for each note would be too much for a table; {right}"
-                )));
-            }
-            if !(0.0..=POINTS_MAX).contains(&steps) {
-                return Err(Failure::Usage(format!(
-                    "--from {} --to {} --step {} is {} points; expected 1 to {POINTS_MAX}, with --to above --from",
-                    self.from,
-                    self.to,
-                    self.step,
-                    steps + 1.0
-                )));
-            }
+        if self.peaks.is_none() && self.notes.one().is_none() {
+            let right = "add --peaks 8 for the peaks of all notes, or choose one note with --written";
+            return Err(Failure::Usage(format!(
+                "one curve for each note would be too much for a table; {right}"
+            )));
+        }
+        let curve = self.peaks.is_none() || (self.notes.one().is_some() && self.plot.wanted());
+        if curve && !(0.0..=POINTS_MAX).contains(&steps) {
+            return Err(Failure::Usage(format!(
+                "--from {} --to {} --step {} is {} points; expected 1 to {POINTS_MAX}, with --to above --from",
+                self.from,
+                self.to,
+                self.step,
+                steps + 1.0
+            )));
         }
         let about = format!(
             "{}; {}, {} C, reed volume {} m3, Zc {:.6e} Pa s/m3",

@@ -3,20 +3,19 @@
 use crate::bore::instrument_file::{Fingering, HoleKind, InstrumentFile, ToneHole};
 use crate::figure::palette::Colour;
 use crate::figure::{Anchor, Axis, Figure, Line, Panel, Points, Polygon, Shape, Text};
+use std::cmp::Ordering;
 
-/// Levels at which names of holes stand, so that neighbours do not run into each other.
-const LEVELS: usize = 4;
-
-/// How the sound stands in the bore: distance from the tip, m, and magnitude of pressure over that at the tip.
-pub struct Standing {
-    /// Of which mode.
-    pub name: String,
-    /// From tip to bell.
-    pub pressure: Vec<(f64, f64)>,
-}
+/// Width of one letter of a hole's name and distance between lines of names, in parts of the stretch a panel shows: what
+/// they are at nominal size (11 and 26 pixels of 1430).
+const LETTER: f64 = 11.0 / 1430.0;
+const LINE: f64 = 26.0 / 1430.0;
+/// Room between axis and edges of a panel, pixels: labels, ticks, legend.
+const AROUND: f64 = 130.0;
+/// Width of the axes at nominal size, pixels.
+const ACROSS: f64 = 1_430.0;
 
 /// `file` from the side, fingered if a fingering is given.
-pub fn profile(file: &InstrumentFile, fingering: Option<&Fingering>, standing: &[Standing]) -> Figure {
+pub fn profile(file: &InstrumentFile, fingering: Option<&Fingering>) -> Figure {
     let title = match fingering {
         Some(fingering) => format!("{}, fingered for written {}", file.name, fingering.written),
         None => file.name.clone(),
@@ -31,21 +30,73 @@ pub fn profile(file: &InstrumentFile, fingering: Option<&Fingering>, standing: &
         figure = figure.note(format!("fingers: {}", fingering.fingers));
     }
     // Half the length a row: twice the scale, and the names of the holes have room.
-    let (rows, row_mm) = (2usize, length_mm / 2.0);
-    for row in 0..rows {
-        let (from_mm, to_mm) = (row as f64 * row_mm, (row + 1) as f64 * row_mm);
-        figure = figure.panel(side(file, fingering, (from_mm, to_mm), row == 0));
+    let half_mm = length_mm / 2.0;
+    let mut height = 0.0;
+    for row in [0.0, 1.0] {
+        let (panel, tall_mm) = side(file, fingering, (row * half_mm, (row + 1.0) * half_mm), row == 0.0);
+        let pixels = tall_mm / half_mm * ACROSS + AROUND;
+        height += pixels;
+        figure = figure.panel(panel.weight(pixels / AROUND));
     }
-    figure.panel(widths(file)).panel_if(pressures(standing, length_mm))
+    let enlarged = 420.0;
+    // Title, notes and margins take about a sixth of a page.
+    let height = (height + enlarged + 260.0) as u32;
+    figure.panel(widths(file).weight(enlarged / AROUND)).size(1_600, height)
 }
 
-impl Figure {
-    fn panel_if(self, panel: Option<Panel>) -> Self {
-        match panel {
-            Some(panel) => self.panel(panel),
-            None => self,
+/// Where a name stands over its place: on which line from the bottom, and on which side of its stem.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Name {
+    x: f64,
+    line: usize,
+    anchor: Anchor,
+    /// What it covers.
+    from: f64,
+    to: f64,
+}
+
+impl Name {
+    fn at(x: f64, width: f64, line: usize, anchor: Anchor) -> Self {
+        let (from, to) = match anchor {
+            Anchor::Left => (x - width, x),
+            Anchor::Right => (x, x + width),
+            _ => (x - 0.5 * width, x + 0.5 * width),
+        };
+        Self { x, line, anchor, from, to }
+    }
+
+    /// Neither covers the other, nor does a stem go through a name.
+    fn is_clear_of(&self, other: &Self) -> bool {
+        let holds = |name: &Self, x: f64| name.from < x && x < name.to;
+        match self.line.cmp(&other.line) {
+            Ordering::Equal => self.to < other.from || other.to < self.from,
+            Ordering::Greater => !holds(other, self.x),
+            Ordering::Less => !holds(self, other.x),
         }
     }
+}
+
+/// Names for places along an axis, `(x, width)` in order of x, as low as there is room.
+fn names(places: &[(f64, f64)]) -> Vec<Name> {
+    let mut set: Vec<Name> = Vec::with_capacity(places.len());
+    for (index, &(x, width)) in places.iter().enumerate() {
+        let near = |other: Option<&(f64, f64)>| other.is_some_and(|other| (other.0 - x).abs() < 0.6 * width);
+        // Away from a neighbour that is near, so that its stem passes.
+        let before = near(index.checked_sub(1).and_then(|before| places.get(before)));
+        let after = near(places.get(index + 1));
+        let sides: &[Anchor] = match (before, after) {
+            (false, true) => &[Anchor::Left, Anchor::Centre],
+            (true, false) => &[Anchor::Right, Anchor::Centre],
+            _ => &[Anchor::Centre, Anchor::Right, Anchor::Left],
+        };
+        let top = set.iter().map(|name| name.line + 1).max().unwrap_or(0);
+        let name = (0..=top)
+            .flat_map(|line| sides.iter().map(move |&side| Name::at(x, width, line, side)))
+            .find(|name| set.iter().all(|other| name.is_clear_of(other)));
+        // Above all others there is room, but for a stem that must go through a name.
+        set.push(name.unwrap_or(Name::at(x, width, top, Anchor::Centre)));
+    }
+    set
 }
 
 fn outline(file: &InstrumentFile, (from_mm, to_mm): (f64, f64)) -> Vec<(f64, f64)> {
@@ -62,48 +113,64 @@ fn outline(file: &InstrumentFile, (from_mm, to_mm): (f64, f64)) -> Vec<(f64, f64
     corners
 }
 
-/// A stretch of the instrument from the side.
+/// A stretch of the instrument from the side, and how tall it is, mm.
 fn side(
     file: &InstrumentFile,
     fingering: Option<&Fingering>,
     (from_mm, to_mm): (f64, f64),
     legend: bool,
-) -> Panel {
+) -> (Panel, f64) {
+    let holes: Vec<(usize, &ToneHole)> = file
+        .holes
+        .iter()
+        .enumerate()
+        .filter(|(_, hole)| (from_mm..to_mm).contains(&(1e3 * hole.x_m)))
+        .collect();
     let upper = outline(file, (from_mm, to_mm));
-    let mut panel = Panel::new("", Axis::linear("distance from the tip of the reed, mm").range(from_mm, to_mm), {
-        let widest = upper.iter().map(|&(_, r)| r).fold(0.0, f64::max);
-        let highest = file.holes.iter().map(|hole| top_mm(file, hole)).fold(widest, f64::max);
-        // Names stand in LEVELS lines of 6 mm above the highest chimney.
-        Axis::linear("mm from the axis").range(-1.1 * widest, highest + 6.0 * (LEVELS as f64 + 0.7))
-    })
+    let widest = upper.iter().map(|&(_, r)| r).fold(0.0, f64::max);
+    let highest = holes.iter().map(|(_, hole)| top_mm(file, hole)).fold(0.0, f64::max);
+    let (letter, line_mm) = (LETTER * (to_mm - from_mm), LINE * (to_mm - from_mm));
+    let width = |hole: &ToneHole| letter * (hole.name.chars().count() as f64 + 1.5);
+    let places: Vec<(f64, f64)> = holes.iter().map(|(_, hole)| (1e3 * hole.x_m, width(hole))).collect();
+    let names = names(&places);
+    let name_mm = |line: usize| highest + line_mm * (line as f64 + 1.0);
+    let names_mm = names.iter().map(|name| name_mm(name.line) + 0.8 * line_mm).fold(0.0, f64::max);
+    let (low, high) = (-1.12 * widest, names_mm.max(1.12 * widest));
+    let mut panel = Panel::new(
+        "",
+        Axis::linear("distance from the tip of the reed, mm").range(from_mm, to_mm),
+        Axis::linear("mm from the axis").range(low, high),
+    )
     .equal_aspect();
     let lower = upper.iter().rev().map(|&(x, r)| (x, -r));
-    let body = Polygon::filled("", upper.iter().copied().chain(lower), Colour::Pale, 0.45).stroke(Colour::Ink);
-    panel = panel.with(body);
-    let highest = file.holes.iter().map(|hole| top_mm(file, hole)).fold(0.0, f64::max);
-    let mut named = [false; 2];
-    for (index, hole) in file.holes.iter().enumerate() {
-        let x = 1e3 * hole.x_m;
-        if !(from_mm..to_mm).contains(&x) {
-            continue;
-        }
+    panel = panel.with(
+        Polygon::filled("", upper.iter().copied().chain(lower), Colour::Pale, 0.45).stroke(Colour::Ink),
+    );
+    // The first of either kind stands in the legend.
+    let mut unnamed = [legend && fingering.is_some(); 2];
+    for ((index, hole), label) in holes.into_iter().zip(names) {
         let open = fingering.map(|fingering| fingering.open.get(index).copied().unwrap_or(false));
+        let (x, half) = (1e3 * hole.x_m, 1e3 * hole.radius_m);
         let (r, top) = (1e3 * file.radius_at(hole.x_m), top_mm(file, hole));
-        let half = 1e3 * hole.radius_m;
         let corners = [(x - half, r), (x - half, top), (x + half, top), (x + half, r)];
         let (name, colour, opacity) = match open {
             Some(true) => ("open", Colour::Sky, 0.35),
             Some(false) => ("closed", Colour::Ink, 0.85),
             None => ("", Colour::Grey, 0.5),
         };
-        let first = legend && open.is_some_and(|open| !std::mem::replace(&mut named[usize::from(open)], true));
-        let shape = Polygon::filled(if first { name } else { "" }, corners, colour, opacity).stroke(Colour::Ink);
-        panel = panel.with(shape);
-        let level = highest + 6.0 * ((index % LEVELS) as f64 + 0.8);
-        let stem = Line::new("", [(x, top), (x, level - 1.5)]).colour(Colour::Grey).width(0.8);
-        panel = panel.with(stem).with(Text::new(x, level + 0.5, &hole.name).anchor(Anchor::Centre));
+        let first = open.is_some_and(|open| std::mem::take(&mut unnamed[usize::from(open)]));
+        let words = name_mm(label.line);
+        // Up to the middle of words beside it, to the foot of words over it.
+        let stem =
+            if label.anchor == Anchor::Centre { words - 0.45 * line_mm } else { words + 0.3 * line_mm };
+        panel = panel
+            .with(
+                Polygon::filled(if first { name } else { "" }, corners, colour, opacity).stroke(Colour::Ink),
+            )
+            .with(Line::new("", [(x, top), (x, stem)]).colour(Colour::Grey).width(0.8))
+            .with(Text::new(x, words, &hole.name).anchor(label.anchor));
     }
-    panel
+    (panel, high - low)
 }
 
 /// Outer end of a chimney, mm from the axis.
@@ -132,15 +199,37 @@ fn widths(file: &InstrumentFile) -> Panel {
     panel
 }
 
-fn pressures(standing: &[Standing], length_mm: f64) -> Option<Panel> {
-    if standing.is_empty() {
-        return None;
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_cover_neither_names_nor_stems() {
+        let file = InstrumentFile::built_in();
+        let places: Vec<(f64, f64)> =
+            file.holes.iter().map(|hole| (1e3 * hole.x_m, 2.6 * (hole.name.len() as f64 + 1.5))).collect();
+        let names = names(&places);
+        for (a, name) in names.iter().enumerate() {
+            for other in &names[..a] {
+                assert!(name.is_clear_of(other), "{name:?} {other:?}");
+            }
+        }
+        assert!(names.iter().all(|name| name.line < 6), "{names:?}");
     }
-    let axis = Axis::linear("distance from the tip of the reed, mm").range(0.0, length_mm);
-    let mut panel = Panel::new("Sound pressure along the bore", axis, Axis::linear("over that at the tip"));
-    for (index, mode) in standing.iter().enumerate() {
-        let points = mode.pressure.iter().map(|&(x_m, p)| (1e3 * x_m, p));
-        panel = panel.with(Line::new(&mode.name, points).colour(Colour::of_family(index, standing.len())));
+
+    #[test]
+    fn both_halves_hold_the_whole_bore() {
+        let file = InstrumentFile::built_in();
+        let ends = |from, to| {
+            let corners = outline(&file, (from, to));
+            (corners[0], corners[corners.len() - 1])
+        };
+        let half = 500.0 * file.length_m();
+        let ((x0, _), (x1, r1)) = ends(0.0, half);
+        let ((x2, r2), (x3, r3)) = ends(half, 2.0 * half);
+        assert!(x0 == 0.0 && x1 == half && x2 == half && (r1 - r2).abs() < 1e-9);
+        assert!(
+            (x3 - 2.0 * half).abs() < 1e-9 && (r3 - 1e3 * file.bore.last().unwrap().r_end_m).abs() < 1e-9
+        );
     }
-    Some(panel)
 }

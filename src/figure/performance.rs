@@ -2,7 +2,9 @@
 
 use crate::analysis::overview::{Envelope, HIGHEST_HZ, Overview};
 use crate::figure::palette::Colour;
-use crate::figure::{Axis, ColourMap, Direction, Figure, Heat, Layer, Line, Mark, Panel, Polygon, SecondAxis};
+use crate::figure::{
+    Axis, ColourMap, Direction, Figure, Heat, Layer, Line, Mark, Panel, Polygon, SecondAxis,
+};
 use crate::instrument::Probe;
 use crate::units::SoundingNote;
 
@@ -62,19 +64,21 @@ pub fn performance(of: &Performance<'_>) -> Figure {
     for note in &of.notes {
         figure = figure.note(note);
     }
+    // Weights and height: what legible panels of this width came out as, looked at in full size.
     figure = figure
-        .panel(outline(of.overview).weight(0.7))
-        .panel(spectrogram(of.overview).weight(1.5))
-        .panel(pitch(of.overview, of.score, of.a4_hz).weight(1.4))
-        .panel(breath(of).weight(0.8));
+        .panel(outline(of.overview).weight(0.85))
+        .panel(spectrogram(of.overview).weight(1.7))
+        .panel(pitch(of.overview, of.score, of.a4_hz).weight(1.6))
+        .panel(breath(of).weight(1.05));
     match of.moment.filter(|moment| !moment.probes.is_empty()) {
-        Some(moment) => figure.panel(reed(moment, of.closing_pa)),
-        None => figure,
+        Some(moment) => figure.panel(reed(moment, of.closing_pa).weight(1.25)).size(1_600, 2_100),
+        None => figure.size(1_600, 1_700),
     }
 }
 
-fn time(overview: &Overview) -> Axis {
-    Axis::linear("time, s").range(0.0, overview.seconds.max(1e-3))
+/// Time has its label once, under the last of the panels that share it.
+fn time(label: &str, overview: &Overview) -> Axis {
+    Axis::linear(label).range(0.0, overview.seconds.max(1e-3))
 }
 
 /// The area between the lowest and the highest values.
@@ -90,8 +94,13 @@ pub fn outline(overview: &Overview) -> Panel {
     let peak = overview.outline.range().map_or(0.0, |[low, high]| f64::from(high.max(-low)));
     // Silence has an axis too.
     let top = if peak > 0.0 { 1.08 * peak } else { 1.0 };
-    Panel::new("Waveform", time(overview), Axis::linear("full scale is 1").range(-top, top))
-        .with(band("", &overview.outline, overview.seconds, Colour::Blue, 0.8))
+    Panel::new("Waveform", time("", overview), Axis::linear("of full scale").range(-top, top)).with(band(
+        "",
+        &overview.outline,
+        overview.seconds,
+        Colour::Blue,
+        0.8,
+    ))
 }
 
 /// Levels over time and frequency.
@@ -99,7 +108,7 @@ pub fn spectrogram(overview: &Overview) -> Panel {
     let top_khz = 1e-3 * HIGHEST_HZ.min(overview.row_hz * (overview.rows as f64 - 0.5));
     let half_khz = 0.5e-3 * overview.row_hz;
     let heat = Heat {
-        name: "level, dB re a sine of full scale".to_owned(),
+        name: "dB of full scale".to_owned(),
         x: [0.0, overview.seconds.max(1e-3)],
         y: [-half_khz, 1e-3 * overview.row_hz * overview.rows as f64 - half_khz],
         columns: overview.columns,
@@ -108,7 +117,7 @@ pub fn spectrogram(overview: &Overview) -> Panel {
         range: [FLOOR_DB, CEILING_DB],
         map: ColourMap::PaperToInk,
     };
-    Panel::new("Spectrogram", time(overview), Axis::linear("frequency, kHz").range(0.0, top_khz))
+    Panel::new("Spectrogram", time("", overview), Axis::linear("frequency, kHz").range(0.0, top_khz))
         .with(Layer::Heat(heat))
 }
 
@@ -120,7 +129,7 @@ pub fn pitch(overview: &Overview, score: &[Note], a4_hz: f64) -> Panel {
     let (low, high) = if low > high { (60.0, 72.0) } else { (low, high) };
     let axis = Axis::notes("sounding pitch").range(low - 1.5, high + 1.5);
     let title = "Pitch heard (line) over the notes of the score (bars of 100 cents)";
-    let mut panel = Panel::new(title, time(overview), axis);
+    let mut panel = Panel::new(title, time("", overview), axis);
     for note in score {
         let key = f64::from(note.note.0);
         let (from, to) = (note.from_s, note.to_s);
@@ -131,7 +140,11 @@ pub fn pitch(overview: &Overview, score: &[Note], a4_hz: f64) -> Panel {
     let mut last: Option<f64> = None;
     for point in &overview.track {
         // A squeak far above the notes is left to the spectrogram.
-        let here = point.hz.filter(|_| point.rms > QUIET).map(key).filter(|key| (low - 1.5..high + 1.5).contains(key));
+        let here = point
+            .hz
+            .filter(|_| point.rms > QUIET)
+            .map(key)
+            .filter(|key| (low - 1.5..high + 1.5).contains(key));
         if let (Some(a), Some(b)) = (here, last)
             && (a - b).abs() > JUMP_CENTS / 100.0
         {
@@ -146,7 +159,7 @@ pub fn pitch(overview: &Overview, score: &[Note], a4_hz: f64) -> Panel {
 fn breath(of: &Performance<'_>) -> Panel {
     let top = of.gamma.range().map_or(1.0, |[_, high]| f64::from(high)).max(1.0);
     let axis = Axis::linear("gamma").range(0.0, 1.08 * top);
-    Panel::new("Mouth pressure over the pressure that shuts the reed", time(of.overview), axis)
+    Panel::new("Mouth pressure over the pressure that shuts the reed", time("time, s", of.overview), axis)
         .right(SecondAxis::times(1e-3 * of.closing_pa, "kPa"))
         .with(Mark::new(Direction::Y, 1.0 / 3.0, "1/3: no note speaks below"))
         .with(band("", of.gamma, of.overview.seconds, Colour::Blue, 0.8))
@@ -161,11 +174,8 @@ fn reed(moment: &Moment, closing_pa: f64) -> Panel {
     let opening = series(&|probe| probe.opening);
     let pressure = series(&|probe| probe.p_mouthpiece_pa / closing_pa);
     let shut = opening.iter().filter(|&&(_, opening)| opening <= 0.0).count() as f64 / opening.len() as f64;
-    let title = format!(
-        "The reed from near, from {:.3} s on: shut {:.0} % of the time",
-        moment.from_s,
-        100.0 * shut
-    );
+    let title =
+        format!("The reed from near, from {:.3} s on: shut {:.0} % of the time", moment.from_s, 100.0 * shut);
     let axis = Axis::linear("time, ms").range(0.0, at(moment.probes.len().max(2) - 1));
     Panel::new(title, axis, Axis::linear("opening; pressure"))
         .with(Mark::new(Direction::Y, 0.0, ""))
