@@ -116,8 +116,9 @@ impl Report {
         let mut lines = about(prepared);
         let outcome = match spread(&watched.heard) {
             Some((count, mean, largest)) => format!(
-                "{count} of {} notes have a pitch; from equal temperament: mean {mean:.1} cents, largest {largest:+.1}.",
-                watched.heard.len()
+                "{count} of {} notes have a pitch; from equal temperament: mean {mean:.1} cents, largest {} cents.",
+                watched.heard.len(),
+                signed(largest)
             ),
             None => "No note has a pitch.".to_owned(),
         };
@@ -205,6 +206,12 @@ fn command() -> String {
     std::iter::once("chalumeau".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
+/// To a tenth, with its sign unless it is none.
+fn signed(cents: f64) -> String {
+    let tenths = (10.0 * cents).round();
+    if tenths == 0.0 { "0.0".to_owned() } else { format!("{:+.1}", tenths / 10.0) }
+}
+
 fn word(text: impl Into<String>) -> Cell {
     Cell::Word(text.into())
 }
@@ -227,7 +234,7 @@ fn notes(prepared: &Prepared, heard: &[Heard], outcome: &str) -> Table {
             word(written.map_or(String::new(), |written| written.to_string())),
             number(format!("{:.2}", to - from)),
             number(or_none(heard.hz.map(|hz| format!("{hz:.2}")))),
-            number(or_none(heard.cents.map(|cents| format!("{cents:+.1}")))),
+            number(or_none(heard.cents.map(signed))),
             number(if heard.level_dbfs.is_finite() {
                 format!("{:.1}", heard.level_dbfs)
             } else {

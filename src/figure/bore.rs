@@ -9,6 +9,9 @@ use std::cmp::Ordering;
 /// they are at nominal size (11 and 26 pixels of 1430).
 const LETTER: f64 = 11.0 / 1430.0;
 const LINE: f64 = 26.0 / 1430.0;
+/// Most lines of names, and most attempts to set them on so many: some milliseconds.
+const LINES_MAX: usize = 7;
+const TRIES: u32 = 100_000;
 /// Room between axis and edges of a panel, pixels: labels, ticks, legend.
 const AROUND: f64 = 130.0;
 /// Width of the axes at nominal size, pixels.
@@ -76,27 +79,40 @@ impl Name {
     }
 }
 
-/// Names for places along an axis, `(x, width)` in order of x, as low as there is room.
+/// Names for places along an axis, `(x, width)` in order of x, on as few lines as they need.
 fn names(places: &[(f64, f64)]) -> Vec<Name> {
-    let mut set: Vec<Name> = Vec::with_capacity(places.len());
-    for (index, &(x, width)) in places.iter().enumerate() {
-        let near = |other: Option<&(f64, f64)>| other.is_some_and(|other| (other.0 - x).abs() < 0.6 * width);
-        // Away from a neighbour that is near, so that its stem passes.
-        let before = near(index.checked_sub(1).and_then(|before| places.get(before)));
-        let after = near(places.get(index + 1));
-        let sides: &[Anchor] = match (before, after) {
-            (false, true) => &[Anchor::Left, Anchor::Centre],
-            (true, false) => &[Anchor::Right, Anchor::Centre],
-            _ => &[Anchor::Centre, Anchor::Right, Anchor::Left],
-        };
-        let top = set.iter().map(|name| name.line + 1).max().unwrap_or(0);
-        let name = (0..=top)
-            .flat_map(|line| sides.iter().map(move |&side| Name::at(x, width, line, side)))
-            .find(|name| set.iter().all(|other| name.is_clear_of(other)));
-        // Above all others there is room, but for a stem that must go through a name.
-        set.push(name.unwrap_or(Name::at(x, width, top, Anchor::Centre)));
+    for lines in 1..=LINES_MAX {
+        let (mut set, mut tries) = (Vec::with_capacity(places.len()), TRIES);
+        if settle(places, lines, &mut set, &mut tries) {
+            return set;
+        }
     }
-    set
+    // Holes too close for words: they cover each other, but each stands over its own.
+    places
+        .iter()
+        .enumerate()
+        .map(|(index, &(x, width))| Name::at(x, width, index % LINES_MAX, Anchor::Centre))
+        .collect()
+}
+
+/// Finds a place for the next name that leaves places for those after it.
+fn settle(places: &[(f64, f64)], lines: usize, set: &mut Vec<Name>, tries: &mut u32) -> bool {
+    let Some(&(x, width)) = places.get(set.len()) else { return true };
+    for line in 0..lines {
+        for side in [Anchor::Centre, Anchor::Right, Anchor::Left] {
+            let name = Name::at(x, width, line, side);
+            if *tries == 0 || !set.iter().all(|other| name.is_clear_of(other)) {
+                continue;
+            }
+            *tries -= 1;
+            set.push(name);
+            if settle(places, lines, set, tries) {
+                return true;
+            }
+            set.pop();
+        }
+    }
+    false
 }
 
 fn outline(file: &InstrumentFile, (from_mm, to_mm): (f64, f64)) -> Vec<(f64, f64)> {
@@ -214,7 +230,7 @@ mod tests {
                 assert!(name.is_clear_of(other), "{name:?} {other:?}");
             }
         }
-        assert!(names.iter().all(|name| name.line < 6), "{names:?}");
+        assert!(names.iter().all(|name| name.line < 5), "{names:?}");
     }
 
     #[test]

@@ -98,7 +98,7 @@ pub fn fingering(about: &Fingering<'_>) -> Figure {
             from: cutoff_hz,
             to: last_hz,
             name,
-            colour: Colour::Orange,
+            colour: Colour::Grey,
         };
         upper = upper.with(above(format!("above the cut-off of the open holes, {cutoff_hz:.0} Hz")));
         lower = lower.with(above(String::new()));

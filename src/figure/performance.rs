@@ -94,7 +94,12 @@ pub fn outline(overview: &Overview) -> Panel {
     let peak = overview.outline.range().map_or(0.0, |[low, high]| f64::from(high.max(-low)));
     // Silence has an axis too.
     let top = if peak > 0.0 { 1.08 * peak } else { 1.0 };
-    Panel::new("Waveform", time("", overview), Axis::linear("of full scale").range(-top, top)).with(band(
+    // The largest of 1, 0.5, 0.2, 0.1 .. that it reaches.
+    let decade = 10f64.powf(top.log10().floor());
+    let round = [5.0, 2.0, 1.0].into_iter().map(|n| n * decade).find(|&x| x <= top).unwrap_or(decade);
+    let ticks = [-round, 0.0, round].map(|at| (at, format!("{at}")));
+    let axis = Axis::linear("of full scale").range(-top, top).ticks(ticks);
+    Panel::new("Waveform", time("", overview), axis).with(band(
         "",
         &overview.outline,
         overview.seconds,
@@ -159,9 +164,11 @@ pub fn pitch(overview: &Overview, score: &[Note], a4_hz: f64) -> Panel {
 fn breath(of: &Performance<'_>) -> Panel {
     let top = of.gamma.range().map_or(1.0, |[_, high]| f64::from(high)).max(1.0);
     let axis = Axis::linear("gamma").range(0.0, 1.08 * top);
-    Panel::new("Mouth pressure over the pressure that shuts the reed", time("time, s", of.overview), axis)
+    let title =
+        "Mouth pressure over the pressure that shuts the reed (dashed: 1/3, below which no note speaks)";
+    Panel::new(title, time("time, s", of.overview), axis)
         .right(SecondAxis::times(1e-3 * of.closing_pa, "kPa"))
-        .with(Mark::new(Direction::Y, 1.0 / 3.0, "1/3: no note speaks below"))
+        .with(Mark::new(Direction::Y, 1.0 / 3.0, ""))
         .with(band("", of.gamma, of.overview.seconds, Colour::Blue, 0.8))
 }
 
@@ -177,7 +184,7 @@ fn reed(moment: &Moment, closing_pa: f64) -> Panel {
     let title =
         format!("The reed from near, from {:.3} s on: shut {:.0} % of the time", moment.from_s, 100.0 * shut);
     let axis = Axis::linear("time, ms").range(0.0, at(moment.probes.len().max(2) - 1));
-    Panel::new(title, axis, Axis::linear("opening; pressure"))
+    Panel::new(title, axis, Axis::linear("over rest; over closing"))
         .with(Mark::new(Direction::Y, 0.0, ""))
         .with(Polygon::area("", opening.iter().copied(), 0.0, Colour::Sky, 0.25))
         .with(Line::new("gap of the reed over that at rest", opening).colour(Colour::Blue))

@@ -79,7 +79,7 @@ pub enum ReportError {
 const STYLE: &str = "\
 :root { color-scheme: light dark; --paper: #fff; --ink: #22262e; --quiet: #5e636c; --line: #d9dde3; --stripe: #f5f6f8; }
 @media (prefers-color-scheme: dark) {
-  :root { --paper: #14161a; --ink: #e6e8ec; --quiet: #a4aab4; --line: #363b44; --stripe: #1c1f25; }
+  :root { --paper: #141414; --ink: #e6e8ec; --quiet: #a4aab4; --line: #363b44; --stripe: #1c1f25; }
   /* White paper becomes the colour of the page; hues come back to where they were. */
   img { filter: invert(0.92) hue-rotate(180deg); }
 }
