@@ -11,6 +11,7 @@ mod doctor;
 mod feel;
 mod haptic;
 mod impedance;
+mod instrument;
 #[cfg(feature = "devices")]
 mod knob;
 #[cfg(feature = "simulator")]
@@ -27,7 +28,8 @@ mod threshold;
 mod tune;
 mod watch;
 
-use crate::bore::instrument_file::InstrumentError;
+use crate::bore::cylinder::CylinderError;
+use crate::bore::instrument_file::{ImportError, InstrumentError};
 use crate::figure::draw::DrawError;
 use crate::figure::report::ReportError;
 use crate::haptics::FeelRefused;
@@ -73,6 +75,7 @@ enum Command {
     Report(Box<report::Report>),
     Impedance(Box<impedance::Impedance>),
     Bore(Box<bore::Bore>),
+    Instrument(Box<instrument::Instrument>),
     Threshold(threshold::Threshold),
     Tune(Box<tune::Tune>),
     Reed(reed::Reed),
@@ -101,6 +104,10 @@ enum Failure {
     InstrumentFile { path: PathBuf, source: InstrumentError },
     #[error("{}: {source}", path.display())]
     Instrument { path: PathBuf, source: BuildError },
+    #[error(transparent)]
+    Import(Box<ImportError>),
+    #[error(transparent)]
+    Cylinder(#[from] CylinderError),
     #[error(transparent)]
     Build(#[from] BuildError),
     #[error(transparent)]
@@ -148,6 +155,12 @@ pub fn main() -> ExitCode {
         Command::Report(command) => command.run(),
         Command::Impedance(command) => command.run(),
         Command::Bore(command) => command.run(),
+        Command::Instrument(command) => {
+            return match command.run() {
+                Ok(code) => code,
+                Err(failure) => failed(&failure),
+            };
+        }
         Command::Threshold(command) => command.run(),
         Command::Tune(command) => command.run(),
         Command::Reed(command) => command.run(),
@@ -161,10 +174,15 @@ pub fn main() -> ExitCode {
         Command::Doctor(command) => command.run(),
     };
     match done {
-        Err(failure) if !failure.is_closed_pipe() => {
-            eprintln!("error: {failure}");
-            ExitCode::from(2)
-        }
-        _ => ExitCode::SUCCESS,
+        Err(failure) => failed(&failure),
+        Ok(()) => ExitCode::SUCCESS,
     }
+}
+
+fn failed(failure: &Failure) -> ExitCode {
+    if failure.is_closed_pipe() {
+        return ExitCode::SUCCESS;
+    }
+    eprintln!("error: {failure}");
+    ExitCode::from(2)
 }

@@ -6,7 +6,6 @@ use crate::cli::play::Prepared;
 use crate::figure::Figure;
 use crate::figure::performance::{Moment, Note, Performance, performance};
 use crate::instrument::Probe;
-use crate::instrument::model::internal_rate_hz;
 use crate::render::heard::{Heard, Listener, Sounding};
 
 /// Columns of a picture: as many as a drawing of usual size has pixels for.
@@ -68,7 +67,7 @@ impl Watch {
             .find(within)
             .map_or(PERIOD_S, |sounding| 1.0 / sounding.note.frequency_hz(a4_hz));
         let length_s = (PERIODS * period_s).clamp(MOMENT_S.0, MOMENT_S.1);
-        let internal_hz = internal_rate_hz(rate_hz);
+        let internal_hz = prepared.model.coeffs.rate_hz;
         let near = ((near_s * internal_hz) as u64, ((near_s + length_s) * internal_hz) as u64);
         let internal = (seconds * internal_hz).ceil() as usize;
         Ok(Self {
