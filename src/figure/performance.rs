@@ -16,6 +16,9 @@ const JUMP_CENTS: f64 = 60.0;
 /// Quieter than this there is no pitch to draw: -80 dB re full scale.
 const QUIET: f64 = 1e-4;
 
+/// A gap below this part of that at rest is shut: some hundredth of a millimetre, where a curved lay never quite closes.
+const SHUT: f64 = 0.01;
+
 /// A note of the score as it is heard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Note {
@@ -180,7 +183,7 @@ fn reed(moment: &Moment, closing_pa: f64) -> Panel {
     };
     let opening = series(&|probe| probe.opening);
     let pressure = series(&|probe| probe.p_mouthpiece_pa / closing_pa);
-    let shut = opening.iter().filter(|&&(_, opening)| opening <= 0.0).count() as f64 / opening.len() as f64;
+    let shut = opening.iter().filter(|&&(_, opening)| opening < SHUT).count() as f64 / opening.len() as f64;
     let title =
         format!("The reed from near, from {:.3} s on: shut {:.0} % of the time", moment.from_s, 100.0 * shut);
     let axis = Axis::linear("time, ms").range(0.0, at(moment.probes.len().max(2) - 1));
