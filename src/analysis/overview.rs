@@ -230,8 +230,9 @@ mod tests {
                 assert!((point.hz.unwrap() / hz - 1.0).abs() < 0.005, "{point:?}");
             }
         }
+        // A look every fortieth of 2 s through 60 ms: the last whole one is at most that and half a window before the end.
         let last = overview.track.last().unwrap().t_s;
-        assert!((1.94..2.0).contains(&last), "{last}");
+        assert!((1.92..1.97).contains(&last), "{last}");
     }
 
     #[test]

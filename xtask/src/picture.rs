@@ -102,3 +102,40 @@ pub fn write_touch(path: &Path, performance: &Performance, rate_hz: f64) -> Resu
         .size(1_600, 1_500);
     Ok(draw::write(&figure, path, None, true)?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chalumeau::render::midi_file;
+    use std::f32::consts::TAU;
+
+    /// A tone with the demo's score, and a hand that turns the knob with it.
+    #[test]
+    fn both_pictures_of_the_demo_are_drawn() {
+        let melody = crate::machine::root().join("examples/melody.mid");
+        let score = midi_file::read(&std::fs::read(melody).unwrap(), 48_000).unwrap();
+        let left: Vec<f32> =
+            (0..score.samples).map(|n| 0.3 * (TAU * 233.1 * n as f32 / 48_000.0).sin()).collect();
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        write(&path("a.png"), &left, 48_000.0, &score, 440.0).unwrap();
+        let times = || (0..2_900).map(|n| 0.01 * f64::from(n));
+        let performance = Performance {
+            left,
+            knob: times().map(|t| [t, 150.0 + 20.0 * t.sin(), -40.0 * t.cos()]).collect(),
+            gamma: times().map(|t| [t, 0.5 + 0.1 * t.sin()]).collect(),
+            threshold: vec![[0.0, 120.0, 0.36], [10.0, 130.0, 0.38]],
+        };
+        write_touch(&path("b.png"), &performance, 48_000.0).unwrap();
+        for name in ["a.png", "b.png"] {
+            let png = std::fs::read(path(name)).unwrap();
+            assert!(&png[1..4] == b"PNG" && png.len() > 50_000, "{name}: {} bytes", png.len());
+        }
+        // To be looked at: `CHALUMEAU_PICTURES=folder cargo test -p xtask --lib picture`.
+        if let Some(to) = std::env::var_os("CHALUMEAU_PICTURES") {
+            for name in ["a.png", "b.png"] {
+                std::fs::copy(path(name), Path::new(&to).join(name)).unwrap();
+            }
+        }
+    }
+}
