@@ -5,6 +5,7 @@
 //! was given and what would be right, and no file; a reader that closes the pipe early is no mistake.
 
 mod args;
+mod bifurcation;
 mod bore;
 #[cfg(feature = "devices")]
 mod doctor;
@@ -77,6 +78,7 @@ enum Command {
     Bore(Box<bore::Bore>),
     Instrument(Box<instrument::Instrument>),
     Threshold(threshold::Threshold),
+    Bifurcation(Box<bifurcation::Bifurcation>),
     Tune(Box<tune::Tune>),
     Reed(reed::Reed),
     Study(study::Study),
@@ -162,6 +164,7 @@ pub fn main() -> ExitCode {
             };
         }
         Command::Threshold(command) => command.run(),
+        Command::Bifurcation(command) => command.run(),
         Command::Tune(command) => command.run(),
         Command::Reed(command) => command.run(),
         Command::Study(command) => command.run(),
