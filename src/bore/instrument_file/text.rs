@@ -26,12 +26,15 @@ impl InstrumentFile {
              transposition_semitones = {}\n\n\
              # Volume of air that moves with the reed, in parallel with the tip, mm3 (1000 mm3 = 1 cm3).\n\
              reed_volume_mm3 = {}\n\n\
+             # Bore that zeta and the size of the reed refer to.\n\
+             nominal_diameter_mm = {}\n\n\
              # Straight cones, each starting where the one before ends. A jump in diameter between two of them is a step.\n\
              bore = [\n",
             quoted(&self.name),
             quoted(&self.source),
             self.transposition,
             number(self.reed_volume_m3, 1e9),
+            number(self.nominal_radius_m, 2e3),
         );
         for segment in &self.bore {
             let _ = writeln!(
@@ -125,20 +128,7 @@ mod tests {
 
     #[test]
     fn lengths_no_decimal_holds_come_back_within_a_nanometre() {
-        let mut file = InstrumentFile::built_in();
-        let factor = 2.0_f64.powf(1.0 / 12.0);
-        for segment in &mut file.bore {
-            segment.x_start_m *= factor;
-            segment.x_end_m *= factor;
-            segment.r_start_m *= factor;
-            segment.r_end_m *= factor;
-        }
-        for hole in &mut file.holes {
-            hole.x_m *= factor;
-            hole.radius_m *= factor;
-            hole.chimney_m *= factor;
-        }
-        file.reed_volume_m3 *= factor.powi(3);
+        let mut file = InstrumentFile::built_in().scaled(2.0_f64.powf(1.0 / 12.0));
         // As wide as the bore: rounding must not make it wider.
         file.holes[0].radius_m = file.radius_at(file.holes[0].x_m);
         let read = InstrumentFile::parse(&file.to_toml()).unwrap();
@@ -152,6 +142,7 @@ mod tests {
             assert!(close(a.chimney_m, b.chimney_m), "{a:?} {b:?}");
         }
         assert!((file.reed_volume_m3 - read.reed_volume_m3).abs() < 1e-15);
+        assert!(close(file.nominal_radius_m, read.nominal_radius_m));
         assert_eq!(file.fingerings, read.fingerings);
     }
 
