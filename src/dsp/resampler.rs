@@ -149,7 +149,8 @@ impl Resampler {
             self.history.copy_within(gone..self.next, 0);
             self.next -= gone;
             self.end -= gone;
-            self.from -= gone;
+            // Far behind while the clock is plain, and not looked at.
+            self.from = self.from.saturating_sub(gone);
         }
         if speed != 1.0 || self.warping {
             self.glide(input.len(), speed);
