@@ -352,7 +352,8 @@ mod tests {
 
     fn heard(in_hz: f64, out_hz: f64, f_hz: f64) -> Heard {
         let mut resampler = Resampler::new(in_hz, out_hz);
-        let (out, _) = convert(&mut resampler, &sine(f_hz, in_hz, (in_hz * 0.3) as usize), std::iter::repeat(64));
+        let (out, _) =
+            convert(&mut resampler, &sine(f_hz, in_hz, (in_hz * 0.3) as usize), std::iter::repeat(64));
         let skip = 400;
         // Least squares on sine and cosine: the two are not quite orthogonal over a slice of any length.
         let (mut ss, mut cc, mut sc, mut ys, mut yc) = (0.0, 0.0, 0.0, 0.0, 0.0);
@@ -378,7 +379,8 @@ mod tests {
     /// Level at the output, dB relative to the sine at the input.
     fn level_db(in_hz: f64, out_hz: f64, f_hz: f64) -> f64 {
         let mut resampler = Resampler::new(in_hz, out_hz);
-        let (out, _) = convert(&mut resampler, &sine(f_hz, in_hz, (in_hz * 0.2) as usize), std::iter::repeat(64));
+        let (out, _) =
+            convert(&mut resampler, &sine(f_hz, in_hz, (in_hz * 0.2) as usize), std::iter::repeat(64));
         let tail = &out[400..];
         10.0 * (2.0 * tail.iter().map(|&y| f64::from(y).powi(2)).sum::<f64>() / tail.len() as f64).log10()
     }
@@ -479,7 +481,7 @@ mod tests {
     fn equal_rates_are_a_pure_delay() {
         let mut resampler = Resampler::new(96e3, 96e3);
         let input = sine(1e3, 96e3, 112);
-        let (out, _) = convert(&mut resampler, &input, std::iter::repeat(7).take(16));
+        let (out, _) = convert(&mut resampler, &input, std::iter::repeat_n(7, 16));
         assert_eq!(resampler.latency_out_samples(), 20.0);
         assert_eq!(input[..92], out[20..]);
         assert!(out[..20].iter().all(|&y| y == 0.0));
