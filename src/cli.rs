@@ -10,11 +10,13 @@ mod doctor;
 mod feel;
 mod haptic;
 mod impedance;
+mod instrument;
 #[cfg(feature = "devices")]
 mod knob;
 #[cfg(feature = "simulator")]
 mod knob_sim;
 mod play;
+mod plot;
 mod reed;
 mod render;
 mod settings;
@@ -23,7 +25,9 @@ mod table;
 mod threshold;
 mod tune;
 
-use crate::bore::instrument_file::InstrumentError;
+use crate::bore::cylinder::CylinderError;
+use crate::bore::instrument_file::{ImportError, InstrumentError};
+use crate::figure::draw::DrawError;
 use crate::haptics::FeelRefused;
 use crate::instrument::BuildError;
 use crate::output::OutputError;
@@ -64,6 +68,7 @@ struct Cli {
 enum Command {
     Render(Box<render::Render>),
     Impedance(impedance::Impedance),
+    Instrument(Box<instrument::Instrument>),
     Threshold(threshold::Threshold),
     Tune(Box<tune::Tune>),
     Reed(reed::Reed),
@@ -93,6 +98,10 @@ enum Failure {
     #[error("{}: {source}", path.display())]
     Instrument { path: PathBuf, source: BuildError },
     #[error(transparent)]
+    Import(Box<ImportError>),
+    #[error(transparent)]
+    Cylinder(#[from] CylinderError),
+    #[error(transparent)]
     Build(#[from] BuildError),
     #[error(transparent)]
     Breath(#[from] BreathError),
@@ -100,6 +109,8 @@ enum Failure {
     Score(#[from] ScoreError),
     #[error(transparent)]
     Output(#[from] OutputError),
+    #[error(transparent)]
+    Draw(#[from] DrawError),
     #[error(transparent)]
     Wav(#[from] WavError),
     #[error(transparent)]
@@ -133,6 +144,12 @@ pub fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Render(command) => command.run(),
         Command::Impedance(command) => command.run(),
+        Command::Instrument(command) => {
+            return match command.run() {
+                Ok(code) => code,
+                Err(failure) => failed(&failure),
+            };
+        }
         Command::Threshold(command) => command.run(),
         Command::Tune(command) => command.run(),
         Command::Reed(command) => command.run(),
@@ -146,10 +163,15 @@ pub fn main() -> ExitCode {
         Command::Doctor(command) => command.run(),
     };
     match done {
-        Err(failure) if !failure.is_closed_pipe() => {
-            eprintln!("error: {failure}");
-            ExitCode::from(2)
-        }
-        _ => ExitCode::SUCCESS,
+        Err(failure) => failed(&failure),
+        Ok(()) => ExitCode::SUCCESS,
     }
+}
+
+fn failed(failure: &Failure) -> ExitCode {
+    if failure.is_closed_pipe() {
+        return ExitCode::SUCCESS;
+    }
+    eprintln!("error: {failure}");
+    ExitCode::from(2)
 }
