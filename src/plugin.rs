@@ -9,6 +9,8 @@
 mod knob;
 mod params;
 mod reed_sources;
+#[cfg(feature = "standalone")]
+pub mod standalone;
 mod translate;
 
 use std::sync::Arc;

@@ -42,6 +42,7 @@ const STEPS: &[Step] = &[
     ("tests, xtask and its MIDI reader", || cargo("test -p xtask --lib --bins")),
     ("CLAP in clack-host", || cargo("test -p xtask --test clap --no-fail-fast")),
     ("CLAP with allocation checks", clap_checked),
+    ("standalone", standalone),
     ("CLAP with the simulated knob", || cargo("test -p xtask --test knob --no-fail-fast")),
     // Elsewhere there is no JACK that a test could start.
     #[cfg(target_os = "linux")]
@@ -136,6 +137,12 @@ fn clap_checked() -> Result<()> {
     let library = machine::target().join("debug").join(library);
     let tests = ["test", "-p", "xtask", "--test", "clap", "--test", "knob", "--no-fail-fast"];
     machine::run(machine::cargo().args(tests).env("CHALUMEAU_CLAP", library))
+}
+
+/// The program of its own, without sound; the JACK step plays it to a server.
+fn standalone() -> Result<()> {
+    cargo("build --all-features --bin chalumeau-standalone")?;
+    cargo("test -p xtask --test standalone --no-fail-fast")
 }
 
 fn dawdreamer() -> Result<()> {
