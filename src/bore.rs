@@ -1,5 +1,6 @@
 //! The bore: its measurements as data, its impedance in the frequency domain, its lattice in the time domain.
 
+pub mod bundled;
 pub mod cells;
 pub mod fit;
 pub mod instrument_file;

@@ -14,6 +14,7 @@ mod impedance;
 mod knob;
 #[cfg(feature = "simulator")]
 mod knob_sim;
+mod play;
 mod reed;
 mod render;
 mod settings;

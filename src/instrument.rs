@@ -1,11 +1,13 @@
 //! Reed and bore married: the voice, how a player articulates, and what comes out at the host's rate.
 
+pub mod cache;
 mod clarinet;
 pub mod embouchure;
 pub mod felt;
 pub mod held;
 pub mod model;
 pub mod player;
+pub mod prepare;
 mod settings;
 mod slap;
 pub mod tuning;
@@ -13,5 +15,6 @@ pub mod voice;
 
 pub use clarinet::Clarinet;
 pub use model::{BuildError, Model};
+pub use prepare::{Quality, Wanted};
 pub use settings::{Settings, Tuning};
 pub use voice::{Probe, Voice};

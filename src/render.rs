@@ -6,6 +6,7 @@
 //! while it plays, and more than one voice.
 
 pub mod breath;
+pub mod heard;
 pub mod midi_file;
 pub mod score;
 pub mod wav;

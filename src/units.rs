@@ -56,7 +56,8 @@ impl Default for Air {
     }
 }
 
-/// Radius of the bore that every dimensionless figure (zeta, |Z|/Zc) refers to, m.
+/// Radius of the bore that every dimensionless figure (zeta, |Z|/Zc) refers to, m, where an instrument file names no other
+/// (its `nominal_diameter_mm`): that of a B flat clarinet.
 pub const REFERENCE_RADIUS_M: f64 = 7.45e-3;
 
 /// A note as MIDI, files and hosts know it: MIDI number of the pitch that sounds.

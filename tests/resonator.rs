@@ -17,7 +17,7 @@ use chalumeau::instrument::model::{INTERNAL_RATES_HZ, Model};
 use chalumeau::instrument::voice::{Drive, TICK, Voice};
 use chalumeau::reed::physical::P_REF_PA;
 use chalumeau::reed::{ReedCoeffs, ReedState, ReedTables};
-use chalumeau::units::{REFERENCE_RADIUS_M, WrittenNote, cents};
+use chalumeau::units::{WrittenNote, cents};
 use num_complex::Complex64;
 use oracle::Oracle;
 use reference::{RANGE, Row, Spread, midi, number, rows};
@@ -609,8 +609,8 @@ fn each_hole_opens_smoothly_from_closed_to_open() {
 
 /// Frequency nearest `near_hz` where the phase falls through zero, reed volume in parallel.
 fn playing_hz(model: &Model, opening: &[f64], near_hz: f64) -> f64 {
-    let compliance =
-        model.file.reed_volume_m3 / (model.air.rho * model.air.c.powi(2)) * model.air.z_c(REFERENCE_RADIUS_M);
+    let compliance = model.file.reed_volume_m3 / (model.air.rho * model.air.c.powi(2))
+        * model.air.z_c(model.file.nominal_radius_m);
     let im = |f_hz: f64| {
         let reed = Complex64::new(0.0, std::f64::consts::TAU * f_hz * compliance);
         (1.0 / (1.0 / model.coeffs.impedance(f_hz, opening) + reed)).im
@@ -634,7 +634,7 @@ fn thresholds_do_not_depend_on_the_rate() {
         let opening = openings(model, index_of(model, midi(row)));
         let f_hz = playing_hz(model, &opening, number(row, "f_play_hz"));
         let compliance = model.file.reed_volume_m3 / (model.air.rho * model.air.c.powi(2))
-            * model.air.z_c(REFERENCE_RADIUS_M);
+            * model.air.z_c(model.file.nominal_radius_m);
         let reed = Complex64::new(0.0, std::f64::consts::TAU * f_hz * compliance);
         threshold_gamma((1.0 / (1.0 / model.coeffs.impedance(f_hz, &opening) + reed)).re, 0.3)
     };

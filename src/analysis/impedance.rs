@@ -2,7 +2,7 @@
 //!
 //! A lattice answers a unit impulse of forward wave at the tip with backward waves `r[n]`; their transform is the
 //! reflectance `R`, and `Z = (1 + R) / (1 - R) / y_tip`. The tip's admittance and Z refer to the characteristic
-//! admittance of a 7.45 mm bore (`units::REFERENCE_RADIUS_M`). Sample 0 is the answer within the same sample. What this
+//! admittance of the instrument's nominal bore. Sample 0 is the answer within the same sample. What this
 //! leaves out: an answer cut off before it has died away rings around the peaks. Hz.
 //!
 //! | symbol | here |

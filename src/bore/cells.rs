@@ -35,6 +35,9 @@ pub struct Cells {
     pub hole_junctions: Vec<usize>,
     /// Radius of the open end, m.
     pub end_radius_m: f64,
+    /// Radius of the bore whose admittance all others are over, m, see [`InstrumentFile::nominal_radius_m`].
+    #[serde(default = "nominal_radius_m")]
+    pub nominal_radius_m: f64,
     /// Frequencies of the three loss poles, Hz, see [`wall_loss`].
     pub loss_poles_hz: [f64; 3],
     /// Their strengths, s^-1/2.
@@ -44,6 +47,11 @@ pub struct Cells {
     pub vent_resistance: f64,
     /// Share of each chimney's mass before its compliance: 1/3 would be right for closed holes, nearly 1/2 for open ones.
     pub chimney_split: f64,
+}
+
+/// What a kept bore refers to where it does not say.
+fn nominal_radius_m() -> f64 {
+    REFERENCE_RADIUS_M
 }
 
 /// Why a bore cannot be put on the grid.
@@ -182,12 +190,13 @@ impl Cells {
         }
         let hole_junctions =
             (0..junctions.len()).filter(|&junction| junctions[junction].1.is_some()).collect();
-        let end_radius_m = file.bore.last().map_or(REFERENCE_RADIUS_M, |segment| segment.r_end_m);
+        let end_radius_m = file.bore.last().map_or(file.nominal_radius_m, |segment| segment.r_end_m);
         Ok(Self {
             rate_hz,
             cells,
             hole_junctions,
             end_radius_m,
+            nominal_radius_m: file.nominal_radius_m,
             loss_poles_hz: wall_loss::POLES_HZ,
             loss_strengths: wall_loss::STRENGTHS,
             vent_resistance: 1.0,

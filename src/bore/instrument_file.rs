@@ -11,12 +11,13 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use crate::units::WrittenNote;
 use crate::units::midi_of_name;
+use crate::units::{REFERENCE_RADIUS_M, WrittenNote};
 
 mod error;
 mod limits;
 mod raw;
+mod text;
 
 pub use error::InstrumentError;
 use limits::*;
@@ -31,6 +32,8 @@ pub const REGISTERS: [&str; 4] = ["chalumeau", "throat", "clarion", "altissimo"]
 
 /// Cones that meet within this distance are taken as touching, m.
 const CONTACT_M: f64 = 1e-6;
+/// What lengths may lose by being written with few digits, m.
+const ROUNDING_M: f64 = 2e-9;
 
 /// One instrument: Design, in the words of the house. SI units.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,6 +46,9 @@ pub struct InstrumentFile {
     pub transposition: i8,
     /// Volume of air that moves with the reed, in parallel with the bore at the tip, m3, 0..=2e-5 (clarinet: 1.2e-6).
     pub reed_volume_m3: f64,
+    /// Radius of the bore that zeta, Zc and the size of the reed refer to, m: that of the cylindrical part, by default
+    /// [`REFERENCE_RADIUS_M`]. Admittances inside are over that of a tube of this radius.
+    pub nominal_radius_m: f64,
     /// The main bore from the reed tip (x = 0) to the end of the bell; contiguous.
     pub bore: Vec<BoreSegment>,
     /// Tone holes, ordered from the reed to the bell, at most [`MAX_HOLES`].
@@ -118,6 +124,9 @@ impl InstrumentFile {
         let raw: RawFile = toml::from_str(text)?;
         within("the file", "transposition_semitones", raw.transposition_semitones as f64, &TRANSPOSITION)?;
         within("the file", "reed_volume_mm3", raw.reed_volume_mm3, &REED_VOLUME)?;
+        if let Some(diameter_mm) = raw.nominal_diameter_mm {
+            within("the file", "nominal_diameter_mm", diameter_mm, &NOMINAL_DIAMETER)?;
+        }
         if raw.name.trim().is_empty() {
             return Err(word("the file", "name", &raw.name, "the name of the instrument"));
         }
@@ -129,6 +138,9 @@ impl InstrumentFile {
             source: raw.source,
             transposition: raw.transposition_semitones as i8,
             reed_volume_m3: raw.reed_volume_mm3 / 1e9,
+            nominal_radius_m: raw
+                .nominal_diameter_mm
+                .map_or(REFERENCE_RADIUS_M, |diameter_mm| diameter_mm / 2e3),
             bore: segments(raw.bore)?,
             holes: Vec::new(),
             fingerings: Vec::new(),
@@ -155,6 +167,29 @@ impl InstrumentFile {
     pub fn built_in() -> Self {
         // PANIC: the text is a constant of this program and a test below parses it.
         Self::parse(Self::built_in_text()).expect("the built-in instrument is valid")
+    }
+
+    /// The same instrument `factor` times as large in every direction: bore, holes, chimneys, nominal bore, and the air
+    /// moving with the reed by the cube. Without losses all its resonances are those of the original divided by `factor`;
+    /// wall losses are a little smaller in a larger bore. Names, chart and transposition stay: what the notes are called
+    /// is the caller's to say. `factor` is finite and above 0; 1 gives the same instrument bit by bit.
+    pub fn scaled(&self, factor: f64) -> Self {
+        let mut file = self.clone();
+        for segment in &mut file.bore {
+            for length in
+                [&mut segment.x_start_m, &mut segment.x_end_m, &mut segment.r_start_m, &mut segment.r_end_m]
+            {
+                *length *= factor;
+            }
+        }
+        for hole in &mut file.holes {
+            for length in [&mut hole.x_m, &mut hole.radius_m, &mut hole.chimney_m] {
+                *length *= factor;
+            }
+        }
+        file.nominal_radius_m *= factor;
+        file.reed_volume_m3 *= factor.powi(3);
+        file
     }
 
     /// Length of the bore from reed tip to bell, m.
@@ -211,7 +246,8 @@ impl InstrumentFile {
                 return Err(InstrumentError::HoleOffBore { place, given_mm, length_mm });
             }
             let (radius_m, bore_radius_m) = (hole.diameter_mm / 2e3, self.radius_at(x_m));
-            if radius_m > bore_radius_m {
+            // A hole as wide as the bore stays so when both are rounded to what a file holds.
+            if radius_m > bore_radius_m + ROUNDING_M {
                 let (given_mm, bore_mm) = (hole.diameter_mm, in_mm(2.0 * bore_radius_m));
                 return Err(InstrumentError::HoleTooWide { place, given_mm, bore_mm });
             }
@@ -332,6 +368,35 @@ mod tests {
         assert_eq!(file.holes.iter().filter(|hole| hole.register).count(), 1);
         assert_eq!((file.transposition, file.reed_volume_m3), (2, 1.2e-6));
         assert!(file.fingering(WrittenNote(51)).is_none());
+    }
+
+    #[test]
+    fn nominal_bore_is_that_of_a_b_flat_clarinet_unless_given() {
+        let text = InstrumentFile::built_in_text();
+        assert_eq!(InstrumentFile::built_in().nominal_radius_m.to_bits(), REFERENCE_RADIUS_M.to_bits());
+        let given = |text: &str| {
+            InstrumentFile::parse(&text.replacen("reed_volume", "nominal_diameter_mm = 23.0\nreed_volume", 1))
+        };
+        assert_eq!(given(text).unwrap().nominal_radius_m, 0.0115);
+        let wrong = text.replacen("reed_volume", "nominal_diameter_mm = 0.023\nreed_volume", 1);
+        let message = InstrumentFile::parse(&wrong).unwrap_err().to_string();
+        assert!(
+            message.contains("nominal_diameter_mm") && message.contains("this looks like metres"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn scaling_is_isotropic_and_by_one_nothing() {
+        let file = InstrumentFile::built_in();
+        assert_eq!(file.scaled(1.0), file);
+        let twice = file.scaled(2.0);
+        assert_eq!((twice.length_m(), twice.nominal_radius_m), (2.0 * file.length_m(), 0.0149));
+        assert_eq!(twice.radius_at(0.4), 2.0 * file.radius_at(0.2));
+        assert_eq!(twice.reed_volume_m3, 8.0 * file.reed_volume_m3);
+        assert_eq!(twice.holes[3].chimney_m, 2.0 * file.holes[3].chimney_m);
+        assert_eq!((twice.transposition, &twice.fingerings), (file.transposition, &file.fingerings));
+        assert_eq!(twice.scaled(0.5), file);
     }
 
     #[test]

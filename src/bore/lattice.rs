@@ -14,7 +14,7 @@
 //! After van Walstijn & Campbell 2003 (wave digital tone holes) and Kelly & Lochbaum 1962; the network of a hole is in
 //! `bore::tone_hole`, losses in `bore::wall_loss`.
 //!
-//! Pressures over a reference pressure P, flows over P / Zc with Zc of a 7.45 mm bore.
+//! Pressures over a reference pressure P, flows over P / Zc with Zc of the instrument's nominal bore.
 
 mod coeffs;
 mod junctions;

@@ -12,7 +12,7 @@ use num_complex::Complex64;
 
 use crate::bore::instrument_file::ToneHole;
 use crate::bore::transfer_matrix::bessel_ratio;
-use crate::units::{Air, REFERENCE_RADIUS_M};
+use crate::units::Air;
 
 /// Unflanged end correction over the radius.
 pub const END_CORRECTION: f64 = 0.6133;
@@ -65,9 +65,9 @@ impl HoleNetwork {
         }
     }
 
-    /// The network at one sample rate (trapezoidal rule), admittances over `S_ref / (rho c)`.
-    pub fn coeffs(&self, rate_hz: f64, air: &Air) -> HoleCoeffs {
-        let y_ref = 1.0 / air.z_c(REFERENCE_RADIUS_M);
+    /// The network at one sample rate (trapezoidal rule), admittances over that of a bore of radius `nominal_radius_m`.
+    pub fn coeffs(&self, rate_hz: f64, nominal_radius_m: f64, air: &Air) -> HoleCoeffs {
+        let y_ref = 1.0 / air.z_c(nominal_radius_m);
         HoleCoeffs {
             r1: 2.0 * rate_hz * self.m1 * y_ref,
             gc: 2.0 * rate_hz * self.c / y_ref,
@@ -77,9 +77,10 @@ impl HoleNetwork {
         }
     }
 
-    /// Resistance per flow of the jet, for pressures over `p_ref_pa` and flows over `p_ref Zc^-1`, at `K` = 1.
-    pub fn jet(&self, p_ref_pa: f64, air: &Air) -> f64 {
-        let z_c = air.z_c(REFERENCE_RADIUS_M);
+    /// Resistance per flow of the jet, for pressures over `p_ref_pa` and flows over `p_ref Zc^-1`, at `K` = 1;
+    /// Zc of a bore of radius `nominal_radius_m`.
+    pub fn jet(&self, p_ref_pa: f64, nominal_radius_m: f64, air: &Air) -> f64 {
+        let z_c = air.z_c(nominal_radius_m);
         air.rho * p_ref_pa / (2.0 * z_c * z_c * self.area_m2 * self.area_m2)
     }
 }

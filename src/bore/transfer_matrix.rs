@@ -13,7 +13,7 @@
 //! | Zc, characteristic impedance with losses, Pa s/m3 | `z_c` |
 //! | t_i, t_a, inner and series length correction of a hole, m | `inner_m`, `series_m` |
 //! | b, a, h: radii of hole and bore, chimney height, m | `radius_m`, `bore_radius_m`, `chimney_m` |
-//! | Z/Zc(7.45 mm) | `over_zc` |
+//! | Z/Zc of the nominal bore | `over_zc` |
 
 use std::collections::HashMap;
 use std::f64::consts::PI;
@@ -26,7 +26,6 @@ use num_complex::Complex64;
 
 use crate::bore::instrument_file::InstrumentFile;
 use crate::units::Air;
-use crate::units::REFERENCE_RADIUS_M;
 
 const J: Complex64 = Complex64::new(0.0, 1.0);
 /// Longest cylinder a cone is cut into, m, and its largest change of radius, m. Halving both moves no peak of the
@@ -47,6 +46,8 @@ pub struct TransferMatrix {
     spans: Vec<Vec<Piece>>,
     holes: Vec<Hole>,
     bell_radius_m: f64,
+    /// Bore that impedances are over the Zc of, m.
+    nominal_radius_m: f64,
     kept: Mutex<HashMap<u64, Arc<AtFrequency>>>,
 }
 
@@ -101,7 +102,7 @@ struct Matrix {
 pub struct Peak {
     /// Frequency, Hz.
     pub f_hz: f64,
-    /// |Z| there, over Zc of a 7.45 mm bore.
+    /// |Z| there, over Zc of the nominal bore.
     pub mag_over_zc: f64,
     /// Quality factor, `-(f/2) d arg Z / df` at the maximum.
     pub q: f64,
@@ -175,11 +176,12 @@ impl TransferMatrix {
         }
         // A hole past the end, which `InstrumentFile::parse` refuses, sits at the bell.
         spans.resize_with(holes.len() + 1, Vec::new);
-        let bell_radius_m = file.bore.last().map_or(REFERENCE_RADIUS_M, |segment| segment.r_end_m);
-        Self { air, radii_m, spans, holes, bell_radius_m, kept: Mutex::default() }
+        let bell_radius_m = file.bore.last().map_or(file.nominal_radius_m, |segment| segment.r_end_m);
+        let nominal_radius_m = file.nominal_radius_m;
+        Self { air, radii_m, spans, holes, bell_radius_m, nominal_radius_m, kept: Mutex::default() }
     }
 
-    /// Input impedance at the reed tip over Zc of a 7.45 mm bore.
+    /// Input impedance at the reed tip over Zc of the instrument's nominal bore.
     ///
     /// `f_hz` is taken into 0.1 Hz..100 kHz. `open[hole]` in the order of the file, missing ones closed. A reed volume
     /// above 0 (m3) is put in parallel at the tip. The first 8192 different frequencies are kept, so that a grid of
@@ -232,7 +234,7 @@ impl TransferMatrix {
         }
         (pressure, flow) = at.spans[0].apply(pressure, flow);
         flows.iter_mut().for_each(|into| *into /= pressure);
-        pressure / flow / self.air.z_c(REFERENCE_RADIUS_M)
+        pressure / flow / self.air.z_c(self.nominal_radius_m)
     }
 
     /// The first `count` impedance peaks of a fingering, see [`find_peaks`].
@@ -280,7 +282,7 @@ impl TransferMatrix {
 
     /// Z/Zc at the tip with the reed volume in parallel.
     fn loaded(&self, at: &AtFrequency, open: &[bool], reed_volume_m3: f64) -> Complex64 {
-        let z_c = self.air.z_c(REFERENCE_RADIUS_M);
+        let z_c = self.air.z_c(self.nominal_radius_m);
         let (pressure, flow) = at.above(open, 0);
         let (pressure, mut flow) = at.spans[0].apply(pressure, flow);
         if reed_volume_m3 > 0.0 {
@@ -508,7 +510,7 @@ fn ratio_by_expansion(z: Complex64) -> Complex64 {
 /// First `count` maxima of |Z| between 60 Hz and 6 kHz of any impedance function of frequency in Hz, lowest first.
 ///
 /// A scan every 2 Hz, then golden section to 0.001 Hz; maxima closer than about 4 Hz are taken as one. `z` is expected in
-/// units of Zc(7.45 mm), as [`TransferMatrix::impedance`] gives it.
+/// units of Zc of the nominal bore, as [`TransferMatrix::impedance`] gives it.
 pub fn find_peaks(z: impl Fn(f64) -> Complex64, count: usize) -> Vec<Peak> {
     maxima(&z, &z, count)
 }
@@ -560,7 +562,7 @@ fn golden(value: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
 /// Mouth pressure over closing pressure at which a quasi-static reed starts to sound.
 ///
 /// From `3 g - 1 = 2 sqrt(g) / (zeta Z1)`: the reed's slope against a mode of height `z_peak_over_zc` (Re Z at the playing
-/// frequency over Zc of 7.45 mm, above 0), with embouchure strength `zeta` in 0..1. Never below 1/3, the lossless bore.
+/// frequency over Zc of the nominal bore, above 0), with embouchure strength `zeta` in 0..1. Never below 1/3, the lossless bore.
 pub fn threshold_gamma(z_peak_over_zc: f64, zeta: f64) -> f64 {
     let b = 1.0 / (zeta * z_peak_over_zc);
     let root = (b + (3.0 + b * b).sqrt()) / 3.0;
@@ -571,7 +573,7 @@ pub fn threshold_gamma(z_peak_over_zc: f64, zeta: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::bore::instrument_file::BoreSegment;
-    use crate::units::cents;
+    use crate::units::{REFERENCE_RADIUS_M, cents};
 
     /// Against mpmath (30 digits).
     #[test]
@@ -608,6 +610,7 @@ mod tests {
             source: String::new(),
             transposition: 0,
             reed_volume_m3: 0.0,
+            nominal_radius_m: REFERENCE_RADIUS_M,
             bore: vec![BoreSegment { part: String::new(), x_start_m, x_end_m, r_start_m, r_end_m }],
             holes: Vec::new(),
             fingerings: Vec::new(),
@@ -624,6 +627,36 @@ mod tests {
             assert!((-30.0..-5.0).contains(&cents(peak.f_hz, lossless)), "{peak:?} {lossless}");
         }
         assert!(model.reflectance_below(10.0, &[], 0).norm() > 0.999);
+    }
+
+    /// Scaled by f, peaks lie at 1/f of the frequency but for wall losses, which go with the inverse root of the size: a
+    /// larger bore is a few cents sharper than that, and its peaks are higher and narrower by about the root of f.
+    #[test]
+    fn scaled_instrument_has_scaled_peaks() {
+        let file = InstrumentFile::built_in();
+        let model = TransferMatrix::new(&file, Air::default());
+        for factor in [0.8, 1.5, 2.0] {
+            let large = TransferMatrix::new(&file.scaled(factor), Air::default());
+            for index in [0, 13, 19, 32] {
+                let open = &file.fingerings[index].open;
+                let (before, after) = (model.peaks(open, 0.0, 2), large.peaks(open, 0.0, 2));
+                assert_eq!(after.len(), 2);
+                for (before, after) in before.iter().zip(&after) {
+                    // Wall losses of quality Q lower a resonance by 1 / 2Q; other losses only make Q smaller.
+                    let walls =
+                        1_200.0 / std::f64::consts::LN_2 / (2.0 * before.q) * (1.0 - factor.powf(-0.5));
+                    let off = cents(after.f_hz * factor, before.f_hz);
+                    assert!(
+                        (0.2..1.3).contains(&(off / walls)),
+                        "{factor} {index}: {off} cents, walls {walls}"
+                    );
+                    let sharper = after.q / before.q / factor.sqrt();
+                    assert!((0.7..1.3).contains(&sharper), "{factor} {index}: Q {} {}", before.q, after.q);
+                    let higher = after.mag_over_zc / before.mag_over_zc / factor.sqrt();
+                    assert!((0.7..1.3).contains(&higher), "{factor} {index}: {before:?} {after:?}");
+                }
+            }
+        }
     }
 
     /// A resonance whose height, frequency and Q are known in closed form.

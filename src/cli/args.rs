@@ -2,9 +2,10 @@
 
 use crate::bore::instrument_file::{InstrumentError, InstrumentFile};
 use crate::cli::Failure;
-use crate::instrument::Model;
+use crate::instrument::{Model, Wanted, prepare};
 use crate::units::{Air, WrittenNote, midi_of_name};
 use clap::Args;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -29,7 +30,7 @@ impl InstrumentArg {
     pub fn model(&self, file: InstrumentFile, host_rate_hz: u32) -> Result<Arc<Model>, Failure> {
         let rate_hz = f64::from(host_rate_hz);
         let Some(path) = &self.instrument else { return Ok(Arc::new(Model::built_in(rate_hz)?)) };
-        match Model::from_file(file, rate_hz) {
+        match prepare::fitted(&Wanted::new(file, rate_hz), &mut |_| ControlFlow::Continue(())) {
             Ok(model) => Ok(Arc::new(model)),
             Err(source) => Err(Failure::Instrument { path: path.clone(), source }),
         }

@@ -6,7 +6,7 @@ use crate::cli::Failure;
 use crate::cli::args::{AirArg, InstrumentArg, NotesArg, within};
 use crate::cli::table::TableArgs;
 use crate::instrument;
-use crate::units::{Air, REFERENCE_RADIUS_M};
+use crate::units::Air;
 use clap::{Args, ValueEnum};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -32,7 +32,7 @@ enum Model {
 
 /// Input impedance of a fingering at the reed: a curve, or its peaks
 ///
-/// Values are over Zc = rho c / S of a 7.45 mm bore. A clarinet sounds near a peak of its impedance; the register key
+/// Values are over Zc = rho c / S of the nominal bore, 14.9 mm wide unless the instrument file names another. A clarinet sounds near a peak of its impedance; the register key
 /// spoils the first one so that the second sounds, a twelfth higher. The reed itself adds a little volume that lowers the
 /// peaks; it is left out unless --reed-volume is given.
 ///
@@ -98,7 +98,7 @@ impl Impedance {
             if self.model == Model::Tmm { "transfer matrices" } else { "lattice at 96 kHz" },
             air.temperature_c,
             volume_m3,
-            air.z_c(REFERENCE_RADIUS_M)
+            air.z_c(file.nominal_radius_m)
         );
         let header = if self.peaks.is_some() {
             "written_midi,n,f_hz,mag_over_zc,q"
@@ -146,7 +146,10 @@ impl Bore {
     fn impedance(&self, f_hz: f64, open: &[bool], volume_m3: f64) -> Complex64 {
         match self {
             Self::Tmm(model) => model.impedance(f_hz, open, volume_m3),
-            Self::Lattice(model) => beside_reed(lattice(model, f_hz, open), f_hz, volume_m3, &model.air),
+            Self::Lattice(model) => {
+                let z_c = model.air.z_c(model.file.nominal_radius_m);
+                beside_reed(lattice(model, f_hz, open), f_hz, volume_m3, z_c, &model.air)
+            }
         }
     }
 
@@ -163,8 +166,8 @@ fn lattice(model: &instrument::Model, f_hz: f64, open: &[bool]) -> Complex64 {
     model.coeffs.impedance(f_hz, &opening)
 }
 
-/// Z/Zc with a volume in parallel.
-fn beside_reed(z: Complex64, f_hz: f64, volume_m3: f64, air: &Air) -> Complex64 {
+/// Z/Zc with a volume in parallel, `z_c` the Zc.
+fn beside_reed(z: Complex64, f_hz: f64, volume_m3: f64, z_c: f64, air: &Air) -> Complex64 {
     let compliance = volume_m3 / (air.rho * air.c * air.c);
-    z / (1.0 + z * Complex64::I * TAU * f_hz * compliance * air.z_c(REFERENCE_RADIUS_M))
+    z / (1.0 + z * Complex64::I * TAU * f_hz * compliance * z_c)
 }

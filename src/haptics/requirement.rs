@@ -25,7 +25,7 @@ use crate::haptics::onset;
 use crate::reed::ReedLaw;
 use crate::reed::law::K_INIT;
 use crate::reed::physical::P_REF_PA;
-use crate::units::{Air, REFERENCE_RADIUS_M, SoundingNote, WrittenNote, cents};
+use crate::units::{Air, SoundingNote, WrittenNote, cents};
 
 /// Grid of the stored admittance, Hz: the one [`TransferMatrix::playing_frequency`] keeps.
 const STEP_HZ: f64 = 2.0;
@@ -302,9 +302,9 @@ impl Requirements {
     }
 }
 
-/// Flow that the reference reed's own motion makes, per speed: V / (S c), s.
+/// Flow that the instrument's reed's own motion makes, per speed: V / (S c), s.
 pub(super) fn swept_s(file: &InstrumentFile, air: &Air) -> f64 {
-    file.reed_volume_m3 / (PI * REFERENCE_RADIUS_M * REFERENCE_RADIUS_M * air.c)
+    file.reed_volume_m3 / (PI * file.nominal_radius_m * file.nominal_radius_m * air.c)
 }
 
 #[cfg(test)]

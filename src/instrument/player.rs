@@ -78,7 +78,7 @@ impl Stance {
             model.coeffs.rate_hz,
         );
         let offset = bend_cents
-            + cents(f64::from(settings.a4_hz), 440.0)
+            + cents(f64::from(settings.a4_hz), model.a4_hz)
             + cents(Air::at(f64::from(settings.temperature_c)).c, model.air.c);
         let sensitivity = model.tuning.notes.get(fingering).map_or(1.0, |note| note.sensitivity);
         let step = |time_s: f64| step_towards(tick_s(model), time_s);

@@ -7,7 +7,7 @@ use crate::reed::ReedCoeffs;
 use crate::reed::ReedState;
 use crate::reed::ReedTables;
 use crate::reed::physical::P_REF_PA;
-use crate::units::{Air, REFERENCE_RADIUS_M};
+use crate::units::Air;
 
 /// Samples of one control tick: everything a player moves, moves on this grid, counted from reset.
 pub const TICK: usize = 16;
@@ -171,7 +171,7 @@ impl<F: Real> Voice<F> {
         reed: ReedCoeffs,
     ) -> Self {
         let rate = coeffs.rate_hz;
-        let flow_unit = P_REF_PA / air.z_c(REFERENCE_RADIUS_M);
+        let flow_unit = P_REF_PA / air.z_c(coeffs.nominal_radius_m);
         let corner = |hz: f64| 1.0 - (-std::f64::consts::TAU * hz / rate).exp();
         Self {
             lattice: Lattice::new(coeffs),

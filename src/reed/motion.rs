@@ -12,7 +12,7 @@
 //! beyond. The closing pressure p_M is therefore the *extrapolated* one. With `lay` 0 the corner is averaged over one
 //! sample, which removes most of its aliasing and is the same parabola with half-width |v| T / 2.
 //!
-//! Pressures over the reference closing pressure P, flows over P / Zc, Zc of a 7.45 mm bore.
+//! Pressures over the reference closing pressure P, flows over P / Zc, Zc of the instrument's nominal bore.
 
 use crate::reed::law::{K_INIT, ReedLaw};
 use crate::reed::tables::ReedTables;

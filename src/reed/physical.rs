@@ -5,6 +5,9 @@ use crate::units::{Air, REFERENCE_RADIUS_M};
 /// Closing pressure of the reference reed, Pa: what everything inside is relative to.
 pub const P_REF_PA: f64 = 6_000.0;
 
+/// Equivalent volume of the reference reed, m3: that of a B flat clarinet's.
+pub const REFERENCE_VOLUME_M3: f64 = 1.2e-6;
+
 /// A reed on its mouthpiece under the player's lip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhysicalReed {
@@ -25,7 +28,7 @@ impl PhysicalReed {
     /// one, and width, area and stiffness then follow. The width is large because it stands for tip and side slits.
     pub fn reference() -> Self {
         let (air, closing_pa, zeta, volume_m3, tip_opening_m) =
-            (Air::default(), P_REF_PA, 0.3, 1.2e-6, 0.5e-3);
+            (Air::default(), P_REF_PA, 0.3, REFERENCE_VOLUME_M3, 0.5e-3);
         let area_m2 = volume_m3 * closing_pa / (air.rho * air.c * air.c * tip_opening_m);
         let stiffness_n_m = closing_pa * area_m2 / tip_opening_m;
         let speed = (2.0 / (air.rho * closing_pa)).sqrt();
@@ -43,9 +46,9 @@ impl PhysicalReed {
         self.width_m * self.tip_opening_m * (2.0 / air.rho).sqrt()
     }
 
-    /// Embouchure parameter `zeta = Zc w H sqrt(2 / (rho p_M))`, Zc of a 7.45 mm bore.
-    pub fn zeta(&self, air: &Air) -> f64 {
-        air.z_c(REFERENCE_RADIUS_M) * self.beta(air) / self.closing_pa().sqrt()
+    /// Embouchure parameter `zeta = Zc w H sqrt(2 / (rho p_M))`, Zc of the instrument's nominal bore.
+    pub fn zeta(&self, air: &Air, nominal_radius_m: f64) -> f64 {
+        air.z_c(nominal_radius_m) * self.beta(air) / self.closing_pa().sqrt()
     }
 
     /// Air volume that yields as much as the reed does, m3: `rho c^2 A_r^2 / K`.
@@ -62,7 +65,7 @@ mod tests {
     fn reference_reed_is_what_it_claims() {
         let (reed, air) = (PhysicalReed::reference(), Air::default());
         assert!((reed.closing_pa() - 6_000.0).abs() < 1e-6);
-        assert!((reed.zeta(&air) - 0.3).abs() < 1e-12);
+        assert!((reed.zeta(&air, REFERENCE_RADIUS_M) - 0.3).abs() < 1e-12);
         assert!((reed.equivalent_volume_m3(&air) - 1.2e-6).abs() < 1e-18);
         assert!((500.0..3_000.0).contains(&reed.stiffness_n_m), "{reed:?}");
         assert!((0.8e-4..1.6e-4).contains(&reed.area_m2), "{reed:?}");
@@ -73,6 +76,6 @@ mod tests {
         let (reed, air) = (PhysicalReed::reference(), Air::default());
         let bitten = PhysicalReed { tip_opening_m: 0.8 * reed.tip_opening_m, ..reed };
         assert!((bitten.closing_pa() / reed.closing_pa() - 0.8).abs() < 1e-12);
-        assert!((bitten.zeta(&air) / reed.zeta(&air) - 0.8_f64.sqrt()).abs() < 1e-12);
+        assert!((bitten.zeta(&air, 0.007) / reed.zeta(&air, 0.007) - 0.8_f64.sqrt()).abs() < 1e-12);
     }
 }

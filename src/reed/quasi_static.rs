@@ -7,7 +7,7 @@
 //! volume the reed displaces is a compliance at the tip, by the trapezoidal rule. What this leaves out: the reed's
 //! resonance, the lay's curve, the tongue.
 //!
-//! Pressures over the reference closing pressure P, flows over P / Zc, Zc of a 7.45 mm bore.
+//! Pressures over the reference closing pressure P, flows over P / Zc, Zc of the instrument's nominal bore.
 //!
 //! | symbol | here |
 //! |---|---|

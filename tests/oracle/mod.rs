@@ -7,7 +7,7 @@
 use chalumeau::bore::cells::Cells;
 use chalumeau::bore::tone_hole::HoleNetwork;
 
-use chalumeau::units::{Air, REFERENCE_RADIUS_M};
+use chalumeau::units::Air;
 
 /// Ticks a wave is remembered.
 const MEMORY: usize = 256;
@@ -122,7 +122,7 @@ impl Oracle {
     ) -> Self {
         let rate = design.rate_hz;
         let section = |radius: f64| std::f64::consts::PI * radius * radius;
-        let z_ref = air.rho * air.c / section(REFERENCE_RADIUS_M);
+        let z_ref = air.rho * air.c / section(design.nominal_radius_m);
         let prandtl = air.mu * air.cp / air.kappa;
         let wall = 1.05 * (1.0 + (air.gamma - 1.0) / prandtl.sqrt()) * (air.mu / air.rho).sqrt() / air.c;
 
@@ -144,7 +144,7 @@ impl Oracle {
         let cells: Vec<Cell> = (0..count)
             .map(|cell| Cell {
                 ticks: design.cells[cell].ticks as usize,
-                y: section(design.cells[cell].radius_m) / section(REFERENCE_RADIUS_M),
+                y: section(design.cells[cell].radius_m) / section(design.nominal_radius_m),
                 down: History([0.0; MEMORY]),
                 back: History([0.0; MEMORY]),
                 loss_down: loss(cell),
@@ -172,7 +172,7 @@ impl Oracle {
             }
         });
         let (d, b) = (0.6133, 0.25);
-        let ratio = cells[count - 1].y * section(REFERENCE_RADIUS_M) / section(design.end_radius_m);
+        let ratio = cells[count - 1].y * section(design.nominal_radius_m) / section(design.end_radius_m);
         let k = 2.0 * rate * design.end_radius_m / air.c;
         let (num, den) = ((b / d - ratio * d) * k, (b / d + ratio * d) * k);
         let reflection = [-(1.0 + num) / (1.0 + den), -(1.0 - num) / (1.0 + den), (1.0 - den) / (1.0 + den)];

@@ -153,7 +153,10 @@ fn dawdreamer() -> Result<()> {
 
 fn python_examples() -> Result<()> {
     let python = python("venv-examples", "numpy, matplotlib, libmapper, pythonosc", EXAMPLE_PACKAGES)?;
-    machine::run(Command::new(&python).arg(machine::root().join("xtask/tests/python_examples.py")))
+    let tests = machine::root().join("xtask/tests/python_examples.py");
+    // The study kit draws what the command line measures.
+    simulator::build()?;
+    machine::run(Command::new(&python).arg(tests).env(simulator::PROGRAM, simulator::program()?))
 }
 
 /// The Python of a virtual environment in the target folder, which is made if it cannot import `modules` yet.

@@ -5,14 +5,11 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use chalumeau::analysis::pitch::{fundamental_hz, refine_hz};
-use chalumeau::analysis::spectrum::rms_dbfs;
 use chalumeau::analysis::to_f64;
-use chalumeau::event::Event;
 use chalumeau::instrument::Clarinet;
 use chalumeau::render;
+use chalumeau::render::heard::{Heard, Listener, Sounding, spread};
 use chalumeau::render::score::Score;
-use chalumeau::units::{SoundingNote, cents};
 
 use crate::host::{At, Plugin};
 use crate::{bundle, machine, midi, picture, simulator, touch_demo};
@@ -25,14 +22,6 @@ const TAIL_S: f64 = 1.0;
 const A4_HZ: f64 = 440.0;
 /// A B flat clarinet sounds two semitones lower than written.
 const TRANSPOSITION: i8 = 2;
-
-/// A note as it is heard: from its key to the next one's, or to its own release.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sounding {
-    pub note: SoundingNote,
-    pub from: usize,
-    pub to: usize,
-}
 
 /// `cargo xtask demo`.
 pub fn run(_: &[String]) -> Result<()> {
@@ -68,8 +57,8 @@ pub fn run(_: &[String]) -> Result<()> {
     write_wav(&wav, &left, &right)?;
 
     let samples = to_f64(&left);
-    let notes = soundings(&score);
-    println!("\n{}", table(&samples, &notes));
+    let notes = score.soundings();
+    println!("\n{}", table(&left, &score));
     picture::write(&png, &samples, f64::from(RATE), &notes, &score, A4_HZ)?;
 
     println!("sound    {}\npicture  {}\n", shown(&wav), shown(&png));
@@ -85,7 +74,7 @@ fn by_knob(clap: &Path, folder: &Path, score: &Score, said: &[At]) -> Result<()>
     let performance = touch_demo::play(clap, folder, score, said, RATE)?;
     let (wav, png) = (folder.join("touch.wav"), folder.join("touch.png"));
     write_wav(&wav, &performance.left, &performance.left)?;
-    println!("\n{}", table(&to_f64(&performance.left), &soundings(score)));
+    println!("\n{}", table(&performance.left, score));
     picture::write_touch(&png, &performance, f64::from(RATE))?;
     println!("sound    {}\npicture  {}\n", shown(&wav), shown(&png));
     Ok(())
@@ -114,65 +103,25 @@ fn comparison(left: &[f32], right: &[f32], rendered: &[f32]) -> String {
     format!("NOT the offline renderer's samples: first difference at {first:?}, largest {apart:e}")
 }
 
-/// Last key wins; when it comes up, the one held before it is heard again.
-pub fn soundings(score: &Score) -> Vec<Sounding> {
-    let (mut held, mut all): (Vec<SoundingNote>, Vec<Sounding>) = (Vec::new(), Vec::new());
-    let mut now: Option<(SoundingNote, usize)> = None;
-    for event in &score.events {
-        match event.event {
-            Event::NoteOn { note, .. } => {
-                held.retain(|&other| other != note);
-                held.push(note);
-            }
-            Event::NoteOff { note } => held.retain(|&other| other != note),
-            Event::Panic => held.clear(),
-            Event::Breath(_) | Event::Bend { .. } | Event::Reed { .. } | Event::TongueSlap { .. } => continue,
-        }
-        let next = held.last().copied();
-        if next == now.map(|(note, _)| note) && !matches!(event.event, Event::NoteOn { .. }) {
-            continue;
-        }
-        if let Some((note, from)) = now.filter(|&(_, from)| from < event.at) {
-            all.push(Sounding { note, from, to: event.at });
-        }
-        now = next.map(|note| (note, event.at));
-    }
-    all
-}
-
-fn table(samples: &[f64], notes: &[Sounding]) -> String {
-    let mut text =
-        " bar time   sounds  written   length       Hz    cents   level\n".replace(" bar time", "   at");
-    let mut heard = Vec::new();
-    for &Sounding { note, from, to } in notes {
-        let rate = f64::from(RATE);
-        // The steady part: after the attack or the slur, before the release.
-        let (first, last) = (from + (to - from) * 3 / 10, to - (to - from) / 10);
-        let middle = &samples[first.min(samples.len())..last.min(samples.len())];
-        let wanted = note.frequency_hz(A4_HZ);
-        let hz = refine_hz(middle, rate, wanted).or_else(|| fundamental_hz(middle, rate));
+fn table(samples: &[f32], score: &Score) -> String {
+    let mut listener = Listener::new(score.soundings(), f64::from(RATE), A4_HZ);
+    listener.hear(samples);
+    let heard = listener.finish();
+    let mut text = "   at   sounds  written   length       Hz    cents   level\n".to_owned();
+    for Heard { sounding: Sounding { note, from, to }, hz, cents, level_dbfs } in &heard {
         let written = note.written(TRANSPOSITION).map_or_else(String::new, |written| written.to_string());
-        let (at_s, length_s) = (from as f64 / rate, (to - from) as f64 / rate);
+        let (at_s, length_s) = (*from as f64 / f64::from(RATE), (to - from) as f64 / f64::from(RATE));
         text += &format!("{at_s:5.2}   {:>6}  {written:>7}  {length_s:5.2} s", note.to_string());
-        match hz {
-            Some(hz) => {
-                let off = cents(hz, wanted);
-                heard.push(off);
-                text += &format!("  {hz:7.2}  {off:+7.1}");
-            }
+        match hz.zip(*cents) {
+            Some((hz, cents)) => text += &format!("  {hz:7.2}  {cents:+7.1}"),
             None => text += "   no pitch        ",
         }
-        text += &format!("  {:6.1}\n", rms_dbfs(middle));
+        text += &format!("  {level_dbfs:6.1}\n");
     }
-    if heard.is_empty() {
-        return text + "no note has a pitch\n";
-    }
-    let mean = heard.iter().map(|cents| cents.abs()).sum::<f64>() / heard.len() as f64;
-    let worst = heard.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+    let Some((count, mean, largest)) = spread(&heard) else { return text + "no note has a pitch\n" };
     text + &format!(
-        "{} of {} notes have a pitch; from equal temperament at A4 = {A4_HZ} Hz: mean {mean:.1} cents, largest {worst:+.1}\n",
-        heard.len(),
-        notes.len()
+        "{count} of {} notes have a pitch; from equal temperament at A4 = {A4_HZ} Hz: mean {mean:.1} cents, largest {largest:+.1}\n",
+        heard.len()
     )
 }
 
@@ -194,29 +143,4 @@ fn write_wav(path: &Path, left: &[f32], right: &[f32]) -> Result<()> {
 /// A path as one would type it from here.
 fn shown(path: &Path) -> String {
     path.strip_prefix(machine::root()).unwrap_or(path).display().to_string()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use chalumeau::event::Timed;
-
-    #[test]
-    fn the_last_key_is_the_note_heard() {
-        let on = |at, key| Timed { at, event: Event::NoteOn { note: SoundingNote(key), velocity: 1.0 } };
-        let off = |at, key| Timed { at, event: Event::NoteOff { note: SoundingNote(key) } };
-        let events = vec![
-            on(0, 60),
-            on(10, 62),
-            off(12, 60),
-            off(20, 62),
-            on(30, 64),
-            on(40, 65),
-            off(50, 65),
-            off(60, 64),
-        ];
-        let heard: Vec<_> =
-            soundings(&Score { events, samples: 99 }).iter().map(|s| (s.note.0, s.from, s.to)).collect();
-        assert_eq!(heard, [(60, 0, 10), (62, 10, 20), (64, 30, 40), (65, 40, 50), (64, 50, 60)]);
-    }
 }

@@ -2,20 +2,21 @@
 
 use std::fs;
 use std::io::IsTerminal;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
-use chalumeau::bore::fit;
 use chalumeau::bore::instrument_file::InstrumentFile;
+use chalumeau::instrument::Wanted;
 use chalumeau::instrument::held::HeldNote;
-use chalumeau::instrument::model::{self, INTERNAL_RATES_HZ, Model};
-use chalumeau::instrument::tuning::{self, GAMMA_NODES, NATURAL_GAMMA, TuningTable};
+use chalumeau::instrument::model::{INTERNAL_RATES_HZ, Model};
+use chalumeau::instrument::prepare::{self, Prepared};
+use chalumeau::instrument::tuning::{self, GAMMA_NODES, NATURAL_GAMMA};
 use chalumeau::reed::{ReedTables, header};
-use chalumeau::units::{Air, cents};
+use chalumeau::units::cents;
 
 const HEADER: &str = "firmware/include/pressure_table_values.h";
-const CELLS: &str = "data/b_flat_clarinet.cells.toml";
-const TUNING: &str = "data/b_flat_clarinet.tuning.toml";
+const PREPARED: &str = "data/b_flat_clarinet.prepared.toml";
 /// A refit may differ by this share of a radius: rounding of another processor, not another bore.
 const RADIUS_TOLERANCE: f64 = 2e-3;
 /// How far a played note may be from its pitch when a committed trim is checked, cents.
@@ -55,23 +56,26 @@ pub fn firmware_header(args: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// The built-in bore's cells at both internal rates; checked by fitting again.
+/// The built-in bore's cells at both internal rates, still untuned; checked by fitting again.
 pub fn fit_bore(args: &[String]) -> Result<()> {
     let check = checking(args)?;
-    let file = InstrumentFile::built_in();
     let fitted = INTERNAL_RATES_HZ
         .iter()
-        .map(|&rate_hz| fit::fit(&file, &Air::default(), rate_hz))
+        .map(|&rate_hz| {
+            prepare::fitted(&Wanted::new(InstrumentFile::built_in(), rate_hz), &mut |_| {
+                ControlFlow::Continue(())
+            })
+        })
         .collect::<Result<Vec<_>, _>>()?;
     if !check {
-        return write(CELLS, &model::format_cells(fitted)?);
+        return write(PREPARED, &prepare::format_shipped(fitted.iter().map(Prepared::of).collect())?);
     }
-    let kept = model::parse_cells(&read(CELLS)?)?;
-    ensure!(kept.len() == fitted.len(), "{CELLS} holds {} rates, not {}", kept.len(), fitted.len());
-    for (kept, fitted) in kept.iter().zip(&fitted) {
+    let kept = prepare::parse_shipped(&read(PREPARED)?)?;
+    ensure!(kept.len() == fitted.len(), "{PREPARED} holds {} rates, not {}", kept.len(), fitted.len());
+    for (kept, fitted) in kept.iter().map(|kept| &kept.cells).zip(fitted.iter().map(|model| &model.cells)) {
         let ticks =
             |cells: &chalumeau::bore::cells::Cells| cells.cells.iter().map(|c| c.ticks).collect::<Vec<_>>();
-        ensure!(ticks(kept) == ticks(fitted), "{CELLS}: the grid at {} Hz has moved", kept.rate_hz);
+        ensure!(ticks(kept) == ticks(fitted), "{PREPARED}: the grid at {} Hz has moved", kept.rate_hz);
         let radii = kept.cells.iter().zip(&fitted.cells).map(|(a, b)| (a.radius_m, b.radius_m));
         let worst = radii
             .chain([(kept.end_radius_m, fitted.end_radius_m)])
@@ -80,7 +84,7 @@ pub fn fit_bore(args: &[String]) -> Result<()> {
         println!("{} Hz: a new fit differs by {worst:.1e} of a radius at most", kept.rate_hz);
         ensure!(
             worst < RADIUS_TOLERANCE,
-            "{CELLS} at {} Hz no longer fits; run `cargo xtask fit-bore`",
+            "{PREPARED} at {} Hz no longer fits; run `cargo xtask fit-bore`",
             kept.rate_hz
         );
     }
@@ -90,22 +94,24 @@ pub fn fit_bore(args: &[String]) -> Result<()> {
 /// Delay trims of every note at both internal rates; checked by playing each note with its trims.
 pub fn tune(args: &[String]) -> Result<()> {
     let check = checking(args)?;
-    let mut tables = Vec::new();
+    let mut tuned = Vec::new();
     for rate_hz in INTERNAL_RATES_HZ {
         let model = Model::built_in(rate_hz)?;
         if check {
             check_tuning(&model)?;
         } else {
             let terminal = std::io::stderr().is_terminal();
-            let table = tuning::tune(&model, |share| {
+            let tuning = tuning::tune(&model, &mut |share| {
                 if terminal {
                     eprint!("\r{rate_hz} Hz: {:3.0} %{}", 100.0 * share, if share < 1.0 { "" } else { "\n" });
                 }
+                ControlFlow::Continue(())
             });
-            tables.push((rate_hz, table));
+            let tuning = tuning.context("not cancelled")?;
+            tuned.push(Prepared::of(&Model { tuning, ..model }));
         }
     }
-    if check { Ok(()) } else { write(TUNING, &TuningTable::format(&tables)?) }
+    if check { Ok(()) } else { write(PREPARED, &prepare::format_shipped(tuned)?) }
 }
 
 fn check_tuning(model: &Model) -> Result<()> {
@@ -120,7 +126,7 @@ fn check_tuning(model: &Model) -> Result<()> {
             let held = HeldNote { rows, ..HeldNote::new(model, index, gamma) };
             let name = || format!("written {} at gamma {gamma}", fingering.written);
             let hz = tuning::heard_hz(model, &held, model.notes_hz[index])
-                .with_context(|| format!("{TUNING}: {} does not sound in its register", name()))?;
+                .with_context(|| format!("{PREPARED}: {} does not sound in its register", name()))?;
             let off = cents(hz, model.notes_hz[index]);
             if off.abs() > worst.0.abs() {
                 worst = (off, name());
@@ -128,6 +134,6 @@ fn check_tuning(model: &Model) -> Result<()> {
         }
     }
     println!("{} Hz: worst trim {:+.2} cents ({})", model.coeffs.rate_hz, worst.0, worst.1);
-    ensure!(worst.0.abs() < CENTS_TOLERANCE, "{TUNING} is out of tune; run `cargo xtask tune`");
+    ensure!(worst.0.abs() < CENTS_TOLERANCE, "{PREPARED} is out of tune; run `cargo xtask tune`");
     Ok(())
 }

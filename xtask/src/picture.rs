@@ -6,11 +6,11 @@ use anyhow::{Result, anyhow};
 use chalumeau::analysis::pitch::pitch_track;
 use chalumeau::analysis::spectrum::{moving_rms, power_spectrum_db};
 use chalumeau::event::Event;
+use chalumeau::render::heard::Sounding;
 use chalumeau::render::score::Score;
 use chalumeau::units::SoundingNote;
 use plotters::prelude::*;
 
-use crate::demo::Sounding;
 use crate::touch_demo::Performance;
 
 const WIDTH: u32 = 1600;

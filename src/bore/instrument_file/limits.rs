@@ -31,6 +31,13 @@ pub(super) const REED_VOLUME: Range = range(
     20.0,
     "in mm3, 0 to 20000 (clarinet: 1200); this looks like cm3 (1 cm3 = 1000 mm3) or m3",
 );
+pub(super) const NOMINAL_DIAMETER: Range = range(
+    1.0,
+    199.999,
+    "1 mm to below 200 mm (B flat clarinet: 14.9)",
+    0.1,
+    "in mm, 1 to below 200 (B flat clarinet: 14.9); this looks like metres (0.015 m = 15 mm)",
+);
 // 3 m is a little more than a contrabass clarinet.
 pub(super) const POSITION: Range = range(0.0, 3_000.0, "0 to 3000 mm", 0.0, "");
 pub(super) const BORE_LENGTH: Range = range(

@@ -13,6 +13,8 @@ pub(super) struct RawFile {
     pub(super) source: String,
     pub(super) transposition_semitones: i64,
     pub(super) reed_volume_mm3: f64,
+    #[serde(default)]
+    pub(super) nominal_diameter_mm: Option<f64>,
     pub(super) bore: Vec<RawSegment>,
     #[serde(default)]
     pub(super) hole: Vec<RawHole>,

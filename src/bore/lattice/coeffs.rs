@@ -7,13 +7,15 @@ use super::{LANES, ROWS};
 use crate::bore::cells::Cells;
 use crate::bore::tone_hole::{HoleCoeffs, HoleNetwork};
 use crate::bore::wall_loss;
-use crate::units::{Air, REFERENCE_RADIUS_M};
+use crate::units::Air;
 
 /// Everything of a lattice that playing does not change.
 #[derive(Clone, Debug)]
 pub struct LatticeCoeffs {
     /// Sample rate, Hz.
     pub rate_hz: f64,
+    /// Radius of the bore whose admittance all others are over, m.
+    pub nominal_radius_m: f64,
     pub(super) ticks: Vec<u32>,
     /// Admittance of each cell over the reference.
     pub(super) admittance: Vec<f64>,
@@ -43,23 +45,25 @@ impl LatticeCoeffs {
                 (amount, wall_loss::pole_coefficient(cells.loss_poles_hz[cell % 3], rate_hz))
             })
             .collect();
+        let nominal_radius_m = cells.nominal_radius_m;
         let radius = cells.end_radius_m;
-        let z_end = air.z_c(radius) / air.z_c(REFERENCE_RADIUS_M);
+        let z_end = air.z_c(radius) / air.z_c(nominal_radius_m);
         let end = crate::bore::tone_hole::END_CORRECTION;
         Self {
             rate_hz,
+            nominal_radius_m,
             ticks: cells.cells.iter().map(|cell| cell.ticks).collect(),
-            admittance: cells.cells.iter().map(|cell| (cell.radius_m / REFERENCE_RADIUS_M).powi(2)).collect(),
+            admittance: cells.cells.iter().map(|cell| (cell.radius_m / nominal_radius_m).powi(2)).collect(),
             loss,
             holes: networks
                 .iter()
-                .map(|network| HoleCoeffs {
-                    rs: network.coeffs(rate_hz, air).rs
-                        * if network.register { cells.vent_resistance } else { 1.0 },
-                    ..network.coeffs(rate_hz, air)
+                .map(|network| {
+                    let coeffs = network.coeffs(rate_hz, nominal_radius_m, air);
+                    let vent = if network.register { cells.vent_resistance } else { 1.0 };
+                    HoleCoeffs { rs: coeffs.rs * vent, ..coeffs }
                 })
                 .collect(),
-            jets: networks.iter().map(|network| network.jet(p_ref_pa, air)).collect(),
+            jets: networks.iter().map(|network| network.jet(p_ref_pa, nominal_radius_m, air)).collect(),
             hole_junctions: cells.hole_junctions.clone(),
             bell: (0.25 / (end * end) / z_end, air.c / (2.0 * rate_hz * end * radius * z_end)),
         }

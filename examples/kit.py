@@ -1,0 +1,62 @@
+"""What the plots of the study kit share: tables of the command line as numpy arrays, and how a figure is saved."""
+
+import pathlib
+import re
+import sys
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+from study_log import BadInput, numbers, read_table
+
+# Okabe and Ito's colours, told apart by all common kinds of colour vision.
+BLUE, RED, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "0.55"
+
+NAMES = ("C", "C#", "D", "D#", "E", "F", "F#", "G", "G#", "A", "A#", "B")
+
+
+def table(path, *columns):
+    """Columns of a table as arrays of floats, in the order asked for; `nan` in the file is nan. Raises BadInput."""
+    cells, lines = read_table(path, columns)
+    emptied = ([("" if cell.strip() == "nan" else cell) for cell in cells[name]] for name in columns)
+    return [numbers(path, name, column, lines, True) for name, column in zip(columns, emptied)]
+
+
+def remark(path, words, unit):
+    """The number that stands between `words` and `unit` in the remarks (#) of a table. Raises BadInput."""
+    with open(path, encoding="utf-8-sig") as file:
+        text = " ".join(line for line in file if line.startswith("#"))
+    found = re.search(rf"{re.escape(words)} ([-+.0-9e]+) ?{re.escape(unit)}", text)
+    if not found:
+        raise BadInput(f"{path}: no remark says `{words} .. {unit}`; was it made by this version of chalumeau?")
+    return float(found.group(1))
+
+
+def name(written):
+    """Written note 60 is C4."""
+    written = int(written)
+    return f"{NAMES[written % 12]}{written // 12 - 1}"
+
+
+def save(figure, path):
+    """PNG, SVG or PDF by the ending of the name. Raises BadInput."""
+    endings = sorted(figure.canvas.get_supported_filetypes())
+    if pathlib.Path(path).suffix.lstrip(".").lower() not in endings:
+        raise BadInput(f"--out {path}: the name must end in one of .{', .'.join(endings)}")
+    try:
+        figure.savefig(path, dpi=130)
+    except OSError as reason:
+        raise BadInput(f"--out {path}: cannot be written: {reason.strerror}") from reason
+    plt.close(figure)
+    print(path)
+
+
+def run(program, draw, args):
+    """Draws, or says what is wrong; the exit code."""
+    try:
+        draw(args)
+    except BadInput as reason:
+        print(f"{program}: {reason}", file=sys.stderr)
+        return 2
+    return 0

@@ -1,0 +1,78 @@
+//! The instruments that come with the program, each a file in `data/`.
+
+use crate::bore::instrument_file::InstrumentFile;
+
+/// One of them. All but the B flat clarinet are that clarinet larger or smaller, which their files say.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Bundled {
+    /// The B flat clarinet.
+    #[default]
+    BFlat,
+    /// The A clarinet, a semitone below.
+    A,
+    /// The small clarinet in E flat, a fourth above.
+    EFlat,
+    /// The clarinet in C.
+    C,
+    /// The bass clarinet in B flat, an octave below.
+    Bass,
+}
+
+impl Bundled {
+    /// All of them, the B flat clarinet first.
+    pub const ALL: [Self; 5] = [Self::BFlat, Self::A, Self::EFlat, Self::C, Self::Bass];
+
+    /// What commands, saved states and file names call it.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::BFlat => "b-flat",
+            Self::A => "a",
+            Self::EFlat => "e-flat",
+            Self::C => "c",
+            Self::Bass => "bass",
+        }
+    }
+
+    /// The instrument called so.
+    pub fn from_id(id: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|instrument| instrument.id() == id)
+    }
+
+    /// The text of its file.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::BFlat => InstrumentFile::built_in_text(),
+            Self::A => include_str!("../../data/a_clarinet.toml"),
+            Self::EFlat => include_str!("../../data/e_flat_clarinet.toml"),
+            Self::C => include_str!("../../data/c_clarinet.toml"),
+            Self::Bass => include_str!("../../data/bass_clarinet.toml"),
+        }
+    }
+
+    /// Its measurements.
+    pub fn file(self) -> InstrumentFile {
+        // PANIC: the texts are constants of this program and a test below parses them.
+        InstrumentFile::parse(self.text()).expect("bundled instruments are valid")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_is_a_whole_instrument_with_a_name_of_its_own() {
+        let lengths = Bundled::ALL.map(|instrument| {
+            assert_eq!(Bundled::from_id(instrument.id()), Some(instrument));
+            let file = instrument.file();
+            assert_eq!((file.holes.len(), file.fingerings.len()), (24, 46), "{}", file.name);
+            assert!(file.source.len() > 20, "{}: where it comes from", file.name);
+            (file.transposition, file.length_m())
+        });
+        // The lower it sounds, the longer it is.
+        let mut sorted = lengths;
+        sorted.sort_by(|a, b| a.0.cmp(&b.0));
+        assert!(sorted.windows(2).all(|pair| pair[0].1 < pair[1].1), "{lengths:?}");
+        assert_eq!(Bundled::from_id("b flat"), None);
+    }
+}

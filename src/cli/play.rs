@@ -1,0 +1,251 @@
+//! What is to be played, as arguments several commands share: a MIDI file, a note or a scale, and the breath under it.
+
+use crate::bore::instrument_file::InstrumentFile;
+use crate::cli::Failure;
+use crate::cli::args::{InstrumentArg, check_fingering, note, within};
+use crate::cli::feel::FeelArgs;
+use crate::cli::settings::SettingsArgs;
+use crate::control::knob::KnobDesign;
+use crate::event::{Event, Timed};
+use crate::instrument::{Clarinet, Model, Settings};
+use crate::render::breath::BreathCurve;
+use crate::render::breath::GAMMA_MAX;
+use crate::render::midi_file;
+use crate::render::score::Score;
+use crate::touch::blower::{Blower, Blown, Hand};
+use crate::touch::feel::{Feels, NO_MOTOR};
+use crate::touch::take::Take;
+use crate::units::{SoundingNote, WrittenNote};
+use clap::{ArgGroup, Args};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Gamma where nothing else is said: a full, easy tone.
+const GAMMA_DEFAULT: f32 = 0.5;
+
+/// What to play, on what, and how.
+#[derive(Args)]
+#[command(group = ArgGroup::new("what").required(true).args(["midi", "written", "sounding", "scale"]))]
+#[command(group = ArgGroup::new("note").args(["written", "sounding", "scale"]))]
+#[command(group = ArgGroup::new("blown").args(["gamma", "breath", "crescendo", "replay"]))]
+pub struct PlayArgs {
+    /// Standard MIDI file, format 0 or 1
+    #[arg(value_name = "MIDI")]
+    midi: Option<PathBuf>,
+    /// One note as a clarinettist reads it: MIDI number (60) or name (C4)
+    #[arg(long, value_name = "NOTE", value_parser = note)]
+    written: Option<u8>,
+    /// One note as it sounds
+    #[arg(long, value_name = "NOTE", value_parser = note)]
+    sounding: Option<u8>,
+    /// Chromatic scale between two written notes, up or down, for example E3:C6
+    #[arg(long, value_name = "FROM:TO", value_parser = interval)]
+    scale: Option<(u8, u8)>,
+    /// Slur the scale instead of tonguing each note
+    #[arg(long, requires = "scale")]
+    slurred: bool,
+    /// Length of the note, or of each note of the scale, s, 0.01..3600 [default: 2, scale 0.5]
+    #[arg(long, value_name = "S", conflicts_with = "midi", value_parser = |s: &str| within(s, 0.01, 3600.0))]
+    seconds: Option<f64>,
+    /// Time to fade after the last event, s, 0..60 [default: 1, one note 0]
+    #[arg(long, value_name = "S", value_parser = |s: &str| within(s, 0.0, 60.0))]
+    tail: Option<f64>,
+
+    /// Constant mouth pressure over closing pressure, 0..3 [default: 0.5 unless a MIDI file plays]
+    #[arg(long, value_name = "G", help_heading = "Breath (replaces that of a MIDI file)", value_parser = |s: &str| within(s, 0.0, f64::from(GAMMA_MAX)))]
+    gamma: Option<f64>,
+    /// Mouth pressure over time: a CSV file t_s,gamma, or ramp:FROM:TO:SECONDS, then held
+    #[arg(long, value_name = "FILE|RAMP", help_heading = "Breath (replaces that of a MIDI file)")]
+    breath: Option<String>,
+    /// Mouth pressure from one gamma to another over the whole length, for example 0.4:0.9
+    #[arg(long, value_name = "FROM:TO", help_heading = "Breath (replaces that of a MIDI file)")]
+    crescendo: Option<String>,
+    /// Breath from a knob's take: a CSV file with t_us and angle_deg, as the plugin or `chalumeau knob` records it; each
+    /// note makes its own pressure of the angle
+    #[arg(long, value_name = "FILE", help_heading = "Breath (replaces that of a MIDI file)")]
+    replay: Option<PathBuf>,
+    /// Sample rate, Hz, 22050..384000
+    #[arg(long, value_name = "HZ", default_value = "48000", help_heading = "Output", value_parser = clap::value_parser!(u32).range(22_050..=384_000))]
+    rate: u32,
+
+    #[command(flatten)]
+    instrument: InstrumentArg,
+    #[command(flatten)]
+    settings: SettingsArgs,
+    #[command(flatten)]
+    feel: FeelArgs,
+}
+
+/// Two notes with a colon between them.
+fn interval(text: &str) -> Result<(u8, u8), String> {
+    let (from, to) = text.split_once(':').ok_or("must be two notes, for example E3:C6 or 52:84")?;
+    Ok((note(from)?, note(to)?))
+}
+
+/// Everything a rendering needs.
+pub struct Prepared {
+    /// The instrument at this rate.
+    pub model: Arc<Model>,
+    /// What the player has set.
+    pub settings: Settings,
+    /// What is played, with its tail.
+    pub score: Score,
+    /// Sample rate, Hz.
+    pub rate: u32,
+}
+
+impl Prepared {
+    /// The instrument as a host has it before it plays: the settings are in place from the first sample.
+    pub fn clarinet(&self) -> Clarinet {
+        let mut clarinet = Clarinet::new(self.model.clone(), f64::from(self.rate));
+        clarinet.set_settings(&self.settings);
+        clarinet.reset();
+        clarinet
+    }
+}
+
+impl PlayArgs {
+    /// Reads, checks and fits whatever was named. Takes seconds for an instrument file.
+    pub fn prepare(&self) -> Result<Prepared, Failure> {
+        let file = self.instrument.load()?;
+        let curve = self.curve()?;
+        let settings = self.settings.blown_by(curve.as_ref())?;
+        let mut score = self.score(&file)?;
+        if let Some(curve) = &curve {
+            score = score.blown(curve, &settings, self.rate);
+        }
+        let model = self.instrument.model(file, self.rate)?;
+        if let Some(take) = &self.replay {
+            score.events = self.replayed(take, &model, &settings, &score)?;
+        }
+        // A single note lasts as long as was asked; a melody gets time to fade.
+        let one_note = self.written.is_some() || self.sounding.is_some();
+        let score = score.with_tail(self.tail.unwrap_or(if one_note { 0.0 } else { 1.0 }), self.rate);
+        Ok(Prepared { model, settings, score, rate: self.rate })
+    }
+
+    /// What is played, in a few words.
+    pub fn title(&self) -> String {
+        match (&self.midi, self.written, self.sounding, self.scale) {
+            (Some(path), ..) => path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned(),
+            (_, Some(written), ..) => format!("written {}", WrittenNote(written)),
+            (_, _, Some(sounding), _) => format!("sounding {}", SoundingNote(sounding)),
+            (.., Some((from, to))) => format!("scale {} to {}", WrittenNote(from), WrittenNote(to)),
+            // clap asks for one of the four.
+            (None, None, None, None) => String::new(),
+        }
+    }
+
+    /// The events of a score, blown by a take.
+    fn replayed(
+        &self,
+        path: &Path,
+        model: &Model,
+        settings: &Settings,
+        score: &Score,
+    ) -> Result<Vec<Timed<Event>>, Failure> {
+        let from = fs::File::open(path).map_err(|source| Failure::Read { path: path.to_owned(), source })?;
+        let take = Take::read(from).map_err(|source| Failure::TakeFile { path: path.to_owned(), source })?;
+        let feels = Feels::new(model);
+        let design = self.feel.design(&model.file)?;
+        let table = feels.table(settings, &design, &NO_MOTOR)?;
+        let knob = KnobDesign { full_deg: design.travel_deg, ..KnobDesign::default() };
+        let hand = Hand { maps: feels.maps(&table), design: knob, feels: true };
+        let rate_hz = f64::from(self.rate);
+        let full_pa = 1e3 * f64::from(settings.breath_full_kpa);
+        let events = Blown::new(
+            score.events.iter().copied(),
+            &mut Blower::default(),
+            &hand,
+            full_pa,
+            score.samples,
+            |at| Some(take.angle_deg(at as f64 / rate_hz)),
+            &mut |_, _| {},
+        )
+        .collect();
+        Ok(events)
+    }
+
+    fn curve(&self) -> Result<Option<BreathCurve>, Failure> {
+        if self.replay.is_some() {
+            return Ok(None);
+        }
+        if let Some(text) = &self.crescendo {
+            return Ok(Some(BreathCurve::parse_crescendo(text)?));
+        }
+        if let Some(gamma) = self.gamma {
+            return Ok(Some(BreathCurve::constant(gamma as f32)));
+        }
+        let Some(text) = &self.breath else {
+            return Ok(self.midi.is_none().then(|| BreathCurve::constant(GAMMA_DEFAULT)));
+        };
+        if text.starts_with("ramp:") {
+            return Ok(Some(BreathCurve::parse_ramp(text)?));
+        }
+        let path = PathBuf::from(text);
+        let from = fs::File::open(&path).map_err(|source| Failure::Read { path: path.clone(), source })?;
+        match BreathCurve::read_csv(from) {
+            Ok(curve) => Ok(Some(curve)),
+            Err(source) => Err(Failure::BreathFile { path, source }),
+        }
+    }
+
+    fn score(&self, file: &InstrumentFile) -> Result<Score, Failure> {
+        let transposition = file.transposition;
+        if let Some(path) = &self.midi {
+            let bytes = fs::read(path).map_err(|source| Failure::Read { path: path.clone(), source })?;
+            let score = midi_file::read(&bytes, self.rate)
+                .map_err(|source| Failure::MidiFile { path: path.clone(), source })?;
+            warn_of_missing_fingerings(&score.events, file);
+            return Ok(score);
+        }
+        if let Some((from, to)) = self.scale {
+            let (from, to) = (WrittenNote(from), WrittenNote(to));
+            for written in from.0.min(to.0)..=from.0.max(to.0) {
+                check_fingering(file, WrittenNote(written))?;
+            }
+            let seconds = self.seconds.unwrap_or(0.5);
+            return Ok(Score::scale(from, to, transposition, seconds, self.slurred, self.rate)?);
+        }
+        let seconds = self.seconds.unwrap_or(2.0);
+        let sounding = match (self.written.map(WrittenNote), self.sounding.map(SoundingNote)) {
+            (Some(written), _) => {
+                check_fingering(file, written)?;
+                written.sounding(transposition)
+            }
+            (None, sounding) => sounding,
+        };
+        let written = sounding.and_then(|note| note.written(transposition));
+        match (sounding, written) {
+            (Some(sounding), Some(written)) => {
+                check_fingering(file, written)?;
+                Ok(Score::note(sounding, seconds, self.rate))
+            }
+            _ => Err(Failure::Usage(
+                "this note lies outside what MIDI can name after transposition".to_owned(),
+            )),
+        }
+    }
+}
+
+/// Notes no fingering can play stay silent, but not unsaid.
+fn warn_of_missing_fingerings(events: &[Timed<Event>], file: &InstrumentFile) {
+    let missing = |event: &Timed<Event>| match event.event {
+        Event::NoteOn { note, .. } => {
+            note.written(file.transposition).and_then(|written| file.fingering(written)).is_none()
+        }
+        _ => false,
+    };
+    let count = events.iter().filter(|event| missing(event)).count();
+    if count > 0 {
+        let (low, high) = (file.lowest(), file.highest());
+        let sounds =
+            |note: WrittenNote| note.sounding(file.transposition).map(|n| n.to_string()).unwrap_or_default();
+        eprintln!(
+            "warning: {count} notes have no fingering and stay silent; this instrument sounds {} to {} (written {low} to {high})",
+            sounds(low),
+            sounds(high)
+        );
+    }
+}
