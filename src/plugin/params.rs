@@ -488,9 +488,9 @@ mod tests {
         ("bendr", "Instrument", "2 st"),
         ("istat", "Instrument", "not playing"),
         ("rface", "Reed, physical", "Dimensionless"),
-        ("rstiff", "Reed, physical", "1217.0 N/m"),
-        ("rarea", "Reed, physical", "101.42 mm²"),
-        ("rwidth", "Reed, physical", "15.26 mm"),
+        ("rstiff", "Reed, physical", "1218.1 N/m"),
+        ("rarea", "Reed, physical", "101.50 mm²"),
+        ("rwidth", "Reed, physical", "15.21 mm"),
         ("ropen", "Reed, physical", "0.500 mm"),
     ];
 

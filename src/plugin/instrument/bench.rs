@@ -185,13 +185,133 @@ impl Bench {
             let beside = &mut beside[..out.len()];
             coming.clarinet.render(beside);
             for (old, new) in out.iter_mut().zip(beside) {
-                let way = coming.played.saturating_sub(self.warm) as f32 / self.fade as f32;
-                // Equal power: the two have their own phases.
-                let angle = std::f32::consts::FRAC_PI_2 * way.min(1.0);
-                *old = *old * angle.cos() + *new * angle.sin();
+                let way = coming.played.saturating_sub(self.warm);
+                // Equal power: the two have their own phases. The end is the new one to the bit.
+                *old = if way < self.fade {
+                    let angle = std::f32::consts::FRAC_PI_2 * way as f32 / self.fade as f32;
+                    *old * angle.cos() + *new * angle.sin()
+                } else {
+                    *new
+                };
                 coming.played += 1;
             }
             self.arrive();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bore::bundled::Bundled;
+    use crate::instrument::Model;
+    use crate::instrument::prepare::{Wanted, rough};
+    use crate::units::SoundingNote;
+
+    const RATE: f64 = 48_000.0;
+    const AT: usize = 24_000;
+
+    struct Ends {
+        bench: Bench,
+        send: rtrb::Producer<Parcel>,
+        back: rtrb::Consumer<Box<Clarinet>>,
+    }
+
+    fn bench() -> Ends {
+        let built_in = || Box::new(Clarinet::built_in(RATE).unwrap());
+        let (send, incoming) = rtrb::RingBuffer::new(4);
+        let (outgoing, back) = rtrb::RingBuffer::new(8);
+        let mut bench = Bench::new(Arc::new(Shared::new()), built_in(), incoming, outgoing);
+        bench.place(None, RATE, 1, 0);
+        bench.set_settings(&Settings::default());
+        Ends { bench, send, back }
+    }
+
+    fn held() -> [Timed<Event>; 2] {
+        let note_on = Event::NoteOn { note: SoundingNote(60), velocity: 0.8 };
+        [Event::Breath(0.6), note_on].map(|event| Timed { at: 0, event })
+    }
+
+    /// A held note with another instrument from a second's half on, in blocks of so many samples.
+    fn exchanged(model: Model, block: usize) -> (Vec<f32>, Ends) {
+        let mut ends = bench();
+        let mut out = vec![0.0; 2 * RATE as usize];
+        let mut said = Some(held());
+        for (number, out) in out.chunks_mut(block).enumerate() {
+            if number * block == AT {
+                let clarinet = Box::new(Clarinet::new(Arc::new(model.clone()), RATE));
+                assert!(ends.send.push(Parcel { turn: 1, clarinet }).is_ok());
+            }
+            ends.bench.tidy();
+            ends.bench.render_events(said.take().into_iter().flatten(), out);
+        }
+        (out, ends)
+    }
+
+    fn largest_step(sound: &[f32]) -> f32 {
+        sound.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f32::max)
+    }
+
+    fn rms(sound: &[f32]) -> f32 {
+        (sound.iter().map(|x| x * x).sum::<f32>() / sound.len() as f32).sqrt()
+    }
+
+    #[test]
+    fn a_note_goes_on_over_an_exchange_without_a_click_or_a_gap() {
+        let another = rough(&Wanted::new(Bundled::A.file(), RATE)).unwrap();
+        for model in [Model::built_in(RATE).unwrap(), another] {
+            let (sound, mut ends) = exchanged(model, 240);
+            let own = largest_step(&sound[AT / 2..AT]).max(largest_step(&sound[3 * AT..]));
+            let over = largest_step(&sound[AT..2 * AT]);
+            assert!(over <= 1.5 * own, "{over} over the exchange, {own} before and after");
+            let loud = rms(&sound[AT / 2..AT]);
+            for (at, window) in sound[AT..].chunks(960).enumerate() {
+                assert!(rms(window) > 0.5 * loud, "{} ms after: {} of {loud}", 20 * at, rms(window));
+            }
+            assert!(ends.back.pop().is_ok(), "the old one was sent back");
+        }
+    }
+
+    #[test]
+    fn where_the_exchange_begins_does_not_depend_on_blocks() {
+        let model = Model::built_in(RATE).unwrap();
+        let whole = exchanged(model.clone(), 24_000).0;
+        for block in [16, 240, 4_000] {
+            assert!(exchanged(model.clone(), block).0 == whole, "blocks of {block}");
+        }
+    }
+
+    #[test]
+    fn hands_stay_where_they_are() {
+        let mut ends = bench();
+        let mut out = vec![0.0; AT];
+        ends.bench.render_events(held(), &mut out);
+        let clarinet = Box::new(Clarinet::built_in(RATE).unwrap());
+        assert!(ends.send.push(Parcel { turn: 1, clarinet }).is_ok());
+        ends.bench.tidy();
+        ends.bench.render_events([], &mut out);
+        let loud = rms(&out[AT / 2..]);
+        assert!(loud > 1e-3, "the key is still down");
+        // Its release and the end of the breath reach the new one.
+        let off = Timed { at: 0, event: Event::NoteOff { note: SoundingNote(60) } };
+        ends.bench.render_events([off], &mut out);
+        assert!(rms(&out[AT / 2..]) < 1e-3 * loud, "{} of {loud}", rms(&out[AT / 2..]));
+    }
+
+    #[test]
+    fn a_silent_instrument_is_exchanged_at_once_and_one_of_another_time_never() {
+        let mut ends = bench();
+        let mut out = vec![0.0; AT];
+        ends.bench.render_events([], &mut out);
+        let clarinet = || Box::new(Clarinet::built_in(RATE).unwrap());
+        let model = clarinet();
+        let model = model.model();
+        assert!(!Arc::ptr_eq(ends.bench.clarinet().model(), model));
+        assert!(ends.send.push(Parcel { turn: 7, clarinet: clarinet() }).is_ok());
+        let new = Box::new(Clarinet::new(model.clone(), RATE));
+        assert!(ends.send.push(Parcel { turn: 1, clarinet: new }).is_ok());
+        ends.bench.tidy();
+        assert!(Arc::ptr_eq(ends.bench.clarinet().model(), model));
+        assert!(ends.back.pop().is_ok() && ends.back.pop().is_ok() && ends.back.pop().is_err());
     }
 }
