@@ -15,6 +15,7 @@ mod knob;
 #[cfg(feature = "simulator")]
 mod knob_sim;
 mod play;
+mod plot;
 mod reed;
 mod render;
 mod settings;
@@ -24,6 +25,7 @@ mod threshold;
 mod tune;
 
 use crate::bore::instrument_file::InstrumentError;
+use crate::figure::draw::DrawError;
 use crate::haptics::FeelRefused;
 use crate::instrument::BuildError;
 use crate::output::OutputError;
@@ -100,6 +102,8 @@ enum Failure {
     Score(#[from] ScoreError),
     #[error(transparent)]
     Output(#[from] OutputError),
+    #[error(transparent)]
+    Draw(#[from] DrawError),
     #[error(transparent)]
     Wav(#[from] WavError),
     #[error(transparent)]

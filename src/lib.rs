@@ -9,6 +9,7 @@ pub mod control;
 pub mod device;
 pub mod dsp;
 pub mod event;
+pub mod figure;
 pub mod haptics;
 pub mod identity;
 pub mod instrument;

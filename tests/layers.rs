@@ -22,6 +22,7 @@ const FLOORS: &[(&str, u8)] = &[
     ("haptics", 3),
     ("instrument", 4),
     ("device", 4),
+    ("figure", 5),
     ("render", 5),
     ("touch", 5),
     ("simulator", 5),

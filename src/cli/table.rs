@@ -20,6 +20,11 @@ pub struct TableArgs {
 }
 
 impl TableArgs {
+    /// Whether existing files are to be replaced.
+    pub fn force(&self) -> bool {
+        self.force
+    }
+
     pub fn open(&self, header: &str) -> Result<Table, Failure> {
         Table::open(&self.csv, self.force, header)
     }

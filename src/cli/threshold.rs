@@ -4,15 +4,23 @@ use crate::bore::transfer_matrix::TransferMatrix;
 use crate::bore::transfer_matrix::threshold_gamma;
 use crate::cli::Failure;
 use crate::cli::args::{AirArg, InstrumentArg, NotesArg, within};
+use crate::cli::plot::PlotArgs;
 use crate::cli::table::TableArgs;
-use crate::units::WrittenNote;
+use crate::figure::threshold::{self, Strength, Thresholds};
+use crate::instrument::Settings;
 use clap::Args;
 
 const EXAMPLES: &str = "\
 Examples:
   chalumeau threshold --all --zeta 0.3
   chalumeau threshold --written G4 --zeta 0.2
-  chalumeau threshold --all --instrument mine.toml --csv gamma_on.csv";
+  chalumeau threshold --all --instrument mine.toml --csv gamma_on.csv
+  chalumeau threshold --plot threshold.png --csv gamma_on.csv";
+
+/// Embouchures drawn beside the one asked for, from firm to loose.
+const ZETAS: [f64; 5] = [0.15, 0.2, 0.3, 0.4, 0.6];
+/// Reeds drawn, by the number on their box.
+const STRENGTHS: [f32; 5] = [2.0, 2.5, 3.0, 3.5, 4.0];
 
 /// Mouth pressure at which each note begins to sound
 ///
@@ -33,6 +41,8 @@ pub struct Threshold {
     instrument: InstrumentArg,
     #[command(flatten)]
     table: TableArgs,
+    #[command(flatten)]
+    plot: PlotArgs,
 }
 
 impl Threshold {
@@ -41,22 +51,55 @@ impl Threshold {
         let notes = self.notes.notes(&file)?;
         let model = TransferMatrix::new(&file, self.air.air());
         let mut table = self.table.open("written_midi,gamma_on")?;
+        let plot = self.plot.open(self.table.force())?;
         table.comment(format_args!("{}; quasi-static reed, zeta {}", file.name, self.zeta))?;
-        for WrittenNote(written) in notes {
-            let gamma_on = file
-                .fingering(WrittenNote(written))
-                .zip(WrittenNote(written).sounding(file.transposition))
-                .and_then(|(fingering, sounding)| {
-                    let near_hz = sounding.frequency_hz(440.0);
-                    model.playing_frequency(&fingering.open, file.reed_volume_m3, near_hz)
+        // Height of the peak each note plays on: the same for every embouchure.
+        let heights: Vec<(u8, Option<f64>)> = notes
+            .into_iter()
+            .map(|written| {
+                let height = file
+                    .fingering(written)
+                    .zip(written.sounding(file.transposition))
+                    .and_then(|(fingering, sounding)| {
+                        let near_hz = sounding.frequency_hz(440.0);
+                        model.playing_frequency(&fingering.open, file.reed_volume_m3, near_hz)
+                    })
+                    .map(|(_, height)| height);
+                (written.0, height.filter(|&height| height > 0.0))
+            })
+            .collect();
+        let thresholds = |zeta: f64| Thresholds {
+            zeta,
+            gamma_on: heights
+                .iter()
+                .map(|&(written, height)| {
+                    (written, height.map_or(f64::NAN, |height| threshold_gamma(height, zeta)))
                 })
-                .filter(|&(_, height)| height > 0.0)
-                .map(|(_, height)| threshold_gamma(height, self.zeta));
-            match gamma_on {
-                Some(gamma_on) => table.line(format_args!("{written},{gamma_on:.6}"))?,
-                None => table.line(format_args!("{written},nan"))?,
+                .collect(),
+        };
+        for (written, gamma_on) in thresholds(self.zeta).gamma_on {
+            match gamma_on.is_finite() {
+                true => table.line(format_args!("{written},{gamma_on:.6}"))?,
+                false => table.line(format_args!("{written},nan"))?,
             }
         }
-        table.finish()
+        table.finish()?;
+        plot.draw(|| {
+            let mut zetas: Vec<f64> =
+                ZETAS.into_iter().filter(|zeta| (zeta - self.zeta).abs() > 0.01).collect();
+            zetas.push(self.zeta);
+            zetas.sort_by(f64::total_cmp);
+            let chosen = zetas.iter().position(|&zeta| zeta == self.zeta).unwrap_or(0);
+            let reference_pa = Settings::default().closing_pa();
+            let reeds = STRENGTHS.map(|strength| {
+                let closing_pa = Settings { strength, ..Settings::default() }.closing_pa();
+                // Stiffer with the same opening: zeta goes with the root of the pressure that closes it.
+                let zeta = self.zeta * (reference_pa / closing_pa).sqrt();
+                let (number, closing_kpa) = (f64::from(strength), 1e-3 * closing_pa);
+                Strength { number, closing_kpa, thresholds: thresholds(zeta) }
+            });
+            let embouchures: Vec<Thresholds> = zetas.into_iter().map(thresholds).collect();
+            threshold::figure(&file.name, &embouchures, chosen, &reeds)
+        })
     }
 }

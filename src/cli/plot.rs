@@ -1,0 +1,41 @@
+//! Pictures of what a command measures.
+
+use crate::cli::Failure;
+use crate::figure::Figure;
+use crate::figure::draw::{Sheet, Size};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Whether and where a picture goes. Existing files stay or go as the command's `--force` says.
+#[derive(Args)]
+pub struct PlotArgs {
+    /// Draw a figure too: a new .png or .svg file
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+    /// Size of the figure, pixels, 400..4000 each way, as 1600x1000 [default: what it needs]
+    #[arg(long, value_name = "WxH", requires = "plot")]
+    plot_size: Option<Size>,
+}
+
+impl PlotArgs {
+    /// Opens the file, so that a wrong name is refused before anything is measured.
+    pub fn open(&self, force: bool) -> Result<Plot, Failure> {
+        let sheet = self.plot.as_ref().map(|path| Sheet::still(path, force, self.plot_size)).transpose()?;
+        Ok(Plot { sheet })
+    }
+}
+
+/// A picture to be, or none.
+pub struct Plot {
+    sheet: Option<Sheet>,
+}
+
+impl Plot {
+    /// Draws what `figure` returns, if a picture is wanted.
+    pub fn draw(self, figure: impl FnOnce() -> Figure) -> Result<(), Failure> {
+        match self.sheet {
+            Some(sheet) => Ok(sheet.draw(&figure())?),
+            None => Ok(()),
+        }
+    }
+}

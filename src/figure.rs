@@ -1,0 +1,16 @@
+//! Figures: what a picture says, as data, and one function that draws it.
+//!
+//! A [`Figure`] holds titles, panels, axes with units, curves and marks, and nothing of pixels. It can be serialised, so
+//! tests compare what a picture says instead of how it looks. `draw` (with feature `cli`) puts it on paper as PNG, SVG or
+//! an animated GIF; fonts come embedded. Modules beside it build figures from measurements; none of them measures.
+
+mod data;
+#[cfg(feature = "cli")]
+pub mod draw;
+pub mod palette;
+pub mod threshold;
+
+pub use data::{
+    Anchor, Axis, ColourMap, Dash, Direction, Figure, Heat, Layer, Line, Mark, Panel, Points, Polygon, Scale,
+    SecondAxis, Shape, Span, Text, Tick,
+};

@@ -1,0 +1,262 @@
+//! Figures on paper: PNG, SVG or an animated GIF, by the file's extension.
+//!
+//! Shapes are drawn by the backends of plotters; where axes, words and legends stand is decided here, so that nothing
+//! covers data and the same figure looks the same in every format. Files appear whole or not at all.
+
+mod canvas;
+mod font;
+mod layout;
+mod ticks;
+
+use crate::figure::Figure;
+use crate::figure::palette::{PAPER, Rgb};
+use crate::output::{NewFile, OutputError};
+use canvas::{Canvas, Vector};
+use plotters_bitmap::BitMapBackend;
+use plotters_svg::SVGBackend;
+use std::fmt;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// Bitmaps are drawn so many times larger in each direction and averaged.
+const FINEST: u32 = 3;
+/// Up to this size; larger ones twice, to spare memory.
+const FINEST_PIXELS: u32 = 4_000_000;
+/// Vector pictures are drawn in this part of a pixel.
+const TENTH: u32 = 10;
+
+/// Why a figure cannot be drawn.
+#[derive(Debug, thiserror::Error)]
+pub enum DrawError {
+    /// No picture by its name.
+    #[error("{}: the name of a picture must end in {}", path.display(), wanted)]
+    Extension {
+        /// The name as given.
+        path: PathBuf,
+        /// What would be right.
+        wanted: &'static str,
+    },
+    /// No size.
+    #[error("size must be WIDTHxHEIGHT in pixels, 400..4000 each, for example 1600x1000; got {0:?}")]
+    Size(String),
+    /// The file cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// Writing ended early.
+    #[error("cannot write {}: {reason}", path.display())]
+    Write {
+        /// The target.
+        path: PathBuf,
+        /// The system's reason.
+        reason: std::io::Error,
+    },
+    /// A picture could not be made: an error of ours.
+    #[error("cannot draw: {0}")]
+    Backend(String),
+}
+
+impl DrawError {
+    fn backend(error: impl fmt::Display) -> Self {
+        Self::Backend(error.to_string())
+    }
+}
+
+/// Width and height of a picture, pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+}
+
+impl Size {
+    /// Below this no axis has room for its words.
+    pub const MIN: u32 = 400;
+    /// Above this bitmaps no longer fit in memory with ease.
+    pub const MAX: u32 = 4_000;
+}
+
+impl Size {
+    /// The size a figure asks for.
+    fn of(figure: &Figure) -> Self {
+        let [width, height] = figure.size.map(|pixels| pixels.clamp(Self::MIN, Self::MAX));
+        Self { width, height }
+    }
+}
+
+impl FromStr for Size {
+    type Err = DrawError;
+
+    fn from_str(text: &str) -> Result<Self, DrawError> {
+        let bad = || DrawError::Size(text.to_owned());
+        let (width, height) = text.split_once(['x', 'X']).ok_or_else(bad)?;
+        let number = |text: &str| {
+            let number = text.trim().parse::<u32>().ok();
+            number.filter(|pixels| (Self::MIN..=Self::MAX).contains(pixels)).ok_or_else(bad)
+        };
+        Ok(Self { width: number(width)?, height: number(height)? })
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Png,
+    Svg,
+    Gif,
+}
+
+impl Format {
+    fn of(path: &Path) -> Option<Self> {
+        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+            "png" => Some(Self::Png),
+            "svg" => Some(Self::Svg),
+            "gif" => Some(Self::Gif),
+            _ => None,
+        }
+    }
+}
+
+/// A picture to be: its file is open, so that what cannot be written is refused before anything is measured.
+pub struct Sheet {
+    file: NewFile,
+    format: Format,
+    size: Option<Size>,
+}
+
+impl Sheet {
+    /// For one figure: a `.png` or an `.svg`, in its own size unless one is given.
+    pub fn still(path: &Path, force: bool, size: Option<Size>) -> Result<Self, DrawError> {
+        match Format::of(path) {
+            Some(format @ (Format::Png | Format::Svg)) => {
+                Ok(Self { file: NewFile::create(path, force)?, format, size })
+            }
+            _ => Err(DrawError::Extension { path: path.to_owned(), wanted: ".png or .svg" }),
+        }
+    }
+
+    /// For a sequence of figures: a `.gif`.
+    pub fn moving(path: &Path, force: bool, size: Option<Size>) -> Result<Self, DrawError> {
+        match Format::of(path) {
+            Some(Format::Gif) => Ok(Self { file: NewFile::create(path, force)?, format: Format::Gif, size }),
+            _ => Err(DrawError::Extension { path: path.to_owned(), wanted: ".gif" }),
+        }
+    }
+
+    /// Draws the figure and gives the file its name.
+    pub fn draw(self, figure: &Figure) -> Result<(), DrawError> {
+        let bytes = match self.format {
+            Format::Svg => svg(figure, self.size)?.into_bytes(),
+            Format::Png | Format::Gif => png(figure, self.size)?,
+        };
+        self.keep(&bytes)
+    }
+
+    /// Draws a sequence, `frame_s` each, repeated for ever, and gives the file its name. `drawn` hears of every frame.
+    pub fn animate(self, frames: &[Figure], frame_s: f64, mut drawn: impl FnMut()) -> Result<(), DrawError> {
+        let size = self.size.or_else(|| frames.first().map(Size::of));
+        let Some(size) = size else { return Err(DrawError::Backend("no frames".to_owned())) };
+        let (width, height) = (size.width as u16, size.height as u16);
+        let mut bytes = Vec::new();
+        let mut encoder = gif::Encoder::new(&mut bytes, width, height, &[]).map_err(DrawError::backend)?;
+        encoder.set_repeat(gif::Repeat::Infinite).map_err(DrawError::backend)?;
+        for figure in frames {
+            let pixels = rgb(figure, size)?;
+            // 10: the middle of the encoder's scale from good (1) to fast (30) choice of colours.
+            let mut frame = gif::Frame::from_rgb_speed(width, height, &pixels, 10);
+            frame.delay = (100.0 * frame_s).round().clamp(2.0, 6_000.0) as u16;
+            encoder.write_frame(&frame).map_err(DrawError::backend)?;
+            drawn();
+        }
+        drop(encoder);
+        self.keep(&bytes)
+    }
+
+    fn keep(mut self, bytes: &[u8]) -> Result<(), DrawError> {
+        let path = self.file.path().to_owned();
+        self.file.write_all(bytes).map_err(|reason| DrawError::Write { path, reason })?;
+        Ok(self.file.keep()?)
+    }
+}
+
+/// The figure as a bitmap, three bytes a pixel, row by row.
+fn rgb(figure: &Figure, size: Size) -> Result<Vec<u8>, DrawError> {
+    let Rgb(paper, ..) = PAPER;
+    let finer = if size.width * size.height <= FINEST_PIXELS { FINEST } else { 2 };
+    let (width, height) = (size.width * finer, size.height * finer);
+    let mut fine = vec![paper; (width * height * 3) as usize];
+    {
+        let backend = BitMapBackend::with_buffer(&mut fine, (width, height));
+        let mut canvas = Canvas::new(backend, f64::from(finer), None);
+        layout::draw(&mut canvas, figure, size)?;
+        canvas.finish()?;
+    }
+    let stride = (3 * width) as usize;
+    let area = finer * finer;
+    let finer = finer as usize;
+    let mut pixels = Vec::with_capacity((size.width * size.height * 3) as usize);
+    for row in fine.chunks_exact(finer * stride) {
+        for x in 0..size.width as usize {
+            for channel in 0..3 {
+                let places =
+                    (0..finer).flat_map(|y| (0..finer).map(move |sub| y * stride + 3 * (finer * x + sub)));
+                let sum: u32 = places.map(|place| u32::from(row[place + channel])).sum();
+                pixels.push(((sum + area / 2) / area) as u8);
+            }
+        }
+    }
+    Ok(pixels)
+}
+
+fn encode_png(pixels: &[u8], width: u32, height: u32) -> Result<Vec<u8>, DrawError> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Default);
+    let mut writer = encoder.write_header().map_err(DrawError::backend)?;
+    writer.write_image_data(pixels).map_err(DrawError::backend)?;
+    writer.finish().map_err(DrawError::backend)?;
+    Ok(bytes)
+}
+
+/// The figure as the bytes of a PNG file.
+pub fn png(figure: &Figure, size: Option<Size>) -> Result<Vec<u8>, DrawError> {
+    let size = size.unwrap_or(Size::of(figure));
+    encode_png(&rgb(figure, size)?, size.width, size.height)
+}
+
+/// The figure as the text of an SVG file, which needs no font and no other file.
+pub fn svg(figure: &Figure, size: Option<Size>) -> Result<String, DrawError> {
+    let size = size.unwrap_or(Size::of(figure));
+    let mut drawn = String::new();
+    let vector = {
+        let (width, height) = (size.width * TENTH, size.height * TENTH);
+        let backend = SVGBackend::with_string(&mut drawn, (width, height));
+        let mut canvas = Canvas::new(backend, f64::from(TENTH), Some(Vector::default()));
+        layout::draw(&mut canvas, figure, size)?;
+        canvas.finish()?.unwrap_or_default()
+    };
+    // The backend's head names its size in tenths; its shapes stay in them, pictures and words are in pixels.
+    let body =
+        drawn.find("<svg").and_then(|head| drawn[head..].find('>').map(|end| &drawn[head + end + 1..]));
+    let body = body.and_then(|body| body.rfind("</svg>").map(|end| &body[..end]));
+    let body = body.ok_or_else(|| DrawError::Backend("the SVG backend wrote no <svg>".to_owned()))?;
+    let (width, height) = (size.width, size.height);
+    let title = figure.title.replace('&', "&amp;").replace('<', "&lt;");
+    Ok(format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} \
+         {height}\">\n<title>{title}</title>\n<rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n{}<g \
+         transform=\"scale({})\" stroke-linejoin=\"round\" stroke-linecap=\"round\">\n{}\n</g>\n{}</svg>\n",
+        vector.under,
+        1.0 / f64::from(TENTH),
+        body.trim(),
+        vector.over
+    ))
+}
+
+/// Draws `figure` into a new file, `.png` or `.svg`.
+pub fn write(figure: &Figure, path: &Path, size: Option<Size>, force: bool) -> Result<(), DrawError> {
+    Sheet::still(path, force, size)?.draw(figure)
+}

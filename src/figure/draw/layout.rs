@@ -1,0 +1,844 @@
+//! Where everything stands on a picture.
+//!
+//! From top to bottom: title and notes; then rows of panels, each with its own title, its legend and the names of its
+//! upright marks above the axes, so that no word covers data.
+
+use crate::figure::draw::canvas::{Align, At, Canvas, Pen};
+use crate::figure::draw::font;
+use crate::figure::draw::ticks::{self, Ticks};
+use crate::figure::draw::{DrawError, Size};
+use crate::figure::palette::{self, FINE_GRID, GRID, INK, PAPER, QUIET_INK, Rgb};
+use crate::figure::{
+    Anchor, Axis, Dash, Direction, Figure, Heat, Layer, Line, Mark, Panel, Points, Scale, Shape, Tick,
+};
+use plotters_backend::DrawingBackend;
+
+const MARGIN: f64 = 26.0;
+const TITLE: f64 = 33.0;
+const PANEL_TITLE: f64 = 25.0;
+const WORDS: f64 = 22.0;
+const SMALL: f64 = 20.0;
+const LINE: f64 = 28.0;
+const GAP: f64 = 26.0;
+/// Length of a stroke beside its name in a legend.
+const SAMPLE: f64 = 34.0;
+const BAR: f64 = 20.0;
+
+/// Values to pixels.
+struct Frame {
+    x: Extent,
+    y: Extent,
+}
+
+/// One axis: values and the pixels they fall on.
+struct Extent {
+    low: f64,
+    high: f64,
+    from: f64,
+    to: f64,
+    log: bool,
+}
+
+impl Extent {
+    fn at(&self, value: f64) -> f64 {
+        let unit = if self.log {
+            (value.max(1e-300) / self.low).ln() / (self.high / self.low).ln()
+        } else {
+            (value - self.low) / (self.high - self.low)
+        };
+        // Far outside is as good as just outside, and keeps pixels countable.
+        self.from + unit.clamp(-1e3, 1e3) * (self.to - self.from)
+    }
+
+    fn holds(&self, value: f64) -> bool {
+        let slack = 1e-9 * (self.high - self.low).abs();
+        (self.low - slack..=self.high + slack).contains(&value)
+    }
+}
+
+impl Frame {
+    fn at(&self, [x, y]: [f64; 2]) -> At {
+        (self.x.at(x), self.y.at(y))
+    }
+
+    fn left(&self) -> f64 {
+        self.x.from
+    }
+
+    fn right(&self) -> f64 {
+        self.x.to
+    }
+
+    fn top(&self) -> f64 {
+        self.y.to
+    }
+
+    fn bottom(&self) -> f64 {
+        self.y.from
+    }
+}
+
+/// Draws the whole figure.
+pub fn draw<B: DrawingBackend>(canvas: &mut Canvas<B>, figure: &Figure, size: Size) -> Result<(), DrawError> {
+    let (width, height) = (f64::from(size.width), f64::from(size.height));
+    let mut top = MARGIN;
+    if !figure.title.is_empty() {
+        for line in wrapped(&figure.title, TITLE, width - 2.0 * MARGIN) {
+            top += 0.85 * TITLE;
+            canvas.text((MARGIN, top), &line, TITLE, INK, Align::Left, false)?;
+            top += 0.35 * TITLE;
+        }
+    }
+    for note in &figure.notes {
+        for line in wrapped(note, WORDS, width - 2.0 * MARGIN) {
+            canvas.text((MARGIN, top + 0.75 * LINE), &line, WORDS, QUIET_INK, Align::Left, false)?;
+            top += LINE;
+        }
+    }
+    top += 0.5 * GAP;
+    let columns = figure.columns.max(1);
+    let rows: Vec<&[Panel]> = figure.panels.chunks(columns).collect();
+    let weight = |row: &[Panel]| row.iter().map(|panel| panel.weight.max(0.05)).fold(0.05, f64::max);
+    let weights: f64 = rows.iter().map(|row| weight(row)).sum();
+    let room = (height - top - MARGIN - GAP * (rows.len().saturating_sub(1)) as f64).max(1.0);
+    let column_width = (width - 2.0 * MARGIN - GAP * (columns - 1) as f64) / columns as f64;
+    // Panels above each other share their edges.
+    let sides: Vec<(f64, f64)> = (0..columns)
+        .map(|column| {
+            let below = figure.panels.iter().skip(column).step_by(columns);
+            let sides = below.map(|panel| side_room(panel, column_width));
+            sides.fold((0.0, 0.0), |(a, b): (f64, f64), (l, r)| (a.max(l), b.max(r)))
+        })
+        .collect();
+    for row in rows {
+        let row_height = room * weight(row) / weights;
+        for (column, panel) in row.iter().enumerate() {
+            let left = MARGIN + column as f64 * (column_width + GAP);
+            draw_panel(canvas, panel, (left, top), (left + column_width, top + row_height), sides[column])?;
+        }
+        top += row_height + GAP;
+    }
+    Ok(())
+}
+
+/// Words on lines no wider than `room`.
+fn wrapped(text: &str, size: f64, room: f64) -> Vec<String> {
+    let mut lines: Vec<String> = vec![String::new()];
+    for word in text.split_whitespace() {
+        let line = lines.last_mut().map(std::mem::take).unwrap_or_default();
+        let longer = if line.is_empty() { word.to_owned() } else { format!("{line} {word}") };
+        let fits = line.is_empty() || font::width(&longer, size) <= room;
+        if let Some(last) = lines.last_mut() {
+            *last = if fits { longer } else { line };
+        }
+        if !fits {
+            lines.push(word.to_owned());
+        }
+    }
+    lines
+}
+
+/// From, to: as given or from the data, with a little room.
+fn range(panel: &Panel, of: Direction) -> (f64, f64) {
+    let axis = match of {
+        Direction::X => &panel.x,
+        Direction::Y => &panel.y,
+    };
+    let which = usize::from(of == Direction::Y);
+    let positive = axis.scale == Scale::Log;
+    let sound = |value: &f64| value.is_finite() && (!positive || *value > 0.0);
+    if let Some([low, high]) = axis.range
+        && sound(&low)
+        && sound(&high)
+        && low < high
+    {
+        return (low, high);
+    }
+    let mut values: Vec<f64> = Vec::new();
+    for layer in &panel.layers {
+        match layer {
+            Layer::Line(line) => values.extend(line.pieces.iter().flatten().map(|point| point[which])),
+            Layer::Points(points) => values.extend(points.points.iter().map(|point| point[which])),
+            Layer::Polygon(polygon) => values.extend(polygon.corners.iter().map(|point| point[which])),
+            Layer::Heat(heat) => values.extend(if which == 0 { heat.x } else { heat.y }),
+            Layer::Mark(mark) if mark.of == of => values.push(mark.at),
+            Layer::Text(text) => values.push(text.at[which]),
+            Layer::Mark(_) | Layer::Span(_) => {}
+        }
+    }
+    let (low, high) = values
+        .into_iter()
+        .filter(sound)
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    if low > high {
+        return if positive { (1.0, 10.0) } else { (0.0, 1.0) };
+    }
+    let heat = panel.layers.iter().any(|layer| matches!(layer, Layer::Heat(_)));
+    match axis.scale {
+        Scale::Log => {
+            let room = if low == high { 2.0 } else { (high / low).powf(0.03) };
+            (low / room, high * room)
+        }
+        Scale::Notes => (low - 0.7, high + 0.7),
+        Scale::Linear => {
+            let room = if low == high { low.abs().max(1.0) * 0.5 } else { (high - low) * 0.04 };
+            // A curve along x begins at the axis.
+            let room = if heat || (of == Direction::X && low < high) { 0.0 } else { room };
+            (low - room, high + room)
+        }
+    }
+}
+
+fn heat_of(panel: &Panel) -> Option<&Heat> {
+    panel.layers.iter().find_map(|layer| if let Layer::Heat(heat) = layer { Some(heat) } else { None })
+}
+
+fn named_marks(panel: &Panel, of: Direction) -> impl Iterator<Item = &Mark> {
+    panel.layers.iter().filter_map(move |layer| match layer {
+        Layer::Mark(mark) if mark.of == of && !mark.name.is_empty() => Some(mark),
+        _ => None,
+    })
+}
+
+fn widest(ticks: &[Tick]) -> f64 {
+    ticks.iter().map(|tick| font::width(&tick.text, SMALL)).fold(0.0, f64::max)
+}
+
+fn second_ticks(first: &Extent, axis: &crate::figure::SecondAxis, wanted: usize) -> Vec<Tick> {
+    if !axis.ticks.is_empty() {
+        return axis.ticks.iter().filter(|tick| first.holds(tick.at)).cloned().collect();
+    }
+    if axis.factor == 0.0 || !axis.factor.is_finite() {
+        return Vec::new();
+    }
+    let scale = if first.log { Scale::Log } else { Scale::Linear };
+    let (a, b) = (first.low * axis.factor, first.high * axis.factor);
+    let plain = Axis { scale, ..Axis::default() };
+    let ticks = ticks::of(&plain, a.min(b), a.max(b), wanted);
+    ticks.named.into_iter().map(|tick| Tick { at: tick.at / axis.factor, text: tick.text }).collect()
+}
+
+/// Space left and right of the axes for a panel of this width.
+fn side_room(panel: &Panel, width: f64) -> (f64, f64) {
+    let (low, high) = range(panel, Direction::Y);
+    let y = Extent { low, high, from: 300.0, to: 0.0, log: panel.y.scale == Scale::Log };
+    let label = |text: &str| if text.is_empty() { 0.0 } else { LINE + 4.0 };
+    let left = widest(&ticks::of(&panel.y, low, high, 8).named) + 12.0 + label(&panel.y.label);
+    let mut right: f64 = 24.0;
+    if let Some(axis) = &panel.right {
+        right = right.max(widest(&second_ticks(&y, axis, 8)) + 12.0 + label(&axis.label) + 6.0);
+    } else if let Some(heat) = heat_of(panel) {
+        let ticks = ticks::linear(heat.range[0], heat.range[1], 6).named;
+        right = right.max(16.0 + BAR + 10.0 + widest(&ticks) + label(&heat.name) + 6.0);
+    } else {
+        let names = named_marks(panel, Direction::Y).map(|mark| font::width(&mark.name, SMALL) + 10.0);
+        right = right.max(names.fold(0.0, f64::max).min(0.3 * width));
+    }
+    (left, right)
+}
+
+/// What a legend shows beside a name.
+enum Sample<'a> {
+    Line(&'a Line),
+    Points(&'a Points),
+    Area(Rgb, f64, Option<Rgb>),
+}
+
+fn legend(panel: &Panel) -> Vec<(&str, Sample<'_>)> {
+    let mut entries = Vec::new();
+    for layer in &panel.layers {
+        let entry = match layer {
+            Layer::Line(line) if !line.name.is_empty() => Some((line.name.as_str(), Sample::Line(line))),
+            Layer::Points(points) if !points.name.is_empty() => {
+                Some((points.name.as_str(), Sample::Points(points)))
+            }
+            Layer::Polygon(polygon) if !polygon.name.is_empty() => {
+                let (fill, opacity) = polygon.fill.map_or((PAPER, 1.0), |fill| (fill.rgb(), polygon.opacity));
+                Some((
+                    polygon.name.as_str(),
+                    Sample::Area(fill, opacity, polygon.stroke.map(palette::Colour::rgb)),
+                ))
+            }
+            Layer::Span(span) if !span.name.is_empty() => {
+                Some((span.name.as_str(), Sample::Area(span.colour.rgb(), SPAN_OPACITY, None)))
+            }
+            _ => None,
+        };
+        entries.extend(entry);
+    }
+    entries
+}
+
+const SPAN_OPACITY: f64 = 0.18;
+
+fn draw_panel<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    panel: &Panel,
+    (left, top): At,
+    (right, bottom): At,
+    (room_left, room_right): (f64, f64),
+) -> Result<(), DrawError> {
+    let (x_from, x_to) = (left + room_left, (right - room_right).max(left + room_left + 10.0));
+    let mut y = top;
+    if !panel.title.is_empty() {
+        for line in wrapped(&panel.title, PANEL_TITLE, right - left) {
+            canvas.text((left, y + 0.8 * PANEL_TITLE), &line, PANEL_TITLE, INK, Align::Left, false)?;
+            y += 1.25 * PANEL_TITLE;
+        }
+    }
+    y = draw_legend(canvas, &legend(panel), (x_from, y + 4.0), right)?;
+
+    let (low, high) = range(panel, Direction::X);
+    let mut x_extent = Extent { low, high, from: x_from, to: x_to, log: panel.x.scale == Scale::Log };
+    // Names of upright marks: on as many rows as they need.
+    let mut rows: Vec<f64> = Vec::new();
+    let mut flags: Vec<(&Mark, usize, f64)> = Vec::new();
+    let mut marks: Vec<&Mark> =
+        named_marks(panel, Direction::X).filter(|mark| x_extent.holds(mark.at)).collect();
+    marks.sort_by(|a, b| a.at.total_cmp(&b.at));
+    for mark in marks {
+        let width = font::width(&mark.name, SMALL);
+        let start = (x_extent.at(mark.at) - 0.5 * width).min(right - width).max(left);
+        let row = rows.iter().position(|&end| end + 14.0 <= start).unwrap_or(rows.len());
+        if row == rows.len() {
+            rows.push(0.0);
+        }
+        rows[row] = start + width;
+        flags.push((mark, row, start));
+    }
+    let flags_top = y;
+    y += rows.len() as f64 * LINE + if rows.is_empty() { 4.0 } else { 8.0 };
+    if let Some(axis) = &panel.top {
+        y += if axis.label.is_empty() { 0.0 } else { LINE } + SMALL + 8.0;
+    }
+    let label_room = if panel.x.label.is_empty() { 0.0 } else { LINE + 4.0 };
+    let y_to = y;
+    let y_from = (bottom - label_room - SMALL - 12.0).max(y_to + 10.0);
+    let (low, high) = range(panel, Direction::Y);
+    let mut y_extent = Extent { low, high, from: y_from, to: y_to, log: panel.y.scale == Scale::Log };
+    if panel.equal_aspect {
+        keep_aspect(&mut x_extent, &mut y_extent);
+    }
+    let frame = Frame { x: x_extent, y: y_extent };
+
+    let wide = frame.right() - frame.left();
+    let tall = frame.bottom() - frame.top();
+    let x_ticks = fitting_x_ticks(panel, &frame, wide);
+    let y_ticks = ticks::of(&panel.y, frame.y.low, frame.y.high, ((tall / 48.0) as usize).clamp(2, 12));
+    draw_grid(canvas, panel, &frame, &x_ticks, &y_ticks)?;
+    for layer in &panel.layers {
+        draw_layer(canvas, layer, &frame)?;
+    }
+    draw_axes(canvas, panel, &frame, &x_ticks, &y_ticks, (left, bottom))?;
+    for (mark, row, start) in flags {
+        let base = flags_top + (row as f64 + 0.78) * LINE;
+        canvas.text((start, base), &mark.name, SMALL, mark.colour.rgb(), Align::Left, false)?;
+        let x = frame.x.at(mark.at);
+        let pen = Pen { colour: mark.colour.rgb(), width: 1.5 };
+        canvas.line(&[(x, base + 6.0), (x, frame.top())], pen)?;
+    }
+    for mark in named_marks(panel, Direction::Y).filter(|mark| frame.y.holds(mark.at)) {
+        let y = frame.y.at(mark.at);
+        let fill = mark.colour.rgb();
+        let width = font::width(&mark.name, SMALL);
+        let beside =
+            panel.right.is_none() && heat_of(panel).is_none() && width + 8.0 <= right - frame.right();
+        if beside {
+            let base = y + 0.5 * font::CAPITAL * SMALL;
+            canvas.text((frame.right() + 8.0, base), &mark.name, SMALL, fill, Align::Left, false)?;
+        } else {
+            let place = (frame.right() - 8.0, y - 7.0);
+            canvas.rect(
+                (place.0 - width - 4.0, place.1 - 0.72 * SMALL),
+                (place.0 + 4.0, place.1 + 0.22 * SMALL),
+                PAPER,
+                0.8,
+            )?;
+            canvas.text(place, &mark.name, SMALL, fill, Align::Right, false)?;
+        }
+    }
+    Ok(())
+}
+
+/// As many ticks as have room for their names.
+fn fitting_x_ticks(panel: &Panel, frame: &Frame, wide: f64) -> Ticks {
+    let mut wanted = 16_usize;
+    loop {
+        let ticks = ticks::of(&panel.x, frame.x.low, frame.x.high, wanted);
+        let places: Vec<(f64, f64)> =
+            ticks.named.iter().map(|tick| (frame.x.at(tick.at), font::width(&tick.text, SMALL))).collect();
+        let fit = places.windows(2).all(|pair| pair[1].0 - pair[0].0 > 0.5 * (pair[0].1 + pair[1].1) + 12.0);
+        if fit || wanted <= 2 || wide < 60.0 {
+            return ticks;
+        }
+        wanted -= 1;
+    }
+}
+
+/// Shrinks one side until a unit is as long in x as in y.
+fn keep_aspect(x: &mut Extent, y: &mut Extent) {
+    let x_unit = (x.to - x.from).abs() / (x.high - x.low);
+    let y_unit = (y.to - y.from).abs() / (y.high - y.low);
+    if y_unit > x_unit {
+        let spare = (y.from - y.to) - x_unit * (y.high - y.low);
+        y.to += 0.5 * spare;
+        y.from -= 0.5 * spare;
+    } else {
+        let spare = (x.to - x.from) - y_unit * (x.high - x.low);
+        x.from += 0.5 * spare;
+        x.to -= 0.5 * spare;
+    }
+}
+
+/// Entries side by side, on as many lines as they need; where they end.
+fn draw_legend<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    entries: &[(&str, Sample<'_>)],
+    (left, top): At,
+    right: f64,
+) -> Result<f64, DrawError> {
+    if entries.is_empty() {
+        return Ok(top);
+    }
+    let (mut x, mut y) = (left, top);
+    for (name, sample) in entries {
+        let width = SAMPLE + 8.0 + font::width(name, SMALL);
+        if x > left && x + width > right {
+            (x, y) = (left, y + LINE);
+        }
+        let middle = y + 0.5 * LINE;
+        match sample {
+            Sample::Line(line) => {
+                let points = [(x, middle), (x + SAMPLE, middle)];
+                stroke(canvas, &points, line.dash, Pen { colour: line.colour.rgb(), width: line.width })?;
+            }
+            Sample::Points(points) => {
+                symbol(
+                    canvas,
+                    (x + 0.5 * SAMPLE, middle),
+                    points.shape,
+                    points.size.min(9.0),
+                    points.colour.rgb(),
+                )?;
+            }
+            Sample::Area(fill, opacity, outline) => {
+                let (a, b) = ((x + 4.0, middle - 8.0), (x + SAMPLE - 4.0, middle + 8.0));
+                canvas.rect(a, b, *fill, *opacity)?;
+                if let Some(colour) = outline {
+                    let corners = [a, (b.0, a.1), b, (a.0, b.1), a];
+                    canvas.line(&corners, Pen { colour: *colour, width: 1.5 })?;
+                }
+            }
+        }
+        let base = middle + 0.5 * font::CAPITAL * SMALL;
+        canvas.text((x + SAMPLE + 8.0, base), name, SMALL, INK, Align::Left, false)?;
+        x += width + 26.0;
+    }
+    Ok(y + LINE + 4.0)
+}
+
+fn draw_grid<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    panel: &Panel,
+    frame: &Frame,
+    x_ticks: &Ticks,
+    y_ticks: &Ticks,
+) -> Result<(), DrawError> {
+    if heat_of(panel).is_some() {
+        return Ok(());
+    }
+    let fine = Pen { colour: FINE_GRID, width: 1.0 };
+    let bold = Pen { colour: GRID, width: 1.2 };
+    let named = |ticks: &Ticks| ticks.named.iter().map(|tick| tick.at).collect::<Vec<_>>();
+    for (places, pen) in [(x_ticks.fine.clone(), fine), (named(x_ticks), bold)] {
+        for x in places.into_iter().filter(|&x| frame.x.holds(x)).map(|x| frame.x.at(x)) {
+            canvas.line(&[(x, frame.top()), (x, frame.bottom())], pen)?;
+        }
+    }
+    for (places, pen) in [(y_ticks.fine.clone(), fine), (named(y_ticks), bold)] {
+        for y in places.into_iter().filter(|&y| frame.y.holds(y)).map(|y| frame.y.at(y)) {
+            canvas.line(&[(frame.left(), y), (frame.right(), y)], pen)?;
+        }
+    }
+    // Where a scale crosses zero the eye looks for a line.
+    let zero = Pen { colour: palette::Colour::Pale.rgb(), width: 2.0 };
+    if panel.x.scale == Scale::Linear && frame.x.low < 0.0 && frame.x.high > 0.0 {
+        canvas.line(&[(frame.x.at(0.0), frame.top()), (frame.x.at(0.0), frame.bottom())], zero)?;
+    }
+    if panel.y.scale == Scale::Linear && frame.y.low < 0.0 && frame.y.high > 0.0 {
+        canvas.line(&[(frame.left(), frame.y.at(0.0)), (frame.right(), frame.y.at(0.0))], zero)?;
+    }
+    Ok(())
+}
+
+fn draw_axes<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    panel: &Panel,
+    frame: &Frame,
+    x_ticks: &Ticks,
+    y_ticks: &Ticks,
+    (left, bottom): At,
+) -> Result<(), DrawError> {
+    let pen = Pen { colour: INK, width: 1.5 };
+    let (x0, x1, y0, y1) = (frame.left(), frame.right(), frame.bottom(), frame.top());
+    canvas.line(&[(x0, y1), (x0, y0), (x1, y0)], pen)?;
+    for tick in x_ticks.named.iter().filter(|tick| frame.x.holds(tick.at)) {
+        let x = frame.x.at(tick.at);
+        canvas.line(&[(x, y0), (x, y0 + 6.0)], pen)?;
+        canvas.text((x, y0 + 10.0 + 0.72 * SMALL), &tick.text, SMALL, INK, Align::Centre, false)?;
+    }
+    for tick in y_ticks.named.iter().filter(|tick| frame.y.holds(tick.at)) {
+        let y = frame.y.at(tick.at);
+        canvas.line(&[(x0 - 6.0, y), (x0, y)], pen)?;
+        let base = y + 0.5 * font::CAPITAL * SMALL;
+        canvas.text((x0 - 10.0, base), &tick.text, SMALL, INK, Align::Right, false)?;
+    }
+    let (middle_x, middle_y) = (0.5 * (x0 + x1), 0.5 * (y0 + y1));
+    let below = if panel.equal_aspect { y0 + SMALL + 12.0 + LINE } else { bottom };
+    canvas.text((middle_x, below - 6.0), &panel.x.label, WORDS, INK, Align::Centre, false)?;
+    upright(canvas, (left + 0.75 * WORDS, middle_y), &panel.y.label, y0 - y1)?;
+    if let Some(axis) = &panel.top {
+        canvas.line(&[(x0, y1), (x1, y1)], pen)?;
+        let mut end = f64::NEG_INFINITY;
+        for tick in second_ticks(&frame.x, axis, ((x1 - x0) / 90.0) as usize) {
+            let (x, half) = (frame.x.at(tick.at), 0.5 * font::width(&tick.text, SMALL));
+            canvas.line(&[(x, y1), (x, y1 - 6.0)], pen)?;
+            if x - half > end + 10.0 {
+                canvas.text((x, y1 - 11.0), &tick.text, SMALL, INK, Align::Centre, false)?;
+                end = x + half;
+            }
+        }
+        canvas.text((middle_x, y1 - SMALL - 16.0), &axis.label, WORDS, INK, Align::Centre, false)?;
+    }
+    if let Some(axis) = &panel.right {
+        canvas.line(&[(x1, y0), (x1, y1)], pen)?;
+        let ticks = second_ticks(&frame.y, axis, (((y0 - y1) / 48.0) as usize).clamp(2, 12));
+        for tick in &ticks {
+            let y = frame.y.at(tick.at);
+            canvas.line(&[(x1, y), (x1 + 6.0, y)], pen)?;
+            let base = y + 0.5 * font::CAPITAL * SMALL;
+            canvas.text((x1 + 11.0, base), &tick.text, SMALL, INK, Align::Left, false)?;
+        }
+        let x = x1 + 12.0 + widest(&ticks) + LINE;
+        upright(canvas, (x, middle_y), &axis.label, y0 - y1)?;
+    } else if let Some(heat) = heat_of(panel) {
+        let bar = (x1 + 16.0, x1 + 16.0 + BAR);
+        canvas.picture((bar.0, y1), (bar.1, y0), |_, down| palette::heat(1.0 - down))?;
+        canvas.line(
+            &[(bar.0, y1), (bar.1, y1), (bar.1, y0), (bar.0, y0), (bar.0, y1)],
+            Pen { width: 1.0, ..pen },
+        )?;
+        let ticks =
+            ticks::linear(heat.range[0], heat.range[1], (((y0 - y1) / 48.0) as usize).clamp(2, 8)).named;
+        for tick in &ticks {
+            let y = y0 + (tick.at - heat.range[0]) / (heat.range[1] - heat.range[0]) * (y1 - y0);
+            canvas.line(&[(bar.1, y), (bar.1 + 5.0, y)], pen)?;
+            let base = y + 0.5 * font::CAPITAL * SMALL;
+            canvas.text((bar.1 + 10.0, base), &tick.text, SMALL, INK, Align::Left, false)?;
+        }
+        upright(canvas, (bar.1 + 12.0 + widest(&ticks) + LINE, middle_y), &heat.name, y0 - y1)?;
+    }
+    Ok(())
+}
+
+/// An axis label from bottom to top, a little smaller where it would not fit.
+fn upright<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    place: At,
+    text: &str,
+    room: f64,
+) -> Result<(), DrawError> {
+    let width = font::width(text, WORDS);
+    let size = if width > room + 40.0 { (WORDS * (room + 40.0) / width).max(16.0) } else { WORDS };
+    canvas.text(place, text, size, INK, Align::Centre, true)
+}
+
+fn draw_layer<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    layer: &Layer,
+    frame: &Frame,
+) -> Result<(), DrawError> {
+    match layer {
+        Layer::Line(line) => {
+            let pen = Pen { colour: line.colour.rgb(), width: line.width };
+            for piece in &line.pieces {
+                let points: Vec<At> = piece.iter().map(|&point| frame.at(point)).collect();
+                for visible in clip_line(&points, frame) {
+                    stroke(canvas, &visible, line.dash, pen)?;
+                }
+            }
+        }
+        Layer::Points(points) => {
+            for &[x, y] in &points.points {
+                if frame.x.holds(x) && frame.y.holds(y) {
+                    symbol(canvas, frame.at([x, y]), points.shape, points.size, points.colour.rgb())?;
+                }
+            }
+        }
+        Layer::Polygon(polygon) => {
+            let corners: Vec<At> = polygon.corners.iter().map(|&point| frame.at(point)).collect();
+            let corners = clip_polygon(corners, frame);
+            if let Some(fill) = polygon.fill {
+                canvas.fill(&corners, fill.rgb(), polygon.opacity)?;
+            }
+            if let (Some(colour), Some(&first)) = (polygon.stroke, corners.first()) {
+                let closed: Vec<At> = corners.iter().copied().chain([first]).collect();
+                canvas.line(&closed, Pen { colour: colour.rgb(), width: 1.5 })?;
+            }
+        }
+        Layer::Heat(heat) => draw_heat(canvas, heat, frame)?,
+        Layer::Mark(mark) => {
+            let pen = Pen { colour: mark.colour.rgb(), width: 1.8 };
+            match mark.of {
+                Direction::X if frame.x.holds(mark.at) => {
+                    let x = frame.x.at(mark.at);
+                    stroke(canvas, &[(x, frame.top()), (x, frame.bottom())], mark.dash, pen)?;
+                }
+                Direction::Y if frame.y.holds(mark.at) => {
+                    let y = frame.y.at(mark.at);
+                    stroke(canvas, &[(frame.left(), y), (frame.right(), y)], mark.dash, pen)?;
+                }
+                _ => {}
+            }
+        }
+        Layer::Span(span) => {
+            let (a, b) = (span.from.min(span.to), span.from.max(span.to));
+            let (from, to) = match span.of {
+                Direction::X => {
+                    let (a, b) = (a.max(frame.x.low), b.min(frame.x.high));
+                    ((frame.x.at(a), frame.top()), (frame.x.at(b), frame.bottom()))
+                }
+                Direction::Y => {
+                    let (a, b) = (a.max(frame.y.low), b.min(frame.y.high));
+                    ((frame.left(), frame.y.at(b)), (frame.right(), frame.y.at(a)))
+                }
+            };
+            if to.0 > from.0 && to.1 > from.1 {
+                canvas.rect(from, to, span.colour.rgb(), SPAN_OPACITY)?;
+            }
+        }
+        Layer::Text(text) => {
+            let (x, y) = frame.at(text.at);
+            let width = font::width(&text.text, SMALL);
+            let half = 0.5 * font::CAPITAL * SMALL;
+            let (start, base) = match text.anchor {
+                Anchor::Right => (x + 9.0, y + half),
+                Anchor::Left => (x - 9.0 - width, y + half),
+                Anchor::Above => (x - 0.5 * width, y - 10.0),
+                Anchor::Below => (x - 0.5 * width, y + 10.0 + 2.0 * half),
+                Anchor::Centre => (x - 0.5 * width, y + half),
+            };
+            let start = start.min(frame.right() - width).max(frame.left() + 4.0);
+            canvas.text((start, base), &text.text, SMALL, text.colour.rgb(), Align::Left, false)?;
+        }
+    }
+    Ok(())
+}
+
+fn draw_heat<B: DrawingBackend>(canvas: &mut Canvas<B>, heat: &Heat, frame: &Frame) -> Result<(), DrawError> {
+    if heat.columns == 0 || heat.rows == 0 || heat.levels.len() != heat.columns * heat.rows {
+        return Err(DrawError::Backend(format!(
+            "{} x {} levels wanted, {} given",
+            heat.columns,
+            heat.rows,
+            heat.levels.len()
+        )));
+    }
+    let (left, right) = (frame.x.at(heat.x[0]).max(frame.left()), frame.x.at(heat.x[1]).min(frame.right()));
+    let (top, bottom) = (frame.y.at(heat.y[1]).max(frame.top()), frame.y.at(heat.y[0]).min(frame.bottom()));
+    if right <= left || bottom <= top {
+        return Ok(());
+    }
+    let back = |extent: &Extent, pixel: f64| {
+        let unit = (pixel - extent.from) / (extent.to - extent.from);
+        if extent.log {
+            extent.low * (extent.high / extent.low).powf(unit)
+        } else {
+            extent.low + unit * (extent.high - extent.low)
+        }
+    };
+    let cell = |value: f64, edges: [f64; 2], count: usize| {
+        let unit = (value - edges[0]) / (edges[1] - edges[0]);
+        (unit * count as f64 - 0.5).clamp(0.0, (count - 1) as f64)
+    };
+    canvas.picture((left, top), (right, bottom), |unit_x, unit_y| {
+        let column =
+            cell(back(&frame.x, left + unit_x * (right - left)), heat.x, heat.columns).round() as usize;
+        let row = cell(back(&frame.y, top + unit_y * (bottom - top)), heat.y, heat.rows);
+        let level = |row: usize| f64::from(heat.levels[column * heat.rows + row.min(heat.rows - 1)]);
+        let (below, part) = (row as usize, row.fract());
+        let level = level(below) + part * (level(below + 1) - level(below));
+        palette::heat((level - heat.range[0]) / (heat.range[1] - heat.range[0]))
+    })
+}
+
+/// A line in its strokes.
+fn stroke<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    points: &[At],
+    dash: Dash,
+    pen: Pen,
+) -> Result<(), DrawError> {
+    let (on, off) = match dash {
+        Dash::Solid => return canvas.line(points, pen),
+        Dash::Dashed => (10.0, 7.0),
+        Dash::Dotted => (2.5, 5.5),
+    };
+    let (mut drawn, mut left) = (true, on);
+    let mut part: Vec<At> = points.first().copied().into_iter().collect();
+    for pair in points.windows(2) {
+        let [a, b] = [pair[0], pair[1]];
+        let length = (b.0 - a.0).hypot(b.1 - a.1);
+        let mut done = 0.0;
+        while length - done > left {
+            done += left;
+            let at = (a.0 + done / length * (b.0 - a.0), a.1 + done / length * (b.1 - a.1));
+            if drawn {
+                part.push(at);
+                canvas.line(&part, pen)?;
+            }
+            part = vec![at];
+            drawn = !drawn;
+            left = if drawn { on } else { off };
+        }
+        left -= length - done;
+        if drawn {
+            part.push(b);
+        }
+    }
+    if drawn { canvas.line(&part, pen) } else { Ok(()) }
+}
+
+fn symbol<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    (x, y): At,
+    shape: Shape,
+    size: f64,
+    colour: Rgb,
+) -> Result<(), DrawError> {
+    let pen = Pen { colour, width: 2.0 };
+    match shape {
+        Shape::Disc => canvas.disc((x, y), size, colour),
+        Shape::Ring => {
+            canvas.disc((x, y), size, colour)?;
+            canvas.disc((x, y), size - 2.0, PAPER)
+        }
+        Shape::Cross => {
+            canvas.line(&[(x - size, y - size), (x + size, y + size)], pen)?;
+            canvas.line(&[(x - size, y + size), (x + size, y - size)], pen)
+        }
+        Shape::TriangleUp => {
+            let size = 1.2 * size;
+            canvas.fill(&[(x, y - size), (x + size, y + 0.8 * size), (x - size, y + 0.8 * size)], colour, 1.0)
+        }
+        Shape::TriangleDown => {
+            let size = 1.2 * size;
+            canvas.fill(&[(x, y + size), (x + size, y - 0.8 * size), (x - size, y - 0.8 * size)], colour, 1.0)
+        }
+        Shape::Diamond => {
+            let size = 1.3 * size;
+            canvas.fill(&[(x, y - size), (x + size, y), (x, y + size), (x - size, y)], colour, 1.0)
+        }
+    }
+}
+
+/// The parts of a line inside the axes (Liang and Barsky, 1984).
+fn clip_line(points: &[At], frame: &Frame) -> Vec<Vec<At>> {
+    let (x0, x1, y0, y1) = (frame.left(), frame.right(), frame.top(), frame.bottom());
+    let mut parts: Vec<Vec<At>> = Vec::new();
+    let mut open = false;
+    for pair in points.windows(2) {
+        let (a, b) = (pair[0], pair[1]);
+        let (dx, dy) = (b.0 - a.0, b.1 - a.1);
+        let (mut from, mut to) = (0.0_f64, 1.0_f64);
+        for (step, room) in [(-dx, a.0 - x0), (dx, x1 - a.0), (-dy, a.1 - y0), (dy, y1 - a.1)] {
+            if step == 0.0 {
+                if room < 0.0 {
+                    to = -1.0;
+                }
+            } else if step < 0.0 {
+                from = from.max(room / step);
+            } else {
+                to = to.min(room / step);
+            }
+        }
+        if from > to {
+            open = false;
+            continue;
+        }
+        let at = |part: f64| (a.0 + part * dx, a.1 + part * dy);
+        match parts.last_mut() {
+            Some(part) if open && from == 0.0 => part.push(at(to)),
+            _ => parts.push(vec![at(from), at(to)]),
+        }
+        open = to == 1.0;
+    }
+    parts
+}
+
+/// The part of a shape inside the axes (Sutherland and Hodgman, 1974).
+fn clip_polygon(mut corners: Vec<At>, frame: &Frame) -> Vec<At> {
+    let (x0, x1, y0, y1) = (frame.left(), frame.right(), frame.top(), frame.bottom());
+    let inside: [&dyn Fn(At) -> f64; 4] = [&|p| p.0 - x0, &|p| x1 - p.0, &|p| p.1 - y0, &|p| y1 - p.1];
+    for inside in inside {
+        let mut kept = Vec::with_capacity(corners.len() + 4);
+        for (index, &b) in corners.iter().enumerate() {
+            let a = corners[(index + corners.len() - 1) % corners.len()];
+            let (da, db) = (inside(a), inside(b));
+            if (da < 0.0) != (db < 0.0) {
+                let part = da / (da - db);
+                kept.push((a.0 + part * (b.0 - a.0), a.1 + part * (b.1 - a.1)));
+            }
+            if db >= 0.0 {
+                kept.push(b);
+            }
+        }
+        corners = kept;
+    }
+    corners
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame() -> Frame {
+        let extent = |from, to| Extent { low: 0.0, high: 10.0, from, to, log: false };
+        Frame { x: extent(0.0, 100.0), y: extent(100.0, 0.0) }
+    }
+
+    #[test]
+    fn lines_are_cut_at_the_axes() {
+        let parts = clip_line(&[(-50.0, 50.0), (150.0, 50.0), (150.0, -20.0), (50.0, 20.0)], &frame());
+        assert_eq!(parts.len(), 2);
+        assert_eq!(parts[0], [(0.0, 50.0), (100.0, 50.0)]);
+        assert_eq!(parts[1].last(), Some(&(50.0, 20.0)));
+        assert!(parts.iter().flatten().all(|p| (0.0..=100.0).contains(&p.0) && (0.0..=100.0).contains(&p.1)));
+        assert!(clip_line(&[(-5.0, 0.0), (-5.0, 100.0)], &frame()).is_empty());
+    }
+
+    #[test]
+    fn shapes_are_cut_at_the_axes() {
+        let cut = clip_polygon(vec![(-50.0, -50.0), (50.0, -50.0), (50.0, 50.0), (-50.0, 50.0)], &frame());
+        let mut corners: Vec<(i32, i32)> = cut.iter().map(|p| (p.0 as i32, p.1 as i32)).collect();
+        corners.sort_unstable();
+        corners.dedup();
+        assert_eq!(corners, [(0, 0), (0, 50), (50, 0), (50, 50)]);
+    }
+
+    #[test]
+    fn words_are_wrapped_at_the_room() {
+        let lines = wrapped("one two three four five six seven", 20.0, 120.0);
+        assert!(lines.len() > 1 && lines.iter().all(|line| font::width(line, 20.0) <= 120.0), "{lines:?}");
+        assert_eq!(lines.join(" "), "one two three four five six seven");
+    }
+
+    #[test]
+    fn to_scale_means_to_scale() {
+        let mut x = Extent { low: 0.0, high: 700.0, from: 100.0, to: 1500.0, log: false };
+        let mut y = Extent { low: -30.0, high: 30.0, from: 900.0, to: 100.0, log: false };
+        keep_aspect(&mut x, &mut y);
+        assert!(((x.to - x.from) / 700.0 - (y.from - y.to) / 60.0).abs() < 1e-9);
+        assert!(y.to >= 100.0 && y.from <= 900.0);
+    }
+}
