@@ -220,7 +220,14 @@ impl Default for ChalumeauParams {
                 lay: number("Lay curve", d.lay, 0.0, 0.5, 3, ""),
             },
             tuning: TuningParams {
-                a4: number("A4", d.a4_hz, A4_RANGE_HZ.0 as f32, A4_RANGE_HZ.1 as f32, 1, " Hz"),
+                a4: number(
+                    "A4",
+                    instrument::beginning().map_or(d.a4_hz, |first| first.a4_hz),
+                    A4_RANGE_HZ.0 as f32,
+                    A4_RANGE_HZ.1 as f32,
+                    1,
+                    " Hz",
+                ),
                 tuning: EnumParam::new("Tuning", d.tuning.into()),
                 temperature: number("Temperature", d.temperature_c, 10.0, 40.0, 1, " °C"),
                 vent_loss: number("Vent loss", d.vent_loss, 0.0, 4.0, 2, ""),
@@ -259,6 +266,7 @@ impl ChalumeauParams {
             vent_loss: settled(&tuning.vent_loss),
             gain_db: settled(&output.gain),
         };
+        settings = self.physical.over(settings);
         if let Some((_, trial, side)) = self.knob.study() {
             settings.reed_h = trial.h as f32;
             settings.reed_k = trial.condition(side).k(trial.h) as f32;

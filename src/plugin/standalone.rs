@@ -11,12 +11,17 @@ use clap::{Parser, ValueEnum};
 use nice_plug::prelude::nice_export_standalone_with_args;
 
 use super::Chalumeau;
+use super::params::instrument::{Beginning, InstrumentChoice, begin_with};
+use crate::bore::bundled::Bundled;
+use crate::bore::instrument_file::InstrumentFile;
 use crate::identity;
+use crate::instrument::prepare::A4_RANGE_HZ;
 
 const HELP: &str = "\
 Examples:
   chalumeau-standalone                                    JACK if a server runs, else the system's sound
   chalumeau-standalone --backend jack --connect-jack-midi-input \"system:midi_capture_1\"
+  chalumeau-standalone --instrument bass --a4 442
   chalumeau-standalone --midi-input \"\"                    lists the MIDI inputs
   chalumeau-standalone --output-device \"\"                 lists the sound cards
   chalumeau-standalone --backend dummy                    no sound: does it start?
@@ -47,6 +52,12 @@ struct Args {
     /// MIDI output for a knob's breath, by its name; an empty name lists them. Not for JACK.
     #[arg(long, value_name = "NAME")]
     midi_output: Option<String>,
+    /// What is played: b-flat, a, e-flat, c, bass, or an instrument file.
+    #[arg(short, long, value_name = "NAME|FILE", default_value = "b-flat", value_parser = instrument)]
+    instrument: (InstrumentChoice, String),
+    /// Pitch of A4, 415..466 Hz.
+    #[arg(long, value_name = "HZ", default_value = "440", value_parser = a4)]
+    a4: f32,
     /// JACK port that plays it.
     #[arg(long, value_name = "PORT")]
     connect_jack_midi_input: Option<String>,
@@ -111,6 +122,28 @@ fn rate(text: &str) -> Result<f32, String> {
     }
 }
 
+fn a4(text: &str) -> Result<f32, String> {
+    let (low, high) = A4_RANGE_HZ;
+    match text.parse::<f32>() {
+        Ok(a4_hz) if (low..=high).contains(&f64::from(a4_hz)) => Ok(a4_hz),
+        _ => Err(format!("A4 must lie in {low}..{high} Hz")),
+    }
+}
+
+/// A file is read here already: later nobody could be told what is wrong with it in time.
+fn instrument(text: &str) -> Result<(InstrumentChoice, String), String> {
+    let named = Bundled::from_id(text).and_then(|bundled| {
+        InstrumentChoice::ALL.into_iter().find(|choice| choice.bundled() == Some(bundled))
+    });
+    if let Some(choice) = named {
+        return Ok((choice, String::new()));
+    }
+    let ids = Bundled::ALL.map(Bundled::id).join(", ");
+    let found = std::fs::read_to_string(text).map_err(|reason| format!("{reason}; known names are {ids}"))?;
+    InstrumentFile::parse(&found).map_err(|reason| reason.to_string())?;
+    Ok((InstrumentChoice::User, text.to_owned()))
+}
+
 impl Args {
     /// What the framework is told.
     fn words(&self, backend: Backend) -> Vec<String> {
@@ -150,6 +183,8 @@ impl Args {
 pub fn main() -> ExitCode {
     let args = Args::parse();
     let heard = log::listen();
+    let (choice, file) = args.instrument.clone();
+    begin_with(Beginning { choice, file, a4_hz: args.a4 });
     // A panic on a backend's thread would leave the program waiting for nothing.
     std::panic::set_hook(Box::new(|why| {
         eprintln!("chalumeau-standalone: {why}");
@@ -221,6 +256,15 @@ mod tests {
         let refused = Args::try_parse_from(["x", "--sample-rate", "8000"]).unwrap_err();
         assert_eq!(refused.exit_code(), 2);
         assert!(refused.to_string().contains("22050..384000"), "{refused}");
+    }
+
+    #[test]
+    fn instruments_have_the_names_of_the_command_line() {
+        assert_eq!(args(&[]).instrument.0, InstrumentChoice::BFlat);
+        assert_eq!(args(&["--instrument", "bass"]).instrument.0, InstrumentChoice::Bass);
+        let refused = Args::try_parse_from(["x", "--instrument", "tuba"]).unwrap_err();
+        assert!(refused.to_string().contains("e-flat"), "{refused}");
+        assert!(Args::try_parse_from(["x", "--a4", "400"]).unwrap_err().to_string().contains("415..466"));
     }
 
     #[test]

@@ -3,12 +3,37 @@
 //! What is exchanged as a whole is not automated: that takes from a moment (what comes with the program) to a minute
 //! (a file of one's own, the first time), and sounds meanwhile as the status says.
 
-use std::sync::{Arc, RwLock};
+use std::sync::{Arc, OnceLock, RwLock};
 
 use nice_plug::prelude::*;
 
 use crate::bore::bundled::Bundled;
 use crate::instrument::prepare::Quality;
+
+/// What a program without projects begins with: instrument, its file, A4.
+static BEGINNING: OnceLock<Beginning> = OnceLock::new();
+
+/// See [`begin_with`].
+#[derive(Clone, Debug)]
+pub struct Beginning {
+    /// Which.
+    pub choice: InstrumentChoice,
+    /// The user's own file, empty for the usual place.
+    pub file: String,
+    /// Pitch of A4, Hz.
+    pub a4_hz: f32,
+}
+
+/// Defaults of all parameters made from now on in this process. For a program that has neither projects nor a window; only
+/// the first call counts.
+pub fn begin_with(beginning: Beginning) {
+    let _ = BEGINNING.set(beginning);
+}
+
+/// What [`begin_with`] was told.
+pub(super) fn beginning() -> Option<&'static Beginning> {
+    BEGINNING.get()
+}
 
 /// Most characters of a path; longer ones are no paths.
 pub const PATH_MOST: usize = 4_096;
@@ -43,6 +68,9 @@ pub enum InstrumentChoice {
 }
 
 impl InstrumentChoice {
+    /// All of them.
+    pub const ALL: [Self; 6] = [Self::BFlat, Self::A, Self::EFlat, Self::C, Self::Bass, Self::User];
+
     /// The one that comes with the program, if it does.
     pub fn bundled(self) -> Option<Bundled> {
         match self {
@@ -108,9 +136,11 @@ impl InstrumentParams {
 
     /// Defaults, with the place where the state of the instrument is worded.
     pub fn new(status: Arc<RwLock<String>>) -> Self {
+        let (choice, file) = beginning()
+            .map_or((InstrumentChoice::BFlat, String::new()), |first| (first.choice, first.file.clone()));
         Self {
-            file: RwLock::default(),
-            choice: EnumParam::new("Instrument", InstrumentChoice::BFlat).non_automatable(),
+            file: RwLock::new(file),
+            choice: EnumParam::new("Instrument", choice).non_automatable(),
             quality: EnumParam::new("Offline quality", QualityChoice::Live).non_automatable(),
             bend_range: IntParam::new("Bend range", 2, IntRange::Linear { min: 0, max: 48 })
                 .with_unit(" st")
