@@ -9,8 +9,10 @@ pub mod held;
 pub mod model;
 pub mod player;
 pub mod prepare;
+mod scale;
 mod settings;
 mod slap;
+pub mod tuner;
 pub mod tuning;
 pub mod voice;
 

@@ -71,7 +71,7 @@ mod tests {
         });
         // The lower it sounds, the longer it is.
         let mut sorted = lengths;
-        sorted.sort_by(|a, b| a.0.cmp(&b.0));
+        sorted.sort_by_key(|(transposition, _)| *transposition);
         assert!(sorted.windows(2).all(|pair| pair[0].1 < pair[1].1), "{lengths:?}");
         assert_eq!(Bundled::from_id("b flat"), None);
     }

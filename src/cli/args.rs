@@ -1,10 +1,16 @@
 //! Arguments several commands share, and how their text is read.
 
+use crate::bore::bundled::Bundled;
 use crate::bore::instrument_file::{InstrumentError, InstrumentFile};
 use crate::cli::Failure;
-use crate::instrument::{Model, Wanted, prepare};
+use crate::instrument::cache::Cache;
+use crate::instrument::model::A4_HZ;
+use crate::instrument::prepare::{self, Progress};
+use crate::instrument::tuning::NoteTuning;
+use crate::instrument::{BuildError, Model, Quality, Wanted};
 use crate::units::{Air, WrittenNote, midi_of_name};
-use clap::Args;
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -12,27 +18,167 @@ use std::sync::Arc;
 /// Which instrument.
 #[derive(Args)]
 pub struct InstrumentArg {
-    /// Instrument file (TOML: bore, tone holes, fingerings) instead of the built-in B flat clarinet
-    #[arg(long, value_name = "FILE")]
+    /// Instrument: b-flat, a, e-flat, c, bass, or a file (TOML: bore, tone holes, fingerings) [default: b-flat]
+    #[arg(long, value_name = "NAME|FILE")]
     instrument: Option<PathBuf>,
 }
 
 impl InstrumentArg {
+    /// Its measurements.
     pub fn load(&self) -> Result<InstrumentFile, Failure> {
         let Some(path) = &self.instrument else { return Ok(InstrumentFile::built_in()) };
+        if let Some(bundled) = path.to_str().and_then(Bundled::from_id) {
+            return Ok(bundled.file());
+        }
         InstrumentFile::load(path).map_err(|source| match source {
+            // What is no path may have been meant for a name.
+            InstrumentError::Read { path, error } if path.components().count() == 1 => {
+                let ids = Bundled::ALL.map(Bundled::id).join(", ");
+                Failure::Usage(format!(
+                    "cannot read {}: {error}; --instrument is a file or one of {ids}",
+                    path.display()
+                ))
+            }
             InstrumentError::Read { path, error } => Failure::Read { path, source: error },
             source => Failure::InstrumentFile { path: path.clone(), source },
         })
     }
 
-    /// The instrument ready to play at a host rate. An instrument file takes seconds: its bore is fitted to the lattice.
-    pub fn model(&self, file: InstrumentFile, host_rate_hz: u32) -> Result<Arc<Model>, Failure> {
-        let rate_hz = f64::from(host_rate_hz);
-        let Some(path) = &self.instrument else { return Ok(Arc::new(Model::built_in(rate_hz)?)) };
-        match prepare::fitted(&Wanted::new(file, rate_hz), &mut |_| ControlFlow::Continue(())) {
-            Ok(model) => Ok(Arc::new(model)),
-            Err(source) => Err(Failure::Instrument { path: path.clone(), source }),
+    /// The bore as it is measured, fitted to the lattice for a host rate. Takes seconds the first time.
+    pub fn bore(
+        &self,
+        file: &InstrumentFile,
+        host_rate_hz: u32,
+        quality: QualityArg,
+    ) -> Result<Arc<Model>, Failure> {
+        let (rate_hz, quality) = (f64::from(host_rate_hz), quality.into());
+        self.made(|cache, on| prepare::bore(file, rate_hz, quality, cache, on))
+    }
+
+    /// The instrument ready to play: from the program's own data or the cache, else fitted and tuned now.
+    pub fn tuned(&self, wanted: &Wanted) -> Result<Arc<Model>, Failure> {
+        let mut fresh = false;
+        let model = self.made(|cache, on| {
+            prepare::make(wanted, cache, &mut |progress| {
+                fresh = true;
+                on(progress)
+            })
+        })?;
+        if fresh {
+            say_what_tuning_found(&model, wanted);
+        }
+        Ok(model)
+    }
+
+    /// With a cache and a bar.
+    fn made(
+        &self,
+        make: impl FnOnce(
+            Option<&Cache>,
+            &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
+        ) -> Result<Model, BuildError>,
+    ) -> Result<Arc<Model>, Failure> {
+        let mut bar = None;
+        let made = make(Cache::system().as_ref(), &mut |progress| {
+            let bar = bar.get_or_insert_with(preparing);
+            let (doing, share) = match progress {
+                Progress::Fitting(share) => ("fitting the bore", share),
+                Progress::Fitted(_) => ("fitting the bore", 1.0),
+                Progress::Tuning(share) => ("tuning its notes", share),
+            };
+            bar.set_message(doing);
+            bar.set_position((1_000.0 * share) as u64);
+            ControlFlow::Continue(())
+        });
+        if let Some(bar) = bar {
+            bar.finish_and_clear();
+        }
+        match (made, &self.instrument) {
+            (Ok(model), _) => Ok(Arc::new(model)),
+            (Err(source), Some(path)) => Err(Failure::Instrument { path: path.clone(), source }),
+            (Err(source), None) => Err(source.into()),
+        }
+    }
+}
+
+/// Seen on a terminal only.
+fn preparing() -> ProgressBar {
+    let bar = ProgressBar::new(1_000);
+    match ProgressStyle::with_template("{msg} {bar:40} {percent:>3} %  {elapsed}") {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
+}
+
+/// How finely the bore is cut.
+#[derive(Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub enum QualityArg {
+    /// As the plugin plays: 96 or 88.2 kHz inside
+    #[default]
+    Live,
+    /// Twice that, with its own fit and tuning
+    High,
+}
+
+impl From<QualityArg> for Quality {
+    fn from(quality: QualityArg) -> Self {
+        match quality {
+            QualityArg::Live => Self::Live,
+            QualityArg::High => Self::High,
+        }
+    }
+}
+
+/// The instrument that is played, and how well it is prepared.
+#[derive(Args)]
+pub struct PlayedArgs {
+    #[command(flatten)]
+    instrument: InstrumentArg,
+    /// How finely the bore is cut
+    #[arg(long, value_enum, default_value_t = QualityArg::Live)]
+    quality: QualityArg,
+    /// Do not tune an instrument file (which takes up to a minute the first time): play it as it is built
+    #[arg(long)]
+    untuned: bool,
+}
+
+impl PlayedArgs {
+    /// Its measurements.
+    pub fn load(&self) -> Result<InstrumentFile, Failure> {
+        self.instrument.load()
+    }
+
+    /// The instrument ready to play, tuned unless that was not wanted.
+    pub fn model(&self, file: InstrumentFile, host_rate_hz: u32, a4_hz: f32) -> Result<Arc<Model>, Failure> {
+        if self.untuned {
+            return self.instrument.bore(&file, host_rate_hz, self.quality);
+        }
+        let (a4_hz, quality) = (f64::from(a4_hz), self.quality.into());
+        self.instrument.tuned(&Wanted { a4_hz, quality, ..Wanted::new(file, f64::from(host_rate_hz)) })
+    }
+}
+
+/// What a maker wants to know once.
+fn say_what_tuning_found(model: &Model, wanted: &Wanted) {
+    let own_scale = A4_HZ / wanted.tuned_a4_hz();
+    let longer = 100.0 * (model.scale / own_scale - 1.0);
+    if longer != 0.0 {
+        let (by, how) = (longer.abs(), if longer > 0.0 { "larger" } else { "smaller" });
+        eprintln!("note: the whole instrument is played {by:.2} % {how} than measured, to be in tune");
+    }
+    let names = |which: fn(&NoteTuning) -> bool| -> Vec<String> {
+        let notes = model.tuning.notes.iter().filter(|note| which(note));
+        notes.map(|note| WrittenNote(note.written).to_string()).collect()
+    };
+    for (what, notes) in [
+        (
+            "do not sound in their register at any pressure and are tuned as their neighbours",
+            names(|n| n.silent),
+        ),
+        ("cannot be tuned by the delay alone", names(|n| !n.silent && n.off_cents != 0.0)),
+    ] {
+        if !notes.is_empty() {
+            eprintln!("note: {} {what}", notes.join(" "));
         }
     }
 }

@@ -3,7 +3,7 @@
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::transfer_matrix::{Peak, TransferMatrix, find_peaks};
 use crate::cli::Failure;
-use crate::cli::args::{AirArg, InstrumentArg, NotesArg, within};
+use crate::cli::args::{AirArg, InstrumentArg, NotesArg, QualityArg, within};
 use crate::cli::table::TableArgs;
 use crate::instrument;
 use crate::units::Air;
@@ -24,7 +24,7 @@ Examples:
 /// Where the answer comes from.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Model {
-    /// The lattice that sounds, at 48 kHz (96 kHz inside)
+    /// The lattice that sounds at 48 kHz (96 kHz inside, 192 kHz with --quality high)
     Lattice,
     /// Transfer matrices with exact wall losses: the reference
     Tmm,
@@ -64,6 +64,9 @@ pub struct Impedance {
     air: AirArg,
     #[command(flatten)]
     instrument: InstrumentArg,
+    /// How finely the lattice is cut
+    #[arg(long, value_enum, default_value_t = QualityArg::Live)]
+    quality: QualityArg,
     #[command(flatten)]
     table: TableArgs,
 }
@@ -95,7 +98,11 @@ impl Impedance {
         let about = format!(
             "{}; {}, {} C, reed volume {} m3, Zc {:.6e} Pa s/m3",
             file.name,
-            if self.model == Model::Tmm { "transfer matrices" } else { "lattice at 96 kHz" },
+            match (self.model, self.quality) {
+                (Model::Tmm, _) => "transfer matrices",
+                (Model::Lattice, QualityArg::Live) => "lattice at 96 kHz",
+                (Model::Lattice, QualityArg::High) => "lattice at 192 kHz",
+            },
             air.temperature_c,
             volume_m3,
             air.z_c(file.nominal_radius_m)
@@ -133,7 +140,7 @@ impl Impedance {
             let right = "leave --temperature out or add --model tmm";
             return Err(Failure::Usage(format!("the lattice is made for air of 25 C; {right}")));
         }
-        Ok(Bore::Lattice(self.instrument.model(file.clone(), 48_000)?))
+        Ok(Bore::Lattice(self.instrument.bore(file, 48_000, self.quality)?))
     }
 }
 

@@ -5,7 +5,7 @@ use crate::cli::args::{InstrumentArg, check_fingering, note, within};
 use crate::cli::feel::FeelArgs;
 use crate::device::{Choice, Hooks, KnobLink, LinkStatus, OFFERED_CEILING_MNM, Phase, StateSample};
 use crate::haptics::{Limits, NoteFeel};
-use crate::instrument::Settings;
+use crate::instrument::{Settings, Wanted};
 use crate::output::OutputError;
 use crate::touch::feel::Feels;
 use crate::touch::take::{Marks, Moment, TakeWriter};
@@ -85,7 +85,7 @@ impl Knob {
         let file = self.instrument.load()?;
         let written = WrittenNote(self.written);
         check_fingering(&file, written)?;
-        let feels = Feels::new(&*self.instrument.model(file.clone(), 48_000)?);
+        let feels = Feels::new(&*self.instrument.tuned(&Wanted::new(file.clone(), 48_000.0))?);
         let ceiling_mnm = self.arm.unwrap_or(100.0);
         let limits = Limits { ceiling_mnm, ..Limits::default() };
         let settings = Settings::default();

@@ -2,7 +2,7 @@
 
 use crate::bore::instrument_file::InstrumentFile;
 use crate::cli::Failure;
-use crate::cli::args::{InstrumentArg, check_fingering, note, within};
+use crate::cli::args::{PlayedArgs, check_fingering, note, within};
 use crate::cli::feel::FeelArgs;
 use crate::cli::settings::SettingsArgs;
 use crate::control::knob::KnobDesign;
@@ -70,7 +70,7 @@ pub struct PlayArgs {
     rate: u32,
 
     #[command(flatten)]
-    instrument: InstrumentArg,
+    instrument: PlayedArgs,
     #[command(flatten)]
     settings: SettingsArgs,
     #[command(flatten)]
@@ -115,7 +115,7 @@ impl PlayArgs {
         if let Some(curve) = &curve {
             score = score.blown(curve, &settings, self.rate);
         }
-        let model = self.instrument.model(file, self.rate)?;
+        let model = self.instrument.model(file, self.rate, settings.a4_hz)?;
         if let Some(take) = &self.replay {
             score.events = self.replayed(take, &model, &settings, &score)?;
         }

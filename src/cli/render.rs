@@ -4,7 +4,6 @@ use crate::cli::Failure;
 use crate::cli::play::{PlayArgs, Prepared};
 use crate::cli::table::Table;
 use crate::instrument::Probe;
-use crate::instrument::model::internal_rate_hz;
 use crate::output::NewFile;
 use crate::reed::physical::P_REF_PA;
 use crate::render as player;
@@ -172,7 +171,7 @@ impl ProbeTable {
     fn open(path: &Path, render: &Render, prepared: &Prepared) -> Result<Self, Failure> {
         let header = "t_s,gamma,opening_unit,flow_m3s,p_mouthpiece_pa,p_radiated_pa";
         let mut table = Table::open(path, render.force, header)?;
-        let rate_hz = internal_rate_hz(f64::from(prepared.rate));
+        let rate_hz = prepared.model.coeffs.rate_hz;
         table.comment(format_args!(
             "s, mouth over closing pressure, opening over rest opening, m3/s, Pa, Pa at 1 m; {rate_hz} Hz / {}",
             render.probe_every

@@ -2,7 +2,7 @@
 
 use crate::analysis::pitch;
 use crate::cli::Failure;
-use crate::cli::args::{InstrumentArg, NotesArg, within};
+use crate::cli::args::{NotesArg, PlayedArgs, within};
 use crate::cli::render::progress;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::table::TableArgs;
@@ -46,7 +46,7 @@ pub struct Tune {
     #[arg(long, value_name = "HZ", default_value = "48000", value_parser = clap::value_parser!(u32).range(22_050..=384_000))]
     rate: u32,
     #[command(flatten)]
-    instrument: InstrumentArg,
+    instrument: PlayedArgs,
     #[command(flatten)]
     table: TableArgs,
     #[command(flatten)]
@@ -69,7 +69,7 @@ impl Tune {
             "{}; gamma {}, {rate} Hz, A4 = {} Hz; tongued, measured from {SETTLE_S} s on",
             name, self.gamma, settings.a4_hz
         ))?;
-        let model = self.instrument.model(file, rate)?;
+        let model = self.instrument.model(file, rate, settings.a4_hz)?;
         let bar = progress(notes.len());
         let measured = |written: WrittenNote| {
             let heard = measure(written, &model, &curve, &settings, rate);

@@ -17,7 +17,9 @@ use crate::bore::fit;
 use crate::bore::instrument_file::{BoreSegment, Fingering, HoleKind, InstrumentFile, ToneHole};
 use crate::instrument::cache::{Cache, Key};
 use crate::instrument::model::{A4_HZ, BuildError, Model, checked_rate_hz};
-use crate::instrument::tuning::{self, NoteTuning, TuningTable};
+use crate::instrument::scale;
+use crate::instrument::tuner;
+use crate::instrument::tuning::{NoteTuning, TuningTable};
 use crate::units::Air;
 
 /// Range of the pitch of A4, Hz: from baroque pitch to the high pitch of the 19th century.
@@ -61,7 +63,8 @@ pub struct Wanted {
     pub quality: Quality,
 }
 
-/// What [`make`] is at.
+/// What [`make`] is at: fitting, fitted, tuning; from the beginning once more where tuning finds that the bore has to be
+/// scaled.
 #[derive(Clone, Copy, Debug)]
 pub enum Progress<'a> {
     /// Fitting; share done, 0..=1.
@@ -91,7 +94,12 @@ impl Wanted {
 
     /// Everything the prepared instrument depends on, and the version of what prepares it.
     pub fn key(&self) -> Result<Key, BuildError> {
+        self.key_of(b"tuned")
+    }
+
+    fn key_of(&self, what: &[u8]) -> Result<Key, BuildError> {
         let mut all = Vec::with_capacity(8_192);
+        all.extend(what);
         all.extend(VERSION.to_le_bytes());
         all.extend(OWN_NUMBERS.as_bytes());
         numbers(&mut all, &[self.internal_rate_hz()?, self.tuned_a4_hz()]);
@@ -231,31 +239,82 @@ pub fn ready(wanted: &Wanted, cache: Option<&Cache>) -> Result<Option<Model>, Bu
         }
     }
     let Some(cache) = cache else { return Ok(None) };
-    let kept = cache.get(&wanted.key()?);
-    Ok(kept.and_then(|text| toml::from_str::<Prepared>(&text).ok()?.model(&wanted.file)))
+    Ok(kept(cache, &wanted.key()?, &wanted.file))
 }
 
 /// The instrument at once: cut, not fitted, untuned. Allocates.
 pub fn rough(wanted: &Wanted) -> Result<Model, BuildError> {
     let (rate_hz, a4_hz) = wanted.checked()?;
-    let cells = Cells::cut(&wanted.file, &Air::default(), rate_hz)?;
-    Ok(untuned(&wanted.file, cells, a4_hz, 1.0))
+    let scale = A4_HZ / a4_hz;
+    let file = wanted.file.scaled(scale);
+    let cells = Cells::cut(&file, &Air::default(), rate_hz)?;
+    Ok(untuned(file, cells, a4_hz, scale))
 }
 
-/// The instrument fitted but not tuned. Takes seconds; no cache. Allocates.
-pub fn fitted(
-    wanted: &Wanted,
+/// The bore exactly as the file has it, fitted, for A4 = 440 Hz: to look at, and to play untuned. Takes seconds the first
+/// time. Allocates.
+pub fn bore(
+    file: &InstrumentFile,
+    host_rate_hz: f64,
+    quality: Quality,
+    cache: Option<&Cache>,
     on: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Model, BuildError> {
+    let wanted = Wanted { quality, ..Wanted::new(file.clone(), host_rate_hz) };
+    if let Some(model) = ready(&wanted, cache)?.filter(|model| model.scale == 1.0) {
+        let tuning = TuningTable::untuned(file);
+        return Ok(Model { tuning, ..model });
+    }
     let (rate_hz, a4_hz) = wanted.checked()?;
-    if on(Progress::Fitting(0.0)).is_break() {
-        return Err(BuildError::Cancelled);
+    let key = wanted.key_of(b"as built")?;
+    if let Some(model) = cache.and_then(|cache| kept(cache, &key, file)) {
+        return Ok(model);
     }
-    let cells = fit::fit(&wanted.file, &Air::default(), rate_hz)?;
-    if on(Progress::Fitting(1.0)).is_break() {
-        return Err(BuildError::Cancelled);
+    let model = fitted_at(file, 1.0, rate_hz, a4_hz, on)?;
+    keep(cache, &key, &model);
+    Ok(model)
+}
+
+/// The instrument fitted but not tuned, its bore scaled for its pitch as far as theory can tell.
+fn fitted(wanted: &Wanted, on: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>) -> Result<Model, BuildError> {
+    let (rate_hz, a4_hz) = wanted.checked()?;
+    on_or_cancelled(on, Progress::Fitting(0.0))?;
+    let scale = scale::by_theory(&wanted.file, &Air::default(), a4_hz);
+    fitted_at(&wanted.file, scale, rate_hz, a4_hz, on)
+}
+
+fn kept(cache: &Cache, key: &Key, file: &InstrumentFile) -> Option<Model> {
+    toml::from_str::<Prepared>(&cache.get(key)?).ok()?.model(file)
+}
+
+fn keep(cache: Option<&Cache>, key: &Key, model: &Model) {
+    if let (Some(cache), Ok(text)) = (cache, toml::to_string(&Prepared::of(model))) {
+        cache.put(key, &text);
     }
-    Ok(untuned(&wanted.file, cells, a4_hz, 1.0))
+}
+
+fn fitted_at(
+    file: &InstrumentFile,
+    scale: f64,
+    rate_hz: f64,
+    a4_hz: f64,
+    on: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
+) -> Result<Model, BuildError> {
+    on_or_cancelled(on, Progress::Fitting(0.0))?;
+    let scaled = file.scaled(scale);
+    let cells = fit::fit(&scaled, &Air::default(), rate_hz)?;
+    on_or_cancelled(on, Progress::Fitting(1.0))?;
+    Ok(untuned(scaled, cells, a4_hz, scale))
+}
+
+fn on_or_cancelled(
+    on: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
+    progress: Progress<'_>,
+) -> Result<(), BuildError> {
+    match on(progress) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(BuildError::Cancelled),
+    }
 }
 
 /// The instrument as good as it can be: what is [`ready`], or fitted and tuned now, and kept in the cache. Takes up to
@@ -269,9 +328,7 @@ pub fn make(
         return Ok(model);
     }
     let model = anew(wanted, on)?;
-    if let (Some(cache), Ok(text)) = (cache, toml::to_string(&Prepared::of(&model))) {
-        cache.put(&wanted.key()?, &text);
-    }
+    keep(cache, &wanted.key()?, &model);
     Ok(model)
 }
 
@@ -280,17 +337,33 @@ pub fn anew(
     wanted: &Wanted,
     on: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Model, BuildError> {
-    let model = Arc::new(fitted(wanted, on)?);
-    if on(Progress::Fitted(&model)).is_break() {
-        return Err(BuildError::Cancelled);
+    let mut model = Arc::new(fitted(wanted, on)?);
+    let mut offsets = heard_offsets(&model, on)?;
+    if let Some(factor) = scale::by_playing(&model, &offsets) {
+        let scale = model.scale * factor;
+        model = Arc::new(fitted_at(&wanted.file, scale, model.coeffs.rate_hz, model.a4_hz, on)?);
+        offsets = heard_offsets(&model, on)?;
     }
     let tuning =
-        tuning::tune(&model, &mut |share| on(Progress::Tuning(share))).ok_or(BuildError::Cancelled)?;
-    Ok(Model { tuning, ..Model::clone(&model) })
+        tuner::tune(&model, &offsets, &mut |share| on(Progress::Tuning(HEARD + (1.0 - HEARD) * share)));
+    Ok(Model { tuning: tuning.ok_or(BuildError::Cancelled)?, ..Model::clone(&model) })
 }
 
-fn untuned(file: &InstrumentFile, cells: Cells, a4_hz: f64, scale: f64) -> Model {
-    Model::assemble(file.clone(), cells, TuningTable::untuned(file), a4_hz, scale)
+/// Share of the work of tuning that is done when every note has been heard once.
+const HEARD: f64 = 0.05;
+
+/// How far off the notes are without trims; says that the instrument can be played.
+fn heard_offsets(
+    model: &Arc<Model>,
+    on: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
+) -> Result<Vec<Option<f64>>, BuildError> {
+    on_or_cancelled(on, Progress::Fitted(model))?;
+    tuner::offsets(model, &mut |share| on(Progress::Tuning(HEARD * share))).ok_or(BuildError::Cancelled)
+}
+
+fn untuned(file: InstrumentFile, cells: Cells, a4_hz: f64, scale: f64) -> Model {
+    let tuning = TuningTable::untuned(&file);
+    Model::assemble(file, cells, tuning, a4_hz, scale)
 }
 
 #[cfg(test)]

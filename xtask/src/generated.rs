@@ -11,7 +11,8 @@ use chalumeau::instrument::Wanted;
 use chalumeau::instrument::held::HeldNote;
 use chalumeau::instrument::model::{INTERNAL_RATES_HZ, Model};
 use chalumeau::instrument::prepare::{self, Prepared};
-use chalumeau::instrument::tuning::{self, GAMMA_NODES, NATURAL_GAMMA};
+use chalumeau::instrument::tuner;
+use chalumeau::instrument::tuning::{GAMMA_NODES, NATURAL_GAMMA};
 use chalumeau::reed::{ReedTables, header};
 use chalumeau::units::cents;
 
@@ -101,7 +102,9 @@ pub fn tune(args: &[String]) -> Result<()> {
             check_tuning(&model)?;
         } else {
             let terminal = std::io::stderr().is_terminal();
-            let tuning = tuning::tune(&model, &mut |share| {
+            let offsets =
+                tuner::offsets(&model, &mut |_| ControlFlow::Continue(())).context("not cancelled")?;
+            let tuning = tuner::tune(&model, &offsets, &mut |share| {
                 if terminal {
                     eprint!("\r{rate_hz} Hz: {:3.0} %{}", 100.0 * share, if share < 1.0 { "" } else { "\n" });
                 }
@@ -125,7 +128,7 @@ fn check_tuning(model: &Model) -> Result<()> {
         for (gamma, rows) in trims {
             let held = HeldNote { rows, ..HeldNote::new(model, index, gamma) };
             let name = || format!("written {} at gamma {gamma}", fingering.written);
-            let hz = tuning::heard_hz(model, &held, model.notes_hz[index])
+            let hz = tuner::heard_hz(model, &held, model.notes_hz[index])
                 .with_context(|| format!("{PREPARED}: {} does not sound in its register", name()))?;
             let off = cents(hz, model.notes_hz[index]);
             if off.abs() > worst.0.abs() {

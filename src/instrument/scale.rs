@@ -1,0 +1,67 @@
+//! How much longer or shorter a bore has to be so that the tuning delay can do the rest.
+//!
+//! All lengths by one factor, as a maker would build it for another pitch: without losses every resonance moves by the
+//! same interval. First by theory, so that hardly any instrument has to be fitted twice; then by how the notes play.
+//! Factors above 1 are longer and lower.
+
+use crate::bore::instrument_file::InstrumentFile;
+use crate::bore::transfer_matrix::TransferMatrix;
+use crate::instrument::model::{A4_HZ, Model};
+use crate::units::{Air, cents};
+
+/// Theory (a reed without inertia or damping) is not better than this: notes of the built-in clarinet play 20 to 70
+/// cents below it. Nothing closer is corrected before it has been heard, cents.
+const THEORY_CENTS: f64 = 50.0;
+/// An instrument further off than this is not out of tune but named wrongly; it is left as it is, cents.
+const MOST_CENTS: f64 = 300.0;
+/// Room that is left in the delay on both sides, cents: for the breath, and for the pitch of the room.
+const ROOM_CENTS: f64 = 10.0;
+
+fn factor(down_cents: f64) -> f64 {
+    (down_cents / 1_200.0).exp2()
+}
+
+/// Factor for a pitch of A4, and for an instrument whose notes lie elsewhere than its chart says.
+pub fn by_theory(file: &InstrumentFile, air: &Air, a4_hz: f64) -> f64 {
+    let model = TransferMatrix::new(file, *air);
+    let offsets: Vec<f64> = file
+        .fingerings
+        .iter()
+        .filter(|fingering| fingering.mode <= 2)
+        .filter_map(|fingering| {
+            let wanted = fingering.written.sounding(file.transposition)?.frequency_hz(A4_HZ);
+            let (hz, _) = model.playing_frequency(&fingering.open, file.reed_volume_m3, wanted)?;
+            Some(cents(hz, wanted))
+        })
+        .collect();
+    let mean = offsets.iter().sum::<f64>() / offsets.len().max(1) as f64;
+    let sharp = if (THEORY_CENTS..MOST_CENTS).contains(&mean.abs()) { mean } else { 0.0 };
+    A4_HZ / a4_hz * factor(sharp)
+}
+
+/// Factor for notes that lie `offsets` from their pitch without a trim, cents above; `None` if the delay reaches all of
+/// them.
+pub fn by_playing(model: &Model, offsets: &[Option<f64>]) -> Option<f64> {
+    let (low_rows, high_rows) = model.coeffs.tuning_range();
+    // For each note the least and the most it may be moved by scale, cents up, for its delay to do the rest.
+    let bounds: Vec<(f64, f64, f64)> = offsets
+        .iter()
+        .enumerate()
+        .filter_map(|(note, off)| Some((note, (*off)?)))
+        .map(|(note, off)| {
+            let up = low_rows / model.rows_for_cents(note, 1.0);
+            let down = high_rows / model.rows_for_cents(note, -1.0);
+            (-off - up, -off + down, -off)
+        })
+        .collect();
+    let least = bounds.iter().map(|bound| bound.0).fold(f64::NEG_INFINITY, f64::max);
+    let most = bounds.iter().map(|bound| bound.1).fold(f64::INFINITY, f64::min);
+    if bounds.is_empty() || (least <= 0.0 && most >= 0.0) {
+        return None;
+    }
+    let mean = bounds.iter().map(|bound| bound.2).sum::<f64>() / bounds.len() as f64;
+    let (least, most) = (least + ROOM_CENTS, most - ROOM_CENTS);
+    // Where no scale serves all notes, those at both ends are left out of tune alike.
+    let up = if least <= most { mean.clamp(least, most) } else { 0.5 * (least + most) };
+    (up.abs() < MOST_CENTS).then(|| factor(-up))
+}
