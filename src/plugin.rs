@@ -142,6 +142,7 @@ impl Plugin for Chalumeau {
         let moved = moved(&self.params, &mut self.panic, &mut self.breath);
         let api = context.plugin_api();
         let translator = &mut self.translator;
+        let bent = translator.bend_range(self.params.instrument.bend_range.value());
         let reed_sources = &mut self.reed_sources;
         let sources = [self.params.knob.h_source.value(), self.params.knob.k_source.value()];
         let played = std::iter::from_fn(|| context.next_event()).flat_map(|event| {
@@ -154,7 +155,7 @@ impl Plugin for Chalumeau {
             .into_iter()
             .flatten()
         });
-        let events = moved.into_iter().flatten().chain(played);
+        let events = moved.into_iter().flatten().chain(bent).chain(played);
         #[cfg(feature = "devices")]
         if let Some((_, audio)) = &mut self.knob {
             let replay = self.params.knob.replay.value();

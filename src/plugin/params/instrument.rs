@@ -26,6 +26,7 @@ pub struct Beginning {
 
 /// Defaults of all parameters made from now on in this process. For a program that has neither projects nor a window; only
 /// the first call counts.
+#[cfg(feature = "standalone")]
 pub fn begin_with(beginning: Beginning) {
     let _ = BEGINNING.set(beginning);
 }
