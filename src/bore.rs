@@ -2,6 +2,8 @@
 
 pub mod bundled;
 pub mod cells;
+pub mod check;
+pub mod cylinder;
 pub mod fit;
 pub mod instrument_file;
 pub mod lattice;

@@ -10,6 +10,7 @@ mod doctor;
 mod feel;
 mod haptic;
 mod impedance;
+mod instrument;
 #[cfg(feature = "devices")]
 mod knob;
 #[cfg(feature = "simulator")]
@@ -24,7 +25,8 @@ mod table;
 mod threshold;
 mod tune;
 
-use crate::bore::instrument_file::InstrumentError;
+use crate::bore::cylinder::CylinderError;
+use crate::bore::instrument_file::{ImportError, InstrumentError};
 use crate::figure::draw::DrawError;
 use crate::haptics::FeelRefused;
 use crate::instrument::BuildError;
@@ -66,6 +68,7 @@ struct Cli {
 enum Command {
     Render(Box<render::Render>),
     Impedance(impedance::Impedance),
+    Instrument(Box<instrument::Instrument>),
     Threshold(threshold::Threshold),
     Tune(Box<tune::Tune>),
     Reed(reed::Reed),
@@ -94,6 +97,10 @@ enum Failure {
     InstrumentFile { path: PathBuf, source: InstrumentError },
     #[error("{}: {source}", path.display())]
     Instrument { path: PathBuf, source: BuildError },
+    #[error(transparent)]
+    Import(Box<ImportError>),
+    #[error(transparent)]
+    Cylinder(#[from] CylinderError),
     #[error(transparent)]
     Build(#[from] BuildError),
     #[error(transparent)]
@@ -137,6 +144,12 @@ pub fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Render(command) => command.run(),
         Command::Impedance(command) => command.run(),
+        Command::Instrument(command) => {
+            return match command.run() {
+                Ok(code) => code,
+                Err(failure) => failed(&failure),
+            };
+        }
         Command::Threshold(command) => command.run(),
         Command::Tune(command) => command.run(),
         Command::Reed(command) => command.run(),
@@ -150,10 +163,15 @@ pub fn main() -> ExitCode {
         Command::Doctor(command) => command.run(),
     };
     match done {
-        Err(failure) if !failure.is_closed_pipe() => {
-            eprintln!("error: {failure}");
-            ExitCode::from(2)
-        }
-        _ => ExitCode::SUCCESS,
+        Err(failure) => failed(&failure),
+        Ok(()) => ExitCode::SUCCESS,
     }
+}
+
+fn failed(failure: &Failure) -> ExitCode {
+    if failure.is_closed_pipe() {
+        return ExitCode::SUCCESS;
+    }
+    eprintln!("error: {failure}");
+    ExitCode::from(2)
 }

@@ -14,14 +14,18 @@ use serde::Deserialize;
 use crate::units::midi_of_name;
 use crate::units::{REFERENCE_RADIUS_M, WrittenNote};
 
+mod csv;
 mod error;
 mod limits;
 mod raw;
 mod text;
+mod words;
 
+pub use csv::{ImportDetails, ImportError, Sheet};
 pub use error::InstrumentError;
 use limits::*;
-use raw::{RawFile, RawFingering, RawHole, RawSegment};
+use raw::{Lined, RawFile, RawFingering, RawHole, RawSegment};
+use words::{Place, Word, Words};
 
 /// Most tone holes a file may have; a full Boehm clarinet has 24.
 pub const MAX_HOLES: usize = 40;
@@ -32,6 +36,8 @@ pub const REGISTERS: [&str; 4] = ["chalumeau", "throat", "clarion", "altissimo"]
 
 /// Cones that meet within this distance are taken as touching, m.
 const CONTACT_M: f64 = 1e-6;
+/// Shortest cone, mm: what is shorter is a mistake in one of its ends.
+const SHORTEST_MM: f64 = 0.01;
 /// What lengths may lose by being written with few digits, m.
 const ROUNDING_M: f64 = 2e-9;
 
@@ -66,9 +72,9 @@ pub struct BoreSegment {
     pub x_start_m: f64,
     /// Downstream end, m, above `x_start_m`.
     pub x_end_m: f64,
-    /// Radius at the upstream end, m, 0 < r < 0.1.
+    /// Radius at the upstream end, m, 0.0005..=0.1.
     pub r_start_m: f64,
-    /// Radius at the downstream end, m, 0 < r < 0.1.
+    /// Radius at the downstream end, m, 0.0005..=0.1.
     pub r_end_m: f64,
 }
 
@@ -121,14 +127,19 @@ pub struct Fingering {
 impl InstrumentFile {
     /// Reads and checks the text of an instrument file. Never panics. Allocates.
     pub fn parse(text: &str) -> Result<Self, InstrumentError> {
-        let raw: RawFile = toml::from_str(text)?;
-        within("the file", "transposition_semitones", raw.transposition_semitones as f64, &TRANSPOSITION)?;
-        within("the file", "reed_volume_mm3", raw.reed_volume_mm3, &REED_VOLUME)?;
+        Self::from_raw(RawFile::from_toml(text)?, &Words::toml())
+    }
+
+    /// Checks what was read; messages are in the words of the file it was read from.
+    fn from_raw(raw: RawFile, words: &Words) -> Result<Self, InstrumentError> {
+        let place = Place { file: None, line: None, what: "the file".to_owned() };
+        within(&place, &words.transposition, raw.transposition_semitones as f64, &TRANSPOSITION)?;
+        within(&place, &words.reed_volume, raw.reed_volume_mm3, &REED_VOLUME)?;
         if let Some(diameter_mm) = raw.nominal_diameter_mm {
-            within("the file", "nominal_diameter_mm", diameter_mm, &NOMINAL_DIAMETER)?;
+            within(&place, &words.nominal, diameter_mm, &NOMINAL_DIAMETER)?;
         }
         if raw.name.trim().is_empty() {
-            return Err(word("the file", "name", &raw.name, "the name of the instrument"));
+            return Err(word(&place, &Word::plain("name"), &raw.name, "the name of the instrument"));
         }
         count("bore", raw.bore.len(), 1, MAX_SEGMENTS)?;
         count("hole", raw.hole.len(), 0, MAX_HOLES)?;
@@ -141,12 +152,12 @@ impl InstrumentFile {
             nominal_radius_m: raw
                 .nominal_diameter_mm
                 .map_or(REFERENCE_RADIUS_M, |diameter_mm| diameter_mm / 2e3),
-            bore: segments(raw.bore)?,
+            bore: segments(raw.bore, words)?,
             holes: Vec::new(),
             fingerings: Vec::new(),
         };
-        file.holes = file.tone_holes(raw.hole)?;
-        file.fingerings = file.chart(raw.fingering)?;
+        file.holes = file.tone_holes(raw.hole, words)?;
+        file.fingerings = file.chart(raw.fingering, words)?;
         Ok(file)
     }
 
@@ -227,29 +238,50 @@ impl InstrumentFile {
         self.fingerings.iter().map(|fingering| fingering.written).max().unwrap_or(WrittenNote(0))
     }
 
-    fn tone_holes(&self, raw: Vec<RawHole>) -> Result<Vec<ToneHole>, InstrumentError> {
+    fn tone_holes(&self, raw: Vec<Lined<RawHole>>, words: &Words) -> Result<Vec<ToneHole>, InstrumentError> {
         let mut holes: Vec<ToneHole> = Vec::with_capacity(raw.len());
-        for (index, hole) in raw.into_iter().enumerate() {
-            let place = format!("hole {} ({})", index + 1, hole.name);
+        for (index, Lined { line, value: hole }) in raw.into_iter().enumerate() {
+            let what = format!("hole {} ({})", index + 1, hole.name);
+            let place = Place { file: words.hole.clone(), line: Some(line), what };
             if hole.name.is_empty() || hole.name.contains(char::is_whitespace) {
-                return Err(word(&place, "name", &hole.name, "one word, as the fingerings use it"));
+                let expected = "one word, as the fingerings use it";
+                return Err(word(&place, &words.hole_name, &hole.name, expected));
             }
             if holes.iter().any(|other| other.name == hole.name) {
-                return Err(InstrumentError::Duplicate { place, what: "hole", name: hole.name });
+                let place = place.to_string();
+                return Err(InstrumentError::Duplicate { place, what: "hole".to_owned(), name: hole.name });
             }
-            within(&place, "x_mm", hole.x_mm, &POSITION)?;
-            within(&place, "diameter_mm", hole.diameter_mm, &HOLE_DIAMETER)?;
-            within(&place, "chimney_mm", hole.chimney_mm, &CHIMNEY)?;
-            let (x_m, length_m) = (hole.x_mm / 1e3, self.length_m());
-            if !(x_m > CONTACT_M && x_m < length_m - CONTACT_M) {
-                let (given_mm, length_mm) = (hole.x_mm, in_mm(length_m));
-                return Err(InstrumentError::HoleOffBore { place, given_mm, length_mm });
+            let length_m = self.length_m();
+            // First, because then the length of the bore shows which unit was meant.
+            if hole.x_mm / 1e3 >= length_m - CONTACT_M {
+                let (unit, end) = (words.x.unit(), words.x.given(length_m * 1e3));
+                let guess = words.x.guess(hole.x_mm, |x_mm| (0.05..0.99).contains(&(x_mm / 1e3 / length_m)));
+                return Err(InstrumentError::Value {
+                    place: place.to_string(),
+                    field: words.x.name.clone(),
+                    given: words.x.given(hole.x_mm),
+                    expected: format!("inside the bore, which runs from 0 to {end} {unit}{guess}"),
+                });
             }
+            within(&place, &words.x, hole.x_mm, &HOLE_POSITION)?;
+            within(&place, &words.hole_width, hole.diameter_mm, &HOLE_DIAMETER)?;
+            within(&place, &words.chimney, hole.chimney_mm, &CHIMNEY)?;
+            let x_m = hole.x_mm / 1e3;
             let (radius_m, bore_radius_m) = (hole.diameter_mm / 2e3, self.radius_at(x_m));
             // A hole as wide as the bore stays so when both are rounded to what a file holds.
             if radius_m > bore_radius_m + ROUNDING_M {
-                let (given_mm, bore_mm) = (hole.diameter_mm, in_mm(2.0 * bore_radius_m));
-                return Err(InstrumentError::HoleTooWide { place, given_mm, bore_mm });
+                let wide = &words.hole_width;
+                return Err(InstrumentError::Value {
+                    place: place.to_string(),
+                    field: wide.name.clone(),
+                    given: wide.given(hole.diameter_mm),
+                    expected: format!(
+                        "at most {} {}, the {} of the bore there",
+                        wide.given(2e3 * bore_radius_m),
+                        wide.unit(),
+                        wide.width()
+                    ),
+                });
             }
             holes.push(ToneHole {
                 name: hole.name,
@@ -265,37 +297,40 @@ impl InstrumentFile {
         Ok(holes)
     }
 
-    fn chart(&self, raw: Vec<RawFingering>) -> Result<Vec<Fingering>, InstrumentError> {
+    fn chart(&self, raw: Vec<Lined<RawFingering>>, words: &Words) -> Result<Vec<Fingering>, InstrumentError> {
         let index: HashMap<&str, usize> =
             self.holes.iter().enumerate().map(|(hole, design)| (design.name.as_str(), hole)).collect();
         let mut chart: Vec<Fingering> = Vec::with_capacity(raw.len());
-        for (number, fingering) in raw.into_iter().enumerate() {
-            let place = format!("fingering {} ({})", number + 1, fingering.written);
+        for (number, Lined { line, value: fingering }) in raw.into_iter().enumerate() {
+            let what = format!("fingering {} ({})", number + 1, fingering.written);
+            let place = Place { file: words.fingering.clone(), line: Some(line), what };
             let Some(written) = midi_of_name(&fingering.written).map(WrittenNote) else {
                 let expected = "a note like E3, F#4 or Bb4, from C-1 to G9";
-                return Err(word(&place, "written", &fingering.written, expected));
+                return Err(word(&place, &words.written, &fingering.written, expected));
             };
             if written.sounding(self.transposition).is_none() {
                 let expected = "a note that sounds between C-1 and G9 after transposition";
-                return Err(word(&place, "written", &fingering.written, expected));
+                return Err(word(&place, &words.written, &fingering.written, expected));
             }
             if chart.iter().any(|other| other.written == written) {
-                return Err(InstrumentError::Duplicate { place, what: "written", name: written.to_string() });
+                let (place, what) = (place.to_string(), words.written.name.clone());
+                return Err(InstrumentError::Duplicate { place, what, name: written.to_string() });
             }
             if !REGISTERS.contains(&fingering.register.as_str()) {
                 let expected = format!("one of {}", REGISTERS.join(", "));
-                return Err(word(&place, "register", &fingering.register, &expected));
+                return Err(word(&place, &words.register, &fingering.register, expected));
             }
-            within(&place, "mode", f64::from(fingering.mode), &MODE)?;
+            within(&place, &words.mode, f64::from(fingering.mode), &MODE)?;
             let mut open = vec![false; self.holes.len()];
             for name in fingering.open.split_whitespace() {
                 let Some(&hole) = index.get(name) else {
                     let known: Vec<&str> = self.holes.iter().map(|hole| hole.name.as_str()).collect();
                     let expected = format!("names of holes out of: {}", known.join(" "));
-                    return Err(word(&place, "open", name, &expected));
+                    return Err(word(&place, &words.open, name, expected));
                 };
                 if std::mem::replace(&mut open[hole], true) {
-                    return Err(InstrumentError::Duplicate { place, what: "hole", name: name.to_owned() });
+                    let (place, what) = (place.to_string(), "hole".to_owned());
+                    return Err(InstrumentError::Duplicate { place, what, name: name.to_owned() });
                 }
             }
             let mode = fingering.mode as usize;
@@ -312,33 +347,43 @@ impl InstrumentFile {
     }
 }
 
-fn segments(raw: Vec<RawSegment>) -> Result<Vec<BoreSegment>, InstrumentError> {
-    let places: Vec<String> = raw
-        .iter()
-        .enumerate()
-        .map(|(index, segment)| format!("bore segment {} ({})", index + 1, segment.part))
-        .collect();
-    if let (Some(last), Some(place)) = (raw.last(), places.last()) {
-        within(place, "x_end_mm", last.x_end_mm, &BORE_LENGTH)?;
+fn segments(raw: Vec<Lined<RawSegment>>, words: &Words) -> Result<Vec<BoreSegment>, InstrumentError> {
+    let place = |index: usize, segment: &Lined<RawSegment>| {
+        let what = format!("bore segment {} ({})", index + 1, segment.value.part);
+        Place { file: words.bore.clone(), line: Some(segment.line), what }
+    };
+    // First, because a whole bore in the wrong unit shows best in its length.
+    if let Some(last) = raw.last() {
+        within(&place(raw.len() - 1, last), &words.x_end, last.value.x_end_mm, &BORE_LENGTH)?;
     }
     let mut bore: Vec<BoreSegment> = Vec::with_capacity(raw.len());
     let mut end_mm = 0.0;
-    for (segment, place) in raw.into_iter().zip(places) {
-        within(&place, "x_start_mm", segment.x_start_mm, &POSITION)?;
-        within(&place, "x_end_mm", segment.x_end_mm, &POSITION)?;
-        within(&place, "diameter_start_mm", segment.diameter_start_mm, &BORE_DIAMETER)?;
-        within(&place, "diameter_end_mm", segment.diameter_end_mm, &BORE_DIAMETER)?;
+    for (index, segment) in raw.into_iter().enumerate() {
+        let place = place(index, &segment);
+        let segment = segment.value;
+        within(&place, &words.x_start, segment.x_start_mm, &POSITION)?;
+        within(&place, &words.x_end, segment.x_end_mm, &POSITION)?;
+        within(&place, &words.width_start, segment.diameter_start_mm, &BORE_DIAMETER)?;
+        within(&place, &words.width_end, segment.diameter_end_mm, &BORE_DIAMETER)?;
         if (segment.x_start_mm - end_mm).abs() > CONTACT_M * 1e3 {
-            let given_mm = segment.x_start_mm;
-            return Err(InstrumentError::NotContiguous { place, given_mm, expected_mm: end_mm });
+            return Err(InstrumentError::NotContiguous {
+                place: place.to_string(),
+                field: words.x_start.name.clone(),
+                given: words.x_start.given(segment.x_start_mm),
+                expected: words.x_start.given(end_mm),
+            });
         }
-        if segment.x_end_mm - end_mm < 0.01 {
-            let expected = "at least 0.01 mm beyond x_start_mm";
+        if segment.x_end_mm - end_mm < SHORTEST_MM {
             return Err(InstrumentError::Value {
-                place,
-                field: "x_end_mm",
-                given: segment.x_end_mm,
-                expected,
+                place: place.to_string(),
+                field: words.x_end.name.clone(),
+                given: words.x_end.given(segment.x_end_mm),
+                expected: format!(
+                    "at least {} {} beyond {}",
+                    words.x_end.given(SHORTEST_MM),
+                    words.x_end.unit(),
+                    words.x_start.name
+                ),
             });
         }
         bore.push(BoreSegment {
@@ -415,7 +460,7 @@ mod tests {
             (
                 "reed_volume_mm3 = 1200.0",
                 "reed_volume_mm3 = 1.2",
-                "the file: reed_volume_mm3 is 1.2; it must be in mm3, 0 to 20000 (clarinet: 1200); this looks like cm3",
+                "the file: reed_volume_mm3 is 1.2; it must be 0, or 20 to 20000 mm3 (clarinet: 1200 mm3); this looks like cubic centimetres: 1.2 cm3 = 1200 mm3",
             ),
             ("transposition_semitones = 2", "transposition_semitones = 200", "-12 to 36 semitones"),
             (
@@ -427,21 +472,26 @@ mod tests {
             (
                 "diameter_start_mm = 13.8,",
                 "diameter_start_mm = 0.0138,",
-                "bore segment 2 (mouthpiece): diameter_start_mm is 0.0138; it must be in mm, 1 to below 200; this looks like metres",
+                "line 29: bore segment 2 (mouthpiece): diameter_start_mm is 0.0138; it must be 1 to 200 mm; this looks like metres: 0.0138 m = 13.8 mm",
+            ),
+            (
+                "x_mm = 155.787",
+                "x_mm = 0.155787",
+                "x_mm is 0.155787; it must be 1 to 3000 mm; this looks like metres",
             ),
             ("diameter_start_mm = 13.8,", "diameter_start_mm = nan,", "diameter_start_mm is NaN"),
             ("x_end_mm = 667.587", "x_end_mm = 0.667", "looks like metres"),
             (
                 "x_mm = 155.787",
                 "x_mm = 855.787",
-                "hole 1 (REG): x_mm is 855.787; the bore runs from 0 to 667.587",
+                "hole 1 (REG): x_mm is 855.787; it must be inside the bore, which runs from 0 to 667.587 mm",
             ),
             (
                 "diameter_mm = 3.167",
                 "diameter_mm = 31.67",
-                "hole 1 (REG): diameter_mm is 31.67; the bore there is 14.9366 wide",
+                "hole 1 (REG): diameter_mm is 31.67; it must be at most 14.9366 mm, the diameter of the bore there",
             ),
-            ("chimney_mm = 12.6", "chimney_mm = 0.0126", "this looks like metres (0.007 m = 7 mm)"),
+            ("chimney_mm = 12.6", "chimney_mm = 0.0126", "this looks like metres: 0.0126 m = 12.6 mm"),
             ("name = \"TRILL4_B\"", "name = \"REG\"", "hole 2 (REG): hole REG appears twice"),
             (
                 "open = \"E_PAD\"",

@@ -1,78 +1,64 @@
-//! What a checker can see: ranges of the file format, with the unit a wrong size suggests.
+//! What a checker can see: ranges of the file format, and the unit a wrong size suggests.
+//!
+//! Bounds are in the words of the format (millimetres, diameters); messages speak those of the file that was read, which
+//! may be a table in metres and radii.
 
 use super::InstrumentError;
+use super::words::{Place, Word};
 
-/// A range of the file format: the bounds, the bound in words, and units a wrong size suggests.
+/// A range of the file format.
 pub(super) struct Range {
     least: f64,
     most: f64,
-    expected: &'static str,
-    /// Below this and above 0 the message is `small` instead: a mistaken unit.
-    small_below: f64,
-    small: &'static str,
+    /// Whether 0 is right as well.
+    or_zero: bool,
+    /// What a sensible value is like: a wrong one that lies here in another unit was meant in that unit.
+    likely: (f64, f64),
+    /// What follows the bounds, e.g. ` semitones (B flat clarinet: 2)`.
+    after: &'static str,
 }
 
-const fn range(
-    least: f64,
-    most: f64,
-    expected: &'static str,
-    small_below: f64,
-    small: &'static str,
-) -> Range {
-    Range { least, most, expected, small_below, small }
+const fn range(least: f64, most: f64, likely: (f64, f64), after: &'static str) -> Range {
+    Range { least, most, or_zero: false, likely, after }
 }
 
-pub(super) const TRANSPOSITION: Range =
-    range(-12.0, 36.0, "-12 to 36 semitones (B flat clarinet: 2)", -13.0, "");
-pub(super) const REED_VOLUME: Range = range(
-    0.0,
-    20_000.0,
-    "0 to 20000 mm3 (clarinet: 1200)",
-    20.0,
-    "in mm3, 0 to 20000 (clarinet: 1200); this looks like cm3 (1 cm3 = 1000 mm3) or m3",
-);
-pub(super) const NOMINAL_DIAMETER: Range = range(
-    1.0,
-    199.999,
-    "1 mm to below 200 mm (B flat clarinet: 14.9)",
-    0.1,
-    "in mm, 1 to below 200 (B flat clarinet: 14.9); this looks like metres (0.015 m = 15 mm)",
-);
+const NEVER: (f64, f64) = (1.0, 0.0);
+
+pub(super) const TRANSPOSITION: Range = range(-12.0, 36.0, NEVER, " semitones (B flat clarinet: 2)");
+pub(super) const REED_VOLUME: Range =
+    Range { or_zero: true, ..range(20.0, 20_000.0, (100.0, 10_000.0), " (clarinet: 1200 mm3)") };
+pub(super) const NOMINAL_DIAMETER: Range = range(1.0, 200.0, (4.0, 150.0), " (B flat clarinet: 14.9 mm)");
 // 3 m is a little more than a contrabass clarinet.
-pub(super) const POSITION: Range = range(0.0, 3_000.0, "0 to 3000 mm", 0.0, "");
-pub(super) const BORE_LENGTH: Range = range(
-    20.0,
-    3_000.0,
-    "20 to 3000 mm for the last cone",
-    20.0,
-    "in mm, 20 to 3000 for the last cone; this looks like metres (1 m = 1000 mm) or centimetres",
-);
-pub(super) const BORE_DIAMETER: Range = range(
-    1.0,
-    199.999,
-    "1 mm to below 200 mm",
-    0.1,
-    "in mm, 1 to below 200; this looks like metres (0.015 m = 15 mm)",
-);
-pub(super) const HOLE_DIAMETER: Range =
-    range(0.2, 60.0, "0.2 to 60 mm", 0.1, "in mm, 0.2 to 60; this looks like metres (0.008 m = 8 mm)");
-pub(super) const CHIMNEY: Range =
-    range(0.2, 100.0, "0.2 to 100 mm", 0.1, "in mm, 0.2 to 100; this looks like metres (0.007 m = 7 mm)");
-pub(super) const MODE: Range =
-    range(1.0, 12.0, "1 to 12, the number of the impedance peak that sounds", 0.0, "");
+pub(super) const POSITION: Range = range(0.0, 3_000.0, (5.0, 3_000.0), "");
+// Nearer to the tip than 1 mm there is no bore to drill.
+pub(super) const HOLE_POSITION: Range = range(1.0, 3_000.0, (20.0, 3_000.0), "");
+pub(super) const BORE_LENGTH: Range = range(20.0, 3_000.0, (100.0, 3_000.0), " for the last cone");
+pub(super) const BORE_DIAMETER: Range = range(1.0, 200.0, (4.0, 150.0), "");
+pub(super) const HOLE_DIAMETER: Range = range(0.2, 60.0, (1.0, 40.0), "");
+pub(super) const CHIMNEY: Range = range(0.2, 100.0, (1.0, 50.0), "");
+pub(super) const MODE: Range = range(1.0, 12.0, NEVER, ", the number of the impedance peak that sounds");
 
-pub(super) fn within(
-    place: &str,
-    field: &'static str,
-    given: f64,
-    range: &Range,
-) -> Result<(), InstrumentError> {
-    let looks_small = given > 0.0 && given < range.small_below;
-    if (range.least..=range.most).contains(&given) && !looks_small {
+/// Refuses a number (in the unit of the format) outside its range.
+pub(super) fn within(place: &Place, word: &Word, value: f64, range: &Range) -> Result<(), InstrumentError> {
+    if (range.least..=range.most).contains(&value) || range.or_zero && value == 0.0 {
         return Ok(());
     }
-    let expected = if looks_small { range.small } else { range.expected };
-    Err(InstrumentError::Value { place: place.to_owned(), field, given, expected })
+    let unit = word.unit();
+    let zero = if range.or_zero { "0, or " } else { "" };
+    let expected = format!(
+        "{zero}{} to {}{}{unit}{}{}",
+        word.given(range.least),
+        word.given(range.most),
+        if unit.is_empty() { "" } else { " " },
+        range.after,
+        word.guess(value, |value| (range.likely.0..=range.likely.1).contains(&value)),
+    );
+    Err(InstrumentError::Value {
+        place: place.to_string(),
+        field: word.name.clone(),
+        given: word.given(value),
+        expected,
+    })
 }
 
 pub(super) fn count(
@@ -88,16 +74,11 @@ pub(super) fn count(
     }
 }
 
-pub(super) fn word(place: &str, field: &'static str, given: &str, expected: &str) -> InstrumentError {
+pub(super) fn word(place: &Place, field: &Word, given: &str, expected: impl Into<String>) -> InstrumentError {
     InstrumentError::Word {
-        place: place.to_owned(),
-        field,
+        place: place.to_string(),
+        field: field.name.clone(),
         given: given.to_owned(),
-        expected: expected.to_owned(),
+        expected: expected.into(),
     }
-}
-
-/// Metres as a message shows them: millimetres to the nearest 0.1 micrometre.
-pub(super) fn in_mm(metres: f64) -> f64 {
-    (metres * 1e7).round() / 1e4
 }

@@ -1,28 +1,81 @@
 //! The text as it is written, before anything is checked.
 
 use serde::Deserialize;
+use toml::Spanned;
 
 use super::HoleKind;
 
-/// The file as it is written, millimetres and diameters.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+/// A line of the file, from 1, and what stands there.
+#[derive(Clone, Debug)]
+pub(super) struct Lined<T> {
+    pub(super) line: u64,
+    pub(super) value: T,
+}
+
+/// An instrument as written, millimetres and diameters.
+#[derive(Clone, Debug)]
 pub(super) struct RawFile {
     pub(super) name: String,
-    #[serde(default)]
     pub(super) source: String,
     pub(super) transposition_semitones: i64,
     pub(super) reed_volume_mm3: f64,
-    #[serde(default)]
     pub(super) nominal_diameter_mm: Option<f64>,
-    pub(super) bore: Vec<RawSegment>,
-    #[serde(default)]
-    pub(super) hole: Vec<RawHole>,
-    #[serde(default)]
-    pub(super) fingering: Vec<RawFingering>,
+    pub(super) bore: Vec<Lined<RawSegment>>,
+    pub(super) hole: Vec<Lined<RawHole>>,
+    pub(super) fingering: Vec<Lined<RawFingering>>,
+}
+
+impl RawFile {
+    /// Reads TOML. Mistakes of syntax, missing and unknown keys come with their line.
+    pub(super) fn from_toml(text: &str) -> Result<Self, toml::de::Error> {
+        let file: TomlFile = toml::from_str(text)?;
+        Ok(Self {
+            name: file.name,
+            source: file.source,
+            transposition_semitones: file.transposition_semitones,
+            reed_volume_mm3: file.reed_volume_mm3,
+            nominal_diameter_mm: file.nominal_diameter_mm,
+            bore: lined(file.bore, text),
+            hole: lined(file.hole, text),
+            fingering: lined(file.fingering, text),
+        })
+    }
+}
+
+fn lined<T>(entries: Vec<Spanned<T>>, text: &str) -> Vec<Lined<T>> {
+    let (mut line, mut at) = (1, 0);
+    let mut lines = Vec::with_capacity(entries.len());
+    for entry in entries {
+        let start = entry.span().start.min(text.len());
+        // Entries come in the order of the text; one that does not is counted from the top.
+        if start < at {
+            (line, at) = (1, 0);
+        }
+        line += text.as_bytes()[at..start].iter().filter(|&&byte| byte == b'\n').count() as u64;
+        at = start;
+        lines.push(Lined { line, value: entry.into_inner() });
+    }
+    lines
 }
 
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TomlFile {
+    name: String,
+    #[serde(default)]
+    source: String,
+    transposition_semitones: i64,
+    reed_volume_mm3: f64,
+    #[serde(default)]
+    nominal_diameter_mm: Option<f64>,
+    bore: Vec<Spanned<RawSegment>>,
+    #[serde(default)]
+    hole: Vec<Spanned<RawHole>>,
+    #[serde(default)]
+    fingering: Vec<Spanned<RawFingering>>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawSegment {
     #[serde(default)]
@@ -33,7 +86,7 @@ pub(super) struct RawSegment {
     pub(super) diameter_end_mm: f64,
 }
 
-#[derive(Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawHole {
     pub(super) name: String,
@@ -47,7 +100,7 @@ pub(super) struct RawHole {
     pub(super) description: String,
 }
 
-#[derive(Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawFingering {
     pub(super) written: String,

@@ -1,0 +1,313 @@
+//! A cylinder with holes that plays the notes asked for: the simplest instrument there is, for measurements and for a
+//! first file to work on.
+//!
+//! The lowest note sounds with every hole closed; each further one opens the next hole from the bell. Length and positions
+//! are moved until the transfer-matrix model, with the reed's volume at the tip, sounds (phase of the impedance through
+//! zero) at every note. A vent can be added a third of the way down for the twelfths, which are as true as a cylinder's.
+
+use crate::bore::instrument_file::{BoreSegment, Fingering, HoleKind, InstrumentFile, MAX_HOLES, ToneHole};
+use crate::bore::transfer_matrix::TransferMatrix;
+use crate::units::{Air, WrittenNote, cents};
+
+/// Rounds of moving everything; each brings the notes several times nearer.
+const ROUNDS: usize = 40;
+/// Near enough, cents: a position to a hundredth of a millimetre.
+const ENOUGH_CENTS: f64 = 0.02;
+/// From a chalumeau note to the clarion note of the same fingers, semitones.
+const TWELFTH: u8 = 19;
+
+/// What the cylinder is to be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cylinder {
+    /// What a player calls it.
+    pub name: String,
+    /// Notes it plays, at least one, rising.
+    pub notes: Vec<WrittenNote>,
+    /// Semitones it sounds below what is written.
+    pub transposition: i8,
+    /// Pitch of A4, Hz.
+    pub a4_hz: f64,
+    /// Bore, m.
+    pub radius_m: f64,
+    /// Tone holes, m.
+    pub hole_radius_m: f64,
+    /// Chimneys, m.
+    pub chimney_m: f64,
+    /// Radius of a register hole, m, if there is to be one.
+    pub vent_radius_m: Option<f64>,
+    /// Volume of air that moves with the reed, m3.
+    pub reed_volume_m3: f64,
+}
+
+/// Why there is no such cylinder.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CylinderError {
+    /// None, or more than an instrument can have holes.
+    #[error("{given} notes; there must be 1 to {most}")]
+    Notes {
+        /// Number of notes.
+        given: usize,
+        /// The most.
+        most: usize,
+    },
+    /// A note that is not above the one before.
+    #[error("{second} comes after {first}; notes must be given from the lowest to the highest, each once")]
+    Order {
+        /// One note.
+        first: WrittenNote,
+        /// The next.
+        second: WrittenNote,
+    },
+    /// A note, or its twelfth, that MIDI does not have.
+    #[error("{0} (or its twelfth) does not sound between C-1 and G9")]
+    Range(WrittenNote),
+    /// Holes wider than the bore.
+    #[error("holes of {hole_mm} mm are wider than a bore of {bore_mm} mm")]
+    TooWide {
+        /// Hole's diameter, mm.
+        hole_mm: f64,
+        /// Bore's, mm.
+        bore_mm: f64,
+    },
+    /// Holes that would run into each other.
+    #[error(
+        "the holes of {first} and {second} would overlap, {apart_mm:.1} mm apart; make them smaller, the chimneys shorter or the steps wider"
+    )]
+    Overlap {
+        /// The lower note.
+        first: WrittenNote,
+        /// The upper.
+        second: WrittenNote,
+        /// Distance of the centres, mm.
+        apart_mm: f64,
+    },
+    /// No cylinder plays it.
+    #[error(
+        "{written} cannot be reached with these holes (still {cents:+.1} cents off); make the holes wider or the chimneys shorter"
+    )]
+    OutOfReach {
+        /// The note.
+        written: WrittenNote,
+        /// What is left, cents.
+        cents: f64,
+    },
+}
+
+impl Cylinder {
+    /// The instrument. Allocates; some tenths of a second.
+    pub fn build(&self, air: Air) -> Result<InstrumentFile, CylinderError> {
+        self.possible()?;
+        let wanted: Vec<f64> = self
+            .notes
+            .iter()
+            .filter_map(|note| note.sounding(self.transposition))
+            .map(|sounding| sounding.frequency_hz(self.a4_hz))
+            .collect();
+        // Ends of the air column, note by note: the bell for the first, then the holes. A quarter wave to start with.
+        let mut ends_m: Vec<f64> = wanted.iter().map(|hz| 0.25 * air.c / hz).collect();
+        let mut worst = (self.notes[0], f64::MAX);
+        for _ in 0..ROUNDS {
+            let file = self.with_ends(&ends_m);
+            let matrix = TransferMatrix::new(&file, air);
+            worst = (self.notes[0], 0.0);
+            for (index, (fingering, wanted_hz)) in file.fingerings.iter().zip(&wanted).enumerate() {
+                let found = matrix.playing_frequency(&fingering.open, self.reed_volume_m3, *wanted_hz);
+                let Some((hz, _)) = found else {
+                    return Err(CylinderError::OutOfReach { written: fingering.written, cents: f64::NAN });
+                };
+                let off = cents(hz, *wanted_hz);
+                if off.abs() > f64::abs(worst.1) {
+                    worst = (fingering.written, off);
+                }
+                ends_m[index] += 0.25 * air.c * (1.0 / wanted_hz - 1.0 / hz);
+            }
+            if worst.1.abs() < ENOUGH_CENTS {
+                break;
+            }
+            // A hole cannot be above the tip.
+            if let Some(index) = ends_m.iter().position(|&end_m| end_m < 3.0 * self.radius_m) {
+                return Err(CylinderError::OutOfReach { written: self.notes[index], cents: worst.1 });
+            }
+        }
+        let (written, off) = worst;
+        if off.abs() > 1.0 {
+            return Err(CylinderError::OutOfReach { written, cents: off });
+        }
+        // A thousandth of a millimetre, and a file that can be read.
+        ends_m.iter_mut().for_each(|end_m| *end_m = (*end_m * 1e6).round() / 1e6);
+        for (pair, notes) in ends_m.windows(2).zip(self.notes.windows(2)).skip(1) {
+            let apart_mm = 1e3 * (pair[0] - pair[1]);
+            if apart_mm < 2e3 * self.hole_radius_m {
+                return Err(CylinderError::Overlap { first: notes[0], second: notes[1], apart_mm });
+            }
+        }
+        let mut file = self.with_ends(&ends_m);
+        if self.vent_radius_m.is_some() {
+            self.add_twelfths(&mut file);
+        }
+        Ok(file)
+    }
+
+    fn possible(&self) -> Result<(), CylinderError> {
+        let most = if self.vent_radius_m.is_some() { MAX_HOLES } else { MAX_HOLES + 1 };
+        if self.notes.is_empty() || self.notes.len() > most {
+            return Err(CylinderError::Notes { given: self.notes.len(), most });
+        }
+        if let Some(pair) = self.notes.windows(2).find(|pair| pair[0] >= pair[1]) {
+            return Err(CylinderError::Order { first: pair[0], second: pair[1] });
+        }
+        let highest = |note: &WrittenNote| match self.vent_radius_m {
+            Some(_) => WrittenNote(note.0.saturating_add(TWELFTH).min(128)),
+            None => *note,
+        };
+        let silent = |note: WrittenNote| note.0 > 127 || note.sounding(self.transposition).is_none();
+        if let Some(note) = self.notes.iter().find(|note| silent(**note) || silent(highest(note))) {
+            return Err(CylinderError::Range(*note));
+        }
+        if self.hole_radius_m > self.radius_m || self.vent_radius_m.is_some_and(|vent| vent > self.radius_m) {
+            let hole_m = self.vent_radius_m.unwrap_or(0.0).max(self.hole_radius_m);
+            return Err(CylinderError::TooWide { hole_mm: 2e3 * hole_m, bore_mm: 2e3 * self.radius_m });
+        }
+        Ok(())
+    }
+
+    /// The instrument with its air column ending here for each note; holes from the reed to the bell.
+    fn with_ends(&self, ends_m: &[f64]) -> InstrumentFile {
+        let count = ends_m.len();
+        let hole = |name: String, x_m: f64, radius_m: f64, register: bool, description: String| ToneHole {
+            name,
+            kind: if register { HoleKind::KeyClosed } else { HoleKind::Finger },
+            x_m,
+            radius_m,
+            chimney_m: self.chimney_m,
+            register,
+            description,
+        };
+        let mut holes = Vec::with_capacity(count);
+        if let (Some(radius_m), Some(highest_m)) = (self.vent_radius_m, ends_m.last()) {
+            // Where a third of the column lies, taken between the longest and the shortest.
+            let third_m = (ends_m[0] + highest_m) / 6.0;
+            holes.push(hole("REG".to_owned(), third_m, radius_m, true, "register hole".to_owned()));
+        }
+        for (index, x_m) in ends_m.iter().enumerate().skip(1).rev() {
+            let description = format!("open for {} and above", self.notes[index]);
+            holes.push(hole(format!("H{index}"), *x_m, self.hole_radius_m, false, description));
+        }
+        let vents = holes.len() + 1 - count;
+        let fingerings = self
+            .notes
+            .iter()
+            .enumerate()
+            .map(|(index, &written)| Fingering {
+                written,
+                register: "chalumeau".to_owned(),
+                mode: 1,
+                open: (0..holes.len()).map(|hole| hole >= vents && holes.len() - hole <= index).collect(),
+                fingers: String::new(),
+            })
+            .collect();
+        InstrumentFile {
+            name: self.name.clone(),
+            source: format!(
+                "Made by `chalumeau instrument new`: a cylinder of {} mm whose length and holes were placed by the \
+                 transfer-matrix model for A4 = {} Hz at 25 C.",
+                2e3 * self.radius_m,
+                self.a4_hz
+            ),
+            transposition: self.transposition,
+            reed_volume_m3: self.reed_volume_m3,
+            nominal_radius_m: self.radius_m,
+            bore: vec![BoreSegment {
+                part: "cylinder".to_owned(),
+                x_start_m: 0.0,
+                x_end_m: ends_m[0],
+                r_start_m: self.radius_m,
+                r_end_m: self.radius_m,
+            }],
+            holes,
+            fingerings,
+        }
+    }
+
+    fn add_twelfths(&self, file: &mut InstrumentFile) {
+        let taken: Vec<WrittenNote> = file.fingerings.iter().map(|fingering| fingering.written).collect();
+        let above: Vec<Fingering> = file
+            .fingerings
+            .iter()
+            .map(|low| {
+                let mut open = low.open.clone();
+                open[0] = true;
+                let written = WrittenNote(low.written.0 + TWELFTH);
+                Fingering { written, register: "clarion".to_owned(), mode: 2, open, fingers: String::new() }
+            })
+            .filter(|high| !taken.contains(&high.written))
+            .collect();
+        file.fingerings.extend(above);
+        file.fingerings.sort_by_key(|fingering| fingering.written);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bore::check::{Check, Concern};
+
+    fn cylinder(notes: &[u8]) -> Cylinder {
+        Cylinder {
+            name: "cylinder".to_owned(),
+            notes: notes.iter().map(|&midi| WrittenNote(midi)).collect(),
+            transposition: 0,
+            a4_hz: 440.0,
+            radius_m: 7.45e-3,
+            hole_radius_m: 4e-3,
+            chimney_m: 8e-3,
+            vent_radius_m: None,
+            reed_volume_m3: 1.2e-6,
+        }
+    }
+
+    #[test]
+    fn its_notes_are_in_tune_and_its_file_is_good() {
+        let file = cylinder(&[50, 52, 53, 55, 57, 59, 60]).build(Air::default()).unwrap();
+        assert_eq!((file.holes.len(), file.fingerings.len()), (6, 7));
+        let check = Check::new(&file, Air::default(), 440.0);
+        assert_eq!(check.concerns, []);
+        for note in check.notes {
+            // Peak and zero of the phase differ a little.
+            assert!(note.cents.unwrap().abs() < 3.0, "{note:?}");
+        }
+        let read = InstrumentFile::parse(&file.to_toml()).unwrap();
+        assert_eq!(read.fingerings, file.fingerings);
+        assert!((read.length_m() - file.length_m()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_vent_adds_the_twelfths() {
+        let file = Cylinder { vent_radius_m: Some(1.2e-3), ..cylinder(&[50, 52, 54]) }
+            .build(Air::default())
+            .unwrap();
+        let notes: Vec<u8> = file.fingerings.iter().map(|fingering| fingering.written.0).collect();
+        assert_eq!(notes, [50, 52, 54, 69, 71, 73]);
+        assert!(file.fingerings[3].open[0] && !file.fingerings[0].open[0] && file.holes[0].register);
+        let check = Check::new(&file, Air::default(), 440.0);
+        let heard: Vec<_> =
+            check.concerns.iter().filter(|concern| !matches!(concern, Concern::Grid(_))).collect();
+        assert!(heard.is_empty(), "{heard:?}: {:?}", check.notes);
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_with_a_reason() {
+        let air = Air::default();
+        let message = |cylinder: Cylinder| cylinder.build(air).unwrap_err().to_string();
+        assert!(message(cylinder(&[])).contains("1 to 41"));
+        assert!(message(cylinder(&[52, 50])).contains("D3 comes after E3"));
+        assert!(message(Cylinder { transposition: 36, ..cylinder(&[30]) }).contains("F#1"));
+        assert!(
+            message(Cylinder { hole_radius_m: 8e-3, ..cylinder(&[50, 52]) })
+                .contains("wider than a bore of 14.9")
+        );
+        let crowd = Cylinder { hole_radius_m: 7e-3, ..cylinder(&[70, 71, 72, 73, 74, 75, 76, 77]) };
+        assert!(message(crowd).contains("overlap"));
+        assert!(message(Cylinder { hole_radius_m: 0.3e-3, ..cylinder(&[50, 69]) }).contains("wider"));
+    }
+}

@@ -1,0 +1,372 @@
+//! `chalumeau instrument`: makes, imports, checks and shows instrument files.
+
+use crate::bore::check::Check;
+use crate::bore::cylinder::Cylinder;
+use crate::bore::instrument_file::{ImportDetails, ImportError, InstrumentFile, Sheet};
+use crate::cli::Failure;
+use crate::cli::args::{AirArg, InstrumentArg, note, within};
+use crate::cli::table::TableArgs;
+use crate::output::NewFile;
+use crate::units::{Air, WrittenNote};
+use clap::{Args, Subcommand};
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+const EXAMPLES: &str = "\
+Examples:
+  chalumeau instrument import --bore bore.csv --holes holes.csv --fingerings chart.csv --name \"My clarinet\" --out my.toml
+  chalumeau instrument check my.toml
+  chalumeau instrument new --notes \"D3 E3 F3\" --diameter-mm 14.9 --out cylinder.toml
+  chalumeau instrument new --scale 1.5 --transposition 9 --out alto.toml
+  chalumeau render --instrument my.toml --written C4 --gamma 0.5 --seconds 1.5 --out c4.wav";
+
+/// Make, import, check or show an instrument file
+///
+/// An instrument is one TOML file: bore, tone holes and fingering chart in millimetres (docs/instrument-file.md). Commands
+/// that play or measure take it with --instrument.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Instrument {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand)]
+enum What {
+    Import(Box<Import>),
+    Check(CheckFile),
+    New(Box<New>),
+    Show(Show),
+}
+
+impl Instrument {
+    pub fn run(&self) -> Result<ExitCode, Failure> {
+        match &self.what {
+            What::Import(import) => import.run().map(|()| ExitCode::SUCCESS),
+            What::Check(check) => check.run(),
+            What::New(new) => new.run().map(|()| ExitCode::SUCCESS),
+            What::Show(show) => show.run().map(|()| ExitCode::SUCCESS),
+        }
+    }
+}
+
+/// Where the instrument goes, and what both makers of one ask.
+#[derive(Args)]
+struct NewInstrument {
+    /// Instrument file to write
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Replace an existing file
+    #[arg(long)]
+    force: bool,
+    /// What a player calls it
+    #[arg(long, value_name = "TEXT")]
+    name: Option<String>,
+    /// Semitones it sounds below what is written: B flat 2, A 3, E flat -3, bass 14
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(i8).range(-12..=36))]
+    transposition: Option<i8>,
+}
+
+impl NewInstrument {
+    /// Writes what can be read again, and says what it is.
+    fn write(&self, file: &InstrumentFile) -> Result<(), Failure> {
+        let text = file.to_toml();
+        // A scaled or solved instrument may have left the limits of the format.
+        InstrumentFile::parse(&text)
+            .map_err(|source| Failure::InstrumentFile { path: self.out.clone(), source })?;
+        let mut out = NewFile::create(&self.out, self.force)?;
+        out.write_all(text.as_bytes())?;
+        out.keep()?;
+        eprintln!(
+            "{}: {}, bore {:.1} mm, {} holes, {} notes {} to {}",
+            self.out.display(),
+            file.name,
+            1e3 * file.length_m(),
+            file.holes.len(),
+            file.fingerings.len(),
+            file.lowest(),
+            file.highest()
+        );
+        for concern in Check::new(file, Air::default(), 440.0).concerns {
+            eprintln!("warning: {concern}");
+        }
+        Ok(())
+    }
+}
+
+/// Make an instrument file from three CSV tables
+///
+/// A line each for a cone of the bore, a tone hole, a note; the first line names the columns, lines beginning with # are
+/// comments. Columns say their unit and whether they are radii: bore x_start_m, x_end_m, r_start_m, r_end_m [part];
+/// holes hole, x_m, hole_radius_m, chimney_height_m [kind, register, description]; fingerings written_note, register, and
+/// one column of 0 (closed) and 1 (open) for each hole [mode, fingers, sounding_note]. Any length may be in _mm, any radius
+/// a diameter (diameter_start_mm).
+#[derive(Args)]
+struct Import {
+    /// Table of the bore
+    #[arg(long, value_name = "CSV")]
+    bore: PathBuf,
+    /// Table of the tone holes
+    #[arg(long, value_name = "CSV")]
+    holes: PathBuf,
+    /// Fingering chart
+    #[arg(long, value_name = "CSV")]
+    fingerings: PathBuf,
+    /// Where the measurements come from [default: the comments at the head of the bore's table]
+    #[arg(long, value_name = "TEXT")]
+    source: Option<String>,
+    /// Air that moves with the reed, mm3: 0, or 20..20000
+    #[arg(long, value_name = "MM3", default_value = "1200", value_parser = |s: &str| within(s, 0.0, 20_000.0))]
+    reed_volume: f64,
+    /// Bore that zeta and the reed's size refer to, mm, 1..200 [default: 14.9, a B flat clarinet's]
+    #[arg(long, value_name = "MM", value_parser = |s: &str| within(s, 1.0, 200.0))]
+    nominal_diameter_mm: Option<f64>,
+    #[command(flatten)]
+    new: NewInstrument,
+}
+
+impl Import {
+    fn run(&self) -> Result<(), Failure> {
+        let read = |path: &Path| {
+            fs::read_to_string(path).map_err(|source| Failure::Read { path: path.to_owned(), source })
+        };
+        let texts = [read(&self.bore)?, read(&self.holes)?, read(&self.fingerings)?];
+        let names = [&self.bore, &self.holes, &self.fingerings].map(|path| path.display().to_string());
+        let [bore, holes, fingerings] =
+            [0, 1, 2].map(|table| Sheet { name: &names[table], text: &texts[table] });
+        let stem = || self.new.out.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+        let details = ImportDetails {
+            name: self.new.name.clone().or_else(stem).unwrap_or_default(),
+            source: self.source.clone().unwrap_or_else(|| head_comments(bore.text)),
+            transposition: self.new.transposition,
+            reed_volume_mm3: self.reed_volume,
+            nominal_diameter_mm: self.nominal_diameter_mm,
+        };
+        self.new.write(&InstrumentFile::from_csv(bore, holes, fingerings, &details)?)
+    }
+}
+
+/// The comments a table begins with.
+fn head_comments(text: &str) -> String {
+    let lines: Vec<&str> = text
+        .lines()
+        .map_while(|line| line.trim_start_matches('\u{feff}').strip_prefix('#'))
+        .map(str::trim)
+        .collect();
+    lines.join("\n")
+}
+
+/// Look for mistakes in an instrument file, before it is played
+///
+/// Prints every note with the resonance it is to sound at (with the reed's volume) and how far that is from equal
+/// temperament, then what to look at. Ends with 2 if the instrument cannot be played, with 0 otherwise, warnings or not.
+///
+/// Columns: written,written_midi,register,mode,wanted_hz,peak_hz,cents,mag_over_zc,q.
+#[derive(Args)]
+struct CheckFile {
+    /// Instrument file
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Pitch of A4, Hz, 380..500
+    #[arg(long, value_name = "HZ", default_value = "440", value_parser = |s: &str| within(s, 380.0, 500.0))]
+    a4: f64,
+    #[command(flatten)]
+    air: AirArg,
+    #[command(flatten)]
+    table: TableArgs,
+}
+
+impl CheckFile {
+    fn run(&self) -> Result<ExitCode, Failure> {
+        let file = InstrumentFile::load(&self.file)
+            .map_err(|source| Failure::InstrumentFile { path: self.file.clone(), source })?;
+        let check = Check::new(&file, self.air.air(), self.a4);
+        let mut table =
+            self.table.open("written,written_midi,register,mode,wanted_hz,peak_hz,cents,mag_over_zc,q")?;
+        table.comment(format_args!("{}, reed volume {:.0} mm3", file.name, 1e9 * file.reed_volume_m3))?;
+        for note in &check.notes {
+            let register = file.fingering(note.written).map_or("", |fingering| fingering.register.as_str());
+            let (peak_hz, cents, mag, q) = match (note.peak, note.cents) {
+                (Some(peak), Some(cents)) => (peak.f_hz, cents, peak.mag_over_zc, peak.q),
+                _ => (f64::NAN, f64::NAN, f64::NAN, f64::NAN),
+            };
+            table.line(format_args!(
+                "{},{},{register},{},{:.2},{peak_hz:.2},{cents:+.1},{mag:.2},{q:.1}",
+                note.written, note.written.0, note.mode, note.wanted_hz
+            ))?;
+        }
+        table.finish()?;
+        for concern in &check.concerns {
+            let weight = if concern.is_fatal() { "error" } else { "warning" };
+            eprintln!("{weight}: {concern}");
+        }
+        let (path, count) = (self.file.display(), check.concerns.len());
+        if !check.is_usable() {
+            eprintln!("{path}: cannot be played");
+            return Ok(ExitCode::from(2));
+        }
+        eprintln!("{path}: can be played, {count} warning{}", if count == 1 { "" } else { "s" });
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// Make an instrument: a cylinder that plays given notes, or another one scaled
+///
+/// With --notes: the lowest note sounds with every hole closed, each further one opens the next hole from the bell; length
+/// and holes are placed so that the model plays them in tune. With --scale: everything X times as large, so that all notes
+/// sound lower by X; say by --transposition how the instrument is then read.
+#[derive(Args)]
+#[group(id = "kind", required = true, multiple = false, args = ["notes", "scale"])]
+struct New {
+    /// Notes of a cylinder, lowest first, e.g. "D3 E3 F3"
+    #[arg(long, value_name = "NOTES")]
+    notes: Option<String>,
+    /// Scale factor, 0.2..5; 1.5 is a fifth lower
+    #[arg(long, value_name = "X", value_parser = |s: &str| within(s, 0.2, 5.0))]
+    scale: Option<f64>,
+    /// Bore of the cylinder, mm, 4..60
+    #[arg(long, value_name = "MM", default_value = "14.9", conflicts_with = "scale", value_parser = |s: &str| within(s, 4.0, 60.0))]
+    diameter_mm: f64,
+    /// Tone holes of the cylinder, mm, 1..40
+    #[arg(long, value_name = "MM", default_value = "8", conflicts_with = "scale", value_parser = |s: &str| within(s, 1.0, 40.0))]
+    hole_mm: f64,
+    /// Height of its chimneys, mm, 1..50
+    #[arg(long, value_name = "MM", default_value = "8", conflicts_with = "scale", value_parser = |s: &str| within(s, 1.0, 50.0))]
+    chimney_mm: f64,
+    /// Give the cylinder a register hole this wide, mm, 0.5..6, and the twelfths of its notes
+    #[arg(long, value_name = "MM", conflicts_with = "scale", value_parser = |s: &str| within(s, 0.5, 6.0))]
+    vent_mm: Option<f64>,
+    /// Air that moves with the reed of the cylinder, mm3: 0, or 20..20000
+    #[arg(long, value_name = "MM3", default_value = "1200", conflicts_with = "scale", value_parser = |s: &str| within(s, 0.0, 20_000.0))]
+    reed_volume: f64,
+    /// Pitch of A4 the cylinder is made for, Hz, 380..500
+    #[arg(long, value_name = "HZ", default_value = "440", conflicts_with = "scale", value_parser = |s: &str| within(s, 380.0, 500.0))]
+    a4: f64,
+    #[command(flatten)]
+    from: InstrumentArg,
+    #[command(flatten)]
+    new: NewInstrument,
+}
+
+impl New {
+    fn run(&self) -> Result<(), Failure> {
+        let file = match (&self.notes, self.scale) {
+            (Some(notes), _) => self.cylinder(notes)?,
+            (None, Some(factor)) => self.scaled(factor)?,
+            (None, None) => {
+                return Err(Failure::Usage("one of --notes and --scale must be given".to_owned()));
+            }
+        };
+        self.new.write(&file)
+    }
+
+    fn cylinder(&self, notes: &str) -> Result<InstrumentFile, Failure> {
+        let notes = notes
+            .split([' ', ','])
+            .filter(|name| !name.is_empty())
+            .map(|name| {
+                note(name).map(WrittenNote).map_err(|why| Failure::Usage(format!("--notes: {name:?} {why}")))
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let cylinder = Cylinder {
+            name: self.new.name.clone().unwrap_or_else(|| format!("Cylinder of {} mm", self.diameter_mm)),
+            notes,
+            transposition: self.new.transposition.unwrap_or(0),
+            a4_hz: self.a4,
+            radius_m: self.diameter_mm / 2e3,
+            hole_radius_m: self.hole_mm / 2e3,
+            chimney_m: self.chimney_mm / 1e3,
+            vent_radius_m: self.vent_mm.map(|mm| mm / 2e3),
+            reed_volume_m3: self.reed_volume / 1e9,
+        };
+        Ok(cylinder.build(Air::default())?)
+    }
+
+    fn scaled(&self, factor: f64) -> Result<InstrumentFile, Failure> {
+        let original = self.from.load()?;
+        let mut file = original.scaled(factor);
+        file.name = self.new.name.clone().unwrap_or_else(|| format!("{} x {factor}", original.name));
+        file.source =
+            format!("{}\nScaled by {factor} in every direction.", original.source).trim().to_owned();
+        if let Some(transposition) = self.new.transposition {
+            file.transposition = transposition;
+        }
+        Ok(file)
+    }
+}
+
+/// Show an instrument as one table: cones, holes, notes
+///
+/// Columns: what,name,x_mm,length_mm,diameter_mm,end_diameter_mm,detail.
+#[derive(Args)]
+struct Show {
+    #[command(flatten)]
+    instrument: InstrumentArg,
+    #[command(flatten)]
+    table: TableArgs,
+}
+
+impl Show {
+    fn run(&self) -> Result<(), Failure> {
+        let file = self.instrument.load()?;
+        let mut table = self.table.open("what,name,x_mm,length_mm,diameter_mm,end_diameter_mm,detail")?;
+        table.comment(format_args!("{}", file.name.replace(['\n', '\r'], " ")))?;
+        table.comment(format_args!(
+            "sounds {} semitones below what is written, {} to {}; reed volume {:.0} mm3",
+            file.transposition,
+            file.lowest(),
+            file.highest(),
+            1e9 * file.reed_volume_m3
+        ))?;
+        for cone in &file.bore {
+            table.line(format_args!(
+                "cone,{},{:.4},{:.4},{:.4},{:.4},",
+                quoted(&cone.part),
+                1e3 * cone.x_start_m,
+                1e3 * (cone.x_end_m - cone.x_start_m),
+                2e3 * cone.r_start_m,
+                2e3 * cone.r_end_m
+            ))?;
+        }
+        for hole in &file.holes {
+            table.line(format_args!(
+                "hole,{},{:.4},{:.4},{:.4},,{}",
+                quoted(&hole.name),
+                1e3 * hole.x_m,
+                1e3 * hole.chimney_m,
+                2e3 * hole.radius_m,
+                quoted(if hole.register { "register hole" } else { "" })
+            ))?;
+        }
+        for fingering in &file.fingerings {
+            let open: Vec<&str> = (file.holes.iter().zip(&fingering.open))
+                .filter_map(|(hole, open)| open.then_some(hole.name.as_str()))
+                .collect();
+            table.line(format_args!(
+                "note,{},,,,,{} peak {}: {}",
+                fingering.written,
+                fingering.register,
+                fingering.mode,
+                if open.is_empty() { "all closed".to_owned() } else { quoted(&open.join(" ")) }
+            ))?;
+        }
+        table.finish()
+    }
+}
+
+/// A field of a table, whatever is in it.
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
+impl From<ImportError> for Failure {
+    fn from(error: ImportError) -> Self {
+        Self::Import(Box::new(error))
+    }
+}
