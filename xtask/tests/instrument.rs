@@ -113,7 +113,7 @@ fn instruments_are_exchanged_while_a_note_sounds() {
     let mut plugin = plugin();
     let choice = plugin.param("Instrument").unwrap().id;
     let mut session = plugin.activate(RATE, BLOCK).unwrap();
-    let mut heard = session.play_live(&[At(0, breath(80)), At(0, on(57))], SECOND, RATE).unwrap()[0].clone();
+    let mut heard = session.play_live(&[At(0, breath(64)), At(0, on(57))], SECOND, RATE).unwrap()[0].clone();
     let own = largest_step(&heard[SECOND / 2..]);
     let mut steps = own;
     for (name, number) in INSTRUMENTS.into_iter().skip(1).chain([INSTRUMENTS[0]]) {
@@ -151,7 +151,7 @@ fn an_instrument_file_plays_at_once_and_in_tune_when_it_is_made() {
     let mut plugin = plugin();
     plugin.restore(&user_state(&path)).unwrap();
     let mut session = plugin.activate(RATE, BLOCK).unwrap();
-    let heard = session.play_live(&[At(0, breath(80)), At(0, on(55))], SECOND / 2, RATE).unwrap();
+    let heard = session.play_live(&[At(0, breath(64)), At(0, on(55))], SECOND / 2, RATE).unwrap();
     assert!(level_db(&heard[0][SECOND / 4..]) > -40.0, "rough, but it sounds");
     let seen = wait(&mut plugin, &mut session, "ready: pipe");
     assert!(seen.iter().any(|text| text.starts_with("fitting ") || text.starts_with("tuning ")), "{seen:?}");
@@ -177,7 +177,7 @@ fn a_file_that_is_none_is_said_and_the_instrument_before_plays_on() {
     let path = folder.path().join("broken.toml");
     std::fs::write(&path, "name = 7").unwrap();
     let mut plugin = plugin();
-    let said = [At(0, breath(80)), At(0, on(57))];
+    let said = [At(0, breath(64)), At(0, on(57))];
     let reference = plugin.play(RATE, BLOCK, &said, SECOND / 2).unwrap();
     plugin.restore(&user_state(&path)).unwrap();
     let heard = plugin.play(RATE, BLOCK, &said, SECOND / 2).unwrap();
@@ -202,7 +202,7 @@ fn an_offline_render_waits_for_its_instrument_and_repeats() {
         let a4 = plugin.param("A4").unwrap();
         let low = a4.min + 0.1 * (a4.max - a4.min);
         vec![
-            At(0, breath(80)),
+            At(0, breath(64)),
             At(0, on(57)),
             At(10_007, Say::Set(choice, 1.0)),
             At(30_000, Say::Set(a4.id, low)),
@@ -228,7 +228,7 @@ fn a_project_begins_with_its_own_instrument() {
     let mut plugin = plugin();
     plugin.set_offline(true).unwrap();
     let choice = plugin.param("Instrument").unwrap().id;
-    let said = [At(0, breath(80)), At(0, on(57))];
+    let said = [At(0, breath(64)), At(0, on(57))];
     let b_flat = plugin.play(RATE, BLOCK, &said, SECOND).unwrap();
     plugin.set(choice, 1.0).unwrap();
     let a = plugin.play(RATE, BLOCK, &said, SECOND).unwrap();
@@ -262,7 +262,7 @@ fn a_state_from_before_instruments_is_the_b_flat_clarinet() {
 #[test]
 fn a_bounce_is_what_was_heard_unless_more_is_asked_for() {
     let mut plugin = plugin();
-    let said = [At(0, breath(80)), At(0, on(57))];
+    let said = [At(0, breath(64)), At(0, on(57))];
     let live = plugin.play(RATE, BLOCK, &said, SECOND).unwrap();
     plugin.set_offline(true).unwrap();
     let bounced = plugin.play(RATE, BLOCK, &said, SECOND).unwrap();
