@@ -306,10 +306,9 @@ fn fitted_at(
     a4_hz: f64,
     on: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Model, BuildError> {
-    on_or_cancelled(on, Progress::Fitting(0.0))?;
     let scaled = file.scaled(scale);
-    let cells = fit::fit(&scaled, &Air::default(), rate_hz)?;
-    on_or_cancelled(on, Progress::Fitting(1.0))?;
+    let cells = fit::fit(&scaled, &Air::default(), rate_hz, &mut |share| on(Progress::Fitting(share)))?
+        .ok_or(BuildError::Cancelled)?;
     Ok(untuned(scaled, cells, a4_hz, scale))
 }
 
