@@ -27,6 +27,9 @@ use crate::units::SoundingNote;
 /// No note is fingered.
 const NO_NOTE: u8 = 255;
 
+/// An instrument's feel, and the table that design and limits make of it.
+type Feel = (Arc<Feels>, FeelTable);
+
 /// What the threads tell each other.
 #[derive(Debug)]
 pub struct Shared {
@@ -37,7 +40,7 @@ pub struct Shared {
     /// Factors on H and k from controllers, bits of f32s.
     reed: [AtomicU32; 2],
     /// The feel in force, with the instrument it is of. Only desk and link lock it.
-    feel: Mutex<Option<Arc<(Arc<Feels>, FeelTable)>>>,
+    feel: Mutex<Option<Arc<Feel>>>,
     stop: AtomicBool,
 }
 
