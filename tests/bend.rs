@@ -216,34 +216,34 @@ fn every_a4_from_415_to_466_is_in_tune_from_the_first_sample() {
 
 /// What folds back shows between the harmonics.
 #[test]
-fn an_octave_up_folds_back_nothing_that_is_heard() {
-    let runs: Vec<(u8, f64)> = [52, 60, 67, 72, 79]
-        .into_iter()
-        .flat_map(|written| {
-            [0.0, 200.0, 700.0, 1200.0, 2400.0, -200.0, -1200.0, -2400.0].map(|bend| (written, bend))
-        })
-        .collect();
+fn nothing_folds_back_that_could_be_heard() {
+    let bends = [0.0, 200.0, 700.0, 1_200.0, 2_400.0, -200.0, -1_200.0];
+    let runs: Vec<(u8, f64)> =
+        [52, 60, 67, 72, 79].into_iter().flat_map(|written| bends.map(|bend| (written, bend))).collect();
     let levels = each(&runs, |&(written, bend)| {
         let settings = Settings { noise: 0.0, gain_db: -12.0, ..Settings::default() };
         let mut clarinet = blown_at(RATE_HZ, &MODEL, written, 0.8, &settings);
         clarinet.apply(Event::Bend { cents: bend as f32 });
-        render(&mut clarinet, 1.0);
-        let sound = render(&mut clarinet, 1.0);
-        let near_hz = MODEL.notes_hz[usize::from(written - 52)] * (bend / 1_200.0).exp2();
-        let f0_hz = hz(&sound, near_hz);
-        (spectrum::non_harmonic_db(&sound, RATE_HZ, f0_hz, 20.0, 18_000.0, 15.0), spectrum::rms_dbfs(&sound))
+        // A larger instrument takes longer to settle, and its harmonics are closer.
+        let ratio = (bend / 1_200.0).exp2();
+        let longer = 1.0 / ratio.min(1.0);
+        render(&mut clarinet, 1.5 * longer);
+        let sound = render(&mut clarinet, longer);
+        let f0_hz = hz(&sound, MODEL.notes_hz[usize::from(written - 52)] * ratio);
+        // What the lattice has between harmonics beyond hearing comes into it downwards, and is not the bend's.
+        let top_hz = 18_000.0 / longer;
+        let between = spectrum::non_harmonic_db(&sound, RATE_HZ, f0_hz, 20.0, top_hz, 15.0 / longer);
+        (between, spectrum::rms_dbfs(&sound))
     });
-    let unbent = |at: usize| levels[at / 8 * 8];
-    let mut worst = [f64::MIN; 2];
-    for (at, (&(written, bend), (level, loud))) in runs.iter().zip(&levels).enumerate() {
-        let louder = loud - unbent(at).1;
-        println!(
-            "written {written} {bend:+} cents: {level:.1} dB between the harmonics, {louder:+.2} dB louder"
-        );
-        worst[usize::from(bend > 1200.0)] = worst[usize::from(bend > 1200.0)].max(*level);
+    for (at, bend) in bends.into_iter().enumerate() {
+        let of_bend = || levels.iter().skip(at).step_by(bends.len());
+        let between = of_bend().map(|(between, _)| *between).fold(f64::MIN, f64::max);
+        let louder = of_bend().zip(levels.iter().step_by(bends.len())).map(|(bent, plain)| bent.1 - plain.1);
+        let louder = louder.fold(0.0, |most: f64, db| if db.abs() > most.abs() { db } else { most });
+        println!("{bend:+} cents: {between:.1} dB between the harmonics, level by {louder:+.2} dB at most");
+        assert!(between < -80.0, "{bend} cents: {between} dB");
+        assert!(louder.abs() < 1.0, "{bend} cents: {louder} dB");
     }
-    println!("up to an octave {:.1} dB, two octaves {:.1} dB", worst[0], worst[1]);
-    assert!(worst[0] < -80.0);
 }
 
 /// xorshift64*, Vigna 2016.

@@ -171,7 +171,7 @@ impl Bends {
             let played = self.wheels[member].played;
             self.wheels[member] = Wheel { semitones: Some(MEMBER_RANGE), played, ..Wheel::NEW };
         }
-        self.common = self.common.filter(|&channel| self.zone_of(channel).is_none());
+        self.common = None;
     }
 
     fn members_of(&self, zone: usize) -> std::ops::Range<usize> {

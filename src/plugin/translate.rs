@@ -96,7 +96,7 @@ mod tests {
 
     fn one(translator: &mut Translator, event: Host) -> Option<Event> {
         let [first, second] = translator.translate(event, PluginApi::Clap);
-        assert_eq!(second.filter(|_| first.is_none()), None, "one event comes first");
+        assert!(first.is_none() || second.is_none(), "{first:?} and {second:?}");
         second.or(first).map(|timed| timed.event)
     }
 
