@@ -18,6 +18,7 @@ mod knob_sim;
 mod play;
 mod plot;
 mod reed;
+mod reed_physical;
 mod render;
 mod settings;
 mod study;
