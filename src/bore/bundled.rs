@@ -38,6 +38,38 @@ impl Bundled {
         Self::ALL.into_iter().find(|instrument| instrument.id() == id)
     }
 
+    /// Its files in `data/` begin so.
+    pub fn data_name(self) -> &'static str {
+        match self {
+            Self::BFlat => "b_flat_clarinet",
+            Self::A => "a_clarinet",
+            Self::EFlat => "e_flat_clarinet",
+            Self::C => "c_clarinet",
+            Self::Bass => "bass_clarinet",
+        }
+    }
+
+    /// What the file of a scaled clarinet must be: the B flat clarinet times a factor, or `None` for that one itself.
+    pub fn scaled_text(self) -> Option<String> {
+        // By equal temperament, so that the trims are nearly the B flat clarinet's. A built bass clarinet is bent, and its
+        // bore narrower than this for its length.
+        let semitone = |count: f64| (count / 12.0).exp2();
+        let (name, factor, said, transposition) = match self {
+            Self::BFlat => return None,
+            Self::A => ("A clarinet", semitone(1.0), "2^(1/12)", 3),
+            Self::EFlat => ("E flat clarinet", semitone(-5.0), "2^(-5/12)", -3),
+            Self::C => ("C clarinet", semitone(-2.0), "2^(-2/12)", 0),
+            Self::Bass => ("B flat bass clarinet", 2.0, "2", 14),
+        };
+        let source = format!(
+            "The built-in B flat clarinet (data/b_flat_clarinet.toml, with its sources), every length times {said}; not a \
+             measured instrument."
+        );
+        let name = format!("{name}, Boehm system");
+        let file = Self::BFlat.file().scaled(factor);
+        Some(InstrumentFile { name, source, transposition, ..file }.to_toml())
+    }
+
     /// The text of its file.
     pub fn text(self) -> &'static str {
         match self {

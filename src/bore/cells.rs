@@ -1,19 +1,39 @@
 //! The bore cut into cylinders for the lattice: the Design between an instrument file and a lattice.
 //!
 //! Junctions stand on a grid of half samples (ticks): the reed tip at 0, every tone hole, a few steps between the tip
-//! and the first hole and between the last hole and the bell's end. Between two junctions lies a lossless cylinder that
+//! and the first hole and between the last hole and the bell's end, and in long stretches between holes. Between two junctions lies a lossless cylinder that
 //! keeps the volume and the inertance of the true profile; a hole's negative series mass is taken out of its neighbours.
 
-use crate::bore::instrument_file::InstrumentFile;
+use crate::bore::instrument_file::{InstrumentFile, MAX_HOLES};
+use crate::bore::lattice::{LANES, MAX_CHUNKS, MAX_TICKS, hole_chunks};
 use crate::bore::tone_hole;
 use crate::bore::wall_loss;
 use crate::units::{Air, REFERENCE_RADIUS_M};
 
-/// Cells between the tip and the first hole, and how much length counts beside flare when they are cut: little, so that
-/// one long cell is left in the cylindrical part, which can give and take the tuning delay.
-const TOP: (usize, f64) = (7, 0.1);
-/// The same between the last hole and the end of the bell.
-const BELL: (usize, f64) = (9, 0.6);
+/// How a stretch of bore between two holes, or above or below them all, is cut into cells.
+struct Cutting {
+    /// Cells of a cylinder: each of the three loss poles has one.
+    least: usize,
+    /// Cells at most.
+    most: usize,
+    /// Flare, as the logarithm of the radius, that deserves a cell of its own.
+    flare: f64,
+    /// How much length counts beside flare when the places are chosen.
+    length_weight: f64,
+}
+
+/// Between the tip and the first hole: length counts little, so that one long cell is left in the cylindrical part, which
+/// can give and take the tuning delay. 7 cells for a clarinet's mouthpiece and barrel.
+const TOP: Cutting = Cutting { least: 3, most: 7, flare: 0.11, length_weight: 0.1 };
+/// Between the last hole and the end of the bell; 9 cells for a clarinet.
+const BELL: Cutting = Cutting { least: 3, most: 9, flare: 0.2, length_weight: 0.6 };
+/// Between two holes.
+const GAP: Cutting = Cutting { least: 1, most: 1, flare: 0.2, length_weight: 0.6 };
+/// Longest cell as a share of the bore: wall losses sit in one place of each cell and one pole of three. A clarinet's
+/// longest, between its register hole and the barrel, has 0.08.
+const LONGEST_SHARE: f64 = 0.1;
+/// How far a junction may be moved to find a place of its own, ticks: what the radii beside it can make up for.
+const MOVED_TICKS: f64 = 1.5;
 
 /// One cylinder.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -69,6 +89,21 @@ pub enum CellsError {
         /// The most it may be.
         limit: u32,
     },
+    /// Two junctions are closer than the grid can tell apart.
+    #[error(
+        "{place} cannot be placed at {rate_hz} Hz: half a sample is {tick_mm:.2} mm, and it would have to move by \
+         {moved_mm:.2} mm to keep its distance from what lies above; a larger instrument or twice the rate has room"
+    )]
+    Crowded {
+        /// What is crowded.
+        place: String,
+        /// Rate of the grid, Hz.
+        rate_hz: f64,
+        /// Step of the grid, mm.
+        tick_mm: f64,
+        /// How far it would be off, mm.
+        moved_mm: f64,
+    },
     /// Too many holes.
     #[error("{0} tone holes; the lattice holds up to 40")]
     Holes(usize),
@@ -92,22 +127,89 @@ fn integrals(file: &InstrumentFile, from: f64, to: f64) -> (f64, f64) {
     (volume, inertance)
 }
 
-/// Positions that cut `from..to` into `count` pieces, finer where the radius changes.
-fn cuts(file: &InstrumentFile, from: f64, to: f64, (count, length_weight): (usize, f64)) -> Vec<f64> {
+/// A piece of bore to be cut, and into how many cells.
+struct Stretch {
+    from_m: f64,
+    to_m: f64,
+    /// `STEPS + 1` values that grow from the start to the end, by flare and length.
+    measure: Vec<f64>,
+    count: usize,
+}
+
+impl Stretch {
     const STEPS: usize = 2_000;
-    let x = |n: usize| from + (to - from) * n as f64 / STEPS as f64;
-    let mut measure = vec![0.0];
-    for n in 1..=STEPS {
-        let flare = (file.radius_at(x(n)) / file.radius_at(x(n - 1))).ln().abs();
-        measure.push(measure[n - 1] + flare + length_weight / STEPS as f64);
+
+    fn new(file: &InstrumentFile, from_m: f64, to_m: f64, cutting: &Cutting) -> Self {
+        let at = |n: usize| from_m + (to_m - from_m) * n as f64 / Self::STEPS as f64;
+        let (mut measure, mut flared) = (vec![0.0], 0.0);
+        for n in 1..=Self::STEPS {
+            let flare = (file.radius_at(at(n)) / file.radius_at(at(n - 1))).ln().abs();
+            flared += flare;
+            measure.push(measure[n - 1] + flare + cutting.length_weight / Self::STEPS as f64);
+        }
+        let by_flare = (cutting.least + (flared / cutting.flare).round() as usize).min(cutting.most);
+        let by_length = ((to_m - from_m) / (LONGEST_SHARE * file.length_m())).ceil() as usize;
+        Self { from_m, to_m, measure, count: by_flare.max(by_length) }
     }
-    let total = measure[STEPS];
-    (1..count)
-        .map(|piece| {
-            let wanted = total * piece as f64 / count as f64;
-            x(measure.partition_point(|&m| m < wanted).min(STEPS))
+
+    /// Positions that cut it into its pieces, finer where the radius changes, but none finer than a quarter of the mean: a
+    /// step is all flare and no length.
+    fn cuts(&self) -> impl Iterator<Item = f64> + '_ {
+        let total = self.measure[Self::STEPS];
+        let least = Self::STEPS / (4 * self.count);
+        let mut before = 0;
+        (1..self.count).map(move |piece| {
+            let wanted = total * piece as f64 / self.count as f64;
+            let n = self.measure.partition_point(|&m| m < wanted);
+            before = n.clamp(before + least, Self::STEPS - (self.count - piece) * least);
+            self.from_m + (self.to_m - self.from_m) * before as f64 / Self::STEPS as f64
         })
-        .collect()
+    }
+
+    /// Length of a piece when there is one less of them, m: what losing one costs.
+    fn coarser_m(&self) -> f64 {
+        if self.count > 1 { (self.to_m - self.from_m) / (self.count - 1) as f64 } else { f64::INFINITY }
+    }
+}
+
+/// The stretches above, between and below the holes, no more cells than the grid and the lanes have room for.
+fn stretches(file: &InstrumentFile, tick_m: f64) -> Vec<Stretch> {
+    let end = file.length_m();
+    let mut edges = vec![0.0];
+    edges.extend(file.holes.iter().map(|hole| hole.x_m));
+    if file.holes.is_empty() {
+        edges.push(0.5 * end);
+    }
+    edges.push(end);
+    let last = edges.len() - 2;
+    let mut stretches: Vec<Stretch> = edges
+        .windows(2)
+        .enumerate()
+        .map(|(index, pair)| {
+            let cutting = if index == 0 {
+                &TOP
+            } else if index == last {
+                &BELL
+            } else {
+                &GAP
+            };
+            let mut stretch = Stretch::new(file, pair[0], pair[1], cutting);
+            // Two ticks a cell beside steps, and one to spare for rounding.
+            let room = ((pair[1] - pair[0]) / tick_m - 1.0) / 2.0;
+            stretch.count = stretch.count.min(room.max(1.0) as usize);
+            stretch
+        })
+        .collect();
+    let lanes = LANES * (MAX_CHUNKS - hole_chunks(file.holes.len()));
+    let without_holes = usize::from(file.holes.is_empty());
+    while stretches.iter().map(|stretch| stretch.count - 1).sum::<usize>() + without_holes > lanes {
+        let Some(cheapest) = stretches.iter_mut().min_by(|a, b| a.coarser_m().total_cmp(&b.coarser_m()))
+        else {
+            break;
+        };
+        cheapest.count -= 1;
+    }
+    stretches
 }
 
 /// Part of a tick to shift all holes by, so that rounding moves them least against each other: the fit can make up for the
@@ -120,19 +222,18 @@ fn grid_shift(holes: impl Iterator<Item = f64> + Clone) -> f64 {
 impl Cells {
     /// Cuts a bore for the lattice at `rate_hz`, without any fit: the start of [`fit`](crate::bore::fit).
     pub fn cut(file: &InstrumentFile, air: &Air, rate_hz: f64) -> Result<Self, CellsError> {
-        if file.holes.len() > 40 {
+        if file.holes.len() > MAX_HOLES {
             return Err(CellsError::Holes(file.holes.len()));
         }
-        let end = file.bore.last().map_or(0.0, |segment| segment.x_end_m);
-        let first = file.holes.first().map_or(0.5 * end, |hole| hole.x_m);
-        let last = file.holes.last().map_or(first, |hole| hole.x_m);
-        let mut junctions: Vec<(f64, Option<usize>)> =
-            cuts(file, 0.0, first, TOP).into_iter().map(|x| (x, None)).collect();
-        junctions.extend(file.holes.iter().enumerate().map(|(index, hole)| (hole.x_m, Some(index))));
-        if file.holes.is_empty() {
-            junctions.push((first, None));
+        let end = file.length_m();
+        let tick_m = air.c / (2.0 * rate_hz);
+        let mut junctions: Vec<(f64, Option<usize>)> = Vec::new();
+        for (above, stretch) in stretches(file, tick_m).iter().enumerate() {
+            if above > 0 {
+                junctions.push((stretch.from_m, (!file.holes.is_empty()).then_some(above - 1)));
+            }
+            junctions.extend(stretch.cuts().map(|x| (x, None)));
         }
-        junctions.extend(cuts(file, last, end, BELL).into_iter().map(|x| (x, None)));
 
         let mut edges = vec![0.0];
         edges.extend(junctions.iter().map(|(x, _)| *x));
@@ -157,7 +258,12 @@ impl Cells {
         let mut exact = 0.0;
         let (radii, positions): (Vec<f64>, Vec<f64>) = pieces
             .iter()
-            .map(|(volume, inertance)| {
+            .zip(&edges)
+            .map(|((volume, inertance), &from_m)| {
+                if *volume <= 0.0 {
+                    // Two holes at one place: a cell of the shortest delay between them.
+                    return (file.radius_at(from_m), exact);
+                }
                 let radius_m = ((volume / inertance).sqrt() / std::f64::consts::PI).sqrt();
                 let length = (volume * inertance).sqrt();
                 exact += length / air.c * (1.0 + wall * air.c * wall_loss::DELAY / radius_m) * 2.0 * rate_hz;
@@ -167,6 +273,12 @@ impl Cells {
         let shift = grid_shift(
             junctions.iter().zip(&positions).filter(|((_, hole), _)| hole.is_some()).map(|(_, &at)| at),
         );
+        let name = |junction: Option<usize>| match junction.map(|junction| junctions.get(junction)) {
+            Some(Some((_, Some(hole)))) => format!("hole {}", file.holes[*hole].name),
+            Some(Some((x, None))) => format!("{:.1} mm", 1e3 * x),
+            Some(None) => "the end of the bell".to_owned(),
+            None => "the tip".to_owned(),
+        };
         let mut cells = Vec::with_capacity(pieces.len());
         let mut placed = 0_i64;
         for (index, (radius_m, position)) in radii.into_iter().zip(positions).enumerate() {
@@ -176,15 +288,15 @@ impl Cells {
             let least = if beside_step(index.checked_sub(1)) || beside_step(Some(index)) { 2 } else { 1 };
             let ticks = ((position + shift).round() as i64 - placed).max(least);
             placed += ticks;
+            let moved = placed as f64 - position - shift;
+            if moved > MOVED_TICKS {
+                let (tick_mm, moved_mm) = (1e3 * tick_m, 1e3 * tick_m * moved);
+                return Err(CellsError::Crowded { place: name(Some(index)), rate_hz, tick_mm, moved_mm });
+            }
             cells.push(Cell { ticks: u32::try_from(ticks).unwrap_or(u32::MAX), radius_m });
         }
-        let limit = crate::bore::lattice::MAX_TICKS;
+        let limit = MAX_TICKS;
         if let Some((index, cell)) = cells.iter().enumerate().find(|(_, cell)| cell.ticks > limit) {
-            let name = |junction: Option<usize>| match junction.and_then(|junction| junctions.get(junction)) {
-                Some((_, Some(hole))) => format!("hole {}", file.holes[*hole].name),
-                Some((x, None)) => format!("{:.1} mm", 1e3 * x),
-                None => "an end".to_owned(),
-            };
             let (from, to) = (name(index.checked_sub(1)), name(Some(index)));
             return Err(CellsError::TooLong { from, to, ticks: cell.ticks, limit });
         }

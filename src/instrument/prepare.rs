@@ -174,7 +174,7 @@ impl Prepared {
     }
 
     /// The instrument again, if it is one of this file.
-    fn model(self, file: &InstrumentFile) -> Option<Model> {
+    pub fn model(self, file: &InstrumentFile) -> Option<Model> {
         let fits = self.note.len() == file.fingerings.len()
             && file.fingerings.iter().zip(&self.note).all(|(is, note)| is.written.0 == note.written)
             && self.cells.hole_junctions.len() == file.holes.len();
@@ -186,6 +186,7 @@ impl Prepared {
 /// The generated file of one bundled instrument.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Shipment {
+    #[serde(default)]
     prepared: Vec<Prepared>,
 }
 
@@ -208,11 +209,14 @@ pub fn format_shipped(prepared: Vec<Prepared>) -> Result<String, BuildError> {
 /// What fitting and tuning make of the built-in clarinet: when it changes, whatever they made before is void.
 const OWN_NUMBERS: &str = include_str!("../../data/b_flat_clarinet.prepared.toml");
 
-/// What comes with the program.
-fn shipped(instrument: Bundled) -> Option<&'static str> {
+/// What comes with the program: the generated file of each instrument.
+fn shipped(instrument: Bundled) -> &'static str {
     match instrument {
-        Bundled::BFlat => Some(OWN_NUMBERS),
-        _ => None,
+        Bundled::BFlat => OWN_NUMBERS,
+        Bundled::A => include_str!("../../data/a_clarinet.prepared.toml"),
+        Bundled::EFlat => include_str!("../../data/e_flat_clarinet.prepared.toml"),
+        Bundled::C => include_str!("../../data/c_clarinet.prepared.toml"),
+        Bundled::Bass => include_str!("../../data/bass_clarinet.prepared.toml"),
     }
 }
 
@@ -230,9 +234,8 @@ static BUNDLED: LazyLock<[(Key, Bundled); 5]> =
 pub fn ready(wanted: &Wanted, cache: Option<&Cache>) -> Result<Option<Model>, BuildError> {
     let (rate_hz, a4_hz) = wanted.checked()?;
     let own = content(&wanted.file);
-    if let Some(text) = BUNDLED.iter().find(|(key, _)| *key == own).and_then(|(_, bundled)| shipped(*bundled))
-    {
-        let mut prepared = parse_shipped(text)?.into_iter();
+    if let Some((_, bundled)) = BUNDLED.iter().find(|(key, _)| *key == own) {
+        let mut prepared = parse_shipped(shipped(*bundled))?.into_iter();
         let found = prepared.find(|prepared| prepared.cells.rate_hz == rate_hz && prepared.a4_hz == a4_hz);
         if let Some(model) = found.and_then(|prepared| prepared.model(&wanted.file)) {
             return Ok(Some(model));
@@ -275,8 +278,11 @@ pub fn bore(
     Ok(model)
 }
 
-/// The instrument fitted but not tuned, its bore scaled for its pitch as far as theory can tell.
-fn fitted(wanted: &Wanted, on: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>) -> Result<Model, BuildError> {
+/// The instrument fitted but not tuned, its bore scaled for its pitch as far as theory can tell. Takes seconds; no cache.
+pub fn fitted(
+    wanted: &Wanted,
+    on: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
+) -> Result<Model, BuildError> {
     let (rate_hz, a4_hz) = wanted.checked()?;
     on_or_cancelled(on, Progress::Fitting(0.0))?;
     let scale = scale::by_theory(&wanted.file, &Air::default(), a4_hz);
@@ -300,10 +306,9 @@ fn fitted_at(
     a4_hz: f64,
     on: &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Model, BuildError> {
-    on_or_cancelled(on, Progress::Fitting(0.0))?;
     let scaled = file.scaled(scale);
-    let cells = fit::fit(&scaled, &Air::default(), rate_hz)?;
-    on_or_cancelled(on, Progress::Fitting(1.0))?;
+    let cells = fit::fit(&scaled, &Air::default(), rate_hz, &mut |share| on(Progress::Fitting(share)))?
+        .ok_or(BuildError::Cancelled)?;
     Ok(untuned(scaled, cells, a4_hz, scale))
 }
 

@@ -24,15 +24,19 @@ const PROBE_CENTS: f64 = -20.0;
 /// Further off than this a note is another one, cents. Before it is trimmed it may be further, but never nearer to a
 /// neighbouring mode than to its own.
 const OWN_CENTS: (f64, f64) = (150.0, 300.0);
-/// Most plays for one trim: a secant's third is within [`CLOSE_CENTS`] of nearly all notes.
+/// Most plays for one trim.
 const PLAYS: usize = 6;
+/// A last step of less than this is not heard again, cents: what a row does is known to a few per cent by then.
+const SURE_CENTS: f64 = 2.0;
+/// A note that was moved by more than this has told what a row does, cents.
+const TOLD_CENTS: f64 = 10.0;
 /// Lowest note of the B flat clarinet, Hz: what is larger takes longer to settle, by as much as it is larger.
 const LOWEST_HZ: f64 = 146.83;
 
 /// How long a note is held before it is listened to, s, and until when: near threshold growth is slow.
 fn listening_s(model: &Model, gamma: f64) -> (f64, f64) {
     let longer = (LOWEST_HZ / model.lowest_hz).clamp(1.0, 4.0);
-    let (from_s, to_s) = if gamma < 0.5 { (1.0, 1.4) } else { (0.6, 1.0) };
+    let (from_s, to_s) = if gamma < 0.5 { (1.0, 1.3) } else { (0.6, 0.9) };
     (longer * from_s, longer * to_s)
 }
 
@@ -75,10 +79,13 @@ impl Trial<'_> {
         Some(Found { rows, off_cents: cents(hz, wanted) })
     }
 
-    /// Secant steps from a trim that was heard; `sensitivity` is the first guess of what a row does.
-    fn trim(&self, from: Found, mut sensitivity: f64) -> Found {
+    /// Secant steps from a trim that was heard; `sensitivity` is what a row does, or nothing yet. Gives the trim and what a
+    /// row does, if that was heard.
+    fn trim(&self, from: Found, known: Option<f64>) -> (Found, Option<f64>) {
         let (low, high) = self.model.coeffs.tuning_range();
         let estimate = |off_cents: f64| self.model.rows_for_cents(self.fingering, off_cents);
+        let mut sensitivity = known.unwrap_or(1.0);
+        let mut heard = known;
         let (mut best, mut before) = (from, from);
         let mut rows = from.rows;
         for _ in 1..PLAYS {
@@ -87,6 +94,10 @@ impl Trial<'_> {
             }
             let wanted = (before.rows - sensitivity * estimate(before.off_cents)).clamp(low, high);
             if wanted == rows {
+                break;
+            }
+            if heard.is_some() && before.off_cents.abs() < SURE_CENTS && wanted > low && wanted < high {
+                best = Found { rows: wanted, off_cents: 0.0 };
                 break;
             }
             rows = wanted;
@@ -99,13 +110,16 @@ impl Trial<'_> {
             let moved = estimate(here.off_cents) - estimate(before.off_cents);
             if moved.abs() > 0.02 {
                 sensitivity = ((here.rows - before.rows) / moved).clamp(0.5, 3.0);
+                if (here.off_cents - before.off_cents).abs() > TOLD_CENTS {
+                    heard = Some(sensitivity);
+                }
             }
             if here.off_cents.abs() < best.off_cents.abs() {
                 best = here;
             }
             before = here;
         }
-        best
+        (best, heard)
     }
 
     /// Rows a cent costs near a trim, over [`Model::rows_for_cents`]; seen by moving the note.
@@ -123,13 +137,16 @@ impl Trial<'_> {
 fn tune_note(model: &Model, fingering: usize, untrimmed_cents: Option<f64>) -> NoteTuning {
     let at = |gamma: f64| Trial { model, fingering, gamma };
     let mut note = model.tuning.notes[fingering];
-    let natural =
-        untrimmed_cents.map(|off_cents| at(NATURAL_GAMMA).trim(Found { rows: 0.0, off_cents }, 1.0));
-    let sensitivity = natural.and_then(|found| at(NATURAL_GAMMA).sensitivity(found));
-    let sensitivity = sensitivity.unwrap_or(1.0);
+    let (natural, heard) = match untrimmed_cents {
+        Some(off_cents) => {
+            let (found, heard) = at(NATURAL_GAMMA).trim(Found { rows: 0.0, off_cents }, None);
+            (Some(found), heard.or_else(|| at(NATURAL_GAMMA).sensitivity(found)))
+        }
+        None => (None, None),
+    };
     let mut guess = natural.map_or(0.0, |found| found.rows);
     let nodes = GAMMA_NODES.map(|gamma| {
-        let found = at(gamma).play(guess).map(|found| at(gamma).trim(found, sensitivity));
+        let found = at(gamma).play(guess).map(|found| at(gamma).trim(found, heard).0);
         if let Some(found) = found {
             guess = found.rows;
         }
@@ -138,7 +155,7 @@ fn tune_note(model: &Model, fingering: usize, untrimmed_cents: Option<f64>) -> N
     // A note too weak for the natural pressure is tuned at the next that it takes.
     let first = natural.or_else(|| nodes.into_iter().flatten().next());
     note.silent = first.is_none();
-    note.sensitivity = sensitivity;
+    note.sensitivity = heard.unwrap_or(1.0);
     note.natural = first.map_or(0.0, |found| found.rows);
     note.off_cents = first.map_or(0.0, |found| found.off_cents);
     if note.off_cents.abs() < OFF_CENTS {
@@ -204,8 +221,8 @@ fn fill_silent(model: &Model, table: &mut TuningTable) {
     }
 }
 
-/// `work` for every fingering on all cores, in order; `None` if `on` broke it off.
-fn each_note<T: Send>(
+/// `work` for every fingering on all cores, results in order; `None` if `on`, told the share done, broke it off.
+pub fn each_note<T: Send>(
     count: usize,
     work: impl Fn(usize) -> T + Sync,
     on: &mut dyn FnMut(f64) -> ControlFlow<()>,

@@ -10,7 +10,7 @@ use chalumeau::bore::tone_hole::HoleNetwork;
 use chalumeau::units::Air;
 
 /// Ticks a wave is remembered.
-const MEMORY: usize = 256;
+const MEMORY: usize = 1024;
 
 /// Waves that left one end of a cell, by tick.
 struct History([f64; MEMORY]);

@@ -10,6 +10,7 @@ pub mod jack;
 pub mod machine;
 pub mod midi;
 pub mod picture;
+pub mod prepared;
 pub mod simulator;
 pub mod touch_demo;
 pub mod wire_vectors;
@@ -62,15 +63,21 @@ pub const COMMANDS: &[Command] = &[
         checks: false,
     },
     Command {
+        name: "scale-bores",
+        about: "write the bundled clarinets that are the B flat clarinet scaled",
+        run: prepared::scale_bores,
+        checks: true,
+    },
+    Command {
         name: "fit-bore",
-        about: "fit the built-in bore's cells to its transfer matrices",
-        run: generated::fit_bore,
+        about: "fit the bundled bores' cells to their transfer matrices; takes names of instruments, live, high",
+        run: prepared::fit_bore,
         checks: true,
     },
     Command {
         name: "tune",
-        about: "play every note of the built-in clarinet and find its delay trims",
-        run: generated::tune,
+        about: "play every note of the bundled instruments and find its delay trims; takes the same",
+        run: prepared::tune,
         checks: true,
     },
     Command {

@@ -9,6 +9,11 @@ use crate::bore::tone_hole::{HoleCoeffs, HoleNetwork};
 use crate::bore::wall_loss;
 use crate::units::Air;
 
+/// Chunks of eight lanes that so many tone holes take: two neighbours never share one, unless there is only one hole.
+pub fn hole_chunks(holes: usize) -> usize {
+    holes.div_ceil(LANES).max(usize::from(holes > 1) + usize::from(holes > 0))
+}
+
 /// Everything of a lattice that playing does not change.
 #[derive(Clone, Debug)]
 pub struct LatticeCoeffs {
@@ -79,6 +84,11 @@ impl LatticeCoeffs {
         self.holes.len()
     }
 
+    /// Whether the tone holes of another lattice are the same.
+    pub fn same_holes(&self, other: &Self) -> bool {
+        self.holes == other.holes
+    }
+
     /// Reflectance at the tip, exactly what [`Lattice`](super::Lattice) does with fixed openings and no jets, at `f_hz`.
     pub fn reflectance(&self, f_hz: f64, opening: &[f64], tuning_rows: f64) -> Complex64 {
         self.looking_down(0, f_hz, opening, tuning_rows)
@@ -141,10 +151,18 @@ impl LatticeCoeffs {
         (1..=end).max_by_key(|&cell| (self.ticks[cell], std::cmp::Reverse(cell))).unwrap_or(1)
     }
 
-    /// Range of the tuning delay, rows of the round trip.
+    /// Range of the tuning delay, rows of the round trip: the tuned cell's returning wave may take from one row to at least
+    /// twice as many as it does.
     pub fn tuning_range(&self) -> (f64, f64) {
         let back = f64::from(self.rows(self.tuned_cell()).1);
-        (1.0 - back, (ROWS - 2) as f64 - back)
+        (1.0 - back, f64::from(self.ring_rows() - 2) - back)
+    }
+
+    /// Rows the ring needs: for the longest cell, and for twice the tuned one's returning wave.
+    pub(super) fn ring_rows(&self) -> u32 {
+        let longest = self.all_rows().map(|(down, back)| down.max(back)).max().unwrap_or_default();
+        let tuned = 2 * self.rows(self.tuned_cell()).1;
+        (longest.max(tuned) + 3).next_power_of_two().clamp(ROWS.0, ROWS.1)
     }
 
     /// Rows a cell gives to the wave going down and to the one coming back.
@@ -169,10 +187,7 @@ impl LatticeCoeffs {
     }
 
     pub(super) fn hole_chunks(&self) -> usize {
-        self.holes
-            .len()
-            .div_ceil(LANES)
-            .max(usize::from(self.holes.len() > 1) + usize::from(!self.holes.is_empty()))
+        hole_chunks(self.holes.len())
     }
 
     pub(super) fn step_chunks(&self) -> usize {

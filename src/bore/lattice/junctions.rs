@@ -1,7 +1,7 @@
 //! Eight junctions at a time: arriving waves and their losses, changes of section, tone holes.
 
 use super::real::Real;
-use super::{BACK, LANES, MASK, RING, TINY};
+use super::{BACK, LANES, SPACE, TINY};
 
 pub(super) type Octet<F> = [F; LANES];
 
@@ -25,10 +25,10 @@ impl<F: Real> Arrivals<F> {
 
     /// Waves arriving at eight junctions on one side, after their cell's loss.
     #[inline(always)]
-    pub(super) fn gather<const SIDE: usize>(&mut self, ring: &[F; RING], base: u16) -> Octet<F> {
+    pub(super) fn gather<const SIDE: usize>(&mut self, ring: &[F; SPACE], base: u16, mask: u16) -> Octet<F> {
         let mut wave = Octet::<F>::default();
         for (wave, offset) in wave.iter_mut().zip(self.offset[SIDE]) {
-            *wave = ring[(base.wrapping_add(offset) & MASK) as usize];
+            *wave = ring[usize::from(base.wrapping_add(offset) & mask)];
         }
         let (taken, q, state) = (&self.taken[SIDE], &self.q[SIDE], &mut self.state[SIDE]);
         for k in 0..LANES {
@@ -53,8 +53,8 @@ pub(super) fn flush<F: Real>(x: &mut F) {
 
 /// Writes the waves leaving eight junctions, down the bore and back.
 #[inline(always)]
-pub(super) fn leave<F: Real>(ring: &mut [F; RING], row: usize, down: &Octet<F>, back: &Octet<F>) {
-    let row = row & (RING - 1) & !(LANES - 1);
+pub(super) fn leave<F: Real>(ring: &mut [F; SPACE], row: usize, down: &Octet<F>, back: &Octet<F>) {
+    let row = row & (SPACE - 1) & !(LANES - 1);
     for (side, wave) in [(row, down), (row | BACK, back)] {
         if let Some(slots) = ring.get_mut(side..side + LANES) {
             slots.copy_from_slice(wave);
@@ -73,9 +73,9 @@ pub(super) struct Steps<F> {
 
 impl<F: Real> Steps<F> {
     #[inline(always)]
-    pub(super) fn tick(&mut self, ring: &mut [F; RING], base: u16, slot: usize) {
-        let left = self.arrivals.gather::<0>(ring, base);
-        let right = self.arrivals.gather::<1>(ring, base);
+    pub(super) fn tick(&mut self, ring: &mut [F; SPACE], base: u16, mask: u16, slot: usize) {
+        let left = self.arrivals.gather::<0>(ring, base, mask);
+        let right = self.arrivals.gather::<1>(ring, base, mask);
         let (mut down, mut back) = (Octet::<F>::default(), Octet::<F>::default());
         for k in 0..LANES {
             let difference = left[k] - right[k];
@@ -136,9 +136,9 @@ impl<F: Real> Holes<F> {
 
     /// The network of [`tone_hole`](crate::bore::tone_hole) at eight junctions, one sample; the flows leaving outside.
     #[inline(always)]
-    pub(super) fn tick(&mut self, ring: &mut [F; RING], base: u16, slot: usize) -> Octet<F> {
-        let left = self.arrivals.gather::<0>(ring, base);
-        let right = self.arrivals.gather::<1>(ring, base);
+    pub(super) fn tick(&mut self, ring: &mut [F; SPACE], base: u16, mask: u16, slot: usize) -> Octet<F> {
+        let left = self.arrivals.gather::<0>(ring, base, mask);
+        let right = self.arrivals.gather::<1>(ring, base, mask);
         let one = F::of(1.0);
         let (mut down, mut back, mut radiated) = (Octet::default(), Octet::default(), Octet::default());
         for k in 0..LANES {

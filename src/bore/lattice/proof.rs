@@ -3,24 +3,24 @@
 use super::coeffs::LatticeCoeffs;
 use super::junctions::Octet;
 use super::real::Real;
-use super::{BACK, END_SLOT, LANES, Lattice, ROWS, STRIDE};
+use super::{BACK, END_SLOT, LANES, Lattice, STRIDE};
 
 impl<F: Real> Lattice<F> {
     /// True when every state is finite.
     pub fn is_finite(&self) -> bool {
-        self.ring.iter().all(|x| x.wide().is_finite())
+        self.waves().iter().all(|x| x.wide().is_finite())
             && self.holes.iter().all(|h| h.outer.iter().chain(&h.compliance).all(|x| x.wide().is_finite()))
     }
 
     /// Largest magnitude of any wave still travelling.
     pub fn peak(&self) -> f64 {
-        self.ring.iter().map(|x| x.wide().abs()).fold(0.0, f64::max)
+        self.waves().iter().map(|x| x.wide().abs()).fold(0.0, f64::max)
     }
 
     /// True if any state is subnormal.
     pub fn has_subnormal(&self) -> bool {
         let tiny = |x: &F| x.wide() != 0.0 && x.wide().abs() < f64::from(f32::MIN_POSITIVE);
-        self.ring.iter().any(tiny)
+        self.waves().iter().any(tiny)
             || self.holes.iter().any(|h| h.outer.iter().chain(&h.compliance).chain(&h.inner).any(tiny))
             || self.holes.iter().any(|h| h.arrivals.state.iter().flatten().any(tiny))
             || self.steps.iter().any(|s| s.arrivals.state.iter().flatten().any(tiny))
@@ -38,7 +38,7 @@ impl<F: Real> Lattice<F> {
         let tuned = coeffs.tuned_cell();
         let row = u32::from(self.base) / STRIDE as u32;
         let square = |slot: usize, age: u32| {
-            let wave = self.ring[(row.wrapping_sub(age) as usize & (ROWS - 1)) * STRIDE + slot].wide();
+            let wave = self.ring[(row.wrapping_sub(age) & (self.rows() - 1)) as usize * STRIDE + slot].wide();
             wave * wave
         };
         let mut energy = 0.0;
@@ -70,6 +70,11 @@ impl<F: Real> Lattice<F> {
         energy + self.bell_state.wide().powi(2) / (4.0 * coeffs.bell.1)
     }
 
+    /// The part of the ring in use.
+    fn waves(&self) -> &[F] {
+        &self.ring[..=usize::from(self.mask)]
+    }
+
     /// State of the loss filter on one side of a junction.
     fn arrivals(&self, lane: usize, side: usize) -> F {
         let (chunk, lane) = (lane / LANES, lane % LANES);
@@ -84,13 +89,13 @@ impl<F: Real> Lattice<F> {
     pub fn scatter(&mut self, mut value: impl FnMut() -> f64) {
         let mut next = || F::of(value());
         for chunk in 0..self.steps.len() + self.holes.len() {
-            for row in 0..ROWS {
+            for row in 0..self.rows() as usize {
                 for slot in [row * STRIDE + chunk * LANES, row * STRIDE + BACK + chunk * LANES] {
                     self.ring[slot..slot + LANES].iter_mut().for_each(|x| *x = next());
                 }
             }
         }
-        for row in 0..ROWS {
+        for row in 0..self.rows() as usize {
             self.ring[row * STRIDE + END_SLOT] = next();
             self.ring[row * STRIDE + BACK + END_SLOT] = next();
         }

@@ -1,0 +1,222 @@
+//! The bundled instruments' generated data: scaled geometry, fitted cells, trims. Made by playing, checked by playing.
+
+use std::io::IsTerminal;
+use std::ops::ControlFlow;
+
+use anyhow::{Context, Result, bail, ensure};
+use chalumeau::bore::bundled::Bundled;
+use chalumeau::bore::cells::Cells;
+use chalumeau::instrument::held::HeldNote;
+use chalumeau::instrument::model::INTERNAL_RATES_HZ;
+use chalumeau::instrument::prepare::{self, Prepared, Progress};
+use chalumeau::instrument::tuner;
+use chalumeau::instrument::tuning::{GAMMA_NODES, NATURAL_GAMMA};
+use chalumeau::instrument::{Model, Quality, Wanted};
+use chalumeau::units::cents;
+
+use crate::generated::{read, write};
+
+/// A refit may differ by this share of a radius: rounding of another processor, not another bore.
+const RADIUS_TOLERANCE: f64 = 2e-3;
+/// How far a played note may be from its pitch when a committed trim is checked, cents.
+const CENTS_TOLERANCE: f64 = 0.5;
+/// Highest written note that is checked; above it fingerings are unreliable.
+const HIGHEST_WRITTEN: u8 = 92;
+/// Of all instruments but the first, every so manieth note is checked.
+const CHECKED_NOTES: usize = 7;
+
+/// What a command is asked to do: instruments, qualities, whether to compare instead of write.
+struct Asked {
+    check: bool,
+    instruments: Vec<Bundled>,
+    qualities: Vec<Quality>,
+}
+
+impl Asked {
+    fn parse(args: &[String]) -> Result<Self> {
+        let mut asked = Self { check: false, instruments: Vec::new(), qualities: Vec::new() };
+        for arg in args {
+            match (arg.as_str(), Bundled::from_id(arg)) {
+                ("--check", _) => asked.check = true,
+                ("live", _) => asked.qualities.push(Quality::Live),
+                ("high", _) => asked.qualities.push(Quality::High),
+                (_, Some(instrument)) => asked.instruments.push(instrument),
+                _ => bail!(
+                    "takes --check, live, high and any of {}, got {arg:?}",
+                    Bundled::ALL.map(Bundled::id).join(", ")
+                ),
+            }
+        }
+        Ok(asked)
+    }
+
+    /// What is asked for, or else `instruments` at `qualities`; each at both families of rates.
+    fn wanted(&self, instruments: &[Bundled], qualities: &[Quality]) -> Vec<(Bundled, Wanted)> {
+        let given =
+            |own: bool, qualities: &[Quality]| if own { self.qualities.clone() } else { qualities.to_vec() };
+        let instruments = if self.instruments.is_empty() { instruments } else { &self.instruments };
+        let qualities = given(!self.qualities.is_empty(), qualities);
+        let mut all = Vec::new();
+        for &instrument in instruments {
+            for &quality in &qualities {
+                for rate_hz in INTERNAL_RATES_HZ {
+                    all.push((instrument, Wanted { quality, ..Wanted::new(instrument.file(), rate_hz) }));
+                }
+            }
+        }
+        all
+    }
+}
+
+const QUALITIES: [Quality; 2] = [Quality::Live, Quality::High];
+
+/// The generated file of an instrument.
+fn path(instrument: Bundled) -> String {
+    format!("data/{}.prepared.toml", instrument.data_name())
+}
+
+fn kept(instrument: Bundled) -> Result<Vec<Prepared>> {
+    Ok(prepare::parse_shipped(&read(&path(instrument))?)?)
+}
+
+/// Puts an entry in its place in the generated file, low rates first.
+fn keep(instrument: Bundled, new: Prepared) -> Result<()> {
+    let mut all = kept(instrument).unwrap_or_default();
+    all.retain(|prepared| prepared.cells.rate_hz != new.cells.rate_hz);
+    all.push(new);
+    all.sort_by(|a, b| a.cells.rate_hz.total_cmp(&b.cells.rate_hz));
+    write(&path(instrument), &prepare::format_shipped(all)?)
+}
+
+fn entry(instrument: Bundled, wanted: &Wanted) -> Result<Prepared> {
+    let rate_hz = wanted.internal_rate_hz()?;
+    let found = kept(instrument)?.into_iter().find(|prepared| prepared.cells.rate_hz == rate_hz);
+    found.with_context(|| format!("{} has nothing for {rate_hz} Hz", path(instrument)))
+}
+
+/// A line that is written over and over on a terminal.
+fn tell(what: &str, share: f64) {
+    if std::io::stderr().is_terminal() {
+        eprint!("\r{what}: {:3.0} %{}", 100.0 * share, if share < 1.0 { "" } else { "\n" });
+    }
+}
+
+fn name(instrument: Bundled, wanted: &Wanted) -> Result<String> {
+    Ok(format!("{}, {} Hz", instrument.id(), wanted.internal_rate_hz()?))
+}
+
+/// The scaled clarinets' measurements, from those of the B flat clarinet; checked byte by byte.
+pub fn scale_bores(args: &[String]) -> Result<()> {
+    let check = Asked::parse(args)?.check;
+    for instrument in Bundled::ALL {
+        let Some(text) = instrument.scaled_text() else { continue };
+        let path = format!("data/{}.toml", instrument.data_name());
+        if check {
+            ensure!(
+                read(&path)? == text,
+                "{path} is not the B flat clarinet scaled; run `cargo xtask scale-bores`"
+            );
+            println!("{path} is the B flat clarinet scaled");
+        } else {
+            write(&path, &text)?;
+        }
+    }
+    Ok(())
+}
+
+/// Cells, still untuned; checked by fitting again.
+pub fn fit_bore(args: &[String]) -> Result<()> {
+    let asked = Asked::parse(args)?;
+    let (instruments, qualities) = if asked.check {
+        ([Bundled::BFlat, Bundled::A].as_slice(), [Quality::Live].as_slice())
+    } else {
+        (Bundled::ALL.as_slice(), QUALITIES.as_slice())
+    };
+    for (instrument, wanted) in asked.wanted(instruments, qualities) {
+        let name = name(instrument, &wanted)?;
+        let fitted = prepare::fitted(&wanted, &mut |progress| {
+            if let Progress::Fitting(share) = progress {
+                tell(&format!("{name}: fitting"), share);
+            }
+            ControlFlow::Continue(())
+        })?;
+        if asked.check {
+            check_fit(&name, &entry(instrument, &wanted)?.cells, &fitted.cells)?;
+        } else {
+            keep(instrument, Prepared::of(&fitted))?;
+        }
+    }
+    Ok(())
+}
+
+fn check_fit(name: &str, kept: &Cells, fitted: &Cells) -> Result<()> {
+    let ticks = |cells: &Cells| cells.cells.iter().map(|cell| cell.ticks).collect::<Vec<_>>();
+    ensure!(ticks(kept) == ticks(fitted), "{name}: the grid has moved; run `cargo xtask fit-bore`");
+    let radii = kept.cells.iter().zip(&fitted.cells).map(|(a, b)| (a.radius_m, b.radius_m));
+    let worst = radii
+        .chain([(kept.end_radius_m, fitted.end_radius_m)])
+        .map(|(a, b)| (a / b - 1.0).abs())
+        .fold(0.0, f64::max);
+    println!("{name}: a new fit differs by {worst:.1e} of a radius at most");
+    ensure!(worst < RADIUS_TOLERANCE, "{name}: no longer fits; run `cargo xtask fit-bore`");
+    Ok(())
+}
+
+/// Delay trims; checked by playing notes with their trims: of the first instrument all, of the others some.
+pub fn tune(args: &[String]) -> Result<()> {
+    let asked = Asked::parse(args)?;
+    let qualities = if asked.check { [Quality::Live].as_slice() } else { QUALITIES.as_slice() };
+    for (instrument, wanted) in asked.wanted(&Bundled::ALL, qualities) {
+        let name = name(instrument, &wanted)?;
+        let entry = entry(instrument, &wanted)?;
+        let model = entry.model(&wanted.file).with_context(|| format!("{name}: kept for another chart"))?;
+        if asked.check {
+            let every = if instrument == Bundled::BFlat { 1 } else { CHECKED_NOTES };
+            check_tuning(&name, &model, every)?;
+            continue;
+        }
+        let mut on = |share| {
+            tell(&format!("{name}: tuning"), share);
+            ControlFlow::Continue(())
+        };
+        let offsets = tuner::offsets(&model, &mut |_| ControlFlow::Continue(())).context("not cancelled")?;
+        let tuning = tuner::tune(&model, &offsets, &mut on).context("not cancelled")?;
+        keep(instrument, Prepared::of(&Model { tuning, ..model }))?;
+    }
+    Ok(())
+}
+
+fn check_tuning(name: &str, model: &Model, every: usize) -> Result<()> {
+    let checked: Vec<usize> = (0..model.file.fingerings.len())
+        .filter(|&note| model.file.fingerings[note].written.0 <= HIGHEST_WRITTEN)
+        .step_by(every)
+        .collect();
+    let worst_of = |at: usize| -> Option<(f64, String)> {
+        let (fingering, note) = (checked[at], model.tuning.notes[checked[at]]);
+        let trims = GAMMA_NODES.into_iter().zip(note.tempered).chain([(NATURAL_GAMMA, note.natural)]);
+        let mut worst = (0.0_f64, String::new());
+        for (gamma, rows) in trims {
+            let held = HeldNote { rows, ..HeldNote::new(model, fingering, gamma) };
+            let hz = tuner::heard_hz(model, &held, model.notes_hz[fingering])?;
+            let off = cents(hz, model.notes_hz[fingering]);
+            if off.abs() > worst.0.abs() {
+                worst =
+                    (off, format!("written {} at gamma {gamma}", model.file.fingerings[fingering].written));
+            }
+        }
+        Some(worst)
+    };
+    let found = tuner::each_note(checked.len(), worst_of, &mut |_| ControlFlow::Continue(()));
+    let mut worst = (0.0_f64, String::new());
+    for (at, note) in found.context("not cancelled")?.into_iter().enumerate() {
+        let written = model.file.fingerings[checked[at]].written;
+        let note =
+            note.with_context(|| format!("{name}: written {written} does not sound in its register"))?;
+        if note.0.abs() > worst.0.abs() {
+            worst = note;
+        }
+    }
+    println!("{name}: {} notes, worst trim {:+.2} cents ({})", checked.len(), worst.0, worst.1);
+    ensure!(worst.0.abs() < CENTS_TOLERANCE, "{name} is out of tune; run `cargo xtask tune`");
+    Ok(())
+}
