@@ -450,7 +450,8 @@ fn is_an_instrument(file: &InstrumentFile) -> Result<(), String> {
             return fail(format!("off the bore: {hole:?}"));
         };
         let bore = r0 + (r1 - r0) * (hole.x_m - from) / (to - from);
-        if !(hole.x_m > 0.0 && hole.x_m < end) || !(hole.radius_m > 0.0 && hole.radius_m <= bore + 3e-9) {
+        let fits = hole.radius_m > 0.0 && hole.radius_m <= bore + 3e-9;
+        if !(hole.x_m > 0.0 && hole.x_m < end && fits) {
             return fail(format!("{hole:?} on a bore of {bore}"));
         }
         if !(0.0002..=0.1).contains(&hole.chimney_m) {
