@@ -142,7 +142,7 @@ fn few(points: &[[f64; 2]]) -> (Vec<f64>, f64) {
 /// Golden figures: name, command, and how far numbers may be off, of what is drawn.
 ///
 /// What follows from formulas is held to rounding; what is played to what another processor's rounding or a better fit
-/// of the bore may do. Written anew by `CHALUMEAU_GOLDEN=write cargo core --test figures`.
+/// of the bore may do. Written anew by `UPDATE_GOLDEN=1 cargo core --test figures`.
 const GOLDEN: [(&str, &str, f64); 13] = [
     ("reed-unit", "reed --figure unit --out FIGURE", 1e-6),
     ("reed-angle", "reed --figure angle --out FIGURE", 1e-6),
@@ -166,7 +166,7 @@ fn figures_say_what_they_said() {
     for (name, command, tolerance) in GOLDEN {
         let path = directory.join(format!("figure-{name}.csv"));
         let now = said(&drawn(command));
-        if std::env::var_os("CHALUMEAU_GOLDEN").is_some_and(|what| what == "write") {
+        if std::env::var_os("UPDATE_GOLDEN").is_some() {
             let mut text = format!("# chalumeau {command}\n# place,words,numbers\n");
             for Said { place, words, numbers, .. } in &now {
                 let numbers: String = numbers.iter().map(|x| format!(",{x:.7e}")).collect();

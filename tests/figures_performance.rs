@@ -1,7 +1,7 @@
 //! Figures of impedance, bore and performance, and the report, compared by what they say; and what refuses to be drawn.
 //!
 //! `tests/golden/NAME.json` holds a figure with long curves thinned out. A number may differ by its tolerance, words may
-//! not. After a change that is meant, `CHALUMEAU_GOLDEN=write cargo test --test figures_performance` writes them anew.
+//! not. After a change that is meant, `UPDATE_GOLDEN=1 cargo core --test figures_performance` writes them anew.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -97,7 +97,7 @@ fn compare(place: &str, found: &Value, wanted: &Value) {
 #[track_caller]
 fn golden(name: &str, figure: &Figure) {
     let found = digest(figure);
-    if std::env::var("CHALUMEAU_GOLDEN").is_ok_and(|what| what == "write") {
+    if std::env::var_os("UPDATE_GOLDEN").is_some() {
         fs::create_dir_all(golden_path(name).parent().unwrap()).unwrap();
         fs::write(golden_path(name), format!("{}\n", serde_json::to_string(&found).unwrap())).unwrap();
         return;
