@@ -5,6 +5,7 @@
 //! was given and what would be right, and no file; a reader that closes the pipe early is no mistake.
 
 mod args;
+mod bifurcation;
 #[cfg(feature = "devices")]
 mod doctor;
 mod feel;
@@ -70,6 +71,7 @@ enum Command {
     Impedance(impedance::Impedance),
     Instrument(Box<instrument::Instrument>),
     Threshold(threshold::Threshold),
+    Bifurcation(Box<bifurcation::Bifurcation>),
     Tune(Box<tune::Tune>),
     Reed(reed::Reed),
     Study(study::Study),
@@ -151,6 +153,7 @@ pub fn main() -> ExitCode {
             };
         }
         Command::Threshold(command) => command.run(),
+        Command::Bifurcation(command) => command.run(),
         Command::Tune(command) => command.run(),
         Command::Reed(command) => command.run(),
         Command::Study(command) => command.run(),

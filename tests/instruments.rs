@@ -69,7 +69,11 @@ fn cases() -> &'static [Case] {
             ("bass", scaled(12.0), room),
             ("E flat", scaled(-5.0), room),
             // Measured by another program's author, imported from its tables: no code here was written against it.
-            ("alto chalumeau from CSV", local(include_str!("../examples/instruments/alto-chalumeau.toml")), room),
+            (
+                "alto chalumeau from CSV",
+                local(include_str!("../examples/instruments/alto-chalumeau.toml")),
+                room,
+            ),
             ("waisted", local(include_str!("instruments/waisted.toml")), room),
             ("built-in at 10 C", InstrumentFile::built_in(), Air::at(10.0)),
         ]

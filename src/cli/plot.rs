@@ -9,7 +9,7 @@ use std::path::PathBuf;
 /// Whether and where a picture goes. Existing files stay or go as the command's `--force` says.
 #[derive(Args)]
 pub struct PlotArgs {
-    /// Draw a figure too: a new .png or .svg file
+    /// Draw a figure too: a new .png or .svg file, or .json for what it shows
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     /// Size of the figure, pixels, 400..4000 each way, as 1600x1000 [default: what it needs]
