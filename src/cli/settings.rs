@@ -50,8 +50,8 @@ pub struct SettingsArgs {
     /// No breath noise, for measurements
     #[arg(long)]
     no_noise: bool,
-    /// Pitch of A4, Hz, 430..450 [default: 440]
-    #[arg(long, value_name = "HZ", value_parser = |s: &str| within_f32(s, 430.0, 450.0))]
+    /// Pitch of A4, Hz, 415..466 [default: 440]
+    #[arg(long, value_name = "HZ", value_parser = |s: &str| within_f32(s, 415.0, 466.0))]
     a4: Option<f32>,
     /// Hold every note in tune whatever the breath, instead of letting it drift as the bore does
     #[arg(long)]

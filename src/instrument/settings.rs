@@ -43,7 +43,7 @@ pub struct Settings {
     pub coupled: bool,
     /// The seed's amplitude A of the flow, 0..=2. Default 1.
     pub reed_a: f32,
-    /// Pitch of A4, Hz, 430..=450.
+    /// Pitch of A4, Hz, 415..=466.
     pub a4_hz: f32,
     /// How notes are held in tune.
     pub tuning: Tuning,
@@ -126,7 +126,7 @@ impl Settings {
             reed_k: fix(self.reed_k, 0.1, 2.0, d.reed_k),
             coupled: self.coupled,
             reed_a: fix(self.reed_a, 0.0, 2.0, d.reed_a),
-            a4_hz: fix(self.a4_hz, 430.0, 450.0, d.a4_hz),
+            a4_hz: fix(self.a4_hz, 415.0, 466.0, d.a4_hz),
             tuning: self.tuning,
             temperature_c: fix(self.temperature_c, 10.0, 40.0, d.temperature_c),
             vent_loss: fix(self.vent_loss, 0.0, 4.0, d.vent_loss),
