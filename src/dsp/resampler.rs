@@ -218,6 +218,8 @@ impl Resampler {
         (self.end, self.phase) = (end, phase);
     }
 
+    /// Beside the plain way, which is taken every few samples and should not prepare for this one.
+    #[inline(never)]
     fn pull_warped(&mut self, out: &mut [f32]) -> usize {
         let mut made = 0;
         let step = self.m as f64 / self.l as f64 * ONE as f64;
@@ -286,6 +288,7 @@ impl Resampler {
     }
 
     /// The output that hears the inputs before `end`, between two of the phases kept.
+    #[inline(never)]
     fn mixed(&self, end: usize, phase: u64) -> f32 {
         let heard = &self.history[end - self.taps..end];
         let position = phase * PHASES;
