@@ -13,7 +13,7 @@ use crate::units::SoundingNote;
 
 /// The bend wheel at rest.
 const CENTRE: u16 = 8192;
-/// Bend range of a channel and of a zone's manager, semitones.
+/// Bend range of a channel and of a zone's manager, semitones, unless the usual one is set otherwise.
 const RANGE: u8 = 2;
 /// Bend range of a zone's members until they are told otherwise, semitones.
 const MEMBER_RANGE: u8 = 48;
@@ -23,20 +23,21 @@ const MANAGERS: [usize; 2] = [0, 15];
 #[derive(Clone, Copy, Debug)]
 struct Wheel {
     at: u16,
-    semitones: u8,
+    /// Bend range; the usual one until it is told.
+    semitones: Option<u8>,
     cents: u8,
     /// Whether the channel has ever played a note.
     played: bool,
 }
 
 impl Wheel {
-    const NEW: Self = Self { at: CENTRE, semitones: RANGE, cents: 0, played: false };
+    const NEW: Self = Self { at: CENTRE, semitones: None, cents: 0, played: false };
 
     /// The wheel has one step less above its centre than below; both ends reach the full range.
-    fn bend_cents(self) -> f32 {
+    fn bend_cents(self, usual: u8) -> f32 {
         let offset = f32::from(self.at) - f32::from(CENTRE);
         let steps = if offset < 0.0 { 8192.0 } else { 8191.0 };
-        offset / steps * (100.0 * f32::from(self.semitones) + f32::from(self.cents))
+        offset / steps * (100.0 * f32::from(self.semitones.unwrap_or(usual)) + f32::from(self.cents))
     }
 }
 
@@ -44,6 +45,8 @@ impl Wheel {
 #[derive(Clone, Debug)]
 pub struct Bends {
     wheels: [Wheel; 16],
+    /// Bend range of the wheels that were not told one, semitones.
+    usual: u8,
     /// Members of the lower zone (channels 1..) and of the upper (..=14).
     members: [usize; 2],
     keys: Keys,
@@ -62,6 +65,7 @@ impl Default for Bends {
     fn default() -> Self {
         Self {
             wheels: [Wheel::NEW; 16],
+            usual: RANGE,
             members: [0; 2],
             keys: Keys::default(),
             holding: [0; 128],
@@ -80,14 +84,18 @@ impl Bends {
         let channel = usize::from(self.owner[key]);
         let manager_cents = match self.zone_of(channel) {
             Some(zone) if MANAGERS[zone] == channel => 0.0,
-            Some(zone) => self.wheels[MANAGERS[zone]].bend_cents(),
+            Some(zone) => self.bend_cents(MANAGERS[zone]),
             None => self.common_cents(Some(channel)),
         };
-        self.wheels[channel].bend_cents() + manager_cents + self.tuning_cents[key]
+        self.bend_cents(channel) + manager_cents + self.tuning_cents[key]
+    }
+
+    fn bend_cents(&self, channel: usize) -> f32 {
+        self.wheels[channel].bend_cents(self.usual)
     }
 
     fn common_cents(&self, but: Option<usize>) -> f32 {
-        self.common.filter(|&channel| Some(channel) != but).map_or(0.0, |at| self.wheels[at].bend_cents())
+        self.common.filter(|&channel| Some(channel) != but).map_or(0.0, |at| self.bend_cents(at))
     }
 
     /// The zone a channel manages or is a member of.
@@ -132,7 +140,7 @@ impl Bends {
     pub fn set_range(&mut self, channel: usize, semitones: Option<u8>, cents: Option<u8>) {
         let mut set = |channel: usize| {
             let wheel = &mut self.wheels[channel];
-            wheel.semitones = semitones.unwrap_or(wheel.semitones);
+            wheel.semitones = semitones.or(wheel.semitones);
             wheel.cents = cents.unwrap_or(wheel.cents);
         };
         set(channel);
@@ -142,6 +150,11 @@ impl Bends {
                 self.wheels[member].cents = self.wheels[channel].cents;
             });
         }
+    }
+
+    /// Bend range of every channel that is not told another, and is no member of a zone, semitones.
+    pub fn set_usual_range(&mut self, semitones: u8) {
+        self.usual = semitones;
     }
 
     /// A zone is made, changed or, with no members, taken away; only the first and the last channel can manage one. The
@@ -156,7 +169,7 @@ impl Bends {
         self.members[1 - zone] = self.members[1 - zone].min(14_usize.saturating_sub(members));
         for member in self.members_of(zone) {
             let played = self.wheels[member].played;
-            self.wheels[member] = Wheel { semitones: MEMBER_RANGE, played, ..Wheel::NEW };
+            self.wheels[member] = Wheel { semitones: Some(MEMBER_RANGE), played, ..Wheel::NEW };
         }
         self.common = None;
     }

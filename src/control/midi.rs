@@ -135,6 +135,12 @@ impl MidiDecoder {
         *self = Self::new();
     }
 
+    /// Bend range until RPN 0 says otherwise, semitones; of MPE members it is 48. Real-time safe.
+    pub fn usual_bend_range(&mut self, semitones: u8) -> Events {
+        self.bends.set_usual_range(semitones);
+        [self.rebend(), None]
+    }
+
     /// A key goes down; with velocity 0 it comes up, as running status has it. Its channel's bend comes before the note.
     /// Real-time safe.
     pub fn note_on(&mut self, channel: u8, key: u8, velocity: u8) -> Events {
@@ -332,6 +338,19 @@ mod tests {
         assert_eq!(only(midi.bend(0, 0)), Some(Event::Bend { cents: -1250.0 }));
         assert_eq!(only(midi.bend(1, 0)), Some(Event::Bend { cents: -200.0 }), "range is per channel");
         assert_eq!(only(midi.controller(0, 121, 0)), Some(Event::Bend { cents: 0.0 }));
+    }
+
+    #[test]
+    fn the_usual_bend_range_is_that_of_who_was_told_nothing() {
+        let mut midi = MidiDecoder::new();
+        assert_eq!(midi.usual_bend_range(2), [None, None], "as it is from the start");
+        midi.bend(0, 0);
+        assert_eq!(midi.usual_bend_range(12), [Some(Event::Bend { cents: -1_200.0 }), None]);
+        for (cc, value) in [(101, 0), (100, 0), (6, 7)] {
+            midi.controller(0, cc, value);
+        }
+        assert_eq!(midi.usual_bend_range(24), [None, None], "RPN 0 has spoken");
+        assert_eq!(midi.bend(0, 0)[0], Some(Event::Bend { cents: -700.0 }));
     }
 
     #[test]

@@ -85,6 +85,12 @@ impl Clarinet {
         self.quiet = 0;
     }
 
+    /// Goes on where the player of another instrument is: keys, breath, bend. For a new instrument. Real-time safe.
+    pub fn carry_on(&mut self, from: &Self) {
+        self.player.carry_on(&from.player, &self.model, &mut self.voice);
+        self.gain = self.gain_wanted;
+    }
+
     /// Overwrites `out` with the next samples, mono. Real-time safe.
     pub fn render(&mut self, out: &mut [f32]) {
         self.render_with(out, &mut None);

@@ -4,6 +4,8 @@
 //! loudness and velocity only hardens the tongue. Notes that overlap are slurred (the holes move, the tongue stays
 //! away); a note after a gap is tongued: the tongue holds the reed while the breath rises behind it, and lets go.
 
+mod carry;
+
 use crate::control::keys::Keys;
 use crate::event::Event;
 use crate::instrument::bend::{self, Split};

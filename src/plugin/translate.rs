@@ -63,6 +63,12 @@ impl Translator {
         events.map(|event| event.map(|event| Timed { at, event }))
     }
 
+    /// How far a wheel bends that RPN 0 has told nothing, semitones; at most one event. Real-time safe.
+    pub fn bend_range(&mut self, semitones: i32) -> Option<Timed<Event>> {
+        let [event, _] = self.midi.usual_bend_range(semitones.clamp(0, 127) as u8);
+        event.map(|event| Timed { at: 0, event })
+    }
+
     fn breathe(&mut self, unit: f32) -> Events {
         self.expression_live |= unit > 0.0;
         [self.expression_live.then_some(Event::Breath(unit.clamp(0.0, 1.0))), None]
