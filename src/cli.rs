@@ -6,6 +6,7 @@
 
 mod args;
 mod bifurcation;
+mod bore;
 #[cfg(feature = "devices")]
 mod doctor;
 mod feel;
@@ -19,16 +20,20 @@ mod knob_sim;
 mod play;
 mod plot;
 mod reed;
+mod reed_physical;
 mod render;
+mod report;
 mod settings;
 mod study;
 mod table;
 mod threshold;
 mod tune;
+mod watch;
 
 use crate::bore::cylinder::CylinderError;
 use crate::bore::instrument_file::{ImportError, InstrumentError};
 use crate::figure::draw::DrawError;
+use crate::figure::report::ReportError;
 use crate::haptics::FeelRefused;
 use crate::instrument::BuildError;
 use crate::output::OutputError;
@@ -48,6 +53,7 @@ Examples:
   chalumeau render examples/melody.mid --out melody.wav
   chalumeau render --written C4 --gamma 0.5 --seconds 1.5 --out c4.wav
   chalumeau impedance --all --peaks 8 --csv peaks.csv
+  chalumeau bore --written C5 --plot c5.svg
   chalumeau threshold --all --zeta 0.3
   chalumeau tune --rate 48000 --gamma 0.5
   chalumeau haptic --all --contrast 1
@@ -68,7 +74,9 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Render>),
-    Impedance(impedance::Impedance),
+    Report(Box<report::Report>),
+    Impedance(Box<impedance::Impedance>),
+    Bore(Box<bore::Bore>),
     Instrument(Box<instrument::Instrument>),
     Threshold(threshold::Threshold),
     Bifurcation(Box<bifurcation::Bifurcation>),
@@ -113,6 +121,8 @@ enum Failure {
     Output(#[from] OutputError),
     #[error(transparent)]
     Draw(#[from] DrawError),
+    #[error("{}: {source}", path.display())]
+    Report { path: PathBuf, source: ReportError },
     #[error(transparent)]
     Wav(#[from] WavError),
     #[error(transparent)]
@@ -145,7 +155,9 @@ impl Failure {
 pub fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Render(command) => command.run(),
+        Command::Report(command) => command.run(),
         Command::Impedance(command) => command.run(),
+        Command::Bore(command) => command.run(),
         Command::Instrument(command) => {
             return match command.run() {
                 Ok(code) => code,

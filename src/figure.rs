@@ -5,11 +5,16 @@
 //! an animated GIF; fonts come embedded. Modules beside it build figures from measurements; none of them measures.
 
 pub mod bifurcation;
+pub mod bore;
 mod data;
 #[cfg(feature = "cli")]
 pub mod draw;
+pub mod impedance;
 pub mod palette;
+pub mod performance;
 pub mod reed;
+#[cfg(feature = "cli")]
+pub mod report;
 pub mod threshold;
 pub mod tune;
 

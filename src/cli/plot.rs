@@ -18,6 +18,11 @@ pub struct PlotArgs {
 }
 
 impl PlotArgs {
+    /// Whether one was asked for.
+    pub fn wanted(&self) -> bool {
+        self.plot.is_some()
+    }
+
     /// Opens the file, so that a wrong name is refused before anything is measured.
     pub fn open(&self, force: bool) -> Result<Plot, Failure> {
         let sheet = self.plot.as_ref().map(|path| Sheet::still(path, force, self.plot_size)).transpose()?;
@@ -31,6 +36,11 @@ pub struct Plot {
 }
 
 impl Plot {
+    /// Whether there will be one.
+    pub fn wanted(&self) -> bool {
+        self.sheet.is_some()
+    }
+
     /// Draws what `figure` returns, if a picture is wanted.
     pub fn draw(self, figure: impl FnOnce() -> Figure) -> Result<(), Failure> {
         match self.sheet {
