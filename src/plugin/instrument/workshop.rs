@@ -253,10 +253,13 @@ impl Maker {
             return self.listen(work, job, placed);
         }
         let mut stage = (placed.order == *order).then_some(placed.stage);
+        // The same instrument at another pitch is played in tune by the one that is there.
+        let bridged = placed.order.source == order.source && placed.stage >= Stage::Near;
+        if bridged && !self.ending.is_empty() {
+            return Ok(());
+        }
         if stage.is_none() {
             let (model, now) = order.at_once(self.cache.as_ref()).map_err(Some)?;
-            // The same instrument at another pitch is played in tune by the one that is there.
-            let bridged = placed.order.source == order.source && placed.stage >= Stage::Near;
             if now == Stage::Tuned || !(bridged || job.offline) {
                 let model = Arc::new(model);
                 let sent = Placed { order: order.clone(), stage: now, model: model.clone() };
