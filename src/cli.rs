@@ -20,6 +20,7 @@ mod knob_sim;
 mod play;
 mod plot;
 mod reed;
+mod reed_physical;
 mod render;
 mod report;
 mod settings;

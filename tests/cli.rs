@@ -110,6 +110,89 @@ fn instrument_files_are_refused_by_field() {
 }
 
 #[test]
+fn instruments_are_made_checked_and_shown() {
+    let d = tempfile::tempdir().unwrap();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/instruments/alto-chalumeau");
+    for name in ["bore.csv", "holes.csv", "fingerings.csv"] {
+        fs::copy(folder.join(name), d.path().join(name)).unwrap();
+    }
+    let tables = "--bore bore.csv --holes holes.csv --fingerings fingerings.csv";
+    succeeds(
+        d.path(),
+        &format!("instrument import {tables} --nominal-diameter-mm 15 --name Alto --out alto.toml"),
+    );
+    let notes = succeeds(d.path(), "instrument check alto.toml");
+    assert!(
+        notes.starts_with("written,written_midi,register,mode,wanted_hz,peak_hz,cents,mag_over_zc,q\n# Alto")
+    );
+    assert_eq!(notes.lines().count(), 17);
+    assert_eq!(succeeds(d.path(), "instrument show --instrument alto.toml").lines().count(), 3 + 1 + 10 + 15);
+    refused(
+        &d,
+        &format!("instrument import {tables} --out alto.toml"),
+        &["alto.toml exists already", "--force"],
+    );
+    refused(
+        &d,
+        &format!("instrument import {tables} --transposition 2 --out b.toml"),
+        &["fingerings.csv, line 4: sounding_note", "A#3"],
+    );
+    let holes = fs::read_to_string(d.path().join("holes.csv")).unwrap();
+    fs::write(d.path().join("holes.csv"), holes.replace("104.4", "0.1044")).unwrap();
+    refused(
+        &d,
+        &format!("instrument import {tables} --out b.toml"),
+        &["holes.csv, line 3: hole 1 (K1): x_mm is 0.1044", "0.1044 m = 104.4 mm"],
+    );
+
+    succeeds(d.path(), "instrument new --notes C4,E4 --diameter-mm 12 --out tube.toml");
+    succeeds(d.path(), "instrument new --instrument tube.toml --scale 1.5 --transposition 7 --out low.toml");
+    let low = fs::read_to_string(d.path().join("low.toml")).unwrap();
+    assert!(
+        low.contains("transposition_semitones = 7") && low.contains("nominal_diameter_mm = 18.0"),
+        "{low}"
+    );
+    refused(&d, "instrument new --out x.toml", &["--notes", "--scale"]);
+    refused(&d, "instrument new --notes E4,C4 --out x.toml", &["C4 comes after E4"]);
+    refused(&d, "instrument new --notes C4,X4 --out x.toml", &["\"X4\" must be a MIDI number"]);
+    refused(&d, "instrument new --scale 5 --out x.toml", &["x.toml", "reed_volume_mm3 is 150000"]);
+    refused(&d, "instrument check none.toml", &["cannot read none.toml"]);
+    // Its only note is to sound at a peak that a tube as short as this does not have.
+    succeeds(d.path(), "instrument new --notes C6 --out high.toml");
+    let high = fs::read_to_string(d.path().join("high.toml")).unwrap();
+    fs::write(d.path().join("mute.toml"), high.replace("mode = 1", "mode = 12")).unwrap();
+    refused(
+        &d,
+        "instrument check mute.toml",
+        &["error: no note of the chart has a peak", "mute.toml: cannot be played"],
+    );
+}
+
+#[test]
+fn a_measured_reed_has_both_faces() {
+    let d = tempfile::tempdir().unwrap();
+    let value = |table: &str, quantity: &str| -> f64 {
+        let line = table.lines().find(|line| line.starts_with(quantity)).unwrap();
+        line.split(',').nth(2).unwrap().parse().unwrap()
+    };
+    let reference = succeeds(d.path(), "reed --physical");
+    assert!((value(&reference, "closing pressure,p_M") - 6.0).abs() < 1e-6, "{reference}");
+    let stiffness = value(&reference, "stiffness,K");
+    let stiff = succeeds(d.path(), &format!("reed --physical --reed-stiffness {}", 2.0 * stiffness));
+    assert!((value(&stiff, "stiffness,k") - 2.0 * value(&reference, "stiffness,k")).abs() < 1e-6, "{stiff}");
+    assert!((value(&stiff, "closing pressure,p_M") - 12.0).abs() < 1e-5, "{stiff}");
+    let free = format!("reed --physical --H 3 --k {} --zeta 0.4", value(&stiff, "stiffness,k"));
+    assert!((value(&succeeds(d.path(), &free), "stiffness,K") - 2.0 * stiffness).abs() < 1e-4);
+    refused(&d, "reed --physical --H 3 --reed-opening 0.6", &["--H", "--reed-opening"]);
+    refused(&d, "render --written 60 --zeta 0.3 --reed-width 12 --out x.wav", &["--zeta", "--reed-width"]);
+    refused(
+        &d,
+        "render --written 60 --reed-opening 2 --out x.wav",
+        &["H = 10.392", "--reed-opening must lie in 0.19..0.96 mm"],
+    );
+}
+
+#[test]
 fn breath_files_are_refused_by_line() {
     let d = tempfile::tempdir().unwrap();
     for (text, says) in [

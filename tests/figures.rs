@@ -142,7 +142,7 @@ fn few(points: &[[f64; 2]]) -> (Vec<f64>, f64) {
 /// Golden figures: name, command, and how far numbers may be off, of what is drawn.
 ///
 /// What follows from formulas is held to rounding; what is played to what another processor's rounding or a better fit
-/// of the bore may do. Written anew by `UPDATE_GOLDEN=1 cargo test --no-default-features --features cli --test figures`.
+/// of the bore may do. Written anew by `UPDATE_GOLDEN=1 cargo core --test figures`.
 const GOLDEN: [(&str, &str, f64); 13] = [
     ("reed-unit", "reed --figure unit --out FIGURE", 1e-6),
     ("reed-angle", "reed --figure angle --out FIGURE", 1e-6),

@@ -60,7 +60,7 @@ impl Bifurcation {
             ))
         })?;
         let curve = BreathCurve::swell(self.to as f32, self.seconds);
-        let settings = self.settings.blown_by(Some(&curve))?;
+        let settings = self.settings.blown_by(Some(&curve), &file)?;
         let mut table = self.table.open("direction,gamma,rms,shut")?;
         let plot = self.plot.open(self.table.force())?;
         // Flow strength of the reed as strength, lip and H, k, A make it: what the linear theory asks for.

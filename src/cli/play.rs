@@ -114,7 +114,7 @@ impl PlayArgs {
     pub fn prepare(&self) -> Result<Prepared, Failure> {
         let file = self.instrument.load()?;
         let curve = self.curve()?;
-        let settings = self.settings.blown_by(curve.as_ref())?;
+        let settings = self.settings.blown_by(curve.as_ref(), &file)?;
         let mut score = self.score(&file)?;
         if let Some(curve) = &curve {
             score = score.blown(curve, &settings, self.rate);

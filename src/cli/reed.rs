@@ -2,16 +2,20 @@
 
 use crate::cli::Failure;
 use crate::cli::args::{PlayedArgs, check_fingering, note, within};
+use crate::cli::reed_physical::{self, PhysicalReedArgs};
 use crate::cli::render::progress;
 use crate::cli::table::TableArgs;
 use crate::figure::draw::{Sheet, Size};
 use crate::figure::reed::{self as figures, Kind, Orbit};
 use crate::instrument::Settings;
+use crate::reed::PhysicalReed;
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
 use crate::reed::law::K_INIT;
 use crate::reed::physical::P_REF_PA;
+use crate::reed::physical::SeedReed;
 use crate::render::orbit;
+use crate::units::REFERENCE_RADIUS_M;
 use crate::units::WrittenNote;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
@@ -22,6 +26,8 @@ Examples:
   chalumeau reed --law                        the reference reed
   chalumeau reed --law --H 3                  wider; k follows so that the peak flow stays 1
   chalumeau reed --law --H 3 --k 0.3849       wider, as stiff as before
+  chalumeau reed --physical --H 3             the same reed in N/m and mm
+  chalumeau reed --physical --reed-stiffness 1500 --reed-opening 0.6
   chalumeau reed --figure coupled --out coupled.svg
   chalumeau reed --figure orbit --written G4 --gamma 0.7 --out orbit.png
   chalumeau reed --figure sweep --out sweep.gif
@@ -75,7 +81,7 @@ enum Format {
 /// pressure of the reference reed.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-#[group(id = "what", required = true, multiple = false, args = ["table", "law", "figure"])]
+#[group(id = "what", required = true, multiple = false, args = ["table", "law", "physical", "figure"])]
 pub struct Reed {
     /// The 3601 table entries: i,p,x_a,x_b,sgn with x_a = sqrt(p), x_b = p^1.5
     #[arg(long)]
@@ -83,18 +89,23 @@ pub struct Reed {
     /// The flow law: p,u from p = -1 to beyond closure
     #[arg(long)]
     law: bool,
+    /// Both faces of the reed: H, k, A and zeta, and stiffness, area, width and opening, whichever were given
+    #[arg(long)]
+    physical: bool,
     /// A figure; needs --out
     #[arg(long, value_enum, value_name = "FIGURE", requires = "out")]
     figure: Option<Which>,
     /// Rest opening H, dimensionless, 0.5..10 [default: sqrt(27)/2]
-    #[arg(long = "H", value_name = "H", requires = "law", value_parser = |s: &str| within(s, 0.5, 10.0))]
+    #[arg(long = "H", value_name = "H", conflicts_with_all = ["table", "figure"], value_parser = |s: &str| within(s, 0.5, 10.0))]
     h: Option<f64>,
     /// Stiffness k, dimensionless, 0.01..20 [default: 27/(4 H^3), which makes the peak flow A]
-    #[arg(long = "k", value_name = "K", requires = "law", value_parser = |s: &str| within(s, 0.01, 20.0))]
+    #[arg(long = "k", value_name = "K", conflicts_with_all = ["table", "figure"], value_parser = |s: &str| within(s, 0.01, 20.0))]
     k: Option<f64>,
     /// Amplitude A of the flow, 0..10 [default: 1]
-    #[arg(long = "A", value_name = "A", requires = "law", value_parser = |s: &str| within(s, 0.0, 10.0))]
+    #[arg(long = "A", value_name = "A", conflicts_with_all = ["table", "figure"], value_parser = |s: &str| within(s, 0.0, 10.0))]
     a: Option<f64>,
+    #[command(flatten)]
+    measured: PhysicalReedArgs,
     #[command(flatten)]
     table_args: TableArgs,
     #[command(flatten)]
@@ -120,7 +131,7 @@ struct Drawing {
     /// Mouth pressure of the orbit over closing pressure, 0..3
     #[arg(long, value_name = "G", default_value = "0.8", value_parser = |s: &str| within(s, 0.0, 3.0))]
     gamma: f64,
-    /// Embouchure of the orbit: flow strength of the reed, 0.05..0.9
+    /// Embouchure of the orbit, or of --physical: flow strength of the reed, 0.05..0.9
     #[arg(long, value_name = "ZETA", default_value = "0.3", value_parser = |s: &str| within(s, 0.05, 0.9))]
     zeta: f64,
     #[command(flatten)]
@@ -259,11 +270,22 @@ impl Reed {
             }
             return table.finish();
         }
-        let (h, a) = (self.h.unwrap_or(ReedLaw::default().h()), self.a.unwrap_or(1.0));
-        let law = match self.k {
+        let reference = PhysicalReed::reference();
+        let measured =
+            self.measured.reed(REFERENCE_RADIUS_M).map(|reed| reed.seed(&reference, self.a.unwrap_or(1.0)));
+        let (h, a) =
+            (measured.map(|seed| seed.h).or(self.h).unwrap_or(ReedLaw::default().h()), self.a.unwrap_or(1.0));
+        let law = match measured.map(|seed| seed.k).or(self.k) {
             Some(k) => ReedLaw::free(h, k, a)?,
             None => ReedLaw::coupled(h, a)?,
         };
+        if self.physical {
+            let zeta = self.drawing.zeta;
+            let seed = measured.unwrap_or(SeedReed { h, k: law.k(), a, zeta, area: 1.0 });
+            let reed = PhysicalReed::from_seed(&seed, &reference);
+            let lay = f64::from(Settings::default().lay);
+            return reed_physical::both_faces(&seed, &reed, lay, &self.table_args);
+        }
         let mut table = self.table_args.open("p,u")?;
         table.comment(format_args!(
             "H = {}, k = {}, A = {}: peak flow {:.6} at p = {:.6}, closed from p = {:.6}",

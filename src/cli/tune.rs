@@ -63,7 +63,7 @@ impl Tune {
         let file = self.instrument.load()?;
         let notes = self.notes.notes(&file)?;
         let curve = BreathCurve::constant(self.gamma as f32);
-        let mut settings = self.settings.blown_by(Some(&curve))?;
+        let mut settings = self.settings.blown_by(Some(&curve), &file)?;
         if !self.settings.noise_given() {
             settings.noise = 0.0;
         }

@@ -141,6 +141,7 @@ impl Resampler {
 
     /// More inputs, while whose clock glides to `speed` (0.25..=4, 1 is their rate). At most
     /// [`PUSH_MOST`](Self::PUSH_MOST), and only after [`pull`](Self::pull) came back short. Real-time safe.
+    #[inline]
     pub fn push(&mut self, input: &[f32], speed: f64) {
         debug_assert!(input.len() <= Self::PUSH_MOST && self.end > self.next);
         let input = &input[..input.len().min(Self::PUSH_MOST)];
@@ -184,23 +185,41 @@ impl Resampler {
     }
 
     fn pull_plain(&mut self, out: &mut [f32]) -> usize {
-        let mut made = 0;
-        for out in out {
-            if self.end > self.next {
-                break;
-            }
-            *out = self.output(self.end);
-            self.end += self.whole;
-            self.phase += self.part;
-            if self.phase >= self.l {
-                self.phase -= self.l;
-                self.end += 1;
-            }
-            made += 1;
+        // As many as the inputs allow: the last of them still finds the inputs it hears.
+        let left = (self.next - self.end) as u64;
+        let most = ((left + 1) * self.l - 1 - self.phase) / self.m + 1;
+        let count = out.len().min(most as usize);
+        let out = &mut out[..count];
+        if self.coeffs.is_empty() {
+            self.step_through(out, |this, end, _| this.history[end - 1 - this.taps / 2]);
+        } else if self.l <= PHASES {
+            self.step_through(out, |this, end, phase| {
+                dot(&this.history[end - this.taps..end], this.row(phase as usize))
+            });
+        } else {
+            self.step_through(out, Self::mixed);
         }
-        made
+        count
     }
 
+    /// Fills `out` with what `output` makes of each position.
+    #[inline(always)]
+    fn step_through(&mut self, out: &mut [f32], output: impl Fn(&Self, usize, u64) -> f32) {
+        let (mut end, mut phase) = (self.end, self.phase);
+        for out in out {
+            *out = output(self, end, phase);
+            end += self.whole;
+            phase += self.part;
+            if phase >= self.l {
+                phase -= self.l;
+                end += 1;
+            }
+        }
+        (self.end, self.phase) = (end, phase);
+    }
+
+    /// Beside the plain way, which is taken every few samples and should not prepare for this one.
+    #[inline(never)]
     fn pull_warped(&mut self, out: &mut [f32]) -> usize {
         let mut made = 0;
         let step = self.m as f64 / self.l as f64 * ONE as f64;
@@ -268,17 +287,11 @@ impl Resampler {
         self.taps
     }
 
-    /// The output that hears the inputs before `end`.
-    #[inline]
-    fn output(&self, end: usize) -> f32 {
-        if self.coeffs.is_empty() {
-            return self.history[end - 1 - self.taps / 2];
-        }
+    /// The output that hears the inputs before `end`, between two of the phases kept.
+    #[inline(never)]
+    fn mixed(&self, end: usize, phase: u64) -> f32 {
         let heard = &self.history[end - self.taps..end];
-        if self.l <= PHASES {
-            return dot(heard, self.row(self.phase as usize));
-        }
-        let position = self.phase * PHASES;
+        let position = phase * PHASES;
         let (row, mix) = ((position / self.l) as usize, (position % self.l) as f32 / self.l as f32);
         let (before, after) = (dot(heard, self.row(row)), dot(heard, self.row(row + 1)));
         before + mix * (after - before)

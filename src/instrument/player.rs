@@ -349,11 +349,8 @@ impl Player {
     }
 
     /// The bore's size follows as the delay does; the first note has it at once.
-    fn follow_bore(&mut self, at_once: bool, settings: &Settings, stance: Stance, model: &Model) {
+    fn follow_bore(&mut self, at_once: bool, settings: &Settings, stance: &Stance, model: &Model) {
         let away = stance.bore_cents - self.bore_cents;
-        if away == 0.0 {
-            return;
-        }
         self.bore_cents = if at_once || away.abs() < ARRIVED_CENTS {
             stance.bore_cents
         } else {
@@ -361,7 +358,7 @@ impl Player {
         };
         self.speed = bend::speed(self.bore_cents);
         // Ticks have another length now.
-        self.stance = Some(Stance { steps: Steps::new(settings, self.tick_s(model)), ..stance });
+        self.stance = Some(Stance { steps: Steps::new(settings, self.tick_s(model)), ..*stance });
     }
 
     /// Advances one control tick: moves holes and delay, and says how the reed is driven. Real-time safe.
@@ -372,11 +369,10 @@ impl Player {
         }
         let settings = self.settings.with_reed_factors(self.reed);
         let fingering = self.fingering.unwrap_or(0);
-        let stance = self.stance.unwrap_or_else(|| {
+        let stance = *self.stance.get_or_insert_with(|| {
             voice.lattice_mut().set_jet_loss(f64::from(settings.vent_loss));
             Stance::new(&settings, fingering, self.bend_cents, tick_s, model)
         });
-        self.stance = Some(stance);
         let closing = stance.closing;
 
         if self.gliding > 0 {
@@ -462,7 +458,9 @@ impl Player {
             self.rows_set = self.fingering.is_some();
             voice.lattice_mut().glide_delay(self.rows, 0);
         }
-        self.follow_bore(at_once, &settings, stance, model);
+        if stance.bore_cents != self.bore_cents {
+            self.follow_bore(at_once, &settings, &stance, model);
+        }
 
         Drive { p_mouth, tongue: self.tongue_force, noise: f64::from(settings.noise), reed: stance.reed }
     }
