@@ -16,7 +16,6 @@ const PATIENCE: Duration = Duration::from_secs(300);
 /// Numbers of *Instrument*'s choices.
 const INSTRUMENTS: [(&str, f64); 5] =
     [("B flat", 0.0), ("A", 1.0), ("E flat", 2.0), ("C", 3.0), ("bass", 4.0)];
-const USER: f64 = 5.0;
 
 fn plugin() -> Plugin {
     let path = match std::env::var_os("CHALUMEAU_CLAP") {

@@ -1,8 +1,11 @@
 //! Where instruments are made: a thread that follows the parameters, and what the main thread does before it.
+//!
+//! Fitting and tuning are a thread of their own: whoever chooses another instrument meanwhile has that at once, and the
+//! old work ends when it next looks up.
 
 use std::ops::ControlFlow;
-use std::sync::Arc;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -50,6 +53,8 @@ impl Workshop {
             order: None,
             since: Instant::now(),
             refused: None,
+            work: None,
+            ending: Vec::new(),
         };
         let thread =
             std::thread::Builder::new().name("chalumeau maker".to_owned()).spawn(move || maker.run());
@@ -120,7 +125,7 @@ impl Workshop {
         let (model, stage) = if offline && stage < Stage::Tuned {
             let wanted = order.wanted(order.file()?);
             let made = make(&wanted, cache, &mut |progress| {
-                say_progress(&self.params, progress);
+                say(&self.params, &progress_words(progress));
                 ControlFlow::Continue(())
             });
             (made.map_err(|reason| reason.to_string())?, Stage::Tuned)
@@ -165,6 +170,24 @@ struct Maker {
     since: Instant,
     /// What cannot be had; not tried again until something else is asked for.
     refused: Option<Order>,
+    work: Option<Work>,
+    /// Work that nobody wants any more, and that has not noticed yet.
+    ending: Vec<JoinHandle<()>>,
+}
+
+/// An instrument being fitted and tuned.
+struct Work {
+    order: Order,
+    turn: u64,
+    cancelled: Arc<AtomicBool>,
+    news: mpsc::Receiver<News>,
+    thread: JoinHandle<()>,
+}
+
+enum News {
+    Progress(String),
+    Fitted(Arc<Model>),
+    Made(Result<Arc<Model>, BuildError>),
 }
 
 impl Maker {
@@ -173,21 +196,33 @@ impl Maker {
             self.turn();
             std::thread::sleep(TURN);
         }
+        self.stop_work();
+        for thread in self.ending.drain(..) {
+            // One that has panicked has been reported already.
+            let _ = thread.join();
+        }
     }
 
-    /// Everything once; as long as an instrument takes.
+    /// Everything once.
     fn turn(&mut self) {
         while self.from_bench.pop().is_ok() {}
         self.push();
+        self.ending.retain(|thread| !thread.is_finished());
         let job = self.shared.job().clone();
-        let (Some(rate_hz), Some(placed)) = (job.rate_hz, &job.placed) else { return };
+        let (Some(rate_hz), Some(placed)) = (job.rate_hz, &job.placed) else { return self.stop_work() };
         let mut order = Order::of(&self.params, rate_hz, job.offline);
-        if job.offline && order.choice == placed.order.choice {
+        if job.offline {
             // While a file is rendered only another instrument is another instrument: A4 is the player's.
-            order = placed.order.clone();
+            let known = self.work.iter().map(|work| &work.order).chain([&placed.order]);
+            if let Some(known) = known.into_iter().find(|known| known.choice == order.choice) {
+                order = known.clone();
+            }
         }
         if self.order.as_ref() != Some(&order) {
             (self.order, self.since) = (Some(order.clone()), Instant::now());
+        }
+        if self.work.as_ref().is_some_and(|work| work.order != order || work.turn != job.turn) {
+            self.stop_work();
         }
         let same = order.source == placed.order.source && order.quality == placed.order.quality;
         if same && order != placed.order && self.since.elapsed() < STILL {
@@ -197,10 +232,11 @@ impl Maker {
             self.refused = None;
             say(&self.params, &words(Stage::Tuned, placed));
             self.serve(&order);
-        } else if self.refused.as_ref() != Some(&order) {
-            self.make(&order, &job, placed);
-        } else {
+        } else if self.refused.as_ref() == Some(&order) {
             self.serve(&order);
+        } else if let Err(Some(reason)) = self.go_on(&order, &job, placed) {
+            say(&self.params, &refusal(&reason, placed));
+            self.refused = Some(order);
         }
     }
 
@@ -211,60 +247,101 @@ impl Maker {
         }
     }
 
-    fn make(&mut self, order: &Order, job: &Job, placed: &Placed) {
-        match self.try_make(order, job, placed) {
-            Ok(()) | Err(None) => {}
-            Err(Some(reason)) => {
-                self.refused = Some(order.clone());
-                say(&self.params, &refusal(&reason, placed));
-            }
+    /// The next thing to be done for an order. `Err(None)`: nobody wants it any more.
+    fn go_on(&mut self, order: &Order, job: &Job, placed: &Placed) -> Result<(), Option<String>> {
+        if let Some(work) = self.work.take() {
+            return self.listen(work, job, placed);
         }
-    }
-
-    /// `Err(None)`: nobody wants it any more.
-    fn try_make(&mut self, order: &Order, job: &Job, placed: &Placed) -> Result<(), Option<String>> {
         let mut stage = (placed.order == *order).then_some(placed.stage);
-        if stage.is_none() {
-            let (model, now) = order.at_once(self.cache.as_ref()).map_err(Some)?;
-            // The same instrument at another pitch is played in tune by the one that is there.
-            let bridged = placed.order.source == order.source && placed.stage >= Stage::Near;
-            if now == Stage::Tuned || !(bridged || job.offline) {
-                self.hand_over(order, job.turn, Arc::new(model), now)?;
-                stage = Some(now);
-            } else if bridged {
-                stage = Some(Stage::Near);
-            }
-        }
-        if stage == Some(Stage::Tuned) {
+        // The same instrument at another pitch is played in tune by the one that is there.
+        let bridged = placed.order.source == order.source && placed.stage >= Stage::Near;
+        if bridged && !self.ending.is_empty() {
             return Ok(());
         }
+        if stage.is_none() {
+            let (model, now) = order.at_once(self.cache.as_ref()).map_err(Some)?;
+            if now == Stage::Tuned || !(bridged || job.offline) {
+                let model = Arc::new(model);
+                let sent = Placed { order: order.clone(), stage: now, model: model.clone() };
+                self.hand_over(order, job.turn, model, now)?;
+                say(&self.params, &words(now, &sent));
+                stage = Some(now);
+            }
+        }
+        // One at a time: each takes all the cores there are.
+        if stage != Some(Stage::Tuned) && self.ending.is_empty() {
+            self.begin(order, job.turn)?;
+        }
+        Ok(())
+    }
+
+    fn begin(&mut self, order: &Order, turn: u64) -> Result<(), Option<String>> {
         let wanted = order.wanted(order.file().map_err(Some)?);
-        let cache = self.cache.clone();
-        let made = make(&wanted, cache.as_ref(), &mut |progress| {
-            if !self.still_wanted(order, job) {
-                return ControlFlow::Break(());
+        let (cache, cancelled) = (self.cache.clone(), Arc::new(AtomicBool::new(false)));
+        let (send, news) = mpsc::channel();
+        let stop = cancelled.clone();
+        let make = move || {
+            let made = make(&wanted, cache.as_ref(), &mut |progress| {
+                let sent = match progress {
+                    Progress::Fitted(model) => send.send(News::Fitted(model.clone())),
+                    shares => send.send(News::Progress(progress_words(shares))),
+                };
+                let go_on = sent.is_ok() && !stop.load(Ordering::Relaxed);
+                if go_on { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+            });
+            // Nobody listens to what is cancelled.
+            let _ = send.send(News::Made(made.map(Arc::new)));
+        };
+        let thread = std::thread::Builder::new()
+            .name("chalumeau fit".to_owned())
+            .spawn(make)
+            .map_err(|reason| Some(format!("cannot start a thread: {reason}")))?;
+        self.work = Some(Work { order: order.clone(), turn, cancelled, news, thread });
+        Ok(())
+    }
+
+    /// What the work has to say.
+    fn listen(&mut self, work: Work, job: &Job, placed: &Placed) -> Result<(), Option<String>> {
+        loop {
+            match work.news.try_recv() {
+                Ok(News::Progress(text)) => say(&self.params, &text),
+                Ok(News::Fitted(model)) => {
+                    // What plays may be tuned already, for another pitch.
+                    let better = placed.order == work.order && placed.stage < Stage::Fitted;
+                    if better
+                        && !job.offline
+                        && let Err(gone) = self.hand_over(&work.order, work.turn, model, Stage::Fitted)
+                    {
+                        work.cancelled.store(true, Ordering::Relaxed);
+                        self.ending.push(work.thread);
+                        return Err(gone);
+                    }
+                }
+                Ok(News::Made(made)) => {
+                    // It has nothing left to do.
+                    let _ = work.thread.join();
+                    return match made {
+                        Ok(model) => self.hand_over(&work.order, work.turn, model, Stage::Tuned),
+                        Err(BuildError::Cancelled) => Err(None),
+                        Err(reason) => Err(Some(reason.to_string())),
+                    };
+                }
+                Err(mpsc::TryRecvError::Empty) => {
+                    self.work = Some(work);
+                    return Ok(());
+                }
+                Err(mpsc::TryRecvError::Disconnected) => {
+                    return Err(Some("fitting it ended in a fault of the program".to_owned()));
+                }
             }
-            say_progress(&self.params, progress);
-            if let Progress::Fitted(model) = progress
-                && stage < Some(Stage::Fitted)
-                && !job.offline
-                && self.hand_over(order, job.turn, model.clone(), Stage::Fitted).is_err()
-            {
-                return ControlFlow::Break(());
-            }
-            ControlFlow::Continue(())
-        });
-        match made {
-            Ok(model) => self.hand_over(order, job.turn, Arc::new(model), Stage::Tuned),
-            Err(BuildError::Cancelled) => Err(None),
-            Err(reason) => Err(Some(reason.to_string())),
         }
     }
 
-    fn still_wanted(&self, order: &Order, job: &Job) -> bool {
-        let now = Order::of(&self.params, order.host_rate_hz, job.offline);
-        let asked = if job.offline { now.choice == order.choice } else { now == *order };
-        asked && !self.shared.stop.load(Ordering::Relaxed) && self.shared.job().turn == job.turn
+    fn stop_work(&mut self) {
+        if let Some(Work { cancelled, thread, .. }) = self.work.take() {
+            cancelled.store(true, Ordering::Relaxed);
+            self.ending.push(thread);
+        }
     }
 
     /// Sends an instrument on its way, unless the host has begun anew meanwhile.
@@ -310,12 +387,12 @@ fn refusal(reason: &str, placed: &Placed) -> String {
     format!("{reason}; still {}", placed.model.file.name)
 }
 
-fn say_progress(params: &ChalumeauParams, progress: Progress<'_>) {
+fn progress_words(progress: Progress<'_>) -> String {
     let percent = |share: f64| (100.0 * share.clamp(0.0, 1.0)).round();
     match progress {
-        Progress::Fitting(share) => say(params, &format!("fitting {} %", percent(share))),
-        Progress::Fitted(_) => {}
-        Progress::Tuning(share) => say(params, &format!("tuning {} %", percent(share))),
+        Progress::Fitting(share) => format!("fitting {} %", percent(share)),
+        Progress::Fitted(_) => "fitted".to_owned(),
+        Progress::Tuning(share) => format!("tuning {} %", percent(share)),
     }
 }
 
