@@ -5,11 +5,6 @@ use nice_plug::prelude::*;
 use super::number;
 use crate::instrument::Settings;
 use crate::reed::PhysicalReed;
-use crate::reed::law::H_INIT;
-use crate::reed::physical::P_REF_PA;
-
-/// Zeta of [`PhysicalReed::reference`] on its bore.
-const ZETA_REFERENCE: f64 = 0.3;
 
 /// Which of the reed's two faces rules.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Enum)]
@@ -70,23 +65,13 @@ impl PhysicalReedParams {
         }
     }
 
-    /// Settings whose reed is this one, if this face rules: opening is H, stiffness over area k, width zeta. Lip, strength
-    /// and the amplitude A act on top. Real-time safe.
+    /// Settings whose reed is this one, if this face rules, as on a B flat clarinet: a larger instrument has a reed as much
+    /// larger. Lip, strength and A act on top. Real-time safe.
     pub fn over(&self, settings: Settings) -> Settings {
         if !self.rules() {
             return settings;
         }
-        let (reed, reference) = (self.reed(), PhysicalReed::reference());
-        let h = H_INIT * reed.tip_opening_m / reference.tip_opening_m;
-        Settings {
-            reed_h: h as f32,
-            // p_M = K H / A_r on one face, P_ref H k on the other.
-            reed_k: (reed.closing_pa() / (P_REF_PA * h)) as f32,
-            coupled: false,
-            // Flow per root of pressure goes with w H; the H is in the law already.
-            zeta: (ZETA_REFERENCE * reed.width_m / reference.width_m) as f32,
-            ..settings
-        }
+        settings.with_physical_reed(&self.reed(), &PhysicalReed::reference())
     }
 
     /// Whether it rules. Real-time safe.
@@ -110,6 +95,8 @@ impl PhysicalReedParams {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reed::law::H_INIT;
+    use crate::reed::physical::P_REF_PA;
     use crate::units::{Air, REFERENCE_RADIUS_M};
 
     fn face(face: ReedFace, change: impl Fn(&mut PhysicalReed)) -> PhysicalReedParams {
