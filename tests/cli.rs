@@ -14,6 +14,7 @@ const MELODY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/melody.mid")
 fn chalumeau<A: AsRef<OsStr>>(directory: &Path, args: impl IntoIterator<Item = A>) -> Output {
     Command::new(env!("CARGO_BIN_EXE_chalumeau"))
         .current_dir(directory)
+        .env("CHALUMEAU_CACHE_DIR", env!("CARGO_TARGET_TMPDIR"))
         .args(args)
         .stdin(Stdio::null())
         .output()
@@ -222,7 +223,7 @@ fn numbers_out_of_range_say_what_would_be_right() {
         ("--zeta 1", "must lie in 0.05..0.9"),
         ("--lay 1", "must lie in 0..0.5"),
         ("--strength 9", "must lie in 1.5..5"),
-        ("--a4 415", "must lie in 430..450"),
+        ("--a4 414.9", "must lie in 415..466"),
         ("--temperature 50", "must lie in 10..40"),
         ("--gain-db -90", "must lie in -60..24"),
         ("--breath ramp:0:1", "ramp:FROM:TO:SECONDS"),
@@ -427,4 +428,46 @@ fn a_take_blows_and_a_damaged_one_is_refused_by_line() {
     fs::write(d.path().join("bad.csv"), "t_us,angle_deg\n0,0\n5,far\n").unwrap();
     refused(&d, &format!("{render} --replay bad.csv --out x.wav"), &["bad.csv", "line 3", "`far`"]);
     refused(&d, &format!("{render} --replay none.csv --out x.wav"), &["none.csv"]);
+}
+
+/// Written pitch is the player's: C4 sounds A3 on the A clarinet and B flat 2 on the bass; a file is kept once it is tuned.
+#[test]
+fn instruments_are_played_by_name_and_files_are_tuned_once() {
+    let d = tempfile::tempdir().unwrap();
+    let cents_of = |instrument: &str| -> (f64, f64) {
+        let line = format!("tune --written C4 --instrument {instrument}");
+        let output = chalumeau(d.path(), words(&line));
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let table = String::from_utf8(output.stdout).unwrap();
+        let numbers: Vec<f64> =
+            table.lines().last().unwrap().split(',').map(|cell| cell.parse().unwrap()).collect();
+        (numbers[1], numbers[2])
+    };
+    for (instrument, sounds_hz) in [("a", 220.0), ("bass", 116.54), ("c", 261.63)] {
+        let (hz, off) = cents_of(instrument);
+        assert!(
+            (hz / sounds_hz - 1.0).abs() < 0.001 && off.abs() < 0.5,
+            "{instrument}: {hz} Hz, {off} cents"
+        );
+    }
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/instruments/cylinder.toml");
+    let cache = tempfile::tempdir().unwrap();
+    let tuned = || {
+        let output = Command::new(env!("CARGO_BIN_EXE_chalumeau"))
+            .env("CHALUMEAU_CACHE_DIR", cache.path())
+            .args(["tune", "--written", "E3", "--instrument", file])
+            .output()
+            .unwrap();
+        (output.status.success(), String::from_utf8(output.stdout).unwrap())
+    };
+    let entries = || names(&cache.path().join("chalumeau"));
+    let first = tuned();
+    let kept = entries();
+    assert!(first.0 && kept.len() == 1, "{first:?} {kept:?}");
+    assert_eq!((tuned(), entries()), (first, kept));
+    refused(
+        &d,
+        "tune --written C4 --instrument violin",
+        &["cannot read violin", "b-flat, a, e-flat, c, bass"],
+    );
 }
