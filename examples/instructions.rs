@@ -1,10 +1,10 @@
 //! Holds one note and prints a checksum of its samples, nothing else: the program to count instructions of.
 //!
-//! `cargo run --release --no-default-features --example instructions -- SECONDS [RATE] [plain]`
+//! `cargo run --release --no-default-features --example instructions -- SECONDS [RATE] [avx2|plain] [BEND]`
 //!
-//! Written C4 at breath 0.5 of full scale; `plain` keeps off AVX2. What a sample costs is the difference of two run lengths, so that building
-//! the instrument cancels; `benches/peers/run.sh` does that under callgrind and by the thread's CPU time, which is
-//! printed where Linux tells it.
+//! Written C4 at breath 0.5 of full scale; `plain` keeps off AVX2, a bend is in cents. What a sample costs is the
+//! difference of two run lengths, so that building the instrument cancels; `benches/peers/run.sh` does that under
+//! callgrind and by the thread's CPU time, which is printed where Linux tells it.
 
 use std::error::Error;
 
@@ -26,9 +26,11 @@ fn thread_cpu_ns() -> Option<f64> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
-    let seconds: f64 = arguments.next().ok_or("usage: instructions SECONDS [RATE] [plain]")?.parse()?;
+    let seconds: f64 =
+        arguments.next().ok_or("usage: instructions SECONDS [RATE] [avx2|plain] [BEND]")?.parse()?;
     let rate_hz: f64 = arguments.next().as_deref().unwrap_or("48000").parse()?;
     let plain = arguments.next().is_some_and(|word| word == "plain");
+    let bend_cents: f32 = arguments.next().as_deref().unwrap_or("0").parse()?;
     let blocks = (seconds * rate_hz / BLOCK as f64).round() as usize;
 
     let mut clarinet = Clarinet::built_in(rate_hz)?;
@@ -36,6 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         clarinet = clarinet.without_avx2();
     }
     let note = WrittenNote(60).sounding(2).ok_or("no such note")?;
+    clarinet.apply(Event::Bend { cents: bend_cents });
     clarinet.apply(Event::Breath(0.5));
     clarinet.apply(Event::NoteOn { note, velocity: 0.8 });
 

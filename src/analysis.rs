@@ -9,6 +9,7 @@ use std::f64::consts::PI;
 
 pub mod impedance;
 pub mod onset;
+pub mod overview;
 pub mod pitch;
 pub mod spectrum;
 

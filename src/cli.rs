@@ -5,6 +5,8 @@
 //! was given and what would be right, and no file; a reader that closes the pipe early is no mistake.
 
 mod args;
+mod bifurcation;
+mod bore;
 #[cfg(feature = "devices")]
 mod doctor;
 mod feel;
@@ -18,16 +20,20 @@ mod knob_sim;
 mod play;
 mod plot;
 mod reed;
+mod reed_physical;
 mod render;
+mod report;
 mod settings;
 mod study;
 mod table;
 mod threshold;
 mod tune;
+mod watch;
 
 use crate::bore::cylinder::CylinderError;
 use crate::bore::instrument_file::{ImportError, InstrumentError};
 use crate::figure::draw::DrawError;
+use crate::figure::report::ReportError;
 use crate::haptics::FeelRefused;
 use crate::instrument::BuildError;
 use crate::output::OutputError;
@@ -47,6 +53,7 @@ Examples:
   chalumeau render examples/melody.mid --out melody.wav
   chalumeau render --written C4 --gamma 0.5 --seconds 1.5 --out c4.wav
   chalumeau impedance --all --peaks 8 --csv peaks.csv
+  chalumeau bore --written C5 --plot c5.svg
   chalumeau threshold --all --zeta 0.3
   chalumeau tune --rate 48000 --gamma 0.5
   chalumeau haptic --all --contrast 1
@@ -67,9 +74,12 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Render>),
-    Impedance(impedance::Impedance),
+    Report(Box<report::Report>),
+    Impedance(Box<impedance::Impedance>),
+    Bore(Box<bore::Bore>),
     Instrument(Box<instrument::Instrument>),
     Threshold(threshold::Threshold),
+    Bifurcation(Box<bifurcation::Bifurcation>),
     Tune(Box<tune::Tune>),
     Reed(reed::Reed),
     Study(study::Study),
@@ -111,6 +121,8 @@ enum Failure {
     Output(#[from] OutputError),
     #[error(transparent)]
     Draw(#[from] DrawError),
+    #[error("{}: {source}", path.display())]
+    Report { path: PathBuf, source: ReportError },
     #[error(transparent)]
     Wav(#[from] WavError),
     #[error(transparent)]
@@ -143,7 +155,9 @@ impl Failure {
 pub fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Render(command) => command.run(),
+        Command::Report(command) => command.run(),
         Command::Impedance(command) => command.run(),
+        Command::Bore(command) => command.run(),
         Command::Instrument(command) => {
             return match command.run() {
                 Ok(code) => code,
@@ -151,6 +165,7 @@ pub fn main() -> ExitCode {
             };
         }
         Command::Threshold(command) => command.run(),
+        Command::Bifurcation(command) => command.run(),
         Command::Tune(command) => command.run(),
         Command::Reed(command) => command.run(),
         Command::Study(command) => command.run(),

@@ -19,7 +19,8 @@ pub enum Event {
     },
     /// Breath from any source, 0..=1 of the full-scale mouth pressure (`Settings::breath_full_kpa`). The first one makes breath *live*.
     Breath(f32),
-    /// Pitch bend, cents; limited to what the bore's tuning delay can do.
+    /// Pitch bend, cents; two octaves at most. Near the note by the lip, beyond by the bore's size, see
+    /// [`bend`](crate::instrument::bend).
     Bend {
         /// Cents above the note.
         cents: f32,

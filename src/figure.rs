@@ -4,11 +4,19 @@
 //! tests compare what a picture says instead of how it looks. `draw` (with feature `cli`) puts it on paper as PNG, SVG or
 //! an animated GIF; fonts come embedded. Modules beside it build figures from measurements; none of them measures.
 
+pub mod bifurcation;
+pub mod bore;
 mod data;
 #[cfg(feature = "cli")]
 pub mod draw;
+pub mod impedance;
 pub mod palette;
+pub mod performance;
+pub mod reed;
+#[cfg(feature = "cli")]
+pub mod report;
 pub mod threshold;
+pub mod tune;
 
 pub use data::{
     Anchor, Axis, ColourMap, Dash, Direction, Figure, Heat, Layer, Line, Mark, Panel, Points, Polygon, Scale,

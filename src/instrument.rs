@@ -1,5 +1,6 @@
 //! Reed and bore married: the voice, how a player articulates, and what comes out at the host's rate.
 
+pub mod bend;
 pub mod cache;
 mod clarinet;
 pub mod embouchure;

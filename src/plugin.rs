@@ -2,13 +2,16 @@
 //!
 //! This module only translates: parameters to settings, host events to the instrument's, one voice to two equal
 //! channels. Notes are sounding pitch, as everywhere outside the instrument. What is heard depends on the events and
-//! their sample positions alone, not on the host's blocks, and is what the offline renderer writes. There is no editor
-//! yet; hosts show their own.
+//! their sample positions alone, not on the host's blocks, and is what the offline renderer writes; except that another
+//! instrument, chosen while somebody listens, comes when it is made. There is no editor yet; hosts show their own.
 
+pub mod instrument;
 #[cfg(feature = "devices")]
 mod knob;
 mod params;
 mod reed_sources;
+#[cfg(feature = "standalone")]
+pub mod standalone;
 mod translate;
 
 use std::sync::Arc;
@@ -16,20 +19,23 @@ use std::sync::Arc;
 use nice_plug::prelude::*;
 
 pub use params::{BreathParams, ChalumeauParams, EmbouchureParams, KnobParams, NoiseParams};
-pub use params::{OutputParams, ReedParams, SCHEMA, TuningChoice, TuningParams};
+pub use params::{InstrumentParams, OutputParams, PhysicalReedParams, ReedParams};
+pub use params::{SCHEMA, TuningChoice, TuningParams};
 
 use crate::event::{Event, Timed};
 use crate::identity;
-use crate::instrument::{Clarinet, Settings};
+use crate::instrument::Settings;
+use instrument::{Bench, Workshop};
 use reed_sources::ReedSources;
 use translate::Translator;
 
-/// The plugin: parameters, and between `activate` and `deactivate` a clarinet.
+/// The plugin: parameters, and from the first `activate` on a clarinet.
 #[derive(Default)]
 pub struct Chalumeau {
     params: Arc<ChalumeauParams>,
-    /// With the rate it was built for.
-    clarinet: Option<(f32, Clarinet)>,
+    /// The clarinet that plays.
+    bench: Option<Bench>,
+    workshop: Option<Workshop>,
     /// What the clarinet has been given.
     settings: Settings,
     translator: Translator,
@@ -76,26 +82,24 @@ impl Plugin for Chalumeau {
         config: &BufferConfig,
         context: &mut impl ActivateContext<Self>,
     ) -> bool {
-        if self.clarinet.as_ref().is_none_or(|(rate_hz, _)| *rate_hz != config.sample_rate) {
-            match Clarinet::built_in(f64::from(config.sample_rate)) {
-                Ok(clarinet) => self.clarinet = Some((config.sample_rate, clarinet)),
-                Err(reason) => {
-                    nice_error!("cannot play: {reason}");
-                    return false;
-                }
-            }
-        }
         self.offline = config.process_mode == ProcessMode::Offline;
+        let params = &self.params;
+        let workshop = self.workshop.get_or_insert_with(|| Workshop::start(params.clone()));
+        if let Err(reason) = workshop.activate(&mut self.bench, f64::from(config.sample_rate), self.offline) {
+            nice_error!("cannot play: {reason}");
+            return false;
+        }
         #[cfg(feature = "devices")]
         {
-            let params = &self.params;
-            let (_, audio) = self.knob.get_or_insert_with(|| knob::Knob::start(params.clone()));
-            audio.prepare(params);
+            let shared = workshop.shared();
+            let (_, audio) =
+                self.knob.get_or_insert_with(|| knob::Knob::start(params.clone(), shared.clone()));
+            audio.prepare(params, shared);
         }
         self.settings = self.params.settings();
-        if let Some((_, clarinet)) = &mut self.clarinet {
-            clarinet.set_settings(&self.settings);
-            context.set_latency_samples(clarinet.latency_samples());
+        if let Some(bench) = &mut self.bench {
+            bench.set_settings(&self.settings);
+            context.set_latency_samples(bench.clarinet().latency_samples());
         }
         self.reset();
         true
@@ -110,8 +114,8 @@ impl Plugin for Chalumeau {
         }
         self.breath = 0.0;
         self.panic = self.params.output.panic.value();
-        if let Some((_, clarinet)) = &mut self.clarinet {
-            clarinet.reset();
+        if let Some(bench) = &mut self.bench {
+            bench.reset();
         }
     }
 
@@ -122,18 +126,23 @@ impl Plugin for Chalumeau {
         context: &mut impl ProcessContext<Self>,
     ) -> ProcessStatus {
         let [out, copies @ ..] = buffer.as_slice() else { return ProcessStatus::Normal };
-        let Some((rate_hz, clarinet)) = &mut self.clarinet else {
+        let Some(bench) = &mut self.bench else {
             return ProcessStatus::Error("not activated");
         };
 
         let settings = self.params.settings();
         if settings != self.settings {
-            clarinet.set_settings(&settings);
+            bench.set_settings(&settings);
             self.settings = settings;
         }
+        if self.offline {
+            bench.wait_for(self.params.instrument.choice.value() as u32);
+        }
+        bench.tidy();
         let moved = moved(&self.params, &mut self.panic, &mut self.breath);
         let api = context.plugin_api();
         let translator = &mut self.translator;
+        let bent = translator.bend_range(self.params.instrument.bend_range.value());
         let reed_sources = &mut self.reed_sources;
         let sources = [self.params.knob.h_source.value(), self.params.knob.k_source.value()];
         let played = std::iter::from_fn(|| context.next_event()).flat_map(|event| {
@@ -146,12 +155,12 @@ impl Plugin for Chalumeau {
             .into_iter()
             .flatten()
         });
-        let events = moved.into_iter().flatten().chain(played);
+        let events = moved.into_iter().flatten().chain(bent).chain(played);
         #[cfg(feature = "devices")]
         if let Some((_, audio)) = &mut self.knob {
             let replay = self.params.knob.replay.value();
-            let stage = knob::Stage { rate_hz: f64::from(*rate_hz), offline: self.offline, replay };
-            audio.render(clarinet, &settings, events, stage, out);
+            let stage = knob::Stage { rate_hz: bench.rate_hz(), offline: self.offline, replay };
+            audio.render(bench, &settings, events, stage, out);
             audio.reed(self.reed_sources.factors(sources));
             for &(at, breath) in audio.sent() {
                 let (coarse, fine) = breath.bytes();
@@ -168,15 +177,12 @@ impl Plugin for Chalumeau {
             }
         }
         #[cfg(not(feature = "devices"))]
-        {
-            let _ = rate_hz;
-            clarinet.render_events(events, out);
-        }
+        bench.render_events(events, out);
 
         for copy in copies {
             copy.copy_from_slice(out);
         }
-        if clarinet.is_silent() { ProcessStatus::Normal } else { ProcessStatus::KeepAlive }
+        if bench.clarinet().is_silent() { ProcessStatus::Normal } else { ProcessStatus::KeepAlive }
     }
 
     fn deactivate(&mut self) {

@@ -5,9 +5,11 @@
 //! samples are those of an offline bounce. Nothing is added and no latency is taken away. Left out: reading a score
 //! while it plays, and more than one voice.
 
+pub mod bifurcation;
 pub mod breath;
 pub mod heard;
 pub mod midi_file;
+pub mod orbit;
 pub mod score;
 pub mod wav;
 

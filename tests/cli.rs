@@ -14,6 +14,7 @@ const MELODY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/melody.mid")
 fn chalumeau<A: AsRef<OsStr>>(directory: &Path, args: impl IntoIterator<Item = A>) -> Output {
     Command::new(env!("CARGO_BIN_EXE_chalumeau"))
         .current_dir(directory)
+        .env("CHALUMEAU_CACHE_DIR", env!("CARGO_TARGET_TMPDIR"))
         .args(args)
         .stdin(Stdio::null())
         .output()
@@ -110,6 +111,89 @@ fn instrument_files_are_refused_by_field() {
 }
 
 #[test]
+fn instruments_are_made_checked_and_shown() {
+    let d = tempfile::tempdir().unwrap();
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/instruments/alto-chalumeau");
+    for name in ["bore.csv", "holes.csv", "fingerings.csv"] {
+        fs::copy(folder.join(name), d.path().join(name)).unwrap();
+    }
+    let tables = "--bore bore.csv --holes holes.csv --fingerings fingerings.csv";
+    succeeds(
+        d.path(),
+        &format!("instrument import {tables} --nominal-diameter-mm 15 --name Alto --out alto.toml"),
+    );
+    let notes = succeeds(d.path(), "instrument check alto.toml");
+    assert!(
+        notes.starts_with("written,written_midi,register,mode,wanted_hz,peak_hz,cents,mag_over_zc,q\n# Alto")
+    );
+    assert_eq!(notes.lines().count(), 17);
+    assert_eq!(succeeds(d.path(), "instrument show --instrument alto.toml").lines().count(), 3 + 1 + 10 + 15);
+    refused(
+        &d,
+        &format!("instrument import {tables} --out alto.toml"),
+        &["alto.toml exists already", "--force"],
+    );
+    refused(
+        &d,
+        &format!("instrument import {tables} --transposition 2 --out b.toml"),
+        &["fingerings.csv, line 4: sounding_note", "A#3"],
+    );
+    let holes = fs::read_to_string(d.path().join("holes.csv")).unwrap();
+    fs::write(d.path().join("holes.csv"), holes.replace("104.4", "0.1044")).unwrap();
+    refused(
+        &d,
+        &format!("instrument import {tables} --out b.toml"),
+        &["holes.csv, line 3: hole 1 (K1): x_mm is 0.1044", "0.1044 m = 104.4 mm"],
+    );
+
+    succeeds(d.path(), "instrument new --notes C4,E4 --diameter-mm 12 --out tube.toml");
+    succeeds(d.path(), "instrument new --instrument tube.toml --scale 1.5 --transposition 7 --out low.toml");
+    let low = fs::read_to_string(d.path().join("low.toml")).unwrap();
+    assert!(
+        low.contains("transposition_semitones = 7") && low.contains("nominal_diameter_mm = 18.0"),
+        "{low}"
+    );
+    refused(&d, "instrument new --out x.toml", &["--notes", "--scale"]);
+    refused(&d, "instrument new --notes E4,C4 --out x.toml", &["C4 comes after E4"]);
+    refused(&d, "instrument new --notes C4,X4 --out x.toml", &["\"X4\" must be a MIDI number"]);
+    refused(&d, "instrument new --scale 5 --out x.toml", &["x.toml", "reed_volume_mm3 is 150000"]);
+    refused(&d, "instrument check none.toml", &["cannot read none.toml"]);
+    // Its only note is to sound at a peak that a tube as short as this does not have.
+    succeeds(d.path(), "instrument new --notes C6 --out high.toml");
+    let high = fs::read_to_string(d.path().join("high.toml")).unwrap();
+    fs::write(d.path().join("mute.toml"), high.replace("mode = 1", "mode = 12")).unwrap();
+    refused(
+        &d,
+        "instrument check mute.toml",
+        &["error: no note of the chart has a peak", "mute.toml: cannot be played"],
+    );
+}
+
+#[test]
+fn a_measured_reed_has_both_faces() {
+    let d = tempfile::tempdir().unwrap();
+    let value = |table: &str, quantity: &str| -> f64 {
+        let line = table.lines().find(|line| line.starts_with(quantity)).unwrap();
+        line.split(',').nth(2).unwrap().parse().unwrap()
+    };
+    let reference = succeeds(d.path(), "reed --physical");
+    assert!((value(&reference, "closing pressure,p_M") - 6.0).abs() < 1e-6, "{reference}");
+    let stiffness = value(&reference, "stiffness,K");
+    let stiff = succeeds(d.path(), &format!("reed --physical --reed-stiffness {}", 2.0 * stiffness));
+    assert!((value(&stiff, "stiffness,k") - 2.0 * value(&reference, "stiffness,k")).abs() < 1e-6, "{stiff}");
+    assert!((value(&stiff, "closing pressure,p_M") - 12.0).abs() < 1e-5, "{stiff}");
+    let free = format!("reed --physical --H 3 --k {} --zeta 0.4", value(&stiff, "stiffness,k"));
+    assert!((value(&succeeds(d.path(), &free), "stiffness,K") - 2.0 * stiffness).abs() < 1e-4);
+    refused(&d, "reed --physical --H 3 --reed-opening 0.6", &["--H", "--reed-opening"]);
+    refused(&d, "render --written 60 --zeta 0.3 --reed-width 12 --out x.wav", &["--zeta", "--reed-width"]);
+    refused(
+        &d,
+        "render --written 60 --reed-opening 2 --out x.wav",
+        &["H = 10.392", "--reed-opening must lie in 0.19..0.96 mm"],
+    );
+}
+
+#[test]
 fn breath_files_are_refused_by_line() {
     let d = tempfile::tempdir().unwrap();
     for (text, says) in [
@@ -139,7 +223,7 @@ fn numbers_out_of_range_say_what_would_be_right() {
         ("--zeta 1", "must lie in 0.05..0.9"),
         ("--lay 1", "must lie in 0..0.5"),
         ("--strength 9", "must lie in 1.5..5"),
-        ("--a4 415", "must lie in 430..450"),
+        ("--a4 414.9", "must lie in 415..466"),
         ("--temperature 50", "must lie in 10..40"),
         ("--gain-db -90", "must lie in -60..24"),
         ("--breath ramp:0:1", "ramp:FROM:TO:SECONDS"),
@@ -344,4 +428,46 @@ fn a_take_blows_and_a_damaged_one_is_refused_by_line() {
     fs::write(d.path().join("bad.csv"), "t_us,angle_deg\n0,0\n5,far\n").unwrap();
     refused(&d, &format!("{render} --replay bad.csv --out x.wav"), &["bad.csv", "line 3", "`far`"]);
     refused(&d, &format!("{render} --replay none.csv --out x.wav"), &["none.csv"]);
+}
+
+/// Written pitch is the player's: C4 sounds A3 on the A clarinet and B flat 2 on the bass; a file is kept once it is tuned.
+#[test]
+fn instruments_are_played_by_name_and_files_are_tuned_once() {
+    let d = tempfile::tempdir().unwrap();
+    let cents_of = |instrument: &str| -> (f64, f64) {
+        let line = format!("tune --written C4 --instrument {instrument}");
+        let output = chalumeau(d.path(), words(&line));
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let table = String::from_utf8(output.stdout).unwrap();
+        let numbers: Vec<f64> =
+            table.lines().last().unwrap().split(',').map(|cell| cell.parse().unwrap()).collect();
+        (numbers[1], numbers[2])
+    };
+    for (instrument, sounds_hz) in [("a", 220.0), ("bass", 116.54), ("c", 261.63)] {
+        let (hz, off) = cents_of(instrument);
+        assert!(
+            (hz / sounds_hz - 1.0).abs() < 0.001 && off.abs() < 0.5,
+            "{instrument}: {hz} Hz, {off} cents"
+        );
+    }
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/instruments/cylinder.toml");
+    let cache = tempfile::tempdir().unwrap();
+    let tuned = || {
+        let output = Command::new(env!("CARGO_BIN_EXE_chalumeau"))
+            .env("CHALUMEAU_CACHE_DIR", cache.path())
+            .args(["tune", "--written", "E3", "--instrument", file])
+            .output()
+            .unwrap();
+        (output.status.success(), String::from_utf8(output.stdout).unwrap())
+    };
+    let entries = || names(&cache.path().join("chalumeau"));
+    let first = tuned();
+    let kept = entries();
+    assert!(first.0 && kept.len() == 1, "{first:?} {kept:?}");
+    assert_eq!((tuned(), entries()), (first, kept));
+    refused(
+        &d,
+        "tune --written C4 --instrument violin",
+        &["cannot read violin", "b-flat, a, e-flat, c, bass"],
+    );
 }

@@ -91,7 +91,7 @@ impl Random {
             }
             6..=8 => Event::NoteOff { note: SoundingNote(40 + self.below(60) as u8) },
             9..=13 => Event::Breath(self.wild(0.0, 1.0)),
-            14 => Event::Bend { cents: self.wild(-200.0, 200.0) },
+            14 => Event::Bend { cents: self.wild(-1_500.0, 1_500.0) },
             15 => Event::TongueSlap { strength: self.wild(0.0, 1.0) },
             16 => Event::Reed { h: self.wild(0.6, 1.6), k: self.wild(0.6, 1.6) },
             _ if self.below(8) == 0 => Event::Panic,
@@ -114,7 +114,7 @@ impl Random {
             reed_k: self.wild(0.1, 2.0),
             coupled: self.below(2) == 0,
             reed_a: self.wild(0.0, 2.0),
-            a4_hz: self.wild(430.0, 450.0),
+            a4_hz: self.wild(415.0, 466.0),
             tuning: if self.below(2) == 0 { Tuning::Natural } else { Tuning::Tempered },
             temperature_c: self.wild(10.0, 40.0),
             vent_loss: self.wild(0.0, 4.0),

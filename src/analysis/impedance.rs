@@ -22,6 +22,18 @@ const POINTS: usize = 1 << 19;
 /// Where peaks are looked for, Hz.
 const SEARCH_HZ: (f64, f64) = (60.0, 6000.0);
 
+/// Grid on which a cut-off is looked for, Hz: that of the reference it is tested against. A finer one would stop at dips of
+/// a few hertz.
+const CUTOFF_STEP_HZ: u32 = 10;
+
+/// Cut-off of a lattice of open tone holes: the first frequency at which the reflectance below its first open hole gives
+/// back less than half of the power, up to 6 kHz. `None` where it never does.
+pub fn cutoff_hz(reflectance: impl Fn(f64) -> Complex64) -> Option<f64> {
+    // Below, a reflectance of less than one half is no lattice's.
+    let grid = (100..6_000).step_by(CUTOFF_STEP_HZ as usize).map(f64::from);
+    grid.into_iter().find(|&f_hz| reflectance(f_hz).norm_sqr() < 0.5)
+}
+
 /// Exact value at `f_hz` of the transform of `response`: `sum r[n] exp(-2 pi j f n / rate)`.
 pub fn reflectance(response: &[f64], rate_hz: f64, f_hz: f64) -> Complex64 {
     with_slope(response, rate_hz, f_hz).0
@@ -126,6 +138,14 @@ mod tests {
             let expected = -0.95 * Complex64::cis(-2.0 * PI * f_hz * 150.0 / RATE_HZ);
             assert!((reflectance(&pipe(), RATE_HZ, f_hz) - expected).norm() < 1e-11);
         }
+    }
+
+    #[test]
+    fn cutoff_is_where_half_of_the_power_stays_away() {
+        // |R|^2 = 1 / (1 + (f/fc)^8): one half at fc.
+        let reflectance = |f_hz: f64| Complex64::from((1.0 + (f_hz / 1234.0).powi(8)).powf(-0.5));
+        assert_eq!(cutoff_hz(reflectance), Some(1240.0));
+        assert_eq!(cutoff_hz(|_| Complex64::ONE), None);
     }
 
     #[test]

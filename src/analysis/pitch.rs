@@ -37,6 +37,9 @@ const HEARD: f64 = 1e-4;
 /// Quieter than this is silence, rms.
 const SILENCE: f64 = 1e-12;
 
+/// Window of a [`pitch_track`], s: three periods of the lowest fundamental.
+pub const WINDOW_S: f64 = 0.06;
+
 /// One moment of a [`pitch_track`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackPoint {
@@ -116,7 +119,7 @@ pub fn periodicity(samples: &[f64], rate_hz: f64, f0_hz: f64) -> f64 {
 
 /// Pitch and level every `hop_s` through windows of 60 ms (three periods of the lowest note), for plots: some cents.
 pub fn pitch_track(samples: &[f64], rate_hz: f64, hop_s: f64) -> Vec<TrackPoint> {
-    let window = (0.06 * rate_hz).round() as usize;
+    let window = (WINDOW_S * rate_hz).round() as usize;
     let mut planner = RealFftPlanner::new();
     let hop = (hop_s * rate_hz).max(1.0);
     (0..)

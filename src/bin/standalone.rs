@@ -1,8 +1,7 @@
-//! The plugin as a program of its own: JACK or ALSA in and out, no window yet.
+//! The plugin as a program of its own.
 
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let played = nice_plug::prelude::nice_export_standalone::<chalumeau::plugin::Chalumeau>();
-    if played { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    chalumeau::plugin::standalone::main()
 }

@@ -1,12 +1,17 @@
 //! `chalumeau impedance`: what the bore answers to the reed, curve or peaks.
 
-use crate::bore::instrument_file::InstrumentFile;
+use crate::analysis::impedance::cutoff_hz;
+use crate::bore::instrument_file::{Fingering, InstrumentFile};
 use crate::bore::transfer_matrix::{Peak, TransferMatrix, find_peaks};
 use crate::cli::Failure;
 use crate::cli::args::{AirArg, InstrumentArg, NotesArg, QualityArg, within};
+use crate::cli::plot::PlotArgs;
 use crate::cli::table::TableArgs;
+use crate::figure;
+use crate::figure::Figure;
+use crate::figure::impedance::{Curve, NotePeaks};
 use crate::instrument;
-use crate::units::Air;
+use crate::units::{Air, SoundingNote, WrittenNote, cents};
 use clap::{Args, ValueEnum};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -19,6 +24,8 @@ const EXAMPLES: &str = "\
 Examples:
   chalumeau impedance --written F4 --csv f4.csv          the curve, 20 Hz to 4 kHz
   chalumeau impedance --all --peaks 8                    eight resonances of every fingering
+  chalumeau impedance --written F4 --plot f4.svg         the curve drawn, with modes and cut-off, beside the other model's
+  chalumeau impedance --all --peaks 6 --plot peaks.png   where the peaks of all notes are
   chalumeau impedance --written 52 --from 100 --to 200 --step 0.1 --reed-volume";
 
 /// Where the answer comes from.
@@ -69,6 +76,8 @@ pub struct Impedance {
     quality: QualityArg,
     #[command(flatten)]
     table: TableArgs,
+    #[command(flatten)]
+    plot: PlotArgs,
 }
 
 impl Impedance {
@@ -77,24 +86,22 @@ impl Impedance {
         let notes = self.notes.notes(&file)?;
         let (air, volume_m3) = (self.air.air(), if self.reed_volume { file.reed_volume_m3 } else { 0.0 });
         let steps = ((self.to - self.from) / self.step + 1e-9).floor();
-        if self.peaks.is_none() {
-            if self.notes.one().is_none() {
-                let right = "add --peaks 8 for the peaks of all notes, or choose one note with --written";
-                return Err(Failure::Usage(format!(
-                    "one curve for each note would be too much for a table; {right}"
-                )));
-            }
-            if !(0.0..=POINTS_MAX).contains(&steps) {
-                return Err(Failure::Usage(format!(
-                    "--from {} --to {} --step {} is {} points; expected 1 to {POINTS_MAX}, with --to above --from",
-                    self.from,
-                    self.to,
-                    self.step,
-                    steps + 1.0
-                )));
-            }
+        if self.peaks.is_none() && self.notes.one().is_none() {
+            let right = "add --peaks 8 for the peaks of all notes, or choose one note with --written";
+            return Err(Failure::Usage(format!(
+                "one curve for each note would be too much for a table; {right}"
+            )));
         }
-        let bore = self.bore(&file)?;
+        let curve = self.peaks.is_none() || (self.notes.one().is_some() && self.plot.wanted());
+        if curve && !(0.0..=POINTS_MAX).contains(&steps) {
+            return Err(Failure::Usage(format!(
+                "--from {} --to {} --step {} is {} points; expected 1 to {POINTS_MAX}, with --to above --from",
+                self.from,
+                self.to,
+                self.step,
+                steps + 1.0
+            )));
+        }
         let about = format!(
             "{}; {}, {} C, reed volume {} m3, Zc {:.6e} Pa s/m3",
             file.name,
@@ -112,9 +119,11 @@ impl Impedance {
         } else {
             "f_hz,re_z_over_zc,im_z_over_zc"
         };
+        let plot = self.plot.open(self.table.force())?;
+        let bore = self.bore(&file)?;
         let mut table = self.table.open(header)?;
         table.comment(format_args!("{about}"))?;
-        for fingering in notes.into_iter().filter_map(|written| file.fingering(written)) {
+        for fingering in notes.iter().filter_map(|&written| file.fingering(written)) {
             if let Some(count) = self.peaks {
                 let peaks = bore.peaks(&fingering.open, volume_m3, usize::from(count));
                 for (n, peak) in (1..).zip(peaks) {
@@ -122,14 +131,111 @@ impl Impedance {
                     table.line(format_args!("{written},{n},{f_hz:.4},{mag:.6},{q:.4}"))?;
                 }
             } else {
-                for step in 0..=steps as u32 {
-                    let f_hz = self.from + f64::from(step) * self.step;
-                    let z = bore.impedance(f_hz, &fingering.open, volume_m3);
-                    table.line(format_args!("{},{:.8},{:.8}", (f_hz * 1e6).round() / 1e6, z.re, z.im))?;
+                for (f_hz, z) in self.curve(&bore, &fingering.open, volume_m3) {
+                    table.line(format_args!("{f_hz},{:.8},{:.8}", z.re, z.im))?;
                 }
             }
         }
-        table.finish()
+        table.finish()?;
+        plot.draw(|| match self.notes.one().and_then(|written| file.fingering(written)) {
+            Some(fingering) => self.fingering(&bore, &file, fingering, volume_m3),
+            None => self.chart(&bore, &file, &notes, volume_m3),
+        })
+    }
+
+    /// Frequencies from first to last, and Z/Zc.
+    fn curve<'a>(
+        &'a self,
+        bore: &'a Bore,
+        open: &'a [bool],
+        volume_m3: f64,
+    ) -> impl Iterator<Item = (f64, Complex64)> + 'a {
+        let steps = ((self.to - self.from) / self.step + 1e-9).floor() as u32;
+        (0..=steps).map(move |step| {
+            let f_hz = self.from + f64::from(step) * self.step;
+            ((f_hz * 1e6).round() / 1e6, bore.impedance(f_hz, open, volume_m3))
+        })
+    }
+
+    /// The picture of one fingering, with the other model beside the one asked for.
+    fn fingering(&self, bore: &Bore, file: &InstrumentFile, of: &Fingering, volume_m3: f64) -> Figure {
+        let air = self.air.air();
+        let count = usize::from(self.peaks.unwrap_or(30));
+        let modes = bore.peaks(&of.open, volume_m3, count);
+        let mut curves =
+            vec![Curve { name: bore.name().to_owned(), z: self.curve(bore, &of.open, volume_m3).collect() }];
+        let mut notes = vec![format!(
+            "{:.0} C, {}; Zc of a bore {:.1} mm wide",
+            air.temperature_c,
+            if self.reed_volume { "with the reed's volume" } else { "without the reed's volume" },
+            2e3 * file.nominal_radius_m
+        )];
+        let exact = TransferMatrix::new(file, air);
+        let first = (of.open.iter().zip(&file.holes)).position(|(&open, hole)| open && !hole.register);
+        let cutoff_hz =
+            first.and_then(|hole| cutoff_hz(|f_hz| exact.reflectance_below(f_hz, &of.open, hole)));
+        // The lattice is made for one air, and takes a fit for an instrument of one's own: beside the transfer matrices
+        // it is drawn only where it was asked for.
+        if matches!(bore, Bore::Lattice(_)) {
+            let exact = Bore::Tmm(exact);
+            let theirs = exact.peaks(&of.open, volume_m3, count);
+            let apart: Vec<(f64, f64)> = modes
+                .iter()
+                .zip(&theirs)
+                .filter(|(mode, _)| mode.f_hz <= self.to)
+                .map(|(a, b)| {
+                    (cents(a.f_hz, b.f_hz).abs(), 20.0 * (a.mag_over_zc / b.mag_over_zc).log10().abs())
+                })
+                .collect();
+            if !apart.is_empty() {
+                let mean =
+                    |value: fn(&(f64, f64)) -> f64| apart.iter().map(value).sum::<f64>() / apart.len() as f64;
+                notes.push(format!(
+                    "{} modes, lattice against transfer matrices: mean {:.1} cents, {:.2} dB",
+                    apart.len(),
+                    mean(|&(cents, _)| cents),
+                    mean(|&(_, db)| db)
+                ));
+            }
+            let z = self.curve(&exact, &of.open, volume_m3).collect();
+            curves.push(Curve { name: exact.name().to_owned(), z });
+        }
+        figure::impedance::fingering(&figure::impedance::Fingering {
+            instrument: &file.name,
+            notes,
+            written: of.written,
+            sounding_hz: sounding_hz(file, of.written),
+            curves,
+            modes,
+            cutoff_hz,
+        })
+    }
+
+    /// The picture of all notes' peaks.
+    fn chart(&self, bore: &Bore, file: &InstrumentFile, notes: &[WrittenNote], volume_m3: f64) -> Figure {
+        let count = usize::from(self.peaks.unwrap_or(8));
+        let rows: Vec<NotePeaks> = notes
+            .iter()
+            .filter_map(|&written| file.fingering(written))
+            .map(|of| NotePeaks {
+                written: of.written,
+                sounding_hz: sounding_hz(file, of.written),
+                mode: of.mode,
+                // The one that sounds shall be among them.
+                peaks: bore.peaks(&of.open, volume_m3, count.max(of.mode)),
+            })
+            .collect();
+        let about = format!(
+            "{}, {:.0} C, {}",
+            bore.name(),
+            self.air.air().temperature_c,
+            if self.reed_volume {
+                "with the reed's volume"
+            } else {
+                "without the reed's volume, which lowers them"
+            }
+        );
+        figure::impedance::chart(&file.name, vec![about], &rows)
     }
 
     fn bore(&self, file: &InstrumentFile) -> Result<Bore, Failure> {
@@ -150,6 +256,13 @@ enum Bore {
 }
 
 impl Bore {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Tmm(_) => "transfer matrices",
+            Self::Lattice(_) => "lattice that sounds",
+        }
+    }
+
     fn impedance(&self, f_hz: f64, open: &[bool], volume_m3: f64) -> Complex64 {
         match self {
             Self::Tmm(model) => model.impedance(f_hz, open, volume_m3),
@@ -166,6 +279,11 @@ impl Bore {
             Self::Lattice(_) => find_peaks(|f_hz| self.impedance(f_hz, open, volume_m3), count),
         }
     }
+}
+
+/// Pitch of a note at A4 = 440 Hz, Hz. A file has no note that could not sound.
+fn sounding_hz(file: &InstrumentFile, written: WrittenNote) -> f64 {
+    written.sounding(file.transposition).unwrap_or(SoundingNote(written.0)).frequency_hz(440.0)
 }
 
 fn lattice(model: &instrument::Model, f_hz: f64, open: &[bool]) -> Complex64 {

@@ -6,6 +6,7 @@ use crate::cli::args::{PlayedArgs, check_fingering, note, within};
 use crate::cli::feel::FeelArgs;
 use crate::cli::settings::SettingsArgs;
 use crate::control::knob::KnobDesign;
+use crate::control::midi::MidiDecoder;
 use crate::event::{Event, Timed};
 use crate::instrument::{Clarinet, Model, Settings};
 use crate::render::breath::BreathCurve;
@@ -33,6 +34,9 @@ pub struct PlayArgs {
     /// Standard MIDI file, format 0 or 1
     #[arg(value_name = "MIDI")]
     midi: Option<PathBuf>,
+    /// The file is of an MPE controller: channel 1 manages the others, which bend by 48 semitones
+    #[arg(long, requires = "midi")]
+    mpe: bool,
     /// One note as a clarinettist reads it: MIDI number (60) or name (C4)
     #[arg(long, value_name = "NOTE", value_parser = note)]
     written: Option<u8>,
@@ -110,7 +114,7 @@ impl PlayArgs {
     pub fn prepare(&self) -> Result<Prepared, Failure> {
         let file = self.instrument.load()?;
         let curve = self.curve()?;
-        let settings = self.settings.blown_by(curve.as_ref())?;
+        let settings = self.settings.blown_by(curve.as_ref(), &file)?;
         let mut score = self.score(&file)?;
         if let Some(curve) = &curve {
             score = score.blown(curve, &settings, self.rate);
@@ -195,7 +199,8 @@ impl PlayArgs {
         let transposition = file.transposition;
         if let Some(path) = &self.midi {
             let bytes = fs::read(path).map_err(|source| Failure::Read { path: path.clone(), source })?;
-            let score = midi_file::read(&bytes, self.rate)
+            let decoder = if self.mpe { MidiDecoder::new().with_mpe() } else { MidiDecoder::new() };
+            let score = midi_file::read_as(decoder, &bytes, self.rate)
                 .map_err(|source| Failure::MidiFile { path: path.clone(), source })?;
             warn_of_missing_fingerings(&score.events, file);
             return Ok(score);

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 /// Whether and where a picture goes. Existing files stay or go as the command's `--force` says.
 #[derive(Args)]
 pub struct PlotArgs {
-    /// Draw a figure too: a new .png or .svg file
+    /// Draw a figure too: a new .png or .svg file, or .json for what it shows
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     /// Size of the figure, pixels, 400..4000 each way, as 1600x1000 [default: what it needs]
@@ -18,6 +18,11 @@ pub struct PlotArgs {
 }
 
 impl PlotArgs {
+    /// Whether one was asked for.
+    pub fn wanted(&self) -> bool {
+        self.plot.is_some()
+    }
+
     /// Opens the file, so that a wrong name is refused before anything is measured.
     pub fn open(&self, force: bool) -> Result<Plot, Failure> {
         let sheet = self.plot.as_ref().map(|path| Sheet::still(path, force, self.plot_size)).transpose()?;
@@ -31,6 +36,11 @@ pub struct Plot {
 }
 
 impl Plot {
+    /// Whether there will be one.
+    pub fn wanted(&self) -> bool {
+        self.sheet.is_some()
+    }
+
     /// Draws what `figure` returns, if a picture is wanted.
     pub fn draw(self, figure: impl FnOnce() -> Figure) -> Result<(), Failure> {
         match self.sheet {

@@ -1,27 +1,87 @@
-//! `chalumeau reed`: the tables and the flow law that sound, knob and firmware share.
+//! `chalumeau reed`: the tables and the flow law that sound, knob and firmware share, and their figures.
 
 use crate::cli::Failure;
-use crate::cli::args::within;
+use crate::cli::args::{PlayedArgs, check_fingering, note, within};
+use crate::cli::reed_physical::{self, PhysicalReedArgs};
+use crate::cli::render::progress;
 use crate::cli::table::TableArgs;
+use crate::figure::draw::{Sheet, Size};
+use crate::figure::reed::{self as figures, Kind, Orbit};
+use crate::instrument::Settings;
+use crate::reed::PhysicalReed;
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
-use clap::Args;
+use crate::reed::law::K_INIT;
+use crate::reed::physical::P_REF_PA;
+use crate::reed::physical::SeedReed;
+use crate::render::orbit;
+use crate::units::REFERENCE_RADIUS_M;
+use crate::units::WrittenNote;
+use clap::{Args, ValueEnum};
+use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
   chalumeau reed --table --csv tables.csv
   chalumeau reed --law                        the reference reed
   chalumeau reed --law --H 3                  wider; k follows so that the peak flow stays 1
-  chalumeau reed --law --H 3 --k 0.3849       wider, as stiff as before";
+  chalumeau reed --law --H 3 --k 0.3849       wider, as stiff as before
+  chalumeau reed --physical --H 3             the same reed in N/m and mm
+  chalumeau reed --physical --reed-stiffness 1500 --reed-opening 0.6
+  chalumeau reed --figure coupled --out coupled.svg
+  chalumeau reed --figure orbit --written G4 --gamma 0.7 --out orbit.png
+  chalumeau reed --figure sweep --out sweep.gif
+  chalumeau reed --figure all --out figures   into a directory";
 
-/// The reed's pressure tables, or flow against pressure
+/// Host rate at which the note of the orbit is played, Hz.
+const RATE: u32 = 48_000;
+/// Frames of the sweep and how long each stands, s: ten seconds, smooth enough for the eye.
+const FRAMES: usize = 199;
+const FRAME_S: f64 = 0.05;
+
+/// What can be drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Which {
+    /// The law with opening, stiffness and closing pressure 1, over -0.1..1
+    Unit,
+    /// The same over 0..360 degrees, normalised
+    Angle,
+    /// Rest openings H
+    FamilyH,
+    /// Stiffnesses k
+    FamilyK,
+    /// Openings with the stiffness that keeps the peak at 1
+    Coupled,
+    /// Amplitudes A
+    Amplitude,
+    /// What happens when the air flows back
+    Negative,
+    /// Reeds in kPa and litres a second
+    Physical,
+    /// Animated: H from 5 to 2 with its stiffness (.gif)
+    Sweep,
+    /// One period of a played note over the curve of the reed
+    Orbit,
+    /// Every one of them, into a directory
+    All,
+}
+
+/// The kind of picture `all` makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    Png,
+    Svg,
+    Json,
+}
+
+/// The reed's pressure tables, flow against pressure, or figures of it
 ///
 /// The flow through a reed grows with the root of the pressure difference until the pressure closes the slit faster than
 /// it drives the air: u = A (H sqrt(p) - p^1.5 / k), zero from p = H k on. p is the pressure difference over the closing
 /// pressure of the reference reed.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-#[group(id = "what", required = true, multiple = false, args = ["table", "law"])]
+#[group(id = "what", required = true, multiple = false, args = ["table", "law", "physical", "figure"])]
 pub struct Reed {
     /// The 3601 table entries: i,p,x_a,x_b,sgn with x_a = sqrt(p), x_b = p^1.5
     #[arg(long)]
@@ -29,22 +89,178 @@ pub struct Reed {
     /// The flow law: p,u from p = -1 to beyond closure
     #[arg(long)]
     law: bool,
+    /// Both faces of the reed: H, k, A and zeta, and stiffness, area, width and opening, whichever were given
+    #[arg(long)]
+    physical: bool,
+    /// A figure; needs --out
+    #[arg(long, value_enum, value_name = "FIGURE", requires = "out")]
+    figure: Option<Which>,
     /// Rest opening H, dimensionless, 0.5..10 [default: sqrt(27)/2]
-    #[arg(long = "H", value_name = "H", requires = "law", value_parser = |s: &str| within(s, 0.5, 10.0))]
+    #[arg(long = "H", value_name = "H", conflicts_with_all = ["table", "figure"], value_parser = |s: &str| within(s, 0.5, 10.0))]
     h: Option<f64>,
     /// Stiffness k, dimensionless, 0.01..20 [default: 27/(4 H^3), which makes the peak flow A]
-    #[arg(long = "k", value_name = "K", requires = "law", value_parser = |s: &str| within(s, 0.01, 20.0))]
+    #[arg(long = "k", value_name = "K", conflicts_with_all = ["table", "figure"], value_parser = |s: &str| within(s, 0.01, 20.0))]
     k: Option<f64>,
     /// Amplitude A of the flow, 0..10 [default: 1]
-    #[arg(long = "A", value_name = "A", requires = "law", value_parser = |s: &str| within(s, 0.0, 10.0))]
+    #[arg(long = "A", value_name = "A", conflicts_with_all = ["table", "figure"], value_parser = |s: &str| within(s, 0.0, 10.0))]
     a: Option<f64>,
     #[command(flatten)]
+    measured: PhysicalReedArgs,
+    #[command(flatten)]
     table_args: TableArgs,
+    #[command(flatten)]
+    drawing: Drawing,
+}
+
+/// Where a figure goes, and what the orbit plays.
+#[derive(Args)]
+#[command(next_help_heading = "Figures")]
+struct Drawing {
+    /// A new .png or .svg file (.json for what it shows, .gif for the sweep), or a directory that exists
+    #[arg(long, value_name = "PATH", requires = "figure")]
+    out: Option<PathBuf>,
+    /// Kind of file made in a directory
+    #[arg(long, value_enum, value_name = "KIND", default_value = "png", requires = "figure")]
+    format: Format,
+    /// Size of a figure, pixels, 400..4000 each way, as 1600x1000 [default: what it needs]
+    #[arg(long, value_name = "WxH", requires = "figure")]
+    size: Option<Size>,
+    /// Written note of the orbit: a MIDI number (60) or a name
+    #[arg(long, value_name = "NOTE", default_value = "C4", value_parser = note)]
+    written: u8,
+    /// Mouth pressure of the orbit over closing pressure, 0..3
+    #[arg(long, value_name = "G", default_value = "0.8", value_parser = |s: &str| within(s, 0.0, 3.0))]
+    gamma: f64,
+    /// Embouchure of the orbit, or of --physical: flow strength of the reed, 0.05..0.9
+    #[arg(long, value_name = "ZETA", default_value = "0.3", value_parser = |s: &str| within(s, 0.05, 0.9))]
+    zeta: f64,
+    #[command(flatten)]
+    instrument: PlayedArgs,
+}
+
+impl Which {
+    fn kind(self) -> Option<Kind> {
+        match self {
+            Self::Unit => Some(Kind::Unit),
+            Self::Angle => Some(Kind::Angle),
+            Self::FamilyH => Some(Kind::FamilyH),
+            Self::FamilyK => Some(Kind::FamilyK),
+            Self::Coupled => Some(Kind::Coupled),
+            Self::Amplitude => Some(Kind::Amplitude),
+            Self::Negative => Some(Kind::Negative),
+            Self::Physical => Some(Kind::Physical),
+            Self::Sweep | Self::Orbit | Self::All => None,
+        }
+    }
+
+    /// As on the command line.
+    fn name(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+}
+
+impl Drawing {
+    /// The file of one figure, open before anything is measured.
+    fn sheet(&self, which: Which, out: &Path, force: bool) -> Result<(Which, Sheet), Failure> {
+        let mut path = out.to_owned();
+        if out.is_dir() {
+            let ending = match (which, self.format) {
+                (Which::Sweep, _) => "gif",
+                (_, Format::Png) => "png",
+                (_, Format::Svg) => "svg",
+                (_, Format::Json) => "json",
+            };
+            path.push(format!("reed-{}.{ending}", which.name()));
+        }
+        let sheet = match which {
+            Which::Sweep => Sheet::moving(&path, force, self.size)?,
+            _ => Sheet::still(&path, force, self.size)?,
+        };
+        Ok((which, sheet))
+    }
+
+    fn run(&self, which: Which, out: &Path, force: bool) -> Result<(), Failure> {
+        let wanted: Vec<Which> = match which {
+            Which::All if !out.is_dir() => {
+                return Err(Failure::Usage(format!(
+                    "--figure all makes ten files; --out must be a directory that exists, got {}",
+                    out.display()
+                )));
+            }
+            Which::All => Which::value_variants().iter().copied().filter(|&w| w != Which::All).collect(),
+            one => vec![one],
+        };
+        let orbit = wanted.contains(&Which::Orbit).then(|| self.prepare_orbit()).transpose()?;
+        let sheets =
+            wanted.iter().map(|&which| self.sheet(which, out, force)).collect::<Result<Vec<_>, _>>()?;
+        let orbit = orbit.map(|play| play()).transpose()?;
+        for (which, sheet) in sheets {
+            match (which.kind(), &orbit) {
+                (Some(kind), _) => sheet.draw(&kind.figure()?)?,
+                (None, Some(orbit)) if which == Which::Orbit => sheet.draw(&orbit.figure())?,
+                _ => {
+                    let bar = progress(FRAMES);
+                    sheet.animate(&figures::sweep(FRAMES)?, FRAME_S, || bar.inc(1))?;
+                    bar.finish_and_clear();
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks what the orbit needs; what is returned plays it.
+    fn prepare_orbit(&self) -> Result<impl FnOnce() -> Result<Orbit, Failure> + '_, Failure> {
+        let file = self.instrument.load()?;
+        let written = WrittenNote(self.written);
+        check_fingering(&file, written)?;
+        let sounding = written.sounding(file.transposition).ok_or_else(|| {
+            Failure::Usage(format!(
+                "written {written} sounds outside MIDI's 0..127; choose one nearer the middle"
+            ))
+        })?;
+        Ok(move || {
+            let breath_full_kpa = 20.0;
+            let settings =
+                Settings { zeta: self.zeta as f32, noise: 0.0, breath_full_kpa, ..Settings::default() };
+            let name = file.name.clone();
+            let model = self.instrument.model(file, RATE, settings.a4_hz)?;
+            let period = orbit::period(&model, &settings, sounding, self.gamma as f32, RATE).ok_or_else(|| {
+                Failure::Usage(format!(
+                    "written {written} does not sound at gamma {} and zeta {}; `chalumeau threshold` and `chalumeau \
+                     bifurcation` show where it does",
+                    self.gamma, self.zeta
+                ))
+            })?;
+            let law = settings.reed_law();
+            let flow_unit_m3s = P_REF_PA / model.air.z_c(model.file.nominal_radius_m);
+            Ok(Orbit {
+                title: format!("{name}, written {written}"),
+                note: format!(
+                    "gamma {}, zeta {}, lay {}; {:.1} Hz. The reed has inertia and damping, so it leaves its curve.",
+                    self.gamma, self.zeta, settings.lay, period.f_hz
+                ),
+                closing_pa: settings.closing_pa(),
+                peak_m3s: K_INIT * self.zeta * law.peak_flow() * flow_unit_m3s,
+                lay: f64::from(settings.lay),
+                gamma: period.gamma,
+                step_s: period.step_s,
+                period: period.moments,
+            })
+        })
+    }
 }
 
 impl Reed {
     pub fn run(&self) -> Result<(), Failure> {
         let tables = ReedTables::seed();
+        if let (Some(which), Some(out)) = (self.figure, &self.drawing.out) {
+            if self.table_args.to_file() {
+                return Err(Failure::Usage(
+                    "--csv goes with --table or --law; a figure goes to --out".to_owned(),
+                ));
+            }
+            return self.drawing.run(which, out, self.table_args.force());
+        }
         if self.table {
             let mut table = self.table_args.open("i,p,x_a,x_b,sgn")?;
             let columns =
@@ -54,11 +270,22 @@ impl Reed {
             }
             return table.finish();
         }
-        let (h, a) = (self.h.unwrap_or(ReedLaw::default().h()), self.a.unwrap_or(1.0));
-        let law = match self.k {
+        let reference = PhysicalReed::reference();
+        let measured =
+            self.measured.reed(REFERENCE_RADIUS_M).map(|reed| reed.seed(&reference, self.a.unwrap_or(1.0)));
+        let (h, a) =
+            (measured.map(|seed| seed.h).or(self.h).unwrap_or(ReedLaw::default().h()), self.a.unwrap_or(1.0));
+        let law = match measured.map(|seed| seed.k).or(self.k) {
             Some(k) => ReedLaw::free(h, k, a)?,
             None => ReedLaw::coupled(h, a)?,
         };
+        if self.physical {
+            let zeta = self.drawing.zeta;
+            let seed = measured.unwrap_or(SeedReed { h, k: law.k(), a, zeta, area: 1.0 });
+            let reed = PhysicalReed::from_seed(&seed, &reference);
+            let lay = f64::from(Settings::default().lay);
+            return reed_physical::both_faces(&seed, &reed, lay, &self.table_args);
+        }
         let mut table = self.table_args.open("p,u")?;
         table.comment(format_args!(
             "H = {}, k = {}, A = {}: peak flow {:.6} at p = {:.6}, closed from p = {:.6}",

@@ -1,8 +1,11 @@
 //! `chalumeau render`: a MIDI file, a note or a scale as a WAV file, with a look inside if wanted.
 
 use crate::cli::Failure;
+use crate::cli::args::within;
 use crate::cli::play::{PlayArgs, Prepared};
+use crate::cli::plot::PlotArgs;
 use crate::cli::table::Table;
+use crate::cli::watch::Watch;
 use crate::instrument::Probe;
 use crate::output::NewFile;
 use crate::reed::physical::P_REF_PA;
@@ -12,6 +15,7 @@ use crate::render::wav::{Depth, Level, WavFile};
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 /// Samples per block; any number gives the same sound.
@@ -25,6 +29,8 @@ Examples:
   chalumeau render --scale E3:C6 --slurred --seconds 0.4 --out scale.wav
   chalumeau render --written G4 --breath ramp:0:1.2:4 --seconds 5 --probe g4.csv --out g4.wav
       From silence over the threshold to a reed held shut, with pressures, flow and opening.
+  chalumeau render melody.mid --out melody.wav --plot melody.png
+      Waveform, spectrogram, pitch against the score, breath, and the reed from near.
   chalumeau render melody.mid --replay take.csv --out again.wav
   chalumeau render melody.mid --crescendo 0.4:0.9 --bits 16 --rate 44100 --out loud.wav";
 
@@ -66,6 +72,11 @@ pub struct Render {
     /// Replace existing files
     #[arg(long, help_heading = "Output")]
     force: bool,
+    #[command(flatten)]
+    plot: PlotArgs,
+    /// Time of the figure's close look at the reed, s [default: the middle of the longest note]
+    #[arg(long, value_name = "S", requires = "plot", help_heading = "Output", value_parser = |s: &str| within(s, 0.0, 1e6))]
+    plot_at: Option<f64>,
 }
 
 impl Render {
@@ -76,6 +87,8 @@ impl Render {
         let mut out = NewFile::create(&self.out, self.force)?;
         let mut probe =
             self.probe.as_deref().map(|path| ProbeTable::open(path, self, &prepared)).transpose()?;
+        let plot = self.plot.open(self.force)?;
+        let watch = plot.wanted().then(|| Watch::new(&prepared, self.plot_at)).transpose()?;
         let mut clarinet = prepared.clarinet();
         let depth = match self.bits {
             Bits::Int16 => Depth::Int16,
@@ -84,26 +97,36 @@ impl Render {
         };
         let mut wav = WavFile::new(&mut out, *rate, depth, self.channels, score.samples)?;
         let bar = progress(score.samples);
+        // Who looks gets samples and insides in turn, hence the cell.
+        let watch = watch.map(RefCell::new);
         let mut write = |block: &[f32]| {
             bar.inc(block.len() as u64);
+            if let Some(watch) = &watch {
+                watch.borrow_mut().hear(block);
+            }
             wav.write(block).map_err(Failure::from)
         };
-        match &mut probe {
-            Some(probe) => {
-                player::play_probed(
-                    &mut clarinet,
-                    score,
-                    BLOCK,
-                    &mut |inside| probe.write(inside),
-                    &mut write,
-                )?;
-            }
-            None => player::play(&mut clarinet, score, BLOCK, &mut write)?,
+        if probe.is_some() || watch.is_some() {
+            let mut inside = |moment| {
+                if let Some(probe) = &mut probe {
+                    probe.write(moment);
+                }
+                if let Some(watch) = &watch {
+                    watch.borrow_mut().inside(moment);
+                }
+            };
+            player::play_probed(&mut clarinet, score, BLOCK, &mut inside, &mut write)?;
+        } else {
+            player::play(&mut clarinet, score, BLOCK, &mut write)?;
         }
         let level = wav.finish()?;
         bar.finish_and_clear();
         if let Some(probe) = probe {
             probe.finish()?;
+        }
+        if let Some(watch) = watch {
+            let (watched, about) = (watch.into_inner().finish(), about(&prepared));
+            plot.draw(|| watched.figure(&self.play.title(), about))?;
         }
         out.keep()?;
         self.report(score, *rate, level, clarinet.resets());
@@ -147,6 +170,19 @@ impl Render {
             );
         }
     }
+}
+
+/// What a reader of a figure wants to know of how it was played.
+pub fn about(prepared: &Prepared) -> Vec<String> {
+    let Prepared { model, settings, score, rate } = prepared;
+    vec![format!(
+        "{}; {:.2} s at {rate} Hz, A4 = {} Hz, zeta {}, the reed shuts at {:.2} kPa",
+        model.file.name,
+        score.seconds(*rate),
+        settings.a4_hz,
+        settings.zeta,
+        1e-3 * settings.closing_pa()
+    )]
 }
 
 /// Seen on a terminal only.

@@ -1,7 +1,9 @@
 //! The player's settings as arguments.
 
+use crate::bore::instrument_file::InstrumentFile;
 use crate::cli::Failure;
 use crate::cli::args::within_f32;
+use crate::cli::reed_physical::PhysicalReedArgs;
 use crate::instrument::{Settings, Tuning};
 use crate::render::breath::BreathCurve;
 use crate::render::score;
@@ -50,8 +52,8 @@ pub struct SettingsArgs {
     /// No breath noise, for measurements
     #[arg(long)]
     no_noise: bool,
-    /// Pitch of A4, Hz, 430..450 [default: 440]
-    #[arg(long, value_name = "HZ", value_parser = |s: &str| within_f32(s, 430.0, 450.0))]
+    /// Pitch of A4, Hz, 415..466 [default: 440]
+    #[arg(long, value_name = "HZ", value_parser = |s: &str| within_f32(s, 415.0, 466.0))]
     a4: Option<f32>,
     /// Hold every note in tune whatever the breath, instead of letting it drift as the bore does
     #[arg(long)]
@@ -68,6 +70,8 @@ pub struct SettingsArgs {
     /// Mouth pressure at full breath (CC2 = 127), kPa, 2..20 [default: 6, more if gamma needs it]
     #[arg(long, value_name = "KPA", value_parser = |s: &str| within_f32(s, 2.0, 20.0))]
     breath_full: Option<f32>,
+    #[command(flatten)]
+    measured: PhysicalReedArgs,
 }
 
 impl SettingsArgs {
@@ -101,8 +105,9 @@ impl SettingsArgs {
     }
 
     /// Settings whose full breath reaches the curve's largest gamma: raised for it unless the user has chosen it.
-    pub fn blown_by(&self, curve: Option<&BreathCurve>) -> Result<Settings, Failure> {
-        let mut settings = self.settings();
+    /// The instrument's nominal bore is what a reed given in millimetres is measured against.
+    pub fn blown_by(&self, curve: Option<&BreathCurve>, file: &InstrumentFile) -> Result<Settings, Failure> {
+        let mut settings = self.measured.over(self.settings(), file.nominal_radius_m)?;
         let Some(gamma_max) = curve.map(BreathCurve::gamma_max) else { return Ok(settings) };
         let closing_kpa = score::closing_kpa(&settings);
         // Less what single precision adds to a closing pressure of 6 kPa.

@@ -20,6 +20,11 @@ pub struct TableArgs {
 }
 
 impl TableArgs {
+    /// Whether the table was to go to a file.
+    pub fn to_file(&self) -> bool {
+        self.csv != Path::new("-")
+    }
+
     /// Whether existing files are to be replaced.
     pub fn force(&self) -> bool {
         self.force

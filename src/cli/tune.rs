@@ -3,10 +3,12 @@
 use crate::analysis::pitch;
 use crate::cli::Failure;
 use crate::cli::args::{NotesArg, PlayedArgs, within};
+use crate::cli::plot::PlotArgs;
 use crate::cli::render::progress;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::table::TableArgs;
-use crate::instrument::{Clarinet, Model, Settings};
+use crate::figure::tune::{self, Heard, Round};
+use crate::instrument::{Clarinet, Model, Settings, Tuning};
 use crate::render;
 use crate::render::breath::{BreathCurve, GAMMA_MAX};
 use crate::render::score::Score;
@@ -27,7 +29,8 @@ const EXAMPLES: &str = "\
 Examples:
   chalumeau tune --rate 48000 --gamma 0.5
   chalumeau tune --gamma 0.8 --tempered --csv loud.csv
-  chalumeau tune --written G5 --strength 3.5";
+  chalumeau tune --written G5 --strength 3.5
+  chalumeau tune --gamma 0.7 --plot tune.png    natural and tempered, as a figure";
 
 /// Play every note steadily and measure its pitch
 ///
@@ -50,6 +53,8 @@ pub struct Tune {
     #[command(flatten)]
     table: TableArgs,
     #[command(flatten)]
+    plot: PlotArgs,
+    #[command(flatten)]
     settings: SettingsArgs,
 }
 
@@ -58,41 +63,21 @@ impl Tune {
         let file = self.instrument.load()?;
         let notes = self.notes.notes(&file)?;
         let curve = BreathCurve::constant(self.gamma as f32);
-        let mut settings = self.settings.blown_by(Some(&curve))?;
+        let mut settings = self.settings.blown_by(Some(&curve), &file)?;
         if !self.settings.noise_given() {
             settings.noise = 0.0;
         }
         let rate = self.rate;
         let name = file.name.clone();
         let mut table = self.table.open("written_midi,f_hz,cents,register_ok")?;
+        let plot = self.plot.open(self.table.force())?;
         table.comment(format_args!(
             "{}; gamma {}, {rate} Hz, A4 = {} Hz; tongued, measured from {SETTLE_S} s on",
             name, self.gamma, settings.a4_hz
         ))?;
         let model = self.instrument.model(file, rate, settings.a4_hz)?;
-        let bar = progress(notes.len());
-        let measured = |written: WrittenNote| {
-            let heard = measure(written, &model, &curve, &settings, rate);
-            bar.inc(1);
-            heard
-        };
-        let workers = thread::available_parallelism().map_or(1, usize::from);
-        let share = notes.len().div_ceil(workers).max(1);
-        let heard: Vec<Option<(f64, f64)>> = thread::scope(|scope| {
-            let measured = &measured;
-            let shares: Vec<_> = notes
-                .chunks(share)
-                .map(|notes| {
-                    scope.spawn(move || notes.iter().map(|&note| measured(note)).collect::<Vec<_>>())
-                })
-                .collect();
-            shares
-                .into_iter()
-                .flat_map(|share| share.join().unwrap_or_else(|e| std::panic::resume_unwind(e)))
-                .collect()
-        });
-        bar.finish_and_clear();
-        for (WrittenNote(written), heard) in notes.into_iter().zip(heard) {
+        let heard = measure_all(&notes, &model, &curve, &settings, rate);
+        for (WrittenNote(written), heard) in notes.iter().zip(&heard) {
             match heard {
                 Some((f_hz, cents)) => {
                     let register_ok = u8::from(cents.abs() <= OWN_CENTS);
@@ -101,8 +86,70 @@ impl Tune {
                 None => table.line(format_args!("{written},nan,nan,0"))?,
             }
         }
-        table.finish()
+        table.finish()?;
+        plot.draw(|| {
+            // The other way of tuning beside it.
+            let other = match settings.tuning {
+                Tuning::Natural => Tuning::Tempered,
+                Tuning::Tempered => Tuning::Natural,
+            };
+            let beside = Settings { tuning: other, ..settings };
+            let beside = (other, measure_all(&notes, &model, &curve, &beside, rate));
+            let mut rounds = [(settings.tuning, heard), beside].map(|(tuning, heard)| round(tuning, &notes, &heard));
+            rounds.sort_by(|a, b| a.name.cmp(&b.name));
+            let note = format!(
+                "gamma {}, A4 = {} Hz, strength {}, zeta {}, {} Celsius; each note tongued, measured from {SETTLE_S} s on. \
+                 Natural drifts with the breath as the bore does, tempered is held in tune.",
+                self.gamma, settings.a4_hz, settings.strength, settings.zeta, settings.temperature_c
+            );
+            tune::figure(&name, &note, &rounds)
+        })
     }
+}
+
+/// One round for the figure.
+fn round(tuning: Tuning, notes: &[WrittenNote], heard: &[Option<(f64, f64)>]) -> Round {
+    let name = match tuning {
+        Tuning::Natural => "natural",
+        Tuning::Tempered => "tempered",
+    };
+    let heard = heard.iter().map(|heard| match *heard {
+        Some((_, cents)) if cents.abs() <= OWN_CENTS => Heard::Own(cents),
+        Some((_, cents)) => Heard::Other(cents),
+        None => Heard::Silence,
+    });
+    Round { name: name.to_owned(), notes: notes.iter().map(|written| written.0).zip(heard).collect() }
+}
+
+/// Frequency and cents of every note, on all cores, with progress.
+fn measure_all(
+    notes: &[WrittenNote],
+    model: &Arc<Model>,
+    curve: &BreathCurve,
+    settings: &Settings,
+    rate: u32,
+) -> Vec<Option<(f64, f64)>> {
+    let bar = progress(notes.len());
+    let measured = |written: WrittenNote| {
+        let heard = measure(written, model, curve, settings, rate);
+        bar.inc(1);
+        heard
+    };
+    let workers = thread::available_parallelism().map_or(1, usize::from);
+    let share = notes.len().div_ceil(workers).max(1);
+    let heard = thread::scope(|scope| {
+        let measured = &measured;
+        let shares: Vec<_> = notes
+            .chunks(share)
+            .map(|notes| scope.spawn(move || notes.iter().map(|&note| measured(note)).collect::<Vec<_>>()))
+            .collect();
+        shares
+            .into_iter()
+            .flat_map(|share| share.join().unwrap_or_else(|e| std::panic::resume_unwind(e)))
+            .collect()
+    });
+    bar.finish_and_clear();
+    heard
 }
 
 /// Frequency of a note, Hz, and its distance from where it should be, cents; `None` if it does not sound.

@@ -2,9 +2,12 @@
 //!
 //! A polyphase FIR: one Kaiser-windowed sinc, sampled at as many phases as the ratio of the two rates needs. It is
 //! linear-phase and leaves out nothing but steepness: the transition runs from 5/12 to 7/12 of the lower of the two
-//! rates, so what folds back lands above 5/12 of the host's rate (18.4 kHz at 44.1 kHz). Formulas for the window and
-//! its length: J. F. Kaiser, Nonrecursive digital filter design using the I0-sinh window function, ISCAS 1974.
+//! rates, so what folds back lands above 5/12 of the host's rate (18.4 kHz at 44.1 kHz).
 //! Designed in f64, run in f32; frequencies in Hz, positions counted in whole numbers, so nothing drifts.
+//!
+//! The input's clock may run faster or slower than its rate says, gliding from one speed to another: then positions are
+//! counted in parts of 2^-32 input samples and [`warp`](super::warp) supplies the taps. Once the speed is 1 again, the
+//! position drifts onto the grid of the plain conversion, inaudibly slowly, and that is what goes on.
 //!
 //! Measured by the tests below. *Ripple*: largest deviation from 0 dB for sines up to the pass edge. *Rest*: everything
 //! in the output that is not the sine (images, aliases, rounding), largest over the same sines. *Alias*: largest output
@@ -24,50 +27,64 @@
 //! | 96 000 -> 50 000 | 72 | 0.365 | 20 833 | 29 167 | 0.0001 | -114 | -98 |
 //! | 96 000 -> 47 999 (mixed phases) | 72 | 0.365 | 20 000 | 27 999 | 0.0002 | -115 | -94 |
 
-use std::f64::consts::PI;
+use crate::dsp::kernel::{Kernel, LANES, TRANSITION, dot, normalised};
+use crate::dsp::warp::{BEYOND, ONE, SPEEDS, Warp};
 
 /// Largest number of phases stored exactly; above it, neighbouring phases are mixed linearly.
 const PHASES: u64 = 512;
-/// Lanes of the dot product; tap counts are multiples of it.
-const LANES: usize = 8;
-/// Width of the transition over the lower rate: 2:1 then costs 72 taps and passes 20 kHz to a host at 48 kHz.
-const TRANSITION: f64 = 1.0 / 6.0;
-/// Attenuation asked of the design, dB. Rounding the taps up gives more, never less.
-const ATTENUATION_DB: f64 = 94.0;
-/// What the length formula promises and the stop band does not quite keep at its edge, dB: the window is shaped for
-/// this much less, which moves the edge where it should be.
-const EDGE_DB: f64 = 2.0;
 /// Room for new inputs behind the ones still heard.
 const ROOM: usize = 1024;
 /// Rates are reduced to a fraction after rounding to this part of a hertz.
 const PARTS_PER_HZ: f64 = 1000.0;
+/// How fast a clock of speed 1 drifts back onto the grid, of its speed: a sixth of a cent, half a sample in 50 ms.
+const DRIFT: f64 = 1e-4;
 
-/// Pull-model sample-rate converter, one channel. See the module's head for its figures.
+/// Sample-rate converter, one channel. See the module's head for its figures.
 ///
-/// The host asks for samples; [`inputs_needed`](Self::inputs_needed) says how many of the instrument's samples that
-/// takes, and [`process`](Self::process) turns exactly those into exactly the ones asked for. Output does not depend
-/// on how the calls are cut. Equal rates pass through untouched, without latency.
+/// The host asks for samples: [`pull`](Self::pull) makes as many as its inputs allow, and when it comes back short,
+/// [`push`](Self::push) gives it more. Output does not depend on how the pulls are cut. Equal rates are a pure delay.
 #[derive(Clone, Debug)]
 pub struct Resampler {
     /// `out / in = l / m` in lowest terms.
     l: u64,
     m: u64,
-    /// Position of the next output after the newest input, in parts of `1 / l` input samples; below `l`.
+    /// `m / l` as whole inputs and parts of `1 / l`.
+    whole: usize,
+    part: u64,
+    /// Position of the next output after the newest input it hears, in parts of `1 / l` input samples; below `l`.
     phase: u64,
     taps: usize,
-    /// `[phase][tap]`, oldest tap first. `l` rows, or `PHASES + 1` when mixed.
+    /// `[phase][tap]`, oldest tap first. `l` rows, or `PHASES + 1` when mixed; none for equal rates.
     coeffs: Box<[[f32; LANES]]>,
-    /// The last inputs in order; when it is full, the last `taps` of them move to its beginning.
+    /// The last inputs in order; when it is full, what can still be heard moves to its beginning.
     history: Box<[f32]>,
-    /// Where the next input is written; the `taps` before it are heard.
+    /// Inputs that can still be heard.
+    reach: usize,
+    /// Where the next input is written.
     next: usize,
+    /// The next output hears the inputs before this one, which may not have come yet.
+    end: usize,
     /// Group delay of the FIR, input samples.
     delay: f64,
     pass_hz: f64,
     stop_hz: f64,
+    warp: Warp,
+    /// The clock is off its speed or off the grid: `fraction` counts, not `phase`.
+    warping: bool,
+    /// Position of the next output after the newest input it hears, in parts of [`ONE`].
+    fraction: u64,
+    /// Speed of the clock at input `from`, and how it changes per input.
+    speed: f64,
+    speed_glide: f64,
+    from: usize,
+    /// Speed the clock glides to.
+    speed_wanted: f64,
 }
 
 impl Resampler {
+    /// Most inputs that may be pushed at once.
+    pub const PUSH_MOST: usize = ROOM / 2;
+
     /// Converter from `in_hz` to `out_hz`, each held to 1000..=1 000 000 Hz and rounded to a thousandth of a hertz.
     /// Allocates.
     pub fn new(in_hz: f64, out_hz: f64) -> Self {
@@ -77,108 +94,186 @@ impl Resampler {
         let common = gcd(input, output);
         let (l, m) = (output / common, input / common);
         let (in_hz, lower_hz) = (input as f64 / PARTS_PER_HZ, input.min(output) as f64 / PARTS_PER_HZ);
-        if l == m {
-            return Self {
-                l,
-                m,
-                phase: 0,
-                taps: 0,
-                coeffs: Box::default(),
-                history: Box::default(),
-                next: 0,
-                delay: 0.0,
-                pass_hz: in_hz / 2.0,
-                stop_hz: in_hz / 2.0,
-            };
-        }
-        let width = TRANSITION * lower_hz / in_hz;
-        let taps = ((ATTENUATION_DB - 7.95) / (14.36 * width)).ceil() as usize;
-        let taps = taps.next_multiple_of(LANES);
-        let beta = 0.1102 * (14.36 * width * taps as f64 + 7.95 - EDGE_DB - 8.7);
         // Exact phases 0..l stop short of a whole sample: centred between the first tap and the last, the set of all
-        // of them is symmetric. Mixed phases include both ends.
-        let (rows, steps, span) = if l <= PHASES {
-            (l, l as f64, taps as f64 - 1.0 / l as f64)
-        } else {
-            (PHASES + 1, PHASES as f64, taps as f64)
-        };
-        let cutoff = lower_hz / in_hz;
+        // of them is symmetric. Mixed phases include both ends. Equal rates want a delay of whole samples.
+        let exact = l <= PHASES && l != m;
+        let (rows, steps) = if exact { (l, l as f64) } else { (PHASES + 1, PHASES as f64) };
+        let kernel = Kernel::new(in_hz, lower_hz, if exact { 1.0 / l as f64 } else { 0.0 });
+        let taps = kernel.taps;
         let mut coeffs = Vec::with_capacity(rows as usize * taps);
         let mut row = vec![0.0; taps];
-        for phase in 0..rows {
+        for phase in 0..if l == m { 0 } else { rows } {
             for (age, tap) in row.iter_mut().rev().enumerate() {
-                let t = age as f64 + phase as f64 / steps - span / 2.0;
-                *tap = sinc(cutoff * t) * kaiser(t / (span / 2.0), beta);
+                *tap = kernel.at(age as f64 + phase as f64 / steps - kernel.half);
             }
-            // Each phase passes a constant unchanged, so that breath pressure makes no whistle at the phase rate.
-            let sum: f64 = row.iter().sum();
-            coeffs.extend(row.iter().map(|tap| (tap / sum) as f32));
+            coeffs.extend(normalised(&row));
         }
-        Self {
+        let warp = Warp::new(&kernel, in_hz, output as f64 / PARTS_PER_HZ);
+        let (whole, part) = ((m / l) as usize, m % l);
+        // One output's step beyond what is heard: where the next one stands may be that far ahead of the inputs.
+        let reach = warp.reach() + (SPEEDS.1 * m as f64 / l as f64).ceil() as usize;
+        let mut resampler = Self {
             l,
             m,
+            whole,
+            part,
             phase: 0,
             taps,
             coeffs: coeffs.as_chunks().0.into(),
-            history: vec![0.0; taps + ROOM].into_boxed_slice(),
-            next: taps,
-            delay: span / 2.0,
-            pass_hz: lower_hz * (0.5 - TRANSITION / 2.0),
-            stop_hz: lower_hz * (0.5 + TRANSITION / 2.0),
+            history: vec![0.0; reach + ROOM].into_boxed_slice(),
+            reach,
+            next: 0,
+            end: 0,
+            delay: kernel.half,
+            pass_hz: if l == m { in_hz / 2.0 } else { lower_hz * (0.5 - TRANSITION / 2.0) },
+            stop_hz: if l == m { in_hz / 2.0 } else { lower_hz * (0.5 + TRANSITION / 2.0) },
+            warp,
+            warping: false,
+            fraction: 0,
+            speed: 1.0,
+            speed_glide: 0.0,
+            from: 0,
+            speed_wanted: 1.0,
+        };
+        resampler.reset();
+        resampler
+    }
+
+    /// More inputs, while whose clock glides to `speed` (0.25..=4, 1 is their rate). At most
+    /// [`PUSH_MOST`](Self::PUSH_MOST), and only after [`pull`](Self::pull) came back short. Real-time safe.
+    #[inline]
+    pub fn push(&mut self, input: &[f32], speed: f64) {
+        debug_assert!(input.len() <= Self::PUSH_MOST && self.end > self.next);
+        let input = &input[..input.len().min(Self::PUSH_MOST)];
+        if self.next + input.len() + BEYOND > self.history.len() {
+            let gone = self.next - self.reach;
+            self.history.copy_within(gone..self.next, 0);
+            self.next -= gone;
+            self.end -= gone;
+            // Far behind while the clock is plain, and not looked at.
+            self.from = self.from.saturating_sub(gone);
         }
-    }
-
-    /// Input samples the next `outputs` output samples consume. Depends on the state. Real-time safe.
-    pub fn inputs_needed(&self, outputs: usize) -> usize {
-        ((self.phase + outputs as u64 * self.m) / self.l) as usize
-    }
-
-    /// Most input samples any `outputs` output samples can consume: the size of the caller's buffer.
-    pub fn inputs_needed_at_most(&self, outputs: usize) -> usize {
-        (outputs as u64 * self.m).div_ceil(self.l) as usize
-    }
-
-    /// Fills `out` from `input`, of which there must be [`inputs_needed`](Self::inputs_needed)`(out.len())`; missing
-    /// samples count as silence, surplus ones are dropped (both refused in debug builds). Real-time safe.
-    pub fn process(&mut self, input: &[f32], out: &mut [f32]) {
-        debug_assert_eq!(input.len(), self.inputs_needed(out.len()));
-        if self.l == self.m {
-            let shared = input.len().min(out.len());
-            out[..shared].copy_from_slice(&input[..shared]);
-            out[shared..].fill(0.0);
-            return;
+        if speed != 1.0 || self.warping {
+            self.glide(input.len(), speed);
         }
-        let mut input = input;
-        // Rates differ by 1000 at most, so there is always room for what one output takes.
-        let piece = ((ROOM as u64 * self.l / self.m) as usize).max(1);
-        for out in out.chunks_mut(piece) {
-            let needed = self.inputs_needed(out.len());
-            let (now, later) = input.split_at(needed.min(input.len()));
-            input = later;
-            let mut end = self.take(now, needed);
-            for out in out {
-                self.phase += self.m;
-                while self.phase >= self.l {
-                    self.phase -= self.l;
-                    end += 1;
-                }
-                *out = self.output(end);
+        self.history[self.next..self.next + input.len()].copy_from_slice(input);
+        self.next += input.len();
+    }
+
+    /// Lets the clock glide to `speed` over the `inputs` that come now.
+    fn glide(&mut self, inputs: usize, speed: f64) {
+        if !self.warping {
+            self.warping = true;
+            self.fraction = (self.phase << 32) / self.l;
+        }
+        let speed = if speed.is_finite() { speed.clamp(SPEEDS.0, SPEEDS.1) } else { 1.0 };
+        self.speed = self.speed_wanted;
+        self.speed_wanted = speed;
+        self.speed_glide = (speed - self.speed) / inputs.max(1) as f64;
+        self.from = self.next;
+        self.warp.choose(speed.min(self.speed));
+    }
+
+    /// Fills `out` as far as the inputs allow; returns how far. Real-time safe.
+    pub fn pull(&mut self, out: &mut [f32]) -> usize {
+        let mut made = 0;
+        while made < out.len() && self.end <= self.next {
+            let out = &mut out[made..];
+            made += if self.warping { self.pull_warped(out) } else { self.pull_plain(out) };
+        }
+        made
+    }
+
+    fn pull_plain(&mut self, out: &mut [f32]) -> usize {
+        // As many as the inputs allow: the last of them still finds the inputs it hears.
+        let left = (self.next - self.end) as u64;
+        let most = ((left + 1) * self.l - 1 - self.phase) / self.m + 1;
+        let count = out.len().min(most as usize);
+        let out = &mut out[..count];
+        if self.coeffs.is_empty() {
+            self.step_through(out, |this, end, _| this.history[end - 1 - this.taps / 2]);
+        } else if self.l <= PHASES {
+            self.step_through(out, |this, end, phase| {
+                dot(&this.history[end - this.taps..end], this.row(phase as usize))
+            });
+        } else {
+            self.step_through(out, Self::mixed);
+        }
+        count
+    }
+
+    /// Fills `out` with what `output` makes of each position.
+    #[inline(always)]
+    fn step_through(&mut self, out: &mut [f32], output: impl Fn(&Self, usize, u64) -> f32) {
+        let (mut end, mut phase) = (self.end, self.phase);
+        for out in out {
+            *out = output(self, end, phase);
+            end += self.whole;
+            phase += self.part;
+            if phase >= self.l {
+                phase -= self.l;
+                end += 1;
             }
         }
+        (self.end, self.phase) = (end, phase);
+    }
+
+    /// Beside the plain way, which is taken every few samples and should not prepare for this one.
+    #[inline(never)]
+    fn pull_warped(&mut self, out: &mut [f32]) -> usize {
+        let mut made = 0;
+        let step = self.m as f64 / self.l as f64 * ONE as f64;
+        for out in out {
+            if self.end > self.next {
+                break;
+            }
+            let gliding = (self.end - 1).saturating_sub(self.from) as f64;
+            let (low, high) = SPEEDS;
+            let speed = (self.speed + self.speed_glide * gliding).clamp(low, high);
+            *out = self.warp.output(&self.history, self.end, self.fraction, speed);
+            made += 1;
+            self.advance((step * speed).round() as u64);
+            if speed == 1.0 && self.speed_wanted == 1.0 && self.land((step * DRIFT) as i64) {
+                break;
+            }
+        }
+        made
+    }
+
+    fn advance(&mut self, step: u64) {
+        let position = self.fraction + step;
+        self.end += (position >> 32) as usize;
+        self.fraction = position & (ONE - 1);
+    }
+
+    /// Moves the next output towards the grid of the plain conversion, by `most` at most; true when it is there.
+    fn land(&mut self, most: i64) -> bool {
+        let phase = (self.fraction * self.l + ONE / 2) >> 32;
+        let away = ((phase << 32) / self.l) as i64 - self.fraction as i64;
+        if away.abs() > most {
+            // The grid's points lie in 0..=ONE, and this stops short of the nearest.
+            self.fraction = (self.fraction as i64 + most * away.signum()) as u64;
+            return false;
+        }
+        (self.end, self.phase) = if phase < self.l { (self.end, phase) } else { (self.end + 1, 0) };
+        (self.warping, self.speed, self.speed_glide) = (false, 1.0, 0.0);
+        true
     }
 
     /// Silence, and the position of a new converter. Real-time safe.
     pub fn reset(&mut self) {
-        self.phase = 0;
-        self.next = self.taps;
         self.history.fill(0.0);
+        self.next = self.reach;
+        (self.end, self.phase) = (self.next + self.whole, self.part);
+        (self.warping, self.fraction, self.from) = (false, 0, self.next);
+        (self.speed, self.speed_glide, self.speed_wanted) = (1.0, 0.0, 1.0);
+        self.warp.choose(1.0);
     }
 
-    /// Delay of the output behind the input, output samples: a signal at input time 0 comes out around this index.
+    /// Delay of the output behind the input at speed 1, output samples: a signal at input time 0 comes out around this
+    /// index. At other speeds the same to a sample, as long as the input is worth no less than the lower of the rates;
+    /// below that it grows as the speed falls.
     pub fn latency_out_samples(&self) -> f64 {
-        if self.l == self.m {
-            return 0.0;
-        }
         (self.delay + 1.0) * self.l as f64 / self.m as f64 - 1.0
     }
 
@@ -187,33 +282,16 @@ impl Resampler {
         (self.pass_hz, self.stop_hz)
     }
 
-    /// Length of one output's dot product; 0 for equal rates. Ratios above 512 phases do two.
+    /// Length of one output's dot product. Ratios above 512 phases and speeds other than 1 do two.
     pub fn taps(&self) -> usize {
         self.taps
     }
 
-    /// Writes `needed` inputs behind those there are; returns where the new ones begin.
-    fn take(&mut self, input: &[f32], needed: usize) -> usize {
-        if self.next + needed > self.history.len() {
-            self.history.copy_within(self.next - self.taps..self.next, 0);
-            self.next = self.taps;
-        }
-        let begin = self.next;
-        self.next += needed;
-        let (given, missing) = self.history[begin..self.next].split_at_mut(input.len());
-        given.copy_from_slice(input);
-        missing.fill(0.0);
-        begin
-    }
-
-    /// The output that hears the `taps` inputs before `end`.
-    #[inline]
-    fn output(&self, end: usize) -> f32 {
+    /// The output that hears the inputs before `end`, between two of the phases kept.
+    #[inline(never)]
+    fn mixed(&self, end: usize, phase: u64) -> f32 {
         let heard = &self.history[end - self.taps..end];
-        if self.l <= PHASES {
-            return dot(heard, self.row(self.phase as usize));
-        }
-        let position = self.phase * PHASES;
+        let position = phase * PHASES;
         let (row, mix) = ((position / self.l) as usize, (position % self.l) as f32 / self.l as f32);
         let (before, after) = (dot(heard, self.row(row)), dot(heard, self.row(row + 1)));
         before + mix * (after - before)
@@ -226,46 +304,14 @@ impl Resampler {
     }
 }
 
-/// Sum of products in eight lanes, then of the lanes one by one: the same order on every machine. (Added pairwise, the
-/// compiler would split the lanes into pairs.)
-#[inline]
-fn dot(a: &[f32], b: &[[f32; LANES]]) -> f32 {
-    let mut lanes = [0.0f32; LANES];
-    for (a, b) in a.as_chunks::<LANES>().0.iter().zip(b) {
-        for k in 0..LANES {
-            lanes[k] += a[k] * b[k];
-        }
-    }
-    lanes.iter().sum()
-}
-
 fn gcd(a: u64, b: u64) -> u64 {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
-fn sinc(x: f64) -> f64 {
-    if x == 0.0 { 1.0 } else { (PI * x).sin() / (PI * x) }
-}
-
-/// Kaiser window at `x` in -1..=1, 1 in the middle.
-fn kaiser(x: f64, beta: f64) -> f64 {
-    bessel_i0(beta * (1.0 - x * x).max(0.0).sqrt()) / bessel_i0(beta)
-}
-
-/// Modified Bessel function of the first kind, order 0, by its power series (all terms positive).
-fn bessel_i0(x: f64) -> f64 {
-    let quarter = x * x / 4.0;
-    let (mut sum, mut term, mut k) = (1.0, 1.0, 1.0);
-    while term > 1e-17 * sum {
-        term *= quarter / (k * k);
-        sum += term;
-        k += 1.0;
-    }
-    sum
-}
-
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
 
     const PAIRS: [(f64, f64); 11] = [
@@ -286,20 +332,27 @@ mod tests {
         (0..len).map(|n| (2.0 * PI * f_hz * n as f64 / rate_hz).sin() as f32).collect()
     }
 
-    fn convert(resampler: &mut Resampler, input: &[f32], blocks: impl Iterator<Item = usize>) -> Vec<f32> {
+    /// Pulls blocks, pushing 16 inputs whenever they run out, until they end. Gives the outputs and the inputs pushed.
+    fn convert(
+        resampler: &mut Resampler,
+        input: &[f32],
+        blocks: impl Iterator<Item = usize>,
+    ) -> (Vec<f32>, usize) {
         let (mut out, mut at) = (Vec::new(), 0);
         for block in blocks {
-            let needed = resampler.inputs_needed(block);
-            assert!(needed <= resampler.inputs_needed_at_most(block));
-            if at + needed > input.len() {
-                break;
-            }
             let mut part = vec![0.0; block];
-            resampler.process(&input[at..at + needed], &mut part);
-            at += needed;
+            let mut made = resampler.pull(&mut part);
+            while made < block {
+                if at + 16 > input.len() {
+                    return (out, at);
+                }
+                resampler.push(&input[at..at + 16], 1.0);
+                at += 16;
+                made += resampler.pull(&mut part[made..]);
+            }
             out.extend(part);
         }
-        out
+        (out, at)
     }
 
     /// What came of a unit sine: its amplitude, its delay in output samples (modulo its period) and the rms of
@@ -312,7 +365,8 @@ mod tests {
 
     fn heard(in_hz: f64, out_hz: f64, f_hz: f64) -> Heard {
         let mut resampler = Resampler::new(in_hz, out_hz);
-        let out = convert(&mut resampler, &sine(f_hz, in_hz, (in_hz * 0.3) as usize), std::iter::repeat(64));
+        let (out, _) =
+            convert(&mut resampler, &sine(f_hz, in_hz, (in_hz * 0.3) as usize), std::iter::repeat(64));
         let skip = 400;
         // Least squares on sine and cosine: the two are not quite orthogonal over a slice of any length.
         let (mut ss, mut cc, mut sc, mut ys, mut yc) = (0.0, 0.0, 0.0, 0.0, 0.0);
@@ -338,7 +392,8 @@ mod tests {
     /// Level at the output, dB relative to the sine at the input.
     fn level_db(in_hz: f64, out_hz: f64, f_hz: f64) -> f64 {
         let mut resampler = Resampler::new(in_hz, out_hz);
-        let out = convert(&mut resampler, &sine(f_hz, in_hz, (in_hz * 0.2) as usize), std::iter::repeat(64));
+        let (out, _) =
+            convert(&mut resampler, &sine(f_hz, in_hz, (in_hz * 0.2) as usize), std::iter::repeat(64));
         let tail = &out[400..];
         10.0 * (2.0 * tail.iter().map(|&y| f64::from(y).powi(2)).sum::<f64>() / tail.len() as f64).log10()
     }
@@ -377,9 +432,9 @@ mod tests {
 
     #[test]
     fn two_to_one_costs_72_taps_and_whole_blocks() {
-        let resampler = Resampler::new(96e3, 48e3);
+        let mut resampler = Resampler::new(96e3, 48e3);
         assert_eq!(resampler.taps(), 72);
-        assert_eq!(resampler.inputs_needed(64), 128);
+        assert_eq!(convert(&mut resampler, &[0.0; 200], std::iter::once(64)).1, 128);
         assert_eq!(resampler.latency_out_samples(), 17.25);
     }
 
@@ -406,7 +461,7 @@ mod tests {
         };
         for (in_hz, out_hz) in PAIRS {
             let mut resampler = Resampler::new(in_hz, out_hz);
-            let whole = convert(&mut resampler, &input, std::iter::once(8192));
+            let (whole, _) = convert(&mut resampler, &input, std::iter::once(8192));
             assert_eq!(whole.len(), 8192);
             let mut seed = 7usize;
             let random: Vec<usize> = std::iter::repeat_with(|| {
@@ -418,7 +473,7 @@ mod tests {
             let cuts: [Vec<usize>; 5] = [vec![1; 8192], vec![17; 482], vec![64; 128], vec![512; 16], random];
             for cut in cuts {
                 resampler.reset();
-                let parts = convert(&mut resampler, &input, cut.iter().copied());
+                let (parts, _) = convert(&mut resampler, &input, cut.iter().copied());
                 let shared = parts.len().min(whole.len());
                 assert!(shared > 8000);
                 assert_eq!(parts[..shared], whole[..shared], "{in_hz} -> {out_hz}, blocks of {}", cut[0]);
@@ -430,28 +485,29 @@ mod tests {
     fn nonsense_rates_are_held_to_the_range() {
         for (in_hz, out_hz) in [(f64::NAN, 48e3), (96e3, f64::INFINITY), (0.0, -1.0)] {
             let mut resampler = Resampler::new(in_hz, out_hz);
-            let input = vec![0.5; resampler.inputs_needed(100)];
-            let mut out = vec![0.0; 100];
-            resampler.process(&input, &mut out);
-            assert!(out.iter().all(|y| y.is_finite()));
+            let (out, _) = convert(&mut resampler, &[0.5; 100_000], std::iter::once(100));
+            assert!(out.len() == 100 && out.iter().all(|y| y.is_finite()));
         }
     }
 
     #[test]
-    fn equal_rates_pass_through() {
+    fn equal_rates_are_a_pure_delay() {
         let mut resampler = Resampler::new(96e3, 96e3);
-        let input = sine(1e3, 96e3, 100);
-        let mut out = vec![0.0; 100];
-        resampler.process(&input, &mut out);
-        assert_eq!(input, out);
-        assert_eq!(resampler.latency_out_samples(), 0.0);
+        let input = sine(1e3, 96e3, 112);
+        let (out, _) = convert(&mut resampler, &input, std::iter::repeat_n(7, 16));
+        assert_eq!(resampler.latency_out_samples(), 20.0);
+        assert_eq!(input[..92], out[20..]);
+        assert!(out[..20].iter().all(|&y| y == 0.0));
     }
 
-    /// A second of output takes a second of input: nothing drifts, even where phases are mixed.
+    /// A second of output takes a second of input, to the 16 pushed at once: nothing drifts, even where phases are mixed.
     #[test]
     fn a_second_is_a_second() {
         for (in_hz, out_hz) in PAIRS {
-            assert_eq!(Resampler::new(in_hz, out_hz).inputs_needed(out_hz as usize), in_hz as usize);
+            let mut resampler = Resampler::new(in_hz, out_hz);
+            let silence = vec![0.0; in_hz as usize + 100];
+            let (out, pushed) = convert(&mut resampler, &silence, std::iter::once(out_hz as usize));
+            assert_eq!((out.len(), pushed), (out_hz as usize, (in_hz as usize).next_multiple_of(16)));
         }
     }
 
@@ -459,7 +515,7 @@ mod tests {
     fn a_constant_stays_constant() {
         for (in_hz, out_hz) in PAIRS {
             let mut resampler = Resampler::new(in_hz, out_hz);
-            let out = convert(&mut resampler, &[1.0; 20_000], std::iter::once(4000));
+            let (out, _) = convert(&mut resampler, &[1.0; 20_000], std::iter::once(4000));
             assert!(out[1000..].iter().all(|y| (y - 1.0).abs() < 1e-6), "{in_hz} -> {out_hz}");
         }
     }

@@ -1,4 +1,4 @@
-//! Figures on paper: PNG, SVG or an animated GIF, by the file's extension.
+//! Figures on paper: PNG, SVG or an animated GIF, by the file's extension; or their data as JSON.
 //!
 //! Shapes are drawn by the backends of plotters; where axes, words and legends stand is decided here, so that nothing
 //! covers data and the same figure looks the same in every format. Files appear whole or not at all.
@@ -105,6 +105,7 @@ enum Format {
     Png,
     Svg,
     Gif,
+    Json,
 }
 
 impl Format {
@@ -113,6 +114,7 @@ impl Format {
             "png" => Some(Self::Png),
             "svg" => Some(Self::Svg),
             "gif" => Some(Self::Gif),
+            "json" => Some(Self::Json),
             _ => None,
         }
     }
@@ -126,13 +128,16 @@ pub struct Sheet {
 }
 
 impl Sheet {
-    /// For one figure: a `.png` or an `.svg`, in its own size unless one is given.
+    /// For one figure: a `.png`, an `.svg` or its data as `.json`, in its own size unless one is given.
     pub fn still(path: &Path, force: bool, size: Option<Size>) -> Result<Self, DrawError> {
         match Format::of(path) {
-            Some(format @ (Format::Png | Format::Svg)) => {
+            Some(format @ (Format::Png | Format::Svg | Format::Json)) => {
                 Ok(Self { file: NewFile::create(path, force)?, format, size })
             }
-            _ => Err(DrawError::Extension { path: path.to_owned(), wanted: ".png or .svg" }),
+            _ => Err(DrawError::Extension {
+                path: path.to_owned(),
+                wanted: ".png or .svg (or .json for its data)",
+            }),
         }
     }
 
@@ -148,6 +153,7 @@ impl Sheet {
     pub fn draw(self, figure: &Figure) -> Result<(), DrawError> {
         let bytes = match self.format {
             Format::Svg => svg(figure, self.size)?.into_bytes(),
+            Format::Json => serde_json::to_vec_pretty(figure).map_err(DrawError::backend)?,
             Format::Png | Format::Gif => png(figure, self.size)?,
         };
         self.keep(&bytes)
@@ -161,12 +167,25 @@ impl Sheet {
         let mut bytes = Vec::new();
         let mut encoder = gif::Encoder::new(&mut bytes, width, height, &[]).map_err(DrawError::backend)?;
         encoder.set_repeat(gif::Repeat::Infinite).map_err(DrawError::backend)?;
+        let mut before: Vec<u8> = Vec::new();
         for figure in frames {
             let pixels = rgb(figure, size)?;
+            // Only what has changed: the rest of the frame before stays.
+            let (left, top, across, down) = changed(&before, &pixels, size);
+            let part: Vec<u8> = (top..top + down)
+                .flat_map(|y| {
+                    let start = 3 * (y * size.width + left) as usize;
+                    &pixels[start..start + 3 * across as usize]
+                })
+                .copied()
+                .collect();
             // 10: the middle of the encoder's scale from good (1) to fast (30) choice of colours.
-            let mut frame = gif::Frame::from_rgb_speed(width, height, &pixels, 10);
+            let mut frame = gif::Frame::from_rgb_speed(across as u16, down as u16, &part, 10);
+            (frame.left, frame.top) = (left as u16, top as u16);
+            frame.dispose = gif::DisposalMethod::Keep;
             frame.delay = (100.0 * frame_s).round().clamp(2.0, 6_000.0) as u16;
             encoder.write_frame(&frame).map_err(DrawError::backend)?;
+            before = pixels;
             drawn();
         }
         drop(encoder);
@@ -178,6 +197,23 @@ impl Sheet {
         self.file.write_all(bytes).map_err(|reason| DrawError::Write { path, reason })?;
         Ok(self.file.keep()?)
     }
+}
+
+/// Left, top, width and height of what differs between two bitmaps; one pixel if nothing does, all if there is no
+/// `before`.
+fn changed(before: &[u8], now: &[u8], size: Size) -> (u32, u32, u32, u32) {
+    if before.len() != now.len() {
+        return (0, 0, size.width, size.height);
+    }
+    let (mut left, mut right, mut top, mut bottom) = (size.width, 0, size.height, 0);
+    for (index, (a, b)) in before.chunks_exact(3).zip(now.chunks_exact(3)).enumerate() {
+        if a != b {
+            let (x, y) = (index as u32 % size.width, index as u32 / size.width);
+            (left, right) = (left.min(x), right.max(x));
+            (top, bottom) = (top.min(y), bottom.max(y));
+        }
+    }
+    if left > right { (0, 0, 1, 1) } else { (left, top, right - left + 1, bottom - top + 1) }
 }
 
 /// The figure as a bitmap, three bytes a pixel, row by row.
@@ -256,7 +292,7 @@ pub fn svg(figure: &Figure, size: Option<Size>) -> Result<String, DrawError> {
     ))
 }
 
-/// Draws `figure` into a new file, `.png` or `.svg`.
+/// Draws `figure` into a new file, `.png`, `.svg` or `.json`.
 pub fn write(figure: &Figure, path: &Path, size: Option<Size>, force: bool) -> Result<(), DrawError> {
     Sheet::still(path, force, size)?.draw(figure)
 }

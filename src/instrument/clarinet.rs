@@ -1,7 +1,8 @@
 //! The whole instrument at the host's sample rate: events in, samples out.
 //!
 //! The voice runs at its internal rate on a fixed control grid; host samples are pulled from it, so output does not
-//! depend on how the host cuts its blocks.
+//! depend on how the host cuts its blocks. What bends a note beyond the lip is the speed of the internal clock, see
+//! [`bend`](super::bend).
 
 use std::sync::Arc;
 
@@ -12,19 +13,21 @@ use crate::instrument::embouchure::embouchure;
 use crate::instrument::model::{BuildError, Model};
 use crate::instrument::player::Player;
 use crate::instrument::settings::Settings;
-use crate::instrument::voice::{Probe, TICK, Voice};
+use crate::instrument::voice::{Probe, Voice};
 use crate::reed::ReedCoeffs;
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
 use crate::reed::motion::TONGUE_FORCE;
+use crate::units::REFERENCE_RADIUS_M;
 
-/// Full scale per pascal at 1 m: 1 Pa is -6 dBFS.
+/// Full scale per pascal at 1 m from a B flat clarinet: 1 Pa is -6 dBFS. A larger instrument is heard from further away, in
+/// proportion to its nominal bore: two that differ only in size are equally loud, and a bass does not live in the limiter.
 const FULL_SCALE_PER_PA: f64 = 0.501_187_233_627_272_2;
 /// Silence: -120 dBFS.
 const SILENCE: f32 = 1e-6;
 /// Samples of silence after which a resting instrument counts as silent.
 const QUIET_SAMPLES: u32 = 4_096;
-/// Host samples rendered in one go.
+/// Host samples between two looks at level and limiter.
 const CHUNK: usize = 64;
 
 /// A playable clarinet.
@@ -34,10 +37,7 @@ pub struct Clarinet {
     voice: Voice<f32>,
     resampler: Resampler,
     limiter: Limiter,
-    /// Internal samples already made but not yet pulled.
-    spare: [f32; TICK],
-    spare_from: usize,
-    inner: Box<[f32]>,
+    full_scale_per_pa: f64,
     gain: f32,
     gain_wanted: f32,
     gain_step: f32,
@@ -60,17 +60,15 @@ impl Clarinet {
         let mut voice = Voice::new(&model.coeffs, &model.air, ReedTables::seed(), reed);
         voice.hold_reed(TONGUE_FORCE);
         let resampler = Resampler::new(rate, host_rate_hz);
-        let inner = vec![0.0; resampler.inputs_needed_at_most(CHUNK)].into_boxed_slice();
-        let gain = gain_of(&Settings::default());
+        let full_scale_per_pa = FULL_SCALE_PER_PA * (REFERENCE_RADIUS_M / model.file.nominal_radius_m);
+        let gain = gain_of(&Settings::default(), full_scale_per_pa);
         Self {
             model,
             player: Player::default(),
             voice,
             resampler,
             limiter: Limiter::new(host_rate_hz),
-            spare: [0.0; TICK],
-            spare_from: TICK,
-            inner,
+            full_scale_per_pa,
             gain,
             gain_wanted: gain,
             // A change of gain takes 20 ms per factor of one.
@@ -83,13 +81,19 @@ impl Clarinet {
     /// Takes new settings; heard from the next control tick on. Real-time safe.
     pub fn set_settings(&mut self, settings: &Settings) {
         self.player.set_settings(settings);
-        self.gain_wanted = gain_of(self.player.settings());
+        self.gain_wanted = gain_of(self.player.settings(), self.full_scale_per_pa);
     }
 
     /// What the player does now. Real-time safe.
     pub fn apply(&mut self, event: Event) {
         self.player.apply(event, &self.model, &mut self.voice);
         self.quiet = 0;
+    }
+
+    /// Goes on where the player of another instrument is: keys, breath, bend. For a new instrument. Real-time safe.
+    pub fn carry_on(&mut self, from: &Self) {
+        self.player.carry_on(&from.player, &self.model, &mut self.voice);
+        self.gain = self.gain_wanted;
     }
 
     /// Overwrites `out` with the next samples, mono. Real-time safe.
@@ -118,24 +122,16 @@ impl Clarinet {
 
     fn render_with(&mut self, out: &mut [f32], probe: &mut Option<&mut dyn FnMut(Probe)>) {
         for out in out.chunks_mut(CHUNK) {
-            let needed = self.resampler.inputs_needed(out.len()).min(self.inner.len());
-            let mut made = 0;
-            while made < needed {
-                if self.spare_from == TICK {
-                    let drive = self.player.tick(&self.model, &mut self.voice);
-                    self.spare = *self.voice.tick(&drive);
-                    self.spare_from = 0;
-                    if let (Some(probe), Some(probes)) = (probe.as_mut(), self.voice.probes()) {
-                        probes.iter().for_each(|&moment| probe(moment));
-                    }
+            let mut made = self.resampler.pull(out);
+            while made < out.len() {
+                let drive = self.player.tick(&self.model, &mut self.voice);
+                let samples = self.voice.tick(&drive);
+                self.resampler.push(samples, self.player.speed());
+                if let (Some(probe), Some(probes)) = (probe.as_mut(), self.voice.probes()) {
+                    probes.iter().for_each(|&moment| probe(moment));
                 }
-                let count = (TICK - self.spare_from).min(needed - made);
-                let spare = &self.spare[self.spare_from..self.spare_from + count];
-                self.inner[made..made + count].copy_from_slice(spare);
-                made += count;
-                self.spare_from += count;
+                made += self.resampler.pull(&mut out[made..]);
             }
-            self.resampler.process(&self.inner[..needed], out);
             for sample in &mut *out {
                 if self.gain != self.gain_wanted {
                     let step = (self.gain_wanted - self.gain) * self.gain_step;
@@ -173,17 +169,17 @@ impl Clarinet {
         }
         self.resampler.reset();
         self.limiter.reset();
-        self.spare_from = TICK;
         self.gain = self.gain_wanted;
         self.quiet = 0;
     }
 
-    /// Delay of the output filter, host samples.
+    /// Delay of the output filter, host samples. Bends leave it; only downwards and by more than the host's rate leaves
+    /// room for (an octave at 48 kHz, nothing at 96 kHz) it grows by their ratio.
     pub fn latency_samples(&self) -> u32 {
         self.resampler.latency_out_samples().round() as u32
     }
 
-    /// Sample rate of the lattice, Hz: 96 000, or 88 200 for hosts of the 44.1 kHz family.
+    /// Sample rate of the lattice while its clock runs at speed 1, Hz: 96 000, or 88 200 for hosts of the 44.1 kHz family.
     pub fn internal_rate_hz(&self) -> f64 {
         self.model.coeffs.rate_hz
     }
@@ -217,6 +213,6 @@ impl Clarinet {
     }
 }
 
-fn gain_of(settings: &Settings) -> f32 {
-    (FULL_SCALE_PER_PA * 10.0_f64.powf(f64::from(settings.gain_db) / 20.0)) as f32
+fn gain_of(settings: &Settings, full_scale_per_pa: f64) -> f32 {
+    (full_scale_per_pa * 10.0_f64.powf(f64::from(settings.gain_db) / 20.0)) as f32
 }

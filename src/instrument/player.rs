@@ -4,8 +4,11 @@
 //! loudness and velocity only hardens the tongue. Notes that overlap are slurred (the holes move, the tongue stays
 //! away); a note after a gap is tongued: the tongue holds the reed while the breath rises behind it, and lets go.
 
+mod carry;
+
 use crate::control::keys::Keys;
 use crate::event::Event;
+use crate::instrument::bend::{self, Split};
 use crate::instrument::embouchure::embouchure;
 use crate::instrument::model::Model;
 use crate::instrument::settings::Settings;
@@ -29,6 +32,8 @@ const BREATH_END_S: f64 = 0.012;
 const VELOCITY_GAMMA: (f64, f64) = (0.43, 0.85);
 /// A slur of an octave or more, or into the altissimo, is helped by a dip of the breath, as players do: depth, length.
 const DIP: (f64, f64) = (0.3, 0.025);
+/// The clock is where it should be when this near, cents.
+const ARRIVED_CENTS: f64 = 0.01;
 /// A note is over when its breath is below this share of the closing pressure.
 const NO_BREATH: f64 = 1e-6;
 
@@ -57,15 +62,34 @@ struct Stance {
     reed: ReedCoeffs,
     /// Delay on top of the note's trim, rows.
     rows: f64,
-    /// How far delay and breath come towards what is wanted in one tick, 0..1.
-    tuning_step: f64,
+    /// What the size of the bore adds, cents.
+    bore_cents: f64,
+    steps: Steps,
+}
+
+/// How far delay, clock and breath come towards what is wanted in one tick, 0..1.
+#[derive(Clone, Copy, Debug)]
+struct Steps {
+    tuning: f64,
     breath_rise: f64,
     breath_follow: f64,
     breath_end: f64,
 }
 
+impl Steps {
+    fn new(settings: &Settings, tick_s: f64) -> Self {
+        let step = |time_s: f64| step_towards(tick_s, time_s);
+        Self {
+            tuning: step(0.5e-3 * f64::from(settings.legato_ms)),
+            breath_rise: step(BREATH_RISE_S),
+            breath_follow: step(BREATH_FOLLOW_S),
+            breath_end: step(BREATH_END_S),
+        }
+    }
+}
+
 impl Stance {
-    fn new(settings: &Settings, fingering: usize, bend_cents: f64, model: &Model) -> Self {
+    fn new(settings: &Settings, fingering: usize, bend_cents: f64, tick_s: f64, model: &Model) -> Self {
         let law = settings.reed_law();
         let lip = embouchure(model.notes_hz[fingering], model.lowest_hz);
         let reed = ReedCoeffs::new(
@@ -81,22 +105,15 @@ impl Stance {
             + cents(f64::from(settings.a4_hz), model.a4_hz)
             + cents(Air::at(f64::from(settings.temperature_c)).c, model.air.c);
         let sensitivity = model.tuning.notes.get(fingering).map_or(1.0, |note| note.sensitivity);
-        let step = |time_s: f64| step_towards(tick_s(model), time_s);
+        let split = Split::new(offset, bend::lip_limit_cents(model, fingering, offset));
         Self {
             closing: law.closing(),
             reed,
-            rows: sensitivity * model.rows_for_cents(fingering, offset),
-            tuning_step: step(0.5e-3 * f64::from(settings.legato_ms)),
-            breath_rise: step(BREATH_RISE_S),
-            breath_follow: step(BREATH_FOLLOW_S),
-            breath_end: step(BREATH_END_S),
+            rows: sensitivity * model.rows_for_cents(fingering, split.lip_cents),
+            bore_cents: split.bore_cents,
+            steps: Steps::new(settings, tick_s),
         }
     }
-}
-
-/// Length of a control tick, s.
-fn tick_s(model: &Model) -> f64 {
-    TICK as f64 / model.coeffs.rate_hz
 }
 
 /// How far a first-order lag of `time_s` comes in `tick_s`, 0..1.
@@ -129,6 +146,9 @@ pub struct Player {
     dip: f64,
     rows: f64,
     rows_set: bool,
+    /// What the clock adds to the pitch, and how fast it therefore runs.
+    bore_cents: f64,
+    speed: f64,
     /// Force of the tongue, smoothed so that it never slaps by accident; negative while it pulls for a slap.
     tongue_force: f64,
 }
@@ -153,6 +173,8 @@ impl Default for Player {
             dip: 0.0,
             rows: 0.0,
             rows_set: false,
+            bore_cents: 0.0,
+            speed: 1.0,
             tongue_force: TONGUE_FORCE,
         }
     }
@@ -171,6 +193,16 @@ impl Player {
     /// The settings in use.
     pub fn settings(&self) -> &Settings {
         &self.settings
+    }
+
+    /// Speed of the instrument's clock at the end of the last tick; 1 is the model's rate.
+    pub fn speed(&self) -> f64 {
+        self.speed
+    }
+
+    /// Length of a control tick, s.
+    fn tick_s(&self, model: &Model) -> f64 {
+        TICK as f64 / (model.coeffs.rate_hz * self.speed)
     }
 
     /// As new; settings stay.
@@ -273,7 +305,7 @@ impl Player {
         model: &Model,
         voice: &mut Voice<F>,
     ) {
-        let tick_s = tick_s(model);
+        let tick_s = self.tick_s(model);
         if let (true, Some(from)) = (slurred, self.fingering) {
             let leap = cents(model.notes_hz[fingering], model.notes_hz[from]).abs() > 1_150.0;
             let (old, new) = (model.registers[from], model.registers[fingering]);
@@ -316,19 +348,31 @@ impl Player {
         self.stance = None;
     }
 
+    /// The bore's size follows as the delay does; the first note has it at once.
+    fn follow_bore(&mut self, at_once: bool, settings: &Settings, stance: &Stance, model: &Model) {
+        let away = stance.bore_cents - self.bore_cents;
+        self.bore_cents = if at_once || away.abs() < ARRIVED_CENTS {
+            stance.bore_cents
+        } else {
+            self.bore_cents + away * stance.steps.tuning
+        };
+        self.speed = bend::speed(self.bore_cents);
+        // Ticks have another length now.
+        self.stance = Some(Stance { steps: Steps::new(settings, self.tick_s(model)), ..*stance });
+    }
+
     /// Advances one control tick: moves holes and delay, and says how the reed is driven. Real-time safe.
     pub fn tick<F: crate::bore::lattice::Real>(&mut self, model: &Model, voice: &mut Voice<F>) -> Drive {
-        let tick_s = tick_s(model);
+        let tick_s = self.tick_s(model);
         if self.reed != self.reed_wanted {
             self.follow_reed(tick_s);
         }
         let settings = self.settings.with_reed_factors(self.reed);
         let fingering = self.fingering.unwrap_or(0);
-        let stance = self.stance.unwrap_or_else(|| {
+        let stance = *self.stance.get_or_insert_with(|| {
             voice.lattice_mut().set_jet_loss(f64::from(settings.vent_loss));
-            Stance::new(&settings, fingering, self.bend_cents, model)
+            Stance::new(&settings, fingering, self.bend_cents, tick_s, model)
         });
-        self.stance = Some(stance);
         let closing = stance.closing;
 
         if self.gliding > 0 {
@@ -353,11 +397,11 @@ impl Player {
         let (wanted, dipping) = if self.dip > 0.0 { (wanted * DIP.0, true) } else { (wanted, false) };
         self.dip -= tick_s;
         let step = if !playing {
-            stance.breath_end
+            stance.steps.breath_end
         } else if matches!(self.tongue, Tongue::Holding(_)) || dipping {
-            stance.breath_rise
+            stance.steps.breath_rise
         } else {
-            stance.breath_follow
+            stance.steps.breath_follow
         };
         self.gamma += (wanted - self.gamma) * step;
         if wanted == 0.0 && self.gamma < NO_BREATH {
@@ -405,13 +449,17 @@ impl Player {
         // Tuning.
         let rows = model.tuning.rows(fingering, settings.tuning, self.gamma) + stance.rows;
         // The delay follows within the time the fingers take; the first note has it at once.
+        let at_once = !self.rows_set;
         if self.rows_set {
-            self.rows += (rows - self.rows) * stance.tuning_step;
+            self.rows += (rows - self.rows) * stance.steps.tuning;
             voice.lattice_mut().glide_delay(self.rows, TICK);
         } else {
             self.rows = rows;
             self.rows_set = self.fingering.is_some();
             voice.lattice_mut().glide_delay(self.rows, 0);
+        }
+        if stance.bore_cents != self.bore_cents {
+            self.follow_bore(at_once, &settings, &stance, model);
         }
 
         Drive { p_mouth, tongue: self.tongue_force, noise: f64::from(settings.noise), reed: stance.reed }

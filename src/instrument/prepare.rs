@@ -94,14 +94,14 @@ impl Wanted {
 
     /// Everything the prepared instrument depends on, and the version of what prepares it.
     pub fn key(&self) -> Result<Key, BuildError> {
-        self.key_of(b"tuned")
+        self.key_of("tuned", VERSION, OWN_NUMBERS)
     }
 
-    fn key_of(&self, what: &[u8]) -> Result<Key, BuildError> {
-        let mut all = Vec::with_capacity(8_192);
-        all.extend(what);
-        all.extend(VERSION.to_le_bytes());
-        all.extend(OWN_NUMBERS.as_bytes());
+    fn key_of(&self, what: &str, version: u32, own_numbers: &str) -> Result<Key, BuildError> {
+        let mut all = Vec::with_capacity(65_536);
+        all.extend(what.as_bytes());
+        all.extend(version.to_le_bytes());
+        all.extend(own_numbers.as_bytes());
         numbers(&mut all, &[self.internal_rate_hz()?, self.tuned_a4_hz()]);
         describe(&mut all, &self.file);
         Ok(Key::of(&all))
@@ -269,7 +269,7 @@ pub fn bore(
         return Ok(Model { tuning, ..model });
     }
     let (rate_hz, a4_hz) = wanted.checked()?;
-    let key = wanted.key_of(b"as built")?;
+    let key = wanted.key_of("as built", VERSION, OWN_NUMBERS)?;
     if let Some(model) = cache.and_then(|cache| kept(cache, &key, file)) {
         return Ok(model);
     }
@@ -419,6 +419,16 @@ mod tests {
         assert!(!same(Wanted { host_rate_hz: 44_100.0, ..wanted.clone() }));
         assert!(!same(Wanted { a4_hz: 415.0, ..wanted.clone() }));
         assert!(!same(Wanted { quality: Quality::High, ..wanted.clone() }));
+        // Other algorithms: counted, or seen in what they make of the built-in clarinet.
+        let keys = [
+            ("tuned", VERSION, OWN_NUMBERS),
+            ("as built", VERSION, OWN_NUMBERS),
+            ("tuned", VERSION + 1, OWN_NUMBERS),
+        ]
+        .map(|(what, version, numbers)| wanted.key_of(what, version, numbers).unwrap());
+        assert_eq!(keys[0], wanted.key().unwrap());
+        let other = wanted.key_of("tuned", VERSION, &OWN_NUMBERS.replacen('4', "5", 1)).unwrap();
+        assert!(keys[1..].iter().chain([&other]).all(|key| *key != keys[0]));
         let changed = |change: fn(&mut InstrumentFile)| {
             let mut file = pipe();
             change(&mut file);

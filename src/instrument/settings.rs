@@ -2,7 +2,7 @@
 
 use crate::reed::ReedLaw;
 use crate::reed::law::coupled_k;
-use crate::reed::physical::P_REF_PA;
+use crate::reed::physical::{P_REF_PA, PhysicalReed, SeedReed};
 
 /// How notes are held in tune.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -43,7 +43,7 @@ pub struct Settings {
     pub coupled: bool,
     /// The seed's amplitude A of the flow, 0..=2. Default 1.
     pub reed_a: f32,
-    /// Pitch of A4, Hz, 430..=450.
+    /// Pitch of A4, Hz, 415..=466.
     pub a4_hz: f32,
     /// How notes are held in tune.
     pub tuning: Tuning,
@@ -101,6 +101,71 @@ impl Settings {
         Self { reed_h: self.reed_h * h, reed_k: self.reed_k * k, ..self }.clamped()
     }
 
+    /// The maker's face of the reed in the case: H, k, A and zeta as they are set, without what strength and lip make of
+    /// it, over the reference reed of the instrument. Real-time safe.
+    pub fn physical_reed(&self, reference: &PhysicalReed) -> PhysicalReed {
+        let settings = self.clamped();
+        let h = f64::from(settings.reed_h);
+        let seed = SeedReed {
+            h,
+            k: if settings.coupled { coupled_k(h) } else { f64::from(settings.reed_k) },
+            a: f64::from(settings.reed_a),
+            zeta: f64::from(settings.zeta),
+            area: 1.0,
+        };
+        PhysicalReed::from_seed(&seed, reference)
+    }
+
+    /// The same in the mouth: strength has multiplied K, the lip the opening. Real-time safe.
+    pub fn played_reed(&self, reference: &PhysicalReed) -> PhysicalReed {
+        let settings = self.clamped();
+        let law = settings.reed_law();
+        let seed = SeedReed { h: law.h(), k: law.k(), a: law.a(), zeta: f64::from(settings.zeta), area: 1.0 };
+        PhysicalReed::from_seed(&seed, reference)
+    }
+
+    /// These settings with H, k and zeta of a reed as its maker measures it; strength, lip, lay and A stay and act on top.
+    /// Of the area only the closing pressure is heard: the air that the reed's motion moves is the instrument's,
+    /// `reed_volume_mm3` of its file, which its tuning is for. Numbers outside the ranges are clamped as all settings are;
+    /// [`refused_reed`](Self::refused_reed) tells. Real-time safe.
+    pub fn with_physical_reed(self, reed: &PhysicalReed, reference: &PhysicalReed) -> Self {
+        let a = f64::from(self.reed_a);
+        let seed = reed.seed(reference, if a > 0.0 { a } else { 1.0 });
+        Self { reed_h: seed.h as f32, reed_k: seed.k as f32, coupled: false, zeta: seed.zeta as f32, ..self }
+    }
+
+    /// Which of H, k and zeta of such a reed lies outside what the instrument plays: symbol, value and range.
+    pub fn refused_reed(
+        &self,
+        reed: &PhysicalReed,
+        reference: &PhysicalReed,
+    ) -> Option<(&'static str, f64, [f64; 2])> {
+        let wanted = self.with_physical_reed(reed, reference);
+        let played = wanted.clamped();
+        let ends = |get: fn(&Self) -> f32, set: fn(&mut Self, f32)| {
+            [-1e9, 1e9].map(|x| {
+                let mut end = wanted;
+                set(&mut end, x);
+                f64::from(get(&end.clamped()))
+            })
+        };
+        if wanted.reed_h != played.reed_h {
+            return Some(("H", wanted.reed_h.into(), ends(|s| s.reed_h, |s, x| s.reed_h = x)));
+        }
+        if wanted.reed_k != played.reed_k {
+            return Some(("k", wanted.reed_k.into(), ends(|s| s.reed_k, |s, x| s.reed_k = x)));
+        }
+        if wanted.zeta != played.zeta {
+            return Some(("zeta", wanted.zeta.into(), ends(|s| s.zeta, |s, x| s.zeta = x)));
+        }
+        None
+    }
+
+    /// Reed strength as on the box of a reed `stiffer` times as stiff as the reference.
+    pub fn strength_of(stiffer: f64) -> f64 {
+        2.5 + 0.5 * stiffer.ln() / 1.2_f64.ln()
+    }
+
     /// Closing pressure of the reed under these settings, Pa.
     pub fn closing_pa(&self) -> f64 {
         P_REF_PA * self.reed_law().closing()
@@ -126,11 +191,52 @@ impl Settings {
             reed_k: fix(self.reed_k, 0.1, 2.0, d.reed_k),
             coupled: self.coupled,
             reed_a: fix(self.reed_a, 0.0, 2.0, d.reed_a),
-            a4_hz: fix(self.a4_hz, 430.0, 450.0, d.a4_hz),
+            a4_hz: fix(self.a4_hz, 415.0, 466.0, d.a4_hz),
             tuning: self.tuning,
             temperature_c: fix(self.temperature_c, 10.0, 40.0, d.temperature_c),
             vent_loss: fix(self.vent_loss, 0.0, 4.0, d.vent_loss),
             gain_db: fix(self.gain_db, -60.0, 24.0, d.gain_db),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_makers_reed_is_played_and_read_back() {
+        let reference = PhysicalReed::reference();
+        let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 3e-7, "{a} {b}, single precision");
+        let d = Settings::default();
+        near(d.physical_reed(&reference).stiffness_n_m, reference.stiffness_n_m);
+        near(d.played_reed(&reference).closing_pa(), P_REF_PA);
+        let reed =
+            PhysicalReed { stiffness_n_m: 2_000.0, tip_opening_m: 0.6e-3, width_m: 20e-3, ..reference };
+        let set =
+            Settings { strength: 3.0, lip: 0.8, reed_a: 0.5, ..d }.with_physical_reed(&reed, &reference);
+        assert_eq!(set.refused_reed(&reed, &reference), None);
+        let read = set.physical_reed(&reference);
+        near(read.stiffness_n_m, 2_000.0);
+        near(read.tip_opening_m, 0.6e-3);
+        near(read.width_m, 20e-3);
+        near(read.area_m2, reference.area_m2);
+        // Half a number is 20 % stiffer; the lip closes.
+        let played = set.played_reed(&reference);
+        near(played.stiffness_n_m, 1.2 * 2_000.0);
+        near(played.tip_opening_m, 0.8 * 0.6e-3);
+        near(played.closing_pa(), set.closing_pa());
+        near(Settings::strength_of(played.stiffness_n_m / 2_000.0), 3.0);
+    }
+
+    #[test]
+    fn a_reed_nobody_could_play_is_named() {
+        let reference = PhysicalReed::reference();
+        let refused = |reed: PhysicalReed| Settings::default().refused_reed(&reed, &reference).unwrap();
+        let (symbol, h, [low, high]) = refused(PhysicalReed { tip_opening_m: 2e-3, ..reference });
+        assert_eq!((symbol, low, high), ("H", 1.0, 5.0));
+        assert!((h - 4.0 * 2.598_076).abs() < 1e-4);
+        assert_eq!(refused(PhysicalReed { stiffness_n_m: 1e5, ..reference }).0, "k");
+        assert_eq!(refused(PhysicalReed { width_m: 0.1, ..reference }).0, "zeta");
     }
 }

@@ -7,6 +7,7 @@
 
 mod audio;
 mod desk;
+mod felt;
 mod takes;
 
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
@@ -16,6 +17,7 @@ use std::thread::JoinHandle;
 pub use audio::{Audio, Stage};
 
 use crate::haptics::FeelTable;
+use crate::plugin::instrument;
 use crate::plugin::params::ChalumeauParams;
 use crate::touch::blower::Hand;
 use crate::touch::feel::Feels;
@@ -24,6 +26,9 @@ use crate::units::SoundingNote;
 
 /// No note is fingered.
 const NO_NOTE: u8 = 255;
+
+/// An instrument's feel, and the table that design and limits make of it.
+type Feel = (Arc<Feels>, FeelTable);
 
 /// What the threads tell each other.
 #[derive(Debug)]
@@ -35,7 +40,7 @@ pub struct Shared {
     /// Factors on H and k from controllers, bits of f32s.
     reed: [AtomicU32; 2],
     /// The feel in force, with the instrument it is of. Only desk and link lock it.
-    feel: Mutex<Option<Arc<(&'static Feels, FeelTable)>>>,
+    feel: Mutex<Option<Arc<Feel>>>,
     stop: AtomicBool,
 }
 
@@ -72,12 +77,12 @@ pub struct Knob {
 
 impl Knob {
     /// Starts the desk; the link follows when the user wants a knob. Allocates.
-    pub fn start(params: Arc<ChalumeauParams>) -> (Self, Audio) {
+    pub fn start(params: Arc<ChalumeauParams>, instruments: Arc<instrument::Shared>) -> (Self, Audio) {
         let shared = Arc::new(Shared::new());
         let (hand_in, hand) = triple_buffer::triple_buffer(&Hand::default());
         let (take_in, take) = triple_buffer::triple_buffer(&None::<Arc<Take>>);
         let (readers_in, readers) = rtrb::RingBuffer::new(1);
-        let desk = desk::Desk::new(params, shared.clone(), readers_in, hand_in, take_in);
+        let desk = desk::Desk::new(params, shared.clone(), instruments, readers_in, hand_in, take_in);
         let desk = std::thread::Builder::new().name("chalumeau knob".to_owned()).spawn(move || desk.run());
         let audio = Audio::new(shared.clone(), readers, hand, take);
         // Without a thread there is no knob; the instrument plays all the same.

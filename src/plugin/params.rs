@@ -9,16 +9,22 @@ use std::sync::{Arc, RwLock};
 
 use nice_plug::prelude::*;
 
+use crate::instrument::prepare::A4_RANGE_HZ;
 use crate::instrument::{Settings, Tuning};
 
+pub mod instrument;
 pub mod knob;
+pub mod reed;
 
+pub use instrument::InstrumentParams;
 pub use knob::KnobParams;
 use knob::{Calibration, ReedSource};
+pub use reed::PhysicalReedParams;
 use serde::{Serialize, de::DeserializeOwned};
 
-/// Layout of the saved state. 1: ids and units as below.
-pub const SCHEMA: u32 = 1;
+/// Layout of the saved state. 1: ids and units as below. 2: the instrument and its file, the physical reed; a state of 1
+/// is the B flat clarinet.
+pub const SCHEMA: u32 = 2;
 const SCHEMA_FIELD: &str = "schema";
 
 /// All parameters, by group.
@@ -48,6 +54,14 @@ pub struct ChalumeauParams {
     /// The knob and what it feels like.
     #[nested(group = "Knob")]
     pub knob: KnobParams,
+    /// Which instrument.
+    #[nested(group = "Instrument")]
+    pub instrument: InstrumentParams,
+    /// The reed in newtons and millimetres.
+    #[nested(group = "Reed, physical")]
+    pub physical: PhysicalReedParams,
+    /// How far the instrument is, in words; written by whoever makes it.
+    pub instrument_status: Arc<RwLock<String>>,
     /// How the link to the knob is, in words; written by the link.
     pub knob_status: Arc<RwLock<String>>,
 }
@@ -176,7 +190,11 @@ impl Default for ChalumeauParams {
     fn default() -> Self {
         let d = Settings::default();
         let knob_status = Arc::new(RwLock::new("off".to_owned()));
+        let instrument_status = Arc::new(RwLock::new("not playing".to_owned()));
         Self {
+            instrument: InstrumentParams::new(instrument_status.clone()),
+            instrument_status,
+            physical: PhysicalReedParams::default(),
             knob: KnobParams::new(knob_status.clone()),
             knob_status,
             schema: AtomicU32::new(SCHEMA),
@@ -202,7 +220,14 @@ impl Default for ChalumeauParams {
                 lay: number("Lay curve", d.lay, 0.0, 0.5, 3, ""),
             },
             tuning: TuningParams {
-                a4: number("A4", d.a4_hz, 430.0, 450.0, 1, " Hz"),
+                a4: number(
+                    "A4",
+                    instrument::beginning().map_or(d.a4_hz, |first| first.a4_hz),
+                    A4_RANGE_HZ.0 as f32,
+                    A4_RANGE_HZ.1 as f32,
+                    1,
+                    " Hz",
+                ),
                 tuning: EnumParam::new("Tuning", d.tuning.into()),
                 temperature: number("Temperature", d.temperature_c, 10.0, 40.0, 1, " °C"),
                 vent_loss: number("Vent loss", d.vent_loss, 0.0, 4.0, 2, ""),
@@ -241,6 +266,7 @@ impl ChalumeauParams {
             vent_loss: settled(&tuning.vent_loss),
             gain_db: settled(&output.gain),
         };
+        settings = self.physical.over(settings);
         if let Some((_, trial, side)) = self.knob.study() {
             settings.reed_h = trial.h as f32;
             settings.reed_k = trial.condition(side).k(trial.h) as f32;
@@ -283,7 +309,8 @@ pub fn mend(state: &mut PluginState) {
     let params = ChalumeauParams::default();
     let mut old = std::mem::take(&mut state.params);
     let mut keep = |id: &str, value: ParamValue| state.params.insert(id.to_owned(), value);
-    for (id, param) in params.numbers().into_iter().chain(params.knob.numbers()) {
+    let numbers = params.numbers().into_iter().chain(params.knob.numbers()).chain(params.physical.numbers());
+    for (id, param) in numbers {
         let value = match old.remove(id) {
             Some(ParamValue::F32(value)) if value.is_finite() => {
                 let (low, high) = (param.preview_plain(0.0), param.preview_plain(1.0));
@@ -293,14 +320,19 @@ pub fn mend(state: &mut PluginState) {
         };
         keep(id, ParamValue::F32(value));
     }
-    for (id, param) in params.knob.wholes() {
+    let bend = ("bendr", &params.instrument.bend_range);
+    for (id, param) in params.knob.wholes().into_iter().chain([bend]) {
         let value = match old.remove(id) {
             Some(ParamValue::I32(value)) => value.clamp(param.preview_plain(0.0), param.preview_plain(1.0)),
             _ => param.default_plain_value(),
         };
         keep(id, ParamValue::I32(value));
     }
-    let own = [("reedc", &params.reed.coupled, true), ("panic", &params.output.panic, true)];
+    let own = [
+        ("reedc", &params.reed.coupled, true),
+        ("panic", &params.output.panic, true),
+        ("istat", &params.instrument.status, false),
+    ];
     for (id, param, kept) in own.into_iter().chain(params.knob.switches()) {
         let value = match old.remove(id) {
             Some(ParamValue::Bool(value)) if kept => value,
@@ -309,7 +341,9 @@ pub fn mend(state: &mut PluginState) {
         keep(id, ParamValue::Bool(value));
     }
     let tunings: (&str, &str, &[&str]) = ("tune", "nat", &["nat", "temp"]);
-    for (id, default, all) in [tunings].into_iter().chain(KnobParams::CHOICES) {
+    let choices = [tunings].into_iter().chain(KnobParams::CHOICES);
+    let choices = choices.chain(InstrumentParams::CHOICES).chain(PhysicalReedParams::CHOICES);
+    for (id, default, all) in choices {
         let value = match old.remove(id) {
             Some(ParamValue::String(value)) if all.contains(&value.as_str()) => value,
             _ => default.to_owned(),
@@ -325,8 +359,9 @@ pub fn mend(state: &mut PluginState) {
     );
     mend_field(state, "midiport", |text: String| text.chars().take(256).collect());
     mend_field(state, "take", |text: String| text);
+    mend_field(state, "instrumentfile", |text: String| text.chars().take(instrument::PATH_MOST).collect());
     mend_field(state, "calibration", Calibration::mended);
-    // There is one schema so far; a newer one is read as far as its ids are known here.
+    // An older schema lacks what it lacks; a newer one is read as far as its ids are known here.
     state.fields.insert(SCHEMA_FIELD.to_owned(), SCHEMA.to_string());
 }
 
@@ -347,6 +382,16 @@ fn settled(param: &FloatParam) -> f32 {
     let (value, default) = (param.value(), param.default_plain_value());
     let span = param.preview_plain(1.0) - param.preview_plain(0.0);
     if (value - default).abs() <= 1e-6 * span { default } else { value }
+}
+
+/// A parameter whose value means nothing and whose text says something.
+fn said(name: &str, text: Arc<RwLock<String>>) -> BoolParam {
+    BoolParam::new(name, false)
+        .with_value_to_string(Arc::new(move |_| {
+            text.read().map_or_else(|_| String::new(), |text| text.clone())
+        }))
+        .with_string_to_value(Arc::new(|_| Some(false)))
+        .non_automatable()
 }
 
 /// A linear parameter shown with `digits` decimals.
@@ -446,15 +491,30 @@ mod tests {
         ("hsrc", "Knob", "Parameter"),
         ("ksrc", "Knob", "Parameter"),
         ("kstat", "Knob", "off"),
+        ("instr", "Instrument", "B flat clarinet"),
+        ("qual", "Instrument", "Same as live"),
+        ("bendr", "Instrument", "2 st"),
+        ("istat", "Instrument", "not playing"),
+        ("rface", "Reed, physical", "Dimensionless"),
+        ("rstiff", "Reed, physical", "1218.1 N/m"),
+        ("rarea", "Reed, physical", "101.50 mm²"),
+        ("rwidth", "Reed, physical", "15.21 mm"),
+        ("ropen", "Reed, physical", "0.500 mm"),
     ];
 
     fn texts(params: &ChalumeauParams) -> BTreeMap<&'static str, String> {
         let text =
             |param: &FloatParam| param.normalized_value_to_string(param.default_normalized_value(), true);
         let numbers = params.numbers().into_iter().chain(params.knob.numbers());
+        let numbers = numbers.chain(params.physical.numbers());
         let mut all: BTreeMap<_, _> = numbers.map(|(id, param)| (id, text(param))).collect();
         all.extend(params.knob.wholes().map(|(id, param)| (id, param.to_string())));
         all.extend(params.knob.switches().map(|(id, param, _)| (id, param.to_string())));
+        all.insert("instr", params.instrument.choice.to_string());
+        all.insert("qual", params.instrument.quality.to_string());
+        all.insert("bendr", params.instrument.bend_range.to_string());
+        all.insert("istat", params.instrument.status.to_string());
+        all.insert("rface", params.physical.face.to_string());
         all.insert("knob", params.knob.kind.to_string());
         all.insert("law", params.knob.law.to_string());
         all.insert("order", params.knob.order.to_string());

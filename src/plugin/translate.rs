@@ -1,22 +1,22 @@
 //! The host's events become the instrument's: the only place that knows both vocabularies.
 //!
 //! MIDI goes through the decoder that the offline renderer uses, with the raw integers the host's 0..=1 values came
-//! from, so that both hear the same. Note expressions have no MIDI form: pressure and expression blow, tuning bends on
-//! top of the wheel until the next note. Left out: volume, pan, vibrato, brightness, program change.
+//! from, so that both hear the same. Note expressions have no MIDI form: pressure and expression blow, tuning bends its
+//! note on top of the wheel until the key is struck anew. Left out: volume, pan, vibrato, brightness, program change.
 
 use nice_plug::midi::Key;
 use nice_plug::prelude::*;
 
-use crate::control::midi::MidiDecoder;
+use crate::control::midi::{Events, MidiDecoder};
 use crate::event::{Event, Timed};
+
+/// The controller that ends every note.
+const ALL_NOTES_OFF: u8 = 123;
 
 /// What has to be remembered between host events. Real-time safe throughout.
 #[derive(Clone, Debug, Default)]
 pub struct Translator {
     midi: MidiDecoder,
-    wheel_cents: f32,
-    /// From the tuning expression of the current note.
-    tuning_cents: f32,
     /// Whether a note expression has blown yet. Some hosts send a zero with each note; a zero alone is not a move.
     expression_live: bool,
 }
@@ -27,40 +27,28 @@ impl Translator {
         *self = Self::default();
     }
 
-    /// At most two events, in order: a note that ends a tuning expression brings a bend with it.
+    /// At most two events, in order: a note brings its bend with it.
     pub fn translate<S>(&mut self, event: NoteEvent<S>, api: PluginApi) -> [Option<Timed<Event>>; 2] {
         let at = event.timing() as usize;
-        let mut bend = None;
-        let main = match event {
+        let events: Events = match event {
+            // The framework has made note-offs of MIDI's zero velocities; a zero that is left is a very soft note.
             NoteEvent::NoteOn { channel, key: Key::Number(key), velocity, .. } => {
-                if self.tuning_cents != 0.0 {
-                    self.tuning_cents = 0.0;
-                    bend = Some(self.bend());
-                }
-                // The framework has made note-offs of MIDI's zero velocities; a zero that is left is a very soft note.
                 self.midi.note_on(channel.number().unwrap_or(0), key, raw7(velocity).max(1))
             }
             NoteEvent::NoteOff { channel, key: Key::Number(key), .. }
             | NoteEvent::Choke { channel, key: Key::Number(key), .. } => {
-                self.midi.note_off(channel.number().unwrap_or(0), key)
+                self.midi.note_off(channel.number(), key)
             }
             NoteEvent::NoteOff { key: Key::Wildcard, .. } | NoteEvent::Choke { key: Key::Wildcard, .. } => {
-                Some(Event::Panic)
+                self.midi.controller(0, ALL_NOTES_OFF, 0)
             }
-            NoteEvent::MidiCC { channel, cc, value, .. } => {
-                let event = self.midi.controller(channel, cc, raw7(value));
-                self.with_tuning(event)
-            }
+            NoteEvent::MidiCC { channel, cc, value, .. } => self.midi.controller(channel, cc, raw7(value)),
             NoteEvent::MidiChannelPressure { channel, pressure, .. } => {
                 self.midi.pressure(channel, raw7(pressure))
             }
-            NoteEvent::MidiPitchBend { channel, value, .. } => {
-                let event = self.midi.bend(channel, raw14(value));
-                self.with_tuning(event)
-            }
-            NoteEvent::PolyTuning { tuning, .. } if tuning.is_finite() => {
-                self.tuning_cents = 100.0 * tuning;
-                Some(self.bend())
+            NoteEvent::MidiPitchBend { channel, value, .. } => self.midi.bend(channel, raw14(value)),
+            NoteEvent::PolyTuning { channel, key, tuning, .. } => {
+                self.midi.tune(channel.number(), key.number(), 100.0 * tuning)
             }
             NoteEvent::PolyPressure { pressure, .. } => self.breathe(pressure),
             // The framework's VST3 wrapper (0.4.2) takes expression for brightness and brightness for expression.
@@ -70,25 +58,20 @@ impl Translator {
             NoteEvent::PolyBrightness { brightness, .. } if api == PluginApi::Vst3 => {
                 self.breathe(brightness)
             }
-            _ => None,
+            _ => [None, None],
         };
-        [bend, main].map(|event| event.map(|event| Timed { at, event }))
+        events.map(|event| event.map(|event| Timed { at, event }))
     }
 
-    fn bend(&self) -> Event {
-        Event::Bend { cents: self.wheel_cents + self.tuning_cents }
+    /// How far a wheel bends that RPN 0 has told nothing, semitones; at most one event. Real-time safe.
+    pub fn bend_range(&mut self, semitones: i32) -> Option<Timed<Event>> {
+        let [event, _] = self.midi.usual_bend_range(semitones.clamp(0, 127) as u8);
+        event.map(|event| Timed { at: 0, event })
     }
 
-    /// Keeps the wheel in mind and adds the tuning expression to it.
-    fn with_tuning(&mut self, event: Option<Event>) -> Option<Event> {
-        let Some(Event::Bend { cents }) = event else { return event };
-        self.wheel_cents = cents;
-        Some(self.bend())
-    }
-
-    fn breathe(&mut self, unit: f32) -> Option<Event> {
+    fn breathe(&mut self, unit: f32) -> Events {
         self.expression_live |= unit > 0.0;
-        self.expression_live.then_some(Event::Breath(unit.clamp(0.0, 1.0)))
+        [self.expression_live.then_some(Event::Breath(unit.clamp(0.0, 1.0))), None]
     }
 }
 
@@ -112,11 +95,17 @@ mod tests {
     type Host = NoteEvent<()>;
 
     fn one(translator: &mut Translator, event: Host) -> Option<Event> {
-        translator.translate(event, PluginApi::Clap)[1].map(|timed| timed.event)
+        let [first, second] = translator.translate(event, PluginApi::Clap);
+        assert!(first.is_none() || second.is_none(), "{first:?} and {second:?}");
+        second.or(first).map(|timed| timed.event)
     }
 
     fn midi(translator: &mut Translator, bytes: [u8; 3]) -> Option<Event> {
         one(translator, Host::from_midi(0, &bytes).expect("a channel message"))
+    }
+
+    fn last([_, event]: Events) -> Option<Event> {
+        event
     }
 
     #[test]
@@ -143,23 +132,24 @@ mod tests {
         let mut translator = Translator::default();
         let mut decoder = MidiDecoder::new();
         for value in 0..=127u8 {
-            assert_eq!(midi(&mut translator, [0xB3, 2, value]), decoder.controller(3, 2, value));
+            assert_eq!(midi(&mut translator, [0xB3, 2, value]), decoder.controller(3, 2, value)[0]);
             assert_eq!(
                 midi(&mut translator, [0xE3, value, 127 - value]),
-                decoder.bend(3, u16::from(127 - value) << 7 | u16::from(value))
+                decoder.bend(3, u16::from(127 - value) << 7 | u16::from(value))[0]
             );
-            assert_eq!(midi(&mut translator, [0x93, value, 90]), decoder.note_on(3, value, 90));
-            assert_eq!(midi(&mut translator, [0x83, value, 90]), decoder.note_off(3, value));
+            assert_eq!(midi(&mut translator, [0x93, value, 90]), last(decoder.note_on(3, value, 90)));
+            assert_eq!(midi(&mut translator, [0x83, value, 90]), last(decoder.note_off(Some(3), value)));
         }
         let mut translator = Translator::default();
-        assert_eq!(midi(&mut translator, [0xD0, 64, 0]), MidiDecoder::new().pressure(0, 64));
+        assert_eq!(midi(&mut translator, [0xD0, 64, 0]), MidiDecoder::new().pressure(0, 64)[0]);
     }
 
     #[test]
-    fn tuning_adds_to_the_wheel_until_the_next_note() {
+    fn tuning_adds_to_the_wheel_until_the_key_is_struck_anew() {
         let mut translator = Translator::default();
         let (voice_id, channel, key) = (VoiceID::Wildcard, Channel::Number(0), Key::Number(60));
         midi(&mut translator, [0xE0, 127, 127]);
+        midi(&mut translator, [0x90, 60, 90]);
         let tuning = Host::PolyTuning { timing: 0, voice_id, channel, key, tuning: -0.5 };
         assert_eq!(one(&mut translator, tuning), Some(Event::Bend { cents: 150.0 }));
         let note = Host::NoteOn { timing: 7, voice_id, channel, key, velocity: 1.0 };

@@ -102,6 +102,12 @@ impl BreathCurve {
         Self { points: vec![(0.0, gamma.clamp(0.0, GAMMA_MAX))], relative: false }
     }
 
+    /// From 0 to `gamma` and back, `seconds` each way; gamma clamped to 0..=3, seconds positive.
+    pub fn swell(gamma: f32, seconds: f64) -> Self {
+        let top = (seconds, gamma.clamp(0.0, GAMMA_MAX));
+        Self { points: vec![(0.0, 0.0), top, (2.0 * seconds, 0.0)], relative: false }
+    }
+
     /// `FROM:TO` over the whole score.
     pub fn parse_crescendo(text: &str) -> Result<Self, BreathError> {
         let bad = || BreathError::Crescendo(text.to_owned());

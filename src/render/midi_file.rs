@@ -8,7 +8,7 @@
 //! Files damaged on the way are refused with the byte where reading stopped, rather than played up to there.
 //! Source: Standard MIDI Files 1.0 (RP-001, 1988).
 
-use crate::control::midi::MidiDecoder;
+use crate::control::midi::{Events, MidiDecoder};
 use crate::event::{Event, Timed};
 use crate::render::score::Score;
 use midly::{EventIter, MetaMessage, MidiMessage, TrackEventKind};
@@ -149,21 +149,25 @@ impl Clock {
 
 /// Reads a whole file as a score at `rate`, ending with its last event.
 pub fn read(bytes: &[u8], rate: u32) -> Result<Score, MidiFileError> {
+    read_as(MidiDecoder::new(), bytes, rate)
+}
+
+/// The same with a decoder that knows something about the file.
+pub fn read_as(mut decoder: MidiDecoder, bytes: &[u8], rate: u32) -> Result<Score, MidiFileError> {
     let (mut clock, messages) = merged(bytes)?;
-    let mut decoder = MidiDecoder::new();
     let (mut events, mut tick, mut notes) = (Vec::new(), 0, 0usize);
     for message in messages {
         clock.advance(message.tick - tick);
         tick = message.tick;
-        let event = match message.kind {
+        let decoded = match message.kind {
             TrackEventKind::Midi { channel, message } => decode(&mut decoder, channel.as_int(), message),
             TrackEventKind::Meta(MetaMessage::Tempo(us)) => {
                 clock.set_tempo(us.as_int());
-                None
+                [None, None]
             }
-            _ => None,
+            _ => [None, None],
         };
-        if let Some(event) = event {
+        for event in decoded.into_iter().flatten() {
             notes += usize::from(matches!(event, Event::NoteOn { .. }));
             events.push(Timed { at: clock.sample(rate)?, event });
         }
@@ -175,16 +179,16 @@ pub fn read(bytes: &[u8], rate: u32) -> Result<Score, MidiFileError> {
     Ok(Score { events, samples })
 }
 
-fn decode(decoder: &mut MidiDecoder, channel: u8, message: MidiMessage) -> Option<Event> {
+fn decode(decoder: &mut MidiDecoder, channel: u8, message: MidiMessage) -> Events {
     match message {
         MidiMessage::NoteOn { key, vel } => decoder.note_on(channel, key.as_int(), vel.as_int()),
-        MidiMessage::NoteOff { key, .. } => decoder.note_off(channel, key.as_int()),
+        MidiMessage::NoteOff { key, .. } => decoder.note_off(Some(channel), key.as_int()),
         MidiMessage::Controller { controller, value } => {
             decoder.controller(channel, controller.as_int(), value.as_int())
         }
         MidiMessage::ChannelAftertouch { vel } => decoder.pressure(channel, vel.as_int()),
         MidiMessage::PitchBend { bend } => decoder.bend(channel, bend.0.as_int()),
-        MidiMessage::Aftertouch { .. } | MidiMessage::ProgramChange { .. } => None,
+        MidiMessage::Aftertouch { .. } | MidiMessage::ProgramChange { .. } => [None, None],
     }
 }
 

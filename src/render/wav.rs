@@ -1,8 +1,7 @@
 //! Samples into a WAV file: 16 or 24 bit integers, rounded to nearest without dither, or 32 bit floats as they are.
 
-use crate::output::NewFile;
 use hound::{SampleFormat, WavSpec, WavWriter};
-use std::io::BufWriter;
+use std::io::{BufWriter, Seek, Write};
 
 /// How a sample is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,22 +42,16 @@ pub struct Level {
 }
 
 /// A WAV file being written; each sample goes to every channel.
-pub struct WavFile<'a> {
-    writer: WavWriter<BufWriter<&'a mut NewFile>>,
+pub struct WavFile<W: Write + Seek> {
+    writer: WavWriter<BufWriter<W>>,
     depth: Depth,
     channels: u16,
     level: Level,
 }
 
-impl<'a> WavFile<'a> {
+impl<W: Write + Seek> WavFile<W> {
     /// Writes a header for `samples` samples per channel, which must fit.
-    pub fn new(
-        file: &'a mut NewFile,
-        rate: u32,
-        depth: Depth,
-        channels: u16,
-        samples: usize,
-    ) -> Result<Self, WavError> {
+    pub fn new(file: W, rate: u32, depth: Depth, channels: u16, samples: usize) -> Result<Self, WavError> {
         let (bits_per_sample, sample_format) = match depth {
             Depth::Int16 => (16, SampleFormat::Int),
             Depth::Int24 => (24, SampleFormat::Int),
@@ -107,6 +100,7 @@ fn round(sample: f32, full_scale: f64) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::output::NewFile;
 
     fn written(depth: Depth, channels: u16) -> (Level, hound::WavReader<std::io::BufReader<std::fs::File>>) {
         let directory = tempfile::tempdir().unwrap();

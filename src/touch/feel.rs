@@ -5,7 +5,7 @@ use crate::haptics::{AngleMap, FeelDesign, FeelRefused, FeelTable, Limits, Requi
 use crate::instrument::felt::{played_reed, requirements};
 use crate::instrument::{BuildError, Model, Settings};
 use crate::units::SoundingNote;
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 /// Pitches there are names for.
 const PITCHES: usize = 128;
@@ -18,8 +18,8 @@ pub const NO_MOTOR: Limits = Limits {
 };
 
 /// The built-in clarinet, worked out once for all that play it.
-static BUILT_IN: LazyLock<Result<Feels, BuildError>> =
-    LazyLock::new(|| Model::built_in(48_000.0).map(|model| Feels::new(&model)));
+static BUILT_IN: LazyLock<Result<Arc<Feels>, BuildError>> =
+    LazyLock::new(|| Model::built_in(48_000.0).map(|model| Arc::new(Feels::new(&model))));
 
 /// An instrument, and what its bore asks for every note. Building one takes a second.
 #[derive(Clone, Debug)]
@@ -32,8 +32,8 @@ pub struct Feels {
 
 impl Feels {
     /// The built-in clarinet. The first call takes a second.
-    pub fn built_in() -> Result<&'static Self, &'static BuildError> {
-        BUILT_IN.as_ref()
+    pub fn built_in() -> Result<Arc<Self>, &'static BuildError> {
+        BUILT_IN.as_ref().map(Arc::clone)
     }
 
     /// Asks an instrument for every note, through the lattice that sounds. Allocates; takes a second.

@@ -40,8 +40,9 @@ const STEPS: &[Step] = &[
     ("bundle", || bundle::run(&[])),
     ("simulated knob", simulator::build),
     ("tests, xtask and its MIDI reader", || cargo("test -p xtask --lib --bins")),
-    ("CLAP in clack-host", || cargo("test -p xtask --test clap --no-fail-fast")),
+    ("CLAP in clack-host", clap),
     ("CLAP with allocation checks", clap_checked),
+    ("standalone", standalone),
     ("CLAP with the simulated knob", || cargo("test -p xtask --test knob --no-fail-fast")),
     // Elsewhere there is no JACK that a test could start.
     #[cfg(target_os = "linux")]
@@ -129,13 +130,31 @@ fn generated() -> Result<()> {
     Ok(())
 }
 
+/// Tests of the CLAP, with a cache of their own for the instruments they make.
+fn clap_tests(names: &[&str]) -> Command {
+    let mut command = machine::cargo();
+    command.args(["test", "-p", "xtask", "--no-fail-fast"]);
+    command.args(names.iter().flat_map(|name| ["--test", name]));
+    command.env("CHALUMEAU_CACHE_DIR", machine::target().join("cache"));
+    command
+}
+
+fn clap() -> Result<()> {
+    machine::run(&mut clap_tests(&["clap", "instrument"]))
+}
+
 /// The same tests on a debug build, where the framework aborts on any allocation while processing.
 fn clap_checked() -> Result<()> {
     cargo("build --all-features --lib")?;
     let library = format!("{}chalumeau{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     let library = machine::target().join("debug").join(library);
-    let tests = ["test", "-p", "xtask", "--test", "clap", "--test", "knob", "--no-fail-fast"];
-    machine::run(machine::cargo().args(tests).env("CHALUMEAU_CLAP", library))
+    machine::run(clap_tests(&["clap", "instrument", "knob"]).env("CHALUMEAU_CLAP", library))
+}
+
+/// The program of its own, without sound; the JACK step plays it to a server.
+fn standalone() -> Result<()> {
+    cargo("build --all-features --bin chalumeau-standalone")?;
+    cargo("test -p xtask --test standalone --no-fail-fast")
 }
 
 fn dawdreamer() -> Result<()> {

@@ -5,7 +5,6 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use chalumeau::analysis::to_f64;
 use chalumeau::instrument::Clarinet;
 use chalumeau::render;
 use chalumeau::render::heard::{Heard, Listener, Sounding, spread};
@@ -56,10 +55,8 @@ pub fn run(_: &[String]) -> Result<()> {
     let (wav, png) = (folder.join("melody.wav"), folder.join("melody.png"));
     write_wav(&wav, &left, &right)?;
 
-    let samples = to_f64(&left);
-    let notes = score.soundings();
     println!("\n{}", table(&left, &score));
-    picture::write(&png, &samples, f64::from(RATE), &notes, &score, A4_HZ)?;
+    picture::write(&png, &left, f64::from(RATE), &score, A4_HZ)?;
 
     println!("sound    {}\npicture  {}\n", shown(&wav), shown(&png));
     by_knob(&clap, &folder, &score, &said)?;

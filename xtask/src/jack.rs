@@ -1,5 +1,5 @@
 //! MIDI between programs without a sound card: a build of plugin and command line whose midir speaks to JACK, a JACK
-//! server with a dummy driver, and the tests that play a simulated knob's MIDI port through both.
+//! server with a dummy driver, the tests that play a simulated knob's MIDI port through both, and the standalone's.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,14 +19,19 @@ const SETTLED: Duration = Duration::from_millis(500);
 /// How long the server may take to answer.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// Builds, starts the server and runs `xtask/tests/knob_midi.rs`.
+/// Builds, starts the server and runs `xtask/tests/knob_midi.rs` and the ignored test of `standalone.rs`.
 pub fn test() -> Result<()> {
-    let Build { plugin, program } = build()?;
+    let Build { plugin, program, standalone } = build()?;
     let server = Server::start()?;
     let tests =
         ["test", "-p", "xtask", "--test", "knob_midi", "--", "--ignored", "--nocapture", "--test-threads=1"];
     let mut command = machine::cargo();
     command.args(tests).env("CHALUMEAU_CLAP", plugin).env(simulator::PROGRAM, program);
+    machine::run(server.for_clients(&mut command))?;
+    let mut command = machine::cargo();
+    command
+        .args(["test", "-p", "xtask", "--test", "standalone", "--", "--ignored"])
+        .env("CHALUMEAU_STANDALONE", standalone);
     machine::run(server.for_clients(&mut command))
 }
 
@@ -34,12 +39,13 @@ pub fn test() -> Result<()> {
 struct Build {
     plugin: PathBuf,
     program: PathBuf,
+    standalone: PathBuf,
 }
 
 /// A debug build with every feature, `midi-jack` among them, as the tests with allocation checks have made it already;
 /// kept aside, because the next build with other features takes its place.
 fn build() -> Result<Build> {
-    let all = ["build", "--all-features", "--lib", "--bin", "chalumeau"];
+    let all = ["build", "--all-features", "--lib", "--bin", "chalumeau", "--bin", "chalumeau-standalone"];
     machine::run(machine::cargo().args(all))?;
     let folder = machine::target().join("midi-jack");
     fs::create_dir_all(&folder)?;
@@ -52,6 +58,7 @@ fn build() -> Result<Build> {
     Ok(Build {
         plugin: keep(format!("{prefix}chalumeau{suffix}"))?,
         program: keep(format!("chalumeau{}", std::env::consts::EXE_SUFFIX))?,
+        standalone: keep(format!("chalumeau-standalone{}", std::env::consts::EXE_SUFFIX))?,
     })
 }
 

@@ -46,7 +46,7 @@ pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -
     let feels = Feels::built_in().map_err(|reason| anyhow!("{reason}"))?;
     let table = feels.table(&Settings::default(), &FeelDesign::default(), &Limits::default())?;
     let hand = folder.join("hand.csv");
-    std::fs::write(&hand, script(score, feels, &table, rate))?;
+    std::fs::write(&hand, script(score, &feels, &table, rate))?;
     let log = folder.join("knob.csv");
     let number = serial_number();
     let text = |path: &Path| path.to_string_lossy().into_owned();
@@ -95,7 +95,7 @@ pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -
         left,
         knob: read_log(&log)?,
         gamma: breath.into_iter().map(|[t, unit]| [t, unit * full]).collect(),
-        threshold: threshold(score, feels, &table, rate),
+        threshold: threshold(score, &feels, &table, rate),
     })
 }
 

@@ -268,9 +268,16 @@ fn text_reads_both_ways() {
     }
 }
 
-/// Switches that act on a knob.
-const ACTS: [&str; 6] =
-    ["Arm knob", "Take over knob", "Rest here", "Blow hard here", "Record take", "Knob status"];
+/// Switches that act on a knob, and what only says something.
+const ACTS: [&str; 7] = [
+    "Arm knob",
+    "Take over knob",
+    "Rest here",
+    "Blow hard here",
+    "Record take",
+    "Knob status",
+    "Instrument status",
+];
 
 #[test]
 fn state_makes_the_round_trip() {

@@ -83,15 +83,51 @@ impl<B: DrawingBackend> Canvas<B> {
         Style { colour: colour(pen.colour, 1.0), width: ((pen.width * self.scale).round() as u32).max(1) }
     }
 
-    /// Lines from point to point.
+    /// Lines from point to point, with round corners.
     pub fn line(&mut self, points: &[At], pen: Pen) -> Result<(), DrawError> {
-        let mut path: Vec<BackendCoord> = points.iter().map(|&point| self.at(point)).collect();
-        path.dedup();
+        let mut path: Vec<BackendCoord> = Vec::with_capacity(points.len());
+        for (index, &point) in points.iter().enumerate() {
+            let at = self.at(point);
+            // Steps shorter than a pixel would follow the backend's grid instead of the curve; corners stay.
+            let near = |before: &BackendCoord| {
+                let (dx, dy) = (f64::from(at.0 - before.0), f64::from(at.1 - before.1));
+                dx.hypot(dy) < self.scale
+            };
+            if path.last().is_none_or(|before| !near(before)) {
+                path.push(at);
+            } else if index + 1 == points.len() && path.len() > 1 {
+                path.pop();
+                path.push(at);
+            }
+        }
         if path.len() < 2 {
             return Ok(());
         }
         let style = self.style(pen);
-        self.backend.draw_path(path, &style).map_err(DrawError::backend)
+        if self.vector.is_some() {
+            return self.backend.draw_path(path, &style).map_err(DrawError::backend);
+        }
+        // The backend's own wide lines tear where they turn back. Stroke by stroke they do not.
+        let (half, fill) =
+            (0.5 * pen.width * self.scale, Style { colour: colour(pen.colour, 1.0), width: 1 });
+        for pair in path.windows(2) {
+            let [a, b] = [pair[0], pair[1]];
+            let (dx, dy) = (f64::from(b.0 - a.0), f64::from(b.1 - a.1));
+            let length = dx.hypot(dy).max(1e-9);
+            let (nx, ny) = (-dy / length * half, dx / length * half);
+            let corner = |p: BackendCoord, side: f64| {
+                ((f64::from(p.0) + side * nx).round() as i32, (f64::from(p.1) + side * ny).round() as i32)
+            };
+            let corners = [corner(a, 1.0), corner(b, 1.0), corner(b, -1.0), corner(a, -1.0)];
+            self.backend.fill_polygon(corners, &fill).map_err(DrawError::backend)?;
+        }
+        if half >= 2.0 && path.len() > 2 {
+            for &joint in &path[1..path.len() - 1] {
+                let radius = (half - 0.5).round() as u32;
+                self.backend.draw_circle(joint, radius, &fill, true).map_err(DrawError::backend)?;
+            }
+        }
+        Ok(())
     }
 
     /// A filled shape.

@@ -329,13 +329,15 @@ fn draw_panel<B: DrawingBackend>(
     for layer in &panel.layers {
         draw_layer(canvas, layer, &frame)?;
     }
-    draw_axes(canvas, panel, &frame, &x_ticks, &y_ticks, (left, bottom))?;
-    for (mark, row, start) in flags {
-        let base = flags_top + (row as f64 + 0.78) * LINE;
-        canvas.text((start, base), &mark.name, SMALL, mark.colour.rgb(), Align::Left, false)?;
+    let base = |row: usize| flags_top + (row as f64 + 0.78) * LINE;
+    for &(mark, row, _) in &flags {
         let x = frame.x.at(mark.at);
         let pen = Pen { colour: mark.colour.rgb(), width: 1.5 };
-        canvas.line(&[(x, base + 6.0), (x, frame.top())], pen)?;
+        canvas.line(&[(x, base(row) + 6.0), (x, frame.top())], pen)?;
+    }
+    draw_axes(canvas, panel, &frame, &x_ticks, &y_ticks, (left, bottom))?;
+    for &(mark, row, start) in &flags {
+        words(canvas, (start, base(row)), &mark.name, SMALL, mark.colour.rgb())?;
     }
     for mark in named_marks(panel, Direction::Y).filter(|mark| frame.y.holds(mark.at)) {
         let y = frame.y.at(mark.at);
@@ -348,13 +350,7 @@ fn draw_panel<B: DrawingBackend>(
             canvas.text((frame.right() + 8.0, base), &mark.name, SMALL, fill, Align::Left, false)?;
         } else {
             let place = (frame.right() - 8.0, y - 7.0);
-            canvas.rect(
-                (place.0 - width - 4.0, place.1 - 0.72 * SMALL),
-                (place.0 + 4.0, place.1 + 0.22 * SMALL),
-                PAPER,
-                0.8,
-            )?;
-            canvas.text(place, &mark.name, SMALL, fill, Align::Right, false)?;
+            words(canvas, (place.0 - width, place.1), &mark.name, SMALL, fill)?;
         }
     }
     Ok(())
@@ -504,11 +500,12 @@ fn draw_axes<B: DrawingBackend>(
             let (x, half) = (frame.x.at(tick.at), 0.5 * font::width(&tick.text, SMALL));
             canvas.line(&[(x, y1), (x, y1 - 6.0)], pen)?;
             if x - half > end + 10.0 {
-                canvas.text((x, y1 - 11.0), &tick.text, SMALL, INK, Align::Centre, false)?;
+                words(canvas, (x - half, y1 - 11.0), &tick.text, SMALL, INK)?;
                 end = x + half;
             }
         }
-        canvas.text((middle_x, y1 - SMALL - 16.0), &axis.label, WORDS, INK, Align::Centre, false)?;
+        let start = middle_x - 0.5 * font::width(&axis.label, WORDS);
+        words(canvas, (start, y1 - SMALL - 16.0), &axis.label, WORDS, INK)?;
     }
     if let Some(axis) = &panel.right {
         canvas.line(&[(x1, y0), (x1, y1)], pen)?;
@@ -539,6 +536,19 @@ fn draw_axes<B: DrawingBackend>(
         upright(canvas, (bar.1 + 12.0 + widest(&ticks) + LINE, middle_y), &heat.name, y0 - y1)?;
     }
     Ok(())
+}
+
+/// Words with paper behind them, where lines may pass.
+fn words<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    (start, base): At,
+    text: &str,
+    size: f64,
+    fill: Rgb,
+) -> Result<(), DrawError> {
+    let width = font::width(text, size);
+    canvas.rect((start - 4.0, base - 0.72 * size), (start + width + 4.0, base + 0.22 * size), PAPER, 0.85)?;
+    canvas.text((start, base), text, size, fill, Align::Left, false)
 }
 
 /// An axis label from bottom to top, a little smaller where it would not fit.

@@ -82,7 +82,7 @@ fn notes(low: f64, high: f64, wanted: usize) -> Ticks {
 }
 
 fn plain(at: f64) -> String {
-    if (1e-4..1e7).contains(&at.abs()) {
+    if (0.999e-3..1e7).contains(&at.abs()) {
         let decimals = (-at.abs().log10().floor()).max(0.0) as usize;
         minus(format!("{at:.decimals$}"))
     } else {

@@ -3,14 +3,15 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use super::{NO_NOTE, Shared, desk, takes};
+use super::{NO_NOTE, Shared, desk, felt, takes};
 use crate::control::knob::slap_strength;
 use crate::device::KnobReader;
 use crate::event::{Event, Timed};
-use crate::instrument::{Clarinet, Settings};
+use crate::instrument::Settings;
+use crate::plugin::instrument::{self, Bench};
 use crate::plugin::params::ChalumeauParams;
 use crate::touch::blower::{Blower, Blown, Breath14, GRID, Hand};
-use crate::touch::feel::{Feels, NO_MOTOR};
+use crate::touch::feel::NO_MOTOR;
 use crate::touch::take::Take;
 
 /// Breath values of one block that are also sent to the host: a block of 8192 samples has 128.
@@ -85,7 +86,7 @@ impl Audio {
 
     /// Before playing: a take that shall be replayed is there from the first sample, so that every render of a file is
     /// the same. Allocates; takes half a second. [main thread]
-    pub fn prepare(&mut self, params: &ChalumeauParams) {
+    pub fn prepare(&mut self, params: &ChalumeauParams, instruments: &instrument::Shared) {
         self.prepared = None;
         if !params.knob.replay.value() {
             return;
@@ -93,7 +94,7 @@ impl Audio {
         let Ok(path) = params.knob.take.read().map(|path| path.clone()) else { return };
         // A take or feel that cannot be had is worded by the desk; nothing is replayed then.
         let Ok(take) = takes::load(&path) else { return };
-        let Ok(feels) = Feels::built_in() else { return };
+        let Some(feels) = felt::Felt::default().of(instruments) else { return };
         let Ok(table) = feels.table(&params.settings(), &desk::design(&params.knob), &NO_MOTOR) else {
             return;
         };
@@ -119,7 +120,7 @@ impl Audio {
     /// Renders one block: the host's events, and the breath of knob or take between them.
     pub fn render(
         &mut self,
-        clarinet: &mut Clarinet,
+        bench: &mut Bench,
         settings: &Settings,
         host: impl Iterator<Item = Timed<Event>>,
         stage: Stage,
@@ -167,7 +168,7 @@ impl Audio {
                 let begun = self.replayed;
                 let angle = |at: usize| Some(take.angle_deg((begun + at as u64) as f64 / stage.rate_hz));
                 let events = Blown::new(host, &mut self.blower, hand, full_pa, samples, angle, &mut heard);
-                clarinet.render_events(events, out);
+                bench.render_events(events, out);
                 self.replayed += samples as u64;
             }
             (Source::Knob, _, Some(reader)) => {
@@ -177,7 +178,7 @@ impl Audio {
                 });
                 let angle = |at: usize| reader.pose(at).map(|pose| f64::from(pose.angle_deg));
                 let events = Blown::new(host, &mut self.blower, hand, full_pa, samples, angle, &mut heard);
-                clarinet.render_events(slap.into_iter().chain(events), out);
+                bench.render_events(slap.into_iter().chain(events), out);
             }
             _ => {
                 let blower = &mut self.blower;
@@ -186,7 +187,7 @@ impl Audio {
                     heard(0, breath);
                     Timed { at: 0, event: Event::Breath(breath.unit()) }
                 });
-                clarinet.render_events(gone.into_iter().chain(host), out);
+                bench.render_events(gone.into_iter().chain(host), out);
             }
         }
         self.blower.advance(samples);

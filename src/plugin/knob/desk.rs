@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
+use super::felt::Felt;
 use super::{Shared, takes};
 use crate::control::knob::{self, KnobDesign, Taken};
 use crate::device::{
@@ -12,12 +13,13 @@ use crate::device::{
 };
 use crate::haptics::{FeelDesign, Limits, Order};
 use crate::instrument::Settings;
+use crate::plugin::instrument;
 use crate::plugin::params::knob::{Calibration, KnobKind, LawChoice, OrderChoice};
 use crate::plugin::params::{ChalumeauParams, KnobParams};
 use crate::touch::blower::Hand;
 use crate::touch::feel::Feels;
 use crate::touch::take::{Moment, Take};
-use crate::units::{SoundingNote, WrittenNote};
+use crate::units::WrittenNote;
 use crate::wire::Law;
 
 /// How often the desk looks up.
@@ -25,8 +27,6 @@ const TURN: Duration = Duration::from_millis(10);
 /// A switch must have been seen off for so long beside a live knob before on means on: what a project or a host sets
 /// by itself while it loads is no act of the user.
 const ARM_AFTER: Duration = Duration::from_millis(500);
-/// A B flat clarinet sounds two semitones lower than written.
-const TRANSPOSITION: i8 = 2;
 /// Torque of the reference note in a study at most, mNm: with it both sides of every trial are allowed under the first
 /// ceiling at the default contrast (a test below).
 const STUDY_MNM: f64 = 50.0;
@@ -35,12 +35,14 @@ const STUDY_MNM: f64 = 50.0;
 pub struct Desk {
     params: Arc<ChalumeauParams>,
     shared: Arc<Shared>,
+    instruments: Arc<instrument::Shared>,
+    felt: Felt,
     readers: rtrb::Producer<KnobReader>,
     hand_in: triple_buffer::Input<Hand>,
     hand: Hand,
     take: triple_buffer::Input<Option<Arc<Take>>>,
     /// What the feel in force was worked out from.
-    made_of: Option<(Settings, FeelDesign, Limits)>,
+    made_of: Option<(Arc<Feels>, Settings, FeelDesign, Limits)>,
     refused: Option<String>,
     /// Why the far end of the knob blows no harder, if it does not.
     short_breath: Option<String>,
@@ -73,6 +75,7 @@ impl Desk {
     pub(super) fn new(
         params: Arc<ChalumeauParams>,
         shared: Arc<Shared>,
+        instruments: Arc<instrument::Shared>,
         readers: rtrb::Producer<KnobReader>,
         hand_in: triple_buffer::Input<Hand>,
         take: triple_buffer::Input<Option<Arc<Take>>>,
@@ -80,6 +83,8 @@ impl Desk {
         Self {
             params,
             shared,
+            instruments,
+            felt: Felt::default(),
             readers,
             hand_in,
             hand: Hand::default(),
@@ -178,6 +183,7 @@ impl Desk {
             Some(index.and_then(|index| table.note(index)).unwrap_or(table.reference()).feel)
         };
         let (shared, rows) = (self.shared.clone(), self.rows.0.clone());
+        let instruments = self.instruments.clone();
         let on_state = move |state: &StateSample| {
             let _ = rows.send(Moment {
                 t_us: u64::try_from(state.host_us).unwrap_or(0),
@@ -186,7 +192,7 @@ impl Desk {
                 torque_mnm: f64::from(state.torque_mnm),
                 written: shared
                     .note()
-                    .and_then(|SoundingNote(note)| SoundingNote(note).written(TRANSPOSITION))
+                    .and_then(|note| note.written(instruments.transposition()))
                     .map(|WrittenNote(written)| written),
                 gamma: f64::from(shared.gamma()),
                 feel_id: state.feel_id,
@@ -204,10 +210,16 @@ impl Desk {
             Some(info) => Limits::of_device(info, ceiling_mnm),
             None => Limits { ceiling_mnm: f64::from(ceiling_mnm), ..Limits::default() },
         };
-        if self.made_of == Some((settings, design, limits)) {
+        let Some(feels) = self.felt.of(&self.instruments) else { return };
+        let same = |(of, ..): &(Arc<Feels>, _, _, _)| Arc::ptr_eq(of, &feels);
+        if self
+            .made_of
+            .as_ref()
+            .is_some_and(|made| same(made) && (made.1, made.2, made.3) == (settings, design, limits))
+        {
             return;
         }
-        self.made_of = Some((settings, design, limits));
+        self.made_of = Some((feels.clone(), settings, design, limits));
         let (full_kpa, closing_kpa) = (f64::from(settings.breath_full_kpa), 1e-3 * settings.closing_pa());
         // Single precision makes 6 kPa a little less than 6 kPa.
         self.short_breath = (full_kpa < 0.999 * closing_kpa).then(|| {
@@ -215,7 +227,6 @@ impl Desk {
                 "this reed shuts at {closing_kpa:.1} kPa: raise Full breath ({full_kpa:.1} kPa) to reach it"
             )
         });
-        let Ok(feels) = Feels::built_in() else { return };
         match feels.table(&settings, &design, &limits) {
             Ok(table) => {
                 self.hand.maps = feels.maps(&table);

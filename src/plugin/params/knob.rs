@@ -295,12 +295,7 @@ impl KnobParams {
             side: switch("A/B", "B", "A"),
             h_source: EnumParam::new("H from", ReedSource::Parameter).non_automatable(),
             k_source: EnumParam::new("k from", ReedSource::Parameter).non_automatable(),
-            status: BoolParam::new("Knob status", false)
-                .with_value_to_string(Arc::new(move |_| {
-                    status.read().map_or_else(|_| String::new(), |text| text.clone())
-                }))
-                .with_string_to_value(Arc::new(|_| Some(false)))
-                .non_automatable(),
+            status: super::said("Knob status", status),
         }
     }
 

@@ -1,0 +1,143 @@
+//! `chalumeau bifurcation`: one note up and down the breath.
+
+use crate::bore::transfer_matrix::{TransferMatrix, threshold_gamma};
+use crate::cli::Failure;
+use crate::cli::args::{PlayedArgs, check_fingering, note, within};
+use crate::cli::plot::PlotArgs;
+use crate::cli::render::progress;
+use crate::cli::settings::SettingsArgs;
+use crate::cli::table::TableArgs;
+use crate::figure::bifurcation::Ramp;
+use crate::render::bifurcation;
+use crate::render::breath::{BreathCurve, GAMMA_MAX};
+use crate::units::{Air, WrittenNote};
+use clap::Args;
+
+const EXAMPLES: &str = "\
+Examples:
+  chalumeau bifurcation --written F3 --plot f3.png
+  chalumeau bifurcation --written G4 --zeta 0.2 --seconds 60 --csv g4.csv";
+
+/// How loud a note is while the breath slowly grows and slowly fades
+///
+/// Gamma (mouth pressure over closing pressure) runs from 0 to --to and back, --seconds each way. direction is 1 growing
+/// and -1 fading, rms that of the pressure in the mouthpiece over the closing pressure, shut the part of the time the
+/// reed is shut. Comments say where the note begins, beats, chokes, returns and ends. Up and down differ because a moving
+/// breath overtakes a threshold before the note has grown or died; what stays with more --seconds is hysteresis proper.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Bifurcation {
+    /// Written note: a MIDI number (65) or a name (F4)
+    #[arg(long, value_name = "NOTE", value_parser = note)]
+    written: u8,
+    /// Largest mouth pressure over closing pressure, 0.2..3
+    #[arg(long, value_name = "G", default_value = "2", value_parser = |s: &str| within(s, 0.2, f64::from(GAMMA_MAX)))]
+    to: f64,
+    /// Time for the way up, and as much for the way down, s, 0.5..600
+    #[arg(long, value_name = "S", default_value = "20", value_parser = |s: &str| within(s, 0.5, 600.0))]
+    seconds: f64,
+    /// Sample rate, Hz, 22050..384000
+    #[arg(long, value_name = "HZ", default_value = "48000", value_parser = clap::value_parser!(u32).range(22_050..=384_000))]
+    rate: u32,
+    #[command(flatten)]
+    instrument: PlayedArgs,
+    #[command(flatten)]
+    table: TableArgs,
+    #[command(flatten)]
+    plot: PlotArgs,
+    #[command(flatten)]
+    settings: SettingsArgs,
+}
+
+impl Bifurcation {
+    pub fn run(&self) -> Result<(), Failure> {
+        let file = self.instrument.load()?;
+        let written = WrittenNote(self.written);
+        check_fingering(&file, written)?;
+        let sounding = written.sounding(file.transposition).ok_or_else(|| {
+            Failure::Usage(format!(
+                "written {written} sounds outside MIDI's 0..127; choose one nearer the middle"
+            ))
+        })?;
+        let curve = BreathCurve::swell(self.to as f32, self.seconds);
+        let settings = self.settings.blown_by(Some(&curve), &file)?;
+        let mut table = self.table.open("direction,gamma,rms,shut")?;
+        let plot = self.plot.open(self.table.force())?;
+        // Flow strength of the reed as strength, lip and H, k, A make it: what the linear theory asks for.
+        let zeta = {
+            let law = settings.reed_law();
+            let reference = crate::reed::ReedLaw::default();
+            let opening = law.a() * law.h() / reference.h();
+            f64::from(settings.zeta) * opening / law.closing().sqrt()
+        };
+        let threshold = file
+            .fingering(written)
+            .and_then(|fingering| {
+                let model = TransferMatrix::new(&file, Air::at(f64::from(settings.temperature_c)));
+                let near_hz = sounding.frequency_hz(f64::from(settings.a4_hz));
+                model.playing_frequency(&fingering.open, file.reed_volume_m3, near_hz)
+            })
+            .filter(|&(_, height)| height > 0.0)
+            .map(|(_, height)| threshold_gamma(height, zeta));
+        let name = file.name.clone();
+        let model = self.instrument.model(file, self.rate, settings.a4_hz)?;
+        let bar = progress((2.0 * self.seconds * f64::from(self.rate)) as usize);
+        let found = bifurcation::measure(
+            &model,
+            &settings,
+            sounding,
+            self.to as f32,
+            self.seconds,
+            self.rate,
+            |samples| bar.inc(samples as u64),
+        );
+        bar.finish_and_clear();
+
+        let note = format!(
+            "zeta {}, strength {}, lay {}, breath noise {}; gamma 0 to {} in {} s and back",
+            settings.zeta, settings.strength, settings.lay, settings.noise, self.to, self.seconds
+        );
+        table.comment(format_args!("{name}; written {written}; {note}"))?;
+        let changes = found.changes();
+        let said = [
+            ("linear threshold", threshold),
+            ("begins", changes.begins),
+            ("beats", changes.beats),
+            ("chokes", changes.chokes),
+            ("returns", changes.returns),
+            ("stops beating", changes.opens),
+            ("ends", changes.ends),
+        ];
+        let said = said.map(|(what, at)| match at {
+            Some(at) => format!("{what} {at:.4}"),
+            None => format!("{what} never"),
+        });
+        table.comment(format_args!("gamma: {}", said.join(", ")))?;
+        for (direction, way) in [(1, &found.up), (-1, &found.down)] {
+            for point in way {
+                table.line(format_args!(
+                    "{direction},{:.6},{:.6e},{:.4}",
+                    point.gamma, point.rms, point.shut
+                ))?;
+            }
+        }
+        table.finish()?;
+        let way = |way: &[bifurcation::Point]| way.iter().map(|p| [p.gamma, p.rms, p.shut]).collect();
+        plot.draw(|| {
+            Ramp {
+                title: format!("{name}, written {written}"),
+                note,
+                closing_kpa: 1e-3 * settings.closing_pa(),
+                up: way(&found.up),
+                down: way(&found.down),
+                threshold,
+                begins: changes.begins,
+                beats: changes.beats,
+                chokes: changes.chokes,
+                returns: changes.returns,
+                ends: changes.ends,
+            }
+            .figure()
+        })
+    }
+}

@@ -1,0 +1,314 @@
+//! `chalumeau report`: a rendering as one HTML page with its sound, figures and tables.
+
+use crate::cli::Failure;
+use crate::cli::args::within;
+use crate::cli::play::{PlayArgs, Prepared};
+use crate::cli::render::{about, progress};
+use crate::cli::watch::{Watch, Watched};
+use crate::figure;
+use crate::figure::report::{Cell, Plate, Report as Page, Sound, Table, write};
+use crate::identity;
+use crate::instrument::{Settings, Tuning};
+use crate::output::NewFile;
+use crate::render as player;
+use crate::render::heard::{Heard, spread};
+use crate::render::wav::{Depth, WavFile};
+use clap::Args;
+use std::cell::RefCell;
+use std::io::{Cursor, Seek, Write};
+use std::path::{Path, PathBuf};
+
+/// Samples per block; any number gives the same sound.
+const BLOCK: usize = 512;
+/// Longest sound put into a page, s: 77 MB of text at 48 kHz, about what browsers still open with ease.
+const INSIDE_MAX_S: f64 = 600.0;
+
+const EXAMPLES: &str = "\
+Examples:
+  chalumeau report melody.mid --out melody.html
+  chalumeau report --scale E3:C6 --gamma 0.5 --no-noise --out scale.html
+  chalumeau report long.mid --wav long.wav --out long.html
+      The sound stays a file of its own, beside the page.";
+
+/// Play as `render` does, and make one HTML page of it
+///
+/// The page has the sound to listen to, waveform, spectrogram, pitch against the score, breath and reed as figures, the
+/// instrument to scale, the cents of every note, and all settings. It needs no other file and no network, unless the sound
+/// is put beside it with --wav.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Report {
+    #[command(flatten)]
+    play: PlayArgs,
+    /// HTML file to write
+    #[arg(short, long, value_name = "FILE", help_heading = "Output")]
+    out: PathBuf,
+    /// Write the sound to this WAV file, in the same directory as the page, instead of into the page
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    wav: Option<PathBuf>,
+    /// Time of the close look at the reed, s [default: the middle of the longest note]
+    #[arg(long, value_name = "S", help_heading = "Output", value_parser = |s: &str| within(s, 0.0, 1e6))]
+    plot_at: Option<f64>,
+    /// Replace existing files
+    #[arg(long, help_heading = "Output")]
+    force: bool,
+}
+
+impl Report {
+    pub fn run(&self) -> Result<(), Failure> {
+        self.refuse_names()?;
+        let prepared = self.play.prepare()?;
+        let seconds = prepared.score.seconds(prepared.rate);
+        if self.wav.is_none() && seconds > INSIDE_MAX_S {
+            return Err(Failure::Usage(format!(
+                "{seconds:.0} s of sound are too much for a page, which holds {INSIDE_MAX_S}; put it beside the page with --wav FILE"
+            )));
+        }
+        let watch = Watch::new(&prepared, self.plot_at)?;
+        let mut page = NewFile::create(&self.out, self.force)?;
+        let (sound, wav, watched) = match &self.wav {
+            Some(path) => {
+                let mut wav = NewFile::create(path, self.force)?;
+                let watched = played(&prepared, watch, &mut wav)?;
+                (Sound::Beside(name(path)), Some(wav), watched)
+            }
+            None => {
+                let mut bytes = Cursor::new(Vec::new());
+                let watched = played(&prepared, watch, &mut bytes)?;
+                (Sound::Inside(bytes.into_inner()), None, watched)
+            }
+        };
+        let report = self.page(&prepared, &watched, sound);
+        write(&report, &mut page).map_err(|source| Failure::Report { path: self.out.clone(), source })?;
+        page.keep()?;
+        if let Some(wav) = wav {
+            wav.keep()?;
+        }
+        Ok(())
+    }
+
+    fn refuse_names(&self) -> Result<(), Failure> {
+        let html = self
+            .out
+            .extension()
+            .is_some_and(|end| ["html", "htm"].iter().any(|e| end.eq_ignore_ascii_case(e)));
+        if !html {
+            let right = "give it a name that ends in .html";
+            return Err(Failure::Usage(format!("{}: a report is a page; {right}", self.out.display())));
+        }
+        let Some(wav) = &self.wav else { return Ok(()) };
+        if !wav.extension().is_some_and(|end| end.eq_ignore_ascii_case("wav")) {
+            return Err(Failure::Usage(format!("--wav {}: the name must end in .wav", wav.display())));
+        }
+        // A page that is moved takes what lies beside it along.
+        if wav.parent() != self.out.parent() {
+            return Err(Failure::Usage(format!(
+                "--wav {} lies elsewhere than the page {}; put both into one directory",
+                wav.display(),
+                self.out.display()
+            )));
+        }
+        Ok(())
+    }
+
+    fn page(&self, prepared: &Prepared, watched: &Watched, sound: Sound) -> Page {
+        let (file, title) = (&prepared.model.file, self.play.title());
+        let mut lines = about(prepared);
+        let outcome = match spread(&watched.heard) {
+            Some((count, mean, largest)) => format!(
+                "{count} of {} notes have a pitch; from equal temperament: mean {mean:.1} cents, largest {} cents.",
+                watched.heard.len(),
+                signed(largest)
+            ),
+            None => "No note has a pitch.".to_owned(),
+        };
+        lines.push(outcome.clone());
+        let longest = watched.heard.iter().max_by_key(|heard| heard.sounding.to - heard.sounding.from);
+        let fingering = longest
+            .and_then(|heard| heard.sounding.note.written(file.transposition))
+            .and_then(|written| file.fingering(written));
+        let fingered = fingering.map_or(String::new(), |fingering| {
+            format!(", fingered for written {}, the longest note", fingering.written)
+        });
+        Page {
+            about: lines,
+            sound,
+            plates: vec![
+                Plate {
+                    figure: watched.figure(&title, about(prepared)),
+                    caption: "Waveform, spectrogram, pitch heard over the notes of the score, mouth pressure, and the \
+                              reed from near."
+                        .to_owned(),
+                    alternative: format!(
+                        "Five panels over the time of {title}, {:.1} seconds: waveform, spectrogram up to 6 kHz, pitch \
+                         over the notes of the score, mouth pressure over the pressure that shuts the reed, and reed \
+                         opening with mouthpiece pressure over a few milliseconds. {outcome}",
+                        prepared.score.seconds(prepared.rate)
+                    ),
+                },
+                Plate {
+                    figure: figure::bore::profile(file, fingering),
+                    caption: format!("The instrument from the side, to scale{fingered}."),
+                    alternative: format!(
+                        "Bore of {} from mouthpiece to bell, {:.0} mm, with its {} tone holes{fingered}.",
+                        file.name,
+                        1e3 * file.length_m(),
+                        file.holes.len()
+                    ),
+                },
+            ],
+            tables: vec![
+                notes(prepared, &watched.heard, &outcome),
+                settings(&prepared.settings),
+                instrument(prepared),
+            ],
+            made_by: format!("Made by {} {}: {}", identity::NAME, identity::VERSION, command()),
+            title,
+        }
+    }
+}
+
+/// Plays and watches; the sound goes to `out` in 16 bits.
+fn played(prepared: &Prepared, watch: Watch, out: &mut (impl Write + Seek)) -> Result<Watched, Failure> {
+    let score = &prepared.score;
+    let mut wav = WavFile::new(out, prepared.rate, Depth::Int16, 1, score.samples)?;
+    let mut clarinet = prepared.clarinet();
+    let bar = progress(score.samples);
+    // Samples and insides come in turn.
+    let watch = RefCell::new(watch);
+    player::play_probed(
+        &mut clarinet,
+        score,
+        BLOCK,
+        &mut |inside| watch.borrow_mut().inside(inside),
+        |block| {
+            bar.inc(block.len() as u64);
+            watch.borrow_mut().hear(block);
+            wav.write(block).map_err(Failure::from)
+        },
+    )?;
+    wav.finish()?;
+    bar.finish_and_clear();
+    Ok(watch.into_inner().finish())
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The command as it was given, so that another can give it again.
+fn command() -> String {
+    let words = std::env::args().skip(1).map(|word| {
+        let plain =
+            !word.is_empty() && !word.contains(|c: char| c.is_whitespace() || "\"'$&;()<>|*?\\".contains(c));
+        if plain { word } else { format!("'{}'", word.replace('\'', "'\\''")) }
+    });
+    std::iter::once("chalumeau".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+}
+
+/// To a tenth, with its sign unless it is none.
+fn signed(cents: f64) -> String {
+    let tenths = (10.0 * cents).round();
+    if tenths == 0.0 { "0.0".to_owned() } else { format!("{:+.1}", tenths / 10.0) }
+}
+
+fn word(text: impl Into<String>) -> Cell {
+    Cell::Word(text.into())
+}
+
+fn number(text: impl Into<String>) -> Cell {
+    Cell::Number(text.into())
+}
+
+fn notes(prepared: &Prepared, heard: &[Heard], outcome: &str) -> Table {
+    let rate_hz = f64::from(prepared.rate);
+    let head = ["at, s", "sounds", "written", "length, s", "pitch, Hz", "cents", "level, dBFS"];
+    let row = |heard: &Heard| {
+        let (from, to) = (heard.sounding.from as f64 / rate_hz, heard.sounding.to as f64 / rate_hz);
+        let written = heard.sounding.note.written(prepared.model.file.transposition);
+        // No pitch is said, not left out.
+        let or_none = |text: Option<String>| text.unwrap_or_else(|| "none".to_owned());
+        vec![
+            number(format!("{from:.2}")),
+            word(heard.sounding.note.to_string()),
+            word(written.map_or(String::new(), |written| written.to_string())),
+            number(format!("{:.2}", to - from)),
+            number(or_none(heard.hz.map(|hz| format!("{hz:.2}")))),
+            number(or_none(heard.cents.map(signed))),
+            number(if heard.level_dbfs.is_finite() {
+                format!("{:.1}", heard.level_dbfs)
+            } else {
+                "silent".to_owned()
+            }),
+        ]
+    };
+    Table {
+        title: "Notes".to_owned(),
+        about: format!(
+            "{outcome} Cents are from equal temperament at A4 = {} Hz, measured between attack and release.",
+            prepared.settings.a4_hz
+        ),
+        head: head.map(str::to_owned).to_vec(),
+        rows: heard.iter().map(row).collect(),
+    }
+}
+
+fn settings(settings: &Settings) -> Table {
+    let law = settings.reed_law();
+    let rows = [
+        ("Full breath", format!("{}", settings.breath_full_kpa), "kPa"),
+        ("Breath noise", format!("{}", settings.noise), "0..1"),
+        ("Tongue lets go in", format!("{}", settings.tongue_ms), "ms"),
+        ("Fingers move in", format!("{}", settings.legato_ms), "ms"),
+        ("Reed strength", format!("{}", settings.strength), "as on the box"),
+        ("Closing pressure", format!("{:.3}", 1e-3 * settings.closing_pa()), "kPa"),
+        ("Lip, tip opening", format!("{}", settings.lip), "of the reference"),
+        ("Lip damping", format!("{}", settings.damping), "of the usual"),
+        ("Embouchure zeta", format!("{}", settings.zeta), ""),
+        ("Curve of the lay", format!("{}", settings.lay), "0 sharp"),
+        ("Reed law H", format!("{:.6}", law.h()), ""),
+        ("Reed law k", format!("{:.6}", law.k()), if settings.coupled { "follows H" } else { "free" }),
+        ("Reed law A", format!("{}", law.a()), ""),
+        ("A4", format!("{}", settings.a4_hz), "Hz"),
+        ("Tuning", if settings.tuning == Tuning::Tempered { "tempered" } else { "natural" }.to_owned(), ""),
+        ("Air", format!("{}", settings.temperature_c), "Celsius"),
+        ("Loss of open holes", format!("{}", settings.vent_loss), ""),
+        ("Output gain", format!("{}", settings.gain_db), "dB"),
+    ];
+    let row = |(name, value, unit): (&str, String, &str)| vec![word(name), number(value), word(unit)];
+    Table {
+        title: "Settings".to_owned(),
+        about: String::new(),
+        head: ["setting", "value", "unit or scale"].map(str::to_owned).to_vec(),
+        rows: rows.into_iter().map(row).collect(),
+    }
+}
+
+fn instrument(prepared: &Prepared) -> Table {
+    let file = &prepared.model.file;
+    let sounds = |note: crate::units::WrittenNote| {
+        note.sounding(file.transposition).map_or(String::new(), |note| format!(" (sounds {note})"))
+    };
+    let (low, high) = (file.lowest(), file.highest());
+    let rows = [
+        ("Name", file.name.clone()),
+        ("Source", file.source.clone()),
+        ("Range", format!("written {low}{} to {high}{}", sounds(low), sounds(high))),
+        (
+            "Bore",
+            format!(
+                "{:.1} mm long, nominally {:.2} mm wide",
+                1e3 * file.length_m(),
+                2e3 * file.nominal_radius_m
+            ),
+        ),
+        ("Tone holes", file.holes.len().to_string()),
+        ("Computed at", format!("{} Hz, put out at {} Hz", prepared.model.coeffs.rate_hz, prepared.rate)),
+    ];
+    Table {
+        title: "Instrument".to_owned(),
+        about: String::new(),
+        head: ["property", "value"].map(str::to_owned).to_vec(),
+        rows: rows.into_iter().map(|(name, value)| vec![word(name), word(value)]).collect(),
+    }
+}

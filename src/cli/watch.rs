@@ -1,0 +1,139 @@
+//! Looks at a rendering while it is made, for pictures and reports: memory does not grow with its length.
+
+use crate::analysis::overview::{Envelope, Overview, Watcher};
+use crate::cli::Failure;
+use crate::cli::play::Prepared;
+use crate::figure::Figure;
+use crate::figure::performance::{Moment, Note, Performance, performance};
+use crate::instrument::Probe;
+use crate::render::heard::{Heard, Listener, Sounding};
+
+/// Columns of a picture: as many as a drawing of usual size has pixels for.
+pub const COLUMNS: usize = 1_300;
+/// Periods of the note in the close look at the reed.
+const PERIODS: f64 = 5.0;
+/// Length of that look, s: short enough to see the reed shut, long enough to see it twice.
+const MOMENT_S: (f64, f64) = (0.004, 0.05);
+/// Period where no note says another, s.
+const PERIOD_S: f64 = 0.004;
+
+/// What looks.
+pub struct Watch {
+    watcher: Watcher,
+    listener: Listener,
+    gamma: Envelope,
+    moment: Moment,
+    /// Internal samples of the close look.
+    near: (u64, u64),
+    seen: u64,
+    soundings: Vec<Sounding>,
+    rate_hz: f64,
+    a4_hz: f64,
+    closing_pa: f64,
+}
+
+/// What was seen.
+pub struct Watched {
+    overview: Overview,
+    gamma: Envelope,
+    moment: Moment,
+    score: Vec<Note>,
+    /// Each note's pitch and level.
+    pub heard: Vec<Heard>,
+    a4_hz: f64,
+    closing_pa: f64,
+}
+
+impl Watch {
+    /// For a rendering about to begin. The close look is at `near_s`, or in the middle of the longest note.
+    pub fn new(prepared: &Prepared, near_s: Option<f64>) -> Result<Self, Failure> {
+        let (score, rate_hz) = (&prepared.score, f64::from(prepared.rate));
+        let (seconds, soundings) = (score.seconds(prepared.rate), score.soundings());
+        if let Some(near_s) = near_s.filter(|&near_s| near_s >= seconds) {
+            return Err(Failure::Usage(format!(
+                "--plot-at {near_s} lies behind the end; this is {seconds:.3} s long"
+            )));
+        }
+        let longest = soundings.iter().max_by_key(|sounding| sounding.to - sounding.from);
+        let middle_s = |sounding: &Sounding| 0.5 * (sounding.from + sounding.to) as f64 / rate_hz;
+        let near_s = near_s.or(longest.map(middle_s)).unwrap_or(0.5 * seconds);
+        let within = |sounding: &&Sounding| {
+            let at = near_s * rate_hz;
+            (sounding.from as f64..sounding.to as f64).contains(&at)
+        };
+        let a4_hz = f64::from(prepared.settings.a4_hz);
+        let period_s = soundings
+            .iter()
+            .find(within)
+            .map_or(PERIOD_S, |sounding| 1.0 / sounding.note.frequency_hz(a4_hz));
+        let length_s = (PERIODS * period_s).clamp(MOMENT_S.0, MOMENT_S.1);
+        let internal_hz = prepared.model.coeffs.rate_hz;
+        let near = ((near_s * internal_hz) as u64, ((near_s + length_s) * internal_hz) as u64);
+        let internal = (seconds * internal_hz).ceil() as usize;
+        Ok(Self {
+            watcher: Watcher::new(score.samples, rate_hz, COLUMNS),
+            listener: Listener::new(soundings.clone(), rate_hz, a4_hz),
+            gamma: Envelope::new(internal, COLUMNS),
+            moment: Moment {
+                from_s: near.0 as f64 / internal_hz,
+                step_s: 1.0 / internal_hz,
+                probes: Vec::new(),
+            },
+            near,
+            seen: 0,
+            soundings,
+            rate_hz,
+            a4_hz,
+            closing_pa: prepared.settings.closing_pa(),
+        })
+    }
+
+    /// The next moment inside.
+    pub fn inside(&mut self, probe: Probe) {
+        self.gamma.push(probe.gamma as f32);
+        if (self.near.0..self.near.1).contains(&self.seen) {
+            self.moment.probes.push(probe);
+        }
+        self.seen += 1;
+    }
+
+    /// The next samples.
+    pub fn hear(&mut self, block: &[f32]) {
+        self.watcher.see(block);
+        self.listener.hear(block);
+    }
+
+    /// The whole.
+    pub fn finish(self) -> Watched {
+        let note = |sounding: &Sounding| Note {
+            note: sounding.note,
+            from_s: sounding.from as f64 / self.rate_hz,
+            to_s: sounding.to as f64 / self.rate_hz,
+        };
+        Watched {
+            overview: self.watcher.finish(),
+            gamma: self.gamma,
+            moment: self.moment,
+            score: self.soundings.iter().map(note).collect(),
+            heard: self.listener.finish(),
+            a4_hz: self.a4_hz,
+            closing_pa: self.closing_pa,
+        }
+    }
+}
+
+impl Watched {
+    /// All of it in one picture.
+    pub fn figure(&self, title: &str, notes: Vec<String>) -> Figure {
+        performance(&Performance {
+            title,
+            notes,
+            overview: &self.overview,
+            score: &self.score,
+            a4_hz: self.a4_hz,
+            gamma: &self.gamma,
+            closing_pa: self.closing_pa,
+            moment: Some(&self.moment),
+        })
+    }
+}

@@ -1,0 +1,232 @@
+//! Whose wheel bends the note that sounds: channels, MPE zones and note expressions of an instrument with one voice.
+//!
+//! A note follows the wheel of its own channel, and with it that of its zone's manager. A wheel that is turned under held
+//! keys is remembered, and heard when the note it belongs to sounds again. Without a zone, the wheel of a channel that has
+//! never played a note (that of a split keyboard) counts as a manager's. A tuning expression belongs to its key until the
+//! key is struck anew. When the last key has come up its note keeps its bend while it fades.
+//!
+//! Left out: what the instrument cannot play is known only there, so a note outside its range still turns the wheel.
+//! Source: MIDI Polyphonic Expression 1.0 (RP-053, 2018): MPE Configuration Message, pitch bend sensitivity of zones.
+
+use crate::control::keys::Keys;
+use crate::units::SoundingNote;
+
+/// The bend wheel at rest.
+const CENTRE: u16 = 8192;
+/// Bend range of a channel and of a zone's manager, semitones, unless the usual one is set otherwise.
+const RANGE: u8 = 2;
+/// Bend range of a zone's members until they are told otherwise, semitones.
+const MEMBER_RANGE: u8 = 48;
+/// The lower zone's manager and the upper's.
+const MANAGERS: [usize; 2] = [0, 15];
+
+#[derive(Clone, Copy, Debug)]
+struct Wheel {
+    at: u16,
+    /// Bend range; the usual one until it is told.
+    semitones: Option<u8>,
+    cents: u8,
+    /// Whether the channel has ever played a note.
+    played: bool,
+}
+
+impl Wheel {
+    const NEW: Self = Self { at: CENTRE, semitones: None, cents: 0, played: false };
+
+    /// The wheel has one step less above its centre than below; both ends reach the full range.
+    fn bend_cents(self, usual: u8) -> f32 {
+        let offset = f32::from(self.at) - f32::from(CENTRE);
+        let steps = if offset < 0.0 { 8192.0 } else { 8191.0 };
+        offset / steps * (100.0 * f32::from(self.semitones.unwrap_or(usual)) + f32::from(self.cents))
+    }
+}
+
+/// Wheels, zones and keys. Everything is real-time safe; channels are 0..=15, keys 0..=127.
+#[derive(Clone, Debug)]
+pub struct Bends {
+    wheels: [Wheel; 16],
+    /// Bend range of the wheels that were not told one, semitones.
+    usual: u8,
+    /// Members of the lower zone (channels 1..) and of the upper (..=14).
+    members: [usize; 2],
+    keys: Keys,
+    /// Channels that hold each key, a bit each, and the one that struck it last.
+    holding: [u16; 128],
+    owner: [u8; 128],
+    /// Tuning expression of each key, cents.
+    tuning_cents: [f32; 128],
+    /// The key that sounds or sounded last.
+    heard: Option<u8>,
+    /// Channel without notes whose wheel moved last.
+    common: Option<usize>,
+}
+
+impl Default for Bends {
+    fn default() -> Self {
+        Self {
+            wheels: [Wheel::NEW; 16],
+            usual: RANGE,
+            members: [0; 2],
+            keys: Keys::default(),
+            holding: [0; 128],
+            owner: [0; 128],
+            tuning_cents: [0.0; 128],
+            heard: None,
+            common: None,
+        }
+    }
+}
+
+impl Bends {
+    /// Bend of the note that sounds, cents.
+    pub fn cents(&self) -> f32 {
+        let Some(key) = self.heard.map(usize::from) else { return self.common_cents(None) };
+        let channel = usize::from(self.owner[key]);
+        let manager_cents = match self.zone_of(channel) {
+            Some(zone) if MANAGERS[zone] == channel => 0.0,
+            Some(zone) => self.bend_cents(MANAGERS[zone]),
+            None => self.common_cents(Some(channel)),
+        };
+        self.bend_cents(channel) + manager_cents + self.tuning_cents[key]
+    }
+
+    fn bend_cents(&self, channel: usize) -> f32 {
+        self.wheels[channel].bend_cents(self.usual)
+    }
+
+    fn common_cents(&self, but: Option<usize>) -> f32 {
+        self.common.filter(|&channel| Some(channel) != but).map_or(0.0, |at| self.bend_cents(at))
+    }
+
+    /// The zone a channel manages or is a member of.
+    fn zone_of(&self, channel: usize) -> Option<usize> {
+        let [lower, upper] = self.members;
+        if lower > 0 && channel <= lower {
+            Some(0)
+        } else {
+            (upper > 0 && channel >= 15 - upper).then_some(1)
+        }
+    }
+
+    /// Whether what happens to this channel's wheel is heard now.
+    pub fn is_heard(&self, channel: usize) -> bool {
+        let Some(key) = self.heard.map(usize::from) else { return self.common == Some(channel) };
+        let owner = usize::from(self.owner[key]);
+        owner == channel
+            || match self.zone_of(owner) {
+                Some(zone) => MANAGERS[zone] == channel,
+                None => self.common == Some(channel),
+            }
+    }
+
+    /// A wheel moves, 0..=16383.
+    pub fn turn(&mut self, channel: usize, at: u16) {
+        self.wheels[channel].at = at.min(16383);
+        if !self.wheels[channel].played && self.zone_of(channel).is_none_or(|zone| MANAGERS[zone] == channel)
+        {
+            self.common = Some(channel);
+        }
+    }
+
+    /// A wheel goes back to rest, and with a manager's its members'.
+    pub fn rest(&mut self, channel: usize) {
+        self.turn(channel, CENTRE);
+        if let Some(zone) = self.zone_of(channel).filter(|&zone| MANAGERS[zone] == channel) {
+            self.members_of(zone).for_each(|member| self.wheels[member].at = CENTRE);
+        }
+    }
+
+    /// Bend range of a channel: semitones, cents, or the one left as it is. That of a zone's member is all members'.
+    pub fn set_range(&mut self, channel: usize, semitones: Option<u8>, cents: Option<u8>) {
+        let mut set = |channel: usize| {
+            let wheel = &mut self.wheels[channel];
+            wheel.semitones = semitones.or(wheel.semitones);
+            wheel.cents = cents.unwrap_or(wheel.cents);
+        };
+        set(channel);
+        if let Some(zone) = self.zone_of(channel).filter(|&zone| MANAGERS[zone] != channel) {
+            self.members_of(zone).for_each(|member| {
+                self.wheels[member].semitones = self.wheels[channel].semitones;
+                self.wheels[member].cents = self.wheels[channel].cents;
+            });
+        }
+    }
+
+    /// Bend range of every channel that is not told another, and is no member of a zone, semitones.
+    pub fn set_usual_range(&mut self, semitones: u8) {
+        self.usual = semitones;
+    }
+
+    /// A zone is made, changed or, with no members, taken away; only the first and the last channel can manage one. The
+    /// other zone gives way, and wheels of the new zone begin at rest with their default ranges.
+    pub fn set_zone(&mut self, manager: usize, members: u8) {
+        let Some(zone) = MANAGERS.iter().position(|&channel| channel == manager) else { return };
+        for channel in std::iter::once(manager).chain(self.members_of(zone)) {
+            self.wheels[channel] = Wheel { played: self.wheels[channel].played, ..Wheel::NEW };
+        }
+        let members = usize::from(members.min(15));
+        self.members[zone] = members;
+        self.members[1 - zone] = self.members[1 - zone].min(14_usize.saturating_sub(members));
+        for member in self.members_of(zone) {
+            let played = self.wheels[member].played;
+            self.wheels[member] = Wheel { semitones: Some(MEMBER_RANGE), played, ..Wheel::NEW };
+        }
+        self.common = None;
+    }
+
+    fn members_of(&self, zone: usize) -> std::ops::Range<usize> {
+        let members = self.members[zone];
+        if zone == 0 { 1..1 + members } else { 15 - members..15 }
+    }
+
+    /// A key goes down.
+    pub fn press(&mut self, channel: usize, key: u8) {
+        let at = usize::from(key);
+        self.wheels[channel].played = true;
+        self.common = self.common.filter(|&common| common != channel);
+        self.keys.press(SoundingNote(key));
+        self.holding[at] |= 1 << channel;
+        self.owner[at] = channel as u8;
+        self.tuning_cents[at] = 0.0;
+        self.heard = Some(key);
+    }
+
+    /// A key comes up on one channel, or on all; true if no other channel holds it.
+    pub fn release(&mut self, channel: Option<usize>, key: u8) -> bool {
+        let holding = &mut self.holding[usize::from(key)];
+        *holding &= channel.map_or(0, |channel| !(1 << channel));
+        if *holding != 0 {
+            let owner = &mut self.owner[usize::from(key)];
+            if channel == Some(usize::from(*owner)) {
+                *owner = holding.trailing_zeros() as u8;
+            }
+            return false;
+        }
+        self.keys.release(SoundingNote(key));
+        if let Some(SoundingNote(last)) = self.keys.last() {
+            self.heard = Some(last);
+        }
+        true
+    }
+
+    /// All keys come up.
+    pub fn release_all(&mut self) {
+        self.keys = Keys::default();
+        self.holding = [0; 128];
+    }
+
+    /// Tuning expression of the keys that a channel holds, of one key, or of one key of one channel; true if it may be heard.
+    pub fn tune(&mut self, channel: Option<usize>, key: Option<u8>, cents: f32) -> bool {
+        let keys = key.map_or(0..128, |key| usize::from(key)..usize::from(key) + 1);
+        let mut heard = false;
+        for at in keys.filter(|&at| at < 128) {
+            let held =
+                channel.map_or(self.holding[at] != 0, |channel| usize::from(self.owner[at]) == channel);
+            if held && (self.holding[at] != 0 || self.heard == Some(at as u8)) {
+                self.tuning_cents[at] = cents;
+                heard |= self.heard == Some(at as u8);
+            }
+        }
+        heard
+    }
+}

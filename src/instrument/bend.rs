@@ -1,0 +1,117 @@
+//! Where a pitch that is not the fingering's comes from: the lip near the note, the size of the instrument beyond.
+//!
+//! A lip (the tuning delay behind the mouthpiece) moves a note by up to [`LIP_CENTS`], less where the bore cannot be made
+//! short enough. What is wanted beyond that is done by the whole bore's scale: an instrument `s` times as small, reed and
+//! player's habits with it, is by similarity the same instrument with its clock running `s` times as fast. So the clock
+//! does run faster, and no bend can lose the register. The hand-over is a knee: both shares change smoothly with the sum.
+//!
+//! What similarity leaves out: the walls' losses, which a really smaller bore would have relatively more of; and the
+//! level, `1/s` for the smaller instrument at the same distance, which stays as it is, as if heard from `s` times as near:
+//! a bend changes the pitch alone. What a player does in seconds (tongue, fingers, breath) stays in seconds.
+//! Moving the clock costs `s` times the instrument's time.
+
+use crate::instrument::model::Model;
+
+/// Most that the lip bends a note, either way, cents. Players go further down than up; this is what the delay does in
+/// every register without changing what mode speaks.
+pub const LIP_CENTS: f64 = 40.0;
+/// Half the width of the knee over the lip's limit.
+const KNEE: f64 = 0.25;
+/// Largest offset from the fingering's note, cents: two octaves.
+pub const MOST_CENTS: f64 = 2_400.0;
+/// Share of the delay's room that the lip may take: the rest is for the tempered trims' way between their nodes.
+const ROOM_SHARE: f64 = 0.9;
+
+/// An offset in cents, divided.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Split {
+    /// By the tuning delay.
+    pub lip_cents: f64,
+    /// By the speed of the clock.
+    pub bore_cents: f64,
+}
+
+impl Split {
+    /// Divides `offset_cents`, clamped to +-[`MOST_CENTS`], for a lip that reaches `limit_cents`. Real-time safe.
+    pub fn new(offset_cents: f64, limit_cents: f64) -> Self {
+        let offset = offset_cents.clamp(-MOST_CENTS, MOST_CENTS);
+        let (from, width) = ((1.0 - KNEE) * limit_cents, 2.0 * KNEE * limit_cents);
+        let over = offset.abs() - from;
+        let bore = if over <= 0.0 {
+            0.0
+        } else if over < width {
+            over * over / (2.0 * width)
+        } else {
+            over - width / 2.0
+        };
+        let bore_cents = bore.copysign(offset);
+        Self { lip_cents: offset - bore_cents, bore_cents }
+    }
+}
+
+/// How far the lip may bend a fingering's note to the side of `offset_cents`, cents. Real-time safe.
+pub fn lip_limit_cents(model: &Model, fingering: usize, offset_cents: f64) -> f64 {
+    let Some(note) = model.tuning.notes.get(fingering) else { return 0.0 };
+    let (shortest, longest) = model.coeffs.tuning_range();
+    let trims = note.tempered.into_iter().chain([note.natural]);
+    let room = if offset_cents > 0.0 {
+        trims.fold(f64::INFINITY, f64::min) - shortest
+    } else {
+        longest - trims.fold(f64::NEG_INFINITY, f64::max)
+    };
+    let needed = note.sensitivity * model.rows_for_cents(fingering, LIP_CENTS.copysign(offset_cents)).abs();
+    LIP_CENTS * (ROOM_SHARE * room / needed).clamp(0.0, 1.0)
+}
+
+/// Speed of the clock for a bore's share in cents. Real-time safe.
+pub fn speed(bore_cents: f64) -> f64 {
+    (bore_cents / 1_200.0).exp2()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_add_up_and_have_no_kink() {
+        for limit in [0.0, 10.0, LIP_CENTS] {
+            let at = |tenth: i32| Split::new(f64::from(tenth) / 10.0, limit);
+            let (mut steepest, mut kink) = (0.0_f64, 0.0_f64);
+            for tenth in -5_000..5_000 {
+                let (before, split, after) = (at(tenth - 1), at(tenth), at(tenth + 1));
+                assert!((split.lip_cents + split.bore_cents - f64::from(tenth) / 10.0).abs() < 1e-9);
+                assert!(split.lip_cents.abs() <= limit + 1e-9);
+                assert_eq!(split.lip_cents, -at(-tenth).lip_cents);
+                steepest = steepest.max((after.bore_cents - split.bore_cents).abs());
+                kink = kink.max((after.bore_cents - 2.0 * split.bore_cents + before.bore_cents).abs());
+            }
+            assert!(steepest <= 0.1 + 1e-9);
+            // A slope of one over the knee's width.
+            let smooth = if limit > 0.0 { 0.01 / (2.0 * KNEE * limit) } else { 0.1 };
+            assert!(kink <= smooth + 1e-9, "limit {limit}: {kink}");
+        }
+    }
+
+    #[test]
+    fn small_offsets_are_the_lips_alone_and_no_offset_is_none() {
+        assert_eq!(Split::new(25.0, LIP_CENTS), Split { lip_cents: 25.0, bore_cents: 0.0 });
+        assert_eq!(Split::new(0.0, 0.0), Split::default());
+        assert_eq!(Split::new(f64::INFINITY, LIP_CENTS).bore_cents, MOST_CENTS - LIP_CENTS);
+    }
+
+    #[test]
+    fn lip_reaches_its_limit_where_the_bore_allows_it() {
+        let model = Model::built_in(48_000.0).unwrap();
+        let limits = |side: f64| -> Vec<f64> {
+            (0..model.notes_hz.len()).map(|note| lip_limit_cents(&model, note, side)).collect()
+        };
+        let (up, down) = (limits(1.0), limits(-1.0));
+        println!("up {up:.0?}\ndown {down:.0?}");
+        assert!(up.iter().chain(&down).all(|limit| (10.0..=LIP_CENTS).contains(limit)));
+        for (note, limit) in up.into_iter().enumerate() {
+            let trim = model.tuning.notes[note];
+            let rows = trim.natural + trim.sensitivity * model.rows_for_cents(note, limit);
+            assert!(rows > model.coeffs.tuning_range().0, "note {note}");
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! Parameters of the instrument itself: which one, how finely a file is rendered, how far the wheel bends.
+//!
+//! What is exchanged as a whole is not automated: that takes from a moment (what comes with the program) to a minute
+//! (a file of one's own, the first time), and sounds meanwhile as the status says.
+
+use std::sync::{Arc, OnceLock, RwLock};
+
+use nice_plug::prelude::*;
+
+use crate::bore::bundled::Bundled;
+use crate::instrument::prepare::Quality;
+
+/// What a program without projects begins with: instrument, its file, A4.
+static BEGINNING: OnceLock<Beginning> = OnceLock::new();
+
+/// See [`begin_with`].
+#[derive(Clone, Debug)]
+pub struct Beginning {
+    /// Which.
+    pub choice: InstrumentChoice,
+    /// The user's own file, empty for the usual place.
+    pub file: String,
+    /// Pitch of A4, Hz.
+    pub a4_hz: f32,
+}
+
+/// Defaults of all parameters made from now on in this process. For a program that has neither projects nor a window; only
+/// the first call counts.
+#[cfg(feature = "standalone")]
+pub fn begin_with(beginning: Beginning) {
+    let _ = BEGINNING.set(beginning);
+}
+
+/// What [`begin_with`] was told.
+pub(super) fn beginning() -> Option<&'static Beginning> {
+    BEGINNING.get()
+}
+
+/// Most characters of a path; longer ones are no paths.
+pub const PATH_MOST: usize = 4_096;
+
+/// Which instrument.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Enum)]
+pub enum InstrumentChoice {
+    /// [`Bundled::BFlat`].
+    #[id = "bflat"]
+    #[name = "B flat clarinet"]
+    BFlat,
+    /// [`Bundled::A`].
+    #[id = "a"]
+    #[name = "A clarinet"]
+    A,
+    /// [`Bundled::EFlat`].
+    #[id = "eflat"]
+    #[name = "E flat clarinet"]
+    EFlat,
+    /// [`Bundled::C`].
+    #[id = "c"]
+    #[name = "C clarinet"]
+    C,
+    /// [`Bundled::Bass`].
+    #[id = "bass"]
+    #[name = "Bass clarinet"]
+    Bass,
+    /// The user's own file.
+    #[id = "user"]
+    #[name = "User file"]
+    User,
+}
+
+impl InstrumentChoice {
+    /// All of them.
+    pub const ALL: [Self; 6] = [Self::BFlat, Self::A, Self::EFlat, Self::C, Self::Bass, Self::User];
+
+    /// The one that comes with the program, if it does.
+    pub fn bundled(self) -> Option<Bundled> {
+        match self {
+            Self::BFlat => Some(Bundled::BFlat),
+            Self::A => Some(Bundled::A),
+            Self::EFlat => Some(Bundled::EFlat),
+            Self::C => Some(Bundled::C),
+            Self::Bass => Some(Bundled::Bass),
+            Self::User => None,
+        }
+    }
+}
+
+/// How finely the host's offline mode renders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Enum)]
+pub enum QualityChoice {
+    /// A bounce is what was heard.
+    #[id = "live"]
+    #[name = "Same as live"]
+    Live,
+    /// [`Quality::High`].
+    #[id = "high"]
+    #[name = "High"]
+    High,
+}
+
+impl From<QualityChoice> for Quality {
+    fn from(choice: QualityChoice) -> Self {
+        match choice {
+            QualityChoice::Live => Self::Live,
+            QualityChoice::High => Self::High,
+        }
+    }
+}
+
+/// Which instrument, and how it is played.
+#[derive(Params)]
+pub struct InstrumentParams {
+    /// The user's own file, empty for the usual place
+    /// ([`user_file`](crate::plugin::instrument::choice::user_file)).
+    #[persist = "instrumentfile"]
+    pub file: RwLock<String>,
+    /// Which. Default B flat clarinet.
+    #[id = "instr"]
+    pub choice: EnumParam<InstrumentChoice>,
+    /// How finely the host's offline mode renders. Default same as live.
+    #[id = "qual"]
+    pub quality: EnumParam<QualityChoice>,
+    /// How far the wheel bends unless RPN 0 says otherwise, semitones. Default 2.
+    #[id = "bendr"]
+    pub bend_range: IntParam,
+    /// Says how far the instrument is; its value means nothing.
+    #[id = "istat"]
+    pub status: BoolParam,
+}
+
+impl InstrumentParams {
+    /// Choices: id, default, and what may stand in a state.
+    pub(super) const CHOICES: [(&'static str, &'static str, &'static [&'static str]); 2] = [
+        ("instr", "bflat", &["bflat", "a", "eflat", "c", "bass", "user"]),
+        ("qual", "live", &["live", "high"]),
+    ];
+
+    /// Defaults, with the place where the state of the instrument is worded.
+    pub fn new(status: Arc<RwLock<String>>) -> Self {
+        let (choice, file) = beginning()
+            .map_or((InstrumentChoice::BFlat, String::new()), |first| (first.choice, first.file.clone()));
+        Self {
+            file: RwLock::new(file),
+            choice: EnumParam::new("Instrument", choice).non_automatable(),
+            quality: EnumParam::new("Offline quality", QualityChoice::Live).non_automatable(),
+            bend_range: IntParam::new("Bend range", 2, IntRange::Linear { min: 0, max: 48 })
+                .with_unit(" st")
+                .non_automatable(),
+            status: super::said("Instrument status", status),
+        }
+    }
+}

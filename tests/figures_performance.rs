@@ -1,0 +1,487 @@
+//! Figures of impedance, bore and performance, and the report, compared by what they say; and what refuses to be drawn.
+//!
+//! `tests/golden/NAME.json` holds a figure with long curves thinned out. A number may differ by its tolerance, words may
+//! not. After a change that is meant, `UPDATE_GOLDEN=1 cargo core --test figures_performance` writes them anew.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use chalumeau::analysis::impedance::cutoff_hz;
+use chalumeau::analysis::overview::{Envelope, Overview, Watcher};
+use chalumeau::bore::instrument_file::InstrumentFile;
+use chalumeau::bore::transfer_matrix::TransferMatrix;
+use chalumeau::figure::impedance::{Curve, Fingering, NotePeaks, chart, fingering};
+use chalumeau::figure::performance::{Moment, Note, Performance, performance};
+use chalumeau::figure::{Figure, Layer, Panel, bore};
+use chalumeau::instrument::{Clarinet, Settings};
+use chalumeau::render::breath::BreathCurve;
+use chalumeau::render::play_probed;
+use chalumeau::render::score::Score;
+use chalumeau::units::{Air, SoundingNote, WrittenNote};
+use serde_json::Value;
+use std::convert::Infallible;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use tempfile::TempDir;
+
+/// Points kept of a long curve.
+const KEPT: usize = 40;
+/// What numbers may differ by, of themselves and at least: figures are drawn to about a thousandth of their width.
+const RELATIVE: f64 = 1e-3;
+const ABSOLUTE: f64 = 2e-3;
+
+fn golden_path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(format!("{name}.json"))
+}
+
+/// The figure as JSON, long lists thinned out, of a heat map only where each column is loudest.
+fn digest(figure: &Figure) -> Value {
+    fn thin(value: &mut Value) {
+        match value {
+            Value::Object(map) => {
+                if let (Some(rows), Some(levels)) =
+                    (map.get("rows").and_then(Value::as_u64), map.get("levels").and_then(Value::as_array))
+                {
+                    let rows = rows as usize;
+                    let loudest = levels.chunks(rows).map(|column| {
+                        let level = |row: usize| column[row].as_f64().unwrap();
+                        (0..rows).max_by(|&a, &b| level(a).total_cmp(&level(b))).unwrap()
+                    });
+                    let loudest: Vec<usize> = loudest.collect();
+                    map.insert("levels".to_owned(), loudest.into());
+                }
+                map.values_mut().for_each(thin);
+            }
+            Value::Array(list) => {
+                if list.len() > KEPT {
+                    let every = list.len().div_ceil(KEPT);
+                    let kept = list.iter().step_by(every).cloned().collect::<Vec<_>>();
+                    *list = kept;
+                }
+                list.iter_mut().for_each(thin);
+            }
+            // Six digits are more than the tolerance needs.
+            Value::Number(number) => {
+                if let Some(x) = number.as_f64().filter(|x| x.fract() != 0.0) {
+                    *value = format!("{x:.6e}").parse::<f64>().unwrap().into();
+                }
+            }
+            _ => {}
+        }
+    }
+    let mut value = serde_json::to_value(figure).unwrap();
+    thin(&mut value);
+    value
+}
+
+fn compare(place: &str, found: &Value, wanted: &Value) {
+    match (found, wanted) {
+        (Value::Object(a), Value::Object(b)) => {
+            assert!(a.keys().eq(b.keys()), "{place}: fields {:?}, not {:?}", a.keys(), b.keys());
+            a.iter().for_each(|(key, value)| compare(&format!("{place}.{key}"), value, &b[key]));
+        }
+        (Value::Array(a), Value::Array(b)) => {
+            assert_eq!(a.len(), b.len(), "{place}");
+            for (index, (a, b)) in a.iter().zip(b).enumerate() {
+                compare(&format!("{place}[{index}]"), a, b);
+            }
+        }
+        (Value::Number(a), Value::Number(b)) => {
+            let (a, b) = (a.as_f64().unwrap(), b.as_f64().unwrap());
+            assert!((a - b).abs() <= ABSOLUTE + RELATIVE * b.abs(), "{place}: {a}, not {b}");
+        }
+        (a, b) => assert_eq!(a, b, "{place}"),
+    }
+}
+
+#[track_caller]
+fn golden(name: &str, figure: &Figure) {
+    let found = digest(figure);
+    if std::env::var_os("UPDATE_GOLDEN").is_some() {
+        fs::create_dir_all(golden_path(name).parent().unwrap()).unwrap();
+        fs::write(golden_path(name), format!("{}\n", serde_json::to_string(&found).unwrap())).unwrap();
+        return;
+    }
+    let text = fs::read_to_string(golden_path(name)).unwrap();
+    compare(name, &found, &serde_json::from_str(&text).unwrap());
+}
+
+#[test]
+fn golden_comparison_can_fail() {
+    let figure = bore::profile(&InstrumentFile::built_in(), None);
+    let mut other = figure.clone();
+    let Layer::Polygon(body) = &mut other.panels[0].layers[0] else { panic!("the body comes first") };
+    body.corners[0][1] += 0.05;
+    let said = std::panic::catch_unwind(|| compare("bore", &digest(&other), &digest(&figure)));
+    assert!(said.is_err());
+    compare("bore", &digest(&figure), &digest(&figure));
+}
+
+fn lines(panel: &Panel) -> Vec<&Vec<[f64; 2]>> {
+    panel
+        .layers
+        .iter()
+        .filter_map(|layer| if let Layer::Line(line) = layer { Some(&line.pieces) } else { None })
+        .flatten()
+        .collect()
+}
+
+#[test]
+fn an_impedance_says_where_its_modes_and_its_cutoff_are() {
+    let file = InstrumentFile::built_in();
+    let model = TransferMatrix::new(&file, Air::default());
+    let written = WrittenNote(65);
+    let of = file.fingering(written).unwrap();
+    let sounding_hz = written.sounding(2).unwrap().frequency_hz(440.0);
+    let first = of.open.iter().zip(&file.holes).position(|(&open, hole)| open && !hole.register).unwrap();
+    let figure = fingering(&Fingering {
+        instrument: &file.name,
+        notes: vec!["a note".to_owned()],
+        written,
+        sounding_hz,
+        curves: vec![Curve {
+            name: "transfer matrices".to_owned(),
+            z: (10..=250)
+                .map(|n| 10.0 * f64::from(n))
+                .map(|hz| (hz, model.impedance(hz, &of.open, 0.0)))
+                .collect(),
+        }],
+        modes: model.peaks(&of.open, 0.0, 8),
+        cutoff_hz: cutoff_hz(|hz| model.reflectance_below(hz, &of.open, first)),
+    });
+    // The modes of the picture are the tops of its curve: nothing within 20 Hz is higher.
+    let [magnitude, phase] = &figure.panels[..] else { panic!("{} panels", figure.panels.len()) };
+    let curve = lines(magnitude)[0];
+    let Some(Layer::Points(modes)) = magnitude.layers.iter().find(|layer| matches!(layer, Layer::Points(_)))
+    else {
+        panic!("no modes")
+    };
+    assert_eq!(modes.points.len(), 6, "those up to 2.5 kHz");
+    for [hz, db] in &modes.points {
+        assert!(curve.iter().filter(|[x, _]| (x - hz).abs() < 20.0).all(|[_, y]| y <= db));
+        // And there the phase falls through zero.
+        let at =
+            lines(phase)[0].iter().min_by(|a, b| (a[0] - hz).abs().total_cmp(&(b[0] - hz).abs())).unwrap();
+        assert!(at[1].abs() < 80.0, "{at:?}");
+    }
+    let Some(Layer::Span(above)) = magnitude.layers.iter().find(|layer| matches!(layer, Layer::Span(_)))
+    else {
+        panic!("no cut-off")
+    };
+    assert!(
+        (1_000.0..2_000.0).contains(&above.from) && above.name.contains(&format!("{:.0} Hz", above.from))
+    );
+    let first_multiple = magnitude.top.as_ref().unwrap().ticks[0].at;
+    assert!((first_multiple - sounding_hz).abs() < 1e-9);
+    golden("impedance_f4", &figure);
+}
+
+#[test]
+fn a_chart_of_peaks_follows_the_notes() {
+    let file = InstrumentFile::built_in();
+    let model = TransferMatrix::new(&file, Air::default());
+    let rows: Vec<NotePeaks> = [52, 60, 72, 84]
+        .map(WrittenNote)
+        .into_iter()
+        .map(|written| {
+            let of = file.fingering(written).unwrap();
+            NotePeaks {
+                written,
+                sounding_hz: written.sounding(2).unwrap().frequency_hz(440.0),
+                mode: of.mode,
+                peaks: model.peaks(&of.open, 0.0, 4),
+            }
+        })
+        .collect();
+    let figure = chart(&file.name, Vec::new(), &rows);
+    // The peak that sounds is that of the note within the reed's volume's reach, and lies above it.
+    let off = &figure.panels[1];
+    let Some(Layer::Points(off)) = off.layers.iter().find(|layer| matches!(layer, Layer::Points(_))) else {
+        panic!("no cents")
+    };
+    assert_eq!(off.points.len(), 4);
+    assert!(off.points.iter().all(|[_, cents]| (0.0..60.0).contains(cents)), "{:?}", off.points);
+    golden("peaks", &figure);
+}
+
+#[test]
+fn a_bore_shows_which_holes_are_open() {
+    let file = InstrumentFile::built_in();
+    let of = file.fingering(WrittenNote(72)).unwrap();
+    let figure = bore::profile(&file, Some(of));
+    // Each hole once, to scale, as its fingering says.
+    let mut shown = Vec::new();
+    for panel in &figure.panels[..2] {
+        assert!(panel.equal_aspect);
+        for layer in &panel.layers[1..] {
+            let Layer::Polygon(hole) = layer else { continue };
+            let [[left, low], _, [right, high], _] = hole.corners[..] else {
+                panic!("a hole has four corners")
+            };
+            shown.push((0.5 * (left + right), right - left, high - low, hole.opacity < 0.5));
+        }
+    }
+    assert_eq!(shown.len(), file.holes.len());
+    for (hole, (&open, (x, wide, tall, shown_open))) in file.holes.iter().zip(of.open.iter().zip(shown)) {
+        assert!((x - 1e3 * hole.x_m).abs() < 1e-9 && (wide - 2e3 * hole.radius_m).abs() < 1e-9);
+        assert!((tall - 1e3 * hole.chimney_m).abs() < 1e-9);
+        assert_eq!(open, shown_open, "{}", hole.name);
+    }
+    golden("bore_c5", &figure);
+}
+
+/// Written G4, then written C5, half a second each, seen in few columns.
+fn played() -> (Overview, Envelope, Moment, Vec<Note>) {
+    let settings = Settings { noise: 0.0, ..Settings::default() };
+    let score = Score::scale(WrittenNote(67), WrittenNote(68), 2, 0.5, false, 48_000).unwrap().blown(
+        &BreathCurve::constant(0.6),
+        &settings,
+        48_000,
+    );
+    let mut clarinet = Clarinet::built_in(48_000.0).unwrap();
+    clarinet.set_settings(&settings);
+    clarinet.reset();
+    let mut watcher = Watcher::new(score.samples, 48_000.0, 24);
+    let mut gamma = Envelope::new(96_000, 24);
+    let mut moment = Moment { from_s: 0.25, step_s: 1.0 / 96_000.0, probes: Vec::new() };
+    let mut seen = 0;
+    let mut inside = |probe: chalumeau::instrument::Probe| {
+        gamma.push(probe.gamma as f32);
+        if (24_000..25_400).contains(&seen) {
+            moment.probes.push(probe);
+        }
+        seen += 1;
+    };
+    play_probed(&mut clarinet, &score, 512, &mut inside, |block| {
+        watcher.see(block);
+        Ok::<_, Infallible>(())
+    })
+    .unwrap();
+    let notes = score.soundings().into_iter().map(|sounding| Note {
+        note: sounding.note,
+        from_s: sounding.from as f64 / 48_000.0,
+        to_s: sounding.to as f64 / 48_000.0,
+    });
+    (watcher.finish(), gamma, moment, notes.collect())
+}
+
+#[test]
+fn a_performance_is_seen_in_tune_and_in_time() {
+    let (overview, gamma, moment, score) = played();
+    let figure = performance(&Performance {
+        title: "two notes",
+        notes: vec![],
+        overview: &overview,
+        score: &score,
+        a4_hz: 440.0,
+        gamma: &gamma,
+        closing_pa: 6_000.0,
+        moment: Some(&moment),
+    });
+    let [wave, spectrum, pitch, breath, reed] = &figure.panels[..] else { panic!("{}", figure.panels.len()) };
+    assert!([wave, spectrum, pitch, breath].iter().all(|panel| panel.x.range == Some([0.0, 1.0])));
+    // While a note sounds, the line of its pitch lies on its bar.
+    let track: Vec<[f64; 2]> = lines(pitch).into_iter().flatten().copied().collect();
+    for note in &score {
+        let sounding = track.iter().filter(|[t, _]| (note.from_s + 0.15..note.to_s - 0.05).contains(t));
+        let keys: Vec<f64> = sounding.map(|&[_, key]| key).collect();
+        assert!(keys.len() > 2, "{note:?}");
+        assert!(keys.iter().all(|key| (key - f64::from(note.note.0)).abs() < 0.15), "{note:?}: {keys:?}");
+    }
+    // The loudest row of the spectrogram is an odd harmonic of the note.
+    let Layer::Heat(heat) = &spectrum.layers[0] else { panic!("no heat") };
+    let hz = SoundingNote(65).frequency_hz(440.0);
+    let column = &heat.levels[6 * heat.rows..7 * heat.rows];
+    let loudest = (0..heat.rows).max_by(|&a, &b| column[a].total_cmp(&column[b])).unwrap();
+    let harmonic = loudest as f64 * overview.row_hz / hz;
+    assert!([1.0, 3.0].iter().any(|odd| (harmonic - odd).abs() < 0.1), "{harmonic}");
+    // Five periods of reed, mouth pressure as it was blown.
+    let shown = lines(reed)[0];
+    assert!((shown[shown.len() - 1][0] - 1_399.0 / 96.0).abs() < 1e-6);
+    let [low, high] = gamma.bins()[8];
+    assert!((low - 0.6).abs() < 0.01 && (high - 0.6).abs() < 0.01, "{low} {high}");
+    golden("performance", &figure);
+}
+
+#[test]
+fn nothing_played_is_a_picture_too() {
+    let overview = Watcher::new(0, 48_000.0, 100).finish();
+    let figure = performance(&Performance {
+        title: "",
+        notes: vec![],
+        overview: &overview,
+        score: &[],
+        a4_hz: 440.0,
+        gamma: &Envelope::new(0, 100),
+        closing_pa: 6_000.0,
+        moment: None,
+    });
+    assert_eq!(figure.panels.len(), 4);
+    let png = chalumeau::figure::draw::png(&figure, Some("400x700".parse().unwrap())).unwrap();
+    assert_eq!(&png[1..4], b"PNG");
+}
+
+fn chalumeau(directory: &Path, line: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_chalumeau"))
+        .current_dir(directory)
+        .args(line.split_whitespace())
+        .stdin(Stdio::null())
+        .output()
+        .unwrap()
+}
+
+#[track_caller]
+fn succeeds(directory: &TempDir, line: &str) {
+    let output = chalumeau(directory.path(), line);
+    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+fn read(directory: &TempDir, name: &str) -> Vec<u8> {
+    fs::read(directory.path().join(name)).unwrap()
+}
+
+const NOTE: &str = "render --written 67 --seconds 0.2 --out a.wav";
+
+#[test]
+fn a_render_is_the_same_with_a_figure_beside_it() {
+    let d = tempfile::tempdir().unwrap();
+    succeeds(&d, NOTE);
+    let plain = read(&d, "a.wav");
+    succeeds(&d, &format!("{NOTE} --force --plot a.svg --plot-size 900x1200 --probe a.csv --plot-at 0.1"));
+    assert!(read(&d, "a.wav") == plain);
+    let svg = String::from_utf8(read(&d, "a.svg")).unwrap();
+    for said in ["viewBox=\"0 0 900 1200\"", "Spectrogram", "written G4", "from 0.100 s on"] {
+        assert!(svg.contains(said), "{said}");
+    }
+    succeeds(&d, "impedance --written 65 --step 20 --plot z.png --csv z.csv");
+    succeeds(&d, "impedance --written 65 --temperature 20 --model tmm --step 20 --plot t.svg --csv t.csv");
+    succeeds(&d, "impedance --all --peaks 2 --plot p.png --csv p.csv");
+    succeeds(&d, "bore --written C5 --plot b.svg --csv b.csv");
+    let table = String::from_utf8(read(&d, "b.csv")).unwrap();
+    let file = InstrumentFile::built_in();
+    let holes: Vec<&str> = table.lines().filter(|line| line.starts_with("hole,")).collect();
+    assert!(table.starts_with("kind,name,x_mm,diameter_mm,chimney_mm,open\n# "));
+    assert_eq!(holes.len(), file.holes.len());
+    let open = holes.iter().map(|line| line.ends_with(",1"));
+    assert!(open.eq(file.fingering(WrittenNote(72)).unwrap().open.iter().copied()));
+    assert!(table.lines().any(|line| line == "bore,mouthpiece,39.787,13.8,,"), "{table}");
+    for name in ["z.png", "p.png"] {
+        assert_eq!(&read(&d, name)[1..4], b"PNG");
+    }
+}
+
+#[test]
+fn a_report_holds_the_sound_the_cents_and_the_settings() {
+    let d = tempfile::tempdir().unwrap();
+    let play = "--scale 60:64 --seconds 0.4 --gamma 0.55 --no-noise --strength 3";
+    succeeds(&d, &format!("report {play} --out r.html"));
+    succeeds(&d, &format!("render {play} --bits 16 --out r.wav"));
+    let page = String::from_utf8(read(&d, "r.html")).unwrap();
+    // The sound of the page is the file that `render` writes.
+    let from = page.find("data:audio/wav;base64,").unwrap() + 22;
+    let sound = &page[from..from + page[from..].find('"').unwrap()];
+    assert!(STANDARD.decode(sound).unwrap() == read(&d, "r.wav"));
+    // Nothing is fetched; every figure has words; headings come in order.
+    assert!(!page.contains("http") && !page.contains("<script") && !page.contains("<link"));
+    assert_eq!((page.matches("<img ").count(), page.matches("<img alt=\"").count()), (2, 2));
+    assert!(!page.contains("alt=\"\""));
+    assert_eq!(page.matches("<h1>").count(), 1);
+    for said in [
+        "<html lang=\"en\">",
+        "prefers-color-scheme: dark",
+        "scale C4 to E4",
+        "5 of 5 notes have a pitch",
+        "<td>Reed strength</td><td class=\"number\">3</td>",
+        "<td>Embouchure zeta</td><td class=\"number\">0.3</td>",
+        "<td>Tuning</td><td class=\"number\">natural</td>",
+        concat!("Chalumeau ", env!("CARGO_PKG_VERSION")),
+        "chalumeau report --scale 60:64",
+        "B flat clarinet, Boehm system",
+    ] {
+        assert!(page.contains(said), "{said}");
+    }
+    let notes =
+        page.matches("<td>A#3</td><td>C4</td>").count() + page.matches("<td>D4</td><td>E4</td>").count();
+    assert_eq!(notes, 2, "sounding and written notes");
+    // Beside the page, the sound is a file.
+    succeeds(&d, &format!("report {play} --out s.html --wav s.wav"));
+    let page = String::from_utf8(read(&d, "s.html")).unwrap();
+    assert!(page.contains("src=\"s.wav\"") && !page.contains("data:audio"));
+    assert!(read(&d, "s.wav") == read(&d, "r.wav"));
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused_and_leaves_nothing() {
+    let d = tempfile::tempdir().unwrap();
+    fs::write(d.path().join("there.svg"), "mine").unwrap();
+    fs::write(d.path().join("there.html"), "mine").unwrap();
+    let report = "report --written 67 --seconds 0.1";
+    for (line, says) in [
+        (format!("{NOTE} --plot a.jpg"), ".png or .svg"),
+        (format!("{NOTE} --plot there.svg"), "exists already"),
+        (format!("{NOTE} --plot none/a.svg"), "directory none does not exist"),
+        (format!("{NOTE} --plot a.svg --plot-size 10x10"), "WIDTHxHEIGHT"),
+        (format!("{NOTE} --plot a.svg --plot-at 5"), "behind the end; this is 0.200 s long"),
+        (format!("{NOTE} --plot-at 0.1"), "--plot"),
+        ("impedance --all --plot z.png".to_owned(), "--peaks 8"),
+        ("impedance --written 65 --peaks 3 --from 100 --to 50 --plot z.png".to_owned(), "--to above --from"),
+        ("impedance --written 40 --peaks 3 --plot z.png".to_owned(), "has no fingering"),
+        ("impedance --written 65 --plot z.gif --csv z.csv".to_owned(), ".png or .svg"),
+        ("bore --written 40 --plot b.png".to_owned(), "written 40 (E2) has no fingering"),
+        ("bore --plot b.pdf --csv b.csv".to_owned(), ".png or .svg"),
+        ("bore --instrument none.toml".to_owned(), "none.toml"),
+        (format!("{report} --out r.pdf"), "ends in .html"),
+        (format!("{report} --out there.html"), "exists already"),
+        (format!("{report} --out none/r.html"), "directory none does not exist"),
+        (format!("{report} --out r.html --wav r.ogg"), "must end in .wav"),
+        (format!("{report} --out r.html --wav sub/r.wav"), "one directory"),
+        (format!("{report} --out r.html --plot-at 3"), "behind the end"),
+        ("report --out r.html".to_owned(), "--written"),
+        ("report --written 67 --seconds 3600 --out r.html".to_owned(), "--wav FILE"),
+        ("report none.mid --out r.html".to_owned(), "cannot read none.mid"),
+    ] {
+        let output = chalumeau(d.path(), &line);
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{line}: {message}");
+        assert!(message.contains(says) && !message.contains("panicked"), "{line}: {message}");
+        let mut left: Vec<_> =
+            fs::read_dir(d.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        left.sort();
+        assert_eq!(left, ["there.html", "there.svg"], "{line}");
+        assert_eq!((read(&d, "there.svg"), read(&d, "there.html")), (b"mine".to_vec(), b"mine".to_vec()));
+    }
+}
+
+#[test]
+fn the_citation_names_this_version() {
+    let citation = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/CITATION.cff")).unwrap();
+    let version = format!("\nversion: {}\n", env!("CARGO_PKG_VERSION"));
+    assert!(citation.contains(&version), "CITATION.cff should say {version}");
+}
+
+/// Everything that `docs/model.md` calls by a path is somewhere in the sources under these names.
+#[test]
+fn the_page_of_the_model_names_what_there_is() {
+    fn sources(directory: &Path, text: &mut String) {
+        for entry in fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().path()) {
+            if entry.is_dir() {
+                sources(&entry, text);
+            } else {
+                text.push_str(&fs::read_to_string(entry).unwrap());
+            }
+        }
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut text = String::new();
+    sources(&root.join("src"), &mut text);
+    let known: std::collections::HashSet<&str> =
+        text.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
+    let page = fs::read_to_string(root.join("docs/model.md")).unwrap();
+    let named: Vec<&str> = page.split('`').skip(1).step_by(2).filter(|code| code.contains("::")).collect();
+    assert!(named.len() > 40, "{}", named.len());
+    for path in named {
+        for name in path.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|name| !name.is_empty()) {
+            assert!(known.contains(name), "docs/model.md: `{path}`: there is no {name}");
+        }
+    }
+}

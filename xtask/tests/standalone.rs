@@ -1,0 +1,150 @@
+//! `chalumeau-standalone` as a user starts it; CHALUMEAU_STANDALONE names the program.
+#![cfg(unix)]
+
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Child, ChildStderr, Command, ExitStatus, Output, Stdio};
+use std::time::{Duration, Instant};
+
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// The program without a display, and without a JACK server or a sound card that this machine may have.
+fn program() -> Command {
+    let path = match std::env::var_os("CHALUMEAU_STANDALONE") {
+        Some(path) => xtask::machine::root().join(path),
+        None => xtask::machine::target().join("debug/chalumeau-standalone"),
+    };
+    let mut command = Command::new(path);
+    command
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .env("ALSA_CONFIG_PATH", "/dev/null")
+        .env("JACK_NO_START_SERVER", "1");
+    command
+}
+
+fn alone(args: &[&str]) -> Output {
+    program().args(args).env("JACK_DEFAULT_SERVER", "chalumeau-no-such-server").output().unwrap()
+}
+
+/// A running program; ends with the test.
+struct Running {
+    child: Child,
+    said: BufReader<ChildStderr>,
+}
+
+impl Running {
+    fn start(args: &[&str]) -> Self {
+        let mut child = program()
+            .args(args)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let said = BufReader::new(child.stderr.take().unwrap());
+        Self { child, said }
+    }
+
+    /// Reads until it says that it plays.
+    fn wait(&mut self) {
+        let mut all = String::new();
+        loop {
+            let from = all.len();
+            let read = self.said.read_line(&mut all).unwrap();
+            assert!(read > 0, "ended without playing: {all}");
+            if all[from..].starts_with("playing") {
+                return;
+            }
+        }
+    }
+
+    /// Ctrl-C.
+    fn interrupt(&mut self) -> ExitStatus {
+        let asked = Command::new("sh").args(["-c", &format!("kill -INT {}", self.child.id())]).status();
+        assert!(asked.unwrap().success());
+        let began = Instant::now();
+        loop {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                return status;
+            }
+            assert!(began.elapsed() < PATIENCE, "still running");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+#[test]
+fn it_plays_to_nobody_and_stops_when_asked() {
+    let mut running = Running::start(&["--backend", "dummy"]);
+    running.wait();
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(running.interrupt().success());
+    let mut rest = String::new();
+    running.said.read_to_string(&mut rest).unwrap();
+    assert!(!rest.contains("panicked"), "{rest}");
+}
+
+#[test]
+fn without_a_device_it_says_what_was_tried_and_what_to_do() {
+    let Output { status, stderr, .. } = alone(&[]);
+    let said = String::from_utf8(stderr).unwrap();
+    assert_eq!(status.code(), Some(1), "{said}");
+    for word in
+        ["tried jack: no JACK server is running", "tried alsa: ", "--output-device", "--backend dummy"]
+    {
+        assert!(said.contains(word), "no {word:?} in {said}");
+    }
+    let Output { status, stderr, .. } = alone(&["--backend", "jack"]);
+    let said = String::from_utf8(stderr).unwrap();
+    assert_eq!(status.code(), Some(1), "{said}");
+    assert!(said.contains("tried jack") && !said.contains("tried alsa"), "{said}");
+}
+
+#[test]
+fn help_helps_and_mistakes_are_named() {
+    let Output { status, stdout, .. } = alone(&["--help"]);
+    let said = String::from_utf8(stdout).unwrap();
+    assert_eq!(status.code(), Some(0));
+    for word in ["--backend", "--midi-input", "--output-device", "Ctrl-C", "no display"] {
+        assert!(said.contains(word), "no {word:?} in {said}");
+    }
+    for (args, word) in [
+        (["--sample-rate", "8000"], "22050..384000"),
+        (["--backend", "oss"], "jack"),
+        (["--output-device", "Nonesuch"], "Nonesuch"),
+    ] {
+        let Output { status, stderr, .. } = alone(&args);
+        let said = String::from_utf8(stderr).unwrap();
+        assert_eq!(status.code(), Some(2), "{said}");
+        assert!(said.contains(word), "no {word:?} in {said}");
+    }
+}
+
+/// Run by the step that starts a JACK server; the environment names it.
+#[test]
+#[ignore = "needs a JACK server"]
+fn it_plays_to_jack() {
+    let mut running = Running::start(&["--backend", "jack"]);
+    running.wait();
+    let began = Instant::now();
+    loop {
+        let ports = Command::new("jack_lsp").output().unwrap();
+        let ports = String::from_utf8_lossy(&ports.stdout).into_owned();
+        if ["chalumeau:output_1", "chalumeau:output_2", "chalumeau:midi_input"]
+            .iter()
+            .all(|port| ports.contains(port))
+        {
+            break;
+        }
+        assert!(began.elapsed() < PATIENCE, "{ports}");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    assert!(running.interrupt().success());
+}
