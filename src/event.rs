@@ -38,6 +38,9 @@ pub enum Event {
         /// How hard, 0..=1; 0 is nothing.
         strength: f32,
     },
+    /// Open holes whatever is fingered, one bit each in the order of the instrument's file from the lowest bit; `None` goes
+    /// back to the fingering of the note.
+    TryHoles(Option<u64>),
     /// Everything up, breath to zero, state cleared.
     Panic,
 }

@@ -15,6 +15,7 @@ mod slap;
 pub mod tuner;
 pub mod tuning;
 pub mod voice;
+pub mod watch;
 
 pub use clarinet::Clarinet;
 pub use model::{BuildError, Model};

@@ -3,7 +3,7 @@
 //! This module only translates: parameters to settings, host events to the instrument's, one voice to two equal
 //! channels. Notes are sounding pitch, as everywhere outside the instrument. What is heard depends on the events and
 //! their sample positions alone, not on the host's blocks, and is what the offline renderer writes; except that another
-//! instrument, chosen while somebody listens, comes when it is made. There is no editor yet; hosts show their own.
+//! instrument, chosen while somebody listens, comes when it is made.
 
 pub mod instrument;
 #[cfg(feature = "devices")]
@@ -13,9 +13,11 @@ mod reed_sources;
 #[cfg(feature = "standalone")]
 pub mod standalone;
 mod translate;
+mod window;
 
 use std::sync::Arc;
 
+use nice_plug::context::gui::AsyncExecutor;
 use nice_plug::prelude::*;
 
 pub use params::{BreathParams, ChalumeauParams, EmbouchureParams, KnobParams, NoiseParams};
@@ -26,8 +28,11 @@ use crate::event::{Event, Timed};
 use crate::identity;
 use crate::instrument::Settings;
 use instrument::{Bench, Workshop};
+use nice_plug_egui::EguiEditor;
 use reed_sources::ReedSources;
 use translate::Translator;
+pub use window::App;
+use window::Window;
 
 /// The plugin: parameters, and from the first `activate` on a clarinet.
 #[derive(Default)]
@@ -42,6 +47,7 @@ pub struct Chalumeau {
     reed_sources: ReedSources,
     #[cfg(feature = "devices")]
     knob: Option<(knob::Knob, knob::Audio)>,
+    window: Option<(Window, window::Audio)>,
     /// Whether a file is rendered: nobody holds a knob then.
     offline: bool,
     /// Where *Breath* was last; at rest until it moves.
@@ -64,12 +70,17 @@ impl Plugin for Chalumeau {
     /// Some hosts send every MIDI controller of every channel (2080) at once; beyond the capacity the wrapper allocates.
     const INPUT_EVENT_CAPACITY: usize = 4096;
 
-    type Editor = ();
+    type Editor = EguiEditor<App>;
     type SysExMessage = ();
     type BackgroundTask = ();
 
     fn params(&self) -> Arc<dyn Params> {
         self.params.clone()
+    }
+
+    fn editor(&mut self, _: AsyncExecutor<Self>) -> Option<Self::Editor> {
+        self.open_shop();
+        self.window.as_mut()?.0.editor()
     }
 
     fn filter_state(state: &mut PluginState) {
@@ -83,8 +94,8 @@ impl Plugin for Chalumeau {
         context: &mut impl ActivateContext<Self>,
     ) -> bool {
         self.offline = config.process_mode == ProcessMode::Offline;
-        let params = &self.params;
-        let workshop = self.workshop.get_or_insert_with(|| Workshop::start(params.clone()));
+        self.open_shop();
+        let Some(workshop) = &mut self.workshop else { return false };
         if let Err(reason) = workshop.activate(&mut self.bench, f64::from(config.sample_rate), self.offline) {
             nice_error!("cannot play: {reason}");
             return false;
@@ -92,9 +103,9 @@ impl Plugin for Chalumeau {
         #[cfg(feature = "devices")]
         {
             let shared = workshop.shared();
-            let (_, audio) =
-                self.knob.get_or_insert_with(|| knob::Knob::start(params.clone(), shared.clone()));
-            audio.prepare(params, shared);
+            if let Some((_, audio)) = &mut self.knob {
+                audio.prepare(&self.params, shared);
+            }
         }
         self.settings = self.params.settings();
         if let Some(bench) = &mut self.bench {
@@ -155,7 +166,9 @@ impl Plugin for Chalumeau {
             .into_iter()
             .flatten()
         });
-        let events = moved.into_iter().flatten().chain(bent).chain(played);
+        let pressed = self.window.as_mut().map(|(_, window)| window.keys());
+        let pressed = pressed.into_iter().flatten().flatten();
+        let events = moved.into_iter().flatten().chain(bent).chain(pressed).chain(played);
         #[cfg(feature = "devices")]
         if let Some((_, audio)) = &mut self.knob {
             let replay = self.params.knob.replay.value();
@@ -179,6 +192,9 @@ impl Plugin for Chalumeau {
         #[cfg(not(feature = "devices"))]
         bench.render_events(events, out);
 
+        if let Some((_, window)) = &mut self.window {
+            window.show(bench, out);
+        }
         for copy in copies {
             copy.copy_from_slice(out);
         }
@@ -187,6 +203,26 @@ impl Plugin for Chalumeau {
 
     fn deactivate(&mut self) {
         self.reset();
+    }
+}
+
+impl Chalumeau {
+    /// Starts the threads beside audio, once.
+    fn open_shop(&mut self) {
+        let params = &self.params;
+        let workshop = self.workshop.get_or_insert_with(|| Workshop::start(params.clone()));
+        let instruments = workshop.shared();
+        #[cfg(feature = "devices")]
+        let (knob, _) =
+            self.knob.get_or_insert_with(|| knob::Knob::start(params.clone(), instruments.clone()));
+        self.window.get_or_insert_with(|| {
+            Window::start(
+                params.clone(),
+                instruments.clone(),
+                #[cfg(feature = "devices")]
+                knob.shared().clone(),
+            )
+        });
     }
 }
 

@@ -14,6 +14,7 @@ use crate::instrument::model::{BuildError, Model};
 use crate::instrument::player::Player;
 use crate::instrument::settings::Settings;
 use crate::instrument::voice::{Probe, Voice};
+use crate::instrument::watch::{Now, Watch};
 use crate::reed::ReedCoeffs;
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
@@ -37,6 +38,9 @@ pub struct Clarinet {
     voice: Voice<f32>,
     resampler: Resampler,
     limiter: Limiter,
+    /// The inside, while somebody looks.
+    watch: Watch,
+    watched: bool,
     full_scale_per_pa: f64,
     gain: f32,
     gain_wanted: f32,
@@ -68,6 +72,8 @@ impl Clarinet {
             voice,
             resampler,
             limiter: Limiter::new(host_rate_hz),
+            watch: Watch::default(),
+            watched: false,
             full_scale_per_pa,
             gain,
             gain_wanted: gain,
@@ -117,7 +123,26 @@ impl Clarinet {
     pub fn render_probed(&mut self, out: &mut [f32], probe: &mut dyn FnMut(Probe)) {
         self.voice.set_probing(true);
         self.render_with(out, &mut Some(probe));
-        self.voice.set_probing(false);
+        self.voice.set_probing(self.watched);
+    }
+
+    /// Keeps the last moments inside for a screen, or no longer. Real-time safe.
+    pub fn set_watched(&mut self, on: bool) {
+        if self.watched != on {
+            self.watched = on;
+            self.voice.set_probing(on);
+            self.watch.clear();
+        }
+    }
+
+    /// The last moments inside; see [`set_watched`](Self::set_watched).
+    pub fn watch(&self) -> &Watch {
+        &self.watch
+    }
+
+    /// What the player is at. Real-time safe.
+    pub fn now(&self) -> Now {
+        self.player.now()
     }
 
     fn render_with(&mut self, out: &mut [f32], probe: &mut Option<&mut dyn FnMut(Probe)>) {
@@ -127,8 +152,13 @@ impl Clarinet {
                 let drive = self.player.tick(&self.model, &mut self.voice);
                 let samples = self.voice.tick(&drive);
                 self.resampler.push(samples, self.player.speed());
-                if let (Some(probe), Some(probes)) = (probe.as_mut(), self.voice.probes()) {
-                    probes.iter().for_each(|&moment| probe(moment));
+                if let Some(probes) = self.voice.probes() {
+                    if let Some(probe) = probe.as_mut() {
+                        probes.iter().for_each(|&moment| probe(moment));
+                    }
+                    if self.watched {
+                        self.watch.take(probes);
+                    }
                 }
                 made += self.resampler.pull(&mut out[made..]);
             }

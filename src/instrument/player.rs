@@ -14,6 +14,7 @@ use crate::instrument::model::Model;
 use crate::instrument::settings::Settings;
 use crate::instrument::slap::{BREATH_GAMMA, Slap};
 use crate::instrument::voice::{Drive, TICK, Voice};
+use crate::instrument::watch::Now;
 use crate::reed::ReedCoeffs;
 use crate::reed::motion::TONGUE_FORCE;
 use crate::reed::physical::P_REF_PA;
@@ -131,6 +132,8 @@ pub struct Player {
     velocity: f64,
     /// Fingering in place, if any note was ever played.
     fingering: Option<usize>,
+    /// Open holes that are tried instead of the fingering's, a bit each.
+    tried: Option<u64>,
     /// Control ticks until the holes have arrived.
     gliding: u32,
     breath_live: bool,
@@ -161,6 +164,7 @@ impl Default for Player {
             keys: Keys::default(),
             velocity: 0.0,
             fingering: None,
+            tried: None,
             gliding: 0,
             breath_live: false,
             breath: 0.0,
@@ -205,6 +209,16 @@ impl Player {
         TICK as f64 / (model.coeffs.rate_hz * self.speed)
     }
 
+    /// What the player is at.
+    pub fn now(&self) -> Now {
+        let closing = self.stance.as_ref().map_or(1.0, |stance| stance.closing);
+        Now {
+            sounding: self.keys.last(),
+            fingering: self.fingering.unwrap_or(0),
+            mouth_kpa: (1e-3 * P_REF_PA * closing * self.gamma) as f32,
+        }
+    }
+
     /// As new; settings stay.
     pub fn reset(&mut self) {
         *self = Self { settings: self.settings, ..Self::default() };
@@ -234,6 +248,12 @@ impl Player {
                 self.reed_wanted = [fix(h), fix(k)];
             }
             Event::TongueSlap { strength } => self.tongue_slap(strength, model, voice),
+            Event::TryHoles(tried) => {
+                self.tried = tried;
+                if let Some(fingering) = self.fingering {
+                    self.move_holes(fingering, 1e-3 * f64::from(self.settings.legato_ms), model, voice);
+                }
+            }
             Event::Panic => {
                 self.reset();
                 voice.reset();
@@ -305,7 +325,6 @@ impl Player {
         model: &Model,
         voice: &mut Voice<F>,
     ) {
-        let tick_s = self.tick_s(model);
         if let (true, Some(from)) = (slurred, self.fingering) {
             let leap = cents(model.notes_hz[fingering], model.notes_hz[from]).abs() > 1_150.0;
             let (old, new) = (model.registers[from], model.registers[fingering]);
@@ -314,19 +333,39 @@ impl Player {
             }
         }
         let ms = if slurred { f64::from(self.settings.legato_ms) } else { 5.0 };
-        let ticks = ((1e-3 * ms / tick_s).round() as u32).max(1);
+        self.move_holes(fingering, 1e-3 * ms, model, voice);
+    }
+
+    /// Fingers on their way to a fingering, or to the holes that are being tried; the first of all are there at once.
+    fn move_holes<F: crate::bore::lattice::Real>(
+        &mut self,
+        fingering: usize,
+        time_s: f64,
+        model: &Model,
+        voice: &mut Voice<F>,
+    ) {
+        let ticks = ((time_s / self.tick_s(model)).round() as u32).max(1);
         // One more than the way takes: they are put in place when they have arrived, not a step before.
         self.gliding = if self.fingering.is_some() { ticks + 1 } else { 0 };
         self.fingering = Some(fingering);
         self.stance = None;
-        for (hole, &open) in model.file.fingerings[fingering].open.iter().enumerate() {
-            let opening = f64::from(u8::from(open));
+        for hole in 0..model.coeffs.holes() {
+            let opening = self.opening(fingering, hole, model);
             if self.gliding == 0 {
                 voice.lattice_mut().set_opening(hole, opening);
             } else {
                 voice.lattice_mut().glide_opening(hole, opening, ticks as usize * TICK);
             }
         }
+    }
+
+    /// How far a hole shall be open.
+    fn opening(&self, fingering: usize, hole: usize, model: &Model) -> f64 {
+        let open = match self.tried {
+            Some(tried) => tried >> hole & 1 == 1,
+            None => model.file.fingerings[fingering].open[hole],
+        };
+        f64::from(u8::from(open))
     }
 
     /// True while nothing is held and the breath has gone.
@@ -378,8 +417,8 @@ impl Player {
         if self.gliding > 0 {
             self.gliding -= 1;
             if self.gliding == 0 {
-                for (hole, &open) in model.file.fingerings[fingering].open.iter().enumerate() {
-                    voice.lattice_mut().set_opening(hole, f64::from(u8::from(open)));
+                for hole in 0..model.coeffs.holes() {
+                    voice.lattice_mut().set_opening(hole, self.opening(fingering, hole, model));
                 }
             }
         }

@@ -15,7 +15,9 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
 pub use audio::{Audio, Stage};
+pub use desk::design;
 
+use crate::device::LinkStatus;
 use crate::haptics::FeelTable;
 use crate::plugin::instrument;
 use crate::plugin::params::ChalumeauParams;
@@ -23,6 +25,7 @@ use crate::touch::blower::Hand;
 use crate::touch::feel::Feels;
 use crate::touch::take::Take;
 use crate::units::SoundingNote;
+use crate::wire::message;
 
 /// No note is fingered.
 const NO_NOTE: u8 = 255;
@@ -41,6 +44,10 @@ pub struct Shared {
     reed: [AtomicU32; 2],
     /// The feel in force, with the instrument it is of. Only desk and link lock it.
     feel: Mutex<Option<Arc<Feel>>>,
+    /// A feel that is tried, whatever is played. Only window, desk and link lock it.
+    test: Mutex<Option<message::Feel>>,
+    /// How the link is. Only desk and window lock it.
+    status: Mutex<Option<LinkStatus>>,
     stop: AtomicBool,
 }
 
@@ -52,12 +59,26 @@ impl Shared {
             gamma: AtomicU32::new(0),
             reed: [one(), one()],
             feel: Mutex::new(None),
+            test: Mutex::default(),
+            status: Mutex::default(),
             stop: AtomicBool::new(false),
         }
     }
 
     fn note(&self) -> Option<SoundingNote> {
         Some(self.note.load(Ordering::Relaxed)).filter(|&note| note != NO_NOTE).map(SoundingNote)
+    }
+
+    /// What the knob shall feel like for a test; `None` ends it.
+    pub fn test(&self, feel: Option<message::Feel>) {
+        if let Ok(mut test) = self.test.lock() {
+            *test = feel;
+        }
+    }
+
+    /// How the link was when the desk last looked.
+    pub fn status(&self) -> Option<LinkStatus> {
+        self.status.lock().ok()?.clone()
     }
 
     fn gamma(&self) -> f32 {
@@ -87,6 +108,13 @@ impl Knob {
         let audio = Audio::new(shared.clone(), readers, hand, take);
         // Without a thread there is no knob; the instrument plays all the same.
         (Self { shared, desk: desk.ok() }, audio)
+    }
+}
+
+impl Knob {
+    /// What the window asks and tells.
+    pub fn shared(&self) -> &Arc<Shared> {
+        &self.shared
     }
 }
 

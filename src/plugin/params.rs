@@ -9,6 +9,7 @@ use std::sync::{Arc, RwLock};
 
 use nice_plug::prelude::*;
 
+use crate::editor::Kept;
 use crate::instrument::prepare::A4_RANGE_HZ;
 use crate::instrument::{Settings, Tuning};
 
@@ -62,6 +63,9 @@ pub struct ChalumeauParams {
     pub physical: PhysicalReedParams,
     /// How far the instrument is, in words; written by whoever makes it.
     pub instrument_status: Arc<RwLock<String>>,
+    /// Size, zoom, theme and view of the window.
+    #[persist = "window"]
+    pub window: RwLock<Kept>,
     /// How the link to the knob is, in words; written by the link.
     pub knob_status: Arc<RwLock<String>>,
 }
@@ -198,6 +202,7 @@ impl Default for ChalumeauParams {
             knob: KnobParams::new(knob_status.clone()),
             knob_status,
             schema: AtomicU32::new(SCHEMA),
+            window: RwLock::default(),
             breath: BreathParams {
                 breath: percent("Breath", 0.0),
                 full: number("Full breath", d.breath_full_kpa, 2.0, 20.0, 2, " kPa"),
@@ -361,6 +366,7 @@ pub fn mend(state: &mut PluginState) {
     mend_field(state, "take", |text: String| text);
     mend_field(state, "instrumentfile", |text: String| text.chars().take(instrument::PATH_MOST).collect());
     mend_field(state, "calibration", Calibration::mended);
+    mend_field(state, "window", Kept::mended);
     // An older schema lacks what it lacks; a newer one is read as far as its ids are known here.
     state.fields.insert(SCHEMA_FIELD.to_owned(), SCHEMA.to_string());
 }

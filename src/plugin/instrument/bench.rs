@@ -83,6 +83,11 @@ impl Bench {
         &self.playing
     }
 
+    /// Keeps the last moments inside for a screen, or no longer.
+    pub fn set_watched(&mut self, on: bool) {
+        self.playing.set_watched(on);
+    }
+
     /// The host rate it plays at, Hz.
     pub fn rate_hz(&self) -> f64 {
         self.rate_hz

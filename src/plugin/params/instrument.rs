@@ -72,6 +72,18 @@ impl InstrumentChoice {
     /// All of them.
     pub const ALL: [Self; 6] = [Self::BFlat, Self::A, Self::EFlat, Self::C, Self::Bass, Self::User];
 
+    /// As lists show it.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::BFlat => "B flat clarinet",
+            Self::A => "A clarinet",
+            Self::EFlat => "E flat clarinet",
+            Self::C => "C clarinet",
+            Self::Bass => "Bass clarinet",
+            Self::User => "User file",
+        }
+    }
+
     /// The one that comes with the program, if it does.
     pub fn bundled(self) -> Option<Bundled> {
         match self {

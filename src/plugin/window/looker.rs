@@ -1,0 +1,286 @@
+//! Makes snapshots while the window is open.
+
+use std::collections::VecDeque;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::{Inside, Shared};
+use crate::bore::transfer_matrix::TransferMatrix;
+use crate::editor::listener::{Heard, Listener, WINDOW};
+#[cfg(feature = "devices")]
+use crate::editor::snapshot::{Device, Knob};
+use crate::editor::snapshot::{Level, Scope, Snapshot, Status, Track};
+use crate::haptics::{FeelDesign, FeelTable, Limits, Requirement};
+use crate::instrument::watch::Watch;
+use crate::instrument::{Model, Settings, felt};
+use crate::plugin::instrument;
+use crate::plugin::instrument::{Placed, Stage};
+#[cfg(feature = "devices")]
+use crate::plugin::knob;
+use crate::plugin::params::ChalumeauParams;
+use crate::plugin::params::instrument::InstrumentChoice;
+use crate::touch::feel::Feels;
+use crate::units::SoundingNote;
+
+/// Between two looks while something moves, and while nothing does.
+const QUICK: Duration = Duration::from_millis(33);
+const IDLE: Duration = Duration::from_millis(200);
+/// Length of the breath's history, s, and of its steps.
+const HISTORY_S: f32 = 10.0;
+const STEP_S: f32 = 0.05;
+/// Mouth pressure that counts as none, kPa.
+const NO_BREATH_KPA: f32 = 1e-3;
+
+/// Everything the thread has.
+pub struct Looker {
+    shared: Arc<Shared>,
+    params: Arc<ChalumeauParams>,
+    instruments: Arc<instrument::Shared>,
+    #[cfg(feature = "devices")]
+    knob: Arc<knob::Shared>,
+    inside: triple_buffer::Output<Inside>,
+    sound: rtrb::Consumer<f32>,
+    heard: VecDeque<f32>,
+    listener: Option<(f64, Listener)>,
+    history: VecDeque<f32>,
+    stepped: Instant,
+    known: Option<Known>,
+}
+
+/// What an instrument is asked once.
+struct Known {
+    model: Arc<Model>,
+    feels: Arc<Feels>,
+    bore: TransferMatrix,
+    /// With what it was worked out from.
+    table: Option<(Settings, FeelDesign, Result<FeelTable, String>)>,
+    /// Fingering, holes, and the standing wave on them.
+    standing: Option<(usize, Vec<bool>, Vec<(f32, f32)>)>,
+}
+
+impl Looker {
+    pub(super) fn new(
+        shared: Arc<Shared>,
+        params: Arc<ChalumeauParams>,
+        instruments: Arc<instrument::Shared>,
+        #[cfg(feature = "devices")] knob: Arc<knob::Shared>,
+        inside: triple_buffer::Output<Inside>,
+        sound: rtrb::Consumer<f32>,
+    ) -> Self {
+        Self {
+            shared,
+            params,
+            instruments,
+            #[cfg(feature = "devices")]
+            knob,
+            inside,
+            sound,
+            heard: VecDeque::with_capacity(2 * WINDOW),
+            listener: None,
+            history: VecDeque::new(),
+            stepped: Instant::now(),
+            known: None,
+        }
+    }
+
+    pub(super) fn run(mut self) {
+        while !self.shared.stop.load(Ordering::Relaxed) {
+            let pause = if self.shared.state.is_open() { self.look() } else { IDLE };
+            std::thread::sleep(pause);
+        }
+    }
+
+    /// One snapshot; how long until the next.
+    fn look(&mut self) -> Duration {
+        let inside = self.inside.read().clone();
+        self.listen();
+        let settings = self.params.settings();
+        let moving = inside.now.mouth_kpa > NO_BREATH_KPA || inside.now.sounding.is_some();
+        self.remember(inside.now.mouth_kpa);
+        let placed = self.instruments.placed();
+        self.know(placed.as_ref());
+        let tried = self.shared.tried.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let mut snapshot = Snapshot { settings, ..Snapshot::default() };
+        snapshot.instruments = InstrumentChoice::ALL.iter().map(|choice| choice.title().to_owned()).collect();
+        snapshot.chosen = Some(self.params.instrument.choice.value() as usize);
+        snapshot.sounding = inside.now.sounding;
+        snapshot.mouth_kpa = inside.now.mouth_kpa;
+        snapshot.latency_ms = (1e3 * f64::from(inside.latency_samples) / inside.host_rate_hz) as f32;
+        snapshot.history = Track { step_s: STEP_S, kpa: self.history.iter().copied().collect() };
+        snapshot.scope = Scope {
+            rate_hz: Watch::rate_hz(inside.voice_rate_hz) as f32,
+            mouthpiece_kpa: inside.moments.iter().map(|moment| moment.mouthpiece_kpa).collect(),
+            opening: inside.moments.iter().map(|moment| moment.opening).collect(),
+            flow_cm3s: inside.moments.iter().map(|moment| moment.flow_cm3s).collect(),
+        };
+        let design = self.design();
+        if let Some(known) = &mut self.known {
+            let model = known.model.clone();
+            let file = &model.file;
+            let fingering = inside.now.fingering.min(file.fingerings.len().saturating_sub(1));
+            let open = tried
+                .filter(|open| open.len() == file.holes.len())
+                .unwrap_or_else(|| file.fingerings[fingering].open.clone());
+            snapshot.fingering = fingering;
+            snapshot.openings = open.iter().map(|&open| f32::from(u8::from(open))).collect();
+            snapshot.requirement = known.requirement(fingering, &settings);
+            snapshot.feel = known.feel(fingering, &settings, &design);
+            snapshot.standing = known.standing(fingering, &open);
+            snapshot.instrument = Arc::new(file.clone());
+        }
+        snapshot.heard = self.hear(inside.host_rate_hz, inside.now.sounding, &settings);
+        #[cfg(feature = "devices")]
+        if let Some(status) = self.knob.status() {
+            let feel = snapshot.feel.as_ref().ok().map(|note| note.feel);
+            snapshot.knob = knob_picture(&status, feel.as_ref());
+        }
+        snapshot.status = self.words(placed.as_ref());
+        *self.shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(snapshot);
+        self.shared.repaint.request_repaint();
+        if moving { QUICK } else { IDLE }
+    }
+
+    fn listen(&mut self) {
+        while let Ok(sample) = self.sound.pop() {
+            if self.heard.len() == WINDOW {
+                self.heard.pop_front();
+            }
+            self.heard.push_back(sample);
+        }
+    }
+
+    fn remember(&mut self, kpa: f32) {
+        let step = Duration::from_secs_f32(STEP_S);
+        // After a pause the history begins anew rather than lie about time.
+        if self.stepped.elapsed() > Duration::from_secs(2) {
+            (self.stepped, self.history) = (Instant::now(), VecDeque::new());
+        }
+        while self.stepped.elapsed() >= step {
+            self.stepped += step;
+            self.history.push_back(kpa);
+            if self.history.len() as f32 * STEP_S > HISTORY_S {
+                self.history.pop_front();
+            }
+        }
+    }
+
+    /// Asks an instrument that is new. Takes a second, in which the window shows what was.
+    fn know(&mut self, placed: Option<&Placed>) {
+        let Some(placed) = placed else { return };
+        if placed.stage == Stage::Rough
+            || self.known.as_ref().is_some_and(|known| Arc::ptr_eq(&known.model, &placed.model))
+        {
+            return;
+        }
+        self.known = Some(Known {
+            feels: Arc::new(Feels::new(&placed.model)),
+            bore: TransferMatrix::new(&placed.model.file, placed.model.air),
+            model: placed.model.clone(),
+            table: None,
+            standing: None,
+        });
+    }
+
+    fn design(&self) -> FeelDesign {
+        #[cfg(feature = "devices")]
+        return knob::design(&self.params.knob);
+        #[cfg(not(feature = "devices"))]
+        FeelDesign::default()
+    }
+
+    fn hear(&mut self, rate_hz: f64, sounding: Option<SoundingNote>, settings: &Settings) -> Heard {
+        if self.listener.as_ref().is_none_or(|(of, _)| *of != rate_hz) {
+            self.listener = Some((rate_hz, Listener::new(rate_hz)));
+        }
+        let wanted = sounding.map(|note| note.frequency_hz(f64::from(settings.a4_hz)));
+        let samples = self.heard.make_contiguous();
+        self.listener.as_mut().map_or_else(Heard::default, |(_, listener)| listener.hear(samples, wanted))
+    }
+
+    fn words(&self, placed: Option<&Placed>) -> Vec<Status> {
+        let mut status = Vec::new();
+        let mut say = |level, text: String| status.push(Status { level, text });
+        if let Ok(text) = self.params.instrument_status.read()
+            && placed.is_none_or(|placed| placed.stage < Stage::Tuned)
+        {
+            say(Level::Note, text.clone());
+        }
+        if let Ok(text) = self.params.knob_status.read()
+            && text.as_str() != "off"
+        {
+            say(Level::Good, text.clone());
+        }
+        status
+    }
+}
+
+impl Known {
+    fn requirement(&self, fingering: usize, settings: &Settings) -> Option<Requirement> {
+        let reed = felt::played_reed(&self.model.file, settings);
+        self.feels.requirements().note(fingering, &reed)
+    }
+
+    fn feel(
+        &mut self,
+        fingering: usize,
+        settings: &Settings,
+        design: &FeelDesign,
+    ) -> Result<crate::haptics::NoteFeel, String> {
+        let same = self.table.as_ref().is_some_and(|(of, by, _)| (of, by) == (settings, design));
+        if !same {
+            let table = self.feels.table(settings, design, &Limits::default());
+            self.table = Some((*settings, *design, table.map_err(|reason| reason.to_string())));
+        }
+        match self.table.as_ref().map(|(.., table)| table) {
+            Some(Ok(table)) => Ok(table.note(fingering).unwrap_or(table.reference()).clone()),
+            Some(Err(reason)) => Err(reason.clone()),
+            None => Err("not known yet".to_owned()),
+        }
+    }
+
+    fn standing(&mut self, fingering: usize, open: &[bool]) -> Vec<(f32, f32)> {
+        let same = self.standing.as_ref().is_some_and(|(of, with, _)| *of == fingering && with == open);
+        if !same {
+            let f_hz = self.model.notes_hz[fingering];
+            let wave = self.bore.standing_pressure(f_hz, open);
+            let wave = wave.into_iter().map(|(x, p)| (x as f32, p as f32)).collect();
+            self.standing = Some((fingering, open.to_vec(), wave));
+        }
+        self.standing.as_ref().map_or_else(Vec::new, |(.., wave)| wave.clone())
+    }
+}
+
+/// The knob as the window shows it.
+#[cfg(feature = "devices")]
+fn knob_picture(status: &crate::device::LinkStatus, feel: Option<&crate::wire::message::Feel>) -> Knob {
+    use crate::device::{Phase, serial_text};
+    let stats = &status.stats;
+    let is_live = status.phase == Phase::Live;
+    let devices = status.serial.map(|serial| Device {
+        key: serial_text(serial),
+        name: status.info.as_ref().map_or_else(|| serial_text(serial), |info| info.name_text().to_string()),
+        state: if is_live { "ready".to_owned() } else { status.text.clone() },
+        is_chosen: true,
+        is_free: is_live,
+    });
+    Knob {
+        devices: devices.into_iter().collect(),
+        text: status.text.clone(),
+        is_live,
+        is_armed: status.armed,
+        ceiling_mnm: f32::from(status.ceiling_mnm),
+        angle_deg: status.angle_deg,
+        torque_mnm: status.angle_deg.zip(feel).map(|(angle_deg, feel)| {
+            crate::haptics::law::torque_mnm(feel, crate::reed::ReedTables::seed(), f64::from(angle_deg))
+                as f32
+        }),
+        notice: status.last_refusal.clone().or_else(|| status.notice.clone()),
+        rate_hz: stats.rate_hz,
+        jitter_us: (stats.jitter_p50_us, stats.jitter_p99_us),
+        round_trip_us: stats.feel_round_trip_us,
+        lost: stats.wire.lost,
+        damaged: stats.wire.crc_errors + stats.wire.length_errors,
+        losses: stats.losses,
+    }
+}
