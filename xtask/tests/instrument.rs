@@ -153,10 +153,12 @@ fn an_instrument_file_plays_at_once_and_in_tune_when_it_is_made() {
     let mut plugin = plugin();
     plugin.restore(&user_state(&path)).unwrap();
     let mut session = plugin.activate(RATE, BLOCK).unwrap();
+    // Fitting takes longer than asking, however quick the machine.
+    let first = status(&mut plugin);
+    assert!(first != "ready: pipe", "nothing is ready yet");
     let heard = session.play_live(&[At(0, breath(64)), At(0, on(55))], SECOND / 2, RATE).unwrap();
     assert!(level_db(&heard[0][SECOND / 4..]) > -40.0, "rough, but it sounds");
-    let seen = wait(&mut plugin, &mut session, "ready: pipe");
-    assert!(seen.iter().any(|text| text.starts_with("fitting ") || text.starts_with("tuning ")), "{seen:?}");
+    wait(&mut plugin, &mut session, "ready: pipe");
     let heard = session.play_live(&[], SECOND, RATE).unwrap();
     let off = cents(&heard[0][SECOND / 2..], 55.0);
     assert!(off.abs() < 3.0, "{off} cents");
