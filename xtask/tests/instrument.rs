@@ -91,21 +91,7 @@ fn user_state(path: &Path) -> Vec<u8> {
 }
 
 /// A pipe of three notes: quickly fitted and tuned.
-const PIPE: &str = r#"
-name = "pipe"
-transposition_semitones = 0
-reed_volume_mm3 = 1000.0
-bore = [{ x_start_mm = 0.0, x_end_mm = 460.0, diameter_start_mm = 14.9, diameter_end_mm = 14.9 }]
-hole = [
-  { name = "upper", kind = "finger", x_mm = 330.0, diameter_mm = 8.0, chimney_mm = 5.0 },
-  { name = "lower", kind = "finger", x_mm = 390.0, diameter_mm = 8.0, chimney_mm = 5.0 },
-]
-fingering = [
-  { written = "F3", register = "chalumeau", mode = 1, open = "" },
-  { written = "G3", register = "chalumeau", mode = 1, open = "lower" },
-  { written = "A3", register = "chalumeau", mode = 1, open = "upper lower" },
-]
-"#;
+const PIPE: &str = include_str!("../../tests/support/pipe.toml");
 
 #[test]
 fn instruments_are_exchanged_while_a_note_sounds() {
