@@ -281,7 +281,7 @@ fn bundled_instruments_hold_their_registers() {
 #[test]
 fn offline_quality_is_cleaner_than_90_db() {
     let settings = Settings { noise: 0.0, gain_db: -12.0, ..Settings::default() };
-    for instrument in [Bundled::BFlat, Bundled::A] {
+    for instrument in Bundled::ALL {
         let model = shipped(instrument, Quality::High);
         assert_eq!(model.coeffs.rate_hz, 192_000.0);
         let notes = [60, 79, 86].map(|midi| {

@@ -8,7 +8,8 @@ use crate::instrument::model::A4_HZ;
 use crate::instrument::prepare::{self, Progress};
 use crate::instrument::tuning::NoteTuning;
 use crate::instrument::{BuildError, Model, Quality, Wanted};
-use crate::units::{Air, WrittenNote, midi_of_name};
+use crate::render::score::ScoreError;
+use crate::units::{Air, SoundingNote, WrittenNote, midi_of_name};
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::ops::ControlFlow;
@@ -239,6 +240,12 @@ pub fn check_fingering(file: &InstrumentFile, written: WrittenNote) -> Result<()
         "written {} ({written}) has no fingering; this instrument has {} ({low}) to {} ({high})",
         written.0, low.0, high.0
     )))
+}
+
+/// What a fingered note sounds, or why it cannot be played.
+pub fn sounding(file: &InstrumentFile, written: WrittenNote) -> Result<SoundingNote, Failure> {
+    check_fingering(file, written)?;
+    Ok(written.sounding(file.transposition).ok_or(ScoreError::OutsideMidi(written))?)
 }
 
 /// A number inside a range, or what would be right.

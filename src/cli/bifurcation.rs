@@ -2,7 +2,7 @@
 
 use crate::bore::transfer_matrix::{TransferMatrix, threshold_gamma};
 use crate::cli::Failure;
-use crate::cli::args::{PlayedArgs, check_fingering, note, within};
+use crate::cli::args::{PlayedArgs, note, sounding, within};
 use crate::cli::plot::PlotArgs;
 use crate::cli::render::progress;
 use crate::cli::settings::SettingsArgs;
@@ -53,12 +53,7 @@ impl Bifurcation {
     pub fn run(&self) -> Result<(), Failure> {
         let file = self.instrument.load()?;
         let written = WrittenNote(self.written);
-        check_fingering(&file, written)?;
-        let sounding = written.sounding(file.transposition).ok_or_else(|| {
-            Failure::Usage(format!(
-                "written {written} sounds outside MIDI's 0..127; choose one nearer the middle"
-            ))
-        })?;
+        let sounding = sounding(&file, written)?;
         let curve = BreathCurve::swell(self.to as f32, self.seconds);
         let settings = self.settings.blown_by(Some(&curve), &file)?;
         let mut table = self.table.open("direction,gamma,rms,shut")?;

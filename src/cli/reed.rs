@@ -1,7 +1,7 @@
 //! `chalumeau reed`: the tables and the flow law that sound, knob and firmware share, and their figures.
 
 use crate::cli::Failure;
-use crate::cli::args::{PlayedArgs, check_fingering, note, within};
+use crate::cli::args::{PlayedArgs, note, sounding, within};
 use crate::cli::reed_physical::{self, PhysicalReedArgs};
 use crate::cli::render::progress;
 use crate::cli::table::TableArgs;
@@ -212,12 +212,7 @@ impl Drawing {
     fn prepare_orbit(&self) -> Result<impl FnOnce() -> Result<Orbit, Failure> + '_, Failure> {
         let file = self.instrument.load()?;
         let written = WrittenNote(self.written);
-        check_fingering(&file, written)?;
-        let sounding = written.sounding(file.transposition).ok_or_else(|| {
-            Failure::Usage(format!(
-                "written {written} sounds outside MIDI's 0..127; choose one nearer the middle"
-            ))
-        })?;
+        let sounding = sounding(&file, written)?;
         Ok(move || {
             let breath_full_kpa = 20.0;
             let settings =

@@ -5,6 +5,8 @@
 
 mod canvas;
 mod font;
+mod frame;
+mod layer;
 mod layout;
 mod ticks;
 

@@ -6,6 +6,7 @@ use crate::figure::{
     Axis, ColourMap, Direction, Figure, Heat, Layer, Line, Mark, Panel, Polygon, SecondAxis,
 };
 use crate::instrument::Probe;
+use crate::reed::motion::SHUT;
 use crate::units::SoundingNote;
 
 /// Levels of the lightest and the darkest colour of the spectrogram, dB re a sine of full scale.
@@ -15,9 +16,6 @@ const CEILING_DB: f64 = -20.0;
 const JUMP_CENTS: f64 = 60.0;
 /// Quieter than this there is no pitch to draw: -80 dB re full scale.
 const QUIET: f64 = 1e-4;
-
-/// A gap below this part of that at rest is shut: some hundredth of a millimetre, where a curved lay never quite closes.
-const SHUT: f64 = 0.01;
 
 /// A note of the score as it is heard.
 #[derive(Clone, Copy, Debug, PartialEq)]

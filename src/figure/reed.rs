@@ -6,6 +6,7 @@
 use crate::figure::palette::Colour;
 use crate::figure::{Axis, Dash, Direction, Figure, Line, Mark, Panel, Points, SecondAxis, Span};
 use crate::reed::law::{H_INIT, K_INIT, ReedError};
+use crate::reed::motion::SHUT;
 use crate::reed::{PhysicalReed, ReedLaw, ReedTables};
 use crate::units::Air;
 
@@ -318,9 +319,6 @@ pub struct Orbit {
     /// One period: pressure difference Pa, flow m3/s, opening over rest.
     pub period: Vec<[f64; 3]>,
 }
-
-/// Below this opening over rest a reed is shut: it beats.
-pub const SHUT: f64 = 1e-3;
 
 impl Orbit {
     /// Part of the period in which the reed is shut, 0..=1.

@@ -31,11 +31,32 @@ const QUIET_SAMPLES: u32 = 4_096;
 /// Host samples between two looks at level and limiter.
 const CHUNK: usize = 64;
 
+/// Up to this rate of the lattice, Hz, single precision is enough. What rounding leaves between the harmonics grows with
+/// the rate over the note: at twice the live rate a bass clarinet had -78 dB, with double precision it has -126 and less
+/// (`docs/findings.md`).
+const SINGLE_BELOW_HZ: f64 = 100_000.0;
+
+/// The voice in the precision that its rate asks for.
+enum Sounding {
+    Single(Box<Voice<f32>>),
+    Double(Box<Voice<f64>>),
+}
+
+/// The same with the voice, whatever its precision.
+macro_rules! of {
+    ($sounding:expr, $voice:ident => $body:expr) => {
+        match $sounding {
+            Sounding::Single($voice) => $body,
+            Sounding::Double($voice) => $body,
+        }
+    };
+}
+
 /// A playable clarinet.
 pub struct Clarinet {
     model: Arc<Model>,
     player: Player,
-    voice: Voice<f32>,
+    voice: Sounding,
     resampler: Resampler,
     limiter: Limiter,
     /// The inside, while somebody looks.
@@ -61,18 +82,24 @@ impl Clarinet {
         let lip = embouchure(model.lowest_hz, model.lowest_hz);
         let (swept, rate) = (model.swept_s, model.coeffs.rate_hz);
         let reed = ReedCoeffs::new(ReedLaw::default(), 0.3, 0.4, lip.resonance_hz, lip.damping, swept, rate);
-        let mut voice = Voice::new(&model.coeffs, &model.air, ReedTables::seed(), reed);
-        voice.hold_reed(TONGUE_FORCE);
+        let tables = ReedTables::seed();
+        let mut voice = if rate > SINGLE_BELOW_HZ {
+            Sounding::Double(Box::new(Voice::new(&model.coeffs, &model.air, tables, reed)))
+        } else {
+            Sounding::Single(Box::new(Voice::new(&model.coeffs, &model.air, tables, reed)))
+        };
+        of!(&mut voice, voice => voice.hold_reed(TONGUE_FORCE));
         let resampler = Resampler::new(rate, host_rate_hz);
         let full_scale_per_pa = FULL_SCALE_PER_PA * (REFERENCE_RADIUS_M / model.file.nominal_radius_m);
         let gain = gain_of(&Settings::default(), full_scale_per_pa);
+        let watch = Watch::new(rate, model.lowest_hz);
         Self {
             model,
             player: Player::default(),
             voice,
             resampler,
             limiter: Limiter::new(host_rate_hz),
-            watch: Watch::default(),
+            watch,
             watched: false,
             full_scale_per_pa,
             gain,
@@ -92,13 +119,13 @@ impl Clarinet {
 
     /// What the player does now. Real-time safe.
     pub fn apply(&mut self, event: Event) {
-        self.player.apply(event, &self.model, &mut self.voice);
+        of!(&mut self.voice, voice => self.player.apply(event, &self.model, voice));
         self.quiet = 0;
     }
 
     /// Goes on where the player of another instrument is: keys, breath, bend. For a new instrument. Real-time safe.
     pub fn carry_on(&mut self, from: &Self) {
-        self.player.carry_on(&from.player, &self.model, &mut self.voice);
+        of!(&mut self.voice, voice => self.player.carry_on(&from.player, &self.model, voice));
         self.gain = self.gain_wanted;
     }
 
@@ -121,21 +148,21 @@ impl Clarinet {
 
     /// As [`render`](Self::render), calling `probe` once per internal sample, in order of time.
     pub fn render_probed(&mut self, out: &mut [f32], probe: &mut dyn FnMut(Probe)) {
-        self.voice.set_probing(true);
+        of!(&mut self.voice, voice => voice.set_probing(true));
         self.render_with(out, &mut Some(probe));
-        self.voice.set_probing(self.watched);
+        of!(&mut self.voice, voice => voice.set_probing(false));
     }
 
-    /// Keeps the last moments inside for a screen, or no longer. Real-time safe.
+    /// Keeps moments inside for a screen, or no longer. Real-time safe.
     pub fn set_watched(&mut self, on: bool) {
         if self.watched != on {
             self.watched = on;
-            self.voice.set_probing(on);
-            self.watch.clear();
+            self.watch.restart();
+            of!(&mut self.voice, voice => voice.set_probing(on));
         }
     }
 
-    /// The last moments inside; see [`set_watched`](Self::set_watched).
+    /// Moments inside; see [`set_watched`](Self::set_watched).
     pub fn watch(&self) -> &Watch {
         &self.watch
     }
@@ -149,17 +176,21 @@ impl Clarinet {
         for out in out.chunks_mut(CHUNK) {
             let mut made = self.resampler.pull(out);
             while made < out.len() {
-                let drive = self.player.tick(&self.model, &mut self.voice);
-                let samples = self.voice.tick(&drive);
-                self.resampler.push(samples, self.player.speed());
-                if let Some(probes) = self.voice.probes() {
-                    if let Some(probe) = probe.as_mut() {
-                        probes.iter().for_each(|&moment| probe(moment));
+                of!(&mut self.voice, voice => {
+                    let drive = self.player.tick(&self.model, voice);
+                    let samples = voice.tick(&drive);
+                    self.resampler.push(samples, self.player.speed());
+                    if let Some(probes) = voice.probes() {
+                        if let Some(probe) = probe.as_mut() {
+                            probes.iter().for_each(|&moment| probe(moment));
+                        }
+                        if self.watched && self.watch.take(probes) {
+                            voice.set_probing(probe.is_some());
+                        }
+                    } else if self.watched && self.watch.rest() {
+                        voice.set_probing(true);
                     }
-                    if self.watched {
-                        self.watch.take(probes);
-                    }
-                }
+                });
                 made += self.resampler.pull(&mut out[made..]);
             }
             for sample in &mut *out {
@@ -180,7 +211,7 @@ impl Clarinet {
                 };
             } else {
                 out.fill(0.0);
-                self.voice.reset();
+                of!(&mut self.voice, voice => voice.reset());
                 self.resampler.reset();
                 self.limiter.reset();
                 self.resets += 1;
@@ -191,12 +222,14 @@ impl Clarinet {
     /// Silence, and every state as new; settings stay. Real-time safe.
     pub fn reset(&mut self) {
         self.player.reset();
-        self.voice.reset();
-        self.voice.hold_reed(TONGUE_FORCE);
-        self.voice.lattice_mut().glide_delay(0.0, 0);
-        for hole in 0..self.model.coeffs.holes() {
-            self.voice.lattice_mut().set_opening(hole, 0.0);
-        }
+        of!(&mut self.voice, voice => {
+            voice.reset();
+            voice.hold_reed(TONGUE_FORCE);
+            voice.lattice_mut().glide_delay(0.0, 0);
+            for hole in 0..self.model.coeffs.holes() {
+                voice.lattice_mut().set_opening(hole, 0.0);
+            }
+        });
         self.resampler.reset();
         self.limiter.reset();
         self.gain = self.gain_wanted;
@@ -226,20 +259,27 @@ impl Clarinet {
 
     /// How often a non-finite state had to be reset since the start.
     pub fn resets(&self) -> u64 {
-        self.resets + self.voice.resets()
+        self.resets + of!(&self.voice, voice => voice.resets())
     }
 
     /// Keeps the plain code path, see [`Lattice::without_avx2`](crate::bore::lattice::Lattice::without_avx2).
     #[doc(hidden)]
     pub fn without_avx2(mut self) -> Self {
-        self.voice = self.voice.without_avx2();
+        self.voice = match self.voice {
+            Sounding::Single(voice) => Sounding::Single(Box::new(voice.without_avx2())),
+            Sounding::Double(voice) => Sounding::Double(Box::new(voice.without_avx2())),
+        };
         self
     }
 
-    /// The voice inside, to be disturbed by tests.
+    /// The voice inside, to be disturbed by tests. Not at twice the rate.
     #[doc(hidden)]
     pub fn voice_mut(&mut self) -> &mut Voice<f32> {
-        &mut self.voice
+        match &mut self.voice {
+            Sounding::Single(voice) => voice,
+            // PANIC: for tests, which ask for no other rate.
+            Sounding::Double(_) => unreachable!("single precision at live rates only"),
+        }
     }
 }
 

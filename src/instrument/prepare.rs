@@ -36,7 +36,7 @@ pub enum Quality {
     /// 96 or 88.2 kHz.
     #[default]
     Live,
-    /// Twice that, with a fit and trims of its own: for rendering.
+    /// Twice that, with a fit and trims of its own, in double precision: for rendering.
     High,
 }
 
@@ -381,21 +381,7 @@ mod tests {
 
     /// A pipe of three notes: quickly fitted.
     fn pipe() -> InstrumentFile {
-        let text = r#"
-            name = "pipe"
-            transposition_semitones = 0
-            reed_volume_mm3 = 1000.0
-            bore = [{ x_start_mm = 0.0, x_end_mm = 460.0, diameter_start_mm = 14.9, diameter_end_mm = 14.9 }]
-            hole = [
-              { name = "upper", kind = "finger", x_mm = 330.0, diameter_mm = 8.0, chimney_mm = 5.0 },
-              { name = "lower", kind = "finger", x_mm = 390.0, diameter_mm = 8.0, chimney_mm = 5.0 },
-            ]
-            fingering = [
-              { written = "F3", register = "chalumeau", mode = 1, open = "" },
-              { written = "G3", register = "chalumeau", mode = 1, open = "lower" },
-              { written = "A3", register = "chalumeau", mode = 1, open = "upper lower" },
-            ]"#;
-        InstrumentFile::parse(text).unwrap()
+        InstrumentFile::parse(include_str!("../../tests/support/pipe.toml")).unwrap()
     }
 
     #[test]

@@ -1,12 +1,17 @@
-//! The last moments inside the instrument, kept for a screen. Nothing is kept while nobody looks.
+//! Moments inside the instrument, for a screen. Nothing is kept while nobody looks.
+//!
+//! A picture is a run of moments that holds at least one period of the lowest note. Between two pictures the voice goes
+//! unprobed for twice as long as one takes: a screen needs no more, and the audio thread hardly notices.
 
 use crate::instrument::voice::{Probe, TICK};
 use crate::units::SoundingNote;
 
-/// Moments kept: 43 ms at every second sample of 96 kHz, six periods of the lowest note.
-pub const MOMENTS: usize = 2_048;
-/// Of so many samples one is kept.
-const EVERY: usize = 2;
+/// Moments of a picture.
+pub const MOMENTS: usize = 512;
+/// Periods of the lowest note in a picture, at least.
+const PERIODS: f64 = 1.5;
+/// So much longer than a picture is the pause after it.
+const PAUSE: usize = 2;
 
 /// One moment inside.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -30,47 +35,78 @@ pub struct Now {
     pub mouth_kpa: f32,
 }
 
-/// The last [`MOMENTS`] moments. Real-time safe but for [`new`](Self::new).
+/// Takes pictures. Real-time safe but for [`new`](Self::new).
 pub struct Watch {
-    moments: Box<[Moment]>,
-    next: usize,
-}
-
-impl Default for Watch {
-    fn default() -> Self {
-        Self { moments: vec![Moment::default(); MOMENTS].into(), next: 0 }
-    }
+    moments: Box<[Moment; MOMENTS]>,
+    taken: usize,
+    /// Of so many samples one is kept.
+    every: usize,
+    /// Samples of the next tick that are passed over.
+    skip: usize,
+    /// Ticks of the pause that are left.
+    pause: usize,
+    pictures: u64,
 }
 
 impl Watch {
-    /// Takes what happened in a control tick.
-    pub fn take(&mut self, probes: &[Probe; TICK]) {
-        for probe in probes.iter().step_by(EVERY) {
-            self.moments[self.next % MOMENTS] = Moment {
+    /// For a voice at this rate whose lowest note is this, both Hz. Allocates.
+    pub fn new(rate_hz: f64, lowest_hz: f64) -> Self {
+        let every = (PERIODS * rate_hz / lowest_hz / MOMENTS as f64).ceil();
+        Self {
+            moments: Box::new([Moment::default(); MOMENTS]),
+            taken: 0,
+            every: (every as usize).max(1),
+            skip: 0,
+            pause: 0,
+            pictures: 0,
+        }
+    }
+
+    /// Takes what happened in a control tick; whether the picture is complete.
+    pub fn take(&mut self, probes: &[Probe; TICK]) -> bool {
+        let mut at = self.skip;
+        while at < TICK && self.taken < MOMENTS {
+            let probe = &probes[at];
+            self.moments[self.taken] = Moment {
                 mouthpiece_kpa: 1e-3 * probe.p_mouthpiece_pa as f32,
                 opening: probe.opening as f32,
                 flow_cm3s: 1e6 * probe.flow_m3s as f32,
             };
-            self.next = (self.next + 1) % MOMENTS;
+            self.taken += 1;
+            at += self.every;
         }
+        self.skip = at.saturating_sub(TICK);
+        if self.taken < MOMENTS {
+            return false;
+        }
+        self.pictures += 1;
+        self.skip = 0;
+        self.pause = PAUSE * MOMENTS * self.every / TICK;
+        true
+    }
+
+    /// Lets a control tick pass; whether the next picture begins.
+    pub fn rest(&mut self) -> bool {
+        self.pause = self.pause.saturating_sub(1);
+        if self.pause == 0 {
+            self.taken = 0;
+        }
+        self.pause == 0
+    }
+
+    /// Begins a picture, whatever was.
+    pub fn restart(&mut self) {
+        (self.taken, self.skip, self.pause) = (0, 0, 0);
+    }
+
+    /// The latest picture with its number, oldest moment first; none while the next is taken.
+    pub fn picture(&self) -> Option<(u64, &[Moment; MOMENTS])> {
+        (self.taken == MOMENTS).then_some((self.pictures, &*self.moments))
     }
 
     /// Moments a second, for the rate of the voice.
-    pub fn rate_hz(voice_rate_hz: f64) -> f64 {
-        voice_rate_hz / EVERY as f64
-    }
-
-    /// All moments, oldest first.
-    pub fn copy_to(&self, all: &mut [Moment; MOMENTS]) {
-        let (newest, oldest) = self.moments.split_at(self.next);
-        all[..oldest.len()].copy_from_slice(oldest);
-        all[oldest.len()..].copy_from_slice(newest);
-    }
-
-    /// As new.
-    pub fn clear(&mut self) {
-        self.moments.fill(Moment::default());
-        self.next = 0;
+    pub fn rate_hz(&self, voice_rate_hz: f64) -> f64 {
+        voice_rate_hz / self.every as f64
     }
 }
 
@@ -78,17 +114,33 @@ impl Watch {
 mod tests {
     use super::*;
 
-    #[test]
-    fn moments_come_oldest_first_whatever_has_been_overwritten() {
-        let mut watch = Watch::default();
-        let mut all = [Moment::default(); MOMENTS];
-        let ticks = 3 * MOMENTS / TICK + 5;
-        for tick in 0..ticks {
+    fn picture(every: usize) -> (Vec<f32>, usize) {
+        let mut watch = Watch::new((every * MOMENTS) as f64, PERIODS);
+        assert_eq!(watch.every, every);
+        let (mut tick, mut full) = (0, false);
+        while !full {
             let probe = |n: usize| Probe { opening: (tick * TICK + n) as f64, ..Probe::default() };
-            watch.take(&std::array::from_fn(probe));
+            full = watch.take(&std::array::from_fn(probe));
+            assert_eq!(watch.picture().is_some(), full);
+            tick += 1;
         }
-        watch.copy_to(&mut all);
-        assert_eq!(all[MOMENTS - 1].opening, (ticks * TICK - EVERY) as f32);
-        assert!(all.windows(2).all(|pair| pair[1].opening - pair[0].opening == EVERY as f32));
+        let openings = watch.picture().unwrap().1.iter().map(|moment| moment.opening).collect();
+        let mut pause = 1;
+        while !watch.rest() {
+            assert!(watch.picture().is_some());
+            pause += 1;
+        }
+        assert!(watch.picture().is_none());
+        (openings, pause)
+    }
+
+    #[test]
+    fn moments_are_at_equal_steps_whatever_the_ticks() {
+        for every in [1, 2, 3, 5, 16, 23] {
+            let (openings, pause) = picture(every);
+            assert_eq!(openings[0], 0.0);
+            assert!(openings.windows(2).all(|pair| pair[1] - pair[0] == every as f32), "{every}");
+            assert!((pause * TICK).abs_diff(PAUSE * MOMENTS * every) < TICK, "{every}");
+        }
     }
 }

@@ -31,8 +31,6 @@ use crate::plugin::params::instrument::InstrumentChoice;
 use hands::HostControls;
 use looker::Looker;
 
-/// Pictures a second of the inside.
-const PICTURES_HZ: f64 = 30.0;
 /// Samples of sound on their way to the looker: a second at 48 kHz.
 const SOUND: usize = 65_536;
 /// Keys of the window on their way to the audio thread.
@@ -45,7 +43,7 @@ const KEYS_A_BLOCK: usize = 8;
 struct Inside {
     now: Now,
     moments: Box<[Moment; MOMENTS]>,
-    voice_rate_hz: f64,
+    moments_hz: f64,
     host_rate_hz: f64,
     latency_samples: u32,
 }
@@ -55,7 +53,7 @@ impl Default for Inside {
         Self {
             now: Now { sounding: None, fingering: 0, mouth_kpa: 0.0 },
             moments: Box::new([Moment::default(); MOMENTS]),
-            voice_rate_hz: 96_000.0,
+            moments_hz: 48_000.0,
             host_rate_hz: 48_000.0,
             latency_samples: 0,
         }
@@ -84,8 +82,8 @@ pub struct Audio {
     inside: triple_buffer::Input<Inside>,
     sound: rtrb::Producer<f32>,
     keys: rtrb::Consumer<Event>,
-    /// Samples since the last picture.
-    since: usize,
+    /// Number of the last picture.
+    shown: u64,
 }
 
 impl Audio {
@@ -105,16 +103,14 @@ impl Audio {
         if let Ok(chunk) = self.sound.write_chunk_uninit(room) {
             chunk.fill_from_iter(heard[heard.len() - room..].iter().copied());
         }
-        self.since += heard.len();
-        if (self.since as f64) < bench.rate_hz() / PICTURES_HZ {
-            return;
-        }
-        self.since = 0;
         let clarinet = bench.clarinet();
+        let watch = clarinet.watch();
+        let Some((number, moments)) = watch.picture().filter(|&(number, _)| number != self.shown) else { return };
+        self.shown = number;
         let inside = self.inside.input_buffer_mut();
         inside.now = clarinet.now();
-        clarinet.watch().copy_to(&mut inside.moments);
-        inside.voice_rate_hz = clarinet.internal_rate_hz();
+        inside.moments.copy_from_slice(moments);
+        inside.moments_hz = watch.rate_hz(clarinet.internal_rate_hz());
         inside.host_rate_hz = bench.rate_hz();
         inside.latency_samples = clarinet.latency_samples();
         self.inside.publish();
@@ -162,7 +158,7 @@ impl Window {
         );
         let looker =
             std::thread::Builder::new().name("chalumeau looker".to_owned()).spawn(move || looker.run());
-        let audio = Audio { shared: shared.clone(), inside: inside_in, sound: sound_in, keys, since: 0 };
+        let audio = Audio { shared: shared.clone(), inside: inside_in, sound: sound_in, keys, shown: 0 };
         // Without a thread the window shows parameters only.
         let window = Self {
             shared,

@@ -17,6 +17,9 @@
 use crate::reed::law::{K_INIT, ReedLaw};
 use crate::reed::tables::ReedTables;
 
+/// Below this opening over rest a reed counts as shut, wherever that is counted or drawn: a thousandth, since a curved lay
+/// lets the last of the gap go only slowly. By judgement.
+pub const SHUT: f64 = 1e-3;
 /// Largest opening, over the rest opening: a reed pushed away from the mouthpiece is stopped by the lip (by judgement).
 const MAX_OPENING: f64 = 2.0;
 /// A force the tongue presses with that holds the reed shut at any playing pressure, over P (lattice study, section 5).

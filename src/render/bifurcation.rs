@@ -6,6 +6,7 @@
 //! has grown (Bergeot, Almeida, Vergez and Gazengel 2013); the slower, the less.
 
 use crate::instrument::{Clarinet, Model, Probe, Settings};
+use crate::reed::motion::SHUT;
 use crate::render;
 use crate::render::breath::BreathCurve;
 use crate::render::score::Score;
@@ -15,8 +16,6 @@ use std::sync::Arc;
 
 /// A note sounds above this rms over the closing pressure: a hundredth of a loud one's.
 pub const SOUNDS: f64 = 0.01;
-/// A reed is shut below this opening over rest.
-const SHUT: f64 = 1e-3;
 /// Shortest window, s.
 const WINDOW_S: f64 = 0.02;
 

@@ -55,6 +55,13 @@ pub struct MidiError(String);
 /// A knob among the MIDI ports of the system.
 #[cfg(unix)]
 pub struct VirtualMidi {
+    name: String,
+    ports: Option<Ports>,
+}
+
+/// What the system shows while the cable is in.
+#[cfg(unix)]
+struct Ports {
     from_host: Receiver<Vec<u8>>,
     to_host: MidiOutputConnection,
     // Closes the port when dropped.
@@ -65,6 +72,34 @@ pub struct VirtualMidi {
 impl VirtualMidi {
     /// Opens an input and an output of this name.
     pub fn open(name: &str) -> Result<Self, MidiError> {
+        Ok(Self { name: name.to_owned(), ports: Some(Ports::open(name)?) })
+    }
+
+    /// Takes the ports away, or brings them back.
+    pub fn plug(&mut self, is_in: bool) -> Result<(), MidiError> {
+        if is_in != self.ports.is_some() {
+            self.ports = if is_in { Some(Ports::open(&self.name)?) } else { None };
+        }
+        Ok(())
+    }
+
+    /// Appends what hosts have sent.
+    pub fn read(&mut self, into: &mut Vec<u8>) {
+        let Some(ports) = &self.ports else { return };
+        ports.from_host.try_iter().take(WAITING_MAX).for_each(|message| into.extend(message));
+    }
+
+    /// Sends one message to whoever listens.
+    pub fn write(&mut self, message: &[u8]) {
+        let Some(ports) = &mut self.ports else { return };
+        // Nobody listening, or a full queue: the next STATE comes soon.
+        let _ = ports.to_host.send(message);
+    }
+}
+
+#[cfg(unix)]
+impl Ports {
+    fn open(name: &str) -> Result<Self, MidiError> {
         let failed = |e: &dyn std::fmt::Display| MidiError(e.to_string());
         let mut input = MidiInput::new(name).map_err(|e| failed(&e))?;
         input.ignore(Ignore::TimeAndActiveSense);
@@ -76,17 +111,6 @@ impl VirtualMidi {
         let output = MidiOutput::new(name).map_err(|e| failed(&e))?;
         let to_host = output.create_virtual(name).map_err(|e| failed(&e))?;
         Ok(Self { from_host, to_host, _input })
-    }
-
-    /// Appends what hosts have sent.
-    pub fn read(&mut self, into: &mut Vec<u8>) {
-        self.from_host.try_iter().take(WAITING_MAX).for_each(|message| into.extend(message));
-    }
-
-    /// Sends one message to whoever listens.
-    pub fn write(&mut self, message: &[u8]) {
-        // Nobody listening, or a full queue: the next STATE comes soon.
-        let _ = self.to_host.send(message);
     }
 }
 

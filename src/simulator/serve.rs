@@ -44,7 +44,7 @@ pub enum Port {
     /// A pseudo-terminal; opened anew after the cable was out.
     #[cfg(unix)]
     Serial(Option<Pty>),
-    /// A virtual MIDI port.
+    /// A virtual MIDI port; opened anew after the cable was out.
     #[cfg(unix)]
     Midi(VirtualMidi),
     /// OSC reports of the stock firmware.
@@ -210,6 +210,10 @@ impl Server {
             }
             Port::Memory(transport) if !self.buffer.is_empty() => _ = transport.send(&self.buffer),
             _ => {}
+        }
+        #[cfg(unix)]
+        if let Port::Midi(midi) = &mut self.port {
+            midi.plug(!self.knob.is_unplugged()).map_err(io::Error::other)?;
         }
         #[cfg(unix)]
         if let Port::Serial(pty) = &mut self.port {

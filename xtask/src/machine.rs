@@ -1,7 +1,8 @@
 //! The machine underneath: folders, programs, system packages.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 
@@ -33,6 +34,25 @@ pub fn run(command: &mut Command) -> Result<()> {
     let name = described(command);
     let status = command.status().with_context(|| format!("cannot start `{name}`"))?;
     if status.success() { Ok(()) } else { bail!("`{name}` failed: {status}") }
+}
+
+/// How long a program that is asked to end may take.
+const LAST_WORDS: Duration = Duration::from_secs(3);
+
+/// Ends a program: asked first, where the system has a way of asking, and killed when it does not listen.
+pub fn terminate(child: &mut Child) -> Result<()> {
+    let asked =
+        Command::new("sh").args(["-c", &format!("kill {}", child.id())]).stderr(Stdio::null()).status();
+    let began = Instant::now();
+    while asked.as_ref().is_ok_and(ExitStatus::success) && began.elapsed() < LAST_WORDS {
+        if child.try_wait()?.is_some() {
+            return Ok(());
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    child.kill()?;
+    child.wait()?;
+    Ok(())
 }
 
 /// Program and arguments, as one would type them.

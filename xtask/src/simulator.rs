@@ -71,19 +71,18 @@ impl Simulator {
         Ok(simulator)
     }
 
-    /// Pulls the plug: the program is gone from one moment to the next.
-    pub fn kill(&mut self) -> Result<()> {
-        self.child.kill()?;
-        self.child.wait()?;
-        Ok(())
+    /// Pulls the plug: its port goes, and then the program.
+    ///
+    /// The program is asked to end. A killed one leaves its MIDI client to JACK, whose server may then run no other.
+    pub fn unplug(&mut self) -> Result<()> {
+        machine::terminate(&mut self.child)
     }
 }
 
 impl Drop for Simulator {
     fn drop(&mut self) {
         // It may be gone already, which is as good.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        let _ = self.unplug();
     }
 }
 

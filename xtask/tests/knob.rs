@@ -105,7 +105,7 @@ fn a_pulled_cable_silences_and_a_new_one_is_found_disarmed() {
             let said = [At(0, on(E3)), At(0, Say::Set(arm, 1.0))];
             let [left, _] = session.play_live(&said, SECOND, RATE).unwrap();
             assert!(level_db(&left[SECOND / 2..]) > -60.0);
-            first.kill().unwrap();
+            first.unplug().unwrap();
             session.play_live(&[], SECOND, RATE).unwrap();
             let [left, _] = session.play_live(&[], SECOND / 4, RATE).unwrap();
             assert!(level_db(&left) < -100.0, "{} dBFS after the cable was pulled", level_db(&left));

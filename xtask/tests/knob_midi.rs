@@ -244,7 +244,7 @@ fn an_unplugged_midi_knob_is_found_again_disarmed() {
     // So soon that no list of ports has shown the gap, and late enough for all to have noticed.
     for unplugged in [Duration::ZERO, Duration::from_secs(2)] {
         let (name, number, sent) = (knob.name.clone(), knob.number, session.answers().len());
-        knob.simulator.kill().unwrap();
+        knob.simulator.unplug().unwrap();
         // Meanwhile the music goes on.
         let plugged = std::thread::spawn(move || {
             std::thread::sleep(unplugged);
@@ -288,7 +288,7 @@ fn the_doctor_hears_a_midi_knob_and_misses_it_when_it_is_gone() {
         assert!(found.contains(say), "{say:?} in {found}");
     }
     assert!(!found.contains("not seen"), "{found}");
-    knob.simulator.kill().unwrap();
+    knob.simulator.unplug().unwrap();
     std::thread::sleep(Duration::from_secs(1));
     let gone = ask();
     assert!(!gone.contains(&serial), "{gone}");

@@ -5,78 +5,24 @@
 
 use crate::figure::draw::canvas::{Align, At, Canvas, Pen};
 use crate::figure::draw::font;
+use crate::figure::draw::frame::{Extent, Frame};
+use crate::figure::draw::layer::{self, stroke, symbol};
 use crate::figure::draw::ticks::{self, Ticks};
 use crate::figure::draw::{DrawError, Size};
 use crate::figure::palette::{self, FINE_GRID, GRID, INK, PAPER, QUIET_INK, Rgb};
-use crate::figure::{
-    Anchor, Axis, Dash, Direction, Figure, Heat, Layer, Line, Mark, Panel, Points, Scale, Shape, Tick,
-};
+use crate::figure::{Axis, Direction, Figure, Heat, Layer, Line, Mark, Panel, Points, Scale, Tick};
 use plotters_backend::DrawingBackend;
 
 const MARGIN: f64 = 26.0;
 const TITLE: f64 = 33.0;
 const PANEL_TITLE: f64 = 25.0;
 const WORDS: f64 = 22.0;
-const SMALL: f64 = 20.0;
+pub(super) const SMALL: f64 = 20.0;
 const LINE: f64 = 28.0;
 const GAP: f64 = 26.0;
 /// Length of a stroke beside its name in a legend.
 const SAMPLE: f64 = 34.0;
 const BAR: f64 = 20.0;
-
-/// Values to pixels.
-struct Frame {
-    x: Extent,
-    y: Extent,
-}
-
-/// One axis: values and the pixels they fall on.
-struct Extent {
-    low: f64,
-    high: f64,
-    from: f64,
-    to: f64,
-    log: bool,
-}
-
-impl Extent {
-    fn at(&self, value: f64) -> f64 {
-        let unit = if self.log {
-            (value.max(1e-300) / self.low).ln() / (self.high / self.low).ln()
-        } else {
-            (value - self.low) / (self.high - self.low)
-        };
-        // Far outside is as good as just outside, and keeps pixels countable.
-        self.from + unit.clamp(-1e3, 1e3) * (self.to - self.from)
-    }
-
-    fn holds(&self, value: f64) -> bool {
-        let slack = 1e-9 * (self.high - self.low).abs();
-        (self.low - slack..=self.high + slack).contains(&value)
-    }
-}
-
-impl Frame {
-    fn at(&self, [x, y]: [f64; 2]) -> At {
-        (self.x.at(x), self.y.at(y))
-    }
-
-    fn left(&self) -> f64 {
-        self.x.from
-    }
-
-    fn right(&self) -> f64 {
-        self.x.to
-    }
-
-    fn top(&self) -> f64 {
-        self.y.to
-    }
-
-    fn bottom(&self) -> f64 {
-        self.y.from
-    }
-}
 
 /// Draws the whole figure.
 pub fn draw<B: DrawingBackend>(canvas: &mut Canvas<B>, figure: &Figure, size: Size) -> Result<(), DrawError> {
@@ -269,7 +215,7 @@ fn legend(panel: &Panel) -> Vec<(&str, Sample<'_>)> {
     entries
 }
 
-const SPAN_OPACITY: f64 = 0.18;
+pub(super) const SPAN_OPACITY: f64 = 0.18;
 
 fn draw_panel<B: DrawingBackend>(
     canvas: &mut Canvas<B>,
@@ -327,7 +273,7 @@ fn draw_panel<B: DrawingBackend>(
     let y_ticks = ticks::of(&panel.y, frame.y.low, frame.y.high, ((tall / 48.0) as usize).clamp(2, 12));
     draw_grid(canvas, panel, &frame, &x_ticks, &y_ticks)?;
     for layer in &panel.layers {
-        draw_layer(canvas, layer, &frame)?;
+        layer::draw(canvas, layer, &frame)?;
     }
     let base = |row: usize| flags_top + (row as f64 + 0.78) * LINE;
     for &(mark, row, _) in &flags {
@@ -563,278 +509,9 @@ fn upright<B: DrawingBackend>(
     canvas.text(place, text, size, INK, Align::Centre, true)
 }
 
-fn draw_layer<B: DrawingBackend>(
-    canvas: &mut Canvas<B>,
-    layer: &Layer,
-    frame: &Frame,
-) -> Result<(), DrawError> {
-    match layer {
-        Layer::Line(line) => {
-            let pen = Pen { colour: line.colour.rgb(), width: line.width };
-            for piece in &line.pieces {
-                let points: Vec<At> = piece.iter().map(|&point| frame.at(point)).collect();
-                for visible in clip_line(&points, frame) {
-                    stroke(canvas, &visible, line.dash, pen)?;
-                }
-            }
-        }
-        Layer::Points(points) => {
-            for &[x, y] in &points.points {
-                if frame.x.holds(x) && frame.y.holds(y) {
-                    symbol(canvas, frame.at([x, y]), points.shape, points.size, points.colour.rgb())?;
-                }
-            }
-        }
-        Layer::Polygon(polygon) => {
-            let corners: Vec<At> = polygon.corners.iter().map(|&point| frame.at(point)).collect();
-            let corners = clip_polygon(corners, frame);
-            if let Some(fill) = polygon.fill {
-                canvas.fill(&corners, fill.rgb(), polygon.opacity)?;
-            }
-            if let (Some(colour), Some(&first)) = (polygon.stroke, corners.first()) {
-                let closed: Vec<At> = corners.iter().copied().chain([first]).collect();
-                canvas.line(&closed, Pen { colour: colour.rgb(), width: 1.5 })?;
-            }
-        }
-        Layer::Heat(heat) => draw_heat(canvas, heat, frame)?,
-        Layer::Mark(mark) => {
-            let pen = Pen { colour: mark.colour.rgb(), width: 1.8 };
-            match mark.of {
-                Direction::X if frame.x.holds(mark.at) => {
-                    let x = frame.x.at(mark.at);
-                    stroke(canvas, &[(x, frame.top()), (x, frame.bottom())], mark.dash, pen)?;
-                }
-                Direction::Y if frame.y.holds(mark.at) => {
-                    let y = frame.y.at(mark.at);
-                    stroke(canvas, &[(frame.left(), y), (frame.right(), y)], mark.dash, pen)?;
-                }
-                _ => {}
-            }
-        }
-        Layer::Span(span) => {
-            let (a, b) = (span.from.min(span.to), span.from.max(span.to));
-            let (from, to) = match span.of {
-                Direction::X => {
-                    let (a, b) = (a.max(frame.x.low), b.min(frame.x.high));
-                    ((frame.x.at(a), frame.top()), (frame.x.at(b), frame.bottom()))
-                }
-                Direction::Y => {
-                    let (a, b) = (a.max(frame.y.low), b.min(frame.y.high));
-                    ((frame.left(), frame.y.at(b)), (frame.right(), frame.y.at(a)))
-                }
-            };
-            if to.0 > from.0 && to.1 > from.1 {
-                canvas.rect(from, to, span.colour.rgb(), SPAN_OPACITY)?;
-            }
-        }
-        Layer::Text(text) => {
-            let (x, y) = frame.at(text.at);
-            let width = font::width(&text.text, SMALL);
-            let half = 0.5 * font::CAPITAL * SMALL;
-            let (start, base) = match text.anchor {
-                Anchor::Right => (x + 9.0, y + half),
-                Anchor::Left => (x - 9.0 - width, y + half),
-                Anchor::Above => (x - 0.5 * width, y - 10.0),
-                Anchor::Below => (x - 0.5 * width, y + 10.0 + 2.0 * half),
-                Anchor::Centre => (x - 0.5 * width, y + half),
-            };
-            let start = start.min(frame.right() - width).max(frame.left() + 4.0);
-            canvas.text((start, base), &text.text, SMALL, text.colour.rgb(), Align::Left, false)?;
-        }
-    }
-    Ok(())
-}
-
-fn draw_heat<B: DrawingBackend>(canvas: &mut Canvas<B>, heat: &Heat, frame: &Frame) -> Result<(), DrawError> {
-    if heat.columns == 0 || heat.rows == 0 || heat.levels.len() != heat.columns * heat.rows {
-        return Err(DrawError::Backend(format!(
-            "{} x {} levels wanted, {} given",
-            heat.columns,
-            heat.rows,
-            heat.levels.len()
-        )));
-    }
-    let (left, right) = (frame.x.at(heat.x[0]).max(frame.left()), frame.x.at(heat.x[1]).min(frame.right()));
-    let (top, bottom) = (frame.y.at(heat.y[1]).max(frame.top()), frame.y.at(heat.y[0]).min(frame.bottom()));
-    if right <= left || bottom <= top {
-        return Ok(());
-    }
-    let back = |extent: &Extent, pixel: f64| {
-        let unit = (pixel - extent.from) / (extent.to - extent.from);
-        if extent.log {
-            extent.low * (extent.high / extent.low).powf(unit)
-        } else {
-            extent.low + unit * (extent.high - extent.low)
-        }
-    };
-    let cell = |value: f64, edges: [f64; 2], count: usize| {
-        let unit = (value - edges[0]) / (edges[1] - edges[0]);
-        (unit * count as f64 - 0.5).clamp(0.0, (count - 1) as f64)
-    };
-    canvas.picture((left, top), (right, bottom), |unit_x, unit_y| {
-        let column =
-            cell(back(&frame.x, left + unit_x * (right - left)), heat.x, heat.columns).round() as usize;
-        let row = cell(back(&frame.y, top + unit_y * (bottom - top)), heat.y, heat.rows);
-        let level = |row: usize| f64::from(heat.levels[column * heat.rows + row.min(heat.rows - 1)]);
-        let (below, part) = (row as usize, row.fract());
-        let level = level(below) + part * (level(below + 1) - level(below));
-        palette::heat((level - heat.range[0]) / (heat.range[1] - heat.range[0]))
-    })
-}
-
-/// A line in its strokes.
-fn stroke<B: DrawingBackend>(
-    canvas: &mut Canvas<B>,
-    points: &[At],
-    dash: Dash,
-    pen: Pen,
-) -> Result<(), DrawError> {
-    let (on, off) = match dash {
-        Dash::Solid => return canvas.line(points, pen),
-        Dash::Dashed => (10.0, 7.0),
-        Dash::Dotted => (2.5, 5.5),
-    };
-    let (mut drawn, mut left) = (true, on);
-    let mut part: Vec<At> = points.first().copied().into_iter().collect();
-    for pair in points.windows(2) {
-        let [a, b] = [pair[0], pair[1]];
-        let length = (b.0 - a.0).hypot(b.1 - a.1);
-        let mut done = 0.0;
-        while length - done > left {
-            done += left;
-            let at = (a.0 + done / length * (b.0 - a.0), a.1 + done / length * (b.1 - a.1));
-            if drawn {
-                part.push(at);
-                canvas.line(&part, pen)?;
-            }
-            part = vec![at];
-            drawn = !drawn;
-            left = if drawn { on } else { off };
-        }
-        left -= length - done;
-        if drawn {
-            part.push(b);
-        }
-    }
-    if drawn { canvas.line(&part, pen) } else { Ok(()) }
-}
-
-fn symbol<B: DrawingBackend>(
-    canvas: &mut Canvas<B>,
-    (x, y): At,
-    shape: Shape,
-    size: f64,
-    colour: Rgb,
-) -> Result<(), DrawError> {
-    let pen = Pen { colour, width: 2.0 };
-    match shape {
-        Shape::Disc => canvas.disc((x, y), size, colour),
-        Shape::Ring => {
-            canvas.disc((x, y), size, colour)?;
-            canvas.disc((x, y), size - 2.0, PAPER)
-        }
-        Shape::Cross => {
-            canvas.line(&[(x - size, y - size), (x + size, y + size)], pen)?;
-            canvas.line(&[(x - size, y + size), (x + size, y - size)], pen)
-        }
-        Shape::TriangleUp => {
-            let size = 1.2 * size;
-            canvas.fill(&[(x, y - size), (x + size, y + 0.8 * size), (x - size, y + 0.8 * size)], colour, 1.0)
-        }
-        Shape::TriangleDown => {
-            let size = 1.2 * size;
-            canvas.fill(&[(x, y + size), (x + size, y - 0.8 * size), (x - size, y - 0.8 * size)], colour, 1.0)
-        }
-        Shape::Diamond => {
-            let size = 1.3 * size;
-            canvas.fill(&[(x, y - size), (x + size, y), (x, y + size), (x - size, y)], colour, 1.0)
-        }
-    }
-}
-
-/// The parts of a line inside the axes (Liang and Barsky, 1984).
-fn clip_line(points: &[At], frame: &Frame) -> Vec<Vec<At>> {
-    let (x0, x1, y0, y1) = (frame.left(), frame.right(), frame.top(), frame.bottom());
-    let mut parts: Vec<Vec<At>> = Vec::new();
-    let mut open = false;
-    for pair in points.windows(2) {
-        let (a, b) = (pair[0], pair[1]);
-        let (dx, dy) = (b.0 - a.0, b.1 - a.1);
-        let (mut from, mut to) = (0.0_f64, 1.0_f64);
-        for (step, room) in [(-dx, a.0 - x0), (dx, x1 - a.0), (-dy, a.1 - y0), (dy, y1 - a.1)] {
-            if step == 0.0 {
-                if room < 0.0 {
-                    to = -1.0;
-                }
-            } else if step < 0.0 {
-                from = from.max(room / step);
-            } else {
-                to = to.min(room / step);
-            }
-        }
-        if from > to {
-            open = false;
-            continue;
-        }
-        let at = |part: f64| (a.0 + part * dx, a.1 + part * dy);
-        match parts.last_mut() {
-            Some(part) if open && from == 0.0 => part.push(at(to)),
-            _ => parts.push(vec![at(from), at(to)]),
-        }
-        open = to == 1.0;
-    }
-    parts
-}
-
-/// The part of a shape inside the axes (Sutherland and Hodgman, 1974).
-fn clip_polygon(mut corners: Vec<At>, frame: &Frame) -> Vec<At> {
-    let (x0, x1, y0, y1) = (frame.left(), frame.right(), frame.top(), frame.bottom());
-    let inside: [&dyn Fn(At) -> f64; 4] = [&|p| p.0 - x0, &|p| x1 - p.0, &|p| p.1 - y0, &|p| y1 - p.1];
-    for inside in inside {
-        let mut kept = Vec::with_capacity(corners.len() + 4);
-        for (index, &b) in corners.iter().enumerate() {
-            let a = corners[(index + corners.len() - 1) % corners.len()];
-            let (da, db) = (inside(a), inside(b));
-            if (da < 0.0) != (db < 0.0) {
-                let part = da / (da - db);
-                kept.push((a.0 + part * (b.0 - a.0), a.1 + part * (b.1 - a.1)));
-            }
-            if db >= 0.0 {
-                kept.push(b);
-            }
-        }
-        corners = kept;
-    }
-    corners
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn frame() -> Frame {
-        let extent = |from, to| Extent { low: 0.0, high: 10.0, from, to, log: false };
-        Frame { x: extent(0.0, 100.0), y: extent(100.0, 0.0) }
-    }
-
-    #[test]
-    fn lines_are_cut_at_the_axes() {
-        let parts = clip_line(&[(-50.0, 50.0), (150.0, 50.0), (150.0, -20.0), (50.0, 20.0)], &frame());
-        assert_eq!(parts.len(), 2);
-        assert_eq!(parts[0], [(0.0, 50.0), (100.0, 50.0)]);
-        assert_eq!(parts[1].last(), Some(&(50.0, 20.0)));
-        assert!(parts.iter().flatten().all(|p| (0.0..=100.0).contains(&p.0) && (0.0..=100.0).contains(&p.1)));
-        assert!(clip_line(&[(-5.0, 0.0), (-5.0, 100.0)], &frame()).is_empty());
-    }
-
-    #[test]
-    fn shapes_are_cut_at_the_axes() {
-        let cut = clip_polygon(vec![(-50.0, -50.0), (50.0, -50.0), (50.0, 50.0), (-50.0, 50.0)], &frame());
-        let mut corners: Vec<(i32, i32)> = cut.iter().map(|p| (p.0 as i32, p.1 as i32)).collect();
-        corners.sort_unstable();
-        corners.dedup();
-        assert_eq!(corners, [(0, 0), (0, 50), (50, 0), (50, 50)]);
-    }
 
     #[test]
     fn words_are_wrapped_at_the_room() {

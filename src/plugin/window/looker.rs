@@ -12,7 +12,6 @@ use crate::editor::listener::{Heard, Listener, WINDOW};
 use crate::editor::snapshot::{Device, Knob};
 use crate::editor::snapshot::{Level, Scope, Snapshot, Status, Track};
 use crate::haptics::{FeelDesign, FeelTable, Limits, Requirement};
-use crate::instrument::watch::Watch;
 use crate::instrument::{Model, Settings, felt};
 use crate::plugin::instrument;
 use crate::plugin::instrument::{Placed, Stage};
@@ -109,7 +108,7 @@ impl Looker {
         snapshot.latency_ms = (1e3 * f64::from(inside.latency_samples) / inside.host_rate_hz) as f32;
         snapshot.history = Track { step_s: STEP_S, kpa: self.history.iter().copied().collect() };
         snapshot.scope = Scope {
-            rate_hz: Watch::rate_hz(inside.voice_rate_hz) as f32,
+            rate_hz: inside.moments_hz as f32,
             mouthpiece_kpa: inside.moments.iter().map(|moment| moment.mouthpiece_kpa).collect(),
             opening: inside.moments.iter().map(|moment| moment.opening).collect(),
             flow_cm3s: inside.moments.iter().map(|moment| moment.flow_cm3s).collect(),
