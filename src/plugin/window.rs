@@ -7,6 +7,8 @@
 
 mod hands;
 mod looker;
+#[cfg(test)]
+mod pinned;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
