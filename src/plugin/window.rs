@@ -105,7 +105,9 @@ impl Audio {
         }
         let clarinet = bench.clarinet();
         let watch = clarinet.watch();
-        let Some((number, moments)) = watch.picture().filter(|&(number, _)| number != self.shown) else { return };
+        let Some((number, moments)) = watch.picture().filter(|&(number, _)| number != self.shown) else {
+            return;
+        };
         self.shown = number;
         let inside = self.inside.input_buffer_mut();
         inside.now = clarinet.now();

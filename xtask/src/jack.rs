@@ -40,7 +40,7 @@ pub fn test() -> Result<()> {
     let server = Server::start()?;
     let mut command = machine::cargo();
     command
-        .args(["test", "-p", "xtask", "--test", "standalone", "--", "--ignored"])
+        .args(["test", "-p", "xtask", "--test", "standalone", "--", "--ignored", "it_plays_to_jack"])
         .env("CHALUMEAU_STANDALONE", standalone);
     machine::run(server.for_clients(&mut command))
 }

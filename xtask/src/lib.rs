@@ -3,6 +3,8 @@
 pub mod bundle;
 pub mod ci;
 pub mod demo;
+#[cfg(target_os = "linux")]
+pub mod display;
 pub mod firmware;
 pub mod generated;
 pub mod host;
@@ -11,8 +13,12 @@ pub mod machine;
 pub mod midi;
 pub mod picture;
 pub mod prepared;
+#[cfg(target_os = "linux")]
+pub mod screen;
 pub mod simulator;
 pub mod touch_demo;
+#[cfg(target_os = "linux")]
+pub mod window;
 pub mod wire_vectors;
 
 /// One chore.

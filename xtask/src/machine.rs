@@ -143,6 +143,31 @@ pub const XCB: Package = Package {
     purpose: "linking the VST3 tests",
 };
 
+/// A display without a screen.
+pub const XVFB: Package =
+    Package { name: "xvfb", present: || works("Xvfb", &["-version"]), purpose: "the tests of the window" };
+/// OpenGL without a graphics card.
+pub const MESA: Package = Package {
+    name: "libgl1-mesa-dri",
+    present: || loads("libEGL_mesa.so.0") || loads("libGLX_mesa.so.0"),
+    purpose: "drawing the window",
+};
+/// The window asks for it at run time.
+pub const EGL: Package =
+    Package { name: "libegl1", present: || loads("libEGL.so.1"), purpose: "drawing the window" };
+/// The window reads keys through it, at run time.
+pub const XKB: Package = Package {
+    name: "libxkbcommon-x11-0",
+    present: || loads("libxkbcommon-x11.so.0"),
+    purpose: "keys in the window",
+};
+/// The window speaks to the display through it, at run time.
+pub const X11_XCB: Package =
+    Package { name: "libx11-xcb1", present: || loads("libX11-xcb.so.1"), purpose: "opening the window" };
+/// The window loads it with Xlib.
+pub const XCURSOR: Package =
+    Package { name: "libxcursor1", present: || loads("libXcursor.so.1"), purpose: "the mouse in the window" };
+
 /// Installs what is missing with apt-get, or names it.
 pub fn provide(packages: &[&Package]) -> Result<()> {
     let missing: Vec<_> = packages.iter().filter(|package| !(package.present)()).collect();
