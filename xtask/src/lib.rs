@@ -50,6 +50,13 @@ pub const COMMANDS: &[Command] = &[
         run: bundle::run,
         checks: false,
     },
+    #[cfg(target_os = "linux")]
+    Command {
+        name: "screenshots",
+        about: "pictures of plugin and standalone in their windows, every view, into target/screenshots",
+        run: window::screenshots,
+        checks: false,
+    },
     Command {
         name: "simulator",
         about: "build `chalumeau knob-sim` into target/simulator, where demo and tests look for it",

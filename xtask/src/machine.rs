@@ -24,6 +24,9 @@ pub fn target() -> PathBuf {
     }
 }
 
+/// Every feature of the program itself; what only tests need, a renderer, is not among them.
+pub const PROGRAM: &str = "--features simulator,standalone,midi-jack";
+
 /// The cargo that runs this.
 pub fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
@@ -144,14 +147,14 @@ pub const XCB: Package = Package {
 };
 
 /// A display without a screen.
-pub const XVFB: Package =
-    Package { name: "xvfb", present: || works("Xvfb", &["-version"]), purpose: "the tests of the window" };
-/// OpenGL without a graphics card.
-pub const MESA: Package = Package {
-    name: "libgl1-mesa-dri",
-    present: || loads("libEGL_mesa.so.0") || loads("libGLX_mesa.so.0"),
-    purpose: "drawing the window",
+pub const XVFB: Package = Package {
+    name: "xvfb",
+    present: || works("sh", &["-c", "command -v Xvfb"]),
+    purpose: "the tests of the window",
 };
+/// OpenGL without a graphics card.
+pub const MESA: Package =
+    Package { name: "libglx-mesa0", present: || loads("libGLX_mesa.so.0"), purpose: "drawing the window" };
 /// The window asks for it at run time.
 pub const EGL: Package =
     Package { name: "libegl1", present: || loads("libEGL.so.1"), purpose: "drawing the window" };
@@ -164,10 +167,6 @@ pub const XKB: Package = Package {
 /// The window speaks to the display through it, at run time.
 pub const X11_XCB: Package =
     Package { name: "libx11-xcb1", present: || loads("libX11-xcb.so.1"), purpose: "opening the window" };
-/// The window loads it with Xlib.
-pub const XCURSOR: Package =
-    Package { name: "libxcursor1", present: || loads("libXcursor.so.1"), purpose: "the mouse in the window" };
-
 /// Installs what is missing with apt-get, or names it.
 pub fn provide(packages: &[&Package]) -> Result<()> {
     let missing: Vec<_> = packages.iter().filter(|package| !(package.present)()).collect();
