@@ -194,13 +194,9 @@ fn history(ui: &mut Ui, snapshot: &Snapshot) {
                 egui_plot::HLine::new(name, f64::from(at)).color(colour).width(1.0).id(("mark", index));
             plot.hline(line.style(egui_plot::LineStyle::dashed_loose()).allow_hover(false));
             if f64::from(at) < full {
-                chart::word(
-                    plot,
-                    [-seconds, f64::from(at)],
-                    Align2::LEFT_BOTTOM,
-                    &format!(" {name}"),
-                    colour,
-                );
+                // "speaks" and "beats" are neighbours: one below its line, one above.
+                let anchor = if name == "speaks" { Align2::LEFT_TOP } else { Align2::LEFT_BOTTOM };
+                chart::word(plot, [-seconds, f64::from(at)], anchor, &format!(" {name}"), colour);
             }
         }
         let points = track.kpa.iter().enumerate();
@@ -225,8 +221,10 @@ fn meter_of(ui: &mut Ui, source: &Source, range: Option<(f32, f32)>) {
     let at = pos2(rect.left() + 15.0, rect.top() + 8.0);
     painter.text(at, Align2::LEFT_CENTER, &source.name, theme::body(), ink);
     let value = chart::share(source.value);
-    let state = if source.is_seen { format!("{:.0} %", 100.0 * value) } else { "not seen".into() };
-    painter.text(pos2(rect.right(), rect.top() + 8.0), Align2::RIGHT_CENTER, &state, theme::small(), ink);
+    let state = if source.is_seen { format!("{:.0} %", 100.0 * value) } else { "not seen".to_owned() };
+    // Beside the longest name there is no room for words in a narrow column.
+    let short = if source.is_seen || rect.width() > 190.0 { &*state } else { "\u{2013}" };
+    painter.text(pos2(rect.right(), rect.top() + 8.0), Align2::RIGHT_CENTER, short, theme::small(), ink);
     if source.is_seen {
         let bar =
             Rect::from_min_max(pos2(rect.left(), rect.bottom() - 9.0), rect.right_bottom() - vec2(0.0, 4.0));

@@ -38,7 +38,7 @@ impl InstrumentView {
         let height = ui.available_height();
         panel(c).show(ui, |ui| {
             ui.set_width(ui.available_width());
-            ui.set_height((0.34 * height - 24.0).max(136.0));
+            ui.set_height((0.34 * height - 24.0).max(168.0));
             egui::ScrollArea::vertical().id_salt("instruments").auto_shrink([false, false]).show(ui, |ui| {
                 self.list(ui, hands, snapshot, actions);
             });
@@ -47,7 +47,7 @@ impl InstrumentView {
             ui.set_width(ui.available_width());
             ui.set_height(ui.available_height());
             let all = ui.available_height();
-            let drawn = if all < 300.0 { 0.0 } else { (0.32 * all).min(180.0) };
+            let drawn = if all < 300.0 { 0.0 } else { (0.40 * all).min(200.0) };
             egui::ScrollArea::vertical()
                 .id_salt("facts")
                 .max_height(all - drawn)

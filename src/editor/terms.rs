@@ -131,8 +131,16 @@ pub const TERMS: &[Term] = &[
         "The knob never makes more. 100 is gentle, 250 the most that can be asked for. Takes effect with the next arming; less at once.",
     ),
     act("takeov", "Takes the knob from the instance that has it", "The other window lets go, disarmed."),
-    act("rest", "The knob is at rest where it stands", "Calibrates no breath."),
-    act("blow", "The knob stands at full breath", "Calibrates full breath: the way from rest to here."),
+    act(
+        "rest",
+        "The knob is at rest where it stands",
+        "Calibrates no breath. Let go of the knob, then press.",
+    ),
+    act(
+        "blow",
+        "The knob stands at full breath",
+        "Calibrates full breath: the way from rest to here. Turn it as far as you want to blow, then press.",
+    ),
     term(
         "law",
         "Law of the torque",
