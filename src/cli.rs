@@ -151,6 +151,15 @@ impl Failure {
     }
 }
 
+/// Whether these words, without the program's name, are a command; nothing is done. So documents are held to what there is.
+pub fn understands<'a>(words: impl IntoIterator<Item = &'a str>) -> Result<(), String> {
+    match Cli::try_parse_from(std::iter::once("chalumeau").chain(words)) {
+        Err(error) if error.use_stderr() => Err(error.to_string()),
+        // Help and version are answers too.
+        _ => Ok(()),
+    }
+}
+
 /// Reads the arguments and does what they say.
 pub fn main() -> ExitCode {
     let done = match Cli::parse().command {
