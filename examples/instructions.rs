@@ -1,15 +1,18 @@
 //! Holds one note and prints a checksum of its samples, nothing else: the program to count instructions of.
 //!
-//! `cargo run --release --no-default-features --example instructions -- SECONDS [RATE] [avx2|plain] [BEND]`
+//! `cargo run --release --no-default-features --example instructions -- SECONDS [RATE] [avx2|plain] [BEND] [watched]`
 //!
-//! Written C4 at breath 0.5 of full scale; `plain` keeps off AVX2, a bend is in cents. What a sample costs is the
+//! Written C4 at breath 0.5 of full scale; `plain` keeps off AVX2, a bend is in cents, and `watched` takes pictures of
+//! the inside and copies pictures and sound away, as while the plugin's window is open. What a sample costs is the
 //! difference of two run lengths, so that building the instrument cancels; `benches/peers/run.sh` does that under
 //! callgrind and by the thread's CPU time, which is printed where Linux tells it.
 
 use std::error::Error;
+use std::hint::black_box;
 
 use chalumeau::event::Event;
 use chalumeau::instrument::Clarinet;
+use chalumeau::instrument::watch::{MOMENTS, Moment};
 use chalumeau::units::WrittenNote;
 
 /// Samples per call, as a host at a common setting would ask for.
@@ -24,13 +27,35 @@ fn thread_cpu_ns() -> Option<f64> {
     text.split_whitespace().next()?.parse().ok()
 }
 
+/// What a screen is told of a block.
+struct Screen {
+    heard: [f32; BLOCK],
+    moments: [Moment; MOMENTS],
+    /// Number of the last picture.
+    shown: u64,
+}
+
+impl Screen {
+    fn see(&mut self, clarinet: &Clarinet, block: &[f32; BLOCK]) {
+        self.heard.copy_from_slice(black_box(block));
+        let picture = clarinet.watch().picture().filter(|&(number, _)| number != self.shown);
+        if let Some((number, moments)) = picture {
+            self.shown = number;
+            self.moments.copy_from_slice(black_box(moments));
+        }
+    }
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
-    let seconds: f64 =
-        arguments.next().ok_or("usage: instructions SECONDS [RATE] [avx2|plain] [BEND]")?.parse()?;
+    let seconds: f64 = arguments
+        .next()
+        .ok_or("usage: instructions SECONDS [RATE] [avx2|plain] [BEND] [watched]")?
+        .parse()?;
     let rate_hz: f64 = arguments.next().as_deref().unwrap_or("48000").parse()?;
     let plain = arguments.next().is_some_and(|word| word == "plain");
     let bend_cents: f32 = arguments.next().as_deref().unwrap_or("0").parse()?;
+    let watched = arguments.next().is_some_and(|word| word == "watched");
     let blocks = (seconds * rate_hz / BLOCK as f64).round() as usize;
 
     let mut clarinet = Clarinet::built_in(rate_hz)?;
@@ -41,12 +66,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     clarinet.apply(Event::Bend { cents: bend_cents });
     clarinet.apply(Event::Breath(0.5));
     clarinet.apply(Event::NoteOn { note, velocity: 0.8 });
+    clarinet.set_watched(watched);
+    let mut screen = Screen { heard: [0.0; BLOCK], moments: [Moment::default(); MOMENTS], shown: 0 };
 
     let mut block = [0.0; BLOCK];
     let mut checksum = 0_u32;
     let start = thread_cpu_ns();
     for _ in 0..blocks {
         clarinet.render(&mut block);
+        if watched {
+            screen.see(&clarinet, &block);
+        }
         checksum = block.iter().fold(checksum, |sum, sample| sum.rotate_left(5) ^ sample.to_bits());
     }
     let end = thread_cpu_ns();

@@ -1,7 +1,7 @@
 //! Moments inside the instrument, for a screen. Nothing is kept while nobody looks.
 //!
 //! A picture is a run of moments that holds at least one period of the lowest note. Between two pictures the voice goes
-//! unprobed for twice as long as one takes: a screen needs no more, and the audio thread hardly notices.
+//! unprobed for three times as long as one takes: a screen needs no more, and the audio thread hardly notices.
 
 use crate::instrument::voice::{Probe, TICK};
 use crate::units::SoundingNote;
@@ -11,7 +11,7 @@ pub const MOMENTS: usize = 512;
 /// Periods of the lowest note in a picture, at least.
 const PERIODS: f64 = 1.5;
 /// So much longer than a picture is the pause after it.
-const PAUSE: usize = 2;
+const PAUSE: usize = 3;
 
 /// One moment inside.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
