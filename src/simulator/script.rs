@@ -205,14 +205,19 @@ impl Script {
         if rows.is_empty() { Err(ScriptError::Empty) } else { Ok(Self { rows, is_force, is_loop: false }) }
     }
 
-    /// The same again and again. A hand goes back to where it began first: a jump would trip the knob's over-speed limit.
-    pub fn repeated(mut self) -> Self {
-        self.is_loop = true;
+    /// And back to where it began: before it is repeated, for a jump would trip the knob's over-speed limit.
+    pub fn returning(mut self) -> Self {
         let (first, last) = (self.rows[0], self.rows[self.rows.len() - 1]);
         let way_deg = (last.value - first.value).abs();
-        if !self.is_force && way_deg > 0.0 && self.rows.len() > 1 {
+        if !self.is_force && way_deg > 0.0 {
             self.rows.push(Row { t_s: last.t_s + way_deg / REACH_DEG_PER_S, ..first });
         }
+        self
+    }
+
+    /// The same again and again.
+    pub fn repeated(mut self) -> Self {
+        self.is_loop = true;
         self
     }
 
@@ -303,8 +308,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_repeated_comes_back_without_a_jump() {
-        let script = Script::parse_crescendo("60:220:4").unwrap().repeated();
+    fn a_crescendo_is_repeated_without_a_jump() {
+        let script = Script::parse_crescendo("60:220:4").unwrap().returning().repeated();
         let deg = |t: f64| match script.at(t).aim {
             Aim::Angle(deg) => deg,
             Aim::Force(_) => unreachable!(),
