@@ -5,6 +5,7 @@
 //! their sample positions alone, not on the host's blocks, and is what the offline renderer writes; except that another
 //! instrument, chosen while somebody listens, comes when it is made.
 
+mod breaths;
 pub mod instrument;
 #[cfg(feature = "devices")]
 mod knob;
@@ -27,11 +28,10 @@ pub use params::{SCHEMA, TuningChoice, TuningParams};
 use crate::event::{Event, Timed};
 use crate::identity;
 use crate::instrument::Settings;
+use breaths::{Breaths, Way};
 use instrument::{Bench, Workshop};
-use nice_plug_egui::EguiEditor;
 use reed_sources::ReedSources;
 use translate::Translator;
-pub use window::App;
 use window::Window;
 
 /// The plugin: parameters, and from the first `activate` on a clarinet.
@@ -48,6 +48,8 @@ pub struct Chalumeau {
     #[cfg(feature = "devices")]
     knob: Option<(knob::Knob, knob::Audio)>,
     window: Option<(Window, window::Audio)>,
+    /// Where breath has come from.
+    breaths: Breaths,
     /// Whether a file is rendered: nobody holds a knob then.
     offline: bool,
     /// Where *Breath* was last; at rest until it moves.
@@ -70,7 +72,7 @@ impl Plugin for Chalumeau {
     /// Some hosts send every MIDI controller of every channel (2080) at once; beyond the capacity the wrapper allocates.
     const INPUT_EVENT_CAPACITY: usize = 4096;
 
-    type Editor = EguiEditor<App>;
+    type Editor = window::Frame;
     type SysExMessage = ();
     type BackgroundTask = ();
 
@@ -80,7 +82,7 @@ impl Plugin for Chalumeau {
 
     fn editor(&mut self, _: AsyncExecutor<Self>) -> Option<Self::Editor> {
         self.open_shop();
-        self.window.as_mut()?.0.editor()
+        self.window.as_mut()?.0.frame()
     }
 
     fn filter_state(state: &mut PluginState) {
@@ -119,6 +121,7 @@ impl Plugin for Chalumeau {
     fn reset(&mut self) {
         self.translator.reset();
         self.reed_sources.reset();
+        self.breaths = Breaths::default();
         #[cfg(feature = "devices")]
         if let Some((_, audio)) = &mut self.knob {
             audio.reset();
@@ -155,13 +158,20 @@ impl Plugin for Chalumeau {
         let translator = &mut self.translator;
         let bent = translator.bend_range(self.params.instrument.bend_range.value());
         let reed_sources = &mut self.reed_sources;
+        let breaths = &mut self.breaths;
+        if let Some(Timed { event: Event::Breath(unit), .. }) = moved[1] {
+            breaths.blow(Way::Parameter, unit);
+        }
         let sources = [self.params.knob.h_source.value(), self.params.knob.k_source.value()];
         let played = std::iter::from_fn(|| context.next_event()).flat_map(|event| {
             if reed_sources.take(&event, sources) {
                 let at = event.timing() as usize;
                 [None, reed_sources.changed(sources).map(|event| Timed { at, event })]
             } else {
-                translator.translate(event, api)
+                let events = translator.translate(event, api);
+                let blew = events.iter().flatten().any(|timed| matches!(timed.event, Event::Breath(_)));
+                breaths.hear(&event, blew);
+                events
             }
             .into_iter()
             .flatten()
@@ -176,6 +186,7 @@ impl Plugin for Chalumeau {
             audio.render(bench, &settings, events, stage, out);
             audio.reed(self.reed_sources.factors(sources));
             for &(at, breath) in audio.sent() {
+                self.breaths.blow(Way::Knob, breath.unit());
                 let (coarse, fine) = breath.bytes();
                 for (cc, byte) in [(2, coarse), (34, fine)] {
                     let value = f32::from(byte) / 127.0;
@@ -193,7 +204,7 @@ impl Plugin for Chalumeau {
         bench.render_events(events, out);
 
         if let Some((_, window)) = &mut self.window {
-            window.show(bench, out);
+            window.show(bench, &self.breaths, out);
         }
         for copy in copies {
             copy.copy_from_slice(out);
@@ -215,15 +226,23 @@ impl Chalumeau {
         #[cfg(feature = "devices")]
         let (knob, _) =
             self.knob.get_or_insert_with(|| knob::Knob::start(params.clone(), instruments.clone()));
-        self.window.get_or_insert_with(|| {
-            Window::start(
-                params.clone(),
-                instruments.clone(),
-                #[cfg(feature = "devices")]
-                knob.shared().clone(),
-            )
-        });
+        let beside = || Beside {
+            params: params.clone(),
+            instruments: instruments.clone(),
+            #[cfg(feature = "devices")]
+            knob: knob.shared().clone(),
+        };
+        self.window.get_or_insert_with(|| Window::start(&beside()));
     }
+}
+
+/// What the threads beside audio share.
+#[derive(Clone)]
+struct Beside {
+    params: Arc<ChalumeauParams>,
+    instruments: Arc<instrument::Shared>,
+    #[cfg(feature = "devices")]
+    knob: Arc<knob::Shared>,
 }
 
 /// What the parameters that act by moving have done since the last block. Real-time safe.

@@ -46,6 +46,8 @@ pub struct Shared {
     feel: Mutex<Option<Arc<Feel>>>,
     /// A feel that is tried, whatever is played. Only window, desk and link lock it.
     test: Mutex<Option<message::Feel>>,
+    /// The user has chosen a device: what is remembered counts as new.
+    chosen: AtomicBool,
     /// How the link is. Only desk and window lock it.
     status: Mutex<Option<LinkStatus>>,
     stop: AtomicBool,
@@ -60,6 +62,7 @@ impl Shared {
             reed: [one(), one()],
             feel: Mutex::new(None),
             test: Mutex::default(),
+            chosen: AtomicBool::new(false),
             status: Mutex::default(),
             stop: AtomicBool::new(false),
         }
@@ -74,6 +77,11 @@ impl Shared {
         if let Ok(mut test) = self.test.lock() {
             *test = feel;
         }
+    }
+
+    /// The user has chosen a device of the list, even if it is of the kind that was chosen already.
+    pub fn choose_anew(&self) {
+        self.chosen.store(true, Ordering::Relaxed);
     }
 
     /// How the link was when the desk last looked.
@@ -109,9 +117,7 @@ impl Knob {
         // Without a thread there is no knob; the instrument plays all the same.
         (Self { shared, desk: desk.ok() }, audio)
     }
-}
 
-impl Knob {
     /// What the window asks and tells.
     pub fn shared(&self) -> &Arc<Shared> {
         &self.shared

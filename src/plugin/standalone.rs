@@ -1,4 +1,4 @@
-//! The plugin as a program of its own: JACK or the system's sound, MIDI in and out, no window yet.
+//! The plugin as a program of its own: its window, JACK or the system's sound, MIDI in and out.
 //!
 //! The framework opens one backend and, asked for *auto*, quietly ends up with one that makes no sound. Here each is
 //! tried by itself, and when none opens the user is told which ones, why, and what to do.
@@ -6,6 +6,8 @@
 mod log;
 
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, LazyLock};
 
 use clap::{Parser, ValueEnum};
 use nice_plug::prelude::nice_export_standalone_with_args;
@@ -16,6 +18,7 @@ use crate::bore::bundled::Bundled;
 use crate::bore::instrument_file::InstrumentFile;
 use crate::identity;
 use crate::instrument::prepare::A4_RANGE_HZ;
+use crate::plugin::window;
 
 const HELP: &str = "\
 Examples:
@@ -24,10 +27,11 @@ Examples:
   chalumeau-standalone --instrument bass --a4 442
   chalumeau-standalone --midi-input \"\"                    lists the MIDI inputs
   chalumeau-standalone --output-device \"\"                 lists the sound cards
-  chalumeau-standalone --backend dummy                    no sound: does it start?
+  chalumeau-standalone --no-window                        MIDI and a knob play it
+  chalumeau-standalone --backend dummy                    no sound: a look at the window
 
-It needs no display: there is no window yet, a MIDI keyboard or wind controller plays it. Breath is CC2 or CC11; until
-one of them moves, velocity makes it. Ctrl-C ends it.";
+A MIDI keyboard, a wind controller, a knob or the keys of the window play it. Breath is CC2 or CC11; until one of them
+moves, velocity makes it. Without a display it plays without a window. Closing the window ends it, and Ctrl-C.";
 
 /// Plays Chalumeau, a clarinet made of physics, without a DAW.
 #[derive(Parser, Debug)]
@@ -58,6 +62,9 @@ struct Args {
     /// Pitch of A4, 415..466 Hz.
     #[arg(long, value_name = "HZ", default_value = "440", value_parser = a4)]
     a4: f32,
+    /// Plays without a window.
+    #[arg(long)]
+    no_window: bool,
     /// JACK port that plays it.
     #[arg(long, value_name = "PORT")]
     connect_jack_midi_input: Option<String>,
@@ -185,6 +192,15 @@ pub fn main() -> ExitCode {
     let heard = log::listen();
     let (choice, file) = args.instrument.clone();
     begin_with(Beginning { choice, file, a4_hz: args.a4 });
+    if args.no_window {
+        window::no_window();
+    } else if lacks_display() {
+        eprintln!(
+            "chalumeau-standalone: no display (DISPLAY is not set): plays without a window; Ctrl-C ends it"
+        );
+        window::no_window();
+    }
+    IS_PROGRAM.store(true, Ordering::Relaxed);
     // A panic on a backend's thread would leave the program waiting for nothing.
     std::panic::set_hook(Box::new(|why| {
         eprintln!("chalumeau-standalone: {why}");
@@ -196,6 +212,10 @@ pub fn main() -> ExitCode {
         if nice_export_standalone_with_args::<Chalumeau, _>(args.words(backend)) {
             return ExitCode::SUCCESS;
         }
+        if window::found_no_display() {
+            // It played on without; who wanted a window has read why there was none.
+            return ExitCode::SUCCESS;
+        }
         let reason = heard.last_error().unwrap_or_else(|| "it does not say why".to_owned());
         if let Some(code) = listed(&reason) {
             return code;
@@ -204,6 +224,34 @@ pub fn main() -> ExitCode {
     }
     eprintln!("{}", complaint(&tried));
     ExitCode::FAILURE
+}
+
+/// This process is the program, and not a host that has loaded the plugin.
+static IS_PROGRAM: AtomicBool = AtomicBool::new(false);
+/// Ctrl-C came, or its like.
+static TOLD_TO_END: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
+
+/// Whether the program was told to end; the window asks.
+pub fn is_told_to_end() -> bool {
+    TOLD_TO_END.load(Ordering::Relaxed)
+}
+
+/// Listens for Ctrl-C beside the framework, which waits for the window alone once there is one. Called when it opens:
+/// what the framework does before would take the ear away.
+pub fn listen_for_the_end() {
+    #[cfg(unix)]
+    if IS_PROGRAM.load(Ordering::Relaxed) {
+        for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+            // Without it the window's own button ends the program.
+            let _ = signal_hook::flag::register(signal, TOLD_TO_END.clone());
+        }
+    }
+}
+
+/// Windows are X11's here.
+fn lacks_display() -> bool {
+    cfg!(all(unix, not(target_os = "macos")))
+        && std::env::var_os("DISPLAY").is_none_or(|name| name.is_empty())
 }
 
 /// The framework lists what there is when a name is not known to it. Asked with an empty name that is an answer, not

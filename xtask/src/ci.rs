@@ -8,9 +8,12 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 
 use crate::machine::{
-    self, ALSA, ARM_CXX, ARM_LIBRARY, CC, CXX, GL, GLIB, JACK, JACKD, PKG_CONFIG, Package, VENV, XCB,
+    self, ALSA, ARM_CXX, ARM_LIBRARY, CC, CXX, EGL, GL, GLIB, JACK, JACKD, MESA, PKG_CONFIG, PROGRAM,
+    Package, VENV, X11_XCB, XCB, XKB, XVFB,
 };
-use crate::{COMMANDS, bundle, firmware, jack, simulator};
+use crate::{COMMANDS, bundle, firmware, simulator};
+#[cfg(target_os = "linux")]
+use crate::{jack, window};
 
 /// DawDreamer's version is pinned: a new one may host differently.
 const DAWDREAMER_PACKAGES: &[&str] = &["dawdreamer==0.9.0", "numpy<3"];
@@ -31,7 +34,8 @@ const STEPS: &[Step] = &[
     ("clippy, xtask", || cargo("clippy -p xtask --all-targets -- -D warnings")),
     ("tests, core", || cargo("test --no-default-features --features cli --no-fail-fast")),
     ("tests, knob", knob),
-    ("tests, all features", || cargo("test --all-features --lib --bins --no-fail-fast")),
+    ("tests, program", || cargo(&format!("test {PROGRAM} --lib --bins --no-fail-fast"))),
+    ("editor", || cargo("test --no-default-features --features editor-tests --test editor --no-fail-fast")),
     ("documentation", documentation),
     ("generated files", generated),
     ("tests, firmware's crate", || cargo("test -p chalumeau-firmware")),
@@ -44,7 +48,9 @@ const STEPS: &[Step] = &[
     ("CLAP with allocation checks", clap_checked),
     ("standalone", standalone),
     ("CLAP with the simulated knob", || cargo("test -p xtask --test knob --no-fail-fast")),
-    // Elsewhere there is no JACK that a test could start.
+    // Elsewhere there is neither a JACK nor a display that a test could start.
+    #[cfg(target_os = "linux")]
+    ("window", window::test),
     #[cfg(target_os = "linux")]
     ("MIDI over JACK", jack::test),
     ("VST3 in vst3-host", || cargo("test -p xtask --test vst3 --no-fail-fast")),
@@ -101,7 +107,25 @@ fn cargo(words: &str) -> Result<()> {
 
 fn packages() -> Result<()> {
     let needed: &[&Package] = if cfg!(target_os = "linux") {
-        &[&CC, &CXX, &ARM_CXX, &ARM_LIBRARY, &PKG_CONFIG, &ALSA, &JACK, &JACKD, &XCB, &VENV, &GL, &GLIB]
+        &[
+            &CC,
+            &CXX,
+            &ARM_CXX,
+            &ARM_LIBRARY,
+            &PKG_CONFIG,
+            &ALSA,
+            &JACK,
+            &JACKD,
+            &XCB,
+            &VENV,
+            &GL,
+            &GLIB,
+            &XVFB,
+            &MESA,
+            &EGL,
+            &XKB,
+            &X11_XCB,
+        ]
     } else {
         &[]
     };
@@ -145,7 +169,7 @@ fn clap() -> Result<()> {
 
 /// The same tests on a debug build, where the framework aborts on any allocation while processing.
 fn clap_checked() -> Result<()> {
-    cargo("build --all-features --lib")?;
+    cargo(&format!("build {PROGRAM} --lib"))?;
     let library = format!("{}chalumeau{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     let library = machine::target().join("debug").join(library);
     machine::run(clap_tests(&["clap", "instrument", "knob"]).env("CHALUMEAU_CLAP", library))
@@ -153,7 +177,7 @@ fn clap_checked() -> Result<()> {
 
 /// The program of its own, without sound; the JACK step plays it to a server.
 fn standalone() -> Result<()> {
-    cargo("build --all-features --bin chalumeau-standalone")?;
+    cargo(&format!("build {PROGRAM} --bin chalumeau-standalone"))?;
     cargo("test -p xtask --test standalone --no-fail-fast")
 }
 

@@ -2,9 +2,13 @@
 
 use std::ffi::CString;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow, bail};
+use clack_extensions::gui::{
+    GuiApiType, GuiConfiguration, GuiSize, HostGui, HostGuiImpl, PluginGui, Window as Handle,
+};
 use clack_extensions::latency::PluginLatency;
 use clack_extensions::params::{ParamInfoBuffer, PluginParams};
 use clack_extensions::render::{PluginRender, RenderMode};
@@ -49,14 +53,52 @@ pub struct Param {
 /// Left and right.
 pub type Stereo = [Vec<f32>; 2];
 
-pub struct Shared;
+/// Something the plugin's window has done to a parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Hand {
+    /// Took hold of it.
+    Begin(ClapId),
+    /// Moved it there; the plain CLAP value.
+    Move(ClapId, f64),
+    /// Let go.
+    End(ClapId),
+}
+
+/// What the plugin asks for, from whichever thread.
+#[derive(Default)]
+pub struct Shared {
+    callback: AtomicBool,
+    /// Size the window wants to have, packed; 0 when nothing is asked for.
+    size: AtomicU64,
+    /// The window has gone by itself.
+    gone: AtomicBool,
+}
 pub struct Main;
 pub struct Host;
 
 impl SharedHandler<'_> for Shared {
     fn request_restart(&self) {}
     fn request_process(&self) {}
-    fn request_callback(&self) {}
+    fn request_callback(&self) {
+        self.callback.store(true, Ordering::Release);
+    }
+}
+
+impl HostGuiImpl for Shared {
+    fn resize_hints_changed(&self) {}
+    fn request_resize(&self, size: GuiSize) -> Result<(), HostError> {
+        self.size.store(size.pack_to_u64(), Ordering::Release);
+        Ok(())
+    }
+    fn request_show(&self) -> Result<(), HostError> {
+        Ok(())
+    }
+    fn request_hide(&self) -> Result<(), HostError> {
+        Ok(())
+    }
+    fn closed(&self, _: bool) {
+        self.gone.store(true, Ordering::Release);
+    }
 }
 
 impl MainThreadHandler<'_> for Main {}
@@ -71,7 +113,7 @@ impl HostHandlers for Host {
     type AudioProcessor<'a> = ();
 
     fn declare_extensions(builder: &mut HostExtensions<Self>, _: &Shared) {
-        builder.register::<HostState>();
+        builder.register::<HostState>().register::<HostGui>();
     }
 }
 
@@ -97,7 +139,7 @@ impl Plugin {
             first.id().context("the plugin has no id")?.to_owned()
         };
         let info = HostInfo::new("Chalumeau xtask", "Chalumeau", "", env!("CARGO_PKG_VERSION"))?;
-        let instance = PluginInstance::new(|_| Shared, |_| Main, &entry, &id, &info)?;
+        let instance = PluginInstance::new(|_| Shared::default(), |_| Main, &entry, &id, &info)?;
         Ok(Self { instance, entry })
     }
 
@@ -116,7 +158,9 @@ impl Plugin {
             PluginAudioConfiguration { sample_rate: rate_hz, min_frames_count: 1, max_frames_count: frames };
         let stopped = self.instance.activate(|_, _| (), config)?;
         match stopped.start_processing() {
-            Ok(processor) => Ok(Session { processor, block, answers: Vec::new(), played: 0 }),
+            Ok(processor) => {
+                Ok(Session { processor, block, answers: Vec::new(), hands: Vec::new(), played: 0 })
+            }
             Err(_) => bail!("the plugin does not start at {rate_hz} Hz"),
         }
     }
@@ -227,6 +271,74 @@ impl Plugin {
         Ok(render.set(&handle, if offline { RenderMode::Offline } else { RenderMode::Realtime })?)
     }
 
+    /// Opens the plugin's window inside an X11 window that `place` makes for the size it is told. The window must stay
+    /// until [`close_window`](Self::close_window).
+    pub fn open_window(&mut self, place: impl FnOnce(u32, u32) -> Result<u32>) -> Result<()> {
+        let handle = self.instance.plugin_handle();
+        let gui: PluginGui = handle.get_extension().context("no window")?;
+        let embedded = GuiConfiguration { api_type: GuiApiType::X11, is_floating: false };
+        if !gui.is_api_supported(&handle, embedded) {
+            bail!("the window does not go into an X11 window");
+        }
+        let size = gui.get_size(&handle).context("the window has no size")?;
+        let parent = place(size.width, size.height)?;
+        gui.create(&handle, embedded)?;
+        // SAFETY: the caller keeps the window until it is closed.
+        unsafe { gui.set_parent(&handle, Handle::from_x11_handle(parent.into())) }?;
+        Ok(gui.show(&handle)?)
+    }
+
+    /// Hides the window, or shows it again.
+    pub fn show_window(&mut self, on: bool) -> Result<()> {
+        let handle = self.instance.plugin_handle();
+        let gui: PluginGui = handle.get_extension().context("no window")?;
+        Ok(if on { gui.show(&handle) } else { gui.hide(&handle) }?)
+    }
+
+    /// Closes the window.
+    pub fn close_window(&mut self) -> Result<()> {
+        let handle = self.instance.plugin_handle();
+        let gui: PluginGui = handle.get_extension().context("no window")?;
+        gui.destroy(&handle);
+        Ok(())
+    }
+
+    /// Size of the window, or of the next one, in pixels.
+    pub fn window_size(&mut self) -> Result<(u32, u32)> {
+        let handle = self.instance.plugin_handle();
+        let gui: PluginGui = handle.get_extension().context("no window")?;
+        let size = gui.get_size(&handle).context("the window has no size")?;
+        Ok((size.width, size.height))
+    }
+
+    /// Gives the open window the size nearest to this one that it can have.
+    pub fn resize_window(&mut self, (width, height): (u32, u32)) -> Result<(u32, u32)> {
+        let handle = self.instance.plugin_handle();
+        let gui: PluginGui = handle.get_extension().context("no window")?;
+        if !gui.can_resize(&handle) {
+            bail!("the window cannot be resized");
+        }
+        let wanted = GuiSize { width, height };
+        let size = gui.adjust_size(&handle, wanted).context("the window does not adjust its size")?;
+        gui.set_size(&handle, size)?;
+        Ok((size.width, size.height))
+    }
+
+    /// Does on the main thread what the plugin has asked for; the size its window wants to have, if it wants another.
+    pub fn attend(&mut self) -> Option<(u32, u32)> {
+        if self.instance.access_shared_handler(|shared| shared.callback.swap(false, Ordering::AcqRel)) {
+            self.instance.call_on_main_thread_callback();
+        }
+        let packed = self.instance.access_shared_handler(|shared| shared.size.swap(0, Ordering::AcqRel));
+        let size = GuiSize::unpack_from_u64(packed);
+        (packed != 0).then_some((size.width, size.height))
+    }
+
+    /// Whether the window has closed by itself.
+    pub fn window_has_gone(&self) -> bool {
+        self.instance.access_shared_handler(|shared| shared.gone.load(Ordering::Acquire))
+    }
+
     pub fn latency(&mut self) -> Result<u32> {
         let handle = self.instance.plugin_handle();
         let latency: PluginLatency = handle.get_extension().context("no latency")?;
@@ -240,6 +352,8 @@ pub struct Session {
     block: usize,
     /// MIDI the plugin has sent, with the sample it belongs to since activation.
     answers: Vec<(usize, [u8; 3])>,
+    /// What was done to parameters in the plugin's window.
+    hands: Vec<Hand>,
     played: usize,
 }
 
@@ -266,6 +380,11 @@ impl Session {
     /// What the plugin has sent since activation.
     pub fn answers(&self) -> &[(usize, [u8; 3])] {
         &self.answers
+    }
+
+    /// What was done to parameters in the window since activation.
+    pub fn hands(&self) -> &[Hand] {
+        &self.hands
     }
 
     /// Plays, calling `before` with the position of each block.
@@ -306,10 +425,20 @@ impl Session {
                 None,
             )?;
             for event in &answered {
-                if let Some(CoreEventSpace::Midi(midi)) = event.as_core_event() {
-                    let at = event.header().time() as usize;
-                    self.answers.push((self.played + start + at, midi.data()));
-                }
+                let at = self.played + start + event.header().time() as usize;
+                let hand = match event.as_core_event() {
+                    Some(CoreEventSpace::Midi(midi)) => {
+                        self.answers.push((at, midi.data()));
+                        None
+                    }
+                    Some(CoreEventSpace::ParamGestureBegin(event)) => event.param_id().map(Hand::Begin),
+                    Some(CoreEventSpace::ParamValue(event)) => {
+                        event.param_id().map(|id| Hand::Move(id, event.value()))
+                    }
+                    Some(CoreEventSpace::ParamGestureEnd(event)) => event.param_id().map(Hand::End),
+                    _ => None,
+                };
+                self.hands.extend(hand);
             }
         }
         self.played += samples;

@@ -40,7 +40,7 @@ pub fn test() -> Result<()> {
     let server = Server::start()?;
     let mut command = machine::cargo();
     command
-        .args(["test", "-p", "xtask", "--test", "standalone", "--", "--ignored"])
+        .args(["test", "-p", "xtask", "--test", "standalone", "--", "--ignored", "it_plays_to_jack"])
         .env("CHALUMEAU_STANDALONE", standalone);
     machine::run(server.for_clients(&mut command))
 }
@@ -52,11 +52,11 @@ struct Build {
     standalone: PathBuf,
 }
 
-/// A debug build with every feature, `midi-jack` among them, as the tests with allocation checks have made it already;
+/// A debug build with every feature of the program, `midi-jack` among them, as the tests with allocation checks have made it already;
 /// kept aside, because the next build with other features takes its place.
 fn build() -> Result<Build> {
-    let all = ["build", "--all-features", "--lib", "--bin", "chalumeau", "--bin", "chalumeau-standalone"];
-    machine::run(machine::cargo().args(all))?;
+    let what = ["--lib", "--bin", "chalumeau", "--bin", "chalumeau-standalone"];
+    machine::run(machine::cargo().arg("build").args(machine::PROGRAM.split(' ')).args(what))?;
     let folder = machine::target().join("midi-jack");
     fs::create_dir_all(&folder)?;
     let keep = |name: String| -> Result<PathBuf> {

@@ -3,6 +3,8 @@
 pub mod bundle;
 pub mod ci;
 pub mod demo;
+#[cfg(target_os = "linux")]
+pub mod display;
 pub mod firmware;
 pub mod generated;
 pub mod host;
@@ -11,8 +13,12 @@ pub mod machine;
 pub mod midi;
 pub mod picture;
 pub mod prepared;
+#[cfg(target_os = "linux")]
+pub mod screen;
 pub mod simulator;
 pub mod touch_demo;
+#[cfg(target_os = "linux")]
+pub mod window;
 pub mod wire_vectors;
 
 /// One chore.
@@ -42,6 +48,13 @@ pub const COMMANDS: &[Command] = &[
         name: "bundle",
         about: "build Chalumeau.clap and Chalumeau.vst3 into target/bundled; takes cargo build's options",
         run: bundle::run,
+        checks: false,
+    },
+    #[cfg(target_os = "linux")]
+    Command {
+        name: "screenshots",
+        about: "pictures of plugin and standalone in their windows, every view, into target/screenshots",
+        run: window::screenshots,
         checks: false,
     },
     Command {

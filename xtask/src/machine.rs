@@ -24,6 +24,9 @@ pub fn target() -> PathBuf {
     }
 }
 
+/// Every feature of the program itself; what only tests need, a renderer, is not among them.
+pub const PROGRAM: &str = "--features simulator,standalone,midi-jack";
+
 /// The cargo that runs this.
 pub fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
@@ -143,6 +146,27 @@ pub const XCB: Package = Package {
     purpose: "linking the VST3 tests",
 };
 
+/// A display without a screen.
+pub const XVFB: Package = Package {
+    name: "xvfb",
+    present: || works("sh", &["-c", "command -v Xvfb"]),
+    purpose: "the tests of the window",
+};
+/// OpenGL without a graphics card.
+pub const MESA: Package =
+    Package { name: "libglx-mesa0", present: || loads("libGLX_mesa.so.0"), purpose: "drawing the window" };
+/// The window asks for it at run time.
+pub const EGL: Package =
+    Package { name: "libegl1", present: || loads("libEGL.so.1"), purpose: "drawing the window" };
+/// The window reads keys through it, at run time.
+pub const XKB: Package = Package {
+    name: "libxkbcommon-x11-0",
+    present: || loads("libxkbcommon-x11.so.0"),
+    purpose: "keys in the window",
+};
+/// The window speaks to the display through it, at run time.
+pub const X11_XCB: Package =
+    Package { name: "libx11-xcb1", present: || loads("libX11-xcb.so.1"), purpose: "opening the window" };
 /// Installs what is missing with apt-get, or names it.
 pub fn provide(packages: &[&Package]) -> Result<()> {
     let missing: Vec<_> = packages.iter().filter(|package| !(package.present)()).collect();

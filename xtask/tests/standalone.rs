@@ -34,13 +34,12 @@ struct Running {
 
 impl Running {
     fn start(args: &[&str]) -> Self {
-        let mut child = program()
-            .args(args)
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        Self::spawn(program().args(args))
+    }
+
+    fn spawn(command: &mut Command) -> Self {
+        let mut child =
+            command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         let said = BufReader::new(child.stderr.take().unwrap());
         Self { child, said }
     }
@@ -147,4 +146,43 @@ fn it_plays_to_jack() {
         std::thread::sleep(Duration::from_millis(50));
     }
     assert!(running.interrupt().success());
+}
+
+/// Run by the step that starts a display.
+#[cfg(target_os = "linux")]
+#[test]
+#[ignore = "needs a display"]
+fn its_window_plays_and_closing_it_is_the_end() {
+    let display = std::env::var("DISPLAY").unwrap();
+    let screen = xtask::screen::Screen::open(Some(&display)).unwrap();
+    let mut command = program();
+    command.env("DISPLAY", &display);
+    let mut running = Running::spawn(command.args(["--backend", "dummy"]));
+    let window = screen.titled("Chalumeau").unwrap();
+    let still = screen.settled(window, Duration::from_millis(600)).unwrap();
+    let keep = |name: &str| {
+        let picture = screen.picture(window).unwrap();
+        picture.write(&xtask::machine::target().join("screenshots").join(name)).unwrap();
+        picture
+    };
+    keep("standalone.png");
+    // A key of the keyboard along the lower edge, held.
+    let (width, height) = screen.size(window).unwrap();
+    let at = |share: u32, of: u32| i16::try_from(of * share / 100).unwrap();
+    screen.point(window, (at(50, width), i16::try_from(height - 16).unwrap())).unwrap();
+    screen.press(true).unwrap();
+    std::thread::sleep(Duration::from_millis(1_500));
+    let sounding = keep("standalone-playing.png");
+    screen.press(false).unwrap();
+    assert!(sounding.differing(&still) > 1_000, "nothing sounds");
+    screen.ask_to_close(window).unwrap();
+    let began = Instant::now();
+    let status = loop {
+        if let Some(status) = running.child.try_wait().unwrap() {
+            break status;
+        }
+        assert!(began.elapsed() < PATIENCE, "still running");
+        std::thread::sleep(Duration::from_millis(20));
+    };
+    assert!(status.success(), "{status}");
 }

@@ -151,9 +151,10 @@ impl Desk {
                 Choice::Osc { port, any_address: knob.osc_any.value() }
             }
         };
+        let is_chosen = self.shared.chosen.swap(false, Ordering::Relaxed);
         // A serial number learnt from the device in hand is no new choice.
         let same = match (&self.choice, &wanted) {
-            (Choice::Serial { serial: None }, Choice::Serial { .. }) => true,
+            (Choice::Serial { serial: None }, Choice::Serial { .. }) => !is_chosen,
             (before, after) => before == after,
         };
         if same {

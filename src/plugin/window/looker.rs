@@ -5,19 +5,26 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::{Inside, Shared};
+use super::Shared;
+use super::audio::Inside;
+#[cfg(feature = "devices")]
+use super::devices;
 use crate::bore::transfer_matrix::TransferMatrix;
+#[cfg(feature = "devices")]
+use crate::device::Places;
+#[cfg(feature = "devices")]
+use crate::editor::Tab;
 use crate::editor::listener::{Heard, Listener, WINDOW};
 #[cfg(feature = "devices")]
 use crate::editor::snapshot::{Device, Knob};
-use crate::editor::snapshot::{Level, Scope, Snapshot, Status, Track};
+use crate::editor::snapshot::{Level, Scope, Snapshot, Source, Status, Track};
 use crate::haptics::{FeelDesign, FeelTable, Limits, Requirement};
 use crate::instrument::{Model, Settings, felt};
-use crate::plugin::instrument;
+use crate::plugin::Beside;
+use crate::plugin::breaths::{Breaths, Way};
 use crate::plugin::instrument::{Placed, Stage};
 #[cfg(feature = "devices")]
 use crate::plugin::knob;
-use crate::plugin::params::ChalumeauParams;
 use crate::plugin::params::instrument::InstrumentChoice;
 use crate::touch::feel::Feels;
 use crate::units::SoundingNote;
@@ -25,6 +32,9 @@ use crate::units::SoundingNote;
 /// Between two looks while something moves, and while nothing does.
 const QUICK: Duration = Duration::from_millis(33);
 const IDLE: Duration = Duration::from_millis(200);
+/// Between two looks for devices.
+#[cfg(feature = "devices")]
+const DEVICES_EVERY: Duration = Duration::from_secs(2);
 /// Length of the breath's history, s, and of its steps.
 const HISTORY_S: f32 = 10.0;
 const STEP_S: f32 = 0.05;
@@ -34,10 +44,7 @@ const NO_BREATH_KPA: f32 = 1e-3;
 /// Everything the thread has.
 pub struct Looker {
     shared: Arc<Shared>,
-    params: Arc<ChalumeauParams>,
-    instruments: Arc<instrument::Shared>,
-    #[cfg(feature = "devices")]
-    knob: Arc<knob::Shared>,
+    beside: Beside,
     inside: triple_buffer::Output<Inside>,
     sound: rtrb::Consumer<f32>,
     heard: VecDeque<f32>,
@@ -45,6 +52,8 @@ pub struct Looker {
     history: VecDeque<f32>,
     stepped: Instant,
     known: Option<Known>,
+    #[cfg(feature = "devices")]
+    devices: (Vec<Device>, Option<Instant>),
 }
 
 /// What an instrument is asked once.
@@ -61,18 +70,13 @@ struct Known {
 impl Looker {
     pub(super) fn new(
         shared: Arc<Shared>,
-        params: Arc<ChalumeauParams>,
-        instruments: Arc<instrument::Shared>,
-        #[cfg(feature = "devices")] knob: Arc<knob::Shared>,
+        beside: Beside,
         inside: triple_buffer::Output<Inside>,
         sound: rtrb::Consumer<f32>,
     ) -> Self {
         Self {
             shared,
-            params,
-            instruments,
-            #[cfg(feature = "devices")]
-            knob,
+            beside,
             inside,
             sound,
             heard: VecDeque::with_capacity(2 * WINDOW),
@@ -80,13 +84,15 @@ impl Looker {
             history: VecDeque::new(),
             stepped: Instant::now(),
             known: None,
+            #[cfg(feature = "devices")]
+            devices: (Vec::new(), None),
         }
     }
 
     pub(super) fn run(mut self) {
         while !self.shared.stop.load(Ordering::Relaxed) {
-            let pause = if self.shared.state.is_open() { self.look() } else { IDLE };
-            std::thread::sleep(pause);
+            let pause = if self.shared.is_open.load(Ordering::Relaxed) { self.look() } else { IDLE };
+            std::thread::park_timeout(pause);
         }
     }
 
@@ -94,17 +100,18 @@ impl Looker {
     fn look(&mut self) -> Duration {
         let inside = self.inside.read().clone();
         self.listen();
-        let settings = self.params.settings();
+        let settings = self.beside.params.settings();
         let moving = inside.now.mouth_kpa > NO_BREATH_KPA || inside.now.sounding.is_some();
         self.remember(inside.now.mouth_kpa);
-        let placed = self.instruments.placed();
+        let placed = self.beside.instruments.placed();
         self.know(placed.as_ref());
-        let tried = self.shared.tried.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let tried = self.shared.tried();
         let mut snapshot = Snapshot { settings, ..Snapshot::default() };
         snapshot.instruments = InstrumentChoice::ALL.iter().map(|choice| choice.title().to_owned()).collect();
-        snapshot.chosen = Some(self.params.instrument.choice.value() as usize);
+        snapshot.chosen = Some(self.beside.params.instrument.choice.value() as usize);
         snapshot.sounding = inside.now.sounding;
         snapshot.mouth_kpa = inside.now.mouth_kpa;
+        snapshot.sources = sources(&inside.breaths, inside.now.sounding.is_some());
         snapshot.latency_ms = (1e3 * f64::from(inside.latency_samples) / inside.host_rate_hz) as f32;
         snapshot.history = Track { step_s: STEP_S, kpa: self.history.iter().copied().collect() };
         snapshot.scope = Scope {
@@ -130,14 +137,29 @@ impl Looker {
         }
         snapshot.heard = self.hear(inside.host_rate_hz, inside.now.sounding, &settings);
         #[cfg(feature = "devices")]
-        if let Some(status) = self.knob.status() {
-            let feel = snapshot.feel.as_ref().ok().map(|note| note.feel);
-            snapshot.knob = knob_picture(&status, feel.as_ref());
+        {
+            let status = self.beside.knob.status();
+            self.list(status.as_ref());
+            snapshot.knob = status.map_or_else(Knob::default, |status| {
+                let feel = snapshot.feel.as_ref().ok().map(|note| note.feel);
+                knob_picture(&status, feel.as_ref())
+            });
+            snapshot.knob.devices = self.devices.0.clone();
         }
         snapshot.status = self.words(placed.as_ref());
         *self.shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(snapshot);
         self.shared.repaint.request_repaint();
         if moving { QUICK } else { IDLE }
+    }
+
+    /// Looks for devices now and then while the list is in view.
+    #[cfg(feature = "devices")]
+    fn list(&mut self, status: Option<&crate::device::LinkStatus>) {
+        let is_due = self.devices.1.is_none_or(|at| at.elapsed() > DEVICES_EVERY);
+        if super::kept(&self.beside.params).tab == Tab::Knob && is_due {
+            let kind = self.beside.params.knob.kind.value();
+            self.devices = (devices::list(&Places::default(), kind, status), Some(Instant::now()));
+        }
     }
 
     fn listen(&mut self) {
@@ -183,7 +205,7 @@ impl Looker {
 
     fn design(&self) -> FeelDesign {
         #[cfg(feature = "devices")]
-        return knob::design(&self.params.knob);
+        return knob::design(&self.beside.params.knob);
         #[cfg(not(feature = "devices"))]
         FeelDesign::default()
     }
@@ -200,12 +222,12 @@ impl Looker {
     fn words(&self, placed: Option<&Placed>) -> Vec<Status> {
         let mut status = Vec::new();
         let mut say = |level, text: String| status.push(Status { level, text });
-        if let Ok(text) = self.params.instrument_status.read()
+        if let Ok(text) = self.beside.params.instrument_status.read()
             && placed.is_none_or(|placed| placed.stage < Stage::Tuned)
         {
             say(Level::Note, text.clone());
         }
-        if let Ok(text) = self.params.knob_status.read()
+        if let Ok(text) = self.beside.params.knob_status.read()
             && text.as_str() != "off"
         {
             say(Level::Good, text.clone());
@@ -250,23 +272,25 @@ impl Known {
     }
 }
 
-/// The knob as the window shows it.
+/// Where breath has come from, as the window shows it.
+fn sources(breaths: &Breaths, held: bool) -> Vec<Source> {
+    let source = |way: Way| {
+        let said = breaths.said(way);
+        // Velocity blows while a key is held.
+        let value = said.filter(|_| way != Way::Keys || held).unwrap_or(0.0);
+        Source { name: way.title().to_owned(), value, is_live: breaths.is_live(way), is_seen: said.is_some() }
+    };
+    Way::ALL.map(source).into()
+}
+
+/// The knob as the window shows it, without the list.
 #[cfg(feature = "devices")]
 fn knob_picture(status: &crate::device::LinkStatus, feel: Option<&crate::wire::message::Feel>) -> Knob {
-    use crate::device::{Phase, serial_text};
     let stats = &status.stats;
-    let is_live = status.phase == Phase::Live;
-    let devices = status.serial.map(|serial| Device {
-        key: serial_text(serial),
-        name: status.info.as_ref().map_or_else(|| serial_text(serial), |info| info.name_text().to_string()),
-        state: if is_live { "ready".to_owned() } else { status.text.clone() },
-        is_chosen: true,
-        is_free: is_live,
-    });
     Knob {
-        devices: devices.into_iter().collect(),
+        devices: Vec::new(),
         text: status.text.clone(),
-        is_live,
+        is_live: status.phase == crate::device::Phase::Live,
         is_armed: status.armed,
         ceiling_mnm: f32::from(status.ceiling_mnm),
         angle_deg: status.angle_deg,

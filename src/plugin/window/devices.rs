@@ -1,0 +1,103 @@
+//! The list of devices, and choosing from it.
+
+use std::sync::PoisonError;
+
+use crate::device::discover::Kind;
+use crate::device::{LinkStatus, Phase, Places, candidates, lock, midi, serial_number, serial_text};
+use crate::editor::snapshot::Device;
+use crate::plugin::Beside;
+use crate::plugin::params::knob::KnobKind;
+
+/// Kinds of device the parameter chooses from.
+pub const KINDS: usize = 4;
+/// Key of what sends OSC.
+const OSC: &str = "osc";
+/// Before the key of a MIDI port and of a serial number.
+const MIDI: &str = "midi:";
+const SERIAL: &str = "serial:";
+/// Key of a board whose serial number is not known before it is asked.
+const BOARD: &str = "board";
+
+/// Everything that may be a knob, the one in use first. Asks the system, which takes milliseconds.
+pub fn list(places: &Places, kind: KnobKind, status: Option<&LinkStatus>) -> Vec<Device> {
+    let mut devices = Vec::new();
+    let in_use = status.filter(|status| status.phase != Phase::Off && kind != KnobKind::Off);
+    let linked = in_use.and_then(|status| Some((status, status.serial?)));
+    if let Some((status, serial)) = linked.filter(|_| kind == KnobKind::Serial) {
+        let is_live = status.phase == Phase::Live;
+        devices.push(Device {
+            key: format!("{SERIAL}{}", serial_text(serial)),
+            name: status.info.as_ref().map_or_else(
+                || serial_text(serial),
+                |info| format!("{}, {}", info.name_text(), serial_text(serial)),
+            ),
+            state: if is_live { format!("in use, {}", status.port) } else { status.text.clone() },
+            is_chosen: true,
+            is_free: is_live,
+        });
+    }
+    for candidate in candidates(places) {
+        let port = candidate.path.display();
+        let device = match (&candidate.kind, candidate.serial_hint()) {
+            (_, Some(serial)) if linked.is_some_and(|(_, chosen)| chosen == serial) => continue,
+            (Kind::Simulated { serial, name }, _) => {
+                let holder = lock::holder(places, *serial);
+                Device {
+                    key: format!("{SERIAL}{}", serial_text(*serial)),
+                    name: format!("{name}, {}", serial_text(*serial)),
+                    state: holder
+                        .as_ref()
+                        .map_or_else(|| format!("simulated, {port}"), |who| format!("held by {who}")),
+                    is_chosen: false,
+                    is_free: holder.is_none(),
+                }
+            }
+            (Kind::Usb { chip, .. }, hint) => Device {
+                key: hint.map_or_else(|| BOARD.into(), |serial| format!("{SERIAL}{}", serial_text(serial))),
+                name: format!("{chip} board"),
+                state: format!("{port}: asked when chosen"),
+                is_chosen: false,
+                is_free: true,
+            },
+        };
+        // The port in hand, whose board has told another serial number than USB.
+        if in_use.is_none_or(|status| status.port != candidate.path.to_string_lossy()) {
+            devices.push(device);
+        }
+    }
+    for name in midi::ports(false).unwrap_or_default() {
+        let is_chosen = kind == KnobKind::Midi && in_use.is_some_and(|status| status.port == name);
+        let state = if is_chosen { "in use" } else { "MIDI port" };
+        let key = format!("{MIDI}{name}");
+        devices.push(Device { key, name, state: state.into(), is_chosen, is_free: true });
+    }
+    devices.push(Device {
+        key: OSC.into(),
+        name: "TorqueTuner with stock firmware, by OSC".into(),
+        state: "read only: angle to breath, no feel".into(),
+        is_chosen: kind == KnobKind::Osc,
+        is_free: true,
+    });
+    devices
+}
+
+/// Makes a device of the list the wanted one; the place of its kind in the parameter, which the caller sets.
+pub fn choose(beside: &Beside, key: &str) -> Option<usize> {
+    let knob = &beside.params.knob;
+    let put = |text: &std::sync::RwLock<String>, word: &str| {
+        let mut text = text.write().unwrap_or_else(PoisonError::into_inner);
+        word.clone_into(&mut text);
+    };
+    let kind = if let Some(name) = key.strip_prefix(MIDI) {
+        put(&knob.midi_port, name);
+        KnobKind::Midi
+    } else if key == OSC {
+        KnobKind::Osc
+    } else {
+        let serial = key.strip_prefix(SERIAL).filter(|text| serial_number(text).is_some());
+        put(&knob.serial, serial.unwrap_or_default());
+        KnobKind::Serial
+    };
+    beside.knob.choose_anew();
+    Some(kind as usize)
+}
