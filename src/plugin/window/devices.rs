@@ -101,3 +101,35 @@ pub fn choose(beside: &Beside, key: &str) -> Option<usize> {
     beside.knob.choose_anew();
     Some(kind as usize)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::Advert;
+    use crate::device::lock::Ownership;
+
+    #[test]
+    fn a_simulated_knob_is_listed_with_who_holds_it() {
+        let directory = tempfile::tempdir().unwrap();
+        let places = Places::within(directory.path());
+        let port = directory.path().join("port");
+        let _advert = Advert::publish(&places, 0x51, "Desk knob", &port).unwrap();
+        let listed = || list(&places, KnobKind::Off, None);
+        let knob = listed().into_iter().find(|device| device.key == "serial:0000000000000051").unwrap();
+        assert!(knob.name.starts_with("Desk knob") && knob.is_free && !knob.is_chosen, "{knob:?}");
+        let _mine = Ownership::take(&places, 0x51, "Track 1", "").unwrap();
+        let knob = listed().into_iter().find(|device| device.key == "serial:0000000000000051").unwrap();
+        assert!(!knob.is_free && knob.state.contains("held by Track 1"), "{knob:?}");
+    }
+
+    #[test]
+    fn stock_firmware_is_always_there_to_choose() {
+        let directory = tempfile::tempdir().unwrap();
+        let places = Places::within(directory.path());
+        for (kind, is_chosen) in [(KnobKind::Off, false), (KnobKind::Osc, true)] {
+            let devices = list(&places, kind, None);
+            let osc = devices.iter().find(|device| device.key == OSC).unwrap();
+            assert_eq!(osc.is_chosen, is_chosen);
+        }
+    }
+}
