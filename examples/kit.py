@@ -1,10 +1,12 @@
 """What the plots of the study kit share: tables of the command line as numpy arrays, and how a figure is saved."""
 
+import itertools
 import pathlib
 import re
 import sys
 
 import matplotlib
+import numpy as np
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
@@ -18,15 +20,32 @@ NAMES = ("C", "C#", "D", "D#", "E", "F", "F#", "G", "G#", "A", "A#", "B")
 
 def table(path, *columns):
     """Columns of a table as arrays of floats, in the order asked for; `nan` in the file is nan. Raises BadInput."""
+    whole = sound(path, columns)
+    if whole is not None:
+        return whole
     cells, lines = read_table(path, columns)
     emptied = ([("" if cell.strip() == "nan" else cell) for cell in cells[name]] for name in columns)
     return [numbers(path, name, column, lines, True) for name, column in zip(columns, emptied)]
 
 
+def sound(path, columns):
+    """The same of a table without fault, quickly: half a minute of a probe is three million rows. None of any other."""
+    try:
+        with open(path, encoding="utf-8-sig") as file:
+            names = file.readline().strip().split(",")
+            places = [names.index(name) for name in columns]
+            read = np.loadtxt(file, delimiter=",", usecols=places, ndmin=2)
+    except (OSError, ValueError):
+        return None
+    return list(read.T) if len(read) and not np.isinf(read).any() else None
+
+
 def remark(path, words, unit):
     """The number that stands between `words` and `unit` in the remarks (#) of a table. Raises BadInput."""
     with open(path, encoding="utf-8-sig") as file:
-        text = " ".join(line for line in file if line.startswith("#"))
+        # Remarks stand on top.
+        head = itertools.takewhile(lambda line: line.startswith("#") or not line[:1].isdigit(), file)
+        text = " ".join(line for line in head if line.startswith("#"))
     found = re.search(rf"{re.escape(words)} ([-+.0-9e]+) ?{re.escape(unit)}", text)
     if not found:
         raise BadInput(f"{path}: no remark says `{words} .. {unit}`; was it made by this version of chalumeau?")

@@ -151,8 +151,32 @@ impl Failure {
     }
 }
 
+/// Whether these words, without the program's name, are a command; nothing is done. So documents are held to what there is.
+pub fn understands<'a>(words: impl IntoIterator<Item = &'a str>) -> Result<(), String> {
+    match Cli::try_parse_from(std::iter::once("chalumeau").chain(words)) {
+        Err(error) if error.use_stderr() => Err(error.to_string()),
+        // Help and version are answers too.
+        _ => Ok(()),
+    }
+}
+
+/// Commands of fuller builds.
+const LEFT_OUT: &[&str] = &[
+    #[cfg(not(feature = "devices"))]
+    "doctor",
+    #[cfg(not(feature = "devices"))]
+    "knob",
+    #[cfg(not(feature = "simulator"))]
+    "knob-sim",
+];
+
 /// Reads the arguments and does what they say.
 pub fn main() -> ExitCode {
+    if let Some(command) = std::env::args().nth(1).filter(|name| LEFT_OUT.contains(&name.as_str())) {
+        return failed(&Failure::Usage(format!(
+            "{command} is not in this build, which leaves devices out; `cargo build --release` builds all of it"
+        )));
+    }
     let done = match Cli::parse().command {
         Command::Render(command) => command.run(),
         Command::Report(command) => command.run(),

@@ -6,9 +6,11 @@
 
 pub mod bifurcation;
 pub mod bore;
+pub mod breath;
 mod data;
 #[cfg(feature = "cli")]
 pub mod draw;
+pub mod felt;
 pub mod impedance;
 pub mod palette;
 pub mod performance;

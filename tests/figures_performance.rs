@@ -9,14 +9,22 @@ use chalumeau::analysis::impedance::cutoff_hz;
 use chalumeau::analysis::overview::{Envelope, Overview, Watcher};
 use chalumeau::bore::instrument_file::InstrumentFile;
 use chalumeau::bore::transfer_matrix::TransferMatrix;
+use chalumeau::figure::breath;
+use chalumeau::figure::breath::Changes;
+use chalumeau::figure::felt::{AtContrast, Torque, torques};
 use chalumeau::figure::impedance::{Curve, Fingering, NotePeaks, chart, fingering};
 use chalumeau::figure::performance::{Moment, Note, Performance, performance};
 use chalumeau::figure::{Figure, Layer, Panel, bore};
+use chalumeau::haptics::{FeelDesign, FeelTable, Limits, Requirements, law};
+use chalumeau::instrument::felt::played_reed;
 use chalumeau::instrument::{Clarinet, Settings};
+use chalumeau::reed::ReedTables;
+use chalumeau::render::bifurcation;
 use chalumeau::render::breath::BreathCurve;
 use chalumeau::render::play_probed;
 use chalumeau::render::score::Score;
 use chalumeau::units::{Air, SoundingNote, WrittenNote};
+use chalumeau::wire::message::Law;
 use serde_json::Value;
 use std::convert::Infallible;
 use std::fs;
@@ -383,7 +391,7 @@ fn a_report_holds_the_sound_the_cents_and_the_settings() {
     assert!(STANDARD.decode(sound).unwrap() == read(&d, "r.wav"));
     // Nothing is fetched; every figure has words; headings come in order.
     assert!(!page.contains("http") && !page.contains("<script") && !page.contains("<link"));
-    assert_eq!((page.matches("<img ").count(), page.matches("<img alt=\"").count()), (2, 2));
+    assert_eq!((page.matches("<img ").count(), page.matches("<img alt=\"").count()), (8, 8));
     assert!(!page.contains("alt=\"\""));
     assert_eq!(page.matches("<h1>").count(), 1);
     for said in [
@@ -397,6 +405,16 @@ fn a_report_holds_the_sound_the_cents_and_the_settings() {
         concat!("Chalumeau ", env!("CARGO_PKG_VERSION")),
         "chalumeau report --scale 60:64",
         "B flat clarinet, Boehm system",
+        // Breath: the last of the longest notes, as `threshold` and the player have it.
+        "<h2>Breath</h2>",
+        "Written E4 begins at",
+        "<h3 id=\"table-1\">Mouth pressures</h3>",
+        // Haptics, and what would be too much of it.
+        "<h2>Haptics</h2>",
+        "The mark of the torque lies within 0.",
+        "What the knob is told",
+        "<td>flow</td><td class=\"number\">3</td><td>accepted</td>",
+        "<td>flow</td><td class=\"number\">5</td><td>refused: C#7 would need",
     ] {
         assert!(page.contains(said), "{said}");
     }
@@ -408,6 +426,117 @@ fn a_report_holds_the_sound_the_cents_and_the_settings() {
     let page = String::from_utf8(read(&d, "s.html")).unwrap();
     assert!(page.contains("src=\"s.wav\"") && !page.contains("data:audio"));
     assert!(read(&d, "s.wav") == read(&d, "r.wav"));
+}
+
+/// A feel that a knob would refuse is no reason to withhold the page: it says so, with the way out.
+#[test]
+fn a_report_says_which_feel_a_knob_would_refuse() {
+    let d = tempfile::tempdir().unwrap();
+    succeeds(&d, "report --written 67 --seconds 0.1 --torque 80 --contrast 5 --out r.html");
+    let page = String::from_utf8(read(&d, "r.html")).unwrap();
+    for said in
+        ["The feel asked for is refused: C#7 would need", "the ceiling is 100", "Contrast 5: C#7 would need"]
+    {
+        assert!(page.contains(said), "{said}");
+    }
+    assert!(!page.contains("What the knob is told"));
+    succeeds(&d, "report --written 67 --seconds 0.1 --torque 60 --travel 120 --out s.html");
+    let page = String::from_utf8(read(&d, "s.html")).unwrap();
+    assert!(page.contains("N m/rad, the"), "the slope has its words too");
+}
+
+#[test]
+fn breath_and_feel_are_figures_of_one_instrument() {
+    let (file, settings) = (InstrumentFile::built_in(), Settings { noise: 0.0, ..Settings::default() });
+    let bore = Requirements::new(&file, Air::default());
+    let reed = played_reed(&file, &settings);
+    let closing_kpa = 1e-3 * reed.closing_pa();
+    let asked = bore.with(&reed);
+    let changes: Vec<Changes> = bore
+        .written()
+        .zip(&asked)
+        .map(|(written, asked)| {
+            let asked = asked.unwrap();
+            Changes {
+                written: written.0,
+                speaks_kpa: closing_kpa * asked.gamma_sounding,
+                beats_kpa: closing_kpa * asked.gamma_beat,
+                chokes_kpa: closing_kpa * asked.gamma_off,
+            }
+        })
+        .collect();
+    assert!(changes.iter().all(|note| {
+        note.speaks_kpa < note.beats_kpa && note.beats_kpa < closing_kpa && closing_kpa < note.chokes_kpa
+    }));
+    golden("breath_notes", &breath::pressures("clarinet", "", closing_kpa, &changes));
+
+    for (law, name) in [(Law::Flow, "flow"), (Law::Pressure, "pressure")] {
+        let mut all = Vec::new();
+        for contrast in [1.0, 5.0] {
+            let design = FeelDesign { law, contrast, ..FeelDesign::default() };
+            let table = FeelTable::new(&bore, &design, &reed, &Limits::default()).unwrap();
+            let notes = table.notes().iter().step_by(20).map(|note| {
+                let at = |deg: f64| (deg, law::torque_mnm(&note.feel, ReedTables::seed(), deg));
+                Torque {
+                    name: note.written.to_string(),
+                    curve: (-30..=120).map(|step| at(4.0 * f64::from(step))).collect(),
+                    on: at(note.landmarks.a_on_deg),
+                    close: at(note.landmarks.a_close_deg),
+                }
+            });
+            all.push(AtContrast { contrast, notes: Ok(notes.collect()) });
+        }
+        all.push(AtContrast { contrast: 9.0, notes: Err("too much".to_owned()) });
+        let figure = torques(name, "", 100.0, &all);
+        // What is refused is said where it would be drawn, and the same scale serves all.
+        assert!(figure.panels.iter().all(|panel| panel.y.range == figure.panels[0].y.range));
+        assert!(figure.panels[2].title.ends_with("refused") && lines(&figure.panels[2]).is_empty());
+        // Under the flow law the felt threshold is the top of the curve up to closure.
+        if law == Law::Flow {
+            for note in all.iter().filter_map(|at| at.notes.as_ref().ok()).flatten() {
+                let up_to_closure = note.curve.iter().filter(|(deg, _)| *deg < note.close.0);
+                let top = up_to_closure.map(|&(_, mnm)| mnm).fold(0.0, f64::max);
+                assert!(
+                    top <= note.on.1 + 1e-3 && top > 0.99 * note.on.1,
+                    "{}: {top} {:?}",
+                    note.name,
+                    note.on
+                );
+            }
+        }
+        golden(&format!("torque_{name}"), &figure);
+    }
+}
+
+#[test]
+fn a_swell_shows_where_it_sounds() {
+    let settings = Settings { noise: 0.0, ..Settings::default() };
+    let model = std::sync::Arc::new(chalumeau::instrument::Model::built_in(48_000.0).unwrap());
+    let played = bifurcation::measure(&model, &settings, SoundingNote(58), 0.9, 1.0, 48_000, |_| {});
+    let course: Vec<[f64; 4]> = played
+        .up
+        .iter()
+        .map(|point| (point.gamma / 0.9, point))
+        .chain(played.down.iter().map(|point| (2.0 - point.gamma / 0.9, point)))
+        .map(|(t_s, point)| [t_s, 6.0 * point.gamma, 6.0 * point.rms, point.shut])
+        .collect();
+    let swell = breath::Swell {
+        title: "written C4".to_owned(),
+        note: String::new(),
+        closing_kpa: 6.0,
+        changes: None,
+        course,
+        sounds_kpa: 0.06,
+    };
+    let figure = swell.figure();
+    let spans: Vec<(f64, f64)> = figure.panels[0]
+        .layers
+        .iter()
+        .filter_map(|layer| if let Layer::Span(span) = layer { Some((span.from, span.to)) } else { None })
+        .collect();
+    let (first, last) = (spans[0], spans[spans.len() - 1]);
+    assert!((0.4..0.8).contains(&first.0) && (1.4..1.9).contains(&last.1), "{spans:?}");
+    assert!(spans.len() <= 5, "no flicker: {spans:?}");
 }
 
 #[test]

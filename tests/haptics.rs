@@ -450,6 +450,21 @@ fn requests_a_knob_cannot_take_are_refused_with_numbers() {
     FeelTable::new(&BORE, &design(Law::Pressure, 3.0), &reed, &gentle).unwrap();
 }
 
+/// A knob that is told one note is held to that note's torque, not to the hardest one's.
+#[test]
+fn one_note_may_keep_to_a_ceiling_that_another_passes() {
+    let (design, limits) = (design(Law::Flow, 3.0), Limits { ceiling_mnm: 60.0, ..Limits::default() });
+    let settings = Settings::default();
+    let table = table(&design, &settings).unwrap();
+    let hardest = table.notes().len() - 1;
+    assert_eq!(table.accepts(0, &design, &limits), Ok(()));
+    let refused = table.accepts(hardest, &design, &limits);
+    assert!(
+        matches!(refused, Err(FeelRefused::Ceiling { wanted_mnm, .. }) if wanted_mnm > 70.0),
+        "{refused:?}"
+    );
+}
+
 #[test]
 fn every_allowed_setting_gives_a_feel_or_a_reason() {
     let mut seed = 7_u64;

@@ -211,7 +211,7 @@ pub struct NotesArg {
     #[arg(long)]
     all: bool,
     /// One written note: a MIDI number (65) or a name (F4)
-    #[arg(long, value_name = "NOTE", value_parser = note)]
+    #[arg(long, aliases = ["note", "fingering"], value_name = "NOTE", value_parser = note)]
     written: Option<u8>,
 }
 

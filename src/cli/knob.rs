@@ -7,7 +7,7 @@ use crate::device::{Choice, Hooks, KnobLink, LinkStatus, OFFERED_CEILING_MNM, Ph
 use crate::haptics::{Limits, NoteFeel};
 use crate::instrument::{Settings, Wanted};
 use crate::output::OutputError;
-use crate::touch::feel::Feels;
+use crate::touch::feel::{Feels, NO_MOTOR};
 use crate::touch::take::{Marks, Moment, TakeWriter};
 use crate::units::WrittenNote;
 use clap::{ArgGroup, Args};
@@ -89,13 +89,15 @@ impl Knob {
         let ceiling_mnm = self.arm.unwrap_or(100.0);
         let limits = Limits { ceiling_mnm, ..Limits::default() };
         let settings = Settings::default();
-        let table = feels.table(&settings, &self.feel.design(&file)?, &limits)?;
-        let note = table.notes().iter().find(|note| note.written == written).copied();
-        let note = note.unwrap_or(*table.reference());
+        // The knob is told this note and no other: what the hardest would need is no matter.
+        let design = self.feel.design(&file)?;
+        let table = feels.table(&settings, &design, &NO_MOTOR)?;
+        let fingering = feels.requirements().written().position(|note| note == written).unwrap_or(0);
+        table.accepts(fingering, &design, &limits)?;
+        let note = table.note(fingering).copied().unwrap_or(*table.reference());
         let take = match &self.record {
             Some(path) => {
-                let remarks =
-                    [format!("written {} of {}, {:?}", written.0, file.name, self.feel.design(&file)?)];
+                let remarks = [format!("written {} of {}, {design:?}", written.0, file.name)];
                 Some(TakeWriter::create(path, self.force, &remarks)?)
             }
             None => None,

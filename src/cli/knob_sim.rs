@@ -146,7 +146,8 @@ impl HandArgs {
             let script = Script::read_csv(file);
             Some(script.map_err(|source| Failure::HandScript { path: path.clone(), source })?)
         } else if let Some(text) = &self.deed.crescendo {
-            Some(Script::parse_crescendo(text).map_err(|e| Failure::Usage(e.to_string()))?)
+            let script = Script::parse_crescendo(text).map_err(|e| Failure::Usage(e.to_string()))?;
+            Some(if self.is_loop { script.returning() } else { script })
         } else {
             let deeds = [self.deed.hold.map(Script::hold), self.deed.press.map(Script::press)];
             deeds.into_iter().flatten().next().or_else(|| self.deed.slap.then(Script::slap))

@@ -8,6 +8,7 @@ use crate::cli::settings::SettingsArgs;
 use crate::control::knob::KnobDesign;
 use crate::control::midi::MidiDecoder;
 use crate::event::{Event, Timed};
+use crate::haptics::FeelDesign;
 use crate::instrument::{Clarinet, Model, Settings};
 use crate::render::breath::BreathCurve;
 use crate::render::breath::GAMMA_MAX;
@@ -70,7 +71,7 @@ pub struct PlayArgs {
     #[arg(long, value_name = "FILE", help_heading = "Breath (replaces that of a MIDI file)")]
     replay: Option<PathBuf>,
     /// Sample rate, Hz, 22050..384000
-    #[arg(long, value_name = "HZ", default_value = "48000", help_heading = "Output", value_parser = clap::value_parser!(u32).range(22_050..=384_000))]
+    #[arg(long, alias = "sr", value_name = "HZ", default_value = "48000", help_heading = "Output", value_parser = clap::value_parser!(u32).range(22_050..=384_000))]
     rate: u32,
 
     #[command(flatten)]
@@ -127,6 +128,11 @@ impl PlayArgs {
         let one_note = self.written.is_some() || self.sounding.is_some();
         let score = score.with_tail(self.tail.unwrap_or(if one_note { 0.0 } else { 1.0 }), self.rate);
         Ok(Prepared { model, settings, score, rate: self.rate })
+    }
+
+    /// How a knob shall feel.
+    pub fn feel(&self, file: &InstrumentFile) -> Result<FeelDesign, Failure> {
+        self.feel.design(file)
     }
 
     /// What is played, in a few words.

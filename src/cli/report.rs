@@ -1,9 +1,12 @@
 //! `chalumeau report`: a rendering as one HTML page with its sound, figures and tables.
 
+mod touch;
+
 use crate::cli::Failure;
 use crate::cli::args::within;
 use crate::cli::play::{PlayArgs, Prepared};
 use crate::cli::render::{about, progress};
+use crate::cli::report::touch::Touch;
 use crate::cli::watch::{Watch, Watched};
 use crate::figure;
 use crate::figure::report::{Cell, Plate, Report as Page, Sound, Table, write};
@@ -33,8 +36,9 @@ Examples:
 /// Play as `render` does, and make one HTML page of it
 ///
 /// The page has the sound to listen to, waveform, spectrogram, pitch against the score, breath and reed as figures, the
-/// instrument to scale, the cents of every note, and all settings. It needs no other file and no network, unless the sound
-/// is put beside it with --wav.
+/// instrument to scale, the mouth pressures at which notes speak, beat and choke, what a knob would feel and what it would
+/// refuse, the cents of every note, and all settings. It needs no other file and no network, unless the sound is put
+/// beside it with --wav.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Report {
@@ -78,7 +82,7 @@ impl Report {
                 (Sound::Inside(bytes.into_inner()), None, watched)
             }
         };
-        let report = self.page(&prepared, &watched, sound);
+        let report = self.page(&prepared, &watched, sound)?;
         write(&report, &mut page).map_err(|source| Failure::Report { path: self.out.clone(), source })?;
         page.keep()?;
         if let Some(wav) = wav {
@@ -111,7 +115,7 @@ impl Report {
         Ok(())
     }
 
-    fn page(&self, prepared: &Prepared, watched: &Watched, sound: Sound) -> Page {
+    fn page(&self, prepared: &Prepared, watched: &Watched, sound: Sound) -> Result<Page, Failure> {
         let (file, title) = (&prepared.model.file, self.play.title());
         let mut lines = about(prepared);
         let outcome = match spread(&watched.heard) {
@@ -124,13 +128,13 @@ impl Report {
         };
         lines.push(outcome.clone());
         let longest = watched.heard.iter().max_by_key(|heard| heard.sounding.to - heard.sounding.from);
-        let fingering = longest
-            .and_then(|heard| heard.sounding.note.written(file.transposition))
-            .and_then(|written| file.fingering(written));
+        let longest = longest.and_then(|heard| heard.sounding.note.written(file.transposition));
+        let fingering = longest.and_then(|written| file.fingering(written));
         let fingered = fingering.map_or(String::new(), |fingering| {
             format!(", fingered for written {}, the longest note", fingering.written)
         });
-        Page {
+        let touch = Touch::new(prepared, self.play.feel(file)?, longest);
+        Ok(Page {
             about: lines,
             sound,
             plates: vec![
@@ -157,6 +161,7 @@ impl Report {
                     ),
                 },
             ],
+            chapters: vec![touch.breath(), touch.haptics()],
             tables: vec![
                 notes(prepared, &watched.heard, &outcome),
                 settings(&prepared.settings),
@@ -164,7 +169,7 @@ impl Report {
             ],
             made_by: format!("Made by {} {}: {}", identity::NAME, identity::VERSION, command()),
             title,
-        }
+        })
     }
 }
 

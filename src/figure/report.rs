@@ -40,6 +40,18 @@ pub struct Table {
     pub rows: Vec<Vec<Cell>>,
 }
 
+/// A part of the page with words, figures and tables of its own.
+pub struct Chapter {
+    /// Heading.
+    pub title: String,
+    /// Paragraphs under it.
+    pub words: Vec<String>,
+    /// Figures.
+    pub plates: Vec<Plate>,
+    /// Tables, each under a smaller heading.
+    pub tables: Vec<Table>,
+}
+
 /// A cell of a table.
 pub enum Cell {
     /// Words.
@@ -58,6 +70,8 @@ pub struct Report {
     pub sound: Sound,
     /// Figures, most telling first.
     pub plates: Vec<Plate>,
+    /// Between the figures and the tables.
+    pub chapters: Vec<Chapter>,
     /// Tables.
     pub tables: Vec<Table>,
     /// Program and version, and the command that makes the page again.
@@ -81,21 +95,25 @@ const STYLE: &str = "\
 @media (prefers-color-scheme: dark) {
   :root { --paper: #141414; --ink: #e6e8ec; --quiet: #a4aab4; --line: #363b44; --stripe: #1c1f25; }
   /* White paper becomes the colour of the page; hues come back to where they were. */
-  img { filter: invert(0.92) hue-rotate(180deg); }
+  img { filter: invert(0.935) hue-rotate(180deg) brightness(1.2); }
 }
 body { margin: 0 auto; padding: 2rem 1.25rem 3rem; max-width: 66rem; background: var(--paper); color: var(--ink);
   font: 1rem/1.5 system-ui, sans-serif; }
 h1 { margin: 0 0 0.25rem; font-size: 1.9rem; line-height: 1.2; overflow-wrap: anywhere; }
 h2 { margin: 2.25rem 0 0.5rem; font-size: 1.3rem; }
-p { margin: 0.25rem 0; }
+h3 { margin: 1.5rem 0 0.5rem; font-size: 1.1rem; }
+p { margin: 0.25rem 0; max-width: 46rem; }
 .quiet, figcaption, footer { color: var(--quiet); }
 audio { display: block; width: 100%; margin: 1rem 0; }
 figure { margin: 1rem 0 2rem; }
-img { display: block; width: 100%; height: auto; }
+img { display: block; width: 100%; min-width: 40rem; height: auto; }
 .scroll { overflow-x: auto; }
+.scroll.table { max-height: 34rem; overflow-y: auto; }
+@media print { .scroll.table { max-height: none; } }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: 0.25rem 0.9rem 0.25rem 0; text-align: left; border-bottom: 1px solid var(--line); }
-td.number, th.number { text-align: right; }
+th { position: sticky; top: 0; background: var(--paper); white-space: nowrap; }
+td.number, th.number { text-align: right; white-space: nowrap; }
 tbody tr:nth-child(even) { background: var(--stripe); }
 footer { margin-top: 3rem; font-size: 0.9rem; overflow-wrap: anywhere; }
 code { font-size: 0.95em; }
@@ -148,16 +166,41 @@ pub fn write(report: &Report, out: &mut impl Write) -> Result<(), ReportError> {
     if !report.plates.is_empty() {
         writeln!(out, "<h2>Figures</h2>")?;
     }
-    for Plate { figure, caption, alternative } in &report.plates {
-        let picture = draw::svg(figure, None)?;
-        write!(out, "<figure>\n<img alt=\"{}\" src=\"data:image/svg+xml;base64,", escaped(alternative))?;
-        write_base64(picture.as_bytes(), out)?;
-        writeln!(out, "\">\n<figcaption>{}</figcaption>\n</figure>", escaped(caption))?;
+    write_plates(&report.plates, out)?;
+    let mut tables = 0;
+    let mut write_tables = |all: &[Table], level: u8, out: &mut _| {
+        all.iter().try_for_each(|table| {
+            tables += 1;
+            write_table(table, tables, level, out)
+        })
+    };
+    for chapter in &report.chapters {
+        writeln!(out, "<h2>{}</h2>", escaped(&chapter.title))?;
+        for line in &chapter.words {
+            writeln!(out, "<p>{}</p>", escaped(line))?;
+        }
+        write_plates(&chapter.plates, out)?;
+        write_tables(&chapter.tables, 3, out)?;
     }
-    for (index, table) in report.tables.iter().enumerate() {
-        write_table(table, index, out)?;
-    }
+    write_tables(&report.tables, 2, out)?;
     writeln!(out, "</main>\n<footer><p>{}</p></footer>\n</body>\n</html>", escaped(&report.made_by))?;
+    Ok(())
+}
+
+/// Each figure in a frame that a narrow screen can scroll sideways.
+fn write_plates(plates: &[Plate], out: &mut impl Write) -> Result<(), ReportError> {
+    for Plate { figure, caption, alternative } in plates {
+        let picture = draw::svg(figure, None)?;
+        let title = escaped(&figure.title);
+        write!(
+            out,
+            "<figure>\n<div class=\"scroll\" role=\"region\" tabindex=\"0\" aria-label=\"{title}\">\n<img alt=\"{}\" \
+             src=\"data:image/svg+xml;base64,",
+            escaped(alternative)
+        )?;
+        write_base64(picture.as_bytes(), out)?;
+        writeln!(out, "\">\n</div>\n<figcaption>{}</figcaption>\n</figure>", escaped(caption))?;
+    }
     Ok(())
 }
 
@@ -188,15 +231,15 @@ fn write_base64(bytes: &[u8], out: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-fn write_table(table: &Table, index: usize, out: &mut impl Write) -> Result<(), ReportError> {
+fn write_table(table: &Table, index: usize, level: u8, out: &mut impl Write) -> Result<(), ReportError> {
     let heading = format!("table-{index}");
-    writeln!(out, "<h2 id=\"{heading}\">{}</h2>", escaped(&table.title))?;
+    writeln!(out, "<h{level} id=\"{heading}\">{}</h{level}>", escaped(&table.title))?;
     if !table.about.is_empty() {
         writeln!(out, "<p>{}</p>", escaped(&table.about))?;
     }
     write!(
         out,
-        "<div class=\"scroll\" role=\"region\" tabindex=\"0\" aria-labelledby=\"{heading}\">\n<table>\n<thead><tr>"
+        "<div class=\"scroll table\" role=\"region\" tabindex=\"0\" aria-labelledby=\"{heading}\">\n<table>\n<thead><tr>"
     )?;
     let is_number =
         |column: usize| table.rows.iter().any(|row| matches!(row.get(column), Some(Cell::Number(_))));
@@ -235,6 +278,7 @@ mod tests {
             about: Vec::new(),
             sound,
             plates: Vec::new(),
+            chapters: Vec::new(),
             tables: vec![Table {
                 title: "T".to_owned(),
                 about: String::new(),

@@ -303,6 +303,12 @@ impl FeelTable {
         &self.notes
     }
 
+    /// Whether one note keeps to limits that the whole table may not have been held to: for a knob that is told no other.
+    pub fn accepts(&self, fingering: usize, design: &FeelDesign, limits: &Limits) -> Result<(), FeelRefused> {
+        let note = self.notes.get(fingering).unwrap_or(self.reference());
+        refuse(std::slice::from_ref(note), design, limits)
+    }
+
     /// The note exaggeration leaves alone.
     pub fn reference(&self) -> &NoteFeel {
         &self.notes[self.reference]

@@ -205,6 +205,16 @@ impl Script {
         if rows.is_empty() { Err(ScriptError::Empty) } else { Ok(Self { rows, is_force, is_loop: false }) }
     }
 
+    /// And back to where it began: before it is repeated, for a jump would trip the knob's over-speed limit.
+    pub fn returning(mut self) -> Self {
+        let (first, last) = (self.rows[0], self.rows[self.rows.len() - 1]);
+        let way_deg = (last.value - first.value).abs();
+        if !self.is_force && way_deg > 0.0 {
+            self.rows.push(Row { t_s: last.t_s + way_deg / REACH_DEG_PER_S, ..first });
+        }
+        self
+    }
+
     /// The same again and again.
     pub fn repeated(mut self) -> Self {
         self.is_loop = true;
@@ -295,6 +305,19 @@ mod tests {
                 "{bad}"
             );
         }
+    }
+
+    #[test]
+    fn a_crescendo_is_repeated_without_a_jump() {
+        let script = Script::parse_crescendo("60:220:4").unwrap().returning().repeated();
+        let deg = |t: f64| match script.at(t).aim {
+            Aim::Angle(deg) => deg,
+            Aim::Force(_) => unreachable!(),
+        };
+        let steps: Vec<f64> = (0..15_000).map(|ms| deg(f64::from(ms) / 1000.0)).collect();
+        assert!(steps.iter().any(|deg| *deg > 219.0));
+        let fastest = steps.windows(2).map(|w| (w[1] - w[0]).abs() * 1000.0).fold(0.0, f64::max);
+        assert!(fastest < 1.1 * REACH_DEG_PER_S, "{fastest} degrees a second");
     }
 
     #[test]

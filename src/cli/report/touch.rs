@@ -1,0 +1,487 @@
+//! The report's chapters on breath and on what a knob feels: for the instrument and the reed that were played.
+
+use crate::cli::play::Prepared;
+use crate::cli::report::{number, word};
+use crate::figure::breath::{Changes, Swell, Turn, pressures, turns};
+use crate::figure::felt::{AtContrast, Felt, Torque, thresholds, torques};
+use crate::figure::report::{Cell, Chapter, Plate, Table};
+use crate::haptics::law::torque_mnm;
+use crate::haptics::{FeelDesign, FeelRefused, FeelTable, Limits, NoteFeel, Requirement};
+use crate::instrument::Settings;
+use crate::instrument::felt::played_reed;
+use crate::reed::ReedTables;
+use crate::render::bifurcation;
+use crate::render::bifurcation::SOUNDS;
+use crate::render::breath::GAMMA_MAX;
+use crate::touch::feel::Feels;
+use crate::units::WrittenNote;
+use crate::wire::message::Law;
+
+/// Exaggerations shown.
+const CONTRASTS: [f64; 3] = [1.0, 3.0, 5.0];
+/// Both laws that push.
+const LAWS: [Law; 2] = [Law::Flow, Law::Pressure];
+/// Most mouth pressure the instrument knows, kPa.
+const MOST_KPA: f64 = 20.0;
+/// The swell goes this far beyond where the note chokes.
+const BEYOND: f64 = 1.06;
+/// The swell's way up, and its way down, s: a long breath.
+const SWELL_S: f64 = 6.0;
+/// Points along a curve.
+const POINTS: usize = 400;
+/// A mode that starts this much later than the first is another register's, over the first.
+const LATER: f64 = 1.01;
+
+fn law_name(law: Law) -> &'static str {
+    match law {
+        Law::Flow => "flow",
+        Law::Pressure => "pressure",
+        Law::Free => "free",
+    }
+}
+
+/// What the instrument asks, and what is made of it.
+pub struct Touch<'a> {
+    prepared: &'a Prepared,
+    feels: Feels,
+    asked: Vec<Option<Requirement>>,
+    /// As the command says.
+    design: FeelDesign,
+    limits: Limits,
+    /// Index of the fingering that is looked at from near.
+    near: Option<usize>,
+}
+
+impl<'a> Touch<'a> {
+    /// Asks the instrument: a second. `near` is the written note to swell.
+    pub fn new(prepared: &'a Prepared, design: FeelDesign, near: Option<WrittenNote>) -> Self {
+        let feels = Feels::new(&prepared.model);
+        let asked = feels.requirements().with(&played_reed(&prepared.model.file, &prepared.settings));
+        let near = near.and_then(|near| feels.requirements().written().position(|written| written == near));
+        let first = asked.iter().position(Option::is_some);
+        let near = near.filter(|&near| asked[near].is_some()).or(first);
+        Self { prepared, feels, asked, design, limits: Limits::default(), near }
+    }
+
+    fn closing_kpa(&self) -> f64 {
+        1e-3 * self.prepared.settings.closing_pa()
+    }
+
+    fn notes(&self) -> impl Iterator<Item = (WrittenNote, Option<Requirement>)> + '_ {
+        self.feels.requirements().written().zip(self.asked.iter().copied())
+    }
+
+    fn table(&self, design: &FeelDesign) -> Result<FeelTable, FeelRefused> {
+        self.feels.table(&self.prepared.settings, design, &self.limits)
+    }
+
+    fn reed(&self) -> String {
+        let settings = &self.prepared.settings;
+        format!(
+            "zeta {}, strength {}, lip {}, lay {}",
+            settings.zeta, settings.strength, settings.lip, settings.lay
+        )
+    }
+
+    fn changes(&self, (written, asked): (WrittenNote, Option<Requirement>)) -> Changes {
+        let of = |gamma: fn(&Requirement) -> f64| {
+            asked.as_ref().map_or(f64::NAN, |asked| self.closing_kpa() * gamma(asked))
+        };
+        Changes {
+            written: written.0,
+            speaks_kpa: of(|asked| asked.gamma_sounding),
+            beats_kpa: of(|asked| asked.gamma_beat),
+            chokes_kpa: of(|asked| asked.gamma_off),
+        }
+    }
+
+    /// How hard notes are blown, one of them swelled, and the knob's angle as breath.
+    pub fn breath(&self) -> Chapter {
+        let closing_kpa = self.closing_kpa();
+        let changes: Vec<Changes> = self.notes().map(|note| self.changes(note)).collect();
+        let instrument = &self.prepared.model.file.name;
+        let mut words = vec![format!(
+            "A note speaks from a mouth pressure on, beats from where the reed touches its lay in each cycle, and chokes \
+             where the reed stays shut; these are worked out from the bore and from the reed as it moves under the lip. It \
+             closes, at {closing_kpa:.2} kPa for every note, where the resting reed would be shut. On a curved lay the \
+             reed rolls up from where it beats and is shut only at more."
+        )];
+        let mut plates = vec![Plate {
+            figure: pressures(instrument, &self.reed(), closing_kpa, &changes),
+            caption: "Every note: green it sounds, orange the reed beats as well.".to_owned(),
+            alternative: format!(
+                "Mouth pressure in kilopascals over the written notes of {instrument}: where each begins, where its reed \
+                 begins to beat, and where it chokes, beside the closing pressure of {closing_kpa:.2} kPa. {}",
+                range(&changes)
+            ),
+        }];
+        if let Some((plate, said)) = self.near.and_then(|near| self.swell(near, changes[near])) {
+            plates.push(plate);
+            words.push(said);
+        }
+        match self.table(&self.design) {
+            Ok(table) => plates.push(self.turns(&table)),
+            Err(reason) => words.push(format!("No knob would take this feel: {reason}.")),
+        }
+        Chapter { title: "Breath".to_owned(), words, plates, tables: vec![self.pressures()] }
+    }
+
+    /// One note played from silence to closure and back.
+    fn swell(&self, near: usize, changes: Changes) -> Option<(Plate, String)> {
+        let (written, asked) = self.notes().nth(near)?;
+        let closing_kpa = self.closing_kpa();
+        let file = &self.prepared.model.file;
+        let sounding = written.sounding(file.transposition)?;
+        let most = f64::from(GAMMA_MAX).min(MOST_KPA / closing_kpa);
+        let gamma = (BEYOND * asked?.gamma_off).min(most);
+        let settings =
+            Settings { breath_full_kpa: (gamma * closing_kpa).max(1.0) as f32, ..self.prepared.settings };
+        let rate = self.prepared.rate;
+        let model = &self.prepared.model;
+        let played = bifurcation::measure(model, &settings, sounding, gamma as f32, SWELL_S, rate, |_| {});
+        let at = |share: f64| share * SWELL_S;
+        let moment = |t_s: f64, point: &bifurcation::Point| {
+            [t_s, closing_kpa * point.gamma, closing_kpa * point.rms, point.shut]
+        };
+        let up = played.up.iter().map(|point| moment(at(point.gamma / gamma), point));
+        let down = played.down.iter().map(|point| moment(at(2.0 - point.gamma / gamma), point));
+        let found = played.changes();
+        let said = |gamma: Option<f64>, what: &str| {
+            gamma.map(|gamma| format!("{what} {:.2} kPa", closing_kpa * gamma))
+        };
+        let told = [
+            said(found.begins, "begins at"),
+            said(found.beats, "beats from"),
+            said(found.chokes, "chokes at"),
+            said(found.returns, "comes back, fading, at"),
+            said(found.ends, "ends at"),
+        ];
+        let told: Vec<String> = told.into_iter().flatten().collect();
+        let outcome = match told.is_empty() {
+            true => format!("Written {written} does not sound on the way."),
+            false => format!("Written {written} {}.", told.join(", ")),
+        };
+        let plate = Plate {
+            figure: Swell {
+                title: format!("written {written}"),
+                note: format!("{}; {SWELL_S} s up and {SWELL_S} s down", self.reed()),
+                closing_kpa,
+                changes: Some(changes),
+                course: up.chain(down).collect(),
+                sounds_kpa: SOUNDS * closing_kpa,
+            }
+            .figure(),
+            caption: format!("Written {written}, blown from nothing to beyond closure and back."),
+            alternative: format!(
+                "Two panels over {} seconds: mouth pressure rising and falling with bands where the note sounds, beats \
+                 and is blown shut; and the amplitude in the mouthpiece. {outcome}",
+                2.0 * SWELL_S
+            ),
+        };
+        let why = "A breath that moves overtakes a threshold before the note has grown or died, so it begins late and ends \
+                   early; the slower the breath, the less.";
+        Some((plate, format!("{outcome} {why}")))
+    }
+
+    /// A few notes: the easiest, the lowest, the reference, the hardest.
+    fn few<'t>(&self, table: &'t FeelTable) -> Vec<&'t NoteFeel> {
+        let need = |note: &&NoteFeel| note.requirement.map_or(f64::NAN, |asked| asked.p_req_pa);
+        let sounding = || table.notes().iter().filter(|note| note.requirement.is_some());
+        let by = |a: &&NoteFeel, b: &&NoteFeel| need(a).total_cmp(&need(b));
+        let mut few: Vec<&NoteFeel> = [
+            sounding().min_by(by),
+            sounding().min_by_key(|note| note.written),
+            Some(table.reference()),
+            sounding().max_by(by),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        few.sort_by(by);
+        few.dedup_by_key(|note| note.written);
+        few
+    }
+
+    fn turns(&self, table: &FeelTable) -> Plate {
+        let few = self.few(table);
+        let most_deg = few.iter().map(|note| f64::from(note.feel.wall_deg)).fold(0.0, f64::max);
+        let turn = |note: &&NoteFeel| {
+            let kpa = |deg: f64| 1e-3 * note.map.pressure_pa(deg);
+            let landmark = |deg: f64| (deg, kpa(deg));
+            Turn {
+                name: note.written.to_string(),
+                map: (0..=POINTS).map(|n| landmark(most_deg * n as f64 / POINTS as f64)).collect(),
+                speaks: landmark(note.landmarks.a_on_deg),
+                closes: landmark(note.landmarks.a_close_deg),
+            }
+        };
+        let all: Vec<Turn> = few.iter().map(turn).collect();
+        let design = format!("{} law, Contrast {}", law_name(self.design.law), self.design.contrast);
+        Plate {
+            figure: turns(&format!("{design}; {}", self.reed()), self.closing_kpa(), &all),
+            caption: "What an angle blows: bent note by note, so that the sound begins (disc) where the torque has its \
+                      mark, and the reed closes (ring) where the torque ends."
+                .to_owned(),
+            alternative: format!(
+                "Mouth pressure against the angle of the knob, {design}, for written {}.",
+                names(&few)
+            ),
+        }
+    }
+
+    fn pressures(&self) -> Table {
+        let head = [
+            "written",
+            "sounds",
+            "speaks, kPa",
+            "of closing",
+            "own pitch from, kPa",
+            "beats, kPa",
+            "chokes, kPa",
+        ];
+        let file = &self.prepared.model.file;
+        let closing_kpa = self.closing_kpa();
+        let row = |(written, asked): (WrittenNote, Option<Requirement>)| {
+            let mut row = vec![
+                word(written.to_string()),
+                word(written.sounding(file.transposition).map_or(String::new(), |note| note.to_string())),
+            ];
+            let Some(asked) = asked else {
+                row.push(number("never"));
+                row.resize_with(head.len(), || number(""));
+                return row;
+            };
+            let kpa = |gamma: f64| number(format!("{:.2}", closing_kpa * gamma));
+            row.push(kpa(asked.gamma_sounding));
+            row.push(number(format!("{:.3}", asked.gamma_sounding)));
+            row.push(match asked.gamma_own {
+                None => number("never"),
+                Some(own) if own > LATER * asked.gamma_sounding => {
+                    number(format!("{:.2}, first {:.0} Hz", closing_kpa * own, asked.sounding_hz))
+                }
+                Some(_) => number("at once"),
+            });
+            row.extend([kpa(asked.gamma_beat), kpa(asked.gamma_off)]);
+            row
+        };
+        Table {
+            title: "Mouth pressures".to_owned(),
+            about: String::new(),
+            head: head.map(str::to_owned).to_vec(),
+            rows: self.notes().map(row).collect(),
+        }
+    }
+
+    /// Torque, thresholds, what goes to the knob, and what a knob would refuse.
+    pub fn haptics(&self) -> Chapter {
+        let ceiling_mnm = self.limits.ceiling_mnm;
+        let mut words = vec![format!(
+            "What a force-feedback knob is told for these notes, at {} mNm. Contrast 1 is what the bore asks; more \
+             exaggerates how notes differ, in the hand only. Drawn is the torque the knob's firmware works out, at rest and \
+             without its friction, which may not pass {ceiling_mnm:.0} mNm or be steeper than {:.2} N m/rad, up to which a \
+             sampled knob stays passive, nor push the hand along with more than {:.1} N m/rad.",
+            self.design.strength_mnm, self.limits.stiffness_nm_per_rad, self.limits.push_nm_per_rad
+        )];
+        let mut plates = Vec::new();
+        let mut felt = Vec::new();
+        let mut refusals = Vec::new();
+        for law in LAWS {
+            let mut on_deg = Vec::new();
+            let mut at_kpa = Vec::new();
+            let mut panels = Vec::new();
+            for contrast in CONTRASTS {
+                let design = FeelDesign { law, contrast, ..self.design };
+                let table = self.table(&design);
+                refusals.push(self.refusal(&design, table.as_ref().err()));
+                if let Ok(table) = &table {
+                    let sounding = || table.notes().iter().filter(|note| note.requirement.is_some());
+                    let on = sounding().map(|note| (note.written.0, note.landmarks.a_on_deg));
+                    on_deg.push((contrast, on.collect()));
+                    if at_kpa.is_empty() {
+                        at_kpa = sounding().map(|note| (note.written.0, marked_kpa(note))).collect();
+                    }
+                }
+                let notes = table.map(|table| self.few(&table).into_iter().map(torque).collect());
+                panels.push(AtContrast { contrast, notes: notes.map_err(|reason| reason.to_string()) });
+            }
+            plates.push(self.torques(law, &panels));
+            felt.push(Felt { law: law_name(law).to_owned(), at_kpa, on_deg });
+        }
+        plates.push(self.thresholds(&felt));
+        let mut tables = vec![refused(refusals)];
+        match self.table(&self.design) {
+            Ok(table) => tables.push(self.feel(&table)),
+            Err(reason) => words.push(format!("The feel asked for is refused: {reason}.")),
+        }
+        Chapter { title: "Haptics".to_owned(), words, plates, tables }
+    }
+
+    fn torques(&self, law: Law, panels: &[AtContrast]) -> Plate {
+        let name = law_name(law);
+        let said: Vec<String> = panels
+            .iter()
+            .filter_map(|at| at.notes.as_ref().err().map(|why| format!("Contrast {}: {why}.", at.contrast)))
+            .collect();
+        let shape = match law {
+            Law::Flow => "It rises to the threshold and falls to nothing where the reed shuts.",
+            _ => "A spring with a step at the threshold.",
+        };
+        Plate {
+            figure: torques(name, &self.reed(), self.limits.ceiling_mnm, panels),
+            caption: format!("The {name} law. {shape} The last rise is the end wall. {}", said.join(" "))
+                .trim_end()
+                .to_owned(),
+            alternative: format!(
+                "Torque in millinewton metres against the angle of the knob under the {name} law, a panel for each of \
+                 Contrast 1, 3 and 5, for the easiest, the lowest, the reference and the hardest note. {}",
+                said.join(" ")
+            ),
+        }
+    }
+
+    fn thresholds(&self, felt: &[Felt]) -> Plate {
+        let closing_kpa = self.closing_kpa();
+        let sounds: Vec<(u8, f64)> = self
+            .notes()
+            .map(|(note, asked)| (note.0, asked.map_or(f64::NAN, |asked| closing_kpa * asked.gamma_sounding)))
+            .collect();
+        let farthest = felt
+            .iter()
+            .flat_map(|felt| &felt.at_kpa)
+            .filter_map(|(written, kpa)| {
+                let (_, sounds) = sounds.iter().find(|(note, _)| note == written)?;
+                Some((kpa / sounds - 1.0).abs())
+            })
+            .fold(0.0, f64::max);
+        let outcome = format!(
+            "The mark of the torque lies within {:.1} % of where the sound begins, for every note and both laws.",
+            100.0 * farthest
+        );
+        Plate {
+            figure: thresholds(&self.reed(), &sounds, felt),
+            caption: format!("{outcome} Contrast moves both on the knob."),
+            alternative: format!(
+                "Over the written notes: mouth pressure where each begins to sound and where the torque has its mark, and \
+                 the angle of the felt threshold at Contrast 1, 3 and 5 under both laws. {outcome}"
+            ),
+        }
+    }
+
+    fn feel(&self, table: &FeelTable) -> Table {
+        let head = [
+            "written",
+            "A_on, degrees",
+            "A_beat, degrees",
+            "closure, degrees",
+            "A_off, degrees",
+            "torque at A_on, mNm",
+            "scale, mNm",
+        ];
+        let row = |note: &NoteFeel| {
+            let at = note.landmarks;
+            let degrees = [at.a_on_deg, at.a_beat_deg, at.a_close_deg, at.a_off_deg];
+            let mut row = vec![word(note.written.to_string())];
+            row.extend(degrees.map(|deg| number(format!("{deg:.1}"))));
+            row.push(number(format!("{:.1}", torque_mnm(&note.feel, ReedTables::seed(), at.a_on_deg))));
+            row.push(number(format!("{:.1}", note.feel.scale_mnm)));
+            row
+        };
+        Table {
+            title: "What the knob is told".to_owned(),
+            about: format!(
+                "FEEL of every note, {} law, Contrast {} about {}: where it is felt to start, beats, closes and chokes.",
+                law_name(self.design.law),
+                self.design.contrast,
+                table.reference().written
+            ),
+            head: head.map(str::to_owned).to_vec(),
+            rows: table.notes().iter().map(row).collect(),
+        }
+    }
+
+    /// Whether a feel is taken, up to which torque, and what stands in the way of more.
+    fn refusal(&self, design: &FeelDesign, reason: Option<&FeelRefused>) -> Vec<Cell> {
+        let taken = reason.map_or("accepted".to_owned(), |reason| format!("refused: {reason}"));
+        let (mut low, mut high) = (0.0, 450.0);
+        let mut bound = None;
+        // To a millinewton metre.
+        while high - low > 1.0 {
+            let strength_mnm = (0.5_f64 * (low + high)).round();
+            match self.table(&FeelDesign { strength_mnm, ..*design }) {
+                Ok(_) => low = strength_mnm,
+                Err(reason) => (high, bound) = (strength_mnm, Some(reason)),
+            }
+        }
+        let bound = match bound {
+            Some(FeelRefused::Ceiling { .. }) => "the ceiling",
+            Some(FeelRefused::Stiffness { .. }) => "the slope up to which the knob is passive",
+            Some(FeelRefused::Push { .. }) => "the slope that would push the hand along",
+            Some(_) => "the reed, at any torque",
+            None => "nothing",
+        };
+        vec![
+            word(law_name(design.law)),
+            number(format!("{}", design.contrast)),
+            word(taken),
+            number(format!("{low:.0}")),
+            word(bound),
+        ]
+    }
+}
+
+fn refused(rows: Vec<Vec<Cell>>) -> Table {
+    let head = ["law", "Contrast", "at the torque asked for", "accepted up to, mNm", "then in the way"];
+    Table {
+        title: "What a knob would refuse".to_owned(),
+        about: "A feel that a knob could not hold still, or that passes the ceiling, is refused whole; nothing is clipped."
+            .to_owned(),
+        head: head.map(str::to_owned).to_vec(),
+        rows,
+    }
+}
+
+fn names(few: &[&NoteFeel]) -> String {
+    few.iter().map(|note| note.written.to_string()).collect::<Vec<_>>().join(", ")
+}
+
+/// From the easiest to the hardest note, in words.
+fn range(changes: &[Changes]) -> String {
+    let speaks = || changes.iter().filter(|note| note.speaks_kpa.is_finite());
+    let by = |a: &&Changes, b: &&Changes| a.speaks_kpa.total_cmp(&b.speaks_kpa);
+    match (speaks().min_by(by), speaks().max_by(by)) {
+        (Some(easy), Some(hard)) => format!(
+            "The easiest is {} at {:.2} kPa, the hardest {} at {:.2} kPa.",
+            WrittenNote(easy.written),
+            easy.speaks_kpa,
+            WrittenNote(hard.written),
+            hard.speaks_kpa
+        ),
+        _ => "No note sounds with this reed.".to_owned(),
+    }
+}
+
+/// The torque of a note, as the firmware makes it.
+fn torque(note: &NoteFeel) -> Torque {
+    let tables = ReedTables::seed();
+    let at = |deg: f64| (deg, torque_mnm(&note.feel, tables, deg));
+    let (from, to) = (-150.0, f64::from(note.feel.wall_deg) + 10.0);
+    Torque {
+        name: note.written.to_string(),
+        curve: (0..=POINTS).map(|n| at(from + (to - from) * n as f64 / POINTS as f64)).collect(),
+        on: at(note.landmarks.a_on_deg),
+        close: at(note.landmarks.a_close_deg),
+    }
+}
+
+/// Mouth pressure at the mark of a note's torque, found on its curve: the top under flow, else its steepest rise.
+fn marked_kpa(note: &NoteFeel) -> f64 {
+    const STEP_DEG: f64 = 0.25;
+    let tables = ReedTables::seed();
+    let mnm = |deg: f64| torque_mnm(&note.feel, tables, deg);
+    let rise = |deg: f64| mnm(deg + STEP_DEG) - mnm(deg - STEP_DEG);
+    let value = |deg: f64| if note.feel.law == Law::Flow { mnm(deg) } else { rise(deg) };
+    let steps = (note.landmarks.a_close_deg / STEP_DEG) as usize;
+    let degrees = (4..steps).map(|step| STEP_DEG * step as f64);
+    let mark = degrees.max_by(|&a, &b| value(a).total_cmp(&value(b))).unwrap_or(0.0);
+    1e-3 * note.map.pressure_pa(mark)
+}
