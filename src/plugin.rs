@@ -162,6 +162,12 @@ impl Plugin for Chalumeau {
         if let Some(Timed { event: Event::Breath(unit), .. }) = moved[1] {
             breaths.blow(Way::Parameter, unit);
         }
+        let pressed = self.window.as_mut().map(|(_, window)| window.keys()).unwrap_or_default();
+        for timed in pressed.iter().flatten() {
+            if let Event::NoteOn { velocity, .. } = timed.event {
+                breaths.press(velocity);
+            }
+        }
         let sources = [self.params.knob.h_source.value(), self.params.knob.k_source.value()];
         let played = std::iter::from_fn(|| context.next_event()).flat_map(|event| {
             if reed_sources.take(&event, sources) {
@@ -176,9 +182,8 @@ impl Plugin for Chalumeau {
             .into_iter()
             .flatten()
         });
-        let pressed = self.window.as_mut().map(|(_, window)| window.keys());
-        let pressed = pressed.into_iter().flatten().flatten();
-        let events = moved.into_iter().flatten().chain(bent).chain(pressed).chain(played);
+        let events =
+            moved.into_iter().flatten().chain(bent).chain(pressed.into_iter().flatten()).chain(played);
         #[cfg(feature = "devices")]
         if let Some((_, audio)) = &mut self.knob {
             let replay = self.params.knob.replay.value();

@@ -157,7 +157,12 @@ fn instruments_are_made_checked_and_shown() {
     refused(&d, "instrument new --notes E4,C4 --out x.toml", &["C4 comes after E4"]);
     refused(&d, "instrument new --notes C4,X4 --out x.toml", &["\"X4\" must be a MIDI number"]);
     refused(&d, "instrument new --scale 5 --out x.toml", &["x.toml", "reed_volume_mm3 is 150000"]);
+    refused(&d, "instrument new --notes C-1 --out x.toml", &["an octave of C-1"]);
     refused(&d, "instrument check none.toml", &["cannot read none.toml"]);
+    // In tune for the pitch it was made for.
+    let old = chalumeau(d.path(), words("instrument new --notes D3,E3,F3 --a4 415 --out old.toml"));
+    let message = String::from_utf8(old.stderr).unwrap();
+    assert!(old.status.success() && !message.contains("warning"), "{message}");
     // Its only note is to sound at a peak that a tube as short as this does not have.
     succeeds(d.path(), "instrument new --notes C6 --out high.toml");
     let high = fs::read_to_string(d.path().join("high.toml")).unwrap();
@@ -167,6 +172,26 @@ fn instruments_are_made_checked_and_shown() {
         "instrument check mute.toml",
         &["error: no note of the chart has a peak", "mute.toml: cannot be played"],
     );
+}
+
+/// A name may have anything in it but stays one field of a table, one line of a comment, and out of the picture's tags.
+#[test]
+fn names_do_not_break_tables_and_pictures() {
+    let d = tempfile::tempdir().unwrap();
+    succeeds(d.path(), "instrument new --notes D3,E3 --name tube --out tube.toml");
+    let tube = fs::read_to_string(d.path().join("tube.toml")).unwrap();
+    let odd = tube
+        .replace("name = \"tube\"", "name = \"a\\nb\\u0007<i>\"")
+        .replace("part = \"cylinder\"", "part = \"a,\\\"b\\\"\"")
+        .replace("\"H1\"", "\"H,1\"");
+    fs::write(d.path().join("odd.toml"), odd).unwrap();
+    let bore = succeeds(d.path(), "bore --instrument odd.toml --plot odd.svg");
+    assert!(bore.lines().nth(1).unwrap().starts_with("# a b"), "{bore}");
+    assert!(bore.contains("bore,\"a,\"\"b\"\"\",0,") && bore.contains("hole,\"H,1\","), "{bore}");
+    let show = succeeds(d.path(), "instrument show --instrument odd.toml");
+    assert!(show.contains("note,E3,,,,,\"chalumeau peak 1: H,1\""), "{show}");
+    let picture = fs::read_to_string(d.path().join("odd.svg")).unwrap();
+    assert!(!picture.contains('\u{7}') && !picture.contains("<i>") && picture.contains("&lt;i&gt;"));
 }
 
 #[test]
@@ -185,6 +210,7 @@ fn a_measured_reed_has_both_faces() {
     let free = format!("reed --physical --H 3 --k {} --zeta 0.4", value(&stiff, "stiffness,k"));
     assert!((value(&succeeds(d.path(), &free), "stiffness,K") - 2.0 * stiffness).abs() < 1e-4);
     refused(&d, "reed --physical --H 3 --reed-opening 0.6", &["--H", "--reed-opening"]);
+    refused(&d, "reed --physical --A 0 --reed-width 12", &["--A 0"]);
     refused(&d, "render --written 60 --zeta 0.3 --reed-width 12 --out x.wav", &["--zeta", "--reed-width"]);
     refused(
         &d,

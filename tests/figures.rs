@@ -29,7 +29,7 @@ fn a_figure_becomes_a_png_or_an_svg_of_its_size() {
     draw::write(&example(), &path("a.SVG"), Some("800x500".parse().unwrap()), false).unwrap();
     let svg = fs::read_to_string(path("a.SVG")).unwrap();
     assert!(svg.contains("viewBox=\"0 0 800 500\"") && svg.contains("aria-label=\"pressure, kPa\""));
-    assert!(svg.contains("<title>Frequency &lt;against> pressure</title>"));
+    assert!(svg.contains("<title>Frequency &lt;against&gt; pressure</title>"));
     assert!(!svg.contains("<text"), "words are outlines: no font is needed");
     assert!(matches!(draw::write(&example(), &path("a.png"), None, false), Err(DrawError::Output(_))));
     for name in ["a.jpg", "a", "a.gif"] {

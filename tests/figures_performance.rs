@@ -422,7 +422,7 @@ fn a_report_holds_the_sound_the_cents_and_the_settings() {
         page.matches("<td>A#3</td><td>C4</td>").count() + page.matches("<td>D4</td><td>E4</td>").count();
     assert_eq!(notes, 2, "sounding and written notes");
     // Beside the page, the sound is a file.
-    succeeds(&d, &format!("report {play} --out s.html --wav s.wav"));
+    succeeds(&d, &format!("report {play} --out s.html --wav ./s.wav"));
     let page = String::from_utf8(read(&d, "s.html")).unwrap();
     assert!(page.contains("src=\"s.wav\"") && !page.contains("data:audio"));
     assert!(read(&d, "s.wav") == read(&d, "r.wav"));

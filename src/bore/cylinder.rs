@@ -81,6 +81,9 @@ pub enum CylinderError {
         /// Distance of the centres, mm.
         apart_mm: f64,
     },
+    /// Nothing to tune.
+    #[error("no resonance of such a bore lies within an octave of {0}; it is too low or too high for it")]
+    NoResonance(WrittenNote),
     /// No cylinder plays it.
     #[error(
         "{written} cannot be reached with these holes (still {cents:+.1} cents off); make the holes wider or the chimneys shorter"
@@ -112,9 +115,7 @@ impl Cylinder {
             worst = (self.notes[0], 0.0);
             for (index, (fingering, wanted_hz)) in file.fingerings.iter().zip(&wanted).enumerate() {
                 let found = matrix.playing_frequency(&fingering.open, self.reed_volume_m3, *wanted_hz);
-                let Some((hz, _)) = found else {
-                    return Err(CylinderError::OutOfReach { written: fingering.written, cents: f64::NAN });
-                };
+                let (hz, _) = found.ok_or(CylinderError::NoResonance(fingering.written))?;
                 let off = cents(hz, *wanted_hz);
                 if off.abs() > f64::abs(worst.1) {
                     worst = (fingering.written, off);
@@ -302,6 +303,7 @@ mod tests {
         assert!(message(cylinder(&[])).contains("1 to 41"));
         assert!(message(cylinder(&[52, 50])).contains("D3 comes after E3"));
         assert!(message(Cylinder { transposition: 36, ..cylinder(&[30]) }).contains("F#1"));
+        assert!(message(cylinder(&[0])).contains("an octave of C-1"));
         assert!(
             message(Cylinder { hole_radius_m: 8e-3, ..cylinder(&[50, 52]) })
                 .contains("wider than a bore of 14.9")

@@ -8,6 +8,7 @@ use crate::cli::render::progress;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::table::TableArgs;
 use crate::figure::bifurcation::Ramp;
+use crate::reed::ReedLaw;
 use crate::render::bifurcation;
 use crate::render::breath::{BreathCurve, GAMMA_MAX};
 use crate::units::{Air, WrittenNote};
@@ -61,7 +62,7 @@ impl Bifurcation {
         // Flow strength of the reed as strength, lip and H, k, A make it: what the linear theory asks for.
         let zeta = {
             let law = settings.reed_law();
-            let reference = crate::reed::ReedLaw::default();
+            let reference = ReedLaw::default();
             let opening = law.a() * law.h() / reference.h();
             f64::from(settings.zeta) * opening / law.closing().sqrt()
         };

@@ -4,7 +4,7 @@ use crate::bore::instrument_file::{Fingering, InstrumentFile};
 use crate::cli::Failure;
 use crate::cli::args::{InstrumentArg, check_fingering, note};
 use crate::cli::plot::PlotArgs;
-use crate::cli::table::TableArgs;
+use crate::cli::table::{TableArgs, quoted};
 use crate::figure;
 use crate::units::WrittenNote;
 use clap::Args;
@@ -44,8 +44,7 @@ impl Bore {
         table.comment(format_args!("{}; mm from the tip of the reed", file.name))?;
         let mut last = None;
         for segment in &file.bore {
-            // A comma would make two columns of a name.
-            let part = segment.part.replace(',', " ");
+            let part = quoted(&segment.part);
             for (x_m, r_m) in [(segment.x_start_m, segment.r_start_m), (segment.x_end_m, segment.r_end_m)] {
                 let row = format!("bore,{part},{},{},,", mm(x_m), mm(2.0 * r_m));
                 if last.as_ref() != Some(&row) {
@@ -55,7 +54,7 @@ impl Bore {
             }
         }
         for (index, hole) in file.holes.iter().enumerate() {
-            let name = hole.name.replace(',', " ");
+            let name = quoted(&hole.name);
             let open = fingering.map_or("", |fingering| {
                 if fingering.open.get(index).copied().unwrap_or(false) { "1" } else { "0" }
             });

@@ -5,7 +5,8 @@ use crate::bore::cylinder::Cylinder;
 use crate::bore::instrument_file::{ImportDetails, ImportError, InstrumentFile, Sheet};
 use crate::cli::Failure;
 use crate::cli::args::{AirArg, InstrumentArg, note, within};
-use crate::cli::table::TableArgs;
+use crate::cli::table::{TableArgs, quoted};
+use crate::instrument::model::A4_HZ;
 use crate::output::NewFile;
 use crate::units::{Air, WrittenNote};
 use clap::{Args, Subcommand};
@@ -70,8 +71,8 @@ struct NewInstrument {
 }
 
 impl NewInstrument {
-    /// Writes what can be read again, and says what it is.
-    fn write(&self, file: &InstrumentFile) -> Result<(), Failure> {
+    /// Writes what can be read again, and says what it is and what is wrong with it at this pitch of A4, Hz.
+    fn write(&self, file: &InstrumentFile, a4_hz: f64) -> Result<(), Failure> {
         let text = file.to_toml();
         // A scaled or solved instrument may have left the limits of the format.
         InstrumentFile::parse(&text)
@@ -89,7 +90,7 @@ impl NewInstrument {
             file.lowest(),
             file.highest()
         );
-        for concern in Check::new(file, Air::default(), 440.0).concerns {
+        for concern in Check::new(file, Air::default(), a4_hz).concerns {
             eprintln!("warning: {concern}");
         }
         Ok(())
@@ -144,7 +145,7 @@ impl Import {
             reed_volume_mm3: self.reed_volume,
             nominal_diameter_mm: self.nominal_diameter_mm,
         };
-        self.new.write(&InstrumentFile::from_csv(bore, holes, fingerings, &details)?)
+        self.new.write(&InstrumentFile::from_csv(bore, holes, fingerings, &details)?, A4_HZ)
     }
 }
 
@@ -259,7 +260,7 @@ impl New {
                 return Err(Failure::Usage("one of --notes and --scale must be given".to_owned()));
             }
         };
-        self.new.write(&file)
+        self.new.write(&file, self.a4)
     }
 
     fn cylinder(&self, notes: &str) -> Result<InstrumentFile, Failure> {
@@ -312,7 +313,7 @@ impl Show {
     fn run(&self) -> Result<(), Failure> {
         let file = self.instrument.load()?;
         let mut table = self.table.open("what,name,x_mm,length_mm,diameter_mm,end_diameter_mm,detail")?;
-        table.comment(format_args!("{}", file.name.replace(['\n', '\r'], " ")))?;
+        table.comment(format_args!("{}", file.name))?;
         table.comment(format_args!(
             "sounds {} semitones below what is written, {} to {}; reed volume {:.0} mm3",
             file.transposition,
@@ -344,24 +345,11 @@ impl Show {
             let open: Vec<&str> = (file.holes.iter().zip(&fingering.open))
                 .filter_map(|(hole, open)| open.then_some(hole.name.as_str()))
                 .collect();
-            table.line(format_args!(
-                "note,{},,,,,{} peak {}: {}",
-                fingering.written,
-                fingering.register,
-                fingering.mode,
-                if open.is_empty() { "all closed".to_owned() } else { quoted(&open.join(" ")) }
-            ))?;
+            let open = if open.is_empty() { "all closed".to_owned() } else { open.join(" ") };
+            let detail = format!("{} peak {}: {open}", fingering.register, fingering.mode);
+            table.line(format_args!("note,{},,,,,{}", fingering.written, quoted(&detail)))?;
         }
         table.finish()
-    }
-}
-
-/// A field of a table, whatever is in it.
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
     }
 }
 

@@ -265,11 +265,13 @@ impl Reed {
             }
             return table.finish();
         }
-        let reference = PhysicalReed::reference();
-        let measured =
-            self.measured.reed(REFERENCE_RADIUS_M).map(|reed| reed.seed(&reference, self.a.unwrap_or(1.0)));
-        let (h, a) =
-            (measured.map(|seed| seed.h).or(self.h).unwrap_or(ReedLaw::default().h()), self.a.unwrap_or(1.0));
+        let (reference, a) = (PhysicalReed::reference(), self.a.unwrap_or(1.0));
+        let measured = self.measured.reed(REFERENCE_RADIUS_M);
+        if measured.is_some() && a == 0.0 {
+            return Err(Failure::Usage("--A 0 lets no air through any measured reed; give more".to_owned()));
+        }
+        let measured = measured.map(|reed| reed.seed(&reference, a));
+        let h = measured.map(|seed| seed.h).or(self.h).unwrap_or(ReedLaw::default().h());
         let law = match measured.map(|seed| seed.k).or(self.k) {
             Some(k) => ReedLaw::free(h, k, a)?,
             None => ReedLaw::coupled(h, a)?,

@@ -13,13 +13,13 @@ use clap::Args;
 #[derive(Args)]
 #[command(next_help_heading = "Reed as measured, instead of H, k and zeta")]
 pub struct PhysicalReedArgs {
-    /// Stiffness K, N/m, 100..20000 [default: the reference reed's, 1234]
+    /// Stiffness K, N/m, 100..20000 [default: the reference reed's, 1218]
     #[arg(long, value_name = "N_PER_M", conflicts_with_all = ["h", "k", "zeta"], value_parser = |s: &str| within(s, 100.0, 20_000.0))]
     reed_stiffness: Option<f64>,
     /// Effective area A_r, mm2, 10..1000 [default: 101.5]
     #[arg(long, value_name = "MM2", conflicts_with_all = ["h", "k", "zeta"], value_parser = |s: &str| within(s, 10.0, 1_000.0))]
     reed_area: Option<f64>,
-    /// Width w of the channel, tip and side slits together, mm, 1..100 [default: 13.9]
+    /// Width w of the channel, tip and side slits together, mm, 1..100 [default: 15.2]
     #[arg(long, value_name = "MM", conflicts_with_all = ["h", "k", "zeta"], value_parser = |s: &str| within(s, 1.0, 100.0))]
     reed_width: Option<f64>,
     /// Opening at the tip at rest, mm, 0.1..4 [default: 0.5]

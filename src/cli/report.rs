@@ -105,7 +105,8 @@ impl Report {
             return Err(Failure::Usage(format!("--wav {}: the name must end in .wav", wav.display())));
         }
         // A page that is moved takes what lies beside it along.
-        if wav.parent() != self.out.parent() {
+        let folder = |path: &Path| Path::new(".").join(path.parent().unwrap_or(path));
+        if folder(wav) != folder(&self.out) {
             return Err(Failure::Usage(format!(
                 "--wav {} lies elsewhere than the page {}; put both into one directory",
                 wav.display(),

@@ -3,6 +3,7 @@
 use crate::cli::Failure;
 use crate::output::NewFile;
 use clap::Args;
+use std::borrow::Cow;
 use std::fmt;
 use std::io;
 use std::io::{BufWriter, StdoutLock, Write};
@@ -58,9 +59,9 @@ impl Table {
         Ok(table)
     }
 
-    /// A line for readers, not for programs.
+    /// A line for readers, not for programs; a name of several lines becomes one.
     pub fn comment(&mut self, text: fmt::Arguments) -> Result<(), Failure> {
-        self.line(format_args!("# {text}"))
+        self.line(format_args!("# {}", text.to_string().replace(['\n', '\r'], " ")))
     }
 
     /// One line of data.
@@ -77,5 +78,14 @@ impl Table {
             Sink::Stdout(mut out) => Ok(out.flush()?),
             Sink::File(file) => Ok(file.keep()?),
         }
+    }
+}
+
+/// A field of a table, whatever is in it.
+pub fn quoted(text: &str) -> Cow<'_, str> {
+    if text.contains([',', '"', '\n', '\r']) {
+        Cow::Owned(format!("\"{}\"", text.replace('"', "\"\"")))
+    } else {
+        Cow::Borrowed(text)
     }
 }

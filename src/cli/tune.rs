@@ -8,6 +8,7 @@ use crate::cli::render::progress;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::table::TableArgs;
 use crate::figure::tune::{self, Heard, Round};
+use crate::instrument::tuner::each_note;
 use crate::instrument::{Clarinet, Model, Settings, Tuning};
 use crate::render;
 use crate::render::breath::{BreathCurve, GAMMA_MAX};
@@ -15,8 +16,8 @@ use crate::render::score::Score;
 use crate::units::{SoundingNote, WrittenNote, cents};
 use clap::Args;
 use std::convert::Infallible;
+use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::thread;
 
 /// Time for a note to become steady, then to be measured, s.
 const SETTLE_S: f64 = 0.8;
@@ -130,26 +131,14 @@ fn measure_all(
     rate: u32,
 ) -> Vec<Option<(f64, f64)>> {
     let bar = progress(notes.len());
-    let measured = |written: WrittenNote| {
-        let heard = measure(written, model, curve, settings, rate);
+    let measured = |note: usize| measure(notes[note], model, curve, settings, rate);
+    // Nothing ends it early, so there is always an answer.
+    let heard = each_note(notes.len(), measured, &mut |_| {
         bar.inc(1);
-        heard
-    };
-    let workers = thread::available_parallelism().map_or(1, usize::from);
-    let share = notes.len().div_ceil(workers).max(1);
-    let heard = thread::scope(|scope| {
-        let measured = &measured;
-        let shares: Vec<_> = notes
-            .chunks(share)
-            .map(|notes| scope.spawn(move || notes.iter().map(|&note| measured(note)).collect::<Vec<_>>()))
-            .collect();
-        shares
-            .into_iter()
-            .flat_map(|share| share.join().unwrap_or_else(|e| std::panic::resume_unwind(e)))
-            .collect()
+        ControlFlow::Continue(())
     });
     bar.finish_and_clear();
-    heard
+    heard.unwrap_or_default()
 }
 
 /// Frequency of a note, Hz, and its distance from where it should be, cents; `None` if it does not sound.

@@ -381,12 +381,6 @@ impl Panel {
         self
     }
 
-    /// With several more layers.
-    pub fn with_all<L: Into<Layer>>(mut self, layers: impl IntoIterator<Item = L>) -> Self {
-        self.layers.extend(layers.into_iter().map(Into::into));
-        self
-    }
-
     /// With a second scale at the top.
     pub fn top(mut self, axis: SecondAxis) -> Self {
         self.top = Some(axis);

@@ -78,9 +78,7 @@ impl Size {
     pub const MIN: u32 = 400;
     /// Above this bitmaps no longer fit in memory with ease.
     pub const MAX: u32 = 4_000;
-}
 
-impl Size {
     /// The size a figure asks for.
     fn of(figure: &Figure) -> Self {
         let [width, height] = figure.size.map(|pixels| pixels.clamp(Self::MIN, Self::MAX));
@@ -282,7 +280,7 @@ pub fn svg(figure: &Figure, size: Option<Size>) -> Result<String, DrawError> {
     let body = body.and_then(|body| body.rfind("</svg>").map(|end| &body[..end]));
     let body = body.ok_or_else(|| DrawError::Backend("the SVG backend wrote no <svg>".to_owned()))?;
     let (width, height) = (size.width, size.height);
-    let title = figure.title.replace('&', "&amp;").replace('<', "&lt;");
+    let title = escaped(&figure.title);
     Ok(format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} \
          {height}\">\n<title>{title}</title>\n<rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n{}<g \
@@ -292,6 +290,24 @@ pub fn svg(figure: &Figure, size: Option<Size>) -> Result<String, DrawError> {
         body.trim(),
         vector.over
     ))
+}
+
+/// Text as SVG and HTML want it, in elements and in attributes.
+pub(super) fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&#39;"),
+            // Not allowed in either, whatever a file name has in it.
+            c if c.is_control() && !matches!(c, '\n' | '\t') => out.push('\u{fffd}'),
+            c => out.push(c),
+        }
+    }
+    out
 }
 
 /// Draws `figure` into a new file, `.png`, `.svg` or `.json`.

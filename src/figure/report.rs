@@ -4,7 +4,7 @@
 //! headings in order, texts for all figures and heads for all tables, and no script.
 
 use crate::figure::Figure;
-use crate::figure::draw::{self, DrawError};
+use crate::figure::draw::{self, DrawError, escaped};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::io;
@@ -118,24 +118,6 @@ tbody tr:nth-child(even) { background: var(--stripe); }
 footer { margin-top: 3rem; font-size: 0.9rem; overflow-wrap: anywhere; }
 code { font-size: 0.95em; }
 ";
-
-/// Text as HTML wants it, in elements and in attributes.
-pub fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&#39;"),
-            // Not allowed in HTML, whatever a file name has in it.
-            c if c.is_control() && !matches!(c, '\n' | '\t') => out.push('\u{fffd}'),
-            c => out.push(c),
-        }
-    }
-    out
-}
 
 /// A file name as a link: bytes that mean something in a URL in per cent.
 fn link(name: &str) -> String {

@@ -242,7 +242,8 @@ impl Clarinet {
         self.resampler.latency_out_samples().round() as u32
     }
 
-    /// Sample rate of the lattice while its clock runs at speed 1, Hz: 96 000, or 88 200 for hosts of the 44.1 kHz family.
+    /// Sample rate of the lattice while its clock runs at speed 1, Hz: 96 000, or 88 200 for hosts of the 44.1 kHz family;
+    /// twice that in high quality.
     pub fn internal_rate_hz(&self) -> f64 {
         self.model.coeffs.rate_hz
     }

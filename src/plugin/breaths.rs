@@ -64,11 +64,18 @@ pub struct Breaths {
 impl Breaths {
     /// Takes notice of a host's event; `blew` if breath came of it.
     pub fn hear<S>(&mut self, event: &NoteEvent<S>, blew: bool) {
-        let Some((way, value)) = Way::of(event) else { return };
-        self.say(way, value);
-        if blew || (way == Way::Keys && self.blows.is_none()) {
-            self.blows = Some(way);
+        match Way::of(event) {
+            Some((Way::Keys, velocity)) => self.press(velocity),
+            Some((way, value)) if blew => self.blow(way, value),
+            Some((way, value)) => self.say(way, value),
+            None => {}
         }
+    }
+
+    /// Takes notice of a key; it blows while nothing else has.
+    pub fn press(&mut self, velocity: f32) {
+        self.say(Way::Keys, velocity);
+        self.blows.get_or_insert(Way::Keys);
     }
 
     /// Takes notice of breath that is no host's event.
@@ -103,6 +110,8 @@ mod tests {
     #[test]
     fn what_blew_last_is_live_and_what_was_outranked_is_shown() {
         let mut breaths = Breaths::default();
+        breaths.press(0.9);
+        assert!(breaths.is_live(Way::Keys));
         breaths.hear(&controller(11, 0.25), true);
         assert!(breaths.is_live(Way::Expression));
         breaths.hear(&controller(2, 0.5), true);
@@ -114,6 +123,7 @@ mod tests {
         assert!(breaths.is_live(Way::Knob));
         assert_eq!(breaths.said(Way::Knob), Some(1.0));
         breaths.hear(&controller(1, 1.0), false);
+        breaths.press(0.9);
         assert!(breaths.is_live(Way::Knob));
     }
 

@@ -4,8 +4,7 @@
 //! pixel. Words are drawn from the embedded font: as pixels, or as outlines, so that a picture looks the same where no
 //! font is installed.
 
-use crate::figure::draw::DrawError;
-use crate::figure::draw::font;
+use crate::figure::draw::{DrawError, encode_png, escaped, font};
 use crate::figure::palette::Rgb;
 use plotters_backend::{BackendColor, BackendCoord, BackendStyle, DrawingBackend};
 use std::fmt::Write;
@@ -182,7 +181,7 @@ impl<B: DrawingBackend> Canvas<B> {
                 (start.0 + dx, start.1 + dy)
             });
             let Rgb(r, g, b) = fill;
-            let name = text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;");
+            let name = escaped(text);
             let _ = writeln!(
                 vector.over,
                 "<path aria-label=\"{name}\" fill=\"#{r:02x}{g:02x}{b:02x}\" stroke=\"none\" d=\"{path}\"/>"
@@ -222,7 +221,7 @@ impl<B: DrawingBackend> Canvas<B> {
                     bytes.extend([r, g, b]);
                 }
             }
-            let png = crate::figure::draw::encode_png(&bytes, width, height)?;
+            let png = encode_png(&bytes, width, height)?;
             let data = base64::Engine::encode(&base64::engine::general_purpose::STANDARD, png);
             if let Some(vector) = &mut self.vector {
                 let _ = writeln!(

@@ -18,8 +18,14 @@ const SERIAL: &str = "serial:";
 /// Key of a board whose serial number is not known before it is asked.
 const BOARD: &str = "board";
 
-/// Everything that may be a knob, the one in use first. Asks the system, which takes milliseconds.
-pub fn list(places: &Places, kind: KnobKind, status: Option<&LinkStatus>) -> Vec<Device> {
+/// Everything that may be a knob, the one in use first. Asks the system, which takes milliseconds; for MIDI no more once
+/// there was none, because some systems complain each time.
+pub fn list(
+    places: &Places,
+    kind: KnobKind,
+    status: Option<&LinkStatus>,
+    has_midi: &mut bool,
+) -> Vec<Device> {
     let mut devices = Vec::new();
     let in_use = status.filter(|status| status.phase != Phase::Off && kind != KnobKind::Off);
     let linked = in_use.and_then(|status| Some((status, status.serial?)));
@@ -65,7 +71,9 @@ pub fn list(places: &Places, kind: KnobKind, status: Option<&LinkStatus>) -> Vec
             devices.push(device);
         }
     }
-    for name in midi::ports(false).unwrap_or_default() {
+    let ports = if *has_midi { midi::ports(false) } else { Ok(Vec::new()) };
+    *has_midi &= ports.is_ok();
+    for name in ports.unwrap_or_default() {
         let is_chosen = kind == KnobKind::Midi && in_use.is_some_and(|status| status.port == name);
         let state = if is_chosen { "in use" } else { "MIDI port" };
         let key = format!("{MIDI}{name}");
@@ -100,4 +108,36 @@ pub fn choose(beside: &Beside, key: &str) -> Option<usize> {
     };
     beside.knob.choose_anew();
     Some(kind as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::Advert;
+    use crate::device::lock::Ownership;
+
+    #[test]
+    fn a_simulated_knob_is_listed_with_who_holds_it() {
+        let directory = tempfile::tempdir().unwrap();
+        let places = Places::within(directory.path());
+        let port = directory.path().join("port");
+        let _advert = Advert::publish(&places, 0x51, "Desk knob", &port).unwrap();
+        let listed = || list(&places, KnobKind::Off, None, &mut false);
+        let knob = listed().into_iter().find(|device| device.key == "serial:0000000000000051").unwrap();
+        assert!(knob.name.starts_with("Desk knob") && knob.is_free && !knob.is_chosen, "{knob:?}");
+        let _mine = Ownership::take(&places, 0x51, "Track 1", "").unwrap();
+        let knob = listed().into_iter().find(|device| device.key == "serial:0000000000000051").unwrap();
+        assert!(!knob.is_free && knob.state.contains("held by Track 1"), "{knob:?}");
+    }
+
+    #[test]
+    fn stock_firmware_is_always_there_to_choose() {
+        let directory = tempfile::tempdir().unwrap();
+        let places = Places::within(directory.path());
+        for (kind, is_chosen) in [(KnobKind::Off, false), (KnobKind::Osc, true)] {
+            let devices = list(&places, kind, None, &mut false);
+            let osc = devices.iter().find(|device| device.key == OSC).unwrap();
+            assert_eq!(osc.is_chosen, is_chosen);
+        }
+    }
 }

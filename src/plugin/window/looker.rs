@@ -54,6 +54,8 @@ pub struct Looker {
     known: Option<Known>,
     #[cfg(feature = "devices")]
     devices: (Vec<Device>, Option<Instant>),
+    #[cfg(feature = "devices")]
+    has_midi: bool,
 }
 
 /// What an instrument is asked once.
@@ -86,6 +88,8 @@ impl Looker {
             known: None,
             #[cfg(feature = "devices")]
             devices: (Vec::new(), None),
+            #[cfg(feature = "devices")]
+            has_midi: true,
         }
     }
 
@@ -158,7 +162,8 @@ impl Looker {
         let is_due = self.devices.1.is_none_or(|at| at.elapsed() > DEVICES_EVERY);
         if super::kept(&self.beside.params).tab == Tab::Knob && is_due {
             let kind = self.beside.params.knob.kind.value();
-            self.devices = (devices::list(&Places::default(), kind, status), Some(Instant::now()));
+            let found = devices::list(&Places::default(), kind, status, &mut self.has_midi);
+            self.devices = (found, Some(Instant::now()));
         }
     }
 
@@ -295,8 +300,9 @@ fn knob_picture(status: &crate::device::LinkStatus, feel: Option<&crate::wire::m
         ceiling_mnm: f32::from(status.ceiling_mnm),
         angle_deg: status.angle_deg,
         torque_mnm: status.angle_deg.zip(feel).map(|(angle_deg, feel)| {
-            crate::haptics::law::torque_mnm(feel, crate::reed::ReedTables::seed(), f64::from(angle_deg))
-                as f32
+            let tables = crate::reed::ReedTables::seed();
+            let torque_mnm = crate::haptics::law::torque_mnm(feel, tables, f64::from(angle_deg));
+            if status.armed { torque_mnm as f32 } else { 0.0 }
         }),
         notice: status.last_refusal.clone().or_else(|| status.notice.clone()),
         rate_hz: stats.rate_hz,
