@@ -39,7 +39,7 @@ pub struct Snapshot {
     pub sources: Vec<Source>,
     /// The last seconds of mouth pressure.
     pub history: Track,
-    /// The inside of the mouthpiece, the latest 40 ms.
+    /// The inside of the mouthpiece, two periods of the lowest note or more.
     pub scope: Scope,
     /// The sound that comes out.
     pub heard: Heard,
@@ -180,6 +180,23 @@ impl Scope {
         let period = if f0_hz > 0.0 { (self.rate_hz / f0_hz).ceil() as usize + 1 } else { length };
         length.saturating_sub(period)..length
     }
+
+    /// Indices of at most `most` whole periods at `f0_hz`, from where the pressure rises through its mean: a picture of
+    /// them stands still. Everything where there is no such.
+    pub fn standing_periods(&self, f0_hz: f32, most: usize) -> std::ops::Range<usize> {
+        let length = self.mouthpiece_kpa.len().min(self.opening.len()).min(self.flow_cm3s.len());
+        let wave = &self.mouthpiece_kpa[..length];
+        let mean = wave.iter().sum::<f32>() / length.max(1) as f32;
+        let Some(rise) = wave.windows(2).position(|pair| pair[0] < mean && pair[1] >= mean) else {
+            return 0..length;
+        };
+        let period = self.rate_hz / f0_hz;
+        let fitting = ((length - rise) as f32 / period) as usize;
+        if !period.is_finite() || fitting == 0 {
+            return 0..length;
+        }
+        rise..(rise + (fitting.min(most) as f32 * period).ceil() as usize + 1).min(length)
+    }
 }
 
 /// A line for the user.
@@ -248,4 +265,39 @@ pub struct Device {
     pub is_chosen: bool,
     /// Nothing stands in the way.
     pub is_free: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scope(f0_hz: f32, length: usize, phase: f32) -> Scope {
+        let turn = std::f32::consts::TAU * f0_hz / 48_000.0;
+        let wave: Vec<f32> = (0..length).map(|n| 1.0 + (turn * n as f32 + phase).sin()).collect();
+        Scope { rate_hz: 48_000.0, opening: wave.clone(), flow_cm3s: wave.clone(), mouthpiece_kpa: wave }
+    }
+
+    #[test]
+    fn a_picture_of_whole_periods_stands_still_whenever_it_is_taken() {
+        let periods = |f0_hz: f32, length: usize| -> Vec<usize> {
+            let lengths = (0..40).map(|step| {
+                let scope = scope(f0_hz, length, 0.3 * step as f32);
+                let shown = scope.standing_periods(f0_hz, 6);
+                assert!((scope.mouthpiece_kpa[shown.start] - 1.0).abs() < 0.2, "begins where it rises");
+                assert!(scope.mouthpiece_kpa[shown.start] > scope.mouthpiece_kpa[shown.start - 1]);
+                ((shown.len() as f32) * f0_hz / 48_000.0).round() as usize
+            });
+            lengths.collect()
+        };
+        // The lowest note of a clarinet in what the audio thread leaves: one period always fits.
+        assert!(periods(146.8, 672).iter().all(|&periods| periods == 1));
+        assert!(periods(1_400.0, 672).iter().all(|&periods| periods == 6));
+    }
+
+    #[test]
+    fn what_has_no_period_is_shown_whole() {
+        assert_eq!(scope(100.0, 672, 0.0).standing_periods(0.0, 6), 0..672);
+        assert_eq!(scope(0.0, 672, 0.0).standing_periods(200.0, 6), 0..672);
+        assert_eq!(Scope::default().standing_periods(200.0, 6), 0..0);
+    }
 }

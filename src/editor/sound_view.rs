@@ -16,6 +16,8 @@ use crate::editor::theme::{Colours, GAP, panel};
 
 /// Highest harmonic marked.
 const HARMONICS: usize = 24;
+/// Periods of the waves at most: more are too narrow to see.
+const PERIODS: usize = 6;
 /// Points of a spectrum at most: more would fall on one column of the screen.
 const COLUMNS: usize = 700;
 
@@ -115,12 +117,13 @@ fn waves(ui: &mut Ui, snapshot: &Snapshot) {
         chart::empty(ui, rect, "The wave in the mouthpiece and the reed's gap would stand here.");
         return;
     }
+    let shown = scope.standing_periods(snapshot.heard.f0_hz.unwrap_or(0.0), PERIODS);
     let step_ms = 1e3 / f64::from(scope.rate_hz);
-    let from = step_ms * (count - 1) as f64;
-    let stride = count.div_ceil(COLUMNS).max(1);
+    let to = step_ms * (shown.len() - 1) as f64;
+    let stride = shown.len().div_ceil(COLUMNS).max(1);
     let track = |values: &[f32]| -> Vec<[f64; 2]> {
-        let values = values.iter().enumerate().step_by(stride);
-        values.map(|(n, &value)| [step_ms * n as f64 - from, f64::from(value)]).collect()
+        let values = values[shown.clone()].iter().enumerate().step_by(stride);
+        values.map(|(n, &value)| [step_ms * n as f64, f64::from(value)]).collect()
     };
     let largest =
         |values: &[f32], least: f64| values.iter().map(|x| f64::from(x.abs())).fold(least, f64::max);
@@ -131,16 +134,16 @@ fn waves(ui: &mut Ui, snapshot: &Snapshot) {
     let height = if has_gap { 0.5 * (ui.available_height() - GAP) - 10.0 } else { ui.available_height() };
     Chart {
         id: "mouthpiece wave",
-        x: (-from, 0.0),
+        x: (0.0, to),
         y: (-most, most),
-        x_name: if has_gap { "" } else { "ms ago" },
+        x_name: if has_gap { "" } else { "ms" },
         y_name: "pressure in the mouthpiece, kPa; straight line: in the mouth",
         height,
         label: "Pressure in the mouthpiece over time",
     }
     .show(ui, |plot| {
         plot.line(
-            chart::curve(vec![[-from, mouth], [0.0, mouth]], c.speaks.gamma_multiply(0.8), 1.0).id("mouth"),
+            chart::curve(vec![[0.0, mouth], [to, mouth]], c.speaks.gamma_multiply(0.8), 1.0).id("mouth"),
         );
         plot.line(chart::curve(track(&scope.mouthpiece_kpa), c.breath, 1.6).id("wave"));
     });
@@ -149,16 +152,16 @@ fn waves(ui: &mut Ui, snapshot: &Snapshot) {
     }
     Chart {
         id: "gap",
-        x: (-from, 0.0),
+        x: (0.0, to),
         y: (-0.25, (1.1 * largest(&scope.opening, 1.0)).max(1.2)),
-        x_name: "ms ago",
+        x_name: "ms",
         y_name: "reed's gap over that at rest",
         height: ui.available_height(),
         label: "Opening of the reed over time",
     }
     .show(ui, |plot| {
-        plot.line(chart::curve(vec![[-from, 0.0], [0.0, 0.0]], c.closes, 1.0).id("shut"));
-        chart::word(plot, [-0.01 * from, 0.0], Align2::RIGHT_TOP, "shut", c.closes);
+        plot.line(chart::curve(vec![[0.0, 0.0], [to, 0.0]], c.closes, 1.0).id("shut"));
+        chart::word(plot, [0.99 * to, 0.0], Align2::RIGHT_TOP, "shut", c.closes);
         plot.line(chart::curve(track(&scope.opening), c.accent, 1.6).fill(0.0).fill_alpha(0.10).id("gap"));
     });
 }

@@ -7,9 +7,9 @@ use crate::instrument::voice::{Probe, TICK};
 use crate::units::SoundingNote;
 
 /// Moments of a picture.
-pub const MOMENTS: usize = 512;
-/// Periods of the lowest note in a picture, at least.
-const PERIODS: f64 = 1.5;
+pub const MOMENTS: usize = 672;
+/// Periods of the lowest note in a picture, at least: a whole one from wherever it is to begin.
+const PERIODS: f64 = 2.0;
 /// So much longer than a picture is the pause after it.
 const PAUSE: usize = 3;
 
