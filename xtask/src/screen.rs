@@ -25,6 +25,9 @@ pub const PATIENCE: Duration = Duration::from_secs(30);
 /// Where a picture may fail to show that a window has drawn: fewer colours than text has shades.
 const DRAWN_COLOURS: usize = 32;
 
+/// Levels of 255 by which the same thing may be drawn differently from one time to the next.
+const SAME: u8 = 8;
+
 /// Bits of red, green and blue in a pixel.
 const RGB: u32 = 0x00ff_ffff;
 
@@ -194,7 +197,7 @@ impl Screen {
         let mut last = (Instant::now(), self.drawn(window)?);
         self.wait("a picture that stays", || {
             let now = self.picture(window)?;
-            if now != last.1 {
+            if now.differing(&last.1) > 0 {
                 last = (Instant::now(), now);
             }
             Ok((last.0.elapsed() >= calm).then(|| last.1.clone()))
@@ -295,12 +298,16 @@ impl Picture {
         colours.len()
     }
 
-    /// Pixels that are not as in another picture of the same size; all of them if it has another.
+    /// Pixels that are visibly not as in another picture of the same size; all of them if it has another.
     pub fn differing(&self, other: &Self) -> usize {
         if (self.width, self.height) != (other.width, other.height) {
             return self.pixels.len();
         }
-        self.pixels.iter().zip(&other.pixels).filter(|(a, b)| a != b).count()
+        let differ = |(a, b): &(&u32, &u32)| {
+            let mut levels = a.to_be_bytes().into_iter().zip(b.to_be_bytes());
+            levels.any(|(a, b)| a.abs_diff(b) > SAME)
+        };
+        self.pixels.iter().zip(&other.pixels).filter(differ).count()
     }
 
     /// Writes it as a PNG; makes the folder.

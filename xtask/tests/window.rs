@@ -14,8 +14,12 @@ use live::{BLOCK, E3, RATE, SECOND, on, plugin};
 use xtask::host::{At, Hand, Plugin, Say, Session};
 use xtask::screen::{Holdings, PATIENCE, Picture, Screen};
 
-/// Nothing that moves by itself moves more slowly.
-const CALM: Duration = Duration::from_millis(600);
+/// How long a picture must stay as it is to count as settled.
+const CALM: Duration = Duration::from_millis(1_000);
+
+/// What a window may leave behind, kB. It is baseview 0.4.2 that never gives back the map of the keyboard, which is 71 kB
+/// here; the allocator's own disorder comes on top. What a plugin could forget, fonts or a frame, weighs thousands.
+const KEPT_KB: usize = 150;
 
 /// A host's window with the plugin's inside; closed when dropped.
 struct Open<'a> {
@@ -56,6 +60,13 @@ impl<'a> Open<'a> {
         if let Some(size) = self.plugin.attend() {
             self.screen.resize(self.frame, size).unwrap();
         }
+    }
+
+    /// Waits until it shows just this.
+    fn comes_to_show(&mut self, wanted: &Picture) -> bool {
+        let Self { screen, frame, .. } = *self;
+        let same = || Ok((screen.picture(frame)?.differing(wanted) == 0).then_some(()));
+        screen.wait("the same picture", same).is_ok()
     }
 
     fn keep(&self, name: &str) {
@@ -196,9 +207,9 @@ fn a_thousand_openings_leave_nothing_behind() {
     assert_eq!(late.threads, early.threads, "threads");
     assert_eq!(late.files, early.files, "open files");
     assert_eq!(late.display, early.display, "what the display holds");
-    // A quarter of a window's pixels in each of them would be a thousand times as much.
-    let grown = late.resident_kb.saturating_sub(early.resident_kb);
-    assert!(grown < 16_384, "{grown} kB more after {} windows", CYCLES - SETTLED);
+    let grown = late.resident_kb.saturating_sub(early.resident_kb) / (CYCLES - SETTLED);
+    println!("{grown} kB more with each window");
+    assert!(grown < KEPT_KB, "{grown} kB more with each window");
 }
 
 #[test]
@@ -327,21 +338,23 @@ fn two_windows_side_by_side_are_two() {
     let (width, _) = left.window_size().unwrap();
     let mut a = Open::new(&screen, &mut left);
     let mut b = Open::at(&screen, &mut right, (i16::try_from(width).unwrap() + 8, 0));
+    // The instrument is looked into when a window first opens, which takes a while.
+    std::thread::sleep(5 * CALM);
     let (seen_a, seen_b) = (a.settled(), b.settled());
     a.keep("clap-left");
     b.keep("clap-right");
     assert!(seen_a.differing(&seen_b) > 0, "one shows the other's value");
     // What happens to one is not seen in the other.
     two.play(&set(0.5), SECOND / 5).unwrap();
-    let (after_a, after_b) = (a.settled(), b.settled());
-    assert_eq!(after_a.differing(&seen_a), 0, "the left window has changed with the right one");
+    let after_b = b.settled();
     assert!(after_b.differing(&seen_b) > 0, "the right window has not changed");
+    assert!(a.comes_to_show(&seen_a), "the left window has changed with the right one");
     let (value_a, value_b) = (a.plugin.value(zeta.id).unwrap(), b.plugin.value(zeta.id).unwrap());
     assert!(value_a < value_b, "{value_a} {value_b}");
     // One may close before the other.
     drop(a);
     two.play(&set(0.9), SECOND / 5).unwrap();
-    assert!(b.settled().differing(&after_b) > 0, "the right window stopped with the left one");
+    assert!(b.settled().differing(&after_b) > 0, "the right window has stopped with the left one");
     drop(b);
     left.deactivate(one);
     right.deactivate(two);
@@ -468,7 +481,7 @@ fn a_project_keeps_the_window() {
     other.restore(&project).unwrap();
     assert_eq!(other.window_size().unwrap(), wanted, "the size");
     let mut open = Open::new(&screen, &mut other);
-    assert_eq!(open.settled().differing(&before), 0, "the same project, another look");
+    assert!(open.comes_to_show(&before), "the same project, another look");
     // Colours of the two themes.
     let colours = |picture: &Picture| picture.pixels.iter().copied().collect::<BTreeSet<u32>>();
     let dark = colours(&before);
@@ -522,7 +535,7 @@ fn every_view_is_drawn_while_a_note_is_played() {
                     let open = Open::new(&screen, &mut plugin);
                     screen.drawn(open.frame).unwrap();
                     // What is drawn first is from before anything was heard.
-                    std::thread::sleep(2 * CALM);
+                    std::thread::sleep(CALM);
                     let percent = (100.0 * zoom) as u32;
                     open.keep(&format!("clap-{view}-{percent}-{theme}"));
                     let picture = screen.picture(open.frame).unwrap();
