@@ -29,7 +29,12 @@ pub const PROGRAM: &str = "--features simulator,standalone,midi-jack";
 
 /// The cargo that runs this.
 pub fn cargo() -> Command {
-    Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    // What is built here is built once: to be ready for the next change costs twice the work.
+    if std::env::var_os("CARGO_INCREMENTAL").is_none() {
+        command.env("CARGO_INCREMENTAL", "0");
+    }
+    command
 }
 
 /// Runs a command to its end; anything but success is an error that names it.
