@@ -6,6 +6,7 @@
 //! asks for no repaint of its own. Made for 1100 by 720 points, usable from 700 by 480 on. Design units: points; zoom
 //! belongs to whoever owns the window.
 
+mod alternates;
 mod blind_view;
 mod breath_view;
 mod chart;
@@ -30,6 +31,7 @@ pub mod theme;
 mod widgets;
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use egui::{CentralPanel, Frame, Margin, Panel, Theme, Ui};
 use serde::{Deserialize, Serialize};
@@ -42,7 +44,7 @@ pub use snapshot::Snapshot;
 
 use crate::units::SoundingNote;
 use crate::wire::message::Feel;
-use controls::{Entry, Hands};
+use controls::{Entry, Hands, Press};
 use history::History;
 use keyboard::Keyboard;
 
@@ -167,6 +169,15 @@ impl Kept {
             ..self
         }
     }
+
+    /// The window is this large now, points. What comes of rounding to whole pixels is no change, so that a project that
+    /// is only looked at stays as it was saved.
+    pub fn resized(&mut self, width: f32, height: f32) {
+        let is_near = |a: f32, b: f32| (a - b).abs() <= 2.0;
+        if !(is_near(self.size.0, width) && is_near(self.size.1, height)) {
+            self.size = (width, height);
+        }
+    }
 }
 
 /// Everything the window remembers between frames.
@@ -178,9 +189,11 @@ pub struct State {
     compare: Compare,
     entry: Option<Entry>,
     held: Vec<&'static str>,
+    presses: Vec<Press>,
     keyboard: Keyboard,
     reed: reed_view::ReedView,
     clarinet: clarinet_view::ClarinetView,
+    breath: breath_view::BreathView,
     knob: knob_panel::KnobPanel,
     instrument: instrument_view::InstrumentView,
 }
@@ -199,8 +212,10 @@ impl State {
     /// Lets go of everything that is held: before the window closes.
     pub fn close(&mut self, controls: &dyn Controls) -> Vec<Action> {
         let mut actions = Vec::new();
-        let Self { history, entry, held, .. } = self;
-        Hands { controls, history, entry, held }.let_go();
+        let Self { history, entry, held, presses, .. } = self;
+        let mut hands = Hands { controls, history, entry, held, presses };
+        hands.end_presses(None);
+        hands.let_go();
         self.keyboard.release(&mut actions);
         self.knob.end_test(&mut actions);
         self.clarinet.end_try(&mut actions);
@@ -209,17 +224,49 @@ impl State {
     }
 }
 
-/// Draws the window into `ui` and gives back what the user did.
+/// Draws the window into `ui` and gives back what the user did. In less room than [`LEAST_SIZE`] (a large zoom in a window
+/// that a host keeps small) all of it scrolls.
 pub fn draw(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &Snapshot) -> Vec<Action> {
+    let (room, least) = (ui.available_size(), egui::vec2(LEAST_SIZE.0, LEAST_SIZE.1));
+    // Rounding to pixels is no lack of room.
+    if room.x >= least.x - 2.0 && room.y >= least.y - 2.0 {
+        return whole(ui, state, controls, snapshot);
+    }
+    let area = egui::ScrollArea::both().id_salt("all").auto_shrink([false, false]);
+    let shown = area.show(ui, |ui| {
+        let (rect, _) = ui.allocate_exact_size(room.max(least), egui::Sense::hover());
+        let inside = egui::UiBuilder::new().max_rect(rect);
+        ui.scope_builder(inside, |ui| whole(ui, state, controls, snapshot)).inner
+    });
+    shown.inner
+}
+
+/// The window where there is room for it.
+fn whole(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &Snapshot) -> Vec<Action> {
     let mut actions = Vec::new();
-    let State { kept, history, compare, entry, held, keyboard, reed, clarinet, knob, instrument } = state;
+    let State {
+        kept,
+        history,
+        compare,
+        entry,
+        held,
+        presses,
+        keyboard,
+        reed,
+        clarinet,
+        breath,
+        knob,
+        instrument,
+    } = state;
     theme::apply(ui, if kept.is_dark { Theme::Dark } else { Theme::Light });
     let c = theme::Colours::here(ui);
-    let mut hands = Hands { controls, history, entry, held };
+    let mut hands = Hands { controls, history, entry, held, presses };
     let (width, height) = (ui.available_width(), ui.available_height());
     let is_small = width < 900.0 || height < 560.0;
     let tab = kept.tab;
     let is_blind = compare.is_blind();
+
+    breath.look(&snapshot.sources);
 
     let ground = |x: i8, y: i8| Frame::new().fill(c.ground).inner_margin(Margin::symmetric(x, y));
     let line = Panel::top("tools").exact_size(if is_small { 44.0 } else { 52.0 }).show_separator_line(false);
@@ -241,7 +288,7 @@ pub fn draw(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &
         match tab {
             Tab::Reed => reed.draw(ui, &mut hands, snapshot),
             Tab::Clarinet => clarinet.draw(ui, snapshot, &mut actions),
-            Tab::Breath => breath_view::draw(ui, &mut hands, snapshot),
+            Tab::Breath => breath.draw(ui, &mut hands, snapshot),
             Tab::Sound => sound_view::draw(ui, &mut hands, snapshot),
             Tab::Knob => knob.draw(ui, &mut hands, snapshot, &mut actions),
             Tab::Instrument => instrument.draw(ui, &mut hands, snapshot, &mut actions),
@@ -250,6 +297,9 @@ pub fn draw(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &
     // A widget that vanished under the hand, with its view or in a blind comparison, ends nothing itself.
     if !hands.held.is_empty() && !ui.input(|input| input.pointer.any_down() || input.pointer.any_released()) {
         hands.let_go();
+    }
+    if let Some(left_s) = hands.end_presses(Some(ui.input(|input| input.time))) {
+        ui.ctx().request_repaint_after(Duration::from_secs_f64(left_s.max(0.0)));
     }
     actions
 }
@@ -267,7 +317,8 @@ fn beside<A>(
     let side = Panel::right(egui::Id::unique((id, "column"))).exact_size(width).show_separator_line(false);
     side.frame(theme::panel(c)).show(ui, |ui| {
         egui::ScrollArea::vertical().id_salt(id).auto_shrink([false, false]).show(ui, |ui| {
-            ui.set_width(ui.available_width() - 4.0);
+            // Beside it stands the bar.
+            ui.set_width(ui.available_width() - 8.0);
             ui.spacing_mut().item_spacing.y = 4.0;
             column(ui, with);
         });
@@ -287,5 +338,17 @@ mod tests {
         let text = toml::to_string(&kept).unwrap();
         assert_eq!(toml::from_str::<Kept>(&text).unwrap(), kept);
         assert_eq!(toml::from_str::<Kept>("").unwrap(), Kept::default());
+    }
+
+    #[test]
+    fn rounding_to_pixels_is_no_new_size() {
+        let mut kept = Kept::default();
+        for zoom in [0.5, 0.75, 1.25, 1.5, 2.5, 3.0] {
+            let points = |size: f32| (size * zoom).round() / zoom;
+            kept.resized(points(SIZE.0), points(SIZE.1));
+            assert_eq!(kept, Kept::default());
+        }
+        kept.resized(SIZE.0 + 20.0, SIZE.1);
+        assert_eq!(kept.size, (SIZE.0 + 20.0, SIZE.1));
     }
 }

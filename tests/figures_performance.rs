@@ -11,11 +11,11 @@ use chalumeau::bore::instrument_file::InstrumentFile;
 use chalumeau::bore::transfer_matrix::TransferMatrix;
 use chalumeau::figure::breath;
 use chalumeau::figure::breath::Changes;
-use chalumeau::figure::felt::{AtContrast, Torque, torques};
+use chalumeau::figure::felt::{AtContrast, Felt, Torque, thresholds, torques};
 use chalumeau::figure::impedance::{Curve, Fingering, NotePeaks, chart, fingering};
 use chalumeau::figure::performance::{Moment, Note, Performance, performance};
 use chalumeau::figure::{Figure, Layer, Panel, bore};
-use chalumeau::haptics::{FeelDesign, FeelTable, Limits, Requirements, law};
+use chalumeau::haptics::{FeelDesign, FeelTable, Limits, NoteFeel, Requirements, law};
 use chalumeau::instrument::felt::played_reed;
 use chalumeau::instrument::{Clarinet, Settings};
 use chalumeau::reed::ReedTables;
@@ -470,8 +470,9 @@ fn breath_and_feel_are_figures_of_one_instrument() {
     }));
     golden("breath_notes", &breath::pressures("clarinet", "", closing_kpa, &changes));
 
+    let mut felt = Vec::new();
     for (law, name) in [(Law::Flow, "flow"), (Law::Pressure, "pressure")] {
-        let mut all = Vec::new();
+        let (mut all, mut on_deg) = (Vec::new(), Vec::new());
         for contrast in [1.0, 5.0] {
             let design = FeelDesign { law, contrast, ..FeelDesign::default() };
             let table = FeelTable::new(&bore, &design, &reed, &Limits::default()).unwrap();
@@ -485,7 +486,27 @@ fn breath_and_feel_are_figures_of_one_instrument() {
                 }
             });
             all.push(AtContrast { contrast, notes: Ok(notes.collect()) });
+            let on = table.notes().iter().map(|note| (note.written.0, note.landmarks.a_on_deg));
+            on_deg.push((contrast, on.collect()));
+            if contrast == 5.0 && law == Law::Flow {
+                // The map passes threshold and closure.
+                let turn = |note: &NoteFeel| {
+                    let at = |deg: f64| (deg, 1e-3 * note.map.pressure_pa(deg));
+                    let closes = at(note.landmarks.a_close_deg);
+                    assert!((closes.1 - closing_kpa).abs() < 1e-9, "{}: {closes:?}", note.written);
+                    breath::Turn {
+                        name: note.written.to_string(),
+                        map: (0..=60).map(|step| at(10.0 * f64::from(step))).collect(),
+                        speaks: at(note.landmarks.a_on_deg),
+                        closes,
+                    }
+                };
+                let turns: Vec<breath::Turn> = table.notes().iter().step_by(20).map(turn).collect();
+                golden("turns", &breath::turns("", closing_kpa, &turns));
+            }
         }
+        let at_kpa = changes.iter().map(|note| (note.written, note.speaks_kpa)).collect();
+        felt.push(Felt { law: name.to_owned(), at_kpa, on_deg });
         all.push(AtContrast { contrast: 9.0, notes: Err("too much".to_owned()) });
         let figure = torques(name, "", 100.0, &all);
         // What is refused is said where it would be drawn, and the same scale serves all.
@@ -506,6 +527,8 @@ fn breath_and_feel_are_figures_of_one_instrument() {
         }
         golden(&format!("torque_{name}"), &figure);
     }
+    let sounds: Vec<(u8, f64)> = changes.iter().map(|note| (note.written, note.speaks_kpa)).collect();
+    golden("felt_thresholds", &thresholds("", &sounds, &felt));
 }
 
 #[test]

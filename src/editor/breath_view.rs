@@ -10,15 +10,75 @@ use crate::editor::snapshot::{Snapshot, Source};
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
 
-/// Draws the view.
-pub fn draw(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
-    crate::editor::beside(
-        ui,
-        "breath",
-        hands,
-        |ui, _| pictures(ui, snapshot),
-        |ui, hands| column(ui, hands, snapshot),
-    );
+/// What the view remembers.
+#[derive(Clone, Debug, Default)]
+pub struct BreathView {
+    /// Least and most that each source has said while somebody looked, by name.
+    ranges: Vec<(String, f32, f32)>,
+}
+
+impl BreathView {
+    /// Draws the view.
+    pub fn draw(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
+        let mut with = (self, hands);
+        crate::editor::beside(
+            ui,
+            "breath",
+            &mut with,
+            |ui, _| pictures(ui, snapshot),
+            |ui, (this, hands)| this.column(ui, hands, snapshot),
+        );
+    }
+
+    /// Takes notice of what the sources say.
+    pub fn look(&mut self, sources: &[Source]) {
+        for source in sources.iter().filter(|source| source.is_seen) {
+            let value = chart::share(source.value);
+            match self.ranges.iter_mut().find(|(name, ..)| *name == source.name) {
+                Some((_, low, high)) => (*low, *high) = (low.min(value), high.max(value)),
+                None => self.ranges.push((source.name.clone(), value, value)),
+            }
+        }
+    }
+
+    fn column(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
+        heading(ui, "Where breath comes from");
+        let mut has_knob = false;
+        for source in &snapshot.sources {
+            let range = self.ranges.iter().find(|(name, ..)| *name == source.name);
+            meter_of(ui, source, range.map(|&(_, low, high)| (low, high)));
+            if source.name == Source::KNOB {
+                has_knob = true;
+                calibrate(ui, hands);
+            }
+        }
+        if snapshot.sources.is_empty() {
+            ui.label("No source has said anything yet: keys blow by velocity.");
+        }
+        if !has_knob {
+            heading(ui, "Calibrate the knob");
+            calibrate(ui, hands);
+        }
+        heading(ui, "Breath");
+        for id in ["breath", "full", "curve"] {
+            slider(ui, hands, id);
+        }
+        heading(ui, "Articulation");
+        for id in ["tongue", "legato", "noise"] {
+            slider(ui, hands, id);
+        }
+    }
+}
+
+/// Where the knob rests, and how far a full blow is.
+fn calibrate(ui: &mut Ui, hands: &mut Hands) {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 6.0;
+        ui.spacing_mut().button_padding.x = 8.0;
+        momentary(ui, hands, "rest", "Rest here");
+        momentary(ui, hands, "blow", "Blow hard here");
+    });
+    ui.add_space(2.0);
 }
 
 fn pictures(ui: &mut Ui, snapshot: &Snapshot) {
@@ -134,13 +194,9 @@ fn history(ui: &mut Ui, snapshot: &Snapshot) {
                 egui_plot::HLine::new(name, f64::from(at)).color(colour).width(1.0).id(("mark", index));
             plot.hline(line.style(egui_plot::LineStyle::dashed_loose()).allow_hover(false));
             if f64::from(at) < full {
-                chart::word(
-                    plot,
-                    [-seconds, f64::from(at)],
-                    Align2::LEFT_BOTTOM,
-                    &format!(" {name}"),
-                    colour,
-                );
+                // "speaks" and "beats" are neighbours: one below its line, one above.
+                let anchor = if name == "speaks" { Align2::LEFT_TOP } else { Align2::LEFT_BOTTOM };
+                chart::word(plot, [-seconds, f64::from(at)], anchor, &format!(" {name}"), colour);
             }
         }
         let points = track.kpa.iter().enumerate();
@@ -149,31 +205,11 @@ fn history(ui: &mut Ui, snapshot: &Snapshot) {
     });
 }
 
-fn column(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
-    heading(ui, "Where breath comes from");
-    for source in &snapshot.sources {
-        meter_of(ui, source);
-    }
-    if snapshot.sources.is_empty() {
-        ui.label("No source has said anything yet: keys blow by velocity.");
-    }
-    slider(ui, hands, "breath");
-    heading(ui, "Calibrate");
-    ui.horizontal_wrapped(|ui| {
-        momentary(ui, hands, "rest", "Rest here");
-        momentary(ui, hands, "blow", "Blow hard here");
-    });
-    slider(ui, hands, "full");
-    slider(ui, hands, "curve");
-    heading(ui, "Articulation");
-    for id in ["tongue", "legato", "noise"] {
-        slider(ui, hands, id);
-    }
-}
-
-fn meter_of(ui: &mut Ui, source: &Source) {
+/// A source, with the range it has gone through.
+fn meter_of(ui: &mut Ui, source: &Source, range: Option<(f32, f32)>) {
     let c = Colours::here(ui);
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 28.0), Sense::hover());
+    let size = vec2(ui.available_width(), if source.is_seen { 28.0 } else { 18.0 });
+    let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
     let painter = ui.painter();
     let ink = if source.is_live { c.ink } else { c.quiet };
     let dot = pos2(rect.left() + 5.0, rect.top() + 8.0);
@@ -182,29 +218,61 @@ fn meter_of(ui: &mut Ui, source: &Source) {
     } else {
         painter.circle_stroke(dot, 3.5, Stroke::new(1.0, c.quiet));
     }
-    painter.text(
-        pos2(rect.left() + 15.0, rect.top() + 8.0),
-        Align2::LEFT_CENTER,
-        &source.name,
-        theme::body(),
-        ink,
-    );
-    let state = if source.is_seen { format!("{:.0} %", 100.0 * source.value) } else { "not seen".into() };
-    painter.text(pos2(rect.right(), rect.top() + 8.0), Align2::RIGHT_CENTER, &state, theme::small(), c.quiet);
-    let bar =
-        Rect::from_min_max(pos2(rect.left(), rect.bottom() - 8.0), pos2(rect.right(), rect.bottom() - 4.0));
-    painter.rect_filled(bar, CornerRadius::same(2), c.raised);
-    let end = bar.left() + chart::share(source.value) * bar.width();
-    let fill = if source.is_live { c.breath } else { c.chokes };
-    painter.rect_filled(Rect::from_min_max(bar.min, pos2(end, bar.bottom())), CornerRadius::same(2), fill);
+    let at = pos2(rect.left() + 15.0, rect.top() + 8.0);
+    painter.text(at, Align2::LEFT_CENTER, &source.name, theme::body(), ink);
+    let value = chart::share(source.value);
+    let state = if source.is_seen { format!("{:.0} %", 100.0 * value) } else { "not seen".to_owned() };
+    // Beside the longest name there is no room for words in a narrow column.
+    let short = if source.is_seen || rect.width() > 190.0 { &*state } else { "\u{2013}" };
+    painter.text(pos2(rect.right(), rect.top() + 8.0), Align2::RIGHT_CENTER, short, theme::small(), ink);
+    if source.is_seen {
+        let bar =
+            Rect::from_min_max(pos2(rect.left(), rect.bottom() - 9.0), rect.right_bottom() - vec2(0.0, 4.0));
+        let x = |unit: f32| bar.left() + unit * bar.width();
+        painter.rect_filled(bar, CornerRadius::same(2), c.raised);
+        let fill = if source.is_live { c.breath } else { c.chokes };
+        let now = Rect::from_min_max(bar.min, pos2(x(value), bar.bottom()));
+        painter.rect_filled(now, CornerRadius::same(2), fill);
+        for end in range.into_iter().flat_map(|(low, high)| [low, high]) {
+            painter.vline(x(end), bar.top() - 1.0..=bar.bottom() + 2.0, Stroke::new(1.5, c.ink));
+        }
+    }
     let blows = if source.is_live { ", blows" } else { "" };
-    response
-        .widget_info(|| WidgetInfo::labeled(Role::Meter, true, format!("{}: {state}{blows}", source.name)));
-    response.on_hover_text(if source.is_live {
-        "This one blows. The source that moves takes over."
-    } else if source.is_seen {
-        "It has moved before; move it and it blows."
-    } else {
-        "Nothing has come from it yet."
+    let went = range.filter(|_| source.is_seen).map_or_else(String::new, |(low, high)| {
+        format!(", from {:.0} to {:.0} %", 100.0 * low, 100.0 * high)
     });
+    response.widget_info(|| {
+        WidgetInfo::labeled(Role::Meter, true, format!("{}: {state}{went}{blows}", source.name))
+    });
+    response.on_hover_ui(|ui| {
+        ui.set_max_width(280.0);
+        ui.label(if source.is_live {
+            "This one blows. The source that moves takes over."
+        } else if source.is_seen {
+            "It has moved before; move it and it blows."
+        } else {
+            "Nothing has come from it yet."
+        });
+        if let Some((low, high)) = range {
+            let went = format!("It went from {:.0} to {:.0} %.", 100.0 * low, 100.0 * high);
+            ui.label(format!("{went} A controller that does not reach 100 % wants more full breath."));
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_source_is_known_by_the_range_it_went_through() {
+        let mut view = BreathView::default();
+        let say = |value, is_seen| [Source { name: "CC2".into(), value, is_live: false, is_seen }];
+        view.look(&say(0.0, false));
+        assert_eq!(view.ranges, []);
+        for value in [0.4, 0.1, 0.7, f32::NAN, 9.0] {
+            view.look(&say(value, true));
+        }
+        assert_eq!(view.ranges, [("CC2".to_owned(), 0.0, 1.0)]);
+    }
 }

@@ -140,6 +140,7 @@ pub fn lines(plot: &mut PlotUi<'_>, marks: &[Mark<'_>]) {
 pub fn names(ui: &Ui, transform: &PlotTransform, marks: &[Mark<'_>]) {
     let frame = *transform.frame();
     let painter = ui.painter_at(frame);
+    let ground = behind_words(ui);
     let mut order: Vec<&Mark> = marks.iter().collect();
     order.sort_by(|a, b| a.at.total_cmp(&b.at));
     let mut taken: Vec<Rect> = Vec::new();
@@ -152,9 +153,16 @@ pub fn names(ui: &Ui, transform: &PlotTransform, marks: &[Mark<'_>]) {
         while taken.iter().any(|other| other.intersects(rect.expand2(vec2(3.0, 0.0)))) {
             rect = rect.translate(vec2(0.0, size.y + 1.0));
         }
+        // Curves pass behind the word.
+        painter.rect_filled(rect.expand2(vec2(2.0, 0.0)), egui::CornerRadius::same(2), ground);
         painter.galley(rect.min, galley, mark.colour);
         taken.push(rect);
     }
+}
+
+/// What words in a picture stand on: nearly the picture's own ground.
+fn behind_words(ui: &Ui) -> Color32 {
+    Colours::here(ui).panel.gamma_multiply(0.85)
 }
 
 /// A word inside a picture.
@@ -163,13 +171,19 @@ pub fn word(plot: &mut PlotUi<'_>, at: [f64; 2], anchor: Align2, text: &str, col
     plot.text(Text::new("", PlotPoint::new(at[0], at[1]), text).anchor(anchor).allow_hover(false));
 }
 
-/// What the curves are, in their colours, right-aligned at a height of the picture, 0 (top) ..=1.
+/// What the curves are, in their colours, right-aligned at a height of the picture, 0 (top) ..=1; on a ground of their own,
+/// so that nothing runs through the words.
 pub fn legend(ui: &Ui, transform: &PlotTransform, height: f32, lines: &[(&str, Color32)]) {
     let frame = *transform.frame();
     let painter = ui.painter_at(frame);
+    let ground = behind_words(ui);
     for (line, (text, colour)) in lines.iter().enumerate() {
-        let at = egui::pos2(frame.right() - 8.0, frame.top() + height * frame.height() + 14.0 * line as f32);
-        painter.text(at, Align2::RIGHT_TOP, text, theme::small(), *colour);
+        let galley = painter.layout_no_wrap((*text).to_owned(), theme::small(), *colour);
+        let top = frame.top() + height * frame.height() + 15.0 * line as f32;
+        let at = egui::pos2(frame.right() - 8.0 - galley.size().x, top);
+        let behind = Rect::from_min_size(at, galley.size()).expand2(vec2(3.0, 1.0));
+        painter.rect_filled(behind, egui::CornerRadius::same(2), ground);
+        painter.galley(at, galley, *colour);
     }
 }
 

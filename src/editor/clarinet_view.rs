@@ -5,13 +5,17 @@
 //! lower one, wherever they are on the real instrument. A click on a hole tries it: it opens or closes whatever is
 //! fingered, until *Back to the note*.
 
+use std::sync::Arc;
+
 use egui::{
     Align2, Color32, CornerRadius, CursorIcon, FontId, Painter, Pos2, Rect, Response, Role, Sense, Shape,
-    Stroke, Ui, WidgetInfo, pos2, vec2,
+    Stroke, Ui, Vec2, WidgetInfo, pos2, vec2,
 };
 
-use crate::bore::instrument_file::{HoleKind, REGISTERS, ToneHole};
+use crate::bore::instrument_file::{HoleKind, InstrumentFile, REGISTERS, ToneHole};
 use crate::editor::Action;
+use crate::editor::alternates;
+use crate::editor::alternates::Choice;
 use crate::editor::chart;
 use crate::editor::clarinet_body::{Body, part_names, ruler, standing};
 use crate::editor::header::note_name;
@@ -27,6 +31,8 @@ const NAMED: f32 = 34.0;
 pub struct ClarinetView {
     /// Holes as they are tried, whatever is fingered.
     tried: Option<Vec<bool>>,
+    /// Of which instrument, and what the picker shows of it.
+    known: Option<(Arc<InstrumentFile>, Arc<Vec<Choice>>)>,
 }
 
 impl ClarinetView {
@@ -118,22 +124,27 @@ impl ClarinetView {
 
     fn picker(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
         let c = Colours::here(ui);
-        let file = &*snapshot.instrument;
+        let all = self.choices(&snapshot.instrument);
         let shown = match &self.tried {
-            Some(tried) => file.fingerings.iter().position(|fingering| fingering.open == *tried),
-            None => Some(snapshot.fingering),
+            Some(tried) => all.iter().position(|choice| choice.open == *tried),
+            None => snapshot
+                .fingering()
+                .and_then(|fingering| all.iter().position(|choice| choice.open == fingering.open)),
         };
+        let name = |choice: &Choice| format!("{}{}", note_name(choice.written.0), "'".repeat(choice.nth));
         ui.horizontal(|ui| {
             ui.set_height(22.0);
-            let told = match shown.and_then(|index| file.fingerings.get(index)) {
-                Some(fingering) => {
+            let told = match shown.map(|index| &all[index]) {
+                Some(choice) => {
                     let fingers =
-                        if fingering.fingers.trim().is_empty() { "no finger" } else { &fingering.fingers };
-                    let alternates =
-                        file.fingerings.iter().filter(|other| other.written == fingering.written).count();
-                    let more =
-                        if alternates > 1 { format!(", {alternates} fingerings") } else { String::new() };
-                    format!("{} {}{more}: {fingers}", note_name(fingering.written.0), fingering.register)
+                        if choice.fingers.trim().is_empty() { "no finger" } else { &choice.fingers };
+                    let of_note = all.iter().filter(|other| other.written == choice.written).count();
+                    let more = match (of_note, choice.nth) {
+                        (1, _) => String::new(),
+                        (_, 0) => format!(", one of {of_note} fingerings"),
+                        _ => ", alternate fingering".into(),
+                    };
+                    format!("{} {}{more}: {fingers}", name(choice), choice.register)
                 }
                 None => "a fingering of your own".into(),
             };
@@ -146,46 +157,51 @@ impl ClarinetView {
             ui.label(told);
         });
         egui::ScrollArea::vertical().id_salt("picker").auto_shrink([false, false]).show(ui, |ui| {
-            ui.spacing_mut().item_spacing = vec2(3.0, 4.0);
+            // Four registers in the least window.
+            let line = ((ui.available_height() - 8.0) / 4.0 - 3.0).clamp(19.0, 24.0);
+            ui.spacing_mut().item_spacing = vec2(3.0, 3.0);
+            ui.spacing_mut().interact_size.y = line;
             // The longest register on one line.
-            let chip_width = ((ui.available_width() - 72.0) / 14.0 - 3.0).clamp(28.0, 38.0);
-            for register in REGISTERS {
-                let of_register = file.fingerings.iter().enumerate().filter(|(_, f)| f.register == register);
-                if of_register.clone().next().is_none() {
-                    continue;
-                }
+            let of = |register: &str| all.iter().filter(|choice| choice.register == register).count();
+            let longest = REGISTERS.iter().map(|register| of(register)).max().unwrap_or(1).max(1);
+            let width = (ui.available_width() - 76.0) / longest as f32 - 3.0;
+            for register in REGISTERS.into_iter().filter(|register| of(register) > 0) {
                 ui.horizontal_wrapped(|ui| {
-                    let (rect, _) = ui.allocate_exact_size(vec2(66.0, 22.0), Sense::hover());
-                    ui.painter().text(
-                        rect.left_center(),
-                        Align2::LEFT_CENTER,
-                        register,
-                        theme::small(),
-                        c.quiet,
-                    );
-                    for (index, fingering) in of_register {
-                        let first =
-                            file.fingerings.iter().position(|other| other.written == fingering.written);
-                        let alternate = if first == Some(index) { "" } else { "'" };
-                        let name = format!("{}{alternate}", note_name(fingering.written.0));
-                        let is_here = shown == Some(index);
-                        let response = chip(ui, c, &name, chip_width, is_here);
+                    let (rect, _) = ui.allocate_exact_size(vec2(66.0, line), Sense::hover());
+                    let at = rect.left_center();
+                    ui.painter().text(at, Align2::LEFT_CENTER, register, theme::small(), c.quiet);
+                    let of_register =
+                        all.iter().enumerate().filter(|(_, choice)| choice.register == register);
+                    for (index, choice) in of_register {
+                        let (name, is_here) = (name(choice), shown == Some(index));
+                        let size = vec2(width.clamp(26.0, 46.0), line);
+                        let response = chip(ui, c, &name, size, is_here, choice.nth > 0);
                         response.widget_info(|| {
-                            WidgetInfo::selected(
-                                Role::RadioButton,
-                                true,
-                                is_here,
-                                format!("Fingering {name}"),
-                            )
+                            let label = format!("Fingering {name}");
+                            WidgetInfo::selected(Role::RadioButton, true, is_here, label)
                         });
-                        if response.on_hover_text(format!("{name}: {}", fingering.fingers)).clicked() {
-                            self.tried = Some(fingering.open.clone());
-                            actions.push(Action::TryFingering(fingering.open.clone()));
+                        let alternate = if choice.nth > 0 { " (alternate, not tuned)" } else { "" };
+                        let told = format!("{name}{alternate}: {}", choice.fingers);
+                        if response.on_hover_text(told).clicked() {
+                            self.tried = Some(choice.open.clone());
+                            actions.push(Action::TryFingering(choice.open.clone()));
                         }
                     }
                 });
             }
         });
+    }
+
+    /// What can be picked; worked out once an instrument.
+    fn choices(&mut self, file: &Arc<InstrumentFile>) -> Arc<Vec<Choice>> {
+        match &self.known {
+            Some((of, choices)) if Arc::ptr_eq(of, file) || of == file => choices.clone(),
+            _ => {
+                let choices = Arc::new(alternates::choices(file));
+                self.known = Some((file.clone(), choices.clone()));
+                choices
+            }
+        }
     }
 }
 
@@ -250,8 +266,8 @@ fn button(ui: &mut Ui, rect: Rect, hole: &ToneHole, opening: f32, is_named: bool
 }
 
 /// A small button of the picker.
-fn chip(ui: &mut Ui, c: &Colours, name: &str, width: f32, is_here: bool) -> Response {
-    let (rect, response) = ui.allocate_exact_size(vec2(width, 22.0), Sense::click());
+fn chip(ui: &mut Ui, c: &Colours, name: &str, size: Vec2, is_here: bool, is_alternate: bool) -> Response {
+    let (rect, response) = ui.allocate_exact_size(size, Sense::click());
     let fill = match (is_here, response.hovered()) {
         (true, _) => c.accent,
         (false, true) => c.hovered,
@@ -262,7 +278,11 @@ fn chip(ui: &mut Ui, c: &Colours, name: &str, width: f32, is_here: bool) -> Resp
     if response.has_focus() {
         ui.painter().rect_stroke(rect, round, Stroke::new(1.5, c.ink), egui::StrokeKind::Inside);
     }
-    let ink = if is_here { c.on_accent } else { c.ink };
+    let ink = match (is_here, is_alternate) {
+        (true, _) => c.on_accent,
+        (false, true) => c.quiet,
+        (false, false) => c.ink,
+    };
     ui.painter().text(rect.center(), Align2::CENTER_CENTER, name, theme::small(), ink);
     response
 }

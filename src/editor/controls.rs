@@ -55,6 +55,21 @@ pub struct Entry {
     pub is_shown: bool,
 }
 
+/// Least time that a pressed button holds its parameter, s: the plugin looks once a block, and 4,096 samples at 44.1 kHz are
+/// 93 ms.
+pub const LEAST_PRESS_S: f64 = 0.1;
+
+/// A button that holds its parameter at 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Press {
+    /// Which.
+    pub id: &'static str,
+    /// When it went down, s.
+    pub since_s: f64,
+    /// Mouse button or key are still down, as its widget saw in this frame.
+    pub is_down: bool,
+}
+
 /// The controls, and what is remembered of touching them.
 pub struct Hands<'a> {
     /// The host.
@@ -65,6 +80,8 @@ pub struct Hands<'a> {
     pub entry: &'a mut Option<Entry>,
     /// Parameters that a hand is on.
     pub held: &'a mut Vec<&'static str>,
+    /// Buttons that are down.
+    pub presses: &'a mut Vec<Press>,
 }
 
 impl Hands<'_> {
@@ -96,11 +113,45 @@ impl Hands<'_> {
         }
     }
 
-    /// All hands off: what held them is gone, or the pointer is up.
+    /// All hands off: what held them is gone, or the pointer is up. Pressed buttons end by themselves.
     pub fn let_go(&mut self) {
         for id in self.held.clone() {
-            self.end(id);
+            if !self.presses.iter().any(|press| press.id == id) {
+                self.end(id);
+            }
         }
+    }
+
+    /// A button was pressed by `now_s`, and `is_down` still: its parameter is 1 until
+    /// [`end_presses`](Self::end_presses).
+    pub fn press(&mut self, id: &'static str, now_s: f64, is_down: bool) {
+        if let Some(press) = self.presses.iter_mut().find(|press| press.id == id) {
+            press.is_down = is_down;
+        } else if !self.held.contains(&id) {
+            self.begin(id);
+            self.set(id, 1.0);
+            self.presses.push(Press { id, since_s: now_s, is_down });
+        }
+    }
+
+    /// Ends the presses that no hand holds and that were long enough, after all widgets of a frame; all of them if
+    /// `now_s` is `None`. How long until the next may end, s.
+    pub fn end_presses(&mut self, now_s: Option<f64>) -> Option<f64> {
+        let mut soonest: Option<f64> = None;
+        for press in std::mem::take(self.presses) {
+            let left_s = now_s.map_or(0.0, |now_s| press.since_s + LEAST_PRESS_S - now_s);
+            if now_s.is_none() || (!press.is_down && left_s <= 0.0) {
+                self.set(press.id, 0.0);
+                self.end(press.id);
+                continue;
+            }
+            if !press.is_down {
+                soonest = Some(soonest.map_or(left_s, |soonest| soonest.min(left_s)));
+            }
+            // Its widget says so again in the next frame, unless it has vanished.
+            self.presses.push(Press { is_down: false, ..press });
+        }
+        soonest
     }
 
     /// One touch: on, there, off.
@@ -137,6 +188,13 @@ impl Hands<'_> {
         if let Some(value) = self.controls.parse(id, &format!("{number}")) {
             self.set(id, value);
         }
+    }
+
+    /// A parameter in its own unit, as exact as its text; 0 where it is no number.
+    pub fn number(&self, id: &str) -> f64 {
+        let text = self.controls.look(id).map_or_else(String::new, |look| self.controls.text(id, look.value));
+        let end = text.find(|c: char| !(c.is_ascii_digit() || "-.".contains(c))).unwrap_or(text.len());
+        text[..end].parse().unwrap_or(0.0)
     }
 
     /// A switch or choice is on its `index`-th step.

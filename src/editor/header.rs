@@ -26,8 +26,11 @@ pub fn note_name(midi: u8) -> String {
 pub fn tools(ui: &mut Ui, kept: &mut Kept, compare: &mut Compare, hands: &mut Hands, snapshot: &Snapshot) {
     let is_wide = ui.available_width() > 900.0;
     ui.horizontal_centered(|ui| {
-        note(ui, snapshot);
-        needle(ui, snapshot, if is_wide { 150.0 } else { 96.0 });
+        // The pitch would tell one setting from another.
+        note(ui, snapshot, !compare.is_blind());
+        if !compare.is_blind() {
+            needle(ui, snapshot, if is_wide { 150.0 } else { 96.0 });
+        }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             ui.spacing_mut().item_spacing.x = 5.0;
             ui.spacing_mut().button_padding.x = if is_wide { 8.0 } else { 6.0 };
@@ -96,7 +99,7 @@ fn icon(ui: &mut Ui, icon: Icon, name: &str) -> egui::Response {
     named(response, name)
 }
 
-fn note(ui: &mut Ui, snapshot: &Snapshot) {
+fn note(ui: &mut Ui, snapshot: &Snapshot, has_pitch: bool) {
     let c = Colours::here(ui);
     let (rect, response) = ui.allocate_exact_size(vec2(150.0, ui.available_height()), Sense::hover());
     let written = snapshot.written().map(|note| note_name(note.0));
@@ -115,6 +118,7 @@ fn note(ui: &mut Ui, snapshot: &Snapshot) {
     let below = sounding.map_or_else(String::new, |note| format!("sounds {}", note_name(note.0)));
     painter.text(pos2(x, rect.center().y - 1.0), Align2::LEFT_BOTTOM, &below, theme::small(), c.quiet);
     let pitch = snapshot.heard.f0_hz.map_or_else(|| "silent".into(), |hz| format!("{hz:.1} Hz"));
+    let pitch = if has_pitch { pitch } else { String::new() };
     painter.text(pos2(x, rect.center().y + 1.0), Align2::LEFT_TOP, &pitch, theme::small(), c.quiet);
     let said = format!("Written {big}, {below}, {pitch}");
     response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &said));
@@ -208,7 +212,8 @@ fn sides(ui: &mut Ui, compare: &mut Compare, hands: &mut Hands, is_wide: bool) {
     }
     for (side, name) in [(Side::B, "B"), (Side::A, "A")] {
         let is_here = compare.side == side;
-        let response = ui.selectable_label(is_here, format!(" {name} "));
+        let button = egui::Button::selectable(is_here, format!(" {name} ")).frame_when_inactive(true);
+        let response = ui.add(button);
         response.widget_info(|| {
             WidgetInfo::selected(Role::RadioButton, true, is_here, format!("Setting {name}"))
         });
@@ -221,7 +226,8 @@ fn sides(ui: &mut Ui, compare: &mut Compare, hands: &mut Hands, is_wide: bool) {
 
 fn zoom(ui: &mut Ui, kept: &mut Kept) {
     let text = format!("{:.0} %", 100.0 * kept.zoom);
-    let list = egui::ComboBox::from_id_salt("zoom").width(64.0).selected_text(&text);
+    // High enough for all of them.
+    let list = egui::ComboBox::from_id_salt("zoom").width(64.0).height(300.0).selected_text(&text);
     let shown = list.show_ui(ui, |ui| {
         for zoom in ZOOMS {
             ui.selectable_value(&mut kept.zoom, zoom, format!("{:.0} %", 100.0 * zoom));

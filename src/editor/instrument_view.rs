@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use egui::{Align2, CornerRadius, RichText, Role, Sense, Stroke, TextEdit, Ui, WidgetInfo, vec2};
 
 use crate::editor::Action;
-use crate::editor::controls::{Hands, choice, heading, slider};
+use crate::editor::chart;
+use crate::editor::clarinet_body::{Body, ruler};
+use crate::editor::controls::{Hands, choice, heading, slider, teach};
 use crate::editor::header::note_name;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
@@ -25,33 +27,39 @@ impl InstrumentView {
             ui,
             "instrument",
             &mut with,
-            |ui, (this, _, actions)| this.left(ui, snapshot, actions),
+            |ui, (this, hands, actions)| this.left(ui, hands, snapshot, actions),
             |ui, (_, hands, _)| column(ui, hands),
         );
     }
 
-    fn left(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    fn left(&mut self, ui: &mut Ui, hands: &Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
         let c = Colours::here(ui);
         ui.spacing_mut().item_spacing.y = GAP;
         let height = ui.available_height();
         panel(c).show(ui, |ui| {
             ui.set_width(ui.available_width());
-            ui.set_height((0.34 * height - 24.0).max(136.0));
+            ui.set_height((0.34 * height - 24.0).max(168.0));
             egui::ScrollArea::vertical().id_salt("instruments").auto_shrink([false, false]).show(ui, |ui| {
-                self.list(ui, snapshot, actions);
+                self.list(ui, hands, snapshot, actions);
             });
         });
         panel(c).show(ui, |ui| {
             ui.set_width(ui.available_width());
             ui.set_height(ui.available_height());
+            let all = ui.available_height();
+            let drawn = if all < 300.0 { 0.0 } else { (0.40 * all).min(200.0) };
             egui::ScrollArea::vertical()
                 .id_salt("facts")
+                .max_height(all - drawn)
                 .auto_shrink([false, false])
                 .show(ui, |ui| facts(ui, snapshot));
+            if drawn > 0.0 {
+                portrait(ui, snapshot);
+            }
         });
     }
 
-    fn list(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    fn list(&mut self, ui: &mut Ui, hands: &Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
         let c = Colours::here(ui);
         heading(ui, "Instrument");
         ui.horizontal_wrapped(|ui| {
@@ -62,6 +70,10 @@ impl InstrumentView {
                 }
             }
         });
+        if let Some(look) = hands.controls.look("istat") {
+            let told = hands.controls.text("istat", look.value);
+            ui.label(RichText::new(told).color(c.quiet)).on_hover_ui(|ui| teach(ui, "istat", ""));
+        }
         if let Some((what, part)) = &snapshot.preparing {
             ui.add(egui::ProgressBar::new(*part).text(what.as_str()).desired_height(16.0).fill(c.accent));
         }
@@ -106,6 +118,20 @@ fn card(ui: &mut Ui, c: &Colours, name: &str, is_here: bool) -> egui::Response {
     response
 }
 
+/// The instrument to scale, with its fingers where they are.
+fn portrait(ui: &Ui, snapshot: &Snapshot) {
+    let c = Colours::here(ui);
+    let area = ui.available_rect_before_wrap();
+    let painter = ui.painter_at(area);
+    let body = Body::new(&snapshot.instrument, area);
+    ruler(&painter, c, area, body.scale);
+    body.paint(&painter, c, &[]);
+    for (index, hole) in snapshot.instrument.holes.iter().enumerate() {
+        let opening = chart::share(snapshot.openings.get(index).copied().unwrap_or(0.0));
+        body.paint_hole(&painter, c, hole, opening, false);
+    }
+}
+
 fn facts(ui: &mut Ui, snapshot: &Snapshot) {
     let c = Colours::here(ui);
     let file = &*snapshot.instrument;
@@ -134,10 +160,14 @@ fn facts(ui: &mut Ui, snapshot: &Snapshot) {
         ("Fingerings", file.fingerings.len().to_string()),
         ("Latency", format!("{:.1} ms", snapshot.latency_ms)),
     ];
-    egui::Grid::new("facts").num_columns(2).spacing([18.0, 5.0]).show(ui, |ui| {
-        for (name, value) in rows {
-            ui.label(RichText::new(name).color(c.quiet));
-            ui.label(value);
+    let beside = if ui.available_width() > 520.0 { 2 } else { 1 };
+    let grid = egui::Grid::new("facts").num_columns(2 * beside).spacing([18.0, 3.0]).min_row_height(20.0);
+    grid.show(ui, |ui| {
+        for row in rows.chunks(beside) {
+            for (name, value) in row {
+                ui.label(RichText::new(*name).color(c.quiet));
+                ui.label(value);
+            }
             ui.end_row();
         }
     });
@@ -152,10 +182,11 @@ fn column(ui: &mut Ui, hands: &mut Hands) {
     for id in ["temp", "vent"] {
         slider(ui, hands, id);
     }
-    heading(ui, "Articulation");
-    for id in ["tongue", "legato", "noise"] {
+    heading(ui, "Playing");
+    for id in ["tongue", "legato", "noise", "bendr"] {
         slider(ui, hands, id);
     }
     heading(ui, "Output");
     slider(ui, hands, "gain");
+    choice(ui, hands, "qual");
 }

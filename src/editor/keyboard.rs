@@ -1,4 +1,4 @@
-//! Keys that play: the compass of the instrument, sounding pitch, higher up on a key is louder.
+//! Keys that play: the compass of the instrument, sounding pitch, further down on a key is louder.
 //!
 //! Sliding from key to key slurs: the new note goes down before the old one comes up. With the focus on it, arrow keys
 //! choose a note and Space plays it as long as it is held.
@@ -75,6 +75,10 @@ impl Keyboard {
         response.widget_info(|| {
             WidgetInfo::labeled(Role::Group, true, format!("Keyboard, {}", note_name(chosen)))
         });
+        response.on_hover_text(
+            "Plays sounding pitches; above, the note stands as a player reads it. Further down on a key is louder; \
+             sliding slurs. By keys, with Tab up to here: arrows choose, Space plays.",
+        );
     }
 
     /// Lets go of what is held: the window closes, or another view takes the pointer.

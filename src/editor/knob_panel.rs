@@ -86,7 +86,8 @@ impl KnobPanel {
         ui.horizontal_wrapped(|ui| {
             for test in FeelTest::ALL {
                 let is_on = self.test == Some(test);
-                let response = ui.selectable_label(is_on, test.name());
+                let button = Button::selectable(is_on, test.name()).frame_when_inactive(true);
+                let response = ui.add(button);
                 response.widget_info(|| {
                     WidgetInfo::selected(
                         Role::RadioButton,
@@ -162,12 +163,30 @@ fn devices(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Ve
     let c = Colours::here(ui);
     let knob = &snapshot.knob;
     egui::ScrollArea::vertical().id_salt("devices").auto_shrink([false, false]).show(ui, |ui| {
-        choice(ui, hands, "knob");
+        ui.horizontal_top(|ui| {
+            let left = (ui.available_width() - 88.0).max(100.0);
+            ui.vertical(|ui| {
+                ui.set_width(left);
+                choice(ui, hands, "knob");
+            });
+            ui.vertical(|ui| {
+                // In line with the list beside its name.
+                ui.add_space(20.0);
+                momentary(ui, hands, "takeov", "Take over");
+            });
+        });
         let colour = if knob.is_live { c.speaks } else { c.quiet };
-        ui.horizontal_wrapped(|ui| {
+        ui.horizontal(|ui| {
             let (dot, _) = ui.allocate_exact_size(vec2(10.0, 14.0), Sense::hover());
             ui.painter().circle_filled(dot.center(), 4.0, colour);
-            ui.label(if knob.text.is_empty() { "no knob chosen" } else { &knob.text });
+            let told = hands.controls.look("kstat").map(|look| hands.controls.text("kstat", look.value));
+            let told = Some(knob.text.clone()).filter(|text| !text.is_empty()).or(told);
+            let told = told.filter(|text| text != "off").unwrap_or_else(|| "no knob chosen".into());
+            let response = ui.add(egui::Label::new(&told).truncate());
+            response.on_hover_ui(|ui| {
+                ui.label(&told);
+                teach(ui, "kstat", "");
+            });
         });
         for device in &knob.devices {
             device_row(ui, c, device, actions);
@@ -175,7 +194,6 @@ fn devices(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Ve
         if let Some(notice) = &knob.notice {
             ui.label(RichText::new(notice).color(c.beats));
         }
-        momentary(ui, hands, "takeov", "Take over the knob");
     });
 }
 
@@ -335,7 +353,7 @@ fn column(ui: &mut Ui, hands: &mut Hands, page: Page) {
             for id in ["part", "seed", "trial"] {
                 slider(ui, hands, id);
             }
-            switch(ui, hands, "side");
+            choice(ui, hands, "side");
         }
     }
 }

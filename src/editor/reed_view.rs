@@ -3,7 +3,8 @@
 //!
 //! Horizontally the pressure difference over the reed, kPa; vertically the flow, cm3/s. The still reed sits on the curve
 //! at the mouth pressure; the sounding reed runs round a loop, which leaves the curve because reed and lay take time.
-//! The peak is the handle of H, closure that of k. Coupled, both move H, and the peak's height is A.
+//! The peak is the handle of H, closure that of k. Coupled, both move H, and the peak's height is A. Where the reed is
+//! named as its maker does, the peak is the handle of the channel's width and closure that of the stiffness.
 
 use egui::{Align2, Pos2, Stroke, Ui, pos2, vec2};
 use egui_plot::{PlotPoint, PlotTransform, PlotUi, Points};
@@ -163,13 +164,13 @@ impl ReedView {
         });
         chart::names(ui, &transform, &marks);
         if ui.available_width() > 300.0 && transform.frame().height() > 200.0 {
-            let sounding = if is_sounding { "the sounding reed, one period" } else { "the reed is still" };
-            let lines = [
-                ("the reed's law", c.accent),
-                (sounding, c.breath),
-                ("circle: the still reed at this breath", c.quiet),
-            ];
-            chart::legend(ui, &transform, 0.34, &lines);
+            let sounding = if is_sounding { "sounding: one period" } else { "the reed is still" };
+            let mut lines = vec![("the reed's law", c.accent), (sounding, c.breath)];
+            if kpa > 0.02 {
+                lines.push(("circle: the still reed", c.breath));
+            }
+            // Below, where the closed reed lets nothing through.
+            chart::legend(ui, &transform, 0.70, &lines);
         }
         self.handles(ui, hands, snapshot, &picture, &transform, (right, top));
     }
@@ -183,67 +184,103 @@ impl ReedView {
         transform: &PlotTransform,
         bounds: (f64, f64),
     ) {
-        let is_coupled = snapshot.settings.coupled;
+        let face = if hands.step("rface") == 1 {
+            Face::Maker
+        } else if snapshot.settings.coupled {
+            Face::Coupled
+        } else {
+            Face::Free
+        };
         let place = |[x, y]: [f64; 2]| transform.position_from_point(&PlotPoint::new(x, y));
-        let (peak_ids, end_ids): (&[&str], &[&str]) =
-            if is_coupled { (&["reedh", "reeda"], &["reedh"]) } else { (&["reedh"], &["reedk"]) };
-        let (peak, peak_to) = handle(ui, "Peak of the flow: H", place(picture.peak()), "H");
-        let (end, end_to) = handle(ui, "Closure of the reed: k", place([picture.closure_kpa(), 0.0]), "k");
-        for (response, to, ids) in [(&peak, peak_to, peak_ids), (&end, end_to, end_ids)] {
+        let [peak_is, end_is] = face.names();
+        let (peak, peak_to) =
+            handle(ui, &format!("Peak of the flow: {peak_is}"), place(picture.peak()), peak_is);
+        let end_at = place([picture.closure_kpa(), 0.0]);
+        let (end, end_to) = handle(ui, &format!("Closure of the reed: {end_is}"), end_at, end_is);
+        for (response, to, is_peak) in [(&peak, peak_to, true), (&end, end_to, false)] {
+            let ids = face.ids(is_peak);
             if response.drag_started() {
-                ids.iter().filter_map(|id| known(id)).for_each(|id| hands.begin(id));
+                ids.iter().for_each(|id| hands.begin(id));
                 self.bounds = Some(bounds);
             }
             if let Some(to) = to {
                 let is_key = !response.dragged();
                 if is_key {
-                    ids.iter().filter_map(|id| known(id)).for_each(|id| hands.begin(id));
+                    ids.iter().for_each(|id| hands.begin(id));
                 }
                 let to = transform.value_from_position(to);
-                match (is_coupled, std::ptr::eq(response, &peak)) {
-                    (true, true) => {
+                match (face, is_peak) {
+                    (Face::Coupled, true) => {
                         hands.set_number("reedh", picture.coupled_h(3.0 * to.x));
                         hands.set_number("reeda", picture.a(to.y));
                     }
-                    (true, false) => hands.set_number("reedh", picture.coupled_h(to.x)),
-                    (false, true) => hands.set_number("reedh", picture.free_h(to.y)),
-                    (false, false) => hands.set_number("reedk", picture.free_k(to.x)),
+                    (Face::Coupled, false) => hands.set_number("reedh", picture.coupled_h(to.x)),
+                    (Face::Free, true) => hands.set_number("reedh", picture.free_h(to.y)),
+                    (Face::Free, false) => hands.set_number("reedk", picture.free_k(to.x)),
+                    // Flow goes with the width, closing pressure with the stiffness.
+                    (Face::Maker, true) => scale(hands, "rwidth", to.y / picture.peak()[1]),
+                    (Face::Maker, false) => scale(hands, "rstiff", to.x / picture.closure_kpa()),
                 }
                 if is_key {
-                    ids.iter().filter_map(|id| known(id)).for_each(|id| hands.end(id));
+                    ids.iter().for_each(|id| hands.end(id));
                 }
             }
             if response.drag_stopped() {
-                ids.iter().filter_map(|id| known(id)).for_each(|id| hands.end(id));
+                ids.iter().for_each(|id| hands.end(id));
                 self.bounds = None;
             }
             if response.double_clicked() {
-                let ids = ids.iter().filter_map(|id| known(id));
                 let defaults: Vec<_> =
-                    ids.filter_map(|id| Some((id, hands.controls.look(id)?.default))).collect();
+                    ids.iter().filter_map(|&id| Some((id, hands.controls.look(id)?.default))).collect();
                 hands.put_all(&defaults);
             }
         }
-        peak.on_hover_ui(|ui| {
-            teach(
-                ui,
-                "reedh",
-                if is_coupled {
-                    "Sideways: H. Up and down: A. Double click: default."
-                } else {
-                    "Up and down: H. Double click: default."
-                },
-            )
-        });
-        end.on_hover_ui(|ui| {
-            teach(ui, if is_coupled { "reedh" } else { "reedk" }, "Sideways. Double click: default.")
-        });
+        let way = match face {
+            Face::Coupled => "Sideways: H. Up and down: A. Double click: default.",
+            Face::Free | Face::Maker => "Up and down. Double click: default.",
+        };
+        peak.on_hover_ui(|ui| teach(ui, face.ids(true)[0], way));
+        end.on_hover_ui(|ui| teach(ui, face.ids(false)[0], "Sideways. Double click: default."));
     }
 }
 
-/// The ids of this view, as the history keeps them.
-fn known(id: &str) -> Option<&'static str> {
-    ["reedh", "reedk", "reeda"].into_iter().find(|known| *known == id)
+/// How the reed is named, which decides what its handles move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Face {
+    /// H alone; k follows.
+    Coupled,
+    /// H and k.
+    Free,
+    /// As a maker measures it.
+    Maker,
+}
+
+impl Face {
+    /// What stands on the handles of peak and closure.
+    fn names(self) -> [&'static str; 2] {
+        match self {
+            Self::Coupled | Self::Free => ["H", "k"],
+            Self::Maker => ["w", "K"],
+        }
+    }
+
+    /// What a handle moves.
+    fn ids(self, is_peak: bool) -> &'static [&'static str] {
+        match (self, is_peak) {
+            (Self::Coupled, true) => &["reedh", "reeda"],
+            (Self::Coupled, false) | (Self::Free, true) => &["reedh"],
+            (Self::Free, false) => &["reedk"],
+            (Self::Maker, true) => &["rwidth"],
+            (Self::Maker, false) => &["rstiff"],
+        }
+    }
+}
+
+/// Sets a parameter to so many times what it is.
+fn scale(hands: &mut Hands, id: &'static str, by: f64) {
+    if by.is_finite() {
+        hands.set_number(id, hands.number(id) * by.max(0.0));
+    }
 }
 
 /// The next multiple of `step` above.
@@ -345,15 +382,26 @@ pub fn torque_picture(ui: &mut Ui, snapshot: &Snapshot) {
 }
 
 fn column(ui: &mut Ui, hands: &mut Hands) {
+    let is_maker = hands.step("rface") == 1;
     heading(ui, "Embouchure");
-    for id in ["stren", "lip", "zeta", "damp"] {
+    for id in ["stren", "lip"] {
         slider(ui, hands, id);
     }
+    // A maker's reed has its zeta from its width and opening.
+    ui.add_enabled_ui(!is_maker, |ui| slider(ui, hands, "zeta"));
+    slider(ui, hands, "damp");
     heading(ui, "Reed");
-    switch(ui, hands, "reedc");
-    slider(ui, hands, "reedh");
-    let is_coupled = hands.step("reedc") == 1;
-    ui.add_enabled_ui(!is_coupled, |ui| slider(ui, hands, "reedk"));
+    choice(ui, hands, "rface");
+    if is_maker {
+        for id in ["rstiff", "rarea", "rwidth", "ropen"] {
+            slider(ui, hands, id);
+        }
+    } else {
+        switch(ui, hands, "reedc");
+        slider(ui, hands, "reedh");
+        let is_coupled = hands.step("reedc") == 1;
+        ui.add_enabled_ui(!is_coupled, |ui| slider(ui, hands, "reedk"));
+    }
     for id in ["reeda", "lay"] {
         slider(ui, hands, id);
     }

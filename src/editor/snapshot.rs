@@ -146,6 +146,11 @@ pub struct Source {
     pub is_seen: bool,
 }
 
+impl Source {
+    /// Name of the one that can be calibrated.
+    pub const KNOB: &'static str = "Knob";
+}
+
 /// Values at equal steps of time, oldest first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Track {

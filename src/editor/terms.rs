@@ -131,8 +131,16 @@ pub const TERMS: &[Term] = &[
         "The knob never makes more. 100 is gentle, 250 the most that can be asked for. Takes effect with the next arming; less at once.",
     ),
     act("takeov", "Takes the knob from the instance that has it", "The other window lets go, disarmed."),
-    act("rest", "The knob is at rest where it stands", "Calibrates no breath."),
-    act("blow", "The knob stands at full breath", "Calibrates full breath: the way from rest to here."),
+    act(
+        "rest",
+        "The knob is at rest where it stands",
+        "Calibrates no breath. Let go of the knob, then press.",
+    ),
+    act(
+        "blow",
+        "The knob stands at full breath",
+        "Calibrates full breath: the way from rest to here. Turn it as far as you want to blow, then press.",
+    ),
     term(
         "law",
         "Law of the torque",
@@ -189,6 +197,49 @@ pub const TERMS: &[Term] = &[
     term("hsrc", "What drives H", "A controller opens the reed in sound and hand alike.", ""),
     term("ksrc", "What drives k", "A controller stiffens the reed; coupling is off meanwhile.", ""),
     act("kstat", "How the link to the knob is", ""),
+    act(
+        "instr",
+        "Which clarinet",
+        "Another bore with its own holes, fingerings and reed. The one that plays fades over when the other is ready.",
+    ),
+    term(
+        "qual",
+        "How finely the host's offline mode renders",
+        "High computes at twice the rate and in double precision: a bounce takes longer than what is heard live.",
+        "",
+    ),
+    term("bendr", "How far the pitch wheel bends, semitones", "What MIDI says by RPN 0 goes before it.", ""),
+    act("istat", "How far the instrument is", ""),
+    term(
+        "rface",
+        "How the reed is named: by the dimensionless H, k and zeta, or as a maker measures it",
+        "The same reed either way: what rules are the values that are shown.",
+        "As heard.",
+    ),
+    term(
+        "rstiff",
+        "Stiffness K of the reed, N/m",
+        "A stiffer reed closes later: closing pressure is K times opening over area.",
+        "Threshold and closure move outwards.",
+    ),
+    term(
+        "rarea",
+        "Area that the breath presses on, mm\u{b2}",
+        "A larger area closes earlier.",
+        "Threshold and closure move inwards.",
+    ),
+    term(
+        "rwidth",
+        "Width w of the channel, tip and side slits together, mm",
+        "Wider: more flow, notes speak and beat earlier, brighter.",
+        "More torque.",
+    ),
+    term(
+        "ropen",
+        "Opening at the tip, at rest under the lip, mm",
+        "Wider: more flow, and the reed closes later.",
+        "More torque, and a farther closure.",
+    ),
 ];
 
 /// The explanation of a parameter.
@@ -207,7 +258,9 @@ mod tests {
 
     #[test]
     fn nothing_that_moves_a_motor_or_plays_travels_with_undo_or_compare() {
-        for id in ["arm", "ceil", "takeov", "rest", "blow", "breath", "panic", "rec", "replay", "knob"] {
+        for id in
+            ["arm", "ceil", "takeov", "rest", "blow", "breath", "panic", "rec", "replay", "knob", "instr"]
+        {
             assert!(!is_setting(id), "{id}");
         }
         assert!(is_setting("zeta") && !is_setting("no such"));

@@ -236,6 +236,8 @@ pub fn apply(ui: &mut Ui, theme: Theme) {
     if ctx.data(|data| data.get_temp::<bool>(id)) != Some(true) {
         ctx.set_style_of(Theme::Light, STYLES[0].clone());
         ctx.set_style_of(Theme::Dark, STYLES[1].clone());
+        // Ctrl and plus belong to the host; the zoom has a list of its own.
+        ctx.options_mut(|options| options.zoom_with_keyboard = false);
         ctx.data_mut(|data| data.insert_temp(id, true));
     }
     if ctx.theme() != theme {

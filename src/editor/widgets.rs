@@ -147,15 +147,17 @@ pub fn toggle(ui: &mut Ui, name: &str, is_on: bool) -> Response {
     response
 }
 
-/// A button that is on while it is held: what it stands for happens once.
+/// A button whose parameter is 1 while it is held, and for a tenth of a second at least.
 pub fn momentary(ui: &mut Ui, hands: &mut Hands, id: &'static str, text: &str) -> Option<Response> {
-    hands.controls.look(id)?;
-    let response = ui.button(text);
-    if response.clicked() {
-        hands.begin(id);
-        hands.set(id, 1.0);
-        hands.set(id, 0.0);
-        hands.end(id);
+    let is_on = hands.controls.look(id)?.value >= 0.5;
+    // A mere click is over after a while, however long the hand stays.
+    let button = egui::Button::new(text).selected(is_on).sense(Sense::click_and_drag());
+    let response = ui.add(button);
+    let by_key = response.has_focus() && ui.input(|i| i.key_down(Key::Space) || i.key_down(Key::Enter));
+    let is_down = response.is_pointer_button_down_on() || by_key;
+    // A click may begin and end within one frame.
+    if is_down || response.clicked() {
+        hands.press(id, ui.input(|i| i.time), is_down);
     }
     Some(response.on_hover_ui(|ui| teach(ui, id, "")))
 }

@@ -12,6 +12,8 @@ mod devices;
 mod frame;
 mod hands;
 mod looker;
+#[cfg(test)]
+mod pinned;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};

@@ -1,10 +1,11 @@
 //! Every control drags, types and resets; switches switch, choices choose; handles in pictures are taken by the hand.
 
+use chalumeau::editor::controls;
 use chalumeau::editor::controls::Controls;
 use chalumeau::editor::{Action, Tab, terms};
 use egui::accesskit::Role;
 use egui::{Key, Modifiers, vec2};
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT, Queryable};
 
 use crate::Window;
 use crate::support::Told;
@@ -18,34 +19,49 @@ const SLIDERS: &[(Tab, &[&str])] = &[
         Tab::Knob,
         &["ceil", "contr", "torque", "detent", "kdamp", "kfric", "refnot", "curve", "oscprt", "oscfl"],
     ),
-    (Tab::Instrument, &["a4", "temp", "vent", "tongue", "legato", "noise", "gain"]),
+    (Tab::Instrument, &["a4", "temp", "vent", "tongue", "legato", "noise", "bendr", "gain"]),
 ];
+/// Where the reed is named as its maker measures it.
+const MAKER_SLIDERS: &[&str] = &["rstiff", "rarea", "rwidth", "ropen"];
 /// On the last page of the knob's panel.
 const STUDY_SLIDERS: &[&str] = &["part", "seed", "trial"];
 const SWITCHES: &[(Tab, &[&str])] = &[(Tab::Reed, &["reedc"]), (Tab::Knob, &["oscany"])];
-const STUDY_SWITCHES: &[&str] = &["rec", "replay", "study", "side"];
+const STUDY_SWITCHES: &[&str] = &["rec", "replay", "study"];
+const STUDY_CHOICES: &[&str] = &["side"];
 const CHOICES: &[(Tab, &[&str])] = &[
-    (Tab::Reed, &["hsrc", "ksrc"]),
+    (Tab::Reed, &["rface", "hsrc", "ksrc"]),
     (Tab::Sound, &["tune"]),
     (Tab::Knob, &["knob", "law", "order"]),
-    (Tab::Instrument, &["tune"]),
+    (Tab::Instrument, &["tune", "qual"]),
+];
+/// Parameters that no widget of that kind moves, and how they are reached; each has a test.
+const OTHERWISE: &[(&str, &str)] = &[
+    ("reedk", "a slider while the reed is not coupled"),
+    ("arm", "the large button"),
+    ("instr", "the cards of the instrument view, as an action: the plugin tells the host"),
+    ("kstat", "its value means nothing; its text is the line of the knob's panel"),
+    ("istat", "its value means nothing; its text is the line below the cards"),
 ];
 const MOMENTARY: &[(Tab, &str, &str)] = &[
     (Tab::Reed, "panic", "Panic"),
     (Tab::Breath, "rest", "Rest here"),
     (Tab::Breath, "blow", "Blow hard here"),
-    (Tab::Knob, "takeov", "Take over the knob"),
+    (Tab::Knob, "takeov", "Take over"),
+    (Tab::Knob, "rest", "Rest here"),
+    (Tab::Knob, "blow", "Blow hard here"),
 ];
 
+/// The fake host has the plugin's parameters, to which a test of the plugin holds it; each of them is drawn by a view, and
+/// moved there by a test of this file.
 #[test]
 fn every_parameter_has_a_place() {
     let host = crate::support::Fake::default();
+    assert_eq!(host.ids().len(), 57);
     let lists = [SLIDERS, SWITCHES, CHOICES].into_iter().flatten().flat_map(|(_, ids)| ids.iter());
     let placed: Vec<&str> = lists
-        .chain([STUDY_SLIDERS, STUDY_SWITCHES].into_iter().flatten())
+        .chain([STUDY_SLIDERS, STUDY_SWITCHES, STUDY_CHOICES, MAKER_SLIDERS].into_iter().flatten())
         .chain(MOMENTARY.iter().map(|(_, id, _)| id))
-        // k while free, below; the large button, below; and a parameter whose text alone says something.
-        .chain(&["reedk", "arm", "kstat"])
+        .chain(OTHERWISE.iter().map(|(id, _)| id))
         .copied()
         .collect();
     for id in host.ids() {
@@ -53,6 +69,17 @@ fn every_parameter_has_a_place() {
         assert!(terms::of(id).is_some(), "{id} has no tool tip");
     }
     assert!(placed.iter().all(|id| host.ids().contains(id)));
+}
+
+#[test]
+fn what_a_status_parameter_says_is_read_in_its_view() {
+    let mut window = Window::tall(Tab::Instrument);
+    window.harness.get_by_label("ready: B flat clarinet");
+    window.harness.state_mut().kept.tab = Tab::Knob;
+    // A plugin without devices has no knob to tell of but the parameter.
+    window.snapshot.borrow_mut().knob = Default::default();
+    window.harness.run();
+    window.harness.get_by_label("no knob chosen");
 }
 
 fn drags_types_and_resets(window: &mut Window, id: &str) {
@@ -120,6 +147,10 @@ fn every_slider_drags_types_and_resets() {
     window.harness.get_by_label("Reed coupled").click();
     window.harness.run();
     drags_types_and_resets(&mut window, "reedk");
+    let mut window = Window::tall(Tab::Reed);
+    window.harness.get_by_label("Reed face: Physical").click();
+    window.harness.run();
+    MAKER_SLIDERS.iter().for_each(|id| drags_types_and_resets(&mut window, id));
 }
 
 fn study() -> Window {
@@ -154,42 +185,113 @@ fn every_switch_switches() {
     STUDY_SWITCHES.iter().for_each(|id| switches(&mut window, id));
 }
 
-#[test]
-fn every_choice_chooses() {
-    for (tab, ids) in CHOICES {
-        let mut window = Window::tall(*tab);
-        for id in *ids {
-            let look = window.host.look(id).unwrap();
-            let steps = look.steps.unwrap();
-            for step in (0..=steps).rev() {
-                let value = step as f32 / steps as f32;
-                let text = window.host.text(id, value);
-                let side_by_side = format!("{}: {text}", look.name);
-                if window.harness.query_by_label(&side_by_side).is_some() {
-                    window.harness.get_by_label(&side_by_side).click();
-                } else {
-                    window.harness.get_by_role_and_label(Role::ComboBox, &look.name).click();
-                    window.harness.run();
-                    let items = window.harness.get_all_by_label(&text).collect::<Vec<_>>();
-                    items.last().unwrap().click();
-                }
-                window.harness.run();
-                assert_eq!(window.host.value(id), value, "{id}: {text}");
-            }
+fn chooses(window: &mut Window, id: &str) {
+    let look = window.host.look(id).unwrap();
+    let steps = look.steps.unwrap();
+    for step in (0..=steps).rev() {
+        let value = step as f32 / steps as f32;
+        let text = window.host.text(id, value);
+        let side_by_side = format!("{}: {text}", look.name);
+        if window.harness.query_by_label(&side_by_side).is_some() {
+            window.harness.get_by_label(&side_by_side).click();
+        } else {
+            window.harness.get_by_role_and_label(Role::ComboBox, &look.name).click();
+            window.harness.run();
+            let items = window.harness.get_all_by_label(&text).collect::<Vec<_>>();
+            items.last().unwrap().click();
         }
+        window.harness.run();
+        assert_eq!(window.host.value(id), value, "{id}: {text}");
     }
 }
 
 #[test]
-fn what_acts_acts_once() {
+fn every_choice_chooses() {
+    for (tab, ids) in CHOICES {
+        let mut window = Window::tall(*tab);
+        ids.iter().for_each(|id| chooses(&mut window, id));
+    }
+    let mut window = study();
+    STUDY_CHOICES.iter().for_each(|id| chooses(&mut window, id));
+}
+
+/// Frames of the tests' clock in the least time of a press.
+const LEAST_FRAMES: usize = (controls::LEAST_PRESS_S * 60.0) as usize;
+
+/// The plugin looks at its parameters once a block: what is on for one frame only may never be seen.
+#[test]
+fn a_button_that_acts_is_on_while_it_is_held_and_a_tenth_of_a_second_at_least() {
     for (tab, id, label) in MOMENTARY {
+        let id = || (*id).to_owned();
+        let press = || [Told::Begin(id()), Told::Set(id(), 1.0)];
+        let release = || [Told::Set(id(), 0.0), Told::End(id())];
         let mut window = Window::tall(*tab);
         window.host.told();
-        window.harness.get_by_label(label).click();
+        let at = window.harness.get_by_label(label).rect().center();
+
+        // Held for a second by the mouse.
+        window.harness.hover_at(at);
+        window.harness.drag_at(at);
+        window.harness.run_steps(60);
+        assert_eq!(window.host.told(), press(), "{label} is down");
+        window.harness.drop_at(at);
+        window.harness.run_steps(2);
+        assert_eq!(window.host.told(), release(), "{label} is up");
+
+        // A quick click, both ends of it in one frame.
+        window.harness.hover_at(at);
+        window.harness.step();
+        for pressed in [true, false] {
+            let (button, modifiers) = (egui::PointerButton::Primary, Modifiers::NONE);
+            window.harness.input_mut().events.push(egui::Event::PointerButton {
+                pos: at,
+                button,
+                pressed,
+                modifiers,
+            });
+        }
+        window.harness.run_steps(LEAST_FRAMES - 2);
+        assert_eq!(window.host.told(), press(), "{label} is on for a while");
+        window.harness.run_steps(4);
+        assert_eq!(window.host.told(), release(), "{label} goes off by itself");
+
+        // Held by a key.
+        window.harness.get_by_label(label).focus();
         window.harness.run();
-        let id = || (*id).to_owned();
-        let told = window.host.told();
-        assert_eq!(told, [Told::Begin(id()), Told::Set(id(), 1.0), Told::Set(id(), 0.0), Told::End(id())]);
+        window.harness.key_down(Key::Space);
+        window.harness.run_steps(30);
+        assert_eq!(window.host.told(), press(), "{label} by the Space bar");
+        window.harness.key_up(Key::Space);
+        window.harness.run_steps(2);
+        assert_eq!(window.host.told(), release(), "{label} by the Space bar");
+
+        // Nothing of it is a step to take back.
+        assert!(window.harness.get_by_label("Undo").accesskit_node().is_disabled());
+    }
+}
+
+#[test]
+fn a_button_that_vanishes_or_closes_while_it_is_down_lets_go() {
+    let mut window = Window::tall(Tab::Breath);
+    let at = window.harness.get_by_label("Rest here").rect().center();
+    for is_closed in [false, true] {
+        window.harness.state_mut().kept.tab = Tab::Breath;
+        window.harness.run();
+        window.harness.hover_at(at);
+        window.harness.drag_at(at);
+        window.harness.run_steps(3);
+        assert_eq!(window.host.value("rest"), 1.0);
+        if is_closed {
+            let host = window.host.clone();
+            window.harness.state_mut().close(&*host);
+        } else {
+            window.harness.state_mut().kept.tab = Tab::Sound;
+            window.harness.run_steps(LEAST_FRAMES + 2);
+        }
+        assert_eq!(window.host.value("rest"), 0.0);
+        assert!(matches!(window.host.told().last(), Some(Told::End(id)) if id == "rest"));
+        window.harness.drop_at(at);
+        window.harness.run();
     }
 }
 
@@ -238,6 +340,26 @@ fn h_and_k_are_taken_by_the_hand() {
     let place = at(&window, peak);
     window.double_click(place);
     assert_eq!(window.host.value("reedh"), window.host.look("reedh").unwrap().default);
+}
+
+#[test]
+fn a_makers_reed_is_taken_by_the_hand() {
+    let mut window = Window::tall(Tab::Reed);
+    window.harness.get_by_label("Reed face: Physical").click();
+    window.harness.run();
+    let (peak, closure) = ("Peak of the flow: w", "Closure of the reed: K");
+    let at = |window: &Window, name: &str| window.harness.get_by_label(name).rect().center();
+    for (name, id, by) in [(peak, "rwidth", vec2(0.0, -30.0)), (closure, "rstiff", vec2(25.0, 0.0))] {
+        let (from, before) = (at(&window, name), window.host.plain(id));
+        window.drag(from, by);
+        assert!(window.host.plain(id) > 1.03 * before, "{id}");
+        let moved = at(&window, name) - from - by;
+        // Sideways the peak stays at a third of closure.
+        assert!((moved * by.normalized()).length() < 3.0, "{name} leaves the hand by {moved:?}");
+        window.harness.get_by_label("Undo").click();
+        window.harness.run();
+        assert!((window.host.plain(id) / before - 1.0).abs() < 1e-5);
+    }
 }
 
 #[test]

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
-use std::time::Duration;
 
 use chalumeau::editor::{Action, FeelTest, Tab};
 use chalumeau::units::SoundingNote;
@@ -26,7 +25,7 @@ fn tabs_lead_to_views_and_are_kept() {
         (Tab::Breath, "Rest here"),
         (Tab::Sound, "Spectrum of the sound"),
         (Tab::Knob, "Disarm the knob"),
-        (Tab::Instrument, "Instrument Bass"),
+        (Tab::Instrument, "Instrument Bass clarinet"),
         (Tab::Reed, "Peak of the flow: H"),
     ] {
         window.harness.get_by_role_and_label(Role::Tab, tab.name()).click();
@@ -66,6 +65,8 @@ fn a_and_b_keep_their_settings_and_blind_hides_them() {
     // Nothing tells: no slider, no curve.
     assert!(window.harness.query_by_label("Lip opening").is_none());
     assert!(window.harness.query_by_label("Undo").is_none());
+    assert!(window.harness.query_by_label_contains("Hz").is_none());
+    assert!(window.harness.query_by_label_contains("Pitch").is_none());
     window.harness.get_by_label("Mouth pressure 3.00 kPa, ");
     let heard: BTreeSet<String> = ["Side X", "Side Y"]
         .into_iter()
@@ -213,6 +214,13 @@ fn holes_are_tried_and_given_back() {
     assert_eq!(window.actions(), [Action::TryFingering(g4.clone())]);
     click(&mut window, "Back to the note");
     assert_eq!(window.actions(), [Action::EndTry]);
+
+    // Alternates stand behind the note they play.
+    click(&mut window, "Fingering Eb4''");
+    window.harness.get_by_label("trying");
+    window.harness.get_by_label("Eb4'' chalumeau, alternate fingering: T L1 R1 (fork)");
+    let [Action::TryFingering(fork)] = &window.actions()[..] else { panic!("no fingering is tried") };
+    assert!(!fork[file.hole("R1").unwrap()] && fork[file.hole("L2").unwrap()]);
 }
 
 #[test]
@@ -251,7 +259,7 @@ fn devices_tests_and_files_are_asked_for() {
     assert_eq!(window.actions(), [Action::FeelTest(None)], "leaving the page ends the test");
 
     let mut window = Window::tall(Tab::Instrument);
-    click(&mut window, "Instrument Bass");
+    click(&mut window, "Instrument Bass clarinet");
     assert_eq!(window.actions(), [Action::ChooseInstrument(4)]);
     let field = window.harness.get_by_label("Path of an instrument file");
     field.focus();
@@ -309,17 +317,95 @@ fn every_control_is_reached_by_the_tab_key() {
     }
 }
 
+/// Frames that an idle window asks for in `seconds`, after two to settle: a clock that runs only when it is asked for.
+fn frames_asked_for(window: &mut Window, seconds: f64) -> usize {
+    let mut count = 0;
+    let mut time = window.harness.ctx.input(|input| input.time);
+    let settled = time + 2.0;
+    while time < settled + seconds {
+        window.harness.input_mut().time = Some(time);
+        window.harness.step();
+        let output = window.harness.output();
+        let delay = output.viewport_output.values().map(|output| output.repaint_delay).min().unwrap();
+        count += usize::from(time >= settled);
+        // A host draws no faster than the screen, and in a test a second is long enough to wait.
+        time += delay.as_secs_f64().clamp(1.0 / 60.0, 1.0);
+    }
+    window.harness.input_mut().time = None;
+    count
+}
+
+/// What moves is told by the snapshot's owner, who asks for frames; the window itself asks for few: a blinking cursor, a
+/// tool tip that is due.
 #[test]
-fn an_idle_window_does_not_repaint() {
+fn an_idle_window_asks_for_five_frames_a_second_at_most() {
+    const SECONDS: f64 = 3.0;
     for tab in Tab::ALL {
         let mut window = Window::new(tab, (1100.0, 720.0));
-        for _ in 0..5 {
-            window.harness.step();
+        let plain = frames_asked_for(&mut window, SECONDS);
+        let mut told = vec![("plain", plain)];
+
+        // Under the pointer: a button with its tool tip, a picture, a slider.
+        for at in [egui::pos2(1070.0, 26.0), egui::pos2(300.0, 300.0), egui::pos2(850.0, 190.0)] {
+            window.harness.hover_at(at);
+            told.push(("under the pointer", frames_asked_for(&mut window, SECONDS)));
         }
-        let soonest =
-            window.harness.output().viewport_output.values().map(|output| output.repaint_delay).min();
-        assert!(soonest.unwrap() >= Duration::from_millis(200), "{tab:?} {soonest:?}");
+        window.harness.remove_cursor();
+
+        // Text being typed: its cursor blinks.
+        if tab == Tab::Reed {
+            let slider = window.harness.get_by_role_and_label(Role::Slider, "Lip opening").rect();
+            let value = slider.right_top() + vec2(-8.0, 9.0);
+            window.harness.drag_at(value);
+            window.harness.drop_at(value);
+            window.harness.step();
+            told.push(("a text field", frames_asked_for(&mut window, SECONDS)));
+            window.harness.get_by_label("Lip opening, value");
+        }
+        println!("{:<11} frames in {SECONDS} s: {told:?}", tab.name());
+        assert!(told.iter().all(|(_, count)| *count as f64 <= 5.0 * SECONDS), "{tab:?} {told:?}");
     }
+}
+
+#[test]
+fn looking_changes_nothing_that_a_project_keeps() {
+    for tab in Tab::ALL {
+        for (size, zoom) in [((1100.0, 720.0), 1.0), ((703.0, 481.0), 1.25), ((1601.0, 999.0), 3.0)] {
+            let mut window = Window::new(tab, size);
+            window.harness.state_mut().kept.zoom = zoom;
+            let before = window.harness.state().kept.clone();
+            window.harness.run_steps(30);
+            window.harness.hover_at(egui::pos2(300.0, 300.0));
+            window.harness.run_steps(30);
+            assert_eq!(window.harness.state().kept, before);
+            assert!(window.host.told().is_empty(), "nor any parameter");
+        }
+    }
+    // And the user does.
+    let mut window = Window::new(Tab::Reed, (1100.0, 720.0));
+    click(&mut window, "Light theme");
+    window.harness.get_by_role_and_label(Role::ComboBox, "Zoom").click();
+    window.harness.run();
+    click(&mut window, "300 %");
+    assert_eq!((window.harness.state().kept.is_dark, window.harness.state().kept.zoom), (false, 3.0));
+}
+
+#[test]
+fn breath_sources_tell_what_they_say_and_how_far_they_went() {
+    let mut window = Window::tall(Tab::Breath);
+    for value in [0.1, 0.7, 0.4] {
+        window.snapshot.borrow_mut().sources[3].value = value;
+        window.harness.run();
+    }
+    let told = |text: &str| window.harness.query_by_label(text).is_some();
+    // It stood at 62 % when the window opened.
+    assert!(told("CC11 expression: 40 %, from 10 to 70 %"));
+    assert!(told("CC2 breath: not seen"));
+    assert!(told("Knob: 50 %, from 50 to 50 %, blows"));
+    // The knob is calibrated where it stands in the list.
+    let below = |name: &str| window.harness.get_by_label_contains(name).rect().bottom();
+    let button = window.harness.get_by_label("Rest here").rect();
+    assert!(button.top() >= below("Knob: 50 %") && button.top() < below("Knob: 50 %") + 12.0);
 }
 
 #[test]
@@ -329,6 +415,27 @@ fn nothing_to_show_is_shown_as_such() {
         *window.snapshot.borrow_mut() = chalumeau::editor::Snapshot::default();
         window.harness.run();
         window.harness.get_by_label_contains("Mouth pressure 0.00 kPa");
+    }
+}
+
+/// At 300 % in a window that a host keeps at 1100 by 720 pixels.
+#[test]
+fn less_room_than_the_least_scrolls() {
+    for tab in Tab::ALL {
+        let mut window = Window::new(tab, (366.0, 240.0));
+        let below = |window: &Window| window.harness.get_by_label_contains("Keyboard").rect().bottom();
+        assert!(below(&window) > 470.0, "{tab:?}: all of it is there");
+        window.harness.hover_at(egui::pos2(100.0, 40.0));
+        let delta = vec2(0.0, -2_000.0);
+        window.harness.event(egui::Event::MouseWheel {
+            unit: egui::MouseWheelUnit::Point,
+            delta,
+            phase: egui::TouchPhase::Move,
+            source: egui::MouseWheelSource::Unknown,
+            modifiers: egui::Modifiers::NONE,
+        });
+        window.harness.run_steps(30);
+        assert!(below(&window) < 260.0, "{tab:?}: {} points down", below(&window));
     }
 }
 

@@ -15,73 +15,49 @@ use chalumeau::editor::{Kept, State, Tab, draw};
 use chalumeau::event::Event;
 use chalumeau::haptics::{FeelDesign, FeelTable, Limits};
 use chalumeau::instrument::{Clarinet, Probe, Settings, Tuning, felt};
+use chalumeau::reed::PhysicalReed;
 use chalumeau::units::WrittenNote;
 use egui_kittest::Harness;
 
-/// Name, id, least, most, default, decimals, unit. A choice has its texts instead.
+/// The plugin's parameters, as a test of the plugin holds them to its own.
+const TABLE: &str = include_str!("parameters.tsv");
+
+/// A parameter of the table. Numbers stand in the unit they are shown in.
 enum Kind {
     Number { min: f32, max: f32, default: f32, digits: usize, unit: &'static str },
-    Whole { min: i32, max: i32, default: i32 },
-    Choice { texts: &'static [&'static str], default: usize },
+    Whole { min: i32, max: i32, default: f32, unit: &'static str },
+    Choice { texts: Vec<&'static str>, default: f32 },
 }
 
-const ON_OFF: &[&str] = &["Off", "On"];
-const SOURCES: &[&str] = &["Parameter", "CC1 (wheel)", "CC16", "CC17", "CC74 (MPE y)", "Pressure (MPE z)"];
+/// A number and what follows it.
+fn number_and_unit(text: &'static str) -> (&'static str, &'static str) {
+    let end = text.find(|c: char| !(c.is_ascii_digit() || "-.".contains(c))).unwrap_or(text.len());
+    text.split_at(end)
+}
 
+/// Id, name and kind of each parameter, in the order of hosts.
 fn table() -> Vec<(&'static str, &'static str, Kind)> {
-    let number = |min, max, default, digits, unit| Kind::Number { min, max, default, digits, unit };
-    let whole = |min, max, default| Kind::Whole { min, max, default };
-    let choice = |texts, default| Kind::Choice { texts, default };
-    vec![
-        ("breath", "Breath", number(0.0, 100.0, 0.0, 1, " %")),
-        ("full", "Full breath", number(2.0, 20.0, 6.0, 2, " kPa")),
-        ("tongue", "Tongue", number(1.0, 20.0, 2.0, 1, " ms")),
-        ("legato", "Legato", number(5.0, 15.0, 8.0, 1, " ms")),
-        ("stren", "Reed strength", number(1.5, 5.0, 2.5, 2, "")),
-        ("lip", "Lip opening", number(0.6, 1.4, 1.0, 3, " x")),
-        ("zeta", "Embouchure zeta", number(0.05, 0.9, 0.3, 3, "")),
-        ("damp", "Lip damping", number(0.2, 2.0, 1.0, 2, " x")),
-        ("reedh", "Reed H", number(1.0, 5.0, 2.598_076, 4, "")),
-        ("reedk", "Reed k", number(0.1, 2.0, 0.384_900_18, 4, "")),
-        ("reedc", "Reed coupled", choice(&["Free", "Coupled"], 1)),
-        ("reeda", "Reed A", number(0.0, 2.0, 1.0, 3, "")),
-        ("lay", "Lay curve", number(0.0, 0.5, 0.4, 3, "")),
-        ("a4", "A4", number(430.0, 450.0, 440.0, 1, " Hz")),
-        ("tune", "Tuning", choice(&["Natural", "Tempered"], 0)),
-        ("temp", "Temperature", number(10.0, 40.0, 25.0, 1, " \u{b0}C")),
-        ("vent", "Vent loss", number(0.0, 4.0, 2.0, 2, "")),
-        ("noise", "Breath noise", number(0.0, 100.0, 30.0, 1, " %")),
-        ("gain", "Gain", number(-60.0, 24.0, 0.0, 1, " dB")),
-        ("panic", "Panic", choice(ON_OFF, 0)),
-        ("knob", "Knob", choice(&["Off", "Serial", "MIDI port", "OSC (stock firmware)"], 1)),
-        ("arm", "Arm knob", choice(ON_OFF, 0)),
-        ("ceil", "Torque ceiling", number(10.0, 250.0, 100.0, 0, " mNm")),
-        ("takeov", "Take over knob", choice(ON_OFF, 0)),
-        ("rest", "Rest here", choice(ON_OFF, 0)),
-        ("blow", "Blow hard here", choice(ON_OFF, 0)),
-        ("law", "Feel", choice(&["Flow", "Pressure", "Free"], 0)),
-        ("contr", "Feel contrast", number(1.0, 5.0, 3.0, 2, " x")),
-        ("order", "Feel order", choice(&["Physical", "Covered holes", "Open holes"], 0)),
-        ("refnot", "Feel reference", whole(52, 97, 72)),
-        ("torque", "Feel torque", number(0.0, 250.0, 60.0, 0, " mNm")),
-        ("kdamp", "Feel damping", number(0.0, 20.0, 1.0, 2, " mNm s")),
-        ("kfric", "Feel friction", number(0.0, 20.0, 1.0, 1, " mNm")),
-        ("detent", "Feel step", number(0.0, 30.0, 6.0, 1, " mNm")),
-        ("curve", "Knob curve", number(0.25, 4.0, 1.0, 2, "")),
-        ("oscprt", "OSC port", whole(1_024, 65_535, 8_000)),
-        ("oscany", "OSC from network", choice(ON_OFF, 0)),
-        ("oscfl", "Feel OSC port", whole(0, 65_535, 0)),
-        ("rec", "Record take", choice(ON_OFF, 0)),
-        ("replay", "Replay take", choice(ON_OFF, 0)),
-        ("study", "Study", choice(ON_OFF, 0)),
-        ("part", "Participant", whole(1, 9_999, 1)),
-        ("seed", "Study seed", whole(1, 9_999, 1)),
-        ("trial", "Trial", whole(1, 16, 1)),
-        ("side", "A/B", choice(&["A", "B"], 0)),
-        ("hsrc", "H from", choice(SOURCES, 0)),
-        ("ksrc", "k from", choice(SOURCES, 0)),
-        ("kstat", "Knob status", choice(ON_OFF, 0)),
-    ]
+    let of_line = |line: &'static str| {
+        let [id, name, steps, default, texts]: [&str; 5] =
+            line.split('\t').collect::<Vec<_>>().try_into().expect("five columns");
+        let default: f32 = default.parse().expect("a normalised default");
+        let kind = match texts.split_once("..") {
+            None => Kind::Choice { texts: texts.split('|').collect(), default },
+            Some((low, high)) => {
+                let ((min, unit), (max, _)) = (number_and_unit(low), number_and_unit(high));
+                if steps.is_empty() {
+                    let digits = min.split_once('.').map_or(0, |(_, digits)| digits.len());
+                    let [min, max] = [min, max].map(|text| text.parse().expect("a number"));
+                    Kind::Number { min, max, default, digits, unit }
+                } else {
+                    let [min, max] = [min, max].map(|text| text.parse().expect("a whole number"));
+                    Kind::Whole { min, max, default, unit }
+                }
+            }
+        };
+        (id, name, kind)
+    };
+    TABLE.lines().filter(|line| !line.starts_with('#')).map(of_line).collect()
 }
 
 /// What the editor told the host.
@@ -105,16 +81,17 @@ impl Default for Fake {
     fn default() -> Self {
         let table = table();
         let ids: Vec<_> = table.iter().map(|(id, ..)| *id).collect();
-        let values = table.iter().map(|(id, _, kind)| ((*id).to_owned(), default(kind))).collect();
+        let mut values: BTreeMap<_, _> =
+            table.iter().map(|(id, _, kind)| ((*id).to_owned(), default(kind))).collect();
+        // A knob by cable: what the pictures show.
+        values.insert("knob".to_owned(), 1.0 / 3.0);
         Self { table, ids, values: RefCell::new(values), open: RefCell::default(), told: RefCell::default() }
     }
 }
 
 fn default(kind: &Kind) -> f32 {
     match kind {
-        Kind::Number { min, max, default, .. } => (default - min) / (max - min),
-        Kind::Whole { min, max, default } => (default - min) as f32 / (max - min) as f32,
-        Kind::Choice { texts, default } => *default as f32 / (texts.len() - 1) as f32,
+        Kind::Number { default, .. } | Kind::Whole { default, .. } | Kind::Choice { default, .. } => *default,
     }
 }
 
@@ -159,7 +136,7 @@ impl Fake {
 
     /// The parameters as the instrument reads them.
     pub fn settings(&self) -> Settings {
-        Settings {
+        let settings = Settings {
             breath_full_kpa: self.plain("full"),
             noise: 0.01 * self.plain("noise"),
             tongue_ms: self.plain("tongue"),
@@ -178,7 +155,17 @@ impl Fake {
             temperature_c: self.plain("temp"),
             vent_loss: self.plain("vent"),
             gain_db: self.plain("gain"),
+        };
+        if self.plain("rface") < 0.5 {
+            return settings;
         }
+        let reed = PhysicalReed {
+            width_m: 1e-3 * f64::from(self.plain("rwidth")),
+            area_m2: 1e-6 * f64::from(self.plain("rarea")),
+            stiffness_n_m: f64::from(self.plain("rstiff")),
+            tip_opening_m: 1e-3 * f64::from(self.plain("ropen")),
+        };
+        settings.with_physical_reed(&reed, &PhysicalReed::reference())
     }
 }
 
@@ -202,7 +189,11 @@ impl Controls for Fake {
             Kind::Number { min, max, digits, unit, .. } => {
                 format!("{:.*}{unit}", *digits, min + value * (max - min))
             }
-            Kind::Whole { min, max, .. } => format!("{:.0}", *min as f32 + value * (max - min) as f32),
+            Kind::Whole { min, max, unit, .. } => {
+                format!("{:.0}{unit}", *min as f32 + value * (max - min) as f32)
+            }
+            // What the plugin words at that moment.
+            Kind::Choice { .. } if id == "istat" => "ready: B flat clarinet".to_owned(),
             Kind::Choice { texts, .. } => {
                 texts[(value * (texts.len() - 1) as f32).round() as usize].to_owned()
             }
@@ -217,8 +208,8 @@ impl Controls for Fake {
             Kind::Number { min, max, unit, .. } => {
                 Some(((number(unit)? - min) / (max - min)).clamp(0.0, 1.0))
             }
-            Kind::Whole { min, max, .. } => {
-                Some(((number("")? - *min as f32) / (max - min) as f32).clamp(0.0, 1.0))
+            Kind::Whole { min, max, unit, .. } => {
+                Some(((number(unit)? - *min as f32) / (max - min) as f32).clamp(0.0, 1.0))
             }
             Kind::Choice { texts, .. } => {
                 Some(texts.iter().position(|known| *known == text)? as f32 / (texts.len() - 1) as f32)
@@ -316,7 +307,16 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
         |name: &str, value: f32, is_live, is_seen| Source { name: name.into(), value, is_live, is_seen };
     Snapshot {
         instrument: Arc::new(model.file.clone()),
-        instruments: ["B flat", "A", "E flat", "C", "Bass"].map(String::from).to_vec(),
+        instruments: [
+            "B flat clarinet",
+            "A clarinet",
+            "E flat clarinet",
+            "C clarinet",
+            "Bass clarinet",
+            "User file",
+        ]
+        .map(String::from)
+        .to_vec(),
         chosen: Some(0),
         sounding: Some(note),
         fingering,
@@ -325,12 +325,13 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
         requirement: bore.note(fingering, &reed),
         settings: *settings,
         sources: vec![
-            source("Knob", breath_at(5.0) as f32, true, true),
+            source("Keys, by velocity", 0.8, false, true),
+            source("Breath parameter", 0.0, false, false),
             source("CC2 breath", 0.0, false, false),
             source("CC11 expression", 0.62, false, true),
             source("Channel pressure", 0.0, false, false),
-            source("Breath parameter", 0.0, false, false),
-            source("Velocity", 0.8, false, true),
+            source("Note expression", 0.0, false, false),
+            source("Knob", breath_at(5.0) as f32, true, true),
         ],
         history: Track { step_s: STEP_S as f32, kpa: probes.iter().step_by(every).map(kpa).collect() },
         scope: Scope {
@@ -394,9 +395,11 @@ pub fn c4() -> Snapshot {
     played(WrittenNote(60), 0.5, &Settings::default())
 }
 
-/// The window as a picture. What a test's frame puts around it is cut off.
-pub fn picture(kept: &Kept, controls: &Fake, snapshot: &Snapshot, scale: f32) -> image::RgbaImage {
-    const FRAME: f32 = 8.0;
+/// What a test's frame puts around a window, points.
+const FRAME: f32 = 8.0;
+
+/// A window to be drawn.
+pub fn window<'a>(kept: &Kept, controls: &'a Fake, snapshot: &'a Snapshot, scale: f32) -> Harness<'a, State> {
     let size = egui::vec2(kept.size.0 + 2.0 * FRAME, kept.size.1 + 2.0 * FRAME);
     let mut harness = Harness::builder().with_size(size).with_pixels_per_point(scale).build_ui_state(
         |ui, state: &mut State| {
@@ -405,11 +408,41 @@ pub fn picture(kept: &Kept, controls: &Fake, snapshot: &Snapshot, scale: f32) ->
         State::new(kept.clone()),
     );
     harness.run();
+    harness
+}
+
+/// The window as a picture, without the frame.
+pub fn shot(harness: &mut Harness<'_, State>, scale: f32) -> image::RgbaImage {
     // A renderer in software may not be done in time on a busy machine.
     let mut tries = (0..6).map(|_| harness.render());
     let whole = tries.find_map(Result::ok).expect("six tries to draw a picture");
+    let size = harness.state().kept.size;
     let px = |points: f32| (points * scale).round() as u32;
-    image::imageops::crop_imm(&whole, px(FRAME), px(FRAME), px(kept.size.0), px(kept.size.1)).to_image()
+    image::imageops::crop_imm(&whole, px(FRAME), px(FRAME), px(size.0), px(size.1)).to_image()
+}
+
+/// Both at once.
+pub fn picture(kept: &Kept, controls: &Fake, snapshot: &Snapshot, scale: f32) -> image::RgbaImage {
+    shot(&mut window(kept, controls, snapshot, scale), scale)
+}
+
+/// Name and place in the picture of everything that can be moved, pressed or chosen.
+pub fn things(harness: &Harness<'_, State>) -> Vec<(String, egui::Rect)> {
+    use egui::accesskit::Role;
+    use egui_kittest::kittest::NodeT;
+    let is_thing = |role| {
+        matches!(
+            role,
+            Role::Slider | Role::Switch | Role::RadioButton | Role::Button | Role::ComboBox | Role::Tab
+        )
+    };
+    let nodes = harness.root().children_recursive().filter(|node| is_thing(node.accesskit_node().role()));
+    nodes
+        .map(|node| {
+            let name = node.accesskit_node().label().unwrap_or_default();
+            (name, node.rect().translate(-egui::Vec2::splat(FRAME)))
+        })
+        .collect()
 }
 
 /// Every view, light and dark, as files in `folder`.
