@@ -18,8 +18,7 @@ mod pinned;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
-
-use nice_plug_egui::RepaintNotifier;
+use std::time::Duration;
 
 use crate::editor::{Kept, Snapshot};
 use crate::plugin::Beside;
@@ -35,7 +34,8 @@ use looker::Looker;
 /// What the threads of the window share. The audio thread takes no lock of it.
 struct Shared {
     is_open: AtomicBool,
-    repaint: RepaintNotifier,
+    /// The window that has drawn its first frame and waits for the next, if one is open.
+    drawn: Mutex<Option<egui::Context>>,
     latest: Mutex<Arc<Snapshot>>,
     /// Holes that are tried, if any: what the looker draws as open.
     tried: Mutex<Option<Vec<bool>>>,
@@ -45,6 +45,20 @@ struct Shared {
 impl Shared {
     fn latest(&self) -> Arc<Snapshot> {
         self.latest.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Has the window drawn again, once it has drawn at all: under X11 the window library loses a frame that is wanted
+    /// before the window is shown, and waits for it ever after.
+    fn draw_again(&self) {
+        let drawn = self.drawn.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if let Some(window) = drawn {
+            // At once, and once; without a delay it would be drawn twice.
+            window.request_repaint_after(Duration::from_micros(1));
+        }
+    }
+
+    fn set_drawn(&self, window: Option<egui::Context>) {
+        *self.drawn.lock().unwrap_or_else(PoisonError::into_inner) = window;
     }
 
     fn tried(&self) -> Option<Vec<bool>> {
@@ -68,7 +82,7 @@ impl Window {
     pub fn start(beside: &Beside) -> (Self, Audio) {
         let shared = Arc::new(Shared {
             is_open: AtomicBool::new(false),
-            repaint: RepaintNotifier::new(),
+            drawn: Mutex::default(),
             latest: Mutex::new(Arc::new(Snapshot::default())),
             tried: Mutex::default(),
             stop: AtomicBool::new(false),

@@ -99,18 +99,20 @@ pub struct App {
     shared: Arc<Shared>,
     memory: Arc<Mutex<Memory>>,
     gui: GuiContext,
+    has_drawn: bool,
 }
 
 impl App {
     pub(super) fn open(shared: Arc<Shared>, memory: Arc<Mutex<Memory>>, gui: GuiContext) -> Self {
         shared.is_open.store(true, Ordering::Relaxed);
-        Self { shared, memory, gui }
+        Self { shared, memory, gui, has_drawn: false }
     }
 }
 
 impl Drop for App {
     fn drop(&mut self) {
         self.shared.is_open.store(false, Ordering::Relaxed);
+        self.shared.set_drawn(None);
         self.memory.lock().unwrap_or_else(PoisonError::into_inner).let_go(&self.shared, &self.gui);
     }
 }
@@ -123,6 +125,9 @@ impl NiceEguiApp for App {
     }
 
     fn ui(&mut self, ui: &mut egui::Ui, _: &mut Frame) {
+        if !std::mem::replace(&mut self.has_drawn, true) {
+            self.shared.set_drawn(Some(ui.ctx().clone()));
+        }
         let mut memory = self.memory.lock().unwrap_or_else(PoisonError::into_inner);
         let memory = &mut *memory;
         let params = memory.beside.params.clone();

@@ -3,13 +3,16 @@
 use std::error::Error;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use nice_plug::context::gui::GuiContext;
 use nice_plug::editor::dpi::{LogicalSize, NativeSize, Size};
 use nice_plug::editor::{
-    Editor, HostMethods, ParentWindowHandle, ResizeHint, SizeConstraints, SpawnedEditor,
+    Editor, EditorHandle, HostMethods, ParentWindowHandle, ResizeHint, SizeConstraints, SpawnedEditor,
 };
-use nice_plug_egui::{EguiEditorHandle, EguiEditorState, EguiNiceSettings, create_egui_editor};
+use nice_plug_egui::{
+    EguiEditorHandle, EguiEditorState, EguiNiceSettings, RepaintNotifier, create_egui_editor,
+};
 
 use super::app::{App, Memory};
 use super::{Shared, kept};
@@ -32,6 +35,10 @@ pub fn no_window() {
 pub fn found_no_display() -> bool {
     NO_DISPLAY.load(Ordering::Relaxed)
 }
+
+/// How often the window asks the framework's notifier, which nobody uses: the looker tells it by itself. Its first answer
+/// is always yes, and would come before a slow host shows the window; see [`Frame::spawn`].
+const ASK: Duration = Duration::from_secs(24 * 3_600);
 
 /// The window, open or not. The framework holds it as long as the plugin lives.
 pub struct Frame {
@@ -69,11 +76,20 @@ impl Editor for Frame {
         let (size, zoom, _) = self.measures();
         // Opening and closing are the window's own life, so its state lasts as long.
         let state = EguiEditorState::from_size(size, zoom);
-        let settings = EguiNiceSettings::new().with_tile(identity::NAME).with_resize_hint(self.resize_hint());
+        let settings = EguiNiceSettings::new()
+            .with_tile(identity::NAME)
+            .with_resize_hint(self.resize_hint())
+            .with_repaint_poll_interval(ASK);
         let app = App::open(self.shared.clone(), self.memory.clone(), gui.clone());
-        let editor = create_egui_editor(state, self.shared.repaint.clone(), settings, app)
+        let editor = create_egui_editor(state, RepaintNotifier::new(), settings, app)
             .ok_or("the window cannot be made")?;
+        let has_parent = parent.is_some();
         let spawned = editor.spawn(parent, wait_for_parent, fallback_scale_factor, gui, host);
+        // Under X11 the window library loses a frame that is wanted before the window is shown, and waits for it ever
+        // after. A host may take its time between the two.
+        if let (true, Ok(spawned)) = (has_parent, &spawned) {
+            let _ = spawned.handle.show(&spawned.window);
+        }
         if spawned.is_err() {
             NO_DISPLAY.store(true, Ordering::Relaxed);
         }

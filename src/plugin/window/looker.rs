@@ -152,7 +152,7 @@ impl Looker {
         }
         snapshot.status = self.words(placed.as_ref());
         *self.shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(snapshot);
-        self.shared.repaint.request_repaint();
+        self.shared.draw_again();
         if moving { QUICK } else { IDLE }
     }
 
