@@ -47,7 +47,8 @@ impl InstrumentView {
             ui.set_width(ui.available_width());
             ui.set_height(ui.available_height());
             let all = ui.available_height();
-            let drawn = if all < 300.0 { 0.0 } else { (0.40 * all).min(200.0) };
+            // What the words leave.
+            let drawn = if all < 260.0 { 0.0 } else { (all - 180.0).min(220.0) };
             egui::ScrollArea::vertical()
                 .id_salt("facts")
                 .max_height(all - drawn)
@@ -61,7 +62,14 @@ impl InstrumentView {
 
     fn list(&mut self, ui: &mut Ui, hands: &Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
         let c = Colours::here(ui);
-        heading(ui, "Instrument");
+        ui.horizontal(|ui| {
+            heading(ui, "Instrument");
+            if let Some(look) = hands.controls.look("istat") {
+                let told = hands.controls.text("istat", look.value);
+                let told = egui::Label::new(RichText::new(told).color(c.quiet)).truncate();
+                ui.add(told).on_hover_ui(|ui| teach(ui, "istat", ""));
+            }
+        });
         ui.horizontal_wrapped(|ui| {
             for (index, name) in snapshot.instruments.iter().enumerate() {
                 let is_here = snapshot.chosen == Some(index);
@@ -70,10 +78,6 @@ impl InstrumentView {
                 }
             }
         });
-        if let Some(look) = hands.controls.look("istat") {
-            let told = hands.controls.text("istat", look.value);
-            ui.label(RichText::new(told).color(c.quiet)).on_hover_ui(|ui| teach(ui, "istat", ""));
-        }
         if let Some((what, part)) = &snapshot.preparing {
             ui.add(egui::ProgressBar::new(*part).text(what.as_str()).desired_height(16.0).fill(c.accent));
         }
@@ -96,7 +100,7 @@ impl InstrumentView {
 
 fn card(ui: &mut Ui, c: &Colours, name: &str, is_here: bool) -> egui::Response {
     let galley = ui.painter().layout_no_wrap(name.to_owned(), theme::body(), c.ink);
-    let size = vec2((galley.size().x + 28.0).max(96.0), 40.0);
+    let size = vec2((galley.size().x + 28.0).max(96.0), 34.0);
     let (rect, response) = ui.allocate_exact_size(size, Sense::click());
     let painter = ui.painter();
     let round = CornerRadius::same(theme::SMALL_RADIUS + 2);
