@@ -2,6 +2,8 @@
 
 use nice_plug::prelude::NoteEvent;
 
+use crate::editor::snapshot::Source;
+
 /// A way breath comes in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
@@ -35,7 +37,7 @@ impl Way {
             Self::Expression => "CC11 expression",
             Self::Pressure => "Channel pressure",
             Self::Note => "Note expression",
-            Self::Knob => "Knob",
+            Self::Knob => Source::KNOB,
         }
     }
 

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use nice_plug::context::gui::GuiContext;
 use nice_plug_egui::baseview::{HandlerError, WindowSize};
-use nice_plug_egui::{Frame, NiceEguiApp};
+use nice_plug_egui::{Frame, KeyCapture, NiceEguiApp};
 
 use super::hands::HostControls;
 use super::{Shared, kept};
@@ -124,7 +124,7 @@ impl NiceEguiApp for App {
         memory.scale = size.scale_factor / f64::from(memory.state.kept.zoom);
     }
 
-    fn ui(&mut self, ui: &mut egui::Ui, _: &mut Frame) {
+    fn ui(&mut self, ui: &mut egui::Ui, frame: &mut Frame) {
         if !std::mem::replace(&mut self.has_drawn, true) {
             self.shared.set_drawn(Some(ui.ctx().clone()));
         }
@@ -146,8 +146,14 @@ impl NiceEguiApp for App {
         for action in actions {
             memory.act(action, &self.shared, &self.gui);
         }
+        // The host's keys stay the host's unless text is typed here.
+        frame.set_key_capture(if memory.state.wants_keyboard(ui.ctx()) {
+            KeyCapture::CaptureAll
+        } else {
+            KeyCapture::IgnoreAll
+        });
         let size = ui.ctx().content_rect().size();
-        memory.state.kept.size = (size.x, size.y);
+        memory.state.kept.resized(size.x, size.y);
         let now = memory.state.kept.clone().mended();
         if memory.written != now
             && let Ok(mut kept) = params.window.write()

@@ -9,6 +9,7 @@ use super::Shared;
 use super::audio::Inside;
 #[cfg(feature = "devices")]
 use super::devices;
+use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::transfer_matrix::TransferMatrix;
 #[cfg(feature = "devices")]
 use crate::device::Places;
@@ -49,6 +50,8 @@ pub struct Looker {
     sound: rtrb::Consumer<f32>,
     heard: VecDeque<f32>,
     listener: Option<(f64, Listener)>,
+    /// What is shown of what is not known; to make one takes an instrument file to be read.
+    blank: Snapshot,
     history: VecDeque<f32>,
     stepped: Instant,
     known: Option<Known>,
@@ -61,6 +64,7 @@ pub struct Looker {
 /// What an instrument is asked once.
 struct Known {
     model: Arc<Model>,
+    file: Arc<InstrumentFile>,
     feels: Arc<Feels>,
     bore: TransferMatrix,
     /// With what it was worked out from.
@@ -83,6 +87,7 @@ impl Looker {
             sound,
             heard: VecDeque::with_capacity(2 * WINDOW),
             listener: None,
+            blank: Snapshot::default(),
             history: VecDeque::new(),
             stepped: Instant::now(),
             known: None,
@@ -110,7 +115,7 @@ impl Looker {
         let placed = self.beside.instruments.placed();
         self.know(placed.as_ref());
         let tried = self.shared.tried();
-        let mut snapshot = Snapshot { settings, ..Snapshot::default() };
+        let mut snapshot = Snapshot { settings, ..self.blank.clone() };
         snapshot.instruments = InstrumentChoice::ALL.iter().map(|choice| choice.title().to_owned()).collect();
         snapshot.chosen = Some(self.beside.params.instrument.choice.value() as usize);
         snapshot.sounding = inside.now.sounding;
@@ -126,8 +131,7 @@ impl Looker {
         };
         let design = self.design();
         if let Some(known) = &mut self.known {
-            let model = known.model.clone();
-            let file = &model.file;
+            let file = known.file.clone();
             let fingering = inside.now.fingering.min(file.fingerings.len().saturating_sub(1));
             let open = tried
                 .filter(|open| open.len() == file.holes.len())
@@ -137,7 +141,7 @@ impl Looker {
             snapshot.requirement = known.requirement(fingering, &settings);
             snapshot.feel = known.feel(fingering, &settings, &design);
             snapshot.standing = known.standing(fingering, &open);
-            snapshot.instrument = Arc::new(file.clone());
+            snapshot.instrument = file;
         }
         snapshot.heard = self.hear(inside.host_rate_hz, inside.now.sounding, &settings);
         #[cfg(feature = "devices")]
@@ -202,6 +206,7 @@ impl Looker {
         self.known = Some(Known {
             feels: Arc::new(Feels::new(&placed.model)),
             bore: TransferMatrix::new(&placed.model.file, placed.model.air),
+            file: Arc::new(placed.model.file.clone()),
             model: placed.model.clone(),
             table: None,
             standing: None,
