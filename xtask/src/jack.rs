@@ -17,7 +17,8 @@ const PERIOD_FRAMES: &str = "256";
 const KILLS: &str = "when_its_host_is_killed";
 
 /// midir 0.11 unregisters a JACK port while its client still runs, and the client, or the next one, may die of that when a
-/// knob is unplugged. ALSA and the other systems know no such thing. What is wrong with us is wrong every time.
+/// knob is unplugged. ALSA and the other systems know no such thing. The price: a fault of ours that
+/// shows only now and then may pass here; the knob's other steps, without JACK, are run once.
 const ATTEMPTS: usize = 3;
 
 /// A server that cannot run has ended by then.
