@@ -103,7 +103,7 @@ impl Editor for Frame {
     }
 
     fn resize_hint(&self) -> ResizeHint {
-        let min_size = Some(LogicalSize::new(LEAST_SIZE.0.into(), LEAST_SIZE.1.into()));
+        let min_size = Some(LogicalSize::new(LEAST_SIZE.0, LEAST_SIZE.1));
         ResizeHint {
             size_constraints: SizeConstraints::Logical { min_size, max_size: None },
             ..ResizeHint::resizable()

@@ -69,8 +69,15 @@ struct Known {
     bore: TransferMatrix,
     /// With what it was worked out from.
     table: Option<(Settings, FeelDesign, Result<FeelTable, String>)>,
-    /// Fingering, holes, and the standing wave on them.
-    standing: Option<(usize, Vec<bool>, Vec<(f32, f32)>)>,
+    standing: Option<Standing>,
+}
+
+/// A standing wave, and what it was worked out from.
+struct Standing {
+    fingering: usize,
+    open: Vec<bool>,
+    /// Place, m from the reed, and magnitude over that at the reed.
+    wave: Vec<(f32, f32)>,
 }
 
 impl Looker {
@@ -264,21 +271,22 @@ impl Known {
             self.table = Some((*settings, *design, table.map_err(|reason| reason.to_string())));
         }
         match self.table.as_ref().map(|(.., table)| table) {
-            Some(Ok(table)) => Ok(table.note(fingering).unwrap_or(table.reference()).clone()),
+            Some(Ok(table)) => Ok(*table.note(fingering).unwrap_or(table.reference())),
             Some(Err(reason)) => Err(reason.clone()),
             None => Err("not known yet".to_owned()),
         }
     }
 
     fn standing(&mut self, fingering: usize, open: &[bool]) -> Vec<(f32, f32)> {
-        let same = self.standing.as_ref().is_some_and(|(of, with, _)| *of == fingering && with == open);
+        let same =
+            self.standing.as_ref().is_some_and(|known| known.fingering == fingering && known.open == open);
         if !same {
             let f_hz = self.model.notes_hz[fingering];
             let wave = self.bore.standing_pressure(f_hz, open);
             let wave = wave.into_iter().map(|(x, p)| (x as f32, p as f32)).collect();
-            self.standing = Some((fingering, open.to_vec(), wave));
+            self.standing = Some(Standing { fingering, open: open.to_vec(), wave });
         }
-        self.standing.as_ref().map_or_else(Vec::new, |(.., wave)| wave.clone())
+        self.standing.as_ref().map_or_else(Vec::new, |known| known.wave.clone())
     }
 }
 
