@@ -14,6 +14,7 @@ const PICTURES: [(&str, &str); 2] = [("window", "every_view"), ("standalone", "i
 
 /// Starts a display and plays the bundled plugin and the debug build of the standalone on it.
 pub fn test() -> Result<()> {
+    build_standalone()?;
     let display = Display::start()?;
     machine::run(&mut tests(&display, "window", ""))?;
     machine::run(&mut tests(&display, "standalone", "its_window"))
@@ -23,14 +24,18 @@ pub fn test() -> Result<()> {
 pub fn screenshots(_: &[String]) -> Result<()> {
     machine::provide(&[&XVFB, &MESA, &EGL, &XKB, &X11_XCB])?;
     bundle::run(&[])?;
-    let mut build = machine::cargo();
-    machine::run(build.arg("build").args(PROGRAM.split(' ')).args(["--bin", "chalumeau-standalone"]))?;
+    build_standalone()?;
     let display = Display::start()?;
     for (file, name) in PICTURES {
         machine::run(&mut tests(&display, file, name))?;
     }
     println!("pictures: {}", machine::target().join(Path::new("screenshots")).display());
     Ok(())
+}
+
+fn build_standalone() -> Result<()> {
+    let mut build = machine::cargo();
+    machine::run(build.arg("build").args(PROGRAM.split(' ')).args(["--bin", "chalumeau-standalone"]))
 }
 
 /// The tests of a file that need a display, those whose name begins with `name`.

@@ -30,9 +30,9 @@ use crate::plugin::params::instrument::InstrumentChoice;
 use crate::touch::feel::Feels;
 use crate::units::SoundingNote;
 
-/// Between two looks while something moves, and while nothing does.
+/// Between two looks while something moves, and while nothing does: less than five a second.
 const QUICK: Duration = Duration::from_millis(33);
-const IDLE: Duration = Duration::from_millis(200);
+const IDLE: Duration = Duration::from_millis(220);
 /// Between two looks for devices.
 #[cfg(feature = "devices")]
 const DEVICES_EVERY: Duration = Duration::from_secs(2);
