@@ -185,17 +185,21 @@ impl Scope {
     /// them stands still. Everything where there is no such.
     pub fn standing_periods(&self, f0_hz: f32, most: usize) -> std::ops::Range<usize> {
         let length = self.mouthpiece_kpa.len().min(self.opening.len()).min(self.flow_cm3s.len());
-        let wave = &self.mouthpiece_kpa[..length];
-        let mean = wave.iter().sum::<f32>() / length.max(1) as f32;
+        let period = self.rate_hz / f0_hz;
+        if !(period.is_finite() && period >= 1.0 && period <= length as f32) {
+            return 0..length;
+        }
+        let whole = (length as f32 / period) as usize;
+        // Over whole periods, or the mean would depend on when they begin.
+        let wave = &self.mouthpiece_kpa[..(whole as f32 * period) as usize];
+        let mean = wave.iter().sum::<f32>() / wave.len() as f32;
         let Some(rise) = wave.windows(2).position(|pair| pair[0] < mean && pair[1] >= mean) else {
             return 0..length;
         };
-        let period = self.rate_hz / f0_hz;
-        let fitting = ((length - rise) as f32 / period) as usize;
-        if !period.is_finite() || fitting == 0 {
-            return 0..length;
-        }
-        rise..(rise + (fitting.min(most) as f32 * period).ceil() as usize + 1).min(length)
+        // It rises somewhere in the first of them.
+        let shown = whole.saturating_sub(1).clamp(1, most.max(1)) as f32 * period;
+        let end = rise + shown.ceil() as usize + 1;
+        if end > length + 1 { 0..length } else { rise..end.min(length) }
     }
 }
 
@@ -284,7 +288,10 @@ mod tests {
                 let scope = scope(f0_hz, length, 0.3 * step as f32);
                 let shown = scope.standing_periods(f0_hz, 6);
                 assert!((scope.mouthpiece_kpa[shown.start] - 1.0).abs() < 0.2, "begins where it rises");
-                assert!(scope.mouthpiece_kpa[shown.start] > scope.mouthpiece_kpa[shown.start - 1]);
+                assert!(
+                    scope.mouthpiece_kpa[shown.start] < scope.mouthpiece_kpa[shown.start + 1],
+                    "and rises"
+                );
                 ((shown.len() as f32) * f0_hz / 48_000.0).round() as usize
             });
             lengths.collect()

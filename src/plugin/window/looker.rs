@@ -30,7 +30,7 @@ use crate::plugin::params::instrument::InstrumentChoice;
 use crate::touch::feel::Feels;
 use crate::units::SoundingNote;
 
-/// Between two looks while something moves, and while nothing does: less than five a second.
+/// From one look to the next while something moves, and while nothing does: less than five a second.
 const QUICK: Duration = Duration::from_millis(33);
 const IDLE: Duration = Duration::from_millis(220);
 /// Between two looks for devices.
@@ -107,12 +107,13 @@ impl Looker {
 
     pub(super) fn run(mut self) {
         while !self.shared.stop.load(Ordering::Relaxed) {
-            let pause = if self.shared.is_open.load(Ordering::Relaxed) { self.look() } else { IDLE };
-            std::thread::park_timeout(pause);
+            let began = Instant::now();
+            let every = if self.shared.is_open.load(Ordering::Relaxed) { self.look() } else { IDLE };
+            std::thread::park_timeout(every.saturating_sub(began.elapsed()));
         }
     }
 
-    /// One snapshot; how long until the next.
+    /// One snapshot; how long from its beginning to the next.
     fn look(&mut self) -> Duration {
         let inside = self.inside.read().clone();
         self.listen();
