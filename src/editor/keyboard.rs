@@ -75,10 +75,13 @@ impl Keyboard {
         response.widget_info(|| {
             WidgetInfo::labeled(Role::Group, true, format!("Keyboard, {}", note_name(chosen)))
         });
-        response.on_hover_text(
-            "Plays sounding pitches; above, the note stands as a player reads it. Further down on a key is louder; \
-             sliding slurs. By keys, with Tab up to here: arrows choose, Space plays.",
-        );
+        // Whoever plays has read it.
+        if self.held.is_none() {
+            response.on_hover_text(
+                "Plays sounding pitches; above, the note stands as a player reads it. Further down on a key is louder; \
+                 sliding slurs. By keys, with Tab up to here: arrows choose, Space plays.",
+            );
+        }
     }
 
     /// Lets go of what is held: the window closes, or another view takes the pointer.
