@@ -52,15 +52,28 @@ pub fn normalised(row: &[f64]) -> impl Iterator<Item = f32> + '_ {
 
 /// Sum of products in eight lanes, then of the lanes one by one: the same order on every machine. (Added pairwise, the
 /// compiler would split the lanes into pairs.)
-#[inline]
+#[inline(always)]
 pub fn dot(a: &[f32], b: &[[f32; LANES]]) -> f32 {
+    // Three rows a turn, in their order: the counting of turns is a fifth of the work otherwise.
+    let (a, a_rest) = a.as_chunks::<LANES>().0.as_chunks::<3>();
+    let (b, b_rest) = b.as_chunks::<3>();
     let mut lanes = [0.0f32; LANES];
-    for (a, b) in a.as_chunks::<LANES>().0.iter().zip(b) {
-        for k in 0..LANES {
-            lanes[k] += a[k] * b[k];
+    for (a, b) in a.iter().zip(b) {
+        for row in 0..3 {
+            add(&mut lanes, &a[row], &b[row]);
         }
     }
+    for (a, b) in a_rest.iter().zip(b_rest) {
+        add(&mut lanes, a, b);
+    }
     lanes.iter().sum()
+}
+
+#[inline(always)]
+fn add(lanes: &mut [f32; LANES], a: &[f32; LANES], b: &[f32; LANES]) {
+    for k in 0..LANES {
+        lanes[k] += a[k] * b[k];
+    }
 }
 
 fn sinc(x: f64) -> f64 {
