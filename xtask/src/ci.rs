@@ -13,7 +13,7 @@ use crate::machine::{
 };
 use crate::{COMMANDS, bundle, firmware, simulator};
 #[cfg(target_os = "linux")]
-use crate::{jack, window};
+use crate::{ardour, jack, window};
 
 /// DawDreamer's version is pinned: a new one may host differently.
 const DAWDREAMER_PACKAGES: &[&str] = &["dawdreamer==0.9.0", "numpy<3"];
@@ -55,6 +55,8 @@ const STEPS: &[Step] = &[
     ("MIDI over JACK", jack::test),
     ("VST3 in vst3-host", || cargo("test -p xtask --test vst3 --no-fail-fast")),
     ("VST3 in DawDreamer", dawdreamer),
+    #[cfg(target_os = "linux")]
+    ("VST3's window in Ardour", ardour::test),
     ("Python examples", python_examples),
     ("instructions", || machine::run(&mut Command::new("benches/instructions.sh"))),
     ("benches build", || cargo("bench --no-default-features --features cli --no-run")),

@@ -89,13 +89,13 @@ fn build() -> Result<Build> {
 const NAMES: [&str; 3] = ["chalumeau-1", "chalumeau-2", "chalumeau-3"];
 
 /// A JACK server with neither sound card nor real-time priority; ends when dropped.
-struct Server {
+pub(crate) struct Server {
     name: &'static str,
     child: Child,
 }
 
 impl Server {
-    fn start() -> Result<Self> {
+    pub(crate) fn start() -> Result<Self> {
         let mut complaints = String::new();
         for name in NAMES {
             match Self::named(name) {
@@ -107,7 +107,9 @@ impl Server {
     }
 
     fn named(name: &'static str) -> Result<Self> {
-        let log = machine::target().join("midi-jack").join(format!("{name}.log"));
+        let folder = machine::target().join("jack");
+        fs::create_dir_all(&folder)?;
+        let log = folder.join(format!("{name}.log"));
         let out = fs::File::create(&log)?;
         let child = Command::new("jackd")
             .args([
@@ -151,7 +153,7 @@ impl Server {
     }
 
     /// Makes a program, and those it starts, clients of this server and of no other.
-    fn for_clients<'a>(&self, command: &'a mut Command) -> &'a mut Command {
+    pub(crate) fn for_clients<'a>(&self, command: &'a mut Command) -> &'a mut Command {
         command.env("JACK_DEFAULT_SERVER", self.name).env("JACK_NO_START_SERVER", "1")
     }
 }

@@ -1,5 +1,7 @@
 //! Chores of the project, one file each; `cargo xtask` lists them.
 
+#[cfg(target_os = "linux")]
+pub mod ardour;
 pub mod bundle;
 pub mod ci;
 pub mod demo;

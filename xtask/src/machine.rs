@@ -172,6 +172,13 @@ pub const XKB: Package = Package {
 /// The window speaks to the display through it, at run time.
 pub const X11_XCB: Package =
     Package { name: "libx11-xcb1", present: || loads("libX11-xcb.so.1"), purpose: "opening the window" };
+/// A host for the VST3's window.
+pub const ARDOUR: Package = Package {
+    name: "ardour",
+    present: || works("sh", &["-c", "ls /usr/lib/ardour*/ardour-vst3-scanner"]),
+    purpose: "the window in a host of musicians",
+};
+
 /// Installs what is missing with apt-get, or names it.
 pub fn provide(packages: &[&Package]) -> Result<()> {
     let missing: Vec<_> = packages.iter().filter(|package| !(package.present)()).collect();

@@ -1,4 +1,4 @@
-//! The plugin's window: its tests in a host, on a display that nobody sees.
+//! The plugin's window: its tests in hosts, on a display that nobody sees.
 
 use std::path::Path;
 use std::process::Command;
@@ -7,7 +7,7 @@ use anyhow::Result;
 
 use crate::display::Display;
 use crate::machine::{self, EGL, MESA, X11_XCB, XKB, XVFB};
-use crate::{bundle, machine::PROGRAM};
+use crate::{ardour, bundle, machine::PROGRAM};
 
 /// The tests that draw every picture worth keeping.
 const PICTURES: [(&str, &str); 2] = [("window", "every_view"), ("standalone", "its_window")];
@@ -29,6 +29,8 @@ pub fn screenshots(_: &[String]) -> Result<()> {
     for (file, name) in PICTURES {
         machine::run(&mut tests(&display, file, name))?;
     }
+    drop(display);
+    ardour::test()?;
     println!("pictures: {}", machine::target().join(Path::new("screenshots")).display());
     Ok(())
 }
