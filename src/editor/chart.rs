@@ -136,6 +136,9 @@ pub fn lines(plot: &mut PlotUi<'_>, marks: &[Mark<'_>]) {
     }
 }
 
+/// Share of a picture's width from which a mark's name stands left of its line if it can: further right curves end.
+const LEFT_FROM: f32 = 0.67;
+
 /// The marks' names along the upper edge, each beside its line, lower where the one before is in the way.
 pub fn names(ui: &Ui, transform: &PlotTransform, marks: &[Mark<'_>]) {
     let frame = *transform.frame();
@@ -148,9 +151,12 @@ pub fn names(ui: &Ui, transform: &PlotTransform, marks: &[Mark<'_>]) {
         let x = transform.position_from_point(&PlotPoint::new(mark.at, 0.0)).x;
         let galley = painter.layout_no_wrap(mark.name.to_owned(), theme::small(), mark.colour);
         let size = galley.size();
-        let left = if x + 4.0 + size.x > frame.right() { x - 4.0 - size.x } else { x + 4.0 };
-        let mut rect = Rect::from_min_size(egui::pos2(left, frame.top() + 4.0), size);
-        while taken.iter().any(|other| other.intersects(rect.expand2(vec2(3.0, 0.0)))) {
+        let at = |left: f32| Rect::from_min_size(egui::pos2(left, frame.top() + 4.0), size);
+        let is_taken = |rect: Rect| taken.iter().any(|other| other.intersects(rect.expand2(vec2(3.0, 0.0))));
+        let (before, behind) = (at(x - 4.0 - size.x), at(x + 4.0));
+        let is_far = x > frame.left() + LEFT_FROM * frame.width() && !is_taken(before);
+        let mut rect = if is_far || behind.right() > frame.right() { before } else { behind };
+        while is_taken(rect) {
             rect = rect.translate(vec2(0.0, size.y + 1.0));
         }
         // Curves pass behind the word.

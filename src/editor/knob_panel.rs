@@ -263,11 +263,14 @@ fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     }
     response.on_hover_ui(|ui| teach(ui, "arm", ""));
     slider(ui, hands, "ceil");
-    let angle = knob.angle_deg.map_or_else(|| "\u{2013}".into(), |deg| format!("{deg:.0}\u{b0}"));
-    let torque = knob.torque_mnm.map_or_else(|| "\u{2013}".into(), |mnm| format!("{mnm:.0} mNm"));
     ui.spacing_mut().item_spacing.y = 2.0;
     let quiet = |text: String| RichText::new(text).font(theme::small()).color(c.quiet);
-    ui.label(quiet(format!("knob at {angle}, {torque}")));
+    let Some(deg) = knob.angle_deg else {
+        ui.label(quiet("where the knob stands, and how its line does, once there is one".into()));
+        return;
+    };
+    let torque = knob.torque_mnm.map_or_else(String::new, |mnm| format!(", {mnm:.0} mNm"));
+    ui.label(quiet(format!("knob at {deg:.0}\u{b0}{torque}")));
     if !has_line {
         return;
     }

@@ -164,20 +164,3 @@ fn another_renderers_edges_are_not() {
     let count = differences(&reduced(&other), &reduced(&whole));
     assert!(count <= MAY_DIFFER, "{count}");
 }
-
-/// Pictures for people, at full size: `EDITOR_PICTURES=FOLDER[,WIDTHxHEIGHT][,SCALE]..`.
-#[test]
-#[ignore = "writes pictures for people"]
-fn pictures() {
-    let text = std::env::var("EDITOR_PICTURES").unwrap_or_else(|_| "target/editor".into());
-    let mut words = text.split(',');
-    let folder = folder(words.next().unwrap());
-    let (mut size, mut scales) = (chalumeau::editor::SIZE, Vec::new());
-    for word in words {
-        match word.split_once('x') {
-            Some((width, height)) => size = (width.parse().unwrap(), height.parse().unwrap()),
-            None => scales.push(word.parse().unwrap()),
-        }
-    }
-    crate::support::pictures(&folder, size, if scales.is_empty() { &[1.0, 2.0] } else { &scales }, &Tab::ALL);
-}
