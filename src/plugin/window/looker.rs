@@ -162,7 +162,7 @@ impl Looker {
             });
             snapshot.knob.devices = self.devices.0.clone();
         }
-        snapshot.status = self.words(placed.as_ref());
+        snapshot.status = self.words(placed.as_ref(), &inside.breaths);
         *self.shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(snapshot);
         self.shared.draw_again();
         if moving { QUICK } else { IDLE }
@@ -237,7 +237,7 @@ impl Looker {
         self.listener.as_mut().map_or_else(Heard::default, |(_, listener)| listener.hear(samples, wanted))
     }
 
-    fn words(&self, placed: Option<&Placed>) -> Vec<Status> {
+    fn words(&self, placed: Option<&Placed>, breaths: &Breaths) -> Vec<Status> {
         let mut status = Vec::new();
         let mut say = |level, text: String| status.push(Status { level, text });
         if let Ok(text) = self.beside.params.instrument_status.read()
@@ -249,6 +249,10 @@ impl Looker {
             && text.as_str() != "off"
         {
             say(Level::Good, text.clone());
+        }
+        // Whoever has just plugged in a breath controller sees that it arrives.
+        if let Some(way) = Way::ALL.into_iter().find(|&way| way != Way::Keys && breaths.is_live(way)) {
+            say(Level::Good, format!("breath: {}", way.title()));
         }
         status
     }
