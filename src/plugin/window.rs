@@ -3,7 +3,7 @@
 //! Three threads. The *audio* thread leaves, while the window is open, what is inside the instrument and the last of what
 //! was heard, and takes the keys that were pressed in the window. A *looker* thread makes a [`Snapshot`] of all that, of
 //! the instrument and of the knob; nothing that takes time is done where the window is drawn. The *main* thread draws the
-//! latest snapshot. While nothing moves the window is drawn five times a second.
+//! latest snapshot. While nothing moves the window is drawn less than five times a second.
 
 mod app;
 mod audio;
