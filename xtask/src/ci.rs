@@ -11,6 +11,7 @@ use crate::machine::{
     self, ALSA, ARM_CXX, ARM_LIBRARY, CC, CXX, EGL, GL, GLIB, JACK, JACKD, MESA, PKG_CONFIG, PROGRAM,
     Package, VENV, X11_XCB, XCB, XKB, XVFB,
 };
+use crate::programs::{STANDALONE, programs};
 use crate::{COMMANDS, bundle, firmware, simulator};
 #[cfg(target_os = "linux")]
 use crate::{ardour, jack, window};
@@ -35,6 +36,8 @@ const STEPS: &[Step] = &[
     ("tests, core", || cargo("test --no-default-features --features cli --no-fail-fast")),
     ("tests, knob", knob),
     ("tests, program", || cargo(&format!("test {PROGRAM} --lib --bins --no-fail-fast"))),
+    // Beside the step with the same features; those that start them come later.
+    ("programs", || programs().map(drop)),
     ("editor", || cargo("test --no-default-features --features editor-tests --test editor --no-fail-fast")),
     ("documentation", documentation),
     ("generated files", generated),
@@ -171,16 +174,14 @@ fn clap() -> Result<()> {
 
 /// The same tests on a debug build, where the framework aborts on any allocation while processing.
 fn clap_checked() -> Result<()> {
-    cargo(&format!("build {PROGRAM} --lib"))?;
-    let library = format!("{}chalumeau{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
-    let library = machine::target().join("debug").join(library);
-    machine::run(clap_tests(&["clap", "instrument", "knob"]).env("CHALUMEAU_CLAP", library))
+    machine::run(clap_tests(&["clap", "instrument", "knob"]).env("CHALUMEAU_CLAP", &programs()?.plugin))
 }
 
 /// The program of its own, without sound; the JACK step plays it to a server.
 fn standalone() -> Result<()> {
-    cargo(&format!("build {PROGRAM} --bin chalumeau-standalone"))?;
-    cargo("test -p xtask --test standalone --no-fail-fast")
+    let mut tests = machine::cargo();
+    tests.args(["test", "-p", "xtask", "--test", "standalone", "--no-fail-fast"]);
+    machine::run(tests.env(STANDALONE, &programs()?.standalone))
 }
 
 fn dawdreamer() -> Result<()> {

@@ -1,13 +1,14 @@
-//! MIDI between programs without a sound card: a build of plugin and command line whose midir speaks to JACK, a JACK
-//! server with a dummy driver, the tests that play a simulated knob's MIDI port through both, and the standalone's.
+//! MIDI between programs without a sound card: plugin and programs whose midir speaks to JACK, a JACK server with a
+//! dummy driver, the tests that play a simulated knob's MIDI port through both, and the standalone's.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 
+use crate::programs::{Programs, STANDALONE, programs};
 use crate::{machine, simulator};
 
 /// Frames of a JACK period at 48 kHz: a message takes up to two of them, 11 ms.
@@ -27,9 +28,9 @@ const SETTLED: Duration = Duration::from_millis(500);
 /// How long the server may take to answer.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// Builds, starts the server and runs `xtask/tests/knob_midi.rs` and the ignored test of `standalone.rs`.
+/// Starts the server and runs `xtask/tests/knob_midi.rs` and the ignored test of `standalone.rs`.
 pub fn test() -> Result<()> {
-    let Build { plugin, program, standalone } = build()?;
+    let Programs { plugin, program, standalone } = programs()?;
     // Killed clients leave a server in a state in which it may run no new ones: the test that kills comes last, alone.
     for which in [["--skip", KILLS].as_slice(), &[KILLS]] {
         let mut left = ATTEMPTS;
@@ -40,8 +41,8 @@ pub fn test() -> Result<()> {
                 .args(["test", "-p", "xtask", "--test", "knob_midi", "--", "--ignored", "--nocapture"])
                 .arg("--test-threads=1")
                 .args(which)
-                .env("CHALUMEAU_CLAP", &plugin)
-                .env(simulator::PROGRAM, &program);
+                .env("CHALUMEAU_CLAP", plugin)
+                .env(simulator::PROGRAM, program);
             left -= 1;
             match machine::run(server.for_clients(&mut command)) {
                 Err(reason) if left > 0 => println!("again, with a new server: {reason:#}"),
@@ -53,35 +54,8 @@ pub fn test() -> Result<()> {
     let mut command = machine::cargo();
     command
         .args(["test", "-p", "xtask", "--test", "standalone", "--", "--ignored", "it_plays_to_jack"])
-        .env("CHALUMEAU_STANDALONE", standalone);
+        .env(STANDALONE, standalone);
     machine::run(server.for_clients(&mut command))
-}
-
-/// What the tests load and start.
-struct Build {
-    plugin: PathBuf,
-    program: PathBuf,
-    standalone: PathBuf,
-}
-
-/// A debug build with every feature of the program, `midi-jack` among them, as the tests with allocation checks have made it already;
-/// kept aside, because the next build with other features takes its place.
-fn build() -> Result<Build> {
-    let what = ["--lib", "--bin", "chalumeau", "--bin", "chalumeau-standalone"];
-    machine::run(machine::cargo().arg("build").args(machine::PROGRAM.split(' ')).args(what))?;
-    let folder = machine::target().join("midi-jack");
-    fs::create_dir_all(&folder)?;
-    let keep = |name: String| -> Result<PathBuf> {
-        let (from, to) = (machine::target().join("debug").join(&name), folder.join(name));
-        fs::copy(&from, &to).with_context(|| format!("cannot copy {}", from.display()))?;
-        Ok(to)
-    };
-    let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
-    Ok(Build {
-        plugin: keep(format!("{prefix}chalumeau{suffix}"))?,
-        program: keep(format!("chalumeau{}", std::env::consts::EXE_SUFFIX))?,
-        standalone: keep(format!("chalumeau-standalone{}", std::env::consts::EXE_SUFFIX))?,
-    })
 }
 
 /// Names for the server; another checkout may be testing at the same time. They are few and always the same, because a

@@ -15,6 +15,7 @@ pub mod machine;
 pub mod midi;
 pub mod picture;
 pub mod prepared;
+pub mod programs;
 #[cfg(target_os = "linux")]
 pub mod screen;
 pub mod simulator;

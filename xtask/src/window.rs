@@ -7,46 +7,41 @@ use anyhow::Result;
 
 use crate::display::Display;
 use crate::machine::{self, EGL, MESA, X11_XCB, XKB, XVFB};
-use crate::{ardour, bundle, machine::PROGRAM};
+use crate::programs::{Programs, STANDALONE, programs};
+use crate::{ardour, bundle};
 
 /// The tests that draw every picture worth keeping.
 const PICTURES: [(&str, &str); 2] = [("window", "every_view"), ("standalone", "its_window")];
 
 /// Starts a display and plays the bundled plugin and the debug build of the standalone on it.
 pub fn test() -> Result<()> {
-    build_standalone()?;
+    let programs = programs()?;
     let display = Display::start()?;
-    machine::run(&mut tests(&display, "window", ""))?;
-    machine::run(&mut tests(&display, "standalone", "its_window"))
+    machine::run(&mut tests(programs, &display, "window", ""))?;
+    machine::run(&mut tests(programs, &display, "standalone", "its_window"))
 }
 
 /// Builds plugin and standalone and keeps pictures of them.
 pub fn screenshots(_: &[String]) -> Result<()> {
     machine::provide(&[&XVFB, &MESA, &EGL, &XKB, &X11_XCB])?;
     bundle::run(&[])?;
-    build_standalone()?;
-    let display = Display::start()?;
+    let (programs, display) = (programs()?, Display::start()?);
     for (file, name) in PICTURES {
-        machine::run(&mut tests(&display, file, name))?;
+        machine::run(&mut tests(programs, &display, file, name))?;
     }
-    drop(display);
     ardour::test()?;
     println!("pictures: {}", machine::target().join(Path::new("screenshots")).display());
     Ok(())
 }
 
-fn build_standalone() -> Result<()> {
-    let mut build = machine::cargo();
-    machine::run(build.arg("build").args(PROGRAM.split(' ')).args(["--bin", "chalumeau-standalone"]))
-}
-
 /// The tests of a file that need a display, those whose name begins with `name`.
-fn tests(display: &Display, file: &str, name: &str) -> Command {
+fn tests(programs: &Programs, display: &Display, file: &str, name: &str) -> Command {
     let mut command = machine::cargo();
     command
         .args(["test", "-p", "xtask", "--test", file, "--no-fail-fast", "--"])
         // One after another: they look at one display and move one pointer.
         .args(["--ignored", "--nocapture", "--test-threads=1", name])
+        .env(STANDALONE, &programs.standalone)
         .env("CHALUMEAU_CACHE_DIR", machine::target().join("cache"));
     display.for_clients(&mut command);
     command

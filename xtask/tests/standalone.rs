@@ -9,9 +9,9 @@ const PATIENCE: Duration = Duration::from_secs(20);
 
 /// The program without a display, and without a JACK server or a sound card that this machine may have.
 fn program() -> Command {
-    let path = match std::env::var_os("CHALUMEAU_STANDALONE") {
+    let path = match std::env::var_os(xtask::programs::STANDALONE) {
         Some(path) => xtask::machine::root().join(path),
-        None => xtask::machine::target().join("debug/chalumeau-standalone"),
+        None => xtask::machine::target().join("programs/chalumeau-standalone"),
     };
     let mut command = Command::new(path);
     command
@@ -111,7 +111,7 @@ fn help_helps_and_mistakes_are_named() {
     let Output { status, stdout, .. } = alone(&["--help"]);
     let said = String::from_utf8(stdout).unwrap();
     assert_eq!(status.code(), Some(0));
-    for word in ["--backend", "--midi-input", "--output-device", "Ctrl-C", "no display"] {
+    for word in ["--backend", "--midi-input", "--output-device", "Ctrl-C", "Without a display"] {
         assert!(said.contains(word), "no {word:?} in {said}");
     }
     for (args, word) in [
