@@ -62,7 +62,6 @@ const STEPS: &[Step] = &[
     ("VST3's window in Ardour", ardour::test),
     ("Python examples", python_examples),
     ("instructions", || machine::run(&mut Command::new("benches/instructions.sh"))),
-    ("benches build", || cargo("bench --no-default-features --features cli --no-run")),
 ];
 
 /// `cargo xtask ci [word..]`: all steps, or those whose name contains one of the words.

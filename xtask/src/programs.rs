@@ -33,7 +33,9 @@ pub fn programs() -> Result<&'static Programs> {
 }
 
 fn build() -> Result<Programs> {
-    let what = ["--lib", "--bin", "chalumeau", "--bin", "chalumeau-standalone"];
+    // With an example, which like a test may use what only tests need, cargo takes the libraries that the program's tests
+    // were just built with; without one some have fewer features, and all that stands on them is built again.
+    let what = ["--lib", "--bin", "chalumeau", "--bin", "chalumeau-standalone", "--example", "instructions"];
     machine::run(machine::cargo().arg("build").args(PROGRAM.split(' ')).args(what))?;
     let folder = machine::target().join("programs");
     fs::create_dir_all(&folder)?;
