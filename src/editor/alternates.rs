@@ -26,16 +26,17 @@ pub struct Choice {
 /// Note, the neighbour whose fingering it begins from, what it opens, what it closes, and in a player's words.
 type Row = (u8, u8, &'static [&'static str], &'static [&'static str], &'static str);
 
-/// Written notes by MIDI number.
+/// Written notes by MIDI number. In the forks the ring of the right first finger closes, by the bridge between the joints,
+/// also the vent above the left second.
 const BOEHM: &[Row] = &[
     (59, 58, &["SLIVER_B"], &[], "T L1 L2 L3 R1 sliverB"),
     (63, 62, &["SIDE1_Eb"], &[], "T L1 L2 side1"),
-    (63, 64, &[], &["R1", "R_VENT"], "T L1 R1 (fork)"),
+    (63, 64, &[], &["R1", "R_VENT", "L2_VENT"], "T L1 R1 (fork)"),
     (66, 65, &["SIDE1_Eb", "SIDE2_Fs"], &[], "T side1 side2"),
     (70, 69, &["TRILL3_Bb"], &[], "A side3"),
     (78, 77, &["SLIVER_B"], &[], "R T L1 L2 L3 R1 sliverB"),
     (82, 81, &["SLIVER_Eb"], &[], "R T L1 L2 sliverEb"),
-    (82, 83, &[], &["R1", "R_VENT"], "R T L1 R1 (fork)"),
+    (82, 83, &[], &["R1", "R_VENT", "L2_VENT"], "R T L1 R1 (fork)"),
 ];
 
 /// All fingerings of the picker: those of the file, each followed by its alternates.
