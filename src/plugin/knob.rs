@@ -50,6 +50,8 @@ pub struct Shared {
     chosen: AtomicBool,
     /// How the link is. Only desk and window lock it.
     status: Mutex<Option<LinkStatus>>,
+    /// The instance has been activated: one that has never played leaves the knob to those that do.
+    plays: AtomicBool,
     stop: AtomicBool,
 }
 
@@ -64,6 +66,7 @@ impl Shared {
             test: Mutex::default(),
             chosen: AtomicBool::new(false),
             status: Mutex::default(),
+            plays: AtomicBool::new(false),
             stop: AtomicBool::new(false),
         }
     }

@@ -87,6 +87,7 @@ impl Audio {
     /// Before playing: a take that shall be replayed is there from the first sample, so that every render of a file is
     /// the same. Allocates; takes half a second. [main thread]
     pub fn prepare(&mut self, params: &ChalumeauParams, instruments: &instrument::Shared) {
+        self.shared.plays.store(true, Ordering::Relaxed);
         self.prepared = None;
         if !params.knob.replay.value() {
             return;

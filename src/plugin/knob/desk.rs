@@ -109,7 +109,9 @@ impl Desk {
 
     pub(super) fn run(mut self) {
         while !self.shared.stop.load(Ordering::Relaxed) {
-            self.turn();
+            if self.shared.plays.load(Ordering::Relaxed) {
+                self.turn();
+            }
             std::thread::sleep(TURN);
         }
         self.record(false);
