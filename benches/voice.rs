@@ -5,13 +5,13 @@
 
 use std::hint::black_box;
 
-use chalumeau::bore::lattice::{Lattice, Tip};
-use chalumeau::event::Event;
-use chalumeau::instrument::held::HeldNote;
-use chalumeau::instrument::voice::{Drive, TICK};
-use chalumeau::instrument::{Clarinet, Model};
-use chalumeau::reed::{ReedState, ReedTables};
-use chalumeau::units::WrittenNote;
+use chalumeau_core::bore::lattice::{Lattice, Tip};
+use chalumeau_core::event::Event;
+use chalumeau_core::instrument::held::HeldNote;
+use chalumeau_core::instrument::voice::{Drive, TICK};
+use chalumeau_core::instrument::{Clarinet, Model};
+use chalumeau_core::reed::{ReedState, ReedTables};
+use chalumeau_core::units::WrittenNote;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 
 const HOST_HZ: f64 = 48_000.0;

@@ -10,10 +10,10 @@
 use std::error::Error;
 use std::hint::black_box;
 
-use chalumeau::event::Event;
-use chalumeau::instrument::Clarinet;
-use chalumeau::instrument::watch::{MOMENTS, Moment};
-use chalumeau::units::WrittenNote;
+use chalumeau_core::event::Event;
+use chalumeau_core::instrument::Clarinet;
+use chalumeau_core::instrument::watch::{MOMENTS, Moment};
+use chalumeau_core::units::WrittenNote;
 
 /// Samples per call, as a host at a common setting would ask for.
 const BLOCK: usize = 64;

@@ -11,20 +11,20 @@
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 
-use chalumeau::control::knob::KnobDesign;
-use chalumeau::device::{Choice, Hooks, KnobLink, Phase, Places};
-use chalumeau::event::{Event, Timed};
-use chalumeau::haptics::FeelDesign;
-use chalumeau::instrument::{Clarinet, Settings};
-use chalumeau::simulator::hand::{Hand as SimulatedHand, HandDesign};
-use chalumeau::simulator::knob::SimulatedKnob;
-use chalumeau::simulator::plant::PlantDesign;
-use chalumeau::simulator::script::Script;
-use chalumeau::simulator::serve::{Port, Server};
-use chalumeau::touch::blower::{Blower, Blown, GRID, Hand};
-use chalumeau::touch::feel::{Feels, NO_MOTOR};
-use chalumeau::units::SoundingNote;
+use chalumeau_core::control::knob::KnobDesign;
+use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::haptics::FeelDesign;
+use chalumeau_core::instrument::{Clarinet, Settings};
+use chalumeau_core::units::SoundingNote;
 use chalumeau_firmware::Setup;
+use chalumeau_knob::device::{Choice, Hooks, KnobLink, Phase, Places};
+use chalumeau_knob::simulator::hand::{Hand as SimulatedHand, HandDesign};
+use chalumeau_knob::simulator::knob::SimulatedKnob;
+use chalumeau_knob::simulator::plant::PlantDesign;
+use chalumeau_knob::simulator::script::Script;
+use chalumeau_knob::simulator::serve::{Port, Server};
+use chalumeau_knob::touch::blower::{Blower, Blown, GRID, Hand};
+use chalumeau_knob::touch::feel::{Feels, NO_MOTOR};
 
 const RATE_HZ: f64 = 48_000.0;
 const BLOCK: usize = 128;
@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut hand = SimulatedHand::new(HandDesign::default(), 1);
     hand.follow(script);
     let knob = SimulatedKnob::new(Setup::default(), PlantDesign::default(), hand, 1);
-    let mut server = Server::new(knob, Port::Serial(Some(chalumeau::simulator::pty::Pty::open()?)));
+    let mut server = Server::new(knob, Port::Serial(Some(chalumeau_knob::simulator::pty::Pty::open()?)));
     let path = server.path().ok_or("the knob has no port")?.to_owned();
     let (tell, told) = channel();
     let end = Instant::now() + Duration::from_secs_f64(seconds + 3.0);

@@ -30,19 +30,19 @@ mod threshold;
 mod tune;
 mod watch;
 
-use crate::bore::cylinder::CylinderError;
-use crate::bore::instrument_file::{ImportError, InstrumentError};
-use crate::figure::draw::DrawError;
-use crate::figure::report::ReportError;
-use crate::haptics::FeelRefused;
-use crate::instrument::BuildError;
 use crate::output::OutputError;
-use crate::reed::law::ReedError;
-use crate::render::breath::BreathError;
-use crate::render::midi_file::MidiFileError;
-use crate::render::score::ScoreError;
-use crate::render::wav::WavError;
-use crate::touch::take::TakeError;
+use crate::picture_file::PictureError;
+use crate::wav::WavError;
+use chalumeau_core::bore::cylinder::CylinderError;
+use chalumeau_core::bore::instrument_file::{ImportError, InstrumentError};
+use chalumeau_core::haptics::FeelRefused;
+use chalumeau_core::instrument::BuildError;
+use chalumeau_core::reed::law::ReedError;
+use chalumeau_core::score::ScoreError;
+use chalumeau_core::score::breath::BreathError;
+use chalumeau_core::score::midi_file::MidiFileError;
+use chalumeau_figure::report::ReportError;
+use chalumeau_knob::touch::take::TakeError;
 use clap::{Parser, Subcommand};
 use std::io;
 use std::path::PathBuf;
@@ -120,7 +120,7 @@ enum Failure {
     #[error(transparent)]
     Output(#[from] OutputError),
     #[error(transparent)]
-    Draw(#[from] DrawError),
+    Draw(#[from] PictureError),
     #[error("{}: {source}", path.display())]
     Report { path: PathBuf, source: ReportError },
     #[error(transparent)]
@@ -129,7 +129,7 @@ enum Failure {
     Reed(#[from] ReedError),
     #[cfg(feature = "simulator")]
     #[error("{}: {source}", path.display())]
-    HandScript { path: PathBuf, source: crate::simulator::script::ScriptError },
+    HandScript { path: PathBuf, source: chalumeau_knob::simulator::script::ScriptError },
     #[cfg(feature = "simulator")]
     #[error("cannot write {}: {source}", path.display())]
     Write { path: PathBuf, source: io::Error },

@@ -42,8 +42,8 @@ pub use feel_test::FeelTest;
 pub use header::note_name;
 pub use snapshot::Snapshot;
 
-use crate::units::SoundingNote;
-use crate::wire::message::Feel;
+use chalumeau_core::units::SoundingNote;
+use chalumeau_knob::wire::message::Feel;
 use controls::{Entry, Hands, Press};
 use history::History;
 use keyboard::Keyboard;

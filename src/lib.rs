@@ -1,28 +1,18 @@
-//! Chalumeau: a clarinet you play by touch.
+//! The programs of Chalumeau: command line, plugin, its window, and the standalone. The instrument itself is in
+//! `chalumeau-core`.
 
-pub mod analysis;
-pub mod bore;
+pub mod cache;
 #[cfg(feature = "cli")]
 pub mod cli;
-pub mod control;
-#[cfg(feature = "devices")]
-pub mod device;
-pub mod dsp;
 #[cfg(feature = "editor")]
 pub mod editor;
-pub mod event;
-pub mod figure;
-pub mod haptics;
 pub mod identity;
-pub mod instrument;
+pub mod instrument_path;
 pub mod output;
+#[cfg(feature = "cli")]
+pub mod picture_file;
 #[cfg(feature = "plugin")]
 pub mod plugin;
-pub mod reed;
+pub mod take_file;
 #[cfg(feature = "cli")]
-pub mod render;
-#[cfg(feature = "simulator")]
-pub mod simulator;
-pub mod touch;
-pub mod units;
-pub mod wire;
+pub mod wav;

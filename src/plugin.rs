@@ -25,10 +25,10 @@ pub use params::{BreathParams, ChalumeauParams, EmbouchureParams, KnobParams, No
 pub use params::{InstrumentParams, OutputParams, PhysicalReedParams, ReedParams};
 pub use params::{SCHEMA, TuningChoice, TuningParams};
 
-use crate::event::{Event, Timed};
 use crate::identity;
-use crate::instrument::Settings;
 use breaths::{Breaths, Way};
+use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::instrument::Settings;
 use instrument::{Bench, Workshop};
 use reed_sources::ReedSources;
 use translate::Translator;

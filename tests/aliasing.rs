@@ -6,14 +6,14 @@ mod parallel;
 
 use std::sync::Arc;
 
-use chalumeau::analysis::pitch;
-use chalumeau::analysis::spectrum;
-use chalumeau::analysis::to_f64;
-use chalumeau::event::Event;
-use chalumeau::instrument::Clarinet;
-use chalumeau::instrument::Model;
-use chalumeau::instrument::Settings;
-use chalumeau::units::WrittenNote;
+use chalumeau_core::analysis::pitch;
+use chalumeau_core::analysis::spectrum;
+use chalumeau_core::analysis::to_f64;
+use chalumeau_core::event::Event;
+use chalumeau_core::instrument::Clarinet;
+use chalumeau_core::instrument::Model;
+use chalumeau_core::instrument::Settings;
+use chalumeau_core::units::WrittenNote;
 use parallel::each;
 
 const RATE_HZ: f64 = 48_000.0;

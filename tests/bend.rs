@@ -6,14 +6,14 @@ mod parallel;
 
 use std::sync::{Arc, LazyLock};
 
-use chalumeau::analysis::pitch;
-use chalumeau::analysis::spectrum;
-use chalumeau::analysis::to_f64;
-use chalumeau::control::midi::{Events, MidiDecoder};
-use chalumeau::event::Event;
-use chalumeau::instrument::{Clarinet, Model, Settings};
-use chalumeau::units::WrittenNote;
-use chalumeau::units::cents;
+use chalumeau_core::analysis::pitch;
+use chalumeau_core::analysis::spectrum;
+use chalumeau_core::analysis::to_f64;
+use chalumeau_core::control::midi::{Events, MidiDecoder};
+use chalumeau_core::event::Event;
+use chalumeau_core::instrument::{Clarinet, Model, Settings};
+use chalumeau_core::units::WrittenNote;
+use chalumeau_core::units::cents;
 use parallel::each;
 
 const RATE_HZ: f64 = 48_000.0;

@@ -85,7 +85,7 @@ fn missing_files_are_named() {
 #[test]
 fn instrument_files_are_refused_by_field() {
     let d = tempfile::tempdir().unwrap();
-    let good = include_str!("../data/b_flat_clarinet.toml");
+    let good = include_str!("../crates/core/data/b_flat_clarinet.toml");
     for (wrong, says) in [
         (
             good.replacen("transposition_semitones = 2", "transposition_semitones = 99", 1),

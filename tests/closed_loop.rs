@@ -10,14 +10,14 @@ mod parallel;
 #[path = "closed_loop/player.rs"]
 mod player;
 
-use chalumeau::haptics::{FeelDesign, FeelRefused, FeelTable, Limits, NoteFeel};
-use chalumeau::instrument::{Model, Settings};
-use chalumeau::simulator::hand::HandDesign;
-use chalumeau::simulator::plant::PlantDesign;
-use chalumeau::simulator::script::{Aim, Script};
-use chalumeau::touch::feel::{Feels, NO_MOTOR};
-use chalumeau::units::{WrittenNote, cents};
-use chalumeau::wire::{Law, RefusedCode};
+use chalumeau_core::haptics::{FeelDesign, FeelRefused, FeelTable, NoteFeel, TorqueLimits};
+use chalumeau_core::instrument::{Model, Settings};
+use chalumeau_core::units::{WrittenNote, cents};
+use chalumeau_knob::simulator::hand::HandDesign;
+use chalumeau_knob::simulator::plant::PlantDesign;
+use chalumeau_knob::simulator::script::{Aim, Script};
+use chalumeau_knob::touch::feel::{Feels, NO_MOTOR};
+use chalumeau_knob::wire::{Law, RefusedCode};
 use felt::{Felt, Fingers};
 use heard::{Ear, Heard, least_squares};
 use parallel::each;
@@ -40,7 +40,7 @@ fn design(law: Law, contrast: f64) -> FeelDesign {
 }
 
 fn table(law: Law, contrast: f64) -> FeelTable {
-    FEELS.table(&Settings::default(), &design(law, contrast), &Limits::default()).unwrap()
+    FEELS.table(&Settings::default(), &design(law, contrast), &TorqueLimits::default()).unwrap()
 }
 
 fn note(table: &FeelTable, written: u8) -> &NoteFeel {
@@ -95,7 +95,7 @@ fn passage(table: &FeelTable, note: &NoteFeel) -> Passage {
     let (mut is_fingered, mut is_over) = (false, false);
     while player.knob.t_s() - begun_s < script.length_s() {
         let (mut sum_deg, mut periods) = (0.0, 0.0);
-        let tick = |knob: &chalumeau::simulator::knob::SimulatedKnob| {
+        let tick = |knob: &chalumeau_knob::simulator::knob::SimulatedKnob| {
             fingers.feel(knob);
             (sum_deg, periods) = (sum_deg + knob.angle_deg(), periods + 1.0);
             if let Aim::Angle(wanted_deg) = script.at(knob.t_s() - begun_s).aim {
@@ -324,7 +324,7 @@ fn what_would_push_or_shake_is_refused_before_the_wire_and_behind_it() {
         };
         let (before, torque) = (player.knob.feel().0, mean_mnm(&mut player));
         let limits =
-            Limits { ceiling_mnm: f64::INFINITY, ..Limits::of_device(player.session.info().unwrap(), 450) };
+            TorqueLimits { ceiling_mnm: f64::INFINITY, ..player.session.info().unwrap().torque_limits(450) };
         let here = FEELS.table(&settings, &wanted, &limits).expect_err(what);
         let is_right = match here {
             FeelRefused::Push { .. } => code == push,

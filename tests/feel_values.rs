@@ -3,7 +3,7 @@
 #[path = "support/reference.rs"]
 mod reference;
 
-use chalumeau::bore::instrument_file::InstrumentFile;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
 use std::collections::BTreeMap;
 use std::process::Command;
 

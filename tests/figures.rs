@@ -1,7 +1,7 @@
 //! What figures say, compared as data; and that they can be drawn.
 
-use chalumeau::figure::draw::{self, DrawError, Sheet};
-use chalumeau::figure::{Axis, Direction, Figure, Layer, Line, Mark, Panel, SecondAxis};
+use chalumeau::picture_file::{self, PictureError, PictureFile};
+use chalumeau_figure::{Axis, Direction, Figure, Layer, Line, Mark, Panel, SecondAxis};
 use std::ffi::OsStr;
 use std::fs;
 use std::path::Path;
@@ -22,21 +22,24 @@ fn example() -> Figure {
 fn a_figure_becomes_a_png_or_an_svg_of_its_size() {
     let directory = tempfile::tempdir().unwrap();
     let path = |name: &str| directory.path().join(name);
-    draw::write(&example(), &path("a.png"), None, false).unwrap();
+    picture_file::write(&example(), &path("a.png"), None, false).unwrap();
     let png = fs::read(path("a.png")).unwrap();
     assert_eq!(&png[1..4], b"PNG");
     assert_eq!((png[18..20].to_vec(), png[22..24].to_vec()), (vec![2, 88], vec![1, 144]), "600 x 400");
-    draw::write(&example(), &path("a.SVG"), Some("800x500".parse().unwrap()), false).unwrap();
+    picture_file::write(&example(), &path("a.SVG"), Some("800x500".parse().unwrap()), false).unwrap();
     let svg = fs::read_to_string(path("a.SVG")).unwrap();
     assert!(svg.contains("viewBox=\"0 0 800 500\"") && svg.contains("aria-label=\"pressure, kPa\""));
     assert!(svg.contains("<title>Frequency &lt;against&gt; pressure</title>"));
     assert!(!svg.contains("<text"), "words are outlines: no font is needed");
-    assert!(matches!(draw::write(&example(), &path("a.png"), None, false), Err(DrawError::Output(_))));
+    assert!(matches!(
+        picture_file::write(&example(), &path("a.png"), None, false),
+        Err(PictureError::Output(_))
+    ));
     for name in ["a.jpg", "a", "a.gif"] {
-        let refused = draw::write(&example(), &path(name), None, false).unwrap_err().to_string();
+        let refused = picture_file::write(&example(), &path(name), None, false).unwrap_err().to_string();
         assert!(refused.contains(".png or .svg"), "{refused}");
     }
-    let refused = Sheet::moving(&path("a.png"), true, None).err().unwrap().to_string();
+    let refused = PictureFile::moving(&path("a.png"), true, None).err().unwrap().to_string();
     assert!(refused.contains(".gif"), "{refused}");
     assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 2, "nothing else is left");
 }

@@ -5,26 +5,26 @@
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use chalumeau::analysis::impedance::cutoff_hz;
-use chalumeau::analysis::overview::{Envelope, Overview, Watcher};
-use chalumeau::bore::instrument_file::InstrumentFile;
-use chalumeau::bore::transfer_matrix::TransferMatrix;
-use chalumeau::figure::breath;
-use chalumeau::figure::breath::Changes;
-use chalumeau::figure::felt::{AtContrast, Felt, Torque, thresholds, torques};
-use chalumeau::figure::impedance::{Curve, Fingering, NotePeaks, chart, fingering};
-use chalumeau::figure::performance::{Moment, Note, Performance, performance};
-use chalumeau::figure::{Figure, Layer, Panel, bore};
-use chalumeau::haptics::{FeelDesign, FeelTable, Limits, NoteFeel, Requirements, law};
-use chalumeau::instrument::felt::played_reed;
-use chalumeau::instrument::{Clarinet, Settings};
-use chalumeau::reed::ReedTables;
-use chalumeau::render::bifurcation;
-use chalumeau::render::breath::BreathCurve;
-use chalumeau::render::play_probed;
-use chalumeau::render::score::Score;
-use chalumeau::units::{Air, SoundingNote, WrittenNote};
-use chalumeau::wire::message::Law;
+use chalumeau_core::analysis::impedance::cutoff_hz;
+use chalumeau_core::analysis::overview::{Envelope, Overview, Watcher};
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::bore::transfer_matrix::TransferMatrix;
+use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, Requirements, TorqueLimits, law};
+use chalumeau_core::instrument::felt::played_reed;
+use chalumeau_core::instrument::{Clarinet, Settings};
+use chalumeau_core::reed::ReedTables;
+use chalumeau_core::score::Score;
+use chalumeau_core::score::bifurcation;
+use chalumeau_core::score::breath::BreathCurve;
+use chalumeau_core::score::play_probed;
+use chalumeau_core::units::{Air, SoundingNote, WrittenNote};
+use chalumeau_figure::breath;
+use chalumeau_figure::breath::Changes;
+use chalumeau_figure::felt::{AtContrast, Felt, Torque, thresholds, torques};
+use chalumeau_figure::impedance::{Curve, Fingering, NotePeaks, chart, fingering};
+use chalumeau_figure::performance::{Moment, Note, Performance, performance};
+use chalumeau_figure::{Figure, Layer, Panel, bore};
+use chalumeau_knob::wire::message::Law;
 use serde_json::Value;
 use std::convert::Infallible;
 use std::fs;
@@ -253,7 +253,7 @@ fn played() -> (Overview, Envelope, Moment, Vec<Note>) {
     let mut gamma = Envelope::new(96_000, 24);
     let mut moment = Moment { from_s: 0.25, step_s: 1.0 / 96_000.0, probes: Vec::new() };
     let mut seen = 0;
-    let mut inside = |probe: chalumeau::instrument::Probe| {
+    let mut inside = |probe: chalumeau_core::instrument::Probe| {
         gamma.push(probe.gamma as f32);
         if (24_000..25_400).contains(&seen) {
             moment.probes.push(probe);
@@ -325,7 +325,7 @@ fn nothing_played_is_a_picture_too() {
         moment: None,
     });
     assert_eq!(figure.panels.len(), 4);
-    let png = chalumeau::figure::draw::png(&figure, Some("400x700".parse().unwrap())).unwrap();
+    let png = chalumeau_figure::draw::png(&figure, Some("400x700".parse().unwrap())).unwrap();
     assert_eq!(&png[1..4], b"PNG");
 }
 
@@ -475,7 +475,7 @@ fn breath_and_feel_are_figures_of_one_instrument() {
         let (mut all, mut on_deg) = (Vec::new(), Vec::new());
         for contrast in [1.0, 5.0] {
             let design = FeelDesign { law, contrast, ..FeelDesign::default() };
-            let table = FeelTable::new(&bore, &design, &reed, &Limits::default()).unwrap();
+            let table = FeelTable::new(&bore, &design, &reed, &TorqueLimits::default()).unwrap();
             let notes = table.notes().iter().step_by(20).map(|note| {
                 let at = |deg: f64| (deg, law::torque_mnm(&note.feel, ReedTables::seed(), deg));
                 Torque {
@@ -534,7 +534,7 @@ fn breath_and_feel_are_figures_of_one_instrument() {
 #[test]
 fn a_swell_shows_where_it_sounds() {
     let settings = Settings { noise: 0.0, ..Settings::default() };
-    let model = std::sync::Arc::new(chalumeau::instrument::Model::built_in(48_000.0).unwrap());
+    let model = std::sync::Arc::new(chalumeau_core::instrument::Model::built_in(48_000.0).unwrap());
     let played = bifurcation::measure(&model, &settings, SoundingNote(58), 0.9, 1.0, 48_000, |_| {});
     let course: Vec<[f64; 4]> = played
         .up

@@ -10,18 +10,18 @@ mod reference;
 
 use std::sync::LazyLock;
 
-use chalumeau::haptics::law;
-use chalumeau::haptics::{
-    FeelDesign, FeelRefused, FeelTable, Limits, Order, PlayedReed, Requirement, Requirements,
+use chalumeau_core::haptics::law;
+use chalumeau_core::haptics::{
+    FeelDesign, FeelRefused, FeelTable, Order, PlayedReed, Requirement, Requirements, TorqueLimits,
 };
-use chalumeau::instrument::felt::{played_reed, requirements};
-use chalumeau::instrument::held::HeldNote;
-use chalumeau::instrument::voice::{Drive, TICK, Voice};
-use chalumeau::instrument::{Model, Settings};
-use chalumeau::reed::physical::P_REF_PA;
-use chalumeau::reed::{ReedCoeffs, ReedTables};
-use chalumeau::units::{Air, WrittenNote};
-use chalumeau::wire::message::Law;
+use chalumeau_core::instrument::felt::{played_reed, requirements};
+use chalumeau_core::instrument::held::HeldNote;
+use chalumeau_core::instrument::voice::{Drive, TICK, Voice};
+use chalumeau_core::instrument::{Model, Settings};
+use chalumeau_core::reed::physical::P_REF_PA;
+use chalumeau_core::reed::{ReedCoeffs, ReedTables};
+use chalumeau_core::units::{Air, WrittenNote};
+use chalumeau_knob::wire::message::Law;
 use parallel::each;
 
 static MODEL: LazyLock<Model> = LazyLock::new(|| Model::built_in(48_000.0).unwrap());
@@ -32,7 +32,7 @@ fn design(law: Law, contrast: f64) -> FeelDesign {
 }
 
 fn table(design: &FeelDesign, settings: &Settings) -> Result<FeelTable, FeelRefused> {
-    FeelTable::new(&BORE, design, &played_reed(&MODEL.file, settings), &Limits::default())
+    FeelTable::new(&BORE, design, &played_reed(&MODEL.file, settings), &TorqueLimits::default())
 }
 
 fn written(fingering: usize) -> u8 {
@@ -443,7 +443,7 @@ fn requests_a_knob_cannot_take_are_refused_with_numbers() {
     assert!(strength_mnm > 50.0);
     table(&FeelDesign { strength_mnm, ..default }, &standard).unwrap();
     // A gentle push limit refuses the falling branch, not the spring.
-    let gentle = Limits { push_nm_per_rad: 0.02, ..Limits::default() };
+    let gentle = TorqueLimits { push_nm_per_rad: 0.02, ..TorqueLimits::default() };
     let reed = played_reed(&MODEL.file, &standard);
     let flow = FeelTable::new(&BORE, &default, &reed, &gentle);
     assert!(matches!(flow, Err(FeelRefused::Push { .. })));
@@ -453,7 +453,8 @@ fn requests_a_knob_cannot_take_are_refused_with_numbers() {
 /// A knob that is told one note is held to that note's torque, not to the hardest one's.
 #[test]
 fn one_note_may_keep_to_a_ceiling_that_another_passes() {
-    let (design, limits) = (design(Law::Flow, 3.0), Limits { ceiling_mnm: 60.0, ..Limits::default() });
+    let (design, limits) =
+        (design(Law::Flow, 3.0), TorqueLimits { ceiling_mnm: 60.0, ..TorqueLimits::default() });
     let settings = Settings::default();
     let table = table(&design, &settings).unwrap();
     let hardest = table.notes().len() - 1;
@@ -521,9 +522,13 @@ fn another_instrument_without_c5_takes_the_middle_of_its_chart() {
     let mut file = MODEL.file.clone();
     file.fingerings.retain(|fingering| fingering.written != WrittenNote(72));
     let bore = Requirements::new(&file, Air::default());
-    let table =
-        FeelTable::new(&bore, &FeelDesign::default(), &PlayedReed::quasi_static(0.3), &Limits::default())
-            .unwrap();
+    let table = FeelTable::new(
+        &bore,
+        &FeelDesign::default(),
+        &PlayedReed::quasi_static(0.3),
+        &TorqueLimits::default(),
+    )
+    .unwrap();
     let (middle, all) = (table.reference().landmarks.a_on_deg, table.notes());
     let harder = all.iter().filter(|note| note.landmarks.a_on_deg > middle).count();
     assert!((harder as f64 / all.len() as f64 - 0.5).abs() < 0.05, "{harder} of {}", all.len());
@@ -534,9 +539,9 @@ mod firmware {
     //! The law here and the law on the knob.
 
     use super::*;
-    use chalumeau::wire::frame::encode;
-    use chalumeau::wire::message::{Feel, Message};
     use chalumeau_firmware::{FeelBytes, check_feel, law_torque_mnm};
+    use chalumeau_knob::wire::frame::encode;
+    use chalumeau_knob::wire::message::{Feel, Message};
 
     /// The payload of FEEL, out of its frame.
     fn bytes(feel: &Feel) -> FeelBytes {
@@ -578,7 +583,7 @@ mod firmware {
     #[test]
     fn slopes_the_knob_refuses_are_refused_before_they_are_sent() {
         let standard = *table(&FeelDesign::default(), &Settings::default()).unwrap().reference();
-        let limits = Limits::default();
+        let limits = TorqueLimits::default();
         let (mut taken, mut refused) = (0, 0);
         for law in [Law::Flow, Law::Pressure] {
             for scale_mnm in [5.0, 40.0, 100.0, 300.0, 450.0_f32] {

@@ -5,12 +5,12 @@
 #[path = "support/reference.rs"]
 mod reference;
 
-use chalumeau::bore::instrument_file::InstrumentFile;
-use chalumeau::bore::transfer_matrix::TransferMatrix;
-use chalumeau::bore::transfer_matrix::threshold_gamma;
-use chalumeau::units::Air;
-use chalumeau::units::WrittenNote;
-use chalumeau::units::cents;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::bore::transfer_matrix::TransferMatrix;
+use chalumeau_core::bore::transfer_matrix::threshold_gamma;
+use chalumeau_core::units::Air;
+use chalumeau_core::units::WrittenNote;
+use chalumeau_core::units::cents;
 use num_complex::Complex64;
 use reference::{RANGE, Spread, midi, number, rows};
 

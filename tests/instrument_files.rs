@@ -5,16 +5,16 @@ use std::panic;
 use std::path::Path;
 use std::thread;
 
-use chalumeau::bore::cells::Cells;
-use chalumeau::bore::check::Check;
-use chalumeau::bore::cylinder::Cylinder;
-use chalumeau::bore::instrument_file::ImportDetails;
-use chalumeau::bore::instrument_file::ImportError;
-use chalumeau::bore::instrument_file::InstrumentFile;
-use chalumeau::bore::instrument_file::Sheet;
-use chalumeau::bore::transfer_matrix::TransferMatrix;
-use chalumeau::units::Air;
-use chalumeau::units::WrittenNote;
+use chalumeau_core::bore::cells::Cells;
+use chalumeau_core::bore::check::Check;
+use chalumeau_core::bore::cylinder::Cylinder;
+use chalumeau_core::bore::instrument_file::ImportDetails;
+use chalumeau_core::bore::instrument_file::ImportError;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::bore::instrument_file::Sheet;
+use chalumeau_core::bore::transfer_matrix::TransferMatrix;
+use chalumeau_core::units::Air;
+use chalumeau_core::units::WrittenNote;
 
 fn text(path: &str) -> String {
     fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap()
@@ -28,6 +28,13 @@ fn details(name: &str) -> ImportDetails {
         reed_volume_mm3: 1200.0,
         nominal_diameter_mm: None,
     }
+}
+
+#[test]
+fn the_example_of_the_manual_is_an_instrument() {
+    let manual = text("docs/instrument-file.md");
+    let example = manual.split("```toml").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    assert_eq!(InstrumentFile::parse(example).unwrap().lowest().to_string(), "F#3");
 }
 
 /// The tables the built-in clarinet was made from.
@@ -92,7 +99,7 @@ fn the_imported_example_is_what_the_command_makes() {
     let check = Check::new(&kept, Air::default(), 440.0);
     assert!(check.is_usable());
     for (note, theirs) in check.notes.iter().zip(widesigner) {
-        let off = chalumeau::units::cents(note.peak.unwrap().f_hz, theirs);
+        let off = chalumeau_core::units::cents(note.peak.unwrap().f_hz, theirs);
         println!("{}: {off:+.1} cents from WIDesigner", note.written);
         assert!(off.abs() < 12.0, "{}: {off}", note.written);
     }

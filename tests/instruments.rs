@@ -15,14 +15,14 @@ use std::ops::ControlFlow;
 use std::sync::OnceLock;
 use std::time::Instant;
 
-use chalumeau::analysis::impedance::reflectance;
-use chalumeau::bore::cells::{Cells, CellsError};
-use chalumeau::bore::fit::{self, networks};
-use chalumeau::bore::instrument_file::{BoreSegment, Fingering, HoleKind, InstrumentFile, ToneHole};
-use chalumeau::bore::lattice::{Lattice, LatticeCoeffs, MAX_TICKS, Tip};
-use chalumeau::bore::transfer_matrix::{TransferMatrix, find_peaks};
-use chalumeau::reed::physical::P_REF_PA;
-use chalumeau::units::{Air, REFERENCE_RADIUS_M, WrittenNote, cents};
+use chalumeau_core::analysis::impedance::reflectance;
+use chalumeau_core::bore::cells::{Cells, CellsError};
+use chalumeau_core::bore::fit::{self, networks};
+use chalumeau_core::bore::instrument_file::{BoreSegment, Fingering, HoleKind, InstrumentFile, ToneHole};
+use chalumeau_core::bore::lattice::{Lattice, LatticeCoeffs, MAX_TICKS, Tip};
+use chalumeau_core::bore::transfer_matrix::{TransferMatrix, find_peaks};
+use chalumeau_core::reed::physical::P_REF_PA;
+use chalumeau_core::units::{Air, REFERENCE_RADIUS_M, WrittenNote, cents};
 use oracle::Oracle;
 use reference::{RANGE, Spread};
 
@@ -344,7 +344,7 @@ fn tuning_delay_has_room_at_every_size_and_rate() {
 fn the_built_in_fits_like_the_file_that_is_shipped() {
     let built_in = cases().iter().find(|case| case.name == "built-in").unwrap();
     for Fitted { cells, coeffs, .. } in built_in.fitted.iter().take(2) {
-        let shipped = chalumeau::instrument::Model::built_in(coeffs.rate_hz).unwrap().cells;
+        let shipped = chalumeau_core::instrument::Model::built_in(coeffs.rate_hz).unwrap().cells;
         let pairs = cells.cells.iter().zip(&shipped.cells);
         assert!(
             cells.cells.len() == shipped.cells.len()

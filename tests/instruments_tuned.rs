@@ -9,19 +9,19 @@ use std::path::Path;
 use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 
-use chalumeau::analysis::onset;
-use chalumeau::analysis::pitch;
-use chalumeau::analysis::spectrum;
-use chalumeau::analysis::to_f64;
-use chalumeau::bore::bundled::Bundled;
-use chalumeau::bore::instrument_file::InstrumentFile;
-use chalumeau::event::Event;
-use chalumeau::instrument::cache::Cache;
-use chalumeau::instrument::held::{HeldNote, Start, TONGUE_HOLD_S};
-use chalumeau::instrument::prepare::{self, Progress};
-use chalumeau::instrument::voice::{Drive, TICK};
-use chalumeau::instrument::{Clarinet, Model, Quality, Settings, Tuning, Wanted, tuner};
-use chalumeau::units::{REFERENCE_RADIUS_M, WrittenNote, cents};
+use chalumeau::cache::Cache;
+use chalumeau_core::analysis::onset;
+use chalumeau_core::analysis::pitch;
+use chalumeau_core::analysis::spectrum;
+use chalumeau_core::analysis::to_f64;
+use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::event::Event;
+use chalumeau_core::instrument::held::{HeldNote, Start, TONGUE_HOLD_S};
+use chalumeau_core::instrument::prepare::{self, Progress};
+use chalumeau_core::instrument::voice::{Drive, TICK};
+use chalumeau_core::instrument::{Clarinet, Model, Quality, Settings, Tuning, Wanted, tuner};
+use chalumeau_core::units::{REFERENCE_RADIUS_M, WrittenNote, cents};
 use parallel::each;
 
 /// Written C6 and G6: up to here notes are promised within 2 and within 5 cents.
@@ -41,7 +41,7 @@ struct Case {
 }
 
 fn local(path: &str) -> InstrumentFile {
-    InstrumentFile::load(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap()
+    chalumeau::instrument_path::load(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap()
 }
 
 /// The built-in clarinet in another size, named for the nearest key.

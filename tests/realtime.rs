@@ -8,10 +8,10 @@ use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
-use chalumeau::analysis::{pitch, spectrum};
-use chalumeau::event::{Event, Timed};
-use chalumeau::instrument::{Clarinet, Model, Settings, Tuning};
-use chalumeau::units::{SoundingNote, WrittenNote, cents};
+use chalumeau_core::analysis::{pitch, spectrum};
+use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::instrument::{Clarinet, Model, Settings, Tuning};
+use chalumeau_core::units::{SoundingNote, WrittenNote, cents};
 
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;

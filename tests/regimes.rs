@@ -9,13 +9,13 @@ mod reference;
 
 use std::sync::LazyLock;
 
-use chalumeau::analysis::pitch;
-use chalumeau::bore::transfer_matrix::threshold_gamma;
-use chalumeau::instrument::Model;
-use chalumeau::instrument::held::HeldNote;
-use chalumeau::instrument::held::Start;
-use chalumeau::units::WrittenNote;
-use chalumeau::units::cents;
+use chalumeau_core::analysis::pitch;
+use chalumeau_core::bore::transfer_matrix::threshold_gamma;
+use chalumeau_core::instrument::Model;
+use chalumeau_core::instrument::held::HeldNote;
+use chalumeau_core::instrument::held::Start;
+use chalumeau_core::units::WrittenNote;
+use chalumeau_core::units::cents;
 use memoryless::Blown;
 use parallel::each;
 
@@ -309,7 +309,7 @@ fn a_reed_without_lip_damping_squeaks() {
     let runs: Vec<HeldNote> = (60..=84)
         .flat_map(|note| [0.45, 0.6, 0.8].map(|gamma| HeldNote::new(&MODEL, fingering(note), gamma)))
         .map(|note| {
-            let rule = chalumeau::instrument::embouchure::embouchure(
+            let rule = chalumeau_core::instrument::embouchure::embouchure(
                 MODEL.notes_hz[note.fingering],
                 MODEL.lowest_hz,
             );

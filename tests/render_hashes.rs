@@ -8,13 +8,13 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 
-use chalumeau::bore::bundled::Bundled;
-use chalumeau::event::{Event, Timed};
-use chalumeau::instrument::prepare::{self, Wanted};
-use chalumeau::instrument::{Clarinet, Quality, Settings, Tuning};
-use chalumeau::render::score::Score;
-use chalumeau::render::{midi_file, play};
-use chalumeau::units::SoundingNote;
+use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::instrument::prepare::{self, Wanted};
+use chalumeau_core::instrument::{Clarinet, Quality, Settings, Tuning};
+use chalumeau_core::score::Score;
+use chalumeau_core::score::{midi_file, play};
+use chalumeau_core::units::SoundingNote;
 use sha2::{Digest, Sha256};
 
 #[path = "support/parallel.rs"]

@@ -8,16 +8,16 @@ mod reference;
 
 use std::sync::OnceLock;
 
-use chalumeau::analysis::impedance::{Impedance, reflectance};
-use chalumeau::bore::fit::networks;
-use chalumeau::bore::lattice::{Lattice, LatticeCoeffs, Real, Tip};
-use chalumeau::bore::transfer_matrix::{TransferMatrix, find_peaks, threshold_gamma};
-use chalumeau::instrument::held::HeldNote;
-use chalumeau::instrument::model::{INTERNAL_RATES_HZ, Model};
-use chalumeau::instrument::voice::{Drive, TICK, Voice};
-use chalumeau::reed::physical::P_REF_PA;
-use chalumeau::reed::{ReedCoeffs, ReedState, ReedTables};
-use chalumeau::units::{WrittenNote, cents};
+use chalumeau_core::analysis::impedance::{Impedance, reflectance};
+use chalumeau_core::bore::fit::networks;
+use chalumeau_core::bore::lattice::{Lattice, LatticeCoeffs, Real, Tip};
+use chalumeau_core::bore::transfer_matrix::{TransferMatrix, find_peaks, threshold_gamma};
+use chalumeau_core::instrument::held::HeldNote;
+use chalumeau_core::instrument::model::{INTERNAL_RATES_HZ, Model};
+use chalumeau_core::instrument::voice::{Drive, TICK, Voice};
+use chalumeau_core::reed::physical::P_REF_PA;
+use chalumeau_core::reed::{ReedCoeffs, ReedState, ReedTables};
+use chalumeau_core::units::{WrittenNote, cents};
 use num_complex::Complex64;
 use oracle::Oracle;
 use reference::{RANGE, Row, Spread, midi, number, rows};

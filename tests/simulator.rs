@@ -6,13 +6,13 @@ mod command;
 #[path = "simulator/host.rs"]
 mod host;
 
-use chalumeau::simulator::fault::{Fault, FaultKind};
-use chalumeau::simulator::hand::{Hand, HandDesign};
-use chalumeau::simulator::knob::SimulatedKnob;
-use chalumeau::simulator::plant::PlantDesign;
-use chalumeau::simulator::script::{Aim, Script};
-use chalumeau::wire::{EventKind, Feel, Law, Message};
 use chalumeau_firmware::Setup;
+use chalumeau_knob::simulator::fault::{Fault, FaultKind};
+use chalumeau_knob::simulator::hand::{Hand, HandDesign};
+use chalumeau_knob::simulator::knob::SimulatedKnob;
+use chalumeau_knob::simulator::plant::PlantDesign;
+use chalumeau_knob::simulator::script::{Aim, Script};
+use chalumeau_knob::wire::{EventKind, Feel, Law, Message};
 use fastrand::Rng;
 use host::Host;
 use std::collections::BTreeMap;

@@ -5,21 +5,21 @@ mod parallel;
 
 use std::sync::Arc;
 
-use chalumeau::analysis::onset;
-use chalumeau::analysis::pitch;
-use chalumeau::analysis::to_f64;
-use chalumeau::event::Event;
-use chalumeau::instrument::Clarinet;
-use chalumeau::instrument::Model;
-use chalumeau::instrument::Settings;
-use chalumeau::instrument::Tuning;
-use chalumeau::instrument::held::HeldNote;
-use chalumeau::instrument::held::Start;
-use chalumeau::instrument::held::TONGUE_HOLD_S;
-use chalumeau::instrument::voice::Drive;
-use chalumeau::instrument::voice::TICK;
-use chalumeau::units::WrittenNote;
-use chalumeau::units::cents;
+use chalumeau_core::analysis::onset;
+use chalumeau_core::analysis::pitch;
+use chalumeau_core::analysis::to_f64;
+use chalumeau_core::event::Event;
+use chalumeau_core::instrument::Clarinet;
+use chalumeau_core::instrument::Model;
+use chalumeau_core::instrument::Settings;
+use chalumeau_core::instrument::Tuning;
+use chalumeau_core::instrument::held::HeldNote;
+use chalumeau_core::instrument::held::Start;
+use chalumeau_core::instrument::held::TONGUE_HOLD_S;
+use chalumeau_core::instrument::voice::Drive;
+use chalumeau_core::instrument::voice::TICK;
+use chalumeau_core::units::WrittenNote;
+use chalumeau_core::units::cents;
 use parallel::each;
 
 fn model(host_rate_hz: f64) -> Arc<Model> {

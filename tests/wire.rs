@@ -6,9 +6,9 @@
 
 use std::collections::HashSet;
 
-use chalumeau::wire::frame::FrameError;
-use chalumeau::wire::midi::{FromKnob, MidiReceiver, encode_sysex};
-use chalumeau::wire::{
+use chalumeau_knob::wire::frame::FrameError;
+use chalumeau_knob::wire::midi::{FromKnob, MidiReceiver, encode_sysex};
+use chalumeau_knob::wire::{
     Arm, Capabilities, Decoder, Event, EventKind, Feel, Flags, Info, Law, Message, State, encode, golden,
     limits,
 };
@@ -34,7 +34,7 @@ impl Noise {
     }
 }
 
-fn within(limit: limits::Limit) -> impl Strategy<Value = f32> {
+fn within(limit: limits::FieldRange) -> impl Strategy<Value = f32> {
     prop_oneof![8 => limit.low..=limit.high, 1 => Just(limit.low), 1 => Just(limit.high)]
 }
 

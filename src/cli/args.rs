@@ -1,15 +1,17 @@
 //! Arguments several commands share, and how their text is read.
 
-use crate::bore::bundled::Bundled;
-use crate::bore::instrument_file::{InstrumentError, InstrumentFile};
+use crate::cache::Cache;
 use crate::cli::Failure;
-use crate::instrument::cache::Cache;
-use crate::instrument::model::A4_HZ;
-use crate::instrument::prepare::{self, Progress};
-use crate::instrument::tuning::NoteTuning;
-use crate::instrument::{BuildError, Model, Quality, Wanted};
-use crate::render::score::ScoreError;
-use crate::units::{Air, SoundingNote, WrittenNote, midi_of_name};
+use crate::instrument_path::{self, LoadError};
+use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::instrument::model::A4_HZ;
+use chalumeau_core::instrument::prepare::{self, Progress};
+use chalumeau_core::instrument::store::Store;
+use chalumeau_core::instrument::tuning::NoteTuning;
+use chalumeau_core::instrument::{BuildError, Model, Quality, Wanted};
+use chalumeau_core::score::ScoreError;
+use chalumeau_core::units::{Air, SoundingNote, WrittenNote, midi_of_name};
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::ops::ControlFlow;
@@ -31,17 +33,17 @@ impl InstrumentArg {
         if let Some(bundled) = path.to_str().and_then(Bundled::from_id) {
             return Ok(bundled.file());
         }
-        InstrumentFile::load(path).map_err(|source| match source {
+        instrument_path::load(path).map_err(|source| match source {
             // What is no path may have been meant for a name.
-            InstrumentError::Read { path, error } if path.components().count() == 1 => {
+            LoadError::Read { path, error } if path.components().count() == 1 => {
                 let ids = Bundled::ALL.map(Bundled::id).join(", ");
                 Failure::Usage(format!(
                     "cannot read {}: {error}; --instrument is a file or one of {ids}",
                     path.display()
                 ))
             }
-            InstrumentError::Read { path, error } => Failure::Read { path, source: error },
-            source => Failure::InstrumentFile { path: path.clone(), source },
+            LoadError::Read { path, error } => Failure::Read { path, source: error },
+            LoadError::Instrument(source) => Failure::InstrumentFile { path: path.clone(), source },
         })
     }
 
@@ -75,12 +77,13 @@ impl InstrumentArg {
     fn made(
         &self,
         make: impl FnOnce(
-            Option<&Cache>,
+            Option<&dyn Store>,
             &mut dyn FnMut(Progress<'_>) -> ControlFlow<()>,
         ) -> Result<Model, BuildError>,
     ) -> Result<Arc<Model>, Failure> {
         let mut bar = None;
-        let made = make(Cache::system().as_ref(), &mut |progress| {
+        let cache = Cache::system();
+        let made = make(Cache::store(cache.as_ref()), &mut |progress| {
             let bar = bar.get_or_insert_with(preparing);
             let (doing, share) = match progress {
                 Progress::Fitting(share) => ("fitting the bore", share),

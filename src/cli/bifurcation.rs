@@ -1,17 +1,17 @@
 //! `chalumeau bifurcation`: one note up and down the breath.
 
-use crate::bore::transfer_matrix::{TransferMatrix, threshold_gamma};
 use crate::cli::Failure;
 use crate::cli::args::{PlayedArgs, note, sounding, within};
 use crate::cli::plot::PlotArgs;
 use crate::cli::render::progress;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::table::TableArgs;
-use crate::figure::bifurcation::Ramp;
-use crate::reed::ReedLaw;
-use crate::render::bifurcation;
-use crate::render::breath::{BreathCurve, GAMMA_MAX};
-use crate::units::{Air, WrittenNote};
+use chalumeau_core::bore::transfer_matrix::{TransferMatrix, threshold_gamma};
+use chalumeau_core::reed::ReedLaw;
+use chalumeau_core::score::bifurcation;
+use chalumeau_core::score::breath::{BreathCurve, GAMMA_MAX};
+use chalumeau_core::units::{Air, WrittenNote};
+use chalumeau_figure::bifurcation::Ramp;
 use clap::Args;
 
 const EXAMPLES: &str = "\

@@ -1,12 +1,12 @@
 //! `chalumeau bore`: an instrument's geometry as a table and as a drawing to scale.
 
-use crate::bore::instrument_file::{Fingering, InstrumentFile};
 use crate::cli::Failure;
 use crate::cli::args::{InstrumentArg, check_fingering, note};
 use crate::cli::plot::PlotArgs;
 use crate::cli::table::{TableArgs, quoted};
-use crate::figure;
-use crate::units::WrittenNote;
+use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
+
+use chalumeau_core::units::WrittenNote;
 use clap::Args;
 
 const EXAMPLES: &str = "\
@@ -66,7 +66,7 @@ impl Bore {
             ))?;
         }
         table.finish()?;
-        plot.draw(|| figure::bore::profile(&file, fingering))
+        plot.draw(|| chalumeau_figure::bore::profile(&file, fingering))
     }
 
     fn fingering<'a>(&self, file: &'a InstrumentFile) -> Result<Option<&'a Fingering>, Failure> {

@@ -2,11 +2,11 @@
 
 use crate::cli::Failure;
 use crate::cli::args::within;
-use crate::device::discover::{Kind, candidates, chip, ports};
-use crate::device::{Choice, Hooks, KnobLink, LinkStatus, Phase, Places, serial_text};
-use crate::device::{midi, osc};
 use crate::identity::VERSION;
-use crate::wire::{Capabilities, Feel, Info, MAJOR, MINOR};
+use chalumeau_knob::device::discover::{Kind, candidates, chip, ports};
+use chalumeau_knob::device::{Choice, Hooks, KnobLink, LinkStatus, Phase, Places, serial_text};
+use chalumeau_knob::device::{midi, osc};
+use chalumeau_knob::wire::{Capabilities, Feel, Info, MAJOR, MINOR};
 use clap::Args;
 use serialport::SerialPortType;
 use std::io;
@@ -113,7 +113,7 @@ impl Doctor {
             None => writeln!(
                 out,
                 "  control changes, no answer to HELLO: tier 0, {}",
-                crate::device::stock::LABEL
+                chalumeau_knob::device::stock::LABEL
             )?,
         }
         tell_link(out, &status)?;
@@ -132,7 +132,11 @@ impl Doctor {
             Phase::ReadOnly => {
                 thread::sleep(Duration::from_secs_f64(self.seconds));
                 let status = link.status();
-                writeln!(out, "  a TorqueTuner's stock firmware: tier 0, {}", crate::device::stock::LABEL)?;
+                writeln!(
+                    out,
+                    "  a TorqueTuner's stock firmware: tier 0, {}",
+                    chalumeau_knob::device::stock::LABEL
+                )?;
                 writeln!(out, "  angle: {:.1} degrees", status.angle_deg.unwrap_or(0.0))?;
                 writeln!(out, "  rate: {:.0} angles a second (25 are sent)", status.stats.rate_hz)?;
                 writeln!(out, "  ignored: {} messages", status.stats.ignored)

@@ -1,11 +1,11 @@
 //! How a knob shall feel, as arguments.
 
-use crate::bore::instrument_file::InstrumentFile;
 use crate::cli::Failure;
 use crate::cli::args::{check_fingering, note, within};
-use crate::haptics::{FeelDesign, Order};
-use crate::units::WrittenNote;
-use crate::wire::message::Law;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::haptics::{FeelDesign, Order};
+use chalumeau_core::units::WrittenNote;
+use chalumeau_knob::wire::message::Law;
 use clap::{Args, ValueEnum};
 
 /// Torque laws by name.

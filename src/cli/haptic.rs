@@ -1,15 +1,15 @@
 //! `chalumeau haptic`: what a force-feedback knob should feel for each note.
 
-use crate::bore::instrument_file::InstrumentFile;
 use crate::cli::Failure;
 use crate::cli::args::{AirArg, InstrumentArg, NotesArg, within, within_f32};
 use crate::cli::feel::FeelArgs;
 use crate::cli::table::TableArgs;
-use crate::haptics::law;
-use crate::haptics::{FeelTable, Limits, NoteFeel, Requirements};
-use crate::instrument::Settings;
-use crate::instrument::felt::played_reed;
-use crate::reed::ReedTables;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::haptics::law;
+use chalumeau_core::haptics::{FeelTable, NoteFeel, Requirements, TorqueLimits};
+use chalumeau_core::instrument::Settings;
+use chalumeau_core::instrument::felt::played_reed;
+use chalumeau_core::reed::ReedTables;
 use clap::Args;
 
 /// Step of the curve, degrees: one of the knob's encoder.
@@ -130,7 +130,7 @@ impl Haptic {
             ..standard
         };
         let design = self.feel.design(file)?;
-        let limits = Limits { ceiling_mnm: self.ceiling, ..Limits::default() };
+        let limits = TorqueLimits { ceiling_mnm: self.ceiling, ..TorqueLimits::default() };
         let bore = Requirements::new(file, self.air.air());
         Ok(FeelTable::new(&bore, &design, &played_reed(file, &settings), &limits)?)
     }

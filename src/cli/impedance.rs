@@ -1,17 +1,17 @@
 //! `chalumeau impedance`: what the bore answers to the reed, curve or peaks.
 
-use crate::analysis::impedance::cutoff_hz;
-use crate::bore::instrument_file::{Fingering, InstrumentFile};
-use crate::bore::transfer_matrix::{Peak, TransferMatrix, find_peaks};
 use crate::cli::Failure;
 use crate::cli::args::{AirArg, InstrumentArg, NotesArg, QualityArg, within};
 use crate::cli::plot::PlotArgs;
 use crate::cli::table::TableArgs;
-use crate::figure;
-use crate::figure::Figure;
-use crate::figure::impedance::{Curve, NotePeaks};
-use crate::instrument;
-use crate::units::{Air, SoundingNote, WrittenNote, cents};
+use chalumeau_core::analysis::impedance::cutoff_hz;
+use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
+use chalumeau_core::bore::transfer_matrix::{Peak, TransferMatrix, find_peaks};
+
+use chalumeau_core::instrument;
+use chalumeau_core::units::{Air, SoundingNote, WrittenNote, cents};
+use chalumeau_figure::Figure;
+use chalumeau_figure::impedance::{Curve, NotePeaks};
 use clap::{Args, ValueEnum};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -200,7 +200,7 @@ impl Impedance {
             let z = self.curve(&exact, &of.open, volume_m3).collect();
             curves.push(Curve { name: exact.name().to_owned(), z });
         }
-        figure::impedance::fingering(&figure::impedance::Fingering {
+        chalumeau_figure::impedance::fingering(&chalumeau_figure::impedance::Fingering {
             instrument: &file.name,
             notes,
             written: of.written,
@@ -235,7 +235,7 @@ impl Impedance {
                 "without the reed's volume, which lowers them"
             }
         );
-        figure::impedance::chart(&file.name, vec![about], &rows)
+        chalumeau_figure::impedance::chart(&file.name, vec![about], &rows)
     }
 
     fn bore(&self, file: &InstrumentFile) -> Result<Bore, Failure> {

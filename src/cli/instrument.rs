@@ -1,14 +1,15 @@
 //! `chalumeau instrument`: makes, imports, checks and shows instrument files.
 
-use crate::bore::check::Check;
-use crate::bore::cylinder::Cylinder;
-use crate::bore::instrument_file::{ImportDetails, ImportError, InstrumentFile, Sheet};
 use crate::cli::Failure;
 use crate::cli::args::{AirArg, InstrumentArg, note, within};
 use crate::cli::table::{TableArgs, quoted};
-use crate::instrument::model::A4_HZ;
+use crate::instrument_path::{self, LoadError};
 use crate::output::NewFile;
-use crate::units::{Air, WrittenNote};
+use chalumeau_core::bore::check::Check;
+use chalumeau_core::bore::cylinder::Cylinder;
+use chalumeau_core::bore::instrument_file::{ImportDetails, ImportError, InstrumentFile, Sheet};
+use chalumeau_core::instrument::model::A4_HZ;
+use chalumeau_core::units::{Air, WrittenNote};
 use clap::{Args, Subcommand};
 use std::fs;
 use std::io::Write;
@@ -181,8 +182,10 @@ struct CheckFile {
 
 impl CheckFile {
     fn run(&self) -> Result<ExitCode, Failure> {
-        let file = InstrumentFile::load(&self.file)
-            .map_err(|source| Failure::InstrumentFile { path: self.file.clone(), source })?;
+        let file = instrument_path::load(&self.file).map_err(|error| match error {
+            LoadError::Read { path, error } => Failure::Read { path, source: error },
+            LoadError::Instrument(source) => Failure::InstrumentFile { path: self.file.clone(), source },
+        })?;
         let check = Check::new(&file, self.air.air(), self.a4);
         let mut table =
             self.table.open("written,written_midi,register,mode,wanted_hz,peak_hz,cents,mag_over_zc,q")?;

@@ -3,13 +3,14 @@
 use crate::cli::Failure;
 use crate::cli::args::{InstrumentArg, check_fingering, note, within};
 use crate::cli::feel::FeelArgs;
-use crate::device::{Choice, Hooks, KnobLink, LinkStatus, OFFERED_CEILING_MNM, Phase, StateSample};
-use crate::haptics::{Limits, NoteFeel};
-use crate::instrument::{Settings, Wanted};
 use crate::output::OutputError;
-use crate::touch::feel::{Feels, NO_MOTOR};
-use crate::touch::take::{Marks, Moment, TakeWriter};
-use crate::units::WrittenNote;
+use crate::take_file::TakeFile;
+use chalumeau_core::haptics::{NoteFeel, TorqueLimits};
+use chalumeau_core::instrument::{Settings, Wanted};
+use chalumeau_core::units::WrittenNote;
+use chalumeau_knob::device::{Choice, Hooks, KnobLink, LinkStatus, OFFERED_CEILING_MNM, Phase, StateSample};
+use chalumeau_knob::touch::feel::{Feels, NO_MOTOR};
+use chalumeau_knob::touch::take::{Marks, Moment};
 use clap::{ArgGroup, Args};
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
@@ -42,7 +43,7 @@ Examples:
 #[command(group = ArgGroup::new("which").args(["serial", "path", "midi", "osc"]))]
 pub struct Knob {
     /// The knob with this serial number (hexadecimal) [default: the first that answers]
-    #[arg(long, value_name = "HEX", value_parser = |s: &str| crate::device::serial_number(s).ok_or("must be a serial number such as 5100000000000001"))]
+    #[arg(long, value_name = "HEX", value_parser = |s: &str| chalumeau_knob::device::serial_number(s).ok_or("must be a serial number such as 5100000000000001"))]
     serial: Option<u64>,
     /// Whatever is at this port
     #[arg(long, value_name = "PORT")]
@@ -87,7 +88,7 @@ impl Knob {
         check_fingering(&file, written)?;
         let feels = Feels::new(&*self.instrument.tuned(&Wanted::new(file.clone(), 48_000.0))?);
         let ceiling_mnm = self.arm.unwrap_or(100.0);
-        let limits = Limits { ceiling_mnm, ..Limits::default() };
+        let limits = TorqueLimits { ceiling_mnm, ..TorqueLimits::default() };
         let settings = Settings::default();
         // The knob is told this note and no other: what the hardest would need is no matter.
         let design = self.feel.design(&file)?;
@@ -98,7 +99,7 @@ impl Knob {
         let take = match &self.record {
             Some(path) => {
                 let remarks = [format!("written {} of {}, {design:?}", written.0, file.name)];
-                Some(TakeWriter::create(path, self.force, &remarks)?)
+                Some(TakeFile::create(path, self.force, &remarks)?)
             }
             None => None,
         };
@@ -134,7 +135,7 @@ impl Knob {
         heard: &Receiver<StateSample>,
         note: &NoteFeel,
         closing_pa: f64,
-        mut take: Option<TakeWriter>,
+        mut take: Option<TakeFile>,
     ) -> Result<(), Failure> {
         let began = Instant::now();
         let mut live_since = None;
@@ -197,7 +198,7 @@ impl Knob {
     }
 }
 
-fn write(take: &mut TakeWriter, state: &StateSample, note: &NoteFeel, gamma: f64) -> Result<(), OutputError> {
+fn write(take: &mut TakeFile, state: &StateSample, note: &NoteFeel, gamma: f64) -> Result<(), OutputError> {
     let moment = Moment {
         t_us: u64::try_from(state.host_us).unwrap_or(0),
         angle_deg: f64::from(state.angle_deg),

@@ -2,20 +2,20 @@
 
 use crate::cli::Failure;
 use crate::cli::args::within;
-use crate::device::places::Places;
-use crate::simulator::fault::Fault;
-use crate::simulator::hand::{Hand, HandDesign};
-use crate::simulator::knob::SimulatedKnob;
-#[cfg(unix)]
-use crate::simulator::midi::VirtualMidi;
-use crate::simulator::osc::{OscSender, Spelling};
-use crate::simulator::plant::PlantDesign;
-#[cfg(unix)]
-use crate::simulator::pty::Pty;
-use crate::simulator::script::Script;
-use crate::simulator::serve::{Port, Server};
-use crate::wire::Law;
 use chalumeau_firmware::Setup;
+use chalumeau_knob::device::places::Places;
+use chalumeau_knob::simulator::fault::Fault;
+use chalumeau_knob::simulator::hand::{Hand, HandDesign};
+use chalumeau_knob::simulator::knob::SimulatedKnob;
+#[cfg(unix)]
+use chalumeau_knob::simulator::midi::VirtualMidi;
+use chalumeau_knob::simulator::osc::{OscSender, Spelling};
+use chalumeau_knob::simulator::plant::PlantDesign;
+#[cfg(unix)]
+use chalumeau_knob::simulator::pty::Pty;
+use chalumeau_knob::simulator::script::Script;
+use chalumeau_knob::simulator::serve::{Port, Server};
+use chalumeau_knob::wire::Law;
 use clap::Args;
 use std::fs::File;
 use std::io::{self, Write};

@@ -1,23 +1,23 @@
 //! What is to be played, as arguments several commands share: a MIDI file, a note or a scale, and the breath under it.
 
-use crate::bore::instrument_file::InstrumentFile;
 use crate::cli::Failure;
 use crate::cli::args::{PlayedArgs, check_fingering, note, within};
 use crate::cli::feel::FeelArgs;
 use crate::cli::settings::SettingsArgs;
-use crate::control::knob::KnobDesign;
-use crate::control::midi::MidiDecoder;
-use crate::event::{Event, Timed};
-use crate::haptics::FeelDesign;
-use crate::instrument::{Clarinet, Model, Settings};
-use crate::render::breath::BreathCurve;
-use crate::render::breath::GAMMA_MAX;
-use crate::render::midi_file;
-use crate::render::score::Score;
-use crate::touch::blower::{Blower, Blown, Hand};
-use crate::touch::feel::{Feels, NO_MOTOR};
-use crate::touch::take::Take;
-use crate::units::{SoundingNote, WrittenNote};
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::control::knob::KnobDesign;
+use chalumeau_core::control::midi::MidiDecoder;
+use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::haptics::FeelDesign;
+use chalumeau_core::instrument::{Clarinet, Model, Settings};
+use chalumeau_core::score::Score;
+use chalumeau_core::score::breath::BreathCurve;
+use chalumeau_core::score::breath::GAMMA_MAX;
+use chalumeau_core::score::midi_file;
+use chalumeau_core::units::{SoundingNote, WrittenNote};
+use chalumeau_knob::touch::blower::{Blower, Blown, Hand};
+use chalumeau_knob::touch::feel::{Feels, NO_MOTOR};
+use chalumeau_knob::touch::take::Take;
 use clap::{ArgGroup, Args};
 use std::fs;
 use std::path::{Path, PathBuf};

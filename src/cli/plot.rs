@@ -1,8 +1,9 @@
 //! Pictures of what a command measures.
 
 use crate::cli::Failure;
-use crate::figure::Figure;
-use crate::figure::draw::{Sheet, Size};
+use crate::picture_file::PictureFile;
+use chalumeau_figure::Figure;
+use chalumeau_figure::draw::Size;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -25,14 +26,15 @@ impl PlotArgs {
 
     /// Opens the file, so that a wrong name is refused before anything is measured.
     pub fn open(&self, force: bool) -> Result<Plot, Failure> {
-        let sheet = self.plot.as_ref().map(|path| Sheet::still(path, force, self.plot_size)).transpose()?;
+        let sheet =
+            self.plot.as_ref().map(|path| PictureFile::still(path, force, self.plot_size)).transpose()?;
         Ok(Plot { sheet })
     }
 }
 
 /// A picture to be, or none.
 pub struct Plot {
-    sheet: Option<Sheet>,
+    sheet: Option<PictureFile>,
 }
 
 impl Plot {

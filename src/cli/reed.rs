@@ -5,18 +5,19 @@ use crate::cli::args::{PlayedArgs, note, sounding, within};
 use crate::cli::reed_physical::{self, PhysicalReedArgs};
 use crate::cli::render::progress;
 use crate::cli::table::TableArgs;
-use crate::figure::draw::{Sheet, Size};
-use crate::figure::reed::{self as figures, Kind, Orbit};
-use crate::instrument::Settings;
-use crate::reed::PhysicalReed;
-use crate::reed::ReedLaw;
-use crate::reed::ReedTables;
-use crate::reed::law::K_INIT;
-use crate::reed::physical::P_REF_PA;
-use crate::reed::physical::SeedReed;
-use crate::render::orbit;
-use crate::units::REFERENCE_RADIUS_M;
-use crate::units::WrittenNote;
+use crate::picture_file::PictureFile;
+use chalumeau_core::instrument::Settings;
+use chalumeau_core::reed::PhysicalReed;
+use chalumeau_core::reed::ReedLaw;
+use chalumeau_core::reed::ReedTables;
+use chalumeau_core::reed::law::K_INIT;
+use chalumeau_core::reed::physical::P_REF_PA;
+use chalumeau_core::reed::physical::SeedReed;
+use chalumeau_core::score::orbit;
+use chalumeau_core::units::REFERENCE_RADIUS_M;
+use chalumeau_core::units::WrittenNote;
+use chalumeau_figure::draw::Size;
+use chalumeau_figure::reed::{self as figures, Kind, Orbit};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 
@@ -161,7 +162,7 @@ impl Which {
 
 impl Drawing {
     /// The file of one figure, open before anything is measured.
-    fn sheet(&self, which: Which, out: &Path, force: bool) -> Result<(Which, Sheet), Failure> {
+    fn sheet(&self, which: Which, out: &Path, force: bool) -> Result<(Which, PictureFile), Failure> {
         let mut path = out.to_owned();
         if out.is_dir() {
             let ending = match (which, self.format) {
@@ -173,8 +174,8 @@ impl Drawing {
             path.push(format!("reed-{}.{ending}", which.name()));
         }
         let sheet = match which {
-            Which::Sweep => Sheet::moving(&path, force, self.size)?,
-            _ => Sheet::still(&path, force, self.size)?,
+            Which::Sweep => PictureFile::moving(&path, force, self.size)?,
+            _ => PictureFile::still(&path, force, self.size)?,
         };
         Ok((which, sheet))
     }

@@ -3,10 +3,10 @@
 use crate::cli::Failure;
 use crate::cli::args::within;
 use crate::cli::table::TableArgs;
-use crate::instrument::Settings;
-use crate::reed::PhysicalReed;
-use crate::reed::physical::SeedReed;
-use crate::units::{Air, REFERENCE_RADIUS_M};
+use chalumeau_core::instrument::Settings;
+use chalumeau_core::reed::PhysicalReed;
+use chalumeau_core::reed::physical::SeedReed;
+use chalumeau_core::units::{Air, REFERENCE_RADIUS_M};
 use clap::Args;
 
 /// A reed in newtons and millimetres; what is not given is the reference reed's.

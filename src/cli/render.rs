@@ -6,12 +6,12 @@ use crate::cli::play::{PlayArgs, Prepared};
 use crate::cli::plot::PlotArgs;
 use crate::cli::table::Table;
 use crate::cli::watch::Watch;
-use crate::instrument::Probe;
 use crate::output::NewFile;
-use crate::reed::physical::P_REF_PA;
-use crate::render as player;
-use crate::render::score::Score;
-use crate::render::wav::{Depth, Level, WavFile};
+use crate::wav::{Depth, Level, WavFile};
+use chalumeau_core::instrument::Probe;
+use chalumeau_core::reed::physical::P_REF_PA;
+use chalumeau_core::score as player;
+use chalumeau_core::score::Score;
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};

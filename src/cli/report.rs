@@ -8,14 +8,14 @@ use crate::cli::play::{PlayArgs, Prepared};
 use crate::cli::render::{about, progress};
 use crate::cli::report::touch::Touch;
 use crate::cli::watch::{Watch, Watched};
-use crate::figure;
-use crate::figure::report::{Cell, Plate, Report as Page, Sound, Table, write};
+
 use crate::identity;
-use crate::instrument::{Settings, Tuning};
 use crate::output::NewFile;
-use crate::render as player;
-use crate::render::heard::{Heard, spread};
-use crate::render::wav::{Depth, WavFile};
+use crate::wav::{Depth, WavFile};
+use chalumeau_core::instrument::{Settings, Tuning};
+use chalumeau_core::score as player;
+use chalumeau_core::score::heard::{Heard, spread};
+use chalumeau_figure::report::{Cell, Plate, Report as Page, Sound, Table, write};
 use clap::Args;
 use std::cell::RefCell;
 use std::io::{Cursor, Seek, Write};
@@ -152,7 +152,7 @@ impl Report {
                     ),
                 },
                 Plate {
-                    figure: figure::bore::profile(file, fingering),
+                    figure: chalumeau_figure::bore::profile(file, fingering),
                     caption: format!("The instrument from the side, to scale{fingered}."),
                     alternative: format!(
                         "Bore of {} from mouthpiece to bell, {:.0} mm, with its {} tone holes{fingered}.",
@@ -292,7 +292,7 @@ fn settings(settings: &Settings) -> Table {
 
 fn instrument(prepared: &Prepared) -> Table {
     let file = &prepared.model.file;
-    let sounds = |note: crate::units::WrittenNote| {
+    let sounds = |note: chalumeau_core::units::WrittenNote| {
         note.sounding(file.transposition).map_or(String::new(), |note| format!(" (sounds {note})"))
     };
     let (low, high) = (file.lowest(), file.highest());

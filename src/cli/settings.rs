@@ -1,12 +1,12 @@
 //! The player's settings as arguments.
 
-use crate::bore::instrument_file::InstrumentFile;
 use crate::cli::Failure;
 use crate::cli::args::within_f32;
 use crate::cli::reed_physical::PhysicalReedArgs;
-use crate::instrument::{Settings, Tuning};
-use crate::render::breath::BreathCurve;
-use crate::render::score;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::instrument::{Settings, Tuning};
+use chalumeau_core::score;
+use chalumeau_core::score::breath::BreathCurve;
 use clap::Args;
 
 /// Most mouth pressure the instrument's settings know, kPa.

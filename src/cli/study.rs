@@ -2,7 +2,7 @@
 
 use crate::cli::Failure;
 use crate::cli::table::TableArgs;
-use crate::touch::study::{Side, plan};
+use chalumeau_knob::touch::study::{Side, plan};
 use clap::Args;
 
 const EXAMPLES: &str = "\

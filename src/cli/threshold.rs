@@ -1,13 +1,13 @@
 //! `chalumeau threshold`: how hard to blow before a note speaks.
 
-use crate::bore::transfer_matrix::TransferMatrix;
-use crate::bore::transfer_matrix::threshold_gamma;
 use crate::cli::Failure;
 use crate::cli::args::{AirArg, InstrumentArg, NotesArg, within};
 use crate::cli::plot::PlotArgs;
 use crate::cli::table::TableArgs;
-use crate::figure::threshold::{self, Strength, Thresholds};
-use crate::instrument::Settings;
+use chalumeau_core::bore::transfer_matrix::TransferMatrix;
+use chalumeau_core::bore::transfer_matrix::threshold_gamma;
+use chalumeau_core::instrument::Settings;
+use chalumeau_figure::threshold::{self, Strength, Thresholds};
 use clap::Args;
 
 const EXAMPLES: &str = "\

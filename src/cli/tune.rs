@@ -1,19 +1,19 @@
 //! `chalumeau tune`: plays every note and measures its pitch.
 
-use crate::analysis::pitch;
 use crate::cli::Failure;
 use crate::cli::args::{NotesArg, PlayedArgs, within};
 use crate::cli::plot::PlotArgs;
 use crate::cli::render::progress;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::table::TableArgs;
-use crate::figure::tune::{self, Heard, Round};
-use crate::instrument::tuner::each_note;
-use crate::instrument::{Clarinet, Model, Settings, Tuning};
-use crate::render;
-use crate::render::breath::{BreathCurve, GAMMA_MAX};
-use crate::render::score::Score;
-use crate::units::{SoundingNote, WrittenNote, cents};
+use chalumeau_core::analysis::pitch;
+use chalumeau_core::instrument::{Clarinet, Model, Settings, Tuning};
+use chalumeau_core::parallel;
+use chalumeau_core::score;
+use chalumeau_core::score::Score;
+use chalumeau_core::score::breath::{BreathCurve, GAMMA_MAX};
+use chalumeau_core::units::{SoundingNote, WrittenNote, cents};
+use chalumeau_figure::tune::{self, Heard, Round};
 use clap::Args;
 use std::convert::Infallible;
 use std::ops::ControlFlow;
@@ -133,7 +133,7 @@ fn measure_all(
     let bar = progress(notes.len());
     let measured = |note: usize| measure(notes[note], model, curve, settings, rate);
     // Nothing ends it early, so there is always an answer.
-    let heard = each_note(notes.len(), measured, &mut |_| {
+    let heard = parallel::each(notes.len(), measured, &mut |_| {
         bar.inc(1);
         ControlFlow::Continue(())
     });
@@ -155,7 +155,7 @@ fn measure(
     clarinet.reset();
     let score = Score::note(sounding, SETTLE_S + MEASURE_S, rate).blown(curve, settings, rate);
     let mut samples: Vec<f64> = Vec::with_capacity(score.samples);
-    let Ok(()) = render::play(&mut clarinet, &score, 4096, |block| {
+    let Ok(()) = score::play(&mut clarinet, &score, 4096, |block| {
         samples.extend(block.iter().map(|&sample| f64::from(sample)));
         Ok::<_, Infallible>(())
     });

@@ -1,12 +1,12 @@
 //! Looks at a rendering while it is made, for pictures and reports: memory does not grow with its length.
 
-use crate::analysis::overview::{Envelope, Overview, Watcher};
 use crate::cli::Failure;
 use crate::cli::play::Prepared;
-use crate::figure::Figure;
-use crate::figure::performance::{Moment, Note, Performance, performance};
-use crate::instrument::Probe;
-use crate::render::heard::{Heard, Listener, Sounding};
+use chalumeau_core::analysis::overview::{Envelope, Overview, Watcher};
+use chalumeau_core::instrument::Probe;
+use chalumeau_core::score::heard::{Heard, Listener, Sounding};
+use chalumeau_figure::Figure;
+use chalumeau_figure::performance::{Moment, Note, Performance, performance};
 
 /// Columns of a picture: as many as a drawing of usual size has pixels for.
 pub const COLUMNS: usize = 1_300;

@@ -5,8 +5,8 @@
 //! finger more; it can be tried, heard and seen here, and is not tuned. The list is every clarinettist's (side and sliver
 //! keys, the fork, trills); left out are those that open and close the same holes by another finger.
 
-use crate::bore::instrument_file::InstrumentFile;
-use crate::units::WrittenNote;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::units::WrittenNote;
 
 /// A fingering of the picker.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,8 +95,8 @@ fn changed(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bore::transfer_matrix::TransferMatrix;
-    use crate::units::{Air, cents};
+    use chalumeau_core::bore::transfer_matrix::TransferMatrix;
+    use chalumeau_core::units::{Air, cents};
 
     /// By the linear model, without a player's lip, which corrects as much.
     #[test]

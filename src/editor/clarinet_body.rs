@@ -3,10 +3,10 @@
 
 use egui::{Align2, Color32, CornerRadius, FontId, Mesh, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 
-use crate::bore::instrument_file::{HoleKind, InstrumentFile, ToneHole};
 use crate::editor::chart;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
+use chalumeau_core::bore::instrument_file::{HoleKind, InstrumentFile, ToneHole};
 
 /// Wood around the bore where no hole tells, m, and at the rim of the bell.
 const WALL_M: f64 = 7e-3;

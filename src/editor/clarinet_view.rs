@@ -12,7 +12,6 @@ use egui::{
     Stroke, Ui, Vec2, WidgetInfo, pos2, vec2,
 };
 
-use crate::bore::instrument_file::{HoleKind, InstrumentFile, REGISTERS, ToneHole};
 use crate::editor::Action;
 use crate::editor::alternates;
 use crate::editor::alternates::Choice;
@@ -22,6 +21,7 @@ use crate::editor::header::note_name;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
+use chalumeau_core::bore::instrument_file::{HoleKind, InstrumentFile, REGISTERS, ToneHole};
 
 /// Least distance of two buttons with their names below, points.
 const NAMED: f32 = 34.0;

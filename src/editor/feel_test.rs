@@ -2,7 +2,7 @@
 //!
 //! They stay far below the least ceiling that the library offers by itself (100 mNm).
 
-use crate::wire::message::{Feel, Law};
+use chalumeau_knob::wire::message::{Feel, Law};
 
 /// Which.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,8 +72,8 @@ impl FeelTest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::haptics::law::{extremes, torque_mnm};
-    use crate::reed::ReedTables;
+    use chalumeau_core::haptics::law::{extremes, torque_mnm};
+    use chalumeau_core::reed::ReedTables;
 
     #[test]
     fn every_test_is_a_feel_a_knob_takes_and_stays_far_below_the_first_ceiling() {

@@ -145,8 +145,9 @@ fn facts(ui: &mut Ui, snapshot: &Snapshot) {
         n if n > 0 => format!("{n} semitones below what is written"),
         n => format!("{} semitones above what is written", -n),
     };
-    let name =
-        |note: Option<crate::units::SoundingNote>| note.map_or_else(|| "?".into(), |note| note_name(note.0));
+    let name = |note: Option<chalumeau_core::units::SoundingNote>| {
+        note.map_or_else(|| "?".into(), |note| note_name(note.0))
+    };
     let transposition = file.transposition;
     let rows = [
         ("Sounds", down),

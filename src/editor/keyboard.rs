@@ -13,7 +13,7 @@ use crate::editor::header::note_name;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
-use crate::units::SoundingNote;
+use chalumeau_core::units::SoundingNote;
 
 /// Velocity by keyboard.
 const PLAIN: f32 = 0.75;

@@ -13,8 +13,8 @@ use crate::editor::reed_view::torque_picture;
 use crate::editor::snapshot::{Device, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
-use crate::haptics::law;
-use crate::reed::ReedTables;
+use chalumeau_core::haptics::law;
+use chalumeau_core::reed::ReedTables;
 
 /// Pages of the panel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -10,9 +10,9 @@ use std::sync::Arc;
 use realfft::num_complex::Complex32;
 use realfft::{RealFftPlanner, RealToComplex};
 
-use crate::analysis::pitch;
-use crate::analysis::spectrum;
-use crate::units::cents;
+use chalumeau_core::analysis::pitch;
+use chalumeau_core::analysis::spectrum;
+use chalumeau_core::units::cents;
 
 /// Samples looked at.
 pub const WINDOW: usize = 8192;

@@ -15,12 +15,12 @@ use crate::editor::controls::{Hands, choice, handle, heading, slider, switch, te
 use crate::editor::meter;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme::{Colours, GAP, panel};
-use crate::haptics::law;
-use crate::instrument::Settings;
-use crate::reed::law::{K_INIT, coupled_k};
-use crate::reed::physical::P_REF_PA;
-use crate::reed::{ReedLaw, ReedTables};
-use crate::units::Air;
+use chalumeau_core::haptics::law;
+use chalumeau_core::instrument::Settings;
+use chalumeau_core::reed::law::{K_INIT, coupled_k};
+use chalumeau_core::reed::physical::P_REF_PA;
+use chalumeau_core::reed::{ReedLaw, ReedTables};
+use chalumeau_core::units::Air;
 
 /// Points of a curve.
 const POINTS: usize = 160;
@@ -414,7 +414,7 @@ fn column(ui: &mut Ui, hands: &mut Hands) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::REFERENCE_RADIUS_M;
+    use chalumeau_core::units::REFERENCE_RADIUS_M;
 
     fn of(settings: &Settings) -> Picture {
         Picture::of(settings, REFERENCE_RADIUS_M)

@@ -6,11 +6,11 @@
 
 use std::sync::Arc;
 
-use crate::bore::instrument_file::{Fingering, InstrumentFile};
 use crate::editor::listener::Heard;
-use crate::haptics::{NoteFeel, Requirement};
-use crate::instrument::Settings;
-use crate::units::{SoundingNote, WrittenNote};
+use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
+use chalumeau_core::haptics::{NoteFeel, Requirement};
+use chalumeau_core::instrument::Settings;
+use chalumeau_core::units::{SoundingNote, WrittenNote};
 
 /// See the module.
 #[derive(Clone, Debug)]

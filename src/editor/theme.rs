@@ -1,6 +1,6 @@
 //! How the editor looks: two sets of colours with the same meanings, type sizes, and the few distances used everywhere.
 //!
-//! The curves' colours are those of the figures ([`palette`](crate::figure::palette): Okabe and Ito, told apart by readers
+//! The curves' colours are those of the figures ([`palette`](chalumeau_figure::palette): Okabe and Ito, told apart by readers
 //! with any kind of colour vision), darkened a little on paper, where they are also text, and lightened on the dark
 //! ground. Each has one meaning in every view: blue is breath,
 //! green where a note speaks, orange where the reed beats, vermilion where it closes, purple what the hand feels.
@@ -11,7 +11,7 @@ use egui::{
     Color32, Context, CornerRadius, FontFamily, FontId, Margin, Shadow, Stroke, Style, TextStyle, Theme, Ui,
 };
 
-use crate::figure::palette::{Colour, Rgb};
+use chalumeau_figure::palette::{Colour, Rgb};
 
 /// Colours by meaning.
 #[derive(Clone, Debug, PartialEq)]

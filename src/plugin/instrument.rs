@@ -14,7 +14,7 @@ pub mod workshop;
 use std::sync::atomic::{AtomicBool, AtomicU32};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::instrument::{Clarinet, Model};
+use chalumeau_core::instrument::{Clarinet, Model};
 use choice::Order;
 
 pub use bench::Bench;

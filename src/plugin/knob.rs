@@ -1,7 +1,7 @@
 //! The plugin's end of the knob.
 //!
 //! Three threads share it. The *audio* thread reads angles from a ring, sends breath, and says which note is fingered.
-//! The *link* thread (in [`device`](crate::device)) asks at every turn what that note shall feel like. The *desk*
+//! The *link* thread (in [`device`](chalumeau_knob::device)) asks at every turn what that note shall feel like. The *desk*
 //! thread does what may take time: it follows the parameters, works out feels, writes takes, and words the status.
 //! Everything between them is an atomic, a triple buffer or a ring; the audio thread never waits and frees nothing.
 
@@ -17,15 +17,15 @@ use std::thread::JoinHandle;
 pub use audio::{Audio, Stage};
 pub use desk::design;
 
-use crate::device::LinkStatus;
-use crate::haptics::FeelTable;
 use crate::plugin::instrument;
 use crate::plugin::params::ChalumeauParams;
-use crate::touch::blower::Hand;
-use crate::touch::feel::Feels;
-use crate::touch::take::Take;
-use crate::units::SoundingNote;
-use crate::wire::message;
+use chalumeau_core::haptics::FeelTable;
+use chalumeau_core::units::SoundingNote;
+use chalumeau_knob::device::LinkStatus;
+use chalumeau_knob::touch::blower::Hand;
+use chalumeau_knob::touch::feel::Feels;
+use chalumeau_knob::touch::take::Take;
+use chalumeau_knob::wire::message;
 
 /// No note is fingered.
 const NO_NOTE: u8 = 255;

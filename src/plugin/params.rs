@@ -10,8 +10,8 @@ use std::sync::{Arc, RwLock};
 use nice_plug::prelude::*;
 
 use crate::editor::Kept;
-use crate::instrument::prepare::A4_RANGE_HZ;
-use crate::instrument::{Settings, Tuning};
+use chalumeau_core::instrument::prepare::A4_RANGE_HZ;
+use chalumeau_core::instrument::{Settings, Tuning};
 
 pub mod instrument;
 pub mod knob;

@@ -8,7 +8,7 @@
 use nice_plug::prelude::NoteEvent;
 
 use super::params::knob::ReedSource;
-use crate::event::Event;
+use chalumeau_core::event::Event;
 
 /// Factor at the end of the travel.
 const SPAN: f32 = 1.6;

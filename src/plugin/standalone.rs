@@ -14,11 +14,11 @@ use nice_plug::prelude::nice_export_standalone_with_args;
 
 use super::Chalumeau;
 use super::params::instrument::{Beginning, InstrumentChoice, begin_with};
-use crate::bore::bundled::Bundled;
-use crate::bore::instrument_file::InstrumentFile;
 use crate::identity;
-use crate::instrument::prepare::A4_RANGE_HZ;
 use crate::plugin::window;
+use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::instrument::prepare::A4_RANGE_HZ;
 
 const HELP: &str = "\
 Examples:
@@ -122,7 +122,7 @@ impl Backend {
 }
 
 fn rate(text: &str) -> Result<f32, String> {
-    let (low, high) = crate::instrument::model::HOST_RATES_HZ;
+    let (low, high) = chalumeau_core::instrument::model::HOST_RATES_HZ;
     match text.parse::<f32>() {
         Ok(rate_hz) if (low..=high).contains(&f64::from(rate_hz)) => Ok(rate_hz),
         _ => Err(format!("a rate must lie in {low}..{high} Hz")),

@@ -7,8 +7,8 @@
 use nice_plug::midi::Key;
 use nice_plug::prelude::*;
 
-use crate::control::midi::{Events, MidiDecoder};
-use crate::event::{Event, Timed};
+use chalumeau_core::control::midi::{Events, MidiDecoder};
+use chalumeau_core::event::{Event, Timed};
 
 /// The controller that ends every note.
 const ALL_NOTES_OFF: u8 = 123;
@@ -90,7 +90,7 @@ mod tests {
     use nice_plug::midi::{Channel, VoiceID};
 
     use super::*;
-    use crate::units::SoundingNote;
+    use chalumeau_core::units::SoundingNote;
 
     type Host = NoteEvent<()>;
 

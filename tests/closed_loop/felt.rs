@@ -10,7 +10,7 @@
 //!   height, on any line, that leaves least over.
 
 use crate::heard::least_squares;
-use chalumeau::simulator::knob::SimulatedKnob;
+use chalumeau_knob::simulator::knob::SimulatedKnob;
 
 /// Width of a bin, degrees.
 const BIN_DEG: f64 = 0.25;

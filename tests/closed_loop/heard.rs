@@ -10,7 +10,7 @@
 //! open holes, whose loss goes as A. With A, its growth and gamma measured this is linear in `gamma_on, a, b, 1/k`: least
 //! squares over the crescendo, from where A leaves the breath noise, give the pressure at which nothing grows.
 
-use chalumeau::instrument::Probe;
+use chalumeau_core::instrument::Probe;
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use std::f64::consts::TAU;

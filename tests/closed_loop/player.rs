@@ -1,20 +1,20 @@
 //! A player at a knob, whole: hand, knob, firmware, wire, host, breath, clarinet. Everything is what a user runs, but for
 //! the port between the two and the clock: time is simulated.
 
-use chalumeau::control::knob::KnobDesign;
-use chalumeau::device::reader::{KnobReader, KnobWriter, Sample, ring};
-use chalumeau::device::session::{Happening, Session, Wish};
-use chalumeau::device::transport::Binding;
-use chalumeau::event::{Event, Timed};
-use chalumeau::instrument::{Clarinet, Model, Probe, Settings};
-use chalumeau::simulator::hand::{Hand, HandDesign};
-use chalumeau::simulator::knob::{PERIOD_US, SimulatedKnob};
-use chalumeau::simulator::plant::PlantDesign;
-use chalumeau::touch::blower::{self, Blower, Blown, GRID};
-use chalumeau::touch::feel::Maps;
-use chalumeau::units::SoundingNote;
-use chalumeau::wire::Feel;
+use chalumeau_core::control::knob::KnobDesign;
+use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::instrument::{Clarinet, Model, Probe, Settings};
+use chalumeau_core::units::SoundingNote;
 use chalumeau_firmware::Setup;
+use chalumeau_knob::device::reader::{KnobReader, KnobWriter, Sample, ring};
+use chalumeau_knob::device::session::{Happening, Session, Wish};
+use chalumeau_knob::device::transport::Binding;
+use chalumeau_knob::simulator::hand::{Hand, HandDesign};
+use chalumeau_knob::simulator::knob::{PERIOD_US, SimulatedKnob};
+use chalumeau_knob::simulator::plant::PlantDesign;
+use chalumeau_knob::touch::blower::{self, Blower, Blown, GRID};
+use chalumeau_knob::touch::feel::Maps;
+use chalumeau_knob::wire::Feel;
 use std::sync::Arc;
 use std::time::Instant;
 

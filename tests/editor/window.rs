@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use chalumeau::editor::{Action, FeelTest, Tab};
-use chalumeau::units::SoundingNote;
+use chalumeau_core::units::SoundingNote;
 use egui::accesskit::Role;
 use egui::{Key, vec2};
 use egui_kittest::kittest::{NodeT, Queryable};
@@ -210,7 +210,7 @@ fn holes_are_tried_and_given_back() {
     assert_eq!(window.actions(), [Action::TryFingering(wanted)]);
     window.harness.get_by_label("Hole L3, open");
     click(&mut window, "Fingering G4");
-    let g4 = &file.fingering(chalumeau::units::WrittenNote(67)).unwrap().open;
+    let g4 = &file.fingering(chalumeau_core::units::WrittenNote(67)).unwrap().open;
     assert_eq!(window.actions(), [Action::TryFingering(g4.clone())]);
     click(&mut window, "Back to the note");
     assert_eq!(window.actions(), [Action::EndTry]);

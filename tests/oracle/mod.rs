@@ -4,10 +4,10 @@
 //! is odd; a wave needs exactly its cell's ticks. Coefficients are worked out here from the cells and the holes'
 //! networks, none are taken from `LatticeCoeffs`. Holes keep their nonlinear loss. Scalar f64.
 
-use chalumeau::bore::cells::Cells;
-use chalumeau::bore::tone_hole::HoleNetwork;
+use chalumeau_core::bore::cells::Cells;
+use chalumeau_core::bore::tone_hole::HoleNetwork;
 
-use chalumeau::units::Air;
+use chalumeau_core::units::Air;
 
 /// Ticks a wave is remembered.
 const MEMORY: usize = 1024;

@@ -1,16 +1,16 @@
-//! `chalumeau knob-sim` as a user and a host meet it. Limits of time are those of a very busy machine.
+//! `chalumeau knob-sim` as a user and a host meet it. TorqueLimits of time are those of a very busy machine.
 
-use chalumeau::device::memory;
-use chalumeau::device::serial::SerialTransport;
-use chalumeau::device::transport::{Binding, Transport};
-use chalumeau::simulator::hand::{Hand, HandDesign};
-use chalumeau::simulator::knob::SimulatedKnob;
-use chalumeau::simulator::plant::PlantDesign;
-use chalumeau::simulator::script::{Aim, Script};
-use chalumeau::simulator::serve::{Control, Port, Server};
-use chalumeau::wire::midi::{FromKnob, MidiReceiver, encode_sysex};
-use chalumeau::wire::{Decoder, Info, Message, encode};
 use chalumeau_firmware::Setup;
+use chalumeau_knob::device::memory;
+use chalumeau_knob::device::serial::SerialTransport;
+use chalumeau_knob::device::transport::{Binding, Transport};
+use chalumeau_knob::simulator::hand::{Hand, HandDesign};
+use chalumeau_knob::simulator::knob::SimulatedKnob;
+use chalumeau_knob::simulator::plant::PlantDesign;
+use chalumeau_knob::simulator::script::{Aim, Script};
+use chalumeau_knob::simulator::serve::{Control, Port, Server};
+use chalumeau_knob::wire::midi::{FromKnob, MidiReceiver, encode_sysex};
+use chalumeau_knob::wire::{Decoder, Info, Message, encode};
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::net::UdpSocket;

@@ -1,8 +1,8 @@
 //! A host in simulated time, as plain as the protocol allows: says hello, sends ALIVE, arms when told.
 
-use chalumeau::simulator::knob::SimulatedKnob;
-use chalumeau::wire::midi::{FromKnob, MidiReceiver, encode_sysex};
-use chalumeau::wire::{Arm, Decoder, Event, Info, Message, State, encode};
+use chalumeau_knob::simulator::knob::SimulatedKnob;
+use chalumeau_knob::wire::midi::{FromKnob, MidiReceiver, encode_sysex};
+use chalumeau_knob::wire::{Arm, Decoder, Event, Info, Message, State, encode};
 
 /// Knob and host on one line.
 pub struct Host {

@@ -7,16 +7,16 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use chalumeau::bore::transfer_matrix::TransferMatrix;
 use chalumeau::editor::controls::{Controls, Look};
 use chalumeau::editor::listener::Listener;
 use chalumeau::editor::snapshot::{Device, Knob, Level, Scope, Snapshot, Source, Status, Track};
 use chalumeau::editor::{Kept, State, Tab, draw};
-use chalumeau::event::Event;
-use chalumeau::haptics::{FeelDesign, FeelTable, Limits};
-use chalumeau::instrument::{Clarinet, Probe, Settings, Tuning, felt};
-use chalumeau::reed::PhysicalReed;
-use chalumeau::units::WrittenNote;
+use chalumeau_core::bore::transfer_matrix::TransferMatrix;
+use chalumeau_core::event::Event;
+use chalumeau_core::haptics::{FeelDesign, FeelTable, TorqueLimits};
+use chalumeau_core::instrument::{Clarinet, Probe, Settings, Tuning, felt};
+use chalumeau_core::reed::PhysicalReed;
+use chalumeau_core::units::WrittenNote;
 use egui_kittest::Harness;
 
 /// The plugin's parameters, as a test of the plugin holds them to its own.
@@ -292,15 +292,18 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
     let open = &model.file.fingerings[fingering].open;
     let bore = felt::requirements(&model);
     let reed = felt::played_reed(&model.file, settings);
-    let limits = Limits { ceiling_mnm: 250.0, stiffness_nm_per_rad: 10.0, push_nm_per_rad: 10.0 };
+    let limits = TorqueLimits { ceiling_mnm: 250.0, stiffness_nm_per_rad: 10.0, push_nm_per_rad: 10.0 };
     let table = FeelTable::new(&bore, &FeelDesign::default(), &reed, &limits);
     let feel = table
         .map_err(|refused| refused.to_string())
         .and_then(|table| table.note(fingering).copied().ok_or_else(|| "this note has no feel".to_owned()));
     let angle_deg = feel.as_ref().ok().map(|feel| feel.map.angle_deg(f64::from(mouth_kpa) * 1e3) as f32);
     let torque_mnm = feel.as_ref().ok().zip(angle_deg).map(|(feel, deg)| {
-        chalumeau::haptics::law::torque_mnm(&feel.feel, chalumeau::reed::ReedTables::seed(), f64::from(deg))
-            as f32
+        chalumeau_core::haptics::law::torque_mnm(
+            &feel.feel,
+            chalumeau_core::reed::ReedTables::seed(),
+            f64::from(deg),
+        ) as f32
     });
     let standing = TransferMatrix::new(&model.file, model.air).standing_pressure(wanted_hz, open);
     let source =

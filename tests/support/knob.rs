@@ -1,8 +1,8 @@
 //! A knob for tests: the firmware itself, compiled for this machine, in simulated time or behind a pseudo-terminal.
 
-use chalumeau::device::{Advert, Places};
-use chalumeau::wire::{Decoder, Message};
 use chalumeau_firmware::{Firmware, Reading, Setup};
+use chalumeau_knob::device::{Advert, Places};
+use chalumeau_knob::wire::{Decoder, Message};
 use serialport::{SerialPort, TTYPort};
 use std::io::{Read, Write};
 use std::path::PathBuf;

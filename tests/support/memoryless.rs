@@ -1,12 +1,12 @@
 //! The reed without inertia, on the built-in bore with linear holes and on a cylinder without losses.
 
-use chalumeau::bore::lattice::Lattice;
-use chalumeau::bore::lattice::Tip;
-use chalumeau::instrument::Model;
-use chalumeau::reed::QuasiStaticReed;
-use chalumeau::reed::QuasiStaticState;
-use chalumeau::reed::ReedLaw;
-use chalumeau::reed::ReedTables;
+use chalumeau_core::bore::lattice::Lattice;
+use chalumeau_core::bore::lattice::Tip;
+use chalumeau_core::instrument::Model;
+use chalumeau_core::reed::QuasiStaticReed;
+use chalumeau_core::reed::QuasiStaticState;
+use chalumeau_core::reed::ReedLaw;
+use chalumeau_core::reed::ReedTables;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 

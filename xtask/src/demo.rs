@@ -5,10 +5,10 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use chalumeau::instrument::Clarinet;
-use chalumeau::render;
-use chalumeau::render::heard::{Heard, Listener, Sounding, spread};
-use chalumeau::render::score::Score;
+use chalumeau_core::instrument::Clarinet;
+use chalumeau_core::score;
+use chalumeau_core::score::Score;
+use chalumeau_core::score::heard::{Heard, Listener, Sounding, spread};
 
 use crate::host::{At, Plugin};
 use crate::{bundle, machine, midi, picture, simulator, touch_demo};
@@ -35,7 +35,7 @@ pub fn run(_: &[String]) -> Result<()> {
 
     let file = machine::root().join("examples/melody.mid");
     let bytes = std::fs::read(&file).with_context(|| format!("cannot read {}", file.display()))?;
-    let score = render::midi_file::read(&bytes, RATE)?.with_tail(TAIL_S, RATE);
+    let score = score::midi_file::read(&bytes, RATE)?.with_tail(TAIL_S, RATE);
     let said = midi::messages(&bytes, RATE)?;
 
     let clap = bundle::clap()?;
@@ -80,7 +80,7 @@ fn by_knob(clap: &Path, folder: &Path, score: &Score, said: &[At]) -> Result<()>
 fn rendered(score: &Score) -> Result<Vec<f32>> {
     let mut clarinet = Clarinet::built_in(f64::from(RATE)).map_err(|reason| anyhow::anyhow!("{reason}"))?;
     let mut all = Vec::with_capacity(score.samples);
-    let done = render::play(&mut clarinet, score, BLOCK, |block| {
+    let done = score::play(&mut clarinet, score, BLOCK, |block| {
         all.extend_from_slice(block);
         Ok::<_, Infallible>(())
     });

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
-use chalumeau::reed::{ReedTables, header};
+use chalumeau_core::reed::{ReedTables, header};
 
 const HEADER: &str = "firmware/include/pressure_table_values.h";
 

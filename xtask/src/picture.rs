@@ -3,13 +3,14 @@
 use std::path::Path;
 
 use anyhow::Result;
-use chalumeau::analysis::overview::{Envelope, Overview, Watcher};
-use chalumeau::event::Event;
-use chalumeau::figure::palette::Colour;
-use chalumeau::figure::performance::{Note, Performance as Played, outline, performance};
-use chalumeau::figure::{Axis, Dash, Figure, Line, Panel, draw};
-use chalumeau::instrument::Settings;
-use chalumeau::render::score::{Score, closing_kpa};
+use chalumeau::picture_file;
+use chalumeau_core::analysis::overview::{Envelope, Overview, Watcher};
+use chalumeau_core::event::Event;
+use chalumeau_core::instrument::Settings;
+use chalumeau_core::score::{Score, closing_kpa};
+use chalumeau_figure::palette::Colour;
+use chalumeau_figure::performance::{Note, Performance as Played, outline, performance};
+use chalumeau_figure::{Axis, Dash, Figure, Line, Panel};
 
 use crate::touch_demo::Performance;
 
@@ -54,7 +55,7 @@ pub fn write(path: &Path, samples: &[f32], rate_hz: f64, score: &Score, a4_hz: f
         closing_pa: settings.closing_pa(),
         moment: None,
     });
-    Ok(draw::write(&figure, path, None, true)?)
+    Ok(picture_file::write(&figure, path, None, true)?)
 }
 
 /// Draws what a hand did on the knob, and what came of it: angle, mouth pressure, torque, sound.
@@ -100,13 +101,13 @@ pub fn write_touch(path: &Path, performance: &Performance, rate_hz: f64) -> Resu
         )
         .panel(Panel { x: time("time, s"), ..outline(&seen(&performance.left, rate_hz)) })
         .size(1_600, 1_500);
-    Ok(draw::write(&figure, path, None, true)?)
+    Ok(picture_file::write(&figure, path, None, true)?)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use chalumeau::render::midi_file;
+    use chalumeau_core::score::midi_file;
     use std::f32::consts::TAU;
 
     /// A tone with the demo's score, and a hand that turns the knob with it.

@@ -4,15 +4,16 @@ use std::io::IsTerminal;
 use std::ops::ControlFlow;
 
 use anyhow::{Context, Result, bail, ensure};
-use chalumeau::bore::bundled::Bundled;
-use chalumeau::bore::cells::Cells;
-use chalumeau::instrument::held::HeldNote;
-use chalumeau::instrument::model::INTERNAL_RATES_HZ;
-use chalumeau::instrument::prepare::{self, Prepared, Progress};
-use chalumeau::instrument::tuner;
-use chalumeau::instrument::tuning::{GAMMA_NODES, NATURAL_GAMMA};
-use chalumeau::instrument::{Model, Quality, Wanted};
-use chalumeau::units::cents;
+use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::bore::cells::Cells;
+use chalumeau_core::instrument::held::HeldNote;
+use chalumeau_core::instrument::model::INTERNAL_RATES_HZ;
+use chalumeau_core::instrument::prepare::{self, Prepared, Progress};
+use chalumeau_core::instrument::tuner;
+use chalumeau_core::instrument::tuning::{GAMMA_NODES, NATURAL_GAMMA};
+use chalumeau_core::instrument::{Model, Quality, Wanted};
+use chalumeau_core::parallel;
+use chalumeau_core::units::cents;
 
 use crate::generated::{read, write};
 
@@ -72,7 +73,7 @@ const QUALITIES: [Quality; 2] = [Quality::Live, Quality::High];
 
 /// The generated file of an instrument.
 fn path(instrument: Bundled) -> String {
-    format!("data/{}.prepared.toml", instrument.data_name())
+    format!("crates/core/data/{}.prepared.toml", instrument.data_name())
 }
 
 fn kept(instrument: Bundled) -> Result<Vec<Prepared>> {
@@ -110,7 +111,7 @@ pub fn scale_bores(args: &[String]) -> Result<()> {
     let check = Asked::parse(args)?.check;
     for instrument in Bundled::ALL {
         let Some(text) = instrument.scaled_text() else { continue };
-        let path = format!("data/{}.toml", instrument.data_name());
+        let path = format!("crates/core/data/{}.toml", instrument.data_name());
         if check {
             ensure!(
                 read(&path)? == text,
@@ -206,7 +207,7 @@ fn check_tuning(name: &str, model: &Model, every: usize) -> Result<()> {
         }
         Some(worst)
     };
-    let found = tuner::each_note(checked.len(), worst_of, &mut |_| ControlFlow::Continue(()));
+    let found = parallel::each(checked.len(), worst_of, &mut |_| ControlFlow::Continue(()));
     let mut worst = (0.0_f64, String::new());
     for (at, note) in found.context("not cancelled")?.into_iter().enumerate() {
         let written = model.file.fingerings[checked[at]].written;

@@ -6,12 +6,12 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow, bail};
-use chalumeau::control::keys::Keys;
-use chalumeau::event::Event;
-use chalumeau::haptics::{FeelDesign, FeelTable, Limits};
-use chalumeau::instrument::Settings;
-use chalumeau::render::score::Score;
-use chalumeau::touch::feel::Feels;
+use chalumeau_core::control::keys::Keys;
+use chalumeau_core::event::Event;
+use chalumeau_core::haptics::{FeelDesign, FeelTable, TorqueLimits};
+use chalumeau_core::instrument::Settings;
+use chalumeau_core::score::Score;
+use chalumeau_knob::touch::feel::Feels;
 
 use crate::host::{At, Plugin, Say, Session};
 use crate::simulator::{Simulator, serial_number};
@@ -44,7 +44,7 @@ pub struct Performance {
 /// Plays the notes of a score through the plugin, its breath through the knob.
 pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -> Result<Performance> {
     let feels = Feels::built_in().map_err(|reason| anyhow!("{reason}"))?;
-    let table = feels.table(&Settings::default(), &FeelDesign::default(), &Limits::default())?;
+    let table = feels.table(&Settings::default(), &FeelDesign::default(), &TorqueLimits::default())?;
     let hand = folder.join("hand.csv");
     std::fs::write(&hand, script(score, &feels, &table, rate))?;
     let log = folder.join("knob.csv");

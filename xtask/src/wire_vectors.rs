@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
-use chalumeau::wire::golden;
+use chalumeau_knob::wire::golden;
 
 const FOLDER: &str = "firmware/golden";
 

@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use chalumeau::analysis::pitch::fundamental_hz;
-use chalumeau::analysis::to_f64;
-use chalumeau::event::{Event, Timed};
-use chalumeau::instrument::{Clarinet, Settings};
-use chalumeau::units::SoundingNote;
+use chalumeau_core::analysis::pitch::fundamental_hz;
+use chalumeau_core::analysis::to_f64;
+use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::instrument::{Clarinet, Settings};
+use chalumeau_core::units::SoundingNote;
 use xtask::host::{At, NoteExpressionType, Plugin, Say, Stereo};
 
 const RATE: f64 = 48_000.0;
@@ -364,10 +364,10 @@ fn a_rate_out_of_reach_is_refused() {
 #[test]
 fn the_melody_is_the_renderers_bit_for_bit() {
     let file = std::fs::read(xtask::machine::root().join("examples/melody.mid")).unwrap();
-    let score = chalumeau::render::midi_file::read(&file, 48_000).unwrap().with_tail(0.5, 48_000);
+    let score = chalumeau_core::score::midi_file::read(&file, 48_000).unwrap().with_tail(0.5, 48_000);
     let mut clarinet = Clarinet::built_in(RATE).unwrap();
     let mut rendered = Vec::new();
-    chalumeau::render::play(&mut clarinet, &score, 512, |block| {
+    chalumeau_core::score::play(&mut clarinet, &score, 512, |block| {
         rendered.extend_from_slice(block);
         Ok::<_, std::convert::Infallible>(())
     })

@@ -4,8 +4,8 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use chalumeau::analysis::pitch::fundamental_hz;
-use chalumeau::analysis::to_f64;
+use chalumeau_core::analysis::pitch::fundamental_hz;
+use chalumeau_core::analysis::to_f64;
 use xtask::host::{At, Plugin, Say, Session};
 
 const RATE: f64 = 48_000.0;
@@ -91,7 +91,7 @@ fn user_state(path: &Path) -> Vec<u8> {
 }
 
 /// A pipe of three notes: quickly fitted and tuned.
-const PIPE: &str = include_str!("../../tests/support/pipe.toml");
+const PIPE: &str = include_str!("../../crates/core/tests/data/pipe.toml");
 
 #[test]
 fn instruments_are_exchanged_while_a_note_sounds() {

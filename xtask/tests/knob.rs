@@ -8,16 +8,16 @@ mod live;
 
 use std::time::Duration;
 
-use chalumeau::analysis::pitch::fundamental_hz;
-use chalumeau::analysis::to_f64;
-use chalumeau::control::knob::KnobDesign;
-use chalumeau::event::{Event, Timed};
-use chalumeau::haptics::FeelDesign;
-use chalumeau::instrument::{Clarinet, Settings};
-use chalumeau::touch::blower::{Blower, Blown, Hand};
-use chalumeau::touch::feel::{Feels, NO_MOTOR};
-use chalumeau::touch::take::Take;
-use chalumeau::units::{SoundingNote, cents};
+use chalumeau_core::analysis::pitch::fundamental_hz;
+use chalumeau_core::analysis::to_f64;
+use chalumeau_core::control::knob::KnobDesign;
+use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::haptics::FeelDesign;
+use chalumeau_core::instrument::{Clarinet, Settings};
+use chalumeau_core::units::{SoundingNote, cents};
+use chalumeau_knob::touch::blower::{Blower, Blown, Hand};
+use chalumeau_knob::touch::feel::{Feels, NO_MOTOR};
+use chalumeau_knob::touch::take::Take;
 use live::{BLOCK, E3, RATE, SECOND, breath, level_db, on, play_until, plugin};
 use xtask::host::{At, Say};
 use xtask::simulator::{Simulator, serial_number};

@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use chalumeau::analysis::pitch::fundamental_hz;
-use chalumeau::analysis::to_f64;
-use chalumeau::units::cents;
+use chalumeau_core::analysis::pitch::fundamental_hz;
+use chalumeau_core::analysis::to_f64;
+use chalumeau_core::units::cents;
 use live::{BLOCK, E3, RATE, SECOND, breath, level_db, on, play_until, plugin};
 use tempfile::TempDir;
 use xtask::host::{At, Plugin, Say};

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 
-use chalumeau::event::{Event, Timed};
-use chalumeau::instrument::{Clarinet, Settings};
-use chalumeau::units::SoundingNote;
+use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::instrument::{Clarinet, Settings};
+use chalumeau_core::units::SoundingNote;
 use vst3_host::prelude::*;
 use vst3_host::{AudioBuffers, MidiChannel, MidiEvent};
 use xtask::host::{At, Say};
@@ -249,10 +249,10 @@ fn latency_is_the_instruments() {
 #[test]
 fn the_melody_is_the_renderers() {
     let file = std::fs::read(xtask::machine::root().join("examples/melody.mid")).unwrap();
-    let score = chalumeau::render::midi_file::read(&file, 48_000).unwrap().with_tail(0.5, 48_000);
+    let score = chalumeau_core::score::midi_file::read(&file, 48_000).unwrap().with_tail(0.5, 48_000);
     let mut clarinet = Clarinet::built_in(RATE).unwrap();
     let mut rendered = Vec::new();
-    chalumeau::render::play(&mut clarinet, &score, 512, |block| {
+    chalumeau_core::score::play(&mut clarinet, &score, 512, |block| {
         rendered.extend_from_slice(block);
         Ok::<_, std::convert::Infallible>(())
     })

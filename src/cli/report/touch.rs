@@ -2,20 +2,20 @@
 
 use crate::cli::play::Prepared;
 use crate::cli::report::{number, word};
-use crate::figure::breath::{Changes, Swell, Turn, pressures, turns};
-use crate::figure::felt::{AtContrast, Felt, Torque, thresholds, torques};
-use crate::figure::report::{Cell, Chapter, Plate, Table};
-use crate::haptics::law::torque_mnm;
-use crate::haptics::{FeelDesign, FeelRefused, FeelTable, Limits, NoteFeel, Requirement};
-use crate::instrument::Settings;
-use crate::instrument::felt::played_reed;
-use crate::reed::ReedTables;
-use crate::render::bifurcation;
-use crate::render::bifurcation::SOUNDS;
-use crate::render::breath::GAMMA_MAX;
-use crate::touch::feel::Feels;
-use crate::units::WrittenNote;
-use crate::wire::message::Law;
+use chalumeau_core::haptics::law::torque_mnm;
+use chalumeau_core::haptics::{FeelDesign, FeelRefused, FeelTable, NoteFeel, Requirement, TorqueLimits};
+use chalumeau_core::instrument::Settings;
+use chalumeau_core::instrument::felt::played_reed;
+use chalumeau_core::reed::ReedTables;
+use chalumeau_core::score::bifurcation;
+use chalumeau_core::score::bifurcation::SOUNDS;
+use chalumeau_core::score::breath::GAMMA_MAX;
+use chalumeau_core::units::WrittenNote;
+use chalumeau_figure::breath::{Changes, Swell, Turn, pressures, turns};
+use chalumeau_figure::felt::{AtContrast, Felt, Torque, thresholds, torques};
+use chalumeau_figure::report::{Cell, Chapter, Plate, Table};
+use chalumeau_knob::touch::feel::Feels;
+use chalumeau_knob::wire::message::Law;
 
 /// Exaggerations shown.
 const CONTRASTS: [f64; 3] = [1.0, 3.0, 5.0];
@@ -47,7 +47,7 @@ pub struct Touch<'a> {
     asked: Vec<Option<Requirement>>,
     /// As the command says.
     design: FeelDesign,
-    limits: Limits,
+    limits: TorqueLimits,
     /// Index of the fingering that is looked at from near.
     near: Option<usize>,
 }
@@ -60,7 +60,7 @@ impl<'a> Touch<'a> {
         let near = near.and_then(|near| feels.requirements().written().position(|written| written == near));
         let first = asked.iter().position(Option::is_some);
         let near = near.filter(|&near| asked[near].is_some()).or(first);
-        Self { prepared, feels, asked, design, limits: Limits::default(), near }
+        Self { prepared, feels, asked, design, limits: TorqueLimits::default(), near }
     }
 
     fn closing_kpa(&self) -> f64 {

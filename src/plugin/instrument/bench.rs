@@ -6,8 +6,8 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::{Parcel, Shared};
-use crate::event::{Event, Timed};
-use crate::instrument::{Clarinet, Settings};
+use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::instrument::{Clarinet, Settings};
 
 /// How long a new instrument speaks unheard, s: the lowest notes are there after 50 ms, a bass clarinet's after 100.
 const WARM_S: f64 = 0.12;
@@ -208,10 +208,10 @@ impl Bench {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bore::bundled::Bundled;
-    use crate::instrument::Model;
-    use crate::instrument::prepare::{Wanted, rough};
-    use crate::units::SoundingNote;
+    use chalumeau_core::bore::bundled::Bundled;
+    use chalumeau_core::instrument::Model;
+    use chalumeau_core::instrument::prepare::{Wanted, rough};
+    use chalumeau_core::units::SoundingNote;
 
     const RATE: f64 = 48_000.0;
     const AT: usize = 24_000;

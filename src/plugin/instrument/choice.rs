@@ -4,13 +4,13 @@ use std::path::PathBuf;
 use std::time::SystemTime;
 
 use super::Stage;
-use crate::bore::bundled::Bundled;
-use crate::bore::instrument_file::InstrumentFile;
-use crate::instrument::Model;
-use crate::instrument::cache::Cache;
-use crate::instrument::model::A4_HZ;
-use crate::instrument::prepare::{A4_BY_DELAY_HZ, Quality, Wanted, ready, rough};
 use crate::plugin::params::ChalumeauParams;
+use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::instrument::Model;
+use chalumeau_core::instrument::model::A4_HZ;
+use chalumeau_core::instrument::prepare::{A4_BY_DELAY_HZ, Quality, Wanted, ready, rough};
+use chalumeau_core::instrument::store::Store;
 
 /// Names the user's instrument file, for those who want it elsewhere.
 pub const VARIABLE: &str = "CHALUMEAU_INSTRUMENT";
@@ -99,7 +99,7 @@ impl Order {
     }
 
     /// What can be had at once, the best first. Takes up to 50 ms; longer only for a file nobody has fitted yet.
-    pub fn at_once(&self, cache: Option<&Cache>) -> Result<(Model, Stage), String> {
+    pub fn at_once(&self, cache: Option<&dyn Store>) -> Result<(Model, Stage), String> {
         let wanted = self.wanted(self.file()?);
         let near = Wanted { a4_hz: A4_HZ, ..wanted.clone() };
         let built = || {
@@ -111,7 +111,7 @@ impl Order {
                 None => Ok((rough(&wanted)?, Stage::Rough)),
             }
         };
-        built().map_err(|reason: crate::instrument::BuildError| reason.to_string())
+        built().map_err(|reason: chalumeau_core::instrument::BuildError| reason.to_string())
     }
 }
 

@@ -13,10 +13,10 @@ use nice_plug::prelude::nice_log;
 
 use super::choice::Order;
 use super::{Bench, Job, NOBODY, Parcel, Placed, Shared, Stage};
-use crate::instrument::cache::Cache;
-use crate::instrument::prepare::{Progress, make};
-use crate::instrument::{BuildError, Clarinet, Model};
+use crate::cache::Cache;
 use crate::plugin::params::ChalumeauParams;
+use chalumeau_core::instrument::prepare::{Progress, make};
+use chalumeau_core::instrument::{BuildError, Clarinet, Model};
 
 /// How often the thread looks up.
 const TURN: Duration = Duration::from_millis(20);
@@ -120,7 +120,7 @@ impl Workshop {
         {
             return Ok(placed.clone());
         }
-        let cache = self.cache.as_ref();
+        let cache = Cache::store(self.cache.as_ref());
         let (model, stage) = order.at_once(cache)?;
         let (model, stage) = if offline && stage < Stage::Tuned {
             let wanted = order.wanted(order.file()?);
@@ -259,7 +259,7 @@ impl Maker {
             return Ok(());
         }
         if stage.is_none() {
-            let (model, now) = order.at_once(self.cache.as_ref()).map_err(Some)?;
+            let (model, now) = order.at_once(Cache::store(self.cache.as_ref())).map_err(Some)?;
             if now == Stage::Tuned || !(bridged || job.offline) {
                 let model = Arc::new(model);
                 let sent = Placed { order: order.clone(), stage: now, model: model.clone() };
@@ -281,7 +281,7 @@ impl Maker {
         let (send, news) = mpsc::channel();
         let stop = cancelled.clone();
         let make = move || {
-            let made = make(&wanted, cache.as_ref(), &mut |progress| {
+            let made = make(&wanted, Cache::store(cache.as_ref()), &mut |progress| {
                 let sent = match progress {
                     Progress::Fitted(model) => send.send(News::Fitted(model.clone())),
                     shares => send.send(News::Progress(progress_words(shares))),

@@ -4,15 +4,15 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use super::{NO_NOTE, Shared, desk, felt, takes};
-use crate::control::knob::slap_strength;
-use crate::device::KnobReader;
-use crate::event::{Event, Timed};
-use crate::instrument::Settings;
 use crate::plugin::instrument::{self, Bench};
 use crate::plugin::params::ChalumeauParams;
-use crate::touch::blower::{Blower, Blown, Breath14, GRID, Hand};
-use crate::touch::feel::NO_MOTOR;
-use crate::touch::take::Take;
+use chalumeau_core::control::knob::slap_strength;
+use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::instrument::Settings;
+use chalumeau_knob::device::KnobReader;
+use chalumeau_knob::touch::blower::{Blower, Blown, Breath14, GRID, Hand};
+use chalumeau_knob::touch::feel::NO_MOTOR;
+use chalumeau_knob::touch::take::Take;
 
 /// Breath values of one block that are also sent to the host: a block of 8192 samples has 128.
 const MOST_SENT: usize = 8_192 / GRID as usize;

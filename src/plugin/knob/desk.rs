@@ -7,20 +7,20 @@ use std::time::{Duration, Instant};
 
 use super::felt::Felt;
 use super::{Shared, takes};
-use crate::control::knob::{self, KnobDesign, Taken};
-use crate::device::{
-    Choice, Hooks, KnobLink, KnobReader, LinkStatus, Phase, StateSample, serial_number, serial_text,
-};
-use crate::haptics::{FeelDesign, Limits, Order};
-use crate::instrument::Settings;
 use crate::plugin::instrument;
 use crate::plugin::params::knob::{Calibration, KnobKind, LawChoice, OrderChoice};
 use crate::plugin::params::{ChalumeauParams, KnobParams};
-use crate::touch::blower::Hand;
-use crate::touch::feel::Feels;
-use crate::touch::take::{Moment, Take};
-use crate::units::WrittenNote;
-use crate::wire::Law;
+use chalumeau_core::control::knob::{self, KnobDesign, Taken};
+use chalumeau_core::haptics::{FeelDesign, Order, TorqueLimits};
+use chalumeau_core::instrument::Settings;
+use chalumeau_core::units::WrittenNote;
+use chalumeau_knob::device::{
+    Choice, Hooks, KnobLink, KnobReader, LinkStatus, Phase, StateSample, serial_number, serial_text,
+};
+use chalumeau_knob::touch::blower::Hand;
+use chalumeau_knob::touch::feel::Feels;
+use chalumeau_knob::touch::take::{Moment, Take};
+use chalumeau_knob::wire::Law;
 
 /// How often the desk looks up.
 const TURN: Duration = Duration::from_millis(10);
@@ -42,7 +42,7 @@ pub struct Desk {
     hand: Hand,
     take: triple_buffer::Input<Option<Arc<Take>>>,
     /// What the feel in force was worked out from.
-    made_of: Option<(Arc<Feels>, Settings, FeelDesign, Limits)>,
+    made_of: Option<(Arc<Feels>, Settings, FeelDesign, TorqueLimits)>,
     refused: Option<String>,
     /// Why the far end of the knob blows no harder, if it does not.
     short_breath: Option<String>,
@@ -216,8 +216,8 @@ impl Desk {
         let design = design(&params.knob);
         let ceiling_mnm = params.knob.ceiling.value().round() as u16;
         let limits = match status.and_then(|status| status.info.as_ref()) {
-            Some(info) => Limits::of_device(info, ceiling_mnm),
-            None => Limits { ceiling_mnm: f64::from(ceiling_mnm), ..Limits::default() },
+            Some(info) => info.torque_limits(ceiling_mnm),
+            None => TorqueLimits { ceiling_mnm: f64::from(ceiling_mnm), ..TorqueLimits::default() },
         };
         let Some(feels) = self.felt.of(&self.instruments) else { return };
         let same = |(of, ..): &(Arc<Feels>, _, _, _)| Arc::ptr_eq(of, &feels);
@@ -483,7 +483,7 @@ pub fn calibrated(knob: &KnobParams) -> KnobDesign {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::touch::study::{Condition, TRIALS, plan};
+    use chalumeau_knob::touch::study::{Condition, TRIALS, plan};
 
     #[test]
     fn both_sides_of_every_trial_can_be_felt_under_the_first_ceiling() {
@@ -497,7 +497,7 @@ mod tests {
                     ..Settings::default()
                 };
                 let design = FeelDesign { strength_mnm: STUDY_MNM, ..FeelDesign::default() };
-                let refused = feels.table(&settings, &design, &Limits::default()).err();
+                let refused = feels.table(&settings, &design, &TorqueLimits::default()).err();
                 assert_eq!(refused, None, "H {} {}", trial.h, condition.name());
             }
         }

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use crate::bore::bundled::Bundled;
-use crate::bore::lattice::LatticeCoeffs;
 use crate::plugin::instrument::choice::Source;
 use crate::plugin::instrument::{Placed, Shared, Stage};
-use crate::touch::feel::Feels;
+use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::bore::lattice::LatticeCoeffs;
+use chalumeau_knob::touch::feel::Feels;
 
 /// The feel of one instrument, kept while it plays.
 #[derive(Default)]

@@ -5,17 +5,18 @@ use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::desk::design;
-use crate::instrument::Settings;
 use crate::plugin::params::ChalumeauParams;
-use crate::touch::study::{Side, plan};
-use crate::touch::take::{Marks, Take, TakeWriter};
+use crate::take_file::TakeFile;
+use chalumeau_core::instrument::Settings;
+use chalumeau_knob::touch::study::{Side, plan};
+use chalumeau_knob::touch::take::{Marks, Take};
 
 /// Where takes go, for those who want them elsewhere.
 const TAKES: &str = "CHALUMEAU_TAKES";
 
 /// A take being written.
 pub struct Recording {
-    pub writer: TakeWriter,
+    pub writer: TakeFile,
     pub path: PathBuf,
     pub rows: u64,
     pub trouble: Option<String>,
@@ -80,6 +81,6 @@ pub fn begin(params: &ChalumeauParams) -> Result<Recording, String> {
             order.join(" ")
         ));
     }
-    let writer = TakeWriter::create(&path, false, &remarks).map_err(|reason| reason.to_string())?;
+    let writer = TakeFile::create(&path, false, &remarks).map_err(|reason| reason.to_string())?;
     Ok(Recording { writer, path, rows: 0, trouble: None })
 }

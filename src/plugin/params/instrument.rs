@@ -7,8 +7,8 @@ use std::sync::{Arc, OnceLock, RwLock};
 
 use nice_plug::prelude::*;
 
-use crate::bore::bundled::Bundled;
-use crate::instrument::prepare::Quality;
+use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::instrument::prepare::Quality;
 
 /// What a program without projects begins with: instrument, its file, A4.
 static BEGINNING: OnceLock<Beginning> = OnceLock::new();

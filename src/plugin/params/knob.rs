@@ -9,8 +9,8 @@ use nice_plug::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{either, number};
-use crate::control::knob::KnobDesign;
-use crate::touch::study::{Side, TRIALS, Trial, plan};
+use chalumeau_core::control::knob::KnobDesign;
+use chalumeau_knob::touch::study::{Side, TRIALS, Trial, plan};
 
 /// Most torque a session starts with, mNm; and the most *Arm* can be given (`docs/protocol.md`, safety).
 pub const CEILING_MNM: (f32, f32) = (100.0, 250.0);

@@ -3,8 +3,8 @@
 use nice_plug::prelude::*;
 
 use super::number;
-use crate::instrument::Settings;
-use crate::reed::PhysicalReed;
+use chalumeau_core::instrument::Settings;
+use chalumeau_core::reed::PhysicalReed;
 
 /// Which of the reed's two faces rules.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Enum)]
@@ -95,9 +95,9 @@ impl PhysicalReedParams {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reed::law::H_INIT;
-    use crate::reed::physical::P_REF_PA;
-    use crate::units::{Air, REFERENCE_RADIUS_M};
+    use chalumeau_core::reed::law::H_INIT;
+    use chalumeau_core::reed::physical::P_REF_PA;
+    use chalumeau_core::units::{Air, REFERENCE_RADIUS_M};
 
     fn face(face: ReedFace, change: impl Fn(&mut PhysicalReed)) -> PhysicalReedParams {
         let mut reed = PhysicalReed::reference();

@@ -10,9 +10,9 @@ use nice_plug_egui::{Frame, KeyCapture, NiceEguiApp};
 use super::hands::HostControls;
 use super::{Shared, kept};
 use crate::editor::{self, Action, Controls, Kept, Snapshot, State};
-use crate::event::Event;
 use crate::plugin::Beside;
 use crate::plugin::params::instrument::InstrumentChoice;
+use chalumeau_core::event::Event;
 
 /// What outlives a closed window.
 pub struct Memory {

@@ -4,10 +4,10 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use super::Shared;
-use crate::event::{Event, Timed};
-use crate::instrument::watch::{MOMENTS, Moment, Now};
 use crate::plugin::breaths::Breaths;
 use crate::plugin::instrument::Bench;
+use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::instrument::watch::{MOMENTS, Moment, Now};
 
 /// Samples of sound on their way to the looker: a second at 48 kHz.
 const SOUND: usize = 65_536;

@@ -2,11 +2,11 @@
 
 use std::sync::PoisonError;
 
-use crate::device::discover::Kind;
-use crate::device::{LinkStatus, Phase, Places, candidates, lock, midi, serial_number, serial_text};
 use crate::editor::snapshot::Device;
 use crate::plugin::Beside;
 use crate::plugin::params::knob::KnobKind;
+use chalumeau_knob::device::discover::Kind;
+use chalumeau_knob::device::{LinkStatus, Phase, Places, candidates, lock, midi, serial_number, serial_text};
 
 /// Kinds of device the parameter chooses from.
 pub const KINDS: usize = 4;
@@ -113,8 +113,8 @@ pub fn choose(beside: &Beside, key: &str) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::Advert;
-    use crate::device::lock::Ownership;
+    use chalumeau_knob::device::Advert;
+    use chalumeau_knob::device::lock::Ownership;
 
     #[test]
     fn a_simulated_knob_is_listed_with_who_holds_it() {

@@ -9,26 +9,26 @@ use super::Shared;
 use super::audio::Inside;
 #[cfg(feature = "devices")]
 use super::devices;
-use crate::bore::instrument_file::InstrumentFile;
-use crate::bore::transfer_matrix::TransferMatrix;
-#[cfg(feature = "devices")]
-use crate::device::Places;
 #[cfg(feature = "devices")]
 use crate::editor::Tab;
 use crate::editor::listener::{Heard, Listener, WINDOW};
 #[cfg(feature = "devices")]
 use crate::editor::snapshot::{Device, Knob};
 use crate::editor::snapshot::{Level, Scope, Snapshot, Source, Status, Track};
-use crate::haptics::{FeelDesign, FeelTable, Limits, Requirement};
-use crate::instrument::{Model, Settings, felt};
 use crate::plugin::Beside;
 use crate::plugin::breaths::{Breaths, Way};
 use crate::plugin::instrument::{Placed, Stage};
 #[cfg(feature = "devices")]
 use crate::plugin::knob;
 use crate::plugin::params::instrument::InstrumentChoice;
-use crate::touch::feel::Feels;
-use crate::units::SoundingNote;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::bore::transfer_matrix::TransferMatrix;
+use chalumeau_core::haptics::{FeelDesign, FeelTable, Requirement, TorqueLimits};
+use chalumeau_core::instrument::{Model, Settings, felt};
+use chalumeau_core::units::SoundingNote;
+#[cfg(feature = "devices")]
+use chalumeau_knob::device::Places;
+use chalumeau_knob::touch::feel::Feels;
 
 /// From one look to the next while something moves, and while nothing does: less than five a second.
 const QUICK: Duration = Duration::from_millis(33);
@@ -170,7 +170,7 @@ impl Looker {
 
     /// Looks for devices now and then while the list is in view.
     #[cfg(feature = "devices")]
-    fn list(&mut self, status: Option<&crate::device::LinkStatus>) {
+    fn list(&mut self, status: Option<&chalumeau_knob::device::LinkStatus>) {
         let is_due = self.devices.1.is_none_or(|at| at.elapsed() > DEVICES_EVERY);
         if super::kept(&self.beside.params).tab == Tab::Knob && is_due {
             let kind = self.beside.params.knob.kind.value();
@@ -269,10 +269,10 @@ impl Known {
         fingering: usize,
         settings: &Settings,
         design: &FeelDesign,
-    ) -> Result<crate::haptics::NoteFeel, String> {
+    ) -> Result<chalumeau_core::haptics::NoteFeel, String> {
         let same = self.table.as_ref().is_some_and(|(of, by, _)| (of, by) == (settings, design));
         if !same {
-            let table = self.feels.table(settings, design, &Limits::default());
+            let table = self.feels.table(settings, design, &TorqueLimits::default());
             self.table = Some((*settings, *design, table.map_err(|reason| reason.to_string())));
         }
         match self.table.as_ref().map(|(.., table)| table) {
@@ -308,18 +308,21 @@ fn sources(breaths: &Breaths, held: bool) -> Vec<Source> {
 
 /// The knob as the window shows it, without the list.
 #[cfg(feature = "devices")]
-fn knob_picture(status: &crate::device::LinkStatus, feel: Option<&crate::wire::message::Feel>) -> Knob {
+fn knob_picture(
+    status: &chalumeau_knob::device::LinkStatus,
+    feel: Option<&chalumeau_knob::wire::message::Feel>,
+) -> Knob {
     let stats = &status.stats;
     Knob {
         devices: Vec::new(),
         text: status.text.clone(),
-        is_live: status.phase == crate::device::Phase::Live,
+        is_live: status.phase == chalumeau_knob::device::Phase::Live,
         is_armed: status.armed,
         ceiling_mnm: f32::from(status.ceiling_mnm),
         angle_deg: status.angle_deg,
         torque_mnm: status.angle_deg.zip(feel).map(|(angle_deg, feel)| {
-            let tables = crate::reed::ReedTables::seed();
-            let torque_mnm = crate::haptics::law::torque_mnm(feel, tables, f64::from(angle_deg));
+            let tables = chalumeau_core::reed::ReedTables::seed();
+            let torque_mnm = chalumeau_core::haptics::law::torque_mnm(feel, tables, f64::from(angle_deg));
             if status.armed { torque_mnm as f32 } else { 0.0 }
         }),
         notice: status.last_refusal.clone().or_else(|| status.notice.clone()),

@@ -1,0 +1,774 @@
+//! The instrument in the frequency domain: input impedance of any fingering, its peaks, what a reed makes of them.
+//!
+//! The bore is a chain of short lossy cylinders (plane waves; Zwikker & Kosten 1949, thermal and viscous boundary layers
+//! with Bessel functions), tone holes are T junctions with the length corrections of Dubos et al. (1999) and a lossy
+//! chimney, closed by a rigid wall or radiating as an unflanged pipe; the bell radiates likewise, and steps carry the
+//! discontinuity mass attributed to Taillard. Equations are those of openwind 0.12.4's transfer-matrix method, which the
+//! tests use as the oracle. Left out: pads above open holes, interaction of holes outside, curvature of the wave front in
+//! the bell, nonlinear losses. This is the slow reference for the lattice in the time domain; SI units, 1 Hz to 20 kHz.
+//!
+//! | symbol | identifier |
+//! |---|---|
+//! | Gamma, propagation constant, 1/m | `gamma` |
+//! | Zc, characteristic impedance with losses, Pa s/m3 | `z_c` |
+//! | t_i, t_a, inner and series length correction of a hole, m | `inner_m`, `series_m` |
+//! | b, a, h: radii of hole and bore, chimney height, m | `radius_m`, `bore_radius_m`, `chimney_m` |
+//! | Z/Zc of the nominal bore | `over_zc` |
+
+mod standing;
+
+use std::collections::HashMap;
+use std::f64::consts::PI;
+use std::f64::consts::TAU;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::Mutex;
+use std::sync::PoisonError;
+
+use num_complex::Complex64;
+
+use crate::bore::instrument_file::InstrumentFile;
+use crate::parallel;
+use crate::units::Air;
+
+const J: Complex64 = Complex64::new(0.0, 1.0);
+/// Longest cylinder a cone is cut into, m, and its largest change of radius, m. Halving both moves no peak of the
+/// built-in clarinet by 0.1 cent (a test holds it to that).
+const PIECE: (f64, f64) = (2.5e-3, 2e-4);
+/// Frequencies kept; 8192 of them take about 25 MB for 24 holes.
+const KEPT: usize = 8192;
+/// Where peaks are looked for, Hz, and the grid of the search: a third of the narrowest resonance of a clarinet.
+const SEARCH_HZ: (f64, f64, f64) = (20.0, 6_000.0, 2.0);
+
+/// One instrument in one air: Design for the frequency domain. Shared between threads freely.
+#[derive(Debug)]
+pub struct TransferMatrix {
+    air: Air,
+    /// Distinct radii of bore pieces and chimneys, m; losses are worked out once for each.
+    radii_m: Vec<f64>,
+    /// Main bore above, between and below the holes: `[holes + 1][piece]`, reed to bell.
+    spans: Vec<Vec<Piece>>,
+    holes: Vec<Hole>,
+    bell_radius_m: f64,
+    /// Bore that impedances are over the Zc of, m.
+    nominal_radius_m: f64,
+    kept: Mutex<HashMap<u64, Arc<AtFrequency>>>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Piece {
+    Cylinder {
+        radius: usize,
+        length_m: f64,
+    },
+    /// A jump in radius: acoustic mass, kg/m4.
+    Step {
+        mass: f64,
+    },
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Hole {
+    /// Index of the chimney's radius and, just upstream, the bore's.
+    radius: usize,
+    bore_radius: usize,
+    chimney_m: f64,
+    /// Mass under the chimney, kg/m4.
+    shunt_mass: f64,
+    /// Half the (negative) series mass of the junction, kg/m4.
+    series_mass: f64,
+}
+
+/// Everything of the instrument that does not depend on the fingering, at one frequency.
+#[derive(Debug)]
+struct AtFrequency {
+    omega: f64,
+    /// One for each span, never empty; the series masses of the holes at its ends are included.
+    spans: Box<[Matrix]>,
+    /// Shunt admittance of each hole, `[closed, open]`, m3/(Pa s).
+    shunts: Box<[[Complex64; 2]]>,
+    /// Lossy characteristic impedance of the bore at each hole, Pa s/m3.
+    bore_z_c: Box<[Complex64]>,
+    bell: Complex64,
+}
+
+/// Maps pressure and flow at the downstream end to those at the upstream end.
+#[derive(Clone, Copy, Debug)]
+struct Matrix {
+    pp: Complex64,
+    pu: Complex64,
+    up: Complex64,
+    uu: Complex64,
+}
+
+/// A maximum of the magnitude of an impedance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Peak {
+    /// Frequency, Hz.
+    pub f_hz: f64,
+    /// |Z| there, over Zc of the nominal bore.
+    pub mag_over_zc: f64,
+    /// Quality factor, `-(f/2) d arg Z / df` at the maximum.
+    pub q: f64,
+}
+
+impl TransferMatrix {
+    /// Cuts an instrument into elements. Holes on a step sit on its upstream side. Allocates.
+    pub fn new(file: &InstrumentFile, air: Air) -> Self {
+        Self::with_pieces(file, air, PIECE)
+    }
+
+    fn with_pieces(file: &InstrumentFile, air: Air, (longest_m, widest_m): (f64, f64)) -> Self {
+        let mut radii_m = Vec::new();
+        let mut radius_index = |radius_m: f64| {
+            radii_m.iter().position(|&known| known == radius_m).unwrap_or_else(|| {
+                radii_m.push(radius_m);
+                radii_m.len() - 1
+            })
+        };
+        let mut holes = Vec::with_capacity(file.holes.len());
+        for hole in &file.holes {
+            let (b, a) = (hole.radius_m, file.radius_at(hole.x_m));
+            let (inner_m, series_m) = hole_corrections_m(a, b);
+            holes.push(Hole {
+                radius: radius_index(b),
+                bore_radius: radius_index(a),
+                chimney_m: hole.chimney_m,
+                shunt_mass: air.rho * inner_m / (PI * b * b),
+                series_mass: 0.5 * air.rho * series_m / (PI * a * a),
+            });
+        }
+        let mut spans = vec![Vec::new()];
+        let mut waiting = file.holes.iter().map(|hole| hole.x_m).peekable();
+        let mut upstream_radius_m: Option<f64> = None;
+        for segment in &file.bore {
+            let radius_m = |x_m: f64| {
+                let along = (x_m - segment.x_start_m) / (segment.x_end_m - segment.x_start_m);
+                segment.r_start_m + (segment.r_end_m - segment.r_start_m) * along
+            };
+            if let Some(mass) = upstream_radius_m.and_then(|left| step_mass(left, segment.r_start_m, air.rho))
+            {
+                push(&mut spans, Piece::Step { mass });
+            }
+            upstream_radius_m = Some(segment.r_end_m);
+            let mut from_m = segment.x_start_m;
+            while from_m < segment.x_end_m {
+                let hole_m = waiting.next_if(|&x_m| x_m <= segment.x_end_m);
+                let to_m = hole_m.unwrap_or(segment.x_end_m).max(from_m);
+                let (r_from, r_to) = (radius_m(from_m), radius_m(to_m));
+                let pieces = if (r_to - r_from).abs() < 1e-9 {
+                    1.0
+                } else {
+                    ((to_m - from_m) / longest_m).max((r_to - r_from).abs() / widest_m).ceil().max(1.0)
+                };
+                if to_m > from_m {
+                    for piece in 0..pieces as usize {
+                        let middle = (piece as f64 + 0.5) / pieces;
+                        let radius = radius_index(r_from + (r_to - r_from) * middle);
+                        push(&mut spans, Piece::Cylinder { radius, length_m: (to_m - from_m) / pieces });
+                    }
+                }
+                if hole_m.is_some() {
+                    spans.push(Vec::new());
+                }
+                from_m = to_m;
+            }
+            // Holes at the very end of the segment, on the upstream side of a step.
+            while waiting.next_if(|&x_m| x_m <= segment.x_end_m).is_some() {
+                spans.push(Vec::new());
+            }
+        }
+        // A hole past the end, which `InstrumentFile::parse` refuses, sits at the bell.
+        spans.resize_with(holes.len() + 1, Vec::new);
+        let bell_radius_m = file.bore.last().map_or(file.nominal_radius_m, |segment| segment.r_end_m);
+        let nominal_radius_m = file.nominal_radius_m;
+        Self { air, radii_m, spans, holes, bell_radius_m, nominal_radius_m, kept: Mutex::default() }
+    }
+
+    /// Input impedance at the reed tip over Zc of the instrument's nominal bore.
+    ///
+    /// `f_hz` is taken into 0.1 Hz..100 kHz. `open[hole]` in the order of the file, missing ones closed. A reed volume
+    /// above 0 (m3) is put in parallel at the tip. The first 8192 different frequencies are kept, so that a grid of
+    /// frequencies costs its losses once for all fingerings.
+    pub fn impedance(&self, f_hz: f64, open: &[bool], reed_volume_m3: f64) -> Complex64 {
+        self.loaded(&self.keep(f_hz), open, reed_volume_m3)
+    }
+
+    /// Pressure reflectance at a plane just upstream of a hole of all that lies below: the reflected over the arriving
+    /// wave in the bore of the radius there. `|R|^2` falling to 1/2 is the cut-off of the tone-hole lattice when
+    /// `hole_index` is the first open one. An index beyond the last hole gives the bell at the end of the bore.
+    pub fn reflectance_below(&self, f_hz: f64, open: &[bool], hole_index: usize) -> Complex64 {
+        let at = self.keep(f_hz);
+        let (pressure, flow) = at.above(open, hole_index);
+        match (at.bore_z_c.get(hole_index), self.holes.get(hole_index)) {
+            (Some(z_c), Some(hole)) => {
+                let pressure = pressure + J * at.omega * hole.series_mass * flow;
+                (pressure - z_c * flow) / (pressure + z_c * flow)
+            }
+            _ => {
+                let z_c = losses(at.omega, self.bell_radius_m, &self.air).z_c;
+                (at.bell - z_c) / (at.bell + z_c)
+            }
+        }
+    }
+
+    /// As [`impedance`](Self::impedance) without reed volume, with a resistance (Pa s/m3) in series with each open hole,
+    /// as the jets of a large oscillation put there. `flows[hole]` becomes the flow into that hole per pascal at the tip.
+    pub fn impedance_with_jets(
+        &self,
+        f_hz: f64,
+        open: &[bool],
+        resistances: &[f64],
+        flows: &mut [Complex64],
+    ) -> Complex64 {
+        let at = self.keep(f_hz);
+        let (mut pressure, mut flow) = (at.bell, Complex64::ONE);
+        flows.fill(Complex64::ZERO);
+        for hole in (0..at.shunts.len()).rev() {
+            (pressure, flow) = at.spans[hole + 1].apply(pressure, flow);
+            let is_open = open.get(hole).copied().unwrap_or(false);
+            let mut shunt = at.shunts[hole][usize::from(is_open)];
+            if is_open {
+                shunt /= 1.0 + shunt * resistances.get(hole).copied().unwrap_or(0.0);
+                if let Some(into) = flows.get_mut(hole) {
+                    *into = pressure * shunt;
+                }
+            }
+            flow += pressure * shunt;
+        }
+        (pressure, flow) = at.spans[0].apply(pressure, flow);
+        flows.iter_mut().for_each(|into| *into /= pressure);
+        pressure / flow / self.air.z_c(self.nominal_radius_m)
+    }
+
+    /// The first `count` impedance peaks of a fingering, see [`find_peaks`].
+    pub fn peaks(&self, open: &[bool], reed_volume_m3: f64, count: usize) -> Vec<Peak> {
+        let scan = |f_hz| self.impedance(f_hz, open, reed_volume_m3);
+        maxima(scan, |f_hz| self.between(f_hz, open, reed_volume_m3), count)
+    }
+
+    /// Impedance between the frequencies of the scan, from those kept: a cubic through the four nearest admittances, which
+    /// bend only over the distance of two modes: closer to the peaks than the search for them (see the test).
+    fn between(&self, f_hz: f64, open: &[bool], reed_volume_m3: f64) -> Complex64 {
+        let (lowest, _, step) = SEARCH_HZ;
+        let at = (f_hz - lowest) / step;
+        let (first, part) = ((at.floor() - 1.0).max(0.0), at - (at.floor() - 1.0).max(0.0));
+        (0..4_u8)
+            .map(f64::from)
+            .map(|n| {
+                let others = (0..4_u8).map(f64::from).filter(|&other| other != n);
+                let weight: f64 = others.map(|other| (part - other) / (n - other)).product();
+                weight / self.impedance(lowest + step * (first + n), open, reed_volume_m3)
+            })
+            .sum::<Complex64>()
+            .inv()
+    }
+
+    /// Works out the losses at every frequency that [`peaks`](Self::peaks) may look at, on all cores; `on` hears the share
+    /// done and may end it, then the answer is `None`. Afterwards peaks of any fingering cost little.
+    pub fn prepare_peaks(&self, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Option<()> {
+        let (lowest, highest, step) = SEARCH_HZ;
+        let steps = ((highest - lowest) / step) as usize;
+        const BATCH: usize = 64;
+        let batch = |batch: usize| {
+            let own = (batch * BATCH..=steps).take(BATCH);
+            own.for_each(|k| drop(self.keep(lowest + step * k as f64)));
+        };
+        parallel::each(steps / BATCH + 1, batch, on).map(drop)
+    }
+
+    /// The frequency nearest `near_hz` (as an interval, within an octave) where the phase of the impedance falls through
+    /// zero, Hz, and Re Z/Zc there: where a reed without inertia plays, and the height its threshold needs.
+    pub fn playing_frequency(&self, open: &[bool], reed_volume_m3: f64, near_hz: f64) -> Option<(f64, f64)> {
+        let (lowest, highest, step) = SEARCH_HZ;
+        let from = (near_hz / 2.0).max(lowest / 2.0);
+        let to = (near_hz * 2.0).min(2.0 * highest);
+        // On whole steps, so that every fingering shares the frequencies kept.
+        let grid = ((from / step).floor() as usize..=(to / step).ceil() as usize).map(|k| k as f64 * step);
+        let mut best: Option<f64> = None;
+        let mut before: Option<(f64, f64)> = None;
+        for f_hz in grid {
+            let im = self.impedance(f_hz, open, reed_volume_m3).im;
+            if let Some((f_before, im_before)) = before
+                && im_before > 0.0
+                && im <= 0.0
+            {
+                let (mut low, mut high) = (f_before, f_hz);
+                while high - low > 1e-6 {
+                    let middle = 0.5 * (low + high);
+                    if self.loaded(&self.at(middle), open, reed_volume_m3).im > 0.0 {
+                        low = middle;
+                    } else {
+                        high = middle;
+                    }
+                }
+                let found = 0.5 * (low + high);
+                let distance = |f_hz: f64| (f_hz / near_hz).log2().abs();
+                if best.is_none_or(|best| distance(found) < distance(best)) {
+                    best = Some(found);
+                }
+            }
+            before = Some((f_hz, im));
+        }
+        let f_hz = best.filter(|best| (best / near_hz).log2().abs() <= 1.0)?;
+        Some((f_hz, self.loaded(&self.at(f_hz), open, reed_volume_m3).re))
+    }
+
+    /// Z/Zc at the tip with the reed volume in parallel.
+    fn loaded(&self, at: &AtFrequency, open: &[bool], reed_volume_m3: f64) -> Complex64 {
+        let z_c = self.air.z_c(self.nominal_radius_m);
+        let (pressure, flow) = at.above(open, 0);
+        let (pressure, mut flow) = at.spans[0].apply(pressure, flow);
+        if reed_volume_m3 > 0.0 {
+            flow += pressure * J * at.omega * reed_volume_m3 / (self.air.rho * self.air.c * self.air.c);
+        }
+        pressure / flow / z_c
+    }
+
+    fn keep(&self, f_hz: f64) -> Arc<AtFrequency> {
+        // A panic elsewhere leaves the map whole: entries are only ever inserted complete.
+        let lock = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = lock().get(&f_hz.to_bits()) {
+            return known.clone();
+        }
+        let fresh = Arc::new(self.at(f_hz));
+        let mut kept = lock();
+        if kept.len() < KEPT {
+            kept.insert(f_hz.to_bits(), fresh.clone());
+        }
+        fresh
+    }
+
+    fn at(&self, f_hz: f64) -> AtFrequency {
+        let omega = TAU * if f_hz > 0.1 { f_hz.min(1e5) } else { 0.1 };
+        let losses: Vec<Losses> =
+            self.radii_m.iter().map(|&radius_m| losses(omega, radius_m, &self.air)).collect();
+        let series = |hole: Option<&Hole>| J * omega * hole.map_or(0.0, |hole| hole.series_mass);
+        let spans = self.spans.iter().enumerate().map(|(index, pieces)| {
+            let above = index.checked_sub(1).and_then(|hole| self.holes.get(hole));
+            let chain = pieces.iter().fold(Matrix::series(series(above)), |chain, piece| {
+                chain.then(match *piece {
+                    Piece::Cylinder { radius, length_m } => losses[radius].cylinder(length_m),
+                    Piece::Step { mass } => Matrix::series(J * omega * mass),
+                })
+            });
+            chain.then(Matrix::series(series(self.holes.get(index))))
+        });
+        let shunts = self.holes.iter().map(|hole| {
+            let Losses { gamma, z_c } = losses[hole.radius];
+            let z_rad = radiation(omega, self.radii_m[hole.radius], &self.air);
+            let tanh = tanh(gamma * hole.chimney_m);
+            let under = J * omega * hole.shunt_mass;
+            let chimney_open = z_c * (z_rad + z_c * tanh) / (z_c + z_rad * tanh);
+            [(z_c / tanh + under).inv(), (chimney_open + under).inv()]
+        });
+        AtFrequency {
+            omega,
+            spans: spans.collect(),
+            shunts: shunts.collect(),
+            bore_z_c: self.holes.iter().map(|hole| losses[hole.bore_radius].z_c).collect(),
+            bell: radiation(omega, self.bell_radius_m, &self.air),
+        }
+    }
+}
+
+impl AtFrequency {
+    /// Pressure and flow just upstream of the shunt of a hole (downstream of the upper half of its series mass), for a
+    /// flow of 1 out of the bell; at the bell for an index beyond the last hole.
+    fn above(&self, open: &[bool], hole_index: usize) -> (Complex64, Complex64) {
+        let (mut pressure, mut flow) = (self.bell, Complex64::ONE);
+        for hole in (hole_index..self.shunts.len()).rev() {
+            (pressure, flow) = self.spans[hole + 1].apply(pressure, flow);
+            let is_open = open.get(hole).copied().unwrap_or(false);
+            flow += pressure * self.shunts[hole][usize::from(is_open)];
+        }
+        (pressure, flow)
+    }
+}
+
+impl Matrix {
+    fn series(impedance: Complex64) -> Self {
+        Self { pp: Complex64::ONE, pu: impedance, up: Complex64::ZERO, uu: Complex64::ONE }
+    }
+
+    /// The chain of `self` upstream and `next` downstream.
+    fn then(self, next: Self) -> Self {
+        Self {
+            pp: self.pp * next.pp + self.pu * next.up,
+            pu: self.pp * next.pu + self.pu * next.uu,
+            up: self.up * next.pp + self.uu * next.up,
+            uu: self.up * next.pu + self.uu * next.uu,
+        }
+    }
+
+    fn apply(self, pressure: Complex64, flow: Complex64) -> (Complex64, Complex64) {
+        (self.pp * pressure + self.pu * flow, self.up * pressure + self.uu * flow)
+    }
+}
+
+/// A tube with viscous and thermal losses, at one frequency.
+#[derive(Clone, Copy, Debug)]
+struct Losses {
+    gamma: Complex64,
+    z_c: Complex64,
+}
+
+impl Losses {
+    fn cylinder(self, length_m: f64) -> Matrix {
+        let grow = (self.gamma * length_m).exp();
+        let decay = grow.inv();
+        let (cosh, sinh) = (0.5 * (grow + decay), 0.5 * (grow - decay));
+        Matrix { pp: cosh, pu: self.z_c * sinh, up: sinh / self.z_c, uu: cosh }
+    }
+}
+
+/// Zwikker & Kosten (1949): series impedance with the viscous, shunt admittance with the thermal boundary layer.
+fn losses(omega: f64, radius_m: f64, air: &Air) -> Losses {
+    let area = PI * radius_m * radius_m;
+    // 2 J1(z) / (z J0(z)) at z = r sqrt(-j omega / diffusivity)
+    let layer = |diffusivity: f64| {
+        let z = Complex64::new(1.0, -1.0) * (radius_m * (0.5 * omega / diffusivity).sqrt());
+        2.0 * bessel_ratio(z) / z
+    };
+    let viscous = layer(air.mu / air.rho);
+    let thermal = layer(air.kappa / (air.rho * air.cp));
+    let z_series = J * (omega * air.rho / area) / (1.0 - viscous);
+    let y_shunt = J * (omega * area / (air.rho * air.c * air.c)) * (1.0 + (air.gamma - 1.0) * thermal);
+    let gamma = (z_series * y_shunt).sqrt();
+    Losses { gamma, z_c: z_series / gamma }
+}
+
+/// Radiation impedance of an unflanged pipe, Pa s/m3: the Pade form openwind uses. Its low-frequency limit, length
+/// correction 0.6133 r and resistance (kr)^2/4, is that of Levine & Schwinger (1948).
+fn radiation(omega: f64, radius_m: f64, air: &Air) -> Complex64 {
+    const END_CORRECTION: f64 = 0.6133;
+    const RESISTANCE: f64 = 0.25;
+    let kr = omega * radius_m / air.c;
+    let below = Complex64::new(1.0 / END_CORRECTION, kr * RESISTANCE / (END_CORRECTION * END_CORRECTION));
+    J * kr * air.z_c(radius_m) / below
+}
+
+/// Inner and series length corrections of a hole of radius `b` on a bore of radius `a`, m. Dubos et al. (1999).
+fn hole_corrections_m(a: f64, b: f64) -> (f64, f64) {
+    let delta = b / a;
+    let inner_m = b * (0.82 + delta * (-0.193 + delta * (-1.09 + delta * (1.27 - 0.71 * delta))));
+    (inner_m, b * (-0.37 + 0.087 * delta) * delta * delta)
+}
+
+/// Acoustic mass of a jump in radius, kg/m4, `None` where there is none. Polynomial as in openwind, after Taillard.
+fn step_mass(left_m: f64, right_m: f64, rho: f64) -> Option<f64> {
+    if (left_m - right_m).abs() <= 1e-9 {
+        return None;
+    }
+    let (narrow_m, wide_m) = (left_m.min(right_m), left_m.max(right_m));
+    let a = narrow_m / wide_m;
+    let a3 = a * a * a;
+    let shape = 0.26164 - 0.353 * a + a3 * (0.0809 + a * (0.03816 + a * (-0.12386 + a * 0.09616)));
+    Some(shape * rho / narrow_m)
+}
+
+fn push(spans: &mut [Vec<Piece>], piece: Piece) {
+    if let Some(last) = spans.last_mut() {
+        last.push(piece);
+    }
+}
+
+fn tanh(z: Complex64) -> Complex64 {
+    let decay = (-2.0 * z).exp();
+    (1.0 - decay) / (1.0 + decay)
+}
+
+/// J1(z)/J0(z) for complex z of moderate size (both parts below about 1e4), what boundary layers in tubes are made of;
+/// relative error below 1e-13 away from its poles on the real axis.
+///
+/// Up to |z| = 25 the continued fraction 1/(2/z - 1/(4/z - ...)) by the method of Lentz; beyond, the Hankel expansions
+/// of both functions (DLMF 10.10.1 and 10.17.5/6), of which one exponential is left far from the real axis.
+pub fn bessel_ratio(z: Complex64) -> Complex64 {
+    const CROSSOVER: f64 = 25.0;
+    if z.re < 0.0 {
+        return -bessel_ratio(-z);
+    }
+    if z.im > 0.0 {
+        return bessel_ratio(z.conj()).conj();
+    }
+    if z.norm() < CROSSOVER { ratio_by_fraction(z) } else { ratio_by_expansion(z) }
+}
+
+fn ratio_by_fraction(z: Complex64) -> Complex64 {
+    if z == Complex64::ZERO {
+        return z;
+    }
+    const TINY: Complex64 = Complex64::new(1e-300, 0.0);
+    let safe = |value: Complex64| if value == Complex64::ZERO { TINY } else { value };
+    let two_over_z = 2.0 / z;
+    // Denominator of 1 / (2/z - 1/(4/z - 1/(6/z - ...))).
+    let mut fraction = two_over_z;
+    let mut c = fraction;
+    let mut d = Complex64::ZERO;
+    for k in 2..200 {
+        let b = two_over_z * f64::from(k);
+        d = safe(b - d).inv();
+        c = safe(b - c.inv());
+        let change = c * d;
+        fraction *= change;
+        if (change - 1.0).norm_sqr() < 1e-31 {
+            break;
+        }
+    }
+    safe(fraction).inv()
+}
+
+/// For Re z >= 0, Im z <= 0, |z| >= 25.
+fn ratio_by_expansion(z: Complex64) -> Complex64 {
+    // Sums of (+-j)^k a_k(order) / z^k.
+    let step = J / (8.0 * z);
+    let sums = |order: f64| {
+        let (mut plus, mut minus, mut term) = (Complex64::ONE, Complex64::ONE, Complex64::ONE);
+        for k in 1..30 {
+            let odd = f64::from(2 * k - 1);
+            term *= step * ((4.0 * order * order - odd * odd) / f64::from(k));
+            plus += term;
+            minus += if k % 2 == 0 { term } else { -term };
+            if term.norm_sqr() < 1e-34 {
+                break;
+            }
+        }
+        (plus, minus)
+    };
+    let ((plus_0, minus_0), (plus_1, minus_1)) = (sums(0.0), sums(1.0));
+    // exp(-2j(z - pi/4)), at most 1 in this quadrant.
+    let other = J * (-2.0 * J * z).exp();
+    J * (other * minus_1 - plus_1) / (plus_0 + other * minus_0)
+}
+
+/// First `count` maxima of |Z| between 20 Hz and 6 kHz of any impedance function of frequency in Hz, lowest first.
+///
+/// A scan every 2 Hz, then golden section to 0.001 Hz; maxima closer than about 4 Hz are taken as one. `z` is expected in
+/// units of Zc of the nominal bore, as [`TransferMatrix::impedance`] gives it.
+pub fn find_peaks(z: impl Fn(f64) -> Complex64, count: usize) -> Vec<Peak> {
+    maxima(&z, &z, count)
+}
+
+/// As [`find_peaks`], with one function for the scan and one for the refinement.
+fn maxima(scan: impl Fn(f64) -> Complex64, fine: impl Fn(f64) -> Complex64, count: usize) -> Vec<Peak> {
+    let (lowest, highest, step) = SEARCH_HZ;
+    let steps = ((highest - lowest) / step) as usize;
+    let mut peaks = Vec::new();
+    let mut last_two = [f64::INFINITY; 2];
+    for k in 0..=steps {
+        if peaks.len() == count {
+            break;
+        }
+        let f_hz = lowest + step * k as f64;
+        let here = scan(f_hz).norm();
+        let [before, middle] = last_two;
+        if middle > before && middle >= here {
+            let f_hz = golden(|f_hz| fine(f_hz).norm(), f_hz - 2.0 * step, f_hz);
+            // Wide enough for the rounding of the phase, narrow against any resonance.
+            let h = 0.01;
+            let turn = (fine(f_hz + h) / fine(f_hz - h)).arg();
+            peaks.push(Peak { f_hz, mag_over_zc: fine(f_hz).norm(), q: -0.5 * f_hz * turn / (2.0 * h) });
+        }
+        last_two = [middle, here];
+    }
+    peaks
+}
+
+/// Maximum of a function with one maximum between `low` and `high`, to 0.0005 (golden section).
+fn golden(value: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    const RATIO: f64 = 0.618_033_988_749_894_8;
+    let (mut a, mut b) = (high - RATIO * (high - low), low + RATIO * (high - low));
+    let (mut value_a, mut value_b) = (value(a), value(b));
+    while high - low > 1e-3 {
+        if value_a > value_b {
+            (high, b, value_b) = (b, a, value_a);
+            a = high - RATIO * (high - low);
+            value_a = value(a);
+        } else {
+            (low, a, value_a) = (a, b, value_b);
+            b = low + RATIO * (high - low);
+            value_b = value(b);
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// Mouth pressure over closing pressure at which a quasi-static reed starts to sound.
+///
+/// From `3 g - 1 = 2 sqrt(g) / (zeta Z1)`: the reed's slope against a mode of height `z_peak_over_zc` (Re Z at the playing
+/// frequency over Zc of the nominal bore, above 0), with embouchure strength `zeta` in 0..1. Never below 1/3, the lossless bore.
+pub fn threshold_gamma(z_peak_over_zc: f64, zeta: f64) -> f64 {
+    let b = 1.0 / (zeta * z_peak_over_zc);
+    let root = (b + (3.0 + b * b).sqrt()) / 3.0;
+    root * root
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bore::instrument_file::BoreSegment;
+    use crate::units::{REFERENCE_RADIUS_M, cents};
+
+    /// Against mpmath (30 digits).
+    #[test]
+    fn bessel_ratio_is_that_of_mpmath() {
+        let cases = [
+            ([0.001, -0.001], [0.0004999998749999583, -0.0005000001249999583]),
+            ([0.5, -0.5], [0.23319357751878375, -0.2642214402469063]),
+            ([1.7, -1.7], [0.23226879711986625, -0.8717393191227187]),
+            ([5.0, -5.0], [0.052799806066648934, -0.9503859560201866]),
+            ([14.0, -14.0], [0.018187295266211895, -0.9821556086241254]),
+            ([17.6, -17.6], [0.014412011792797441, -0.9858017251067006]),
+            ([17.8, -17.8], [0.014247712409359226, -0.9859611115841213]),
+            ([40.0, -40.0], [0.006289550252139817, -0.9937505078493043]),
+            ([300.0, -300.0], [0.000834028935164107, -0.9991666678301231]),
+            ([3.0, 0.5], [-0.6234172132514337, 0.9799427079362115]),
+            ([26.0, -2.0], [0.024561779419476154, -0.9631629653806216]),
+            ([30.0, 0.3], [1.0913838647660885, 0.7164690670813585]),
+            ([-4.0, -4.0], [-0.06688225859811267, -0.9375597736008432]),
+            ([17.5, 17.7], [0.01433093766363248, 0.9857190879710848]),
+        ];
+        for ([re, im], [expected_re, expected_im]) in cases {
+            let (got, expected) =
+                (bessel_ratio(Complex64::new(re, im)), Complex64::new(expected_re, expected_im));
+            let error = (got - expected).norm() / expected.norm();
+            assert!(error < 1e-13, "{re} {im}: {got}, {expected}, relative error {error:e}");
+        }
+        assert_eq!(bessel_ratio(Complex64::ZERO), Complex64::ZERO);
+    }
+
+    fn tube(length_m: f64, radius_m: f64) -> InstrumentFile {
+        let (x_start_m, x_end_m, r_start_m, r_end_m) = (0.0, length_m, radius_m, radius_m);
+        InstrumentFile {
+            name: "tube".into(),
+            source: String::new(),
+            transposition: 0,
+            reed_volume_m3: 0.0,
+            nominal_radius_m: REFERENCE_RADIUS_M,
+            bore: vec![BoreSegment { part: String::new(), x_start_m, x_end_m, r_start_m, r_end_m }],
+            holes: Vec::new(),
+            fingerings: Vec::new(),
+        }
+    }
+
+    /// An open pipe without holes resonates at odd multiples of c / 4(L + 0.6133 r), a little flat with losses.
+    #[test]
+    fn open_cylinder_has_odd_quarter_waves() {
+        let air = Air::default();
+        let model = TransferMatrix::new(&tube(0.5, REFERENCE_RADIUS_M), air);
+        for (mode, peak) in model.peaks(&[], 0.0, 5).iter().enumerate() {
+            let lossless = (2 * mode + 1) as f64 * air.c / (4.0 * (0.5 + 0.6133 * REFERENCE_RADIUS_M));
+            assert!((-30.0..-5.0).contains(&cents(peak.f_hz, lossless)), "{peak:?} {lossless}");
+        }
+        assert!(model.reflectance_below(10.0, &[], 0).norm() > 0.999);
+    }
+
+    /// Scaled by f, peaks lie at 1/f of the frequency but for wall losses, which go with the inverse root of the size: a
+    /// larger bore is a few cents sharper than that, and its peaks are higher and narrower by about the root of f.
+    #[test]
+    fn scaled_instrument_has_scaled_peaks() {
+        let file = InstrumentFile::built_in();
+        let model = TransferMatrix::new(&file, Air::default());
+        for factor in [0.8, 1.5, 2.0] {
+            let large = TransferMatrix::new(&file.scaled(factor), Air::default());
+            for index in [0, 13, 19, 32] {
+                let open = &file.fingerings[index].open;
+                let (before, after) = (model.peaks(open, 0.0, 2), large.peaks(open, 0.0, 2));
+                assert_eq!(after.len(), 2);
+                for (before, after) in before.iter().zip(&after) {
+                    // Wall losses of quality Q lower a resonance by 1 / 2Q; other losses only make Q smaller.
+                    let walls =
+                        1_200.0 / std::f64::consts::LN_2 / (2.0 * before.q) * (1.0 - factor.powf(-0.5));
+                    let off = cents(after.f_hz * factor, before.f_hz);
+                    assert!(
+                        (0.2..1.3).contains(&(off / walls)),
+                        "{factor} {index}: {off} cents, walls {walls}"
+                    );
+                    let sharper = after.q / before.q / factor.sqrt();
+                    assert!((0.7..1.3).contains(&sharper), "{factor} {index}: Q {} {}", before.q, after.q);
+                    let higher = after.mag_over_zc / before.mag_over_zc / factor.sqrt();
+                    assert!((0.7..1.3).contains(&higher), "{factor} {index}: {before:?} {after:?}");
+                }
+            }
+        }
+    }
+
+    /// Peaks between the frequencies of the scan are those of the matrices themselves, also of a tube as long as a file may
+    /// have, whose modes lie closest.
+    #[test]
+    fn interpolated_peaks_are_the_exact_ones() {
+        let file = InstrumentFile::built_in();
+        for (file, open) in [
+            (file.clone(), file.fingerings[0].open.clone()),
+            (file.clone(), file.fingerings[32].open.clone()),
+            (file.scaled(2.0), file.fingerings[19].open.clone()),
+            (tube(3.0, 0.012), Vec::new()),
+        ] {
+            let model = TransferMatrix::new(&file, Air::default());
+            let exact = find_peaks(|f_hz| model.loaded(&model.at(f_hz), &open, 0.0), 3);
+            let found = model.peaks(&open, 0.0, 3);
+            assert_eq!((found.len(), exact.len()), (3, 3));
+            for (found, exact) in found.iter().zip(&exact) {
+                let off = cents(found.f_hz, exact.f_hz).abs();
+                let (height, q) = (found.mag_over_zc / exact.mag_over_zc - 1.0, found.q / exact.q - 1.0);
+                // Golden section itself stops at a thousandth of a hertz.
+                assert!(off < 0.05 && height.abs() < 5e-5 && q.abs() < 1e-3, "{found:?} {exact:?}");
+            }
+        }
+    }
+
+    /// A resonance whose height, frequency and Q are known in closed form.
+    #[test]
+    fn peaks_of_a_known_resonance_are_found() {
+        let resonance = |f_hz: f64, at_hz: f64, height: f64, q: f64| {
+            height / Complex64::new(1.0, q * (f_hz / at_hz - at_hz / f_hz))
+        };
+        let peaks = find_peaks(|f_hz| resonance(f_hz, 440.3, 30.0, 40.0), 9);
+        let [Peak { f_hz, mag_over_zc, q }] = peaks[..] else { panic!("{peaks:?}") };
+        assert!((f_hz - 440.3).abs() < 1e-3 && (mag_over_zc - 30.0).abs() < 1e-6 && (q - 40.0).abs() < 0.01);
+        let two = |f_hz| resonance(f_hz, 440.3, 30.0, 40.0) + resonance(f_hz, 1320.7, 20.0, 50.0);
+        assert_eq!([find_peaks(two, 9).len(), find_peaks(two, 1).len(), find_peaks(two, 0).len()], [2, 1, 0]);
+        assert!(find_peaks(|_| Complex64::new(f64::NAN, 0.0), 3).is_empty());
+    }
+
+    /// The pieces are fine enough: halving them moves no peak of the built-in clarinet by 0.1 cent.
+    #[test]
+    fn finer_pieces_move_no_peak() {
+        let file = InstrumentFile::built_in();
+        let open = file.fingerings[10].open.clone();
+        let coarse = TransferMatrix::new(&file, Air::default()).peaks(&open, 0.0, 3);
+        let fine = TransferMatrix::with_pieces(&file, Air::default(), (PIECE.0 / 2.0, PIECE.1 / 2.0));
+        for (coarse, fine) in coarse.iter().zip(fine.peaks(&open, 0.0, 3)) {
+            assert!(cents(coarse.f_hz, fine.f_hz).abs() < 0.1, "{coarse:?} {fine:?}");
+            assert!((coarse.mag_over_zc / fine.mag_over_zc - 1.0).abs() < 0.002, "{coarse:?} {fine:?}");
+        }
+    }
+
+    /// Re Z > 0 for every fingering, and nothing comes back louder than it went. With a complex Zc waves do not carry
+    /// power independently, so |R| may pass 1 by a few parts in a million at the lowest frequencies.
+    #[test]
+    fn the_instrument_is_passive() {
+        let file = InstrumentFile::built_in();
+        let model = TransferMatrix::new(&file, Air::default());
+        for fingering in &file.fingerings {
+            for k in 0..60 {
+                let f_hz = 20.0 * 1.12f64.powi(k);
+                let z = model.impedance(f_hz, &fingering.open, file.reed_volume_m3);
+                assert!(z.re > 0.0, "{} {f_hz}: {z}", fingering.written);
+                for hole in 0..=24 {
+                    let r = model.reflectance_below(f_hz, &fingering.open, hole).norm();
+                    assert!(r < 1.0 + 1e-5, "{} {f_hz} {hole}: {r}", fingering.written);
+                }
+            }
+        }
+        assert!(
+            model.impedance(f64::NAN, &[], 1.2e-6).is_finite() && model.impedance(1e9, &[], 0.0).is_finite()
+        );
+    }
+
+    #[test]
+    fn threshold_is_a_third_without_losses() {
+        assert!((threshold_gamma(1e12, 0.3) - 1.0 / 3.0).abs() < 1e-9);
+        assert!((threshold_gamma(33.67, 0.3) - 0.3737).abs() < 1e-4);
+    }
+}

@@ -1,0 +1,220 @@
+//! Finds the trims of a [`TuningTable`] by playing: every note is held, heard, and its delay moved until it is right.
+//!
+//! Notes are shared between the processor's cores and do not know of each other, so the result does not depend on how
+//! many there are. A note that does not sound in its register gets what its neighbours got and is marked. Cents above
+//! what is wanted, rows of round-trip delay, gamma.
+
+use std::ops::ControlFlow;
+
+use crate::analysis::pitch;
+use crate::instrument::held::HeldNote;
+use crate::instrument::model::Model;
+use crate::instrument::tuning::{GAMMA_NODES, NATURAL_GAMMA, NoteTuning, TuningTable};
+use crate::parallel;
+use crate::units::cents;
+
+/// A trimmed note is at most so far from its pitch, cents; a tenth of what anyone hears.
+const CLOSE_CENTS: f64 = 0.1;
+/// A note further off than this after its trim has been moved is said to be out of tune, cents.
+const OFF_CENTS: f64 = 0.5;
+/// How far a note is moved to see what a row of delay does to it, cents: down, where the delay always has room.
+const PROBE_CENTS: f64 = -20.0;
+/// Further off than this a note is another one, cents. Before it is trimmed it may be further, but never nearer to a
+/// neighbouring mode than to its own.
+const OWN_CENTS: (f64, f64) = (150.0, 300.0);
+/// Most plays for one trim.
+const PLAYS: usize = 6;
+/// A last step of less than this is not heard again, cents: what a row does is known to a few per cent by then.
+const SURE_CENTS: f64 = 2.0;
+/// A note that was moved by more than this has told what a row does, cents.
+const TOLD_CENTS: f64 = 10.0;
+/// Lowest note of the B flat clarinet, Hz: what is larger takes longer to settle, by as much as it is larger.
+const LOWEST_HZ: f64 = 146.83;
+
+/// How long a note is held before it is listened to, s, and until when: near threshold growth is slow.
+fn listening_s(model: &Model, gamma: f64) -> (f64, f64) {
+    let longer = (LOWEST_HZ / model.lowest_hz).clamp(1.0, 4.0);
+    let (from_s, to_s) = if gamma < 0.5 { (1.0, 1.3) } else { (0.6, 0.9) };
+    (longer * from_s, longer * to_s)
+}
+
+/// Pitch of a held note, Hz, or `None` if it is more than 150 cents from `wanted_hz` or not a note.
+pub fn heard_hz(model: &Model, note: &HeldNote, wanted_hz: f64) -> Option<f64> {
+    heard_within(model, note, wanted_hz, OWN_CENTS.0)
+}
+
+fn heard_within(model: &Model, note: &HeldNote, wanted_hz: f64, own_cents: f64) -> Option<f64> {
+    let (from_s, to_s) = listening_s(model, note.gamma);
+    let sound = note.radiated(model, from_s, to_s);
+    let hz = pitch::fundamental_hz(&sound, model.coeffs.rate_hz)?;
+    (cents(hz, wanted_hz).abs() < own_cents && pitch::periodicity(&sound, model.coeffs.rate_hz, hz) > 0.9)
+        .then_some(hz)
+}
+
+/// One note at one mouth pressure.
+struct Trial<'a> {
+    model: &'a Model,
+    fingering: usize,
+    gamma: f64,
+}
+
+/// Where a search has come to.
+#[derive(Clone, Copy)]
+struct Found {
+    rows: f64,
+    off_cents: f64,
+}
+
+impl Trial<'_> {
+    /// How far off the note is with so many rows.
+    fn play(&self, rows: f64) -> Option<Found> {
+        let wanted = self.model.notes_hz[self.fingering];
+        // Modes stand as the odd numbers: half the way to the next one up.
+        let mode = self.model.file.fingerings[self.fingering].mode as f64;
+        let half_way = 600.0 * ((2.0 * mode + 1.0) / (2.0 * mode - 1.0)).log2();
+        let note = HeldNote { rows, ..HeldNote::new(self.model, self.fingering, self.gamma) };
+        let hz = heard_within(self.model, &note, wanted, half_way.min(OWN_CENTS.1))?;
+        Some(Found { rows, off_cents: cents(hz, wanted) })
+    }
+
+    /// Secant steps from a trim that was heard; `sensitivity` is what a row does, or nothing yet. Gives the trim and what a
+    /// row does, if that was heard.
+    fn trim(&self, from: Found, known: Option<f64>) -> (Found, Option<f64>) {
+        let (low, high) = self.model.coeffs.tuning_range();
+        let estimate = |off_cents: f64| self.model.rows_for_cents(self.fingering, off_cents);
+        let mut sensitivity = known.unwrap_or(1.0);
+        let mut heard = known;
+        let (mut best, mut before) = (from, from);
+        let mut rows = from.rows;
+        for _ in 1..PLAYS {
+            if best.off_cents.abs() < CLOSE_CENTS {
+                break;
+            }
+            let wanted = (before.rows - sensitivity * estimate(before.off_cents)).clamp(low, high);
+            if wanted == rows {
+                break;
+            }
+            if heard.is_some() && before.off_cents.abs() < SURE_CENTS && wanted > low && wanted < high {
+                best = Found { rows: wanted, off_cents: 0.0 };
+                break;
+            }
+            rows = wanted;
+            let Some(here) = self.play(rows) else {
+                // It went too far and fell out of its register: half the way.
+                sensitivity *= 0.5;
+                before = best;
+                continue;
+            };
+            let moved = estimate(here.off_cents) - estimate(before.off_cents);
+            if moved.abs() > 0.02 {
+                sensitivity = ((here.rows - before.rows) / moved).clamp(0.5, 3.0);
+                if (here.off_cents - before.off_cents).abs() > TOLD_CENTS {
+                    heard = Some(sensitivity);
+                }
+            }
+            if here.off_cents.abs() < best.off_cents.abs() {
+                best = here;
+            }
+            before = here;
+        }
+        (best, heard)
+    }
+
+    /// Rows a cent costs near a trim, over [`Model::rows_for_cents`]; seen by moving the note.
+    fn sensitivity(&self, at: Found) -> Option<f64> {
+        let probe = self.model.rows_for_cents(self.fingering, PROBE_CENTS);
+        let (low, high) = self.model.coeffs.tuning_range();
+        // Where there is no room below there is above.
+        let probe = if at.rows + probe > high { (-probe).max(low - at.rows) } else { probe };
+        let moved = self.play(at.rows + probe)?.off_cents - at.off_cents;
+        Some((probe / self.model.rows_for_cents(self.fingering, moved)).clamp(0.5, 3.0))
+    }
+}
+
+/// The trims of one note, `untrimmed_cents` off without any at [`NATURAL_GAMMA`] or silent there.
+fn tune_note(model: &Model, fingering: usize, untrimmed_cents: Option<f64>) -> NoteTuning {
+    let at = |gamma: f64| Trial { model, fingering, gamma };
+    let mut note = model.tuning.notes[fingering];
+    let (natural, heard) = match untrimmed_cents {
+        Some(off_cents) => {
+            let (found, heard) = at(NATURAL_GAMMA).trim(Found { rows: 0.0, off_cents }, None);
+            (Some(found), heard.or_else(|| at(NATURAL_GAMMA).sensitivity(found)))
+        }
+        None => (None, None),
+    };
+    let mut guess = natural.map_or(0.0, |found| found.rows);
+    let nodes = GAMMA_NODES.map(|gamma| {
+        let found = at(gamma).play(guess).map(|found| at(gamma).trim(found, heard).0);
+        if let Some(found) = found {
+            guess = found.rows;
+        }
+        found
+    });
+    // A note too weak for the natural pressure is tuned at the next that it takes.
+    let first = natural.or_else(|| nodes.into_iter().flatten().next());
+    note.silent = first.is_none();
+    note.sensitivity = heard.unwrap_or(1.0);
+    note.natural = first.map_or(0.0, |found| found.rows);
+    note.off_cents = first.map_or(0.0, |found| found.off_cents);
+    if note.off_cents.abs() < OFF_CENTS {
+        note.off_cents = 0.0;
+    }
+    let mut rows = note.natural;
+    for (trim, found) in note.tempered.iter_mut().zip(nodes) {
+        rows = found.map_or(rows, |found| found.rows);
+        *trim = rows;
+    }
+    note
+}
+
+/// How far each note is from its pitch without a trim at [`NATURAL_GAMMA`], cents; `None` where it is not its own. `on`
+/// is told the share done and may end it.
+pub fn offsets(model: &Model, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Option<Vec<Option<f64>>> {
+    let untrimmed = |fingering: usize| {
+        let trial = Trial { model, fingering, gamma: NATURAL_GAMMA };
+        trial.play(0.0).map(|found| found.off_cents)
+    };
+    parallel::each(model.file.fingerings.len(), untrimmed, on)
+}
+
+/// Tunes every fingering of a model by playing it, on all cores; `offsets` as [`offsets`] heard them. Takes up to a
+/// minute; `on` is told the share done and may end it, for `None`.
+pub fn tune(
+    model: &Model,
+    offsets: &[Option<f64>],
+    on: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Option<TuningTable> {
+    let count = model.file.fingerings.len();
+    let note = |fingering: usize| tune_note(model, fingering, offsets.get(fingering).copied().flatten());
+    let mut table = TuningTable { notes: parallel::each(count, note, on)? };
+    fill_silent(model, &mut table);
+    Some(table)
+}
+
+/// Gives notes that do not sound trims between those of the nearest that do, as parts of the note's own length.
+fn fill_silent(model: &Model, table: &mut TuningTable) {
+    let per_cent = |fingering: usize| model.rows_for_cents(fingering, -1.0);
+    let heard: Vec<usize> = (0..table.notes.len()).filter(|&note| !table.notes[note].silent).collect();
+    for silent in 0..table.notes.len() {
+        if !table.notes[silent].silent {
+            continue;
+        }
+        let after = heard.partition_point(|&note| note < silent);
+        let (below, above) = (after.checked_sub(1).map(|at| heard[at]), heard.get(after).copied());
+        let (Some(low), Some(high)) = (below.or(above), above.or(below)) else { return };
+        let way = if low == high { 0.0 } else { (silent - low) as f64 / (high - low) as f64 };
+        let (low, high) = ((low, table.notes[low]), (high, table.notes[high]));
+        let between = |rows: fn(&NoteTuning) -> f64| {
+            let [a, b] = [low, high].map(|(note, tuning)| rows(&tuning) / per_cent(note));
+            (a + way * (b - a)) * per_cent(silent)
+        };
+        let note = &mut table.notes[silent];
+        note.natural = between(|note| note.natural);
+        note.tempered = [
+            between(|note| note.tempered[0]),
+            between(|note| note.tempered[1]),
+            between(|note| note.tempered[2]),
+            between(|note| note.tempered[3]),
+        ];
+    }
+}

@@ -1,0 +1,209 @@
+//! Amplitude of a note while the breath slowly grows and slowly fades: where it begins, beats, chokes and returns.
+//!
+//! Gamma runs in a straight line from 0 to a maximum and back. In windows of whole periods the pressure in the
+//! mouthpiece gives its rms about its mean, over the closing pressure, and the reed the part of time it is shut. Up and
+//! down differ where two states are stable, and because a ramp that moves at all overtakes a threshold before the note
+//! has grown (Bergeot, Almeida, Vergez and Gazengel 2013); the slower, the less.
+
+use crate::instrument::{Clarinet, Model, Probe, Settings};
+use crate::reed::motion::SHUT;
+use crate::score::Score;
+use crate::score::breath::BreathCurve;
+use crate::score::play_probed;
+use crate::units::SoundingNote;
+use std::convert::Infallible;
+use std::sync::Arc;
+
+/// A note sounds above this rms over the closing pressure: a hundredth of a loud one's.
+pub const SOUNDS: f64 = 0.01;
+/// Shortest window, s.
+const WINDOW_S: f64 = 0.02;
+
+/// One window of the ramp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    /// Mouth pressure over closing pressure, mean of the window.
+    pub gamma: f64,
+    /// Rms of the mouthpiece's pressure about its mean, over the closing pressure.
+    pub rms: f64,
+    /// Part of the time the reed is shut, 0..=1.
+    pub shut: f64,
+}
+
+/// Both ways.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Bifurcation {
+    /// Gamma growing.
+    pub up: Vec<Point>,
+    /// Gamma falling.
+    pub down: Vec<Point>,
+}
+
+/// Gammas at which something changes; `None` where it does not within the ramp.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Changes {
+    /// Growing: the note begins.
+    pub begins: Option<f64>,
+    /// Growing: the reed first touches the lay while the note sounds.
+    pub beats: Option<f64>,
+    /// Growing: the reed stays shut, the note chokes.
+    pub chokes: Option<f64>,
+    /// Falling: the note comes back.
+    pub returns: Option<f64>,
+    /// Falling: the reed no longer touches the lay.
+    pub opens: Option<f64>,
+    /// Falling: the note ends.
+    pub ends: Option<f64>,
+}
+
+impl Bifurcation {
+    /// Where things change.
+    pub fn changes(&self) -> Changes {
+        let sounds = |point: &Point| point.rms > SOUNDS;
+        let begins = self.up.iter().position(sounds);
+        let sounding = begins.map_or(&[][..], |begins| &self.up[begins..]);
+        let beats = sounding.iter().find(|point| point.shut > 0.0);
+        // The last window that sounds, if silence follows.
+        let chokes = sounding.iter().rposition(sounds).and_then(|last| sounding.get(last + 1));
+        let returns = self.down.iter().position(sounds);
+        let after = returns.map_or(&[][..], |returns| &self.down[returns..]);
+        let opens = after.iter().rposition(|point| sounds(point) && point.shut > 0.0);
+        let ends = after.iter().rposition(sounds).and_then(|last| after.get(last + 1));
+        let gamma = |point: &Point| point.gamma;
+        Changes {
+            begins: sounding.first().map(gamma),
+            beats: beats.map(gamma),
+            chokes: chokes.map(gamma),
+            // A note that never choked has nothing to come back from.
+            returns: chokes.and(after.first()).map(gamma),
+            opens: opens.and_then(|last| after.get(last + 1)).map(gamma),
+            ends: ends.map(gamma),
+        }
+    }
+}
+
+/// Plays `note` while gamma goes from 0 to `gamma_max` and back, `seconds` each way. `each` hears how many host samples
+/// have gone by.
+///
+/// `settings` must let full breath reach `gamma_max`.
+pub fn measure(
+    model: &Arc<Model>,
+    settings: &Settings,
+    note: SoundingNote,
+    gamma_max: f32,
+    seconds: f64,
+    rate: u32,
+    mut each: impl FnMut(usize),
+) -> Bifurcation {
+    let mut clarinet = Clarinet::new(model.clone(), f64::from(rate));
+    clarinet.set_settings(settings);
+    clarinet.reset();
+    let score =
+        Score::note(note, 2.0 * seconds, rate).blown(&BreathCurve::swell(gamma_max, seconds), settings, rate);
+    let inner_hz = clarinet.internal_rate_hz();
+    let period = inner_hz / note.frequency_hz(f64::from(settings.a4_hz));
+    let window = (period * (WINDOW_S * inner_hz / period).ceil()).round() as usize;
+    let closing_pa = settings.closing_pa();
+    let half = (seconds * inner_hz) as usize;
+    let mut found = Bifurcation::default();
+    let (mut seen, mut inside) = (0_usize, Window::default());
+    let mut probe = |probe: Probe| {
+        inside.add(&probe, closing_pa);
+        seen += 1;
+        if inside.count == window {
+            let point = std::mem::take(&mut inside).point();
+            if seen <= half { found.up.push(point) } else { found.down.push(point) }
+        }
+    };
+    let Ok(()) = play_probed(&mut clarinet, &score, 4096, &mut probe, |block| {
+        each(block.len());
+        Ok::<_, Infallible>(())
+    });
+    found
+}
+
+/// Sums over a window.
+#[derive(Default)]
+struct Window {
+    count: usize,
+    gamma: f64,
+    sum: f64,
+    squares: f64,
+    shut: usize,
+}
+
+impl Window {
+    fn add(&mut self, probe: &Probe, closing_pa: f64) {
+        let p = probe.p_mouthpiece_pa / closing_pa;
+        self.count += 1;
+        self.gamma += probe.gamma;
+        self.sum += p;
+        self.squares += p * p;
+        self.shut += usize::from(probe.opening < SHUT);
+    }
+
+    fn point(self) -> Point {
+        let count = self.count.max(1) as f64;
+        let mean = self.sum / count;
+        Point {
+            gamma: self.gamma / count,
+            rms: (self.squares / count - mean * mean).max(0.0).sqrt(),
+            shut: self.shut as f64 / count,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(gamma: f64, rms: f64, shut: f64) -> Point {
+        Point { gamma, rms, shut }
+    }
+
+    #[test]
+    fn changes_are_found_both_ways() {
+        let found = Bifurcation {
+            up: vec![
+                point(0.1, 0.0, 0.0),
+                point(0.4, 0.2, 0.0),
+                point(0.5, 0.3, 0.1),
+                point(1.0, 0.5, 0.5),
+                point(1.5, 0.0, 1.0),
+            ],
+            down: vec![
+                point(1.4, 0.0, 1.0),
+                point(1.0, 0.5, 0.5),
+                point(0.45, 0.2, 0.0),
+                point(0.35, 0.001, 0.0),
+            ],
+        };
+        let changes = found.changes();
+        assert_eq!((changes.begins, changes.beats, changes.chokes), (Some(0.4), Some(0.5), Some(1.5)));
+        assert_eq!((changes.returns, changes.opens, changes.ends), (Some(1.0), Some(0.45), Some(0.35)));
+        assert_eq!(Bifurcation::default().changes(), Changes::default());
+    }
+
+    #[test]
+    fn a_low_note_begins_above_a_third_and_beats_near_one_half_on_a_sharp_lay() {
+        let model = Arc::new(Model::built_in(48_000.0).unwrap());
+        let settings = Settings { breath_full_kpa: 20.0, lay: 0.0, ..Settings::default() };
+        let mut samples = 0;
+        let found = measure(&model, &settings, SoundingNote(50), 0.8, 4.0, 48_000, |block| samples += block);
+        assert_eq!(samples, 8 * 48_000);
+        let changes = found.changes();
+        let (begins, beats, ends) = (changes.begins.unwrap(), changes.beats.unwrap(), changes.ends.unwrap());
+        assert!((1.0 / 3.0..0.5).contains(&begins), "{changes:?}");
+        // Raman's string without losses: 1/2.
+        assert!((0.44..0.52).contains(&beats) && beats > begins, "{changes:?}");
+        assert!(ends < begins, "a ramp overtakes the threshold: {changes:?}");
+        assert_eq!((changes.chokes, changes.returns), (None, None));
+        let slow = measure(&model, &settings, SoundingNote(50), 0.8, 12.0, 48_000, |_| {}).changes();
+        assert!(
+            slow.begins.unwrap() < begins && slow.ends.unwrap() > ends,
+            "slower, less: {slow:?} {changes:?}"
+        );
+        let top = found.up.last().unwrap();
+        assert!((0.7..=0.8).contains(&top.gamma) && top.rms > 0.4, "{top:?}");
+    }
+}

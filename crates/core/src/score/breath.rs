@@ -1,0 +1,264 @@
+//! Mouth pressure over time, in closing pressures (gamma), drawn as straight lines between points.
+//!
+//! Sources: a constant, a ramp, a crescendo over the whole score, or a CSV file `t_s,gamma`. Before the first point and
+//! after the last one pressure holds. The curve reaches the instrument as a breath event every millisecond while it
+//! moves, finer than any controller; the instrument smooths what is between.
+
+use crate::event::{Event, Timed};
+use crate::instrument::Settings;
+use crate::score;
+use std::io;
+use std::io::{BufRead, BufReader};
+
+/// Largest mouth pressure the renderer takes, closing pressures. The instrument is tested up to here.
+pub const GAMMA_MAX: f32 = 3.0;
+
+/// Largest breath file, points: a day at one point per millisecond would be 86 million, an hour is enough.
+const POINTS_MAX: usize = 3_600_000;
+
+/// Time between breath events while the curve moves, s.
+const STEP_S: f64 = 0.001;
+
+/// Why a breath curve was refused. Lines are counted from 1.
+#[derive(Debug, thiserror::Error)]
+pub enum BreathError {
+    /// Outside what the instrument can take.
+    #[error("gamma must lie in 0..3 (mouth pressure over closing pressure), got {0}")]
+    Gamma(f32),
+    /// A shape in words that is none.
+    #[error("breath {0:?} is neither a CSV file nor ramp:FROM:TO:SECONDS, for example ramp:0:1:4")]
+    Shape(String),
+    /// A crescendo in words that is none.
+    #[error("crescendo must be FROM:TO, for example 0.4:0.9, got {0:?}")]
+    Crescendo(String),
+    /// A duration that is none.
+    #[error("a ramp lasts more than 0 s and at most a day, got {0:?}")]
+    Seconds(String),
+    /// The file cannot be read.
+    #[error("{0}")]
+    Read(#[from] io::Error),
+    /// A line without two columns.
+    #[error("line {line}: expected two columns t_s,gamma, got {given:?}")]
+    Columns {
+        /// Line in the file.
+        line: u64,
+        /// The line as it stands.
+        given: String,
+    },
+    /// A field that is no number.
+    #[error("line {line}: {column} must be a number, got {given:?}")]
+    Number {
+        /// Line in the file.
+        line: u64,
+        /// Column name.
+        column: &'static str,
+        /// The field as it stands.
+        given: String,
+    },
+    /// Time that is negative or does not advance.
+    #[error(
+        "line {line}: t_s must grow from line to line and start at 0 or later, got {given} after {before}"
+    )]
+    Time {
+        /// Line in the file.
+        line: u64,
+        /// Time of this line, s.
+        given: f64,
+        /// Time of the line before, s.
+        before: f64,
+    },
+    /// Pressure outside the range.
+    #[error("line {line}: gamma must lie in 0..3 (mouth pressure over closing pressure), got {given}")]
+    LineGamma {
+        /// Line in the file.
+        line: u64,
+        /// The pressure as it stands.
+        given: f32,
+    },
+    /// Nothing to blow.
+    #[error("no data: expected lines t_s,gamma, for example 0.0,0.5")]
+    Empty,
+    /// Longer than anyone blows.
+    #[error("more than {POINTS_MAX} points; one per millisecond is enough")]
+    TooLong,
+}
+
+/// Gamma over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BreathCurve {
+    /// Time in s, strictly growing, and gamma 0..=3. Never empty.
+    points: Vec<(f64, f32)>,
+    /// Time is a fraction of the score instead of seconds.
+    relative: bool,
+}
+
+fn gamma(gamma: f32) -> Result<f32, BreathError> {
+    if (0.0..=GAMMA_MAX).contains(&gamma) { Ok(gamma) } else { Err(BreathError::Gamma(gamma)) }
+}
+
+impl BreathCurve {
+    /// The same pressure all the time, clamped to 0..=3.
+    pub fn constant(gamma: f32) -> Self {
+        Self { points: vec![(0.0, gamma.clamp(0.0, GAMMA_MAX))], relative: false }
+    }
+
+    /// From 0 to `gamma` and back, `seconds` each way; gamma clamped to 0..=3, seconds positive.
+    pub fn swell(gamma: f32, seconds: f64) -> Self {
+        let top = (seconds, gamma.clamp(0.0, GAMMA_MAX));
+        Self { points: vec![(0.0, 0.0), top, (2.0 * seconds, 0.0)], relative: false }
+    }
+
+    /// `FROM:TO` over the whole score.
+    pub fn parse_crescendo(text: &str) -> Result<Self, BreathError> {
+        let bad = || BreathError::Crescendo(text.to_owned());
+        let (from, to) = text.split_once(':').ok_or_else(bad)?;
+        let number = |s: &str| s.trim().parse::<f32>().map_err(|_| bad());
+        Ok(Self { points: vec![(0.0, gamma(number(from)?)?), (1.0, gamma(number(to)?)?)], relative: true })
+    }
+
+    /// `ramp:FROM:TO:SECONDS`, then held; a trailing `s` is allowed.
+    pub fn parse_ramp(text: &str) -> Result<Self, BreathError> {
+        let bad = || BreathError::Shape(text.to_owned());
+        let fields: Vec<&str> =
+            text.strip_prefix("ramp:").ok_or_else(bad)?.split(':').map(str::trim).collect();
+        let &[from, to, duration] = fields.as_slice() else { return Err(bad()) };
+        let number = |s: &str| s.parse::<f32>().map_err(|_| bad());
+        let seconds = duration
+            .trim_end_matches('s')
+            .parse::<f64>()
+            .ok()
+            .filter(|s| *s > 0.0 && *s <= 86_400.0)
+            .ok_or_else(|| BreathError::Seconds(duration.to_owned()))?;
+        Ok(Self {
+            points: vec![(0.0, gamma(number(from)?)?), (seconds, gamma(number(to)?)?)],
+            relative: false,
+        })
+    }
+
+    /// Lines `t_s,gamma`; the header line may be there, `#` begins a comment line.
+    pub fn read_csv(from: impl io::Read) -> Result<Self, BreathError> {
+        let mut points: Vec<(f64, f32)> = Vec::new();
+        let mut first = true;
+        // Two plain numbers need no quoting, and counting lines ourselves counts empty ones and comments too.
+        for (text, line) in BufReader::new(from).split(b'\n').zip(1..) {
+            let text = text?;
+            let text = String::from_utf8_lossy(&text);
+            let text = text.trim_start_matches('\u{feff}').trim();
+            if text.is_empty() || text.starts_with('#') {
+                continue;
+            }
+            let fields: Vec<&str> = text.split(',').map(str::trim).collect();
+            let &[t, g] = fields.as_slice() else {
+                return Err(BreathError::Columns { line, given: text.to_owned() });
+            };
+            if std::mem::take(&mut first) && (t, g) == ("t_s", "gamma") {
+                continue;
+            }
+            let number = |given: &str, column| {
+                let refused = || BreathError::Number { line, column, given: given.to_owned() };
+                given.parse::<f64>().ok().filter(|x| x.is_finite()).ok_or_else(refused)
+            };
+            let (t, g) = (number(t, "t_s")?, number(g, "gamma")? as f32);
+            let before = points.last().map_or(f64::NEG_INFINITY, |p| p.0);
+            if t < 0.0 || t <= before {
+                return Err(BreathError::Time { line, given: t, before: before.max(0.0) });
+            }
+            if !(0.0..=GAMMA_MAX).contains(&g) {
+                return Err(BreathError::LineGamma { line, given: g });
+            }
+            if points.len() == POINTS_MAX {
+                return Err(BreathError::TooLong);
+            }
+            points.push((t, g));
+        }
+        if points.is_empty() { Err(BreathError::Empty) } else { Ok(Self { points, relative: false }) }
+    }
+
+    /// The hardest blow, closing pressures.
+    pub fn gamma_max(&self) -> f32 {
+        self.points.iter().fold(0.0, |max, p| max.max(p.1))
+    }
+
+    /// Pressure at `t`, in seconds (or as a fraction of the score).
+    fn at(&self, t: f64) -> f32 {
+        let after = self.points.partition_point(|p| p.0 <= t);
+        match (after.checked_sub(1).map(|i| self.points[i]), self.points.get(after)) {
+            (Some((t0, g0)), Some(&(t1, g1))) => {
+                (f64::from(g0) + (t - t0) / (t1 - t0) * f64::from(g1 - g0)) as f32
+            }
+            (Some((_, g)), None) | (None, Some(&(_, g))) => g,
+            (None, None) => 0.0,
+        }
+    }
+
+    /// Breath events for a score of `samples`.
+    pub(super) fn events(&self, samples: usize, rate: u32, settings: &Settings) -> Vec<Timed<Event>> {
+        let unit = if self.relative { (samples as f64 / f64::from(rate)).max(STEP_S) } else { 1.0 };
+        let mut events: Vec<Timed<Event>> = Vec::new();
+        let mut last = None;
+        for step in 0.. {
+            let at = score::samples_in(f64::from(step) * STEP_S, rate);
+            if step > 0 && at >= samples {
+                break;
+            }
+            let gamma = self.at(at as f64 / f64::from(rate) / unit);
+            if last.replace(gamma) != Some(gamma) {
+                events.push(Timed { at, event: Event::Breath(score::breath_of_gamma(gamma, settings)) });
+            }
+        }
+        events
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(text: &str) -> String {
+        BreathCurve::read_csv(text.as_bytes()).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn lines_between_points_and_held_ends() {
+        let curve = BreathCurve::read_csv("# my breath\nt_s,gamma\n1, 0.2\n2, 0.6\n".as_bytes()).unwrap();
+        assert_eq!(curve.at(0.0), 0.2);
+        assert!((curve.at(1.5) - 0.4).abs() < 1e-6);
+        assert_eq!(curve.at(9.0), 0.6);
+        assert_eq!(curve.gamma_max(), 0.6);
+    }
+
+    #[test]
+    fn constant_is_one_event_and_a_ramp_one_per_millisecond() {
+        let settings = Settings::default();
+        assert_eq!(BreathCurve::constant(0.5).events(48_000, 48_000, &settings).len(), 1);
+        let ramp = BreathCurve::parse_ramp("ramp:0:1:0.5s").unwrap().events(48_000, 48_000, &settings);
+        assert_eq!(ramp.len(), 501);
+        assert!(matches!(ramp[500], Timed { at: 24_000, event: Event::Breath(b) } if (b - 1.0).abs() < 1e-6));
+        let swell = BreathCurve::parse_crescendo("0.4:0.8").unwrap().events(48_000, 48_000, &settings);
+        assert_eq!(swell.len(), 1000);
+        assert!(matches!(swell[500].event, Event::Breath(b) if (b - 0.6).abs() < 1e-6));
+    }
+
+    #[test]
+    fn refusals_name_the_line_and_what_would_be_right() {
+        assert!(
+            refusal("t_s,gamma\n0,0.1\n1,loud\n").starts_with("line 3: gamma must be a number, got \"loud\"")
+        );
+        assert!(refusal("0,0.1\n\n0,0.2\n").starts_with("line 3: t_s must grow"));
+        assert!(refusal("0,0.1,7\n").starts_with("line 1: expected two columns t_s,gamma, got \"0,0.1,7\""));
+        assert!(refusal("0,3.5\n").starts_with("line 1: gamma must lie in 0..3"));
+        assert!(refusal("-1,0.5\n").starts_with("line 1: t_s"));
+        assert!(refusal("0,nan\n").starts_with("line 1: gamma must be a number"));
+        assert!(refusal("# nothing\n").starts_with("no data"));
+    }
+
+    #[test]
+    fn shapes_that_are_none_are_refused() {
+        for text in ["ramp:0:1", "ramp:a:1:2", "ramp:0:1:0", "ramp:0:4:1", "rampe:0:1:2"] {
+            assert!(BreathCurve::parse_ramp(text).is_err(), "{text}");
+        }
+        for text in ["0.4", "0.4:x", "0.4:-1", "0.4:0.9:1", "nan:1"] {
+            assert!(BreathCurve::parse_crescendo(text).is_err(), "{text}");
+        }
+    }
+}

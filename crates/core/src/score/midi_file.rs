@@ -1,0 +1,373 @@
+//! Standard MIDI files, format 0 and 1, as a score.
+//!
+//! Tracks merge by tick; at one tick the earlier track and the earlier message come first, so that a file always plays
+//! the same way. Tempo changes of every track count. Time is kept as an exact fraction and rounded once, to the nearest
+//! sample. Notes are sounding pitch. Left out: format 2 (patterns that do not belong together) and everything that is
+//! not a channel message or a tempo.
+//!
+//! Files damaged on the way are refused with the byte where reading stopped, rather than played up to there.
+//! Source: Standard MIDI Files 1.0 (RP-001, 1988).
+
+use crate::control::midi::{Events, MidiDecoder};
+use crate::event::{Event, Timed};
+use crate::score::Score;
+use midly::{EventIter, MetaMessage, MidiMessage, TrackEventKind};
+
+/// Longest score, s. Sample positions stay far inside every integer.
+const SECONDS_MAX: u32 = 6 * 3600;
+
+/// Microseconds in a quarter note until the file says otherwise.
+const DEFAULT_TEMPO_US: u32 = 500_000;
+
+/// Why a MIDI file was refused. Positions are bytes from the start of the file.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum MidiFileError {
+    /// Another kind of file, or none.
+    #[error("not a standard MIDI file: it should begin with MThd{}", begins(.0))]
+    NotMidi(Vec<u8>),
+    /// A header cut short.
+    #[error("MIDI header is cut short: {length} bytes of 14")]
+    Header {
+        /// Bytes there are.
+        length: usize,
+    },
+    /// A format nobody has defined.
+    #[error("MIDI format must be 0 or 1, got {0}")]
+    Format(u8),
+    /// A film speed nobody uses.
+    #[error("MIDI time code must count 24, 25, 29 or 30 frames a second, got {0}")]
+    Frames(u8),
+    /// Format 2.
+    #[error("MIDI format 2 (unrelated patterns) cannot be played as one piece; save it as format 0 or 1")]
+    Format2,
+    /// A division of time into nothing.
+    #[error("MIDI header gives 0 ticks per beat or frame; expected 1 or more, usually 480 or 960")]
+    NoTicks,
+    /// The file ends before a chunk does.
+    #[error(
+        "MIDI file ends at byte {end}, but the chunk at byte {start} should go on to byte {wanted}; is it a whole file?"
+    )]
+    Truncated {
+        /// First byte of the chunk.
+        start: usize,
+        /// Where the chunk should end.
+        wanted: usize,
+        /// Where the file ends.
+        end: usize,
+    },
+    /// Fewer tracks than the header says.
+    #[error("MIDI header announces {announced} tracks, the file holds {found}; is it a whole file?")]
+    Tracks {
+        /// Tracks in the header.
+        announced: u16,
+        /// Tracks in the file.
+        found: u16,
+    },
+    /// A message that is none.
+    #[error("MIDI track {track} is damaged: no valid message at byte {at}")]
+    Message {
+        /// Track, counted from 1.
+        track: usize,
+        /// First byte of the message.
+        at: usize,
+    },
+    /// Nothing to play.
+    #[error("MIDI file holds no notes; expected at least one note-on")]
+    NoNotes,
+    /// Longer than a score may be.
+    #[error("MIDI file lasts {hours:.1} hours; at most {} can be rendered", SECONDS_MAX / 3600)]
+    TooLong {
+        /// Length of the file.
+        hours: f64,
+    },
+}
+
+fn begins(bytes: &[u8]) -> String {
+    if bytes.is_empty() {
+        ", but it is empty".to_owned()
+    } else {
+        format!(", but begins with {:?}", String::from_utf8_lossy(bytes))
+    }
+}
+
+/// A message of any track, in its place.
+struct Message<'a> {
+    tick: u64,
+    kind: TrackEventKind<'a>,
+}
+
+/// Seconds as a fraction with a fixed denominator: `numerator / per_second`.
+struct Clock {
+    /// Tempo counts; otherwise ticks are parts of a film frame.
+    metrical: bool,
+    per_second: u128,
+    per_tick: u128,
+    numerator: u128,
+}
+
+/// The header's division of time: ticks per quarter note, or minus frames per second and ticks per frame.
+fn clock(high: u8, low: u8) -> Result<Clock, MidiFileError> {
+    let metrical = high < 128;
+    let (per_second, per_tick) = if metrical {
+        (u128::from(u16::from_be_bytes([high, low])) * 1_000_000, u128::from(DEFAULT_TEMPO_US))
+    } else {
+        // 29 stands for 30000/1001 frames per second.
+        let (frames, seconds) = match high.wrapping_neg() {
+            29 => (30_000, 1001),
+            frames @ (24 | 25 | 30) => (u128::from(frames), 1),
+            frames => return Err(MidiFileError::Frames(frames)),
+        };
+        (frames * u128::from(low), seconds)
+    };
+    if per_second == 0 {
+        return Err(MidiFileError::NoTicks);
+    }
+    Ok(Clock { metrical, per_second, per_tick, numerator: 0 })
+}
+
+impl Clock {
+    fn advance(&mut self, ticks: u64) {
+        self.numerator += u128::from(ticks) * self.per_tick;
+    }
+
+    fn set_tempo(&mut self, us_per_beat: u32) {
+        if self.metrical {
+            self.per_tick = u128::from(us_per_beat);
+        }
+    }
+
+    fn sample(&self, rate: u32) -> Result<usize, MidiFileError> {
+        if self.numerator > u128::from(SECONDS_MAX) * self.per_second {
+            return Err(MidiFileError::TooLong {
+                hours: self.numerator as f64 / self.per_second as f64 / 3600.0,
+            });
+        }
+        let rounded = (2 * self.numerator * u128::from(rate) + self.per_second) / (2 * self.per_second);
+        Ok(rounded as usize)
+    }
+}
+
+/// Reads a whole file as a score at `rate`, ending with its last event.
+pub fn read(bytes: &[u8], rate: u32) -> Result<Score, MidiFileError> {
+    read_as(MidiDecoder::new(), bytes, rate)
+}
+
+/// The same with a decoder that knows something about the file.
+pub fn read_as(mut decoder: MidiDecoder, bytes: &[u8], rate: u32) -> Result<Score, MidiFileError> {
+    let (mut clock, messages) = merged(bytes)?;
+    let (mut events, mut tick, mut notes) = (Vec::new(), 0, 0usize);
+    for message in messages {
+        clock.advance(message.tick - tick);
+        tick = message.tick;
+        let decoded = match message.kind {
+            TrackEventKind::Midi { channel, message } => decode(&mut decoder, channel.as_int(), message),
+            TrackEventKind::Meta(MetaMessage::Tempo(us)) => {
+                clock.set_tempo(us.as_int());
+                [None, None]
+            }
+            _ => [None, None],
+        };
+        for event in decoded.into_iter().flatten() {
+            notes += usize::from(matches!(event, Event::NoteOn { .. }));
+            events.push(Timed { at: clock.sample(rate)?, event });
+        }
+    }
+    if notes == 0 {
+        return Err(MidiFileError::NoNotes);
+    }
+    let samples = events.last().map_or(0, |e| e.at);
+    Ok(Score { events, samples })
+}
+
+fn decode(decoder: &mut MidiDecoder, channel: u8, message: MidiMessage) -> Events {
+    match message {
+        MidiMessage::NoteOn { key, vel } => decoder.note_on(channel, key.as_int(), vel.as_int()),
+        MidiMessage::NoteOff { key, .. } => decoder.note_off(Some(channel), key.as_int()),
+        MidiMessage::Controller { controller, value } => {
+            decoder.controller(channel, controller.as_int(), value.as_int())
+        }
+        MidiMessage::ChannelAftertouch { vel } => decoder.pressure(channel, vel.as_int()),
+        MidiMessage::PitchBend { bend } => decoder.bend(channel, bend.0.as_int()),
+        MidiMessage::Aftertouch { .. } | MidiMessage::ProgramChange { .. } => [None, None],
+    }
+}
+
+/// All tracks in one row, in order of time.
+fn merged(bytes: &[u8]) -> Result<(Clock, Vec<Message<'_>>), MidiFileError> {
+    // A RIFF wrapper (.rmi) holds an ordinary file further in.
+    let start = if bytes.starts_with(b"RIFF") { find(bytes, b"MThd").unwrap_or(0) } else { 0 };
+    let file = &bytes[start..];
+    if !file.starts_with(b"MThd") {
+        return Err(MidiFileError::NotMidi(bytes[..bytes.len().min(4)].to_vec()));
+    }
+    let &[_, _, _, _, _, _, _, _, _, format, t0, t1, d0, d1, ..] = file else {
+        return Err(MidiFileError::Header { length: file.len() });
+    };
+    let (announced, clock) = (u16::from_be_bytes([t0, t1]), clock(d0, d1)?);
+    match format {
+        0 | 1 => {}
+        2 => return Err(MidiFileError::Format2),
+        other => return Err(MidiFileError::Format(other)),
+    }
+    let mut messages = Vec::new();
+    let (mut at, mut track) = (0, 0u16);
+    // Padding or a wrapper's other chunks may follow the last track.
+    while at < file.len() && (at == 0 || track < announced) {
+        let Some(length) = file.get(at + 4..at + 8) else { break };
+        // PANIC: the slice above has four bytes.
+        let length = u32::from_be_bytes([length[0], length[1], length[2], length[3]]) as usize;
+        let (first, end) = (at + 8, (at + 8).saturating_add(length));
+        let Some(body) = file.get(first..end) else {
+            return Err(MidiFileError::Truncated {
+                start: start + at,
+                wanted: start.saturating_add(end),
+                end: bytes.len(),
+            });
+        };
+        if file[at..].starts_with(b"MTrk") {
+            track += 1;
+            read_track(body, usize::from(track), start + first, &mut messages)?;
+        }
+        at = end;
+    }
+    if track < announced {
+        return Err(MidiFileError::Tracks { announced, found: track });
+    }
+    messages.sort_by_key(|m: &Message| m.tick);
+    Ok((clock, messages))
+}
+
+fn read_track<'a>(
+    body: &'a [u8],
+    track: usize,
+    offset: usize,
+    messages: &mut Vec<Message<'a>>,
+) -> Result<(), MidiFileError> {
+    let mut track_events = EventIter::new(body);
+    let mut tick = 0u64;
+    loop {
+        let before = track_events.unread().len();
+        match track_events.next() {
+            Some(Ok(event)) => {
+                tick += u64::from(event.delta.as_int());
+                messages.push(Message { tick, kind: event.kind });
+                if event.kind == TrackEventKind::Meta(MetaMessage::EndOfTrack) {
+                    return Ok(());
+                }
+            }
+            // The iterator falls silent at a message it cannot read; only an empty rest is the end.
+            None if before == 0 => return Ok(()),
+            None | Some(Err(_)) => {
+                return Err(MidiFileError::Message { track, at: offset + body.len() - before });
+            }
+        }
+    }
+}
+
+fn find(bytes: &[u8], word: &[u8]) -> Option<usize> {
+    bytes.windows(word.len()).position(|w| w == word)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::SoundingNote;
+
+    /// A file from a division and the bodies of its tracks.
+    fn file(format: u8, division: [u8; 2], tracks: &[&[u8]]) -> Vec<u8> {
+        let mut bytes = b"MThd\0\0\0\x06\0".to_vec();
+        bytes.extend([format, 0, tracks.len() as u8, division[0], division[1]]);
+        for track in tracks {
+            bytes.extend(b"MTrk");
+            bytes.extend((track.len() as u32).to_be_bytes());
+            bytes.extend(*track);
+        }
+        bytes
+    }
+
+    const NOTE: &[u8] = &[0, 0x90, 60, 64, 96, 0x80, 60, 0, 0, 0xFF, 0x2F, 0];
+
+    fn positions(bytes: &[u8], rate: u32) -> Vec<usize> {
+        read(bytes, rate).unwrap().events.iter().map(|e| e.at).collect()
+    }
+
+    #[test]
+    fn tempo_of_another_track_counts_and_time_is_rounded_once() {
+        let tempo: &[u8] =
+            &[0, 0xFF, 0x51, 3, 0x07, 0xA1, 0x21, 48, 0xFF, 0x51, 3, 0x0F, 0x42, 0x40, 0, 0xFF, 0x2F, 0];
+        let bytes = file(1, [0, 96], &[tempo, NOTE]);
+        // 48 ticks at 500.001 ms a beat, then 48 at 1 s.
+        assert_eq!(positions(&bytes, 48_000), [0, (0.75 * 48_000.0_f64).round() as usize]);
+        assert_eq!(positions(&bytes, 44_100), [0, 33_075]);
+        assert_eq!(positions(&file(0, [0, 96], &[NOTE]), 44_100), [0, 22_050]);
+    }
+
+    #[test]
+    fn smpte_time_is_frames() {
+        // 25 frames of 40 ticks: a millisecond a tick. 29 is 30000/1001.
+        assert_eq!(positions(&file(0, [0xE7, 40], &[NOTE]), 48_000), [0, 96 * 48]);
+        let wanted = (96.0 * 1001.0 / 30_000.0 / 4.0 * 48_000.0_f64).round() as usize;
+        assert_eq!(positions(&file(0, [0xE3, 4], &[NOTE]), 48_000), [0, wanted]);
+    }
+
+    #[test]
+    fn one_tick_keeps_the_order_of_tracks_and_messages() {
+        let first: &[u8] = &[0, 0xB0, 2, 1, 0, 0xB0, 2, 2, 0, 0xFF, 0x2F, 0];
+        let score = read(&file(1, [0, 96], &[first, NOTE]), 48_000).unwrap();
+        let [a, b, c, _] = score.events[..] else { panic!("{score:?}") };
+        assert_eq!((a.event, b.event), (Event::Breath(1.0 / 127.0), Event::Breath(2.0 / 127.0)));
+        assert!(matches!(c.event, Event::NoteOn { note: SoundingNote(60), .. }));
+    }
+
+    #[test]
+    fn running_status_and_velocity_zero_are_understood() {
+        let track: &[u8] = &[0, 0x90, 60, 64, 10, 60, 0, 0, 0xFF, 0x2F, 0];
+        let score = read(&file(0, [0, 96], &[track]), 48_000).unwrap();
+        assert_eq!(score.events[1].event, Event::NoteOff { note: SoundingNote(60) });
+    }
+
+    #[test]
+    fn a_damaged_file_is_refused_where_it_breaks() {
+        let whole = file(0, [0, 96], &[NOTE]);
+        for length in 0..whole.len() {
+            assert!(read(&whole[..length], 48_000).is_err(), "first {length} bytes");
+        }
+        let cut = read(&whole[..whole.len() - 1], 48_000).unwrap_err();
+        assert_eq!(cut, MidiFileError::Truncated { start: 14, wanted: 34, end: 33 });
+        let bad: &[u8] = &[0, 0x90, 60, 64, 0, 0xF4, 0];
+        assert_eq!(
+            read(&file(0, [0, 96], &[bad]), 48_000).unwrap_err(),
+            MidiFileError::Message { track: 1, at: 22 + 4 }
+        );
+        assert_eq!(read(&file(2, [0, 96], &[NOTE]), 48_000).unwrap_err(), MidiFileError::Format2);
+        assert_eq!(read(&file(0, [0, 0], &[NOTE]), 48_000).unwrap_err(), MidiFileError::NoTicks);
+        assert_eq!(
+            read(&file(0, [0, 96], &[&[0, 0xFF, 0x2F, 0]]), 48_000).unwrap_err(),
+            MidiFileError::NoNotes
+        );
+        assert!(read(b"RIFF....WAVE", 48_000).unwrap_err().to_string().contains("begins with \"RIFF\""));
+        let mut two = whole.clone();
+        two[11] = 2;
+        assert_eq!(read(&two, 48_000).unwrap_err(), MidiFileError::Tracks { announced: 2, found: 1 });
+    }
+
+    #[test]
+    fn a_file_of_days_is_refused() {
+        let slow: &[u8] =
+            &[0, 0xFF, 0x51, 3, 255, 255, 255, 0xFF, 0xFF, 0xFF, 0x7F, 0x90, 60, 64, 0, 0xFF, 0x2F, 0];
+        assert!(matches!(read(&file(0, [0, 1], &[slow]), 48_000), Err(MidiFileError::TooLong { .. })));
+    }
+
+    /// Any bytes give a score or a refusal, never a panic.
+    #[test]
+    fn no_bytes_are_fatal() {
+        let whole = file(1, [0, 96], &[NOTE, NOTE]);
+        for at in 0..whole.len() {
+            for value in 0..=255 {
+                let mut bytes = whole.clone();
+                bytes[at] = value;
+                let _ = read(&bytes, 48_000);
+            }
+        }
+    }
+}

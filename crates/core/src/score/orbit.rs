@@ -1,0 +1,101 @@
+//! One period of a steady note, as its reed lives through it.
+
+use crate::analysis::pitch;
+use crate::instrument::{Clarinet, Model, Settings};
+use crate::score::Score;
+use crate::score::bifurcation::SOUNDS;
+use crate::score::breath::BreathCurve;
+use crate::score::play_probed;
+use crate::units::SoundingNote;
+use std::convert::Infallible;
+use std::sync::Arc;
+
+/// Time for a note to become steady, s.
+const SETTLE_S: f64 = 1.2;
+/// Time in which its period is measured, s.
+const MEASURE_S: f64 = 0.2;
+
+/// A period at the internal rate, from the moment of the largest pressure difference.
+pub struct Period {
+    /// Frequency, Hz.
+    pub f_hz: f64,
+    /// Time between samples, s.
+    pub step_s: f64,
+    /// Mouth pressure over closing pressure.
+    pub gamma: f64,
+    /// Pressure difference mouth minus mouthpiece, Pa; flow through the reed, m3/s; opening over rest.
+    pub moments: Vec<[f64; 3]>,
+}
+
+/// Plays `note` at `gamma` until it is steady; `None` if it does not sound.
+///
+/// `settings` must let full breath reach `gamma`.
+pub fn period(
+    model: &Arc<Model>,
+    settings: &Settings,
+    note: SoundingNote,
+    gamma: f32,
+    rate: u32,
+) -> Option<Period> {
+    let mut clarinet = Clarinet::new(model.clone(), f64::from(rate));
+    clarinet.set_settings(settings);
+    clarinet.reset();
+    let score = Score::note(note, SETTLE_S + MEASURE_S, rate);
+    let score = score.blown(&BreathCurve::constant(gamma), settings, rate);
+    let inner_hz = clarinet.internal_rate_hz();
+    let closing_pa = settings.closing_pa();
+    let (mut moments, mut seen, skip) = (Vec::new(), 0_usize, (SETTLE_S * inner_hz) as usize);
+    let mut blown = 0.0;
+    let mut probe = |probe: crate::instrument::Probe| {
+        seen += 1;
+        if seen > skip {
+            blown = probe.gamma;
+            let p_delta = probe.gamma * closing_pa - probe.p_mouthpiece_pa;
+            moments.push([p_delta, probe.flow_m3s, probe.opening]);
+        }
+    };
+    let Ok(()) = play_probed(&mut clarinet, &score, 4096, &mut probe, |_| Ok::<_, Infallible>(()));
+    let pressure: Vec<f64> = moments.iter().map(|moment| moment[0]).collect();
+    // What still rings from the tongue is periodic too.
+    let count = pressure.len().max(1) as f64;
+    let mean = pressure.iter().sum::<f64>() / count;
+    let rms = (pressure.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / count).sqrt();
+    if rms < SOUNDS * closing_pa {
+        return None;
+    }
+    let f_hz = pitch::fundamental_hz(&pressure, inner_hz)?;
+    let count = (inner_hz / f_hz).round() as usize;
+    // Within the note: at its very end the tongue comes back.
+    let last = moments.len().checked_sub(count / 2 + 1)?;
+    let mut moments = moments.get(last.checked_sub(count)?..last)?.to_vec();
+    let greatest = moments.iter().enumerate().max_by(|a, b| a.1[0].total_cmp(&b.1[0]))?.0;
+    moments.rotate_left(greatest);
+    Some(Period { f_hz, step_s: 1.0 / inner_hz, gamma: blown, moments })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_soft_note_stays_open_a_loud_one_beats() {
+        let model = Arc::new(Model::built_in(48_000.0).unwrap());
+        let settings = Settings { noise: 0.0, ..Settings::default() };
+        let shut = |gamma: f32| {
+            let period = period(&model, &settings, SoundingNote(58), gamma, 48_000).unwrap();
+            assert!(
+                (period.f_hz / SoundingNote(58).frequency_hz(440.0) - 1.0).abs() < 0.02,
+                "{}",
+                period.f_hz
+            );
+            assert!((period.gamma - f64::from(gamma)).abs() < 1e-3);
+            // What the difference of pressure does over a period is no more than the bore can give back.
+            let mean = period.moments.iter().map(|m| m[0]).sum::<f64>() / period.moments.len() as f64;
+            assert!((mean / 6_000.0 - period.gamma).abs() < 0.1, "{mean}");
+            period.moments.iter().filter(|m| m[2] < 1e-3).count() as f64 / period.moments.len() as f64
+        };
+        assert_eq!(shut(0.4), 0.0);
+        assert!((0.3..0.6).contains(&shut(0.8)), "{}", shut(0.8));
+        assert!(period(&model, &settings, SoundingNote(58), 0.2, 48_000).is_none());
+    }
+}

@@ -1,0 +1,123 @@
+//! The instrument without a host: a score in, samples out, as fast as the machine can.
+//!
+//! A score is a list of events at sample positions, made from a standard MIDI file, one note or a scale. It is played
+//! once, forwards, block by block, through the same [`Clarinet`] the plugin plays; the block size is inaudible, so the
+//! samples are those of an offline bounce. Nothing is added and no latency is taken away. Left out: reading a score
+//! while it plays, and more than one voice.
+
+use crate::event::{Event, Timed};
+use crate::instrument::Clarinet;
+use crate::instrument::Probe;
+use crate::score::Score;
+
+/// Plays `score` in blocks of `block` samples and hands each block to `each`, whose first error ends it.
+pub fn play<E>(
+    clarinet: &mut Clarinet,
+    score: &Score,
+    block: usize,
+    each: impl FnMut(&[f32]) -> Result<(), E>,
+) -> Result<(), E> {
+    let render = |events: &[Timed<Event>], begun: usize, out: &mut [f32]| {
+        clarinet.render_events(events.iter().map(|e| Timed { at: e.at - begun, event: e.event }), out);
+    };
+    in_blocks(score, block, render, each)
+}
+
+/// As [`play`], with a look inside at every internal sample.
+pub fn play_probed<E>(
+    clarinet: &mut Clarinet,
+    score: &Score,
+    block: usize,
+    probe: &mut dyn FnMut(Probe),
+    each: impl FnMut(&[f32]) -> Result<(), E>,
+) -> Result<(), E> {
+    let render = |events: &[Timed<Event>], begun: usize, out: &mut [f32]| {
+        let mut done = 0;
+        for event in events {
+            let at = event.at - begun;
+            clarinet.render_probed(&mut out[done..at], probe);
+            clarinet.apply(event.event);
+            done = at;
+        }
+        clarinet.render_probed(&mut out[done..], probe);
+    };
+    in_blocks(score, block, render, each)
+}
+
+/// Cuts a score into blocks: `render` gets the events of one, the sample it begins at, and where to write.
+fn in_blocks<E>(
+    score: &Score,
+    block: usize,
+    mut render: impl FnMut(&[Timed<Event>], usize, &mut [f32]),
+    mut each: impl FnMut(&[f32]) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut out = vec![0.0; block.max(1)];
+    let mut events = score.events.as_slice();
+    let mut done = 0;
+    while done < score.samples {
+        let out = &mut out[..block.max(1).min(score.samples - done)];
+        render(take_before(&mut events, done + out.len()), done, out);
+        each(out)?;
+        done += out.len();
+    }
+    Ok(())
+}
+
+/// Splits off the events that happen before sample `end`.
+fn take_before<'a, E>(events: &mut &'a [Timed<E>], end: usize) -> &'a [Timed<E>] {
+    let (now, later) = events.split_at(events.partition_point(|e| e.at < end));
+    *events = later;
+    now
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::event::Event;
+    use crate::units::SoundingNote;
+    use std::convert::Infallible;
+
+    fn score() -> Score {
+        let mut events = vec![Timed { at: 0, event: Event::Breath(0.5) }];
+        for i in 0..20u8 {
+            let note = SoundingNote(60 + i);
+            let at = 37 + 211 * usize::from(i);
+            events.push(Timed { at, event: Event::NoteOn { note, velocity: 0.8 } });
+            events.push(Timed { at: at + 200, event: Event::NoteOff { note } });
+        }
+        Score { events, samples: 5000 }
+    }
+
+    fn samples(block: usize) -> Vec<f32> {
+        let mut clarinet = Clarinet::built_in(48_000.0).unwrap();
+        let mut all = Vec::new();
+        play(&mut clarinet, &score(), block, |out| {
+            all.extend_from_slice(out);
+            Ok::<_, Infallible>(())
+        })
+        .unwrap();
+        all
+    }
+
+    #[test]
+    fn block_size_is_inaudible() {
+        let whole = samples(5000);
+        assert_eq!(whole.len(), 5000);
+        for block in [1, 17, 64, 512, 4096] {
+            assert!(samples(block) == whole, "block of {block}");
+        }
+    }
+
+    #[test]
+    fn a_look_inside_changes_nothing() {
+        let mut clarinet = Clarinet::built_in(48_000.0).unwrap();
+        let (mut all, mut probed) = (Vec::new(), 0usize);
+        play_probed(&mut clarinet, &score(), 300, &mut |_| probed += 1, |out| {
+            all.extend_from_slice(out);
+            Ok::<_, Infallible>(())
+        })
+        .unwrap();
+        assert!(all == samples(512));
+        assert!(probed >= 5000);
+    }
+}

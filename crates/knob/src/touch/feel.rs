@@ -1,0 +1,108 @@
+//! The feel of an instrument as it is set up to play, and what each note's knob angle blows.
+
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::haptics::{AngleMap, FeelDesign, FeelRefused, FeelTable, Requirements, TorqueLimits};
+use chalumeau_core::instrument::felt::{played_reed, requirements};
+use chalumeau_core::instrument::{BuildError, Model, Settings};
+use chalumeau_core::units::SoundingNote;
+use std::sync::{Arc, LazyLock};
+
+/// Pitches there are names for.
+const PITCHES: usize = 128;
+
+/// Where no motor turns, as in a replay, any feel will do.
+pub const NO_MOTOR: TorqueLimits = TorqueLimits {
+    ceiling_mnm: f64::INFINITY,
+    stiffness_nm_per_rad: f64::INFINITY,
+    push_nm_per_rad: f64::INFINITY,
+};
+
+/// The built-in clarinet, worked out once for all that play it.
+static BUILT_IN: LazyLock<Result<Arc<Feels>, BuildError>> =
+    LazyLock::new(|| Model::built_in(48_000.0).map(|model| Arc::new(Feels::new(&model))));
+
+/// An instrument, and what its bore asks for every note. Building one takes a second.
+#[derive(Clone, Debug)]
+pub struct Feels {
+    requirements: Requirements,
+    file: InstrumentFile,
+    /// Index of the fingering for each sounding pitch.
+    fingerings: [Option<u8>; PITCHES],
+}
+
+impl Feels {
+    /// The built-in clarinet. The first call takes a second.
+    pub fn built_in() -> Result<Arc<Self>, &'static BuildError> {
+        BUILT_IN.as_ref().map(Arc::clone)
+    }
+
+    /// Asks an instrument for every note, through the lattice that sounds. Allocates; takes a second.
+    pub fn new(model: &Model) -> Self {
+        let file = &model.file;
+        let mut fingerings = [None; PITCHES];
+        for (index, fingering) in file.fingerings.iter().enumerate() {
+            let sounding = fingering.written.sounding(file.transposition).unwrap_or(SoundingNote(0));
+            if let Some(place) = fingerings.get_mut(usize::from(sounding.0)) {
+                *place = u8::try_from(index).ok();
+            }
+        }
+        Self { requirements: requirements(model), file: file.clone(), fingerings }
+    }
+
+    /// What the bore asks.
+    pub fn requirements(&self) -> &Requirements {
+        &self.requirements
+    }
+
+    /// The feel of every note. Allocates; takes up to 50 ms.
+    pub fn table(
+        &self,
+        settings: &Settings,
+        design: &FeelDesign,
+        limits: &TorqueLimits,
+    ) -> Result<FeelTable, FeelRefused> {
+        FeelTable::new(&self.requirements, design, &played_reed(&self.file, settings), limits)
+    }
+
+    /// Index of the fingering for a sounding pitch. Real-time safe.
+    pub fn fingering(&self, note: SoundingNote) -> Option<usize> {
+        self.fingerings.get(usize::from(note.0)).copied().flatten().map(usize::from)
+    }
+
+    /// The same table by sounding pitch, for the audio thread.
+    pub fn maps(&self, table: &FeelTable) -> Maps {
+        let of = |index: u8| table.note(usize::from(index)).map(|note| note.map);
+        Maps {
+            by_pitch: self.fingerings.map(|fingering| fingering.and_then(of)),
+            otherwise: Some(table.reference().map),
+        }
+    }
+}
+
+/// What each sounding pitch makes of the knob's angle. Plain numbers, to be copied between threads.
+#[derive(Clone, Copy, Debug)]
+pub struct Maps {
+    by_pitch: [Option<AngleMap>; PITCHES],
+    otherwise: Option<AngleMap>,
+}
+
+impl Default for Maps {
+    /// No pitch blows anything.
+    fn default() -> Self {
+        Self { by_pitch: [None; PITCHES], otherwise: None }
+    }
+}
+
+impl Maps {
+    /// Mouth pressure, Pa, with a note fingered (none: as on the reference note) and the knob turned so far from rest.
+    /// Real-time safe.
+    pub fn pressure_pa(&self, note: Option<SoundingNote>, angle_deg: f64) -> f64 {
+        let own = note.and_then(|note| self.by_pitch.get(usize::from(note.0)).copied().flatten());
+        own.or(self.otherwise).map_or(0.0, |map| map.pressure_pa(angle_deg))
+    }
+
+    /// Whether there is anything to play with.
+    pub fn is_ready(&self) -> bool {
+        self.otherwise.is_some()
+    }
+}

@@ -1,0 +1,316 @@
+//! The messages of TTLink 1 as values. Offsets, units and ranges: `docs/protocol.md`.
+
+use std::borrow::Cow;
+
+use crate::wire::codes::{FaultCode, RefusedCode};
+use chalumeau_core::haptics::TorqueLimits;
+pub use chalumeau_core::haptics::{Feel, Law};
+
+/// ARM and ALIVE.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Arm {
+    /// Session of HELLO.
+    pub session: u32,
+    /// Most torque the user allows, mNm, 0..=450.
+    pub ceiling_mnm: u16,
+}
+
+/// What a device can do, see INFO.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Capabilities(pub u16);
+
+impl Capabilities {
+    /// Knows the flow law.
+    pub const FLOW: u16 = 1;
+    /// Knows the pressure law.
+    pub const PRESSURE: u16 = 1 << 1;
+    /// Has a slap region.
+    pub const SLAP: u16 = 1 << 2;
+    /// Has marks at the threshold.
+    pub const DETENT: u16 = 1 << 3;
+    /// Has a button.
+    pub const BUTTON: u16 = 1 << 4;
+    /// Has a motor.
+    pub const MOTOR: u16 = 1 << 5;
+    /// Is a simulation.
+    pub const SIMULATED: u16 = 1 << 6;
+
+    /// Whether all of `bits` are set.
+    pub fn has(self, bits: u16) -> bool {
+        self.0 & bits == bits
+    }
+}
+
+/// What a device says of itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Info {
+    /// Version of the protocol.
+    pub major: u8,
+    /// Version of the protocol.
+    pub minor: u8,
+    /// What it can do.
+    pub capabilities: Capabilities,
+    /// Version of the firmware: major, minor, patch.
+    pub firmware: (u8, u8, u16),
+    /// UTF-8, padded with zeros.
+    pub name: [u8; 16],
+    /// Identity of the device, never 0.
+    pub serial: u64,
+    /// Counts per turn of its encoder.
+    pub counts_per_turn: u32,
+    /// Rate of the haptic loop, Hz.
+    pub loop_hz: u16,
+    /// Silence after which torque begins to fade, ms.
+    pub watchdog_ms: u16,
+    /// Length of the fade, ms.
+    pub fade_ms: u16,
+    /// Most torque it will ever make, mNm.
+    pub ceiling_mnm: u16,
+    /// Session of the HELLO answered.
+    pub session: u32,
+    /// Steepest restoring slope it accepts, 0.001 N m/rad.
+    pub stiffness_limit: u16,
+    /// Steepest positive-feedback slope it accepts, 0.001 N m/rad.
+    pub push_limit: u16,
+}
+
+impl Info {
+    /// A name as INFO carries it: cut at the last whole character that fits 16 bytes.
+    pub fn name_bytes(name: &str) -> [u8; 16] {
+        let mut bytes = [0; 16];
+        let length = (0..=bytes.len()).rev().find(|&at| name.is_char_boundary(at)).unwrap_or(0);
+        bytes[..length].copy_from_slice(&name.as_bytes()[..length]);
+        bytes
+    }
+
+    /// The name up to its padding; bytes that are no UTF-8 show as replacement characters.
+    pub fn name_text(&self) -> Cow<'_, str> {
+        let length = self.name.iter().position(|&byte| byte == 0).unwrap_or(self.name.len());
+        String::from_utf8_lossy(&self.name[..length])
+    }
+
+    /// The limits a feel must keep on this device, under a ceiling of `allowed_mnm` that the user allows.
+    pub fn torque_limits(&self, allowed_mnm: u16) -> TorqueLimits {
+        TorqueLimits {
+            ceiling_mnm: f64::from(self.ceiling_mnm.min(allowed_mnm)),
+            stiffness_nm_per_rad: 1e-3 * f64::from(self.stiffness_limit),
+            push_nm_per_rad: 1e-3 * f64::from(self.push_limit),
+        }
+    }
+
+    /// Whether this device may be armed by a host of this version.
+    pub fn speaks_our_major(&self) -> bool {
+        self.major == crate::wire::MAJOR
+    }
+}
+
+/// Flags of STATE.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Flags(pub u16);
+
+impl Flags {
+    /// Torque is allowed.
+    pub const ARMED: u16 = 1;
+    /// The last torque was limited.
+    pub const LIMITED: u16 = 1 << 1;
+    /// A fault stands.
+    pub const FAULT: u16 = 1 << 2;
+    /// The knob is in the slap region.
+    pub const SLAP: u16 = 1 << 3;
+    /// The button is down.
+    pub const BUTTON: u16 = 1 << 4;
+    /// Torque is fading out.
+    pub const FADING: u16 = 1 << 5;
+    /// The old feel gives way to the new.
+    pub const MORPHING: u16 = 1 << 6;
+    /// The continuous rating limits torque.
+    pub const THERMAL: u16 = 1 << 7;
+
+    /// Whether all of `bits` are set.
+    pub fn has(self, bits: u16) -> bool {
+        self.0 & bits == bits
+    }
+
+    /// These flags with `bits` switched on or off.
+    #[must_use]
+    pub fn with(self, bits: u16, on: bool) -> Self {
+        Self(if on { self.0 | bits } else { self.0 & !bits })
+    }
+
+    /// Whether torque is allowed.
+    pub fn armed(self) -> bool {
+        self.has(Self::ARMED)
+    }
+
+    /// Whether a fault stands.
+    pub fn fault(self) -> bool {
+        self.has(Self::FAULT)
+    }
+
+    /// Whether the button is down.
+    pub fn button(self) -> bool {
+        self.has(Self::BUTTON)
+    }
+}
+
+/// Where the knob is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct State {
+    /// Device clock, microseconds; wraps.
+    pub t_us: u32,
+    /// 0.01 degrees since zero.
+    pub angle: i32,
+    /// 0.1 rpm.
+    pub velocity: i16,
+    /// Command after all limits, mNm.
+    pub torque: i16,
+    /// See [`Flags`].
+    pub flags: Flags,
+    /// Last FEEL accepted.
+    pub feel_id: u8,
+    /// Counter of slaps.
+    pub slaps: u8,
+    /// Counter of the last EVENT.
+    pub events: u8,
+    /// Standing fault, 0 none.
+    pub fault: u8,
+}
+
+impl State {
+    /// Angle since zero, degrees.
+    pub fn angle_deg(&self) -> f64 {
+        0.01 * f64::from(self.angle)
+    }
+
+    /// Velocity, rad/s.
+    pub fn velocity_rad_s(&self) -> f64 {
+        f64::from(self.velocity) * (0.1 * std::f64::consts::TAU / 60.0)
+    }
+
+    /// The fault that stands, if this version knows its code.
+    pub fn fault_code(&self) -> Option<FaultCode> {
+        FaultCode::from_u8(self.fault)
+    }
+}
+
+/// Kinds of EVENT.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum EventKind {
+    /// The knob went through the slap region; value: peak speed, rad/s.
+    Slap = 1,
+    /// Value: 1 down, 0 up.
+    Button = 2,
+    /// Torque was limited; value: torque wanted, mNm.
+    Limit = 3,
+    /// A fault.
+    Fault = 4,
+    /// A request was refused; value: the number refused.
+    Refused = 5,
+    /// The knob disarmed.
+    Disarmed = 6,
+}
+
+/// Something that happened on the device.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event {
+    /// What.
+    pub kind: EventKind,
+    /// Counts events, so that a lost one shows.
+    pub counter: u8,
+    /// See the protocol.
+    pub code: u8,
+    /// Of the FEEL refused, else the one in force.
+    pub feel_id: u8,
+    /// Device clock, microseconds.
+    pub t_us: u32,
+    /// See [`EventKind`].
+    pub value: f32,
+}
+
+impl Event {
+    /// What the code says to people; `None` where the kind has no codes.
+    pub fn code_text(&self) -> Option<&'static str> {
+        let unknown = "for a reason this version does not know";
+        match self.kind {
+            EventKind::Fault | EventKind::Disarmed => {
+                Some(FaultCode::from_u8(self.code).map_or(unknown, FaultCode::text))
+            }
+            EventKind::Refused => Some(RefusedCode::from_u8(self.code).map_or(unknown, RefusedCode::text)),
+            EventKind::Slap | EventKind::Button | EventKind::Limit => None,
+        }
+    }
+}
+
+/// A message of either direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Message {
+    /// The host has opened the line.
+    Hello {
+        /// Version of the protocol.
+        major: u8,
+        /// Version of the protocol.
+        minor: u8,
+        /// Chosen at random for this opening.
+        session: u32,
+    },
+    /// The whole state of the feel.
+    Feel(Feel),
+    /// The user allows torque.
+    Arm(Arm),
+    /// The host is there.
+    Alive(Arm),
+    /// Torque off.
+    Free,
+    /// What the present position shall be called, 0.01 degrees.
+    Zero(i32),
+    /// How often STATE comes, Hz.
+    Rate(u16),
+    /// The host leaves.
+    Bye {
+        /// Session of HELLO.
+        session: u32,
+    },
+    /// Answer to HELLO.
+    Info(Info),
+    /// Where the knob is.
+    State(State),
+    /// Something happened.
+    Event(Event),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_cut_between_characters() {
+        let info = |name: &str| Info {
+            major: 1,
+            minor: 0,
+            capabilities: Capabilities(Capabilities::FLOW),
+            firmware: (0, 1, 0),
+            name: Info::name_bytes(name),
+            serial: 1,
+            counts_per_turn: 3_600,
+            loop_hz: 2_000,
+            watchdog_ms: 80,
+            fade_ms: 50,
+            ceiling_mnm: 450,
+            session: 0,
+            stiffness_limit: 0,
+            push_limit: 0,
+        };
+        assert_eq!(info("TorqueTuner").name_text(), "TorqueTuner");
+        assert_eq!(info("exactly 16 bytes").name_text(), "exactly 16 bytes");
+        assert_eq!(info("fifteen bytes, \u{e9}").name_text(), "fifteen bytes, ");
+        assert_eq!(info("").name_text(), "");
+    }
+
+    #[test]
+    fn flags_are_switched_one_by_one() {
+        let flags = Flags::default().with(Flags::ARMED, true).with(Flags::BUTTON, true);
+        assert!(flags.armed() && flags.button() && !flags.fault());
+        assert_eq!(flags.with(Flags::ARMED, false), Flags(Flags::BUTTON));
+    }
+}

@@ -1,0 +1,108 @@
+//! Pictures as files: PNG, SVG, an animated GIF, or a figure's data as JSON, chosen by the file's extension.
+//!
+//! A file appears whole or not at all.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use chalumeau_figure::Figure;
+use chalumeau_figure::draw::{self, DrawError, Size};
+
+use crate::output::{NewFile, OutputError};
+
+/// Why a picture cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum PictureError {
+    /// The extension names no format.
+    #[error("{}: the name of a picture must end in {}", path.display(), wanted)]
+    Extension {
+        /// The name as given.
+        path: PathBuf,
+        /// The extensions allowed.
+        wanted: &'static str,
+    },
+    /// The figure cannot be drawn.
+    #[error(transparent)]
+    Draw(#[from] DrawError),
+    /// The file cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Png,
+    Svg,
+    Gif,
+    Json,
+}
+
+impl Format {
+    fn of(path: &Path) -> Option<Self> {
+        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+            "png" => Some(Self::Png),
+            "svg" => Some(Self::Svg),
+            "gif" => Some(Self::Gif),
+            "json" => Some(Self::Json),
+            _ => None,
+        }
+    }
+}
+
+/// A picture file that is open already, so that a bad path is refused before anything is measured.
+pub struct PictureFile {
+    file: NewFile,
+    format: Format,
+    size: Option<Size>,
+}
+
+impl PictureFile {
+    /// For one figure: a `.png`, an `.svg`, or its data as `.json`; in the figure's own size unless one is given.
+    pub fn still(path: &Path, force: bool, size: Option<Size>) -> Result<Self, PictureError> {
+        match Format::of(path) {
+            Some(format @ (Format::Png | Format::Svg | Format::Json)) => {
+                Ok(Self { file: NewFile::create(path, force)?, format, size })
+            }
+            _ => Err(PictureError::Extension {
+                path: path.to_owned(),
+                wanted: ".png or .svg (or .json for its data)",
+            }),
+        }
+    }
+
+    /// For a sequence of figures: a `.gif`.
+    pub fn moving(path: &Path, force: bool, size: Option<Size>) -> Result<Self, PictureError> {
+        match Format::of(path) {
+            Some(Format::Gif) => Ok(Self { file: NewFile::create(path, force)?, format: Format::Gif, size }),
+            _ => Err(PictureError::Extension { path: path.to_owned(), wanted: ".gif" }),
+        }
+    }
+
+    /// Draws the figure and gives the file its name.
+    pub fn draw(self, figure: &Figure) -> Result<(), PictureError> {
+        let bytes = match self.format {
+            Format::Svg => draw::svg(figure, self.size)?.into_bytes(),
+            Format::Json => draw::json(figure)?,
+            Format::Png | Format::Gif => draw::png(figure, self.size)?,
+        };
+        self.keep(&bytes)
+    }
+
+    /// Draws a sequence, `frame_s` seconds a frame, repeated for ever, and gives the file its name. `drawn` is called
+    /// after each frame.
+    pub fn animate(self, frames: &[Figure], frame_s: f64, drawn: impl FnMut()) -> Result<(), PictureError> {
+        let bytes = draw::gif(frames, self.size, frame_s, drawn)?;
+        self.keep(&bytes)
+    }
+
+    fn keep(mut self, bytes: &[u8]) -> Result<(), PictureError> {
+        let path = self.file.path().to_owned();
+        self.file.write_all(bytes).map_err(|source| OutputError::Write { path, source })?;
+        Ok(self.file.keep()?)
+    }
+}
+
+/// Draws `figure` into a new file, `.png`, `.svg` or `.json`.
+pub fn write(figure: &Figure, path: &Path, size: Option<Size>, force: bool) -> Result<(), PictureError> {
+    PictureFile::still(path, force, size)?.draw(figure)
+}

@@ -1,0 +1,57 @@
+//! Takes as files: a take appears in its folder whole or not at all.
+
+use std::io;
+use std::path::Path;
+
+use chalumeau_knob::touch::take::{Marks, Moment, TakeWriter};
+
+use crate::output::{NewFile, OutputError};
+
+/// A take being written; the file appears, complete, with [`keep`](Self::keep).
+pub struct TakeFile {
+    writer: TakeWriter<NewFile>,
+}
+
+impl TakeFile {
+    /// Begins a file with remarks (one a line) and the columns' names.
+    pub fn create(path: &Path, force: bool, remarks: &[String]) -> Result<Self, OutputError> {
+        let file = NewFile::create(path, force)?;
+        match TakeWriter::new(file, remarks) {
+            Ok(writer) => Ok(Self { writer }),
+            Err(source) => Err(OutputError::Write { path: path.to_owned(), source }),
+        }
+    }
+
+    /// Adds a row.
+    pub fn write(&mut self, moment: &Moment, marks: &Marks) -> io::Result<()> {
+        self.writer.write(moment, marks)
+    }
+
+    /// Where the file will be.
+    pub fn path(&self) -> &Path {
+        self.writer.get_ref().path()
+    }
+
+    /// Gives the file its name.
+    pub fn keep(self) -> Result<(), OutputError> {
+        self.writer.into_inner().keep()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_take_appears_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("take.csv");
+        let mut take = TakeFile::create(&path, false, &["participant 7".to_owned()]).unwrap();
+        assert_eq!(take.path().file_name(), path.file_name());
+        take.write(&Moment::default(), &Marks::default()).unwrap();
+        assert!(!path.exists(), "no half-written file");
+        take.keep().unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 3);
+        assert!(matches!(TakeFile::create(&path, false, &[]), Err(OutputError::Exists(_))));
+    }
+}
