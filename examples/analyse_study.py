@@ -1,18 +1,18 @@
 #!/usr/bin/env python3
-"""From the logs of a study to a table, a comparison and plots.
+"""Analyses the logs of a study: writes a table, a comparison and plots.
 
     python analyse_study.py take-*.csv --thresholds haptic.csv --out results
 
-The logs are takes that were recorded with Study on (docs/study.md). Needs numpy and matplotlib. Written to --out:
+The logs are takes recorded with Study on (docs/study.md). Needs numpy and matplotlib. Files written to --out:
 
     summary.csv      one line for each participant, trial and side
     comparison.csv   coupled against free, paired by trial, with effect size and permutation test
-    paired.png       every trial's two sides, by opening H
+    paired.png       the two sides of every trial, by opening H
     phase_*.png      torque against angle, one file for each participant
     timeline_*.png   angle, gamma and torque against time, one file for each trial
 
-Logs are taken in the order given: the last side of a trial is the one that stands last in the last log that has it.
-What each figure means stands in docs/study.md. Exit code 0: done; 2: a file cannot be used, and the message says why.
+Logs are read in the order given: the last side of a trial is the last one in the last log that contains the trial.
+docs/study.md explains each column. Exit code 0: done; 2: a file cannot be used, and the message says why.
 """
 
 import argparse
@@ -26,24 +26,24 @@ import numpy as np
 from study_log import H_REFERENCE, SIDES, BadInput, Onset, read_log
 from study_plots import METRICS, plot_paired, plot_phase, plot_timeline
 
-# A note's steadiness is looked at in windows of this length, from so long after it speaks or the side was switched:
-# the attack is no unsteadiness. Both by judgement.
+# Steadiness is measured in windows of this length, which begin this long after the note starts to sound or the side is
+# switched: the attack does not count as unsteadiness. Both values are judgement.
 WINDOW_S = 0.5
 SETTLE_S = 0.3
-# Fewest rows in such a window: 10 of the slowest stream, 25 Hz.
+# Fewest rows in such a window: the slowest stream, 25 Hz, has about 12.
 WINDOW_ROWS = 10
-# How long after the onset the overshoot is looked for: about the time of a reaction.
+# The overshoot is measured for this long after the onset: about the reaction time of a person.
 OVERSHOOT_S = 0.2
-# By then a feel has long been sent, accepted and echoed (5 ms, and 100 at most on MIDI).
+# After this time a feel has certainly been sent, accepted and echoed (5 ms; at most 100 ms on MIDI).
 FOLLOWS_S = 0.2
-# Up to so many pairs all sign patterns are counted; beyond, so many are drawn.
+# Up to EXACT_PAIRS pairs all sign patterns are counted; above that, DRAWS random patterns.
 EXACT_PAIRS = 16
 DRAWS = 100_000
 
 
 @dataclasses.dataclass
 class Notes:
-    """What the notes of one piece say."""
+    """Measures of the notes of one piece."""
 
     rms: list
     onset_s: list
@@ -52,7 +52,7 @@ class Notes:
 
 
 def notes_of(piece):
-    """Steadiness, onsets and notes that never spoke."""
+    """Steadiness, onsets and notes that never sounded."""
     found = Notes([], [], [], 0)
     t, gamma, on, written = piece.t_s, piece.gamma, piece.gamma_on, piece.written
     changes = np.flatnonzero(np.nan_to_num(np.diff(np.nan_to_num(written, nan=-1.0))) != 0) + 1
@@ -61,11 +61,12 @@ def notes_of(piece):
             continue
         above = np.flatnonzero(gamma[begin:end] >= on[begin:end])
         if not above.size:
-            # One cut off by the end of the piece might have spoken yet.
+            # A note cut off by the end of the piece might still have sounded.
             found.silent += begin > 0 and end < len(t)
             continue
         speaks = begin + above[0]
-        # Only what began in this piece, below its onset, has an onset here; the rest was slurred or switched into.
+        # Only a note that began in this piece, below its threshold, has an onset here; other notes were slurred or
+        # sounded at the switch.
         if begin > 0 and speaks > begin:
             before, after = gamma[speaks - 1] - on[speaks - 1], gamma[speaks] - on[speaks]
             share = -before / (after - before)
@@ -92,16 +93,16 @@ def integrals(piece):
     dt = np.diff(piece.t_s)
     torque = 0.5 * (piece.torque_mnm[1:] + piece.torque_mnm[:-1])
     size = 0.5 * (np.abs(piece.torque_mnm[1:]) + np.abs(piece.torque_mnm[:-1]))
-    # mNm times radians is mJ; the log's torque is the motor's, against which the hand works.
+    # mNm times radians is mJ. The log has the torque of the motor; the hand works against it.
     work = -torque * np.radians(np.diff(piece.angle_deg))
     return np.array([dt.sum(), (size * dt).sum(), work.sum()])
 
 
 def feel_followed(pieces):
-    """Whether every switch between the sides brought another feel to the knob; None where that cannot be told.
+    """Whether every switch between the sides changed the feel of the knob; None if the log does not show it.
 
-    The two sides never have the same feel. A knob that goes on echoing the old one has refused the new one, or was
-    never sent it, or is one that takes none.
+    The two sides never have the same feel. A knob that still echoes the old feel refused the new one, never received
+    it, or accepts no feels.
     """
     told = []
     for before, now in zip(pieces, pieces[1:]):
@@ -114,7 +115,7 @@ def feel_followed(pieces):
 
 
 def by_trial(pieces):
-    """Pieces by participant and trial. Raises BadInput where two orders of a study are mixed."""
+    """Pieces by participant and trial. Raises BadInput if two orders of a study are mixed."""
     trials = {}
     for piece in pieces:
         trials.setdefault((piece.participant, piece.trial), []).append(piece)
@@ -180,12 +181,12 @@ def summarise(trials, least_s):
 
 
 def sign_flip_p(differences):
-    """Two-sided p of the mean of paired differences, and how it was found.
+    """Two-sided p of the mean of paired differences, and the method.
 
-    If it made no difference which side was which, each difference could as well have the other sign. p is the share
-    of sign patterns whose mean is at least as far from 0 as the one seen: all of them up to EXACT_PAIRS pairs, else
-    DRAWS at random, the one seen among them. Nothing is assumed about the distribution. With differences of +1 and -1
-    this is the sign test.
+    If the condition had no effect, each difference could equally have the other sign. p is the share of sign patterns
+    whose mean is at least as far from 0 as the observed one. All patterns are counted up to EXACT_PAIRS pairs; above
+    that, DRAWS random patterns and the observed one. No distribution is assumed. With differences of +1 and -1 this is
+    the sign test.
     """
     d = np.asarray(differences, dtype=float)
     seen = abs(d.sum()) * (1 - 1e-12)
@@ -199,7 +200,7 @@ def sign_flip_p(differences):
 
 
 def holm(p_values):
-    """Holm's (1979) adjustment for asking several questions of the same data."""
+    """Holm's (1979) adjustment of p for several questions asked of the same data."""
     order, worst, adjusted = np.argsort(p_values), 0.0, [math.nan] * len(p_values)
     for rank, index in enumerate(order):
         worst = max(worst, min(1.0, (len(p_values) - rank) * p_values[index]))
@@ -233,16 +234,16 @@ def belongs(h, opening):
 
 
 def compare(table):
-    """Coupled less free: over participants, and for each participant over trials; by openings.
+    """Coupled minus free: over participants, and for each participant over trials; by openings.
 
-    Below the reference H the coupled reed is the stiffer one, above it the softer: what torque and hand do there may
-    differ in opposite directions and vanish over all openings.
+    Below the reference H the coupled reed is the stiffer one, above it the softer one. Effects on torque and hand may
+    have opposite signs there and cancel over all openings.
     """
     pairs = pairs_of(table)
     openings = sorted({h for trials in pairs.values() for h, _ in trials if math.isfinite(h)})
     scopes = [(f"participant {who}", {n: [trial] for n, trial in enumerate(trials)}) for who, trials in pairs.items()]
     if len(pairs) > 1:
-        # Trials of one person are not independent: over persons, each counts once, with the mean of its trials.
+        # Trials of one person are not independent: over participants, each person counts once, with the mean of their trials.
         scopes.insert(0, ("participants", pairs))
     rows = []
     for scope, units in scopes:
@@ -260,7 +261,7 @@ def compare(table):
                 d = coupled - free
                 p, method = sign_flip_p(d)
                 sd = float(np.std(d, ddof=1)) if len(d) > 1 else math.nan
-                # Differences that are equal but for rounding have no spread to compare with.
+                # Differences that are equal except for rounding have no spread.
                 has_spread = sd > 1e-9 * np.max(np.abs(d))
                 group.append(
                     {
@@ -296,7 +297,7 @@ def write_csv(path, rows):
 
 
 def report(rows):
-    """What the comparison says, in words and a table, on standard output."""
+    """Prints the comparison as a table with remarks on standard output."""
     scope = rows[0]["scope"]
     chosen = [row for row in rows if row["scope"] == scope and row["opening_h"] == "all"]
     counted = "participants" if scope == "participants" else f"trials of {scope}"
@@ -319,14 +320,14 @@ def main():
         description=words, epilog=rest, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("takes", nargs="+", metavar="TAKE.csv", help="logs of the study, in order of time")
-    parser.add_argument("--out", required=True, metavar="DIR", help="folder for the results; made if need be")
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder for the results; created if missing")
     parser.add_argument(
         "--thresholds", metavar="CSV",
         help="gamma_on of every note, from `chalumeau haptic --all --zeta Z --csv CSV` [default: 1/3 for all notes]",
     )
     parser.add_argument(
         "--least", type=float, default=2.0, metavar="S",
-        help="trials are compared if each side was held so long, seconds [default: 2]",
+        help="compare a trial if each side was held at least this long, seconds [default: 2]",
     )
     parser.add_argument("--no-timelines", action="store_true", help="leave out the plots of single trials")
     args = parser.parse_args()

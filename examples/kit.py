@@ -1,4 +1,4 @@
-"""What the plots of the study kit share: tables of the command line as numpy arrays, and how a figure is saved."""
+"""Functions shared by the plots of the study kit: tables of the command line as numpy arrays, and saving of figures."""
 
 import itertools
 import pathlib
@@ -12,14 +12,14 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from study_log import BadInput, numbers, read_table
 
-# Okabe and Ito's colours, told apart by all common kinds of colour vision.
+# Okabe and Ito's colours, distinct for all common kinds of colour vision.
 BLUE, RED, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "0.55"
 
 NAMES = ("C", "C#", "D", "D#", "E", "F", "F#", "G", "G#", "A", "A#", "B")
 
 
 def table(path, *columns):
-    """Columns of a table as arrays of floats, in the order asked for; `nan` in the file is nan. Raises BadInput."""
+    """Columns of a table as arrays of floats, in the given order; `nan` in the file is nan. Raises BadInput."""
     whole = sound(path, columns)
     if whole is not None:
         return whole
@@ -29,7 +29,7 @@ def table(path, *columns):
 
 
 def sound(path, columns):
-    """The same of a table without fault, quickly: half a minute of a probe is three million rows. None of any other."""
+    """The same, fast, for a table without errors; None for any other. Half a minute of a probe is three million rows."""
     try:
         with open(path, encoding="utf-8-sig") as file:
             names = file.readline().strip().split(",")
@@ -41,9 +41,9 @@ def sound(path, columns):
 
 
 def remark(path, words, unit):
-    """The number that stands between `words` and `unit` in the remarks (#) of a table. Raises BadInput."""
+    """The number between `words` and `unit` in the remarks (#) of a table. Raises BadInput."""
     with open(path, encoding="utf-8-sig") as file:
-        # Remarks stand on top.
+        # Remarks are at the top of the file.
         head = itertools.takewhile(lambda line: line.startswith("#") or not line[:1].isdigit(), file)
         text = " ".join(line for line in head if line.startswith("#"))
     found = re.search(rf"{re.escape(words)} ([-+.0-9e]+) ?{re.escape(unit)}", text)
@@ -53,13 +53,13 @@ def remark(path, words, unit):
 
 
 def name(written):
-    """Written note 60 is C4."""
+    """Name of a written note: 60 is C4."""
     written = int(written)
     return f"{NAMES[written % 12]}{written // 12 - 1}"
 
 
 def save(figure, path):
-    """PNG, SVG or PDF by the ending of the name. Raises BadInput."""
+    """Saves a figure as PNG, SVG or PDF, by the ending of the name. Raises BadInput."""
     endings = sorted(figure.canvas.get_supported_filetypes())
     if pathlib.Path(path).suffix.lstrip(".").lower() not in endings:
         raise BadInput(f"--out {path}: the name must end in one of .{', .'.join(endings)}")
@@ -72,7 +72,7 @@ def save(figure, path):
 
 
 def run(program, draw, args):
-    """Draws, or says what is wrong; the exit code."""
+    """Draws, or prints the error. Returns the exit code."""
     try:
         draw(args)
     except BadInput as reason:

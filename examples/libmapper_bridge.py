@@ -2,30 +2,31 @@
 """Bridges the feel that Chalumeau sends as OSC to libmapper signals.
 
     python libmapper_bridge.py --interface wlan0                          signals only, map them as you like
-    python libmapper_bridge.py --interface wlan0 --map TorqueTuner_001    and drive a TorqueTuner
+    python libmapper_bridge.py --interface wlan0 --map TorqueTuner_001    also drives a TorqueTuner
 
-Chalumeau sends each field of a feel as a float to /chalumeau/feel/<field>, all in one bundle, on change and once a
-second, when the plugin's parameter Feel OSC port is 9001. Here every field becomes the output signal feel/<field> of
-the libmapper device `chalumeau`, with its unit and range. Needs libmapper and python-osc.
+When the plugin's parameter Feel OSC port is 9001, Chalumeau sends each field of a feel as a float to
+/chalumeau/feel/<field>, all in one bundle, on change and once a second. This program makes every field the output
+signal feel/<field> of the libmapper device `chalumeau`, with its unit and range. Needs libmapper and python-osc.
 
---map makes maps to the signals that TorqueTuner's upstream firmware has (the reed firmware has none):
+--map makes maps to the signals of TorqueTuner's upstream firmware (the reed firmware has none):
 
     feel/scale    mNm         Scale    counts              x counts_per_nm / 1000
     feel/stretch              Stretch                      x 1
     feel/offset   degrees     Offset   0.1 degrees         x 10
     feel/damping  mNm s/rad   Damping  counts per rpm      x counts_per_nm / 1000 x 2 pi / 60
 
-NOT TRIED ON HARDWARE; all of this was read from public sources. 208 counts are 1 N m to the moteus board, whose
-firmware cuts torque at 0.1 N m (20.8 counts); to the Mechaduino board 208 counts are 1.8 A, and what torque that makes
-is not told. The firmware has no reed law: Scale and Stretch act on the curve of the mode it is in, and Offset only when
-a mode begins. In its mode Free, Scale is a constant torque that spins the knob: choose the mode before you start this.
-That firmware has neither watchdog nor torque limit. So here: nothing above --ceiling is sent; Scale rises by at most
-400 mNm a second; when the feel has been silent for 3 seconds, and at the end (Ctrl-C), Scale and Damping go to 0. If
-this program, its machine or the network dies, the knob keeps the last torque: keep its power switch at hand. A knob
-that comes back is mapped again; one that vanished without a farewell when libmapper has forgotten it, in half a minute.
+NOT TRIED ON HARDWARE; all of this was read from public sources. For the moteus board 208 counts are 1 N m, and its
+firmware clips torque at 0.1 N m (20.8 counts). For the Mechaduino board 208 counts are 1.8 A; the torque is not
+documented. The firmware has no reed law: Scale and Stretch act on the curve of the current mode, and Offset only when a
+mode begins. In its mode Free, Scale is a constant torque that spins the knob: choose the mode before you start this
+program. That firmware has no watchdog and no torque limit. This program therefore sends nothing above --ceiling; raises
+Scale by at most 400 mNm a second; and sets Scale and Damping to 0 when no feel has arrived for 3 seconds, and at the
+end (Ctrl-C). If this program, its machine or the network fails, the knob keeps the last torque: keep its power switch
+at hand. A knob that comes back is mapped again; one that vanished without logging off only after libmapper has dropped
+it, which takes half a minute.
 
-A datagram with a value outside its range is refused as a whole, with the reason. Exit code 0: ended by the user; 2: it
-cannot work as asked, and the message says why.
+A datagram with a value outside its range is refused as a whole, with the reason. Exit code 0: ended by the user; 2: the
+request cannot be met, and the message says why.
 """
 
 import argparse
@@ -44,7 +45,7 @@ try:
 except ImportError as reason:
     sys.exit(f"libmapper_bridge: {reason}; install it: python -m pip install libmapper python-osc")
 
-# python-osc writes a line for every odd packet, which a flood would turn into another.
+# python-osc logs a line for every bad packet; a flood of packets would flood the log.
 logging.disable(logging.WARNING)
 
 PREFIX = "/chalumeau/feel/"
@@ -67,9 +68,9 @@ FIELDS = {
     "friction": ("mNm", 0, 100),
     "detent": ("mNm", 0, 100),
 }
-# Fields that make torque by themselves; they go to 0 when nobody plays.
+# Fields that make torque by themselves; they go to 0 when no feel arrives.
 TORQUE = ("scale", "damping")
-# TorqueTuner's signals: name, field, what to multiply with, and its range.
+# TorqueTuner's signals: name, field, factor, and range.
 RPM_PER_RAD_S = 60 / (2 * math.pi)
 COUNTS_PER_NM = 208.0
 
@@ -84,16 +85,16 @@ def torquetuner(counts_per_nm):
     }
 
 
-# Least time between two updates of the signals: Chalumeau sends 100 feels a second at most.
+# Shortest time between two updates of the signals: Chalumeau sends at most 100 feels a second.
 TURN_S = 0.01
-# Datagrams looked at in one turn; what a flood brings beyond that, the system drops.
+# Most datagrams read in one turn; in a flood, the system drops the rest.
 MOST_DATAGRAMS = 256
-# A feel is some 500 bytes.
+# A feel is about 500 bytes.
 MOST_BYTES = 4096
 MOST_DEPTH = 4
 # Three repetitions missed.
 SILENCE_S = 3.0
-# From nothing to the default ceiling in the 250 ms a knob takes to arm.
+# From 0 to the default ceiling in 250 ms, the time in which a knob arms.
 RISE_MNM_S = 400.0
 # libmapper looks for a free name for about a second.
 READY_S = 15.0
@@ -101,20 +102,20 @@ CEILING_MNM = (100.0, 250.0)
 
 
 class Refused(Exception):
-    """A datagram that will not be followed; the text says why."""
+    """A refused datagram; the text says why."""
 
 
 def elements(datagram, depth=0):
     """The OSC messages of a datagram. Raises Refused.
 
-    Bundles are taken apart here: python-osc 1.10 runs for ever on one whose element has a negative length.
+    Bundles are parsed here, because python-osc 1.10 never returns from a bundle with an element of negative length.
     """
     if not datagram.startswith(b"#bundle\0"):
         yield datagram
         return
     if depth == MOST_DEPTH:
         raise Refused(f"bundles in bundles, more than {MOST_DEPTH} deep")
-    # The time tag is not followed: a feel is for now.
+    # The time tag is ignored: a feel is valid at once.
     at = 16
     while at < len(datagram):
         if at + 4 > len(datagram):
@@ -128,7 +129,7 @@ def elements(datagram, depth=0):
 
 
 def feel_of(datagram, limits):
-    """The fields of a datagram by name, unknown addresses left out. Raises Refused."""
+    """The fields of a datagram by name, without unknown addresses. Raises Refused."""
     if len(datagram) > MOST_BYTES:
         raise Refused(f"more than {MOST_BYTES} bytes")
     feel = {}
@@ -144,7 +145,7 @@ def feel_of(datagram, limits):
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise Refused(f"{name} must be one number, got {message.params}")
         low, high, why = limits[name]
-        # What is not a number is in no range.
+        # NaN is outside every range.
         if not low <= value <= high:
             unit = f" {FIELDS[name][0]}" if FIELDS[name][0] else ""
             raise Refused(f"{name} must lie in {low:g}..{high:g}{unit}{why}, got {value:g}")
@@ -153,7 +154,7 @@ def feel_of(datagram, limits):
 
 
 def limits_for(ceiling_mnm, targets):
-    """Range of each field and the reason where it is narrower than the protocol's."""
+    """Range of each field, with the reason if it is narrower than the range in the protocol."""
     limits = {name: (low, high, "") for name, (_, low, high) in FIELDS.items()}
     for signal_name, (field, factor, low, high) in targets.items():
         least, most, _ = limits[field]
@@ -201,14 +202,14 @@ class Signals:
         self.device.poll(0)
 
     def free(self):
-        # Long enough for the last values to leave.
+        # Long enough to send the last values.
         for _ in range(20):
             self.device.poll(10)
         self.device.free()
 
 
 class Wiring:
-    """Makes the maps to a device, whenever it is there."""
+    """Makes the maps to a device whenever the device is present."""
 
     def __init__(self, ours, wanted, targets):
         self.ours, self.wanted, self.targets = ours, wanted, targets
@@ -220,13 +221,13 @@ class Wiring:
             self.said = text
 
     def matches(self, name):
-        # libmapper adds an ordinal: TorqueTuner_001 is TorqueTuner_001.1.
+        # libmapper appends a number: TorqueTuner_001 becomes TorqueTuner_001.1.
         return name == self.wanted or name.rpartition(".")[0] == self.wanted
 
     def look(self):
-        """To be called about once a second."""
+        """Looks for the device and makes missing maps; call it about once a second."""
         prop = libmapper.Property
-        # A device that has left may stay listed for a while, without signals.
+        # A device that has gone may stay listed for a while, without signals.
         devices = {}
         for theirs in self.ours.graph.signals():
             device, name = theirs.device()[prop.NAME], theirs[prop.NAME]
@@ -250,7 +251,7 @@ class Wiring:
         }
         for name, (field, factor, _, _) in self.targets.items():
             if name in found and name not in mapped:
-                # Said outright: ranges that a device declares are no guide (upstream's Damping declares +-1800).
+                # The factor is explicit: the ranges a device declares are no guide (upstream's Damping declares +-1800).
                 libmapper.Map(f"%y=%x*{factor:.9g}", found[name], self.ours.signals[field]).push()
         missing = [name for name in self.targets if name not in found]
         done = [name for name in self.targets if name in mapped]
@@ -259,7 +260,7 @@ class Wiring:
 
 
 class Bridge:
-    """What was received last, and what of it is to be sent."""
+    """The last values received, and those still to be sent."""
 
     def __init__(self, limits):
         self.limits = limits
@@ -274,7 +275,7 @@ class Bridge:
             feel = feel_of(datagram, self.limits)
         except Refused as refusal:
             self.refused += 1
-            # A flood shall not fill the terminal.
+            # A flood of packets must not fill the terminal.
             if now_s - self.said_at >= 1.0:
                 print(f"refused: {refusal}", flush=True)
                 self.said_at = now_s
@@ -285,7 +286,7 @@ class Bridge:
         self.taken += 1
         self.heard_at = now_s
         self.scale["wanted"] = feel.pop("scale", self.scale["wanted"])
-        # What comes again goes out again: a TorqueTuner forgets its values when its mode changes.
+        # Repeated values are sent again: a TorqueTuner forgets its values when its mode changes.
         self.fresh |= feel | {"scale": None}
 
     def due(self, now_s, dt_s):
@@ -333,11 +334,11 @@ def arguments():
     )
     parser.add_argument(
         "--listen", type=address, default=("127.0.0.1", 9001), metavar="ADDRESS:PORT",
-        help="where the feel comes in; port 0 lets the system choose [default: 127.0.0.1:9001, this machine only]",
+        help="address to receive the feel; port 0 lets the system choose [default: 127.0.0.1:9001, this machine only]",
     )
-    parser.add_argument("--interface", metavar="NAME", help="network for libmapper [default: libmapper's choice]")
-    parser.add_argument("--name", default="chalumeau", metavar="NAME", help="of our device [default: chalumeau]")
-    parser.add_argument("--map", metavar="DEVICE", help="TorqueTuner to drive, by its libmapper name")
+    parser.add_argument("--interface", metavar="NAME", help="network interface for libmapper [default: libmapper's choice]")
+    parser.add_argument("--name", default="chalumeau", metavar="NAME", help="name of our device [default: chalumeau]")
+    parser.add_argument("--map", metavar="DEVICE", help="libmapper name of the TorqueTuner to drive")
     default, most = CEILING_MNM
     parser.add_argument(
         "--ceiling", type=within(0, most), default=default, metavar="MNM",
@@ -380,7 +381,7 @@ def main():
 
 
 def serve(receiver, signals, bridge, wiring, stop):
-    """Until `stop` has something in it."""
+    """Receives and sends until `stop` is not empty."""
     sent_at = looked_at = time.monotonic()
     while not stop:
         select.select([receiver], [], [], TURN_S)
@@ -388,7 +389,7 @@ def serve(receiver, signals, bridge, wiring, stop):
             try:
                 datagram = receiver.recv(MOST_BYTES + 1)
             except OSError:
-                # Nothing more, or an error that an earlier sender's machine sent back.
+                # No more data, or an error that an earlier sender's machine returned.
                 break
             bridge.take(datagram, time.monotonic())
         now = time.monotonic()

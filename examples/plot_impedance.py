@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Input impedance of a fingering: magnitude with its modes, and phase, of one or several models.
+"""Plots the input impedance of a fingering: magnitude with its modes, and phase, of one or several models.
 
     chalumeau impedance --written F4 --csv f4.csv
     chalumeau impedance --written F4 --peaks 8 --csv f4_peaks.csv
     chalumeau impedance --written F4 --model tmm --csv f4_tmm.csv
     python plot_impedance.py f4.csv f4_tmm.csv --peaks f4_peaks.csv --out f4.png
 
-Each mode is named by its frequency and by how far it stands from a whole multiple of the sounding note, in cents: modes
-near odd multiples help the tone. Needs numpy and matplotlib. Exit code 0: done; 2: a file cannot be used, and the
+Each mode is labelled with its frequency and its distance in cents from the nearest whole multiple of the sounding note.
+Modes near odd multiples support the tone. Needs numpy and matplotlib. Exit code 0: done; 2: a file cannot be used, and the
 message says why.
 """
 
@@ -40,7 +40,7 @@ def draw(args):
         if len(set(written)) != 1:
             raise kit.BadInput(f"{args.peaks}: has {len(set(written))} notes; one was expected, as --written F4 gives")
         played_hz = 440 * 2 ** ((written[0] - args.transposition - 69) / 12)
-        # Text of a mode nearer than this to the one before goes a step up, Hz and points.
+        # The label of a mode nearer than this to the previous one moves up a step; Hz and points.
         near_hz, step_pt, last_hz, lift_pt = 250, 26, -np.inf, 6
         for mode_hz, height in zip(f_hz, size):
             harmonic = max(1, round(mode_hz / played_hz))
@@ -68,7 +68,7 @@ def main():
     words = {"description": __doc__, "formatter_class": argparse.RawDescriptionHelpFormatter}
     parser = argparse.ArgumentParser(**words)
     parser.add_argument("curves", nargs="+", help="tables of chalumeau impedance --written")
-    parser.add_argument("--peaks", metavar="FILE", help="table of the same note with --peaks N: marks its modes")
+    parser.add_argument("--peaks", metavar="FILE", help="table of the same note, made with --peaks N: marks its modes")
     parser.add_argument(
         "--transposition", type=int, default=2, metavar="N",
         help="semitones the instrument sounds below what is written [default: 2, B flat]",

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Every note of an instrument: how hard to blow before it speaks, and what it then plays.
+"""Plots the threshold and the pitch of every note of an instrument.
 
     chalumeau threshold --all --zeta 0.3 --csv threshold.csv
     chalumeau tune --gamma 0.5 --csv mf.csv
     chalumeau tune --gamma 0.8 --csv ff.csv
     python plot_notes.py threshold.csv mf.csv ff.csv --out notes.png
 
-Thresholds are over the pressure that shuts the reed; a bore without losses would have 1/3 everywhere. Pitch is against
-equal temperament; a note whose register did not hold is a cross at the bottom. Needs numpy and matplotlib. Exit code 0:
+Thresholds are relative to the closing pressure of the reed; a bore without losses would have 1/3 everywhere. Pitch is
+relative to equal temperament; a note that lost its register is a cross at the bottom. Needs numpy and matplotlib. Exit code 0:
 done; 2: a file cannot be used, and the message says why.
 """
 
@@ -36,12 +36,12 @@ def draw(args):
         fallen += [(note, index, colour) for note in notes[~good]]
     lower.axhline(0, color=kit.GREY, lw=0.8)
     low, high = lower.get_ylim()
-    # No closer than a hundredth of a semitone: what is in tune shall look so.
+    # Show at least +-1 cent, so that notes in tune look in tune.
     low, high = min(low, -1.0), max(high, 1.0)
-    # Below the lowest note there is room for those that fell and for the legend.
+    # Leave room at the bottom for notes that lost their register and for the legend.
     lower.set_ylim(low - 0.25 * (high - low), high)
     for note, index, colour in fallen:
-        # One line a table, so that they do not cover each other.
+        # One line for each table, so that the crosses do not overlap.
         lower.plot(note, 0.04 + 0.05 * index, "x", color=colour, ms=6, transform=lower.get_xaxis_transform())
     if fallen:
         lower.plot([], [], "x", color="black", label="register did not hold")

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""The reed's flow law in physical units, with the orbit of a played note over it.
+"""Plots the flow law of the reed in physical units, with the orbit of a played note.
 
     chalumeau reed --law --csv law.csv
     chalumeau render --written G4 --gamma 0.5 --seconds 1 --no-noise --out g4.wav --probe g4.csv
     python plot_reed.py law.csv g4.csv --out reed.png
 
-The law is what a reed at rest at each pressure would let through. The note goes round beside it, since the moving reed
-has inertia and its lay is curved. Needs numpy and matplotlib. Exit code 0: done; 2: a file cannot be used, and the
+The law is the flow through a reed at rest at each pressure. The orbit of the note differs from it, because the moving
+reed has inertia and its lay is curved. Needs numpy and matplotlib. Exit code 0: done; 2: a file cannot be used, and the
 message says why.
 """
 
@@ -17,9 +17,9 @@ import sys
 import kit
 import numpy as np
 
-# The seed's reed, to which zeta refers: p = 1 shuts it.
+# The reference reed of the notebook, to which zeta refers: p = 1 shuts it.
 H_REFERENCE = math.sqrt(27) / 2
-# Shown of the note, s, from its end back: several periods of the lowest one.
+# Length shown, s, up to the end of the note: several periods of the lowest note.
 SHOWN_S = 0.05
 
 
@@ -34,7 +34,7 @@ def draw(args):
     if shown.sum() < 16:
         raise kit.BadInput(f"{args.probe}: {shown.sum()} rows before {end_s:g} s; it has {t[0]:g} to {t[-1]:g} s")
 
-    # All over the closing pressure, so that both axes of the law are those of the note.
+    # Both curves use the same closing pressure, so that the axes of the law are those of the note.
     p_delta_kpa = 1e-3 * (gamma[shown] * closing_pa - mouthpiece[shown])
     reference_kpa = 1e-3 * kit.remark(args.probe, "reference pressure", "Pa")
     law_kpa, law_l_s = reference_kpa * p, 1e3 * scale_m3s * u / H_REFERENCE
@@ -47,7 +47,7 @@ def draw(args):
     left.axvline(0, color=kit.GREY, lw=0.8)
     left.plot(law_kpa[seen], law_l_s[seen], color=kit.BLUE, lw=2, label="law, reed at rest at each pressure")
     left.plot(p_delta_kpa, 1e3 * flow[shown], color=kit.RED, lw=1, label="orbit of the note")
-    # Which way it goes: from the fullest flow on.
+    # An arrow shows the direction, from the largest flow on.
     at = int(np.argmax(flow[shown][: -len(p_delta_kpa) // 8]))
     there = [(p_delta_kpa[n], 1e3 * flow[shown][n]) for n in (at, at + max(2, len(p_delta_kpa) // 400))]
     left.annotate("", there[1], there[0], arrowprops={"arrowstyle": "-|>", "color": kit.RED, "mutation_scale": 18})

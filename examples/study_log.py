@@ -1,4 +1,4 @@
-"""Reads the logs of a study, for analyse_study.py: pieces of one side of a trial, and the onset of their notes."""
+"""Reads the logs of a study for analyse_study.py: pieces of one side of a trial, and the thresholds of their notes."""
 
 import csv
 import dataclasses
@@ -10,26 +10,26 @@ NUMBERS = (
     "t_us", "angle_deg", "torque_mnm", "written_midi", "gamma", "feel_id", "h", "k", "participant", "trial",
 )
 WORDS = ("side", "condition")
-# These may be empty: no note is fingered, no study runs, the reed is not known.
+# These may be empty: no note is fingered, no study runs, or the reed is unknown.
 MAY_BE_EMPTY = ("written_midi", "feel_id", "h", "k", "participant", "trial")
 SIDES = ("A", "B")
 CONDITIONS = ("coupled", "free")
 
-# The seed's reed: H = sqrt(27)/2 and k = 27 / (4 H^3).
+# The reference reed of the notebook: H = sqrt(27)/2 and k = 27 / (4 H^3).
 H_REFERENCE = math.sqrt(27) / 2
 K_REFERENCE = 27 / (4 * H_REFERENCE**3)
-# Rows further apart than this are a gap in the link (a knob sends 25 to 1000 rows a second): nothing is counted across.
+# Rows further apart than this are a gap in the link (a knob sends 25 to 1000 rows a second). No measure spans a gap.
 GAP_S = 0.1
 
 
 class BadInput(Exception):
-    """A file that cannot be used; the text says which, where and why."""
+    """A file that cannot be used; the text says which file, where and why."""
 
 
 def read_table(path, needed):
-    """Columns of a CSV file by name in lower case, the numbers of their lines, and nothing else.
+    """The needed columns of a CSV file, by name in lower case, and the line number of each row.
 
-    Lines beginning with # are remarks. Raises BadInput.
+    Lines that begin with # are remarks. Raises BadInput.
     """
     rows, lines, header = [], [], None
     try:
@@ -65,7 +65,7 @@ def read_table(path, needed):
 
 
 def numbers(path, name, cells, lines, may_be_empty):
-    """A column as floats, nan where it is empty. Raises BadInput with the line of the first bad cell."""
+    """A column as floats, nan for empty cells. Raises BadInput with the line of the first bad cell."""
     found = np.full(len(cells), np.nan)
     for row, cell in enumerate(cells):
         cell = cell.strip()
@@ -98,9 +98,9 @@ class Piece:
     feel_id: np.ndarray
     h: float
     k: float
-    # False where the piece only goes on after a gap.
+    # False if the piece only continues after a gap.
     is_visit: bool
-    # Counts the logs, so that times of two are never subtracted.
+    # Number of the log, so that times of two logs are never subtracted.
     log: int
 
 
@@ -112,7 +112,7 @@ def read_log(path, log, onset):
     back = np.flatnonzero(np.diff(data["t_us"]) < 0)
     if back.size:
         raise BadInput(f"{path}: line {lines[back[0] + 1]}: t_us goes back; a log runs forward")
-    # A study is on where the participant is named.
+    # A study is on in rows that name a participant.
     on = np.isfinite(data["participant"])
     if not on.any():
         raise BadInput(f"{path}: no row belongs to a study; was Study on while the take was recorded?")
@@ -141,7 +141,7 @@ def read_log(path, log, onset):
                 int(participant), int(trial), str(side), str(condition), t_s[rows], data["angle_deg"][rows],
                 data["torque_mnm"][rows], written, data["gamma"][rows], onset.gamma(written, h, k),
                 data["feel_id"][rows],
-                # Side and parameters change a little apart in time; what most rows have is meant.
+                # Side and parameters do not change at exactly the same time, so the median of the rows counts.
                 float(np.median(h)), float(np.median(k)), begin == 0 or bool(changes[begin - 1]), log,
             )
         )
@@ -149,7 +149,7 @@ def read_log(path, log, onset):
 
 
 class Onset:
-    """gamma_on of a note: from the table of `chalumeau haptic --all --csv`, else 1/3, that of a bore without losses."""
+    """gamma_on of a note, from the table of `chalumeau haptic --all --csv`; without a table 1/3, as for a bore without losses."""
 
     def __init__(self, path=None):
         self.losses = {}
@@ -163,8 +163,8 @@ class Onset:
                 continue
             if not (1 / 3 <= gamma <= 1 and written == int(written) and h > 0 and k > 0):
                 raise BadInput(f"{path}: line {line}: gamma_on must lie in 1/3..1, H and k above 0, the note be whole")
-            # sqrt(g) = (b + sqrt(3 + b^2)) / 3 solved for b = Zc / (zeta Zpeak), then over the strength of the
-            # table's reed: what is left is the note's own.
+            # sqrt(g) = (b + sqrt(3 + b^2)) / 3 is solved for b = Zc / (zeta Zpeak), then multiplied by the strength of
+            # the table's reed. The result depends only on the note.
             root = math.sqrt(gamma)
             self.losses[int(written)] = (3 * gamma - 1) / (2 * root) * self.strength(h, k)
         if not self.losses:
@@ -172,15 +172,15 @@ class Onset:
 
     @staticmethod
     def strength(h, k):
-        """Flow strength of a reed over the reference's: zeta goes as H / sqrt(H k)."""
+        """Flow strength of a reed relative to the reference reed: zeta is proportional to H / sqrt(H k)."""
         return h * K_REFERENCE / np.sqrt(h * k)
 
     def gamma(self, written, h, k):
-        """gamma_on row by row, nan where no note is fingered or the table does not have it."""
+        """gamma_on row by row; nan where no note is fingered or the table lacks the note."""
         known = np.isfinite(written)
         if not self.losses:
             return np.where(known, 1 / 3, np.nan)
-        # A log that does not tell H and k is taken to be of the reference reed.
+        # A log without H and k is taken as one of the reference reed.
         h, k = np.where(np.isfinite(h), h, H_REFERENCE), np.where(np.isfinite(k), k, K_REFERENCE)
         notes = np.where(known, written, -1).astype(int)
         b = np.array([self.losses.get(note, np.nan) for note in notes]) / self.strength(h, k)

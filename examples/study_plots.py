@@ -1,4 +1,4 @@
-"""Draws a study, for analyse_study.py: single trials, torque against angle, and the paired comparison."""
+"""Draws the plots of analyse_study.py: single trials, torque against angle, and the paired comparison."""
 
 import math
 
@@ -9,10 +9,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from study_log import CONDITIONS
 
-# Okabe and Ito's colours, told apart by all common kinds of colour vision; shapes and dashes tell them apart in grey.
+# Okabe and Ito's colours, distinct for all common kinds of colour vision; shapes and dashes distinguish them in grey.
 STYLE = {"coupled": {"color": "#0072B2", "marker": "o"}, "free": {"color": "#D55E00", "marker": "s"}}
 
-# What is compared: column of the summary, unit, words for plots.
+# The measures compared: column of the summary, unit, label for plots.
 METRICS = {
     "gamma_rms": ("1", "unsteadiness of gamma, rms"),
     "onset_s": ("s", "note to onset, s"),
@@ -24,7 +24,7 @@ METRICS = {
 
 
 def plot_timeline(path, title, pieces):
-    """Angle, gamma and torque of one trial; grey bands are side B. Time between two logs is left out."""
+    """Angle, gamma and torque of one trial; grey bands are side B. The time between two logs is left out."""
     figure, axes = plt.subplots(3, 1, figsize=(10, 7), sharex=True, layout="constrained")
     offset, last_log, last_end, spans = 0.0, None, 0.0, []
     for piece in pieces:
@@ -47,7 +47,7 @@ def plot_timeline(path, title, pieces):
         axis.grid(alpha=0.3)
     whole = max(last_end - spans[0][2], 1e-9)
     for side, condition, begin, end in spans:
-        # A name where there is room for one.
+        # A label only where there is room for it.
         if (end - begin) / whole > 0.08:
             where = axes[0].get_xaxis_transform()
             axes[0].text(
@@ -68,7 +68,7 @@ def plot_timeline(path, title, pieces):
 
 
 def plot_phase(path, participant, trials):
-    """Torque against angle, one field for each opening."""
+    """Torque against angle, one panel for each opening."""
     fields = {}
     for piece in (piece for pieces in trials.values() for piece in pieces if piece.participant == participant):
         fields.setdefault(round(piece.h, 3) if math.isfinite(piece.h) else None, []).append(piece)
@@ -85,7 +85,7 @@ def plot_phase(path, participant, trials):
         for piece in pieces:
             style = STYLE[piece.condition]
             axis.plot(piece.angle_deg, piece.torque_mnm, color=style["color"], lw=0.6, alpha=0.35)
-            # Shapes, since lines lie on each other too much for dashes; some 300 in a field.
+            # Markers, because the lines overlap too much for dashes; about 300 in a panel.
             some = slice(None, None, max(1, rows // 300))
             axis.plot(
                 piece.angle_deg[some], piece.torque_mnm[some], ls="", marker=style["marker"], ms=4, mec=style["color"],
@@ -107,7 +107,7 @@ def plot_phase(path, participant, trials):
 
 
 def plot_paired(path, pairs):
-    """Each trial's two sides, joined; one field for each metric, one place for each opening. Bars are means."""
+    """The two sides of each trial, joined by a line; one panel for each metric, one place for each opening. Bars are means."""
     openings = sorted({h for trials in pairs.values() for h, _ in trials if math.isfinite(h)})
     place = {h: n for n, h in enumerate(openings)}
     names = ["preference", *METRICS]
