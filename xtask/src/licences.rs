@@ -48,12 +48,9 @@ pub fn run(args: &[String]) -> Result<()> {
 
 /// The list for the targets of a build with these options: the host unless they name one.
 pub fn beside_bundles(options: &[String]) -> Result<()> {
-    let mut options = options.iter();
-    let target = options.find_map(|option| match option.strip_prefix("--target=") {
-        Some(target) => Some(target),
-        None if option == "--target" => options.clone().next().map(String::as_str),
-        None => None,
-    });
+    let mut words =
+        options.iter().flat_map(|option| option.split('=')).skip_while(|word| *word != "--target");
+    let target = words.nth(1);
     write(&[target.unwrap_or(HOST)])
 }
 
@@ -89,13 +86,12 @@ fn allowed(deny: &str) -> Result<BTreeSet<String>> {
 
 /// The packages inside the binaries of one target; our own are not among them.
 fn shipped(target: &str) -> Result<Vec<Package>> {
+    let features = ["--no-default-features", "--features", FEATURES];
     let tree = ["tree", "-p", "chalumeau", "-e", "normal,no-proc-macro", "--prefix", "none", "-f", "{p}"];
-    let tree = output(
-        &[&tree[..], &["--no-default-features", "--features", FEATURES, "--target", target]].concat(),
-    )?;
+    let tree = output(&[&tree[..], &features, &["--target", target]].concat())?;
     let inside: BTreeSet<_> = tree.lines().filter_map(title).collect();
-    let metadata =
-        output(&["metadata", "--format-version", "1", "--all-features", "--filter-platform", target])?;
+    let metadata = ["metadata", "--format-version", "1", "--filter-platform", target];
+    let metadata = output(&[&metadata[..], &features].concat())?;
     let metadata: Value = serde_json::from_str(&metadata)?;
     let packages = metadata["packages"].as_array().context("cargo metadata names no packages")?;
     let packages: Vec<_> = packages.iter().map(package).collect::<Option<_>>().context("cargo metadata")?;
