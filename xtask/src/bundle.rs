@@ -1,8 +1,6 @@
 //! Builds the plugin and puts it into the shapes hosts look for, with the licences of what is inside.
 
-use std::path::PathBuf;
-
-use anyhow::{Result, anyhow};
+use anyhow::Result;
 
 use crate::{licences, machine};
 
@@ -19,26 +17,6 @@ pub fn run(args: &[String]) -> Result<()> {
     nice_plug_xtask::build(&[PACKAGE.to_owned()], &options)?;
     nice_plug_xtask::bundle(&machine::target(), PACKAGE, &options, false)?;
     licences::beside_bundles(&options)
-}
-
-/// The bundled CLAP, as a host would load it: the file, or on macOS the binary inside the bundle.
-pub fn clap() -> Result<PathBuf> {
-    let path = machine::target().join("bundled/Chalumeau.clap");
-    let inside = path.join("Contents/MacOS/Chalumeau");
-    present(if inside.exists() { inside } else { path })
-}
-
-/// The bundled VST3, a folder.
-pub fn vst3() -> Result<PathBuf> {
-    present(machine::target().join("bundled/Chalumeau.vst3"))
-}
-
-fn present(path: PathBuf) -> Result<PathBuf> {
-    if path.exists() {
-        Ok(path)
-    } else {
-        Err(anyhow!("{} is not there; run `cargo xtask bundle`", path.display()))
-    }
 }
 
 /// Where hosts look for plugins.

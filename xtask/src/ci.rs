@@ -7,14 +7,18 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 
-use crate::machine::{
-    self, ALSA, ARM_CXX, ARM_LIBRARY, CC, CXX, EGL, GL, GLIB, JACK, JACKD, MESA, PKG_CONFIG, PROGRAM,
-    Package, VENV, X11_XCB, XCB, XKB, XVFB,
-};
-use crate::programs::{STANDALONE, programs};
-use crate::{COMMANDS, bundle, firmware, simulator};
 #[cfg(target_os = "linux")]
-use crate::{ardour, jack, window};
+use chalumeau_test_host::ardour;
+use chalumeau_test_host::artefacts;
+
+use crate::machine::{
+    self, ALSA, ARM_CXX, ARM_LIBRARY, CC, CXX, EGL, GL, GLIB, JACK, JACKD, MESA, PKG_CONFIG, Package,
+    VALGRIND, VENV, X11_XCB, XCB, XKB, XVFB,
+};
+use crate::programs::{TESTS, programs, test_files};
+use crate::{COMMANDS, bundle, firmware};
+#[cfg(target_os = "linux")]
+use crate::{jack, window};
 
 /// DawDreamer's version is pinned: a new one may host differently.
 const DAWDREAMER_PACKAGES: &[&str] = &["dawdreamer==0.9.0", "numpy<3"];
@@ -24,39 +28,32 @@ const EXAMPLE_PACKAGES: &[&str] =
 
 type Step = (&'static str, fn() -> Result<()>);
 
+/// Two builds serve all steps: one debug build of everything (`programs`) and the bundle. Clippy and documentation only
+/// check. A step whose tool is missing fails: a gate that did not run is not green.
 const STEPS: &[Step] = &[
     ("system packages", packages),
     ("format", || cargo("fmt --all --check")),
-    ("clippy, core", || cargo("clippy --no-default-features --features cli --all-targets -- -D warnings")),
-    ("clippy, knob", || {
-        cargo("clippy --no-default-features --features simulator --all-targets -- -D warnings")
+    ("clippy", || cargo("clippy --workspace --all-features --all-targets -- -D warnings")),
+    ("clippy, core alone", || cargo("clippy -p chalumeau-core --all-targets -- -D warnings")),
+    ("clippy, command line alone", || {
+        cargo("clippy -p chalumeau --no-default-features --features cli --all-targets -- -D warnings")
     }),
-    ("clippy, all features", || cargo("clippy --all-features --all-targets -- -D warnings")),
-    ("clippy, xtask", || cargo("clippy -p xtask --all-targets -- -D warnings")),
-    ("tests, core", || cargo("test --no-default-features --features cli --no-fail-fast")),
-    ("tests, knob", knob),
-    ("tests, program", || cargo(&format!("test {PROGRAM} --lib --bins --no-fail-fast"))),
-    // Beside the step with the same features; those that start them come later.
-    ("programs", || programs().map(drop)),
-    ("editor", || cargo("test --no-default-features --features editor-tests --test editor --no-fail-fast")),
+    ("tests and programs build", || programs().map(drop)),
+    ("tests", tests),
+    ("examples in documentation", || cargo("test --workspace --all-features --doc")),
     ("documentation", documentation),
     ("generated files", generated),
-    ("tests, firmware's crate", || cargo("test -p chalumeau-firmware")),
-    ("clippy, firmware's crate", || cargo("clippy -p chalumeau-firmware --all-targets -- -D warnings")),
     ("firmware, host and ARM", firmware::all),
     ("bundle", || bundle::run(&[])),
-    ("simulated knob", simulator::build),
-    ("tests, xtask and its MIDI reader", || cargo("test -p xtask --lib --bins")),
     ("CLAP in clack-host", clap),
     ("CLAP with allocation checks", clap_checked),
     ("standalone", standalone),
-    ("CLAP with the simulated knob", || cargo("test -p xtask --test knob --no-fail-fast")),
     // Elsewhere there is neither a JACK nor a display that a test could start.
     #[cfg(target_os = "linux")]
     ("window", window::test),
     #[cfg(target_os = "linux")]
     ("MIDI over JACK", jack::test),
-    ("VST3 in vst3-host", || cargo("test -p xtask --test vst3 --no-fail-fast")),
+    ("VST3 in vst3-host", || machine::run(&mut host_tests(&["vst3"]))),
     ("VST3 in DawDreamer", dawdreamer),
     #[cfg(target_os = "linux")]
     ("VST3's window in Ardour", ardour::test),
@@ -125,6 +122,7 @@ fn packages() -> Result<()> {
             &GL,
             &GLIB,
             &XVFB,
+            &VALGRIND,
             &MESA,
             &EGL,
             &XKB,
@@ -136,16 +134,25 @@ fn packages() -> Result<()> {
     machine::provide(needed)
 }
 
-/// Haptics, links, firmware and simulator together; what the core's tests cover is not run again.
-fn knob() -> Result<()> {
-    let tests =
-        ["device", "simulator", "haptics", "closed_loop"].map(|name| format!(" --test {name}")).concat();
-    cargo(&format!("test --no-default-features --features simulator --no-fail-fast --lib --bins{tests}"))
+/// All tests that need no host, with nextest where it is installed: it spreads them over the cores.
+fn tests() -> Result<()> {
+    programs()?;
+    let files = test_files()?;
+    let chosen = files.iter().flat_map(|name| ["--test", name]);
+    let mut command = machine::cargo();
+    if machine::works("cargo", &["nextest", "--version"]) {
+        command.arg("nextest").arg("run").args(&TESTS[1..]).arg("--no-fail-fast").args(["--lib", "--bins"]);
+    } else {
+        command.args(TESTS).args(["--no-fail-fast", "--lib", "--bins"]);
+    }
+    machine::run(command.args(chosen))
 }
 
 fn documentation() -> Result<()> {
     machine::run(
-        machine::cargo().args(["doc", "--no-deps", "--all-features"]).env("RUSTDOCFLAGS", "-D warnings"),
+        machine::cargo()
+            .args(["doc", "--workspace", "--no-deps", "--all-features"])
+            .env("RUSTDOCFLAGS", "-D warnings"),
     )
 }
 
@@ -158,43 +165,44 @@ fn generated() -> Result<()> {
     Ok(())
 }
 
-/// Tests of the CLAP, with a cache of their own for the instruments they make.
-fn clap_tests(names: &[&str]) -> Command {
+/// Tests of the plugin and the programs in hosts, with a cache of their own for the instruments they make.
+fn host_tests(names: &[&str]) -> Command {
     let mut command = machine::cargo();
-    command.args(["test", "-p", "xtask", "--no-fail-fast"]);
+    command.args(TESTS).arg("--no-fail-fast");
     command.args(names.iter().flat_map(|name| ["--test", name]));
-    command.env("CHALUMEAU_CACHE_DIR", machine::target().join("cache"));
+    command.env(artefacts::CACHE, machine::target().join("cache"));
     command
 }
 
 fn clap() -> Result<()> {
-    machine::run(&mut clap_tests(&["clap", "instrument"]))
+    let program = &programs()?.program;
+    machine::run(host_tests(&["clap", "instrument", "knob"]).env(artefacts::PROGRAM, program))
 }
 
 /// The same tests on a debug build, where the framework aborts on any allocation while processing.
 fn clap_checked() -> Result<()> {
-    machine::run(clap_tests(&["clap", "instrument", "knob"]).env("CHALUMEAU_CLAP", &programs()?.plugin))
+    let programs = programs()?;
+    let mut tests = host_tests(&["clap", "instrument", "knob"]);
+    tests.env(artefacts::CLAP, &programs.plugin).env(artefacts::PROGRAM, &programs.program);
+    machine::run(&mut tests)
 }
 
 /// The program of its own, without sound; the JACK step plays it to a server.
 fn standalone() -> Result<()> {
-    let mut tests = machine::cargo();
-    tests.args(["test", "-p", "xtask", "--test", "standalone", "--no-fail-fast"]);
-    machine::run(tests.env(STANDALONE, &programs()?.standalone))
+    machine::run(host_tests(&["standalone"]).env(artefacts::STANDALONE, &programs()?.standalone))
 }
 
 fn dawdreamer() -> Result<()> {
     let python = python("venv", "dawdreamer, numpy", DAWDREAMER_PACKAGES)?;
-    let script = machine::root().join("xtask/tests/vst3_in_dawdreamer.py");
-    machine::run(Command::new(&python).arg(script).arg(bundle::vst3()?))
+    let script = machine::root().join("crates/test-host/tests/vst3_in_dawdreamer.py");
+    machine::run(Command::new(&python).arg(script).arg(artefacts::vst3()?))
 }
 
 fn python_examples() -> Result<()> {
     let python = python("venv-examples", "numpy, matplotlib, libmapper, pythonosc", EXAMPLE_PACKAGES)?;
-    let tests = machine::root().join("xtask/tests/python_examples.py");
+    let tests = machine::root().join("examples/tests/python_examples.py");
     // The study kit draws what the command line measures.
-    simulator::build()?;
-    machine::run(Command::new(&python).arg(tests).env(simulator::PROGRAM, simulator::program()?))
+    machine::run(Command::new(&python).arg(tests).env(artefacts::PROGRAM, &programs()?.program))
 }
 
 /// The Python of a virtual environment in the target folder, which is made if it cannot import `modules` yet.

@@ -10,8 +10,10 @@ use chalumeau_core::score;
 use chalumeau_core::score::Score;
 use chalumeau_core::score::heard::{Heard, Listener, Sounding, spread};
 
-use crate::host::{At, Plugin};
-use crate::{bundle, machine, midi, picture, simulator, touch_demo};
+use chalumeau_test_host::clap::{At, Plugin};
+use chalumeau_test_host::{artefacts, midi};
+
+use crate::{bundle, machine, picture, simulator, touch_demo};
 
 const RATE: u32 = 48_000;
 const BLOCK: usize = 512;
@@ -38,7 +40,7 @@ pub fn run(_: &[String]) -> Result<()> {
     let score = score::midi_file::read(&bytes, RATE)?.with_tail(TAIL_S, RATE);
     let said = midi::messages(&bytes, RATE)?;
 
-    let clap = bundle::clap()?;
+    let clap = artefacts::clap()?;
     println!("\nplaying {} through {}", shown(&file), shown(&clap));
     let started = Instant::now();
     let mut plugin = Plugin::load(&clap)?;

@@ -105,10 +105,7 @@ fn cost(program: &PathBuf) -> Result<()> {
     machine::run(
         Command::new("g++").args(STRICT).args(["-O2", "firmware/cost/tick.cpp", "-o"]).arg(program),
     )?;
-    if !machine::works("valgrind", &["--version"]) {
-        println!("instructions of a tick not counted: apt-get install valgrind");
-        return Ok(());
-    }
+    machine::provide(&[&machine::VALGRIND])?;
     for mood in ["average", "busy"] {
         let collected = |ticks: u64| -> Result<u64> {
             let output = Command::new("valgrind")

@@ -1,29 +1,22 @@
 //! Chores of the project, one file each; `cargo xtask` lists them.
 
-#[cfg(target_os = "linux")]
-pub mod ardour;
 pub mod bundle;
 pub mod ci;
 pub mod demo;
-#[cfg(target_os = "linux")]
-pub mod display;
 pub mod firmware;
 pub mod generated;
-pub mod host;
 pub mod jack;
 pub mod licences;
-pub mod machine;
-pub mod midi;
 pub mod picture;
 pub mod prepared;
 pub mod programs;
-#[cfg(target_os = "linux")]
-pub mod screen;
 pub mod simulator;
 pub mod touch_demo;
 #[cfg(target_os = "linux")]
 pub mod window;
 pub mod wire_vectors;
+
+pub use chalumeau_test_host::machine;
 
 /// One chore.
 pub struct Command {

@@ -3,14 +3,13 @@
 use std::path::Path;
 
 use anyhow::Result;
-use chalumeau::picture_file;
 use chalumeau_core::analysis::overview::{Envelope, Overview, Watcher};
 use chalumeau_core::event::Event;
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::score::{Score, closing_kpa};
 use chalumeau_figure::palette::Colour;
 use chalumeau_figure::performance::{Note, Performance as Played, outline, performance};
-use chalumeau_figure::{Axis, Dash, Figure, Line, Panel};
+use chalumeau_figure::{Axis, Dash, Figure, Line, Panel, draw};
 
 use crate::touch_demo::Performance;
 
@@ -55,7 +54,7 @@ pub fn write(path: &Path, samples: &[f32], rate_hz: f64, score: &Score, a4_hz: f
         closing_pa: settings.closing_pa(),
         moment: None,
     });
-    Ok(picture_file::write(&figure, path, None, true)?)
+    Ok(std::fs::write(path, draw::png(&figure, None)?)?)
 }
 
 /// Draws what a hand did on the knob, and what came of it: angle, mouth pressure, torque, sound.
@@ -101,7 +100,7 @@ pub fn write_touch(path: &Path, performance: &Performance, rate_hz: f64) -> Resu
         )
         .panel(Panel { x: time("time, s"), ..outline(&seen(&performance.left, rate_hz)) })
         .size(1_600, 1_500);
-    Ok(picture_file::write(&figure, path, None, true)?)
+    Ok(std::fs::write(path, draw::png(&figure, None)?)?)
 }
 
 #[cfg(test)]

@@ -1,13 +1,16 @@
-//! The plugin and the programs with every feature, built once and kept where no other build takes their place: cargo gives
-//! a library that can be loaded one name, whatever its features, and so builds it anew whenever they change.
+//! The one debug build of everything: all packages with all features, so that no step of `ci` builds anything again.
 
+use std::ffi::OsStr;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use anyhow::{Context, Result};
 
-use crate::machine::{self, PROGRAM};
+use crate::machine;
+
+/// What every step that tests begins with. Another choice of packages or features would build the dependencies again.
+pub const TESTS: [&str; 3] = ["test", "--workspace", "--all-features"];
 
 /// Debug builds, in which the framework aborts on any allocation while processing; their midir speaks to JACK.
 pub struct Programs {
@@ -19,10 +22,7 @@ pub struct Programs {
     pub standalone: PathBuf,
 }
 
-/// Which program the tests of the standalone start.
-pub const STANDALONE: &str = "CHALUMEAU_STANDALONE";
-
-/// Builds them when first asked.
+/// Builds all tests and programs when first asked.
 pub fn programs() -> Result<&'static Programs> {
     static BUILT: OnceLock<Programs> = OnceLock::new();
     if let Some(built) = BUILT.get() {
@@ -32,11 +32,9 @@ pub fn programs() -> Result<&'static Programs> {
     Ok(BUILT.get_or_init(|| built))
 }
 
+/// The programs are copied: a user's next `cargo build` has other features and writes to the same place.
 fn build() -> Result<Programs> {
-    // With an example, which like a test may use what only tests need, cargo takes the libraries that the program's tests
-    // were just built with; without one some have fewer features, and all that stands on them is built again.
-    let what = ["--lib", "--bin", "chalumeau", "--bin", "chalumeau-standalone", "--example", "instructions"];
-    machine::run(machine::cargo().arg("build").args(PROGRAM.split(' ')).args(what))?;
+    machine::run(machine::cargo().args(TESTS).arg("--no-run"))?;
     let folder = machine::target().join("programs");
     fs::create_dir_all(&folder)?;
     let keep = |name: String| -> Result<PathBuf> {
@@ -50,4 +48,25 @@ fn build() -> Result<Programs> {
         program: keep(format!("chalumeau{}", std::env::consts::EXE_SUFFIX))?,
         standalone: keep(format!("chalumeau-standalone{}", std::env::consts::EXE_SUFFIX))?,
     })
+}
+
+/// Names of the test files that need neither a bundle nor a host, sorted.
+pub fn test_files() -> Result<Vec<String>> {
+    let mut names = Vec::new();
+    for folder in ["tests", "crates/core/tests", "crates/knob/tests", "crates/figure/tests", "firmware/tests"]
+    {
+        let folder = machine::root().join(folder);
+        if folder.exists() {
+            for entry in fs::read_dir(&folder).with_context(|| format!("cannot list {}", folder.display()))? {
+                names.extend(stem(&entry?.path()));
+            }
+        }
+    }
+    names.sort();
+    Ok(names)
+}
+
+fn stem(path: &Path) -> Option<String> {
+    let is_rust = path.extension() == Some(OsStr::new("rs"));
+    is_rust.then(|| path.file_stem().map(|stem| stem.to_string_lossy().into_owned()))?
 }

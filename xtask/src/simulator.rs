@@ -1,95 +1,17 @@
-//! The simulated knob as a program of its own, started and stopped by whoever plays with it.
+//! Builds `chalumeau` with the simulated knob.
 
-use std::io::{BufRead, BufReader};
-use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
-use std::sync::atomic::{AtomicU32, Ordering};
-
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
+use chalumeau_test_host::artefacts;
 
 use crate::machine;
 
-/// Where the command line is built with a simulator in it.
-const FEATURES: &str = "simulator";
-
-/// Builds `chalumeau` with the simulator, as the tests of the knob do, and puts it where no other build takes its place.
+/// Builds it and puts it where no other build takes its place.
 pub fn build() -> Result<()> {
-    let features = ["--no-default-features", "--features", FEATURES];
+    let features = ["--no-default-features", "--features", "simulator"];
     machine::run(machine::cargo().args(["build", "--bin", "chalumeau"]).args(features))?;
-    let path = path();
+    let path = artefacts::program_path();
     std::fs::create_dir_all(path.parent().context("no folder for the simulator")?)?;
     let built = machine::target().join("debug").join(path.file_name().context("no name for the simulator")?);
     std::fs::copy(&built, &path).with_context(|| format!("cannot copy {}", built.display()))?;
     Ok(())
-}
-
-fn path() -> PathBuf {
-    machine::target().join("simulator").join(format!("chalumeau{}", std::env::consts::EXE_SUFFIX))
-}
-
-/// Another program of the same command line, to be used instead.
-pub const PROGRAM: &str = "CHALUMEAU_PROGRAM";
-
-/// The program that `build` makes, unless [`PROGRAM`] names another.
-pub fn program() -> Result<PathBuf> {
-    if let Some(path) = std::env::var_os(PROGRAM) {
-        return Ok(machine::root().join(path));
-    }
-    let path = path();
-    if path.exists() {
-        Ok(path)
-    } else {
-        bail!("{} is not there; run `cargo xtask simulator`", path.display())
-    }
-}
-
-/// A running simulator; it ends when dropped.
-pub struct Simulator {
-    child: Child,
-    /// Its first line: `serial /dev/pts/7` and the like.
-    pub greeting: String,
-}
-
-impl Simulator {
-    /// Starts it with arguments of `chalumeau knob-sim`, and waits until it is there.
-    pub fn start(args: &[&str]) -> Result<Self> {
-        let mut child = Command::new(program()?)
-            .arg("knob-sim")
-            .arg("--quiet")
-            .args(args)
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .spawn()
-            .context("cannot start the simulated knob")?;
-        let mut greeting = String::new();
-        let out = child.stdout.take().context("no output of the simulated knob")?;
-        BufReader::new(out).read_line(&mut greeting)?;
-        let simulator = Self { child, greeting: greeting.trim().to_owned() };
-        if simulator.greeting.is_empty() {
-            bail!("the simulated knob ended at once: knob-sim {}", args.join(" "));
-        }
-        Ok(simulator)
-    }
-
-    /// Pulls the plug: its port goes, and then the program.
-    ///
-    /// The program is asked to end. A killed one leaves its MIDI client to JACK, whose server may then run no other.
-    pub fn unplug(&mut self) -> Result<()> {
-        machine::terminate(&mut self.child)
-    }
-}
-
-impl Drop for Simulator {
-    fn drop(&mut self) {
-        // It may be gone already, which is as good.
-        let _ = self.unplug();
-    }
-}
-
-/// A serial number no other simulator on this machine has, so that tests do not take each other's knobs.
-pub fn serial_number() -> u64 {
-    static NEXT: AtomicU32 = AtomicU32::new(1);
-    0x5100_0000_0000_0000
-        | u64::from(std::process::id()) << 16
-        | u64::from(NEXT.fetch_add(1, Ordering::Relaxed))
 }

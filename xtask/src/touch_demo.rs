@@ -3,9 +3,8 @@
 
 use std::fmt::Write as _;
 use std::path::Path;
-use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result, anyhow};
 use chalumeau_core::control::keys::Keys;
 use chalumeau_core::event::Event;
 use chalumeau_core::haptics::{FeelDesign, FeelTable, TorqueLimits};
@@ -13,8 +12,9 @@ use chalumeau_core::instrument::Settings;
 use chalumeau_core::score::Score;
 use chalumeau_knob::touch::feel::Feels;
 
-use crate::host::{At, Plugin, Say, Session};
-use crate::simulator::{Simulator, serial_number};
+use chalumeau_test_host::clap::{At, Plugin, Say, Session};
+use chalumeau_test_host::knob_setup::{connect, wait_until_live};
+use chalumeau_test_host::simulator::{Simulator, serial_number};
 
 /// Frames of a block: what a musician at a computer plays with.
 const BLOCK: usize = 128;
@@ -26,8 +26,6 @@ const AHEAD_S: f64 = 0.06;
 const STEP_S: f64 = 0.01;
 /// The hand turns no faster than this, degrees a step: 10 rad/s, far from the knob's over-speed of 60.
 const HASTE_DEG: f64 = 6.0;
-/// How long to wait for the knob, s.
-const PATIENCE_S: u64 = 20;
 
 /// What came of it; all times in seconds from the first note.
 pub struct Performance {
@@ -97,55 +95,6 @@ pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -
         gamma: breath.into_iter().map(|[t, unit]| [t, unit * full]).collect(),
         threshold: threshold(score, &feels, &table, rate),
     })
-}
-
-/// Points a plugin at the knob with this serial number, as a saved project does.
-pub fn connect(plugin: &mut Plugin, serial: u64) -> Result<()> {
-    edit(plugin, |state| {
-        state["fields"]["serial"] = format!("\"{serial:016x}\"").into();
-        state["params"]["knob"] = serde_json::json!({ "string": "serial" });
-    })
-}
-
-/// Points a plugin at the knob whose MIDI port has this name.
-pub fn connect_midi(plugin: &mut Plugin, name: &str) -> Result<()> {
-    edit(plugin, |state| {
-        state["fields"]["midiport"] = serde_json::json!(name).to_string().into();
-        state["params"]["knob"] = serde_json::json!({ "string": "midi" });
-    })
-}
-
-/// Has a plugin listen to stock firmware on a UDP port.
-pub fn listen(plugin: &mut Plugin, port: u16) -> Result<()> {
-    edit(plugin, |state| {
-        state["params"]["knob"] = serde_json::json!({ "string": "osc" });
-        state["params"]["oscprt"] = serde_json::json!({ "i32": port });
-    })
-}
-
-/// Changes a plugin's state as a project file would.
-pub fn edit(plugin: &mut Plugin, change: impl FnOnce(&mut serde_json::Value)) -> Result<()> {
-    let state = plugin.save()?;
-    // The wrapper's own frame: eight bytes of length, then JSON.
-    let json = state.get(8..).context("the plugin's state is too short")?;
-    let mut json: serde_json::Value =
-        serde_json::from_slice(json).context("the plugin's state is no JSON")?;
-    change(&mut json);
-    let json = serde_json::to_vec(&json)?;
-    plugin.restore(&[&(json.len() as u64).to_le_bytes(), json.as_slice()].concat())
-}
-
-/// Plays silence until the knob's breath arrives, then half a second more, so that the switch is seen off.
-pub fn wait_until_live(session: &mut Session, rate_hz: f64) -> Result<()> {
-    let began = Instant::now();
-    while session.answers().is_empty() {
-        if began.elapsed() > Duration::from_secs(PATIENCE_S) {
-            bail!("the plugin has not found the simulated knob within {PATIENCE_S} s");
-        }
-        session.play_live(&[], (0.1 * rate_hz) as usize, rate_hz)?;
-    }
-    session.play_live(&[], rate_hz as usize, rate_hz)?;
-    Ok(())
 }
 
 /// Breath as the host could have recorded it: seconds from sample `first`, 0..=1 of full breath.

@@ -5,10 +5,12 @@ use std::process::Command;
 
 use anyhow::Result;
 
-use crate::display::Display;
+use chalumeau_test_host::display::Display;
+use chalumeau_test_host::{ardour, artefacts};
+
+use crate::bundle;
 use crate::machine::{self, EGL, MESA, X11_XCB, XKB, XVFB};
-use crate::programs::{Programs, STANDALONE, programs};
-use crate::{ardour, bundle};
+use crate::programs::{Programs, TESTS, programs};
 
 /// The tests that draw every picture worth keeping.
 const PICTURES: [(&str, &str); 2] = [("window", "every_view"), ("standalone", "its_window")];
@@ -38,11 +40,12 @@ pub fn screenshots(_: &[String]) -> Result<()> {
 fn tests(programs: &Programs, display: &Display, file: &str, name: &str) -> Command {
     let mut command = machine::cargo();
     command
-        .args(["test", "-p", "xtask", "--test", file, "--no-fail-fast", "--"])
+        .args(TESTS)
+        .args(["--test", file, "--no-fail-fast", "--"])
         // One after another: they look at one display and move one pointer.
         .args(["--ignored", "--nocapture", "--test-threads=1", name])
-        .env(STANDALONE, &programs.standalone)
-        .env("CHALUMEAU_CACHE_DIR", machine::target().join("cache"));
+        .env(artefacts::STANDALONE, &programs.standalone)
+        .env(artefacts::CACHE, machine::target().join("cache"));
     display.for_clients(&mut command);
     command
 }

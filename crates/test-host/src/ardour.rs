@@ -8,9 +8,9 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::bundle;
+use crate::artefacts;
 use crate::display::Display;
-use crate::jack::Server;
+use crate::jack::JackServer;
 use crate::machine::{self, ARDOUR, JACKD};
 use crate::screen::Screen;
 
@@ -54,9 +54,9 @@ quit()
 /// Opens the plugin's window in Ardour and plays a key of it; keeps pictures in `target/screenshots`.
 pub fn test() -> Result<()> {
     machine::provide(&[&ARDOUR, &JACKD])?;
-    let ardour = Ardour::new(bundle::vst3()?)?;
+    let ardour = Ardour::new(artefacts::vst3()?)?;
     let session = ardour.session()?;
-    let (display, server) = (Display::start()?, Server::start()?);
+    let (display, server) = (Display::start()?, JackServer::start()?);
     let mut command = ardour.command(Path::new("ardour"));
     let log = ardour.home.join("ardour.log");
     let out = fs::File::create(&log)?;
@@ -126,7 +126,7 @@ impl Ardour {
             .env_remove("XDG_DATA_HOME")
             .env_remove("XDG_CACHE_HOME")
             .env("VST3_PATH", self.plugin.parent().unwrap_or(Path::new(".")))
-            .env("CHALUMEAU_CACHE_DIR", machine::target().join("cache"))
+            .env(artefacts::CACHE, machine::target().join("cache"))
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::null());

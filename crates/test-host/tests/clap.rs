@@ -1,24 +1,18 @@
 //! The bundled CLAP, as a host sees and hears it. `cargo xtask bundle` first; CHALUMEAU_CLAP names another file.
 
-use std::path::PathBuf;
-
 use chalumeau_core::analysis::pitch::fundamental_hz;
 use chalumeau_core::analysis::to_f64;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::{Clarinet, Settings};
 use chalumeau_core::units::SoundingNote;
-use xtask::host::{At, NoteExpressionType, Plugin, Say, Stereo};
+use chalumeau_test_host::clap::{At, NoteExpressionType, Plugin, Say, Stereo};
 
 const RATE: f64 = 48_000.0;
 const SECOND: usize = 48_000;
 const BLOCKS: [usize; 5] = [1, 17, 64, 512, 4096];
 
 fn plugin() -> Plugin {
-    let path = match std::env::var_os("CHALUMEAU_CLAP") {
-        // Tests run in xtask/, names are given from the root.
-        Some(path) => xtask::machine::root().join(PathBuf::from(path)),
-        None => xtask::bundle::clap().unwrap(),
-    };
+    let path = chalumeau_test_host::artefacts::clap().unwrap();
     Plugin::load(&path).unwrap()
 }
 
@@ -363,7 +357,7 @@ fn a_rate_out_of_reach_is_refused() {
 
 #[test]
 fn the_melody_is_the_renderers_bit_for_bit() {
-    let file = std::fs::read(xtask::machine::root().join("examples/melody.mid")).unwrap();
+    let file = std::fs::read(chalumeau_test_host::machine::root().join("examples/melody.mid")).unwrap();
     let score = chalumeau_core::score::midi_file::read(&file, 48_000).unwrap().with_tail(0.5, 48_000);
     let mut clarinet = Clarinet::built_in(RATE).unwrap();
     let mut rendered = Vec::new();
@@ -372,7 +366,7 @@ fn the_melody_is_the_renderers_bit_for_bit() {
         Ok::<_, std::convert::Infallible>(())
     })
     .unwrap();
-    let said = xtask::midi::messages(&file, 48_000).unwrap();
+    let said = chalumeau_test_host::midi::messages(&file, 48_000).unwrap();
     for block in BLOCKS {
         let [left, right] = plugin().play(RATE, block, &said, score.samples).unwrap();
         assert!(left == rendered && right == rendered, "blocks of {block}");

@@ -1,12 +1,12 @@
 //! The bundled CLAP on other instruments: exchanged while it sounds, from a file, rendered offline. CHALUMEAU_CLAP names
 //! another library, CHALUMEAU_CACHE_DIR a folder for what is made.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use chalumeau_core::analysis::pitch::fundamental_hz;
 use chalumeau_core::analysis::to_f64;
-use xtask::host::{At, Plugin, Say, Session};
+use chalumeau_test_host::clap::{At, Plugin, Say, Session};
 
 const RATE: f64 = 48_000.0;
 const SECOND: usize = 48_000;
@@ -18,10 +18,7 @@ const INSTRUMENTS: [(&str, f64); 5] =
     [("B flat", 0.0), ("A", 1.0), ("E flat", 2.0), ("C", 3.0), ("bass", 4.0)];
 
 fn plugin() -> Plugin {
-    let path = match std::env::var_os("CHALUMEAU_CLAP") {
-        Some(path) => xtask::machine::root().join(PathBuf::from(path)),
-        None => xtask::bundle::clap().unwrap(),
-    };
+    let path = chalumeau_test_host::artefacts::clap().unwrap();
     Plugin::load(&path).unwrap()
 }
 
@@ -91,7 +88,7 @@ fn user_state(path: &Path) -> Vec<u8> {
 }
 
 /// A pipe of three notes: quickly fitted and tuned.
-const PIPE: &str = include_str!("../../crates/core/tests/data/pipe.toml");
+const PIPE: &str = include_str!("../../core/tests/data/pipe.toml");
 
 #[test]
 fn instruments_are_exchanged_while_a_note_sounds() {

@@ -9,10 +9,7 @@ const PATIENCE: Duration = Duration::from_secs(20);
 
 /// The program without a display, and without a JACK server or a sound card that this machine may have.
 fn program() -> Command {
-    let path = match std::env::var_os(xtask::programs::STANDALONE) {
-        Some(path) => xtask::machine::root().join(path),
-        None => xtask::machine::target().join("programs/chalumeau-standalone"),
-    };
+    let path = chalumeau_test_host::artefacts::standalone().unwrap();
     let mut command = Command::new(path);
     command
         .env_remove("DISPLAY")
@@ -154,7 +151,7 @@ fn it_plays_to_jack() {
 #[ignore = "needs a display"]
 fn its_window_plays_and_closing_it_is_the_end() {
     let display = std::env::var("DISPLAY").unwrap();
-    let screen = xtask::screen::Screen::open(Some(&display)).unwrap();
+    let screen = chalumeau_test_host::screen::Screen::open(Some(&display)).unwrap();
     let mut command = program();
     command.env("DISPLAY", &display);
     let mut running = Running::spawn(command.args(["--backend", "dummy"]));
@@ -162,7 +159,7 @@ fn its_window_plays_and_closing_it_is_the_end() {
     let still = screen.settled(window, Duration::from_millis(600)).unwrap();
     let keep = |name: &str| {
         let picture = screen.picture(window).unwrap();
-        picture.write(&xtask::machine::target().join("screenshots").join(name)).unwrap();
+        picture.write(&chalumeau_test_host::machine::target().join("screenshots").join(name)).unwrap();
         picture
     };
     keep("standalone.png");

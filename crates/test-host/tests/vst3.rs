@@ -1,14 +1,13 @@
 //! The bundled VST3, as a host sees and hears it. `cargo xtask bundle` first; CHALUMEAU_VST3 names another bundle.
 
-use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::{Clarinet, Settings};
 use chalumeau_core::units::SoundingNote;
+use chalumeau_test_host::clap::{At, Say};
 use vst3_host::prelude::*;
 use vst3_host::{AudioBuffers, MidiChannel, MidiEvent};
-use xtask::host::{At, Say};
 
 const RATE: f64 = 48_000.0;
 const SECOND: usize = 48_000;
@@ -35,16 +34,13 @@ fn load(block: usize) -> Loaded {
 
 /// For a second plugin in the same test.
 fn load_beside(block: usize) -> Loaded {
-    let path = match std::env::var_os("CHALUMEAU_VST3") {
-        Some(path) => xtask::machine::root().join(PathBuf::from(path)),
-        None => xtask::bundle::vst3().unwrap(),
-    };
+    let path = chalumeau_test_host::artefacts::vst3().unwrap();
     let load = || {
         let mut host = Vst3Host::builder().sample_rate(RATE).block_size(block).build().unwrap();
         let plugin = host.load_plugin(&path).unwrap();
         (plugin, host)
     };
-    // One stays loaded for good, so that the library does: see `xtask::host::Plugin::load`.
+    // One stays loaded for good, so that the library does: see `chalumeau_test_host::clap::Plugin::load`.
     static FIRST: Once = Once::new();
     FIRST.call_once(|| std::mem::forget(load()));
     let (plugin, host) = load();
@@ -248,7 +244,7 @@ fn latency_is_the_instruments() {
 
 #[test]
 fn the_melody_is_the_renderers() {
-    let file = std::fs::read(xtask::machine::root().join("examples/melody.mid")).unwrap();
+    let file = std::fs::read(chalumeau_test_host::machine::root().join("examples/melody.mid")).unwrap();
     let score = chalumeau_core::score::midi_file::read(&file, 48_000).unwrap().with_tail(0.5, 48_000);
     let mut clarinet = Clarinet::built_in(RATE).unwrap();
     let mut rendered = Vec::new();
@@ -257,7 +253,7 @@ fn the_melody_is_the_renderers() {
         Ok::<_, std::convert::Infallible>(())
     })
     .unwrap();
-    let said: Vec<_> = xtask::midi::messages(&file, 48_000)
+    let said: Vec<_> = chalumeau_test_host::midi::messages(&file, 48_000)
         .unwrap()
         .into_iter()
         .filter_map(|At(at, say)| match say {

@@ -1,9 +1,8 @@
 //! What tests that play the plugin at the pace of a sound card share.
 
-use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use xtask::host::{Plugin, Say, Session};
+use chalumeau_test_host::clap::{Plugin, Say, Session};
 
 pub const RATE: f64 = 48_000.0;
 pub const SECOND: usize = 48_000;
@@ -13,10 +12,7 @@ pub const E3: u8 = 50;
 
 /// The bundled CLAP, or another build of it that the environment names.
 pub fn plugin() -> Plugin {
-    let path = match std::env::var_os("CHALUMEAU_CLAP") {
-        Some(path) => xtask::machine::root().join(PathBuf::from(path)),
-        None => xtask::bundle::clap().unwrap(),
-    };
+    let path = chalumeau_test_host::artefacts::clap().unwrap();
     Plugin::load(&path).unwrap()
 }
 

@@ -18,10 +18,10 @@ use chalumeau_core::units::{SoundingNote, cents};
 use chalumeau_knob::touch::blower::{Blower, Blown, Hand};
 use chalumeau_knob::touch::feel::{Feels, NO_MOTOR};
 use chalumeau_knob::touch::take::Take;
+use chalumeau_test_host::clap::{At, Say};
+use chalumeau_test_host::knob_setup::{connect, edit, wait_until_live};
+use chalumeau_test_host::simulator::{Simulator, serial_number};
 use live::{BLOCK, E3, RATE, SECOND, breath, level_db, on, play_until, plugin};
-use xtask::host::{At, Say};
-use xtask::simulator::{Simulator, serial_number};
-use xtask::touch_demo::{connect, edit, wait_until_live};
 
 fn knob(number: u64, hand: &[&str]) -> Simulator {
     Simulator::start(&[&["--serial-number", &format!("{number:016x}")], hand].concat()).unwrap()
@@ -169,7 +169,7 @@ fn stock_firmware_plays_over_osc() {
     let port = std::net::UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
     let _knob = Simulator::start(&["--osc", &format!("127.0.0.1:{port}"), "--hold", "200"]).unwrap();
     let mut plugin = plugin();
-    xtask::touch_demo::listen(&mut plugin, port).unwrap();
+    chalumeau_test_host::knob_setup::listen(&mut plugin, port).unwrap();
     let heard = plugin
         .session(RATE, BLOCK, |session| {
             wait_until_live(session, RATE).unwrap();

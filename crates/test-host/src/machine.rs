@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail};
 
 /// The workspace, whichever folder the command was called from.
 pub fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
+    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap_or(Path::new("."))
 }
 
 /// Makes the workspace the current folder.
@@ -23,9 +23,6 @@ pub fn target() -> PathBuf {
         None => root().join("target"),
     }
 }
-
-/// Every feature of the program itself; what only tests need, a renderer, is not among them.
-pub const PROGRAM: &str = "--features simulator,standalone,midi-jack";
 
 /// The cargo that runs this.
 pub fn cargo() -> Command {
@@ -95,6 +92,12 @@ pub struct Package {
 
 /// For cargo itself: crates with C parts, and linking.
 pub const CC: Package = Package { name: "gcc", present: || works("cc", &["--version"]), purpose: "linking" };
+/// Counts instructions for the gates.
+pub const VALGRIND: Package = Package {
+    name: "valgrind",
+    present: || works("valgrind", &["--version"]),
+    purpose: "counting instructions",
+};
 /// For the knob's firmware, on this machine.
 pub const CXX: Package =
     Package { name: "g++", present: || works("g++", &["--version"]), purpose: "the knob's firmware" };

@@ -14,11 +14,12 @@ use std::time::{Duration, Instant};
 use chalumeau_core::analysis::pitch::fundamental_hz;
 use chalumeau_core::analysis::to_f64;
 use chalumeau_core::units::cents;
+use chalumeau_test_host::artefacts;
+use chalumeau_test_host::clap::{At, Plugin, Say};
+use chalumeau_test_host::knob_setup::{connect_midi, wait_until_live};
+use chalumeau_test_host::simulator::{Simulator, serial_number};
 use live::{BLOCK, E3, RATE, SECOND, breath, level_db, on, play_until, plugin};
 use tempfile::TempDir;
-use xtask::host::{At, Plugin, Say};
-use xtask::simulator::{self, Simulator, serial_number};
-use xtask::touch_demo::{connect_midi, wait_until_live};
 
 /// In the middle of the travel, degrees: sounds, and is felt.
 const HAND_DEG: f64 = 200.0;
@@ -116,7 +117,7 @@ struct Host(Child);
 
 impl Host {
     fn arm(knob: &MidiKnob) -> Self {
-        let mut host = Command::new(simulator::program().unwrap());
+        let mut host = Command::new(artefacts::program().unwrap());
         host.args(["knob", "--midi", &knob.name, "--written", "E3", "--arm", "150", "--seconds", "600"]);
         Self(host.stdin(Stdio::null()).stdout(Stdio::null()).spawn().unwrap())
     }
@@ -277,7 +278,7 @@ fn an_unplugged_midi_knob_is_found_again_disarmed() {
 fn the_doctor_hears_a_midi_knob_and_misses_it_when_it_is_gone() {
     let mut knob = MidiKnob::plug();
     let ask = || {
-        let mut doctor = Command::new(simulator::program().unwrap());
+        let mut doctor = Command::new(artefacts::program().unwrap());
         let output = doctor.args(["doctor", "--seconds", "3"]).output().unwrap();
         String::from_utf8(output.stdout).unwrap()
     };

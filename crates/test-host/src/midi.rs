@@ -4,7 +4,7 @@
 use anyhow::{Context, Result, bail};
 use midly::{MetaMessage, Smf, Timing, TrackEventKind, live::LiveEvent};
 
-use crate::host::{At, Say};
+use crate::clap::{At, Say};
 
 /// Channel messages of a metrical file, in order of time.
 pub fn messages(bytes: &[u8], rate: u32) -> Result<Vec<At>> {

@@ -10,9 +10,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
+use chalumeau_test_host::clap::{At, Hand, Plugin, Say, Session};
+use chalumeau_test_host::screen::{Holdings, PATIENCE, Picture, Screen};
 use live::{BLOCK, E3, RATE, SECOND, on, plugin};
-use xtask::host::{At, Hand, Plugin, Say, Session};
-use xtask::screen::{Holdings, PATIENCE, Picture, Screen};
 
 /// How long a picture must stay as it is to count as settled.
 const CALM: Duration = Duration::from_millis(1_000);
@@ -70,7 +70,7 @@ impl<'a> Open<'a> {
     }
 
     fn keep(&self, name: &str) {
-        let path = xtask::machine::target().join("screenshots").join(format!("{name}.png"));
+        let path = chalumeau_test_host::machine::target().join("screenshots").join(format!("{name}.png"));
         self.screen.picture(self.frame).unwrap().write(&path).unwrap();
     }
 }
