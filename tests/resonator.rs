@@ -440,7 +440,7 @@ impl<'a> Blown<'a> {
     fn blow(&mut self, p_minus: f64) -> f64 {
         self.n += 1;
         let p_mouth = 0.5 * (self.n as f64 / (0.020 * self.rate_hz)).min(1.0);
-        let tables = ReedTables::seed();
+        let tables = ReedTables::reference();
         let p_plus = self.state.tick(self.reed, tables, self.kappa, p_mouth, p_minus, 0.0, 0.0);
         self.pressure.push(self.state.p_mouthpiece);
         p_plus
@@ -785,7 +785,7 @@ fn mouthpiece_pressure_decays_with_the_q_of_the_bore() {
             let (coeffs, mut state) = (note.reed(model), ReedState::default());
             let kappa = 1.0 / model.coeffs.tip_admittance();
             let behind_reed = decay_s(model, fingering, f_hz, |p_minus| {
-                state.tick(&coeffs, ReedTables::seed(), kappa, 0.0, p_minus, 0.0, 0.0)
+                state.tick(&coeffs, ReedTables::reference(), kappa, 0.0, p_minus, 0.0, 0.0)
             });
             let peak = matrices.peaks(&model.file.fingerings[fingering].open, 0.0, 1)[0];
             let rigid_s = peak.q / (std::f64::consts::PI * peak.f_hz);

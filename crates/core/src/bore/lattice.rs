@@ -18,8 +18,8 @@
 //! Pressures over a reference pressure P, flows over P / Zc with Zc of the instrument's nominal bore.
 
 mod coeffs;
+mod diagnostics;
 mod junctions;
-mod proof;
 mod real;
 pub mod sensitivity;
 
