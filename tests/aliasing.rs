@@ -42,20 +42,21 @@ fn non_harmonic_db(model: &Arc<Model>, written: u8, lay: f32) -> f64 {
 #[test]
 fn loud_notes_are_clean_between_their_harmonics() {
     let model = Arc::new(Model::built_in(RATE_HZ).unwrap());
+    // Measured levels rounded up by half a decibel; `docs/measured.md` quotes the first.
+    let limits_db = [-99.6, -96.4, -88.5, -86.6, -85.4, -82.8];
     let runs: Vec<(u8, f32)> =
         [0.4, 0.0].into_iter().flat_map(|lay| [60, 79, 86].map(|written| (written, lay))).collect();
     let levels = each(&runs, |&(written, lay)| non_harmonic_db(&model, written, lay));
     for (&(written, lay), level) in runs.iter().zip(&levels) {
         println!("written {written} lay {lay}: {level:.1} dB");
     }
-    for ((written, lay), level) in runs.into_iter().zip(levels) {
-        let limit = if lay > 0.0 { -85.0 } else { -80.0 };
-        assert!(level <= limit, "written {written} lay {lay}: {level:.1} dB");
+    for (((written, lay), level), limit_db) in runs.into_iter().zip(levels).zip(limits_db) {
+        assert!(level <= limit_db, "written {written} lay {lay}: {level:.1} dB, at most {limit_db}");
     }
 }
 
 #[test]
-fn half_of_all_notes_are_cleaner_than_90_db() {
+fn half_of_all_notes_are_cleaner_than_100_db() {
     let model = Arc::new(Model::built_in(RATE_HZ).unwrap());
     let notes: Vec<u8> = (52..=92).collect();
     let levels = each(&notes, |&written| non_harmonic_db(&model, written, 0.4));
@@ -63,7 +64,7 @@ fn half_of_all_notes_are_cleaner_than_90_db() {
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (median, worst) = (sorted[sorted.len() / 2].0, &sorted[sorted.len() - 5..]);
     println!("median {median:.1} dB, best {:?}, worst {worst:.1?}", sorted[0]);
-    assert!(median <= -90.0, "{median}");
+    assert!(median <= -100.6, "{median}");
 }
 
 /// In the chalumeau and the throat at every step. In the clarion tone saturates once the reed beats, and the highest

@@ -130,8 +130,8 @@ fn running_lattice_has_the_peaks_of_openwind() {
         height.print("  peaks 1-3, dB");
         q.print("  peaks 1-3, Q, %");
         assert_eq!(pitch.count, 99);
-        assert!(pitch.mean() <= 2.5 && pitch.max <= 8.5);
-        assert!(height.mean() <= 0.5 && height.max <= 1.6);
+        assert!(pitch.mean() <= 1.65 && pitch.max <= 6.2);
+        assert!(height.mean() <= 0.2 && height.max <= 0.67);
     }
 }
 
@@ -161,7 +161,7 @@ fn coefficients_and_running_lattice_agree_on_the_reflectance() {
     }
 }
 
-/// The whole curve, not only its peaks: rms 1 dB to 4 kHz, 2 dB to 6 kHz.
+/// The whole curve, not only its peaks: rms 0.85 dB to 4 kHz, 1.5 dB to 6 kHz.
 #[test]
 fn impedance_curves_follow_openwind_to_six_kilohertz() {
     for model in models() {
@@ -190,7 +190,7 @@ fn impedance_curves_follow_openwind_to_six_kilohertz() {
                 WrittenNote(midi_note),
                 model.coeffs.rate_hz
             );
-            assert!(lowest < 0.5 && low < 0.5 && narrow < 1.0 && wide < 2.0);
+            assert!(lowest < 0.21 && low < 0.4 && narrow < 0.88 && wide < 1.52);
         }
     }
 }
@@ -333,7 +333,7 @@ fn without_losses_stored_energy_is_constant() {
             worst = worst.max((lattice.stored_energy(&coeffs) / first - 1.0).abs());
         }
         println!("lossless, fingers moving, {} Hz: energy constant within {worst:.1e}", coeffs.rate_hz);
-        assert!(worst < 1e-6);
+        assert!(worst < 1e-9);
     }
 }
 
@@ -374,7 +374,7 @@ fn moving_delay_is_bounded_and_decays() {
             "delay and fingers moving, {rate_hz} Hz: energy at most {most:.4} of the start, {moving:.1e} after 100000 \
              samples, {rest:.1e} and waves {wave:.1e} ten seconds later"
         );
-        assert!(most < 1.5 && moving < 1e-4 && rest < 1e-12 && wave < 1e-6);
+        assert!(most < 1.001 && moving < 2e-6 && rest < 1e-15 && wave < 1e-7);
     }
 }
 
@@ -409,7 +409,7 @@ fn independent_lattice_answers_an_impulse_alike() {
             }
         }
         println!("impulse on the independent lattice, {} Hz: within {worst:.1e}", model.coeffs.rate_hz);
-        assert!(worst < 1e-12);
+        assert!(worst < 1e-14);
     }
 }
 
@@ -440,7 +440,7 @@ impl<'a> Blown<'a> {
     fn blow(&mut self, p_minus: f64) -> f64 {
         self.n += 1;
         let p_mouth = 0.5 * (self.n as f64 / (0.020 * self.rate_hz)).min(1.0);
-        let tables = ReedTables::seed();
+        let tables = ReedTables::reference();
         let p_plus = self.state.tick(self.reed, tables, self.kappa, p_mouth, p_minus, 0.0, 0.0);
         self.pressure.push(self.state.p_mouthpiece);
         p_plus
@@ -519,8 +519,8 @@ fn reed_plays_the_same_on_the_independent_lattice() {
         );
         let swing = slow.pressure[9 * tenth..].iter().fold(0.0_f64, |most, p| most.max(p.abs()));
         assert!(swing > 0.2, "the note sounds: {swing}");
-        assert!(exact <= 1e-6 && early <= 1e-4 && late <= 5e-4);
-        assert!(outside <= 1e-6);
+        assert!(exact <= 1e-12 && early <= 6e-5 && late <= 1e-4);
+        assert!(outside <= 1e-12);
     }
 }
 
@@ -644,7 +644,7 @@ fn thresholds_do_not_depend_on_the_rate() {
         spread.add(100.0 * (b / a - 1.0), row["written_note"].clone());
     }
     spread.print("threshold at 88.2 against 96 kHz, %");
-    assert!(spread.count == 33 && spread.max < 0.5);
+    assert!(spread.count == 33 && spread.max < 0.25);
 }
 
 #[test]
@@ -666,7 +666,7 @@ fn register_key_gives_twelfths() {
         }
         twelfth.print(&format!("twelfth, {} Hz, cents from 3", model.coeffs.rate_hz));
         against.print("  against the reference's own, cents");
-        assert!(twelfth.count == 12 && twelfth.max <= 20.0 && against.max <= 8.5);
+        assert!(twelfth.count == 12 && twelfth.max <= 14.0 && against.max <= 4.5);
     }
 }
 
@@ -785,7 +785,7 @@ fn mouthpiece_pressure_decays_with_the_q_of_the_bore() {
             let (coeffs, mut state) = (note.reed(model), ReedState::default());
             let kappa = 1.0 / model.coeffs.tip_admittance();
             let behind_reed = decay_s(model, fingering, f_hz, |p_minus| {
-                state.tick(&coeffs, ReedTables::seed(), kappa, 0.0, p_minus, 0.0, 0.0)
+                state.tick(&coeffs, ReedTables::reference(), kappa, 0.0, p_minus, 0.0, 0.0)
             });
             let peak = matrices.peaks(&model.file.fingerings[fingering].open, 0.0, 1)[0];
             let rigid_s = peak.q / (std::f64::consts::PI * peak.f_hz);
@@ -800,8 +800,8 @@ fn mouthpiece_pressure_decays_with_the_q_of_the_bore() {
                 1e3 * rigid_s
             );
             // Higher up the reed's own damping takes a growing part, which the reference leaves out.
-            assert!(written > 52 || (behind_reed / expected_s - 1.0).abs() <= 0.2);
-            assert!((behind_wall / rigid_s - 1.0).abs() <= 0.2);
+            assert!(written > 52 || (behind_reed / expected_s - 1.0).abs() <= 0.1);
+            assert!((behind_wall / rigid_s - 1.0).abs() <= 0.02);
         }
     }
 }

@@ -1,10 +1,20 @@
-//! The single reed: one set of tables, the law that reads them, the reed that moves, the reed on the bench.
+//! The single reed: its flow tables, its flow law, its motion, and its physical measurements.
 //!
-//! The tables are the ones the knob's firmware reads; sound, torque and the exported header all go through
-//! [`ReedTables`]. Pressures are relative to a reference closing pressure, so that the tables' 0..=1 spans rest to
-//! closure of the reference reed.
+//! Sound, torque of the knob and firmware read the same tables ([`ReedTables`]). Pressures are relative to a reference
+//! closing pressure: in the tables 0 is rest and 1 is closure of the reference reed.
+//!
+//! ```
+//! use chalumeau_core::reed::{ReedLaw, ReedTables};
+//!
+//! let (law, tables) = (ReedLaw::default(), ReedTables::reference());
+//! // The flow rises to its peak at a third of the closing pressure and is 0 from closure on.
+//! assert!((law.flow(tables, 1.0 / 3.0) - 1.0).abs() < 1e-3);
+//! assert_eq!(law.flow(tables, 1.2), 0.0);
+//! // Suction opens the reed instead: the air flows back.
+//! assert!(law.flow(tables, -0.5) < 0.0);
+//! ```
 
-pub mod header;
+pub mod firmware_header;
 pub mod law;
 pub mod motion;
 pub mod physical;
@@ -12,7 +22,7 @@ pub mod quasi_static;
 pub mod tables;
 
 pub use law::ReedLaw;
-pub use motion::{ReedCoeffs, ReedState};
+pub use motion::{MovingReed, ReedCoeffs, ReedState};
 pub use physical::PhysicalReed;
 pub use quasi_static::{QuasiStaticReed, QuasiStaticState};
 pub use tables::ReedTables;

@@ -1,4 +1,4 @@
-//! The bore cut into cylinders for the lattice: the Design between an instrument file and a lattice.
+//! The bore cut into cylinders: the step between an instrument file and a lattice.
 //!
 //! Junctions stand on a grid of half samples (ticks): the reed tip at 0, every tone hole, a few steps between the tip
 //! and the first hole and between the last hole and the bell's end, and in long stretches between holes. Between two junctions lies a lossless cylinder that
@@ -219,6 +219,54 @@ fn grid_shift(holes: impl Iterator<Item = f64> + Clone) -> f64 {
     (-10..=10).map(|n| 0.05 * f64::from(n)).min_by(|a, b| moved(*a).total_cmp(&moved(*b))).unwrap_or(0.0)
 }
 
+/// A junction: its place, m from the tip, and the index of its hole; `None` for a change of section.
+type Junction = (f64, Option<usize>);
+
+/// Volume and inertance (m3, 1/m) of each piece between two edges, less the negative series mass of the holes beside it.
+fn volumes_and_inertances(file: &InstrumentFile, junctions: &[Junction], edges: &[f64]) -> Vec<(f64, f64)> {
+    let mut pieces: Vec<(f64, f64)> =
+        edges.windows(2).map(|pair| integrals(file, pair[0], pair[1])).collect();
+    for (junction, (x, hole)) in junctions.iter().enumerate() {
+        let Some(hole) = *hole else { continue };
+        let radius = file.radius_at(*x);
+        let mass = tone_hole::series_correction_m(file.holes[hole].radius_m, radius)
+            / (std::f64::consts::PI * radius * radius);
+        let (left, right) = (x - edges[junction], edges[junction + 2] - x);
+        // A neighbour never gives more than half of its own inertance.
+        for (piece, share) in [(junction, left / (left + right)), (junction + 1, right / (left + right))] {
+            let inertance = &mut pieces[piece].1;
+            *inertance = (*inertance + mass * share).max(0.5 * *inertance);
+        }
+    }
+    pieces
+}
+
+/// Radius of the cylinder that stands for each piece, m, and exact position of the piece's lower end, half samples.
+fn radii_and_positions(
+    file: &InstrumentFile,
+    air: &Air,
+    rate_hz: f64,
+    pieces: &[(f64, f64)],
+    edges: &[f64],
+) -> (Vec<f64>, Vec<f64>) {
+    let wall = wall_loss::wall_constant(air);
+    let mut exact = 0.0;
+    pieces
+        .iter()
+        .zip(edges)
+        .map(|((volume, inertance), &from_m)| {
+            if *volume <= 0.0 {
+                // Two holes at one place: a cell of the shortest delay between them.
+                return (file.radius_at(from_m), exact);
+            }
+            let radius_m = ((volume / inertance).sqrt() / std::f64::consts::PI).sqrt();
+            let length = (volume * inertance).sqrt();
+            exact += length / air.c * (1.0 + wall * air.c * wall_loss::DELAY / radius_m) * 2.0 * rate_hz;
+            (radius_m, exact)
+        })
+        .unzip()
+}
+
 impl Cells {
     /// Cuts a bore for the lattice at `rate_hz`, without any fit: the start of [`fit`](crate::bore::fit).
     pub fn cut(file: &InstrumentFile, air: &Air, rate_hz: f64) -> Result<Self, CellsError> {
@@ -227,7 +275,7 @@ impl Cells {
         }
         let end = file.length_m();
         let tick_m = air.c / (2.0 * rate_hz);
-        let mut junctions: Vec<(f64, Option<usize>)> = Vec::new();
+        let mut junctions: Vec<Junction> = Vec::new();
         for (above, stretch) in stretches(file, tick_m).iter().enumerate() {
             if above > 0 {
                 junctions.push((stretch.from_m, (!file.holes.is_empty()).then_some(above - 1)));
@@ -238,38 +286,8 @@ impl Cells {
         let mut edges = vec![0.0];
         edges.extend(junctions.iter().map(|(x, _)| *x));
         edges.push(end);
-        let mut pieces: Vec<(f64, f64)> =
-            edges.windows(2).map(|pair| integrals(file, pair[0], pair[1])).collect();
-        for (junction, (x, hole)) in junctions.iter().enumerate() {
-            let Some(hole) = *hole else { continue };
-            let radius = file.radius_at(*x);
-            let mass = tone_hole::series_correction_m(file.holes[hole].radius_m, radius)
-                / (std::f64::consts::PI * radius * radius);
-            let (left, right) = (x - edges[junction], edges[junction + 2] - x);
-            // A neighbour never gives more than half of its own inertance.
-            for (piece, share) in [(junction, left / (left + right)), (junction + 1, right / (left + right))]
-            {
-                let inertance = &mut pieces[piece].1;
-                *inertance = (*inertance + mass * share).max(0.5 * *inertance);
-            }
-        }
-        let wall = wall_loss::wall_constant(air);
-        // Exact position of each junction and of the end, ticks.
-        let mut exact = 0.0;
-        let (radii, positions): (Vec<f64>, Vec<f64>) = pieces
-            .iter()
-            .zip(&edges)
-            .map(|((volume, inertance), &from_m)| {
-                if *volume <= 0.0 {
-                    // Two holes at one place: a cell of the shortest delay between them.
-                    return (file.radius_at(from_m), exact);
-                }
-                let radius_m = ((volume / inertance).sqrt() / std::f64::consts::PI).sqrt();
-                let length = (volume * inertance).sqrt();
-                exact += length / air.c * (1.0 + wall * air.c * wall_loss::DELAY / radius_m) * 2.0 * rate_hz;
-                (radius_m, exact)
-            })
-            .unzip();
+        let pieces = volumes_and_inertances(file, &junctions, &edges);
+        let (radii, positions) = radii_and_positions(file, air, rate_hz, &pieces, &edges);
         let shift = grid_shift(
             junctions.iter().zip(&positions).filter(|((_, hole), _)| hole.is_some()).map(|(_, &at)| at),
         );

@@ -18,15 +18,15 @@
 //! Pressures over a reference pressure P, flows over P / Zc with Zc of the instrument's nominal bore.
 
 mod coeffs;
+mod diagnostics;
 mod junctions;
-mod proof;
 mod real;
 pub mod sensitivity;
 
 pub use coeffs::{LatticeCoeffs, hole_chunks};
 pub use real::Real;
 
-use junctions::{Arrivals, Holes, Octet, Steps, flush};
+use junctions::{Holes, Octet, Steps, flush};
 
 /// Junctions processed together.
 pub const LANES: usize = 8;
@@ -53,9 +53,10 @@ pub const MAX_TICKS: u32 = ROWS.1 - 8;
 /// Most tone holes and most changes of section together: lanes of seven groups of eight, of which holes and steps fill
 /// whole ones each.
 pub const MAX_CHUNKS: usize = 7;
-/// Below this a state is nothing: flushed so that no denormal slows a held note.
+/// States below this are set to 0, so that no denormal number slows a held note.
 const TINY: f64 = 1e-18;
-/// What sits at the reed end: takes the arriving wave, gives the leaving one, hears what radiates.
+
+/// The reed end of the bore: takes the arriving wave, gives the leaving one, and is told what radiates.
 ///
 /// Implementations mark both `#[inline(always)]` so that they are compiled with the lattice's vector features.
 pub trait Tip<F> {
@@ -116,79 +117,65 @@ fn back_rows(rows: u32, slot: usize) -> u16 {
     (slot as u16).wrapping_sub(rows as u16 * STRIDE as u16)
 }
 
+/// Chunks of changes of section, and of tone holes.
+type Chunks<F> = (Box<[Steps<F>]>, Box<[Holes<F>]>);
+
+/// All chunks of a lattice, silent, each junction in its lane.
+fn junction_chunks<F: Real>(coeffs: &LatticeCoeffs) -> Chunks<F> {
+    let junctions = coeffs.ticks.len() - 1;
+    let mut steps = vec![Steps::idle(IDLE_SLOT); coeffs.step_chunks()];
+    let mut holes = vec![Holes::idle(IDLE_SLOT); coeffs.hole_chunks()];
+    let tuned = coeffs.tuned_cell();
+    for junction in 0..junctions {
+        let lane = coeffs.lane_of(junction);
+        let (chunk, k) = (lane / LANES, lane % LANES);
+        let (left, right) = (junction, junction + 1);
+        let (y_left, y_right) = (coeffs.admittance[left], coeffs.admittance[right]);
+        let arrivals = match chunk.checked_sub(steps.len()) {
+            None => {
+                steps[chunk].weight[k] = F::of(2.0 * y_left / (y_left + y_right));
+                &mut steps[chunk].arrivals
+            }
+            Some(chunk) => {
+                let index = coeffs.hole_junctions.partition_point(|&hole| hole < junction);
+                holes[chunk].place(k, &coeffs.holes[index], y_left, y_right);
+                &mut holes[chunk].arrivals
+            }
+        };
+        let from_left = if junction == 0 { END_SLOT } else { coeffs.lane_of(junction - 1) };
+        let from_right =
+            if right == junctions { BACK + END_SLOT } else { BACK + coeffs.lane_of(junction + 1) };
+        arrivals.offset[0][k] = back_rows(coeffs.rows(left).0, from_left);
+        arrivals.offset[1][k] =
+            if right == tuned { TUNED_SLOT as u16 } else { back_rows(coeffs.rows(right).1, from_right) };
+        for (side, cell) in [left, right].into_iter().enumerate() {
+            let (amount, q) = coeffs.loss[cell];
+            arrivals.taken[side][k] = F::of(amount * (1.0 - q));
+            arrivals.q[side][k] = F::of(q);
+        }
+    }
+    (steps.into(), holes.into())
+}
+
+/// A silent ring whose first `mask + 1` values are in memory.
+fn silent_ring<F: Real>(mask: u16) -> Box<[F; SPACE]> {
+    // PANIC: the vector has exactly SPACE elements.
+    let mut ring: Box<[F; SPACE]> =
+        vec![F::default(); SPACE].into_boxed_slice().try_into().unwrap_or_else(|_| unreachable!());
+    // The system only promises fresh memory. Writing it here makes sure that it is there before the audio thread reads it.
+    for value in [F::of(1.0), F::default()] {
+        ring[..=usize::from(mask)].fill(value);
+        std::hint::black_box(&mut ring);
+    }
+    ring
+}
+
 impl<F: Real> Lattice<F> {
     /// A silent lattice with all holes closed. Allocates.
     pub fn new(coeffs: &LatticeCoeffs) -> Self {
         let junctions = coeffs.ticks.len() - 1;
-        let one = F::of(1.0);
-        let ones = [one; LANES];
-        let none = Octet::<F>::default();
-        let mut steps =
-            vec![Steps { arrivals: Arrivals::idle(IDLE_SLOT), weight: ones }; coeffs.step_chunks()];
-        let idle = Holes {
-            arrivals: Arrivals::idle(IDLE_SLOT),
-            y_left: none,
-            y_right: none,
-            y_sum: ones,
-            r1: none,
-            minus_r1: none,
-            gc: none,
-            minus_gc2: none,
-            gl2: none,
-            outside: none,
-            rs0: none,
-            jet_open: none,
-            jet: none,
-            opening: none,
-            glide: none,
-            resistance: none,
-            outer: none,
-            compliance: none,
-            inner: none,
-        };
-        let mut holes = vec![idle; coeffs.hole_chunks()];
+        let (steps, holes) = junction_chunks(coeffs);
         let tuned = coeffs.tuned_cell();
-        for junction in 0..junctions {
-            let lane = coeffs.lane_of(junction);
-            let (chunk, k) = (lane / LANES, lane % LANES);
-            let (left, right) = (junction, junction + 1);
-            let down = coeffs.rows(left).0;
-            let back = coeffs.rows(right).1;
-            let from_left = if junction == 0 { END_SLOT } else { coeffs.lane_of(junction - 1) };
-            let from_right =
-                if right == junctions { BACK + END_SLOT } else { BACK + coeffs.lane_of(junction + 1) };
-            let arrivals = match chunk.checked_sub(steps.len()) {
-                None => {
-                    let (y_left, y_right) = (coeffs.admittance[left], coeffs.admittance[right]);
-                    steps[chunk].weight[k] = F::of(2.0 * y_left / (y_left + y_right));
-                    &mut steps[chunk].arrivals
-                }
-                Some(chunk) => {
-                    let index = coeffs.hole_junctions.partition_point(|&hole| hole < junction);
-                    let (hole, lanes) = (coeffs.holes[index], &mut holes[chunk]);
-                    lanes.y_left[k] = F::of(2.0 * coeffs.admittance[left]);
-                    lanes.y_right[k] = F::of(2.0 * coeffs.admittance[right]);
-                    lanes.y_sum[k] = F::of(coeffs.admittance[left] + coeffs.admittance[right]);
-                    lanes.r1[k] = F::of(hole.r1);
-                    lanes.minus_r1[k] = F::of(-hole.r1);
-                    lanes.gc[k] = F::of(hole.gc);
-                    lanes.minus_gc2[k] = F::of(-2.0 * hole.gc);
-                    lanes.gl2[k] = F::of(2.0 * hole.gl);
-                    lanes.outside[k] = F::of(hole.gl + hole.gp);
-                    lanes.rs0[k] = F::of(hole.rs);
-                    lanes.resistance[k] = F::of(hole.rs);
-                    &mut lanes.arrivals
-                }
-            };
-            arrivals.offset[0][k] = back_rows(down, from_left);
-            arrivals.offset[1][k] =
-                if right == tuned { TUNED_SLOT as u16 } else { back_rows(back, from_right) };
-            for (side, cell) in [left, right].into_iter().enumerate() {
-                let (amount, q) = coeffs.loss[cell];
-                arrivals.taken[side][k] = F::of(amount * (1.0 - q));
-                arrivals.q[side][k] = F::of(q);
-            }
-        }
         let end = |cell: usize, offset: u16| EndLoss {
             offset,
             taken: F::of(coeffs.loss[cell].0 * (1.0 - coeffs.loss[cell].1)),
@@ -198,20 +185,12 @@ impl<F: Real> Lattice<F> {
         let last_lane = coeffs.lane_of(junctions - 1);
         let bell_y = coeffs.admittance[junctions];
         let tuned_right = if tuned == junctions { END_SLOT } else { coeffs.lane_of(tuned) };
-        // PANIC: the vector has exactly SPACE elements.
-        let mut ring: Box<[F; SPACE]> =
-            vec![F::default(); SPACE].into_boxed_slice().try_into().unwrap_or_else(|_| unreachable!());
         let mask = (coeffs.ring_rows() * STRIDE as u32 - 1) as u16;
-        // Fresh memory is only promised; written once here, it is there before the audio thread asks for it.
-        for value in [one, F::default()] {
-            ring[..=usize::from(mask)].fill(value);
-            std::hint::black_box(&mut ring);
-        }
         Self {
-            ring,
+            ring: silent_ring(mask),
             mask,
-            steps: steps.into(),
-            holes: holes.into(),
+            steps,
+            holes,
             hole_lanes: (0..coeffs.holes.len())
                 .map(|hole| coeffs.lane_of(coeffs.hole_junctions[hole]))
                 .map(|lane| (lane / LANES - coeffs.step_chunks(), lane % LANES))

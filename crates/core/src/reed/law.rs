@@ -1,26 +1,39 @@
-//! The quasi-static flow law of the reed, as the seed explored it and as physics corrects it.
+//! The quasi-static flow law of the reed: the notebook's law, corrected for negative pressure.
 //!
 //! For a pressure difference `p >= 0` (mouth minus mouthpiece, over the reference closing pressure) the flow is
 //! `u = A (H sqrt(p) - p^1.5 / k)` until the reed closes at `p_c = H k`, and 0 beyond. For `p < 0` the air flows back
 //! and the reed is pushed *open*: `u = -A (H sqrt|p| + |p|^1.5 / k)`. The notebook's form multiplies the forward law by
 //! the sign of `p` and so closes the reed at `p = -H k`, where a real one stands at twice its opening; a test below
-//! shows the difference. (Wilson & Beavers 1974 for the Bernoulli valve; the seed's tables for the arithmetic.)
+//! shows the difference. Sources: Wilson & Beavers 1974 for the Bernoulli valve, the notebook's tables for the arithmetic.
 //!
-//! | seed | here | meaning |
+//! | notebook | here | meaning |
 //! |---|---|---|
 //! | H | `h` | rest opening, dimensionless; reference sqrt(27)/2 |
 //! | k | `k` | stiffness, dimensionless; reference 27/(4 H^3) |
 //! | A | `a` | amplitude of the flow, 1 |
 //! | x_A, x_B | `ReedTables` | sqrt(p), p^1.5 |
+//!
+//! ```
+//! use chalumeau_core::reed::{ReedLaw, ReedTables};
+//!
+//! // Twice the usual stiffness: the reed closes at twice the pressure, and more air passes before.
+//! let (usual, stiff) = (ReedLaw::default(), ReedLaw::free(2.598, 2.0 * 0.3849, 1.0)?);
+//! assert!((stiff.closing() / usual.closing() - 2.0).abs() < 1e-3);
+//! assert!(stiff.flow(ReedTables::reference(), 0.5) > usual.flow(ReedTables::reference(), 0.5));
+//! assert!(ReedLaw::free(0.0, 0.4, 1.0).is_err());
+//! # Ok::<(), chalumeau_core::reed::law::ReedError>(())
+//! ```
 
 use crate::reed::tables::ReedTables;
 
-/// The seed's H: sqrt(27)/2 makes closure fall on 1 when k follows from it.
+/// The notebook's rest opening H, dimensionless: sqrt(27)/2. With [`K_INIT`] the closing pressure H k is 1.
 pub const H_INIT: f64 = 2.598_076_211_353_316;
-/// The seed's k: 27/(4 H^3) makes the peak flow 1.
+/// The notebook's stiffness k, dimensionless: 27/(4 H^3), which makes the peak flow 1.
 pub const K_INIT: f64 = 0.384_900_179_459_750_5;
 
-/// The reed's flow law in the seed's dimensionless numbers.
+/// The reed's flow law in the notebook's dimensionless numbers H, k and A.
+///
+/// The default is the reference: [`H_INIT`], [`K_INIT`] and A = 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReedLaw {
     h: f64,
@@ -28,7 +41,7 @@ pub struct ReedLaw {
     a: f64,
 }
 
-/// Why a law cannot be.
+/// Why a law is refused: one of its numbers is out of range.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ReedError {
     /// H outside its range.
@@ -43,7 +56,7 @@ pub enum ReedError {
 }
 
 impl ReedLaw {
-    /// Free H, k and A: peak flow `A sqrt(4 H^3 k / 27)` at `H k / 3`, closure at `H k`.
+    /// A law with H (0.5..=10), k (0.01..=20) and A (0..=10), each free: peak flow `A sqrt(4 H^3 k / 27)` at `H k / 3`, closure at `H k`.
     pub fn free(h: f64, k: f64, a: f64) -> Result<Self, ReedError> {
         if !(0.5..=10.0).contains(&h) {
             return Err(ReedError::H(h));
@@ -57,7 +70,7 @@ impl ReedLaw {
         Ok(Self { h, k, a })
     }
 
-    /// k follows from H so that the peak flow stays A: `k = 27 / (4 H^3)`.
+    /// A law whose k follows from H, see [`coupled_k`], so that the peak flow stays A. Fails like [`free`](Self::free).
     pub fn coupled(h: f64, a: f64) -> Result<Self, ReedError> {
         Self::free(h, coupled_k(h), a)
     }
@@ -72,7 +85,7 @@ impl ReedLaw {
         self.k
     }
 
-    /// Amplitude A.
+    /// Amplitude A of the flow, dimensionless.
     pub fn a(self) -> f64 {
         self.a
     }
@@ -82,7 +95,7 @@ impl ReedLaw {
         self.h * self.k
     }
 
-    /// Where the flow peaks, `H k / 3`.
+    /// Pressure difference where the flow peaks, `H k / 3`, over the reference closing pressure.
     pub fn peak_at(self) -> f64 {
         self.closing() / 3.0
     }
@@ -92,7 +105,8 @@ impl ReedLaw {
         self.a * (4.0 * self.h.powi(3) * self.k / 27.0).sqrt()
     }
 
-    /// Flow at pressure difference `p`, read from the tables. Real-time safe.
+    /// Flow at pressure difference `p` (mouth minus mouthpiece, over the reference closing pressure), read from the
+    /// tables; dimensionless, the reference peaks at 1. Real-time safe.
     pub fn flow(self, tables: &ReedTables, p: f64) -> f64 {
         let (x_a, x_b) = tables.at(p.abs());
         if p < 0.0 {
@@ -111,7 +125,7 @@ impl Default for ReedLaw {
     }
 }
 
-/// `27 / (4 H^3)`.
+/// The stiffness `27 / (4 H^3)` that gives a reed of rest opening `h` the peak flow 1.
 pub fn coupled_k(h: f64) -> f64 {
     27.0 / (h.powi(3) * 4.0)
 }
@@ -121,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn seed_constants_are_the_notebooks() {
+    fn constants_are_the_notebooks() {
         assert_eq!(27.0_f64.sqrt() / 2.0, H_INIT);
         assert_eq!(27.0 / (H_INIT.powi(3) * 4.0), K_INIT);
         assert!((ReedLaw::default().closing() - 1.0).abs() < 1e-15);
@@ -129,7 +143,7 @@ mod tests {
 
     #[test]
     fn coupled_keeps_the_peak_free_moves_it() {
-        let tables = ReedTables::seed();
+        let tables = ReedTables::reference();
         for h in [1.5, 2.0, H_INIT, 3.0, 5.0] {
             let law = ReedLaw::coupled(h, 1.0).unwrap();
             assert!((law.peak_flow() - 1.0).abs() < 1e-12);
@@ -143,7 +157,7 @@ mod tests {
 
     #[test]
     fn notebooks_sign_form_errs_for_negative_pressure() {
-        let (law, tables) = (ReedLaw::default(), ReedTables::seed());
+        let (law, tables) = (ReedLaw::default(), ReedTables::reference());
         let notebook = |p: f64| (law.h() * p.abs().sqrt() - p.abs().powf(1.5) / law.k()) * p.signum();
         // Physics: at p = -1 the reed stands at twice its rest opening, u = -(H + 1/k). The notebook closes it.
         assert!((law.flow(tables, -1.0) + law.h() + 1.0 / law.k()).abs() < 1e-12);
@@ -156,7 +170,7 @@ mod tests {
 
     #[test]
     fn table_error_is_below_two_thousandths_of_the_peak() {
-        let (law, tables) = (ReedLaw::default(), ReedTables::seed());
+        let (law, tables) = (ReedLaw::default(), ReedTables::reference());
         let worst = (0..100_000)
             .map(|n| f64::from(n) / 100_000.0)
             .map(|p| (law.flow(tables, p) - (law.h() * p.sqrt() - p.powf(1.5) / law.k())).abs())

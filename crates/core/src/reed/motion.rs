@@ -1,11 +1,11 @@
-//! The moving reed at the end of the bore: one closed-form solve a sample, no iteration.
+//! The moving reed at the end of the bore, solved in closed form once a sample.
 //!
 //! The reed is a damped oscillator driven by the pressure difference, `e'' / w_r^2 + q e' / w_r + e = r p + F`, where
 //! `e` is its closing in units of the reference rest opening, `r = k_ref / k` its compliance and `F` the tongue. Its
 //! position is known when the flow is wanted, so flow and pressure follow from a quadratic (as Guillemain, Kergomard &
 //! Voinier 2005 do): with `B` the opening and `X` the pressure difference at zero flow, `p + kappa zeta B sqrt(p) = X`.
-//! The result is then corrected once by what the tables say there, so that the sound hears the very entries the knob
-//! feels: `u = zeta (x_a[p] (B + r p) - r x_b[p])`, the table's quasi-static law plus inertia, which for exact tables
+//! The result is then corrected once by what the tables say there, so that sound and knob read
+//! the same entries: `u = zeta (x_a[p] (B + r p) - r x_b[p])`, the table's quasi-static law plus inertia, which for exact tables
 //! is `zeta B sqrt(p)`.
 //!
 //! The lay rounds the closure: the opening is linear until `lay` before contact and then a parabola, zero at `lay`
@@ -17,15 +17,44 @@
 use crate::reed::law::{K_INIT, ReedLaw};
 use crate::reed::tables::ReedTables;
 
-/// Below this opening over rest a reed counts as shut, wherever that is counted or drawn: a thousandth, since a curved lay
-/// lets the last of the gap go only slowly. By judgement.
+/// A reed counts as shut below this opening (over the rest opening), in statistics and drawings. With a curved lay the last
+/// of the gap closes only slowly, hence a thousandth. By judgement.
 pub const SHUT: f64 = 1e-3;
 /// Largest opening, over the rest opening: a reed pushed away from the mouthpiece is stopped by the lip (by judgement).
 const MAX_OPENING: f64 = 2.0;
-/// A force the tongue presses with that holds the reed shut at any playing pressure, over P (lattice study, section 5).
+/// Force of the tongue that holds the reed shut at any playing pressure, over P. By judgement.
 pub const TONGUE_FORCE: f64 = 1.6;
 
-/// What the reed is like during one control tick, at one sample rate.
+/// A reed as a damped oscillator with a flow law.
+///
+/// ```
+/// use chalumeau_core::reed::{MovingReed, ReedCoeffs, ReedLaw, ReedState, ReedTables};
+///
+/// let (law, swept_s) = (ReedLaw::default(), 2e-5);
+/// let reed = MovingReed { law, zeta: 0.3, lay: 0.4, resonance_hz: 2_200.0, damping: 0.8, swept_s };
+/// let coeffs = ReedCoeffs::new(reed, 96_000.0);
+/// let mut state = ReedState::default();
+/// // Blown at 0.4 of the closing pressure into a bore that sends nothing back: air flows into the bore.
+/// let wave = state.tick(&coeffs, ReedTables::reference(), 1.0, 0.4, 0.0, 0.0, 0.0);
+/// assert!(state.flow > 0.0 && wave > 0.0);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MovingReed {
+    /// Quasi-static flow law: rest opening H, stiffness k, amplitude A.
+    pub law: ReedLaw,
+    /// Embouchure parameter of the reference reed, dimensionless; the reference has 0.3.
+    pub zeta: f64,
+    /// Half-width of the parabola with which a curved lay rounds the closure, over the rest opening; 0 is a sharp corner.
+    pub lay: f64,
+    /// Resonance frequency, Hz; held to 0.15 of the sample rate, where the integration is stable.
+    pub resonance_hz: f64,
+    /// Damping q of the resonance, 1 / Q, dimensionless.
+    pub damping: f64,
+    /// Equivalent volume of the reference reed over (section of the nominal bore times speed of sound), s.
+    pub swept_s: f64,
+}
+
+/// The coefficients of a reed during one control tick, at one sample rate.
 #[derive(Clone, Copy, Debug)]
 pub struct ReedCoeffs {
     /// Sample period, s.
@@ -51,18 +80,9 @@ pub struct ReedCoeffs {
 }
 
 impl ReedCoeffs {
-    /// Coefficients for a law (with `zeta` of the reference reed), a resonance and a damping, at `rate_hz`.
-    ///
-    /// `swept_s` is the equivalent volume of the reference reed over (bore section times speed of sound), seconds.
-    pub fn new(
-        law: ReedLaw,
-        zeta: f64,
-        lay: f64,
-        resonance_hz: f64,
-        damping: f64,
-        swept_s: f64,
-        rate_hz: f64,
-    ) -> Self {
+    /// Coefficients of a reed at the sample rate `rate_hz`. Real-time safe.
+    pub fn new(reed: MovingReed, rate_hz: f64) -> Self {
+        let MovingReed { law, zeta, lay, resonance_hz, damping, swept_s } = reed;
         let period = 1.0 / rate_hz;
         let closing = law.h() * K_INIT;
         // w_r T stays below 1, well inside the integrator's stability limit of 2.
@@ -158,13 +178,15 @@ mod tests {
     use super::*;
 
     fn quasi_static(zeta: f64) -> ReedCoeffs {
-        ReedCoeffs::new(ReedLaw::default(), zeta, 0.0, 2_200.0, 0.8, 0.0, 96_000.0)
+        let law = ReedLaw::default();
+        let reed = MovingReed { law, zeta, lay: 0.0, resonance_hz: 2_200.0, damping: 0.8, swept_s: 0.0 };
+        ReedCoeffs::new(reed, 96_000.0)
     }
 
     /// The solve leaves p = X - kappa u to rounding, for any state and both corners.
     #[test]
     fn flow_and_pressure_agree_whatever_comes() {
-        let tables = ReedTables::seed();
+        let tables = ReedTables::reference();
         let mut seed = 1_u64;
         let mut random = move || {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -190,7 +212,8 @@ mod tests {
     #[test]
     fn closed_reed_passes_nothing_and_reflects_everything() {
         let mut state = ReedState { closing: 1.5, ..Default::default() };
-        let p_plus = state.tick(&quasi_static(0.3), ReedTables::seed(), 1.0, 2.0, 0.25, 0.0, TONGUE_FORCE);
+        let p_plus =
+            state.tick(&quasi_static(0.3), ReedTables::reference(), 1.0, 2.0, 0.25, 0.0, TONGUE_FORCE);
         assert_eq!((state.flow, state.opening), (0.0, 0.0));
         assert!((p_plus - 0.25).abs() < 1e-12);
     }
@@ -201,7 +224,7 @@ mod tests {
             let reed = ReedCoeffs { lay, ..quasi_static(0.3) };
             let opening = |closing: f64| {
                 let mut state = ReedState { closing, ..Default::default() };
-                state.tick(&reed, ReedTables::seed(), 1.0, 0.5, 0.0, 0.0, 0.0);
+                state.tick(&reed, ReedTables::reference(), 1.0, 0.5, 0.0, 0.0, 0.0);
                 state.opening
             };
             assert_eq!(opening(0.0), 1.0);
@@ -216,8 +239,8 @@ mod tests {
 
     #[test]
     fn one_table_entry_is_heard_felt_and_exported() {
-        let seed = ReedTables::seed();
-        let mut bent = seed.clone();
+        let reference = ReedTables::reference();
+        let mut bent = reference.clone();
         bent.x_a[1_800] *= 1.01;
         bent.x_b[1_800] *= 1.01;
         let sound = |tables: &ReedTables| {
@@ -225,19 +248,22 @@ mod tests {
             state.tick(&quasi_static(0.3), tables, 1.0, 0.5 + 0.3 * 0.5 * 0.5_f64.sqrt(), 0.0, 0.0, 0.0)
         };
         let law = ReedLaw::default();
-        assert!((sound(&bent) - sound(seed)).abs() > 1e-4, "audio");
-        assert!((law.flow(&bent, 0.5) - law.flow(seed, 0.5)).abs() > 1e-3, "torque law");
-        let header = crate::reed::header::pressure_table_values;
-        assert_ne!(header(&bent), header(seed), "header");
+        assert!((sound(&bent) - sound(reference)).abs() > 1e-4, "audio");
+        assert!((law.flow(&bent, 0.5) - law.flow(reference, 0.5)).abs() > 1e-3, "torque law");
+        let header = crate::reed::firmware_header::pressure_table_values;
+        assert_ne!(header(&bent), header(reference), "header");
     }
 
     #[test]
     fn free_reed_rings_at_its_resonance() {
-        let reed = ReedCoeffs::new(ReedLaw::default(), 0.0, 0.4, 1_500.0, 0.02, 0.0, 96_000.0);
+        let law = ReedLaw::default();
+        let reed =
+            MovingReed { law, zeta: 0.0, lay: 0.4, resonance_hz: 1_500.0, damping: 0.02, swept_s: 0.0 };
+        let reed = ReedCoeffs::new(reed, 96_000.0);
         let mut state = ReedState { closing: 0.2, ..Default::default() };
         let (mut crossings, mut last) = (0, state.closing);
         for _ in 0..9_600 {
-            state.tick(&reed, ReedTables::seed(), 1.0, 0.0, 0.0, 0.0, 0.0);
+            state.tick(&reed, ReedTables::reference(), 1.0, 0.0, 0.0, 0.0, 0.0);
             crossings += i32::from(last < 0.0 && state.closing >= 0.0);
             last = state.closing;
         }

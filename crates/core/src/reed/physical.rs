@@ -1,34 +1,45 @@
-//! The reed as a maker measures it, and what follows for the law.
+//! The reed as a maker measures it, and its translation to the notebook's dimensionless numbers.
 //!
-//! One reed has two faces. The maker's: stiffness K (N/m), effective area A_r, channel width w, rest opening H_m. The
-//! seed's: H, k, A, with the embouchure parameter zeta as the measure of flow. Over a reference reed, whose H is
-//! sqrt(27)/2, k 27/(4 H^3) and zeta 0.3:
+//! A reed has two descriptions. A maker measures stiffness K (N/m), effective area A_r, channel width w and rest opening
+//! H_m. The notebook has the dimensionless H, k and A, and the embouchure parameter zeta measures the flow. The two are
+//! related by a reference reed, whose H is sqrt(27)/2, k 27/(4 H^3) and zeta 0.3:
 //!
-//! | seed | maker |
+//! | notebook | maker |
 //! |---|---|
 //! | `H / H_init` | `H_m / H_m,ref` |
 //! | `k / k_init` | `(K / A_r) / (K_ref / A_ref)` |
 //! | `zeta A / 0.3` | `w / w_ref` |
-//! | `area` | `A_r / A_ref`: besides the closing pressure, only the air the reed's own motion moves |
+//! | `area` | `A_r / A_ref`: enters the closing pressure, and otherwise only the air that the reed's motion displaces |
 //!
-//! so that `p_M = K H_m / A_r = P_ref H k` on both. [`SeedReed`] keeps A apart from zeta and the area beside them, and nothing
-//! is lost either way. The seed's face is the one that is stored and played; the maker's is worked out from it.
+//! The closing pressure is `p_M = K H_m / A_r = P_ref H k` in both. [`DimensionlessReed`] keeps A apart from zeta and also
+//! keeps the area, so that nothing is lost in either direction. Settings store and play the dimensionless numbers; the
+//! maker's are computed from them.
+//!
+//! ```
+//! use chalumeau_core::reed::physical::{DimensionlessReed, PhysicalReed};
+//!
+//! let reference = PhysicalReed::reference();
+//! let stiff = PhysicalReed { stiffness_n_m: 1.5 * reference.stiffness_n_m, ..reference };
+//! let numbers = stiff.dimensionless(&reference, 1.0);
+//! assert!((numbers.k / DimensionlessReed::reference().k - 1.5).abs() < 1e-12);
+//! assert!((stiff.closing_pa() - 9_000.0).abs() < 1e-6);
+//! ```
 
 use crate::reed::law::{H_INIT, K_INIT};
 use crate::units::{Air, REFERENCE_RADIUS_M};
 
-/// Closing pressure of the reference reed, Pa: what everything inside is relative to.
+/// Closing pressure of the reference reed, Pa. All pressures in the model are relative to it.
 pub const P_REF_PA: f64 = 6_000.0;
 
-/// Equivalent volume of the reference reed, m3: that of a B flat clarinet's.
+/// Equivalent volume of the reference reed, m3: 1.2 cm3, as on a B flat clarinet.
 pub const REFERENCE_VOLUME_M3: f64 = 1.2e-6;
 
 /// Embouchure parameter of the reference reed.
 pub const ZETA_REFERENCE: f64 = 0.3;
 
-/// The seed's face of a reed: dimensionless.
+/// A reed in the notebook's dimensionless numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SeedReed {
+pub struct DimensionlessReed {
     /// Rest opening, reference sqrt(27)/2.
     pub h: f64,
     /// Stiffness, reference 27/(4 H^3).
@@ -41,8 +52,8 @@ pub struct SeedReed {
     pub area: f64,
 }
 
-impl SeedReed {
-    /// The reference reed's.
+impl DimensionlessReed {
+    /// The reference reed.
     pub fn reference() -> Self {
         Self { h: H_INIT, k: K_INIT, a: 1.0, zeta: ZETA_REFERENCE, area: 1.0 }
     }
@@ -64,8 +75,8 @@ pub struct PhysicalReed {
 impl PhysicalReed {
     /// The reference reed: closing pressure 6 kPa, zeta 0.3, equivalent volume 1.2 cm3 at 25 C.
     ///
-    /// Those three follow physics of the instrument the geometry was tuned with; the tip opening of 0.5 mm is a common
-    /// one, and width, area and stiffness then follow. The width is large because it stands for tip and side slits.
+    /// These three are the values with which the geometry of the built-in clarinet was tuned. The tip opening of 0.5 mm is a
+    /// common one; width, area and stiffness follow. The width is large because it includes tip and side slits.
     pub fn reference() -> Self {
         let (air, closing_pa, zeta, volume_m3, tip_opening_m) =
             (Air::default(), P_REF_PA, ZETA_REFERENCE, REFERENCE_VOLUME_M3, 0.5e-3);
@@ -91,11 +102,11 @@ impl PhysicalReed {
         Self::reference().scaled(nominal_radius_m / REFERENCE_RADIUS_M)
     }
 
-    /// The seed's face, over a reference reed. How much of the flow is A's and how much zeta's is for the seed to say: `a`,
-    /// above 0. Real-time safe.
-    pub fn seed(&self, reference: &Self, a: f64) -> SeedReed {
+    /// The dimensionless numbers of this reed, relative to a reference reed. The measurements fix only the product zeta A;
+    /// `a`, above 0, says how much of it is A. Real-time safe.
+    pub fn dimensionless(&self, reference: &Self, a: f64) -> DimensionlessReed {
         let area = self.area_m2 / reference.area_m2;
-        SeedReed {
+        DimensionlessReed {
             h: H_INIT * (self.tip_opening_m / reference.tip_opening_m),
             k: K_INIT * (self.stiffness_n_m / reference.stiffness_n_m / area),
             a,
@@ -104,13 +115,13 @@ impl PhysicalReed {
         }
     }
 
-    /// The maker's face of a seed's reed, over the same reference. Real-time safe.
-    pub fn from_seed(seed: &SeedReed, reference: &Self) -> Self {
+    /// The maker's measurements of a reed given in dimensionless numbers, relative to the same reference. Real-time safe.
+    pub fn from_dimensionless(numbers: &DimensionlessReed, reference: &Self) -> Self {
         Self {
-            width_m: reference.width_m * (seed.zeta * seed.a / ZETA_REFERENCE),
-            area_m2: reference.area_m2 * seed.area,
-            stiffness_n_m: reference.stiffness_n_m * (seed.k / K_INIT * seed.area),
-            tip_opening_m: reference.tip_opening_m * (seed.h / H_INIT),
+            width_m: reference.width_m * (numbers.zeta * numbers.a / ZETA_REFERENCE),
+            area_m2: reference.area_m2 * numbers.area,
+            stiffness_n_m: reference.stiffness_n_m * (numbers.k / K_INIT * numbers.area),
+            tip_opening_m: reference.tip_opening_m * (numbers.h / H_INIT),
         }
     }
 
@@ -129,7 +140,7 @@ impl PhysicalReed {
         air.z_c(nominal_radius_m) * self.beta(air) / self.closing_pa().sqrt()
     }
 
-    /// Air volume that yields as much as the reed does, m3: `rho c^2 A_r^2 / K`.
+    /// Volume of air with the same compliance as the reed, m3: `rho c^2 A_r^2 / K`.
     pub fn equivalent_volume_m3(&self, air: &Air) -> f64 {
         air.rho * air.c * air.c * self.area_m2 * self.area_m2 / self.stiffness_n_m
     }
@@ -159,39 +170,42 @@ mod tests {
 
     /// Both ways for reeds from soft and wide to hard and close, on bores from E flat to bass: nothing is lost.
     #[test]
-    fn the_two_faces_are_one_reed() {
+    fn the_two_descriptions_are_one_reed() {
         let air = Air::default();
         let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-12, "{a} {b}");
         for factor in [0.75, 1.0, 1.5, 2.0] {
             let nominal_m = factor * REFERENCE_RADIUS_M;
             let reference = PhysicalReed::reference_on(nominal_m);
-            assert_eq!(PhysicalReed::from_seed(&SeedReed::reference(), &reference), reference);
+            assert_eq!(
+                PhysicalReed::from_dimensionless(&DimensionlessReed::reference(), &reference),
+                reference
+            );
             near(reference.closing_pa(), P_REF_PA);
             near(reference.zeta(&air, nominal_m), ZETA_REFERENCE);
             near(reference.equivalent_volume_m3(&air), REFERENCE_VOLUME_M3 * factor.powi(3));
             for n in 0..1_000_u32 {
                 let step = |prime: u32| f64::from(n * prime % 101) / 100.0;
-                let seed = SeedReed {
+                let numbers = DimensionlessReed {
                     h: 1.0 + 4.0 * step(7),
                     k: 0.1 + 1.9 * step(13),
                     a: 0.05 + 1.95 * step(29),
                     zeta: 0.05 + 0.85 * step(41),
                     area: 0.3 + 2.0 * step(53),
                 };
-                let reed = PhysicalReed::from_seed(&seed, &reference);
-                let back = reed.seed(&reference, seed.a);
-                near(back.h, seed.h);
-                near(back.k, seed.k);
-                near(back.zeta, seed.zeta);
-                near(back.area, seed.area);
-                let again = PhysicalReed::from_seed(&back, &reference);
+                let reed = PhysicalReed::from_dimensionless(&numbers, &reference);
+                let back = reed.dimensionless(&reference, numbers.a);
+                near(back.h, numbers.h);
+                near(back.k, numbers.k);
+                near(back.zeta, numbers.zeta);
+                near(back.area, numbers.area);
+                let again = PhysicalReed::from_dimensionless(&back, &reference);
                 near(again.stiffness_n_m, reed.stiffness_n_m);
                 near(again.area_m2, reed.area_m2);
                 near(again.width_m, reed.width_m);
                 near(again.tip_opening_m, reed.tip_opening_m);
-                // The physics is the same on both faces.
-                near(reed.closing_pa(), P_REF_PA * seed.h * seed.k);
-                let peak = (4.0 * seed.h.powi(3) * seed.k / 27.0).sqrt() * seed.a * seed.zeta;
+                // The physics is the same in both descriptions.
+                near(reed.closing_pa(), P_REF_PA * numbers.h * numbers.k);
+                let peak = (4.0 * numbers.h.powi(3) * numbers.k / 27.0).sqrt() * numbers.a * numbers.zeta;
                 // Peak flow of the Bernoulli valve, 2 w H_m / 3 sqrt(2 p_M / (3 rho)), over that of the reference at zeta 1.
                 let flow = 2.0 / 3.0 * reed.beta(&air) * (reed.closing_pa() / 3.0).sqrt();
                 let unit = 2.0 / 3.0 * reference.beta(&air) * (P_REF_PA / 3.0).sqrt() / ZETA_REFERENCE;

@@ -1,5 +1,5 @@
-//! The reed without inertia: it stands wherever the pressure difference puts it. For thresholds and for looking at the
-//! model with one thing less in it; played, it squeaks, because nothing damps the upper resonances of the bore.
+//! The reed without inertia: its position follows the pressure difference at once. It serves to compute thresholds and to
+//! study a simpler model. As an instrument it squeaks, because nothing damps the upper resonances of the bore.
 //!
 //! The flow is the law of [`law`](crate::reed::law) read from the tables, scaled to zeta:
 //! `u = zeta 2/(3 sqrt 3) A (H x_a[p] - x_b[p] / k)`. The bore's load line `p + kappa u(p) = X` meets it once while
@@ -35,7 +35,7 @@ pub struct QuasiStaticReed {
     conductance: f64,
 }
 
-/// What its volume remembers, and what last came through it.
+/// The state of a [`QuasiStaticReed`]: pressure, flow, and the flow into the reed's volume.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct QuasiStaticState {
     /// Pressure in the mouthpiece in the last sample, over P.
@@ -159,7 +159,7 @@ mod tests {
 
     #[test]
     fn solve_leaves_nothing_for_any_wave_and_embouchure() {
-        let (tables, mut random) = (ReedTables::seed(), random());
+        let (tables, mut random) = (ReedTables::reference(), random());
         let mut worst = 0.0_f64;
         for _ in 0..1_000_000 {
             let (gamma, wave, zeta) = (random(0.0, 3.0), random(-4.0, 4.0), random(0.0, 0.95));
@@ -185,7 +185,7 @@ mod tests {
 
     #[test]
     fn other_laws_and_bent_tables_are_solved_too() {
-        let (mut tables, mut random) = (ReedTables::seed().clone(), random());
+        let (mut tables, mut random) = (ReedTables::reference().clone(), random());
         for i in 1..=LAST {
             let bend = 1.0 + random(-1e-3, 1e-3);
             tables.x_a[i] *= bend;
@@ -218,7 +218,7 @@ mod tests {
         let mut state = QuasiStaticState::default();
         let mut pressure = Vec::new();
         for _ in 0..2_000 {
-            state.tick(&reed, ReedTables::seed(), 1e-12, 0.4, 0.0);
+            state.tick(&reed, ReedTables::reference(), 1e-12, 0.4, 0.0);
             pressure.push(state.p_mouthpiece);
         }
         let rise = (pressure[3] - pressure[2]) * 96_000.0 * 1e-3;

@@ -1,16 +1,26 @@
 //! The pressure tables shared by sound, touch and firmware.
 //!
-//! 3601 entries over one turn of the knob in tenths of a degree times ten: index `i` stands for the pressure difference
-//! `x = i / 3600` of a full-scale (closing) pressure. `x_a = sqrt(x)` and `x_b = x^1.5` are what the flow law
-//! `u = H x_a - x_b / k` needs. The grid is built as `i * (1/3600)` with the last entry exactly 1, which is how numpy's
-//! `linspace` does it; `i / 3600` would differ in the last bit of 29 entries.
+//! The tables have 3601 entries over one turn of the knob, one entry every tenth of a degree. Entry `i` belongs to the
+//! pressure difference `x = i / 3600`, where 1 is the closing pressure. The flow law `u = H x_a - x_b / k` needs
+//! `x_a = sqrt(x)` and `x_b = x^1.5`. The grid is `i * (1/3600)` with the last entry set to 1, as numpy's `linspace`
+//! computes it in the notebook; `i / 3600` would differ in the last bit of 29 entries.
+//!
+//! ```
+//! use chalumeau_core::reed::ReedTables;
+//!
+//! let tables = ReedTables::reference();
+//! assert_eq!((tables.x[900], tables.x_a[900], tables.x_b[900]), (0.25, 0.5, 0.125));
+//! // Between two entries the tables are interpolated.
+//! let (root, _) = tables.at(0.3);
+//! assert!((root - 0.3_f64.sqrt()).abs() < 3.0e-4);
+//! ```
 
 use std::sync::LazyLock;
 
 /// Index of the last table entry.
 pub const LAST: usize = 3600;
 
-/// Pressure tables over 0..=1 of the reference closing pressure.
+/// Pressure tables over 0..=1 of the reference closing pressure. All values are dimensionless.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReedTables {
     /// Pressure difference, 0..=1.
@@ -23,12 +33,12 @@ pub struct ReedTables {
     pub sgn: Box<[i8; LAST + 1]>,
 }
 
-static SEED: LazyLock<ReedTables> = LazyLock::new(ReedTables::build);
+static REFERENCE: LazyLock<ReedTables> = LazyLock::new(ReedTables::build);
 
 impl ReedTables {
-    /// The one set everything reads. The first call allocates; call it before audio starts.
-    pub fn seed() -> &'static Self {
-        &SEED
+    /// The reference tables, which sound, torque and firmware share. The first call allocates; make it before audio starts.
+    pub fn reference() -> &'static Self {
+        &REFERENCE
     }
 
     fn build() -> Self {
@@ -76,7 +86,7 @@ mod tests {
 
     #[test]
     fn grid_is_linspace_to_the_bit() {
-        let tables = ReedTables::seed();
+        let tables = ReedTables::reference();
         let differing = (0..=LAST).filter(|&i| tables.x[i] != i as f64 / LAST as f64).count();
         assert_eq!(differing, 29, "i * (1/3600) differs from i/3600 in 29 entries");
         assert_eq!(tables.x[LAST], 1.0);
@@ -90,7 +100,7 @@ mod tests {
 
     #[test]
     fn interpolation_error_is_bounded_from_the_root_to_beyond_the_table() {
-        let tables = ReedTables::seed();
+        let tables = ReedTables::reference();
         let (mut worst_a, mut worst_b, mut worst_first) = (0.0_f64, 0.0_f64, 0.0_f64);
         for n in 0..400_000 {
             let p = f64::from(n) / 200_000.0; // 0..2

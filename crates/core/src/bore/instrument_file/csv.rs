@@ -7,11 +7,15 @@
 
 use csv::StringRecord;
 
-use super::raw::{Lined, RawFile, RawFingering, RawHole, RawSegment};
+use super::raw::{Lined, RawFile, RawHole, RawSegment};
 use super::words::{Place, Unit, Word, Words};
 use super::{HoleKind, InstrumentError, InstrumentFile};
 use crate::bore::transfer_matrix::TransferMatrix;
-use crate::units::{Air, WrittenNote, cents, midi_of_name};
+use crate::units::{Air, cents};
+
+mod chart;
+
+use chart::read_chart;
 
 /// One table: its name for messages, and its text.
 #[derive(Clone, Copy, Debug)]
@@ -332,7 +336,6 @@ fn shifted(text: &str, shift: i32) -> Option<f64> {
 
 const BORE_EXAMPLE: &str = "part,x_start_mm,x_end_mm,diameter_start_mm,diameter_end_mm";
 const HOLE_EXAMPLE: &str = "hole,kind,x_mm,diameter_mm,chimney_mm,register,description";
-const CHART_EXAMPLE: &str = "written_note,register,mode,L1,L2,L3,fingers";
 
 fn read_bore(sheet: Sheet<'_>, words: &mut Words) -> Result<Vec<Lined<RawSegment>>, ImportError> {
     let table = Table::read(sheet, BORE_EXAMPLE)?;
@@ -439,141 +442,6 @@ fn read_holes(sheet: Sheet<'_>, words: &mut Words) -> Result<Vec<Lined<RawHole>>
     words.hole_name = Word::plain(&table.columns[name]);
     [words.x, words.hole_width, words.chimney] = [x.word, width.word, chimney.word];
     Ok(holes)
-}
-
-/// Columns of a chart that are no holes.
-const CHART_COLUMNS: [&str; 9] = [
-    "written_note",
-    "written_midi",
-    "sounding_note",
-    "sounding_midi",
-    "f_et440_hz",
-    "register",
-    "mode",
-    "register_mode",
-    "fingers",
-];
-
-struct Chart {
-    notes: Vec<Lined<RawFingering>>,
-    /// What the sounding notes show, if there are any.
-    transposition: Option<i64>,
-    /// Whether a column says which peaks sound.
-    has_modes: bool,
-}
-
-fn read_chart(
-    sheet: Sheet<'_>,
-    holes: &[&str],
-    wanted: Option<i8>,
-    words: &mut Words,
-) -> Result<Chart, ImportError> {
-    let table = Table::read(sheet, CHART_EXAMPLE)?;
-    let (note, midi) = (table.optional(&["written_note"])?, table.optional(&["written_midi"])?);
-    let written = match note.or(midi) {
-        Some(index) => index,
-        None => table.required(&["written_note", "written_midi"])?,
-    };
-    let (sounding_note, sounding_midi) =
-        (table.optional(&["sounding_note"])?, table.optional(&["sounding_midi"])?);
-    let register = table.required(&["register"])?;
-    let mode = table.optional(&["mode", "register_mode"])?;
-    let fingers = table.optional(&["fingers"])?;
-    let mut known = CHART_COLUMNS.to_vec();
-    known.extend(holes);
-    table.only(&known, || format!("{} and the holes {}", CHART_COLUMNS.join(", "), holes.join(" ")))?;
-    let mut columns = Vec::with_capacity(holes.len());
-    for &hole in holes {
-        // A hole called like a column of the chart cannot be told from it.
-        if CHART_COLUMNS.contains(&hole) {
-            let (first, second) = (hole.to_owned(), format!("a hole called {hole}"));
-            return Err(ImportError::TwoColumns { file: table.file, first, second });
-        }
-        columns.push((hole, table.required(&[hole])?));
-    }
-    let mut chart = Vec::with_capacity(table.rows.len());
-    let mut transposition: Option<i64> = None;
-    for &(line, ref row) in &table.rows {
-        let text = |index: usize| row.get(index).unwrap_or_default();
-        // A note by name or by number; where both are there they must agree.
-        let pitch = |name: Option<usize>, number: Option<usize>| -> Result<Option<u8>, ImportError> {
-            let by_name = match name {
-                Some(index) => Some(midi_of_name(text(index)).ok_or_else(|| {
-                    table.field(line, index, text(index), "a note like E3, F#4 or Bb4, from C-1 to G9")
-                })?),
-                None => None,
-            };
-            let by_number = match number {
-                Some(index) => {
-                    let midi = text(index).parse::<u8>().ok().filter(|&midi| midi < 128);
-                    Some(
-                        midi.ok_or_else(|| table.field(line, index, text(index), "a MIDI number, 0 to 127"))?,
-                    )
-                }
-                None => None,
-            };
-            match (by_name, by_number, number) {
-                (Some(named), Some(numbered), Some(index)) if named != numbered => {
-                    let expected = format!("{named}, the number of {}", WrittenNote(named));
-                    Err(table.field(line, index, text(index), expected))
-                }
-                (named, numbered, _) => Ok(named.or(numbered)),
-            }
-        };
-        let Some(plays) = pitch(note, midi)? else { continue };
-        if let Some(sounds) = pitch(sounding_note, sounding_midi)? {
-            let lower = i64::from(plays) - i64::from(sounds);
-            let right = wanted.map(i64::from).or(transposition);
-            if let (Some(right), Some(index)) = (right, sounding_midi.or(sounding_note))
-                && right != lower
-            {
-                let why = if wanted.is_some() { "asked for" } else { "of the lines before" };
-                let note = i64::from(plays) - right;
-                let expected = match u8::try_from(note).ok().filter(|&midi| midi < 128) {
-                    Some(midi) => {
-                        format!(
-                            "{} ({midi}), {right} semitones below the written note as {why}",
-                            WrittenNote(midi)
-                        )
-                    }
-                    None => format!("{right} semitones below the written note as {why}"),
-                };
-                return Err(table.field(line, index, text(index), expected));
-            }
-            transposition = Some(lower);
-        }
-        let sounds_at = match mode {
-            Some(index) => text(index).parse::<u32>().map_err(|_| {
-                table.field(line, index, text(index), "1 to 12, the number of the impedance peak that sounds")
-            })?,
-            // As a clarinet overblows; the altissimo is looked up when the bore is known.
-            None => match text(register) {
-                "clarion" => 2,
-                "altissimo" => 3,
-                _ => 1,
-            },
-        };
-        let mut open: Vec<&str> = Vec::new();
-        for &(hole, index) in &columns {
-            match text(index) {
-                "1" => open.push(hole),
-                "0" => {}
-                other => {
-                    return Err(table.field(line, index, other, "1 for an open hole, 0 for a closed one"));
-                }
-            }
-        }
-        let value = RawFingering {
-            written: WrittenNote(plays).to_string(),
-            register: text(register).to_owned(),
-            mode: sounds_at,
-            open: open.join(" "),
-            fingers: fingers.map(text).unwrap_or_default().to_owned(),
-        };
-        chart.push(Lined { line, value });
-    }
-    words.written = Word::plain(&table.columns[written]);
-    Ok(Chart { notes: chart, transposition, has_modes: mode.is_some() })
 }
 
 #[cfg(test)]

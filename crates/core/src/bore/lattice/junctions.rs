@@ -2,6 +2,7 @@
 
 use super::real::Real;
 use super::{BACK, LANES, SPACE, TINY};
+use crate::bore::tone_hole::HoleCoeffs;
 
 pub(super) type Octet<F> = [F; LANES];
 
@@ -72,6 +73,11 @@ pub(super) struct Steps<F> {
 }
 
 impl<F: Real> Steps<F> {
+    /// Eight lanes without a junction; `slot` is one that nobody writes.
+    pub(super) fn idle(slot: usize) -> Self {
+        Self { arrivals: Arrivals::idle(slot), weight: [F::of(1.0); LANES] }
+    }
+
     #[inline(always)]
     pub(super) fn tick(&mut self, ring: &mut [F; SPACE], base: u16, mask: u16, slot: usize) {
         let left = self.arrivals.gather::<0>(ring, base, mask);
@@ -113,6 +119,47 @@ pub(super) struct Holes<F> {
 }
 
 impl<F: Real> Holes<F> {
+    /// Eight lanes without a hole; `slot` is one that nobody writes.
+    pub(super) fn idle(slot: usize) -> Self {
+        let none = Octet::<F>::default();
+        Self {
+            arrivals: Arrivals::idle(slot),
+            y_left: none,
+            y_right: none,
+            y_sum: [F::of(1.0); LANES],
+            r1: none,
+            minus_r1: none,
+            gc: none,
+            minus_gc2: none,
+            gl2: none,
+            outside: none,
+            rs0: none,
+            jet_open: none,
+            jet: none,
+            opening: none,
+            glide: none,
+            resistance: none,
+            outer: none,
+            compliance: none,
+            inner: none,
+        }
+    }
+
+    /// Puts a closed hole into lane `k`, between cells of these admittances (over the reference).
+    pub(super) fn place(&mut self, k: usize, hole: &HoleCoeffs, y_left: f64, y_right: f64) {
+        self.y_left[k] = F::of(2.0 * y_left);
+        self.y_right[k] = F::of(2.0 * y_right);
+        self.y_sum[k] = F::of(y_left + y_right);
+        self.r1[k] = F::of(hole.r1);
+        self.minus_r1[k] = F::of(-hole.r1);
+        self.gc[k] = F::of(hole.gc);
+        self.minus_gc2[k] = F::of(-2.0 * hole.gc);
+        self.gl2[k] = F::of(2.0 * hole.gl);
+        self.outside[k] = F::of(hole.gl + hole.gp);
+        self.rs0[k] = F::of(hole.rs);
+        self.resistance[k] = F::of(hole.rs);
+    }
+
     /// A hole opened by `a` passes its jet through `a^2` of its area (its mass, too, is 1 / a^2 of the open one's). Seen
     /// behind the transformer the loss is then 1 / a^2 of the open hole's: it is what quietens the air column when the
     /// fingers leave many holes at once. Held below a bound where no air passes anyway.

@@ -1,4 +1,7 @@
-//! What tests and the curious ask of a lattice. None of it is for the audio path.
+//! Reads and fills the whole state of a lattice: stored energy, largest wave, subnormal numbers.
+//!
+//! The integration tests of energy, passivity and denormals need this. It is compiled into the crate because the state is
+//! private and those tests live in other packages. None of it is for the audio thread.
 
 use super::coeffs::LatticeCoeffs;
 use super::junctions::Octet;
@@ -28,7 +31,7 @@ impl<F: Real> Lattice<F> {
     }
 
     /// Energy of everything in the bore, in units of a wave of pressure 1 passing the reference section for one sample;
-    /// `coeffs` are those the lattice was made from. For proofs, not for the audio path.
+    /// `coeffs` are those the lattice was made from.
     ///
     /// Waves in flight count with their cell's admittance, and the row that a fractional tuning delay has half read with
     /// the part still to come. A loss filter holds `Y A (1 - q) / q l^2`; a trapezoidal element of conductance G or
@@ -85,7 +88,7 @@ impl<F: Real> Lattice<F> {
         arrivals.state[side][lane]
     }
 
-    /// Fills every state with `value()`; for tests that start from anything.
+    /// Fills every state with `value()`, so that a test can start from any state.
     pub fn scatter(&mut self, mut value: impl FnMut() -> f64) {
         let mut next = || F::of(value());
         for chunk in 0..self.steps.len() + self.holes.len() {
