@@ -10,9 +10,10 @@ mod reference;
 
 use std::sync::LazyLock;
 
-use chalumeau_core::haptics::law;
+use chalumeau_core::haptics::torque_law;
 use chalumeau_core::haptics::{
-    FeelDesign, FeelRefused, FeelTable, Order, PlayedReed, Requirement, Requirements, TorqueLimits,
+    FeelDesign, FeelRefused, FeelTable, NoteOrder, NoteRequirement, PlayedReed, RequirementSolver,
+    TorqueLimits,
 };
 use chalumeau_core::instrument::felt::{played_reed, requirements};
 use chalumeau_core::instrument::held::HeldNote;
@@ -21,13 +22,13 @@ use chalumeau_core::instrument::{Model, Settings};
 use chalumeau_core::reed::physical::P_REF_PA;
 use chalumeau_core::reed::{ReedCoeffs, ReedTables};
 use chalumeau_core::units::{Air, WrittenNote};
-use chalumeau_knob::wire::message::Law;
+use chalumeau_knob::wire::message::TorqueLaw;
 use parallel::each;
 
 static MODEL: LazyLock<Model> = LazyLock::new(|| Model::built_in(48_000.0).unwrap());
-static BORE: LazyLock<Requirements> = LazyLock::new(|| requirements(&MODEL));
+static BORE: LazyLock<RequirementSolver> = LazyLock::new(|| requirements(&MODEL));
 
-fn design(law: Law, contrast: f64) -> FeelDesign {
+fn design(law: TorqueLaw, contrast: f64) -> FeelDesign {
     FeelDesign { law, contrast, ..FeelDesign::default() }
 }
 
@@ -43,7 +44,7 @@ fn written(fingering: usize) -> u8 {
 fn physical_feel_is_the_reference_table() {
     let expected = reference::by_written("thresholds_tuned.csv", "gamma_th_zeta0.3");
     let mut worst = 0.0_f64;
-    for law in [Law::Flow, Law::Pressure] {
+    for law in [TorqueLaw::Flow, TorqueLaw::Pressure] {
         let table = table(&design(law, 1.0), &Settings::default()).unwrap();
         let standard = table.reference();
         assert_eq!((table.notes().len(), standard.written), (46, WrittenNote(72)));
@@ -64,12 +65,12 @@ fn physical_feel_is_the_reference_table() {
 }
 
 #[test]
-fn seeds_travel_is_kept_on_the_reference_note() {
-    let flow = table(&design(Law::Flow, 3.0), &Settings::default()).unwrap();
+fn default_travel_is_kept_on_the_reference_note() {
+    let flow = table(&design(TorqueLaw::Flow, 3.0), &Settings::default()).unwrap();
     let a = flow.reference().landmarks;
     assert!((a.a_on_deg - 120.0).abs() < 1e-4 && (a.a_close_deg - 360.0).abs() < 1e-3);
     assert!((flow.reference().feel.stretch - 1.0).abs() < 1e-6);
-    let pressure = table(&design(Law::Pressure, 3.0), &Settings::default()).unwrap();
+    let pressure = table(&design(TorqueLaw::Pressure, 3.0), &Settings::default()).unwrap();
     for note in pressure.notes() {
         assert!((note.landmarks.a_close_deg - 360.0).abs() < 1e-3, "closure does not depend on the note");
     }
@@ -79,7 +80,7 @@ fn seeds_travel_is_kept_on_the_reference_note() {
 #[test]
 fn landmarks_torque_and_pressure_agree_at_any_contrast() {
     let tables = ReedTables::seed();
-    for law in [Law::Flow, Law::Pressure] {
+    for law in [TorqueLaw::Flow, TorqueLaw::Pressure] {
         for contrast in [1.0, 3.0, 5.0] {
             let table = table(&design(law, contrast), &Settings::default()).unwrap();
             for note in table.notes() {
@@ -94,10 +95,10 @@ fn landmarks_torque_and_pressure_agree_at_any_contrast() {
                     assert!((note.map.pressure_pa(angle) / p_close - gamma).abs() < 1e-6, "{}", note.written);
                 }
                 assert!(0.0 < a.a_on_deg && a.a_on_deg <= a.a_beat_deg && a.a_beat_deg < a.a_close_deg);
-                assert!((law::closure_deg(&note.feel) - a.a_close_deg).abs() < 1e-3);
-                if law == Law::Flow {
+                assert!((torque_law::closure_deg(&note.feel) - a.a_close_deg).abs() < 1e-3);
+                if law == TorqueLaw::Flow {
                     // Torque at a twentieth before and behind the threshold is less than on it.
-                    let torque = |share: f64| law::torque_mnm(&note.feel, tables, share * a.a_on_deg);
+                    let torque = |share: f64| torque_law::torque_mnm(&note.feel, tables, share * a.a_on_deg);
                     assert!(torque(1.0) > torque(0.95) && torque(1.0) > torque(1.05));
                     assert!((torque(1.0) / f64::from(note.feel.scale_mnm) - 1.0).abs() < 2e-3);
                 }
@@ -114,7 +115,7 @@ fn spread(table: &FeelTable) -> f64 {
 
 #[test]
 fn contrast_is_a_power_of_the_physical_spread_about_the_reference() {
-    let at = |contrast: f64| table(&design(Law::Flow, contrast), &Settings::default()).unwrap();
+    let at = |contrast: f64| table(&design(TorqueLaw::Flow, contrast), &Settings::default()).unwrap();
     let physical = spread(&at(1.0));
     println!(
         "spread of thresholds: physical {physical:.3}, 3 {:.3}, 5 {:.3}",
@@ -129,12 +130,12 @@ fn contrast_is_a_power_of_the_physical_spread_about_the_reference() {
 
 #[test]
 fn covered_holes_order_notes_by_their_fingers_either_way() {
-    let with = |order: Order| {
-        let design = FeelDesign { order, ..design(Law::Flow, 1.0) };
+    let with = |order: NoteOrder| {
+        let design = FeelDesign { order, ..design(TorqueLaw::Flow, 1.0) };
         table(&design, &Settings::default()).unwrap()
     };
     let (covered, reversed, physical) =
-        (with(Order::CoveredHoles), with(Order::CoveredHolesReversed), with(Order::Physical));
+        (with(NoteOrder::CoveredHoles), with(NoteOrder::CoveredHolesReversed), with(NoteOrder::Physical));
     let lengths: Vec<f64> = BORE.closed_tube_m().collect();
     for (a, (long, felt)) in lengths.iter().zip(covered.notes()).enumerate() {
         for (b, (short, other)) in lengths.iter().zip(covered.notes()).enumerate() {
@@ -216,7 +217,7 @@ fn linear_stability_of_the_moving_reed_is_the_instruments_own() {
     ];
     let runs: Vec<(usize, usize)> =
         (0..reeds.len()).flat_map(|reed| [0, 8, 16, 20, 27, 33, 36].map(|note| (reed, note))).collect();
-    let asked: Vec<Vec<Option<Requirement>>> =
+    let asked: Vec<Vec<Option<NoteRequirement>>> =
         reeds.iter().map(|settings| BORE.with(&played_reed(&MODEL.file, settings))).collect();
     let found = each(&runs, |&(reed, note)| {
         let asked = asked[reed][note].unwrap();
@@ -292,7 +293,7 @@ fn what_is_felt_is_what_sounds() {
         );
     }
     let mut worst = 0.0_f64;
-    for law in [Law::Flow, Law::Pressure] {
+    for law in [TorqueLaw::Flow, TorqueLaw::Pressure] {
         for contrast in [1.0, 3.0, 5.0] {
             let table = table(&design(law, contrast), &Settings::default()).unwrap();
             for (note, &gamma) in table.notes().iter().zip(&heard) {
@@ -388,8 +389,9 @@ fn extinction_is_within_a_tenth_of_the_instruments() {
 
 #[test]
 fn a_reed_in_use_moves_angles_and_keeps_its_own_closure() {
-    let standard = table(&design(Law::Flow, 1.0), &Settings::default()).unwrap();
-    let hard = table(&design(Law::Flow, 1.0), &Settings { strength: 4.0, ..Settings::default() }).unwrap();
+    let standard = table(&design(TorqueLaw::Flow, 1.0), &Settings::default()).unwrap();
+    let hard =
+        table(&design(TorqueLaw::Flow, 1.0), &Settings { strength: 4.0, ..Settings::default() }).unwrap();
     let (soft, hard) = (standard.reference(), hard.reference());
     let closing = Settings { strength: 4.0, ..Settings::default() }.reed_law().closing();
     assert!(hard.landmarks.a_on_deg > 1.6 * soft.landmarks.a_on_deg);
@@ -401,7 +403,7 @@ fn a_reed_in_use_moves_angles_and_keeps_its_own_closure() {
             < 1e-6
     );
     // A firmer embouchure asks less.
-    let firm = table(&design(Law::Flow, 1.0), &Settings { zeta: 0.45, ..Settings::default() }).unwrap();
+    let firm = table(&design(TorqueLaw::Flow, 1.0), &Settings { zeta: 0.45, ..Settings::default() }).unwrap();
     assert!(
         firm.notes().iter().zip(standard.notes()).all(|(a, b)| a.landmarks.a_on_deg < b.landmarks.a_on_deg)
     );
@@ -428,9 +430,9 @@ fn requests_a_knob_cannot_take_are_refused_with_numbers() {
     says(FeelDesign { reference: Some(WrittenNote(20)), ..default }, standard, &["does not sound"]);
     says(default, Settings { reed_a: 0.1, ..standard }, &["too weak"]);
     says(
-        FeelDesign { law: Law::Pressure, contrast: 5.0, ..default },
+        FeelDesign { law: TorqueLaw::Pressure, contrast: 5.0, ..default },
         Settings { zeta: 0.1, ..standard },
-        &["behind closure", "lower Contrast"],
+        &["too near closure", "lower Contrast"],
     );
     let slip = Settings { reed_h: 3.674_234_6, ..standard };
     says(default, slip, &["sqrt(27/2)", "2.598"]);
@@ -447,14 +449,14 @@ fn requests_a_knob_cannot_take_are_refused_with_numbers() {
     let reed = played_reed(&MODEL.file, &standard);
     let flow = FeelTable::new(&BORE, &default, &reed, &gentle);
     assert!(matches!(flow, Err(FeelRefused::Push { .. })));
-    FeelTable::new(&BORE, &design(Law::Pressure, 3.0), &reed, &gentle).unwrap();
+    FeelTable::new(&BORE, &design(TorqueLaw::Pressure, 3.0), &reed, &gentle).unwrap();
 }
 
 /// A knob that is told one note is held to that note's torque, not to the hardest one's.
 #[test]
 fn one_note_may_keep_to_a_ceiling_that_another_passes() {
     let (design, limits) =
-        (design(Law::Flow, 3.0), TorqueLimits { ceiling_mnm: 60.0, ..TorqueLimits::default() });
+        (design(TorqueLaw::Flow, 3.0), TorqueLimits { ceiling_mnm: 60.0, ..TorqueLimits::default() });
     let settings = Settings::default();
     let table = table(&design, &settings).unwrap();
     let hardest = table.notes().len() - 1;
@@ -489,7 +491,7 @@ fn every_allowed_setting_gives_a_feel_or_a_reason() {
             ..Settings::default()
         };
         let design = FeelDesign {
-            law: [Law::Free, Law::Flow, Law::Pressure][run % 3],
+            law: [TorqueLaw::Free, TorqueLaw::Flow, TorqueLaw::Pressure][run % 3],
             contrast: random(1.0, 5.0),
             strength_mnm: random(0.0, 150.0),
             travel_deg: random(120.0, 1_080.0),
@@ -521,7 +523,7 @@ fn every_allowed_setting_gives_a_feel_or_a_reason() {
 fn another_instrument_without_c5_takes_the_middle_of_its_chart() {
     let mut file = MODEL.file.clone();
     file.fingerings.retain(|fingering| fingering.written != WrittenNote(72));
-    let bore = Requirements::new(&file, Air::default());
+    let bore = RequirementSolver::new(&file, Air::default());
     let table = FeelTable::new(
         &bore,
         &FeelDesign::default(),
@@ -556,7 +558,7 @@ mod firmware {
     fn both_laws_are_the_knobs_at_every_index_of_the_table() {
         let standard = *table(&FeelDesign::default(), &Settings::default()).unwrap().reference();
         let (mut worst, mut count) = (0.0_f64, 0);
-        for law in [Law::Free, Law::Flow, Law::Pressure] {
+        for law in [TorqueLaw::Free, TorqueLaw::Flow, TorqueLaw::Pressure] {
             for h in [0.5, 1.0, 2.0, 2.598_076, 3.0, 5.0_f32] {
                 for k in [0.05, 0.2, 0.384_900_2, 0.8, 2.0_f32] {
                     for (offset_deg, detent) in [(0.0, 0), (-40.0, 60), (15.0, 100_u16)] {
@@ -564,7 +566,7 @@ mod firmware {
                         let there = bytes(&feel);
                         for index in -1_500..=4_200 {
                             let angle = 0.1 * f64::from(index);
-                            let here = law::torque_mnm(&feel, ReedTables::seed(), angle);
+                            let here = torque_law::torque_mnm(&feel, ReedTables::seed(), angle);
                             let off = here + f64::from(law_torque_mnm(&there, angle as f32));
                             assert!(off.abs() <= 0.2, "{feel:?} at {angle}: {here}, {off}");
                             (worst, count) = (worst.max(off.abs()), count + 1);
@@ -585,7 +587,7 @@ mod firmware {
         let standard = *table(&FeelDesign::default(), &Settings::default()).unwrap().reference();
         let limits = TorqueLimits::default();
         let (mut taken, mut refused) = (0, 0);
-        for law in [Law::Flow, Law::Pressure] {
+        for law in [TorqueLaw::Flow, TorqueLaw::Pressure] {
             for scale_mnm in [5.0, 40.0, 100.0, 300.0, 450.0_f32] {
                 for stretch in [0.3, 1.0, 3.0, 8.0, 25.0_f32] {
                     for wall_mnm_per_deg in [0.0, 5.0, 13.0, 16.0_f32] {
@@ -601,7 +603,7 @@ mod firmware {
                                 wall_deg,
                                 ..standard.feel
                             };
-                            let extremes = law::extremes(&feel);
+                            let extremes = torque_law::extremes(&feel);
                             let share = (extremes.stiffness_nm_per_rad / limits.stiffness_nm_per_rad)
                                 .max(extremes.push_nm_per_rad / limits.push_nm_per_rad);
                             if (share - 1.0).abs() < 1e-3 || feel.check().is_err() {
@@ -621,7 +623,7 @@ mod firmware {
 
     #[test]
     fn every_note_at_every_contrast_is_accepted_by_the_knob() {
-        for law in [Law::Flow, Law::Pressure] {
+        for law in [TorqueLaw::Flow, TorqueLaw::Pressure] {
             for contrast in [1.0, 3.0, 5.0] {
                 for note in table(&design(law, contrast), &Settings::default()).unwrap().notes() {
                     check_feel(&bytes(&note.feel), DAMPING_NMS).unwrap();
