@@ -3,7 +3,7 @@
 //!
 //! One number describes a note: `r = (P / P_ref)^Contrast`, its required pressure over that of the reference note. The felt
 //! threshold `A_on` is `r` times that of the reference note, and the torque is `r` times as strong. Contrast 1 gives the
-//! physical differences. A higher Contrast exaggerates them, because their true spread (4 to 18 %) is close to the smallest
+//! physical differences. A higher Contrast exaggerates them, because their true spread (4 to 19 %) is close to the smallest
 //! difference that fingers can feel on a knob. Under the flow law the threshold is the peak of the law, so closure lies at
 //! `3 A_on`. Under the pressure law closure is the angle at which the resting reed would shut, the same for every note.
 //!
