@@ -1,9 +1,9 @@
-//! Work on independent items: on all cores with the feature `threads`, one after another without it. Results are the
-//! same either way.
+//! Work on independent items: on all cores with the feature `threads`, one after another without it. The results are the
+//! same in both cases.
 
 use std::ops::ControlFlow;
 
-/// Most threads for the short parts of [`each_part`]: bounds what starting them costs.
+/// Most threads for the short work of [`each_part`]: it limits the cost of starting them.
 #[cfg(feature = "threads")]
 const PARTS_MOST: usize = 8;
 
@@ -12,8 +12,9 @@ fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// `work` for each of `0..count`, results in that order. `on` gets the share done, 0..=1, after each item; when it
-/// breaks, the answer is `None`.
+/// Calls `work` for each of `0..count` and returns the results in that order.
+///
+/// `on` gets the share that is done, 0..=1, after each item. If it breaks, no new item is begun and the answer is `None`.
 #[cfg(feature = "threads")]
 pub fn each<T: Send>(
     count: usize,
@@ -51,8 +52,9 @@ pub fn each<T: Send>(
     found.into_iter().collect()
 }
 
-/// `work` for each of `0..count`, results in that order. `on` gets the share done, 0..=1, after each item; when it
-/// breaks, the answer is `None`.
+/// Calls `work` for each of `0..count` and returns the results in that order.
+///
+/// `on` gets the share that is done, 0..=1, after each item. If it breaks, no new item is begun and the answer is `None`.
 #[cfg(not(feature = "threads"))]
 pub fn each<T: Send>(
     count: usize,
@@ -67,7 +69,13 @@ pub fn each<T: Send>(
         .collect()
 }
 
-/// `work` on each item with its own part of `out`; `width` gives the length of an item's part, in order.
+/// Calls `work` on each item with its own part of `out`.
+///
+/// `width` is the length of an item's part. The parts lie in the order of the items.
+///
+/// # Panics
+///
+/// If `out` is shorter than all parts together.
 pub fn each_part<T: Sync>(
     items: &[T],
     width: impl Fn(&T) -> usize,

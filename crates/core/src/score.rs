@@ -1,175 +1,44 @@
-//! What is to be played: events at sample positions, and how long to listen.
+//! Scores: what to play, and playing it offline.
+//!
+//! A [`Score`] is a list of events at sample positions. It comes from a note, a scale, a MIDI file ([`midi_file`], feature
+//! `midi`) or your own events. A [`BreathCurve`](breath::BreathCurve) gives its mouth pressure. [`play`] renders it block by
+//! block through a [`Clarinet`](crate::instrument::Clarinet); [`play_probed`] also shows the inside of the instrument. A
+//! [`NoteSpan`] says which note is heard when.
+//!
+//! Positions are in samples. Notes in events are sounding pitches; [`Score::scale`] takes written ones. `gamma` is mouth
+//! pressure over closing pressure.
+//!
+//! ```
+//! use chalumeau_core::instrument::{Clarinet, Settings};
+//! use chalumeau_core::score::breath::BreathCurve;
+//! use chalumeau_core::score::{Score, play};
+//! use chalumeau_core::units::WrittenNote;
+//!
+//! const RATE: u32 = 48_000;
+//! let mut clarinet = Clarinet::built_in(f64::from(RATE))?;
+//! // Written E3 to G3 on a B flat clarinet, slurred, 0.2 s each, with a crescendo.
+//! let score = Score::scale(WrittenNote(52), WrittenNote(55), 2, 0.2, true, RATE)?;
+//! let score = score.blown(&BreathCurve::parse_crescendo("0.45:0.8")?, &Settings::default(), RATE);
+//!
+//! let mut samples = Vec::new();
+//! play(&mut clarinet, &score, 512, |block| {
+//!     samples.extend_from_slice(block);
+//!     Ok::<_, std::convert::Infallible>(())
+//! })?;
+//! assert_eq!(samples.len(), score.samples);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
-pub mod bifurcation;
 pub mod breath;
-pub mod heard;
 #[cfg(feature = "midi")]
 pub mod midi_file;
-pub mod orbit;
+mod note_spans;
 mod play;
+mod samples;
+mod timeline;
 
+pub use breath::{breath_of_gamma, closing_kpa};
+pub use note_spans::NoteSpan;
 pub use play::{play, play_probed};
-
-use crate::event::{Event, Timed};
-use crate::instrument::Settings;
-use crate::score::breath::BreathCurve;
-use crate::units::{SoundingNote, WrittenNote};
-
-/// Silence before a tongued note of a scale, s: the time a tongue takes to touch the reed and leave again, by ear.
-const TONGUE_GAP_S: f64 = 0.03;
-
-/// Tongue of a note that no keyboard has struck, 0..=1.
-const PLAIN_VELOCITY: f32 = 0.8;
-
-/// Events in order of time, at one sample rate.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Score {
-    /// In order of time; positions in samples from the start.
-    pub events: Vec<Timed<Event>>,
-    /// Length of the whole, with the time to fade; samples.
-    pub samples: usize,
-}
-
-/// What cannot be played.
-#[derive(Debug, thiserror::Error, PartialEq)]
-pub enum ScoreError {
-    /// A transposing instrument has no such sounding note.
-    #[error("written note {0} sounds outside MIDI's 0..127; choose one nearer the middle")]
-    OutsideMidi(WrittenNote),
-}
-
-/// Breath that gives a mouth pressure of `gamma` closing pressures, 0..=1 of full breath.
-pub fn breath_of_gamma(gamma: f32, settings: &Settings) -> f32 {
-    gamma * closing_kpa(settings) / settings.breath_full_kpa
-}
-
-/// Pressure that shuts the reed of these settings, kPa.
-pub fn closing_kpa(settings: &Settings) -> f32 {
-    (1e-3 * settings.closing_pa()) as f32
-}
-
-impl Score {
-    /// One note from the start, held for `seconds`.
-    pub fn note(note: SoundingNote, seconds: f64, rate: u32) -> Self {
-        let end = samples_in(seconds, rate);
-        let events = vec![
-            Timed { at: 0, event: Event::NoteOn { note, velocity: PLAIN_VELOCITY } },
-            Timed { at: end, event: Event::NoteOff { note } },
-        ];
-        Self { events, samples: end }
-    }
-
-    /// Every semitone from one written note to another, up or down, each lasting `seconds`; tongued or slurred.
-    pub fn scale(
-        from: WrittenNote,
-        to: WrittenNote,
-        transposition: i8,
-        seconds: f64,
-        slurred: bool,
-        rate: u32,
-    ) -> Result<Self, ScoreError> {
-        let semitones: Vec<u8> =
-            if from <= to { (from.0..=to.0).collect() } else { (to.0..=from.0).rev().collect() };
-        let gap_s = if slurred { 0.0 } else { TONGUE_GAP_S.min(seconds / 4.0) };
-        let (mut events, mut end, mut last) = (Vec::new(), 0, None);
-        for (index, written) in semitones.into_iter().map(WrittenNote).enumerate() {
-            let note = written.sounding(transposition).ok_or(ScoreError::OutsideMidi(written))?;
-            let start = samples_in(index as f64 * seconds, rate);
-            events.push(Timed { at: start, event: Event::NoteOn { note, velocity: PLAIN_VELOCITY } });
-            if let Some(note) = last.filter(|_| slurred) {
-                // After the next key is down: fingers change while the reed keeps going.
-                events.push(Timed { at: start, event: Event::NoteOff { note } });
-            }
-            end = samples_in((index + 1) as f64 * seconds, rate);
-            if !slurred {
-                let up = samples_in((index + 1) as f64 * seconds - gap_s, rate);
-                events.push(Timed { at: up, event: Event::NoteOff { note } });
-            }
-            last = Some(note);
-        }
-        if let Some(note) = last.filter(|_| slurred) {
-            events.push(Timed { at: end, event: Event::NoteOff { note } });
-        }
-        Ok(Self { events, samples: end })
-    }
-
-    /// The same notes blown by `curve` instead of whatever breath the score had.
-    pub fn blown(mut self, curve: &BreathCurve, settings: &Settings, rate: u32) -> Self {
-        self.events.retain(|e| !matches!(e.event, Event::Breath(_)));
-        let mut events = curve.events(self.samples, rate, settings);
-        events.append(&mut self.events);
-        // Stable: of two things at one sample, breath comes first, so that a tongue finds pressure behind it.
-        events.sort_by_key(|e| e.at);
-        Self { events, samples: self.samples }
-    }
-
-    /// The same score with time to fade after its end.
-    pub fn with_tail(mut self, seconds: f64, rate: u32) -> Self {
-        self.samples = self.samples.saturating_add(samples_in(seconds, rate));
-        self
-    }
-
-    /// Length, s.
-    pub fn seconds(&self, rate: u32) -> f64 {
-        self.samples as f64 / f64::from(rate)
-    }
-}
-
-/// Nearest sample to a time; a negative time is the start.
-pub fn samples_in(seconds: f64, rate: u32) -> usize {
-    (seconds * f64::from(rate)).round().max(0.0) as usize
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn reference_breath_is_gamma() {
-        let settings = Settings::default();
-        assert!((breath_of_gamma(0.5, &settings) - 0.5).abs() < 1e-6);
-        let wide = Settings { breath_full_kpa: 12.0, ..settings };
-        assert!((breath_of_gamma(1.5, &wide) - 0.75).abs() < 1e-6);
-        let hard = Settings { strength: 3.5, ..settings };
-        assert!((closing_kpa(&hard) - 6.0 * 1.44).abs() < 1e-4);
-    }
-
-    #[test]
-    fn breath_comes_before_the_note_it_carries() {
-        let score = Score::note(SoundingNote(60), 1.0, 48_000).blown(
-            &BreathCurve::constant(0.5),
-            &Settings::default(),
-            48_000,
-        );
-        assert!(matches!(score.events[0].event, Event::Breath(breath) if (breath - 0.5).abs() < 1e-6));
-        assert!(matches!(score.events[1].event, Event::NoteOn { .. }));
-        assert_eq!((score.events.len(), score.samples), (3, 48_000));
-    }
-
-    #[test]
-    fn slurred_notes_overlap_and_tongued_ones_do_not() {
-        for slurred in [false, true] {
-            let scale = Score::scale(WrittenNote(52), WrittenNote(64), 2, 0.25, slurred, 48_000).unwrap();
-            let (mut held, mut empty) = (0, 0);
-            for event in &scale.events[..scale.events.len() - 1] {
-                match event.event {
-                    Event::NoteOn { .. } => held += 1,
-                    Event::NoteOff { .. } => held -= 1,
-                    _ => {}
-                }
-                empty += u32::from(held == 0);
-            }
-            assert_eq!(empty, if slurred { 0 } else { 12 });
-            assert_eq!(scale.events.len(), 26);
-            assert_eq!(scale.samples, 13 * 12_000);
-            assert!(scale.events.is_sorted_by_key(|e| e.at));
-        }
-    }
-
-    #[test]
-    fn a_scale_can_fall() {
-        let scale = Score::scale(WrittenNote(64), WrittenNote(52), 2, 0.1, true, 48_000).unwrap();
-        assert!(matches!(scale.events[0].event, Event::NoteOn { note: SoundingNote(62), .. }));
-        assert!(Score::scale(WrittenNote(0), WrittenNote(5), 2, 0.1, true, 48_000).is_err());
-    }
-}
+pub use samples::samples_in;
+pub use timeline::{Score, ScoreError};

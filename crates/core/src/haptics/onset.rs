@@ -1,59 +1,61 @@
-//! Onset with the reed as it moves: linear stability of the bore behind a resonant, damped reed.
+//! Onset with a moving reed: linear stability of a bore driven by a reed with resonance and damping.
 //!
-//! Small oscillations `exp(j w t)` about the steady state at pressure difference P (over the closing pressure): the
-//! channel gives `F_p + F_x D` per unit of pressure difference, with `F_p` from Bernoulli at fixed opening, `F_x` from
-//! the opening at fixed pressure and `D = 1 / (1 - (w/w_r)^2 + j q w/w_r)` the reed's own answer; its motion displaces
-//! `j w V D` on top. The note neither grows nor dies where
+//! Consider a small oscillation `exp(j w t)` about the steady state at the pressure difference P (over the closing
+//! pressure). Per unit of pressure difference, the flow through the channel is `F_p + F_x D`. `F_p` follows from Bernoulli
+//! at a fixed opening, `F_x` from the opening at a fixed pressure, and `D = 1 / (1 - (w/w_r)^2 + j q w/w_r)` is the response
+//! of the reed. The motion of the reed adds the flow `j w V D`. The oscillation neither grows nor decays where
 //!
 //! ```text
 //! Y(w) + zeta [B / (2 sqrt(P)) - sqrt(P) B' D(w)] + j w s D(w) = 0       B: opening at P, B' = -dB/dP, s = V / (S c)
 //! ```
 //!
-//! Two real equations for w and P, solved by Newton's method from every resonance of the bore. (Wilson & Beavers 1974 is
-//! the source of the problem; the equations are written down here for the reed of `reed::motion`.) Above the reed's
-//! resonance nothing starts; below it the reed's phase helps, so that high notes start earlier than a reed without
-//! inertia would.
+//! These are two real equations for w and P. Newton's method solves them, starting from every resonance of the bore. The
+//! problem is that of Wilson & Beavers (1974), written here for the reed of `reed::motion`. Above the resonance of the reed
+//! no oscillation starts. Below it the phase of the reed helps, so that high notes start earlier than with a reed without
+//! inertia.
 //!
-//! A lattice moves its reed in samples of length T. With `z = exp(j w T)`, `d = 1 / (1 + q w_r T)`, `A = d (T w_r)^2`:
-//! `D = A z / ((z - 1)(z - d) + A z)` and `(1 - 1/z) / T` for `j w`, which is worth 1 % at 1 kHz and 5 % at 1.8 kHz.
+//! The lattice moves its reed in samples of length T. With `z = exp(j w T)`, `d = 1 / (1 + q w_r T)`, `A = d (T w_r)^2`, its
+//! response is `D = A z / ((z - 1)(z - d) + A z)`, and `(1 - 1/z) / T` takes the place of `j w`. The difference is 1 % at
+//! 1 kHz and 5 % at 1.8 kHz.
 //!
-//! Left out: the loss of jets in holes, which is second order in amplitude once the steady flow has found its way out
-//! of the bell.
+//! The loss of jets in open holes is left out: once the steady flow leaves through the bell, it is of second order in the
+//! amplitude.
 
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
 use crate::bore::transfer_matrix::threshold_gamma;
-use crate::haptics::requirement::{Grid, Lip};
+use crate::haptics::admittance::AdmittanceGrid;
+use crate::haptics::played_reed::Lip;
 
-/// Newton steps at most; ten are plenty where there is a solution.
+/// Most Newton steps. Where there is a solution, ten are enough.
 const STEPS: usize = 60;
-/// Longest step, over the value: keeps a bad slope from leaving for another mode at once.
+/// Longest Newton step, over the value. It keeps one bad slope from jumping to another mode.
 const LONGEST: f64 = 0.02;
-/// The search begins at the onset without inertia, but not above this, and a second time here: far below, where
-/// the reed's resonance carries the mode.
+/// The search begins at the onset without inertia, but at most at the first value. It begins again at the second value,
+/// far below, where a mode near the resonance of the reed starts.
 const START: (f64, f64) = (0.9, 0.35);
-/// The search for the upper end of the unstable range begins at this share of the lay's knee beyond closure.
+/// The search for the upper end of the unstable range begins beyond closure, by this share of the lay's half-width.
 const SHUT: f64 = 0.8;
-/// The reed's resonance is kept this far below the sample rate, as `reed::motion` keeps it.
+/// Highest resonance of the reed over the sample rate, as in `reed::motion`.
 const RESONANCE_TO_RATE: f64 = 0.15;
 
-/// What the reed is like, over its own closing pressure.
-pub(super) struct Reed {
-    /// Flow strength of this reed.
+/// The reed, with pressures over its own closing pressure.
+pub(super) struct MovingReed {
+    /// Embouchure parameter of this reed.
     pub(super) zeta: f64,
-    /// Half-width of the lay's knee.
+    /// Half-width of the rounded part of the lay.
     pub(super) lay: f64,
     /// Resonance and damping.
     pub(super) lip: Lip,
-    /// Flow by its motion, s.
+    /// Flow made by its motion, per speed, s.
     pub(super) swept_s: f64,
-    /// Rate at which it moves, Hz; `None`: continuously.
+    /// Sample rate at which it moves, Hz; `None` if it moves continuously.
     pub(super) rate_hz: Option<f64>,
 }
 
-impl Reed {
-    /// Opening at a steady pressure difference and how fast it closes.
+impl MovingReed {
+    /// Opening at a steady pressure difference, and minus its slope.
     fn opening(&self, gamma: f64) -> (f64, f64) {
         let gap = 1.0 - gamma;
         if gap >= self.lay {
@@ -64,8 +66,8 @@ impl Reed {
         }
     }
 
-    /// How the reed follows a pressure difference, and the factor of its speed.
-    fn answer(&self, f_hz: f64) -> (Complex64, Complex64) {
+    /// Response of the reed to a pressure difference, and the factor that turns a position into a speed, 1/s.
+    fn response(&self, f_hz: f64) -> (Complex64, Complex64) {
         let Lip { resonance_hz, damping } = self.lip;
         match self.rate_hz {
             None => {
@@ -82,31 +84,35 @@ impl Reed {
         }
     }
 
-    /// Admittance of bore and reed together; zero at an onset.
-    fn balance(&self, grid: &Grid, f_hz: f64, gamma: f64) -> Option<Complex64> {
-        let (answer, speed) = self.answer(f_hz);
+    /// Admittance of bore and reed together, which is zero at an onset; `None` outside the grid.
+    fn balance(&self, grid: &AdmittanceGrid, f_hz: f64, gamma: f64) -> Option<Complex64> {
+        let (response, speed) = self.response(f_hz);
         let (opening, closing) = self.opening(gamma);
         let root = gamma.sqrt();
-        let channel = self.zeta * (opening / (2.0 * root) - root * closing * answer);
-        Some(grid.at(f_hz)? + channel + self.swept_s * speed * answer)
+        let channel = self.zeta * (opening / (2.0 * root) - root * closing * response);
+        Some(grid.at(f_hz)? + channel + self.swept_s * speed * response)
     }
 }
 
-/// Every `(gamma, frequency in Hz)` at which a small oscillation neither grows nor dies, one or two for each resonance.
-pub(super) fn onsets<'a>(grid: &'a Grid, reed: &'a Reed) -> impl Iterator<Item = (f64, f64)> + 'a {
+/// Every `(gamma, frequency in Hz)` at which a small oscillation neither grows nor decays: at most two for each resonance.
+pub(super) fn onsets<'a>(
+    grid: &'a AdmittanceGrid,
+    reed: &'a MovingReed,
+) -> impl Iterator<Item = (f64, f64)> + 'a {
     grid.modes(reed.swept_s).flat_map(move |(f_hz, height)| {
         let without_inertia = threshold_gamma(height, reed.zeta).min(START.0);
         [without_inertia, START.1].into_iter().filter_map(move |gamma| onset(grid, reed, f_hz, gamma))
     })
 }
 
-/// Where the steady state, blown nearly shut on the curve of the lay, becomes stable again: `gamma` and frequency, from a
-/// mode near `f_hz`. `None` on a sharp lay, where that is closure itself.
-pub(super) fn shut(grid: &Grid, reed: &Reed, f_hz: f64) -> Option<(f64, f64)> {
+/// `(gamma, frequency in Hz)` at which the steady state becomes stable again, with the reed nearly shut on the curve of the
+/// lay; the search starts at `f_hz`. `None` on a sharp lay, where it becomes stable at closure.
+pub(super) fn shut(grid: &AdmittanceGrid, reed: &MovingReed, f_hz: f64) -> Option<(f64, f64)> {
     onset(grid, reed, f_hz, 1.0 + SHUT * reed.lay).filter(|&(gamma, _)| gamma > 1.0)
 }
 
-fn onset(grid: &Grid, reed: &Reed, mut f_hz: f64, mut gamma: f64) -> Option<(f64, f64)> {
+/// One onset, by Newton's method from a first guess; `None` if the search finds none.
+fn onset(grid: &AdmittanceGrid, reed: &MovingReed, mut f_hz: f64, mut gamma: f64) -> Option<(f64, f64)> {
     for _ in 0..STEPS {
         let off = reed.balance(grid, f_hz, gamma)?;
         let (df, dg) = (1e-4 * f_hz, 1e-4 * gamma);

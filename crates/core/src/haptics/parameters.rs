@@ -1,9 +1,9 @@
 //! The parameters that shape a knob's torque, one set for each note, and the range of each.
 //!
 //! The knob computes its torque from these; `docs/protocol.md` specifies the same fields as bytes. Ranges are compared in
-//! binary32, as the firmware does, so that both ends agree about the last bit.
+//! binary32, as the firmware does, so that both ends agree to the last bit.
 
-/// Closed range of one field.
+/// Range of one field, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldRange {
     /// Name of the field in `docs/protocol.md`.
@@ -20,7 +20,7 @@ pub struct FieldRange {
 pub struct OutOfRange {
     /// Name of the field in `docs/protocol.md`.
     pub field: &'static str,
-    /// What was given.
+    /// The value given.
     pub value: f32,
     /// Least value allowed.
     pub low: f32,
@@ -34,12 +34,12 @@ impl FieldRange {
         Self { field, low, high }
     }
 
-    /// Whether `value` may be sent; what is not a number may not.
+    /// Whether `value` lies in the range. NaN does not.
     pub fn contains(self, value: f32) -> bool {
         (self.low..=self.high).contains(&value)
     }
 
-    /// `value` itself, or why it is refused.
+    /// Refuses a `value` outside the range.
     pub fn check(self, value: f32) -> Result<(), OutOfRange> {
         let Self { field, low, high } = self;
         if self.contains(value) { Ok(()) } else { Err(OutOfRange { field, value, low, high }) }
@@ -49,40 +49,40 @@ impl FieldRange {
 /// Which torque law the knob follows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
-pub enum Law {
+pub enum TorqueLaw {
     /// No torque but friction and damping.
     #[default]
     Free = 0,
-    /// The seed's flow: rises to the threshold, falls to nothing at closure.
+    /// The flow of the reference notebook: rises to the threshold, falls to zero at closure.
     Flow = 1,
-    /// A spring with a step at the threshold: easy to hold.
+    /// A spring with a step at the threshold. A hand holds an angle more easily than under the flow law.
     Pressure = 2,
 }
 
-/// The whole state of the feel.
+/// The feel of one note, as it is sent to the knob. [`torque_law`](crate::haptics::torque_law) gives its torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Feel {
-    /// Echoed by STATE once accepted.
+    /// Number of this feel; the knob repeats it in STATE once it has accepted the feel.
     pub feel_id: u8,
     /// Torque law.
-    pub law: Law,
-    /// Time in which the old torque gives way to the new, ms, 20..=1000.
+    pub law: TorqueLaw,
+    /// Time in which the torque changes from the old feel to this one, ms, 20..=1000.
     pub morph_ms: u16,
-    /// The seed's H, rest opening, 0.5..=10.
+    /// Rest opening H of the reference law, 0.5..=10.
     pub h: f32,
-    /// The seed's k, stiffness, 0.01..=20.
+    /// Stiffness k of the reference law, 0.01..=20.
     pub k: f32,
     /// Torque per unit of flow (flow law) or at closure (pressure law), mNm, 0..=450.
     pub scale_mnm: f32,
-    /// Closure of H k = 1 lies at 360 / stretch degrees; 0.1..=30.
+    /// Scale of the angle, 0.1..=30: with H k = 1 the law closes at 360 / stretch degrees.
     pub stretch: f32,
-    /// Where the law's origin lies, degrees, -360..=360.
+    /// Angle of the origin of the law, degrees, -360..=360.
     pub offset_deg: f32,
-    /// Felt threshold, degrees, 0..=3600.
+    /// Felt threshold, where the sound starts, degrees, 0..=3600.
     pub a_on_deg: f32,
     /// Felt extinction, degrees, 0..=36000.
     pub a_off_deg: f32,
-    /// Where the reed begins to beat, degrees, 0..=3600.
+    /// Angle at which the reed begins to beat, degrees, 0..=3600.
     pub a_beat_deg: f32,
     /// End wall, degrees, 10..=36000.
     pub wall_deg: f32,
@@ -90,7 +90,7 @@ pub struct Feel {
     pub wall_mnm_per_deg: f32,
     /// Spring of the slap region below -100 degrees, mNm per degree, 0..=20.
     pub slap_mnm_per_deg: f32,
-    /// Damping on top of the knob's own, mNm s/rad, 0..=20.
+    /// Damping in addition to the knob's own, mNm s/rad, 0..=20.
     pub damping_mnms: f32,
     /// Smooth Coulomb friction, 0.1 mNm, 0..=1000.
     pub friction: u16,
@@ -98,13 +98,13 @@ pub struct Feel {
     pub detent: u16,
 }
 
-/// No torque: law free, no friction, walls without stiffness. H and k are the seed's (H k = 1), landmarks those of its
-/// lossless reed on one turn: threshold at a third of the closing angle, beating from its half.
+/// No torque: law free, no friction, walls without stiffness. H and k are those of the reference (H k = 1). The landmarks
+/// are those of a lossless reed on one turn: threshold at a third of the closing angle, beating from half of it.
 impl Default for Feel {
     fn default() -> Self {
         Self {
             feel_id: 0,
-            law: Law::Free,
+            law: TorqueLaw::Free,
             morph_ms: 50,
             h: 2.598_076,
             k: 0.384_900_18,
@@ -125,7 +125,8 @@ impl Default for Feel {
 }
 
 impl Feel {
-    /// Whether every field lies in its range, H k among them. A device refuses more: slopes and its own ceiling.
+    /// Refuses a feel with a field, or a product H k, outside its range. A device also refuses slopes that are too steep and
+    /// torque above its own ceiling; see [`torque_law::extremes`](crate::haptics::torque_law::extremes).
     pub fn check(&self) -> Result<(), OutOfRange> {
         MORPH_MS.check(self.morph_ms.into())?;
         H.check(self.h)?;
@@ -146,17 +147,17 @@ impl Feel {
     }
 }
 
-/// Time of a morph, ms.
+/// Time in which the torque changes from one feel to the next, ms.
 pub const MORPH_MS: FieldRange = FieldRange::new("morph_ms", 20.0, 1_000.0);
-/// Rest opening, the seed's H.
+/// Rest opening H of the reference law.
 pub const H: FieldRange = FieldRange::new("h", 0.5, 10.0);
-/// Stiffness, the seed's k.
+/// Stiffness k of the reference law.
 pub const K: FieldRange = FieldRange::new("k", 0.01, 20.0);
-/// Product H k; its lower end follows from those of H and k.
+/// Product H k. The ranges of H and k imply its lower end.
 pub const H_K: FieldRange = FieldRange::new("h*k", 0.0, 10.0);
-/// Torque per unit of the law, mNm.
+/// Torque per unit of flow (flow law) or at closure (pressure law), mNm.
 pub const SCALE_MNM: FieldRange = FieldRange::new("scale_mnm", 0.0, 450.0);
-/// TorqueTuner's Stretch.
+/// Scale of the angle, TorqueTuner's Stretch.
 pub const STRETCH: FieldRange = FieldRange::new("stretch", 0.1, 30.0);
 /// Origin of the law, degrees.
 pub const OFFSET_DEG: FieldRange = FieldRange::new("offset_deg", -360.0, 360.0);
@@ -164,7 +165,7 @@ pub const OFFSET_DEG: FieldRange = FieldRange::new("offset_deg", -360.0, 360.0);
 pub const A_ON_DEG: FieldRange = FieldRange::new("a_on_deg", 0.0, 3_600.0);
 /// Felt extinction, degrees.
 pub const A_OFF_DEG: FieldRange = FieldRange::new("a_off_deg", 0.0, 36_000.0);
-/// Beginning of beating, degrees.
+/// Angle at which the reed begins to beat, degrees.
 pub const A_BEAT_DEG: FieldRange = FieldRange::new("a_beat_deg", 0.0, 3_600.0);
 /// End wall, degrees.
 pub const WALL_DEG: FieldRange = FieldRange::new("wall_deg", 10.0, 36_000.0);
@@ -172,12 +173,13 @@ pub const WALL_DEG: FieldRange = FieldRange::new("wall_deg", 10.0, 36_000.0);
 pub const WALL_MNM_PER_DEG: FieldRange = FieldRange::new("wall_mnm_per_deg", 0.0, 100.0);
 /// Spring of the slap region, mNm per degree.
 pub const SLAP_MNM_PER_DEG: FieldRange = FieldRange::new("slap_mnm_per_deg", 0.0, 20.0);
-/// Damping, mNm s/rad.
+/// Damping in addition to the knob's own, mNm s/rad.
 pub const DAMPING_MNMS: FieldRange = FieldRange::new("damping_mnms", 0.0, 20.0);
-/// Coulomb friction, 0.1 mNm.
+/// Smooth Coulomb friction, 0.1 mNm.
 pub const FRICTION: FieldRange = FieldRange::new("friction", 0.0, 1_000.0);
-/// Mark or step at the threshold, 0.1 mNm.
+/// Height of the mark (flow law) or step (pressure law) at the threshold, 0.1 mNm.
 pub const DETENT: FieldRange = FieldRange::new("detent", 0.0, 1_000.0);
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -211,7 +213,7 @@ mod tests {
     fn feel_at_rest_is_allowed_and_makes_no_torque() {
         let feel = Feel::default();
         assert_eq!(feel.check(), Ok(()));
-        assert_eq!((feel.law, feel.scale_mnm, feel.wall_mnm_per_deg), (Law::Free, 0.0, 0.0));
+        assert_eq!((feel.law, feel.scale_mnm, feel.wall_mnm_per_deg), (TorqueLaw::Free, 0.0, 0.0));
         assert!((feel.h * feel.k - 1.0).abs() < 1e-6);
     }
 

@@ -1,43 +1,43 @@
-//! Mouth pressure over time, in closing pressures (gamma), drawn as straight lines between points.
+//! Mouth pressure over time: gamma, mouth pressure over closing pressure, with straight lines between points.
 //!
-//! Sources: a constant, a ramp, a crescendo over the whole score, or a CSV file `t_s,gamma`. Before the first point and
-//! after the last one pressure holds. The curve reaches the instrument as a breath event every millisecond while it
-//! moves, finer than any controller; the instrument smooths what is between.
+//! A curve is a constant, a ramp, a crescendo over the whole score, or a CSV file `t_s,gamma`. The pressure is constant
+//! before the first point and after the last one. While the curve moves, it reaches the instrument as one breath event per
+//! millisecond, finer than any controller; the instrument smooths between them.
 
 use crate::event::{Event, Timed};
 use crate::instrument::Settings;
-use crate::score;
+use crate::score::samples::samples_in;
 use std::io;
 use std::io::{BufRead, BufReader};
 
-/// Largest mouth pressure the renderer takes, closing pressures. The instrument is tested up to here.
+/// Largest gamma of a breath curve. The instrument is tested up to here.
 pub const GAMMA_MAX: f32 = 3.0;
 
-/// Largest breath file, points: a day at one point per millisecond would be 86 million, an hour is enough.
+/// Most points of a breath file: one hour at one point per millisecond.
 const POINTS_MAX: usize = 3_600_000;
 
 /// Time between breath events while the curve moves, s.
 const STEP_S: f64 = 0.001;
 
-/// Why a breath curve was refused. Lines are counted from 1.
+/// Why a breath curve was refused. Lines are counted from 1; the messages say what would be right.
 #[derive(Debug, thiserror::Error)]
 pub enum BreathError {
-    /// Outside what the instrument can take.
+    /// A gamma outside 0 to 3.
     #[error("gamma must lie in 0..3 (mouth pressure over closing pressure), got {0}")]
     Gamma(f32),
-    /// A shape in words that is none.
+    /// A text that is no ramp.
     #[error("breath {0:?} is neither a CSV file nor ramp:FROM:TO:SECONDS, for example ramp:0:1:4")]
     Shape(String),
-    /// A crescendo in words that is none.
+    /// A text that is no crescendo.
     #[error("crescendo must be FROM:TO, for example 0.4:0.9, got {0:?}")]
     Crescendo(String),
-    /// A duration that is none.
+    /// A duration outside 0 s to a day.
     #[error("a ramp lasts more than 0 s and at most a day, got {0:?}")]
     Seconds(String),
     /// The file cannot be read.
     #[error("{0}")]
     Read(#[from] io::Error),
-    /// A line without two columns.
+    /// A line that has not two columns.
     #[error("line {line}: expected two columns t_s,gamma, got {given:?}")]
     Columns {
         /// Line in the file.
@@ -45,7 +45,7 @@ pub enum BreathError {
         /// The line as it stands.
         given: String,
     },
-    /// A field that is no number.
+    /// A field that is not a finite number.
     #[error("line {line}: {column} must be a number, got {given:?}")]
     Number {
         /// Line in the file.
@@ -55,7 +55,7 @@ pub enum BreathError {
         /// The field as it stands.
         given: String,
     },
-    /// Time that is negative or does not advance.
+    /// A time that is negative or not later than that of the line before.
     #[error(
         "line {line}: t_s must grow from line to line and start at 0 or later, got {given} after {before}"
     )]
@@ -67,28 +67,28 @@ pub enum BreathError {
         /// Time of the line before, s.
         before: f64,
     },
-    /// Pressure outside the range.
+    /// A gamma outside 0 to 3 in a file.
     #[error("line {line}: gamma must lie in 0..3 (mouth pressure over closing pressure), got {given}")]
     LineGamma {
         /// Line in the file.
         line: u64,
-        /// The pressure as it stands.
+        /// The gamma as it stands.
         given: f32,
     },
-    /// Nothing to blow.
+    /// A file without points.
     #[error("no data: expected lines t_s,gamma, for example 0.0,0.5")]
     Empty,
-    /// Longer than anyone blows.
+    /// A file with too many points.
     #[error("more than {POINTS_MAX} points; one per millisecond is enough")]
     TooLong,
 }
 
-/// Gamma over time.
+/// Gamma over time: mouth pressure over closing pressure, 0 to 3.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BreathCurve {
     /// Time in s, strictly growing, and gamma 0..=3. Never empty.
     points: Vec<(f64, f32)>,
-    /// Time is a fraction of the score instead of seconds.
+    /// Whether time is a fraction of the score instead of seconds.
     relative: bool,
 }
 
@@ -96,8 +96,19 @@ fn gamma(gamma: f32) -> Result<f32, BreathError> {
     if (0.0..=GAMMA_MAX).contains(&gamma) { Ok(gamma) } else { Err(BreathError::Gamma(gamma)) }
 }
 
+/// The value of [`Event::Breath`] that gives a mouth pressure of `gamma` times the closing pressure. It exceeds 1 if full
+/// breath does not reach that pressure.
+pub fn breath_of_gamma(gamma: f32, settings: &Settings) -> f32 {
+    gamma * closing_kpa(settings) / settings.breath_full_kpa
+}
+
+/// Closing pressure of the reed with these settings, kPa.
+pub fn closing_kpa(settings: &Settings) -> f32 {
+    (1e-3 * settings.closing_pa()) as f32
+}
+
 impl BreathCurve {
-    /// The same pressure all the time, clamped to 0..=3.
+    /// The same gamma all the time, clamped to 0..=3.
     pub fn constant(gamma: f32) -> Self {
         Self { points: vec![(0.0, gamma.clamp(0.0, GAMMA_MAX))], relative: false }
     }
@@ -108,7 +119,11 @@ impl BreathCurve {
         Self { points: vec![(0.0, 0.0), top, (2.0 * seconds, 0.0)], relative: false }
     }
 
-    /// `FROM:TO` over the whole score.
+    /// A crescendo or diminuendo `FROM:TO` in gamma, over the whole score.
+    ///
+    /// # Errors
+    ///
+    /// [`BreathError::Crescendo`] for any other text, [`BreathError::Gamma`] for a value outside 0..=3.
     pub fn parse_crescendo(text: &str) -> Result<Self, BreathError> {
         let bad = || BreathError::Crescendo(text.to_owned());
         let (from, to) = text.split_once(':').ok_or_else(bad)?;
@@ -116,7 +131,12 @@ impl BreathCurve {
         Ok(Self { points: vec![(0.0, gamma(number(from)?)?), (1.0, gamma(number(to)?)?)], relative: true })
     }
 
-    /// `ramp:FROM:TO:SECONDS`, then held; a trailing `s` is allowed.
+    /// A ramp `ramp:FROM:TO:SECONDS` in gamma, then constant. An `s` after the seconds is allowed.
+    ///
+    /// # Errors
+    ///
+    /// [`BreathError::Shape`] for any other text, [`BreathError::Seconds`] for a duration outside 0 s to a day,
+    /// [`BreathError::Gamma`] for a value outside 0..=3.
     pub fn parse_ramp(text: &str) -> Result<Self, BreathError> {
         let bad = || BreathError::Shape(text.to_owned());
         let fields: Vec<&str> =
@@ -135,11 +155,15 @@ impl BreathCurve {
         })
     }
 
-    /// Lines `t_s,gamma`; the header line may be there, `#` begins a comment line.
+    /// Reads lines `t_s,gamma`. A header line `t_s,gamma` may come first; `#` begins a comment line.
+    ///
+    /// # Errors
+    ///
+    /// [`BreathError`] with the number of the first line that is wrong, or what the reader reports.
     pub fn read_csv(from: impl io::Read) -> Result<Self, BreathError> {
         let mut points: Vec<(f64, f32)> = Vec::new();
         let mut first = true;
-        // Two plain numbers need no quoting, and counting lines ourselves counts empty ones and comments too.
+        // Two plain numbers need no quoting. Counted here, line numbers include empty lines and comments.
         for (text, line) in BufReader::new(from).split(b'\n').zip(1..) {
             let text = text?;
             let text = String::from_utf8_lossy(&text);
@@ -174,12 +198,12 @@ impl BreathCurve {
         if points.is_empty() { Err(BreathError::Empty) } else { Ok(Self { points, relative: false }) }
     }
 
-    /// The hardest blow, closing pressures.
+    /// The largest gamma of the curve.
     pub fn gamma_max(&self) -> f32 {
         self.points.iter().fold(0.0, |max, p| max.max(p.1))
     }
 
-    /// Pressure at `t`, in seconds (or as a fraction of the score).
+    /// Gamma at `t`, in seconds or as a fraction of the score.
     fn at(&self, t: f64) -> f32 {
         let after = self.points.partition_point(|p| p.0 <= t);
         match (after.checked_sub(1).map(|i| self.points[i]), self.points.get(after)) {
@@ -191,19 +215,19 @@ impl BreathCurve {
         }
     }
 
-    /// Breath events for a score of `samples`.
+    /// Breath events for a score that lasts `samples`.
     pub(super) fn events(&self, samples: usize, rate: u32, settings: &Settings) -> Vec<Timed<Event>> {
         let unit = if self.relative { (samples as f64 / f64::from(rate)).max(STEP_S) } else { 1.0 };
         let mut events: Vec<Timed<Event>> = Vec::new();
         let mut last = None;
         for step in 0.. {
-            let at = score::samples_in(f64::from(step) * STEP_S, rate);
+            let at = samples_in(f64::from(step) * STEP_S, rate);
             if step > 0 && at >= samples {
                 break;
             }
             let gamma = self.at(at as f64 / f64::from(rate) / unit);
             if last.replace(gamma) != Some(gamma) {
-                events.push(Timed { at, event: Event::Breath(score::breath_of_gamma(gamma, settings)) });
+                events.push(Timed { at, event: Event::Breath(breath_of_gamma(gamma, settings)) });
             }
         }
         events
@@ -213,6 +237,16 @@ impl BreathCurve {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn reference_breath_is_gamma() {
+        let settings = Settings::default();
+        assert!((breath_of_gamma(0.5, &settings) - 0.5).abs() < 1e-6);
+        let wide = Settings { breath_full_kpa: 12.0, ..settings };
+        assert!((breath_of_gamma(1.5, &wide) - 0.75).abs() < 1e-6);
+        let hard = Settings { strength: 3.5, ..settings };
+        assert!((closing_kpa(&hard) - 6.0 * 1.44).abs() < 1e-4);
+    }
 
     fn refusal(text: &str) -> String {
         BreathCurve::read_csv(text.as_bytes()).unwrap_err().to_string()

@@ -1,46 +1,46 @@
-//! Standard MIDI files, format 0 and 1, as a score.
+//! Reads standard MIDI files, formats 0 and 1, as a score.
 //!
-//! Tracks merge by tick; at one tick the earlier track and the earlier message come first, so that a file always plays
-//! the same way. Tempo changes of every track count. Time is kept as an exact fraction and rounded once, to the nearest
-//! sample. Notes are sounding pitch. Left out: format 2 (patterns that do not belong together) and everything that is
-//! not a channel message or a tempo.
+//! Tracks are merged by tick. At one tick the earlier track and the earlier message come first, so that a file always plays
+//! the same way. Tempo changes of every track count. Time is an exact fraction, and is rounded once, to the nearest sample.
+//! Notes are sounding pitches. Format 2 (independent patterns) is refused; messages other than channel messages and tempo
+//! are ignored.
 //!
-//! Files damaged on the way are refused with the byte where reading stopped, rather than played up to there.
+//! A damaged file is refused with the byte at which reading stopped; it is not played up to there.
 //! Source: Standard MIDI Files 1.0 (RP-001, 1988).
 
 use crate::control::midi::{Events, MidiDecoder};
 use crate::event::{Event, Timed};
-use crate::score::Score;
+use crate::score::timeline::Score;
 use midly::{EventIter, MetaMessage, MidiMessage, TrackEventKind};
 
-/// Longest score, s. Sample positions stay far inside every integer.
+/// Longest score, s. Sample positions stay far below the largest integer.
 const SECONDS_MAX: u32 = 6 * 3600;
 
-/// Microseconds in a quarter note until the file says otherwise.
+/// Microseconds in a quarter note until the file sets a tempo (Standard MIDI Files 1.0).
 const DEFAULT_TEMPO_US: u32 = 500_000;
 
 /// Why a MIDI file was refused. Positions are bytes from the start of the file.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum MidiFileError {
-    /// Another kind of file, or none.
+    /// The file is of another kind, or empty; holds its first bytes.
     #[error("not a standard MIDI file: it should begin with MThd{}", begins(.0))]
     NotMidi(Vec<u8>),
-    /// A header cut short.
+    /// The header is cut short.
     #[error("MIDI header is cut short: {length} bytes of 14")]
     Header {
-        /// Bytes there are.
+        /// Length of the file, bytes.
         length: usize,
     },
-    /// A format nobody has defined.
+    /// The format is not 0, 1 or 2.
     #[error("MIDI format must be 0 or 1, got {0}")]
     Format(u8),
-    /// A film speed nobody uses.
+    /// The time code counts an unknown number of frames per second.
     #[error("MIDI time code must count 24, 25, 29 or 30 frames a second, got {0}")]
     Frames(u8),
-    /// Format 2.
+    /// The file has format 2.
     #[error("MIDI format 2 (unrelated patterns) cannot be played as one piece; save it as format 0 or 1")]
     Format2,
-    /// A division of time into nothing.
+    /// The header gives no ticks.
     #[error("MIDI header gives 0 ticks per beat or frame; expected 1 or more, usually 480 or 960")]
     NoTicks,
     /// The file ends before a chunk does.
@@ -55,7 +55,7 @@ pub enum MidiFileError {
         /// Where the file ends.
         end: usize,
     },
-    /// Fewer tracks than the header says.
+    /// The file holds fewer tracks than its header says.
     #[error("MIDI header announces {announced} tracks, the file holds {found}; is it a whole file?")]
     Tracks {
         /// Tracks in the header.
@@ -63,7 +63,7 @@ pub enum MidiFileError {
         /// Tracks in the file.
         found: u16,
     },
-    /// A message that is none.
+    /// A track holds bytes that are no valid message.
     #[error("MIDI track {track} is damaged: no valid message at byte {at}")]
     Message {
         /// Track, counted from 1.
@@ -71,13 +71,13 @@ pub enum MidiFileError {
         /// First byte of the message.
         at: usize,
     },
-    /// Nothing to play.
+    /// The file holds no notes.
     #[error("MIDI file holds no notes; expected at least one note-on")]
     NoNotes,
-    /// Longer than a score may be.
+    /// The file lasts longer than 6 hours.
     #[error("MIDI file lasts {hours:.1} hours; at most {} can be rendered", SECONDS_MAX / 3600)]
     TooLong {
-        /// Length of the file.
+        /// Length of the file, hours.
         hours: f64,
     },
 }
@@ -90,7 +90,7 @@ fn begins(bytes: &[u8]) -> String {
     }
 }
 
-/// A message of any track, in its place.
+/// A message of any track, with its position in ticks.
 struct Message<'a> {
     tick: u64,
     kind: TrackEventKind<'a>,
@@ -98,7 +98,7 @@ struct Message<'a> {
 
 /// Seconds as a fraction with a fixed denominator: `numerator / per_second`.
 struct Clock {
-    /// Tempo counts; otherwise ticks are parts of a film frame.
+    /// Whether ticks are parts of a quarter note; otherwise they are parts of a film frame.
     metrical: bool,
     per_second: u128,
     per_tick: u128,
@@ -147,12 +147,20 @@ impl Clock {
     }
 }
 
-/// Reads a whole file as a score at `rate`, ending with its last event.
+/// Reads the bytes of a file as a score at the sample rate `rate`, Hz. The score ends with the last event.
+///
+/// # Errors
+///
+/// [`MidiFileError`] says what is wrong with the file, and at which byte.
 pub fn read(bytes: &[u8], rate: u32) -> Result<Score, MidiFileError> {
     read_as(MidiDecoder::new(), bytes, rate)
 }
 
-/// The same with a decoder that knows something about the file.
+/// As [`read`], with a decoder that has been set up for the file.
+///
+/// # Errors
+///
+/// As [`read`].
 pub fn read_as(mut decoder: MidiDecoder, bytes: &[u8], rate: u32) -> Result<Score, MidiFileError> {
     let (mut clock, messages) = merged(bytes)?;
     let (mut events, mut tick, mut notes) = (Vec::new(), 0, 0usize);
@@ -192,7 +200,7 @@ fn decode(decoder: &mut MidiDecoder, channel: u8, message: MidiMessage) -> Event
     }
 }
 
-/// All tracks in one row, in order of time.
+/// The messages of all tracks, in order of time.
 fn merged(bytes: &[u8]) -> Result<(Clock, Vec<Message<'_>>), MidiFileError> {
     // A RIFF wrapper (.rmi) holds an ordinary file further in.
     let start = if bytes.starts_with(b"RIFF") { find(bytes, b"MThd").unwrap_or(0) } else { 0 };
@@ -255,7 +263,7 @@ fn read_track<'a>(
                     return Ok(());
                 }
             }
-            // The iterator falls silent at a message it cannot read; only an empty rest is the end.
+            // The iterator also ends at a message that it cannot read. Only without unread bytes is it the end.
             None if before == 0 => return Ok(()),
             None | Some(Err(_)) => {
                 return Err(MidiFileError::Message { track, at: offset + body.len() - before });
@@ -358,9 +366,9 @@ mod tests {
         assert!(matches!(read(&file(0, [0, 1], &[slow]), 48_000), Err(MidiFileError::TooLong { .. })));
     }
 
-    /// Any bytes give a score or a refusal, never a panic.
+    /// Any bytes give a score or an error, never a panic.
     #[test]
-    fn no_bytes_are_fatal() {
+    fn no_bytes_cause_a_panic() {
         let whole = file(1, [0, 96], &[NOTE, NOTE]);
         for at in 0..whole.len() {
             for value in 0..=255 {

@@ -1,16 +1,19 @@
-//! The instrument without a host: a score in, samples out, as fast as the machine can.
+//! Offline rendering: a score in, samples out, as fast as the machine can.
 //!
-//! A score is a list of events at sample positions, made from a standard MIDI file, one note or a scale. It is played
-//! once, forwards, block by block, through the same [`Clarinet`] the plugin plays; the block size is inaudible, so the
-//! samples are those of an offline bounce. Nothing is added and no latency is taken away. Left out: reading a score
-//! while it plays, and more than one voice.
+//! The score is played once, block by block, through the same [`Clarinet`] that the plugin uses. The samples do not depend
+//! on the size of the blocks. The latency of the instrument is not removed.
 
 use crate::event::{Event, Timed};
-use crate::instrument::Clarinet;
-use crate::instrument::Probe;
-use crate::score::Score;
+use crate::instrument::{Clarinet, Probe};
+use crate::score::timeline::Score;
 
-/// Plays `score` in blocks of `block` samples and hands each block to `each`, whose first error ends it.
+/// Plays `score` in blocks of `block` samples (at least 1) and hands each block to `each`. Allocates one block.
+///
+/// `score` must have the sample rate of the host for which `clarinet` was made.
+///
+/// # Errors
+///
+/// The first error that `each` returns; it ends the playing.
 pub fn play<E>(
     clarinet: &mut Clarinet,
     score: &Score,
@@ -23,7 +26,11 @@ pub fn play<E>(
     in_blocks(score, block, render, each)
 }
 
-/// As [`play`], with a look inside at every internal sample.
+/// As [`play`], and calls `probe` with the state inside the instrument at every sample of its internal rate.
+///
+/// # Errors
+///
+/// The first error that `each` returns; it ends the playing.
 pub fn play_probed<E>(
     clarinet: &mut Clarinet,
     score: &Score,
@@ -44,7 +51,7 @@ pub fn play_probed<E>(
     in_blocks(score, block, render, each)
 }
 
-/// Cuts a score into blocks: `render` gets the events of one, the sample it begins at, and where to write.
+/// Cuts a score into blocks. `render` gets the events of a block, the sample at which it begins, and where to write.
 fn in_blocks<E>(
     score: &Score,
     block: usize,
@@ -100,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn block_size_is_inaudible() {
+    fn block_size_does_not_change_the_samples() {
         let whole = samples(5000);
         assert_eq!(whole.len(), 5000);
         for block in [1, 17, 64, 512, 4096] {
@@ -109,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn a_look_inside_changes_nothing() {
+    fn probing_does_not_change_the_samples() {
         let mut clarinet = Clarinet::built_in(48_000.0).unwrap();
         let (mut all, mut probed) = (Vec::new(), 0usize);
         play_probed(&mut clarinet, &score(), 300, &mut |_| probed += 1, |out| {

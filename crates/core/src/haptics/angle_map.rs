@@ -1,12 +1,12 @@
-//! From the angle of the knob to mouth pressure, bent so that what is felt is what sounds.
+//! The map from the angle of the knob to mouth pressure, which puts the start of the sound at the felt threshold.
 //!
-//! Straight lines through rest, onset, closure and extinction; beyond extinction the last line goes on. Monotone, and
-//! exactly invertible. A dead zone around rest is the knob reader's matter.
+//! Straight lines join rest, onset, closure and extinction; the last line continues beyond extinction. The map is monotone
+//! and has an exact inverse. A dead zone around rest is left to the code that reads the knob.
 
-/// Rest, onset, closure, extinction.
+/// Number of points: rest, onset, closure, extinction.
 const KNOTS: usize = 4;
 
-/// Angle to mouth pressure for one note. A few numbers, to be copied anywhere.
+/// The map from angle to mouth pressure for one note. Eight numbers; cheap to copy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AngleMap {
     angle_deg: [f64; KNOTS],
@@ -14,8 +14,8 @@ pub struct AngleMap {
 }
 
 impl AngleMap {
-    /// Through rest and three landmarks `(angle, pressure)`, both rising. A landmark that does not rise over the one
-    /// before it is put just above it, so that the map stays invertible.
+    /// A map through rest and three landmarks `(angle, pressure)`. A landmark that does not lie above the one before it is
+    /// moved just above it, so that the map keeps an inverse.
     pub(super) fn new(landmarks: [(f64, f64); KNOTS - 1]) -> Self {
         let (mut angle_deg, mut pressure_pa) = ([0.0; KNOTS], [0.0; KNOTS]);
         for (at, (angle, pressure)) in landmarks.into_iter().enumerate() {
@@ -25,24 +25,26 @@ impl AngleMap {
         Self { angle_deg, pressure_pa }
     }
 
-    /// Mouth pressure at an angle from rest, Pa; 0 on the other side of rest. Real-time safe. [audio thread]
+    /// Mouth pressure at an angle from rest, Pa; 0 at and below rest, and for NaN. Real-time safe.
     pub fn pressure_pa(&self, angle_deg: f64) -> f64 {
         along(&self.angle_deg, &self.pressure_pa, angle_deg)
     }
 
-    /// Angle at which the mouth pressure is so many Pa; 0 at and below 0. Real-time safe.
+    /// Angle from rest, degrees, at which the mouth pressure is `pressure_pa`; 0 at and below 0 Pa, and for NaN. Real-time
+    /// safe.
     pub fn angle_deg(&self, pressure_pa: f64) -> f64 {
         along(&self.pressure_pa, &self.angle_deg, pressure_pa)
     }
 }
 
+/// The straight lines from one set of points to the other.
 fn along(from: &[f64; KNOTS], to: &[f64; KNOTS], x: f64) -> f64 {
     if x.is_nan() || x <= 0.0 {
         return 0.0;
     }
     let right = from[1..KNOTS - 1].iter().filter(|&&knot| knot < x).count() + 1;
-    let way = (x - from[right - 1]) / (from[right] - from[right - 1]);
-    to[right - 1] + way * (to[right] - to[right - 1])
+    let share = (x - from[right - 1]) / (from[right] - from[right - 1]);
+    to[right - 1] + share * (to[right] - to[right - 1])
 }
 
 #[cfg(test)]
@@ -50,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn map_rises_passes_its_landmarks_and_is_undone() {
+    fn map_rises_through_its_landmarks_and_has_an_inverse() {
         let map = AngleMap::new([(120.0, 2_350.0), (360.0, 6_000.0), (700.0, 11_700.0)]);
         for (angle, pressure) in [(0.0, 0.0), (120.0, 2_350.0), (360.0, 6_000.0), (700.0, 11_700.0)] {
             assert!((map.pressure_pa(angle) - pressure).abs() < 1e-9);

@@ -1,80 +1,80 @@
-//! Amplitude of a note while the breath slowly grows and slowly fades: where it begins, beats, chokes and returns.
+//! The bifurcation diagram of a note: its amplitude while the mouth pressure slowly rises and slowly falls.
 //!
-//! Gamma runs in a straight line from 0 to a maximum and back. In windows of whole periods the pressure in the
-//! mouthpiece gives its rms about its mean, over the closing pressure, and the reed the part of time it is shut. Up and
-//! down differ where two states are stable, and because a ramp that moves at all overtakes a threshold before the note
-//! has grown (Bergeot, Almeida, Vergez and Gazengel 2013); the slower, the less.
+//! Gamma, mouth pressure over closing pressure, runs in a straight line from 0 to a maximum and back. Each point covers a
+//! window of whole periods. It holds the rms of the pressure in the mouthpiece about its mean, over the closing pressure, and
+//! the share of time in which the reed is shut. The two ways differ where two states are stable. They also differ because a
+//! moving ramp passes a threshold before the note has grown (Bergeot, Almeida, Vergez & Gazengel 2013); a slower ramp
+//! passes it by less.
 
 use crate::instrument::{Clarinet, Model, Probe, Settings};
 use crate::reed::motion::SHUT;
-use crate::score::Score;
 use crate::score::breath::BreathCurve;
-use crate::score::play_probed;
+use crate::score::{Score, play_probed};
 use crate::units::SoundingNote;
 use std::convert::Infallible;
 use std::sync::Arc;
 
-/// A note sounds above this rms over the closing pressure: a hundredth of a loud one's.
-pub const SOUNDS: f64 = 0.01;
+/// A note counts as sounding above this rms over the closing pressure: a hundredth of that of a loud note.
+pub const SOUNDING_RMS: f64 = 0.01;
 /// Shortest window, s.
 const WINDOW_S: f64 = 0.02;
 
-/// One window of the ramp.
+/// One window of the ramp: a point of the diagram.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Point {
-    /// Mouth pressure over closing pressure, mean of the window.
+pub struct RampPoint {
+    /// Mean mouth pressure over closing pressure.
     pub gamma: f64,
-    /// Rms of the mouthpiece's pressure about its mean, over the closing pressure.
+    /// Rms of the pressure in the mouthpiece about its mean, over the closing pressure.
     pub rms: f64,
-    /// Part of the time the reed is shut, 0..=1.
+    /// Share of time in which the reed is shut, 0..=1.
     pub shut: f64,
 }
 
-/// Both ways.
+/// The amplitude of a note along both ways of the ramp.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Bifurcation {
-    /// Gamma growing.
-    pub up: Vec<Point>,
-    /// Gamma falling.
-    pub down: Vec<Point>,
+pub struct BifurcationDiagram {
+    /// The way up: gamma rises.
+    pub up: Vec<RampPoint>,
+    /// The way down: gamma falls.
+    pub down: Vec<RampPoint>,
 }
 
-/// Gammas at which something changes; `None` where it does not within the ramp.
+/// Values of gamma at which the state of the note changes; `None` if it does not change within the ramp.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Changes {
-    /// Growing: the note begins.
+pub struct Transitions {
+    /// Rising: the note begins.
     pub begins: Option<f64>,
-    /// Growing: the reed first touches the lay while the note sounds.
+    /// Rising: the reed begins to shut for a part of each period while the note sounds (beating).
     pub beats: Option<f64>,
-    /// Growing: the reed stays shut, the note chokes.
+    /// Rising: the note chokes, because the reed stays shut.
     pub chokes: Option<f64>,
-    /// Falling: the note comes back.
+    /// Falling: a choked note sounds again.
     pub returns: Option<f64>,
-    /// Falling: the reed no longer touches the lay.
+    /// Falling: the reed no longer shuts.
     pub opens: Option<f64>,
     /// Falling: the note ends.
     pub ends: Option<f64>,
 }
 
-impl Bifurcation {
-    /// Where things change.
-    pub fn changes(&self) -> Changes {
-        let sounds = |point: &Point| point.rms > SOUNDS;
+impl BifurcationDiagram {
+    /// The values of gamma at which the note begins, beats, chokes, returns, opens and ends.
+    pub fn transitions(&self) -> Transitions {
+        let sounds = |point: &RampPoint| point.rms > SOUNDING_RMS;
         let begins = self.up.iter().position(sounds);
         let sounding = begins.map_or(&[][..], |begins| &self.up[begins..]);
         let beats = sounding.iter().find(|point| point.shut > 0.0);
-        // The last window that sounds, if silence follows.
+        // The first silent window after the last one that sounds.
         let chokes = sounding.iter().rposition(sounds).and_then(|last| sounding.get(last + 1));
         let returns = self.down.iter().position(sounds);
         let after = returns.map_or(&[][..], |returns| &self.down[returns..]);
         let opens = after.iter().rposition(|point| sounds(point) && point.shut > 0.0);
         let ends = after.iter().rposition(sounds).and_then(|last| after.get(last + 1));
-        let gamma = |point: &Point| point.gamma;
-        Changes {
+        let gamma = |point: &RampPoint| point.gamma;
+        Transitions {
             begins: sounding.first().map(gamma),
             beats: beats.map(gamma),
             chokes: chokes.map(gamma),
-            // A note that never choked has nothing to come back from.
+            // Only a choked note can return.
             returns: chokes.and(after.first()).map(gamma),
             opens: opens.and_then(|last| after.get(last + 1)).map(gamma),
             ends: ends.map(gamma),
@@ -82,10 +82,10 @@ impl Bifurcation {
     }
 }
 
-/// Plays `note` while gamma goes from 0 to `gamma_max` and back, `seconds` each way. `each` hears how many host samples
-/// have gone by.
+/// Plays `note` while gamma goes from 0 to `gamma_max` and back, `seconds` each way. Allocates.
 ///
-/// `settings` must let full breath reach `gamma_max`.
+/// `settings` must let full breath reach `gamma_max` (`breath_full_kpa`). `rate` is the host's sample rate, Hz. `each` is
+/// called after every block with its number of samples, to show progress.
 pub fn measure(
     model: &Arc<Model>,
     settings: &Settings,
@@ -94,7 +94,7 @@ pub fn measure(
     seconds: f64,
     rate: u32,
     mut each: impl FnMut(usize),
-) -> Bifurcation {
+) -> BifurcationDiagram {
     let mut clarinet = Clarinet::new(model.clone(), f64::from(rate));
     clarinet.set_settings(settings);
     clarinet.reset();
@@ -105,7 +105,7 @@ pub fn measure(
     let window = (period * (WINDOW_S * inner_hz / period).ceil()).round() as usize;
     let closing_pa = settings.closing_pa();
     let half = (seconds * inner_hz) as usize;
-    let mut found = Bifurcation::default();
+    let mut found = BifurcationDiagram::default();
     let (mut seen, mut inside) = (0_usize, Window::default());
     let mut probe = |probe: Probe| {
         inside.add(&probe, closing_pa);
@@ -122,7 +122,7 @@ pub fn measure(
     found
 }
 
-/// Sums over a window.
+/// Sums over one window.
 #[derive(Default)]
 struct Window {
     count: usize,
@@ -142,10 +142,10 @@ impl Window {
         self.shut += usize::from(probe.opening < SHUT);
     }
 
-    fn point(self) -> Point {
+    fn point(self) -> RampPoint {
         let count = self.count.max(1) as f64;
         let mean = self.sum / count;
-        Point {
+        RampPoint {
             gamma: self.gamma / count,
             rms: (self.squares / count - mean * mean).max(0.0).sqrt(),
             shut: self.shut as f64 / count,
@@ -157,13 +157,13 @@ impl Window {
 mod tests {
     use super::*;
 
-    fn point(gamma: f64, rms: f64, shut: f64) -> Point {
-        Point { gamma, rms, shut }
+    fn point(gamma: f64, rms: f64, shut: f64) -> RampPoint {
+        RampPoint { gamma, rms, shut }
     }
 
     #[test]
     fn changes_are_found_both_ways() {
-        let found = Bifurcation {
+        let found = BifurcationDiagram {
             up: vec![
                 point(0.1, 0.0, 0.0),
                 point(0.4, 0.2, 0.0),
@@ -178,10 +178,10 @@ mod tests {
                 point(0.35, 0.001, 0.0),
             ],
         };
-        let changes = found.changes();
+        let changes = found.transitions();
         assert_eq!((changes.begins, changes.beats, changes.chokes), (Some(0.4), Some(0.5), Some(1.5)));
         assert_eq!((changes.returns, changes.opens, changes.ends), (Some(1.0), Some(0.45), Some(0.35)));
-        assert_eq!(Bifurcation::default().changes(), Changes::default());
+        assert_eq!(BifurcationDiagram::default().transitions(), Transitions::default());
     }
 
     #[test]
@@ -191,14 +191,14 @@ mod tests {
         let mut samples = 0;
         let found = measure(&model, &settings, SoundingNote(50), 0.8, 4.0, 48_000, |block| samples += block);
         assert_eq!(samples, 8 * 48_000);
-        let changes = found.changes();
+        let changes = found.transitions();
         let (begins, beats, ends) = (changes.begins.unwrap(), changes.beats.unwrap(), changes.ends.unwrap());
         assert!((1.0 / 3.0..0.5).contains(&begins), "{changes:?}");
         // Raman's string without losses: 1/2.
         assert!((0.44..0.52).contains(&beats) && beats > begins, "{changes:?}");
         assert!(ends < begins, "a ramp overtakes the threshold: {changes:?}");
         assert_eq!((changes.chokes, changes.returns), (None, None));
-        let slow = measure(&model, &settings, SoundingNote(50), 0.8, 12.0, 48_000, |_| {}).changes();
+        let slow = measure(&model, &settings, SoundingNote(50), 0.8, 12.0, 48_000, |_| {}).transitions();
         assert!(
             slow.begins.unwrap() < begins && slow.ends.unwrap() > ends,
             "slower, less: {slow:?} {changes:?}"

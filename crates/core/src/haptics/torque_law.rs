@@ -1,22 +1,25 @@
-//! Torque against angle, as the knob's firmware works it out: for previews, for limits, and to hold the firmware to.
+//! Torque as a function of angle, as the firmware of the knob computes it. The program uses it for previews and limits, and
+//! tests compare the firmware with it.
 //!
-//! The static part only; damping, friction, morphing and the device's limits come on top of it there. Angles in degrees
-//! from the knob's zero, torque in mNm. Positive torque *resists blowing*: the command to the motor is its negative.
+//! This is the static part. The firmware adds damping and friction, morphs from one note to the next, and applies the limits
+//! of the device. Angles are in degrees from the knob's zero, torques in mNm. Positive torque *resists blowing*: the command
+//! to the motor is its negative.
 //!
-//! - *flow*: `scale u(p)`, `p = (angle - offset) stretch / 360`, `u = H x_a - x_b / k` from [`ReedTables`], the tables
-//!   of the sound, and 0 from closure on. Within [`ROUNDED_DEG`] of the origin the square root, whose slope is infinite
-//!   at 0, is replaced by `sqrt(p0) (5/4 s - 1/4 s^3)`, `s = p / p0`, which meets it in value and slope.
-//! - *pressure*: a spring that reaches `scale` at closure and stays there.
+//! - *flow*: `scale u(p)` with `p = (angle - offset) stretch / 360`. `u = H x_a - x_b / k` comes from [`ReedTables`], the
+//!   tables of the sound, and is 0 from closure on. The slope of the square root is infinite at 0. Within [`ROUNDED_DEG`]
+//!   of the origin it is therefore replaced by `sqrt(p0) (5/4 s - 1/4 s^3)`, `s = p / p0`, which has the same value and slope
+//!   at `p0`.
+//! - *pressure*: a spring that reaches `scale` at closure; the torque stays there beyond.
 //! - The mark at the threshold is a bump (flow) or a step (pressure) of the height `detent`.
-//! - Below -100 degrees the slap spring, at most `scale`; beyond the wall the wall's spring.
+//! - Below -100 degrees there is the slap spring, of at most `scale`; beyond the wall there is the spring of the wall.
 //! - *free*: none of these.
 
-use crate::haptics::parameters::{Feel, Law};
+use crate::haptics::parameters::{Feel, TorqueLaw};
 use crate::reed::ReedTables;
 
-/// Where the slap spring begins, degrees; an offset below 0 moves it.
+/// Angle below which the slap spring acts, degrees. An offset below 0 moves it.
 pub const SLAP_DEG: f64 = -100.0;
-/// Travel over which the root is rounded, degrees, and the most it may be of the way to closure.
+/// Travel over which the square root is rounded, degrees. It is at most a twelfth of the way to closure.
 pub const ROUNDED_DEG: f64 = 6.0;
 const ROUNDED_SHARE: f64 = 1.0 / 12.0;
 /// Half-width of the mark at the threshold, degrees.
@@ -25,7 +28,7 @@ const MARK_DEG: f64 = 6.0;
 const BUMP_SLOPE: f64 = 1.539_600_717_839_002;
 const STEP_SLOPE: f64 = 0.75;
 
-/// A feel taken apart.
+/// The fields of a feel in the units of the formulas.
 struct Curve<'a> {
     feel: &'a Feel,
     tables: &'a ReedTables,
@@ -87,14 +90,14 @@ impl<'a> Curve<'a> {
     }
 
     fn torque(&self, angle_deg: f64) -> f64 {
-        if self.feel.law == Law::Free {
+        if self.feel.law == TorqueLaw::Free {
             return 0.0;
         }
         let p = (angle_deg - self.offset) * self.p_per_deg;
         let x = (angle_deg - self.mark_at) / MARK_DEG;
         let mut torque = 0.0;
         if p > 0.0 {
-            torque += if self.feel.law == Law::Flow {
+            torque += if self.feel.law == TorqueLaw::Flow {
                 let rest = (1.0 - x * x).max(0.0);
                 self.scale * self.flow(p) + self.mark * rest * rest
             } else {
@@ -107,7 +110,7 @@ impl<'a> Curve<'a> {
         torque - slap.min(self.scale) + self.wall * (angle_deg - self.wall_at).max(0.0)
     }
 
-    /// Slope of the flow law, mNm per degree.
+    /// Slope of the flow law without its mark, mNm per degree.
     fn slope(&self, angle_deg: f64) -> f64 {
         let p = (angle_deg - self.offset) * self.p_per_deg;
         let by_p = if p <= self.rounded {
@@ -120,17 +123,17 @@ impl<'a> Curve<'a> {
         self.scale * by_p * self.p_per_deg
     }
 
-    /// Steepest restoring slope, mNm per degree: a bound, the steepest of mark and law added where they overlap.
+    /// Upper bound of the steepest restoring slope, mNm per degree. Where mark and law overlap, their steepest slopes add.
     fn stiffness(&self) -> f64 {
         let spring = self.scale / self.closing() * self.p_per_deg;
         let (law, mark, at_wall) = match self.feel.law {
-            Law::Free => return 0.0,
-            Law::Flow => {
+            TorqueLaw::Free => return 0.0,
+            TorqueLaw::Flow => {
                 let mark = self.mark / MARK_DEG * BUMP_SLOPE;
                 let beside = self.slope(self.mark_at - MARK_DEG).max(0.0) + mark;
                 (self.slope(self.offset).max(beside), mark, self.slope(self.wall_at).max(0.0))
             }
-            Law::Pressure => {
+            TorqueLaw::Pressure => {
                 let mark = self.mark / MARK_DEG * STEP_SLOPE;
                 (spring + mark, mark, if self.wall_at < self.closure_deg() { spring } else { 0.0 })
             }
@@ -139,9 +142,9 @@ impl<'a> Curve<'a> {
         law.max(self.wall + at_wall + near_mark).max(f64::from(self.feel.slap_mnm_per_deg))
     }
 
-    /// Steepest slope that pushes on, mNm per degree, a bound likewise. The pressure law has none.
+    /// Upper bound of the steepest slope that pushes the hand along, mNm per degree; 0 under the pressure law.
     fn push(&self) -> f64 {
-        if self.feel.law != Law::Flow {
+        if self.feel.law != TorqueLaw::Flow {
             return 0.0;
         }
         let closure = self.closure_deg();
@@ -150,43 +153,43 @@ impl<'a> Curve<'a> {
         fall(closure).max(self.mark / MARK_DEG * BUMP_SLOPE + fall(self.mark_at + MARK_DEG))
     }
 
-    /// Most torque between origin and wall, a bound: the law's largest, and the mark on top of it where there is one.
+    /// Upper bound of the torque between origin and wall, mNm: the peak of the law plus the mark.
     fn most(&self) -> f64 {
         let law = match self.feel.law {
-            Law::Free => return 0.0,
-            Law::Flow => self.scale * (4.0 * self.h.powi(3) * self.k / 27.0).sqrt(),
-            Law::Pressure => self.scale,
+            TorqueLaw::Free => return 0.0,
+            TorqueLaw::Flow => self.scale * (4.0 * self.h.powi(3) * self.k / 27.0).sqrt(),
+            TorqueLaw::Pressure => self.scale,
         };
         law + self.mark
     }
 }
 
-/// Static torque at an angle, mNm, positive against the breath. Real-time safe.
+/// Static torque at `angle_deg`, mNm; positive torque resists blowing. Real-time safe.
 pub fn torque_mnm(feel: &Feel, tables: &ReedTables, angle_deg: f64) -> f64 {
     Curve::new(feel, tables).torque(angle_deg)
 }
 
-/// Where the law closes, degrees from the knob's zero.
+/// Angle at which the torque law closes, degrees from the knob's zero.
 pub fn closure_deg(feel: &Feel) -> f64 {
     360.0 * f64::from(feel.h) * f64::from(feel.k) / f64::from(feel.stretch) + f64::from(feel.offset_deg)
 }
 
-/// The extremes of a feel's static torque, the largest a device will find as well.
+/// Upper bounds of the static torque of a feel and of its slopes. A device that checks a feel finds no more.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Extremes {
-    /// Most torque between rest and wall, mNm.
+pub struct TorqueExtremes {
+    /// Largest torque between rest and wall, mNm.
     pub torque_mnm: f64,
     /// Steepest restoring slope, N m/rad.
     pub stiffness_nm_per_rad: f64,
-    /// Steepest slope that pushes on in the direction of the movement, N m/rad.
+    /// Steepest slope that pushes the hand in the direction of its movement, N m/rad.
     pub push_nm_per_rad: f64,
 }
 
-/// Bounds from the formulas of the law.
-pub fn extremes(feel: &Feel) -> Extremes {
+/// The bounds of a feel, from the formulas of its torque law. Real-time safe.
+pub fn extremes(feel: &Feel) -> TorqueExtremes {
     let curve = Curve::new(feel, ReedTables::seed());
     let per_rad = 1e-3 * 1_f64.to_radians().recip();
-    Extremes {
+    TorqueExtremes {
         torque_mnm: curve.most(),
         stiffness_nm_per_rad: per_rad * curve.stiffness(),
         push_nm_per_rad: per_rad * curve.push(),
@@ -198,8 +201,8 @@ mod tests {
     use super::*;
     use crate::reed::law::{H_INIT, K_INIT};
 
-    /// TorqueTuner's setting, scale in mNm: one turn, nothing on top.
-    fn seed(law: Law, h: f64, k: f64) -> Feel {
+    /// The setting of TorqueTuner, scale in mNm: one turn, no mark, no damping.
+    fn torque_tuner(law: TorqueLaw, h: f64, k: f64) -> Feel {
         Feel {
             feel_id: 0,
             law,
@@ -222,22 +225,23 @@ mod tests {
     }
 
     #[test]
-    fn flow_is_the_seeds_formula_behind_the_rounded_origin() {
+    fn flow_is_the_reference_formula_beyond_the_rounded_origin() {
         let tables = ReedTables::seed();
         for h in [1.0, 2.0, H_INIT, 4.0] {
             for k in [0.1, 0.25, K_INIT, 1.0] {
-                let feel = seed(Law::Flow, h, k);
+                let feel = torque_tuner(TorqueLaw::Flow, h, k);
                 let (h, k) = (f64::from(feel.h), f64::from(feel.k));
                 for index in 0..=3600 {
                     let p = tables.x[index];
-                    let seed = if p < h * k { h * tables.x_a[index] - tables.x_b[index] / k } else { 0.0 };
+                    let expected =
+                        if p < h * k { h * tables.x_a[index] - tables.x_b[index] / k } else { 0.0 };
                     let torque = torque_mnm(&feel, tables, 0.1 * index as f64);
                     let rounded = 0.1 * (index as f64) < ROUNDED_DEG;
-                    // What the rounding takes away is at most a third of the root at its end.
+                    // The rounding lowers the root by at most a third of its value at the end.
                     let off = if rounded { 0.35 * 90.0 * h * (ROUNDED_DEG / 360.0).sqrt() } else { 1e-3 };
                     assert!(
-                        (torque - 90.0 * seed).abs() <= off,
-                        "H {h} k {k} index {index}: {torque}, {seed}"
+                        (torque - 90.0 * expected).abs() <= off,
+                        "H {h} k {k} index {index}: {torque}, {expected}"
                     );
                 }
             }
@@ -246,7 +250,7 @@ mod tests {
 
     #[test]
     fn flow_peaks_at_a_third_of_closure_and_is_gone_beyond() {
-        let (feel, tables) = (seed(Law::Flow, H_INIT, K_INIT), ReedTables::seed());
+        let (feel, tables) = (torque_tuner(TorqueLaw::Flow, H_INIT, K_INIT), ReedTables::seed());
         let steps = 0..4_000;
         let peak = steps
             .clone()
@@ -262,7 +266,7 @@ mod tests {
 
     #[test]
     fn pressure_never_falls_and_steps_up_at_the_threshold() {
-        let feel = Feel { detent: 100, ..seed(Law::Pressure, H_INIT, K_INIT) };
+        let feel = Feel { detent: 100, ..torque_tuner(TorqueLaw::Pressure, H_INIT, K_INIT) };
         let torque = |angle: f64| torque_mnm(&feel, ReedTables::seed(), angle);
         let mut before = torque(-300.0);
         for step in -3_000..8_000 {
@@ -277,9 +281,9 @@ mod tests {
     #[test]
     fn the_bounds_hold_what_the_curve_does() {
         let tables = ReedTables::seed();
-        for law in [Law::Flow, Law::Pressure] {
+        for law in [TorqueLaw::Flow, TorqueLaw::Pressure] {
             for (detent, wall_deg, offset_deg) in [(0, 414.0, 0.0), (80, 414.0, 0.0), (80, 200.0, 20.0)] {
-                let feel = Feel { detent, wall_deg, offset_deg, ..seed(law, H_INIT, K_INIT) };
+                let feel = Feel { detent, wall_deg, offset_deg, ..torque_tuner(law, H_INIT, K_INIT) };
                 let bounds = extremes(&feel);
                 let (mut most, mut up, mut down) = (0.0_f64, 0.0_f64, 0.0_f64);
                 let mut before = torque_mnm(&feel, tables, -130.0);
@@ -287,7 +291,7 @@ mod tests {
                     let angle = 0.01 * f64::from(step);
                     let torque = torque_mnm(&feel, tables, angle);
                     let slope = 1e-3 * (torque - before) / 0.01_f64.to_radians();
-                    // The tables' polygon and the corner at closure are no slopes of the law.
+                    // The tables are polygons and closure is a corner: hence the tolerances below.
                     (up, down) = (up.max(slope), down.max(-slope));
                     if angle < f64::from(wall_deg) {
                         most = most.max(torque);
@@ -297,15 +301,15 @@ mod tests {
                 assert!(most <= bounds.torque_mnm * 1.000_1, "{law:?}: {most}, {bounds:?}");
                 assert!(up <= bounds.stiffness_nm_per_rad * 1.02, "{law:?}: {up}, {bounds:?}");
                 assert!(down <= bounds.push_nm_per_rad * 1.02 + 1e-3, "{law:?}: {down}, {bounds:?}");
-                assert!(up >= 0.5 * bounds.stiffness_nm_per_rad, "no idle bound: {up}, {bounds:?}");
+                assert!(up >= 0.5 * bounds.stiffness_nm_per_rad, "the bound is too wide: {up}, {bounds:?}");
             }
         }
     }
 
     #[test]
     fn a_free_knob_has_no_torque() {
-        let feel = seed(Law::Free, H_INIT, K_INIT);
+        let feel = torque_tuner(TorqueLaw::Free, H_INIT, K_INIT);
         assert!([-500.0, 0.0, 120.0, 40_000.0].map(|a| torque_mnm(&feel, ReedTables::seed(), a)) == [0.0; 4]);
-        assert_eq!(extremes(&feel), Extremes::default());
+        assert_eq!(extremes(&feel), TorqueExtremes::default());
     }
 }

@@ -1,0 +1,74 @@
+//! The reed as it is played: its law, the embouchure, and the lip for every fingering.
+//!
+//! [`crate::instrument::felt::played_reed`] makes one from the settings of the instrument, with the player's rule for the
+//! lip.
+
+use crate::reed::ReedLaw;
+use crate::reed::law::K_INIT;
+use crate::reed::physical::P_REF_PA;
+
+/// Resonance and damping of the reed under the lip, for one fingering.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lip {
+    /// Resonance of the reed with the lip on it, Hz.
+    pub resonance_hz: f64,
+    /// Damping q, the inverse of the quality factor.
+    pub damping: f64,
+}
+
+/// The reed as it is played. Sound and feel use the same one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlayedReed {
+    /// Rest opening H, stiffness k and amplitude A.
+    pub law: ReedLaw,
+    /// Embouchure parameter zeta of the reference reed, dimensionless; [`flow_strength`](Self::flow_strength) gives that of
+    /// this reed.
+    pub zeta: f64,
+    /// Half-width of the range of pressure in which the reed rolls onto the lay, over the closing pressure; 0 for a sharp
+    /// lay.
+    pub lay: f64,
+    /// Loss coefficient K of the jets in open holes; 0 without jets.
+    pub jet_loss: f64,
+    /// Lip for each fingering of the instrument file, in its order. A fingering without one gets a reed without inertia.
+    pub lips: Vec<Lip>,
+}
+
+impl PlayedReed {
+    /// The reference reed without inertia, on a bore without jets, with the embouchure `zeta`.
+    pub fn quasi_static(zeta: f64) -> Self {
+        Self { law: ReedLaw::default(), zeta, lay: 0.0, jet_loss: 0.0, lips: Vec::new() }
+    }
+
+    /// Closing pressure p_M, Pa: 6 kPa times H k.
+    pub fn closing_pa(&self) -> f64 {
+        P_REF_PA * self.law.closing()
+    }
+
+    /// Compliance relative to that of the reference reed.
+    pub fn compliance(&self) -> f64 {
+        K_INIT / self.law.k()
+    }
+
+    /// Embouchure parameter of this reed relative to its own closing pressure: `zeta A H k_ref / sqrt(H k)`.
+    ///
+    /// It equals `zeta` for the reference reed. A wider reed is stronger (as H^2 if k follows H, as sqrt(H) if k is free), a
+    /// stiffer one weaker.
+    pub fn flow_strength(&self) -> f64 {
+        self.zeta * self.law.a() * self.law.h() * K_INIT / self.law.closing().sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reference_reed_has_the_strength_it_was_given() {
+        assert!((PlayedReed::quasi_static(0.3).flow_strength() - 0.3).abs() < 1e-12);
+        let wide = PlayedReed { law: ReedLaw::coupled(3.0, 1.0).unwrap(), ..PlayedReed::quasi_static(0.3) };
+        let ratio = 3.0 / crate::reed::law::H_INIT;
+        assert!((wide.flow_strength() - 0.3 * ratio * ratio).abs() < 1e-12);
+        let loud = PlayedReed { law: ReedLaw::coupled(3.0, 2.0).unwrap(), ..wide.clone() };
+        assert!((loud.flow_strength() - 2.0 * wide.flow_strength()).abs() < 1e-12);
+    }
+}

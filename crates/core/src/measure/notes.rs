@@ -1,0 +1,153 @@
+//! Pitch and level of each note of a score, measured while the samples are rendered.
+//!
+//! [`Score::note_spans`](crate::score::Score::note_spans) says which note is heard when. Pitch and level are those of its
+//! steady part, after the attack or the slur and before the release. A [`NoteMeter`] keeps the samples of one note at a time,
+//! at most [`LONGEST_S`] of it.
+
+use crate::analysis::pitch::{fundamental_hz, refine_hz};
+use crate::analysis::spectrum::rms_dbfs;
+use crate::score::NoteSpan;
+use crate::units::cents;
+
+/// Longest part of a note that is measured, s: ten times what a pitch within 0.1 cents needs.
+pub const LONGEST_S: f64 = 3.0;
+
+/// Pitch and level of one note.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeasuredNote {
+    /// Which note, and when it is heard.
+    pub span: NoteSpan,
+    /// Its pitch, Hz; `None` if it has none.
+    pub hz: Option<f64>,
+    /// Its deviation from equal temperament, cents; `None` if it has no pitch.
+    pub cents: Option<f64>,
+    /// Root mean square of the measured part, dBFS; minus infinity for silence.
+    pub level_dbfs: f64,
+}
+
+/// Measures the notes of a score while its samples are rendered.
+pub struct NoteMeter {
+    rate_hz: f64,
+    a4_hz: f64,
+    notes: std::vec::IntoIter<NoteSpan>,
+    now: Option<NoteSpan>,
+    kept: Vec<f64>,
+    at: usize,
+    measured: Vec<MeasuredNote>,
+}
+
+impl NoteMeter {
+    /// A meter for the [`note_spans`](crate::score::Score::note_spans) of a score, which must be in order of time. `rate_hz` is
+    /// that of the samples; `a4_hz` is the pitch of A4 for the deviation in cents.
+    pub fn new(notes: Vec<NoteSpan>, rate_hz: f64, a4_hz: f64) -> Self {
+        let mut notes = notes.into_iter();
+        let now = notes.next();
+        Self { rate_hz, a4_hz, notes, now, kept: Vec::new(), at: 0, measured: Vec::new() }
+    }
+
+    /// Takes the next samples. Allocates.
+    pub fn hear(&mut self, block: &[f32]) {
+        let end = self.at + block.len();
+        while let Some(span) = self.now {
+            let (first, last) = self.range(&span);
+            let part = first.clamp(self.at, end) - self.at..last.clamp(self.at, end) - self.at;
+            self.kept.extend(block[part].iter().map(|&sample| f64::from(sample)));
+            if last > end {
+                break;
+            }
+            self.measure(span);
+            self.now = self.notes.next();
+        }
+        self.at = end;
+    }
+
+    /// The measured notes. A note that was cut off is measured as far as it went.
+    pub fn finish(mut self) -> Vec<MeasuredNote> {
+        while let Some(span) = self.now {
+            self.measure(span);
+            self.now = self.notes.next();
+        }
+        self.measured
+    }
+
+    /// The samples to measure: the steady part of a note, or the middle of it if the note is long.
+    fn range(&self, span: &NoteSpan) -> (usize, usize) {
+        let (first, last) = span.steady();
+        let longest = (LONGEST_S * self.rate_hz) as usize;
+        let spare = (last - first).saturating_sub(longest) / 2;
+        (first + spare, last - spare)
+    }
+
+    fn measure(&mut self, span: NoteSpan) {
+        let wanted_hz = span.note.frequency_hz(self.a4_hz);
+        let hz = refine_hz(&self.kept, self.rate_hz, wanted_hz)
+            .or_else(|| fundamental_hz(&self.kept, self.rate_hz));
+        self.measured.push(MeasuredNote {
+            span,
+            hz,
+            cents: hz.map(|hz| cents(hz, wanted_hz)),
+            level_dbfs: rms_dbfs(&self.kept),
+        });
+        self.kept.clear();
+    }
+}
+
+/// Number of notes with a pitch, mean of the absolute deviations from equal temperament, and the largest deviation with its
+/// sign, cents. `None` if no note has a pitch.
+pub fn spread(measured: &[MeasuredNote]) -> Option<(usize, f64, f64)> {
+    let cents: Vec<f64> = measured.iter().filter_map(|note| note.cents).collect();
+    let largest = cents.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+    let mean = cents.iter().map(|cents| cents.abs()).sum::<f64>() / cents.len() as f64;
+    Some((cents.len(), mean, largest))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::SoundingNote;
+    use std::f64::consts::TAU;
+
+    /// Three tones, the middle one 20 cents sharp, the last one long and in silence afterwards.
+    fn tones() -> (Vec<NoteSpan>, Vec<f32>) {
+        let mut notes = Vec::new();
+        let mut samples: Vec<f32> = Vec::new();
+        for (note, off, length) in [(60, 0.0, 20_000), (64, 20.0, 24_000), (67, -5.0, 400_000)] {
+            let note = SoundingNote(note);
+            let hz = note.frequency_hz(440.0) * 2f64.powf(off / 1200.0);
+            let from = samples.len();
+            samples.extend((0..length).map(|n| (0.5 * (TAU * hz * f64::from(n) / 48_000.0).sin()) as f32));
+            notes.push(NoteSpan { note, from, to: samples.len() });
+        }
+        (notes, samples)
+    }
+
+    #[test]
+    fn cents_and_levels_are_those_of_the_tones_whatever_the_blocks() {
+        let (notes, samples) = tones();
+        let mut all = Vec::new();
+        for block in [64, 4_800, 1_000_000] {
+            let mut meter = NoteMeter::new(notes.clone(), 48_000.0, 440.0);
+            samples.chunks(block).for_each(|block| meter.hear(block));
+            all.push(meter.finish());
+        }
+        assert!(all[0] == all[1] && all[1] == all[2]);
+        for (heard, off) in all[0].iter().zip([0.0, 20.0, -5.0]) {
+            assert!((heard.cents.unwrap() - off).abs() < 0.1, "{heard:?}");
+            assert!((heard.level_dbfs - 20.0 * (0.5 / 2f64.sqrt()).log10()).abs() < 0.02, "{heard:?}");
+        }
+        let (count, mean, largest) = spread(&all[0]).unwrap();
+        assert!(count == 3 && (mean - 25.0 / 3.0).abs() < 0.1 && (largest - 20.0).abs() < 0.1);
+        assert_eq!(spread(&[]), None);
+    }
+
+    #[test]
+    fn a_note_cut_off_is_measured_and_silence_has_no_pitch() {
+        let (notes, samples) = tones();
+        let mut meter = NoteMeter::new(notes, 48_000.0, 440.0);
+        meter.hear(&samples[..18_000]);
+        let heard = meter.finish();
+        assert!(heard[0].cents.is_some());
+        assert_eq!((heard[1].hz, heard[2].cents), (None, None));
+        assert_eq!(heard[2].level_dbfs, f64::NEG_INFINITY);
+    }
+}

@@ -1,0 +1,151 @@
+//! A score: events at sample positions, and how long to listen.
+
+use crate::event::{Event, Timed};
+use crate::instrument::Settings;
+use crate::score::breath::BreathCurve;
+use crate::score::samples::samples_in;
+use crate::units::{SoundingNote, WrittenNote};
+
+/// Silence before a tongued note of a scale, s: the time a tongue takes to touch the reed and leave it again, chosen by ear.
+const TONGUE_GAP_S: f64 = 0.03;
+
+/// Velocity of a note that no keyboard has played, 0..=1.
+const PLAIN_VELOCITY: f32 = 0.8;
+
+/// What is to be played: events in order of time, at one sample rate.
+///
+/// Make one with [`note`](Self::note), [`scale`](Self::scale), a MIDI file (feature `midi`), or from your own events.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Score {
+    /// The events, in order of time; positions in samples from the start.
+    pub events: Vec<Timed<Event>>,
+    /// Length of the score, with the time to fade, samples.
+    pub samples: usize,
+}
+
+/// Why a score cannot be made.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum ScoreError {
+    /// The sounding pitch of a written note would lie outside MIDI's 0 to 127.
+    #[error("written note {0} sounds outside MIDI's 0..127; choose one nearer the middle")]
+    OutsideMidi(WrittenNote),
+}
+
+impl Score {
+    /// One note from the start, held for `seconds`. `rate` is the sample rate, Hz.
+    pub fn note(note: SoundingNote, seconds: f64, rate: u32) -> Self {
+        let end = samples_in(seconds, rate);
+        let events = vec![
+            Timed { at: 0, event: Event::NoteOn { note, velocity: PLAIN_VELOCITY } },
+            Timed { at: end, event: Event::NoteOff { note } },
+        ];
+        Self { events, samples: end }
+    }
+
+    /// Every semitone from one written note to another, up or down, each lasting `seconds`; tongued or slurred.
+    ///
+    /// The instrument sounds `transposition` semitones below what is written (B flat clarinet: 2). `rate` is the sample rate,
+    /// Hz.
+    ///
+    /// # Errors
+    ///
+    /// [`ScoreError::OutsideMidi`] if a note sounds outside MIDI's range.
+    pub fn scale(
+        from: WrittenNote,
+        to: WrittenNote,
+        transposition: i8,
+        seconds: f64,
+        slurred: bool,
+        rate: u32,
+    ) -> Result<Self, ScoreError> {
+        let semitones: Vec<u8> =
+            if from <= to { (from.0..=to.0).collect() } else { (to.0..=from.0).rev().collect() };
+        let gap_s = if slurred { 0.0 } else { TONGUE_GAP_S.min(seconds / 4.0) };
+        let (mut events, mut end, mut last) = (Vec::new(), 0, None);
+        for (index, written) in semitones.into_iter().map(WrittenNote).enumerate() {
+            let note = written.sounding(transposition).ok_or(ScoreError::OutsideMidi(written))?;
+            let start = samples_in(index as f64 * seconds, rate);
+            events.push(Timed { at: start, event: Event::NoteOn { note, velocity: PLAIN_VELOCITY } });
+            if let Some(note) = last.filter(|_| slurred) {
+                // The old key comes up after the next one is down: a slur, in which the reed keeps vibrating.
+                events.push(Timed { at: start, event: Event::NoteOff { note } });
+            }
+            end = samples_in((index + 1) as f64 * seconds, rate);
+            if !slurred {
+                let up = samples_in((index + 1) as f64 * seconds - gap_s, rate);
+                events.push(Timed { at: up, event: Event::NoteOff { note } });
+            }
+            last = Some(note);
+        }
+        if let Some(note) = last.filter(|_| slurred) {
+            events.push(Timed { at: end, event: Event::NoteOff { note } });
+        }
+        Ok(Self { events, samples: end })
+    }
+
+    /// The same notes with the breath of `curve`, which replaces all breath events of the score.
+    pub fn blown(mut self, curve: &BreathCurve, settings: &Settings, rate: u32) -> Self {
+        self.events.retain(|e| !matches!(e.event, Event::Breath(_)));
+        let mut events = curve.events(self.samples, rate, settings);
+        events.append(&mut self.events);
+        // The sort is stable. At one sample breath comes before notes, so that the tongue releases a blown reed.
+        events.sort_by_key(|e| e.at);
+        Self { events, samples: self.samples }
+    }
+
+    /// The same score with `seconds` more at its end, in which the sound fades.
+    pub fn with_tail(mut self, seconds: f64, rate: u32) -> Self {
+        self.samples = self.samples.saturating_add(samples_in(seconds, rate));
+        self
+    }
+
+    /// Length of the score, s.
+    pub fn seconds(&self, rate: u32) -> f64 {
+        self.samples as f64 / f64::from(rate)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::score::breath::BreathCurve;
+
+    #[test]
+    fn breath_comes_before_the_note_it_sounds() {
+        let score = Score::note(SoundingNote(60), 1.0, 48_000).blown(
+            &BreathCurve::constant(0.5),
+            &Settings::default(),
+            48_000,
+        );
+        assert!(matches!(score.events[0].event, Event::Breath(breath) if (breath - 0.5).abs() < 1e-6));
+        assert!(matches!(score.events[1].event, Event::NoteOn { .. }));
+        assert_eq!((score.events.len(), score.samples), (3, 48_000));
+    }
+
+    #[test]
+    fn slurred_notes_overlap_and_tongued_ones_do_not() {
+        for slurred in [false, true] {
+            let scale = Score::scale(WrittenNote(52), WrittenNote(64), 2, 0.25, slurred, 48_000).unwrap();
+            let (mut held, mut empty) = (0, 0);
+            for event in &scale.events[..scale.events.len() - 1] {
+                match event.event {
+                    Event::NoteOn { .. } => held += 1,
+                    Event::NoteOff { .. } => held -= 1,
+                    _ => {}
+                }
+                empty += u32::from(held == 0);
+            }
+            assert_eq!(empty, if slurred { 0 } else { 12 });
+            assert_eq!(scale.events.len(), 26);
+            assert_eq!(scale.samples, 13 * 12_000);
+            assert!(scale.events.is_sorted_by_key(|e| e.at));
+        }
+    }
+
+    #[test]
+    fn a_scale_can_fall() {
+        let scale = Score::scale(WrittenNote(64), WrittenNote(52), 2, 0.1, true, 48_000).unwrap();
+        assert!(matches!(scale.events[0].event, Event::NoteOn { note: SoundingNote(62), .. }));
+        assert!(Score::scale(WrittenNote(0), WrittenNote(5), 2, 0.1, true, 48_000).is_err());
+    }
+}
