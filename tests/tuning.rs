@@ -1,4 +1,4 @@
-//! How well in tune the radiated sound is, and how soon it speaks. Figures are printed (`--nocapture`) to be quoted.
+//! How well in tune the radiated sound is, and how soon it speaks. The tests print their figures (`--nocapture`).
 
 #[path = "support/parallel.rs"]
 mod parallel;
@@ -94,7 +94,7 @@ fn tempered_notes_stay_in_tune_from_piano_to_forte() {
     let off = each(&runs, |&(written, gamma)| {
         let note = fingering(&model, written);
         let rows = model.tuning.rows(note, Tuning::Tempered, gamma);
-        // Just above the threshold notes take their time.
+        // Just above the threshold notes grow slowly.
         let from_s = if gamma < 0.5 { 0.9 } else { 0.6 };
         let sound =
             HeldNote { rows, ..HeldNote::new(&model, note, gamma) }.radiated(&model, from_s, from_s + 0.3);
@@ -185,7 +185,7 @@ fn tongued_notes_speak_at_once() {
             HeldNote { start: Start::Tongued(2.0), ..HeldNote::new(&model, fingering(&model, written), 0.5) };
         1e3 * onset::t90_s(&mouthpiece(&model, &note, 1.0), rate, TONGUE_HOLD_S).unwrap()
     });
-    // From the key: what the tongue's hold and the breath's rise add.
+    // From the key, that is with the tongue's hold and the breath's rise.
     let key_ms = each(&notes, |&written| {
         let mut clarinet = Keyed::new(written, 0.5).start(&model, 48_000.0);
         let mut pressure = Vec::new();
