@@ -133,6 +133,12 @@ fn sweeps(bends: &[f64], seconds: &[f64]) -> Vec<Swept> {
 
 /// A note with a larger error than this has changed its register, cents.
 const LOST_CENTS: f64 = 60.0;
+/// Largest error of a bent note, cents; measured 1.41.
+const BENT_CENTS: f64 = 1.5;
+/// Largest error after the way back, cents; measured below 0.005.
+const BACK_CENTS: f64 = 0.01;
+/// Largest step between samples and largest change of a step, over those of the steady notes; measured 1.35 and 1.62.
+const EDGES: [f64; 2] = [1.5, 1.8];
 
 /// Prints the figures of some sweeps and asserts that none clicks. Returns the notes that lost their register.
 fn judge(what: &str, swept: &[Swept]) -> Vec<u8> {
@@ -157,11 +163,12 @@ fn judge(what: &str, swept: &[Swept]) -> Vec<u8> {
     // When the pitch jumps an octave at once, the reed's jerk makes the change of a step a little larger than in a steady
     // note; a gap in the sound would make it many times larger.
     let clicks: Vec<_> =
-        swept.iter().filter(|s| !lost(s) && (s.edges[0] > 1.5 || s.edges[1] > 2.0)).collect();
+        swept.iter().filter(|s| !lost(s) && (s.edges[0] > EDGES[0] || s.edges[1] > EDGES[1])).collect();
     for s in &clicks {
         println!("{what}: click {s:.2?}");
     }
     assert!(clicks.is_empty(), "{} clicks", clicks.len());
+    assert!(kept().all(|s| s.off_cents.abs() <= BENT_CENTS && s.back_cents.abs() <= BACK_CENTS), "{what}");
     notes
 }
 
@@ -169,7 +176,7 @@ fn judge(what: &str, swept: &[Swept]) -> Vec<u8> {
 fn two_semitones_arrive_in_their_register_without_a_click() {
     for seconds in [0.0, 0.1, 1.0] {
         let lost = judge(&format!("+-200 cents in {seconds} s"), &sweeps(&[200.0, -200.0], &[seconds]));
-        assert!(lost.len() <= 2, "at least 95 % of 40 notes keep their register: {lost:?}");
+        assert!(lost.is_empty(), "all 40 notes keep their register: {lost:?}");
     }
 }
 
@@ -177,7 +184,7 @@ fn two_semitones_arrive_in_their_register_without_a_click() {
 fn an_octave_arrives_in_its_register_without_a_click() {
     for seconds in [0.0, 0.1, 1.0] {
         let lost = judge(&format!("+-1200 cents in {seconds} s"), &sweeps(&[1200.0, -1200.0], &[seconds]));
-        assert!(lost.len() <= 2, "at least 95 % of 40 notes keep their register: {lost:?}");
+        assert!(lost.is_empty(), "all 40 notes keep their register: {lost:?}");
     }
 }
 
@@ -195,7 +202,8 @@ fn small_bends_arrive_on_every_note_the_lowest_too() {
     });
     let most = off.iter().fold(0.0_f64, |most, off| most.max(off.abs()));
     println!("+-50 and +-100 cents: off by {most:.2} at most; E3: {:.2?}", &off[..4]);
-    assert!(off.iter().all(|off| off.abs() < 3.0), "{off:?}");
+    // Measured 0.85.
+    assert!(off.iter().all(|off| off.abs() <= 0.95), "{off:?}");
 }
 
 #[test]
@@ -212,7 +220,8 @@ fn every_a4_from_415_to_466_is_in_tune_from_the_first_sample() {
         cents(hz(&render(&mut clarinet, 0.4), 0.0), sounding.frequency_hz(f64::from(a4_hz)))
     });
     println!("A4 415, 430, 450, 466: {off:.2?} cents off");
-    assert!(off.iter().all(|off| off.abs() < 3.0), "{off:?}");
+    // Measured 0.42.
+    assert!(off.iter().all(|off| off.abs() <= 0.5), "{off:?}");
 }
 
 /// Whatever folds back shows between the harmonics.
@@ -242,8 +251,9 @@ fn nothing_folds_back_that_could_be_heard() {
         let louder = of_bend().zip(levels.iter().step_by(bends.len())).map(|(bent, plain)| bent.1 - plain.1);
         let louder = louder.fold(0.0, |most: f64, db| if db.abs() > most.abs() { db } else { most });
         println!("{bend:+} cents: {between:.1} dB between the harmonics, level by {louder:+.2} dB at most");
-        assert!(between < -80.0, "{bend} cents: {between} dB");
-        assert!(louder.abs() < 1.0, "{bend} cents: {louder} dB");
+        // Measured -91.8 dB at most, and 0.59 dB.
+        assert!(between < -90.0, "{bend} cents: {between} dB");
+        assert!(louder.abs() < 0.7, "{bend} cents: {louder} dB");
     }
 }
 

@@ -17,7 +17,6 @@ use crate::bore::lattice::Real;
 use crate::control::keys::Keys;
 use crate::event::Event;
 use crate::instrument::model::Model;
-use crate::instrument::scope::PlayerState;
 use crate::instrument::settings::Settings;
 use crate::instrument::voice::{Drive, TICK, Voice};
 use crate::reed::motion::TONGUE_FORCE;
@@ -49,6 +48,17 @@ struct TickContext<'a> {
 /// Share of the way that a first-order lag with the time constant `time_s` covers in `tick_s`, 0..1.
 fn step_towards(tick_s: f64, time_s: f64) -> f64 {
     1.0 - (-tick_s / time_s).exp()
+}
+
+/// What the player does now.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlayerState {
+    /// The note that is held, if any.
+    pub sounding: Option<SoundingNote>,
+    /// Index of the fingering in place.
+    pub fingering: usize,
+    /// Mouth pressure, kPa.
+    pub mouth_kpa: f32,
 }
 
 /// One player of one instrument.

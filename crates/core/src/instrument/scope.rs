@@ -4,7 +4,6 @@
 //! as long as the capture took: a screen needs no more, and the audio thread saves the work.
 
 use crate::instrument::voice::{Probe, TICK};
-use crate::units::SoundingNote;
 
 /// Samples of one capture.
 pub const SCOPE_SAMPLES: usize = 672;
@@ -22,17 +21,6 @@ pub struct ScopeSample {
     pub opening: f32,
     /// Flow through the reed, cm3/s.
     pub flow_cm3s: f32,
-}
-
-/// What the player does now.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlayerState {
-    /// The note that is held, if any.
-    pub sounding: Option<SoundingNote>,
-    /// Index of the fingering in place.
-    pub fingering: usize,
-    /// Mouth pressure, kPa.
-    pub mouth_kpa: f32,
 }
 
 /// Records captures. Real-time safe except for [`new`](Self::new).
