@@ -1,8 +1,8 @@
-//! Prepared instruments kept between sessions: a folder that may be deleted at any time.
+//! Keeps prepared instruments between sessions, in a folder that may be deleted at any time.
 //!
-//! An entry's name is a hash of everything its content depends on, so nothing in it ever has to be looked up or mended:
-//! what is damaged, from another version or not there at all is made again. Entries appear whole or not at all, and two
-//! programs that make the same one write the same bytes.
+//! The name of an entry is a hash of everything its content depends on. So nothing ever has to be repaired: an entry that
+//! is damaged, missing or from another version is made again. Entries appear whole or not at all, and two programs that
+//! make the same one write the same bytes.
 
 use std::fs;
 use std::io::Write as _;
@@ -13,25 +13,26 @@ use chalumeau_core::instrument::store::{Key, Store};
 
 use crate::output::NewFile;
 
-/// Names the directory instead of the system's own; for tests and unusual systems.
+/// Environment variable that names a directory to use instead of the system's own; for tests and unusual systems.
 pub const VARIABLE: &str = "CHALUMEAU_CACHE_DIR";
-/// Entries kept; the ones not used for longest go. An entry is about 10 kB.
+/// Number of entries kept; the least recently used are removed first. An entry is about 10 kB.
 pub const ENTRIES_MOST: usize = 64;
-/// Entries end so.
+/// File name extension of entries.
 const SUFFIX: &str = "prepared";
-/// What a program that was ended while writing has left behind is removed after this.
+/// A partly written file that a program has left behind is removed after this time.
 const ABANDONED: Duration = Duration::from_secs(3_600);
-/// Larger than any entry; what is larger is not one.
+/// Upper limit for the size of an entry, bytes; a larger file is not one.
 const BYTES_MOST: u64 = 1 << 20;
 
-/// The folder.
+/// The folder of prepared instruments: a [`Store`] on disk.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cache {
     folder: PathBuf,
 }
 
 impl Cache {
-    /// `chalumeau` in the user's folder for caches, or in that named by [`VARIABLE`]; `None` where there is none.
+    /// The folder `chalumeau` in the user's cache directory, or in the directory that [`VARIABLE`] names; `None` if there is
+    /// neither.
     pub fn system() -> Option<Self> {
         let chosen = std::env::var_os(VARIABLE).filter(|chosen| !chosen.is_empty()).map(PathBuf::from);
         chosen.or_else(dirs::cache_dir).map(|root| Self::within(root.join("chalumeau")))
@@ -42,17 +43,17 @@ impl Cache {
         cache.map(|cache| cache as &dyn Store)
     }
 
-    /// A folder of its own choice; made when something is kept.
+    /// A cache in this folder, which is created when the first entry is kept.
     pub fn within(folder: impl Into<PathBuf>) -> Self {
         Self { folder: folder.into() }
     }
 
-    /// Where the entries are.
+    /// The folder of the entries.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// Where an entry is, or would be.
+    /// Path of the entry of a key, whether it exists or not.
     pub fn path(&self, key: &Key) -> PathBuf {
         self.folder.join(format!("{key}.{SUFFIX}"))
     }
@@ -73,14 +74,14 @@ impl Cache {
         let spare = entries.len().saturating_sub(ENTRIES_MOST);
         entries.sort();
         for (_, path) in entries.into_iter().take(spare) {
-            // Another program may have been quicker.
+            // Another program may have removed it already.
             let _ = fs::remove_file(path);
         }
     }
 }
 
 impl Store for Cache {
-    /// What was kept under a key, if it is whole.
+    /// The text kept under a key, if it is whole.
     fn get(&self, key: &Key) -> Option<String> {
         let path = self.path(key);
         if fs::metadata(&path).ok()?.len() > BYTES_MOST {
@@ -89,7 +90,7 @@ impl Store for Cache {
         let text = fs::read_to_string(&path).ok()?;
         let (head, body) = text.split_once('\n')?;
         (head == heading(body)).then(|| {
-            // Only to know what is used; where it may not be written, the oldest entry goes all the same.
+            // Marks the entry as used. If the file cannot be written, the entry only counts as older than it is.
             let _ = fs::File::options()
                 .write(true)
                 .open(&path)
@@ -98,8 +99,8 @@ impl Store for Cache {
         })
     }
 
-    /// Keeps a text under a key, and drops what has not been used for longest. A cache that cannot be written is as
-    /// good as none: nothing is reported.
+    /// Keeps a text under a key, and removes the least recently used entries. Reports nothing if the cache cannot be
+    /// written: the program works without it.
     fn put(&self, key: &Key, body: &str) {
         let write = || -> Option<()> {
             fs::create_dir_all(&self.folder).ok()?;
@@ -113,7 +114,7 @@ impl Store for Cache {
     }
 }
 
-/// First line of an entry: says what it is, and whether the rest is whole.
+/// First line of an entry: tells a reader what the file is, and the program whether the rest is whole.
 fn heading(body: &str) -> String {
     format!("# Chalumeau: a prepared instrument; may be deleted. sha256 {}", Key::of(body.as_bytes()))
 }

@@ -1,5 +1,5 @@
-//! Bends: whether the pitch arrives, in the register it began in, without a click, and what folds back when the whole
-//! instrument is an octave higher. Figures are printed (`--nocapture`) to be quoted.
+//! Bends: the pitch arrives, in the register where it began, without a click; and nothing audible folds back when the
+//! whole instrument is an octave higher. The tests print their figures (`--nocapture`).
 
 #[path = "support/parallel.rs"]
 mod parallel;
@@ -40,7 +40,7 @@ fn render(clarinet: &mut Clarinet, seconds: f64) -> Vec<f64> {
     to_f64(&out)
 }
 
-/// Turns the wheel from one offset to another within `seconds` (0 at once), a message every 32 samples.
+/// Turns the wheel from one offset to another within `seconds` (0: at once), one message every 32 samples.
 fn turn(clarinet: &mut Clarinet, from_cents: f64, to_cents: f64, seconds: f64) -> Vec<f64> {
     let messages = (seconds * RATE_HZ / 32.0) as usize;
     let mut sound = Vec::new();
@@ -55,7 +55,7 @@ fn turn(clarinet: &mut Clarinet, from_cents: f64, to_cents: f64, seconds: f64) -
 
 /// Pitch of a note that should sound at `near_hz`; NaN for none.
 fn hz(sound: &[f64], near_hz: f64) -> f64 {
-    // Above what the tracker covers it is known how far a bend goes, and a lost register is a fifth or more below.
+    // Above the tracker's range the expected pitch is known, and a lost register would lie a fifth or more below it.
     let found = if near_hz > 0.9 * pitch::HIGHEST_HZ {
         pitch::refine_hz(sound, RATE_HZ, near_hz).filter(|&hz| pitch::periodicity(sound, RATE_HZ, hz) > 0.95)
     } else {
@@ -74,19 +74,19 @@ fn edges(sound: &[f64]) -> [f64; 2] {
     ]
 }
 
-/// What became of one sweep up or down and back.
+/// Result of one sweep up or down and back.
 #[derive(Debug)]
-#[expect(dead_code, reason = "what is only printed tells which sweep it was")]
+#[expect(dead_code, reason = "printed only, to tell which sweep it was")]
 struct Swept {
     written: u8,
     gamma: f32,
     bend_cents: f64,
     seconds: f64,
-    /// Where the bent note is from where it should be, cents; NaN for none.
+    /// Error of the bent note, cents; NaN if there is none.
     off_cents: f64,
     /// The same after the way back.
     back_cents: f64,
-    /// Largest edge on the way over the largest of the two steady notes, steps and their changes.
+    /// Largest step between samples during the sweep, and largest change of a step, over those of the steady notes.
     edges: [f64; 2],
 }
 
@@ -131,10 +131,16 @@ fn sweeps(bends: &[f64], seconds: &[f64]) -> Vec<Swept> {
     each(&runs, sweep)
 }
 
-/// A note that is more than this from where it should be has changed its register.
+/// A note with a larger error than this has changed its register, cents.
 const LOST_CENTS: f64 = 60.0;
+/// Largest error of a bent note, cents; measured 1.41.
+const BENT_CENTS: f64 = 1.5;
+/// Largest error after the way back, cents; measured below 0.005.
+const BACK_CENTS: f64 = 0.01;
+/// Largest step between samples and largest change of a step, over those of the steady notes; measured 1.35 and 1.62.
+const EDGES: [f64; 2] = [1.5, 1.8];
 
-/// Prints what is to be known of some sweeps; asserts that none clicks. Gives the notes lost.
+/// Prints the figures of some sweeps and asserts that none clicks. Returns the notes that lost their register.
 fn judge(what: &str, swept: &[Swept]) -> Vec<u8> {
     let lost = |s: &&Swept| !(s.off_cents.abs() < LOST_CENTS && s.back_cents.abs() < LOST_CENTS);
     let mut notes: Vec<u8> = swept.iter().filter(lost).map(|s| s.written).collect();
@@ -154,13 +160,15 @@ fn judge(what: &str, swept: &[Swept]) -> Vec<u8> {
         most(&|s| s.edges[0]),
         most(&|s| s.edges[1]),
     );
-    // Of the reed's jerk at an octave in no time the second is a little more than of a steady note; a gap is many times.
+    // When the pitch jumps an octave at once, the reed's jerk makes the change of a step a little larger than in a steady
+    // note; a gap in the sound would make it many times larger.
     let clicks: Vec<_> =
-        swept.iter().filter(|s| !lost(s) && (s.edges[0] > 1.5 || s.edges[1] > 2.0)).collect();
+        swept.iter().filter(|s| !lost(s) && (s.edges[0] > EDGES[0] || s.edges[1] > EDGES[1])).collect();
     for s in &clicks {
         println!("{what}: click {s:.2?}");
     }
     assert!(clicks.is_empty(), "{} clicks", clicks.len());
+    assert!(kept().all(|s| s.off_cents.abs() <= BENT_CENTS && s.back_cents.abs() <= BACK_CENTS), "{what}");
     notes
 }
 
@@ -168,7 +176,7 @@ fn judge(what: &str, swept: &[Swept]) -> Vec<u8> {
 fn two_semitones_arrive_in_their_register_without_a_click() {
     for seconds in [0.0, 0.1, 1.0] {
         let lost = judge(&format!("+-200 cents in {seconds} s"), &sweeps(&[200.0, -200.0], &[seconds]));
-        assert!(lost.len() <= 2, "at least 95 % of 40 notes keep their register: {lost:?}");
+        assert!(lost.is_empty(), "all 40 notes keep their register: {lost:?}");
     }
 }
 
@@ -176,7 +184,7 @@ fn two_semitones_arrive_in_their_register_without_a_click() {
 fn an_octave_arrives_in_its_register_without_a_click() {
     for seconds in [0.0, 0.1, 1.0] {
         let lost = judge(&format!("+-1200 cents in {seconds} s"), &sweeps(&[1200.0, -1200.0], &[seconds]));
-        assert!(lost.len() <= 2, "at least 95 % of 40 notes keep their register: {lost:?}");
+        assert!(lost.is_empty(), "all 40 notes keep their register: {lost:?}");
     }
 }
 
@@ -194,7 +202,8 @@ fn small_bends_arrive_on_every_note_the_lowest_too() {
     });
     let most = off.iter().fold(0.0_f64, |most, off| most.max(off.abs()));
     println!("+-50 and +-100 cents: off by {most:.2} at most; E3: {:.2?}", &off[..4]);
-    assert!(off.iter().all(|off| off.abs() < 3.0), "{off:?}");
+    // Measured 0.85.
+    assert!(off.iter().all(|off| off.abs() <= 0.95), "{off:?}");
 }
 
 #[test]
@@ -211,10 +220,11 @@ fn every_a4_from_415_to_466_is_in_tune_from_the_first_sample() {
         cents(hz(&render(&mut clarinet, 0.4), 0.0), sounding.frequency_hz(f64::from(a4_hz)))
     });
     println!("A4 415, 430, 450, 466: {off:.2?} cents off");
-    assert!(off.iter().all(|off| off.abs() < 3.0), "{off:?}");
+    // Measured 0.42.
+    assert!(off.iter().all(|off| off.abs() <= 0.5), "{off:?}");
 }
 
-/// What folds back shows between the harmonics.
+/// Whatever folds back shows between the harmonics.
 #[test]
 fn nothing_folds_back_that_could_be_heard() {
     let bends = [0.0, 200.0, 700.0, 1_200.0, 2_400.0, -200.0, -1_200.0];
@@ -230,7 +240,7 @@ fn nothing_folds_back_that_could_be_heard() {
         render(&mut clarinet, 1.5 * longer);
         let sound = render(&mut clarinet, longer);
         let f0_hz = hz(&sound, MODEL.notes_hz[usize::from(written - 52)] * ratio);
-        // What the lattice has between harmonics beyond hearing comes into it downwards, and is not the bend's.
+        // A bend downwards brings into hearing what the lattice has between harmonics above it; that is not the bend's.
         let top_hz = 18_000.0 / longer;
         let between = spectrum::non_harmonic_db(&sound, RATE_HZ, f0_hz, 20.0, top_hz, 15.0 / longer);
         (between, spectrum::rms_dbfs(&sound))
@@ -241,8 +251,9 @@ fn nothing_folds_back_that_could_be_heard() {
         let louder = of_bend().zip(levels.iter().step_by(bends.len())).map(|(bent, plain)| bent.1 - plain.1);
         let louder = louder.fold(0.0, |most: f64, db| if db.abs() > most.abs() { db } else { most });
         println!("{bend:+} cents: {between:.1} dB between the harmonics, level by {louder:+.2} dB at most");
-        assert!(between < -80.0, "{bend} cents: {between} dB");
-        assert!(louder.abs() < 1.0, "{bend} cents: {louder} dB");
+        // Measured -91.8 dB at most, and 0.59 dB.
+        assert!(between < -90.0, "{bend} cents: {between} dB");
+        assert!(louder.abs() < 0.7, "{bend} cents: {louder} dB");
     }
 }
 
@@ -258,13 +269,13 @@ impl Random {
     }
 }
 
-/// Fifteen fingers on one voice: the last key down sounds, with its own bend, whatever is held or comes up meanwhile.
+/// Fifteen channels play one voice: the last key down sounds, with its own bend, whatever else is held or released.
 #[test]
 fn no_note_of_fifteen_channels_is_stuck_or_has_anothers_bend() {
     let mut random = Random(7);
     let mut midi = MidiDecoder::new().with_mpe();
     let mut clarinet = Clarinet::new(MODEL.clone(), RATE_HZ);
-    // What is held, oldest first, the slow way: keys as the instrument was told, and (key, channel) as they were played.
+    // A slow model of the held keys, oldest first: as the instrument was told, and (key, channel) as they were played.
     let (mut told, mut held): (Vec<u8>, Vec<(u8, u8)>) = (Vec::new(), Vec::new());
     let (mut wheels, mut bent) = ([8192_u16; 16], 0.0_f32);
     let mut listen = |events: Events, told: &mut Vec<u8>, bent: &mut f32| {
@@ -285,7 +296,7 @@ fn no_note_of_fifteen_channels_is_stuck_or_has_anothers_bend() {
     for _ in 0..4_000 {
         let channel = 1 + random.below(15) as u8;
         match random.below(5) {
-            // A finger that is down comes up before it goes down elsewhere; some keys are struck by two fingers.
+            // A finger is lifted before it strikes another key; two fingers may strike the same key.
             0 | 1 if !held.iter().any(|&(_, by)| by == channel) => {
                 let key = 55 + random.below(20) as u8;
                 held.push((key, channel));

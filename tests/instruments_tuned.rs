@@ -1,5 +1,5 @@
-//! Instruments that no table in this repository was made for by hand: fitted, tuned and heard. Figures are printed
-//! (`--nocapture`) to be quoted.
+//! Any instrument is fitted, tuned and heard: bundled ones, other sizes, files. The tests print their figures
+//! (`--nocapture`).
 
 #[path = "support/parallel.rs"]
 mod parallel;
@@ -18,16 +18,16 @@ use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::event::Event;
 use chalumeau_core::instrument::held::{HeldNote, Start, TONGUE_HOLD_S};
-use chalumeau_core::instrument::prepare::{self, Progress};
+use chalumeau_core::instrument::prepare::{Preparation, Progress, auto_tune};
 use chalumeau_core::instrument::voice::{Drive, TICK};
-use chalumeau_core::instrument::{Clarinet, Model, Quality, Settings, Tuning, Wanted, tuner};
+use chalumeau_core::instrument::{Clarinet, Model, Quality, Settings, Tuning, Wanted};
 use chalumeau_core::units::{REFERENCE_RADIUS_M, WrittenNote, cents};
 use parallel::each;
 
-/// Written C6 and G6: up to here notes are promised within 2 and within 5 cents.
+/// Written C6 and G6.
 const C6: u8 = 84;
 const G6: u8 = 91;
-/// Written G#6: up to here notes are promised in their register.
+/// Written G#6: up to here every note must hold its register.
 const G_SHARP_6: u8 = 92;
 /// Lowest note of the B flat clarinet, Hz.
 const LOWEST_HZ: f64 = 146.83;
@@ -51,23 +51,24 @@ fn resized(factor: f64) -> InstrumentFile {
     InstrumentFile { transposition: file.transposition + lower, ..file }
 }
 
-/// Prepared from nothing, as on the first day.
+/// Prepares an instrument from scratch.
 fn case(name: &'static str, wanted: Wanted) -> Case {
     let begun = Instant::now();
     let mut fitted = Vec::new();
-    let model = prepare::anew(&wanted, &mut |progress| {
-        if let Progress::Fitted(_) = progress {
-            fitted.push(begun.elapsed());
-        }
-        ControlFlow::Continue(())
-    })
-    .unwrap();
-    // Where the bore had to be scaled, it was fitted twice.
+    let model = Preparation::from_scratch(&wanted)
+        .tuned(&mut |progress| {
+            if let Progress::Fitted(_) = progress {
+                fitted.push(begun.elapsed());
+            }
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+    // A bore that had to be scaled was fitted twice.
     let tuning = begun.elapsed() - fitted[fitted.len() - 1];
     Case { name, model: Arc::new(model), fitting: fitted[0], tuning }
 }
 
-/// Every instrument at one host rate of each family.
+/// Instruments at one host rate of each family.
 static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
     let mut cases = Vec::new();
     for host_rate_hz in [48_000.0, 44_100.0] {
@@ -89,12 +90,12 @@ fn at_96_khz() -> impl Iterator<Item = &'static Case> {
     CASES.iter().filter(|case| case.model.coeffs.rate_hz == 96_000.0)
 }
 
-/// How much larger than a B flat clarinet an instrument is.
+/// Size of an instrument over that of a B flat clarinet.
 fn size(model: &Model) -> f64 {
     LOWEST_HZ / model.lowest_hz
 }
 
-/// How much longer an instrument's notes take to be steady, as the tuner has it.
+/// How much longer the notes of an instrument take to become steady; the rule of the automatic tuning.
 fn slower(model: &Model) -> f64 {
     size(model).clamp(1.0, 4.0)
 }
@@ -107,7 +108,7 @@ fn fingering(model: &Model, written: u8) -> usize {
     model.file.fingerings.iter().position(|fingering| fingering.written == WrittenNote(written)).unwrap()
 }
 
-/// Cents above its pitch of what was heard of a note; NaN for nothing.
+/// Error of a heard note, cents above its pitch; NaN if nothing was heard.
 fn off_cents(model: &Model, fingering: usize, heard_hz: Option<f64>) -> f64 {
     heard_hz.map_or(f64::NAN, |hz| cents(hz, model.notes_hz[fingering]))
 }
@@ -117,7 +118,7 @@ struct Keyed {
     host_rate_hz: f64,
     gamma: f32,
     gain_db: f32,
-    /// How much of it is listened to once it is steady, s.
+    /// Length of the steady part that is measured, s.
     heard_s: f64,
 }
 
@@ -136,7 +137,7 @@ impl Keyed {
     }
 }
 
-/// Cents above its pitch of a note as a host plays it; NaN for none.
+/// Error of a note as a host plays it, cents above its pitch; NaN if there is none.
 fn keyed_cents(model: &Arc<Model>, fingering: usize, host_rate_hz: f64) -> f64 {
     let keyed = Keyed { host_rate_hz, gamma: 0.5, gain_db: -12.0, heard_s: 0.4 * slower(model) };
     let steady = keyed.steady(model, fingering);
@@ -184,7 +185,7 @@ fn tuned_instruments_are_in_tune_as_hosts_hear_them() {
     }
 }
 
-/// Cents above its pitch of a held note, tempered; NaN for none.
+/// Error of a held note with tempered trims, cents above its pitch; NaN if there is none.
 fn tempered_cents(model: &Model, note: usize, gamma: f64) -> f64 {
     let rows = model.tuning.rows(note, Tuning::Tempered, gamma);
     let from_s = slower(model) * if gamma < 0.5 { 1.0 } else { 0.6 };
@@ -227,8 +228,8 @@ fn mouthpiece(model: &Model, note: &HeldNote) -> Vec<f64> {
     pressure
 }
 
-/// As soon as the B flat clarinet's, in periods of the note: from the tongue 45 ms for C4 and 60 ms for E3, longer as the
-/// instrument is larger.
+/// The limits are those of the B flat clarinet, 45 ms for C4 and 60 ms for E3 from the tongue, in proportion to the size of
+/// the instrument.
 #[test]
 fn tongued_notes_of_every_size_speak_at_once() {
     for case in at_96_khz().filter(|case| case.model.file.fingerings.len() > 40) {
@@ -244,7 +245,7 @@ fn tongued_notes_of_every_size_speak_at_once() {
     }
 }
 
-/// The bound on time is for a machine with nothing else to do; here it is printed, and held with room for other work.
+/// The times are printed; the limits leave room for other work on the machine.
 #[test]
 fn preparing_takes_seconds_and_loading_none() {
     for case in &*CASES {
@@ -256,7 +257,7 @@ fn preparing_takes_seconds_and_loading_none() {
     let cache = Cache::within(folder.path());
     let wanted = Wanted::new(local("examples/instruments/alto-chalumeau.toml"), 48_000.0);
     let begun = Instant::now();
-    let made = prepare::make(&wanted, Some(&cache), &mut |_| ControlFlow::Continue(())).unwrap();
+    let made = Preparation::new(&wanted, Some(&cache)).tuned(&mut |_| ControlFlow::Continue(())).unwrap();
     let making = begun.elapsed();
     let timed = |load: &dyn Fn() -> Option<Model>| {
         let mut times: Vec<Duration> = (0..9)
@@ -269,14 +270,14 @@ fn preparing_takes_seconds_and_loading_none() {
         times.sort();
         times[4]
     };
-    let cached = timed(&|| prepare::ready(&wanted, Some(&cache)).unwrap());
+    let cached = timed(&|| Preparation::new(&wanted, Some(&cache)).ready().unwrap());
     let shipped = Wanted::new(Bundled::Bass.file(), 48_000.0);
-    let shipped = timed(&|| prepare::ready(&shipped, None).unwrap());
+    let shipped = timed(&|| Preparation::new(&shipped, None).ready().unwrap());
     println!(
         "made in {making:.2?}, loaded from the cache in {cached:.2?}; bass from the program's data in {shipped:.2?}"
     );
-    assert_eq!(prepare::ready(&wanted, Some(&cache)).unwrap().unwrap().tuning, made.tuning);
-    // 50 ms are asked of a program that is optimised; this one's readers are not.
+    assert_eq!(Preparation::new(&wanted, Some(&cache)).ready().unwrap().unwrap().tuning, made.tuning);
+    // An optimised program must take at most 50 ms; in this one the parsers are not optimised.
     assert!(cached < Duration::from_millis(100) && cached < making / 10, "{cached:?}");
     assert!(shipped < Duration::from_millis(400), "{shipped:?}");
 }
@@ -292,13 +293,13 @@ fn old_pitch_and_high_pitch_are_a_longer_and_a_shorter_bore() {
         let notes: Vec<usize> = up_to(model, G6).collect();
         let off = each(&notes, |&note| {
             let held = HeldNote::new(model, note, 0.5);
-            off_cents(model, note, tuner::heard_hz(model, &held, model.notes_hz[note]))
+            off_cents(model, note, auto_tune::heard_hz(model, &held, model.notes_hz[note]))
         });
         assert_in_tune(&format!("B flat at A4 = {a4_hz} Hz, scale {:.4}", model.scale), model, &notes, &off);
     }
 }
 
-/// A cylinder a third of a tone flat of what its chart says, more than a delay can mend.
+/// A cylinder that is a semitone flatter than its chart says: more than the delay can correct.
 #[test]
 fn a_flat_instrument_is_played_shorter() {
     let file = local("examples/instruments/cylinder.toml").scaled(1.06);
@@ -314,7 +315,7 @@ fn a_flat_instrument_is_played_shorter() {
 
 fn shipped(instrument: Bundled, quality: Quality) -> Arc<Model> {
     let wanted = Wanted { quality, ..Wanted::new(instrument.file(), 48_000.0) };
-    Arc::new(prepare::ready(&wanted, None).unwrap().unwrap())
+    Arc::new(Preparation::new(&wanted, None).ready().unwrap().unwrap())
 }
 
 #[test]
@@ -325,7 +326,8 @@ fn bundled_instruments_hold_their_registers() {
         let promised = up_to(&model, G_SHARP_6).count();
         for gamma in [0.5, 0.8] {
             let right = each(&notes, |&note| {
-                tuner::heard_hz(&model, &HeldNote::new(&model, note, gamma), model.notes_hz[note]).is_some()
+                auto_tune::heard_hz(&model, &HeldNote::new(&model, note, gamma), model.notes_hz[note])
+                    .is_some()
             });
             let held = right.iter().filter(|&&right| right).count();
             println!("{instrument:?} gamma {gamma}: {held} of {} in their register", notes.len());
@@ -334,7 +336,7 @@ fn bundled_instruments_hold_their_registers() {
     }
 }
 
-/// At twice the rate what is between the harmonics of loud notes, 20 Hz to 8 kHz, is at least 90 dB below them.
+/// At twice the rate everything between the harmonics of loud notes, 20 Hz to 8 kHz, is at least 90 dB below them.
 fn assert_clean(what: &str, model: &Arc<Model>, written: [u8; 3]) {
     assert_eq!(model.coeffs.rate_hz, 192_000.0);
     let keyed = Keyed { host_rate_hz: 48_000.0, gamma: 0.8, gain_db: -12.0, heard_s: 1.0 };
@@ -349,7 +351,7 @@ fn assert_clean(what: &str, model: &Arc<Model>, written: [u8; 3]) {
     let notes = written.map(|written| WrittenNote(written).to_string());
     println!("{what}, {} at gamma 0.8: {levels:.1?} dB, {off:+.0?} cents", notes.join(", "));
     assert!(levels.iter().all(|level| *level <= -90.0), "{what}: {levels:.1?}");
-    // Untuned, perhaps, but no squeak.
+    // A model that is only fitted may be out of tune, but it must not squeak.
     assert!(off.iter().all(|off| off.abs() < 150.0), "{what}: {off:.1?}");
 }
 
@@ -368,26 +370,26 @@ fn bundled_instruments_in_offline_quality_are_cleaner_than_90_db() {
     }
 }
 
-/// Untuned, as the fit leaves them: tuning them at twice the rate takes minutes.
+/// Only fitted, because tuning at twice the rate takes minutes.
 #[test]
 fn any_instrument_in_offline_quality_is_cleaner_than_90_db() {
     for (name, file, notes) in [
         ("B flat x 1.5", resized(1.5), LOUD),
         ("B flat x 0.8", resized(0.8), LOUD),
-        // D3, E3, F3: all it has.
+        // D3, E3, F3: all its notes.
         ("cylinder with two holes", local("examples/instruments/cylinder.toml"), [50, 52, 53]),
         // C4, G#4, F5: the lowest, the middle one and the highest.
         ("imported from CSV", local("examples/instruments/alto-chalumeau.toml"), [60, 68, 77]),
     ] {
         let wanted = Wanted { quality: Quality::High, ..Wanted::new(file, 48_000.0) };
         let begun = Instant::now();
-        let model = prepare::fitted(&wanted, &mut |_| ControlFlow::Continue(())).unwrap();
+        let model = Preparation::new(&wanted, None).fitted(&mut |_| ControlFlow::Continue(())).unwrap();
         println!("{name} at 192 kHz fitted in {:.1?}", begun.elapsed());
         assert_clean(name, &Arc::new(model), notes);
     }
 }
 
-/// Peak of the loud E6 at 0 dB as it comes out of each, and what the limiter would have had to take away.
+/// Peak of a loud E6 at 0 dB gain on each instrument, before and after the limiter.
 #[test]
 fn every_size_is_about_as_loud() {
     for instrument in Bundled::ALL {
@@ -401,7 +403,7 @@ fn every_size_is_about_as_loud() {
         println!(
             "{instrument:?}: loud E6 peaks at {unlimited_db:.2} dBFS, {limited_db:.2} after the limiter"
         );
-        // A touch on the loudest note there is: what sounds is a gain a little lower, not a bend.
+        // On this, one of the loudest notes, the limiter lowers the gain a little; it does not distort.
         assert!((-6.0..1.3).contains(&unlimited_db), "{instrument:?}: {unlimited_db}");
         assert!(unlimited_db - limited_db < 1.5, "{instrument:?}");
     }

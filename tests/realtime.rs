@@ -1,7 +1,8 @@
-//! What a host may rely on: no allocation while playing, the same bits for any block size, silence that is silent, a
-//! sound that survives nonsense, and one instrument at every sample rate.
+//! Guarantees for a host: no allocation while playing, the same bits for any block size, real silence, a sound that
+//! survives invalid numbers, and one instrument at every sample rate.
 //!
-//! Only without the plugin: its framework brings an allocation check of its own, which the tests in hosts use.
+//! These tests run only without the plugin, because its framework has an allocation check of its own, which the tests in
+//! hosts use.
 #![cfg(not(feature = "plugin"))]
 
 use std::sync::{Arc, LazyLock};
@@ -76,7 +77,7 @@ impl Random {
         (low + (high - low) * self.unit()) as f32
     }
 
-    /// Mostly a number of the range, sometimes one no host should send.
+    /// Mostly a number in the range, sometimes one that no host should send.
     fn wild(&mut self, low: f64, high: f64) -> f32 {
         match self.below(12) {
             0 => [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, -1.0, 1e-40][self.below(6)],
@@ -200,7 +201,7 @@ fn two_renders_are_identical_and_reset_is_a_new_instrument() {
         let len = (0.5 * host_hz) as usize;
         let mut random = Random(3);
         let (score, other) = (random.performance(60, len), random.performance(60, len));
-        // A changed gain glides in, so a new instrument told of it differs from one that had it: leave that one.
+        // A changed gain glides in, so a new instrument would differ from one that has the gain already: keep the default.
         let settings = Settings { gain_db: 0.0, ..Random(9).settings() };
         let fresh = || {
             let mut clarinet = clarinet(host_hz);
@@ -257,7 +258,7 @@ fn steady_note_has_no_constant_part() {
         clarinet.apply(note_on(written));
         render(&mut clarinet, 1.0, 48_000.0);
         let sound = render(&mut clarinet, 1.0, 48_000.0);
-        // Seen through a four-term Blackman-Harris window, which leaves -92 dB of neighbours 100 bins away at most.
+        // A four-term Blackman-Harris window leaves at most -92 dB of components that are 100 bins away.
         let angle = |n: usize| std::f64::consts::TAU * (n as f64 + 0.5) / sound.len() as f64;
         let window = |n: usize| {
             0.358_75 - 0.488_29 * angle(n).cos() + 0.141_28 * (2.0 * angle(n)).cos()
@@ -370,7 +371,7 @@ fn a_minute_of_nonsense_stays_within_full_scale() {
     }
     let mean = began.elapsed() / blocks as u32;
     println!("64 samples at 48 kHz: mean {mean:?}, worst {worst:?}, deadline 1.33 ms");
-    assert!(sounding > blocks / 10, "it does play: {sounding} of {blocks}");
+    assert!(sounding > blocks / 10, "it must sound: {sounding} of {blocks} blocks");
     assert_eq!(clarinet.resets(), 0, "settings within their ranges never break a state");
     assert!(mean < Duration::from_micros(1_333));
 }
@@ -440,7 +441,7 @@ fn every_host_rate_plays_the_same_instrument() {
                 (hz, levels)
             })
             .collect();
-        // Hosts share two internal rates whose cells are fitted each for itself: what is 30 dB down differs a bit more.
+        // The two internal rates have cells fitted separately: harmonics below -30 dB differ a little more.
         let (mut cents_off, mut strong_db, mut weak_db) = (0.0_f64, 0.0_f64, 0.0_f64);
         for (hz, levels) in &heard {
             cents_off = cents_off.max(cents(*hz, heard[1].0).abs());

@@ -1,4 +1,4 @@
-//! When notes speak, in which register, and when they stop. Figures are printed (`--nocapture`) to be quoted.
+//! When notes speak, in which register, and when they stop. The tests print their figures (`--nocapture`).
 
 #[path = "support/memoryless.rs"]
 mod memoryless;
@@ -86,7 +86,7 @@ fn harmonics_grow_as_powers_of_the_first_near_threshold() {
             let rate = MODEL.coeffs.rate_hz;
             let mut blown = Blown::new(&MODEL, fingering(note), 0.3);
             blown.blow(played * rise, 0.02, 0.0);
-            // Growth takes a second for each half per cent above the threshold, so it begins near the end.
+            // Growth is slow so near the threshold, so the note begins near its final level.
             blown.blow(played * rise, 12.0, 0.05);
             let sound = blown.blow(played * rise, 1.0, 0.0);
             let hz = pitch::fundamental_hz(&sound, rate).unwrap();
@@ -228,10 +228,11 @@ fn every_note_up_to_g_sharp_6_holds_its_register() {
         })
         .collect();
     println!("{} of {} in their register", runs.len() - wrong.len(), runs.len());
+    assert_eq!(runs.len(), 1_230);
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// Above G#6 the fingerings have no resonance in the right order: counted, not promised.
+/// Above G#6 the fingerings have no resonance in the right place: the notes are counted, not required.
 #[test]
 fn notes_above_g_sharp_6_are_counted() {
     let runs: Vec<HeldNote> = (93..=97)
@@ -274,7 +275,7 @@ fn without_vent_loss_fewer_clarion_and_altissimo_notes_hold() {
     }
 }
 
-/// Highest fundamental that is not asked for and not a squeak.
+/// A fundamental above this that is not the wanted note is a squeak, Hz.
 const SQUEAK_HZ: f64 = 1_050.0;
 
 fn squeaks(note: &HeldNote) -> bool {
@@ -309,10 +310,8 @@ fn a_reed_without_lip_damping_squeaks() {
     let runs: Vec<HeldNote> = (60..=84)
         .flat_map(|note| [0.45, 0.6, 0.8].map(|gamma| HeldNote::new(&MODEL, fingering(note), gamma)))
         .map(|note| {
-            let rule = chalumeau_core::instrument::embouchure::embouchure(
-                MODEL.notes_hz[note.fingering],
-                MODEL.lowest_hz,
-            );
+            let rule =
+                chalumeau_core::instrument::lip::embouchure(MODEL.notes_hz[note.fingering], MODEL.lowest_hz);
             HeldNote { damping: 0.3 / rule.damping, ..note }
         })
         .collect();

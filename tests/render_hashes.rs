@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::event::{Event, Timed};
-use chalumeau_core::instrument::prepare::{self, Wanted};
+use chalumeau_core::instrument::prepare::{Preparation, Wanted};
 use chalumeau_core::instrument::{Clarinet, Quality, Settings, Tuning};
 use chalumeau_core::score::Score;
 use chalumeau_core::score::{midi_file, play};
@@ -136,7 +136,7 @@ fn hash(clarinet: &mut Clarinet, score: &Score, block: usize) -> String {
 
 fn clarinet(instrument: Bundled, quality: Quality, rate_hz: u32) -> Clarinet {
     let wanted = Wanted { quality, ..Wanted::new(instrument.file(), f64::from(rate_hz)) };
-    let model = prepare::ready(&wanted, None).unwrap().expect("bundled instruments are ready");
+    let model = Preparation::new(&wanted, None).ready().unwrap().expect("bundled instruments are ready");
     Clarinet::new(Arc::new(model), f64::from(rate_hz))
 }
 

@@ -1,4 +1,4 @@
-//! How well in tune the radiated sound is, and how soon it speaks. Figures are printed (`--nocapture`) to be quoted.
+//! How well in tune the radiated sound is, and how soon it speaks. The tests print their figures (`--nocapture`).
 
 #[path = "support/parallel.rs"]
 mod parallel;
@@ -81,8 +81,9 @@ fn radiated_notes_are_in_tune_at_every_host_rate() {
         println!(
             "{rate_hz} Hz: E3..C6 max {max:.3} mean {mean:.3} cents; C#6..G6 max {max_high:.3} mean {mean_high:.3}"
         );
-        assert!(max <= 2.0, "{rate_hz} Hz: {low:?}");
-        assert!(max_high <= 5.0, "{rate_hz} Hz: {high:?}");
+        // Measured 0.026 and 0.028.
+        assert!(max <= 0.04, "{rate_hz} Hz: {low:?}");
+        assert!(max_high <= 0.04, "{rate_hz} Hz: {high:?}");
     }
 }
 
@@ -94,7 +95,7 @@ fn tempered_notes_stay_in_tune_from_piano_to_forte() {
     let off = each(&runs, |&(written, gamma)| {
         let note = fingering(&model, written);
         let rows = model.tuning.rows(note, Tuning::Tempered, gamma);
-        // Just above the threshold notes take their time.
+        // Just above the threshold notes grow slowly.
         let from_s = if gamma < 0.5 { 0.9 } else { 0.6 };
         let sound =
             HeldNote { rows, ..HeldNote::new(&model, note, gamma) }.radiated(&model, from_s, from_s + 0.3);
@@ -118,7 +119,8 @@ fn tempered_notes_stay_in_tune_from_piano_to_forte() {
     println!(
         "tempered E3..C6 max {max:.2} mean {mean:.2} cents; C#6..G#6 max {max_high:.2} mean {mean_high:.2}"
     );
-    let worst: Vec<_> = runs.iter().zip(&off).filter(|(_, off)| off.is_nan() || off.abs() > 3.0).collect();
+    // Measured 1.86.
+    let worst: Vec<_> = runs.iter().zip(&off).filter(|(_, off)| off.is_nan() || off.abs() > 1.95).collect();
     assert!(worst.is_empty(), "{worst:?}");
 }
 
@@ -133,7 +135,8 @@ fn a_played_crescendo_stays_in_tune_when_tempered() {
     let off = each(&runs, |note| note.cents(&model, 48_000.0));
     let (max, mean) = spread(&off);
     println!("tempered through the instrument: max {max:.2} mean {mean:.2} cents");
-    assert!(max <= 3.0, "{off:?}");
+    // Measured 1.43.
+    assert!(max <= 1.5, "{off:?}");
 }
 
 #[test]
@@ -147,7 +150,8 @@ fn reference_pitch_bend_and_temperature_move_notes_by_what_they_say() {
         });
         println!("{what}: expected {expected:+.2}, moved {off:.2?} cents");
         for (off, written) in off.into_iter().zip(notes) {
-            assert!((off - expected).abs() <= 3.0, "{what}, written {written}: {off} instead of {expected}");
+            // Measured 0.40.
+            assert!((off - expected).abs() <= 0.5, "{what}, written {written}: {off} instead of {expected}");
         }
     };
     let set = |change: &'static (dyn Fn(Settings) -> Settings + Sync)| {
@@ -185,7 +189,7 @@ fn tongued_notes_speak_at_once() {
             HeldNote { start: Start::Tongued(2.0), ..HeldNote::new(&model, fingering(&model, written), 0.5) };
         1e3 * onset::t90_s(&mouthpiece(&model, &note, 1.0), rate, TONGUE_HOLD_S).unwrap()
     });
-    // From the key: what the tongue's hold and the breath's rise add.
+    // From the key, that is with the tongue's hold and the breath's rise.
     let key_ms = each(&notes, |&written| {
         let mut clarinet = Keyed::new(written, 0.5).start(&model, 48_000.0);
         let mut pressure = Vec::new();
@@ -196,6 +200,7 @@ fn tongued_notes_speak_at_once() {
         println!("written {written}: t90 {t90:.1} ms from the tongue, {key:.1} ms from the key");
     }
     let at = |written: u8| t90_ms[usize::from(written - 52)];
-    assert!(at(60) <= 45.0, "C4 {}", at(60));
-    assert!(at(52) <= 60.0, "E3 {}", at(52));
+    // Measured 32.2 and 47.9.
+    assert!(at(60) <= 35.0, "C4 {}", at(60));
+    assert!(at(52) <= 50.0, "E3 {}", at(52));
 }

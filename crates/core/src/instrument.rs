@@ -1,24 +1,39 @@
-//! Reed and bore married: the voice, how a player articulates, and what comes out at the host's rate.
+//! Couples reed and bore into a playable instrument, moved by a player and heard at the host's sample rate.
+//!
+//! [`Clarinet`] is the whole instrument: events in, samples out. It plays a [`Model`], which a [`Preparation`] makes from
+//! an instrument file. Inside, a [`player`] turns events and [`Settings`] into breath, tongue, fingers and tuning, and a
+//! [`Voice`] turns those into sound.
+//!
+//! ```
+//! use chalumeau_core::event::Event;
+//! use chalumeau_core::instrument::Clarinet;
+//! use chalumeau_core::units::SoundingNote;
+//!
+//! let mut clarinet = Clarinet::built_in(48_000.0)?;
+//! clarinet.apply(Event::NoteOn { note: SoundingNote(60), velocity: 0.8 });
+//! let mut samples = vec![0.0; 4_800];
+//! clarinet.render(&mut samples);
+//! assert!(samples.iter().any(|sample| sample.abs() > 0.01));
+//! # Ok::<(), chalumeau_core::instrument::BuildError>(())
+//! ```
 
 pub mod bend;
 mod clarinet;
-pub mod embouchure;
 pub mod felt;
 pub mod held;
+pub mod lip;
 pub mod model;
 pub mod player;
 pub mod prepare;
-mod scale;
+pub mod scope;
 mod settings;
 mod slap;
 pub mod store;
-pub mod tuner;
-pub mod tuning;
+pub mod tuning_table;
 pub mod voice;
-pub mod watch;
 
 pub use clarinet::Clarinet;
 pub use model::{BuildError, Model};
-pub use prepare::{Quality, Wanted};
+pub use prepare::{Preparation, Quality, Wanted};
 pub use settings::{Settings, Tuning};
 pub use voice::{Probe, Voice};

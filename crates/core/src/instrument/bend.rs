@@ -1,37 +1,37 @@
-//! Where a pitch that is not the fingering's comes from: the lip near the note, the size of the instrument beyond.
+//! Pitch bends: the lip bends a note a little; beyond that the whole instrument becomes smaller or larger.
 //!
-//! A lip (the tuning delay behind the mouthpiece) moves a note by up to [`LIP_CENTS`], less where the bore cannot be made
-//! short enough. What is wanted beyond that is done by the whole bore's scale: an instrument `s` times as small, reed and
-//! player's habits with it, is by similarity the same instrument with its clock running `s` times as fast. So the clock
-//! does run faster, and no bend can lose the register. The hand-over is a knee: both shares change smoothly with the sum.
+//! The lip is the tuning delay behind the mouthpiece. It moves a note by up to [`LIP_CENTS`], less where the bore cannot
+//! be made short enough. The rest of a bend scales the whole instrument: one that is `s` times as small, with its reed and
+//! the player's habits, is by similarity the same instrument with its clock running `s` times as fast. So the clock runs
+//! faster, and no bend can lose the register. A knee joins the two: both shares change smoothly with their sum.
 //!
-//! What similarity leaves out: the walls' losses, which a really smaller bore would have relatively more of; and the
-//! level, `1/s` for the smaller instrument at the same distance, which stays as it is, as if heard from `s` times as near:
-//! a bend changes the pitch alone. What a player does in seconds (tongue, fingers, breath) stays in seconds.
-//! Moving the clock costs `s` times the instrument's time.
+//! Similarity leaves out two things. A bore that is really smaller has relatively larger wall losses. And its level at the
+//! same distance would be `1/s`; here the level stays, as if one listened from `s` times as near, so that a bend changes
+//! the pitch alone. Times of the player (tongue, fingers, breath) stay in seconds. A faster clock costs `s` times the
+//! instrument's processor time.
 
 use crate::instrument::model::Model;
 
-/// Most that the lip bends a note, either way, cents. Players go further down than up; this is what the delay does in
-/// every register without changing what mode speaks.
+/// Farthest that the lip bends a note, either way, cents. Players go further down than up; this is what the delay can do
+/// in every register while the same mode speaks.
 pub const LIP_CENTS: f64 = 40.0;
 /// Half the width of the knee over the lip's limit.
 const KNEE: f64 = 0.25;
 /// Largest offset from the fingering's note, cents: two octaves.
 pub const MOST_CENTS: f64 = 2_400.0;
-/// Share of the delay's room that the lip may take: the rest is for the tempered trims' way between their nodes.
+/// Share of the delay's room that the lip may use; the tempered trims need the rest between their nodes.
 const ROOM_SHARE: f64 = 0.9;
 
-/// An offset in cents, divided.
+/// A bend, divided between lip and bore.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Split {
-    /// By the tuning delay.
+pub struct BendSplit {
+    /// Share of the lip (the tuning delay), cents.
     pub lip_cents: f64,
-    /// By the speed of the clock.
+    /// Share of the bore's size (the speed of the clock), cents.
     pub bore_cents: f64,
 }
 
-impl Split {
+impl BendSplit {
     /// Divides `offset_cents`, clamped to +-[`MOST_CENTS`], for a lip that reaches `limit_cents`. Real-time safe.
     pub fn new(offset_cents: f64, limit_cents: f64) -> Self {
         let offset = offset_cents.clamp(-MOST_CENTS, MOST_CENTS);
@@ -49,7 +49,8 @@ impl Split {
     }
 }
 
-/// How far the lip may bend a fingering's note to the side of `offset_cents`, cents. Real-time safe.
+/// How far the lip may bend a fingering's note towards `offset_cents` (up if positive, else down), cents, 0 or more.
+/// Real-time safe.
 pub fn lip_limit_cents(model: &Model, fingering: usize, offset_cents: f64) -> f64 {
     let Some(note) = model.tuning.notes.get(fingering) else { return 0.0 };
     let (shortest, longest) = model.coeffs.tuning_range();
@@ -63,7 +64,7 @@ pub fn lip_limit_cents(model: &Model, fingering: usize, offset_cents: f64) -> f6
     LIP_CENTS * (ROOM_SHARE * room / needed).clamp(0.0, 1.0)
 }
 
-/// Speed of the clock for a bore's share in cents. Real-time safe.
+/// Speed of the clock for the bore's share of a bend, cents; 1 is the model's rate. Real-time safe.
 pub fn speed(bore_cents: f64) -> f64 {
     (bore_cents / 1_200.0).exp2()
 }
@@ -75,7 +76,7 @@ mod tests {
     #[test]
     fn shares_add_up_and_have_no_kink() {
         for limit in [0.0, 10.0, LIP_CENTS] {
-            let at = |tenth: i32| Split::new(f64::from(tenth) / 10.0, limit);
+            let at = |tenth: i32| BendSplit::new(f64::from(tenth) / 10.0, limit);
             let (mut steepest, mut kink) = (0.0_f64, 0.0_f64);
             for tenth in -5_000..5_000 {
                 let (before, split, after) = (at(tenth - 1), at(tenth), at(tenth + 1));
@@ -94,9 +95,9 @@ mod tests {
 
     #[test]
     fn small_offsets_are_the_lips_alone_and_no_offset_is_none() {
-        assert_eq!(Split::new(25.0, LIP_CENTS), Split { lip_cents: 25.0, bore_cents: 0.0 });
-        assert_eq!(Split::new(0.0, 0.0), Split::default());
-        assert_eq!(Split::new(f64::INFINITY, LIP_CENTS).bore_cents, MOST_CENTS - LIP_CENTS);
+        assert_eq!(BendSplit::new(25.0, LIP_CENTS), BendSplit { lip_cents: 25.0, bore_cents: 0.0 });
+        assert_eq!(BendSplit::new(0.0, 0.0), BendSplit::default());
+        assert_eq!(BendSplit::new(f64::INFINITY, LIP_CENTS).bore_cents, MOST_CENTS - LIP_CENTS);
     }
 
     #[test]

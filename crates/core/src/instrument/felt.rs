@@ -1,14 +1,14 @@
-//! The instrument's reed as the knob's side of the house wants to know it.
+//! What haptics needs to know about an instrument: the reed as it is played, and the pressures its notes need.
 
 use crate::bore::fit;
 use crate::bore::instrument_file::InstrumentFile;
 use crate::haptics::{Lip, PlayedReed, Requirements};
-use crate::instrument::embouchure::embouchure;
+use crate::instrument::lip::embouchure;
 use crate::instrument::model::Model;
 use crate::instrument::settings::Settings;
 use crate::units::SoundingNote;
 
-/// The reed under these settings, lip and law as the sound has them, for every fingering of a file. Allocates.
+/// The reed under these settings, with the law and the lip that the sound has, for every fingering of a file. Allocates.
 pub fn played_reed(file: &InstrumentFile, settings: &Settings) -> PlayedReed {
     let settings = settings.clamped();
     let lowest_hz = fit::lowest_hz(file);
@@ -30,7 +30,8 @@ pub fn played_reed(file: &InstrumentFile, settings: &Settings) -> PlayedReed {
     }
 }
 
-/// What the notes of a model ask, their onsets those of the lattice that sounds. Takes a second. Allocates.
+/// The mouth pressures that the notes of a model need. The onsets are those of the lattice that sounds. Takes a second.
+/// Allocates.
 pub fn requirements(model: &Model) -> Requirements {
     let rows = |fingering: usize| model.tuning.notes.get(fingering).map_or(0.0, |note| note.natural);
     Requirements::new(&model.file, model.air).heard_through(&model.file, &model.coeffs, rows)

@@ -1,8 +1,8 @@
 //! A note held by a blowing machine: constant fingering and lip, breath from a ramp or behind a tongue.
 //!
-//! What tuning, thresholds and the tests of physics play; a musician plays through [`player`](super::player).
+//! Tuning, thresholds and the tests of physics play it; a musician plays through the [`player`](super::player).
 
-use crate::instrument::embouchure::embouchure;
+use crate::instrument::lip::embouchure;
 use crate::instrument::model::Model;
 use crate::instrument::voice::{Drive, TICK, Voice};
 use crate::reed::ReedCoeffs;
@@ -13,40 +13,41 @@ use crate::reed::motion::TONGUE_FORCE;
 /// How a held note begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start {
-    /// Mouth pressure rises over so many ms.
+    /// The mouth pressure rises in so many ms.
     Ramp(f64),
-    /// The tongue holds the reed while breath rises, and lets go in so many ms.
+    /// The tongue holds the reed for [`TONGUE_HOLD_S`] while the breath rises, and lets go in so many ms.
     Tongued(f64),
 }
 
 /// How long the machine's tongue holds the reed before it lets go, s.
 pub const TONGUE_HOLD_S: f64 = 0.020;
 
-/// A held note.
+/// A held note. [`new`](Self::new) gives the reference clarinet's numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeldNote {
     /// Index of the fingering in the instrument file.
     pub fingering: usize,
     /// Mouth pressure over the closing pressure.
     pub gamma: f64,
-    /// Embouchure parameter.
+    /// Embouchure parameter zeta, the flow strength of the reed.
     pub zeta: f64,
-    /// Half-width of the lay's knee.
+    /// Half-width of the knee of the lay, 0 (sharp)..=0.5.
     pub lay: f64,
-    /// Damping over the embouchure rule's.
+    /// Damping of the reed over that of the [lip rule](embouchure).
     pub damping: f64,
-    /// Jet loss K.
+    /// Loss factor K of the jets in open holes.
     pub jet_loss: f64,
     /// Breath noise, 0..=1.
     pub noise: f64,
-    /// Tuning delay, rows.
+    /// Tuning delay, rows of round trip.
     pub rows: f64,
-    /// How it begins.
+    /// How the note begins.
     pub start: Start,
 }
 
 impl HeldNote {
-    /// A note at a mouth pressure, everything else as the reference clarinet has it, without noise.
+    /// A fingering (index in the file) at a mouth pressure over the closing pressure; everything else as on the reference
+    /// clarinet, with the natural trim and without noise.
     pub fn new(model: &Model, fingering: usize, gamma: f64) -> Self {
         Self {
             fingering,
@@ -61,7 +62,7 @@ impl HeldNote {
         }
     }
 
-    /// The reed this note is played with.
+    /// The reed under the lip of this note.
     pub fn reed(&self, model: &Model) -> ReedCoeffs {
         let lip = embouchure(model.notes_hz[self.fingering], model.lowest_hz);
         let law = ReedLaw::default();
@@ -77,7 +78,7 @@ impl HeldNote {
         )
     }
 
-    /// A silent voice fingered and ready for this note.
+    /// A silent voice with the fingering, delay and reed of this note. Allocates.
     pub fn voice<F: crate::bore::lattice::Real>(&self, model: &Model) -> Voice<F> {
         let mut voice = Voice::new(&model.coeffs, &model.air, ReedTables::seed(), self.reed(model));
         for (hole, &open) in model.file.fingerings[self.fingering].open.iter().enumerate() {
@@ -88,7 +89,7 @@ impl HeldNote {
         voice
     }
 
-    /// Mouth pressure and tongue force at `t` seconds.
+    /// Mouth pressure and tongue force at `t` seconds, over the closing pressure.
     pub fn breath(&self, t: f64) -> (f64, f64) {
         match self.start {
             Start::Ramp(ms) => (self.gamma * (t / (1e-3 * ms)).min(1.0), 0.0),
@@ -99,7 +100,7 @@ impl HeldNote {
         }
     }
 
-    /// Plays for `seconds`; `heard` gets the radiated pressure (Pa at 1 m) and the voice after each control tick.
+    /// Plays for `seconds`; calls `heard` after each control tick with the radiated pressure (Pa at 1 m) and the voice.
     pub fn play(&self, model: &Model, seconds: f64, mut heard: impl FnMut(&[f32; TICK], &Voice<f32>)) {
         let mut voice: Voice<f32> = self.voice(model);
         let reed = self.reed(model);
@@ -112,7 +113,7 @@ impl HeldNote {
         }
     }
 
-    /// The radiated pressure from `from_s` to `to_s`, at the internal rate.
+    /// The radiated pressure (Pa at 1 m) from `from_s` to `to_s`, at the internal rate. Allocates.
     pub fn radiated(&self, model: &Model, from_s: f64, to_s: f64) -> Vec<f64> {
         let mut all = Vec::with_capacity((to_s * model.coeffs.rate_hz) as usize + TICK);
         self.play(model, to_s, |out, _| all.extend(out.iter().map(|&x| f64::from(x))));

@@ -1,15 +1,15 @@
-//! An instrument file made ready to play at one internal rate: cells, coefficients, tuning.
+//! An instrument that is ready to play at one internal rate: cells, coefficients, tuning.
+//!
+//! [`prepare`](super::prepare) makes models from instrument files.
 
 use std::sync::Arc;
 
-use crate::bore::bundled::Bundled;
 use crate::bore::cells::Cells;
 use crate::bore::cells::CellsError;
 use crate::bore::fit;
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::lattice::LatticeCoeffs;
-use crate::instrument::prepare::{self, Wanted};
-use crate::instrument::tuning::TuningTable;
+use crate::instrument::tuning_table::TuningTable;
 use crate::reed::PhysicalReed;
 use crate::reed::physical::{P_REF_PA, REFERENCE_VOLUME_M3};
 use crate::units::{Air, SoundingNote};
@@ -17,10 +17,21 @@ use crate::units::{Air, SoundingNote};
 /// Lowest and highest host rate, Hz.
 pub const HOST_RATES_HZ: (f64, f64) = (22_050.0, 384_000.0);
 
-/// Pitch of A4 that instruments are made for unless another is asked for, Hz.
+/// Default pitch of A4, Hz.
 pub const A4_HZ: f64 = 440.0;
 
-/// An instrument at one internal rate. Immutable; share it.
+/// An instrument at one internal rate. It does not change: share it in an [`Arc`].
+///
+/// ```
+/// use chalumeau_core::instrument::Model;
+/// use chalumeau_core::units::SoundingNote;
+///
+/// let model = Model::built_in(48_000.0)?;
+/// // Sounding D3 is the lowest note of the B flat clarinet, written E3.
+/// assert_eq!(model.fingering_for(SoundingNote(50)), Some(0));
+/// assert!((model.notes_hz[0] - 146.83).abs() < 0.01);
+/// # Ok::<(), chalumeau_core::instrument::BuildError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Model {
     /// The measurements, after scaling.
@@ -29,47 +40,48 @@ pub struct Model {
     pub cells: Cells,
     /// The lattice's coefficients.
     pub coeffs: Arc<LatticeCoeffs>,
-    /// Delay trims per note, right at [`a4_hz`](Self::a4_hz).
+    /// Delay trims of each note, for [`a4_hz`](Self::a4_hz).
     pub tuning: TuningTable,
-    /// Pitch of A4 that it is tuned to, Hz.
+    /// Pitch of A4 that the instrument is tuned to, Hz.
     pub a4_hz: f64,
-    /// How much longer the bore is than its file says, because the delay alone could not tune it; mostly 1.
+    /// Length of the bore over that of its file. Other than 1 for another A4, or where the delay alone could not tune the
+    /// instrument.
     pub scale: f64,
-    /// Air the coefficients were made for.
+    /// Air that the coefficients hold for.
     pub air: Air,
     /// Equal-tempered frequency of the lowest note at [`a4_hz`](Self::a4_hz), Hz.
     pub lowest_hz: f64,
-    /// Sounding frequency of each fingering of the file at [`a4_hz`](Self::a4_hz).
+    /// Sounding frequency of each fingering of the file at [`a4_hz`](Self::a4_hz), Hz.
     pub notes_hz: Vec<f64>,
     /// Register of each fingering: 1 chalumeau and throat, 2 clarion, 3 altissimo.
     pub registers: Vec<u8>,
-    /// Volume that the instrument's reed displaces, over the nominal bore's section and the speed of sound, s.
+    /// Volume that the instrument's reed displaces, over the cross-section of the nominal bore and the speed of sound, s.
     pub swept_s: f64,
 }
 
 /// Why an instrument cannot be built.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
-    /// Host rate out of range.
+    /// The host rate, Hz, lies outside [`HOST_RATES_HZ`].
     #[error("sample rate must lie in 22050..384000 Hz, got {0}")]
     Rate(f64),
-    /// Reference pitch out of range.
+    /// The pitch of A4, Hz, lies outside [`A4_RANGE_HZ`](super::prepare::A4_RANGE_HZ).
     #[error("A4 must lie in 415..466 Hz, got {0}")]
     A4(f64),
-    /// Whoever waited for it does not want it any more.
+    /// The caller ended the preparation.
     #[error("cancelled")]
     Cancelled,
-    /// The bore does not fit the lattice.
+    /// The bore cannot be cut into cells of the lattice.
     #[error(transparent)]
     Cells(#[from] CellsError),
-    /// A generated file of the repository is damaged.
+    /// A generated file that comes with the program is damaged.
     #[error(
         "generated data of the built-in instrument: {0}; run `cargo xtask fit-bore` and `cargo xtask tune`"
     )]
     Data(String),
 }
 
-/// The lattice's rate for a host rate: 88.2 kHz for the 44.1 kHz family, 96 kHz for all others.
+/// The lattice's rate for a host rate, both Hz: 88.2 kHz for the 44.1 kHz family, 96 kHz for all others.
 pub fn internal_rate_hz(host_rate_hz: f64) -> f64 {
     let family = |base: f64| {
         let ratio = host_rate_hz / base;
@@ -78,17 +90,11 @@ pub fn internal_rate_hz(host_rate_hz: f64) -> f64 {
     if family(11_025.0) && !family(12_000.0) { 88_200.0 } else { 96_000.0 }
 }
 
-/// The two rates that tables exist for, Hz.
+/// The lattice's two rates in [`Quality::Live`](super::Quality::Live), Hz.
 pub const INTERNAL_RATES_HZ: [f64; 2] = [96_000.0, 88_200.0];
 
 impl Model {
-    /// The built-in B flat clarinet, cells and tuning from the repository's generated data. Allocates.
-    pub fn built_in(host_rate_hz: f64) -> Result<Self, BuildError> {
-        prepare::ready(&Wanted::new(Bundled::BFlat.file(), host_rate_hz), None)?
-            .ok_or_else(|| BuildError::Data(format!("nothing for {host_rate_hz} Hz")))
-    }
-
-    /// From parts; `file` already scaled by `scale`, to be played at `a4_hz`.
+    /// Assembles a model from its parts. `file` is already scaled by `scale`; the model plays at `a4_hz`. Allocates.
     pub fn assemble(file: InstrumentFile, cells: Cells, tuning: TuningTable, a4_hz: f64, scale: f64) -> Self {
         let air = Air::default();
         let coeffs =
@@ -109,7 +115,7 @@ impl Model {
             })
             .collect();
         let section = std::f64::consts::PI * file.nominal_radius_m * file.nominal_radius_m;
-        // The instrument's own reed, by the ratio to the reference: exactly that of the reference on a B flat clarinet.
+        // The instrument's own reed by its ratio to the reference, so that a B flat clarinet has exactly the reference.
         let larger = file.reed_volume_m3 / REFERENCE_VOLUME_M3;
         let swept_s = PhysicalReed::reference().equivalent_volume_m3(&air) / (section * air.c) * larger;
         Self {
@@ -127,13 +133,14 @@ impl Model {
         }
     }
 
-    /// Index of the fingering for a sounding pitch.
+    /// Index of the fingering for a sounding note; `None` if the instrument does not have the note. Real-time safe.
     pub fn fingering_for(&self, note: SoundingNote) -> Option<usize> {
         let written = note.written(self.file.transposition)?;
         self.file.fingerings.iter().position(|fingering| fingering.written == written)
     }
 
-    /// Rows of delay that move a note by `cents`, counted from the note's own quarter-wave length.
+    /// Rows of round-trip delay that move a fingering's note by `cents`, estimated from the note's quarter-wave length.
+    /// Positive cents are up and give negative rows. Real-time safe.
     pub fn rows_for_cents(&self, fingering: usize, cents: f64) -> f64 {
         let quarter_waves = f64::from(2 * self.registers[fingering] - 1);
         let quarter_rows = quarter_waves * self.coeffs.rate_hz / (4.0 * self.notes_hz[fingering]);
@@ -141,7 +148,10 @@ impl Model {
     }
 }
 
-/// The lattice's rate for a host rate, see [`internal_rate_hz`], if there is one.
+/// The lattice's rate for a host rate, both Hz; see [`internal_rate_hz`].
+///
+/// # Errors
+/// [`BuildError::Rate`] if the host rate lies outside [`HOST_RATES_HZ`].
 pub fn checked_rate_hz(host_rate_hz: f64) -> Result<f64, BuildError> {
     if (HOST_RATES_HZ.0..=HOST_RATES_HZ.1).contains(&host_rate_hz) {
         Ok(internal_rate_hz(host_rate_hz))

@@ -1,57 +1,68 @@
-//! What a player can set, in the units a player uses. Plain numbers; clamped once, at the door.
+//! What a player can set, as plain numbers in the units that a player uses. They are clamped once, where they come in.
 
 use crate::reed::ReedLaw;
 use crate::reed::law::coupled_k;
 use crate::reed::physical::{P_REF_PA, PhysicalReed, SeedReed};
 
-/// How notes are held in tune.
+/// How the tuning delay follows the breath.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Tuning {
-    /// One trim per note, right at gamma 0.5: pitch moves with dynamics as the bore makes it.
+    /// One trim per note, right at gamma 0.5: the pitch moves with the dynamics as the bore makes it.
     #[default]
     Natural,
-    /// The trim follows the breath so that each note stays in tune from gamma 0.45 to 0.9.
+    /// The trim follows the breath, so that each note stays in tune from gamma 0.45 to 0.9.
     Tempered,
 }
 
 /// Everything that can be set while playing. `Default` is the reference clarinet.
+///
+/// ```
+/// use chalumeau_core::instrument::{Clarinet, Settings, Tuning};
+///
+/// let settings = Settings { strength: 3.0, tuning: Tuning::Tempered, ..Settings::default() };
+/// // A harder reed closes at a higher pressure: 20 % for half a number.
+/// assert!((settings.closing_pa() / Settings::default().closing_pa() - 1.2).abs() < 1e-6);
+/// Clarinet::built_in(48_000.0)?.set_settings(&settings);
+/// # Ok::<(), chalumeau_core::instrument::BuildError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Mouth pressure at full breath, kPa, 2..=20. Default 6, the reference reed's closing pressure.
     pub breath_full_kpa: f32,
-    /// Breath noise, 0 (none) ..=1 (much). Default 0.3, by ear.
+    /// Breath noise, 0 (none)..=1 (much). Default 0.3, by ear.
     pub noise: f32,
-    /// Time for the tongue to let go of the reed, ms, 1..=20. Default 2.
+    /// Time that the tongue takes to let go of the reed, ms, 1..=20. Default 2.
     pub tongue_ms: f32,
-    /// Time for fingers to move between slurred notes, ms, 5..=15. Default 8.
+    /// Time that the fingers take between slurred notes, ms, 5..=15. Default 8.
     pub legato_ms: f32,
-    /// Reed strength as on the box, 1.5..=5; 2.5 is the reference (closing pressure 6 kPa). Scales the stiffness.
+    /// Reed strength as printed on the box, 1.5..=5. It scales the stiffness. Default 2.5, the reference reed (closing
+    /// pressure 6 kPa).
     pub strength: f32,
-    /// Lip position: tip opening relative to the reference, 0.6..=1.4. Below 1 bites.
+    /// Lip position: tip opening over the reference, 0.6..=1.4; below 1 the lip bites. Default 1.
     pub lip: f32,
-    /// Embouchure parameter zeta of the reference reed, 0.05..=0.9. Default 0.3. Flow strength.
+    /// Embouchure parameter zeta, the flow strength of the reed, 0.05..=0.9. Default 0.3.
     pub zeta: f32,
-    /// Lip damping relative to the embouchure rule, 0.2..=2. Default 1. Low values squeak.
+    /// Lip damping over that of the [lip rule](super::lip), 0.2..=2; low values squeak. Default 1.
     pub damping: f32,
-    /// Curve of the lay, 0 (sharp, the seed's closure) ..=0.5. Default 0.4.
+    /// Curve of the lay, 0 (sharp, the closure of the reference notebook)..=0.5. Default 0.4.
     pub lay: f32,
-    /// The seed's H, dimensionless rest opening, 1..=5. Default sqrt(27)/2.
+    /// H of the reference notebook, the dimensionless rest opening, 1..=5. Default sqrt(27)/2.
     pub reed_h: f32,
-    /// The seed's k, dimensionless stiffness, 0.1..=2. Default 27/(4 H^3). Ignored while `coupled`.
+    /// k of the reference notebook, the dimensionless stiffness, 0.1..=2. Default 27/(4 H^3). Ignored while `coupled`.
     pub reed_k: f32,
-    /// The seed's coupling: k = 27/(4 H^3), so that peak flow stays 1.
+    /// Coupling of the reference notebook: k = 27/(4 H^3), so that the peak flow stays 1. Default true.
     pub coupled: bool,
-    /// The seed's amplitude A of the flow, 0..=2. Default 1.
+    /// Amplitude A of the flow in the reference notebook, 0..=2. Default 1.
     pub reed_a: f32,
-    /// Pitch of A4, Hz, 415..=466.
+    /// Pitch of A4, Hz, 415..=466. Default 440.
     pub a4_hz: f32,
-    /// How notes are held in tune.
+    /// How the tuning delay follows the breath. Default [`Tuning::Natural`].
     pub tuning: Tuning,
-    /// Air temperature, Celsius, 10..=40. The instrument is tuned at 25; pitch rises by 3 cents a kelvin.
+    /// Air temperature, Celsius, 10..=40. The instrument is tuned at 25, the default; the pitch rises by 3 cents a kelvin.
     pub temperature_c: f32,
-    /// Nonlinear flow loss of open holes, 0..=4. Default 2; 0 removes the loss and with it most of the clarion.
+    /// Nonlinear flow loss K of open holes, 0..=4. At 0 fewer notes of clarion and altissimo hold their register. Default 2.
     pub vent_loss: f32,
-    /// Output gain, dB, -60..=24. At 0 dB, 1 Pa at 1 m is -6 dBFS.
+    /// Output gain, dB, -60..=24. At 0 dB, the default, 1 Pa at 1 m from a B flat clarinet is -6 dBFS.
     pub gain_db: f32,
 }
 
@@ -81,19 +92,20 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The law of the reed under these settings: strength is stiffness, the lip sets the opening. Real-time safe.
+    /// The law of the reed under these settings: strength sets the stiffness, the lip the opening. Real-time safe.
     pub fn reed_law(&self) -> ReedLaw {
         let settings = self.clamped();
-        let seed_h = f64::from(settings.reed_h);
-        let seed_k = if settings.coupled { coupled_k(seed_h) } else { f64::from(settings.reed_k) };
+        let set_h = f64::from(settings.reed_h);
+        let set_k = if settings.coupled { coupled_k(set_h) } else { f64::from(settings.reed_k) };
         // A box strength is about 20 % stiffer per half number (makers' charts, by judgement).
         let stiffer = 1.2_f64.powf(2.0 * (f64::from(settings.strength) - 2.5));
-        let h = (seed_h * f64::from(settings.lip)).clamp(0.5, 10.0);
-        let k = (seed_k * stiffer).clamp(0.01, 20.0);
+        let h = (set_h * f64::from(settings.lip)).clamp(0.5, 10.0);
+        let k = (set_k * stiffer).clamp(0.01, 20.0);
         ReedLaw::free(h, k, f64::from(settings.reed_a)).unwrap_or_default()
     }
 
-    /// The same with H and k multiplied by what controllers say; see [`Event::Reed`](crate::event::Event::Reed).
+    /// These settings with H and k multiplied by the factors of controllers; see
+    /// [`Event::Reed`](crate::event::Event::Reed). Real-time safe.
     pub fn with_reed_factors(self, [h, k]: [f32; 2]) -> Self {
         if [h, k] == [1.0, 1.0] {
             return self;
@@ -101,40 +113,43 @@ impl Settings {
         Self { reed_h: self.reed_h * h, reed_k: self.reed_k * k, ..self }.clamped()
     }
 
-    /// The maker's face of the reed in the case: H, k, A and zeta as they are set, without what strength and lip make of
-    /// it, over the reference reed of the instrument. Real-time safe.
+    /// The reed in maker's quantities as it lies in its case: from H, k, A and zeta as they are set, without strength and
+    /// lip, relative to the instrument's reference reed. Real-time safe.
     pub fn physical_reed(&self, reference: &PhysicalReed) -> PhysicalReed {
         let settings = self.clamped();
         let h = f64::from(settings.reed_h);
-        let seed = SeedReed {
+        let dimensionless = SeedReed {
             h,
             k: if settings.coupled { coupled_k(h) } else { f64::from(settings.reed_k) },
             a: f64::from(settings.reed_a),
             zeta: f64::from(settings.zeta),
             area: 1.0,
         };
-        PhysicalReed::from_seed(&seed, reference)
+        PhysicalReed::from_seed(&dimensionless, reference)
     }
 
-    /// The same in the mouth: strength has multiplied K, the lip the opening. Real-time safe.
+    /// The reed in maker's quantities as it is in the mouth: strength multiplies the stiffness, the lip the opening.
+    /// Real-time safe.
     pub fn played_reed(&self, reference: &PhysicalReed) -> PhysicalReed {
         let settings = self.clamped();
         let law = settings.reed_law();
-        let seed = SeedReed { h: law.h(), k: law.k(), a: law.a(), zeta: f64::from(settings.zeta), area: 1.0 };
-        PhysicalReed::from_seed(&seed, reference)
+        let (h, k, a, zeta) = (law.h(), law.k(), law.a(), f64::from(settings.zeta));
+        let dimensionless = SeedReed { h, k, a, zeta, area: 1.0 };
+        PhysicalReed::from_seed(&dimensionless, reference)
     }
 
-    /// These settings with H, k and zeta of a reed as its maker measures it; strength, lip, lay and A stay and act on top.
-    /// Of the area only the closing pressure is heard: the air that the reed's motion moves is the instrument's,
-    /// `reed_volume_mm3` of its file, which its tuning is for. Numbers outside the ranges are clamped as all settings are;
-    /// [`refused_reed`](Self::refused_reed) tells. Real-time safe.
+    /// These settings with H, k and zeta of a reed as its maker measures it; strength, lip, lay and A stay and act on it.
+    /// The area is heard only in the closing pressure: the air that the reed's motion moves belongs to the instrument
+    /// (`reed_volume_mm3` of its file), because its tuning depends on it. Numbers outside the ranges are clamped as all
+    /// settings are; [`refused_reed`](Self::refused_reed) tells which. Real-time safe.
     pub fn with_physical_reed(self, reed: &PhysicalReed, reference: &PhysicalReed) -> Self {
         let a = f64::from(self.reed_a);
-        let seed = reed.seed(reference, if a > 0.0 { a } else { 1.0 });
-        Self { reed_h: seed.h as f32, reed_k: seed.k as f32, coupled: false, zeta: seed.zeta as f32, ..self }
+        let set = reed.seed(reference, if a > 0.0 { a } else { 1.0 });
+        Self { reed_h: set.h as f32, reed_k: set.k as f32, coupled: false, zeta: set.zeta as f32, ..self }
     }
 
-    /// Which of H, k and zeta of such a reed lies outside what the instrument plays: symbol, value and range.
+    /// The first of H, k and zeta of such a reed that lies outside the range the instrument plays: symbol, value and
+    /// range; `None` if all lie inside.
     pub fn refused_reed(
         &self,
         reed: &PhysicalReed,
@@ -161,7 +176,7 @@ impl Settings {
         None
     }
 
-    /// Reed strength as on the box of a reed `stiffer` times as stiff as the reference.
+    /// Reed strength as printed on the box, of a reed `stiffer` times as stiff as the reference.
     pub fn strength_of(stiffer: f64) -> f64 {
         2.5 + 0.5 * stiffer.ln() / 1.2_f64.ln()
     }
@@ -171,7 +186,7 @@ impl Settings {
         P_REF_PA * self.reed_law().closing()
     }
 
-    /// The same settings with every number inside its range; a non-finite number becomes its default.
+    /// These settings with every number inside its range; a number that is not finite becomes its default. Real-time safe.
     pub fn clamped(self) -> Self {
         let d = Self::default();
         let fix = |x: f32, low: f32, high: f32, default: f32| {
@@ -221,7 +236,7 @@ mod tests {
         near(read.tip_opening_m, 0.6e-3);
         near(read.width_m, 20e-3);
         near(read.area_m2, reference.area_m2);
-        // Half a number is 20 % stiffer; the lip closes.
+        // Half a number is 20 % stiffer; the lip reduces the opening.
         let played = set.played_reed(&reference);
         near(played.stiffness_n_m, 1.2 * 2_000.0);
         near(played.tip_opening_m, 0.8 * 0.6e-3);

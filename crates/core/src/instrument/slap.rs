@@ -1,19 +1,20 @@
-//! A tongue slap: the tongue sucks at the reed, bends it away from the mouthpiece and lets go, and it slams on the lay.
+//! A tongue slap: the tongue sucks at the reed, bends it away from the mouthpiece and lets go; the reed slams on the lay.
 //!
-//! Two things drive the bore: the volume the reed sweeps as it flies back, and the suction in the mouthpiece that ends
-//! when the tongue comes off. The tongue seals the tip meanwhile, so a breath behind it is heard only afterwards; without
-//! breath it follows the reed and keeps it shut, so that the bore rings with a closed end: open, the reed would swallow
-//! the sound within milliseconds. Left out: the tongue's own noise, and the bounce of the reed on a hard lay. The figures
-//! are by judgement, no measured slap was at hand: at full strength a loud pop, no louder than a loud note.
+//! Two things drive the bore: the volume that the reed sweeps as it flies back, and the suction in the mouthpiece, which
+//! ends when the tongue comes off. Meanwhile the tongue seals the tip, so a breath behind it is heard only afterwards.
+//! Without breath the tongue follows the reed and keeps it shut, so that the bore rings with a closed end; an open reed
+//! would absorb the sound within milliseconds. The model leaves out the tongue's own noise and the bounce of the reed on a
+//! hard lay. Its numbers are by judgement, because no measured slap was at hand: at full strength a loud pop, no louder
+//! than a loud note.
 
 /// How long the tongue pulls, s.
 const PULL_S: f64 = 0.008;
-/// Force of the hardest pull, over the closing pressure: bends the reed away by so many rest openings.
+/// Force of the strongest pull, over the closing pressure. It bends the reed away by as many rest openings.
 const PULL: f64 = 1.5;
-/// Suction under the hardest pull, over the closing pressure.
+/// Suction of the strongest pull, over the closing pressure.
 const SUCTION: f64 = 0.3;
-/// Breath over the closing pressure from which the tongue stays away after a slap, so that the note goes on; soft notes
-/// begin above.
+/// Mouth pressure over the closing pressure from which the tongue stays away after a slap, so that the note goes on. Soft
+/// notes begin above it.
 pub const BREATH_GAMMA: f64 = 0.3;
 
 /// A slap while the tongue pulls.
@@ -25,20 +26,20 @@ pub struct Slap {
     from: f64,
 }
 
-/// What a pull does to the reed, over its closing pressure.
+/// Effect of the pulling tongue on the reed, over its closing pressure.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pull {
-    /// Force: from what it was to a pull away from the mouthpiece, which is negative.
+pub struct TonguePull {
+    /// Force on the reed; it goes from what it was before to negative, away from the mouthpiece.
     pub force: f64,
     /// Suction at the tip, 0 or less.
     pub suction: f64,
-    /// Share of the breath that the tongue keeps from the reed, 0..=1.
+    /// Share of the breath that the tongue keeps away from the reed, 0..=1.
     pub seal: f64,
 }
 
 impl Slap {
-    /// The tongue begins to pull; `None` without strength. A second slap during the pull makes it as strong as the
-    /// stronger. `force` is that of the tongue so far, over the closing pressure.
+    /// Begins a slap of a strength in 0..=1 (more counts as 1); `None` for 0, less, or not a number. A second slap during
+    /// the pull counts if it is stronger. `force` is that of the tongue so far, over the closing pressure.
     pub fn begin(strength: f32, force: f64, before: Option<Self>) -> Option<Self> {
         let strength = f64::from(strength);
         let slap = before.unwrap_or(Self { age_s: 0.0, strength: 0.0, from: force });
@@ -46,7 +47,7 @@ impl Slap {
     }
 
     /// Advances by a control tick; `None` when the tongue has let go.
-    pub fn tick(&mut self, tick_s: f64) -> Option<Pull> {
+    pub fn tick(&mut self, tick_s: f64) -> Option<TonguePull> {
         self.age_s += tick_s;
         if self.age_s >= PULL_S {
             return None;
@@ -55,7 +56,7 @@ impl Slap {
         let way = self.age_s / PULL_S;
         let seal = way * way * (3.0 - 2.0 * way);
         let share = self.strength * seal;
-        Some(Pull { force: self.from * (1.0 - seal) - PULL * share, suction: -SUCTION * share, seal })
+        Some(TonguePull { force: self.from * (1.0 - seal) - PULL * share, suction: -SUCTION * share, seal })
     }
 }
 

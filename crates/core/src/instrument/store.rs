@@ -1,4 +1,4 @@
-//! Where prepared instruments are kept between sessions, if anywhere: a trait, so that this crate opens no file.
+//! A place that keeps prepared instruments between sessions: a trait, so that this crate opens no file.
 
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
@@ -22,12 +22,12 @@ impl std::fmt::Display for Key {
     }
 }
 
-/// Keeps texts under keys. A store may forget any text at any time; a text it returns is whole.
+/// Keeps texts under keys. A store may forget any text at any time, but it returns a text whole or not at all.
 pub trait Store {
     /// The text kept under `key`, if there is one.
     fn get(&self, key: &Key) -> Option<String>;
 
-    /// Keeps `text` under `key`. A store that cannot keep it says nothing: the text is made again when it is needed.
+    /// Keeps `text` under `key`. A store that cannot keep it reports nothing: the text is made again when it is needed.
     fn put(&self, key: &Key, text: &str);
 }
 

@@ -1,4 +1,4 @@
-//! One reed on one bore, at the internal rate: the thing that sounds. It knows pressures and holes, not notes.
+//! One reed on one bore, at the internal rate: it makes the sound. It knows pressures and holes, not notes.
 
 use std::sync::Arc;
 
@@ -9,21 +9,20 @@ use crate::reed::ReedTables;
 use crate::reed::physical::P_REF_PA;
 use crate::units::Air;
 
-/// Samples of one control tick: everything a player moves, moves on this grid, counted from reset.
+/// Samples of one control tick. Everything a player moves, moves on this grid, counted from the last reset.
 pub const TICK: usize = 16;
-/// Ticks between two flushes of states too small to hear.
+/// Ticks between two flushes of states that are too small to hear.
 const FLUSH_TICKS: u32 = 64;
 /// Breath noise at `noise` = 1: rms of the noise flow over the mean flow it rides on (by level: -40 dB under
 /// a mezzo-forte fundamental at the default 0.3).
 const NOISE_FLOW: f64 = 0.018;
 /// Below this flow the jet is laminar and quiet: a Reynolds number of 25 in a channel 13 mm wide, about a hundredth of
-/// the flow in a soft note. When the breath has ended, the air left moving in the bore dies away only as 1 / t; it must
-/// not hiss.
+/// the flow in a soft note. After the breath has ended, the flow in the bore decays only as 1 / t; it must not hiss.
 const LAMINAR_FLOW: f64 = 0.002;
 /// Corners of the noise band, Hz: turbulence in the channel is broad around a few kHz (physics notes, by judgement).
 const NOISE_BAND_HZ: (f64, f64) = (600.0, 5_000.0);
 
-/// One moment of the inside of the instrument, at the internal rate.
+/// One sample of the inside of the instrument, at the internal rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Probe {
     /// Mouth pressure over the closing pressure of the reed as it is set.
@@ -38,12 +37,12 @@ pub struct Probe {
     pub p_radiated_pa: f64,
 }
 
-/// What the player's breath, lip and tongue do during one control tick. Pressures over the reference closing pressure.
+/// What breath, lip and tongue do during one control tick. Pressures are over the reference closing pressure.
 #[derive(Clone, Copy, Debug)]
 pub struct Drive {
-    /// Mouth pressure reached at the end of the tick.
+    /// Mouth pressure at the end of the tick.
     pub p_mouth: f64,
-    /// Force of the tongue on the reed reached at the end of the tick.
+    /// Force of the tongue on the reed at the end of the tick; negative pulls.
     pub tongue: f64,
     /// Breath noise, 0..=1.
     pub noise: f64,
@@ -51,7 +50,7 @@ pub struct Drive {
     pub reed: ReedCoeffs,
 }
 
-/// A sounding reed and bore. `F` is `f32` to play, `f64` to prove.
+/// A sounding reed and bore. `F` is `f32` for playing live, `f64` for high quality and for proofs.
 pub struct Voice<F = f32> {
     lattice: Lattice<F>,
     mouth: Mouth,
@@ -59,7 +58,7 @@ pub struct Voice<F = f32> {
     resets: u64,
 }
 
-/// Everything at the reed end, and the ear outside.
+/// Everything at the reed end, and the listener outside.
 struct Mouth {
     tables: &'static ReedTables,
     reed: ReedCoeffs,
@@ -85,14 +84,15 @@ struct Mouth {
     flow_unit: f64,
 }
 
-/// Seed of the breath noise: any constant; renders repeat.
+/// Seed of the breath noise: any constant does; with a constant, renders repeat.
 const NOISE_SEED: u64 = 0x9E37_79B9_7F4A_7C15;
 
 impl Mouth {
-    /// Turbulence for the next tick: white noise between two corners. Beside the loop over samples, which is crowded.
+    /// Turbulence for the next tick: white noise between two corners. Computed outside the loop over samples, which has no
+    /// registers to spare.
     ///
-    /// White is a linear congruential generator (Knuth, The Art of Computer Programming 2, 3.3.4: MMIX), whose upper
-    /// bits are what is heard, uniform with unit variance.
+    /// The white noise comes from a linear congruential generator (Knuth, The Art of Computer Programming 2, 3.3.4: MMIX);
+    /// its upper bits are heard, uniform with unit variance.
     fn breathe(&mut self) {
         if self.noise == 0.0 {
             return;
@@ -109,7 +109,7 @@ impl Mouth {
         (self.random, self.noise_low, self.noise_band) = (random, smooth, drift);
     }
 
-    /// What a tick's flows sound like: a small source is heard by its change of flow.
+    /// Radiates a tick's flows: the pressure of a small source is proportional to the change of its flow.
     fn radiate(&mut self) {
         let mut before = self.last_flow;
         for (out, &flow) in self.out.iter_mut().zip(&self.flows) {
@@ -163,7 +163,7 @@ impl<F: Real> Tip<F> for Mouth {
 }
 
 impl<F: Real> Voice<F> {
-    /// A silent voice. Allocates.
+    /// A silent voice with closed holes. Allocates.
     pub fn new(
         coeffs: &Arc<LatticeCoeffs>,
         air: &Air,
@@ -213,25 +213,25 @@ impl<F: Real> Voice<F> {
         &self.lattice
     }
 
-    /// Keeps the plain code path, see [`Lattice::without_avx2`].
+    /// Keeps to the code path without AVX2, see [`Lattice::without_avx2`].
     pub fn without_avx2(mut self) -> Self {
         self.lattice = self.lattice.without_avx2();
         self
     }
 
-    /// Starts or stops recording the inside of the instrument.
+    /// Starts or stops recording [`Probe`]s. Real-time safe.
     pub fn set_probing(&mut self, on: bool) {
         self.mouth.probes = on.then(|| [Probe::default(); TICK]);
     }
 
-    /// The probes of the last tick, if they are on.
+    /// The probes of the last tick, if they are recorded.
     pub fn probes(&self) -> Option<&[Probe; TICK]> {
         self.mouth.probes.as_ref()
     }
 
-    /// One control tick: the radiated pressure at 1 m, Pa. Real-time safe. [audio thread]
+    /// Advances one control tick and returns the radiated pressure at 1 m, Pa. Real-time safe. [audio thread]
     ///
-    /// A state that is no longer finite is reset to silence and counted; nothing here can fail.
+    /// A state that is no longer finite is reset to silence and counted; nothing else can fail.
     pub fn tick(&mut self, drive: &Drive) -> &[f32; TICK] {
         let mouth = &mut self.mouth;
         mouth.reed = drive.reed;
@@ -257,13 +257,14 @@ impl<F: Real> Voice<F> {
         &self.mouth.out
     }
 
-    /// Puts the reed where a tongue of this force holds it, without the thump of getting there. Real-time safe.
+    /// Puts the reed where a tongue of this force (over the reference closing pressure) holds it, without the thump of the
+    /// movement. Real-time safe.
     pub fn hold_reed(&mut self, tongue: f64) {
         self.mouth.state = ReedState { closing: tongue, ..ReedState::default() };
         self.mouth.tongue = tongue;
     }
 
-    /// Silence, noise generator and tick counter included; openings and delay stay. Real-time safe.
+    /// Resets to silence, with the noise generator and the tick counter; openings and delay stay. Real-time safe.
     pub fn reset(&mut self) {
         self.lattice.reset();
         let mouth = &mut self.mouth;
@@ -275,7 +276,7 @@ impl<F: Real> Voice<F> {
         self.ticks = 0;
     }
 
-    /// How often a non-finite state was reset.
+    /// How often a state that was not finite was reset.
     pub fn resets(&self) -> u64 {
         self.resets
     }
@@ -285,12 +286,12 @@ impl<F: Real> Voice<F> {
         self.mouth.state.p_mouthpiece
     }
 
-    /// The reed as it stands.
+    /// Displacement, speed, flow and pressure of the reed now.
     pub fn reed(&self) -> ReedState {
         self.mouth.state
     }
 
-    /// For tests: the reed as it stands, to be disturbed.
+    /// The state of the reed, for tests that disturb it.
     pub fn reed_mut(&mut self) -> &mut ReedState {
         &mut self.mouth.state
     }

@@ -1,17 +1,18 @@
-//! The player's small corrections: a delay per note, found by playing the instrument itself.
+//! A table of small pitch corrections: a delay (trim) for each note, found by playing the instrument.
 //!
-//! Linear theory cannot supply them (reed damping and saturation move every note by tens of cents), so
-//! [`tuner`](super::tuner) plays each note and moves its delay until it is right. *Natural* is the trim at gamma 0.5; *tempered* has four nodes
-//! over gamma, because a real bore's modes are not harmonic and pitch sags as the reed begins to beat.
+//! Linear theory cannot supply the trims, because reed damping and saturation move every note by tens of cents. So
+//! [`auto_tune`](super::prepare::auto_tune) plays each note and moves its delay until the pitch is right. The *natural*
+//! trim is right at gamma 0.5. The *tempered* trims are given at four nodes over gamma, because the modes of a real bore
+//! are not harmonic and the pitch sags as the reed begins to beat.
 
 use crate::bore::instrument_file::{Fingering, InstrumentFile};
 use crate::instrument::settings::Tuning;
 
-/// Mouth pressures over the closing pressure at which tempered trims are given.
+/// Nodes of the tempered trims: mouth pressures over the closing pressure.
 ///
-/// Of all places for four straight-line nodes these leave the least between them: 1.9 cents at most.
+/// Of all places for four nodes with straight lines between them, these leave the smallest error.
 pub const GAMMA_NODES: [f64; 4] = [0.45, 0.55, 0.725, 0.9];
-/// Mouth pressure of the natural trim.
+/// Mouth pressure over the closing pressure at which the natural trim is right.
 pub const NATURAL_GAMMA: f64 = 0.5;
 
 /// Trims of one note, rows of round-trip delay.
@@ -26,10 +27,10 @@ pub struct NoteTuning {
     /// Rows that lower the note by one cent, over the quarter-wave estimate of
     /// [`Model::rows_for_cents`](super::Model::rows_for_cents).
     pub sensitivity: f64,
-    /// How far above its pitch it is at [`NATURAL_GAMMA`] all the same, because the delay has no more to give, cents.
+    /// Remaining error at [`NATURAL_GAMMA`] where the delay has no more to give, cents above the note; else 0.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub off_cents: f64,
-    /// It does not sound in its register at any of these pressures: its trims are its neighbours'.
+    /// True if the note does not sound in its register at any of these pressures; its trims are those of its neighbours.
     #[serde(default, skip_serializing_if = "is_false")]
     pub silent: bool,
 }
@@ -50,7 +51,7 @@ pub struct TuningTable {
 }
 
 impl TuningTable {
-    /// No trims.
+    /// A table of zero trims. Allocates.
     pub fn untuned(file: &InstrumentFile) -> Self {
         let note = |fingering: &Fingering| NoteTuning {
             written: fingering.written.0,
@@ -60,7 +61,8 @@ impl TuningTable {
         Self { notes: file.fingerings.iter().map(note).collect() }
     }
 
-    /// Trim of a note at a mouth pressure, rows. Real-time safe.
+    /// Trim of a fingering at a mouth pressure `gamma` (over the closing pressure), rows; 0 for a fingering that the table
+    /// does not have. Outside the nodes the tempered trim is that of the nearest node. Real-time safe.
     pub fn rows(&self, fingering: usize, tuning: Tuning, gamma: f64) -> f64 {
         let Some(note) = self.notes.get(fingering) else { return 0.0 };
         match tuning {

@@ -1,8 +1,8 @@
-//! What a player's lip does without being asked: reed resonance and damping for the note in hand.
+//! The lip on the reed: the reed's resonance and damping for each note, which a player sets without thinking.
 //!
-//! The rule is relative to the instrument (lowest note) and the note, so that scaled instruments speak without a
-//! change. Found by mapping which (resonance, damping) pairs hold which note in its register: low damping squeaks in
-//! the chalumeau, high damping loses everything above written B5, where the reed's gain must lift mode 3 over mode 1.
+//! The rule is relative to the note and to the instrument's lowest note, so that it holds for instruments of every size.
+//! It comes from a map of the (resonance, damping) pairs that hold each note in its register: low damping squeaks in the
+//! chalumeau register; high damping loses everything above written B5, where the reed must favour mode 3 over mode 1.
 
 /// Reed resonance and damping under the lip.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,9 +13,18 @@ pub struct Embouchure {
     pub damping: f64,
 }
 
-/// Embouchure for a note sounding at `note_hz` on an instrument whose lowest note sounds at `lowest_hz`.
+/// Embouchure for a note sounding at `note_hz` on an instrument whose lowest note sounds at `lowest_hz`. Real-time safe.
 ///
-/// `f_r = max(10.2 f_low, 1.55 f)`, `q` from 0.8 to 0.25 while f / f_r goes from 0.36 to 0.54.
+/// The resonance is `f_r = max(10.2 f_low, 1.55 f)`; the damping `q` goes from 0.8 to 0.25 while `f / f_r` goes from 0.36
+/// to 0.54.
+///
+/// ```
+/// use chalumeau_core::instrument::lip::embouchure;
+///
+/// // E3 and C6 (written) of a B flat clarinet: a low note is damped, a high one is not.
+/// let (low, high) = (embouchure(146.8, 146.8), embouchure(932.3, 146.8));
+/// assert!(low.damping == 0.8 && high.damping < 0.3);
+/// ```
 pub fn embouchure(note_hz: f64, lowest_hz: f64) -> Embouchure {
     let resonance_hz = (10.2 * lowest_hz).max(1.55 * note_hz);
     let way = ((note_hz / resonance_hz - 0.36) / (0.54 - 0.36)).clamp(0.0, 1.0);

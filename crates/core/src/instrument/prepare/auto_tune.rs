@@ -1,46 +1,48 @@
-//! Finds the trims of a [`TuningTable`] by playing: every note is held, heard, and its delay moved until it is right.
+//! Finds the trims of a [`TuningTable`] by playing: it holds every note, measures its pitch, and moves its delay until the
+//! pitch is right.
 //!
-//! Notes are shared between the processor's cores and do not know of each other, so the result does not depend on how
-//! many there are. A note that does not sound in its register gets what its neighbours got and is marked. Cents above
-//! what is wanted, rows of round-trip delay, gamma.
+//! The notes are independent, so the result does not depend on how many processor cores share them. A note that does not
+//! sound in its register gets the trims of its neighbours and is marked. Units: cents above the wanted pitch, rows of
+//! round-trip delay, mouth pressure over the closing pressure (gamma).
 
 use std::ops::ControlFlow;
 
 use crate::analysis::pitch;
 use crate::instrument::held::HeldNote;
 use crate::instrument::model::Model;
-use crate::instrument::tuning::{GAMMA_NODES, NATURAL_GAMMA, NoteTuning, TuningTable};
+use crate::instrument::tuning_table::{GAMMA_NODES, NATURAL_GAMMA, NoteTuning, TuningTable};
 use crate::parallel;
 use crate::units::cents;
 
-/// A trimmed note is at most so far from its pitch, cents; a tenth of what anyone hears.
+/// Largest error of a note that needs no further trim, cents.
 const CLOSE_CENTS: f64 = 0.1;
-/// A note further off than this after its trim has been moved is said to be out of tune, cents.
+/// A note with a larger error than this after trimming is reported as out of tune, cents.
 const OFF_CENTS: f64 = 0.5;
-/// How far a note is moved to see what a row of delay does to it, cents: down, where the delay always has room.
+/// How far a note is moved to measure its sensitivity to the delay, cents: down, where the delay has more room.
 const PROBE_CENTS: f64 = -20.0;
-/// Further off than this a note is another one, cents. Before it is trimmed it may be further, but never nearer to a
-/// neighbouring mode than to its own.
-const OWN_CENTS: (f64, f64) = (150.0, 300.0);
-/// Most plays for one trim.
+/// A pitch further off than this is another note, cents: after trimming, and before. Before trimming a note must also be
+/// nearer to its own mode than to a neighbouring one.
+const OTHER_NOTE_CENTS: (f64, f64) = (150.0, 300.0);
+/// Largest number of times a note is played for one trim.
 const PLAYS: usize = 6;
-/// A last step of less than this is not heard again, cents: what a row does is known to a few per cent by then.
+/// A last step of less than this is not played again, cents: the sensitivity is known to a few per cent by then.
 const SURE_CENTS: f64 = 2.0;
-/// A note that was moved by more than this has told what a row does, cents.
-const TOLD_CENTS: f64 = 10.0;
-/// Lowest note of the B flat clarinet, Hz: what is larger takes longer to settle, by as much as it is larger.
+/// A move by more than this measures the sensitivity, cents.
+const MEASURING_CENTS: f64 = 10.0;
+/// Lowest note of the B flat clarinet, Hz. A larger instrument takes longer to settle, in proportion to its size.
 const LOWEST_HZ: f64 = 146.83;
 
-/// How long a note is held before it is listened to, s, and until when: near threshold growth is slow.
+/// From when to when the pitch of a held note is measured, s: near the threshold a note grows slowly.
 fn listening_s(model: &Model, gamma: f64) -> (f64, f64) {
     let longer = (LOWEST_HZ / model.lowest_hz).clamp(1.0, 4.0);
     let (from_s, to_s) = if gamma < 0.5 { (1.0, 1.3) } else { (0.6, 0.9) };
     (longer * from_s, longer * to_s)
 }
 
-/// Pitch of a held note, Hz, or `None` if it is more than 150 cents from `wanted_hz` or not a note.
+/// Pitch of a held note, Hz, or `None` if it is not periodic or more than 150 cents from `wanted_hz`. Plays the note for
+/// about a second, longer on larger instruments. Allocates.
 pub fn heard_hz(model: &Model, note: &HeldNote, wanted_hz: f64) -> Option<f64> {
-    heard_within(model, note, wanted_hz, OWN_CENTS.0)
+    heard_within(model, note, wanted_hz, OTHER_NOTE_CENTS.0)
 }
 
 fn heard_within(model: &Model, note: &HeldNote, wanted_hz: f64, own_cents: f64) -> Option<f64> {
@@ -58,28 +60,28 @@ struct Trial<'a> {
     gamma: f64,
 }
 
-/// Where a search has come to.
+/// A trim that was played.
 #[derive(Clone, Copy)]
-struct Found {
+struct PlayedTrim {
     rows: f64,
     off_cents: f64,
 }
 
 impl Trial<'_> {
-    /// How far off the note is with so many rows.
-    fn play(&self, rows: f64) -> Option<Found> {
+    /// Plays the note with a trim of `rows`; `None` if another note or none sounds.
+    fn play(&self, rows: f64) -> Option<PlayedTrim> {
         let wanted = self.model.notes_hz[self.fingering];
-        // Modes stand as the odd numbers: half the way to the next one up.
+        // The modes are as the odd numbers; the limit is half-way to the next higher one.
         let mode = self.model.file.fingerings[self.fingering].mode as f64;
         let half_way = 600.0 * ((2.0 * mode + 1.0) / (2.0 * mode - 1.0)).log2();
         let note = HeldNote { rows, ..HeldNote::new(self.model, self.fingering, self.gamma) };
-        let hz = heard_within(self.model, &note, wanted, half_way.min(OWN_CENTS.1))?;
-        Some(Found { rows, off_cents: cents(hz, wanted) })
+        let hz = heard_within(self.model, &note, wanted, half_way.min(OTHER_NOTE_CENTS.1))?;
+        Some(PlayedTrim { rows, off_cents: cents(hz, wanted) })
     }
 
-    /// Secant steps from a trim that was heard; `sensitivity` is what a row does, or nothing yet. Gives the trim and what a
-    /// row does, if that was heard.
-    fn trim(&self, from: Found, known: Option<f64>) -> (Found, Option<f64>) {
+    /// Secant steps from a trim that was played. `known` is the sensitivity if it was measured already; it comes back with
+    /// the trim, measured if possible.
+    fn trim(&self, from: PlayedTrim, known: Option<f64>) -> (PlayedTrim, Option<f64>) {
         let (low, high) = self.model.coeffs.tuning_range();
         let estimate = |off_cents: f64| self.model.rows_for_cents(self.fingering, off_cents);
         let mut sensitivity = known.unwrap_or(1.0);
@@ -95,12 +97,12 @@ impl Trial<'_> {
                 break;
             }
             if heard.is_some() && before.off_cents.abs() < SURE_CENTS && wanted > low && wanted < high {
-                best = Found { rows: wanted, off_cents: 0.0 };
+                best = PlayedTrim { rows: wanted, off_cents: 0.0 };
                 break;
             }
             rows = wanted;
             let Some(here) = self.play(rows) else {
-                // It went too far and fell out of its register: half the way.
+                // The step went too far and the note left its register: take half of it.
                 sensitivity *= 0.5;
                 before = best;
                 continue;
@@ -108,7 +110,7 @@ impl Trial<'_> {
             let moved = estimate(here.off_cents) - estimate(before.off_cents);
             if moved.abs() > 0.02 {
                 sensitivity = ((here.rows - before.rows) / moved).clamp(0.5, 3.0);
-                if (here.off_cents - before.off_cents).abs() > TOLD_CENTS {
+                if (here.off_cents - before.off_cents).abs() > MEASURING_CENTS {
                     heard = Some(sensitivity);
                 }
             }
@@ -120,24 +122,25 @@ impl Trial<'_> {
         (best, heard)
     }
 
-    /// Rows a cent costs near a trim, over [`Model::rows_for_cents`]; seen by moving the note.
-    fn sensitivity(&self, at: Found) -> Option<f64> {
+    /// Rows per cent near a trim, over [`Model::rows_for_cents`]; measured by moving the note.
+    fn sensitivity(&self, at: PlayedTrim) -> Option<f64> {
         let probe = self.model.rows_for_cents(self.fingering, PROBE_CENTS);
         let (low, high) = self.model.coeffs.tuning_range();
-        // Where there is no room below there is above.
+        // Move the note up where the delay has no room to move it down.
         let probe = if at.rows + probe > high { (-probe).max(low - at.rows) } else { probe };
         let moved = self.play(at.rows + probe)?.off_cents - at.off_cents;
         Some((probe / self.model.rows_for_cents(self.fingering, moved)).clamp(0.5, 3.0))
     }
 }
 
-/// The trims of one note, `untrimmed_cents` off without any at [`NATURAL_GAMMA`] or silent there.
+/// The trims of one note. `untrimmed_cents` is its error without a trim at [`NATURAL_GAMMA`], `None` if it is silent
+/// there.
 fn tune_note(model: &Model, fingering: usize, untrimmed_cents: Option<f64>) -> NoteTuning {
     let at = |gamma: f64| Trial { model, fingering, gamma };
     let mut note = model.tuning.notes[fingering];
     let (natural, heard) = match untrimmed_cents {
         Some(off_cents) => {
-            let (found, heard) = at(NATURAL_GAMMA).trim(Found { rows: 0.0, off_cents }, None);
+            let (found, heard) = at(NATURAL_GAMMA).trim(PlayedTrim { rows: 0.0, off_cents }, None);
             (Some(found), heard.or_else(|| at(NATURAL_GAMMA).sensitivity(found)))
         }
         None => (None, None),
@@ -150,7 +153,7 @@ fn tune_note(model: &Model, fingering: usize, untrimmed_cents: Option<f64>) -> N
         }
         found
     });
-    // A note too weak for the natural pressure is tuned at the next that it takes.
+    // A note that does not speak at the natural pressure is tuned at the first pressure where it does.
     let first = natural.or_else(|| nodes.into_iter().flatten().next());
     note.silent = first.is_none();
     note.sensitivity = heard.unwrap_or(1.0);
@@ -167,8 +170,8 @@ fn tune_note(model: &Model, fingering: usize, untrimmed_cents: Option<f64>) -> N
     note
 }
 
-/// How far each note is from its pitch without a trim at [`NATURAL_GAMMA`], cents; `None` where it is not its own. `on`
-/// is told the share done and may end it.
+/// Error of each note without a trim at [`NATURAL_GAMMA`], cents above its pitch; `None` for a note that does not sound in
+/// its register. `on` receives the share done, 0..=1; if it breaks, the result is `None`.
 pub fn offsets(model: &Model, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Option<Vec<Option<f64>>> {
     let untrimmed = |fingering: usize| {
         let trial = Trial { model, fingering, gamma: NATURAL_GAMMA };
@@ -177,8 +180,8 @@ pub fn offsets(model: &Model, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Opt
     parallel::each(model.file.fingerings.len(), untrimmed, on)
 }
 
-/// Tunes every fingering of a model by playing it, on all cores; `offsets` as [`offsets`] heard them. Takes up to a
-/// minute; `on` is told the share done and may end it, for `None`.
+/// Tunes every fingering of a model by playing it, on all cores. `offsets` is the result of [`offsets`](fn@offsets). Takes
+/// up to a minute on two cores. `on` receives the share done, 0..=1; if it breaks, the result is `None`.
 pub fn tune(
     model: &Model,
     offsets: &[Option<f64>],
@@ -191,7 +194,8 @@ pub fn tune(
     Some(table)
 }
 
-/// Gives notes that do not sound trims between those of the nearest that do, as parts of the note's own length.
+/// Gives each silent note trims between those of its nearest neighbours that sound, in cents, so that they fit the note's
+/// own length.
 fn fill_silent(model: &Model, table: &mut TuningTable) {
     let per_cent = |fingering: usize| model.rows_for_cents(fingering, -1.0);
     let heard: Vec<usize> = (0..table.notes.len()).filter(|&note| !table.notes[note].silent).collect();

@@ -1,27 +1,27 @@
-//! How much longer or shorter a bore has to be so that the tuning delay can do the rest.
+//! Scales a bore so that the tuning delay can do the rest.
 //!
-//! All lengths by one factor, as a maker would build it for another pitch: without losses every resonance moves by the
-//! same interval. First by theory, so that hardly any instrument has to be fitted twice; then by how the notes play.
-//! Factors above 1 are longer and lower.
+//! One factor multiplies all lengths, as a maker would build the instrument for another pitch: without losses every
+//! resonance moves by the same interval. Theory gives a first factor, so that hardly any instrument has to be fitted twice;
+//! the played notes give a second one where it is needed. Factors above 1 make the bore longer and the pitch lower.
 
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::transfer_matrix::TransferMatrix;
 use crate::instrument::model::{A4_HZ, Model};
 use crate::units::{Air, cents};
 
-/// Theory (a reed without inertia or damping) is not better than this: notes of the built-in clarinet play 20 to 70
-/// cents below it. Nothing closer is corrected before it has been heard, cents.
+/// Error of the theory (a reed without inertia or damping), cents: notes of the built-in clarinet play 20 to 70 cents
+/// below it. Smaller offsets are corrected only after the notes have been heard.
 const THEORY_CENTS: f64 = 50.0;
-/// An instrument further off than this is not out of tune but named wrongly; it is left as it is, cents.
+/// An instrument further off than this, cents, is not out of tune but has the wrong note names; it is left as it is.
 const MOST_CENTS: f64 = 300.0;
-/// Room that is left in the delay on both sides, cents: for the breath, and for the pitch of the room.
+/// Room that the delay keeps on both sides, cents, for changes of breath and temperature.
 const ROOM_CENTS: f64 = 10.0;
 
 fn factor(down_cents: f64) -> f64 {
     (down_cents / 1_200.0).exp2()
 }
 
-/// Factor for a pitch of A4, and for an instrument whose notes lie elsewhere than its chart says.
+/// Factor for a pitch of A4, Hz; also corrects an instrument whose notes lie elsewhere than its chart says.
 pub fn by_theory(file: &InstrumentFile, air: &Air, a4_hz: f64) -> f64 {
     let model = TransferMatrix::new(file, *air);
     let offsets: Vec<f64> = file
@@ -39,11 +39,12 @@ pub fn by_theory(file: &InstrumentFile, air: &Air, a4_hz: f64) -> f64 {
     A4_HZ / a4_hz * factor(sharp)
 }
 
-/// Factor for notes that lie `offsets` from their pitch without a trim, cents above; `None` if the delay reaches all of
-/// them.
+/// Factor for notes that lie `offsets` cents above their pitch without a trim (`None`: not heard); `None` if the delay
+/// can correct all of them.
 pub fn by_playing(model: &Model, offsets: &[Option<f64>]) -> Option<f64> {
     let (low_rows, high_rows) = model.coeffs.tuning_range();
-    // For each note the least and the most it may be moved by scale, cents up, for its delay to do the rest.
+    // For each note the least and the most that scaling may move it, cents up, so that its delay can do the rest; and the
+    // offset that needs no delay.
     let bounds: Vec<(f64, f64, f64)> = offsets
         .iter()
         .enumerate()
@@ -61,7 +62,7 @@ pub fn by_playing(model: &Model, offsets: &[Option<f64>]) -> Option<f64> {
     }
     let mean = bounds.iter().map(|bound| bound.2).sum::<f64>() / bounds.len() as f64;
     let (least, most) = (least + ROOM_CENTS, most - ROOM_CENTS);
-    // Where no scale serves all notes, those at both ends are left out of tune alike.
+    // Where no scale serves all notes, the lowest and the highest offset stay out of tune by the same amount.
     let up = if least <= most { mean.clamp(least, most) } else { 0.5 * (least + most) };
     (up.abs() < MOST_CENTS).then(|| factor(-up))
 }

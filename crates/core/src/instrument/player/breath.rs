@@ -1,0 +1,98 @@
+//! The breath: a breath source sets the mouth pressure; without one, key velocity sets it.
+//!
+//! Without breath input, a key blows with a constant pressure that its velocity chooses. The first breath event makes
+//! the breath *live*: from then on breath events alone set the pressure, and velocity only shapes the attack.
+
+use super::TickContext;
+use crate::reed::physical::P_REF_PA;
+
+/// Mouth pressure over the closing pressure for velocity 0 and 1: just above the threshold, and loud (by ear).
+const VELOCITY_GAMMA: (f64, f64) = (0.43, 0.85);
+/// The dip that helps a difficult slur: factor on the pressure, length in s.
+const DIP: (f64, f64) = (0.3, 0.025);
+/// A note is over when its mouth pressure is below this share of the closing pressure.
+const NO_BREATH: f64 = 1e-6;
+
+/// State of the breath.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Breath {
+    /// Velocity of the last key, 0..=1.
+    velocity: f64,
+    /// Whether any breath event has arrived.
+    live: bool,
+    /// The last breath event, 0..=1 of the full-scale mouth pressure.
+    level: f64,
+    /// Mouth pressure over the closing pressure of the reed.
+    gamma: f64,
+    /// What is left of the dip, s; 0 or less for none.
+    dip_s: f64,
+}
+
+impl Breath {
+    /// A breath event, 0..=1 of the full-scale mouth pressure; not a number counts as 0.
+    pub fn set_level(&mut self, level: f32) {
+        self.live = true;
+        self.level = f64::from(if level.is_finite() { level.clamp(0.0, 1.0) } else { 0.0 });
+    }
+
+    /// The velocity of a new key, 0..=1; not a number counts as 0.5.
+    pub fn set_velocity(&mut self, velocity: f32) {
+        self.velocity = f64::from(if velocity.is_finite() { velocity.clamp(0.0, 1.0) } else { 0.5 });
+    }
+
+    /// Begins a short dip of the pressure.
+    pub fn dip(&mut self) {
+        self.dip_s = DIP.1;
+    }
+
+    /// Mouth pressure over the closing pressure of the reed.
+    pub fn gamma(&self) -> f64 {
+        self.gamma
+    }
+
+    /// How quickly the tongue lets go, as a factor on the time that is set: velocity hardens the attack by half either
+    /// way once the breath is live, because it then does not set the pressure.
+    pub fn attack_hardness(&self) -> f64 {
+        if self.live { 0.5 + self.velocity } else { 1.0 }
+    }
+
+    /// Whether the pressure has gone and none is asked for.
+    pub fn is_resting(&self, key_down: bool) -> bool {
+        self.gamma < NO_BREATH && (!key_down || (self.live && self.level == 0.0))
+    }
+
+    /// The same velocity and breath level for another instrument, whose pressure begins at 0.
+    pub fn carried(&self) -> Self {
+        Self { velocity: self.velocity, live: self.live, level: self.level, ..Self::default() }
+    }
+
+    /// Moves the pressure towards its target. `tongue_holds`: the tongue holds the reed before a note, so that the
+    /// pressure may rise behind it at once.
+    pub fn tick(&mut self, key_down: bool, tongue_holds: bool, context: &TickContext<'_>) {
+        let (settings, posture) = (context.settings, context.posture);
+        let target = match (key_down, self.live) {
+            (false, _) => 0.0,
+            (true, true) => {
+                self.level * 1e3 * f64::from(settings.breath_full_kpa) / (P_REF_PA * posture.closing)
+            }
+            (true, false) => {
+                let (soft, loud) = VELOCITY_GAMMA;
+                soft + (loud - soft) * self.velocity
+            }
+        };
+        let dipping = self.dip_s > 0.0;
+        let target = if dipping { target * DIP.0 } else { target };
+        self.dip_s -= context.tick_s;
+        let share = if !key_down {
+            posture.lags.breath_end
+        } else if tongue_holds || dipping {
+            posture.lags.breath_rise
+        } else {
+            posture.lags.breath_follow
+        };
+        self.gamma += (target - self.gamma) * share;
+        if target == 0.0 && self.gamma < NO_BREATH {
+            self.gamma = 0.0;
+        }
+    }
+}

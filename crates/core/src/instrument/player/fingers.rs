@@ -1,0 +1,74 @@
+//! The fingers: which fingering is in place, and how its holes get there.
+
+use crate::bore::lattice::{Lattice, Real};
+use crate::instrument::model::Model;
+use crate::instrument::voice::TICK;
+
+/// State of the fingers.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Fingers {
+    /// Index of the fingering in place; none before the first note.
+    fingering: Option<usize>,
+    /// Open holes that replace those of the fingering, one bit each.
+    tried: Option<u64>,
+    /// Control ticks until the holes have arrived.
+    gliding: u32,
+}
+
+impl Fingers {
+    /// Index of the fingering in place, if there was any note.
+    pub fn fingering(&self) -> Option<usize> {
+        self.fingering
+    }
+
+    /// Replaces the open holes of every fingering, one bit each from the lowest; `None` goes back to the fingering.
+    /// [`move_to`](Self::move_to) then moves the holes.
+    pub fn try_holes(&mut self, tried: Option<u64>) {
+        self.tried = tried;
+    }
+
+    /// Moves the fingers to a fingering within `ticks` control ticks; the first fingering of all is in place at once.
+    pub fn move_to<F: Real>(
+        &mut self,
+        fingering: usize,
+        ticks: u32,
+        model: &Model,
+        lattice: &mut Lattice<F>,
+    ) {
+        let ticks = ticks.max(1);
+        // One more than the glide takes: the holes are set exactly when they have arrived, not a step before.
+        self.gliding = if self.fingering.is_some() { ticks + 1 } else { 0 };
+        self.fingering = Some(fingering);
+        for hole in 0..model.coeffs.holes() {
+            let opening = self.opening(fingering, hole, model);
+            if self.gliding == 0 {
+                lattice.set_opening(hole, opening);
+            } else {
+                lattice.glide_opening(hole, opening, ticks as usize * TICK);
+            }
+        }
+    }
+
+    /// Sets the holes exactly when they have arrived.
+    pub fn tick<F: Real>(&mut self, model: &Model, lattice: &mut Lattice<F>) {
+        if self.gliding == 0 {
+            return;
+        }
+        self.gliding -= 1;
+        if self.gliding == 0 {
+            let fingering = self.fingering.unwrap_or(0);
+            for hole in 0..model.coeffs.holes() {
+                lattice.set_opening(hole, self.opening(fingering, hole, model));
+            }
+        }
+    }
+
+    /// Opening of a hole under a fingering: 1 open, 0 closed.
+    fn opening(&self, fingering: usize, hole: usize, model: &Model) -> f64 {
+        let open = match self.tried {
+            Some(tried) => tried >> hole & 1 == 1,
+            None => model.file.fingerings[fingering].open[hole],
+        };
+        f64::from(u8::from(open))
+    }
+}

@@ -1,0 +1,147 @@
+//! The tongue: it holds the reed before a note, lets go, stops the note, and slaps.
+
+use super::{TickContext, step_towards};
+use crate::instrument::slap::{BREATH_GAMMA, Slap};
+use crate::reed::motion::TONGUE_FORCE;
+
+/// How long the tongue holds the reed before a tongued note, s: long enough for the breath to rise behind it.
+const HOLD_S: f64 = 0.008;
+/// How long the tongue takes to reach the reed when it stops a note, s.
+const STOP_S: f64 = 0.005;
+/// Time constant with which the force on the reed grows, s, so that the tongue lands softly.
+const PRESS_S: f64 = 0.001;
+
+/// Where the tongue is. Between notes it rests on the reed, so that the reed does not slam shut when the next note is
+/// prepared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Position {
+    /// On the reed.
+    Resting,
+    /// Away from the reed.
+    Away,
+    /// On the reed before a note, for so many more seconds.
+    Holding(f64),
+    /// Letting go; share of the force that is left, 1..0.
+    Leaving(f64),
+    /// Pressing to stop a note; share of the force that is reached, 0..1.
+    Stopping(f64),
+    /// On the reed after a slap under a held key, until the breath is strong enough for the note.
+    AwaitingBreath,
+}
+
+/// State of the tongue.
+#[derive(Clone, Copy, Debug)]
+pub struct Tongue {
+    position: Position,
+    /// The slap that pulls at the reed, if there is one; it overrides the position.
+    slap: Option<Slap>,
+    /// Force on the reed, smoothed so that the tongue never slaps by accident; negative while a slap pulls.
+    force: f64,
+}
+
+impl Default for Tongue {
+    fn default() -> Self {
+        Self { position: Position::Resting, slap: None, force: TONGUE_FORCE }
+    }
+}
+
+impl Tongue {
+    /// Prepares a tongued note.
+    pub fn hold(&mut self) {
+        self.position = Position::Holding(HOLD_S);
+    }
+
+    /// Stops the note.
+    pub fn stop(&mut self) {
+        self.position = Position::Stopping(0.0);
+    }
+
+    /// Begins a slap of a strength in 0..=1; false if there is nothing to begin. `closing` is the closing pressure of
+    /// the reed over the reference, `gamma` the mouth pressure over the closing pressure.
+    pub fn slap(&mut self, strength: f32, closing: f64, key_down: bool, gamma: f64) -> bool {
+        let Some(slap) = Slap::begin(strength, self.force / closing, self.slap) else { return false };
+        self.slap = Some(slap);
+        self.position = match key_down {
+            false => Position::Resting,
+            true if gamma < BREATH_GAMMA => Position::AwaitingBreath,
+            true => Position::Away,
+        };
+        true
+    }
+
+    /// Whether the tongue holds the reed before a note.
+    pub fn is_holding(&self) -> bool {
+        matches!(self.position, Position::Holding(_))
+    }
+
+    /// Whether a slap pulls at the reed.
+    pub fn is_slapping(&self) -> bool {
+        self.slap.is_some()
+    }
+
+    /// Takes over from the tongue of a player of another instrument, under a held key: a movement goes on, but a tongue
+    /// that rested or was about to rest stays away.
+    pub fn carry_on(&mut self, from: &Self) {
+        self.position = match from.position {
+            Position::Resting | Position::Stopping(_) => Position::Away,
+            position => position,
+        };
+        if self.position == Position::Away {
+            self.force = 0.0;
+        }
+    }
+
+    /// Moves the tongue. `gamma` is the mouth pressure over the closing pressure, `hardness` the factor of
+    /// [`Breath::attack_hardness`](super::breath::Breath::attack_hardness). Gives the pressure at the reed's tip and
+    /// the force on the reed, both over the reference closing pressure.
+    pub fn tick(&mut self, gamma: f64, hardness: f64, context: &TickContext<'_>) -> (f64, f64) {
+        let (tick_s, closing) = (context.tick_s, context.posture.closing);
+        let share = self.move_on(gamma, hardness, context);
+        let p_mouth = gamma * closing;
+        let force = TONGUE_FORCE * closing * share;
+        let Some(slap) = &mut self.slap else {
+            // Letting go is as quick as asked; pressing takes a moment.
+            self.force = if force <= self.force {
+                force
+            } else {
+                self.force + step_towards(tick_s, PRESS_S) * (force - self.force)
+            };
+            return (p_mouth, self.force);
+        };
+        match slap.tick(tick_s) {
+            Some(pull) => {
+                self.force = pull.force * closing;
+                (p_mouth * (1.0 - pull.seal) + pull.suction * closing, self.force)
+            }
+            // The tongue comes off within one tick; its next movement begins at the free reed.
+            None => {
+                self.slap = None;
+                self.force = 0.0;
+                (p_mouth, self.force)
+            }
+        }
+    }
+
+    /// Moves on to the next position; gives the share of the full force that the position asks for.
+    fn move_on(&mut self, gamma: f64, hardness: f64, context: &TickContext<'_>) -> f64 {
+        let tick_s = context.tick_s;
+        let (position, share) = match self.position {
+            Position::Resting => (Position::Resting, 1.0),
+            Position::Away => (Position::Away, 0.0),
+            Position::Holding(left_s) if left_s > tick_s => (Position::Holding(left_s - tick_s), 1.0),
+            Position::Holding(_) => (Position::Leaving(1.0), 1.0),
+            Position::Leaving(share) => {
+                let share = share - tick_s * hardness / (1e-3 * f64::from(context.settings.tongue_ms));
+                if share > 0.0 { (Position::Leaving(share), share) } else { (Position::Away, 0.0) }
+            }
+            Position::Stopping(share) => {
+                let share = (share + tick_s / STOP_S).min(1.0);
+                (if share < 1.0 { Position::Stopping(share) } else { Position::Resting }, share)
+            }
+            Position::AwaitingBreath if gamma < BREATH_GAMMA => (Position::AwaitingBreath, 1.0),
+            Position::AwaitingBreath => (Position::Leaving(1.0), 1.0),
+        };
+        self.position = position;
+        share
+    }
+}
