@@ -69,11 +69,11 @@ class Random {
 
 }  // namespace test
 
-#define CHECK(condition)                                       \
-    do {                                                       \
+#define CHECK(condition)                                              \
+    do {                                                              \
         if (!(condition)) test::fail(__FILE__, __LINE__, #condition); \
     } while (false)
-#define CLAIM(name)                                            \
-    static void name();                                        \
-    static const test::Register register_##name{#name, name};  \
+#define CLAIM(name)                                           \
+    static void name();                                       \
+    static const test::Register register_##name{#name, name}; \
     static void name()

@@ -10,9 +10,7 @@
 
 using namespace chalumeau;
 
-CLAIM(crc_has_its_check_value) {
-    CHECK(crc32(reinterpret_cast<const std::uint8_t*>("123456789"), 9) == 0xCBF43926U);
-}
+CLAIM(crc_has_its_check_value) { CHECK(crc32(reinterpret_cast<const std::uint8_t*>("123456789"), 9) == 0xCBF43926U); }
 
 CLAIM(cobs_gives_back_every_pattern_of_zeros) {
     for (unsigned pattern = 0; pattern < 1024; ++pattern) {
@@ -349,8 +347,9 @@ CLAIM(random_bytes_neither_crash_nor_hang_nor_move_the_knob) {
         }
     }
     const FrameCounts& counts = serial.reader.counts;
-    std::printf("    %llu bytes: %u stretches of junk, %u checksum errors; frames: %llu sent, %llu by serial, %llu by MIDI\n",
-                total, counts.junk, counts.crc_errors, whole, by_serial, by_midi);
+    std::printf(
+        "    %llu bytes: %u stretches of junk, %u checksum errors; frames: %llu sent, %llu by serial, %llu by MIDI\n",
+        total, counts.junk, counts.crc_errors, whole, by_serial, by_midi);
     CHECK(!bench.device.armed());
     CHECK(counts.crc_errors > total / 10000);
     // The odds of a 32-bit checksum for all tries together: about 1 in 10,000 at 10^8 bytes.

@@ -55,8 +55,9 @@ CLAIM(integer_torque_is_the_stock_firmwares_at_every_tenth_of_a_degree_but_the_f
             }
         }
     }
-    std::printf("    %d of %d angles compared equal; of the 59 between 0 and 6 degrees %d differ, by at most %d counts\n",
-                compared, 4601 - 59, differ_inside, most_inside);
+    std::printf(
+        "    %d of %d angles compared equal; of the 59 between 0 and 6 degrees %d differ, by at most %d counts\n",
+        compared, 4601 - 59, differ_inside, most_inside);
     CHECK(compared == 4601 - 59 && differ_inside > 0 && most_inside <= 7);
 }
 
@@ -116,8 +117,8 @@ CLAIM(fault_3_the_slap_region_does_not_jump_and_its_event_tells_the_peak_speed) 
               stock_at(there, count));
     }
     for (int count = -990; count > -4000; --count) {
-        const float jump = curve.at_rest(0.1F * static_cast<float>(count)) -
-                           curve.at_rest(0.1F * static_cast<float>(count + 1));
+        const float jump =
+            curve.at_rest(0.1F * static_cast<float>(count)) - curve.at_rest(0.1F * static_cast<float>(count + 1));
         CHECK(jump >= 0.0F && jump < 0.07F);
     }
     CHECK(curve.at_rest(-399.0F) == 90.0F);

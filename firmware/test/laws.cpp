@@ -58,7 +58,8 @@ CLAIM(table_and_formula_agree_at_all_3601_indices_for_every_pair) {
             const double p = index / 3600.0;
             const double wanted = static_cast<double>(h) * std::sqrt(p) - p * std::sqrt(p) / static_cast<double>(k);
             const double got = static_cast<double>(seed_flow(static_cast<std::uint16_t>(index), h, k));
-            worst = std::max(worst, std::fabs(got - wanted) / std::max(static_cast<double>(h), 1.0 / static_cast<double>(k)));
+            worst = std::max(worst,
+                             std::fabs(got - wanted) / std::max(static_cast<double>(h), 1.0 / static_cast<double>(k)));
         }
     });
     std::printf("    worst error of u over max(H, 1/k): %.2e\n", worst);
@@ -135,7 +136,8 @@ CLAIM(torque_is_continuous_everywhere_and_no_steeper_than_declared) {
             const double here = static_cast<double>(curve.at_rest(static_cast<float>(-420.0 + step * i)));
             const double slope = (here - before) / step * 57.29578e-3;
             before = here;
-            if (-slope > static_cast<double>(curve.stiffness()) + loose || slope > static_cast<double>(curve.push()) + loose) {
+            if (-slope > static_cast<double>(curve.stiffness()) + loose ||
+                slope > static_cast<double>(curve.push()) + loose) {
                 CHECK(!"steeper than declared");
                 std::printf("    at %.2f degrees: %.3f N m/rad, declared %.3f and %.3f; law %d detent %d\n",
                             -420.0 + step * i, slope, static_cast<double>(-curve.stiffness()),

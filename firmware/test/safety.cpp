@@ -183,11 +183,14 @@ CLAIM(rule_2_over_speed_i2c_brown_out_and_not_a_number_fade_at_once) {
         void (*end)(Bench&);
     };
     const Trip trips[] = {
-        {Cause::OverSpeed, [](Bench& b) { b.reading.velocity_rpm = 700.0F; }, [](Bench& b) { b.reading.velocity_rpm = 0.0F; }},
+        {Cause::OverSpeed, [](Bench& b) { b.reading.velocity_rpm = 700.0F; },
+         [](Bench& b) { b.reading.velocity_rpm = 0.0F; }},
         {Cause::I2c, [](Bench& b) { b.reading.bus_ok = false; }, [](Bench& b) { b.reading.bus_ok = true; }},
         {Cause::BrownOut, [](Bench& b) { b.reading.supply_ok = false; }, [](Bench& b) { b.reading.supply_ok = true; }},
-        {Cause::NotFinite, [](Bench& b) { b.reading.velocity_rpm = NAN; }, [](Bench& b) { b.reading.velocity_rpm = 0.0F; }},
-        {Cause::NotFinite, [](Bench& b) { b.reading.velocity_rpm = -INFINITY; }, [](Bench& b) { b.reading.velocity_rpm = 0.0F; }},
+        {Cause::NotFinite, [](Bench& b) { b.reading.velocity_rpm = NAN; },
+         [](Bench& b) { b.reading.velocity_rpm = 0.0F; }},
+        {Cause::NotFinite, [](Bench& b) { b.reading.velocity_rpm = -INFINITY; },
+         [](Bench& b) { b.reading.velocity_rpm = 0.0F; }},
         {Cause::NotFinite,
          [](Bench& b) {
              Feel feel = held_feel();
@@ -291,7 +294,7 @@ CLAIM(rule_4_no_command_exceeds_the_least_of_all_ceilings) {
     for (int trial = 0; trial < 200; ++trial) {
         Config config = test::damped();
         config.ceiling_mnm = static_cast<std::uint16_t>(50 + random.below(600));
-            Bench bench(config);
+        Bench bench(config);
         std::uint16_t user = static_cast<std::uint16_t>(random.below(451));
         Feel feel = held_feel();
         feel.scale_mnm = random.between(0.0F, 450.0F);
@@ -445,8 +448,8 @@ CLAIM(rule_5_no_change_of_parameters_moves_torque_faster_than_5_nm_per_s) {
             break;
         }
     }
-    std::printf("    %lu changes, %lu accepted: at most %.4f mNm per tick beyond the law's own (allowed 2.5)\n", changes,
-                accepted, static_cast<double>(worst));
+    std::printf("    %lu changes, %lu accepted: at most %.4f mNm per tick beyond the law's own (allowed 2.5)\n",
+                changes, accepted, static_cast<double>(worst));
     CHECK(worst <= 2.501F && worst > 2.4F);
 }
 

@@ -1,10 +1,10 @@
-//! Builds the plugin and puts it into the shapes hosts look for.
+//! Builds the plugin and puts it into the shapes hosts look for, with the licences of what is inside.
 
 use std::path::PathBuf;
 
 use anyhow::{Result, anyhow};
 
-use crate::machine;
+use crate::{licences, machine};
 
 const PACKAGE: &str = "chalumeau";
 
@@ -17,7 +17,8 @@ pub fn run(args: &[String]) -> Result<()> {
     }
     options.extend_from_slice(args);
     nice_plug_xtask::build(&[PACKAGE.to_owned()], &options)?;
-    nice_plug_xtask::bundle(&machine::target(), PACKAGE, &options, false)
+    nice_plug_xtask::bundle(&machine::target(), PACKAGE, &options, false)?;
+    licences::beside_bundles(&options)
 }
 
 /// The bundled CLAP, as a host would load it: the file, or on macOS the binary inside the bundle.

@@ -11,6 +11,7 @@ pub mod firmware;
 pub mod generated;
 pub mod host;
 pub mod jack;
+pub mod licences;
 pub mod machine;
 pub mod midi;
 pub mod picture;
@@ -51,6 +52,12 @@ pub const COMMANDS: &[Command] = &[
         name: "bundle",
         about: "build Chalumeau.clap and Chalumeau.vst3 into target/bundled; takes cargo build's options",
         run: bundle::run,
+        checks: false,
+    },
+    Command {
+        name: "licences",
+        about: "list the licences of all crates in the binaries, in target/bundled; takes targets, all systems by default",
+        run: licences::run,
         checks: false,
     },
     #[cfg(target_os = "linux")]

@@ -21,28 +21,28 @@ constexpr std::uint8_t FIRMWARE_MINOR = 1;
 constexpr std::uint16_t FIRMWARE_PATCH = 0;
 
 constexpr std::uint16_t STATE_HZ_SERIAL = 500;
-constexpr std::uint16_t STATE_HZ_MIDI = 100;           // SysEx; the controllers carry the breath
-constexpr std::uint32_t CONTROLLER_US = 2000;          // controllers no faster than STATE on serial
-constexpr std::uint32_t TICK_LONGEST_US = 1000000;     // a longer pause counts as this: the watchdogs have long fired
-constexpr std::uint32_t BUTTON_US = 5000;              // contacts bounce for less (judgement)
-constexpr std::uint32_t LIMIT_EVENT_US = 1000000;      // a limit is told once a second at most
-constexpr float SLAP_LEAVES_DEG = 1.0F;                // hysteresis of the slap region's edge
+constexpr std::uint16_t STATE_HZ_MIDI = 100;        // SysEx; the controllers carry the breath
+constexpr std::uint32_t CONTROLLER_US = 2000;       // controllers no faster than STATE on serial
+constexpr std::uint32_t TICK_LONGEST_US = 1000000;  // a longer pause counts as this: the watchdogs have long fired
+constexpr std::uint32_t BUTTON_US = 5000;           // contacts bounce for less (judgement)
+constexpr std::uint32_t LIMIT_EVENT_US = 1000000;   // a limit is told once a second at most
+constexpr float SLAP_LEAVES_DEG = 1.0F;             // hysteresis of the slap region's edge
 constexpr std::uint8_t BUS_FAILURES = 3;
 
 /// What is built in, and what was measured on the knob.
 struct Config {
-    std::uint64_t serial = 1;                  // identity, never 0
+    std::uint64_t serial = 1;  // identity, never 0
     char name[16] = {'C', 'h', 'a', 'l', 'u', 'm', 'e', 'a', 'u', ' ', 'k', 'n', 'o', 'b', 0, 0};
     Binding binding = Binding::Serial;
-    std::uint8_t major = PROTOCOL_MAJOR;       // anything else only to test a mismatch
+    std::uint8_t major = PROTOCOL_MAJOR;  // anything else only to test a mismatch
     std::uint16_t capabilities = capability::FLOW | capability::PRESSURE | capability::SLAP | capability::DETENT |
                                  capability::BUTTON | capability::MOTOR;
     std::uint32_t counts_per_turn = 3600;
-    std::uint32_t wraps_at = 0;                // raw reading wraps here; 0: a 32-bit counter
-    float knob_damping_nms = 5e-4F;            // N m s/rad, the knob's own; within 2e-4..2e-3 for knobs
+    std::uint32_t wraps_at = 0;      // raw reading wraps here; 0: a 32-bit counter
+    float knob_damping_nms = 5e-4F;  // N m s/rad, the knob's own; within 2e-4..2e-3 for knobs
     std::uint16_t ceiling_mnm = 450;
-    std::uint16_t rating_mnm = 200;            // may be held for ever (judgement: not measured on a motor)
-    float push_limit = 0.2F;                   // N m/rad (judgement: less than a relaxed grip's stiffness)
+    std::uint16_t rating_mnm = 200;  // may be held for ever (judgement: not measured on a motor)
+    float push_limit = 0.2F;         // N m/rad (judgement: less than a relaxed grip's stiffness)
 };
 
 /// Of one tick.
@@ -61,8 +61,7 @@ class Device {
         : config_(config), encoder_(config.counts_per_turn, config.wraps_at),
           limits_(config.ceiling_mnm, config.rating_mnm),
           session_(config.major, config.binding == Binding::Serial ? WATCHDOG_SERIAL_MS : WATCHDOG_MIDI_MS),
-          outbox_(config.binding),
-          state_hz_(config.binding == Binding::Serial ? STATE_HZ_SERIAL : STATE_HZ_MIDI) {
+          outbox_(config.binding), state_hz_(config.binding == Binding::Serial ? STATE_HZ_SERIAL : STATE_HZ_MIDI) {
         // Sampling alone allows 2 b / T; a period of delay on the bus leaves a third of it (Colgate and Brown 1994,
         // b > K (T/2 + delay)); a quarter is calm under any load (docs/simulator.md).
         allowed_.stiffness = 0.5F * config.knob_damping_nms / LOOP_S;

@@ -10,9 +10,9 @@
 
 namespace chalumeau {
 
-constexpr std::size_t FRAME_MAX = 64;                          // type..crc
-constexpr std::size_t PAYLOAD_MAX = FRAME_MAX - 6;             // without type, seq, crc
-constexpr std::size_t SERIAL_FRAME_MAX = FRAME_MAX + 1 + 2;    // stuffed, between two zeros
+constexpr std::size_t FRAME_MAX = 64;                        // type..crc
+constexpr std::size_t PAYLOAD_MAX = FRAME_MAX - 6;           // without type, seq, crc
+constexpr std::size_t SERIAL_FRAME_MAX = FRAME_MAX + 1 + 2;  // stuffed, between two zeros
 
 /// What a decoder has seen.
 struct FrameCounts {

@@ -15,17 +15,17 @@ namespace chalumeau {
 
 constexpr float INDEX_PER_P = 3600.0F;
 constexpr float DEG_PER_RAD = 57.2957795F;
-constexpr float START_DEG = 6.0F;         // width of the regularised origin: a tremor's size, by judgement
+constexpr float START_DEG = 6.0F;                 // width of the regularised origin: a tremor's size, by judgement
 constexpr float START_OF_CLOSURE = 1.0F / 12.0F;  // and at most this share of H k: a quarter of the way to the peak
-constexpr float START_SLOPE = 1.25F;      // of 1.25 s - 0.25 s^3 at 0
-constexpr float MARK_DEG = 6.0F;          // half width of mark and step: felt as one thing, by judgement
-constexpr float MARK_SLOPE = 1.5396007F;  // steepest of (1 - x^2)^2: 8 / (3 sqrt 3)
-constexpr float STEP_SLOPE = 0.75F;       // steepest of the step, per half width
-constexpr float SLAP_DEG = -100.0F;       // TorqueTuner's -1000 counts
-constexpr float WALL_SOFT_DEG = 1.0F;     // the wall's damping sets in over this depth
-constexpr float WALL_DAMPING_MNMS = 2.0F; // takes the rebound, by judgement
-constexpr float FRICTION_SPEED = 0.5F;    // rad/s at which Coulomb friction begins to be itself, by judgement
-constexpr float VISCOUS_MAX_MNMS = 20.0F; // slope of damping and friction at rest: more shakes a light knob
+constexpr float START_SLOPE = 1.25F;              // of 1.25 s - 0.25 s^3 at 0
+constexpr float MARK_DEG = 6.0F;                  // half width of mark and step: felt as one thing, by judgement
+constexpr float MARK_SLOPE = 1.5396007F;          // steepest of (1 - x^2)^2: 8 / (3 sqrt 3)
+constexpr float STEP_SLOPE = 0.75F;               // steepest of the step, per half width
+constexpr float SLAP_DEG = -100.0F;               // TorqueTuner's -1000 counts
+constexpr float WALL_SOFT_DEG = 1.0F;             // the wall's damping sets in over this depth
+constexpr float WALL_DAMPING_MNMS = 2.0F;         // takes the rebound, by judgement
+constexpr float FRICTION_SPEED = 0.5F;            // rad/s at which Coulomb friction begins to be itself, by judgement
+constexpr float VISCOUS_MAX_MNMS = 20.0F;         // slope of damping and friction at rest: more shakes a light knob
 
 /// A table between its points.
 inline float table_at(const float* table, float index) {
@@ -43,8 +43,7 @@ inline float root_at(float index) {
 
 /// p to the power of 1.5, likewise.
 inline float power_at(float index) {
-    return index <= INDEX_PER_P ? table_at(rp_B_table, index)
-                                : 64.0F * table_at(rp_B_table, index * (1.0F / 16.0F));
+    return index <= INDEX_PER_P ? table_at(rp_B_table, index) : 64.0F * table_at(rp_B_table, index * (1.0F / 16.0F));
 }
 
 /// The seed's flow at a whole index: its formula on its table, nothing else.
@@ -153,9 +152,7 @@ class Curve {
         return torque;
     }
 
-    float torque(float angle_deg, float velocity) const {
-        return at_rest(angle_deg) + of_motion(angle_deg, velocity);
-    }
+    float torque(float angle_deg, float velocity) const { return at_rest(angle_deg) + of_motion(angle_deg, velocity); }
 
     /// The flow law's u, regularised at the origin and closed past H k; index above 0.
     float flow(float index) const {
@@ -241,15 +238,15 @@ class Curve {
 
 /// What a device allows.
 struct FeelLimits {
-    float stiffness = 0.5F;    // N m/rad
-    float push = 0.2F;         // N m/rad
+    float stiffness = 0.5F;  // N m/rad
+    float push = 0.2F;       // N m/rad
     float ceiling_mnm = 450.0F;
 };
 
 constexpr float CLOSURE_MAX_DEG = 3600.0F;
-constexpr float SLIP_H = 3.67423461F;  // sqrt(27 / 2), written in the notebook's last line for sqrt(27) / 2
-constexpr float SLIP_K = 0.136082763F; // 27 / (4 H^3): with it H k = 0.5
-constexpr float SLIP_NEAR = 1e-4F;     // as near as somebody types it
+constexpr float SLIP_H = 3.67423461F;   // sqrt(27 / 2), written in the notebook's last line for sqrt(27) / 2
+constexpr float SLIP_K = 0.136082763F;  // 27 / (4 H^3): with it H k = 0.5
+constexpr float SLIP_NEAR = 1e-4F;      // as near as somebody types it
 
 inline bool is_near(float a, float b) { return a - b <= SLIP_NEAR * b && b - a <= SLIP_NEAR * b; }
 

@@ -23,7 +23,10 @@ class Limits {
     /// What ARM or ALIVE allows; lower at once, higher at the slew rate of rule 5: see `clamp`.
     void allow(float user_mnm) { user_ = least(user_mnm, device_); }
 
-    void disarm() { now_ = 0.0F; user_ = 0.0F; }
+    void disarm() {
+        now_ = 0.0F;
+        user_ = 0.0F;
+    }
     /// The soft start takes care of the rise.
     void arm(float user_mnm) { user_ = now_ = least(user_mnm, device_); }
 

@@ -76,11 +76,13 @@ class MidiDecoder {
     bool finish(Frame& frame) {
         constexpr std::size_t HEAD = sizeof SYSEX_HEAD - 1;
         // A group is at least the byte of top bits and one more.
-        if (foreign_ || length_ < HEAD || (length_ - HEAD) % 8 == 1 || std::memcmp(buffer_, SYSEX_HEAD + 1, HEAD) != 0) {
+        if (foreign_ || length_ < HEAD || (length_ - HEAD) % 8 == 1 ||
+            std::memcmp(buffer_, SYSEX_HEAD + 1, HEAD) != 0) {
             ++reader.counts.junk;
             return false;
         }
-        static_assert(FRAME_MAX == PACKED_MAX - (PACKED_MAX + 7) / 8, "what fits the buffer unpacks to a frame at most");
+        static_assert(FRAME_MAX == PACKED_MAX - (PACKED_MAX + 7) / 8,
+                      "what fits the buffer unpacks to a frame at most");
         std::size_t written = 0;
         for (std::size_t start = HEAD; start < length_; start += 8) {
             const std::uint8_t tops = buffer_[start];
@@ -101,8 +103,11 @@ class MidiDecoder {
 
 /// The two messages of a 14-bit controller, most significant first. Returns 6.
 inline std::size_t controller_14bit(std::uint8_t controller, std::uint16_t value, std::uint8_t* out) {
-    const std::uint8_t message[] = {0xB0, controller, static_cast<std::uint8_t>((value >> 7U) & 0x7FU),
-                                    0xB0, static_cast<std::uint8_t>(controller + CC_FINE),
+    const std::uint8_t message[] = {0xB0,
+                                    controller,
+                                    static_cast<std::uint8_t>((value >> 7U) & 0x7FU),
+                                    0xB0,
+                                    static_cast<std::uint8_t>(controller + CC_FINE),
                                     static_cast<std::uint8_t>(value & 0x7FU)};
     std::memcpy(out, message, sizeof message);
     return sizeof message;

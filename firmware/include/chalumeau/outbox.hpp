@@ -23,8 +23,8 @@ class Outbox {
             frame_encode(static_cast<std::uint8_t>(type), seq_, payload.bytes, payload.length, frame);
         std::uint8_t dressed[SYSEX_MAX];
         static_assert(SYSEX_MAX >= SERIAL_FRAME_MAX, "the larger of the two");
-        const std::size_t end = binding_ == Binding::Serial ? serial_encode(frame, length, dressed)
-                                                            : sysex_encode(frame, length, dressed);
+        const std::size_t end =
+            binding_ == Binding::Serial ? serial_encode(frame, length, dressed) : sysex_encode(frame, length, dressed);
         if (put(dressed, end)) {
             ++seq_;
         }
