@@ -184,22 +184,24 @@ fn open(frame: &[u8]) -> Result<(u8, u8, &[u8]), FrameError> {
     Ok((*kind, *seq, payload))
 }
 
-/// A frame before COBS: type..checksum.
-#[derive(Clone, Copy)]
-pub(super) struct Body {
+/// A frame before COBS or SysEx packing: type, sequence number, payload and checksum.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameBody {
     bytes: [u8; MAX_DECODED],
     length: usize,
 }
 
-impl Body {
-    pub(super) fn new(message: &Message, seq: u8) -> Self {
+impl FrameBody {
+    /// The body of `message`. Fields outside their range are written as they are. Real-time safe.
+    pub fn new(message: &Message, seq: u8) -> Self {
         let mut bytes = [0; MAX_PAYLOAD];
         let length = payload::write(message, &mut bytes);
-        Self::of(message.kind(), seq, &bytes[..length])
+        Self::from_parts(message.kind(), seq, &bytes[..length])
     }
 
-    /// Any type and payload; what does not fit is cut.
-    pub(super) fn of(kind: u8, seq: u8, payload: &[u8]) -> Self {
+    /// A body of any type and payload, as a later version of the protocol might send it; for tests. Only the first
+    /// [`MAX_PAYLOAD`] bytes of the payload are used. Real-time safe.
+    pub fn from_parts(kind: u8, seq: u8, payload: &[u8]) -> Self {
         let payload = &payload[..payload.len().min(MAX_PAYLOAD)];
         let mut bytes = [0; MAX_DECODED];
         let end = 2 + payload.len();
@@ -211,8 +213,13 @@ impl Body {
         Self { bytes, length: end + 4 }
     }
 
-    /// With COBS and both zeros.
-    pub(super) fn framed(&self) -> EncodedFrame {
+    /// The payload without type, sequence number and checksum.
+    pub fn payload(&self) -> &[u8] {
+        &self.bytes[2..self.length - 4]
+    }
+
+    /// With COBS and both zeros, as the serial line carries it. Real-time safe.
+    pub fn framed(&self) -> EncodedFrame {
         let mut bytes = [0; MAX_ENCODED];
         // PANIC: COBS adds one byte to the first 254, so 64 bytes fit the 65 between the zeros.
         let length = cobs::encode(self, &mut bytes[1..=MAX_RUN]);
@@ -220,7 +227,7 @@ impl Body {
     }
 }
 
-impl Deref for Body {
+impl Deref for FrameBody {
     type Target = [u8];
 
     fn deref(&self) -> &[u8] {
@@ -246,7 +253,7 @@ impl Deref for EncodedFrame {
 /// Encodes any message. Fields outside their range are sent as they are, for the other end to refuse: ask
 /// [`Message::check`] first. Real-time safe.
 pub fn encode(message: &Message, seq: u8) -> EncodedFrame {
-    Body::new(message, seq).framed()
+    FrameBody::new(message, seq).framed()
 }
 
 /// Finds messages in a stream of bytes. Real-time safe.

@@ -15,7 +15,7 @@ pub struct Arm {
     pub ceiling_mnm: u16,
 }
 
-/// What a device can do, see INFO.
+/// What a device can do, see INFO. `docs/protocol.md` lists all bits; those that the program uses have names here.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Capabilities(pub u16);
 
@@ -30,8 +30,6 @@ impl Capabilities {
     pub const DETENT: u16 = 1 << 3;
     /// Has a button.
     pub const BUTTON: u16 = 1 << 4;
-    /// Has a motor.
-    pub const MOTOR: u16 = 1 << 5;
     /// Is a simulation.
     pub const SIMULATED: u16 = 1 << 6;
 
@@ -104,27 +102,19 @@ impl Info {
     }
 }
 
-/// Flags of STATE.
+/// Flags of STATE. `docs/protocol.md` lists all bits; those that the program uses have names here.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Flags(pub u16);
 
 impl Flags {
     /// Torque is allowed.
     pub const ARMED: u16 = 1;
-    /// The last torque was limited.
-    pub const LIMITED: u16 = 1 << 1;
     /// A fault stands.
     pub const FAULT: u16 = 1 << 2;
     /// The knob is in the slap region.
     pub const SLAP: u16 = 1 << 3;
     /// The button is down.
     pub const BUTTON: u16 = 1 << 4;
-    /// Torque is fading out.
-    pub const FADING: u16 = 1 << 5;
-    /// The old feel gives way to the new.
-    pub const MORPHING: u16 = 1 << 6;
-    /// The continuous rating limits torque.
-    pub const THERMAL: u16 = 1 << 7;
 
     /// Whether all of `bits` are set.
     pub fn has(self, bits: u16) -> bool {
@@ -155,7 +145,7 @@ impl Flags {
 
 /// Where the knob is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct State {
+pub struct DeviceState {
     /// Device clock, microseconds; wraps.
     pub t_us: u32,
     /// 0.01 degrees since zero.
@@ -176,15 +166,10 @@ pub struct State {
     pub fault: u8,
 }
 
-impl State {
+impl DeviceState {
     /// Angle since zero, degrees.
     pub fn angle_deg(&self) -> f64 {
         0.01 * f64::from(self.angle)
-    }
-
-    /// Velocity, rad/s.
-    pub fn velocity_rad_s(&self) -> f64 {
-        f64::from(self.velocity) * (0.1 * std::f64::consts::TAU / 60.0)
     }
 
     /// The fault that stands, if this version knows its code.
@@ -213,7 +198,7 @@ pub enum EventKind {
 
 /// Something that happened on the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Event {
+pub struct DeviceEvent {
     /// What.
     pub kind: EventKind,
     /// Counts events, so that a lost one shows.
@@ -228,7 +213,7 @@ pub struct Event {
     pub value: f32,
 }
 
-impl Event {
+impl DeviceEvent {
     /// What the code says to people; `None` where the kind has no codes.
     pub fn code_text(&self) -> Option<&'static str> {
         let unknown = "for a reason this version does not know";
@@ -274,9 +259,9 @@ pub enum Message {
     /// Answer to HELLO.
     Info(Info),
     /// Where the knob is.
-    State(State),
+    State(DeviceState),
     /// Something happened.
-    Event(Event),
+    Event(DeviceEvent),
 }
 
 #[cfg(test)]
