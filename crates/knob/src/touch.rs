@@ -6,3 +6,4 @@ pub mod blower;
 pub mod feel;
 pub mod study;
 pub mod take;
+pub mod take_csv;

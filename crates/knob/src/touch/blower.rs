@@ -3,7 +3,7 @@
 //! Breath goes out on a grid of samples counted from the start, so that it does not depend on the host's blocks, and in
 //! the steps of a 14-bit controller, so that a host that records it plays the very same breath back.
 
-use crate::touch::feel::Maps;
+use crate::touch::feel::PitchMaps;
 use chalumeau_core::control::keys::Keys;
 use chalumeau_core::control::knob::{KnobBreath, KnobDesign};
 use chalumeau_core::event::{Event, Timed};
@@ -35,9 +35,9 @@ impl Breath14 {
 
 /// The hand on the knob: how it blows, and whether it feels. Plain numbers, to be copied between threads.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Hand {
+pub struct BreathMapping {
     /// What each note makes of the angle.
-    pub maps: Maps,
+    pub maps: PitchMaps,
     /// Rest, full blow, dead zone and curve.
     pub design: KnobDesign,
     /// The knob feels: angles are taken as they are, because the notes' landmarks lie on them. On one that does not,
@@ -103,7 +103,13 @@ impl Blower {
     }
 
     /// Breath of a knob at an angle, at a sample of the block that begins now, if it is not what was sent last.
-    pub fn blow(&mut self, hand: &Hand, at: usize, angle_deg: f64, full_pa: f64) -> Option<Breath14> {
+    pub fn blow(
+        &mut self,
+        hand: &BreathMapping,
+        at: usize,
+        angle_deg: f64,
+        full_pa: f64,
+    ) -> Option<Breath14> {
         let angle_deg =
             if hand.feels { self.beyond_rest(hand, angle_deg) } else { self.unfelt(hand, angle_deg) };
         let mut pressure_pa = hand.maps.pressure_pa(self.fingered, angle_deg);
@@ -118,7 +124,7 @@ impl Blower {
     }
 
     /// Angle from rest, 0 inside the dead zone; what lies beyond is not moved, it has been felt there.
-    fn beyond_rest(&mut self, hand: &Hand, angle_deg: f64) -> f64 {
+    fn beyond_rest(&mut self, hand: &BreathMapping, angle_deg: f64) -> f64 {
         let KnobDesign { zero_deg, dead_on_deg, dead_off_deg, .. } = hand.design;
         let from_rest = angle_deg - zero_deg;
         // Not a number is no breath.
@@ -127,7 +133,7 @@ impl Blower {
     }
 
     /// The share of full blow as an angle on the reference reed's travel.
-    fn unfelt(&mut self, hand: &Hand, angle_deg: f64) -> f64 {
+    fn unfelt(&mut self, hand: &BreathMapping, angle_deg: f64) -> f64 {
         if self.unfelt.is_none_or(|knob| *knob.design() != hand.design) {
             self.unfelt = KnobBreath::new(hand.design).ok();
         }
@@ -142,10 +148,10 @@ impl Blower {
 }
 
 /// Host events in order of time with the knob's breath between them.
-pub struct Blown<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> {
+pub struct BlownEvents<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> {
     host: std::iter::Peekable<I>,
     blower: &'a mut Blower,
-    hand: &'a Hand,
+    hand: &'a BreathMapping,
     full_pa: f64,
     /// Angle at a sample of the block.
     angle: A,
@@ -155,12 +161,12 @@ pub struct Blown<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option
     heard: &'a mut dyn FnMut(usize, Breath14),
 }
 
-impl<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Blown<'a, I, A> {
+impl<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> BlownEvents<'a, I, A> {
     /// `angle` gives the knob's angle at a sample of the block, degrees; `heard` is told of every breath.
     pub fn new(
         host: I,
         blower: &'a mut Blower,
-        hand: &'a Hand,
+        hand: &'a BreathMapping,
         full_pa: f64,
         samples: usize,
         angle: A,
@@ -171,7 +177,7 @@ impl<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Blown
     }
 }
 
-impl<I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Iterator for Blown<'_, I, A> {
+impl<I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Iterator for BlownEvents<'_, I, A> {
     type Item = Timed<Event>;
 
     fn next(&mut self) -> Option<Timed<Event>> {
@@ -203,16 +209,16 @@ impl<I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Iterator 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::touch::feel::{Feels, NO_MOTOR};
+    use crate::touch::feel::{InstrumentFeel, NO_MOTOR};
     use chalumeau_core::control::midi::MidiDecoder;
     use chalumeau_core::haptics::FeelDesign;
     use chalumeau_core::instrument::Settings;
     use std::sync::LazyLock;
 
-    static HAND: LazyLock<Hand> = LazyLock::new(|| {
-        let feels = Feels::built_in().unwrap();
+    static HAND: LazyLock<BreathMapping> = LazyLock::new(|| {
+        let feels = InstrumentFeel::built_in().unwrap();
         let table = feels.table(&Settings::default(), &FeelDesign::default(), &NO_MOTOR).unwrap();
-        Hand { maps: feels.maps(&table), design: KnobDesign::default(), feels: true }
+        BreathMapping { maps: feels.maps(&table), design: KnobDesign::default(), feels: true }
     });
 
     fn note_on(at: usize, note: u8) -> Timed<Event> {
@@ -229,7 +235,7 @@ mod tests {
             let here = here.map(|event| Timed { at: event.at - start, event: event.event });
             let angle = |at: usize| Some(0.04 * (start + at) as f64);
             let mut ignore = |_, _| {};
-            let events = Blown::new(here, &mut blower, &HAND, 6_000.0, samples, angle, &mut ignore);
+            let events = BlownEvents::new(here, &mut blower, &HAND, 6_000.0, samples, angle, &mut ignore);
             all.extend(events.map(|event| (start + event.at, event.event)));
             blower.advance(samples);
         }
@@ -301,8 +307,11 @@ mod tests {
 
     #[test]
     fn a_knob_that_feels_nothing_reaches_full_blow_where_the_player_has_put_it() {
-        let hand =
-            Hand { feels: false, design: KnobDesign { full_deg: 180.0, ..KnobDesign::default() }, ..*HAND };
+        let hand = BreathMapping {
+            feels: false,
+            design: KnobDesign { full_deg: 180.0, ..KnobDesign::default() },
+            ..*HAND
+        };
         let mut blower = Blower::default();
         let travel = hand.maps.pressure_pa(None, 180.0);
         let full = blower.blow(&hand, 0, 180.0, 6_000.0).unwrap();

@@ -18,19 +18,19 @@ pub const NO_MOTOR: TorqueLimits = TorqueLimits {
 };
 
 /// The built-in clarinet, worked out once for all that play it.
-static BUILT_IN: LazyLock<Result<Arc<Feels>, BuildError>> =
-    LazyLock::new(|| Model::built_in(48_000.0).map(|model| Arc::new(Feels::new(&model))));
+static BUILT_IN: LazyLock<Result<Arc<InstrumentFeel>, BuildError>> =
+    LazyLock::new(|| Model::built_in(48_000.0).map(|model| Arc::new(InstrumentFeel::new(&model))));
 
 /// An instrument, and what its bore asks for every note. Building one takes a second.
 #[derive(Clone, Debug)]
-pub struct Feels {
+pub struct InstrumentFeel {
     requirements: Requirements,
     file: InstrumentFile,
     /// Index of the fingering for each sounding pitch.
     fingerings: [Option<u8>; PITCHES],
 }
 
-impl Feels {
+impl InstrumentFeel {
     /// The built-in clarinet. The first call takes a second.
     pub fn built_in() -> Result<Arc<Self>, &'static BuildError> {
         BUILT_IN.as_ref().map(Arc::clone)
@@ -70,9 +70,9 @@ impl Feels {
     }
 
     /// The same table by sounding pitch, for the audio thread.
-    pub fn maps(&self, table: &FeelTable) -> Maps {
+    pub fn maps(&self, table: &FeelTable) -> PitchMaps {
         let of = |index: u8| table.note(usize::from(index)).map(|note| note.map);
-        Maps {
+        PitchMaps {
             by_pitch: self.fingerings.map(|fingering| fingering.and_then(of)),
             otherwise: Some(table.reference().map),
         }
@@ -81,19 +81,19 @@ impl Feels {
 
 /// What each sounding pitch makes of the knob's angle. Plain numbers, to be copied between threads.
 #[derive(Clone, Copy, Debug)]
-pub struct Maps {
+pub struct PitchMaps {
     by_pitch: [Option<AngleMap>; PITCHES],
     otherwise: Option<AngleMap>,
 }
 
-impl Default for Maps {
+impl Default for PitchMaps {
     /// No pitch blows anything.
     fn default() -> Self {
         Self { by_pitch: [None; PITCHES], otherwise: None }
     }
 }
 
-impl Maps {
+impl PitchMaps {
     /// Mouth pressure, Pa, with a note fingered (none: as on the reference note) and the knob turned so far from rest.
     /// Real-time safe.
     pub fn pressure_pa(&self, note: Option<SoundingNote>, angle_deg: f64) -> f64 {

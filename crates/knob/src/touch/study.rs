@@ -43,7 +43,7 @@ impl Condition {
 
 /// What the player's switch says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
+pub enum StudySide {
     /// Not switched.
     A,
     /// Switched.
@@ -63,11 +63,11 @@ pub struct Trial {
 
 impl Trial {
     /// What a side is.
-    pub fn condition(&self, side: Side) -> Condition {
+    pub fn condition(&self, side: StudySide) -> Condition {
         match (side, self.a) {
-            (Side::A, a) => a,
-            (Side::B, Condition::Coupled) => Condition::Free,
-            (Side::B, Condition::Free) => Condition::Coupled,
+            (StudySide::A, a) => a,
+            (StudySide::B, Condition::Coupled) => Condition::Free,
+            (StudySide::B, Condition::Free) => Condition::Coupled,
         }
     }
 }
@@ -130,7 +130,7 @@ mod tests {
     #[test]
     fn sides_differ_and_meet_at_the_seeds_opening() {
         let trial = plan(1, 1)[0];
-        assert_ne!(trial.condition(Side::A), trial.condition(Side::B));
+        assert_ne!(trial.condition(StudySide::A), trial.condition(StudySide::B));
         assert!((Condition::Coupled.k(H_INIT) - Condition::Free.k(H_INIT)).abs() < 1e-12);
         for h in OPENINGS {
             assert!((Condition::Coupled.k(h) / Condition::Free.k(h) - 1.0).abs() > 0.2, "{h}");
