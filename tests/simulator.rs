@@ -8,13 +8,13 @@ mod host;
 
 use chalumeau_firmware::Setup;
 use chalumeau_knob::simulator::fault::{Fault, FaultKind};
-use chalumeau_knob::simulator::hand::{Hand, HandDesign};
+use chalumeau_knob::simulator::hand::{HandDesign, SimulatedHand};
 use chalumeau_knob::simulator::knob::SimulatedKnob;
 use chalumeau_knob::simulator::plant::PlantDesign;
 use chalumeau_knob::simulator::script::{Aim, Script};
 use chalumeau_knob::wire::{EventKind, Feel, Law, Message};
 use fastrand::Rng;
-use host::Host;
+use host::TestHost;
 use std::collections::BTreeMap;
 
 /// What counts as rest, degrees rms: twice the step of the encoder.
@@ -52,14 +52,15 @@ fn setup(midi: bool, knob_damping_nms: f64) -> Setup {
 }
 
 /// A knob without a hand at an angle, armed with a feel; none if the firmware refuses it.
-fn released(feel: Feel, plant: PlantDesign, angle_deg: f64) -> Option<Host> {
+fn released(feel: Feel, plant: PlantDesign, angle_deg: f64) -> Option<TestHost> {
     released_by(HandDesign::default(), feel, plant, angle_deg)
 }
 
 /// The same, with a certain hand ready to take hold.
-fn released_by(hand: HandDesign, feel: Feel, plant: PlantDesign, angle_deg: f64) -> Option<Host> {
-    let hand = Hand::new(hand, 1);
-    let mut host = Host::new(SimulatedKnob::new(setup(false, plant.viscous_nms), plant, hand, 1), false, 450);
+fn released_by(hand: HandDesign, feel: Feel, plant: PlantDesign, angle_deg: f64) -> Option<TestHost> {
+    let hand = SimulatedHand::new(hand, 1);
+    let mut host =
+        TestHost::new(SimulatedKnob::new(setup(false, plant.viscous_nms), plant, hand, 1), false, 450);
     host.greet(); // zero is where the knob stood when it started
     host.knob.plant().set(angle_deg.to_radians(), 0.0);
     host.send(&Message::Feel(feel));
@@ -74,7 +75,7 @@ fn released_by(hand: HandDesign, feel: Feel, plant: PlantDesign, angle_deg: f64)
 
 /// Swing within a second about a straight line, degrees rms, once the knob has had time to get where it wants to: a weak
 /// spring against strong damping creeps for minutes, and that is no swing.
-fn unrest_deg(host: &mut Host) -> f64 {
+fn unrest_deg(host: &mut TestHost) -> f64 {
     let mut calm = 0;
     let mut unrest = 0.0f64;
     for _ in 0..30 {
@@ -301,8 +302,13 @@ fn listening_hand_holds_gamma_one_half_under_both_laws() {
             for stretch in [1.0, 2.0, 4.0] {
                 let design = HandDesign::listening();
                 let plant = PlantDesign::default();
-                let mut host = Host::new(
-                    SimulatedKnob::new(setup(false, plant.viscous_nms), plant, Hand::new(design, 3), 3),
+                let mut host = TestHost::new(
+                    SimulatedKnob::new(
+                        setup(false, plant.viscous_nms),
+                        plant,
+                        SimulatedHand::new(design, 3),
+                        3,
+                    ),
                     false,
                     250,
                 );
@@ -383,7 +389,7 @@ fn break_it(harm: Harm, midi: bool, seed: u64) -> f64 {
     let knob = SimulatedKnob::new(
         setup(midi, plant.viscous_nms),
         plant,
-        Hand::new(HandDesign::default(), seed),
+        SimulatedHand::new(HandDesign::default(), seed),
         seed,
     );
     let ceiling_mnm = between(40.0, 250.0).round();
@@ -391,7 +397,7 @@ fn break_it(harm: Harm, midi: bool, seed: u64) -> f64 {
     let played = feel(law, between(60.0, 220.0) as f32, between(0.7, 2.0) as f32, H, K);
     let closure_deg = 360.0 / f64::from(played.stretch);
     let angle_deg = closure_deg * between(0.2, 0.6);
-    let mut host = Host::new(knob, midi, ceiling_mnm as u16);
+    let mut host = TestHost::new(knob, midi, ceiling_mnm as u16);
     let context = format!("{harm:?}, midi {midi}, seed {seed}");
     host.greet();
     host.knob.plant().set(angle_deg.to_radians(), 0.0);
@@ -505,8 +511,8 @@ fn motor_board_without_a_watchdog_keeps_its_torque_when_the_bus_dies() {
 fn same_seed_gives_the_same_run_to_the_bit() {
     let run = |seed| {
         let plant = PlantDesign::default();
-        let hand = Hand::new(HandDesign::default(), seed);
-        let mut host = Host::new(SimulatedKnob::new(setup(false, 1e-3), plant, hand, seed), false, 200);
+        let hand = SimulatedHand::new(HandDesign::default(), seed);
+        let mut host = TestHost::new(SimulatedKnob::new(setup(false, 1e-3), plant, hand, seed), false, 200);
         host.knob.inject("corrupt@0.5:1=0.02".parse().unwrap());
         host.greet();
         host.send(&Message::Feel(feel(Law::Flow, 150.0, 2.0, H, K)));
@@ -524,9 +530,10 @@ fn same_seed_gives_the_same_run_to_the_bit() {
 #[test]
 fn slap_of_the_hand_is_told_with_its_speed() {
     let plant = PlantDesign::default();
-    let mut hand = Hand::new(HandDesign::default(), 1);
+    let mut hand = SimulatedHand::new(HandDesign::default(), 1);
     hand.follow(Script::slap());
-    let mut host = Host::new(SimulatedKnob::new(setup(false, plant.viscous_nms), plant, hand, 1), false, 100);
+    let mut host =
+        TestHost::new(SimulatedKnob::new(setup(false, plant.viscous_nms), plant, hand, 1), false, 100);
     host.greet();
     let mut fastest = 0.0f64;
     host.run(2.0, |knob| fastest = fastest.max(knob.velocity_rpm().abs()));

@@ -4,7 +4,6 @@
 
 pub mod codes;
 pub mod frame;
-pub mod golden;
 pub mod limits;
 pub mod message;
 pub mod midi;
@@ -13,7 +12,7 @@ mod payload;
 pub use codes::{FaultCode, RefusedCode};
 pub use frame::{Decoder, EncodedFrame, FrameError, WireStats, encode};
 pub use limits::{FieldRange, OutOfRange};
-pub use message::{Arm, Capabilities, Event, EventKind, Feel, Flags, Info, Law, Message, State};
+pub use message::{Arm, Capabilities, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Law, Message};
 
 /// Version of the protocol spoken here: another major one is never armed.
 pub const MAJOR: u8 = 1;

@@ -9,11 +9,11 @@ pub const VARIABLE: &str = "CHALUMEAU_RUNTIME_DIR";
 
 /// The directory shared by all instances: `chalumeau` in the user's runtime directory, else in that for temporary files.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Places {
+pub struct RuntimeDir {
     root: PathBuf,
 }
 
-impl Default for Places {
+impl Default for RuntimeDir {
     fn default() -> Self {
         let chosen = std::env::var_os(VARIABLE).map(PathBuf::from);
         let root = chosen.or_else(dirs::runtime_dir).unwrap_or_else(std::env::temp_dir);
@@ -21,7 +21,7 @@ impl Default for Places {
     }
 }
 
-impl Places {
+impl RuntimeDir {
     /// `chalumeau` in `directory`.
     pub fn within(directory: impl Into<PathBuf>) -> Self {
         Self { root: directory.into().join("chalumeau") }

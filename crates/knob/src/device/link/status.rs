@@ -1,6 +1,6 @@
 //! What a link shows of itself.
 
-use crate::device::places::serial_text;
+use crate::device::runtime_dir::serial_text;
 use crate::device::stats::LinkStats;
 use crate::wire::Info;
 
