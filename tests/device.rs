@@ -658,7 +658,7 @@ fn rates_are_those_of_the_protocol_in_simulated_time() {
     let mut bench = Bench::new(Binding::Serial);
     bench.session.want_feel(Feel::default());
     bench.run(10_000);
-    assert_eq!(bench.session.standing(bench.now_us), SessionStatus::Live);
+    assert_eq!(bench.session.status(bench.now_us), SessionStatus::Live);
     assert_eq!(bench.count(|m| matches!(m, Message::Hello { .. })), 1);
     let alive = bench.count(|m| matches!(m, Message::Alive(_)));
     assert!((499..=502).contains(&alive), "{alive} ALIVE in 10 s");
@@ -760,7 +760,7 @@ fn no_fault_ever_arms_a_knob() {
         bench.run(1000);
         disarmed_lives += u32::from(was_disarmed);
         assert_eq!(bench.count(|m| matches!(m, Message::Arm(_))), arms, "life {life}");
-        assert_eq!(bench.session.standing(bench.now_us), SessionStatus::Live, "life {life} recovers");
+        assert_eq!(bench.session.status(bench.now_us), SessionStatus::Live, "life {life} recovers");
         assert_eq!(bench.session.is_armed(), bench.device.firmware.is_armed(), "life {life}");
     }
     assert!(armed_lives == 300 && disarmed_lives > 200, "{armed_lives}, {disarmed_lives}");
@@ -777,10 +777,10 @@ fn a_midi_knob_whose_answer_is_late_is_not_taken_for_a_plain_one() {
                 line.clear();
             }
         });
-        assert_ne!(bench.session.standing(bench.now_us), SessionStatus::PlainMidi, "{ms} ms");
+        assert_ne!(bench.session.status(bench.now_us), SessionStatus::PlainMidi, "{ms} ms");
         assert!(ms != 100 || bench.states > 0, "its breath is heard all the same");
     }
-    assert_eq!(bench.session.standing(bench.now_us), SessionStatus::Live);
+    assert_eq!(bench.session.status(bench.now_us), SessionStatus::Live);
 }
 
 #[test]
@@ -791,7 +791,7 @@ fn over_midi_frames_leave_20_ms_between_them() {
         bench.session.want_feel(Feel { a_on_deg: ms as f32, ..Feel::default() });
         bench.tick(|_| {});
     }
-    assert_eq!(bench.session.standing(bench.now_us), SessionStatus::Live);
+    assert_eq!(bench.session.status(bench.now_us), SessionStatus::Live);
     let expected_us = 2_000_000 / bench.states as u32;
     assert!(bench.period_us.abs_diff(expected_us) <= 500, "{} us, {expected_us}", bench.period_us);
     bench.session.arm(100, false, bench.now_us);

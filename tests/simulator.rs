@@ -380,37 +380,8 @@ const HARMS: [Harm; 13] = [
 /// How long a harm lasts, s: longer than the longest allowed silence.
 const HARM_S: f64 = 0.6;
 
-/// Breaks a knob in play, and returns the time from the harm to the end of all torque, s.
-fn break_it(harm: Harm, midi: bool, seed: u64) -> f64 {
-    let mut rng = Rng::with_seed(seed);
-    let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
-    // Damped enough for every feel drawn below to be allowed.
-    let plant = PlantDesign { torque_step_nm: 0.0, viscous_nms: 2e-3, ..PlantDesign::default() };
-    let knob = SimulatedKnob::new(
-        setup(midi, plant.viscous_nms),
-        plant,
-        SimulatedHand::new(HandDesign::default(), seed),
-        seed,
-    );
-    let ceiling_mnm = between(40.0, 250.0).round();
-    let law = if between(0.0, 1.0) < 0.5 { Law::Flow } else { Law::Pressure };
-    let played = feel(law, between(60.0, 220.0) as f32, between(0.7, 2.0) as f32, H, K);
-    let closure_deg = 360.0 / f64::from(played.stretch);
-    let angle_deg = closure_deg * between(0.2, 0.6);
-    let mut host = TestHost::new(knob, midi, ceiling_mnm as u16);
-    let context = format!("{harm:?}, midi {midi}, seed {seed}");
-    host.greet();
-    host.knob.plant().set(angle_deg.to_radians(), 0.0);
-    host.knob.hand().aim(Aim::Angle(angle_deg));
-    host.send(&Message::Feel(played));
-    host.run(0.1, |_| {});
-    assert_eq!(host.state().feel_id, 1, "{context}: the feel is allowed");
-    host.arm();
-    let mut strongest = 0.0f64;
-    let mut watch = |knob: &SimulatedKnob| strongest = strongest.max(knob.motor_mnm().abs());
-    host.run(between(0.2, 0.6), &mut watch);
-    assert!(host.knob.is_armed() && host.knob.motor_mnm().abs() > 4.0, "{context}: in play");
-
+/// Does the harm to a knob in play; `between` draws a number from a range.
+fn inflict(harm: Harm, host: &mut TestHost, played: Feel, between: &mut dyn FnMut(f64, f64) -> f64) {
     let t_s = host.knob.t_s();
     let fault = |kind| Fault::new(kind, t_s).lasting(HARM_S);
     match harm {
@@ -444,6 +415,41 @@ fn break_it(harm: Harm, midi: bool, seed: u64) -> f64 {
             host.send(&Message::Hello { major: 1, minor: 0, session: host.session ^ 1 });
         }
     }
+}
+
+/// Breaks a knob in play, and returns the time from the harm to the end of all torque, s.
+fn break_it(harm: Harm, midi: bool, seed: u64) -> f64 {
+    let mut rng = Rng::with_seed(seed);
+    let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
+    // Damped enough for every feel drawn below to be allowed.
+    let plant = PlantDesign { torque_step_nm: 0.0, viscous_nms: 2e-3, ..PlantDesign::default() };
+    let knob = SimulatedKnob::new(
+        setup(midi, plant.viscous_nms),
+        plant,
+        SimulatedHand::new(HandDesign::default(), seed),
+        seed,
+    );
+    let ceiling_mnm = between(40.0, 250.0).round();
+    let law = if between(0.0, 1.0) < 0.5 { Law::Flow } else { Law::Pressure };
+    let played = feel(law, between(60.0, 220.0) as f32, between(0.7, 2.0) as f32, H, K);
+    let closure_deg = 360.0 / f64::from(played.stretch);
+    let angle_deg = closure_deg * between(0.2, 0.6);
+    let mut host = TestHost::new(knob, midi, ceiling_mnm as u16);
+    let context = format!("{harm:?}, midi {midi}, seed {seed}");
+    host.greet();
+    host.knob.plant().set(angle_deg.to_radians(), 0.0);
+    host.knob.hand().aim(Aim::Angle(angle_deg));
+    host.send(&Message::Feel(played));
+    host.run(0.1, |_| {});
+    assert_eq!(host.state().feel_id, 1, "{context}: the feel is allowed");
+    host.arm();
+    let mut strongest = 0.0f64;
+    let mut watch = |knob: &SimulatedKnob| strongest = strongest.max(knob.motor_mnm().abs());
+    host.run(between(0.2, 0.6), &mut watch);
+    assert!(host.knob.is_armed() && host.knob.motor_mnm().abs() > 4.0, "{context}: in play");
+
+    let t_s = host.knob.t_s();
+    inflict(harm, &mut host, played, &mut between);
     let mut last_torque_s = t_s;
     host.run(HARM_S, |knob| {
         watch(knob);

@@ -1,7 +1,7 @@
-//! Links to knobs: the port, the session, the clock between the two, and breath for the audio thread.
+//! Links to knobs: ports, sessions, clock alignment, and positions for the audio thread.
 //!
-//! [`KnobLink`] runs one thread per instance; the audio thread holds a [`KnobReader`]. Torque never crosses the link:
-//! the knob computes it from [`Feel`](crate::wire::Feel). Nothing here was ever tried on hardware; see `docs/touch.md`.
+//! [`KnobLink`] runs one thread per instance; the audio thread holds a [`KnobReader`]. Torque never crosses the
+//! link: the knob computes it from [`Feel`](crate::wire::Feel). Not yet tested on hardware; see `docs/touch.md`.
 
 pub mod clock;
 pub mod discover;

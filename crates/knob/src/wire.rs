@@ -1,6 +1,7 @@
-//! TTLink 1: bytes become messages and messages bytes. `docs/protocol.md` is the specification.
+//! The protocol TTLink 1: encodes messages as bytes and decodes bytes into messages. `docs/protocol.md` is the
+//! specification.
 //!
-//! Nothing here knows of ports, time or threads, allocates, or can be brought to panic by what it is fed.
+//! The code here uses no ports, clock or threads. It does not allocate, and no input makes it panic.
 
 pub mod codes;
 pub mod frame;

@@ -1,7 +1,7 @@
-//! The link to a knob: one thread that finds it, keeps it, and ends when the [`KnobLink`] is dropped.
+//! The link to a knob: one thread finds the knob and keeps the connection. It ends when the [`KnobLink`] is dropped.
 //!
-//! All that crosses to other threads: commands come by a queue, samples leave by the ring of the [`KnobReader`], and what
-//! screens show is a value behind a lock that is held for a copy. The audio thread has the reader and nothing else.
+//! Other threads talk to it in three ways: commands go through a queue, samples leave through the ring of the
+//! [`KnobReader`], and screens copy a status behind a lock. The audio thread only has the reader.
 
 mod connection;
 mod status;
@@ -35,9 +35,9 @@ pub enum KnobChoice {
         /// INFO's serial number.
         serial: Option<u64>,
     },
-    /// Whatever is at this port, which is opened because the user says so.
+    /// The device at this serial port, whatever it is; only for an explicit choice of the user.
     Path(PathBuf),
-    /// A knob at a MIDI port whose name contains this, else the first that sounds like one.
+    /// A knob at a MIDI port whose name contains `name`; without a name, the first port whose name is a known knob's.
     Midi {
         /// Part of the port's name.
         name: Option<String>,
@@ -51,7 +51,7 @@ pub enum KnobChoice {
     },
 }
 
-/// What the link asks of and tells its owner, on the link's thread. Both must return at once.
+/// Callbacks of the link to its owner, on the link's thread. Both must return at once.
 pub struct Hooks {
     /// The feel wanted now; asked at most 1 ms apart while a knob is there. The link compares, and sends what changes.
     pub feel: Box<dyn FnMut() -> Option<Feel> + Send>,
@@ -80,7 +80,7 @@ impl KnobLink {
         Self::spawn_in(RuntimeDir::default(), label, hooks)
     }
 
-    /// The same with its own directory for locks and announcements.
+    /// As [`KnobLink::spawn`], with a given directory for locks and announcements.
     pub fn spawn_in(places: RuntimeDir, label: &str, hooks: Hooks) -> (Self, KnobReader) {
         let epoch = Instant::now();
         let (writer, reader) = ring(epoch);
@@ -137,12 +137,12 @@ impl KnobLink {
         self.tell(LinkCommand::FeelOsc(to));
     }
 
-    /// How things stand, for screens: never on the audio thread.
+    /// The status for screens. Takes a lock: not for the audio thread.
     pub fn status(&self) -> LinkStatus {
         self.status.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// What all host times count from.
+    /// The zero of all host times.
     pub fn epoch(&self) -> Instant {
         self.epoch
     }

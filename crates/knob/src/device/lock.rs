@@ -1,4 +1,4 @@
-//! One owner per knob, among all instances of all programs on this machine.
+//! Gives each knob one owner among all instances of all programs on this machine.
 //!
 //! `locks/<serial>.lock` is locked by the owner, so that it is free again however the owner ends; it is never removed, or
 //! two could lock two files of one name. `<serial>.owner` says who that is. Who wants the knob writes `<serial>.wanted`;
@@ -60,7 +60,7 @@ fn seconds() -> u64 {
 #[derive(Debug, thiserror::Error)]
 pub enum LockError {
     /// Somebody else has it.
-    #[error("held by {0}")]
+    #[error("in use by {0}")]
     Held(Holder),
     /// The lock itself fails.
     #[error("cannot lock the knob: {0}")]

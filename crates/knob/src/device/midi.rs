@@ -35,7 +35,7 @@ pub enum MidiError {
     #[error("MIDI is not available: {0}")]
     Unavailable(String),
     /// No such port now.
-    #[error("no MIDI port {0} that a knob could be behind")]
+    #[error("no MIDI port {0}")]
     Missing(String),
     /// The port is there and does not open.
     #[error("the MIDI port {name} does not open: {reason}")]

@@ -1,7 +1,7 @@
-//! The host's side of a TTLink session as a machine without ports and clocks: time and bytes in, bytes out.
+//! The host's side of a TTLink session, without ports and clocks: time and bytes go in, bytes come out.
 //!
-//! What holds at any time: once INFO is there ALIVE goes out at its rate whatever else happens; ARM follows an act of the user and nothing
-//! else; no torque is ever sent, only parameters and a ceiling. Rates, codes and layouts: `docs/protocol.md`.
+//! Three rules always hold. After INFO, the session sends ALIVE at its rate whatever else happens. It sends ARM only after
+//! an act of the user. It never sends torque, only parameters and a ceiling. Rates, codes and layouts: `docs/protocol.md`.
 
 pub mod arming;
 pub mod feeling;
@@ -64,18 +64,18 @@ pub struct StateSample {
     pub period_us: u32,
 }
 
-/// What a session tells whoever runs it.
+/// What a session reports to its caller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SessionEvent {
-    /// Where the knob was.
+    /// A measurement of the knob.
     State(StateSample),
-    /// It was slapped, with this peak speed, rad/s.
+    /// The player slapped the knob, with this peak speed, rad/s.
     Slap(f32),
     /// Its button went down (true) or up.
     Button(bool),
 }
 
-/// What a session wants done.
+/// What a session asks its caller to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SessionOutput<'a> {
     /// Send these bytes, whole or not at all.
@@ -84,14 +84,14 @@ pub enum SessionOutput<'a> {
     Baud(u32),
 }
 
-/// Where a session stands.
+/// The status of a session.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SessionStatus {
     /// No INFO yet.
     Greeting,
-    /// INFO is there and STATE comes.
+    /// INFO has come, and STATE keeps coming.
     Live,
-    /// INFO is there; STATE is not yet, or no longer.
+    /// INFO has come; STATE has not come yet, or comes no longer.
     Silent,
     /// Another major version: its position is read, it is never armed.
     OtherVersion,
@@ -106,7 +106,7 @@ enum Incoming {
     Midi(Box<MidiReceiver>),
 }
 
-/// See the module.
+/// The host's side of a session with one device; see the module.
 pub struct HostSession {
     binding: Binding,
     number: u32,
@@ -168,7 +168,7 @@ impl HostSession {
         }
     }
 
-    /// What the device says of itself.
+    /// The device's INFO; `None` before it has answered HELLO.
     pub fn info(&self) -> Option<&Info> {
         self.info.as_ref()
     }
@@ -213,13 +213,13 @@ impl HostSession {
         self.notice.as_deref()
     }
 
-    /// Counts and times. Sorts: not for every loop.
+    /// Counts and times. Sorts about 1,000 values: call it a few times a second at most.
     pub fn stats(&self) -> LinkStats {
         LinkStats { wire: self.wire_stats(), skew_ppm: self.clock.skew_ppm() as f32, ..self.meter.picture() }
     }
 
-    /// Where the session stands at `now_us`.
-    pub fn standing(&self, now_us: i64) -> SessionStatus {
+    /// The status at `now_us`.
+    pub fn status(&self, now_us: i64) -> SessionStatus {
         match &self.info {
             Some(info) if !info.speaks_our_major() => SessionStatus::OtherVersion,
             Some(_) if self.is_heard(now_us) => SessionStatus::Live,
@@ -248,7 +248,7 @@ impl HostSession {
             Some(info) if !info.speaks_our_major() => {
                 "not armed: the knob speaks another version of the protocol"
             }
-            Some(_) if !self.is_heard(now_us) => "not armed: the knob is silent",
+            Some(_) if !self.is_heard(now_us) => "not armed: the knob sends nothing",
             Some(info) => {
                 self.arming.arm(ceiling_mnm, further_act, info, now_us);
                 (self.refusal, self.notice, self.zero_due) = (None, None, false);
@@ -484,7 +484,7 @@ impl HostSession {
 
     fn hear_state(&mut self, state: &DeviceState, now_us: i64, tell: &mut dyn FnMut(SessionEvent)) {
         if self.clock.observe(state.t_us, now_us) && self.info.is_some() {
-            self.notice = Some("the knob has started anew; it is disarmed".into());
+            self.notice = Some("the knob has restarted and is disarmed".into());
             self.arming.disarm(now_us);
             self.feeling.forget();
             self.slaps = Slaps::default();
@@ -503,7 +503,7 @@ impl HostSession {
         self.state = Some((*state, now_us));
         self.slaps.state(state.slaps, now_us);
         if self.arming.hear(state.flags.armed()) && self.notice.is_none() {
-            let why = state.fault_code().map_or("the knob has disarmed", |code| code.text());
+            let why = state.fault_code().map_or("the knob has disarmed itself", |code| code.text());
             self.notice = Some(format!("disarmed: {why}"));
         }
         if let Some(round_trip_us) = self.feeling.echoed(state.feel_id, now_us) {

@@ -1,4 +1,4 @@
-//! A knob's angle becomes breath, note by note.
+//! Turns a knob's angle into breath, note by note.
 //!
 //! Breath goes out on a grid of samples counted from the start, so that it does not depend on the host's blocks, and in
 //! the steps of a 14-bit controller, so that a host that records it plays the very same breath back.
@@ -22,26 +22,26 @@ const STEPS: f32 = 16_383.0;
 pub struct Breath14(pub u16);
 
 impl Breath14 {
-    /// Of full breath, 0..=1, exactly as [`MidiDecoder`](chalumeau_core::control::midi::MidiDecoder) reads the pair.
+    /// Share of full breath, 0..=1, exactly as [`MidiDecoder`](chalumeau_core::control::midi::MidiDecoder) reads the pair.
     pub fn unit(self) -> f32 {
         f32::from(self.0) / STEPS
     }
 
-    /// Values of the coarse and the fine controller.
+    /// Values of the coarse (CC 2) and the fine controller (CC 34), 0..=127.
     pub fn bytes(self) -> (u8, u8) {
         ((self.0 >> 7) as u8 & 127, self.0 as u8 & 127)
     }
 }
 
-/// The hand on the knob: how it blows, and whether it feels. Plain numbers, to be copied between threads.
+/// How knob angles become breath. Plain numbers, which threads may copy.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct BreathMapping {
-    /// What each note makes of the angle.
+    /// Map from angle to mouth pressure, for each note.
     pub maps: PitchMaps,
     /// Rest, full blow, dead zone and curve.
     pub design: KnobDesign,
-    /// The knob feels: angles are taken as they are, because the notes' landmarks lie on them. On one that does not,
-    /// full blow is the reference reed's closure, wherever the player has put it, and the curve bends the way there.
+    /// True if the knob gives the feel. Then angles count as they are, because the notes' landmarks lie on them. If
+    /// false, the player's full-blow angle means the closure of the reference reed, and the curve shapes the way there.
     pub feels: bool,
 }
 
@@ -61,12 +61,12 @@ pub struct Blower {
 }
 
 impl Blower {
-    /// As new.
+    /// Returns to the initial state.
     pub fn reset(&mut self) {
         *self = Self::default();
     }
 
-    /// Takes notice of what is played, at a sample of the block that begins now.
+    /// Notes an event of the block that begins now.
     pub fn heed(&mut self, event: &Timed<Event>) {
         match event.event {
             Event::NoteOn { note, .. } => self.keys.press(note),
@@ -81,7 +81,7 @@ impl Blower {
         }
     }
 
-    /// The note in the fingers, also after its key has come up.
+    /// The fingered note; it stays after its key is released.
     pub fn fingered(&self) -> Option<SoundingNote> {
         self.fingered
     }
@@ -97,12 +97,13 @@ impl Blower {
         (at.next_multiple_of(GRID) - self.clock) as usize
     }
 
-    /// The block is over.
+    /// Ends a block of `samples` samples.
     pub fn advance(&mut self, samples: usize) {
         self.clock += samples as u64;
     }
 
-    /// Breath of a knob at an angle, at a sample of the block that begins now, if it is not what was sent last.
+    /// Breath at a knob angle (degrees), at sample `at` of the block that begins now; `None` if it has not changed.
+    /// `full_pa` is the mouth pressure of full breath, Pa.
     pub fn blow(
         &mut self,
         hand: &BreathMapping,
@@ -141,13 +142,13 @@ impl Blower {
         self.unfelt.as_mut().map_or(0.0, |knob| travel_deg * f64::from(knob.pressure_unit(angle_deg)))
     }
 
-    /// The knob has gone: no breath, if there was any.
+    /// Call it when the knob is gone: returns breath 0 if breath was sent before.
     pub fn fall_silent(&mut self) -> Option<Breath14> {
         self.sent.take().filter(|&sent| sent != Breath14(0)).map(|_| Breath14(0))
     }
 }
 
-/// Host events in order of time with the knob's breath between them.
+/// Iterator over the host's events in order of time, with the knob's breath between them.
 pub struct BlownEvents<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> {
     host: std::iter::Peekable<I>,
     blower: &'a mut Blower,
@@ -162,7 +163,8 @@ pub struct BlownEvents<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> 
 }
 
 impl<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> BlownEvents<'a, I, A> {
-    /// `angle` gives the knob's angle at a sample of the block, degrees; `heard` is told of every breath.
+    /// `angle` gives the knob's angle at a sample of the block, degrees; `heard` is called with the sample and value of each
+    /// breath.
     pub fn new(
         host: I,
         blower: &'a mut Blower,

@@ -6,7 +6,7 @@ use crate::wire::codes::{FaultCode, RefusedCode};
 use chalumeau_core::haptics::TorqueLimits;
 pub use chalumeau_core::haptics::{Feel, Law};
 
-/// ARM and ALIVE.
+/// Content of ARM and of ALIVE.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Arm {
     /// Session of HELLO.
@@ -39,7 +39,7 @@ impl Capabilities {
     }
 }
 
-/// What a device says of itself.
+/// Message INFO: the device describes itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Info {
     /// Version of the protocol.
@@ -143,36 +143,36 @@ impl Flags {
     }
 }
 
-/// Where the knob is.
+/// Message STATE: position, speed, torque and flags of the knob.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DeviceState {
     /// Device clock, microseconds; wraps.
     pub t_us: u32,
-    /// 0.01 degrees since zero.
+    /// Angle from zero, 0.01 degrees.
     pub angle: i32,
-    /// 0.1 rpm.
+    /// Speed, 0.1 rpm.
     pub velocity: i16,
-    /// Command after all limits, mNm.
+    /// Torque command after all limits, mNm.
     pub torque: i16,
     /// See [`Flags`].
     pub flags: Flags,
-    /// Last FEEL accepted.
+    /// Number of the last FEEL accepted.
     pub feel_id: u8,
     /// Counter of slaps.
     pub slaps: u8,
     /// Counter of the last EVENT.
     pub events: u8,
-    /// Standing fault, 0 none.
+    /// Code of the present fault; 0 if there is none.
     pub fault: u8,
 }
 
 impl DeviceState {
-    /// Angle since zero, degrees.
+    /// Angle from zero, degrees.
     pub fn angle_deg(&self) -> f64 {
         0.01 * f64::from(self.angle)
     }
 
-    /// The fault that stands, if this version knows its code.
+    /// The present fault; `None` without a fault, or if this version does not know its code.
     pub fn fault_code(&self) -> Option<FaultCode> {
         FaultCode::from_u8(self.fault)
     }
@@ -196,16 +196,16 @@ pub enum EventKind {
     Disarmed = 6,
 }
 
-/// Something that happened on the device.
+/// Message EVENT: something happened on the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeviceEvent {
-    /// What.
+    /// Kind of event.
     pub kind: EventKind,
-    /// Counts events, so that a lost one shows.
+    /// Counts events, modulo 256; a gap shows a lost event.
     pub counter: u8,
-    /// See the protocol.
+    /// Depends on the kind; see `docs/protocol.md`.
     pub code: u8,
-    /// Of the FEEL refused, else the one in force.
+    /// Number of the FEEL refused, otherwise of the FEEL in force.
     pub feel_id: u8,
     /// Device clock, microseconds.
     pub t_us: u32,
@@ -214,9 +214,9 @@ pub struct DeviceEvent {
 }
 
 impl DeviceEvent {
-    /// What the code says to people; `None` where the kind has no codes.
+    /// The code as a sentence for people; `None` where the kind has no codes.
     pub fn code_text(&self) -> Option<&'static str> {
-        let unknown = "for a reason this version does not know";
+        let unknown = "for a reason that this version does not know";
         match self.kind {
             EventKind::Fault | EventKind::Disarmed => {
                 Some(FaultCode::from_u8(self.code).map_or(unknown, FaultCode::text))
@@ -230,7 +230,7 @@ impl DeviceEvent {
 /// A message of either direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Message {
-    /// The host has opened the line.
+    /// HELLO: the host has opened the line.
     Hello {
         /// Version of the protocol.
         major: u8,
@@ -239,28 +239,28 @@ pub enum Message {
         /// Chosen at random for this opening.
         session: u32,
     },
-    /// The whole state of the feel.
+    /// FEEL: all parameters of the torque.
     Feel(Feel),
-    /// The user allows torque.
+    /// ARM: the user allows torque.
     Arm(Arm),
-    /// The host is there.
+    /// ALIVE: the host is running.
     Alive(Arm),
-    /// Torque off.
+    /// FREE: torque off.
     Free,
-    /// What the present position shall be called, 0.01 degrees.
+    /// ZERO: the new angle of the present position, 0.01 degrees.
     Zero(i32),
-    /// How often STATE comes, Hz.
+    /// RATE: how often the device sends STATE, Hz.
     Rate(u16),
-    /// The host leaves.
+    /// BYE: the host closes the line.
     Bye {
         /// Session of HELLO.
         session: u32,
     },
-    /// Answer to HELLO.
+    /// INFO: the answer to HELLO.
     Info(Info),
-    /// Where the knob is.
+    /// STATE: position of the knob.
     State(DeviceState),
-    /// Something happened.
+    /// EVENT: something happened.
     Event(DeviceEvent),
 }
 

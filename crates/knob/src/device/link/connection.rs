@@ -148,7 +148,7 @@ impl Connection {
         let Protocol::Stock(tracker, _) = &self.brain else { return None };
         let (jumps, degrees) = tracker.jumps();
         (jumps > 0).then(|| {
-            format!("the knob jumped by {degrees:.0} degrees, as when it starts anew: its position then is zero now")
+            format!("the knob jumped by {degrees:.0} degrees, as if it had restarted; its new position is zero now")
         })
     }
 
@@ -256,14 +256,14 @@ impl Connection {
         let Protocol::Session(session) = &self.brain else { return Ok(()) };
         let silent_us = now_us - session.heard_us().unwrap_or(session.opened_us());
         let lost_us = if self.transport.binding() == Binding::Midi { LOST_MIDI_US } else { LOST_US };
-        match session.standing(now_us) {
+        match session.status(now_us) {
             SessionStatus::Stock(name) => return Err(ConnectionEnd::Stock(name)),
             // MIDI devices that only send control changes rest for as long as they like.
             SessionStatus::Greeting | SessionStatus::PlainMidi
                 if self.transport.binding() == Binding::Midi => {}
             _ if session.heard_us().is_none() && silent_us > BOOT_US => return Err(ConnectionEnd::NoAnswer),
             _ if session.heard_us().is_some() && silent_us > lost_us => {
-                return Err(ConnectionEnd::Gone("the knob is silent".into()));
+                return Err(ConnectionEnd::Gone("the knob sends nothing".into()));
             }
             _ => {}
         }

@@ -1,4 +1,4 @@
-//! The link's thread: chooses ports, keeps one connection, tells how things stand.
+//! The link's thread: chooses ports, keeps one connection, and publishes the status.
 
 use crate::device::discover;
 use crate::device::discover::Candidate;
@@ -214,7 +214,7 @@ impl Worker {
                 let why = if self.connection.is_some() {
                     "this knob's firmware can only be read"
                 } else {
-                    "no knob"
+                    "no knob is connected"
                 };
                 self.refusal = Some(format!("not armed: {why}"));
             }
@@ -275,7 +275,7 @@ impl Worker {
         let session = connection.session();
         let is_live = session.as_ref().is_some_and(|session| {
             matches!(
-                session.standing(now_us),
+                session.status(now_us),
                 SessionStatus::Live | SessionStatus::OtherVersion | SessionStatus::PlainMidi
             )
         });
@@ -316,12 +316,15 @@ impl Worker {
             }
             ConnectionEnd::NoAnswer => {
                 self.trouble = Phase::NoAnswer(format!(
-                    "nothing that is known answers at {port}: is it a knob with the firmware in firmware/?"
+                    "no known device answers at {port}: does it run the firmware in firmware/?"
                 ));
                 self.back_off(now_us);
             }
             ConnectionEnd::AnotherKnob(serial) => {
-                let text = format!("the knob at {port} is {}, not the one chosen", serial_text(serial));
+                let text = format!(
+                    "the knob at {port} has serial number {}; another one was chosen",
+                    serial_text(serial)
+                );
                 self.trouble = Phase::NoAnswer(text);
                 self.back_off(now_us);
             }
@@ -439,7 +442,7 @@ impl Worker {
         let owned = self.own(port_serial(&name), &name)?;
         let transport = OscTransport::open(port, any_address).map_err(|e| match e.kind() {
             io::ErrorKind::AddrInUse => Phase::Busy(format!(
-                "{name} is in use by another program: close that one, or set another port there and here"
+                "{name} is in use by another program: close that program, or set another port on both sides"
             )),
             _ => Phase::Failed(format!("{name} does not open: {e}")),
         })?;
@@ -501,7 +504,7 @@ impl Worker {
                         if let Some(refusal) = session.refusal() {
                             status.last_refusal = Some(refusal.into());
                         }
-                        match session.standing(now_us) {
+                        match session.status(now_us) {
                             SessionStatus::Live => Phase::Live,
                             SessionStatus::OtherVersion => Phase::VersionMismatch,
                             SessionStatus::PlainMidi => Phase::ReadOnly,
