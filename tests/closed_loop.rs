@@ -16,16 +16,16 @@ use chalumeau_core::units::{WrittenNote, cents};
 use chalumeau_knob::simulator::hand::HandDesign;
 use chalumeau_knob::simulator::plant::PlantDesign;
 use chalumeau_knob::simulator::script::{Aim, Script};
-use chalumeau_knob::touch::feel::{Feels, NO_MOTOR};
+use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::wire::{Law, RefusedCode};
-use felt::{Felt, Fingers};
-use heard::{Ear, Heard, least_squares};
+use felt::{FeltThreshold, Fingers};
+use heard::{Ear, SoundOnset, least_squares};
 use parallel::each;
-use player::Player;
+use player::LoopPlayer;
 use std::sync::{Arc, LazyLock};
 
 static MODEL: LazyLock<Arc<Model>> = LazyLock::new(|| Arc::new(Model::built_in(48_000.0).unwrap()));
-static FEELS: LazyLock<Feels> = LazyLock::new(|| Feels::new(&MODEL));
+static FEELS: LazyLock<InstrumentFeel> = LazyLock::new(|| InstrumentFeel::new(&MODEL));
 
 const LAWS: [Law; 2] = [Law::Flow, Law::Pressure];
 const CONTRASTS: [f64; 3] = [1.0, 3.0, 5.0];
@@ -48,14 +48,14 @@ fn note(table: &FeelTable, written: u8) -> &NoteFeel {
 }
 
 /// A listening player with one note's feel, armed.
-fn seated(table: &FeelTable, note: &NoteFeel, settings: &Settings, hand: HandDesign) -> Player {
+fn seated(table: &FeelTable, note: &NoteFeel, settings: &Settings, hand: HandDesign) -> LoopPlayer {
     let mut player =
-        Player::new(&MODEL, settings, FEELS.maps(table), note.feel, hand, PlantDesign::default());
+        LoopPlayer::new(&MODEL, settings, FEELS.maps(table), note.feel, hand, PlantDesign::default());
     player.arm(100);
     player
 }
 
-fn finger(player: &mut Player, note: &NoteFeel) {
+fn finger(player: &mut LoopPlayer, note: &NoteFeel) {
     player.finger(note.written.sounding(MODEL.file.transposition).unwrap());
 }
 
@@ -68,9 +68,9 @@ fn crescendo(from_deg: f64, to_deg: f64, deg_per_s: f64) -> Script {
 
 /// What one crescendo showed.
 struct Passage {
-    felt: Felt,
+    felt: FeltThreshold,
     /// `None`: nothing began between shortly before the threshold and well above it.
-    heard: Option<Heard>,
+    heard: Option<SoundOnset>,
     /// Largest distance between what the map makes of the shaft's angle and what the reed got, over the latter.
     lag: f64,
     /// Largest distance of the shaft from where the hand wanted it, degrees.
@@ -313,11 +313,11 @@ fn what_would_push_or_shake_is_refused_before_the_wire_and_behind_it() {
         ("stiff step", thin, FeelDesign { detent_mnm: Some(100.0), travel_deg: 120.0, ..pressure }, shake),
     ] {
         let hand = HandDesign::listening();
-        let mut player = Player::new(&MODEL, &settings, FEELS.maps(&table), note.feel, hand, plant);
+        let mut player = LoopPlayer::new(&MODEL, &settings, FEELS.maps(&table), note.feel, hand, plant);
         player.arm(100);
         player.knob.hand().aim(Aim::Angle(2.0 * note.landmarks.a_on_deg));
         player.run(4.0, |_| {}, |_| {});
-        let mean_mnm = |player: &mut Player| {
+        let mean_mnm = |player: &mut LoopPlayer| {
             let (mut sum, mut periods) = (0.0, 0.0);
             player.run(2.0, |knob| (sum, periods) = (sum + knob.command_mnm(), periods + 1.0), |_| {});
             sum / periods

@@ -16,18 +16,18 @@ use chalumeau_core::instrument::{Clarinet, Settings};
 use chalumeau_core::units::{SoundingNote, cents};
 use chalumeau_firmware::Setup;
 use chalumeau_knob::device::memory::{MemoryPort, pair};
-use chalumeau_knob::device::session::{Happening, Session, Standing, Wish};
+use chalumeau_knob::device::session::{HostSession, SessionEvent, SessionOutput, SessionStatus};
 use chalumeau_knob::device::transport::{Binding, Transport};
-use chalumeau_knob::device::{Choice, Hooks, KnobLink, Phase, Places, StateSample};
-use chalumeau_knob::simulator::hand::{Hand, HandDesign};
+use chalumeau_knob::device::{Hooks, KnobChoice, KnobLink, Phase, RuntimeDir, StateSample};
+use chalumeau_knob::simulator::hand::{HandDesign, SimulatedHand};
 use chalumeau_knob::simulator::knob::SimulatedKnob;
 use chalumeau_knob::simulator::plant::PlantDesign;
 use chalumeau_knob::simulator::script::Aim;
 use chalumeau_knob::simulator::serve::{Control, Port, Server};
-use chalumeau_knob::touch::blower::{Blower, Blown, Breath14, Hand as Blowing};
-use chalumeau_knob::touch::feel::{Feels, NO_MOTOR};
+use chalumeau_knob::touch::blower::{Blower, BlownEvents, Breath14, BreathMapping};
+use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::wire::{Decoder, Feel, Law, Message};
-use knob::{Device, PtyKnob, recorder, soon};
+use knob::{FirmwareKnob, PtyKnob, recorder, soon};
 use rosc::{OscMessage, OscPacket, OscType, encoder};
 use serialport::{SerialPort, TTYPort};
 use std::io;
@@ -44,21 +44,21 @@ use tempfile::TempDir;
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
 
-fn places() -> (TempDir, Places) {
+fn places() -> (TempDir, RuntimeDir) {
     let directory = tempfile::tempdir().unwrap();
-    let places = Places::within(directory.path());
+    let places = RuntimeDir::within(directory.path());
     (directory, places)
 }
 
 /// A link to `choice` with nothing to feel.
-fn linked(places: &Places, label: &str, choice: Choice) -> KnobLink {
+fn linked(places: &RuntimeDir, label: &str, choice: KnobChoice) -> KnobLink {
     let (link, _reader) = KnobLink::spawn_in(places.clone(), label, Hooks::default());
     link.choose(choice);
     link
 }
 
-fn any_serial() -> Choice {
-    Choice::Serial { serial: None }
+fn any_serial() -> KnobChoice {
+    KnobChoice::Serial { serial: None }
 }
 
 #[track_caller]
@@ -207,24 +207,24 @@ fn what_is_missing_or_busy_or_another_says_so_each_in_its_own_words() {
     link.arm(100);
     soon("refused", || link.status().last_refusal.is_some_and(|why| why.contains("no knob")));
 
-    link.choose(Choice::Path("/dev/not-there".into()));
+    link.choose(KnobChoice::Path("/dev/not-there".into()));
     soon("missing", || link.status().text.contains("/dev/not-there is not there"));
 
     let knob = PtyKnob::plug(None, &Setup::default());
     let _monitor = serialport::new(knob.path.to_string_lossy(), 115_200).open().unwrap();
-    link.choose(Choice::Path(knob.path.clone()));
+    link.choose(KnobChoice::Path(knob.path.clone()));
     soon("busy", || matches!(link.status().phase, Phase::Busy(text) if text.contains("another program")));
 
     let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
-    link.choose(Choice::Osc { port: taken.local_addr().unwrap().port(), any_address: false });
+    link.choose(KnobChoice::Osc { port: taken.local_addr().unwrap().port(), any_address: false });
     soon("busy UDP", || matches!(link.status().phase, Phase::Busy(text) if text.contains("UDP port")));
 
     let other = PtyKnob::plug(Some(&places), &Setup { serial: 0xA, ..Setup::default() });
-    link.choose(Choice::Serial { serial: Some(0xB) });
+    link.choose(KnobChoice::Serial { serial: Some(0xB) });
     thread::sleep(Duration::from_millis(600));
     assert_eq!(link.status().phase, Phase::Searching, "a knob of another number is not taken");
     assert_eq!(said(&other, |_| true), 0, "nor even spoken to");
-    link.choose(Choice::Serial { serial: Some(0xA) });
+    link.choose(KnobChoice::Serial { serial: Some(0xA) });
     live(&link);
 }
 
@@ -237,7 +237,7 @@ fn of_two_instances_one_has_the_knob_and_the_other_knows_who_and_can_take_it() {
     first.arm(100);
     soon("armed", || knob.is_armed());
     // By its number, and by its port.
-    for choice in [any_serial(), Choice::Path(knob.path.clone())] {
+    for choice in [any_serial(), KnobChoice::Path(knob.path.clone())] {
         let second = linked(&places, "Track 2", choice);
         soon("held", || matches!(second.status().phase, Phase::HeldBy(who) if who.contains("Track 1")));
         assert!(knob.is_armed(), "looking on disturbs nobody");
@@ -262,17 +262,17 @@ fn a_link_ends_when_dropped_whatever_it_is_doing() {
     stalled.faults.stalled.store(true, Ordering::Relaxed);
     let living = PtyKnob::plug(Some(&places), &Setup::default());
     let choices = [
-        Choice::Off,
-        Choice::Path(stalled.path.clone()),
-        Choice::Path("/dev/not-there".into()),
-        Choice::Osc { port: free_port(), any_address: false },
-        Choice::Midi { name: Some("no such port".into()) },
+        KnobChoice::Off,
+        KnobChoice::Path(stalled.path.clone()),
+        KnobChoice::Path("/dev/not-there".into()),
+        KnobChoice::Osc { port: free_port(), any_address: false },
+        KnobChoice::Midi { name: Some("no such port".into()) },
         any_serial(),
     ];
     for choice in choices {
         let link = linked(&places, "test", choice.clone());
         match choice {
-            Choice::Serial { .. } => drop(live(&link)),
+            KnobChoice::Serial { .. } => drop(live(&link)),
             _ => thread::sleep(Duration::from_millis(150)),
         }
         let begun = Instant::now();
@@ -361,7 +361,7 @@ fn unmodified_firmware_at_the_serial_port_is_recognised_and_explained() {
         }
         heard
     });
-    let link = linked(&places, "test", Choice::Path(path));
+    let link = linked(&places, "test", KnobChoice::Path(path));
     soon(
         "recognised",
         || matches!(link.status().phase, Phase::StockSerial(name) if name == "TorqueTuner_001"),
@@ -388,7 +388,7 @@ fn the_stock_firmwares_stream_plays_through_a_flood() {
     let (_directory, places) = places();
     let port = free_port();
     let (link, mut reader) = KnobLink::spawn_in(places, "test", Hooks::default());
-    link.choose(Choice::Osc { port, any_address: false });
+    link.choose(KnobChoice::Osc { port, any_address: false });
     soon("listening", || link.status().phase == Phase::Waiting);
     let stop = Arc::new(AtomicBool::new(false));
     let stopped = stop.clone();
@@ -451,7 +451,7 @@ fn over_midi_the_same_firmware_is_played_and_felt() {
     let stop = Arc::new(AtomicBool::new(false));
     let stopped = stop.clone();
     let knob = thread::spawn(move || {
-        let mut device = Device::new(Setup { midi: true, ..Setup::default() });
+        let mut device = FirmwareKnob::new(Setup { midi: true, ..Setup::default() });
         let (begun, mut sent) = (Instant::now(), Vec::new());
         let mut was_armed = false;
         while !stopped.load(Ordering::Relaxed) {
@@ -521,13 +521,18 @@ impl Transport for ControllersOnly {
 fn over_midi_a_hand_on_the_knob_is_heard_with_and_without_sysex() {
     const RATE_HZ: f64 = 48_000.0;
     const BLOCK: usize = 128;
-    let feels = Feels::built_in().unwrap();
+    let feels = InstrumentFeel::built_in().unwrap();
     let table = feels.table(&Settings::default(), &FeelDesign::default(), &NO_MOTOR).unwrap();
     for is_plain in [false, true] {
         let (_directory, places) = places();
         let (device, host) = pair(Binding::Midi, "TorqueTuner MIDI");
         let setup = Setup { midi: true, ..Setup::default() };
-        let knob = SimulatedKnob::new(setup, PlantDesign::default(), Hand::new(HandDesign::default(), 1), 1);
+        let knob = SimulatedKnob::new(
+            setup,
+            PlantDesign::default(),
+            SimulatedHand::new(HandDesign::default(), 1),
+            1,
+        );
         let running = Server::new(knob, Port::Memory(Box::new(device))).spawn().unwrap();
         running.tell(Control::Aim(Aim::Angle(200.0)));
         let (link, mut reader) = KnobLink::spawn_in(places, "test", Hooks::default());
@@ -535,7 +540,8 @@ fn over_midi_a_hand_on_the_knob_is_heard_with_and_without_sysex() {
         let phase = if is_plain { Phase::ReadOnly } else { Phase::Live };
         soon("there", || link.status().phase == phase);
 
-        let hand = Blowing { maps: feels.maps(&table), design: KnobDesign::default(), feels: !is_plain };
+        let hand =
+            BreathMapping { maps: feels.maps(&table), design: KnobDesign::default(), feels: !is_plain };
         let (mut blower, mut clarinet) = (Blower::default(), Clarinet::built_in(RATE_HZ).unwrap());
         let full_pa = 1e3 * f64::from(Settings::default().breath_full_kpa);
         // The lowest note, written E3.
@@ -554,7 +560,7 @@ fn over_midi_a_hand_on_the_knob_is_heard_with_and_without_sysex() {
                     Some(angle_deg)
                 };
                 let mut blown = |_: usize, value: Breath14| breath = value.unit();
-                let events = Blown::new(
+                let events = BlownEvents::new(
                     host.take().into_iter(),
                     &mut blower,
                     &hand,
@@ -580,8 +586,8 @@ fn over_midi_a_hand_on_the_knob_is_heard_with_and_without_sysex() {
 
 /// Firmware and session in simulated time, with a line between them that does what it is told.
 struct Bench {
-    session: Session,
-    device: Device,
+    session: HostSession,
+    device: FirmwareKnob,
     now_us: i64,
     born_us: i64,
     is_midi: bool,
@@ -596,8 +602,8 @@ impl Bench {
     fn new(binding: Binding) -> Self {
         let setup = Setup { midi: binding == Binding::Midi, ..Setup::default() };
         Self {
-            session: Session::new(binding, 0xABCD, 0),
-            device: Device::new(setup),
+            session: HostSession::new(binding, 0xABCD, 0),
+            device: FirmwareKnob::new(setup),
             now_us: 0,
             born_us: 0,
             is_midi: binding == Binding::Midi,
@@ -613,8 +619,8 @@ impl Bench {
     fn tick(&mut self, mut line: impl FnMut(&mut Vec<u8>)) {
         self.now_us += 1000;
         let (mut said, mut slaps) = (Vec::new(), 0);
-        let send = &mut |wish: Wish| {
-            if let Wish::Send(bytes) = wish {
+        let send = &mut |wish: SessionOutput| {
+            if let SessionOutput::Send(bytes) = wish {
                 said.extend_from_slice(bytes);
                 self.sent_at_us.push(self.now_us);
             }
@@ -632,7 +638,7 @@ impl Bench {
         line(&mut answer);
         let (states, period_us) = (&mut self.states, &mut self.period_us);
         self.session.receive(self.now_us, &answer, &mut |what| {
-            if let Happening::State(state) = what {
+            if let SessionEvent::State(state) = what {
                 (*states, *period_us) = (*states + 1, state.period_us);
             }
         });
@@ -652,7 +658,7 @@ fn rates_are_those_of_the_protocol_in_simulated_time() {
     let mut bench = Bench::new(Binding::Serial);
     bench.session.want_feel(Feel::default());
     bench.run(10_000);
-    assert_eq!(bench.session.standing(bench.now_us), Standing::Live);
+    assert_eq!(bench.session.status(bench.now_us), SessionStatus::Live);
     assert_eq!(bench.count(|m| matches!(m, Message::Hello { .. })), 1);
     let alive = bench.count(|m| matches!(m, Message::Alive(_)));
     assert!((499..=502).contains(&alive), "{alive} ALIVE in 10 s");
@@ -754,7 +760,7 @@ fn no_fault_ever_arms_a_knob() {
         bench.run(1000);
         disarmed_lives += u32::from(was_disarmed);
         assert_eq!(bench.count(|m| matches!(m, Message::Arm(_))), arms, "life {life}");
-        assert_eq!(bench.session.standing(bench.now_us), Standing::Live, "life {life} recovers");
+        assert_eq!(bench.session.status(bench.now_us), SessionStatus::Live, "life {life} recovers");
         assert_eq!(bench.session.is_armed(), bench.device.firmware.is_armed(), "life {life}");
     }
     assert!(armed_lives == 300 && disarmed_lives > 200, "{armed_lives}, {disarmed_lives}");
@@ -771,10 +777,10 @@ fn a_midi_knob_whose_answer_is_late_is_not_taken_for_a_plain_one() {
                 line.clear();
             }
         });
-        assert_ne!(bench.session.standing(bench.now_us), Standing::PlainMidi, "{ms} ms");
+        assert_ne!(bench.session.status(bench.now_us), SessionStatus::PlainMidi, "{ms} ms");
         assert!(ms != 100 || bench.states > 0, "its breath is heard all the same");
     }
-    assert_eq!(bench.session.standing(bench.now_us), Standing::Live);
+    assert_eq!(bench.session.status(bench.now_us), SessionStatus::Live);
 }
 
 #[test]
@@ -785,7 +791,7 @@ fn over_midi_frames_leave_20_ms_between_them() {
         bench.session.want_feel(Feel { a_on_deg: ms as f32, ..Feel::default() });
         bench.tick(|_| {});
     }
-    assert_eq!(bench.session.standing(bench.now_us), Standing::Live);
+    assert_eq!(bench.session.status(bench.now_us), SessionStatus::Live);
     let expected_us = 2_000_000 / bench.states as u32;
     assert!(bench.period_us.abs_diff(expected_us) <= 500, "{} us, {expected_us}", bench.period_us);
     bench.session.arm(100, false, bench.now_us);

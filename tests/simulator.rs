@@ -8,13 +8,13 @@ mod host;
 
 use chalumeau_firmware::Setup;
 use chalumeau_knob::simulator::fault::{Fault, FaultKind};
-use chalumeau_knob::simulator::hand::{Hand, HandDesign};
+use chalumeau_knob::simulator::hand::{HandDesign, SimulatedHand};
 use chalumeau_knob::simulator::knob::SimulatedKnob;
 use chalumeau_knob::simulator::plant::PlantDesign;
 use chalumeau_knob::simulator::script::{Aim, Script};
 use chalumeau_knob::wire::{EventKind, Feel, Law, Message};
 use fastrand::Rng;
-use host::Host;
+use host::TestHost;
 use std::collections::BTreeMap;
 
 /// What counts as rest, degrees rms: twice the step of the encoder.
@@ -52,14 +52,15 @@ fn setup(midi: bool, knob_damping_nms: f64) -> Setup {
 }
 
 /// A knob without a hand at an angle, armed with a feel; none if the firmware refuses it.
-fn released(feel: Feel, plant: PlantDesign, angle_deg: f64) -> Option<Host> {
+fn released(feel: Feel, plant: PlantDesign, angle_deg: f64) -> Option<TestHost> {
     released_by(HandDesign::default(), feel, plant, angle_deg)
 }
 
 /// The same, with a certain hand ready to take hold.
-fn released_by(hand: HandDesign, feel: Feel, plant: PlantDesign, angle_deg: f64) -> Option<Host> {
-    let hand = Hand::new(hand, 1);
-    let mut host = Host::new(SimulatedKnob::new(setup(false, plant.viscous_nms), plant, hand, 1), false, 450);
+fn released_by(hand: HandDesign, feel: Feel, plant: PlantDesign, angle_deg: f64) -> Option<TestHost> {
+    let hand = SimulatedHand::new(hand, 1);
+    let mut host =
+        TestHost::new(SimulatedKnob::new(setup(false, plant.viscous_nms), plant, hand, 1), false, 450);
     host.greet(); // zero is where the knob stood when it started
     host.knob.plant().set(angle_deg.to_radians(), 0.0);
     host.send(&Message::Feel(feel));
@@ -74,7 +75,7 @@ fn released_by(hand: HandDesign, feel: Feel, plant: PlantDesign, angle_deg: f64)
 
 /// Swing within a second about a straight line, degrees rms, once the knob has had time to get where it wants to: a weak
 /// spring against strong damping creeps for minutes, and that is no swing.
-fn unrest_deg(host: &mut Host) -> f64 {
+fn unrest_deg(host: &mut TestHost) -> f64 {
     let mut calm = 0;
     let mut unrest = 0.0f64;
     for _ in 0..30 {
@@ -301,8 +302,13 @@ fn listening_hand_holds_gamma_one_half_under_both_laws() {
             for stretch in [1.0, 2.0, 4.0] {
                 let design = HandDesign::listening();
                 let plant = PlantDesign::default();
-                let mut host = Host::new(
-                    SimulatedKnob::new(setup(false, plant.viscous_nms), plant, Hand::new(design, 3), 3),
+                let mut host = TestHost::new(
+                    SimulatedKnob::new(
+                        setup(false, plant.viscous_nms),
+                        plant,
+                        SimulatedHand::new(design, 3),
+                        3,
+                    ),
                     false,
                     250,
                 );
@@ -374,37 +380,8 @@ const HARMS: [Harm; 13] = [
 /// How long a harm lasts, s: longer than the longest allowed silence.
 const HARM_S: f64 = 0.6;
 
-/// Breaks a knob in play, and returns the time from the harm to the end of all torque, s.
-fn break_it(harm: Harm, midi: bool, seed: u64) -> f64 {
-    let mut rng = Rng::with_seed(seed);
-    let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
-    // Damped enough for every feel drawn below to be allowed.
-    let plant = PlantDesign { torque_step_nm: 0.0, viscous_nms: 2e-3, ..PlantDesign::default() };
-    let knob = SimulatedKnob::new(
-        setup(midi, plant.viscous_nms),
-        plant,
-        Hand::new(HandDesign::default(), seed),
-        seed,
-    );
-    let ceiling_mnm = between(40.0, 250.0).round();
-    let law = if between(0.0, 1.0) < 0.5 { Law::Flow } else { Law::Pressure };
-    let played = feel(law, between(60.0, 220.0) as f32, between(0.7, 2.0) as f32, H, K);
-    let closure_deg = 360.0 / f64::from(played.stretch);
-    let angle_deg = closure_deg * between(0.2, 0.6);
-    let mut host = Host::new(knob, midi, ceiling_mnm as u16);
-    let context = format!("{harm:?}, midi {midi}, seed {seed}");
-    host.greet();
-    host.knob.plant().set(angle_deg.to_radians(), 0.0);
-    host.knob.hand().aim(Aim::Angle(angle_deg));
-    host.send(&Message::Feel(played));
-    host.run(0.1, |_| {});
-    assert_eq!(host.state().feel_id, 1, "{context}: the feel is allowed");
-    host.arm();
-    let mut strongest = 0.0f64;
-    let mut watch = |knob: &SimulatedKnob| strongest = strongest.max(knob.motor_mnm().abs());
-    host.run(between(0.2, 0.6), &mut watch);
-    assert!(host.knob.is_armed() && host.knob.motor_mnm().abs() > 4.0, "{context}: in play");
-
+/// Does the harm to a knob in play; `between` draws a number from a range.
+fn inflict(harm: Harm, host: &mut TestHost, played: Feel, between: &mut dyn FnMut(f64, f64) -> f64) {
     let t_s = host.knob.t_s();
     let fault = |kind| Fault::new(kind, t_s).lasting(HARM_S);
     match harm {
@@ -438,6 +415,41 @@ fn break_it(harm: Harm, midi: bool, seed: u64) -> f64 {
             host.send(&Message::Hello { major: 1, minor: 0, session: host.session ^ 1 });
         }
     }
+}
+
+/// Breaks a knob in play, and returns the time from the harm to the end of all torque, s.
+fn break_it(harm: Harm, midi: bool, seed: u64) -> f64 {
+    let mut rng = Rng::with_seed(seed);
+    let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
+    // Damped enough for every feel drawn below to be allowed.
+    let plant = PlantDesign { torque_step_nm: 0.0, viscous_nms: 2e-3, ..PlantDesign::default() };
+    let knob = SimulatedKnob::new(
+        setup(midi, plant.viscous_nms),
+        plant,
+        SimulatedHand::new(HandDesign::default(), seed),
+        seed,
+    );
+    let ceiling_mnm = between(40.0, 250.0).round();
+    let law = if between(0.0, 1.0) < 0.5 { Law::Flow } else { Law::Pressure };
+    let played = feel(law, between(60.0, 220.0) as f32, between(0.7, 2.0) as f32, H, K);
+    let closure_deg = 360.0 / f64::from(played.stretch);
+    let angle_deg = closure_deg * between(0.2, 0.6);
+    let mut host = TestHost::new(knob, midi, ceiling_mnm as u16);
+    let context = format!("{harm:?}, midi {midi}, seed {seed}");
+    host.greet();
+    host.knob.plant().set(angle_deg.to_radians(), 0.0);
+    host.knob.hand().aim(Aim::Angle(angle_deg));
+    host.send(&Message::Feel(played));
+    host.run(0.1, |_| {});
+    assert_eq!(host.state().feel_id, 1, "{context}: the feel is allowed");
+    host.arm();
+    let mut strongest = 0.0f64;
+    let mut watch = |knob: &SimulatedKnob| strongest = strongest.max(knob.motor_mnm().abs());
+    host.run(between(0.2, 0.6), &mut watch);
+    assert!(host.knob.is_armed() && host.knob.motor_mnm().abs() > 4.0, "{context}: in play");
+
+    let t_s = host.knob.t_s();
+    inflict(harm, &mut host, played, &mut between);
     let mut last_torque_s = t_s;
     host.run(HARM_S, |knob| {
         watch(knob);
@@ -505,8 +517,8 @@ fn motor_board_without_a_watchdog_keeps_its_torque_when_the_bus_dies() {
 fn same_seed_gives_the_same_run_to_the_bit() {
     let run = |seed| {
         let plant = PlantDesign::default();
-        let hand = Hand::new(HandDesign::default(), seed);
-        let mut host = Host::new(SimulatedKnob::new(setup(false, 1e-3), plant, hand, seed), false, 200);
+        let hand = SimulatedHand::new(HandDesign::default(), seed);
+        let mut host = TestHost::new(SimulatedKnob::new(setup(false, 1e-3), plant, hand, seed), false, 200);
         host.knob.inject("corrupt@0.5:1=0.02".parse().unwrap());
         host.greet();
         host.send(&Message::Feel(feel(Law::Flow, 150.0, 2.0, H, K)));
@@ -524,9 +536,10 @@ fn same_seed_gives_the_same_run_to_the_bit() {
 #[test]
 fn slap_of_the_hand_is_told_with_its_speed() {
     let plant = PlantDesign::default();
-    let mut hand = Hand::new(HandDesign::default(), 1);
+    let mut hand = SimulatedHand::new(HandDesign::default(), 1);
     hand.follow(Script::slap());
-    let mut host = Host::new(SimulatedKnob::new(setup(false, plant.viscous_nms), plant, hand, 1), false, 100);
+    let mut host =
+        TestHost::new(SimulatedKnob::new(setup(false, plant.viscous_nms), plant, hand, 1), false, 100);
     host.greet();
     let mut fastest = 0.0f64;
     host.run(2.0, |knob| fastest = fastest.max(knob.velocity_rpm().abs()));

@@ -53,12 +53,12 @@ unsafe extern "C" {
 
 /// A C++ `Device` in memory that Rust owns. It holds no pointer and needs no destructor, so it may move with its box and
 /// between threads.
-pub struct Device {
+pub struct RawDevice {
     // u64 words: the C++ side asserts that no more alignment is needed.
     memory: Box<[u64]>,
 }
 
-impl Device {
+impl RawDevice {
     pub fn new(setup: &Setup) -> Self {
         let mut name = [0; 16];
         let mut cut = setup.name.len().min(name.len());

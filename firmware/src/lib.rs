@@ -104,7 +104,7 @@ pub type FeelBytes = [u8; 56];
 
 /// One knob's firmware. It keeps no time of its own and starts no thread: it lives by [`Firmware::tick`].
 pub struct Firmware {
-    device: core::Device,
+    device: core::RawDevice,
 }
 
 impl fmt::Debug for Firmware {
@@ -119,7 +119,7 @@ impl fmt::Debug for Firmware {
 impl Firmware {
     /// Powers up. Allocates, and nothing after does.
     pub fn new(setup: &Setup) -> Self {
-        Self { device: core::Device::new(setup) }
+        Self { device: core::RawDevice::new(setup) }
     }
 
     /// Serial bytes from the host, any number of any.
@@ -211,7 +211,7 @@ pub fn decode_counts_midi(bytes: &[u8]) -> Counts {
     core::decode_midi(bytes)
 }
 
-/// The seed's flow at an index 0..=3600 of its table: the formula, not closed past H k.
+/// The reference flow at an index 0..=3600 of its table: the formula, not closed past H k.
 pub fn seed_flow(index: u16, h: f32, k: f32) -> f32 {
     core::seed_flow(index, h, k)
 }

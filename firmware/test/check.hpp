@@ -47,7 +47,7 @@ inline void fail(const char* file, int line, const char* what) {
     }
 }
 
-/// Numbers without a seed of their own from one: xorshift64*.
+/// Random numbers from a seed: xorshift64*.
 class Random {
   public:
     explicit Random(std::uint64_t seed) : state_(seed * 2654435769U + 88172645463325252U) {}

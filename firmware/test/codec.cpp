@@ -286,7 +286,7 @@ CLAIM(frame_behind_any_damage_is_received) {
 }
 
 CLAIM(no_damaged_byte_passes) {
-    Payload payload = test::seed_feel().encode();
+    Payload payload = test::reference_feel().encode();
     std::uint8_t body[FRAME_MAX];
     std::uint8_t wire[SERIAL_FRAME_MAX];
     const std::size_t end = serial_encode(body, frame_encode(2, 1, payload.bytes, payload.length, body), wire);
@@ -315,7 +315,7 @@ CLAIM(random_bytes_neither_crash_nor_hang_nor_move_the_knob) {
     unsigned long long by_midi = 0;
     unsigned long long whole = 0;
     const unsigned long long total = test::options().fuzz_bytes;
-    Payload payload = test::seed_feel().encode();
+    Payload payload = test::reference_feel().encode();
     std::uint8_t body[FRAME_MAX];
     std::uint8_t wire[SERIAL_FRAME_MAX];
     const std::size_t end = serial_encode(body, frame_encode(2, 1, payload.bytes, payload.length, body), wire);

@@ -24,13 +24,13 @@ int stock_at(stock::Knob& knob, int count) {
 
 }  // namespace
 
-/// The seed's own setting: stretch 1, scale 90 of 180 counts. In our units a count may be anything; here it is 1 mNm.
+/// The reference setting: stretch 1, scale 90 of 180 counts. In our units a count may be anything; here it is 1 mNm.
 CLAIM(integer_torque_is_the_stock_firmwares_at_every_tenth_of_a_degree_but_the_first_six_degrees) {
     stock::Knob knob;
     stock_at(knob, -1001);
     const TorqueUnit unit{1.0F, 450.0F};
     test::Bench bench;
-    Feel feel = test::seed_feel();
+    Feel feel = test::reference_feel();
     feel.slap_mnm_per_deg = 90.0F / 150.0F;
     bench.ready(feel, -1000);
     int compared = 0;
@@ -67,7 +67,7 @@ CLAIM(fault_1_the_slip_of_the_notebook_is_refused_and_no_pair_reverses_past_clos
     slipped.k = 27.0F / (4.0F * slipped.h * slipped.h * slipped.h);
     CHECK(std::fabs(slipped.u(3600) + 3.67F) < 0.01F);  // the torque reverses
     CHECK(stock_at(slipped, 3600) == 331);
-    Feel feel = test::seed_feel();
+    Feel feel = test::reference_feel();
     feel.h = slipped.h;
     feel.k = slipped.k;
     const Verdict verdict = check_feel(feel, FeelLimits{});
@@ -107,7 +107,7 @@ CLAIM(fault_2_a_negative_pressure_opens_the_reed_instead_of_closing_it) {
 CLAIM(fault_3_the_slap_region_does_not_jump_and_its_event_tells_the_peak_speed) {
     stock::Knob knob;
     CHECK(stock_at(knob, -1500) == 30 && stock_at(knob, -1501) == 90);  // from a third to all of it
-    Feel feel = test::seed_feel();
+    Feel feel = test::reference_feel();
     feel.slap_mnm_per_deg = 90.0F / 150.0F;
     const Curve curve(feel);
     for (int count = -1000; count >= -1500; --count) {
@@ -146,7 +146,7 @@ CLAIM(fault_3_the_slap_region_does_not_jump_and_its_event_tells_the_peak_speed) 
 CLAIM(fault_4_a_knob_let_go_past_closure_meets_a_wall) {
     stock::Knob knob;
     CHECK(stock_at(knob, 3600) == 0 && stock_at(knob, 9000) == 0);
-    const Curve curve(test::seed_feel());
+    const Curve curve(test::reference_feel());
     CHECK(curve.at_rest(361.0F) == 0.0F && curve.at_rest(399.9F) == 0.0F);
     CHECK(std::fabs(curve.at_rest(404.5F) + 90.0F) < 1e-3F);
 }
@@ -163,7 +163,7 @@ CLAIM(fault_5_slow_motion_counts_and_the_way_there_does_not_matter) {
         hurrying.tick(count, 0.0F);
     }
     CHECK(hurrying.state == 600);
-    Feel feel = test::seed_feel();
+    Feel feel = test::reference_feel();
     feel.stretch = 0.4F;
     test::Bench slow;
     slow.ready(feel);
@@ -211,7 +211,7 @@ CLAIM(fault_6_no_number_of_turns_overflows_a_law_change_keeps_the_angle_and_an_u
     CHECK(single.hundredths() == -100 * (20 * 36 - 1) * 10);
     // A change of law under the hand.
     test::Bench held;
-    held.ready(test::seed_feel(), 800);
+    held.ready(test::reference_feel(), 800);
     const std::int32_t before = held.state.angle;
     Feel other = test::pressure_feel();
     held.feel(other);
@@ -260,7 +260,7 @@ CLAIM(fault_7_a_spring_from_both_sides_without_end_of_slope_swings_and_the_regul
     const auto odd = [](float deg, float) {
         return static_cast<double>(-180.0F * stock::odd_flow(deg / 360.0F, H_init, k_init));
     };
-    Feel feel = test::seed_feel();
+    Feel feel = test::reference_feel();
     feel.scale_mnm = 180.0F;
     const Curve curve(feel);
     const auto regular = [&](float deg, float) {
@@ -296,7 +296,7 @@ CLAIM(fault_8_torque_is_mnm_and_a_board_says_what_it_clips) {
     bench.hello();
     bench.run(1);
     CHECK(bench.info.ceiling_mnm == 100);
-    Feel feel = test::seed_feel();
+    Feel feel = test::reference_feel();
     feel.scale_mnm = 120.0F;
     bench.feel(feel);
     bench.run(1);
@@ -306,7 +306,7 @@ CLAIM(fault_8_torque_is_mnm_and_a_board_says_what_it_clips) {
 CLAIM(fault_9_every_silence_ends_in_no_torque) {
     // The stock board holds its last torque over an I2C error; see session.cpp for all the others.
     test::Bench bench;
-    bench.ready(test::seed_feel(), 1200);
+    bench.ready(test::reference_feel(), 1200);
     CHECK(bench.run(1) < -89.0F);
     bench.reading.bus_ok = false;
     CHECK(bench.run(2) < -89.0F);  // two failures are weather

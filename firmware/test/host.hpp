@@ -12,8 +12,8 @@ using namespace chalumeau;
 
 constexpr std::uint32_t SESSION = 0x1234ABCD;
 
-/// A flow law in the seed's own setting: 90 units at the peak, closure at 360 degrees.
-inline Feel seed_feel() {
+/// A flow law with the reference reed: 90 units at the peak, closure at 360 degrees.
+inline Feel reference_feel() {
     Feel feel;
     feel.feel_id = 1;
     feel.law = static_cast<std::uint8_t>(Law::Flow);
@@ -24,7 +24,7 @@ inline Feel seed_feel() {
 }
 
 inline Feel pressure_feel() {
-    Feel feel = seed_feel();
+    Feel feel = reference_feel();
     feel.law = static_cast<std::uint8_t>(Law::Pressure);
     feel.detent = 100;
     return feel;

@@ -9,7 +9,7 @@ using namespace chalumeau;
 
 namespace {
 
-/// The seed's formula in double precision, closed past H k.
+/// The reference formula in double precision, closed past H k.
 double formula(double p, double h, double k) {
     return p <= 0.0 || p >= h * k ? 0.0 : h * std::sqrt(p) - p * std::sqrt(p) / k;
 }
@@ -74,7 +74,7 @@ CLAIM(flow_law_is_the_formula_within_1_mnm_over_all_indices_and_pairs_outside_it
         const float closure = h * k;
         const float peak = std::sqrt(4.0F * h * h * h * k / 27.0F);
         for (float scale : {90.0F, std::min(450.0F, 450.0F / peak)}) {
-            Feel feel = test::seed_feel();
+            Feel feel = test::reference_feel();
             feel.h = h;
             feel.k = k;
             feel.scale_mnm = scale;
@@ -98,7 +98,7 @@ CLAIM(flow_law_is_the_formula_within_1_mnm_over_all_indices_and_pairs_outside_it
 
 CLAIM(origin_meets_the_root_in_value_and_slope_and_has_the_slope_promised) {
     for (float stretch : {0.1F, 1.0F, 4.0F, 10.0F, 30.0F}) {
-        Feel feel = test::seed_feel();
+        Feel feel = test::reference_feel();
         feel.stretch = stretch;
         feel.wall_deg = 36000.0F;
         const Curve curve(feel);
@@ -171,7 +171,7 @@ CLAIM(pressure_law_never_pushes_reaches_scale_at_closure_and_steps_by_the_detent
 }
 
 CLAIM(mark_of_the_flow_law_stands_at_the_threshold_and_nowhere_else) {
-    Feel plain = test::seed_feel();
+    Feel plain = test::reference_feel();
     Feel marked = plain;
     marked.detent = 80;
     marked.a_on_deg = 140.0F;
@@ -187,7 +187,7 @@ CLAIM(mark_of_the_flow_law_stands_at_the_threshold_and_nowhere_else) {
 }
 
 CLAIM(free_law_is_damping_and_friction_alone) {
-    Feel feel = test::seed_feel();
+    Feel feel = test::reference_feel();
     feel.law = static_cast<std::uint8_t>(Law::Free);
     feel.damping_mnms = 3.0F;
     feel.friction = 200;
@@ -215,7 +215,7 @@ CLAIM(friction_and_damping_only_ever_brake_and_never_more_steeply_than_a_light_k
 }
 
 CLAIM(wall_damps_inwards_only_and_never_pulls) {
-    Feel feel = test::seed_feel();
+    Feel feel = test::reference_feel();
     feel.damping_mnms = 0.0F;
     const Curve curve(feel);
     CHECK(curve.of_motion(405.0F, -20.0F) == 0.0F);
@@ -227,7 +227,7 @@ CLAIM(wall_damps_inwards_only_and_never_pulls) {
 CLAIM(what_would_shake_push_or_exceed_is_refused_with_its_number) {
     const FeelLimits limits{2.0F, 0.2F, 300.0F};
     const auto verdict = [&](auto change) {
-        Feel feel = test::seed_feel();
+        Feel feel = test::reference_feel();
         change(feel);
         return check_feel(feel, limits);
     };
@@ -252,7 +252,7 @@ CLAIM(what_would_shake_push_or_exceed_is_refused_with_its_number) {
 }
 
 CLAIM(walls_of_100_mnm_per_degree_ask_for_a_knob_that_damps_more) {
-    Feel feel = test::seed_feel();
+    Feel feel = test::reference_feel();
     feel.wall_mnm_per_deg = 100.0F;
     for (float damping : {5e-4F, 2e-3F, 5.6e-3F, 5.8e-3F, 8e-3F}) {
         Config config;

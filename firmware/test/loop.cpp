@@ -86,7 +86,7 @@ CLAIM(every_accepted_feel_lets_a_free_knob_come_to_rest) {
     unsigned long tried = 0;
     unsigned long tripped = 0;
     while (tried < test::options().trials / 250) {
-        Feel feel = test::seed_feel();
+        Feel feel = test::reference_feel();
         feel.feel_id = 77;
         feel.law = static_cast<std::uint8_t>(1 + random.below(2));
         feel.h = random.between(0.5F, 10.0F);

@@ -12,7 +12,7 @@ using test::SESSION;
 namespace {
 
 Feel held_feel() {
-    Feel feel = test::seed_feel();
+    Feel feel = test::reference_feel();
     feel.scale_mnm = 100.0F;
     return feel;
 }
@@ -405,7 +405,7 @@ CLAIM(rule_5_no_change_of_parameters_moves_torque_faster_than_5_nm_per_s) {
         }
         if (random.below(4) == 0) {
             ++changes;
-            Feel feel = test::seed_feel();
+            Feel feel = test::reference_feel();
             feel.feel_id = static_cast<std::uint8_t>(changes);
             feel.law = static_cast<std::uint8_t>(random.below(3));
             feel.morph_ms = static_cast<std::uint16_t>(20 + random.below(60));

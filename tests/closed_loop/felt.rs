@@ -36,7 +36,7 @@ pub struct Fingers {
 
 /// A threshold, degrees, twice.
 #[derive(Clone, Copy, Debug)]
-pub struct Felt {
+pub struct FeltThreshold {
     /// In what the firmware commanded.
     pub commanded_deg: f64,
     /// In what the motor made.
@@ -72,7 +72,7 @@ impl Fingers {
     }
 
     /// The threshold of the flow law, on a motor with stairs of `stair_mnm`.
-    pub fn peak(&self, stair_mnm: f64) -> Option<Felt> {
+    pub fn peak(&self, stair_mnm: f64) -> Option<FeltThreshold> {
         let (commanded, made) = (self.commanded(), self.made());
         let most = commanded.iter().map(|x| x.1).fold(0.0, f64::max);
         // The highest riser that is clearly below the top.
@@ -80,7 +80,7 @@ impl Fingers {
         let crosses = |w: &[(f64, f64)]| w[0].0 + (riser - w[0].1) / (w[1].1 - w[0].1) * (w[1].0 - w[0].0);
         let y = made.windows(2).find(|w| w[0].1 < riser && w[1].1 >= riser).map(crosses)?;
         let z = made.windows(2).rev().find(|w| w[0].1 >= riser && w[1].1 < riser).map(crosses)?;
-        Some(Felt {
+        Some(FeltThreshold {
             commanded_deg: top(&commanded, 0.9 * most)?,
             made_deg: (y + (y * z).sqrt() + z) / 3.0,
             plain_deg: 0.5 * (y + z),
@@ -88,10 +88,14 @@ impl Fingers {
     }
 
     /// The threshold of the pressure law.
-    pub fn step(&self) -> Option<Felt> {
+    pub fn step(&self) -> Option<FeltThreshold> {
         let (commanded, made) = (self.commanded(), self.made());
         let commanded_deg = steepest(&commanded)?;
-        Some(Felt { commanded_deg, made_deg: step(&made, commanded_deg)?, plain_deg: steepest(&made)? })
+        Some(FeltThreshold {
+            commanded_deg,
+            made_deg: step(&made, commanded_deg)?,
+            plain_deg: steepest(&made)?,
+        })
     }
 }
 

@@ -43,7 +43,7 @@ pub struct Ear {
 
 /// A sound that began.
 #[derive(Clone, Copy, Debug)]
-pub struct Heard {
+pub struct SoundOnset {
     /// Mouth pressure over the closing pressure from which it grew.
     pub gamma: f64,
     /// Mouth pressure at which it was as loud as `NOTICED`.
@@ -81,7 +81,7 @@ impl Ear {
     }
 
     /// What began in a slow crescendo; `None` if nothing did.
-    pub fn onset(&self) -> Option<Heard> {
+    pub fn onset(&self) -> Option<SoundOnset> {
         let windows: Vec<&[f64]> = self.sound.windows(WINDOW).step_by(HOP).collect();
         // The last crossing upwards: what the first breath stirs up dies away.
         let noticed = windows.iter().rposition(|sound| rms(sound) < NOTICED / 2_f64.sqrt())? + 1;
@@ -104,7 +104,7 @@ impl Ear {
         let gammas: Vec<f64> = used.iter().map(|&n| mean(&self.gamma[n * HOP..n * HOP + WINDOW])).collect();
         let (found, rest) = least_squares(&rows, &gammas)?;
         let gamma = found[0];
-        Some(Heard {
+        Some(SoundOnset {
             gamma,
             noticed: self.gamma[at + WINDOW / 2],
             soft_hz,

@@ -7,13 +7,13 @@ use chalumeau_core::instrument::{Clarinet, Model, Probe, Settings};
 use chalumeau_core::units::SoundingNote;
 use chalumeau_firmware::Setup;
 use chalumeau_knob::device::reader::{KnobReader, KnobWriter, Sample, ring};
-use chalumeau_knob::device::session::{Happening, Session, Wish};
+use chalumeau_knob::device::session::{HostSession, SessionEvent, SessionOutput};
 use chalumeau_knob::device::transport::Binding;
-use chalumeau_knob::simulator::hand::{Hand, HandDesign};
+use chalumeau_knob::simulator::hand::{HandDesign, SimulatedHand};
 use chalumeau_knob::simulator::knob::{PERIOD_US, SimulatedKnob};
 use chalumeau_knob::simulator::plant::PlantDesign;
-use chalumeau_knob::touch::blower::{self, Blower, Blown, GRID};
-use chalumeau_knob::touch::feel::Maps;
+use chalumeau_knob::touch::blower::{self, Blower, BlownEvents, GRID};
+use chalumeau_knob::touch::feel::PitchMaps;
 use chalumeau_knob::wire::Feel;
 use std::sync::Arc;
 use std::time::Instant;
@@ -21,14 +21,14 @@ use std::time::Instant;
 /// Samples a second of the host.
 const RATE_HZ: f64 = 48_000.0;
 
-pub struct Player {
+pub struct LoopPlayer {
     pub knob: SimulatedKnob,
-    pub session: Session,
+    pub session: HostSession,
     pub clarinet: Clarinet,
     writer: KnobWriter,
     reader: KnobReader,
     blower: Blower,
-    hand: blower::Hand,
+    hand: blower::BreathMapping,
     full_pa: f64,
     rendered: u64,
     is_sounding: bool,
@@ -36,12 +36,12 @@ pub struct Player {
     due: Option<SoundingNote>,
 }
 
-impl Player {
+impl LoopPlayer {
     /// Sits down: the knob has been found and feels, nothing is armed, the hand lies on the knob.
     pub fn new(
         model: &Arc<Model>,
         settings: &Settings,
-        maps: Maps,
+        maps: PitchMaps,
         feel: Feel,
         hand: HandDesign,
         plant: PlantDesign,
@@ -51,13 +51,13 @@ impl Player {
         let mut clarinet = Clarinet::new(model.clone(), RATE_HZ);
         clarinet.set_settings(settings);
         let mut player = Self {
-            knob: SimulatedKnob::new(setup, plant, Hand::new(hand, 1), 1),
-            session: Session::new(Binding::Serial, 0x0C10_5ED0, 0),
+            knob: SimulatedKnob::new(setup, plant, SimulatedHand::new(hand, 1), 1),
+            session: HostSession::new(Binding::Serial, 0x0C10_5ED0, 0),
             clarinet,
             writer,
             reader,
             blower: Blower::default(),
-            hand: blower::Hand { maps, design: KnobDesign::default(), feels: true },
+            hand: blower::BreathMapping { maps, design: KnobDesign::default(), feels: true },
             full_pa: 1e3 * f64::from(settings.breath_full_kpa),
             rendered: 0,
             is_sounding: false,
@@ -108,8 +108,8 @@ impl Player {
         let (now_us, mut bytes) = (self.now_us(), Vec::new());
         self.knob.receive(&mut bytes);
         let writer = &mut self.writer;
-        let mut tell = |happening: Happening| {
-            if let Happening::State(state) = happening {
+        let mut tell = |happening: SessionEvent| {
+            if let SessionEvent::State(state) = happening {
                 writer.push(Sample {
                     host_us: state.host_us,
                     angle_deg: state.angle_deg,
@@ -121,8 +121,8 @@ impl Player {
         };
         self.session.receive(now_us, &bytes, &mut tell);
         let knob = &mut self.knob;
-        let mut send = |wish: Wish| {
-            if let Wish::Send(bytes) = wish {
+        let mut send = |wish: SessionOutput| {
+            if let SessionOutput::Send(bytes) = wish {
                 knob.send(bytes);
             }
         };
@@ -140,7 +140,7 @@ impl Player {
         let reader = &self.reader;
         let angle = |at: usize| reader.pose(at).map(|pose| f64::from(pose.angle_deg));
         let mut ignore = |_, _| {};
-        let events = Blown::new(
+        let events = BlownEvents::new(
             note.into_iter(),
             &mut self.blower,
             &self.hand,

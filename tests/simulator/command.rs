@@ -4,7 +4,7 @@ use chalumeau_firmware::Setup;
 use chalumeau_knob::device::memory;
 use chalumeau_knob::device::serial::SerialTransport;
 use chalumeau_knob::device::transport::{Binding, Transport};
-use chalumeau_knob::simulator::hand::{Hand, HandDesign};
+use chalumeau_knob::simulator::hand::{HandDesign, SimulatedHand};
 use chalumeau_knob::simulator::knob::SimulatedKnob;
 use chalumeau_knob::simulator::plant::PlantDesign;
 use chalumeau_knob::simulator::script::{Aim, Script};
@@ -216,7 +216,8 @@ fn mistakes_are_explained() {
 #[test]
 fn knob_within_the_program_speaks_midi_and_obeys() {
     let setup = Setup { midi: true, serial: 0xC1A3, ..Setup::default() };
-    let knob = SimulatedKnob::new(setup, PlantDesign::default(), Hand::new(HandDesign::default(), 1), 1);
+    let knob =
+        SimulatedKnob::new(setup, PlantDesign::default(), SimulatedHand::new(HandDesign::default(), 1), 1);
     let (device, mut host) = memory::pair(Binding::Midi, "a wire");
     let running = Server::new(knob, Port::Memory(Box::new(device))).spawn().unwrap();
     assert_eq!(greet(&mut host, 9).watchdog_ms, 330);

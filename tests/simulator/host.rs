@@ -2,14 +2,14 @@
 
 use chalumeau_knob::simulator::knob::SimulatedKnob;
 use chalumeau_knob::wire::midi::{FromKnob, MidiReceiver, encode_sysex};
-use chalumeau_knob::wire::{Arm, Decoder, Event, Info, Message, State, encode};
+use chalumeau_knob::wire::{Arm, Decoder, DeviceEvent, DeviceState, Info, Message, encode};
 
 /// Knob and host on one line.
-pub struct Host {
+pub struct TestHost {
     pub knob: SimulatedKnob,
     pub session: u32,
     pub is_alive: bool,
-    pub events: Vec<Event>,
+    pub events: Vec<DeviceEvent>,
     pub heard_bytes: Vec<u8>,
     is_midi: bool,
     ceiling_mnm: u16,
@@ -18,10 +18,10 @@ pub struct Host {
     serial: Decoder,
     midi: MidiReceiver,
     info: Option<Info>,
-    last: State,
+    last: DeviceState,
 }
 
-impl Host {
+impl TestHost {
     pub fn new(knob: SimulatedKnob, is_midi: bool, ceiling_mnm: u16) -> Self {
         Self {
             knob,
@@ -36,12 +36,12 @@ impl Host {
             serial: Decoder::new(),
             midi: MidiReceiver::new(),
             info: None,
-            last: State::default(),
+            last: DeviceState::default(),
         }
     }
 
     /// Last STATE heard.
-    pub fn state(&self) -> State {
+    pub fn state(&self) -> DeviceState {
         self.last
     }
 

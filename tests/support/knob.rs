@@ -1,7 +1,7 @@
 //! A knob for tests: the firmware itself, compiled for this machine, in simulated time or behind a pseudo-terminal.
 
 use chalumeau_firmware::{Firmware, Reading, Setup};
-use chalumeau_knob::device::{Advert, Places};
+use chalumeau_knob::device::{Announcement, RuntimeDir};
 use chalumeau_knob::wire::{Decoder, Message};
 use serialport::{SerialPort, TTYPort};
 use std::io::{Read, Write};
@@ -14,7 +14,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// The firmware with a shaft that is where it is put.
-pub struct Device {
+pub struct FirmwareKnob {
     pub firmware: Firmware,
     /// Where the shaft is, 0.1 degrees.
     pub counts: i64,
@@ -22,7 +22,7 @@ pub struct Device {
     ticks: u64,
 }
 
-impl Device {
+impl FirmwareKnob {
     pub fn new(setup: Setup) -> Self {
         Self { firmware: Firmware::new(&setup), counts: 0, setup, ticks: 0 }
     }
@@ -72,22 +72,22 @@ pub struct PtyKnob {
     heard: Arc<Mutex<Vec<(Instant, Message)>>>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
-    _advert: Option<Advert>,
+    _advert: Option<Announcement>,
 }
 
 impl PtyKnob {
     /// Plugs it in; announced to `places` as simulated knobs are.
-    pub fn plug(places: Option<&Places>, setup: &Setup) -> Self {
+    pub fn plug(places: Option<&RuntimeDir>, setup: &Setup) -> Self {
         let (master, slave) = TTYPort::pair().unwrap();
         let path = PathBuf::from(slave.name().unwrap());
-        let advert = places.map(|places| Advert::publish(places, setup.serial, "test", &path).unwrap());
+        let advert = places.map(|places| Announcement::publish(places, setup.serial, "test", &path).unwrap());
         let (stop, faults) = (Arc::new(AtomicBool::new(false)), Arc::new(Faults::default()));
         let (counts, armed) = (Arc::new(AtomicI64::new(0)), Arc::new(AtomicBool::new(false)));
         let heard = Arc::new(Mutex::new(Vec::new()));
         let life = Life {
             master,
             _slave: slave,
-            device: Device::new(setup.clone()),
+            device: FirmwareKnob::new(setup.clone()),
             stop: stop.clone(),
             faults: faults.clone(),
             counts: counts.clone(),
@@ -121,7 +121,7 @@ struct Life {
     master: TTYPort,
     /// Kept open, so that the master does not hang up before the host comes.
     _slave: TTYPort,
-    device: Device,
+    device: FirmwareKnob,
     stop: Arc<AtomicBool>,
     faults: Arc<Faults>,
     counts: Arc<AtomicI64>,

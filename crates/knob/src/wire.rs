@@ -1,10 +1,10 @@
-//! TTLink 1: bytes become messages and messages bytes. `docs/protocol.md` is the specification.
+//! The protocol TTLink 1: encodes messages as bytes and decodes bytes into messages. `docs/protocol.md` is the
+//! specification.
 //!
-//! Nothing here knows of ports, time or threads, allocates, or can be brought to panic by what it is fed.
+//! The code here uses no ports, clock or threads. It does not allocate, and no input makes it panic.
 
 pub mod codes;
 pub mod frame;
-pub mod golden;
 pub mod limits;
 pub mod message;
 pub mod midi;
@@ -13,7 +13,7 @@ mod payload;
 pub use codes::{FaultCode, RefusedCode};
 pub use frame::{Decoder, EncodedFrame, FrameError, WireStats, encode};
 pub use limits::{FieldRange, OutOfRange};
-pub use message::{Arm, Capabilities, Event, EventKind, Feel, Flags, Info, Law, Message, State};
+pub use message::{Arm, Capabilities, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Law, Message};
 
 /// Version of the protocol spoken here: another major one is never armed.
 pub const MAJOR: u8 = 1;

@@ -11,6 +11,7 @@
 #include "morph.hpp"
 #include "outbox.hpp"
 #include "session.hpp"
+#include "watchdog.hpp"
 
 namespace chalumeau {
 

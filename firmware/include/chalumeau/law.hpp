@@ -1,7 +1,7 @@
-// Torque against angle: the seed's flow, the monotone pressure law, walls, slap spring, marks. Restoring torque is
-// negative at positive angles; mNm, degrees, and indices of the seed's table (3600 to the reference closing pressure).
+// Torque against angle: the reference flow, the monotone pressure law, walls, slap spring, marks. Restoring torque is
+// negative at positive angles; mNm, degrees, and indices of the reference table (3600 to the reference closing pressure).
 //
-// The seed: u(p) = H sqrt(p) - p^1.5 / k for p of 0 to H k, and nothing past closure. Its infinite slope at the origin
+// The reference flow: u(p) = H sqrt(p) - p^1.5 / k for p of 0 to H k, and nothing past closure. Its infinite slope at the origin
 // makes an undamped knob swing about it, so below p0 the root gives way to
 //     sqrt(p0) (1.25 s - 0.25 s^3), s = p / p0,
 // which meets it with equal value and slope; from p0 on the law is exact. p0 is 6 degrees of the hand, at most a quarter
@@ -46,7 +46,7 @@ inline float power_at(float index) {
     return index <= INDEX_PER_P ? table_at(rp_B_table, index) : 64.0F * table_at(rp_B_table, index * (1.0F / 16.0F));
 }
 
-/// The seed's flow at a whole index: its formula on its table, nothing else.
+/// The reference flow at a whole index of its table, nothing else.
 inline float seed_flow(std::uint16_t index, float h, float k) {
     const std::uint16_t at = index > 3600 ? std::uint16_t{3600} : index;
     return (h * rp_table[at] - rp_B_table[at] / k) * static_cast<float>(rp_sgn_table[at]);

@@ -1,20 +1,19 @@
-// Who may move the motor: session, arming, watchdog, faults and the gain they leave. `docs/protocol.md`, "Session" and
-// "Safety". Times are differences of a microsecond clock that wraps.
+// Decides whether the motor may turn: session, arming, standing faults and the share of torque they leave.
+// `docs/protocol.md`, "Session" and "Safety". The watchdog is in `watchdog.hpp`.
 #pragma once
 
 #include "messages.hpp"
+#include "watchdog.hpp"
 
 namespace chalumeau {
 
-constexpr std::uint32_t WATCHDOG_SERIAL_MS = 80;
-constexpr std::uint32_t WATCHDOG_MIDI_MS = 330;  // with the fade 380: the 400 that are promised bear some lateness
 constexpr std::uint32_t FADE_MS = 50;
 constexpr std::uint32_t SOFT_START_MS = 250;
-constexpr float ARM_SPEED = 2.0F;    // rad/s, faster than this nobody gets armed
+constexpr float ARM_SPEED = 2.0F;    // rad/s; a knob that turns faster is not armed
 constexpr float OVER_SPEED = 60.0F;  // rad/s
 
-/// Conditions that stand as long as their reason does; bits of a byte.
-class Standing {
+/// Faults that last as long as their cause does, each one bit of a byte.
+class StandingFaults {
   public:
     void set(Cause cause, bool stands) {
         const auto bit = static_cast<std::uint8_t>(1U << static_cast<unsigned>(cause));
@@ -39,9 +38,9 @@ enum class Phase : std::uint8_t { Disarmed, Armed, Fading };
 
 class Session {
   public:
-    Session(std::uint8_t major, std::uint32_t watchdog_ms) : major_(major), watchdog_us_(watchdog_ms * 1000) {}
+    Session(std::uint8_t major, std::uint32_t watchdog_ms) : major_(major), watchdog_(watchdog_ms) {}
 
-    /// A host says hello. Tells what ended by it: None, NewSession or Version.
+    /// A host sends HELLO. Returns why an armed session ended: None, NewSession or Version.
     Cause hello(const Hello& hello) {
         const bool fits = hello.major == major_;
         const bool same = known_ && hello.session == id_;
@@ -51,7 +50,7 @@ class Session {
         version_fits_ = fits;
         fresh_ = !same;
         if (fresh_) {
-            standing.set(Cause::Watchdog, false);  // that was another host's silence
+            standing.set(Cause::Watchdog, false);  // the silence was another host's
         }
         if (!fits && held) {
             return Cause::Version;
@@ -77,20 +76,20 @@ class Session {
             return Refusal::Fault;
         }
         if (phase_ == Phase::Armed) {
-            return Refusal::None;  // a second ARM brings its ceiling, but feeds no watchdog
+            return Refusal::None;  // a second ARM sets its ceiling, but does not feed the watchdog
         }
         if (!(speed < ARM_SPEED)) {
             return Refusal::Moving;
         }
         phase_ = Phase::Armed;
         gain_ = 0.0F;
-        alive_us_ = now_us;
+        watchdog_.feed(now_us);
         return Refusal::None;
     }
 
-    /// The host lives.
+    /// A valid ALIVE of this session.
     void alive(std::uint32_t now_us) {
-        alive_us_ = now_us;
+        watchdog_.feed(now_us);
         standing.set(Cause::Watchdog, false);
     }
 
@@ -108,7 +107,7 @@ class Session {
         }
     }
 
-    bool silent(std::uint32_t now_us) const { return phase_ == Phase::Armed && now_us - alive_us_ > watchdog_us_; }
+    bool silent(std::uint32_t now_us) const { return phase_ == Phase::Armed && watchdog_.expired(now_us); }
 
     /// The share of torque this tick may have, 0 to 1. Returns true in the tick a fade ends.
     bool tick(float dt_s) {
@@ -128,13 +127,12 @@ class Session {
     float gain() const { return gain_; }
     Phase phase() const { return phase_; }
 
-    Standing standing;
+    StandingFaults standing;
 
   private:
     std::uint8_t major_;
-    std::uint32_t watchdog_us_;
+    Watchdog watchdog_;
     std::uint32_t id_ = 0;
-    std::uint32_t alive_us_ = 0;
     bool known_ = false;
     bool fresh_ = false;
     bool version_fits_ = false;

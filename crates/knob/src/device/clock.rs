@@ -66,11 +66,6 @@ impl ClockFit {
         *self = Self::new(self.slack_us, self.patience_us);
     }
 
-    /// True once anything has been observed.
-    pub fn is_set(&self) -> bool {
-        self.used > 0
-    }
-
     /// Takes in that remote time `remote_us` was seen at local time `local_us`.
     pub fn observe(&mut self, remote_us: i64, local_us: i64) {
         let excess_us = local_us - remote_us;

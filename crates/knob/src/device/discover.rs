@@ -1,7 +1,7 @@
 //! Which ports may have a knob behind them. Only these are ever opened unasked.
 
 use crate::device::lock::try_lock_patiently;
-use crate::device::places::{Places, serial_number, serial_text};
+use crate::device::runtime_dir::{RuntimeDir, serial_number, serial_text};
 use serde::{Deserialize, Serialize};
 use serialport::SerialPortType;
 use std::fs;
@@ -15,7 +15,7 @@ pub const KNOWN: &[(u16, Option<u16>, &str)] =
 
 /// What stands behind a port as far as the system tells.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum PortKind {
     /// A USB device of a known identity.
     Usb {
         /// Vendor and product.
@@ -40,27 +40,27 @@ pub struct Candidate {
     /// Path or name to open.
     pub path: PathBuf,
     /// What is known of it.
-    pub kind: Kind,
+    pub kind: PortKind,
 }
 
 impl Candidate {
     /// The device's serial number where it is known without asking. Of USB it is a hint only.
     pub fn serial_hint(&self) -> Option<u64> {
         match &self.kind {
-            Kind::Simulated { serial, .. } => Some(*serial),
-            Kind::Usb { usb_serial, .. } => usb_serial.as_deref().and_then(serial_number),
+            PortKind::Simulated { serial, .. } => Some(*serial),
+            PortKind::Usb { usb_serial, .. } => usb_serial.as_deref().and_then(serial_number),
         }
     }
 
     /// True when the hint cannot be wrong.
     pub fn is_certain(&self) -> bool {
-        matches!(self.kind, Kind::Simulated { .. })
+        matches!(self.kind, PortKind::Simulated { .. })
     }
 }
 
 /// Every port that may have a knob behind it. Simulated knobs come first: they were started on purpose, and answer at
 /// once, where a board that is no knob costs seconds.
-pub fn candidates(places: &Places) -> Vec<Candidate> {
+pub fn candidates(places: &RuntimeDir) -> Vec<Candidate> {
     let mut found = simulated(places);
     found.extend(boards());
     found
@@ -87,7 +87,7 @@ pub fn chip(vid: u16, pid: u16) -> Option<&'static str> {
 fn boards() -> Vec<Candidate> {
     let board = |port: serialport::SerialPortInfo| {
         let SerialPortType::UsbPort(usb) = port.port_type else { return None };
-        let kind = Kind::Usb {
+        let kind = PortKind::Usb {
             id: (usb.vid, usb.pid),
             chip: chip(usb.vid, usb.pid)?,
             usb_serial: usb.serial_number,
@@ -99,7 +99,7 @@ fn boards() -> Vec<Candidate> {
 
 /// What a simulated knob leaves in `knobs/<serial>.toml`.
 #[derive(Debug, Serialize, Deserialize)]
-struct Card {
+struct AnnouncementFile {
     path: PathBuf,
     name: String,
     pid: u32,
@@ -107,15 +107,15 @@ struct Card {
 
 /// A simulated knob's announcement; withdrawn when dropped, and void when its program ends in any other way.
 #[derive(Debug)]
-pub struct Advert {
+pub struct Announcement {
     card: PathBuf,
     /// Locked as long as the program lives: what a process number cannot promise.
     _alive: File,
 }
 
-impl Advert {
+impl Announcement {
     /// Announces that the knob `serial` can be reached at `path`. One serial number can be announced once at a time.
-    pub fn publish(places: &Places, serial: u64, name: &str, path: &Path) -> io::Result<Self> {
+    pub fn publish(places: &RuntimeDir, serial: u64, name: &str, path: &Path) -> io::Result<Self> {
         let directory = places.knobs()?;
         let alive = File::create(directory.join(serial_text(serial) + ".alive"))?;
         try_lock_patiently(&alive).map_err(|e| match e {
@@ -127,8 +127,12 @@ impl Advert {
             TryLockError::Error(e) => e,
         })?;
         let card = directory.join(serial_text(serial) + ".toml");
-        let text = toml::to_string(&Card { path: path.into(), name: name.into(), pid: std::process::id() })
-            .map_err(io::Error::other)?;
+        let text = toml::to_string(&AnnouncementFile {
+            path: path.into(),
+            name: name.into(),
+            pid: std::process::id(),
+        })
+        .map_err(io::Error::other)?;
         // Whole or not at all: others read it at any time.
         let draft = card.with_extension("new");
         fs::write(&draft, text)?;
@@ -137,14 +141,14 @@ impl Advert {
     }
 }
 
-impl Drop for Advert {
+impl Drop for Announcement {
     fn drop(&mut self) {
         let _ = fs::remove_file(&self.card);
     }
 }
 
 /// Simulated knobs whose programs are running, by serial number.
-pub fn simulated(places: &Places) -> Vec<Candidate> {
+pub fn simulated(places: &RuntimeDir) -> Vec<Candidate> {
     let Ok(entries) = places.knobs().and_then(fs::read_dir) else { return Vec::new() };
     let mut found: Vec<Candidate> = entries.flatten().filter_map(|entry| read_card(&entry.path())).collect();
     found.sort_by_key(Candidate::serial_hint);
@@ -160,8 +164,8 @@ fn read_card(card: &Path) -> Option<Candidate> {
     if alive.try_lock_shared().is_ok() {
         return None; // its program has ended without withdrawing it
     }
-    let Card { path, name, .. } = toml::from_str(&fs::read_to_string(card).ok()?).ok()?;
-    Some(Candidate { path, kind: Kind::Simulated { serial, name } })
+    let AnnouncementFile { path, name, .. } = toml::from_str(&fs::read_to_string(card).ok()?).ok()?;
+    Some(Candidate { path, kind: PortKind::Simulated { serial, name } })
 }
 
 #[cfg(test)]
@@ -192,12 +196,12 @@ mod tests {
     #[test]
     fn a_simulated_knob_is_found_while_it_lives() {
         let directory = tempfile::tempdir().unwrap();
-        let places = Places::within(directory.path());
+        let places = RuntimeDir::within(directory.path());
         assert_eq!(simulated(&places), []);
-        let advert = Advert::publish(&places, 0xC1A2, "simulated", Path::new("/dev/pts/9")).unwrap();
-        let kind = Kind::Simulated { serial: 0xC1A2, name: "simulated".into() };
+        let advert = Announcement::publish(&places, 0xC1A2, "simulated", Path::new("/dev/pts/9")).unwrap();
+        let kind = PortKind::Simulated { serial: 0xC1A2, name: "simulated".into() };
         assert_eq!(simulated(&places), [Candidate { path: "/dev/pts/9".into(), kind }]);
-        let twice = Advert::publish(&places, 0xC1A2, "again", Path::new("/dev/pts/10")).unwrap_err();
+        let twice = Announcement::publish(&places, 0xC1A2, "again", Path::new("/dev/pts/10")).unwrap_err();
         assert!(twice.to_string().contains("000000000000c1a2 is running already"), "{twice}");
         drop(advert);
         assert_eq!(simulated(&places), []);
@@ -206,7 +210,7 @@ mod tests {
     #[test]
     fn cards_of_dead_programs_and_nonsense_are_ignored() {
         let directory = tempfile::tempdir().unwrap();
-        let places = Places::within(directory.path());
+        let places = RuntimeDir::within(directory.path());
         let knobs = places.knobs().unwrap();
         fs::write(knobs.join("000000000000c1a2.toml"), "path = '/dev/pts/9'\nname = 'dead'\npid = 1\n")
             .unwrap();

@@ -1,15 +1,15 @@
-//! The link to a knob: one thread that finds it, keeps it, and ends when the [`KnobLink`] is dropped.
+//! The link to a knob: one thread finds the knob and keeps the connection. It ends when the [`KnobLink`] is dropped.
 //!
-//! All that crosses to other threads: commands come by a queue, samples leave by the ring of the [`KnobReader`], and what
-//! screens show is a value behind a lock that is held for a copy. The audio thread has the reader and nothing else.
+//! Other threads talk to it in three ways: commands go through a queue, samples leave through the ring of the
+//! [`KnobReader`], and screens copy a status behind a lock. The audio thread only has the reader.
 
 mod connection;
 mod status;
 mod worker;
 
-use crate::device::link::worker::{Command, Worker};
-use crate::device::places::Places;
+use crate::device::link::worker::{LinkCommand, Worker};
 use crate::device::reader::{KnobReader, ring};
+use crate::device::runtime_dir::RuntimeDir;
 use crate::device::session::StateSample;
 use crate::device::transport::Transport;
 use crate::wire::Feel;
@@ -25,7 +25,7 @@ pub use crate::device::link::status::{LinkStatus, Phase};
 
 /// Which knob to link to.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub enum Choice {
+pub enum KnobChoice {
     /// None.
     #[default]
     Off,
@@ -35,9 +35,9 @@ pub enum Choice {
         /// INFO's serial number.
         serial: Option<u64>,
     },
-    /// Whatever is at this port, which is opened because the user says so.
+    /// The device at this serial port, whatever it is; only for an explicit choice of the user.
     Path(PathBuf),
-    /// A knob at a MIDI port whose name contains this, else the first that sounds like one.
+    /// A knob at a MIDI port whose name contains `name`; without a name, the first port whose name is a known knob's.
     Midi {
         /// Part of the port's name.
         name: Option<String>,
@@ -51,7 +51,7 @@ pub enum Choice {
     },
 }
 
-/// What the link asks of and tells its owner, on the link's thread. Both must return at once.
+/// Callbacks of the link to its owner, on the link's thread. Both must return at once.
 pub struct Hooks {
     /// The feel wanted now; asked at most 1 ms apart while a knob is there. The link compares, and sends what changes.
     pub feel: Box<dyn FnMut() -> Option<Feel> + Send>,
@@ -68,20 +68,20 @@ impl Default for Hooks {
 /// A link to at most one knob. No method waits.
 pub struct KnobLink {
     /// `None` once dropping: the thread ends when the queue does.
-    commands: Option<Sender<Command>>,
+    commands: Option<Sender<LinkCommand>>,
     status: Arc<Mutex<LinkStatus>>,
     thread: Option<JoinHandle<()>>,
     epoch: Instant,
 }
 
 impl KnobLink {
-    /// Begins with [`Choice::Off`]. `label` is what other instances show of this one.
+    /// Begins with [`KnobChoice::Off`]. `label` is what other instances show of this one.
     pub fn spawn(label: &str, hooks: Hooks) -> (Self, KnobReader) {
-        Self::spawn_in(Places::default(), label, hooks)
+        Self::spawn_in(RuntimeDir::default(), label, hooks)
     }
 
-    /// The same with its own directory for locks and announcements.
-    pub fn spawn_in(places: Places, label: &str, hooks: Hooks) -> (Self, KnobReader) {
+    /// As [`KnobLink::spawn`], with a given directory for locks and announcements.
+    pub fn spawn_in(places: RuntimeDir, label: &str, hooks: Hooks) -> (Self, KnobReader) {
         let epoch = Instant::now();
         let (writer, reader) = ring(epoch);
         let (commands, queue) = channel();
@@ -93,61 +93,61 @@ impl KnobLink {
     }
 
     /// Links to another knob; the one before is left, disarmed.
-    pub fn choose(&self, choice: Choice) {
-        self.tell(Command::Choose(choice));
+    pub fn choose(&self, choice: KnobChoice) {
+        self.tell(LinkCommand::Choose(choice));
     }
 
     /// Links to a port that is open already, until it fails; for tests and simulators within the program.
     pub fn attach(&self, transport: Box<dyn Transport>) {
-        self.tell(Command::Attach(transport));
+        self.tell(LinkCommand::Attach(transport));
     }
 
     /// Allows torque up to `ceiling_mnm`, at most 250: only ever call it for an act of the user.
     pub fn arm(&self, ceiling_mnm: u16) {
-        self.tell(Command::Arm { ceiling_mnm, further_act: false });
+        self.tell(LinkCommand::Arm { ceiling_mnm, further_act: false });
     }
 
     /// Allows torque up to `ceiling_mnm`, at most 450: only ever call it after a second question to the user.
     pub fn arm_beyond_offer(&self, ceiling_mnm: u16) {
-        self.tell(Command::Arm { ceiling_mnm, further_act: true });
+        self.tell(LinkCommand::Arm { ceiling_mnm, further_act: true });
     }
 
     /// Lowers the ceiling of an armed knob at once; never raises it.
     pub fn lower_ceiling(&self, ceiling_mnm: u16) {
-        self.tell(Command::LowerCeiling(ceiling_mnm));
+        self.tell(LinkCommand::LowerCeiling(ceiling_mnm));
     }
 
     /// Torque off.
     pub fn disarm(&self) {
-        self.tell(Command::Disarm);
+        self.tell(LinkCommand::Disarm);
     }
 
     /// The present position becomes zero. The knob refuses while it is armed.
     pub fn zero(&self) {
-        self.tell(Command::Zero);
+        self.tell(LinkCommand::Zero);
     }
 
     /// Asks the instance that has the knob to let go, and takes it.
     pub fn take_over(&self) {
-        self.tell(Command::TakeOver);
+        self.tell(LinkCommand::TakeOver);
     }
 
     /// Also sends the feel as OSC to this address, see [`feel_osc`](crate::device::feel_osc).
     pub fn feel_osc(&self, to: Option<SocketAddr>) {
-        self.tell(Command::FeelOsc(to));
+        self.tell(LinkCommand::FeelOsc(to));
     }
 
-    /// How things stand, for screens: never on the audio thread.
+    /// The status for screens. Takes a lock: not for the audio thread.
     pub fn status(&self) -> LinkStatus {
         self.status.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// What all host times count from.
+    /// The zero of all host times.
     pub fn epoch(&self) -> Instant {
         self.epoch
     }
 
-    fn tell(&self, command: Command) {
+    fn tell(&self, command: LinkCommand) {
         if let Some(commands) = &self.commands {
             let _ = commands.send(command);
         }

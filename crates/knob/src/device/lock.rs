@@ -1,10 +1,10 @@
-//! One owner per knob, among all instances of all programs on this machine.
+//! Gives each knob one owner among all instances of all programs on this machine.
 //!
 //! `locks/<serial>.lock` is locked by the owner, so that it is free again however the owner ends; it is never removed, or
 //! two could lock two files of one name. `<serial>.owner` says who that is. Who wants the knob writes `<serial>.wanted`;
 //! the owner looks for it and lets go.
 
-use crate::device::places::{Places, serial_number, serial_text};
+use crate::device::runtime_dir::{RuntimeDir, serial_number, serial_text};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::fs;
@@ -60,7 +60,7 @@ fn seconds() -> u64 {
 #[derive(Debug, thiserror::Error)]
 pub enum LockError {
     /// Somebody else has it.
-    #[error("held by {0}")]
+    #[error("in use by {0}")]
     Held(Holder),
     /// The lock itself fails.
     #[error("cannot lock the knob: {0}")]
@@ -75,7 +75,7 @@ struct Files {
 }
 
 impl Files {
-    fn of(places: &Places, serial: u64) -> io::Result<Self> {
+    fn of(places: &RuntimeDir, serial: u64) -> io::Result<Self> {
         let base = places.locks()?.join(serial_text(serial));
         let [lock, owner, wanted] =
             ["lock", "owner", "wanted"].map(|extension| base.with_extension(extension));
@@ -120,7 +120,7 @@ pub struct Ownership {
 
 impl Ownership {
     /// Takes the knob `serial`, or says who has it.
-    pub fn take(places: &Places, serial: u64, label: &str, port: &str) -> Result<Self, LockError> {
+    pub fn take(places: &RuntimeDir, serial: u64, label: &str, port: &str) -> Result<Self, LockError> {
         let files = Files::of(places, serial)?;
         let lock = File::options().create(true).truncate(false).write(true).open(&files.lock)?;
         match try_lock_patiently(&lock) {
@@ -151,12 +151,12 @@ impl Drop for Ownership {
 }
 
 /// Asks the owner of the knob `serial` to let go.
-pub fn ask_for(places: &Places, serial: u64, label: &str) -> io::Result<()> {
+pub fn ask_for(places: &RuntimeDir, serial: u64, label: &str) -> io::Result<()> {
     write(&Files::of(places, serial)?.wanted, &Holder::me(label, ""))
 }
 
 /// Who has the knob `serial`, if anybody does.
-pub fn holder(places: &Places, serial: u64) -> Option<Holder> {
+pub fn holder(places: &RuntimeDir, serial: u64) -> Option<Holder> {
     let files = Files::of(places, serial).ok()?;
     match File::open(&files.lock).ok()?.try_lock_shared() {
         Err(TryLockError::WouldBlock) => Some(files.holder()),
@@ -165,7 +165,7 @@ pub fn holder(places: &Places, serial: u64) -> Option<Holder> {
 }
 
 /// Who has a knob through the port `port`, and which.
-pub fn holder_of_port(places: &Places, port: &str) -> Option<(u64, Holder)> {
+pub fn holder_of_port(places: &RuntimeDir, port: &str) -> Option<(u64, Holder)> {
     let entries = fs::read_dir(places.locks().ok()?).ok()?;
     entries.flatten().find_map(|entry| {
         let path = entry.path();
@@ -182,7 +182,7 @@ mod tests {
     #[test]
     fn one_owner_at_a_time_and_the_other_knows_who() {
         let directory = tempfile::tempdir().unwrap();
-        let places = Places::within(directory.path());
+        let places = RuntimeDir::within(directory.path());
         let mine = Ownership::take(&places, 7, "Track 1", "/dev/pts/3").unwrap();
         let Err(LockError::Held(holder)) = Ownership::take(&places, 7, "Track 2", "/dev/pts/3") else {
             panic!("taken twice")
@@ -200,7 +200,7 @@ mod tests {
     #[test]
     fn owner_hears_who_wants_the_knob_once() {
         let directory = tempfile::tempdir().unwrap();
-        let places = Places::within(directory.path());
+        let places = RuntimeDir::within(directory.path());
         let mine = Ownership::take(&places, 7, "Track 1", "").unwrap();
         assert_eq!(mine.wanted_by(), None);
         ask_for(&places, 7, "Track 2").unwrap();
@@ -213,7 +213,7 @@ mod tests {
     #[test]
     fn what_a_dead_owner_left_stops_nobody() {
         let directory = tempfile::tempdir().unwrap();
-        let places = Places::within(directory.path());
+        let places = RuntimeDir::within(directory.path());
         drop(Ownership::take(&places, 9, "dead", "").unwrap());
         let files = Files::of(&places, 9).unwrap();
         write(&files.owner, &Holder::me("dead", "")).unwrap();

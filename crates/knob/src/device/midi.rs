@@ -35,7 +35,7 @@ pub enum MidiError {
     #[error("MIDI is not available: {0}")]
     Unavailable(String),
     /// No such port now.
-    #[error("no MIDI port {0} that a knob could be behind")]
+    #[error("no MIDI port {0}")]
     Missing(String),
     /// The port is there and does not open.
     #[error("the MIDI port {name} does not open: {reason}")]
@@ -53,7 +53,7 @@ pub struct MidiTransport {
     incoming: Receiver<Vec<u8>>,
     _input: MidiInputConnection<()>,
     output: Option<MidiOutputConnection>,
-    watch: Watch,
+    watch: PortWatch,
 }
 
 /// Names of the input ports behind which a knob may be; all of them with `any`.
@@ -111,7 +111,7 @@ impl MidiTransport {
             Some(port) => Some(output.connect(&port, "to knob").map_err(|e| refused(e.to_string()))?),
             None => None,
         };
-        let watch = Watch::begin(name.clone());
+        let watch = PortWatch::begin(name.clone());
         Ok(Self { name, incoming, _input: input, output, watch })
     }
 }
@@ -176,13 +176,13 @@ impl Transport for MidiTransport {
 }
 
 /// Looks whether a port is still listed, on a thread that ends when this is dropped.
-struct Watch {
+struct PortWatch {
     stop: Arc<AtomicBool>,
     gone: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Watch {
+impl PortWatch {
     fn begin(name: String) -> Self {
         let (stop, gone) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
         let flags = (stop.clone(), gone.clone());
@@ -210,7 +210,7 @@ impl Watch {
     }
 }
 
-impl Drop for Watch {
+impl Drop for PortWatch {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {

@@ -35,7 +35,7 @@ const MESSAGES: usize = 64;
 
 /// What unmodified firmware says. Ranges in `docs/touch.md`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Word {
+pub enum StockMessage {
     /// `angle_out`: 0.1 degrees since it was switched on.
     Angle(f64),
     /// `velocity`: rpm.
@@ -113,7 +113,7 @@ impl Transport for OscTransport {
 }
 
 /// Reads a datagram; returns how many of its messages were none of a TorqueTuner's, one for a datagram that is no OSC.
-pub fn read(datagram: &[u8], mut sink: impl FnMut(Word)) -> u64 {
+pub fn read(datagram: &[u8], mut sink: impl FnMut(StockMessage)) -> u64 {
     if datagram.len() > DATAGRAM {
         return 1;
     }
@@ -147,7 +147,7 @@ fn walk(packet: &[u8], depth: usize, left: &mut usize, sink: &mut dyn FnMut(&[u8
     }
 }
 
-fn word(message: &[u8]) -> Option<Word> {
+fn word(message: &[u8]) -> Option<StockMessage> {
     if message.len() > MESSAGE {
         return None;
     }
@@ -183,12 +183,12 @@ fn word(message: &[u8]) -> Option<Word> {
     }
     // The firmware's documents put a comma into one name.
     Some(match name.replace(',', "").as_str() {
-        "angle_out" => Word::Angle(value),
-        "velocity" => Word::Velocity(value),
-        "pluck" => Word::Pluck(value != 0.0),
-        "st" => Word::Slap(value),
-        "button" => Word::Button(value),
-        "trigger" | "angle_discrete" | "flow" | "torque" | "speed" | "accl" => Word::Other,
+        "angle_out" => StockMessage::Angle(value),
+        "velocity" => StockMessage::Velocity(value),
+        "pluck" => StockMessage::Pluck(value != 0.0),
+        "st" => StockMessage::Slap(value),
+        "button" => StockMessage::Button(value),
+        "trigger" | "angle_discrete" | "flow" | "torque" | "speed" | "accl" => StockMessage::Other,
         _ => return None,
     })
 }
@@ -202,31 +202,31 @@ mod tests {
         OscPacket::Message(OscMessage { addr: addr.into(), args: vec![arg] })
     }
 
-    fn words(datagram: &[u8]) -> (Vec<Word>, u64) {
+    fn words(datagram: &[u8]) -> (Vec<StockMessage>, u64) {
         let mut words = Vec::new();
         let ignored = read(datagram, |word| words.push(word));
         (words, ignored)
     }
 
-    fn heard(addr: &str, arg: OscType) -> Option<Word> {
+    fn heard(addr: &str, arg: OscType) -> Option<StockMessage> {
         words(&encoder::encode(&message(addr, arg)).unwrap()).0.first().copied()
     }
 
     #[test]
     fn every_name_of_the_stock_firmware_is_known_however_it_is_spelt() {
         let at = |name: &str| format!("/TorqueTuner_001/instrument/{name}");
-        assert_eq!(heard(&at("angle_out"), OscType::Int(-1234)), Some(Word::Angle(-1234.0)));
-        assert_eq!(heard(&at("velocity"), OscType::Float(-2.5)), Some(Word::Velocity(-2.5)));
-        assert_eq!(heard(&at("pluck"), OscType::Int(1)), Some(Word::Pluck(true)));
-        assert_eq!(heard(&at("st"), OscType::Float(-0.5)), Some(Word::Slap(-0.5)));
-        assert_eq!(heard(&at("button"), OscType::Int(3)), Some(Word::Button(3.0)));
+        assert_eq!(heard(&at("angle_out"), OscType::Int(-1234)), Some(StockMessage::Angle(-1234.0)));
+        assert_eq!(heard(&at("velocity"), OscType::Float(-2.5)), Some(StockMessage::Velocity(-2.5)));
+        assert_eq!(heard(&at("pluck"), OscType::Int(1)), Some(StockMessage::Pluck(true)));
+        assert_eq!(heard(&at("st"), OscType::Float(-0.5)), Some(StockMessage::Slap(-0.5)));
+        assert_eq!(heard(&at("button"), OscType::Int(3)), Some(StockMessage::Button(3.0)));
         for name in ["trigger", "angle_discrete", "angle_d,iscrete", "flow", "torque", "speed", "accl"] {
-            assert_eq!(heard(&at(name), OscType::Int(0)), Some(Word::Other), "{name}");
+            assert_eq!(heard(&at(name), OscType::Int(0)), Some(StockMessage::Other), "{name}");
         }
         for addr in
             ["/Torquetuner_042/Instrument/Angle_Out", "/a/b/c/instrument/angle_out", "/instrument/angle_out"]
         {
-            assert_eq!(heard(addr, OscType::Int(5)), Some(Word::Angle(5.0)), "{addr}");
+            assert_eq!(heard(addr, OscType::Int(5)), Some(StockMessage::Angle(5.0)), "{addr}");
         }
         for addr in
             ["/TorqueTuner_001/angle_out", "/x/instruments/angle_out", "/x/instrument/angle_out2", "/"]
@@ -242,7 +242,7 @@ mod tests {
             // The crate encodes any address, but pads it as it is.
             let datagram =
                 encoder::encode(&message(&format!("{device}/instrument/velocity"), OscType::Float(7.5)));
-            assert_eq!(words(&datagram.unwrap()), (vec![Word::Velocity(7.5)], 0), "{device}");
+            assert_eq!(words(&datagram.unwrap()), (vec![StockMessage::Velocity(7.5)], 0), "{device}");
         }
     }
 
@@ -256,7 +256,7 @@ mod tests {
         for depth in 1..=DEPTH + 1 {
             packet = bundle(vec![packet]);
             let (words, ignored) = words(&encoder::encode(&packet).unwrap());
-            let expected = if depth <= DEPTH { (vec![Word::Angle(9.0)], 0) } else { (vec![], 1) };
+            let expected = if depth <= DEPTH { (vec![StockMessage::Angle(9.0)], 0) } else { (vec![], 1) };
             assert_eq!((words, ignored), expected, "depth {depth}");
         }
     }

@@ -169,7 +169,7 @@ fn call_out_device(path: &str, is_macos: bool) -> Option<String> {
     Some(format!("/dev/cu.{name}"))
 }
 
-/// Says what keeps `path` from opening and what to do.
+/// Says why `path` does not open, and what the user can do.
 fn explain(error: &serialport::Error, path: &str) -> OpenError {
     let said = error.description.to_lowercase();
     match error.kind() {
@@ -180,7 +180,7 @@ fn explain(error: &serialport::Error, path: &str) -> OpenError {
         // Both a locked terminal and a missing one are `NoDevice` on one system or another.
         ErrorKind::NoDevice if ["busy", "lock", "denied"].iter().any(|word| said.contains(word)) => {
             OpenError::Busy(format!(
-                "{path} is in use by another program (a serial monitor, another instance of Chalumeau?): close that one"
+                "{path} is in use by another program (a serial monitor, another instance of Chalumeau?): close that program"
             ))
         }
         ErrorKind::NoDevice => OpenError::Missing(format!("{path} is not there: is the knob plugged in?")),
@@ -202,7 +202,7 @@ fn permission_text(path: &str) -> String {
 
 #[cfg(not(target_os = "linux"))]
 fn permission_text(path: &str) -> String {
-    format!("no permission to open {path}: run `ls -l {path}` to see who may, and log in as one of them")
+    format!("no permission to open {path}: `ls -l {path}` shows which users may open it")
 }
 
 #[cfg(target_os = "linux")]

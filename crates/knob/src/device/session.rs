@@ -1,7 +1,7 @@
-//! The host's side of a TTLink session as a machine without ports and clocks: time and bytes in, bytes out.
+//! The host's side of a TTLink session, without ports and clocks: time and bytes go in, bytes come out.
 //!
-//! What holds at any time: once INFO is there ALIVE goes out at its rate whatever else happens; ARM follows an act of the user and nothing
-//! else; no torque is ever sent, only parameters and a ceiling. Rates, codes and layouts: `docs/protocol.md`.
+//! Three rules always hold. After INFO, the session sends ALIVE at its rate whatever else happens. It sends ARM only after
+//! an act of the user. It never sends torque, only parameters and a ceiling. Rates, codes and layouts: `docs/protocol.md`.
 
 pub mod arming;
 pub mod feeling;
@@ -17,7 +17,7 @@ use crate::device::stats::{LinkStats, Meter};
 use crate::device::transport::Binding;
 use crate::wire;
 use crate::wire::midi::{BREATH_MAX, FromKnob, MidiReceiver};
-use crate::wire::{Arm, Event, EventKind, Feel, Info, Message, State, WireStats};
+use crate::wire::{Arm, DeviceEvent, DeviceState, EventKind, Feel, Info, Message, WireStats};
 
 /// Time between two ALIVE on a serial line, us.
 const ALIVE_US: i64 = 20_000;
@@ -64,34 +64,34 @@ pub struct StateSample {
     pub period_us: u32,
 }
 
-/// What a session tells whoever runs it.
+/// What a session reports to its caller.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Happening {
-    /// Where the knob was.
+pub enum SessionEvent {
+    /// A measurement of the knob.
     State(StateSample),
-    /// It was slapped, with this peak speed, rad/s.
+    /// The player slapped the knob, with this peak speed, rad/s.
     Slap(f32),
     /// Its button went down (true) or up.
     Button(bool),
 }
 
-/// What a session wants done.
+/// What a session asks its caller to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wish<'a> {
+pub enum SessionOutput<'a> {
     /// Send these bytes, whole or not at all.
     Send(&'a [u8]),
     /// Change the speed of the line.
     Baud(u32),
 }
 
-/// Where a session stands.
+/// The status of a session.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Standing {
+pub enum SessionStatus {
     /// No INFO yet.
     Greeting,
-    /// INFO is there and STATE comes.
+    /// INFO has come, and STATE keeps coming.
     Live,
-    /// INFO is there; STATE is not yet, or no longer.
+    /// INFO has come; STATE has not come yet, or comes no longer.
     Silent,
     /// Another major version: its position is read, it is never armed.
     OtherVersion,
@@ -101,17 +101,17 @@ pub enum Standing {
     PlainMidi,
 }
 
-enum Ears {
+enum Incoming {
     Stream(Box<wire::Decoder>),
     Midi(Box<MidiReceiver>),
 }
 
-/// See the module.
-pub struct Session {
+/// The host's side of a session with one device; see the module.
+pub struct HostSession {
     binding: Binding,
     number: u32,
     seq: u8,
-    ears: Ears,
+    ears: Incoming,
     opened_us: i64,
     greeting: Greeting,
     arming: Arming,
@@ -124,7 +124,7 @@ pub struct Session {
     zero_due: bool,
     rate_due: bool,
     clock: DeviceClock,
-    state: Option<(State, i64)>,
+    state: Option<(DeviceState, i64)>,
     mean_step_us: f32,
     last_event: Option<u8>,
     plain: Option<StateSample>,
@@ -134,7 +134,7 @@ pub struct Session {
     meter: Meter,
 }
 
-impl Session {
+impl HostSession {
     /// Opens a session at `now_us`; `number` is random, so that a knob can tell two openings apart.
     pub fn new(binding: Binding, number: u32, now_us: i64) -> Self {
         Self {
@@ -142,8 +142,8 @@ impl Session {
             number,
             seq: 0,
             ears: match binding {
-                Binding::Midi => Ears::Midi(Box::default()),
-                Binding::Serial | Binding::Osc => Ears::Stream(Box::default()),
+                Binding::Midi => Incoming::Midi(Box::default()),
+                Binding::Serial | Binding::Osc => Incoming::Stream(Box::default()),
             },
             opened_us: now_us,
             greeting: Greeting::new(binding, now_us),
@@ -168,13 +168,13 @@ impl Session {
         }
     }
 
-    /// What the device says of itself.
+    /// The device's INFO; `None` before it has answered HELLO.
     pub fn info(&self) -> Option<&Info> {
         self.info.as_ref()
     }
 
     /// The last STATE.
-    pub fn state(&self) -> Option<&State> {
+    pub fn state(&self) -> Option<&DeviceState> {
         self.state.as_ref().map(|(state, _)| state)
     }
 
@@ -213,22 +213,23 @@ impl Session {
         self.notice.as_deref()
     }
 
-    /// Counts and times. Sorts: not for every loop.
+    /// Counts and times. Sorts about 1,000 values: call it a few times a second at most.
     pub fn stats(&self) -> LinkStats {
         LinkStats { wire: self.wire_stats(), skew_ppm: self.clock.skew_ppm() as f32, ..self.meter.picture() }
     }
 
-    /// Where the session stands at `now_us`.
-    pub fn standing(&self, now_us: i64) -> Standing {
+    /// The status at `now_us`.
+    pub fn status(&self, now_us: i64) -> SessionStatus {
         match &self.info {
-            Some(info) if !info.speaks_our_major() => Standing::OtherVersion,
-            Some(_) if self.is_heard(now_us) => Standing::Live,
-            Some(_) if self.state.is_none() && self.is_plain(now_us) => Standing::PlainMidi,
-            Some(_) => Standing::Silent,
-            None if self.is_plain(now_us) => Standing::PlainMidi,
-            None => {
-                self.greeting.stock_name().map_or(Standing::Greeting, |name| Standing::Stock(name.into()))
-            }
+            Some(info) if !info.speaks_our_major() => SessionStatus::OtherVersion,
+            Some(_) if self.is_heard(now_us) => SessionStatus::Live,
+            Some(_) if self.state.is_none() && self.is_plain(now_us) => SessionStatus::PlainMidi,
+            Some(_) => SessionStatus::Silent,
+            None if self.is_plain(now_us) => SessionStatus::PlainMidi,
+            None => self
+                .greeting
+                .stock_name()
+                .map_or(SessionStatus::Greeting, |name| SessionStatus::Stock(name.into())),
         }
     }
 
@@ -247,7 +248,7 @@ impl Session {
             Some(info) if !info.speaks_our_major() => {
                 "not armed: the knob speaks another version of the protocol"
             }
-            Some(_) if !self.is_heard(now_us) => "not armed: the knob is silent",
+            Some(_) if !self.is_heard(now_us) => "not armed: the knob sends nothing",
             Some(info) => {
                 self.arming.arm(ceiling_mnm, further_act, info, now_us);
                 (self.refusal, self.notice, self.zero_due) = (None, None, false);
@@ -277,18 +278,23 @@ impl Session {
     }
 
     /// The frame to send before closing: torque off, the host leaves.
-    pub fn bye(&mut self, send: &mut dyn FnMut(Wish)) {
+    pub fn bye(&mut self, send: &mut dyn FnMut(SessionOutput)) {
         self.arming.forget();
         self.say(&Message::Bye { session: self.number }, send);
     }
 
     /// Lets time pass and hands over what is to be sent, and slaps of which only the count arrived.
-    pub fn poll(&mut self, now_us: i64, send: &mut dyn FnMut(Wish), tell: &mut dyn FnMut(Happening)) {
+    pub fn poll(
+        &mut self,
+        now_us: i64,
+        send: &mut dyn FnMut(SessionOutput),
+        tell: &mut dyn FnMut(SessionEvent),
+    ) {
         self.meter.tick(now_us);
         while let Some(speed) = self.slaps.poll(now_us) {
-            tell(Happening::Slap(speed));
+            tell(SessionEvent::Slap(speed));
         }
-        if let Ears::Midi(_) = &self.ears {
+        if let Incoming::Midi(_) = &self.ears {
             self.hear_midi(&[], now_us, tell);
         }
         if self.info.is_some() && !self.is_heard(now_us) {
@@ -308,15 +314,15 @@ impl Session {
     }
 
     /// Takes in a chunk as it came.
-    pub fn receive(&mut self, now_us: i64, chunk: &[u8], tell: &mut dyn FnMut(Happening)) {
+    pub fn receive(&mut self, now_us: i64, chunk: &[u8], tell: &mut dyn FnMut(SessionEvent)) {
         if self.info.is_none() {
             self.greeting.hear(chunk);
         }
         match &mut self.ears {
-            Ears::Midi(_) => self.hear_midi(chunk, now_us, tell),
-            Ears::Stream(_) => {
+            Incoming::Midi(_) => self.hear_midi(chunk, now_us, tell),
+            Incoming::Stream(_) => {
                 for &byte in chunk {
-                    let Ears::Stream(decoder) = &mut self.ears else { return };
+                    let Incoming::Stream(decoder) = &mut self.ears else { return };
                     if let Some(Ok((_, message))) = decoder.push(byte) {
                         self.hear(&message, now_us, tell);
                     }
@@ -337,8 +343,8 @@ impl Session {
 
     fn wire_stats(&self) -> WireStats {
         match &self.ears {
-            Ears::Stream(decoder) => decoder.stats(),
-            Ears::Midi(receiver) => receiver.stats(),
+            Incoming::Stream(decoder) => decoder.stats(),
+            Incoming::Midi(receiver) => receiver.stats(),
         }
     }
 
@@ -346,14 +352,14 @@ impl Session {
         self.binding != Binding::Midi || now_us >= self.next_slot_us
     }
 
-    fn next_message(&mut self, now_us: i64, send: &mut dyn FnMut(Wish)) -> Option<Message> {
+    fn next_message(&mut self, now_us: i64, send: &mut dyn FnMut(SessionOutput)) -> Option<Message> {
         if self.info.as_ref().is_some_and(|info| !info.speaks_our_major()) {
             return None; // nobody knows what it would make of it
         }
         let arm = Arm { session: self.number, ceiling_mnm: self.arming.ceiling_mnm() };
         match self.arming.poll(now_us) {
-            Some(arming::Due::Free) => return Some(Message::Free),
-            Some(arming::Due::Arm) => return Some(Message::Arm(arm)),
+            Some(arming::ArmingMessage::Free) => return Some(Message::Free),
+            Some(arming::ArmingMessage::Arm) => return Some(Message::Arm(arm)),
             None => {}
         }
         if self.info.is_some() && now_us >= self.next_alive_us {
@@ -366,9 +372,9 @@ impl Session {
             let is_framed = self.wire_stats().frames > 0;
             while let Some(due) = self.greeting.poll(now_us, is_framed) {
                 match due {
-                    greeting::Due::Baud(baud) => send(Wish::Baud(baud)),
-                    greeting::Due::Question => send(Wish::Send(greeting::QUESTION)),
-                    greeting::Due::Hello => {
+                    greeting::GreetingStep::Baud(baud) => send(SessionOutput::Baud(baud)),
+                    greeting::GreetingStep::Question => send(SessionOutput::Send(greeting::QUESTION)),
+                    greeting::GreetingStep::Hello => {
                         let (major, minor) = (wire::MAJOR, wire::MINOR);
                         return Some(Message::Hello { major, minor, session: self.number });
                     }
@@ -387,16 +393,16 @@ impl Session {
         self.feeling.poll(now_us, self.is_heard(now_us)).map(Message::Feel)
     }
 
-    fn say(&mut self, message: &Message, send: &mut dyn FnMut(Wish)) {
+    fn say(&mut self, message: &Message, send: &mut dyn FnMut(SessionOutput)) {
         match self.binding {
-            Binding::Midi => send(Wish::Send(&wire::midi::encode_sysex(message, self.seq))),
-            Binding::Serial | Binding::Osc => send(Wish::Send(&wire::encode(message, self.seq))),
+            Binding::Midi => send(SessionOutput::Send(&wire::midi::encode_sysex(message, self.seq))),
+            Binding::Serial | Binding::Osc => send(SessionOutput::Send(&wire::encode(message, self.seq))),
         }
         self.seq = self.seq.wrapping_add(1);
     }
 
-    fn hear_midi(&mut self, bytes: &[u8], now_us: i64, tell: &mut dyn FnMut(Happening)) {
-        let Ears::Midi(receiver) = &mut self.ears else { return };
+    fn hear_midi(&mut self, bytes: &[u8], now_us: i64, tell: &mut dyn FnMut(SessionEvent)) {
+        let Incoming::Midi(receiver) = &mut self.ears else { return };
         // A block of bytes holds few values; those of one call are taken in after it.
         let mut heard = Vec::new();
         if bytes.is_empty() {
@@ -410,7 +416,7 @@ impl Session {
                 FromKnob::Frame(Err(_)) => {}
                 // STATE says it all and better.
                 _ if self.state.is_some() => {}
-                FromKnob::Button(down) => tell(Happening::Button(down)),
+                FromKnob::Button(down) => tell(SessionEvent::Button(down)),
                 FromKnob::Angle(tenths) => {
                     self.has_plain_angle = true;
                     self.hear_plain(0.1 * tenths as f32, now_us, tell);
@@ -426,7 +432,7 @@ impl Session {
     }
 
     /// An angle without a clock.
-    fn hear_plain(&mut self, angle_deg: f32, now_us: i64, tell: &mut dyn FnMut(Happening)) {
+    fn hear_plain(&mut self, angle_deg: f32, now_us: i64, tell: &mut dyn FnMut(SessionEvent)) {
         let velocity_deg_s = match self.plain {
             Some(before) if (1..PLAIN_GAP_US).contains(&(now_us - before.host_us)) => {
                 (angle_deg - before.angle_deg) / ((now_us - before.host_us) as f32 * 1e-6)
@@ -443,10 +449,10 @@ impl Session {
         };
         self.plain = Some(sample);
         self.meter.state(0);
-        tell(Happening::State(sample));
+        tell(SessionEvent::State(sample));
     }
 
-    fn hear(&mut self, message: &Message, now_us: i64, tell: &mut dyn FnMut(Happening)) {
+    fn hear(&mut self, message: &Message, now_us: i64, tell: &mut dyn FnMut(SessionEvent)) {
         match message {
             Message::Info(info) => self.hear_info(info, now_us),
             Message::State(state) => self.hear_state(state, now_us, tell),
@@ -470,15 +476,15 @@ impl Session {
             self.feeling.forget();
             // What had piled up on the line before anybody read it is no loss of this session.
             match &mut self.ears {
-                Ears::Midi(receiver) => receiver.forget_counts(),
-                Ears::Stream(decoder) => decoder.forget_counts(),
+                Incoming::Midi(receiver) => receiver.forget_counts(),
+                Incoming::Stream(decoder) => decoder.forget_counts(),
             }
         }
     }
 
-    fn hear_state(&mut self, state: &State, now_us: i64, tell: &mut dyn FnMut(Happening)) {
+    fn hear_state(&mut self, state: &DeviceState, now_us: i64, tell: &mut dyn FnMut(SessionEvent)) {
         if self.clock.observe(state.t_us, now_us) && self.info.is_some() {
-            self.notice = Some("the knob has started anew; it is disarmed".into());
+            self.notice = Some("the knob has restarted and is disarmed".into());
             self.arming.disarm(now_us);
             self.feeling.forget();
             self.slaps = Slaps::default();
@@ -497,13 +503,13 @@ impl Session {
         self.state = Some((*state, now_us));
         self.slaps.state(state.slaps, now_us);
         if self.arming.hear(state.flags.armed()) && self.notice.is_none() {
-            let why = state.fault_code().map_or("the knob has disarmed", |code| code.text());
+            let why = state.fault_code().map_or("the knob has disarmed itself", |code| code.text());
             self.notice = Some(format!("disarmed: {why}"));
         }
         if let Some(round_trip_us) = self.feeling.echoed(state.feel_id, now_us) {
             self.meter.feel_echoed(round_trip_us);
         }
-        tell(Happening::State(StateSample {
+        tell(SessionEvent::State(StateSample {
             host_us,
             t_us: state.t_us,
             angle_deg: state.angle_deg() as f32,
@@ -521,7 +527,7 @@ impl Session {
         (self.mean_step_us / 500.0).round().max(1.0) as u32 * 500
     }
 
-    fn hear_event(&mut self, event: &Event, tell: &mut dyn FnMut(Happening)) {
+    fn hear_event(&mut self, event: &DeviceEvent, tell: &mut dyn FnMut(SessionEvent)) {
         if self.last_event.replace(event.counter) == Some(event.counter) {
             return;
         }
@@ -529,9 +535,9 @@ impl Session {
         match event.kind {
             EventKind::Slap => {
                 self.slaps.event();
-                tell(Happening::Slap(event.value));
+                tell(SessionEvent::Slap(event.value));
             }
-            EventKind::Button => tell(Happening::Button(event.value > 0.5)),
+            EventKind::Button => tell(SessionEvent::Button(event.value > 0.5)),
             EventKind::Limit => {}
             EventKind::Fault => self.notice = Some(format!("fault: {text}")),
             EventKind::Disarmed => {

@@ -7,7 +7,7 @@
 //! The firmware counts from where the knob stood when it was switched on, without bounds, in both directions. Zero is
 //! therefore set here. A jump that no hand can make is a restart: the new position becomes zero, so that it is silent.
 
-use crate::device::osc::Word;
+use crate::device::osc::StockMessage;
 use crate::device::session::StateSample;
 
 /// What people are told about this firmware.
@@ -90,15 +90,15 @@ impl StockTracker {
     }
 
     /// Takes in a word that came at `now_us`; the peak speed of a slap, rad/s, if it was one.
-    pub fn hear(&mut self, word: Word, now_us: i64) -> Option<f32> {
+    pub fn hear(&mut self, word: StockMessage, now_us: i64) -> Option<f32> {
         match word {
-            Word::Angle(tenths) => self.hear_angle(0.1 * tenths, now_us),
-            Word::Velocity(rpm) => {
+            StockMessage::Angle(tenths) => self.hear_angle(0.1 * tenths, now_us),
+            StockMessage::Velocity(rpm) => {
                 self.velocity_deg_s = (6.0 * rpm).clamp(-FASTEST_DEG_S, FASTEST_DEG_S);
                 self.sent_velocity_us = Some(now_us);
                 self.fastest_deg_s = self.fastest_deg_s.max(self.velocity_deg_s.abs());
             }
-            Word::Pluck(pluck) => {
+            StockMessage::Pluck(pluck) => {
                 let was_pluck = std::mem::replace(&mut self.pluck, pluck);
                 if pluck && !was_pluck {
                     self.slap_said = true;
@@ -106,18 +106,18 @@ impl StockTracker {
                 }
             }
             // Cleared in the tick in which the pluck ends: mostly it is not seen, or seen without the pluck.
-            Word::Slap(depth) if depth < 0.0 => {
+            StockMessage::Slap(depth) if depth < 0.0 => {
                 if !std::mem::replace(&mut self.slap_said, true) {
                     return Some(self.slap_speed(depth.max(-1.0).abs()));
                 }
             }
-            Word::Slap(_) => self.slap_said = self.pluck,
-            Word::Button(count) => {
+            StockMessage::Slap(_) => self.slap_said = self.pluck,
+            StockMessage::Button(count) => {
                 if self.button.replace(count).is_some_and(|before| before != count) {
                     self.zero();
                 }
             }
-            Word::Other => {}
+            StockMessage::Other => {}
         }
         None
     }
@@ -220,9 +220,9 @@ mod tests {
             while let Some((_, t)) = due.next_if(|(at, _)| *at <= now_us) {
                 if with_velocity {
                     let rpm = (angle_deg(t + 1e-3) - angle_deg(t)) * 1e3 / 6.0;
-                    tracker.hear(Word::Velocity(rpm), now_us);
+                    tracker.hear(StockMessage::Velocity(rpm), now_us);
                 }
-                tracker.hear(Word::Angle((10.0 * angle_deg(t)).round()), now_us);
+                tracker.hear(StockMessage::Angle((10.0 * angle_deg(t)).round()), now_us);
             }
             tracker.poll(now_us, &mut |s| shown.push((s.host_us as f64 * 1e-6, f64::from(s.angle_deg))));
         }
@@ -268,8 +268,8 @@ mod tests {
     #[test]
     fn prediction_ends_and_a_silent_knob_is_gone() {
         let mut tracker = StockTracker::default();
-        tracker.hear(Word::Velocity(100.0), 0);
-        tracker.hear(Word::Angle(0.0), 0);
+        tracker.hear(StockMessage::Velocity(100.0), 0);
+        tracker.hear(StockMessage::Angle(0.0), 0);
         let mut shown = Vec::new();
         for now_us in (0..1_000_000).step_by(1000) {
             tracker.poll(now_us, &mut |s| shown.push(s));
@@ -284,7 +284,7 @@ mod tests {
         let mut tracker = StockTracker::default();
         let shown = |tracker: &mut StockTracker, now_us| {
             let mut last = 0.0;
-            tracker.hear(Word::Angle(-4321.0), now_us);
+            tracker.hear(StockMessage::Angle(-4321.0), now_us);
             tracker.poll(now_us, &mut |s| last = s.angle_deg);
             last
         };
@@ -293,9 +293,9 @@ mod tests {
         assert!(shown(&mut tracker, 40_000).abs() < 0.01);
         let mut tracker = StockTracker::default();
         shown(&mut tracker, 0);
-        tracker.hear(Word::Button(5.0), 10_000);
+        tracker.hear(StockMessage::Button(5.0), 10_000);
         assert!((shown(&mut tracker, 40_000) + 432.1).abs() < 0.01, "the first count is no press");
-        tracker.hear(Word::Button(6.0), 50_000);
+        tracker.hear(StockMessage::Button(6.0), 50_000);
         assert!(shown(&mut tracker, 80_000).abs() < 0.01);
     }
 
@@ -304,16 +304,16 @@ mod tests {
         let mut tracker = StockTracker::default();
         let mut slaps = Vec::new();
         let words = [
-            Word::Velocity(-120.0),
-            Word::Pluck(true),
-            Word::Slap(-0.4),
-            Word::Pluck(true),
-            Word::Slap(-0.9),
-            Word::Pluck(false),
-            Word::Slap(0.0),
+            StockMessage::Velocity(-120.0),
+            StockMessage::Pluck(true),
+            StockMessage::Slap(-0.4),
+            StockMessage::Pluck(true),
+            StockMessage::Slap(-0.9),
+            StockMessage::Pluck(false),
+            StockMessage::Slap(0.0),
             // A quick one: only its depth is seen.
-            Word::Slap(-0.3),
-            Word::Slap(0.0),
+            StockMessage::Slap(-0.3),
+            StockMessage::Slap(0.0),
         ];
         for (n, word) in words.into_iter().enumerate() {
             slaps.extend(tracker.hear(word, n as i64 * 10_000));

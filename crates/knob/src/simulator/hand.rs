@@ -9,7 +9,7 @@
 //! A player also *listens*: with `correction_per_s` the aim is moved, after a reaction time, until the knob is where it
 //! was wanted. Without it the hand sags under torque by torque over stiffness.
 
-use crate::simulator::plant::{LOOP_HZ, Pull};
+use crate::simulator::plant::{HandPull, LOOP_HZ};
 use crate::simulator::script::{Aim, Script};
 use fastrand::Rng;
 use std::collections::VecDeque;
@@ -24,7 +24,7 @@ const TREMOR_HZ: (f64, f64) = (8.0, 12.0);
 /// How far the ear moves the aim at most, degrees. Judgement: further and a player would grip again.
 const CORRECTION_MAX_DEG: f64 = 120.0;
 
-/// How fast an aim given by [`Hand::aim`] is approached, degrees per second. Judgement: a hand, not a step.
+/// How fast an aim given by [`SimulatedHand::aim`] is approached, degrees per second. Judgement: a hand, not a step.
 const REACH_DEG_PER_S: f64 = 360.0;
 
 /// What a hand is like.
@@ -77,7 +77,7 @@ enum Lead {
 
 /// A hand at work.
 #[derive(Clone, Debug)]
-pub struct Hand {
+pub struct SimulatedHand {
     design: HandDesign,
     lead: Lead,
     /// Frequency, Hz, and phase of each sine of the tremor.
@@ -90,8 +90,8 @@ pub struct Hand {
     button: bool,
 }
 
-impl Hand {
-    /// No hand; [`Hand::follow`] or [`Hand::aim`] takes hold. The same seed trembles alike.
+impl SimulatedHand {
+    /// No hand; [`SimulatedHand::follow`] or [`SimulatedHand::aim`] takes hold. The same seed trembles alike.
     pub fn new(design: HandDesign, seed: u64) -> Self {
         let mut rng = Rng::with_seed(seed ^ 0x7472_656d_6f72);
         let (low, high) = TREMOR_HZ;
@@ -136,7 +136,7 @@ impl Hand {
     }
 
     /// What the hand does in the period that begins at `t_s`.
-    pub fn pull(&mut self, t_s: f64, angle_rad: f64, is_armed: bool) -> Pull {
+    pub fn pull(&mut self, t_s: f64, angle_rad: f64, is_armed: bool) -> HandPull {
         let angle_deg = angle_rad.to_degrees();
         let period_s = 1.0 / f64::from(LOOP_HZ);
         let (aim, grip_unit) = match &mut self.lead {
@@ -160,7 +160,7 @@ impl Hand {
         if grip_unit <= 0.0 {
             self.fingers_deg = None;
             self.forget();
-            return Pull::default();
+            return HandPull::default();
         }
         let damping_nms = grip_unit * self.design.damping_nms;
         match aim {
@@ -168,7 +168,7 @@ impl Hand {
                 self.fingers_deg = None;
                 self.forget();
                 let torque_nm = grip_unit * mnm / 1000.0;
-                Pull { damping_nms, torque_nm, most_nm: self.design.most_nm, ..Pull::default() }
+                HandPull { damping_nms, torque_nm, most_nm: self.design.most_nm, ..HandPull::default() }
             }
             Aim::Angle(wanted_deg) => {
                 self.listen(wanted_deg, angle_deg, period_s);
@@ -176,7 +176,7 @@ impl Hand {
                 let from_deg = self.fingers_deg.unwrap_or(to_deg);
                 self.fingers_deg = Some(to_deg);
                 let (from_rad, to_rad) = (from_deg.to_radians(), to_deg.to_radians());
-                Pull {
+                HandPull {
                     from_rad,
                     to_rad,
                     stiffness_nm_per_rad: grip_unit * self.design.stiffness_nm_per_rad,
@@ -220,7 +220,7 @@ mod tests {
     use crate::simulator::plant::{Plant, PlantDesign};
 
     /// Angles, degrees, one per period, of a knob whose motor pulls with a constant torque.
-    fn held(hand: &mut Hand, motor_nm: f64, seconds: f64) -> Vec<f64> {
+    fn held(hand: &mut SimulatedHand, motor_nm: f64, seconds: f64) -> Vec<f64> {
         let mut plant = Plant::new(PlantDesign::default(), 1);
         (0..(seconds * f64::from(LOOP_HZ)) as u32)
             .map(|tick| {
@@ -242,7 +242,7 @@ mod tests {
         let sag_deg = (motor_nm / still.stiffness_nm_per_rad).to_degrees();
         let friction_deg = (PlantDesign::default().static_nm / still.stiffness_nm_per_rad).to_degrees();
         for (correction_per_s, expected) in [(0.0, 90.0 + sag_deg), (2.0, 90.0)] {
-            let mut hand = Hand::new(HandDesign { correction_per_s, ..still }, 1);
+            let mut hand = SimulatedHand::new(HandDesign { correction_per_s, ..still }, 1);
             hand.aim(Aim::Angle(90.0));
             let angles = held(&mut hand, motor_nm, 8.0);
             let end = mean(&angles[angles.len() - 1000..]);
@@ -252,7 +252,7 @@ mod tests {
 
     #[test]
     fn tremor_lies_in_its_band_with_its_strength() {
-        let hand = Hand::new(HandDesign { tremor_deg: 0.3, ..HandDesign::default() }, 5);
+        let hand = SimulatedHand::new(HandDesign { tremor_deg: 0.3, ..HandDesign::default() }, 5);
         let seconds = 40.0;
         let x: Vec<f64> = (0..40_000).map(|ms| hand.tremor_deg(f64::from(ms) / 1000.0)).collect();
         let rms = mean(&x.iter().map(|x| x * x).collect::<Vec<_>>()).sqrt();
@@ -263,9 +263,9 @@ mod tests {
 
     #[test]
     fn script_waits_for_the_device_being_armed() {
-        let mut hand = Hand::new(HandDesign { tremor_deg: 0.0, ..HandDesign::default() }, 1);
+        let mut hand = SimulatedHand::new(HandDesign { tremor_deg: 0.0, ..HandDesign::default() }, 1);
         hand.follow_once_armed(Script::parse_crescendo("0:100:1").unwrap());
-        let target = |hand: &mut Hand, t_s, armed| hand.pull(t_s, 0.0, armed).to_rad.to_degrees();
+        let target = |hand: &mut SimulatedHand, t_s, armed| hand.pull(t_s, 0.0, armed).to_rad.to_degrees();
         assert_eq!(target(&mut hand, 5.0, false), 0.0);
         assert!(target(&mut hand, 6.0, true).abs() < 0.1);
         let later = target(&mut hand, 6.6, true);
@@ -274,11 +274,11 @@ mod tests {
 
     #[test]
     fn open_hand_does_nothing() {
-        let mut hand = Hand::new(HandDesign::default(), 1);
-        assert_eq!(hand.pull(0.0, 1.0, true), Pull::default());
+        let mut hand = SimulatedHand::new(HandDesign::default(), 1);
+        assert_eq!(hand.pull(0.0, 1.0, true), HandPull::default());
         hand.aim(Aim::Angle(10.0));
-        assert_ne!(hand.pull(0.0, 1.0, true), Pull::default());
+        assert_ne!(hand.pull(0.0, 1.0, true), HandPull::default());
         hand.release();
-        assert_eq!(hand.pull(0.0, 1.0, true), Pull::default());
+        assert_eq!(hand.pull(0.0, 1.0, true), HandPull::default());
     }
 }

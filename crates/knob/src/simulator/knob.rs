@@ -5,8 +5,8 @@
 //! the same run to the bit.
 
 use crate::simulator::fault::{Fault, FaultKind};
-use crate::simulator::hand::Hand;
-use crate::simulator::line::Line;
+use crate::simulator::hand::SimulatedHand;
+use crate::simulator::line::SimulatedLine;
 use crate::simulator::plant::{LOOP_HZ, Plant, PlantDesign};
 use crate::simulator::stock::{StockFirmware, Value};
 use crate::simulator::tap::Tap;
@@ -27,7 +27,7 @@ const TRANSMIT_MAX: usize = 1024;
 const STATE_FEEL_ID: usize = 14;
 
 /// What runs on the controller.
-enum Brain {
+enum Controller {
     Link(Box<Firmware>),
     Stock(Box<StockFirmware>),
     /// Starting anew.
@@ -38,12 +38,12 @@ enum Brain {
 pub struct SimulatedKnob {
     setup: Option<Setup>,
     is_midi: bool,
-    brain: Brain,
+    brain: Controller,
     plant: Plant,
-    hand: Hand,
+    hand: SimulatedHand,
     faults: Vec<Fault>,
-    to_device: Line,
-    to_host: Line,
+    to_device: SimulatedLine,
+    to_host: SimulatedLine,
     tap: Tap,
     tick: u64,
     booted_at_tick: u64,
@@ -54,17 +54,23 @@ pub struct SimulatedKnob {
 
 impl SimulatedKnob {
     /// A knob with our firmware. The seed is that of noise and faults; the hand has its own.
-    pub fn new(setup: Setup, plant: PlantDesign, hand: Hand, seed: u64) -> Self {
-        let brain = Brain::Link(Box::new(Firmware::new(&setup)));
+    pub fn new(setup: Setup, plant: PlantDesign, hand: SimulatedHand, seed: u64) -> Self {
+        let brain = Controller::Link(Box::new(Firmware::new(&setup)));
         Self::with_brain(brain, Some(setup), plant, hand, seed)
     }
 
     /// A knob with the reed firmware it is sold with; it speaks OSC only, see [`SimulatedKnob::take_report`].
-    pub fn stock(plant: PlantDesign, hand: Hand, seed: u64) -> Self {
-        Self::with_brain(Brain::Stock(Box::default()), None, plant, hand, seed)
+    pub fn stock(plant: PlantDesign, hand: SimulatedHand, seed: u64) -> Self {
+        Self::with_brain(Controller::Stock(Box::default()), None, plant, hand, seed)
     }
 
-    fn with_brain(brain: Brain, setup: Option<Setup>, plant: PlantDesign, hand: Hand, seed: u64) -> Self {
+    fn with_brain(
+        brain: Controller,
+        setup: Option<Setup>,
+        plant: PlantDesign,
+        hand: SimulatedHand,
+        seed: u64,
+    ) -> Self {
         let is_midi = setup.as_ref().is_some_and(|setup| setup.midi);
         Self {
             setup,
@@ -73,8 +79,8 @@ impl SimulatedKnob {
             plant: Plant::new(plant, seed),
             hand,
             faults: Vec::new(),
-            to_device: Line::new(seed.wrapping_add(1)),
-            to_host: Line::new(seed.wrapping_add(2)),
+            to_device: SimulatedLine::new(seed.wrapping_add(1)),
+            to_host: SimulatedLine::new(seed.wrapping_add(2)),
             tap: Tap::new(is_midi),
             tick: 0,
             booted_at_tick: 0,
@@ -117,7 +123,7 @@ impl SimulatedKnob {
         self.to_device.take(t_s, &self.faults, &mut arrived);
         let mut command_nm = None;
         match &mut self.brain {
-            Brain::Link(firmware) => {
+            Controller::Link(firmware) => {
                 self.tap.hear(&arrived);
                 if self.is_midi {
                     firmware.receive_midi(&arrived);
@@ -130,11 +136,11 @@ impl SimulatedKnob {
                 let length = firmware.transmit(&mut bytes);
                 self.to_host.push(t_s, &self.faults, &bytes[..length]);
             }
-            Brain::Stock(firmware) => {
+            Controller::Stock(firmware) => {
                 command_nm = Some(firmware.tick(reading.counts, self.plant.rpm(), reading.button));
                 self.report = firmware.report().or(self.report.take());
             }
-            Brain::Absent => {}
+            Controller::Absent => {}
         }
         self.command_nm = command_nm.unwrap_or(0.0);
         let mut pull = self.hand.pull(t_s, self.plant.angle_rad(), self.is_armed());
@@ -155,7 +161,7 @@ impl SimulatedKnob {
                     self.plant.set(self.plant.angle_rad(), fault.strength);
                 }
                 FaultKind::Reboot if is_active && !was_active => {
-                    self.brain = Brain::Absent;
+                    self.brain = Controller::Absent;
                     self.to_device.clear();
                     if self.setup.is_some() && !self.is_midi {
                         self.to_host.push(t_s, &self.faults, BOOT_TEXT);
@@ -170,8 +176,8 @@ impl SimulatedKnob {
     fn boot(&mut self) {
         self.booted_at_tick = self.tick;
         self.brain = match &self.setup {
-            Some(setup) => Brain::Link(Box::new(Firmware::new(setup))),
-            None => Brain::Stock(Box::default()),
+            Some(setup) => Controller::Link(Box::new(Firmware::new(setup))),
+            None => Controller::Stock(Box::default()),
         };
         // What arrived while nobody was there is lost.
         self.to_device.clear();
@@ -227,15 +233,15 @@ impl SimulatedKnob {
     /// Whether the firmware allows torque. The stock firmware always does.
     pub fn is_armed(&self) -> bool {
         match &self.brain {
-            Brain::Link(firmware) => firmware.is_armed(),
-            Brain::Stock(_) => true,
-            Brain::Absent => false,
+            Controller::Link(firmware) => firmware.is_armed(),
+            Controller::Stock(_) => true,
+            Controller::Absent => false,
         }
     }
 
     /// Number and law of the feel in force; no law before the first FEEL.
     pub fn feel(&self) -> (u8, Option<Law>) {
-        let Brain::Link(firmware) = &self.brain else { return (0, None) };
+        let Controller::Link(firmware) = &self.brain else { return (0, None) };
         let feel_id = firmware.state()[STATE_FEEL_ID];
         (feel_id, self.tap.law(feel_id))
     }
@@ -243,7 +249,7 @@ impl SimulatedKnob {
     /// The fault that stands, else the one that disarmed last, as STATE says it; 0 none.
     pub fn fault(&self) -> u8 {
         match &self.brain {
-            Brain::Link(firmware) => firmware.fault(),
+            Controller::Link(firmware) => firmware.fault(),
             _ => 0,
         }
     }
@@ -254,7 +260,7 @@ impl SimulatedKnob {
     }
 
     /// The hand, to be told what to do.
-    pub fn hand(&mut self) -> &mut Hand {
+    pub fn hand(&mut self) -> &mut SimulatedHand {
         &mut self.hand
     }
 

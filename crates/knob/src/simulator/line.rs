@@ -9,14 +9,14 @@ const WAITING_MAX: usize = 65_536;
 
 /// One direction.
 #[derive(Debug)]
-pub struct Line {
+pub struct SimulatedLine {
     rng: Rng,
     /// When a piece arrives, s, and its bytes.
     waiting: VecDeque<(f64, Vec<u8>)>,
     waiting_bytes: usize,
 }
 
-impl Line {
+impl SimulatedLine {
     /// An empty line; the seed decides which bytes a fault hits.
     pub fn new(seed: u64) -> Self {
         Self { rng: Rng::with_seed(seed), waiting: VecDeque::new(), waiting_bytes: 0 }
@@ -80,7 +80,7 @@ mod tests {
 
     /// Sends 1000 pieces of ten bytes, one per ms, and returns what arrives with the times, ms.
     fn through(faults: &[Fault]) -> (Vec<u8>, Vec<(u32, usize)>) {
-        let mut line = Line::new(1);
+        let mut line = SimulatedLine::new(1);
         let (mut all, mut arrivals) = (Vec::new(), Vec::new());
         for ms in 0..1000 {
             let t_s = f64::from(ms) / 1000.0;
@@ -127,7 +127,7 @@ mod tests {
     #[test]
     fn flood_is_bounded() {
         let stall = Fault::new(FaultKind::Stall, 0.0).lasting(10.0);
-        let mut line = Line::new(1);
+        let mut line = SimulatedLine::new(1);
         for _ in 0..10_000 {
             line.push(1.0, &[stall], &[0; 64]);
         }

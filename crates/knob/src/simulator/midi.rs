@@ -50,7 +50,7 @@ impl MidiSplitter {
     "no virtual MIDI port ({0}). On Linux this needs ALSA's sequencer (`modprobe snd-seq`, and permission for \
      /dev/snd/seq); without a sound card, build with `--features midi-jack` and start `jackd -d dummy`"
 )]
-pub struct MidiError(String);
+pub struct VirtualMidiError(String);
 
 /// A knob among the MIDI ports of the system.
 #[cfg(unix)]
@@ -71,12 +71,12 @@ struct Ports {
 #[cfg(unix)]
 impl VirtualMidi {
     /// Opens an input and an output of this name.
-    pub fn open(name: &str) -> Result<Self, MidiError> {
+    pub fn open(name: &str) -> Result<Self, VirtualMidiError> {
         Ok(Self { name: name.to_owned(), ports: Some(Ports::open(name)?) })
     }
 
     /// Takes the ports away, or brings them back.
-    pub fn plug(&mut self, is_in: bool) -> Result<(), MidiError> {
+    pub fn plug(&mut self, is_in: bool) -> Result<(), VirtualMidiError> {
         if is_in != self.ports.is_some() {
             self.ports = if is_in { Some(Ports::open(&self.name)?) } else { None };
         }
@@ -99,8 +99,8 @@ impl VirtualMidi {
 
 #[cfg(unix)]
 impl Ports {
-    fn open(name: &str) -> Result<Self, MidiError> {
-        let failed = |e: &dyn std::fmt::Display| MidiError(e.to_string());
+    fn open(name: &str) -> Result<Self, VirtualMidiError> {
+        let failed = |e: &dyn std::fmt::Display| VirtualMidiError(e.to_string());
         let mut input = MidiInput::new(name).map_err(|e| failed(&e))?;
         input.ignore(Ignore::TimeAndActiveSense);
         let (sender, from_host) = sync_channel(WAITING_MAX);

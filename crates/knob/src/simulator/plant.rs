@@ -62,7 +62,7 @@ impl Default for PlantDesign {
 
 /// What a hand does to the knob during one period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Pull {
+pub struct HandPull {
     /// Where the fingers want the knob at the beginning, rad.
     pub from_rad: f64,
     /// Where they want it at the end, rad.
@@ -79,7 +79,7 @@ pub struct Pull {
     pub most_nm: f64,
 }
 
-impl Pull {
+impl HandPull {
     fn torque_nm(&self, part: f64, angle_rad: f64, speed_rads: f64) -> f64 {
         let wanted = self.from_rad + part * (self.to_rad - self.from_rad);
         let spring = self.stiffness_nm_per_rad * (wanted - angle_rad);
@@ -167,7 +167,7 @@ impl Plant {
     }
 
     /// One period of the haptic loop. `command_nm` is what the firmware sent at its beginning, none if the bus failed.
-    pub fn advance(&mut self, command_nm: Option<f64>, pull: &Pull) {
+    pub fn advance(&mut self, command_nm: Option<f64>, pull: &HandPull) {
         let d = self.design;
         let period_s = 1.0 / f64::from(LOOP_HZ);
         self.since_command_s += period_s;
@@ -238,7 +238,7 @@ mod tests {
     fn free_knob_follows_newton() {
         let mut plant = Plant::new(ideal(), 1);
         for _ in 0..201 {
-            plant.advance(Some(0.01), &Pull::default());
+            plant.advance(Some(0.01), &HandPull::default());
         }
         // The first period passes before the command arrives.
         let t = 200.0 * PERIOD_S;
@@ -255,18 +255,18 @@ mod tests {
         let mut plant = Plant::new(design, 1);
         plant.set(0.0, 10.0);
         for _ in 0..2000 {
-            plant.advance(Some(0.0), &Pull::default());
+            plant.advance(Some(0.0), &HandPull::default());
         }
         let way = 0.5 * design.inertia_kgm2 * 100.0 / design.coulomb_nm;
         assert_eq!(plant.speed_rads(), 0.0);
         assert!((plant.angle_rad() / way - 1.0).abs() < 2e-3, "{} {way}", plant.angle_rad());
         let rest = plant.angle_rad();
         for _ in 0..100 {
-            plant.advance(Some(2.9e-3), &Pull::default());
+            plant.advance(Some(2.9e-3), &HandPull::default());
         }
         assert_eq!(plant.angle_rad(), rest, "less than the static torque moves nothing");
         for _ in 0..100 {
-            plant.advance(Some(3.1e-3), &Pull::default());
+            plant.advance(Some(3.1e-3), &HandPull::default());
         }
         assert!(plant.angle_rad() > rest);
     }
@@ -275,7 +275,7 @@ mod tests {
     fn spring_of_the_hand_swings_at_its_frequency() {
         let mut plant = Plant::new(ideal(), 1);
         plant.set(0.2, 0.0);
-        let pull = Pull { stiffness_nm_per_rad: 0.5, most_nm: 1.0, ..Pull::default() };
+        let pull = HandPull { stiffness_nm_per_rad: 0.5, most_nm: 1.0, ..HandPull::default() };
         let mut crossings = Vec::new();
         for tick in 0..2000 {
             let before = plant.angle_rad();
@@ -294,7 +294,8 @@ mod tests {
     #[test]
     fn motor_saturates_and_lets_go_when_the_bus_is_silent() {
         let mut plant = Plant::new(PlantDesign::default(), 1);
-        let held = Pull { stiffness_nm_per_rad: 10.0, damping_nms: 0.01, most_nm: 1.0, ..Pull::default() };
+        let held =
+            HandPull { stiffness_nm_per_rad: 10.0, damping_nms: 0.01, most_nm: 1.0, ..HandPull::default() };
         for _ in 0..10 {
             plant.advance(Some(2.0), &held);
         }

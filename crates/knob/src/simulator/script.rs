@@ -88,7 +88,7 @@ pub enum Aim {
 
 /// One moment of a script.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moment {
+pub struct ScriptPoint {
     /// What the fingers want.
     pub aim: Aim,
     /// 0 no hand ..1 a firm one.
@@ -227,7 +227,7 @@ impl Script {
     }
 
     /// What to do at a time, s.
-    pub fn at(&self, t_s: f64) -> Moment {
+    pub fn at(&self, t_s: f64) -> ScriptPoint {
         let length_s = self.length_s();
         let t_s = if self.is_loop && length_s > 0.0 { t_s.rem_euclid(length_s) } else { t_s };
         let next = self.rows.partition_point(|row| row.t_s <= t_s);
@@ -241,7 +241,7 @@ impl Script {
             _ => (before.value, before.grip_unit),
         };
         let aim = if self.is_force { Aim::Force(value) } else { Aim::Angle(value) };
-        Moment { aim, grip_unit, button: before.button && next > 0 }
+        ScriptPoint { aim, grip_unit, button: before.button && next > 0 }
     }
 }
 
@@ -257,7 +257,7 @@ mod tests {
     fn rows_are_joined_by_lines() {
         let text = "# made by hand\nt_s, angle_deg, grip, button\n1, 0, 1, 0\n2, 90, 0.5, 1\n\n4, 80, 1, 0\n";
         let script = Script::read_csv(text.as_bytes()).unwrap();
-        let moment = |deg, grip_unit, button| Moment { aim: Aim::Angle(deg), grip_unit, button };
+        let moment = |deg, grip_unit, button| ScriptPoint { aim: Aim::Angle(deg), grip_unit, button };
         assert_eq!(script.at(0.0), moment(0.0, 1.0, false));
         assert_eq!(script.at(1.5), moment(45.0, 0.75, false));
         assert_eq!(script.at(3.0), moment(85.0, 0.75, true));

@@ -3,8 +3,8 @@
 //! Periods are counted from one start, so nothing drifts: whoever wakes late makes up for it. Only after a stop of more than
 //! 50 ms (a suspended machine) is time lost instead, lest the firmware's watchdog take our sleep for the host's.
 
-use crate::device::discover::Advert;
-use crate::device::places::Places;
+use crate::device::discover::Announcement;
+use crate::device::runtime_dir::RuntimeDir;
 use crate::device::transport::{Binding, Transport};
 use crate::simulator::fault::Fault;
 use crate::simulator::knob::{PERIOD_US, SimulatedKnob};
@@ -86,19 +86,20 @@ pub enum Control {
 }
 
 /// Where hosts look for knobs, and what they find there while there is a path.
-struct Announcement {
-    places: Places,
+struct Announcer {
+    places: RuntimeDir,
     serial: u64,
     name: String,
-    advert: Option<Advert>,
+    advert: Option<Announcement>,
 }
 
-impl Announcement {
+impl Announcer {
     fn update(&mut self, path: Option<&Path>) -> io::Result<()> {
         // The old one first: a serial number can be announced once at a time.
         self.advert = None;
-        self.advert =
-            path.map(|path| Advert::publish(&self.places, self.serial, &self.name, path)).transpose()?;
+        self.advert = path
+            .map(|path| Announcement::publish(&self.places, self.serial, &self.name, path))
+            .transpose()?;
         Ok(())
     }
 }
@@ -110,7 +111,7 @@ pub struct Server {
     port: Port,
     pace: Pace,
     log: Option<BufWriter<File>>,
-    announcement: Option<Announcement>,
+    announcement: Option<Announcer>,
     splitter: MidiSplitter,
     buffer: Vec<u8>,
 }
@@ -139,8 +140,8 @@ impl Server {
     }
 
     /// Lets hosts that look for this serial number find the port, as long as the server lives and the cable is in.
-    pub fn announce(&mut self, places: Places, serial: u64, name: &str) -> io::Result<()> {
-        let mut announcement = Announcement { places, serial, name: name.to_owned(), advert: None };
+    pub fn announce(&mut self, places: RuntimeDir, serial: u64, name: &str) -> io::Result<()> {
+        let mut announcement = Announcer { places, serial, name: name.to_owned(), advert: None };
         announcement.update(path_of(&self.port))?;
         self.announcement = Some(announcement);
         Ok(())

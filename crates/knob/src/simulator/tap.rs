@@ -3,14 +3,14 @@
 use crate::wire::midi::{FromKnob, MidiReceiver};
 use crate::wire::{Decoder, Law, Message};
 
-enum Listener {
+enum TapDecoder {
     Serial(Box<Decoder>),
     Midi(Box<MidiReceiver>),
 }
 
 /// An ear on the line to the device.
 pub struct Tap {
-    listener: Listener,
+    listener: TapDecoder,
     /// Law of every feel number seen.
     laws: [Option<Law>; 256],
 }
@@ -19,7 +19,7 @@ impl Tap {
     /// Has heard nothing.
     pub fn new(is_midi: bool) -> Self {
         let listener =
-            if is_midi { Listener::Midi(Box::default()) } else { Listener::Serial(Box::default()) };
+            if is_midi { TapDecoder::Midi(Box::default()) } else { TapDecoder::Serial(Box::default()) };
         Self { listener, laws: [None; 256] }
     }
 
@@ -32,9 +32,11 @@ impl Tap {
             }
         };
         match &mut self.listener {
-            Listener::Serial(decoder) => decoder.feed(bytes).flatten().for_each(|(_, message)| note(message)),
+            TapDecoder::Serial(decoder) => {
+                decoder.feed(bytes).flatten().for_each(|(_, message)| note(message))
+            }
             // Time only matters for control changes, which a host does not send.
-            Listener::Midi(receiver) => receiver.feed(bytes, 0, |heard| {
+            TapDecoder::Midi(receiver) => receiver.feed(bytes, 0, |heard| {
                 if let FromKnob::Frame(Ok((_, message))) = heard {
                     note(message);
                 }

@@ -1,9 +1,9 @@
-//! A knob's angle becomes breath, note by note.
+//! Turns a knob's angle into breath, note by note.
 //!
 //! Breath goes out on a grid of samples counted from the start, so that it does not depend on the host's blocks, and in
 //! the steps of a 14-bit controller, so that a host that records it plays the very same breath back.
 
-use crate::touch::feel::Maps;
+use crate::touch::feel::PitchMaps;
 use chalumeau_core::control::keys::Keys;
 use chalumeau_core::control::knob::{KnobBreath, KnobDesign};
 use chalumeau_core::event::{Event, Timed};
@@ -22,26 +22,26 @@ const STEPS: f32 = 16_383.0;
 pub struct Breath14(pub u16);
 
 impl Breath14 {
-    /// Of full breath, 0..=1, exactly as [`MidiDecoder`](chalumeau_core::control::midi::MidiDecoder) reads the pair.
+    /// Share of full breath, 0..=1, exactly as [`MidiDecoder`](chalumeau_core::control::midi::MidiDecoder) reads the pair.
     pub fn unit(self) -> f32 {
         f32::from(self.0) / STEPS
     }
 
-    /// Values of the coarse and the fine controller.
+    /// Values of the coarse (CC 2) and the fine controller (CC 34), 0..=127.
     pub fn bytes(self) -> (u8, u8) {
         ((self.0 >> 7) as u8 & 127, self.0 as u8 & 127)
     }
 }
 
-/// The hand on the knob: how it blows, and whether it feels. Plain numbers, to be copied between threads.
+/// How knob angles become breath. Plain numbers, which threads may copy.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Hand {
-    /// What each note makes of the angle.
-    pub maps: Maps,
+pub struct BreathMapping {
+    /// Map from angle to mouth pressure, for each note.
+    pub maps: PitchMaps,
     /// Rest, full blow, dead zone and curve.
     pub design: KnobDesign,
-    /// The knob feels: angles are taken as they are, because the notes' landmarks lie on them. On one that does not,
-    /// full blow is the reference reed's closure, wherever the player has put it, and the curve bends the way there.
+    /// True if the knob gives the feel. Then angles count as they are, because the notes' landmarks lie on them. If
+    /// false, the player's full-blow angle means the closure of the reference reed, and the curve shapes the way there.
     pub feels: bool,
 }
 
@@ -61,12 +61,12 @@ pub struct Blower {
 }
 
 impl Blower {
-    /// As new.
+    /// Returns to the initial state.
     pub fn reset(&mut self) {
         *self = Self::default();
     }
 
-    /// Takes notice of what is played, at a sample of the block that begins now.
+    /// Notes an event of the block that begins now.
     pub fn heed(&mut self, event: &Timed<Event>) {
         match event.event {
             Event::NoteOn { note, .. } => self.keys.press(note),
@@ -81,7 +81,7 @@ impl Blower {
         }
     }
 
-    /// The note in the fingers, also after its key has come up.
+    /// The fingered note; it stays after its key is released.
     pub fn fingered(&self) -> Option<SoundingNote> {
         self.fingered
     }
@@ -97,13 +97,20 @@ impl Blower {
         (at.next_multiple_of(GRID) - self.clock) as usize
     }
 
-    /// The block is over.
+    /// Ends a block of `samples` samples.
     pub fn advance(&mut self, samples: usize) {
         self.clock += samples as u64;
     }
 
-    /// Breath of a knob at an angle, at a sample of the block that begins now, if it is not what was sent last.
-    pub fn blow(&mut self, hand: &Hand, at: usize, angle_deg: f64, full_pa: f64) -> Option<Breath14> {
+    /// Breath at a knob angle (degrees), at sample `at` of the block that begins now; `None` if it has not changed.
+    /// `full_pa` is the mouth pressure of full breath, Pa.
+    pub fn blow(
+        &mut self,
+        hand: &BreathMapping,
+        at: usize,
+        angle_deg: f64,
+        full_pa: f64,
+    ) -> Option<Breath14> {
         let angle_deg =
             if hand.feels { self.beyond_rest(hand, angle_deg) } else { self.unfelt(hand, angle_deg) };
         let mut pressure_pa = hand.maps.pressure_pa(self.fingered, angle_deg);
@@ -118,7 +125,7 @@ impl Blower {
     }
 
     /// Angle from rest, 0 inside the dead zone; what lies beyond is not moved, it has been felt there.
-    fn beyond_rest(&mut self, hand: &Hand, angle_deg: f64) -> f64 {
+    fn beyond_rest(&mut self, hand: &BreathMapping, angle_deg: f64) -> f64 {
         let KnobDesign { zero_deg, dead_on_deg, dead_off_deg, .. } = hand.design;
         let from_rest = angle_deg - zero_deg;
         // Not a number is no breath.
@@ -127,7 +134,7 @@ impl Blower {
     }
 
     /// The share of full blow as an angle on the reference reed's travel.
-    fn unfelt(&mut self, hand: &Hand, angle_deg: f64) -> f64 {
+    fn unfelt(&mut self, hand: &BreathMapping, angle_deg: f64) -> f64 {
         if self.unfelt.is_none_or(|knob| *knob.design() != hand.design) {
             self.unfelt = KnobBreath::new(hand.design).ok();
         }
@@ -135,17 +142,17 @@ impl Blower {
         self.unfelt.as_mut().map_or(0.0, |knob| travel_deg * f64::from(knob.pressure_unit(angle_deg)))
     }
 
-    /// The knob has gone: no breath, if there was any.
+    /// Call it when the knob is gone: returns breath 0 if breath was sent before.
     pub fn fall_silent(&mut self) -> Option<Breath14> {
         self.sent.take().filter(|&sent| sent != Breath14(0)).map(|_| Breath14(0))
     }
 }
 
-/// Host events in order of time with the knob's breath between them.
-pub struct Blown<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> {
+/// Iterator over the host's events in order of time, with the knob's breath between them.
+pub struct BlownEvents<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> {
     host: std::iter::Peekable<I>,
     blower: &'a mut Blower,
-    hand: &'a Hand,
+    hand: &'a BreathMapping,
     full_pa: f64,
     /// Angle at a sample of the block.
     angle: A,
@@ -155,12 +162,13 @@ pub struct Blown<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option
     heard: &'a mut dyn FnMut(usize, Breath14),
 }
 
-impl<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Blown<'a, I, A> {
-    /// `angle` gives the knob's angle at a sample of the block, degrees; `heard` is told of every breath.
+impl<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> BlownEvents<'a, I, A> {
+    /// `angle` gives the knob's angle at a sample of the block, degrees; `heard` is called with the sample and value of each
+    /// breath.
     pub fn new(
         host: I,
         blower: &'a mut Blower,
-        hand: &'a Hand,
+        hand: &'a BreathMapping,
         full_pa: f64,
         samples: usize,
         angle: A,
@@ -171,7 +179,7 @@ impl<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Blown
     }
 }
 
-impl<I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Iterator for Blown<'_, I, A> {
+impl<I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Iterator for BlownEvents<'_, I, A> {
     type Item = Timed<Event>;
 
     fn next(&mut self) -> Option<Timed<Event>> {
@@ -203,16 +211,16 @@ impl<I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Iterator 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::touch::feel::{Feels, NO_MOTOR};
+    use crate::touch::feel::{InstrumentFeel, NO_MOTOR};
     use chalumeau_core::control::midi::MidiDecoder;
     use chalumeau_core::haptics::FeelDesign;
     use chalumeau_core::instrument::Settings;
     use std::sync::LazyLock;
 
-    static HAND: LazyLock<Hand> = LazyLock::new(|| {
-        let feels = Feels::built_in().unwrap();
+    static HAND: LazyLock<BreathMapping> = LazyLock::new(|| {
+        let feels = InstrumentFeel::built_in().unwrap();
         let table = feels.table(&Settings::default(), &FeelDesign::default(), &NO_MOTOR).unwrap();
-        Hand { maps: feels.maps(&table), design: KnobDesign::default(), feels: true }
+        BreathMapping { maps: feels.maps(&table), design: KnobDesign::default(), feels: true }
     });
 
     fn note_on(at: usize, note: u8) -> Timed<Event> {
@@ -229,7 +237,7 @@ mod tests {
             let here = here.map(|event| Timed { at: event.at - start, event: event.event });
             let angle = |at: usize| Some(0.04 * (start + at) as f64);
             let mut ignore = |_, _| {};
-            let events = Blown::new(here, &mut blower, &HAND, 6_000.0, samples, angle, &mut ignore);
+            let events = BlownEvents::new(here, &mut blower, &HAND, 6_000.0, samples, angle, &mut ignore);
             all.extend(events.map(|event| (start + event.at, event.event)));
             blower.advance(samples);
         }
@@ -301,8 +309,11 @@ mod tests {
 
     #[test]
     fn a_knob_that_feels_nothing_reaches_full_blow_where_the_player_has_put_it() {
-        let hand =
-            Hand { feels: false, design: KnobDesign { full_deg: 180.0, ..KnobDesign::default() }, ..*HAND };
+        let hand = BreathMapping {
+            feels: false,
+            design: KnobDesign { full_deg: 180.0, ..KnobDesign::default() },
+            ..*HAND
+        };
         let mut blower = Blower::default();
         let travel = hand.maps.pressure_pa(None, 180.0);
         let full = blower.blow(&hand, 0, 180.0, 6_000.0).unwrap();

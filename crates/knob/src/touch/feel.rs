@@ -1,4 +1,4 @@
-//! The feel of an instrument as it is set up to play, and what each note's knob angle blows.
+//! The feel of each note of an instrument, and the mouth pressure that each knob angle gives.
 
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::{AngleMap, FeelDesign, FeelRefused, FeelTable, Requirements, TorqueLimits};
@@ -7,36 +7,36 @@ use chalumeau_core::instrument::{BuildError, Model, Settings};
 use chalumeau_core::units::SoundingNote;
 use std::sync::{Arc, LazyLock};
 
-/// Pitches there are names for.
+/// MIDI pitches.
 const PITCHES: usize = 128;
 
-/// Where no motor turns, as in a replay, any feel will do.
+/// Limits that allow any feel, for replays and knobs without a motor.
 pub const NO_MOTOR: TorqueLimits = TorqueLimits {
     ceiling_mnm: f64::INFINITY,
     stiffness_nm_per_rad: f64::INFINITY,
     push_nm_per_rad: f64::INFINITY,
 };
 
-/// The built-in clarinet, worked out once for all that play it.
-static BUILT_IN: LazyLock<Result<Arc<Feels>, BuildError>> =
-    LazyLock::new(|| Model::built_in(48_000.0).map(|model| Arc::new(Feels::new(&model))));
+/// The built-in clarinet, computed once for all users.
+static BUILT_IN: LazyLock<Result<Arc<InstrumentFeel>, BuildError>> =
+    LazyLock::new(|| Model::built_in(48_000.0).map(|model| Arc::new(InstrumentFeel::new(&model))));
 
-/// An instrument, and what its bore asks for every note. Building one takes a second.
+/// An instrument with what its bore requires for every note. Building one takes about a second.
 #[derive(Clone, Debug)]
-pub struct Feels {
+pub struct InstrumentFeel {
     requirements: Requirements,
     file: InstrumentFile,
     /// Index of the fingering for each sounding pitch.
     fingerings: [Option<u8>; PITCHES],
 }
 
-impl Feels {
-    /// The built-in clarinet. The first call takes a second.
+impl InstrumentFeel {
+    /// The built-in clarinet. The first call takes about a second; an error says why the model cannot be built.
     pub fn built_in() -> Result<Arc<Self>, &'static BuildError> {
         BUILT_IN.as_ref().map(Arc::clone)
     }
 
-    /// Asks an instrument for every note, through the lattice that sounds. Allocates; takes a second.
+    /// Analyses every note of a model with its waveguide. Allocates; takes about a second.
     pub fn new(model: &Model) -> Self {
         let file = &model.file;
         let mut fingerings = [None; PITCHES];
@@ -49,12 +49,12 @@ impl Feels {
         Self { requirements: requirements(model), file: file.clone(), fingerings }
     }
 
-    /// What the bore asks.
+    /// What the bore requires for each note.
     pub fn requirements(&self) -> &Requirements {
         &self.requirements
     }
 
-    /// The feel of every note. Allocates; takes up to 50 ms.
+    /// The feel of every note, or why the limits refuse it. Allocates; takes up to 50 ms.
     pub fn table(
         &self,
         settings: &Settings,
@@ -70,30 +70,30 @@ impl Feels {
     }
 
     /// The same table by sounding pitch, for the audio thread.
-    pub fn maps(&self, table: &FeelTable) -> Maps {
+    pub fn maps(&self, table: &FeelTable) -> PitchMaps {
         let of = |index: u8| table.note(usize::from(index)).map(|note| note.map);
-        Maps {
+        PitchMaps {
             by_pitch: self.fingerings.map(|fingering| fingering.and_then(of)),
             otherwise: Some(table.reference().map),
         }
     }
 }
 
-/// What each sounding pitch makes of the knob's angle. Plain numbers, to be copied between threads.
+/// For each sounding pitch, the map from knob angle to mouth pressure. Plain numbers, which threads may copy.
 #[derive(Clone, Copy, Debug)]
-pub struct Maps {
+pub struct PitchMaps {
     by_pitch: [Option<AngleMap>; PITCHES],
     otherwise: Option<AngleMap>,
 }
 
-impl Default for Maps {
-    /// No pitch blows anything.
+impl Default for PitchMaps {
+    /// No pitch has a map; every angle gives 0 Pa.
     fn default() -> Self {
         Self { by_pitch: [None; PITCHES], otherwise: None }
     }
 }
 
-impl Maps {
+impl PitchMaps {
     /// Mouth pressure, Pa, with a note fingered (none: as on the reference note) and the knob turned so far from rest.
     /// Real-time safe.
     pub fn pressure_pa(&self, note: Option<SoundingNote>, angle_deg: f64) -> f64 {
@@ -101,7 +101,7 @@ impl Maps {
         own.or(self.otherwise).map_or(0.0, |map| map.pressure_pa(angle_deg))
     }
 
-    /// Whether there is anything to play with.
+    /// Whether any map is there.
     pub fn is_ready(&self) -> bool {
         self.otherwise.is_some()
     }

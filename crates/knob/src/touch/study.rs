@@ -1,13 +1,13 @@
-//! The seed's open question as an experiment: does a player prefer, or play better with, a reed whose stiffness follows
-//! its opening (*coupled*, the peak of the flow stays 1) or one whose opening alone changes (*free*)?
+//! An open question of the reference as an experiment: does a player prefer, or play better with, a reed whose stiffness
+//! follows its opening (*coupled*, the peak of the flow stays 1) or one whose opening alone changes (*free*)?
 //!
-//! Each trial compares the two at one opening H, as A and B, which the player switches between without knowing which is
-//! which. Both are what sound and hand have, at the same time. Four openings, each with either condition as A, twice:
-//! sixteen trials, in an order that participant and seed decide, so that it can be told again afterwards.
+//! Each trial compares the two at one opening H, as sides A and B. The player switches between them without knowing which
+//! is which. Sound and feel change together. There are sixteen trials: four openings, each with either condition as A,
+//! twice. Participant and seed fix the order, so that the analysis can find it again.
 
 use chalumeau_core::reed::law::{K_INIT, coupled_k};
 
-/// Openings tried: two below and two above the seed's sqrt(27)/2, inside what the knob can do (by judgement).
+/// Openings tried: two below and two above the reference's sqrt(27)/2, inside what the knob can do (by judgement).
 const OPENINGS: [f64; 4] = [2.0, 2.3, 2.9, 3.3];
 /// How often each opening comes with the same condition as A.
 const REPEATS: usize = 2;
@@ -19,12 +19,12 @@ pub const TRIALS: usize = OPENINGS.len() * 2 * REPEATS;
 pub enum Condition {
     /// `k = 27 / (4 H^3)`.
     Coupled,
-    /// k stays where the seed starts.
+    /// k keeps the reference value.
     Free,
 }
 
 impl Condition {
-    /// As it stands in the log.
+    /// The name in the study log.
     pub fn name(self) -> &'static str {
         match self {
             Self::Coupled => "coupled",
@@ -41,33 +41,33 @@ impl Condition {
     }
 }
 
-/// What the player's switch says.
+/// Position of the player's switch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
+pub enum StudySide {
     /// Not switched.
     A,
     /// Switched.
     B,
 }
 
-/// One comparison.
+/// One comparison of two sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trial {
-    /// From 1.
+    /// Number of the trial, from 1.
     pub number: u32,
-    /// Opening of both sides.
+    /// Opening H of both sides.
     pub h: f64,
-    /// What A is; B is the other one.
+    /// Condition of side A; B has the other.
     pub a: Condition,
 }
 
 impl Trial {
-    /// What a side is.
-    pub fn condition(&self, side: Side) -> Condition {
+    /// Condition of a side.
+    pub fn condition(&self, side: StudySide) -> Condition {
         match (side, self.a) {
-            (Side::A, a) => a,
-            (Side::B, Condition::Coupled) => Condition::Free,
-            (Side::B, Condition::Free) => Condition::Coupled,
+            (StudySide::A, a) => a,
+            (StudySide::B, Condition::Coupled) => Condition::Free,
+            (StudySide::B, Condition::Free) => Condition::Coupled,
         }
     }
 }
@@ -128,9 +128,9 @@ mod tests {
     }
 
     #[test]
-    fn sides_differ_and_meet_at_the_seeds_opening() {
+    fn sides_differ_and_meet_at_the_reference_opening() {
         let trial = plan(1, 1)[0];
-        assert_ne!(trial.condition(Side::A), trial.condition(Side::B));
+        assert_ne!(trial.condition(StudySide::A), trial.condition(StudySide::B));
         assert!((Condition::Coupled.k(H_INIT) - Condition::Free.k(H_INIT)).abs() < 1e-12);
         for h in OPENINGS {
             assert!((Condition::Coupled.k(h) / Condition::Free.k(h) - 1.0).abs() > 0.2, "{h}");

@@ -1,4 +1,4 @@
-//! Codes of EVENT and STATE, with words for people. A later minor version may send others: they stay numbers.
+//! Codes of EVENT and STATE, with a sentence for people. A later minor version may send other codes; they stay numbers.
 
 use std::fmt;
 
@@ -45,16 +45,16 @@ impl FaultCode {
         Self::ALL.into_iter().find(|known| *known as u8 == code)
     }
 
-    /// A sentence for people.
+    /// The cause as a sentence for people, without capital and full stop.
     pub fn text(self) -> &'static str {
         match self {
             Self::Watchdog => "the knob no longer heard from this computer",
             Self::OverSpeed => "the knob turned faster than 60 rad/s",
             Self::I2c => "the knob's motor board does not answer",
             Self::BrownOut => "the knob's supply voltage is too low",
-            Self::NotFinite => "the knob met a number that is not finite",
+            Self::NotFinite => "the knob got or computed a number that is not finite",
             Self::Free => "torque was switched off",
-            Self::Bye => "the program that played has left",
+            Self::Bye => "the program that used the knob has closed the link",
             Self::NewSession => "another program opened the knob",
             Self::Version => "the knob speaks another version of the protocol",
         }
@@ -95,7 +95,7 @@ pub enum RefusedCode {
     WrongSession = 11,
     /// Another major version.
     Version = 12,
-    /// ARM whose sequence number is not ahead: a line that repeats itself.
+    /// ARM whose sequence number is not newer than the last: the line repeated an old frame.
     Repeated = 13,
 }
 
@@ -122,7 +122,7 @@ impl RefusedCode {
         Self::ALL.into_iter().find(|known| *known as u8 == code)
     }
 
-    /// A sentence for people.
+    /// The cause as a sentence for people, without capital and full stop.
     pub fn text(self) -> &'static str {
         match self {
             Self::HTimesK => "H times k is outside the range in which the reed closes",
@@ -132,10 +132,12 @@ impl RefusedCode {
             Self::NotFinite => "the knob was sent a number that is not finite",
             Self::OutOfRange => "the knob was sent a number outside its range",
             Self::LawUnknown => "the knob does not know this law of torque",
-            Self::FaultStands => "not armed: a fault still stands",
+            Self::FaultStands => "not armed: the fault is still present",
             Self::Moving => "not armed: the knob is moving; hold it still or let it go",
-            Self::ZeroWhileArmed => "the zero cannot be moved while the knob is armed; disarm it first",
-            Self::WrongSession => "another program holds the knob",
+            Self::ZeroWhileArmed => {
+                "the zero position cannot be changed while the knob is armed; disarm it first"
+            }
+            Self::WrongSession => "another program is using the knob",
             Self::Version => "the knob speaks another version of the protocol",
             Self::Repeated => "not armed: the request came twice or out of order; arm again",
         }

@@ -1,7 +1,7 @@
 //! Frames of TTLink 1: type, sequence number, payload and checksum, COBS between zeros.
 //!
-//! The decoder takes any bytes at any time. Its promise after damage: a frame whose own bytes, the zero behind them and
-//! the one in front are intact is received, whatever came before. Source of the algorithms: Cheshire & Baker, COBS
+//! The decoder accepts any bytes at any time. After damage it still receives every frame whose own bytes and both zeros
+//! around them are intact, whatever came before. Source of the algorithms: Cheshire & Baker, COBS
 //! (1999), by crate `cobs`; CRC-32/ISO-HDLC by crate `crc`.
 
 use std::ops::Deref;
@@ -25,7 +25,7 @@ pub const MAX_ENCODED: usize = MAX_RUN + 2;
 
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
-/// Why bytes between two zeros are no message, in the order in which it is asked.
+/// Why the bytes between two zeros are not a message, in the order of the checks.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FrameError {
     /// More bytes than a frame can have: noise, or a zero that was lost.
@@ -35,26 +35,26 @@ pub enum FrameError {
         given: usize,
     },
     /// COBS, or the packing of SysEx, announces more bytes than came.
-    #[error("{given} bytes of a frame that was cut short")]
+    #[error("a frame that was cut short after {given} bytes")]
     CutShort {
         /// Bytes that came.
         given: usize,
     },
-    /// Not even an empty message.
-    #[error("a frame of {given} bytes; the least is {OVERHEAD}")]
+    /// Shorter than a message without payload.
+    #[error("a frame of {given} bytes; the shortest has {OVERHEAD}")]
     TooShort {
         /// Bytes once decoded.
         given: usize,
     },
-    /// The checksum does not fit.
-    #[error("checksum {given:08x} where the bytes give {computed:08x}")]
+    /// The checksum is wrong.
+    #[error("checksum {given:08x} received, {computed:08x} computed")]
     Checksum {
         /// As received.
         given: u32,
         /// As the bytes give it.
         computed: u32,
     },
-    /// A type of a later version; to be ignored.
+    /// A type of a later version; receivers ignore it.
     #[error("message of unknown type {kind:#04x}")]
     UnknownType {
         /// Type byte.
@@ -63,7 +63,7 @@ pub enum FrameError {
         seq: u8,
     },
     /// A payload shorter than its type has.
-    #[error("{message} with a payload of {given} bytes; it has at least {least}")]
+    #[error("{message} with a payload of {given} bytes; it needs at least {least}")]
     ShortPayload {
         /// Name of the type.
         message: &'static str,
@@ -134,7 +134,7 @@ pub struct WireStats {
     pub skipped_bytes: u64,
 }
 
-/// Numbers and counts what arrives; shared by COBS frames and SysEx.
+/// Reads and counts frames after COBS or SysEx has been undone.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Receiver {
     pub(super) stats: WireStats,
@@ -184,22 +184,24 @@ fn open(frame: &[u8]) -> Result<(u8, u8, &[u8]), FrameError> {
     Ok((*kind, *seq, payload))
 }
 
-/// A frame before COBS: type..checksum.
-#[derive(Clone, Copy)]
-pub(super) struct Body {
+/// A frame before COBS or SysEx packing: type, sequence number, payload and checksum.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameBody {
     bytes: [u8; MAX_DECODED],
     length: usize,
 }
 
-impl Body {
-    pub(super) fn new(message: &Message, seq: u8) -> Self {
+impl FrameBody {
+    /// The body of `message`. Fields outside their range are written as they are. Real-time safe.
+    pub fn new(message: &Message, seq: u8) -> Self {
         let mut bytes = [0; MAX_PAYLOAD];
         let length = payload::write(message, &mut bytes);
-        Self::of(message.kind(), seq, &bytes[..length])
+        Self::from_parts(message.kind(), seq, &bytes[..length])
     }
 
-    /// Any type and payload; what does not fit is cut.
-    pub(super) fn of(kind: u8, seq: u8, payload: &[u8]) -> Self {
+    /// A body of any type and payload, as a later version of the protocol might send it; for tests. Only the first
+    /// [`MAX_PAYLOAD`] bytes of the payload are used. Real-time safe.
+    pub fn from_parts(kind: u8, seq: u8, payload: &[u8]) -> Self {
         let payload = &payload[..payload.len().min(MAX_PAYLOAD)];
         let mut bytes = [0; MAX_DECODED];
         let end = 2 + payload.len();
@@ -211,8 +213,13 @@ impl Body {
         Self { bytes, length: end + 4 }
     }
 
-    /// With COBS and both zeros.
-    pub(super) fn framed(&self) -> EncodedFrame {
+    /// The payload without type, sequence number and checksum.
+    pub fn payload(&self) -> &[u8] {
+        &self.bytes[2..self.length - 4]
+    }
+
+    /// With COBS and both zeros, as the serial line carries it. Real-time safe.
+    pub fn framed(&self) -> EncodedFrame {
         let mut bytes = [0; MAX_ENCODED];
         // PANIC: COBS adds one byte to the first 254, so 64 bytes fit the 65 between the zeros.
         let length = cobs::encode(self, &mut bytes[1..=MAX_RUN]);
@@ -220,7 +227,7 @@ impl Body {
     }
 }
 
-impl Deref for Body {
+impl Deref for FrameBody {
     type Target = [u8];
 
     fn deref(&self) -> &[u8] {
@@ -243,10 +250,10 @@ impl Deref for EncodedFrame {
     }
 }
 
-/// Encodes any message. Fields outside their range are sent as they are, for the other end to refuse: ask
+/// Encodes any message. Fields outside their range are written as they are, and the receiver refuses them: call
 /// [`Message::check`] first. Real-time safe.
 pub fn encode(message: &Message, seq: u8) -> EncodedFrame {
-    Body::new(message, seq).framed()
+    FrameBody::new(message, seq).framed()
 }
 
 /// Finds messages in a stream of bytes. Real-time safe.
@@ -265,12 +272,12 @@ impl Default for Decoder {
 }
 
 impl Decoder {
-    /// A decoder that has seen nothing; bytes up to the first zero are taken for the rest of something.
+    /// A new decoder. It takes bytes before the first zero for the end of a damaged frame.
     pub fn new() -> Self {
         Self { run: [0; MAX_RUN], length: 0, receiver: Receiver::default() }
     }
 
-    /// Takes one byte. A zero that ends a run of others gives a message and its sequence number, or says why not.
+    /// Takes one byte. A zero at the end of a frame returns the sequence number and the message, or the error.
     pub fn push(&mut self, byte: u8) -> Option<Result<(u8, Message), FrameError>> {
         if byte != 0 {
             if let Some(free) = self.run.get_mut(self.length) {
@@ -298,7 +305,7 @@ impl Decoder {
         Err(error)
     }
 
-    /// Everything that `bytes` complete, in order.
+    /// Sequence numbers and messages of all frames that `bytes` complete, or their errors, in order.
     pub fn feed<'a>(
         &'a mut self,
         bytes: &'a [u8],
@@ -306,12 +313,12 @@ impl Decoder {
         bytes.iter().filter_map(|&byte| self.push(byte))
     }
 
-    /// What was counted so far.
+    /// The counts since the decoder was made, or since [`Decoder::forget_counts`].
     pub fn stats(&self) -> WireStats {
         self.receiver.stats
     }
 
-    /// Counts from zero; what is being read and the sequence go on.
+    /// Sets the counts to zero. The frame being read and the last sequence number are kept.
     pub fn forget_counts(&mut self) {
         self.receiver.stats = WireStats::default();
     }

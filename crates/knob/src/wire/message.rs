@@ -6,7 +6,7 @@ use crate::wire::codes::{FaultCode, RefusedCode};
 use chalumeau_core::haptics::TorqueLimits;
 pub use chalumeau_core::haptics::{Feel, Law};
 
-/// ARM and ALIVE.
+/// Content of ARM and of ALIVE.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Arm {
     /// Session of HELLO.
@@ -15,7 +15,7 @@ pub struct Arm {
     pub ceiling_mnm: u16,
 }
 
-/// What a device can do, see INFO.
+/// What a device can do, see INFO. `docs/protocol.md` lists all bits; those that the program uses have names here.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Capabilities(pub u16);
 
@@ -30,8 +30,6 @@ impl Capabilities {
     pub const DETENT: u16 = 1 << 3;
     /// Has a button.
     pub const BUTTON: u16 = 1 << 4;
-    /// Has a motor.
-    pub const MOTOR: u16 = 1 << 5;
     /// Is a simulation.
     pub const SIMULATED: u16 = 1 << 6;
 
@@ -41,7 +39,7 @@ impl Capabilities {
     }
 }
 
-/// What a device says of itself.
+/// Message INFO: the device describes itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Info {
     /// Version of the protocol.
@@ -104,27 +102,19 @@ impl Info {
     }
 }
 
-/// Flags of STATE.
+/// Flags of STATE. `docs/protocol.md` lists all bits; those that the program uses have names here.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Flags(pub u16);
 
 impl Flags {
     /// Torque is allowed.
     pub const ARMED: u16 = 1;
-    /// The last torque was limited.
-    pub const LIMITED: u16 = 1 << 1;
     /// A fault stands.
     pub const FAULT: u16 = 1 << 2;
     /// The knob is in the slap region.
     pub const SLAP: u16 = 1 << 3;
     /// The button is down.
     pub const BUTTON: u16 = 1 << 4;
-    /// Torque is fading out.
-    pub const FADING: u16 = 1 << 5;
-    /// The old feel gives way to the new.
-    pub const MORPHING: u16 = 1 << 6;
-    /// The continuous rating limits torque.
-    pub const THERMAL: u16 = 1 << 7;
 
     /// Whether all of `bits` are set.
     pub fn has(self, bits: u16) -> bool {
@@ -153,41 +143,36 @@ impl Flags {
     }
 }
 
-/// Where the knob is.
+/// Message STATE: position, speed, torque and flags of the knob.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct State {
+pub struct DeviceState {
     /// Device clock, microseconds; wraps.
     pub t_us: u32,
-    /// 0.01 degrees since zero.
+    /// Angle from zero, 0.01 degrees.
     pub angle: i32,
-    /// 0.1 rpm.
+    /// Speed, 0.1 rpm.
     pub velocity: i16,
-    /// Command after all limits, mNm.
+    /// Torque command after all limits, mNm.
     pub torque: i16,
     /// See [`Flags`].
     pub flags: Flags,
-    /// Last FEEL accepted.
+    /// Number of the last FEEL accepted.
     pub feel_id: u8,
     /// Counter of slaps.
     pub slaps: u8,
     /// Counter of the last EVENT.
     pub events: u8,
-    /// Standing fault, 0 none.
+    /// Code of the present fault; 0 if there is none.
     pub fault: u8,
 }
 
-impl State {
-    /// Angle since zero, degrees.
+impl DeviceState {
+    /// Angle from zero, degrees.
     pub fn angle_deg(&self) -> f64 {
         0.01 * f64::from(self.angle)
     }
 
-    /// Velocity, rad/s.
-    pub fn velocity_rad_s(&self) -> f64 {
-        f64::from(self.velocity) * (0.1 * std::f64::consts::TAU / 60.0)
-    }
-
-    /// The fault that stands, if this version knows its code.
+    /// The present fault; `None` without a fault, or if this version does not know its code.
     pub fn fault_code(&self) -> Option<FaultCode> {
         FaultCode::from_u8(self.fault)
     }
@@ -211,16 +196,16 @@ pub enum EventKind {
     Disarmed = 6,
 }
 
-/// Something that happened on the device.
+/// Message EVENT: something happened on the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Event {
-    /// What.
+pub struct DeviceEvent {
+    /// Kind of event.
     pub kind: EventKind,
-    /// Counts events, so that a lost one shows.
+    /// Counts events, modulo 256; a gap shows a lost event.
     pub counter: u8,
-    /// See the protocol.
+    /// Depends on the kind; see `docs/protocol.md`.
     pub code: u8,
-    /// Of the FEEL refused, else the one in force.
+    /// Number of the FEEL refused, otherwise of the FEEL in force.
     pub feel_id: u8,
     /// Device clock, microseconds.
     pub t_us: u32,
@@ -228,10 +213,10 @@ pub struct Event {
     pub value: f32,
 }
 
-impl Event {
-    /// What the code says to people; `None` where the kind has no codes.
+impl DeviceEvent {
+    /// The code as a sentence for people; `None` where the kind has no codes.
     pub fn code_text(&self) -> Option<&'static str> {
-        let unknown = "for a reason this version does not know";
+        let unknown = "for a reason that this version does not know";
         match self.kind {
             EventKind::Fault | EventKind::Disarmed => {
                 Some(FaultCode::from_u8(self.code).map_or(unknown, FaultCode::text))
@@ -245,7 +230,7 @@ impl Event {
 /// A message of either direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Message {
-    /// The host has opened the line.
+    /// HELLO: the host has opened the line.
     Hello {
         /// Version of the protocol.
         major: u8,
@@ -254,29 +239,29 @@ pub enum Message {
         /// Chosen at random for this opening.
         session: u32,
     },
-    /// The whole state of the feel.
+    /// FEEL: all parameters of the torque.
     Feel(Feel),
-    /// The user allows torque.
+    /// ARM: the user allows torque.
     Arm(Arm),
-    /// The host is there.
+    /// ALIVE: the host is running.
     Alive(Arm),
-    /// Torque off.
+    /// FREE: torque off.
     Free,
-    /// What the present position shall be called, 0.01 degrees.
+    /// ZERO: the new angle of the present position, 0.01 degrees.
     Zero(i32),
-    /// How often STATE comes, Hz.
+    /// RATE: how often the device sends STATE, Hz.
     Rate(u16),
-    /// The host leaves.
+    /// BYE: the host closes the line.
     Bye {
         /// Session of HELLO.
         session: u32,
     },
-    /// Answer to HELLO.
+    /// INFO: the answer to HELLO.
     Info(Info),
-    /// Where the knob is.
-    State(State),
-    /// Something happened.
-    Event(Event),
+    /// STATE: position of the knob.
+    State(DeviceState),
+    /// EVENT: something happened.
+    Event(DeviceEvent),
 }
 
 #[cfg(test)]

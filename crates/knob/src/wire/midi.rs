@@ -5,7 +5,7 @@
 
 use std::ops::Deref;
 
-use crate::wire::frame::{Body, FrameError, MAX_DECODED, Receiver, WireStats};
+use crate::wire::frame::{FrameBody, FrameError, MAX_DECODED, Receiver, WireStats};
 use crate::wire::message::Message;
 
 /// Start of system exclusive, the identity for private use, `TT` and the major version.
@@ -45,7 +45,7 @@ impl Deref for SysEx {
 
 /// Encodes any message as SysEx, as [`encode`](crate::wire::encode) does for the serial line. Real-time safe.
 pub fn encode_sysex(message: &Message, seq: u8) -> SysEx {
-    let body = Body::new(message, seq);
+    let body = FrameBody::new(message, seq);
     let mut out = SysEx { bytes: [0; MAX_SYSEX], length: 0 };
     // PANIC: `MAX_SYSEX` counts header, end and the groups of the longest body.
     let mut put = |byte: u8| {
@@ -75,27 +75,6 @@ fn unpack(packed: &[u8], out: &mut [u8; MAX_DECODED]) -> Option<usize> {
         }
     }
     Some(length)
-}
-
-/// Two control changes on the first channel: breath 0..=16383 of the travel up to the wall. For the device's side.
-pub fn encode_breath(breath: u16) -> [u8; 6] {
-    pair(BREATH, breath.min(BREATH_MAX))
-}
-
-/// Two control changes on the first channel: the angle in 0.1 degrees, saturating. For the device's side.
-pub fn encode_angle(tenths_deg: i32) -> [u8; 6] {
-    let value = tenths_deg.clamp(-ANGLE_ZERO, ANGLE_ZERO - 1) + ANGLE_ZERO;
-    pair(ANGLE, value as u16)
-}
-
-/// One control change on the first channel. For the device's side.
-pub fn encode_button(down: bool) -> [u8; 3] {
-    [CONTROL_CHANGE, BUTTON, if down { 127 } else { 0 }]
-}
-
-fn pair(controller: u8, value: u16) -> [u8; 6] {
-    let [coarse, fine] = [value >> 7, value & 0x7F].map(|part| part as u8);
-    [CONTROL_CHANGE, controller, coarse, CONTROL_CHANGE, controller + FINE, fine]
 }
 
 /// What a knob says over MIDI.
@@ -340,6 +319,22 @@ impl MidiReceiver {
 mod tests {
     use super::*;
 
+    /// Two control changes on the first channel: breath 0..=16383 of the travel up to the wall.
+    fn encode_breath(breath: u16) -> [u8; 6] {
+        pair(BREATH, breath.min(BREATH_MAX))
+    }
+
+    /// Two control changes on the first channel: the angle in 0.1 degrees, saturating.
+    fn encode_angle(tenths_deg: i32) -> [u8; 6] {
+        let value = tenths_deg.clamp(-ANGLE_ZERO, ANGLE_ZERO - 1) + ANGLE_ZERO;
+        pair(ANGLE, value as u16)
+    }
+
+    fn pair(controller: u8, value: u16) -> [u8; 6] {
+        let [coarse, fine] = [value >> 7, value & 0x7F].map(|part| part as u8);
+        [CONTROL_CHANGE, controller, coarse, CONTROL_CHANGE, controller + FINE, fine]
+    }
+
     /// Everything a fresh receiver says to timed pieces of MIDI and a last poll at the end.
     fn heard(pieces: &[(u64, &[u8])]) -> Vec<FromKnob> {
         let mut receiver = MidiReceiver::new();
@@ -443,7 +438,7 @@ mod tests {
 
     #[test]
     fn longest_exclusive_message_fits() {
-        let body = Body::of(0x05, 1, &[0xFF; 58]);
+        let body = FrameBody::from_parts(0x05, 1, &[0xFF; 58]);
         assert_eq!(body.len(), MAX_DECODED);
         let mut frame = [0; MAX_DECODED];
         let packed: Vec<u8> = body

@@ -2,7 +2,9 @@
 
 use crate::wire::frame::{FrameError, MAX_PAYLOAD};
 use crate::wire::limits::{self, FieldRange, OutOfRange};
-use crate::wire::message::{Arm, Capabilities, Event, EventKind, Feel, Flags, Info, Law, Message, State};
+use crate::wire::message::{
+    Arm, Capabilities, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Law, Message,
+};
 
 const MAGIC: [u8; 4] = *b"TTLK";
 
@@ -229,8 +231,8 @@ impl Reader<'_> {
         }
     }
 
-    fn state(&self) -> State {
-        State {
+    fn state(&self) -> DeviceState {
+        DeviceState {
             t_us: self.u32(0),
             angle: i32::from_le_bytes(self.take(4)),
             velocity: i16::from_le_bytes(self.take(8)),
@@ -243,7 +245,7 @@ impl Reader<'_> {
         }
     }
 
-    fn event(&self) -> Result<Event, OutOfRange> {
+    fn event(&self) -> Result<DeviceEvent, OutOfRange> {
         let kind = match self.u8(0) {
             1 => EventKind::Slap,
             2 => EventKind::Button,
@@ -253,7 +255,7 @@ impl Reader<'_> {
             6 => EventKind::Disarmed,
             other => return Err(outside(limits::KIND, other)),
         };
-        Ok(Event {
+        Ok(DeviceEvent {
             kind,
             counter: self.u8(1),
             code: self.u8(2),

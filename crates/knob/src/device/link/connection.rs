@@ -3,10 +3,10 @@
 use crate::device::link::Hooks;
 use crate::device::lock::{Holder, LockError, Ownership};
 use crate::device::osc;
-use crate::device::osc::Word;
-use crate::device::places::Places;
+use crate::device::osc::StockMessage;
 use crate::device::reader::{KnobWriter, Sample};
-use crate::device::session::{Happening, Session, Standing, StateSample, Wish};
+use crate::device::runtime_dir::RuntimeDir;
+use crate::device::session::{HostSession, SessionEvent, SessionOutput, SessionStatus, StateSample};
 use crate::device::stats::{LinkStats, Meter};
 use crate::device::stock::StockTracker;
 use crate::device::transport::{Binding, Transport};
@@ -36,7 +36,7 @@ const MIDI_SLOT: Duration = Duration::from_millis(20);
 
 /// Why a connection ended.
 #[derive(Debug)]
-pub enum End {
+pub enum ConnectionEnd {
     /// The port is gone, or the knob fell silent: why.
     Gone(String),
     /// Nothing known has answered.
@@ -51,15 +51,15 @@ pub enum End {
     LetGo(u64, Holder),
 }
 
-enum Brain {
-    Session(Box<Session>),
+enum Protocol {
+    Session(Box<HostSession>),
     Stock(Box<StockTracker>, Box<Meter>),
 }
 
 /// See the module.
 pub struct Connection {
     transport: Box<dyn Transport>,
-    brain: Brain,
+    brain: Protocol,
     owned: Vec<Ownership>,
     is_claimed: bool,
     next_wanted_us: i64,
@@ -99,8 +99,8 @@ impl Connection {
     /// Begins with an open port; `owned` are the locks that were taken for it.
     pub fn new(transport: Box<dyn Transport>, owned: Vec<Ownership>, number: u32, now_us: i64) -> Self {
         let brain = match transport.binding() {
-            Binding::Osc => Brain::Stock(Box::default(), Box::new(Meter::new(now_us))),
-            binding => Brain::Session(Box::new(Session::new(binding, number, now_us))),
+            Binding::Osc => Protocol::Stock(Box::default(), Box::new(Meter::new(now_us))),
+            binding => Protocol::Session(Box::new(HostSession::new(binding, number, now_us))),
         };
         let (is_claimed, ignored) = (false, 0);
         Self {
@@ -116,10 +116,10 @@ impl Connection {
     }
 
     /// The session, if the device speaks TTLink or might.
-    pub fn session(&mut self) -> Option<&mut Session> {
+    pub fn session(&mut self) -> Option<&mut HostSession> {
         match &mut self.brain {
-            Brain::Session(session) => Some(session),
-            Brain::Stock(..) => None,
+            Protocol::Session(session) => Some(session),
+            Protocol::Stock(..) => None,
         }
     }
 
@@ -140,52 +140,52 @@ impl Connection {
 
     /// True while unmodified firmware is heard.
     pub fn is_stock_heard(&self, now_us: i64) -> bool {
-        matches!(&self.brain, Brain::Stock(tracker, _) if tracker.heard_us().is_some_and(|at| now_us - at < LOST_US))
+        matches!(&self.brain, Protocol::Stock(tracker, _) if tracker.heard_us().is_some_and(|at| now_us - at < LOST_US))
     }
 
     /// What unmodified firmware did that a hand cannot.
     pub fn stock_notice(&self) -> Option<String> {
-        let Brain::Stock(tracker, _) = &self.brain else { return None };
+        let Protocol::Stock(tracker, _) = &self.brain else { return None };
         let (jumps, degrees) = tracker.jumps();
         (jumps > 0).then(|| {
-            format!("the knob jumped by {degrees:.0} degrees, as when it starts anew: its position then is zero now")
+            format!("the knob jumped by {degrees:.0} degrees, as if it had restarted; its new position is zero now")
         })
     }
 
     /// The present position becomes zero.
     pub fn zero(&mut self) {
         match &mut self.brain {
-            Brain::Session(session) => session.zero(),
-            Brain::Stock(tracker, _) => tracker.zero(),
+            Protocol::Session(session) => session.zero(),
+            Protocol::Stock(tracker, _) => tracker.zero(),
         }
     }
 
     /// Counts and times. Sorts: not for every loop.
     pub fn stats(&self) -> LinkStats {
         let stats = match &self.brain {
-            Brain::Session(session) => session.stats(),
-            Brain::Stock(_, meter) => meter.picture(),
+            Protocol::Session(session) => session.stats(),
+            Protocol::Stock(_, meter) => meter.picture(),
         };
         LinkStats { ignored: self.ignored, ..stats }
     }
 
     /// One round: sends what is due, takes in what comes, waits 1 ms at most.
-    pub fn round(&mut self, feel: Option<Feel>, outlet: &mut Outlet) -> Result<(), End> {
+    pub fn round(&mut self, feel: Option<Feel>, outlet: &mut Outlet) -> Result<(), ConnectionEnd> {
         // A knob that may be another's is not played.
         let is_played = self.is_claimed || self.transport.binding() == Binding::Midi;
         let mut last = self.last;
         let mut button = self.button;
         let mut failed = None;
         let received = match &mut self.brain {
-            Brain::Session(session) => {
+            Protocol::Session(session) => {
                 if let Some(feel) = feel {
                     session.want_feel(feel);
                 }
                 let transport = &mut self.transport;
-                let mut send = |wish: Wish| {
+                let mut send = |wish: SessionOutput| {
                     let done = match wish {
-                        Wish::Send(bytes) => transport.send(bytes),
-                        Wish::Baud(baud) => transport.set_baud(baud),
+                        SessionOutput::Send(bytes) => transport.send(bytes),
+                        SessionOutput::Baud(baud) => transport.set_baud(baud),
                     };
                     // What does not fit now is said again in time.
                     if let Err(e) = done
@@ -194,26 +194,26 @@ impl Connection {
                         failed = Some(e);
                     }
                 };
-                let mut tell = |outlet: &mut Outlet, what: Happening| match what {
+                let mut tell = |outlet: &mut Outlet, what: SessionEvent| match what {
                     _ if !is_played => {}
-                    Happening::State(state) => {
+                    SessionEvent::State(state) => {
                         last = Some(state);
                         outlet.state(&state);
                     }
-                    Happening::Slap(speed) => outlet.writer.slap(speed),
-                    Happening::Button(down) => button = down,
+                    SessionEvent::Slap(speed) => outlet.writer.slap(speed),
+                    SessionEvent::Button(down) => button = down,
                 };
                 session.poll(outlet.now_us(), &mut send, &mut |what| tell(outlet, what));
                 self.transport.poll(WAIT, &mut |chunk| {
                     session.receive(outlet.now_us(), chunk, &mut |what| tell(outlet, what));
                 })
             }
-            Brain::Stock(tracker, meter) => {
+            Protocol::Stock(tracker, meter) => {
                 let ignored = &mut self.ignored;
                 let received = self.transport.poll(WAIT, &mut |datagram| {
                     let now_us = outlet.now_us();
                     *ignored += osc::read(datagram, |word| {
-                        if let Word::Angle(_) = word {
+                        if let StockMessage::Angle(_) = word {
                             meter.state(0);
                         }
                         if let Some(speed) = tracker.hear(word, now_us) {
@@ -232,7 +232,7 @@ impl Connection {
         };
         (self.last, self.button) = (last, button);
         match received.err().or(failed) {
-            Some(e) => Err(End::Gone(format!("{}: {e}", self.transport.describe()))),
+            Some(e) => Err(ConnectionEnd::Gone(format!("{}: {e}", self.transport.describe()))),
             None => Ok(()),
         }
     }
@@ -240,43 +240,44 @@ impl Connection {
     /// Whether the connection shall go on: the right knob, owned, alive, not wanted by others.
     pub fn check(
         &mut self,
-        places: &Places,
+        places: &RuntimeDir,
         label: &str,
         wanted_serial: Option<u64>,
         now_us: i64,
-    ) -> Result<(), End> {
+    ) -> Result<(), ConnectionEnd> {
         if now_us >= self.next_wanted_us {
             self.next_wanted_us = now_us + WANTED_US;
             for ownership in &self.owned {
                 if let Some(holder) = ownership.wanted_by() {
-                    return Err(End::LetGo(ownership.serial(), holder));
+                    return Err(ConnectionEnd::LetGo(ownership.serial(), holder));
                 }
             }
         }
-        let Brain::Session(session) = &self.brain else { return Ok(()) };
+        let Protocol::Session(session) = &self.brain else { return Ok(()) };
         let silent_us = now_us - session.heard_us().unwrap_or(session.opened_us());
         let lost_us = if self.transport.binding() == Binding::Midi { LOST_MIDI_US } else { LOST_US };
-        match session.standing(now_us) {
-            Standing::Stock(name) => return Err(End::Stock(name)),
+        match session.status(now_us) {
+            SessionStatus::Stock(name) => return Err(ConnectionEnd::Stock(name)),
             // MIDI devices that only send control changes rest for as long as they like.
-            Standing::Greeting | Standing::PlainMidi if self.transport.binding() == Binding::Midi => {}
-            _ if session.heard_us().is_none() && silent_us > BOOT_US => return Err(End::NoAnswer),
+            SessionStatus::Greeting | SessionStatus::PlainMidi
+                if self.transport.binding() == Binding::Midi => {}
+            _ if session.heard_us().is_none() && silent_us > BOOT_US => return Err(ConnectionEnd::NoAnswer),
             _ if session.heard_us().is_some() && silent_us > lost_us => {
-                return Err(End::Gone("the knob is silent".into()));
+                return Err(ConnectionEnd::Gone("the knob sends nothing".into()));
             }
             _ => {}
         }
         if let Some(info) = session.info().filter(|_| !self.is_claimed) {
             let serial = info.serial;
             if wanted_serial.is_some_and(|wanted| wanted != serial) {
-                return Err(End::AnotherKnob(serial));
+                return Err(ConnectionEnd::AnotherKnob(serial));
             }
             self.is_claimed = true;
             let is_ours = self.owned.iter().any(|ownership| ownership.serial() == serial);
             if !is_ours {
                 match Ownership::take(places, serial, label, &self.transport.describe()) {
                     Ok(ownership) => self.owned.push(ownership),
-                    Err(LockError::Held(holder)) => return Err(End::Held(serial, holder)),
+                    Err(LockError::Held(holder)) => return Err(ConnectionEnd::Held(serial, holder)),
                     // Without a place for locks the port itself is still ours alone.
                     Err(LockError::Io(_)) => {}
                 }
@@ -287,13 +288,13 @@ impl Connection {
 
     /// Leaves: torque off, and everything free for others.
     pub fn close(mut self) {
-        if let Brain::Session(session) = &mut self.brain {
+        if let Protocol::Session(session) = &mut self.brain {
             if self.transport.binding() == Binding::Midi {
                 thread::sleep(MIDI_SLOT);
             }
             let transport = &mut self.transport;
             session.bye(&mut |wish| {
-                if let Wish::Send(bytes) = wish {
+                if let SessionOutput::Send(bytes) = wish {
                     let _ = transport.send(bytes);
                 }
             });

@@ -1,6 +1,6 @@
 //! What a link shows of itself.
 
-use crate::device::places::serial_text;
+use crate::device::runtime_dir::serial_text;
 use crate::device::stats::LinkStats;
 use crate::wire::Info;
 
@@ -29,7 +29,7 @@ pub enum Phase {
     NoPermission(String),
     /// Another program has the port: what to do.
     Busy(String),
-    /// The knob speaks another major version: its position is read, it is never armed.
+    /// The knob speaks another major version: the program reads its position and never arms it.
     VersionMismatch,
     /// Unmodified firmware answers at the serial port, where it can do no more than that: its name.
     StockSerial(String),
@@ -40,7 +40,7 @@ pub enum Phase {
 }
 
 impl Phase {
-    /// Of several troubles the one to tell: the higher.
+    /// Of several problems, the screen shows the one with the highest rank.
     pub(super) fn rank(&self) -> u8 {
         match self {
             Self::HeldBy(_) => 6,
@@ -53,7 +53,7 @@ impl Phase {
         }
     }
 
-    /// One line for people.
+    /// The status in one line for people.
     pub(super) fn text(&self, port: &str, info: Option<&Info>) -> String {
         let knob = || {
             let Some(info) = info else { return "the knob".into() };
@@ -66,7 +66,9 @@ impl Phase {
             Self::Waiting => format!("waiting for an answer at {port}"),
             Self::Live => format!("{} at {port}", knob()),
             Self::ReadOnly => format!("{port}: {}", crate::device::stock::LABEL),
-            Self::Lost { seconds } => format!("lost {seconds:.0} s ago; it will come back disarmed"),
+            Self::Lost { seconds } => {
+                format!("connection lost {seconds:.0} s ago; the knob will be disarmed when it returns")
+            }
             Self::HeldBy(holder) => format!("in use by {holder}"),
             Self::NoPermission(text) | Self::Busy(text) | Self::NoAnswer(text) | Self::Failed(text) => {
                 text.clone()
@@ -74,7 +76,7 @@ impl Phase {
             Self::VersionMismatch => {
                 let version = info.map_or((0, 0), |info| (info.major, info.minor));
                 format!(
-                    "{} speaks TTLink {}.{}, this program {}.{}: its position is read, it is never armed",
+                    "{} speaks TTLink {}.{}, this program {}.{}: the program reads its position and never arms it",
                     knob(),
                     version.0,
                     version.1,
@@ -83,7 +85,7 @@ impl Phase {
                 )
             }
             Self::StockSerial(name) => format!(
-                "{name} at {port} has its stock firmware, which says nothing more by cable: choose OSC, port 8000, to \
+                "{name} at {port} has its stock firmware, which sends no position over USB: choose OSC, port 8000, to \
                  play it without feel, or flash the firmware in firmware/ (docs/touch.md)"
             ),
         }

@@ -1,19 +1,19 @@
-//! The link's thread: chooses ports, keeps one connection, tells how things stand.
+//! The link's thread: chooses ports, keeps one connection, and publishes the status.
 
 use crate::device::discover;
 use crate::device::discover::Candidate;
 use crate::device::feel_osc::FeelSender;
-use crate::device::link::connection::{Connection, End, Outlet};
+use crate::device::link::connection::{Connection, ConnectionEnd, Outlet};
 use crate::device::link::status::{LinkStatus, Phase};
-use crate::device::link::{Choice, Hooks};
+use crate::device::link::{Hooks, KnobChoice};
 use crate::device::lock;
 use crate::device::lock::{LockError, Ownership};
 use crate::device::midi::{MidiError, MidiTransport};
 use crate::device::osc::OscTransport;
-use crate::device::places::{Places, serial_text};
 use crate::device::reader::KnobWriter;
+use crate::device::runtime_dir::{RuntimeDir, serial_text};
 use crate::device::serial::{OpenError, SerialTransport};
-use crate::device::session::Standing;
+use crate::device::session::SessionStatus;
 use crate::device::stats::LinkStats;
 use crate::device::transport::Transport;
 use std::hash::{BuildHasher, RandomState};
@@ -49,8 +49,8 @@ const STATUS_US: i64 = 40_000;
 const STATS_US: i64 = 200_000;
 
 /// What a link is told.
-pub enum Command {
-    Choose(Choice),
+pub enum LinkCommand {
+    Choose(KnobChoice),
     Attach(Box<dyn Transport>),
     Arm { ceiling_mnm: u16, further_act: bool },
     LowerCeiling(u16),
@@ -62,16 +62,16 @@ pub enum Command {
 
 /// See the module.
 pub struct Worker {
-    places: Places,
+    places: RuntimeDir,
     label: String,
     hooks: Hooks,
-    commands: Receiver<Command>,
+    commands: Receiver<LinkCommand>,
     status: Arc<Mutex<LinkStatus>>,
     writer: KnobWriter,
     epoch: Instant,
     random: RandomState,
     openings: u64,
-    choice: Choice,
+    choice: KnobChoice,
     connection: Option<Connection>,
     feel_sender: Option<FeelSender>,
     /// What keeps the knob away; shown while there is no connection.
@@ -106,10 +106,10 @@ impl From<Phase> for Trouble {
 
 impl Worker {
     pub fn new(
-        places: Places,
+        places: RuntimeDir,
         label: &str,
         hooks: Hooks,
-        commands: Receiver<Command>,
+        commands: Receiver<LinkCommand>,
         status: Arc<Mutex<LinkStatus>>,
         writer: KnobWriter,
         epoch: Instant,
@@ -124,7 +124,7 @@ impl Worker {
             epoch,
             random: RandomState::new(),
             openings: 0,
-            choice: Choice::Off,
+            choice: KnobChoice::Off,
             connection: None,
             feel_sender: None,
             trouble: Phase::Off,
@@ -161,14 +161,14 @@ impl Worker {
             if let (Some(sender), Some(feel)) = (&mut self.feel_sender, &feel) {
                 sender.poll(feel, now_us);
             }
-            if self.connection.is_none() && now_us >= self.next_try_us && self.choice != Choice::Off {
+            if self.connection.is_none() && now_us >= self.next_try_us && self.choice != KnobChoice::Off {
                 self.try_open(now_us);
             }
             let mut outlet = Outlet { writer: &mut self.writer, hooks: &mut self.hooks, epoch: self.epoch };
             let ended = match &mut self.connection {
                 Some(connection) => connection.round(feel, &mut outlet).and_then(|()| {
                     let wanted = match self.choice {
-                        Choice::Serial { serial } => serial,
+                        KnobChoice::Serial { serial } => serial,
                         _ => None,
                     };
                     let now_us = self.epoch.elapsed().as_micros() as i64;
@@ -191,43 +191,43 @@ impl Worker {
 
     fn rest(&self) -> Duration {
         match self.choice {
-            Choice::Off => 5 * REST,
+            KnobChoice::Off => 5 * REST,
             _ => Duration::from_micros((self.next_try_us - self.now_us()).clamp(0, 10_000) as u64).min(REST),
         }
     }
 
-    fn obey(&mut self, command: Command) {
+    fn obey(&mut self, command: LinkCommand) {
         let now_us = self.now_us();
         let session = self.connection.as_mut().and_then(Connection::session);
         match (command, session) {
-            (Command::Choose(choice), _) => self.choose(choice),
-            (Command::Attach(transport), _) => {
+            (LinkCommand::Choose(choice), _) => self.choose(choice),
+            (LinkCommand::Attach(transport), _) => {
                 self.close();
                 self.lost_us = None;
                 self.open(transport, Vec::new(), now_us);
             }
-            (Command::Arm { ceiling_mnm, further_act }, Some(session)) => {
+            (LinkCommand::Arm { ceiling_mnm, further_act }, Some(session)) => {
                 self.refusal = None;
                 session.arm(ceiling_mnm, further_act, now_us);
             }
-            (Command::Arm { .. }, None) => {
+            (LinkCommand::Arm { .. }, None) => {
                 let why = if self.connection.is_some() {
                     "this knob's firmware can only be read"
                 } else {
-                    "no knob"
+                    "no knob is connected"
                 };
                 self.refusal = Some(format!("not armed: {why}"));
             }
-            (Command::LowerCeiling(ceiling_mnm), Some(session)) => session.lower_ceiling(ceiling_mnm),
-            (Command::Disarm, Some(session)) => session.disarm(now_us),
-            (Command::LowerCeiling(_) | Command::Disarm, None) => {}
-            (Command::Zero, _) => {
+            (LinkCommand::LowerCeiling(ceiling_mnm), Some(session)) => session.lower_ceiling(ceiling_mnm),
+            (LinkCommand::Disarm, Some(session)) => session.disarm(now_us),
+            (LinkCommand::LowerCeiling(_) | LinkCommand::Disarm, None) => {}
+            (LinkCommand::Zero, _) => {
                 if let Some(connection) = &mut self.connection {
                     connection.zero();
                 }
             }
-            (Command::TakeOver, _) => self.take_over(now_us),
-            (Command::FeelOsc(to), _) => {
+            (LinkCommand::TakeOver, _) => self.take_over(now_us),
+            (LinkCommand::FeelOsc(to), _) => {
                 self.feel_sender = to.and_then(|to| match FeelSender::new(to) {
                     Ok(sender) => Some(sender),
                     Err(e) => {
@@ -240,12 +240,12 @@ impl Worker {
         self.publish(true);
     }
 
-    fn choose(&mut self, choice: Choice) {
+    fn choose(&mut self, choice: KnobChoice) {
         if choice == self.choice {
             return;
         }
         self.close();
-        self.trouble = if choice == Choice::Off { Phase::Off } else { Phase::Searching };
+        self.trouble = if choice == KnobChoice::Off { Phase::Off } else { Phase::Searching };
         (self.held, self.last_serial, self.lost_us, self.refusal) = (None, None, None, None);
         (self.next_try_us, self.retry_us, self.cursor, self.taking_until_us) =
             (0, RETRY_LEAST_US, 0, i64::MIN);
@@ -274,7 +274,10 @@ impl Worker {
         let is_stock = connection.is_stock_heard(now_us);
         let session = connection.session();
         let is_live = session.as_ref().is_some_and(|session| {
-            matches!(session.standing(now_us), Standing::Live | Standing::OtherVersion | Standing::PlainMidi)
+            matches!(
+                session.status(now_us),
+                SessionStatus::Live | SessionStatus::OtherVersion | SessionStatus::PlainMidi
+            )
         });
         if is_live || is_stock {
             self.last_serial =
@@ -284,14 +287,14 @@ impl Worker {
         }
     }
 
-    fn ended(&mut self, end: End) {
+    fn ended(&mut self, end: ConnectionEnd) {
         let now_us = self.now_us();
         let Some(mut connection) = self.connection.take() else { return };
         let port = connection.port();
         let was_there = connection.session().is_none_or(|session| session.heard_us().is_some());
         self.next_try_us = now_us + RETRY_LEAST_US;
         match end {
-            End::Gone(why) => {
+            ConnectionEnd::Gone(why) => {
                 if was_there {
                     self.losses += 1;
                     self.lost_us = Some(now_us);
@@ -299,26 +302,29 @@ impl Worker {
                     self.trouble = Phase::Failed(why);
                 }
             }
-            End::LetGo(serial, holder) => {
+            ConnectionEnd::LetGo(serial, holder) => {
                 (self.trouble, self.held) = (Phase::HeldBy(holder.to_string()), Some(serial));
                 self.next_try_us = now_us + YIELD_US;
             }
-            End::Held(serial, holder) => {
+            ConnectionEnd::Held(serial, holder) => {
                 (self.trouble, self.held) = (Phase::HeldBy(holder.to_string()), Some(serial));
                 self.back_off(now_us);
             }
-            End::Stock(name) => {
+            ConnectionEnd::Stock(name) => {
                 self.trouble = Phase::StockSerial(name);
                 self.back_off(now_us);
             }
-            End::NoAnswer => {
+            ConnectionEnd::NoAnswer => {
                 self.trouble = Phase::NoAnswer(format!(
-                    "nothing that is known answers at {port}: is it a knob with the firmware in firmware/?"
+                    "no known device answers at {port}: does it run the firmware in firmware/?"
                 ));
                 self.back_off(now_us);
             }
-            End::AnotherKnob(serial) => {
-                let text = format!("the knob at {port} is {}, not the one chosen", serial_text(serial));
+            ConnectionEnd::AnotherKnob(serial) => {
+                let text = format!(
+                    "the knob at {port} has serial number {}; another one was chosen",
+                    serial_text(serial)
+                );
                 self.trouble = Phase::NoAnswer(text);
                 self.back_off(now_us);
             }
@@ -339,11 +345,11 @@ impl Worker {
 
     fn try_open(&mut self, now_us: i64) {
         let opened = match self.choice.clone() {
-            Choice::Off => return,
-            Choice::Serial { serial } => self.open_serial(serial),
-            Choice::Path(path) => self.open_path(&path),
-            Choice::Midi { name } => self.open_midi(name.as_deref()),
-            Choice::Osc { port, any_address } => self.open_osc(port, any_address),
+            KnobChoice::Off => return,
+            KnobChoice::Serial { serial } => self.open_serial(serial),
+            KnobChoice::Path(path) => self.open_path(&path),
+            KnobChoice::Midi { name } => self.open_midi(name.as_deref()),
+            KnobChoice::Osc { port, any_address } => self.open_osc(port, any_address),
         };
         match opened {
             Ok((transport, owned)) => self.open(transport, owned, now_us),
@@ -406,7 +412,7 @@ impl Worker {
         match SerialTransport::open(path) {
             Ok(port) => Ok(Box::new(port)),
             Err(OpenError::Missing(text)) => {
-                let is_chosen = matches!(self.choice, Choice::Path(_)) && self.lost_us.is_none();
+                let is_chosen = matches!(self.choice, KnobChoice::Path(_)) && self.lost_us.is_none();
                 Err(if is_chosen { Phase::Failed(text) } else { Phase::Searching }.into())
             }
             Err(OpenError::Permission(text)) => Err(Phase::NoPermission(text).into()),
@@ -436,7 +442,7 @@ impl Worker {
         let owned = self.own(port_serial(&name), &name)?;
         let transport = OscTransport::open(port, any_address).map_err(|e| match e.kind() {
             io::ErrorKind::AddrInUse => Phase::Busy(format!(
-                "{name} is in use by another program: close that one, or set another port there and here"
+                "{name} is in use by another program: close that program, or set another port on both sides"
             )),
             _ => Phase::Failed(format!("{name} does not open: {e}")),
         })?;
@@ -498,12 +504,12 @@ impl Worker {
                         if let Some(refusal) = session.refusal() {
                             status.last_refusal = Some(refusal.into());
                         }
-                        match session.standing(now_us) {
-                            Standing::Live => Phase::Live,
-                            Standing::OtherVersion => Phase::VersionMismatch,
-                            Standing::PlainMidi => Phase::ReadOnly,
-                            Standing::Stock(name) => Phase::StockSerial(name),
-                            Standing::Greeting | Standing::Silent => lost.unwrap_or(Phase::Waiting),
+                        match session.status(now_us) {
+                            SessionStatus::Live => Phase::Live,
+                            SessionStatus::OtherVersion => Phase::VersionMismatch,
+                            SessionStatus::PlainMidi => Phase::ReadOnly,
+                            SessionStatus::Stock(name) => Phase::StockSerial(name),
+                            SessionStatus::Greeting | SessionStatus::Silent => lost.unwrap_or(Phase::Waiting),
                         }
                     }
                 }

@@ -21,7 +21,7 @@ const TRIES: u32 = 4;
 
 /// What is due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Due {
+pub enum ArmingMessage {
     /// Send ARM.
     Arm,
     /// Send FREE.
@@ -29,7 +29,7 @@ pub enum Due {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Want {
+enum Goal {
     Free,
     /// Told to arm; not seen armed yet.
     Arming {
@@ -41,7 +41,7 @@ enum Want {
 /// See the module.
 #[derive(Debug)]
 pub struct Arming {
-    want: Want,
+    want: Goal,
     ceiling_mnm: u16,
     next_us: i64,
     say_free: bool,
@@ -51,7 +51,7 @@ pub struct Arming {
 impl Default for Arming {
     fn default() -> Self {
         Self {
-            want: Want::Free,
+            want: Goal::Free,
             ceiling_mnm: FIRST_CEILING_MNM,
             next_us: i64::MIN,
             say_free: false,
@@ -68,14 +68,14 @@ impl Arming {
 
     /// True while the knob is armed and shall be.
     pub fn is_armed(&self) -> bool {
-        self.is_armed && self.want == Want::Armed
+        self.is_armed && self.want == Goal::Armed
     }
 
     /// The user allows torque. Above [`OFFERED_CEILING_MNM`] only with a `further_act`; the least limit wins, last of all.
     pub fn arm(&mut self, ceiling_mnm: u16, further_act: bool, info: &Info, now_us: i64) {
         let offered = if further_act { HARD_CEILING_MNM } else { OFFERED_CEILING_MNM };
         self.ceiling_mnm = ceiling_mnm.min(offered).min(info.ceiling_mnm).min(HARD_CEILING_MNM);
-        self.want = Want::Arming { tries: 0 };
+        self.want = Goal::Arming { tries: 0 };
         self.next_us = now_us;
         self.say_free = false;
     }
@@ -87,14 +87,14 @@ impl Arming {
 
     /// The user, or whoever runs this, wants no torque.
     pub fn disarm(&mut self, now_us: i64) {
-        self.want = Want::Free;
+        self.want = Goal::Free;
         self.say_free = true;
         self.next_us = now_us;
     }
 
     /// The knob is gone, or has refused: nothing to say, and a new act needed.
     pub fn forget(&mut self) {
-        self.want = Want::Free;
+        self.want = Goal::Free;
         self.is_armed = false;
     }
 
@@ -102,9 +102,9 @@ impl Arming {
     pub fn hear(&mut self, is_armed: bool) -> bool {
         let was_armed = std::mem::replace(&mut self.is_armed, is_armed);
         match self.want {
-            Want::Arming { .. } if is_armed => self.want = Want::Armed,
-            Want::Armed if was_armed && !is_armed => {
-                self.want = Want::Free;
+            Goal::Arming { .. } if is_armed => self.want = Goal::Armed,
+            Goal::Armed if was_armed && !is_armed => {
+                self.want = Goal::Free;
                 return true;
             }
             _ => {}
@@ -113,27 +113,27 @@ impl Arming {
     }
 
     /// What is due now.
-    pub fn poll(&mut self, now_us: i64) -> Option<Due> {
+    pub fn poll(&mut self, now_us: i64) -> Option<ArmingMessage> {
         if now_us < self.next_us {
             return None;
         }
         match self.want {
-            Want::Free if self.say_free || self.is_armed => {
+            Goal::Free if self.say_free || self.is_armed => {
                 self.say_free = false;
                 self.next_us = now_us + INSIST_US;
-                Some(Due::Free)
+                Some(ArmingMessage::Free)
             }
-            Want::Arming { tries } if tries < TRIES => {
-                self.want = Want::Arming { tries: tries + 1 };
+            Goal::Arming { tries } if tries < TRIES => {
+                self.want = Goal::Arming { tries: tries + 1 };
                 self.next_us = now_us + INSIST_US;
-                Some(Due::Arm)
+                Some(ArmingMessage::Arm)
             }
             // All tries are through and the last has had its time.
-            Want::Arming { .. } => {
-                self.want = Want::Free;
+            Goal::Arming { .. } => {
+                self.want = Goal::Free;
                 None
             }
-            Want::Free | Want::Armed => None,
+            Goal::Free | Goal::Armed => None,
         }
     }
 }
@@ -162,7 +162,7 @@ pub(super) mod tests {
         }
     }
 
-    fn said(arming: &mut Arming, from_ms: i64, to_ms: i64) -> Vec<Due> {
+    fn said(arming: &mut Arming, from_ms: i64, to_ms: i64) -> Vec<ArmingMessage> {
         (from_ms..to_ms).filter_map(|ms| arming.poll(ms * 1000)).collect()
     }
 
@@ -189,7 +189,7 @@ pub(super) mod tests {
         let mut arming = Arming::default();
         assert_eq!(said(&mut arming, 0, 100), []);
         arming.arm(100, false, &info(450), 100_000);
-        assert_eq!(said(&mut arming, 100, 120), [Due::Arm]);
+        assert_eq!(said(&mut arming, 100, 120), [ArmingMessage::Arm]);
         assert!(!arming.hear(true));
         assert!(arming.is_armed());
         assert_eq!(said(&mut arming, 120, 1000), []);
@@ -201,19 +201,23 @@ pub(super) mod tests {
     fn an_act_without_effect_ends() {
         let mut arming = Arming::default();
         arming.arm(100, false, &info(450), 0);
-        assert_eq!(said(&mut arming, 0, 3000), [Due::Arm; 4]);
+        assert_eq!(said(&mut arming, 0, 3000), [ArmingMessage::Arm; 4]);
         arming.hear(true);
-        assert_eq!(said(&mut arming, 3000, 3001), [Due::Free], "too late: nobody wants it any more");
+        assert_eq!(
+            said(&mut arming, 3000, 3001),
+            [ArmingMessage::Free],
+            "too late: nobody wants it any more"
+        );
     }
 
     #[test]
     fn an_armed_knob_nobody_wants_is_freed_until_it_is() {
         let mut arming = Arming::default();
         arming.hear(true);
-        assert_eq!(said(&mut arming, 0, 200), [Due::Free; 4]);
+        assert_eq!(said(&mut arming, 0, 200), [ArmingMessage::Free; 4]);
         arming.hear(false);
         assert_eq!(said(&mut arming, 200, 400), []);
         arming.disarm(400_000);
-        assert_eq!(said(&mut arming, 400, 600), [Due::Free], "said even if the knob seems free");
+        assert_eq!(said(&mut arming, 400, 600), [ArmingMessage::Free], "said even if the knob seems free");
     }
 }

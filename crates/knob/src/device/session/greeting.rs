@@ -26,7 +26,7 @@ const TEXT: usize = 256;
 
 /// What is due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Due {
+pub enum GreetingStep {
     /// Send HELLO.
     Hello,
     /// Set the line to this speed.
@@ -87,7 +87,7 @@ impl Greeting {
     }
 
     /// The next thing due, until `None`. `is_framed`: valid frames arrive, so the speed is right.
-    pub fn poll(&mut self, now_us: i64, is_framed: bool) -> Option<Due> {
+    pub fn poll(&mut self, now_us: i64, is_framed: bool) -> Option<GreetingStep> {
         if self.is_serial && now_us >= self.next_speed_us && !is_framed {
             self.next_speed_us = now_us + SPEED_US;
             self.is_slow = !self.is_slow;
@@ -97,17 +97,17 @@ impl Greeting {
                 self.text.clear();
             }
             self.next_hello_us = now_us;
-            return Some(Due::Baud(if self.is_slow { SLOW_BAUD } else { BAUD }));
+            return Some(GreetingStep::Baud(if self.is_slow { SLOW_BAUD } else { BAUD }));
         }
         if std::mem::take(&mut self.question_due) {
             self.has_asked = true;
             self.next_hello_us = now_us + QUIET_US;
-            return Some(Due::Question);
+            return Some(GreetingStep::Question);
         }
         if now_us >= self.next_hello_us {
             self.next_hello_us = now_us + HELLO_US;
             self.hello_us = Some(now_us);
-            return Some(Due::Hello);
+            return Some(GreetingStep::Hello);
         }
         None
     }
@@ -145,7 +145,7 @@ mod tests {
     use super::*;
 
     /// Everything due within `seconds` of silence, with its time in ms.
-    fn log(seconds: i64, greeting: &mut Greeting) -> Vec<(i64, Due)> {
+    fn log(seconds: i64, greeting: &mut Greeting) -> Vec<(i64, GreetingStep)> {
         let mut log = Vec::new();
         for ms in 0..seconds * 1000 {
             while let Some(due) = greeting.poll(ms * 1000, false) {
@@ -158,17 +158,18 @@ mod tests {
     #[test]
     fn both_speeds_are_tried_and_the_question_asked_once() {
         let log = log(5, &mut Greeting::new(Binding::Serial, 0));
-        let hello: Vec<i64> = log.iter().filter(|(_, due)| *due == Due::Hello).map(|(ms, _)| *ms).collect();
+        let hello: Vec<i64> =
+            log.iter().filter(|(_, due)| *due == GreetingStep::Hello).map(|(ms, _)| *ms).collect();
         assert_eq!(hello[..3], [0, 250, 500]);
         assert!(
             hello.windows(6).all(|six| six[5] - six[0] >= 1000),
             "four a second, and one with each change of speed"
         );
-        let bauds: Vec<(i64, Due)> =
-            log.iter().filter(|(_, due)| matches!(due, Due::Baud(_))).copied().collect();
-        assert_eq!(bauds[..2], [(600, Due::Baud(115_200)), (1300, Due::Baud(921_600))]);
+        let bauds: Vec<(i64, GreetingStep)> =
+            log.iter().filter(|(_, due)| matches!(due, GreetingStep::Baud(_))).copied().collect();
+        assert_eq!(bauds[..2], [(600, GreetingStep::Baud(115_200)), (1300, GreetingStep::Baud(921_600))]);
         let asked: Vec<i64> =
-            log.iter().filter(|(_, due)| *due == Due::Question).map(|(ms, _)| *ms).collect();
+            log.iter().filter(|(_, due)| *due == GreetingStep::Question).map(|(ms, _)| *ms).collect();
         assert_eq!(asked, [600]);
     }
 
@@ -178,7 +179,7 @@ mod tests {
         greeting.hear(b"rst:0x1 (POWERON_RESET)");
         let asked: Vec<i64> = log(5, &mut greeting)
             .iter()
-            .filter(|(_, due)| *due == Due::Question)
+            .filter(|(_, due)| *due == GreetingStep::Question)
             .map(|(ms, _)| *ms)
             .collect();
         assert_eq!(asked, [2000]);
@@ -188,7 +189,7 @@ mod tests {
     fn midi_knows_no_speed_and_no_question() {
         let log = log(3, &mut Greeting::new(Binding::Midi, 0));
         assert_eq!(log.len(), 12);
-        assert!(log.iter().all(|(_, due)| *due == Due::Hello));
+        assert!(log.iter().all(|(_, due)| *due == GreetingStep::Hello));
     }
 
     #[test]

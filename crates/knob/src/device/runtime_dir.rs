@@ -1,19 +1,19 @@
-//! Where programs on this machine leave word for each other about knobs.
+//! The directory in which programs on this machine tell each other about knobs.
 
 use std::fs;
 use std::io;
 use std::path::PathBuf;
 
-/// Names the directory instead of the system's own; for tests and unusual systems.
+/// Environment variable that names another directory; for tests and unusual systems.
 pub const VARIABLE: &str = "CHALUMEAU_RUNTIME_DIR";
 
 /// The directory shared by all instances: `chalumeau` in the user's runtime directory, else in that for temporary files.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Places {
+pub struct RuntimeDir {
     root: PathBuf,
 }
 
-impl Default for Places {
+impl Default for RuntimeDir {
     fn default() -> Self {
         let chosen = std::env::var_os(VARIABLE).map(PathBuf::from);
         let root = chosen.or_else(dirs::runtime_dir).unwrap_or_else(std::env::temp_dir);
@@ -21,18 +21,18 @@ impl Default for Places {
     }
 }
 
-impl Places {
+impl RuntimeDir {
     /// `chalumeau` in `directory`.
     pub fn within(directory: impl Into<PathBuf>) -> Self {
         Self { root: directory.into().join("chalumeau") }
     }
 
-    /// Where simulated knobs are announced; made if it is not there.
+    /// The directory in which simulated knobs are announced; created if missing.
     pub fn knobs(&self) -> io::Result<PathBuf> {
         self.made("knobs")
     }
 
-    /// Where owners of knobs are named; made if it is not there.
+    /// The directory of locks and owners; created if missing.
     pub fn locks(&self) -> io::Result<PathBuf> {
         self.made("locks")
     }
@@ -44,7 +44,7 @@ impl Places {
     }
 }
 
-/// A device's serial number as file names and people have it.
+/// A device's serial number as text, 16 hexadecimal digits, as in file names and on screens.
 pub fn serial_text(serial: u64) -> String {
     format!("{serial:016x}")
 }

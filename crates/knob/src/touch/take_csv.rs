@@ -1,0 +1,278 @@
+//! Reads and writes takes as CSV files, with the columns of the study log.
+//!
+//! The first line names the columns; lines that begin with `#` are comments. `t_us` and `angle_deg` are required, at any
+//! place; the other columns may be missing or empty. Unknown columns are ignored. Time may start anywhere but must not
+//! go back; a replay starts at the first row.
+
+use crate::touch::study::StudySide;
+use crate::touch::take::{Take, TakeMarks, TakeRow};
+use std::io::{self, Read, Write};
+
+/// Column names in the order they are written.
+pub const HEADER: &str = "t_us,angle_deg,velocity_deg_s,torque_mnm,written_midi,gamma,feel_id,h,k,\
+                          participant,trial,side,condition";
+/// Rows a file may have: ten hours at 500 a second.
+const MOST_ROWS: usize = 18_000_000;
+/// Largest angle that makes sense, degrees: a hundred turns.
+const MOST_DEG: f64 = 36_000.0;
+/// Largest magnitude of any other number; only keeps out what no knob measures.
+const MOST_MEASURED: f64 = 1e9;
+
+/// Why a file cannot be read as a take. Lines count from 1.
+#[derive(Debug, thiserror::Error)]
+pub enum TakeError {
+    /// A required column is missing.
+    #[error("the first line has no column `{0}`; a take begins with a line such as `{HEADER}`")]
+    Column(&'static str),
+    /// A cell does not hold a number of the right kind.
+    #[error("line {line}: {column} is `{text}`; it must be {wanted}")]
+    Cell {
+        /// Line of the file, from 1.
+        line: u64,
+        /// Column's name.
+        column: &'static str,
+        /// Its text.
+        text: String,
+        /// What it should hold.
+        wanted: &'static str,
+    },
+    /// Time runs backwards.
+    #[error("line {line}: t_us goes back from {before} to {now}; a take runs forward")]
+    Backwards {
+        /// Line of the file.
+        line: u64,
+        /// Time of the row before, us.
+        before: u64,
+        /// Time of this row, us.
+        now: u64,
+    },
+    /// No rows.
+    #[error("the take has no rows")]
+    Empty,
+    /// Too many rows.
+    #[error("the take has more than {MOST_ROWS} rows; cut it into pieces")]
+    TooLong,
+    /// Not a CSV table.
+    #[error("not a CSV table: {0}")]
+    Csv(#[from] csv::Error),
+}
+
+impl Take {
+    /// Reads a take from a CSV file. The first error ends the reading; its text names the line.
+    pub fn read(from: impl Read) -> Result<Self, TakeError> {
+        let mut reader = csv::ReaderBuilder::new()
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .flexible(true)
+            .from_reader(from);
+        let columns = Columns::find(reader.headers()?)?;
+        let mut rows: Vec<TakeRow> = Vec::new();
+        let mut record = csv::StringRecord::new();
+        while reader.read_record(&mut record)? {
+            if rows.len() == MOST_ROWS {
+                return Err(TakeError::TooLong);
+            }
+            let row = columns.row(&record)?;
+            if let Some(before) = rows.last().map(|last| last.t_us).filter(|&before| before > row.t_us) {
+                return Err(TakeError::Backwards { line: line(&record), before, now: row.t_us });
+            }
+            rows.push(row);
+        }
+        if rows.is_empty() { Err(TakeError::Empty) } else { Ok(Self { rows }) }
+    }
+}
+
+/// A column's name, and its place in the file if the file has it.
+type Column = (&'static str, Option<usize>);
+
+/// Where a file has each column.
+struct Columns {
+    t_us: Column,
+    angle_deg: Column,
+    velocity_deg_s: Column,
+    torque_mnm: Column,
+    written: Column,
+    gamma: Column,
+    feel_id: Column,
+}
+
+impl Columns {
+    fn find(header: &csv::StringRecord) -> Result<Self, TakeError> {
+        let column = |name: &'static str| -> Column {
+            (name, header.iter().position(|column| column.eq_ignore_ascii_case(name)))
+        };
+        let required = |name| match column(name) {
+            (_, None) => Err(TakeError::Column(name)),
+            found => Ok(found),
+        };
+        Ok(Self {
+            t_us: required("t_us")?,
+            angle_deg: required("angle_deg")?,
+            velocity_deg_s: column("velocity_deg_s"),
+            torque_mnm: column("torque_mnm"),
+            written: column("written_midi"),
+            gamma: column("gamma"),
+            feel_id: column("feel_id"),
+        })
+    }
+
+    fn row(&self, record: &csv::StringRecord) -> Result<TakeRow, TakeError> {
+        let measured = |column| match cell(record, column) {
+            "" => Ok(0.0),
+            _ => number(record, column, MOST_MEASURED, "a number, or empty"),
+        };
+        let small = |column| match cell(record, column) {
+            "" => Ok(None),
+            text => text
+                .parse::<u8>()
+                .map(Some)
+                .map_err(|_| refuse(record, column, "a whole number in 0..255, or empty")),
+        };
+        let t_us = cell(record, self.t_us).parse();
+        Ok(TakeRow {
+            t_us: t_us.map_err(|_| refuse(record, self.t_us, "a whole number of microseconds"))?,
+            angle_deg: number(record, self.angle_deg, MOST_DEG, "degrees within 100 turns")?,
+            velocity_deg_s: measured(self.velocity_deg_s)?,
+            torque_mnm: measured(self.torque_mnm)?,
+            written: small(self.written)?,
+            gamma: measured(self.gamma)?,
+            feel_id: small(self.feel_id)?.unwrap_or(0),
+        })
+    }
+}
+
+/// Line of a record in its file, from 1.
+fn line(record: &csv::StringRecord) -> u64 {
+    record.position().map_or(0, csv::Position::line)
+}
+
+fn cell(record: &csv::StringRecord, (_, at): Column) -> &str {
+    at.and_then(|at| record.get(at)).unwrap_or("")
+}
+
+fn number(
+    record: &csv::StringRecord,
+    column: Column,
+    limit: f64,
+    wanted: &'static str,
+) -> Result<f64, TakeError> {
+    match cell(record, column).parse::<f64>() {
+        Ok(value) if value.abs() <= limit => Ok(value),
+        _ => Err(refuse(record, column, wanted)),
+    }
+}
+
+fn refuse(record: &csv::StringRecord, column: Column, wanted: &'static str) -> TakeError {
+    let text = cell(record, column).to_owned();
+    TakeError::Cell { line: line(record), column: column.0, text, wanted }
+}
+
+/// Writes a take as a CSV file.
+pub struct TakeWriter<W> {
+    out: W,
+}
+
+impl<W: Write> TakeWriter<W> {
+    /// Begins with comments (one a line) and the names of the columns. Errors are those of `out`.
+    pub fn new(mut out: W, comments: &[String]) -> io::Result<Self> {
+        for comment in comments {
+            writeln!(out, "# {}", comment.replace(['\r', '\n'], " "))?;
+        }
+        writeln!(out, "{HEADER}")?;
+        Ok(Self { out })
+    }
+
+    /// Writes one row. Errors are those of the output.
+    pub fn write(&mut self, row: &TakeRow, marks: &TakeMarks) -> io::Result<()> {
+        let TakeRow { t_us, angle_deg, velocity_deg_s, torque_mnm, written, gamma, feel_id } = *row;
+        let written = written.map_or_else(String::new, |written| written.to_string());
+        write!(
+            self.out,
+            "{t_us},{angle_deg:.2},{velocity_deg_s:.1},{torque_mnm:.0},{written},{gamma:.5},{feel_id},"
+        )?;
+        match marks.reed {
+            Some((h, k)) => write!(self.out, "{h:.5},{k:.5},")?,
+            None => write!(self.out, ",,")?,
+        }
+        match marks.study {
+            Some((participant, trial, side, condition)) => {
+                let side = match side {
+                    StudySide::A => "A",
+                    StudySide::B => "B",
+                };
+                writeln!(self.out, "{participant},{trial},{side},{}", condition.name())
+            }
+            None => writeln!(self.out, ",,,"),
+        }
+    }
+
+    /// The output.
+    pub fn get_ref(&self) -> &W {
+        &self.out
+    }
+
+    /// Gives the output back.
+    pub fn into_inner(self) -> W {
+        self.out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Take, TakeError> {
+        Take::read(text.as_bytes())
+    }
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let rows: Vec<TakeRow> = (0..50)
+            .map(|n| TakeRow {
+                t_us: 1_000_000 + 2_000 * n,
+                angle_deg: -3.25 + n as f64,
+                velocity_deg_s: 500.0,
+                torque_mnm: -17.0,
+                written: (n > 10).then_some(60),
+                gamma: 0.5,
+                feel_id: n as u8,
+            })
+            .collect();
+        let mut writer = TakeWriter::new(Vec::new(), &["participant\n7".to_owned()]).unwrap();
+        for row in &rows {
+            writer.write(row, &TakeMarks::default()).unwrap();
+        }
+        let take = Take::read(&*writer.into_inner()).unwrap();
+        assert_eq!(take.rows(), rows);
+        assert!((take.seconds() - 0.098).abs() < 1e-12);
+    }
+
+    #[test]
+    fn two_columns_are_enough_and_the_angle_runs_between_rows() {
+        let take = read("# by hand\nangle_deg, t_us\n0,0\n10,1000\n10,1000\n30,3000\n").unwrap();
+        for (t_s, angle_deg) in [(-1.0, 0.0), (0.0, 0.0), (0.0005, 5.0), (0.002, 20.0), (9.0, 30.0)] {
+            assert!((take.angle_deg(t_s) - angle_deg).abs() < 1e-9, "{t_s}");
+        }
+    }
+
+    #[test]
+    fn mistakes_are_named_with_their_line() {
+        for (text, said) in [
+            ("", "no column `t_us`"),
+            ("t_us,angle\n", "no column `angle_deg`"),
+            ("t_us,angle_deg\n", "no rows"),
+            ("t_us,angle_deg\n1,2\nx,3\n", "line 3: t_us is `x`"),
+            ("t_us,angle_deg\n1,nan\n", "line 2: angle_deg is `nan`"),
+            ("t_us,angle_deg\n1,1e9\n", "within 100 turns"),
+            ("t_us,angle_deg\n5,1\n4,1\n", "line 3: t_us goes back from 5 to 4"),
+            ("t_us,angle_deg,written_midi\n5,1,300\n", "written_midi is `300`"),
+            ("t_us,angle_deg,gamma\n5,1,loud\n", "gamma is `loud`"),
+            ("t_us,angle_deg\n5\n", "angle_deg is ``"),
+            ("t_us,angle_deg\n5,\u{0}\n", "angle_deg"),
+        ] {
+            let error = read(text).unwrap_err().to_string();
+            assert!(error.contains(said), "{text:?}: {error}");
+        }
+        assert!(Take::read(&b"t_us,angle_deg\n\xff,1\n"[..]).is_err());
+    }
+}
