@@ -1,8 +1,8 @@
 //! The player: turns notes, breath and settings into holes, lip, tongue and mouth pressure, tick by tick.
 //!
-//! [`breath`] makes the mouth pressure from a breath source or from key velocity. [`tongue`] articulates: overlapping
+//! `breath` makes the mouth pressure from a breath source or from key velocity. `tongue` articulates: overlapping
 //! notes are slurred (the holes move and the tongue stays away); after a gap the tongue holds the reed while the breath
-//! rises behind it, and lets go. [`fingers`] moves the holes, [`tuning`] the pitch, and [`posture`] holds what settings,
+//! rises behind it, and lets go. `fingers` moves the holes, `tuning` the pitch, and `posture` holds what settings,
 //! fingering and bend ask for.
 
 mod breath;
