@@ -30,14 +30,14 @@ pub enum PictureError {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Format {
+enum PictureFormat {
     Png,
     Svg,
     Gif,
     Json,
 }
 
-impl Format {
+impl PictureFormat {
     fn of(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "png" => Some(Self::Png),
@@ -52,15 +52,15 @@ impl Format {
 /// A picture file that is open already, so that a bad path is refused before anything is measured.
 pub struct PictureFile {
     file: NewFile,
-    format: Format,
+    format: PictureFormat,
     size: Option<Size>,
 }
 
 impl PictureFile {
     /// For one figure: a `.png`, an `.svg`, or its data as `.json`; in the figure's own size unless one is given.
     pub fn still(path: &Path, force: bool, size: Option<Size>) -> Result<Self, PictureError> {
-        match Format::of(path) {
-            Some(format @ (Format::Png | Format::Svg | Format::Json)) => {
+        match PictureFormat::of(path) {
+            Some(format @ (PictureFormat::Png | PictureFormat::Svg | PictureFormat::Json)) => {
                 Ok(Self { file: NewFile::create(path, force)?, format, size })
             }
             _ => Err(PictureError::Extension {
@@ -72,8 +72,10 @@ impl PictureFile {
 
     /// For a sequence of figures: a `.gif`.
     pub fn moving(path: &Path, force: bool, size: Option<Size>) -> Result<Self, PictureError> {
-        match Format::of(path) {
-            Some(Format::Gif) => Ok(Self { file: NewFile::create(path, force)?, format: Format::Gif, size }),
+        match PictureFormat::of(path) {
+            Some(PictureFormat::Gif) => {
+                Ok(Self { file: NewFile::create(path, force)?, format: PictureFormat::Gif, size })
+            }
             _ => Err(PictureError::Extension { path: path.to_owned(), wanted: ".gif" }),
         }
     }
@@ -81,9 +83,9 @@ impl PictureFile {
     /// Draws the figure and gives the file its name.
     pub fn draw(self, figure: &Figure) -> Result<(), PictureError> {
         let bytes = match self.format {
-            Format::Svg => draw::svg(figure, self.size)?.into_bytes(),
-            Format::Json => draw::json(figure)?,
-            Format::Png | Format::Gif => draw::png(figure, self.size)?,
+            PictureFormat::Svg => draw::svg(figure, self.size)?.into_bytes(),
+            PictureFormat::Json => draw::json(figure)?,
+            PictureFormat::Png | PictureFormat::Gif => draw::png(figure, self.size)?,
         };
         self.keep(&bytes)
     }

@@ -34,7 +34,7 @@ pub enum WavError {
 
 /// What went into a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Level {
+pub struct PeakLevel {
     /// Largest magnitude, full scale 1.
     pub peak: f32,
     /// Samples beyond full scale, cut (never for floats).
@@ -46,7 +46,7 @@ pub struct WavFile<W: Write + Seek> {
     writer: WavWriter<BufWriter<W>>,
     depth: Depth,
     channels: u16,
-    level: Level,
+    level: PeakLevel,
 }
 
 impl<W: Write + Seek> WavFile<W> {
@@ -66,7 +66,7 @@ impl<W: Write + Seek> WavFile<W> {
         }
         let spec = WavSpec { channels, sample_rate: rate, bits_per_sample, sample_format };
         let writer = WavWriter::new(BufWriter::new(file), spec)?;
-        Ok(Self { writer, depth, channels, level: Level::default() })
+        Ok(Self { writer, depth, channels, level: PeakLevel::default() })
     }
 
     /// Appends one block.
@@ -86,7 +86,7 @@ impl<W: Write + Seek> WavFile<W> {
     }
 
     /// Completes the header.
-    pub fn finish(self) -> Result<Level, WavError> {
+    pub fn finish(self) -> Result<PeakLevel, WavError> {
         self.writer.finalize()?;
         Ok(self.level)
     }
@@ -102,7 +102,10 @@ mod tests {
     use super::*;
     use crate::output::NewFile;
 
-    fn written(depth: Depth, channels: u16) -> (Level, hound::WavReader<std::io::BufReader<std::fs::File>>) {
+    fn written(
+        depth: Depth,
+        channels: u16,
+    ) -> (PeakLevel, hound::WavReader<std::io::BufReader<std::fs::File>>) {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("x.wav");
         let mut file = NewFile::create(&path, false).unwrap();
@@ -117,7 +120,7 @@ mod tests {
     #[test]
     fn integers_round_and_clipping_is_counted() {
         let (level, mut reader) = written(Depth::Int16, 2);
-        assert_eq!(level, Level { peak: 1.5, clipped: 1 });
+        assert_eq!(level, PeakLevel { peak: 1.5, clipped: 1 });
         let samples: Vec<i32> = reader.samples().map(Result::unwrap).collect();
         assert_eq!(samples, [16_384, 16_384, -32_767, -32_767, 32_767, 32_767, 0, 0]);
         let (_, mut reader) = written(Depth::Int24, 1);
@@ -128,7 +131,7 @@ mod tests {
     #[test]
     fn floats_stay_as_they_are() {
         let (level, mut reader) = written(Depth::Float32, 1);
-        assert_eq!(level, Level { peak: 1.5, clipped: 0 });
+        assert_eq!(level, PeakLevel { peak: 1.5, clipped: 0 });
         let samples: Vec<f32> = reader.samples().map(Result::unwrap).collect();
         assert_eq!(samples, [0.5, -1.0, 1.5, 0.0]);
     }
