@@ -1,6 +1,6 @@
-//! Pictures as files: PNG, SVG, an animated GIF, or a figure's data as JSON, chosen by the file's extension.
+//! Writes figures as files: PNG, SVG, animated GIF, or the figure's data as JSON. The file's extension decides which.
 //!
-//! A file appears whole or not at all.
+//! A file appears complete or not at all.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -49,7 +49,7 @@ impl PictureFormat {
     }
 }
 
-/// A picture file that is open already, so that a bad path is refused before anything is measured.
+/// A picture file, opened before any measurement, so that a bad path fails early.
 pub struct PictureFile {
     file: NewFile,
     format: PictureFormat,
@@ -57,7 +57,7 @@ pub struct PictureFile {
 }
 
 impl PictureFile {
-    /// For one figure: a `.png`, an `.svg`, or its data as `.json`; in the figure's own size unless one is given.
+    /// Opens a `.png`, an `.svg`, or a `.json` for one figure. Without `size`, the figure has its own size.
     pub fn still(path: &Path, force: bool, size: Option<Size>) -> Result<Self, PictureError> {
         match PictureFormat::of(path) {
             Some(format @ (PictureFormat::Png | PictureFormat::Svg | PictureFormat::Json)) => {
@@ -70,7 +70,7 @@ impl PictureFile {
         }
     }
 
-    /// For a sequence of figures: a `.gif`.
+    /// Opens a `.gif` for a sequence of figures.
     pub fn moving(path: &Path, force: bool, size: Option<Size>) -> Result<Self, PictureError> {
         match PictureFormat::of(path) {
             Some(PictureFormat::Gif) => {
@@ -90,7 +90,7 @@ impl PictureFile {
         self.keep(&bytes)
     }
 
-    /// Draws a sequence, `frame_s` seconds a frame, repeated for ever, and gives the file its name. `drawn` is called
+    /// Draws a sequence that repeats forever, with `frame_s` seconds per frame, and gives the file its name. Calls `drawn`
     /// after each frame.
     pub fn animate(self, frames: &[Figure], frame_s: f64, drawn: impl FnMut()) -> Result<(), PictureError> {
         let bytes = draw::gif(frames, self.size, frame_s, drawn)?;
@@ -104,7 +104,7 @@ impl PictureFile {
     }
 }
 
-/// Draws `figure` into a new file, `.png`, `.svg` or `.json`.
+/// Draws `figure` into a new file: `.png`, `.svg` or `.json`. `force` replaces an existing file.
 pub fn write(figure: &Figure, path: &Path, size: Option<Size>, force: bool) -> Result<(), PictureError> {
     PictureFile::still(path, force, size)?.draw(figure)
 }

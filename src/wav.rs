@@ -1,4 +1,4 @@
-//! Samples into a WAV file: 16 or 24 bit integers, rounded to nearest without dither, or 32 bit floats as they are.
+//! Writes WAV files: 16 or 24 bit integers, rounded to nearest without dither, or unchanged 32 bit floats.
 
 use hound::{SampleFormat, WavSpec, WavWriter};
 use std::io::{BufWriter, Seek, Write};
@@ -14,34 +14,34 @@ pub enum Depth {
     Float32,
 }
 
-/// What a WAV file cannot hold.
+/// Why a WAV file cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum WavError {
-    /// Sizes in the header have 32 bits.
+    /// The file would be larger than 4 GB; its header has 32 bits for sizes.
     #[error(
         "{seconds:.0} s at this rate and depth need {gigabytes:.1} GB, a WAV file holds 4; render less, at a lower rate or fewer bits"
     )]
     TooLong {
-        /// Length asked for.
+        /// Requested length, s.
         seconds: f64,
-        /// Its size.
+        /// The size of the file, GB.
         gigabytes: f64,
     },
-    /// The disk refuses.
+    /// The system reports an error.
     #[error("cannot write the WAV file: {0}")]
     Write(#[from] hound::Error),
 }
 
-/// What went into a file.
+/// Level of the samples in a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PeakLevel {
     /// Largest magnitude, full scale 1.
     pub peak: f32,
-    /// Samples beyond full scale, cut (never for floats).
+    /// Number of samples clipped at full scale; 0 for floats.
     pub clipped: u64,
 }
 
-/// A WAV file being written; each sample goes to every channel.
+/// A WAV file that is being written. Each sample goes to every channel.
 pub struct WavFile<W: Write + Seek> {
     writer: WavWriter<BufWriter<W>>,
     depth: Depth,
@@ -50,7 +50,7 @@ pub struct WavFile<W: Write + Seek> {
 }
 
 impl<W: Write + Seek> WavFile<W> {
-    /// Writes a header for `samples` samples per channel, which must fit.
+    /// Writes the header of a file at `rate` Hz. Fails if `samples` samples per channel would not fit.
     pub fn new(file: W, rate: u32, depth: Depth, channels: u16, samples: usize) -> Result<Self, WavError> {
         let (bits_per_sample, sample_format) = match depth {
             Depth::Int16 => (16, SampleFormat::Int),
@@ -92,7 +92,7 @@ impl<W: Write + Seek> WavFile<W> {
     }
 }
 
-/// Nearest integer, full scale to full scale.
+/// Scales -1..=1 to integer full scale, rounds to nearest and clips.
 fn round(sample: f32, full_scale: f64) -> i32 {
     (f64::from(sample).clamp(-1.0, 1.0) * full_scale).round() as i32
 }
