@@ -1,16 +1,16 @@
-//! The names hosts and saved projects know this plugin by. None of the ids may ever change.
+//! The names and ids by which hosts and saved projects know this plugin. The ids must never change.
 
 /// Name of the plugin, and of its bundles (`bundler.toml`).
 pub const NAME: &str = "Chalumeau";
-/// Who makes it.
+/// Vendor of the plugin.
 pub const VENDOR: &str = "Chalumeau";
-/// Where it lives: the `repository` field of Cargo.toml, empty until the project has a public address.
+/// Address of the project: the `repository` field of Cargo.toml, empty until there is a public one.
 pub const URL: &str = env!("CARGO_PKG_REPOSITORY");
-/// No mail address is given.
+/// Mail address: none.
 pub const EMAIL: &str = "";
 /// Version shown to hosts.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
-/// One line for plugin browsers.
+/// Description in plugin browsers.
 pub const DESCRIPTION: &str = "A clarinet you play by touch";
 /// CLAP plugin id.
 pub const CLAP_ID: &str = "chalumeau.clarinet";

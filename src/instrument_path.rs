@@ -1,18 +1,18 @@
-//! Instrument files from paths.
+//! Loads instrument files from paths.
 
 use std::path::{Path, PathBuf};
 
 use chalumeau_core::bore::instrument_file::{InstrumentError, InstrumentFile};
 
-/// Why a path is not an instrument.
+/// Why an instrument cannot be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// The file could not be read.
     #[error("cannot read {}: {error}", path.display())]
     Read {
-        /// The path asked for.
+        /// The requested path.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         error: std::io::Error,
     },
     /// The file is not an instrument.

@@ -1,5 +1,14 @@
-//! The programs of Chalumeau: command line, plugin, its window, and the standalone. The instrument itself is in
-//! `chalumeau-core`.
+//! The programs of Chalumeau: command line, plugin, editor (what the plugin's window shows), standalone.
+//!
+//! The instrument itself is in `chalumeau-core`, the knob in `chalumeau-knob`, figures in `chalumeau-figure`. Only this
+//! package knows a host, a file system and a user.
+//!
+//! Four parts stand on small modules for files:
+//! - `cli` and `editor` use neither each other nor the plugin. The editor knows no host, no thread and no knob link.
+//! - `plugin` uses the editor, and puts it into the host's window.
+//! - `standalone` uses the plugin, and runs it without a host. The plugin does not use the standalone.
+//! - `cache`, `instrument_path`, `output`, `picture_file`, `take_file` and `wav` read and write files for them;
+//!   `identity` has the names that hosts know the plugin by. They use none of the four.
 
 pub mod cache;
 #[cfg(feature = "cli")]
@@ -13,6 +22,8 @@ pub mod output;
 pub mod picture_file;
 #[cfg(feature = "plugin")]
 pub mod plugin;
+#[cfg(feature = "standalone")]
+pub mod standalone;
 pub mod take_file;
 #[cfg(feature = "cli")]
 pub mod wav;

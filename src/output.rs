@@ -1,7 +1,7 @@
-//! New files that appear whole or not at all.
+//! New files that appear complete or not at all.
 //!
-//! Everything is written to a temporary file beside the target and takes its name only at the end; dropping it on the
-//! way leaves nothing behind. A file that is there already stays, unless it was to be replaced.
+//! The data goes to a temporary file beside the target, which gets its name only at the end. If it is dropped before,
+//! nothing remains. An existing file stays, unless the caller asks to replace it.
 
 use std::fs;
 use std::io;
@@ -12,16 +12,16 @@ use tempfile::NamedTempFile;
 /// Why a file cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
-    /// Not to be replaced.
+    /// The file exists, and the caller did not ask to replace it.
     #[error("{} exists already; choose another name or add --force to replace it", .0.display())]
     Exists(PathBuf),
-    /// A directory or a device.
+    /// The path names a directory or a device.
     #[error("{} is not a regular file; give the name of a file to write", .0.display())]
     NotAFile(PathBuf),
-    /// No place for it.
+    /// The directory does not exist.
     #[error("directory {} does not exist; create it or choose another place", .0.display())]
     NoDirectory(PathBuf),
-    /// The system refuses.
+    /// The system reports an error.
     #[error("cannot write {}: {source}", path.display())]
     Write {
         /// The target.
@@ -31,7 +31,7 @@ pub enum OutputError {
     },
 }
 
-/// A file on its way.
+/// A file that is being written.
 pub struct NewFile {
     path: PathBuf,
     force: bool,
@@ -39,9 +39,9 @@ pub struct NewFile {
 }
 
 impl NewFile {
-    /// Opens a temporary file beside `path`; refuses early what would fail at the end.
+    /// Opens a temporary file beside `path`. Checks at once what would fail at the end. `force` replaces an existing file.
     pub fn create(path: &Path, force: bool) -> Result<Self, OutputError> {
-        // A link is followed: what it points to is replaced, not the link.
+        // Follow a link, so that its target is replaced and not the link.
         let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         match fs::metadata(&path) {
             Ok(there) if !there.is_file() => return Err(OutputError::NotAFile(path)),
@@ -60,17 +60,17 @@ impl NewFile {
         prefix.push(".");
         let mut builder = tempfile::Builder::new();
         builder.prefix(&prefix).suffix(".part");
-        // As any new file: the user's mask decides, not the private mode of temporary files.
+        // The permissions of any new file, which the user's mask limits, instead of the private ones of a temporary file.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         match builder.tempfile_in(directory) {
             Ok(temp) => Ok(Self { temp: BufWriter::new(temp), path, force }),
-            // The message of `tempfile` repeats the temporary name, which says nothing to the user.
+            // The message of `tempfile` has the temporary name, which does not help the user.
             Err(error) => Err(OutputError::Write { source: plain(error), path }),
         }
     }
 
-    /// Where it will be.
+    /// The path that the file will have.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -91,7 +91,7 @@ impl NewFile {
     }
 }
 
-/// The system's error without what a library has added.
+/// The system's error, without the text that a library has added.
 fn plain(error: io::Error) -> io::Error {
     match error.raw_os_error() {
         Some(code) => io::Error::from_raw_os_error(code),

@@ -1,6 +1,6 @@
-//! Pictures as files: PNG, SVG, an animated GIF, or a figure's data as JSON, chosen by the file's extension.
+//! Writes figures as files: PNG, SVG, animated GIF, or the figure's data as JSON. The file's extension decides which.
 //!
-//! A file appears whole or not at all.
+//! A file appears complete or not at all.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -30,14 +30,14 @@ pub enum PictureError {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Format {
+enum PictureFormat {
     Png,
     Svg,
     Gif,
     Json,
 }
 
-impl Format {
+impl PictureFormat {
     fn of(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "png" => Some(Self::Png),
@@ -49,18 +49,18 @@ impl Format {
     }
 }
 
-/// A picture file that is open already, so that a bad path is refused before anything is measured.
+/// A picture file, opened before any measurement, so that a bad path fails early.
 pub struct PictureFile {
     file: NewFile,
-    format: Format,
+    format: PictureFormat,
     size: Option<Size>,
 }
 
 impl PictureFile {
-    /// For one figure: a `.png`, an `.svg`, or its data as `.json`; in the figure's own size unless one is given.
+    /// Opens a `.png`, an `.svg`, or a `.json` for one figure. Without `size`, the figure has its own size.
     pub fn still(path: &Path, force: bool, size: Option<Size>) -> Result<Self, PictureError> {
-        match Format::of(path) {
-            Some(format @ (Format::Png | Format::Svg | Format::Json)) => {
+        match PictureFormat::of(path) {
+            Some(format @ (PictureFormat::Png | PictureFormat::Svg | PictureFormat::Json)) => {
                 Ok(Self { file: NewFile::create(path, force)?, format, size })
             }
             _ => Err(PictureError::Extension {
@@ -70,10 +70,12 @@ impl PictureFile {
         }
     }
 
-    /// For a sequence of figures: a `.gif`.
+    /// Opens a `.gif` for a sequence of figures.
     pub fn moving(path: &Path, force: bool, size: Option<Size>) -> Result<Self, PictureError> {
-        match Format::of(path) {
-            Some(Format::Gif) => Ok(Self { file: NewFile::create(path, force)?, format: Format::Gif, size }),
+        match PictureFormat::of(path) {
+            Some(PictureFormat::Gif) => {
+                Ok(Self { file: NewFile::create(path, force)?, format: PictureFormat::Gif, size })
+            }
             _ => Err(PictureError::Extension { path: path.to_owned(), wanted: ".gif" }),
         }
     }
@@ -81,14 +83,14 @@ impl PictureFile {
     /// Draws the figure and gives the file its name.
     pub fn draw(self, figure: &Figure) -> Result<(), PictureError> {
         let bytes = match self.format {
-            Format::Svg => draw::svg(figure, self.size)?.into_bytes(),
-            Format::Json => draw::json(figure)?,
-            Format::Png | Format::Gif => draw::png(figure, self.size)?,
+            PictureFormat::Svg => draw::svg(figure, self.size)?.into_bytes(),
+            PictureFormat::Json => draw::json(figure)?,
+            PictureFormat::Png | PictureFormat::Gif => draw::png(figure, self.size)?,
         };
         self.keep(&bytes)
     }
 
-    /// Draws a sequence, `frame_s` seconds a frame, repeated for ever, and gives the file its name. `drawn` is called
+    /// Draws a sequence that repeats forever, with `frame_s` seconds per frame, and gives the file its name. Calls `drawn`
     /// after each frame.
     pub fn animate(self, frames: &[Figure], frame_s: f64, drawn: impl FnMut()) -> Result<(), PictureError> {
         let bytes = draw::gif(frames, self.size, frame_s, drawn)?;
@@ -102,7 +104,7 @@ impl PictureFile {
     }
 }
 
-/// Draws `figure` into a new file, `.png`, `.svg` or `.json`.
+/// Draws `figure` into a new file: `.png`, `.svg` or `.json`. `force` replaces an existing file.
 pub fn write(figure: &Figure, path: &Path, size: Option<Size>, force: bool) -> Result<(), PictureError> {
     PictureFile::still(path, force, size)?.draw(figure)
 }

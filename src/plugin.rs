@@ -1,19 +1,26 @@
 //! The instrument as a CLAP and VST3 plugin.
 //!
-//! This module only translates: parameters to settings, host events to the instrument's, one voice to two equal
-//! channels. Notes are sounding pitch, as everywhere outside the instrument. What is heard depends on the events and
-//! their sample positions alone, not on the host's blocks, and is what the offline renderer writes; except that another
-//! instrument, chosen while somebody listens, comes when it is made.
+//! This module only translates: parameters to settings, the host's events to the instrument's events, one voice to two
+//! equal channels. Notes are sounding pitch, as everywhere outside the instrument. The sound depends on the events and
+//! their sample positions alone, not on the host's blocks, and it is what the offline renderer writes. There is one
+//! exception: when the user chooses another instrument during live playing, it comes as soon as it is ready.
+//!
+//! - `translate_events`: the host's events; `breath_sources` and `reed_sources`: where breath and reed changes
+//!   come from
+//! - `instrument_loading`: loads and exchanges instruments
+//! - `knob`: the force-feedback knob (feature `devices`)
+//! - `params`: what hosts automate and projects save
+//! - `window`: the editor in the host's window
+//! - `launch_options`: what the standalone program sets
 
-mod breaths;
-pub mod instrument;
+mod breath_sources;
+pub mod instrument_loading;
 #[cfg(feature = "devices")]
 mod knob;
+pub mod launch_options;
 mod params;
 mod reed_sources;
-#[cfg(feature = "standalone")]
-pub mod standalone;
-mod translate;
+mod translate_events;
 mod window;
 
 use std::sync::Arc;
@@ -21,40 +28,36 @@ use std::sync::Arc;
 use nice_plug::context::gui::AsyncExecutor;
 use nice_plug::prelude::*;
 
+pub use params::instrument::InstrumentChoice;
 pub use params::{BreathParams, ChalumeauParams, EmbouchureParams, KnobParams, NoiseParams};
 pub use params::{InstrumentParams, OutputParams, PhysicalReedParams, ReedParams};
 pub use params::{SCHEMA, TuningChoice, TuningParams};
 
 use crate::identity;
-use breaths::{Breaths, Way};
+use breath_sources::{BreathInput, BreathSources};
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::Settings;
-use instrument::{Bench, Workshop};
+use instrument_loading::{InstrumentLoader, InstrumentSwap, SharedInstrument};
+use params::knob::ReedSource;
 use reed_sources::ReedSources;
-use translate::Translator;
-use window::Window;
+use translate_events::EventTranslator;
+use window::{HostWindow, PluginWindow, WindowAudio};
 
-/// The plugin: parameters, and from the first `activate` on a clarinet.
+/// The plugin. It has parameters from the start, and a clarinet from the first activation.
 #[derive(Default)]
 pub struct Chalumeau {
     params: Arc<ChalumeauParams>,
-    /// The clarinet that plays.
-    bench: Option<Bench>,
-    workshop: Option<Workshop>,
-    /// What the clarinet has been given.
+    instrument: Option<InstrumentSwap>,
+    loader: Option<InstrumentLoader>,
+    /// The settings that the instrument has.
     settings: Settings,
-    translator: Translator,
-    reed_sources: ReedSources,
+    inputs: HostInputs,
+    moved: MovedParameters,
     #[cfg(feature = "devices")]
-    knob: Option<(knob::Knob, knob::Audio)>,
-    window: Option<(Window, window::Audio)>,
-    /// Where breath has come from.
-    breaths: Breaths,
-    /// Whether a file is rendered: nobody holds a knob then.
+    knob: Option<(knob::PluginKnob, knob::KnobAudio)>,
+    window: Option<(PluginWindow, WindowAudio)>,
+    /// Whether the host renders a file, in which a live knob has no effect.
     offline: bool,
-    /// Where *Breath* was last; at rest until it moves.
-    breath: f32,
-    panic: bool,
 }
 
 impl Plugin for Chalumeau {
@@ -66,13 +69,14 @@ impl Plugin for Chalumeau {
     const AUDIO_IO_LAYOUTS: &'static [AudioIOLayout] =
         &[AudioIOLayout { main_output_channels: NonZeroU32::new(2), ..AudioIOLayout::const_default() }];
     const MIDI_INPUT: MidiConfig = MidiConfig::MidiCCs;
-    /// A knob's breath, as CC2 and CC34, so that a host can record it.
+    /// The plugin sends the knob's breath as CC2 and CC34, so that a host can record it.
     const MIDI_OUTPUT: MidiConfig = MidiConfig::MidiCCs;
     const SAMPLE_ACCURATE_AUTOMATION: bool = true;
-    /// Some hosts send every MIDI controller of every channel (2080) at once; beyond the capacity the wrapper allocates.
+    /// Some hosts send every MIDI controller of every channel (2080 events) at once. Beyond this capacity the wrapper
+    /// allocates.
     const INPUT_EVENT_CAPACITY: usize = 4096;
 
-    type Editor = window::Frame;
+    type Editor = HostWindow;
     type SysExMessage = ();
     type BackgroundTask = ();
 
@@ -81,8 +85,8 @@ impl Plugin for Chalumeau {
     }
 
     fn editor(&mut self, _: AsyncExecutor<Self>) -> Option<Self::Editor> {
-        self.open_shop();
-        self.window.as_mut()?.0.frame()
+        self.start_threads();
+        self.window.as_mut()?.0.host_window()
     }
 
     fn filter_state(state: &mut PluginState) {
@@ -96,40 +100,35 @@ impl Plugin for Chalumeau {
         context: &mut impl ActivateContext<Self>,
     ) -> bool {
         self.offline = config.process_mode == ProcessMode::Offline;
-        self.open_shop();
-        let Some(workshop) = &mut self.workshop else { return false };
-        if let Err(reason) = workshop.activate(&mut self.bench, f64::from(config.sample_rate), self.offline) {
+        self.start_threads();
+        let Some(loader) = &mut self.loader else { return false };
+        let activated = loader.activate(&mut self.instrument, f64::from(config.sample_rate), self.offline);
+        if let Err(reason) = activated {
             nice_error!("cannot play: {reason}");
             return false;
         }
         #[cfg(feature = "devices")]
-        {
-            let shared = workshop.shared();
-            if let Some((_, audio)) = &mut self.knob {
-                audio.prepare(&self.params, shared);
-            }
+        if let Some((_, audio)) = &mut self.knob {
+            audio.prepare(&self.params, loader.shared());
         }
         self.settings = self.params.settings();
-        if let Some(bench) = &mut self.bench {
-            bench.set_settings(&self.settings);
-            context.set_latency_samples(bench.clarinet().latency_samples());
+        if let Some(instrument) = &mut self.instrument {
+            instrument.set_settings(&self.settings);
+            context.set_latency_samples(instrument.clarinet().latency_samples());
         }
         self.reset();
         true
     }
 
     fn reset(&mut self) {
-        self.translator.reset();
-        self.reed_sources.reset();
-        self.breaths = Breaths::default();
+        self.inputs = HostInputs::default();
+        self.moved.reset(&self.params);
         #[cfg(feature = "devices")]
         if let Some((_, audio)) = &mut self.knob {
             audio.reset();
         }
-        self.breath = 0.0;
-        self.panic = self.params.output.panic.value();
-        if let Some(bench) = &mut self.bench {
-            bench.reset();
+        if let Some(instrument) = &mut self.instrument {
+            instrument.reset();
         }
     }
 
@@ -140,81 +139,58 @@ impl Plugin for Chalumeau {
         context: &mut impl ProcessContext<Self>,
     ) -> ProcessStatus {
         let [out, copies @ ..] = buffer.as_slice() else { return ProcessStatus::Normal };
-        let Some(bench) = &mut self.bench else {
+        let Some(instrument) = &mut self.instrument else {
             return ProcessStatus::Error("not activated");
         };
 
         let settings = self.params.settings();
         if settings != self.settings {
-            bench.set_settings(&settings);
+            instrument.set_settings(&settings);
             self.settings = settings;
         }
         if self.offline {
-            bench.wait_for(self.params.instrument.choice.value() as u32);
+            instrument.wait_for(self.params.instrument.choice.value() as u32);
         }
-        bench.tidy();
-        let moved = moved(&self.params, &mut self.panic, &mut self.breath);
+        instrument.receive();
+
+        let inputs = &mut self.inputs;
+        let moved = self.moved.events(&self.params);
+        let bend_range = inputs.translator.bend_range(self.params.instrument.bend_range.value());
+        let keys = self.window.as_mut().map(|(_, window)| window.keys()).unwrap_or_default();
+        for Timed { event, .. } in moved.iter().chain(&keys).flatten() {
+            match *event {
+                Event::Breath(unit) => inputs.breath_sources.blow(BreathInput::Parameter, unit),
+                Event::NoteOn { velocity, .. } => inputs.breath_sources.key(velocity),
+                _ => {}
+            }
+        }
         let api = context.plugin_api();
-        let translator = &mut self.translator;
-        let bent = translator.bend_range(self.params.instrument.bend_range.value());
-        let reed_sources = &mut self.reed_sources;
-        let breaths = &mut self.breaths;
-        if let Some(Timed { event: Event::Breath(unit), .. }) = moved[1] {
-            breaths.blow(Way::Parameter, unit);
-        }
-        let pressed = self.window.as_mut().map(|(_, window)| window.keys()).unwrap_or_default();
-        for timed in pressed.iter().flatten() {
-            if let Event::NoteOn { velocity, .. } = timed.event {
-                breaths.press(velocity);
-            }
-        }
-        let sources = [self.params.knob.h_source.value(), self.params.knob.k_source.value()];
-        let played = std::iter::from_fn(|| context.next_event()).flat_map(|event| {
-            if reed_sources.take(&event, sources) {
-                let at = event.timing() as usize;
-                [None, reed_sources.changed(sources).map(|event| Timed { at, event })]
-            } else {
-                let events = translator.translate(event, api);
-                let blew = events.iter().flatten().any(|timed| matches!(timed.event, Event::Breath(_)));
-                breaths.hear(&event, blew);
-                events
-            }
-            .into_iter()
-            .flatten()
-        });
+        let drives = [self.params.knob.h_source.value(), self.params.knob.k_source.value()];
+        let played = std::iter::from_fn(|| context.next_event())
+            .flat_map(|event| inputs.translate(event, api, drives).into_iter().flatten());
         let events =
-            moved.into_iter().flatten().chain(bent).chain(pressed.into_iter().flatten()).chain(played);
+            moved.into_iter().flatten().chain(bend_range).chain(keys.into_iter().flatten()).chain(played);
         #[cfg(feature = "devices")]
         if let Some((_, audio)) = &mut self.knob {
             let replay = self.params.knob.replay.value();
-            let stage = knob::Stage { rate_hz: bench.rate_hz(), offline: self.offline, replay };
-            audio.render(bench, &settings, events, stage, out);
-            audio.reed(self.reed_sources.factors(sources));
+            let block = knob::BlockContext { rate_hz: instrument.rate_hz(), offline: self.offline, replay };
+            audio.render(instrument, &settings, events, block, out);
+            audio.set_reed_factors(self.inputs.reed_sources.factors(drives));
             for &(at, breath) in audio.sent() {
-                self.breaths.blow(Way::Knob, breath.unit());
-                let (coarse, fine) = breath.bytes();
-                for (cc, byte) in [(2, coarse), (34, fine)] {
-                    let value = f32::from(byte) / 127.0;
-                    // A host that takes no events loses a recording, not the sound.
-                    let _ = context.try_send_event(NoteEvent::MidiCC {
-                        timing: at as u32,
-                        channel: 0,
-                        cc,
-                        value,
-                    });
-                }
+                self.inputs.breath_sources.blow(BreathInput::Knob, breath.unit());
+                send_breath(context, at, breath.bytes());
             }
         }
         #[cfg(not(feature = "devices"))]
-        bench.render_events(events, out);
+        instrument.render_events(events, out);
 
         if let Some((_, window)) = &mut self.window {
-            window.show(bench, &self.breaths, out);
+            window.send(instrument, &self.inputs.breath_sources, out);
         }
         for copy in copies {
             copy.copy_from_slice(out);
         }
-        if bench.clarinet().is_silent() { ProcessStatus::Normal } else { ProcessStatus::KeepAlive }
+        if instrument.clarinet().is_silent() { ProcessStatus::Normal } else { ProcessStatus::KeepAlive }
     }
 
     fn deactivate(&mut self) {
@@ -223,41 +199,94 @@ impl Plugin for Chalumeau {
 }
 
 impl Chalumeau {
-    /// Starts the threads beside audio, once.
-    fn open_shop(&mut self) {
+    /// Starts the threads of loader, knob and window, once.
+    fn start_threads(&mut self) {
         let params = &self.params;
-        let workshop = self.workshop.get_or_insert_with(|| Workshop::start(params.clone()));
-        let instruments = workshop.shared();
+        let loader = self.loader.get_or_insert_with(|| InstrumentLoader::start(params.clone()));
+        let instrument = loader.shared();
         #[cfg(feature = "devices")]
         let (knob, _) =
-            self.knob.get_or_insert_with(|| knob::Knob::start(params.clone(), instruments.clone()));
-        let beside = || Beside {
+            self.knob.get_or_insert_with(|| knob::PluginKnob::start(params.clone(), instrument.clone()));
+        let handles = || SharedHandles {
             params: params.clone(),
-            instruments: instruments.clone(),
+            instrument: instrument.clone(),
             #[cfg(feature = "devices")]
             knob: knob.shared().clone(),
         };
-        self.window.get_or_insert_with(|| Window::start(&beside()));
+        self.window.get_or_insert_with(|| PluginWindow::start(&handles()));
     }
 }
 
-/// What the threads beside audio share.
+/// Handles to what the threads of one plugin instance share.
 #[derive(Clone)]
-struct Beside {
+struct SharedHandles {
     params: Arc<ChalumeauParams>,
-    instruments: Arc<instrument::Shared>,
+    instrument: Arc<SharedInstrument>,
     #[cfg(feature = "devices")]
-    knob: Arc<knob::Shared>,
+    knob: Arc<knob::SharedKnob>,
 }
 
-/// What the parameters that act by moving have done since the last block. Real-time safe.
-fn moved(params: &ChalumeauParams, panic: &mut bool, breath: &mut f32) -> [Option<Timed<Event>>; 2] {
-    let pressed = params.output.panic.value();
-    let panicked = !std::mem::replace(panic, pressed) && pressed;
-    let blown = params.breath.breath.value();
-    let breathed = std::mem::replace(breath, blown) != blown;
-    [panicked.then_some(Event::Panic), breathed.then_some(Event::Breath(blown))]
-        .map(|event| event.map(|event| Timed { at: 0, event }))
+/// What the plugin remembers of the host's events. Real-time safe.
+#[derive(Default)]
+struct HostInputs {
+    translator: EventTranslator,
+    reed_sources: ReedSources,
+    breath_sources: BreathSources,
+}
+
+impl HostInputs {
+    /// Translates one event. An event of a controller that `drives` H or k only changes the reed.
+    fn translate(
+        &mut self,
+        event: NoteEvent<()>,
+        api: PluginApi,
+        drives: [ReedSource; 2],
+    ) -> [Option<Timed<Event>>; 2] {
+        if self.reed_sources.take(&event, drives) {
+            let at = event.timing() as usize;
+            return [None, self.reed_sources.changed(drives).map(|event| Timed { at, event })];
+        }
+        let events = self.translator.translate(event, api);
+        let blew = events.iter().flatten().any(|timed| matches!(timed.event, Event::Breath(_)));
+        self.breath_sources.record(&event, blew);
+        events
+    }
+}
+
+/// The parameters that act when they move: *Breath* and *Panic*. Real-time safe.
+#[derive(Default)]
+struct MovedParameters {
+    /// The value of *Breath* in the last block.
+    breath: f32,
+    /// The value of *Panic* in the last block.
+    panic: bool,
+}
+
+impl MovedParameters {
+    fn reset(&mut self, params: &ChalumeauParams) {
+        // Breath counts as moved if it is not at rest.
+        *self = Self { breath: 0.0, panic: params.output.panic.value() };
+    }
+
+    /// What they have done since the last block.
+    fn events(&mut self, params: &ChalumeauParams) -> [Option<Timed<Event>>; 2] {
+        let panic = params.output.panic.value();
+        let has_panicked = !std::mem::replace(&mut self.panic, panic) && panic;
+        let breath = params.breath.breath.value();
+        let has_breathed = std::mem::replace(&mut self.breath, breath) != breath;
+        [has_panicked.then_some(Event::Panic), has_breathed.then_some(Event::Breath(breath))]
+            .map(|event| event.map(|event| Timed { at: 0, event }))
+    }
+}
+
+/// Sends one breath value of the knob to the host, as CC2 and CC34.
+#[cfg(feature = "devices")]
+fn send_breath(context: &mut impl ProcessContext<Chalumeau>, at: usize, (coarse, fine): (u8, u8)) {
+    for (cc, byte) in [(2, coarse), (34, fine)] {
+        let (timing, value) = (at as u32, f32::from(byte) / 127.0);
+        // If the host takes no events, it only loses the recording.
+        let _ = context.try_send_event(NoteEvent::MidiCC { timing, channel: 0, cc, value });
+    }
 }
 
 impl ClapPlugin for Chalumeau {
@@ -276,7 +305,7 @@ impl Vst3Plugin for Chalumeau {
 }
 
 mod export {
-    // A plugin's entry points are C functions: the macros below are the one place for that.
+    // The plugin's entry points are C functions, which the macros below define.
     #![allow(unsafe_code)]
 
     use super::Chalumeau;

@@ -1,4 +1,4 @@
-//! Takes as files: a take appears in its folder whole or not at all.
+//! Writes takes as files. A take appears in its folder complete or not at all.
 
 use std::io;
 use std::path::Path;
@@ -7,13 +7,13 @@ use chalumeau_knob::touch::take::{Marks, Moment, TakeWriter};
 
 use crate::output::{NewFile, OutputError};
 
-/// A take being written; the file appears, complete, with [`keep`](Self::keep).
+/// A take that is being written. [`keep`](Self::keep) makes the complete file appear.
 pub struct TakeFile {
     writer: TakeWriter<NewFile>,
 }
 
 impl TakeFile {
-    /// Begins a file with remarks (one a line) and the columns' names.
+    /// Begins a file with remarks, one per line, and the names of the columns. `force` replaces an existing file.
     pub fn create(path: &Path, force: bool, remarks: &[String]) -> Result<Self, OutputError> {
         let file = NewFile::create(path, force)?;
         match TakeWriter::new(file, remarks) {
@@ -27,7 +27,7 @@ impl TakeFile {
         self.writer.write(moment, marks)
     }
 
-    /// Where the file will be.
+    /// The path that the file will have.
     pub fn path(&self) -> &Path {
         self.writer.get_ref().path()
     }

@@ -1,4 +1,4 @@
-//! Samples into a WAV file: 16 or 24 bit integers, rounded to nearest without dither, or 32 bit floats as they are.
+//! Writes WAV files: 16 or 24 bit integers, rounded to nearest without dither, or unchanged 32 bit floats.
 
 use hound::{SampleFormat, WavSpec, WavWriter};
 use std::io::{BufWriter, Seek, Write};
@@ -14,43 +14,43 @@ pub enum Depth {
     Float32,
 }
 
-/// What a WAV file cannot hold.
+/// Why a WAV file cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum WavError {
-    /// Sizes in the header have 32 bits.
+    /// The file would be larger than 4 GB; its header has 32 bits for sizes.
     #[error(
         "{seconds:.0} s at this rate and depth need {gigabytes:.1} GB, a WAV file holds 4; render less, at a lower rate or fewer bits"
     )]
     TooLong {
-        /// Length asked for.
+        /// Requested length, s.
         seconds: f64,
-        /// Its size.
+        /// The size of the file, GB.
         gigabytes: f64,
     },
-    /// The disk refuses.
+    /// The system reports an error.
     #[error("cannot write the WAV file: {0}")]
     Write(#[from] hound::Error),
 }
 
-/// What went into a file.
+/// Level of the samples in a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Level {
+pub struct PeakLevel {
     /// Largest magnitude, full scale 1.
     pub peak: f32,
-    /// Samples beyond full scale, cut (never for floats).
+    /// Number of samples clipped at full scale; 0 for floats.
     pub clipped: u64,
 }
 
-/// A WAV file being written; each sample goes to every channel.
+/// A WAV file that is being written. Each sample goes to every channel.
 pub struct WavFile<W: Write + Seek> {
     writer: WavWriter<BufWriter<W>>,
     depth: Depth,
     channels: u16,
-    level: Level,
+    level: PeakLevel,
 }
 
 impl<W: Write + Seek> WavFile<W> {
-    /// Writes a header for `samples` samples per channel, which must fit.
+    /// Writes the header of a file at `rate` Hz. Fails if `samples` samples per channel would not fit.
     pub fn new(file: W, rate: u32, depth: Depth, channels: u16, samples: usize) -> Result<Self, WavError> {
         let (bits_per_sample, sample_format) = match depth {
             Depth::Int16 => (16, SampleFormat::Int),
@@ -66,7 +66,7 @@ impl<W: Write + Seek> WavFile<W> {
         }
         let spec = WavSpec { channels, sample_rate: rate, bits_per_sample, sample_format };
         let writer = WavWriter::new(BufWriter::new(file), spec)?;
-        Ok(Self { writer, depth, channels, level: Level::default() })
+        Ok(Self { writer, depth, channels, level: PeakLevel::default() })
     }
 
     /// Appends one block.
@@ -86,13 +86,13 @@ impl<W: Write + Seek> WavFile<W> {
     }
 
     /// Completes the header.
-    pub fn finish(self) -> Result<Level, WavError> {
+    pub fn finish(self) -> Result<PeakLevel, WavError> {
         self.writer.finalize()?;
         Ok(self.level)
     }
 }
 
-/// Nearest integer, full scale to full scale.
+/// Scales -1..=1 to integer full scale, rounds to nearest and clips.
 fn round(sample: f32, full_scale: f64) -> i32 {
     (f64::from(sample).clamp(-1.0, 1.0) * full_scale).round() as i32
 }
@@ -102,7 +102,10 @@ mod tests {
     use super::*;
     use crate::output::NewFile;
 
-    fn written(depth: Depth, channels: u16) -> (Level, hound::WavReader<std::io::BufReader<std::fs::File>>) {
+    fn written(
+        depth: Depth,
+        channels: u16,
+    ) -> (PeakLevel, hound::WavReader<std::io::BufReader<std::fs::File>>) {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("x.wav");
         let mut file = NewFile::create(&path, false).unwrap();
@@ -117,7 +120,7 @@ mod tests {
     #[test]
     fn integers_round_and_clipping_is_counted() {
         let (level, mut reader) = written(Depth::Int16, 2);
-        assert_eq!(level, Level { peak: 1.5, clipped: 1 });
+        assert_eq!(level, PeakLevel { peak: 1.5, clipped: 1 });
         let samples: Vec<i32> = reader.samples().map(Result::unwrap).collect();
         assert_eq!(samples, [16_384, 16_384, -32_767, -32_767, 32_767, 32_767, 0, 0]);
         let (_, mut reader) = written(Depth::Int24, 1);
@@ -128,7 +131,7 @@ mod tests {
     #[test]
     fn floats_stay_as_they_are() {
         let (level, mut reader) = written(Depth::Float32, 1);
-        assert_eq!(level, Level { peak: 1.5, clipped: 0 });
+        assert_eq!(level, PeakLevel { peak: 1.5, clipped: 0 });
         let samples: Vec<f32> = reader.samples().map(Result::unwrap).collect();
         assert_eq!(samples, [0.5, -1.0, 1.5, 0.0]);
     }

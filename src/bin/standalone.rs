@@ -1,7 +1,7 @@
-//! The plugin as a program of its own.
+//! The standalone program: the plugin without a host.
 
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    chalumeau::plugin::standalone::main()
+    chalumeau::standalone::main()
 }

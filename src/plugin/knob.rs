@@ -1,23 +1,29 @@
-//! The plugin's end of the knob.
+//! The plugin's side of the knob.
 //!
-//! Three threads share it. The *audio* thread reads angles from a ring, sends breath, and says which note is fingered.
-//! The *link* thread (in [`device`](chalumeau_knob::device)) asks at every turn what that note shall feel like. The *desk*
-//! thread does what may take time: it follows the parameters, works out feels, writes takes, and words the status.
-//! Everything between them is an atomic, a triple buffer or a ring; the audio thread never waits and frees nothing.
+//! Three threads share it.
+//! - The *audio* thread reads angles from a ring, renders the breath, and tells which note is fingered.
+//! - The *link* thread (see [`device`](chalumeau_knob::device)) asks at each cycle for the feel of that note.
+//! - The *knob controller* thread does what may take time: it follows the parameters, computes feels, writes takes, and
+//!   composes the status text.
+//!
+//! They exchange data through atomics, triple buffers and rings. The audio thread never waits and frees nothing.
 
-mod audio;
-mod desk;
-mod felt;
-mod takes;
+mod calibrator;
+mod feel_design;
+mod feels_cache;
+mod knob_audio;
+mod knob_controller;
+mod knob_switches;
+mod take_recorder;
 
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
-pub use audio::{Audio, Stage};
-pub use desk::design;
+pub use feel_design::feel_design;
+pub use knob_audio::{BlockContext, KnobAudio};
 
-use crate::plugin::instrument;
+use crate::plugin::instrument_loading::SharedInstrument;
 use crate::plugin::params::ChalumeauParams;
 use chalumeau_core::haptics::FeelTable;
 use chalumeau_core::units::SoundingNote;
@@ -26,47 +32,48 @@ use chalumeau_knob::touch::blower::Hand;
 use chalumeau_knob::touch::feel::Feels;
 use chalumeau_knob::touch::take::Take;
 use chalumeau_knob::wire::message;
+use knob_controller::KnobController;
 
-/// No note is fingered.
+/// Number that stands for no note.
 const NO_NOTE: u8 = 255;
 
-/// An instrument's feel, and the table that design and limits make of it.
-type Feel = (Arc<Feels>, FeelTable);
+/// What an instrument requires of the hand, and the feel of each note under the present design and limits.
+type InstrumentFeel = (Arc<Feels>, FeelTable);
 
-/// What the threads tell each other.
+/// What the threads share about the knob.
 #[derive(Debug)]
-pub struct Shared {
-    /// Sounding note in the fingers, or [`NO_NOTE`].
+pub struct SharedKnob {
+    /// The fingered note, sounding pitch, or [`NO_NOTE`].
     note: AtomicU8,
-    /// Mouth pressure over closing pressure, bits of an f32.
+    /// Mouth pressure over closing pressure, the bits of an f32.
     gamma: AtomicU32,
-    /// Factors on H and k from controllers, bits of f32s.
-    reed: [AtomicU32; 2],
-    /// The feel in force, with the instrument it is of. Only desk and link lock it.
-    feel: Mutex<Option<Arc<Feel>>>,
-    /// A feel that is tried, whatever is played. Only window, desk and link lock it.
+    /// Factors that controllers put on H and k, the bits of f32s.
+    reed_factors: [AtomicU32; 2],
+    /// The feel in force. Only the controller and the link lock it.
+    feel: Mutex<Option<Arc<InstrumentFeel>>>,
+    /// A test feel, which replaces the feel of any note. Only the window, the controller and the link lock it.
     test: Mutex<Option<message::Feel>>,
-    /// The user has chosen a device: what is remembered counts as new.
-    chosen: AtomicBool,
-    /// How the link is. Only desk and window lock it.
+    /// The user has chosen a device, so that even the same choice counts as new.
+    device_chosen: AtomicBool,
+    /// The state of the link. Only the controller and the window lock it.
     status: Mutex<Option<LinkStatus>>,
-    /// The instance has been activated: one that has never played leaves the knob to those that do.
-    plays: AtomicBool,
+    /// The host has activated this instance. An instance that was never active leaves the knob to the others.
+    is_active: AtomicBool,
     stop: AtomicBool,
 }
 
-impl Shared {
+impl SharedKnob {
     fn new() -> Self {
         let one = || AtomicU32::new(1.0_f32.to_bits());
         Self {
             note: AtomicU8::new(NO_NOTE),
             gamma: AtomicU32::new(0),
-            reed: [one(), one()],
+            reed_factors: [one(), one()],
             feel: Mutex::new(None),
             test: Mutex::default(),
-            chosen: AtomicBool::new(false),
+            device_chosen: AtomicBool::new(false),
             status: Mutex::default(),
-            plays: AtomicBool::new(false),
+            is_active: AtomicBool::new(false),
             stop: AtomicBool::new(false),
         }
     }
@@ -75,19 +82,19 @@ impl Shared {
         Some(self.note.load(Ordering::Relaxed)).filter(|&note| note != NO_NOTE).map(SoundingNote)
     }
 
-    /// What the knob shall feel like for a test; `None` ends it.
+    /// Makes the knob feel like `feel`, whatever note is fingered; `None` ends the test.
     pub fn test(&self, feel: Option<message::Feel>) {
         if let Ok(mut test) = self.test.lock() {
             *test = feel;
         }
     }
 
-    /// The user has chosen a device of the list, even if it is of the kind that was chosen already.
-    pub fn choose_anew(&self) {
-        self.chosen.store(true, Ordering::Relaxed);
+    /// Says that the user has chosen a device from the list, even if its kind was already chosen.
+    pub fn choose_device_again(&self) {
+        self.device_chosen.store(true, Ordering::Relaxed);
     }
 
-    /// How the link was when the desk last looked.
+    /// The state of the link at the controller's last cycle; `None` without a link.
     pub fn status(&self) -> Option<LinkStatus> {
         self.status.lock().ok()?.clone()
     }
@@ -96,43 +103,45 @@ impl Shared {
         f32::from_bits(self.gamma.load(Ordering::Relaxed))
     }
 
-    fn reed(&self) -> [f32; 2] {
-        [0, 1].map(|which| f32::from_bits(self.reed[which].load(Ordering::Relaxed)))
+    fn reed_factors(&self) -> [f32; 2] {
+        [0, 1].map(|which| f32::from_bits(self.reed_factors[which].load(Ordering::Relaxed)))
     }
 }
 
-/// Desk and link of one plugin instance; both end when it is dropped.
-pub struct Knob {
-    shared: Arc<Shared>,
-    desk: Option<JoinHandle<()>>,
+/// The knob of one plugin instance. Dropping it ends the controller and the link.
+pub struct PluginKnob {
+    shared: Arc<SharedKnob>,
+    controller: Option<JoinHandle<()>>,
 }
 
-impl Knob {
-    /// Starts the desk; the link follows when the user wants a knob. Allocates.
-    pub fn start(params: Arc<ChalumeauParams>, instruments: Arc<instrument::Shared>) -> (Self, Audio) {
-        let shared = Arc::new(Shared::new());
+impl PluginKnob {
+    /// Starts the controller, which starts the link when the user wants a knob. Allocates.
+    pub fn start(params: Arc<ChalumeauParams>, instrument: Arc<SharedInstrument>) -> (Self, KnobAudio) {
+        let shared = Arc::new(SharedKnob::new());
         let (hand_in, hand) = triple_buffer::triple_buffer(&Hand::default());
         let (take_in, take) = triple_buffer::triple_buffer(&None::<Arc<Take>>);
         let (readers_in, readers) = rtrb::RingBuffer::new(1);
-        let desk = desk::Desk::new(params, shared.clone(), instruments, readers_in, hand_in, take_in);
-        let desk = std::thread::Builder::new().name("chalumeau knob".to_owned()).spawn(move || desk.run());
-        let audio = Audio::new(shared.clone(), readers, hand, take);
-        // Without a thread there is no knob; the instrument plays all the same.
-        (Self { shared, desk: desk.ok() }, audio)
+        let controller =
+            KnobController::new(params, shared.clone(), instrument, readers_in, hand_in, take_in);
+        let controller =
+            std::thread::Builder::new().name("KnobController".to_owned()).spawn(move || controller.run());
+        let audio = KnobAudio::new(shared.clone(), readers, hand, take);
+        // Without a thread there is no knob, but the instrument plays.
+        (Self { shared, controller: controller.ok() }, audio)
     }
 
-    /// What the window asks and tells.
-    pub fn shared(&self) -> &Arc<Shared> {
+    /// What the window reads and sets.
+    pub fn shared(&self) -> &Arc<SharedKnob> {
         &self.shared
     }
 }
 
-impl Drop for Knob {
+impl Drop for PluginKnob {
     fn drop(&mut self) {
         self.shared.stop.store(true, Ordering::Relaxed);
-        if let Some(desk) = self.desk.take() {
-            // A desk that has panicked has been reported already.
-            let _ = desk.join();
+        if let Some(controller) = self.controller.take() {
+            // The panic of a thread was reported when it happened.
+            let _ = controller.join();
         }
     }
 }

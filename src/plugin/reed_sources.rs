@@ -1,28 +1,29 @@
-//! Controllers that open and stiffen the reed: H and k, in the sound and under the hand.
+//! MIDI controllers that change the reed's opening H and stiffness k, in the sound and in the feel.
 //!
-//! A controller with a middle (CC74, the y of a Linnstrument) leaves the parameter alone there and goes both ways; one
-//! that rests at zero (wheel, pressure) leaves it alone there and only raises it. Full travel is a factor of 1.6 (by
-//! judgement: on coupled reeds that is closing pressures from 2/5 to 2 1/2 times). A source that drives the reed no
-//! longer does anything else.
+//! A controller with a middle (CC74, the y of a Linnstrument) has no effect at its middle, and raises or lowers the
+//! parameter from there. A controller that rests at zero (wheel, pressure) has no effect at zero and only raises the
+//! parameter. Full travel is a factor of 1.6, chosen by judgement: on coupled reeds it makes closing pressures of 2/5 to
+//! 2 1/2 times. A controller that drives the reed does nothing else.
 
 use nice_plug::prelude::NoteEvent;
 
 use super::params::knob::ReedSource;
 use chalumeau_core::event::Event;
 
-/// Factor at the end of the travel.
-const SPAN: f32 = 1.6;
+/// Factor at full travel.
+const FULL_FACTOR: f32 = 1.6;
 const CC_SLIDE: u8 = 74;
 
-/// What has been heard from each controller. Real-time safe.
+/// The latest value of each controller. Real-time safe.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ReedSources {
-    /// Controllers 1, 16, 17, 74 and pressure, 0..=1, `None` until they move.
-    heard: [Option<f32>; 5],
+    /// Controllers 1, 16, 17, 74 and pressure, 0..=1; `None` until they move.
+    values: [Option<f32>; 5],
+    /// The factors that were sent last.
     sent: Option<[f32; 2]>,
 }
 
-fn place(source: ReedSource) -> Option<usize> {
+fn index(source: ReedSource) -> Option<usize> {
     match source {
         ReedSource::Parameter => None,
         ReedSource::Wheel => Some(0),
@@ -34,12 +35,7 @@ fn place(source: ReedSource) -> Option<usize> {
 }
 
 impl ReedSources {
-    /// Forgets what was heard.
-    pub fn reset(&mut self) {
-        *self = Self::default();
-    }
-
-    /// Takes an event if it drives H or k.
+    /// Takes an event if it drives H or k; returns whether it does.
     pub fn take<S>(&mut self, event: &NoteEvent<S>, sources: [ReedSource; 2]) -> bool {
         let (at, value) = match *event {
             NoteEvent::MidiCC { cc: 1, value, .. } => (0, value),
@@ -52,24 +48,24 @@ impl ReedSources {
             }
             _ => return false,
         };
-        if !sources.map(place).contains(&Some(at)) {
+        if !sources.map(index).contains(&Some(at)) {
             return false;
         }
-        self.heard[at] = Some(if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 });
+        self.values[at] = Some(if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 });
         true
     }
 
-    /// Factors on H and k.
+    /// The factors on H and k.
     pub fn factors(&self, sources: [ReedSource; 2]) -> [f32; 2] {
         sources.map(|source| {
-            let Some(value) = place(source).and_then(|at| self.heard[at]) else { return 1.0 };
-            // The middle of seven bits is 64.
-            let way = if source == ReedSource::Slide { (value * 127.0 - 64.0) / 63.0 } else { value };
-            SPAN.powf(way.clamp(-1.0, 1.0))
+            let Some(value) = index(source).and_then(|at| self.values[at]) else { return 1.0 };
+            // The middle of a 7-bit value is 64.
+            let travel = if source == ReedSource::Slide { (value * 127.0 - 64.0) / 63.0 } else { value };
+            FULL_FACTOR.powf(travel.clamp(-1.0, 1.0))
         })
     }
 
-    /// The event that brings the voice up to date, if it is not.
+    /// An event with the new factors, if they have changed since the last call.
     pub fn changed(&mut self, sources: [ReedSource; 2]) -> Option<Event> {
         let [h, k] = self.factors(sources);
         let before = self.sent.replace([h, k]).unwrap_or([1.0, 1.0]);
@@ -86,12 +82,12 @@ mod tests {
     }
 
     #[test]
-    fn a_linnstrument_opens_with_y_and_stiffens_with_z() {
+    fn y_of_a_linnstrument_opens_the_reed_and_z_stiffens_it() {
         let mut reed = ReedSources::default();
         let sources = [ReedSource::Slide, ReedSource::Pressure];
-        assert_eq!(reed.changed(sources), None, "nothing has moved");
+        assert_eq!(reed.changed(sources), None, "no controller has moved");
         assert!(reed.take(&cc(74, 64), sources));
-        assert_eq!(reed.changed(sources), None, "the middle leaves the parameter alone");
+        assert_eq!(reed.changed(sources), None, "the middle has no effect");
         assert!(reed.take(&cc(74, 127), sources));
         let z = NoteEvent::<()>::MidiChannelPressure { timing: 0, channel: 3, pressure: 0.5 };
         assert!(reed.take(&z, sources));
@@ -104,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn what_drives_nothing_is_left_to_the_breath() {
+    fn an_event_that_drives_nothing_is_not_taken() {
         let mut reed = ReedSources::default();
         let pressure = NoteEvent::<()>::MidiChannelPressure { timing: 0, channel: 0, pressure: 0.5 };
         assert!(!reed.take(&pressure, [ReedSource::Slide, ReedSource::Parameter]));

@@ -1,19 +1,21 @@
-//! The plugin's window: the [`editor`](crate::editor) in the host's frame, and what it is told.
+//! The plugin's window: the [`editor`](crate::editor) inside the host's frame, and the data that it shows.
 //!
-//! Three threads. The *audio* thread leaves, while the window is open, what is inside the instrument and the last of what
-//! was heard, and takes the keys that were pressed in the window. A *looker* thread makes a [`Snapshot`] of all that, of
-//! the instrument and of the knob; nothing that takes time is done where the window is drawn. The *main* thread draws the
-//! latest snapshot. While nothing moves the window is drawn less than five times a second.
+//! Three threads take part.
+//! - While the window is open, the *audio* thread sends the inside of the instrument and the latest sound. It receives the
+//!   keys that the user presses in the window.
+//! - The *snapshot* thread makes a [`Snapshot`] of this data, the instrument and the knob. All slow work happens there.
+//! - The *main* thread draws the latest snapshot. While nothing moves, it draws less than five times a second.
 
-mod app;
-mod audio;
 #[cfg(feature = "devices")]
-mod devices;
-mod frame;
-mod hands;
-mod looker;
+mod device_list;
+mod editor_app;
+mod host_controls;
+mod host_window;
+mod instrument_analysis;
 #[cfg(test)]
-mod pinned;
+mod parameters_match_tests;
+mod snapshot_thread;
+mod window_audio;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -21,38 +23,36 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use crate::editor::{Kept, Snapshot};
-use crate::plugin::Beside;
+use crate::plugin::SharedHandles;
 use crate::plugin::params::ChalumeauParams;
-use app::Memory;
-pub use audio::Audio;
-use audio::Ends;
-pub use frame::Frame;
-#[cfg(feature = "standalone")]
-pub use frame::{found_no_display, no_window};
-use looker::Looker;
+use editor_app::WindowMemory;
+pub use host_window::HostWindow;
+use snapshot_thread::SnapshotThread;
+pub use window_audio::WindowAudio;
+use window_audio::WindowChannels;
 
-/// What the threads of the window share. The audio thread takes no lock of it.
-struct Shared {
+/// What the threads share about the window. The audio thread takes none of its locks.
+struct SharedWindow {
     is_open: AtomicBool,
-    /// The window that has drawn its first frame and waits for the next, if one is open.
+    /// The open window, from its first frame on.
     drawn: Mutex<Option<egui::Context>>,
     latest: Mutex<Arc<Snapshot>>,
-    /// Holes that are tried, if any: what the looker draws as open.
+    /// The holes that the user tries, which the snapshot shows instead of the fingering.
     tried: Mutex<Option<Vec<bool>>>,
     stop: AtomicBool,
 }
 
-impl Shared {
+impl SharedWindow {
     fn latest(&self) -> Arc<Snapshot> {
         self.latest.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Has the window drawn again, once it has drawn at all: under X11 the window library loses a frame that is wanted
-    /// before the window is shown, and waits for it ever after.
+    /// Asks the window to draw again, but only after its first frame: under X11, the window library loses a request from
+    /// before the window is shown, and then waits forever.
     fn draw_again(&self) {
         let drawn = self.drawn.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if let Some(window) = drawn {
-            // At once, and once; without a delay it would be drawn twice.
+            // Without a delay the window would draw twice.
             window.request_repaint_after(Duration::from_micros(1));
         }
     }
@@ -70,50 +70,50 @@ impl Shared {
     }
 }
 
-/// The window of one plugin instance, open or not; its looker ends with it.
-pub struct Window {
-    shared: Arc<Shared>,
-    memory: Option<Memory>,
-    looker: Option<JoinHandle<()>>,
+/// The window of one plugin instance, open or closed. Dropping it ends the snapshot thread.
+pub struct PluginWindow {
+    shared: Arc<SharedWindow>,
+    memory: Option<WindowMemory>,
+    snapshots: Option<JoinHandle<()>>,
 }
 
-impl Window {
-    /// Starts the looker, which does nothing while the window is closed. Allocates.
-    pub fn start(beside: &Beside) -> (Self, Audio) {
-        let shared = Arc::new(Shared {
+impl PluginWindow {
+    /// Starts the snapshot thread, which does nothing while the window is closed. Allocates.
+    pub fn start(handles: &SharedHandles) -> (Self, WindowAudio) {
+        let shared = Arc::new(SharedWindow {
             is_open: AtomicBool::new(false),
             drawn: Mutex::default(),
             latest: Mutex::new(Arc::new(Snapshot::default())),
             tried: Mutex::default(),
             stop: AtomicBool::new(false),
         });
-        let (audio, Ends { inside, sound, keys }) = Audio::new(shared.clone());
-        let looker = Looker::new(shared.clone(), beside.clone(), inside, sound);
-        let looker =
-            std::thread::Builder::new().name("chalumeau looker".to_owned()).spawn(move || looker.run());
-        let memory = Memory::new(beside.clone(), keys);
-        // Without a thread the window shows parameters only.
-        (Self { shared, memory: Some(memory), looker: looker.ok() }, audio)
+        let (audio, WindowChannels { inside, sound, keys }) = WindowAudio::new(shared.clone());
+        let snapshots = SnapshotThread::new(shared.clone(), handles.clone(), inside, sound);
+        let snapshots =
+            std::thread::Builder::new().name("SnapshotThread".to_owned()).spawn(move || snapshots.run());
+        let memory = WindowMemory::new(handles.clone(), keys);
+        // Without a thread the window shows only the parameters.
+        (Self { shared, memory: Some(memory), snapshots: snapshots.ok() }, audio)
     }
 
-    /// The window for the host; there is one.
-    pub fn frame(&mut self) -> Option<Frame> {
-        Frame::new(self.shared.clone(), self.memory.take()?)
+    /// The window for the host, once.
+    pub fn host_window(&mut self) -> Option<HostWindow> {
+        HostWindow::new(self.shared.clone(), self.memory.take()?)
     }
 }
 
-impl Drop for Window {
+impl Drop for PluginWindow {
     fn drop(&mut self) {
         self.shared.stop.store(true, Ordering::Relaxed);
-        if let Some(looker) = self.looker.take() {
-            looker.thread().unpark();
-            // A looker that has panicked has been reported already.
-            let _ = looker.join();
+        if let Some(snapshots) = self.snapshots.take() {
+            snapshots.thread().unpark();
+            // The panic of a thread was reported when it happened.
+            let _ = snapshots.join();
         }
     }
 }
 
-/// What the state of the plugin keeps of the window.
+/// What the project keeps of the window.
 fn kept(params: &ChalumeauParams) -> Kept {
     params.window.read().map_or_else(|_| Kept::default(), |kept| kept.clone()).mended()
 }

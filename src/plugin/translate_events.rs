@@ -1,8 +1,9 @@
-//! The host's events become the instrument's: the only place that knows both vocabularies.
+//! Translates the host's events into the instrument's. No other module knows both.
 //!
-//! MIDI goes through the decoder that the offline renderer uses, with the raw integers the host's 0..=1 values came
-//! from, so that both hear the same. Note expressions have no MIDI form: pressure and expression blow, tuning bends its
-//! note on top of the wheel until the key is struck anew. Left out: volume, pan, vibrato, brightness, program change.
+//! The decoder is that of the offline renderer. It gets the raw integers that the host's 0..=1 values came from, so that
+//! plugin and renderer hear the same. Note expressions have no MIDI form: pressure and expression set the breath, and
+//! tuning bends its note, in addition to the wheel, until the key is struck again. Volume, pan, vibrato, brightness and
+//! program change have no effect.
 
 use nice_plug::midi::Key;
 use nice_plug::prelude::*;
@@ -10,28 +11,23 @@ use nice_plug::prelude::*;
 use chalumeau_core::control::midi::{Events, MidiDecoder};
 use chalumeau_core::event::{Event, Timed};
 
-/// The controller that ends every note.
+/// The controller that ends all notes.
 const ALL_NOTES_OFF: u8 = 123;
 
-/// What has to be remembered between host events. Real-time safe throughout.
+/// Translates one event at a time, and keeps the state between them. Real-time safe throughout.
 #[derive(Clone, Debug, Default)]
-pub struct Translator {
+pub struct EventTranslator {
     midi: MidiDecoder,
-    /// Whether a note expression has blown yet. Some hosts send a zero with each note; a zero alone is not a move.
+    /// Whether a note expression has set the breath yet. Some hosts send a zero with each note; a zero alone does not count.
     expression_live: bool,
 }
 
-impl Translator {
-    /// Forgets controllers, bends and breath sources.
-    pub fn reset(&mut self) {
-        *self = Self::default();
-    }
-
-    /// At most two events, in order: a note brings its bend with it.
+impl EventTranslator {
+    /// Returns at most two events, in order: a note may need a bend before it.
     pub fn translate<S>(&mut self, event: NoteEvent<S>, api: PluginApi) -> [Option<Timed<Event>>; 2] {
         let at = event.timing() as usize;
         let events: Events = match event {
-            // The framework has made note-offs of MIDI's zero velocities; a zero that is left is a very soft note.
+            // The framework turns MIDI notes of velocity 0 into note-offs; a velocity that rounds to 0 here is a very soft note.
             NoteEvent::NoteOn { channel, key: Key::Number(key), velocity, .. } => {
                 self.midi.note_on(channel.number().unwrap_or(0), key, raw7(velocity).max(1))
             }
@@ -51,7 +47,7 @@ impl Translator {
                 self.midi.tune(channel.number(), key.number(), 100.0 * tuning)
             }
             NoteEvent::PolyPressure { pressure, .. } => self.breathe(pressure),
-            // The framework's VST3 wrapper (0.4.2) takes expression for brightness and brightness for expression.
+            // The framework's VST3 wrapper (0.4.2) confuses expression and brightness.
             NoteEvent::PolyExpression { expression, .. } if api != PluginApi::Vst3 => {
                 self.breathe(expression)
             }
@@ -63,7 +59,7 @@ impl Translator {
         events.map(|event| event.map(|event| Timed { at, event }))
     }
 
-    /// How far a wheel bends that RPN 0 has told nothing, semitones; at most one event. Real-time safe.
+    /// Sets how far the wheel bends until RPN 0 says otherwise, semitones. Returns at most one event. Real-time safe.
     pub fn bend_range(&mut self, semitones: i32) -> Option<Timed<Event>> {
         let [event, _] = self.midi.usual_bend_range(semitones.clamp(0, 127) as u8);
         event.map(|event| Timed { at: 0, event })
@@ -75,12 +71,12 @@ impl Translator {
     }
 }
 
-/// The data byte a host's 0..=1 value was made from.
+/// The MIDI data byte that a host's 0..=1 value came from.
 fn raw7(value: f32) -> u8 {
     (value * 127.0).round().clamp(0.0, 127.0) as u8
 }
 
-/// The same for the bend wheel. A host's plain 0.5 rounds to the centre too.
+/// The same for the bend wheel, 14 bits. A value of exactly 0.5 rounds to the centre too.
 fn raw14(value: f32) -> u16 {
     (value * 16383.0).round().clamp(0.0, 16383.0) as u16
 }
@@ -94,13 +90,13 @@ mod tests {
 
     type Host = NoteEvent<()>;
 
-    fn one(translator: &mut Translator, event: Host) -> Option<Event> {
+    fn one(translator: &mut EventTranslator, event: Host) -> Option<Event> {
         let [first, second] = translator.translate(event, PluginApi::Clap);
         assert!(first.is_none() || second.is_none(), "{first:?} and {second:?}");
         second.or(first).map(|timed| timed.event)
     }
 
-    fn midi(translator: &mut Translator, bytes: [u8; 3]) -> Option<Event> {
+    fn midi(translator: &mut EventTranslator, bytes: [u8; 3]) -> Option<Event> {
         one(translator, Host::from_midi(0, &bytes).expect("a channel message"))
     }
 
@@ -120,8 +116,8 @@ mod tests {
     }
 
     #[test]
-    fn a_wheel_at_rest_bends_by_nothing() {
-        let mut translator = Translator::default();
+    fn a_wheel_at_rest_does_not_bend() {
+        let mut translator = EventTranslator::default();
         assert_eq!(midi(&mut translator, [0xE0, 0, 64]), Some(Event::Bend { cents: 0.0 }));
         let half = Host::MidiPitchBend { timing: 0, channel: 0, value: 0.5 };
         assert_eq!(one(&mut translator, half), Some(Event::Bend { cents: 0.0 }));
@@ -129,7 +125,7 @@ mod tests {
 
     #[test]
     fn plugin_and_renderer_hear_the_same_midi() {
-        let mut translator = Translator::default();
+        let mut translator = EventTranslator::default();
         let mut decoder = MidiDecoder::new();
         for value in 0..=127u8 {
             assert_eq!(midi(&mut translator, [0xB3, 2, value]), decoder.controller(3, 2, value)[0]);
@@ -140,13 +136,13 @@ mod tests {
             assert_eq!(midi(&mut translator, [0x93, value, 90]), last(decoder.note_on(3, value, 90)));
             assert_eq!(midi(&mut translator, [0x83, value, 90]), last(decoder.note_off(Some(3), value)));
         }
-        let mut translator = Translator::default();
+        let mut translator = EventTranslator::default();
         assert_eq!(midi(&mut translator, [0xD0, 64, 0]), MidiDecoder::new().pressure(0, 64)[0]);
     }
 
     #[test]
-    fn tuning_adds_to_the_wheel_until_the_key_is_struck_anew() {
-        let mut translator = Translator::default();
+    fn tuning_adds_to_the_wheel_until_the_key_is_struck_again() {
+        let mut translator = EventTranslator::default();
         let (voice_id, channel, key) = (VoiceID::Wildcard, Channel::Number(0), Key::Number(60));
         midi(&mut translator, [0xE0, 127, 127]);
         midi(&mut translator, [0x90, 60, 90]);
@@ -165,8 +161,8 @@ mod tests {
     }
 
     #[test]
-    fn a_resting_expression_does_not_take_the_breath() {
-        let mut translator = Translator::default();
+    fn a_note_expression_of_zero_does_not_take_the_breath() {
+        let mut translator = EventTranslator::default();
         let (voice_id, channel, key) = (VoiceID::Wildcard, Channel::Number(0), Key::Number(60));
         let press = |pressure| Host::PolyPressure { timing: 0, voice_id, channel, key, pressure };
         assert_eq!(one(&mut translator, press(0.0)), None);
@@ -177,8 +173,8 @@ mod tests {
     }
 
     #[test]
-    fn a_wildcard_ends_everything() {
-        let mut translator = Translator::default();
+    fn a_wildcard_note_off_ends_all_notes() {
+        let mut translator = EventTranslator::default();
         let off = Host::NoteOff {
             timing: 0,
             voice_id: VoiceID::Wildcard,

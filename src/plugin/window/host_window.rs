@@ -1,7 +1,7 @@
-//! The window as the host knows it: made anew each time it opens, of the size that the project kept.
+//! The window as the host knows it. It is made anew each time it opens, in the size that the project keeps.
 
 use std::error::Error;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -14,53 +14,39 @@ use nice_plug_egui::{
     EguiEditorHandle, EguiEditorState, EguiNiceSettings, RepaintNotifier, create_egui_editor,
 };
 
-use super::app::{App, Memory};
-use super::{Shared, kept};
+use super::editor_app::{EditorApp, WindowMemory};
+use super::{SharedWindow, kept};
 use crate::editor::LEAST_SIZE;
 use crate::identity;
+use crate::plugin::launch_options::LaunchOptions;
 
-/// See [`no_window`].
-static NO_WINDOW: AtomicBool = AtomicBool::new(false);
-/// See [`found_no_display`].
-static NO_DISPLAY: AtomicBool = AtomicBool::new(false);
+/// How often the window asks the framework's notifier: practically never. The snapshot thread asks for a repaint itself,
+/// and the notifier's first answer is always yes, which would come before a slow host shows the window; see
+/// [`HostWindow::spawn`].
+const NOTIFIER_INTERVAL: Duration = Duration::from_secs(24 * 3_600);
 
-/// From now on no plugin of this process has a window. For a program that is told so.
-#[cfg(feature = "standalone")]
-pub fn no_window() {
-    NO_WINDOW.store(true, Ordering::Relaxed);
+/// The window, open or closed. The framework holds it as long as the plugin lives.
+pub struct HostWindow {
+    shared: Arc<SharedWindow>,
+    memory: Arc<Mutex<WindowMemory>>,
 }
 
-/// Whether a window was wanted and did not open.
-#[cfg(feature = "standalone")]
-pub fn found_no_display() -> bool {
-    NO_DISPLAY.load(Ordering::Relaxed)
-}
-
-/// How often the window asks the framework's notifier, which nobody uses: the looker tells it by itself. Its first answer
-/// is always yes, and would come before a slow host shows the window; see [`Frame::spawn`].
-const ASK: Duration = Duration::from_secs(24 * 3_600);
-
-/// The window, open or not. The framework holds it as long as the plugin lives.
-pub struct Frame {
-    shared: Arc<Shared>,
-    memory: Arc<Mutex<Memory>>,
-}
-
-impl Frame {
-    pub(super) fn new(shared: Arc<Shared>, memory: Memory) -> Option<Self> {
-        let frame = Self { shared, memory: Arc::new(Mutex::new(memory)) };
-        (!NO_WINDOW.load(Ordering::Relaxed)).then_some(frame)
+impl HostWindow {
+    /// `None` if the launch options exclude a window.
+    pub(super) fn new(shared: Arc<SharedWindow>, memory: WindowMemory) -> Option<Self> {
+        let window = Self { shared, memory: Arc::new(Mutex::new(memory)) };
+        LaunchOptions::get().is_none_or(|options| options.has_window).then_some(window)
     }
 
     /// Size without zoom in points, zoom, pixels per point without zoom.
     fn measures(&self) -> (LogicalSize<f32>, f32, f64) {
         let memory = self.memory.lock().unwrap_or_else(PoisonError::into_inner);
-        let kept = kept(&memory.beside.params);
+        let kept = kept(&memory.handles.params);
         (LogicalSize::new(kept.size.0, kept.size.1), kept.zoom, memory.scale)
     }
 }
 
-impl Editor for Frame {
+impl Editor for HostWindow {
     type Handle = EguiEditorHandle;
 
     fn spawn(
@@ -71,27 +57,28 @@ impl Editor for Frame {
         gui: GuiContext,
         host: Option<HostMethods>,
     ) -> Result<SpawnedEditor<Self::Handle>, Box<dyn Error>> {
-        #[cfg(feature = "standalone")]
-        crate::plugin::standalone::listen_for_the_end();
+        if let Some(options) = LaunchOptions::get() {
+            (options.before_window)(&options.quit);
+        }
         let (size, zoom, _) = self.measures();
-        // Opening and closing are the window's own life, so its state lasts as long.
+        // The framework's state of the window lasts from opening to closing; the project keeps the rest.
         let state = EguiEditorState::from_size(size, zoom);
         let settings = EguiNiceSettings::new()
             .with_tile(identity::NAME)
             .with_resize_hint(self.resize_hint())
-            .with_repaint_poll_interval(ASK);
-        let app = App::open(self.shared.clone(), self.memory.clone(), gui.clone());
+            .with_repaint_poll_interval(NOTIFIER_INTERVAL);
+        let app = EditorApp::open(self.shared.clone(), self.memory.clone(), gui.clone());
         let editor = create_egui_editor(state, RepaintNotifier::new(), settings, app)
-            .ok_or("the window cannot be made")?;
+            .ok_or("cannot create the window")?;
         let has_parent = parent.is_some();
         let spawned = editor.spawn(parent, wait_for_parent, fallback_scale_factor, gui, host);
-        // Under X11 the window library loses a frame that is wanted before the window is shown, and waits for it ever
-        // after. A host may take its time between the two.
+        // Under X11, the window library loses a frame that is requested before the window is shown, and then waits
+        // forever. Some hosts take their time before they show the window, so show it here.
         if let (true, Ok(spawned)) = (has_parent, &spawned) {
             let _ = spawned.handle.show(&spawned.window);
         }
-        if spawned.is_err() {
-            NO_DISPLAY.store(true, Ordering::Relaxed);
+        if let (Err(_), Some(options)) = (&spawned, LaunchOptions::get()) {
+            options.window_failed.store(true, Ordering::Relaxed);
         }
         spawned
     }

@@ -1,4 +1,4 @@
-//! Draws the latest snapshot, and does what was done.
+//! Draws the latest snapshot and applies the user's actions.
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -7,41 +7,42 @@ use nice_plug::context::gui::GuiContext;
 use nice_plug_egui::baseview::{HandlerError, WindowSize};
 use nice_plug_egui::{Frame, KeyCapture, NiceEguiApp};
 
-use super::hands::HostControls;
-use super::{Shared, kept};
+use super::host_controls::HostControls;
+use super::{SharedWindow, kept};
 use crate::editor::{self, Action, Controls, Kept, Snapshot, State};
-use crate::plugin::Beside;
+use crate::plugin::SharedHandles;
+use crate::plugin::launch_options::LaunchOptions;
 use crate::plugin::params::instrument::InstrumentChoice;
 use chalumeau_core::event::Event;
 
-/// What outlives a closed window.
-pub struct Memory {
-    pub(super) beside: Beside,
+/// What the window keeps while it is closed.
+pub struct WindowMemory {
+    pub(super) handles: SharedHandles,
     controls: HostControls,
     state: State,
-    /// What the window last wrote into the project.
+    /// What the window has written into the project last.
     written: Kept,
     keys: rtrb::Producer<Event>,
-    /// Pixels per point without zoom, of the screen it was last on.
+    /// Pixels per point without zoom, on the latest screen.
     pub(super) scale: f64,
 }
 
-impl Memory {
-    pub(super) fn new(beside: Beside, keys: rtrb::Producer<Event>) -> Self {
-        let written = kept(&beside.params);
+impl WindowMemory {
+    pub(super) fn new(handles: SharedHandles, keys: rtrb::Producer<Event>) -> Self {
+        let written = kept(&handles.params);
         Self {
-            controls: HostControls::new(beside.params.clone()),
+            controls: HostControls::new(handles.params.clone()),
             state: State::new(written.clone()),
             written,
-            beside,
+            handles,
             keys,
             scale: 1.0,
         }
     }
 
-    fn act(&mut self, action: Action, shared: &Shared, gui: &GuiContext) {
+    fn act(&mut self, action: Action, shared: &SharedWindow, gui: &GuiContext) {
         match action {
-            // A full ring loses a key, not the window.
+            // A full ring loses the key; the window goes on.
             Action::NoteOn { note, velocity } => {
                 let _ = self.keys.push(Event::NoteOn { note, velocity });
             }
@@ -59,7 +60,7 @@ impl Memory {
             }
             Action::ChooseInstrument(index) => self.choose("instr", index, InstrumentChoice::ALL.len(), gui),
             Action::OpenInstrument(path) => {
-                if let Ok(mut file) = self.beside.params.instrument.file.write() {
+                if let Ok(mut file) = self.handles.params.instrument.file.write() {
                     *file = path.display().to_string();
                 }
                 let user = InstrumentChoice::ALL.len() - 1;
@@ -67,18 +68,18 @@ impl Memory {
             }
             #[cfg(feature = "devices")]
             Action::ChooseDevice(key) => {
-                if let Some(kind) = super::devices::choose(&self.beside, &key) {
-                    self.choose("knob", kind, super::devices::KINDS, gui);
+                if let Some(kind) = super::device_list::choose(&self.handles, &key) {
+                    self.choose("knob", kind, super::device_list::KINDS, gui);
                 }
             }
             #[cfg(feature = "devices")]
-            Action::FeelTest(feel) => self.beside.knob.test(feel),
+            Action::FeelTest(feel) => self.handles.knob.test(feel),
             #[cfg(not(feature = "devices"))]
             Action::ChooseDevice(_) | Action::FeelTest(_) => {}
         }
     }
 
-    /// Puts a choice among `count` on its `index`-th, as a hand would.
+    /// Sets a choice parameter to value `index` of `count`, as the user would.
     fn choose(&self, id: &str, index: usize, count: usize, gui: &GuiContext) {
         let controls = self.controls.with(gui);
         controls.begin(id);
@@ -86,7 +87,7 @@ impl Memory {
         controls.end(id);
     }
 
-    fn let_go(&mut self, shared: &Shared, gui: &GuiContext) {
+    fn close(&mut self, shared: &SharedWindow, gui: &GuiContext) {
         let actions = self.state.close(&self.controls.with(gui));
         for action in actions {
             self.act(action, shared, gui);
@@ -94,33 +95,33 @@ impl Memory {
     }
 }
 
-/// The open window; what it holds is let go of when it closes. [main thread]
-pub struct App {
-    shared: Arc<Shared>,
-    memory: Arc<Mutex<Memory>>,
+/// The open window. It releases held keys and parameters when it closes. [main thread]
+pub struct EditorApp {
+    shared: Arc<SharedWindow>,
+    memory: Arc<Mutex<WindowMemory>>,
     gui: GuiContext,
     has_drawn: bool,
 }
 
-impl App {
-    pub(super) fn open(shared: Arc<Shared>, memory: Arc<Mutex<Memory>>, gui: GuiContext) -> Self {
+impl EditorApp {
+    pub(super) fn open(shared: Arc<SharedWindow>, memory: Arc<Mutex<WindowMemory>>, gui: GuiContext) -> Self {
         shared.is_open.store(true, Ordering::Relaxed);
         Self { shared, memory, gui, has_drawn: false }
     }
 }
 
-impl Drop for App {
+impl Drop for EditorApp {
     fn drop(&mut self) {
         self.shared.is_open.store(false, Ordering::Relaxed);
         self.shared.set_drawn(None);
-        self.memory.lock().unwrap_or_else(PoisonError::into_inner).let_go(&self.shared, &self.gui);
+        self.memory.lock().unwrap_or_else(PoisonError::into_inner).close(&self.shared, &self.gui);
     }
 }
 
-impl NiceEguiApp for App {
+impl NiceEguiApp for EditorApp {
     fn resized(&mut self, size: WindowSize) {
         let mut memory = self.memory.lock().unwrap_or_else(PoisonError::into_inner);
-        // The framework's factor has the zoom in it.
+        // The framework's factor includes the zoom.
         memory.scale = size.scale_factor / f64::from(memory.state.kept.zoom);
     }
 
@@ -130,23 +131,23 @@ impl NiceEguiApp for App {
         }
         let mut memory = self.memory.lock().unwrap_or_else(PoisonError::into_inner);
         let memory = &mut *memory;
-        let params = memory.beside.params.clone();
+        let params = memory.handles.params.clone();
         let now = kept(&params);
         if now != memory.written {
-            // A project was loaded while the window was open.
+            // The host has loaded a project while the window is open.
             let size = egui::vec2(now.size.0, now.size.1);
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::InnerSize(size));
             memory.state.kept = now;
         }
         let mut snapshot = Snapshot::clone(&self.shared.latest());
-        // A handle under the mouse must follow in this very frame.
+        // What the mouse drags must follow in this frame.
         snapshot.settings = params.settings();
         ui.ctx().set_zoom_factor(memory.state.kept.zoom);
         let actions = editor::draw(ui, &mut memory.state, &memory.controls.with(&self.gui), &snapshot);
         for action in actions {
             memory.act(action, &self.shared, &self.gui);
         }
-        // The host's keys stay the host's unless text is typed here.
+        // The host gets the keyboard, unless the user types text here.
         frame.set_key_capture(if memory.state.wants_keyboard(ui.ctx()) {
             KeyCapture::CaptureAll
         } else {
@@ -161,8 +162,7 @@ impl NiceEguiApp for App {
             *kept = now.clone();
             memory.written = now;
         }
-        #[cfg(feature = "standalone")]
-        if crate::plugin::standalone::is_told_to_end() {
+        if LaunchOptions::get().is_some_and(|options| options.quit.load(Ordering::Relaxed)) {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
         }
     }

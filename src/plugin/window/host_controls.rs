@@ -9,38 +9,42 @@ use nice_plug::prelude::{ParamPtr, Params};
 use crate::editor::{Controls, Look};
 use crate::plugin::params::ChalumeauParams;
 
-/// All parameters by their ids. The pointers stay valid as long as `_params` is held.
+/// All parameters by their ids. `_params` keeps the pointers valid.
 pub struct HostControls {
     ids: Vec<&'static str>,
-    of: HashMap<&'static str, ParamPtr>,
+    pointers: HashMap<&'static str, ParamPtr>,
     _params: Arc<ChalumeauParams>,
 }
 
-/// The same with the host's ear.
+/// The parameters together with the host's context, which is told of changes.
 pub struct WithHost<'a> {
     controls: &'a HostControls,
     gui: &'a GuiContext,
 }
 
 impl HostControls {
-    /// Of these parameters.
+    /// Lists these parameters.
     pub fn new(params: Arc<ChalumeauParams>) -> Self {
-        // Ids are words of this program: a handful of bytes once a window.
+        // The editor wants ids that live forever. They are a few bytes, leaked once a plugin instance.
         let all: Vec<(&'static str, ParamPtr)> = params
             .param_map()
             .into_iter()
             .map(|(id, pointer, _)| (&*Box::leak(id.into_boxed_str()), pointer))
             .collect();
-        Self { ids: all.iter().map(|(id, _)| *id).collect(), of: all.into_iter().collect(), _params: params }
+        Self {
+            ids: all.iter().map(|(id, _)| *id).collect(),
+            pointers: all.into_iter().collect(),
+            _params: params,
+        }
     }
 
-    /// For one frame.
+    /// The controls for one frame.
     pub fn with<'a>(&'a self, gui: &'a GuiContext) -> WithHost<'a> {
         WithHost { controls: self, gui }
     }
 }
 
-// The parameter pointers of the framework are raw; they point into `_params`.
+// The framework's parameter pointers are raw; they point into `_params`.
 #[allow(unsafe_code)]
 mod raw {
     use super::*;
@@ -54,8 +58,8 @@ mod raw {
         }
 
         fn look(&self, id: &str) -> Option<Look> {
-            let param = *self.controls.of.get(id)?;
-            // SAFETY: `_params` keeps what the pointer points to.
+            let param = *self.controls.pointers.get(id)?;
+            // SAFETY: `_params` keeps the parameter alive.
             unsafe {
                 Some(Look {
                     name: param.name().to_owned(),
@@ -69,32 +73,32 @@ mod raw {
         fn text(&self, id: &str, value: f32) -> String {
             // SAFETY: as above.
             self.controls
-                .of
+                .pointers
                 .get(id)
                 .map_or_else(String::new, |param| unsafe { param.normalized_value_to_string(value, true) })
         }
 
         fn parse(&self, id: &str, text: &str) -> Option<f32> {
             // SAFETY: as above.
-            unsafe { self.controls.of.get(id)?.string_to_normalized_value(text) }
+            unsafe { self.controls.pointers.get(id)?.string_to_normalized_value(text) }
         }
 
         fn begin(&self, id: &str) {
-            if let Some(&param) = self.controls.of.get(id) {
+            if let Some(&param) = self.controls.pointers.get(id) {
                 // SAFETY: as above.
                 unsafe { self.gui.raw_begin_set_parameter(param) }
             }
         }
 
         fn set(&self, id: &str, value: f32) {
-            if let Some(&param) = self.controls.of.get(id) {
+            if let Some(&param) = self.controls.pointers.get(id) {
                 // SAFETY: as above.
                 unsafe { self.gui.raw_set_parameter_normalized(param, value) }
             }
         }
 
         fn end(&self, id: &str) {
-            if let Some(&param) = self.controls.of.get(id) {
+            if let Some(&param) = self.controls.pointers.get(id) {
                 // SAFETY: as above.
                 unsafe { self.gui.raw_end_set_parameter(param) }
             }

@@ -1,0 +1,138 @@
+//! Which input each breath value came from, for the window. The voice decides which input blows; this only records it.
+
+use nice_plug::prelude::NoteEvent;
+
+use crate::editor::snapshot::Source;
+
+/// An input that breath can come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BreathInput {
+    /// Velocity of the keys, until another input moves.
+    Keys,
+    /// The parameter *Breath*, which hosts automate.
+    Parameter,
+    /// Breath controller, CC2.
+    Breath,
+    /// Expression, CC11.
+    Expression,
+    /// Channel pressure.
+    Pressure,
+    /// Pressure or expression of a note.
+    Note,
+    /// The knob's angle.
+    Knob,
+}
+
+impl BreathInput {
+    /// All inputs, in the order the window shows them.
+    pub const ALL: [Self; 7] =
+        [Self::Keys, Self::Parameter, Self::Breath, Self::Expression, Self::Pressure, Self::Note, Self::Knob];
+
+    /// Its name in the window.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Keys => "Keys, by velocity",
+            Self::Parameter => "Breath parameter",
+            Self::Breath => "CC2 breath",
+            Self::Expression => "CC11 expression",
+            Self::Pressure => "Channel pressure",
+            Self::Note => "Note expression",
+            Self::Knob => Source::KNOB,
+        }
+    }
+
+    /// The input of a host's event, and its value.
+    fn of<S>(event: &NoteEvent<S>) -> Option<(Self, f32)> {
+        Some(match *event {
+            NoteEvent::NoteOn { velocity, .. } => (Self::Keys, velocity),
+            NoteEvent::MidiCC { cc: 2, value, .. } => (Self::Breath, value),
+            NoteEvent::MidiCC { cc: 11, value, .. } => (Self::Expression, value),
+            NoteEvent::MidiChannelPressure { pressure, .. } => (Self::Pressure, pressure),
+            NoteEvent::PolyPressure { pressure: value, .. }
+            | NoteEvent::PolyExpression { expression: value, .. }
+            | NoteEvent::PolyBrightness { brightness: value, .. } => (Self::Note, value),
+            _ => return None,
+        })
+    }
+}
+
+/// The latest value of each input, and the input that blows now. Real-time safe.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BreathSources {
+    values: [Option<f32>; BreathInput::ALL.len()],
+    live: Option<BreathInput>,
+}
+
+impl BreathSources {
+    /// Records a host's event. `blew` says whether the translator made breath of it.
+    pub fn record<S>(&mut self, event: &NoteEvent<S>, blew: bool) {
+        match BreathInput::of(event) {
+            Some((BreathInput::Keys, velocity)) => self.key(velocity),
+            Some((input, value)) if blew => self.blow(input, value),
+            Some((input, value)) => self.set(input, value),
+            None => {}
+        }
+    }
+
+    /// Records a key, which blows until another input has.
+    pub fn key(&mut self, velocity: f32) {
+        self.set(BreathInput::Keys, velocity);
+        self.live.get_or_insert(BreathInput::Keys);
+    }
+
+    /// Records breath, 0..=1, and makes its input the live one.
+    pub fn blow(&mut self, input: BreathInput, breath: f32) {
+        self.set(input, breath);
+        self.live = Some(input);
+    }
+
+    fn set(&mut self, input: BreathInput, value: f32) {
+        self.values[input as usize] = Some(value.clamp(0.0, 1.0));
+    }
+
+    /// The latest value of an input, 0..=1; `None` if it has sent nothing.
+    pub fn value(&self, input: BreathInput) -> Option<f32> {
+        self.values[input as usize]
+    }
+
+    /// Whether this input blows now.
+    pub fn is_live(&self, input: BreathInput) -> bool {
+        self.live == Some(input)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn controller(cc: u8, value: f32) -> NoteEvent<()> {
+        NoteEvent::MidiCC { timing: 0, channel: 0, cc, value }
+    }
+
+    #[test]
+    fn the_latest_breath_is_live_and_an_overruled_value_is_shown() {
+        let mut sources = BreathSources::default();
+        sources.key(0.9);
+        assert!(sources.is_live(BreathInput::Keys));
+        sources.record(&controller(11, 0.25), true);
+        assert!(sources.is_live(BreathInput::Expression));
+        sources.record(&controller(2, 0.5), true);
+        sources.record(&controller(11, 0.75), false);
+        assert!(sources.is_live(BreathInput::Breath) && !sources.is_live(BreathInput::Expression));
+        assert_eq!(sources.value(BreathInput::Expression), Some(0.75));
+        assert_eq!(sources.value(BreathInput::Knob), None);
+        sources.blow(BreathInput::Knob, 2.0);
+        assert!(sources.is_live(BreathInput::Knob));
+        assert_eq!(sources.value(BreathInput::Knob), Some(1.0));
+        sources.record(&controller(1, 1.0), false);
+        sources.key(0.9);
+        assert!(sources.is_live(BreathInput::Knob));
+    }
+
+    #[test]
+    fn each_input_is_shown_once() {
+        for (place, input) in BreathInput::ALL.into_iter().enumerate() {
+            assert_eq!(input as usize, place);
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! Loads the instrument that the parameters ask for, and exchanges it while it sounds.
+//!
+//! Three threads take part.
+//! - The *main* thread builds what is available at once when the host activates the plugin.
+//! - The *loader* thread then follows the parameters. It takes another instrument from the program or the cache. If it
+//!   finds none, it builds a rough one so that something sounds, then fits and tunes it, and hands over each better one.
+//! - The *audio* thread receives a complete instrument through a ring. The new instrument first plays unheard beside the
+//!   old one, then the two crossfade, and the old one goes back through another ring. The audio thread allocates and frees
+//!   nothing. It waits for nobody, with one exception: an offline render waits for the instrument that its parameters ask
+//!   for, so that two renders are the same.
+
+pub mod instrument_loader;
+pub mod instrument_request;
+pub mod instrument_swap;
+
+use std::sync::atomic::{AtomicBool, AtomicU32};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use chalumeau_core::instrument::{Clarinet, Model};
+use instrument_request::InstrumentRequest;
+
+pub use instrument_loader::InstrumentLoader;
+pub use instrument_swap::InstrumentSwap;
+
+/// The loader has finished with no choice yet.
+const NO_CHOICE: u32 = u32::MAX;
+
+/// Transposition before the first activation: a B flat clarinet sounds two semitones lower than written.
+const BUILT_IN_TRANSPOSITION: i8 = 2;
+
+/// How far an instrument is built, the worst first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Readiness {
+    /// Not fitted: it speaks, but out of tune.
+    Rough,
+    /// Fitted, not tuned.
+    Fitted,
+    /// Tuned for another A4; the player corrects the difference.
+    OtherA4,
+    /// Fitted and tuned for the A4 of the request.
+    Tuned,
+}
+
+/// The instrument that plays, or that is on its way to the audio thread.
+#[derive(Clone, Debug)]
+pub struct CurrentInstrument {
+    /// The request it answers.
+    pub request: InstrumentRequest,
+    /// How far it is built.
+    pub readiness: Readiness,
+    /// The instrument.
+    pub model: Arc<Model>,
+}
+
+/// The host's latest activation of the plugin.
+#[derive(Clone, Debug, Default)]
+struct Activation {
+    /// Host rate, Hz; `None` before the first activation and while the main thread builds an instrument.
+    host_rate_hz: Option<f64>,
+    /// Whether the host renders a file.
+    offline: bool,
+    current: Option<CurrentInstrument>,
+    /// Counts activations. Work that began under an earlier number is discarded.
+    number: u64,
+}
+
+/// What the threads share about the instrument. Only the main thread, the loader, the knob controller and the snapshot
+/// thread take the lock.
+#[derive(Debug)]
+pub struct SharedInstrument {
+    activation: Mutex<Activation>,
+    /// The value of *Instrument*, as a number, for which the loader has nothing left to do.
+    finished_choice: AtomicU32,
+    stop: AtomicBool,
+}
+
+impl SharedInstrument {
+    fn new() -> Self {
+        Self {
+            activation: Mutex::default(),
+            finished_choice: AtomicU32::new(NO_CHOICE),
+            stop: AtomicBool::new(false),
+        }
+    }
+
+    fn activation(&self) -> MutexGuard<'_, Activation> {
+        self.activation.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Written pitch minus sounding pitch of the current instrument, semitones.
+    pub fn transposition(&self) -> i8 {
+        let activation = self.activation();
+        activation.current.as_ref().map_or(BUILT_IN_TRANSPOSITION, |current| current.model.file.transposition)
+    }
+
+    /// The current instrument; `None` before the first activation.
+    pub fn current(&self) -> Option<CurrentInstrument> {
+        self.activation().current.clone()
+    }
+}
+
+/// An instrument on its way to the audio thread.
+pub struct PreparedInstrument {
+    /// Number of the activation that it was built for.
+    activation: u64,
+    clarinet: Box<Clarinet>,
+}

@@ -1,0 +1,330 @@
+//! The instrument that the audio thread plays, and its exchange for the next one. Real-time safe throughout.
+//! [audio thread]
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use super::{PreparedInstrument, SharedInstrument};
+use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::instrument::{Clarinet, Settings};
+
+/// Time for which a new instrument plays unheard, s. The lowest notes of a B flat clarinet speak after 50 ms, those of a
+/// bass clarinet after 100 ms.
+const WARM_UP_S: f64 = 0.12;
+/// Length of the crossfade, s.
+const FADE_S: f64 = 0.02;
+/// Samples mixed at a time.
+const CHUNK: usize = 64;
+/// Longest time for which an offline render waits for an instrument before it continues with the one it has.
+const LONGEST_WAIT: Duration = Duration::from_secs(600);
+
+/// The instrument that plays, and the next one while they change over.
+pub struct InstrumentSwap {
+    shared: Arc<SharedInstrument>,
+    playing: Box<Clarinet>,
+    next: Option<NextInstrument>,
+    /// An old instrument that the ring back had no room for.
+    old: Option<Box<Clarinet>>,
+    incoming: rtrb::Consumer<PreparedInstrument>,
+    outgoing: rtrb::Producer<Box<Clarinet>>,
+    settings: Settings,
+    activation: u64,
+    /// The value of *Instrument* that was waited for last.
+    awaited_choice: u32,
+    rate_hz: f64,
+    warm_up: usize,
+    fade: usize,
+}
+
+/// A new instrument beside the old one.
+struct NextInstrument {
+    clarinet: Box<Clarinet>,
+    /// Samples it has played.
+    played: usize,
+}
+
+impl InstrumentSwap {
+    pub(super) fn new(
+        shared: Arc<SharedInstrument>,
+        playing: Box<Clarinet>,
+        incoming: rtrb::Consumer<PreparedInstrument>,
+        outgoing: rtrb::Producer<Box<Clarinet>>,
+    ) -> Self {
+        Self {
+            shared,
+            playing,
+            next: None,
+            old: None,
+            incoming,
+            outgoing,
+            settings: Settings::default(),
+            activation: 0,
+            awaited_choice: 0,
+            rate_hz: 0.0,
+            warm_up: 0,
+            fade: 1,
+        }
+    }
+
+    /// Begins a new activation. `clarinet` replaces the instrument if the old one does not fit. [main thread]
+    pub(super) fn activate(
+        &mut self,
+        clarinet: Option<Box<Clarinet>>,
+        rate_hz: f64,
+        activation: u64,
+        choice: u32,
+    ) {
+        self.next = None;
+        if let Some(clarinet) = clarinet {
+            self.playing = clarinet;
+        }
+        (self.activation, self.awaited_choice) = (activation, choice);
+        self.rate_hz = rate_hz;
+        self.warm_up = (WARM_UP_S * rate_hz) as usize;
+        self.fade = (FADE_S * rate_hz) as usize;
+    }
+
+    /// The instrument that plays.
+    pub fn clarinet(&self) -> &Clarinet {
+        &self.playing
+    }
+
+    /// Switches on or off that the instrument keeps its last moments for the window.
+    pub fn set_watched(&mut self, on: bool) {
+        self.playing.set_watched(on);
+    }
+
+    /// The host's sample rate, Hz.
+    pub fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
+    /// Applies settings to both instruments.
+    pub fn set_settings(&mut self, settings: &Settings) {
+        self.settings = *settings;
+        self.playing.set_settings(settings);
+        if let Some(next) = &mut self.next {
+            next.clarinet.set_settings(settings);
+        }
+    }
+
+    /// Waits until the loader has finished with `choice`, the value of *Instrument*. Only for an offline render: this is
+    /// the one place where the audio thread waits.
+    pub fn wait_for(&mut self, choice: u32) {
+        if std::mem::replace(&mut self.awaited_choice, choice) == choice {
+            return;
+        }
+        let began = Instant::now();
+        while self.shared.finished_choice.load(Ordering::Acquire) != choice && began.elapsed() < LONGEST_WAIT
+        {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// Receives instruments from the loader, and sends old ones back. Call it once a block.
+    pub fn receive(&mut self) {
+        self.send_back();
+        while self.next.is_none() && self.old.is_none() {
+            let Ok(PreparedInstrument { activation, mut clarinet }) = self.incoming.pop() else { return };
+            if activation != self.activation {
+                self.old = Some(clarinet);
+            } else {
+                clarinet.set_settings(&self.settings);
+                clarinet.carry_on(&self.playing);
+                // Silence needs no fade.
+                let played = if self.playing.is_silent() { self.warm_up + self.fade } else { 0 };
+                self.next = Some(NextInstrument { clarinet, played });
+                self.finish_swap();
+            }
+            self.send_back();
+        }
+    }
+
+    fn send_back(&mut self) {
+        if let Some(old) = self.old.take()
+            && let Err(rtrb::PushError::Full(old)) = self.outgoing.push(old)
+        {
+            self.old = Some(old);
+        }
+    }
+
+    /// Replaces the old instrument if the new one has faded in and there is a place for the old one.
+    fn finish_swap(&mut self) {
+        let done = self.next.as_ref().is_some_and(|next| next.played >= self.warm_up + self.fade);
+        if done
+            && self.old.is_none()
+            && let Some(next) = self.next.take()
+        {
+            self.old = Some(std::mem::replace(&mut self.playing, next.clarinet));
+        }
+    }
+
+    /// Silences everything and clears every state. A new instrument that had arrived now plays.
+    pub fn reset(&mut self) {
+        if let Some(next) = &mut self.next {
+            next.played = self.warm_up + self.fade;
+        }
+        self.finish_swap();
+        self.playing.reset();
+        if let Some(next) = &mut self.next {
+            next.clarinet.reset();
+        }
+    }
+
+    /// See [`Clarinet::render_events`]; both instruments receive the events.
+    pub fn render_events(&mut self, events: impl IntoIterator<Item = Timed<Event>>, out: &mut [f32]) {
+        if self.next.is_none() {
+            return self.playing.render_events(events, out);
+        }
+        let mut done = 0;
+        for Timed { at, event } in events {
+            let at = at.clamp(done, out.len());
+            self.render(&mut out[done..at]);
+            self.playing.apply(event);
+            if let Some(next) = &mut self.next {
+                next.clarinet.apply(event);
+            }
+            done = at;
+        }
+        self.render(&mut out[done..]);
+    }
+
+    fn render(&mut self, out: &mut [f32]) {
+        let mut new_out = [0.0; CHUNK];
+        for out in out.chunks_mut(CHUNK) {
+            self.playing.render(out);
+            let Some(next) = &mut self.next else { continue };
+            let new_out = &mut new_out[..out.len()];
+            next.clarinet.render(new_out);
+            for (old, new) in out.iter_mut().zip(new_out) {
+                let faded = next.played.saturating_sub(self.warm_up);
+                // Equal power, because the two have different phases. At the end the output is the new one to the bit.
+                *old = if faded < self.fade {
+                    let angle = std::f32::consts::FRAC_PI_2 * faded as f32 / self.fade as f32;
+                    *old * angle.cos() + *new * angle.sin()
+                } else {
+                    *new
+                };
+                next.played += 1;
+            }
+            self.finish_swap();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chalumeau_core::bore::bundled::Bundled;
+    use chalumeau_core::instrument::Model;
+    use chalumeau_core::instrument::prepare::{Wanted, rough};
+    use chalumeau_core::units::SoundingNote;
+
+    const RATE: f64 = 48_000.0;
+    const AT: usize = 24_000;
+
+    struct SwapEnds {
+        swap: InstrumentSwap,
+        send: rtrb::Producer<PreparedInstrument>,
+        back: rtrb::Consumer<Box<Clarinet>>,
+    }
+
+    fn swap_ends() -> SwapEnds {
+        let built_in = || Box::new(Clarinet::built_in(RATE).unwrap());
+        let (send, incoming) = rtrb::RingBuffer::new(4);
+        let (outgoing, back) = rtrb::RingBuffer::new(8);
+        let mut swap = InstrumentSwap::new(Arc::new(SharedInstrument::new()), built_in(), incoming, outgoing);
+        swap.activate(None, RATE, 1, 0);
+        swap.set_settings(&Settings::default());
+        SwapEnds { swap, send, back }
+    }
+
+    fn held() -> [Timed<Event>; 2] {
+        let note_on = Event::NoteOn { note: SoundingNote(60), velocity: 0.8 };
+        [Event::Breath(0.6), note_on].map(|event| Timed { at: 0, event })
+    }
+
+    /// Plays a held note, with another instrument after half a second, in blocks of `block` samples.
+    fn exchanged(model: Model, block: usize) -> (Vec<f32>, SwapEnds) {
+        let mut ends = swap_ends();
+        let mut out = vec![0.0; 2 * RATE as usize];
+        let mut said = Some(held());
+        for (number, out) in out.chunks_mut(block).enumerate() {
+            if number * block == AT {
+                let clarinet = Box::new(Clarinet::new(Arc::new(model.clone()), RATE));
+                assert!(ends.send.push(PreparedInstrument { activation: 1, clarinet }).is_ok());
+            }
+            ends.swap.receive();
+            ends.swap.render_events(said.take().into_iter().flatten(), out);
+        }
+        (out, ends)
+    }
+
+    fn largest_step(sound: &[f32]) -> f32 {
+        sound.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f32::max)
+    }
+
+    fn rms(sound: &[f32]) -> f32 {
+        (sound.iter().map(|x| x * x).sum::<f32>() / sound.len() as f32).sqrt()
+    }
+
+    #[test]
+    fn a_note_goes_on_over_an_exchange_without_a_click_or_a_gap() {
+        let another = rough(&Wanted::new(Bundled::A.file(), RATE)).unwrap();
+        for model in [Model::built_in(RATE).unwrap(), another] {
+            let (sound, mut ends) = exchanged(model, 240);
+            let own = largest_step(&sound[AT / 2..AT]).max(largest_step(&sound[3 * AT..]));
+            let over = largest_step(&sound[AT..2 * AT]);
+            assert!(over <= 1.5 * own, "{over} over the exchange, {own} before and after");
+            let loud = rms(&sound[AT / 2..AT]);
+            for (at, window) in sound[AT..].chunks(960).enumerate() {
+                assert!(rms(window) > 0.5 * loud, "{} ms after: {} of {loud}", 20 * at, rms(window));
+            }
+            assert!(ends.back.pop().is_ok(), "the old one was sent back");
+        }
+    }
+
+    #[test]
+    fn where_the_exchange_begins_does_not_depend_on_blocks() {
+        let model = Model::built_in(RATE).unwrap();
+        let whole = exchanged(model.clone(), 24_000).0;
+        for block in [16, 240, 4_000] {
+            assert!(exchanged(model.clone(), block).0 == whole, "blocks of {block}");
+        }
+    }
+
+    #[test]
+    fn held_keys_stay_held() {
+        let mut ends = swap_ends();
+        let mut out = vec![0.0; AT];
+        ends.swap.render_events(held(), &mut out);
+        let clarinet = Box::new(Clarinet::built_in(RATE).unwrap());
+        assert!(ends.send.push(PreparedInstrument { activation: 1, clarinet }).is_ok());
+        ends.swap.receive();
+        ends.swap.render_events([], &mut out);
+        let loud = rms(&out[AT / 2..]);
+        assert!(loud > 1e-3, "the key is still down");
+        // The release reaches the new instrument.
+        let off = Timed { at: 0, event: Event::NoteOff { note: SoundingNote(60) } };
+        ends.swap.render_events([off], &mut out);
+        assert!(rms(&out[AT / 2..]) < 1e-3 * loud, "{} of {loud}", rms(&out[AT / 2..]));
+    }
+
+    #[test]
+    fn a_silent_instrument_is_exchanged_at_once_and_one_of_another_activation_never() {
+        let mut ends = swap_ends();
+        let mut out = vec![0.0; AT];
+        ends.swap.render_events([], &mut out);
+        let clarinet = || Box::new(Clarinet::built_in(RATE).unwrap());
+        let model = clarinet();
+        let model = model.model();
+        assert!(!Arc::ptr_eq(ends.swap.clarinet().model(), model));
+        assert!(ends.send.push(PreparedInstrument { activation: 7, clarinet: clarinet() }).is_ok());
+        let new = Box::new(Clarinet::new(model.clone(), RATE));
+        assert!(ends.send.push(PreparedInstrument { activation: 1, clarinet: new }).is_ok());
+        ends.swap.receive();
+        assert!(Arc::ptr_eq(ends.swap.clarinet().model(), model));
+        assert!(ends.back.pop().is_ok() && ends.back.pop().is_ok() && ends.back.pop().is_err());
+    }
+}

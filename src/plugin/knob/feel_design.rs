@@ -1,0 +1,74 @@
+//! The feel and the calibration that the knob's parameters describe.
+
+use crate::plugin::params::KnobParams;
+use crate::plugin::params::knob::{Calibration, LawChoice, OrderChoice};
+use chalumeau_core::control::knob::KnobDesign;
+use chalumeau_core::haptics::{FeelDesign, Order};
+use chalumeau_core::units::WrittenNote;
+use chalumeau_knob::wire::Law;
+
+/// Highest torque of the reference note in a study, mNm. With it, both sides of every trial stay under the first ceiling
+/// at the default contrast (the test below checks this).
+const STUDY_MNM: f64 = 50.0;
+
+/// The feel that the parameters describe.
+pub fn feel_design(knob: &KnobParams) -> FeelDesign {
+    let calibration = knob.calibration.read().map_or_else(|_| Calibration::default(), |c| c.mended());
+    FeelDesign {
+        law: match knob.law.value() {
+            LawChoice::Flow => Law::Flow,
+            LawChoice::Pressure => Law::Pressure,
+            LawChoice::Free => Law::Free,
+        },
+        reference: u8::try_from(knob.reference.value()).ok().map(WrittenNote),
+        contrast: f64::from(knob.contrast.value()),
+        order: match knob.order.value() {
+            OrderChoice::Physical => Order::Physical,
+            OrderChoice::CoveredHoles => Order::CoveredHoles,
+            OrderChoice::OpenHoles => Order::CoveredHolesReversed,
+        },
+        strength_mnm: match knob.study() {
+            Some(_) => f64::from(knob.torque.value()).min(STUDY_MNM),
+            None => f64::from(knob.torque.value()),
+        },
+        travel_deg: calibration.travel_deg,
+        damping_mnms: f64::from(knob.damping.value()),
+        friction_mnm: f64::from(knob.friction.value()),
+        detent_mnm: (knob.law.value() == LawChoice::Pressure).then(|| f64::from(knob.detent.value())),
+        ..FeelDesign::default()
+    }
+}
+
+/// Rest angle, full-blow angle, dead zone and curve from the parameters.
+pub fn knob_design(knob: &KnobParams) -> KnobDesign {
+    let calibration = knob.calibration.read().map_or_else(|_| Calibration::default(), |c| *c);
+    calibration.design(f64::from(knob.curve.value()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chalumeau_core::haptics::TorqueLimits;
+    use chalumeau_core::instrument::Settings;
+    use chalumeau_knob::touch::feel::Feels;
+    use chalumeau_knob::touch::study::{Condition, TRIALS, plan};
+
+    #[test]
+    fn both_sides_of_every_trial_can_be_felt_under_the_first_ceiling() {
+        let feels = Feels::built_in().unwrap();
+        for trial in plan(1, 1).iter().chain(&plan(2, 1)) {
+            for condition in [Condition::Coupled, Condition::Free] {
+                let settings = Settings {
+                    reed_h: trial.h as f32,
+                    reed_k: condition.k(trial.h) as f32,
+                    coupled: false,
+                    ..Settings::default()
+                };
+                let design = FeelDesign { strength_mnm: STUDY_MNM, ..FeelDesign::default() };
+                let refused = feels.table(&settings, &design, &TorqueLimits::default()).err();
+                assert_eq!(refused, None, "H {} {}", trial.h, condition.name());
+            }
+        }
+        assert_eq!(plan(1, 1).len(), TRIALS);
+    }
+}

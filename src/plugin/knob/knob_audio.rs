@@ -1,0 +1,213 @@
+//! The audio thread's part of the knob. Real-time safe throughout. [audio thread]
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use super::feel_design::{feel_design, knob_design};
+use super::feels_cache::FeelsCache;
+use super::take_recorder::load_take;
+use super::{NO_NOTE, SharedKnob};
+use crate::plugin::instrument_loading::{InstrumentSwap, SharedInstrument};
+use crate::plugin::params::ChalumeauParams;
+use chalumeau_core::control::knob::slap_strength;
+use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::instrument::Settings;
+use chalumeau_knob::device::KnobReader;
+use chalumeau_knob::touch::blower::{Blower, Blown, Breath14, GRID, Hand};
+use chalumeau_knob::touch::feel::NO_MOTOR;
+use chalumeau_knob::touch::take::Take;
+
+/// Breath values of one block that also go to the host: a block of 8192 samples has 128.
+const SENT_MOST: usize = 8_192 / GRID as usize;
+
+/// Where a block's breath comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum BlockBreath {
+    /// The host's events.
+    Host,
+    /// A live knob.
+    Knob,
+    /// A recorded take.
+    Take,
+}
+
+/// The audio thread's part of the knob.
+pub struct KnobAudio {
+    shared: Arc<SharedKnob>,
+    readers: rtrb::Consumer<KnobReader>,
+    reader: Option<KnobReader>,
+    hand: triple_buffer::Output<Hand>,
+    take: triple_buffer::Output<Option<Arc<Take>>>,
+    blower: Blower,
+    breath_from: BlockBreath,
+    sent: SentBreath,
+    /// Samples of a take that have been played.
+    replayed: u64,
+    /// A replay that was loaded before playing began; it takes precedence over what the controller has loaded since.
+    prepared: Option<PreparedReplay>,
+}
+
+/// What a replay needs from its first sample.
+struct PreparedReplay {
+    hand: Hand,
+    take: Arc<Take>,
+}
+
+/// The breath values of one block that go to the host.
+struct SentBreath {
+    values: [(usize, Breath14); SENT_MOST],
+    count: usize,
+}
+
+impl SentBreath {
+    fn push(&mut self, at: usize, breath: Breath14) {
+        if let Some(place) = self.values.get_mut(self.count) {
+            *place = (at, breath);
+            self.count += 1;
+        }
+    }
+}
+
+/// What a block depends on, besides its events.
+#[derive(Clone, Copy, Debug)]
+pub struct BlockContext {
+    /// Sample rate, Hz.
+    pub rate_hz: f64,
+    /// The host renders a file, so a live knob has no effect.
+    pub offline: bool,
+    /// A take replaces the knob.
+    pub replay: bool,
+}
+
+impl KnobAudio {
+    pub(super) fn new(
+        shared: Arc<SharedKnob>,
+        readers: rtrb::Consumer<KnobReader>,
+        hand: triple_buffer::Output<Hand>,
+        take: triple_buffer::Output<Option<Arc<Take>>>,
+    ) -> Self {
+        Self {
+            shared,
+            readers,
+            reader: None,
+            hand,
+            take,
+            blower: Blower::default(),
+            breath_from: BlockBreath::Host,
+            sent: SentBreath { values: [(0, Breath14(0)); SENT_MOST], count: 0 },
+            replayed: 0,
+            prepared: None,
+        }
+    }
+
+    /// Loads the take to replay before playing begins, so that it plays from the first sample and every render of a file
+    /// is the same. Allocates; takes about half a second. [main thread]
+    pub fn prepare(&mut self, params: &ChalumeauParams, instrument: &SharedInstrument) {
+        self.shared.is_active.store(true, Ordering::Relaxed);
+        self.prepared = None;
+        if !params.knob.replay.value() {
+            return;
+        }
+        let Ok(path) = params.knob.take.read().map(|path| path.clone()) else { return };
+        // If the take or the feel fails to load, nothing is replayed; the controller reports why.
+        let Ok(take) = load_take(&path) else { return };
+        let Some(feels) = FeelsCache::default().of(instrument) else { return };
+        let Ok(table) = feels.table(&params.settings(), &feel_design(&params.knob), &NO_MOTOR) else {
+            return;
+        };
+        let hand = Hand { maps: feels.maps(&table), design: knob_design(&params.knob), feels: true };
+        self.prepared = Some(PreparedReplay { hand, take });
+    }
+
+    /// Tells the controller which factors the reed's MIDI controllers put on H and k.
+    pub fn set_reed_factors(&self, factors: [f32; 2]) {
+        for (place, factor) in self.shared.reed_factors.iter().zip(factors) {
+            place.store(factor.to_bits(), Ordering::Relaxed);
+        }
+    }
+
+    /// Forgets notes and breath; the link stays.
+    pub fn reset(&mut self) {
+        self.blower.reset();
+        self.breath_from = BlockBreath::Host;
+        self.replayed = 0;
+        self.shared.note.store(NO_NOTE, Ordering::Relaxed);
+    }
+
+    /// Renders one block: the host's events, and between them the breath of the knob or the take.
+    pub fn render(
+        &mut self,
+        instrument: &mut InstrumentSwap,
+        settings: &Settings,
+        host: impl Iterator<Item = Timed<Event>>,
+        context: BlockContext,
+        out: &mut [f32],
+    ) {
+        if self.reader.is_none() {
+            self.reader = self.readers.pop().ok();
+        }
+        self.sent.count = 0;
+        let samples = out.len();
+        let (hand, take) = (self.hand.read(), self.take.read());
+        let (hand, take) = match &self.prepared {
+            Some(PreparedReplay { hand, take }) if context.replay => (hand, Some(&**take)),
+            _ => (hand, take.as_deref().filter(|_| context.replay)),
+        };
+        // The ring is emptied even if nothing uses its angles.
+        let mut reader = self.reader.as_mut();
+        if let Some(reader) = &mut reader {
+            reader.begin_block(samples, context.rate_hz);
+        }
+        let breath_from = match (&take, &reader) {
+            _ if !hand.maps.is_ready() => BlockBreath::Host,
+            (Some(_), _) => BlockBreath::Take,
+            (None, Some(reader)) if !context.offline && reader.pose(0).is_some() => BlockBreath::Knob,
+            _ => BlockBreath::Host,
+        };
+        let has_left = breath_from == BlockBreath::Host && self.breath_from != BlockBreath::Host;
+        let last_breath = has_left.then(|| self.blower.fall_silent()).flatten();
+        self.breath_from = breath_from;
+        let full_pa = 1e3 * f64::from(settings.breath_full_kpa);
+        let (shared, sent, closing_pa) = (&self.shared, &mut self.sent, settings.closing_pa());
+        let mut on_breath = |at: usize, breath: Breath14| {
+            let gamma = f64::from(breath.unit()) * full_pa / closing_pa;
+            shared.gamma.store((gamma as f32).to_bits(), Ordering::Relaxed);
+            sent.push(at, breath);
+        };
+        let blower = &mut self.blower;
+        match (breath_from, take, reader) {
+            (BlockBreath::Take, Some(take), _) => {
+                let begun = self.replayed;
+                let angle = |at: usize| Some(take.angle_deg((begun + at as u64) as f64 / context.rate_hz));
+                let events = Blown::new(host, blower, hand, full_pa, samples, angle, &mut on_breath);
+                instrument.render_events(events, out);
+                self.replayed += samples as u64;
+            }
+            (BlockBreath::Knob, _, Some(reader)) => {
+                let slap = reader.take_slap().map(|speed| Timed {
+                    at: 0,
+                    event: Event::TongueSlap { strength: slap_strength(speed) },
+                });
+                let angle = |at: usize| reader.pose(at).map(|pose| f64::from(pose.angle_deg));
+                let events = Blown::new(host, blower, hand, full_pa, samples, angle, &mut on_breath);
+                instrument.render_events(slap.into_iter().chain(events), out);
+            }
+            _ => {
+                let host = host.inspect(|event| blower.heed(event));
+                let last_breath = last_breath.map(|breath| {
+                    on_breath(0, breath);
+                    Timed { at: 0, event: Event::Breath(breath.unit()) }
+                });
+                instrument.render_events(last_breath.into_iter().chain(host), out);
+            }
+        }
+        self.blower.advance(samples);
+        let note = self.blower.fingered().map_or(NO_NOTE, |note| note.0);
+        self.shared.note.store(note, Ordering::Relaxed);
+    }
+
+    /// The breath values of the last block and their sample positions, in order of time, for the host to record.
+    pub fn sent(&self) -> &[(usize, Breath14)] {
+        &self.sent.values[..self.sent.count]
+    }
+}

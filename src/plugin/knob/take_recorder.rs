@@ -1,0 +1,141 @@
+//! Records takes: their folder, their remarks, the marks of their rows. Also reads a take back.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use super::feel_design::feel_design;
+use crate::plugin::params::ChalumeauParams;
+use crate::take_file::TakeFile;
+use chalumeau_core::instrument::Settings;
+use chalumeau_knob::touch::study::{Side, plan};
+use chalumeau_knob::touch::take::{Marks, Moment, Take};
+
+/// Environment variable that names another folder for takes.
+const TAKES: &str = "CHALUMEAU_TAKES";
+
+/// Writes at most one take at a time.
+#[derive(Default)]
+pub struct TakeRecorder {
+    recording: Option<Recording>,
+}
+
+/// A take that is being written.
+struct Recording {
+    writer: TakeFile,
+    path: PathBuf,
+    rows: u64,
+    /// Why a row could not be written.
+    error: Option<String>,
+}
+
+impl TakeRecorder {
+    /// Opens a new take, if none is open.
+    pub fn begin(&mut self, params: &ChalumeauParams) -> Result<(), String> {
+        if self.recording.is_none() {
+            self.recording = Some(create(params)?);
+        }
+        Ok(())
+    }
+
+    /// Adds a row to the take, if one is open.
+    pub fn write(&mut self, moment: &Moment, marks: &Marks) {
+        if let Some(recording) = &mut self.recording {
+            match recording.writer.write(moment, marks) {
+                Ok(()) => recording.rows += 1,
+                Err(reason) => recording.error = Some(reason.to_string()),
+            }
+        }
+    }
+
+    /// Rows of the open take.
+    pub fn rows(&self) -> Option<u64> {
+        self.recording.as_ref().map(|recording| recording.rows)
+    }
+
+    /// Completes the open take and makes it the take of the project. Returns a message for the user, if a take was open.
+    pub fn end(&mut self, params: &ChalumeauParams) -> Option<String> {
+        let Recording { writer, path, rows, error } = self.recording.take()?;
+        if rows == 0 {
+            return Some("nothing recorded: the knob sent nothing".to_owned());
+        }
+        let kept = match error {
+            Some(reason) => Err(reason),
+            None => writer.keep().map_err(|reason| reason.to_string()),
+        };
+        Some(match kept {
+            Ok(()) => {
+                if let Ok(mut take) = params.knob.take.write() {
+                    *take = path.display().to_string();
+                }
+                format!("take {} has {rows} rows", path.display())
+            }
+            Err(reason) => format!("take lost: {reason}"),
+        })
+    }
+}
+
+/// Reads a take. The error is a message for the user.
+pub fn load_take(path: &str) -> Result<Arc<Take>, String> {
+    let file = std::fs::File::open(path).map_err(|reason| format!("cannot read take {path}: {reason}"))?;
+    Take::read(file).map(Arc::new).map_err(|reason| format!("take {path}: {reason}"))
+}
+
+/// Reed and study trial of the rows that are written now.
+pub fn marks(params: &ChalumeauParams, settings: &Settings) -> Marks {
+    let law = settings.reed_law();
+    let study = params
+        .knob
+        .study()
+        .map(|(participant, trial, side)| (participant, trial.number, side, trial.condition(side)));
+    Marks { reed: Some((law.h(), law.k())), study }
+}
+
+/// Creates a new take in the folder of takes.
+fn create(params: &ChalumeauParams) -> Result<Recording, String> {
+    let folder = match std::env::var_os(TAKES) {
+        Some(folder) => PathBuf::from(folder),
+        None => dirs::document_dir()
+            .or_else(dirs::data_dir)
+            .ok_or_else(|| format!("no folder for takes; set {TAKES} to one"))?
+            .join("Chalumeau")
+            .join("takes"),
+    };
+    std::fs::create_dir_all(&folder).map_err(|reason| {
+        format!("cannot create {}: {reason}; set {TAKES} to another folder", folder.display())
+    })?;
+    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
+    let path = (0..1_000)
+        .map(|n| {
+            folder.join(if n == 0 {
+                format!("take-{seconds}.csv")
+            } else {
+                format!("take-{seconds}-{n}.csv")
+            })
+        })
+        .find(|path| !path.exists())
+        .ok_or_else(|| format!("{} has too many takes of this second", folder.display()))?;
+    let writer = TakeFile::create(&path, false, &remarks(params)).map_err(|reason| reason.to_string())?;
+    Ok(Recording { writer, path, rows: 0, error: None })
+}
+
+/// The lines above a take's columns: program, feel, and the order of the study's trials.
+fn remarks(params: &ChalumeauParams) -> Vec<String> {
+    let knob = &params.knob;
+    let mut remarks = vec![
+        format!(
+            "Chalumeau {} take; t_us is the host's clock, angle from the knob's zero",
+            env!("CARGO_PKG_VERSION")
+        ),
+        format!("feel {:?}", feel_design(knob)),
+    ];
+    if let Some((participant, ..)) = knob.study() {
+        let seed = knob.seed.value();
+        let order: Vec<String> = plan(participant, seed as u32)
+            .iter()
+            .map(|trial| format!("{}:H={},A={}", trial.number, trial.h, trial.condition(Side::A).name()))
+            .collect();
+        remarks.push(format!("study participant {participant} seed {seed} order {}", order.join(" ")));
+    }
+    remarks
+}

@@ -1,0 +1,42 @@
+//! What the standalone program tells the plugin that it runs.
+//!
+//! The framework constructs the plugin by itself and passes nothing to it. These options are therefore the one global of
+//! the plugin. The standalone sets them once, before it starts the framework. In a host nobody sets them.
+
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
+
+use super::params::instrument::InstrumentChoice;
+
+static LAUNCH_OPTIONS: OnceLock<LaunchOptions> = OnceLock::new();
+
+/// Options of this process.
+#[derive(Debug)]
+pub struct LaunchOptions {
+    /// Default of the parameter *Instrument*.
+    pub instrument: InstrumentChoice,
+    /// Path of the user's instrument file; empty for the usual place.
+    pub instrument_file: String,
+    /// Default of the parameter *A4*, Hz.
+    pub a4_hz: f32,
+    /// Whether the plugin has a window.
+    pub has_window: bool,
+    /// The plugin calls this with `quit` just before its window opens.
+    pub before_window: fn(&Arc<AtomicBool>),
+    /// The open window closes when this is set.
+    pub quit: Arc<AtomicBool>,
+    /// The plugin sets this when its window could not open.
+    pub window_failed: AtomicBool,
+}
+
+impl LaunchOptions {
+    /// Sets the options of this process and returns them. Only the first call has an effect.
+    pub fn set(self) -> &'static Self {
+        LAUNCH_OPTIONS.get_or_init(|| self)
+    }
+
+    /// The options of this process; `None` in a host.
+    pub fn get() -> Option<&'static Self> {
+        LAUNCH_OPTIONS.get()
+    }
+}

@@ -1,0 +1,91 @@
+//! What the window shows of an instrument that does not change from moment to moment: requirement, feel, standing wave.
+
+use std::sync::Arc;
+
+use crate::plugin::instrument_loading::CurrentInstrument;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::bore::transfer_matrix::TransferMatrix;
+use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, Requirement, TorqueLimits};
+use chalumeau_core::instrument::{Model, Settings, felt};
+use chalumeau_knob::touch::feel::Feels;
+
+/// An instrument, analysed once, with the latest results for a fingering.
+pub struct InstrumentAnalysis {
+    model: Arc<Model>,
+    file: Arc<InstrumentFile>,
+    feels: Arc<Feels>,
+    bore: TransferMatrix,
+    /// The latest feel table, and what it was computed from.
+    table: Option<(Settings, FeelDesign, Result<FeelTable, String>)>,
+    standing_wave: Option<StandingWave>,
+}
+
+/// A standing wave, and what it was computed from.
+struct StandingWave {
+    fingering: usize,
+    open: Vec<bool>,
+    /// Distance from the reed, m, and magnitude over that at the reed.
+    wave: Vec<(f32, f32)>,
+}
+
+impl InstrumentAnalysis {
+    /// Analyses an instrument. Takes about a second.
+    pub fn new(current: &CurrentInstrument) -> Self {
+        Self {
+            feels: Arc::new(Feels::new(&current.model)),
+            bore: TransferMatrix::new(&current.model.file, current.model.air),
+            file: Arc::new(current.model.file.clone()),
+            model: current.model.clone(),
+            table: None,
+            standing_wave: None,
+        }
+    }
+
+    /// Whether this is the analysis of that instrument.
+    pub fn is_of(&self, current: &CurrentInstrument) -> bool {
+        Arc::ptr_eq(&self.model, &current.model)
+    }
+
+    /// The instrument's measurements.
+    pub fn file(&self) -> &Arc<InstrumentFile> {
+        &self.file
+    }
+
+    /// What a fingering requires of the breath with this reed; `None` if it does not sound.
+    pub fn requirement(&self, fingering: usize, settings: &Settings) -> Option<Requirement> {
+        let reed = felt::played_reed(&self.model.file, settings);
+        self.feels.requirements().note(fingering, &reed)
+    }
+
+    /// What the hand feels on a fingering, or why there is no feel.
+    pub fn feel(
+        &mut self,
+        fingering: usize,
+        settings: &Settings,
+        design: &FeelDesign,
+    ) -> Result<NoteFeel, String> {
+        let same = self.table.as_ref().is_some_and(|(of, by, _)| (of, by) == (settings, design));
+        if !same {
+            let table = self.feels.table(settings, design, &TorqueLimits::default());
+            self.table = Some((*settings, *design, table.map_err(|reason| reason.to_string())));
+        }
+        match self.table.as_ref().map(|(.., table)| table) {
+            Some(Ok(table)) => Ok(*table.note(fingering).unwrap_or(table.reference())),
+            Some(Err(reason)) => Err(reason.clone()),
+            None => Err("not known yet".to_owned()),
+        }
+    }
+
+    /// The standing wave of a fingering with these holes open: distance from the reed, m, and magnitude over that at the
+    /// reed.
+    pub fn standing_wave(&mut self, fingering: usize, open: &[bool]) -> Vec<(f32, f32)> {
+        let known = self.standing_wave.as_ref();
+        if let Some(known) = known.filter(|known| known.fingering == fingering && known.open == open) {
+            return known.wave.clone();
+        }
+        let wave = self.bore.standing_pressure(self.model.notes_hz[fingering], open);
+        let wave: Vec<_> = wave.into_iter().map(|(x, p)| (x as f32, p as f32)).collect();
+        self.standing_wave = Some(StandingWave { fingering, open: open.to_vec(), wave: wave.clone() });
+        wave
+    }
+}

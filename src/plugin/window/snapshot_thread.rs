@@ -1,0 +1,294 @@
+//! The snapshot thread: collects what the window shows while it is open.
+
+use std::collections::VecDeque;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::SharedWindow;
+#[cfg(feature = "devices")]
+use super::device_list;
+use super::instrument_analysis::InstrumentAnalysis;
+use super::window_audio::AudioSnapshot;
+#[cfg(feature = "devices")]
+use crate::editor::Tab;
+use crate::editor::listener::{Heard, Listener, WINDOW};
+#[cfg(feature = "devices")]
+use crate::editor::snapshot::{Device, Knob};
+use crate::editor::snapshot::{Level, Scope, Snapshot, Source, Status, Track};
+use crate::plugin::SharedHandles;
+use crate::plugin::breath_sources::{BreathInput, BreathSources};
+use crate::plugin::instrument_loading::{CurrentInstrument, Readiness};
+#[cfg(feature = "devices")]
+use crate::plugin::knob;
+use crate::plugin::params::instrument::InstrumentChoice;
+use chalumeau_core::haptics::FeelDesign;
+use chalumeau_core::instrument::Settings;
+use chalumeau_core::units::SoundingNote;
+#[cfg(feature = "devices")]
+use chalumeau_knob::device::{LinkStatus, Phase, Places};
+#[cfg(feature = "devices")]
+use chalumeau_knob::wire::message::Feel;
+
+/// Time from one snapshot to the next while something moves.
+const MOVING: Duration = Duration::from_millis(33);
+/// The same while nothing moves: less than five snapshots a second.
+const IDLE: Duration = Duration::from_millis(220);
+/// Time between two searches for devices.
+#[cfg(feature = "devices")]
+const DEVICES_EVERY: Duration = Duration::from_secs(2);
+/// Length of the breath's history, s.
+const HISTORY_S: f32 = 10.0;
+/// Time between two values of the history, s.
+const STEP_S: f32 = 0.05;
+/// A longer pause clears the history, whose values would not show when they were.
+const LONGEST_GAP: Duration = Duration::from_secs(2);
+/// Less mouth pressure than this counts as none, kPa.
+const NO_BREATH_KPA: f32 = 1e-3;
+
+/// The state of the thread.
+pub struct SnapshotThread {
+    shared: Arc<SharedWindow>,
+    handles: SharedHandles,
+    inside: triple_buffer::Output<AudioSnapshot>,
+    sound: rtrb::Consumer<f32>,
+    heard: VecDeque<f32>,
+    listener: Option<(f64, Listener)>,
+    /// The values that a snapshot shows where nothing is known. Kept, because making them parses an instrument file.
+    blank: Snapshot,
+    history: VecDeque<f32>,
+    /// Time of the latest value of the history.
+    stepped: Instant,
+    analysis: Option<InstrumentAnalysis>,
+    /// The devices found, and when.
+    #[cfg(feature = "devices")]
+    devices: (Vec<Device>, Option<Instant>),
+    #[cfg(feature = "devices")]
+    has_midi: bool,
+}
+
+impl SnapshotThread {
+    pub(super) fn new(
+        shared: Arc<SharedWindow>,
+        handles: SharedHandles,
+        inside: triple_buffer::Output<AudioSnapshot>,
+        sound: rtrb::Consumer<f32>,
+    ) -> Self {
+        Self {
+            shared,
+            handles,
+            inside,
+            sound,
+            heard: VecDeque::with_capacity(2 * WINDOW),
+            listener: None,
+            blank: Snapshot::default(),
+            history: VecDeque::new(),
+            stepped: Instant::now(),
+            analysis: None,
+            #[cfg(feature = "devices")]
+            devices: (Vec::new(), None),
+            #[cfg(feature = "devices")]
+            has_midi: true,
+        }
+    }
+
+    pub(super) fn run(mut self) {
+        while !self.shared.stop.load(Ordering::Relaxed) {
+            let began = Instant::now();
+            let every = if self.shared.is_open.load(Ordering::Relaxed) { self.publish() } else { IDLE };
+            std::thread::park_timeout(every.saturating_sub(began.elapsed()));
+        }
+    }
+
+    /// Makes one snapshot and asks the window to draw it. Returns the time from its beginning to the next one's.
+    fn publish(&mut self) -> Duration {
+        let inside = self.inside.read().clone();
+        let current = self.handles.instrument.current();
+        self.receive_sound();
+        self.extend_history(inside.now.mouth_kpa);
+        self.analyse(current.as_ref());
+        let settings = self.handles.params.settings();
+        let mut snapshot = Snapshot { settings, ..self.blank.clone() };
+        snapshot.instruments = InstrumentChoice::ALL.iter().map(|choice| choice.title().to_owned()).collect();
+        snapshot.chosen = Some(self.handles.params.instrument.choice.value() as usize);
+        show_inside(&mut snapshot, &inside);
+        snapshot.history = Track { step_s: STEP_S, kpa: self.history.iter().copied().collect() };
+        self.show_instrument(&mut snapshot, inside.now.fingering);
+        snapshot.heard = self.analyse_sound(inside.host_rate_hz, inside.now.sounding, &settings);
+        #[cfg(feature = "devices")]
+        self.show_knob(&mut snapshot);
+        snapshot.status = self.status(current.as_ref(), &inside.breath_sources);
+        *self.shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(snapshot);
+        self.shared.draw_again();
+        let is_moving = inside.now.mouth_kpa > NO_BREATH_KPA || inside.now.sounding.is_some();
+        if is_moving { MOVING } else { IDLE }
+    }
+
+    /// Fills in the fingering, and what the analysis says of it.
+    fn show_instrument(&mut self, snapshot: &mut Snapshot, fingering: usize) {
+        let design = self.feel_design();
+        let Some(analysis) = &mut self.analysis else { return };
+        let file = analysis.file().clone();
+        let fingering = fingering.min(file.fingerings.len().saturating_sub(1));
+        let open = self
+            .shared
+            .tried()
+            .filter(|open| open.len() == file.holes.len())
+            .unwrap_or_else(|| file.fingerings[fingering].open.clone());
+        snapshot.fingering = fingering;
+        snapshot.openings = open.iter().map(|&open| f32::from(u8::from(open))).collect();
+        snapshot.requirement = analysis.requirement(fingering, &snapshot.settings);
+        snapshot.feel = analysis.feel(fingering, &snapshot.settings, &design);
+        snapshot.standing = analysis.standing_wave(fingering, &open);
+        snapshot.instrument = file;
+    }
+
+    /// Fills in the knob and the list of devices.
+    #[cfg(feature = "devices")]
+    fn show_knob(&mut self, snapshot: &mut Snapshot) {
+        let status = self.handles.knob.status();
+        self.find_devices(status.as_ref());
+        snapshot.knob = status.map_or_else(Knob::default, |status| {
+            let feel = snapshot.feel.as_ref().ok().map(|note| note.feel);
+            knob_view(&status, feel.as_ref())
+        });
+        snapshot.knob.devices = self.devices.0.clone();
+    }
+
+    /// Searches for devices from time to time while the list is in view.
+    #[cfg(feature = "devices")]
+    fn find_devices(&mut self, status: Option<&LinkStatus>) {
+        let is_due = self.devices.1.is_none_or(|at| at.elapsed() > DEVICES_EVERY);
+        if super::kept(&self.handles.params).tab == Tab::Knob && is_due {
+            let kind = self.handles.params.knob.kind.value();
+            let found = device_list::list(&Places::default(), kind, status, &mut self.has_midi);
+            self.devices = (found, Some(Instant::now()));
+        }
+    }
+
+    fn receive_sound(&mut self) {
+        while let Ok(sample) = self.sound.pop() {
+            if self.heard.len() == WINDOW {
+                self.heard.pop_front();
+            }
+            self.heard.push_back(sample);
+        }
+    }
+
+    fn extend_history(&mut self, kpa: f32) {
+        let step = Duration::from_secs_f32(STEP_S);
+        if self.stepped.elapsed() > LONGEST_GAP {
+            (self.stepped, self.history) = (Instant::now(), VecDeque::new());
+        }
+        while self.stepped.elapsed() >= step {
+            self.stepped += step;
+            self.history.push_back(kpa);
+            if self.history.len() as f32 * STEP_S > HISTORY_S {
+                self.history.pop_front();
+            }
+        }
+    }
+
+    /// Analyses a new instrument (about 1 s); the old view stays until then.
+    fn analyse(&mut self, current: Option<&CurrentInstrument>) {
+        let Some(current) = current else { return };
+        let is_known = self.analysis.as_ref().is_some_and(|analysis| analysis.is_of(current));
+        if current.readiness > Readiness::Rough && !is_known {
+            self.analysis = Some(InstrumentAnalysis::new(current));
+        }
+    }
+
+    fn feel_design(&self) -> FeelDesign {
+        #[cfg(feature = "devices")]
+        return knob::feel_design(&self.handles.params.knob);
+        #[cfg(not(feature = "devices"))]
+        FeelDesign::default()
+    }
+
+    fn analyse_sound(&mut self, rate_hz: f64, sounding: Option<SoundingNote>, settings: &Settings) -> Heard {
+        if self.listener.as_ref().is_none_or(|(of, _)| *of != rate_hz) {
+            self.listener = Some((rate_hz, Listener::new(rate_hz)));
+        }
+        let wanted = sounding.map(|note| note.frequency_hz(f64::from(settings.a4_hz)));
+        let samples = self.heard.make_contiguous();
+        self.listener.as_mut().map_or_else(Heard::default, |(_, listener)| listener.hear(samples, wanted))
+    }
+
+    /// The messages on the status line.
+    fn status(&self, current: Option<&CurrentInstrument>, sources: &BreathSources) -> Vec<Status> {
+        let mut status = Vec::new();
+        let mut add = |level, text: String| status.push(Status { level, text });
+        if let Ok(text) = self.handles.params.instrument_status.read()
+            && current.is_none_or(|current| current.readiness < Readiness::Tuned)
+        {
+            add(Level::Note, text.clone());
+        }
+        if let Ok(text) = self.handles.params.knob_status.read()
+            && text.as_str() != "off"
+        {
+            add(Level::Good, text.clone());
+        }
+        // A user who has just plugged in a breath controller sees that its messages arrive.
+        let live = BreathInput::ALL.into_iter().find(|&input| sources.is_live(input));
+        if let Some(input) = live.filter(|&input| input != BreathInput::Keys) {
+            add(Level::Good, format!("breath: {}", input.title()));
+        }
+        status
+    }
+}
+
+/// Fills in what the audio thread has sent.
+fn show_inside(snapshot: &mut Snapshot, inside: &AudioSnapshot) {
+    snapshot.sounding = inside.now.sounding;
+    snapshot.mouth_kpa = inside.now.mouth_kpa;
+    snapshot.sources = source_views(&inside.breath_sources, inside.now.sounding.is_some());
+    snapshot.latency_ms = (1e3 * f64::from(inside.latency_samples) / inside.host_rate_hz) as f32;
+    snapshot.scope = Scope {
+        rate_hz: inside.moments_hz as f32,
+        mouthpiece_kpa: inside.moments.iter().map(|moment| moment.mouthpiece_kpa).collect(),
+        opening: inside.moments.iter().map(|moment| moment.opening).collect(),
+        flow_cm3s: inside.moments.iter().map(|moment| moment.flow_cm3s).collect(),
+    };
+}
+
+/// The breath inputs as the window shows them. `is_held`: a key is down.
+fn source_views(sources: &BreathSources, is_held: bool) -> Vec<Source> {
+    let view = |input: BreathInput| {
+        let latest = sources.value(input);
+        // Velocity makes breath only while a key is down.
+        let value = latest.filter(|_| input != BreathInput::Keys || is_held).unwrap_or(0.0);
+        Source {
+            name: input.title().to_owned(),
+            value,
+            is_live: sources.is_live(input),
+            is_seen: latest.is_some(),
+        }
+    };
+    BreathInput::ALL.map(view).into()
+}
+
+/// The knob as the window shows it, without the list of devices.
+#[cfg(feature = "devices")]
+fn knob_view(status: &LinkStatus, feel: Option<&Feel>) -> Knob {
+    let stats = &status.stats;
+    Knob {
+        devices: Vec::new(),
+        text: status.text.clone(),
+        is_live: status.phase == Phase::Live,
+        is_armed: status.armed,
+        ceiling_mnm: f32::from(status.ceiling_mnm),
+        angle_deg: status.angle_deg,
+        torque_mnm: status.angle_deg.zip(feel).map(|(angle_deg, feel)| {
+            let tables = chalumeau_core::reed::ReedTables::seed();
+            let torque_mnm = chalumeau_core::haptics::law::torque_mnm(feel, tables, f64::from(angle_deg));
+            if status.armed { torque_mnm as f32 } else { 0.0 }
+        }),
+        notice: status.last_refusal.clone().or_else(|| status.notice.clone()),
+        rate_hz: stats.rate_hz,
+        jitter_us: (stats.jitter_p50_us, stats.jitter_p99_us),
+        round_trip_us: stats.feel_round_trip_us,
+        lost: stats.wire.lost,
+        damaged: stats.wire.crc_errors + stats.wire.length_errors,
+        losses: stats.losses,
+    }
+}

@@ -1,0 +1,115 @@
+//! The audio thread's part of the window. [audio thread]
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use super::SharedWindow;
+use crate::plugin::breath_sources::BreathSources;
+use crate::plugin::instrument_loading::InstrumentSwap;
+use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::instrument::watch::{MOMENTS, Moment, Now};
+
+/// Samples on their way to the snapshot thread: more than a second at 48 kHz.
+const SOUND_SAMPLES: usize = 65_536;
+/// Key events on their way from the window to the audio thread.
+const KEY_EVENTS: usize = 256;
+/// Key events that one block takes; the others wait for the next block.
+const KEYS_PER_BLOCK: usize = 8;
+
+/// The inside of the instrument at one moment, as the audio thread sends it.
+#[derive(Clone)]
+pub struct AudioSnapshot {
+    /// What the player is doing.
+    pub now: Now,
+    /// The latest moments inside the mouthpiece, oldest first.
+    pub moments: Box<[Moment; MOMENTS]>,
+    /// Moments per second.
+    pub moments_hz: f64,
+    /// Sample rate of the sound, Hz.
+    pub host_rate_hz: f64,
+    /// Latency of the plugin, samples.
+    pub latency_samples: u32,
+    /// Which input the breath came from.
+    pub breath_sources: BreathSources,
+}
+
+impl Default for AudioSnapshot {
+    fn default() -> Self {
+        Self {
+            now: Now { sounding: None, fingering: 0, mouth_kpa: 0.0 },
+            moments: Box::new([Moment::default(); MOMENTS]),
+            moments_hz: 48_000.0,
+            host_rate_hz: 48_000.0,
+            latency_samples: 0,
+            breath_sources: BreathSources::default(),
+        }
+    }
+}
+
+/// The audio thread's part of the window.
+pub struct WindowAudio {
+    shared: Arc<SharedWindow>,
+    inside: triple_buffer::Input<AudioSnapshot>,
+    sound: rtrb::Producer<f32>,
+    keys: rtrb::Consumer<Event>,
+    /// Number of the picture that was sent last.
+    shown: u64,
+}
+
+/// The other ends of its channels.
+pub struct WindowChannels {
+    /// The inside of the instrument, for the snapshot thread.
+    pub inside: triple_buffer::Output<AudioSnapshot>,
+    /// The sound, for the snapshot thread.
+    pub sound: rtrb::Consumer<f32>,
+    /// Key events from the window.
+    pub keys: rtrb::Producer<Event>,
+}
+
+impl WindowAudio {
+    /// Makes the channels. Allocates.
+    pub(super) fn new(shared: Arc<SharedWindow>) -> (Self, WindowChannels) {
+        let (inside_in, inside) = triple_buffer::triple_buffer(&AudioSnapshot::default());
+        let (sound_in, sound) = rtrb::RingBuffer::new(SOUND_SAMPLES);
+        let (keys_in, keys) = rtrb::RingBuffer::new(KEY_EVENTS);
+        let audio = Self { shared, inside: inside_in, sound: sound_in, keys, shown: 0 };
+        (audio, WindowChannels { inside, sound, keys: keys_in })
+    }
+
+    /// The key events of the window since the last block. Real-time safe.
+    pub fn keys(&mut self) -> [Option<Timed<Event>>; KEYS_PER_BLOCK] {
+        std::array::from_fn(|_| self.keys.pop().ok().map(|event| Timed { at: 0, event }))
+    }
+
+    /// Sends the sound and the inside of the instrument while the window is open. Real-time safe.
+    pub fn send(&mut self, instrument: &mut InstrumentSwap, breath_sources: &BreathSources, sound: &[f32]) {
+        let is_open = self.shared.is_open.load(Ordering::Relaxed);
+        instrument.set_watched(is_open);
+        if !is_open {
+            return;
+        }
+        let room = self.sound.slots().min(sound.len());
+        if let Ok(mut chunk) = self.sound.write_chunk(room) {
+            let newest = &sound[sound.len() - room..];
+            let (first, second) = chunk.as_mut_slices();
+            let (a, b) = newest.split_at(first.len());
+            first.copy_from_slice(a);
+            second.copy_from_slice(b);
+            chunk.commit_all();
+        }
+        let clarinet = instrument.clarinet();
+        let watch = clarinet.watch();
+        let Some((number, moments)) = watch.picture().filter(|&(number, _)| number != self.shown) else {
+            return;
+        };
+        self.shown = number;
+        let inside = self.inside.input_buffer_mut();
+        inside.now = clarinet.now();
+        inside.moments.copy_from_slice(moments);
+        inside.moments_hz = watch.rate_hz(clarinet.internal_rate_hz());
+        inside.host_rate_hz = instrument.rate_hz();
+        inside.latency_samples = clarinet.latency_samples();
+        inside.breath_sources = *breath_sources;
+        self.inside.publish();
+    }
+}

@@ -1,0 +1,137 @@
+//! The plugin as a program of its own: its window, JACK or the system's sound, MIDI in and out.
+//!
+//! The framework opens one backend. Asked for *auto*, it may silently choose one that makes no sound. So this program
+//! tries each backend by itself. If none opens, it prints which ones it tried, why they failed, and what to do.
+
+mod arguments;
+mod log;
+
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use clap::Parser;
+use nice_plug::prelude::nice_export_standalone_with_args;
+
+use crate::plugin::Chalumeau;
+use crate::plugin::launch_options::LaunchOptions;
+use arguments::{Args, Backend};
+
+/// Reads the arguments and plays until the user quits. Exit codes: 0, it has played; 1, no backend opened; 2, a mistake in
+/// the arguments.
+pub fn main() -> ExitCode {
+    let args = Args::parse();
+    let last_error = log::start();
+    let (instrument, instrument_file) = args.instrument.clone();
+    let lacks_display = !args.no_window && lacks_display();
+    if lacks_display {
+        eprintln!(
+            "chalumeau-standalone: no display (DISPLAY is not set), so it plays without a window; press Ctrl-C to quit"
+        );
+    }
+    let options = LaunchOptions {
+        instrument,
+        instrument_file,
+        a4_hz: args.a4,
+        has_window: !args.no_window && !lacks_display,
+        before_window: listen_for_signals,
+        quit: Arc::default(),
+        window_failed: AtomicBool::new(false),
+    }
+    .set();
+    // Without this, the program would go on without sound after a panic on a backend's thread.
+    std::panic::set_hook(Box::new(|why| {
+        eprintln!("chalumeau-standalone: {why}");
+        std::process::exit(1);
+    }));
+    let mut tried = Vec::new();
+    for backend in args.backends() {
+        last_error.clear();
+        if nice_export_standalone_with_args::<Chalumeau, _>(args.for_framework(backend)) {
+            return ExitCode::SUCCESS;
+        }
+        if options.window_failed.load(Ordering::Relaxed) {
+            // It has played without a window, and the framework has logged why there was none.
+            return ExitCode::SUCCESS;
+        }
+        let reason = last_error.get().unwrap_or_else(|| "it gave no reason".to_owned());
+        if let Some(code) = device_list_answer(&reason) {
+            return code;
+        }
+        tried.push((backend, plain_reason(&reason)));
+    }
+    eprintln!("{}", no_backend_message(&tried));
+    ExitCode::FAILURE
+}
+
+/// Makes Ctrl-C and its like set `quit`, which closes the window. The framework, once it has a window, waits only for
+/// that; and it would remove a handler that was registered before the window opens.
+fn listen_for_signals(quit: &Arc<AtomicBool>) {
+    #[cfg(unix)]
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        // If this fails, the user can still close the window.
+        let _ = signal_hook::flag::register(signal, quit.clone());
+    }
+    #[cfg(not(unix))]
+    let _ = quit;
+}
+
+/// Whether windows need X11 here and it is missing.
+fn lacks_display() -> bool {
+    cfg!(all(unix, not(target_os = "macos")))
+        && std::env::var_os("DISPLAY").is_none_or(|name| name.is_empty())
+}
+
+/// The framework answers an unknown device name with a list of all devices. An empty name asks for that list, so it is an
+/// answer then, and an error otherwise. `None` if `reason` has no such list.
+fn device_list_answer(reason: &str) -> Option<ExitCode> {
+    let (asked, list) = reason.split_once(". Available devices are:")?;
+    let list = list.trim_matches('\n');
+    let list = if list.is_empty() { "(none)" } else { list };
+    if asked.ends_with("''") {
+        println!("{list}");
+        return Some(ExitCode::SUCCESS);
+    }
+    eprintln!("chalumeau-standalone: {asked}; available devices:\n{list}");
+    Some(ExitCode::from(2))
+}
+
+/// A reason in words, where the library gives only the names of status bits.
+fn plain_reason(reason: &str) -> String {
+    if reason.contains("SERVER_FAILED") { "no JACK server is running".to_owned() } else { reason.to_owned() }
+}
+
+/// Which backends were tried, why they failed, what to do.
+fn no_backend_message(tried: &[(Backend, String)]) -> String {
+    let mut text = "chalumeau-standalone: no sound output opens".to_owned();
+    for (backend, reason) in tried {
+        text += &format!("\n  tried {}: {reason}", backend.name());
+        text += &format!("\n    {}", backend.remedy());
+    }
+    text + "\n  without sound: --backend dummy; into a file: chalumeau render"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_empty_name_asks_and_a_wrong_one_errs() {
+        let said = |name: &str| format!("Unknown output device '{name}'. Available devices are:\nFront");
+        assert_eq!(device_list_answer(&said("")), Some(ExitCode::SUCCESS));
+        assert_eq!(device_list_answer(&said("Back")), Some(ExitCode::from(2)));
+        assert_eq!(device_list_answer("No default audio output device available"), None);
+    }
+
+    #[test]
+    fn the_message_says_what_was_tried_why_it_failed_and_what_to_do() {
+        let text = no_backend_message(&[
+            (Backend::Jack, plain_reason("client error, status is ClientStatus(FAILURE | SERVER_FAILED)")),
+            (arguments::SYSTEM, "no card".to_owned()),
+        ]);
+        for word in ["tried jack: no JACK server is running", "no card", "--output-device", "--backend dummy"]
+        {
+            assert!(text.contains(word), "{text}");
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! The arguments of the standalone program.
+
+use clap::{Parser, ValueEnum};
+
+use crate::plugin::InstrumentChoice;
+use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::instrument::model::HOST_RATES_HZ;
+use chalumeau_core::instrument::prepare::A4_RANGE_HZ;
+
+const HELP: &str = "\
+Examples:
+  chalumeau-standalone                                    JACK if a server runs, else the system's sound
+  chalumeau-standalone --backend jack --connect-jack-midi-input \"system:midi_capture_1\"
+  chalumeau-standalone --instrument bass --a4 442
+  chalumeau-standalone --midi-input \"\"                    lists the MIDI inputs
+  chalumeau-standalone --output-device \"\"                 lists the sound cards
+  chalumeau-standalone --no-window                        plays from MIDI or a knob
+  chalumeau-standalone --backend dummy                    shows the window, makes no sound
+
+Play it with a MIDI keyboard, a wind controller, a knob, or the keys in the window. CC2 or CC11 sets the breath. Until one
+of them moves, key velocity sets it. Without a display, the program plays without a window. To quit, close the window or
+press Ctrl-C.";
+
+/// Plays Chalumeau, a physical model of a clarinet, without a DAW.
+#[derive(Parser, Debug)]
+#[command(name = "chalumeau-standalone", version, after_help = HELP, max_term_width = 100)]
+pub struct Args {
+    /// Where sound and MIDI go.
+    #[arg(short, long, default_value = "auto")]
+    pub backend: Backend,
+    /// Sample rate, 22050..384000 Hz; JACK sets its own.
+    #[arg(short = 'r', long, value_name = "HZ", default_value = "48000", value_parser = rate)]
+    sample_rate: f32,
+    /// Samples per block, 16..8192; JACK sets its own. Small blocks respond faster, but the sound may drop out.
+    #[arg(short, long, value_name = "SAMPLES", default_value = "256",
+          value_parser = clap::value_parser!(u32).range(16..=8192))]
+    period_size: u32,
+    /// Name of the sound card; an empty name lists them. Not for JACK.
+    #[arg(short, long, value_name = "NAME")]
+    output_device: Option<String>,
+    /// Name of the MIDI input; an empty name lists them. Not for JACK.
+    #[arg(short, long, value_name = "NAME")]
+    midi_input: Option<String>,
+    /// Name of the MIDI output for a knob's breath; an empty name lists them. Not for JACK.
+    #[arg(long, value_name = "NAME")]
+    midi_output: Option<String>,
+    /// Instrument: b-flat, a, e-flat, c, bass, or an instrument file.
+    #[arg(short, long, value_name = "NAME|FILE", default_value = "b-flat", value_parser = instrument)]
+    pub instrument: (InstrumentChoice, String),
+    /// Pitch of A4, 415..466 Hz.
+    #[arg(long, value_name = "HZ", default_value = "440", value_parser = a4)]
+    pub a4: f32,
+    /// Play without a window.
+    #[arg(long)]
+    pub no_window: bool,
+    /// JACK port whose MIDI plays the instrument.
+    #[arg(long, value_name = "PORT")]
+    connect_jack_midi_input: Option<String>,
+    /// JACK port that receives a knob's breath.
+    #[arg(long, value_name = "PORT")]
+    connect_jack_midi_output: Option<String>,
+}
+
+/// Where sound and MIDI go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Backend {
+    /// JACK if a server runs, else the system's sound.
+    Auto,
+    /// A running JACK server, or PipeWire in its place.
+    Jack,
+    /// ALSA.
+    #[cfg(all(unix, not(target_os = "macos")))]
+    Alsa,
+    /// Core Audio.
+    #[cfg(target_os = "macos")]
+    CoreAudio,
+    /// WASAPI.
+    #[cfg(windows)]
+    Wasapi,
+    /// No sound and no MIDI.
+    Dummy,
+}
+
+/// The backend of this system's own sound.
+#[cfg(all(unix, not(target_os = "macos")))]
+pub const SYSTEM: Backend = Backend::Alsa;
+/// The backend of this system's own sound.
+#[cfg(target_os = "macos")]
+pub const SYSTEM: Backend = Backend::CoreAudio;
+/// The backend of this system's own sound.
+#[cfg(windows)]
+pub const SYSTEM: Backend = Backend::Wasapi;
+
+impl Backend {
+    /// Its name, here and in the framework's own option.
+    pub fn name(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+
+    /// What the user can do if it does not open.
+    pub fn remedy(self) -> &'static str {
+        match self {
+            Self::Jack => "start a server (`jackd -d alsa`, or run this program under `pw-jack`)",
+            Self::Auto | Self::Dummy => "",
+            #[allow(unreachable_patterns)]
+            _ => {
+                "plug in or switch on a sound card, name one with --output-device (\"\" lists them), \
+                 or try another --sample-rate or --period-size"
+            }
+        }
+    }
+}
+
+fn rate(text: &str) -> Result<f32, String> {
+    let (low, high) = HOST_RATES_HZ;
+    match text.parse::<f32>() {
+        Ok(rate_hz) if (low..=high).contains(&f64::from(rate_hz)) => Ok(rate_hz),
+        _ => Err(format!("the rate must lie in {low}..{high} Hz")),
+    }
+}
+
+fn a4(text: &str) -> Result<f32, String> {
+    let (low, high) = A4_RANGE_HZ;
+    match text.parse::<f32>() {
+        Ok(a4_hz) if (low..=high).contains(&f64::from(a4_hz)) => Ok(a4_hz),
+        _ => Err(format!("A4 must lie in {low}..{high} Hz")),
+    }
+}
+
+/// Checks an instrument file already here, while an error can still be reported as a mistake in the arguments.
+fn instrument(text: &str) -> Result<(InstrumentChoice, String), String> {
+    let named = Bundled::from_id(text).and_then(|bundled| {
+        InstrumentChoice::ALL.into_iter().find(|choice| choice.bundled() == Some(bundled))
+    });
+    if let Some(choice) = named {
+        return Ok((choice, String::new()));
+    }
+    let ids = Bundled::ALL.map(Bundled::id).join(", ");
+    let found = std::fs::read_to_string(text)
+        .map_err(|reason| format!("{reason}; instruments without a file are {ids}"))?;
+    InstrumentFile::parse(&found).map_err(|reason| reason.to_string())?;
+    Ok((InstrumentChoice::User, text.to_owned()))
+}
+
+impl Args {
+    /// The arguments for the framework.
+    pub fn for_framework(&self, backend: Backend) -> Vec<String> {
+        let mut words = vec!["chalumeau-standalone".to_owned()];
+        let mut add = |name: &str, value: String| words.push(format!("--{name}={value}"));
+        add("backend", backend.name());
+        add("sample-rate", self.sample_rate.to_string());
+        add("period-size", self.period_size.to_string());
+        for (name, value) in [
+            ("output-device", &self.output_device),
+            ("midi-input", &self.midi_input),
+            ("midi-output", &self.midi_output),
+            ("connect-jack-midi-input", &self.connect_jack_midi_input),
+            ("connect-jack-midi-output", &self.connect_jack_midi_output),
+        ] {
+            if let Some(value) = value {
+                add(name, value.clone());
+            }
+        }
+        words
+    }
+
+    /// The backends to try, in this order. A user who names a sound card or a MIDI port of the system wants the system's
+    /// backend.
+    pub fn backends(&self) -> Vec<Backend> {
+        let of_system = [&self.output_device, &self.midi_input, &self.midi_output];
+        let of_jack = [&self.connect_jack_midi_input, &self.connect_jack_midi_output];
+        match self.backend {
+            Backend::Auto if of_system.iter().any(|name| name.is_some()) => vec![SYSTEM],
+            Backend::Auto if of_jack.iter().any(|name| name.is_some()) => vec![Backend::Jack],
+            Backend::Auto => vec![Backend::Jack, SYSTEM],
+            one => vec![one],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn args(words: &[&str]) -> Args {
+        Args::try_parse_from([&["chalumeau-standalone"], words].concat()).unwrap()
+    }
+
+    #[test]
+    fn the_named_devices_decide_which_backends_are_tried() {
+        assert_eq!(args(&[]).backends(), [Backend::Jack, SYSTEM]);
+        assert_eq!(args(&["--midi-input", ""]).backends(), [SYSTEM]);
+        assert_eq!(args(&["--connect-jack-midi-input", "a:b"]).backends(), [Backend::Jack]);
+        assert_eq!(args(&["--backend", "dummy", "-m", "x"]).backends(), [Backend::Dummy]);
+    }
+
+    #[test]
+    fn a_wrong_rate_is_refused_with_the_right_ones() {
+        let refused = Args::try_parse_from(["x", "--sample-rate", "8000"]).unwrap_err();
+        assert_eq!(refused.exit_code(), 2);
+        assert!(refused.to_string().contains("22050..384000"), "{refused}");
+    }
+
+    #[test]
+    fn instruments_have_the_names_of_the_command_line() {
+        assert_eq!(args(&[]).instrument.0, InstrumentChoice::BFlat);
+        assert_eq!(args(&["--instrument", "bass"]).instrument.0, InstrumentChoice::Bass);
+        let refused = Args::try_parse_from(["x", "--instrument", "tuba"]).unwrap_err();
+        assert!(refused.to_string().contains("e-flat"), "{refused}");
+        assert!(Args::try_parse_from(["x", "--a4", "400"]).unwrap_err().to_string().contains("415..466"));
+    }
+
+    #[test]
+    fn the_framework_gets_the_arguments_of_the_user() {
+        let words = args(&["-r", "44100", "-o", "", "-m", "Wind"]).for_framework(SYSTEM);
+        for word in ["--sample-rate=44100", "--output-device=", "--midi-input=Wind"] {
+            assert!(words.iter().any(|said| said == word), "{words:?}");
+        }
+    }
+}
