@@ -249,3 +249,93 @@ impl SettingsArgs {
         Ok(settings)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        settings: SettingsArgs,
+    }
+
+    /// Settings of a command line, or what is said against it.
+    fn read(words: &[&str]) -> Result<Settings, String> {
+        let line =
+            Line::try_parse_from(std::iter::once(&"program").chain(words)).map_err(|e| e.to_string())?;
+        line.settings.settings(&InstrumentFile::built_in()).map_err(|failure| failure.to_string())
+    }
+
+    fn said(words: &[&str]) -> String {
+        read(words).expect_err("refused")
+    }
+
+    #[test]
+    fn nothing_given_is_the_reference_clarinet() {
+        assert_eq!(read(&[]), Ok(Settings::default()));
+    }
+
+    #[test]
+    fn flags_and_assignments_set_the_same() {
+        let mut given = 0;
+        for (parameter, number) in flagged() {
+            let text = number.text(number.max);
+            let flag = format!("{}={}", parameter.flag, number.max);
+            let by_flag = read(&[&flag]).unwrap();
+            assert_ne!(by_flag, Settings::default(), "{flag}");
+            assert_eq!(read(&["--set", &format!("{}={text}{}", parameter.id, number.unit)]), Ok(by_flag));
+            given += 1;
+        }
+        assert_eq!(given, 16, "all numbers of the settings have a flag");
+        assert_eq!(read(&["--set", "tune=tempered"]), read(&["--tempered"]));
+        assert_eq!(read(&["--set", "noise=0 %"]), read(&["--no-noise"]));
+        let several = read(&["--set", "vent=2.5", "--set", "temp=20 °C", "--set", "reedc=free"]).unwrap();
+        let d = Settings::default();
+        assert_eq!(several, Settings { vent_loss: 2.5, temperature_c: 20.0, coupled: false, ..d });
+        assert!(!read(&["--k", "0.5"]).unwrap().coupled && !read(&["--set", "reedk=0.5"]).unwrap().coupled);
+    }
+
+    #[test]
+    fn a_measured_reed_is_set_either_way() {
+        let by_flag = read(&["--reed-stiffness", "2000"]).unwrap();
+        assert_ne!(by_flag, Settings::default());
+        assert_eq!(read(&["--set", "rstiff=2000 N/m"]), Ok(by_flag));
+        assert_eq!(read(&["--set", "rstiff=2000", "--set", "rface=physical"]), Ok(by_flag));
+        assert!(!read(&["--set", "rface=physical"]).unwrap().coupled);
+        assert_eq!(read(&["--set", "rface=dimensionless"]), Ok(Settings::default()));
+    }
+
+    #[test]
+    fn mistakes_are_told() {
+        for (words, says) in [
+            (
+                &["--set", "vnt=2"][..],
+                &["no parameter \"vnt\"", "vent (Vent loss), noise (Breath noise)"][..],
+            ),
+            (&["--set", "vent"], &["must be id=value"]),
+            (&["--set", "vent=9"], &["vent (Vent loss) must lie in 0..4, got 9"]),
+            (&["--set", "temp=50 °C"], &["temp (Temperature) must lie in 10..40 °C"]),
+            (&["--set", "tune=just"], &["must be one of Natural, Tempered"]),
+            (&["--set", "instr=bass"], &["instr (Instrument)", "the flag is --instrument"]),
+            (&["--set", "arm=on"], &["arm (Arm knob) is only in the plugin"]),
+            (&["--zeta", "0.4", "--set", "zeta=0.5"], &["--zeta and --set zeta both set Embouchure zeta"]),
+            (&["--set", "lip=1.1", "--set", "lip=1.2"], &["--set lip and --set lip both set"]),
+            (&["--no-noise", "--set", "noise=3"], &["--no-noise and --set noise both set"]),
+            (&["--tempered", "--set", "tune=natural"], &["--tempered and --set tune both set"]),
+            (
+                &["--k", "0.5", "--set", "reedc=coupled"],
+                &["--set reedc makes k follow H", "--k has no effect"],
+            ),
+            (&["--reed-area", "90", "--set", "rarea=90"], &["--reed-area and --set rarea both set"]),
+            (&["--reed-area", "90", "--set", "zeta=0.4"], &["--set zeta cannot be used with"]),
+            (&["--set", "rface=dimensionless", "--set", "rwidth=9"], &["--set rface cannot be used with"]),
+            (&["--zeta", "1"], &["must lie in 0.05..0.9"]),
+            (&["--gain-db", "loud"], &["must be a number in -60..24"]),
+        ] {
+            let said = said(words);
+            assert!(says.iter().all(|say| said.contains(say)), "{words:?}: {said}");
+        }
+    }
+}

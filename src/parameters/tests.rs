@@ -132,7 +132,8 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
     for (parameter, number) in numbers() {
         let Some(Sets::Number(field)) = parameter.sets else { continue };
         fields += 1;
-        assert_eq!(*field(&mut d.clone()), number.default, "{}", parameter.id);
+        let mut copy = d;
+        assert_eq!(*field(&mut copy), number.default, "{}", parameter.id);
         for (value, end) in [(-1e9, number.min), (1e9, number.max)] {
             let mut settings = d;
             parameter.set(&mut settings, Value::Number(value));
