@@ -17,6 +17,7 @@ mod instrument;
 mod knob;
 #[cfg(feature = "simulator")]
 mod knob_sim;
+mod parameters;
 mod play;
 mod plot;
 mod reed;
@@ -83,6 +84,7 @@ enum Command {
     Tune(Box<tune::Tune>),
     Reed(reed::Reed),
     Study(study::Study),
+    Parameters(parameters::Parameters),
     #[cfg(feature = "devices")]
     Knob(Box<knob::Knob>),
     #[cfg(feature = "simulator")]
@@ -193,6 +195,7 @@ pub fn main() -> ExitCode {
         Command::Tune(command) => command.run(),
         Command::Reed(command) => command.run(),
         Command::Study(command) => command.run(),
+        Command::Parameters(command) => command.run(),
         #[cfg(feature = "devices")]
         Command::Knob(command) => command.run(),
         #[cfg(feature = "simulator")]

@@ -18,6 +18,7 @@ pub mod editor;
 pub mod identity;
 pub mod instrument_path;
 pub mod output;
+pub mod parameters;
 #[cfg(feature = "cli")]
 pub mod picture_file;
 #[cfg(feature = "plugin")]

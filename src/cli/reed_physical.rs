@@ -10,7 +10,7 @@ use chalumeau_core::units::{Air, REFERENCE_RADIUS_M};
 use clap::Args;
 
 /// A reed in newtons and millimetres; what is not given is the reference reed's.
-#[derive(Args)]
+#[derive(Args, Clone, Copy)]
 #[command(next_help_heading = "Reed as measured, instead of H, k and zeta")]
 pub struct PhysicalReedArgs {
     /// Stiffness K, N/m, 100..20000 [default: the reference reed's, 1218]
@@ -25,13 +25,28 @@ pub struct PhysicalReedArgs {
     /// Opening at the tip at rest, mm, 0.1..4 [default: 0.5]
     #[arg(long, value_name = "MM", conflicts_with_all = ["h", "k", "zeta"], value_parser = |s: &str| within(s, 0.1, 4.0))]
     reed_opening: Option<f64>,
+    /// A reed as measured is in use, even if nothing of it is given.
+    #[arg(skip)]
+    pub is_used: bool,
 }
 
 impl PhysicalReedArgs {
+    /// Sets what the parameter `id` of the table is, in its unit; what was given before.
+    pub fn replace(&mut self, id: &str, value: f64) -> Option<f64> {
+        let field = match id {
+            "rstiff" => &mut self.reed_stiffness,
+            "rarea" => &mut self.reed_area,
+            "rwidth" => &mut self.reed_width,
+            "ropen" => &mut self.reed_opening,
+            _ => return None,
+        };
+        field.replace(value)
+    }
+
     /// The reed, if anything of it is given, on a nominal bore whose reference reed fills in the rest.
     pub fn reed(&self, nominal_radius_m: f64) -> Option<PhysicalReed> {
         let given = [self.reed_stiffness, self.reed_area, self.reed_width, self.reed_opening];
-        given.iter().any(Option::is_some).then(|| {
+        (self.is_used || given.iter().any(Option::is_some)).then(|| {
             let d = PhysicalReed::reference_on(nominal_radius_m);
             PhysicalReed {
                 stiffness_n_m: self.reed_stiffness.unwrap_or(d.stiffness_n_m),

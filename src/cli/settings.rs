@@ -1,113 +1,233 @@
-//! The player's settings as arguments.
+//! The player's settings as arguments: a flag for each number of the parameter table, and `--set` for all of it.
 
 use crate::cli::Failure;
-use crate::cli::args::within_f32;
 use crate::cli::reed_physical::PhysicalReedArgs;
+use crate::parameters::{self, Kind, Number, PARAMETERS, Parameter, Sets, Value};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
-use chalumeau_core::instrument::{Settings, Tuning};
+use chalumeau_core::instrument::Settings;
 use chalumeau_core::score;
 use chalumeau_core::score::breath::BreathCurve;
-use clap::Args;
-
-/// Most mouth pressure the instrument's settings know, kPa.
-const BREATH_FULL_MAX_KPA: f32 = 20.0;
+use chalumeau_core::units::REFERENCE_RADIUS_M;
+use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 
 /// What a player can set; what is not given stays as the reference clarinet has it.
 #[derive(Args)]
 #[command(next_help_heading = "Player, reed and instrument")]
 pub struct SettingsArgs {
-    /// Reed strength as on the box, 1.5..5; 2.5 closes at 6 kPa
-    #[arg(long, value_name = "N", value_parser = |s: &str| within_f32(s, 1.5, 5.0))]
-    strength: Option<f32>,
-    /// Lip: tip opening over the reference, 0.6 (bites) ..1.4 [default: 1]
-    #[arg(long, value_name = "X", value_parser = |s: &str| within_f32(s, 0.6, 1.4))]
-    lip: Option<f32>,
-    /// Lip damping over the normal embouchure, 0.2 (squeaks) ..2 [default: 1]
-    #[arg(long, value_name = "X", value_parser = |s: &str| within_f32(s, 0.2, 2.0))]
-    damping: Option<f32>,
-    /// Embouchure parameter zeta, flow strength of the reed, 0.05..0.9 [default: 0.3]
-    #[arg(long, value_name = "ZETA", value_parser = |s: &str| within_f32(s, 0.05, 0.9))]
-    zeta: Option<f32>,
-    /// Curve of the lay, 0 (closes sharply) ..0.5 [default: 0.4]
-    #[arg(long, value_name = "X", value_parser = |s: &str| within_f32(s, 0.0, 0.5))]
-    lay: Option<f32>,
-    /// Rest opening H of the dimensionless law, 1..5 [default: sqrt(27)/2]
-    #[arg(long = "H", value_name = "H", value_parser = |s: &str| within_f32(s, 1.0, 5.0))]
-    h: Option<f32>,
-    /// Stiffness k of the dimensionless law, 0.1..2 [default: 27/(4 H^3), following H]
-    #[arg(long = "k", value_name = "K", value_parser = |s: &str| within_f32(s, 0.1, 2.0))]
-    k: Option<f32>,
-    /// Amplitude A of the flow, 0..2 [default: 1]
-    #[arg(long = "A", value_name = "A", value_parser = |s: &str| within_f32(s, 0.0, 2.0))]
-    a: Option<f32>,
-    /// Time for the tongue to let go of the reed, ms, 1..20 [default: 2]
-    #[arg(long, value_name = "MS", value_parser = |s: &str| within_f32(s, 1.0, 20.0))]
-    tongue_ms: Option<f32>,
-    /// Time for fingers to move between slurred notes, ms, 5..15 [default: 8]
-    #[arg(long, value_name = "MS", value_parser = |s: &str| within_f32(s, 5.0, 15.0))]
-    legato_ms: Option<f32>,
-    /// Breath noise, 0..1 [default: 0.3]
-    #[arg(long, value_name = "X", conflicts_with = "no_noise", value_parser = |s: &str| within_f32(s, 0.0, 1.0))]
-    noise: Option<f32>,
+    #[command(flatten)]
+    numbers: NumberFlags,
     /// No breath noise, for measurements
-    #[arg(long)]
+    #[arg(long, conflicts_with = "noise")]
     no_noise: bool,
-    /// Pitch of A4, Hz, 415..466 [default: 440]
-    #[arg(long, value_name = "HZ", value_parser = |s: &str| within_f32(s, 415.0, 466.0))]
-    a4: Option<f32>,
-    /// Hold every note in tune whatever the breath, instead of letting it drift as the bore does
+    /// Keep every note in tune at every breath, instead of letting it drift as the bore does
     #[arg(long)]
     tempered: bool,
-    /// Air temperature, Celsius, 10..40 [default: 25]
-    #[arg(long, value_name = "C", value_parser = |s: &str| within_f32(s, 10.0, 40.0))]
-    temperature: Option<f32>,
-    /// Nonlinear loss of open holes, 0..4; without it the clarion hardly speaks [default: 2]
-    #[arg(long, value_name = "X", value_parser = |s: &str| within_f32(s, 0.0, 4.0))]
-    vent_loss: Option<f32>,
-    /// Output gain, dB, -60..24; at 0, 1 Pa at 1 m is -6 dBFS
-    #[arg(long, value_name = "DB", allow_negative_numbers = true, value_parser = |s: &str| within_f32(s, -60.0, 24.0))]
-    gain_db: Option<f32>,
-    /// Mouth pressure at full breath (CC2 = 127), kPa, 2..20 [default: 6, more if gamma needs it]
-    #[arg(long, value_name = "KPA", value_parser = |s: &str| within_f32(s, 2.0, 20.0))]
-    breath_full: Option<f32>,
+    /// Any parameter of the sound by its id, with the text a host would show, such as vent=2 or "temp=20 °C"; may be
+    /// repeated. `chalumeau parameters` lists them
+    #[arg(long = "set", value_name = "ID=VALUE", value_parser = assignment)]
+    set: Vec<Given>,
     #[command(flatten)]
     measured: PhysicalReedArgs,
 }
 
-impl SettingsArgs {
-    fn settings(&self) -> Settings {
-        let d = Settings::default();
-        Settings {
-            breath_full_kpa: self.breath_full.unwrap_or(d.breath_full_kpa),
-            noise: if self.no_noise { 0.0 } else { self.noise.unwrap_or(d.noise) },
-            tongue_ms: self.tongue_ms.unwrap_or(d.tongue_ms),
-            legato_ms: self.legato_ms.unwrap_or(d.legato_ms),
-            strength: self.strength.unwrap_or(d.strength),
-            lip: self.lip.unwrap_or(d.lip),
-            zeta: self.zeta.unwrap_or(d.zeta),
-            damping: self.damping.unwrap_or(d.damping),
-            lay: self.lay.unwrap_or(d.lay),
-            reed_h: self.h.unwrap_or(d.reed_h),
-            reed_k: self.k.unwrap_or(d.reed_k),
-            coupled: self.k.is_none(),
-            reed_a: self.a.unwrap_or(d.reed_a),
-            a4_hz: self.a4.unwrap_or(d.a4_hz),
-            tuning: if self.tempered { Tuning::Tempered } else { Tuning::Natural },
-            temperature_c: self.temperature.unwrap_or(d.temperature_c),
-            vent_loss: self.vent_loss.unwrap_or(d.vent_loss),
-            gain_db: self.gain_db.unwrap_or(d.gain_db),
+/// The numbers of the settings, each with the flag that the table gives it.
+struct NumberFlags(Vec<Given>);
+
+/// A value that the user has given.
+#[derive(Clone, Debug)]
+struct Given {
+    parameter: &'static Parameter,
+    value: Value,
+    /// As it was typed: the flag, or `--set` and the id.
+    typed: String,
+}
+
+/// Defaults that a command works out, by id.
+const WORKED_OUT: [(&str, &str); 2] =
+    [("full", "6, more if gamma needs it"), ("reedk", "27/(4 H^3), following H")];
+
+/// Numbers of the settings that have a flag.
+fn flagged() -> impl Iterator<Item = (&'static Parameter, Number)> {
+    PARAMETERS.iter().filter_map(|parameter| match (parameter.kind, parameter.sets) {
+        (Kind::Number(number), Some(Sets::Number(_))) if !parameter.flag.is_empty() => {
+            Some((parameter, number))
         }
+        _ => None,
+    })
+}
+
+/// The flag without its dashes.
+fn long(parameter: &Parameter) -> &'static str {
+    parameter.flag.trim_start_matches('-')
+}
+
+/// The id by which clap knows the flag: as a field of that name would have it, for conflicts with the measured reed.
+fn arg_id(parameter: &Parameter) -> &'static str {
+    match long(parameter) {
+        "H" => "h",
+        long => long,
+    }
+}
+
+impl NumberFlags {
+    fn arg((parameter, number): (&'static Parameter, Number)) -> Arg {
+        // A flag takes plain numbers: of a percentage, 0..1.
+        let Number { min, max, default, scale, .. } = number;
+        let range = if scale == 1.0 { number.range() } else { format!("{min}..{max}") };
+        let worked_out = WORKED_OUT.iter().find(|(id, _)| *id == parameter.id);
+        let default = worked_out.map_or_else(|| default.to_string(), |(_, text)| (*text).to_owned());
+        let value_name = match parameter.unit() {
+            "kPa" => "KPA",
+            "ms" => "MS",
+            "Hz" => "HZ",
+            "\u{b0}C" => "C",
+            "dB" => "DB",
+            _ => "X",
+        };
+        Arg::new(arg_id(parameter))
+            .long(long(parameter))
+            .value_name(value_name)
+            .help(format!("{}, {range} [default: {default}]", parameter.meaning))
+            .allow_negative_numbers(min < 0.0)
+            .action(ArgAction::Set)
+            .value_parser(move |text: &str| match text.parse::<f32>() {
+                Ok(value) if number.contains(value) => Ok(value),
+                Ok(_) => Err(format!("must lie in {min}..{max}")),
+                Err(_) => Err(format!("must be a number in {min}..{max}")),
+            })
+    }
+}
+
+impl Args for NumberFlags {
+    fn augment_args(command: Command) -> Command {
+        command.args(flagged().map(Self::arg))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for NumberFlags {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let given = flagged().filter_map(|(parameter, _)| {
+            let value = Value::Number(*matches.get_one::<f32>(arg_id(parameter))?);
+            Some(Given { parameter, value, typed: parameter.flag.to_owned() })
+        });
+        Ok(Self(given.collect()))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+/// Reads `id=value`.
+fn assignment(text: &str) -> Result<Given, String> {
+    let (id, value) = text.split_once('=').ok_or("must be id=value, for example vent=2")?;
+    let id = id.trim();
+    let known = parameters::find(id);
+    if let Some(parameter) = known.filter(|parameter| parameter.sets.is_some()) {
+        let typed = format!("--set {id}");
+        return Ok(Given { parameter, value: parameter.read(value)?, typed });
+    }
+    let what = match known {
+        Some(Parameter { name, flag: "", .. }) => format!("{id} ({name}) is only in the plugin"),
+        Some(Parameter { name, flag, .. }) => format!("{id} ({name}) is not set so; the flag is {flag}"),
+        None => format!("no parameter {id:?}"),
+    };
+    let ids = PARAMETERS.iter().filter(|parameter| parameter.sets.is_some());
+    let ids: Vec<_> = ids.map(|Parameter { id, name, .. }| format!("{id} ({name})")).collect();
+    Err(format!("{what}; the parameters that can be set are {}", ids.join(", ")))
+}
+
+/// `--no-noise` and `--tempered` as values of the table.
+fn shorthand(id: &str, text: &str, typed: &str) -> Option<Given> {
+    let parameter = parameters::find(id)?;
+    Some(Given { parameter, value: parameter.read(text).ok()?, typed: typed.to_owned() })
+}
+
+impl SettingsArgs {
+    /// All that was given, each parameter once.
+    fn given(&self) -> Result<Vec<Given>, Failure> {
+        let no_noise = self.no_noise.then(|| shorthand("noise", "0", "--no-noise")).flatten();
+        let tempered = self.tempered.then(|| shorthand("tune", "Tempered", "--tempered")).flatten();
+        let all: Vec<Given> =
+            self.numbers.0.iter().chain(&no_noise).chain(&tempered).chain(&self.set).cloned().collect();
+        for (at, later) in all.iter().enumerate() {
+            if let Some(earlier) = all[..at].iter().find(|other| other.parameter.id == later.parameter.id) {
+                return Err(Failure::Usage(format!(
+                    "{} and {} both set {}; give one of them",
+                    earlier.typed, later.typed, later.parameter.name
+                )));
+            }
+        }
+        Ok(all)
+    }
+
+    fn has(&self, id: &str) -> bool {
+        self.numbers.0.iter().chain(&self.set).any(|given| given.parameter.id == id)
     }
 
     /// Whether the user has chosen an amount of breath noise.
     pub fn noise_given(&self) -> bool {
-        self.noise.is_some()
+        self.has("noise")
+    }
+
+    fn settings(&self, file: &InstrumentFile) -> Result<Settings, Failure> {
+        let given = self.given()?;
+        let find = |id: &str| given.iter().find(|given| given.parameter.id == id);
+        let mut settings = Settings::default();
+        for Given { parameter, value, .. } in &given {
+            parameter.set(&mut settings, *value);
+        }
+        if let Some(k) = find("reedk") {
+            if let Some(Given { value: Value::Switch(true), typed, .. }) = find("reedc") {
+                return Err(Failure::Usage(format!(
+                    "{typed} makes k follow H, so {} has no effect; give one of them",
+                    k.typed
+                )));
+            }
+            settings.coupled = false;
+        }
+        self.measured_with(&given)?.over(settings, file.nominal_radius_m)
+    }
+
+    /// The measured reed of flags and `--set`.
+    fn measured_with(&self, given: &[Given]) -> Result<PhysicalReedArgs, Failure> {
+        let mut measured = self.measured;
+        for Given { parameter, value, typed } in given {
+            match (parameter.sets, value) {
+                (Some(Sets::ReedFace), Value::Choice(1)) => measured.is_used = true,
+                (Some(Sets::Reed(..)), Value::Number(value)) => {
+                    if measured.replace(parameter.id, f64::from(*value)).is_some() {
+                        let Parameter { flag, name, .. } = parameter;
+                        return Err(Failure::Usage(format!(
+                            "{flag} and {typed} both set {name}; give one of them"
+                        )));
+                    }
+                }
+                _ => {}
+            }
+        }
+        let other = given.iter().find(|Given { parameter, value, .. }| match parameter.sets {
+            Some(Sets::ReedFace) => *value == Value::Choice(0),
+            _ => ["reedh", "reedk", "reedc", "zeta"].contains(&parameter.id),
+        });
+        match other {
+            Some(other) if measured.reed(REFERENCE_RADIUS_M).is_some() => Err(Failure::Usage(format!(
+                "{} cannot be used with a reed as measured; give H, k and zeta, or stiffness, area, width and opening",
+                other.typed
+            ))),
+            _ => Ok(measured),
+        }
     }
 
     /// Settings whose full breath reaches the curve's largest gamma: raised for it unless the user has chosen it.
-    /// The instrument's nominal bore is what a reed given in millimetres is measured against.
+    /// A reed given in millimetres is measured against the instrument's nominal bore.
     pub fn blown_by(&self, curve: Option<&BreathCurve>, file: &InstrumentFile) -> Result<Settings, Failure> {
-        let mut settings = self.measured.over(self.settings(), file.nominal_radius_m)?;
+        let mut settings = self.settings(file)?;
         let Some(gamma_max) = curve.map(BreathCurve::gamma_max) else { return Ok(settings) };
         let closing_kpa = score::closing_kpa(&settings);
         // Less what single precision adds to a closing pressure of 6 kPa.
@@ -115,16 +235,107 @@ impl SettingsArgs {
         if needed_kpa <= settings.breath_full_kpa {
             return Ok(settings);
         }
-        let limit_kpa =
-            if self.breath_full.is_some() { settings.breath_full_kpa } else { BREATH_FULL_MAX_KPA };
+        // The end of the range, as the settings clamp it.
+        let most_kpa = Settings { breath_full_kpa: f32::MAX, ..settings }.clamped().breath_full_kpa;
+        let limit_kpa = if self.has("full") { settings.breath_full_kpa } else { most_kpa };
         if needed_kpa > limit_kpa {
             return Err(Failure::Usage(format!(
                 "gamma {gamma_max} needs {needed_kpa:.1} kPa with this reed, but full breath is {limit_kpa} kPa; \
-                 stay below gamma {:.2}, or take a softer reed or more --breath-full (up to {BREATH_FULL_MAX_KPA})",
+                 stay below gamma {:.2}, or take a softer reed or more --breath-full (up to {most_kpa})",
                 limit_kpa / closing_kpa
             )));
         }
         settings.breath_full_kpa = needed_kpa;
         Ok(settings)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        settings: SettingsArgs,
+    }
+
+    /// Settings of a command line, or what is said against it.
+    fn read(words: &[&str]) -> Result<Settings, String> {
+        let line =
+            Line::try_parse_from(std::iter::once(&"program").chain(words)).map_err(|e| e.to_string())?;
+        line.settings.settings(&InstrumentFile::built_in()).map_err(|failure| failure.to_string())
+    }
+
+    fn said(words: &[&str]) -> String {
+        read(words).expect_err("refused")
+    }
+
+    #[test]
+    fn nothing_given_is_the_reference_clarinet() {
+        assert_eq!(read(&[]), Ok(Settings::default()));
+    }
+
+    #[test]
+    fn flags_and_assignments_set_the_same() {
+        let mut given = 0;
+        for (parameter, number) in flagged() {
+            let text = number.text(number.max);
+            let flag = format!("{}={}", parameter.flag, number.max);
+            let by_flag = read(&[&flag]).unwrap();
+            assert_ne!(by_flag, Settings::default(), "{flag}");
+            assert_eq!(read(&["--set", &format!("{}={text}{}", parameter.id, number.unit)]), Ok(by_flag));
+            given += 1;
+        }
+        assert_eq!(given, 16, "all numbers of the settings have a flag");
+        assert_eq!(read(&["--set", "tune=tempered"]), read(&["--tempered"]));
+        assert_eq!(read(&["--set", "noise=0 %"]), read(&["--no-noise"]));
+        let several = read(&["--set", "vent=2.5", "--set", "temp=20 °C", "--set", "reedc=free"]).unwrap();
+        let d = Settings::default();
+        assert_eq!(several, Settings { vent_loss: 2.5, temperature_c: 20.0, coupled: false, ..d });
+        assert!(!read(&["--k", "0.5"]).unwrap().coupled && !read(&["--set", "reedk=0.5"]).unwrap().coupled);
+    }
+
+    #[test]
+    fn a_measured_reed_is_set_either_way() {
+        let by_flag = read(&["--reed-stiffness", "2000"]).unwrap();
+        assert_ne!(by_flag, Settings::default());
+        assert_eq!(read(&["--set", "rstiff=2000 N/m"]), Ok(by_flag));
+        assert_eq!(read(&["--set", "rstiff=2000", "--set", "rface=physical"]), Ok(by_flag));
+        assert!(!read(&["--set", "rface=physical"]).unwrap().coupled);
+        assert_eq!(read(&["--set", "rface=dimensionless"]), Ok(Settings::default()));
+    }
+
+    #[test]
+    fn mistakes_are_told() {
+        for (words, says) in [
+            (
+                &["--set", "vnt=2"][..],
+                &["no parameter \"vnt\"", "vent (Vent loss), noise (Breath noise)"][..],
+            ),
+            (&["--set", "vent"], &["must be id=value"]),
+            (&["--set", "vent=9"], &["vent (Vent loss) must lie in 0..4, got 9"]),
+            (&["--set", "temp=50 °C"], &["temp (Temperature) must lie in 10..40 °C"]),
+            (&["--set", "tune=just"], &["must be one of Natural, Tempered"]),
+            (&["--set", "instr=bass"], &["instr (Instrument)", "the flag is --instrument"]),
+            (&["--set", "arm=on"], &["arm (Arm knob) is only in the plugin"]),
+            (&["--zeta", "0.4", "--set", "zeta=0.5"], &["--zeta and --set zeta both set Embouchure zeta"]),
+            (&["--set", "lip=1.1", "--set", "lip=1.2"], &["--set lip and --set lip both set"]),
+            (&["--no-noise", "--set", "noise=3"], &["--no-noise and --set noise both set"]),
+            (&["--tempered", "--set", "tune=natural"], &["--tempered and --set tune both set"]),
+            (
+                &["--k", "0.5", "--set", "reedc=coupled"],
+                &["--set reedc makes k follow H", "--k has no effect"],
+            ),
+            (&["--reed-area", "90", "--set", "rarea=90"], &["--reed-area and --set rarea both set"]),
+            (&["--reed-area", "90", "--set", "zeta=0.4"], &["--set zeta cannot be used with"]),
+            (&["--set", "rface=dimensionless", "--set", "rwidth=9"], &["--set rface cannot be used with"]),
+            (&["--zeta", "1"], &["must lie in 0.05..0.9"]),
+            (&["--gain-db", "loud"], &["must be a number in -60..24"]),
+        ] {
+            let said = said(words);
+            assert!(says.iter().all(|say| said.contains(say)), "{words:?}: {said}");
+        }
     }
 }

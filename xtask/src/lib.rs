@@ -7,6 +7,7 @@ pub mod firmware;
 pub mod generated;
 pub mod jack;
 pub mod licences;
+pub mod parameter_reference;
 pub mod picture;
 pub mod prepared;
 pub mod programs;
@@ -100,6 +101,12 @@ pub const COMMANDS: &[Command] = &[
         name: "wire-vectors",
         about: "write the golden frames of the knob's protocol to firmware/golden",
         run: wire_vectors::wire_vectors,
+        checks: true,
+    },
+    Command {
+        name: "parameter-reference",
+        about: "write docs/parameters.md and the editor tests' parameters from the table of parameters",
+        run: parameter_reference::parameter_reference,
         checks: true,
     },
 ];

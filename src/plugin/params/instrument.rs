@@ -7,6 +7,7 @@ use std::sync::{Arc, OnceLock, RwLock};
 
 use nice_plug::prelude::*;
 
+use super::entry::{choice, status, whole};
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::instrument::prepare::Quality;
 
@@ -74,14 +75,7 @@ impl InstrumentChoice {
 
     /// As lists show it.
     pub fn title(self) -> &'static str {
-        match self {
-            Self::BFlat => "B flat clarinet",
-            Self::A => "A clarinet",
-            Self::EFlat => "E flat clarinet",
-            Self::C => "C clarinet",
-            Self::Bass => "Bass clarinet",
-            Self::User => "User file",
-        }
+        Self::variants()[self.to_index()]
     }
 
     /// The one that comes with the program, if it does.
@@ -141,24 +135,16 @@ pub struct InstrumentParams {
 }
 
 impl InstrumentParams {
-    /// Choices: id, default, and what may stand in a state.
-    pub(super) const CHOICES: [(&'static str, &'static str, &'static [&'static str]); 2] = [
-        ("instr", "bflat", &["bflat", "a", "eflat", "c", "bass", "user"]),
-        ("qual", "live", &["live", "high"]),
-    ];
-
-    /// Defaults, with the place where the state of the instrument is worded.
-    pub fn new(status: Arc<RwLock<String>>) -> Self {
-        let (choice, file) = beginning()
+    /// Defaults; whoever loads the instrument writes its state to `state`.
+    pub fn new(state: Arc<RwLock<String>>) -> Self {
+        let (first, file) = beginning()
             .map_or((InstrumentChoice::BFlat, String::new()), |first| (first.choice, first.file.clone()));
         Self {
             file: RwLock::new(file),
-            choice: EnumParam::new("Instrument", choice).non_automatable(),
-            quality: EnumParam::new("Offline quality", QualityChoice::Live).non_automatable(),
-            bend_range: IntParam::new("Bend range", 2, IntRange::Linear { min: 0, max: 48 })
-                .with_unit(" st")
-                .non_automatable(),
-            status: super::said("Instrument status", status),
+            choice: choice("instr", first),
+            quality: choice("qual", QualityChoice::Live),
+            bend_range: whole("bendr"),
+            status: status("istat", state),
         }
     }
 }

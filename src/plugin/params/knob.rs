@@ -8,12 +8,9 @@ use std::sync::{Arc, RwLock};
 use nice_plug::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{either, number};
+use super::entry::{choice, number, status, switch, whole};
 use chalumeau_core::control::knob::KnobDesign;
-use chalumeau_knob::touch::study::{Side, TRIALS, Trial, plan};
-
-/// Most torque a session starts with, mNm; and the most *Arm* can be given (`docs/protocol.md`, safety).
-pub const CEILING_MNM: (f32, f32) = (100.0, 250.0);
+use chalumeau_knob::touch::study::{Side, Trial, plan};
 
 /// Which kind of device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Enum)]
@@ -251,51 +248,41 @@ pub struct KnobParams {
 }
 
 impl KnobParams {
-    /// Defaults, with a place that the link writes its state to, in words.
-    pub fn new(status: Arc<RwLock<String>>) -> Self {
-        let switch = |name: &str, yes: &'static str, no: &'static str| {
-            BoolParam::new(name, false)
-                .with_value_to_string(Arc::new(move |on| if on { yes } else { no }.to_owned()))
-                .with_string_to_value(Arc::new(move |text| either(text, yes, no)))
-        };
-        let act = |name: &str| switch(name, "On", "Off").non_automatable();
-        let whole = |name: &str, default: i32, min: i32, max: i32| {
-            IntParam::new(name, default, IntRange::Linear { min, max }).non_automatable()
-        };
+    /// Defaults; the link to the knob writes its state to `link`.
+    pub fn new(link: Arc<RwLock<String>>) -> Self {
         Self {
             serial: RwLock::default(),
             midi_port: RwLock::default(),
             calibration: RwLock::default(),
             take: RwLock::default(),
-            kind: EnumParam::new("Knob", KnobKind::Off).non_automatable(),
-            arm: act("Arm knob"),
-            ceiling: number("Torque ceiling", CEILING_MNM.0, 10.0, CEILING_MNM.1, 0, " mNm")
-                .non_automatable(),
-            take_over: act("Take over knob"),
-            rest: act("Rest here"),
-            blow: act("Blow hard here"),
-            law: EnumParam::new("Feel", LawChoice::Flow).non_automatable(),
-            contrast: number("Feel contrast", 3.0, 1.0, 5.0, 2, " x").non_automatable(),
-            order: EnumParam::new("Feel order", OrderChoice::Physical).non_automatable(),
-            reference: whole("Feel reference", 72, 52, 97),
-            torque: number("Feel torque", 60.0, 0.0, CEILING_MNM.1, 0, " mNm").non_automatable(),
-            damping: number("Feel damping", 1.0, 0.0, 20.0, 2, " mNm s").non_automatable(),
-            friction: number("Feel friction", 1.0, 0.0, 20.0, 1, " mNm").non_automatable(),
-            detent: number("Feel step", 6.0, 0.0, 30.0, 1, " mNm").non_automatable(),
-            curve: number("Knob curve", 1.0, 0.25, 4.0, 2, "").non_automatable(),
-            osc_port: whole("OSC port", 8_000, 1_024, 65_535),
-            osc_any: act("OSC from network"),
-            feel_port: whole("Feel OSC port", 0, 0, 65_535),
-            record: act("Record take"),
-            replay: act("Replay take"),
-            study: act("Study"),
-            participant: whole("Participant", 1, 1, 9_999),
-            seed: whole("Study seed", 1, 1, 9_999),
-            trial: whole("Trial", 1, 1, TRIALS as i32),
-            side: switch("A/B", "B", "A"),
-            h_source: EnumParam::new("H from", ReedSource::Parameter).non_automatable(),
-            k_source: EnumParam::new("k from", ReedSource::Parameter).non_automatable(),
-            status: super::said("Knob status", status),
+            kind: choice("knob", KnobKind::Off),
+            arm: switch("arm"),
+            ceiling: number("ceil"),
+            take_over: switch("takeov"),
+            rest: switch("rest"),
+            blow: switch("blow"),
+            law: choice("law", LawChoice::Flow),
+            contrast: number("contr"),
+            order: choice("order", OrderChoice::Physical),
+            reference: whole("refnot"),
+            torque: number("torque"),
+            damping: number("kdamp"),
+            friction: number("kfric"),
+            detent: number("detent"),
+            curve: number("curve"),
+            osc_port: whole("oscprt"),
+            osc_any: switch("oscany"),
+            feel_port: whole("oscfl"),
+            record: switch("rec"),
+            replay: switch("replay"),
+            study: switch("study"),
+            participant: whole("part"),
+            seed: whole("seed"),
+            trial: whole("trial"),
+            side: switch("side"),
+            h_source: choice("hsrc", ReedSource::Parameter),
+            k_source: choice("ksrc", ReedSource::Parameter),
+            status: status("kstat", link),
         }
     }
 
@@ -310,52 +297,4 @@ impl KnobParams {
         let trial = *trials.get(whole(&self.trial).saturating_sub(1) as usize)?;
         Some((participant, trial, if self.side.value() { Side::B } else { Side::A }))
     }
-
-    pub(super) fn numbers(&self) -> [(&'static str, &FloatParam); 7] {
-        [
-            ("ceil", &self.ceiling),
-            ("contr", &self.contrast),
-            ("torque", &self.torque),
-            ("kdamp", &self.damping),
-            ("kfric", &self.friction),
-            ("detent", &self.detent),
-            ("curve", &self.curve),
-        ]
-    }
-
-    pub(super) fn wholes(&self) -> [(&'static str, &IntParam); 6] {
-        [
-            ("refnot", &self.reference),
-            ("oscprt", &self.osc_port),
-            ("oscfl", &self.feel_port),
-            ("part", &self.participant),
-            ("seed", &self.seed),
-            ("trial", &self.trial),
-        ]
-    }
-
-    /// Switches, and whether a state keeps them.
-    pub(super) fn switches(&self) -> [(&'static str, &BoolParam, bool); 10] {
-        [
-            ("arm", &self.arm, false),
-            ("takeov", &self.take_over, false),
-            ("rest", &self.rest, false),
-            ("blow", &self.blow, false),
-            ("oscany", &self.osc_any, true),
-            ("rec", &self.record, false),
-            ("replay", &self.replay, true),
-            ("study", &self.study, true),
-            ("side", &self.side, true),
-            ("kstat", &self.status, false),
-        ]
-    }
-
-    /// Choices: id, default, and what may stand in a state.
-    pub(super) const CHOICES: [(&'static str, &'static str, &'static [&'static str]); 5] = [
-        ("knob", "off", &["off", "serial", "midi", "osc"]),
-        ("law", "flow", &["flow", "press", "free"]),
-        ("order", "phys", &["phys", "cover", "open"]),
-        ("hsrc", "param", &["param", "cc1", "cc16", "cc17", "cc74", "press"]),
-        ("ksrc", "param", &["param", "cc1", "cc16", "cc17", "cc74", "press"]),
-    ];
 }

@@ -2,7 +2,7 @@
 
 use nice_plug::prelude::*;
 
-use super::number;
+use super::entry::{choice, number};
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::reed::PhysicalReed;
 
@@ -41,14 +41,12 @@ pub struct PhysicalReedParams {
 
 impl Default for PhysicalReedParams {
     fn default() -> Self {
-        let d = PhysicalReed::reference();
-        let at = |si: f64, unit: f64| (si * unit) as f32;
         Self {
-            face: EnumParam::new("Reed face", ReedFace::Dimensionless).non_automatable(),
-            stiffness: number("Reed stiffness", at(d.stiffness_n_m, 1.0), 300.0, 6_000.0, 1, " N/m"),
-            area: number("Reed area", at(d.area_m2, 1e6), 40.0, 250.0, 2, " mm²"),
-            width: number("Reed width", at(d.width_m, 1e3), 3.0, 40.0, 2, " mm"),
-            opening: number("Reed opening", at(d.tip_opening_m, 1e3), 0.2, 0.95, 3, " mm"),
+            face: choice("rface", ReedFace::Dimensionless),
+            stiffness: number("rstiff"),
+            area: number("rarea"),
+            width: number("rwidth"),
+            opening: number("ropen"),
         }
     }
 }
@@ -78,18 +76,6 @@ impl PhysicalReedParams {
     pub fn rules(&self) -> bool {
         self.face.value() == ReedFace::Physical
     }
-
-    pub(super) const CHOICES: [(&'static str, &'static str, &'static [&'static str]); 1] =
-        [("rface", "seed", &["seed", "phys"])];
-
-    pub(super) fn numbers(&self) -> [(&'static str, &FloatParam); 4] {
-        [
-            ("rstiff", &self.stiffness),
-            ("rarea", &self.area),
-            ("rwidth", &self.width),
-            ("ropen", &self.opening),
-        ]
-    }
 }
 
 #[cfg(test)]
@@ -102,7 +88,9 @@ mod tests {
     fn face(face: ReedFace, change: impl Fn(&mut PhysicalReed)) -> PhysicalReedParams {
         let mut reed = PhysicalReed::reference();
         change(&mut reed);
-        let fixed = |value: f64, unit: f64| number("", (value * unit) as f32, 0.0, 1e4, 3, "");
+        let fixed = |value: f64, unit: f64| {
+            FloatParam::new("", (value * unit) as f32, FloatRange::Linear { min: 0.0, max: 1e4 })
+        };
         PhysicalReedParams {
             face: EnumParam::new("Reed face", face),
             stiffness: fixed(reed.stiffness_n_m, 1.0),

@@ -1,0 +1,522 @@
+//! The parameters themselves, in the order of hosts. Groups, order and ids are fixed for ever; tests hold a frozen copy.
+
+use chalumeau_core::instrument::prepare::A4_RANGE_HZ;
+use chalumeau_knob::touch::study::TRIALS;
+
+use crate::parameters::{Choice, Kind, Number, Parameter, Sets, Switch, Whole};
+
+const BREATH: &str = "Breath";
+const EMBOUCHURE: &str = "Embouchure";
+const REED: &str = "Reed";
+const TUNING: &str = "Tuning";
+const NOISE: &str = "Noise";
+const OUTPUT: &str = "Output";
+const KNOB: &str = "Knob";
+const INSTRUMENT: &str = "Instrument";
+const PHYSICAL_REED: &str = "Reed, physical";
+
+/// Largest torque that the user can allow, mNm (`docs/protocol.md`, safety).
+const MOST_TORQUE_MNM: f32 = 250.0;
+
+/// Controllers that can drive H and k.
+const REED_MIDI: &str = "CC1, CC16, CC17, CC74 or pressure, as *H from* and *k from* select";
+
+const REED_SOURCES: &[(&str, &str)] = &[
+    ("param", "Parameter"),
+    ("cc1", "CC1 (wheel)"),
+    ("cc16", "CC16"),
+    ("cc17", "CC17"),
+    ("cc74", "CC74 (MPE y)"),
+    ("press", "Pressure (MPE z)"),
+];
+
+const fn entry(id: &'static str, group: &'static str, name: &'static str, kind: Kind) -> Parameter {
+    Parameter {
+        id,
+        group,
+        name,
+        kind,
+        meaning: "",
+        sound: "",
+        feel: "",
+        sets: None,
+        flag: "",
+        midi: "",
+        is_automatable: true,
+        is_undoable: true,
+        is_restored: true,
+    }
+}
+
+const fn number([min, max]: [f32; 2], default: f32, digits: usize, unit: &'static str) -> Kind {
+    Kind::Number(Number { min, max, default, digits, unit, scale: 1.0 })
+}
+
+/// 0 to 1, shown as 0 to 100 %.
+const fn percent(default: f32) -> Kind {
+    Kind::Number(Number { min: 0.0, max: 1.0, default, digits: 1, unit: " %", scale: 100.0 })
+}
+
+const fn whole([min, max]: [i32; 2], default: i32, unit: &'static str) -> Kind {
+    Kind::Whole(Whole { min, max, default, unit })
+}
+
+const fn choice(all: &'static [(&'static str, &'static str)]) -> Kind {
+    Kind::Choice(Choice { all })
+}
+
+const fn switch(default: bool, [off, on]: [&'static str; 2]) -> Kind {
+    Kind::Switch(Switch { default, on, off })
+}
+
+const OFF: Kind = switch(false, ["Off", "On"]);
+
+impl Parameter {
+    const fn help(self, meaning: &'static str, sound: &'static str, feel: &'static str) -> Self {
+        Self { meaning, sound, feel, ..self }
+    }
+
+    const fn sets(self, sets: Sets) -> Self {
+        Self { sets: Some(sets), ..self }
+    }
+
+    const fn flag(self, flag: &'static str) -> Self {
+        Self { flag, ..self }
+    }
+
+    const fn midi(self, midi: &'static str) -> Self {
+        Self { midi, ..self }
+    }
+
+    /// A host cannot automate it.
+    const fn setup(self) -> Self {
+        Self { is_automatable: false, ..self }
+    }
+
+    /// It acts, arms or plays: undo and A/B leave it alone.
+    const fn act(self) -> Self {
+        Self { is_undoable: false, ..self }
+    }
+
+    /// A loaded state has it at its default.
+    const fn never_restored(self) -> Self {
+        Self { is_restored: false, ..self }
+    }
+}
+
+/// All parameters, in the order in which hosts list them.
+pub static PARAMETERS: &[Parameter] = &[
+    entry("breath", BREATH, "Breath", percent(0.0))
+        .help(
+            "Mouth pressure in percent of full breath",
+            "Moving it blows the instrument. The note starts at the threshold of the reed. More pressure is louder and brighter; then the reed beats, and at last it closes.",
+            "",
+        )
+        .midi("CC2 (fine CC34), CC11 (fine CC43), channel pressure")
+        .act(),
+    entry("full", BREATH, "Full breath", number([2.0, 20.0], 6.0, 2, " kPa"))
+        .help(
+            "Mouth pressure at full breath",
+            "Sets how hard a controller or the knob blows at its end. A clarinettist plays between 2 and 6 kPa.",
+            "Sets how far the knob's whole travel reaches into the note.",
+        )
+        .sets(Sets::Number(|settings| &mut settings.breath_full_kpa))
+        .flag("--breath-full"),
+    entry("tongue", BREATH, "Tongue", number([1.0, 20.0], 2.0, 1, " ms"))
+        .help(
+            "Time in which the tongue releases the reed",
+            "A short time gives a crisp attack, a long time a soft one.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.tongue_ms))
+        .flag("--tongue-ms"),
+    entry("legato", BREATH, "Legato", number([5.0, 15.0], 8.0, 1, " ms"))
+        .help(
+            "Time in which the fingers move between slurred notes",
+            "Holes open and close over this time. In a long slur the notes between speak as well.",
+            "The torque changes from one note's curve to the next note's.",
+        )
+        .sets(Sets::Number(|settings| &mut settings.legato_ms))
+        .flag("--legato-ms"),
+    entry("stren", EMBOUCHURE, "Reed strength", number([1.5, 5.0], 2.5, 2, ""))
+        .help(
+            "Reed strength as printed on the box; 2.5 closes at 6 kPa",
+            "A stiffer reed needs more breath and beats later. Half a number is about 20 % more stiffness.",
+            "The threshold and the closure move outwards.",
+        )
+        .sets(Sets::Number(|settings| &mut settings.strength))
+        .flag("--strength"),
+    entry("lip", EMBOUCHURE, "Lip opening", number([0.6, 1.4], 1.0, 3, " x"))
+        .help(
+            "Opening of the reed's tip under the lip, relative to the reference",
+            "Below 1 the player bites: less air, a thinner sound, and the reed closes early. Above 1 the sound is open and loud.",
+            "Changes the torque, and how far away the closure is.",
+        )
+        .sets(Sets::Number(|settings| &mut settings.lip))
+        .flag("--lip"),
+    entry("zeta", EMBOUCHURE, "Embouchure zeta", number([0.05, 0.9], 0.3, 3, ""))
+        .help(
+            "Embouchure parameter \u{3b6}: strength of the flow through the reed",
+            "At higher values notes speak earlier, beat earlier and sound brighter.",
+            "At higher values the threshold is nearer.",
+        )
+        .sets(Sets::Number(|settings| &mut settings.zeta))
+        .flag("--zeta"),
+    entry("damp", EMBOUCHURE, "Lip damping", number([0.2, 2.0], 1.0, 2, " x"))
+        .help(
+            "Damping of the reed by the lip, relative to a normal embouchure",
+            "At low values the reed squeaks. At high values the sound is dark and the reed does not squeak easily.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.damping))
+        .flag("--damping"),
+    entry("reedh", REED, "Reed H", number([1.0, 5.0], 2.598_076, 4, ""))
+        .help(
+            "H: opening of the reed at rest, dimensionless; the reference is \u{221a}27/2",
+            "A wider opening gives more flow. While k is coupled to H, the peak of the flow stays the same and the reed closes earlier.",
+            "Changes height and width of the torque curve, which is the same curve as the flow's.",
+        )
+        .sets(Sets::Number(|settings| &mut settings.reed_h))
+        .flag("--H")
+        .midi(REED_MIDI),
+    entry("reedk", REED, "Reed k", number([0.1, 2.0], 0.384_900_18, 4, ""))
+        .help(
+            "k: stiffness of the reed, dimensionless; the reference is 27/(4H\u{b3})",
+            "A stiffer reed closes later, at H\u{b7}k. Has no effect while k is coupled to H.",
+            "Moves the end of the torque curve.",
+        )
+        .sets(Sets::Number(|settings| &mut settings.reed_k))
+        .flag("--k")
+        .midi(REED_MIDI),
+    entry("reedc", REED, "Reed coupled", switch(true, ["Free", "Coupled"]))
+        .help(
+            "Whether k follows H as 27/(4H\u{b3})",
+            "Coupled: the largest flow stays at A. Free: H and k are set separately.",
+            "The torque curve changes as the sound does.",
+        )
+        .sets(Sets::Switch(|settings| &mut settings.coupled)),
+    entry("reeda", REED, "Reed A", number([0.0, 2.0], 1.0, 3, ""))
+        .help(
+            "A: amplitude of the flow",
+            "Scales the flow, and with it what a note needs to speak.",
+            "Scales the torque.",
+        )
+        .sets(Sets::Number(|settings| &mut settings.reed_a))
+        .flag("--A"),
+    entry("lay", REED, "Lay curve", number([0.0, 0.5], 0.4, 3, ""))
+        .help(
+            "Curve of the lay that the reed closes on",
+            "At 0 the reed closes all at once and sounds bright. At higher values it rolls onto the lay and sounds softer.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.lay))
+        .flag("--lay"),
+    entry("a4", TUNING, "A4", number([A4_RANGE_HZ.0 as f32, A4_RANGE_HZ.1 as f32], 440.0, 1, " Hz"))
+        .help("Pitch of A4", "Tunes the whole instrument by changing its length.", "")
+        .sets(Sets::Number(|settings| &mut settings.a4_hz))
+        .flag("--a4"),
+    entry("tune", TUNING, "Tuning", choice(&[("nat", "Natural"), ("temp", "Tempered")]))
+        .help(
+            "How notes are held in tune",
+            "Natural: in tune at mezzo-forte; the pitch moves with the breath, as in a real bore. Tempered: in tune at every breath.",
+            "",
+        )
+        .sets(Sets::Tuning)
+        .flag("--tempered"),
+    entry("temp", TUNING, "Temperature", number([10.0, 40.0], 25.0, 1, " \u{b0}C"))
+        .help(
+            "Temperature of the air",
+            "Sound travels faster in warm air: the pitch rises by 3 cents per degree.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.temperature_c))
+        .flag("--temperature"),
+    entry("vent", TUNING, "Vent loss", number([0.0, 4.0], 2.0, 2, ""))
+        .help(
+            "Loss of the air jets in open holes",
+            "At 0 there is no loss, and most of the clarion register does not speak: the register key needs this loss to work.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.vent_loss))
+        .flag("--vent-loss"),
+    entry("noise", NOISE, "Breath noise", percent(0.3))
+        .help("Noise of the breath in the reed channel", "Adds the sound of air.", "")
+        .sets(Sets::Number(|settings| &mut settings.noise))
+        .flag("--noise"),
+    entry("gain", OUTPUT, "Gain", number([-60.0, 24.0], 0.0, 1, " dB"))
+        .help("Output level", "At 0 dB, 1 Pa at a distance of 1 m is -6 dBFS.", "")
+        .sets(Sets::Number(|settings| &mut settings.gain_db))
+        .flag("--gain-db"),
+    entry("panic", OUTPUT, "Panic", OFF)
+        .help("Ends everything at once", "Silences the instrument when it is switched on.", "")
+        .midi("CC120, CC123")
+        .act(),
+    entry(
+        "knob",
+        KNOB,
+        "Knob",
+        choice(&[("off", "Off"), ("serial", "Serial"), ("midi", "MIDI port"), ("osc", "OSC (stock firmware)")]),
+    )
+    .help(
+        "Kind of knob",
+        "Knobs on serial and MIDI can be felt. A knob with stock firmware on OSC plays, but cannot be felt.",
+        "",
+    )
+    .setup()
+    .act(),
+    entry("arm", KNOB, "Arm knob", OFF)
+        .help(
+            "Lets the knob make torque",
+            "It is off when a project is loaded, and after anything that disarms the knob: a pulled plug, a fault, silence on the line. Then switch it off and on again.",
+            "",
+        )
+        .setup()
+        .act()
+        .never_restored(),
+    entry("ceil", KNOB, "Torque ceiling", number([10.0, MOST_TORQUE_MNM], 100.0, 0, " mNm"))
+        .help(
+            "Largest torque that you allow",
+            "The knob never makes more. 100 is gentle, and 250 is the most you can ask for. A higher value takes effect at the next arming, a lower value at once.",
+            "",
+        )
+        .flag("--ceiling")
+        .setup()
+        .act(),
+    entry("takeov", KNOB, "Take over knob", OFF)
+        .help(
+            "Takes the knob from the instance that has it",
+            "The other instance lets go of it, and the knob is disarmed.",
+            "",
+        )
+        .setup()
+        .act()
+        .never_restored(),
+    entry("rest", KNOB, "Rest here", OFF)
+        .help(
+            "Makes the knob's present angle its rest",
+            "Calibrates no breath. Let go of the knob, then press.",
+            "",
+        )
+        .setup()
+        .act()
+        .never_restored(),
+    entry("blow", KNOB, "Blow hard here", OFF)
+        .help(
+            "Makes the knob's present angle full breath",
+            "Calibrates the travel from rest to full breath. Turn the knob as far as you want to blow, then press.",
+            "",
+        )
+        .setup()
+        .act()
+        .never_restored(),
+    entry("law", KNOB, "Feel", choice(&[("flow", "Flow"), ("press", "Pressure"), ("free", "Free")]))
+        .help(
+            "Law of the torque",
+            "",
+            "Flow: the reed's own curve, which rises to the threshold and falls to closure. Pressure: a spring with a step at the threshold. Free: no torque.",
+        )
+        .flag("--law")
+        .setup(),
+    entry("contr", KNOB, "Feel contrast", number([1.0, 5.0], 3.0, 2, " x"))
+        .help(
+            "Exaggerates the differences between notes",
+            "Does not change the sound.",
+            "1 is what the bore needs: differences of about 15 % over the compass, at the limit of what fingers can tell apart. 3 makes them plain.",
+        )
+        .flag("--contrast")
+        .setup(),
+    entry(
+        "order",
+        KNOB,
+        "Feel order",
+        choice(&[("phys", "Physical"), ("cover", "Covered holes"), ("open", "Open holes")]),
+    )
+    .help(
+        "What makes one note harder than another",
+        "Does not change the sound.",
+        "Physical: the pressure that the bore needs. Covered holes: more covered holes are harder. Open holes: more covered holes are easier.",
+    )
+    .flag("--order")
+    .setup(),
+    entry("refnot", KNOB, "Feel reference", whole([52, 97], 72, ""))
+        .help(
+            "Written note that feels the same at every contrast, as a MIDI number",
+            "",
+            "Contrast moves the other notes away from this one.",
+        )
+        .flag("--reference")
+        .setup(),
+    entry("torque", KNOB, "Feel torque", number([0.0, MOST_TORQUE_MNM], 60.0, 0, " mNm"))
+        .help("Torque of the reference note", "", "Sets how strong everything feels.")
+        .flag("--torque")
+        .setup(),
+    entry("kdamp", KNOB, "Feel damping", number([0.0, 20.0], 1.0, 2, " mNm s"))
+        .help(
+            "Damping added to the knob's own, per radian",
+            "",
+            "The knob turns as if in a thick liquid.",
+        )
+        .setup(),
+    entry("kfric", KNOB, "Feel friction", number([0.0, 20.0], 1.0, 1, " mNm"))
+        .help("Friction", "", "Holds the knob where you let go of it.")
+        .setup(),
+    entry("detent", KNOB, "Feel step", number([0.0, 30.0], 6.0, 1, " mNm"))
+        .help(
+            "Height of the step at the threshold, under the pressure law",
+            "",
+            "You feel a click where the note speaks. The flow law already has its peak there.",
+        )
+        .flag("--detent")
+        .setup(),
+    entry("curve", KNOB, "Knob curve", number([0.25, 4.0], 1.0, 2, ""))
+        .help(
+            "Exponent of the travel from rest to full breath",
+            "For knobs that cannot be felt. Values above 1 give soft breath more of the travel.",
+            "",
+        )
+        .setup(),
+    entry("oscprt", KNOB, "OSC port", whole([1_024, 65_535], 8_000, ""))
+        .help("UDP port that stock firmware sends to", "Stock firmware is set to 8000.", "")
+        .setup()
+        .act(),
+    entry("oscany", KNOB, "OSC from network", OFF)
+        .help(
+            "Whether OSC from other machines is accepted",
+            "While it is off, only this machine is heard.",
+            "",
+        )
+        .setup()
+        .act(),
+    entry("oscfl", KNOB, "Feel OSC port", whole([0, 65_535], 0, ""))
+        .help(
+            "UDP port on this machine that the feel is sent to, as OSC",
+            "For other programs that make torque. 0 sends nothing.",
+            "",
+        )
+        .setup()
+        .act(),
+    entry("rec", KNOB, "Record take", OFF)
+        .help(
+            "Records what the knob does in a file",
+            "The recording replays to the same sample.",
+            "",
+        )
+        .setup()
+        .act()
+        .never_restored(),
+    entry("replay", KNOB, "Replay take", OFF)
+        .help(
+            "Plays the recorded take instead of the knob",
+            "Starts when it is switched on, or when the host starts again.",
+            "",
+        )
+        .flag("--replay")
+        .setup()
+        .act(),
+    entry("study", KNOB, "Study", OFF)
+        .help("Takes H and k from the trial of a study", "See docs/study.md.", "")
+        .setup()
+        .act(),
+    entry("part", KNOB, "Participant", whole([1, 9_999], 1, ""))
+        .help("Number of the participant", "", "")
+        .setup()
+        .act(),
+    entry("seed", KNOB, "Study seed", whole([1, 9_999], 1, ""))
+        .help("Random seed of the study", "Participant and seed fix the order of the trials.", "")
+        .setup()
+        .act(),
+    entry("trial", KNOB, "Trial", whole([1, TRIALS as i32], 1, ""))
+        .help("Number of the trial", "", "")
+        .setup()
+        .act(),
+    entry("side", KNOB, "A/B", switch(false, ["A", "B"])).help("Side A or B of the trial", "", "").act(),
+    entry("hsrc", KNOB, "H from", choice(REED_SOURCES))
+        .help("What drives H", "A controller opens the reed, in the sound and under the hand.", "")
+        .setup(),
+    entry("ksrc", KNOB, "k from", choice(REED_SOURCES))
+        .help("What drives k", "A controller stiffens the reed. Meanwhile k is not coupled to H.", "")
+        .setup(),
+    entry("kstat", KNOB, "Knob status", Kind::Status("off"))
+        .help("State of the link to the knob", "", "")
+        .setup()
+        .act()
+        .never_restored(),
+    entry(
+        "instr",
+        INSTRUMENT,
+        "Instrument",
+        choice(&[
+            ("bflat", "B flat clarinet"),
+            ("a", "A clarinet"),
+            ("eflat", "E flat clarinet"),
+            ("c", "C clarinet"),
+            ("bass", "Bass clarinet"),
+            ("user", "User file"),
+        ]),
+    )
+    .help(
+        "Which clarinet",
+        "Each has its own bore, holes, fingerings and reed. The old one fades over to the new one when that is ready.",
+        "",
+    )
+    .flag("--instrument")
+    .setup()
+    .act(),
+    entry("qual", INSTRUMENT, "Offline quality", choice(&[("live", "Same as live"), ("high", "High")]))
+        .help(
+            "How finely the host's offline mode renders",
+            "High computes at twice the rate and in double precision. A bounce then takes longer.",
+            "",
+        )
+        .flag("--quality")
+        .setup(),
+    entry("bendr", INSTRUMENT, "Bend range", whole([0, 48], 2, " st"))
+        .help("How far the pitch wheel bends", "A range set over MIDI takes precedence.", "")
+        .midi("RPN 0")
+        .setup(),
+    entry("istat", INSTRUMENT, "Instrument status", Kind::Status("not playing"))
+        .help("State of the instrument", "", "")
+        .setup()
+        .act()
+        .never_restored(),
+    entry("rface", PHYSICAL_REED, "Reed face", choice(&[("seed", "Dimensionless"), ("phys", "Physical")]))
+        .help(
+            "How the reed is given: as dimensionless H, k and zeta, or as a maker measures it",
+            "Both describe the same reed. The values that are shown are in use.",
+            "The torque curve changes as the sound does.",
+        )
+        .sets(Sets::ReedFace)
+        .setup(),
+    entry("rstiff", PHYSICAL_REED, "Reed stiffness", number([300.0, 6_000.0], 1_218.06, 1, " N/m"))
+        .help(
+            "Stiffness K of the reed",
+            "A stiffer reed closes later: the closing pressure is K times the opening over the area.",
+            "The threshold and the closure move outwards.",
+        )
+        .sets(Sets::Reed(|reed| &mut reed.stiffness_n_m, 1.0))
+        .flag("--reed-stiffness"),
+    entry("rarea", PHYSICAL_REED, "Reed area", number([40.0, 250.0], 101.505, 2, " mm\u{b2}"))
+        .help(
+            "Area of the reed that the breath presses on",
+            "A larger area closes earlier.",
+            "The threshold and the closure move inwards.",
+        )
+        .sets(Sets::Reed(|reed| &mut reed.area_m2, 1e6))
+        .flag("--reed-area"),
+    entry("rwidth", PHYSICAL_REED, "Reed width", number([3.0, 40.0], 15.2137, 2, " mm"))
+        .help(
+            "Width w of the channel, tip and side slits together",
+            "A wider channel lets more air flow: notes speak and beat earlier and sound brighter.",
+            "A wider channel gives more torque.",
+        )
+        .sets(Sets::Reed(|reed| &mut reed.width_m, 1e3))
+        .flag("--reed-width"),
+    entry("ropen", PHYSICAL_REED, "Reed opening", number([0.2, 0.95], 0.5, 3, " mm"))
+        .help(
+            "Opening at the tip of the reed, at rest under the lip",
+            "A wider opening lets more air flow, and the reed closes later.",
+            "A wider opening gives more torque and a farther closure.",
+        )
+        .sets(Sets::Reed(|reed| &mut reed.tip_opening_m, 1e3))
+        .flag("--reed-opening"),
+];

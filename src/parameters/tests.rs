@@ -1,0 +1,239 @@
+use super::*;
+
+/// Id, group, name, default, and whether a host can automate it, in the order of hosts. A frozen copy: saved projects and
+/// automation lanes depend on it. Append only.
+const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
+    ("breath", "Breath", "Breath", "0.0 %", true),
+    ("full", "Breath", "Full breath", "6.00 kPa", true),
+    ("tongue", "Breath", "Tongue", "2.0 ms", true),
+    ("legato", "Breath", "Legato", "8.0 ms", true),
+    ("stren", "Embouchure", "Reed strength", "2.50", true),
+    ("lip", "Embouchure", "Lip opening", "1.000 x", true),
+    ("zeta", "Embouchure", "Embouchure zeta", "0.300", true),
+    ("damp", "Embouchure", "Lip damping", "1.00 x", true),
+    ("reedh", "Reed", "Reed H", "2.5981", true),
+    ("reedk", "Reed", "Reed k", "0.3849", true),
+    ("reedc", "Reed", "Reed coupled", "Coupled", true),
+    ("reeda", "Reed", "Reed A", "1.000", true),
+    ("lay", "Reed", "Lay curve", "0.400", true),
+    ("a4", "Tuning", "A4", "440.0 Hz", true),
+    ("tune", "Tuning", "Tuning", "Natural", true),
+    ("temp", "Tuning", "Temperature", "25.0 °C", true),
+    ("vent", "Tuning", "Vent loss", "2.00", true),
+    ("noise", "Noise", "Breath noise", "30.0 %", true),
+    ("gain", "Output", "Gain", "0.0 dB", true),
+    ("panic", "Output", "Panic", "Off", true),
+    ("knob", "Knob", "Knob", "Off", false),
+    ("arm", "Knob", "Arm knob", "Off", false),
+    ("ceil", "Knob", "Torque ceiling", "100 mNm", false),
+    ("takeov", "Knob", "Take over knob", "Off", false),
+    ("rest", "Knob", "Rest here", "Off", false),
+    ("blow", "Knob", "Blow hard here", "Off", false),
+    ("law", "Knob", "Feel", "Flow", false),
+    ("contr", "Knob", "Feel contrast", "3.00 x", false),
+    ("order", "Knob", "Feel order", "Physical", false),
+    ("refnot", "Knob", "Feel reference", "72", false),
+    ("torque", "Knob", "Feel torque", "60 mNm", false),
+    ("kdamp", "Knob", "Feel damping", "1.00 mNm s", false),
+    ("kfric", "Knob", "Feel friction", "1.0 mNm", false),
+    ("detent", "Knob", "Feel step", "6.0 mNm", false),
+    ("curve", "Knob", "Knob curve", "1.00", false),
+    ("oscprt", "Knob", "OSC port", "8000", false),
+    ("oscany", "Knob", "OSC from network", "Off", false),
+    ("oscfl", "Knob", "Feel OSC port", "0", false),
+    ("rec", "Knob", "Record take", "Off", false),
+    ("replay", "Knob", "Replay take", "Off", false),
+    ("study", "Knob", "Study", "Off", false),
+    ("part", "Knob", "Participant", "1", false),
+    ("seed", "Knob", "Study seed", "1", false),
+    ("trial", "Knob", "Trial", "1", false),
+    ("side", "Knob", "A/B", "A", true),
+    ("hsrc", "Knob", "H from", "Parameter", false),
+    ("ksrc", "Knob", "k from", "Parameter", false),
+    ("kstat", "Knob", "Knob status", "off", false),
+    ("instr", "Instrument", "Instrument", "B flat clarinet", false),
+    ("qual", "Instrument", "Offline quality", "Same as live", false),
+    ("bendr", "Instrument", "Bend range", "2 st", false),
+    ("istat", "Instrument", "Instrument status", "not playing", false),
+    ("rface", "Reed, physical", "Reed face", "Dimensionless", false),
+    ("rstiff", "Reed, physical", "Reed stiffness", "1218.1 N/m", true),
+    ("rarea", "Reed, physical", "Reed area", "101.50 mm²", true),
+    ("rwidth", "Reed, physical", "Reed width", "15.21 mm", true),
+    ("ropen", "Reed, physical", "Reed opening", "0.500 mm", true),
+];
+
+/// Ids of choices in saved states. Append only.
+const FROZEN_CHOICES: &[(&str, &[&str])] = &[
+    ("tune", &["nat", "temp"]),
+    ("knob", &["off", "serial", "midi", "osc"]),
+    ("law", &["flow", "press", "free"]),
+    ("order", &["phys", "cover", "open"]),
+    ("hsrc", &["param", "cc1", "cc16", "cc17", "cc74", "press"]),
+    ("ksrc", &["param", "cc1", "cc16", "cc17", "cc74", "press"]),
+    ("instr", &["bflat", "a", "eflat", "c", "bass", "user"]),
+    ("qual", &["live", "high"]),
+    ("rface", &["seed", "phys"]),
+];
+
+fn numbers() -> impl Iterator<Item = (&'static Parameter, Number)> {
+    PARAMETERS.iter().filter_map(|parameter| match parameter.kind {
+        Kind::Number(number) => Some((parameter, number)),
+        _ => None,
+    })
+}
+
+#[test]
+fn the_table_is_as_saved_projects_know_it() {
+    let found: Vec<_> =
+        PARAMETERS.iter().map(|p| (p.id, p.group, p.name, p.default_text(), p.is_automatable)).collect();
+    let frozen: Vec<_> = FROZEN
+        .iter()
+        .map(|&(id, group, name, default, auto)| (id, group, name, default.to_owned(), auto))
+        .collect();
+    assert_eq!(found, frozen);
+    let choices: Vec<(&str, Vec<&str>)> = PARAMETERS
+        .iter()
+        .filter_map(|p| match p.kind {
+            Kind::Choice(choice) => Some((p.id, choice.all.iter().map(|(id, _)| *id).collect())),
+            _ => None,
+        })
+        .collect();
+    let frozen: Vec<(&str, Vec<&str>)> = FROZEN_CHOICES.iter().map(|(id, all)| (*id, all.to_vec())).collect();
+    assert_eq!(choices, frozen);
+}
+
+#[test]
+fn ids_are_short_and_stand_once_and_every_parameter_is_explained() {
+    for (at, parameter) in PARAMETERS.iter().enumerate() {
+        assert!((1..=6).contains(&parameter.id.len()), "{}", parameter.id);
+        assert!(!parameter.meaning.is_empty(), "{}", parameter.id);
+        assert!(PARAMETERS[..at].iter().all(|other| other.id != parameter.id), "{}", parameter.id);
+    }
+}
+
+#[test]
+fn nothing_that_moves_a_motor_or_plays_travels_with_undo_or_is_automated() {
+    for id in ["arm", "ceil", "takeov", "rest", "blow", "rec", "replay", "knob", "instr"] {
+        let parameter = find(id).unwrap();
+        assert!(!parameter.is_undoable && !parameter.is_automatable, "{id}");
+    }
+    assert!(!find("breath").unwrap().is_undoable && !find("panic").unwrap().is_undoable);
+    for id in ["arm", "takeov", "rest", "blow", "rec"] {
+        assert!(!find(id).unwrap().is_restored, "{id} is never on in a loaded state");
+    }
+    assert!(find("no such").is_none());
+}
+
+#[test]
+fn defaults_and_ranges_are_those_of_the_instrument() {
+    let d = Settings::default();
+    let mut filled = Settings { coupled: !d.coupled, tuning: Tuning::Tempered, ..d };
+    let mut fields = 2;
+    for (parameter, number) in numbers() {
+        let Some(Sets::Number(field)) = parameter.sets else { continue };
+        fields += 1;
+        let mut copy = d;
+        assert_eq!(*field(&mut copy), number.default, "{}", parameter.id);
+        for (value, end) in [(-1e9, number.min), (1e9, number.max)] {
+            let mut settings = d;
+            parameter.set(&mut settings, Value::Number(value));
+            assert_eq!(*field(&mut settings.clamped()), end, "{}", parameter.id);
+        }
+        *field(&mut filled) = f32::NAN;
+        parameter.set(&mut filled, Value::Number(number.default));
+    }
+    find("reedc").unwrap().set(&mut filled, Value::Switch(true));
+    find("tune").unwrap().set(&mut filled, Value::Choice(0));
+    assert_eq!(filled, d, "the table reaches every field");
+    // All fields of the settings, each by one parameter.
+    let Settings {
+        breath_full_kpa: _,
+        noise: _,
+        tongue_ms: _,
+        legato_ms: _,
+        strength: _,
+        lip: _,
+        zeta: _,
+        damping: _,
+        lay: _,
+        reed_h: _,
+        reed_k: _,
+        coupled: _,
+        reed_a: _,
+        a4_hz: _,
+        tuning: _,
+        temperature_c: _,
+        vent_loss: _,
+        gain_db: _,
+    } = d;
+    assert_eq!(fields, 18);
+}
+
+#[test]
+fn defaults_of_the_measured_reed_are_the_reference_reed() {
+    let mut reference = PhysicalReed::reference();
+    let mut count = 0;
+    for (parameter, number) in numbers() {
+        if let Some(Sets::Reed(field, per_si)) = parameter.sets {
+            assert_eq!(number.default, (*field(&mut reference) * per_si) as f32, "{}", parameter.id);
+            count += 1;
+        }
+    }
+    assert_eq!(count, 4);
+}
+
+#[test]
+fn numbers_read_both_ways() {
+    for (parameter, number) in numbers() {
+        let id = parameter.id;
+        for step in 0..=200 {
+            let value = number.min + (number.max - number.min) * step as f32 / 200.0;
+            for unit in ["", number.unit] {
+                let text = number.text(value);
+                let back = number.parse(&format!("{text}{unit}")).unwrap_or_else(|| panic!("{id}: {text}"));
+                assert!(
+                    (back - value).abs() < 0.006 * (number.max - number.min),
+                    "{id}: {text} read as {back}"
+                );
+                assert_eq!(number.text(back), text, "{id}");
+            }
+        }
+        for nonsense in ["", "loud", "1e99", "nan", "1.2.3", "°", "%%"] {
+            assert_eq!(number.parse(nonsense), None, "{id}: {nonsense}");
+        }
+        assert!(number.contains(number.default), "{id}");
+    }
+    let read = |id: &str, text: &str| find(id).unwrap().read(text);
+    assert_eq!(read("full", "6,5 KPA"), Ok(Value::Number(6.5)));
+    assert_eq!(read("gain", " -3 "), Ok(Value::Number(-3.0)));
+    assert_eq!(read("temp", "20 °C"), Ok(Value::Number(20.0)));
+    assert_eq!(read("noise", "30 %"), Ok(Value::Number(0.3)));
+    let [full, noise] = [("full", 1), ("noise", 120)].map(|(id, n)| read(id, &n.to_string()).unwrap_err());
+    assert_eq!(full, "full (Full breath) must lie in 2..20 kPa, got 1");
+    assert_eq!(noise, "noise (Breath noise) must lie in 0..100 %, got 120");
+    let Kind::Number(gain) = find("gain").unwrap().kind else { panic!("a number") };
+    assert_eq!(gain.text(-0.04), "0.0", "no negative zero");
+}
+
+#[test]
+fn switches_and_choices_read_both_ways() {
+    for parameter in PARAMETERS {
+        match parameter.kind {
+            Kind::Switch(switch) => {
+                for on in [true, false] {
+                    assert_eq!(parameter.read(switch.text(on)), Ok(Value::Switch(on)), "{}", parameter.id);
+                }
+            }
+            Kind::Choice(choice) => {
+                for (at, (id, text)) in choice.all.iter().enumerate() {
+                    for word in [id.to_string(), text.to_uppercase()] {
+                        assert_eq!(parameter.read(&word), Ok(Value::Choice(at)), "{}", parameter.id);
+                    }
+                }
+            }
+            _ => continue,
+        }
+        assert!(parameter.read("perhaps").unwrap_err().contains(&parameter.range()), "{}", parameter.id);
+    }
+    assert_eq!(find("reedc").unwrap().read("on"), Ok(Value::Switch(true)));
+}

@@ -1,0 +1,139 @@
+//! Saved states: what may stand in one, and how any state is made fit to load.
+
+use nice_plug::plugin::ParamValue;
+use nice_plug::prelude::*;
+use serde::{Serialize, de::DeserializeOwned};
+
+use super::instrument::{self, beginning};
+use super::knob::Calibration;
+use crate::editor::Kept;
+use crate::parameters::{Kind, Number, PARAMETERS, Parameter};
+
+/// Layout of the saved state. 1: ids and units as below. 2: the instrument and its file, the physical reed; a state of 1
+/// is the B flat clarinet.
+pub const SCHEMA: u32 = 2;
+const SCHEMA_FIELD: &str = "schema";
+
+/// A number's default in this process: the table's, or what the program was started with.
+pub(super) fn starting(id: &str, number: &Number) -> f32 {
+    match beginning() {
+        Some(first) if id == "a4" => first.a4_hz,
+        _ => number.default,
+    }
+}
+
+/// Makes a state fit to load, whoever wrote it: numbers inside their ranges, values of the wrong kind and unknown ids
+/// dropped, and what the state does not mention set to its default, so that a state means the same in every session.
+pub fn mend(state: &mut PluginState) {
+    let mut old = std::mem::take(&mut state.params);
+    for parameter in PARAMETERS {
+        let value = mended(parameter, old.remove(parameter.id));
+        state.params.insert(parameter.id.to_owned(), value);
+    }
+    mend_field(
+        state,
+        "serial",
+        |text: String| {
+            if u64::from_str_radix(&text, 16).is_ok() { text } else { String::new() }
+        },
+    );
+    mend_field(state, "midiport", |text: String| text.chars().take(256).collect());
+    mend_field(state, "take", |text: String| text);
+    mend_field(state, "instrumentfile", |text: String| text.chars().take(instrument::PATH_MOST).collect());
+    mend_field(state, "calibration", Calibration::mended);
+    mend_field(state, "window", Kept::mended);
+    // An older schema lacks what it lacks; a newer one is read as far as its ids are known here.
+    state.fields.insert(SCHEMA_FIELD.to_owned(), SCHEMA.to_string());
+}
+
+/// A parameter's value as it may be, or its default.
+fn mended(parameter: &Parameter, saved: Option<ParamValue>) -> ParamValue {
+    let saved = saved.filter(|_| parameter.is_restored);
+    match parameter.kind {
+        Kind::Number(number) => ParamValue::F32(match saved {
+            Some(ParamValue::F32(value)) if value.is_finite() => value.clamp(number.min, number.max),
+            _ => starting(parameter.id, &number),
+        }),
+        Kind::Whole(whole) => ParamValue::I32(match saved {
+            Some(ParamValue::I32(value)) => value.clamp(whole.min, whole.max),
+            _ => whole.default,
+        }),
+        Kind::Switch(switch) => ParamValue::Bool(match saved {
+            Some(ParamValue::Bool(value)) => value,
+            _ => switch.default,
+        }),
+        Kind::Choice(choice) => ParamValue::String(match saved {
+            Some(ParamValue::String(value)) if choice.all.iter().any(|(id, _)| *id == value) => value,
+            _ => choice.all[0].0.to_owned(),
+        }),
+        Kind::Status(_) => ParamValue::Bool(false),
+    }
+}
+
+/// A field as it may be, or as it is by default.
+fn mend_field<T: Default + Serialize + DeserializeOwned>(
+    state: &mut PluginState,
+    id: &str,
+    mended: impl Fn(T) -> T,
+) {
+    let value = state.fields.get(id).and_then(|text| serde_json::from_str(text).ok());
+    if let Ok(text) = serde_json::to_string(&mended(value.unwrap_or_default())) {
+        state.fields.insert(id.to_owned(), text);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+
+    #[test]
+    fn any_state_is_mended() {
+        let mut state = PluginState {
+            version: String::new(),
+            params: BTreeMap::from([
+                ("full".to_owned(), ParamValue::F32(99.0)),
+                ("zeta".to_owned(), ParamValue::F32(f32::NAN)),
+                ("lip".to_owned(), ParamValue::Bool(true)),
+                ("tune".to_owned(), ParamValue::String("just".to_owned())),
+                ("reedc".to_owned(), ParamValue::Bool(false)),
+                ("gone".to_owned(), ParamValue::I32(3)),
+                ("arm".to_owned(), ParamValue::Bool(true)),
+                ("rec".to_owned(), ParamValue::Bool(true)),
+                ("knob".to_owned(), ParamValue::String("osc".to_owned())),
+                ("law".to_owned(), ParamValue::String("strong".to_owned())),
+                ("trial".to_owned(), ParamValue::I32(99)),
+                ("ceil".to_owned(), ParamValue::F32(9e9)),
+            ]),
+            fields: BTreeMap::from([
+                ("schema".to_owned(), "rubbish".to_owned()),
+                ("serial".to_owned(), "\"/dev/ttyUSB0\"".to_owned()),
+                (
+                    "calibration".to_owned(),
+                    "{\"rest_deg\":1e99,\"travel_deg\":1.0,\"dead_deg\":[1,5]}".to_owned(),
+                ),
+            ]),
+        };
+        mend(&mut state);
+        assert_eq!(state.params.len(), PARAMETERS.len());
+        assert!(matches!(state.params["full"], ParamValue::F32(20.0)));
+        assert!(matches!(state.params["zeta"], ParamValue::F32(0.3)));
+        assert!(matches!(state.params["lip"], ParamValue::F32(1.0)));
+        assert!(matches!(state.params["reedc"], ParamValue::Bool(false)));
+        assert!(matches!(&state.params["tune"], ParamValue::String(id) if id == "nat"));
+        assert_eq!(state.fields["schema"], SCHEMA.to_string());
+        for id in ["arm", "rec"] {
+            assert!(
+                matches!(state.params[id], ParamValue::Bool(false)),
+                "{id} is never on in a loaded state"
+            );
+        }
+        assert!(matches!(&state.params["knob"], ParamValue::String(id) if id == "osc"));
+        assert!(matches!(&state.params["law"], ParamValue::String(id) if id == "flow"));
+        assert!(matches!(state.params["trial"], ParamValue::I32(16)));
+        assert!(matches!(state.params["ceil"], ParamValue::F32(250.0)));
+        assert_eq!(state.fields["serial"], "\"\"", "a path is no serial number");
+        assert!(state.fields["calibration"].contains("120.0"), "{}", state.fields["calibration"]);
+    }
+}
