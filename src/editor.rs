@@ -6,7 +6,6 @@
 //! asks for no repaint of its own. Made for 1100 by 720 points, usable from 700 by 480 on. Design units: points; zoom
 //! belongs to whoever owns the window.
 
-mod alternates;
 mod blind_view;
 mod breath_view;
 mod chart;

@@ -13,14 +13,13 @@ use egui::{
 };
 
 use crate::editor::Action;
-use crate::editor::alternates;
-use crate::editor::alternates::Choice;
 use crate::editor::chart;
 use crate::editor::clarinet_body::{Body, part_names, ruler, standing};
 use crate::editor::header::note_name;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
+use chalumeau_core::bore::alternate_fingerings::{self, FingeringChoice};
 use chalumeau_core::bore::instrument_file::{HoleKind, InstrumentFile, REGISTERS, ToneHole};
 
 /// Least distance of two buttons with their names below, points.
@@ -32,7 +31,7 @@ pub struct ClarinetView {
     /// Holes as they are tried, whatever is fingered.
     tried: Option<Vec<bool>>,
     /// Of which instrument, and what the picker shows of it.
-    known: Option<(Arc<InstrumentFile>, Arc<Vec<Choice>>)>,
+    known: Option<(Arc<InstrumentFile>, Arc<Vec<FingeringChoice>>)>,
 }
 
 impl ClarinetView {
@@ -131,7 +130,8 @@ impl ClarinetView {
                 .fingering()
                 .and_then(|fingering| all.iter().position(|choice| choice.open == fingering.open)),
         };
-        let name = |choice: &Choice| format!("{}{}", note_name(choice.written.0), "'".repeat(choice.nth));
+        let name =
+            |choice: &FingeringChoice| format!("{}{}", note_name(choice.written.0), "'".repeat(choice.nth));
         ui.horizontal(|ui| {
             ui.set_height(22.0);
             let told = match shown.map(|index| &all[index]) {
@@ -193,11 +193,11 @@ impl ClarinetView {
     }
 
     /// What can be picked; worked out once an instrument.
-    fn choices(&mut self, file: &Arc<InstrumentFile>) -> Arc<Vec<Choice>> {
+    fn choices(&mut self, file: &Arc<InstrumentFile>) -> Arc<Vec<FingeringChoice>> {
         match &self.known {
             Some((of, choices)) if Arc::ptr_eq(of, file) || of == file => choices.clone(),
             _ => {
-                let choices = Arc::new(alternates::choices(file));
+                let choices = Arc::new(alternate_fingerings::fingering_choices(file));
                 self.known = Some((file.clone(), choices.clone()));
                 choices
             }
