@@ -4,12 +4,12 @@
 //! with `#` that say what was measured, then data. A mistake of the user ends with exit code 2, a message that says what
 //! was given and what would be right, and no file; a reader that closes the pipe early is no mistake.
 
-mod args;
 mod bifurcation;
 mod bore;
+mod csv_table;
 #[cfg(feature = "devices")]
 mod doctor;
-mod feel;
+mod feel_args;
 mod haptic;
 mod impedance;
 mod instrument;
@@ -17,18 +17,18 @@ mod instrument;
 mod knob;
 #[cfg(feature = "simulator")]
 mod knob_sim;
-mod play;
-mod plot;
+mod plot_args;
 mod reed;
 mod reed_physical;
 mod render;
+mod render_monitor;
 mod report;
+mod score_args;
 mod settings;
+mod shared_args;
 mod study;
-mod table;
 mod threshold;
 mod tune;
-mod watch;
 
 use crate::output::OutputError;
 use crate::picture_file::PictureError;
@@ -73,23 +73,23 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    Render(Box<render::Render>),
-    Report(Box<report::Report>),
-    Impedance(Box<impedance::Impedance>),
-    Bore(Box<bore::Bore>),
-    Instrument(Box<instrument::Instrument>),
-    Threshold(threshold::Threshold),
-    Bifurcation(Box<bifurcation::Bifurcation>),
-    Tune(Box<tune::Tune>),
-    Reed(reed::Reed),
-    Study(study::Study),
+    Render(Box<render::RenderCommand>),
+    Report(Box<report::ReportCommand>),
+    Impedance(Box<impedance::ImpedanceCommand>),
+    Bore(Box<bore::BoreCommand>),
+    Instrument(Box<instrument::InstrumentCommand>),
+    Threshold(threshold::ThresholdCommand),
+    Bifurcation(Box<bifurcation::BifurcationCommand>),
+    Tune(Box<tune::TuneCommand>),
+    Reed(reed::ReedCommand),
+    Study(study::StudyCommand),
     #[cfg(feature = "devices")]
-    Knob(Box<knob::Knob>),
+    Knob(Box<knob::KnobCommand>),
     #[cfg(feature = "simulator")]
-    KnobSim(Box<knob_sim::KnobSim>),
-    Haptic(Box<haptic::Haptic>),
+    KnobSim(Box<knob_sim::KnobSimCommand>),
+    Haptic(Box<haptic::HapticCommand>),
     #[cfg(feature = "devices")]
-    Doctor(doctor::Doctor),
+    Doctor(doctor::DoctorCommand),
 }
 
 /// Why a command ended early.

@@ -6,27 +6,27 @@
 //! asks for no repaint of its own. Made for 1100 by 720 points, usable from 700 by 480 on. Design units: points; zoom
 //! belongs to whoever owns the window.
 
-mod blind_view;
+pub mod ab_comparison;
+mod blind_comparison_view;
+mod breath_meter;
 mod breath_view;
 mod chart;
-mod clarinet_body;
+mod clarinet_drawing;
 mod clarinet_view;
-pub mod compare;
 pub mod controls;
 pub mod feel_test;
 mod header;
-pub mod history;
 mod instrument_view;
 mod keyboard;
-mod knob_panel;
-pub mod listener;
-mod meter;
+mod knob_view;
 mod reed_view;
 mod slider;
 pub mod snapshot;
+pub mod sound_analysis;
 mod sound_view;
 pub mod terms;
 pub mod theme;
+pub mod undo;
 mod widgets;
 
 use std::path::PathBuf;
@@ -35,7 +35,7 @@ use std::time::Duration;
 use egui::{CentralPanel, Frame, Margin, Panel, Theme, Ui};
 use serde::{Deserialize, Serialize};
 
-pub use compare::Compare;
+pub use ab_comparison::AbComparison;
 pub use controls::{Controls, Look};
 pub use feel_test::FeelTest;
 pub use header::note_name;
@@ -44,8 +44,8 @@ pub use snapshot::Snapshot;
 use chalumeau_core::units::SoundingNote;
 use chalumeau_knob::wire::message::Feel;
 use controls::{Entry, Hands, Press};
-use history::History;
 use keyboard::Keyboard;
+use undo::UndoHistory;
 
 /// Size the window opens with, points.
 pub const SIZE: (f32, f32) = (1100.0, 720.0);
@@ -132,10 +132,10 @@ impl Tab {
     }
 }
 
-/// What a project keeps of the window. Whatever a file says is taken into its ranges by [`Kept::mended`].
+/// What a project keeps of the window. Whatever a file says is taken into its ranges by [`WindowState::mended`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Kept {
+pub struct WindowState {
     /// Width and height, points.
     pub size: (f32, f32),
     /// Zoom, 0.5..=3.
@@ -146,13 +146,13 @@ pub struct Kept {
     pub tab: Tab,
 }
 
-impl Default for Kept {
+impl Default for WindowState {
     fn default() -> Self {
         Self { size: SIZE, zoom: 1.0, is_dark: true, tab: Tab::Reed }
     }
 }
 
-impl Kept {
+impl WindowState {
     /// The same inside its ranges.
     pub fn mended(self) -> Self {
         let d = Self::default();
@@ -181,11 +181,11 @@ impl Kept {
 
 /// Everything the window remembers between frames.
 #[derive(Clone, Debug, Default)]
-pub struct State {
+pub struct EditorState {
     /// What a project keeps.
-    pub kept: Kept,
-    history: History,
-    compare: Compare,
+    pub kept: WindowState,
+    history: UndoHistory,
+    compare: AbComparison,
     entry: Option<Entry>,
     held: Vec<&'static str>,
     presses: Vec<Press>,
@@ -193,13 +193,13 @@ pub struct State {
     reed: reed_view::ReedView,
     clarinet: clarinet_view::ClarinetView,
     breath: breath_view::BreathView,
-    knob: knob_panel::KnobPanel,
+    knob: knob_view::KnobView,
     instrument: instrument_view::InstrumentView,
 }
 
-impl State {
+impl EditorState {
     /// With what a project kept.
-    pub fn new(kept: Kept) -> Self {
+    pub fn new(kept: WindowState) -> Self {
         Self { kept: kept.mended(), ..Self::default() }
     }
 
@@ -225,7 +225,12 @@ impl State {
 
 /// Draws the window into `ui` and gives back what the user did. In less room than [`LEAST_SIZE`] (a large zoom in a window
 /// that a host keeps small) all of it scrolls.
-pub fn draw(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &Snapshot) -> Vec<Action> {
+pub fn draw(
+    ui: &mut Ui,
+    state: &mut EditorState,
+    controls: &dyn Controls,
+    snapshot: &Snapshot,
+) -> Vec<Action> {
     let (room, least) = (ui.available_size(), egui::vec2(LEAST_SIZE.0, LEAST_SIZE.1));
     // Rounding to pixels is no lack of room.
     if room.x >= least.x - 2.0 && room.y >= least.y - 2.0 {
@@ -241,9 +246,9 @@ pub fn draw(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &
 }
 
 /// The window where there is room for it.
-fn whole(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &Snapshot) -> Vec<Action> {
+fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot: &Snapshot) -> Vec<Action> {
     let mut actions = Vec::new();
-    let State {
+    let EditorState {
         kept,
         history,
         compare,
@@ -278,10 +283,10 @@ fn whole(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &Sna
     line.frame(ground(8, 5)).show(ui, |ui| keyboard.draw(ui, snapshot, &mut actions));
     let line =
         Panel::right("meter").exact_size(if is_small { 96.0 } else { 112.0 }).show_separator_line(false);
-    line.frame(ground(8, 8)).show(ui, |ui| meter::column(ui, snapshot, !is_blind));
+    line.frame(ground(8, 8)).show(ui, |ui| breath_meter::column(ui, snapshot, !is_blind));
     CentralPanel::default().frame(ground(8, 8)).show(ui, |ui| {
         if is_blind {
-            blind_view::draw(ui, compare, &mut hands);
+            blind_comparison_view::draw(ui, compare, &mut hands);
             return;
         }
         match tab {
@@ -332,20 +337,21 @@ mod tests {
 
     #[test]
     fn what_a_project_keeps_survives_rubbish() {
-        let kept = Kept { size: (f32::NAN, 1e9), zoom: -3.0, is_dark: false, tab: Tab::Sound }.mended();
-        assert_eq!(kept, Kept { size: (SIZE.0, 8_000.0), zoom: 0.5, is_dark: false, tab: Tab::Sound });
+        let kept =
+            WindowState { size: (f32::NAN, 1e9), zoom: -3.0, is_dark: false, tab: Tab::Sound }.mended();
+        assert_eq!(kept, WindowState { size: (SIZE.0, 8_000.0), zoom: 0.5, is_dark: false, tab: Tab::Sound });
         let text = toml::to_string(&kept).unwrap();
-        assert_eq!(toml::from_str::<Kept>(&text).unwrap(), kept);
-        assert_eq!(toml::from_str::<Kept>("").unwrap(), Kept::default());
+        assert_eq!(toml::from_str::<WindowState>(&text).unwrap(), kept);
+        assert_eq!(toml::from_str::<WindowState>("").unwrap(), WindowState::default());
     }
 
     #[test]
     fn rounding_to_pixels_is_no_new_size() {
-        let mut kept = Kept::default();
+        let mut kept = WindowState::default();
         for zoom in [0.5, 0.75, 1.25, 1.5, 2.5, 3.0] {
             let points = |size: f32| (size * zoom).round() / zoom;
             kept.resized(points(SIZE.0), points(SIZE.1));
-            assert_eq!(kept, Kept::default());
+            assert_eq!(kept, WindowState::default());
         }
         kept.resized(SIZE.0 + 20.0, SIZE.1);
         assert_eq!(kept.size, (SIZE.0 + 20.0, SIZE.1));

@@ -1,9 +1,9 @@
 //! `chalumeau bore`: an instrument's geometry as a table and as a drawing to scale.
 
 use crate::cli::Failure;
-use crate::cli::args::{InstrumentArg, check_fingering, note};
-use crate::cli::plot::PlotArgs;
-use crate::cli::table::{TableArgs, quoted};
+use crate::cli::csv_table::{TableArgs, quoted};
+use crate::cli::plot_args::PlotArgs;
+use crate::cli::shared_args::{InstrumentArg, check_fingering, note};
 use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
 
 use chalumeau_core::units::WrittenNote;
@@ -23,7 +23,7 @@ Examples:
 /// open (1) or closed (0). What does not apply is empty. The drawing shows the instrument from the side, to scale.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Bore {
+pub struct BoreCommand {
     /// Finger this written note: a MIDI number (72) or a name (C5)
     #[arg(long, value_name = "NOTE", value_parser = note)]
     written: Option<u8>,
@@ -35,7 +35,7 @@ pub struct Bore {
     plot: PlotArgs,
 }
 
-impl Bore {
+impl BoreCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let file = self.instrument.load()?;
         let fingering = self.fingering(&file)?;

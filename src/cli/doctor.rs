@@ -1,7 +1,7 @@
 //! `chalumeau doctor`: which knobs there are, what keeps them from answering, and how well they do.
 
 use crate::cli::Failure;
-use crate::cli::args::within;
+use crate::cli::shared_args::within;
 use crate::identity::VERSION;
 use chalumeau_knob::device::discover::{Kind, candidates, chip, ports};
 use chalumeau_knob::device::{Choice, Hooks, KnobLink, LinkStatus, Phase, Places, serial_text};
@@ -35,7 +35,7 @@ const FEEL_EVERY: Duration = Duration::from_millis(50);
 /// torque. Without a knob it says what to do next.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Doctor {
+pub struct DoctorCommand {
     /// Ask this serial port only, even if its USB identity is not known
     #[arg(long, value_name = "PORT", conflicts_with = "osc")]
     path: Option<PathBuf>,
@@ -50,7 +50,7 @@ pub struct Doctor {
     seconds: f64,
 }
 
-impl Doctor {
+impl DoctorCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let mut out = io::stdout().lock();
         writeln!(out, "Chalumeau {VERSION}, TTLink {MAJOR}.{MINOR}")?;

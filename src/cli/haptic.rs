@@ -1,9 +1,9 @@
 //! `chalumeau haptic`: what a force-feedback knob should feel for each note.
 
 use crate::cli::Failure;
-use crate::cli::args::{AirArg, InstrumentArg, NotesArg, within, within_f32};
-use crate::cli::feel::FeelArgs;
-use crate::cli::table::TableArgs;
+use crate::cli::csv_table::TableArgs;
+use crate::cli::feel_args::FeelArgs;
+use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within, within_f32};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::law;
 use chalumeau_core::haptics::{FeelTable, NoteFeel, Requirements, TorqueLimits};
@@ -38,7 +38,7 @@ Examples:
 /// against the breath.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Haptic {
+pub struct HapticCommand {
     #[command(flatten)]
     notes: NotesArg,
     /// The torque curve of one note instead of the table
@@ -72,7 +72,7 @@ pub struct Haptic {
     table: TableArgs,
 }
 
-impl Haptic {
+impl HapticCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let file = self.instrument.load()?;
         let notes = self.notes.notes(&file)?;

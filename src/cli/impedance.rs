@@ -1,9 +1,9 @@
 //! `chalumeau impedance`: what the bore answers to the reed, curve or peaks.
 
 use crate::cli::Failure;
-use crate::cli::args::{AirArg, InstrumentArg, NotesArg, QualityArg, within};
-use crate::cli::plot::PlotArgs;
-use crate::cli::table::TableArgs;
+use crate::cli::csv_table::TableArgs;
+use crate::cli::plot_args::PlotArgs;
+use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, QualityArg, within};
 use chalumeau_core::analysis::impedance::cutoff_hz;
 use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
 use chalumeau_core::bore::transfer_matrix::{Peak, TransferMatrix, find_peaks};
@@ -46,7 +46,7 @@ enum Model {
 /// Columns: f_hz,re_z_over_zc,im_z_over_zc, or with --peaks written_midi,n,f_hz,mag_over_zc,q.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Impedance {
+pub struct ImpedanceCommand {
     #[command(flatten)]
     notes: NotesArg,
     /// Table of the first N peaks instead of the curve, 1..30
@@ -80,7 +80,7 @@ pub struct Impedance {
     plot: PlotArgs,
 }
 
-impl Impedance {
+impl ImpedanceCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let file = self.instrument.load()?;
         let notes = self.notes.notes(&file)?;
@@ -200,7 +200,7 @@ impl Impedance {
             let z = self.curve(&exact, &of.open, volume_m3).collect();
             curves.push(Curve { name: exact.name().to_owned(), z });
         }
-        chalumeau_figure::impedance::fingering(&chalumeau_figure::impedance::Fingering {
+        chalumeau_figure::impedance::fingering(&chalumeau_figure::impedance::FingeringImpedance {
             instrument: &file.name,
             notes,
             written: of.written,

@@ -1,8 +1,8 @@
 //! `chalumeau instrument`: makes, imports, checks and shows instrument files.
 
 use crate::cli::Failure;
-use crate::cli::args::{AirArg, InstrumentArg, note, within};
-use crate::cli::table::{TableArgs, quoted};
+use crate::cli::csv_table::{TableArgs, quoted};
+use crate::cli::shared_args::{AirArg, InstrumentArg, note, within};
 use crate::instrument_path::{self, LoadError};
 use crate::output::NewFile;
 use chalumeau_core::bore::check::Check;
@@ -30,7 +30,7 @@ Examples:
 /// that play or measure take it with --instrument.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Instrument {
+pub struct InstrumentCommand {
     #[command(subcommand)]
     what: What,
 }
@@ -43,7 +43,7 @@ enum What {
     Show(Show),
 }
 
-impl Instrument {
+impl InstrumentCommand {
     pub fn run(&self) -> Result<ExitCode, Failure> {
         match &self.what {
             What::Import(import) => import.run().map(|()| ExitCode::SUCCESS),

@@ -1,8 +1,8 @@
 //! `chalumeau knob`: a knob in the hand without a DAW: watch it, feel a note on it, record a take.
 
 use crate::cli::Failure;
-use crate::cli::args::{InstrumentArg, check_fingering, note, within};
-use crate::cli::feel::FeelArgs;
+use crate::cli::feel_args::FeelArgs;
+use crate::cli::shared_args::{InstrumentArg, check_fingering, note, within};
 use crate::output::OutputError;
 use crate::take_file::TakeFile;
 use chalumeau_core::haptics::{NoteFeel, TorqueLimits};
@@ -41,7 +41,7 @@ Examples:
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 #[command(group = ArgGroup::new("which").args(["serial", "path", "midi", "osc"]))]
-pub struct Knob {
+pub struct KnobCommand {
     /// The knob with this serial number (hexadecimal) [default: the first that answers]
     #[arg(long, value_name = "HEX", value_parser = |s: &str| chalumeau_knob::device::serial_number(s).ok_or("must be a serial number such as 5100000000000001"))]
     serial: Option<u64>,
@@ -81,7 +81,7 @@ pub struct Knob {
     feel: FeelArgs,
 }
 
-impl Knob {
+impl KnobCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let file = self.instrument.load()?;
         let written = WrittenNote(self.written);

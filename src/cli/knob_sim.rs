@@ -1,7 +1,7 @@
 //! `chalumeau knob-sim`: a TorqueTuner for those who have none, with a hand that turns it.
 
 use crate::cli::Failure;
-use crate::cli::args::within;
+use crate::cli::shared_args::within;
 use chalumeau_firmware::Setup;
 use chalumeau_knob::device::places::Places;
 use chalumeau_knob::simulator::fault::Fault;
@@ -46,7 +46,7 @@ const NAME: &str = "TorqueTuner sim";
 /// Simulated means simulated: nothing of it was compared with hardware.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct KnobSim {
+pub struct KnobSimCommand {
     /// Something that goes wrong, at a time in seconds; may be given more than once
     #[arg(long = "fault", value_name = "KIND@AT[:SECONDS]")]
     faults: Vec<Fault>,
@@ -173,7 +173,7 @@ impl HandArgs {
     }
 }
 
-impl KnobSim {
+impl KnobSimCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);

@@ -1,10 +1,10 @@
 //! `chalumeau reed`: the tables and the flow law that sound, knob and firmware share, and their figures.
 
 use crate::cli::Failure;
-use crate::cli::args::{PlayedArgs, note, sounding, within};
+use crate::cli::csv_table::TableArgs;
 use crate::cli::reed_physical::{self, PhysicalReedArgs};
 use crate::cli::render::progress;
-use crate::cli::table::TableArgs;
+use crate::cli::shared_args::{PlayedArgs, note, sounding, within};
 use crate::picture_file::PictureFile;
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::reed::PhysicalReed;
@@ -17,7 +17,9 @@ use chalumeau_core::score::orbit;
 use chalumeau_core::units::REFERENCE_RADIUS_M;
 use chalumeau_core::units::WrittenNote;
 use chalumeau_figure::draw::Size;
-use chalumeau_figure::reed::{self as figures, Kind, Orbit};
+use chalumeau_figure::reed::LawFigure;
+use chalumeau_figure::reed_orbit::ReedOrbit;
+use chalumeau_figure::reed_sweep::reed_sweep;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 
@@ -83,7 +85,7 @@ enum Format {
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 #[group(id = "what", required = true, multiple = false, args = ["table", "law", "physical", "figure"])]
-pub struct Reed {
+pub struct ReedCommand {
     /// The 3601 table entries: i,p,x_a,x_b,sgn with x_a = sqrt(p), x_b = p^1.5
     #[arg(long)]
     table: bool,
@@ -140,16 +142,16 @@ struct Drawing {
 }
 
 impl Which {
-    fn kind(self) -> Option<Kind> {
+    fn kind(self) -> Option<LawFigure> {
         match self {
-            Self::Unit => Some(Kind::Unit),
-            Self::Angle => Some(Kind::Angle),
-            Self::FamilyH => Some(Kind::FamilyH),
-            Self::FamilyK => Some(Kind::FamilyK),
-            Self::Coupled => Some(Kind::Coupled),
-            Self::Amplitude => Some(Kind::Amplitude),
-            Self::Negative => Some(Kind::Negative),
-            Self::Physical => Some(Kind::Physical),
+            Self::Unit => Some(LawFigure::Unit),
+            Self::Angle => Some(LawFigure::Angle),
+            Self::FamilyH => Some(LawFigure::FamilyH),
+            Self::FamilyK => Some(LawFigure::FamilyK),
+            Self::Coupled => Some(LawFigure::Coupled),
+            Self::Amplitude => Some(LawFigure::Amplitude),
+            Self::Negative => Some(LawFigure::Negative),
+            Self::Physical => Some(LawFigure::Physical),
             Self::Sweep | Self::Orbit | Self::All => None,
         }
     }
@@ -201,7 +203,7 @@ impl Drawing {
                 (None, Some(orbit)) if which == Which::Orbit => sheet.draw(&orbit.figure())?,
                 _ => {
                     let bar = progress(FRAMES);
-                    sheet.animate(&figures::sweep(FRAMES)?, FRAME_S, || bar.inc(1))?;
+                    sheet.animate(&reed_sweep(FRAMES)?, FRAME_S, || bar.inc(1))?;
                     bar.finish_and_clear();
                 }
             }
@@ -210,7 +212,7 @@ impl Drawing {
     }
 
     /// Checks what the orbit needs; what is returned plays it.
-    fn prepare_orbit(&self) -> Result<impl FnOnce() -> Result<Orbit, Failure> + '_, Failure> {
+    fn prepare_orbit(&self) -> Result<impl FnOnce() -> Result<ReedOrbit, Failure> + '_, Failure> {
         let file = self.instrument.load()?;
         let written = WrittenNote(self.written);
         let sounding = sounding(&file, written)?;
@@ -229,7 +231,7 @@ impl Drawing {
             })?;
             let law = settings.reed_law();
             let flow_unit_m3s = P_REF_PA / model.air.z_c(model.file.nominal_radius_m);
-            Ok(Orbit {
+            Ok(ReedOrbit {
                 title: format!("{name}, written {written}"),
                 note: format!(
                     "gamma {}, zeta {}, lay {}; {:.1} Hz. The reed has inertia and damping, so it leaves its curve.",
@@ -246,7 +248,7 @@ impl Drawing {
     }
 }
 
-impl Reed {
+impl ReedCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let tables = ReedTables::seed();
         if let (Some(which), Some(out)) = (self.figure, &self.drawing.out) {

@@ -1,11 +1,11 @@
 //! `chalumeau render`: a MIDI file, a note or a scale as a WAV file, with a look inside if wanted.
 
 use crate::cli::Failure;
-use crate::cli::args::within;
-use crate::cli::play::{PlayArgs, Prepared};
-use crate::cli::plot::PlotArgs;
-use crate::cli::table::Table;
-use crate::cli::watch::Watch;
+use crate::cli::csv_table::CsvTable;
+use crate::cli::plot_args::PlotArgs;
+use crate::cli::render_monitor::RenderMonitor;
+use crate::cli::score_args::{RenderJob, ScoreArgs};
+use crate::cli::shared_args::within;
 use crate::output::NewFile;
 use crate::wav::{Depth, Level, WavFile};
 use chalumeau_core::instrument::Probe;
@@ -50,9 +50,9 @@ enum Bits {
 /// The WAV file appears only when it is complete.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Render {
+pub struct RenderCommand {
     #[command(flatten)]
-    play: PlayArgs,
+    play: ScoreArgs,
 
     /// WAV file to write
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
@@ -79,16 +79,16 @@ pub struct Render {
     plot_at: Option<f64>,
 }
 
-impl Render {
+impl RenderCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let prepared = self.play.prepare()?;
-        let Prepared { score, rate, .. } = &prepared;
+        let RenderJob { score, rate, .. } = &prepared;
         self.refuse_same_file()?;
         let mut out = NewFile::create(&self.out, self.force)?;
         let mut probe =
             self.probe.as_deref().map(|path| ProbeTable::open(path, self, &prepared)).transpose()?;
         let plot = self.plot.open(self.force)?;
-        let watch = plot.wanted().then(|| Watch::new(&prepared, self.plot_at)).transpose()?;
+        let watch = plot.wanted().then(|| RenderMonitor::new(&prepared, self.plot_at)).transpose()?;
         let mut clarinet = prepared.clarinet();
         let depth = match self.bits {
             Bits::Int16 => Depth::Int16,
@@ -173,8 +173,8 @@ impl Render {
 }
 
 /// What a reader of a figure wants to know of how it was played.
-pub fn about(prepared: &Prepared) -> Vec<String> {
-    let Prepared { model, settings, score, rate } = prepared;
+pub fn about(prepared: &RenderJob) -> Vec<String> {
+    let RenderJob { model, settings, score, rate } = prepared;
     vec![format!(
         "{}; {:.2} s at {rate} Hz, A4 = {} Hz, zeta {}, the reed shuts at {:.2} kPa",
         model.file.name,
@@ -196,7 +196,7 @@ pub fn progress(samples: usize) -> ProgressBar {
 
 /// The inside of the instrument as a table.
 struct ProbeTable {
-    table: Table,
+    table: CsvTable,
     every: u64,
     rate_hz: f64,
     seen: u64,
@@ -204,9 +204,9 @@ struct ProbeTable {
 }
 
 impl ProbeTable {
-    fn open(path: &Path, render: &Render, prepared: &Prepared) -> Result<Self, Failure> {
+    fn open(path: &Path, render: &RenderCommand, prepared: &RenderJob) -> Result<Self, Failure> {
         let header = "t_s,gamma,opening_unit,flow_m3s,p_mouthpiece_pa,p_radiated_pa";
-        let mut table = Table::open(path, render.force, header)?;
+        let mut table = CsvTable::open(path, render.force, header)?;
         let rate_hz = prepared.model.coeffs.rate_hz;
         table.comment(format_args!(
             "s, mouth over closing pressure, opening over rest opening, m3/s, Pa, Pa at 1 m; {rate_hz} Hz / {}",

@@ -1,13 +1,13 @@
 //! `chalumeau report`: a rendering as one HTML page with its sound, figures and tables.
 
-mod touch;
+mod breath_and_haptics;
 
 use crate::cli::Failure;
-use crate::cli::args::within;
-use crate::cli::play::{PlayArgs, Prepared};
 use crate::cli::render::{about, progress};
-use crate::cli::report::touch::Touch;
-use crate::cli::watch::{Watch, Watched};
+use crate::cli::render_monitor::{RenderMonitor, RenderSummary};
+use crate::cli::report::breath_and_haptics::BreathAndHaptics;
+use crate::cli::score_args::{RenderJob, ScoreArgs};
+use crate::cli::shared_args::within;
 
 use crate::identity;
 use crate::output::NewFile;
@@ -15,7 +15,7 @@ use crate::wav::{Depth, WavFile};
 use chalumeau_core::instrument::{Settings, Tuning};
 use chalumeau_core::score as player;
 use chalumeau_core::score::heard::{Heard, spread};
-use chalumeau_figure::report::{Cell, Plate, Report as Page, Sound, Table, write};
+use chalumeau_figure::report::{Plate, Report as Page, ReportTable, Sound, TableCell, write};
 use clap::Args;
 use std::cell::RefCell;
 use std::io::{Cursor, Seek, Write};
@@ -41,9 +41,9 @@ Examples:
 /// beside it with --wav.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Report {
+pub struct ReportCommand {
     #[command(flatten)]
-    play: PlayArgs,
+    play: ScoreArgs,
     /// HTML file to write
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
     out: PathBuf,
@@ -58,7 +58,7 @@ pub struct Report {
     force: bool,
 }
 
-impl Report {
+impl ReportCommand {
     pub fn run(&self) -> Result<(), Failure> {
         self.refuse_names()?;
         let prepared = self.play.prepare()?;
@@ -68,7 +68,7 @@ impl Report {
                 "{seconds:.0} s of sound are too much for a page, which holds {INSIDE_MAX_S}; put it beside the page with --wav FILE"
             )));
         }
-        let watch = Watch::new(&prepared, self.plot_at)?;
+        let watch = RenderMonitor::new(&prepared, self.plot_at)?;
         let mut page = NewFile::create(&self.out, self.force)?;
         let (sound, wav, watched) = match &self.wav {
             Some(path) => {
@@ -116,7 +116,7 @@ impl Report {
         Ok(())
     }
 
-    fn page(&self, prepared: &Prepared, watched: &Watched, sound: Sound) -> Result<Page, Failure> {
+    fn page(&self, prepared: &RenderJob, watched: &RenderSummary, sound: Sound) -> Result<Page, Failure> {
         let (file, title) = (&prepared.model.file, self.play.title());
         let mut lines = about(prepared);
         let outcome = match spread(&watched.heard) {
@@ -134,7 +134,7 @@ impl Report {
         let fingered = fingering.map_or(String::new(), |fingering| {
             format!(", fingered for written {}, the longest note", fingering.written)
         });
-        let touch = Touch::new(prepared, self.play.feel(file)?, longest);
+        let touch = BreathAndHaptics::new(prepared, self.play.feel(file)?, longest);
         Ok(Page {
             about: lines,
             sound,
@@ -175,7 +175,11 @@ impl Report {
 }
 
 /// Plays and watches; the sound goes to `out` in 16 bits.
-fn played(prepared: &Prepared, watch: Watch, out: &mut (impl Write + Seek)) -> Result<Watched, Failure> {
+fn played(
+    prepared: &RenderJob,
+    watch: RenderMonitor,
+    out: &mut (impl Write + Seek),
+) -> Result<RenderSummary, Failure> {
     let score = &prepared.score;
     let mut wav = WavFile::new(out, prepared.rate, Depth::Int16, 1, score.samples)?;
     let mut clarinet = prepared.clarinet();
@@ -218,15 +222,15 @@ fn signed(cents: f64) -> String {
     if tenths == 0.0 { "0.0".to_owned() } else { format!("{:+.1}", tenths / 10.0) }
 }
 
-fn word(text: impl Into<String>) -> Cell {
-    Cell::Word(text.into())
+fn word(text: impl Into<String>) -> TableCell {
+    TableCell::Word(text.into())
 }
 
-fn number(text: impl Into<String>) -> Cell {
-    Cell::Number(text.into())
+fn number(text: impl Into<String>) -> TableCell {
+    TableCell::Number(text.into())
 }
 
-fn notes(prepared: &Prepared, heard: &[Heard], outcome: &str) -> Table {
+fn notes(prepared: &RenderJob, heard: &[Heard], outcome: &str) -> ReportTable {
     let rate_hz = f64::from(prepared.rate);
     let head = ["at, s", "sounds", "written", "length, s", "pitch, Hz", "cents", "level, dBFS"];
     let row = |heard: &Heard| {
@@ -248,7 +252,7 @@ fn notes(prepared: &Prepared, heard: &[Heard], outcome: &str) -> Table {
             }),
         ]
     };
-    Table {
+    ReportTable {
         title: "Notes".to_owned(),
         about: format!(
             "{outcome} Cents are from equal temperament at A4 = {} Hz, measured between attack and release.",
@@ -259,7 +263,7 @@ fn notes(prepared: &Prepared, heard: &[Heard], outcome: &str) -> Table {
     }
 }
 
-fn settings(settings: &Settings) -> Table {
+fn settings(settings: &Settings) -> ReportTable {
     let law = settings.reed_law();
     let rows = [
         ("Full breath", format!("{}", settings.breath_full_kpa), "kPa"),
@@ -282,7 +286,7 @@ fn settings(settings: &Settings) -> Table {
         ("Output gain", format!("{}", settings.gain_db), "dB"),
     ];
     let row = |(name, value, unit): (&str, String, &str)| vec![word(name), number(value), word(unit)];
-    Table {
+    ReportTable {
         title: "Settings".to_owned(),
         about: String::new(),
         head: ["setting", "value", "unit or scale"].map(str::to_owned).to_vec(),
@@ -290,7 +294,7 @@ fn settings(settings: &Settings) -> Table {
     }
 }
 
-fn instrument(prepared: &Prepared) -> Table {
+fn instrument(prepared: &RenderJob) -> ReportTable {
     let file = &prepared.model.file;
     let sounds = |note: chalumeau_core::units::WrittenNote| {
         note.sounding(file.transposition).map_or(String::new(), |note| format!(" (sounds {note})"))
@@ -311,7 +315,7 @@ fn instrument(prepared: &Prepared) -> Table {
         ("Tone holes", file.holes.len().to_string()),
         ("Computed at", format!("{} Hz, put out at {} Hz", prepared.model.coeffs.rate_hz, prepared.rate)),
     ];
-    Table {
+    ReportTable {
         title: "Instrument".to_owned(),
         about: String::new(),
         head: ["property", "value"].map(str::to_owned).to_vec(),

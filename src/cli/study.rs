@@ -1,7 +1,7 @@
 //! `chalumeau study`: what a participant will meet, for the experimenter's desk.
 
 use crate::cli::Failure;
-use crate::cli::table::TableArgs;
+use crate::cli::csv_table::TableArgs;
 use chalumeau_knob::touch::study::{Side, plan};
 use clap::Args;
 
@@ -18,7 +18,7 @@ Examples:
 /// participant: it says which side is which.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Study {
+pub struct StudyCommand {
     /// Number of the participant, 1..9999
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=9_999))]
     participant: u32,
@@ -29,7 +29,7 @@ pub struct Study {
     table: TableArgs,
 }
 
-impl Study {
+impl StudyCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let mut table = self.table.open("participant,seed,trial,h,a,k_a,b,k_b")?;
         table.comment(format_args!(

@@ -1,9 +1,9 @@
 //! `chalumeau threshold`: how hard to blow before a note speaks.
 
 use crate::cli::Failure;
-use crate::cli::args::{AirArg, InstrumentArg, NotesArg, within};
-use crate::cli::plot::PlotArgs;
-use crate::cli::table::TableArgs;
+use crate::cli::csv_table::TableArgs;
+use crate::cli::plot_args::PlotArgs;
+use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within};
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::bore::transfer_matrix::threshold_gamma;
 use chalumeau_core::instrument::Settings;
@@ -29,7 +29,7 @@ const STRENGTHS: [f32; 5] = [2.0, 2.5, 3.0, 3.5, 4.0];
 /// bore without losses. A note that no peak carries has nan.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Threshold {
+pub struct ThresholdCommand {
     #[command(flatten)]
     notes: NotesArg,
     /// Embouchure: flow strength of the reed, 0.05..0.9
@@ -45,7 +45,7 @@ pub struct Threshold {
     plot: PlotArgs,
 }
 
-impl Threshold {
+impl ThresholdCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let file = self.instrument.load()?;
         let notes = self.notes.notes(&file)?;

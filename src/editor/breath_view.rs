@@ -2,11 +2,11 @@
 
 use egui::{Align2, CornerRadius, FontId, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
+use crate::editor::breath_meter;
 use crate::editor::chart;
 use crate::editor::chart::Chart;
 use crate::editor::controls::{Hands, heading, momentary, slider};
-use crate::editor::meter;
-use crate::editor::snapshot::{Snapshot, Source};
+use crate::editor::snapshot::{BreathSource, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
 
@@ -31,7 +31,7 @@ impl BreathView {
     }
 
     /// Takes notice of what the sources say.
-    pub fn look(&mut self, sources: &[Source]) {
+    pub fn look(&mut self, sources: &[BreathSource]) {
         for source in sources.iter().filter(|source| source.is_seen) {
             let value = chart::share(source.value);
             match self.ranges.iter_mut().find(|(name, ..)| *name == source.name) {
@@ -47,7 +47,7 @@ impl BreathView {
         for source in &snapshot.sources {
             let range = self.ranges.iter().find(|(name, ..)| *name == source.name);
             meter_of(ui, source, range.map(|&(_, low, high)| (low, high)));
-            if source.name == Source::KNOB {
+            if source.name == BreathSource::KNOB {
                 has_knob = true;
                 calibrate(ui, hands);
             }
@@ -102,10 +102,10 @@ fn gauge(ui: &mut Ui, snapshot: &Snapshot) {
     let c = Colours::here(ui);
     let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
     let painter = ui.painter();
-    let full = meter::full_kpa(snapshot);
+    let full = breath_meter::full_kpa(snapshot);
     let kpa = snapshot.mouth_now_kpa();
     let all = snapshot.marks();
-    let (word, colour) = meter::state(&all, kpa, c);
+    let (word, colour) = breath_meter::state(&all, kpa, c);
     let number = painter.text(
         rect.left_top() - vec2(0.0, 6.0),
         Align2::LEFT_TOP,
@@ -132,7 +132,7 @@ fn gauge(ui: &mut Ui, snapshot: &Snapshot) {
     let speaks = all.speaks_kpa.unwrap_or(all.closes_kpa);
     let beats = all.beats_kpa.unwrap_or(all.closes_kpa).max(speaks);
     let end = all.chokes_kpa.unwrap_or(full).min(full);
-    for (from, to, colour) in meter::bands(speaks, beats, all.closes_kpa, end, c) {
+    for (from, to, colour) in breath_meter::bands(speaks, beats, all.closes_kpa, end, c) {
         let band = Rect::from_min_max(pos2(x(from), bar.top()), pos2(x(to), bar.bottom()));
         painter.rect_filled(band, CornerRadius::ZERO, colour);
     }
@@ -140,7 +140,7 @@ fn gauge(ui: &mut Ui, snapshot: &Snapshot) {
     painter.rect_filled(air.shrink2(vec2(0.0, 0.18 * bar.height())), round, c.breath.gamma_multiply(0.85));
     painter.vline(x(kpa), bar.y_range(), Stroke::new(2.0, c.ink));
     let mut end_of_last = f32::NEG_INFINITY;
-    for (at, name, colour) in meter::marks(snapshot, c).into_iter().filter(|mark| mark.0 <= full) {
+    for (at, name, colour) in breath_meter::marks(snapshot, c).into_iter().filter(|mark| mark.0 <= full) {
         painter.vline(x(at), bar.top() - 4.0..=bar.bottom(), Stroke::new(1.5, colour));
         let text = format!("{name} {at:.2}");
         let galley = painter.layout_no_wrap(text, theme::small(), colour);
@@ -165,7 +165,7 @@ fn gauge(ui: &mut Ui, snapshot: &Snapshot) {
         );
     }
     response.widget_info(|| WidgetInfo::labeled(Role::Meter, true, format!("Breath {kpa:.2} kPa, {word}")));
-    response.on_hover_text_at_pointer(meter::LEGEND);
+    response.on_hover_text_at_pointer(breath_meter::LEGEND);
 }
 
 fn history(ui: &mut Ui, snapshot: &Snapshot) {
@@ -177,8 +177,8 @@ fn history(ui: &mut Ui, snapshot: &Snapshot) {
         chart::empty(ui, rect, "Blow, and your breath is drawn here.");
         return;
     }
-    let full = f64::from(meter::full_kpa(snapshot));
-    let marks = meter::marks(snapshot, c);
+    let full = f64::from(breath_meter::full_kpa(snapshot));
+    let marks = breath_meter::marks(snapshot, c);
     Chart {
         id: "breath history",
         x: (-seconds, 0.0),
@@ -206,7 +206,7 @@ fn history(ui: &mut Ui, snapshot: &Snapshot) {
 }
 
 /// A source, with the range it has gone through.
-fn meter_of(ui: &mut Ui, source: &Source, range: Option<(f32, f32)>) {
+fn meter_of(ui: &mut Ui, source: &BreathSource, range: Option<(f32, f32)>) {
     let c = Colours::here(ui);
     let size = vec2(ui.available_width(), if source.is_seen { 28.0 } else { 18.0 });
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
@@ -267,7 +267,7 @@ mod tests {
     #[test]
     fn a_source_is_known_by_the_range_it_went_through() {
         let mut view = BreathView::default();
-        let say = |value, is_seen| [Source { name: "CC2".into(), value, is_live: false, is_seen }];
+        let say = |value, is_seen| [BreathSource { name: "CC2".into(), value, is_live: false, is_seen }];
         view.look(&say(0.0, false));
         assert_eq!(view.ranges, []);
         for value in [0.4, 0.1, 0.7, f32::NAN, 9.0] {

@@ -32,7 +32,7 @@ pub struct Chart<'a> {
 }
 
 /// A vertical line that means something.
-pub struct Mark<'a> {
+pub struct ChartMark<'a> {
     /// Where.
     pub at: f64,
     /// What, in a word or two.
@@ -129,7 +129,7 @@ pub fn curve(points: Vec<[f64; 2]>, colour: Color32, width: f32) -> Line<'static
 }
 
 /// Vertical dashed lines for `marks`.
-pub fn lines(plot: &mut PlotUi<'_>, marks: &[Mark<'_>]) {
+pub fn lines(plot: &mut PlotUi<'_>, marks: &[ChartMark<'_>]) {
     for (index, mark) in marks.iter().enumerate() {
         let line = VLine::new(mark.name, mark.at).color(mark.colour).width(1.0).id(("mark", index));
         plot.vline(line.style(LineStyle::dashed_loose()).allow_hover(false));
@@ -140,11 +140,11 @@ pub fn lines(plot: &mut PlotUi<'_>, marks: &[Mark<'_>]) {
 const LEFT_FROM: f32 = 0.67;
 
 /// The marks' names along the upper edge, each beside its line, lower where the one before is in the way.
-pub fn names(ui: &Ui, transform: &PlotTransform, marks: &[Mark<'_>]) {
+pub fn names(ui: &Ui, transform: &PlotTransform, marks: &[ChartMark<'_>]) {
     let frame = *transform.frame();
     let painter = ui.painter_at(frame);
     let ground = behind_words(ui);
-    let mut order: Vec<&Mark> = marks.iter().collect();
+    let mut order: Vec<&ChartMark> = marks.iter().collect();
     order.sort_by(|a, b| a.at.total_cmp(&b.at));
     let mut taken: Vec<Rect> = Vec::new();
     for mark in order {

@@ -14,7 +14,7 @@ use egui::{
 
 use crate::editor::Action;
 use crate::editor::chart;
-use crate::editor::clarinet_body::{Body, part_names, ruler, standing};
+use crate::editor::clarinet_drawing::{ClarinetDrawing, part_names, ruler, standing};
 use crate::editor::header::note_name;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
@@ -70,7 +70,7 @@ impl ClarinetView {
         let area = ui.available_rect_before_wrap();
         ui.allocate_rect(area, Sense::hover());
         let painter = ui.painter_at(area.expand(2.0));
-        let body = Body::new(file, area);
+        let body = ClarinetDrawing::new(file, area);
         let wave = wave_rect(area, &body);
         ruler(&painter, c, area, body.scale);
         painter.text(
@@ -206,7 +206,7 @@ impl ClarinetView {
 }
 
 /// Place of the wave above the body.
-fn wave_rect(area: Rect, body: &Body<'_>) -> Rect {
+fn wave_rect(area: Rect, body: &ClarinetDrawing<'_>) -> Rect {
     Rect::from_min_max(area.left_top() + vec2(0.0, 14.0), pos2(area.right(), body.top() - 14.0))
 }
 

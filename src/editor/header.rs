@@ -4,14 +4,14 @@ use egui::{
     Align, Align2, CornerRadius, FontId, Layout, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2,
 };
 
-use crate::editor::compare::Compare;
-use crate::editor::compare::Side;
+use crate::editor::ab_comparison::AbComparison;
+use crate::editor::ab_comparison::ComparisonSide;
 use crate::editor::controls::Hands;
 use crate::editor::controls::momentary;
-use crate::editor::snapshot::{Level, Snapshot};
+use crate::editor::snapshot::{Severity, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
-use crate::editor::{Kept, Tab};
+use crate::editor::{Tab, WindowState};
 
 /// Least and most zoom, and the steps offered.
 pub const ZOOMS: [f32; 8] = [0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0];
@@ -23,7 +23,13 @@ pub fn note_name(midi: u8) -> String {
 }
 
 /// The upper line.
-pub fn tools(ui: &mut Ui, kept: &mut Kept, compare: &mut Compare, hands: &mut Hands, snapshot: &Snapshot) {
+pub fn tools(
+    ui: &mut Ui,
+    kept: &mut WindowState,
+    compare: &mut AbComparison,
+    hands: &mut Hands,
+    snapshot: &Snapshot,
+) {
     let is_wide = ui.available_width() > 900.0;
     ui.horizontal_centered(|ui| {
         // The pitch would tell one setting from another.
@@ -167,7 +173,7 @@ pub fn needle(ui: &mut Ui, snapshot: &Snapshot, width: f32) {
 }
 
 fn undo(ui: &mut Ui, hands: &mut Hands) {
-    let name = |hands: &Hands, step: Option<&[crate::editor::history::Change]>| {
+    let name = |hands: &Hands, step: Option<&[crate::editor::undo::Change]>| {
         step.map(|step| step.iter().map(|change| hands.name(change.id)).collect::<Vec<_>>().join(", "))
     };
     let (undoable, redoable) = (name(hands, hands.history.undoable()), name(hands, hands.history.redoable()));
@@ -189,7 +195,7 @@ fn undo(ui: &mut Ui, hands: &mut Hands) {
     });
 }
 
-fn sides(ui: &mut Ui, compare: &mut Compare, hands: &mut Hands, is_wide: bool) {
+fn sides(ui: &mut Ui, compare: &mut AbComparison, hands: &mut Hands, is_wide: bool) {
     if compare.is_blind() {
         let c = Colours::here(ui);
         ui.label(egui::RichText::new("blind").color(c.beats));
@@ -201,16 +207,16 @@ fn sides(ui: &mut Ui, compare: &mut Compare, hands: &mut Hands, is_wide: bool) {
         compare.hide();
     }
     let (text, other) = match compare.side {
-        Side::A if is_wide => ("A to B", "B"),
-        Side::B if is_wide => ("B to A", "A"),
-        Side::A => (">", "B"),
-        Side::B => ("<", "A"),
+        ComparisonSide::A if is_wide => ("A to B", "B"),
+        ComparisonSide::B if is_wide => ("B to A", "A"),
+        ComparisonSide::A => (">", "B"),
+        ComparisonSide::B => ("<", "A"),
     };
     let copy = named(ui.button(text), &format!("Copy to {other}"));
     if copy.on_hover_text(format!("Makes {other} the same as what you hear now")).clicked() {
         compare.copy(hands.setting());
     }
-    for (side, name) in [(Side::B, "B"), (Side::A, "A")] {
+    for (side, name) in [(ComparisonSide::B, "B"), (ComparisonSide::A, "A")] {
         let is_here = compare.side == side;
         let button = egui::Button::selectable(is_here, format!(" {name} ")).frame_when_inactive(true);
         let response = ui.add(button);
@@ -224,7 +230,7 @@ fn sides(ui: &mut Ui, compare: &mut Compare, hands: &mut Hands, is_wide: bool) {
     }
 }
 
-fn zoom(ui: &mut Ui, kept: &mut Kept) {
+fn zoom(ui: &mut Ui, kept: &mut WindowState) {
     let text = format!("{:.0} %", 100.0 * kept.zoom);
     // High enough for all of them.
     let list = egui::ComboBox::from_id_salt("zoom").width(64.0).height(300.0).selected_text(&text);
@@ -242,7 +248,7 @@ fn zoom(ui: &mut Ui, kept: &mut Kept) {
 }
 
 /// The lower line.
-pub fn tabs(ui: &mut Ui, kept: &mut Kept, snapshot: &Snapshot) {
+pub fn tabs(ui: &mut Ui, kept: &mut WindowState, snapshot: &Snapshot) {
     let c = Colours::here(ui);
     let is_wide = ui.available_width() > 900.0;
     ui.horizontal_centered(|ui| {
@@ -283,14 +289,14 @@ pub fn tabs(ui: &mut Ui, kept: &mut Kept, snapshot: &Snapshot) {
 fn status(ui: &mut Ui, snapshot: &Snapshot) {
     let c = Colours::here(ui);
     let colour = |level| match level {
-        Level::Good => c.speaks,
-        Level::Note => c.breath,
-        Level::Warn => c.danger,
+        Severity::Good => c.speaks,
+        Severity::Note => c.breath,
+        Severity::Warn => c.danger,
     };
     let preparing = snapshot
         .preparing
         .as_ref()
-        .map(|(what, part)| (Level::Note, format!("{what} {:.0} %", 100.0 * part)));
+        .map(|(what, part)| (Severity::Note, format!("{what} {:.0} %", 100.0 * part)));
     let first =
         preparing.or_else(|| snapshot.status.first().map(|status| (status.level, status.text.clone())));
     let Some((level, text)) = first else { return };

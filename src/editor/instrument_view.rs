@@ -6,7 +6,7 @@ use egui::{Align2, CornerRadius, RichText, Role, Sense, Stroke, TextEdit, Ui, Wi
 
 use crate::editor::Action;
 use crate::editor::chart;
-use crate::editor::clarinet_body::{Body, ruler};
+use crate::editor::clarinet_drawing::{ClarinetDrawing, ruler};
 use crate::editor::controls::{Hands, choice, heading, slider, teach};
 use crate::editor::header::note_name;
 use crate::editor::snapshot::Snapshot;
@@ -127,7 +127,7 @@ fn portrait(ui: &Ui, snapshot: &Snapshot) {
     let c = Colours::here(ui);
     let area = ui.available_rect_before_wrap();
     let painter = ui.painter_at(area);
-    let body = Body::new(&snapshot.instrument, area);
+    let body = ClarinetDrawing::new(&snapshot.instrument, area);
     ruler(&painter, c, area, body.scale);
     body.paint(&painter, c, &[]);
     for (index, hole) in snapshot.instrument.holes.iter().enumerate() {

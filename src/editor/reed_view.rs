@@ -9,10 +9,10 @@
 use egui::{Align2, Pos2, Stroke, Ui, pos2, vec2};
 use egui_plot::{PlotPoint, PlotTransform, PlotUi, Points};
 
+use crate::editor::breath_meter;
 use crate::editor::chart;
-use crate::editor::chart::{Chart, Mark};
+use crate::editor::chart::{Chart, ChartMark};
 use crate::editor::controls::{Hands, choice, handle, heading, slider, switch, teach};
-use crate::editor::meter;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme::{Colours, GAP, panel};
 use chalumeau_core::haptics::law;
@@ -135,9 +135,9 @@ impl ReedView {
             even(1.3 * picture.peak()[1].max(0.6 * picture.flow_cm3s), 50.0),
         );
         let (right, top) = self.bounds.unwrap_or(wanted);
-        let marks: Vec<Mark> = meter::marks(snapshot, c)
+        let marks: Vec<ChartMark> = breath_meter::marks(snapshot, c)
             .into_iter()
-            .map(|(at, name, colour)| Mark { at: f64::from(at), name, colour })
+            .map(|(at, name, colour)| ChartMark { at: f64::from(at), name, colour })
             .filter(|mark| mark.at < right)
             .collect();
         let period = snapshot.scope.last_period(snapshot.heard.f0_hz.unwrap_or(0.0));
@@ -342,13 +342,13 @@ pub fn torque_picture(ui: &mut Ui, snapshot: &Snapshot) {
     let wall = f64::from(feel.wall_deg);
     let most = points.iter().filter(|[deg, _]| *deg < wall).map(|[_, mnm]| *mnm).fold(10.0, f64::max);
     let top = even(1.25 * most, 20.0);
-    let marks: Vec<Mark> = [
+    let marks: Vec<ChartMark> = [
         (at.a_on_deg, "speaks", c.speaks),
         (at.a_beat_deg, "beats", c.beats),
         (at.a_close_deg, "closes", c.closes),
     ]
     .into_iter()
-    .map(|(at, name, colour)| Mark { at, name, colour })
+    .map(|(at, name, colour)| ChartMark { at, name, colour })
     .filter(|mark| mark.at > 0.0 && mark.at < right)
     .collect();
     let knob = snapshot.knob.angle_deg.map(f64::from).filter(|deg| (0.0..right).contains(deg));

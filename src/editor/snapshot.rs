@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use crate::editor::listener::Heard;
+use crate::editor::sound_analysis::SoundAnalysis;
 use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
 use chalumeau_core::haptics::{NoteFeel, Requirement};
 use chalumeau_core::instrument::Settings;
@@ -36,13 +36,13 @@ pub struct Snapshot {
     /// What the parameters say.
     pub settings: Settings,
     /// Where breath can come from.
-    pub sources: Vec<Source>,
+    pub sources: Vec<BreathSource>,
     /// The last seconds of mouth pressure.
     pub history: Track,
     /// The inside of the mouthpiece, two periods of the lowest note or more.
     pub scope: Scope,
     /// The sound that comes out.
-    pub heard: Heard,
+    pub heard: SoundAnalysis,
     /// Standing wave of the fingering at the pitch of the note: place, m from the reed, and magnitude over that at the
     /// reed.
     pub standing: Vec<(f32, f32)>,
@@ -51,7 +51,7 @@ pub struct Snapshot {
     /// What the hand feels on this fingering, or why nothing.
     pub feel: Result<NoteFeel, String>,
     /// The knob.
-    pub knob: Knob,
+    pub knob: KnobState,
     /// Delay of the plugin, ms.
     pub latency_ms: f32,
 }
@@ -74,11 +74,11 @@ impl Default for Snapshot {
             sources: Vec::new(),
             history: Track::default(),
             scope: Scope::default(),
-            heard: Heard::default(),
+            heard: SoundAnalysis::default(),
             standing: Vec::new(),
             status: Vec::new(),
             feel: Err("no knob feel yet".into()),
-            knob: Knob::default(),
+            knob: KnobState::default(),
             latency_ms: 0.0,
         }
     }
@@ -108,10 +108,10 @@ impl Snapshot {
     }
 
     /// The pressures that matter for this note.
-    pub fn marks(&self) -> Marks {
+    pub fn marks(&self) -> PressureMarks {
         let closing_kpa = self.closing_kpa();
         let of = |gamma: f64| gamma as f32 * closing_kpa;
-        Marks {
+        PressureMarks {
             speaks_kpa: self.requirement.map(|r| of(r.gamma_sounding)),
             beats_kpa: self.requirement.map(|r| of(r.gamma_beat)),
             closes_kpa: closing_kpa,
@@ -122,7 +122,7 @@ impl Snapshot {
 
 /// Mouth pressures of the current note, kPa.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Marks {
+pub struct PressureMarks {
     /// The note begins to sound.
     pub speaks_kpa: Option<f32>,
     /// The reed begins to touch the lay.
@@ -135,7 +135,7 @@ pub struct Marks {
 
 /// One way breath comes in.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Source {
+pub struct BreathSource {
     /// As players call it: "CC2 breath", "Knob".
     pub name: String,
     /// What it says now, 0..=1.
@@ -146,7 +146,7 @@ pub struct Source {
     pub is_seen: bool,
 }
 
-impl Source {
+impl BreathSource {
     /// Name of the one that can be calibrated.
     pub const KNOB: &'static str = "Knob";
 }
@@ -207,14 +207,14 @@ impl Scope {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Status {
     /// How much it matters.
-    pub level: Level,
+    pub level: Severity,
     /// The line.
     pub text: String,
 }
 
 /// How much something matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Level {
+pub enum Severity {
     /// All is well.
     Good,
     /// Worth knowing.
@@ -225,9 +225,9 @@ pub enum Level {
 
 /// The knob and the line to it.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Knob {
+pub struct KnobState {
     /// What there is to choose from.
-    pub devices: Vec<Device>,
+    pub devices: Vec<KnobDevice>,
     /// Where the link stands, in a line.
     pub text: String,
     /// It answers and can be armed.
@@ -258,7 +258,7 @@ pub struct Knob {
 
 /// One device in the list.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Device {
+pub struct KnobDevice {
     /// What to give back in [`Action::ChooseDevice`](crate::editor::Action::ChooseDevice).
     pub key: String,
     /// Name and serial number.

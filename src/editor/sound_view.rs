@@ -10,8 +10,8 @@ use crate::editor::chart;
 use crate::editor::chart::Chart;
 use crate::editor::controls::{Hands, choice, heading, slider};
 use crate::editor::header;
-use crate::editor::listener::FLOOR_DB;
 use crate::editor::snapshot::Snapshot;
+use crate::editor::sound_analysis::FLOOR_DB;
 use crate::editor::theme::{Colours, GAP, panel};
 
 /// Highest harmonic marked.
@@ -97,7 +97,7 @@ fn spectrum(ui: &mut Ui, snapshot: &Snapshot) {
         );
         let Some(f0_hz) = f0_hz else { return };
         for is_odd in [true, false] {
-            let colour = if is_odd { c.breath } else { c.even };
+            let colour = if is_odd { c.odd_harmonic } else { c.even_harmonic };
             let harmonics = (1..=HARMONICS).filter(|k| (k % 2 == 1) == is_odd).map(|k| k as f64 * f0_hz);
             let points: Vec<[f64; 2]> =
                 harmonics.filter(|hz| *hz < right).map(|hz| [1e-3 * hz, level(hz)]).collect();
@@ -105,7 +105,12 @@ fn spectrum(ui: &mut Ui, snapshot: &Snapshot) {
             plot.points(points.color(colour).allow_hover(false));
         }
     });
-    chart::legend(ui, &transform, 0.02, &[("odd harmonics", c.breath), ("even harmonics", c.even)]);
+    chart::legend(
+        ui,
+        &transform,
+        0.02,
+        &[("odd harmonics", c.odd_harmonic), ("even harmonics", c.even_harmonic)],
+    );
 }
 
 fn waves(ui: &mut Ui, snapshot: &Snapshot) {

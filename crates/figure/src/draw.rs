@@ -3,16 +3,20 @@
 //! The backends of plotters draw the shapes. This module places axes, words and legends, so that nothing covers data and
 //! a figure looks the same in every format.
 
+mod axes;
 mod canvas;
 mod font;
-mod frame;
 mod layer;
 mod layout;
+mod legend;
+mod plot_area;
+mod range;
+mod sizes;
 mod ticks;
 
 use crate::Figure;
 use crate::palette::{PAPER, Rgb};
-use canvas::{Canvas, Vector};
+use canvas::{Canvas, SvgParts};
 use plotters_bitmap::BitMapBackend;
 use plotters_svg::SVGBackend;
 use std::fmt;
@@ -192,7 +196,7 @@ pub fn svg(figure: &Figure, size: Option<Size>) -> Result<String, DrawError> {
     let vector = {
         let (width, height) = (size.width * TENTH, size.height * TENTH);
         let backend = SVGBackend::with_string(&mut drawn, (width, height));
-        let mut canvas = Canvas::new(backend, f64::from(TENTH), Some(Vector::default()));
+        let mut canvas = Canvas::new(backend, f64::from(TENTH), Some(SvgParts::default()));
         layout::draw(&mut canvas, figure, size)?;
         canvas.finish()?.unwrap_or_default()
     };

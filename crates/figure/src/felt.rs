@@ -73,7 +73,7 @@ pub fn torques(law: &str, note: &str, ceiling_mnm: f64, all: &[AtContrast]) -> F
 }
 
 /// Thresholds under one law.
-pub struct Felt {
+pub struct FeltThresholds {
     /// Name of the law.
     pub law: String,
     /// Mouth pressure at the mark of the torque (its top, or the middle of its step): written note (MIDI), kPa.
@@ -83,7 +83,7 @@ pub struct Felt {
 }
 
 /// Where each note is felt to start, beside where it starts to sound.
-pub fn thresholds(note: &str, sounds_kpa: &[(u8, f64)], laws: &[Felt]) -> Figure {
+pub fn thresholds(note: &str, sounds_kpa: &[(u8, f64)], laws: &[FeltThresholds]) -> Figure {
     let notes = || sounds_kpa.iter().map(|&(written, _)| written);
     let along = |values: &[(u8, f64)]| -> Vec<(f64, f64)> {
         values.iter().map(|&(written, value)| (f64::from(written), value)).collect()

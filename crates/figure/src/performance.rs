@@ -28,7 +28,7 @@ pub struct Note {
 
 /// The inside of the instrument at one moment.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Moment {
+pub struct ReedCloseUp {
     /// When it begins, s.
     pub from_s: f64,
     /// From one probe to the next, s.
@@ -38,7 +38,7 @@ pub struct Moment {
 }
 
 /// Everything the picture shows.
-pub struct Performance<'a> {
+pub struct PerformanceFigure<'a> {
     /// What is played.
     pub title: &'a str,
     /// Lines under the title.
@@ -54,11 +54,11 @@ pub struct Performance<'a> {
     /// Pressure that closes the reed, Pa.
     pub closing_pa: f64,
     /// A moment from near, if there is one.
-    pub moment: Option<&'a Moment>,
+    pub moment: Option<&'a ReedCloseUp>,
 }
 
 /// All panels below each other.
-pub fn performance(of: &Performance<'_>) -> Figure {
+pub fn performance(of: &PerformanceFigure<'_>) -> Figure {
     let mut figure = Figure::new(of.title);
     for note in &of.notes {
         figure = figure.note(note);
@@ -160,7 +160,7 @@ pub fn pitch(overview: &Overview, score: &[Note], a4_hz: f64) -> Panel {
     panel.with(Line::new("", line).colour(Colour::Vermilion).width(2.0))
 }
 
-fn breath(of: &Performance<'_>) -> Panel {
+fn breath(of: &PerformanceFigure<'_>) -> Panel {
     let top = of.gamma.range().map_or(1.0, |[_, high]| f64::from(high)).max(1.0);
     let axis = Axis::linear("gamma").range(0.0, 1.08 * top);
     let title =
@@ -172,7 +172,7 @@ fn breath(of: &Performance<'_>) -> Panel {
 }
 
 /// The reed and the pressure that moves it.
-fn reed(moment: &Moment, closing_pa: f64) -> Panel {
+fn reed(moment: &ReedCloseUp, closing_pa: f64) -> Panel {
     let at = |index: usize| 1e3 * moment.step_s * index as f64;
     let series = |value: &dyn Fn(&Probe) -> f64| -> Vec<(f64, f64)> {
         moment.probes.iter().enumerate().map(|(index, probe)| (at(index), value(probe))).collect()

@@ -1,12 +1,12 @@
 //! Looks at a rendering while it is made, for pictures and reports: memory does not grow with its length.
 
 use crate::cli::Failure;
-use crate::cli::play::Prepared;
+use crate::cli::score_args::RenderJob;
 use chalumeau_core::analysis::overview::{Envelope, Overview, Watcher};
 use chalumeau_core::instrument::Probe;
 use chalumeau_core::score::heard::{Heard, Listener, Sounding};
 use chalumeau_figure::Figure;
-use chalumeau_figure::performance::{Moment, Note, Performance, performance};
+use chalumeau_figure::performance::{Note, PerformanceFigure, ReedCloseUp, performance};
 
 /// Columns of a picture: as many as a drawing of usual size has pixels for.
 pub const COLUMNS: usize = 1_300;
@@ -18,11 +18,11 @@ const MOMENT_S: (f64, f64) = (0.004, 0.05);
 const PERIOD_S: f64 = 0.004;
 
 /// What looks.
-pub struct Watch {
+pub struct RenderMonitor {
     watcher: Watcher,
     listener: Listener,
     gamma: Envelope,
-    moment: Moment,
+    moment: ReedCloseUp,
     /// Internal samples of the close look.
     near: (u64, u64),
     seen: u64,
@@ -33,10 +33,10 @@ pub struct Watch {
 }
 
 /// What was seen.
-pub struct Watched {
+pub struct RenderSummary {
     overview: Overview,
     gamma: Envelope,
-    moment: Moment,
+    moment: ReedCloseUp,
     score: Vec<Note>,
     /// Each note's pitch and level.
     pub heard: Vec<Heard>,
@@ -44,9 +44,9 @@ pub struct Watched {
     closing_pa: f64,
 }
 
-impl Watch {
+impl RenderMonitor {
     /// For a rendering about to begin. The close look is at `near_s`, or in the middle of the longest note.
-    pub fn new(prepared: &Prepared, near_s: Option<f64>) -> Result<Self, Failure> {
+    pub fn new(prepared: &RenderJob, near_s: Option<f64>) -> Result<Self, Failure> {
         let (score, rate_hz) = (&prepared.score, f64::from(prepared.rate));
         let (seconds, soundings) = (score.seconds(prepared.rate), score.soundings());
         if let Some(near_s) = near_s.filter(|&near_s| near_s >= seconds) {
@@ -74,7 +74,7 @@ impl Watch {
             watcher: Watcher::new(score.samples, rate_hz, COLUMNS),
             listener: Listener::new(soundings.clone(), rate_hz, a4_hz),
             gamma: Envelope::new(internal, COLUMNS),
-            moment: Moment {
+            moment: ReedCloseUp {
                 from_s: near.0 as f64 / internal_hz,
                 step_s: 1.0 / internal_hz,
                 probes: Vec::new(),
@@ -104,13 +104,13 @@ impl Watch {
     }
 
     /// The whole.
-    pub fn finish(self) -> Watched {
+    pub fn finish(self) -> RenderSummary {
         let note = |sounding: &Sounding| Note {
             note: sounding.note,
             from_s: sounding.from as f64 / self.rate_hz,
             to_s: sounding.to as f64 / self.rate_hz,
         };
-        Watched {
+        RenderSummary {
             overview: self.watcher.finish(),
             gamma: self.gamma,
             moment: self.moment,
@@ -122,10 +122,10 @@ impl Watch {
     }
 }
 
-impl Watched {
+impl RenderSummary {
     /// All of it in one picture.
     pub fn figure(&self, title: &str, notes: Vec<String>) -> Figure {
-        performance(&Performance {
+        performance(&PerformanceFigure {
             title,
             notes,
             overview: &self.overview,

@@ -2,7 +2,7 @@
 
 use egui::{Align2, Color32, CornerRadius, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
-use crate::editor::snapshot::{Marks, Snapshot};
+use crate::editor::snapshot::{PressureMarks, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
@@ -16,7 +16,7 @@ pub fn full_kpa(snapshot: &Snapshot) -> f32 {
 }
 
 /// What the reed does at a pressure, in a word, and its colour.
-pub fn state(marks: &Marks, kpa: f32, c: &Colours) -> (&'static str, Color32) {
+pub fn state(marks: &PressureMarks, kpa: f32, c: &Colours) -> (&'static str, Color32) {
     let above = |mark: Option<f32>| mark.is_some_and(|mark| kpa >= mark);
     if kpa < 0.02 {
         ("at rest", c.quiet)

@@ -25,7 +25,7 @@ pub(super) fn ruler(painter: &Painter, c: &Colours, area: Rect, scale: f32) {
 }
 
 /// Names of the parts, where there is room for them.
-pub(super) fn part_names(painter: &Painter, c: &Colours, body: &Body<'_>, y: f32) {
+pub(super) fn part_names(painter: &Painter, c: &Colours, body: &ClarinetDrawing<'_>, y: f32) {
     let mut segments = body.file.bore.iter().peekable();
     while let Some(first) = segments.next() {
         let mut end_m = first.x_end_m;
@@ -41,7 +41,13 @@ pub(super) fn part_names(painter: &Painter, c: &Colours, body: &Body<'_>, y: f32
 }
 
 /// The sound pressure, aligned with the bore.
-pub(super) fn standing(painter: &Painter, c: &Colours, body: &Body<'_>, rect: Rect, wave: &[(f32, f32)]) {
+pub(super) fn standing(
+    painter: &Painter,
+    c: &Colours,
+    body: &ClarinetDrawing<'_>,
+    rect: Rect,
+    wave: &[(f32, f32)],
+) {
     if rect.height() < 16.0 {
         return;
     }
@@ -82,7 +88,7 @@ fn loudest(wave: &[(f32, f32)]) -> f32 {
 }
 
 /// The body on the screen: one scale both ways.
-pub(super) struct Body<'a> {
+pub(super) struct ClarinetDrawing<'a> {
     pub(super) file: &'a InstrumentFile,
     left: f32,
     axis: f32,
@@ -95,7 +101,7 @@ pub(super) struct Body<'a> {
 }
 
 /// A hole on the screen.
-pub(super) struct Place {
+pub(super) struct HolePlace {
     pub(super) rect: Rect,
     /// Where a line from the button ends.
     pub(super) foot: Pos2,
@@ -103,7 +109,7 @@ pub(super) struct Place {
     out: f32,
 }
 
-impl<'a> Body<'a> {
+impl<'a> ClarinetDrawing<'a> {
     pub(super) fn new(file: &'a InstrumentFile, area: Rect) -> Self {
         let length_m = file.length_m();
         let mut depths: Vec<f64> = file.holes.iter().map(|hole| hole.chimney_m).collect();
@@ -199,7 +205,7 @@ impl<'a> Body<'a> {
         }
     }
 
-    pub(super) fn hole(&self, hole: &ToneHole) -> Place {
+    pub(super) fn hole(&self, hole: &ToneHole) -> HolePlace {
         let out = if hole.kind == HoleKind::KeyClosed { 1.0 } else { -1.0 };
         let x = self.x(hole.x_m);
         let half = (self.scale * hole.radius_m as f32).max(1.5);
@@ -211,7 +217,7 @@ impl<'a> Body<'a> {
             pos2(x + half, self.axis + out * outside),
         );
         let foot = pos2(x, self.axis + outside + 7.0);
-        Place { rect, foot, out }
+        HolePlace { rect, foot, out }
     }
 
     pub(super) fn paint_hole(
@@ -222,7 +228,7 @@ impl<'a> Body<'a> {
         opening: f32,
         is_hot: bool,
     ) {
-        let Place { rect, out, .. } = self.hole(hole);
+        let HolePlace { rect, out, .. } = self.hole(hole);
         // The chimney stands in wood, out of the body where it is deeper than the wall.
         let chimney = rect.expand2(vec2(2.5, 0.0));
         painter.rect_filled(chimney, CornerRadius::same(1), c.wood);

@@ -1,9 +1,9 @@
 //! What is to be played, as arguments several commands share: a MIDI file, a note or a scale, and the breath under it.
 
 use crate::cli::Failure;
-use crate::cli::args::{PlayedArgs, check_fingering, note, within};
-use crate::cli::feel::FeelArgs;
+use crate::cli::feel_args::FeelArgs;
 use crate::cli::settings::SettingsArgs;
+use crate::cli::shared_args::{PlayedArgs, check_fingering, note, within};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::control::midi::MidiDecoder;
@@ -31,7 +31,7 @@ const GAMMA_DEFAULT: f32 = 0.5;
 #[command(group = ArgGroup::new("what").required(true).args(["midi", "written", "sounding", "scale"]))]
 #[command(group = ArgGroup::new("note").args(["written", "sounding", "scale"]))]
 #[command(group = ArgGroup::new("blown").args(["gamma", "breath", "crescendo", "replay"]))]
-pub struct PlayArgs {
+pub struct ScoreArgs {
     /// Standard MIDI file, format 0 or 1
     #[arg(value_name = "MIDI")]
     midi: Option<PathBuf>,
@@ -89,7 +89,7 @@ fn interval(text: &str) -> Result<(u8, u8), String> {
 }
 
 /// Everything a rendering needs.
-pub struct Prepared {
+pub struct RenderJob {
     /// The instrument at this rate.
     pub model: Arc<Model>,
     /// What the player has set.
@@ -100,7 +100,7 @@ pub struct Prepared {
     pub rate: u32,
 }
 
-impl Prepared {
+impl RenderJob {
     /// The instrument as a host has it before it plays: the settings are in place from the first sample.
     pub fn clarinet(&self) -> Clarinet {
         let mut clarinet = Clarinet::new(self.model.clone(), f64::from(self.rate));
@@ -110,9 +110,9 @@ impl Prepared {
     }
 }
 
-impl PlayArgs {
+impl ScoreArgs {
     /// Reads, checks and fits whatever was named. Takes seconds for an instrument file.
-    pub fn prepare(&self) -> Result<Prepared, Failure> {
+    pub fn prepare(&self) -> Result<RenderJob, Failure> {
         let file = self.instrument.load()?;
         let curve = self.curve()?;
         let settings = self.settings.blown_by(curve.as_ref(), &file)?;
@@ -127,7 +127,7 @@ impl PlayArgs {
         // A single note lasts as long as was asked; a melody gets time to fade.
         let one_note = self.written.is_some() || self.sounding.is_some();
         let score = score.with_tail(self.tail.unwrap_or(if one_note { 0.0 } else { 1.0 }), self.rate);
-        Ok(Prepared { model, settings, score, rate: self.rate })
+        Ok(RenderJob { model, settings, score, rate: self.rate })
     }
 
     /// How a knob shall feel.

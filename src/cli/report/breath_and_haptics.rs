@@ -1,7 +1,7 @@
 //! The report's chapters on breath and on what a knob feels: for the instrument and the reed that were played.
 
-use crate::cli::play::Prepared;
 use crate::cli::report::{number, word};
+use crate::cli::score_args::RenderJob;
 use chalumeau_core::haptics::law::torque_mnm;
 use chalumeau_core::haptics::{FeelDesign, FeelRefused, FeelTable, NoteFeel, Requirement, TorqueLimits};
 use chalumeau_core::instrument::Settings;
@@ -11,9 +11,9 @@ use chalumeau_core::score::bifurcation;
 use chalumeau_core::score::bifurcation::SOUNDS;
 use chalumeau_core::score::breath::GAMMA_MAX;
 use chalumeau_core::units::WrittenNote;
-use chalumeau_figure::breath::{Changes, Swell, Turn, pressures, turns};
-use chalumeau_figure::felt::{AtContrast, Felt, Torque, thresholds, torques};
-use chalumeau_figure::report::{Cell, Chapter, Plate, Table};
+use chalumeau_figure::breath::{NotePressures, Swell, Turn, pressures, turns};
+use chalumeau_figure::felt::{AtContrast, FeltThresholds, Torque, thresholds, torques};
+use chalumeau_figure::report::{Chapter, Plate, ReportTable, TableCell};
 use chalumeau_knob::touch::feel::Feels;
 use chalumeau_knob::wire::message::Law;
 
@@ -41,8 +41,8 @@ fn law_name(law: Law) -> &'static str {
 }
 
 /// What the instrument asks, and what is made of it.
-pub struct Touch<'a> {
-    prepared: &'a Prepared,
+pub struct BreathAndHaptics<'a> {
+    prepared: &'a RenderJob,
     feels: Feels,
     asked: Vec<Option<Requirement>>,
     /// As the command says.
@@ -52,9 +52,9 @@ pub struct Touch<'a> {
     near: Option<usize>,
 }
 
-impl<'a> Touch<'a> {
+impl<'a> BreathAndHaptics<'a> {
     /// Asks the instrument: a second. `near` is the written note to swell.
-    pub fn new(prepared: &'a Prepared, design: FeelDesign, near: Option<WrittenNote>) -> Self {
+    pub fn new(prepared: &'a RenderJob, design: FeelDesign, near: Option<WrittenNote>) -> Self {
         let feels = Feels::new(&prepared.model);
         let asked = feels.requirements().with(&played_reed(&prepared.model.file, &prepared.settings));
         let near = near.and_then(|near| feels.requirements().written().position(|written| written == near));
@@ -83,11 +83,11 @@ impl<'a> Touch<'a> {
         )
     }
 
-    fn changes(&self, (written, asked): (WrittenNote, Option<Requirement>)) -> Changes {
+    fn changes(&self, (written, asked): (WrittenNote, Option<Requirement>)) -> NotePressures {
         let of = |gamma: fn(&Requirement) -> f64| {
             asked.as_ref().map_or(f64::NAN, |asked| self.closing_kpa() * gamma(asked))
         };
-        Changes {
+        NotePressures {
             written: written.0,
             speaks_kpa: of(|asked| asked.gamma_sounding),
             beats_kpa: of(|asked| asked.gamma_beat),
@@ -98,7 +98,7 @@ impl<'a> Touch<'a> {
     /// How hard notes are blown, one of them swelled, and the knob's angle as breath.
     pub fn breath(&self) -> Chapter {
         let closing_kpa = self.closing_kpa();
-        let changes: Vec<Changes> = self.notes().map(|note| self.changes(note)).collect();
+        let changes: Vec<NotePressures> = self.notes().map(|note| self.changes(note)).collect();
         let instrument = &self.prepared.model.file.name;
         let mut words = vec![format!(
             "A note speaks from a mouth pressure on, beats from where the reed touches its lay in each cycle, and chokes \
@@ -127,7 +127,7 @@ impl<'a> Touch<'a> {
     }
 
     /// One note played from silence to closure and back.
-    fn swell(&self, near: usize, changes: Changes) -> Option<(Plate, String)> {
+    fn swell(&self, near: usize, changes: NotePressures) -> Option<(Plate, String)> {
         let (written, asked) = self.notes().nth(near)?;
         let closing_kpa = self.closing_kpa();
         let file = &self.prepared.model.file;
@@ -229,7 +229,7 @@ impl<'a> Touch<'a> {
         }
     }
 
-    fn pressures(&self) -> Table {
+    fn pressures(&self) -> ReportTable {
         let head = [
             "written",
             "sounds",
@@ -264,7 +264,7 @@ impl<'a> Touch<'a> {
             row.extend([kpa(asked.gamma_beat), kpa(asked.gamma_off)]);
             row
         };
-        Table {
+        ReportTable {
             title: "Mouth pressures".to_owned(),
             about: String::new(),
             head: head.map(str::to_owned).to_vec(),
@@ -305,7 +305,7 @@ impl<'a> Touch<'a> {
                 panels.push(AtContrast { contrast, notes: notes.map_err(|reason| reason.to_string()) });
             }
             plates.push(self.torques(law, &panels));
-            felt.push(Felt { law: law_name(law).to_owned(), at_kpa, on_deg });
+            felt.push(FeltThresholds { law: law_name(law).to_owned(), at_kpa, on_deg });
         }
         plates.push(self.thresholds(&felt));
         let mut tables = vec![refused(refusals)];
@@ -339,7 +339,7 @@ impl<'a> Touch<'a> {
         }
     }
 
-    fn thresholds(&self, felt: &[Felt]) -> Plate {
+    fn thresholds(&self, felt: &[FeltThresholds]) -> Plate {
         let closing_kpa = self.closing_kpa();
         let sounds: Vec<(u8, f64)> = self
             .notes()
@@ -367,7 +367,7 @@ impl<'a> Touch<'a> {
         }
     }
 
-    fn feel(&self, table: &FeelTable) -> Table {
+    fn feel(&self, table: &FeelTable) -> ReportTable {
         let head = [
             "written",
             "A_on, degrees",
@@ -386,7 +386,7 @@ impl<'a> Touch<'a> {
             row.push(number(format!("{:.1}", note.feel.scale_mnm)));
             row
         };
-        Table {
+        ReportTable {
             title: "What the knob is told".to_owned(),
             about: format!(
                 "FEEL of every note, {} law, Contrast {} about {}: where it is felt to start, beats, closes and chokes.",
@@ -400,7 +400,7 @@ impl<'a> Touch<'a> {
     }
 
     /// Whether a feel is taken, up to which torque, and what stands in the way of more.
-    fn refusal(&self, design: &FeelDesign, reason: Option<&FeelRefused>) -> Vec<Cell> {
+    fn refusal(&self, design: &FeelDesign, reason: Option<&FeelRefused>) -> Vec<TableCell> {
         let taken = reason.map_or("accepted".to_owned(), |reason| format!("refused: {reason}"));
         let (mut low, mut high) = (0.0, 450.0);
         let mut bound = None;
@@ -429,9 +429,9 @@ impl<'a> Touch<'a> {
     }
 }
 
-fn refused(rows: Vec<Vec<Cell>>) -> Table {
+fn refused(rows: Vec<Vec<TableCell>>) -> ReportTable {
     let head = ["law", "Contrast", "at the torque asked for", "accepted up to, mNm", "then in the way"];
-    Table {
+    ReportTable {
         title: "What a knob would refuse".to_owned(),
         about: "A feel that a knob could not hold still, or that passes the ceiling, is refused whole; nothing is clipped."
             .to_owned(),
@@ -445,9 +445,9 @@ fn names(few: &[&NoteFeel]) -> String {
 }
 
 /// From the easiest to the hardest note, in words.
-fn range(changes: &[Changes]) -> String {
+fn range(changes: &[NotePressures]) -> String {
     let speaks = || changes.iter().filter(|note| note.speaks_kpa.is_finite());
-    let by = |a: &&Changes, b: &&Changes| a.speaks_kpa.total_cmp(&b.speaks_kpa);
+    let by = |a: &&NotePressures, b: &&NotePressures| a.speaks_kpa.total_cmp(&b.speaks_kpa);
     match (speaks().min_by(by), speaks().max_by(by)) {
         (Some(easy), Some(hard)) => format!(
             "The easiest is {} at {:.2} kPa, the hardest {} at {:.2} kPa.",

@@ -12,7 +12,7 @@ pub type Values = Vec<(&'static str, f32)>;
 
 /// Which side.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Side {
+pub enum ComparisonSide {
     /// The first.
     #[default]
     A,
@@ -20,7 +20,7 @@ pub enum Side {
     B,
 }
 
-impl Side {
+impl ComparisonSide {
     /// The other one.
     pub fn other(self) -> Self {
         match self {
@@ -32,9 +32,9 @@ impl Side {
 
 /// Both sides.
 #[derive(Clone, Debug, Default)]
-pub struct Compare {
+pub struct AbComparison {
     /// The side in force.
-    pub side: Side,
+    pub side: ComparisonSide,
     /// The values of the side that is not in force; `None` until it was first gone to.
     resting: Option<Values>,
     blind: Option<Blind>,
@@ -47,10 +47,10 @@ struct Blind {
     is_revealed: bool,
 }
 
-impl Compare {
+impl AbComparison {
     /// Goes to `side`: what to set, with `now` kept for coming back. Nothing for the side in force. A side never gone to
     /// begins as a copy.
-    pub fn go(&mut self, side: Side, now: Values) -> Values {
+    pub fn go(&mut self, side: ComparisonSide, now: Values) -> Values {
         if side == self.side {
             return Vec::new();
         }
@@ -103,9 +103,9 @@ impl Compare {
     }
 
     /// The side behind X (`first`) or Y.
-    pub fn behind(&self, first: bool) -> Side {
+    pub fn behind(&self, first: bool) -> ComparisonSide {
         let is_crossed = self.blind.is_some_and(|blind| blind.is_crossed);
-        if first == is_crossed { Side::B } else { Side::A }
+        if first == is_crossed { ComparisonSide::B } else { ComparisonSide::A }
     }
 }
 
@@ -115,28 +115,28 @@ mod tests {
 
     #[test]
     fn each_side_keeps_what_was_set_on_it() {
-        let mut compare = Compare::default();
-        assert_eq!(compare.go(Side::A, vec![("lip", 0.1)]), []);
-        assert_eq!(compare.go(Side::B, vec![("lip", 0.1)]), [("lip", 0.1)], "B begins as A");
-        assert_eq!(compare.go(Side::A, vec![("lip", 0.9)]), [("lip", 0.1)]);
-        assert_eq!(compare.go(Side::B, vec![("lip", 0.2)]), [("lip", 0.9)]);
+        let mut compare = AbComparison::default();
+        assert_eq!(compare.go(ComparisonSide::A, vec![("lip", 0.1)]), []);
+        assert_eq!(compare.go(ComparisonSide::B, vec![("lip", 0.1)]), [("lip", 0.1)], "B begins as A");
+        assert_eq!(compare.go(ComparisonSide::A, vec![("lip", 0.9)]), [("lip", 0.1)]);
+        assert_eq!(compare.go(ComparisonSide::B, vec![("lip", 0.2)]), [("lip", 0.9)]);
         compare.copy(vec![("lip", 0.5)]);
-        assert_eq!(compare.go(Side::A, vec![("lip", 0.5)]), [("lip", 0.5)]);
+        assert_eq!(compare.go(ComparisonSide::A, vec![("lip", 0.5)]), [("lip", 0.5)]);
     }
 
     #[test]
     fn blind_names_cover_both_sides_and_the_lot_falls_both_ways() {
-        let mut compare = Compare::default();
+        let mut compare = AbComparison::default();
         for is_crossed in [false, true] {
             compare.hide_as(is_crossed);
             assert_ne!(compare.behind(true), compare.behind(false));
-            assert_eq!(compare.behind(true) == Side::B, is_crossed);
+            assert_eq!(compare.behind(true) == ComparisonSide::B, is_crossed);
             assert!(!compare.is_revealed());
         }
         let mut seen = [false; 2];
         for _ in 0..200 {
             compare.hide();
-            seen[usize::from(compare.behind(true) == Side::B)] = true;
+            seen[usize::from(compare.behind(true) == ComparisonSide::B)] = true;
         }
         assert_eq!(seen, [true, true]);
     }

@@ -1,7 +1,7 @@
 //! How a knob shall feel, as arguments.
 
 use crate::cli::Failure;
-use crate::cli::args::{check_fingering, note, within};
+use crate::cli::shared_args::{check_fingering, note, within};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::{FeelDesign, Order};
 use chalumeau_core::units::WrittenNote;

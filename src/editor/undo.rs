@@ -19,7 +19,7 @@ pub struct Change {
 
 /// What was done, and what was undone.
 #[derive(Clone, Debug, Default)]
-pub struct History {
+pub struct UndoHistory {
     done: Vec<Vec<Change>>,
     undone: Vec<Vec<Change>>,
     /// Gestures that have begun, with the value they found.
@@ -28,7 +28,7 @@ pub struct History {
     parts: Vec<Change>,
 }
 
-impl History {
+impl UndoHistory {
     /// A gesture on `id` begins.
     pub fn begin(&mut self, id: &'static str, value: f32) {
         if !self.open.iter().any(|(open, _)| *open == id) {
@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn a_gesture_is_one_step_however_far_it_went() {
-        let mut history = History::default();
+        let mut history = UndoHistory::default();
         history.begin("zeta", 0.1);
         history.begin("zeta", 0.2);
         history.end("zeta", 0.7);
@@ -109,7 +109,7 @@ mod tests {
 
     #[test]
     fn parameters_moved_together_come_back_together() {
-        let mut history = History::default();
+        let mut history = UndoHistory::default();
         history.begin("reedh", 0.1);
         history.begin("reedk", 0.2);
         history.end("reedh", 0.3);
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn a_new_step_forgets_what_was_undone_and_nothing_is_no_step() {
-        let mut history = History::default();
+        let mut history = UndoHistory::default();
         for after in [0.2, 0.3] {
             history.begin("lip", 0.1);
             history.end("lip", after);
@@ -136,7 +136,7 @@ mod tests {
 
     #[test]
     fn long_work_does_not_grow_without_end() {
-        let mut history = History::default();
+        let mut history = UndoHistory::default();
         for n in 0..1000 {
             history.begin("lip", n as f32);
             history.end("lip", n as f32 + 1.0);

@@ -31,8 +31,8 @@ impl TableArgs {
         self.force
     }
 
-    pub fn open(&self, header: &str) -> Result<Table, Failure> {
-        Table::open(&self.csv, self.force, header)
+    pub fn open(&self, header: &str) -> Result<CsvTable, Failure> {
+        CsvTable::open(&self.csv, self.force, header)
     }
 }
 
@@ -41,12 +41,12 @@ enum Sink {
     File(NewFile),
 }
 
-/// A table being written; a file appears with [`finish`](Table::finish).
-pub struct Table {
+/// A table being written; a file appears with [`finish`](CsvTable::finish).
+pub struct CsvTable {
     sink: Sink,
 }
 
-impl Table {
+impl CsvTable {
     /// Opens `path` (`-`: standard output) and writes the column names.
     pub fn open(path: &Path, force: bool, header: &str) -> Result<Self, Failure> {
         let sink = if path == Path::new("-") {

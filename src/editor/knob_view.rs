@@ -10,7 +10,7 @@ use crate::editor::chart::Chart;
 use crate::editor::controls::{Hands, choice, heading, momentary, segments, slider, switch, teach};
 use crate::editor::feel_test::FeelTest;
 use crate::editor::reed_view::torque_picture;
-use crate::editor::snapshot::{Device, Snapshot};
+use crate::editor::snapshot::{KnobDevice, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
 use chalumeau_core::haptics::law;
@@ -30,12 +30,12 @@ const PAGES: [(Page, &str); 3] =
 
 /// What the panel remembers.
 #[derive(Clone, Debug, Default)]
-pub struct KnobPanel {
+pub struct KnobView {
     page: Page,
     test: Option<FeelTest>,
 }
 
-impl KnobPanel {
+impl KnobView {
     /// Ends a feel test.
     pub fn end_test(&mut self, actions: &mut Vec<Action>) {
         if self.test.take().is_some() {
@@ -197,7 +197,7 @@ fn devices(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Ve
     });
 }
 
-fn device_row(ui: &mut Ui, c: &Colours, device: &Device, actions: &mut Vec<Action>) {
+fn device_row(ui: &mut Ui, c: &Colours, device: &KnobDevice, actions: &mut Vec<Action>) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 36.0), Sense::click());
     let painter = ui.painter_at(rect);
     let round = CornerRadius::same(theme::SMALL_RADIUS);
