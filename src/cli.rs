@@ -1,8 +1,8 @@
-//! The command line: arguments in, files and tables out. Measures and plays nothing itself.
+//! The command line: reads arguments, writes files and tables. Other modules measure and play.
 //!
 //! Each subcommand is one file. Tables go to standard output or a file as CSV: the header first, then lines beginning
-//! with `#` that say what was measured, then data. A mistake of the user ends with exit code 2, a message that says what
-//! was given and what would be right, and no file; a reader that closes the pipe early is no mistake.
+//! with `#` that say what was measured, then data. After a user's mistake the exit code is 2, a message
+//! says what was given and what would be right, and no file is written. A reader that closes the pipe early is no error.
 
 mod bifurcation;
 mod bore;
@@ -151,7 +151,8 @@ impl Failure {
     }
 }
 
-/// Whether these words, without the program's name, are a command; nothing is done. So documents are held to what there is.
+/// Checks that these words, without the program's name, are a valid command. Runs nothing. A test checks the commands in
+/// the documents with it.
 pub fn understands<'a>(words: impl IntoIterator<Item = &'a str>) -> Result<(), String> {
     match Cli::try_parse_from(std::iter::once("chalumeau").chain(words)) {
         Err(error) if error.use_stderr() => Err(error.to_string()),
@@ -160,7 +161,7 @@ pub fn understands<'a>(words: impl IntoIterator<Item = &'a str>) -> Result<(), S
     }
 }
 
-/// Commands of fuller builds.
+/// Commands that this build lacks.
 const LEFT_OUT: &[&str] = &[
     #[cfg(not(feature = "devices"))]
     "doctor",
@@ -174,7 +175,7 @@ const LEFT_OUT: &[&str] = &[
 pub fn main() -> ExitCode {
     if let Some(command) = std::env::args().nth(1).filter(|name| LEFT_OUT.contains(&name.as_str())) {
         return failed(&Failure::Usage(format!(
-            "{command} is not in this build, which leaves devices out; `cargo build --release` builds all of it"
+            "{command} is not in this build, which has no devices; `cargo build --release` builds all commands"
         )));
     }
     let done = match Cli::parse().command {

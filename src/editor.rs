@@ -1,10 +1,9 @@
-//! What the plugin's window shows: a pure function of parameters and a snapshot of one moment.
-//!
-//! [`draw`] lays out one calm window: note, pitch and tools on top, the breath meter on the right and keys below, always
-//! in sight, and one view in the middle. It reads [`Snapshot`] and [`Controls`], moves parameters through the latter,
-//! and gives back what is no parameter as [`Action`]s. It never sees a voice, a link or a host; it blocks on nothing and
-//! asks for no repaint of its own. Made for 1100 by 720 points, usable from 700 by 480 on. Design units: points; zoom
-//! belongs to whoever owns the window.
+//! The plugin's window, as a pure function of the parameters and a snapshot.
+//! [`draw`] lays out one window: note, pitch and tools on top, the breath meter on the right and the keys below are always
+//! in sight; one view is in the middle. It reads [`Snapshot`] and [`Controls`], changes parameters through [`Controls`], and
+//! returns everything else that the user did as [`Action`]s. It knows no voice, no link to the knob and no host, it never
+//! blocks, and it asks for no repaint. The design size is 1100 by 720 points, the least usable size 700 by 480. The owner
+//! of the window applies the zoom.
 
 pub mod ab_comparison;
 mod blind_comparison_view;
@@ -54,7 +53,7 @@ pub const LEAST_SIZE: (f32, f32) = (700.0, 480.0);
 /// Least and most zoom.
 pub const ZOOM: (f32, f32) = (0.5, 3.0);
 
-/// What the user did that is no parameter.
+/// What the user did, other than changing a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     /// A key goes down.
@@ -69,13 +68,14 @@ pub enum Action {
         /// Sounding pitch.
         note: SoundingNote,
     },
-    /// Holes to open, in the order of the instrument's file, whatever is fingered; until [`Action::EndTry`].
+    /// Use these holes (open or not, in the order of the instrument's file) instead of the played fingering, until
+    /// [`Action::EndTry`].
     TryFingering(Vec<bool>),
     /// Back to the fingering of the note.
     EndTry,
     /// A device of the list, by its key.
     ChooseDevice(String),
-    /// What the knob shall feel like for a test, whatever is played; `None` ends the test.
+    /// The feel of a test, which replaces the feel of the notes; `None` ends the test.
     FeelTest(Option<Feel>),
     /// An instrument of the list.
     ChooseInstrument(usize),
@@ -87,7 +87,7 @@ pub enum Action {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Tab {
-    /// The reed at work.
+    /// Flow through the reed, and torque.
     #[default]
     Reed,
     /// Bore, holes, fingerings.
@@ -103,11 +103,11 @@ pub enum Tab {
 }
 
 impl Tab {
-    /// In the order they stand.
+    /// In their order on the screen.
     pub const ALL: [Self; 6] =
         [Self::Reed, Self::Clarinet, Self::Breath, Self::Sound, Self::Knob, Self::Instrument];
 
-    /// What it says on the tab.
+    /// The text on the tab.
     pub fn name(self) -> &'static str {
         match self {
             Self::Reed => "Reed",
@@ -119,20 +119,20 @@ impl Tab {
         }
     }
 
-    /// What is there.
+    /// The tool tip of the tab.
     fn about(self) -> &'static str {
         match self {
-            Self::Reed => "The reed at work: flow over pressure, and the torque it is felt as",
+            Self::Reed => "Reed: flow over pressure, and the torque you feel",
             Self::Clarinet => "Bore, tone holes and keys; try fingerings",
             Self::Breath => "Mouth pressure, where it comes from, calibration",
             Self::Sound => "Spectrum, waves, pitch",
-            Self::Knob => "The knob: device, arming, what it feels like",
+            Self::Knob => "Knob: device, arming, torque",
             Self::Instrument => "Which clarinet, tuning, articulation, output",
         }
     }
 }
 
-/// What a project keeps of the window. Whatever a file says is taken into its ranges by [`WindowState::mended`].
+/// The state of the window that is saved with a project. [`WindowState::mended`] limits values from a file to their ranges.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct WindowState {
@@ -153,7 +153,7 @@ impl Default for WindowState {
 }
 
 impl WindowState {
-    /// The same inside its ranges.
+    /// The same, with every value inside its range.
     pub fn mended(self) -> Self {
         let d = Self::default();
         let fix = |x: f32, (low, high): (f32, f32), default| {
@@ -169,8 +169,8 @@ impl WindowState {
         }
     }
 
-    /// The window is this large now, points. What comes of rounding to whole pixels is no change, so that a project that
-    /// is only looked at stays as it was saved.
+    /// The window has this size now, points. A difference from rounding to whole pixels is no change, so a project that is
+    /// opened and not edited stays as it was saved.
     pub fn resized(&mut self, width: f32, height: f32) {
         let is_near = |a: f32, b: f32| (a - b).abs() <= 2.0;
         if !(is_near(self.size.0, width) && is_near(self.size.1, height)) {
@@ -182,7 +182,7 @@ impl WindowState {
 /// Everything the window remembers between frames.
 #[derive(Clone, Debug, Default)]
 pub struct EditorState {
-    /// What a project keeps.
+    /// The part that is saved with a project.
     pub kept: WindowState,
     history: UndoHistory,
     compare: AbComparison,
@@ -198,7 +198,7 @@ pub struct EditorState {
 }
 
 impl EditorState {
-    /// With what a project kept.
+    /// With the saved state of a project.
     pub fn new(kept: WindowState) -> Self {
         Self { kept: kept.mended(), ..Self::default() }
     }
@@ -298,7 +298,7 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
             Tab::Instrument => instrument.draw(ui, &mut hands, snapshot, &mut actions),
         }
     });
-    // A widget that vanished under the hand, with its view or in a blind comparison, ends nothing itself.
+    // A widget that disappears while it is held, with its view or in a blind comparison, cannot end its gesture.
     if !hands.held.is_empty() && !ui.input(|input| input.pointer.any_down() || input.pointer.any_released()) {
         hands.let_go();
     }
@@ -321,7 +321,7 @@ fn beside<A>(
     let side = Panel::right(egui::Id::unique((id, "column"))).exact_size(width).show_separator_line(false);
     side.frame(theme::panel(c)).show(ui, |ui| {
         egui::ScrollArea::vertical().id_salt(id).auto_shrink([false, false]).show(ui, |ui| {
-            // Beside it stands the bar.
+            // Room for the scroll bar.
             ui.set_width(ui.available_width() - 8.0);
             ui.spacing_mut().item_spacing.y = 4.0;
             column(ui, with);

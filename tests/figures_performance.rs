@@ -412,7 +412,7 @@ fn a_report_holds_the_sound_the_cents_and_the_settings() {
         // Haptics, and what would be too much of it.
         "<h2>Haptics</h2>",
         "The mark of the torque lies within 0.",
-        "What the knob is told",
+        "Feel sent to the knob",
         "<td>flow</td><td class=\"number\">3</td><td>accepted</td>",
         "<td>flow</td><td class=\"number\">5</td><td>refused: C#7 would need",
     ] {
@@ -439,7 +439,7 @@ fn a_report_says_which_feel_a_knob_would_refuse() {
     {
         assert!(page.contains(said), "{said}");
     }
-    assert!(!page.contains("What the knob is told"));
+    assert!(!page.contains("Feel sent to the knob"));
     succeeds(&d, "report --written 67 --seconds 0.1 --torque 60 --travel 120 --out s.html");
     let page = String::from_utf8(read(&d, "s.html")).unwrap();
     assert!(page.contains("N m/rad, the"), "the slope has its words too");

@@ -22,12 +22,12 @@ Examples:
   chalumeau bifurcation --written F3 --plot f3.png
   chalumeau bifurcation --written G4 --zeta 0.2 --seconds 60 --csv g4.csv";
 
-/// How loud a note is while the breath slowly grows and slowly fades
+/// Measure how loud a note is while the breath slowly rises and falls
 ///
-/// Gamma (mouth pressure over closing pressure) runs from 0 to --to and back, --seconds each way. direction is 1 growing
-/// and -1 fading, rms that of the pressure in the mouthpiece over the closing pressure, shut the part of the time the
-/// reed is shut. Comments say where the note begins, beats, chokes, returns and ends. Up and down differ because a moving
-/// breath overtakes a threshold before the note has grown or died; what stays with more --seconds is hysteresis proper.
+/// Gamma (mouth pressure over closing pressure) runs from 0 to --to and back, --seconds each way. direction is 1 (rising)
+/// or -1 (falling), rms is the pressure in the mouthpiece over the closing pressure, shut is the fraction of time the reed
+/// is shut. Comments say where the note begins, beats, chokes, returns and ends. Up and down differ because a moving breath
+/// passes a threshold before the note has grown or died. A difference that remains with more --seconds is true hysteresis.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct BifurcationCommand {
@@ -37,7 +37,7 @@ pub struct BifurcationCommand {
     /// Largest mouth pressure over closing pressure, 0.2..3
     #[arg(long, value_name = "G", default_value = "2", value_parser = |s: &str| within(s, 0.2, f64::from(GAMMA_MAX)))]
     to: f64,
-    /// Time for the way up, and as much for the way down, s, 0.5..600
+    /// Time of the rise, and again of the fall, s, 0.5..600
     #[arg(long, value_name = "S", default_value = "20", value_parser = |s: &str| within(s, 0.5, 600.0))]
     seconds: f64,
     /// Sample rate, Hz, 22050..384000

@@ -16,11 +16,11 @@ Examples:
   chalumeau bore --written C5 --csv c5.csv
   chalumeau bore --instrument mine.toml --plot mine.png";
 
-/// Bore, tone holes and fingering of an instrument
+/// Print or draw bore, tone holes and fingering of an instrument
 ///
 /// The table has a row for each end of a cone of the bore and one for each hole: kind (bore or hole), name (of the part or
 /// the hole), distance from the tip of the reed, diameter, height of the chimney, and with --written whether the hole is
-/// open (1) or closed (0). What does not apply is empty. The drawing shows the instrument from the side, to scale.
+/// open (1) or closed (0). Fields that do not apply are empty. The drawing shows the instrument from the side, to scale.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct BoreCommand {

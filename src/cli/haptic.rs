@@ -1,4 +1,4 @@
-//! `chalumeau haptic`: what a force-feedback knob should feel for each note.
+//! `chalumeau haptic`: the torque of a force-feedback knob for each note.
 
 use crate::cli::Failure;
 use crate::cli::csv_table::TableArgs;
@@ -26,7 +26,7 @@ Examples:
   chalumeau haptic --all --H 3 --k 0.3849          a wider reed, as stiff as before
   chalumeau haptic --all --order covered-holes --contrast 2";
 
-/// What a force-feedback knob should feel for each note
+/// Calculate the torque of a force-feedback knob for each note
 ///
 /// Every note has its own pressure requirement p_req_pa = p_M gamma_on (see `threshold`), above which it sounds, and an
 /// extinction gamma_off above which the shut reed is silent. On the knob they lie at a_on_deg and a_off_deg; at

@@ -1,4 +1,4 @@
-//! `chalumeau impedance`: what the bore answers to the reed, curve or peaks.
+//! `chalumeau impedance`: the input impedance of the bore, as a curve or as its peaks.
 
 use crate::cli::Failure;
 use crate::cli::csv_table::TableArgs;
@@ -24,14 +24,14 @@ const EXAMPLES: &str = "\
 Examples:
   chalumeau impedance --written F4 --csv f4.csv          the curve, 20 Hz to 4 kHz
   chalumeau impedance --all --peaks 8                    eight resonances of every fingering
-  chalumeau impedance --written F4 --plot f4.svg         the curve drawn, with modes and cut-off, beside the other model's
+  chalumeau impedance --written F4 --plot f4.svg         the curve as a figure, with modes and cut-off, beside the other model
   chalumeau impedance --all --peaks 6 --plot peaks.png   where the peaks of all notes are
   chalumeau impedance --written 52 --from 100 --to 200 --step 0.1 --reed-volume";
 
-/// Where the answer comes from.
+/// Which model calculates the impedance.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Model {
-    /// The lattice that sounds at 48 kHz (96 kHz inside, 192 kHz with --quality high)
+    /// The lattice that plays at 48 kHz (96 kHz internally, 192 kHz with --quality high)
     Lattice,
     /// Transfer matrices with exact wall losses: the reference
     Tmm,
@@ -52,7 +52,7 @@ pub struct ImpedanceCommand {
     /// Table of the first N peaks instead of the curve, 1..30
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=30))]
     peaks: Option<u8>,
-    /// Where the answer comes from
+    /// Which model calculates the impedance
     #[arg(long, value_enum, default_value_t = Model::Lattice)]
     model: Model,
     /// Put the reed's equivalent volume in parallel, as when the clarinet is played
@@ -88,9 +88,7 @@ impl ImpedanceCommand {
         let steps = ((self.to - self.from) / self.step + 1e-9).floor();
         if self.peaks.is_none() && self.notes.one().is_none() {
             let right = "add --peaks 8 for the peaks of all notes, or choose one note with --written";
-            return Err(Failure::Usage(format!(
-                "one curve for each note would be too much for a table; {right}"
-            )));
+            return Err(Failure::Usage(format!("a table holds one curve only; {right}")));
         }
         let curve = self.peaks.is_none() || (self.notes.one().is_some() && self.plot.wanted());
         if curve && !(0.0..=POINTS_MAX).contains(&steps) {

@@ -63,7 +63,7 @@ struct NewInstrument {
     /// Replace an existing file
     #[arg(long)]
     force: bool,
-    /// What a player calls it
+    /// Name of the instrument
     #[arg(long, value_name = "TEXT")]
     name: Option<String>,
     /// Semitones it sounds below what is written: B flat 2, A 3, E flat -3, bass 14
@@ -119,7 +119,7 @@ struct Import {
     /// Where the measurements come from [default: the comments at the head of the bore's table]
     #[arg(long, value_name = "TEXT")]
     source: Option<String>,
-    /// Air that moves with the reed, mm3: 0, or 20..20000
+    /// Volume of air that moves with the reed, mm3: 0, or 20..20000
     #[arg(long, value_name = "MM3", default_value = "1200", value_parser = |s: &str| within(s, 0.0, 20_000.0))]
     reed_volume: f64,
     /// Bore that zeta and the reed's size refer to, mm, 1..200 [default: 14.9, a B flat clarinet's]
@@ -160,10 +160,10 @@ fn head_comments(text: &str) -> String {
     lines.join("\n")
 }
 
-/// Look for mistakes in an instrument file, before it is played
+/// Check an instrument file for mistakes
 ///
-/// Prints every note with the resonance it is to sound at (with the reed's volume) and how far that is from equal
-/// temperament, then what to look at. Ends with 2 if the instrument cannot be played, with 0 otherwise, warnings or not.
+/// Prints for every note the resonance it plays on (with the reed's volume) and its distance from equal temperament, then
+/// warnings. The exit code is 2 if the instrument cannot be played, else 0, with or without warnings.
 ///
 /// Columns: written,written_midi,register,mode,wanted_hz,peak_hz,cents,mag_over_zc,q.
 #[derive(Args)]
@@ -219,8 +219,8 @@ impl CheckFile {
 /// Make an instrument: a cylinder that plays given notes, or another one scaled
 ///
 /// With --notes: the lowest note sounds with every hole closed, each further one opens the next hole from the bell; length
-/// and holes are placed so that the model plays them in tune. With --scale: everything X times as large, so that all notes
-/// sound lower by X; say by --transposition how the instrument is then read.
+/// and holes are placed so that the model plays them in tune. With --scale: every length is X times as large, so that all frequencies are X times lower; set
+/// --transposition for how the instrument is then read.
 #[derive(Args)]
 #[group(id = "kind", required = true, multiple = false, args = ["notes", "scale"])]
 struct New {
@@ -242,7 +242,7 @@ struct New {
     /// Give the cylinder a register hole this wide, mm, 0.5..6, and the twelfths of its notes
     #[arg(long, value_name = "MM", conflicts_with = "scale", value_parser = |s: &str| within(s, 0.5, 6.0))]
     vent_mm: Option<f64>,
-    /// Air that moves with the reed of the cylinder, mm3: 0, or 20..20000
+    /// Volume of air that moves with the reed of the cylinder, mm3: 0, or 20..20000
     #[arg(long, value_name = "MM3", default_value = "1200", conflicts_with = "scale", value_parser = |s: &str| within(s, 0.0, 20_000.0))]
     reed_volume: f64,
     /// Pitch of A4 the cylinder is made for, Hz, 380..500
@@ -301,7 +301,7 @@ impl New {
     }
 }
 
-/// Show an instrument as one table: cones, holes, notes
+/// Print an instrument as one table: cones, holes, notes
 ///
 /// Columns: what,name,x_mm,length_mm,diameter_mm,end_diameter_mm,detail.
 #[derive(Args)]

@@ -65,7 +65,7 @@ enum Which {
     Sweep,
     /// One period of a played note over the curve of the reed
     Orbit,
-    /// Every one of them, into a directory
+    /// All of them, into a directory
     All,
 }
 
@@ -92,7 +92,7 @@ pub struct ReedCommand {
     /// The flow law: p,u from p = -1 to beyond closure
     #[arg(long)]
     law: bool,
-    /// Both faces of the reed: H, k, A and zeta, and stiffness, area, width and opening, whichever were given
+    /// Both descriptions of the reed: H, k, A and zeta; stiffness, area, width and opening
     #[arg(long)]
     physical: bool,
     /// A figure; needs --out
@@ -119,13 +119,13 @@ pub struct ReedCommand {
 #[derive(Args)]
 #[command(next_help_heading = "Figures")]
 struct Drawing {
-    /// A new .png or .svg file (.json for what it shows, .gif for the sweep), or a directory that exists
+    /// A new .png or .svg file (.json for its data, .gif for the sweep), or a directory that exists
     #[arg(long, value_name = "PATH", requires = "figure")]
     out: Option<PathBuf>,
     /// Kind of file made in a directory
     #[arg(long, value_enum, value_name = "KIND", default_value = "png", requires = "figure")]
     format: Format,
-    /// Size of a figure, pixels, 400..4000 each way, as 1600x1000 [default: what it needs]
+    /// Size of a figure, pixels, 400..4000 each way, for example 1600x1000 [default: depends on the figure]
     #[arg(long, value_name = "WxH", requires = "figure")]
     size: Option<Size>,
     /// Written note of the orbit: a MIDI number (60) or a name
@@ -271,7 +271,9 @@ impl ReedCommand {
         let (reference, a) = (PhysicalReed::reference(), self.a.unwrap_or(1.0));
         let measured = self.measured.reed(REFERENCE_RADIUS_M);
         if measured.is_some() && a == 0.0 {
-            return Err(Failure::Usage("--A 0 lets no air through any measured reed; give more".to_owned()));
+            return Err(Failure::Usage(
+                "with --A 0 no air flows through a measured reed; give a larger A".to_owned(),
+            ));
         }
         let measured = measured.map(|reed| reed.seed(&reference, a));
         let h = measured.map(|seed| seed.h).or(self.h).unwrap_or(ReedLaw::default().h());

@@ -1,4 +1,4 @@
-//! `chalumeau render`: a MIDI file, a note or a scale as a WAV file, with a look inside if wanted.
+//! `chalumeau render`: plays a MIDI file, a note or a scale into a WAV file; writes internal signals and a figure too.
 
 use crate::cli::Failure;
 use crate::cli::csv_table::CsvTable;
@@ -30,7 +30,7 @@ Examples:
   chalumeau render --written G4 --breath ramp:0:1.2:4 --seconds 5 --probe g4.csv --out g4.wav
       From silence over the threshold to a reed held shut, with pressures, flow and opening.
   chalumeau render melody.mid --out melody.wav --plot melody.png
-      Waveform, spectrogram, pitch against the score, breath, and the reed from near.
+      Waveform, spectrogram, pitch against the score, breath, and the reed in close-up.
   chalumeau render melody.mid --replay take.csv --out again.wav
   chalumeau render melody.mid --crescendo 0.4:0.9 --bits 16 --rate 44100 --out loud.wav";
 
@@ -46,7 +46,7 @@ enum Bits {
 
 /// Play a MIDI file, a note or a scale into a WAV file
 ///
-/// Renders offline what the plugin would play, sample for sample. Two renders are identical: the breath noise is seeded.
+/// Renders offline what the plugin would play, sample for sample. The same command gives the same file: the breath noise has a fixed seed.
 /// The WAV file appears only when it is complete.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
@@ -60,10 +60,10 @@ pub struct RenderCommand {
     /// Bits per sample: integers rounded without dither, or floats as computed
     #[arg(long, value_enum, default_value_t = Bits::Float32, help_heading = "Output")]
     bits: Bits,
-    /// 1, or 2 with the same sound in both
+    /// Channels: 1, or 2 with the same sound in both
     #[arg(long, value_name = "N", default_value = "1", help_heading = "Output", value_parser = clap::value_parser!(u16).range(1..=2))]
     channels: u16,
-    /// CSV file with the inside of the instrument over time: mouth pressure, reed opening, flow, mouthpiece and radiated pressure
+    /// CSV file of internal signals over time: mouth pressure, reed opening, flow, mouthpiece and radiated pressure
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     probe: Option<PathBuf>,
     /// Write every Nth internal sample (96 or 88.2 thousand a second) to the probe file
@@ -74,7 +74,7 @@ pub struct RenderCommand {
     force: bool,
     #[command(flatten)]
     plot: PlotArgs,
-    /// Time of the figure's close look at the reed, s [default: the middle of the longest note]
+    /// Time of the reed's close-up in the figure, s [default: the middle of the longest note]
     #[arg(long, value_name = "S", requires = "plot", help_heading = "Output", value_parser = |s: &str| within(s, 0.0, 1e6))]
     plot_at: Option<f64>,
 }
@@ -166,13 +166,13 @@ impl RenderCommand {
         }
         if resets > 0 {
             eprintln!(
-                "warning: the instrument lost its numbers and was reset {resets} times; please report this"
+                "warning: the calculation broke down and the instrument was reset {resets} times; please report this"
             );
         }
     }
 }
 
-/// What a reader of a figure wants to know of how it was played.
+/// How it was played, for the lines under a figure's title.
 pub fn about(prepared: &RenderJob) -> Vec<String> {
     let RenderJob { model, settings, score, rate } = prepared;
     vec![format!(
@@ -185,7 +185,7 @@ pub fn about(prepared: &RenderJob) -> Vec<String> {
     )]
 }
 
-/// Seen on a terminal only.
+/// A progress bar; it shows on a terminal only.
 pub fn progress(samples: usize) -> ProgressBar {
     let bar = ProgressBar::new(samples as u64);
     match ProgressStyle::with_template("{bar:40} {percent:>3} %  {elapsed} (left: {eta})") {
@@ -194,7 +194,7 @@ pub fn progress(samples: usize) -> ProgressBar {
     }
 }
 
-/// The inside of the instrument as a table.
+/// The table of internal signals.
 struct ProbeTable {
     table: CsvTable,
     every: u64,

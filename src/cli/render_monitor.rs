@@ -1,4 +1,4 @@
-//! Looks at a rendering while it is made, for pictures and reports: memory does not grow with its length.
+//! Analyses a rendering while it runs, for figures and reports. Memory does not grow with the length of the sound.
 
 use crate::cli::Failure;
 use crate::cli::score_args::RenderJob;
@@ -17,7 +17,7 @@ const MOMENT_S: (f64, f64) = (0.004, 0.05);
 /// Period where no note says another, s.
 const PERIOD_S: f64 = 0.004;
 
-/// What looks.
+/// Collects what the figure and the report need, block by block.
 pub struct RenderMonitor {
     watcher: Watcher,
     listener: Listener,
@@ -32,7 +32,7 @@ pub struct RenderMonitor {
     closing_pa: f64,
 }
 
-/// What was seen.
+/// What a rendering was like.
 pub struct RenderSummary {
     overview: Overview,
     gamma: Envelope,
@@ -51,7 +51,7 @@ impl RenderMonitor {
         let (seconds, soundings) = (score.seconds(prepared.rate), score.soundings());
         if let Some(near_s) = near_s.filter(|&near_s| near_s >= seconds) {
             return Err(Failure::Usage(format!(
-                "--plot-at {near_s} lies behind the end; this is {seconds:.3} s long"
+                "--plot-at {near_s} is after the end; the sound is {seconds:.3} s long"
             )));
         }
         let longest = soundings.iter().max_by_key(|sounding| sounding.to - sounding.from);

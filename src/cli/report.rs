@@ -31,9 +31,9 @@ Examples:
   chalumeau report melody.mid --out melody.html
   chalumeau report --scale E3:C6 --gamma 0.5 --no-noise --out scale.html
   chalumeau report long.mid --wav long.wav --out long.html
-      The sound stays a file of its own, beside the page.";
+      The sound is a separate file beside the page.";
 
-/// Play as `render` does, and make one HTML page of it
+/// Play like `render`, and write one HTML page about it
 ///
 /// The page has the sound to listen to, waveform, spectrogram, pitch against the score, breath and reed as figures, the
 /// instrument to scale, the mouth pressures at which notes speak, beat and choke, what a knob would feel and what it would
@@ -50,7 +50,7 @@ pub struct ReportCommand {
     /// Write the sound to this WAV file, in the same directory as the page, instead of into the page
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     wav: Option<PathBuf>,
-    /// Time of the close look at the reed, s [default: the middle of the longest note]
+    /// Time of the reed's close-up, s [default: the middle of the longest note]
     #[arg(long, value_name = "S", help_heading = "Output", value_parser = |s: &str| within(s, 0.0, 1e6))]
     plot_at: Option<f64>,
     /// Replace existing files
@@ -65,7 +65,7 @@ impl ReportCommand {
         let seconds = prepared.score.seconds(prepared.rate);
         if self.wav.is_none() && seconds > INSIDE_MAX_S {
             return Err(Failure::Usage(format!(
-                "{seconds:.0} s of sound are too much for a page, which holds {INSIDE_MAX_S}; put it beside the page with --wav FILE"
+                "{seconds:.0} s of sound are too long for a page, which holds {INSIDE_MAX_S} s; put the sound beside the page with --wav FILE"
             )));
         }
         let watch = RenderMonitor::new(&prepared, self.plot_at)?;
@@ -108,7 +108,7 @@ impl ReportCommand {
         let folder = |path: &Path| Path::new(".").join(path.parent().unwrap_or(path));
         if folder(wav) != folder(&self.out) {
             return Err(Failure::Usage(format!(
-                "--wav {} lies elsewhere than the page {}; put both into one directory",
+                "--wav {} is not in the directory of the page {}; put both into one directory",
                 wav.display(),
                 self.out.display()
             )));
@@ -141,8 +141,7 @@ impl ReportCommand {
             plates: vec![
                 Plate {
                     figure: watched.figure(&title, about(prepared)),
-                    caption: "Waveform, spectrogram, pitch heard over the notes of the score, mouth pressure, and the \
-                              reed from near."
+                    caption: "Waveform, spectrogram, measured pitch over the notes of the score, mouth pressure, and the reed in close-up."
                         .to_owned(),
                     alternative: format!(
                         "Five panels over the time of {title}, {:.1} seconds: waveform, spectrogram up to 6 kHz, pitch \
@@ -268,8 +267,8 @@ fn settings(settings: &Settings) -> ReportTable {
     let rows = [
         ("Full breath", format!("{}", settings.breath_full_kpa), "kPa"),
         ("Breath noise", format!("{}", settings.noise), "0..1"),
-        ("Tongue lets go in", format!("{}", settings.tongue_ms), "ms"),
-        ("Fingers move in", format!("{}", settings.legato_ms), "ms"),
+        ("Tongue release", format!("{}", settings.tongue_ms), "ms"),
+        ("Finger movement", format!("{}", settings.legato_ms), "ms"),
         ("Reed strength", format!("{}", settings.strength), "as on the box"),
         ("Closing pressure", format!("{:.3}", 1e-3 * settings.closing_pa()), "kPa"),
         ("Lip, tip opening", format!("{}", settings.lip), "of the reference"),

@@ -1,4 +1,4 @@
-//! What is to be played, as arguments several commands share: a MIDI file, a note or a scale, and the breath under it.
+//! Arguments for what is played: a MIDI file, a note or a scale, and its breath. `render` and `report` share them.
 
 use crate::cli::Failure;
 use crate::cli::feel_args::FeelArgs;
@@ -35,13 +35,13 @@ pub struct ScoreArgs {
     /// Standard MIDI file, format 0 or 1
     #[arg(value_name = "MIDI")]
     midi: Option<PathBuf>,
-    /// The file is of an MPE controller: channel 1 manages the others, which bend by 48 semitones
+    /// The file is MPE: channel 1 is the manager, the other channels bend by 48 semitones
     #[arg(long, requires = "midi")]
     mpe: bool,
     /// One note as a clarinettist reads it: MIDI number (60) or name (C4)
     #[arg(long, value_name = "NOTE", value_parser = note)]
     written: Option<u8>,
-    /// One note as it sounds
+    /// One note by its sounding pitch
     #[arg(long, value_name = "NOTE", value_parser = note)]
     sounding: Option<u8>,
     /// Chromatic scale between two written notes, up or down, for example E3:C6
@@ -66,8 +66,8 @@ pub struct ScoreArgs {
     /// Mouth pressure from one gamma to another over the whole length, for example 0.4:0.9
     #[arg(long, value_name = "FROM:TO", help_heading = "Breath (replaces that of a MIDI file)")]
     crescendo: Option<String>,
-    /// Breath from a knob's take: a CSV file with t_us and angle_deg, as the plugin or `chalumeau knob` records it; each
-    /// note makes its own pressure of the angle
+    /// Breath from a recorded take: a CSV file with t_us and angle_deg, from the plugin or `chalumeau knob`. Each note turns
+    /// the angle into its own pressure
     #[arg(long, value_name = "FILE", help_heading = "Breath (replaces that of a MIDI file)")]
     replay: Option<PathBuf>,
     /// Sample rate, Hz, 22050..384000
@@ -233,14 +233,12 @@ impl ScoreArgs {
                 check_fingering(file, written)?;
                 Ok(Score::note(sounding, seconds, self.rate))
             }
-            _ => Err(Failure::Usage(
-                "this note lies outside what MIDI can name after transposition".to_owned(),
-            )),
+            _ => Err(Failure::Usage("after transposition this note is outside the range of MIDI".to_owned())),
         }
     }
 }
 
-/// Notes no fingering can play stay silent, but not unsaid.
+/// Warns of notes that have no fingering and stay silent.
 fn warn_of_missing_fingerings(events: &[Timed<Event>], file: &InstrumentFile) {
     let missing = |event: &Timed<Event>| match event.event {
         Event::NoteOn { note, .. } => {

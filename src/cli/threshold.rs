@@ -1,4 +1,4 @@
-//! `chalumeau threshold`: how hard to blow before a note speaks.
+//! `chalumeau threshold`: the mouth pressure at which each note begins to sound.
 
 use crate::cli::Failure;
 use crate::cli::csv_table::TableArgs;
@@ -22,11 +22,11 @@ const ZETAS: [f64; 5] = [0.15, 0.2, 0.3, 0.4, 0.6];
 /// Reeds drawn, by the number on their box.
 const STRENGTHS: [f32; 5] = [2.0, 2.5, 3.0, 3.5, 4.0];
 
-/// Mouth pressure at which each note begins to sound
+/// Calculate the mouth pressure at which each note begins to sound
 ///
 /// gamma_on is that pressure over the closing pressure of the reed, from the height of the impedance peak the note plays
-/// on (frequency-domain model, reed volume included) and the flow strength zeta of the embouchure. Never below 1/3, the
-/// bore without losses. A note that no peak carries has nan.
+/// on (frequency-domain model, reed volume included) and the flow strength zeta of the embouchure. It is never below 1/3, the value of a bore
+/// without losses. A note without an impedance peak has nan.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct ThresholdCommand {

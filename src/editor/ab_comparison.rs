@@ -1,8 +1,8 @@
-//! Two settings side by side: A, B, and not knowing which.
+//! Comparison of two settings, A and B, also blind.
 //!
-//! A slot holds the values of all parameters that belong to a setting. Changing sides keeps the side that is left as it
-//! was just then. Blind, the sides are called X and Y, which is which is drawn by lot and told by *Reveal* alone, and the
-//! window shows no value that would tell.
+//! A slot holds the values of all parameters that belong to a setting. Changing sides saves the values of the
+//! side that is left. In a blind comparison the sides are called X and Y in random order, only *Reveal* tells which is
+//! which, and the window shows no value that would tell.
 
 use std::collections::hash_map::RandomState;
 use std::hash::{BuildHasher, Hasher};
@@ -35,7 +35,7 @@ impl ComparisonSide {
 pub struct AbComparison {
     /// The side in force.
     pub side: ComparisonSide,
-    /// The values of the side that is not in force; `None` until it was first gone to.
+    /// The values of the side that is not in force; `None` until it is first used.
     resting: Option<Values>,
     blind: Option<Blind>,
 }
@@ -48,8 +48,8 @@ struct Blind {
 }
 
 impl AbComparison {
-    /// Goes to `side`: what to set, with `now` kept for coming back. Nothing for the side in force. A side never gone to
-    /// begins as a copy.
+    /// Goes to `side`: saves `now` for the old side and returns the values to set. Returns nothing for the side in force. A
+    /// side that was never used begins as a copy.
     pub fn go(&mut self, side: ComparisonSide, now: Values) -> Values {
         if side == self.side {
             return Vec::new();
@@ -70,12 +70,12 @@ impl AbComparison {
         self.resting.as_ref().is_some_and(|resting| resting != now)
     }
 
-    /// Hides which is which; the lot decides.
+    /// Starts a blind comparison; X and Y get their sides at random.
     pub fn hide(&mut self) {
         self.hide_as(RandomState::new().build_hasher().finish() & 1 == 1);
     }
 
-    /// Hides which is which with X as B if `is_crossed`.
+    /// Starts a blind comparison in which X is B if `is_crossed`.
     pub fn hide_as(&mut self, is_crossed: bool) {
         self.blind = Some(Blind { is_crossed, is_revealed: false });
     }

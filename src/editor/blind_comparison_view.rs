@@ -1,4 +1,4 @@
-//! The page of a blind comparison: two names, and nothing that would tell which is which.
+//! The page of a blind comparison: X and Y, and nothing that tells which is which.
 
 use egui::{Align2, CornerRadius, FontId, RichText, Role, Sense, Stroke, Ui, WidgetInfo, vec2};
 
@@ -15,7 +15,8 @@ pub fn draw(ui: &mut Ui, compare: &mut AbComparison, hands: &mut Hands) {
         ui.add_space(0.12 * height);
         ui.label(RichText::new("Blind comparison").font(FontId::proportional(22.0)));
         ui.label(
-            RichText::new("Play, change sides as often as you like, decide, then reveal.").color(c.quiet),
+            RichText::new("Play, switch between X and Y as often as you like, decide, then press Reveal.")
+                .color(c.quiet),
         );
         ui.add_space(0.06 * height);
         let size = vec2((0.3 * ui.available_width()).min(220.0), (0.3 * height).min(150.0));

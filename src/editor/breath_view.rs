@@ -1,4 +1,4 @@
-//! Mouth pressure large, where it comes from, and how it has been.
+//! The breath view: mouth pressure, its sources, and its history.
 
 use egui::{Align2, CornerRadius, FontId, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
@@ -13,7 +13,7 @@ use crate::editor::theme::{Colours, GAP, panel};
 /// What the view remembers.
 #[derive(Clone, Debug, Default)]
 pub struct BreathView {
-    /// Least and most that each source has said while somebody looked, by name.
+    /// Least and greatest value of each source while the window was open, by name.
     ranges: Vec<(String, f32, f32)>,
 }
 
@@ -30,7 +30,7 @@ impl BreathView {
         );
     }
 
-    /// Takes notice of what the sources say.
+    /// Updates the ranges of the sources.
     pub fn look(&mut self, sources: &[BreathSource]) {
         for source in sources.iter().filter(|source| source.is_seen) {
             let value = chart::share(source.value);
@@ -42,7 +42,7 @@ impl BreathView {
     }
 
     fn column(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
-        heading(ui, "Where breath comes from");
+        heading(ui, "Breath sources");
         let mut has_knob = false;
         for source in &snapshot.sources {
             let range = self.ranges.iter().find(|(name, ..)| *name == source.name);
@@ -53,7 +53,7 @@ impl BreathView {
             }
         }
         if snapshot.sources.is_empty() {
-            ui.label("No source has said anything yet: keys blow by velocity.");
+            ui.label("No source has sent a value yet. Key velocity sets the mouth pressure.");
         }
         if !has_knob {
             heading(ui, "Calibrate the knob");
@@ -174,7 +174,7 @@ fn history(ui: &mut Ui, snapshot: &Snapshot) {
     let seconds = f64::from(track.step_s) * track.kpa.len().saturating_sub(1) as f64;
     if track.kpa.len() < 2 {
         let rect = ui.available_rect_before_wrap();
-        chart::empty(ui, rect, "Blow, and your breath is drawn here.");
+        chart::empty(ui, rect, "Your breath appears here when you blow.");
         return;
     }
     let full = f64::from(breath_meter::full_kpa(snapshot));
@@ -237,7 +237,7 @@ fn meter_of(ui: &mut Ui, source: &BreathSource, range: Option<(f32, f32)>) {
             painter.vline(x(end), bar.top() - 1.0..=bar.bottom() + 2.0, Stroke::new(1.5, c.ink));
         }
     }
-    let blows = if source.is_live { ", blows" } else { "" };
+    let blows = if source.is_live { ", sets the breath" } else { "" };
     let went = range.filter(|_| source.is_seen).map_or_else(String::new, |(low, high)| {
         format!(", from {:.0} to {:.0} %", 100.0 * low, 100.0 * high)
     });
@@ -247,15 +247,15 @@ fn meter_of(ui: &mut Ui, source: &BreathSource, range: Option<(f32, f32)>) {
     response.on_hover_ui(|ui| {
         ui.set_max_width(280.0);
         ui.label(if source.is_live {
-            "This one blows. The source that moves takes over."
+            "This source sets the breath. Another source takes over as soon as it moves."
         } else if source.is_seen {
-            "It has moved before; move it and it blows."
+            "This source has sent values. Move it, and it sets the breath."
         } else {
-            "Nothing has come from it yet."
+            "This source has sent nothing yet."
         });
         if let Some((low, high)) = range {
-            let went = format!("It went from {:.0} to {:.0} %.", 100.0 * low, 100.0 * high);
-            ui.label(format!("{went} A controller that does not reach 100 % wants more full breath."));
+            let went = format!("Its values so far: {:.0} to {:.0} %.", 100.0 * low, 100.0 * high);
+            ui.label(format!("{went} If a controller does not reach 100 %, raise Full breath."));
         }
     });
 }

@@ -1,5 +1,5 @@
-//! The clarinet's body on the screen: bore, wood, holes with what covers them, the standing wave above it, one scale both
-//! ways.
+//! The drawing of the clarinet: bore, wood, holes and their covers, and the standing wave above. Both directions have the
+//! same scale.
 
 use egui::{Align2, Color32, CornerRadius, FontId, Mesh, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 
@@ -8,11 +8,11 @@ use crate::editor::theme;
 use crate::editor::theme::Colours;
 use chalumeau_core::bore::instrument_file::{HoleKind, InstrumentFile, ToneHole};
 
-/// Wood around the bore where no hole tells, m, and at the rim of the bell.
+/// Thickness of the wood where no hole gives it, m, and at the rim of the bell.
 const WALL_M: f64 = 7e-3;
 const RIM_M: f64 = 2.5e-3;
 
-/// How long ten centimetres are here.
+/// A ruler of ten centimetres.
 pub(super) fn ruler(painter: &Painter, c: &Colours, area: Rect, scale: f32) {
     let (right, y) = (area.right() - 2.0, area.top() + 6.0);
     let left = right - 0.1 * scale;
@@ -57,7 +57,7 @@ pub(super) fn standing(
             painter,
             rect.center(),
             Align2::CENTER_CENTER,
-            "no standing wave known for these holes",
+            "no standing wave calculated for these holes",
             c.quiet,
         );
         return;
@@ -87,7 +87,7 @@ fn loudest(wave: &[(f32, f32)]) -> f32 {
     wave.iter().map(|&(_, magnitude)| magnitude).filter(|x| x.is_finite()).fold(1e-6, f32::max)
 }
 
-/// The body on the screen: one scale both ways.
+/// The drawing, with the same scale in both directions.
 pub(super) struct ClarinetDrawing<'a> {
     pub(super) file: &'a InstrumentFile,
     left: f32,
@@ -118,7 +118,7 @@ impl<'a> ClarinetDrawing<'a> {
         let last_hole_m = file.holes.iter().map(|hole| hole.x_m).fold(0.0, f64::max);
         let widest_m = file.bore.iter().map(|s| s.r_start_m.max(s.r_end_m)).fold(0.0, f64::max) + RIM_M;
         let by_width = area.width() / length_m as f32;
-        // A short fat instrument in a long low window is as high as half of it.
+        // A short, wide instrument takes at most half of the height.
         let scale = by_width.min(0.5 * area.height() / (2.0 * widest_m) as f32);
         let left = area.left() + 0.5 * (area.width() - scale * length_m as f32);
         let axis = area.top() + 0.50 * area.height();

@@ -1,4 +1,4 @@
-//! The two lines on top: note, pitch, tools; tabs and what the user should know.
+//! The two lines on top: note, pitch and tools; tabs and status.
 
 use egui::{
     Align, Align2, CornerRadius, FontId, Layout, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2,
@@ -69,7 +69,7 @@ enum Icon {
     Theme,
 }
 
-/// A button with a drawn sign: the fonts at hand have none that all of them share.
+/// A button with a drawn symbol, because no symbol is in all fonts.
 fn icon(ui: &mut Ui, icon: Icon, name: &str) -> egui::Response {
     let (rect, response) = ui.allocate_exact_size(vec2(28.0, 24.0), Sense::click());
     let visuals = *ui.style().interact(&response);
@@ -128,8 +128,7 @@ fn note(ui: &mut Ui, snapshot: &Snapshot, has_pitch: bool) {
     painter.text(pos2(x, rect.center().y + 1.0), Align2::LEFT_TOP, &pitch, theme::small(), c.quiet);
     let said = format!("Written {big}, {below}, {pitch}");
     response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &said));
-    response
-        .on_hover_text("The note as it is read, what sounds on this instrument, and the pitch that is heard");
+    response.on_hover_text("The written note, the note that this instrument sounds, and the measured pitch");
 }
 
 /// Cents above or below the note: a needle over 50 cents each way.
@@ -150,7 +149,7 @@ pub fn needle(ui: &mut Ui, snapshot: &Snapshot, width: f32) {
         };
         painter.vline(at(cents), line_y - height..=line_y, Stroke::new(1.0, c.quiet));
     }
-    // Five cents either way: what a listener takes for in tune.
+    // Within five cents a listener hears the note as in tune.
     let near = Rect::from_min_max(pos2(at(-5.0), line_y), pos2(at(5.0), line_y + 3.0));
     painter.rect_filled(near, CornerRadius::ZERO, c.speaks);
     let text = match snapshot.heard.cents.filter(|cents| cents.is_finite()) {
@@ -167,7 +166,7 @@ pub fn needle(ui: &mut Ui, snapshot: &Snapshot, width: f32) {
     painter.text(place, Align2::RIGHT_TOP, &text, theme::small(), c.quiet);
     response.widget_info(|| WidgetInfo::labeled(Role::Meter, true, format!("Pitch: {text}")));
     response.on_hover_text(format!(
-        "How far the sound is from the note at A4 = {:.1} Hz",
+        "Distance of the sound from the note, at A4 = {:.1} Hz",
         snapshot.settings.a4_hz
     ));
 }
@@ -202,8 +201,9 @@ fn sides(ui: &mut Ui, compare: &mut AbComparison, hands: &mut Hands, is_wide: bo
         return;
     }
     let blind = ui.add_enabled(compare.differs(&hands.setting()), egui::Button::new("Blind"));
-    let blind = blind.on_hover_text("Compare without knowing which is which: A and B become X and Y by lot");
-    if blind.on_disabled_hover_text("Set A and B apart first, then compare them blind").clicked() {
+    let blind = blind
+        .on_hover_text("Compare without knowing which is which: A and B appear as X and Y in random order");
+    if blind.on_disabled_hover_text("Make A and B different first, then compare them blind").clicked() {
         compare.hide();
     }
     let (text, other) = match compare.side {
@@ -213,7 +213,7 @@ fn sides(ui: &mut Ui, compare: &mut AbComparison, hands: &mut Hands, is_wide: bo
         ComparisonSide::B => ("<", "A"),
     };
     let copy = named(ui.button(text), &format!("Copy to {other}"));
-    if copy.on_hover_text(format!("Makes {other} the same as what you hear now")).clicked() {
+    if copy.on_hover_text(format!("Copies the settings you hear now to {other}")).clicked() {
         compare.copy(hands.setting());
     }
     for (side, name) in [(ComparisonSide::B, "B"), (ComparisonSide::A, "A")] {
@@ -223,7 +223,8 @@ fn sides(ui: &mut Ui, compare: &mut AbComparison, hands: &mut Hands, is_wide: bo
         response.widget_info(|| {
             WidgetInfo::selected(Role::RadioButton, true, is_here, format!("Setting {name}"))
         });
-        if response.on_hover_text(format!("Setting {name}: change it, and go back and forth")).clicked() {
+        if response.on_hover_text(format!("Setting {name}: change it, and switch between A and B")).clicked()
+        {
             let values = compare.go(side, hands.setting());
             hands.restore(&values);
         }
@@ -244,7 +245,7 @@ fn zoom(ui: &mut Ui, kept: &mut WindowState) {
         info.current_text_value = Some(text.clone());
         info
     });
-    shown.response.on_hover_text("Size of everything in this window; kept with the project");
+    shown.response.on_hover_text("Size of everything in this window; saved with the project");
 }
 
 /// The lower line.

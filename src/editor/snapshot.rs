@@ -1,8 +1,7 @@
-//! One moment of everything the editor shows, as plain data.
-//!
-//! Whoever hosts the editor fills it from atomics, triple buffers and rings; tests fill it by hand or by playing the
-//! instrument offline. The editor never sees a voice, a link or a lock. What is missing is shown as missing: every
-//! `Option` and empty list has a look of its own.
+//! Everything the editor shows at one moment, as plain data.
+//! The plugin fills it from atomics, triple buffers and rings. Tests fill it by hand or by playing the instrument offline.
+//! The editor knows no voice, no link to the knob and no lock. It shows missing values as missing: every `Option` and every
+//! empty list has its own look.
 
 use std::sync::Arc;
 
@@ -31,9 +30,9 @@ pub struct Snapshot {
     pub openings: Vec<f32>,
     /// Mouth pressure, kPa.
     pub mouth_kpa: f32,
-    /// What this fingering asks under the reed as it is set; `None` if it cannot sound or is not known yet.
+    /// The pressures that this fingering needs with this reed; `None` if it cannot sound or is not known yet.
     pub requirement: Option<Requirement>,
-    /// What the parameters say.
+    /// The settings of the parameters.
     pub settings: Settings,
     /// Where breath can come from.
     pub sources: Vec<BreathSource>,
@@ -48,7 +47,7 @@ pub struct Snapshot {
     pub standing: Vec<(f32, f32)>,
     /// What the user should know, most important first.
     pub status: Vec<Status>,
-    /// What the hand feels on this fingering, or why nothing.
+    /// The feel of this fingering, or the reason why there is none.
     pub feel: Result<NoteFeel, String>,
     /// The knob.
     pub knob: KnobState,
@@ -90,7 +89,7 @@ impl Snapshot {
         (self.settings.closing_pa() * 1e-3) as f32
     }
 
-    /// Mouth pressure, kPa, whatever stands there: 0..=100.
+    /// Mouth pressure, kPa, limited to 0..=100.
     pub fn mouth_now_kpa(&self) -> f32 {
         if self.mouth_kpa.is_finite() { self.mouth_kpa.clamp(0.0, 100.0) } else { 0.0 }
     }
@@ -129,20 +128,20 @@ pub struct PressureMarks {
     pub beats_kpa: Option<f32>,
     /// The reed at rest would be shut.
     pub closes_kpa: f32,
-    /// Nothing sounds any more.
+    /// The sound stops.
     pub chokes_kpa: Option<f32>,
 }
 
-/// One way breath comes in.
+/// A source of breath.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BreathSource {
     /// As players call it: "CC2 breath", "Knob".
     pub name: String,
-    /// What it says now, 0..=1.
+    /// Its value, 0..=1.
     pub value: f32,
-    /// It is the one that blows.
+    /// It sets the breath.
     pub is_live: bool,
-    /// It has said something since the start.
+    /// It has sent a value since the start.
     pub is_seen: bool,
 }
 
@@ -219,16 +218,16 @@ pub enum Severity {
     Good,
     /// Worth knowing.
     Note,
-    /// Something keeps the user from what they want.
+    /// Something the user should fix.
     Warn,
 }
 
-/// The knob and the line to it.
+/// The knob and the connection to it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct KnobState {
     /// What there is to choose from.
     pub devices: Vec<KnobDevice>,
-    /// Where the link stands, in a line.
+    /// State of the connection, in one line.
     pub text: String,
     /// It answers and can be armed.
     pub is_live: bool,

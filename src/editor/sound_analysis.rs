@@ -1,9 +1,8 @@
-//! What the sound view shows of the sound: spectrum, harmonics, pitch. For any thread but the audio thread, and only
-//! while somebody looks.
+//! Analysis for the sound view: spectrum, harmonics, pitch. It runs outside the audio thread, and only while a window is
+//! open.
 //!
-//! The latest samples go through one Hann window of 2^13 samples (171 ms at 48 kHz, bins of 5.9 Hz); the pitch is the
-//! house's own ([`pitch`]). A level is that of a sine: 0 dB is a sine of amplitude 1. Left out: averaging; the
-//! eye does it.
+//! The latest samples go through one Hann window of 2^13 samples (171 ms at 48 kHz, bins of 5.9 Hz); [`pitch`]
+//! measures the pitch. Levels are levels of a sine: 0 dB is amplitude 1. There is no averaging.
 
 use std::sync::Arc;
 
@@ -16,12 +15,12 @@ use chalumeau_core::units::cents;
 
 /// Samples looked at.
 pub const WINDOW: usize = 8192;
-/// Nothing is quieter, dB.
+/// Least level shown, dB.
 pub const FLOOR_DB: f32 = -120.0;
 /// Highest frequency shown, Hz.
 const HIGHEST_HZ: f64 = 12_000.0;
 
-/// What was heard.
+/// Spectrum, harmonics and pitch of the latest sound.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SoundAnalysis {
     /// Distance of `level_db`, Hz.
@@ -36,7 +35,7 @@ pub struct SoundAnalysis {
     pub cents: Option<f32>,
 }
 
-/// Looks at the sound. Allocates when made; each look allocates its answer.
+/// Analyses the sound. Allocates when made; each analysis allocates its result.
 pub struct SoundAnalyser {
     rate_hz: f64,
     fft: Arc<dyn RealToComplex<f32>>,
@@ -59,8 +58,8 @@ impl SoundAnalyser {
         }
     }
 
-    /// Looks at the end of `samples`; what is missing at the front counts as silence. `wanted_hz` is the pitch of the
-    /// note that is fingered.
+    /// Analyses the end of `samples`; missing samples at the front count as silence. `wanted_hz` is the pitch of the fingered
+    /// note.
     pub fn hear(&mut self, samples: &[f32], wanted_hz: Option<f64>) -> SoundAnalysis {
         let latest = &samples[samples.len().saturating_sub(WINDOW)..];
         let missing = WINDOW - latest.len();

@@ -1,4 +1,4 @@
-//! How the editor looks: two sets of colours with the same meanings, type sizes, and the few distances used everywhere.
+//! The editor's theme: two sets of colours with the same meanings, font sizes and distances.
 //!
 //! The curves' colours are those of the figures ([`palette`](chalumeau_figure::palette): Okabe and Ito, told apart by readers
 //! with any kind of colour vision), darkened a little on paper, where they are also text, and lightened on the dark

@@ -1,7 +1,6 @@
-//! Undo and redo of what was done in this window.
-//!
-//! A step is a gesture: the parameters it moved, each with its value before and after. What hosts automate, or another
-//! surface moves, is not recorded; undoing puts a parameter to where this window found it.
+//! Undo and redo of the changes made in this window.
+//! A step is a gesture: the parameters it changed, each with its value before and after. Changes by the host or by another
+//! controller are not recorded. Undoing sets a parameter to the value that it had at the start of the gesture.
 
 /// Steps kept; some hours of work.
 const KEPT: usize = 200;
@@ -9,7 +8,7 @@ const KEPT: usize = 200;
 /// One parameter in a step, normalised.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
-    /// Which.
+    /// A test.
     pub id: &'static str,
     /// Before the gesture.
     pub before: f32,
@@ -17,7 +16,7 @@ pub struct Change {
     pub after: f32,
 }
 
-/// What was done, and what was undone.
+/// The steps that can be undone, and those that can be redone.
 #[derive(Clone, Debug, Default)]
 pub struct UndoHistory {
     done: Vec<Vec<Change>>,

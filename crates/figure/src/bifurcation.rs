@@ -1,4 +1,4 @@
-//! How loud a note is against how hard it is blown, on the way up and on the way down.
+//! Amplitude of a note over mouth pressure, for rising and for falling pressure.
 
 use crate::palette::Colour;
 use crate::{Axis, Dash, Direction, Figure, Line, Mark, Panel, SecondAxis, Span};

@@ -1,4 +1,5 @@
-//! What the breath does: the pressures at which notes change, one note swelled and faded, and what blows from a knob.
+//! Figures of breath: the pressures at which notes change, a crescendo and diminuendo of one note, and the pressure over
+//! the knob's angle.
 //!
 //! Colours as in the editor: blue is breath, green where a note speaks, orange where the reed beats, vermilion where it
 //! closes, grey where the note chokes.

@@ -1,7 +1,6 @@
-//! What a figure says.
-//!
-//! All numbers are finite: builders drop what is not (a curve breaks there), so figures survive a way through JSON.
-//! Ranges left open are taken from the data when drawn.
+//! The data of a figure.
+//! All numbers are finite: builders drop others (a curve breaks there), so JSON can hold every figure. A range that is not
+//! given is taken from the data when the figure is drawn.
 
 use crate::palette::Colour;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! What the hand feels: torque against angle, and where it is felt against where it sounds.
+//! Torque over angle, and felt thresholds beside sounding thresholds.
 //!
 //! Torque is positive against the breath. A disc stands at the felt threshold, a ring where the resting reed is shut.
 
@@ -26,7 +26,7 @@ pub struct Torque {
 pub struct AtContrast {
     /// How much differences are exaggerated.
     pub contrast: f64,
-    /// The notes, or why a knob would not take them.
+    /// The notes, or the reason why a knob would refuse them.
     pub notes: Result<Vec<Torque>, String>,
 }
 
@@ -82,7 +82,7 @@ pub struct FeltThresholds {
     pub on_deg: Vec<(f64, Vec<(u8, f64)>)>,
 }
 
-/// Where each note is felt to start, beside where it starts to sound.
+/// The felt threshold of each note beside its sounding threshold.
 pub fn thresholds(note: &str, sounds_kpa: &[(u8, f64)], laws: &[FeltThresholds]) -> Figure {
     let notes = || sounds_kpa.iter().map(|&(written, _)| written);
     let along = |values: &[(u8, f64)]| -> Vec<(f64, f64)> {

@@ -1,4 +1,4 @@
-//! A rendering as a picture: outline, spectrogram, pitch over the score, breath, and the reed at one moment.
+//! The figure of a rendering: waveform, spectrogram, pitch over the score, breath, and the reed in close-up.
 
 use crate::palette::Colour;
 use crate::{Axis, ColourMap, Direction, Figure, Heat, Layer, Line, Mark, Panel, Polygon, SecondAxis};
@@ -26,7 +26,7 @@ pub struct Note {
     pub to_s: f64,
 }
 
-/// The inside of the instrument at one moment.
+/// Internal signals of the instrument over a few periods.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReedCloseUp {
     /// When it begins, s.
@@ -37,7 +37,7 @@ pub struct ReedCloseUp {
     pub probes: Vec<Probe>,
 }
 
-/// Everything the picture shows.
+/// Everything the figure shows.
 pub struct PerformanceFigure<'a> {
     /// What is played.
     pub title: &'a str,
@@ -53,7 +53,7 @@ pub struct PerformanceFigure<'a> {
     pub gamma: &'a Envelope,
     /// Pressure that closes the reed, Pa.
     pub closing_pa: f64,
-    /// A moment from near, if there is one.
+    /// The close-up, if there is one.
     pub moment: Option<&'a ReedCloseUp>,
 }
 

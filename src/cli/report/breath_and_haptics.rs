@@ -1,4 +1,4 @@
-//! The report's chapters on breath and on what a knob feels: for the instrument and the reed that were played.
+//! The report's chapters "Breath" and "Haptics", for the instrument and the reed that were played.
 
 use crate::cli::report::{number, word};
 use crate::cli::score_args::RenderJob;
@@ -40,7 +40,7 @@ fn law_name(law: Law) -> &'static str {
     }
 }
 
-/// What the instrument asks, and what is made of it.
+/// The pressures that the notes need, and the feel made from them.
 pub struct BreathAndHaptics<'a> {
     prepared: &'a RenderJob,
     feels: Feels,
@@ -53,7 +53,7 @@ pub struct BreathAndHaptics<'a> {
 }
 
 impl<'a> BreathAndHaptics<'a> {
-    /// Asks the instrument: a second. `near` is the written note to swell.
+    /// Analyses the instrument (about 1 s). `near` is the written note to swell.
     pub fn new(prepared: &'a RenderJob, design: FeelDesign, near: Option<WrittenNote>) -> Self {
         let feels = Feels::new(&prepared.model);
         let asked = feels.requirements().with(&played_reed(&prepared.model.file, &prepared.settings));
@@ -219,8 +219,8 @@ impl<'a> BreathAndHaptics<'a> {
         let design = format!("{} law, Contrast {}", law_name(self.design.law), self.design.contrast);
         Plate {
             figure: turns(&format!("{design}; {}", self.reed()), self.closing_kpa(), &all),
-            caption: "What an angle blows: bent note by note, so that the sound begins (disc) where the torque has its \
-                      mark, and the reed closes (ring) where the torque ends."
+            caption: "The mouth pressure of an angle, for each note: the sound begins (disc) at the mark of the torque, and the reed \
+                      closes (ring) where the torque ends."
                 .to_owned(),
             alternative: format!(
                 "Mouth pressure against the angle of the knob, {design}, for written {}.",
@@ -276,10 +276,10 @@ impl<'a> BreathAndHaptics<'a> {
     pub fn haptics(&self) -> Chapter {
         let ceiling_mnm = self.limits.ceiling_mnm;
         let mut words = vec![format!(
-            "What a force-feedback knob is told for these notes, at {} mNm. Contrast 1 is what the bore asks; more \
-             exaggerates how notes differ, in the hand only. Drawn is the torque the knob's firmware works out, at rest and \
-             without its friction, which may not pass {ceiling_mnm:.0} mNm or be steeper than {:.2} N m/rad, up to which a \
-             sampled knob stays passive, nor push the hand along with more than {:.1} N m/rad.",
+            "The feel of a force-feedback knob for these notes, at {} mNm. Contrast 1 follows the bore; a larger contrast \
+             exaggerates how notes differ, in the hand only. The figures show the torque that the knob's firmware calculates, at \
+             rest and without friction. It must not pass {ceiling_mnm:.0} mNm, must not be steeper than {:.2} N m/rad, up to \
+             which a sampled knob stays passive, and must not push the hand along with more than {:.1} N m/rad.",
             self.design.strength_mnm, self.limits.stiffness_nm_per_rad, self.limits.push_nm_per_rad
         )];
         let mut plates = Vec::new();
@@ -387,7 +387,7 @@ impl<'a> BreathAndHaptics<'a> {
             row
         };
         ReportTable {
-            title: "What the knob is told".to_owned(),
+            title: "Feel sent to the knob".to_owned(),
             about: format!(
                 "FEEL of every note, {} law, Contrast {} about {}: where it is felt to start, beats, closes and chokes.",
                 law_name(self.design.law),
@@ -430,10 +430,10 @@ impl<'a> BreathAndHaptics<'a> {
 }
 
 fn refused(rows: Vec<Vec<TableCell>>) -> ReportTable {
-    let head = ["law", "Contrast", "at the torque asked for", "accepted up to, mNm", "then in the way"];
+    let head = ["law", "Contrast", "at the torque asked for", "accepted up to, mNm", "limited by"];
     ReportTable {
         title: "What a knob would refuse".to_owned(),
-        about: "A feel that a knob could not hold still, or that passes the ceiling, is refused whole; nothing is clipped."
+        about: "A feel is refused as a whole if a knob could not hold it stable or if it passes the ceiling; it is never clipped."
             .to_owned(),
         head: head.map(str::to_owned).to_vec(),
         rows,

@@ -1,4 +1,4 @@
-//! Where everything stands on a picture.
+//! The layout of a figure.
 //!
 //! From top to bottom: title and notes; then rows of panels, each with its own title, its legend and the names of its
 //! upright marks above the axes, so that no word covers data.
