@@ -1,4 +1,4 @@
-//! `chalumeau bifurcation`: one note up and down the breath.
+//! `chalumeau bifurcation`: one note with slowly rising and falling breath.
 
 use crate::cli::Failure;
 use crate::cli::csv_table::TableArgs;

@@ -76,7 +76,7 @@ impl BoreCommand {
     }
 }
 
-/// Metres as millimetres to the nanometre, without what binary fractions add.
+/// Metres as millimetres, rounded to the nanometre to remove errors of binary fractions.
 fn mm(metres: f64) -> f64 {
     (metres * 1e9).round() / 1e6
 }

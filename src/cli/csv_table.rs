@@ -21,12 +21,12 @@ pub struct TableArgs {
 }
 
 impl TableArgs {
-    /// Whether the table was to go to a file.
+    /// Whether the table goes to a file.
     pub fn to_file(&self) -> bool {
         self.csv != Path::new("-")
     }
 
-    /// Whether existing files are to be replaced.
+    /// Whether existing files may be replaced.
     pub fn force(&self) -> bool {
         self.force
     }
@@ -41,7 +41,7 @@ enum Sink {
     File(NewFile),
 }
 
-/// A table being written; a file appears with [`finish`](CsvTable::finish).
+/// A table being written. A file appears with [`finish`](CsvTable::finish).
 pub struct CsvTable {
     sink: Sink,
 }
@@ -59,7 +59,7 @@ impl CsvTable {
         Ok(table)
     }
 
-    /// A line for readers, not for programs; a name of several lines becomes one.
+    /// A comment line for a human reader; line breaks become spaces.
     pub fn comment(&mut self, text: fmt::Arguments) -> Result<(), Failure> {
         self.line(format_args!("# {}", text.to_string().replace(['\n', '\r'], " ")))
     }
@@ -72,7 +72,7 @@ impl CsvTable {
         }?)
     }
 
-    /// Writes what is left and gives a file its name.
+    /// Writes the rest; a file gets its name.
     pub fn finish(self) -> Result<(), Failure> {
         match self.sink {
             Sink::Stdout(mut out) => Ok(out.flush()?),
@@ -81,7 +81,7 @@ impl CsvTable {
     }
 }
 
-/// A field of a table, whatever is in it.
+/// A field of a table, quoted where its text needs that.
 pub fn quoted(text: &str) -> Cow<'_, str> {
     if text.contains([',', '"', '\n', '\r']) {
         Cow::Owned(format!("\"{}\"", text.replace('"', "\"\"")))

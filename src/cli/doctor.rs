@@ -22,10 +22,10 @@ Examples:
   chalumeau doctor --osc --any-address        stock firmware, over Wi-Fi
   chalumeau doctor --seconds 60               a longer look at rate and jitter";
 
-/// A port is given so long to answer; a board that restarts when its port is opened takes 5 s.
+/// Longest wait for an answer; a board that restarts when its port is opened takes 5 s.
 const ANSWER: Duration = Duration::from_secs(7);
 
-/// FEEL changes so often while it is timed.
+/// Time between two changes of FEEL while its round trip is measured.
 const FEEL_EVERY: Duration = Duration::from_millis(50);
 
 /// List knobs, say why one does not answer, and measure the connection
@@ -39,7 +39,7 @@ pub struct DoctorCommand {
     /// Ask this serial port only, even if its USB identity is not known
     #[arg(long, value_name = "PORT", conflicts_with = "osc")]
     path: Option<PathBuf>,
-    /// Listen only for the OSC of unmodified firmware, at this port of UDP
+    /// Listen only for OSC from unmodified firmware, at this UDP port
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8000")]
     osc: Option<u16>,
     /// With --osc: listen to the whole network instead of this machine alone
@@ -77,7 +77,7 @@ impl DoctorCommand {
         Ok(())
     }
 
-    /// Links to `choice`, watches it and tells; true if a knob with our firmware answered.
+    /// Links to `choice`, watches it and reports; true if a knob with this project's firmware answered.
     fn ask(&self, out: &mut impl Write, choice: Choice) -> io::Result<bool> {
         let name = match &choice {
             Choice::Path(path) => path.display().to_string(),

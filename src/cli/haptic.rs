@@ -16,7 +16,7 @@ use clap::Args;
 const STEP_DEG: f64 = 0.1;
 /// The curve begins in the slap region, degrees.
 const FROM_DEG: f64 = -150.0;
-/// And ends this far behind the wall, degrees.
+/// The curve ends this far behind the wall, degrees.
 const BEHIND_WALL_DEG: f64 = 5.0;
 
 const EXAMPLES: &str = "\

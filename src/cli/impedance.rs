@@ -37,7 +37,7 @@ enum Model {
     Tmm,
 }
 
-/// Input impedance of a fingering at the reed: a curve, or its peaks
+/// Calculate the input impedance of a fingering at the reed: a curve, or its peaks
 ///
 /// Values are over Zc = rho c / S of the nominal bore, 14.9 mm wide unless the instrument file names another. A clarinet sounds near a peak of its impedance; the register key
 /// spoils the first one so that the second sounds, a twelfth higher. The reed itself adds a little volume that lowers the
@@ -71,7 +71,7 @@ pub struct ImpedanceCommand {
     air: AirArg,
     #[command(flatten)]
     instrument: InstrumentArg,
-    /// How finely the lattice is cut
+    /// Resolution of the lattice
     #[arg(long, value_enum, default_value_t = QualityArg::Live)]
     quality: QualityArg,
     #[command(flatten)]
@@ -155,7 +155,7 @@ impl ImpedanceCommand {
         })
     }
 
-    /// The picture of one fingering, with the other model beside the one asked for.
+    /// The figure of one fingering, with the other model beside the chosen one.
     fn fingering(&self, bore: &Bore, file: &InstrumentFile, of: &Fingering, volume_m3: f64) -> Figure {
         let air = self.air.air();
         let count = usize::from(self.peaks.unwrap_or(30));
@@ -209,7 +209,7 @@ impl ImpedanceCommand {
         })
     }
 
-    /// The picture of all notes' peaks.
+    /// The figure of the peaks of all notes.
     fn chart(&self, bore: &Bore, file: &InstrumentFile, notes: &[WrittenNote], volume_m3: f64) -> Figure {
         let count = usize::from(self.peaks.unwrap_or(8));
         let rows: Vec<NotePeaks> = notes
@@ -279,7 +279,7 @@ impl Bore {
     }
 }
 
-/// Pitch of a note at A4 = 440 Hz, Hz. A file has no note that could not sound.
+/// Pitch of a note at A4 = 440 Hz, Hz. Every note of an instrument file has a sounding pitch.
 fn sounding_hz(file: &InstrumentFile, written: WrittenNote) -> f64 {
     written.sounding(file.transposition).unwrap_or(SoundingNote(written.0)).frequency_hz(440.0)
 }

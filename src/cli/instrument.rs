@@ -54,7 +54,7 @@ impl InstrumentCommand {
     }
 }
 
-/// Where the instrument goes, and what both makers of one ask.
+/// Output file, name and transposition, for `import` and `new`.
 #[derive(Args)]
 struct NewInstrument {
     /// Instrument file to write
@@ -72,10 +72,10 @@ struct NewInstrument {
 }
 
 impl NewInstrument {
-    /// Writes what can be read again, and says what it is and what is wrong with it at this pitch of A4, Hz.
+    /// Writes the instrument, after a check that it can be read again; then prints a summary and warnings for this A4, Hz.
     fn write(&self, file: &InstrumentFile, a4_hz: f64) -> Result<(), Failure> {
         let text = file.to_toml();
-        // A scaled or solved instrument may have left the limits of the format.
+        // A scaled or calculated instrument may be outside the limits of the format.
         InstrumentFile::parse(&text)
             .map_err(|source| Failure::InstrumentFile { path: self.out.clone(), source })?;
         let mut out = NewFile::create(&self.out, self.force)?;
@@ -99,9 +99,8 @@ impl NewInstrument {
 }
 
 /// Make an instrument file from three CSV tables
-///
-/// A line each for a cone of the bore, a tone hole, a note; the first line names the columns, lines beginning with # are
-/// comments. Columns say their unit and whether they are radii: bore x_start_m, x_end_m, r_start_m, r_end_m [part];
+/// The tables have one line for each cone of the bore, each tone hole and each note. The first line names the columns;
+/// lines that begin with # are comments. Column names contain the unit, and radius or diameter: bore x_start_m, x_end_m, r_start_m, r_end_m [part];
 /// holes hole, x_m, hole_radius_m, chimney_height_m [kind, register, description]; fingerings written_note, register, and
 /// one column of 0 (closed) and 1 (open) for each hole [mode, fingers, sounding_note]. Any length may be in _mm, any radius
 /// a diameter (diameter_start_mm).

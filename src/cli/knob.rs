@@ -17,7 +17,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-/// How often the line on the screen is written anew.
+/// Time between two updates of the line on the screen.
 const SHOWN_EVERY: Duration = Duration::from_millis(100);
 /// How long to look for a knob before giving up.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -90,7 +90,7 @@ impl KnobCommand {
         let ceiling_mnm = self.arm.unwrap_or(100.0);
         let limits = TorqueLimits { ceiling_mnm, ..TorqueLimits::default() };
         let settings = Settings::default();
-        // The knob is told this note and no other: what the hardest would need is no matter.
+        // The knob gets this note only, so the hardest note does not matter.
         let design = self.feel.design(&file)?;
         let table = feels.table(&settings, &design, &NO_MOTOR)?;
         let fingering = feels.requirements().written().position(|note| note == written).unwrap_or(0);

@@ -40,7 +40,7 @@ i2c, brownout, overspeed.";
 /// What the knob calls itself.
 const NAME: &str = "TorqueTuner sim";
 
-/// A simulated TorqueTuner running the real firmware, at a serial port of its own
+/// Simulate a TorqueTuner that runs the real firmware, at its own serial port
 ///
 /// Simulates knob, friction, encoder, motor board and a hand, 2,000 times a second. Like a real knob, it arms only when a
 /// host asks.
@@ -69,7 +69,7 @@ pub struct KnobSimCommand {
     port: PortArgs,
 }
 
-/// What the hand does; without one, nobody holds the knob.
+/// The hand's motion; without one, nobody holds the knob.
 #[derive(Args)]
 #[group(id = "deed", multiple = false)]
 struct DeedArgs {
@@ -90,7 +90,7 @@ struct DeedArgs {
     slap: bool,
 }
 
-/// The hand and how it is.
+/// The hand.
 #[derive(Args)]
 #[command(next_help_heading = "Hand")]
 struct HandArgs {

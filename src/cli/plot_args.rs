@@ -19,7 +19,7 @@ pub struct PlotArgs {
 }
 
 impl PlotArgs {
-    /// Whether one was asked for.
+    /// Whether a figure is wanted.
     pub fn wanted(&self) -> bool {
         self.plot.is_some()
     }
@@ -38,12 +38,12 @@ pub struct Plot {
 }
 
 impl Plot {
-    /// Whether there will be one.
+    /// Whether a figure will be drawn.
     pub fn wanted(&self) -> bool {
         self.sheet.is_some()
     }
 
-    /// Draws what `figure` returns, if a picture is wanted.
+    /// Draws what `figure` returns, if a figure is wanted.
     pub fn draw(self, figure: impl FnOnce() -> Figure) -> Result<(), Failure> {
         match self.sheet {
             Some(sheet) => Ok(sheet.draw(&figure())?),

@@ -42,7 +42,7 @@ const RATE: u32 = 48_000;
 const FRAMES: usize = 199;
 const FRAME_S: f64 = 0.05;
 
-/// What can be drawn.
+/// The figures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Which {
     /// The law with opening, stiffness and closing pressure 1, over -0.1..1
@@ -57,7 +57,7 @@ enum Which {
     Coupled,
     /// Amplitudes A
     Amplitude,
-    /// What happens when the air flows back
+    /// Flow and opening when the air flows back
     Negative,
     /// Reeds in kPa and litres a second
     Physical,
@@ -69,7 +69,7 @@ enum Which {
     All,
 }
 
-/// The kind of picture `all` makes.
+/// File format of figures in a directory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Format {
     Png,
@@ -77,7 +77,7 @@ enum Format {
     Json,
 }
 
-/// The reed's pressure tables, flow against pressure, or figures of it
+/// Print the reed's tables or flow law, or draw figures of them
 ///
 /// The flow through a reed grows with the root of the pressure difference until the pressure closes the slit faster than
 /// it drives the air: u = A (H sqrt(p) - p^1.5 / k), zero from p = H k on. p is the pressure difference over the closing
@@ -211,7 +211,7 @@ impl Drawing {
         Ok(())
     }
 
-    /// Checks what the orbit needs; what is returned plays it.
+    /// Checks the arguments of the orbit; the returned function plays it.
     fn prepare_orbit(&self) -> Result<impl FnOnce() -> Result<ReedOrbit, Failure> + '_, Failure> {
         let file = self.instrument.load()?;
         let written = WrittenNote(self.written);

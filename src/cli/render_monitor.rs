@@ -10,11 +10,11 @@ use chalumeau_figure::performance::{Note, PerformanceFigure, ReedCloseUp, perfor
 
 /// Columns of a picture: as many as a drawing of usual size has pixels for.
 pub const COLUMNS: usize = 1_300;
-/// Periods of the note in the close look at the reed.
+/// Periods of the note in the reed's close-up.
 const PERIODS: f64 = 5.0;
-/// Length of that look, s: short enough to see the reed shut, long enough to see it twice.
+/// Least and greatest length of the close-up, s: short enough to see the reed shut, long enough to see it twice.
 const MOMENT_S: (f64, f64) = (0.004, 0.05);
-/// Period where no note says another, s.
+/// Period where there is no note, s.
 const PERIOD_S: f64 = 0.004;
 
 /// Collects what the figure and the report need, block by block.
@@ -23,7 +23,7 @@ pub struct RenderMonitor {
     listener: Listener,
     gamma: Envelope,
     moment: ReedCloseUp,
-    /// Internal samples of the close look.
+    /// First and last internal sample of the close-up.
     near: (u64, u64),
     seen: u64,
     soundings: Vec<Sounding>,
@@ -32,7 +32,7 @@ pub struct RenderMonitor {
     closing_pa: f64,
 }
 
-/// What a rendering was like.
+/// Analysis of a whole rendering.
 pub struct RenderSummary {
     overview: Overview,
     gamma: Envelope,
@@ -45,7 +45,7 @@ pub struct RenderSummary {
 }
 
 impl RenderMonitor {
-    /// For a rendering about to begin. The close look is at `near_s`, or in the middle of the longest note.
+    /// For a rendering that is about to begin. The close-up is at `near_s`, or in the middle of the longest note.
     pub fn new(prepared: &RenderJob, near_s: Option<f64>) -> Result<Self, Failure> {
         let (score, rate_hz) = (&prepared.score, f64::from(prepared.rate));
         let (seconds, soundings) = (score.seconds(prepared.rate), score.soundings());
@@ -88,7 +88,7 @@ impl RenderMonitor {
         })
     }
 
-    /// The next moment inside.
+    /// Takes the next internal sample.
     pub fn inside(&mut self, probe: Probe) {
         self.gamma.push(probe.gamma as f32);
         if (self.near.0..self.near.1).contains(&self.seen) {
@@ -97,13 +97,13 @@ impl RenderMonitor {
         self.seen += 1;
     }
 
-    /// The next samples.
+    /// Takes the next block of sound.
     pub fn hear(&mut self, block: &[f32]) {
         self.watcher.see(block);
         self.listener.hear(block);
     }
 
-    /// The whole.
+    /// The analysis of the whole rendering.
     pub fn finish(self) -> RenderSummary {
         let note = |sounding: &Sounding| Note {
             note: sounding.note,
@@ -123,7 +123,7 @@ impl RenderMonitor {
 }
 
 impl RenderSummary {
-    /// All of it in one picture.
+    /// The figure of the rendering.
     pub fn figure(&self, title: &str, notes: Vec<String>) -> Figure {
         performance(&PerformanceFigure {
             title,

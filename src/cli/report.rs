@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 
 /// Samples per block; any number gives the same sound.
 const BLOCK: usize = 512;
-/// Longest sound put into a page, s: 77 MB of text at 48 kHz, about what browsers still open with ease.
+/// Longest sound inside a page, s: 77 MB of text at 48 kHz, about what browsers still open easily.
 const INSIDE_MAX_S: f64 = 600.0;
 
 const EXAMPLES: &str = "\
@@ -173,7 +173,7 @@ impl ReportCommand {
     }
 }
 
-/// Plays and watches; the sound goes to `out` in 16 bits.
+/// Plays and analyses; the sound goes to `out` in 16 bits.
 fn played(
     prepared: &RenderJob,
     watch: RenderMonitor,
@@ -205,7 +205,7 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// The command as it was given, so that another can give it again.
+/// The command as typed, so that a reader can repeat it.
 fn command() -> String {
     let words = std::env::args().skip(1).map(|word| {
         let plain =
@@ -215,7 +215,7 @@ fn command() -> String {
     std::iter::once("chalumeau".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
-/// To a tenth, with its sign unless it is none.
+/// Rounded to a tenth, with its sign unless it is 0.
 fn signed(cents: f64) -> String {
     let tenths = (10.0 * cents).round();
     if tenths == 0.0 { "0.0".to_owned() } else { format!("{:+.1}", tenths / 10.0) }
@@ -235,7 +235,7 @@ fn notes(prepared: &RenderJob, heard: &[Heard], outcome: &str) -> ReportTable {
     let row = |heard: &Heard| {
         let (from, to) = (heard.sounding.from as f64 / rate_hz, heard.sounding.to as f64 / rate_hz);
         let written = heard.sounding.note.written(prepared.model.file.transposition);
-        // No pitch is said, not left out.
+        // A note without a pitch says "none".
         let or_none = |text: Option<String>| text.unwrap_or_else(|| "none".to_owned());
         vec![
             number(format!("{from:.2}")),

@@ -111,7 +111,7 @@ impl RenderJob {
 }
 
 impl ScoreArgs {
-    /// Reads, checks and fits whatever was named. Takes seconds for an instrument file.
+    /// Reads and checks the arguments and prepares the instrument. Takes seconds for an instrument file.
     pub fn prepare(&self) -> Result<RenderJob, Failure> {
         let file = self.instrument.load()?;
         let curve = self.curve()?;
@@ -130,7 +130,7 @@ impl ScoreArgs {
         Ok(RenderJob { model, settings, score, rate: self.rate })
     }
 
-    /// How a knob shall feel.
+    /// The feel of the knob.
     pub fn feel(&self, file: &InstrumentFile) -> Result<FeelDesign, Failure> {
         self.feel.design(file)
     }
@@ -147,7 +147,7 @@ impl ScoreArgs {
         }
     }
 
-    /// The events of a score, blown by a take.
+    /// The events of a score with the breath of a take.
     fn replayed(
         &self,
         path: &Path,

@@ -114,7 +114,7 @@ fn preparing() -> ProgressBar {
     }
 }
 
-/// How finely the bore is cut.
+/// Resolution of the lattice.
 #[derive(Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub enum QualityArg {
     /// As the plugin plays: 96 or 88.2 kHz internally
@@ -138,7 +138,7 @@ impl From<QualityArg> for Quality {
 pub struct PlayedArgs {
     #[command(flatten)]
     instrument: InstrumentArg,
-    /// How finely the bore is cut
+    /// Resolution of the lattice
     #[arg(long, value_enum, default_value_t = QualityArg::Live)]
     quality: QualityArg,
     /// Play an instrument file as measured; tuning it takes up to a minute the first time

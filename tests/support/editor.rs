@@ -15,7 +15,7 @@ use chalumeau::editor::sound_analysis::SoundAnalyser;
 use chalumeau::editor::{EditorState, Tab, WindowState, draw};
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::event::Event;
-use chalumeau_core::haptics::{FeelDesign, FeelTable, TorqueLimits};
+use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, PlayedReed, Requirements, TorqueLimits};
 use chalumeau_core::instrument::{Clarinet, Probe, Settings, Tuning, felt};
 use chalumeau_core::reed::PhysicalReed;
 use chalumeau_core::units::WrittenNote;
@@ -326,6 +326,15 @@ fn armed_knob(angle_deg: Option<f32>, torque_mnm: Option<f32>) -> KnobState {
     }
 }
 
+/// The feel of a fingering with generous limits, or why there is none.
+fn feel_of(bore: &Requirements, reed: &PlayedReed, fingering: usize) -> Result<NoteFeel, String> {
+    let limits = TorqueLimits { ceiling_mnm: 250.0, stiffness_nm_per_rad: 10.0, push_nm_per_rad: 10.0 };
+    let table = FeelTable::new(bore, &FeelDesign::default(), reed, &limits);
+    table
+        .map_err(|refused| refused.to_string())
+        .and_then(|table| table.note(fingering).copied().ok_or_else(|| "this note has no feel".to_owned()))
+}
+
 /// Plays `written` for five seconds, a swell that settles at `gamma`, and looks at the end of it.
 pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot {
     let mut clarinet = Clarinet::built_in(RATE_HZ).unwrap();
@@ -361,11 +370,7 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
     let open = &model.file.fingerings[fingering].open;
     let bore = felt::requirements(&model);
     let reed = felt::played_reed(&model.file, settings);
-    let limits = TorqueLimits { ceiling_mnm: 250.0, stiffness_nm_per_rad: 10.0, push_nm_per_rad: 10.0 };
-    let table = FeelTable::new(&bore, &FeelDesign::default(), &reed, &limits);
-    let feel = table
-        .map_err(|refused| refused.to_string())
-        .and_then(|table| table.note(fingering).copied().ok_or_else(|| "this note has no feel".to_owned()));
+    let feel = feel_of(&bore, &reed, fingering);
     let angle_deg = feel.as_ref().ok().map(|feel| feel.map.angle_deg(f64::from(mouth_kpa) * 1e3) as f32);
     let torque_mnm = feel.as_ref().ok().zip(angle_deg).map(|(feel, deg)| {
         chalumeau_core::haptics::law::torque_mnm(

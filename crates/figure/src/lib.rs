@@ -33,6 +33,7 @@
 pub mod bifurcation;
 pub mod bore;
 pub mod breath;
+mod builders;
 mod data;
 #[cfg(feature = "draw")]
 pub mod draw;

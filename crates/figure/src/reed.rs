@@ -26,7 +26,7 @@ pub enum LawFigure {
     Coupled,
     /// Amplitudes A.
     Amplitude,
-    /// What happens when the air flows back.
+    /// Flow and opening when the air flows back.
     Negative,
     /// Reeds in pascal and litres a second.
     Physical,

@@ -17,19 +17,19 @@ use chalumeau_figure::report::{Chapter, Plate, ReportTable, TableCell};
 use chalumeau_knob::touch::feel::Feels;
 use chalumeau_knob::wire::message::Law;
 
-/// Exaggerations shown.
+/// Contrasts shown.
 const CONTRASTS: [f64; 3] = [1.0, 3.0, 5.0];
 /// Both laws that push.
 const LAWS: [Law; 2] = [Law::Flow, Law::Pressure];
-/// Most mouth pressure the instrument knows, kPa.
+/// Greatest mouth pressure of the instrument, kPa.
 const MOST_KPA: f64 = 20.0;
-/// The swell goes this far beyond where the note chokes.
+/// The crescendo goes to this many times the pressure at which the note chokes.
 const BEYOND: f64 = 1.06;
-/// The swell's way up, and its way down, s: a long breath.
+/// Time of the crescendo, and again of the diminuendo, s: a long breath.
 const SWELL_S: f64 = 6.0;
 /// Points along a curve.
 const POINTS: usize = 400;
-/// A mode that starts this much later than the first is another register's, over the first.
+/// A mode that starts at this many times the pressure of the first belongs to another register.
 const LATER: f64 = 1.01;
 
 fn law_name(law: Law) -> &'static str {
@@ -48,7 +48,7 @@ pub struct BreathAndHaptics<'a> {
     /// As the command says.
     design: FeelDesign,
     limits: TorqueLimits,
-    /// Index of the fingering that is looked at from near.
+    /// Index of the fingering for the crescendo.
     near: Option<usize>,
 }
 
@@ -95,7 +95,7 @@ impl<'a> BreathAndHaptics<'a> {
         }
     }
 
-    /// How hard notes are blown, one of them swelled, and the knob's angle as breath.
+    /// Pressures of all notes, a crescendo of one note, and pressure over the knob's angle.
     pub fn breath(&self) -> Chapter {
         let closing_kpa = self.closing_kpa();
         let changes: Vec<NotePressures> = self.notes().map(|note| self.changes(note)).collect();
@@ -126,7 +126,7 @@ impl<'a> BreathAndHaptics<'a> {
         Chapter { title: "Breath".to_owned(), words, plates, tables: vec![self.pressures()] }
     }
 
-    /// One note played from silence to closure and back.
+    /// One note from silence to closure and back.
     fn swell(&self, near: usize, changes: NotePressures) -> Option<(Plate, String)> {
         let (written, asked) = self.notes().nth(near)?;
         let closing_kpa = self.closing_kpa();
@@ -399,7 +399,7 @@ impl<'a> BreathAndHaptics<'a> {
         }
     }
 
-    /// Whether a feel is taken, up to which torque, and what stands in the way of more.
+    /// Whether a feel is accepted, up to which torque, and what limits the torque.
     fn refusal(&self, design: &FeelDesign, reason: Option<&FeelRefused>) -> Vec<TableCell> {
         let taken = reason.map_or("accepted".to_owned(), |reason| format!("refused: {reason}"));
         let (mut low, mut high) = (0.0, 450.0);
