@@ -1,15 +1,15 @@
-//! The command line: arguments in, files and tables out. Measures and plays nothing itself.
+//! The command line: reads arguments, writes files and tables. Other modules measure and play.
 //!
 //! Each subcommand is one file. Tables go to standard output or a file as CSV: the header first, then lines beginning
-//! with `#` that say what was measured, then data. A mistake of the user ends with exit code 2, a message that says what
-//! was given and what would be right, and no file; a reader that closes the pipe early is no mistake.
+//! with `#` that say what was measured, then data. After a user's mistake the exit code is 2, a message
+//! says what was given and what would be right, and no file is written. A reader that closes the pipe early is no error.
 
-mod args;
 mod bifurcation;
 mod bore;
+mod csv_table;
 #[cfg(feature = "devices")]
 mod doctor;
-mod feel;
+mod feel_args;
 mod haptic;
 mod impedance;
 mod instrument;
@@ -18,18 +18,18 @@ mod knob;
 #[cfg(feature = "simulator")]
 mod knob_sim;
 mod parameters;
-mod play;
-mod plot;
+mod plot_args;
 mod reed;
 mod reed_physical;
 mod render;
+mod render_monitor;
 mod report;
+mod score_args;
 mod settings;
+mod shared_args;
 mod study;
-mod table;
 mod threshold;
 mod tune;
-mod watch;
 
 use crate::output::OutputError;
 use crate::picture_file::PictureError;
@@ -74,24 +74,24 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    Render(Box<render::Render>),
-    Report(Box<report::Report>),
-    Impedance(Box<impedance::Impedance>),
-    Bore(Box<bore::Bore>),
-    Instrument(Box<instrument::Instrument>),
-    Threshold(threshold::Threshold),
-    Bifurcation(Box<bifurcation::Bifurcation>),
-    Tune(Box<tune::Tune>),
-    Reed(reed::Reed),
-    Study(study::Study),
+    Render(Box<render::RenderCommand>),
+    Report(Box<report::ReportCommand>),
+    Impedance(Box<impedance::ImpedanceCommand>),
+    Bore(Box<bore::BoreCommand>),
+    Instrument(Box<instrument::InstrumentCommand>),
+    Threshold(threshold::ThresholdCommand),
+    Bifurcation(Box<bifurcation::BifurcationCommand>),
+    Tune(Box<tune::TuneCommand>),
+    Reed(reed::ReedCommand),
+    Study(study::StudyCommand),
     Parameters(parameters::Parameters),
     #[cfg(feature = "devices")]
-    Knob(Box<knob::Knob>),
+    Knob(Box<knob::KnobCommand>),
     #[cfg(feature = "simulator")]
-    KnobSim(Box<knob_sim::KnobSim>),
-    Haptic(Box<haptic::Haptic>),
+    KnobSim(Box<knob_sim::KnobSimCommand>),
+    Haptic(Box<haptic::HapticCommand>),
     #[cfg(feature = "devices")]
-    Doctor(doctor::Doctor),
+    Doctor(doctor::DoctorCommand),
 }
 
 /// Why a command ended early.
@@ -153,7 +153,8 @@ impl Failure {
     }
 }
 
-/// Whether these words, without the program's name, are a command; nothing is done. So documents are held to what there is.
+/// Checks that these words, without the program's name, are a valid command. Runs nothing. A test checks the commands in
+/// the documents with it.
 pub fn understands<'a>(words: impl IntoIterator<Item = &'a str>) -> Result<(), String> {
     match Cli::try_parse_from(std::iter::once("chalumeau").chain(words)) {
         Err(error) if error.use_stderr() => Err(error.to_string()),
@@ -162,7 +163,7 @@ pub fn understands<'a>(words: impl IntoIterator<Item = &'a str>) -> Result<(), S
     }
 }
 
-/// Commands of fuller builds.
+/// Commands that this build lacks.
 const LEFT_OUT: &[&str] = &[
     #[cfg(not(feature = "devices"))]
     "doctor",
@@ -176,7 +177,7 @@ const LEFT_OUT: &[&str] = &[
 pub fn main() -> ExitCode {
     if let Some(command) = std::env::args().nth(1).filter(|name| LEFT_OUT.contains(&name.as_str())) {
         return failed(&Failure::Usage(format!(
-            "{command} is not in this build, which leaves devices out; `cargo build --release` builds all of it"
+            "{command} is not in this build, which has no devices; `cargo build --release` builds all commands"
         )));
     }
     let done = match Cli::parse().command {

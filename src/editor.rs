@@ -1,33 +1,31 @@
-//! What the plugin's window shows: a pure function of parameters and a snapshot of one moment.
-//!
-//! [`draw`] lays out one calm window: note, pitch and tools on top, the breath meter on the right and keys below, always
-//! in sight, and one view in the middle. It reads [`Snapshot`] and [`Controls`], moves parameters through the latter,
-//! and gives back what is no parameter as [`Action`]s. It never sees a voice, a link or a host; it blocks on nothing and
-//! asks for no repaint of its own. Made for 1100 by 720 points, usable from 700 by 480 on. Design units: points; zoom
-//! belongs to whoever owns the window.
+//! The plugin's window, as a pure function of the parameters and a snapshot.
+//! [`draw`] lays out one window: note, pitch and tools on top, the breath meter on the right and the keys below are always
+//! in sight; one view is in the middle. It reads [`Snapshot`] and [`Controls`], changes parameters through [`Controls`], and
+//! returns everything else that the user did as [`Action`]s. It knows no voice, no link to the knob and no host, it never
+//! blocks, and it asks for no repaint. The design size is 1100 by 720 points, the least usable size 700 by 480. The owner
+//! of the window applies the zoom.
 
-mod alternates;
-mod blind_view;
+pub mod ab_comparison;
+mod blind_comparison_view;
+mod breath_meter;
 mod breath_view;
 mod chart;
-mod clarinet_body;
+mod clarinet_drawing;
 mod clarinet_view;
-pub mod compare;
 pub mod controls;
 pub mod feel_test;
 mod header;
-pub mod history;
 mod instrument_view;
 mod keyboard;
-mod knob_panel;
-pub mod listener;
-mod meter;
+mod knob_view;
 mod reed_view;
 mod slider;
 pub mod snapshot;
+pub mod sound_analysis;
 mod sound_view;
 pub mod terms;
 pub mod theme;
+pub mod undo;
 mod widgets;
 
 use std::path::PathBuf;
@@ -36,7 +34,7 @@ use std::time::Duration;
 use egui::{CentralPanel, Frame, Margin, Panel, Theme, Ui};
 use serde::{Deserialize, Serialize};
 
-pub use compare::Compare;
+pub use ab_comparison::AbComparison;
 pub use controls::{Controls, Look};
 pub use feel_test::FeelTest;
 pub use header::note_name;
@@ -45,8 +43,8 @@ pub use snapshot::Snapshot;
 use chalumeau_core::units::SoundingNote;
 use chalumeau_knob::wire::message::Feel;
 use controls::{Entry, Hands, Press};
-use history::History;
 use keyboard::Keyboard;
+use undo::UndoHistory;
 
 /// Size the window opens with, points.
 pub const SIZE: (f32, f32) = (1100.0, 720.0);
@@ -55,7 +53,7 @@ pub const LEAST_SIZE: (f32, f32) = (700.0, 480.0);
 /// Least and most zoom.
 pub const ZOOM: (f32, f32) = (0.5, 3.0);
 
-/// What the user did that is no parameter.
+/// What the user did, other than changing a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     /// A key goes down.
@@ -70,13 +68,14 @@ pub enum Action {
         /// Sounding pitch.
         note: SoundingNote,
     },
-    /// Holes to open, in the order of the instrument's file, whatever is fingered; until [`Action::EndTry`].
+    /// Use these holes (open or not, in the order of the instrument's file) instead of the played fingering, until
+    /// [`Action::EndTry`].
     TryFingering(Vec<bool>),
     /// Back to the fingering of the note.
     EndTry,
     /// A device of the list, by its key.
     ChooseDevice(String),
-    /// What the knob shall feel like for a test, whatever is played; `None` ends the test.
+    /// The feel of a test, which replaces the feel of the notes; `None` ends the test.
     FeelTest(Option<Feel>),
     /// An instrument of the list.
     ChooseInstrument(usize),
@@ -88,7 +87,7 @@ pub enum Action {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Tab {
-    /// The reed at work.
+    /// Flow through the reed, and torque.
     #[default]
     Reed,
     /// Bore, holes, fingerings.
@@ -104,11 +103,11 @@ pub enum Tab {
 }
 
 impl Tab {
-    /// In the order they stand.
+    /// In their order on the screen.
     pub const ALL: [Self; 6] =
         [Self::Reed, Self::Clarinet, Self::Breath, Self::Sound, Self::Knob, Self::Instrument];
 
-    /// What it says on the tab.
+    /// The text on the tab.
     pub fn name(self) -> &'static str {
         match self {
             Self::Reed => "Reed",
@@ -120,23 +119,23 @@ impl Tab {
         }
     }
 
-    /// What is there.
+    /// The tool tip of the tab.
     fn about(self) -> &'static str {
         match self {
-            Self::Reed => "The reed at work: flow over pressure, and the torque it is felt as",
+            Self::Reed => "Reed: flow over pressure, and the torque you feel",
             Self::Clarinet => "Bore, tone holes and keys; try fingerings",
             Self::Breath => "Mouth pressure, where it comes from, calibration",
             Self::Sound => "Spectrum, waves, pitch",
-            Self::Knob => "The knob: device, arming, what it feels like",
+            Self::Knob => "Knob: device, arming, torque",
             Self::Instrument => "Which clarinet, tuning, articulation, output",
         }
     }
 }
 
-/// What a project keeps of the window. Whatever a file says is taken into its ranges by [`Kept::mended`].
+/// The state of the window that is saved with a project. [`WindowState::mended`] limits values from a file to their ranges.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Kept {
+pub struct WindowState {
     /// Width and height, points.
     pub size: (f32, f32),
     /// Zoom, 0.5..=3.
@@ -147,14 +146,14 @@ pub struct Kept {
     pub tab: Tab,
 }
 
-impl Default for Kept {
+impl Default for WindowState {
     fn default() -> Self {
         Self { size: SIZE, zoom: 1.0, is_dark: true, tab: Tab::Reed }
     }
 }
 
-impl Kept {
-    /// The same inside its ranges.
+impl WindowState {
+    /// The same, with every value inside its range.
     pub fn mended(self) -> Self {
         let d = Self::default();
         let fix = |x: f32, (low, high): (f32, f32), default| {
@@ -170,8 +169,8 @@ impl Kept {
         }
     }
 
-    /// The window is this large now, points. What comes of rounding to whole pixels is no change, so that a project that
-    /// is only looked at stays as it was saved.
+    /// The window has this size now, points. A difference from rounding to whole pixels is no change, so a project that is
+    /// opened and not edited stays as it was saved.
     pub fn resized(&mut self, width: f32, height: f32) {
         let is_near = |a: f32, b: f32| (a - b).abs() <= 2.0;
         if !(is_near(self.size.0, width) && is_near(self.size.1, height)) {
@@ -182,11 +181,11 @@ impl Kept {
 
 /// Everything the window remembers between frames.
 #[derive(Clone, Debug, Default)]
-pub struct State {
-    /// What a project keeps.
-    pub kept: Kept,
-    history: History,
-    compare: Compare,
+pub struct EditorState {
+    /// The part that is saved with a project.
+    pub kept: WindowState,
+    history: UndoHistory,
+    compare: AbComparison,
     entry: Option<Entry>,
     held: Vec<&'static str>,
     presses: Vec<Press>,
@@ -194,13 +193,13 @@ pub struct State {
     reed: reed_view::ReedView,
     clarinet: clarinet_view::ClarinetView,
     breath: breath_view::BreathView,
-    knob: knob_panel::KnobPanel,
+    knob: knob_view::KnobView,
     instrument: instrument_view::InstrumentView,
 }
 
-impl State {
-    /// With what a project kept.
-    pub fn new(kept: Kept) -> Self {
+impl EditorState {
+    /// With the saved state of a project.
+    pub fn new(kept: WindowState) -> Self {
         Self { kept: kept.mended(), ..Self::default() }
     }
 
@@ -226,7 +225,12 @@ impl State {
 
 /// Draws the window into `ui` and gives back what the user did. In less room than [`LEAST_SIZE`] (a large zoom in a window
 /// that a host keeps small) all of it scrolls.
-pub fn draw(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &Snapshot) -> Vec<Action> {
+pub fn draw(
+    ui: &mut Ui,
+    state: &mut EditorState,
+    controls: &dyn Controls,
+    snapshot: &Snapshot,
+) -> Vec<Action> {
     let (room, least) = (ui.available_size(), egui::vec2(LEAST_SIZE.0, LEAST_SIZE.1));
     // Rounding to pixels is no lack of room.
     if room.x >= least.x - 2.0 && room.y >= least.y - 2.0 {
@@ -242,9 +246,9 @@ pub fn draw(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &
 }
 
 /// The window where there is room for it.
-fn whole(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &Snapshot) -> Vec<Action> {
+fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot: &Snapshot) -> Vec<Action> {
     let mut actions = Vec::new();
-    let State {
+    let EditorState {
         kept,
         history,
         compare,
@@ -279,10 +283,10 @@ fn whole(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &Sna
     line.frame(ground(8, 5)).show(ui, |ui| keyboard.draw(ui, snapshot, &mut actions));
     let line =
         Panel::right("meter").exact_size(if is_small { 96.0 } else { 112.0 }).show_separator_line(false);
-    line.frame(ground(8, 8)).show(ui, |ui| meter::column(ui, snapshot, !is_blind));
+    line.frame(ground(8, 8)).show(ui, |ui| breath_meter::column(ui, snapshot, !is_blind));
     CentralPanel::default().frame(ground(8, 8)).show(ui, |ui| {
         if is_blind {
-            blind_view::draw(ui, compare, &mut hands);
+            blind_comparison_view::draw(ui, compare, &mut hands);
             return;
         }
         match tab {
@@ -294,7 +298,7 @@ fn whole(ui: &mut Ui, state: &mut State, controls: &dyn Controls, snapshot: &Sna
             Tab::Instrument => instrument.draw(ui, &mut hands, snapshot, &mut actions),
         }
     });
-    // A widget that vanished under the hand, with its view or in a blind comparison, ends nothing itself.
+    // A widget that disappears while it is held, with its view or in a blind comparison, cannot end its gesture.
     if !hands.held.is_empty() && !ui.input(|input| input.pointer.any_down() || input.pointer.any_released()) {
         hands.let_go();
     }
@@ -317,7 +321,7 @@ fn beside<A>(
     let side = Panel::right(egui::Id::unique((id, "column"))).exact_size(width).show_separator_line(false);
     side.frame(theme::panel(c)).show(ui, |ui| {
         egui::ScrollArea::vertical().id_salt(id).auto_shrink([false, false]).show(ui, |ui| {
-            // Beside it stands the bar.
+            // Room for the scroll bar.
             ui.set_width(ui.available_width() - 8.0);
             ui.spacing_mut().item_spacing.y = 4.0;
             column(ui, with);
@@ -333,20 +337,21 @@ mod tests {
 
     #[test]
     fn what_a_project_keeps_survives_rubbish() {
-        let kept = Kept { size: (f32::NAN, 1e9), zoom: -3.0, is_dark: false, tab: Tab::Sound }.mended();
-        assert_eq!(kept, Kept { size: (SIZE.0, 8_000.0), zoom: 0.5, is_dark: false, tab: Tab::Sound });
+        let kept =
+            WindowState { size: (f32::NAN, 1e9), zoom: -3.0, is_dark: false, tab: Tab::Sound }.mended();
+        assert_eq!(kept, WindowState { size: (SIZE.0, 8_000.0), zoom: 0.5, is_dark: false, tab: Tab::Sound });
         let text = toml::to_string(&kept).unwrap();
-        assert_eq!(toml::from_str::<Kept>(&text).unwrap(), kept);
-        assert_eq!(toml::from_str::<Kept>("").unwrap(), Kept::default());
+        assert_eq!(toml::from_str::<WindowState>(&text).unwrap(), kept);
+        assert_eq!(toml::from_str::<WindowState>("").unwrap(), WindowState::default());
     }
 
     #[test]
     fn rounding_to_pixels_is_no_new_size() {
-        let mut kept = Kept::default();
+        let mut kept = WindowState::default();
         for zoom in [0.5, 0.75, 1.25, 1.5, 2.5, 3.0] {
             let points = |size: f32| (size * zoom).round() / zoom;
             kept.resized(points(SIZE.0), points(SIZE.1));
-            assert_eq!(kept, Kept::default());
+            assert_eq!(kept, WindowState::default());
         }
         kept.resized(SIZE.0 + 20.0, SIZE.1);
         assert_eq!(kept.size, (SIZE.0 + 20.0, SIZE.1));

@@ -88,6 +88,71 @@ fn every_link_leads_somewhere() {
     assert!(count > 60 && wrong.is_empty(), "{count} links\n{}", wrong.join("\n"));
 }
 
+/// A path of the repository that stands in a document: what begins with the name of one of its folders.
+fn repository_paths(text: &str) -> Vec<&str> {
+    const FOLDERS: [&str; 9] =
+        ["benches/", "crates/", "docs/", "examples/", "firmware/", "packaging/", "src/", "tests/", "xtask/"];
+    let is_part = |c: char| c.is_alphanumeric() || "_-./*".contains(c);
+    let words = text.split(|c: char| !is_part(c));
+    words
+        .map(|word| word.trim_end_matches(['.', '/']))
+        .filter(|word| FOLDERS.iter().any(|folder| word.starts_with(folder)))
+        .collect()
+}
+
+/// Whether a path, in which `*` stands for any part of a name, leads to something below `folder`.
+fn leads_somewhere(folder: &Path, path: &str) -> bool {
+    let (name, rest) = path.split_once('/').unwrap_or((path, ""));
+    let parts: Vec<&str> = name.split('*').collect();
+    let fits = |file: &str| match parts.as_slice() {
+        [whole] => file == *whole,
+        [start, middle @ .., end] => {
+            file.len() >= start.len() + end.len()
+                && file.starts_with(start)
+                && file.ends_with(end)
+                && middle.iter().all(|part| file.contains(part))
+        }
+        [] => false,
+    };
+    let Ok(entries) = fs::read_dir(folder) else { return false };
+    entries.map(|entry| entry.unwrap()).any(|entry| {
+        fits(&entry.file_name().to_string_lossy())
+            && (rest.is_empty() || leads_somewhere(&entry.path(), rest))
+    })
+}
+
+#[test]
+fn every_path_of_the_repository_named_in_a_document_exists() {
+    let (mut wrong, mut count) = (Vec::new(), 0);
+    // The change log tells of files that have gone since.
+    for (path, text) in documents().into_iter().filter(|(path, _)| !path.ends_with("CHANGELOG.md")) {
+        for named in repository_paths(&text) {
+            count += 1;
+            // A page may name its neighbours, too.
+            if ![root(), path.parent().unwrap()].iter().any(|from| leads_somewhere(from, named)) {
+                wrong.push(format!("{}: {named}", path.display()));
+            }
+        }
+    }
+    assert!(count > 60 && wrong.is_empty(), "{count} paths\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_path_in_a_document_is_found_and_a_wrong_one_is_not() {
+    assert_eq!(repository_paths("see `src/cli.rs`, (docs/*.md)."), ["src/cli.rs", "docs/*.md"]);
+    assert_eq!(repository_paths("https://host.example/src/cli.rs and x-src/y"), Vec::<&str>::new());
+    for (path, exists) in [
+        ("src/cli.rs", true),
+        ("crates/*/src", true),
+        ("crates/core/data/*_clarinet.toml", true),
+        ("src/no_such.rs", false),
+        ("crates/*/no_such", false),
+        ("docs/*.nothing", false),
+    ] {
+        assert_eq!(leads_somewhere(root(), path), exists, "{path}");
+    }
+}
+
 /// What a reader types: without the remark behind it, and without what a shell does with the output.
 fn typed(line: &str) -> Option<Vec<String>> {
     let (mut words, mut word, mut quoted) = (Vec::new(), String::new(), false);

@@ -17,7 +17,7 @@ use std::rc::Rc;
 use std::sync::OnceLock;
 
 use chalumeau::editor::snapshot::Snapshot;
-use chalumeau::editor::{Action, Kept, State, Tab, draw};
+use chalumeau::editor::{Action, EditorState, Tab, WindowState, draw};
 use egui_kittest::Harness;
 use support::Fake;
 
@@ -29,7 +29,7 @@ fn c4() -> Snapshot {
 
 /// A window in a test.
 struct Window {
-    harness: Harness<'static, State>,
+    harness: Harness<'static, EditorState>,
     host: Rc<Fake>,
     snapshot: Rc<RefCell<Snapshot>>,
     actions: Rc<RefCell<Vec<Action>>>,
@@ -45,16 +45,16 @@ impl Window {
         let (host, snapshot) = (Rc::new(Fake::default()), Rc::new(RefCell::new(c4())));
         let actions = Rc::new(RefCell::new(Vec::new()));
         let (h, s, a) = (host.clone(), snapshot.clone(), actions.clone());
-        let kept = Kept { tab, size, ..Kept::default() };
+        let kept = WindowState { tab, size, ..WindowState::default() };
         let mut harness =
             Harness::builder().with_step_dt(1.0 / 60.0).with_size(egui::vec2(size.0, size.1)).build_ui_state(
-                move |ui, state: &mut State| {
+                move |ui, state: &mut EditorState| {
                     // As a plugin does: settings of this very frame.
                     s.borrow_mut().settings = h.settings();
                     let done = draw(ui, state, &*h, &s.borrow());
                     a.borrow_mut().extend(done);
                 },
-                State::new(kept),
+                EditorState::new(kept),
             );
         harness.run();
         Self { harness, host, snapshot, actions }

@@ -19,10 +19,10 @@ use chalumeau_core::score::breath::BreathCurve;
 use chalumeau_core::score::play_probed;
 use chalumeau_core::units::{Air, SoundingNote, WrittenNote};
 use chalumeau_figure::breath;
-use chalumeau_figure::breath::Changes;
-use chalumeau_figure::felt::{AtContrast, Felt, Torque, thresholds, torques};
-use chalumeau_figure::impedance::{Curve, Fingering, NotePeaks, chart, fingering};
-use chalumeau_figure::performance::{Moment, Note, Performance, performance};
+use chalumeau_figure::breath::NotePressures;
+use chalumeau_figure::felt::{AtContrast, FeltThresholds, Torque, thresholds, torques};
+use chalumeau_figure::impedance::{Curve, FingeringImpedance, NotePeaks, chart, fingering};
+use chalumeau_figure::performance::{Note, PerformanceFigure, ReedCloseUp, performance};
 use chalumeau_figure::{Figure, Layer, Panel, bore};
 use chalumeau_knob::wire::message::Law;
 use serde_json::Value;
@@ -142,7 +142,7 @@ fn an_impedance_says_where_its_modes_and_its_cutoff_are() {
     let of = file.fingering(written).unwrap();
     let sounding_hz = written.sounding(2).unwrap().frequency_hz(440.0);
     let first = of.open.iter().zip(&file.holes).position(|(&open, hole)| open && !hole.register).unwrap();
-    let figure = fingering(&Fingering {
+    let figure = fingering(&FingeringImpedance {
         instrument: &file.name,
         notes: vec!["a note".to_owned()],
         written,
@@ -239,7 +239,7 @@ fn a_bore_shows_which_holes_are_open() {
 }
 
 /// Written G4, then written C5, half a second each, seen in few columns.
-fn played() -> (Overview, Envelope, Moment, Vec<Note>) {
+fn played() -> (Overview, Envelope, ReedCloseUp, Vec<Note>) {
     let settings = Settings { noise: 0.0, ..Settings::default() };
     let score = Score::scale(WrittenNote(67), WrittenNote(68), 2, 0.5, false, 48_000).unwrap().blown(
         &BreathCurve::constant(0.6),
@@ -251,7 +251,7 @@ fn played() -> (Overview, Envelope, Moment, Vec<Note>) {
     clarinet.reset();
     let mut watcher = Watcher::new(score.samples, 48_000.0, 24);
     let mut gamma = Envelope::new(96_000, 24);
-    let mut moment = Moment { from_s: 0.25, step_s: 1.0 / 96_000.0, probes: Vec::new() };
+    let mut moment = ReedCloseUp { from_s: 0.25, step_s: 1.0 / 96_000.0, probes: Vec::new() };
     let mut seen = 0;
     let mut inside = |probe: chalumeau_core::instrument::Probe| {
         gamma.push(probe.gamma as f32);
@@ -276,7 +276,7 @@ fn played() -> (Overview, Envelope, Moment, Vec<Note>) {
 #[test]
 fn a_performance_is_seen_in_tune_and_in_time() {
     let (overview, gamma, moment, score) = played();
-    let figure = performance(&Performance {
+    let figure = performance(&PerformanceFigure {
         title: "two notes",
         notes: vec![],
         overview: &overview,
@@ -314,7 +314,7 @@ fn a_performance_is_seen_in_tune_and_in_time() {
 #[test]
 fn nothing_played_is_a_picture_too() {
     let overview = Watcher::new(0, 48_000.0, 100).finish();
-    let figure = performance(&Performance {
+    let figure = performance(&PerformanceFigure {
         title: "",
         notes: vec![],
         overview: &overview,
@@ -412,7 +412,7 @@ fn a_report_holds_the_sound_the_cents_and_the_settings() {
         // Haptics, and what would be too much of it.
         "<h2>Haptics</h2>",
         "The mark of the torque lies within 0.",
-        "What the knob is told",
+        "Feel sent to the knob",
         "<td>flow</td><td class=\"number\">3</td><td>accepted</td>",
         "<td>flow</td><td class=\"number\">5</td><td>refused: C#7 would need",
     ] {
@@ -439,10 +439,27 @@ fn a_report_says_which_feel_a_knob_would_refuse() {
     {
         assert!(page.contains(said), "{said}");
     }
-    assert!(!page.contains("What the knob is told"));
+    assert!(!page.contains("Feel sent to the knob"));
     succeeds(&d, "report --written 67 --seconds 0.1 --torque 60 --travel 120 --out s.html");
     let page = String::from_utf8(read(&d, "s.html")).unwrap();
     assert!(page.contains("N m/rad, the"), "the slope has its words too");
+}
+
+/// Mouth pressure over angle for a few notes; closure lies at the closing pressure.
+fn turns_of(table: &FeelTable, closing_kpa: f64) -> Figure {
+    let turn = |note: &NoteFeel| {
+        let at = |deg: f64| (deg, 1e-3 * note.map.pressure_pa(deg));
+        let closes = at(note.landmarks.a_close_deg);
+        assert!((closes.1 - closing_kpa).abs() < 1e-9, "{}: {closes:?}", note.written);
+        breath::Turn {
+            name: note.written.to_string(),
+            map: (0..=60).map(|step| at(10.0 * f64::from(step))).collect(),
+            speaks: at(note.landmarks.a_on_deg),
+            closes,
+        }
+    };
+    let turns: Vec<breath::Turn> = table.notes().iter().step_by(20).map(turn).collect();
+    breath::turns("", closing_kpa, &turns)
 }
 
 #[test]
@@ -452,12 +469,12 @@ fn breath_and_feel_are_figures_of_one_instrument() {
     let reed = played_reed(&file, &settings);
     let closing_kpa = 1e-3 * reed.closing_pa();
     let asked = bore.with(&reed);
-    let changes: Vec<Changes> = bore
+    let changes: Vec<NotePressures> = bore
         .written()
         .zip(&asked)
         .map(|(written, asked)| {
             let asked = asked.unwrap();
-            Changes {
+            NotePressures {
                 written: written.0,
                 speaks_kpa: closing_kpa * asked.gamma_sounding,
                 beats_kpa: closing_kpa * asked.gamma_beat,
@@ -489,24 +506,11 @@ fn breath_and_feel_are_figures_of_one_instrument() {
             let on = table.notes().iter().map(|note| (note.written.0, note.landmarks.a_on_deg));
             on_deg.push((contrast, on.collect()));
             if contrast == 5.0 && law == Law::Flow {
-                // The map passes threshold and closure.
-                let turn = |note: &NoteFeel| {
-                    let at = |deg: f64| (deg, 1e-3 * note.map.pressure_pa(deg));
-                    let closes = at(note.landmarks.a_close_deg);
-                    assert!((closes.1 - closing_kpa).abs() < 1e-9, "{}: {closes:?}", note.written);
-                    breath::Turn {
-                        name: note.written.to_string(),
-                        map: (0..=60).map(|step| at(10.0 * f64::from(step))).collect(),
-                        speaks: at(note.landmarks.a_on_deg),
-                        closes,
-                    }
-                };
-                let turns: Vec<breath::Turn> = table.notes().iter().step_by(20).map(turn).collect();
-                golden("turns", &breath::turns("", closing_kpa, &turns));
+                golden("turns", &turns_of(&table, closing_kpa));
             }
         }
         let at_kpa = changes.iter().map(|note| (note.written, note.speaks_kpa)).collect();
-        felt.push(Felt { law: name.to_owned(), at_kpa, on_deg });
+        felt.push(FeltThresholds { law: name.to_owned(), at_kpa, on_deg });
         all.push(AtContrast { contrast: 9.0, notes: Err("too much".to_owned()) });
         let figure = torques(name, "", 100.0, &all);
         // What is refused is said where it would be drawn, and the same scale serves all.
@@ -573,7 +577,7 @@ fn what_cannot_be_drawn_is_refused_and_leaves_nothing() {
         (format!("{NOTE} --plot there.svg"), "exists already"),
         (format!("{NOTE} --plot none/a.svg"), "directory none does not exist"),
         (format!("{NOTE} --plot a.svg --plot-size 10x10"), "WIDTHxHEIGHT"),
-        (format!("{NOTE} --plot a.svg --plot-at 5"), "behind the end; this is 0.200 s long"),
+        (format!("{NOTE} --plot a.svg --plot-at 5"), "after the end; the sound is 0.200 s long"),
         (format!("{NOTE} --plot-at 0.1"), "--plot"),
         ("impedance --all --plot z.png".to_owned(), "--peaks 8"),
         ("impedance --written 65 --peaks 3 --from 100 --to 50 --plot z.png".to_owned(), "--to above --from"),
@@ -587,7 +591,7 @@ fn what_cannot_be_drawn_is_refused_and_leaves_nothing() {
         (format!("{report} --out none/r.html"), "directory none does not exist"),
         (format!("{report} --out r.html --wav r.ogg"), "must end in .wav"),
         (format!("{report} --out r.html --wav sub/r.wav"), "one directory"),
-        (format!("{report} --out r.html --plot-at 3"), "behind the end"),
+        (format!("{report} --out r.html --plot-at 3"), "after the end"),
         ("report --out r.html".to_owned(), "--written"),
         ("report --written 67 --seconds 3600 --out r.html".to_owned(), "--wav FILE"),
         ("report none.mid --out r.html".to_owned(), "cannot read none.mid"),
@@ -626,6 +630,9 @@ fn the_page_of_the_model_names_what_there_is() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut text = String::new();
     sources(&root.join("src"), &mut text);
+    for member in fs::read_dir(root.join("crates")).unwrap().map(|entry| entry.unwrap().path()) {
+        sources(&member.join("src"), &mut text);
+    }
     let known: std::collections::HashSet<&str> =
         text.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
     let page = fs::read_to_string(root.join("docs/model.md")).unwrap();

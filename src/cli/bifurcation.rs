@@ -1,16 +1,19 @@
-//! `chalumeau bifurcation`: one note up and down the breath.
+//! `chalumeau bifurcation`: one note with slowly rising and falling breath.
 
 use crate::cli::Failure;
-use crate::cli::args::{PlayedArgs, note, sounding, within};
-use crate::cli::plot::PlotArgs;
+use crate::cli::csv_table::TableArgs;
+use crate::cli::plot_args::PlotArgs;
 use crate::cli::render::progress;
 use crate::cli::settings::SettingsArgs;
-use crate::cli::table::TableArgs;
+use crate::cli::shared_args::{PlayedArgs, note, sounding, within};
+use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::bore::transfer_matrix::{TransferMatrix, threshold_gamma};
+use chalumeau_core::instrument::Settings;
 use chalumeau_core::reed::ReedLaw;
 use chalumeau_core::score::bifurcation;
+use chalumeau_core::score::bifurcation::Changes;
 use chalumeau_core::score::breath::{BreathCurve, GAMMA_MAX};
-use chalumeau_core::units::{Air, WrittenNote};
+use chalumeau_core::units::{Air, SoundingNote, WrittenNote};
 use chalumeau_figure::bifurcation::Ramp;
 use clap::Args;
 
@@ -19,22 +22,22 @@ Examples:
   chalumeau bifurcation --written F3 --plot f3.png
   chalumeau bifurcation --written G4 --zeta 0.2 --seconds 60 --csv g4.csv";
 
-/// How loud a note is while the breath slowly grows and slowly fades
+/// Measure how loud a note is while the breath slowly rises and falls
 ///
-/// Gamma (mouth pressure over closing pressure) runs from 0 to --to and back, --seconds each way. direction is 1 growing
-/// and -1 fading, rms that of the pressure in the mouthpiece over the closing pressure, shut the part of the time the
-/// reed is shut. Comments say where the note begins, beats, chokes, returns and ends. Up and down differ because a moving
-/// breath overtakes a threshold before the note has grown or died; what stays with more --seconds is hysteresis proper.
+/// Gamma (mouth pressure over closing pressure) runs from 0 to --to and back, --seconds each way. direction is 1 (rising)
+/// or -1 (falling), rms is the pressure in the mouthpiece over the closing pressure, shut is the fraction of time the reed
+/// is shut. Comments say where the note begins, beats, chokes, returns and ends. Up and down differ because a moving breath
+/// passes a threshold before the note has grown or died. A difference that remains with more --seconds is true hysteresis.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Bifurcation {
+pub struct BifurcationCommand {
     /// Written note: a MIDI number (65) or a name (F4)
     #[arg(long, value_name = "NOTE", value_parser = note)]
     written: u8,
     /// Largest mouth pressure over closing pressure, 0.2..3
     #[arg(long, value_name = "G", default_value = "2", value_parser = |s: &str| within(s, 0.2, f64::from(GAMMA_MAX)))]
     to: f64,
-    /// Time for the way up, and as much for the way down, s, 0.5..600
+    /// Time of the rise, and again of the fall, s, 0.5..600
     #[arg(long, value_name = "S", default_value = "20", value_parser = |s: &str| within(s, 0.5, 600.0))]
     seconds: f64,
     /// Sample rate, Hz, 22050..384000
@@ -50,7 +53,7 @@ pub struct Bifurcation {
     settings: SettingsArgs,
 }
 
-impl Bifurcation {
+impl BifurcationCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let file = self.instrument.load()?;
         let written = WrittenNote(self.written);
@@ -59,22 +62,7 @@ impl Bifurcation {
         let settings = self.settings.blown_by(Some(&curve), &file)?;
         let mut table = self.table.open("direction,gamma,rms,shut")?;
         let plot = self.plot.open(self.table.force())?;
-        // Flow strength of the reed as strength, lip and H, k, A make it: what the linear theory asks for.
-        let zeta = {
-            let law = settings.reed_law();
-            let reference = ReedLaw::default();
-            let opening = law.a() * law.h() / reference.h();
-            f64::from(settings.zeta) * opening / law.closing().sqrt()
-        };
-        let threshold = file
-            .fingering(written)
-            .and_then(|fingering| {
-                let model = TransferMatrix::new(&file, Air::at(f64::from(settings.temperature_c)));
-                let near_hz = sounding.frequency_hz(f64::from(settings.a4_hz));
-                model.playing_frequency(&fingering.open, file.reed_volume_m3, near_hz)
-            })
-            .filter(|&(_, height)| height > 0.0)
-            .map(|(_, height)| threshold_gamma(height, zeta));
+        let threshold = linear_threshold(&file, written, sounding, &settings);
         let name = file.name.clone();
         let model = self.instrument.model(file, self.rate, settings.a4_hz)?;
         let bar = progress((2.0 * self.seconds * f64::from(self.rate)) as usize);
@@ -95,20 +83,7 @@ impl Bifurcation {
         );
         table.comment(format_args!("{name}; written {written}; {note}"))?;
         let changes = found.changes();
-        let said = [
-            ("linear threshold", threshold),
-            ("begins", changes.begins),
-            ("beats", changes.beats),
-            ("chokes", changes.chokes),
-            ("returns", changes.returns),
-            ("stops beating", changes.opens),
-            ("ends", changes.ends),
-        ];
-        let said = said.map(|(what, at)| match at {
-            Some(at) => format!("{what} {at:.4}"),
-            None => format!("{what} never"),
-        });
-        table.comment(format_args!("gamma: {}", said.join(", ")))?;
+        table.comment(format_args!("gamma: {}", changes_in_words(threshold, &changes)))?;
         for (direction, way) in [(1, &found.up), (-1, &found.down)] {
             for point in way {
                 table.line(format_args!(
@@ -136,4 +111,40 @@ impl Bifurcation {
             .figure()
         })
     }
+}
+
+/// Gamma at which the linear theory lets the note begin; `None` where no impedance peak carries it.
+fn linear_threshold(
+    file: &InstrumentFile,
+    written: WrittenNote,
+    sounding: SoundingNote,
+    settings: &Settings,
+) -> Option<f64> {
+    // Flow strength of the reed as strength, lip and H, k, A make it: what the linear theory asks for.
+    let law = settings.reed_law();
+    let opening = law.a() * law.h() / ReedLaw::default().h();
+    let zeta = f64::from(settings.zeta) * opening / law.closing().sqrt();
+    let fingering = file.fingering(written)?;
+    let model = TransferMatrix::new(file, Air::at(f64::from(settings.temperature_c)));
+    let near_hz = sounding.frequency_hz(f64::from(settings.a4_hz));
+    let (_, height) = model.playing_frequency(&fingering.open, file.reed_volume_m3, near_hz)?;
+    (height > 0.0).then(|| threshold_gamma(height, zeta))
+}
+
+/// Gamma of every change of the note, for the comment in the table.
+fn changes_in_words(threshold: Option<f64>, changes: &Changes) -> String {
+    let all = [
+        ("linear threshold", threshold),
+        ("begins", changes.begins),
+        ("beats", changes.beats),
+        ("chokes", changes.chokes),
+        ("returns", changes.returns),
+        ("stops beating", changes.opens),
+        ("ends", changes.ends),
+    ];
+    let words = all.map(|(what, at)| match at {
+        Some(at) => format!("{what} {at:.4}"),
+        None => format!("{what} never"),
+    });
+    words.join(", ")
 }

@@ -1,9 +1,9 @@
 //! `chalumeau bore`: an instrument's geometry as a table and as a drawing to scale.
 
 use crate::cli::Failure;
-use crate::cli::args::{InstrumentArg, check_fingering, note};
-use crate::cli::plot::PlotArgs;
-use crate::cli::table::{TableArgs, quoted};
+use crate::cli::csv_table::{TableArgs, quoted};
+use crate::cli::plot_args::PlotArgs;
+use crate::cli::shared_args::{InstrumentArg, check_fingering, note};
 use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
 
 use chalumeau_core::units::WrittenNote;
@@ -16,14 +16,14 @@ Examples:
   chalumeau bore --written C5 --csv c5.csv
   chalumeau bore --instrument mine.toml --plot mine.png";
 
-/// Bore, tone holes and fingering of an instrument
+/// Print or draw bore, tone holes and fingering of an instrument
 ///
 /// The table has a row for each end of a cone of the bore and one for each hole: kind (bore or hole), name (of the part or
 /// the hole), distance from the tip of the reed, diameter, height of the chimney, and with --written whether the hole is
-/// open (1) or closed (0). What does not apply is empty. The drawing shows the instrument from the side, to scale.
+/// open (1) or closed (0). Fields that do not apply are empty. The drawing shows the instrument from the side, to scale.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Bore {
+pub struct BoreCommand {
     /// Finger this written note: a MIDI number (72) or a name (C5)
     #[arg(long, value_name = "NOTE", value_parser = note)]
     written: Option<u8>,
@@ -35,7 +35,7 @@ pub struct Bore {
     plot: PlotArgs,
 }
 
-impl Bore {
+impl BoreCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let file = self.instrument.load()?;
         let fingering = self.fingering(&file)?;
@@ -76,7 +76,7 @@ impl Bore {
     }
 }
 
-/// Metres as millimetres to the nanometre, without what binary fractions add.
+/// Metres as millimetres, rounded to the nanometre to remove errors of binary fractions.
 fn mm(metres: f64) -> f64 {
     (metres * 1e9).round() / 1e6
 }

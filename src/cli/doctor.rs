@@ -1,7 +1,7 @@
-//! `chalumeau doctor`: which knobs there are, what keeps them from answering, and how well they do.
+//! `chalumeau doctor`: lists knobs, says why one does not answer, and measures the connection.
 
 use crate::cli::Failure;
-use crate::cli::args::within;
+use crate::cli::shared_args::within;
 use crate::identity::VERSION;
 use chalumeau_knob::device::discover::{Kind, candidates, chip, ports};
 use chalumeau_knob::device::{Choice, Hooks, KnobLink, LinkStatus, Phase, Places, serial_text};
@@ -17,29 +17,29 @@ use std::time::{Duration, Instant};
 
 const EXAMPLES: &str = "\
 Examples:
-  chalumeau doctor                            everything that may be a knob
-  chalumeau doctor --path /dev/ttyUSB1        this port, whatever it is
+  chalumeau doctor                            every port that may have a knob
+  chalumeau doctor --path /dev/ttyUSB1        this port only
   chalumeau doctor --osc --any-address        stock firmware, over Wi-Fi
   chalumeau doctor --seconds 60               a longer look at rate and jitter";
 
-/// A port is given so long to answer; a board that restarts when its port is opened takes 5 s.
+/// Longest wait for an answer; a board that restarts when its port is opened takes 5 s.
 const ANSWER: Duration = Duration::from_secs(7);
 
-/// FEEL changes so often while it is timed.
+/// Time between two changes of FEEL while its round trip is measured.
 const FEEL_EVERY: Duration = Duration::from_millis(50);
 
-/// Which knobs there are, what keeps them from answering, and how well they do
+/// List knobs, say why one does not answer, and measure the connection
 ///
-/// Lists serial and MIDI ports, opens those a knob may be behind (known USB identities and simulated knobs, others only
-/// with --path), and tells what answers, its firmware, rate, jitter and round trip. Nothing is armed: the knob makes no
-/// torque. Without a knob it says what to do next.
+/// Lists serial and MIDI ports, opens those that may have a knob (known USB identities and simulated knobs, others only
+/// with --path), and reports the firmware, rate, jitter and round trip of each knob. It arms no knob: there is no torque.
+/// If no knob answers, it says what to do next.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Doctor {
+pub struct DoctorCommand {
     /// Ask this serial port only, even if its USB identity is not known
     #[arg(long, value_name = "PORT", conflicts_with = "osc")]
     path: Option<PathBuf>,
-    /// Listen only for the OSC of unmodified firmware, at this port of UDP
+    /// Listen only for OSC from unmodified firmware, at this UDP port
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8000")]
     osc: Option<u16>,
     /// With --osc: listen to the whole network instead of this machine alone
@@ -50,7 +50,7 @@ pub struct Doctor {
     seconds: f64,
 }
 
-impl Doctor {
+impl DoctorCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let mut out = io::stdout().lock();
         writeln!(out, "Chalumeau {VERSION}, TTLink {MAJOR}.{MINOR}")?;
@@ -77,7 +77,7 @@ impl Doctor {
         Ok(())
     }
 
-    /// Links to `choice`, watches it and tells; true if a knob with our firmware answered.
+    /// Links to `choice`, watches it and reports; true if a knob with this project's firmware answered.
     fn ask(&self, out: &mut impl Write, choice: Choice) -> io::Result<bool> {
         let name = match &choice {
             Choice::Path(path) => path.display().to_string(),
@@ -145,7 +145,7 @@ impl Doctor {
             _ => {
                 writeln!(
                     out,
-                    "  nothing heard ({} packets were none of a knob's)",
+                    "  nothing received ({} packets did not come from a knob)",
                     link.status().stats.ignored
                 )?;
                 writeln!(
@@ -170,8 +170,8 @@ const NO_KNOB: &str = "\
 No knob answers. What to do next:
   A knob with a cable   plug it in and run this again; if its port is listed but not known, --path PORT
   Stock firmware        chalumeau doctor --osc --any-address
-  No knob at all        chalumeau knob-sim, in another terminal, is one
-The whole way, step by step: docs/touch.md";
+  No knob at all        run chalumeau knob-sim in another terminal
+All steps: docs/touch.md";
 
 fn wait(link: &KnobLink, most: Duration, until: impl Fn(&Phase) -> bool) -> LinkStatus {
     let begun = Instant::now();
@@ -220,7 +220,7 @@ fn list_midi(out: &mut impl Write) -> io::Result<Vec<String>> {
         Ok(all) => {
             for name in all {
                 let is_known =
-                    if known.contains(&name) { "" } else { " (does not sound like a knob: not asked)" };
+                    if known.contains(&name) { "" } else { " (not the name of a knob: not asked)" };
                 writeln!(out, "  {name}{is_known}")?;
             }
         }
@@ -255,14 +255,14 @@ fn tell_link(out: &mut impl Write, status: &LinkStatus) -> io::Result<()> {
     let stats = &status.stats;
     let ms = |us: u32| f64::from(us) * 1e-3;
     let slow =
-        if status.is_slow { " at 115200 baud: does the cable or its driver not carry 921600?" } else { "" };
+        if status.is_slow { " at 115200 baud: the cable or its driver may not support 921600" } else { "" };
     writeln!(out, "  angle: {:.2} degrees", status.angle_deg.unwrap_or(0.0))?;
     writeln!(out, "  rate: {:.0} positions a second{slow}", stats.rate_hz)?;
     writeln!(out, "  jitter: {:.2} ms p50, {:.2} ms p99", ms(stats.jitter_p50_us), ms(stats.jitter_p99_us))?;
     let wire = &stats.wire;
     writeln!(
         out,
-        "  frames: {} received, {} lost, {} twice, {} damaged, {} bytes that were none",
+        "  frames: {} received, {} lost, {} duplicated, {} damaged, {} bytes outside frames",
         wire.frames,
         wire.lost,
         wire.duplicates,
@@ -271,7 +271,7 @@ fn tell_link(out: &mut impl Write, status: &LinkStatus) -> io::Result<()> {
     )?;
     let trip = |us: Option<u32>| us.map_or_else(|| "not seen".into(), |us| format!("{:.1} ms", ms(us)));
     let (hello, feel) = (trip(stats.hello_round_trip_us), trip(stats.feel_round_trip_us));
-    writeln!(out, "  there and back: HELLO to INFO {hello}, FEEL to its echo {feel}")?;
+    writeln!(out, "  round trip: HELLO to INFO {hello}, FEEL to its echo {feel}")?;
     writeln!(out, "  clocks differ by {:.0} ppm", stats.skew_ppm)?;
     match &status.notice {
         Some(notice) => writeln!(out, "  {notice}"),

@@ -1,9 +1,9 @@
-//! `chalumeau haptic`: what a force-feedback knob should feel for each note.
+//! `chalumeau haptic`: the torque of a force-feedback knob for each note.
 
 use crate::cli::Failure;
-use crate::cli::args::{AirArg, InstrumentArg, NotesArg, within, within_f32};
-use crate::cli::feel::FeelArgs;
-use crate::cli::table::TableArgs;
+use crate::cli::csv_table::TableArgs;
+use crate::cli::feel_args::FeelArgs;
+use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within, within_f32};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::law;
 use chalumeau_core::haptics::{FeelTable, NoteFeel, Requirements, TorqueLimits};
@@ -16,7 +16,7 @@ use clap::Args;
 const STEP_DEG: f64 = 0.1;
 /// The curve begins in the slap region, degrees.
 const FROM_DEG: f64 = -150.0;
-/// And ends this far behind the wall, degrees.
+/// The curve ends this far behind the wall, degrees.
 const BEHIND_WALL_DEG: f64 = 5.0;
 
 const EXAMPLES: &str = "\
@@ -26,7 +26,7 @@ Examples:
   chalumeau haptic --all --H 3 --k 0.3849          a wider reed, as stiff as before
   chalumeau haptic --all --order covered-holes --contrast 2";
 
-/// What a force-feedback knob should feel for each note
+/// Calculate the torque of a force-feedback knob for each note
 ///
 /// Every note has its own pressure requirement p_req_pa = p_M gamma_on (see `threshold`), above which it sounds, and an
 /// extinction gamma_off above which the shut reed is silent. On the knob they lie at a_on_deg and a_off_deg; at
@@ -38,7 +38,7 @@ Examples:
 /// against the breath.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Haptic {
+pub struct HapticCommand {
     #[command(flatten)]
     notes: NotesArg,
     /// The torque curve of one note instead of the table
@@ -72,7 +72,7 @@ pub struct Haptic {
     table: TableArgs,
 }
 
-impl Haptic {
+impl HapticCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let file = self.instrument.load()?;
         let notes = self.notes.notes(&file)?;

@@ -1,9 +1,9 @@
-//! `chalumeau impedance`: what the bore answers to the reed, curve or peaks.
+//! `chalumeau impedance`: the input impedance of the bore, as a curve or as its peaks.
 
 use crate::cli::Failure;
-use crate::cli::args::{AirArg, InstrumentArg, NotesArg, QualityArg, within};
-use crate::cli::plot::PlotArgs;
-use crate::cli::table::TableArgs;
+use crate::cli::csv_table::TableArgs;
+use crate::cli::plot_args::PlotArgs;
+use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, QualityArg, within};
 use chalumeau_core::analysis::impedance::cutoff_hz;
 use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
 use chalumeau_core::bore::transfer_matrix::{Peak, TransferMatrix, find_peaks};
@@ -24,20 +24,20 @@ const EXAMPLES: &str = "\
 Examples:
   chalumeau impedance --written F4 --csv f4.csv          the curve, 20 Hz to 4 kHz
   chalumeau impedance --all --peaks 8                    eight resonances of every fingering
-  chalumeau impedance --written F4 --plot f4.svg         the curve drawn, with modes and cut-off, beside the other model's
+  chalumeau impedance --written F4 --plot f4.svg         the curve as a figure, with modes and cut-off, beside the other model
   chalumeau impedance --all --peaks 6 --plot peaks.png   where the peaks of all notes are
   chalumeau impedance --written 52 --from 100 --to 200 --step 0.1 --reed-volume";
 
-/// Where the answer comes from.
+/// Which model calculates the impedance.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Model {
-    /// The lattice that sounds at 48 kHz (96 kHz inside, 192 kHz with --quality high)
+    /// The lattice that plays at 48 kHz (96 kHz internally, 192 kHz with --quality high)
     Lattice,
     /// Transfer matrices with exact wall losses: the reference
     Tmm,
 }
 
-/// Input impedance of a fingering at the reed: a curve, or its peaks
+/// Calculate the input impedance of a fingering at the reed: a curve, or its peaks
 ///
 /// Values are over Zc = rho c / S of the nominal bore, 14.9 mm wide unless the instrument file names another. A clarinet sounds near a peak of its impedance; the register key
 /// spoils the first one so that the second sounds, a twelfth higher. The reed itself adds a little volume that lowers the
@@ -46,13 +46,13 @@ enum Model {
 /// Columns: f_hz,re_z_over_zc,im_z_over_zc, or with --peaks written_midi,n,f_hz,mag_over_zc,q.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Impedance {
+pub struct ImpedanceCommand {
     #[command(flatten)]
     notes: NotesArg,
     /// Table of the first N peaks instead of the curve, 1..30
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=30))]
     peaks: Option<u8>,
-    /// Where the answer comes from
+    /// Which model calculates the impedance
     #[arg(long, value_enum, default_value_t = Model::Lattice)]
     model: Model,
     /// Put the reed's equivalent volume in parallel, as when the clarinet is played
@@ -71,7 +71,7 @@ pub struct Impedance {
     air: AirArg,
     #[command(flatten)]
     instrument: InstrumentArg,
-    /// How finely the lattice is cut
+    /// Resolution of the lattice
     #[arg(long, value_enum, default_value_t = QualityArg::Live)]
     quality: QualityArg,
     #[command(flatten)]
@@ -80,7 +80,7 @@ pub struct Impedance {
     plot: PlotArgs,
 }
 
-impl Impedance {
+impl ImpedanceCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let file = self.instrument.load()?;
         let notes = self.notes.notes(&file)?;
@@ -88,9 +88,7 @@ impl Impedance {
         let steps = ((self.to - self.from) / self.step + 1e-9).floor();
         if self.peaks.is_none() && self.notes.one().is_none() {
             let right = "add --peaks 8 for the peaks of all notes, or choose one note with --written";
-            return Err(Failure::Usage(format!(
-                "one curve for each note would be too much for a table; {right}"
-            )));
+            return Err(Failure::Usage(format!("a table holds one curve only; {right}")));
         }
         let curve = self.peaks.is_none() || (self.notes.one().is_some() && self.plot.wanted());
         if curve && !(0.0..=POINTS_MAX).contains(&steps) {
@@ -157,7 +155,7 @@ impl Impedance {
         })
     }
 
-    /// The picture of one fingering, with the other model beside the one asked for.
+    /// The figure of one fingering, with the other model beside the chosen one.
     fn fingering(&self, bore: &Bore, file: &InstrumentFile, of: &Fingering, volume_m3: f64) -> Figure {
         let air = self.air.air();
         let count = usize::from(self.peaks.unwrap_or(30));
@@ -200,7 +198,7 @@ impl Impedance {
             let z = self.curve(&exact, &of.open, volume_m3).collect();
             curves.push(Curve { name: exact.name().to_owned(), z });
         }
-        chalumeau_figure::impedance::fingering(&chalumeau_figure::impedance::Fingering {
+        chalumeau_figure::impedance::fingering(&chalumeau_figure::impedance::FingeringImpedance {
             instrument: &file.name,
             notes,
             written: of.written,
@@ -211,7 +209,7 @@ impl Impedance {
         })
     }
 
-    /// The picture of all notes' peaks.
+    /// The figure of the peaks of all notes.
     fn chart(&self, bore: &Bore, file: &InstrumentFile, notes: &[WrittenNote], volume_m3: f64) -> Figure {
         let count = usize::from(self.peaks.unwrap_or(8));
         let rows: Vec<NotePeaks> = notes
@@ -281,7 +279,7 @@ impl Bore {
     }
 }
 
-/// Pitch of a note at A4 = 440 Hz, Hz. A file has no note that could not sound.
+/// Pitch of a note at A4 = 440 Hz, Hz. Every note of an instrument file has a sounding pitch.
 fn sounding_hz(file: &InstrumentFile, written: WrittenNote) -> f64 {
     written.sounding(file.transposition).unwrap_or(SoundingNote(written.0)).frequency_hz(440.0)
 }

@@ -1,8 +1,8 @@
 //! `chalumeau instrument`: makes, imports, checks and shows instrument files.
 
 use crate::cli::Failure;
-use crate::cli::args::{AirArg, InstrumentArg, note, within};
-use crate::cli::table::{TableArgs, quoted};
+use crate::cli::csv_table::{TableArgs, quoted};
+use crate::cli::shared_args::{AirArg, InstrumentArg, note, within};
 use crate::instrument_path::{self, LoadError};
 use crate::output::NewFile;
 use chalumeau_core::bore::check::Check;
@@ -30,7 +30,7 @@ Examples:
 /// that play or measure take it with --instrument.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Instrument {
+pub struct InstrumentCommand {
     #[command(subcommand)]
     what: What,
 }
@@ -43,7 +43,7 @@ enum What {
     Show(Show),
 }
 
-impl Instrument {
+impl InstrumentCommand {
     pub fn run(&self) -> Result<ExitCode, Failure> {
         match &self.what {
             What::Import(import) => import.run().map(|()| ExitCode::SUCCESS),
@@ -54,7 +54,7 @@ impl Instrument {
     }
 }
 
-/// Where the instrument goes, and what both makers of one ask.
+/// Output file, name and transposition, for `import` and `new`.
 #[derive(Args)]
 struct NewInstrument {
     /// Instrument file to write
@@ -63,7 +63,7 @@ struct NewInstrument {
     /// Replace an existing file
     #[arg(long)]
     force: bool,
-    /// What a player calls it
+    /// Name of the instrument
     #[arg(long, value_name = "TEXT")]
     name: Option<String>,
     /// Semitones it sounds below what is written: B flat 2, A 3, E flat -3, bass 14
@@ -72,10 +72,10 @@ struct NewInstrument {
 }
 
 impl NewInstrument {
-    /// Writes what can be read again, and says what it is and what is wrong with it at this pitch of A4, Hz.
+    /// Writes the instrument, after a check that it can be read again; then prints a summary and warnings for this A4, Hz.
     fn write(&self, file: &InstrumentFile, a4_hz: f64) -> Result<(), Failure> {
         let text = file.to_toml();
-        // A scaled or solved instrument may have left the limits of the format.
+        // A scaled or calculated instrument may be outside the limits of the format.
         InstrumentFile::parse(&text)
             .map_err(|source| Failure::InstrumentFile { path: self.out.clone(), source })?;
         let mut out = NewFile::create(&self.out, self.force)?;
@@ -99,9 +99,8 @@ impl NewInstrument {
 }
 
 /// Make an instrument file from three CSV tables
-///
-/// A line each for a cone of the bore, a tone hole, a note; the first line names the columns, lines beginning with # are
-/// comments. Columns say their unit and whether they are radii: bore x_start_m, x_end_m, r_start_m, r_end_m [part];
+/// The tables have one line for each cone of the bore, each tone hole and each note. The first line names the columns;
+/// lines that begin with # are comments. Column names contain the unit, and radius or diameter: bore x_start_m, x_end_m, r_start_m, r_end_m [part];
 /// holes hole, x_m, hole_radius_m, chimney_height_m [kind, register, description]; fingerings written_note, register, and
 /// one column of 0 (closed) and 1 (open) for each hole [mode, fingers, sounding_note]. Any length may be in _mm, any radius
 /// a diameter (diameter_start_mm).
@@ -119,7 +118,7 @@ struct Import {
     /// Where the measurements come from [default: the comments at the head of the bore's table]
     #[arg(long, value_name = "TEXT")]
     source: Option<String>,
-    /// Air that moves with the reed, mm3: 0, or 20..20000
+    /// Volume of air that moves with the reed, mm3: 0, or 20..20000
     #[arg(long, value_name = "MM3", default_value = "1200", value_parser = |s: &str| within(s, 0.0, 20_000.0))]
     reed_volume: f64,
     /// Bore that zeta and the reed's size refer to, mm, 1..200 [default: 14.9, a B flat clarinet's]
@@ -160,10 +159,10 @@ fn head_comments(text: &str) -> String {
     lines.join("\n")
 }
 
-/// Look for mistakes in an instrument file, before it is played
+/// Check an instrument file for mistakes
 ///
-/// Prints every note with the resonance it is to sound at (with the reed's volume) and how far that is from equal
-/// temperament, then what to look at. Ends with 2 if the instrument cannot be played, with 0 otherwise, warnings or not.
+/// Prints for every note the resonance it plays on (with the reed's volume) and its distance from equal temperament, then
+/// warnings. The exit code is 2 if the instrument cannot be played, else 0, with or without warnings.
 ///
 /// Columns: written,written_midi,register,mode,wanted_hz,peak_hz,cents,mag_over_zc,q.
 #[derive(Args)]
@@ -219,8 +218,8 @@ impl CheckFile {
 /// Make an instrument: a cylinder that plays given notes, or another one scaled
 ///
 /// With --notes: the lowest note sounds with every hole closed, each further one opens the next hole from the bell; length
-/// and holes are placed so that the model plays them in tune. With --scale: everything X times as large, so that all notes
-/// sound lower by X; say by --transposition how the instrument is then read.
+/// and holes are placed so that the model plays them in tune. With --scale: every length is X times as large, so that all frequencies are X times lower; set
+/// --transposition for how the instrument is then read.
 #[derive(Args)]
 #[group(id = "kind", required = true, multiple = false, args = ["notes", "scale"])]
 struct New {
@@ -242,7 +241,7 @@ struct New {
     /// Give the cylinder a register hole this wide, mm, 0.5..6, and the twelfths of its notes
     #[arg(long, value_name = "MM", conflicts_with = "scale", value_parser = |s: &str| within(s, 0.5, 6.0))]
     vent_mm: Option<f64>,
-    /// Air that moves with the reed of the cylinder, mm3: 0, or 20..20000
+    /// Volume of air that moves with the reed of the cylinder, mm3: 0, or 20..20000
     #[arg(long, value_name = "MM3", default_value = "1200", conflicts_with = "scale", value_parser = |s: &str| within(s, 0.0, 20_000.0))]
     reed_volume: f64,
     /// Pitch of A4 the cylinder is made for, Hz, 380..500
@@ -301,7 +300,7 @@ impl New {
     }
 }
 
-/// Show an instrument as one table: cones, holes, notes
+/// Print an instrument as one table: cones, holes, notes
 ///
 /// Columns: what,name,x_mm,length_mm,diameter_mm,end_diameter_mm,detail.
 #[derive(Args)]

@@ -1,8 +1,8 @@
-//! `chalumeau knob`: a knob in the hand without a DAW: watch it, feel a note on it, record a take.
+//! `chalumeau knob`: uses a knob without a DAW: watch it, feel a note on it, record a take.
 
 use crate::cli::Failure;
-use crate::cli::args::{InstrumentArg, check_fingering, note, within};
-use crate::cli::feel::FeelArgs;
+use crate::cli::feel_args::FeelArgs;
+use crate::cli::shared_args::{InstrumentArg, check_fingering, note, within};
 use crate::output::OutputError;
 use crate::take_file::TakeFile;
 use chalumeau_core::haptics::{NoteFeel, TorqueLimits};
@@ -17,7 +17,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-/// How often the line on the screen is written anew.
+/// Time between two updates of the line on the screen.
 const SHOWN_EVERY: Duration = Duration::from_millis(100);
 /// How long to look for a knob before giving up.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -36,16 +36,16 @@ Examples:
 
 /// Watch a knob, feel a note on it, record a take
 ///
-/// Torque is only made with --arm, never more than it says, and never when the knob's own limits say less; it ends with the
-/// program, whatever ends it. Without --arm the knob turns freely and is read only.
+/// The knob makes torque only with --arm, and never more than --arm and its own limits allow. Torque ends with the program,
+/// however the program ends. Without --arm the knob turns freely and is only read.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 #[command(group = ArgGroup::new("which").args(["serial", "path", "midi", "osc"]))]
-pub struct Knob {
+pub struct KnobCommand {
     /// The knob with this serial number (hexadecimal) [default: the first that answers]
     #[arg(long, value_name = "HEX", value_parser = |s: &str| chalumeau_knob::device::serial_number(s).ok_or("must be a serial number such as 5100000000000001"))]
     serial: Option<u64>,
-    /// Whatever is at this port
+    /// The device at this port
     #[arg(long, value_name = "PORT")]
     path: Option<PathBuf>,
     /// A knob at a MIDI port whose name contains this
@@ -54,19 +54,19 @@ pub struct Knob {
     /// Stock firmware sending OSC to this UDP port
     #[arg(long, value_name = "PORT")]
     osc: Option<u16>,
-    /// Take OSC from other machines too
+    /// Accept OSC from other machines too
     #[arg(long, requires = "osc")]
     network: bool,
     /// Written note whose resistance is felt
     #[arg(long, value_name = "NOTE", default_value = "C5", value_parser = note)]
     written: u8,
-    /// Let the knob make torque, at most so many mNm (10..250)
+    /// Let the knob make torque, at most this many mNm (10..250)
     #[arg(long, value_name = "MNM", value_parser = |s: &str| within(s, 10.0, f64::from(OFFERED_CEILING_MNM)))]
     arm: Option<f64>,
-    /// What the position now is called, before anything else: zero
+    /// First make the present position zero
     #[arg(long)]
     zero: bool,
-    /// Ends after this time, s
+    /// End after this time, s
     #[arg(long, value_name = "S", value_parser = |s: &str| within(s, 0.1, 86_400.0))]
     seconds: Option<f64>,
     /// Write the take to this CSV file when done
@@ -81,7 +81,7 @@ pub struct Knob {
     feel: FeelArgs,
 }
 
-impl Knob {
+impl KnobCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let file = self.instrument.load()?;
         let written = WrittenNote(self.written);
@@ -90,7 +90,7 @@ impl Knob {
         let ceiling_mnm = self.arm.unwrap_or(100.0);
         let limits = TorqueLimits { ceiling_mnm, ..TorqueLimits::default() };
         let settings = Settings::default();
-        // The knob is told this note and no other: what the hardest would need is no matter.
+        // The knob gets this note only, so the hardest note does not matter.
         let design = self.feel.design(&file)?;
         let table = feels.table(&settings, &design, &NO_MOTOR)?;
         let fingering = feels.requirements().written().position(|note| note == written).unwrap_or(0);
@@ -182,7 +182,7 @@ impl Knob {
         }
         let stats = link.status().stats;
         eprintln!(
-            "{} positions, {:.0} a second; {} lost, {} damaged, {} twice; jitter p50 {:.2} ms, p99 {:.2} ms",
+            "{} positions, {:.0} a second; {} lost, {} damaged, {} duplicated; jitter p50 {:.2} ms, p99 {:.2} ms",
             stats.states,
             stats.rate_hz,
             stats.wire.lost,

@@ -1,7 +1,7 @@
-//! `chalumeau knob-sim`: a TorqueTuner for those who have none, with a hand that turns it.
+//! `chalumeau knob-sim`: simulates a TorqueTuner and the hand that turns it.
 
 use crate::cli::Failure;
-use crate::cli::args::within;
+use crate::cli::shared_args::within;
 use chalumeau_firmware::Setup;
 use chalumeau_knob::device::places::Places;
 use chalumeau_knob::simulator::fault::Fault;
@@ -30,7 +30,7 @@ Examples:
   chalumeau knob-sim --crescendo 0:200:6 --wait-armed   a hand that blows once it is armed
   chalumeau knob-sim --script examples/hands/swell.csv --loop --log knob.csv
   chalumeau knob-sim --hold 120 --fault unplug@5:2 --fault corrupt@10:3
-  chalumeau knob-sim --osc 127.0.0.1:8000 --slap --loop the firmware it is sold with
+  chalumeau knob-sim --osc 127.0.0.1:8000 --slap --loop the stock firmware
 
 The first line of standard output says where the knob is: `serial /dev/pts/7`, `midi NAME` or
 `osc HOST:PORT`; a new `serial` line follows when an unplugged cable is put back.
@@ -40,26 +40,27 @@ i2c, brownout, overspeed.";
 /// What the knob calls itself.
 const NAME: &str = "TorqueTuner sim";
 
-/// A simulated TorqueTuner running the real firmware, at a serial port of its own
+/// Simulate a TorqueTuner that runs the real firmware, at its own serial port
 ///
-/// Knob, friction, encoder, motor board and a hand, 2,000 times a second. It arms only when a host asks, as a real one.
-/// Simulated means simulated: nothing of it was compared with hardware.
+/// Simulates knob, friction, encoder, motor board and a hand, 2,000 times a second. Like a real knob, it arms only when a
+/// host asks.
+/// The simulation has not been compared with hardware.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct KnobSim {
-    /// Something that goes wrong, at a time in seconds; may be given more than once
+pub struct KnobSimCommand {
+    /// A fault at a time in seconds; may be given more than once
     #[arg(long = "fault", value_name = "KIND@AT[:SECONDS]")]
     faults: Vec<Fault>,
     /// Seed of tremor, noise and faults
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Ends after this time, s
+    /// End after this time, s
     #[arg(long, value_name = "S", value_parser = |s: &str| within(s, 0.0, 1e6))]
     seconds: Option<f64>,
-    /// Writes t_us,angle_deg,velocity_rpm,torque_mnm,hand_mnm,armed,feel_id, 500 lines a second
+    /// Write t_us,angle_deg,velocity_rpm,torque_mnm,hand_mnm,armed,feel_id, 500 lines a second
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
-    /// No status line each second
+    /// Print no status lines
     #[arg(long)]
     quiet: bool,
     #[command(flatten)]
@@ -68,37 +69,37 @@ pub struct KnobSim {
     port: PortArgs,
 }
 
-/// What the hand does; without one, nobody holds the knob.
+/// The hand's motion; without one, nobody holds the knob.
 #[derive(Args)]
 #[group(id = "deed", multiple = false)]
 struct DeedArgs {
     /// CSV: t_s,angle_deg or t_s,force_mnm, then grip (0..1) and button (0 or 1) if wanted
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
-    /// Turns to this angle and stays, degrees
+    /// Turn to this angle and hold it, degrees
     #[arg(long, value_name = "DEG", allow_hyphen_values = true, value_parser = |s: &str| within(s, -3600.0, 3600.0))]
     hold: Option<f64>,
-    /// Turns from one angle to another, degrees and seconds
+    /// Turn from one angle to another, degrees and seconds
     #[arg(long, value_name = "FROM:TO:SECONDS", allow_hyphen_values = true)]
     crescendo: Option<String>,
-    /// Presses with a constant torque, mNm
+    /// Press with a constant torque, mNm
     #[arg(long, value_name = "MNM", allow_hyphen_values = true, value_parser = |s: &str| within(s, -1000.0, 1000.0))]
     press: Option<f64>,
-    /// Slaps: out beyond -150 degrees and back
+    /// Slap: turn beyond -150 degrees and back
     #[arg(long)]
     slap: bool,
 }
 
-/// The hand and how it is.
+/// The hand.
 #[derive(Args)]
 #[command(next_help_heading = "Hand")]
 struct HandArgs {
     #[command(flatten)]
     deed: DeedArgs,
-    /// Again and again
+    /// Repeat the hand's motion
     #[arg(long = "loop", requires = "deed")]
     is_loop: bool,
-    /// Waits at the beginning until the host has armed the knob
+    /// Wait until the host has armed the knob
     #[arg(long, requires = "deed")]
     wait_armed: bool,
     /// Spring between fingers and knob, N m/rad [default: 0.5, a pinch grip]
@@ -107,22 +108,22 @@ struct HandArgs {
     /// Tremor of the hand at 8..12 Hz, degrees rms [default: 0.1]
     #[arg(long, value_name = "DEG", value_parser = |s: &str| within(s, 0.0, 10.0))]
     tremor: Option<f64>,
-    /// The hand corrects what torque does to its angle, as a player does by ear
+    /// The hand corrects its angle against the torque, as a player corrects by ear
     #[arg(long)]
     listen: bool,
 }
 
-/// How a host reaches it; without these, by a serial port.
+/// How a host reaches the knob; by default through a serial port.
 #[derive(Args)]
 #[command(next_help_heading = "Port")]
 struct PortArgs {
-    /// The stock firmware instead of ours: OSC to this address, 25 times a second, and a feel nobody can change
+    /// Run the stock firmware instead of this project's: OSC to this address, 25 times a second, with a fixed feel
     #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["midi", "serial_number"])]
     osc: Option<String>,
     /// Name of the device in OSC addresses
     #[arg(long, value_name = "NAME", default_value = "TorqueTuner_001", requires = "osc")]
     osc_name: String,
-    /// OSC addresses as the document of the stock firmware spells them
+    /// Spell the OSC addresses as the stock firmware's documentation does
     #[arg(long, requires = "osc")]
     misspelt: bool,
     /// A virtual MIDI port instead of a serial one
@@ -173,7 +174,7 @@ impl HandArgs {
     }
 }
 
-impl KnobSim {
+impl KnobSimCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);

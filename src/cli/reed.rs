@@ -1,10 +1,10 @@
 //! `chalumeau reed`: the tables and the flow law that sound, knob and firmware share, and their figures.
 
 use crate::cli::Failure;
-use crate::cli::args::{PlayedArgs, note, sounding, within};
+use crate::cli::csv_table::TableArgs;
 use crate::cli::reed_physical::{self, PhysicalReedArgs};
 use crate::cli::render::progress;
-use crate::cli::table::TableArgs;
+use crate::cli::shared_args::{PlayedArgs, note, sounding, within};
 use crate::picture_file::PictureFile;
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::reed::PhysicalReed;
@@ -17,7 +17,9 @@ use chalumeau_core::score::orbit;
 use chalumeau_core::units::REFERENCE_RADIUS_M;
 use chalumeau_core::units::WrittenNote;
 use chalumeau_figure::draw::Size;
-use chalumeau_figure::reed::{self as figures, Kind, Orbit};
+use chalumeau_figure::reed::LawFigure;
+use chalumeau_figure::reed_orbit::ReedOrbit;
+use chalumeau_figure::reed_sweep::reed_sweep;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 
@@ -40,7 +42,7 @@ const RATE: u32 = 48_000;
 const FRAMES: usize = 199;
 const FRAME_S: f64 = 0.05;
 
-/// What can be drawn.
+/// The figures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Which {
     /// The law with opening, stiffness and closing pressure 1, over -0.1..1
@@ -55,7 +57,7 @@ enum Which {
     Coupled,
     /// Amplitudes A
     Amplitude,
-    /// What happens when the air flows back
+    /// Flow and opening when the air flows back
     Negative,
     /// Reeds in kPa and litres a second
     Physical,
@@ -63,11 +65,11 @@ enum Which {
     Sweep,
     /// One period of a played note over the curve of the reed
     Orbit,
-    /// Every one of them, into a directory
+    /// All of them, into a directory
     All,
 }
 
-/// The kind of picture `all` makes.
+/// File format of figures in a directory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Format {
     Png,
@@ -75,7 +77,7 @@ enum Format {
     Json,
 }
 
-/// The reed's pressure tables, flow against pressure, or figures of it
+/// Print the reed's tables or flow law, or draw figures of them
 ///
 /// The flow through a reed grows with the root of the pressure difference until the pressure closes the slit faster than
 /// it drives the air: u = A (H sqrt(p) - p^1.5 / k), zero from p = H k on. p is the pressure difference over the closing
@@ -83,14 +85,14 @@ enum Format {
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 #[group(id = "what", required = true, multiple = false, args = ["table", "law", "physical", "figure"])]
-pub struct Reed {
+pub struct ReedCommand {
     /// The 3601 table entries: i,p,x_a,x_b,sgn with x_a = sqrt(p), x_b = p^1.5
     #[arg(long)]
     table: bool,
     /// The flow law: p,u from p = -1 to beyond closure
     #[arg(long)]
     law: bool,
-    /// Both faces of the reed: H, k, A and zeta, and stiffness, area, width and opening, whichever were given
+    /// Both descriptions of the reed: H, k, A and zeta; stiffness, area, width and opening
     #[arg(long)]
     physical: bool,
     /// A figure; needs --out
@@ -117,13 +119,13 @@ pub struct Reed {
 #[derive(Args)]
 #[command(next_help_heading = "Figures")]
 struct Drawing {
-    /// A new .png or .svg file (.json for what it shows, .gif for the sweep), or a directory that exists
+    /// A new .png or .svg file (.json for its data, .gif for the sweep), or a directory that exists
     #[arg(long, value_name = "PATH", requires = "figure")]
     out: Option<PathBuf>,
     /// Kind of file made in a directory
     #[arg(long, value_enum, value_name = "KIND", default_value = "png", requires = "figure")]
     format: Format,
-    /// Size of a figure, pixels, 400..4000 each way, as 1600x1000 [default: what it needs]
+    /// Size of a figure, pixels, 400..4000 each way, for example 1600x1000 [default: depends on the figure]
     #[arg(long, value_name = "WxH", requires = "figure")]
     size: Option<Size>,
     /// Written note of the orbit: a MIDI number (60) or a name
@@ -140,16 +142,16 @@ struct Drawing {
 }
 
 impl Which {
-    fn kind(self) -> Option<Kind> {
+    fn kind(self) -> Option<LawFigure> {
         match self {
-            Self::Unit => Some(Kind::Unit),
-            Self::Angle => Some(Kind::Angle),
-            Self::FamilyH => Some(Kind::FamilyH),
-            Self::FamilyK => Some(Kind::FamilyK),
-            Self::Coupled => Some(Kind::Coupled),
-            Self::Amplitude => Some(Kind::Amplitude),
-            Self::Negative => Some(Kind::Negative),
-            Self::Physical => Some(Kind::Physical),
+            Self::Unit => Some(LawFigure::Unit),
+            Self::Angle => Some(LawFigure::Angle),
+            Self::FamilyH => Some(LawFigure::FamilyH),
+            Self::FamilyK => Some(LawFigure::FamilyK),
+            Self::Coupled => Some(LawFigure::Coupled),
+            Self::Amplitude => Some(LawFigure::Amplitude),
+            Self::Negative => Some(LawFigure::Negative),
+            Self::Physical => Some(LawFigure::Physical),
             Self::Sweep | Self::Orbit | Self::All => None,
         }
     }
@@ -201,7 +203,7 @@ impl Drawing {
                 (None, Some(orbit)) if which == Which::Orbit => sheet.draw(&orbit.figure())?,
                 _ => {
                     let bar = progress(FRAMES);
-                    sheet.animate(&figures::sweep(FRAMES)?, FRAME_S, || bar.inc(1))?;
+                    sheet.animate(&reed_sweep(FRAMES)?, FRAME_S, || bar.inc(1))?;
                     bar.finish_and_clear();
                 }
             }
@@ -209,8 +211,8 @@ impl Drawing {
         Ok(())
     }
 
-    /// Checks what the orbit needs; what is returned plays it.
-    fn prepare_orbit(&self) -> Result<impl FnOnce() -> Result<Orbit, Failure> + '_, Failure> {
+    /// Checks the arguments of the orbit; the returned function plays it.
+    fn prepare_orbit(&self) -> Result<impl FnOnce() -> Result<ReedOrbit, Failure> + '_, Failure> {
         let file = self.instrument.load()?;
         let written = WrittenNote(self.written);
         let sounding = sounding(&file, written)?;
@@ -229,7 +231,7 @@ impl Drawing {
             })?;
             let law = settings.reed_law();
             let flow_unit_m3s = P_REF_PA / model.air.z_c(model.file.nominal_radius_m);
-            Ok(Orbit {
+            Ok(ReedOrbit {
                 title: format!("{name}, written {written}"),
                 note: format!(
                     "gamma {}, zeta {}, lay {}; {:.1} Hz. The reed has inertia and damping, so it leaves its curve.",
@@ -246,7 +248,7 @@ impl Drawing {
     }
 }
 
-impl Reed {
+impl ReedCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let tables = ReedTables::seed();
         if let (Some(which), Some(out)) = (self.figure, &self.drawing.out) {
@@ -269,7 +271,9 @@ impl Reed {
         let (reference, a) = (PhysicalReed::reference(), self.a.unwrap_or(1.0));
         let measured = self.measured.reed(REFERENCE_RADIUS_M);
         if measured.is_some() && a == 0.0 {
-            return Err(Failure::Usage("--A 0 lets no air through any measured reed; give more".to_owned()));
+            return Err(Failure::Usage(
+                "with --A 0 no air flows through a measured reed; give a larger A".to_owned(),
+            ));
         }
         let measured = measured.map(|reed| reed.seed(&reference, a));
         let h = measured.map(|seed| seed.h).or(self.h).unwrap_or(ReedLaw::default().h());

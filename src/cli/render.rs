@@ -1,11 +1,11 @@
-//! `chalumeau render`: a MIDI file, a note or a scale as a WAV file, with a look inside if wanted.
+//! `chalumeau render`: plays a MIDI file, a note or a scale into a WAV file; writes internal signals and a figure too.
 
 use crate::cli::Failure;
-use crate::cli::args::within;
-use crate::cli::play::{PlayArgs, Prepared};
-use crate::cli::plot::PlotArgs;
-use crate::cli::table::Table;
-use crate::cli::watch::Watch;
+use crate::cli::csv_table::CsvTable;
+use crate::cli::plot_args::PlotArgs;
+use crate::cli::render_monitor::RenderMonitor;
+use crate::cli::score_args::{RenderJob, ScoreArgs};
+use crate::cli::shared_args::within;
 use crate::output::NewFile;
 use crate::wav::{Depth, Level, WavFile};
 use chalumeau_core::instrument::Probe;
@@ -30,7 +30,7 @@ Examples:
   chalumeau render --written G4 --breath ramp:0:1.2:4 --seconds 5 --probe g4.csv --out g4.wav
       From silence over the threshold to a reed held shut, with pressures, flow and opening.
   chalumeau render melody.mid --out melody.wav --plot melody.png
-      Waveform, spectrogram, pitch against the score, breath, and the reed from near.
+      Waveform, spectrogram, pitch against the score, breath, and the reed in close-up.
   chalumeau render melody.mid --replay take.csv --out again.wav
   chalumeau render melody.mid --crescendo 0.4:0.9 --bits 16 --rate 44100 --out loud.wav";
 
@@ -46,13 +46,13 @@ enum Bits {
 
 /// Play a MIDI file, a note or a scale into a WAV file
 ///
-/// Renders offline what the plugin would play, sample for sample. Two renders are identical: the breath noise is seeded.
+/// Renders offline what the plugin would play, sample for sample. The same command gives the same file: the breath noise has a fixed seed.
 /// The WAV file appears only when it is complete.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Render {
+pub struct RenderCommand {
     #[command(flatten)]
-    play: PlayArgs,
+    play: ScoreArgs,
 
     /// WAV file to write
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
@@ -60,10 +60,10 @@ pub struct Render {
     /// Bits per sample: integers rounded without dither, or floats as computed
     #[arg(long, value_enum, default_value_t = Bits::Float32, help_heading = "Output")]
     bits: Bits,
-    /// 1, or 2 with the same sound in both
+    /// Channels: 1, or 2 with the same sound in both
     #[arg(long, value_name = "N", default_value = "1", help_heading = "Output", value_parser = clap::value_parser!(u16).range(1..=2))]
     channels: u16,
-    /// CSV file with the inside of the instrument over time: mouth pressure, reed opening, flow, mouthpiece and radiated pressure
+    /// CSV file of internal signals over time: mouth pressure, reed opening, flow, mouthpiece and radiated pressure
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     probe: Option<PathBuf>,
     /// Write every Nth internal sample (96 or 88.2 thousand a second) to the probe file
@@ -74,21 +74,21 @@ pub struct Render {
     force: bool,
     #[command(flatten)]
     plot: PlotArgs,
-    /// Time of the figure's close look at the reed, s [default: the middle of the longest note]
+    /// Time of the reed's close-up in the figure, s [default: the middle of the longest note]
     #[arg(long, value_name = "S", requires = "plot", help_heading = "Output", value_parser = |s: &str| within(s, 0.0, 1e6))]
     plot_at: Option<f64>,
 }
 
-impl Render {
+impl RenderCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let prepared = self.play.prepare()?;
-        let Prepared { score, rate, .. } = &prepared;
+        let RenderJob { score, rate, .. } = &prepared;
         self.refuse_same_file()?;
         let mut out = NewFile::create(&self.out, self.force)?;
         let mut probe =
             self.probe.as_deref().map(|path| ProbeTable::open(path, self, &prepared)).transpose()?;
         let plot = self.plot.open(self.force)?;
-        let watch = plot.wanted().then(|| Watch::new(&prepared, self.plot_at)).transpose()?;
+        let watch = plot.wanted().then(|| RenderMonitor::new(&prepared, self.plot_at)).transpose()?;
         let mut clarinet = prepared.clarinet();
         let depth = match self.bits {
             Bits::Int16 => Depth::Int16,
@@ -166,15 +166,15 @@ impl Render {
         }
         if resets > 0 {
             eprintln!(
-                "warning: the instrument lost its numbers and was reset {resets} times; please report this"
+                "warning: the calculation broke down and the instrument was reset {resets} times; please report this"
             );
         }
     }
 }
 
-/// What a reader of a figure wants to know of how it was played.
-pub fn about(prepared: &Prepared) -> Vec<String> {
-    let Prepared { model, settings, score, rate } = prepared;
+/// How it was played, for the lines under a figure's title.
+pub fn about(prepared: &RenderJob) -> Vec<String> {
+    let RenderJob { model, settings, score, rate } = prepared;
     vec![format!(
         "{}; {:.2} s at {rate} Hz, A4 = {} Hz, zeta {}, the reed shuts at {:.2} kPa",
         model.file.name,
@@ -185,7 +185,7 @@ pub fn about(prepared: &Prepared) -> Vec<String> {
     )]
 }
 
-/// Seen on a terminal only.
+/// A progress bar; it shows on a terminal only.
 pub fn progress(samples: usize) -> ProgressBar {
     let bar = ProgressBar::new(samples as u64);
     match ProgressStyle::with_template("{bar:40} {percent:>3} %  {elapsed} (left: {eta})") {
@@ -194,9 +194,9 @@ pub fn progress(samples: usize) -> ProgressBar {
     }
 }
 
-/// The inside of the instrument as a table.
+/// The table of internal signals.
 struct ProbeTable {
-    table: Table,
+    table: CsvTable,
     every: u64,
     rate_hz: f64,
     seen: u64,
@@ -204,9 +204,9 @@ struct ProbeTable {
 }
 
 impl ProbeTable {
-    fn open(path: &Path, render: &Render, prepared: &Prepared) -> Result<Self, Failure> {
+    fn open(path: &Path, render: &RenderCommand, prepared: &RenderJob) -> Result<Self, Failure> {
         let header = "t_s,gamma,opening_unit,flow_m3s,p_mouthpiece_pa,p_radiated_pa";
-        let mut table = Table::open(path, render.force, header)?;
+        let mut table = CsvTable::open(path, render.force, header)?;
         let rate_hz = prepared.model.coeffs.rate_hz;
         table.comment(format_args!(
             "s, mouth over closing pressure, opening over rest opening, m3/s, Pa, Pa at 1 m; {rate_hz} Hz / {}",

@@ -1,13 +1,13 @@
 //! `chalumeau report`: a rendering as one HTML page with its sound, figures and tables.
 
-mod touch;
+mod breath_and_haptics;
 
 use crate::cli::Failure;
-use crate::cli::args::within;
-use crate::cli::play::{PlayArgs, Prepared};
 use crate::cli::render::{about, progress};
-use crate::cli::report::touch::Touch;
-use crate::cli::watch::{Watch, Watched};
+use crate::cli::render_monitor::{RenderMonitor, RenderSummary};
+use crate::cli::report::breath_and_haptics::BreathAndHaptics;
+use crate::cli::score_args::{RenderJob, ScoreArgs};
+use crate::cli::shared_args::within;
 
 use crate::identity;
 use crate::output::NewFile;
@@ -15,7 +15,7 @@ use crate::wav::{Depth, WavFile};
 use chalumeau_core::instrument::{Settings, Tuning};
 use chalumeau_core::score as player;
 use chalumeau_core::score::heard::{Heard, spread};
-use chalumeau_figure::report::{Cell, Plate, Report as Page, Sound, Table, write};
+use chalumeau_figure::report::{Plate, Report as Page, ReportTable, Sound, TableCell, write};
 use clap::Args;
 use std::cell::RefCell;
 use std::io::{Cursor, Seek, Write};
@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 
 /// Samples per block; any number gives the same sound.
 const BLOCK: usize = 512;
-/// Longest sound put into a page, s: 77 MB of text at 48 kHz, about what browsers still open with ease.
+/// Longest sound inside a page, s: 77 MB of text at 48 kHz, about what browsers still open easily.
 const INSIDE_MAX_S: f64 = 600.0;
 
 const EXAMPLES: &str = "\
@@ -31,9 +31,9 @@ Examples:
   chalumeau report melody.mid --out melody.html
   chalumeau report --scale E3:C6 --gamma 0.5 --no-noise --out scale.html
   chalumeau report long.mid --wav long.wav --out long.html
-      The sound stays a file of its own, beside the page.";
+      The sound is a separate file beside the page.";
 
-/// Play as `render` does, and make one HTML page of it
+/// Play like `render`, and write one HTML page about it
 ///
 /// The page has the sound to listen to, waveform, spectrogram, pitch against the score, breath and reed as figures, the
 /// instrument to scale, the mouth pressures at which notes speak, beat and choke, what a knob would feel and what it would
@@ -41,16 +41,16 @@ Examples:
 /// beside it with --wav.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Report {
+pub struct ReportCommand {
     #[command(flatten)]
-    play: PlayArgs,
+    play: ScoreArgs,
     /// HTML file to write
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
     out: PathBuf,
     /// Write the sound to this WAV file, in the same directory as the page, instead of into the page
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     wav: Option<PathBuf>,
-    /// Time of the close look at the reed, s [default: the middle of the longest note]
+    /// Time of the reed's close-up, s [default: the middle of the longest note]
     #[arg(long, value_name = "S", help_heading = "Output", value_parser = |s: &str| within(s, 0.0, 1e6))]
     plot_at: Option<f64>,
     /// Replace existing files
@@ -58,17 +58,17 @@ pub struct Report {
     force: bool,
 }
 
-impl Report {
+impl ReportCommand {
     pub fn run(&self) -> Result<(), Failure> {
         self.refuse_names()?;
         let prepared = self.play.prepare()?;
         let seconds = prepared.score.seconds(prepared.rate);
         if self.wav.is_none() && seconds > INSIDE_MAX_S {
             return Err(Failure::Usage(format!(
-                "{seconds:.0} s of sound are too much for a page, which holds {INSIDE_MAX_S}; put it beside the page with --wav FILE"
+                "{seconds:.0} s of sound are too long for a page, which holds {INSIDE_MAX_S} s; put the sound beside the page with --wav FILE"
             )));
         }
-        let watch = Watch::new(&prepared, self.plot_at)?;
+        let watch = RenderMonitor::new(&prepared, self.plot_at)?;
         let mut page = NewFile::create(&self.out, self.force)?;
         let (sound, wav, watched) = match &self.wav {
             Some(path) => {
@@ -108,7 +108,7 @@ impl Report {
         let folder = |path: &Path| Path::new(".").join(path.parent().unwrap_or(path));
         if folder(wav) != folder(&self.out) {
             return Err(Failure::Usage(format!(
-                "--wav {} lies elsewhere than the page {}; put both into one directory",
+                "--wav {} is not in the directory of the page {}; put both into one directory",
                 wav.display(),
                 self.out.display()
             )));
@@ -116,7 +116,7 @@ impl Report {
         Ok(())
     }
 
-    fn page(&self, prepared: &Prepared, watched: &Watched, sound: Sound) -> Result<Page, Failure> {
+    fn page(&self, prepared: &RenderJob, watched: &RenderSummary, sound: Sound) -> Result<Page, Failure> {
         let (file, title) = (&prepared.model.file, self.play.title());
         let mut lines = about(prepared);
         let outcome = match spread(&watched.heard) {
@@ -134,15 +134,14 @@ impl Report {
         let fingered = fingering.map_or(String::new(), |fingering| {
             format!(", fingered for written {}, the longest note", fingering.written)
         });
-        let touch = Touch::new(prepared, self.play.feel(file)?, longest);
+        let touch = BreathAndHaptics::new(prepared, self.play.feel(file)?, longest);
         Ok(Page {
             about: lines,
             sound,
             plates: vec![
                 Plate {
                     figure: watched.figure(&title, about(prepared)),
-                    caption: "Waveform, spectrogram, pitch heard over the notes of the score, mouth pressure, and the \
-                              reed from near."
+                    caption: "Waveform, spectrogram, measured pitch over the notes of the score, mouth pressure, and the reed in close-up."
                         .to_owned(),
                     alternative: format!(
                         "Five panels over the time of {title}, {:.1} seconds: waveform, spectrogram up to 6 kHz, pitch \
@@ -174,8 +173,12 @@ impl Report {
     }
 }
 
-/// Plays and watches; the sound goes to `out` in 16 bits.
-fn played(prepared: &Prepared, watch: Watch, out: &mut (impl Write + Seek)) -> Result<Watched, Failure> {
+/// Plays and analyses; the sound goes to `out` in 16 bits.
+fn played(
+    prepared: &RenderJob,
+    watch: RenderMonitor,
+    out: &mut (impl Write + Seek),
+) -> Result<RenderSummary, Failure> {
     let score = &prepared.score;
     let mut wav = WavFile::new(out, prepared.rate, Depth::Int16, 1, score.samples)?;
     let mut clarinet = prepared.clarinet();
@@ -202,7 +205,7 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// The command as it was given, so that another can give it again.
+/// The command as typed, so that a reader can repeat it.
 fn command() -> String {
     let words = std::env::args().skip(1).map(|word| {
         let plain =
@@ -212,27 +215,27 @@ fn command() -> String {
     std::iter::once("chalumeau".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
-/// To a tenth, with its sign unless it is none.
+/// Rounded to a tenth, with its sign unless it is 0.
 fn signed(cents: f64) -> String {
     let tenths = (10.0 * cents).round();
     if tenths == 0.0 { "0.0".to_owned() } else { format!("{:+.1}", tenths / 10.0) }
 }
 
-fn word(text: impl Into<String>) -> Cell {
-    Cell::Word(text.into())
+fn word(text: impl Into<String>) -> TableCell {
+    TableCell::Word(text.into())
 }
 
-fn number(text: impl Into<String>) -> Cell {
-    Cell::Number(text.into())
+fn number(text: impl Into<String>) -> TableCell {
+    TableCell::Number(text.into())
 }
 
-fn notes(prepared: &Prepared, heard: &[Heard], outcome: &str) -> Table {
+fn notes(prepared: &RenderJob, heard: &[Heard], outcome: &str) -> ReportTable {
     let rate_hz = f64::from(prepared.rate);
     let head = ["at, s", "sounds", "written", "length, s", "pitch, Hz", "cents", "level, dBFS"];
     let row = |heard: &Heard| {
         let (from, to) = (heard.sounding.from as f64 / rate_hz, heard.sounding.to as f64 / rate_hz);
         let written = heard.sounding.note.written(prepared.model.file.transposition);
-        // No pitch is said, not left out.
+        // A note without a pitch says "none".
         let or_none = |text: Option<String>| text.unwrap_or_else(|| "none".to_owned());
         vec![
             number(format!("{from:.2}")),
@@ -248,7 +251,7 @@ fn notes(prepared: &Prepared, heard: &[Heard], outcome: &str) -> Table {
             }),
         ]
     };
-    Table {
+    ReportTable {
         title: "Notes".to_owned(),
         about: format!(
             "{outcome} Cents are from equal temperament at A4 = {} Hz, measured between attack and release.",
@@ -259,13 +262,13 @@ fn notes(prepared: &Prepared, heard: &[Heard], outcome: &str) -> Table {
     }
 }
 
-fn settings(settings: &Settings) -> Table {
+fn settings(settings: &Settings) -> ReportTable {
     let law = settings.reed_law();
     let rows = [
         ("Full breath", format!("{}", settings.breath_full_kpa), "kPa"),
         ("Breath noise", format!("{}", settings.noise), "0..1"),
-        ("Tongue lets go in", format!("{}", settings.tongue_ms), "ms"),
-        ("Fingers move in", format!("{}", settings.legato_ms), "ms"),
+        ("Tongue release", format!("{}", settings.tongue_ms), "ms"),
+        ("Finger movement", format!("{}", settings.legato_ms), "ms"),
         ("Reed strength", format!("{}", settings.strength), "as on the box"),
         ("Closing pressure", format!("{:.3}", 1e-3 * settings.closing_pa()), "kPa"),
         ("Lip, tip opening", format!("{}", settings.lip), "of the reference"),
@@ -282,7 +285,7 @@ fn settings(settings: &Settings) -> Table {
         ("Output gain", format!("{}", settings.gain_db), "dB"),
     ];
     let row = |(name, value, unit): (&str, String, &str)| vec![word(name), number(value), word(unit)];
-    Table {
+    ReportTable {
         title: "Settings".to_owned(),
         about: String::new(),
         head: ["setting", "value", "unit or scale"].map(str::to_owned).to_vec(),
@@ -290,7 +293,7 @@ fn settings(settings: &Settings) -> Table {
     }
 }
 
-fn instrument(prepared: &Prepared) -> Table {
+fn instrument(prepared: &RenderJob) -> ReportTable {
     let file = &prepared.model.file;
     let sounds = |note: chalumeau_core::units::WrittenNote| {
         note.sounding(file.transposition).map_or(String::new(), |note| format!(" (sounds {note})"))
@@ -311,7 +314,7 @@ fn instrument(prepared: &Prepared) -> Table {
         ("Tone holes", file.holes.len().to_string()),
         ("Computed at", format!("{} Hz, put out at {} Hz", prepared.model.coeffs.rate_hz, prepared.rate)),
     ];
-    Table {
+    ReportTable {
         title: "Instrument".to_owned(),
         about: String::new(),
         head: ["property", "value"].map(str::to_owned).to_vec(),

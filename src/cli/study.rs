@@ -1,7 +1,7 @@
-//! `chalumeau study`: what a participant will meet, for the experimenter's desk.
+//! `chalumeau study`: the trials of one participant, for the experimenter.
 
 use crate::cli::Failure;
-use crate::cli::table::TableArgs;
+use crate::cli::csv_table::TableArgs;
 use chalumeau_knob::touch::study::{Side, plan};
 use clap::Args;
 
@@ -10,15 +10,15 @@ Examples:
   chalumeau study --participant 7
   chalumeau study --participant 7 --seed 3 --csv participant7.csv";
 
-/// Order of a listening and touching study
+/// Print the order of trials of a listening and touch study
 ///
 /// Sixteen trials compare a reed whose stiffness k follows its opening H (coupled, peak flow stays 1) with one whose k
-/// stays (free), as sides A and B of the plugin's A/B switch, in sound and hand alike. Participant and seed decide the
-/// order; the plugin's parameters Participant, Study seed and Trial select the very same. Keep the table from the
+/// stays (free), as sides A and B of the plugin's A/B switch, both in sound and in feel. Participant and seed fix the
+/// order. The plugin's parameters Participant, Study seed and Trial select the same order. Do not show the table to the
 /// participant: it says which side is which.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Study {
+pub struct StudyCommand {
     /// Number of the participant, 1..9999
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=9_999))]
     participant: u32,
@@ -29,11 +29,11 @@ pub struct Study {
     table: TableArgs,
 }
 
-impl Study {
+impl StudyCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let mut table = self.table.open("participant,seed,trial,h,a,k_a,b,k_b")?;
         table.comment(format_args!(
-            "k of the coupled side is 27/(4 H^3), of the free side the seed's 0.3849"
+            "k of the coupled side is 27/(4 H^3), of the free side the reference 0.3849"
         ))?;
         for trial in plan(self.participant, self.seed) {
             let [a, b] = [Side::A, Side::B].map(|side| trial.condition(side));

@@ -1,9 +1,9 @@
-//! `chalumeau threshold`: how hard to blow before a note speaks.
+//! `chalumeau threshold`: the mouth pressure at which each note begins to sound.
 
 use crate::cli::Failure;
-use crate::cli::args::{AirArg, InstrumentArg, NotesArg, within};
-use crate::cli::plot::PlotArgs;
-use crate::cli::table::TableArgs;
+use crate::cli::csv_table::TableArgs;
+use crate::cli::plot_args::PlotArgs;
+use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within};
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::bore::transfer_matrix::threshold_gamma;
 use chalumeau_core::instrument::Settings;
@@ -22,14 +22,14 @@ const ZETAS: [f64; 5] = [0.15, 0.2, 0.3, 0.4, 0.6];
 /// Reeds drawn, by the number on their box.
 const STRENGTHS: [f32; 5] = [2.0, 2.5, 3.0, 3.5, 4.0];
 
-/// Mouth pressure at which each note begins to sound
+/// Calculate the mouth pressure at which each note begins to sound
 ///
 /// gamma_on is that pressure over the closing pressure of the reed, from the height of the impedance peak the note plays
-/// on (frequency-domain model, reed volume included) and the flow strength zeta of the embouchure. Never below 1/3, the
-/// bore without losses. A note that no peak carries has nan.
+/// on (frequency-domain model, reed volume included) and the flow strength zeta of the embouchure. It is never below 1/3, the value of a bore
+/// without losses. A note without an impedance peak has nan.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Threshold {
+pub struct ThresholdCommand {
     #[command(flatten)]
     notes: NotesArg,
     /// Embouchure: flow strength of the reed, 0.05..0.9
@@ -45,7 +45,7 @@ pub struct Threshold {
     plot: PlotArgs,
 }
 
-impl Threshold {
+impl ThresholdCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let file = self.instrument.load()?;
         let notes = self.notes.notes(&file)?;

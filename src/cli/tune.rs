@@ -1,11 +1,11 @@
 //! `chalumeau tune`: plays every note and measures its pitch.
 
 use crate::cli::Failure;
-use crate::cli::args::{NotesArg, PlayedArgs, within};
-use crate::cli::plot::PlotArgs;
+use crate::cli::csv_table::TableArgs;
+use crate::cli::plot_args::PlotArgs;
 use crate::cli::render::progress;
 use crate::cli::settings::SettingsArgs;
-use crate::cli::table::TableArgs;
+use crate::cli::shared_args::{NotesArg, PlayedArgs, within};
 use chalumeau_core::analysis::pitch;
 use chalumeau_core::instrument::{Clarinet, Model, Settings, Tuning};
 use chalumeau_core::parallel;
@@ -13,7 +13,7 @@ use chalumeau_core::score;
 use chalumeau_core::score::Score;
 use chalumeau_core::score::breath::{BreathCurve, GAMMA_MAX};
 use chalumeau_core::units::{SoundingNote, WrittenNote, cents};
-use chalumeau_figure::tune::{self, Heard, Round};
+use chalumeau_figure::tune::{self, Round, TunedNote};
 use clap::Args;
 use std::convert::Infallible;
 use std::ops::ControlFlow;
@@ -40,7 +40,7 @@ Examples:
 /// squeak) or none; a note that does not sound has nan.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
-pub struct Tune {
+pub struct TuneCommand {
     #[command(flatten)]
     notes: NotesArg,
     /// Mouth pressure over closing pressure, 0..3
@@ -59,7 +59,7 @@ pub struct Tune {
     settings: SettingsArgs,
 }
 
-impl Tune {
+impl TuneCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let file = self.instrument.load()?;
         let notes = self.notes.notes(&file)?;
@@ -115,9 +115,9 @@ fn round(tuning: Tuning, notes: &[WrittenNote], heard: &[Option<(f64, f64)>]) ->
         Tuning::Tempered => "tempered",
     };
     let heard = heard.iter().map(|heard| match *heard {
-        Some((_, cents)) if cents.abs() <= OWN_CENTS => Heard::Own(cents),
-        Some((_, cents)) => Heard::Other(cents),
-        None => Heard::Silence,
+        Some((_, cents)) if cents.abs() <= OWN_CENTS => TunedNote::Own(cents),
+        Some((_, cents)) => TunedNote::Other(cents),
+        None => TunedNote::Silence,
     });
     Round { name: name.to_owned(), notes: notes.iter().map(|written| written.0).zip(heard).collect() }
 }

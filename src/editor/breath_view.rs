@@ -1,19 +1,19 @@
-//! Mouth pressure large, where it comes from, and how it has been.
+//! The breath view: mouth pressure, its sources, and its history.
 
 use egui::{Align2, CornerRadius, FontId, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
+use crate::editor::breath_meter;
 use crate::editor::chart;
 use crate::editor::chart::Chart;
 use crate::editor::controls::{Hands, heading, momentary, slider};
-use crate::editor::meter;
-use crate::editor::snapshot::{Snapshot, Source};
+use crate::editor::snapshot::{BreathSource, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
 
 /// What the view remembers.
 #[derive(Clone, Debug, Default)]
 pub struct BreathView {
-    /// Least and most that each source has said while somebody looked, by name.
+    /// Least and greatest value of each source while the window was open, by name.
     ranges: Vec<(String, f32, f32)>,
 }
 
@@ -30,8 +30,8 @@ impl BreathView {
         );
     }
 
-    /// Takes notice of what the sources say.
-    pub fn look(&mut self, sources: &[Source]) {
+    /// Updates the ranges of the sources.
+    pub fn look(&mut self, sources: &[BreathSource]) {
         for source in sources.iter().filter(|source| source.is_seen) {
             let value = chart::share(source.value);
             match self.ranges.iter_mut().find(|(name, ..)| *name == source.name) {
@@ -42,18 +42,18 @@ impl BreathView {
     }
 
     fn column(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
-        heading(ui, "Where breath comes from");
+        heading(ui, "Breath sources");
         let mut has_knob = false;
         for source in &snapshot.sources {
             let range = self.ranges.iter().find(|(name, ..)| *name == source.name);
             meter_of(ui, source, range.map(|&(_, low, high)| (low, high)));
-            if source.name == Source::KNOB {
+            if source.name == BreathSource::KNOB {
                 has_knob = true;
                 calibrate(ui, hands);
             }
         }
         if snapshot.sources.is_empty() {
-            ui.label("No source has said anything yet: keys blow by velocity.");
+            ui.label("No source has sent a value yet. Key velocity sets the mouth pressure.");
         }
         if !has_knob {
             heading(ui, "Calibrate the knob");
@@ -102,10 +102,10 @@ fn gauge(ui: &mut Ui, snapshot: &Snapshot) {
     let c = Colours::here(ui);
     let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
     let painter = ui.painter();
-    let full = meter::full_kpa(snapshot);
+    let full = breath_meter::full_kpa(snapshot);
     let kpa = snapshot.mouth_now_kpa();
     let all = snapshot.marks();
-    let (word, colour) = meter::state(&all, kpa, c);
+    let (word, colour) = breath_meter::state(&all, kpa, c);
     let number = painter.text(
         rect.left_top() - vec2(0.0, 6.0),
         Align2::LEFT_TOP,
@@ -132,7 +132,7 @@ fn gauge(ui: &mut Ui, snapshot: &Snapshot) {
     let speaks = all.speaks_kpa.unwrap_or(all.closes_kpa);
     let beats = all.beats_kpa.unwrap_or(all.closes_kpa).max(speaks);
     let end = all.chokes_kpa.unwrap_or(full).min(full);
-    for (from, to, colour) in meter::bands(speaks, beats, all.closes_kpa, end, c) {
+    for (from, to, colour) in breath_meter::bands(speaks, beats, all.closes_kpa, end, c) {
         let band = Rect::from_min_max(pos2(x(from), bar.top()), pos2(x(to), bar.bottom()));
         painter.rect_filled(band, CornerRadius::ZERO, colour);
     }
@@ -140,7 +140,7 @@ fn gauge(ui: &mut Ui, snapshot: &Snapshot) {
     painter.rect_filled(air.shrink2(vec2(0.0, 0.18 * bar.height())), round, c.breath.gamma_multiply(0.85));
     painter.vline(x(kpa), bar.y_range(), Stroke::new(2.0, c.ink));
     let mut end_of_last = f32::NEG_INFINITY;
-    for (at, name, colour) in meter::marks(snapshot, c).into_iter().filter(|mark| mark.0 <= full) {
+    for (at, name, colour) in breath_meter::marks(snapshot, c).into_iter().filter(|mark| mark.0 <= full) {
         painter.vline(x(at), bar.top() - 4.0..=bar.bottom(), Stroke::new(1.5, colour));
         let text = format!("{name} {at:.2}");
         let galley = painter.layout_no_wrap(text, theme::small(), colour);
@@ -165,7 +165,7 @@ fn gauge(ui: &mut Ui, snapshot: &Snapshot) {
         );
     }
     response.widget_info(|| WidgetInfo::labeled(Role::Meter, true, format!("Breath {kpa:.2} kPa, {word}")));
-    response.on_hover_text_at_pointer(meter::LEGEND);
+    response.on_hover_text_at_pointer(breath_meter::LEGEND);
 }
 
 fn history(ui: &mut Ui, snapshot: &Snapshot) {
@@ -174,11 +174,11 @@ fn history(ui: &mut Ui, snapshot: &Snapshot) {
     let seconds = f64::from(track.step_s) * track.kpa.len().saturating_sub(1) as f64;
     if track.kpa.len() < 2 {
         let rect = ui.available_rect_before_wrap();
-        chart::empty(ui, rect, "Blow, and your breath is drawn here.");
+        chart::empty(ui, rect, "Your breath appears here when you blow.");
         return;
     }
-    let full = f64::from(meter::full_kpa(snapshot));
-    let marks = meter::marks(snapshot, c);
+    let full = f64::from(breath_meter::full_kpa(snapshot));
+    let marks = breath_meter::marks(snapshot, c);
     Chart {
         id: "breath history",
         x: (-seconds, 0.0),
@@ -206,7 +206,7 @@ fn history(ui: &mut Ui, snapshot: &Snapshot) {
 }
 
 /// A source, with the range it has gone through.
-fn meter_of(ui: &mut Ui, source: &Source, range: Option<(f32, f32)>) {
+fn meter_of(ui: &mut Ui, source: &BreathSource, range: Option<(f32, f32)>) {
     let c = Colours::here(ui);
     let size = vec2(ui.available_width(), if source.is_seen { 28.0 } else { 18.0 });
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
@@ -237,7 +237,7 @@ fn meter_of(ui: &mut Ui, source: &Source, range: Option<(f32, f32)>) {
             painter.vline(x(end), bar.top() - 1.0..=bar.bottom() + 2.0, Stroke::new(1.5, c.ink));
         }
     }
-    let blows = if source.is_live { ", blows" } else { "" };
+    let blows = if source.is_live { ", sets the breath" } else { "" };
     let went = range.filter(|_| source.is_seen).map_or_else(String::new, |(low, high)| {
         format!(", from {:.0} to {:.0} %", 100.0 * low, 100.0 * high)
     });
@@ -247,15 +247,15 @@ fn meter_of(ui: &mut Ui, source: &Source, range: Option<(f32, f32)>) {
     response.on_hover_ui(|ui| {
         ui.set_max_width(280.0);
         ui.label(if source.is_live {
-            "This one blows. The source that moves takes over."
+            "This source sets the breath. Another source takes over as soon as it moves."
         } else if source.is_seen {
-            "It has moved before; move it and it blows."
+            "This source has sent values. Move it, and it sets the breath."
         } else {
-            "Nothing has come from it yet."
+            "This source has sent nothing yet."
         });
         if let Some((low, high)) = range {
-            let went = format!("It went from {:.0} to {:.0} %.", 100.0 * low, 100.0 * high);
-            ui.label(format!("{went} A controller that does not reach 100 % wants more full breath."));
+            let went = format!("Its values so far: {:.0} to {:.0} %.", 100.0 * low, 100.0 * high);
+            ui.label(format!("{went} If a controller does not reach 100 %, raise Full breath."));
         }
     });
 }
@@ -267,7 +267,7 @@ mod tests {
     #[test]
     fn a_source_is_known_by_the_range_it_went_through() {
         let mut view = BreathView::default();
-        let say = |value, is_seen| [Source { name: "CC2".into(), value, is_live: false, is_seen }];
+        let say = |value, is_seen| [BreathSource { name: "CC2".into(), value, is_live: false, is_seen }];
         view.look(&say(0.0, false));
         assert_eq!(view.ranges, []);
         for value in [0.4, 0.1, 0.7, f32::NAN, 9.0] {

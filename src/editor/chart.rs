@@ -1,6 +1,5 @@
-//! The frame of every picture with axes: fixed bounds, quiet grid, units on the axes, marks of the note.
-//!
-//! Nothing can be dragged or zoomed by accident; what can be dragged is a handle on top.
+//! Charts: axes with units and fixed bounds, a grid, marks of the note.
+//! A chart cannot be dragged or zoomed. Handles on top of it can be dragged.
 
 use egui::{Align2, Color32, Rangef, Rect, Ui, vec2};
 use egui_plot::{
@@ -31,8 +30,8 @@ pub struct Chart<'a> {
     pub label: &'a str,
 }
 
-/// A vertical line that means something.
-pub struct Mark<'a> {
+/// A vertical line with a name.
+pub struct ChartMark<'a> {
     /// Where.
     pub at: f64,
     /// What, in a word or two.
@@ -56,7 +55,7 @@ impl Chart<'_> {
         };
         let has_x = !self.x_name.is_empty();
         let digits = |mark: GridMark, _: &std::ops::RangeInclusive<f64>| tidy(mark.value, mark.step_size);
-        // Time gone by is negative on the axis and told without a sign.
+        // Past time is negative on the axis and shown without a sign.
         let is_ago = self.x_name.ends_with("ago");
         let x_axis = axis(AxisHints::new_x()).formatter(move |mark, _| {
             tidy(if is_ago { mark.value.abs() } else { mark.value }, mark.step_size)
@@ -129,22 +128,22 @@ pub fn curve(points: Vec<[f64; 2]>, colour: Color32, width: f32) -> Line<'static
 }
 
 /// Vertical dashed lines for `marks`.
-pub fn lines(plot: &mut PlotUi<'_>, marks: &[Mark<'_>]) {
+pub fn lines(plot: &mut PlotUi<'_>, marks: &[ChartMark<'_>]) {
     for (index, mark) in marks.iter().enumerate() {
         let line = VLine::new(mark.name, mark.at).color(mark.colour).width(1.0).id(("mark", index));
         plot.vline(line.style(LineStyle::dashed_loose()).allow_hover(false));
     }
 }
 
-/// Share of a picture's width from which a mark's name stands left of its line if it can: further right curves end.
+/// Right of this share of the width, a mark's name is left of its line if there is room, because curves end on the right.
 const LEFT_FROM: f32 = 0.67;
 
-/// The marks' names along the upper edge, each beside its line, lower where the one before is in the way.
-pub fn names(ui: &Ui, transform: &PlotTransform, marks: &[Mark<'_>]) {
+/// Draws the marks' names along the upper edge, each beside its line, and lower where the name before is in the way.
+pub fn names(ui: &Ui, transform: &PlotTransform, marks: &[ChartMark<'_>]) {
     let frame = *transform.frame();
     let painter = ui.painter_at(frame);
     let ground = behind_words(ui);
-    let mut order: Vec<&Mark> = marks.iter().collect();
+    let mut order: Vec<&ChartMark> = marks.iter().collect();
     order.sort_by(|a, b| a.at.total_cmp(&b.at));
     let mut taken: Vec<Rect> = Vec::new();
     for mark in order {
@@ -166,7 +165,7 @@ pub fn names(ui: &Ui, transform: &PlotTransform, marks: &[Mark<'_>]) {
     }
 }
 
-/// What words in a picture stand on: nearly the picture's own ground.
+/// The ground behind words in a chart: nearly the panel's colour.
 fn behind_words(ui: &Ui) -> Color32 {
     Colours::here(ui).panel.gamma_multiply(0.85)
 }
@@ -177,8 +176,8 @@ pub fn word(plot: &mut PlotUi<'_>, at: [f64; 2], anchor: Align2, text: &str, col
     plot.text(Text::new("", PlotPoint::new(at[0], at[1]), text).anchor(anchor).allow_hover(false));
 }
 
-/// What the curves are, in their colours, right-aligned at a height of the picture, 0 (top) ..=1; on a ground of their own,
-/// so that nothing runs through the words.
+/// Names of the curves in their colours, right-aligned, at a share of the chart's height: 0 (top) ..=1. They have a ground
+/// of their own, so that no curve crosses the words.
 pub fn legend(ui: &Ui, transform: &PlotTransform, height: f32, lines: &[(&str, Color32)]) {
     let frame = *transform.frame();
     let painter = ui.painter_at(frame);
@@ -193,12 +192,12 @@ pub fn legend(ui: &Ui, transform: &PlotTransform, height: f32, lines: &[(&str, C
     }
 }
 
-/// A number from outside as a share: 0..=1, 0 for what is none.
+/// A number from outside as a share 0..=1; 0 if it is not finite.
 pub fn share(value: f32) -> f32 {
     if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// What stands where there is nothing to show yet.
+/// A text where there is nothing to draw yet.
 pub fn empty(ui: &Ui, frame: Rect, text: &str) {
     let c = Colours::here(ui);
     let galley = ui.painter().layout(text.to_owned(), theme::body(), c.quiet, frame.width() - 24.0);

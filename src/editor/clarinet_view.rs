@@ -1,9 +1,8 @@
-//! The clarinet to scale, from the instrument's file: bore, tone holes, what covers them, and the sound that stands in it.
-//!
-//! Both directions have one scale. Bore, holes and chimneys are the file's; the outside of the wood is drawn as thick as
-//! the holes are deep, which the file does not say. Finger holes and rings stand on the upper edge, closed keys on the
-//! lower one, wherever they are on the real instrument. A click on a hole tries it: it opens or closes whatever is
-//! fingered, until *Back to the note*.
+//! The clarinet view: bore, tone holes and their covers to scale, the standing wave, and the picker of fingerings.
+//! Both directions have the same scale. Bore, holes and chimneys come from the instrument's file. The file does not give
+//! the thickness of the wood; it is drawn as deep as the holes. Finger holes and rings are on the upper edge and closed
+//! keys on the lower edge, unlike on the real instrument. A click on a hole opens or closes it for a trial, which lasts
+//! until *Back to the note*.
 
 use std::sync::Arc;
 
@@ -13,14 +12,13 @@ use egui::{
 };
 
 use crate::editor::Action;
-use crate::editor::alternates;
-use crate::editor::alternates::Choice;
 use crate::editor::chart;
-use crate::editor::clarinet_body::{Body, part_names, ruler, standing};
+use crate::editor::clarinet_drawing::{ClarinetDrawing, part_names, ruler, standing};
 use crate::editor::header::note_name;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
+use chalumeau_core::bore::alternate_fingerings::{self, FingeringChoice};
 use chalumeau_core::bore::instrument_file::{HoleKind, InstrumentFile, REGISTERS, ToneHole};
 
 /// Least distance of two buttons with their names below, points.
@@ -29,14 +27,14 @@ const NAMED: f32 = 34.0;
 /// What the view remembers.
 #[derive(Clone, Debug, Default)]
 pub struct ClarinetView {
-    /// Holes as they are tried, whatever is fingered.
+    /// The holes of a trial, which replace the played fingering.
     tried: Option<Vec<bool>>,
-    /// Of which instrument, and what the picker shows of it.
-    known: Option<(Arc<InstrumentFile>, Arc<Vec<Choice>>)>,
+    /// The choices of the picker, and the instrument they belong to.
+    known: Option<(Arc<InstrumentFile>, Arc<Vec<FingeringChoice>>)>,
 }
 
 impl ClarinetView {
-    /// Ends what is tried.
+    /// Ends a trial.
     pub fn end_try(&mut self, actions: &mut Vec<Action>) {
         if self.tried.take().is_some() {
             actions.push(Action::EndTry);
@@ -71,7 +69,7 @@ impl ClarinetView {
         let area = ui.available_rect_before_wrap();
         ui.allocate_rect(area, Sense::hover());
         let painter = ui.painter_at(area.expand(2.0));
-        let body = Body::new(file, area);
+        let body = ClarinetDrawing::new(file, area);
         let wave = wave_rect(area, &body);
         ruler(&painter, c, area, body.scale);
         painter.text(
@@ -131,7 +129,8 @@ impl ClarinetView {
                 .fingering()
                 .and_then(|fingering| all.iter().position(|choice| choice.open == fingering.open)),
         };
-        let name = |choice: &Choice| format!("{}{}", note_name(choice.written.0), "'".repeat(choice.nth));
+        let name =
+            |choice: &FingeringChoice| format!("{}{}", note_name(choice.written.0), "'".repeat(choice.nth));
         ui.horizontal(|ui| {
             ui.set_height(22.0);
             let told = match shown.map(|index| &all[index]) {
@@ -146,10 +145,14 @@ impl ClarinetView {
                     };
                     format!("{} {}{more}: {fingers}", name(choice), choice.register)
                 }
-                None => "a fingering of your own".into(),
+                None => "your own fingering".into(),
             };
             if self.tried.is_some() {
-                if ui.button("Back to the note").on_hover_text("The keys finger again").clicked() {
+                if ui
+                    .button("Back to the note")
+                    .on_hover_text("Ends the trial; the played note sets the holes again")
+                    .clicked()
+                {
                     self.end_try(actions);
                 }
                 ui.colored_label(c.beats, "trying");
@@ -192,12 +195,12 @@ impl ClarinetView {
         });
     }
 
-    /// What can be picked; worked out once an instrument.
-    fn choices(&mut self, file: &Arc<InstrumentFile>) -> Arc<Vec<Choice>> {
+    /// The choices of the picker; calculated once for each instrument.
+    fn choices(&mut self, file: &Arc<InstrumentFile>) -> Arc<Vec<FingeringChoice>> {
         match &self.known {
             Some((of, choices)) if Arc::ptr_eq(of, file) || of == file => choices.clone(),
             _ => {
-                let choices = Arc::new(alternates::choices(file));
+                let choices = Arc::new(alternate_fingerings::fingering_choices(file));
                 self.known = Some((file.clone(), choices.clone()));
                 choices
             }
@@ -206,7 +209,7 @@ impl ClarinetView {
 }
 
 /// Place of the wave above the body.
-fn wave_rect(area: Rect, body: &Body<'_>) -> Rect {
+fn wave_rect(area: Rect, body: &ClarinetDrawing<'_>) -> Rect {
     Rect::from_min_max(area.left_top() + vec2(0.0, 14.0), pos2(area.right(), body.top() - 14.0))
 }
 
@@ -223,7 +226,7 @@ fn hole_buttons(area: Rect, holes: usize) -> Vec<Rect> {
         .collect()
 }
 
-/// What the fingers see: full is covered.
+/// A hole as fingering charts draw it: filled means covered.
 fn button(ui: &mut Ui, rect: Rect, hole: &ToneHole, opening: f32, is_named: bool) -> Response {
     let c = Colours::here(ui);
     let response = ui.interact(rect, ui.scope_id().with(("hole", &hole.name)), Sense::click());
@@ -305,7 +308,7 @@ fn about(ui: &mut Ui, hole: &ToneHole, opening: f32) {
         1e3 * hole.chimney_m,
         1e3 * hole.x_m
     ));
-    ui.label(egui::RichText::new("Click: try it").font(theme::small()).color(c.quiet));
+    ui.label(egui::RichText::new("Click to open or close this hole").font(theme::small()).color(c.quiet));
 }
 
 fn leader(painter: &Painter, c: &Colours, foot: Pos2, button: Rect, is_hot: bool, opening: f32) {

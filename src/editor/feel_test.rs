@@ -1,10 +1,9 @@
-//! Five simple feels to try a knob with before any music: each is one idea, and says what the hand should notice.
-//!
-//! They stay far below the least ceiling that the library offers by itself (100 mNm).
+//! Five simple feels for testing a knob before any music. Each shows one thing and says what the hand should notice.
+//! Their torque is far below the default ceiling (100 mNm).
 
 use chalumeau_knob::wire::message::{Feel, Law};
 
-/// Which.
+/// A test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FeelTest {
     /// No torque.
@@ -15,7 +14,7 @@ pub enum FeelTest {
     Bump,
     /// A stop.
     Wall,
-    /// The spring behind rest that a tongue slap is pulled against.
+    /// The spring behind rest, which a tongue slap pulls against.
     Slap,
 }
 
@@ -44,11 +43,11 @@ impl FeelTest {
                 "Pushes back more the further you turn, up to 40 mNm at one turn, and returns to rest."
             }
             Self::Bump => {
-                "A bump at 120 degrees, as where a note speaks: light before it, and a little let go after it."
+                "A bump at 120 degrees, like the point where a note speaks: the torque is small before it and drops a little after it."
             }
             Self::Wall => "Free up to 90 degrees, then a soft wall. It should not buzz when you lean on it.",
             Self::Slap => {
-                "Turn back beyond -100 degrees: a spring pulls forwards. Let go, and it snaps, as a tongue slap does."
+                "Turn back beyond -100 degrees: a spring pulls forwards. Let go, and the knob snaps forwards, like a tongue slap."
             }
         }
     }

@@ -1,17 +1,17 @@
-//! The two lines on top: note, pitch, tools; tabs and what the user should know.
+//! The two lines on top: note, pitch and tools; tabs and status.
 
 use egui::{
     Align, Align2, CornerRadius, FontId, Layout, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2,
 };
 
-use crate::editor::compare::Compare;
-use crate::editor::compare::Side;
+use crate::editor::ab_comparison::AbComparison;
+use crate::editor::ab_comparison::ComparisonSide;
 use crate::editor::controls::Hands;
 use crate::editor::controls::momentary;
-use crate::editor::snapshot::{Level, Snapshot};
+use crate::editor::snapshot::{Severity, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
-use crate::editor::{Kept, Tab};
+use crate::editor::{Tab, WindowState};
 
 /// Least and most zoom, and the steps offered.
 pub const ZOOMS: [f32; 8] = [0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0];
@@ -23,7 +23,13 @@ pub fn note_name(midi: u8) -> String {
 }
 
 /// The upper line.
-pub fn tools(ui: &mut Ui, kept: &mut Kept, compare: &mut Compare, hands: &mut Hands, snapshot: &Snapshot) {
+pub fn tools(
+    ui: &mut Ui,
+    kept: &mut WindowState,
+    compare: &mut AbComparison,
+    hands: &mut Hands,
+    snapshot: &Snapshot,
+) {
     let is_wide = ui.available_width() > 900.0;
     ui.horizontal_centered(|ui| {
         // The pitch would tell one setting from another.
@@ -63,7 +69,7 @@ enum Icon {
     Theme,
 }
 
-/// A button with a drawn sign: the fonts at hand have none that all of them share.
+/// A button with a drawn symbol, because no symbol is in all fonts.
 fn icon(ui: &mut Ui, icon: Icon, name: &str) -> egui::Response {
     let (rect, response) = ui.allocate_exact_size(vec2(28.0, 24.0), Sense::click());
     let visuals = *ui.style().interact(&response);
@@ -122,8 +128,7 @@ fn note(ui: &mut Ui, snapshot: &Snapshot, has_pitch: bool) {
     painter.text(pos2(x, rect.center().y + 1.0), Align2::LEFT_TOP, &pitch, theme::small(), c.quiet);
     let said = format!("Written {big}, {below}, {pitch}");
     response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &said));
-    response
-        .on_hover_text("The note as it is read, what sounds on this instrument, and the pitch that is heard");
+    response.on_hover_text("The written note, the note that this instrument sounds, and the measured pitch");
 }
 
 /// Cents above or below the note: a needle over 50 cents each way.
@@ -144,7 +149,7 @@ pub fn needle(ui: &mut Ui, snapshot: &Snapshot, width: f32) {
         };
         painter.vline(at(cents), line_y - height..=line_y, Stroke::new(1.0, c.quiet));
     }
-    // Five cents either way: what a listener takes for in tune.
+    // Within five cents a listener hears the note as in tune.
     let near = Rect::from_min_max(pos2(at(-5.0), line_y), pos2(at(5.0), line_y + 3.0));
     painter.rect_filled(near, CornerRadius::ZERO, c.speaks);
     let text = match snapshot.heard.cents.filter(|cents| cents.is_finite()) {
@@ -161,13 +166,13 @@ pub fn needle(ui: &mut Ui, snapshot: &Snapshot, width: f32) {
     painter.text(place, Align2::RIGHT_TOP, &text, theme::small(), c.quiet);
     response.widget_info(|| WidgetInfo::labeled(Role::Meter, true, format!("Pitch: {text}")));
     response.on_hover_text(format!(
-        "How far the sound is from the note at A4 = {:.1} Hz",
+        "Distance of the sound from the note, at A4 = {:.1} Hz",
         snapshot.settings.a4_hz
     ));
 }
 
 fn undo(ui: &mut Ui, hands: &mut Hands) {
-    let name = |hands: &Hands, step: Option<&[crate::editor::history::Change]>| {
+    let name = |hands: &Hands, step: Option<&[crate::editor::undo::Change]>| {
         step.map(|step| step.iter().map(|change| hands.name(change.id)).collect::<Vec<_>>().join(", "))
     };
     let (undoable, redoable) = (name(hands, hands.history.undoable()), name(hands, hands.history.redoable()));
@@ -189,42 +194,44 @@ fn undo(ui: &mut Ui, hands: &mut Hands) {
     });
 }
 
-fn sides(ui: &mut Ui, compare: &mut Compare, hands: &mut Hands, is_wide: bool) {
+fn sides(ui: &mut Ui, compare: &mut AbComparison, hands: &mut Hands, is_wide: bool) {
     if compare.is_blind() {
         let c = Colours::here(ui);
         ui.label(egui::RichText::new("blind").color(c.beats));
         return;
     }
     let blind = ui.add_enabled(compare.differs(&hands.setting()), egui::Button::new("Blind"));
-    let blind = blind.on_hover_text("Compare without knowing which is which: A and B become X and Y by lot");
-    if blind.on_disabled_hover_text("Set A and B apart first, then compare them blind").clicked() {
+    let blind = blind
+        .on_hover_text("Compare without knowing which is which: A and B appear as X and Y in random order");
+    if blind.on_disabled_hover_text("Make A and B different first, then compare them blind").clicked() {
         compare.hide();
     }
     let (text, other) = match compare.side {
-        Side::A if is_wide => ("A to B", "B"),
-        Side::B if is_wide => ("B to A", "A"),
-        Side::A => (">", "B"),
-        Side::B => ("<", "A"),
+        ComparisonSide::A if is_wide => ("A to B", "B"),
+        ComparisonSide::B if is_wide => ("B to A", "A"),
+        ComparisonSide::A => (">", "B"),
+        ComparisonSide::B => ("<", "A"),
     };
     let copy = named(ui.button(text), &format!("Copy to {other}"));
-    if copy.on_hover_text(format!("Makes {other} the same as what you hear now")).clicked() {
+    if copy.on_hover_text(format!("Copies the settings you hear now to {other}")).clicked() {
         compare.copy(hands.setting());
     }
-    for (side, name) in [(Side::B, "B"), (Side::A, "A")] {
+    for (side, name) in [(ComparisonSide::B, "B"), (ComparisonSide::A, "A")] {
         let is_here = compare.side == side;
         let button = egui::Button::selectable(is_here, format!(" {name} ")).frame_when_inactive(true);
         let response = ui.add(button);
         response.widget_info(|| {
             WidgetInfo::selected(Role::RadioButton, true, is_here, format!("Setting {name}"))
         });
-        if response.on_hover_text(format!("Setting {name}: change it, and go back and forth")).clicked() {
+        if response.on_hover_text(format!("Setting {name}: change it, and switch between A and B")).clicked()
+        {
             let values = compare.go(side, hands.setting());
             hands.restore(&values);
         }
     }
 }
 
-fn zoom(ui: &mut Ui, kept: &mut Kept) {
+fn zoom(ui: &mut Ui, kept: &mut WindowState) {
     let text = format!("{:.0} %", 100.0 * kept.zoom);
     // High enough for all of them.
     let list = egui::ComboBox::from_id_salt("zoom").width(64.0).height(300.0).selected_text(&text);
@@ -238,11 +245,11 @@ fn zoom(ui: &mut Ui, kept: &mut Kept) {
         info.current_text_value = Some(text.clone());
         info
     });
-    shown.response.on_hover_text("Size of everything in this window; kept with the project");
+    shown.response.on_hover_text("Size of everything in this window; saved with the project");
 }
 
 /// The lower line.
-pub fn tabs(ui: &mut Ui, kept: &mut Kept, snapshot: &Snapshot) {
+pub fn tabs(ui: &mut Ui, kept: &mut WindowState, snapshot: &Snapshot) {
     let c = Colours::here(ui);
     let is_wide = ui.available_width() > 900.0;
     ui.horizontal_centered(|ui| {
@@ -283,14 +290,14 @@ pub fn tabs(ui: &mut Ui, kept: &mut Kept, snapshot: &Snapshot) {
 fn status(ui: &mut Ui, snapshot: &Snapshot) {
     let c = Colours::here(ui);
     let colour = |level| match level {
-        Level::Good => c.speaks,
-        Level::Note => c.breath,
-        Level::Warn => c.danger,
+        Severity::Good => c.speaks,
+        Severity::Note => c.breath,
+        Severity::Warn => c.danger,
     };
     let preparing = snapshot
         .preparing
         .as_ref()
-        .map(|(what, part)| (Level::Note, format!("{what} {:.0} %", 100.0 * part)));
+        .map(|(what, part)| (Severity::Note, format!("{what} {:.0} %", 100.0 * part)));
     let first =
         preparing.or_else(|| snapshot.status.first().map(|status| (status.level, status.text.clone())));
     let Some((level, text)) = first else { return };

@@ -1,4 +1,4 @@
-//! Which clarinet, how it is tuned, how it articulates, how loud it is.
+//! The instrument view: which clarinet, its tuning, articulation and level.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use egui::{Align2, CornerRadius, RichText, Role, Sense, Stroke, TextEdit, Ui, Wi
 
 use crate::editor::Action;
 use crate::editor::chart;
-use crate::editor::clarinet_body::{Body, ruler};
+use crate::editor::clarinet_drawing::{ClarinetDrawing, ruler};
 use crate::editor::controls::{Hands, choice, heading, slider, teach};
 use crate::editor::header::note_name;
 use crate::editor::snapshot::Snapshot;
@@ -47,7 +47,7 @@ impl InstrumentView {
             ui.set_width(ui.available_width());
             ui.set_height(ui.available_height());
             let all = ui.available_height();
-            // What the words leave.
+            // The height that the words leave.
             let drawn = if all < 260.0 { 0.0 } else { (all - 180.0).min(220.0) };
             egui::ScrollArea::vertical()
                 .id_salt("facts")
@@ -82,7 +82,7 @@ impl InstrumentView {
             ui.add(egui::ProgressBar::new(*part).text(what.as_str()).desired_height(16.0).fill(c.accent));
         }
         ui.add_space(4.0);
-        ui.label(RichText::new("A file of your own (docs/instrument-file.md)").color(c.quiet));
+        ui.label(RichText::new("Your own instrument file (see docs/instrument-file.md)").color(c.quiet));
         ui.horizontal(|ui| {
             let width = ui.available_width() - 74.0;
             let field =
@@ -127,7 +127,7 @@ fn portrait(ui: &Ui, snapshot: &Snapshot) {
     let c = Colours::here(ui);
     let area = ui.available_rect_before_wrap();
     let painter = ui.painter_at(area);
-    let body = Body::new(&snapshot.instrument, area);
+    let body = ClarinetDrawing::new(&snapshot.instrument, area);
     ruler(&painter, c, area, body.scale);
     body.paint(&painter, c, &[]);
     for (index, hole) in snapshot.instrument.holes.iter().enumerate() {
@@ -151,9 +151,9 @@ fn facts(ui: &mut Ui, snapshot: &Snapshot) {
     let transposition = file.transposition;
     let rows = [
         ("Sounds", down),
-        ("Compass, written", format!("{} to {}", note_name(file.lowest().0), note_name(file.highest().0))),
+        ("Range, written", format!("{} to {}", note_name(file.lowest().0), note_name(file.highest().0))),
         (
-            "Compass, sounding",
+            "Range, sounding",
             format!(
                 "{} to {}",
                 name(file.lowest().sounding(transposition)),

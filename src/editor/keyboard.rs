@@ -1,7 +1,6 @@
-//! Keys that play: the compass of the instrument, sounding pitch, further down on a key is louder.
-//!
-//! Sliding from key to key slurs: the new note goes down before the old one comes up. With the focus on it, arrow keys
-//! choose a note and Space plays it as long as it is held.
+//! The keyboard: the range of the instrument at sounding pitch. A press lower on a key is louder.
+//! Sliding from key to key slurs: the new note starts before the old one ends. With the keyboard focus, the arrow keys
+//! choose a note, and Space plays it while it is held.
 
 use egui::{
     Align2, Color32, CornerRadius, Event, EventFilter, Key, Pos2, Rect, Role, Sense, Stroke, Ui, WidgetInfo,
@@ -15,7 +14,7 @@ use crate::editor::theme;
 use crate::editor::theme::Colours;
 use chalumeau_core::units::SoundingNote;
 
-/// Velocity by keyboard.
+/// Velocity of a note played with Space.
 const PLAIN: f32 = 0.75;
 
 /// What the keys remember.
@@ -25,7 +24,7 @@ pub struct Keyboard {
     held: Option<SoundingNote>,
     /// It is held by the Space bar.
     by_key: bool,
-    /// The note the arrow keys stand on.
+    /// The note that the arrow keys have chosen.
     chosen: Option<SoundingNote>,
 }
 
@@ -75,11 +74,10 @@ impl Keyboard {
         response.widget_info(|| {
             WidgetInfo::labeled(Role::Group, true, format!("Keyboard, {}", note_name(chosen)))
         });
-        // Whoever plays has read it.
+        // A user who plays needs no tool tip.
         if self.held.is_none() {
             response.on_hover_text(
-                "Plays sounding pitches; above, the note stands as a player reads it. Further down on a key is louder; \
-                 sliding slurs. By keys, with Tab up to here: arrows choose, Space plays.",
+                "The keys play sounding pitches; the written note is at the top of the window. Press lower on a key to play louder; slide to slur. With the keyboard: Tab to here, choose with the arrow keys, play with Space.",
             );
         }
     }

@@ -1,18 +1,18 @@
-//! The reed at work: flow against pressure from the tables of sound and touch, H and k to be taken by the hand, and the
-//! same curve as torque beside it.
-//!
-//! Horizontally the pressure difference over the reed, kPa; vertically the flow, cm3/s. The still reed sits on the curve
-//! at the mouth pressure; the sounding reed runs round a loop, which leaves the curve because reed and lay take time.
-//! The peak is the handle of H, closure that of k. Coupled, both move H, and the peak's height is A. Where the reed is
-//! named as its maker does, the peak is the handle of the channel's width and closure that of the stiffness.
+//! The reed view: flow over pressure, from the tables that sound and touch share, with handles for H and k; beside it the
+//! same curve as torque.
+//! The horizontal axis is the pressure difference over the reed, kPa; the vertical axis is the flow, cm3/s. A reed at rest
+//! is on the curve at the mouth pressure. A sounding reed runs along a loop, which leaves the curve because of the reed's
+//! inertia and the lay.
+//! The peak is the handle of H, closure that of k. Coupled, both move H, and the peak's height is A. If the reed
+//! is given in physical units, the peak is the handle of the channel's width and closure that of the stiffness.
 
 use egui::{Align2, Pos2, Stroke, Ui, pos2, vec2};
 use egui_plot::{PlotPoint, PlotTransform, PlotUi, Points};
 
+use crate::editor::breath_meter;
 use crate::editor::chart;
-use crate::editor::chart::{Chart, Mark};
+use crate::editor::chart::{Chart, ChartMark};
 use crate::editor::controls::{Hands, choice, handle, heading, slider, switch, teach};
-use crate::editor::meter;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme::{Colours, GAP, panel};
 use chalumeau_core::haptics::law;
@@ -28,7 +28,7 @@ const POINTS: usize = 160;
 /// What the view remembers.
 #[derive(Clone, Debug, Default)]
 pub struct ReedView {
-    /// Bounds of the picture while a handle is held: else it would run away from the hand.
+    /// Bounds of the chart while a handle is held; otherwise the chart would rescale under the pointer.
     bounds: Option<(f64, f64)>,
 }
 
@@ -135,9 +135,9 @@ impl ReedView {
             even(1.3 * picture.peak()[1].max(0.6 * picture.flow_cm3s), 50.0),
         );
         let (right, top) = self.bounds.unwrap_or(wanted);
-        let marks: Vec<Mark> = meter::marks(snapshot, c)
+        let marks: Vec<ChartMark> = breath_meter::marks(snapshot, c)
             .into_iter()
-            .map(|(at, name, colour)| Mark { at: f64::from(at), name, colour })
+            .map(|(at, name, colour)| ChartMark { at: f64::from(at), name, colour })
             .filter(|mark| mark.at < right)
             .collect();
         let period = snapshot.scope.last_period(snapshot.heard.f0_hz.unwrap_or(0.0));
@@ -164,10 +164,10 @@ impl ReedView {
         });
         chart::names(ui, &transform, &marks);
         if ui.available_width() > 300.0 && transform.frame().height() > 200.0 {
-            let sounding = if is_sounding { "sounding: one period" } else { "the reed is still" };
-            let mut lines = vec![("the reed's law", c.accent), (sounding, c.breath)];
+            let sounding = if is_sounding { "one period of the sound" } else { "the reed does not swing" };
+            let mut lines = vec![("flow law of the reed", c.accent), (sounding, c.breath)];
             if kpa > 0.02 {
-                lines.push(("circle: the still reed", c.breath));
+                lines.push(("circle: the reed at rest", c.breath));
             }
             // Below, where the closed reed lets nothing through.
             chart::legend(ui, &transform, 0.70, &lines);
@@ -244,19 +244,19 @@ impl ReedView {
     }
 }
 
-/// How the reed is named, which decides what its handles move.
+/// How the reed is given, which decides what the handles change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Face {
     /// H alone; k follows.
     Coupled,
     /// H and k.
     Free,
-    /// As a maker measures it.
+    /// In physical units, as a maker measures it.
     Maker,
 }
 
 impl Face {
-    /// What stands on the handles of peak and closure.
+    /// The letters on the handles of peak and closure.
     fn names(self) -> [&'static str; 2] {
         match self {
             Self::Coupled | Self::Free => ["H", "k"],
@@ -264,7 +264,7 @@ impl Face {
         }
     }
 
-    /// What a handle moves.
+    /// The parameters that a handle changes.
     fn ids(self, is_peak: bool) -> &'static [&'static str] {
         match (self, is_peak) {
             (Self::Coupled, true) => &["reedh", "reeda"],
@@ -276,7 +276,7 @@ impl Face {
     }
 }
 
-/// Sets a parameter to so many times what it is.
+/// Multiplies a parameter.
 fn scale(hands: &mut Hands, id: &'static str, by: f64) {
     if by.is_finite() {
         hands.set_number(id, hands.number(id) * by.max(0.0));
@@ -322,14 +322,14 @@ fn framed(ui: &mut Ui, c: &Colours, size: egui::Vec2, draw: impl FnOnce(&mut Ui)
     });
 }
 
-/// The torque of the current note over the knob's way, with where the knob is.
+/// The torque of the current note over the knob's angle, with the knob's position.
 pub fn torque_picture(ui: &mut Ui, snapshot: &Snapshot) {
     let c = Colours::here(ui);
     let note = match &snapshot.feel {
         Ok(note) => *note,
         Err(reason) => {
             let rect = ui.available_rect_before_wrap();
-            chart::empty(ui, rect, &format!("What the hand feels would stand here.\n{reason}"));
+            chart::empty(ui, rect, &format!("The torque of the note appears here.\n{reason}"));
             return;
         }
     };
@@ -342,13 +342,13 @@ pub fn torque_picture(ui: &mut Ui, snapshot: &Snapshot) {
     let wall = f64::from(feel.wall_deg);
     let most = points.iter().filter(|[deg, _]| *deg < wall).map(|[_, mnm]| *mnm).fold(10.0, f64::max);
     let top = even(1.25 * most, 20.0);
-    let marks: Vec<Mark> = [
+    let marks: Vec<ChartMark> = [
         (at.a_on_deg, "speaks", c.speaks),
         (at.a_beat_deg, "beats", c.beats),
         (at.a_close_deg, "closes", c.closes),
     ]
     .into_iter()
-    .map(|(at, name, colour)| Mark { at, name, colour })
+    .map(|(at, name, colour)| ChartMark { at, name, colour })
     .filter(|mark| mark.at > 0.0 && mark.at < right)
     .collect();
     let knob = snapshot.knob.angle_deg.map(f64::from).filter(|deg| (0.0..right).contains(deg));
@@ -405,7 +405,7 @@ fn column(ui: &mut Ui, hands: &mut Hands) {
     for id in ["reeda", "lay"] {
         slider(ui, hands, id);
     }
-    heading(ui, "Moved by a controller");
+    heading(ui, "Controllers for H and k");
     for id in ["hsrc", "ksrc"] {
         choice(ui, hands, id);
     }

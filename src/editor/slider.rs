@@ -1,5 +1,5 @@
-//! The slider: drags relative to where it stands (Shift: ten times finer), goes to its default by a double click or
-//! Ctrl-click, takes typed text by a click on its value or Enter, and moves by arrow keys when it has the focus.
+//! The slider. It moves by dragging (Shift: ten times finer) and by arrow keys when it has the focus. A double click or
+//! Ctrl-click sets the default. A click on its value, or Enter, opens a text field.
 
 use egui::accesskit::Action as AccessAction;
 use egui::{
@@ -18,7 +18,7 @@ const SLIDER_HEIGHT: f32 = 36.0;
 /// Share of the track an arrow key moves; a hundredth of that with Shift.
 const KEY_STEP: f32 = 0.01;
 
-/// A named slider as wide as its place. Nothing where there is no such parameter.
+/// A slider with its name, as wide as its place. `None` if there is no such parameter.
 pub fn slider(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Response> {
     let look = hands.controls.look(id)?;
     let c = Colours::here(ui);
@@ -29,7 +29,7 @@ pub fn slider(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
     let value_size = galley.size() + vec2(10.0, 4.0);
     let value_rect = Rect::from_min_size(pos2(rect.right() - value_size.x + 5.0, rect.top()), value_size);
     let is_typing = hands.entry.as_ref().is_some_and(|entry| entry.id == id);
-    // One stop of the Tab key a slider: its value opens by Enter.
+    // The Tab key stops once per slider; Enter opens its value.
     let value_response = ui.interact(value_rect, response.id.with("value"), Sense::CLICK);
 
     let track = Rect::from_min_max(

@@ -1,12 +1,11 @@
-//! One moment of everything the editor shows, as plain data.
-//!
-//! Whoever hosts the editor fills it from atomics, triple buffers and rings; tests fill it by hand or by playing the
-//! instrument offline. The editor never sees a voice, a link or a lock. What is missing is shown as missing: every
-//! `Option` and empty list has a look of its own.
+//! Everything the editor shows at one moment, as plain data.
+//! The plugin fills it from atomics, triple buffers and rings. Tests fill it by hand or by playing the instrument offline.
+//! The editor knows no voice, no link to the knob and no lock. It shows missing values as missing: every `Option` and every
+//! empty list has its own look.
 
 use std::sync::Arc;
 
-use crate::editor::listener::Heard;
+use crate::editor::sound_analysis::SoundAnalysis;
 use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
 use chalumeau_core::haptics::{NoteFeel, Requirement};
 use chalumeau_core::instrument::Settings;
@@ -31,27 +30,27 @@ pub struct Snapshot {
     pub openings: Vec<f32>,
     /// Mouth pressure, kPa.
     pub mouth_kpa: f32,
-    /// What this fingering asks under the reed as it is set; `None` if it cannot sound or is not known yet.
+    /// The pressures that this fingering needs with this reed; `None` if it cannot sound or is not known yet.
     pub requirement: Option<Requirement>,
-    /// What the parameters say.
+    /// The settings of the parameters.
     pub settings: Settings,
     /// Where breath can come from.
-    pub sources: Vec<Source>,
+    pub sources: Vec<BreathSource>,
     /// The last seconds of mouth pressure.
     pub history: Track,
     /// The inside of the mouthpiece, two periods of the lowest note or more.
     pub scope: Scope,
     /// The sound that comes out.
-    pub heard: Heard,
+    pub heard: SoundAnalysis,
     /// Standing wave of the fingering at the pitch of the note: place, m from the reed, and magnitude over that at the
     /// reed.
     pub standing: Vec<(f32, f32)>,
     /// What the user should know, most important first.
     pub status: Vec<Status>,
-    /// What the hand feels on this fingering, or why nothing.
+    /// The feel of this fingering, or the reason why there is none.
     pub feel: Result<NoteFeel, String>,
     /// The knob.
-    pub knob: Knob,
+    pub knob: KnobState,
     /// Delay of the plugin, ms.
     pub latency_ms: f32,
 }
@@ -74,11 +73,11 @@ impl Default for Snapshot {
             sources: Vec::new(),
             history: Track::default(),
             scope: Scope::default(),
-            heard: Heard::default(),
+            heard: SoundAnalysis::default(),
             standing: Vec::new(),
             status: Vec::new(),
             feel: Err("no knob feel yet".into()),
-            knob: Knob::default(),
+            knob: KnobState::default(),
             latency_ms: 0.0,
         }
     }
@@ -90,7 +89,7 @@ impl Snapshot {
         (self.settings.closing_pa() * 1e-3) as f32
     }
 
-    /// Mouth pressure, kPa, whatever stands there: 0..=100.
+    /// Mouth pressure, kPa, limited to 0..=100.
     pub fn mouth_now_kpa(&self) -> f32 {
         if self.mouth_kpa.is_finite() { self.mouth_kpa.clamp(0.0, 100.0) } else { 0.0 }
     }
@@ -108,10 +107,10 @@ impl Snapshot {
     }
 
     /// The pressures that matter for this note.
-    pub fn marks(&self) -> Marks {
+    pub fn marks(&self) -> PressureMarks {
         let closing_kpa = self.closing_kpa();
         let of = |gamma: f64| gamma as f32 * closing_kpa;
-        Marks {
+        PressureMarks {
             speaks_kpa: self.requirement.map(|r| of(r.gamma_sounding)),
             beats_kpa: self.requirement.map(|r| of(r.gamma_beat)),
             closes_kpa: closing_kpa,
@@ -122,31 +121,31 @@ impl Snapshot {
 
 /// Mouth pressures of the current note, kPa.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Marks {
+pub struct PressureMarks {
     /// The note begins to sound.
     pub speaks_kpa: Option<f32>,
     /// The reed begins to touch the lay.
     pub beats_kpa: Option<f32>,
     /// The reed at rest would be shut.
     pub closes_kpa: f32,
-    /// Nothing sounds any more.
+    /// The sound stops.
     pub chokes_kpa: Option<f32>,
 }
 
-/// One way breath comes in.
+/// A source of breath.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Source {
+pub struct BreathSource {
     /// As players call it: "CC2 breath", "Knob".
     pub name: String,
-    /// What it says now, 0..=1.
+    /// Its value, 0..=1.
     pub value: f32,
-    /// It is the one that blows.
+    /// It sets the breath.
     pub is_live: bool,
-    /// It has said something since the start.
+    /// It has sent a value since the start.
     pub is_seen: bool,
 }
 
-impl Source {
+impl BreathSource {
     /// Name of the one that can be calibrated.
     pub const KNOB: &'static str = "Knob";
 }
@@ -207,28 +206,28 @@ impl Scope {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Status {
     /// How much it matters.
-    pub level: Level,
+    pub level: Severity,
     /// The line.
     pub text: String,
 }
 
 /// How much something matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Level {
+pub enum Severity {
     /// All is well.
     Good,
     /// Worth knowing.
     Note,
-    /// Something keeps the user from what they want.
+    /// Something the user should fix.
     Warn,
 }
 
-/// The knob and the line to it.
+/// The knob and the connection to it.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Knob {
+pub struct KnobState {
     /// What there is to choose from.
-    pub devices: Vec<Device>,
-    /// Where the link stands, in a line.
+    pub devices: Vec<KnobDevice>,
+    /// State of the connection, in one line.
     pub text: String,
     /// It answers and can be armed.
     pub is_live: bool,
@@ -258,7 +257,7 @@ pub struct Knob {
 
 /// One device in the list.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Device {
+pub struct KnobDevice {
     /// What to give back in [`Action::ChooseDevice`](crate::editor::Action::ChooseDevice).
     pub key: String,
     /// Name and serial number.

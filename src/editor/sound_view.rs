@@ -1,4 +1,4 @@
-//! The sound: spectrum with odd and even harmonics told apart, the wave in the mouthpiece and the reed's gap.
+//! The sound view: spectrum with odd and even harmonics in two colours, mouthpiece pressure and reed opening.
 //!
 //! A closed pipe favours the odd harmonics, which is why a clarinet's low register sounds hollow; the even ones come with
 //! the beating reed, the bell and the tone holes.
@@ -10,8 +10,8 @@ use crate::editor::chart;
 use crate::editor::chart::Chart;
 use crate::editor::controls::{Hands, choice, heading, slider};
 use crate::editor::header;
-use crate::editor::listener::FLOOR_DB;
 use crate::editor::snapshot::Snapshot;
+use crate::editor::sound_analysis::FLOOR_DB;
 use crate::editor::theme::{Colours, GAP, panel};
 
 /// Highest harmonic marked.
@@ -53,7 +53,7 @@ fn spectrum(ui: &mut Ui, snapshot: &Snapshot) {
     let heard = &snapshot.heard;
     if heard.level_db.len() < 2 {
         let rect = ui.available_rect_before_wrap();
-        chart::empty(ui, rect, "The spectrum of what sounds would stand here.");
+        chart::empty(ui, rect, "No sound yet. The spectrum appears here.");
         return;
     }
     let f0_hz = heard.f0_hz.map(f64::from);
@@ -97,7 +97,7 @@ fn spectrum(ui: &mut Ui, snapshot: &Snapshot) {
         );
         let Some(f0_hz) = f0_hz else { return };
         for is_odd in [true, false] {
-            let colour = if is_odd { c.breath } else { c.even };
+            let colour = if is_odd { c.odd_harmonic } else { c.even_harmonic };
             let harmonics = (1..=HARMONICS).filter(|k| (k % 2 == 1) == is_odd).map(|k| k as f64 * f0_hz);
             let points: Vec<[f64; 2]> =
                 harmonics.filter(|hz| *hz < right).map(|hz| [1e-3 * hz, level(hz)]).collect();
@@ -105,7 +105,12 @@ fn spectrum(ui: &mut Ui, snapshot: &Snapshot) {
             plot.points(points.color(colour).allow_hover(false));
         }
     });
-    chart::legend(ui, &transform, 0.02, &[("odd harmonics", c.breath), ("even harmonics", c.even)]);
+    chart::legend(
+        ui,
+        &transform,
+        0.02,
+        &[("odd harmonics", c.odd_harmonic), ("even harmonics", c.even_harmonic)],
+    );
 }
 
 fn waves(ui: &mut Ui, snapshot: &Snapshot) {
@@ -114,7 +119,7 @@ fn waves(ui: &mut Ui, snapshot: &Snapshot) {
     let count = scope.mouthpiece_kpa.len().min(scope.opening.len());
     if count < 2 || scope.rate_hz <= 0.0 {
         let rect = ui.available_rect_before_wrap();
-        chart::empty(ui, rect, "The wave in the mouthpiece and the reed's gap would stand here.");
+        chart::empty(ui, rect, "No sound yet. Mouthpiece pressure and reed opening appear here.");
         return;
     }
     let shown = scope.standing_periods(snapshot.heard.f0_hz.unwrap_or(0.0), PERIODS);
@@ -137,7 +142,7 @@ fn waves(ui: &mut Ui, snapshot: &Snapshot) {
         x: (0.0, to),
         y: (-most, most),
         x_name: if has_gap { "" } else { "ms" },
-        y_name: "pressure in the mouthpiece, kPa; straight line: in the mouth",
+        y_name: "mouthpiece pressure, kPa; straight line: mouth pressure",
         height,
         label: "Pressure in the mouthpiece over time",
     }
@@ -155,7 +160,7 @@ fn waves(ui: &mut Ui, snapshot: &Snapshot) {
         x: (0.0, to),
         y: (-0.25, (1.1 * largest(&scope.opening, 1.0)).max(1.2)),
         x_name: "ms",
-        y_name: "reed's gap over that at rest",
+        y_name: "reed opening over opening at rest",
         height: ui.available_height(),
         label: "Opening of the reed over time",
     }
@@ -172,12 +177,12 @@ fn column(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     let width = ui.available_width();
     header::needle(ui, snapshot, width);
     let heard = &snapshot.heard;
-    let pitch = heard.f0_hz.map_or_else(|| "nothing sounds".into(), |hz| format!("{hz:.2} Hz"));
+    let pitch = heard.f0_hz.map_or_else(|| "no sound".into(), |hz| format!("{hz:.2} Hz"));
     ui.label(egui::RichText::new(pitch).color(c.quiet));
     if let Some(balance) = balance_db(&heard.harmonics_db) {
         let text = format!("odd over even harmonics {balance:+.0} dB");
         ui.label(egui::RichText::new(text).color(c.quiet)).on_hover_text(
-            "Power of harmonics 1, 3, 5.. over that of 2, 4, 6..: a low clarinet is 20 dB and more, a saxophone about 0",
+            "Power of harmonics 1, 3, 5 ... over the power of harmonics 2, 4, 6 ...: 20 dB or more for a low clarinet, about 0 dB for a saxophone",
         );
     }
     choice(ui, hands, "tune");

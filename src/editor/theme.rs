@@ -1,4 +1,4 @@
-//! How the editor looks: two sets of colours with the same meanings, type sizes, and the few distances used everywhere.
+//! The editor's theme: two sets of colours with the same meanings, font sizes and distances.
 //!
 //! The curves' colours are those of the figures ([`palette`](chalumeau_figure::palette): Okabe and Ito, told apart by readers
 //! with any kind of colour vision), darkened a little on paper, where they are also text, and lightened on the dark
@@ -48,8 +48,10 @@ pub struct Colours {
     pub felt: Color32,
     /// Where nothing sounds any more.
     pub chokes: Color32,
-    /// Even harmonics, second curves.
-    pub even: Color32,
+    /// Odd harmonics; the colour of breath.
+    pub odd_harmonic: Color32,
+    /// Even harmonics.
+    pub even_harmonic: Color32,
     /// What needs attention at once.
     pub danger: Color32,
     /// Body of the clarinet, and its edge.
@@ -97,7 +99,8 @@ fn light() -> Colours {
         closes: toned(Colour::Vermilion, -0.10),
         felt: toned(Colour::Purple, -0.12),
         chokes: toned(Colour::Grey, 0.0),
-        even: toned(Colour::Orange, 0.0),
+        odd_harmonic: toned(Colour::Blue, 0.0),
+        even_harmonic: toned(Colour::Orange, 0.0),
         danger: rgb(0xb3_2318),
         wood: rgb(0x4a_3a32),
         metal: rgb(0xa9_adb4),
@@ -126,7 +129,8 @@ fn dark() -> Colours {
         closes: toned(Colour::Vermilion, 0.28),
         felt: toned(Colour::Purple, 0.38),
         chokes: toned(Colour::Grey, 0.25),
-        even: toned(Colour::Orange, 0.30),
+        odd_harmonic: toned(Colour::Sky, 0.22),
+        even_harmonic: toned(Colour::Orange, 0.30),
         danger: rgb(0xff_6a5a),
         wood: rgb(0x5a_473c),
         metal: rgb(0x9a_9ea6),

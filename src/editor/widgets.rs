@@ -1,4 +1,4 @@
-//! The other widgets: choices, switches, buttons that act, headings, handles in pictures, and tool tips that teach.
+//! Choices, switches, buttons, headings, handles in charts, and tool tips that explain a parameter.
 
 use egui::{
     Align2, CornerRadius, CursorIcon, EventFilter, FontId, Key, Pos2, Rect, Response, Role, Sense, Stroke,
@@ -118,7 +118,7 @@ pub fn switch(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
     Some(response.on_hover_ui(|ui| teach(ui, id, "Click: on, off.")))
 }
 
-/// The picture and the hand of a switch.
+/// A switch that belongs to no parameter.
 pub fn toggle(ui: &mut Ui, name: &str, is_on: bool) -> Response {
     let c = Colours::here(ui);
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 24.0), Sense::click());
@@ -150,7 +150,7 @@ pub fn toggle(ui: &mut Ui, name: &str, is_on: bool) -> Response {
 /// A button whose parameter is 1 while it is held, and for a tenth of a second at least.
 pub fn momentary(ui: &mut Ui, hands: &mut Hands, id: &'static str, text: &str) -> Option<Response> {
     let is_on = hands.controls.look(id)?.value >= 0.5;
-    // A mere click is over after a while, however long the hand stays.
+    // A click ends after a short time, even if the pointer stays.
     let button = egui::Button::new(text).selected(is_on).sense(Sense::click_and_drag());
     let response = ui.add(button);
     let by_key = response.has_focus() && ui.input(|i| i.key_down(Key::Space) || i.key_down(Key::Enter));
@@ -169,12 +169,12 @@ pub fn heading(ui: &mut Ui, text: &str) {
     ui.label(egui::RichText::new(text).font(FontId::proportional(12.0)).color(c.accent).strong());
 }
 
-/// A handle in a picture: its response, and where a hand takes it this frame.
+/// A handle in a chart: its response, and the place it is dragged to in this frame.
 pub fn handle(ui: &mut Ui, name: &str, at: Pos2, text: &str) -> (Response, Option<Pos2>) {
     let c = Colours::here(ui);
     let rect = Rect::from_center_size(at, Vec2::splat(26.0));
     let response = ui.interact(rect, ui.scope_id().with(("handle", name)), Sense::click_and_drag());
-    // Where the hand is, which need not be where the parameter could follow.
+    // The place of the pointer; the parameter may not be able to follow it.
     let hand = response.id.with("hand");
     let mut to = None;
     if response.drag_started() {

@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use chalumeau::editor::{Kept, State, Tab, draw};
+use chalumeau::editor::{EditorState, Tab, WindowState, draw};
 
 use crate::c4;
 use crate::support::Fake;
@@ -31,7 +31,7 @@ struct Cost {
 fn cost(tab: Tab, scale: f32) -> Cost {
     let (snapshot, host) = (c4(), Fake::default());
     let ctx = egui::Context::default();
-    let mut state = State::new(Kept { tab, ..Kept::default() });
+    let mut state = EditorState::new(WindowState { tab, ..WindowState::default() });
     let (mut walls, mut meshes, mut begun) = (Vec::new(), 0, on_cpu());
     for frame in 0..WARM + FRAMES {
         if frame == WARM {

@@ -8,7 +8,7 @@
 
 use std::path::PathBuf;
 
-use chalumeau::editor::{Kept, Tab};
+use chalumeau::editor::{Tab, WindowState};
 use egui::{Pos2, Rect};
 use image::{RgbaImage, imageops};
 
@@ -49,7 +49,7 @@ fn every_view_looks_as_it_did() {
     for size in SIZES {
         for is_dark in [false, true] {
             for tab in Tab::ALL {
-                let kept = Kept { size, is_dark, tab, ..Kept::default() };
+                let kept = WindowState { size, is_dark, tab, ..WindowState::default() };
                 let whole = picture(&kept, &Fake::default(), &snapshot, 1.0);
                 let small = reduced(&whole);
                 let theme = if is_dark { "dark" } else { "light" };
@@ -114,7 +114,7 @@ fn every_control_that_moves_or_vanishes_is_seen() {
     let (snapshot, host) = (c4(), Fake::default());
     for is_dark in [false, true] {
         for tab in Tab::ALL {
-            let kept = Kept { is_dark, tab, ..Kept::default() };
+            let kept = WindowState { is_dark, tab, ..WindowState::default() };
             let mut window = window(&kept, &host, &snapshot, 1.0);
             let whole = shot(&mut window, 1.0);
             let (mut count, mut least) = (0, (usize::MAX, String::new()));
@@ -135,7 +135,7 @@ fn every_control_that_moves_or_vanishes_is_seen() {
 
 #[test]
 fn a_control_that_the_host_lacks_or_turns_is_seen() {
-    let kept = Kept { is_dark: false, ..Kept::default() };
+    let kept = WindowState { is_dark: false, ..WindowState::default() };
     let known = reduced(&picture(&kept, &Fake::default(), &c4(), 1.0));
 
     // Vanished, and what was below it is higher.
@@ -152,7 +152,7 @@ fn a_control_that_the_host_lacks_or_turns_is_seen() {
 
 #[test]
 fn another_renderers_edges_are_not() {
-    let kept = Kept { is_dark: true, ..Kept::default() };
+    let kept = WindowState { is_dark: true, ..WindowState::default() };
     let whole = picture(&kept, &Fake::default(), &c4(), 1.0);
     // Edges softer than they were, and every colour off by two.
     let mut other = imageops::blur(&whole, 0.45);

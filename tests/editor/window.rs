@@ -166,7 +166,7 @@ fn pictures_of_pages() {
     click(&mut window, "Page: Feel test");
     click(&mut window, "Feel test: Threshold");
     save(&mut window, "feel-test");
-    click(&mut window, "Page: Line, takes, studies");
+    click(&mut window, "Page: Connection, takes, study");
     save(&mut window, "line");
     let mut window = Window::new(Tab::Clarinet, (1100.0, 720.0));
     click(&mut window, "Hole L3, closed");
@@ -401,7 +401,7 @@ fn breath_sources_tell_what_they_say_and_how_far_they_went() {
     // It stood at 62 % when the window opened.
     assert!(told("CC11 expression: 40 %, from 10 to 70 %"));
     assert!(told("CC2 breath: not seen"));
-    assert!(told("Knob: 50 %, from 50 to 50 %, blows"));
+    assert!(told("Knob: 50 %, from 50 to 50 %, sets the breath"));
     // The knob is calibrated where it stands in the list.
     let below = |name: &str| window.harness.get_by_label_contains(name).rect().bottom();
     let button = window.harness.get_by_label("Rest here").rect();

@@ -8,12 +8,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 use chalumeau::editor::controls::{Controls, Look};
-use chalumeau::editor::listener::Listener;
-use chalumeau::editor::snapshot::{Device, Knob, Level, Scope, Snapshot, Source, Status, Track};
-use chalumeau::editor::{Kept, State, Tab, draw};
+use chalumeau::editor::snapshot::{
+    BreathSource, KnobDevice, KnobState, Scope, Severity, Snapshot, Status, Track,
+};
+use chalumeau::editor::sound_analysis::SoundAnalyser;
+use chalumeau::editor::{EditorState, Tab, WindowState, draw};
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::event::Event;
-use chalumeau_core::haptics::{FeelDesign, FeelTable, TorqueLimits};
+use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, PlayedReed, Requirements, TorqueLimits};
 use chalumeau_core::instrument::{Clarinet, Probe, Settings, Tuning, felt};
 use chalumeau_core::reed::PhysicalReed;
 use chalumeau_core::units::WrittenNote;
@@ -246,6 +248,93 @@ const RATE_HZ: f64 = 48_000.0;
 /// Of the breath's history.
 const STEP_S: f64 = 1.0 / 30.0;
 
+/// What the list of instruments shows.
+const INSTRUMENTS: [&str; 6] =
+    ["B flat clarinet", "A clarinet", "E flat clarinet", "C clarinet", "Bass clarinet", "User file"];
+
+/// Gamma at a time, s: rises above `gamma`, falls below it and settles.
+fn swell(t: f64, gamma: f64) -> f64 {
+    if t < 0.4 {
+        0.0
+    } else if t < 2.0 {
+        (t - 0.4) / 1.6 * 1.25 * gamma
+    } else if t < 3.4 {
+        (1.25 - 0.6 * (t - 2.0) / 1.4) * gamma
+    } else {
+        (0.65 + 0.35 * ((t - 3.4) / 0.6).min(1.0)) * gamma
+    }
+}
+
+/// Every source of breath; the knob is the one that blows.
+fn breath_sources(knob: f32) -> Vec<BreathSource> {
+    let source = |name: &str, value: f32, is_live, is_seen| BreathSource {
+        name: name.into(),
+        value,
+        is_live,
+        is_seen,
+    };
+    vec![
+        source("Keys, by velocity", 0.8, false, true),
+        source("Breath parameter", 0.0, false, false),
+        source("CC2 breath", 0.0, false, false),
+        source("CC11 expression", 0.62, false, true),
+        source("Channel pressure", 0.0, false, false),
+        source("Note expression", 0.0, false, false),
+        source("Knob", knob, true, true),
+    ]
+}
+
+/// A knob by cable that is armed, and two other devices.
+fn armed_knob(angle_deg: Option<f32>, torque_mnm: Option<f32>) -> KnobState {
+    KnobState {
+        devices: vec![
+            KnobDevice {
+                key: "7f3a".into(),
+                name: "TorqueTuner 7f3a".into(),
+                state: "in use here, /dev/ttyACM0".into(),
+                is_chosen: true,
+                is_free: true,
+            },
+            KnobDevice {
+                key: "sim".into(),
+                name: "Simulated knob 0001".into(),
+                state: "ready".into(),
+                is_chosen: false,
+                is_free: true,
+            },
+            KnobDevice {
+                key: "ttyUSB0".into(),
+                name: "/dev/ttyUSB0".into(),
+                state: "no permission: add yourself to the group dialout".into(),
+                is_chosen: false,
+                is_free: false,
+            },
+        ],
+        text: "TorqueTuner 7f3a (firmware 1.2.0) at /dev/ttyACM0".into(),
+        is_live: true,
+        is_armed: true,
+        ceiling_mnm: 100.0,
+        angle_deg,
+        torque_mnm,
+        notice: None,
+        rate_hz: 500.0,
+        jitter_us: (140, 610),
+        round_trip_us: Some(3_900),
+        lost: 0,
+        damaged: 0,
+        losses: 0,
+    }
+}
+
+/// The feel of a fingering with generous limits, or why there is none.
+fn feel_of(bore: &Requirements, reed: &PlayedReed, fingering: usize) -> Result<NoteFeel, String> {
+    let limits = TorqueLimits { ceiling_mnm: 250.0, stiffness_nm_per_rad: 10.0, push_nm_per_rad: 10.0 };
+    let table = FeelTable::new(bore, &FeelDesign::default(), reed, &limits);
+    table
+        .map_err(|refused| refused.to_string())
+        .and_then(|table| table.note(fingering).copied().ok_or_else(|| "this note has no feel".to_owned()))
+}
+
 /// Plays `written` for five seconds, a swell that settles at `gamma`, and looks at the end of it.
 pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot {
     let mut clarinet = Clarinet::built_in(RATE_HZ).unwrap();
@@ -254,18 +343,7 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
     let note = written.sounding(model.file.transposition).unwrap();
     let closing_kpa = 1e-3 * settings.closing_pa();
     let full_kpa = f64::from(settings.breath_full_kpa);
-    let breath_at = |t: f64| {
-        let swell = if t < 0.4 {
-            0.0
-        } else if t < 2.0 {
-            (t - 0.4) / 1.6 * 1.25 * gamma
-        } else if t < 3.4 {
-            (1.25 - 0.6 * (t - 2.0) / 1.4) * gamma
-        } else {
-            (0.65 + 0.35 * ((t - 3.4) / 0.6).min(1.0)) * gamma
-        };
-        swell * closing_kpa / full_kpa
-    };
+    let breath_at = |t: f64| swell(t, gamma) * closing_kpa / full_kpa;
     let block = 160;
     let blocks = (5.0 * RATE_HZ / block as f64) as usize;
     let (mut sound, mut probes): (Vec<f32>, Vec<Probe>) = (Vec::new(), Vec::new());
@@ -286,17 +364,13 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
     let thin: Vec<&Probe> = latest.iter().step_by(2).collect();
     let mouth_kpa = kpa(probes.last().unwrap());
     let wanted_hz = note.frequency_hz(f64::from(settings.a4_hz));
-    let heard = Listener::new(RATE_HZ).hear(&sound, Some(wanted_hz));
+    let heard = SoundAnalyser::new(RATE_HZ).hear(&sound, Some(wanted_hz));
 
     let fingering = model.fingering_for(note).unwrap();
     let open = &model.file.fingerings[fingering].open;
     let bore = felt::requirements(&model);
     let reed = felt::played_reed(&model.file, settings);
-    let limits = TorqueLimits { ceiling_mnm: 250.0, stiffness_nm_per_rad: 10.0, push_nm_per_rad: 10.0 };
-    let table = FeelTable::new(&bore, &FeelDesign::default(), &reed, &limits);
-    let feel = table
-        .map_err(|refused| refused.to_string())
-        .and_then(|table| table.note(fingering).copied().ok_or_else(|| "this note has no feel".to_owned()));
+    let feel = feel_of(&bore, &reed, fingering);
     let angle_deg = feel.as_ref().ok().map(|feel| feel.map.angle_deg(f64::from(mouth_kpa) * 1e3) as f32);
     let torque_mnm = feel.as_ref().ok().zip(angle_deg).map(|(feel, deg)| {
         chalumeau_core::haptics::law::torque_mnm(
@@ -306,20 +380,9 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
         ) as f32
     });
     let standing = TransferMatrix::new(&model.file, model.air).standing_pressure(wanted_hz, open);
-    let source =
-        |name: &str, value: f32, is_live, is_seen| Source { name: name.into(), value, is_live, is_seen };
     Snapshot {
         instrument: Arc::new(model.file.clone()),
-        instruments: [
-            "B flat clarinet",
-            "A clarinet",
-            "E flat clarinet",
-            "C clarinet",
-            "Bass clarinet",
-            "User file",
-        ]
-        .map(String::from)
-        .to_vec(),
+        instruments: INSTRUMENTS.map(String::from).to_vec(),
         chosen: Some(0),
         sounding: Some(note),
         fingering,
@@ -327,15 +390,7 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
         mouth_kpa,
         requirement: bore.note(fingering, &reed),
         settings: *settings,
-        sources: vec![
-            source("Keys, by velocity", 0.8, false, true),
-            source("Breath parameter", 0.0, false, false),
-            source("CC2 breath", 0.0, false, false),
-            source("CC11 expression", 0.62, false, true),
-            source("Channel pressure", 0.0, false, false),
-            source("Note expression", 0.0, false, false),
-            source("Knob", breath_at(5.0) as f32, true, true),
-        ],
+        sources: breath_sources(breath_at(5.0) as f32),
         history: Track { step_s: STEP_S as f32, kpa: probes.iter().step_by(every).map(kpa).collect() },
         scope: Scope {
             rate_hz: (0.5 * inner_hz) as f32,
@@ -346,49 +401,16 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
         heard,
         standing: standing.into_iter().map(|(x_m, magnitude)| (x_m as f32, magnitude as f32)).collect(),
         status: vec![
-            Status { level: Level::Good, text: "TorqueTuner 7f3a at /dev/ttyACM0, armed at 100 mNm".into() },
-            Status { level: Level::Note, text: "Breath from the knob; CC11 has moved before".into() },
+            Status {
+                level: Severity::Good,
+                text: "TorqueTuner 7f3a at /dev/ttyACM0, armed at 100 mNm".into(),
+            },
+            Status { level: Severity::Note, text: "Breath from the knob; CC11 has moved before".into() },
         ],
         feel,
-        knob: Knob {
-            devices: vec![
-                Device {
-                    key: "7f3a".into(),
-                    name: "TorqueTuner 7f3a".into(),
-                    state: "in use here, /dev/ttyACM0".into(),
-                    is_chosen: true,
-                    is_free: true,
-                },
-                Device {
-                    key: "sim".into(),
-                    name: "Simulated knob 0001".into(),
-                    state: "ready".into(),
-                    is_chosen: false,
-                    is_free: true,
-                },
-                Device {
-                    key: "ttyUSB0".into(),
-                    name: "/dev/ttyUSB0".into(),
-                    state: "no permission: add yourself to the group dialout".into(),
-                    is_chosen: false,
-                    is_free: false,
-                },
-            ],
-            text: "TorqueTuner 7f3a (firmware 1.2.0) at /dev/ttyACM0".into(),
-            is_live: true,
-            is_armed: true,
-            ceiling_mnm: 100.0,
-            angle_deg,
-            torque_mnm,
-            notice: None,
-            rate_hz: 500.0,
-            jitter_us: (140, 610),
-            round_trip_us: Some(3_900),
-            lost: 0,
-            damaged: 0,
-            losses: 0,
-        },
-        latency_ms: 1.3,
+        knob: armed_knob(angle_deg, torque_mnm),
+        // The plugin's delay at 48 kHz.
+        latency_ms: 0.4,
         ..Snapshot::default()
     }
 }
@@ -402,20 +424,25 @@ pub fn c4() -> Snapshot {
 const FRAME: f32 = 8.0;
 
 /// A window to be drawn.
-pub fn window<'a>(kept: &Kept, controls: &'a Fake, snapshot: &'a Snapshot, scale: f32) -> Harness<'a, State> {
+pub fn window<'a>(
+    kept: &WindowState,
+    controls: &'a Fake,
+    snapshot: &'a Snapshot,
+    scale: f32,
+) -> Harness<'a, EditorState> {
     let size = egui::vec2(kept.size.0 + 2.0 * FRAME, kept.size.1 + 2.0 * FRAME);
     let mut harness = Harness::builder().with_size(size).with_pixels_per_point(scale).build_ui_state(
-        |ui, state: &mut State| {
+        |ui, state: &mut EditorState| {
             draw(ui, state, controls, snapshot);
         },
-        State::new(kept.clone()),
+        EditorState::new(kept.clone()),
     );
     harness.run();
     harness
 }
 
 /// The window as a picture, without the frame.
-pub fn shot(harness: &mut Harness<'_, State>, scale: f32) -> image::RgbaImage {
+pub fn shot(harness: &mut Harness<'_, EditorState>, scale: f32) -> image::RgbaImage {
     // A renderer in software may not be done in time on a busy machine.
     let mut tries = (0..6).map(|_| harness.render());
     let whole = tries.find_map(Result::ok).expect("six tries to draw a picture");
@@ -425,12 +452,12 @@ pub fn shot(harness: &mut Harness<'_, State>, scale: f32) -> image::RgbaImage {
 }
 
 /// Both at once.
-pub fn picture(kept: &Kept, controls: &Fake, snapshot: &Snapshot, scale: f32) -> image::RgbaImage {
+pub fn picture(kept: &WindowState, controls: &Fake, snapshot: &Snapshot, scale: f32) -> image::RgbaImage {
     shot(&mut window(kept, controls, snapshot, scale), scale)
 }
 
 /// Name and place in the picture of everything that can be moved, pressed or chosen.
-pub fn things(harness: &Harness<'_, State>) -> Vec<(String, egui::Rect)> {
+pub fn things(harness: &Harness<'_, EditorState>) -> Vec<(String, egui::Rect)> {
     use egui::accesskit::Role;
     use egui_kittest::kittest::NodeT;
     let is_thing = |role| {
@@ -455,7 +482,7 @@ pub fn pictures(folder: &Path, size: (f32, f32), scales: &[f32], tabs: &[Tab]) {
     for &scale in scales {
         for is_dark in [false, true] {
             for &tab in tabs {
-                let kept = Kept { is_dark, tab, size, ..Kept::default() };
+                let kept = WindowState { is_dark, tab, size, ..WindowState::default() };
                 let theme = if is_dark { "dark" } else { "light" };
                 let name = format!("{}-{theme}-{:.0}.png", tab.name().to_lowercase(), 100.0 * scale);
                 picture(&kept, &Fake::default(), &snapshot, scale).save(folder.join(&name)).unwrap();

@@ -11,7 +11,7 @@ use num_complex::Complex64;
 use std::f64::consts::TAU;
 
 /// A memoryless reed and its volume at the lattice's tip, all in f64.
-pub struct Blown<'a> {
+pub struct MemorylessVoice<'a> {
     model: &'a Model,
     open: Vec<f64>,
     lattice: Lattice<f64>,
@@ -44,7 +44,7 @@ impl Tip<f64> for Mouth {
     fn radiated(&mut self, _flow: f64) {}
 }
 
-impl<'a> Blown<'a> {
+impl<'a> MemorylessVoice<'a> {
     /// A silent note: linear holes, no trim.
     pub fn new(model: &'a Model, fingering: usize, zeta: f64) -> Self {
         let mut lattice = Lattice::new(&model.coeffs);
@@ -157,7 +157,7 @@ pub fn amplitude_at(sound: &[f64], f_hz: f64, rate_hz: f64) -> f64 {
 /// Mouth pressure at which a note's small oscillation neither grows nor dies, by playing, found within 2 % of the
 /// `expected` one; NaN if it is not there.
 pub fn threshold_by_growth(model: &Model, fingering: usize, zeta: f64, f_hz: f64, expected: f64) -> f64 {
-    let growth = |gamma: f64| Blown::new(model, fingering, zeta).growth(gamma, f_hz);
+    let growth = |gamma: f64| MemorylessVoice::new(model, fingering, zeta).growth(gamma, f_hz);
     let (mut low, mut high) = (0.98 * expected, 1.02 * expected);
     if growth(low) > 0.0 || growth(high) < 0.0 {
         return f64::NAN;

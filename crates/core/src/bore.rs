@@ -1,5 +1,6 @@
 //! The bore: its measurements as data, its impedance in the frequency domain, its lattice in the time domain.
 
+pub mod alternate_fingerings;
 pub mod bundled;
 pub mod cells;
 pub mod check;

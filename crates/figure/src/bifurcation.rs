@@ -1,10 +1,10 @@
-//! How loud a note is against how hard it is blown, on the way up and on the way down.
+//! Amplitude of a note over mouth pressure, for rising and for falling pressure.
 
 use crate::palette::Colour;
 use crate::{Axis, Dash, Direction, Figure, Line, Mark, Panel, SecondAxis, Span};
 
 /// Amplitude over mouth pressure: gamma, rms over closing pressure, part of the time the reed is shut.
-pub type Way = Vec<[f64; 3]>;
+pub type RampPoints = Vec<[f64; 3]>;
 
 /// A ramp up and down, and where it changed.
 pub struct Ramp {
@@ -15,9 +15,9 @@ pub struct Ramp {
     /// Pressure that closes the reed, kPa.
     pub closing_kpa: f64,
     /// Breath growing.
-    pub up: Way,
+    pub up: RampPoints,
     /// Breath fading.
-    pub down: Way,
+    pub down: RampPoints,
     /// Where the linear theory lets the note begin.
     pub threshold: Option<f64>,
     /// Growing: the note begins, beats, chokes.
@@ -40,11 +40,11 @@ impl Ramp {
     pub fn figure(&self) -> Figure {
         let highest = self.up.iter().chain(&self.down).map(|point| point[0]).fold(0.1, f64::max);
         let axis = || Axis::linear("mouth pressure over closing pressure, gamma").range(0.0, highest);
-        let along = |way: &Way, which: usize| -> Vec<(f64, f64)> {
+        let along = |way: &RampPoints, which: usize| -> Vec<(f64, f64)> {
             way.iter().map(|point| (point[0], point[which])).collect()
         };
         let both = |panel: Panel, which: usize, floor: f64| {
-            let over = |way: &Way| {
+            let over = |way: &RampPoints| {
                 along(way, which)
                     .into_iter()
                     .map(move |(gamma, y)| (gamma, if y < floor { f64::NAN } else { y }))

@@ -1,4 +1,5 @@
-//! What the breath does: the pressures at which notes change, one note swelled and faded, and what blows from a knob.
+//! Figures of breath: the pressures at which notes change, a crescendo and diminuendo of one note, and the pressure over
+//! the knob's angle.
 //!
 //! Colours as in the editor: blue is breath, green where a note speaks, orange where the reed beats, vermilion where it
 //! closes, grey where the note chokes.
@@ -11,7 +12,7 @@ const CM_WATER: f64 = 10.197;
 
 /// Mouth pressures at which a note changes, kPa; not finite for a note that cannot sound.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Changes {
+pub struct NotePressures {
     /// Written note (MIDI).
     pub written: u8,
     /// It begins.
@@ -22,7 +23,7 @@ pub struct Changes {
     pub chokes_kpa: f64,
 }
 
-impl Changes {
+impl NotePressures {
     /// With their names, in order.
     fn named(&self) -> [(f64, &'static str, Colour); 3] {
         [
@@ -41,8 +42,8 @@ pub(super) fn written_axis(notes: impl Iterator<Item = u8>) -> Axis {
 }
 
 /// All notes: where they speak, beat, close and choke.
-pub fn pressures(instrument: &str, note: &str, closing_kpa: f64, notes: &[Changes]) -> Figure {
-    let series = |value: fn(&Changes) -> f64| -> Vec<(f64, f64)> {
+pub fn pressures(instrument: &str, note: &str, closing_kpa: f64, notes: &[NotePressures]) -> Figure {
+    let series = |value: fn(&NotePressures) -> f64| -> Vec<(f64, f64)> {
         notes.iter().map(|note| (f64::from(note.written), value(note))).collect()
     };
     let (speaks, beats) = (series(|note| note.speaks_kpa), series(|note| note.beats_kpa));
@@ -93,7 +94,7 @@ pub struct Swell {
     /// Pressure that shuts the resting reed, kPa.
     pub closing_kpa: f64,
     /// Where theory has the note change.
-    pub changes: Option<Changes>,
+    pub changes: Option<NotePressures>,
     /// Time, s; mouth pressure, kPa; rms of the pressure in the mouthpiece, kPa; part of the time the reed is shut.
     pub course: Vec<[f64; 4]>,
     /// From this rms on a note sounds, kPa.
@@ -241,7 +242,8 @@ mod tests {
     #[test]
     fn notes_that_cannot_sound_leave_a_gap() {
         let nan = f64::NAN;
-        let note = |written, speaks_kpa| Changes { written, speaks_kpa, beats_kpa: 4.0, chokes_kpa: 8.0 };
+        let note =
+            |written, speaks_kpa| NotePressures { written, speaks_kpa, beats_kpa: 4.0, chokes_kpa: 8.0 };
         let figure = pressures("", "", 6.0, &[note(60, 2.2), note(61, nan), note(62, 2.3)]);
         let lines = figure.panels[0].layers.iter().filter_map(|layer| match layer {
             Layer::Line(line) if line.name.starts_with("speaks") => Some(line.pieces.len()),

@@ -3,16 +3,20 @@
 //! The backends of plotters draw the shapes. This module places axes, words and legends, so that nothing covers data and
 //! a figure looks the same in every format.
 
+mod axes;
 mod canvas;
 mod font;
-mod frame;
 mod layer;
 mod layout;
+mod legend;
+mod plot_area;
+mod range;
+mod sizes;
 mod ticks;
 
 use crate::Figure;
 use crate::palette::{PAPER, Rgb};
-use canvas::{Canvas, Vector};
+use canvas::{Canvas, SvgParts};
 use plotters_bitmap::BitMapBackend;
 use plotters_svg::SVGBackend;
 use std::fmt;
@@ -25,13 +29,13 @@ const FINEST_PIXELS: u32 = 4_000_000;
 /// Vector pictures are drawn in this part of a pixel.
 const TENTH: u32 = 10;
 
-/// Why a figure cannot be drawn.
+/// The reason why a figure cannot be drawn.
 #[derive(Debug, thiserror::Error)]
 pub enum DrawError {
     /// No size.
     #[error("size must be WIDTHxHEIGHT in pixels, 400..4000 each, for example 1600x1000; got {0:?}")]
     Size(String),
-    /// A picture could not be made: an error of ours.
+    /// The figure could not be drawn: an error of this program.
     #[error("cannot draw: {0}")]
     Backend(String),
 }
@@ -78,7 +82,8 @@ impl FromStr for Size {
     }
 }
 
-/// A sequence as the bytes of a GIF file, `frame_s` seconds a frame, repeated for ever. `drawn` is called after each frame.
+/// Figures as the frames of an animated GIF file, `frame_s` seconds per frame, in an endless loop. Returns the bytes. Calls
+/// `drawn` after each frame.
 pub fn gif(
     frames: &[Figure],
     size: Option<Size>,
@@ -192,7 +197,7 @@ pub fn svg(figure: &Figure, size: Option<Size>) -> Result<String, DrawError> {
     let vector = {
         let (width, height) = (size.width * TENTH, size.height * TENTH);
         let backend = SVGBackend::with_string(&mut drawn, (width, height));
-        let mut canvas = Canvas::new(backend, f64::from(TENTH), Some(Vector::default()));
+        let mut canvas = Canvas::new(backend, f64::from(TENTH), Some(SvgParts::default()));
         layout::draw(&mut canvas, figure, size)?;
         canvas.finish()?.unwrap_or_default()
     };

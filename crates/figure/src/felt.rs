@@ -1,4 +1,4 @@
-//! What the hand feels: torque against angle, and where it is felt against where it sounds.
+//! Torque over angle, and felt thresholds beside sounding thresholds.
 //!
 //! Torque is positive against the breath. A disc stands at the felt threshold, a ring where the resting reed is shut.
 
@@ -26,7 +26,7 @@ pub struct Torque {
 pub struct AtContrast {
     /// How much differences are exaggerated.
     pub contrast: f64,
-    /// The notes, or why a knob would not take them.
+    /// The notes, or the reason why a knob would refuse them.
     pub notes: Result<Vec<Torque>, String>,
 }
 
@@ -73,7 +73,7 @@ pub fn torques(law: &str, note: &str, ceiling_mnm: f64, all: &[AtContrast]) -> F
 }
 
 /// Thresholds under one law.
-pub struct Felt {
+pub struct FeltThresholds {
     /// Name of the law.
     pub law: String,
     /// Mouth pressure at the mark of the torque (its top, or the middle of its step): written note (MIDI), kPa.
@@ -82,8 +82,8 @@ pub struct Felt {
     pub on_deg: Vec<(f64, Vec<(u8, f64)>)>,
 }
 
-/// Where each note is felt to start, beside where it starts to sound.
-pub fn thresholds(note: &str, sounds_kpa: &[(u8, f64)], laws: &[Felt]) -> Figure {
+/// The felt threshold of each note beside its sounding threshold.
+pub fn thresholds(note: &str, sounds_kpa: &[(u8, f64)], laws: &[FeltThresholds]) -> Figure {
     let notes = || sounds_kpa.iter().map(|&(written, _)| written);
     let along = |values: &[(u8, f64)]| -> Vec<(f64, f64)> {
         values.iter().map(|&(written, value)| (f64::from(written), value)).collect()

@@ -17,7 +17,7 @@ pub struct Curve {
 }
 
 /// A fingering and what was found of it.
-pub struct Fingering<'a> {
+pub struct FingeringImpedance<'a> {
     /// The instrument.
     pub instrument: &'a str,
     /// Settings worth telling.
@@ -45,7 +45,7 @@ fn db(z: Complex64) -> f64 {
 }
 
 /// Magnitude with modes and cut-off, and phase, over frequency.
-pub fn fingering(about: &Fingering<'_>) -> Figure {
+pub fn fingering(about: &FingeringImpedance<'_>) -> Figure {
     let written = about.written;
     let mut figure = Figure::new(format!("Input impedance of written {written}")).note(about.instrument);
     for note in &about.notes {
@@ -108,7 +108,7 @@ pub fn fingering(about: &Fingering<'_>) -> Figure {
 }
 
 /// Discs on the modes, with frequency and cents; words that would run into each other go up in steps.
-fn modes(mut panel: Panel, about: &Fingering<'_>, (first_hz, last_hz): (f64, f64)) -> Panel {
+fn modes(mut panel: Panel, about: &FingeringImpedance<'_>, (first_hz, last_hz): (f64, f64)) -> Panel {
     let shown: Vec<&Peak> =
         about.modes.iter().filter(|mode| (first_hz..=last_hz).contains(&mode.f_hz)).collect();
     let at = |mode: &Peak| (mode.f_hz, 20.0 * mode.mag_over_zc.log10());

@@ -25,9 +25,9 @@ pub const FINE_GRID: Rgb = Rgb(240, 242, 245);
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Colour {
-    /// As text.
+    /// The colour of text.
     Ink,
-    /// For what stands behind the matter.
+    /// For what is in the background.
     Grey,
     /// Light grey, for areas.
     Pale,

@@ -1,4 +1,4 @@
-//! A rendering as a picture: outline, spectrogram, pitch over the score, breath, and the reed at one moment.
+//! The figure of a rendering: waveform, spectrogram, pitch over the score, breath, and the reed in close-up.
 
 use crate::palette::Colour;
 use crate::{Axis, ColourMap, Direction, Figure, Heat, Layer, Line, Mark, Panel, Polygon, SecondAxis};
@@ -26,9 +26,9 @@ pub struct Note {
     pub to_s: f64,
 }
 
-/// The inside of the instrument at one moment.
+/// Internal signals of the instrument over a few periods.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Moment {
+pub struct ReedCloseUp {
     /// When it begins, s.
     pub from_s: f64,
     /// From one probe to the next, s.
@@ -37,8 +37,8 @@ pub struct Moment {
     pub probes: Vec<Probe>,
 }
 
-/// Everything the picture shows.
-pub struct Performance<'a> {
+/// Everything the figure shows.
+pub struct PerformanceFigure<'a> {
     /// What is played.
     pub title: &'a str,
     /// Lines under the title.
@@ -53,12 +53,12 @@ pub struct Performance<'a> {
     pub gamma: &'a Envelope,
     /// Pressure that closes the reed, Pa.
     pub closing_pa: f64,
-    /// A moment from near, if there is one.
-    pub moment: Option<&'a Moment>,
+    /// The close-up, if there is one.
+    pub moment: Option<&'a ReedCloseUp>,
 }
 
 /// All panels below each other.
-pub fn performance(of: &Performance<'_>) -> Figure {
+pub fn performance(of: &PerformanceFigure<'_>) -> Figure {
     let mut figure = Figure::new(of.title);
     for note in &of.notes {
         figure = figure.note(note);
@@ -160,7 +160,7 @@ pub fn pitch(overview: &Overview, score: &[Note], a4_hz: f64) -> Panel {
     panel.with(Line::new("", line).colour(Colour::Vermilion).width(2.0))
 }
 
-fn breath(of: &Performance<'_>) -> Panel {
+fn breath(of: &PerformanceFigure<'_>) -> Panel {
     let top = of.gamma.range().map_or(1.0, |[_, high]| f64::from(high)).max(1.0);
     let axis = Axis::linear("gamma").range(0.0, 1.08 * top);
     let title =
@@ -172,7 +172,7 @@ fn breath(of: &Performance<'_>) -> Panel {
 }
 
 /// The reed and the pressure that moves it.
-fn reed(moment: &Moment, closing_pa: f64) -> Panel {
+fn reed(moment: &ReedCloseUp, closing_pa: f64) -> Panel {
     let at = |index: usize| 1e3 * moment.step_s * index as f64;
     let series = |value: &dyn Fn(&Probe) -> f64| -> Vec<(f64, f64)> {
         moment.probes.iter().enumerate().map(|(index, probe)| (at(index), value(probe))).collect()

@@ -1,18 +1,19 @@
-//! The reed's flow law from every side, as the seed's notebook drew it, and as a played note runs along it.
+//! Figures of the reed's flow law, as the reference notebook drew them.
 //!
-//! `p` is the pressure difference (mouth minus mouthpiece) over a closing pressure, `u` the flow in the seed's numbers,
-//! `u = A (H sqrt(p) - p^1.5 / k)`; see [`chalumeau_core::reed::law`]. Curves are read from the tables sound and knob share.
+//! `p` is the pressure difference (mouth minus mouthpiece) over a closing pressure, `u` the dimensionless flow,
+//! `u = A (H sqrt(p) - p^1.5 / k)`; see [`chalumeau_core::reed::law`]. The curves come from the
+//! tables that sound and knob share. [`reed_sweep`](crate::reed_sweep) animates one of them, [`reed_orbit`](crate::reed_orbit)
+//! draws a played note over the curve.
 
 use crate::palette::Colour;
-use crate::{Axis, Dash, Direction, Figure, Line, Mark, Panel, Points, SecondAxis, Span};
+use crate::{Axis, Dash, Direction, Figure, Line, Mark, Panel, Points, SecondAxis};
 use chalumeau_core::reed::law::{H_INIT, K_INIT, ReedError};
-use chalumeau_core::reed::motion::SHUT;
 use chalumeau_core::reed::{PhysicalReed, ReedLaw, ReedTables};
 use chalumeau_core::units::Air;
 
 /// The figures of one picture each, by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum LawFigure {
     /// The law with everything 1.
     Unit,
     /// The same over a turn of the knob.
@@ -25,13 +26,13 @@ pub enum Kind {
     Coupled,
     /// Amplitudes A.
     Amplitude,
-    /// What happens when the air flows back.
+    /// Flow and opening when the air flows back.
     Negative,
     /// Reeds in pascal and litres a second.
     Physical,
 }
 
-impl Kind {
+impl LawFigure {
     /// All of them, in the order of the notebook.
     pub const ALL: [Self; 8] = [
         Self::Unit,
@@ -64,11 +65,11 @@ const OPENINGS: [f64; 6] = [1.5, 2.0, H_INIT, 3.0, 3.5, 4.0];
 /// Points of a curve.
 const POINTS: usize = 550;
 
-const PRESSURE: &str = "pressure difference p, over the reference closing pressure";
-const FLOW: &str = "flow u";
+pub(crate) const PRESSURE: &str = "pressure difference p, over the reference closing pressure";
+pub(crate) const FLOW: &str = "flow u";
 
 /// Flow from `low` to `high`; closely spaced about 0, where it rises steeply.
-fn curve(law: ReedLaw, low: f64, high: f64) -> Vec<(f64, f64)> {
+pub(crate) fn curve(law: ReedLaw, low: f64, high: f64) -> Vec<(f64, f64)> {
     let tables = ReedTables::seed();
     let mut points: Vec<f64> = (0..=POINTS).map(|n| low + (high - low) * n as f64 / POINTS as f64).collect();
     points.extend((-30_i32..=30).map(|n| f64::from(n * n.abs()) * 2e-5).filter(|p| (low..=high).contains(p)));
@@ -77,7 +78,8 @@ fn curve(law: ReedLaw, low: f64, high: f64) -> Vec<(f64, f64)> {
     points.into_iter().map(|p| (p, law.flow(tables, p))).collect()
 }
 
-fn peak(law: ReedLaw) -> (f64, f64) {
+/// Pressure and flow at the maximum of the curve.
+pub(crate) fn peak(law: ReedLaw) -> (f64, f64) {
     (law.peak_at(), law.peak_flow())
 }
 
@@ -280,148 +282,6 @@ fn physical(air: &Air) -> Figure {
         .size(1_600, 1_300)
 }
 
-/// The sweep over H with coupled stiffness, from 5 to 2 in even steps: one figure a frame.
-pub fn sweep(frames: usize) -> Result<Vec<Figure>, ReedError> {
-    let last = frames.saturating_sub(1).max(1) as f64;
-    (0..frames)
-        .map(|frame| {
-            let h = 5.0 - 3.0 * frame as f64 / last;
-            let law = ReedLaw::coupled(h, 1.0)?;
-            let panel =
-                Panel::new("", Axis::linear(PRESSURE).range(-0.03, 1.0), Axis::linear(FLOW).range(-1.0, 1.2))
-                    .with(Mark::new(Direction::Y, 1.0, "peak 1").colour(Colour::Ink))
-                    .with(
-                        Line::new(format!("H = {h:.2}, k = {:.3}", law.k()), curve(law, -0.03, 1.0))
-                            .width(4.0),
-                    )
-                    .with(Points::new("", [peak(law)]).size(7.0));
-            Ok(Figure::new("Flow through the reed, k = 27 / (4 H\u{00b3})").panel(panel).size(800, 560))
-        })
-        .collect()
-}
-
-/// What a played note's reed is like, and one period of what it does.
-pub struct Orbit {
-    /// What is played, for the title.
-    pub title: String,
-    /// By which settings.
-    pub note: String,
-    /// Pressure that closes the reed, extrapolated where the lay is curved, Pa.
-    pub closing_pa: f64,
-    /// Flow of the reed standing at its peak (sharp lay), m3/s.
-    pub peak_m3s: f64,
-    /// Half-width of the rounded closure, over the rest opening.
-    pub lay: f64,
-    /// Mouth pressure over closing pressure.
-    pub gamma: f64,
-    /// Time between samples, s.
-    pub step_s: f64,
-    /// One period: pressure difference Pa, flow m3/s, opening over rest.
-    pub period: Vec<[f64; 3]>,
-}
-
-impl Orbit {
-    /// Part of the period in which the reed is shut, 0..=1.
-    pub fn shut(&self) -> f64 {
-        let shut = self.period.iter().filter(|[.., opening]| *opening < SHUT).count();
-        shut as f64 / self.period.len().max(1) as f64
-    }
-
-    /// Flow of the reed without inertia at `p` over the closing pressure, over [`peak_m3s`](Self::peak_m3s).
-    pub fn at_rest(&self, p: f64) -> f64 {
-        let gap = 1.0 - p;
-        let opening = match self.lay > 0.0 && gap < self.lay {
-            true => (gap + self.lay).max(0.0).powi(2) / (4.0 * self.lay),
-            false => gap.max(0.0),
-        };
-        let peak = 2.0 / 27.0_f64.sqrt();
-        opening * p.abs().sqrt().copysign(p) / peak
-    }
-
-    /// The orbit over the curve of the reed at rest, and the same over time.
-    pub fn figure(&self) -> Figure {
-        let kpa = 1e-3 * self.closing_pa;
-        let litres = 1e3;
-        let closed: Vec<[f64; 3]> = self.period.iter().chain(self.period.first()).copied().collect();
-        let orbit = closed.iter().map(|&[p, u, _]| (1e-3 * p, litres * u));
-        let shut =
-            closed.iter().map(
-                |&[p, u, opening]| {
-                    if opening < SHUT { (1e-3 * p, litres * u) } else { (f64::NAN, f64::NAN) }
-                },
-            );
-        let pressures = self.period.iter().map(|[p, ..]| p / self.closing_pa);
-        let (low, high) = pressures.fold((0.0_f64, 1.05_f64), |(low, high), p| (low.min(p), high.max(p)));
-        let (low, high) = (low - 0.05, high.max(1.0 + self.lay) + 0.05);
-        let rest = (0..=800).map(|n| {
-            let p = low + (high - low) * f64::from(n) / 800.0;
-            (kpa * p, litres * self.peak_m3s * self.at_rest(p))
-        });
-        let mut plane = Panel::new(
-            "Flow against pressure difference",
-            Axis::linear("pressure difference mouth \u{2212} mouthpiece, kPa").range(kpa * low, kpa * high),
-            Axis::linear("flow through the reed, l/s"),
-        )
-        .weight(1.5)
-        .top(SecondAxis::times(1.0 / kpa, "over the closing pressure"))
-        .with(Mark::new(Direction::X, kpa / 3.0, "1/3: peak"))
-        .with(
-            Mark::new(Direction::X, kpa * self.gamma, format!("gamma {:.2}: mouth pressure", self.gamma))
-                .colour(Colour::Green),
-        );
-        if self.lay > 0.0 {
-            plane = plane.with(Span {
-                of: Direction::X,
-                from: kpa * (1.0 - self.lay),
-                to: kpa * (1.0 + self.lay),
-                name: "reed rolls onto the curved lay".to_owned(),
-                colour: Colour::Grey,
-            });
-        }
-        plane = plane
-            .with(Mark::new(Direction::X, kpa, "1: closing pressure"))
-            .with(Line::new("reed standing still", rest).colour(Colour::Grey).width(3.0))
-            .with(Line::new("one period of the note", orbit).width(3.0));
-        if self.shut() > 0.0 {
-            plane = plane.with(
-                Line::new(format!("reed shut, {:.0} % of the period", 100.0 * self.shut()), shut)
-                    .colour(Colour::Vermilion)
-                    .width(6.0),
-            );
-        }
-        let ms = |index: usize| 1e3 * self.step_s * index as f64;
-        let over = |value: fn(&Self, [f64; 3]) -> f64| {
-            closed
-                .iter()
-                .enumerate()
-                .map(|(index, &moment)| (ms(index), value(self, moment)))
-                .collect::<Vec<_>>()
-        };
-        let time =
-            Panel::new("One period", Axis::linear("time, ms"), Axis::linear("over closing, peak, rest"))
-                .with(Line::new(
-                    "pressure difference over closing pressure",
-                    over(|o, [p, ..]| p / o.closing_pa),
-                ))
-                .with(
-                    Line::new("flow over peak flow", over(|o, [_, u, _]| u / o.peak_m3s))
-                        .colour(Colour::Vermilion)
-                        .dash(Dash::Dashed),
-                )
-                .with(
-                    Line::new("opening over rest", over(|_, [.., opening]| opening))
-                        .colour(Colour::Green)
-                        .dash(Dash::Dotted)
-                        .width(3.0),
-                );
-        Figure::new(format!("Reed of a played note: {}", self.title))
-            .note(self.note.clone())
-            .panel(plane)
-            .panel(time)
-            .size(1_600, 1_400)
-    }
-}
-
 /// A number with at most three decimals.
 fn short(x: f64) -> String {
     let text = format!("{x:.3}");
@@ -444,7 +304,7 @@ mod tests {
 
     #[test]
     fn coupled_curves_all_peak_at_one() {
-        let figure = Kind::Coupled.figure().unwrap();
+        let figure = LawFigure::Coupled.figure().unwrap();
         assert_eq!(lines(&figure).len(), 7);
         for line in lines(&figure) {
             assert!((highest(line) - 1.0).abs() < 1e-4, "{}: {}", line.name, highest(line));
@@ -455,11 +315,11 @@ mod tests {
     fn free_curves_peak_where_the_notebook_derives_it() {
         for (kind, law) in [
             (
-                Kind::FamilyH,
+                LawFigure::FamilyH,
                 &(|x| ReedLaw::free(x, K_INIT, 1.0)) as &dyn Fn(f64) -> Result<ReedLaw, ReedError>,
             ),
-            (Kind::FamilyK, &|x| ReedLaw::free(H_INIT, x, 1.0)),
-            (Kind::Amplitude, &|x| ReedLaw::coupled(H_INIT, x)),
+            (LawFigure::FamilyK, &|x| ReedLaw::free(H_INIT, x, 1.0)),
+            (LawFigure::Amplitude, &|x| ReedLaw::coupled(H_INIT, x)),
         ] {
             for line in lines(&kind.figure().unwrap()) {
                 let (_, value) = line.name.split_once("= ").unwrap();
@@ -471,14 +331,14 @@ mod tests {
 
     #[test]
     fn normalised_curve_peaks_at_a_third_of_a_turn() {
-        let figure = Kind::Angle.figure().unwrap();
+        let figure = LawFigure::Angle.figure().unwrap();
         let peak = lines(&figure)[0].pieces[0].iter().max_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
         assert!((peak[0] - 120.0).abs() < 1.0 && (peak[1] - 1.0).abs() < 1e-4, "{peak:?}");
     }
 
     #[test]
     fn flow_back_opens_the_reed() {
-        let figure = Kind::Negative.figure().unwrap();
+        let figure = LawFigure::Negative.figure().unwrap();
         let first = |line: &Line| line.pieces[0][0];
         let lines = lines(&figure);
         assert_eq!(first(lines[0])[0], -1.0);
@@ -488,7 +348,7 @@ mod tests {
 
     #[test]
     fn physical_curves_end_at_their_closing_pressure() {
-        for line in lines(&Kind::Physical.figure().unwrap()) {
+        for line in lines(&LawFigure::Physical.figure().unwrap()) {
             let shut = line.pieces[0].iter().find(|[p, u]| *p > 0.1 && *u <= 1e-12).unwrap()[0];
             let (value, unit) = line.name.split_once(' ').unwrap();
             let (value, reference) = (value.parse::<f64>().unwrap(), PhysicalReed::reference());
@@ -497,35 +357,6 @@ mod tests {
                 _ => PhysicalReed { stiffness_n_m: value, ..reference },
             };
             assert!((1e3 * shut / reed.closing_pa() - 1.0).abs() < 5e-3, "{}: {shut} kPa", line.name);
-        }
-    }
-
-    #[test]
-    fn an_orbit_of_a_standing_reed_lies_on_its_curve() {
-        let mut orbit = Orbit {
-            title: String::new(),
-            note: String::new(),
-            closing_pa: 6_000.0,
-            peak_m3s: 3e-4,
-            lay: 0.0,
-            gamma: 0.5,
-            step_s: 1e-5,
-            period: Vec::new(),
-        };
-        for n in 0..100 {
-            let p = 0.5 + 0.55 * (std::f64::consts::TAU * f64::from(n) / 100.0).sin();
-            orbit.period.push([6_000.0 * p, 3e-4 * orbit.at_rest(p), (1.0 - p).max(0.0)]);
-        }
-        assert!((orbit.at_rest(1.0 / 3.0) - 1.0).abs() < 1e-12 && orbit.at_rest(1.2) == 0.0);
-        assert!(orbit.at_rest(-1.0) < -2.0 && orbit.shut() > 0.05 && orbit.shut() < 0.25);
-        let figure = orbit.figure();
-        let all = lines(&figure);
-        let along = |name: &str| all.iter().find(|line| line.name.starts_with(name)).unwrap();
-        let rest = &along("reed standing").pieces[0];
-        for [p, u] in &along("one period").pieces[0] {
-            let after = rest.partition_point(|[x, _]| x < p).clamp(1, rest.len() - 1);
-            let nearest = 0.5 * (rest[after - 1][1] + rest[after][1]);
-            assert!((u - nearest).abs() < 0.02, "{p} {u} {nearest}");
         }
     }
 }

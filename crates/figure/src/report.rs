@@ -29,7 +29,7 @@ pub struct Plate {
 }
 
 /// A table.
-pub struct Table {
+pub struct ReportTable {
     /// Heading above it.
     pub title: String,
     /// Words under the heading, may be empty.
@@ -37,7 +37,7 @@ pub struct Table {
     /// Names of the columns.
     pub head: Vec<String>,
     /// Cells; numbers stand to the right.
-    pub rows: Vec<Vec<Cell>>,
+    pub rows: Vec<Vec<TableCell>>,
 }
 
 /// A part of the page with words, figures and tables of its own.
@@ -49,11 +49,11 @@ pub struct Chapter {
     /// Figures.
     pub plates: Vec<Plate>,
     /// Tables, each under a smaller heading.
-    pub tables: Vec<Table>,
+    pub tables: Vec<ReportTable>,
 }
 
 /// A cell of a table.
-pub enum Cell {
+pub enum TableCell {
     /// Words.
     Word(String),
     /// A number, with as many digits as it deserves.
@@ -73,7 +73,7 @@ pub struct Report {
     /// Between the figures and the tables.
     pub chapters: Vec<Chapter>,
     /// Tables.
-    pub tables: Vec<Table>,
+    pub tables: Vec<ReportTable>,
     /// Program and version, and the command that makes the page again.
     pub made_by: String,
 }
@@ -150,7 +150,7 @@ pub fn write(report: &Report, out: &mut impl Write) -> Result<(), ReportError> {
     }
     write_plates(&report.plates, out)?;
     let mut tables = 0;
-    let mut write_tables = |all: &[Table], level: u8, out: &mut _| {
+    let mut write_tables = |all: &[ReportTable], level: u8, out: &mut _| {
         all.iter().try_for_each(|table| {
             tables += 1;
             write_table(table, tables, level, out)
@@ -213,7 +213,12 @@ fn write_base64(bytes: &[u8], out: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-fn write_table(table: &Table, index: usize, level: u8, out: &mut impl Write) -> Result<(), ReportError> {
+fn write_table(
+    table: &ReportTable,
+    index: usize,
+    level: u8,
+    out: &mut impl Write,
+) -> Result<(), ReportError> {
     let heading = format!("table-{index}");
     writeln!(out, "<h{level} id=\"{heading}\">{}</h{level}>", escaped(&table.title))?;
     if !table.about.is_empty() {
@@ -224,7 +229,7 @@ fn write_table(table: &Table, index: usize, level: u8, out: &mut impl Write) -> 
         "<div class=\"scroll table\" role=\"region\" tabindex=\"0\" aria-labelledby=\"{heading}\">\n<table>\n<thead><tr>"
     )?;
     let is_number =
-        |column: usize| table.rows.iter().any(|row| matches!(row.get(column), Some(Cell::Number(_))));
+        |column: usize| table.rows.iter().any(|row| matches!(row.get(column), Some(TableCell::Number(_))));
     for (column, name) in table.head.iter().enumerate() {
         let class = if is_number(column) { " class=\"number\"" } else { "" };
         write!(out, "<th scope=\"col\"{class}>{}</th>", escaped(name))?;
@@ -234,8 +239,8 @@ fn write_table(table: &Table, index: usize, level: u8, out: &mut impl Write) -> 
         write!(out, "<tr>")?;
         for cell in row {
             match cell {
-                Cell::Word(text) => write!(out, "<td>{}</td>", escaped(text))?,
-                Cell::Number(text) => write!(out, "<td class=\"number\">{}</td>", escaped(text))?,
+                TableCell::Word(text) => write!(out, "<td>{}</td>", escaped(text))?,
+                TableCell::Number(text) => write!(out, "<td class=\"number\">{}</td>", escaped(text))?,
             }
         }
         writeln!(out, "</tr>")?;
@@ -261,11 +266,11 @@ mod tests {
             sound,
             plates: Vec::new(),
             chapters: Vec::new(),
-            tables: vec![Table {
+            tables: vec![ReportTable {
                 title: "T".to_owned(),
                 about: String::new(),
                 head: vec!["note".to_owned(), "cents".to_owned()],
-                rows: vec![vec![Cell::Word("C<4".to_owned()), Cell::Number("+0.1".to_owned())]],
+                rows: vec![vec![TableCell::Word("C<4".to_owned()), TableCell::Number("+0.1".to_owned())]],
             }],
             made_by: String::new(),
         }

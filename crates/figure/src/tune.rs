@@ -8,12 +8,12 @@ pub struct Round {
     /// What was different about it: "natural".
     pub name: String,
     /// Written note (MIDI) and what sounded.
-    pub notes: Vec<(u8, Heard)>,
+    pub notes: Vec<(u8, TunedNote)>,
 }
 
 /// What sounded.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Heard {
+pub enum TunedNote {
     /// The note, so far from its pitch, cents.
     Own(f64),
     /// Another note, so far away, cents.
@@ -28,12 +28,12 @@ const IN_TUNE_CENTS: f64 = 5.0;
 /// Cents over notes for each round; notes in another register or silent stand at the lower edge.
 pub fn figure(instrument: &str, note: &str, rounds: &[Round]) -> Figure {
     let own = rounds.iter().flat_map(|round| &round.notes).filter_map(|(_, heard)| match heard {
-        Heard::Own(cents) => Some(*cents),
+        TunedNote::Own(cents) => Some(*cents),
         _ => None,
     });
     let (low, high) = own.fold((-6.0_f64, 6.0_f64), |(low, high), cents| (low.min(cents), high.max(cents)));
     let failed =
-        rounds.iter().flat_map(|round| &round.notes).any(|(_, heard)| !matches!(heard, Heard::Own(_)));
+        rounds.iter().flat_map(|round| &round.notes).any(|(_, heard)| !matches!(heard, TunedNote::Own(_)));
     let room = 0.06 * (high - low);
     // One line of marks for each round, below the notes.
     let rows = rounds.len() as f64;
@@ -59,9 +59,9 @@ pub fn figure(instrument: &str, note: &str, rounds: &[Round]) -> Figure {
     ];
     for ((row, round), (colour, dash, shape)) in rounds.iter().enumerate().zip(looks.into_iter().cycle()) {
         let level = low - (row + 1) as f64 * room;
-        let cents = |heard: &Heard| if let Heard::Own(cents) = heard { *cents } else { f64::NAN };
+        let cents = |heard: &TunedNote| if let TunedNote::Own(cents) = heard { *cents } else { f64::NAN };
         let points = || round.notes.iter().map(|(written, heard)| (f64::from(*written), cents(heard)));
-        let at_edge = |which: fn(&Heard) -> bool| {
+        let at_edge = |which: fn(&TunedNote) -> bool| {
             let notes = round.notes.iter().filter(move |(_, heard)| which(heard));
             notes.map(|(written, _)| (f64::from(*written), level)).collect::<Vec<_>>()
         };
@@ -71,12 +71,12 @@ pub fn figure(instrument: &str, note: &str, rounds: &[Round]) -> Figure {
         panel = panel
             .with(Line::new(name, points()).colour(colour).dash(dash))
             .with(Points::new("", points()).colour(colour).shape(shape).size(5.5));
-        let others = at_edge(|heard| matches!(heard, Heard::Other(_)));
+        let others = at_edge(|heard| matches!(heard, TunedNote::Other(_)));
         if !others.is_empty() {
             let name = format!("{}: another note sounds", round.name);
             panel = panel.with(Points::new(name, others).colour(colour).shape(Shape::Cross).size(8.0));
         }
-        let silent = at_edge(|heard| *heard == Heard::Silence);
+        let silent = at_edge(|heard| *heard == TunedNote::Silence);
         if !silent.is_empty() {
             let name = format!("{}: silent", round.name);
             panel = panel.with(Points::new(name, silent).colour(colour).shape(Shape::Ring).size(8.0));
@@ -93,10 +93,10 @@ mod tests {
     #[test]
     fn lost_notes_stand_at_the_edge_and_break_the_line() {
         let notes = vec![
-            (60, Heard::Own(1.0)),
-            (61, Heard::Other(-1900.0)),
-            (62, Heard::Silence),
-            (63, Heard::Own(-2.0)),
+            (60, TunedNote::Own(1.0)),
+            (61, TunedNote::Other(-1900.0)),
+            (62, TunedNote::Silence),
+            (63, TunedNote::Own(-2.0)),
         ];
         let figure = figure("test", "", &[Round { name: "natural".to_owned(), notes }]);
         let panel = &figure.panels[0];

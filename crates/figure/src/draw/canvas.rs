@@ -10,11 +10,11 @@ use plotters_backend::{BackendColor, BackendCoord, BackendStyle, DrawingBackend}
 use std::fmt::Write;
 
 /// A place, right and down from the upper left corner, pixels.
-pub type At = (f64, f64);
+pub type PixelPoint = (f64, f64);
 
 /// What a vector picture has besides the backend's shapes.
 #[derive(Default)]
-pub struct Vector {
+pub struct SvgParts {
     /// Pictures, drawn under everything else.
     pub under: String,
     /// Words, drawn over everything else.
@@ -26,7 +26,7 @@ pub struct Canvas<B> {
     backend: B,
     /// Backend's pixels per nominal pixel.
     scale: f64,
-    vector: Option<Vector>,
+    vector: Option<SvgParts>,
 }
 
 /// How wide a line is, and in which colour.
@@ -64,17 +64,17 @@ pub enum Align {
 }
 
 impl<B: DrawingBackend> Canvas<B> {
-    pub fn new(backend: B, scale: f64, vector: Option<Vector>) -> Self {
+    pub fn new(backend: B, scale: f64, vector: Option<SvgParts>) -> Self {
         Self { backend, scale, vector }
     }
 
     /// Ends drawing.
-    pub fn finish(mut self) -> Result<Option<Vector>, DrawError> {
+    pub fn finish(mut self) -> Result<Option<SvgParts>, DrawError> {
         self.backend.present().map_err(DrawError::backend)?;
         Ok(self.vector)
     }
 
-    fn at(&self, (x, y): At) -> BackendCoord {
+    fn at(&self, (x, y): PixelPoint) -> BackendCoord {
         ((x * self.scale).round() as i32, (y * self.scale).round() as i32)
     }
 
@@ -83,7 +83,7 @@ impl<B: DrawingBackend> Canvas<B> {
     }
 
     /// Lines from point to point, with round corners.
-    pub fn line(&mut self, points: &[At], pen: Pen) -> Result<(), DrawError> {
+    pub fn line(&mut self, points: &[PixelPoint], pen: Pen) -> Result<(), DrawError> {
         let mut path: Vec<BackendCoord> = Vec::with_capacity(points.len());
         for (index, &point) in points.iter().enumerate() {
             let at = self.at(point);
@@ -130,7 +130,7 @@ impl<B: DrawingBackend> Canvas<B> {
     }
 
     /// A filled shape.
-    pub fn fill(&mut self, corners: &[At], fill: Rgb, opacity: f64) -> Result<(), DrawError> {
+    pub fn fill(&mut self, corners: &[PixelPoint], fill: Rgb, opacity: f64) -> Result<(), DrawError> {
         let mut path: Vec<BackendCoord> = corners.iter().map(|&point| self.at(point)).collect();
         path.dedup();
         if path.len() < 3 {
@@ -141,7 +141,13 @@ impl<B: DrawingBackend> Canvas<B> {
     }
 
     /// A filled rectangle.
-    pub fn rect(&mut self, from: At, to: At, fill: Rgb, opacity: f64) -> Result<(), DrawError> {
+    pub fn rect(
+        &mut self,
+        from: PixelPoint,
+        to: PixelPoint,
+        fill: Rgb,
+        opacity: f64,
+    ) -> Result<(), DrawError> {
         let style = Style { colour: colour(fill, opacity), width: 1 };
         let (from, to) = (self.at(from), self.at(to));
         // The last pixel is drawn too.
@@ -150,7 +156,7 @@ impl<B: DrawingBackend> Canvas<B> {
     }
 
     /// A filled circle.
-    pub fn disc(&mut self, centre: At, radius: f64, fill: Rgb) -> Result<(), DrawError> {
+    pub fn disc(&mut self, centre: PixelPoint, radius: f64, fill: Rgb) -> Result<(), DrawError> {
         let style = Style { colour: colour(fill, 1.0), width: 1 };
         let (centre, radius) = (self.at(centre), (radius * self.scale).round().max(1.0) as u32);
         self.backend.draw_circle(centre, radius, &style, true).map_err(DrawError::backend)
@@ -159,7 +165,7 @@ impl<B: DrawingBackend> Canvas<B> {
     /// Words; `place` is on their base line. `upright` words run from bottom to top.
     pub fn text(
         &mut self,
-        place: At,
+        place: PixelPoint,
         text: &str,
         size: f64,
         fill: Rgb,
@@ -205,8 +211,8 @@ impl<B: DrawingBackend> Canvas<B> {
     /// A picture from `from` to `to`, its colours by distance from its upper left corner, 0..1 each.
     pub fn picture(
         &mut self,
-        from: At,
-        to: At,
+        from: PixelPoint,
+        to: PixelPoint,
         colour_at: impl Fn(f64, f64) -> Rgb,
     ) -> Result<(), DrawError> {
         if self.vector.is_some() {

@@ -1,23 +1,23 @@
-//! What stands between the axes: lines, points, shapes, heat maps, marks, words.
+//! Draws the layers of a panel between its axes: lines, points, shapes, heat maps, marks, bands, words.
 
-use crate::draw::canvas::{Align, At, Canvas, Pen};
-use crate::draw::frame::{Extent, Frame, clip_line, clip_polygon};
-use crate::draw::layout::{SMALL, SPAN_OPACITY};
+use crate::draw::canvas::{Align, Canvas, Pen, PixelPoint};
+use crate::draw::plot_area::{Extent, PlotArea, clip_line, clip_polygon};
+use crate::draw::sizes::{SMALL, SPAN_OPACITY};
 use crate::draw::{DrawError, font};
 use crate::palette::{self, PAPER, Rgb};
-use crate::{Anchor, Dash, Direction, Heat, Layer, Shape};
+use crate::{Anchor, Dash, Direction, Heat, Layer, Mark, Shape, Span, Text};
 use plotters_backend::DrawingBackend;
 
 pub fn draw<B: DrawingBackend>(
     canvas: &mut Canvas<B>,
     layer: &Layer,
-    frame: &Frame,
+    frame: &PlotArea,
 ) -> Result<(), DrawError> {
     match layer {
         Layer::Line(line) => {
             let pen = Pen { colour: line.colour.rgb(), width: line.width };
             for piece in &line.pieces {
-                let points: Vec<At> = piece.iter().map(|&point| frame.at(point)).collect();
+                let points: Vec<PixelPoint> = piece.iter().map(|&point| frame.at(point)).collect();
                 for visible in clip_line(&points, frame) {
                     stroke(canvas, &visible, line.dash, pen)?;
                 }
@@ -31,66 +31,93 @@ pub fn draw<B: DrawingBackend>(
             }
         }
         Layer::Polygon(polygon) => {
-            let corners: Vec<At> = polygon.corners.iter().map(|&point| frame.at(point)).collect();
+            let corners: Vec<PixelPoint> = polygon.corners.iter().map(|&point| frame.at(point)).collect();
             let corners = clip_polygon(corners, frame);
             if let Some(fill) = polygon.fill {
                 canvas.fill(&corners, fill.rgb(), polygon.opacity)?;
             }
             if let (Some(colour), Some(&first)) = (polygon.stroke, corners.first()) {
-                let closed: Vec<At> = corners.iter().copied().chain([first]).collect();
+                let closed: Vec<PixelPoint> = corners.iter().copied().chain([first]).collect();
                 canvas.line(&closed, Pen { colour: colour.rgb(), width: 1.5 })?;
             }
         }
         Layer::Heat(heat) => draw_heat(canvas, heat, frame)?,
-        Layer::Mark(mark) => {
-            let pen = Pen { colour: mark.colour.rgb(), width: 1.8 };
-            match mark.of {
-                Direction::X if frame.x.holds(mark.at) => {
-                    let x = frame.x.at(mark.at);
-                    stroke(canvas, &[(x, frame.top()), (x, frame.bottom())], mark.dash, pen)?;
-                }
-                Direction::Y if frame.y.holds(mark.at) => {
-                    let y = frame.y.at(mark.at);
-                    stroke(canvas, &[(frame.left(), y), (frame.right(), y)], mark.dash, pen)?;
-                }
-                _ => {}
-            }
-        }
-        Layer::Span(span) => {
-            let (a, b) = (span.from.min(span.to), span.from.max(span.to));
-            let (from, to) = match span.of {
-                Direction::X => {
-                    let (a, b) = (a.max(frame.x.low), b.min(frame.x.high));
-                    ((frame.x.at(a), frame.top()), (frame.x.at(b), frame.bottom()))
-                }
-                Direction::Y => {
-                    let (a, b) = (a.max(frame.y.low), b.min(frame.y.high));
-                    ((frame.left(), frame.y.at(b)), (frame.right(), frame.y.at(a)))
-                }
-            };
-            if to.0 > from.0 && to.1 > from.1 {
-                canvas.rect(from, to, span.colour.rgb(), SPAN_OPACITY)?;
-            }
-        }
-        Layer::Text(text) => {
-            let (x, y) = frame.at(text.at);
-            let width = font::width(&text.text, SMALL);
-            let half = 0.5 * font::CAPITAL * SMALL;
-            let (start, base) = match text.anchor {
-                Anchor::Right => (x + 9.0, y + half),
-                Anchor::Left => (x - 9.0 - width, y + half),
-                Anchor::Above => (x - 0.5 * width, y - 10.0),
-                Anchor::Below => (x - 0.5 * width, y + 10.0 + 2.0 * half),
-                Anchor::Centre => (x - 0.5 * width, y + half),
-            };
-            let start = start.min(frame.right() - width).max(frame.left() + 4.0);
-            canvas.text((start, base), &text.text, SMALL, text.colour.rgb(), Align::Left, false)?;
-        }
+        Layer::Mark(mark) => draw_mark(canvas, mark, frame)?,
+        Layer::Span(span) => draw_span(canvas, span, frame)?,
+        Layer::Text(text) => draw_text(canvas, text, frame)?,
     }
     Ok(())
 }
 
-fn draw_heat<B: DrawingBackend>(canvas: &mut Canvas<B>, heat: &Heat, frame: &Frame) -> Result<(), DrawError> {
+/// A line across the panel.
+fn draw_mark<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    mark: &Mark,
+    frame: &PlotArea,
+) -> Result<(), DrawError> {
+    let pen = Pen { colour: mark.colour.rgb(), width: 1.8 };
+    match mark.of {
+        Direction::X if frame.x.holds(mark.at) => {
+            let x = frame.x.at(mark.at);
+            stroke(canvas, &[(x, frame.top()), (x, frame.bottom())], mark.dash, pen)?;
+        }
+        Direction::Y if frame.y.holds(mark.at) => {
+            let y = frame.y.at(mark.at);
+            stroke(canvas, &[(frame.left(), y), (frame.right(), y)], mark.dash, pen)?;
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+/// A band across the panel, cut at the axes.
+fn draw_span<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    span: &Span,
+    frame: &PlotArea,
+) -> Result<(), DrawError> {
+    let (a, b) = (span.from.min(span.to), span.from.max(span.to));
+    let (from, to) = match span.of {
+        Direction::X => {
+            let (a, b) = (a.max(frame.x.low), b.min(frame.x.high));
+            ((frame.x.at(a), frame.top()), (frame.x.at(b), frame.bottom()))
+        }
+        Direction::Y => {
+            let (a, b) = (a.max(frame.y.low), b.min(frame.y.high));
+            ((frame.left(), frame.y.at(b)), (frame.right(), frame.y.at(a)))
+        }
+    };
+    if to.0 > from.0 && to.1 > from.1 {
+        canvas.rect(from, to, span.colour.rgb(), SPAN_OPACITY)?;
+    }
+    Ok(())
+}
+
+/// Words beside their place, moved inside the axes.
+fn draw_text<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    text: &Text,
+    frame: &PlotArea,
+) -> Result<(), DrawError> {
+    let (x, y) = frame.at(text.at);
+    let width = font::width(&text.text, SMALL);
+    let half = 0.5 * font::CAPITAL * SMALL;
+    let (start, base) = match text.anchor {
+        Anchor::Right => (x + 9.0, y + half),
+        Anchor::Left => (x - 9.0 - width, y + half),
+        Anchor::Above => (x - 0.5 * width, y - 10.0),
+        Anchor::Below => (x - 0.5 * width, y + 10.0 + 2.0 * half),
+        Anchor::Centre => (x - 0.5 * width, y + half),
+    };
+    let start = start.min(frame.right() - width).max(frame.left() + 4.0);
+    canvas.text((start, base), &text.text, SMALL, text.colour.rgb(), Align::Left, false)
+}
+
+fn draw_heat<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    heat: &Heat,
+    frame: &PlotArea,
+) -> Result<(), DrawError> {
     if heat.columns == 0 || heat.rows == 0 || heat.levels.len() != heat.columns * heat.rows {
         return Err(DrawError::Backend(format!(
             "{} x {} levels wanted, {} given",
@@ -130,7 +157,7 @@ fn draw_heat<B: DrawingBackend>(canvas: &mut Canvas<B>, heat: &Heat, frame: &Fra
 /// A line in its strokes.
 pub fn stroke<B: DrawingBackend>(
     canvas: &mut Canvas<B>,
-    points: &[At],
+    points: &[PixelPoint],
     dash: Dash,
     pen: Pen,
 ) -> Result<(), DrawError> {
@@ -140,7 +167,7 @@ pub fn stroke<B: DrawingBackend>(
         Dash::Dotted => (2.5, 5.5),
     };
     let (mut drawn, mut left) = (true, on);
-    let mut part: Vec<At> = points.first().copied().into_iter().collect();
+    let mut part: Vec<PixelPoint> = points.first().copied().into_iter().collect();
     for pair in points.windows(2) {
         let [a, b] = [pair[0], pair[1]];
         let length = (b.0 - a.0).hypot(b.1 - a.1);
@@ -166,7 +193,7 @@ pub fn stroke<B: DrawingBackend>(
 
 pub fn symbol<B: DrawingBackend>(
     canvas: &mut Canvas<B>,
-    (x, y): At,
+    (x, y): PixelPoint,
     shape: Shape,
     size: f64,
     colour: Rgb,

@@ -1,7 +1,7 @@
-//! The report's chapters on breath and on what a knob feels: for the instrument and the reed that were played.
+//! The report's chapters "Breath" and "Haptics", for the instrument and the reed that were played.
 
-use crate::cli::play::Prepared;
 use crate::cli::report::{number, word};
+use crate::cli::score_args::RenderJob;
 use chalumeau_core::haptics::law::torque_mnm;
 use chalumeau_core::haptics::{FeelDesign, FeelRefused, FeelTable, NoteFeel, Requirement, TorqueLimits};
 use chalumeau_core::instrument::Settings;
@@ -11,25 +11,25 @@ use chalumeau_core::score::bifurcation;
 use chalumeau_core::score::bifurcation::SOUNDS;
 use chalumeau_core::score::breath::GAMMA_MAX;
 use chalumeau_core::units::WrittenNote;
-use chalumeau_figure::breath::{Changes, Swell, Turn, pressures, turns};
-use chalumeau_figure::felt::{AtContrast, Felt, Torque, thresholds, torques};
-use chalumeau_figure::report::{Cell, Chapter, Plate, Table};
+use chalumeau_figure::breath::{NotePressures, Swell, Turn, pressures, turns};
+use chalumeau_figure::felt::{AtContrast, FeltThresholds, Torque, thresholds, torques};
+use chalumeau_figure::report::{Chapter, Plate, ReportTable, TableCell};
 use chalumeau_knob::touch::feel::Feels;
 use chalumeau_knob::wire::message::Law;
 
-/// Exaggerations shown.
+/// Contrasts shown.
 const CONTRASTS: [f64; 3] = [1.0, 3.0, 5.0];
 /// Both laws that push.
 const LAWS: [Law; 2] = [Law::Flow, Law::Pressure];
-/// Most mouth pressure the instrument knows, kPa.
+/// Greatest mouth pressure of the instrument, kPa.
 const MOST_KPA: f64 = 20.0;
-/// The swell goes this far beyond where the note chokes.
+/// The crescendo goes to this many times the pressure at which the note chokes.
 const BEYOND: f64 = 1.06;
-/// The swell's way up, and its way down, s: a long breath.
+/// Time of the crescendo, and again of the diminuendo, s: a long breath.
 const SWELL_S: f64 = 6.0;
 /// Points along a curve.
 const POINTS: usize = 400;
-/// A mode that starts this much later than the first is another register's, over the first.
+/// A mode that starts at this many times the pressure of the first belongs to another register.
 const LATER: f64 = 1.01;
 
 fn law_name(law: Law) -> &'static str {
@@ -40,21 +40,21 @@ fn law_name(law: Law) -> &'static str {
     }
 }
 
-/// What the instrument asks, and what is made of it.
-pub struct Touch<'a> {
-    prepared: &'a Prepared,
+/// The pressures that the notes need, and the feel made from them.
+pub struct BreathAndHaptics<'a> {
+    prepared: &'a RenderJob,
     feels: Feels,
     asked: Vec<Option<Requirement>>,
     /// As the command says.
     design: FeelDesign,
     limits: TorqueLimits,
-    /// Index of the fingering that is looked at from near.
+    /// Index of the fingering for the crescendo.
     near: Option<usize>,
 }
 
-impl<'a> Touch<'a> {
-    /// Asks the instrument: a second. `near` is the written note to swell.
-    pub fn new(prepared: &'a Prepared, design: FeelDesign, near: Option<WrittenNote>) -> Self {
+impl<'a> BreathAndHaptics<'a> {
+    /// Analyses the instrument (about 1 s). `near` is the written note to swell.
+    pub fn new(prepared: &'a RenderJob, design: FeelDesign, near: Option<WrittenNote>) -> Self {
         let feels = Feels::new(&prepared.model);
         let asked = feels.requirements().with(&played_reed(&prepared.model.file, &prepared.settings));
         let near = near.and_then(|near| feels.requirements().written().position(|written| written == near));
@@ -83,11 +83,11 @@ impl<'a> Touch<'a> {
         )
     }
 
-    fn changes(&self, (written, asked): (WrittenNote, Option<Requirement>)) -> Changes {
+    fn changes(&self, (written, asked): (WrittenNote, Option<Requirement>)) -> NotePressures {
         let of = |gamma: fn(&Requirement) -> f64| {
             asked.as_ref().map_or(f64::NAN, |asked| self.closing_kpa() * gamma(asked))
         };
-        Changes {
+        NotePressures {
             written: written.0,
             speaks_kpa: of(|asked| asked.gamma_sounding),
             beats_kpa: of(|asked| asked.gamma_beat),
@@ -95,10 +95,10 @@ impl<'a> Touch<'a> {
         }
     }
 
-    /// How hard notes are blown, one of them swelled, and the knob's angle as breath.
+    /// Pressures of all notes, a crescendo of one note, and pressure over the knob's angle.
     pub fn breath(&self) -> Chapter {
         let closing_kpa = self.closing_kpa();
-        let changes: Vec<Changes> = self.notes().map(|note| self.changes(note)).collect();
+        let changes: Vec<NotePressures> = self.notes().map(|note| self.changes(note)).collect();
         let instrument = &self.prepared.model.file.name;
         let mut words = vec![format!(
             "A note speaks from a mouth pressure on, beats from where the reed touches its lay in each cycle, and chokes \
@@ -126,8 +126,8 @@ impl<'a> Touch<'a> {
         Chapter { title: "Breath".to_owned(), words, plates, tables: vec![self.pressures()] }
     }
 
-    /// One note played from silence to closure and back.
-    fn swell(&self, near: usize, changes: Changes) -> Option<(Plate, String)> {
+    /// One note from silence to closure and back.
+    fn swell(&self, near: usize, changes: NotePressures) -> Option<(Plate, String)> {
         let (written, asked) = self.notes().nth(near)?;
         let closing_kpa = self.closing_kpa();
         let file = &self.prepared.model.file;
@@ -219,8 +219,8 @@ impl<'a> Touch<'a> {
         let design = format!("{} law, Contrast {}", law_name(self.design.law), self.design.contrast);
         Plate {
             figure: turns(&format!("{design}; {}", self.reed()), self.closing_kpa(), &all),
-            caption: "What an angle blows: bent note by note, so that the sound begins (disc) where the torque has its \
-                      mark, and the reed closes (ring) where the torque ends."
+            caption: "The mouth pressure of an angle, for each note: the sound begins (disc) at the mark of the torque, and the reed \
+                      closes (ring) where the torque ends."
                 .to_owned(),
             alternative: format!(
                 "Mouth pressure against the angle of the knob, {design}, for written {}.",
@@ -229,7 +229,7 @@ impl<'a> Touch<'a> {
         }
     }
 
-    fn pressures(&self) -> Table {
+    fn pressures(&self) -> ReportTable {
         let head = [
             "written",
             "sounds",
@@ -264,7 +264,7 @@ impl<'a> Touch<'a> {
             row.extend([kpa(asked.gamma_beat), kpa(asked.gamma_off)]);
             row
         };
-        Table {
+        ReportTable {
             title: "Mouth pressures".to_owned(),
             about: String::new(),
             head: head.map(str::to_owned).to_vec(),
@@ -276,10 +276,10 @@ impl<'a> Touch<'a> {
     pub fn haptics(&self) -> Chapter {
         let ceiling_mnm = self.limits.ceiling_mnm;
         let mut words = vec![format!(
-            "What a force-feedback knob is told for these notes, at {} mNm. Contrast 1 is what the bore asks; more \
-             exaggerates how notes differ, in the hand only. Drawn is the torque the knob's firmware works out, at rest and \
-             without its friction, which may not pass {ceiling_mnm:.0} mNm or be steeper than {:.2} N m/rad, up to which a \
-             sampled knob stays passive, nor push the hand along with more than {:.1} N m/rad.",
+            "The feel of a force-feedback knob for these notes, at {} mNm. Contrast 1 follows the bore; a larger contrast \
+             exaggerates how notes differ, in the hand only. The figures show the torque that the knob's firmware calculates, at \
+             rest and without friction. It must not pass {ceiling_mnm:.0} mNm, must not be steeper than {:.2} N m/rad, up to \
+             which a sampled knob stays passive, and must not push the hand along with more than {:.1} N m/rad.",
             self.design.strength_mnm, self.limits.stiffness_nm_per_rad, self.limits.push_nm_per_rad
         )];
         let mut plates = Vec::new();
@@ -305,7 +305,7 @@ impl<'a> Touch<'a> {
                 panels.push(AtContrast { contrast, notes: notes.map_err(|reason| reason.to_string()) });
             }
             plates.push(self.torques(law, &panels));
-            felt.push(Felt { law: law_name(law).to_owned(), at_kpa, on_deg });
+            felt.push(FeltThresholds { law: law_name(law).to_owned(), at_kpa, on_deg });
         }
         plates.push(self.thresholds(&felt));
         let mut tables = vec![refused(refusals)];
@@ -339,7 +339,7 @@ impl<'a> Touch<'a> {
         }
     }
 
-    fn thresholds(&self, felt: &[Felt]) -> Plate {
+    fn thresholds(&self, felt: &[FeltThresholds]) -> Plate {
         let closing_kpa = self.closing_kpa();
         let sounds: Vec<(u8, f64)> = self
             .notes()
@@ -367,7 +367,7 @@ impl<'a> Touch<'a> {
         }
     }
 
-    fn feel(&self, table: &FeelTable) -> Table {
+    fn feel(&self, table: &FeelTable) -> ReportTable {
         let head = [
             "written",
             "A_on, degrees",
@@ -386,8 +386,8 @@ impl<'a> Touch<'a> {
             row.push(number(format!("{:.1}", note.feel.scale_mnm)));
             row
         };
-        Table {
-            title: "What the knob is told".to_owned(),
+        ReportTable {
+            title: "Feel sent to the knob".to_owned(),
             about: format!(
                 "FEEL of every note, {} law, Contrast {} about {}: where it is felt to start, beats, closes and chokes.",
                 law_name(self.design.law),
@@ -399,8 +399,8 @@ impl<'a> Touch<'a> {
         }
     }
 
-    /// Whether a feel is taken, up to which torque, and what stands in the way of more.
-    fn refusal(&self, design: &FeelDesign, reason: Option<&FeelRefused>) -> Vec<Cell> {
+    /// Whether a feel is accepted, up to which torque, and what limits the torque.
+    fn refusal(&self, design: &FeelDesign, reason: Option<&FeelRefused>) -> Vec<TableCell> {
         let taken = reason.map_or("accepted".to_owned(), |reason| format!("refused: {reason}"));
         let (mut low, mut high) = (0.0, 450.0);
         let mut bound = None;
@@ -429,11 +429,11 @@ impl<'a> Touch<'a> {
     }
 }
 
-fn refused(rows: Vec<Vec<Cell>>) -> Table {
-    let head = ["law", "Contrast", "at the torque asked for", "accepted up to, mNm", "then in the way"];
-    Table {
+fn refused(rows: Vec<Vec<TableCell>>) -> ReportTable {
+    let head = ["law", "Contrast", "at the torque asked for", "accepted up to, mNm", "limited by"];
+    ReportTable {
         title: "What a knob would refuse".to_owned(),
-        about: "A feel that a knob could not hold still, or that passes the ceiling, is refused whole; nothing is clipped."
+        about: "A feel is refused as a whole if a knob could not hold it stable or if it passes the ceiling; it is never clipped."
             .to_owned(),
         head: head.map(str::to_owned).to_vec(),
         rows,
@@ -445,9 +445,9 @@ fn names(few: &[&NoteFeel]) -> String {
 }
 
 /// From the easiest to the hardest note, in words.
-fn range(changes: &[Changes]) -> String {
+fn range(changes: &[NotePressures]) -> String {
     let speaks = || changes.iter().filter(|note| note.speaks_kpa.is_finite());
-    let by = |a: &&Changes, b: &&Changes| a.speaks_kpa.total_cmp(&b.speaks_kpa);
+    let by = |a: &&NotePressures, b: &&NotePressures| a.speaks_kpa.total_cmp(&b.speaks_kpa);
     match (speaks().min_by(by), speaks().max_by(by)) {
         (Some(easy), Some(hard)) => format!(
             "The easiest is {} at {:.2} kPa, the hardest {} at {:.2} kPa.",

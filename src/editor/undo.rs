@@ -1,7 +1,6 @@
-//! Undo and redo of what was done in this window.
-//!
-//! A step is a gesture: the parameters it moved, each with its value before and after. What hosts automate, or another
-//! surface moves, is not recorded; undoing puts a parameter to where this window found it.
+//! Undo and redo of the changes made in this window.
+//! A step is a gesture: the parameters it changed, each with its value before and after. Changes by the host or by another
+//! controller are not recorded. Undoing sets a parameter to the value that it had at the start of the gesture.
 
 /// Steps kept; some hours of work.
 const KEPT: usize = 200;
@@ -9,7 +8,7 @@ const KEPT: usize = 200;
 /// One parameter in a step, normalised.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
-    /// Which.
+    /// A test.
     pub id: &'static str,
     /// Before the gesture.
     pub before: f32,
@@ -17,9 +16,9 @@ pub struct Change {
     pub after: f32,
 }
 
-/// What was done, and what was undone.
+/// The steps that can be undone, and those that can be redone.
 #[derive(Clone, Debug, Default)]
-pub struct History {
+pub struct UndoHistory {
     done: Vec<Vec<Change>>,
     undone: Vec<Vec<Change>>,
     /// Gestures that have begun, with the value they found.
@@ -28,7 +27,7 @@ pub struct History {
     parts: Vec<Change>,
 }
 
-impl History {
+impl UndoHistory {
     /// A gesture on `id` begins.
     pub fn begin(&mut self, id: &'static str, value: f32) {
         if !self.open.iter().any(|(open, _)| *open == id) {
@@ -98,7 +97,7 @@ mod tests {
 
     #[test]
     fn a_gesture_is_one_step_however_far_it_went() {
-        let mut history = History::default();
+        let mut history = UndoHistory::default();
         history.begin("zeta", 0.1);
         history.begin("zeta", 0.2);
         history.end("zeta", 0.7);
@@ -109,7 +108,7 @@ mod tests {
 
     #[test]
     fn parameters_moved_together_come_back_together() {
-        let mut history = History::default();
+        let mut history = UndoHistory::default();
         history.begin("reedh", 0.1);
         history.begin("reedk", 0.2);
         history.end("reedh", 0.3);
@@ -120,7 +119,7 @@ mod tests {
 
     #[test]
     fn a_new_step_forgets_what_was_undone_and_nothing_is_no_step() {
-        let mut history = History::default();
+        let mut history = UndoHistory::default();
         for after in [0.2, 0.3] {
             history.begin("lip", 0.1);
             history.end("lip", after);
@@ -136,7 +135,7 @@ mod tests {
 
     #[test]
     fn long_work_does_not_grow_without_end() {
-        let mut history = History::default();
+        let mut history = UndoHistory::default();
         for n in 0..1000 {
             history.begin("lip", n as f32);
             history.end("lip", n as f32 + 1.0);

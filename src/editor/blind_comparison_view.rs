@@ -1,21 +1,22 @@
-//! The page of a blind comparison: two names, and nothing that would tell which is which.
+//! The page of a blind comparison: X and Y, and nothing that tells which is which.
 
 use egui::{Align2, CornerRadius, FontId, RichText, Role, Sense, Stroke, Ui, WidgetInfo, vec2};
 
-use crate::editor::compare::{Compare, Side};
+use crate::editor::ab_comparison::{AbComparison, ComparisonSide};
 use crate::editor::controls::Hands;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
 /// Draws the page.
-pub fn draw(ui: &mut Ui, compare: &mut Compare, hands: &mut Hands) {
+pub fn draw(ui: &mut Ui, compare: &mut AbComparison, hands: &mut Hands) {
     let c = Colours::here(ui);
     let height = ui.available_height();
     ui.vertical_centered(|ui| {
         ui.add_space(0.12 * height);
         ui.label(RichText::new("Blind comparison").font(FontId::proportional(22.0)));
         ui.label(
-            RichText::new("Play, change sides as often as you like, decide, then reveal.").color(c.quiet),
+            RichText::new("Play, switch between X and Y as often as you like, decide, then press Reveal.")
+                .color(c.quiet),
         );
         ui.add_space(0.06 * height);
         let size = vec2((0.3 * ui.available_width()).min(220.0), (0.3 * height).min(150.0));
@@ -39,7 +40,7 @@ pub fn draw(ui: &mut Ui, compare: &mut Compare, hands: &mut Hands) {
                 let ink = if is_here { c.on_accent } else { c.ink };
                 painter.text(rect.center(), Align2::CENTER_CENTER, name, FontId::proportional(44.0), ink);
                 if compare.is_revealed() {
-                    let told = if side == Side::A { "is A" } else { "is B" };
+                    let told = if side == ComparisonSide::A { "is A" } else { "is B" };
                     let at = rect.center_bottom() - vec2(0.0, 10.0);
                     painter.text(at, Align2::CENTER_BOTTOM, told, theme::heading(), ink);
                 }

@@ -1,7 +1,7 @@
-//! How a knob shall feel, as arguments.
+//! Arguments for the feel of the knob.
 
 use crate::cli::Failure;
-use crate::cli::args::{check_fingering, note, within};
+use crate::cli::shared_args::{check_fingering, note, within};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::{FeelDesign, Order};
 use chalumeau_core::units::WrittenNote;
@@ -11,7 +11,7 @@ use clap::{Args, ValueEnum};
 /// Torque laws by name.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum LawArg {
-    /// Rises to the threshold, falls to nothing where the reed shuts
+    /// Rises to the threshold, falls to zero where the reed shuts
     Flow,
     /// A spring with a step at the threshold: easy to hold
     Pressure,
@@ -20,7 +20,7 @@ enum LawArg {
 /// Orders by name.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum OrderArg {
-    /// By the pressure the bore asks
+    /// By the pressure that the bore needs
     Physical,
     /// The longer the closed tube, the harder
     CoveredHoles,
@@ -28,7 +28,7 @@ enum OrderArg {
     CoveredHolesReversed,
 }
 
-/// What of the feel a user chooses.
+/// The parts of the feel that a user chooses.
 #[derive(Args)]
 #[command(next_help_heading = "Feel of the knob")]
 pub struct FeelArgs {
@@ -41,7 +41,7 @@ pub struct FeelArgs {
     /// Which note feels harder
     #[arg(long, value_enum, default_value_t = OrderArg::Physical)]
     order: OrderArg,
-    /// Written note that exaggeration leaves alone [default: C5 or, without one, the middle of the chart]
+    /// Written note that contrast does not change [default: C5 or, without one, the middle of the chart]
     #[arg(long, value_name = "NOTE", value_parser = note)]
     reference: Option<u8>,
     /// Torque per unit of flow (flow) or at closure (pressure) on the reference note, mNm, 0..450
@@ -50,7 +50,7 @@ pub struct FeelArgs {
     /// Angle at which the reference reed closes on the reference note, degrees, 120..1080
     #[arg(long, value_name = "DEG", default_value = "360", value_parser = |s: &str| within(s, 120.0, 1_080.0))]
     travel: f64,
-    /// Mark at the threshold, mNm, 0..100 [default: none under flow, 6 under pressure]
+    /// Height of the step at the threshold, mNm, 0..100 [default: none under flow, 6 under pressure]
     #[arg(long, value_name = "MNM", value_parser = |s: &str| within(s, 0.0, 100.0))]
     detent: Option<f64>,
 }

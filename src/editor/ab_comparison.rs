@@ -1,8 +1,8 @@
-//! Two settings side by side: A, B, and not knowing which.
+//! Comparison of two settings, A and B, also blind.
 //!
-//! A slot holds the values of all parameters that belong to a setting. Changing sides keeps the side that is left as it
-//! was just then. Blind, the sides are called X and Y, which is which is drawn by lot and told by *Reveal* alone, and the
-//! window shows no value that would tell.
+//! A slot holds the values of all parameters that belong to a setting. Changing sides saves the values of the
+//! side that is left. In a blind comparison the sides are called X and Y in random order, only *Reveal* tells which is
+//! which, and the window shows no value that would tell.
 
 use std::collections::hash_map::RandomState;
 use std::hash::{BuildHasher, Hasher};
@@ -12,7 +12,7 @@ pub type Values = Vec<(&'static str, f32)>;
 
 /// Which side.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Side {
+pub enum ComparisonSide {
     /// The first.
     #[default]
     A,
@@ -20,7 +20,7 @@ pub enum Side {
     B,
 }
 
-impl Side {
+impl ComparisonSide {
     /// The other one.
     pub fn other(self) -> Self {
         match self {
@@ -32,10 +32,10 @@ impl Side {
 
 /// Both sides.
 #[derive(Clone, Debug, Default)]
-pub struct Compare {
+pub struct AbComparison {
     /// The side in force.
-    pub side: Side,
-    /// The values of the side that is not in force; `None` until it was first gone to.
+    pub side: ComparisonSide,
+    /// The values of the side that is not in force; `None` until it is first used.
     resting: Option<Values>,
     blind: Option<Blind>,
 }
@@ -47,10 +47,10 @@ struct Blind {
     is_revealed: bool,
 }
 
-impl Compare {
-    /// Goes to `side`: what to set, with `now` kept for coming back. Nothing for the side in force. A side never gone to
-    /// begins as a copy.
-    pub fn go(&mut self, side: Side, now: Values) -> Values {
+impl AbComparison {
+    /// Goes to `side`: saves `now` for the old side and returns the values to set. Returns nothing for the side in force. A
+    /// side that was never used begins as a copy.
+    pub fn go(&mut self, side: ComparisonSide, now: Values) -> Values {
         if side == self.side {
             return Vec::new();
         }
@@ -70,12 +70,12 @@ impl Compare {
         self.resting.as_ref().is_some_and(|resting| resting != now)
     }
 
-    /// Hides which is which; the lot decides.
+    /// Starts a blind comparison; X and Y get their sides at random.
     pub fn hide(&mut self) {
         self.hide_as(RandomState::new().build_hasher().finish() & 1 == 1);
     }
 
-    /// Hides which is which with X as B if `is_crossed`.
+    /// Starts a blind comparison in which X is B if `is_crossed`.
     pub fn hide_as(&mut self, is_crossed: bool) {
         self.blind = Some(Blind { is_crossed, is_revealed: false });
     }
@@ -103,9 +103,9 @@ impl Compare {
     }
 
     /// The side behind X (`first`) or Y.
-    pub fn behind(&self, first: bool) -> Side {
+    pub fn behind(&self, first: bool) -> ComparisonSide {
         let is_crossed = self.blind.is_some_and(|blind| blind.is_crossed);
-        if first == is_crossed { Side::B } else { Side::A }
+        if first == is_crossed { ComparisonSide::B } else { ComparisonSide::A }
     }
 }
 
@@ -115,28 +115,28 @@ mod tests {
 
     #[test]
     fn each_side_keeps_what_was_set_on_it() {
-        let mut compare = Compare::default();
-        assert_eq!(compare.go(Side::A, vec![("lip", 0.1)]), []);
-        assert_eq!(compare.go(Side::B, vec![("lip", 0.1)]), [("lip", 0.1)], "B begins as A");
-        assert_eq!(compare.go(Side::A, vec![("lip", 0.9)]), [("lip", 0.1)]);
-        assert_eq!(compare.go(Side::B, vec![("lip", 0.2)]), [("lip", 0.9)]);
+        let mut compare = AbComparison::default();
+        assert_eq!(compare.go(ComparisonSide::A, vec![("lip", 0.1)]), []);
+        assert_eq!(compare.go(ComparisonSide::B, vec![("lip", 0.1)]), [("lip", 0.1)], "B begins as A");
+        assert_eq!(compare.go(ComparisonSide::A, vec![("lip", 0.9)]), [("lip", 0.1)]);
+        assert_eq!(compare.go(ComparisonSide::B, vec![("lip", 0.2)]), [("lip", 0.9)]);
         compare.copy(vec![("lip", 0.5)]);
-        assert_eq!(compare.go(Side::A, vec![("lip", 0.5)]), [("lip", 0.5)]);
+        assert_eq!(compare.go(ComparisonSide::A, vec![("lip", 0.5)]), [("lip", 0.5)]);
     }
 
     #[test]
     fn blind_names_cover_both_sides_and_the_lot_falls_both_ways() {
-        let mut compare = Compare::default();
+        let mut compare = AbComparison::default();
         for is_crossed in [false, true] {
             compare.hide_as(is_crossed);
             assert_ne!(compare.behind(true), compare.behind(false));
-            assert_eq!(compare.behind(true) == Side::B, is_crossed);
+            assert_eq!(compare.behind(true) == ComparisonSide::B, is_crossed);
             assert!(!compare.is_revealed());
         }
         let mut seen = [false; 2];
         for _ in 0..200 {
             compare.hide();
-            seen[usize::from(compare.behind(true) == Side::B)] = true;
+            seen[usize::from(compare.behind(true) == ComparisonSide::B)] = true;
         }
         assert_eq!(seen, [true, true]);
     }

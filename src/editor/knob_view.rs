@@ -1,4 +1,4 @@
-//! The knob: which, how it is, arming it, what it feels like, and a page to try it on.
+//! The knob view: device, status, arming, feel, and a page of feel tests.
 
 use egui::{
     Align2, Button, Color32, CornerRadius, FontId, RichText, Role, Sense, Stroke, Ui, WidgetInfo, vec2,
@@ -10,7 +10,7 @@ use crate::editor::chart::Chart;
 use crate::editor::controls::{Hands, choice, heading, momentary, segments, slider, switch, teach};
 use crate::editor::feel_test::FeelTest;
 use crate::editor::reed_view::torque_picture;
-use crate::editor::snapshot::{Device, Snapshot};
+use crate::editor::snapshot::{KnobDevice, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
 use chalumeau_core::haptics::law;
@@ -26,16 +26,16 @@ enum Page {
 }
 
 const PAGES: [(Page, &str); 3] =
-    [(Page::Play, "Feel"), (Page::Try, "Feel test"), (Page::Study, "Line, takes, studies")];
+    [(Page::Play, "Feel"), (Page::Try, "Feel test"), (Page::Study, "Connection, takes, study")];
 
 /// What the panel remembers.
 #[derive(Clone, Debug, Default)]
-pub struct KnobPanel {
+pub struct KnobView {
     page: Page,
     test: Option<FeelTest>,
 }
 
-impl KnobPanel {
+impl KnobView {
     /// Ends a feel test.
     pub fn end_test(&mut self, actions: &mut Vec<Action>) {
         if self.test.take().is_some() {
@@ -111,14 +111,14 @@ impl KnobPanel {
             chart::empty(
                 ui,
                 rect,
-                "Choose a test, arm the knob, and turn it. Each says what your hand should notice.",
+                "Choose a test, arm the knob, and turn it. Each test says what your hand should feel.",
             );
             return;
         };
         let notice = if snapshot.knob.is_armed { c.ink } else { c.quiet };
         ui.label(RichText::new(test.notice()).color(notice));
         if !snapshot.knob.is_armed {
-            ui.label(RichText::new("The knob is not armed: nothing is felt yet.").color(c.beats));
+            ui.label(RichText::new("The knob is not armed, so it makes no torque.").color(c.beats));
         }
         let feel = test.feel();
         let torque = |deg: f64| law::torque_mnm(&feel, ReedTables::seed(), deg);
@@ -197,7 +197,7 @@ fn devices(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Ve
     });
 }
 
-fn device_row(ui: &mut Ui, c: &Colours, device: &Device, actions: &mut Vec<Action>) {
+fn device_row(ui: &mut Ui, c: &Colours, device: &KnobDevice, actions: &mut Vec<Action>) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 36.0), Sense::click());
     let painter = ui.painter_at(rect);
     let round = CornerRadius::same(theme::SMALL_RADIUS);
@@ -224,16 +224,16 @@ fn device_row(ui: &mut Ui, c: &Colours, device: &Device, actions: &mut Vec<Actio
     }
 }
 
-/// The large button, and what is allowed.
+/// The large arming button, and the ceiling of the torque.
 fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     let c = Colours::here(ui);
     let knob = &snapshot.knob;
     let is_wanted = hands.step("arm") == 1;
     let (title, line, fill, ink): (&str, &str, Color32, Color32) = match (knob.is_armed, is_wanted) {
         (true, _) => ("ARMED", "press to disarm", c.danger, c.panel),
-        (false, true) => ("DISARMED", "the knob let go: press, then arm again", c.raised, c.beats),
-        (false, false) if knob.is_live => ("ARM", "the knob may then push back", c.accent, c.on_accent),
-        (false, false) => ("ARM", "no knob to arm yet", c.raised, c.quiet),
+        (false, true) => ("DISARMED", "disarmed by the knob: press, then arm again", c.raised, c.beats),
+        (false, false) if knob.is_live => ("ARM", "lets the knob make torque", c.accent, c.on_accent),
+        (false, false) => ("ARM", "no knob connected", c.raised, c.quiet),
     };
     let has_line = ui.available_height() > 160.0;
     let height = (ui.available_height() - if has_line { 118.0 } else { 66.0 }).clamp(42.0, 84.0);
@@ -266,7 +266,7 @@ fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     ui.spacing_mut().item_spacing.y = 2.0;
     let quiet = |text: String| RichText::new(text).font(theme::small()).color(c.quiet);
     let Some(deg) = knob.angle_deg else {
-        ui.label(quiet("where the knob stands, and how its line does, once there is one".into()));
+        ui.label(quiet("angle and connection quality appear here when a knob is connected".into()));
         return;
     };
     let torque = knob.torque_mnm.map_or_else(String::new, |mnm| format!(", {mnm:.0} mNm"));
@@ -277,18 +277,15 @@ fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     let late = |us: u32| 1e-3 * f64::from(us);
     let (median, worst) = (late(knob.jitter_us.0), late(knob.jitter_us.1));
     ui.label(quiet(format!(
-        "{:.0} positions a second, late by {median:.1} ms, at worst {worst:.1}",
+        "{:.0} positions a second, jitter {median:.1} ms, 99th percentile {worst:.1}",
         knob.rate_hz
     )));
     let echo = knob.round_trip_us.map_or_else(|| "?".into(), |us| format!("{:.1} ms", late(us)));
     let errors = knob.lost + knob.damaged;
-    ui.label(quiet(format!(
-        "new feel after {echo}; {errors} errors on the line, away {} times",
-        knob.losses
-    )));
+    ui.label(quiet(format!("new feel after {echo}; {errors} line errors, {} disconnects", knob.losses)));
 }
 
-/// What the line to the knob does.
+/// Quality of the connection to the knob.
 fn line(ui: &mut Ui, snapshot: &Snapshot) {
     let c = Colours::here(ui);
     let knob = &snapshot.knob;
@@ -297,24 +294,24 @@ fn line(ui: &mut Ui, snapshot: &Snapshot) {
         ("Positions", format!("{:.0} a second", knob.rate_hz), "As many as the device sends; 500 by cable"),
         (
             "Jitter",
-            format!("{:.1} ms, worst of a hundred {:.1} ms", late(knob.jitter_us.0), late(knob.jitter_us.1)),
-            "Lateness of positions against a steady clock; taken out by their time stamps",
+            format!("{:.1} ms, 99th percentile {:.1} ms", late(knob.jitter_us.0), late(knob.jitter_us.1)),
+            "Delay of positions against a steady clock; their time stamps remove it",
         ),
         (
-            "New feel felt after",
+            "Delay of a new feel",
             knob.round_trip_us.map_or_else(|| "not known".into(), |us| format!("{:.1} ms", late(us))),
-            "From a new note to the knob's echo of its feel",
+            "Time from a new note to the knob's reply",
         ),
         (
             "Frames lost, damaged",
             format!("{}, {}", knob.lost, knob.damaged),
-            "Damaged ones are refused by their checksum",
+            "Frames with a wrong checksum are ignored",
         ),
-        ("Times the knob went away", knob.losses.to_string(), "It comes back disarmed"),
+        ("Disconnects", knob.losses.to_string(), "The knob is disarmed after each one"),
         (
-            "Latency of the sound",
+            "Latency of the plugin",
             format!("{:.1} ms", snapshot.latency_ms),
-            "Of the plugin itself, told to the host",
+            "The plugin reports it to the host",
         ),
     ];
     egui::Grid::new("line").num_columns(2).spacing([18.0, 7.0]).show(ui, |ui| {
@@ -329,14 +326,14 @@ fn line(ui: &mut Ui, snapshot: &Snapshot) {
 fn column(ui: &mut Ui, hands: &mut Hands, page: Page) {
     match page {
         Page::Play | Page::Try => {
-            heading(ui, "What it feels like");
+            heading(ui, "Feel");
             for id in ["law", "order"] {
                 choice(ui, hands, id);
             }
             for id in ["contr", "torque", "detent", "kdamp", "kfric", "refnot"] {
                 slider(ui, hands, id);
             }
-            heading(ui, "Calibrate");
+            heading(ui, "Calibration");
             ui.horizontal_wrapped(|ui| {
                 momentary(ui, hands, "rest", "Rest here");
                 momentary(ui, hands, "blow", "Blow hard here");

@@ -1,8 +1,8 @@
-//! The breath meter that is always in sight: mouth pressure as a column of air, with what it does to this note.
+//! The breath meter, which is always in sight: mouth pressure as a column, with the pressures that matter for this note.
 
 use egui::{Align2, Color32, CornerRadius, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
-use crate::editor::snapshot::{Marks, Snapshot};
+use crate::editor::snapshot::{PressureMarks, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
@@ -15,8 +15,8 @@ pub fn full_kpa(snapshot: &Snapshot) -> f32 {
     (1.25 * marks.closes_kpa).max(1.05 * snapshot.settings.breath_full_kpa).max(1.0)
 }
 
-/// What the reed does at a pressure, in a word, and its colour.
-pub fn state(marks: &Marks, kpa: f32, c: &Colours) -> (&'static str, Color32) {
+/// The state of the reed at a pressure, in words, and its colour.
+pub fn state(marks: &PressureMarks, kpa: f32, c: &Colours) -> (&'static str, Color32) {
     let above = |mark: Option<f32>| mark.is_some_and(|mark| kpa >= mark);
     if kpa < 0.02 {
         ("at rest", c.quiet)
@@ -45,19 +45,19 @@ pub fn marks(snapshot: &Snapshot, c: &Colours) -> Vec<(f32, &'static str, Color3
 }
 
 /// What each mark means, for tool tips.
-pub const LEGEND: &str = "speaks (p_on): the note begins here, coming up or going down.\n\
-    beats: from here the reed touches the lay in each cycle, and the sound turns bright.\n\
-    closes: here the resting reed would be shut.\n\
-    chokes (p_off): above this the reed stays shut and nothing sounds.";
+pub const LEGEND: &str = "speaks (p_on): the note starts to sound at this pressure, or stops.\n\
+    beats: above this the reed touches the lay in each cycle, and the sound is bright.\n\
+    closes: this pressure would shut the reed at rest.\n\
+    chokes (p_off): above this the reed stays shut, and there is no sound.";
 
-/// What a scale is tinted with: from where, to where, how.
+/// The coloured bands of a scale: lower end, upper end, colour.
 pub fn bands(speaks: f32, beats: f32, closes: f32, end: f32, c: &Colours) -> [(f32, f32, Color32); 3] {
     let closes = closes.max(beats).min(end.max(beats));
     [(speaks, beats, c.speaks), (beats, closes, c.beats), (closes, end.max(closes), c.closes)]
         .map(|(from, to, colour)| (from, to, colour.gamma_multiply(0.14)))
 }
 
-/// The column, as high as its place. Without the marks where they would tell one setting from another.
+/// The column, as high as its place. A blind comparison hides the marks, because they would tell one setting from another.
 pub fn column(ui: &mut Ui, snapshot: &Snapshot, has_marks: bool) {
     let c = Colours::here(ui);
     let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
@@ -102,7 +102,7 @@ pub fn column(ui: &mut Ui, snapshot: &Snapshot, has_marks: bool) {
             continue;
         }
         painter.hline(scale.left()..=scale.right() + 5.0, y(at), Stroke::new(1.5, colour));
-        // Two lines of text each; pushed up where the one below is in the way.
+        // Each has two lines of text, which move up where the mark below is too near.
         let text_y = y(at).min(lowest - 26.0);
         lowest = text_y;
         let place = pos2(scale.right() + 8.0, text_y);

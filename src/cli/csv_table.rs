@@ -21,18 +21,18 @@ pub struct TableArgs {
 }
 
 impl TableArgs {
-    /// Whether the table was to go to a file.
+    /// Whether the table goes to a file.
     pub fn to_file(&self) -> bool {
         self.csv != Path::new("-")
     }
 
-    /// Whether existing files are to be replaced.
+    /// Whether existing files may be replaced.
     pub fn force(&self) -> bool {
         self.force
     }
 
-    pub fn open(&self, header: &str) -> Result<Table, Failure> {
-        Table::open(&self.csv, self.force, header)
+    pub fn open(&self, header: &str) -> Result<CsvTable, Failure> {
+        CsvTable::open(&self.csv, self.force, header)
     }
 }
 
@@ -41,12 +41,12 @@ enum Sink {
     File(NewFile),
 }
 
-/// A table being written; a file appears with [`finish`](Table::finish).
-pub struct Table {
+/// A table being written. A file appears with [`finish`](CsvTable::finish).
+pub struct CsvTable {
     sink: Sink,
 }
 
-impl Table {
+impl CsvTable {
     /// Opens `path` (`-`: standard output) and writes the column names.
     pub fn open(path: &Path, force: bool, header: &str) -> Result<Self, Failure> {
         let sink = if path == Path::new("-") {
@@ -59,7 +59,7 @@ impl Table {
         Ok(table)
     }
 
-    /// A line for readers, not for programs; a name of several lines becomes one.
+    /// A comment line for a human reader; line breaks become spaces.
     pub fn comment(&mut self, text: fmt::Arguments) -> Result<(), Failure> {
         self.line(format_args!("# {}", text.to_string().replace(['\n', '\r'], " ")))
     }
@@ -72,7 +72,7 @@ impl Table {
         }?)
     }
 
-    /// Writes what is left and gives a file its name.
+    /// Writes the rest; a file gets its name.
     pub fn finish(self) -> Result<(), Failure> {
         match self.sink {
             Sink::Stdout(mut out) => Ok(out.flush()?),
@@ -81,7 +81,7 @@ impl Table {
     }
 }
 
-/// A field of a table, whatever is in it.
+/// A field of a table, quoted where its text needs that.
 pub fn quoted(text: &str) -> Cow<'_, str> {
     if text.contains([',', '"', '\n', '\r']) {
         Cow::Owned(format!("\"{}\"", text.replace('"', "\"\"")))

@@ -1,9 +1,9 @@
-//! What is to be played, as arguments several commands share: a MIDI file, a note or a scale, and the breath under it.
+//! Arguments for what is played: a MIDI file, a note or a scale, and its breath. `render` and `report` share them.
 
 use crate::cli::Failure;
-use crate::cli::args::{PlayedArgs, check_fingering, note, within};
-use crate::cli::feel::FeelArgs;
+use crate::cli::feel_args::FeelArgs;
 use crate::cli::settings::SettingsArgs;
+use crate::cli::shared_args::{PlayedArgs, check_fingering, note, within};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::control::midi::MidiDecoder;
@@ -31,17 +31,17 @@ const GAMMA_DEFAULT: f32 = 0.5;
 #[command(group = ArgGroup::new("what").required(true).args(["midi", "written", "sounding", "scale"]))]
 #[command(group = ArgGroup::new("note").args(["written", "sounding", "scale"]))]
 #[command(group = ArgGroup::new("blown").args(["gamma", "breath", "crescendo", "replay"]))]
-pub struct PlayArgs {
+pub struct ScoreArgs {
     /// Standard MIDI file, format 0 or 1
     #[arg(value_name = "MIDI")]
     midi: Option<PathBuf>,
-    /// The file is of an MPE controller: channel 1 manages the others, which bend by 48 semitones
+    /// The file is MPE: channel 1 is the manager, the other channels bend by 48 semitones
     #[arg(long, requires = "midi")]
     mpe: bool,
     /// One note as a clarinettist reads it: MIDI number (60) or name (C4)
     #[arg(long, value_name = "NOTE", value_parser = note)]
     written: Option<u8>,
-    /// One note as it sounds
+    /// One note by its sounding pitch
     #[arg(long, value_name = "NOTE", value_parser = note)]
     sounding: Option<u8>,
     /// Chromatic scale between two written notes, up or down, for example E3:C6
@@ -66,8 +66,8 @@ pub struct PlayArgs {
     /// Mouth pressure from one gamma to another over the whole length, for example 0.4:0.9
     #[arg(long, value_name = "FROM:TO", help_heading = "Breath (replaces that of a MIDI file)")]
     crescendo: Option<String>,
-    /// Breath from a knob's take: a CSV file with t_us and angle_deg, as the plugin or `chalumeau knob` records it; each
-    /// note makes its own pressure of the angle
+    /// Breath from a recorded take: a CSV file with t_us and angle_deg, from the plugin or `chalumeau knob`. Each note turns
+    /// the angle into its own pressure
     #[arg(long, value_name = "FILE", help_heading = "Breath (replaces that of a MIDI file)")]
     replay: Option<PathBuf>,
     /// Sample rate, Hz, 22050..384000
@@ -89,7 +89,7 @@ fn interval(text: &str) -> Result<(u8, u8), String> {
 }
 
 /// Everything a rendering needs.
-pub struct Prepared {
+pub struct RenderJob {
     /// The instrument at this rate.
     pub model: Arc<Model>,
     /// What the player has set.
@@ -100,7 +100,7 @@ pub struct Prepared {
     pub rate: u32,
 }
 
-impl Prepared {
+impl RenderJob {
     /// The instrument as a host has it before it plays: the settings are in place from the first sample.
     pub fn clarinet(&self) -> Clarinet {
         let mut clarinet = Clarinet::new(self.model.clone(), f64::from(self.rate));
@@ -110,9 +110,9 @@ impl Prepared {
     }
 }
 
-impl PlayArgs {
-    /// Reads, checks and fits whatever was named. Takes seconds for an instrument file.
-    pub fn prepare(&self) -> Result<Prepared, Failure> {
+impl ScoreArgs {
+    /// Reads and checks the arguments and prepares the instrument. Takes seconds for an instrument file.
+    pub fn prepare(&self) -> Result<RenderJob, Failure> {
         let file = self.instrument.load()?;
         let curve = self.curve()?;
         let settings = self.settings.blown_by(curve.as_ref(), &file)?;
@@ -127,10 +127,10 @@ impl PlayArgs {
         // A single note lasts as long as was asked; a melody gets time to fade.
         let one_note = self.written.is_some() || self.sounding.is_some();
         let score = score.with_tail(self.tail.unwrap_or(if one_note { 0.0 } else { 1.0 }), self.rate);
-        Ok(Prepared { model, settings, score, rate: self.rate })
+        Ok(RenderJob { model, settings, score, rate: self.rate })
     }
 
-    /// How a knob shall feel.
+    /// The feel of the knob.
     pub fn feel(&self, file: &InstrumentFile) -> Result<FeelDesign, Failure> {
         self.feel.design(file)
     }
@@ -147,7 +147,7 @@ impl PlayArgs {
         }
     }
 
-    /// The events of a score, blown by a take.
+    /// The events of a score with the breath of a take.
     fn replayed(
         &self,
         path: &Path,
@@ -233,14 +233,12 @@ impl PlayArgs {
                 check_fingering(file, written)?;
                 Ok(Score::note(sounding, seconds, self.rate))
             }
-            _ => Err(Failure::Usage(
-                "this note lies outside what MIDI can name after transposition".to_owned(),
-            )),
+            _ => Err(Failure::Usage("after transposition this note is outside the range of MIDI".to_owned())),
         }
     }
 }
 
-/// Notes no fingering can play stay silent, but not unsaid.
+/// Warns of notes that have no fingering and stay silent.
 fn warn_of_missing_fingerings(events: &[Timed<Event>], file: &InstrumentFile) {
     let missing = |event: &Timed<Event>| match event.event {
         Event::NoteOn { note, .. } => {

@@ -1,4 +1,4 @@
-//! Arguments several commands share, and how their text is read.
+//! Arguments that several commands share, and the functions that read them.
 
 use crate::cache::Cache;
 use crate::cli::Failure;
@@ -105,7 +105,7 @@ impl InstrumentArg {
     }
 }
 
-/// Seen on a terminal only.
+/// A progress bar; it shows on a terminal only.
 fn preparing() -> ProgressBar {
     let bar = ProgressBar::new(1_000);
     match ProgressStyle::with_template("{msg} {bar:40} {percent:>3} %  {elapsed}") {
@@ -114,10 +114,10 @@ fn preparing() -> ProgressBar {
     }
 }
 
-/// How finely the bore is cut.
+/// Resolution of the lattice.
 #[derive(Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub enum QualityArg {
-    /// As the plugin plays: 96 or 88.2 kHz inside
+    /// As the plugin plays: 96 or 88.2 kHz internally
     #[default]
     Live,
     /// Twice that, with its own fit and tuning
@@ -138,10 +138,10 @@ impl From<QualityArg> for Quality {
 pub struct PlayedArgs {
     #[command(flatten)]
     instrument: InstrumentArg,
-    /// How finely the bore is cut
+    /// Resolution of the lattice
     #[arg(long, value_enum, default_value_t = QualityArg::Live)]
     quality: QualityArg,
-    /// Do not tune an instrument file (which takes up to a minute the first time): play it as it is built
+    /// Play an instrument file as measured; tuning it takes up to a minute the first time
     #[arg(long)]
     untuned: bool,
 }
@@ -162,7 +162,7 @@ impl PlayedArgs {
     }
 }
 
-/// What a maker wants to know once.
+/// Tells the maker of an instrument once what the tuning found.
 fn say_what_tuning_found(model: &Model, wanted: &Wanted) {
     let own_scale = A4_HZ / wanted.tuned_a4_hz();
     let longer = 100.0 * (model.scale / own_scale - 1.0);
@@ -176,7 +176,7 @@ fn say_what_tuning_found(model: &Model, wanted: &Wanted) {
     };
     for (what, notes) in [
         (
-            "do not sound in their register at any pressure and are tuned as their neighbours",
+            "do not sound in their register at any pressure and get the tuning of their neighbours",
             names(|n| n.silent),
         ),
         ("cannot be tuned by the delay alone", names(|n| !n.silent && n.off_cents != 0.0)),

@@ -1,5 +1,5 @@
-//! The clarinet's body on the screen: bore, wood, holes with what covers them, the standing wave above it, one scale both
-//! ways.
+//! The drawing of the clarinet: bore, wood, holes and their covers, and the standing wave above. Both directions have the
+//! same scale.
 
 use egui::{Align2, Color32, CornerRadius, FontId, Mesh, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 
@@ -8,11 +8,11 @@ use crate::editor::theme;
 use crate::editor::theme::Colours;
 use chalumeau_core::bore::instrument_file::{HoleKind, InstrumentFile, ToneHole};
 
-/// Wood around the bore where no hole tells, m, and at the rim of the bell.
+/// Thickness of the wood where no hole gives it, m, and at the rim of the bell.
 const WALL_M: f64 = 7e-3;
 const RIM_M: f64 = 2.5e-3;
 
-/// How long ten centimetres are here.
+/// A ruler of ten centimetres.
 pub(super) fn ruler(painter: &Painter, c: &Colours, area: Rect, scale: f32) {
     let (right, y) = (area.right() - 2.0, area.top() + 6.0);
     let left = right - 0.1 * scale;
@@ -25,7 +25,7 @@ pub(super) fn ruler(painter: &Painter, c: &Colours, area: Rect, scale: f32) {
 }
 
 /// Names of the parts, where there is room for them.
-pub(super) fn part_names(painter: &Painter, c: &Colours, body: &Body<'_>, y: f32) {
+pub(super) fn part_names(painter: &Painter, c: &Colours, body: &ClarinetDrawing<'_>, y: f32) {
     let mut segments = body.file.bore.iter().peekable();
     while let Some(first) = segments.next() {
         let mut end_m = first.x_end_m;
@@ -41,7 +41,13 @@ pub(super) fn part_names(painter: &Painter, c: &Colours, body: &Body<'_>, y: f32
 }
 
 /// The sound pressure, aligned with the bore.
-pub(super) fn standing(painter: &Painter, c: &Colours, body: &Body<'_>, rect: Rect, wave: &[(f32, f32)]) {
+pub(super) fn standing(
+    painter: &Painter,
+    c: &Colours,
+    body: &ClarinetDrawing<'_>,
+    rect: Rect,
+    wave: &[(f32, f32)],
+) {
     if rect.height() < 16.0 {
         return;
     }
@@ -51,7 +57,7 @@ pub(super) fn standing(painter: &Painter, c: &Colours, body: &Body<'_>, rect: Re
             painter,
             rect.center(),
             Align2::CENTER_CENTER,
-            "no standing wave known for these holes",
+            "no standing wave calculated for these holes",
             c.quiet,
         );
         return;
@@ -81,8 +87,8 @@ fn loudest(wave: &[(f32, f32)]) -> f32 {
     wave.iter().map(|&(_, magnitude)| magnitude).filter(|x| x.is_finite()).fold(1e-6, f32::max)
 }
 
-/// The body on the screen: one scale both ways.
-pub(super) struct Body<'a> {
+/// The drawing, with the same scale in both directions.
+pub(super) struct ClarinetDrawing<'a> {
     pub(super) file: &'a InstrumentFile,
     left: f32,
     axis: f32,
@@ -95,7 +101,7 @@ pub(super) struct Body<'a> {
 }
 
 /// A hole on the screen.
-pub(super) struct Place {
+pub(super) struct HolePlace {
     pub(super) rect: Rect,
     /// Where a line from the button ends.
     pub(super) foot: Pos2,
@@ -103,7 +109,7 @@ pub(super) struct Place {
     out: f32,
 }
 
-impl<'a> Body<'a> {
+impl<'a> ClarinetDrawing<'a> {
     pub(super) fn new(file: &'a InstrumentFile, area: Rect) -> Self {
         let length_m = file.length_m();
         let mut depths: Vec<f64> = file.holes.iter().map(|hole| hole.chimney_m).collect();
@@ -112,7 +118,7 @@ impl<'a> Body<'a> {
         let last_hole_m = file.holes.iter().map(|hole| hole.x_m).fold(0.0, f64::max);
         let widest_m = file.bore.iter().map(|s| s.r_start_m.max(s.r_end_m)).fold(0.0, f64::max) + RIM_M;
         let by_width = area.width() / length_m as f32;
-        // A short fat instrument in a long low window is as high as half of it.
+        // A short, wide instrument takes at most half of the height.
         let scale = by_width.min(0.5 * area.height() / (2.0 * widest_m) as f32);
         let left = area.left() + 0.5 * (area.width() - scale * length_m as f32);
         let axis = area.top() + 0.50 * area.height();
@@ -199,7 +205,7 @@ impl<'a> Body<'a> {
         }
     }
 
-    pub(super) fn hole(&self, hole: &ToneHole) -> Place {
+    pub(super) fn hole(&self, hole: &ToneHole) -> HolePlace {
         let out = if hole.kind == HoleKind::KeyClosed { 1.0 } else { -1.0 };
         let x = self.x(hole.x_m);
         let half = (self.scale * hole.radius_m as f32).max(1.5);
@@ -211,7 +217,7 @@ impl<'a> Body<'a> {
             pos2(x + half, self.axis + out * outside),
         );
         let foot = pos2(x, self.axis + outside + 7.0);
-        Place { rect, foot, out }
+        HolePlace { rect, foot, out }
     }
 
     pub(super) fn paint_hole(
@@ -222,7 +228,7 @@ impl<'a> Body<'a> {
         opening: f32,
         is_hot: bool,
     ) {
-        let Place { rect, out, .. } = self.hole(hole);
+        let HolePlace { rect, out, .. } = self.hole(hole);
         // The chimney stands in wood, out of the body where it is deeper than the wall.
         let chimney = rect.expand2(vec2(2.5, 0.0));
         painter.rect_filled(chimney, CornerRadius::same(1), c.wood);

@@ -1,4 +1,4 @@
-//! Pictures of what a command measures.
+//! Arguments for the figure that a command draws.
 
 use crate::cli::Failure;
 use crate::picture_file::PictureFile;
@@ -7,19 +7,19 @@ use chalumeau_figure::draw::Size;
 use clap::Args;
 use std::path::PathBuf;
 
-/// Whether and where a picture goes. Existing files stay or go as the command's `--force` says.
+/// Whether a figure is drawn, and into which file. The command's `--force` decides about existing files.
 #[derive(Args)]
 pub struct PlotArgs {
-    /// Draw a figure too: a new .png or .svg file, or .json for what it shows
+    /// Also draw a figure: a new .png or .svg file, or .json for its data
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
-    /// Size of the figure, pixels, 400..4000 each way, as 1600x1000 [default: what it needs]
+    /// Size of the figure, pixels, 400..4000 each way, for example 1600x1000 [default: depends on the figure]
     #[arg(long, value_name = "WxH", requires = "plot")]
     plot_size: Option<Size>,
 }
 
 impl PlotArgs {
-    /// Whether one was asked for.
+    /// Whether a figure is wanted.
     pub fn wanted(&self) -> bool {
         self.plot.is_some()
     }
@@ -32,18 +32,18 @@ impl PlotArgs {
     }
 }
 
-/// A picture to be, or none.
+/// The file of a figure, if one is wanted.
 pub struct Plot {
     sheet: Option<PictureFile>,
 }
 
 impl Plot {
-    /// Whether there will be one.
+    /// Whether a figure will be drawn.
     pub fn wanted(&self) -> bool {
         self.sheet.is_some()
     }
 
-    /// Draws what `figure` returns, if a picture is wanted.
+    /// Draws what `figure` returns, if a figure is wanted.
     pub fn draw(self, figure: impl FnOnce() -> Figure) -> Result<(), Failure> {
         match self.sheet {
             Some(sheet) => Ok(sheet.draw(&figure())?),

@@ -1,29 +1,29 @@
-//! Looks at a rendering while it is made, for pictures and reports: memory does not grow with its length.
+//! Analyses a rendering while it runs, for figures and reports. Memory does not grow with the length of the sound.
 
 use crate::cli::Failure;
-use crate::cli::play::Prepared;
+use crate::cli::score_args::RenderJob;
 use chalumeau_core::analysis::overview::{Envelope, Overview, Watcher};
 use chalumeau_core::instrument::Probe;
 use chalumeau_core::score::heard::{Heard, Listener, Sounding};
 use chalumeau_figure::Figure;
-use chalumeau_figure::performance::{Moment, Note, Performance, performance};
+use chalumeau_figure::performance::{Note, PerformanceFigure, ReedCloseUp, performance};
 
 /// Columns of a picture: as many as a drawing of usual size has pixels for.
 pub const COLUMNS: usize = 1_300;
-/// Periods of the note in the close look at the reed.
+/// Periods of the note in the reed's close-up.
 const PERIODS: f64 = 5.0;
-/// Length of that look, s: short enough to see the reed shut, long enough to see it twice.
+/// Least and greatest length of the close-up, s: short enough to see the reed shut, long enough to see it twice.
 const MOMENT_S: (f64, f64) = (0.004, 0.05);
-/// Period where no note says another, s.
+/// Period where there is no note, s.
 const PERIOD_S: f64 = 0.004;
 
-/// What looks.
-pub struct Watch {
+/// Collects what the figure and the report need, block by block.
+pub struct RenderMonitor {
     watcher: Watcher,
     listener: Listener,
     gamma: Envelope,
-    moment: Moment,
-    /// Internal samples of the close look.
+    moment: ReedCloseUp,
+    /// First and last internal sample of the close-up.
     near: (u64, u64),
     seen: u64,
     soundings: Vec<Sounding>,
@@ -32,11 +32,11 @@ pub struct Watch {
     closing_pa: f64,
 }
 
-/// What was seen.
-pub struct Watched {
+/// Analysis of a whole rendering.
+pub struct RenderSummary {
     overview: Overview,
     gamma: Envelope,
-    moment: Moment,
+    moment: ReedCloseUp,
     score: Vec<Note>,
     /// Each note's pitch and level.
     pub heard: Vec<Heard>,
@@ -44,14 +44,14 @@ pub struct Watched {
     closing_pa: f64,
 }
 
-impl Watch {
-    /// For a rendering about to begin. The close look is at `near_s`, or in the middle of the longest note.
-    pub fn new(prepared: &Prepared, near_s: Option<f64>) -> Result<Self, Failure> {
+impl RenderMonitor {
+    /// For a rendering that is about to begin. The close-up is at `near_s`, or in the middle of the longest note.
+    pub fn new(prepared: &RenderJob, near_s: Option<f64>) -> Result<Self, Failure> {
         let (score, rate_hz) = (&prepared.score, f64::from(prepared.rate));
         let (seconds, soundings) = (score.seconds(prepared.rate), score.soundings());
         if let Some(near_s) = near_s.filter(|&near_s| near_s >= seconds) {
             return Err(Failure::Usage(format!(
-                "--plot-at {near_s} lies behind the end; this is {seconds:.3} s long"
+                "--plot-at {near_s} is after the end; the sound is {seconds:.3} s long"
             )));
         }
         let longest = soundings.iter().max_by_key(|sounding| sounding.to - sounding.from);
@@ -74,7 +74,7 @@ impl Watch {
             watcher: Watcher::new(score.samples, rate_hz, COLUMNS),
             listener: Listener::new(soundings.clone(), rate_hz, a4_hz),
             gamma: Envelope::new(internal, COLUMNS),
-            moment: Moment {
+            moment: ReedCloseUp {
                 from_s: near.0 as f64 / internal_hz,
                 step_s: 1.0 / internal_hz,
                 probes: Vec::new(),
@@ -88,7 +88,7 @@ impl Watch {
         })
     }
 
-    /// The next moment inside.
+    /// Takes the next internal sample.
     pub fn inside(&mut self, probe: Probe) {
         self.gamma.push(probe.gamma as f32);
         if (self.near.0..self.near.1).contains(&self.seen) {
@@ -97,20 +97,20 @@ impl Watch {
         self.seen += 1;
     }
 
-    /// The next samples.
+    /// Takes the next block of sound.
     pub fn hear(&mut self, block: &[f32]) {
         self.watcher.see(block);
         self.listener.hear(block);
     }
 
-    /// The whole.
-    pub fn finish(self) -> Watched {
+    /// The analysis of the whole rendering.
+    pub fn finish(self) -> RenderSummary {
         let note = |sounding: &Sounding| Note {
             note: sounding.note,
             from_s: sounding.from as f64 / self.rate_hz,
             to_s: sounding.to as f64 / self.rate_hz,
         };
-        Watched {
+        RenderSummary {
             overview: self.watcher.finish(),
             gamma: self.gamma,
             moment: self.moment,
@@ -122,10 +122,10 @@ impl Watch {
     }
 }
 
-impl Watched {
-    /// All of it in one picture.
+impl RenderSummary {
+    /// The figure of the rendering.
     pub fn figure(&self, title: &str, notes: Vec<String>) -> Figure {
-        performance(&Performance {
+        performance(&PerformanceFigure {
             title,
             notes,
             overview: &self.overview,

@@ -1,9 +1,9 @@
 //! Axes: values to pixels, and what of lines and shapes lies between them.
 
-use crate::draw::canvas::At;
+use crate::draw::canvas::PixelPoint;
 
 /// Values to pixels.
-pub struct Frame {
+pub struct PlotArea {
     pub x: Extent,
     pub y: Extent,
 }
@@ -34,8 +34,8 @@ impl Extent {
     }
 }
 
-impl Frame {
-    pub fn at(&self, [x, y]: [f64; 2]) -> At {
+impl PlotArea {
+    pub fn at(&self, [x, y]: [f64; 2]) -> PixelPoint {
         (self.x.at(x), self.y.at(y))
     }
 
@@ -57,9 +57,9 @@ impl Frame {
 }
 
 /// The parts of a line inside the axes (Liang and Barsky, 1984).
-pub fn clip_line(points: &[At], frame: &Frame) -> Vec<Vec<At>> {
+pub fn clip_line(points: &[PixelPoint], frame: &PlotArea) -> Vec<Vec<PixelPoint>> {
     let (x0, x1, y0, y1) = (frame.left(), frame.right(), frame.top(), frame.bottom());
-    let mut parts: Vec<Vec<At>> = Vec::new();
+    let mut parts: Vec<Vec<PixelPoint>> = Vec::new();
     let mut open = false;
     for pair in points.windows(2) {
         let (a, b) = (pair[0], pair[1]);
@@ -91,9 +91,10 @@ pub fn clip_line(points: &[At], frame: &Frame) -> Vec<Vec<At>> {
 }
 
 /// The part of a shape inside the axes (Sutherland and Hodgman, 1974).
-pub fn clip_polygon(mut corners: Vec<At>, frame: &Frame) -> Vec<At> {
+pub fn clip_polygon(mut corners: Vec<PixelPoint>, frame: &PlotArea) -> Vec<PixelPoint> {
     let (x0, x1, y0, y1) = (frame.left(), frame.right(), frame.top(), frame.bottom());
-    let inside: [&dyn Fn(At) -> f64; 4] = [&|p| p.0 - x0, &|p| x1 - p.0, &|p| p.1 - y0, &|p| y1 - p.1];
+    let inside: [&dyn Fn(PixelPoint) -> f64; 4] =
+        [&|p| p.0 - x0, &|p| x1 - p.0, &|p| p.1 - y0, &|p| y1 - p.1];
     for inside in inside {
         let mut kept = Vec::with_capacity(corners.len() + 4);
         for (index, &b) in corners.iter().enumerate() {
@@ -116,9 +117,9 @@ pub fn clip_polygon(mut corners: Vec<At>, frame: &Frame) -> Vec<At> {
 mod tests {
     use super::*;
 
-    fn frame() -> Frame {
+    fn frame() -> PlotArea {
         let extent = |from, to| Extent { low: 0.0, high: 10.0, from, to, log: false };
-        Frame { x: extent(0.0, 100.0), y: extent(100.0, 0.0) }
+        PlotArea { x: extent(0.0, 100.0), y: extent(100.0, 0.0) }
     }
 
     #[test]

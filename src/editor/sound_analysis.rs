@@ -1,9 +1,8 @@
-//! What the sound view shows of the sound: spectrum, harmonics, pitch. For any thread but the audio thread, and only
-//! while somebody looks.
+//! Analysis for the sound view: spectrum, harmonics, pitch. It runs outside the audio thread, and only while a window is
+//! open.
 //!
-//! The latest samples go through one Hann window of 2^13 samples (171 ms at 48 kHz, bins of 5.9 Hz); the pitch is the
-//! house's own ([`pitch`]). A level is that of a sine: 0 dB is a sine of amplitude 1. Left out: averaging; the
-//! eye does it.
+//! The latest samples go through one Hann window of 2^13 samples (171 ms at 48 kHz, bins of 5.9 Hz); [`pitch`]
+//! measures the pitch. Levels are levels of a sine: 0 dB is amplitude 1. There is no averaging.
 
 use std::sync::Arc;
 
@@ -16,14 +15,14 @@ use chalumeau_core::units::cents;
 
 /// Samples looked at.
 pub const WINDOW: usize = 8192;
-/// Nothing is quieter, dB.
+/// Least level shown, dB.
 pub const FLOOR_DB: f32 = -120.0;
 /// Highest frequency shown, Hz.
 const HIGHEST_HZ: f64 = 12_000.0;
 
-/// What was heard.
+/// Spectrum, harmonics and pitch of the latest sound.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Heard {
+pub struct SoundAnalysis {
     /// Distance of `level_db`, Hz.
     pub bin_hz: f32,
     /// Level of each bin from 0 Hz, dB.
@@ -36,8 +35,8 @@ pub struct Heard {
     pub cents: Option<f32>,
 }
 
-/// Looks at the sound. Allocates when made; each look allocates its answer.
-pub struct Listener {
+/// Analyses the sound. Allocates when made; each analysis allocates its result.
+pub struct SoundAnalyser {
     rate_hz: f64,
     fft: Arc<dyn RealToComplex<f32>>,
     window: Vec<f32>,
@@ -45,7 +44,7 @@ pub struct Listener {
     bins: Vec<Complex32>,
 }
 
-impl Listener {
+impl SoundAnalyser {
     /// For samples at this rate.
     pub fn new(rate_hz: f64) -> Self {
         let fft = RealFftPlanner::new().plan_fft_forward(WINDOW);
@@ -59,9 +58,9 @@ impl Listener {
         }
     }
 
-    /// Looks at the end of `samples`; what is missing at the front counts as silence. `wanted_hz` is the pitch of the
-    /// note that is fingered.
-    pub fn hear(&mut self, samples: &[f32], wanted_hz: Option<f64>) -> Heard {
+    /// Analyses the end of `samples`; missing samples at the front count as silence. `wanted_hz` is the pitch of the fingered
+    /// note.
+    pub fn hear(&mut self, samples: &[f32], wanted_hz: Option<f64>) -> SoundAnalysis {
         let latest = &samples[samples.len().saturating_sub(WINDOW)..];
         let missing = WINDOW - latest.len();
         self.input[..missing].fill(0.0);
@@ -84,10 +83,10 @@ impl Listener {
         let bin_hz = (self.rate_hz / WINDOW as f64) as f32;
         let steady: Vec<f64> = latest.iter().map(|&sample| f64::from(sample)).collect();
         let Some(f0_hz) = pitch::fundamental_hz(&steady, self.rate_hz) else {
-            return Heard { bin_hz, level_db, ..Heard::default() };
+            return SoundAnalysis { bin_hz, level_db, ..SoundAnalysis::default() };
         };
         let harmonics = spectrum::harmonic_levels_db(&steady, self.rate_hz, f0_hz);
-        Heard {
+        SoundAnalysis {
             bin_hz,
             level_db,
             harmonics_db: harmonics.into_iter().map(|db| db as f32).collect(),
@@ -113,7 +112,8 @@ mod tests {
     #[test]
     fn a_tone_is_heard_at_its_level_and_pitch() {
         for rate_hz in [44_100.0, 48_000.0, 96_000.0] {
-            let heard = Listener::new(rate_hz).hear(&tone(233.0, rate_hz, &[0.5, 0.0, 0.05]), Some(233.082));
+            let heard =
+                SoundAnalyser::new(rate_hz).hear(&tone(233.0, rate_hz, &[0.5, 0.0, 0.05]), Some(233.082));
             let f0_hz = heard.f0_hz.unwrap();
             assert!((f0_hz - 233.0).abs() < 0.1, "{f0_hz}");
             assert!((heard.cents.unwrap() + 0.6).abs() < 0.7, "{:?}", heard.cents);
@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn silence_and_rubbish_have_no_pitch() {
-        let mut listener = Listener::new(48_000.0);
+        let mut listener = SoundAnalyser::new(48_000.0);
         for samples in [vec![], vec![0.0; 100], vec![0.0; 3 * WINDOW], vec![f32::NAN; WINDOW]] {
             let heard = listener.hear(&samples, Some(440.0));
             assert_eq!((heard.f0_hz, heard.cents), (None, None));
