@@ -24,7 +24,7 @@ fn held(model: &Model) -> HeldNote {
 
 fn reed(criterion: &mut Criterion) {
     let model = Model::built_in(HOST_HZ).expect("built in");
-    let (coeffs, tables) = (held(&model).reed(&model), ReedTables::seed());
+    let (coeffs, tables) = (held(&model).reed(&model), ReedTables::reference());
     let mut state = ReedState::default();
     let mut p_minus = 0.0;
     let mut group = criterion.benchmark_group("reed");

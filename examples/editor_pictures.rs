@@ -6,7 +6,7 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use chalumeau::editor::{Kept, SIZE, Tab};
+use chalumeau::editor::{SIZE, Tab, WindowState};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 
 #[path = "../tests/support/editor.rs"]
@@ -48,7 +48,7 @@ fn guide(folder: &Path, size: (f32, f32)) -> Result<(), Box<dyn std::error::Erro
     std::fs::create_dir_all(folder)?;
     let snapshot = support::c4();
     for (tab, is_dark) in GUIDE {
-        let kept = Kept { is_dark, tab, size, ..Kept::default() };
+        let kept = WindowState { is_dark, tab, size, ..WindowState::default() };
         let theme = if is_dark { "dark" } else { "light" };
         let path = folder.join(format!("{}-{theme}.png", tab.name().to_lowercase()));
         let picture = support::picture(&kept, &support::Fake::default(), &snapshot, 1.0);

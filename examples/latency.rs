@@ -17,14 +17,14 @@ use chalumeau_core::haptics::FeelDesign;
 use chalumeau_core::instrument::{Clarinet, Settings};
 use chalumeau_core::units::SoundingNote;
 use chalumeau_firmware::Setup;
-use chalumeau_knob::device::{Choice, Hooks, KnobLink, Phase, Places};
-use chalumeau_knob::simulator::hand::{Hand as SimulatedHand, HandDesign};
+use chalumeau_knob::device::{Hooks, KnobChoice, KnobLink, Phase, RuntimeDir};
+use chalumeau_knob::simulator::hand::{HandDesign, SimulatedHand};
 use chalumeau_knob::simulator::knob::SimulatedKnob;
 use chalumeau_knob::simulator::plant::PlantDesign;
 use chalumeau_knob::simulator::script::Script;
 use chalumeau_knob::simulator::serve::{Port, Server};
-use chalumeau_knob::touch::blower::{Blower, Blown, GRID, Hand};
-use chalumeau_knob::touch::feel::{Feels, NO_MOTOR};
+use chalumeau_knob::touch::blower::{Blower, BlownEvents, BreathMapping, GRID};
+use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 
 const RATE_HZ: f64 = 48_000.0;
 const BLOCK: usize = 128;
@@ -52,14 +52,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         })
     });
 
-    let feels = Feels::built_in()?;
+    let feels = InstrumentFeel::built_in()?;
     let settings = Settings::default();
     let table = feels.table(&settings, &FeelDesign::default(), &NO_MOTOR)?;
-    let hand = Hand { maps: feels.maps(&table), design: KnobDesign::default(), feels: true };
+    let hand = BreathMapping { maps: feels.maps(&table), design: KnobDesign::default(), feels: true };
     let feel = table.reference().feel;
     let hooks = Hooks { feel: Box::new(move || Some(feel)), ..Hooks::default() };
-    let (link, mut reader) = KnobLink::spawn_in(Places::within(folder.path()), "latency", hooks);
-    link.choose(Choice::Path(path));
+    let (link, mut reader) = KnobLink::spawn_in(RuntimeDir::within(folder.path()), "latency", hooks);
+    link.choose(KnobChoice::Path(path));
     while link.status().phase != Phase::Live {
         std::thread::sleep(Duration::from_millis(10));
     }
@@ -84,7 +84,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut ignore = |_, _| {};
         let host = first.take().into_iter();
         clarinet.render_events(
-            Blown::new(host, &mut blower, &hand, full_pa, BLOCK, angle, &mut ignore),
+            BlownEvents::new(host, &mut blower, &hand, full_pa, BLOCK, angle, &mut ignore),
             &mut out,
         );
         blower.advance(BLOCK);

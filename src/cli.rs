@@ -43,7 +43,7 @@ use chalumeau_core::score::ScoreError;
 use chalumeau_core::score::breath::BreathError;
 use chalumeau_core::score::midi_file::MidiFileError;
 use chalumeau_figure::report::ReportError;
-use chalumeau_knob::touch::take::TakeError;
+use chalumeau_knob::touch::take_csv::TakeError;
 use clap::{Parser, Subcommand};
 use std::io;
 use std::path::PathBuf;
@@ -84,7 +84,7 @@ enum Command {
     Tune(Box<tune::TuneCommand>),
     Reed(reed::ReedCommand),
     Study(study::StudyCommand),
-    Parameters(parameters::Parameters),
+    Parameters(parameters::ParametersCommand),
     #[cfg(feature = "devices")]
     Knob(Box<knob::KnobCommand>),
     #[cfg(feature = "simulator")]

@@ -3,7 +3,8 @@
 use std::io;
 use std::path::Path;
 
-use chalumeau_knob::touch::take::{Marks, Moment, TakeWriter};
+use chalumeau_knob::touch::take::{TakeMarks, TakeRow};
+use chalumeau_knob::touch::take_csv::TakeWriter;
 
 use crate::output::{NewFile, OutputError};
 
@@ -23,7 +24,7 @@ impl TakeFile {
     }
 
     /// Adds a row.
-    pub fn write(&mut self, moment: &Moment, marks: &Marks) -> io::Result<()> {
+    pub fn write(&mut self, moment: &TakeRow, marks: &TakeMarks) -> io::Result<()> {
         self.writer.write(moment, marks)
     }
 
@@ -48,7 +49,7 @@ mod tests {
         let path = folder.path().join("take.csv");
         let mut take = TakeFile::create(&path, false, &["participant 7".to_owned()]).unwrap();
         assert_eq!(take.path().file_name(), path.file_name());
-        take.write(&Moment::default(), &Marks::default()).unwrap();
+        take.write(&TakeRow::default(), &TakeMarks::default()).unwrap();
         assert!(!path.exists(), "no half-written file");
         take.keep().unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap().lines().count(), 3);

@@ -17,7 +17,7 @@ use chalumeau_knob::simulator::hand::HandDesign;
 use chalumeau_knob::simulator::plant::PlantDesign;
 use chalumeau_knob::simulator::script::{Aim, Script};
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
-use chalumeau_knob::wire::{Law, RefusedCode};
+use chalumeau_knob::wire::{RefusedCode, TorqueLaw};
 use felt::{FeltThreshold, Fingers};
 use heard::{Ear, SoundOnset, least_squares};
 use parallel::each;
@@ -27,7 +27,7 @@ use std::sync::{Arc, LazyLock};
 static MODEL: LazyLock<Arc<Model>> = LazyLock::new(|| Arc::new(Model::built_in(48_000.0).unwrap()));
 static FEELS: LazyLock<InstrumentFeel> = LazyLock::new(|| InstrumentFeel::new(&MODEL));
 
-const LAWS: [Law; 2] = [Law::Flow, Law::Pressure];
+const LAWS: [TorqueLaw; 2] = [TorqueLaw::Flow, TorqueLaw::Pressure];
 const CONTRASTS: [f64; 3] = [1.0, 3.0, 5.0];
 /// Notes that the fingering starts in another register, see docs/feel.md.
 const ELSEWHERE: [u8; 6] = [92, 93, 94, 95, 96, 97];
@@ -35,11 +35,11 @@ const ELSEWHERE: [u8; 6] = [92, 93, 94, 95, 96, 97];
 /// blows more.
 const BEYOND_CLOSURE_KPA: f32 = 9.0;
 
-fn design(law: Law, contrast: f64) -> FeelDesign {
+fn design(law: TorqueLaw, contrast: f64) -> FeelDesign {
     FeelDesign { law, contrast, ..FeelDesign::default() }
 }
 
-fn table(law: Law, contrast: f64) -> FeelTable {
+fn table(law: TorqueLaw, contrast: f64) -> FeelTable {
     FEELS.table(&Settings::default(), &design(law, contrast), &TorqueLimits::default()).unwrap()
 }
 
@@ -124,8 +124,8 @@ fn passage(table: &FeelTable, note: &NoteFeel) -> Passage {
         }
     }
     let felt = match note.feel.law {
-        Law::Flow => fingers.peak(1e3 * player.knob.plant().design().torque_step_nm),
-        Law::Pressure | Law::Free => fingers.step(),
+        TorqueLaw::Flow => fingers.peak(1e3 * player.knob.plant().design().torque_step_nm),
+        TorqueLaw::Pressure | TorqueLaw::Free => fingers.step(),
     };
     Passage { felt: felt.expect("a threshold in the torque"), heard: ear.onset(), lag, astray_deg }
 }
@@ -134,7 +134,7 @@ fn passage(table: &FeelTable, note: &NoteFeel) -> Passage {
 /// every note, Contrast 1, 3 and 5, both laws.
 #[test]
 fn in_a_slow_crescendo_the_sound_begins_where_the_hand_feels_the_threshold() {
-    let conditions: Vec<(Law, f64, FeelTable)> = LAWS
+    let conditions: Vec<(TorqueLaw, f64, FeelTable)> = LAWS
         .iter()
         .flat_map(|&law| CONTRASTS.map(|contrast| (law, contrast, table(law, contrast))))
         .collect();
@@ -188,7 +188,7 @@ fn in_a_slow_crescendo_the_sound_begins_where_the_hand_feels_the_threshold() {
         let plain = in_deg(felt.plain_deg).abs();
         let noticed = 100.0 * (noticed_deg / felt.made_deg - 1.0);
         let late = if is_own { [noticed, 0.0] } else { [0.0, noticed] };
-        let pressure_plain = if law == Law::Pressure { plain } else { 0.0 };
+        let pressure_plain = if law == TorqueLaw::Pressure { plain } else { 0.0 };
         let astray = passage.astray_deg;
         let here =
             [off[0], off[1], pressure_plain, late[0], late[1], 100.0 * passage.lag, astray, heard.rest];
@@ -210,7 +210,7 @@ fn in_a_slow_crescendo_the_sound_begins_where_the_hand_feels_the_threshold() {
 /// that they sound; where they arrive is told in docs/feel.md.
 #[test]
 fn above_g6_the_sound_that_begins_goes_on_and_only_sometimes_becomes_the_note() {
-    let (settings, table) = (Settings::default(), table(Law::Flow, 1.0));
+    let (settings, table) = (Settings::default(), table(TorqueLaw::Flow, 1.0));
     let closing_pa = settings.closing_pa();
     let tracks = each(&ELSEWHERE, |&written| {
         let note = note(&table, written);
@@ -300,9 +300,9 @@ fn a_hand_holds_gamma_one_half_at_the_reed_under_both_laws() {
 #[test]
 fn what_would_push_or_shake_is_refused_before_the_wire_and_behind_it() {
     let settings = Settings::default();
-    let table = table(Law::Flow, 3.0);
+    let table = table(TorqueLaw::Flow, 3.0);
     let note = note(&table, 72);
-    let (flow, pressure) = (design(Law::Flow, 1.0), design(Law::Pressure, 1.0));
+    let (flow, pressure) = (design(TorqueLaw::Flow, 1.0), design(TorqueLaw::Pressure, 1.0));
     let usual = PlantDesign::default();
     let [thin, thick] = [4e-4, 1e-2].map(|viscous_nms| PlantDesign { viscous_nms, ..usual });
     let (push, shake) = (RefusedCode::WouldPush, RefusedCode::TooStiff);
@@ -338,7 +338,7 @@ fn what_would_push_or_shake_is_refused_before_the_wire_and_behind_it() {
         let there = player.session.refusal().unwrap_or_default().to_owned();
         println!("{what}: here: {here}; there: {there}");
         assert!(there.contains(code.text()), "{what}: {there}");
-        assert_eq!(player.knob.feel(), (before, Some(Law::Flow)), "{what}: the feel before stays");
+        assert_eq!(player.knob.feel(), (before, Some(TorqueLaw::Flow)), "{what}: the feel before stays");
         let now = mean_mnm(&mut player);
         assert!(player.knob.is_armed() && torque < -30.0 && (now - torque).abs() < 1.0, "{torque} {now}");
     }
@@ -382,7 +382,7 @@ fn static_reed(
 #[test]
 fn felt_closure_is_where_the_resting_reed_shuts() {
     for (contrast, written) in [(1.0, 52), (3.0, 72), (5.0, 84)] {
-        let table = table(Law::Flow, contrast);
+        let table = table(TorqueLaw::Flow, contrast);
         let note = note(&table, written);
         let a_close = note.landmarks.a_close_deg;
         let (fingers, opening) = static_reed(&table, note, 0.0, 0.9, 1.12);
@@ -426,7 +426,7 @@ fn felt_closure_is_where_the_resting_reed_shuts() {
 #[test]
 fn tongued_beyond_closure_a_reed_on_a_sharp_lay_stays_shut_and_the_motor_at_rest() {
     let settings = Settings { lay: 0.0, breath_full_kpa: BEYOND_CLOSURE_KPA, ..Settings::default() };
-    let table = table(Law::Flow, 3.0);
+    let table = table(TorqueLaw::Flow, 3.0);
     for written in [52, 72, 84] {
         let note = note(&table, written);
         let mut player = seated(&table, note, &settings, HandDesign::listening());

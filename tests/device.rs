@@ -26,7 +26,7 @@ use chalumeau_knob::simulator::script::Aim;
 use chalumeau_knob::simulator::serve::{Control, Port, Server};
 use chalumeau_knob::touch::blower::{Blower, BlownEvents, Breath14, BreathMapping};
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
-use chalumeau_knob::wire::{Decoder, Feel, Law, Message};
+use chalumeau_knob::wire::{Decoder, Feel, Message, TorqueLaw};
 use knob::{FirmwareKnob, PtyKnob, recorder, soon};
 use rosc::{OscMessage, OscPacket, OscType, encoder};
 use serialport::{SerialPort, TTYPort};
@@ -74,7 +74,7 @@ fn said(knob: &PtyKnob, what: impl Fn(&Message) -> bool) -> usize {
 fn a_simulated_knob_is_found_played_armed_and_left_in_peace() {
     let (_directory, places) = places();
     let knob = PtyKnob::plug(Some(&places), &Setup::default());
-    let feel = Arc::new(Mutex::new(Feel { law: Law::Flow, scale_mnm: 50.0, ..Feel::default() }));
+    let feel = Arc::new(Mutex::new(Feel { law: TorqueLaw::Flow, scale_mnm: 50.0, ..Feel::default() }));
     let wanted = feel.clone();
     let (on_state, states) = recorder::<StateSample>();
     let hooks = Hooks { feel: Box::new(move || Some(*wanted.lock().unwrap())), on_state };
@@ -472,7 +472,7 @@ fn over_midi_the_same_firmware_is_played_and_felt() {
         }
         was_armed
     });
-    let feel = Feel { law: Law::Pressure, scale_mnm: 30.0, ..Feel::default() };
+    let feel = Feel { law: TorqueLaw::Pressure, scale_mnm: 30.0, ..Feel::default() };
     let (on_state, states) = recorder::<StateSample>();
     let (link, _reader) =
         KnobLink::spawn_in(places, "test", Hooks { feel: Box::new(move || Some(feel)), on_state });
@@ -680,7 +680,8 @@ fn a_refused_feel_is_explained_and_not_repeated() {
     let mut bench = Bench::new(Binding::Serial);
     bench.run(500);
     // A wall of 100 mNm per degree is 5.7 N m/rad: beyond 2 b / T of the simulated knob.
-    let steep = Feel { law: Law::Pressure, wall_mnm_per_deg: 100.0, scale_mnm: 20.0, ..Feel::default() };
+    let steep =
+        Feel { law: TorqueLaw::Pressure, wall_mnm_per_deg: 100.0, scale_mnm: 20.0, ..Feel::default() };
     bench.session.want_feel(steep);
     bench.run(3000);
     let why = bench.session.refusal().expect("a reason");
@@ -730,7 +731,7 @@ fn no_fault_ever_arms_a_knob() {
     let (mut armed_lives, mut disarmed_lives) = (0, 0);
     for life in 0..300 {
         let mut bench = Bench::new(Binding::Serial);
-        bench.session.want_feel(Feel { law: Law::Flow, scale_mnm: 40.0, ..Feel::default() });
+        bench.session.want_feel(Feel { law: TorqueLaw::Flow, scale_mnm: 40.0, ..Feel::default() });
         bench.run(300);
         bench.session.arm(100, false, bench.now_us);
         bench.run(100);

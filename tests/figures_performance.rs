@@ -9,12 +9,12 @@ use chalumeau_core::analysis::impedance::cutoff_hz;
 use chalumeau_core::analysis::overview::{Envelope, Overview, Watcher};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
-use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, Requirements, TorqueLimits, law};
+use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, RequirementSolver, TorqueLimits, torque_law};
 use chalumeau_core::instrument::felt::played_reed;
 use chalumeau_core::instrument::{Clarinet, Settings};
+use chalumeau_core::measure::bifurcation;
 use chalumeau_core::reed::ReedTables;
 use chalumeau_core::score::Score;
-use chalumeau_core::score::bifurcation;
 use chalumeau_core::score::breath::BreathCurve;
 use chalumeau_core::score::play_probed;
 use chalumeau_core::units::{Air, SoundingNote, WrittenNote};
@@ -24,7 +24,7 @@ use chalumeau_figure::felt::{AtContrast, FeltThresholds, Torque, thresholds, tor
 use chalumeau_figure::impedance::{Curve, FingeringImpedance, NotePeaks, chart, fingering};
 use chalumeau_figure::performance::{Note, PerformanceFigure, ReedCloseUp, performance};
 use chalumeau_figure::{Figure, Layer, Panel, bore};
-use chalumeau_knob::wire::message::Law;
+use chalumeau_knob::wire::message::TorqueLaw;
 use serde_json::Value;
 use std::convert::Infallible;
 use std::fs;
@@ -265,7 +265,7 @@ fn played() -> (Overview, Envelope, ReedCloseUp, Vec<Note>) {
         Ok::<_, Infallible>(())
     })
     .unwrap();
-    let notes = score.soundings().into_iter().map(|sounding| Note {
+    let notes = score.note_spans().into_iter().map(|sounding| Note {
         note: sounding.note,
         from_s: sounding.from as f64 / 48_000.0,
         to_s: sounding.to as f64 / 48_000.0,
@@ -465,7 +465,7 @@ fn turns_of(table: &FeelTable, closing_kpa: f64) -> Figure {
 #[test]
 fn breath_and_feel_are_figures_of_one_instrument() {
     let (file, settings) = (InstrumentFile::built_in(), Settings { noise: 0.0, ..Settings::default() });
-    let bore = Requirements::new(&file, Air::default());
+    let bore = RequirementSolver::new(&file, Air::default());
     let reed = played_reed(&file, &settings);
     let closing_kpa = 1e-3 * reed.closing_pa();
     let asked = bore.with(&reed);
@@ -488,13 +488,13 @@ fn breath_and_feel_are_figures_of_one_instrument() {
     golden("breath_notes", &breath::pressures("clarinet", "", closing_kpa, &changes));
 
     let mut felt = Vec::new();
-    for (law, name) in [(Law::Flow, "flow"), (Law::Pressure, "pressure")] {
+    for (law, name) in [(TorqueLaw::Flow, "flow"), (TorqueLaw::Pressure, "pressure")] {
         let (mut all, mut on_deg) = (Vec::new(), Vec::new());
         for contrast in [1.0, 5.0] {
             let design = FeelDesign { law, contrast, ..FeelDesign::default() };
             let table = FeelTable::new(&bore, &design, &reed, &TorqueLimits::default()).unwrap();
             let notes = table.notes().iter().step_by(20).map(|note| {
-                let at = |deg: f64| (deg, law::torque_mnm(&note.feel, ReedTables::seed(), deg));
+                let at = |deg: f64| (deg, torque_law::torque_mnm(&note.feel, ReedTables::reference(), deg));
                 Torque {
                     name: note.written.to_string(),
                     curve: (-30..=120).map(|step| at(4.0 * f64::from(step))).collect(),
@@ -505,7 +505,7 @@ fn breath_and_feel_are_figures_of_one_instrument() {
             all.push(AtContrast { contrast, notes: Ok(notes.collect()) });
             let on = table.notes().iter().map(|note| (note.written.0, note.landmarks.a_on_deg));
             on_deg.push((contrast, on.collect()));
-            if contrast == 5.0 && law == Law::Flow {
+            if contrast == 5.0 && law == TorqueLaw::Flow {
                 golden("turns", &turns_of(&table, closing_kpa));
             }
         }
@@ -517,7 +517,7 @@ fn breath_and_feel_are_figures_of_one_instrument() {
         assert!(figure.panels.iter().all(|panel| panel.y.range == figure.panels[0].y.range));
         assert!(figure.panels[2].title.ends_with("refused") && lines(&figure.panels[2]).is_empty());
         // Under the flow law the felt threshold is the top of the curve up to closure.
-        if law == Law::Flow {
+        if law == TorqueLaw::Flow {
             for note in all.iter().filter_map(|at| at.notes.as_ref().ok()).flatten() {
                 let up_to_closure = note.curve.iter().filter(|(deg, _)| *deg < note.close.0);
                 let top = up_to_closure.map(|&(_, mnm)| mnm).fold(0.0, f64::max);

@@ -20,7 +20,7 @@ use chalumeau_core::instrument::held::HeldNote;
 use chalumeau_core::instrument::voice::{Drive, TICK, Voice};
 use chalumeau_core::instrument::{Model, Settings};
 use chalumeau_core::reed::physical::P_REF_PA;
-use chalumeau_core::reed::{ReedCoeffs, ReedTables};
+use chalumeau_core::reed::{MovingReed, ReedCoeffs, ReedTables};
 use chalumeau_core::units::{Air, WrittenNote};
 use chalumeau_knob::wire::message::TorqueLaw;
 use parallel::each;
@@ -79,7 +79,7 @@ fn default_travel_is_kept_on_the_reference_note() {
 /// The peak of the torque, the landmarks and the pressures agree at any Contrast.
 #[test]
 fn landmarks_torque_and_pressure_agree_at_any_contrast() {
-    let tables = ReedTables::seed();
+    let tables = ReedTables::reference();
     for law in [TorqueLaw::Flow, TorqueLaw::Pressure] {
         for contrast in [1.0, 3.0, 5.0] {
             let table = table(&design(law, contrast), &Settings::default()).unwrap();
@@ -163,12 +163,14 @@ fn growth(fingering: usize, settings: &Settings, gamma: f64, f_hz: f64) -> f64 {
     let played = played_reed(&MODEL.file, settings);
     let (lip, rate) = (played.lips[fingering], MODEL.coeffs.rate_hz);
     let reed = ReedCoeffs::new(
-        played.law,
-        played.zeta,
-        played.lay,
-        lip.resonance_hz,
-        lip.damping,
-        MODEL.swept_s,
+        MovingReed {
+            law: played.law,
+            zeta: played.zeta,
+            lay: played.lay,
+            resonance_hz: lip.resonance_hz,
+            damping: lip.damping,
+            swept_s: MODEL.swept_s,
+        },
         rate,
     );
     // Without jets: half a second after the breath began, the rest of the steady flow in the holes would still damp.
@@ -565,7 +567,7 @@ mod firmware {
                         let there = bytes(&feel);
                         for index in -1_500..=4_200 {
                             let angle = 0.1 * f64::from(index);
-                            let here = torque_law::torque_mnm(&feel, ReedTables::seed(), angle);
+                            let here = torque_law::torque_mnm(&feel, ReedTables::reference(), angle);
                             let off = here + f64::from(law_torque_mnm(&there, angle as f32));
                             assert!(off.abs() <= 0.2, "{feel:?} at {angle}: {here}, {off}");
                             (worst, count) = (worst.max(off.abs()), count + 1);

@@ -16,7 +16,7 @@ use chalumeau_core::instrument::held::HeldNote;
 use chalumeau_core::instrument::held::Start;
 use chalumeau_core::units::WrittenNote;
 use chalumeau_core::units::cents;
-use memoryless::Blown;
+use memoryless::MemorylessVoice;
 use parallel::each;
 
 static MODEL: LazyLock<Model> = LazyLock::new(|| Model::built_in(48_000.0).unwrap());
@@ -32,7 +32,7 @@ fn written(fingering: usize) -> u8 {
 /// Mouth pressures at which a note starts: by the lattice's own impedance, and by playing.
 fn thresholds(written: u8, zeta: f64) -> (f64, f64) {
     let note = fingering(written);
-    let (f_hz, height) = Blown::new(&MODEL, note, zeta).playing_frequency(MODEL.notes_hz[note]);
+    let (f_hz, height) = MemorylessVoice::new(&MODEL, note, zeta).playing_frequency(MODEL.notes_hz[note]);
     let theory = threshold_gamma(height, zeta);
     (theory, memoryless::threshold_by_growth(&MODEL, note, zeta, f_hz, theory))
 }
@@ -84,7 +84,7 @@ fn harmonics_grow_as_powers_of_the_first_near_threshold() {
         let rises = [1.005, 1.01, 1.02, 1.03];
         let levels_db: Vec<[f64; 3]> = each(&rises, |rise| {
             let rate = MODEL.coeffs.rate_hz;
-            let mut blown = Blown::new(&MODEL, fingering(note), 0.3);
+            let mut blown = MemorylessVoice::new(&MODEL, fingering(note), 0.3);
             blown.blow(played * rise, 0.02, 0.0);
             // Growth is slow so near the threshold, so the note begins near its final level.
             blown.blow(played * rise, 12.0, 0.05);
@@ -163,7 +163,7 @@ fn too_much_breath_shuts_the_reed_until_it_is_much_less() {
     const STEP_S: f64 = 0.02;
     const TOP: f64 = 3.0;
     let steps = (10.0 / STEP_S) as usize;
-    let mut note = Blown::new(&MODEL, fingering(52), 0.3);
+    let mut note = MemorylessVoice::new(&MODEL, fingering(52), 0.3);
     // A trace of noise lets an instability show at once, as breath does.
     let mut swing = |gamma: f64| {
         let sound = note.blow(gamma, STEP_S, 1e-5);

@@ -12,7 +12,7 @@ use chalumeau_knob::simulator::hand::{HandDesign, SimulatedHand};
 use chalumeau_knob::simulator::knob::SimulatedKnob;
 use chalumeau_knob::simulator::plant::PlantDesign;
 use chalumeau_knob::simulator::script::{Aim, Script};
-use chalumeau_knob::wire::{EventKind, Feel, Law, Message};
+use chalumeau_knob::wire::{EventKind, Feel, Message, TorqueLaw};
 use fastrand::Rng;
 use host::TestHost;
 use std::collections::BTreeMap;
@@ -24,7 +24,7 @@ const REST_DEG: f64 = 0.2;
 const H: f32 = 2.598_076;
 const K: f32 = 0.384_900_2;
 
-fn feel(law: Law, scale_mnm: f32, stretch: f32, h: f32, k: f32) -> Feel {
+fn feel(law: TorqueLaw, scale_mnm: f32, stretch: f32, h: f32, k: f32) -> Feel {
     let closure_deg = 360.0 * h * k / stretch;
     Feel {
         feel_id: 1,
@@ -163,7 +163,7 @@ fn knobs() -> [PlantDesign; 4] {
 fn no_allowed_setting_makes_a_released_knob_swing() {
     let mut findings = Findings::default();
     for plant in knobs() {
-        for law in [Law::Flow, Law::Pressure] {
+        for law in [TorqueLaw::Flow, TorqueLaw::Pressure] {
             for scale_mnm in [30.0, 100.0, 250.0, 450.0] {
                 for stretch in [0.5, 1.0, 3.0, 10.0] {
                     for (h, k) in [(H, K), (2.0, 0.843_75), (4.0, 0.2)] {
@@ -188,7 +188,7 @@ fn no_allowed_feel_drawn_by_lot_makes_a_released_knob_swing() {
     for _ in 0..1000 {
         let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
         let (h, k) = (between(0.5, 5.0) as f32, between(0.01f64.ln(), 3.0f64.ln()).exp() as f32);
-        let law = if between(0.0, 1.0) < 0.5 { Law::Flow } else { Law::Pressure };
+        let law = if between(0.0, 1.0) < 0.5 { TorqueLaw::Flow } else { TorqueLaw::Pressure };
         let scale_mnm = between(0.0, 450.0) as f32;
         let stretch = between(0.1f64.ln(), 30.0f64.ln()).exp() as f32;
         let base = feel(law, scale_mnm, stretch, h, k);
@@ -218,8 +218,10 @@ fn pressed_deg(feel: Feel, plant: PlantDesign, angle_deg: f64, damping_nms: f64)
 /// A wall, and a pressure law, of a share of the stiffness b / (2 T) the firmware accepts; with where to press them.
 fn springs(plant: &PlantDesign, share: f64) -> impl Iterator<Item = (Feel, f64)> {
     let mnm_per_deg = (1000.0 * share * 0.5 * plant.viscous_nms * 2000.0).to_radians();
-    let base =
-        |scale_mnm, stretch| Feel { damping_mnms: 0.0, ..feel(Law::Pressure, scale_mnm, stretch, H, K) };
+    let base = |scale_mnm, stretch| Feel {
+        damping_mnms: 0.0,
+        ..feel(TorqueLaw::Pressure, scale_mnm, stretch, H, K)
+    };
     let wall = Feel { wall_deg: 100.0, wall_mnm_per_deg: mnm_per_deg as f32, ..base(0.0, 1.0) };
     let law = base(200.0, (1.8 * mnm_per_deg) as f32);
     [(wall, 101.0), (law, 5.0)].into_iter().filter(|(feel, _)| feel.stretch <= 30.0)
@@ -266,13 +268,13 @@ fn morph_never_changes_torque_faster_than_the_slew_limit() {
     let mut rng = Rng::with_seed(2);
     let (mut fastest, mut largest, mut accepted) = (0.0f64, 0.0f64, 0);
     for angle_deg in [20.0, 60.0, 120.0, 300.0] {
-        let first = Feel { damping_mnms: 0.0, ..feel(Law::Pressure, 200.0, 1.0, H, K) };
+        let first = Feel { damping_mnms: 0.0, ..feel(TorqueLaw::Pressure, 200.0, 1.0, H, K) };
         let mut host = released(first, flywheel, angle_deg).unwrap();
         host.run(0.3, |_| {});
         let mut last = host.knob.command_mnm();
         for feel_id in 2..250 {
             let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
-            let law = [Law::Free, Law::Flow, Law::Pressure][between(0.0, 2.999) as usize];
+            let law = [TorqueLaw::Free, TorqueLaw::Flow, TorqueLaw::Pressure][between(0.0, 2.999) as usize];
             let base =
                 feel(law, between(0.0, 450.0) as f32, between(0.3, 3.0) as f32, H, between(0.1, 0.5) as f32);
             let next = Feel { feel_id, damping_mnms: 0.0, morph_ms: between(20.0, 100.0) as u16, ..base };
@@ -297,7 +299,7 @@ fn morph_never_changes_torque_faster_than_the_slew_limit() {
 #[test]
 fn listening_hand_holds_gamma_one_half_under_both_laws() {
     let (mut worst, mut held, mut refused) = (0.0f64, 0, 0);
-    for law in [Law::Flow, Law::Pressure] {
+    for law in [TorqueLaw::Flow, TorqueLaw::Pressure] {
         for scale_mnm in [50.0, 100.0, 200.0] {
             for stretch in [1.0, 2.0, 4.0] {
                 let design = HandDesign::listening();
@@ -430,7 +432,7 @@ fn break_it(harm: Harm, midi: bool, seed: u64) -> f64 {
         seed,
     );
     let ceiling_mnm = between(40.0, 250.0).round();
-    let law = if between(0.0, 1.0) < 0.5 { Law::Flow } else { Law::Pressure };
+    let law = if between(0.0, 1.0) < 0.5 { TorqueLaw::Flow } else { TorqueLaw::Pressure };
     let played = feel(law, between(60.0, 220.0) as f32, between(0.7, 2.0) as f32, H, K);
     let closure_deg = 360.0 / f64::from(played.stretch);
     let angle_deg = closure_deg * between(0.2, 0.6);
@@ -502,7 +504,7 @@ fn four_hundred_faults_on_midi_end_torque_within_400_ms() {
 fn motor_board_without_a_watchdog_keeps_its_torque_when_the_bus_dies() {
     // Why docs/simulator.md asks for one: the stock boards hold what they were told last, and no firmware can reach them.
     let stock_board = PlantDesign { motor_timeout_s: f64::INFINITY, ..PlantDesign::default() };
-    let mut host = released(feel(Law::Pressure, 200.0, 1.0, H, K), stock_board, 0.0).unwrap();
+    let mut host = released(feel(TorqueLaw::Pressure, 200.0, 1.0, H, K), stock_board, 0.0).unwrap();
     host.knob.hand().aim(Aim::Angle(120.0));
     host.run(1.5, |_| {});
     let t_s = host.knob.t_s();
@@ -521,7 +523,7 @@ fn same_seed_gives_the_same_run_to_the_bit() {
         let mut host = TestHost::new(SimulatedKnob::new(setup(false, 1e-3), plant, hand, seed), false, 200);
         host.knob.inject("corrupt@0.5:1=0.02".parse().unwrap());
         host.greet();
-        host.send(&Message::Feel(feel(Law::Flow, 150.0, 2.0, H, K)));
+        host.send(&Message::Feel(feel(TorqueLaw::Flow, 150.0, 2.0, H, K)));
         host.arm();
         host.knob.hand().aim(Aim::Angle(70.0));
         let mut course = Vec::new();

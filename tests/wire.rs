@@ -9,8 +9,8 @@ use std::collections::HashSet;
 use chalumeau_knob::wire::frame::FrameError;
 use chalumeau_knob::wire::midi::{FromKnob, MidiReceiver, encode_sysex};
 use chalumeau_knob::wire::{
-    Arm, Capabilities, Decoder, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Law, Message, encode,
-    limits,
+    Arm, Capabilities, Decoder, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Message, TorqueLaw,
+    encode, limits,
 };
 use proptest::prelude::*;
 
@@ -54,7 +54,7 @@ prop_compose! {
     fn feel()(
         landmarks in landmarks(),
         feel_id: u8,
-        law in prop::sample::select(vec![Law::Free, Law::Flow, Law::Pressure]),
+        law in prop::sample::select(vec![TorqueLaw::Free, TorqueLaw::Flow, TorqueLaw::Pressure]),
         morph_ms in 20u16..=1_000,
         h in within(limits::H),
         k in within(limits::K),

@@ -9,9 +9,9 @@ use crate::cli::shared_args::{PlayedArgs, note, sounding, within};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::bore::transfer_matrix::{TransferMatrix, threshold_gamma};
 use chalumeau_core::instrument::Settings;
+use chalumeau_core::measure::bifurcation;
+use chalumeau_core::measure::bifurcation::Transitions;
 use chalumeau_core::reed::ReedLaw;
-use chalumeau_core::score::bifurcation;
-use chalumeau_core::score::bifurcation::Changes;
 use chalumeau_core::score::breath::{BreathCurve, GAMMA_MAX};
 use chalumeau_core::units::{Air, SoundingNote, WrittenNote};
 use chalumeau_figure::bifurcation::Ramp;
@@ -82,7 +82,7 @@ impl BifurcationCommand {
             settings.zeta, settings.strength, settings.lay, settings.noise, self.to, self.seconds
         );
         table.comment(format_args!("{name}; written {written}; {note}"))?;
-        let changes = found.changes();
+        let changes = found.transitions();
         table.comment(format_args!("gamma: {}", changes_in_words(threshold, &changes)))?;
         for (direction, way) in [(1, &found.up), (-1, &found.down)] {
             for point in way {
@@ -93,7 +93,7 @@ impl BifurcationCommand {
             }
         }
         table.finish()?;
-        let way = |way: &[bifurcation::Point]| way.iter().map(|p| [p.gamma, p.rms, p.shut]).collect();
+        let way = |way: &[bifurcation::RampPoint]| way.iter().map(|p| [p.gamma, p.rms, p.shut]).collect();
         plot.draw(|| {
             Ramp {
                 title: format!("{name}, written {written}"),
@@ -132,7 +132,7 @@ fn linear_threshold(
 }
 
 /// Gamma of every change of the note, for the comment in the table.
-fn changes_in_words(threshold: Option<f64>, changes: &Changes) -> String {
+fn changes_in_words(threshold: Option<f64>, changes: &Transitions) -> String {
     let all = [
         ("linear threshold", threshold),
         ("begins", changes.begins),

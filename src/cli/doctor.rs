@@ -3,8 +3,8 @@
 use crate::cli::Failure;
 use crate::cli::shared_args::within;
 use crate::identity::VERSION;
-use chalumeau_knob::device::discover::{Kind, candidates, chip, ports};
-use chalumeau_knob::device::{Choice, Hooks, KnobLink, LinkStatus, Phase, Places, serial_text};
+use chalumeau_knob::device::discover::{PortKind, candidates, chip, ports};
+use chalumeau_knob::device::{Hooks, KnobChoice, KnobLink, LinkStatus, Phase, RuntimeDir, serial_text};
 use chalumeau_knob::device::{midi, osc};
 use chalumeau_knob::wire::{Capabilities, Feel, Info, MAJOR, MINOR};
 use clap::Args;
@@ -58,18 +58,18 @@ impl DoctorCommand {
             return Ok(self.ask_osc(&mut out, port)?);
         }
         if let Some(path) = &self.path {
-            self.ask(&mut out, Choice::Path(path.clone()))?;
+            self.ask(&mut out, KnobChoice::Path(path.clone()))?;
             return Ok(());
         }
-        let places = Places::default();
+        let places = RuntimeDir::default();
         list_serial(&mut out, &places)?;
         let midi = list_midi(&mut out)?;
         let mut live = 0;
         for candidate in candidates(&places) {
-            live += u32::from(self.ask(&mut out, Choice::Path(candidate.path))?);
+            live += u32::from(self.ask(&mut out, KnobChoice::Path(candidate.path))?);
         }
         for name in midi {
-            live += u32::from(self.ask(&mut out, Choice::Midi { name: Some(name) })?);
+            live += u32::from(self.ask(&mut out, KnobChoice::Midi { name: Some(name) })?);
         }
         if live == 0 {
             writeln!(out, "\n{NO_KNOB}")?;
@@ -78,11 +78,11 @@ impl DoctorCommand {
     }
 
     /// Links to `choice`, watches it and reports; true if a knob with this project's firmware answered.
-    fn ask(&self, out: &mut impl Write, choice: Choice) -> io::Result<bool> {
+    fn ask(&self, out: &mut impl Write, choice: KnobChoice) -> io::Result<bool> {
         let name = match &choice {
-            Choice::Path(path) => path.display().to_string(),
-            Choice::Midi { name } => name.clone().unwrap_or_default(),
-            Choice::Off | Choice::Serial { .. } | Choice::Osc { .. } => String::new(),
+            KnobChoice::Path(path) => path.display().to_string(),
+            KnobChoice::Midi { name } => name.clone().unwrap_or_default(),
+            KnobChoice::Off | KnobChoice::Serial { .. } | KnobChoice::Osc { .. } => String::new(),
         };
         writeln!(out, "\n{name}")?;
         out.flush()?;
@@ -125,7 +125,7 @@ impl DoctorCommand {
         writeln!(out, "\nOSC at UDP port {port}, from {from}")?;
         out.flush()?;
         let (link, _reader) = KnobLink::spawn("chalumeau doctor", Hooks::default());
-        link.choose(Choice::Osc { port, any_address: self.any_address });
+        link.choose(KnobChoice::Osc { port, any_address: self.any_address });
         let is_told = |phase: &Phase| !matches!(phase, Phase::Off | Phase::Searching | Phase::Waiting);
         let status = wait(&link, ANSWER.min(Duration::from_secs_f64(self.seconds + 1.0)), is_told);
         match &status.phase {
@@ -184,7 +184,7 @@ fn wait(link: &KnobLink, most: Duration, until: impl Fn(&Phase) -> bool) -> Link
     }
 }
 
-fn list_serial(out: &mut impl Write, places: &Places) -> io::Result<()> {
+fn list_serial(out: &mut impl Write, places: &RuntimeDir) -> io::Result<()> {
     writeln!(out, "\nSerial ports")?;
     let ports = ports();
     for port in &ports {
@@ -199,7 +199,7 @@ fn list_serial(out: &mut impl Write, places: &Places) -> io::Result<()> {
         writeln!(out, "  {:<16} {what}", port.port_name)?;
     }
     for candidate in candidates(places) {
-        if let Kind::Simulated { serial, name } = &candidate.kind {
+        if let PortKind::Simulated { serial, name } = &candidate.kind {
             let path = candidate.path.display().to_string();
             writeln!(out, "  {path:<16} simulated: {name}, {}", serial_text(*serial))?;
         }

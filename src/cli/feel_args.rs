@@ -3,9 +3,9 @@
 use crate::cli::Failure;
 use crate::cli::shared_args::{check_fingering, note, within};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
-use chalumeau_core::haptics::{FeelDesign, Order};
+use chalumeau_core::haptics::{FeelDesign, NoteOrder};
 use chalumeau_core::units::WrittenNote;
-use chalumeau_knob::wire::message::Law;
+use chalumeau_knob::wire::message::TorqueLaw;
 use clap::{Args, ValueEnum};
 
 /// Torque laws by name.
@@ -63,15 +63,15 @@ impl FeelArgs {
         }
         Ok(FeelDesign {
             law: match self.law {
-                LawArg::Flow => Law::Flow,
-                LawArg::Pressure => Law::Pressure,
+                LawArg::Flow => TorqueLaw::Flow,
+                LawArg::Pressure => TorqueLaw::Pressure,
             },
             reference: self.reference.map(WrittenNote),
             contrast: self.contrast,
             order: match self.order {
-                OrderArg::Physical => Order::Physical,
-                OrderArg::CoveredHoles => Order::CoveredHoles,
-                OrderArg::CoveredHolesReversed => Order::CoveredHolesReversed,
+                OrderArg::Physical => NoteOrder::Physical,
+                OrderArg::CoveredHoles => NoteOrder::CoveredHoles,
+                OrderArg::CoveredHolesReversed => NoteOrder::CoveredHolesReversed,
             },
             strength_mnm: self.torque,
             travel_deg: self.travel,

@@ -5,8 +5,8 @@ use crate::cli::csv_table::TableArgs;
 use crate::cli::feel_args::FeelArgs;
 use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within, within_f32};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
-use chalumeau_core::haptics::law;
-use chalumeau_core::haptics::{FeelTable, NoteFeel, Requirements, TorqueLimits};
+use chalumeau_core::haptics::torque_law;
+use chalumeau_core::haptics::{FeelTable, NoteFeel, RequirementSolver, TorqueLimits};
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::instrument::felt::played_reed;
 use chalumeau_core::reed::ReedTables;
@@ -131,7 +131,7 @@ impl HapticCommand {
         };
         let design = self.feel.design(file)?;
         let limits = TorqueLimits { ceiling_mnm: self.ceiling, ..TorqueLimits::default() };
-        let bore = Requirements::new(file, self.air.air());
+        let bore = RequirementSolver::new(file, self.air.air());
         Ok(FeelTable::new(&bore, &design, &played_reed(file, &settings), &limits)?)
     }
 
@@ -152,7 +152,7 @@ impl HapticCommand {
         let first = (FROM_DEG / STEP_DEG) as i32;
         for step in first..=first + steps {
             let angle = f64::from(step) / 10.0;
-            let torque = law::torque_mnm(&note.feel, ReedTables::seed(), angle);
+            let torque = torque_law::torque_mnm(&note.feel, ReedTables::reference(), angle);
             table.line(format_args!("{angle:.1},{torque:.5}"))?;
         }
         table.finish()

@@ -8,9 +8,11 @@ use crate::take_file::TakeFile;
 use chalumeau_core::haptics::{NoteFeel, TorqueLimits};
 use chalumeau_core::instrument::{Settings, Wanted};
 use chalumeau_core::units::WrittenNote;
-use chalumeau_knob::device::{Choice, Hooks, KnobLink, LinkStatus, OFFERED_CEILING_MNM, Phase, StateSample};
-use chalumeau_knob::touch::feel::{Feels, NO_MOTOR};
-use chalumeau_knob::touch::take::{Marks, Moment};
+use chalumeau_knob::device::{
+    Hooks, KnobChoice, KnobLink, LinkStatus, OFFERED_CEILING_MNM, Phase, StateSample,
+};
+use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
+use chalumeau_knob::touch::take::{TakeMarks, TakeRow};
 use clap::{ArgGroup, Args};
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
@@ -86,7 +88,7 @@ impl KnobCommand {
         let file = self.instrument.load()?;
         let written = WrittenNote(self.written);
         check_fingering(&file, written)?;
-        let feels = Feels::new(&*self.instrument.tuned(&Wanted::new(file.clone(), 48_000.0))?);
+        let feels = InstrumentFeel::new(&*self.instrument.tuned(&Wanted::new(file.clone(), 48_000.0))?);
         let ceiling_mnm = self.arm.unwrap_or(100.0);
         let limits = TorqueLimits { ceiling_mnm, ..TorqueLimits::default() };
         let settings = Settings::default();
@@ -116,16 +118,16 @@ impl KnobCommand {
         self.watch(&link, &heard, &note, settings.closing_pa(), take)
     }
 
-    fn choice(&self) -> Choice {
+    fn choice(&self) -> KnobChoice {
         if let Some(path) = &self.path {
-            return Choice::Path(path.clone());
+            return KnobChoice::Path(path.clone());
         }
         if let Some(name) = &self.midi {
-            return Choice::Midi { name: (!name.is_empty()).then(|| name.clone()) };
+            return KnobChoice::Midi { name: (!name.is_empty()).then(|| name.clone()) };
         }
         match self.osc {
-            Some(port) => Choice::Osc { port, any_address: self.network },
-            None => Choice::Serial { serial: self.serial },
+            Some(port) => KnobChoice::Osc { port, any_address: self.network },
+            None => KnobChoice::Serial { serial: self.serial },
         }
     }
 
@@ -199,7 +201,7 @@ impl KnobCommand {
 }
 
 fn write(take: &mut TakeFile, state: &StateSample, note: &NoteFeel, gamma: f64) -> Result<(), OutputError> {
-    let moment = Moment {
+    let moment = TakeRow {
         t_us: u64::try_from(state.host_us).unwrap_or(0),
         angle_deg: f64::from(state.angle_deg),
         velocity_deg_s: f64::from(state.velocity_deg_s),
@@ -209,7 +211,7 @@ fn write(take: &mut TakeFile, state: &StateSample, note: &NoteFeel, gamma: f64) 
         feel_id: state.feel_id,
     };
     let reed = Some((f64::from(note.feel.h), f64::from(note.feel.k)));
-    take.write(&moment, &Marks { reed, study: None })
+    take.write(&moment, &TakeMarks { reed, study: None })
         .map_err(|source| OutputError::Write { path: take.path().to_owned(), source })
 }
 

@@ -3,9 +3,9 @@
 use crate::cli::Failure;
 use crate::cli::shared_args::within;
 use chalumeau_firmware::Setup;
-use chalumeau_knob::device::places::Places;
+use chalumeau_knob::device::runtime_dir::RuntimeDir;
 use chalumeau_knob::simulator::fault::Fault;
-use chalumeau_knob::simulator::hand::{Hand, HandDesign};
+use chalumeau_knob::simulator::hand::{HandDesign, SimulatedHand};
 use chalumeau_knob::simulator::knob::SimulatedKnob;
 #[cfg(unix)]
 use chalumeau_knob::simulator::midi::VirtualMidi;
@@ -15,7 +15,7 @@ use chalumeau_knob::simulator::plant::PlantDesign;
 use chalumeau_knob::simulator::pty::Pty;
 use chalumeau_knob::simulator::script::Script;
 use chalumeau_knob::simulator::serve::{Port, Server};
-use chalumeau_knob::wire::Law;
+use chalumeau_knob::wire::TorqueLaw;
 use clap::Args;
 use std::fs::File;
 use std::io::{self, Write};
@@ -92,7 +92,7 @@ struct DeedArgs {
 
 /// The hand.
 #[derive(Args)]
-#[command(next_help_heading = "Hand")]
+#[command(next_help_heading = "SimulatedHand")]
 struct HandArgs {
     #[command(flatten)]
     deed: DeedArgs,
@@ -156,7 +156,7 @@ impl HandArgs {
         Ok(script.map(|script| if self.is_loop { script.repeated() } else { script }))
     }
 
-    fn hand(&self, seed: u64) -> Result<Hand, Failure> {
+    fn hand(&self, seed: u64) -> Result<SimulatedHand, Failure> {
         let mut design = if self.listen { HandDesign::listening() } else { HandDesign::default() };
         if let Some(stiffness) = self.stiffness {
             // A firmer grip damps more: the same damping ratio.
@@ -164,7 +164,7 @@ impl HandArgs {
             design.stiffness_nm_per_rad = stiffness;
         }
         design.tremor_deg = self.tremor.unwrap_or(design.tremor_deg);
-        let mut hand = Hand::new(design, seed);
+        let mut hand = SimulatedHand::new(design, seed);
         match self.script()? {
             Some(script) if self.wait_armed => hand.follow_once_armed(script),
             Some(script) => hand.follow(script),
@@ -230,7 +230,7 @@ impl KnobSimCommand {
         self.faults.iter().for_each(|fault| knob.inject(*fault));
         let mut server = Server::new(knob, port);
         if server.path().is_some() {
-            let announced = server.announce(Places::default(), self.port.serial_number, NAME);
+            let announced = server.announce(RuntimeDir::default(), self.port.serial_number, NAME);
             announced.map_err(|e| Failure::Usage(format!("cannot announce the knob: {e}")))?;
         }
         Ok(server)
@@ -277,9 +277,9 @@ fn status(server: &Server) -> String {
     let (feel_id, law) = knob.feel();
     let law = match law {
         None => "none yet",
-        Some(Law::Free) => "free",
-        Some(Law::Flow) => "flow",
-        Some(Law::Pressure) => "pressure",
+        Some(TorqueLaw::Free) => "free",
+        Some(TorqueLaw::Flow) => "flow",
+        Some(TorqueLaw::Pressure) => "pressure",
     };
     let lost = match server.slipped() {
         0 => String::new(),

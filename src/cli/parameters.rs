@@ -1,7 +1,7 @@
 //! `chalumeau parameters`: the table of parameters.
 
 use crate::cli::Failure;
-use crate::cli::table::{TableArgs, quoted};
+use crate::cli::csv_table::{TableArgs, quoted};
 use crate::parameters::PARAMETERS;
 use clap::Args;
 
@@ -9,12 +9,12 @@ use clap::Args;
 ///
 /// Ids with `settable` yes can be given to --set of render, report, tune and bifurcation.
 #[derive(Args)]
-pub struct Parameters {
+pub struct ParametersCommand {
     #[command(flatten)]
     table: TableArgs,
 }
 
-impl Parameters {
+impl ParametersCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let mut table =
             self.table.open("id,name,group,unit,range,default,automatable,midi,flag,settable,meaning")?;

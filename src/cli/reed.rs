@@ -7,13 +7,13 @@ use crate::cli::render::progress;
 use crate::cli::shared_args::{PlayedArgs, note, sounding, within};
 use crate::picture_file::PictureFile;
 use chalumeau_core::instrument::Settings;
+use chalumeau_core::measure::steady_period;
 use chalumeau_core::reed::PhysicalReed;
 use chalumeau_core::reed::ReedLaw;
 use chalumeau_core::reed::ReedTables;
 use chalumeau_core::reed::law::K_INIT;
+use chalumeau_core::reed::physical::DimensionlessReed;
 use chalumeau_core::reed::physical::P_REF_PA;
-use chalumeau_core::reed::physical::SeedReed;
-use chalumeau_core::score::orbit;
 use chalumeau_core::units::REFERENCE_RADIUS_M;
 use chalumeau_core::units::WrittenNote;
 use chalumeau_figure::draw::Size;
@@ -222,7 +222,7 @@ impl Drawing {
                 Settings { zeta: self.zeta as f32, noise: 0.0, breath_full_kpa, ..Settings::default() };
             let name = file.name.clone();
             let model = self.instrument.model(file, RATE, settings.a4_hz)?;
-            let period = orbit::period(&model, &settings, sounding, self.gamma as f32, RATE).ok_or_else(|| {
+            let period = steady_period::measure(&model, &settings, sounding, self.gamma as f32, RATE).ok_or_else(|| {
                 Failure::Usage(format!(
                     "written {written} does not sound at gamma {} and zeta {}; `chalumeau threshold` and `chalumeau \
                      bifurcation` show where it does",
@@ -250,7 +250,7 @@ impl Drawing {
 
 impl ReedCommand {
     pub fn run(&self) -> Result<(), Failure> {
-        let tables = ReedTables::seed();
+        let tables = ReedTables::reference();
         if let (Some(which), Some(out)) = (self.figure, &self.drawing.out) {
             if self.table_args.to_file() {
                 return Err(Failure::Usage(
@@ -275,7 +275,7 @@ impl ReedCommand {
                 "with --A 0 no air flows through a measured reed; give a larger A".to_owned(),
             ));
         }
-        let measured = measured.map(|reed| reed.seed(&reference, a));
+        let measured = measured.map(|reed| reed.dimensionless(&reference, a));
         let h = measured.map(|seed| seed.h).or(self.h).unwrap_or(ReedLaw::default().h());
         let law = match measured.map(|seed| seed.k).or(self.k) {
             Some(k) => ReedLaw::free(h, k, a)?,
@@ -283,8 +283,8 @@ impl ReedCommand {
         };
         if self.physical {
             let zeta = self.drawing.zeta;
-            let seed = measured.unwrap_or(SeedReed { h, k: law.k(), a, zeta, area: 1.0 });
-            let reed = PhysicalReed::from_seed(&seed, &reference);
+            let seed = measured.unwrap_or(DimensionlessReed { h, k: law.k(), a, zeta, area: 1.0 });
+            let reed = PhysicalReed::from_dimensionless(&seed, &reference);
             let lay = f64::from(Settings::default().lay);
             return reed_physical::both_faces(&seed, &reed, lay, &self.table_args);
         }

@@ -1,11 +1,11 @@
 //! The reed as its maker measures it, as arguments and as a table of both its faces.
 
 use crate::cli::Failure;
-use crate::cli::args::within;
-use crate::cli::table::TableArgs;
+use crate::cli::csv_table::TableArgs;
+use crate::cli::shared_args::within;
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::reed::PhysicalReed;
-use chalumeau_core::reed::physical::SeedReed;
+use chalumeau_core::reed::physical::DimensionlessReed;
 use chalumeau_core::units::{Air, REFERENCE_RADIUS_M};
 use clap::Args;
 
@@ -85,7 +85,12 @@ impl PhysicalReedArgs {
 }
 
 /// Both faces of a reed, one quantity a line.
-pub fn both_faces(seed: &SeedReed, reed: &PhysicalReed, lay: f64, table: &TableArgs) -> Result<(), Failure> {
+pub fn both_faces(
+    seed: &DimensionlessReed,
+    reed: &PhysicalReed,
+    lay: f64,
+    table: &TableArgs,
+) -> Result<(), Failure> {
     let air = Air::default();
     let reference = PhysicalReed::reference();
     let mut table = table.open("quantity,symbol,value,unit")?;

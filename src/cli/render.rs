@@ -7,7 +7,7 @@ use crate::cli::render_monitor::RenderMonitor;
 use crate::cli::score_args::{RenderJob, ScoreArgs};
 use crate::cli::shared_args::within;
 use crate::output::NewFile;
-use crate::wav::{Depth, Level, WavFile};
+use crate::wav::{Depth, PeakLevel, WavFile};
 use chalumeau_core::instrument::Probe;
 use chalumeau_core::reed::physical::P_REF_PA;
 use chalumeau_core::score as player;
@@ -148,7 +148,7 @@ impl RenderCommand {
         Ok(())
     }
 
-    fn report(&self, score: &Score, rate: u32, level: Level, resets: u64) {
+    fn report(&self, score: &Score, rate: u32, level: PeakLevel, resets: u64) {
         let bits = match self.bits {
             Bits::Int16 => "16 bit",
             Bits::Int24 => "24 bit",

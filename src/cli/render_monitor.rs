@@ -4,7 +4,8 @@ use crate::cli::Failure;
 use crate::cli::score_args::RenderJob;
 use chalumeau_core::analysis::overview::{Envelope, Overview, Watcher};
 use chalumeau_core::instrument::Probe;
-use chalumeau_core::score::heard::{Heard, Listener, Sounding};
+use chalumeau_core::measure::notes::{MeasuredNote, NoteMeter};
+use chalumeau_core::score::NoteSpan;
 use chalumeau_figure::Figure;
 use chalumeau_figure::performance::{Note, PerformanceFigure, ReedCloseUp, performance};
 
@@ -20,13 +21,13 @@ const PERIOD_S: f64 = 0.004;
 /// Collects what the figure and the report need, block by block.
 pub struct RenderMonitor {
     watcher: Watcher,
-    listener: Listener,
+    listener: NoteMeter,
     gamma: Envelope,
     moment: ReedCloseUp,
     /// First and last internal sample of the close-up.
     near: (u64, u64),
     seen: u64,
-    soundings: Vec<Sounding>,
+    soundings: Vec<NoteSpan>,
     rate_hz: f64,
     a4_hz: f64,
     closing_pa: f64,
@@ -39,7 +40,7 @@ pub struct RenderSummary {
     moment: ReedCloseUp,
     score: Vec<Note>,
     /// Each note's pitch and level.
-    pub heard: Vec<Heard>,
+    pub heard: Vec<MeasuredNote>,
     a4_hz: f64,
     closing_pa: f64,
 }
@@ -48,16 +49,16 @@ impl RenderMonitor {
     /// For a rendering that is about to begin. The close-up is at `near_s`, or in the middle of the longest note.
     pub fn new(prepared: &RenderJob, near_s: Option<f64>) -> Result<Self, Failure> {
         let (score, rate_hz) = (&prepared.score, f64::from(prepared.rate));
-        let (seconds, soundings) = (score.seconds(prepared.rate), score.soundings());
+        let (seconds, soundings) = (score.seconds(prepared.rate), score.note_spans());
         if let Some(near_s) = near_s.filter(|&near_s| near_s >= seconds) {
             return Err(Failure::Usage(format!(
                 "--plot-at {near_s} is after the end; the sound is {seconds:.3} s long"
             )));
         }
         let longest = soundings.iter().max_by_key(|sounding| sounding.to - sounding.from);
-        let middle_s = |sounding: &Sounding| 0.5 * (sounding.from + sounding.to) as f64 / rate_hz;
+        let middle_s = |sounding: &NoteSpan| 0.5 * (sounding.from + sounding.to) as f64 / rate_hz;
         let near_s = near_s.or(longest.map(middle_s)).unwrap_or(0.5 * seconds);
-        let within = |sounding: &&Sounding| {
+        let within = |sounding: &&NoteSpan| {
             let at = near_s * rate_hz;
             (sounding.from as f64..sounding.to as f64).contains(&at)
         };
@@ -72,7 +73,7 @@ impl RenderMonitor {
         let internal = (seconds * internal_hz).ceil() as usize;
         Ok(Self {
             watcher: Watcher::new(score.samples, rate_hz, COLUMNS),
-            listener: Listener::new(soundings.clone(), rate_hz, a4_hz),
+            listener: NoteMeter::new(soundings.clone(), rate_hz, a4_hz),
             gamma: Envelope::new(internal, COLUMNS),
             moment: ReedCloseUp {
                 from_s: near.0 as f64 / internal_hz,
@@ -105,7 +106,7 @@ impl RenderMonitor {
 
     /// The analysis of the whole rendering.
     pub fn finish(self) -> RenderSummary {
-        let note = |sounding: &Sounding| Note {
+        let note = |sounding: &NoteSpan| Note {
             note: sounding.note,
             from_s: sounding.from as f64 / self.rate_hz,
             to_s: sounding.to as f64 / self.rate_hz,

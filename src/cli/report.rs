@@ -13,8 +13,8 @@ use crate::identity;
 use crate::output::NewFile;
 use crate::wav::{Depth, WavFile};
 use chalumeau_core::instrument::{Settings, Tuning};
+use chalumeau_core::measure::notes::{MeasuredNote, spread};
 use chalumeau_core::score as player;
-use chalumeau_core::score::heard::{Heard, spread};
 use chalumeau_figure::report::{Plate, Report as Page, ReportTable, Sound, TableCell, write};
 use clap::Args;
 use std::cell::RefCell;
@@ -128,8 +128,8 @@ impl ReportCommand {
             None => "No note has a pitch.".to_owned(),
         };
         lines.push(outcome.clone());
-        let longest = watched.heard.iter().max_by_key(|heard| heard.sounding.to - heard.sounding.from);
-        let longest = longest.and_then(|heard| heard.sounding.note.written(file.transposition));
+        let longest = watched.heard.iter().max_by_key(|heard| heard.span.to - heard.span.from);
+        let longest = longest.and_then(|heard| heard.span.note.written(file.transposition));
         let fingering = longest.and_then(|written| file.fingering(written));
         let fingered = fingering.map_or(String::new(), |fingering| {
             format!(", fingered for written {}, the longest note", fingering.written)
@@ -229,17 +229,17 @@ fn number(text: impl Into<String>) -> TableCell {
     TableCell::Number(text.into())
 }
 
-fn notes(prepared: &RenderJob, heard: &[Heard], outcome: &str) -> ReportTable {
+fn notes(prepared: &RenderJob, heard: &[MeasuredNote], outcome: &str) -> ReportTable {
     let rate_hz = f64::from(prepared.rate);
     let head = ["at, s", "sounds", "written", "length, s", "pitch, Hz", "cents", "level, dBFS"];
-    let row = |heard: &Heard| {
-        let (from, to) = (heard.sounding.from as f64 / rate_hz, heard.sounding.to as f64 / rate_hz);
-        let written = heard.sounding.note.written(prepared.model.file.transposition);
+    let row = |heard: &MeasuredNote| {
+        let (from, to) = (heard.span.from as f64 / rate_hz, heard.span.to as f64 / rate_hz);
+        let written = heard.span.note.written(prepared.model.file.transposition);
         // A note without a pitch says "none".
         let or_none = |text: Option<String>| text.unwrap_or_else(|| "none".to_owned());
         vec![
             number(format!("{from:.2}")),
-            word(heard.sounding.note.to_string()),
+            word(heard.span.note.to_string()),
             word(written.map_or(String::new(), |written| written.to_string())),
             number(format!("{:.2}", to - from)),
             number(or_none(heard.hz.map(|hz| format!("{hz:.2}")))),

@@ -15,8 +15,8 @@ use chalumeau_core::score::breath::BreathCurve;
 use chalumeau_core::score::breath::GAMMA_MAX;
 use chalumeau_core::score::midi_file;
 use chalumeau_core::units::{SoundingNote, WrittenNote};
-use chalumeau_knob::touch::blower::{Blower, Blown, Hand};
-use chalumeau_knob::touch::feel::{Feels, NO_MOTOR};
+use chalumeau_knob::touch::blower::{Blower, BlownEvents, BreathMapping};
+use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::touch::take::Take;
 use clap::{ArgGroup, Args};
 use std::fs;
@@ -157,14 +157,14 @@ impl ScoreArgs {
     ) -> Result<Vec<Timed<Event>>, Failure> {
         let from = fs::File::open(path).map_err(|source| Failure::Read { path: path.to_owned(), source })?;
         let take = Take::read(from).map_err(|source| Failure::TakeFile { path: path.to_owned(), source })?;
-        let feels = Feels::new(model);
+        let feels = InstrumentFeel::new(model);
         let design = self.feel.design(&model.file)?;
         let table = feels.table(settings, &design, &NO_MOTOR)?;
         let knob = KnobDesign { full_deg: design.travel_deg, ..KnobDesign::default() };
-        let hand = Hand { maps: feels.maps(&table), design: knob, feels: true };
+        let hand = BreathMapping { maps: feels.maps(&table), design: knob, feels: true };
         let rate_hz = f64::from(self.rate);
         let full_pa = 1e3 * f64::from(settings.breath_full_kpa);
-        let events = Blown::new(
+        let events = BlownEvents::new(
             score.events.iter().copied(),
             &mut Blower::default(),
             &hand,

@@ -6,9 +6,9 @@ use crate::instrument_path::{self, LoadError};
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::instrument::model::A4_HZ;
-use chalumeau_core::instrument::prepare::{self, Progress};
+use chalumeau_core::instrument::prepare::{Preparation, Progress};
 use chalumeau_core::instrument::store::Store;
-use chalumeau_core::instrument::tuning::NoteTuning;
+use chalumeau_core::instrument::tuning_table::NoteTuning;
 use chalumeau_core::instrument::{BuildError, Model, Quality, Wanted};
 use chalumeau_core::score::ScoreError;
 use chalumeau_core::units::{Air, SoundingNote, WrittenNote, midi_of_name};
@@ -54,15 +54,15 @@ impl InstrumentArg {
         host_rate_hz: u32,
         quality: QualityArg,
     ) -> Result<Arc<Model>, Failure> {
-        let (rate_hz, quality) = (f64::from(host_rate_hz), quality.into());
-        self.made(|cache, on| prepare::bore(file, rate_hz, quality, cache, on))
+        let wanted = Wanted { quality: quality.into(), ..Wanted::new(file.clone(), f64::from(host_rate_hz)) };
+        self.made(|cache, on| Preparation::new(&wanted, cache).as_built(on))
     }
 
     /// The instrument ready to play: from the program's own data or the cache, else fitted and tuned now.
     pub fn tuned(&self, wanted: &Wanted) -> Result<Arc<Model>, Failure> {
         let mut fresh = false;
         let model = self.made(|cache, on| {
-            prepare::make(wanted, cache, &mut |progress| {
+            Preparation::new(wanted, cache).tuned(&mut |progress| {
                 fresh = true;
                 on(progress)
             })

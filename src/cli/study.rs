@@ -2,7 +2,7 @@
 
 use crate::cli::Failure;
 use crate::cli::csv_table::TableArgs;
-use chalumeau_knob::touch::study::{Side, plan};
+use chalumeau_knob::touch::study::{StudySide, plan};
 use clap::Args;
 
 const EXAMPLES: &str = "\
@@ -36,7 +36,7 @@ impl StudyCommand {
             "k of the coupled side is 27/(4 H^3), of the free side the reference 0.3849"
         ))?;
         for trial in plan(self.participant, self.seed) {
-            let [a, b] = [Side::A, Side::B].map(|side| trial.condition(side));
+            let [a, b] = [StudySide::A, StudySide::B].map(|side| trial.condition(side));
             table.line(format_args!(
                 "{},{},{},{},{},{:.5},{},{:.5}",
                 self.participant,

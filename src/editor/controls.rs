@@ -4,9 +4,9 @@
 //! normalised, 0..=1; text is the parameter's own both ways. Every widget goes through [`Hands`], which remembers what
 //! was done.
 
-use crate::editor::compare::Values;
-use crate::editor::history::History;
+use crate::editor::ab_comparison::Values;
 use crate::editor::terms;
+use crate::editor::undo::UndoHistory;
 
 pub use crate::editor::slider::slider;
 pub use crate::editor::widgets::{choice, handle, heading, momentary, segments, switch, teach};
@@ -75,7 +75,7 @@ pub struct Hands<'a> {
     /// The host.
     pub controls: &'a dyn Controls,
     /// What was done.
-    pub history: &'a mut History,
+    pub history: &'a mut UndoHistory,
     /// The open text field.
     pub entry: &'a mut Option<Entry>,
     /// Parameters that a hand is on.

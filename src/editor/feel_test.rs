@@ -1,7 +1,7 @@
 //! Five simple feels for testing a knob before any music. Each shows one thing and says what the hand should notice.
 //! Their torque is far below the default ceiling (100 mNm).
 
-use chalumeau_knob::wire::message::{Feel, Law};
+use chalumeau_knob::wire::message::{Feel, TorqueLaw};
 
 /// A test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,13 +54,18 @@ impl FeelTest {
 
     /// What goes to the knob.
     pub fn feel(self) -> Feel {
-        let plain =
-            Feel { law: Law::Pressure, morph_ms: 200, damping_mnms: 1.0, friction: 10, ..Feel::default() };
+        let plain = Feel {
+            law: TorqueLaw::Pressure,
+            morph_ms: 200,
+            damping_mnms: 1.0,
+            friction: 10,
+            ..Feel::default()
+        };
         match self {
             Self::Free => Feel { morph_ms: 200, ..Feel::default() },
             Self::Spring => Feel { scale_mnm: 40.0, ..plain },
             Self::Bump => {
-                Feel { law: Law::Flow, scale_mnm: 12.0, detent: 150, wall_mnm_per_deg: 1.0, ..plain }
+                Feel { law: TorqueLaw::Flow, scale_mnm: 12.0, detent: 150, wall_mnm_per_deg: 1.0, ..plain }
             }
             Self::Wall => Feel { scale_mnm: 0.0, wall_deg: 90.0, wall_mnm_per_deg: 2.0, ..plain },
             Self::Slap => Feel { scale_mnm: 40.0, slap_mnm_per_deg: 0.8, ..plain },
@@ -71,7 +76,7 @@ impl FeelTest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use chalumeau_core::haptics::law::{extremes, torque_mnm};
+    use chalumeau_core::haptics::torque_law::{extremes, torque_mnm};
     use chalumeau_core::reed::ReedTables;
 
     #[test]
@@ -85,7 +90,7 @@ mod tests {
 
     #[test]
     fn each_is_what_it_says() {
-        let torque = |test: FeelTest, deg: f64| torque_mnm(&test.feel(), ReedTables::seed(), deg);
+        let torque = |test: FeelTest, deg: f64| torque_mnm(&test.feel(), ReedTables::reference(), deg);
         assert!((-400..400).all(|deg| torque(FeelTest::Free, f64::from(deg)) == 0.0));
         assert!((torque(FeelTest::Spring, 180.0) - 20.0).abs() < 0.5);
         assert!(torque(FeelTest::Bump, 120.0) > torque(FeelTest::Bump, 100.0) + 10.0);

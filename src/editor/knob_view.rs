@@ -13,7 +13,7 @@ use crate::editor::reed_view::torque_picture;
 use crate::editor::snapshot::{KnobDevice, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
-use chalumeau_core::haptics::law;
+use chalumeau_core::haptics::torque_law;
 use chalumeau_core::reed::ReedTables;
 
 /// Pages of the panel.
@@ -121,7 +121,7 @@ impl KnobView {
             ui.label(RichText::new("The knob is not armed, so it makes no torque.").color(c.beats));
         }
         let feel = test.feel();
-        let torque = |deg: f64| law::torque_mnm(&feel, ReedTables::seed(), deg);
+        let torque = |deg: f64| torque_law::torque_mnm(&feel, ReedTables::reference(), deg);
         let points: Vec<[f64; 2]> =
             (-90..=200).map(|n| 2.0 * f64::from(n)).map(|deg| [deg, torque(deg)]).collect();
         let knob = snapshot.knob.angle_deg.map(f64::from);

@@ -15,7 +15,7 @@ use crate::editor::chart::{Chart, ChartMark};
 use crate::editor::controls::{Hands, choice, handle, heading, slider, switch, teach};
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme::{Colours, GAP, panel};
-use chalumeau_core::haptics::law;
+use chalumeau_core::haptics::torque_law;
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::reed::law::{K_INIT, coupled_k};
 use chalumeau_core::reed::physical::P_REF_PA;
@@ -59,7 +59,7 @@ impl Picture {
     }
 
     fn flow(&self, kpa: f64) -> f64 {
-        self.flow_cm3s * self.law.flow(ReedTables::seed(), kpa / Self::kpa(1.0))
+        self.flow_cm3s * self.law.flow(ReedTables::reference(), kpa / Self::kpa(1.0))
     }
 
     fn peak(&self) -> [f64; 2] {
@@ -335,7 +335,7 @@ pub fn torque_picture(ui: &mut Ui, snapshot: &Snapshot) {
     };
     let (feel, at) = (note.feel, note.landmarks);
     let right = even(1.08 * f64::from(feel.wall_deg).min(1.3 * at.a_close_deg), 60.0);
-    let torque = |deg: f64| law::torque_mnm(&feel, ReedTables::seed(), deg);
+    let torque = |deg: f64| torque_law::torque_mnm(&feel, ReedTables::reference(), deg);
     let ceiling = f64::from(snapshot.knob.ceiling_mnm);
     let points: Vec<[f64; 2]> =
         (0..=POINTS).map(|n| right * n as f64 / POINTS as f64).map(|deg| [deg, torque(deg)]).collect();

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::editor::sound_analysis::SoundAnalysis;
 use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
-use chalumeau_core::haptics::{NoteFeel, Requirement};
+use chalumeau_core::haptics::{NoteFeel, NoteRequirement};
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::units::{SoundingNote, WrittenNote};
 
@@ -31,7 +31,7 @@ pub struct Snapshot {
     /// Mouth pressure, kPa.
     pub mouth_kpa: f32,
     /// The pressures that this fingering needs with this reed; `None` if it cannot sound or is not known yet.
-    pub requirement: Option<Requirement>,
+    pub requirement: Option<NoteRequirement>,
     /// The settings of the parameters.
     pub settings: Settings,
     /// Where breath can come from.

@@ -15,7 +15,7 @@ pub fn teach(ui: &mut Ui, id: &str, how: &str) {
     let c = Colours::here(ui);
     let Some(term) = terms::of(id) else { return };
     ui.set_max_width(300.0);
-    ui.label(egui::RichText::new(term.word).strong());
+    ui.label(egui::RichText::new(term.meaning).strong());
     for (what, text) in [("Sound", term.sound), ("Feel", term.feel)] {
         if !text.is_empty() {
             ui.label(egui::RichText::new(if term.feel.is_empty() {

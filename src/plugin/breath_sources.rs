@@ -2,7 +2,7 @@
 
 use nice_plug::prelude::NoteEvent;
 
-use crate::editor::snapshot::Source;
+use crate::editor::snapshot::BreathSource;
 
 /// An input that breath can come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,7 +37,7 @@ impl BreathInput {
             Self::Expression => "CC11 expression",
             Self::Pressure => "Channel pressure",
             Self::Note => "Note expression",
-            Self::Knob => Source::KNOB,
+            Self::Knob => BreathSource::KNOB,
         }
     }
 

@@ -28,8 +28,8 @@ use crate::plugin::params::ChalumeauParams;
 use chalumeau_core::haptics::FeelTable;
 use chalumeau_core::units::SoundingNote;
 use chalumeau_knob::device::LinkStatus;
-use chalumeau_knob::touch::blower::Hand;
-use chalumeau_knob::touch::feel::Feels;
+use chalumeau_knob::touch::blower::BreathMapping;
+use chalumeau_knob::touch::feel::InstrumentFeel;
 use chalumeau_knob::touch::take::Take;
 use chalumeau_knob::wire::message;
 use knob_controller::KnobController;
@@ -38,7 +38,7 @@ use knob_controller::KnobController;
 const NO_NOTE: u8 = 255;
 
 /// What an instrument requires of the hand, and the feel of each note under the present design and limits.
-type InstrumentFeel = (Arc<Feels>, FeelTable);
+type InstrumentAndFeel = (Arc<InstrumentFeel>, FeelTable);
 
 /// What the threads share about the knob.
 #[derive(Debug)]
@@ -50,7 +50,7 @@ pub struct SharedKnob {
     /// Factors that controllers put on H and k, the bits of f32s.
     reed_factors: [AtomicU32; 2],
     /// The feel in force. Only the controller and the link lock it.
-    feel: Mutex<Option<Arc<InstrumentFeel>>>,
+    feel: Mutex<Option<Arc<InstrumentAndFeel>>>,
     /// A test feel, which replaces the feel of any note. Only the window, the controller and the link lock it.
     test: Mutex<Option<message::Feel>>,
     /// The user has chosen a device, so that even the same choice counts as new.
@@ -118,7 +118,7 @@ impl PluginKnob {
     /// Starts the controller, which starts the link when the user wants a knob. Allocates.
     pub fn start(params: Arc<ChalumeauParams>, instrument: Arc<SharedInstrument>) -> (Self, KnobAudio) {
         let shared = Arc::new(SharedKnob::new());
-        let (hand_in, hand) = triple_buffer::triple_buffer(&Hand::default());
+        let (hand_in, hand) = triple_buffer::triple_buffer(&BreathMapping::default());
         let (take_in, take) = triple_buffer::triple_buffer(&None::<Arc<Take>>);
         let (readers_in, readers) = rtrb::RingBuffer::new(1);
         let controller =

@@ -8,7 +8,7 @@ use std::sync::{Arc, RwLock};
 
 use nice_plug::prelude::*;
 
-use crate::editor::Kept;
+use crate::editor::WindowState;
 use crate::parameters::Number;
 use chalumeau_core::instrument::{Settings, Tuning};
 
@@ -62,7 +62,7 @@ pub struct ChalumeauParams {
     pub instrument_status: Arc<RwLock<String>>,
     /// Size, zoom, theme and view of the window.
     #[persist = "window"]
-    pub window: RwLock<Kept>,
+    pub window: RwLock<WindowState>,
     /// State of the link to the knob as text, written by the link.
     pub knob_status: Arc<RwLock<String>>,
 }

@@ -22,7 +22,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use crate::editor::{Kept, Snapshot};
+use crate::editor::{Snapshot, WindowState};
 use crate::plugin::SharedHandles;
 use crate::plugin::params::ChalumeauParams;
 use editor_app::WindowMemory;
@@ -114,6 +114,6 @@ impl Drop for PluginWindow {
 }
 
 /// What the project keeps of the window.
-fn kept(params: &ChalumeauParams) -> Kept {
-    params.window.read().map_or_else(|_| Kept::default(), |kept| kept.clone()).mended()
+fn kept(params: &ChalumeauParams) -> WindowState {
+    params.window.read().map_or_else(|_| WindowState::default(), |kept| kept.clone()).mended()
 }

@@ -15,7 +15,7 @@ use chalumeau::editor::sound_analysis::SoundAnalyser;
 use chalumeau::editor::{EditorState, Tab, WindowState, draw};
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::event::Event;
-use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, PlayedReed, Requirements, TorqueLimits};
+use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, PlayedReed, RequirementSolver, TorqueLimits};
 use chalumeau_core::instrument::{Clarinet, Probe, Settings, Tuning, felt};
 use chalumeau_core::reed::PhysicalReed;
 use chalumeau_core::units::WrittenNote;
@@ -327,7 +327,7 @@ fn armed_knob(angle_deg: Option<f32>, torque_mnm: Option<f32>) -> KnobState {
 }
 
 /// The feel of a fingering with generous limits, or why there is none.
-fn feel_of(bore: &Requirements, reed: &PlayedReed, fingering: usize) -> Result<NoteFeel, String> {
+fn feel_of(bore: &RequirementSolver, reed: &PlayedReed, fingering: usize) -> Result<NoteFeel, String> {
     let limits = TorqueLimits { ceiling_mnm: 250.0, stiffness_nm_per_rad: 10.0, push_nm_per_rad: 10.0 };
     let table = FeelTable::new(bore, &FeelDesign::default(), reed, &limits);
     table
@@ -373,9 +373,9 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
     let feel = feel_of(&bore, &reed, fingering);
     let angle_deg = feel.as_ref().ok().map(|feel| feel.map.angle_deg(f64::from(mouth_kpa) * 1e3) as f32);
     let torque_mnm = feel.as_ref().ok().zip(angle_deg).map(|(feel, deg)| {
-        chalumeau_core::haptics::law::torque_mnm(
+        chalumeau_core::haptics::torque_law::torque_mnm(
             &feel.feel,
-            chalumeau_core::reed::ReedTables::seed(),
+            chalumeau_core::reed::ReedTables::reference(),
             f64::from(deg),
         ) as f32
     });

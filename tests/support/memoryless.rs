@@ -57,7 +57,7 @@ impl<'a> MemorylessVoice<'a> {
         let tip = Mouth {
             reed: QuasiStaticReed::new(ReedLaw::default(), zeta, model.swept_s, model.coeffs.rate_hz),
             state: QuasiStaticState::default(),
-            tables: ReedTables::seed(),
+            tables: ReedTables::reference(),
             admittance: model.coeffs.tip_admittance(),
             p_mouth: 0.0,
             glide: 0.0,
@@ -172,7 +172,8 @@ pub fn threshold_by_growth(model: &Model, fingering: usize, zeta: f64, f_hz: f64
 /// Steady rms in the mouthpiece of a memoryless reed on a cylinder that loses nothing.
 pub fn raman_rms(gamma: f64, zeta: f64) -> f64 {
     const ROUND_TRIP: usize = 100;
-    let (reed, tables) = (QuasiStaticReed::new(ReedLaw::default(), zeta, 0.0, 96_000.0), ReedTables::seed());
+    let (reed, tables) =
+        (QuasiStaticReed::new(ReedLaw::default(), zeta, 0.0, 96_000.0), ReedTables::reference());
     let mut state = QuasiStaticState::default();
     let mut pipe = [0.0; ROUND_TRIP];
     let mut square = 0.0;

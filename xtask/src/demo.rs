@@ -6,9 +6,10 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use chalumeau_core::instrument::Clarinet;
+use chalumeau_core::measure::notes::{MeasuredNote, NoteMeter, spread};
 use chalumeau_core::score;
+use chalumeau_core::score::NoteSpan;
 use chalumeau_core::score::Score;
-use chalumeau_core::score::heard::{Heard, Listener, Sounding, spread};
 
 use chalumeau_test_host::clap::{At, Plugin};
 use chalumeau_test_host::{artefacts, midi};
@@ -103,11 +104,11 @@ fn comparison(left: &[f32], right: &[f32], rendered: &[f32]) -> String {
 }
 
 fn table(samples: &[f32], score: &Score) -> String {
-    let mut listener = Listener::new(score.soundings(), f64::from(RATE), A4_HZ);
+    let mut listener = NoteMeter::new(score.note_spans(), f64::from(RATE), A4_HZ);
     listener.hear(samples);
     let heard = listener.finish();
     let mut text = "   at   sounds  written   length       Hz    cents   level\n".to_owned();
-    for Heard { sounding: Sounding { note, from, to }, hz, cents, level_dbfs } in &heard {
+    for MeasuredNote { span: NoteSpan { note, from, to }, hz, cents, level_dbfs } in &heard {
         let written = note.written(TRANSPOSITION).map_or_else(String::new, |written| written.to_string());
         let (at_s, length_s) = (*from as f64 / f64::from(RATE), (to - from) as f64 / f64::from(RATE));
         text += &format!("{at_s:5.2}   {:>6}  {written:>7}  {length_s:5.2} s", note.to_string());

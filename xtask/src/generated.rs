@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
-use chalumeau_core::reed::{ReedTables, header};
+use chalumeau_core::reed::{ReedTables, firmware_header as header};
 
 const HEADER: &str = "firmware/include/pressure_table_values.h";
 
@@ -33,7 +33,7 @@ pub fn read(path: &str) -> Result<String> {
 
 /// The reed tables as the firmware's header; checked byte for byte.
 pub fn firmware_header(args: &[String]) -> Result<()> {
-    let text = header::pressure_table_values(ReedTables::seed());
+    let text = header::pressure_table_values(ReedTables::reference());
     if !checking(args)? {
         return write(HEADER, &text);
     }

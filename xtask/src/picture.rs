@@ -8,7 +8,7 @@ use chalumeau_core::event::Event;
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::score::{Score, closing_kpa};
 use chalumeau_figure::palette::Colour;
-use chalumeau_figure::performance::{Note, Performance as Played, outline, performance};
+use chalumeau_figure::performance::{Note, PerformanceFigure as Played, outline, performance};
 use chalumeau_figure::{Axis, Dash, Figure, Line, Panel, draw};
 
 use crate::touch_demo::Performance;
@@ -39,7 +39,7 @@ pub fn write(path: &Path, samples: &[f32], rate_hz: f64, score: &Score, a4_hz: f
         }
         gamma.push(now);
     }
-    let notes = score.soundings().into_iter().map(|sounding| Note {
+    let notes = score.note_spans().into_iter().map(|sounding| Note {
         note: sounding.note,
         from_s: sounding.from as f64 / rate_hz,
         to_s: sounding.to as f64 / rate_hz,

@@ -8,9 +8,9 @@ use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::cells::Cells;
 use chalumeau_core::instrument::held::HeldNote;
 use chalumeau_core::instrument::model::INTERNAL_RATES_HZ;
-use chalumeau_core::instrument::prepare::{self, Prepared, Progress};
-use chalumeau_core::instrument::tuner;
-use chalumeau_core::instrument::tuning::{GAMMA_NODES, NATURAL_GAMMA};
+use chalumeau_core::instrument::prepare::auto_tune;
+use chalumeau_core::instrument::prepare::{self, Preparation, PreparedInstrument, Progress};
+use chalumeau_core::instrument::tuning_table::{GAMMA_NODES, NATURAL_GAMMA};
 use chalumeau_core::instrument::{Model, Quality, Wanted};
 use chalumeau_core::parallel;
 use chalumeau_core::units::cents;
@@ -76,20 +76,20 @@ fn path(instrument: Bundled) -> String {
     format!("crates/core/data/{}.prepared.toml", instrument.data_name())
 }
 
-fn kept(instrument: Bundled) -> Result<Vec<Prepared>> {
-    Ok(prepare::parse_shipped(&read(&path(instrument))?)?)
+fn kept(instrument: Bundled) -> Result<Vec<PreparedInstrument>> {
+    Ok(prepare::parse_generated(&read(&path(instrument))?)?)
 }
 
 /// Puts an entry in its place in the generated file, low rates first.
-fn keep(instrument: Bundled, new: Prepared) -> Result<()> {
+fn keep(instrument: Bundled, new: PreparedInstrument) -> Result<()> {
     let mut all = kept(instrument).unwrap_or_default();
     all.retain(|prepared| prepared.cells.rate_hz != new.cells.rate_hz);
     all.push(new);
     all.sort_by(|a, b| a.cells.rate_hz.total_cmp(&b.cells.rate_hz));
-    write(&path(instrument), &prepare::format_shipped(all)?)
+    write(&path(instrument), &prepare::format_generated(all)?)
 }
 
-fn entry(instrument: Bundled, wanted: &Wanted) -> Result<Prepared> {
+fn entry(instrument: Bundled, wanted: &Wanted) -> Result<PreparedInstrument> {
     let rate_hz = wanted.internal_rate_hz()?;
     let found = kept(instrument)?.into_iter().find(|prepared| prepared.cells.rate_hz == rate_hz);
     found.with_context(|| format!("{} has nothing for {rate_hz} Hz", path(instrument)))
@@ -135,7 +135,7 @@ pub fn fit_bore(args: &[String]) -> Result<()> {
     };
     for (instrument, wanted) in asked.wanted(instruments, qualities) {
         let name = name(instrument, &wanted)?;
-        let fitted = prepare::fitted(&wanted, &mut |progress| {
+        let fitted = Preparation::new(&wanted, None).fitted(&mut |progress| {
             if let Progress::Fitting(share) = progress {
                 tell(&format!("{name}: fitting"), share);
             }
@@ -144,7 +144,7 @@ pub fn fit_bore(args: &[String]) -> Result<()> {
         if asked.check {
             check_fit(&name, &entry(instrument, &wanted)?.cells, &fitted.cells)?;
         } else {
-            keep(instrument, Prepared::of(&fitted))?;
+            keep(instrument, PreparedInstrument::of(&fitted))?;
         }
     }
     Ok(())
@@ -180,9 +180,10 @@ pub fn tune(args: &[String]) -> Result<()> {
             tell(&format!("{name}: tuning"), share);
             ControlFlow::Continue(())
         };
-        let offsets = tuner::offsets(&model, &mut |_| ControlFlow::Continue(())).context("not cancelled")?;
-        let tuning = tuner::tune(&model, &offsets, &mut on).context("not cancelled")?;
-        keep(instrument, Prepared::of(&Model { tuning, ..model }))?;
+        let offsets =
+            auto_tune::offsets(&model, &mut |_| ControlFlow::Continue(())).context("not cancelled")?;
+        let tuning = auto_tune::tune(&model, &offsets, &mut on).context("not cancelled")?;
+        keep(instrument, PreparedInstrument::of(&Model { tuning, ..model }))?;
     }
     Ok(())
 }
@@ -198,7 +199,7 @@ fn check_tuning(name: &str, model: &Model, every: usize) -> Result<()> {
         let mut worst = (0.0_f64, String::new());
         for (gamma, rows) in trims {
             let held = HeldNote { rows, ..HeldNote::new(model, fingering, gamma) };
-            let hz = tuner::heard_hz(model, &held, model.notes_hz[fingering])?;
+            let hz = auto_tune::heard_hz(model, &held, model.notes_hz[fingering])?;
             let off = cents(hz, model.notes_hz[fingering]);
             if off.abs() > worst.0.abs() {
                 worst =

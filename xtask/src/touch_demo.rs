@@ -10,7 +10,7 @@ use chalumeau_core::event::Event;
 use chalumeau_core::haptics::{FeelDesign, FeelTable, TorqueLimits};
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::score::Score;
-use chalumeau_knob::touch::feel::Feels;
+use chalumeau_knob::touch::feel::InstrumentFeel;
 
 use chalumeau_test_host::clap::{At, Plugin, Say, Session};
 use chalumeau_test_host::knob_setup::{connect, wait_until_live};
@@ -41,7 +41,7 @@ pub struct Performance {
 
 /// Plays the notes of a score through the plugin, its breath through the knob.
 pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -> Result<Performance> {
-    let feels = Feels::built_in().map_err(|reason| anyhow!("{reason}"))?;
+    let feels = InstrumentFeel::built_in().map_err(|reason| anyhow!("{reason}"))?;
     let table = feels.table(&Settings::default(), &FeelDesign::default(), &TorqueLimits::default())?;
     let hand = folder.join("hand.csv");
     std::fs::write(&hand, script(score, &feels, &table, rate))?;
@@ -118,7 +118,7 @@ fn breath_sent(session: &Session, first: usize, rate_hz: f64) -> Vec<[f64; 2]> {
 }
 
 /// What the hand does: for each moment the angle that blows what the score asks of the note in the fingers.
-fn script(score: &Score, feels: &Feels, table: &FeelTable, rate: u32) -> String {
+fn script(score: &Score, feels: &InstrumentFeel, table: &FeelTable, rate: u32) -> String {
     let full_pa = 1e3 * f64::from(Settings::default().breath_full_kpa);
     let maps = feels.maps(table);
     let mut angles = Vec::new();
@@ -158,7 +158,7 @@ fn script(score: &Score, feels: &Feels, table: &FeelTable, rate: u32) -> String 
 }
 
 /// Where each note's threshold lies, in degrees and as gamma.
-fn threshold(score: &Score, feels: &Feels, table: &FeelTable, rate: u32) -> Vec<[f64; 3]> {
+fn threshold(score: &Score, feels: &InstrumentFeel, table: &FeelTable, rate: u32) -> Vec<[f64; 3]> {
     let note_ons = score.events.iter().filter_map(|event| match event.event {
         Event::NoteOn { note, .. } => Some((event.at, note)),
         _ => None,

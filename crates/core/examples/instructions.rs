@@ -12,7 +12,7 @@ use std::hint::black_box;
 
 use chalumeau_core::event::Event;
 use chalumeau_core::instrument::Clarinet;
-use chalumeau_core::instrument::watch::{MOMENTS, Moment};
+use chalumeau_core::instrument::scope::{SCOPE_SAMPLES, ScopeSample};
 use chalumeau_core::units::WrittenNote;
 
 /// Samples per call, as a host at a common setting would ask for.
@@ -30,7 +30,7 @@ fn thread_cpu_ns() -> Option<f64> {
 /// What a screen is told of a block.
 struct Screen {
     heard: [f32; BLOCK],
-    moments: [Moment; MOMENTS],
+    moments: [ScopeSample; SCOPE_SAMPLES],
     /// Number of the last picture.
     shown: u64,
 }
@@ -38,7 +38,7 @@ struct Screen {
 impl Screen {
     fn see(&mut self, clarinet: &Clarinet, block: &[f32; BLOCK]) {
         self.heard.copy_from_slice(black_box(block));
-        let picture = clarinet.watch().picture().filter(|&(number, _)| number != self.shown);
+        let picture = clarinet.scope().capture().filter(|&(number, _)| number != self.shown);
         if let Some((number, moments)) = picture {
             self.shown = number;
             self.moments.copy_from_slice(black_box(moments));
@@ -66,8 +66,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     clarinet.apply(Event::Bend { cents: bend_cents });
     clarinet.apply(Event::Breath(0.5));
     clarinet.apply(Event::NoteOn { note, velocity: 0.8 });
-    clarinet.set_watched(watched);
-    let mut screen = Screen { heard: [0.0; BLOCK], moments: [Moment::default(); MOMENTS], shown: 0 };
+    clarinet.set_scope_on(watched);
+    let mut screen =
+        Screen { heard: [0.0; BLOCK], moments: [ScopeSample::default(); SCOPE_SAMPLES], shown: 0 };
 
     let mut block = [0.0; BLOCK];
     let mut checksum = 0_u32;

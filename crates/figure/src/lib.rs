@@ -13,7 +13,7 @@
 //! let reed = ReedLaw::default();
 //! let curve: Vec<(f64, f64)> = (0..=100)
 //!     .map(|n| f64::from(n) / 100.0)
-//!     .map(|p| (p, reed.flow(ReedTables::seed(), p)))
+//!     .map(|p| (p, reed.flow(ReedTables::reference(), p)))
 //!     .collect();
 //! let panel = Panel::new("", Axis::linear("pressure difference p"), Axis::linear("flow u"))
 //!     .with(Mark::new(Direction::X, reed.peak_at(), "peak"))

@@ -70,7 +70,7 @@ pub(crate) const FLOW: &str = "flow u";
 
 /// Flow from `low` to `high`; closely spaced about 0, where it rises steeply.
 pub(crate) fn curve(law: ReedLaw, low: f64, high: f64) -> Vec<(f64, f64)> {
-    let tables = ReedTables::seed();
+    let tables = ReedTables::reference();
     let mut points: Vec<f64> = (0..=POINTS).map(|n| low + (high - low) * n as f64 / POINTS as f64).collect();
     points.extend((-30_i32..=30).map(|n| f64::from(n * n.abs()) * 2e-5).filter(|p| (low..=high).contains(p)));
     points.extend([law.peak_at(), law.closing()].into_iter().filter(|p| (low..=high).contains(p)));

@@ -49,7 +49,7 @@ pub fn figure(instrument: &str, embouchures: &[Thresholds], chosen: usize, reeds
             .with(Points::new("", points).colour(colour).size(0.8 * width + 1.5));
     }
 
-    let (law, tables) = (ReedLaw::default(), ReedTables::seed());
+    let (law, tables) = (ReedLaw::default(), ReedTables::reference());
     let finite = own.iter().map(|&(_, gamma)| gamma).filter(|gamma| gamma.is_finite());
     let (low, high) = finite
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), gamma| (low.min(gamma), high.max(gamma)));

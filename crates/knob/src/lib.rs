@@ -12,7 +12,7 @@
 //! use chalumeau_knob::wire::{Decoder, DeviceState, Feel, Law, Message, encode};
 //!
 //! // Host to knob: a flow law with 90 mNm per unit of flow. These bytes go to the serial port.
-//! let feel = Message::Feel(Feel { law: Law::Flow, scale_mnm: 90.0, ..Feel::default() });
+//! let feel = Message::Feel(Feel { law: TorqueLaw::Flow, scale_mnm: 90.0, ..Feel::default() });
 //! feel.check()?;
 //! let frame = encode(&feel, 7);
 //! assert_eq!((frame[0], frame[frame.len() - 1]), (0, 0));

@@ -13,7 +13,9 @@ mod payload;
 pub use codes::{FaultCode, RefusedCode};
 pub use frame::{Decoder, EncodedFrame, FrameError, WireStats, encode};
 pub use limits::{FieldRange, OutOfRange};
-pub use message::{Arm, Capabilities, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Law, Message};
+pub use message::{
+    Arm, Capabilities, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Message, TorqueLaw,
+};
 
 /// Version of the protocol spoken here: another major one is never armed.
 pub const MAJOR: u8 = 1;

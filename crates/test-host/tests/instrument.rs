@@ -178,7 +178,7 @@ fn a_file_that_is_none_is_said_and_the_instrument_before_plays_on() {
     // Chosen by hand while it is away.
     std::fs::remove_file(&path).unwrap();
     let seen = wait(&mut plugin, &mut session, "cannot read");
-    assert!(seen.last().unwrap().ends_with("still pipe"), "{seen:?}");
+    assert!(seen.last().unwrap().ends_with("still playing pipe"), "{seen:?}");
     plugin.deactivate(session);
 }
 

@@ -15,8 +15,8 @@ use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::haptics::FeelDesign;
 use chalumeau_core::instrument::{Clarinet, Settings};
 use chalumeau_core::units::{SoundingNote, cents};
-use chalumeau_knob::touch::blower::{Blower, Blown, Hand};
-use chalumeau_knob::touch::feel::{Feels, NO_MOTOR};
+use chalumeau_knob::touch::blower::{Blower, BlownEvents, BreathMapping};
+use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::touch::take::Take;
 use chalumeau_test_host::clap::{At, Say};
 use chalumeau_test_host::knob_setup::{connect, edit, wait_until_live};
@@ -201,9 +201,9 @@ fn a_take_is_replayed_the_same_by_plugin_and_renderer() {
     let second = plugin.play(RATE, 77, &said, 2 * SECOND).unwrap();
     assert!(first == second, "two bounces of a take differ");
 
-    let feels = Feels::built_in().unwrap();
+    let feels = InstrumentFeel::built_in().unwrap();
     let table = feels.table(&Settings::default(), &FeelDesign::default(), &NO_MOTOR).unwrap();
-    let hand = Hand { maps: feels.maps(&table), design: KnobDesign::default(), feels: true };
+    let hand = BreathMapping { maps: feels.maps(&table), design: KnobDesign::default(), feels: true };
     let take = Take::read(std::fs::File::open(&path).unwrap()).unwrap();
     let note =
         |at, key| Timed { at, event: Event::NoteOn { note: SoundingNote(key), velocity: 100.0 / 127.0 } };
@@ -211,7 +211,7 @@ fn a_take_is_replayed_the_same_by_plugin_and_renderer() {
     let mut ignore = |_, _| {};
     let angle = |at: usize| Some(take.angle_deg(at as f64 / RATE));
     let notes = [note(0, 60), note(SECOND, 67)].into_iter();
-    let events = Blown::new(notes, &mut blower, &hand, 6_000.0, 2 * SECOND, angle, &mut ignore);
+    let events = BlownEvents::new(notes, &mut blower, &hand, 6_000.0, 2 * SECOND, angle, &mut ignore);
     let mut rendered = vec![0.0; 2 * SECOND];
     Clarinet::built_in(RATE).unwrap().render_events(events, &mut rendered);
     assert!(level_db(&rendered) > -60.0);

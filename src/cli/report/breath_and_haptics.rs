@@ -2,25 +2,25 @@
 
 use crate::cli::report::{number, word};
 use crate::cli::score_args::RenderJob;
-use chalumeau_core::haptics::law::torque_mnm;
-use chalumeau_core::haptics::{FeelDesign, FeelRefused, FeelTable, NoteFeel, Requirement, TorqueLimits};
+use chalumeau_core::haptics::torque_law::torque_mnm;
+use chalumeau_core::haptics::{FeelDesign, FeelRefused, FeelTable, NoteFeel, NoteRequirement, TorqueLimits};
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::instrument::felt::played_reed;
+use chalumeau_core::measure::bifurcation;
+use chalumeau_core::measure::bifurcation::SOUNDING_RMS;
 use chalumeau_core::reed::ReedTables;
-use chalumeau_core::score::bifurcation;
-use chalumeau_core::score::bifurcation::SOUNDS;
 use chalumeau_core::score::breath::GAMMA_MAX;
 use chalumeau_core::units::WrittenNote;
 use chalumeau_figure::breath::{NotePressures, Swell, Turn, pressures, turns};
 use chalumeau_figure::felt::{AtContrast, FeltThresholds, Torque, thresholds, torques};
 use chalumeau_figure::report::{Chapter, Plate, ReportTable, TableCell};
-use chalumeau_knob::touch::feel::Feels;
-use chalumeau_knob::wire::message::Law;
+use chalumeau_knob::touch::feel::InstrumentFeel;
+use chalumeau_knob::wire::message::TorqueLaw;
 
 /// Contrasts shown.
 const CONTRASTS: [f64; 3] = [1.0, 3.0, 5.0];
 /// Both laws that push.
-const LAWS: [Law; 2] = [Law::Flow, Law::Pressure];
+const LAWS: [TorqueLaw; 2] = [TorqueLaw::Flow, TorqueLaw::Pressure];
 /// Greatest mouth pressure of the instrument, kPa.
 const MOST_KPA: f64 = 20.0;
 /// The crescendo goes to this many times the pressure at which the note chokes.
@@ -32,19 +32,19 @@ const POINTS: usize = 400;
 /// A mode that starts at this many times the pressure of the first belongs to another register.
 const LATER: f64 = 1.01;
 
-fn law_name(law: Law) -> &'static str {
+fn law_name(law: TorqueLaw) -> &'static str {
     match law {
-        Law::Flow => "flow",
-        Law::Pressure => "pressure",
-        Law::Free => "free",
+        TorqueLaw::Flow => "flow",
+        TorqueLaw::Pressure => "pressure",
+        TorqueLaw::Free => "free",
     }
 }
 
 /// The pressures that the notes need, and the feel made from them.
 pub struct BreathAndHaptics<'a> {
     prepared: &'a RenderJob,
-    feels: Feels,
-    asked: Vec<Option<Requirement>>,
+    feels: InstrumentFeel,
+    asked: Vec<Option<NoteRequirement>>,
     /// As the command says.
     design: FeelDesign,
     limits: TorqueLimits,
@@ -55,7 +55,7 @@ pub struct BreathAndHaptics<'a> {
 impl<'a> BreathAndHaptics<'a> {
     /// Analyses the instrument (about 1 s). `near` is the written note to swell.
     pub fn new(prepared: &'a RenderJob, design: FeelDesign, near: Option<WrittenNote>) -> Self {
-        let feels = Feels::new(&prepared.model);
+        let feels = InstrumentFeel::new(&prepared.model);
         let asked = feels.requirements().with(&played_reed(&prepared.model.file, &prepared.settings));
         let near = near.and_then(|near| feels.requirements().written().position(|written| written == near));
         let first = asked.iter().position(Option::is_some);
@@ -67,7 +67,7 @@ impl<'a> BreathAndHaptics<'a> {
         1e-3 * self.prepared.settings.closing_pa()
     }
 
-    fn notes(&self) -> impl Iterator<Item = (WrittenNote, Option<Requirement>)> + '_ {
+    fn notes(&self) -> impl Iterator<Item = (WrittenNote, Option<NoteRequirement>)> + '_ {
         self.feels.requirements().written().zip(self.asked.iter().copied())
     }
 
@@ -83,8 +83,8 @@ impl<'a> BreathAndHaptics<'a> {
         )
     }
 
-    fn changes(&self, (written, asked): (WrittenNote, Option<Requirement>)) -> NotePressures {
-        let of = |gamma: fn(&Requirement) -> f64| {
+    fn changes(&self, (written, asked): (WrittenNote, Option<NoteRequirement>)) -> NotePressures {
+        let of = |gamma: fn(&NoteRequirement) -> f64| {
             asked.as_ref().map_or(f64::NAN, |asked| self.closing_kpa() * gamma(asked))
         };
         NotePressures {
@@ -140,12 +140,12 @@ impl<'a> BreathAndHaptics<'a> {
         let model = &self.prepared.model;
         let played = bifurcation::measure(model, &settings, sounding, gamma as f32, SWELL_S, rate, |_| {});
         let at = |share: f64| share * SWELL_S;
-        let moment = |t_s: f64, point: &bifurcation::Point| {
+        let moment = |t_s: f64, point: &bifurcation::RampPoint| {
             [t_s, closing_kpa * point.gamma, closing_kpa * point.rms, point.shut]
         };
         let up = played.up.iter().map(|point| moment(at(point.gamma / gamma), point));
         let down = played.down.iter().map(|point| moment(at(2.0 - point.gamma / gamma), point));
-        let found = played.changes();
+        let found = played.transitions();
         let said = |gamma: Option<f64>, what: &str| {
             gamma.map(|gamma| format!("{what} {:.2} kPa", closing_kpa * gamma))
         };
@@ -168,7 +168,7 @@ impl<'a> BreathAndHaptics<'a> {
                 closing_kpa,
                 changes: Some(changes),
                 course: up.chain(down).collect(),
-                sounds_kpa: SOUNDS * closing_kpa,
+                sounds_kpa: SOUNDING_RMS * closing_kpa,
             }
             .figure(),
             caption: format!("Written {written}, blown from nothing to beyond closure and back."),
@@ -241,7 +241,7 @@ impl<'a> BreathAndHaptics<'a> {
         ];
         let file = &self.prepared.model.file;
         let closing_kpa = self.closing_kpa();
-        let row = |(written, asked): (WrittenNote, Option<Requirement>)| {
+        let row = |(written, asked): (WrittenNote, Option<NoteRequirement>)| {
             let mut row = vec![
                 word(written.to_string()),
                 word(written.sounding(file.transposition).map_or(String::new(), |note| note.to_string())),
@@ -316,14 +316,14 @@ impl<'a> BreathAndHaptics<'a> {
         Chapter { title: "Haptics".to_owned(), words, plates, tables }
     }
 
-    fn torques(&self, law: Law, panels: &[AtContrast]) -> Plate {
+    fn torques(&self, law: TorqueLaw, panels: &[AtContrast]) -> Plate {
         let name = law_name(law);
         let said: Vec<String> = panels
             .iter()
             .filter_map(|at| at.notes.as_ref().err().map(|why| format!("Contrast {}: {why}.", at.contrast)))
             .collect();
         let shape = match law {
-            Law::Flow => "It rises to the threshold and falls to nothing where the reed shuts.",
+            TorqueLaw::Flow => "It rises to the threshold and falls to nothing where the reed shuts.",
             _ => "A spring with a step at the threshold.",
         };
         Plate {
@@ -382,7 +382,7 @@ impl<'a> BreathAndHaptics<'a> {
             let degrees = [at.a_on_deg, at.a_beat_deg, at.a_close_deg, at.a_off_deg];
             let mut row = vec![word(note.written.to_string())];
             row.extend(degrees.map(|deg| number(format!("{deg:.1}"))));
-            row.push(number(format!("{:.1}", torque_mnm(&note.feel, ReedTables::seed(), at.a_on_deg))));
+            row.push(number(format!("{:.1}", torque_mnm(&note.feel, ReedTables::reference(), at.a_on_deg))));
             row.push(number(format!("{:.1}", note.feel.scale_mnm)));
             row
         };
@@ -462,7 +462,7 @@ fn range(changes: &[NotePressures]) -> String {
 
 /// The torque of a note, as the firmware makes it.
 fn torque(note: &NoteFeel) -> Torque {
-    let tables = ReedTables::seed();
+    let tables = ReedTables::reference();
     let at = |deg: f64| (deg, torque_mnm(&note.feel, tables, deg));
     let (from, to) = (-150.0, f64::from(note.feel.wall_deg) + 10.0);
     Torque {
@@ -476,10 +476,10 @@ fn torque(note: &NoteFeel) -> Torque {
 /// Mouth pressure at the mark of a note's torque, found on its curve: the top under flow, else its steepest rise.
 fn marked_kpa(note: &NoteFeel) -> f64 {
     const STEP_DEG: f64 = 0.25;
-    let tables = ReedTables::seed();
+    let tables = ReedTables::reference();
     let mnm = |deg: f64| torque_mnm(&note.feel, tables, deg);
     let rise = |deg: f64| mnm(deg + STEP_DEG) - mnm(deg - STEP_DEG);
-    let value = |deg: f64| if note.feel.law == Law::Flow { mnm(deg) } else { rise(deg) };
+    let value = |deg: f64| if note.feel.law == TorqueLaw::Flow { mnm(deg) } else { rise(deg) };
     let steps = (note.landmarks.a_close_deg / STEP_DEG) as usize;
     let degrees = (4..steps).map(|step| STEP_DEG * step as f64);
     let mark = degrees.max_by(|&a, &b| value(a).total_cmp(&value(b))).unwrap_or(0.0);

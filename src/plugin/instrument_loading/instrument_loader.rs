@@ -17,7 +17,7 @@ use super::{
 };
 use crate::cache::Cache;
 use crate::plugin::params::ChalumeauParams;
-use chalumeau_core::instrument::prepare::{Progress, make};
+use chalumeau_core::instrument::prepare::{Preparation, Progress};
 use chalumeau_core::instrument::{BuildError, Clarinet, Model};
 
 /// How often the thread looks at the parameters.
@@ -131,7 +131,8 @@ impl InstrumentLoader {
         let cache = Cache::store(self.cache.as_ref());
         let (mut model, mut readiness) = request.available_now(cache)?;
         if offline && readiness < Readiness::Tuned {
-            let made = make(&request.wanted(request.file()?), cache, &mut |progress| {
+            let wanted = request.wanted(request.file()?);
+            let made = Preparation::new(&wanted, cache).tuned(&mut |progress| {
                 report(&self.params, &progress_text(progress));
                 ControlFlow::Continue(())
             });
@@ -311,7 +312,7 @@ impl LoaderThread {
         let (send, news) = mpsc::channel();
         let stop = cancelled.clone();
         let work = move || {
-            let made = make(&wanted, Cache::store(cache.as_ref()), &mut |progress| {
+            let made = Preparation::new(&wanted, Cache::store(cache.as_ref())).tuned(&mut |progress| {
                 let sent = match progress {
                     Progress::Fitted(model) => send.send(FittingNews::Fitted(model.clone())),
                     shares => send.send(FittingNews::Progress(progress_text(shares))),

@@ -9,7 +9,7 @@ use crate::plugin::params::instrument::InstrumentChoice;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::instrument::model::A4_HZ;
-use chalumeau_core::instrument::prepare::{A4_BY_DELAY_HZ, Quality, Wanted, ready, rough};
+use chalumeau_core::instrument::prepare::{A4_BY_DELAY_HZ, Preparation, Quality, Wanted};
 use chalumeau_core::instrument::store::Store;
 use chalumeau_core::instrument::{BuildError, Model};
 
@@ -118,12 +118,12 @@ impl InstrumentRequest {
         let wanted = self.wanted(self.file()?);
         let at_440 = Wanted { a4_hz: A4_HZ, ..wanted.clone() };
         let built = || {
-            if let Some(model) = ready(&wanted, cache)? {
+            if let Some(model) = Preparation::new(&wanted, cache).ready()? {
                 return Ok((model, Readiness::Tuned));
             }
-            match ready(&at_440, cache)? {
+            match Preparation::new(&at_440, cache).ready()? {
                 Some(model) => Ok((model, Readiness::OtherA4)),
-                None => Ok((rough(&wanted)?, Readiness::Rough)),
+                None => Ok((Preparation::new(&wanted, None).rough()?, Readiness::Rough)),
             }
         };
         built().map_err(|reason: BuildError| reason.to_string())

@@ -91,8 +91,8 @@ impl InstrumentSwap {
     }
 
     /// Switches on or off that the instrument keeps its last moments for the window.
-    pub fn set_watched(&mut self, on: bool) {
-        self.playing.set_watched(on);
+    pub fn set_scope_on(&mut self, on: bool) {
+        self.playing.set_scope_on(on);
     }
 
     /// The host's sample rate, Hz.
@@ -218,7 +218,7 @@ mod tests {
     use super::*;
     use chalumeau_core::bore::bundled::Bundled;
     use chalumeau_core::instrument::Model;
-    use chalumeau_core::instrument::prepare::{Wanted, rough};
+    use chalumeau_core::instrument::prepare::{Preparation, Wanted};
     use chalumeau_core::units::SoundingNote;
 
     const RATE: f64 = 48_000.0;
@@ -271,7 +271,7 @@ mod tests {
 
     #[test]
     fn a_note_goes_on_over_an_exchange_without_a_click_or_a_gap() {
-        let another = rough(&Wanted::new(Bundled::A.file(), RATE)).unwrap();
+        let another = Preparation::new(&Wanted::new(Bundled::A.file(), RATE), None).rough().unwrap();
         for model in [Model::built_in(RATE).unwrap(), another] {
             let (sound, mut ends) = exchanged(model, 240);
             let own = largest_step(&sound[AT / 2..AT]).max(largest_step(&sound[3 * AT..]));

@@ -3,9 +3,9 @@
 use crate::plugin::params::KnobParams;
 use crate::plugin::params::knob::{Calibration, LawChoice, OrderChoice};
 use chalumeau_core::control::knob::KnobDesign;
-use chalumeau_core::haptics::{FeelDesign, Order};
+use chalumeau_core::haptics::{FeelDesign, NoteOrder};
 use chalumeau_core::units::WrittenNote;
-use chalumeau_knob::wire::Law;
+use chalumeau_knob::wire::TorqueLaw;
 
 /// Highest torque of the reference note in a study, mNm. With it, both sides of every trial stay under the first ceiling
 /// at the default contrast (the test below checks this).
@@ -16,16 +16,16 @@ pub fn feel_design(knob: &KnobParams) -> FeelDesign {
     let calibration = knob.calibration.read().map_or_else(|_| Calibration::default(), |c| c.mended());
     FeelDesign {
         law: match knob.law.value() {
-            LawChoice::Flow => Law::Flow,
-            LawChoice::Pressure => Law::Pressure,
-            LawChoice::Free => Law::Free,
+            LawChoice::Flow => TorqueLaw::Flow,
+            LawChoice::Pressure => TorqueLaw::Pressure,
+            LawChoice::Free => TorqueLaw::Free,
         },
         reference: u8::try_from(knob.reference.value()).ok().map(WrittenNote),
         contrast: f64::from(knob.contrast.value()),
         order: match knob.order.value() {
-            OrderChoice::Physical => Order::Physical,
-            OrderChoice::CoveredHoles => Order::CoveredHoles,
-            OrderChoice::OpenHoles => Order::CoveredHolesReversed,
+            OrderChoice::Physical => NoteOrder::Physical,
+            OrderChoice::CoveredHoles => NoteOrder::CoveredHoles,
+            OrderChoice::OpenHoles => NoteOrder::CoveredHolesReversed,
         },
         strength_mnm: match knob.study() {
             Some(_) => f64::from(knob.torque.value()).min(STUDY_MNM),
@@ -50,12 +50,12 @@ mod tests {
     use super::*;
     use chalumeau_core::haptics::TorqueLimits;
     use chalumeau_core::instrument::Settings;
-    use chalumeau_knob::touch::feel::Feels;
+    use chalumeau_knob::touch::feel::InstrumentFeel;
     use chalumeau_knob::touch::study::{Condition, TRIALS, plan};
 
     #[test]
     fn both_sides_of_every_trial_can_be_felt_under_the_first_ceiling() {
-        let feels = Feels::built_in().unwrap();
+        let feels = InstrumentFeel::built_in().unwrap();
         for trial in plan(1, 1).iter().chain(&plan(2, 1)) {
             for condition in [Condition::Coupled, Condition::Free] {
                 let settings = Settings {

@@ -13,7 +13,7 @@ use chalumeau_core::control::knob::slap_strength;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::Settings;
 use chalumeau_knob::device::KnobReader;
-use chalumeau_knob::touch::blower::{Blower, Blown, Breath14, GRID, Hand};
+use chalumeau_knob::touch::blower::{Blower, BlownEvents, Breath14, BreathMapping, GRID};
 use chalumeau_knob::touch::feel::NO_MOTOR;
 use chalumeau_knob::touch::take::Take;
 
@@ -36,7 +36,7 @@ pub struct KnobAudio {
     shared: Arc<SharedKnob>,
     readers: rtrb::Consumer<KnobReader>,
     reader: Option<KnobReader>,
-    hand: triple_buffer::Output<Hand>,
+    hand: triple_buffer::Output<BreathMapping>,
     take: triple_buffer::Output<Option<Arc<Take>>>,
     blower: Blower,
     breath_from: BlockBreath,
@@ -49,7 +49,7 @@ pub struct KnobAudio {
 
 /// What a replay needs from its first sample.
 struct PreparedReplay {
-    hand: Hand,
+    hand: BreathMapping,
     take: Arc<Take>,
 }
 
@@ -83,7 +83,7 @@ impl KnobAudio {
     pub(super) fn new(
         shared: Arc<SharedKnob>,
         readers: rtrb::Consumer<KnobReader>,
-        hand: triple_buffer::Output<Hand>,
+        hand: triple_buffer::Output<BreathMapping>,
         take: triple_buffer::Output<Option<Arc<Take>>>,
     ) -> Self {
         Self {
@@ -115,7 +115,7 @@ impl KnobAudio {
         let Ok(table) = feels.table(&params.settings(), &feel_design(&params.knob), &NO_MOTOR) else {
             return;
         };
-        let hand = Hand { maps: feels.maps(&table), design: knob_design(&params.knob), feels: true };
+        let hand = BreathMapping { maps: feels.maps(&table), design: knob_design(&params.knob), feels: true };
         self.prepared = Some(PreparedReplay { hand, take });
     }
 
@@ -179,7 +179,7 @@ impl KnobAudio {
             (BlockBreath::Take, Some(take), _) => {
                 let begun = self.replayed;
                 let angle = |at: usize| Some(take.angle_deg((begun + at as u64) as f64 / context.rate_hz));
-                let events = Blown::new(host, blower, hand, full_pa, samples, angle, &mut on_breath);
+                let events = BlownEvents::new(host, blower, hand, full_pa, samples, angle, &mut on_breath);
                 instrument.render_events(events, out);
                 self.replayed += samples as u64;
             }
@@ -189,7 +189,7 @@ impl KnobAudio {
                     event: Event::TongueSlap { strength: slap_strength(speed) },
                 });
                 let angle = |at: usize| reader.pose(at).map(|pose| f64::from(pose.angle_deg));
-                let events = Blown::new(host, blower, hand, full_pa, samples, angle, &mut on_breath);
+                let events = BlownEvents::new(host, blower, hand, full_pa, samples, angle, &mut on_breath);
                 instrument.render_events(slap.into_iter().chain(events), out);
             }
             _ => {

@@ -17,11 +17,11 @@ use chalumeau_core::haptics::{FeelDesign, TorqueLimits};
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::units::WrittenNote;
 use chalumeau_knob::device::{
-    Choice, Hooks, KnobLink, KnobReader, LinkStatus, StateSample, serial_number, serial_text,
+    Hooks, KnobChoice, KnobLink, KnobReader, LinkStatus, StateSample, serial_number, serial_text,
 };
-use chalumeau_knob::touch::blower::Hand;
-use chalumeau_knob::touch::feel::Feels;
-use chalumeau_knob::touch::take::{Moment, Take};
+use chalumeau_knob::touch::blower::BreathMapping;
+use chalumeau_knob::touch::feel::InstrumentFeel;
+use chalumeau_knob::touch::take::{Take, TakeRow};
 
 /// Time between two cycles of the thread.
 const CYCLE: Duration = Duration::from_millis(10);
@@ -33,19 +33,19 @@ pub struct KnobController {
     instrument: Arc<SharedInstrument>,
     feels_cache: FeelsCache,
     readers: rtrb::Producer<KnobReader>,
-    hand_in: triple_buffer::Input<Hand>,
-    hand: Hand,
+    hand_in: triple_buffer::Input<BreathMapping>,
+    hand: BreathMapping,
     take: triple_buffer::Input<Option<Arc<Take>>>,
     /// What the feel in force was computed from.
-    feel_inputs: Option<(Arc<Feels>, Settings, FeelDesign, TorqueLimits)>,
+    feel_inputs: Option<(Arc<InstrumentFeel>, Settings, FeelDesign, TorqueLimits)>,
     /// Why the latest feel was refused.
     refused: Option<String>,
     /// A warning that full breath does not reach the closing pressure.
     short_breath: Option<String>,
     link: Option<KnobLink>,
-    choice: Choice,
+    choice: KnobChoice,
     /// Rows that the link's thread sends.
-    rows: (mpsc::Sender<Moment>, mpsc::Receiver<Moment>),
+    rows: (mpsc::Sender<TakeRow>, mpsc::Receiver<TakeRow>),
     recorder: TakeRecorder,
     /// The take that is replayed; empty for none.
     replay_path: String,
@@ -61,7 +61,7 @@ impl KnobController {
         shared: Arc<SharedKnob>,
         instrument: Arc<SharedInstrument>,
         readers: rtrb::Producer<KnobReader>,
-        hand_in: triple_buffer::Input<Hand>,
+        hand_in: triple_buffer::Input<BreathMapping>,
         take: triple_buffer::Input<Option<Arc<Take>>>,
     ) -> Self {
         Self {
@@ -71,13 +71,13 @@ impl KnobController {
             feels_cache: FeelsCache::default(),
             readers,
             hand_in,
-            hand: Hand::default(),
+            hand: BreathMapping::default(),
             take,
             feel_inputs: None,
             refused: None,
             short_breath: None,
             link: None,
-            choice: Choice::Off,
+            choice: KnobChoice::Off,
             rows: mpsc::channel(),
             recorder: TakeRecorder::default(),
             replay_path: String::new(),
@@ -102,7 +102,7 @@ impl KnobController {
         let params = self.params.clone();
         let knob = &params.knob;
         self.choose_device(knob);
-        if self.choice != Choice::Off || knob.replay.value() {
+        if self.choice != KnobChoice::Off || knob.replay.value() {
             let status = self.link.as_ref().map(KnobLink::status);
             self.update_feel(&params, status.as_ref());
         }
@@ -114,7 +114,7 @@ impl KnobController {
         }
         let rows = self.received();
         self.calibrate(&rows, knob);
-        self.record(&rows, knob.record.value() && self.choice != Choice::Off);
+        self.record(&rows, knob.record.value() && self.choice != KnobChoice::Off);
         self.remember_serial(status.as_ref());
         self.report(status.as_ref());
         if let Ok(mut shown) = self.shared.status.lock() {
@@ -126,27 +126,27 @@ impl KnobController {
     fn choose_device(&mut self, knob: &KnobParams) {
         let remembered = knob.serial.read().map_or(None, |text| serial_number(&text));
         let wanted = match knob.kind.value() {
-            KnobKind::Off => Choice::Off,
-            KnobKind::Serial => Choice::Serial { serial: remembered },
+            KnobKind::Off => KnobChoice::Off,
+            KnobKind::Serial => KnobChoice::Serial { serial: remembered },
             KnobKind::Midi => {
                 let name = knob.midi_port.read().map_or_else(|_| String::new(), |name| name.clone());
-                Choice::Midi { name: (!name.is_empty()).then_some(name) }
+                KnobChoice::Midi { name: (!name.is_empty()).then_some(name) }
             }
             KnobKind::Osc => {
                 let port = u16::try_from(knob.osc_port.value()).unwrap_or(8_000);
-                Choice::Osc { port, any_address: knob.osc_any.value() }
+                KnobChoice::Osc { port, any_address: knob.osc_any.value() }
             }
         };
         let chosen_again = self.shared.device_chosen.swap(false, Ordering::Relaxed);
         // The serial number that the linked device has told is not a new choice.
         let same = match (&self.choice, &wanted) {
-            (Choice::Serial { serial: None }, Choice::Serial { .. }) => !chosen_again,
+            (KnobChoice::Serial { serial: None }, KnobChoice::Serial { .. }) => !chosen_again,
             (before, after) => before == after,
         };
         if same {
             return;
         }
-        if wanted == Choice::Off {
+        if wanted == KnobChoice::Off {
             // A user who switches off and on again asks for another device.
             if let Ok(mut serial) = knob.serial.write() {
                 serial.clear();
@@ -179,7 +179,7 @@ impl KnobController {
         let (shared, rows) = (self.shared.clone(), self.rows.0.clone());
         let instrument = self.instrument.clone();
         let on_state = move |state: &StateSample| {
-            let _ = rows.send(Moment {
+            let _ = rows.send(TakeRow {
                 t_us: u64::try_from(state.host_us).unwrap_or(0),
                 angle_deg: f64::from(state.angle_deg),
                 velocity_deg_s: f64::from(state.velocity_deg_s),
@@ -257,11 +257,11 @@ impl KnobController {
     }
 
     /// The rows that have come since the last cycle.
-    fn received(&self) -> Vec<Moment> {
+    fn received(&self) -> Vec<TakeRow> {
         self.rows.1.try_iter().collect()
     }
 
-    fn calibrate(&mut self, rows: &[Moment], knob: &KnobParams) {
+    fn calibrate(&mut self, rows: &[TakeRow], knob: &KnobParams) {
         let angles = rows.iter().map(|moment| Some(moment.angle_deg));
         // A calibration also counts the time in which the knob sends nothing.
         let silence = rows.is_empty().then_some(None);
@@ -273,7 +273,7 @@ impl KnobController {
     }
 
     /// Records rows while `wanted`; otherwise completes the take.
-    fn record(&mut self, rows: &[Moment], wanted: bool) {
+    fn record(&mut self, rows: &[TakeRow], wanted: bool) {
         if wanted && let Err(reason) = self.recorder.begin(&self.params) {
             self.take_message = Some(reason);
             return;
@@ -296,7 +296,7 @@ impl KnobController {
     fn remember_serial(&self, status: Option<&LinkStatus>) {
         if let Some(status) = status
             && is_live(status)
-            && let (Choice::Serial { .. }, Some(serial)) = (&self.choice, status.serial)
+            && let (KnobChoice::Serial { .. }, Some(serial)) = (&self.choice, status.serial)
             && let Ok(mut remembered) = self.params.knob.serial.write()
         {
             *remembered = serial_text(serial);

@@ -8,8 +8,8 @@ use super::feel_design::feel_design;
 use crate::plugin::params::ChalumeauParams;
 use crate::take_file::TakeFile;
 use chalumeau_core::instrument::Settings;
-use chalumeau_knob::touch::study::{Side, plan};
-use chalumeau_knob::touch::take::{Marks, Moment, Take};
+use chalumeau_knob::touch::study::{StudySide, plan};
+use chalumeau_knob::touch::take::{Take, TakeMarks, TakeRow};
 
 /// Environment variable that names another folder for takes.
 const TAKES: &str = "CHALUMEAU_TAKES";
@@ -39,7 +39,7 @@ impl TakeRecorder {
     }
 
     /// Adds a row to the take, if one is open.
-    pub fn write(&mut self, moment: &Moment, marks: &Marks) {
+    pub fn write(&mut self, moment: &TakeRow, marks: &TakeMarks) {
         if let Some(recording) = &mut self.recording {
             match recording.writer.write(moment, marks) {
                 Ok(()) => recording.rows += 1,
@@ -82,13 +82,13 @@ pub fn load_take(path: &str) -> Result<Arc<Take>, String> {
 }
 
 /// Reed and study trial of the rows that are written now.
-pub fn marks(params: &ChalumeauParams, settings: &Settings) -> Marks {
+pub fn marks(params: &ChalumeauParams, settings: &Settings) -> TakeMarks {
     let law = settings.reed_law();
     let study = params
         .knob
         .study()
         .map(|(participant, trial, side)| (participant, trial.number, side, trial.condition(side)));
-    Marks { reed: Some((law.h(), law.k())), study }
+    TakeMarks { reed: Some((law.h(), law.k())), study }
 }
 
 /// Creates a new take in the folder of takes.
@@ -133,7 +133,7 @@ fn remarks(params: &ChalumeauParams) -> Vec<String> {
         let seed = knob.seed.value();
         let order: Vec<String> = plan(participant, seed as u32)
             .iter()
-            .map(|trial| format!("{}:H={},A={}", trial.number, trial.h, trial.condition(Side::A).name()))
+            .map(|trial| format!("{}:H={},A={}", trial.number, trial.h, trial.condition(StudySide::A).name()))
             .collect();
         remarks.push(format!("study participant {participant} seed {seed} order {}", order.join(" ")));
     }

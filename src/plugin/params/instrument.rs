@@ -3,39 +3,14 @@
 //! What is exchanged as a whole is not automated: that takes from a moment (what comes with the program) to a minute
 //! (a file of one's own, the first time), and sounds meanwhile as the status says.
 
-use std::sync::{Arc, OnceLock, RwLock};
+use std::sync::{Arc, RwLock};
 
 use nice_plug::prelude::*;
 
 use super::entry::{choice, status, whole};
+use crate::plugin::launch_options::LaunchOptions;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::instrument::prepare::Quality;
-
-/// What a program without projects begins with: instrument, its file, A4.
-static BEGINNING: OnceLock<Beginning> = OnceLock::new();
-
-/// See [`begin_with`].
-#[derive(Clone, Debug)]
-pub struct Beginning {
-    /// Which.
-    pub choice: InstrumentChoice,
-    /// The user's own file, empty for the usual place.
-    pub file: String,
-    /// Pitch of A4, Hz.
-    pub a4_hz: f32,
-}
-
-/// Defaults of all parameters made from now on in this process. For a program that has neither projects nor a window; only
-/// the first call counts.
-#[cfg(feature = "standalone")]
-pub fn begin_with(beginning: Beginning) {
-    let _ = BEGINNING.set(beginning);
-}
-
-/// What [`begin_with`] was told.
-pub(super) fn beginning() -> Option<&'static Beginning> {
-    BEGINNING.get()
-}
 
 /// Most characters of a path; longer ones are no paths.
 pub const PATH_MOST: usize = 4_096;
@@ -117,7 +92,7 @@ impl From<QualityChoice> for Quality {
 #[derive(Params)]
 pub struct InstrumentParams {
     /// The user's own file, empty for the usual place
-    /// ([`user_file`](crate::plugin::instrument::choice::user_file)).
+    /// ([`user_file`](crate::plugin::instrument_loading::instrument_request::user_file)).
     #[persist = "instrumentfile"]
     pub file: RwLock<String>,
     /// Which. Default B flat clarinet.
@@ -137,8 +112,9 @@ pub struct InstrumentParams {
 impl InstrumentParams {
     /// Defaults; whoever loads the instrument writes its state to `state`.
     pub fn new(state: Arc<RwLock<String>>) -> Self {
-        let (first, file) = beginning()
-            .map_or((InstrumentChoice::BFlat, String::new()), |first| (first.choice, first.file.clone()));
+        let (first, file) = LaunchOptions::get().map_or((InstrumentChoice::BFlat, String::new()), |first| {
+            (first.instrument, first.instrument_file.clone())
+        });
         Self {
             file: RwLock::new(file),
             choice: choice("instr", first),

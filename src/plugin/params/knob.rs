@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::entry::{choice, number, status, switch, whole};
 use chalumeau_core::control::knob::KnobDesign;
-use chalumeau_knob::touch::study::{Side, Trial, plan};
+use chalumeau_knob::touch::study::{StudySide, Trial, plan};
 
 /// Which kind of device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Enum)]
@@ -287,7 +287,7 @@ impl KnobParams {
     }
 
     /// Participant, trial and side, while a study is on. Real-time safe.
-    pub fn study(&self) -> Option<(u32, Trial, Side)> {
+    pub fn study(&self) -> Option<(u32, Trial, StudySide)> {
         if !self.study.value() {
             return None;
         }
@@ -295,6 +295,6 @@ impl KnobParams {
         let participant = whole(&self.participant);
         let trials = plan(participant, whole(&self.seed));
         let trial = *trials.get(whole(&self.trial).saturating_sub(1) as usize)?;
-        Some((participant, trial, if self.side.value() { Side::B } else { Side::A }))
+        Some((participant, trial, if self.side.value() { StudySide::B } else { StudySide::A }))
     }
 }

@@ -4,9 +4,10 @@ use nice_plug::plugin::ParamValue;
 use nice_plug::prelude::*;
 use serde::{Serialize, de::DeserializeOwned};
 
-use super::instrument::{self, beginning};
+use super::instrument;
 use super::knob::Calibration;
-use crate::editor::Kept;
+use crate::editor::WindowState;
+use crate::plugin::launch_options::LaunchOptions;
 use crate::parameters::{Kind, Number, PARAMETERS, Parameter};
 
 /// Layout of the saved state. 1: ids and units as below. 2: the instrument and its file, the physical reed; a state of 1
@@ -16,7 +17,7 @@ const SCHEMA_FIELD: &str = "schema";
 
 /// A number's default in this process: the table's, or what the program was started with.
 pub(super) fn starting(id: &str, number: &Number) -> f32 {
-    match beginning() {
+    match LaunchOptions::get() {
         Some(first) if id == "a4" => first.a4_hz,
         _ => number.default,
     }
@@ -41,7 +42,7 @@ pub fn mend(state: &mut PluginState) {
     mend_field(state, "take", |text: String| text);
     mend_field(state, "instrumentfile", |text: String| text.chars().take(instrument::PATH_MOST).collect());
     mend_field(state, "calibration", Calibration::mended);
-    mend_field(state, "window", Kept::mended);
+    mend_field(state, "window", WindowState::mended);
     // An older schema lacks what it lacks; a newer one is read as far as its ids are known here.
     state.fields.insert(SCHEMA_FIELD.to_owned(), SCHEMA.to_string());
 }

@@ -2,12 +2,12 @@
 
 use std::sync::PoisonError;
 
-use crate::editor::snapshot::Device;
+use crate::editor::snapshot::KnobDevice;
 use crate::plugin::SharedHandles;
 use crate::plugin::params::knob::KnobKind;
-use chalumeau_knob::device::discover::Kind;
+use chalumeau_knob::device::discover::PortKind;
 use chalumeau_knob::device::{
-    Candidate, LinkStatus, Phase, Places, candidates, lock, midi, serial_number, serial_text,
+    Candidate, LinkStatus, Phase, RuntimeDir, candidates, lock, midi, serial_number, serial_text,
 };
 
 /// Number of device kinds that the parameter *Knob* offers.
@@ -24,15 +24,15 @@ const BOARD: &str = "board";
 /// Lists everything that may be a knob, the one in use first. Asks the system, which takes milliseconds. If the system
 /// has no MIDI, `has_midi` becomes false and later calls do not ask again, because some systems print an error each time.
 pub fn list(
-    places: &Places,
+    places: &RuntimeDir,
     kind: KnobKind,
     status: Option<&LinkStatus>,
     has_midi: &mut bool,
-) -> Vec<Device> {
+) -> Vec<KnobDevice> {
     let in_use = status.filter(|status| status.phase != Phase::Off && kind != KnobKind::Off);
     let linked = in_use.filter(|_| kind == KnobKind::Serial);
     let linked = linked.and_then(|status| Some((status, status.serial?)));
-    let mut devices: Vec<Device> =
+    let mut devices: Vec<KnobDevice> =
         linked.map(|(status, serial)| linked_device(status, serial)).into_iter().collect();
     // A knob of any kind has told its serial number; the list has that knob already.
     let known_serial = in_use.and_then(|status| status.serial);
@@ -51,9 +51,9 @@ pub fn list(
         let is_chosen = kind == KnobKind::Midi && in_use.is_some_and(|status| status.port == name);
         let state = if is_chosen { "in use" } else { "MIDI port" };
         let key = format!("{MIDI}{name}");
-        devices.push(Device { key, name, state: state.into(), is_chosen, is_free: true });
+        devices.push(KnobDevice { key, name, state: state.into(), is_chosen, is_free: true });
     }
-    devices.push(Device {
+    devices.push(KnobDevice {
         key: OSC.into(),
         name: "TorqueTuner with stock firmware, by OSC".into(),
         state: "read only: angle to breath, no feel".into(),
@@ -64,10 +64,10 @@ pub fn list(
 }
 
 /// The serial knob that the link uses.
-fn linked_device(status: &LinkStatus, serial: u64) -> Device {
+fn linked_device(status: &LinkStatus, serial: u64) -> KnobDevice {
     let is_live = status.phase == Phase::Live;
     let serial = serial_text(serial);
-    Device {
+    KnobDevice {
         key: format!("{SERIAL}{serial}"),
         name: status
             .info
@@ -80,12 +80,12 @@ fn linked_device(status: &LinkStatus, serial: u64) -> Device {
 }
 
 /// A simulated knob or a USB board that the link does not use.
-fn found_device(places: &Places, candidate: &Candidate) -> Device {
+fn found_device(places: &RuntimeDir, candidate: &Candidate) -> KnobDevice {
     let port = candidate.path.display();
     match (&candidate.kind, candidate.serial_hint()) {
-        (Kind::Simulated { serial, name }, _) => {
+        (PortKind::Simulated { serial, name }, _) => {
             let holder = lock::holder(places, *serial);
-            Device {
+            KnobDevice {
                 key: format!("{SERIAL}{}", serial_text(*serial)),
                 name: format!("{name}, {}", serial_text(*serial)),
                 state: holder
@@ -95,7 +95,7 @@ fn found_device(places: &Places, candidate: &Candidate) -> Device {
                 is_free: holder.is_none(),
             }
         }
-        (Kind::Usb { chip, .. }, hint) => Device {
+        (PortKind::Usb { chip, .. }, hint) => KnobDevice {
             key: hint.map_or_else(|| BOARD.into(), |serial| format!("{SERIAL}{}", serial_text(serial))),
             name: format!("{chip} board"),
             state: format!("{port}: asked when chosen"),
@@ -129,15 +129,15 @@ pub fn choose(handles: &SharedHandles, key: &str) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use chalumeau_knob::device::Advert;
+    use chalumeau_knob::device::Announcement;
     use chalumeau_knob::device::lock::Ownership;
 
     #[test]
     fn a_simulated_knob_is_listed_with_who_holds_it() {
         let directory = tempfile::tempdir().unwrap();
-        let places = Places::within(directory.path());
+        let places = RuntimeDir::within(directory.path());
         let port = directory.path().join("port");
-        let _advert = Advert::publish(&places, 0x51, "KnobController knob", &port).unwrap();
+        let _advert = Announcement::publish(&places, 0x51, "KnobController knob", &port).unwrap();
         let listed = || list(&places, KnobKind::Off, None, &mut false);
         let knob = listed().into_iter().find(|device| device.key == "serial:0000000000000051").unwrap();
         assert!(knob.name.starts_with("KnobController knob") && knob.is_free && !knob.is_chosen, "{knob:?}");
@@ -149,7 +149,7 @@ mod tests {
     #[test]
     fn stock_firmware_is_always_listed() {
         let directory = tempfile::tempdir().unwrap();
-        let places = Places::within(directory.path());
+        let places = RuntimeDir::within(directory.path());
         for (kind, is_chosen) in [(KnobKind::Off, false), (KnobKind::Osc, true)] {
             let devices = list(&places, kind, None, &mut false);
             let osc = devices.iter().find(|device| device.key == OSC).unwrap();

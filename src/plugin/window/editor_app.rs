@@ -9,7 +9,7 @@ use nice_plug_egui::{Frame, KeyCapture, NiceEguiApp};
 
 use super::host_controls::HostControls;
 use super::{SharedWindow, kept};
-use crate::editor::{self, Action, Controls, Kept, Snapshot, State};
+use crate::editor::{self, Action, Controls, EditorState, Snapshot, WindowState};
 use crate::plugin::SharedHandles;
 use crate::plugin::launch_options::LaunchOptions;
 use crate::plugin::params::instrument::InstrumentChoice;
@@ -19,9 +19,9 @@ use chalumeau_core::event::Event;
 pub struct WindowMemory {
     pub(super) handles: SharedHandles,
     controls: HostControls,
-    state: State,
+    state: EditorState,
     /// What the window has written into the project last.
-    written: Kept,
+    written: WindowState,
     keys: rtrb::Producer<Event>,
     /// Pixels per point without zoom, on the latest screen.
     pub(super) scale: f64,
@@ -32,7 +32,7 @@ impl WindowMemory {
         let written = kept(&handles.params);
         Self {
             controls: HostControls::new(handles.params.clone()),
-            state: State::new(written.clone()),
+            state: EditorState::new(written.clone()),
             written,
             handles,
             keys,

@@ -5,15 +5,15 @@ use std::sync::Arc;
 use crate::plugin::instrument_loading::CurrentInstrument;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
-use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, Requirement, TorqueLimits};
+use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, NoteRequirement, TorqueLimits};
 use chalumeau_core::instrument::{Model, Settings, felt};
-use chalumeau_knob::touch::feel::Feels;
+use chalumeau_knob::touch::feel::InstrumentFeel;
 
 /// An instrument, analysed once, with the latest results for a fingering.
 pub struct InstrumentAnalysis {
     model: Arc<Model>,
     file: Arc<InstrumentFile>,
-    feels: Arc<Feels>,
+    feels: Arc<InstrumentFeel>,
     bore: TransferMatrix,
     /// The latest feel table, and what it was computed from.
     table: Option<(Settings, FeelDesign, Result<FeelTable, String>)>,
@@ -32,7 +32,7 @@ impl InstrumentAnalysis {
     /// Analyses an instrument. Takes about a second.
     pub fn new(current: &CurrentInstrument) -> Self {
         Self {
-            feels: Arc::new(Feels::new(&current.model)),
+            feels: Arc::new(InstrumentFeel::new(&current.model)),
             bore: TransferMatrix::new(&current.model.file, current.model.air),
             file: Arc::new(current.model.file.clone()),
             model: current.model.clone(),
@@ -52,7 +52,7 @@ impl InstrumentAnalysis {
     }
 
     /// What a fingering requires of the breath with this reed; `None` if it does not sound.
-    pub fn requirement(&self, fingering: usize, settings: &Settings) -> Option<Requirement> {
+    pub fn requirement(&self, fingering: usize, settings: &Settings) -> Option<NoteRequirement> {
         let reed = felt::played_reed(&self.model.file, settings);
         self.feels.requirements().note(fingering, &reed)
     }

@@ -12,10 +12,10 @@ use super::instrument_analysis::InstrumentAnalysis;
 use super::window_audio::AudioSnapshot;
 #[cfg(feature = "devices")]
 use crate::editor::Tab;
-use crate::editor::listener::{Heard, Listener, WINDOW};
+use crate::editor::snapshot::{BreathSource, Scope, Severity, Snapshot, Status, Track};
 #[cfg(feature = "devices")]
-use crate::editor::snapshot::{Device, Knob};
-use crate::editor::snapshot::{Level, Scope, Snapshot, Source, Status, Track};
+use crate::editor::snapshot::{KnobDevice, KnobState};
+use crate::editor::sound_analysis::{SoundAnalyser, SoundAnalysis, WINDOW};
 use crate::plugin::SharedHandles;
 use crate::plugin::breath_sources::{BreathInput, BreathSources};
 use crate::plugin::instrument_loading::{CurrentInstrument, Readiness};
@@ -26,7 +26,7 @@ use chalumeau_core::haptics::FeelDesign;
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::units::SoundingNote;
 #[cfg(feature = "devices")]
-use chalumeau_knob::device::{LinkStatus, Phase, Places};
+use chalumeau_knob::device::{LinkStatus, Phase, RuntimeDir};
 #[cfg(feature = "devices")]
 use chalumeau_knob::wire::message::Feel;
 
@@ -53,7 +53,7 @@ pub struct SnapshotThread {
     inside: triple_buffer::Output<AudioSnapshot>,
     sound: rtrb::Consumer<f32>,
     heard: VecDeque<f32>,
-    listener: Option<(f64, Listener)>,
+    listener: Option<(f64, SoundAnalyser)>,
     /// The values that a snapshot shows where nothing is known. Kept, because making them parses an instrument file.
     blank: Snapshot,
     history: VecDeque<f32>,
@@ -62,7 +62,7 @@ pub struct SnapshotThread {
     analysis: Option<InstrumentAnalysis>,
     /// The devices found, and when.
     #[cfg(feature = "devices")]
-    devices: (Vec<Device>, Option<Instant>),
+    devices: (Vec<KnobDevice>, Option<Instant>),
     #[cfg(feature = "devices")]
     has_midi: bool,
 }
@@ -148,7 +148,7 @@ impl SnapshotThread {
     fn show_knob(&mut self, snapshot: &mut Snapshot) {
         let status = self.handles.knob.status();
         self.find_devices(status.as_ref());
-        snapshot.knob = status.map_or_else(Knob::default, |status| {
+        snapshot.knob = status.map_or_else(KnobState::default, |status| {
             let feel = snapshot.feel.as_ref().ok().map(|note| note.feel);
             knob_view(&status, feel.as_ref())
         });
@@ -161,7 +161,7 @@ impl SnapshotThread {
         let is_due = self.devices.1.is_none_or(|at| at.elapsed() > DEVICES_EVERY);
         if super::kept(&self.handles.params).tab == Tab::Knob && is_due {
             let kind = self.handles.params.knob.kind.value();
-            let found = device_list::list(&Places::default(), kind, status, &mut self.has_midi);
+            let found = device_list::list(&RuntimeDir::default(), kind, status, &mut self.has_midi);
             self.devices = (found, Some(Instant::now()));
         }
     }
@@ -205,13 +205,20 @@ impl SnapshotThread {
         FeelDesign::default()
     }
 
-    fn analyse_sound(&mut self, rate_hz: f64, sounding: Option<SoundingNote>, settings: &Settings) -> Heard {
+    fn analyse_sound(
+        &mut self,
+        rate_hz: f64,
+        sounding: Option<SoundingNote>,
+        settings: &Settings,
+    ) -> SoundAnalysis {
         if self.listener.as_ref().is_none_or(|(of, _)| *of != rate_hz) {
-            self.listener = Some((rate_hz, Listener::new(rate_hz)));
+            self.listener = Some((rate_hz, SoundAnalyser::new(rate_hz)));
         }
         let wanted = sounding.map(|note| note.frequency_hz(f64::from(settings.a4_hz)));
         let samples = self.heard.make_contiguous();
-        self.listener.as_mut().map_or_else(Heard::default, |(_, listener)| listener.hear(samples, wanted))
+        self.listener
+            .as_mut()
+            .map_or_else(SoundAnalysis::default, |(_, listener)| listener.hear(samples, wanted))
     }
 
     /// The messages on the status line.
@@ -221,17 +228,17 @@ impl SnapshotThread {
         if let Ok(text) = self.handles.params.instrument_status.read()
             && current.is_none_or(|current| current.readiness < Readiness::Tuned)
         {
-            add(Level::Note, text.clone());
+            add(Severity::Note, text.clone());
         }
         if let Ok(text) = self.handles.params.knob_status.read()
             && text.as_str() != "off"
         {
-            add(Level::Good, text.clone());
+            add(Severity::Good, text.clone());
         }
         // A user who has just plugged in a breath controller sees that its messages arrive.
         let live = BreathInput::ALL.into_iter().find(|&input| sources.is_live(input));
         if let Some(input) = live.filter(|&input| input != BreathInput::Keys) {
-            add(Level::Good, format!("breath: {}", input.title()));
+            add(Severity::Good, format!("breath: {}", input.title()));
         }
         status
     }
@@ -252,12 +259,12 @@ fn show_inside(snapshot: &mut Snapshot, inside: &AudioSnapshot) {
 }
 
 /// The breath inputs as the window shows them. `is_held`: a key is down.
-fn source_views(sources: &BreathSources, is_held: bool) -> Vec<Source> {
+fn source_views(sources: &BreathSources, is_held: bool) -> Vec<BreathSource> {
     let view = |input: BreathInput| {
         let latest = sources.value(input);
         // Velocity makes breath only while a key is down.
         let value = latest.filter(|_| input != BreathInput::Keys || is_held).unwrap_or(0.0);
-        Source {
+        BreathSource {
             name: input.title().to_owned(),
             value,
             is_live: sources.is_live(input),
@@ -269,9 +276,9 @@ fn source_views(sources: &BreathSources, is_held: bool) -> Vec<Source> {
 
 /// The knob as the window shows it, without the list of devices.
 #[cfg(feature = "devices")]
-fn knob_view(status: &LinkStatus, feel: Option<&Feel>) -> Knob {
+fn knob_view(status: &LinkStatus, feel: Option<&Feel>) -> KnobState {
     let stats = &status.stats;
-    Knob {
+    KnobState {
         devices: Vec::new(),
         text: status.text.clone(),
         is_live: status.phase == Phase::Live,
@@ -279,8 +286,9 @@ fn knob_view(status: &LinkStatus, feel: Option<&Feel>) -> Knob {
         ceiling_mnm: f32::from(status.ceiling_mnm),
         angle_deg: status.angle_deg,
         torque_mnm: status.angle_deg.zip(feel).map(|(angle_deg, feel)| {
-            let tables = chalumeau_core::reed::ReedTables::seed();
-            let torque_mnm = chalumeau_core::haptics::law::torque_mnm(feel, tables, f64::from(angle_deg));
+            let tables = chalumeau_core::reed::ReedTables::reference();
+            let torque_mnm =
+                chalumeau_core::haptics::torque_law::torque_mnm(feel, tables, f64::from(angle_deg));
             if status.armed { torque_mnm as f32 } else { 0.0 }
         }),
         notice: status.last_refusal.clone().or_else(|| status.notice.clone()),

@@ -7,7 +7,8 @@ use super::SharedWindow;
 use crate::plugin::breath_sources::BreathSources;
 use crate::plugin::instrument_loading::InstrumentSwap;
 use chalumeau_core::event::{Event, Timed};
-use chalumeau_core::instrument::watch::{MOMENTS, Moment, Now};
+use chalumeau_core::instrument::player::PlayerState;
+use chalumeau_core::instrument::scope::{SCOPE_SAMPLES, ScopeSample};
 
 /// Samples on their way to the snapshot thread: more than a second at 48 kHz.
 const SOUND_SAMPLES: usize = 65_536;
@@ -20,9 +21,9 @@ const KEYS_PER_BLOCK: usize = 8;
 #[derive(Clone)]
 pub struct AudioSnapshot {
     /// What the player is doing.
-    pub now: Now,
+    pub now: PlayerState,
     /// The latest moments inside the mouthpiece, oldest first.
-    pub moments: Box<[Moment; MOMENTS]>,
+    pub moments: Box<[ScopeSample; SCOPE_SAMPLES]>,
     /// Moments per second.
     pub moments_hz: f64,
     /// Sample rate of the sound, Hz.
@@ -36,8 +37,8 @@ pub struct AudioSnapshot {
 impl Default for AudioSnapshot {
     fn default() -> Self {
         Self {
-            now: Now { sounding: None, fingering: 0, mouth_kpa: 0.0 },
-            moments: Box::new([Moment::default(); MOMENTS]),
+            now: PlayerState { sounding: None, fingering: 0, mouth_kpa: 0.0 },
+            moments: Box::new([ScopeSample::default(); SCOPE_SAMPLES]),
             moments_hz: 48_000.0,
             host_rate_hz: 48_000.0,
             latency_samples: 0,
@@ -84,7 +85,7 @@ impl WindowAudio {
     /// Sends the sound and the inside of the instrument while the window is open. Real-time safe.
     pub fn send(&mut self, instrument: &mut InstrumentSwap, breath_sources: &BreathSources, sound: &[f32]) {
         let is_open = self.shared.is_open.load(Ordering::Relaxed);
-        instrument.set_watched(is_open);
+        instrument.set_scope_on(is_open);
         if !is_open {
             return;
         }
@@ -98,15 +99,15 @@ impl WindowAudio {
             chunk.commit_all();
         }
         let clarinet = instrument.clarinet();
-        let watch = clarinet.watch();
-        let Some((number, moments)) = watch.picture().filter(|&(number, _)| number != self.shown) else {
+        let scope = clarinet.scope();
+        let Some((number, moments)) = scope.capture().filter(|&(number, _)| number != self.shown) else {
             return;
         };
         self.shown = number;
         let inside = self.inside.input_buffer_mut();
-        inside.now = clarinet.now();
+        inside.now = clarinet.player_state();
         inside.moments.copy_from_slice(moments);
-        inside.moments_hz = watch.rate_hz(clarinet.internal_rate_hz());
+        inside.moments_hz = scope.rate_hz(clarinet.internal_rate_hz());
         inside.host_rate_hz = instrument.rate_hz();
         inside.latency_samples = clarinet.latency_samples();
         inside.breath_sources = *breath_sources;

@@ -1,14 +1,14 @@
 //! The messages that every implementation must write byte for byte.
 
 use chalumeau_knob::wire::{
-    Arm, Capabilities, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Law, Message,
+    Arm, Capabilities, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Message, TorqueLaw,
 };
 
 /// The reference reed at TorqueTuner's own scale, with everything switched on.
 pub fn reference_feel() -> Feel {
     Feel {
         feel_id: 17,
-        law: Law::Flow,
+        law: TorqueLaw::Flow,
         scale_mnm: 90.0,
         wall_mnm_per_deg: 4.0,
         slap_mnm_per_deg: 0.5,
@@ -76,7 +76,7 @@ fn host_messages() -> Vec<Named> {
 fn feels() -> Vec<Named> {
     let least = Feel {
         feel_id: 0,
-        law: Law::Free,
+        law: TorqueLaw::Free,
         morph_ms: 20,
         h: 0.5,
         k: 0.01,
@@ -95,7 +95,7 @@ fn feels() -> Vec<Named> {
     };
     let most = Feel {
         feel_id: 255,
-        law: Law::Pressure,
+        law: TorqueLaw::Pressure,
         morph_ms: 1_000,
         h: 10.0,
         k: 1.0,

@@ -187,7 +187,7 @@ pub struct TorqueExtremes {
 
 /// The bounds of a feel, from the formulas of its torque law. Real-time safe.
 pub fn extremes(feel: &Feel) -> TorqueExtremes {
-    let curve = Curve::new(feel, ReedTables::seed());
+    let curve = Curve::new(feel, ReedTables::reference());
     let per_rad = 1e-3 * 1_f64.to_radians().recip();
     TorqueExtremes {
         torque_mnm: curve.most(),
@@ -226,7 +226,7 @@ mod tests {
 
     #[test]
     fn flow_is_the_reference_formula_beyond_the_rounded_origin() {
-        let tables = ReedTables::seed();
+        let tables = ReedTables::reference();
         for h in [1.0, 2.0, H_INIT, 4.0] {
             for k in [0.1, 0.25, K_INIT, 1.0] {
                 let feel = torque_tuner(TorqueLaw::Flow, h, k);
@@ -250,7 +250,7 @@ mod tests {
 
     #[test]
     fn flow_peaks_at_a_third_of_closure_and_is_gone_beyond() {
-        let (feel, tables) = (torque_tuner(TorqueLaw::Flow, H_INIT, K_INIT), ReedTables::seed());
+        let (feel, tables) = (torque_tuner(TorqueLaw::Flow, H_INIT, K_INIT), ReedTables::reference());
         let steps = 0..4_000;
         let peak = steps
             .clone()
@@ -267,7 +267,7 @@ mod tests {
     #[test]
     fn pressure_never_falls_and_steps_up_at_the_threshold() {
         let feel = Feel { detent: 100, ..torque_tuner(TorqueLaw::Pressure, H_INIT, K_INIT) };
-        let torque = |angle: f64| torque_mnm(&feel, ReedTables::seed(), angle);
+        let torque = |angle: f64| torque_mnm(&feel, ReedTables::reference(), angle);
         let mut before = torque(-300.0);
         for step in -3_000..8_000 {
             let here = torque(0.1 * f64::from(step));
@@ -280,7 +280,7 @@ mod tests {
 
     #[test]
     fn the_bounds_hold_what_the_curve_does() {
-        let tables = ReedTables::seed();
+        let tables = ReedTables::reference();
         for law in [TorqueLaw::Flow, TorqueLaw::Pressure] {
             for (detent, wall_deg, offset_deg) in [(0, 414.0, 0.0), (80, 414.0, 0.0), (80, 200.0, 20.0)] {
                 let feel = Feel { detent, wall_deg, offset_deg, ..torque_tuner(law, H_INIT, K_INIT) };
@@ -309,7 +309,9 @@ mod tests {
     #[test]
     fn a_free_knob_has_no_torque() {
         let feel = torque_tuner(TorqueLaw::Free, H_INIT, K_INIT);
-        assert!([-500.0, 0.0, 120.0, 40_000.0].map(|a| torque_mnm(&feel, ReedTables::seed(), a)) == [0.0; 4]);
+        assert!(
+            [-500.0, 0.0, 120.0, 40_000.0].map(|a| torque_mnm(&feel, ReedTables::reference(), a)) == [0.0; 4]
+        );
         assert_eq!(extremes(&feel), TorqueExtremes::default());
     }
 }

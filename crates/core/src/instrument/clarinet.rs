@@ -15,10 +15,10 @@ use crate::instrument::player::{Player, PlayerState};
 use crate::instrument::scope::Scope;
 use crate::instrument::settings::Settings;
 use crate::instrument::voice::{Probe, Voice};
-use crate::reed::ReedCoeffs;
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
 use crate::reed::motion::TONGUE_FORCE;
+use crate::reed::{MovingReed, ReedCoeffs};
 use crate::units::REFERENCE_RADIUS_M;
 
 /// Full scale per pascal at 1 m from a B flat clarinet: 1 Pa is -6 dBFS. A larger instrument is heard from further away,
@@ -101,8 +101,18 @@ impl Clarinet {
     pub fn new(model: Arc<Model>, host_rate_hz: f64) -> Self {
         let lip = embouchure(model.lowest_hz, model.lowest_hz);
         let (swept, rate) = (model.swept_s, model.coeffs.rate_hz);
-        let reed = ReedCoeffs::new(ReedLaw::default(), 0.3, 0.4, lip.resonance_hz, lip.damping, swept, rate);
-        let tables = ReedTables::seed();
+        let reed = ReedCoeffs::new(
+            MovingReed {
+                law: ReedLaw::default(),
+                zeta: 0.3,
+                lay: 0.4,
+                resonance_hz: lip.resonance_hz,
+                damping: lip.damping,
+                swept_s: swept,
+            },
+            rate,
+        );
+        let tables = ReedTables::reference();
         let mut voice = if rate > SINGLE_BELOW_HZ {
             AnyVoice::Double(Box::new(Voice::new(&model.coeffs, &model.air, tables, reed)))
         } else {

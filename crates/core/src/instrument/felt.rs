@@ -2,7 +2,7 @@
 
 use crate::bore::fit;
 use crate::bore::instrument_file::InstrumentFile;
-use crate::haptics::{Lip, PlayedReed, Requirements};
+use crate::haptics::{Lip, PlayedReed, RequirementSolver};
 use crate::instrument::lip::embouchure;
 use crate::instrument::model::Model;
 use crate::instrument::settings::Settings;
@@ -32,7 +32,7 @@ pub fn played_reed(file: &InstrumentFile, settings: &Settings) -> PlayedReed {
 
 /// The mouth pressures that the notes of a model need. The onsets are those of the lattice that sounds. Takes a second.
 /// Allocates.
-pub fn requirements(model: &Model) -> Requirements {
+pub fn requirements(model: &Model) -> RequirementSolver {
     let rows = |fingering: usize| model.tuning.notes.get(fingering).map_or(0.0, |note| note.natural);
-    Requirements::new(&model.file, model.air).heard_through(&model.file, &model.coeffs, rows)
+    RequirementSolver::new(&model.file, model.air).with_lattice(&model.file, &model.coeffs, rows)
 }

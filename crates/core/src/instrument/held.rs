@@ -5,10 +5,10 @@
 use crate::instrument::lip::embouchure;
 use crate::instrument::model::Model;
 use crate::instrument::voice::{Drive, TICK, Voice};
-use crate::reed::ReedCoeffs;
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
 use crate::reed::motion::TONGUE_FORCE;
+use crate::reed::{MovingReed, ReedCoeffs};
 
 /// How a held note begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,19 +68,21 @@ impl HeldNote {
         let law = ReedLaw::default();
         let damping = lip.damping * self.damping;
         ReedCoeffs::new(
-            law,
-            self.zeta,
-            self.lay,
-            lip.resonance_hz,
-            damping,
-            model.swept_s,
+            MovingReed {
+                law,
+                zeta: self.zeta,
+                lay: self.lay,
+                resonance_hz: lip.resonance_hz,
+                damping,
+                swept_s: model.swept_s,
+            },
             model.coeffs.rate_hz,
         )
     }
 
     /// A silent voice with the fingering, delay and reed of this note. Allocates.
     pub fn voice<F: crate::bore::lattice::Real>(&self, model: &Model) -> Voice<F> {
-        let mut voice = Voice::new(&model.coeffs, &model.air, ReedTables::seed(), self.reed(model));
+        let mut voice = Voice::new(&model.coeffs, &model.air, ReedTables::reference(), self.reed(model));
         for (hole, &open) in model.file.fingerings[self.fingering].open.iter().enumerate() {
             voice.lattice_mut().set_opening(hole, f64::from(u8::from(open)));
         }

@@ -2,7 +2,7 @@
 
 use crate::reed::ReedLaw;
 use crate::reed::law::coupled_k;
-use crate::reed::physical::{P_REF_PA, PhysicalReed, SeedReed};
+use crate::reed::physical::{DimensionlessReed, P_REF_PA, PhysicalReed};
 
 /// How the tuning delay follows the breath.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -118,14 +118,14 @@ impl Settings {
     pub fn physical_reed(&self, reference: &PhysicalReed) -> PhysicalReed {
         let settings = self.clamped();
         let h = f64::from(settings.reed_h);
-        let dimensionless = SeedReed {
+        let dimensionless = DimensionlessReed {
             h,
             k: if settings.coupled { coupled_k(h) } else { f64::from(settings.reed_k) },
             a: f64::from(settings.reed_a),
             zeta: f64::from(settings.zeta),
             area: 1.0,
         };
-        PhysicalReed::from_seed(&dimensionless, reference)
+        PhysicalReed::from_dimensionless(&dimensionless, reference)
     }
 
     /// The reed in maker's quantities as it is in the mouth: strength multiplies the stiffness, the lip the opening.
@@ -134,8 +134,8 @@ impl Settings {
         let settings = self.clamped();
         let law = settings.reed_law();
         let (h, k, a, zeta) = (law.h(), law.k(), law.a(), f64::from(settings.zeta));
-        let dimensionless = SeedReed { h, k, a, zeta, area: 1.0 };
-        PhysicalReed::from_seed(&dimensionless, reference)
+        let dimensionless = DimensionlessReed { h, k, a, zeta, area: 1.0 };
+        PhysicalReed::from_dimensionless(&dimensionless, reference)
     }
 
     /// These settings with H, k and zeta of a reed as its maker measures it; strength, lip, lay and A stay and act on it.
@@ -144,7 +144,7 @@ impl Settings {
     /// settings are; [`refused_reed`](Self::refused_reed) tells which. Real-time safe.
     pub fn with_physical_reed(self, reed: &PhysicalReed, reference: &PhysicalReed) -> Self {
         let a = f64::from(self.reed_a);
-        let set = reed.seed(reference, if a > 0.0 { a } else { 1.0 });
+        let set = reed.dimensionless(reference, if a > 0.0 { a } else { 1.0 });
         Self { reed_h: set.h as f32, reed_k: set.k as f32, coupled: false, zeta: set.zeta as f32, ..self }
     }
 

@@ -10,7 +10,7 @@ use crate::simulator::line::SimulatedLine;
 use crate::simulator::plant::{LOOP_HZ, Plant, PlantDesign};
 use crate::simulator::stock::{StockFirmware, Value};
 use crate::simulator::tap::Tap;
-use crate::wire::Law;
+use crate::wire::TorqueLaw;
 use chalumeau_firmware::{Firmware, Reading, Setup};
 
 /// Length of a period, us.
@@ -240,7 +240,7 @@ impl SimulatedKnob {
     }
 
     /// Number and law of the feel in force; no law before the first FEEL.
-    pub fn feel(&self) -> (u8, Option<Law>) {
+    pub fn feel(&self) -> (u8, Option<TorqueLaw>) {
         let Controller::Link(firmware) = &self.brain else { return (0, None) };
         let feel_id = firmware.state()[STATE_FEEL_ID];
         (feel_id, self.tap.law(feel_id))

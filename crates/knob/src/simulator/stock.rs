@@ -54,7 +54,7 @@ pub struct StockFirmware {
 impl Default for StockFirmware {
     fn default() -> Self {
         Self {
-            tables: ReedTables::seed(),
+            tables: ReedTables::reference(),
             tick: 0,
             last_counts: 0,
             angle_out: 0,

@@ -1,7 +1,7 @@
 //! Listens to what the host sends, to tell people which law is in force: STATE only carries the number of a feel.
 
 use crate::wire::midi::{FromKnob, MidiReceiver};
-use crate::wire::{Decoder, Law, Message};
+use crate::wire::{Decoder, Message, TorqueLaw};
 
 enum TapDecoder {
     Serial(Box<Decoder>),
@@ -12,7 +12,7 @@ enum TapDecoder {
 pub struct Tap {
     listener: TapDecoder,
     /// Law of every feel number seen.
-    laws: [Option<Law>; 256],
+    laws: [Option<TorqueLaw>; 256],
 }
 
 impl Tap {
@@ -45,7 +45,7 @@ impl Tap {
     }
 
     /// Law of a feel by its number, if it was heard.
-    pub fn law(&self, feel_id: u8) -> Option<Law> {
+    pub fn law(&self, feel_id: u8) -> Option<TorqueLaw> {
         self.laws[usize::from(feel_id)]
     }
 }

@@ -1,7 +1,9 @@
 //! The feel of each note of an instrument, and the mouth pressure that each knob angle gives.
 
 use chalumeau_core::bore::instrument_file::InstrumentFile;
-use chalumeau_core::haptics::{AngleMap, FeelDesign, FeelRefused, FeelTable, Requirements, TorqueLimits};
+use chalumeau_core::haptics::{
+    AngleMap, FeelDesign, FeelRefused, FeelTable, RequirementSolver, TorqueLimits,
+};
 use chalumeau_core::instrument::felt::{played_reed, requirements};
 use chalumeau_core::instrument::{BuildError, Model, Settings};
 use chalumeau_core::units::SoundingNote;
@@ -24,7 +26,7 @@ static BUILT_IN: LazyLock<Result<Arc<InstrumentFeel>, BuildError>> =
 /// An instrument with what its bore requires for every note. Building one takes about a second.
 #[derive(Clone, Debug)]
 pub struct InstrumentFeel {
-    requirements: Requirements,
+    requirements: RequirementSolver,
     file: InstrumentFile,
     /// Index of the fingering for each sounding pitch.
     fingerings: [Option<u8>; PITCHES],
@@ -50,7 +52,7 @@ impl InstrumentFeel {
     }
 
     /// What the bore requires for each note.
-    pub fn requirements(&self) -> &Requirements {
+    pub fn requirements(&self) -> &RequirementSolver {
         &self.requirements
     }
 

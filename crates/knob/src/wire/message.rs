@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use crate::wire::codes::{FaultCode, RefusedCode};
 use chalumeau_core::haptics::TorqueLimits;
-pub use chalumeau_core::haptics::{Feel, Law};
+pub use chalumeau_core::haptics::{Feel, TorqueLaw};
 
 /// Content of ARM and of ALIVE.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 use crate::wire::frame::{FrameError, MAX_PAYLOAD};
 use crate::wire::limits::{self, FieldRange, OutOfRange};
 use crate::wire::message::{
-    Arm, Capabilities, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Law, Message,
+    Arm, Capabilities, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Message, TorqueLaw,
 };
 
 const MAGIC: [u8; 4] = *b"TTLK";
@@ -186,9 +186,9 @@ impl Reader<'_> {
 
     fn feel(&self) -> Result<Feel, OutOfRange> {
         let law = match self.u8(1) {
-            0 => Law::Free,
-            1 => Law::Flow,
-            2 => Law::Pressure,
+            0 => TorqueLaw::Free,
+            1 => TorqueLaw::Flow,
+            2 => TorqueLaw::Pressure,
             other => return Err(outside(limits::LAW, other)),
         };
         Ok(Feel {

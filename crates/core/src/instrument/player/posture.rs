@@ -5,7 +5,7 @@ use crate::instrument::bend::{self, BendSplit};
 use crate::instrument::lip::embouchure;
 use crate::instrument::model::Model;
 use crate::instrument::settings::Settings;
-use crate::reed::ReedCoeffs;
+use crate::reed::{MovingReed, ReedCoeffs};
 use crate::units::{Air, cents};
 
 /// Time constant of breath that rises behind the tongue, s.
@@ -63,12 +63,14 @@ impl Posture {
         let law = settings.reed_law();
         let lip = embouchure(model.notes_hz[fingering], model.lowest_hz);
         let reed = ReedCoeffs::new(
-            law,
-            f64::from(settings.zeta),
-            f64::from(settings.lay),
-            lip.resonance_hz,
-            lip.damping * f64::from(settings.damping),
-            model.swept_s,
+            MovingReed {
+                law,
+                zeta: f64::from(settings.zeta),
+                lay: f64::from(settings.lay),
+                resonance_hz: lip.resonance_hz,
+                damping: lip.damping * f64::from(settings.damping),
+                swept_s: model.swept_s,
+            },
             model.coeffs.rate_hz,
         );
         let offset = bend_cents
