@@ -294,7 +294,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("rest", KNOB, "Rest here", OFF)
         .help(
             "Makes the knob's present angle its rest",
-            "Calibrates no breath. Let go of the knob, then press.",
+            "This angle then means no breath. Let go of the knob, then press.",
             "",
         )
         .setup()
@@ -303,7 +303,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("blow", KNOB, "Blow hard here", OFF)
         .help(
             "Makes the knob's present angle full breath",
-            "Calibrates the travel from rest to full breath. Turn the knob as far as you want to blow, then press.",
+            "The travel from rest to this angle then means full breath. Turn the knob as far as you want to blow, then press.",
             "",
         )
         .setup()
