@@ -294,7 +294,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("rest", KNOB, "Rest here", OFF)
         .help(
             "Makes the knob's present angle its rest",
-            "Calibrates no breath. Let go of the knob, then press.",
+            "This angle then means no breath. Let go of the knob, then press.",
             "",
         )
         .setup()
@@ -303,7 +303,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("blow", KNOB, "Blow hard here", OFF)
         .help(
             "Makes the knob's present angle full breath",
-            "Calibrates the travel from rest to full breath. Turn the knob as far as you want to blow, then press.",
+            "The travel from rest to this angle then means full breath. Turn the knob as far as you want to blow, then press.",
             "",
         )
         .setup()
@@ -487,7 +487,7 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::ReedFace)
         .setup(),
-    entry("rstiff", PHYSICAL_REED, "Reed stiffness", number([300.0, 6_000.0], 1_218.06, 1, " N/m"))
+    entry("rstiff", PHYSICAL_REED, "Reed stiffness", number([300.0, 6_000.0], 1_218.057_3, 1, " N/m"))
         .help(
             "Stiffness K of the reed",
             "A stiffer reed closes later: the closing pressure is K times the opening over the area.",
@@ -495,7 +495,7 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Reed(|reed| &mut reed.stiffness_n_m, 1.0))
         .flag("--reed-stiffness"),
-    entry("rarea", PHYSICAL_REED, "Reed area", number([40.0, 250.0], 101.505, 2, " mm\u{b2}"))
+    entry("rarea", PHYSICAL_REED, "Reed area", number([40.0, 250.0], 101.504_77, 2, " mm\u{b2}"))
         .help(
             "Area of the reed that the breath presses on",
             "A larger area closes earlier.",
@@ -503,7 +503,7 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Reed(|reed| &mut reed.area_m2, 1e6))
         .flag("--reed-area"),
-    entry("rwidth", PHYSICAL_REED, "Reed width", number([3.0, 40.0], 15.2137, 2, " mm"))
+    entry("rwidth", PHYSICAL_REED, "Reed width", number([3.0, 40.0], 15.213_75, 2, " mm"))
         .help(
             "Width w of the channel, tip and side slits together",
             "A wider channel lets more air flow: notes speak and beat earlier and sound brighter.",

@@ -23,7 +23,7 @@ for a percentage. Some flags of the knob and of the measured reed have a wider r
 
 `--set` takes any parameter of the sound by its id, with the text that a host would show:
 
-```
+```sh
 chalumeau render --written C4 --set vent=2 --set tune=tempered --set \"temp=20 \u{b0}C\" --out c4.wav
 ```
 
