@@ -1,7 +1,19 @@
-//! Measuring what is heard: pitch, spectrum, onset, and the impedance behind a reflectance.
+//! Measurements of sound: pitch, spectrum, onset, and the impedance behind a reflectance.
 //!
 //! Pure functions of slices of f64 samples (full scale 1.0) at a rate in Hz. They allocate and take milliseconds: for
 //! renders, tests and plots, never for the audio thread.
+//!
+//! ```
+//! use chalumeau_core::analysis::{pitch, spectrum};
+//!
+//! // Half a second of a tone of 220 Hz with a third harmonic of half the amplitude.
+//! let phase = |n: u32| std::f64::consts::TAU * 220.0 * f64::from(n) / 44_100.0;
+//! let tone: Vec<f64> = (0..22_050).map(|n| phase(n).sin() + 0.5 * (3.0 * phase(n)).sin()).collect();
+//! let f0_hz = pitch::fundamental_hz(&tone, 44_100.0).unwrap();
+//! assert!((f0_hz - 220.0).abs() < 1e-3);
+//! let levels_db = spectrum::harmonic_levels_db(&tone, 44_100.0, f0_hz);
+//! assert!((levels_db[2] + 6.02).abs() < 0.1);
+//! ```
 
 use num_complex::Complex64;
 use realfft::RealFftPlanner;

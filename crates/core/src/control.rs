@@ -1,4 +1,4 @@
-//! What controllers send, made into events. Nothing here knows the instrument behind them.
+//! Turns what controllers send into [`Event`](crate::event::Event)s. Nothing here depends on an instrument.
 
 pub mod bends;
 pub mod keys;

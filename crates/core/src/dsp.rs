@@ -1,4 +1,4 @@
-//! Signal processing that knows no physics: sample-rate conversion and the last guard of the output.
+//! Signal processing without physics: sample-rate conversion, and the limiter at the output.
 
 pub mod kernel;
 pub mod limiter;

@@ -1,15 +1,24 @@
-//! The core's only input words. Hosts, MIDI files and devices are translated into these at the door.
+//! The events that a player causes. Hosts, MIDI files and devices are translated into these; the core takes nothing else.
+//!
+//! ```
+//! use chalumeau_core::event::{Event, Timed};
+//! use chalumeau_core::units::SoundingNote;
+//!
+//! let note_on = Event::NoteOn { note: SoundingNote(58), velocity: 0.8 };
+//! let score = [Timed { at: 0, event: Event::Breath(0.5) }, Timed { at: 480, event: note_on }];
+//! assert!(score.is_sorted_by_key(|timed| timed.at));
+//! ```
 
 use crate::units::SoundingNote;
 
-/// Something the player does.
+/// Something the player does, in the units of the instrument.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
     /// A key or fingering goes down. `velocity` 0..=1.
     NoteOn {
         /// Sounding pitch.
         note: SoundingNote,
-        /// How hard, 0..=1. Makes the breath until a breath source moves; afterwards it only shapes the tongue.
+        /// How hard, 0..=1. Sets the mouth pressure until a breath source moves; afterwards it only shapes the attack.
         velocity: f32,
     },
     /// A key comes up.
@@ -41,7 +50,7 @@ pub enum Event {
     /// Open holes whatever is fingered, one bit each in the order of the instrument's file from the lowest bit; `None` goes
     /// back to the fingering of the note.
     TryHoles(Option<u64>),
-    /// Everything up, breath to zero, state cleared.
+    /// Releases all notes, sets the breath to 0 and clears the state.
     Panic,
 }
 

@@ -55,6 +55,15 @@ pub struct TrackPoint {
 ///
 /// Found in the last second, refined over the whole slice: on steady tones of 0.3 s and more within 0.1 cent. Slices
 /// under 10 periods are not refined (some cents).
+///
+/// ```
+/// use chalumeau_core::analysis::pitch::fundamental_hz;
+///
+/// let sine = |n: u32| (std::f64::consts::TAU * 440.0 * f64::from(n) / 48_000.0).sin();
+/// let tone: Vec<f64> = (0..24_000).map(sine).collect();
+/// assert!((fundamental_hz(&tone, 48_000.0).unwrap() - 440.0).abs() < 1e-3);
+/// assert_eq!(fundamental_hz(&[0.0; 24_000], 48_000.0), None);
+/// ```
 pub fn fundamental_hz(samples: &[f64], rate_hz: f64) -> Option<f64> {
     let tail = &samples[samples.len().saturating_sub(rate_hz as usize)..];
     let coarse = coarse_hz(&mut RealFftPlanner::new(), tail, rate_hz)?;

@@ -109,7 +109,7 @@ pub fn harmonic_levels_db(segment: &[f64], rate_hz: f64, f0_hz: f64) -> Vec<f64>
     peaks.iter().map(|peak| 10.0 * (peak / strongest).max(1e-30).log10()).collect()
 }
 
-/// Power-weighted mean frequency from 20 Hz to half the rate, noise included; `None` for silence.
+/// Spectral centroid: power-weighted mean frequency, Hz, from 20 Hz to half the rate, noise included; `None` for silence.
 pub fn centroid_hz(segment: &[f64], rate_hz: f64) -> Option<f64> {
     let size = segment.len().next_power_of_two();
     let bins = transform(&mut RealFftPlanner::new(), &hann(segment), size);
@@ -165,7 +165,17 @@ pub fn non_harmonic_db(
     if all > 0.0 { 10.0 * (between / all).log10() } else { f64::NEG_INFINITY }
 }
 
-/// Spectrum of the whole slice through a four-term Blackman-Harris window, floor -200 dB.
+/// Spectrum of the whole slice through a four-term Blackman-Harris window, floor -200 dB. Allocates.
+///
+/// ```
+/// use chalumeau_core::analysis::spectrum::power_spectrum_db;
+///
+/// // 32 cycles in 1024 samples at half of full scale: -6 dB in bin 32.
+/// let sine = |n: u32| 0.5 * (std::f64::consts::TAU * 32.0 * f64::from(n) / 1024.0).sin();
+/// let spectrum = power_spectrum_db(&(0..1024).map(sine).collect::<Vec<f64>>(), 48_000.0);
+/// assert_eq!(spectrum.bin_hz, 46.875);
+/// assert!((spectrum.level_db[32] + 6.02).abs() < 0.01);
+/// ```
 pub fn power_spectrum_db(samples: &[f64], rate_hz: f64) -> PowerSpectrum {
     let len = samples.len().max(1);
     let windowed: Vec<f64> = samples

@@ -3,8 +3,7 @@
 //! The file is TOML in millimetres and diameters (`docs/instrument-file.md`); here everything is metres and radii. The
 //! bore is a chain of straight cones from the reed tip, holes are circular, and a fingering is a set of open holes, one
 //! fingering a note. Pads above open holes, undercutting and the shape of the mouthpiece chamber are left out.
-//! Reading never panics: whatever a program can see to be wrong is refused with the place, the value given and what
-//! would be right. The built-in clarinet and its credits are in `data/b_flat_clarinet.toml`.
+//! Reading never panics. An error names the place, the value given and what would be right. The built-in clarinet and its credits are in `data/b_flat_clarinet.toml`.
 
 use std::collections::HashMap;
 
@@ -40,7 +39,19 @@ const SHORTEST_MM: f64 = 0.01;
 /// What lengths may lose by being written with few digits, m.
 const ROUNDING_M: f64 = 2e-9;
 
-/// One instrument: Design, in the words of the house. SI units.
+/// One instrument: its bore, tone holes and fingering chart, in SI units.
+///
+/// ```
+/// use chalumeau_core::bore::instrument_file::InstrumentFile;
+///
+/// let clarinet = InstrumentFile::built_in();
+/// assert_eq!((clarinet.holes.len(), clarinet.fingerings.len()), (24, 46));
+/// // A bass clarinet is about twice as large; text and instrument convert both ways.
+/// let bass = clarinet.scaled(2.0);
+/// assert!((bass.length_m() - 1.335).abs() < 1e-3);
+/// assert_eq!(InstrumentFile::parse(&bass.to_toml()).unwrap().holes.len(), 24);
+/// assert!(InstrumentFile::parse("name = 3").is_err());
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct InstrumentFile {
     /// What a player calls it.

@@ -1,4 +1,5 @@
-//! The instrument in the frequency domain: input impedance of any fingering, its peaks, what a reed makes of them.
+//! The instrument in the frequency domain: input impedance of any fingering, its peaks, and the frequencies and thresholds
+//! at which a reed plays it.
 //!
 //! The bore is a chain of short lossy cylinders (plane waves; Zwikker & Kosten 1949, thermal and viscous boundary layers
 //! with Bessel functions), tone holes are T junctions with the length corrections of Dubos et al. (1999) and a lossy
@@ -40,7 +41,19 @@ const KEPT: usize = 8192;
 /// Where peaks are looked for, Hz, and the grid of the search: a third of the narrowest resonance of a clarinet.
 const SEARCH_HZ: (f64, f64, f64) = (20.0, 6_000.0, 2.0);
 
-/// One instrument in one air: Design for the frequency domain. Shared between threads freely.
+/// One instrument in one air, in the frequency domain. Threads may share it.
+///
+/// ```
+/// use chalumeau_core::bore::{instrument_file::InstrumentFile, transfer_matrix::TransferMatrix};
+/// use chalumeau_core::units::Air;
+///
+/// let clarinet = InstrumentFile::built_in();
+/// let matrix = TransferMatrix::new(&clarinet, Air::default());
+/// let closed = vec![false; clarinet.holes.len()];
+/// let z = matrix.impedance(440.0, &closed, clarinet.reed_volume_m3);
+/// // A passive instrument: the real part of the impedance is positive.
+/// assert!(z.re > 0.0);
+/// ```
 #[derive(Debug)]
 pub struct TransferMatrix {
     air: Air,

@@ -1,11 +1,11 @@
-//! Whose wheel bends the note that sounds: channels, MPE zones and note expressions of an instrument with one voice.
+//! Which bend wheel acts on the sounding note: channels, MPE zones and note expressions of an instrument with one voice.
 //!
-//! A note follows the wheel of its own channel, and with it that of its zone's manager. A wheel that is turned under held
-//! keys is remembered, and heard when the note it belongs to sounds again. Without a zone, the wheel of a channel that has
+//! A note follows the wheel of its own channel and that of its zone's manager. A wheel that is turned while its note is
+//! held but silent is remembered, and heard when the note sounds again. Without a zone, the wheel of a channel that has
 //! never played a note (that of a split keyboard) counts as a manager's. A tuning expression belongs to its key until the
 //! key is struck anew. When the last key has come up its note keeps its bend while it fades.
 //!
-//! Left out: what the instrument cannot play is known only there, so a note outside its range still turns the wheel.
+//! Left out: only the instrument knows its range, so a note outside it still selects a wheel.
 //! Source: MIDI Polyphonic Expression 1.0 (RP-053, 2018): MPE Configuration Message, pitch bend sensitivity of zones.
 
 use crate::control::keys::Keys;

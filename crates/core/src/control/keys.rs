@@ -1,4 +1,4 @@
-//! Which of the held keys is heard: the last one; when it comes up, the one held before it. Real-time safe.
+//! Which of the held keys sounds: the last one pressed; when it is released, the one pressed before it. Real-time safe.
 
 use crate::units::SoundingNote;
 
@@ -19,7 +19,7 @@ impl Default for Keys {
 }
 
 impl Keys {
-    /// The key that is heard.
+    /// The key that sounds; `None` while no key is held.
     pub fn last(&self) -> Option<SoundingNote> {
         self.count.checked_sub(1).map(|last| self.held[last])
     }

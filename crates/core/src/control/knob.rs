@@ -1,7 +1,16 @@
-//! The knob as breath: where it rests, how far full blow is, and what lies between.
+//! Turns the angle of the knob into breath: rest, dead zone, curve, and full blow.
 //!
-//! Angles are degrees since the device's zero, positive is blowing, and may be any number of turns. What a note needs
-//! and how the hand feels it is not known here: `haptics` bends the result for knobs that feel.
+//! Angles are degrees since the device's zero, positive is blowing, and may be any number of turns. This
+//! module does not depend on the note or on the torque; `haptics` adapts the result for knobs with a motor.
+//!
+//! ```
+//! use chalumeau_core::control::knob::{KnobBreath, KnobDesign};
+//!
+//! // One turn from rest to full blow, with a dead zone of 0.5 to 1 degree.
+//! let mut knob = KnobBreath::new(KnobDesign::default())?;
+//! assert_eq!([0.4, 360.0].map(|angle_deg| knob.pressure_unit(angle_deg)), [0.0, 1.0]);
+//! # Ok::<(), chalumeau_core::control::knob::KnobError>(())
+//! ```
 
 pub mod calibration;
 pub mod slap;
@@ -36,7 +45,7 @@ impl Default for KnobDesign {
     }
 }
 
-/// Why a design cannot be played.
+/// Why a design is refused.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum KnobError {
     /// A number is not finite.
@@ -67,7 +76,7 @@ pub enum KnobError {
 }
 
 impl KnobDesign {
-    /// Whether this can be played.
+    /// Checks all fields. The error names the first field that is out of range.
     pub fn check(&self) -> Result<(), KnobError> {
         for (field, value) in [
             ("zero_deg", self.zero_deg),
@@ -103,14 +112,14 @@ pub struct KnobBreath {
 }
 
 impl KnobBreath {
-    /// A knob at rest.
+    /// A knob at rest. Fails if the design does not pass [`check`](KnobDesign::check).
     pub fn new(design: KnobDesign) -> Result<Self, KnobError> {
         design.check()?;
         let origin_deg = design.zero_deg + design.dead_off_deg;
         Ok(Self { design, origin_deg, per_travel: 1.0 / (design.full_deg - origin_deg), blowing: false })
     }
 
-    /// What it was made from.
+    /// The design it was made from.
     pub fn design(&self) -> &KnobDesign {
         &self.design
     }

@@ -1,15 +1,25 @@
-//! MIDI channel messages in, events out: the one translation shared by the plugin and the offline renderer.
+//! Turns MIDI channel messages into events, for the plugin and for the offline renderer alike.
 //!
-//! The instrument is one voice, so channels merge: a note is a note wherever it comes from, and breath is one stream.
-//! Breath is looked for where wind controllers put it: breath controller (CC2, fine part CC34), expression (CC11, fine
+//! The instrument has one voice, so all channels play it, and their breath is one stream. Breath comes from the
+//! controllers that wind controllers use: breath controller (CC2, fine part CC34), expression (CC11, fine
 //! part CC43) and channel pressure. A controller often sends several at once, so the sources are ranked, CC2 over CC11
-//! over pressure: a source is heard until a higher one has sent its first message, and from then on only the higher
-//! one, until [`reset`](MidiDecoder::reset). Any message counts as movement, a zero too: a controller at rest is a
-//! player who does not blow. Bend follows the sounding note's channel and its MPE zone, see [`bends`](super::bends);
+//! over pressure: a source is heard until a higher one sends its first value above 0, and from then on only the higher
+//! one, until [`reset`](MidiDecoder::reset). A source that has only sent 0 does not count: some hosts send every
+//! controller once at the start. Once a source is in use, its 0 means that the player does not blow. Bend follows the sounding note's channel and its MPE zone, see [`bends`](super::bends);
 //! RPN 0 sets a bend range, RPN 6 a zone. Left out: poly pressure, pedals, program and bank.
 //!
 //! Source: MIDI 1.0 Detailed Specification 4.2.1 (1996), control change numbers and registered parameters; RP-015 for
-//! CC121; RP-053 for MPE. Data bytes above 127 are read as 127 and channels modulo 16, so that no input is wrong.
+//! CC121; RP-053 for MPE. Data bytes above 127 are read as 127 and channels modulo 16, so that every
+//! input is valid.
+//!
+//! ```
+//! use chalumeau_core::{control::midi::MidiDecoder, event::Event};
+//!
+//! let mut midi = MidiDecoder::new();
+//! // Breath controller (CC2) at 0 does not count as breath; at 64 it does.
+//! assert_eq!(midi.controller(0, 2, 0), [None, None]);
+//! assert_eq!(midi.controller(0, 2, 64), [Some(Event::Breath(64.0 / 127.0)), None]);
+//! ```
 
 use crate::control::bends::Bends;
 use crate::event::Event;
@@ -34,7 +44,7 @@ const RPN_NONE: [u8; 2] = [127, 127];
 const RPN_BEND_RANGE: [u8; 2] = [0, 0];
 const RPN_MPE_ZONE: [u8; 2] = [0, 6];
 
-/// What a message amounts to: at most two events, in order.
+/// The events of one message: at most two, in order.
 pub type Events = [Option<Event>; 2];
 
 const NOTHING: Events = [None, None];
@@ -95,7 +105,7 @@ impl Channel {
     };
 }
 
-/// Remembers what running controllers need remembered; each message gives at most two events. Real-time safe.
+/// Decodes MIDI messages; it keeps the state of controllers, bend wheels and zones. Real-time safe.
 #[derive(Clone, Debug)]
 pub struct MidiDecoder {
     channels: [Channel; 16],
@@ -237,8 +247,8 @@ impl MidiDecoder {
         (self.bends.cents() != self.bent_cents).then(|| self.bent())
     }
 
-    /// A source at rest has not moved yet: hosts that send every controller once at the start do not take the breath away
-    /// from the keys.
+    /// A source that has only sent 0 is not in use yet. Otherwise hosts that send every controller once at the start would
+    /// take the breath away from the keys.
     fn breathe(&mut self, source: Source, unit: f32) -> Events {
         if source > self.source && unit == 0.0 {
             return NOTHING;

@@ -1,4 +1,4 @@
-//! The one low-pass all sample-rate conversion here is made of: a sinc under a Kaiser window, as a function of time.
+//! The low-pass of all sample-rate conversion here: a sinc under a Kaiser window, as a function of time.
 //!
 //! Formulas for the window and its length: J. F. Kaiser, Nonrecursive digital filter design using the I0-sinh window
 //! function, ISCAS 1974. Time counts in input samples, in f64; rows of taps are f32.

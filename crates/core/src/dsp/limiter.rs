@@ -1,4 +1,4 @@
-//! A safety limiter: transparent below full scale, and a gain, not a bend, above it.
+//! A safety limiter: it changes nothing below full scale and lowers the gain above it, without distorting the waveform.
 //!
 //! The gain follows the envelope of the peaks: it falls at once and recovers slowly, so that a steady loud note is
 //! turned down without being distorted. Nothing ever leaves -1..=1.
@@ -8,7 +8,15 @@ const CEILING: f32 = 0.98;
 /// Time in which the gain recovers by a factor e, s.
 const RECOVERY_S: f64 = 0.2;
 
-/// The limiter's memory.
+/// A limiter with its envelope.
+///
+/// ```
+/// use chalumeau_core::dsp::limiter::Limiter;
+///
+/// let mut samples = [0.5, 3.0, -3.0];
+/// Limiter::new(48_000.0).process(&mut samples);
+/// assert!(samples[0] == 0.5 && samples.iter().all(|sample| sample.abs() <= 1.0));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Limiter {
     envelope: f32,
@@ -35,7 +43,7 @@ impl Limiter {
         }
     }
 
-    /// As new. Real-time safe.
+    /// Forgets the envelope, as after [`new`](Self::new). Real-time safe.
     pub fn reset(&mut self) {
         self.envelope = 0.0;
     }

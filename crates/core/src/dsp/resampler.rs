@@ -43,6 +43,20 @@ const DRIFT: f64 = 1e-4;
 ///
 /// The host asks for samples: [`pull`](Self::pull) makes as many as its inputs allow, and when it comes back short,
 /// [`push`](Self::push) gives it more. Output does not depend on how the pulls are cut. Equal rates are a pure delay.
+///
+/// ```
+/// use chalumeau_core::dsp::resampler::Resampler;
+///
+/// let mut resampler = Resampler::new(96_000.0, 48_000.0);
+/// let mut out = [0.0; 200];
+/// let mut made = resampler.pull(&mut out);
+/// while made < out.len() {
+///     resampler.push(&[1.0; 16], 1.0);
+///     made += resampler.pull(&mut out[made..]);
+/// }
+/// // A constant stays constant once the filter is full.
+/// assert!((out[199] - 1.0).abs() < 1e-6);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Resampler {
     /// `out / in = l / m` in lowest terms.

@@ -1,4 +1,4 @@
-//! Teaching the instrument a hand: *Rest* finds zero and the dead zone, *Blow hard* finds full blow.
+//! Calibration of the knob: *Rest* finds zero and the dead zone, *Blow hard* finds full blow.
 //!
 //! Each step collects readings for a moment and then either takes them or says what to do differently. Times are those
 //! of the readings, so nothing here waits or asks a clock. The thresholds are by judgement, for a knob that reads in
@@ -70,7 +70,7 @@ pub enum CalibrationError {
     /// Full blow too near to rest.
     #[error(
         "the knob went {travel_deg:.1} degrees from its rest, too little to blow with; press Blow hard again and turn \
-         it as far as your loudest note shall be, {least_deg:.0} degrees at least"
+         it to where your loudest note should be, at least {least_deg:.0} degrees"
     )]
     TooLittleTravel {
         /// From rest, degrees.
@@ -85,7 +85,7 @@ pub enum CalibrationError {
         travel_deg: f64,
     },
     /// The knob says too little.
-    #[error("only {readings} readings came from the knob; look whether it is connected, then try again")]
+    #[error("only {readings} readings came from the knob; check that it is connected, then try again")]
     TooFewReadings {
         /// How many came.
         readings: u32,

@@ -1,4 +1,4 @@
-//! How hard a tongue slap is that a knob reports. That one happened, each only once, the link finds out.
+//! Strength of a tongue slap that a knob reports. The link to the knob detects each slap once.
 
 /// Speed of the hardest slap, rad/s: what a knob may turn at before it is switched off.
 const FULL_SPEED_RAD_S: f32 = 60.0;
