@@ -7,8 +7,8 @@ use serde::{Serialize, de::DeserializeOwned};
 use super::instrument;
 use super::knob::Calibration;
 use crate::editor::WindowState;
-use crate::plugin::launch_options::LaunchOptions;
 use crate::parameters::{Kind, Number, PARAMETERS, Parameter};
+use crate::plugin::launch_options::LaunchOptions;
 
 /// Layout of the saved state. 1: ids and units as below. 2: the instrument and its file, the physical reed; a state of 1
 /// is the B flat clarinet.
