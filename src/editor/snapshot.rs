@@ -39,7 +39,7 @@ pub struct Snapshot {
     /// The last seconds of mouth pressure.
     pub history: Track,
     /// The inside of the mouthpiece, two periods of the lowest note or more.
-    pub scope: Scope,
+    pub scope: MouthpieceTraces,
     /// The sound that comes out.
     pub heard: SoundAnalysis,
     /// Standing wave of the fingering at the pitch of the note: place, m from the reed, and magnitude over that at the
@@ -72,7 +72,7 @@ impl Default for Snapshot {
             settings: Settings::default(),
             sources: Vec::new(),
             history: Track::default(),
-            scope: Scope::default(),
+            scope: MouthpieceTraces::default(),
             heard: SoundAnalysis::default(),
             standing: Vec::new(),
             status: Vec::new(),
@@ -161,7 +161,7 @@ pub struct Track {
 
 /// The inside of the mouthpiece at equal steps, oldest first; all of one length.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Scope {
+pub struct MouthpieceTraces {
     /// Values a second.
     pub rate_hz: f32,
     /// Pressure in the mouthpiece, kPa.
@@ -172,7 +172,7 @@ pub struct Scope {
     pub flow_cm3s: Vec<f32>,
 }
 
-impl Scope {
+impl MouthpieceTraces {
     /// Indices of the latest whole period at `f0_hz`.
     pub fn last_period(&self, f0_hz: f32) -> std::ops::Range<usize> {
         let length = self.mouthpiece_kpa.len().min(self.opening.len()).min(self.flow_cm3s.len());
@@ -274,10 +274,15 @@ pub struct KnobDevice {
 mod tests {
     use super::*;
 
-    fn scope(f0_hz: f32, length: usize, phase: f32) -> Scope {
+    fn scope(f0_hz: f32, length: usize, phase: f32) -> MouthpieceTraces {
         let turn = std::f32::consts::TAU * f0_hz / 48_000.0;
         let wave: Vec<f32> = (0..length).map(|n| 1.0 + (turn * n as f32 + phase).sin()).collect();
-        Scope { rate_hz: 48_000.0, opening: wave.clone(), flow_cm3s: wave.clone(), mouthpiece_kpa: wave }
+        MouthpieceTraces {
+            rate_hz: 48_000.0,
+            opening: wave.clone(),
+            flow_cm3s: wave.clone(),
+            mouthpiece_kpa: wave,
+        }
     }
 
     #[test]
@@ -304,6 +309,6 @@ mod tests {
     fn what_has_no_period_is_shown_whole() {
         assert_eq!(scope(100.0, 672, 0.0).standing_periods(0.0, 6), 0..672);
         assert_eq!(scope(0.0, 672, 0.0).standing_periods(200.0, 6), 0..672);
-        assert_eq!(Scope::default().standing_periods(200.0, 6), 0..0);
+        assert_eq!(MouthpieceTraces::default().standing_periods(200.0, 6), 0..0);
     }
 }

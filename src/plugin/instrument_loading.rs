@@ -100,7 +100,7 @@ impl SharedInstrument {
 }
 
 /// An instrument on its way to the audio thread.
-pub struct PreparedInstrument {
+pub struct SwapCandidate {
     /// Number of the activation that it was built for.
     activation: u64,
     clarinet: Box<Clarinet>,

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use chalumeau::editor::controls::{Controls, Look};
 use chalumeau::editor::snapshot::{
-    BreathSource, KnobDevice, KnobState, Scope, Severity, Snapshot, Status, Track,
+    BreathSource, KnobDevice, KnobState, MouthpieceTraces, Severity, Snapshot, Status, Track,
 };
 use chalumeau::editor::sound_analysis::SoundAnalyser;
 use chalumeau::editor::{EditorState, Tab, WindowState, draw};
@@ -392,7 +392,7 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
         settings: *settings,
         sources: breath_sources(breath_at(5.0) as f32),
         history: Track { step_s: STEP_S as f32, kpa: probes.iter().step_by(every).map(kpa).collect() },
-        scope: Scope {
+        scope: MouthpieceTraces {
             rate_hz: (0.5 * inner_hz) as f32,
             mouthpiece_kpa: thin.iter().map(|probe| (1e-3 * probe.p_mouthpiece_pa) as f32).collect(),
             opening: thin.iter().map(|probe| probe.opening as f32).collect(),

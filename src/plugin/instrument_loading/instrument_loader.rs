@@ -13,7 +13,7 @@ use nice_plug::prelude::nice_log;
 
 use super::instrument_request::InstrumentRequest;
 use super::{
-    Activation, CurrentInstrument, InstrumentSwap, NO_CHOICE, PreparedInstrument, Readiness, SharedInstrument,
+    Activation, CurrentInstrument, InstrumentSwap, NO_CHOICE, Readiness, SharedInstrument, SwapCandidate,
 };
 use crate::cache::Cache;
 use crate::plugin::params::ChalumeauParams;
@@ -35,7 +35,7 @@ pub struct InstrumentLoader {
     cache: Option<Cache>,
     activations: u64,
     /// The audio thread's ends of the rings, until an [`InstrumentSwap`] takes them.
-    ends: Option<(rtrb::Consumer<PreparedInstrument>, rtrb::Producer<Box<Clarinet>>)>,
+    ends: Option<(rtrb::Consumer<SwapCandidate>, rtrb::Producer<Box<Clarinet>>)>,
 }
 
 impl InstrumentLoader {
@@ -170,10 +170,10 @@ struct LoaderThread {
     params: Arc<ChalumeauParams>,
     shared: Arc<SharedInstrument>,
     cache: Option<Cache>,
-    to_audio: rtrb::Producer<PreparedInstrument>,
+    to_audio: rtrb::Producer<SwapCandidate>,
     from_audio: rtrb::Consumer<Box<Clarinet>>,
     /// An instrument that the ring had no room for, because the audio thread does not run.
-    waiting: Option<PreparedInstrument>,
+    waiting: Option<SwapCandidate>,
     /// The latest request, and the time when it came.
     request: Option<InstrumentRequest>,
     since: Instant,
@@ -398,7 +398,7 @@ impl LoaderThread {
             activation.current = Some(CurrentInstrument { request: request.clone(), readiness, model });
         }
         // This replaces an instrument that still waits for room: that one is worse.
-        self.waiting = Some(PreparedInstrument { activation: number, clarinet });
+        self.waiting = Some(SwapCandidate { activation: number, clarinet });
         self.push();
         Ok(())
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use super::{PreparedInstrument, SharedInstrument};
+use super::{SharedInstrument, SwapCandidate};
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::{Clarinet, Settings};
 
@@ -26,7 +26,7 @@ pub struct InstrumentSwap {
     next: Option<NextInstrument>,
     /// An old instrument that the ring back had no room for.
     old: Option<Box<Clarinet>>,
-    incoming: rtrb::Consumer<PreparedInstrument>,
+    incoming: rtrb::Consumer<SwapCandidate>,
     outgoing: rtrb::Producer<Box<Clarinet>>,
     settings: Settings,
     activation: u64,
@@ -48,7 +48,7 @@ impl InstrumentSwap {
     pub(super) fn new(
         shared: Arc<SharedInstrument>,
         playing: Box<Clarinet>,
-        incoming: rtrb::Consumer<PreparedInstrument>,
+        incoming: rtrb::Consumer<SwapCandidate>,
         outgoing: rtrb::Producer<Box<Clarinet>>,
     ) -> Self {
         Self {
@@ -126,7 +126,7 @@ impl InstrumentSwap {
     pub fn receive(&mut self) {
         self.send_back();
         while self.next.is_none() && self.old.is_none() {
-            let Ok(PreparedInstrument { activation, mut clarinet }) = self.incoming.pop() else { return };
+            let Ok(SwapCandidate { activation, mut clarinet }) = self.incoming.pop() else { return };
             if activation != self.activation {
                 self.old = Some(clarinet);
             } else {
@@ -226,7 +226,7 @@ mod tests {
 
     struct SwapEnds {
         swap: InstrumentSwap,
-        send: rtrb::Producer<PreparedInstrument>,
+        send: rtrb::Producer<SwapCandidate>,
         back: rtrb::Consumer<Box<Clarinet>>,
     }
 
@@ -253,7 +253,7 @@ mod tests {
         for (number, out) in out.chunks_mut(block).enumerate() {
             if number * block == AT {
                 let clarinet = Box::new(Clarinet::new(Arc::new(model.clone()), RATE));
-                assert!(ends.send.push(PreparedInstrument { activation: 1, clarinet }).is_ok());
+                assert!(ends.send.push(SwapCandidate { activation: 1, clarinet }).is_ok());
             }
             ends.swap.receive();
             ends.swap.render_events(said.take().into_iter().flatten(), out);
@@ -300,7 +300,7 @@ mod tests {
         let mut out = vec![0.0; AT];
         ends.swap.render_events(held(), &mut out);
         let clarinet = Box::new(Clarinet::built_in(RATE).unwrap());
-        assert!(ends.send.push(PreparedInstrument { activation: 1, clarinet }).is_ok());
+        assert!(ends.send.push(SwapCandidate { activation: 1, clarinet }).is_ok());
         ends.swap.receive();
         ends.swap.render_events([], &mut out);
         let loud = rms(&out[AT / 2..]);
@@ -320,9 +320,9 @@ mod tests {
         let model = clarinet();
         let model = model.model();
         assert!(!Arc::ptr_eq(ends.swap.clarinet().model(), model));
-        assert!(ends.send.push(PreparedInstrument { activation: 7, clarinet: clarinet() }).is_ok());
+        assert!(ends.send.push(SwapCandidate { activation: 7, clarinet: clarinet() }).is_ok());
         let new = Box::new(Clarinet::new(model.clone(), RATE));
-        assert!(ends.send.push(PreparedInstrument { activation: 1, clarinet: new }).is_ok());
+        assert!(ends.send.push(SwapCandidate { activation: 1, clarinet: new }).is_ok());
         ends.swap.receive();
         assert!(Arc::ptr_eq(ends.swap.clarinet().model(), model));
         assert!(ends.back.pop().is_ok() && ends.back.pop().is_ok() && ends.back.pop().is_err());

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use super::feel_design::knob_design;
 use crate::plugin::params::KnobParams;
-use crate::plugin::params::knob::Calibration;
+use crate::plugin::params::knob::SavedCalibration;
 use chalumeau_core::control::knob::{self, KnobDesign, Taken};
 use chalumeau_knob::device::KnobLink;
 
@@ -48,11 +48,11 @@ impl Calibrator {
             link.zero();
             (design.zero_deg, design.full_deg) = (0.0, design.full_deg - design.zero_deg);
         }
-        let measured = Calibration::of(&design);
+        let measured = SavedCalibration::of(&design);
         if let Ok(mut calibration) = knob.calibration.write() {
             *calibration = measured;
         }
-        let Calibration { travel_deg, dead_deg, .. } = measured;
+        let SavedCalibration { travel_deg, dead_deg, .. } = measured;
         Some(match taken {
             Taken::Rest { .. } => format!("rest is set; breath begins {:.1} degrees from here", dead_deg.0),
             Taken::Blow { .. } => format!("full blow is {travel_deg:.0} degrees from rest"),

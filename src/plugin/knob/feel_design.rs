@@ -1,7 +1,7 @@
 //! The feel and the calibration that the knob's parameters describe.
 
 use crate::plugin::params::KnobParams;
-use crate::plugin::params::knob::{Calibration, LawChoice, OrderChoice};
+use crate::plugin::params::knob::{LawChoice, OrderChoice, SavedCalibration};
 use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::haptics::{FeelDesign, NoteOrder};
 use chalumeau_core::units::WrittenNote;
@@ -13,7 +13,7 @@ const STUDY_MNM: f64 = 50.0;
 
 /// The feel that the parameters describe.
 pub fn feel_design(knob: &KnobParams) -> FeelDesign {
-    let calibration = knob.calibration.read().map_or_else(|_| Calibration::default(), |c| c.mended());
+    let calibration = knob.calibration.read().map_or_else(|_| SavedCalibration::default(), |c| c.mended());
     FeelDesign {
         law: match knob.law.value() {
             LawChoice::Flow => TorqueLaw::Flow,
@@ -41,7 +41,7 @@ pub fn feel_design(knob: &KnobParams) -> FeelDesign {
 
 /// Rest angle, full-blow angle, dead zone and curve from the parameters.
 pub fn knob_design(knob: &KnobParams) -> KnobDesign {
-    let calibration = knob.calibration.read().map_or_else(|_| Calibration::default(), |c| *c);
+    let calibration = knob.calibration.read().map_or_else(|_| SavedCalibration::default(), |c| *c);
     calibration.design(f64::from(knob.curve.value()))
 }
 

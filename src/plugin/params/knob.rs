@@ -94,7 +94,7 @@ pub enum ReedSource {
 
 /// Where the hand rests and how far it turns, as a state keeps it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Calibration {
+pub struct SavedCalibration {
     /// Angle of the knob at rest, degrees.
     pub rest_deg: f64,
     /// Angle from rest that is a full blow: the reference reed's closure on the reference note, degrees.
@@ -103,7 +103,7 @@ pub struct Calibration {
     pub dead_deg: (f64, f64),
 }
 
-impl Calibration {
+impl SavedCalibration {
     /// What a hand can turn comfortably, degrees.
     pub const TRAVEL_DEG: (f64, f64) = (120.0, 1_080.0);
 
@@ -138,7 +138,7 @@ impl Calibration {
     }
 }
 
-impl Default for Calibration {
+impl Default for SavedCalibration {
     fn default() -> Self {
         let design = KnobDesign::default();
         Self { rest_deg: 0.0, travel_deg: 360.0, dead_deg: (design.dead_on_deg, design.dead_off_deg) }
@@ -156,7 +156,7 @@ pub struct KnobParams {
     pub midi_port: RwLock<String>,
     /// Rest and full blow.
     #[persist = "calibration"]
-    pub calibration: RwLock<Calibration>,
+    pub calibration: RwLock<SavedCalibration>,
     /// The take last recorded, or put here by the user's project: a file's path, empty for none.
     #[persist = "take"]
     pub take: RwLock<String>,

@@ -5,7 +5,7 @@ use nice_plug::prelude::*;
 use serde::{Serialize, de::DeserializeOwned};
 
 use super::instrument;
-use super::knob::Calibration;
+use super::knob::SavedCalibration;
 use crate::editor::WindowState;
 use crate::parameters::{Kind, Number, PARAMETERS, Parameter};
 use crate::plugin::launch_options::LaunchOptions;
@@ -41,7 +41,7 @@ pub fn mend(state: &mut PluginState) {
     mend_field(state, "midiport", |text: String| text.chars().take(256).collect());
     mend_field(state, "take", |text: String| text);
     mend_field(state, "instrumentfile", |text: String| text.chars().take(instrument::PATH_MOST).collect());
-    mend_field(state, "calibration", Calibration::mended);
+    mend_field(state, "calibration", SavedCalibration::mended);
     mend_field(state, "window", WindowState::mended);
     // An older schema lacks what it lacks; a newer one is read as far as its ids are known here.
     state.fields.insert(SCHEMA_FIELD.to_owned(), SCHEMA.to_string());

@@ -12,7 +12,7 @@ use super::instrument_analysis::InstrumentAnalysis;
 use super::window_audio::AudioSnapshot;
 #[cfg(feature = "devices")]
 use crate::editor::Tab;
-use crate::editor::snapshot::{BreathSource, Scope, Severity, Snapshot, Status, Track};
+use crate::editor::snapshot::{BreathSource, MouthpieceTraces, Severity, Snapshot, Status, Track};
 #[cfg(feature = "devices")]
 use crate::editor::snapshot::{KnobDevice, KnobState};
 use crate::editor::sound_analysis::{SoundAnalyser, SoundAnalysis, WINDOW};
@@ -250,7 +250,7 @@ fn show_inside(snapshot: &mut Snapshot, inside: &AudioSnapshot) {
     snapshot.mouth_kpa = inside.now.mouth_kpa;
     snapshot.sources = source_views(&inside.breath_sources, inside.now.sounding.is_some());
     snapshot.latency_ms = (1e3 * f64::from(inside.latency_samples) / inside.host_rate_hz) as f32;
-    snapshot.scope = Scope {
+    snapshot.scope = MouthpieceTraces {
         rate_hz: inside.moments_hz as f32,
         mouthpiece_kpa: inside.moments.iter().map(|moment| moment.mouthpiece_kpa).collect(),
         opening: inside.moments.iter().map(|moment| moment.opening).collect(),

@@ -8,7 +8,7 @@ use crate::simulator::fault::{Fault, FaultKind};
 use crate::simulator::hand::SimulatedHand;
 use crate::simulator::line::SimulatedLine;
 use crate::simulator::plant::{LOOP_HZ, Plant, PlantDesign};
-use crate::simulator::stock::{StockFirmware, Value};
+use crate::simulator::stock::{OscValue, StockFirmware};
 use crate::simulator::tap::Tap;
 use crate::wire::TorqueLaw;
 use chalumeau_firmware::{Firmware, Reading, Setup};
@@ -48,7 +48,7 @@ pub struct SimulatedKnob {
     tick: u64,
     booted_at_tick: u64,
     command_nm: f64,
-    report: Option<[(&'static str, Value); 8]>,
+    report: Option<[(&'static str, OscValue); 8]>,
     extra_button: bool,
 }
 
@@ -255,7 +255,7 @@ impl SimulatedKnob {
     }
 
     /// The report of the stock firmware that is due, once.
-    pub fn take_report(&mut self) -> Option<[(&'static str, Value); 8]> {
+    pub fn take_report(&mut self) -> Option<[(&'static str, OscValue); 8]> {
         self.report.take()
     }
 

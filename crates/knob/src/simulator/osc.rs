@@ -1,6 +1,6 @@
 //! The stock firmware's reports as OSC over UDP, in its spelling or in that of its document.
 
-use crate::simulator::stock::Value;
+use crate::simulator::stock::OscValue;
 use rosc::{OscMessage, OscPacket, OscType, encoder};
 use std::io;
 use std::net::{ToSocketAddrs, UdpSocket};
@@ -65,11 +65,11 @@ impl OscSender {
     }
 
     /// Sends one report, a packet for each output as the firmware does.
-    pub fn send(&mut self, report: &[(&'static str, Value)]) {
+    pub fn send(&mut self, report: &[(&'static str, OscValue)]) {
         for (name, value) in report {
             let argument = match *value {
-                Value::Int(i) => OscType::Int(i),
-                Value::Float(f) => OscType::Float(f),
+                OscValue::Int(i) => OscType::Int(i),
+                OscValue::Float(f) => OscType::Float(f),
             };
             let addr = address(&self.device, name, self.spelling);
             let packet = OscPacket::Message(OscMessage { addr, args: vec![argument] });
@@ -89,7 +89,7 @@ mod tests {
         ear.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
         let to = ear.local_addr().unwrap().to_string();
         let mut sender = OscSender::new(&to, "TorqueTuner_001", spelling).unwrap();
-        sender.send(&[("angle_discrete", Value::Int(-7)), ("velocity", Value::Float(1.5))]);
+        sender.send(&[("angle_discrete", OscValue::Int(-7)), ("velocity", OscValue::Float(1.5))]);
         assert_eq!(sender.unsent, 0);
         let mut buffer = [0; 1500];
         (0..2)

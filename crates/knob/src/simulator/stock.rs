@@ -28,7 +28,7 @@ const REPORT_TICKS: u64 = 80;
 
 /// An argument of a report.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Value {
+pub enum OscValue {
     /// OSC `i`.
     Int(i32),
     /// OSC `f`.
@@ -107,17 +107,17 @@ impl StockFirmware {
     }
 
     /// The report due after this tick, in the order it is sent; none in most ticks.
-    pub fn report(&self) -> Option<[(&'static str, Value); 8]> {
+    pub fn report(&self) -> Option<[(&'static str, OscValue); 8]> {
         let is_plucked = i64::from(self.angle_out) < PLUCK_AT;
         self.tick.is_multiple_of(REPORT_TICKS).then_some([
-            ("angle_out", Value::Int(self.angle_out.into())),
-            ("velocity", Value::Float(self.rpm as f32)),
-            ("trigger", Value::Int(self.trigger)),
-            ("angle_discrete", Value::Int((self.angle_out / 100).into())),
-            ("flow", Value::Int(self.torque_counts)),
-            ("pluck", Value::Int(is_plucked.into())),
-            ("st", Value::Float(self.slap)),
-            ("button", Value::Int(self.presses)),
+            ("angle_out", OscValue::Int(self.angle_out.into())),
+            ("velocity", OscValue::Float(self.rpm as f32)),
+            ("trigger", OscValue::Int(self.trigger)),
+            ("angle_discrete", OscValue::Int((self.angle_out / 100).into())),
+            ("flow", OscValue::Int(self.torque_counts)),
+            ("pluck", OscValue::Int(is_plucked.into())),
+            ("st", OscValue::Float(self.slap)),
+            ("button", OscValue::Int(self.presses)),
         ])
     }
 }
@@ -150,9 +150,13 @@ mod tests {
         assert!((first + last - 2 * 1200).abs() < 120, "{first} {last}: about a third of 3600");
         assert_eq!(torques[3599], 0);
         assert!(turn(&mut firmware, 3600, 7200).iter().all(|t| *t == 0));
-        assert_eq!(firmware.report().unwrap()[0], ("angle_out", Value::Int(7200)), "no bounds");
+        assert_eq!(firmware.report().unwrap()[0], ("angle_out", OscValue::Int(7200)), "no bounds");
         turn(&mut firmware, 7200, 32_768 + 32);
-        assert_eq!(firmware.report().unwrap()[0], ("angle_out", Value::Int(32 - 32_768)), "but an overflow");
+        assert_eq!(
+            firmware.report().unwrap()[0],
+            ("angle_out", OscValue::Int(32 - 32_768)),
+            "but an overflow"
+        );
     }
 
     #[test]
@@ -197,6 +201,6 @@ mod tests {
         for tick in 0..400u64 {
             firmware.tick(0, 0.0, (tick / 50) % 2 == 1);
         }
-        assert_eq!(firmware.report().unwrap()[7], ("button", Value::Int(4)));
+        assert_eq!(firmware.report().unwrap()[7], ("button", OscValue::Int(4)));
     }
 }

@@ -48,6 +48,12 @@ impl InstrumentFile {
             );
         }
         out.push_str("]\n");
+        self.write_holes(&mut out);
+        self.write_fingerings(&mut out);
+        out
+    }
+
+    fn write_holes(&self, out: &mut String) {
         if !self.holes.is_empty() {
             out.push_str("\n# Tone holes from the reed to the bell; the chimney from the wall of the bore to the outside.\n");
         }
@@ -73,6 +79,9 @@ impl InstrumentFile {
                 let _ = writeln!(out, "description = {}", quoted(&hole.description));
             }
         }
+    }
+
+    fn write_fingerings(&self, out: &mut String) {
         out.push_str(
             "\n# One fingering a note: the holes that are open (all others are closed), the register, and the impedance peak\n\
              # that sounds.\n",
@@ -94,7 +103,6 @@ impl InstrumentFile {
                 let _ = writeln!(out, "fingers = {}", quoted(&fingering.fingers));
             }
         }
-        out
     }
 }
 
