@@ -7,7 +7,7 @@ use std::hint::black_box;
 
 use chalumeau_core::bore::lattice::{Lattice, Tip};
 use chalumeau_core::event::Event;
-use chalumeau_core::instrument::held::HeldNote;
+use chalumeau_core::instrument::held_note::HeldNote;
 use chalumeau_core::instrument::voice::{Drive, TICK};
 use chalumeau_core::instrument::{Clarinet, Model};
 use chalumeau_core::reed::{ReedState, ReedTables};

@@ -23,7 +23,7 @@ use chalumeau_knob::simulator::knob::SimulatedKnob;
 use chalumeau_knob::simulator::plant::PlantDesign;
 use chalumeau_knob::simulator::script::Script;
 use chalumeau_knob::simulator::serve::{Port, Server};
-use chalumeau_knob::touch::blower::{Blower, BlownEvents, BreathMapping, GRID};
+use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, BreathMapping, GRID};
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 
 const RATE_HZ: f64 = 48_000.0;

@@ -24,7 +24,7 @@ use chalumeau_knob::simulator::knob::SimulatedKnob;
 use chalumeau_knob::simulator::plant::PlantDesign;
 use chalumeau_knob::simulator::script::Aim;
 use chalumeau_knob::simulator::serve::{Control, Port, Server};
-use chalumeau_knob::touch::blower::{Blower, BlownEvents, Breath14, BreathMapping};
+use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, Breath14, BreathMapping};
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::wire::{Decoder, Feel, Message, TorqueLaw};
 use knob::{FirmwareKnob, PtyKnob, recorder, soon};

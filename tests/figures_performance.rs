@@ -10,7 +10,7 @@ use chalumeau_core::analysis::overview::{Envelope, Overview, Watcher};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, RequirementSolver, TorqueLimits, torque_law};
-use chalumeau_core::instrument::felt::played_reed;
+use chalumeau_core::instrument::feel_inputs::played_reed;
 use chalumeau_core::instrument::{Clarinet, Settings};
 use chalumeau_core::measure::bifurcation;
 use chalumeau_core::reed::ReedTables;

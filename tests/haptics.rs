@@ -15,8 +15,8 @@ use chalumeau_core::haptics::{
     FeelDesign, FeelRefused, FeelTable, NoteOrder, NoteRequirement, PlayedReed, RequirementSolver,
     TorqueLimits,
 };
-use chalumeau_core::instrument::felt::{played_reed, requirements};
-use chalumeau_core::instrument::held::HeldNote;
+use chalumeau_core::instrument::feel_inputs::{played_reed, requirements};
+use chalumeau_core::instrument::held_note::HeldNote;
 use chalumeau_core::instrument::voice::{Drive, TICK, Voice};
 use chalumeau_core::instrument::{Model, Settings};
 use chalumeau_core::reed::physical::P_REF_PA;

@@ -17,7 +17,7 @@ use chalumeau_core::analysis::to_f64;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::event::Event;
-use chalumeau_core::instrument::held::{HeldNote, Start, TONGUE_HOLD_S};
+use chalumeau_core::instrument::held_note::{HeldNote, Start, TONGUE_HOLD_S};
 use chalumeau_core::instrument::prepare::{Preparation, Progress, auto_tune};
 use chalumeau_core::instrument::voice::{Drive, TICK};
 use chalumeau_core::instrument::{Clarinet, Model, Quality, Settings, Tuning, Wanted};

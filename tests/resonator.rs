@@ -12,7 +12,7 @@ use chalumeau_core::analysis::impedance::{Impedance, reflectance};
 use chalumeau_core::bore::fit::networks;
 use chalumeau_core::bore::lattice::{Lattice, LatticeCoeffs, Real, Tip};
 use chalumeau_core::bore::transfer_matrix::{TransferMatrix, find_peaks, threshold_gamma};
-use chalumeau_core::instrument::held::HeldNote;
+use chalumeau_core::instrument::held_note::HeldNote;
 use chalumeau_core::instrument::model::{INTERNAL_RATES_HZ, Model};
 use chalumeau_core::instrument::voice::{Drive, TICK, Voice};
 use chalumeau_core::reed::physical::P_REF_PA;

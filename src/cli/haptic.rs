@@ -8,7 +8,7 @@ use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::torque_law;
 use chalumeau_core::haptics::{FeelTable, NoteFeel, RequirementSolver, TorqueLimits};
 use chalumeau_core::instrument::Settings;
-use chalumeau_core::instrument::felt::played_reed;
+use chalumeau_core::instrument::feel_inputs::played_reed;
 use chalumeau_core::reed::ReedTables;
 use clap::Args;
 

@@ -15,7 +15,7 @@ use chalumeau_core::score::breath::BreathCurve;
 use chalumeau_core::score::breath::GAMMA_MAX;
 use chalumeau_core::score::midi_file;
 use chalumeau_core::units::{SoundingNote, WrittenNote};
-use chalumeau_knob::touch::blower::{Blower, BlownEvents, BreathMapping};
+use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, BreathMapping};
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::touch::take::Take;
 use clap::{ArgGroup, Args};

@@ -28,7 +28,7 @@ use crate::plugin::params::ChalumeauParams;
 use chalumeau_core::haptics::FeelTable;
 use chalumeau_core::units::SoundingNote;
 use chalumeau_knob::device::LinkStatus;
-use chalumeau_knob::touch::blower::BreathMapping;
+use chalumeau_knob::touch::breath_from_angle::BreathMapping;
 use chalumeau_knob::touch::feel::InstrumentFeel;
 use chalumeau_knob::touch::take::Take;
 use chalumeau_knob::wire::message;

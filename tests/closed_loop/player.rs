@@ -12,7 +12,7 @@ use chalumeau_knob::device::transport::Binding;
 use chalumeau_knob::simulator::hand::{HandDesign, SimulatedHand};
 use chalumeau_knob::simulator::knob::{PERIOD_US, SimulatedKnob};
 use chalumeau_knob::simulator::plant::PlantDesign;
-use chalumeau_knob::touch::blower::{self, Blower, BlownEvents, GRID};
+use chalumeau_knob::touch::breath_from_angle::{self, Blower, BlownEvents, GRID};
 use chalumeau_knob::touch::feel::PitchMaps;
 use chalumeau_knob::wire::Feel;
 use std::sync::Arc;

@@ -16,7 +16,7 @@ use chalumeau::editor::{EditorState, Tab, WindowState, draw};
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::event::Event;
 use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, PlayedReed, RequirementSolver, TorqueLimits};
-use chalumeau_core::instrument::{Clarinet, Probe, Settings, Tuning, felt};
+use chalumeau_core::instrument::{Clarinet, Probe, Settings, Tuning, feel_inputs};
 use chalumeau_core::reed::PhysicalReed;
 use chalumeau_core::units::WrittenNote;
 use egui_kittest::Harness;
@@ -368,8 +368,8 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
 
     let fingering = model.fingering_for(note).unwrap();
     let open = &model.file.fingerings[fingering].open;
-    let bore = felt::requirements(&model);
-    let reed = felt::played_reed(&model.file, settings);
+    let bore = feel_inputs::requirements(&model);
+    let reed = feel_inputs::played_reed(&model.file, settings);
     let feel = feel_of(&bore, &reed, fingering);
     let angle_deg = feel.as_ref().ok().map(|feel| feel.map.angle_deg(f64::from(mouth_kpa) * 1e3) as f32);
     let torque_mnm = feel.as_ref().ok().zip(angle_deg).map(|(feel, deg)| {

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use anyhow::{Context, Result, bail, ensure};
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::cells::Cells;
-use chalumeau_core::instrument::held::HeldNote;
+use chalumeau_core::instrument::held_note::HeldNote;
 use chalumeau_core::instrument::model::INTERNAL_RATES_HZ;
 use chalumeau_core::instrument::prepare::auto_tune;
 use chalumeau_core::instrument::prepare::{self, Preparation, PreparedInstrument, Progress};

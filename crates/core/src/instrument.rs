@@ -18,11 +18,13 @@
 //! ```
 
 pub mod bend;
+mod breath_noise;
 mod clarinet;
-pub mod felt;
-pub mod held;
+pub mod feel_inputs;
+pub mod held_note;
 pub mod lip;
 pub mod model;
+mod output_level;
 pub mod player;
 pub mod prepare;
 pub mod scope;

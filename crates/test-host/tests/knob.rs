@@ -15,7 +15,7 @@ use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::haptics::FeelDesign;
 use chalumeau_core::instrument::{Clarinet, Settings};
 use chalumeau_core::units::{SoundingNote, cents};
-use chalumeau_knob::touch::blower::{Blower, BlownEvents, BreathMapping};
+use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, BreathMapping};
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::touch::take::Take;
 use chalumeau_test_host::clap::{At, Say};

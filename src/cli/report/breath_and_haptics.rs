@@ -5,7 +5,7 @@ use crate::cli::score_args::RenderJob;
 use chalumeau_core::haptics::torque_law::torque_mnm;
 use chalumeau_core::haptics::{FeelDesign, FeelRefused, FeelTable, NoteFeel, NoteRequirement, TorqueLimits};
 use chalumeau_core::instrument::Settings;
-use chalumeau_core::instrument::felt::played_reed;
+use chalumeau_core::instrument::feel_inputs::played_reed;
 use chalumeau_core::measure::bifurcation;
 use chalumeau_core::measure::bifurcation::SOUNDING_RMS;
 use chalumeau_core::reed::ReedTables;

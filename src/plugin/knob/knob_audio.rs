@@ -13,7 +13,7 @@ use chalumeau_core::control::knob::slap_strength;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::Settings;
 use chalumeau_knob::device::KnobReader;
-use chalumeau_knob::touch::blower::{Blower, BlownEvents, Breath14, BreathMapping, GRID};
+use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, Breath14, BreathMapping, GRID};
 use chalumeau_knob::touch::feel::NO_MOTOR;
 use chalumeau_knob::touch::take::Take;
 

@@ -19,7 +19,7 @@ use chalumeau_core::units::WrittenNote;
 use chalumeau_knob::device::{
     Hooks, KnobChoice, KnobLink, KnobReader, LinkStatus, StateSample, serial_number, serial_text,
 };
-use chalumeau_knob::touch::blower::BreathMapping;
+use chalumeau_knob::touch::breath_from_angle::BreathMapping;
 use chalumeau_knob::touch::feel::InstrumentFeel;
 use chalumeau_knob::touch::take::{Take, TakeRow};
 

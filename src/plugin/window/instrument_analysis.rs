@@ -6,7 +6,7 @@ use crate::plugin::instrument_loading::CurrentInstrument;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, NoteRequirement, TorqueLimits};
-use chalumeau_core::instrument::{Model, Settings, felt};
+use chalumeau_core::instrument::{Model, Settings, feel_inputs};
 use chalumeau_knob::touch::feel::InstrumentFeel;
 
 /// An instrument, analysed once, with the latest results for a fingering.
@@ -53,7 +53,7 @@ impl InstrumentAnalysis {
 
     /// What a fingering requires of the breath with this reed; `None` if it does not sound.
     pub fn requirement(&self, fingering: usize, settings: &Settings) -> Option<NoteRequirement> {
-        let reed = felt::played_reed(&self.model.file, settings);
+        let reed = feel_inputs::played_reed(&self.model.file, settings);
         self.feels.requirements().note(fingering, &reed)
     }
 

@@ -1,7 +1,7 @@
 //! How a clarinet shall feel: the choices of the user, with their ranges and defaults.
 
+use crate::haptics::feel_parameters::TorqueLaw;
 use crate::haptics::feel_refused::FeelRefused;
-use crate::haptics::parameters::TorqueLaw;
 use crate::units::WrittenNote;
 
 /// What decides which note feels harder to blow than which.

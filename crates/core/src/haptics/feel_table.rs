@@ -11,8 +11,8 @@
 
 use crate::haptics::angle_map::AngleMap;
 use crate::haptics::feel_design::{FeelDesign, NoteOrder};
+use crate::haptics::feel_parameters::{Feel, TorqueLaw};
 use crate::haptics::feel_refused::FeelRefused;
-use crate::haptics::parameters::{Feel, TorqueLaw};
 use crate::haptics::played_reed::PlayedReed;
 use crate::haptics::requirement::{NoteRequirement, RequirementSolver};
 use crate::haptics::torque_law;

@@ -1,6 +1,6 @@
 //! The reed as it is played: its law, the embouchure, and the lip for every fingering.
 //!
-//! [`crate::instrument::felt::played_reed`] makes one from the settings of the instrument, with the player's rule for the
+//! [`crate::instrument::feel_inputs::played_reed`] makes one from the settings of the instrument, with the player's rule for the
 //! lip.
 
 use crate::reed::ReedLaw;

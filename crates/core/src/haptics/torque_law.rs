@@ -14,7 +14,7 @@
 //! - Below -100 degrees there is the slap spring, of at most `scale`; beyond the wall there is the spring of the wall.
 //! - *free*: none of these.
 
-use crate::haptics::parameters::{Feel, TorqueLaw};
+use crate::haptics::feel_parameters::{Feel, TorqueLaw};
 use crate::reed::ReedTables;
 
 /// Angle below which the slap spring acts, degrees. An offset below 0 moves it.

@@ -11,6 +11,7 @@ use crate::dsp::resampler::Resampler;
 use crate::event::{Event, Timed};
 use crate::instrument::lip::embouchure;
 use crate::instrument::model::{BuildError, Model};
+use crate::instrument::output_level::OutputLevel;
 use crate::instrument::player::{Player, PlayerState};
 use crate::instrument::scope::Scope;
 use crate::instrument::settings::Settings;
@@ -19,12 +20,7 @@ use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
 use crate::reed::motion::TONGUE_FORCE;
 use crate::reed::{MovingReed, ReedCoeffs};
-use crate::units::REFERENCE_RADIUS_M;
 
-/// Full scale per pascal at 1 m from a B flat clarinet: 1 Pa is -6 dBFS. A larger instrument is heard from further away,
-/// in proportion to its nominal bore. So two instruments that differ only in size are equally loud, and a bass does not
-/// drive the limiter all the time.
-const FULL_SCALE_PER_PA: f64 = 0.501_187_233_627_272_2;
 /// Samples up to this magnitude count as silence: -120 dBFS.
 const SILENCE: f32 = 1e-6;
 /// Samples of silence after which a resting instrument counts as silent.
@@ -79,10 +75,7 @@ pub struct Clarinet {
     limiter: Limiter,
     scope: Scope,
     scope_on: bool,
-    full_scale_per_pa: f64,
-    gain: f32,
-    gain_wanted: f32,
-    gain_step: f32,
+    level: OutputLevel,
     /// Samples of silence since the player came to rest.
     quiet: u32,
     resets: u64,
@@ -120,8 +113,7 @@ impl Clarinet {
         };
         with_voice!(&mut voice, voice => voice.hold_reed(TONGUE_FORCE));
         let resampler = Resampler::new(rate, host_rate_hz);
-        let full_scale_per_pa = FULL_SCALE_PER_PA * (REFERENCE_RADIUS_M / model.file.nominal_radius_m);
-        let gain = gain_of(&Settings::default(), full_scale_per_pa);
+        let level = OutputLevel::new(model.file.nominal_radius_m, host_rate_hz);
         let scope = Scope::new(rate, model.lowest_hz);
         Self {
             model,
@@ -131,11 +123,7 @@ impl Clarinet {
             limiter: Limiter::new(host_rate_hz),
             scope,
             scope_on: false,
-            full_scale_per_pa,
-            gain,
-            gain_wanted: gain,
-            // A change of gain takes 20 ms per factor of one.
-            gain_step: (1.0 / (0.02 * host_rate_hz)) as f32,
+            level,
             quiet: 0,
             resets: 0,
         }
@@ -144,7 +132,7 @@ impl Clarinet {
     /// Takes new settings, clamped to their ranges; they are heard from the next control tick on. Real-time safe.
     pub fn set_settings(&mut self, settings: &Settings) {
         self.player.set_settings(settings);
-        self.gain_wanted = gain_of(self.player.settings(), self.full_scale_per_pa);
+        self.level.set(self.player.settings());
     }
 
     /// Handles an event now. Real-time safe.
@@ -156,7 +144,7 @@ impl Clarinet {
     /// Takes over keys, breath and bend from another instrument, which this new one replaces. Real-time safe.
     pub fn carry_on(&mut self, from: &Self) {
         with_voice!(&mut self.voice, voice => self.player.carry_on(&from.player, &self.model, voice));
-        self.gain = self.gain_wanted;
+        self.level.settle();
     }
 
     /// Overwrites `out` with the next samples, mono. Real-time safe.
@@ -224,13 +212,7 @@ impl Clarinet {
                 });
                 made += self.resampler.pull(&mut out[made..]);
             }
-            for sample in &mut *out {
-                if self.gain != self.gain_wanted {
-                    let step = (self.gain_wanted - self.gain) * self.gain_step;
-                    self.gain = if step.abs() < 1e-9 { self.gain_wanted } else { self.gain + step };
-                }
-                *sample *= self.gain;
-            }
+            self.level.apply(out);
             if out.iter().sum::<f32>().is_finite() {
                 // The loudest altissimo comes within 1 dB of full scale; the limiter acts only above that.
                 self.limiter.process(out);
@@ -263,7 +245,7 @@ impl Clarinet {
         });
         self.resampler.reset();
         self.limiter.reset();
-        self.gain = self.gain_wanted;
+        self.level.settle();
         self.quiet = 0;
     }
 
@@ -313,8 +295,4 @@ impl Clarinet {
             AnyVoice::Double(_) => unreachable!("single precision at live rates only"),
         }
     }
-}
-
-fn gain_of(settings: &Settings, full_scale_per_pa: f64) -> f32 {
-    (full_scale_per_pa * 10.0_f64.powf(f64::from(settings.gain_db) / 20.0)) as f32
 }

@@ -6,7 +6,7 @@
 //! fingering and bend ask for.
 
 mod breath;
-mod carry;
+mod carry_on;
 mod fingers;
 mod posture;
 mod reed_control;

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::bore::lattice::{Lattice, LatticeCoeffs, Real, Tip};
+use crate::instrument::breath_noise::BreathNoise;
 use crate::reed::ReedCoeffs;
 use crate::reed::ReedState;
 use crate::reed::ReedTables;
@@ -13,14 +14,6 @@ use crate::units::Air;
 pub const TICK: usize = 16;
 /// Ticks between two flushes of states that are too small to hear.
 const FLUSH_TICKS: u32 = 64;
-/// Breath noise at `noise` = 1: rms of the noise flow over the mean flow it rides on (by level: -40 dB under
-/// a mezzo-forte fundamental at the default 0.3).
-const NOISE_FLOW: f64 = 0.018;
-/// Below this flow the jet is laminar and quiet: a Reynolds number of 25 in a channel 13 mm wide, about a hundredth of
-/// the flow in a soft note. After the breath has ended, the flow in the bore decays only as 1 / t; it must not hiss.
-const LAMINAR_FLOW: f64 = 0.002;
-/// Corners of the noise band, Hz: turbulence in the channel is broad around a few kHz (physics notes, by judgement).
-const NOISE_BAND_HZ: (f64, f64) = (600.0, 5_000.0);
 
 /// One sample of the inside of the instrument, at the internal rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -68,12 +61,7 @@ struct Mouth {
     p_mouth_glide: f64,
     tongue: f64,
     tongue_glide: f64,
-    noise: f64,
-    random: u64,
-    noise_low: f64,
-    noise_band: f64,
-    noise_corners: (f64, f64),
-    hiss: [f64; TICK],
+    noise: BreathNoise,
     flows: [f64; TICK],
     last_flow: f64,
     /// Radiated pressure at 1 m per change of flow, Pa.
@@ -84,31 +72,7 @@ struct Mouth {
     flow_unit: f64,
 }
 
-/// Seed of the breath noise: any constant does; with a constant, renders repeat.
-const NOISE_SEED: u64 = 0x9E37_79B9_7F4A_7C15;
-
 impl Mouth {
-    /// Turbulence for the next tick: white noise between two corners. Computed outside the loop over samples, which has no
-    /// registers to spare.
-    ///
-    /// The white noise comes from a linear congruential generator (Knuth, The Art of Computer Programming 2, 3.3.4: MMIX);
-    /// its upper bits are heard, uniform with unit variance.
-    fn breathe(&mut self) {
-        if self.noise == 0.0 {
-            return;
-        }
-        let (low, high) = self.noise_corners;
-        let unit = high * 1.732_050_807_568_877_2 / (1_u64 << 63) as f64;
-        let (mut random, mut smooth, mut drift) = (self.random, self.noise_low, self.noise_band);
-        for hiss in &mut self.hiss {
-            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            smooth += unit * (random as i64) as f64 - high * smooth;
-            drift += low * (smooth - drift);
-            *hiss = smooth - drift;
-        }
-        (self.random, self.noise_low, self.noise_band) = (random, smooth, drift);
-    }
-
     /// Radiates a tick's flows: the pressure of a small source is proportional to the change of its flow.
     fn radiate(&mut self) {
         let mut before = self.last_flow;
@@ -130,9 +94,7 @@ impl<F: Real> Tip<F> for Mouth {
     fn reflect(&mut self, p_minus: F) -> F {
         self.p_mouth += self.p_mouth_glide;
         self.tongue += self.tongue_glide;
-        // Turbulence rides on the jet: no flow, no noise.
-        let turbulent = (self.state.flow.abs() - LAMINAR_FLOW).max(0.0);
-        let noise = self.noise * turbulent * self.hiss[self.at & (TICK - 1)];
+        let noise = self.noise.flow(self.state.flow, self.at);
         let p_plus = self.state.tick(
             &self.reed,
             self.tables,
@@ -172,7 +134,6 @@ impl<F: Real> Voice<F> {
     ) -> Self {
         let rate = coeffs.rate_hz;
         let flow_unit = P_REF_PA / air.z_c(coeffs.nominal_radius_m);
-        let corner = |hz: f64| 1.0 - (-std::f64::consts::TAU * hz / rate).exp();
         Self {
             lattice: Lattice::new(coeffs),
             mouth: Mouth {
@@ -184,12 +145,7 @@ impl<F: Real> Voice<F> {
                 p_mouth_glide: 0.0,
                 tongue: 0.0,
                 tongue_glide: 0.0,
-                noise: 0.0,
-                random: NOISE_SEED,
-                noise_low: 0.0,
-                noise_band: 0.0,
-                noise_corners: (corner(NOISE_BAND_HZ.0), corner(NOISE_BAND_HZ.1)),
-                hiss: [0.0; TICK],
+                noise: BreathNoise::new(rate),
                 flows: [0.0; TICK],
                 last_flow: 0.0,
                 loudness: air.rho / (4.0 * std::f64::consts::PI) * flow_unit * rate,
@@ -237,9 +193,8 @@ impl<F: Real> Voice<F> {
         mouth.reed = drive.reed;
         mouth.p_mouth_glide = (drive.p_mouth - mouth.p_mouth) / TICK as f64;
         mouth.tongue_glide = (drive.tongue - mouth.tongue) / TICK as f64;
-        mouth.noise = drive.noise * NOISE_FLOW;
         mouth.at = 0;
-        mouth.breathe();
+        mouth.noise.fill(drive.noise);
         self.lattice.run(TICK, mouth);
         mouth.radiate();
         (mouth.p_mouth, mouth.tongue) = (drive.p_mouth, drive.tongue);
@@ -270,8 +225,8 @@ impl<F: Real> Voice<F> {
         let mouth = &mut self.mouth;
         mouth.state = ReedState::default();
         (mouth.p_mouth, mouth.p_mouth_glide, mouth.tongue, mouth.tongue_glide) = (0.0, 0.0, 0.0, 0.0);
-        (mouth.noise_low, mouth.noise_band, mouth.last_flow) = (0.0, 0.0, 0.0);
-        mouth.random = NOISE_SEED;
+        mouth.last_flow = 0.0;
+        mouth.noise.reset();
         mouth.out = [0.0; TICK];
         self.ticks = 0;
     }

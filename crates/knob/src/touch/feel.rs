@@ -4,7 +4,7 @@ use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::{
     AngleMap, FeelDesign, FeelRefused, FeelTable, RequirementSolver, TorqueLimits,
 };
-use chalumeau_core::instrument::felt::{played_reed, requirements};
+use chalumeau_core::instrument::feel_inputs::{played_reed, requirements};
 use chalumeau_core::instrument::{BuildError, Model, Settings};
 use chalumeau_core::units::SoundingNote;
 use std::sync::{Arc, LazyLock};

@@ -1,6 +1,6 @@
 //! Ranges of the fields that have one. A value outside is refused with its frame, never clamped.
 
-pub use chalumeau_core::haptics::parameters::*;
+pub use chalumeau_core::haptics::feel_parameters::*;
 
 /// Torque ceiling of ARM and ALIVE, mNm.
 pub const CEILING_MNM: FieldRange = FieldRange::new("ceiling_mnm", 0.0, 450.0);

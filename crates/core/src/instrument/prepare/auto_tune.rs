@@ -8,7 +8,7 @@
 use std::ops::ControlFlow;
 
 use crate::analysis::pitch;
-use crate::instrument::held::HeldNote;
+use crate::instrument::held_note::HeldNote;
 use crate::instrument::model::Model;
 use crate::instrument::tuning_table::{GAMMA_NODES, NATURAL_GAMMA, NoteTuning, TuningTable};
 use crate::parallel;

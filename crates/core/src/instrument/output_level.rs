@@ -1,0 +1,53 @@
+//! Output level: from radiated pressure to full scale, and the gain on top of it.
+
+use crate::instrument::settings::Settings;
+use crate::units::REFERENCE_RADIUS_M;
+
+/// Full scale per pascal at 1 m from a B flat clarinet: 1 Pa is -6 dBFS. A larger instrument is heard from further away,
+/// in proportion to its nominal bore. So two instruments that differ only in size are equally loud, and a bass does not
+/// drive the limiter all the time.
+const FULL_SCALE_PER_PA: f64 = 0.501_187_233_627_272_2;
+/// Time that a change of the gain by a factor of one takes, s.
+const GAIN_S: f64 = 0.02;
+
+/// The gain of one instrument, which follows its setting without a click.
+pub(super) struct OutputLevel {
+    full_scale_per_pa: f64,
+    gain: f32,
+    target: f32,
+    step: f32,
+}
+
+impl OutputLevel {
+    /// At the default setting, for an instrument of this nominal radius, m, and the host's rate, Hz.
+    pub fn new(nominal_radius_m: f64, host_rate_hz: f64) -> Self {
+        let full_scale_per_pa = FULL_SCALE_PER_PA * (REFERENCE_RADIUS_M / nominal_radius_m);
+        let gain = gain(&Settings::default(), full_scale_per_pa);
+        Self { full_scale_per_pa, gain, target: gain, step: (1.0 / (GAIN_S * host_rate_hz)) as f32 }
+    }
+
+    /// Goes to the gain of these settings.
+    pub fn set(&mut self, settings: &Settings) {
+        self.target = gain(settings, self.full_scale_per_pa);
+    }
+
+    /// Arrives at once.
+    pub fn settle(&mut self) {
+        self.gain = self.target;
+    }
+
+    /// Pascals become samples.
+    pub fn apply(&mut self, out: &mut [f32]) {
+        for sample in out {
+            if self.gain != self.target {
+                let step = (self.target - self.gain) * self.step;
+                self.gain = if step.abs() < 1e-9 { self.target } else { self.gain + step };
+            }
+            *sample *= self.gain;
+        }
+    }
+}
+
+fn gain(settings: &Settings, full_scale_per_pa: f64) -> f32 {
+    (full_scale_per_pa * 10.0_f64.powf(f64::from(settings.gain_db) / 20.0)) as f32
+}
