@@ -12,7 +12,7 @@ use chalumeau_knob::device::transport::Binding;
 use chalumeau_knob::simulator::hand::{HandDesign, SimulatedHand};
 use chalumeau_knob::simulator::knob::{PERIOD_US, SimulatedKnob};
 use chalumeau_knob::simulator::plant::PlantDesign;
-use chalumeau_knob::touch::breath_from_angle::{self, Blower, BlownEvents, GRID};
+use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, BreathMapping, GRID};
 use chalumeau_knob::touch::feel::PitchMaps;
 use chalumeau_knob::wire::Feel;
 use std::sync::Arc;
@@ -28,7 +28,7 @@ pub struct LoopPlayer {
     writer: KnobWriter,
     reader: KnobReader,
     blower: Blower,
-    hand: blower::BreathMapping,
+    hand: BreathMapping,
     full_pa: f64,
     rendered: u64,
     is_sounding: bool,
@@ -57,7 +57,7 @@ impl LoopPlayer {
             writer,
             reader,
             blower: Blower::default(),
-            hand: blower::BreathMapping { maps, design: KnobDesign::default(), feels: true },
+            hand: BreathMapping { maps, design: KnobDesign::default(), feels: true },
             full_pa: 1e3 * f64::from(settings.breath_full_kpa),
             rendered: 0,
             is_sounding: false,
