@@ -200,13 +200,13 @@ impl SettingsArgs {
         for Given { parameter, value, typed } in given {
             match (parameter.sets, value) {
                 (Some(Sets::ReedFace), Value::Choice(1)) => measured.is_used = true,
-                (Some(Sets::Reed(..)), Value::Number(value)) => {
-                    if measured.replace(parameter.id, f64::from(*value)).is_some() {
-                        let Parameter { flag, name, .. } = parameter;
-                        return Err(Failure::Usage(format!(
-                            "{flag} and {typed} both set {name}; give one of them"
-                        )));
-                    }
+                (Some(Sets::Reed(..)), Value::Number(value))
+                    if measured.replace(parameter.id, f64::from(*value)).is_some() =>
+                {
+                    let Parameter { flag, name, .. } = parameter;
+                    return Err(Failure::Usage(format!(
+                        "{flag} and {typed} both set {name}; give one of them"
+                    )));
                 }
                 _ => {}
             }

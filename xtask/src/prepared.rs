@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::cells::Cells;
 use chalumeau_core::instrument::held_note::HeldNote;
-use chalumeau_core::instrument::model::INTERNAL_RATES_HZ;
+use chalumeau_core::instrument::internal_rate::INTERNAL_RATES_HZ;
 use chalumeau_core::instrument::prepare::auto_tune;
 use chalumeau_core::instrument::prepare::{self, Preparation, PreparedInstrument, Progress};
 use chalumeau_core::instrument::tuning_table::{GAMMA_NODES, NATURAL_GAMMA};
@@ -20,7 +20,7 @@ use crate::generated::{read, write};
 /// A refit may differ by this share of a radius: rounding of another processor, not another bore.
 const RADIUS_TOLERANCE: f64 = 2e-3;
 /// How far a played note may be from its pitch when a committed trim is checked, cents.
-const CENTS_TOLERANCE: f64 = 0.5;
+const CENTS_TOLERANCE: f64 = 0.12;
 /// Highest written note that is checked; above it fingerings are unreliable.
 const HIGHEST_WRITTEN: u8 = 92;
 /// Of all instruments but the first, every so manieth note is checked.

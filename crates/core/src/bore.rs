@@ -24,6 +24,7 @@ pub mod cylinder;
 pub mod fit;
 pub mod instrument_file;
 pub mod lattice;
+pub mod radiation;
 pub mod tone_hole;
 pub mod transfer_matrix;
 pub mod wall_loss;

@@ -22,6 +22,7 @@ mod breath_noise;
 mod clarinet;
 pub mod feel_inputs;
 pub mod held_note;
+pub mod internal_rate;
 pub mod lip;
 pub mod model;
 mod output_level;

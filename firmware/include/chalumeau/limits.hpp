@@ -1,4 +1,5 @@
-// The last thing between a law and a motor: the ceiling of the user, of the device, of the compiler, and of heat.
+// Limits of torque and speed. Torque is clamped last, between the law and the motor: by the ceiling of the user, of the
+// device, of the compiler, and of heat.
 #pragma once
 
 #include "law.hpp"
@@ -8,6 +9,10 @@ namespace chalumeau {
 
 /// 45 Ncm, whatever anybody asks.
 constexpr float HARD_CAP_MNM = CEILING_MOST_MNM;
+/// Speed above which the motor is switched off, rad/s.
+constexpr float OVER_SPEED = 60.0F;
+/// A knob that turns faster than this is not armed, rad/s.
+constexpr float ARM_SPEED = 2.0F;
 /// Heat is a mean of the squared torque over this time.
 constexpr float THERMAL_S = 10.0F;
 /// How fast the ceiling sinks to the continuous rating and rises again, mNm/s: not to be felt as a step (judgement).

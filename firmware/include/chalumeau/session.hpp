@@ -2,6 +2,7 @@
 // `docs/protocol.md`, "Session" and "Safety". The watchdog is in `watchdog.hpp`.
 #pragma once
 
+#include "limits.hpp"
 #include "messages.hpp"
 #include "watchdog.hpp"
 
@@ -9,8 +10,6 @@ namespace chalumeau {
 
 constexpr std::uint32_t FADE_MS = 50;
 constexpr std::uint32_t SOFT_START_MS = 250;
-constexpr float ARM_SPEED = 2.0F;    // rad/s; a knob that turns faster is not armed
-constexpr float OVER_SPEED = 60.0F;  // rad/s
 
 /// Faults that last as long as their cause does, each one bit of a byte.
 class StandingFaults {

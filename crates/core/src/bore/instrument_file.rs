@@ -22,13 +22,10 @@ mod words;
 pub use csv::{ImportDetails, ImportError, Sheet};
 pub use error::InstrumentError;
 use limits::*;
+pub use limits::{MAX_HOLES, MAX_SEGMENTS};
 use raw::{Lined, RawFile, RawFingering, RawHole, RawSegment};
 use words::{Place, Word, Words};
 
-/// Most tone holes a file may have; a full Boehm clarinet has 24.
-pub const MAX_HOLES: usize = 40;
-/// Most cones a bore may be made of.
-pub const MAX_SEGMENTS: usize = 256;
 /// The registers a fingering may name, low to high.
 pub const REGISTERS: [&str; 4] = ["chalumeau", "throat", "clarion", "altissimo"];
 

@@ -11,11 +11,9 @@
 use num_complex::Complex64;
 
 use crate::bore::instrument_file::ToneHole;
+use crate::bore::radiation::{END_CORRECTION, RESISTANCE};
 use crate::bore::transfer_matrix::bessel_ratio;
 use crate::units::Air;
-
-/// Unflanged end correction over the radius.
-pub const END_CORRECTION: f64 = 0.6133;
 
 /// Design of one hole's network, SI units (acoustic: Pa, m3/s).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,7 +51,7 @@ impl HoleNetwork {
         let m2 = mass * (h * (viscous - split) + outer);
         // Resistance of the end in parallel with its own mass is r0 = (0.6133^2 / 0.25) rho c / S; in parallel with the
         // larger m2 the same power is radiated by r0 (m2 / m_end)^2.
-        let r_end = END_CORRECTION * END_CORRECTION / 0.25 * air.rho * air.c / area_m2;
+        let r_end = END_CORRECTION * END_CORRECTION / RESISTANCE * air.rho * air.c / area_m2;
         Self {
             m1: mass * (inner + split * h),
             c: area_m2 * h / (air.rho * air.c * air.c),

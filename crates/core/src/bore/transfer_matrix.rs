@@ -29,6 +29,7 @@ use std::sync::PoisonError;
 use num_complex::Complex64;
 
 use crate::bore::instrument_file::InstrumentFile;
+use crate::bore::radiation;
 use crate::parallel;
 use crate::units::Air;
 
@@ -369,7 +370,7 @@ impl TransferMatrix {
         });
         let shunts = self.holes.iter().map(|hole| {
             let Losses { gamma, z_c } = losses[hole.radius];
-            let z_rad = radiation(omega, self.radii_m[hole.radius], &self.air);
+            let z_rad = radiation::impedance(omega, self.radii_m[hole.radius], &self.air);
             let tanh = tanh(gamma * hole.chimney_m);
             let under = J * omega * hole.shunt_mass;
             let chimney_open = z_c * (z_rad + z_c * tanh) / (z_c + z_rad * tanh);
@@ -380,7 +381,7 @@ impl TransferMatrix {
             spans: spans.collect(),
             shunts: shunts.collect(),
             bore_z_c: self.holes.iter().map(|hole| losses[hole.bore_radius].z_c).collect(),
-            bell: radiation(omega, self.bell_radius_m, &self.air),
+            bell: radiation::impedance(omega, self.bell_radius_m, &self.air),
         }
     }
 }
@@ -449,16 +450,6 @@ fn losses(omega: f64, radius_m: f64, air: &Air) -> Losses {
     let y_shunt = J * (omega * area / (air.rho * air.c * air.c)) * (1.0 + (air.gamma - 1.0) * thermal);
     let gamma = (z_series * y_shunt).sqrt();
     Losses { gamma, z_c: z_series / gamma }
-}
-
-/// Radiation impedance of an unflanged pipe, Pa s/m3: the Pade form openwind uses. Its low-frequency limit, length
-/// correction 0.6133 r and resistance (kr)^2/4, is that of Levine & Schwinger (1948).
-fn radiation(omega: f64, radius_m: f64, air: &Air) -> Complex64 {
-    const END_CORRECTION: f64 = 0.6133;
-    const RESISTANCE: f64 = 0.25;
-    let kr = omega * radius_m / air.c;
-    let below = Complex64::new(1.0 / END_CORRECTION, kr * RESISTANCE / (END_CORRECTION * END_CORRECTION));
-    J * kr * air.z_c(radius_m) / below
 }
 
 /// Inner and series length corrections of a hole of radius `b` on a bore of radius `a`, m. Dubos et al. (1999).

@@ -14,9 +14,6 @@ use crate::reed::PhysicalReed;
 use crate::reed::physical::{P_REF_PA, REFERENCE_VOLUME_M3};
 use crate::units::{Air, SoundingNote};
 
-/// Lowest and highest host rate, Hz.
-pub const HOST_RATES_HZ: (f64, f64) = (22_050.0, 384_000.0);
-
 /// Default pitch of A4, Hz.
 pub const A4_HZ: f64 = 440.0;
 
@@ -62,7 +59,7 @@ pub struct Model {
 /// Why an instrument cannot be built.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
-    /// The host rate, Hz, lies outside [`HOST_RATES_HZ`].
+    /// The host rate, Hz, lies outside [`HOST_RATES_HZ`](super::internal_rate::HOST_RATES_HZ).
     #[error("sample rate must lie in 22050..384000 Hz, got {0}")]
     Rate(f64),
     /// The pitch of A4, Hz, lies outside [`A4_RANGE_HZ`](super::prepare::A4_RANGE_HZ).
@@ -80,18 +77,6 @@ pub enum BuildError {
     )]
     Data(String),
 }
-
-/// The lattice's rate for a host rate, both Hz: 88.2 kHz for the 44.1 kHz family, 96 kHz for all others.
-pub fn internal_rate_hz(host_rate_hz: f64) -> f64 {
-    let family = |base: f64| {
-        let ratio = host_rate_hz / base;
-        (ratio - ratio.round()).abs() < 1e-9
-    };
-    if family(11_025.0) && !family(12_000.0) { 88_200.0 } else { 96_000.0 }
-}
-
-/// The lattice's two rates in [`Quality::Live`](super::Quality::Live), Hz.
-pub const INTERNAL_RATES_HZ: [f64; 2] = [96_000.0, 88_200.0];
 
 impl Model {
     /// Assembles a model from its parts. `file` is already scaled by `scale`; the model plays at `a4_hz`. Allocates.
@@ -145,17 +130,5 @@ impl Model {
         let quarter_waves = f64::from(2 * self.registers[fingering] - 1);
         let quarter_rows = quarter_waves * self.coeffs.rate_hz / (4.0 * self.notes_hz[fingering]);
         2.0 * quarter_rows * ((-cents / 1_200.0).exp2() - 1.0)
-    }
-}
-
-/// The lattice's rate for a host rate, both Hz; see [`internal_rate_hz`].
-///
-/// # Errors
-/// [`BuildError::Rate`] if the host rate lies outside [`HOST_RATES_HZ`].
-pub fn checked_rate_hz(host_rate_hz: f64) -> Result<f64, BuildError> {
-    if (HOST_RATES_HZ.0..=HOST_RATES_HZ.1).contains(&host_rate_hz) {
-        Ok(internal_rate_hz(host_rate_hz))
-    } else {
-        Err(BuildError::Rate(host_rate_hz))
     }
 }

@@ -6,6 +6,11 @@
 use super::InstrumentError;
 use super::words::{Place, Word};
 
+/// Most tone holes a file may have; a full Boehm clarinet has 24.
+pub const MAX_HOLES: usize = 40;
+/// Most cones a bore may be made of.
+pub const MAX_SEGMENTS: usize = 256;
+
 /// A range of the file format.
 pub(super) struct Range {
     least: f64,

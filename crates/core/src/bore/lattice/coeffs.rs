@@ -5,6 +5,7 @@ use num_complex::Complex64;
 
 use super::{LANES, ROWS};
 use crate::bore::cells::Cells;
+use crate::bore::radiation;
 use crate::bore::tone_hole::{HoleCoeffs, HoleNetwork};
 use crate::bore::wall_loss;
 use crate::units::Air;
@@ -53,7 +54,7 @@ impl LatticeCoeffs {
         let nominal_radius_m = cells.nominal_radius_m;
         let radius = cells.end_radius_m;
         let z_end = air.z_c(radius) / air.z_c(nominal_radius_m);
-        let end = crate::bore::tone_hole::END_CORRECTION;
+        let end = radiation::END_CORRECTION;
         Self {
             rate_hz,
             nominal_radius_m,
@@ -70,7 +71,10 @@ impl LatticeCoeffs {
                 .collect(),
             jets: networks.iter().map(|network| network.jet(p_ref_pa, nominal_radius_m, air)).collect(),
             hole_junctions: cells.hole_junctions.clone(),
-            bell: (0.25 / (end * end) / z_end, air.c / (2.0 * rate_hz * end * radius * z_end)),
+            bell: (
+                radiation::RESISTANCE / (end * end) / z_end,
+                air.c / (2.0 * rate_hz * end * radius * z_end),
+            ),
         }
     }
 

@@ -6,6 +6,12 @@
 use super::TickContext;
 use crate::reed::physical::P_REF_PA;
 
+/// Time constant of breath that rises behind the tongue, s.
+pub const BREATH_RISE_S: f64 = 0.002;
+/// Time constant of breath that follows a breath source, s.
+pub const BREATH_FOLLOW_S: f64 = 0.005;
+/// Time constant of breath that ends, s.
+pub const BREATH_END_S: f64 = 0.012;
 /// Mouth pressure over the closing pressure for velocity 0 and 1: just above the threshold, and loud (by ear).
 const VELOCITY_GAMMA: (f64, f64) = (0.43, 0.85);
 /// The dip that helps a difficult slur: factor on the pressure, length in s.

@@ -1,5 +1,6 @@
 //! What settings, fingering and bend amount to: reed, delay and clock of the note, and how fast they are reached.
 
+use super::breath::{BREATH_END_S, BREATH_FOLLOW_S, BREATH_RISE_S};
 use super::step_towards;
 use crate::instrument::bend::{self, BendSplit};
 use crate::instrument::lip::embouchure;
@@ -7,13 +8,6 @@ use crate::instrument::model::Model;
 use crate::instrument::settings::Settings;
 use crate::reed::{MovingReed, ReedCoeffs};
 use crate::units::{Air, cents};
-
-/// Time constant of breath that rises behind the tongue, s.
-const BREATH_RISE_S: f64 = 0.002;
-/// Time constant of breath that follows a breath source, s.
-pub const BREATH_FOLLOW_S: f64 = 0.005;
-/// Time constant of breath that ends, s.
-const BREATH_END_S: f64 = 0.012;
 
 /// Targets of the note in the fingers. The player works them out when a setting, the fingering or the bend changes, not
 /// at every tick.

@@ -1,6 +1,6 @@
 //! Controllers that open and stiffen the reed: their factors, smoothed so that their steps are not heard.
 
-use super::posture::BREATH_FOLLOW_S;
+use super::breath::BREATH_FOLLOW_S;
 use super::step_towards;
 
 /// A factor counts as arrived when it is this near to its target.

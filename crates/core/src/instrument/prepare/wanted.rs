@@ -2,7 +2,8 @@
 
 use super::bundled;
 use crate::bore::instrument_file::{BoreSegment, Fingering, HoleKind, InstrumentFile, ToneHole};
-use crate::instrument::model::{A4_HZ, BuildError, checked_rate_hz};
+use crate::instrument::internal_rate::checked_rate_hz;
+use crate::instrument::model::{A4_HZ, BuildError};
 use crate::instrument::store::Key;
 
 /// Range of the pitch of A4, Hz: from baroque pitch to the high pitch of the 19th century.
