@@ -18,6 +18,7 @@ mod header;
 mod instrument_view;
 mod keyboard;
 mod knob_view;
+mod pitch_needle;
 mod reed_view;
 mod slider;
 pub mod snapshot;

@@ -5,7 +5,7 @@
 //! their sample positions alone, not on the host's blocks, and it is what the offline renderer writes. There is one
 //! exception: when the user chooses another instrument during live playing, it comes as soon as it is ready.
 //!
-//! - `translate_events`: the host's events; `breath_sources` and `reed_sources`: where breath and reed changes
+//! - `translate_events`: the host's events; `breath_sources` and `reed_controllers`: where breath and reed changes
 //!   come from
 //! - `instrument_loading`: loads and exchanges instruments
 //! - `knob`: the force-feedback knob (feature `devices`)
@@ -19,7 +19,7 @@ pub mod instrument_loading;
 mod knob;
 pub mod launch_options;
 mod params;
-mod reed_sources;
+mod reed_controllers;
 mod translate_events;
 mod window;
 
@@ -39,7 +39,7 @@ use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::Settings;
 use instrument_loading::{InstrumentLoader, InstrumentSwap, SharedInstrument};
 use params::knob::ReedSource;
-use reed_sources::ReedSources;
+use reed_controllers::ReedControllers;
 use translate_events::EventTranslator;
 use window::{HostWindow, PluginWindow, WindowAudio};
 
@@ -175,7 +175,7 @@ impl Plugin for Chalumeau {
             let replay = self.params.knob.replay.value();
             let block = knob::BlockContext { rate_hz: instrument.rate_hz(), offline: self.offline, replay };
             audio.render(instrument, &settings, events, block, out);
-            audio.set_reed_factors(self.inputs.reed_sources.factors(drives));
+            audio.set_reed_factors(self.inputs.reed_controllers.factors(drives));
             for &(at, breath) in audio.sent() {
                 self.inputs.breath_sources.blow(BreathInput::Knob, breath.unit());
                 send_breath(context, at, breath.bytes());
@@ -230,7 +230,7 @@ struct SharedHandles {
 #[derive(Default)]
 struct HostInputs {
     translator: EventTranslator,
-    reed_sources: ReedSources,
+    reed_controllers: ReedControllers,
     breath_sources: BreathSources,
 }
 
@@ -242,9 +242,9 @@ impl HostInputs {
         api: PluginApi,
         drives: [ReedSource; 2],
     ) -> [Option<Timed<Event>>; 2] {
-        if self.reed_sources.take(&event, drives) {
+        if self.reed_controllers.take(&event, drives) {
             let at = event.timing() as usize;
-            return [None, self.reed_sources.changed(drives).map(|event| Timed { at, event })];
+            return [None, self.reed_controllers.changed(drives).map(|event| Timed { at, event })];
         }
         let events = self.translator.translate(event, api);
         let blew = events.iter().flatten().any(|timed| matches!(timed.event, Event::Breath(_)));

@@ -8,7 +8,7 @@ use crate::output::NewFile;
 use chalumeau_core::bore::check::Check;
 use chalumeau_core::bore::cylinder::Cylinder;
 use chalumeau_core::bore::instrument_file::{ImportDetails, ImportError, InstrumentFile, Sheet};
-use chalumeau_core::instrument::model::A4_HZ;
+use chalumeau_core::instrument::concert_pitch::A4_HZ;
 use chalumeau_core::units::{Air, WrittenNote};
 use clap::{Args, Subcommand};
 use std::fs;

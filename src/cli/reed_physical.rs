@@ -117,7 +117,7 @@ pub fn both_faces(
         (
             "strength as on the box",
             "strength",
-            Settings::strength_of(reed.stiffness_n_m / reference.stiffness_n_m),
+            chalumeau_core::reed::strength::of_stiffness(reed.stiffness_n_m / reference.stiffness_n_m),
             "",
         ),
     ];

@@ -5,7 +5,7 @@ use crate::cli::Failure;
 use crate::instrument_path::{self, LoadError};
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
-use chalumeau_core::instrument::model::A4_HZ;
+use chalumeau_core::instrument::concert_pitch::A4_HZ;
 use chalumeau_core::instrument::prepare::{Preparation, Progress};
 use chalumeau_core::instrument::store::Store;
 use chalumeau_core::instrument::tuning_table::NoteTuning;

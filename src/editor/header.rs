@@ -8,6 +8,7 @@ use crate::editor::ab_comparison::AbComparison;
 use crate::editor::ab_comparison::ComparisonSide;
 use crate::editor::controls::Hands;
 use crate::editor::controls::momentary;
+use crate::editor::pitch_needle;
 use crate::editor::snapshot::{Severity, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
@@ -35,7 +36,7 @@ pub fn tools(
         // The pitch would tell one setting from another.
         note(ui, snapshot, !compare.is_blind());
         if !compare.is_blind() {
-            needle(ui, snapshot, if is_wide { 150.0 } else { 96.0 });
+            pitch_needle::needle(ui, snapshot, if is_wide { 150.0 } else { 96.0 });
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             ui.spacing_mut().item_spacing.x = 5.0;
@@ -129,46 +130,6 @@ fn note(ui: &mut Ui, snapshot: &Snapshot, has_pitch: bool) {
     let said = format!("Written {big}, {below}, {pitch}");
     response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &said));
     response.on_hover_text("The written note, the note that this instrument sounds, and the measured pitch");
-}
-
-/// Cents above or below the note: a needle over 50 cents each way.
-pub fn needle(ui: &mut Ui, snapshot: &Snapshot, width: f32) {
-    let c = Colours::here(ui);
-    let (rect, response) = ui.allocate_exact_size(vec2(width, 36.0), Sense::hover());
-    let painter = ui.painter();
-    let line_y = rect.bottom() - 9.0;
-    let at = |cents: f32| rect.center().x + (cents / 50.0).clamp(-1.0, 1.0) * (0.5 * rect.width() - 6.0);
-    painter.hline(rect.left()..=rect.right(), line_y, Stroke::new(1.0, c.line));
-    for cents in [-50.0, -40.0, -30.0, -20.0, -10.0, 0.0, 10.0, 20.0, 30.0, 40.0, 50.0_f32] {
-        let height = if cents == 0.0 {
-            9.0
-        } else if cents % 50.0 == 0.0 {
-            7.0
-        } else {
-            4.0
-        };
-        painter.vline(at(cents), line_y - height..=line_y, Stroke::new(1.0, c.quiet));
-    }
-    // Within five cents a listener hears the note as in tune.
-    let near = Rect::from_min_max(pos2(at(-5.0), line_y), pos2(at(5.0), line_y + 3.0));
-    painter.rect_filled(near, CornerRadius::ZERO, c.speaks);
-    let text = match snapshot.heard.cents.filter(|cents| cents.is_finite()) {
-        Some(cents) => {
-            let colour = if cents.abs() <= 5.0 { c.speaks } else { c.beats };
-            let x = at(cents);
-            painter.line_segment([pos2(x, line_y - 14.0), pos2(x, line_y + 4.0)], Stroke::new(2.5, colour));
-            painter.circle_filled(pos2(x, line_y - 14.0), 3.0, colour);
-            if cents.abs() < 0.5 { "in tune".into() } else { format!("{cents:+.0} cents") }
-        }
-        None => "no pitch".into(),
-    };
-    let place = pos2(rect.right(), rect.top() - 1.0);
-    painter.text(place, Align2::RIGHT_TOP, &text, theme::small(), c.quiet);
-    response.widget_info(|| WidgetInfo::labeled(Role::Meter, true, format!("Pitch: {text}")));
-    response.on_hover_text(format!(
-        "Distance of the sound from the note, at A4 = {:.1} Hz",
-        snapshot.settings.a4_hz
-    ));
 }
 
 fn undo(ui: &mut Ui, hands: &mut Hands) {

@@ -9,7 +9,7 @@ use egui_plot::Points;
 use crate::editor::chart;
 use crate::editor::chart::Chart;
 use crate::editor::controls::{Hands, choice, heading, slider};
-use crate::editor::header;
+use crate::editor::pitch_needle;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::sound_analysis::FLOOR_DB;
 use crate::editor::theme::{Colours, GAP, panel};
@@ -175,7 +175,7 @@ fn column(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     let c = Colours::here(ui);
     heading(ui, "Pitch");
     let width = ui.available_width();
-    header::needle(ui, snapshot, width);
+    pitch_needle::needle(ui, snapshot, width);
     let heard = &snapshot.heard;
     let pitch = heard.f0_hz.map_or_else(|| "no sound".into(), |hz| format!("{hz:.2} Hz"));
     ui.label(egui::RichText::new(pitch).color(c.quiet));

@@ -1,6 +1,6 @@
 //! The parameters themselves, in the order of hosts. Groups, order and ids are fixed for ever; tests hold a frozen copy.
 
-use chalumeau_core::instrument::prepare::A4_RANGE_HZ;
+use chalumeau_core::instrument::concert_pitch::A4_RANGE_HZ;
 use chalumeau_knob::touch::study::TRIALS;
 
 use crate::parameters::{Choice, Kind, Number, Parameter, Sets, Switch, Whole};

@@ -7,6 +7,7 @@
 //! - The *main* thread draws the latest snapshot. While nothing moves, it draws less than five times a second.
 
 #[cfg(feature = "devices")]
+mod breath_history;
 mod device_list;
 mod editor_app;
 mod host_controls;

@@ -5,8 +5,8 @@ use clap::{Parser, ValueEnum};
 use crate::plugin::InstrumentChoice;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::instrument::concert_pitch::A4_RANGE_HZ;
 use chalumeau_core::instrument::internal_rate::HOST_RATES_HZ;
-use chalumeau_core::instrument::prepare::A4_RANGE_HZ;
 
 const HELP: &str = "\
 Examples:

@@ -20,6 +20,7 @@
 pub mod bend;
 mod breath_noise;
 mod clarinet;
+pub mod concert_pitch;
 pub mod feel_inputs;
 pub mod held_note;
 pub mod internal_rate;

@@ -19,6 +19,7 @@ pub mod law;
 pub mod motion;
 pub mod physical;
 pub mod quasi_static;
+pub mod strength;
 pub mod tables;
 
 pub use law::ReedLaw;

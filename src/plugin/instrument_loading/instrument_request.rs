@@ -8,8 +8,9 @@ use crate::plugin::params::ChalumeauParams;
 use crate::plugin::params::instrument::InstrumentChoice;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
-use chalumeau_core::instrument::model::A4_HZ;
-use chalumeau_core::instrument::prepare::{A4_BY_DELAY_HZ, Preparation, Quality, Wanted};
+use chalumeau_core::instrument::concert_pitch::A4_BY_DELAY_HZ;
+use chalumeau_core::instrument::concert_pitch::A4_HZ;
+use chalumeau_core::instrument::prepare::{Preparation, Quality, Wanted};
 use chalumeau_core::instrument::store::Store;
 use chalumeau_core::instrument::{BuildError, Model};
 

@@ -6,13 +6,14 @@ use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::SharedWindow;
+use super::breath_history::BreathHistory;
 #[cfg(feature = "devices")]
 use super::device_list;
 use super::instrument_analysis::InstrumentAnalysis;
 use super::window_audio::AudioSnapshot;
 #[cfg(feature = "devices")]
 use crate::editor::Tab;
-use crate::editor::snapshot::{BreathSource, MouthpieceTraces, Severity, Snapshot, Status, Track};
+use crate::editor::snapshot::{BreathSource, MouthpieceTraces, Severity, Snapshot, Status};
 #[cfg(feature = "devices")]
 use crate::editor::snapshot::{KnobDevice, KnobState};
 use crate::editor::sound_analysis::{SoundAnalyser, SoundAnalysis, WINDOW};
@@ -37,12 +38,6 @@ const IDLE: Duration = Duration::from_millis(220);
 /// Time between two searches for devices.
 #[cfg(feature = "devices")]
 const DEVICES_EVERY: Duration = Duration::from_secs(2);
-/// Length of the breath's history, s.
-const HISTORY_S: f32 = 10.0;
-/// Time between two values of the history, s.
-const STEP_S: f32 = 0.05;
-/// A longer pause clears the history, whose values would not show when they were.
-const LONGEST_GAP: Duration = Duration::from_secs(2);
 /// Less mouth pressure than this counts as none, kPa.
 const NO_BREATH_KPA: f32 = 1e-3;
 
@@ -56,9 +51,7 @@ pub struct SnapshotThread {
     listener: Option<(f64, SoundAnalyser)>,
     /// The values that a snapshot shows where nothing is known. Kept, because making them parses an instrument file.
     blank: Snapshot,
-    history: VecDeque<f32>,
-    /// Time of the latest value of the history.
-    stepped: Instant,
+    history: BreathHistory,
     analysis: Option<InstrumentAnalysis>,
     /// The devices found, and when.
     #[cfg(feature = "devices")]
@@ -82,8 +75,7 @@ impl SnapshotThread {
             heard: VecDeque::with_capacity(2 * WINDOW),
             listener: None,
             blank: Snapshot::default(),
-            history: VecDeque::new(),
-            stepped: Instant::now(),
+            history: BreathHistory::new(),
             analysis: None,
             #[cfg(feature = "devices")]
             devices: (Vec::new(), None),
@@ -105,14 +97,14 @@ impl SnapshotThread {
         let inside = self.inside.read().clone();
         let current = self.handles.instrument.current();
         self.receive_sound();
-        self.extend_history(inside.now.mouth_kpa);
+        self.history.extend(inside.now.mouth_kpa);
         self.analyse(current.as_ref());
         let settings = self.handles.params.settings();
         let mut snapshot = Snapshot { settings, ..self.blank.clone() };
         snapshot.instruments = InstrumentChoice::ALL.iter().map(|choice| choice.title().to_owned()).collect();
         snapshot.chosen = Some(self.handles.params.instrument.choice.value() as usize);
         show_inside(&mut snapshot, &inside);
-        snapshot.history = Track { step_s: STEP_S, kpa: self.history.iter().copied().collect() };
+        snapshot.history = self.history.track();
         self.show_instrument(&mut snapshot, inside.now.fingering);
         snapshot.heard = self.analyse_sound(inside.host_rate_hz, inside.now.sounding, &settings);
         #[cfg(feature = "devices")]
@@ -172,20 +164,6 @@ impl SnapshotThread {
                 self.heard.pop_front();
             }
             self.heard.push_back(sample);
-        }
-    }
-
-    fn extend_history(&mut self, kpa: f32) {
-        let step = Duration::from_secs_f32(STEP_S);
-        if self.stepped.elapsed() > LONGEST_GAP {
-            (self.stepped, self.history) = (Instant::now(), VecDeque::new());
-        }
-        while self.stepped.elapsed() >= step {
-            self.stepped += step;
-            self.history.push_back(kpa);
-            if self.history.len() as f32 * STEP_S > HISTORY_S {
-                self.history.pop_front();
-            }
         }
     }
 

@@ -9,13 +9,11 @@ use crate::bore::cells::CellsError;
 use crate::bore::fit;
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::lattice::LatticeCoeffs;
+use crate::instrument::concert_pitch::A4_HZ;
 use crate::instrument::tuning_table::TuningTable;
 use crate::reed::PhysicalReed;
 use crate::reed::physical::{P_REF_PA, REFERENCE_VOLUME_M3};
 use crate::units::{Air, SoundingNote};
-
-/// Default pitch of A4, Hz.
-pub const A4_HZ: f64 = 440.0;
 
 /// An instrument at one internal rate. It does not change: share it in an [`Arc`].
 ///
@@ -62,7 +60,7 @@ pub enum BuildError {
     /// The host rate, Hz, lies outside [`HOST_RATES_HZ`](super::internal_rate::HOST_RATES_HZ).
     #[error("sample rate must lie in 22050..384000 Hz, got {0}")]
     Rate(f64),
-    /// The pitch of A4, Hz, lies outside [`A4_RANGE_HZ`](super::prepare::A4_RANGE_HZ).
+    /// The pitch of A4, Hz, lies outside [`A4_RANGE_HZ`](super::concert_pitch::A4_RANGE_HZ).
     #[error("A4 must lie in 415..466 Hz, got {0}")]
     A4(f64),
     /// The caller ended the preparation.

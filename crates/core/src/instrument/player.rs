@@ -9,7 +9,7 @@ mod breath;
 mod carry_on;
 mod fingers;
 mod posture;
-mod reed_control;
+mod reed_smoothing;
 mod tongue;
 mod tuning;
 
@@ -25,7 +25,7 @@ use crate::units::{SoundingNote, cents};
 use breath::Breath;
 use fingers::Fingers;
 use posture::{Lags, Posture};
-use reed_control::ReedControl;
+use reed_smoothing::ReedSmoothing;
 use tongue::Tongue;
 use tuning::PlayedTuning;
 
@@ -72,7 +72,7 @@ pub struct Player {
     tongue: Tongue,
     fingers: Fingers,
     tuning: PlayedTuning,
-    reed: ReedControl,
+    reed: ReedSmoothing,
     bend_cents: f64,
 }
 

@@ -29,13 +29,14 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::bore::bundled::Bundled;
-use crate::instrument::model::{A4_HZ, BuildError, Model};
+use crate::instrument::concert_pitch::A4_HZ;
+use crate::instrument::model::{BuildError, Model};
 use crate::instrument::store::Store;
 use crate::instrument::tuning_table::TuningTable;
 use crate::units::Air;
 pub use prepared_file::{PreparedInstrument, format_generated, parse_generated};
 use wanted::Stored;
-pub use wanted::{A4_BY_DELAY_HZ, A4_RANGE_HZ, Quality, Wanted};
+pub use wanted::{Quality, Wanted};
 
 /// What a preparation does now: it fits, has fitted, tunes. It begins again once if tuning finds that the bore has to be
 /// scaled.

@@ -3,6 +3,7 @@
 use crate::reed::ReedLaw;
 use crate::reed::law::coupled_k;
 use crate::reed::physical::{DimensionlessReed, P_REF_PA, PhysicalReed};
+use crate::reed::strength;
 
 /// How the tuning delay follows the breath.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -97,8 +98,7 @@ impl Settings {
         let settings = self.clamped();
         let set_h = f64::from(settings.reed_h);
         let set_k = if settings.coupled { coupled_k(set_h) } else { f64::from(settings.reed_k) };
-        // A box strength is about 20 % stiffer per half number (makers' charts, by judgement).
-        let stiffer = 1.2_f64.powf(2.0 * (f64::from(settings.strength) - 2.5));
+        let stiffer = strength::stiffness(f64::from(settings.strength));
         let h = (set_h * f64::from(settings.lip)).clamp(0.5, 10.0);
         let k = (set_k * stiffer).clamp(0.01, 20.0);
         ReedLaw::free(h, k, f64::from(settings.reed_a)).unwrap_or_default()
@@ -176,11 +176,6 @@ impl Settings {
         None
     }
 
-    /// Reed strength as printed on the box, of a reed `stiffer` times as stiff as the reference.
-    pub fn strength_of(stiffer: f64) -> f64 {
-        2.5 + 0.5 * stiffer.ln() / 1.2_f64.ln()
-    }
-
     /// Closing pressure of the reed under these settings, Pa.
     pub fn closing_pa(&self) -> f64 {
         P_REF_PA * self.reed_law().closing()
@@ -241,7 +236,7 @@ mod tests {
         near(played.stiffness_n_m, 1.2 * 2_000.0);
         near(played.tip_opening_m, 0.8 * 0.6e-3);
         near(played.closing_pa(), set.closing_pa());
-        near(Settings::strength_of(played.stiffness_n_m / 2_000.0), 3.0);
+        near(strength::of_stiffness(played.stiffness_n_m / 2_000.0), 3.0);
     }
 
     #[test]

@@ -6,7 +6,8 @@
 
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::transfer_matrix::TransferMatrix;
-use crate::instrument::model::{A4_HZ, Model};
+use crate::instrument::concert_pitch::A4_HZ;
+use crate::instrument::model::Model;
 use crate::units::{Air, cents};
 
 /// Error of the theory (a reed without inertia or damping), cents: notes of the built-in clarinet play 20 to 70 cents

@@ -2,14 +2,11 @@
 
 use super::bundled;
 use crate::bore::instrument_file::{BoreSegment, Fingering, HoleKind, InstrumentFile, ToneHole};
+use crate::instrument::concert_pitch::{A4_BY_DELAY_HZ, A4_HZ, A4_RANGE_HZ};
 use crate::instrument::internal_rate::checked_rate_hz;
-use crate::instrument::model::{A4_HZ, BuildError};
+use crate::instrument::model::BuildError;
 use crate::instrument::store::Key;
 
-/// Range of the pitch of A4, Hz: from baroque pitch to the high pitch of the 19th century.
-pub const A4_RANGE_HZ: (f64, f64) = (415.0, 466.0);
-/// Range of A4, Hz, in which the instrument is the one for 440 Hz and the player's tuning delay does the rest.
-pub const A4_BY_DELAY_HZ: (f64, f64) = (430.0, 450.0);
 /// Part of every key. Raise it when fitting or tuning give other numbers for the same instrument. A change that moves the
 /// data of the built-in clarinet changes the keys without it.
 const VERSION: u32 = 1;

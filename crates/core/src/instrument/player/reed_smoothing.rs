@@ -8,18 +8,18 @@ const ARRIVED: f32 = 1e-4;
 
 /// Factors on the H and k of the [`Settings`](crate::instrument::Settings).
 #[derive(Clone, Copy, Debug)]
-pub struct ReedControl {
+pub struct ReedSmoothing {
     factors: [f32; 2],
     targets: [f32; 2],
 }
 
-impl Default for ReedControl {
+impl Default for ReedSmoothing {
     fn default() -> Self {
         Self { factors: [1.0; 2], targets: [1.0; 2] }
     }
 }
 
-impl ReedControl {
+impl ReedSmoothing {
     /// New factors on H and k, 0.1..=10; not a number counts as 1.
     pub fn set(&mut self, h: f32, k: f32) {
         let fix = |x: f32| if x.is_finite() { x.clamp(0.1, 10.0) } else { 1.0 };

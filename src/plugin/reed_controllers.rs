@@ -16,7 +16,7 @@ const CC_SLIDE: u8 = 74;
 
 /// The latest value of each controller. Real-time safe.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct ReedSources {
+pub struct ReedControllers {
     /// Controllers 1, 16, 17, 74 and pressure, 0..=1; `None` until they move.
     values: [Option<f32>; 5],
     /// The factors that were sent last.
@@ -34,7 +34,7 @@ fn index(source: ReedSource) -> Option<usize> {
     }
 }
 
-impl ReedSources {
+impl ReedControllers {
     /// Takes an event if it drives H or k; returns whether it does.
     pub fn take<S>(&mut self, event: &NoteEvent<S>, sources: [ReedSource; 2]) -> bool {
         let (at, value) = match *event {
@@ -83,7 +83,7 @@ mod tests {
 
     #[test]
     fn y_of_a_linnstrument_opens_the_reed_and_z_stiffens_it() {
-        let mut reed = ReedSources::default();
+        let mut reed = ReedControllers::default();
         let sources = [ReedSource::Slide, ReedSource::Pressure];
         assert_eq!(reed.changed(sources), None, "no controller has moved");
         assert!(reed.take(&cc(74, 64), sources));
@@ -101,7 +101,7 @@ mod tests {
 
     #[test]
     fn an_event_that_drives_nothing_is_not_taken() {
-        let mut reed = ReedSources::default();
+        let mut reed = ReedControllers::default();
         let pressure = NoteEvent::<()>::MidiChannelPressure { timing: 0, channel: 0, pressure: 0.5 };
         assert!(!reed.take(&pressure, [ReedSource::Slide, ReedSource::Parameter]));
         assert!(!reed.take(&cc(2, 9), [ReedSource::Slide, ReedSource::Pressure]));
