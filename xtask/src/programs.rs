@@ -37,16 +37,17 @@ fn build() -> Result<Programs> {
     machine::run(machine::cargo().args(TESTS).arg("--no-run"))?;
     let folder = machine::target().join("programs");
     fs::create_dir_all(&folder)?;
-    let keep = |name: String| -> Result<PathBuf> {
-        let (from, to) = (machine::target().join("debug").join(&name), folder.join(name));
+    let keep = |built: &str, name: String| -> Result<PathBuf> {
+        let (from, to) = (machine::target().join(built).join(&name), folder.join(name));
         fs::copy(&from, &to).with_context(|| format!("cannot copy {}", from.display()))?;
         Ok(to)
     };
     let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     Ok(Programs {
-        plugin: keep(format!("{prefix}chalumeau{suffix}"))?,
-        program: keep(format!("chalumeau{}", std::env::consts::EXE_SUFFIX))?,
-        standalone: keep(format!("chalumeau-standalone{}", std::env::consts::EXE_SUFFIX))?,
+        // A build for tests leaves the library among its dependencies.
+        plugin: keep("debug/deps", format!("{prefix}chalumeau{suffix}"))?,
+        program: keep("debug", format!("chalumeau{}", std::env::consts::EXE_SUFFIX))?,
+        standalone: keep("debug", format!("chalumeau-standalone{}", std::env::consts::EXE_SUFFIX))?,
     })
 }
 

@@ -9,7 +9,7 @@
 //! Sends the feel of one note to the knob, and receives a measurement from it:
 //!
 //! ```
-//! use chalumeau_knob::wire::{Decoder, DeviceState, Feel, Law, Message, encode};
+//! use chalumeau_knob::wire::{Decoder, DeviceState, Feel, Message, TorqueLaw, encode};
 //!
 //! // Host to knob: a flow law with 90 mNm per unit of flow. These bytes go to the serial port.
 //! let feel = Message::Feel(Feel { law: TorqueLaw::Flow, scale_mnm: 90.0, ..Feel::default() });

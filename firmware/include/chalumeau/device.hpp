@@ -11,12 +11,11 @@
 #include "morph.hpp"
 #include "outbox.hpp"
 #include "session.hpp"
+#include "timing.hpp"
 #include "watchdog.hpp"
 
 namespace chalumeau {
 
-constexpr std::uint16_t LOOP_HZ = 2000;
-constexpr float LOOP_S = 1.0F / LOOP_HZ;
 constexpr std::uint8_t FIRMWARE_MAJOR = 0;
 constexpr std::uint8_t FIRMWARE_MINOR = 1;
 constexpr std::uint16_t FIRMWARE_PATCH = 0;

@@ -4,12 +4,11 @@
 
 #include "limits.hpp"
 #include "messages.hpp"
+#include "timing.hpp"
 #include "watchdog.hpp"
 
 namespace chalumeau {
 
-constexpr std::uint32_t FADE_MS = 50;
-constexpr std::uint32_t SOFT_START_MS = 250;
 
 /// Faults that last as long as their cause does, each one bit of a byte.
 class StandingFaults {

@@ -31,9 +31,6 @@ use tuning::PlayedTuning;
 
 /// Time the fingers take behind the tongue, ms; slurred they take the setting's time.
 const TONGUED_FINGERS_MS: f64 = 5.0;
-/// A slur of an octave or more is helped by a dip of the breath, as players do; the limit leaves room below the octave,
-/// cents.
-const LEAP_CENTS: f64 = 1_150.0;
 /// Widest bend an event may ask for, cents either way: 48 semitones, the range of an MPE note.
 const BEND_CENTS: f32 = 4_800.0;
 
@@ -183,11 +180,8 @@ impl Player {
     /// leap, or into or out of the altissimo, gets a dip of the breath.
     fn finger<F: Real>(&mut self, fingering: usize, slurred: bool, model: &Model, voice: &mut Voice<F>) {
         if let (true, Some(from)) = (slurred, self.fingers.fingering()) {
-            let leap = cents(model.notes_hz[fingering], model.notes_hz[from]).abs() > LEAP_CENTS;
-            let (old, new) = (model.registers[from], model.registers[fingering]);
-            if leap || (old != new && old.max(new) > 2) {
-                self.breath.dip();
-            }
+            let interval = cents(model.notes_hz[fingering], model.notes_hz[from]);
+            self.breath.slur(interval, model.registers[from], model.registers[fingering]);
         }
         let ms = if slurred { f64::from(self.settings.legato_ms) } else { TONGUED_FINGERS_MS };
         self.move_holes(fingering, 1e-3 * ms, model, voice);

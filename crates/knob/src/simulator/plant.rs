@@ -11,7 +11,7 @@ use fastrand::Rng;
 use std::f64::consts::TAU;
 
 /// Rate of the haptic loop, Hz: one exchange with the motor board per period (TorqueTuner firmware).
-pub const LOOP_HZ: u32 = 2000;
+pub use chalumeau_firmware::LOOP_HZ;
 
 /// Steps of integration in a period: 32 kHz, three hundred times the fastest pole of knob and hand.
 const SUBSTEPS: u32 = 16;

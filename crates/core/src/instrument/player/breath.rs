@@ -14,6 +14,11 @@ pub const BREATH_FOLLOW_S: f64 = 0.005;
 pub const BREATH_END_S: f64 = 0.012;
 /// Mouth pressure over the closing pressure for velocity 0 and 1: just above the threshold, and loud (by ear).
 const VELOCITY_GAMMA: (f64, f64) = (0.43, 0.85);
+/// A slur of an octave or more is helped by a dip of the breath, as players do; the limit leaves room below the octave,
+/// cents.
+const LEAP_CENTS: f64 = 1_150.0;
+/// The highest register that a slur enters or leaves without a dip: the clarion.
+const CLARION: u8 = 2;
 /// The dip that helps a difficult slur: factor on the pressure, length in s.
 const DIP: (f64, f64) = (0.3, 0.025);
 /// A note is over when its mouth pressure is below this share of the closing pressure.
@@ -46,9 +51,11 @@ impl Breath {
         self.velocity = f64::from(if velocity.is_finite() { velocity.clamp(0.0, 1.0) } else { 0.5 });
     }
 
-    /// Begins a short dip of the pressure.
-    pub fn dip(&mut self) {
-        self.dip_s = DIP.1;
+    /// A slur over an interval, cents, from one register to another: a difficult one begins a short dip of the pressure.
+    pub fn slur(&mut self, interval_cents: f64, from: u8, to: u8) {
+        if interval_cents.abs() > LEAP_CENTS || (from != to && from.max(to) > CLARION) {
+            self.dip_s = DIP.1;
+        }
     }
 
     /// Mouth pressure over the closing pressure of the reed.
