@@ -1,6 +1,6 @@
 //! Signal processing without physics: sample-rate conversion, and the limiter at the output.
 
-pub mod kernel;
+pub mod low_pass;
 pub mod limiter;
 pub mod resampler;
 pub mod warp;

@@ -27,7 +27,7 @@
 //! | 96 000 -> 50 000 | 72 | 0.365 | 20 833 | 29 167 | 0.0001 | -114 | -98 |
 //! | 96 000 -> 47 999 (mixed phases) | 72 | 0.365 | 20 000 | 27 999 | 0.0002 | -115 | -94 |
 
-use crate::dsp::kernel::{Kernel, LANES, TRANSITION, dot, normalised};
+use crate::dsp::low_pass::{Kernel, LANES, TRANSITION, dot, normalised};
 use crate::dsp::warp::{BEYOND, ONE, SPEEDS, Warp};
 
 /// Largest number of phases stored exactly; above it, neighbouring phases are mixed linearly.

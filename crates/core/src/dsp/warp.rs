@@ -6,7 +6,7 @@
 //! close enough to mix two neighbours linearly (rest -96 dB at the pass edge, 12 dB less per octave below it); speeds
 //! between two steps take the shorter window, whose stop band begins up to 1.2 times higher: -92 dB from there on.
 
-use crate::dsp::kernel::{Kernel, LANES, dot, normalised};
+use crate::dsp::low_pass::{Kernel, LANES, dot, normalised};
 
 /// Slowest and fastest clock: two octaves down and up.
 pub const SPEEDS: (f64, f64) = (0.25, 4.0);
