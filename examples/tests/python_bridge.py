@@ -346,7 +346,7 @@ def what_the_bridge_cannot_do_is_said():
 
 
 def fields_are_those_that_are_sent():
-    source = (ROOT / "src/device/feel_osc.rs").read_text()
+    source = (ROOT / "crates/knob/src/device/feel_osc.rs").read_text()
     sent = re.findall(r'^\s*\("(\w+)", ', source, re.MULTILINE)
     assert list(libmapper_bridge.FIELDS) == sent and f'"{libmapper_bridge.PREFIX}{{name}}"' in source, sent
 
