@@ -288,6 +288,7 @@ impl TransferMatrix {
             let own = (batch * BATCH..=steps).take(BATCH);
             own.for_each(|k| drop(self.keep(lowest + step * k as f64)));
         };
+        on(0.0).is_continue().then_some(())?;
         parallel::each(steps / BATCH + 1, batch, on).map(drop)
     }
 
