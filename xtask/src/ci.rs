@@ -134,18 +134,27 @@ fn packages() -> Result<()> {
     machine::provide(needed)
 }
 
+/// Test files whose tests share what takes minutes to prepare. nextest starts a process for each test, which would prepare
+/// it again each time.
+const SHARED_PREPARATION: &[&str] = &["haptics", "instruments", "instruments_tuned"];
+
 /// All tests that need no host, with nextest where it is installed: it spreads them over the cores.
 fn tests() -> Result<()> {
     programs()?;
-    let files = test_files()?;
-    let chosen = files.iter().flat_map(|name| ["--test", name]);
-    let mut command = machine::cargo();
-    if machine::works("cargo", &["nextest", "--version"]) {
-        command.arg("nextest").arg("run").args(&TESTS[1..]).arg("--no-fail-fast").args(["--lib", "--bins"]);
-    } else {
-        command.args(TESTS).args(["--no-fail-fast", "--lib", "--bins"]);
+    let run = |command: &mut Command, files: &[String]| {
+        machine::run(command.args(files.iter().flat_map(|name| ["--test", name])))
+    };
+    let mut plain = machine::cargo();
+    plain.args(TESTS).arg("--no-fail-fast");
+    if !machine::works("cargo", &["nextest", "--version"]) {
+        return run(plain.args(["--lib", "--bins"]), &test_files()?);
     }
-    machine::run(command.args(chosen))
+    let (shared, others): (Vec<_>, Vec<_>) =
+        test_files()?.into_iter().partition(|name| SHARED_PREPARATION.contains(&name.as_str()));
+    let mut nextest = machine::cargo();
+    nextest.args(["nextest", "run"]).args(&TESTS[1..]).args(["--no-fail-fast", "--lib", "--bins"]);
+    let results = [run(&mut nextest, &others), run(&mut plain, &shared)];
+    results.into_iter().collect()
 }
 
 fn documentation() -> Result<()> {
