@@ -18,7 +18,7 @@ if ! command -v valgrind >/dev/null; then
 fi
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 target=${CARGO_TARGET_DIR:-$root/target}
-(cd "$root" && CARGO_TARGET_DIR=$target cargo build --quiet --profile plugin -p chalumeau-core --features threads --example instructions)
+(cd "$root" && CARGO_TARGET_DIR=$target cargo build --quiet --profile plugin -p chalumeau-core --features fit,threads --example instructions)
 program=$target/plugin/examples/instructions
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT

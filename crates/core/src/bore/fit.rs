@@ -18,10 +18,10 @@ use crate::bore::cells::{Cells, CellsError};
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::lattice::LatticeCoeffs;
 use crate::bore::lattice::sensitivity::{AtFrequency, Layout, Sweep, hole_admittances};
-use crate::bore::tone_hole::HoleNetwork;
+use crate::bore::tone_hole::networks;
 use crate::bore::transfer_matrix::TransferMatrix;
 use crate::parallel::each_part;
-use crate::units::{Air, SoundingNote};
+use crate::units::Air;
 
 /// A relative change of a radius or loss that costs as much as two cents on one peak.
 const STIFFNESS: f64 = 0.15;
@@ -90,22 +90,6 @@ impl Group {
     fn rows(&self) -> usize {
         self.targets.iter().map(Target::rows).sum()
     }
-}
-
-/// Tone-hole networks of a file; viscous resistance taken at 2.4 times the lowest note (350 Hz on the B flat clarinet).
-pub fn networks(file: &InstrumentFile, air: &Air, cells: &Cells) -> Vec<HoleNetwork> {
-    let lowest_hz = lowest_hz(file);
-    file.holes
-        .iter()
-        .map(|hole| {
-            HoleNetwork::new(hole, file.radius_at(hole.x_m), cells.chimney_split, 2.4 * lowest_hz, air)
-        })
-        .collect()
-}
-
-/// Equal-tempered frequency of the lowest note in the file, A4 = 440 Hz.
-pub fn lowest_hz(file: &InstrumentFile) -> f64 {
-    file.lowest().sounding(file.transposition).unwrap_or(SoundingNote(50)).frequency_hz(440.0)
 }
 
 /// What hears how much is done, 0..=1, and may end it; and the same, kept.

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use serde::Deserialize;
 
 use crate::units::midi_of_name;
-use crate::units::{REFERENCE_RADIUS_M, WrittenNote};
+use crate::units::{REFERENCE_RADIUS_M, SoundingNote, WrittenNote};
 
 mod csv;
 mod error;
@@ -225,6 +225,11 @@ impl InstrumentFile {
     /// Index of a hole by name.
     pub fn hole(&self, name: &str) -> Option<usize> {
         self.holes.iter().position(|hole| hole.name == name)
+    }
+
+    /// Equal-tempered frequency of the lowest note, A4 = 440 Hz.
+    pub fn lowest_hz(&self) -> f64 {
+        self.lowest().sounding(self.transposition).unwrap_or(SoundingNote(50)).frequency_hz(440.0)
     }
 
     /// The lowest note of the chart; MIDI note 0 for an instrument made by hand without one.

@@ -21,6 +21,7 @@ mod coeffs;
 mod diagnostics;
 mod junctions;
 mod real;
+#[cfg(feature = "fit")]
 pub mod sensitivity;
 
 pub use coeffs::{LatticeCoeffs, hole_chunks};

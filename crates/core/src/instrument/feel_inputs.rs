@@ -1,6 +1,5 @@
 //! What haptics needs to know about an instrument: the reed as it is played, and the pressures its notes need.
 
-use crate::bore::fit;
 use crate::bore::instrument_file::InstrumentFile;
 use crate::haptics::{Lip, PlayedReed, RequirementSolver};
 use crate::instrument::lip::embouchure;
@@ -11,7 +10,7 @@ use crate::units::SoundingNote;
 /// The reed under these settings, with the law and the lip that the sound has, for every fingering of a file. Allocates.
 pub fn played_reed(file: &InstrumentFile, settings: &Settings) -> PlayedReed {
     let settings = settings.clamped();
-    let lowest_hz = fit::lowest_hz(file);
+    let lowest_hz = file.lowest_hz();
     let lips = file
         .fingerings
         .iter()

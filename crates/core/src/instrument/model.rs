@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use crate::bore::cells::Cells;
 use crate::bore::cells::CellsError;
-use crate::bore::fit;
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::lattice::LatticeCoeffs;
+use crate::bore::tone_hole::networks;
 use crate::instrument::concert_pitch::A4_HZ;
 use crate::instrument::tuning_table::TuningTable;
 use crate::reed::PhysicalReed;
@@ -80,8 +80,7 @@ impl Model {
     /// Assembles a model from its parts. `file` is already scaled by `scale`; the model plays at `a4_hz`. Allocates.
     pub fn assemble(file: InstrumentFile, cells: Cells, tuning: TuningTable, a4_hz: f64, scale: f64) -> Self {
         let air = Air::default();
-        let coeffs =
-            Arc::new(LatticeCoeffs::new(&cells, &fit::networks(&file, &air, &cells), P_REF_PA, &air));
+        let coeffs = Arc::new(LatticeCoeffs::new(&cells, &networks(&file, &air, &cells), P_REF_PA, &air));
         let notes_hz = file
             .fingerings
             .iter()
@@ -102,7 +101,7 @@ impl Model {
         let larger = file.reed_volume_m3 / REFERENCE_VOLUME_M3;
         let swept_s = PhysicalReed::reference().equivalent_volume_m3(&air) / (section * air.c) * larger;
         Self {
-            lowest_hz: fit::lowest_hz(&file) * a4_hz / A4_HZ,
+            lowest_hz: file.lowest_hz() * a4_hz / A4_HZ,
             notes_hz,
             registers,
             swept_s,

@@ -5,7 +5,7 @@
 //! matrices (`cut_and_fit`), and plays every note until its trim is right ([`auto_tune`]). Where the trims would need
 //! more than the tuning delay can give, it makes the whole bore a little longer or shorter first and fits it again: a
 //! maker's remedy, which keeps the relations between the notes. Callers that cannot wait, or want the bore as it was
-//! built, stop half-way: see the methods of [`Preparation`]. Results do not depend on the number of cores.
+//! built, stop half-way: see the methods of [`Preparation`]. All that makes an instrument needs the feature `fit`. Results do not depend on the number of cores.
 //!
 //! ```
 //! use chalumeau_core::bore::bundled::Bundled;
@@ -13,15 +13,17 @@
 //!
 //! let wanted = Wanted::new(Bundled::A.file(), 48_000.0);
 //! // No store: this instrument comes with the program.
-//! let model = Preparation::new(&wanted, None).tuned(&mut |_| std::ops::ControlFlow::Continue(()))?;
+//! let model = Preparation::new(&wanted, None).ready()?.expect("bundled");
 //! assert_eq!((model.coeffs.rate_hz, model.a4_hz), (96_000.0, 440.0));
 //! # Ok::<(), chalumeau_core::instrument::BuildError>(())
 //! ```
 
+#[cfg(feature = "fit")]
 pub mod auto_tune;
 mod bundled;
 mod cut_and_fit;
 mod prepared_file;
+#[cfg(feature = "fit")]
 mod scale;
 mod wanted;
 
@@ -32,7 +34,9 @@ use crate::bore::bundled::Bundled;
 use crate::instrument::concert_pitch::A4_HZ;
 use crate::instrument::model::{BuildError, Model};
 use crate::instrument::store::Store;
+#[cfg(feature = "fit")]
 use crate::instrument::tuning_table::TuningTable;
+#[cfg(feature = "fit")]
 use crate::units::Air;
 pub use prepared_file::{PreparedInstrument, format_generated, parse_generated};
 use wanted::Stored;
@@ -54,6 +58,7 @@ pub enum Progress<'a> {
 pub type OnProgress<'a> = &'a mut dyn FnMut(Progress<'_>) -> ControlFlow<()>;
 
 /// Share of the work of tuning that is done when every note has been heard once.
+#[cfg(feature = "fit")]
 const HEARD: f64 = 0.05;
 
 /// Prepares one instrument. Every method allocates, and refuses a host rate or an A4 out of range with
@@ -95,6 +100,17 @@ impl<'a> Preparation<'a> {
         cut_and_fit::cut(&self.wanted.file, A4_HZ / a4_hz, rate_hz, a4_hz)
     }
 
+    fn stored(&self, stored: Stored) -> Result<Option<Model>, BuildError> {
+        let Some(store) = self.store else { return Ok(None) };
+        let text = store.get(&self.wanted.key_of(stored)?);
+        let prepared = text.and_then(|text| PreparedInstrument::from_text(&text));
+        Ok(prepared.and_then(|prepared| prepared.model(&self.wanted.file)))
+    }
+}
+
+/// What is neither bundled nor stored is made.
+#[cfg(feature = "fit")]
+impl Preparation<'_> {
     /// The bore exactly as the file has it, fitted but not tuned, for A4 = 440 Hz whatever pitch is wanted: to measure,
     /// and to play untuned. Takes seconds, unless it is bundled or stored.
     pub fn as_built(&self, on: OnProgress<'_>) -> Result<Model, BuildError> {
@@ -139,13 +155,6 @@ impl<'a> Preparation<'a> {
         Ok(model)
     }
 
-    fn stored(&self, stored: Stored) -> Result<Option<Model>, BuildError> {
-        let Some(store) = self.store else { return Ok(None) };
-        let text = store.get(&self.wanted.key_of(stored)?);
-        let prepared = text.and_then(|text| PreparedInstrument::from_text(&text));
-        Ok(prepared.and_then(|prepared| prepared.model(&self.wanted.file)))
-    }
-
     fn keep(&self, stored: Stored, model: &Model) -> Result<(), BuildError> {
         let Some(store) = self.store else { return Ok(()) };
         if let Some(text) = PreparedInstrument::of(model).to_text() {
@@ -169,6 +178,7 @@ impl Model {
     }
 }
 
+#[cfg(feature = "fit")]
 fn go_on(on: OnProgress<'_>, progress: Progress<'_>) -> Result<(), BuildError> {
     match on(progress) {
         ControlFlow::Continue(()) => Ok(()),
@@ -176,13 +186,14 @@ fn go_on(on: OnProgress<'_>, progress: Progress<'_>) -> Result<(), BuildError> {
     }
 }
 
+#[cfg(feature = "fit")]
 /// How far off the notes are without trims; first reports that the instrument can be played.
 fn heard_offsets(model: &Arc<Model>, on: OnProgress<'_>) -> Result<Vec<Option<f64>>, BuildError> {
     go_on(on, Progress::Fitted(model))?;
     auto_tune::offsets(model, &mut |share| on(Progress::Tuning(HEARD * share))).ok_or(BuildError::Cancelled)
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "fit"))]
 mod tests {
     use super::*;
     use crate::bore::instrument_file::InstrumentFile;

@@ -1,7 +1,9 @@
 //! Cuts a bore into cells of the lattice, and fits the cells to the bore's transfer matrices.
 
+#[cfg(feature = "fit")]
 use super::{OnProgress, Progress};
 use crate::bore::cells::Cells;
+#[cfg(feature = "fit")]
 use crate::bore::fit;
 use crate::bore::instrument_file::InstrumentFile;
 use crate::instrument::model::{BuildError, Model};
@@ -15,6 +17,7 @@ pub fn cut(file: &InstrumentFile, scale: f64, rate_hz: f64, a4_hz: f64) -> Resul
     Ok(untuned(file, cells, a4_hz, scale))
 }
 
+#[cfg(feature = "fit")]
 /// Cut and fitted, not tuned. Takes seconds. `scale` multiplies all lengths of the file.
 pub fn fit(
     file: &InstrumentFile,

@@ -50,6 +50,7 @@ pub(super) enum Stored {
     /// Scaled, fitted and tuned.
     Tuned,
     /// Fitted exactly as the file has it, not tuned.
+    #[cfg(feature = "fit")]
     AsBuilt,
 }
 
@@ -58,6 +59,7 @@ impl Stored {
     fn word(self) -> &'static str {
         match self {
             Self::Tuned => "tuned",
+            #[cfg(feature = "fit")]
             Self::AsBuilt => "as built",
         }
     }
@@ -162,7 +164,7 @@ fn describe(all: &mut Vec<u8>, file: &InstrumentFile) {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "fit"))]
 mod tests {
     use super::*;
 
