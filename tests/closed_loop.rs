@@ -130,7 +130,10 @@ fn passage(table: &FeelTable, note: &NoteFeel) -> Passage {
     Passage { felt: felt.expect("a threshold in the torque"), heard: ear.onset(), lag, astray_deg }
 }
 
-/// Acceptance of the touch: in a slow crescendo, felt and sounding onset agree within 3 % in angle and in pressure, for
+/// Largest difference between felt and sounding onset, %; 1.67 was measured.
+const ONSET_PERCENT: f64 = 1.75;
+
+/// Acceptance of the touch: in a slow crescendo, felt and sounding onset agree within 1.75 % in angle and in pressure, for
 /// every note, Contrast 1, 3 and 5, both laws.
 #[test]
 fn in_a_slow_crescendo_the_sound_begins_where_the_hand_feels_the_threshold() {
@@ -178,7 +181,7 @@ fn in_a_slow_crescendo_the_sound_begins_where_the_hand_feels_the_threshold() {
             100.0 * heard.rest,
         );
         let off = [felt.commanded_deg, felt.made_deg].map(|deg| in_deg(deg).abs().max(in_pa(deg).abs()));
-        if !(off[0] < 3.0 && off[1] < 3.0) {
+        if !(off[0] < ONSET_PERCENT && off[1] < ONSET_PERCENT) {
             missed.push(at);
         }
         let is_own = !ELSEWHERE.contains(&note.written.0);
@@ -202,7 +205,7 @@ fn in_a_slow_crescendo_the_sound_begins_where_the_hand_feels_the_threshold() {
         runs.len(),
         100.0 * rest
     );
-    assert!(missed.is_empty(), "{} of {} beyond 3 %", missed.len(), runs.len());
+    assert!(missed.is_empty(), "{} of {} beyond {ONSET_PERCENT} %", missed.len(), runs.len());
     assert!(astray_deg < 2.0, "the hand holds the falling branch, too: {astray_deg}");
 }
 
