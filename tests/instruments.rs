@@ -16,11 +16,11 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 use chalumeau_core::analysis::impedance::reflectance;
+use chalumeau_core::bore::cells::networks;
 use chalumeau_core::bore::cells::{Cells, CellsError};
 use chalumeau_core::bore::fit;
 use chalumeau_core::bore::instrument_file::{BoreSegment, Fingering, HoleKind, InstrumentFile, ToneHole};
 use chalumeau_core::bore::lattice::{Lattice, LatticeCoeffs, MAX_TICKS, Tip};
-use chalumeau_core::bore::tone_hole::networks;
 use chalumeau_core::bore::transfer_matrix::{TransferMatrix, find_peaks};
 use chalumeau_core::reed::physical::P_REF_PA;
 use chalumeau_core::units::{Air, REFERENCE_RADIUS_M, WrittenNote, cents};

@@ -9,8 +9,8 @@ mod reference;
 use std::sync::OnceLock;
 
 use chalumeau_core::analysis::impedance::{Impedance, reflectance};
+use chalumeau_core::bore::cells::networks;
 use chalumeau_core::bore::lattice::{Lattice, LatticeCoeffs, Real, Tip};
-use chalumeau_core::bore::tone_hole::networks;
 use chalumeau_core::bore::transfer_matrix::{TransferMatrix, find_peaks, threshold_gamma};
 use chalumeau_core::instrument::Model;
 use chalumeau_core::instrument::held_note::HeldNote;

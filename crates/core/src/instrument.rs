@@ -21,6 +21,7 @@ pub mod bend;
 mod breath_noise;
 mod clarinet;
 pub mod concert_pitch;
+mod control_tick;
 pub mod feel_inputs;
 pub mod held_note;
 pub mod internal_rate;

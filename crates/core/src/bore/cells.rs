@@ -6,7 +6,7 @@
 
 use crate::bore::instrument_file::{InstrumentFile, MAX_HOLES};
 use crate::bore::lattice::{LANES, MAX_CHUNKS, MAX_TICKS, hole_chunks};
-use crate::bore::tone_hole;
+use crate::bore::tone_hole::{self, HoleNetwork};
 use crate::bore::wall_loss;
 use crate::units::{Air, REFERENCE_RADIUS_M};
 
@@ -333,4 +333,16 @@ impl Cells {
             chimney_split: 0.4,
         })
     }
+}
+
+/// The networks of all holes of a file; viscous resistance taken at 2.4 times the lowest note (350 Hz on the B flat
+/// clarinet).
+pub fn networks(file: &InstrumentFile, air: &Air, cells: &Cells) -> Vec<HoleNetwork> {
+    let lowest_hz = file.lowest_hz();
+    file.holes
+        .iter()
+        .map(|hole| {
+            HoleNetwork::new(hole, file.radius_at(hole.x_m), cells.chimney_split, 2.4 * lowest_hz, air)
+        })
+        .collect()
 }

@@ -14,11 +14,11 @@ use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationRe
 use nalgebra::{DMatrix, DVector, Dyn, Owned};
 use num_complex::Complex64;
 
+use crate::bore::cells::networks;
 use crate::bore::cells::{Cells, CellsError};
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::lattice::LatticeCoeffs;
 use crate::bore::lattice::sensitivity::{AtFrequency, Layout, Sweep, hole_admittances};
-use crate::bore::tone_hole::networks;
 use crate::bore::transfer_matrix::TransferMatrix;
 use crate::parallel::each_part;
 use crate::units::Air;

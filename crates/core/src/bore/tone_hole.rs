@@ -10,8 +10,7 @@
 
 use num_complex::Complex64;
 
-use crate::bore::cells::Cells;
-use crate::bore::instrument_file::{InstrumentFile, ToneHole};
+use crate::bore::instrument_file::ToneHole;
 use crate::bore::radiation::{END_CORRECTION, RESISTANCE};
 use crate::bore::transfer_matrix::bessel_ratio;
 use crate::units::Air;
@@ -112,16 +111,4 @@ impl HoleCoeffs {
         let outside = 1.0 / (self.rs + 1.0 / (self.gl * trapezoid + self.gp));
         1.0 / (self.r1 / trapezoid + 1.0 / (self.gc / trapezoid + a * a * outside))
     }
-}
-
-/// The networks of all holes of a file; viscous resistance taken at 2.4 times the lowest note (350 Hz on the B flat
-/// clarinet).
-pub fn networks(file: &InstrumentFile, air: &Air, cells: &Cells) -> Vec<HoleNetwork> {
-    let lowest_hz = file.lowest_hz();
-    file.holes
-        .iter()
-        .map(|hole| {
-            HoleNetwork::new(hole, file.radius_at(hole.x_m), cells.chimney_split, 2.4 * lowest_hz, air)
-        })
-        .collect()
 }

@@ -1,6 +1,6 @@
 //! Breath noise: turbulence of the jet through the reed channel, white noise between two corners that rides on the flow.
 
-use super::voice::TICK;
+use super::control_tick::TICK;
 
 /// Noise at amount 1: rms of the noise flow over the mean flow it rides on (by level: -40 dB under a mezzo-forte
 /// fundamental at the default 0.3).

@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use crate::bore::cells::Cells;
 use crate::bore::cells::CellsError;
+use crate::bore::cells::networks;
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::lattice::LatticeCoeffs;
-use crate::bore::tone_hole::networks;
 use crate::instrument::concert_pitch::A4_HZ;
 use crate::instrument::tuning_table::TuningTable;
 use crate::reed::PhysicalReed;

@@ -4,14 +4,13 @@ use std::sync::Arc;
 
 use crate::bore::lattice::{Lattice, LatticeCoeffs, Real, Tip};
 use crate::instrument::breath_noise::BreathNoise;
+pub use crate::instrument::control_tick::TICK;
 use crate::reed::ReedCoeffs;
 use crate::reed::ReedState;
 use crate::reed::ReedTables;
 use crate::reed::physical::P_REF_PA;
 use crate::units::Air;
 
-/// Samples of one control tick. Everything a player moves, moves on this grid, counted from the last reset.
-pub const TICK: usize = 16;
 /// Ticks between two flushes of states that are too small to hear.
 const FLUSH_TICKS: u32 = 64;
 

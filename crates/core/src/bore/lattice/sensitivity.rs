@@ -157,8 +157,8 @@ pub fn hole_admittances(coeffs: &LatticeCoeffs, f_hz: f64) -> Vec<[Complex64; 2]
 mod tests {
     use super::*;
     use crate::bore::cells::Cells;
+    use crate::bore::cells::networks;
     use crate::bore::instrument_file::InstrumentFile;
-    use crate::bore::tone_hole::networks;
     use crate::units::Air;
 
     /// Every derivative against a difference, at frequencies on and off resonance.

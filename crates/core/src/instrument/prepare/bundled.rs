@@ -2,15 +2,12 @@
 
 use std::sync::LazyLock;
 
-use super::prepared_file::parse_generated;
+use super::prepared_file::{BUILT_IN, parse_generated};
 use super::wanted::content;
 use crate::bore::bundled::Bundled;
 use crate::bore::instrument_file::InstrumentFile;
 use crate::instrument::model::{BuildError, Model};
 use crate::instrument::store::Key;
-
-/// The generated file of the built-in clarinet.
-pub const BUILT_IN: &str = include_str!("../../../data/b_flat_clarinet.prepared.toml");
 
 /// The generated file of each instrument.
 fn generated(instrument: Bundled) -> &'static str {

@@ -7,6 +7,9 @@ use crate::bore::instrument_file::InstrumentFile;
 use crate::instrument::model::{BuildError, Model};
 use crate::instrument::tuning_table::{NoteTuning, TuningTable};
 
+/// The generated file of the built-in clarinet.
+pub const BUILT_IN: &str = include_str!("../../../data/b_flat_clarinet.prepared.toml");
+
 /// The parts of a model that are expensive to compute. The instrument file has the rest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PreparedInstrument {

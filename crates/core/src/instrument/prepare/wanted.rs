@@ -1,6 +1,6 @@
 //! Which instrument is wanted, at which pitch, rate and quality; and the key under which the result is kept.
 
-use super::bundled;
+use super::prepared_file;
 use crate::bore::instrument_file::{BoreSegment, Fingering, HoleKind, InstrumentFile, ToneHole};
 use crate::instrument::concert_pitch::{A4_BY_DELAY_HZ, A4_HZ, A4_RANGE_HZ};
 use crate::instrument::internal_rate::checked_rate_hz;
@@ -94,7 +94,7 @@ impl Wanted {
     }
 
     pub(super) fn key_of(&self, stored: Stored) -> Result<Key, BuildError> {
-        self.key_with(stored, VERSION, bundled::BUILT_IN)
+        self.key_with(stored, VERSION, prepared_file::BUILT_IN)
     }
 
     /// `built_in` is what fitting and tuning make of the built-in clarinet: when it changes, everything they made before
@@ -182,13 +182,13 @@ mod tests {
         assert!(!same(Wanted { quality: Quality::High, ..wanted.clone() }));
         // Other algorithms change the version, or what they make of the built-in clarinet.
         let keys = [
-            (Stored::Tuned, VERSION, bundled::BUILT_IN),
-            (Stored::AsBuilt, VERSION, bundled::BUILT_IN),
-            (Stored::Tuned, VERSION + 1, bundled::BUILT_IN),
+            (Stored::Tuned, VERSION, prepared_file::BUILT_IN),
+            (Stored::AsBuilt, VERSION, prepared_file::BUILT_IN),
+            (Stored::Tuned, VERSION + 1, prepared_file::BUILT_IN),
         ]
         .map(|(stored, version, built_in)| wanted.key_with(stored, version, built_in).unwrap());
         assert_eq!(keys[0], wanted.key().unwrap());
-        let other = bundled::BUILT_IN.replacen('4', "5", 1);
+        let other = prepared_file::BUILT_IN.replacen('4', "5", 1);
         let other = wanted.key_with(Stored::Tuned, VERSION, &other).unwrap();
         assert!(keys[1..].iter().chain([&other]).all(|key| *key != keys[0]));
         let changed = |change: fn(&mut InstrumentFile)| {
