@@ -62,7 +62,7 @@ pub struct Cells {
     pub loss_poles_hz: [f64; 3],
     /// Their strengths, s^-1/2.
     pub loss_strengths: [f64; 3],
-    /// Viscous resistance of register holes over that of [`HoleNetwork`](crate::bore::tone_hole::HoleNetwork), which is
+    /// Viscous resistance of register holes over that of [`HoleNetwork`], which is
     /// constant where the true one grows with the root of frequency.
     pub vent_resistance: f64,
     /// Share of each chimney's mass before its compliance: 1/3 would be right for closed holes, nearly 1/2 for open ones.
