@@ -186,8 +186,8 @@ fn go_on(on: OnProgress<'_>, progress: Progress<'_>) -> Result<(), BuildError> {
     }
 }
 
-#[cfg(feature = "fit")]
 /// How far off the notes are without trims; first reports that the instrument can be played.
+#[cfg(feature = "fit")]
 fn heard_offsets(model: &Arc<Model>, on: OnProgress<'_>) -> Result<Vec<Option<f64>>, BuildError> {
     go_on(on, Progress::Fitted(model))?;
     auto_tune::offsets(model, &mut |share| on(Progress::Tuning(HEARD * share))).ok_or(BuildError::Cancelled)

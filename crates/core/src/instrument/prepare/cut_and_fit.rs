@@ -17,8 +17,8 @@ pub fn cut(file: &InstrumentFile, scale: f64, rate_hz: f64, a4_hz: f64) -> Resul
     Ok(untuned(file, cells, a4_hz, scale))
 }
 
-#[cfg(feature = "fit")]
 /// Cut and fitted, not tuned. Takes seconds. `scale` multiplies all lengths of the file.
+#[cfg(feature = "fit")]
 pub fn fit(
     file: &InstrumentFile,
     scale: f64,

@@ -39,8 +39,8 @@ impl PreparedInstrument {
         fits.then(|| Model::assemble(file.scaled(self.scale), self.cells, tuning, self.a4_hz, self.scale))
     }
 
-    #[cfg(feature = "fit")]
     /// As TOML, for a store; `None` if a number has no text.
+    #[cfg(feature = "fit")]
     pub(super) fn to_text(&self) -> Option<String> {
         toml::to_string(self).ok()
     }
