@@ -242,7 +242,7 @@ fn numbers_out_of_range_say_what_would_be_right() {
         ("--gamma 3.5", "must lie in 0..3"),
         ("--gamma nan", "must lie in 0..3"),
         ("--gamma soft", "must be a number in 0..3"),
-        ("--rate 8000", "22050..=384000"),
+        ("--rate 800", "1000..=1536000"),
         ("--bits 20", "possible values: 16, 24, 32f"),
         ("--channels 3", "1..=2"),
         ("--seconds 0", "must lie in 0.01..3600"),

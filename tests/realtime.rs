@@ -226,6 +226,52 @@ fn plain_code_path_gives_the_same_bits() {
     assert!(bits(&vector) == bits(&plain));
 }
 
+/// Rates that hosts and validators ask for, Hz.
+const ALL_RATES_HZ: [f64; 20] = [
+    1_000.0,
+    2_000.0,
+    4_000.0,
+    8_000.0,
+    11_025.0,
+    16_000.0,
+    22_050.0,
+    24_000.0,
+    32_000.0,
+    44_100.0,
+    47_999.0,
+    48_000.0,
+    88_200.0,
+    96_000.0,
+    176_400.0,
+    192_000.0,
+    384_000.0,
+    705_600.0,
+    768_000.0,
+    1_536_000.0,
+];
+
+#[test]
+fn the_lowest_note_is_in_tune_at_every_rate() {
+    let wanted_hz = SoundingNote(50).frequency_hz(440.0);
+    let mut worst = 0.0_f64;
+    for host_hz in ALL_RATES_HZ {
+        let mut clarinet = clarinet(host_hz);
+        clarinet.set_settings(&Settings { noise: 0.0, ..Settings::default() });
+        clarinet.apply(Event::Breath(0.5));
+        clarinet.apply(note_on(52));
+        render(&mut clarinet, 0.6, host_hz);
+        let sound = wide(&render(&mut clarinet, 0.4, host_hz));
+        let hz = pitch::fundamental_hz(&sound, host_hz).unwrap_or_else(|| panic!("silent at {host_hz} Hz"));
+        let off = cents(hz, wanted_hz);
+        worst = worst.max(off.abs());
+        assert!(off.abs() < 2.0, "{host_hz} Hz: {off} cents");
+        clarinet.apply(Event::Panic);
+        render(&mut clarinet, 5.0, host_hz);
+        assert!(clarinet.is_silent(), "{host_hz} Hz: not silent");
+    }
+    println!("{} rates from 1 kHz to 1.536 MHz: worst {worst:.3} cents", ALL_RATES_HZ.len());
+}
+
 #[test]
 fn silence_is_silent_a_second_after_the_breath_or_the_key() {
     for host_hz in [44_100.0, 48_000.0] {

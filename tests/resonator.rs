@@ -251,13 +251,12 @@ struct Fingers {
 impl Fingers {
     fn move_on(&mut self, lattice: &mut Lattice<f64>, model: &Model, random: &mut Random) {
         if self.left == 0 {
-            for (hole, &opening) in self.target.iter().enumerate() {
-                lattice.set_opening(hole, opening);
-            }
             self.target = openings(model, random.below(model.file.fingerings.len()));
             self.left = ((1e-3 + 19e-3 * random.unit()) * model.coeffs.rate_hz) as usize;
+            // Some arrive long before the next movement, some are still under way.
+            let glide = (2.0 * random.unit() * self.left as f64) as usize;
             for (hole, &opening) in self.target.iter().enumerate() {
-                lattice.glide_opening(hole, opening, self.left);
+                lattice.glide_opening(hole, opening, glide);
             }
         }
         self.left -= 1;
@@ -375,7 +374,7 @@ fn moving_delay_is_bounded_and_decays() {
             "delay and fingers moving, {rate_hz} Hz: energy at most {most:.4} of the start, {moving:.1e} after 100000 \
              samples, {rest:.1e} and waves {wave:.1e} ten seconds later"
         );
-        assert!(most < 1.001 && moving < 2e-6 && rest < 1e-15 && wave < 1e-7);
+        assert!(most < 1.001 && moving < 2e-5 && rest < 1e-15 && wave < 1e-7);
     }
 }
 
@@ -535,20 +534,17 @@ fn bits<F: Real>(plain: bool) -> Vec<u64> {
     }
     let mut random = Random(0xb175_0000_1111_2222);
     let ticks = model.coeffs.rate_hz as usize / TICK;
-    let (mut target, glide) = (openings(model, first.fingering), 40);
+    let glide = 40;
     let mut bits = Vec::new();
     for tick in 0..ticks {
         let lattice = voice.lattice_mut();
         if tick % 200 == 0 {
-            target = openings(model, random.below(model.file.fingerings.len()));
+            let target = openings(model, random.below(model.file.fingerings.len()));
             for (hole, &opening) in target.iter().enumerate() {
                 lattice.glide_opening(hole, opening, glide * TICK);
             }
             lattice.glide_delay(3.0 * random.both(), glide * TICK);
         } else if tick % 200 == glide {
-            for (hole, &opening) in target.iter().enumerate() {
-                lattice.set_opening(hole, opening);
-            }
             lattice.glide_delay(0.5, 0);
         }
         let p_mouth = 0.6 * (tick as f64 / 120.0).min(1.0);

@@ -40,8 +40,8 @@ pub struct BifurcationCommand {
     /// Time of the rise, and again of the fall, s, 0.5..600
     #[arg(long, value_name = "S", default_value = "20", value_parser = |s: &str| within(s, 0.5, 600.0))]
     seconds: f64,
-    /// Sample rate, Hz, 22050..384000
-    #[arg(long, alias = "sr", value_name = "HZ", default_value = "48000", value_parser = clap::value_parser!(u32).range(22_050..=384_000))]
+    /// Sample rate, Hz, 1000..1536000
+    #[arg(long, alias = "sr", value_name = "HZ", default_value = "48000", value_parser = clap::value_parser!(u32).range(1_000..=1_536_000))]
     rate: u32,
     #[command(flatten)]
     instrument: PlayedArgs,

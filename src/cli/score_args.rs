@@ -19,6 +19,7 @@ use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, BreathMappin
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::touch::take::Take;
 use clap::{ArgGroup, Args};
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -70,8 +71,8 @@ pub struct ScoreArgs {
     /// the angle into its own pressure
     #[arg(long, value_name = "FILE", help_heading = "Breath (replaces that of a MIDI file)")]
     replay: Option<PathBuf>,
-    /// Sample rate, Hz, 22050..384000
-    #[arg(long, alias = "sr", value_name = "HZ", default_value = "48000", help_heading = "Output", value_parser = clap::value_parser!(u32).range(22_050..=384_000))]
+    /// Sample rate, Hz, 1000..1536000
+    #[arg(long, alias = "sr", value_name = "HZ", default_value = "48000", help_heading = "Output", value_parser = clap::value_parser!(u32).range(1_000..=1_536_000))]
     rate: u32,
 
     #[command(flatten)]
@@ -121,6 +122,7 @@ impl ScoreArgs {
             score = score.blown(curve, &settings, self.rate);
         }
         let model = self.instrument.model(file, self.rate, settings.a4_hz)?;
+        warn_of_silent_notes(&score.events, &model);
         if let Some(take) = &self.replay {
             score.events = self.replayed(take, &model, &settings, &score)?;
         }
@@ -208,7 +210,6 @@ impl ScoreArgs {
             let decoder = if self.mpe { MidiDecoder::new().with_mpe() } else { MidiDecoder::new() };
             let score = midi_file::read_as(decoder, &bytes, self.rate)
                 .map_err(|source| Failure::MidiFile { path: path.clone(), source })?;
-            warn_of_missing_fingerings(&score.events, file);
             return Ok(score);
         }
         if let Some((from, to)) = self.scale {
@@ -238,23 +239,36 @@ impl ScoreArgs {
     }
 }
 
-/// Warns of notes that have no fingering and stay silent.
-fn warn_of_missing_fingerings(events: &[Timed<Event>], file: &InstrumentFile) {
-    let missing = |event: &Timed<Event>| match event.event {
-        Event::NoteOn { note, .. } => {
-            note.written(file.transposition).and_then(|written| file.fingering(written)).is_none()
-        }
-        _ => false,
-    };
-    let count = events.iter().filter(|event| missing(event)).count();
-    if count > 0 {
+/// Warns of notes that the instrument cannot play, which stay silent.
+fn warn_of_silent_notes(events: &[Timed<Event>], model: &Model) {
+    let file = &model.file;
+    let sounds =
+        |note: WrittenNote| note.sounding(file.transposition).map(|n| n.to_string()).unwrap_or_default();
+    let asked = events.iter().filter_map(|timed| match timed.event {
+        Event::NoteOn { note, .. } => Some(note),
+        _ => None,
+    });
+    let silent: Vec<_> = asked.filter(|&note| model.fingering_for(note).is_none()).collect();
+    let written = |note: SoundingNote| note.written(file.transposition);
+    let (muted, missing): (Vec<_>, Vec<_>) = silent
+        .into_iter()
+        .partition(|&note| written(note).is_some_and(|note| file.fingering(note).is_some()));
+    if !missing.is_empty() {
         let (low, high) = (file.lowest(), file.highest());
-        let sounds =
-            |note: WrittenNote| note.sounding(file.transposition).map(|n| n.to_string()).unwrap_or_default();
         eprintln!(
-            "warning: {count} notes have no fingering and stay silent; this instrument sounds {} to {} (written {low} to {high})",
+            "warning: {} notes have no fingering and stay silent; this instrument sounds {} to {} (written {low} to {high})",
+            missing.len(),
             sounds(low),
             sounds(high)
+        );
+    }
+    if !muted.is_empty() {
+        let names: BTreeSet<_> = muted.iter().filter_map(|&note| written(note)).collect();
+        let names: Vec<_> = names.iter().map(|note| format!("{note} (sounds {})", sounds(*note))).collect();
+        eprintln!(
+            "warning: {} notes stay silent, because their fingering does not speak in tune on this instrument: written {}",
+            muted.len(),
+            names.join(", ")
         );
     }
 }

@@ -46,8 +46,8 @@ pub struct TuneCommand {
     /// Mouth pressure over closing pressure, 0..3
     #[arg(long, value_name = "G", default_value = "0.5", value_parser = |s: &str| within(s, 0.0, f64::from(GAMMA_MAX)))]
     gamma: f64,
-    /// Sample rate, Hz, 22050..384000
-    #[arg(long, alias = "sr", value_name = "HZ", default_value = "48000", value_parser = clap::value_parser!(u32).range(22_050..=384_000))]
+    /// Sample rate, Hz, 1000..1536000
+    #[arg(long, alias = "sr", value_name = "HZ", default_value = "48000", value_parser = clap::value_parser!(u32).range(1_000..=1_536_000))]
     rate: u32,
     #[command(flatten)]
     instrument: PlayedArgs,

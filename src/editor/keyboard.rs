@@ -17,6 +17,9 @@ use chalumeau_core::units::SoundingNote;
 /// Velocity of a note played with Space.
 const PLAIN: f32 = 0.75;
 
+const HELP: &str = "The keys play sounding pitches; the written note is at the top of the window. Press lower on a key to play louder; slide to slur. With the keyboard: Tab to here, choose with the arrow keys, play with Space.";
+const SILENT_KEY: &str = "The instrument does not play this note in tune, so the key is silent.";
+
 /// What the keys remember.
 #[derive(Clone, Debug, Default)]
 pub struct Keyboard {
@@ -42,7 +45,9 @@ impl Keyboard {
         let to = if is_black(highest.0) { highest.0 + 1 } else { highest.0 };
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
         let keys = Keys::new(rect, from, to);
-        let playable = |note: u8| (lowest.0..=highest.0).contains(&note);
+        let playable = |note: u8| {
+            (lowest.0..=highest.0).contains(&note) && !snapshot.silent.contains(&SoundingNote(note))
+        };
 
         let pointer = response.interact_pointer_pos().filter(|_| response.is_pointer_button_down_on());
         let wanted = pointer.and_then(|at| keys.at(at)).filter(|(note, _)| playable(*note));
@@ -76,9 +81,9 @@ impl Keyboard {
         });
         // A user who plays needs no tool tip.
         if self.held.is_none() {
-            response.on_hover_text(
-                "The keys play sounding pitches; the written note is at the top of the window. Press lower on a key to play louder; slide to slur. With the keyboard: Tab to here, choose with the arrow keys, play with Space.",
-            );
+            let pointed = response.hover_pos().and_then(|at| keys.at(at));
+            let is_silent = pointed.is_some_and(|(note, _)| !playable(note));
+            response.on_hover_text(if is_silent { SILENT_KEY } else { HELP });
         }
     }
 

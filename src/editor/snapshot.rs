@@ -16,6 +16,8 @@ use chalumeau_core::units::{SoundingNote, WrittenNote};
 pub struct Snapshot {
     /// The instrument that sounds.
     pub instrument: Arc<InstrumentFile>,
+    /// Notes within its range that it cannot play, see [`Model::speaks`](chalumeau_core::instrument::Model::speaks).
+    pub silent: Vec<SoundingNote>,
     /// Instruments that can be chosen, by name; the chosen one may be none of them.
     pub instruments: Vec<String>,
     /// Index into `instruments`.
@@ -61,6 +63,7 @@ impl Default for Snapshot {
         let openings = vec![0.0; instrument.holes.len()];
         Self {
             instrument,
+            silent: Vec::new(),
             instruments: Vec::new(),
             chosen: None,
             preparing: None,

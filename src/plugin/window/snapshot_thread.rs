@@ -102,6 +102,7 @@ impl SnapshotThread {
         let settings = self.handles.params.settings();
         let mut snapshot = Snapshot { settings, ..self.blank.clone() };
         snapshot.instruments = InstrumentChoice::ALL.iter().map(|choice| choice.title().to_owned()).collect();
+        snapshot.silent = current.as_ref().map_or_else(Vec::new, |current| current.model.silent_notes());
         snapshot.chosen = Some(self.handles.params.instrument.choice.value() as usize);
         show_inside(&mut snapshot, &inside);
         snapshot.history = self.history.track();

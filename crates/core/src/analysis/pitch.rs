@@ -149,7 +149,7 @@ pub fn pitch_track(samples: &[f64], rate_hz: f64, hop_s: f64) -> Vec<TrackPoint>
 fn coarse_hz(planner: &mut RealFftPlanner<f64>, samples: &[f64], rate_hz: f64) -> Option<f64> {
     let len = samples.len();
     let longest = ((rate_hz / LOWEST_HZ * 1.02) as usize).min(len / 3);
-    let shortest = (rate_hz / HIGHEST_HZ * 0.98) as usize;
+    let shortest = ((rate_hz / HIGHEST_HZ * 0.98) as usize).max(1);
     if longest <= shortest + 2 || rms(samples) < SILENCE {
         return None;
     }

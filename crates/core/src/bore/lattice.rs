@@ -91,6 +91,8 @@ pub struct Lattice<F> {
     /// Rows the returning wave of the tuned cell takes, and their change per row.
     delay: F,
     delay_glide: F,
+    /// Samples until the delay has arrived; 0 while it rests.
+    delay_left: usize,
     /// Openings or jets have changed since they were last matched.
     moved: bool,
     avx2: bool,
@@ -209,6 +211,7 @@ impl<F: Real> Lattice<F> {
             tuned_rows: coeffs.rows(tuned).1 as u16,
             delay: F::of(f64::from(coeffs.rows(tuned).1)),
             delay_glide: F::default(),
+            delay_left: 0,
             moved: true,
             avx2: has_avx2(),
         }
@@ -219,8 +222,17 @@ impl<F: Real> Lattice<F> {
         u32::from(self.mask / STRIDE as u16) + 1
     }
 
-    /// Silence; openings, delay and loss stay. Real-time safe.
+    /// Back to the beginning: silence, all holes closed, the tuning delay at 0; the loss of the jets stays. Real-time safe.
     pub fn reset(&mut self) {
+        self.silence();
+        for hole in 0..self.hole_lanes.len() {
+            self.set_opening(hole, 0.0);
+        }
+        self.glide_delay(0.0, 0);
+    }
+
+    /// Takes all waves away; openings, delay and what moves them stay. Real-time safe.
+    pub fn silence(&mut self) {
         self.ring[..=usize::from(self.mask)].fill(F::default());
         self.steps.iter_mut().for_each(|steps| steps.arrivals.state = Default::default());
         for holes in &mut *self.holes {
@@ -245,18 +257,21 @@ impl<F: Real> Lattice<F> {
     /// Opening of a hole, 0 closed ..= 1 open, at once. Real-time safe.
     pub fn set_opening(&mut self, hole: usize, opening: f64) {
         let (chunk, lane) = self.hole_lanes[hole];
-        self.holes[chunk].opening[lane] = F::of(opening.clamp(0.0, 1.0));
-        self.holes[chunk].glide[lane] = F::default();
+        self.holes[chunk].set_opening(lane, opening.clamp(0.0, 1.0));
         self.moved = true;
     }
 
-    /// Starts a hole towards an opening that it reaches after `samples`; set it there with
-    /// [`set_opening`](Self::set_opening) then. Real-time safe.
+    /// Starts a hole towards an opening, 0..=1, where it arrives after `samples` and rests. Real-time safe.
     pub fn glide_opening(&mut self, hole: usize, opening: f64, samples: usize) {
         let (chunk, lane) = self.hole_lanes[hole];
-        let from = self.holes[chunk].opening[lane].wide();
-        self.holes[chunk].glide[lane] = F::of((opening.clamp(0.0, 1.0) - from) / samples as f64);
+        self.holes[chunk].glide_opening(lane, opening.clamp(0.0, 1.0), samples);
         self.moved = true;
+    }
+
+    /// Opening of a hole now, 0 closed ..= 1 open.
+    pub fn opening(&self, hole: usize) -> f64 {
+        let (chunk, lane) = self.hole_lanes[hole];
+        self.holes[chunk].opening[lane].wide()
     }
 
     /// Strength of the jet's loss in all holes: K, 0 (linear) ..= 4; 2 is physical for sharp edges. Real-time safe.
@@ -267,10 +282,11 @@ impl<F: Real> Lattice<F> {
         self.moved = true;
     }
 
-    /// Tuning delay, rows of the round trip, clamped to what the cell can give; reached after `samples`, 0 for at once.
-    /// Real-time safe.
+    /// Tuning delay, rows of the round trip, clamped to what the cell can give; it arrives after `samples` and rests, 0 for
+    /// at once. Real-time safe.
     pub fn glide_delay(&mut self, rows: f64, samples: usize) {
         let rows = (rows + f64::from(self.tuned_rows)).clamp(1.0, f64::from(self.rows() - 2));
+        self.delay_left = samples;
         if samples == 0 {
             self.delay = F::of(rows);
             self.delay_glide = F::default();
@@ -281,11 +297,26 @@ impl<F: Real> Lattice<F> {
 
     /// Runs `samples` samples (a control tick) with `tip` at the reed end; jets of moving holes are brought up to date
     /// once a call. Real-time safe. [audio thread]
-    pub fn run<T: Tip<F>>(&mut self, samples: usize, tip: &mut T) {
+    pub fn run<T: Tip<F>>(&mut self, mut samples: usize, tip: &mut T) {
+        // A delay that arrives on the way rests from there on.
+        while (1..samples).contains(&self.delay_left) {
+            samples -= self.delay_left;
+            self.run_part(self.delay_left, tip);
+        }
+        self.run_part(samples, tip);
+    }
+
+    /// Runs no further than to where the delay arrives.
+    #[inline(always)]
+    fn run_part<T: Tip<F>>(&mut self, samples: usize, tip: &mut T) {
         match self.mask {
             LEAST_MASK => self.run_masked::<T, LEAST_MASK>(samples, tip),
             NEXT_MASK => self.run_masked::<T, NEXT_MASK>(samples, tip),
             _ => self.run_masked::<T, 0>(samples, tip),
+        }
+        self.delay_left = self.delay_left.saturating_sub(samples);
+        if self.delay_left == 0 {
+            self.delay_glide = F::default();
         }
     }
 

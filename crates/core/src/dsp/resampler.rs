@@ -1,4 +1,4 @@
-//! Sample-rate conversion from the instrument's own rate (96 000 or 88 200 Hz) to the host's (22 050..=384 000 Hz).
+//! Sample-rate conversion from the instrument's own rate (96 000 or 88 200 Hz) to the host's (1 000..=1 536 000 Hz).
 //!
 //! A polyphase FIR: one Kaiser-windowed sinc, sampled at as many phases as the ratio of the two rates needs. It is
 //! linear-phase and leaves out nothing but steepness: the transition runs from 5/12 to 7/12 of the lower of the two
@@ -99,11 +99,11 @@ impl Resampler {
     /// Most inputs that may be pushed at once.
     pub const PUSH_MOST: usize = ROOM / 2;
 
-    /// Converter from `in_hz` to `out_hz`, each held to 1000..=1 000 000 Hz and rounded to a thousandth of a hertz.
+    /// Converter from `in_hz` to `out_hz`, each held to 1000..=2 000 000 Hz and rounded to a thousandth of a hertz.
     /// Allocates.
     pub fn new(in_hz: f64, out_hz: f64) -> Self {
         // The cast turns NaN into 0, the last step that into the lowest rate.
-        let parts = |hz: f64| ((hz.clamp(1e3, 1e6) * PARTS_PER_HZ).round() as u64).max(1_000_000);
+        let parts = |hz: f64| ((hz.clamp(1e3, 2e6) * PARTS_PER_HZ).round() as u64).max(1_000_000);
         let (input, output) = (parts(in_hz), parts(out_hz));
         let common = gcd(input, output);
         let (l, m) = (output / common, input / common);

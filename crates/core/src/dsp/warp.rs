@@ -12,6 +12,10 @@ use crate::dsp::low_pass::{Kernel, LANES, dot, normalised};
 pub const SPEEDS: (f64, f64) = (0.25, 4.0);
 /// Phases of the window of speed 1; a stretched one is smoother and needs fewer.
 const PHASES: usize = 128;
+/// A window of more taps than this at speed 1, for a host rate below 12 kHz, is smoother in proportion.
+const SMOOTH_TAPS: f64 = 256.0;
+/// Windows shorter than that of speed 1 differ by one lane, or by this part of their length.
+const FINEST: usize = 16;
 /// Points per input sample of the table all windows are read from.
 const POINTS: f64 = 256.0;
 /// Places behind the newest input that taps of nothing may lie on.
@@ -52,7 +56,12 @@ impl Warp {
         let shortest = (taps as f64 * (out_hz / in_hz).min(1.0)).ceil() as usize;
         let shortest = shortest.next_multiple_of(LANES);
         let longest = (taps as f64 * (SPEEDS.1 * stretch).max(1.0)).ceil() as usize;
-        let mut lengths: Vec<usize> = (shortest..taps).step_by(LANES).collect();
+        let mut lengths = Vec::new();
+        let mut length = shortest;
+        while length < taps {
+            lengths.push(length);
+            length += (length / FINEST).next_multiple_of(LANES).max(LANES);
+        }
         let mut length = taps;
         while length < longest {
             lengths.push(length);
@@ -103,7 +112,8 @@ impl Warp {
 impl Window {
     fn new(kernel: &Kernel, table: &[f64], taps: usize) -> Self {
         let stretch = taps as f64 / kernel.taps as f64;
-        let phases = (PHASES as f64 / stretch).ceil() as usize;
+        let smoother = (kernel.taps as f64 / SMOOTH_TAPS).max(1.0);
+        let phases = (PHASES as f64 / (stretch * smoother)).ceil() as usize;
         // Nothing is heard in the last phase's width and a bit: taps on inputs that have not come are 0 in both rows.
         let silent = kernel.half - 1.5 / (phases as f64 * stretch);
         let height = |t: f64| {

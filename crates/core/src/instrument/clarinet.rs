@@ -18,7 +18,6 @@ use crate::instrument::settings::Settings;
 use crate::instrument::voice::{Probe, Voice};
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
-use crate::reed::motion::TONGUE_FORCE;
 use crate::reed::{MovingReed, ReedCoeffs};
 
 /// Samples up to this magnitude count as silence: -120 dBFS.
@@ -82,7 +81,7 @@ pub struct Clarinet {
 }
 
 impl Clarinet {
-    /// The built-in B flat clarinet at a host rate in Hz, 22050..=384000. Allocates.
+    /// The built-in B flat clarinet at a host rate in Hz, 1000..=1536000. Allocates.
     ///
     /// # Errors
     /// [`BuildError::Rate`] if the host rate is out of range.
@@ -111,7 +110,7 @@ impl Clarinet {
         } else {
             AnyVoice::Single(Box::new(Voice::new(&model.coeffs, &model.air, tables, reed)))
         };
-        with_voice!(&mut voice, voice => voice.hold_reed(TONGUE_FORCE));
+        with_voice!(&mut voice, voice => voice.reset());
         let resampler = Resampler::new(rate, host_rate_hz);
         let level = OutputLevel::new(model.file.nominal_radius_m, host_rate_hz);
         let scope = Scope::new(rate, model.lowest_hz);
@@ -224,7 +223,7 @@ impl Clarinet {
                 };
             } else {
                 out.fill(0.0);
-                with_voice!(&mut self.voice, voice => voice.reset());
+                with_voice!(&mut self.voice, voice => voice.silence());
                 self.resampler.reset();
                 self.limiter.reset();
                 self.resets += 1;
@@ -234,15 +233,7 @@ impl Clarinet {
 
     /// Silences and resets everything; settings stay. Real-time safe.
     pub fn reset(&mut self) {
-        self.player.reset();
-        with_voice!(&mut self.voice, voice => {
-            voice.reset();
-            voice.hold_reed(TONGUE_FORCE);
-            voice.lattice_mut().glide_delay(0.0, 0);
-            for hole in 0..self.model.coeffs.holes() {
-                voice.lattice_mut().set_opening(hole, 0.0);
-            }
-        });
+        with_voice!(&mut self.voice, voice => self.player.reset(voice));
         self.resampler.reset();
         self.limiter.reset();
         self.level.settle();

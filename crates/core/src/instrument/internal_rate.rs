@@ -2,8 +2,9 @@
 
 use crate::instrument::model::BuildError;
 
-/// Lowest and highest host rate, Hz.
-pub const HOST_RATES_HZ: (f64, f64) = (22_050.0, 384_000.0);
+/// Lowest and highest host rate, Hz: the widest range that a validator of plugins was seen to ask for. A low rate cannot
+/// carry high notes.
+pub const HOST_RATES_HZ: (f64, f64) = (1_000.0, 1_536_000.0);
 
 /// The lattice's rate for a host rate, both Hz: 88.2 kHz for the 44.1 kHz family, 96 kHz for all others.
 pub fn internal_rate_hz(host_rate_hz: f64) -> f64 {

@@ -15,6 +15,10 @@ use crate::reed::PhysicalReed;
 use crate::reed::physical::{P_REF_PA, REFERENCE_VOLUME_M3};
 use crate::units::{Air, SoundingNote};
 
+/// Largest error of a note that is played, cents. A note further off that the delay cannot mend also leaves its register
+/// at most pressures: written A#6 of the built-in clarinets is 14 to 40 cents flat and speaks at one pressure of five.
+pub const IN_TUNE_CENTS: f64 = 10.0;
+
 /// An instrument at one internal rate. It does not change: share it in an [`Arc`].
 ///
 /// ```
@@ -58,7 +62,7 @@ pub struct Model {
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
     /// The host rate, Hz, lies outside [`HOST_RATES_HZ`](super::internal_rate::HOST_RATES_HZ).
-    #[error("sample rate must lie in 22050..384000 Hz, got {0}")]
+    #[error("sample rate must lie in 1000..1536000 Hz, got {0}")]
     Rate(f64),
     /// The pitch of A4, Hz, lies outside [`A4_RANGE_HZ`](super::concert_pitch::A4_RANGE_HZ).
     #[error("A4 must lie in 415..466 Hz, got {0}")]
@@ -115,10 +119,28 @@ impl Model {
         }
     }
 
-    /// Index of the fingering for a sounding note; `None` if the instrument does not have the note. Real-time safe.
+    /// Index of the fingering that plays a sounding note; `None` if the instrument has none, or if the fingering does not
+    /// [speak in tune](Self::speaks). A player who asks for such a note hears nothing, not another note. Real-time safe.
     pub fn fingering_for(&self, note: SoundingNote) -> Option<usize> {
         let written = note.written(self.file.transposition)?;
-        self.file.fingerings.iter().position(|fingering| fingering.written == written)
+        let fingering = self.file.fingerings.iter().position(|fingering| fingering.written == written)?;
+        self.speaks(fingering).then_some(fingering)
+    }
+
+    /// Whether a fingering speaks in its own register within [`IN_TUNE_CENTS`], as the tuning found. True before an
+    /// instrument is tuned, and for a fingering that the tuning does not have. Real-time safe.
+    pub fn speaks(&self, fingering: usize) -> bool {
+        let tuned = self.tuning.notes.get(fingering);
+        tuned.is_none_or(|note| !note.silent && note.off_cents.abs() <= IN_TUNE_CENTS)
+    }
+
+    /// Sounding notes that have a fingering which does not [speak in tune](Self::speaks), in the order of the file.
+    /// Allocates.
+    pub fn silent_notes(&self) -> Vec<SoundingNote> {
+        let silent = (0..self.file.fingerings.len()).filter(|&fingering| !self.speaks(fingering));
+        silent
+            .filter_map(|fingering| self.file.fingerings[fingering].written.sounding(self.file.transposition))
+            .collect()
     }
 
     /// Rows of round-trip delay that move a fingering's note by `cents`, estimated from the note's quarter-wave length.

@@ -19,7 +19,6 @@ use crate::event::Event;
 use crate::instrument::model::Model;
 use crate::instrument::settings::Settings;
 use crate::instrument::voice::{Drive, TICK, Voice};
-use crate::reed::motion::TONGUE_FORCE;
 use crate::reed::physical::P_REF_PA;
 use crate::units::{SoundingNote, cents};
 use breath::Breath;
@@ -112,9 +111,11 @@ impl Player {
         }
     }
 
-    /// Resets everything but the settings. Real-time safe.
-    pub fn reset(&mut self) {
+    /// Puts player, reed and bore back to the beginning; settings stay. The one way to end everything: a player who forgot
+    /// while the bore went on would leave fingers under way. Real-time safe.
+    pub fn reset<F: Real>(&mut self, voice: &mut Voice<F>) {
         *self = Self { settings: self.settings, ..Self::default() };
+        voice.reset();
     }
 
     /// Handles an event. Numbers out of range are clamped. Real-time safe.
@@ -136,11 +137,7 @@ impl Player {
                     self.move_holes(fingering, 1e-3 * f64::from(self.settings.legato_ms), model, voice);
                 }
             }
-            Event::Panic => {
-                self.reset();
-                voice.reset();
-                voice.hold_reed(TONGUE_FORCE);
-            }
+            Event::Panic => self.reset(voice),
         }
     }
 
@@ -213,7 +210,6 @@ impl Player {
         let context = TickContext { tick_s, settings: &settings, posture: &posture };
         let lattice = voice.lattice_mut();
 
-        self.fingers.tick(model, lattice);
         self.breath.tick(!self.keys.is_empty(), self.tongue.is_holding(), &context);
         let gamma = self.breath.gamma();
         let (p_mouth, tongue) = self.tongue.tick(gamma, self.breath.attack_hardness(), &context);

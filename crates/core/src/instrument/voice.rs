@@ -8,6 +8,7 @@ pub use crate::instrument::control_tick::TICK;
 use crate::reed::ReedCoeffs;
 use crate::reed::ReedState;
 use crate::reed::ReedTables;
+use crate::reed::motion::TONGUE_FORCE;
 use crate::reed::physical::P_REF_PA;
 use crate::units::Air;
 
@@ -72,6 +73,15 @@ struct Mouth {
 }
 
 impl Mouth {
+    /// No pressure, no motion, no tongue, and the noise from its beginning.
+    fn silence(&mut self) {
+        self.state = ReedState::default();
+        (self.p_mouth, self.p_mouth_glide, self.tongue, self.tongue_glide) = (0.0, 0.0, 0.0, 0.0);
+        self.last_flow = 0.0;
+        self.noise.reset();
+        self.out = [0.0; TICK];
+    }
+
     /// Radiates a tick's flows: the pressure of a small source is proportional to the change of its flow.
     fn radiate(&mut self) {
         let mut before = self.last_flow;
@@ -205,28 +215,26 @@ impl<F: Real> Voice<F> {
         if !(self.mouth.out.iter().sum::<f32>() + (state.closing + state.speed + state.p_mouthpiece) as f32)
             .is_finite()
         {
-            self.reset();
+            self.silence();
             self.resets += 1;
         }
         &self.mouth.out
     }
 
-    /// Puts the reed where a tongue of this force (over the reference closing pressure) holds it, without the thump of the
-    /// movement. Real-time safe.
-    pub fn hold_reed(&mut self, tongue: f64) {
-        self.mouth.state = ReedState { closing: tongue, ..ReedState::default() };
-        self.mouth.tongue = tongue;
-    }
-
-    /// Resets to silence, with the noise generator and the tick counter; openings and delay stay. Real-time safe.
+    /// Back to the beginning: silence, all holes closed, the tongue on the reed. Real-time safe.
     pub fn reset(&mut self) {
         self.lattice.reset();
-        let mouth = &mut self.mouth;
-        mouth.state = ReedState::default();
-        (mouth.p_mouth, mouth.p_mouth_glide, mouth.tongue, mouth.tongue_glide) = (0.0, 0.0, 0.0, 0.0);
-        mouth.last_flow = 0.0;
-        mouth.noise.reset();
-        mouth.out = [0.0; TICK];
+        self.mouth.silence();
+        // The reed is where the tongue holds it: no movement, no thump.
+        self.mouth.state.closing = TONGUE_FORCE;
+        self.mouth.tongue = TONGUE_FORCE;
+        self.ticks = 0;
+    }
+
+    /// Takes away all waves and all motion of the reed; openings and delay stay. Real-time safe.
+    pub fn silence(&mut self) {
+        self.lattice.silence();
+        self.mouth.silence();
         self.ticks = 0;
     }
 

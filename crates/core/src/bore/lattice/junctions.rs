@@ -110,8 +110,11 @@ pub(super) struct Holes<F> {
     /// Jet resistance per flow of the open hole, and as it stands.
     pub(super) jet_open: Octet<F>,
     pub(super) jet: Octet<F>,
+    /// Openings, 0 closed ..= 1 open, and their change per sample, 0 at rest. No opening leaves its `range` (low, high): the
+    /// way from where the hole began to where it goes.
     pub(super) opening: Octet<F>,
-    pub(super) glide: Octet<F>,
+    glide: Octet<F>,
+    range: [Octet<F>; 2],
     pub(super) resistance: Octet<F>,
     pub(super) outer: Octet<F>,
     pub(super) compliance: Octet<F>,
@@ -138,6 +141,7 @@ impl<F: Real> Holes<F> {
             jet: none,
             opening: none,
             glide: none,
+            range: [none; 2],
             resistance: none,
             outer: none,
             compliance: none,
@@ -160,24 +164,48 @@ impl<F: Real> Holes<F> {
         self.resistance[k] = F::of(hole.rs);
     }
 
+    /// Puts the hole in lane `k` at an opening, 0..=1.
+    pub(super) fn set_opening(&mut self, k: usize, opening: f64) {
+        let opening = F::of(opening);
+        self.opening[k] = opening;
+        self.glide[k] = F::default();
+        self.range.iter_mut().for_each(|bound| bound[k] = opening);
+    }
+
+    /// Sends the hole in lane `k` to an opening, 0..=1, within `samples`.
+    pub(super) fn glide_opening(&mut self, k: usize, opening: f64, samples: usize) {
+        let (from, to) = (self.opening[k], F::of(opening));
+        self.glide[k] = F::of((opening - from.wide()) / samples.max(1) as f64);
+        let (low, high) = if from < to { (from, to) } else { (to, from) };
+        self.range[0][k] = low;
+        self.range[1][k] = high;
+    }
+
     /// A hole opened by `a` passes its jet through `a^2` of its area (its mass, too, is 1 / a^2 of the open one's). Seen
     /// behind the transformer the loss is then 1 / a^2 of the open hole's: it is what quietens the air column when the
     /// fingers leave many holes at once. Held below a bound where no air passes anyway.
     ///
-    /// True if a hole is on its way. Seldom called, hence not inlined: it would crowd the loop over samples.
+    /// Stops the holes that have arrived, and is true if a hole is on its way. Seldom called, hence not inlined: it would
+    /// crowd the loop over samples.
     #[inline(never)]
     pub(super) fn throttle(&mut self) -> bool {
         for k in 0..LANES {
             let area = self.opening[k] * self.opening[k];
             self.jet[k] = self.jet_open[k] / (area + F::of(0.02) * (F::of(1.0) - area));
+            let going_up = self.glide[k] > F::default();
+            let there = self.opening[k] == self.range[usize::from(going_up)][k];
+            self.glide[k] = if there { F::default() } else { self.glide[k] };
         }
         self.glide != Octet::default()
     }
 
     #[inline(always)]
     pub(super) fn glide(&mut self) {
+        let [low, high] = &self.range;
         for k in 0..LANES {
-            self.opening[k] = self.opening[k] + self.glide[k];
+            let next = self.opening[k] + self.glide[k];
+            let next = if next < low[k] { low[k] } else { next };
+            self.opening[k] = if next > high[k] { high[k] } else { next };
         }
     }
 

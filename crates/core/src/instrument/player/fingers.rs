@@ -11,8 +11,6 @@ pub struct Fingers {
     fingering: Option<usize>,
     /// Open holes that replace those of the fingering, one bit each.
     tried: Option<u64>,
-    /// Control ticks until the holes have arrived.
-    gliding: u32,
 }
 
 impl Fingers {
@@ -35,30 +33,14 @@ impl Fingers {
         model: &Model,
         lattice: &mut Lattice<F>,
     ) {
-        let ticks = ticks.max(1);
-        // One more than the glide takes: the holes are set exactly when they have arrived, not a step before.
-        self.gliding = if self.fingering.is_some() { ticks + 1 } else { 0 };
+        let is_first = self.fingering.is_none();
         self.fingering = Some(fingering);
         for hole in 0..model.coeffs.holes() {
             let opening = self.opening(fingering, hole, model);
-            if self.gliding == 0 {
+            if is_first {
                 lattice.set_opening(hole, opening);
             } else {
-                lattice.glide_opening(hole, opening, ticks as usize * TICK);
-            }
-        }
-    }
-
-    /// Sets the holes exactly when they have arrived.
-    pub fn tick<F: Real>(&mut self, model: &Model, lattice: &mut Lattice<F>) {
-        if self.gliding == 0 {
-            return;
-        }
-        self.gliding -= 1;
-        if self.gliding == 0 {
-            let fingering = self.fingering.unwrap_or(0);
-            for hole in 0..model.coeffs.holes() {
-                lattice.set_opening(hole, self.opening(fingering, hole, model));
+                lattice.glide_opening(hole, opening, ticks.max(1) as usize * TICK);
             }
         }
     }

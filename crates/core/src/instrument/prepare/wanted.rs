@@ -38,7 +38,7 @@ pub struct Wanted {
     pub file: InstrumentFile,
     /// Pitch of A4, Hz, 415..=466.
     pub a4_hz: f64,
-    /// The host's sample rate, Hz, 22050..=384000.
+    /// The host's sample rate, Hz, 1000..=1536000.
     pub host_rate_hz: f64,
     /// How finely the bore is cut.
     pub quality: Quality,

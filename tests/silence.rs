@@ -1,0 +1,227 @@
+//! What must end does end: however a slur is cut off, the instrument falls silent and says so.
+//!
+//! `CHALUMEAU_CASES=10000 cargo test --release --no-default-features --features cli --test silence` plays many more
+//! cases than the default.
+
+#[path = "support/parallel.rs"]
+mod parallel;
+
+use std::sync::{Arc, LazyLock};
+
+use chalumeau_core::control::midi::MidiDecoder;
+use chalumeau_core::event::Event;
+use chalumeau_core::instrument::voice::{Drive, Voice};
+use chalumeau_core::instrument::{Clarinet, Model, Settings, Tuning};
+use chalumeau_core::reed::{MovingReed, PhysicalReed, ReedCoeffs, ReedTables};
+use chalumeau_core::units::{SoundingNote, WrittenNote};
+
+const HOST_HZ: f64 = 48_000.0;
+/// Time that the instrument has to fall silent, s.
+const TIME_S: f64 = 5.0;
+/// Silence: -100 dBFS.
+const SILENT: f32 = 1e-5;
+
+static MODEL: LazyLock<Arc<Model>> = LazyLock::new(|| Arc::new(Model::built_in(HOST_HZ).unwrap()));
+
+fn cases(usual: usize) -> usize {
+    std::env::var("CHALUMEAU_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(usual)
+}
+
+/// Numbers that look random and are the same in every run (SplitMix64).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn between(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * (self.next() >> 40) as f32 / (1 << 24) as f32
+    }
+
+    fn below(&mut self, count: usize) -> usize {
+        (self.next() % count as u64) as usize
+    }
+}
+
+fn sounding(written: u8) -> SoundingNote {
+    WrittenNote(written).sounding(2).unwrap()
+}
+
+fn render(clarinet: &mut Clarinet, seconds: f64) -> f32 {
+    let mut out = vec![0.0; (seconds * HOST_HZ).round() as usize];
+    clarinet.render(&mut out);
+    out.iter().fold(0.0, |peak, sample| peak.max(sample.abs()))
+}
+
+/// Every way to say that all sound must end.
+fn ends(clarinet: &mut Clarinet, midi: &mut MidiDecoder, way: usize) {
+    let controller = match way {
+        0 => 120,
+        1 => 123,
+        _ => return clarinet.apply(Event::Panic),
+    };
+    for event in midi.controller(0, controller, 0).into_iter().flatten() {
+        clarinet.apply(event);
+    }
+}
+
+fn assert_silent(clarinet: &mut Clarinet, what: &str) {
+    render(clarinet, TIME_S);
+    let peak = render(clarinet, 0.1);
+    assert!(peak < SILENT, "{what}: {peak:e} after {TIME_S} s");
+    assert!(clarinet.is_silent(), "{what}: the instrument does not say that it is silent");
+    assert_eq!(clarinet.resets(), 0, "{what}");
+}
+
+#[test]
+fn a_slur_cut_off_does_not_sing_by_itself() {
+    let reference = PhysicalReed::reference();
+    for stiffness_n_m in [4_930.0, 2_500.0, reference.stiffness_n_m] {
+        for cut_ms in [0.5, 2.0, 6.2] {
+            for way in 0..3 {
+                let mut clarinet = Clarinet::new(MODEL.clone(), HOST_HZ);
+                let reed = PhysicalReed { stiffness_n_m, ..reference };
+                clarinet.set_settings(&Settings::default().with_physical_reed(&reed, &reference));
+                let mut midi = MidiDecoder::new();
+                clarinet.apply(Event::NoteOn { note: sounding(57), velocity: 0.8 });
+                render(&mut clarinet, 0.3);
+                clarinet.apply(Event::NoteOn { note: sounding(65), velocity: 0.8 });
+                render(&mut clarinet, 1e-3 * cut_ms);
+                ends(&mut clarinet, &mut midi, way);
+                assert_silent(&mut clarinet, &format!("{stiffness_n_m} N/m, cut after {cut_ms} ms, {way}"));
+            }
+        }
+    }
+}
+
+/// Settings anywhere in their ranges: reeds, lays, lips, and all that a user may set.
+fn any_settings(random: &mut Random) -> Settings {
+    Settings {
+        breath_full_kpa: random.between(2.0, 20.0),
+        noise: random.between(0.0, 1.0),
+        tongue_ms: random.between(1.0, 20.0),
+        legato_ms: random.between(5.0, 15.0),
+        strength: random.between(1.5, 5.0),
+        lip: random.between(0.6, 1.4),
+        zeta: random.between(0.05, 0.9),
+        damping: random.between(0.2, 2.0),
+        lay: random.between(0.0, 0.5),
+        reed_h: random.between(1.0, 5.0),
+        reed_k: random.between(0.1, 2.0),
+        coupled: random.below(2) == 0,
+        reed_a: random.between(0.0, 2.0),
+        a4_hz: random.between(415.0, 466.0),
+        tuning: if random.below(2) == 0 { Tuning::Natural } else { Tuning::Tempered },
+        temperature_c: random.between(10.0, 40.0),
+        vent_loss: random.between(0.0, 4.0),
+        gain_db: random.between(-20.0, 24.0),
+    }
+}
+
+fn any_note(random: &mut Random) -> Event {
+    let note = sounding(52 + random.below(46) as u8);
+    Event::NoteOn { note, velocity: random.between(0.1, 1.0) }
+}
+
+/// Plays a few notes, most of them slurred, while anything else may happen, and cuts them off.
+fn any_phrase_ends(case: usize) {
+    let mut random = Random(0x0051_1ece ^ ((case as u64) << 32));
+    let mut clarinet = Clarinet::new(MODEL.clone(), HOST_HZ);
+    let mut midi = MidiDecoder::new();
+    clarinet.set_settings(&any_settings(&mut random));
+    for _ in 0..1 + random.below(5) {
+        clarinet.apply(any_note(&mut random));
+        match random.below(6) {
+            0 => clarinet.apply(Event::Breath(random.between(0.0, 1.0))),
+            1 => clarinet.apply(Event::Bend { cents: random.between(-2_400.0, 2_400.0) }),
+            2 => clarinet.apply(Event::TryHoles(Some(random.next()))),
+            3 => clarinet.apply(Event::TongueSlap { strength: random.between(0.0, 1.0) }),
+            4 => {
+                clarinet.apply(Event::Reed { h: random.between(0.2, 5.0), k: random.between(0.2, 5.0) });
+            }
+            _ => clarinet.set_settings(&any_settings(&mut random)),
+        }
+        let seconds = random.between(0.0, 0.15);
+        render(&mut clarinet, f64::from(seconds));
+    }
+    clarinet.apply(any_note(&mut random));
+    let seconds = random.between(0.0, 0.02);
+    render(&mut clarinet, f64::from(seconds));
+    ends(&mut clarinet, &mut midi, case % 3);
+    assert_silent(&mut clarinet, &format!("case {case}"));
+}
+
+#[test]
+fn whatever_is_cut_off_falls_silent() {
+    let cases = cases(60);
+    let numbers: Vec<usize> = (0..cases).collect();
+    parallel::each(&numbers, |&case| any_phrase_ends(case));
+    println!(
+        "{cases} phrases cut off: below -100 dBFS after {TIME_S} s, and silent by the instrument's word"
+    );
+}
+
+/// Without breath everything can only die away: any reed and lip that settings give, and somewhat beyond, any state of the
+/// bore, fingers that never rest, and movements that nobody ends.
+#[test]
+fn without_breath_the_energy_falls() {
+    const WINDOW_TICKS: usize = 300;
+    let mut random = Random(0x0e_ae_2b);
+    let model = &**MODEL;
+    let holes = model.coeffs.holes();
+    let starts = cases(60).min(2_000);
+    let (mut worst, mut most_left) = (0.0_f64, 0.0_f64);
+    for start in 0..starts {
+        let law = any_settings(&mut random).reed_law();
+        let mut unit = |low: f32, high: f32| f64::from(random.between(low, high));
+        let reed = MovingReed {
+            law,
+            zeta: unit(0.05, 0.9),
+            lay: unit(0.0, 0.5),
+            resonance_hz: unit(1_000.0, 4_000.0),
+            damping: unit(0.05, 1.6),
+            swept_s: model.swept_s * unit(0.5, 2.0),
+        };
+        let reed = ReedCoeffs::new(reed, model.coeffs.rate_hz);
+        let mut voice: Voice<f64> = Voice::new(&model.coeffs, &model.air, ReedTables::reference(), reed);
+        voice.lattice_mut().set_jet_loss(unit(0.0, 4.0));
+        voice.lattice_mut().scatter(|| unit(-0.5, 0.5));
+        let drive = Drive { p_mouth: 0.0, tongue: 0.0, noise: 0.0, reed };
+        let first = voice.lattice().stored_energy(&model.coeffs);
+        let mut before = f64::INFINITY;
+        for window in 0..6 {
+            let mut energy = 0.0;
+            for tick in 0..WINDOW_TICKS {
+                // Movements begin at any time, last any time, and are never ended by hand.
+                if start % 2 == 0 && tick % 50 == 0 {
+                    for hole in 0..holes {
+                        let samples = random.below(4_000);
+                        let opening = f64::from(random.between(-0.5, 1.5));
+                        voice.lattice_mut().glide_opening(hole, opening, samples);
+                    }
+                }
+                voice.tick(&drive);
+                energy += voice.lattice().stored_energy(&model.coeffs) / WINDOW_TICKS as f64;
+            }
+            for hole in 0..holes {
+                assert!((0.0..=1.0).contains(&voice.lattice().opening(hole)), "start {start}, hole {hole}");
+            }
+            if window > 0 {
+                worst = worst.max(energy / before);
+                assert!(energy < before, "start {start}, window {window}: {:e} of before", energy / before);
+            }
+            before = energy;
+        }
+        most_left = most_left.max(before / first);
+        assert_eq!(voice.resets(), 0);
+    }
+    println!(
+        "{starts} starts: from 50 ms to the next at most {worst:.3} of the energy is left, at the end {most_left:.1e}"
+    );
+    assert!(most_left < 0.05);
+}
