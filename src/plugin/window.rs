@@ -10,6 +10,8 @@
 mod breath_history;
 mod device_list;
 mod editor_app;
+#[cfg(target_os = "linux")]
+mod graphics_libraries;
 mod host_controls;
 mod host_window;
 mod instrument_analysis;

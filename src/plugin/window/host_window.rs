@@ -72,6 +72,8 @@ impl Editor for HostWindow {
             .ok_or("cannot create the window")?;
         let has_parent = parent.is_some();
         let spawned = editor.spawn(parent, wait_for_parent, fallback_scale_factor, gui, host);
+        #[cfg(target_os = "linux")]
+        super::graphics_libraries::keep_loaded();
         // Under X11, the window library loses a frame that is requested before the window is shown, and then waits
         // forever. Some hosts take their time before they show the window, so show it here.
         if let (true, Ok(spawned)) = (has_parent, &spawned) {
