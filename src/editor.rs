@@ -15,6 +15,7 @@ mod clarinet_view;
 pub mod controls;
 pub mod feel_test;
 mod header;
+mod host_marks;
 mod instrument_view;
 mod keyboard;
 mod knob_view;

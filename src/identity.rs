@@ -6,6 +6,15 @@ pub const NAME: &str = "Chalumeau";
 pub const VENDOR: &str = "Chalumeau";
 /// Address of the project: the `repository` field of Cargo.toml, empty until there is a public one.
 pub const URL: &str = env!("CARGO_PKG_REPOSITORY");
+/// The manual, in the repository; none while there is no public one.
+pub const MANUAL_URL: Option<&str> = if URL.is_empty() {
+    None
+} else {
+    Some(concat!(env!("CARGO_PKG_REPOSITORY"), "/blob/main/docs/guide/README.md"))
+};
+/// Where to ask and to report, in the repository; none while there is no public one.
+pub const SUPPORT_URL: Option<&str> =
+    if URL.is_empty() { None } else { Some(concat!(env!("CARGO_PKG_REPOSITORY"), "/issues")) };
 /// Mail address: none.
 pub const EMAIL: &str = "";
 /// Version shown to hosts.

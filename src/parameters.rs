@@ -4,6 +4,7 @@
 //! knows no host. Its order is the order in which hosts list the parameters. Ids live in saved projects and in automation
 //! lanes: entries are only ever added, at the end of their group, and an id never changes.
 
+mod spelling;
 mod table;
 mod text;
 
@@ -41,6 +42,21 @@ pub struct Parameter {
     pub is_undoable: bool,
     /// A saved state brings its value back. Otherwise a loaded state always has the default.
     pub is_restored: bool,
+    /// When it has an effect. Hosts may leave the others out of their lists.
+    pub in_use: InUse,
+}
+
+/// When a parameter has an effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InUse {
+    /// Always.
+    Always,
+    /// While *Knob* names a kind of knob.
+    WithKnob,
+    /// While *Knob* is OSC.
+    WithOscKnob,
+    /// While *Study* is on.
+    InStudy,
 }
 
 /// What values a parameter takes, and its default.

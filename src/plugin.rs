@@ -11,9 +11,12 @@
 //! - `knob`: the force-feedback knob (feature `devices`)
 //! - `params`: what hosts automate and projects save
 //! - `window`: the editor in the host's window
+//! - `host_link`: what the plugin's threads tell the host; `clap`: what the framework's CLAP lacks
 //! - `launch_options`: what the standalone program sets
 
 mod breath_sources;
+mod clap;
+mod host_link;
 pub mod instrument_loading;
 #[cfg(feature = "devices")]
 mod knob;
@@ -34,11 +37,13 @@ pub use params::{InstrumentParams, OutputParams, PhysicalReedParams, ReedParams}
 pub use params::{SCHEMA, TuningChoice, TuningParams};
 
 use crate::identity;
+use crate::parameters::InUse;
 use breath_sources::{BreathInput, BreathSources};
 use chalumeau_core::event::{Event, Timed};
-use chalumeau_core::instrument::Settings;
+use chalumeau_core::instrument::{Clarinet, Settings};
 use instrument_loading::{InstrumentLoader, InstrumentSwap, SharedInstrument};
 use params::knob::ReedSource;
+use params::moment::Moment;
 use reed_controllers::ReedControllers;
 use translate_events::EventTranslator;
 use window::{HostWindow, PluginWindow, WindowAudio};
@@ -47,6 +52,7 @@ use window::{HostWindow, PluginWindow, WindowAudio};
 #[derive(Default)]
 pub struct Chalumeau {
     params: Arc<ChalumeauParams>,
+    shared_instrument: Arc<SharedInstrument>,
     instrument: Option<InstrumentSwap>,
     loader: Option<InstrumentLoader>,
     /// The settings that the instrument has.
@@ -78,7 +84,16 @@ impl Plugin for Chalumeau {
 
     type Editor = HostWindow;
     type SysExMessage = ();
-    type BackgroundTask = ();
+    type BackgroundTask = clap::Introduction;
+
+    fn task_executor(&mut self) -> TaskExecutor<Self> {
+        let (params, instrument) = (self.params.clone(), self.shared_instrument.clone());
+        Box::new(move |clap::Introduction(tell)| {
+            let (params, instrument) = (params.clone(), instrument.clone());
+            // Who asks waits for the answer.
+            let _ = tell.send(clap::Introduced { params, instrument });
+        })
+    }
 
     fn params(&self) -> Arc<dyn Params> {
         self.params.clone()
@@ -109,7 +124,7 @@ impl Plugin for Chalumeau {
         }
         #[cfg(feature = "devices")]
         if let Some((_, audio)) = &mut self.knob {
-            audio.prepare(&self.params, loader.shared());
+            audio.prepare(&self.params, &self.shared_instrument);
         }
         self.settings = self.params.settings();
         if let Some(instrument) = &mut self.instrument {
@@ -190,7 +205,8 @@ impl Plugin for Chalumeau {
         for copy in copies {
             copy.copy_from_slice(out);
         }
-        if instrument.clarinet().is_silent() { ProcessStatus::Normal } else { ProcessStatus::KeepAlive }
+        let is_watched = self.window.as_ref().is_some_and(|(_, window)| window.is_open());
+        rest_status(&self.params, instrument, is_watched)
     }
 
     fn deactivate(&mut self) {
@@ -201,9 +217,8 @@ impl Plugin for Chalumeau {
 impl Chalumeau {
     /// Starts the threads of loader, knob and window, once.
     fn start_threads(&mut self) {
-        let params = &self.params;
-        let loader = self.loader.get_or_insert_with(|| InstrumentLoader::start(params.clone()));
-        let instrument = loader.shared();
+        let (params, instrument) = (&self.params, &self.shared_instrument);
+        self.loader.get_or_insert_with(|| InstrumentLoader::start(params.clone(), instrument.clone()));
         #[cfg(feature = "devices")]
         let (knob, _) =
             self.knob.get_or_insert_with(|| knob::PluginKnob::start(params.clone(), instrument.clone()));
@@ -253,25 +268,37 @@ impl HostInputs {
     }
 }
 
+/// What the host may do after a block: at rest the sound lasts for the tail, and in silence the host may stop until the next
+/// event. A knob blows without events, and an open window shows what happens. Real-time safe.
+fn rest_status(params: &ChalumeauParams, instrument: &InstrumentSwap, is_watched: bool) -> ProcessStatus {
+    params.fall_back();
+    let clarinet = instrument.clarinet();
+    let may_sleep = clarinet.is_silent() && !is_watched && !params.is_in_use(InUse::WithKnob);
+    params.host.set_may_sleep(may_sleep);
+    if clarinet.is_resting() {
+        ProcessStatus::Tail((Clarinet::TAIL_S * instrument.rate_hz()) as u32)
+    } else {
+        ProcessStatus::KeepAlive
+    }
+}
+
 /// The parameters that act when they move: *Breath* and *Panic*. Real-time safe.
 #[derive(Default)]
 struct MovedParameters {
     /// The value of *Breath* in the last block.
     breath: f32,
-    /// The value of *Panic* in the last block.
-    panic: bool,
 }
 
 impl MovedParameters {
     fn reset(&mut self, params: &ChalumeauParams) {
         // Breath counts as moved if it is not at rest.
-        *self = Self { breath: 0.0, panic: params.output.panic.value() };
+        *self = Self::default();
+        params.moments.take(Moment::Panic);
     }
 
     /// What they have done since the last block.
     fn events(&mut self, params: &ChalumeauParams) -> [Option<Timed<Event>>; 2] {
-        let panic = params.output.panic.value();
-        let has_panicked = !std::mem::replace(&mut self.panic, panic) && panic;
+        let has_panicked = params.moments.take(Moment::Panic);
         let breath = params.breath.breath.value();
         let has_breathed = std::mem::replace(&mut self.breath, breath) != breath;
         [has_panicked.then_some(Event::Panic), has_breathed.then_some(Event::Breath(breath))]
@@ -292,10 +319,14 @@ fn send_breath(context: &mut impl ProcessContext<Chalumeau>, at: usize, (coarse,
 impl ClapPlugin for Chalumeau {
     const CLAP_ID: &'static str = identity::CLAP_ID;
     const CLAP_DESCRIPTION: Option<&'static str> = Some(identity::DESCRIPTION);
-    const CLAP_MANUAL_URL: Option<&'static str> = None;
-    const CLAP_SUPPORT_URL: Option<&'static str> = None;
+    const CLAP_MANUAL_URL: Option<&'static str> = identity::MANUAL_URL;
+    const CLAP_SUPPORT_URL: Option<&'static str> = identity::SUPPORT_URL;
     const CLAP_FEATURES: &'static [ClapFeature] =
         &[ClapFeature::Instrument, ClapFeature::Synthesizer, ClapFeature::Stereo];
+
+    fn remote_controls(&self, context: &mut impl RemoteControlsContext) {
+        clap::define_remote_pages(&self.params, context);
+    }
 }
 
 impl Vst3Plugin for Chalumeau {
@@ -305,11 +336,10 @@ impl Vst3Plugin for Chalumeau {
 }
 
 mod export {
-    // The plugin's entry points are C functions, which the macros below define.
+    // The VST3's entry points are C functions, which the macro below defines. The CLAP's are in `clap`.
     #![allow(unsafe_code)]
 
     use super::Chalumeau;
 
-    nice_plug::nice_export_clap!(Chalumeau);
     nice_plug::nice_export_vst3!(Chalumeau);
 }

@@ -24,6 +24,15 @@ pub struct Look {
     pub steps: Option<usize>,
 }
 
+/// Something that the host has tied to a parameter: a controller, automation.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mark {
+    /// Red, green, blue; `None` if the host leaves it to the window.
+    pub colour: Option<[u8; 3]>,
+    /// What it is, for a tool tip.
+    pub text: String,
+}
+
 /// The host, as the editor sees it.
 pub trait Controls {
     /// All parameters, in the order hosts list them.
@@ -40,6 +49,12 @@ pub trait Controls {
     fn set(&self, id: &str, value: f32);
     /// The hand is off.
     fn end(&self, id: &str);
+    /// What the host has tied to it; nothing where hosts do not tell.
+    fn marks(&self, _id: &str) -> Vec<Mark> {
+        Vec::new()
+    }
+    /// Opens the host's own menu for it, at a place of the window in pixels. Nothing happens where the host has none.
+    fn menu(&self, _id: &str, _at: (i32, i32)) {}
 }
 
 /// Text being typed for one parameter.

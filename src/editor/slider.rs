@@ -7,7 +7,8 @@ use egui::{
     WidgetInfo, pos2, vec2,
 };
 
-use crate::editor::controls::{Entry, Hands, Look, teach};
+use crate::editor::controls::{Entry, Hands, Look, Mark, teach};
+use crate::editor::host_marks;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
@@ -56,7 +57,9 @@ pub fn slider(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
         response.mark_changed();
     }
 
-    paint_slider(ui, c, rect, track, &look, value, &response);
+    let marks = hands.controls.marks(id);
+    paint_slider(ui, c, [rect, track], &look, &marks, value, &response);
+    host_marks::offer_menu(ui, hands, id, &response);
     if is_typing {
         type_value(
             ui,
@@ -84,7 +87,10 @@ pub fn slider(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
     });
     value_response.on_hover_cursor(CursorIcon::Text);
     let response = response.on_hover_and_drag_cursor(CursorIcon::ResizeHorizontal);
-    Some(response.on_hover_ui(|ui| teach(ui, id, HOW_SLIDER)))
+    Some(response.on_hover_ui(|ui| {
+        teach(ui, id, HOW_SLIDER);
+        host_marks::explain(ui, &marks);
+    }))
 }
 
 fn pressed_enter(input: &egui::InputState) -> bool {
@@ -159,10 +165,20 @@ fn moved_by_keys(
     Some(value)
 }
 
-fn paint_slider(ui: &Ui, c: &Colours, rect: Rect, track: Rect, look: &Look, value: f32, response: &Response) {
+fn paint_slider(
+    ui: &Ui,
+    c: &Colours,
+    [rect, track]: [Rect; 2],
+    look: &Look,
+    marks: &[Mark],
+    value: f32,
+    response: &Response,
+) {
     let painter = ui.painter();
     let name = if response.hovered() || response.has_focus() { c.ink } else { c.quiet };
-    painter.text(pos2(rect.left(), rect.top() + 9.0), Align2::LEFT_CENTER, &look.name, theme::body(), name);
+    let at = pos2(rect.left(), rect.top() + 9.0);
+    let name = painter.text(at, Align2::LEFT_CENTER, &look.name, theme::body(), name);
+    host_marks::paint(ui, marks, name.right_center());
     let at = |unit: f32| track.left() + unit.clamp(0.0, 1.0) * track.width();
     let round = CornerRadius::same(2);
     painter.rect_filled(track, round, c.raised);

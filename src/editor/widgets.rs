@@ -6,6 +6,7 @@ use egui::{
 };
 
 use crate::editor::controls::Hands;
+use crate::editor::host_marks;
 use crate::editor::terms;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
@@ -40,7 +41,13 @@ pub fn choice(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
     let now = (look.value * steps as f32).round() as usize;
     ui.add_space(1.0);
     let name = ui.label(egui::RichText::new(&look.name).color(c.quiet));
-    name.on_hover_ui(|ui| teach(ui, id, ""));
+    let marks = hands.controls.marks(id);
+    host_marks::paint(ui, &marks, name.rect.right_center());
+    host_marks::offer_menu_at_name(ui, hands, id, &name);
+    name.on_hover_ui(|ui| {
+        teach(ui, id, "");
+        host_marks::explain(ui, &marks);
+    });
     let width = |text: &str| ui.painter().layout_no_wrap(text.to_owned(), theme::body(), c.ink).size().x;
     // Cells are equally wide.
     let needed = texts.iter().map(|text| width(text) + 14.0).fold(0.0, f32::max) * texts.len() as f32;
@@ -110,6 +117,7 @@ pub fn switch(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
     let look = hands.controls.look(id)?;
     let is_on = look.value >= 0.5;
     let mut response = toggle(ui, &look.name, is_on);
+    host_marks::offer_menu(ui, hands, id, &response);
     if response.clicked() {
         let value = if ui.input(|i| i.modifiers.command) { look.default } else { f32::from(!is_on) };
         hands.put(id, value);

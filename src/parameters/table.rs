@@ -3,7 +3,7 @@
 use chalumeau_core::instrument::concert_pitch::A4_RANGE_HZ;
 use chalumeau_knob::touch::study::TRIALS;
 
-use crate::parameters::{Choice, Kind, Number, Parameter, Sets, Switch, Whole};
+use crate::parameters::{Choice, InUse, Kind, Number, Parameter, Sets, Switch, Whole};
 
 const BREATH: &str = "Breath";
 const EMBOUCHURE: &str = "Embouchure";
@@ -45,6 +45,7 @@ const fn entry(id: &'static str, group: &'static str, name: &'static str, kind: 
         is_automatable: true,
         is_undoable: true,
         is_restored: true,
+        in_use: InUse::Always,
     }
 }
 
@@ -101,6 +102,11 @@ impl Parameter {
     /// A loaded state has it at its default.
     const fn never_restored(self) -> Self {
         Self { is_restored: false, ..self }
+    }
+
+    /// It has an effect only then.
+    const fn only(self, in_use: InUse) -> Self {
+        Self { in_use, ..self }
     }
 }
 
@@ -248,9 +254,14 @@ pub static PARAMETERS: &[Parameter] = &[
         .sets(Sets::Number(|settings| &mut settings.gain_db))
         .flag("--gain-db"),
     entry("panic", OUTPUT, "Panic", OFF)
-        .help("Ends everything at once", "Silences the instrument when it is switched on.", "")
+        .help(
+            "Ends everything at once",
+            "Silences the instrument when it is switched on, and is Off again.",
+            "",
+        )
         .midi("CC120, CC123")
-        .act(),
+        .act()
+        .never_restored(),
     entry(
         "knob",
         KNOB,
@@ -267,12 +278,13 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("arm", KNOB, "Arm knob", OFF)
         .help(
             "Lets the knob make torque",
-            "It is off when a project is loaded, and after anything that disarms the knob: a pulled plug, a fault, silence on the line. Then switch it off and on again.",
+            "It is off when a project is loaded, beside no connected knob, and after anything that disarms the knob: a pulled plug, a fault, silence on the line. Then switch it on again.",
             "",
         )
         .setup()
         .act()
-        .never_restored(),
+        .never_restored()
+        .only(InUse::WithKnob),
     entry("ceil", KNOB, "Torque ceiling", number([10.0, MOST_TORQUE_MNM], 100.0, 0, " mNm"))
         .help(
             "Largest torque that you allow",
@@ -281,34 +293,38 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .flag("--ceiling")
         .setup()
-        .act(),
+        .act()
+        .only(InUse::WithKnob),
     entry("takeov", KNOB, "Take over knob", OFF)
         .help(
             "Takes the knob from the instance that has it",
-            "The other instance lets go of it, and the knob is disarmed.",
+            "The other instance lets go of it, and the knob is disarmed. The switch is then Off again.",
             "",
         )
         .setup()
         .act()
-        .never_restored(),
+        .never_restored()
+        .only(InUse::WithKnob),
     entry("rest", KNOB, "Rest here", OFF)
         .help(
             "Makes the knob's present angle its rest",
-            "This angle then means no breath. Let go of the knob, then press.",
+            "This angle then means no breath. Let go of the knob, then press. The switch is then Off again.",
             "",
         )
         .setup()
         .act()
-        .never_restored(),
+        .never_restored()
+        .only(InUse::WithKnob),
     entry("blow", KNOB, "Blow hard here", OFF)
         .help(
             "Makes the knob's present angle full breath",
-            "The travel from rest to this angle then means full breath. Turn the knob as far as you want to blow, then press.",
+            "The travel from rest to this angle then means full breath. Turn the knob as far as you want to blow, then press. The switch is then Off again.",
             "",
         )
         .setup()
         .act()
-        .never_restored(),
+        .never_restored()
+        .only(InUse::WithKnob),
     entry("law", KNOB, "Feel", choice(&[("flow", "Flow"), ("press", "Pressure"), ("free", "Free")]))
         .help(
             "Law of the torque",
@@ -374,11 +390,13 @@ pub static PARAMETERS: &[Parameter] = &[
             "For knobs that cannot be felt. Values above 1 give soft breath more of the travel.",
             "",
         )
-        .setup(),
+        .setup()
+        .only(InUse::WithKnob),
     entry("oscprt", KNOB, "OSC port", whole([1_024, 65_535], 8_000, ""))
         .help("UDP port that stock firmware sends to", "Stock firmware is set to 8000.", "")
         .setup()
-        .act(),
+        .act()
+        .only(InUse::WithOscKnob),
     entry("oscany", KNOB, "OSC from network", OFF)
         .help(
             "Whether OSC from other machines is accepted",
@@ -386,7 +404,8 @@ pub static PARAMETERS: &[Parameter] = &[
             "",
         )
         .setup()
-        .act(),
+        .act()
+        .only(InUse::WithOscKnob),
     entry("oscfl", KNOB, "Feel OSC port", whole([0, 65_535], 0, ""))
         .help(
             "UDP port on this machine that the feel is sent to, as OSC",
@@ -394,16 +413,18 @@ pub static PARAMETERS: &[Parameter] = &[
             "",
         )
         .setup()
-        .act(),
+        .act()
+        .only(InUse::WithKnob),
     entry("rec", KNOB, "Record take", OFF)
         .help(
             "Records what the knob does in a file",
-            "The recording replays to the same sample.",
+            "The recording replays to the same sample. Without a knob it is off.",
             "",
         )
         .setup()
         .act()
-        .never_restored(),
+        .never_restored()
+        .only(InUse::WithKnob),
     entry("replay", KNOB, "Replay take", OFF)
         .help(
             "Plays the recorded take instead of the knob",
@@ -420,15 +441,18 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("part", KNOB, "Participant", whole([1, 9_999], 1, ""))
         .help("Number of the participant", "", "")
         .setup()
-        .act(),
+        .act()
+        .only(InUse::InStudy),
     entry("seed", KNOB, "Study seed", whole([1, 9_999], 1, ""))
         .help("Random seed of the study", "Participant and seed fix the order of the trials.", "")
         .setup()
-        .act(),
+        .act()
+        .only(InUse::InStudy),
     entry("trial", KNOB, "Trial", whole([1, TRIALS as i32], 1, ""))
         .help("Number of the trial", "", "")
         .setup()
-        .act(),
+        .act()
+        .only(InUse::InStudy),
     entry("side", KNOB, "A/B", switch(false, ["A", "B"])).help("Side A or B of the trial", "", "").act(),
     entry("hsrc", KNOB, "H from", choice(REED_SOURCES))
         .help("What drives H", "A controller opens the reed, in the sound and under the hand.", "")

@@ -1,5 +1,9 @@
 //! Values as text, and text as values.
+//!
+//! Texts are written in one way, and read back to the same step. What a user types is read generously: `spelling` has the
+//! forms.
 
+use crate::parameters::spelling::{bare_number, begins_with, canonical};
 use crate::parameters::{Choice, Kind, Number, Parameter, Switch, Value, Whole};
 
 impl Number {
@@ -14,16 +18,8 @@ impl Number {
 
     /// Reads a number with or without its unit; a decimal comma is allowed. Does not check the range.
     pub fn parse(&self, text: &str) -> Option<f32> {
-        let text = text.trim();
-        let unit = self.unit.trim();
-        let bare = text
-            .len()
-            .checked_sub(unit.len())
-            .and_then(|at| text.split_at_checked(at))
-            .filter(|(_, tail)| tail.eq_ignore_ascii_case(unit))
-            .map_or(text, |(head, _)| head);
-        let shown: Option<f32> = bare.trim().replace(',', ".").parse().ok();
-        shown.filter(|value| value.is_finite()).map(|shown| shown / self.scale)
+        let shown: f32 = bare_number(text, self.unit).parse().ok()?;
+        shown.is_finite().then_some(shown / self.scale)
     }
 
     /// Whether the value lies in the range.
@@ -51,6 +47,14 @@ impl Whole {
     pub fn text(&self, value: i32) -> String {
         value.to_string()
     }
+
+    /// Reads a whole number with or without its unit; `5.0` is one, `5.5` is none. What lies outside the range becomes its
+    /// end.
+    pub fn parse(&self, text: &str) -> Option<i32> {
+        let value: f64 = bare_number(text, self.unit).parse().ok()?;
+        (value.is_finite() && value.fract() == 0.0)
+            .then(|| value.clamp(f64::from(self.min), f64::from(self.max)) as i32)
+    }
 }
 
 impl Switch {
@@ -59,12 +63,12 @@ impl Switch {
         if on { self.on } else { self.off }
     }
 
-    /// Reads its own texts, on and off, true and false, 1 and 0.
+    /// Reads its own texts, on and off, yes and no, true and false, 1 and 0.
     pub fn parse(&self, text: &str) -> Option<bool> {
-        let is = |words: [&str; 4]| words.iter().any(|word| text.trim().eq_ignore_ascii_case(word));
-        if is([self.on, "on", "true", "1"]) {
+        let is = |words: [&str; 5]| words.iter().any(|word| text.trim().eq_ignore_ascii_case(word));
+        if is([self.on, "on", "yes", "true", "1"]) {
             Some(true)
-        } else if is([self.off, "off", "false", "0"]) {
+        } else if is([self.off, "off", "no", "false", "0"]) {
             Some(false)
         } else {
             None
@@ -73,10 +77,18 @@ impl Switch {
 }
 
 impl Choice {
-    /// Reads a text or an id.
+    /// Reads a text, an id, or the first words of one text alone: `Bass` is *Bass clarinet*.
     pub fn parse(&self, text: &str) -> Option<usize> {
-        let is = |word: &str| text.trim().eq_ignore_ascii_case(word);
-        self.all.iter().position(|&(id, name)| is(name) || is(id))
+        let typed = canonical(text);
+        if typed.is_empty() {
+            return None;
+        }
+        let exact =
+            self.all.iter().position(|&(id, name)| typed == canonical(name) || typed == canonical(id));
+        exact.or_else(|| {
+            let mut begun = (0..self.all.len()).filter(|&at| begins_with(self.all[at].1, &typed));
+            begun.next().filter(|_| begun.next().is_none())
+        })
     }
 }
 

@@ -74,15 +74,17 @@ pub struct SharedInstrument {
     stop: AtomicBool,
 }
 
-impl SharedInstrument {
-    fn new() -> Self {
+impl Default for SharedInstrument {
+    fn default() -> Self {
         Self {
             activation: Mutex::default(),
             finished_choice: AtomicU32::new(NO_CHOICE),
             stop: AtomicBool::new(false),
         }
     }
+}
 
+impl SharedInstrument {
     fn activation(&self) -> MutexGuard<'_, Activation> {
         self.activation.lock().unwrap_or_else(PoisonError::into_inner)
     }

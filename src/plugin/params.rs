@@ -9,21 +9,24 @@ use std::sync::{Arc, RwLock};
 use nice_plug::prelude::*;
 
 use crate::editor::WindowState;
-use crate::parameters::Number;
+use crate::parameters::{InUse, Number};
+use crate::plugin::host_link::HostLink;
 use chalumeau_core::instrument::{Settings, Tuning};
 
 mod entry;
 pub mod instrument;
 pub mod knob;
+pub mod moment;
 pub mod reed;
 mod state;
 
 use entry::{choice, number_from, status_text, switch};
 pub use instrument::InstrumentParams;
 pub use knob::KnobParams;
-use knob::ReedSource;
+use knob::{KnobKind, ReedSource};
+use moment::{Moment, Moments};
 pub use reed::PhysicalReedParams;
-pub use state::{SCHEMA, mend};
+pub use state::{SCHEMA, mend, without_moments};
 
 /// All parameters, by group.
 #[derive(Params)]
@@ -65,6 +68,10 @@ pub struct ChalumeauParams {
     pub window: RwLock<WindowState>,
     /// State of the link to the knob as text, written by the link.
     pub knob_status: Arc<RwLock<String>>,
+    /// What has happened to the controls of the moment.
+    pub moments: Arc<Moments>,
+    /// The way from the plugin's threads to the host.
+    pub host: HostLink,
 }
 
 /// Breath and articulation.
@@ -152,7 +159,7 @@ pub struct OutputParams {
     /// [`Settings::gain_db`].
     #[id = "gain"]
     pub gain: FloatParam,
-    /// Silences everything once, when it is switched on.
+    /// Silences everything once, when it is switched on; see [`Moment::Panic`].
     #[id = "panic"]
     pub panic: BoolParam,
 }
@@ -197,11 +204,12 @@ impl ChalumeauParams {
     fn new(start: &dyn Fn(&str, &Number) -> f32) -> Self {
         let number = |id: &str| number_from(id, |number| start(id, number));
         let (knob_status, instrument_status) = (status_text("kstat"), status_text("istat"));
+        let moments = Arc::<Moments>::default();
         Self {
             instrument: InstrumentParams::new(instrument_status.clone()),
             instrument_status,
             physical: PhysicalReedParams::default(),
-            knob: KnobParams::new(knob_status.clone()),
+            knob: KnobParams::new(knob_status.clone(), &moments),
             knob_status,
             schema: AtomicU32::new(SCHEMA),
             window: RwLock::default(),
@@ -231,7 +239,21 @@ impl ChalumeauParams {
                 vent_loss: number("vent"),
             },
             noise: NoiseParams { noise: number("noise") },
-            output: OutputParams { gain: number("gain"), panic: switch("panic") },
+            output: OutputParams { gain: number("gain"), panic: moment::switch(Moment::Panic, &moments) },
+            moments,
+            host: HostLink::default(),
+        }
+    }
+
+    /// Whether parameters of this kind have an effect now. Real-time safe.
+    pub fn is_in_use(&self, in_use: InUse) -> bool {
+        let Self { knob, .. } = self;
+        match in_use {
+            InUse::Always => true,
+            // A take is replayed as a knob would play it.
+            InUse::WithKnob => knob.kind.value() != KnobKind::Off || knob.replay.value(),
+            InUse::WithOscKnob => knob.kind.value() == KnobKind::Osc,
+            InUse::InStudy => knob.study.value(),
         }
     }
 

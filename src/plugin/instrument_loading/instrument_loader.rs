@@ -40,8 +40,7 @@ pub struct InstrumentLoader {
 
 impl InstrumentLoader {
     /// Starts the thread. Allocates.
-    pub fn start(params: Arc<ChalumeauParams>) -> Self {
-        let shared = Arc::new(SharedInstrument::new());
+    pub fn start(params: Arc<ChalumeauParams>, shared: Arc<SharedInstrument>) -> Self {
         let (to_audio, incoming) = rtrb::RingBuffer::new(IN_FLIGHT);
         let (outgoing, from_audio) = rtrb::RingBuffer::new(2 * IN_FLIGHT);
         let cache = Cache::system();
@@ -62,11 +61,6 @@ impl InstrumentLoader {
             std::thread::Builder::new().name("InstrumentLoader".to_owned()).spawn(move || thread.run());
         // Without a thread the plugin still gets an instrument at each activation.
         Self { params, shared, thread: thread.ok(), cache, activations: 0, ends: Some((incoming, outgoing)) }
-    }
-
-    /// What the other threads may read about the instrument.
-    pub fn shared(&self) -> &Arc<SharedInstrument> {
-        &self.shared
     }
 
     /// Puts the instrument that the parameters ask for into `swap`: the best one available at once, or, for an offline
@@ -397,6 +391,8 @@ impl LoaderThread {
             }
             activation.current = Some(CurrentInstrument { request: request.clone(), readiness, model });
         }
+        // Its keys may have other names.
+        self.params.host.tell();
         // This replaces an instrument that still waits for room: that one is worse.
         self.waiting = Some(SwapCandidate { activation: number, clarinet });
         self.push();
@@ -440,5 +436,7 @@ fn report(params: &ChalumeauParams, text: &str) {
     {
         nice_log!("instrument: {text}");
         text.clone_into(&mut status);
+        drop(status);
+        params.host.text_changed();
     }
 }

@@ -234,7 +234,7 @@ mod tests {
         let built_in = || Box::new(Clarinet::built_in(RATE).unwrap());
         let (send, incoming) = rtrb::RingBuffer::new(4);
         let (outgoing, back) = rtrb::RingBuffer::new(8);
-        let mut swap = InstrumentSwap::new(Arc::new(SharedInstrument::new()), built_in(), incoming, outgoing);
+        let mut swap = InstrumentSwap::new(Arc::default(), built_in(), incoming, outgoing);
         swap.activate(None, RATE, 1, 0);
         swap.set_settings(&Settings::default());
         SwapEnds { swap, send, back }

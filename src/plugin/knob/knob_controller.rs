@@ -12,6 +12,7 @@ use super::knob_switches::{KnobSwitches, is_live};
 use super::take_recorder::{TakeRecorder, load_take, marks};
 use crate::plugin::instrument_loading::SharedInstrument;
 use crate::plugin::params::knob::KnobKind;
+use crate::plugin::params::moment::Moment;
 use crate::plugin::params::{ChalumeauParams, KnobParams};
 use chalumeau_core::haptics::{FeelDesign, TorqueLimits};
 use chalumeau_core::instrument::Settings;
@@ -91,6 +92,8 @@ impl KnobController {
         while !self.shared.stop.load(Ordering::Relaxed) {
             if self.shared.is_active.load(Ordering::Relaxed) {
                 self.cycle();
+            } else {
+                KnobSwitches::without_knob(&self.params.moments);
             }
             std::thread::sleep(CYCLE);
         }
@@ -109,8 +112,11 @@ impl KnobController {
         self.update_replay(knob);
         let status = self.link.as_ref().map(KnobLink::status);
         self.update_hand(knob, status.as_ref().is_none_or(|status| status.tier > 0));
-        if let (Some(status), Some(link)) = (&status, &self.link) {
-            self.switches.apply(knob, status, link, &mut self.calibrator);
+        match (&status, &self.link) {
+            (Some(status), Some(link)) => {
+                self.switches.apply(&params.moments, knob, status, link, &mut self.calibrator);
+            }
+            _ => KnobSwitches::without_knob(&params.moments),
         }
         let rows = self.received();
         self.calibrate(&rows, knob);
@@ -272,9 +278,15 @@ impl KnobController {
         }
     }
 
-    /// Records rows while `wanted`; otherwise completes the take.
+    /// Records rows while `wanted`; otherwise completes the take. *Record take* stays on only while it can record.
     fn record(&mut self, rows: &[TakeRow], wanted: bool) {
+        let (moments, has_knob) = (&self.params.moments, self.choice != KnobChoice::Off);
+        if moments.take(Moment::Record) && !has_knob {
+            self.take_message = Some("nothing to record: choose a knob first".to_owned());
+        }
+        moments.set_possible(Moment::Record, has_knob);
         if wanted && let Err(reason) = self.recorder.begin(&self.params) {
+            self.params.moments.set_possible(Moment::Record, false);
             self.take_message = Some(reason);
             return;
         }
@@ -320,6 +332,8 @@ impl KnobController {
         {
             nice_plug::prelude::nice_log!("knob: {text}");
             *shown = text;
+            drop(shown);
+            self.params.host.text_changed();
         }
     }
 }

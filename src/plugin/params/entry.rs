@@ -36,8 +36,12 @@ pub(super) fn number(id: &str) -> FloatParam {
 /// A whole number of the table.
 pub(super) fn whole(id: &str) -> IntParam {
     let parameter = of(id);
-    let Kind::Whole(Whole { min, max, default, unit }) = parameter.kind else { wrong(id) };
-    let param = IntParam::new(parameter.name, default, IntRange::Linear { min, max }).with_unit(unit);
+    let Kind::Whole(whole) = parameter.kind else { wrong(id) };
+    let Whole { min, max, default, unit } = whole;
+    let param = IntParam::new(parameter.name, default, IntRange::Linear { min, max })
+        .with_unit(unit)
+        .with_value_to_string(Arc::new(move |value| whole.text(value)))
+        .with_string_to_value(Arc::new(move |text| whole.parse(text)));
     if parameter.is_automatable { param } else { param.non_automatable() }
 }
 

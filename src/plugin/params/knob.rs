@@ -1,7 +1,7 @@
 //! Parameters of the knob: which one, what it shall feel like, takes and studies.
 //!
 //! None of them can be automated except those that are heard: what moves a motor is the user's to move. Switches that
-//! act (*Arm*, *Take over*, *Rest here*, *Blow hard here*, *Record take*) are never on in a state that is loaded.
+//! act (*Arm*, *Take over*, *Rest here*, *Blow hard here*, *Record take*) are controls of the [`moment`](super::moment).
 
 use std::sync::{Arc, RwLock};
 
@@ -9,6 +9,7 @@ use nice_plug::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::entry::{choice, number, status, switch, whole};
+use super::moment::{self, Moment, Moments};
 use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_knob::touch::study::{StudySide, Trial, plan};
 
@@ -163,20 +164,20 @@ pub struct KnobParams {
     /// Which kind of device. Default off.
     #[id = "knob"]
     pub kind: EnumParam<KnobKind>,
-    /// Lets the knob make torque. Off in every state that is loaded, and after anything that disarms the knob it must
-    /// be switched off and on again.
+    /// Lets the knob make torque. Off in every state that is loaded, beside no connected knob, and after anything that
+    /// disarms the knob: then it must be switched on again.
     #[id = "arm"]
     pub arm: BoolParam,
     /// Most torque the user allows, mNm, 10..=250. Default 100.
     #[id = "ceil"]
     pub ceiling: FloatParam,
-    /// Takes the knob from the instance that has it.
+    /// Takes the knob from the instance that has it: a command.
     #[id = "takeov"]
     pub take_over: BoolParam,
-    /// The knob is at rest where it stands.
+    /// The knob is at rest where it stands: a command.
     #[id = "rest"]
     pub rest: BoolParam,
-    /// The knob stands where a full blow shall be.
+    /// The knob stands where a full blow shall be: a command.
     #[id = "blow"]
     pub blow: BoolParam,
     /// Torque law. Default flow.
@@ -215,7 +216,7 @@ pub struct KnobParams {
     /// UDP port on this machine that the feel is also sent to, as OSC; 0 for none.
     #[id = "oscfl"]
     pub feel_port: IntParam,
-    /// Writes a take while on.
+    /// Writes a take while on, which it can only be beside a knob.
     #[id = "rec"]
     pub record: BoolParam,
     /// Plays the take instead of a knob, from when it is switched on or the host starts again.
@@ -248,19 +249,19 @@ pub struct KnobParams {
 }
 
 impl KnobParams {
-    /// Defaults; the link to the knob writes its state to `link`.
-    pub fn new(link: Arc<RwLock<String>>) -> Self {
+    /// Defaults; the link to the knob writes its state to `link`, and switches that act tell `moments`.
+    pub fn new(link: Arc<RwLock<String>>, moments: &Arc<Moments>) -> Self {
         Self {
             serial: RwLock::default(),
             midi_port: RwLock::default(),
             calibration: RwLock::default(),
             take: RwLock::default(),
             kind: choice("knob", KnobKind::Off),
-            arm: switch("arm"),
+            arm: moment::switch(Moment::Arm, moments),
             ceiling: number("ceil"),
-            take_over: switch("takeov"),
-            rest: switch("rest"),
-            blow: switch("blow"),
+            take_over: moment::switch(Moment::TakeOver, moments),
+            rest: moment::switch(Moment::Rest, moments),
+            blow: moment::switch(Moment::Blow, moments),
             law: choice("law", LawChoice::Flow),
             contrast: number("contr"),
             order: choice("order", OrderChoice::Physical),
@@ -273,7 +274,7 @@ impl KnobParams {
             osc_port: whole("oscprt"),
             osc_any: switch("oscany"),
             feel_port: whole("oscfl"),
-            record: switch("rec"),
+            record: moment::switch(Moment::Record, moments),
             replay: switch("replay"),
             study: switch("study"),
             participant: whole("part"),

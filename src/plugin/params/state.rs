@@ -47,6 +47,13 @@ pub fn mend(state: &mut PluginState) {
     state.fields.insert(SCHEMA_FIELD.to_owned(), SCHEMA.to_string());
 }
 
+/// Puts what no loaded state brings back to its default, before a state is saved.
+pub fn without_moments(state: &mut PluginState) {
+    for parameter in PARAMETERS.iter().filter(|parameter| !parameter.is_restored) {
+        state.params.insert(parameter.id.to_owned(), mended(parameter, None));
+    }
+}
+
 /// A parameter's value as it may be, or its default.
 fn mended(parameter: &Parameter, saved: Option<ParamValue>) -> ParamValue {
     let saved = saved.filter(|_| parameter.is_restored);
@@ -136,5 +143,17 @@ mod tests {
         assert!(matches!(state.params["ceil"], ParamValue::F32(250.0)));
         assert_eq!(state.fields["serial"], "\"\"", "a path is no serial number");
         assert!(state.fields["calibration"].contains("120.0"), "{}", state.fields["calibration"]);
+    }
+
+    #[test]
+    fn a_saved_state_has_nothing_of_the_moment() {
+        let on = || ParamValue::Bool(true);
+        let params = ["arm", "rec", "panic", "replay"].map(|id| (id.to_owned(), on()));
+        let mut state =
+            PluginState { version: String::new(), params: BTreeMap::from(params), fields: BTreeMap::new() };
+        without_moments(&mut state);
+        for (id, stays) in [("arm", false), ("rec", false), ("panic", false), ("replay", true)] {
+            assert!(matches!(state.params[id], ParamValue::Bool(on) if on == stays), "{id}");
+        }
     }
 }

@@ -106,6 +106,8 @@ pub struct EditorApp {
 impl EditorApp {
     pub(super) fn open(shared: Arc<SharedWindow>, memory: Arc<Mutex<WindowMemory>>, gui: GuiContext) -> Self {
         shared.is_open.store(true, Ordering::Relaxed);
+        // A host that sleeps would show an old picture, and hear no key of the window.
+        memory.lock().unwrap_or_else(PoisonError::into_inner).handles.params.host.wake();
         Self { shared, memory, gui, has_drawn: false }
     }
 }

@@ -6,14 +6,16 @@ use std::sync::Arc;
 use nice_plug::context::gui::GuiContext;
 use nice_plug::prelude::{ParamPtr, Params};
 
+use crate::editor::controls::Mark;
 use crate::editor::{Controls, Look};
+use crate::plugin::host_link::MenuRequest;
 use crate::plugin::params::ChalumeauParams;
 
-/// All parameters by their ids. `_params` keeps the pointers valid.
+/// All parameters by their ids. `params` keeps the pointers valid.
 pub struct HostControls {
     ids: Vec<&'static str>,
     pointers: HashMap<&'static str, ParamPtr>,
-    _params: Arc<ChalumeauParams>,
+    params: Arc<ChalumeauParams>,
 }
 
 /// The parameters together with the host's context, which is told of changes.
@@ -34,7 +36,7 @@ impl HostControls {
         Self {
             ids: all.iter().map(|(id, _)| *id).collect(),
             pointers: all.into_iter().collect(),
-            _params: params,
+            params,
         }
     }
 
@@ -44,7 +46,7 @@ impl HostControls {
     }
 }
 
-// The framework's parameter pointers are raw; they point into `_params`.
+// The framework's parameter pointers are raw; they point into `params`.
 #[allow(unsafe_code)]
 mod raw {
     use super::*;
@@ -59,7 +61,7 @@ mod raw {
 
         fn look(&self, id: &str) -> Option<Look> {
             let param = *self.controls.pointers.get(id)?;
-            // SAFETY: `_params` keeps the parameter alive.
+            // SAFETY: `params` keeps the parameter alive.
             unsafe {
                 Some(Look {
                     name: param.name().to_owned(),
@@ -101,6 +103,16 @@ mod raw {
             if let Some(&param) = self.controls.pointers.get(id) {
                 // SAFETY: as above.
                 unsafe { self.gui.raw_end_set_parameter(param) }
+            }
+        }
+
+        fn marks(&self, id: &str) -> Vec<Mark> {
+            self.controls.params.host.marks(id)
+        }
+
+        fn menu(&self, id: &str, at: (i32, i32)) {
+            if let Some(&id) = self.controls.ids.iter().find(|known| **known == id) {
+                self.controls.params.host.ask_menu(MenuRequest { id, at });
             }
         }
     }

@@ -77,6 +77,11 @@ impl WindowAudio {
         (audio, WindowChannels { inside, sound, keys: keys_in })
     }
 
+    /// Whether the window is open. Real-time safe.
+    pub fn is_open(&self) -> bool {
+        self.shared.is_open.load(Ordering::Relaxed)
+    }
+
     /// The key events of the window since the last block. Real-time safe.
     pub fn keys(&mut self) -> [Option<Timed<Event>>; KEYS_PER_BLOCK] {
         std::array::from_fn(|_| self.keys.pop().ok().map(|event| Timed { at: 0, event }))
@@ -84,7 +89,7 @@ impl WindowAudio {
 
     /// Sends the sound and the inside of the instrument while the window is open. Real-time safe.
     pub fn send(&mut self, instrument: &mut InstrumentSwap, breath_sources: &BreathSources, sound: &[f32]) {
-        let is_open = self.shared.is_open.load(Ordering::Relaxed);
+        let is_open = self.is_open();
         instrument.set_scope_on(is_open);
         if !is_open {
             return;

@@ -81,6 +81,10 @@ pub struct Clarinet {
 }
 
 impl Clarinet {
+    /// Longest time from rest to silence, s: what a host must still play when breath and keys have ended. Measured over all
+    /// instruments and keys (`tests/realtime.rs`), with room for reeds and gains that ring longer.
+    pub const TAIL_S: f64 = 2.0;
+
     /// The built-in B flat clarinet at a host rate in Hz, 1000..=1536000. Allocates.
     ///
     /// # Errors
@@ -255,6 +259,11 @@ impl Clarinet {
     /// The instrument that is played.
     pub fn model(&self) -> &Arc<Model> {
         &self.model
+    }
+
+    /// True while no key sounds and nobody blows; the instrument may still ring.
+    pub fn is_resting(&self) -> bool {
+        self.player.is_resting()
     }
 
     /// True when the output is silent and the player rests: the host may stop calling.

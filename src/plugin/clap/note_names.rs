@@ -1,0 +1,92 @@
+//! Names of the keys that sound: the note that a clarinettist reads for each.
+//!
+//! A host shows them beside its keys, which are sounding pitch. They follow the instrument and its transposition.
+
+use std::sync::PoisonError;
+
+use clap_sys::ext::note_name::{clap_note_name, clap_plugin_note_name};
+use clap_sys::plugin::clap_plugin;
+
+use super::instance::Instance;
+use super::{Introduced, text};
+use crate::plugin::instrument_loading::instrument_request::InstrumentRequest;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::units::{SoundingNote, WrittenNote};
+
+pub static NOTE_NAME: clap_plugin_note_name = clap_plugin_note_name { count: Some(count), get: Some(get) };
+
+/// The keys that sound and their written notes, in order of pitch.
+#[derive(Default)]
+pub struct NoteNames(Vec<(SoundingNote, WrittenNote)>);
+
+impl NoteNames {
+    /// Takes them from the instrument that plays, or before the first activation from the chosen one. Says whether they have
+    /// changed.
+    pub fn renew(&mut self, introduced: &Introduced) -> bool {
+        let names = match introduced.instrument.current() {
+            Some(current) => named(&current.model.file, |fingering| current.model.speaks(fingering)),
+            None => {
+                // The rate is no matter for a file. Without a readable file nothing is known to sound.
+                let request = InstrumentRequest::from_params(&introduced.params, 48_000.0, false);
+                request.file().map_or_else(|_| Vec::new(), |file| named(&file, |_| true))
+            }
+        };
+        let has_changed = self.0 != names;
+        self.0 = names;
+        has_changed
+    }
+}
+
+/// The keys of an instrument's fingerings, without those that do not speak in tune and are silent.
+fn named(file: &InstrumentFile, speaks: impl Fn(usize) -> bool) -> Vec<(SoundingNote, WrittenNote)> {
+    let speaking = file.fingerings.iter().enumerate().filter(|(index, _)| speaks(*index));
+    let mut names: Vec<_> = speaking
+        .filter_map(|(_, fingering)| Some((fingering.written.sounding(file.transposition)?, fingering.written)))
+        .collect();
+    names.sort_unstable();
+    names.dedup();
+    names
+}
+
+unsafe extern "C" fn count(plugin: *const clap_plugin) -> u32 {
+    // SAFETY: the host's pointer is ours.
+    let Some(this) = (unsafe { Instance::of(plugin) }) else { return 0 };
+    let mut names = this.note_names.lock().unwrap_or_else(PoisonError::into_inner);
+    let _ = names.renew(&this.introduced);
+    names.0.len() as u32
+}
+
+unsafe extern "C" fn get(plugin: *const clap_plugin, index: u32, note_name: *mut clap_note_name) -> bool {
+    // SAFETY: as above.
+    let Some(this) = (unsafe { Instance::of(plugin) }) else { return false };
+    let names = this.note_names.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some((sounding, written)) = names.0.get(index as usize).filter(|_| !note_name.is_null()) else {
+        return false;
+    };
+    let mut name = [0; _];
+    text::write(&format!("{written} written"), &mut name);
+    // Every port, every channel.
+    let named = clap_note_name { name, port: -1, key: i16::from(sounding.0), channel: -1 };
+    // SAFETY: `note_name` has room for one.
+    unsafe { *note_name = named };
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chalumeau_core::bore::bundled::Bundled;
+
+    #[test]
+    fn keys_have_the_names_that_the_player_reads() {
+        for (instrument, count, lowest) in
+            [(Bundled::BFlat, 46, (50, "E3")), (Bundled::A, 46, (49, "E3")), (Bundled::Bass, 46, (38, "E3"))]
+        {
+            let names = named(&instrument.file(), |_| true);
+            assert_eq!(names.len(), count, "{instrument:?}");
+            assert_eq!(named(&instrument.file(), |fingering| fingering > 0).len(), count - 1);
+            let (sounding, written) = names[0];
+            assert_eq!((sounding.0, written.to_string().as_str()), lowest, "{instrument:?}");
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! Saved states, without the controls of the moment.
+//!
+//! The framework writes eight bytes of length and then JSON. *Arm knob* and *Record take* may be on while a project is saved,
+//! but no loaded state ever has them on: they are written as Off, so that a state that is loaded and saved is the same.
+//! A project, a duplicate and a preset of the host are one state: it has nothing that would belong to one of them alone.
+
+use std::ffi::c_void;
+
+use clap_sys::ext::state::{CLAP_EXT_STATE, clap_plugin_state};
+use clap_sys::ext::state_context::{clap_plugin_state_context, clap_plugin_state_context_type};
+use clap_sys::plugin::clap_plugin;
+use clap_sys::stream::{clap_istream, clap_ostream};
+use nice_plug::prelude::PluginState;
+
+use super::instance::Instance;
+use crate::plugin::host_link::HostCalls;
+use crate::plugin::params::without_moments;
+
+pub static STATE: clap_plugin_state = clap_plugin_state { save: Some(save), load: Some(load) };
+pub static STATE_CONTEXT: clap_plugin_state_context =
+    clap_plugin_state_context { save: Some(save_for), load: Some(load_for) };
+
+/// Bytes of the length that stands before the JSON.
+const LENGTH_BYTES: usize = size_of::<u64>();
+
+impl Instance {
+    fn framework_state(&self) -> Option<&clap_plugin_state> {
+        // SAFETY: that is the extension's type.
+        unsafe { self.inner_extension(CLAP_EXT_STATE) }
+    }
+
+    /// What the framework saves, with the controls of the moment Off.
+    fn saved(&self, plugin: *const clap_plugin) -> Option<Vec<u8>> {
+        let mut bytes = Vec::<u8>::new();
+        let stream = clap_ostream { ctx: (&raw mut bytes).cast::<c_void>(), write: Some(append) };
+        // SAFETY: the stream is valid for this call.
+        let is_saved = unsafe { self.framework_state()?.save?(plugin, &raw const stream) };
+        let mut state: PluginState =
+            serde_json::from_slice(bytes.get(LENGTH_BYTES..).filter(|_| is_saved)?).ok()?;
+        without_moments(&mut state);
+        let json = serde_json::to_vec(&state).ok()?;
+        Some([&(json.len() as u64).to_le_bytes()[..], &json].concat())
+    }
+}
+
+unsafe extern "C" fn append(stream: *const clap_ostream, bytes: *const c_void, size: u64) -> i64 {
+    // SAFETY: the stream is the one of `saved`, whose bytes nothing else uses meanwhile.
+    let Some(all) = (unsafe { (*stream).ctx.cast::<Vec<u8>>().as_mut() }) else { return -1 };
+    let (Ok(count), Ok(written), false) = (usize::try_from(size), i64::try_from(size), bytes.is_null())
+    else {
+        return -1;
+    };
+    // SAFETY: the framework hands in `size` bytes.
+    all.extend_from_slice(unsafe { std::slice::from_raw_parts(bytes.cast::<u8>(), count) });
+    written
+}
+
+unsafe extern "C" fn save(plugin: *const clap_plugin, stream: *const clap_ostream) -> bool {
+    // SAFETY: the host's pointers: the first is ours, the second valid for this call.
+    let (Some(this), Some(write)) =
+        (unsafe { (Instance::of(plugin), stream.as_ref().and_then(|stream| stream.write)) })
+    else {
+        return false;
+    };
+    let Some(bytes) = this.saved(plugin) else { return false };
+    let mut left = &bytes[..];
+    while !left.is_empty() {
+        // SAFETY: as above. A host may take less than it is offered.
+        let taken = unsafe { write(stream, left.as_ptr().cast(), left.len() as u64) };
+        match usize::try_from(taken) {
+            Ok(taken) if (1..=left.len()).contains(&taken) => left = &left[taken..],
+            _ => return false,
+        }
+    }
+    true
+}
+
+unsafe extern "C" fn load(plugin: *const clap_plugin, stream: *const clap_istream) -> bool {
+    // SAFETY: as above.
+    let Some(this) = (unsafe { Instance::of(plugin) }) else { return false };
+    if stream.is_null() {
+        return false;
+    }
+    // SAFETY: as above.
+    let is_loaded = this
+        .framework_state()
+        .and_then(|state| state.load)
+        .is_some_and(|load| unsafe { load(plugin, stream) });
+    // Other parameters may be in use; hosts load states on the main thread.
+    this.look_at_use();
+    this.tell_changes();
+    this.host.calls().request_process();
+    is_loaded
+}
+
+unsafe extern "C" fn save_for(
+    plugin: *const clap_plugin,
+    stream: *const clap_ostream,
+    _context: clap_plugin_state_context_type,
+) -> bool {
+    // SAFETY: as above.
+    unsafe { save(plugin, stream) }
+}
+
+unsafe extern "C" fn load_for(
+    plugin: *const clap_plugin,
+    stream: *const clap_istream,
+    _context: clap_plugin_state_context_type,
+) -> bool {
+    // SAFETY: as above.
+    unsafe { load(plugin, stream) }
+}
