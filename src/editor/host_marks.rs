@@ -14,7 +14,8 @@ const RADIUS: f32 = 3.0;
 pub fn paint(ui: &Ui, marks: &[Mark], after: Pos2) {
     let c = Colours::here(ui);
     for (mark, at) in marks.iter().zip(1_u8..) {
-        let colour = mark.colour.map_or(c.accent, |[red, green, blue]| egui::Color32::from_rgb(red, green, blue));
+        let colour =
+            mark.colour.map_or(c.accent, |[red, green, blue]| egui::Color32::from_rgb(red, green, blue));
         ui.painter().circle_filled(after + vec2(STEP * f32::from(at), 0.0), RADIUS, colour);
     }
 }

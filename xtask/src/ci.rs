@@ -183,15 +183,18 @@ fn host_tests(names: &[&str]) -> Command {
     command
 }
 
+/// Test files that play the bundled CLAP.
+const CLAP_TESTS: &[&str] = &["clap", "clap_rules", "clap_sleep", "instrument", "knob"];
+
 fn clap() -> Result<()> {
     let program = &programs()?.program;
-    machine::run(host_tests(&["clap", "instrument", "knob"]).env(artefacts::PROGRAM, program))
+    machine::run(host_tests(CLAP_TESTS).env(artefacts::PROGRAM, program))
 }
 
 /// The same tests on a debug build, where the framework aborts on any allocation while processing.
 fn clap_checked() -> Result<()> {
     let programs = programs()?;
-    let mut tests = host_tests(&["clap", "instrument", "knob"]);
+    let mut tests = host_tests(CLAP_TESTS);
     tests.env(artefacts::CLAP, &programs.plugin).env(artefacts::PROGRAM, &programs.program);
     machine::run(&mut tests)
 }

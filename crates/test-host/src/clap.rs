@@ -1,24 +1,40 @@
 //! A small CLAP host: loads one plugin in process and plays to it what a test or the demo says.
 
+mod extensions;
+mod host_side;
+
 use std::ffi::CString;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow, bail};
-use clack_extensions::gui::{
-    GuiApiType, GuiConfiguration, GuiSize, HostGui, HostGuiImpl, PluginGui, Window as Handle,
-};
+use clack_extensions::gui::{GuiApiType, GuiConfiguration, GuiSize, PluginGui, Window as Handle};
 use clack_extensions::latency::PluginLatency;
+pub use clack_extensions::note_ports::NoteDialects;
+pub use clack_extensions::param_indication::ParamIndicationAutomation;
 use clack_extensions::params::{ParamInfoBuffer, PluginParams};
+pub use clack_extensions::params::{ParamInfoFlags, ParamRescanFlags};
 use clack_extensions::render::{PluginRender, RenderMode};
-use clack_extensions::state::{HostState, HostStateImpl, PluginState};
+use clack_extensions::state::PluginState;
+pub use clack_extensions::state_context::StateContextType;
+use clack_extensions::tail::PluginTail;
+pub use clack_extensions::tail::TailLength;
 pub use clack_host::events::event_types::NoteExpressionType;
 use clack_host::events::event_types::{
-    MidiEvent, NoteExpressionEvent, NoteOffEvent, NoteOnEvent, ParamValueEvent,
+    MidiEvent, NoteExpressionEvent, NoteOffEvent, NoteOnEvent, ParamModEvent, ParamValueEvent,
 };
 use clack_host::events::spaces::CoreEventSpace;
+pub use clack_host::prelude::ProcessStatus;
 use clack_host::prelude::*;
+use clap_sys::events::clap_event_header;
+
+pub use extensions::{Description, RemotePage};
+use host_side::{Audio, Main};
+pub use host_side::{Heard, Host, Shared};
+
+/// A namespace that no host has registered.
+const FOREIGN: u16 = 0xB33F;
 
 /// Something said to the plugin at a sample position, counted from the start of playing.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +53,10 @@ pub enum Say {
     Express(u16, NoteExpressionType, f64),
     /// A parameter moves; its plain CLAP value.
     Set(ClapId, f64),
+    /// A modulator offsets a parameter by so much.
+    Modulate(ClapId, f64),
+    /// An event of no known namespace that looks like [`Set`](Self::Set).
+    Foreign(ClapId, f64),
 }
 
 /// A parameter as the plugin describes it.
@@ -48,6 +68,7 @@ pub struct Param {
     pub min: f64,
     pub max: f64,
     pub default: f64,
+    pub flags: ParamInfoFlags,
 }
 
 /// Left and right.
@@ -64,59 +85,6 @@ pub enum Hand {
     End(ClapId),
 }
 
-/// What the plugin asks for, from whichever thread.
-#[derive(Default)]
-pub struct Shared {
-    callback: AtomicBool,
-    /// Size the window wants to have, packed; 0 when nothing is asked for.
-    size: AtomicU64,
-    /// The window has gone by itself.
-    gone: AtomicBool,
-}
-pub struct Main;
-pub struct Host;
-
-impl SharedHandler<'_> for Shared {
-    fn request_restart(&self) {}
-    fn request_process(&self) {}
-    fn request_callback(&self) {
-        self.callback.store(true, Ordering::Release);
-    }
-}
-
-impl HostGuiImpl for Shared {
-    fn resize_hints_changed(&self) {}
-    fn request_resize(&self, size: GuiSize) -> Result<(), HostError> {
-        self.size.store(size.pack_to_u64(), Ordering::Release);
-        Ok(())
-    }
-    fn request_show(&self) -> Result<(), HostError> {
-        Ok(())
-    }
-    fn request_hide(&self) -> Result<(), HostError> {
-        Ok(())
-    }
-    fn closed(&self, _: bool) {
-        self.gone.store(true, Ordering::Release);
-    }
-}
-
-impl MainThreadHandler<'_> for Main {}
-
-impl HostStateImpl for Main {
-    fn mark_dirty(&self) {}
-}
-
-impl HostHandlers for Host {
-    type Shared<'a> = Shared;
-    type MainThread<'a> = Main;
-    type AudioProcessor<'a> = ();
-
-    fn declare_extensions(builder: &mut HostExtensions<Self>, _: &Shared) {
-        builder.register::<HostState>().register::<HostGui>();
-    }
-}
-
 /// One loaded plugin.
 pub struct Plugin {
     // Before the library it comes from, so that it is dropped first.
@@ -127,6 +95,15 @@ pub struct Plugin {
 impl Plugin {
     /// Loads the first plugin of a CLAP library.
     pub fn load(path: &Path) -> Result<Self> {
+        Self::load_into(path, Shared::default())
+    }
+
+    /// The same in a host that opens no windows.
+    pub fn load_blind(path: &Path) -> Result<Self> {
+        Self::load_into(path, Shared::blind())
+    }
+
+    fn load_into(path: &Path, shared: Shared) -> Result<Self> {
         // SAFETY: the file is the plugin this project has just built.
         let entry = unsafe { PluginEntry::load(path) }
             .with_context(|| format!("cannot load {} as a CLAP", path.display()))?;
@@ -139,7 +116,7 @@ impl Plugin {
             first.id().context("the plugin has no id")?.to_owned()
         };
         let info = HostInfo::new("Chalumeau xtask", "Chalumeau", "", env!("CARGO_PKG_VERSION"))?;
-        let instance = PluginInstance::new(|_| Shared::default(), |_| Main, &entry, &id, &info)?;
+        let instance = PluginInstance::<Host>::new(|_| shared, |shared| Main(shared), &entry, &id, &info)?;
         Ok(Self { instance, entry })
     }
 
@@ -156,10 +133,11 @@ impl Plugin {
         let frames = u32::try_from(block)?;
         let config =
             PluginAudioConfiguration { sample_rate: rate_hz, min_frames_count: 1, max_frames_count: frames };
-        let stopped = self.instance.activate(|_, _| (), config)?;
+        let stopped = self.instance.activate(|shared, _| Audio(shared), config)?;
         match stopped.start_processing() {
             Ok(processor) => {
-                Ok(Session { processor, block, answers: Vec::new(), hands: Vec::new(), played: 0 })
+                let (answers, hands, status) = (Vec::new(), Vec::new(), ProcessStatus::Continue);
+                Ok(Session { processor, block, answers, hands, status, played: 0 })
             }
             Err(_) => bail!("the plugin does not start at {rate_hz} Hz"),
         }
@@ -202,6 +180,7 @@ impl Plugin {
                 min: info.min_value,
                 max: info.max_value,
                 default: info.default_value,
+                flags: info.flags,
             });
         }
         Ok(all)
@@ -223,17 +202,28 @@ impl Plugin {
 
     /// Sets a parameter of a plugin that is not active.
     pub fn set(&mut self, id: ClapId, value: f64) -> Result<()> {
+        self.set_all(&[(id, value)]).map(drop)
+    }
+
+    /// The same for several; what the plugin answers about parameters.
+    pub fn set_all(&mut self, values: &[(ClapId, f64)]) -> Result<Vec<Hand>> {
         let mut handle = self.instance.inactive_plugin_handle().context("the plugin is active")?;
         let params: PluginParams = handle.get_extension().context("no parameters")?;
-        let mut said = EventBuffer::new();
-        said.push(&ParamValueEvent::new(0, id, Pckn::match_all(), value));
-        let mut answered = EventBuffer::new();
+        let (mut said, mut answered) = (EventBuffer::new(), EventBuffer::new());
+        for &(id, value) in values {
+            push(&mut said, 0, Say::Set(id, value));
+        }
         params.flush(
             &mut handle,
             &InputEvents::from_buffer(&said),
             &mut OutputEvents::from_buffer(&mut answered),
         );
-        Ok(())
+        Ok(answered.iter().filter_map(hand).collect())
+    }
+
+    /// Whether the plugin offers a window to this host.
+    pub fn has_window(&mut self) -> bool {
+        self.instance.plugin_handle().get_extension::<PluginGui>().is_some()
     }
 
     pub fn text(&mut self, id: ClapId, value: f64) -> Result<String> {
@@ -354,6 +344,8 @@ pub struct Session {
     answers: Vec<(usize, [u8; 3])>,
     /// What was done to parameters in the plugin's window.
     hands: Vec<Hand>,
+    /// What the plugin said of going on, after the last block.
+    status: ProcessStatus,
     played: usize,
 }
 
@@ -380,6 +372,17 @@ impl Session {
     /// What the plugin has sent since activation.
     pub fn answers(&self) -> &[(usize, [u8; 3])] {
         &self.answers
+    }
+
+    /// What the plugin said of going on, after the last block.
+    pub fn status(&self) -> ProcessStatus {
+        self.status
+    }
+
+    /// How long the plugin sounds on.
+    pub fn tail(&mut self) -> TailLength {
+        let handle = self.processor.plugin_handle();
+        handle.get_extension::<PluginTail>().map_or(TailLength::Finite(0), |tail| tail.get(&handle))
     }
 
     /// What was done to parameters in the window since activation.
@@ -416,7 +419,7 @@ impl Session {
                 latency: 0,
                 channels: AudioPortBufferType::f32_output_only(heard.iter_mut().map(|c| &mut c[start..end])),
             }]);
-            self.processor.process(
+            self.status = self.processor.process(
                 &no_input,
                 &mut out,
                 &InputEvents::from_buffer(&events),
@@ -424,30 +427,53 @@ impl Session {
                 Some((self.played + start) as u64),
                 None,
             )?;
+            let mut latest = 0;
             for event in &answered {
-                let at = self.played + start + event.header().time() as usize;
-                let hand = match event.as_core_event() {
-                    Some(CoreEventSpace::Midi(midi)) => {
-                        self.answers.push((at, midi.data()));
-                        None
-                    }
-                    Some(CoreEventSpace::ParamGestureBegin(event)) => event.param_id().map(Hand::Begin),
-                    Some(CoreEventSpace::ParamValue(event)) => {
-                        event.param_id().map(|id| Hand::Move(id, event.value()))
-                    }
-                    Some(CoreEventSpace::ParamGestureEnd(event)) => event.param_id().map(Hand::End),
-                    _ => None,
-                };
-                self.hands.extend(hand);
+                let time = event.header().time();
+                anyhow::ensure!(
+                    latest <= time && (time as usize) < end - start,
+                    "an answer at {time} after {latest}"
+                );
+                latest = time;
+                if let Some(CoreEventSpace::Midi(midi)) = event.as_core_event() {
+                    self.answers.push((self.played + start + time as usize, midi.data()));
+                }
+                self.hands.extend(hand(event));
             }
         }
         self.played += samples;
         Ok(heard)
     }
 
+    /// Moves parameters without processing.
+    pub fn flush(&mut self, values: &[(ClapId, f64)]) -> Result<Vec<Hand>> {
+        let mut handle = self.processor.plugin_handle();
+        let params: PluginParams = handle.get_extension().context("no parameters")?;
+        let (mut said, mut answered) = (EventBuffer::new(), EventBuffer::new());
+        for &(id, value) in values {
+            push(&mut said, 0, Say::Set(id, value));
+        }
+        params.flush_active(
+            &mut handle,
+            &InputEvents::from_buffer(&said),
+            &mut OutputEvents::from_buffer(&mut answered),
+        );
+        Ok(answered.iter().filter_map(hand).collect())
+    }
+
     /// As when a host's transport jumps.
     pub fn reset(&mut self) {
         self.processor.reset();
+    }
+}
+
+/// What an answer of the plugin says of a parameter.
+fn hand(event: &UnknownEvent) -> Option<Hand> {
+    match event.as_core_event() {
+        Some(CoreEventSpace::ParamGestureBegin(event)) => event.param_id().map(Hand::Begin),
+        Some(CoreEventSpace::ParamValue(event)) => event.param_id().map(|id| Hand::Move(id, event.value())),
+        Some(CoreEventSpace::ParamGestureEnd(event)) => event.param_id().map(Hand::End),
+        _ => None,
     }
 }
 
@@ -459,5 +485,15 @@ fn push(events: &mut EventBuffer, at: u32, say: Say) {
         Say::NoteOff(key) => events.push(&NoteOffEvent::new(at, of(key), 0.0)),
         Say::Express(key, kind, value) => events.push(&NoteExpressionEvent::new(at, of(key), kind, value)),
         Say::Set(id, value) => events.push(&ParamValueEvent::new(at, id, Pckn::match_all(), value)),
+        Say::Modulate(id, amount) => events.push(&ParamModEvent::new(at, id, Pckn::match_all(), amount)),
+        Say::Foreign(id, value) => {
+            let mut event = ParamValueEvent::new(at, id, Pckn::match_all(), value);
+            let raw: *mut clap_event_header = (&raw mut event).cast();
+            // SAFETY: every event begins with its header; the event is copied whole before it ends.
+            unsafe {
+                (*raw).space_id = FOREIGN;
+                events.push(UnknownEvent::from_raw(raw));
+            }
+        }
     };
 }

@@ -73,7 +73,7 @@ impl<'a> OutEvents<'a> {
                 value: 0.0,
             };
             // SAFETY: the event is whole.
-            let _ = unsafe { self.push(&raw const event.header) };
+            let _ = unsafe { self.push((&raw const event).cast()) };
         }
     }
 
@@ -191,11 +191,16 @@ mod tests {
             header: header::<clap_event_param_gesture>(CLAP_EVENT_PARAM_GESTURE_BEGIN, 0),
             param_id: 0,
         };
-        send(&raw const value(id_of("bendr"), 4.999_999_88, 0).header);
-        send(&raw const midi.header);
-        send(&raw const gesture.header);
-        send(&raw const value(id_of("gain"), 0.7, 0).header);
-        send(&raw const value(id_of("oscprt"), 6_975.999_8, 99).header);
+        let moved = [
+            value(id_of("bendr"), 4.999_999_88, 0),
+            value(id_of("gain"), 0.7, 0),
+            value(id_of("oscprt"), 6_975.999_8, 99),
+        ];
+        send((&raw const moved[0]).cast());
+        send((&raw const midi).cast());
+        send((&raw const gesture).cast());
+        send((&raw const moved[1]).cast());
+        send((&raw const moved[2]).cast());
         params.moments.press(crate::plugin::params::moment::Moment::Rest);
         out.push_off(&params, 63);
         drop(out);

@@ -33,11 +33,7 @@ impl HostControls {
             .into_iter()
             .map(|(id, pointer, _)| (&*Box::leak(id.into_boxed_str()), pointer))
             .collect();
-        Self {
-            ids: all.iter().map(|(id, _)| *id).collect(),
-            pointers: all.into_iter().collect(),
-            params,
-        }
+        Self { ids: all.iter().map(|(id, _)| *id).collect(), pointers: all.into_iter().collect(), params }
     }
 
     /// The controls for one frame.
