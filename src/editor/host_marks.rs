@@ -1,6 +1,6 @@
 //! What a host ties to a parameter, shown beside its name, and the host's own menu on a right click.
 
-use egui::{Pos2, Response, Sense, Ui, vec2};
+use egui::{Pos2, Response, Ui, vec2};
 
 use crate::editor::controls::{Hands, Mark};
 use crate::editor::theme;
@@ -37,10 +37,4 @@ pub fn offer_menu(ui: &Ui, hands: &Hands, id: &str, response: &Response) {
     // Windows of macOS are counted in points of the system, all others in pixels.
     let scale = if cfg!(target_os = "macos") { ui.ctx().zoom_factor() } else { ui.ctx().pixels_per_point() };
     hands.controls.menu(id, ((scale * at.x).round() as i32, (scale * at.y).round() as i32));
-}
-
-/// The same for a name, which is no control otherwise.
-pub fn offer_menu_at_name(ui: &Ui, hands: &Hands, id: &'static str, name: &Response) {
-    let response = ui.interact(name.rect, name.id.with(("menu", id)), Sense::CLICK);
-    offer_menu(ui, hands, id, &response);
 }

@@ -43,7 +43,8 @@ pub fn choice(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
     let name = ui.label(egui::RichText::new(&look.name).color(c.quiet));
     let marks = hands.controls.marks(id);
     host_marks::paint(ui, &marks, name.rect.right_center());
-    host_marks::offer_menu_at_name(ui, hands, id, &name);
+    let name = name.interact(Sense::CLICK);
+    host_marks::offer_menu(ui, hands, id, &name);
     name.on_hover_ui(|ui| {
         teach(ui, id, "");
         host_marks::explain(ui, &marks);

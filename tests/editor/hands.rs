@@ -1,7 +1,7 @@
 //! Every control drags, types and resets; switches switch, choices choose; handles in pictures are taken by the hand.
 
 use chalumeau::editor::controls;
-use chalumeau::editor::controls::Controls;
+use chalumeau::editor::controls::{Controls, Mark};
 use chalumeau::editor::{Action, Tab, terms};
 use egui::accesskit::Role;
 use egui::{Key, Modifiers, vec2};
@@ -392,4 +392,38 @@ fn automation_shows_at_once() {
     let text = window.host.text("lip", 0.9);
     assert_eq!(window.harness.get_by_role_and_label(Role::Slider, "Lip opening").value(), Some(text));
     assert_eq!(window.actions(), Vec::<Action>::new());
+}
+
+#[test]
+fn a_right_click_asks_for_the_hosts_menu_and_moves_nothing() {
+    let mut window = Window::tall(Tab::Knob);
+    window.host.told();
+    let contrast = window.harness.get_by_role_and_label(Role::Slider, "Feel contrast").rect().center();
+    window.harness.get_by_role_and_label(Role::Slider, "Feel contrast").click_secondary();
+    window.harness.run();
+    let at = (contrast.x.round() as i32, contrast.y.round() as i32);
+    assert_eq!(window.host.menus(), [("contr".to_owned(), at)]);
+    for (name, id) in [("Feel order", "order"), ("OSC from network", "oscany")] {
+        window.harness.get_by_label(name).click_secondary();
+        window.harness.run();
+        let asked: Vec<_> = window.host.menus().into_iter().map(|(asked, _)| asked).collect();
+        assert_eq!(asked, [id]);
+    }
+    assert!(window.host.told().is_empty());
+}
+
+#[test]
+fn what_a_host_has_tied_to_a_parameter_is_a_dot_of_its_colour() {
+    let dots = |window: &mut Window| {
+        let picture = window.harness.render().unwrap();
+        picture.pixels().filter(|pixel| pixel.0 == [255, 0, 254, 255]).count()
+    };
+    let mut window = Window::tall(Tab::Knob);
+    assert_eq!(dots(&mut window), 0);
+    for id in ["contr", "order"] {
+        let before = dots(&mut window);
+        window.host.mark(id, Mark { colour: Some([255, 0, 254]), text: "Mapped: Knob 3".to_owned() });
+        window.harness.run();
+        assert!(dots(&mut window) > before + 10, "{id}");
+    }
 }

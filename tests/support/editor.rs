@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use chalumeau::editor::controls::{Controls, Look};
+use chalumeau::editor::controls::{Controls, Look, Mark};
 use chalumeau::editor::snapshot::{
     BreathSource, KnobDevice, KnobState, MouthpieceTraces, Severity, Snapshot, Status, Track,
 };
@@ -77,6 +77,8 @@ pub struct Fake {
     values: RefCell<BTreeMap<String, f32>>,
     open: RefCell<Vec<String>>,
     told: RefCell<Vec<Told>>,
+    marks: RefCell<BTreeMap<String, Mark>>,
+    menus: RefCell<Vec<(String, (i32, i32))>>,
 }
 
 impl Default for Fake {
@@ -87,7 +89,15 @@ impl Default for Fake {
             table.iter().map(|(id, _, kind)| ((*id).to_owned(), default(kind))).collect();
         // A knob by cable: what the pictures show.
         values.insert("knob".to_owned(), 1.0 / 3.0);
-        Self { table, ids, values: RefCell::new(values), open: RefCell::default(), told: RefCell::default() }
+        Self {
+            table,
+            ids,
+            values: RefCell::new(values),
+            open: RefCell::default(),
+            told: RefCell::default(),
+            marks: RefCell::default(),
+            menus: RefCell::default(),
+        }
     }
 }
 
@@ -129,6 +139,16 @@ impl Fake {
     /// As a host's automation moves it.
     pub fn automate(&self, id: &str, value: f32) {
         self.values.borrow_mut().insert(id.to_owned(), value);
+    }
+
+    /// Ties something to a parameter.
+    pub fn mark(&self, id: &str, mark: Mark) {
+        self.marks.borrow_mut().insert(id.to_owned(), mark);
+    }
+
+    /// The menus that were asked for since this was last asked.
+    pub fn menus(&self) -> Vec<(String, (i32, i32))> {
+        std::mem::take(&mut self.menus.borrow_mut())
     }
 
     /// What was told since this was last asked.
@@ -174,6 +194,14 @@ impl Fake {
 impl Controls for Fake {
     fn ids(&self) -> &[&'static str] {
         &self.ids
+    }
+
+    fn marks(&self, id: &str) -> Vec<Mark> {
+        self.marks.borrow().get(id).cloned().into_iter().collect()
+    }
+
+    fn menu(&self, id: &str, at: (i32, i32)) {
+        self.menus.borrow_mut().push((id.to_owned(), at));
     }
 
     fn look(&self, id: &str) -> Option<Look> {
