@@ -41,7 +41,9 @@ impl NoteNames {
 fn named(file: &InstrumentFile, speaks: impl Fn(usize) -> bool) -> Vec<(SoundingNote, WrittenNote)> {
     let speaking = file.fingerings.iter().enumerate().filter(|(index, _)| speaks(*index));
     let mut names: Vec<_> = speaking
-        .filter_map(|(_, fingering)| Some((fingering.written.sounding(file.transposition)?, fingering.written)))
+        .filter_map(|(_, fingering)| {
+            Some((fingering.written.sounding(file.transposition)?, fingering.written))
+        })
         .collect();
     names.sort_unstable();
     names.dedup();
