@@ -4,3 +4,4 @@ pub mod bends;
 pub mod keys;
 pub mod knob;
 pub mod midi;
+pub mod notes;

@@ -26,6 +26,11 @@ pub enum Event {
         /// Sounding pitch.
         note: SoundingNote,
     },
+    /// A note ends at once, in less than 5 ms, and its key comes up. A note that was held before it begins anew, tongued.
+    Choke {
+        /// Sounding pitch.
+        note: SoundingNote,
+    },
     /// Breath from any source, 0..=1 of the full-scale mouth pressure (`Settings::breath_full_kpa`). The first one makes breath *live*.
     Breath(f32),
     /// Pitch bend, cents; two octaves at most. Near the note by the lip, beyond by the bore's size, see
@@ -46,6 +51,16 @@ pub enum Event {
     TongueSlap {
         /// How hard, 0..=1; 0 is nothing.
         strength: f32,
+    },
+    /// Loudness after the instrument, before the limiter.
+    Volume {
+        /// Factor on the amplitude, 0..=4; 1 leaves it.
+        gain: f32,
+    },
+    /// Place between left and right, see [`Stereo`](crate::instrument::stereo::Stereo). The instrument itself is mono.
+    Pan {
+        /// -1 left, 0 middle, 1 right.
+        position: f32,
     },
     /// Open holes whatever is fingered, one bit each in the order of the instrument's file from the lowest bit; `None` goes
     /// back to the fingering of the note.

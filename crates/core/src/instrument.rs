@@ -19,6 +19,7 @@
 
 pub mod bend;
 mod breath_noise;
+mod choke;
 mod clarinet;
 pub mod concert_pitch;
 mod control_tick;
@@ -33,6 +34,7 @@ pub mod prepare;
 pub mod scope;
 mod settings;
 mod slap;
+pub mod stereo;
 pub mod store;
 pub mod tuning_table;
 pub mod voice;

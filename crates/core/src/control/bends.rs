@@ -1,15 +1,12 @@
-//! Which bend wheel acts on the sounding note: channels, MPE zones and note expressions of an instrument with one voice.
+//! Which bend wheel acts on the sounding note: channels and MPE zones of an instrument with one voice.
 //!
 //! A note follows the wheel of its own channel and that of its zone's manager. A wheel that is turned while its note is
 //! held but silent is remembered, and heard when the note sounds again. Without a zone, the wheel of a channel that has
-//! never played a note (that of a split keyboard) counts as a manager's. A tuning expression belongs to its key until the
-//! key is struck anew. When the last key has come up its note keeps its bend while it fades.
+//! never played a note (that of a split keyboard) counts as a manager's. When the last key has come up its note keeps its
+//! bend while it fades.
 //!
 //! Left out: only the instrument knows its range, so a note outside it still selects a wheel.
 //! Source: MIDI Polyphonic Expression 1.0 (RP-053, 2018): MPE Configuration Message, pitch bend sensitivity of zones.
-
-use crate::control::keys::Keys;
-use crate::units::SoundingNote;
 
 /// The bend wheel at rest.
 const CENTRE: u16 = 8192;
@@ -41,7 +38,9 @@ impl Wheel {
     }
 }
 
-/// Wheels, zones and keys. Everything is real-time safe; channels are 0..=15, keys 0..=127.
+/// Wheels and zones. Everything is real-time safe; channels are 0..=15.
+///
+/// `heard` is the channel of the note that sounds or sounded last, if there was one.
 #[derive(Clone, Debug)]
 pub struct Bends {
     wheels: [Wheel; 16],
@@ -49,45 +48,26 @@ pub struct Bends {
     usual: u8,
     /// Members of the lower zone (channels 1..) and of the upper (..=14).
     members: [usize; 2],
-    keys: Keys,
-    /// Channels that hold each key, a bit each, and the one that struck it last.
-    holding: [u16; 128],
-    owner: [u8; 128],
-    /// Tuning expression of each key, cents.
-    tuning_cents: [f32; 128],
-    /// The key that sounds or sounded last.
-    heard: Option<u8>,
     /// Channel without notes whose wheel moved last.
     common: Option<usize>,
 }
 
 impl Default for Bends {
     fn default() -> Self {
-        Self {
-            wheels: [Wheel::NEW; 16],
-            usual: RANGE,
-            members: [0; 2],
-            keys: Keys::default(),
-            holding: [0; 128],
-            owner: [0; 128],
-            tuning_cents: [0.0; 128],
-            heard: None,
-            common: None,
-        }
+        Self { wheels: [Wheel::NEW; 16], usual: RANGE, members: [0; 2], common: None }
     }
 }
 
 impl Bends {
-    /// Bend of the note that sounds, cents.
-    pub fn cents(&self) -> f32 {
-        let Some(key) = self.heard.map(usize::from) else { return self.common_cents(None) };
-        let channel = usize::from(self.owner[key]);
+    /// What the wheels bend the heard note by, cents.
+    pub fn cents(&self, heard: Option<usize>) -> f32 {
+        let Some(channel) = heard else { return self.common_cents(None) };
         let manager_cents = match self.zone_of(channel) {
             Some(zone) if MANAGERS[zone] == channel => 0.0,
             Some(zone) => self.bend_cents(MANAGERS[zone]),
             None => self.common_cents(Some(channel)),
         };
-        self.bend_cents(channel) + manager_cents + self.tuning_cents[key]
+        self.bend_cents(channel) + manager_cents
     }
 
     fn bend_cents(&self, channel: usize) -> f32 {
@@ -109,11 +89,10 @@ impl Bends {
     }
 
     /// Whether what happens to this channel's wheel is heard now.
-    pub fn is_heard(&self, channel: usize) -> bool {
-        let Some(key) = self.heard.map(usize::from) else { return self.common == Some(channel) };
-        let owner = usize::from(self.owner[key]);
-        owner == channel
-            || match self.zone_of(owner) {
+    pub fn is_heard(&self, channel: usize, heard: Option<usize>) -> bool {
+        let Some(heard) = heard else { return self.common == Some(channel) };
+        heard == channel
+            || match self.zone_of(heard) {
                 Some(zone) => MANAGERS[zone] == channel,
                 None => self.common == Some(channel),
             }
@@ -179,54 +158,9 @@ impl Bends {
         if zone == 0 { 1..1 + members } else { 15 - members..15 }
     }
 
-    /// A key goes down.
-    pub fn press(&mut self, channel: usize, key: u8) {
-        let at = usize::from(key);
+    /// A channel plays a note: its wheel is its own from now on.
+    pub fn play(&mut self, channel: usize) {
         self.wheels[channel].played = true;
         self.common = self.common.filter(|&common| common != channel);
-        self.keys.press(SoundingNote(key));
-        self.holding[at] |= 1 << channel;
-        self.owner[at] = channel as u8;
-        self.tuning_cents[at] = 0.0;
-        self.heard = Some(key);
-    }
-
-    /// A key comes up on one channel, or on all; true if no other channel holds it.
-    pub fn release(&mut self, channel: Option<usize>, key: u8) -> bool {
-        let holding = &mut self.holding[usize::from(key)];
-        *holding &= channel.map_or(0, |channel| !(1 << channel));
-        if *holding != 0 {
-            let owner = &mut self.owner[usize::from(key)];
-            if channel == Some(usize::from(*owner)) {
-                *owner = holding.trailing_zeros() as u8;
-            }
-            return false;
-        }
-        self.keys.release(SoundingNote(key));
-        if let Some(SoundingNote(last)) = self.keys.last() {
-            self.heard = Some(last);
-        }
-        true
-    }
-
-    /// All keys come up.
-    pub fn release_all(&mut self) {
-        self.keys = Keys::default();
-        self.holding = [0; 128];
-    }
-
-    /// Tuning expression of the keys that a channel holds, of one key, or of one key of one channel; true if it may be heard.
-    pub fn tune(&mut self, channel: Option<usize>, key: Option<u8>, cents: f32) -> bool {
-        let keys = key.map_or(0..128, |key| usize::from(key)..usize::from(key) + 1);
-        let mut heard = false;
-        for at in keys.filter(|&at| at < 128) {
-            let held =
-                channel.map_or(self.holding[at] != 0, |channel| usize::from(self.owner[at]) == channel);
-            if held && (self.holding[at] != 0 || self.heard == Some(at as u8)) {
-                self.tuning_cents[at] = cents;
-                heard |= self.heard == Some(at as u8);
-            }
-        }
-        heard
     }
 }

@@ -24,6 +24,11 @@ impl Keys {
         self.count.checked_sub(1).map(|last| self.held[last])
     }
 
+    /// The held keys, oldest first.
+    pub fn held(&self) -> &[SoundingNote] {
+        &self.held[..self.count]
+    }
+
     /// Whether no key is held.
     pub fn is_empty(&self) -> bool {
         self.count == 0

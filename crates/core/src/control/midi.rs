@@ -1,36 +1,53 @@
-//! Turns MIDI channel messages into events, for the plugin and for the offline renderer alike.
+//! Turns MIDI channel messages and the note events of hosts into events, for the plugin and for the offline renderer
+//! alike.
 //!
-//! The instrument has one voice, so all channels play it, and their breath is one stream. Breath comes from the
-//! controllers that wind controllers use: breath controller (CC2, fine part CC34), expression (CC11, fine
-//! part CC43) and channel pressure. A controller often sends several at once, so the sources are ranked, CC2 over CC11
-//! over pressure: a source is heard until a higher one sends its first value above 0, and from then on only the higher
-//! one, until [`reset`](MidiDecoder::reset). A source that has only sent 0 does not count: some hosts send every
-//! controller once at the start. Once a source is in use, its 0 means that the player does not blow. Bend follows the sounding note's channel and its MPE zone, see [`bends`](super::bends);
-//! RPN 0 sets a bend range, RPN 6 a zone. Left out: poly pressure, pedals, program and bank.
+//! The instrument has one voice, so all channels play it. The last key struck is heard; see [`notes`](super::notes).
+//! [`breath`] says which controller the breath comes from, [`snapshot`] what is left out of the start of a project, [`mix`]
+//! what volume and pan do. Bend follows the heard note's channel and its MPE zone, see [`bends`](super::bends); RPN 0 sets a
+//! bend range, RPN 6 a zone. While the sustain pedal (CC64) is down, the last note goes on after its key has come up, until
+//! the pedal comes up or another key is struck, which slurs; the same key again is tongued. Left out: balance (CC8),
+//! portamento, sostenuto and soft pedal, program and bank.
 //!
 //! Source: MIDI 1.0 Detailed Specification 4.2.1 (1996), control change numbers and registered parameters; RP-015 for
 //! CC121; RP-053 for MPE. Data bytes above 127 are read as 127 and channels modulo 16, so that every
 //! input is valid.
 //!
 //! ```
-//! use chalumeau_core::{control::midi::MidiDecoder, event::Event};
+//! use chalumeau_core::{control::midi::MidiDecoder, event::Event, units::SoundingNote};
 //!
 //! let mut midi = MidiDecoder::new();
-//! // Breath controller (CC2) at 0 does not count as breath; at 64 it does.
-//! assert_eq!(midi.controller(0, 2, 0), [None, None]);
-//! assert_eq!(midi.controller(0, 2, 64), [Some(Event::Breath(64.0 / 127.0)), None]);
+//! // Breath controller (CC2) at 64 counts as breath when a key is struck.
+//! assert!(midi.controller(0, 2, 64).is_empty());
+//! let note_on = Event::NoteOn { note: SoundingNote(60), velocity: 1.0 };
+//! assert_eq!(midi.note_on(0, 60, 127), [Event::Breath(64.0 / 127.0), note_on]);
 //! ```
 
+pub mod breath;
+pub mod mix;
+mod said;
+pub mod snapshot;
+#[cfg(test)]
+mod tests;
+
 use crate::control::bends::Bends;
+use crate::control::keys::Keys;
+use crate::control::notes::{HeldNote, Note, NoteAddress, NoteExpression, Notes};
 use crate::event::Event;
 use crate::units::SoundingNote;
+use breath::{BreathChoice, BreathController};
+use mix::{Mix, MixControllers};
+use said::Said;
+use snapshot::{PRESSURE, Place, Run};
 
 const BREATH: u8 = 2;
 const DATA_ENTRY: u8 = 6;
+const VOLUME: u8 = 7;
+const PAN: u8 = 10;
 const EXPRESSION: u8 = 11;
 const BREATH_FINE: u8 = BREATH + 32;
 const DATA_ENTRY_FINE: u8 = DATA_ENTRY + 32;
 const EXPRESSION_FINE: u8 = EXPRESSION + 32;
+const SUSTAIN: u8 = 64;
 const NRPN_FINE: u8 = 98;
 const NRPN: u8 = 99;
 const RPN_FINE: u8 = 100;
@@ -39,97 +56,65 @@ const ALL_SOUND_OFF: u8 = 120;
 const RESET_CONTROLLERS: u8 = 121;
 const ALL_NOTES_OFF: u8 = 123;
 
+/// From this value on the pedal is down.
+const PEDAL_DOWN: u8 = 64;
+
 /// Registered parameter "none selected".
 const RPN_NONE: [u8; 2] = [127, 127];
 const RPN_BEND_RANGE: [u8; 2] = [0, 0];
 const RPN_MPE_ZONE: [u8; 2] = [0, 6];
 
-/// The events of one message: at most two, in order.
-pub type Events = [Option<Event>; 2];
-
-const NOTHING: Events = [None, None];
-
-fn one(event: Event) -> Events {
-    [Some(event), None]
-}
-
-/// Where breath can come from, the weakest claim first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Source {
-    Nothing,
-    Pressure,
-    Expression,
-    Breath,
-}
-
-/// A controller with a coarse and, on some devices, a fine part.
-#[derive(Clone, Copy, Debug, Default)]
-struct Fader {
-    coarse: u8,
-    /// `None` until the device has shown that it sends one.
-    fine: Option<u8>,
-}
-
-impl Fader {
-    fn set(&mut self, fine: bool, value: u8) {
-        if fine {
-            self.fine = Some(value);
-        } else {
-            self.coarse = value;
-        }
-    }
-
-    /// 0..=1: 127ths as long as only the coarse part is known, 16383rds afterwards. The fine part is kept when a coarse
-    /// part follows (the specification would zero it), so that devices sending the fine part first end right too.
-    fn unit(self) -> f32 {
-        match self.fine {
-            None => f32::from(self.coarse) / 127.0,
-            Some(fine) => f32::from(u16::from(self.coarse) * 128 + u16::from(fine)) / 16383.0,
-        }
-    }
+/// Where a breath event came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BreathOrigin {
+    /// A controller.
+    Controller(BreathController),
+    /// What belongs to a note.
+    Note,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Channel {
-    breath: Fader,
-    expression: Fader,
     /// Registered parameter that data entry would set, coarse then fine.
     rpn: [u8; 2],
+    /// Its controllers since the last note.
+    run: Run,
+    /// Volume and pan, and the pedal, before the run.
+    before: (MixControllers, bool),
 }
 
-impl Channel {
-    const NEW: Self = Self {
-        breath: Fader { coarse: 0, fine: None },
-        expression: Fader { coarse: 0, fine: None },
-        rpn: RPN_NONE,
-    };
+impl Default for Channel {
+    fn default() -> Self {
+        Self { rpn: RPN_NONE, run: Run::default(), before: (MixControllers::default(), false) }
+    }
 }
 
-/// Decodes MIDI messages; it keeps the state of controllers, bend wheels and zones. Real-time safe.
-#[derive(Clone, Debug)]
+/// Decodes MIDI messages and note events; it keeps the state of notes, controllers, bend wheels and zones. Each message
+/// gives its events, in order. Real-time safe.
+#[derive(Clone, Debug, Default)]
 pub struct MidiDecoder {
     channels: [Channel; 16],
-    source: Source,
+    breath: BreathChoice,
+    /// Whether the breath of a note has been above 0. Some hosts send a zero with each note; a zero alone does not count.
+    has_note_breath: bool,
+    origin: Option<BreathOrigin>,
+    mix: Mix,
+    pedal: bool,
+    notes: Notes,
+    /// The keys as the player holds them, who gets the events.
+    fingers: Keys,
+    /// Velocity of the last key, 0..=1.
+    velocity: f32,
     bends: Bends,
     /// The last bend there was an event for.
     bent_cents: f32,
-}
-
-impl Default for MidiDecoder {
-    fn default() -> Self {
-        Self::new()
-    }
+    said: Said,
 }
 
 impl MidiDecoder {
     /// As after switching on: no breath source known, no MPE zone, bend range two semitones. Does not allocate.
     pub fn new() -> Self {
-        Self {
-            channels: [Channel::NEW; 16],
-            source: Source::Nothing,
-            bends: Bends::default(),
-            bent_cents: 0.0,
-        }
+        Self::default()
     }
 
     /// The same with MPE's usual lower zone, for what was played on an MPE controller that did not announce itself: channel 1
@@ -140,66 +125,136 @@ impl MidiDecoder {
         self
     }
 
-    /// Forgets every controller, the breath source, the zones and the bend ranges. Real-time safe.
+    /// Forgets every note and controller, the breath source, the zones and the bend ranges. Real-time safe.
     pub fn reset(&mut self) {
         *self = Self::new();
     }
 
     /// Bend range until RPN 0 says otherwise, semitones; of MPE members it is 48. Real-time safe.
-    pub fn usual_bend_range(&mut self, semitones: u8) -> Events {
+    pub fn usual_bend_range(&mut self, semitones: u8) -> &[Event] {
+        self.begin();
         self.bends.set_usual_range(semitones);
-        [self.rebend(), None]
+        self.rebend();
+        self.said.events()
     }
 
-    /// A key goes down; with velocity 0 it comes up, as running status has it. Its channel's bend comes before the note.
-    /// Real-time safe.
-    pub fn note_on(&mut self, channel: u8, key: u8, velocity: u8) -> Events {
+    /// A MIDI key goes down; with velocity 0 it comes up, as running status has it. Real-time safe.
+    pub fn note_on(&mut self, channel: u8, key: u8, velocity: u8) -> &[Event] {
         if velocity == 0 {
-            return self.note_off(Some(channel), key);
+            return self.note_off(channel, key);
         }
-        let velocity = f32::from(velocity.min(127)) / 127.0;
-        self.bends.press(usize::from(channel % 16), key.min(127));
-        [self.rebend(), Some(Event::NoteOn { note: SoundingNote(key.min(127)), velocity })]
+        self.strike(Note { id: None, channel, key }, velocity)
     }
 
-    /// A key comes up, on one channel or on all. Nothing happens to a note that another channel still holds, but the bend
-    /// may be another one's now. Real-time safe.
-    pub fn note_off(&mut self, channel: Option<u8>, key: u8) -> Events {
-        let up = self.bends.release(channel.map(|channel| usize::from(channel % 16)), key.min(127));
-        [self.rebend(), up.then_some(Event::NoteOff { note: SoundingNote(key.min(127)) })]
+    /// A MIDI key comes up. Real-time safe.
+    pub fn note_off(&mut self, channel: u8, key: u8) -> &[Event] {
+        self.release(NoteAddress::of_key(channel % 16, key.min(127)))
     }
 
-    /// Tuning of a note above its key, cents, until it is struck anew: all notes of a channel, or one key. Real-time safe.
-    pub fn tune(&mut self, channel: Option<u8>, key: Option<u8>, cents: f32) -> Events {
-        let cents = if cents.is_finite() { cents } else { 0.0 };
-        let channel = channel.map(|channel| usize::from(channel % 16));
-        if self.bends.tune(channel, key.map(|key| key.min(127)), cents) { one(self.bent()) } else { NOTHING }
+    /// A note begins, with a velocity of 1..=127. Its bend, breath, volume and pan come before it. Real-time safe.
+    pub fn strike(&mut self, note: Note, velocity: u8) -> &[Event] {
+        self.begin();
+        let note = Note { channel: note.channel % 16, key: note.key.min(127), ..note };
+        self.velocity = f32::from(velocity.clamp(1, 127)) / 127.0;
+        let by_pedal = self.notes.take_by_pedal();
+        self.notes.press(note);
+        self.bends.play(usize::from(note.channel));
+        self.channels.iter_mut().for_each(|channel| channel.run = Run::default());
+        self.rebend();
+        if let Some((controller, unit)) = self.breath.settle() {
+            self.blow(BreathOrigin::Controller(controller), unit);
+        }
+        self.remix();
+        if by_pedal.is_some_and(|held| held.key == note.key) {
+            self.lift(note.key);
+        }
+        self.finger(note.key);
+        self.lift_others(None);
+        self.said.events()
+    }
+
+    /// Keys come up. The note that sounded before is heard again; the last one ends, or the pedal holds it. Real-time safe.
+    pub fn release(&mut self, address: NoteAddress) -> &[Event] {
+        self.begin();
+        let before = self.sounding();
+        self.notes.release(address, self.pedal);
+        self.hear_next(before);
+        self.said.events()
+    }
+
+    /// Notes end at once, whatever the pedal does. Real-time safe.
+    pub fn choke(&mut self, address: NoteAddress) -> &[Event] {
+        self.begin();
+        let before = self.sounding();
+        let heard = self.notes.choke(address);
+        // The others first: none of them is to be heard in between.
+        self.lift_others(heard);
+        if let Some(key) = heard {
+            self.fingers.release(SoundingNote(key));
+            self.said.push(Event::Choke { note: SoundingNote(key) });
+        }
+        self.hear_next(before);
+        self.said.events()
+    }
+
+    /// All notes end at once, as by CC120. Real-time safe.
+    pub fn silence(&mut self) -> &[Event] {
+        self.begin();
+        self.cut_all();
+        self.said.events()
+    }
+
+    /// Something changes that belongs to notes. An unheard note keeps it until it is heard; a note struck anew has lost it.
+    /// Real-time safe.
+    pub fn express(&mut self, address: NoteAddress, expression: NoteExpression) -> &[Event] {
+        self.begin();
+        if let NoteExpression::Breath(unit) = expression {
+            self.has_note_breath |= unit > 0.0;
+        }
+        if self.notes.express(address, expression) {
+            match expression {
+                NoteExpression::Tuning(_) => self.bend_anew(),
+                NoteExpression::Breath(_) => self.blow_note(),
+                NoteExpression::Volume(_) | NoteExpression::Pan(_) => self.remix(),
+                NoteExpression::Brightness(_) | NoteExpression::Press(_) => {}
+            }
+        }
+        self.said.events()
     }
 
     /// A control change. Real-time safe.
-    pub fn controller(&mut self, channel: u8, cc: u8, value: u8) -> Events {
-        let value = value.min(127);
-        let at = usize::from(channel % 16);
-        let state = &mut self.channels[at];
+    pub fn controller(&mut self, channel: u8, cc: u8, value: u8) -> &[Event] {
+        self.begin();
+        let (at, cc, value) = (usize::from(channel % 16), cc.min(127), value.min(127));
+        let place = self.place(at, cc);
         match cc {
             BREATH | BREATH_FINE => {
-                state.breath.set(cc == BREATH_FINE, value);
-                let unit = state.breath.unit();
-                self.breathe(Source::Breath, unit)
+                self.hear(BreathController::Breath, at, (cc == BREATH_FINE, value), place);
             }
             EXPRESSION | EXPRESSION_FINE => {
-                state.expression.set(cc == EXPRESSION_FINE, value);
-                let unit = state.expression.unit();
-                self.breathe(Source::Expression, unit)
+                self.hear(BreathController::Expression, at, (cc == EXPRESSION_FINE, value), place);
             }
-            RPN | RPN_FINE => {
-                state.rpn[usize::from(cc == RPN_FINE)] = value;
-                NOTHING
+            _ if matches!(place, Place::Recognised | Place::Within) => {}
+            _ => self.control(at, cc, value),
+        }
+        self.said.events()
+    }
+
+    /// A controller that is not breath.
+    fn control(&mut self, at: usize, cc: u8, value: u8) {
+        let state = &mut self.channels[at];
+        match cc {
+            VOLUME => {
+                self.mix.controllers.volume = value;
+                self.remix();
             }
-            NRPN | NRPN_FINE => {
-                state.rpn = RPN_NONE;
-                NOTHING
+            PAN => {
+                self.mix.controllers.pan = value;
+                self.remix();
             }
+            SUSTAIN => self.set_pedal(value >= PEDAL_DOWN),
+            RPN | RPN_FINE => state.rpn[usize::from(cc == RPN_FINE)] = value,
+            NRPN | NRPN_FINE => state.rpn = RPN_NONE,
             DATA_ENTRY | DATA_ENTRY_FINE => {
                 match (state.rpn, cc) {
                     (RPN_BEND_RANGE, DATA_ENTRY) => self.bends.set_range(at, Some(value), None),
@@ -207,286 +262,194 @@ impl MidiDecoder {
                     (RPN_MPE_ZONE, DATA_ENTRY) => self.bends.set_zone(at, value),
                     _ => {}
                 }
-                [self.rebend(), None]
+                self.rebend();
             }
             RESET_CONTROLLERS => {
-                // RP-015 also puts expression to full, which on a wind instrument would be a blast: breath stays.
+                // RP-015 also puts expression to full, which on a wind instrument would be a blast: breath stays. Volume
+                // and pan stay, as it says.
                 state.rpn = RPN_NONE;
                 self.bends.rest(at);
-                [self.bends.is_heard(at).then(|| self.bent()), None]
+                if self.bends.is_heard(at, self.heard_channel()) {
+                    self.bend_anew();
+                }
+                self.set_pedal(false);
             }
-            ALL_SOUND_OFF | ALL_NOTES_OFF => {
-                // The instrument forgets its bend, wheels do not.
-                self.bends.release_all();
-                self.bent_cents = 0.0;
-                [Some(Event::Panic), self.rebend()]
-            }
-            _ => NOTHING,
+            ALL_SOUND_OFF | ALL_NOTES_OFF => self.cut_all(),
+            _ => {}
         }
     }
 
     /// Channel pressure (aftertouch). Real-time safe.
-    pub fn pressure(&mut self, _channel: u8, value: u8) -> Events {
-        self.breathe(Source::Pressure, f32::from(value.min(127)) / 127.0)
+    pub fn pressure(&mut self, channel: u8, value: u8) -> &[Event] {
+        self.begin();
+        let at = usize::from(channel % 16);
+        let place = self.place(at, PRESSURE);
+        self.hear(BreathController::Pressure, at, (false, value.min(127)), place);
+        self.said.events()
     }
 
     /// The bend wheel, 0..=16383, 8192 at rest. Real-time safe.
-    pub fn bend(&mut self, channel: u8, value14: u16) -> Events {
+    pub fn bend(&mut self, channel: u8, value14: u16) -> &[Event] {
+        self.begin();
         let at = usize::from(channel % 16);
         self.bends.turn(at, value14);
-        [self.bends.is_heard(at).then(|| self.bent()), None]
-    }
-
-    fn bent(&mut self) -> Event {
-        self.bent_cents = self.bends.cents();
-        Event::Bend { cents: self.bent_cents }
-    }
-
-    /// A bend, if it has changed.
-    fn rebend(&mut self) -> Option<Event> {
-        (self.bends.cents() != self.bent_cents).then(|| self.bent())
-    }
-
-    /// A source that has only sent 0 is not in use yet. Otherwise hosts that send every controller once at the start would
-    /// take the breath away from the keys.
-    fn breathe(&mut self, source: Source, unit: f32) -> Events {
-        if source > self.source && unit == 0.0 {
-            return NOTHING;
+        if self.bends.is_heard(at, self.heard_channel()) {
+            self.bend_anew();
         }
-        self.source = self.source.max(source);
-        [(source == self.source).then_some(Event::Breath(unit)), None]
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The event of a message that has at most one.
-    fn only([event, none]: Events) -> Option<Event> {
-        assert_eq!(none, None);
-        event
+        self.said.events()
     }
 
-    #[test]
-    fn velocity_zero_is_note_off() {
-        let mut midi = MidiDecoder::new();
-        let note = SoundingNote(60);
-        assert_eq!(midi.note_on(0, 60, 127), [None, Some(Event::NoteOn { note, velocity: 1.0 })]);
-        assert_eq!(midi.note_on(0, 60, 0), [None, Some(Event::NoteOff { note })]);
+    /// The note that sounds, or the last one while it fades, and what belongs to it.
+    pub fn heard(&self) -> Option<&HeldNote> {
+        self.notes.heard()
     }
 
-    #[test]
-    fn a_source_at_rest_has_not_moved() {
-        let mut midi = MidiDecoder::new();
-        assert_eq!(only(midi.controller(0, 2, 0)), None);
-        assert_eq!(only(midi.pressure(0, 0)), None);
-        assert_eq!(only(midi.controller(0, 11, 1)), Some(Event::Breath(1.0 / 127.0)));
-        assert_eq!(only(midi.controller(0, 2, 0)), None, "CC2 has yet to move");
-        assert_eq!(only(midi.controller(0, 11, 0)), Some(Event::Breath(0.0)));
+    /// The notes that the latest message has ended. A released note that fades is not among them.
+    pub fn over(&self) -> &[Note] {
+        self.notes.over()
     }
 
-    #[test]
-    fn breath_is_exact_in_7_bits_and_in_14() {
-        let mut midi = MidiDecoder::new();
-        assert_eq!(only(midi.controller(0, 2, 127)), Some(Event::Breath(1.0)));
-        assert_eq!(only(midi.controller(0, 2, 64)), Some(Event::Breath(64.0 / 127.0)));
-        assert_eq!(only(midi.controller(0, 34, 1)), Some(Event::Breath(8193.0 / 16383.0)));
-        assert_eq!(
-            only(midi.controller(1, 2, 64)),
-            Some(Event::Breath(64.0 / 127.0)),
-            "fine part is per channel"
-        );
-        midi.controller(0, 2, 127);
-        assert_eq!(only(midi.controller(0, 34, 127)), Some(Event::Breath(1.0)));
-        midi.reset();
-        assert_eq!(only(midi.controller(0, 2, 127)), Some(Event::Breath(1.0)));
+    /// The released note that faded until now. Call it when the instrument is silent: then it has ended. Real-time safe.
+    pub fn take_faded(&mut self) -> Option<Note> {
+        self.notes.take_faded()
     }
 
-    #[test]
-    fn fine_breath_rises_with_every_step() {
-        let mut midi = MidiDecoder::new();
-        let mut last = 0.0;
-        for value in 1..16384u16 {
-            midi.controller(0, 2, (value >> 7) as u8);
-            let [Some(Event::Breath(unit)), None] = midi.controller(0, 34, (value & 127) as u8) else {
-                panic!()
-            };
-            assert!(unit > last && unit <= 1.0);
-            last = unit;
+    /// Where the latest breath event came from.
+    pub fn breath_origin(&self) -> Option<BreathOrigin> {
+        self.origin
+    }
+
+    /// Whether what this channel's controllers have sent since the last note is a snapshot.
+    pub fn is_snapshot(&self, channel: u8) -> bool {
+        self.channels[usize::from(channel % 16)].run.is_snapshot()
+    }
+
+    fn begin(&mut self) {
+        self.said.clear();
+        self.notes.begin();
+    }
+
+    fn sounding(&self) -> Option<Note> {
+        self.notes.sounding().map(|held| held.note)
+    }
+
+    fn heard_channel(&self) -> Option<usize> {
+        self.notes.heard().map(|held| usize::from(held.note.channel))
+    }
+
+    /// The place of a message in its channel's run of controllers. If it shows that the run is a snapshot, volume, pan and
+    /// pedal go back to where they were before it.
+    fn place(&mut self, at: usize, controller: u8) -> Place {
+        let channel = &mut self.channels[at];
+        if channel.run.is_empty() || channel.run.has(controller) {
+            channel.before = (self.mix.controllers, self.pedal);
         }
-        assert_eq!(last, 1.0);
-    }
-
-    #[test]
-    fn the_highest_source_that_has_moved_is_heard() {
-        let mut midi = MidiDecoder::new();
-        assert_eq!(only(midi.pressure(0, 127)), Some(Event::Breath(1.0)));
-        assert_eq!(only(midi.controller(3, 11, 1)), Some(Event::Breath(1.0 / 127.0)));
-        assert_eq!(only(midi.pressure(0, 100)), None);
-        assert!(only(midi.controller(0, 2, 10)).is_some());
-        assert_eq!(only(midi.controller(3, 11, 80)), None);
-        assert_eq!(only(midi.controller(3, 43, 80)), None);
-        midi.reset();
-        assert!(only(midi.pressure(0, 100)).is_some());
-    }
-
-    #[test]
-    fn bend_reaches_both_ends_and_follows_rpn_0() {
-        let mut midi = MidiDecoder::new();
-        assert_eq!(only(midi.bend(0, 8192)), Some(Event::Bend { cents: 0.0 }));
-        assert_eq!(only(midi.bend(0, 16383)), Some(Event::Bend { cents: 200.0 }));
-        assert_eq!(only(midi.bend(0, 0)), Some(Event::Bend { cents: -200.0 }));
-        assert_eq!(only(midi.controller(0, 6, 12)), None, "no parameter selected");
-        midi.controller(0, 101, 0);
-        midi.controller(0, 100, 0);
-        assert_eq!(only(midi.controller(0, 6, 12)), Some(Event::Bend { cents: -1200.0 }));
-        assert_eq!(only(midi.controller(0, 38, 50)), Some(Event::Bend { cents: -1250.0 }));
-        midi.controller(0, 101, 127);
-        midi.controller(0, 100, 127);
-        midi.controller(0, 6, 1);
-        assert_eq!(only(midi.bend(0, 0)), Some(Event::Bend { cents: -1250.0 }));
-        assert_eq!(only(midi.bend(1, 0)), Some(Event::Bend { cents: -200.0 }), "range is per channel");
-        assert_eq!(only(midi.controller(0, 121, 0)), Some(Event::Bend { cents: 0.0 }));
-    }
-
-    #[test]
-    fn the_usual_bend_range_is_that_of_who_was_told_nothing() {
-        let mut midi = MidiDecoder::new();
-        assert_eq!(midi.usual_bend_range(2), [None, None], "as it is from the start");
-        midi.bend(0, 0);
-        assert_eq!(midi.usual_bend_range(12), [Some(Event::Bend { cents: -1_200.0 }), None]);
-        for (cc, value) in [(101, 0), (100, 0), (6, 7)] {
-            midi.controller(0, cc, value);
+        let place = channel.run.place(controller);
+        if place == Place::Recognised {
+            channel.rpn = RPN_NONE;
+            let (controllers, pedal) = channel.before;
+            self.breath.forget_waiting(at);
+            self.mix.controllers = controllers;
+            self.remix();
+            self.set_pedal(pedal);
         }
-        assert_eq!(midi.usual_bend_range(24), [None, None], "RPN 0 has spoken");
-        assert_eq!(midi.bend(0, 0)[0], Some(Event::Bend { cents: -700.0 }));
+        place
     }
 
-    #[test]
-    fn an_unregistered_parameter_is_not_the_bend_range() {
-        let mut midi = MidiDecoder::new();
-        midi.controller(0, 101, 0);
-        midi.controller(0, 100, 0);
-        midi.controller(0, 99, 0);
-        midi.controller(0, 6, 24);
-        assert_eq!(only(midi.bend(0, 16383)), Some(Event::Bend { cents: 200.0 }));
+    fn hear(&mut self, controller: BreathController, at: usize, part: (bool, u8), place: Place) {
+        let is_held = self.sounding().is_some();
+        if let Some(unit) = self.breath.hear(controller, at, part, place, is_held) {
+            self.blow(BreathOrigin::Controller(controller), unit);
+        }
     }
 
-    #[test]
-    fn no_input_is_wrong() {
-        let mut midi = MidiDecoder::new();
-        for a in 0..=255u8 {
-            for b in 0..=255u8 {
-                for event in [
-                    midi.note_on(a, b, b),
-                    midi.note_off(Some(a), b),
-                    midi.controller(a, b, a ^ b),
-                    midi.pressure(a, b),
-                    midi.bend(a, u16::from(a) << 8 | u16::from(b)),
-                    midi.tune(Some(a), Some(b), f32::from(a) - f32::from(b)),
-                ]
-                .into_iter()
-                .flatten()
-                {
-                    match event {
-                        Some(Event::Breath(x)) => assert!((0.0..=1.0).contains(&x)),
-                        Some(Event::Bend { cents }) => assert!(cents.abs() <= 26_000.0),
-                        Some(Event::NoteOn { velocity, .. }) => assert!(velocity > 0.0 && velocity <= 1.0),
-                        _ => {}
-                    }
-                }
+    fn blow(&mut self, origin: BreathOrigin, unit: f32) {
+        self.origin = Some(origin);
+        self.said.push(Event::Breath(unit));
+    }
+
+    /// The breath of the heard note, if it has one.
+    fn blow_note(&mut self) {
+        let breath = self.notes.heard().and_then(|held| held.breath);
+        if let Some(unit) = breath.filter(|_| self.has_note_breath) {
+            self.blow(BreathOrigin::Note, unit);
+        }
+    }
+
+    /// Volume and pan, if they have changed.
+    fn remix(&mut self) {
+        for event in self.mix.changed(self.notes.heard()).into_iter().flatten() {
+            self.said.push(event);
+        }
+    }
+
+    fn bend_anew(&mut self) {
+        let tuning_cents = self.notes.heard().map_or(0.0, |held| held.tuning_cents);
+        self.bent_cents = self.bends.cents(self.heard_channel()) + tuning_cents;
+        self.said.push(Event::Bend { cents: self.bent_cents });
+    }
+
+    /// The bend, if it has changed.
+    fn rebend(&mut self) {
+        let tuning_cents = self.notes.heard().map_or(0.0, |held| held.tuning_cents);
+        if self.bends.cents(self.heard_channel()) + tuning_cents != self.bent_cents {
+            self.bend_anew();
+        }
+    }
+
+    fn set_pedal(&mut self, is_down: bool) {
+        self.pedal = is_down;
+        let before = self.sounding();
+        if !is_down && self.notes.take_by_pedal().is_some() {
+            self.hear_next(before);
+        }
+    }
+
+    fn cut_all(&mut self) {
+        self.notes.choke(NoteAddress::default());
+        self.fingers = Keys::default();
+        self.said.push(Event::Panic);
+        // The player forgets its bend, wheels do not.
+        self.bent_cents = 0.0;
+        self.rebend();
+    }
+
+    /// Keys have come up, and `before` sounded until now: what is heard now, and which keys are no longer down.
+    fn hear_next(&mut self, before: Option<Note>) {
+        self.rebend();
+        if let Some(Note { key, .. }) = self.sounding().filter(|&now| Some(now) != before) {
+            self.blow_note();
+            self.remix();
+            let next = self.fingers.held().iter().rev().find(|finger| self.notes.holds(finger.0));
+            if next != Some(&SoundingNote(key)) {
+                // Of two notes of one key the later one has come up; the earlier one lies below others.
+                self.finger(key);
             }
         }
-        assert_eq!(midi.controller(0, 120, 0)[0], Some(Event::Panic));
-        assert_eq!(midi.controller(0, 123, 0)[0], Some(Event::Panic));
+        self.lift_others(None);
     }
 
-    /// A member's full wheel, and a manager's.
-    const FULL: [f32; 2] = [4_800.0, 200.0];
+    /// A key goes down for the player.
+    fn finger(&mut self, key: u8) {
+        let note = SoundingNote(key);
+        self.fingers.press(note);
+        self.said.push(Event::NoteOn { note, velocity: self.velocity });
+    }
 
-    #[test]
-    fn an_announced_zone_bends_by_48_semitones_and_its_manager_by_2() {
-        let mut midi = MidiDecoder::new();
-        for (cc, value) in [(101, 0), (100, 6), (6, 7)] {
-            assert_eq!(midi.controller(0, cc, value), NOTHING);
+    /// A key comes up for the player.
+    fn lift(&mut self, key: u8) {
+        let note = SoundingNote(key);
+        self.fingers.release(note);
+        self.said.push(Event::NoteOff { note });
+    }
+
+    /// Lifts the keys of which no note is held any more, but `kept`; the one that sounds comes last.
+    fn lift_others(&mut self, kept: Option<u8>) {
+        let fingers = self.fingers;
+        for &SoundingNote(key) in fingers.held() {
+            if Some(key) != kept && !self.notes.holds(key) {
+                self.lift(key);
+            }
         }
-        midi.note_on(3, 60, 90);
-        assert_eq!(only(midi.bend(3, 16383)), Some(Event::Bend { cents: FULL[0] }));
-        assert_eq!(only(midi.bend(0, 0)), Some(Event::Bend { cents: FULL[0] - FULL[1] }));
-        assert_eq!(only(midi.bend(4, 0)), None, "another finger's wheel");
-        assert_eq!(only(midi.bend(9, 0)), None, "outside the zone");
-        // The range of one member is that of all.
-        for (cc, value) in [(101, 0), (100, 0), (6, 24)] {
-            midi.controller(5, cc, value);
-        }
-        assert_eq!(only(midi.bend(3, 16383)), Some(Event::Bend { cents: FULL[0] / 2.0 - FULL[1] }));
-        // No members, no zone.
-        for (cc, value) in [(101, 0), (100, 6), (6, 0)] {
-            midi.controller(0, cc, value);
-        }
-        assert_eq!(only(midi.bend(3, 16383)), Some(Event::Bend { cents: 200.0 }));
-    }
-
-    #[test]
-    fn the_upper_zone_counts_down_and_gives_way() {
-        let mut midi = MidiDecoder::new().with_mpe();
-        for (cc, value) in [(101, 0), (100, 6), (6, 5)] {
-            midi.controller(15, cc, value);
-        }
-        midi.note_on(10, 60, 90);
-        assert_eq!(only(midi.bend(10, 16383)), Some(Event::Bend { cents: FULL[0] }));
-        assert_eq!(only(midi.bend(15, 16383)), Some(Event::Bend { cents: FULL[0] + FULL[1] }));
-        assert_eq!(only(midi.bend(0, 16383)), None, "the other zone's manager");
-        midi.note_on(9, 62, 90);
-        assert_eq!(only(midi.bend(9, 16383)), Some(Event::Bend { cents: FULL[0] + FULL[1] }));
-    }
-
-    #[test]
-    fn each_note_has_its_own_channels_bend() {
-        let mut midi = MidiDecoder::new().with_mpe();
-        midi.note_on(1, 60, 90);
-        midi.bend(1, 16383);
-        let low = Event::NoteOn { note: SoundingNote(62), velocity: 1.0 };
-        assert_eq!(midi.note_on(2, 62, 127), [Some(Event::Bend { cents: 0.0 }), Some(low)]);
-        assert_eq!(only(midi.bend(1, 8192 + 4096)), None, "the key below slides on, unheard");
-        let [Some(Event::Bend { cents }), Some(Event::NoteOff { note })] = midi.note_off(Some(2), 62) else {
-            panic!("back to the lower key")
-        };
-        assert!((cents - FULL[0] * 4096.0 / 8191.0).abs() < 1e-2 && note == SoundingNote(62));
-        assert_eq!(midi.note_off(Some(1), 60)[0], None, "a fading note keeps its bend");
-        assert_eq!(only(midi.bend(1, 8192)), Some(Event::Bend { cents: 0.0 }), "and follows its wheel");
-    }
-
-    #[test]
-    fn without_a_zone_the_wheel_of_a_channel_without_notes_is_for_all() {
-        let mut midi = MidiDecoder::new();
-        midi.note_on(4, 60, 90);
-        assert_eq!(only(midi.bend(0, 16383)), Some(Event::Bend { cents: 200.0 }));
-        assert_eq!(only(midi.bend(4, 16383)), Some(Event::Bend { cents: 400.0 }));
-        // It plays now: its wheel is its own.
-        assert_eq!(midi.note_on(0, 64, 90)[0], Some(Event::Bend { cents: 200.0 }));
-        assert_eq!(only(midi.bend(4, 0)), None);
-    }
-
-    #[test]
-    fn a_key_two_channels_hold_comes_up_with_the_second() {
-        let mut midi = MidiDecoder::new().with_mpe();
-        midi.note_on(1, 60, 90);
-        midi.bend(2, 16383);
-        assert_eq!(midi.note_on(2, 60, 90)[0], Some(Event::Bend { cents: FULL[0] }));
-        assert_eq!(midi.note_off(Some(2), 60), [Some(Event::Bend { cents: 0.0 }), None]);
-        assert_eq!(midi.note_off(Some(1), 60), [None, Some(Event::NoteOff { note: SoundingNote(60) })]);
-        midi.note_on(3, 60, 90);
-        midi.note_on(4, 60, 90);
-        assert_eq!(midi.note_off(None, 60)[1], Some(Event::NoteOff { note: SoundingNote(60) }));
-    }
-
-    #[test]
-    fn a_panic_leaves_the_wheels_where_they_are() {
-        let mut midi = MidiDecoder::new();
-        midi.note_on(0, 60, 90);
-        midi.bend(0, 16383);
-        assert_eq!(midi.controller(0, 123, 0), [Some(Event::Panic), Some(Event::Bend { cents: 200.0 })]);
     }
 }

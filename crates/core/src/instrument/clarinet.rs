@@ -9,6 +9,7 @@ use std::sync::Arc;
 use crate::dsp::limiter::Limiter;
 use crate::dsp::resampler::Resampler;
 use crate::event::{Event, Timed};
+use crate::instrument::choke::Choke;
 use crate::instrument::lip::embouchure;
 use crate::instrument::model::{BuildError, Model};
 use crate::instrument::output_level::OutputLevel;
@@ -75,6 +76,7 @@ pub struct Clarinet {
     scope: Scope,
     scope_on: bool,
     level: OutputLevel,
+    choke: Choke,
     /// Samples of silence since the player came to rest.
     quiet: u32,
     resets: u64,
@@ -127,6 +129,7 @@ impl Clarinet {
             scope,
             scope_on: false,
             level,
+            choke: Choke::new(host_rate_hz),
             quiet: 0,
             resets: 0,
         }
@@ -140,6 +143,11 @@ impl Clarinet {
 
     /// Handles an event now. Real-time safe.
     pub fn apply(&mut self, event: Event) {
+        match event {
+            Event::Volume { gain } => self.level.set_volume(gain),
+            Event::Choke { note } if self.player.is_heard(note) => self.choke.begin(),
+            _ => {}
+        }
         with_voice!(&mut self.voice, voice => self.player.apply(event, &self.model, voice));
         self.quiet = 0;
     }
@@ -147,7 +155,7 @@ impl Clarinet {
     /// Takes over keys, breath and bend from another instrument, which this new one replaces. Real-time safe.
     pub fn carry_on(&mut self, from: &Self) {
         with_voice!(&mut self.voice, voice => self.player.carry_on(&from.player, &self.model, voice));
-        self.level.settle();
+        self.level.carry_on(&from.level);
     }
 
     /// Overwrites `out` with the next samples, mono. Real-time safe.
@@ -195,7 +203,11 @@ impl Clarinet {
     }
 
     fn render_with(&mut self, out: &mut [f32], probe: &mut Option<&mut dyn FnMut(Probe)>) {
-        for out in out.chunks_mut(CHUNK) {
+        let mut rest = out;
+        while !rest.is_empty() {
+            // A choke ends at its sample, not at the end of a chunk.
+            let (out, later) = rest.split_at_mut(self.choke.reach(CHUNK.min(rest.len())));
+            rest = later;
             let mut made = self.resampler.pull(out);
             while made < out.len() {
                 with_voice!(&mut self.voice, voice => {
@@ -219,6 +231,9 @@ impl Clarinet {
             if out.iter().sum::<f32>().is_finite() {
                 // The loudest altissimo comes within 1 dB of full scale; the limiter acts only above that.
                 self.limiter.process(out);
+                if self.choke.fade(out) {
+                    self.cut();
+                }
                 let audible = out.iter().any(|sample| sample.abs() > SILENCE);
                 self.quiet = if audible || !self.player.is_resting() {
                     0
@@ -235,12 +250,20 @@ impl Clarinet {
         }
     }
 
+    /// Takes away what is left of a choked note, in the bore and in the output filter. The fingers stay.
+    fn cut(&mut self) {
+        with_voice!(&mut self.voice, voice => voice.cut());
+        self.player.end_choke();
+        self.resampler.reset();
+    }
+
     /// Silences and resets everything; settings stay. Real-time safe.
     pub fn reset(&mut self) {
         with_voice!(&mut self.voice, voice => self.player.reset(voice));
         self.resampler.reset();
         self.limiter.reset();
-        self.level.settle();
+        self.level.reset();
+        self.choke.reset();
         self.quiet = 0;
     }
 

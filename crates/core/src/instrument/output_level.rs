@@ -1,5 +1,6 @@
-//! Output level: from radiated pressure to full scale, and the gain on top of it.
+//! Output level: from radiated pressure to full scale, the gain on top of it, and the volume of controllers and notes.
 
+use crate::dsp::glide::Glide;
 use crate::instrument::settings::Settings;
 use crate::units::REFERENCE_RADIUS_M;
 
@@ -9,13 +10,18 @@ use crate::units::REFERENCE_RADIUS_M;
 const FULL_SCALE_PER_PA: f64 = 0.501_187_233_627_272_2;
 /// Time that a change of the gain by a factor of one takes, s.
 const GAIN_S: f64 = 0.02;
+/// Time that a change of the volume takes, s.
+const VOLUME_S: f64 = 0.010;
+/// Largest factor of the volume: that of a CLAP note expression.
+const VOLUME_MOST: f32 = 4.0;
 
-/// The gain of one instrument, which follows its setting without a click.
+/// The gain of one instrument, which follows its setting without a click, and the volume.
 pub(super) struct OutputLevel {
     full_scale_per_pa: f64,
     gain: f32,
     target: f32,
     step: f32,
+    volume: Glide,
 }
 
 impl OutputLevel {
@@ -23,7 +29,30 @@ impl OutputLevel {
     pub fn new(nominal_radius_m: f64, host_rate_hz: f64) -> Self {
         let full_scale_per_pa = FULL_SCALE_PER_PA * (REFERENCE_RADIUS_M / nominal_radius_m);
         let gain = gain(&Settings::default(), full_scale_per_pa);
-        Self { full_scale_per_pa, gain, target: gain, step: (1.0 / (GAIN_S * host_rate_hz)) as f32 }
+        Self {
+            full_scale_per_pa,
+            gain,
+            target: gain,
+            step: (1.0 / (GAIN_S * host_rate_hz)) as f32,
+            volume: Glide::new(1.0, VOLUME_S, host_rate_hz),
+        }
+    }
+
+    /// Goes to a volume, a factor of 0..=4.
+    pub fn set_volume(&mut self, volume: f32) {
+        self.volume.go_to(if volume.is_finite() { volume.clamp(0.0, VOLUME_MOST) } else { 1.0 });
+    }
+
+    /// Takes over the volume of the instrument that this one replaces.
+    pub fn carry_on(&mut self, from: &Self) {
+        self.settle();
+        self.volume = from.volume;
+    }
+
+    /// Arrives at once, with the volume at 1.
+    pub fn reset(&mut self) {
+        self.settle();
+        self.volume.set(1.0);
     }
 
     /// Goes to the gain of these settings.
@@ -38,12 +67,17 @@ impl OutputLevel {
 
     /// Pascals become samples.
     pub fn apply(&mut self, out: &mut [f32]) {
-        for sample in out {
+        for sample in &mut *out {
             if self.gain != self.target {
                 let step = (self.target - self.gain) * self.step;
                 self.gain = if step.abs() < 1e-9 { self.target } else { self.gain + step };
             }
             *sample *= self.gain;
+        }
+        if !self.volume.rests_at(1.0) {
+            for sample in out {
+                *sample *= self.volume.next();
+            }
         }
     }
 }

@@ -123,6 +123,7 @@ impl Player {
         match event {
             Event::NoteOn { note, velocity } => self.note_on(note, velocity, model, voice),
             Event::NoteOff { note } => self.note_off(note, model, voice),
+            Event::Choke { note } => self.choke(note, model, voice),
             Event::Breath(level) => self.breath.set_level(level),
             Event::Bend { cents } => {
                 self.bend_cents =
@@ -137,6 +138,8 @@ impl Player {
                     self.move_holes(fingering, 1e-3 * f64::from(self.settings.legato_ms), model, voice);
                 }
             }
+            // They act after the instrument.
+            Event::Volume { .. } | Event::Pan { .. } => {}
             Event::Panic => self.reset(voice),
         }
     }
@@ -162,6 +165,35 @@ impl Player {
         match self.keys.last().and_then(|last| model.fingering_for(last)) {
             Some(fingering) => self.finger(fingering, true, model, voice),
             None => self.tongue.stop(),
+        }
+    }
+
+    /// Whether a choke of this note would silence something: it sounds, or no key is down and something may fade.
+    pub fn is_heard(&self, note: SoundingNote) -> bool {
+        self.keys.last().is_none_or(|last| last == note)
+    }
+
+    /// A key comes up and its note is about to be cut; the note held before it begins anew behind the tongue.
+    fn choke<F: Real>(&mut self, note: SoundingNote, model: &Model, voice: &mut Voice<F>) {
+        if !self.is_heard(note) {
+            self.keys.release(note);
+            return;
+        }
+        self.keys.release(note);
+        match self.keys.last().and_then(|last| model.fingering_for(last)) {
+            Some(fingering) => {
+                self.tongue.hold();
+                self.finger(fingering, false, model, voice);
+            }
+            None => self.tongue.stop(),
+        }
+    }
+
+    /// The choked note has been cut: the breath begins again from nothing, and the tongue is on the reed.
+    pub fn end_choke(&mut self) {
+        self.breath = self.breath.carried();
+        if !self.tongue.is_holding() {
+            self.tongue = Tongue::default();
         }
     }
 

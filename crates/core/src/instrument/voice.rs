@@ -82,6 +82,12 @@ impl Mouth {
         self.out = [0.0; TICK];
     }
 
+    /// The reed is where the tongue holds it: no movement, no thump.
+    fn hold_reed(&mut self) {
+        self.state.closing = TONGUE_FORCE;
+        self.tongue = TONGUE_FORCE;
+    }
+
     /// Radiates a tick's flows: the pressure of a small source is proportional to the change of its flow.
     fn radiate(&mut self) {
         let mut before = self.last_flow;
@@ -225,10 +231,14 @@ impl<F: Real> Voice<F> {
     pub fn reset(&mut self) {
         self.lattice.reset();
         self.mouth.silence();
-        // The reed is where the tongue holds it: no movement, no thump.
-        self.mouth.state.closing = TONGUE_FORCE;
-        self.mouth.tongue = TONGUE_FORCE;
+        self.mouth.hold_reed();
         self.ticks = 0;
+    }
+
+    /// Cuts a note off: [`silence`](Self::silence), with the tongue on the reed. Real-time safe.
+    pub fn cut(&mut self) {
+        self.silence();
+        self.mouth.hold_reed();
     }
 
     /// Takes away all waves and all motion of the reed; openings and delay stay. Real-time safe.

@@ -8,7 +8,8 @@
 //! A damaged file is refused with the byte at which reading stopped; it is not played up to there.
 //! Source: Standard MIDI Files 1.0 (RP-001, 1988).
 
-use crate::control::midi::{Events, MidiDecoder};
+use crate::control::midi::MidiDecoder;
+use crate::control::notes::{NoteAddress, NoteExpression};
 use crate::event::{Event, Timed};
 use crate::score::timeline::Score;
 use midly::{EventIter, MetaMessage, MidiMessage, TrackEventKind};
@@ -171,11 +172,11 @@ pub fn read_as(mut decoder: MidiDecoder, bytes: &[u8], rate: u32) -> Result<Scor
             TrackEventKind::Midi { channel, message } => decode(&mut decoder, channel.as_int(), message),
             TrackEventKind::Meta(MetaMessage::Tempo(us)) => {
                 clock.set_tempo(us.as_int());
-                [None, None]
+                &[]
             }
-            _ => [None, None],
+            _ => &[],
         };
-        for event in decoded.into_iter().flatten() {
+        for &event in decoded {
             notes += usize::from(matches!(event, Event::NoteOn { .. }));
             events.push(Timed { at: clock.sample(rate)?, event });
         }
@@ -187,16 +188,20 @@ pub fn read_as(mut decoder: MidiDecoder, bytes: &[u8], rate: u32) -> Result<Scor
     Ok(Score { events, samples })
 }
 
-fn decode(decoder: &mut MidiDecoder, channel: u8, message: MidiMessage) -> Events {
+fn decode(decoder: &mut MidiDecoder, channel: u8, message: MidiMessage) -> &[Event] {
     match message {
         MidiMessage::NoteOn { key, vel } => decoder.note_on(channel, key.as_int(), vel.as_int()),
-        MidiMessage::NoteOff { key, .. } => decoder.note_off(Some(channel), key.as_int()),
+        MidiMessage::NoteOff { key, .. } => decoder.note_off(channel, key.as_int()),
         MidiMessage::Controller { controller, value } => {
             decoder.controller(channel, controller.as_int(), value.as_int())
         }
         MidiMessage::ChannelAftertouch { vel } => decoder.pressure(channel, vel.as_int()),
         MidiMessage::PitchBend { bend } => decoder.bend(channel, bend.0.as_int()),
-        MidiMessage::Aftertouch { .. } | MidiMessage::ProgramChange { .. } => [None, None],
+        MidiMessage::Aftertouch { key, vel } => {
+            let breath = NoteExpression::Breath(f32::from(vel.as_int()) / 127.0);
+            decoder.express(NoteAddress::of_key(channel, key.as_int()), breath)
+        }
+        MidiMessage::ProgramChange { .. } => &[],
     }
 }
 
@@ -322,9 +327,10 @@ mod tests {
     fn one_tick_keeps_the_order_of_tracks_and_messages() {
         let first: &[u8] = &[0, 0xB0, 2, 1, 0, 0xB0, 2, 2, 0, 0xFF, 0x2F, 0];
         let score = read(&file(1, [0, 96], &[first, NOTE]), 48_000).unwrap();
-        let [a, b, c, _] = score.events[..] else { panic!("{score:?}") };
-        assert_eq!((a.event, b.event), (Event::Breath(1.0 / 127.0), Event::Breath(2.0 / 127.0)));
-        assert!(matches!(c.event, Event::NoteOn { note: SoundingNote(60), .. }));
+        // The first value waits for a key or for a second one.
+        let [a, b, _] = score.events[..] else { panic!("{score:?}") };
+        assert_eq!(a.event, Event::Breath(2.0 / 127.0));
+        assert!(matches!(b.event, Event::NoteOn { note: SoundingNote(60), .. }));
     }
 
     #[test]

@@ -29,7 +29,7 @@ impl Score {
                     held.retain(|&other| other != note);
                     held.push(note);
                 }
-                Event::NoteOff { note } => held.retain(|&other| other != note),
+                Event::NoteOff { note } | Event::Choke { note } => held.retain(|&other| other != note),
                 Event::Panic => held.clear(),
                 _ => continue,
             }

@@ -70,7 +70,7 @@ impl Blower {
     pub fn heed(&mut self, event: &Timed<Event>) {
         match event.event {
             Event::NoteOn { note, .. } => self.keys.press(note),
-            Event::NoteOff { note } => self.keys.release(note),
+            Event::NoteOff { note } | Event::Choke { note } => self.keys.release(note),
             Event::Panic => self.keys = Keys::default(),
             _ => return,
         }

@@ -1,0 +1,159 @@
+//! Which controller the breath comes from.
+//!
+//! Breath comes from the controllers that wind controllers use: breath controller (CC2, fine part CC34), expression
+//! (CC11, fine part CC43) and channel pressure. A wind controller often sends several at once, so they are ranked, CC2 over
+//! CC11 over pressure: one is heard until a higher one counts, and from then on only the higher one.
+//!
+//! A controller counts as breath when
+//! - it changes while a key is held, or
+//! - it comes a second time, changed, before a key is struck, or
+//! - it has come once when a key is struck,
+//!
+//! and never by its value in a [snapshot](super::snapshot), nor by a value at rest that comes once. At rest are 0 and, for
+//! expression, 127: every sequencer sends that as *full*, and it would blow with closing pressure. Once a controller
+//! counts, its 0 means that the player does not blow.
+
+use super::snapshot::Place;
+
+/// A controller that breath can come from, the weakest claim first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum BreathController {
+    /// Channel pressure.
+    Pressure,
+    /// Expression, CC11.
+    Expression,
+    /// Breath controller, CC2.
+    Breath,
+}
+
+impl BreathController {
+    const ALL: [Self; 3] = [Self::Pressure, Self::Expression, Self::Breath];
+
+    /// Whether a value that has come once says nothing.
+    fn is_rest(self, unit: f32) -> bool {
+        unit <= 0.0 || (self == Self::Expression && unit >= 1.0)
+    }
+}
+
+/// A controller with a coarse and, on some devices, a fine part.
+#[derive(Clone, Copy, Debug, Default)]
+struct Fader {
+    coarse: u8,
+    /// `None` until the device has shown that it sends one.
+    fine: Option<u8>,
+}
+
+impl Fader {
+    fn set(&mut self, is_fine: bool, value: u8) {
+        if is_fine {
+            self.fine = Some(value);
+        } else {
+            self.coarse = value;
+        }
+    }
+
+    /// 0..=1: 127ths as long as only the coarse part is known, 16383rds afterwards. The fine part is kept when a coarse
+    /// part follows (the specification would zero it), so that devices sending the fine part first end right too.
+    fn unit(self) -> f32 {
+        match self.fine {
+            None => f32::from(self.coarse) / 127.0,
+            Some(fine) => f32::from(u16::from(self.coarse) * 128 + u16::from(fine)) / 16383.0,
+        }
+    }
+}
+
+/// What one channel has sent of one controller.
+#[derive(Clone, Copy, Debug, Default)]
+struct Claim {
+    fader: Fader,
+    /// Its latest value, 0..=1.
+    unit: Option<f32>,
+    /// It will count when a key is struck.
+    waits: bool,
+    /// Number of the message, to find the latest.
+    message: u64,
+}
+
+/// The controllers of all channels, and the one that is heard. The channels are one stream. Real-time safe.
+#[derive(Clone, Debug, Default)]
+pub struct BreathChoice {
+    claims: [[Claim; BreathController::ALL.len()]; 16],
+    heard: Option<BreathController>,
+    messages: u64,
+}
+
+impl BreathChoice {
+    /// The controller that is heard, if any has counted yet.
+    pub fn heard(&self) -> Option<BreathController> {
+        self.heard
+    }
+
+    /// A controller moves. `place` is its place among the channel's controllers; `is_held`: a key is. Gives breath, 0..=1,
+    /// if it is heard.
+    pub fn hear(
+        &mut self,
+        controller: BreathController,
+        channel: usize,
+        (is_fine, value): (bool, u8),
+        place: Place,
+        is_held: bool,
+    ) -> Option<f32> {
+        self.messages += 1;
+        let is_snapshot = matches!(place, Place::Recognised | Place::Within);
+        let claim = &mut self.claims[channel][controller as usize];
+        if is_snapshot && is_fine && self.heard != Some(controller) {
+            // It does not show that the device has a fine part.
+            return None;
+        }
+        claim.fader.set(is_fine, value);
+        claim.message = self.messages;
+        let unit = claim.fader.unit();
+        let before = claim.unit.replace(unit);
+        if self.heard >= Some(controller) {
+            return (self.heard == Some(controller)).then_some(unit);
+        }
+        let has_changed = before.is_some_and(|before| before != unit);
+        let counts = match place {
+            _ if is_snapshot => false,
+            _ if is_held => has_changed || (before.is_none() && !controller.is_rest(unit)),
+            Place::Again => has_changed,
+            _ => false,
+        };
+        claim.waits = !counts && !is_snapshot;
+        if counts {
+            self.heard = Some(controller);
+        }
+        counts.then_some(unit)
+    }
+
+    /// What this channel has sent was a snapshot: nothing of it waits for a key, and it shows no fine part.
+    pub fn forget_waiting(&mut self, channel: usize) {
+        for (controller, claim) in BreathController::ALL.into_iter().zip(&mut self.claims[channel]) {
+            claim.waits = false;
+            if self.heard != Some(controller) {
+                claim.fader.fine = None;
+                claim.unit = claim.unit.map(|_| claim.fader.unit());
+            }
+        }
+    }
+
+    /// A key is struck: the strongest controller that waits counts now. Gives its
+    /// breath, 0..=1.
+    pub fn settle(&mut self) -> Option<(BreathController, f32)> {
+        let mut best: Option<(BreathController, u64, f32)> = None;
+        for claims in &mut self.claims {
+            for (controller, claim) in BreathController::ALL.into_iter().zip(claims) {
+                let unit = claim.unit.filter(|&unit| claim.waits && !controller.is_rest(unit));
+                claim.waits = false;
+                if let Some(unit) = unit.filter(|_| self.heard < Some(controller))
+                    && best.is_none_or(|(other, message, _)| (other, message) < (controller, claim.message))
+                {
+                    best = Some((controller, claim.message, unit));
+                }
+            }
+        }
+        let (controller, _, unit) = best?;
+        self.heard = Some(controller);
+        Some((controller, unit))
+    }
+}
