@@ -1,12 +1,12 @@
 //! The instrument as a CLAP and VST3 plugin.
 //!
 //! This module only translates: parameters to settings, the host's events to the instrument's events, one voice to two
-//! equal channels. Notes are sounding pitch, as everywhere outside the instrument. The sound depends on the events and
+//! channels. Notes are sounding pitch, as everywhere outside the instrument. The sound depends on the events and
 //! their sample positions alone, not on the host's blocks, and it is what the offline renderer writes. There is one
 //! exception: when the user chooses another instrument during live playing, it comes as soon as it is ready.
 //!
-//! - `translate_events`: the host's events; `breath_sources` and `reed_controllers`: where breath and reed changes
-//!   come from
+//! - `host_inputs`: what is remembered of the host's events; `translate_events`: what they mean; `breath_sources` and
+//!   `reed_controllers`: where breath and reed changes come from
 //! - `instrument_loading`: loads and exchanges instruments
 //! - `knob`: the force-feedback knob (feature `devices`)
 //! - `params`: what hosts automate and projects save
@@ -16,6 +16,7 @@
 
 mod breath_sources;
 mod clap;
+mod host_inputs;
 mod host_link;
 pub mod instrument_loading;
 #[cfg(feature = "devices")]
@@ -29,6 +30,7 @@ mod window;
 use std::sync::Arc;
 
 use nice_plug::context::gui::AsyncExecutor;
+use nice_plug::midi::{Channel, Key, VoiceID};
 use nice_plug::prelude::*;
 
 pub use params::instrument::InstrumentChoice;
@@ -38,14 +40,13 @@ pub use params::{SCHEMA, TuningChoice, TuningParams};
 
 use crate::identity;
 use crate::parameters::InUse;
-use breath_sources::{BreathInput, BreathSources};
+use breath_sources::BreathInput;
+use chalumeau_core::control::notes::Note;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::{Clarinet, Settings};
+use host_inputs::HostInputs;
 use instrument_loading::{InstrumentLoader, InstrumentSwap, SharedInstrument};
-use params::knob::ReedSource;
 use params::moment::Moment;
-use reed_controllers::ReedControllers;
-use translate_events::EventTranslator;
 use window::{HostWindow, PluginWindow, WindowAudio};
 
 /// The plugin. It has parameters from the start, and a clarinet from the first activation.
@@ -136,7 +137,7 @@ impl Plugin for Chalumeau {
     }
 
     fn reset(&mut self) {
-        self.inputs = HostInputs::default();
+        self.inputs.reset();
         self.moved.reset(&self.params);
         #[cfg(feature = "devices")]
         if let Some((_, audio)) = &mut self.knob {
@@ -153,7 +154,7 @@ impl Plugin for Chalumeau {
         _aux: &mut AuxiliaryBuffers,
         context: &mut impl ProcessContext<Self>,
     ) -> ProcessStatus {
-        let [out, copies @ ..] = buffer.as_slice() else { return ProcessStatus::Normal };
+        let [out, others @ ..] = buffer.as_slice() else { return ProcessStatus::Normal };
         let Some(instrument) = &mut self.instrument else {
             return ProcessStatus::Error("not activated");
         };
@@ -169,41 +170,51 @@ impl Plugin for Chalumeau {
         instrument.receive();
 
         let inputs = &mut self.inputs;
-        let moved = self.moved.events(&self.params);
-        let bend_range = inputs.translator.bend_range(self.params.instrument.bend_range.value());
+        inputs.begin_block();
+        let panic = if self.params.moments.take(Moment::Panic) { inputs.silence() } else { [None; 2] };
+        let breath = self.moved.breath(&self.params);
+        let bend_range = inputs.bend_range(self.params.instrument.bend_range.value());
         let keys = self.window.as_mut().map(|(_, window)| window.keys()).unwrap_or_default();
-        for Timed { event, .. } in moved.iter().chain(&keys).flatten() {
+        for Timed { event, .. } in [breath].iter().chain(&keys).flatten() {
             match *event {
-                Event::Breath(unit) => inputs.breath_sources.blow(BreathInput::Parameter, unit),
-                Event::NoteOn { velocity, .. } => inputs.breath_sources.key(velocity),
+                Event::Breath(unit) => inputs.breath_sources().blow(BreathInput::Parameter, unit),
+                Event::NoteOn { velocity, .. } => inputs.breath_sources().key(velocity),
                 _ => {}
             }
         }
         let api = context.plugin_api();
         let drives = [self.params.knob.h_source.value(), self.params.knob.k_source.value()];
-        let played = std::iter::from_fn(|| context.next_event())
-            .flat_map(|event| inputs.translate(event, api, drives).into_iter().flatten());
-        let events =
-            moved.into_iter().flatten().chain(bend_range).chain(keys.into_iter().flatten()).chain(played);
+        let played = std::iter::from_fn(|| inputs.next(|| context.next_event(), api, drives));
+        let at_once = panic.into_iter().chain([breath, bend_range]).chain(keys).flatten();
+        let events = at_once.chain(played);
         #[cfg(feature = "devices")]
         if let Some((_, audio)) = &mut self.knob {
             let replay = self.params.knob.replay.value();
             let block = knob::BlockContext { rate_hz: instrument.rate_hz(), offline: self.offline, replay };
             audio.render(instrument, &settings, events, block, out);
-            audio.set_reed_factors(self.inputs.reed_controllers.factors(drives));
-            for &(at, breath) in audio.sent() {
-                self.inputs.breath_sources.blow(BreathInput::Knob, breath.unit());
-                send_breath(context, at, breath.bytes());
-            }
+            audio.set_reed_factors(self.inputs.reed_factors(drives));
         }
         #[cfg(not(feature = "devices"))]
         instrument.render_events(events, out);
 
-        if let Some((_, window)) = &mut self.window {
-            window.send(instrument, &self.inputs.breath_sources, out);
+        if instrument.clarinet().is_silent() {
+            self.inputs.fall_silent(out.len().saturating_sub(1) as u32);
         }
-        for copy in copies {
-            copy.copy_from_slice(out);
+        #[cfg(feature = "devices")]
+        for &(_, breath) in self.knob.iter().flat_map(|(_, audio)| audio.sent()) {
+            self.inputs.breath_sources().blow(BreathInput::Knob, breath.unit());
+        }
+        #[cfg(feature = "devices")]
+        let blown = self.knob.iter().flat_map(|(_, audio)| audio.sent()).map(|(at, breath)| (*at, breath.bytes()));
+        #[cfg(not(feature = "devices"))]
+        let blown = std::iter::empty();
+        answer(context, self.inputs.ended(), blown);
+
+        if let Some((_, window)) = &mut self.window {
+            window.send(instrument, self.inputs.breath_sources(), out);
+        }
+        if let Some(right) = others.first_mut() {
+            instrument.spread(out, right);
         }
         let is_watched = self.window.as_ref().is_some_and(|(_, window)| window.is_open());
         rest_status(&self.params, instrument, is_watched)
@@ -241,33 +252,6 @@ struct SharedHandles {
     knob: Arc<knob::SharedKnob>,
 }
 
-/// What the plugin remembers of the host's events. Real-time safe.
-#[derive(Default)]
-struct HostInputs {
-    translator: EventTranslator,
-    reed_controllers: ReedControllers,
-    breath_sources: BreathSources,
-}
-
-impl HostInputs {
-    /// Translates one event. An event of a controller that `drives` H or k only changes the reed.
-    fn translate(
-        &mut self,
-        event: NoteEvent<()>,
-        api: PluginApi,
-        drives: [ReedSource; 2],
-    ) -> [Option<Timed<Event>>; 2] {
-        if self.reed_controllers.take(&event, drives) {
-            let at = event.timing() as usize;
-            return [None, self.reed_controllers.changed(drives).map(|event| Timed { at, event })];
-        }
-        let events = self.translator.translate(event, api);
-        let blew = events.iter().flatten().any(|timed| matches!(timed.event, Event::Breath(_)));
-        self.breath_sources.record(&event, blew);
-        events
-    }
-}
-
 /// What the host may do after a block: at rest the sound lasts for the tail, and in silence the host may stop until the next
 /// event. A knob blows without events, and an open window shows what happens. Real-time safe.
 fn rest_status(params: &ChalumeauParams, instrument: &InstrumentSwap, is_watched: bool) -> ProcessStatus {
@@ -296,18 +280,42 @@ impl MovedParameters {
         params.moments.take(Moment::Panic);
     }
 
-    /// What they have done since the last block.
-    fn events(&mut self, params: &ChalumeauParams) -> [Option<Timed<Event>>; 2] {
-        let has_panicked = params.moments.take(Moment::Panic);
+    /// Where *Breath* has moved since the last block.
+    fn breath(&mut self, params: &ChalumeauParams) -> Option<Timed<Event>> {
         let breath = params.breath.breath.value();
-        let has_breathed = std::mem::replace(&mut self.breath, breath) != breath;
-        [has_panicked.then_some(Event::Panic), has_breathed.then_some(Event::Breath(breath))]
-            .map(|event| event.map(|event| Timed { at: 0, event }))
+        let has_moved = std::mem::replace(&mut self.breath, breath) != breath;
+        has_moved.then_some(Timed { at: 0, event: Event::Breath(breath) })
     }
 }
 
-/// Sends one breath value of the knob to the host, as CC2 and CC34.
-#[cfg(feature = "devices")]
+/// Sends the host what a block has made, in order of time: notes that have ended, which only CLAP knows, and breath of the
+/// knob at a sample, as CC2 and CC34.
+fn answer(
+    context: &mut impl ProcessContext<Chalumeau>,
+    ended: &[(u32, Note)],
+    blown: impl Iterator<Item = (usize, (u8, u8))>,
+) {
+    let is_clap = context.plugin_api() == PluginApi::Clap;
+    let mut ended = ended.iter().filter(|_| is_clap).peekable();
+    for (at, bytes) in blown {
+        while let Some(&(when, note)) = ended.next_if(|(when, _)| *when as usize <= at) {
+            send_end(context, when, note);
+        }
+        send_breath(context, at, bytes);
+    }
+    ended.for_each(|&(when, note)| send_end(context, when, note));
+}
+
+/// Tells the host that a note has ended.
+fn send_end(context: &mut impl ProcessContext<Chalumeau>, timing: u32, note: Note) {
+    let Note { id, channel, key } = note;
+    let voice_id = id.map_or(VoiceID::Wildcard, VoiceID::ID);
+    let (channel, key) = (Channel::Number(channel), Key::Number(key));
+    // If the host takes no events, it only loses a hint.
+    let _ = context.try_send_event(NoteEvent::VoiceTerminated { timing, voice_id, channel, key });
+}
+
+/// Sends one breath value of the knob to the host.
 fn send_breath(context: &mut impl ProcessContext<Chalumeau>, at: usize, (coarse, fine): (u8, u8)) {
     for (cc, byte) in [(2, coarse), (34, fine)] {
         let (timing, value) = (at as u32, f32::from(byte) / 127.0);
@@ -321,6 +329,9 @@ impl ClapPlugin for Chalumeau {
     const CLAP_DESCRIPTION: Option<&'static str> = Some(identity::DESCRIPTION);
     const CLAP_MANUAL_URL: Option<&'static str> = identity::MANUAL_URL;
     const CLAP_SUPPORT_URL: Option<&'static str> = identity::SUPPORT_URL;
+    /// One voice, whose notes are told apart by their ids.
+    const CLAP_POLY_MODULATION_CONFIG: Option<PolyModulationConfig> =
+        Some(PolyModulationConfig { max_voice_capacity: 1, supports_overlapping_voices: true });
     const CLAP_FEATURES: &'static [ClapFeature] =
         &[ClapFeature::Instrument, ClapFeature::Synthesizer, ClapFeature::Stereo];
 

@@ -37,11 +37,11 @@ pub enum WavError {
 pub struct PeakLevel {
     /// Largest magnitude, full scale 1.
     pub peak: f32,
-    /// Number of samples clipped at full scale; 0 for floats.
+    /// Number of samples clipped at full scale, of all channels; 0 for floats.
     pub clipped: u64,
 }
 
-/// A WAV file that is being written. Each sample goes to every channel.
+/// A WAV file that is being written.
 pub struct WavFile<W: Write + Seek> {
     writer: WavWriter<BufWriter<W>>,
     depth: Depth,
@@ -69,18 +69,20 @@ impl<W: Write + Seek> WavFile<W> {
         Ok(Self { writer, depth, channels, level: PeakLevel::default() })
     }
 
-    /// Appends one block.
-    pub fn write(&mut self, block: &[f32]) -> Result<(), WavError> {
-        for &sample in block {
-            self.level.peak = self.level.peak.max(sample.abs());
-            for _ in 0..self.channels {
+    /// Appends one block: a mono sound, which goes to every channel, or the channels.
+    pub fn write(&mut self, block: &[&[f32]]) -> Result<(), WavError> {
+        let samples = block.first().map_or(0, |first| first.len());
+        for at in 0..samples {
+            for channel in 0..usize::from(self.channels) {
+                let sample = block[channel % block.len()][at];
+                self.level.peak = self.level.peak.max(sample.abs());
                 match self.depth {
                     Depth::Int16 => self.writer.write_sample(round(sample, 32_767.0))?,
                     Depth::Int24 => self.writer.write_sample(round(sample, 8_388_607.0))?,
                     Depth::Float32 => self.writer.write_sample(sample)?,
                 }
+                self.level.clipped += u64::from(self.depth != Depth::Float32 && sample.abs() > 1.0);
             }
-            self.level.clipped += u64::from(self.depth != Depth::Float32 && sample.abs() > 1.0);
         }
         Ok(())
     }
@@ -110,8 +112,8 @@ mod tests {
         let path = directory.path().join("x.wav");
         let mut file = NewFile::create(&path, false).unwrap();
         let mut wav = WavFile::new(&mut file, 48_000, depth, channels, 4).unwrap();
-        wav.write(&[0.5, -1.0]).unwrap();
-        wav.write(&[1.5, 0.0]).unwrap();
+        wav.write(&[&[0.5, -1.0]]).unwrap();
+        wav.write(&[&[1.5, 0.0]]).unwrap();
         let level = wav.finish().unwrap();
         file.keep().unwrap();
         (level, hound::WavReader::open(&path).unwrap())
@@ -120,12 +122,26 @@ mod tests {
     #[test]
     fn integers_round_and_clipping_is_counted() {
         let (level, mut reader) = written(Depth::Int16, 2);
-        assert_eq!(level, PeakLevel { peak: 1.5, clipped: 1 });
+        assert_eq!(level, PeakLevel { peak: 1.5, clipped: 2 });
         let samples: Vec<i32> = reader.samples().map(Result::unwrap).collect();
         assert_eq!(samples, [16_384, 16_384, -32_767, -32_767, 32_767, 32_767, 0, 0]);
         let (_, mut reader) = written(Depth::Int24, 1);
         let samples: Vec<i32> = reader.samples().map(Result::unwrap).collect();
         assert_eq!(samples, [4_194_304, -8_388_607, 8_388_607, 0]);
+    }
+
+    #[test]
+    fn two_channels_have_their_own_samples() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("x.wav");
+        let mut file = NewFile::create(&path, false).unwrap();
+        let mut wav = WavFile::new(&mut file, 48_000, Depth::Float32, 2, 2).unwrap();
+        wav.write(&[&[0.1, 0.2], &[0.3, -0.4]]).unwrap();
+        assert_eq!(wav.finish().unwrap().peak, 0.4);
+        file.keep().unwrap();
+        let mut reader = hound::WavReader::open(&path).unwrap();
+        let samples: Vec<f32> = reader.samples().map(Result::unwrap).collect();
+        assert_eq!(samples, [0.1, 0.3, 0.2, -0.4]);
     }
 
     #[test]

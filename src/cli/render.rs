@@ -11,7 +11,7 @@ use crate::wav::{Depth, PeakLevel, WavFile};
 use chalumeau_core::instrument::Probe;
 use chalumeau_core::reed::physical::P_REF_PA;
 use chalumeau_core::score as player;
-use chalumeau_core::score::Score;
+use chalumeau_core::score::{Score, StereoBlocks};
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -24,7 +24,7 @@ const BLOCK: usize = 512;
 const EXAMPLES: &str = "\
 Examples:
   chalumeau render melody.mid --out melody.wav
-      Notes are sounding pitch; breath from CC2, else CC11, else channel pressure, else velocity.
+      Notes are sounding pitch; breath from CC2, else CC11, else channel pressure, else velocity; volume from CC7.
   chalumeau render --written C4 --gamma 0.5 --seconds 1.5 --no-noise --out c4.wav
   chalumeau render --scale E3:C6 --slurred --seconds 0.4 --out scale.wav
   chalumeau render --written G4 --breath ramp:0:1.2:4 --seconds 5 --probe g4.csv --out g4.wav
@@ -60,7 +60,7 @@ pub struct RenderCommand {
     /// Bits per sample: integers rounded without dither, or floats as computed
     #[arg(long, value_enum, default_value_t = Bits::Float32, help_heading = "Output")]
     bits: Bits,
-    /// Channels: 1, or 2 with the same sound in both
+    /// Channels: 1, or 2, which differ where pan (CC10) leaves the middle
     #[arg(long, value_name = "N", default_value = "1", help_heading = "Output", value_parser = clap::value_parser!(u16).range(1..=2))]
     channels: u16,
     /// CSV file of internal signals over time: mouth pressure, reed opening, flow, mouthpiece and radiated pressure
@@ -99,12 +99,18 @@ impl RenderCommand {
         let bar = progress(score.samples);
         // Who looks gets samples and insides in turn, hence the cell.
         let watch = watch.map(RefCell::new);
+        // One channel is the instrument itself; pan (CC10) places it between two.
+        let mut stereo = (self.channels == 2).then(|| StereoBlocks::new(score, *rate));
         let mut write = |block: &[f32]| {
             bar.inc(block.len() as u64);
             if let Some(watch) = &watch {
                 watch.borrow_mut().hear(block);
             }
-            wav.write(block).map_err(Failure::from)
+            let written = match &mut stereo {
+                Some(stereo) => wav.write(&stereo.spread(block)),
+                None => wav.write(&[block]),
+            };
+            written.map_err(Failure::from)
         };
         if probe.is_some() || watch.is_some() {
             let mut inside = |moment| {

@@ -193,7 +193,7 @@ fn played(
         |block| {
             bar.inc(block.len() as u64);
             watch.borrow_mut().hear(block);
-            wav.write(block).map_err(Failure::from)
+            wav.write(&[block]).map_err(Failure::from)
         },
     )?;
     wav.finish()?;

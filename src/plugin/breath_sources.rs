@@ -1,8 +1,11 @@
-//! Which input each breath value came from, for the window. The voice decides which input blows; this only records it.
+//! Which input each breath value came from, for the window. The decoder and the voice decide which input blows; this only
+//! records it.
 
 use nice_plug::prelude::NoteEvent;
 
 use crate::editor::snapshot::BreathSource;
+use chalumeau_core::control::midi::BreathOrigin;
+use chalumeau_core::control::midi::breath::BreathController;
 
 /// An input that breath can come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,10 +52,20 @@ impl BreathInput {
             NoteEvent::MidiCC { cc: 11, value, .. } => (Self::Expression, value),
             NoteEvent::MidiChannelPressure { pressure, .. } => (Self::Pressure, pressure),
             NoteEvent::PolyPressure { pressure: value, .. }
-            | NoteEvent::PolyExpression { expression: value, .. }
-            | NoteEvent::PolyBrightness { brightness: value, .. } => (Self::Note, value),
+            | NoteEvent::PolyExpression { expression: value, .. } => (Self::Note, value),
             _ => return None,
         })
+    }
+}
+
+impl From<BreathOrigin> for BreathInput {
+    fn from(origin: BreathOrigin) -> Self {
+        match origin {
+            BreathOrigin::Controller(BreathController::Breath) => Self::Breath,
+            BreathOrigin::Controller(BreathController::Expression) => Self::Expression,
+            BreathOrigin::Controller(BreathController::Pressure) => Self::Pressure,
+            BreathOrigin::Note => Self::Note,
+        }
     }
 }
 
@@ -64,11 +77,10 @@ pub struct BreathSources {
 }
 
 impl BreathSources {
-    /// Records a host's event. `blew` says whether the translator made breath of it.
-    pub fn record<S>(&mut self, event: &NoteEvent<S>, blew: bool) {
+    /// Records a host's event. Whether it is breath the decoder says.
+    pub fn record<S>(&mut self, event: &NoteEvent<S>) {
         match BreathInput::of(event) {
             Some((BreathInput::Keys, velocity)) => self.key(velocity),
-            Some((input, value)) if blew => self.blow(input, value),
             Some((input, value)) => self.set(input, value),
             None => {}
         }
@@ -114,17 +126,19 @@ mod tests {
         let mut sources = BreathSources::default();
         sources.key(0.9);
         assert!(sources.is_live(BreathInput::Keys));
-        sources.record(&controller(11, 0.25), true);
+        sources.blow(BreathOrigin::Controller(BreathController::Expression).into(), 0.25);
         assert!(sources.is_live(BreathInput::Expression));
-        sources.record(&controller(2, 0.5), true);
-        sources.record(&controller(11, 0.75), false);
+        sources.record(&controller(2, 0.5));
+        assert!(sources.is_live(BreathInput::Expression), "it came, and the decoder did not take it");
+        sources.blow(BreathOrigin::Controller(BreathController::Breath).into(), 0.5);
+        sources.record(&controller(11, 0.75));
         assert!(sources.is_live(BreathInput::Breath) && !sources.is_live(BreathInput::Expression));
         assert_eq!(sources.value(BreathInput::Expression), Some(0.75));
         assert_eq!(sources.value(BreathInput::Knob), None);
         sources.blow(BreathInput::Knob, 2.0);
         assert!(sources.is_live(BreathInput::Knob));
         assert_eq!(sources.value(BreathInput::Knob), Some(1.0));
-        sources.record(&controller(1, 1.0), false);
+        sources.record(&controller(1, 1.0));
         sources.key(0.9);
         assert!(sources.is_live(BreathInput::Knob));
     }

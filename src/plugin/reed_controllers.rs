@@ -2,12 +2,14 @@
 //!
 //! A controller with a middle (CC74, the y of a Linnstrument) has no effect at its middle, and raises or lowers the
 //! parameter from there. A controller that rests at zero (wheel, pressure) has no effect at zero and only raises the
-//! parameter. Full travel is a factor of 1.6, chosen by judgement: on coupled reeds it makes closing pressures of 2/5 to
+//! parameter. What belongs to a note (brightness, pressure) acts while that note is heard. A snapshot of all controllers at the
+//! start of a project changes nothing. Full travel is a factor of 1.6, chosen by judgement: on coupled reeds it makes closing pressures of 2/5 to
 //! 2 1/2 times. A controller that drives the reed does nothing else.
 
 use nice_plug::prelude::NoteEvent;
 
 use super::params::knob::ReedSource;
+use chalumeau_core::control::notes::HeldNote;
 use chalumeau_core::event::Event;
 
 /// Factor at full travel.
@@ -19,6 +21,8 @@ const CC_SLIDE: u8 = 74;
 pub struct ReedControllers {
     /// Controllers 1, 16, 17, 74 and pressure, 0..=1; `None` until they move.
     values: [Option<f32>; 5],
+    /// The same at the last note.
+    kept: [Option<f32>; 5],
     /// The factors that were sent last.
     sent: Option<[f32; 2]>,
 }
@@ -35,8 +39,8 @@ fn index(source: ReedSource) -> Option<usize> {
 }
 
 impl ReedControllers {
-    /// Takes an event if it drives H or k; returns whether it does.
-    pub fn take<S>(&mut self, event: &NoteEvent<S>, sources: [ReedSource; 2]) -> bool {
+    /// What an event moves if it drives H or k: the place of a controller, and its value.
+    pub fn of<S>(event: &NoteEvent<S>, sources: [ReedSource; 2]) -> Option<(usize, f32)> {
         let (at, value) = match *event {
             NoteEvent::MidiCC { cc: 1, value, .. } => (0, value),
             NoteEvent::MidiCC { cc: 16, value, .. } => (1, value),
@@ -46,13 +50,30 @@ impl ReedControllers {
             NoteEvent::MidiChannelPressure { pressure, .. } | NoteEvent::PolyPressure { pressure, .. } => {
                 (4, pressure)
             }
-            _ => return false,
+            _ => return None,
         };
-        if !sources.map(index).contains(&Some(at)) {
-            return false;
-        }
+        sources.map(index).contains(&Some(at)).then_some((at, value))
+    }
+
+    /// A controller moves.
+    pub fn set(&mut self, (at, value): (usize, f32)) {
         self.values[at] = Some(if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 });
-        true
+    }
+
+    /// Another note is heard: what belongs to it acts now.
+    pub fn follow(&mut self, heard: &HeldNote) {
+        let [.., slide, pressure] = &mut self.values;
+        (*slide, *pressure) = (heard.brightness.or(*slide), heard.press.or(*pressure));
+    }
+
+    /// Keeps the values of now; call it at each note.
+    pub fn keep(&mut self) {
+        self.kept = self.values;
+    }
+
+    /// Goes back to the values that were kept: what came since was a snapshot.
+    pub fn go_back(&mut self) {
+        self.values = self.kept;
     }
 
     /// The factors on H and k.
@@ -81,19 +102,25 @@ mod tests {
         NoteEvent::MidiCC { timing: 0, channel: 3, cc, value: f32::from(raw) / 127.0 }
     }
 
+    fn take(reed: &mut ReedControllers, event: &NoteEvent<()>, sources: [ReedSource; 2]) -> bool {
+        let moved = ReedControllers::of(event, sources);
+        moved.into_iter().for_each(|moved| reed.set(moved));
+        moved.is_some()
+    }
+
     #[test]
     fn y_of_a_linnstrument_opens_the_reed_and_z_stiffens_it() {
         let mut reed = ReedControllers::default();
         let sources = [ReedSource::Slide, ReedSource::Pressure];
         assert_eq!(reed.changed(sources), None, "no controller has moved");
-        assert!(reed.take(&cc(74, 64), sources));
+        assert!(take(&mut reed, &cc(74, 64), sources));
         assert_eq!(reed.changed(sources), None, "the middle has no effect");
-        assert!(reed.take(&cc(74, 127), sources));
+        assert!(take(&mut reed, &cc(74, 127), sources));
         let z = NoteEvent::<()>::MidiChannelPressure { timing: 0, channel: 3, pressure: 0.5 };
-        assert!(reed.take(&z, sources));
+        assert!(take(&mut reed, &z, sources));
         let [h, k] = reed.factors(sources);
         assert!((h - 1.6).abs() < 1e-6 && (k - 1.6_f32.sqrt()).abs() < 1e-6, "{h} {k}");
-        assert!(reed.take(&cc(74, 0), sources));
+        assert!(take(&mut reed, &cc(74, 0), sources));
         assert!(reed.factors(sources)[0] < 1.0 / 1.59);
         assert!(reed.changed(sources).is_some());
         assert_eq!(reed.changed(sources), None);
@@ -103,8 +130,8 @@ mod tests {
     fn an_event_that_drives_nothing_is_not_taken() {
         let mut reed = ReedControllers::default();
         let pressure = NoteEvent::<()>::MidiChannelPressure { timing: 0, channel: 0, pressure: 0.5 };
-        assert!(!reed.take(&pressure, [ReedSource::Slide, ReedSource::Parameter]));
-        assert!(!reed.take(&cc(2, 9), [ReedSource::Slide, ReedSource::Pressure]));
+        assert!(!take(&mut reed, &pressure, [ReedSource::Slide, ReedSource::Parameter]));
+        assert!(!take(&mut reed, &cc(2, 9), [ReedSource::Slide, ReedSource::Pressure]));
         assert_eq!(reed.factors([ReedSource::Parameter; 2]), [1.0, 1.0]);
     }
 }

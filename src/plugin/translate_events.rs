@@ -1,74 +1,129 @@
 //! Translates the host's events into the instrument's. No other module knows both.
 //!
 //! The decoder is that of the offline renderer. It gets the raw integers that the host's 0..=1 values came from, so that
-//! plugin and renderer hear the same. Note expressions have no MIDI form: pressure and expression set the breath, and
-//! tuning bends its note, in addition to the wheel, until the key is struck again. Volume, pan, vibrato, brightness and
-//! program change have no effect.
+//! plugin and renderer hear the same. Note expressions belong to their note: pressure and expression set the breath, tuning
+//! bends in addition to the wheel, volume and pan act after the instrument. Brightness changes the reed where it is chosen
+//! for that, see [`reed_controllers`](super::reed_controllers). Vibrato and program change have no effect.
 
-use nice_plug::midi::Key;
+use nice_plug::midi::{Channel, Key, VoiceID};
 use nice_plug::prelude::*;
 
-use chalumeau_core::control::midi::{Events, MidiDecoder};
-use chalumeau_core::event::{Event, Timed};
-
-/// The controller that ends all notes.
-const ALL_NOTES_OFF: u8 = 123;
+use chalumeau_core::control::midi::{BreathOrigin, MidiDecoder};
+use chalumeau_core::control::notes::{HeldNote, Note, NoteAddress, NoteExpression};
+use chalumeau_core::event::Event;
 
 /// Translates one event at a time, and keeps the state between them. Real-time safe throughout.
 #[derive(Clone, Debug, Default)]
 pub struct EventTranslator {
     midi: MidiDecoder,
-    /// Whether a note expression has set the breath yet. Some hosts send a zero with each note; a zero alone does not count.
-    expression_live: bool,
 }
 
 impl EventTranslator {
-    /// Returns at most two events, in order: a note may need a bend before it.
-    pub fn translate<S>(&mut self, event: NoteEvent<S>, api: PluginApi) -> [Option<Timed<Event>>; 2] {
-        let at = event.timing() as usize;
-        let events: Events = match event {
-            // The framework turns MIDI notes of velocity 0 into note-offs; a velocity that rounds to 0 here is a very soft note.
-            NoteEvent::NoteOn { channel, key: Key::Number(key), velocity, .. } => {
-                self.midi.note_on(channel.number().unwrap_or(0), key, raw7(velocity).max(1))
+    /// The events of a host's event, in order. `is_reeds`: it changes the reed, so that its pressure is no breath.
+    pub fn translate<S>(&mut self, event: &NoteEvent<S>, is_reeds: bool) -> &[Event] {
+        match *event {
+            NoteEvent::NoteOn { voice_id, channel, key: Key::Number(key), velocity, .. } => {
+                let note = Note { id: voice_id.id(), channel: channel.number().unwrap_or(0), key };
+                // The framework turns MIDI notes of velocity 0 into note-offs; a velocity that rounds to 0 here is a very
+                // soft note.
+                self.midi.strike(note, raw7(velocity).max(1))
             }
-            NoteEvent::NoteOff { channel, key: Key::Number(key), .. }
-            | NoteEvent::Choke { channel, key: Key::Number(key), .. } => {
-                self.midi.note_off(channel.number(), key)
+            NoteEvent::NoteOff { voice_id, channel, key, .. } => {
+                self.midi.release(address(voice_id, channel, key))
             }
-            NoteEvent::NoteOff { key: Key::Wildcard, .. } | NoteEvent::Choke { key: Key::Wildcard, .. } => {
-                self.midi.controller(0, ALL_NOTES_OFF, 0)
+            NoteEvent::Choke { voice_id, channel, key, .. } => {
+                self.midi.choke(address(voice_id, channel, key))
             }
             NoteEvent::MidiCC { channel, cc, value, .. } => self.midi.controller(channel, cc, raw7(value)),
-            NoteEvent::MidiChannelPressure { channel, pressure, .. } => {
+            NoteEvent::MidiChannelPressure { channel, pressure, .. } if !is_reeds => {
                 self.midi.pressure(channel, raw7(pressure))
             }
             NoteEvent::MidiPitchBend { channel, value, .. } => self.midi.bend(channel, raw14(value)),
-            NoteEvent::PolyTuning { channel, key, tuning, .. } => {
-                self.midi.tune(channel.number(), key.number(), 100.0 * tuning)
-            }
-            NoteEvent::PolyPressure { pressure, .. } => self.breathe(pressure),
-            // The framework's VST3 wrapper (0.4.2) confuses expression and brightness.
-            NoteEvent::PolyExpression { expression, .. } if api != PluginApi::Vst3 => {
-                self.breathe(expression)
-            }
-            NoteEvent::PolyBrightness { brightness, .. } if api == PluginApi::Vst3 => {
-                self.breathe(brightness)
-            }
-            _ => [None, None],
-        };
-        events.map(|event| event.map(|event| Timed { at, event }))
+            _ => match expression(event, is_reeds) {
+                Some((address, expression)) => self.midi.express(address, expression),
+                None => &[],
+            },
+        }
     }
 
-    /// Sets how far the wheel bends until RPN 0 says otherwise, semitones. Returns at most one event. Real-time safe.
-    pub fn bend_range(&mut self, semitones: i32) -> Option<Timed<Event>> {
-        let [event, _] = self.midi.usual_bend_range(semitones.clamp(0, 127) as u8);
-        event.map(|event| Timed { at: 0, event })
+    /// Sets how far the wheel bends until RPN 0 says otherwise, semitones.
+    pub fn bend_range(&mut self, semitones: i32) -> &[Event] {
+        self.midi.usual_bend_range(semitones.clamp(0, 127) as u8)
     }
 
-    fn breathe(&mut self, unit: f32) -> Events {
-        self.expression_live |= unit > 0.0;
-        [self.expression_live.then_some(Event::Breath(unit.clamp(0.0, 1.0))), None]
+    /// Ends all notes at once.
+    pub fn silence(&mut self) -> &[Event] {
+        self.midi.silence()
     }
+
+    /// See [`MidiDecoder::heard`].
+    pub fn heard(&self) -> Option<&HeldNote> {
+        self.midi.heard()
+    }
+
+    /// See [`MidiDecoder::over`].
+    pub fn over(&self) -> &[Note] {
+        self.midi.over()
+    }
+
+    /// See [`MidiDecoder::take_faded`].
+    pub fn take_faded(&mut self) -> Option<Note> {
+        self.midi.take_faded()
+    }
+
+    /// See [`MidiDecoder::breath_origin`].
+    pub fn breath_origin(&self) -> Option<BreathOrigin> {
+        self.midi.breath_origin()
+    }
+
+    /// See [`MidiDecoder::is_snapshot`].
+    pub fn is_snapshot(&self, channel: u8) -> bool {
+        self.midi.is_snapshot(channel)
+    }
+}
+
+/// An event as its name says. The framework's VST3 wrapper (0.4.2) confuses expression and brightness.
+pub fn untangled<S>(event: NoteEvent<S>, api: PluginApi) -> NoteEvent<S> {
+    match event {
+        NoteEvent::PolyExpression { timing, voice_id, channel, key, expression } if api == PluginApi::Vst3 => {
+            NoteEvent::PolyBrightness { timing, voice_id, channel, key, brightness: expression }
+        }
+        NoteEvent::PolyBrightness { timing, voice_id, channel, key, brightness } if api == PluginApi::Vst3 => {
+            NoteEvent::PolyExpression { timing, voice_id, channel, key, expression: brightness }
+        }
+        event => event,
+    }
+}
+
+/// The notes that an expression is for, and what it says.
+pub fn expression<S>(event: &NoteEvent<S>, is_reeds: bool) -> Option<(NoteAddress, NoteExpression)> {
+    let (voice_id, channel, key, expression) = match *event {
+        NoteEvent::PolyTuning { voice_id, channel, key, tuning, .. } => {
+            (voice_id, channel, key, NoteExpression::Tuning(100.0 * tuning))
+        }
+        NoteEvent::PolyPressure { voice_id, channel, key, pressure, .. } if is_reeds => {
+            (voice_id, channel, key, NoteExpression::Press(pressure))
+        }
+        NoteEvent::PolyPressure { voice_id, channel, key, pressure: breath, .. }
+        | NoteEvent::PolyExpression { voice_id, channel, key, expression: breath, .. } => {
+            (voice_id, channel, key, NoteExpression::Breath(breath))
+        }
+        NoteEvent::PolyVolume { voice_id, channel, key, gain, .. } => {
+            (voice_id, channel, key, NoteExpression::Volume(gain))
+        }
+        NoteEvent::PolyPan { voice_id, channel, key, pan, .. } => {
+            (voice_id, channel, key, NoteExpression::Pan(pan))
+        }
+        NoteEvent::PolyBrightness { voice_id, channel, key, brightness, .. } => {
+            (voice_id, channel, key, NoteExpression::Brightness(brightness))
+        }
+        _ => return None,
+    };
+    Some((address(voice_id, channel, key), expression))
+}
+
+fn address(voice_id: VoiceID, channel: Channel, key: Key) -> NoteAddress {
+    NoteAddress { id: voice_id.id(), channel: channel.number(), key: key.number() }
 }
 
 /// The MIDI data byte that a host's 0..=1 value came from.
@@ -83,25 +138,15 @@ fn raw14(value: f32) -> u16 {
 
 #[cfg(test)]
 mod tests {
-    use nice_plug::midi::{Channel, VoiceID};
-
     use super::*;
     use chalumeau_core::units::SoundingNote;
 
     type Host = NoteEvent<()>;
 
-    fn one(translator: &mut EventTranslator, event: Host) -> Option<Event> {
-        let [first, second] = translator.translate(event, PluginApi::Clap);
-        assert!(first.is_none() || second.is_none(), "{first:?} and {second:?}");
-        second.or(first).map(|timed| timed.event)
-    }
+    const OF_60: (VoiceID, Channel, Key) = (VoiceID::Wildcard, Channel::Number(0), Key::Number(60));
 
-    fn midi(translator: &mut EventTranslator, bytes: [u8; 3]) -> Option<Event> {
-        one(translator, Host::from_midi(0, &bytes).expect("a channel message"))
-    }
-
-    fn last([_, event]: Events) -> Option<Event> {
-        event
+    fn midi(translator: &mut EventTranslator, bytes: [u8; 3]) -> Vec<Event> {
+        translator.translate(&Host::from_midi(0, &bytes).expect("a channel message"), false).to_vec()
     }
 
     #[test]
@@ -118,9 +163,9 @@ mod tests {
     #[test]
     fn a_wheel_at_rest_does_not_bend() {
         let mut translator = EventTranslator::default();
-        assert_eq!(midi(&mut translator, [0xE0, 0, 64]), Some(Event::Bend { cents: 0.0 }));
+        assert_eq!(midi(&mut translator, [0xE0, 0, 64]), [Event::Bend { cents: 0.0 }]);
         let half = Host::MidiPitchBend { timing: 0, channel: 0, value: 0.5 };
-        assert_eq!(one(&mut translator, half), Some(Event::Bend { cents: 0.0 }));
+        assert_eq!(translator.translate(&half, false), [Event::Bend { cents: 0.0 }]);
     }
 
     #[test]
@@ -128,60 +173,75 @@ mod tests {
         let mut translator = EventTranslator::default();
         let mut decoder = MidiDecoder::new();
         for value in 0..=127u8 {
-            assert_eq!(midi(&mut translator, [0xB3, 2, value]), decoder.controller(3, 2, value)[0]);
+            for cc in [2, 7, 10, 11, 34, 64, 123] {
+                assert_eq!(midi(&mut translator, [0xB3, cc, value]), decoder.controller(3, cc, value));
+            }
             assert_eq!(
                 midi(&mut translator, [0xE3, value, 127 - value]),
-                decoder.bend(3, u16::from(127 - value) << 7 | u16::from(value))[0]
+                decoder.bend(3, u16::from(127 - value) << 7 | u16::from(value))
             );
-            assert_eq!(midi(&mut translator, [0x93, value, 90]), last(decoder.note_on(3, value, 90)));
-            assert_eq!(midi(&mut translator, [0x83, value, 90]), last(decoder.note_off(Some(3), value)));
+            assert_eq!(midi(&mut translator, [0x93, value, 90]), decoder.note_on(3, value, 90));
+            assert_eq!(midi(&mut translator, [0xD3, value, 0]), decoder.pressure(3, value));
+            let pressed = NoteExpression::Breath(f32::from(value) / 127.0);
+            assert_eq!(
+                midi(&mut translator, [0xA3, value, value]),
+                decoder.express(NoteAddress::of_key(3, value), pressed)
+            );
+            assert_eq!(midi(&mut translator, [0x83, value, 90]), decoder.note_off(3, value));
         }
-        let mut translator = EventTranslator::default();
-        assert_eq!(midi(&mut translator, [0xD0, 64, 0]), MidiDecoder::new().pressure(0, 64)[0]);
     }
 
     #[test]
     fn tuning_adds_to_the_wheel_until_the_key_is_struck_again() {
         let mut translator = EventTranslator::default();
-        let (voice_id, channel, key) = (VoiceID::Wildcard, Channel::Number(0), Key::Number(60));
+        let (voice_id, channel, key) = OF_60;
         midi(&mut translator, [0xE0, 127, 127]);
         midi(&mut translator, [0x90, 60, 90]);
         let tuning = Host::PolyTuning { timing: 0, voice_id, channel, key, tuning: -0.5 };
-        assert_eq!(one(&mut translator, tuning), Some(Event::Bend { cents: 150.0 }));
+        assert_eq!(translator.translate(&tuning, false), [Event::Bend { cents: 150.0 }]);
         let note = Host::NoteOn { timing: 7, voice_id, channel, key, velocity: 1.0 };
         let note_on = Event::NoteOn { note: SoundingNote(60), velocity: 1.0 };
-        assert_eq!(
-            translator.translate(note, PluginApi::Clap),
-            [
-                Some(Timed { at: 7, event: Event::Bend { cents: 200.0 } }),
-                Some(Timed { at: 7, event: note_on })
-            ]
-        );
-        assert_eq!(translator.translate(note, PluginApi::Clap)[0], None);
+        assert_eq!(translator.translate(&note, false), [Event::Bend { cents: 200.0 }, note_on]);
+        assert_eq!(translator.translate(&note, false), [note_on]);
     }
 
     #[test]
     fn a_note_expression_of_zero_does_not_take_the_breath() {
         let mut translator = EventTranslator::default();
-        let (voice_id, channel, key) = (VoiceID::Wildcard, Channel::Number(0), Key::Number(60));
+        let (voice_id, channel, key) = OF_60;
         let press = |pressure| Host::PolyPressure { timing: 0, voice_id, channel, key, pressure };
-        assert_eq!(one(&mut translator, press(0.0)), None);
-        assert_eq!(one(&mut translator, press(0.6)), Some(Event::Breath(0.6)));
-        assert_eq!(one(&mut translator, press(0.0)), Some(Event::Breath(0.0)));
+        midi(&mut translator, [0x90, 60, 90]);
+        assert_eq!(translator.translate(&press(0.0), false), []);
+        assert_eq!(translator.translate(&press(0.6), true), [], "it moves the reed");
+        assert_eq!(translator.translate(&press(0.6), false), [Event::Breath(0.6)]);
+        assert_eq!(translator.translate(&press(0.0), false), [Event::Breath(0.0)]);
         let express = Host::PolyExpression { timing: 0, voice_id, channel, key, expression: 2.0 };
-        assert_eq!(one(&mut translator, express), Some(Event::Breath(1.0)));
+        assert_eq!(translator.translate(&express, false), [Event::Breath(1.0)]);
+        // The framework says brightness where a VST3 host said expression.
+        let bright = Host::PolyBrightness { timing: 0, voice_id, channel, key, brightness: 0.25 };
+        assert_eq!(translator.translate(&bright, false), []);
+        assert_eq!(translator.translate(&untangled(bright, PluginApi::Vst3), false), [Event::Breath(0.25)]);
+        assert_eq!(translator.translate(&untangled(express, PluginApi::Vst3), false), []);
     }
 
     #[test]
-    fn a_wildcard_note_off_ends_all_notes() {
+    fn a_wildcard_note_off_releases_all_notes_and_an_id_alone_one() {
         let mut translator = EventTranslator::default();
-        let off = Host::NoteOff {
+        let off = |voice_id| Host::NoteOff {
             timing: 0,
-            voice_id: VoiceID::Wildcard,
+            voice_id,
             channel: Channel::Wildcard,
             key: Key::Wildcard,
             velocity: 0.0,
         };
-        assert_eq!(one(&mut translator, off), Some(Event::Panic));
+        for (id, key) in [(7, 60), (64, 62)] {
+            let (voice_id, key) = (VoiceID::ID(id), Key::Number(key));
+            let on = Host::NoteOn { timing: 0, voice_id, channel: Channel::Number(2), key, velocity: 1.0 };
+            translator.translate(&on, false);
+        }
+        let up = |key| Event::NoteOff { note: SoundingNote(key) };
+        assert_eq!(translator.translate(&off(VoiceID::ID(64)), false), [up(62)]);
+        assert_eq!(translator.translate(&off(VoiceID::ID(64)), false), []);
+        assert_eq!(translator.translate(&off(VoiceID::Wildcard), false), [up(60)]);
     }
 }

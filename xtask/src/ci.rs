@@ -174,6 +174,9 @@ fn generated() -> Result<()> {
     Ok(())
 }
 
+/// Tests of the bundled CLAP.
+const CLAP_TESTS: &[&str] = &["clap", "note_ids", "keyboard", "instrument", "knob"];
+
 /// Tests of the plugin and the programs in hosts, with a cache of their own for the instruments they make.
 fn host_tests(names: &[&str]) -> Command {
     let mut command = machine::cargo();

@@ -2,7 +2,7 @@
 //!
 //! A [`Score`] is a list of events at sample positions. It comes from a note, a scale, a MIDI file ([`midi_file`], feature
 //! `midi`) or your own events. A [`BreathCurve`](breath::BreathCurve) gives its mouth pressure. [`play`] renders it block by
-//! block through a [`Clarinet`](crate::instrument::Clarinet); [`play_probed`] also shows the inside of the instrument. A
+//! block through a [`Clarinet`](crate::instrument::Clarinet); [`play_probed`] also shows the inside of the instrument. [`StereoBlocks`] pans them. A
 //! [`NoteSpan`] says which note is heard when.
 //!
 //! Positions are in samples. Notes in events are sounding pitches; [`Score::scale`] takes written ones. `gamma` is mouth
@@ -35,10 +35,12 @@ pub mod midi_file;
 mod note_spans;
 mod play;
 mod samples;
+mod stereo_blocks;
 mod timeline;
 
 pub use breath::{breath_of_gamma, closing_kpa};
 pub use note_spans::NoteSpan;
 pub use play::{play, play_probed};
 pub use samples::samples_in;
+pub use stereo_blocks::StereoBlocks;
 pub use timeline::{Score, ScoreError};

@@ -20,10 +20,13 @@ use clack_extensions::state::PluginState;
 pub use clack_extensions::state_context::StateContextType;
 use clack_extensions::tail::PluginTail;
 pub use clack_extensions::tail::TailLength;
+use clack_extensions::voice_info::PluginVoiceInfo;
+pub use clack_extensions::voice_info::{VoiceInfo, VoiceInfoFlags};
 pub use clack_host::events::event_types::NoteExpressionType;
 use clack_host::events::event_types::{
-    MidiEvent, NoteExpressionEvent, NoteOffEvent, NoteOnEvent, ParamModEvent, ParamValueEvent,
+    MidiEvent, NoteChokeEvent, NoteExpressionEvent, NoteOffEvent, NoteOnEvent, ParamModEvent, ParamValueEvent,
 };
+use clack_host::events::Match;
 use clack_host::events::spaces::CoreEventSpace;
 pub use clack_host::prelude::ProcessStatus;
 use clack_host::prelude::*;
@@ -51,12 +54,47 @@ pub enum Say {
     NoteOff(u16),
     /// A note expression of a key.
     Express(u16, NoteExpressionType, f64),
+    /// A CLAP note by its whole name, and its velocity 0..=1.
+    Strike(NoteName, f64),
+    /// The end of all notes that a name fits.
+    Release(NoteName),
+    /// Their immediate end.
+    Choke(NoteName),
+    /// An expression of all notes that a name fits.
+    ExpressNotes(NoteName, NoteExpressionType, f64),
     /// A parameter moves; its plain CLAP value.
     Set(ClapId, f64),
     /// A modulator offsets a parameter by so much.
     Modulate(ClapId, f64),
     /// An event of no known namespace that looks like [`Set`](Self::Set).
     Foreign(ClapId, f64),
+}
+
+/// The name of CLAP notes. A part that is `None` is a wildcard; the port always is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NoteName {
+    pub id: Option<u32>,
+    pub channel: Option<u16>,
+    pub key: Option<u16>,
+}
+
+impl NoteName {
+    fn pckn(self) -> Pckn {
+        fn part<T>(part: Option<T>) -> Match<T> {
+            part.map_or(Match::All, Match::Specific)
+        }
+        Pckn { port_index: Match::All, channel: part(self.channel), key: part(self.key), note_id: part(self.id) }
+    }
+
+    fn of(pckn: Pckn) -> Self {
+        fn part<T>(part: Match<T>) -> Option<T> {
+            match part {
+                Match::Specific(part) => Some(part),
+                Match::All => None,
+            }
+        }
+        Self { id: part(pckn.note_id), channel: part(pckn.channel), key: part(pckn.key) }
+    }
 }
 
 /// A parameter as the plugin describes it.
@@ -136,8 +174,9 @@ impl Plugin {
         let stopped = self.instance.activate(|shared, _| Audio(shared), config)?;
         match stopped.start_processing() {
             Ok(processor) => {
-                let (answers, hands, status) = (Vec::new(), Vec::new(), ProcessStatus::Continue);
-                Ok(Session { processor, block, answers, hands, status, played: 0 })
+                let (answers, ends, hands) = (Vec::new(), Vec::new(), Vec::new());
+                let status = ProcessStatus::Continue;
+                Ok(Session { processor, block, answers, ends, hands, status, played: 0 })
             }
             Err(_) => bail!("the plugin does not start at {rate_hz} Hz"),
         }
@@ -329,6 +368,13 @@ impl Plugin {
         self.instance.access_shared_handler(|shared| shared.gone.load(Ordering::Acquire))
     }
 
+    /// How many voices the plugin has.
+    pub fn voice_info(&mut self) -> Result<VoiceInfo> {
+        let handle = self.instance.plugin_handle();
+        let voices: PluginVoiceInfo = handle.get_extension().context("no voice info")?;
+        voices.get(&handle).context("the plugin does not say how many voices it has")
+    }
+
     pub fn latency(&mut self) -> Result<u32> {
         let handle = self.instance.plugin_handle();
         let latency: PluginLatency = handle.get_extension().context("no latency")?;
@@ -342,6 +388,8 @@ pub struct Session {
     block: usize,
     /// MIDI the plugin has sent, with the sample it belongs to since activation.
     answers: Vec<(usize, [u8; 3])>,
+    /// Notes that the plugin has said to be over, with the sample since activation.
+    ends: Vec<(usize, NoteName)>,
     /// What was done to parameters in the plugin's window.
     hands: Vec<Hand>,
     /// What the plugin said of going on, after the last block.
@@ -383,6 +431,11 @@ impl Session {
     pub fn tail(&mut self) -> TailLength {
         let handle = self.processor.plugin_handle();
         handle.get_extension::<PluginTail>().map_or(TailLength::Finite(0), |tail| tail.get(&handle))
+    }
+
+    /// The notes that the plugin has said to be over since activation.
+    pub fn ends(&self) -> &[(usize, NoteName)] {
+        &self.ends
     }
 
     /// What was done to parameters in the window since activation.
@@ -435,8 +488,11 @@ impl Session {
                     "an answer at {time} after {latest}"
                 );
                 latest = time;
-                if let Some(CoreEventSpace::Midi(midi)) = event.as_core_event() {
-                    self.answers.push((self.played + start + time as usize, midi.data()));
+                let at = self.played + start + time as usize;
+                match event.as_core_event() {
+                    Some(CoreEventSpace::Midi(midi)) => self.answers.push((at, midi.data())),
+                    Some(CoreEventSpace::NoteEnd(end)) => self.ends.push((at, NoteName::of(end.pckn()))),
+                    _ => {}
                 }
                 self.hands.extend(hand(event));
             }
@@ -484,6 +540,16 @@ fn push(events: &mut EventBuffer, at: u32, say: Say) {
         Say::NoteOn(key, velocity) => events.push(&NoteOnEvent::new(at, of(key), velocity)),
         Say::NoteOff(key) => events.push(&NoteOffEvent::new(at, of(key), 0.0)),
         Say::Express(key, kind, value) => events.push(&NoteExpressionEvent::new(at, of(key), kind, value)),
+        Say::Strike(name, velocity) => {
+            // A new note needs a port.
+            let pckn = Pckn { port_index: Match::Specific(0), ..name.pckn() };
+            events.push(&NoteOnEvent::new(at, pckn, velocity))
+        }
+        Say::Release(name) => events.push(&NoteOffEvent::new(at, name.pckn(), 0.0)),
+        Say::Choke(name) => events.push(&NoteChokeEvent::new(at, name.pckn())),
+        Say::ExpressNotes(name, kind, value) => {
+            events.push(&NoteExpressionEvent::new(at, name.pckn(), kind, value))
+        }
         Say::Set(id, value) => events.push(&ParamValueEvent::new(at, id, Pckn::match_all(), value)),
         Say::Modulate(id, amount) => events.push(&ParamModEvent::new(at, id, Pckn::match_all(), amount)),
         Say::Foreign(id, value) => {

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::{SharedInstrument, SwapCandidate};
 use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::instrument::stereo::Stereo;
 use chalumeau_core::instrument::{Clarinet, Settings};
 
 /// Time for which a new instrument plays unheard, s. The lowest notes of a B flat clarinet speak after 50 ms, those of a
@@ -29,6 +30,7 @@ pub struct InstrumentSwap {
     incoming: rtrb::Consumer<SwapCandidate>,
     outgoing: rtrb::Producer<Box<Clarinet>>,
     settings: Settings,
+    stereo: Stereo,
     activation: u64,
     /// The value of *Instrument* that was waited for last.
     awaited_choice: u32,
@@ -59,6 +61,7 @@ impl InstrumentSwap {
             incoming,
             outgoing,
             settings: Settings::default(),
+            stereo: Stereo::new(48_000.0),
             activation: 0,
             awaited_choice: 0,
             rate_hz: 0.0,
@@ -81,6 +84,7 @@ impl InstrumentSwap {
         }
         (self.activation, self.awaited_choice) = (activation, choice);
         self.rate_hz = rate_hz;
+        self.stereo = Stereo::new(rate_hz);
         self.warm_up = (WARM_UP_S * rate_hz) as usize;
         self.fade = (FADE_S * rate_hz) as usize;
     }
@@ -166,6 +170,7 @@ impl InstrumentSwap {
             next.played = self.warm_up + self.fade;
         }
         self.finish_swap();
+        self.stereo.reset();
         self.playing.reset();
         if let Some(next) = &mut self.next {
             next.clarinet.reset();
@@ -175,10 +180,12 @@ impl InstrumentSwap {
     /// See [`Clarinet::render_events`]; both instruments receive the events.
     pub fn render_events(&mut self, events: impl IntoIterator<Item = Timed<Event>>, out: &mut [f32]) {
         if self.next.is_none() {
-            return self.playing.render_events(events, out);
+            let stereo = &mut self.stereo;
+            return self.playing.render_events(events.into_iter().inspect(|event| stereo.heed(event)), out);
         }
         let mut done = 0;
         for Timed { at, event } in events {
+            self.stereo.heed(&Timed { at, event });
             let at = at.clamp(done, out.len());
             self.render(&mut out[done..at]);
             self.playing.apply(event);
@@ -188,6 +195,11 @@ impl InstrumentSwap {
             done = at;
         }
         self.render(&mut out[done..]);
+    }
+
+    /// Makes two channels of the block that was rendered last: `left` holds it. See [`Stereo`].
+    pub fn spread(&mut self, left: &mut [f32], right: &mut [f32]) {
+        self.stereo.spread(left, right);
     }
 
     fn render(&mut self, out: &mut [f32]) {

@@ -71,7 +71,7 @@ fn in_blocks<E>(
 }
 
 /// Splits off the events that happen before sample `end`.
-fn take_before<'a, E>(events: &mut &'a [Timed<E>], end: usize) -> &'a [Timed<E>] {
+pub(super) fn take_before<'a, E>(events: &mut &'a [Timed<E>], end: usize) -> &'a [Timed<E>] {
     let (now, later) = events.split_at(events.partition_point(|e| e.at < end));
     *events = later;
     now

@@ -1,0 +1,288 @@
+//! What the plugin remembers of the host's events, and what it makes of them. Real-time safe.
+
+use nice_plug::prelude::*;
+
+use super::breath_sources::BreathSources;
+use super::params::knob::ReedSource;
+use super::reed_controllers::ReedControllers;
+use super::translate_events::{EventTranslator, expression, untangled};
+use chalumeau_core::control::notes::Note;
+use chalumeau_core::event::{Event, Timed};
+
+/// Events that one event of the host can become: what the decoder says, and a change of the reed.
+const EVENTS: usize = 32;
+/// Ends of notes that one block can hold: each event that the wrapper keeps room for begins at most one note, and 17 notes
+/// may be there before. Later ones are lost to the host, which only loses a hint.
+const ENDS: usize = 4_096 + 17;
+
+/// Everything that is remembered of the host's events between two blocks.
+pub struct HostInputs {
+    translator: EventTranslator,
+    reed_controllers: ReedControllers,
+    breath_sources: BreathSources,
+    /// Events of the host's event that was taken last, their sample, how many they are, and how many have been handed out.
+    events: [Event; EVENTS],
+    at: usize,
+    count: usize,
+    handed: usize,
+    /// Notes that have ended in this block, in order of time.
+    ended: Vec<(u32, Note)>,
+    /// The note whose expressions the reed follows.
+    heard: Option<Note>,
+}
+
+impl Default for HostInputs {
+    /// Allocates.
+    fn default() -> Self {
+        Self {
+            translator: EventTranslator::default(),
+            reed_controllers: ReedControllers::default(),
+            breath_sources: BreathSources::default(),
+            // What lies beyond `count` is never read.
+            events: [Event::Panic; EVENTS],
+            at: 0,
+            count: 0,
+            handed: 0,
+            ended: Vec::with_capacity(ENDS),
+            heard: None,
+        }
+    }
+}
+
+impl HostInputs {
+    /// Forgets everything.
+    pub fn reset(&mut self) {
+        self.translator = EventTranslator::default();
+        self.reed_controllers = ReedControllers::default();
+        self.breath_sources = BreathSources::default();
+        (self.count, self.handed, self.heard) = (0, 0, None);
+        self.ended.clear();
+    }
+
+    /// Begins a block.
+    pub fn begin_block(&mut self) {
+        self.ended.clear();
+    }
+
+    /// Which input each breath value came from.
+    pub fn breath_sources(&mut self) -> &mut BreathSources {
+        &mut self.breath_sources
+    }
+
+    /// The factors that controllers and notes put on H and k.
+    pub fn reed_factors(&self, drives: [ReedSource; 2]) -> [f32; 2] {
+        self.reed_controllers.factors(drives)
+    }
+
+    /// The next event of the instrument; `next` gives the host's. Events of what `drives` H or k change the reed and nothing
+    /// else.
+    pub fn next(
+        &mut self,
+        mut next: impl FnMut() -> Option<NoteEvent<()>>,
+        api: PluginApi,
+        drives: [ReedSource; 2],
+    ) -> Option<Timed<Event>> {
+        loop {
+            if self.handed < self.count {
+                self.handed += 1;
+                return Some(Timed { at: self.at, event: self.events[self.handed - 1] });
+            }
+            self.take(untangled(next()?, api), drives);
+        }
+    }
+
+    fn take(&mut self, event: NoteEvent<()>, drives: [ReedSource; 2]) {
+        (self.at, self.count, self.handed) = (event.timing() as usize, 0, 0);
+        let channel = match event {
+            NoteEvent::MidiCC { channel, .. } => Some(channel),
+            _ => None,
+        };
+        let was_snapshot = channel.is_some_and(|channel| self.translator.is_snapshot(channel));
+        let reeds = ReedControllers::of(&event, drives);
+        self.breath_sources.record(&event);
+        for (place, &event) in self.events.iter_mut().zip(self.translator.translate(&event, reeds.is_some())) {
+            *place = event;
+            self.count += 1;
+        }
+        for &event in &self.events[..self.count] {
+            if let (Event::Breath(unit), Some(origin)) = (event, self.translator.breath_origin()) {
+                self.breath_sources.blow(origin.into(), unit);
+            }
+        }
+        self.note_ends(event.timing());
+        let is_snapshot = channel.is_some_and(|channel| self.translator.is_snapshot(channel));
+        match reeds {
+            _ if is_snapshot && !was_snapshot => self.reed_controllers.go_back(),
+            Some(moved) if !is_snapshot && self.is_heard(&event) => self.reed_controllers.set(moved),
+            _ => {}
+        }
+        if matches!(event, NoteEvent::NoteOn { .. }) {
+            self.reed_controllers.keep();
+        }
+        if let Some(heard) = self.translator.heard()
+            && self.heard.replace(heard.note) != Some(heard.note)
+        {
+            self.reed_controllers.follow(heard);
+        }
+        if let Some(event) = self.reed_controllers.changed(drives)
+            && let Some(place) = self.events.get_mut(self.count)
+        {
+            *place = event;
+            self.count += 1;
+        }
+    }
+
+    /// Whether an event is for the heard note, or for no note in particular.
+    fn is_heard(&self, event: &NoteEvent<()>) -> bool {
+        let Some((address, _)) = expression(event, true) else { return true };
+        self.translator.heard().is_some_and(|heard| address.fits(heard.note))
+    }
+
+    /// Sets how far the wheel bends until RPN 0 says otherwise, semitones. Returns at most one event.
+    pub fn bend_range(&mut self, semitones: i32) -> Option<Timed<Event>> {
+        self.translator.bend_range(semitones).first().map(|&event| Timed { at: 0, event })
+    }
+
+    /// Ends all notes at once. Returns at most two events.
+    pub fn silence(&mut self) -> [Option<Timed<Event>>; 2] {
+        let said = self.translator.silence();
+        let events = [0, 1].map(|place| said.get(place).map(|&event| Timed { at: 0, event }));
+        self.note_ends(0);
+        events
+    }
+
+    /// The instrument is silent at sample `at`: what faded has ended.
+    pub fn fall_silent(&mut self, at: u32) {
+        if let Some(note) = self.translator.take_faded() {
+            end(&mut self.ended, at, note);
+        }
+    }
+
+    /// The notes that have ended in this block, in order of time, for the host.
+    pub fn ended(&self) -> &[(u32, Note)] {
+        &self.ended
+    }
+
+    fn note_ends(&mut self, at: u32) {
+        for &note in self.translator.over() {
+            end(&mut self.ended, at, note);
+        }
+    }
+}
+
+/// Adds the end of a note, without allocating.
+fn end(ended: &mut Vec<(u32, Note)>, at: u32, note: Note) {
+    if ended.len() < ended.capacity() {
+        ended.push((at, note));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nice_plug::midi::{Channel, Key, VoiceID};
+
+    use super::*;
+    use crate::plugin::breath_sources::BreathInput;
+    use chalumeau_core::units::SoundingNote;
+
+    const NO_REED: [ReedSource; 2] = [ReedSource::Parameter; 2];
+
+    fn midi(inputs: &mut HostInputs, drives: [ReedSource; 2], said: &[[u8; 3]]) -> Vec<Event> {
+        let mut said = said.iter().map(|bytes| NoteEvent::from_midi(5, bytes).unwrap());
+        let mut next = || inputs.next(|| said.next(), PluginApi::Clap, drives);
+        std::iter::from_fn(|| next().map(|timed| timed.event)).collect()
+    }
+
+    fn all_controllers(value: u8) -> Vec<[u8; 3]> {
+        let of_channel = |channel: u8| {
+            let controllers = (0..128_u8).map(move |cc| [0xB0 | channel, cc, value]);
+            controllers.chain([[0xD0 | channel, value, 0]])
+        };
+        (0..16).flat_map(of_channel).collect()
+    }
+
+    #[test]
+    fn a_start_that_sends_every_controller_names_no_source_and_leaves_velocity_and_reed() {
+        let reeds = [ReedSource::Wheel, ReedSource::Cc16];
+        for value in [0, 1, 64, 127] {
+            let mut inputs = HostInputs::default();
+            for _ in 0..2 {
+                let events = midi(&mut inputs, reeds, &all_controllers(value));
+                assert!(!events.iter().any(|event| matches!(event, Event::Breath(_))), "{value}");
+            }
+            let named = |inputs: &mut HostInputs| {
+                let sources = inputs.breath_sources();
+                BreathInput::ALL.into_iter().find(|&input| sources.is_live(input))
+            };
+            assert_eq!(named(&mut inputs), None, "{value}");
+            assert_eq!(inputs.reed_factors(reeds), [1.0, 1.0], "{value}");
+            let note_on = Event::NoteOn { note: SoundingNote(60), velocity: 100.0 / 127.0 };
+            assert_eq!(midi(&mut inputs, reeds, &[[0x90, 60, 100]]), [note_on], "{value}");
+            assert_eq!(named(&mut inputs), Some(BreathInput::Keys));
+            // A player who blows now is named.
+            midi(&mut inputs, reeds, &[[0xB0, 2, 40], [0xB0, 2, 45]]);
+            assert_eq!(named(&mut inputs), Some(BreathInput::Breath));
+        }
+    }
+
+    #[test]
+    fn a_value_that_the_key_makes_breath_is_named_with_the_key() {
+        let mut inputs = HostInputs::default();
+        midi(&mut inputs, NO_REED, &[[0xB0, 11, 90]]);
+        assert!(!inputs.breath_sources().is_live(BreathInput::Expression));
+        midi(&mut inputs, NO_REED, &[[0x90, 60, 100]]);
+        assert!(inputs.breath_sources().is_live(BreathInput::Expression));
+    }
+
+    #[test]
+    fn the_reed_follows_the_heard_note_only() {
+        let drives = [ReedSource::Slide, ReedSource::Pressure];
+        let mut inputs = HostInputs::default();
+        let bright = |id, brightness| NoteEvent::PolyBrightness {
+            timing: 0,
+            voice_id: VoiceID::ID(id),
+            channel: Channel::Wildcard,
+            key: Key::Wildcard,
+            brightness,
+        };
+        let on = |id, key| NoteEvent::NoteOn {
+            timing: 0,
+            voice_id: VoiceID::ID(id),
+            channel: Channel::Number(0),
+            key: Key::Number(key),
+            velocity: 0.8,
+        };
+        let mut say = |event: NoteEvent<()>| {
+            let mut event = Some(event);
+            while inputs.next(|| event.take(), PluginApi::Clap, drives).is_some() {}
+            inputs.reed_factors(drives)[0]
+        };
+        say(on(1, 60));
+        say(on(2, 64));
+        assert_eq!(say(bright(1, 1.0)), 1.0, "unheard");
+        assert!((say(bright(2, 0.0)) - 1.0 / 1.6).abs() < 1e-3);
+        let off = NoteEvent::NoteOff {
+            timing: 0,
+            voice_id: VoiceID::ID(2),
+            channel: Channel::Wildcard,
+            key: Key::Wildcard,
+            velocity: 0.0,
+        };
+        assert!((say(off) - 1.6).abs() < 1e-3, "its own, now that it is heard");
+    }
+
+    #[test]
+    fn each_note_ends_once() {
+        let mut inputs = HostInputs::default();
+        midi(&mut inputs, NO_REED, &[[0x90, 60, 100], [0x90, 64, 100], [0x80, 64, 0], [0x80, 60, 0]]);
+        let key = |inputs: &HostInputs| inputs.ended().iter().map(|(_, note)| note.key).collect::<Vec<_>>();
+        assert_eq!(key(&inputs), [64]);
+        inputs.begin_block();
+        inputs.fall_silent(63);
+        inputs.fall_silent(63);
+        assert_eq!((key(&inputs), inputs.ended()[0].0), (vec![60], 63));
+        inputs.begin_block();
+        midi(&mut inputs, NO_REED, &[[0x90, 60, 100], [0xB0, 120, 0]]);
+        assert_eq!(key(&inputs), [60]);
+    }
+}
