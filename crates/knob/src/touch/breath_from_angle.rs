@@ -330,7 +330,7 @@ mod tests {
             midi.controller(0, 2, coarse);
             let event = midi.controller(0, 34, fine);
             if raw > 0 {
-                assert_eq!(event[0], Some(Event::Breath(Breath14(raw).unit())), "{raw}");
+                assert_eq!(event, [Event::Breath(Breath14(raw).unit())], "{raw}");
             }
         }
     }
