@@ -95,8 +95,12 @@ impl Random {
             14 => Event::Bend { cents: self.wild(-1_500.0, 1_500.0) },
             15 => Event::TongueSlap { strength: self.wild(0.0, 1.0) },
             16 => Event::Reed { h: self.wild(0.6, 1.6), k: self.wild(0.6, 1.6) },
-            _ if self.below(8) == 0 => Event::Panic,
-            _ => Event::Breath(0.6),
+            _ => match self.below(8) {
+                0 => Event::Panic,
+                1 | 2 => Event::Choke { note: SoundingNote(40 + self.below(60) as u8) },
+                3 => Event::Volume { gain: self.wild(0.0, 4.0) },
+                _ => Event::Breath(0.6),
+            },
         }
     }
 
