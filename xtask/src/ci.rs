@@ -174,9 +174,6 @@ fn generated() -> Result<()> {
     Ok(())
 }
 
-/// Tests of the bundled CLAP.
-const CLAP_TESTS: &[&str] = &["clap", "note_ids", "keyboard", "instrument", "knob"];
-
 /// Tests of the plugin and the programs in hosts, with a cache of their own for the instruments they make.
 fn host_tests(names: &[&str]) -> Command {
     let mut command = machine::cargo();
@@ -187,7 +184,7 @@ fn host_tests(names: &[&str]) -> Command {
 }
 
 /// Test files that play the bundled CLAP.
-const CLAP_TESTS: &[&str] = &["clap", "clap_rules", "clap_sleep", "instrument", "knob"];
+const CLAP_TESTS: &[&str] = &["clap", "clap_rules", "clap_sleep", "note_ids", "keyboard", "instrument", "knob"];
 
 fn clap() -> Result<()> {
     let program = &programs()?.program;
