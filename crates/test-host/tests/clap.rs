@@ -1,20 +1,19 @@
 //! The bundled CLAP, as a host sees and hears it. `cargo xtask bundle` first; CHALUMEAU_CLAP names another file.
 
+#[path = "support/rules.rs"]
+mod rules;
+
 use chalumeau_core::analysis::pitch::fundamental_hz;
 use chalumeau_core::analysis::to_f64;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::{Clarinet, Settings};
 use chalumeau_core::units::SoundingNote;
 use chalumeau_test_host::clap::{At, NoteExpressionType, Plugin, Say, Stereo};
+use rules::plugin;
 
 const RATE: f64 = 48_000.0;
 const SECOND: usize = 48_000;
 const BLOCKS: [usize; 5] = [1, 17, 64, 512, 4096];
-
-fn plugin() -> Plugin {
-    let path = chalumeau_test_host::artefacts::clap().unwrap();
-    Plugin::load(&path).unwrap()
-}
 
 fn play(said: &[At], samples: usize) -> Vec<f32> {
     let [left, right] = plugin().play(RATE, 512, said, samples).unwrap();
@@ -265,7 +264,7 @@ fn text_reads_both_ways() {
 #[test]
 fn state_makes_the_round_trip() {
     let mut plugin = plugin();
-    for (index, param) in plugin.params().unwrap().into_iter().enumerate() {
+    for (index, param) in rules::movable(&mut plugin).into_iter().enumerate() {
         let unit = 0.15 + 0.7 * (index as f64 * 0.618).fract();
         plugin.set(param.id, param.min + unit * (param.max - param.min)).unwrap();
     }
@@ -336,7 +335,9 @@ fn latency_is_the_instruments() {
 #[test]
 fn a_rate_out_of_reach_is_refused() {
     let mut plugin = plugin();
-    assert!(plugin.session(8_000.0, 512, |_| ()).is_err());
+    for rate in [999.0, 1_536_001.0] {
+        assert!(plugin.session(rate, 512, |_| ()).is_err(), "{rate} Hz");
+    }
     plugin.play(RATE, 512, &[At(0, on(60))], 100).unwrap();
 }
 

@@ -65,6 +65,11 @@ impl OutputLevel {
         self.gain = self.target;
     }
 
+    /// How many times larger samples are than without the user's gain; 1 where the gain makes them smaller.
+    pub fn boost(&self) -> f32 {
+        (self.gain / self.full_scale_per_pa as f32).max(1.0)
+    }
+
     /// Pascals become samples.
     pub fn apply(&mut self, out: &mut [f32]) {
         for sample in &mut *out {
