@@ -205,7 +205,8 @@ impl Plugin for Chalumeau {
             self.inputs.breath_sources().blow(BreathInput::Knob, breath.unit());
         }
         #[cfg(feature = "devices")]
-        let blown = self.knob.iter().flat_map(|(_, audio)| audio.sent()).map(|(at, breath)| (*at, breath.bytes()));
+        let blown =
+            self.knob.iter().flat_map(|(_, audio)| audio.sent()).map(|(at, breath)| (*at, breath.bytes()));
         #[cfg(not(feature = "devices"))]
         let blown = std::iter::empty();
         answer(context, self.inputs.ended(), blown);

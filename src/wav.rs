@@ -71,10 +71,9 @@ impl<W: Write + Seek> WavFile<W> {
 
     /// Appends one block: a mono sound, which goes to every channel, or the channels.
     pub fn write(&mut self, block: &[&[f32]]) -> Result<(), WavError> {
-        let samples = block.first().map_or(0, |first| first.len());
-        for at in 0..samples {
+        for (at, &first) in block.first().into_iter().flat_map(|first| first.iter()).enumerate() {
             for channel in 0..usize::from(self.channels) {
-                let sample = block[channel % block.len()][at];
+                let sample = block.get(channel).map_or(first, |samples| samples[at]);
                 self.level.peak = self.level.peak.max(sample.abs());
                 match self.depth {
                     Depth::Int16 => self.writer.write_sample(round(sample, 32_767.0))?,

@@ -100,7 +100,8 @@ impl HostInputs {
         let was_snapshot = channel.is_some_and(|channel| self.translator.is_snapshot(channel));
         let reeds = ReedControllers::of(&event, drives);
         self.breath_sources.record(&event);
-        for (place, &event) in self.events.iter_mut().zip(self.translator.translate(&event, reeds.is_some())) {
+        for (place, &event) in self.events.iter_mut().zip(self.translator.translate(&event, reeds.is_some()))
+        {
             *place = event;
             self.count += 1;
         }

@@ -85,10 +85,14 @@ impl EventTranslator {
 /// An event as its name says. The framework's VST3 wrapper (0.4.2) confuses expression and brightness.
 pub fn untangled<S>(event: NoteEvent<S>, api: PluginApi) -> NoteEvent<S> {
     match event {
-        NoteEvent::PolyExpression { timing, voice_id, channel, key, expression } if api == PluginApi::Vst3 => {
+        NoteEvent::PolyExpression { timing, voice_id, channel, key, expression }
+            if api == PluginApi::Vst3 =>
+        {
             NoteEvent::PolyBrightness { timing, voice_id, channel, key, brightness: expression }
         }
-        NoteEvent::PolyBrightness { timing, voice_id, channel, key, brightness } if api == PluginApi::Vst3 => {
+        NoteEvent::PolyBrightness { timing, voice_id, channel, key, brightness }
+            if api == PluginApi::Vst3 =>
+        {
             NoteEvent::PolyExpression { timing, voice_id, channel, key, expression: brightness }
         }
         event => event,

@@ -184,7 +184,8 @@ fn host_tests(names: &[&str]) -> Command {
 }
 
 /// Test files that play the bundled CLAP.
-const CLAP_TESTS: &[&str] = &["clap", "clap_rules", "clap_sleep", "note_ids", "keyboard", "instrument", "knob"];
+const CLAP_TESTS: &[&str] =
+    &["clap", "clap_rules", "clap_sleep", "note_ids", "keyboard", "instrument", "knob"];
 
 fn clap() -> Result<()> {
     let program = &programs()?.program;

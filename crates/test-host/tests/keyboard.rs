@@ -130,7 +130,9 @@ fn pan_has_constant_power_and_leaves_the_middle_alone() {
         let sides = [power(&left[SECOND / 2..]), power(&right[SECOND / 2..])];
         assert!((10.0 * ((sides[0] + sides[1]) / whole).log10()).abs() < 0.01, "{value}: {sides:?}");
         let angle = (value.max(1) - 1) as f64 / 126.0;
-        assert!((sides[1] / (sides[0] + sides[1]) - (angle * 90_f64.to_radians()).sin().powi(2)).abs() < 1e-3);
+        assert!(
+            (sides[1] / (sides[0] + sides[1]) - (angle * 90_f64.to_radians()).sin().powi(2)).abs() < 1e-3
+        );
     }
 }
 

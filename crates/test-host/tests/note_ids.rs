@@ -106,7 +106,13 @@ const TWIN: NoteName = name(2, 0, 60);
 
 const CASES: &[Case] = &[
     // One note.
-    case("its whole name releases a note", &[strike(1, 60), Say::Release(ONE)], &[(0, on(60)), (1, off(60))], None, &[ONE]),
+    case(
+        "its whole name releases a note",
+        &[strike(1, 60), Say::Release(ONE)],
+        &[(0, on(60)), (1, off(60))],
+        None,
+        &[ONE],
+    ),
     case(
         "its id alone does, though the id looks like a key",
         &[strike(64, 60), Say::Release(id(64))],
@@ -114,7 +120,13 @@ const CASES: &[Case] = &[
         None,
         &[name(64, 0, 60)],
     ),
-    case("its key alone does", &[strike(1, 60), Say::Release(key(60))], &[(0, on(60)), (1, off(60))], None, &[ONE]),
+    case(
+        "its key alone does",
+        &[strike(1, 60), Say::Release(key(60))],
+        &[(0, on(60)), (1, off(60))],
+        None,
+        &[ONE],
+    ),
     case(
         "its channel and key do",
         &[strike(1, 60), Say::Release(midi_name(0, 60))],
@@ -122,11 +134,41 @@ const CASES: &[Case] = &[
         None,
         &[ONE],
     ),
-    case("its channel alone does", &[strike(1, 60), Say::Release(channel(0))], &[(0, on(60)), (1, off(60))], None, &[ONE]),
-    case("wildcards alone do", &[strike(1, 60), Say::Release(ANY)], &[(0, on(60)), (1, off(60))], None, &[ONE]),
-    case("another id does not", &[strike(1, 60), Say::Release(name(7, 0, 60))], &[(0, on(60))], Some(60.0), &[]),
-    case("another key does not", &[strike(1, 60), Say::Release(name(1, 0, 61))], &[(0, on(60))], Some(60.0), &[]),
-    case("another channel does not", &[strike(1, 60), Say::Release(name(1, 3, 60))], &[(0, on(60))], Some(60.0), &[]),
+    case(
+        "its channel alone does",
+        &[strike(1, 60), Say::Release(channel(0))],
+        &[(0, on(60)), (1, off(60))],
+        None,
+        &[ONE],
+    ),
+    case(
+        "wildcards alone do",
+        &[strike(1, 60), Say::Release(ANY)],
+        &[(0, on(60)), (1, off(60))],
+        None,
+        &[ONE],
+    ),
+    case(
+        "another id does not",
+        &[strike(1, 60), Say::Release(name(7, 0, 60))],
+        &[(0, on(60))],
+        Some(60.0),
+        &[],
+    ),
+    case(
+        "another key does not",
+        &[strike(1, 60), Say::Release(name(1, 0, 61))],
+        &[(0, on(60))],
+        Some(60.0),
+        &[],
+    ),
+    case(
+        "another channel does not",
+        &[strike(1, 60), Say::Release(name(1, 3, 60))],
+        &[(0, on(60))],
+        Some(60.0),
+        &[],
+    ),
     case(
         "an id that has gone does not",
         &[strike(1, 60), Say::Release(ONE), strike(2, 64), Say::Release(id(1))],
@@ -135,7 +177,13 @@ const CASES: &[Case] = &[
         &[ONE],
     ),
     // Notes of several keys.
-    case("the last note struck is heard", &[strike(1, 60), strike(2, 64)], &[(0, on(60)), (1, on(64))], Some(64.0), &[]),
+    case(
+        "the last note struck is heard",
+        &[strike(1, 60), strike(2, 64)],
+        &[(0, on(60)), (1, on(64))],
+        Some(64.0),
+        &[],
+    ),
     case(
         "its release gives the note before it",
         &[strike(1, 60), strike(2, 64), Say::Release(id(2))],
@@ -293,7 +341,13 @@ const CASES: &[Case] = &[
         &[ONE, TWO],
     ),
     // Choke.
-    case("a choke ends a note", &[strike(1, 60), Say::Choke(id(1))], &[(0, on(60)), (1, choked(60))], None, &[ONE]),
+    case(
+        "a choke ends a note",
+        &[strike(1, 60), Say::Choke(id(1))],
+        &[(0, on(60)), (1, choked(60))],
+        None,
+        &[ONE],
+    ),
     case(
         "a choke of an unheard note is not heard",
         &[strike(1, 60), strike(2, 64), Say::Choke(id(1))],
@@ -308,7 +362,13 @@ const CASES: &[Case] = &[
         Some(60.0),
         &[TWO],
     ),
-    case("a foreign choke does nothing", &[strike(1, 60), Say::Choke(name(9, 0, 60))], &[(0, on(60))], Some(60.0), &[]),
+    case(
+        "a foreign choke does nothing",
+        &[strike(1, 60), Say::Choke(name(9, 0, 60))],
+        &[(0, on(60))],
+        Some(60.0),
+        &[],
+    ),
     case(
         "a choke of everything",
         &[strike(1, 60), strike(2, 64), Say::Choke(ANY)],
@@ -324,7 +384,13 @@ const CASES: &[Case] = &[
         &[TWIN],
     ),
     // What belongs to a note.
-    case("tuning bends the note of its id", &[strike(1, 60), tune(id(1), 0.5)], &[(0, on(60)), (1, bend(50.0))], Some(60.5), &[]),
+    case(
+        "tuning bends the note of its id",
+        &[strike(1, 60), tune(id(1), 0.5)],
+        &[(0, on(60)), (1, bend(50.0))],
+        Some(60.5),
+        &[],
+    ),
     case(
         "tuning for an unheard id bends nothing",
         &[strike(1, 60), strike(2, 64), tune(id(1), 2.92)],
@@ -346,7 +412,13 @@ const CASES: &[Case] = &[
         Some(60.0),
         &[TWIN],
     ),
-    case("tuning for a foreign id bends nothing", &[strike(1, 60), tune(name(7, 0, 60), 3.0)], &[(0, on(60))], Some(60.0), &[]),
+    case(
+        "tuning for a foreign id bends nothing",
+        &[strike(1, 60), tune(name(7, 0, 60), 3.0)],
+        &[(0, on(60))],
+        Some(60.0),
+        &[],
+    ),
     case(
         "tuning for all bends the one that is heard",
         &[strike(1, 60), strike(2, 64), tune(ANY, -1.0)],
@@ -418,7 +490,9 @@ fn every_case_of_the_table_holds() {
                 .unwrap();
             if sound != wanted {
                 let at = sound.iter().zip(&wanted).position(|(one, other)| one != other);
-                wrong.push(format!("{name}: not the instrument's sound, from sample {at:?}, in blocks of {block}"));
+                wrong.push(format!(
+                    "{name}: not the instrument's sound, from sample {at:?}, in blocks of {block}"
+                ));
             }
             let told: Vec<NoteName> = told.into_iter().map(|(_, name)| name).collect();
             if told != *over {

@@ -168,18 +168,18 @@ impl Player {
         }
     }
 
-    /// Whether a choke of this note would silence something: it sounds, or no key is down and something may fade.
+    /// Whether a choke of this note silences something: it sounds, or no key is down and it may fade.
     pub fn is_heard(&self, note: SoundingNote) -> bool {
         self.keys.last().is_none_or(|last| last == note)
     }
 
     /// A key comes up and its note is about to be cut; the note held before it begins anew behind the tongue.
     fn choke<F: Real>(&mut self, note: SoundingNote, model: &Model, voice: &mut Voice<F>) {
-        if !self.is_heard(note) {
-            self.keys.release(note);
+        let sounding = self.keys.last() == Some(note);
+        self.keys.release(note);
+        if !sounding {
             return;
         }
-        self.keys.release(note);
         match self.keys.last().and_then(|last| model.fingering_for(last)) {
             Some(fingering) => {
                 self.tongue.hold();

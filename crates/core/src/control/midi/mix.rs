@@ -50,9 +50,6 @@ impl Mix {
         let position = (position + note_pan).clamp(-1.0, 1.0);
         let has_gain = std::mem::replace(&mut self.gain, gain) != gain;
         let has_moved = std::mem::replace(&mut self.position, position) != position;
-        [
-            has_gain.then_some(Event::Volume { gain }),
-            has_moved.then_some(Event::Pan { position }),
-        ]
+        [has_gain.then_some(Event::Volume { gain }), has_moved.then_some(Event::Pan { position })]
     }
 }

@@ -355,7 +355,11 @@ fn an_id_names_one_note_and_no_other() {
     let mut midi = MidiDecoder::new();
     midi.strike(note(1, 60), 127);
     midi.strike(note(2, 64), 127);
-    assert_eq!(midi.release(NoteAddress { id: Some(7), channel: Some(0), key: Some(64) }), NOTHING, "foreign");
+    assert_eq!(
+        midi.release(NoteAddress { id: Some(7), channel: Some(0), key: Some(64) }),
+        NOTHING,
+        "foreign"
+    );
     assert_eq!(midi.release(NoteAddress { id: Some(2), key: Some(60), ..id(2) }), NOTHING, "another key");
     assert_eq!(midi.release(id(2)), [off(64)], "the id is enough");
     assert_eq!(midi.over(), [note(2, 64)]);
