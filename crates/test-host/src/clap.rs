@@ -22,11 +22,11 @@ use clack_extensions::tail::PluginTail;
 pub use clack_extensions::tail::TailLength;
 use clack_extensions::voice_info::PluginVoiceInfo;
 pub use clack_extensions::voice_info::{VoiceInfo, VoiceInfoFlags};
+use clack_host::events::Match;
 pub use clack_host::events::event_types::NoteExpressionType;
 use clack_host::events::event_types::{
     MidiEvent, NoteChokeEvent, NoteExpressionEvent, NoteOffEvent, NoteOnEvent, ParamModEvent, ParamValueEvent,
 };
-use clack_host::events::Match;
 use clack_host::events::spaces::CoreEventSpace;
 pub use clack_host::prelude::ProcessStatus;
 use clack_host::prelude::*;
@@ -83,7 +83,12 @@ impl NoteName {
         fn part<T>(part: Option<T>) -> Match<T> {
             part.map_or(Match::All, Match::Specific)
         }
-        Pckn { port_index: Match::All, channel: part(self.channel), key: part(self.key), note_id: part(self.id) }
+        Pckn {
+            port_index: Match::All,
+            channel: part(self.channel),
+            key: part(self.key),
+            note_id: part(self.id),
+        }
     }
 
     fn of(pckn: Pckn) -> Self {
