@@ -403,8 +403,10 @@ fn a_right_click_asks_for_the_hosts_menu_and_moves_nothing() {
     window.harness.run();
     let at = (contrast.x.round() as i32, contrast.y.round() as i32);
     assert_eq!(window.host.menus(), [("contr".to_owned(), at)]);
-    for (name, id) in [("Feel order", "order"), ("OSC from network", "oscany")] {
-        window.harness.get_by_label(name).click_secondary();
+    for (role, name, id) in
+        [(Role::ComboBox, "Feel order", "order"), (Role::Switch, "OSC from network", "oscany")]
+    {
+        window.harness.get_by_role_and_label(role, name).click_secondary();
         window.harness.run();
         let asked: Vec<_> = window.host.menus().into_iter().map(|(asked, _)| asked).collect();
         assert_eq!(asked, [id]);

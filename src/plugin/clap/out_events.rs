@@ -203,7 +203,6 @@ mod tests {
         send((&raw const moved[2]).cast());
         params.moments.press(crate::plugin::params::moment::Moment::Rest);
         out.push_off(&params, 63);
-        drop(out);
         let (set, begin) = (CLAP_EVENT_PARAM_VALUE, CLAP_EVENT_PARAM_GESTURE_BEGIN);
         let expected =
             [(set, 0, 5.0), (CLAP_EVENT_MIDI, 40, 0.0), (begin, 40, 0.0), (set, 40, 0.7), (set, 63, 6_976.0)];

@@ -304,7 +304,7 @@ mod tests {
         let a4 = Wanted { a4_hz: 414.9, ..wanted.clone() };
         let refused = Preparation::new(&a4, None).rough().unwrap_err();
         assert_eq!(refused.to_string(), "A4 must lie in 415..466 Hz, got 414.9");
-        let slow = Wanted { host_rate_hz: 8_000.0, ..wanted };
+        let slow = Wanted { host_rate_hz: 800.0, ..wanted };
         assert!(matches!(Preparation::new(&slow, None).ready(), Err(BuildError::Rate(_))));
     }
 }
