@@ -159,7 +159,7 @@ pub struct OutputParams {
     /// [`Settings::gain_db`].
     #[id = "gain"]
     pub gain: FloatParam,
-    /// Silences everything once, when it is switched on; see [`Moment::Panic`].
+    /// Silences everything once, when it is switched on; see `moment`.
     #[id = "panic"]
     pub panic: BoolParam,
 }

@@ -12,7 +12,8 @@ use crate::score::timeline::Score;
 /// use chalumeau_core::units::SoundingNote;
 ///
 /// let score = Score::note(SoundingNote(60), 1.0, 48_000);
-/// let [left, right] = StereoBlocks::new(&score, 48_000).spread(&[0.1, 0.2]);
+/// let mut blocks = StereoBlocks::new(&score, 48_000);
+/// let [left, right] = blocks.spread(&[0.1, 0.2]);
 /// assert_eq!((left, right), (&[0.1, 0.2][..], &[0.1, 0.2][..]));
 /// ```
 pub struct StereoBlocks<'a> {
