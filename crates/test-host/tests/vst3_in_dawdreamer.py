@@ -31,6 +31,14 @@ def render(engine, plugin, seconds):
     return left
 
 
+def restore(plugin, path):
+    try:
+        plugin.load_state(path)
+    except RuntimeError as error:
+        # DawDreamer 0.9 loads the state, then wants to open an editor to make the plugin notice it.
+        assert "no available editor" in str(error), error
+
+
 def index(plugin, name):
     return next(p["index"] for p in plugin.get_parameters_description() if p["name"] == name)
 
@@ -125,14 +133,34 @@ def state_makes_the_round_trip():
     path = str(SCRATCH / "state")
     plugin.save_state(path)
     other_engine, other = load()
-    try:
-        other.load_state(path)
-    except RuntimeError as error:
-        # DawDreamer 0.9 loads the state, then wants to open an editor to make the plugin notice it.
-        assert "no available editor" in str(error), error
+    restore(other, path)
     render(other_engine, other, 0.1)
     assert abs(other.get_parameter(zeta) - 0.625) < 1e-5 and other.get_parameter(coupled) == 0.0
     assert other.get_parameter_text(coupled) == "Free"
+
+
+def values_set_live_sound_like_the_same_values_from_a_state():
+    random = np.random.default_rng(7)
+    for _ in range(3):
+        engine, plugin = load()
+        for parameter in plugin.get_parameters_description():
+            # Switches of the knob, and another instrument, which is exchanged while it plays.
+            if parameter["name"] in OURS[:-1]:
+                plugin.set_parameter(parameter["index"], float(random.uniform()))
+        heard = []
+        for _ in range(2):
+            plugin.clear_midi()
+            plugin.add_midi_note(58, 100, 0.05, 0.4)
+            plugin.add_midi_note(62, 90, 0.5, 0.3)
+            heard.append(render(engine, plugin, 1.0))
+        assert np.array_equal(heard[0], heard[1]), "from the first start of processing on"
+        path = str(SCRATCH / "live")
+        plugin.save_state(path)
+        other_engine, other = load()
+        restore(other, path)
+        other.add_midi_note(58, 100, 0.05, 0.4)
+        other.add_midi_note(62, 90, 0.5, 0.3)
+        assert np.array_equal(render(other_engine, other, 1.0), heard[0]), "from the saved state"
 
 
 TESTS = [
@@ -143,6 +171,7 @@ TESTS = [
     the_wheel_bends,
     the_breath_parameter_follows_automation,
     state_makes_the_round_trip,
+    values_set_live_sound_like_the_same_values_from_a_state,
 ]
 
 failed = 0

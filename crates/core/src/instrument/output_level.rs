@@ -22,6 +22,8 @@ pub(super) struct OutputLevel {
     target: f32,
     step: f32,
     volume: Glide,
+    /// No sample has passed since [`settle`](Self::settle): a new gain cannot click, so it holds from the first sample on.
+    is_fresh: bool,
 }
 
 impl OutputLevel {
@@ -35,6 +37,7 @@ impl OutputLevel {
             target: gain,
             step: (1.0 / (GAIN_S * host_rate_hz)) as f32,
             volume: Glide::new(1.0, VOLUME_S, host_rate_hz),
+            is_fresh: false,
         }
     }
 
@@ -58,11 +61,15 @@ impl OutputLevel {
     /// Goes to the gain of these settings.
     pub fn set(&mut self, settings: &Settings) {
         self.target = gain(settings, self.full_scale_per_pa);
+        if self.is_fresh {
+            self.gain = self.target;
+        }
     }
 
     /// Arrives at once.
     pub fn settle(&mut self) {
         self.gain = self.target;
+        self.is_fresh = true;
     }
 
     /// How many times larger samples are than without the user's gain; 1 where the gain makes them smaller.
@@ -72,6 +79,7 @@ impl OutputLevel {
 
     /// Pascals become samples.
     pub fn apply(&mut self, out: &mut [f32]) {
+        self.is_fresh = false;
         for sample in &mut *out {
             if self.gain != self.target {
                 let step = (self.target - self.gain) * self.step;
@@ -89,4 +97,33 @@ impl OutputLevel {
 
 fn gain(settings: &Settings, full_scale_per_pa: f64) -> f32 {
     (full_scale_per_pa * 10.0_f64.powf(f64::from(settings.gain_db) / 20.0)) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn applied(level: &mut OutputLevel) -> [f32; 4] {
+        let mut out = [1.0; 4];
+        level.apply(&mut out);
+        out
+    }
+
+    #[test]
+    fn after_a_reset_it_does_not_matter_whether_the_gain_came_before_or_after() {
+        let quiet = Settings { gain_db: -12.0, ..Settings::default() };
+        let fresh = || OutputLevel::new(REFERENCE_RADIUS_M, 48_000.0);
+        let (mut before, mut after) = (fresh(), fresh());
+        before.set(&quiet);
+        before.settle();
+        after.settle();
+        after.set(&quiet);
+        let first = applied(&mut before);
+        assert_eq!(applied(&mut after), first);
+        assert_eq!(first[0], first[3], "it does not glide");
+        // While it plays, it glides.
+        after.set(&Settings::default());
+        let gliding = applied(&mut after);
+        assert!(gliding[0] < gliding[3], "{gliding:?}");
+    }
 }
