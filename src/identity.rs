@@ -25,3 +25,7 @@ pub const DESCRIPTION: &str = "A clarinet you play by touch";
 pub const CLAP_ID: &str = "chalumeau.clarinet";
 /// VST3 class id.
 pub const VST3_CLASS_ID: [u8; 16] = *b"ChalumeauClarint";
+/// Name of the VST3 without MIDI controllers.
+pub const NOTES_ONLY_NAME: &str = "Chalumeau (notes only)";
+/// VST3 class id of the plugin without MIDI controllers.
+pub const NOTES_ONLY_VST3_CLASS_ID: [u8; 16] = *b"ChalumeauNotesOn";

@@ -13,6 +13,7 @@
 //! - `window`: the editor in the host's window
 //! - `host_link`: what the plugin's threads tell the host; `clap`: what the framework's CLAP lacks
 //! - `launch_options`: what the standalone program sets
+//! - `notes_only`: the VST3 without MIDI controllers
 
 mod breath_sources;
 mod clap;
@@ -22,6 +23,7 @@ pub mod instrument_loading;
 #[cfg(feature = "devices")]
 mod knob;
 pub mod launch_options;
+mod notes_only;
 mod params;
 mod reed_controllers;
 mod translate_events;
@@ -46,6 +48,7 @@ use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::{Clarinet, Settings};
 use host_inputs::HostInputs;
 use instrument_loading::{InstrumentLoader, InstrumentSwap, SharedInstrument};
+pub use notes_only::NotesOnly;
 use params::moment::Moment;
 use window::{HostWindow, PluginWindow, WindowAudio};
 
@@ -115,6 +118,35 @@ impl Plugin for Chalumeau {
         config: &BufferConfig,
         context: &mut impl ActivateContext<Self>,
     ) -> bool {
+        self.start(config, context)
+    }
+
+    fn reset(&mut self) {
+        self.forget();
+    }
+
+    fn process(
+        &mut self,
+        buffer: &mut Buffer,
+        _aux: &mut AuxiliaryBuffers,
+        context: &mut impl ProcessContext<Self>,
+    ) -> ProcessStatus {
+        self.play(buffer.as_slice(), context)
+    }
+
+    fn deactivate(&mut self) {
+        self.forget();
+    }
+}
+
+/// What every kind of the plugin does: this one, and those that contain it.
+impl Chalumeau {
+    /// Makes the plugin ready to play. `false` if there is no instrument for this rate. [main thread]
+    pub fn start<P: Plugin<SysExMessage = ()>>(
+        &mut self,
+        config: &BufferConfig,
+        context: &mut impl ActivateContext<P>,
+    ) -> bool {
         self.offline = config.process_mode == ProcessMode::Offline;
         self.start_threads();
         let Some(loader) = &mut self.loader else { return false };
@@ -132,11 +164,12 @@ impl Plugin for Chalumeau {
             instrument.set_settings(&self.settings);
             context.set_latency_samples(instrument.clarinet().latency_samples());
         }
-        self.reset();
+        self.forget();
         true
     }
 
-    fn reset(&mut self) {
+    /// Silences everything, and forgets notes and breath. Real-time safe.
+    pub fn forget(&mut self) {
         self.inputs.reset();
         self.moved.reset(&self.params);
         #[cfg(feature = "devices")]
@@ -148,13 +181,13 @@ impl Plugin for Chalumeau {
         }
     }
 
-    fn process(
+    /// Renders one block into all `channels`, which are of the same length. Real-time safe.
+    pub fn play<P: Plugin<SysExMessage = ()>>(
         &mut self,
-        buffer: &mut Buffer,
-        _aux: &mut AuxiliaryBuffers,
-        context: &mut impl ProcessContext<Self>,
+        channels: &mut [&mut [f32]],
+        context: &mut impl ProcessContext<P>,
     ) -> ProcessStatus {
-        let [out, others @ ..] = buffer.as_slice() else { return ProcessStatus::Normal };
+        let [out, others @ ..] = channels else { return ProcessStatus::Normal };
         let Some(instrument) = &mut self.instrument else {
             return ProcessStatus::Error("not activated");
         };
@@ -221,12 +254,6 @@ impl Plugin for Chalumeau {
         rest_status(&self.params, instrument, is_watched)
     }
 
-    fn deactivate(&mut self) {
-        self.reset();
-    }
-}
-
-impl Chalumeau {
     /// Starts the threads of loader, knob and window, once.
     fn start_threads(&mut self) {
         let (params, instrument) = (&self.params, &self.shared_instrument);
@@ -242,6 +269,18 @@ impl Chalumeau {
         };
         self.window.get_or_insert_with(|| PluginWindow::start(&handles()));
     }
+}
+
+/// Hands tasks of the plugin on through the framework's wrapper of a plugin that contains it.
+pub fn executor_of<P>(outer: AsyncExecutor<P>) -> AsyncExecutor<Chalumeau>
+where
+    P: Plugin<BackgroundTask = <Chalumeau as Plugin>::BackgroundTask>,
+{
+    let background = outer.clone();
+    AsyncExecutor::new(
+        Arc::new(move |task| background.execute_background(task)),
+        Arc::new(move |task| outer.execute_gui(task)),
+    )
 }
 
 /// Handles to what the threads of one plugin instance share.
@@ -291,8 +330,8 @@ impl MovedParameters {
 
 /// Sends the host what a block has made, in order of time: notes that have ended, which only CLAP knows, and breath of the
 /// knob at a sample, as CC2 and CC34.
-fn answer(
-    context: &mut impl ProcessContext<Chalumeau>,
+fn answer<P: Plugin<SysExMessage = ()>>(
+    context: &mut impl ProcessContext<P>,
     ended: &[(u32, Note)],
     blown: impl Iterator<Item = (usize, (u8, u8))>,
 ) {
@@ -308,7 +347,7 @@ fn answer(
 }
 
 /// Tells the host that a note has ended.
-fn send_end(context: &mut impl ProcessContext<Chalumeau>, timing: u32, note: Note) {
+fn send_end<P: Plugin<SysExMessage = ()>>(context: &mut impl ProcessContext<P>, timing: u32, note: Note) {
     let Note { id, channel, key } = note;
     let voice_id = id.map_or(VoiceID::Wildcard, VoiceID::ID);
     let (channel, key) = (Channel::Number(channel), Key::Number(key));
@@ -317,7 +356,11 @@ fn send_end(context: &mut impl ProcessContext<Chalumeau>, timing: u32, note: Not
 }
 
 /// Sends one breath value of the knob to the host.
-fn send_breath(context: &mut impl ProcessContext<Chalumeau>, at: usize, (coarse, fine): (u8, u8)) {
+fn send_breath<P: Plugin<SysExMessage = ()>>(
+    context: &mut impl ProcessContext<P>,
+    at: usize,
+    (coarse, fine): (u8, u8),
+) {
     for (cc, byte) in [(2, coarse), (34, fine)] {
         let (timing, value) = (at as u32, f32::from(byte) / 127.0);
         // If the host takes no events, it only loses the recording.
@@ -351,7 +394,7 @@ mod export {
     // The VST3's entry points are C functions, which the macro below defines. The CLAP's are in `clap`.
     #![allow(unsafe_code)]
 
-    use super::Chalumeau;
+    use super::{Chalumeau, NotesOnly};
 
-    nice_plug::nice_export_vst3!(Chalumeau);
+    nice_plug::nice_export_vst3!(Chalumeau, NotesOnly);
 }

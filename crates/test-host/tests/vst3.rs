@@ -34,11 +34,19 @@ fn load(block: usize) -> Loaded {
 
 /// For a second plugin in the same test.
 fn load_beside(block: usize) -> Loaded {
+    load_class(block, None)
+}
+
+/// The class of this id, or the first one.
+fn load_class(block: usize, id: Option<&str>) -> Loaded {
     let path = chalumeau_test_host::artefacts::vst3().unwrap();
     let load = || {
         let mut host = Vst3Host::builder().sample_rate(RATE).block_size(block).build().unwrap();
-        let plugin = host.load_plugin(&path).unwrap();
-        (plugin, host)
+        let plugin = match id {
+            Some(id) => host.load_plugin_class(&path, id),
+            None => host.load_plugin(&path),
+        };
+        (plugin.unwrap(), host)
     };
     // One stays loaded for good, so that the library does: see `chalumeau_test_host::clap::Plugin::load`.
     static FIRST: Once = Once::new();
@@ -220,6 +228,27 @@ fn state_makes_the_round_trip() {
     assert!((value(&other, "Embouchure zeta") - 0.625).abs() < 1e-6);
     assert_eq!(value(&other, "Reed coupled"), 0.0);
     assert_eq!(other.plugin.save_state().unwrap(), saved);
+}
+
+#[test]
+fn without_controllers_it_has_few_parameters_and_the_same_sound_and_state() {
+    let _turn = turn();
+    // "ChalumeauNotesOn".
+    let mut notes = load_class(64, Some("4368616C756D6561754E6F7465734F6E"));
+    let names = |loaded: &Loaded| loaded.plugin.get_parameters().unwrap().into_iter().map(|param| param.name);
+    let mut full = load_beside(64);
+    let ours: Vec<_> = names(&full).filter(|name| !name.starts_with("MIDI")).collect();
+    assert_eq!(names(&notes).collect::<Vec<_>>(), ours);
+    notes.plugin.start_processing().unwrap();
+    let heard = play_on(&mut notes, 64, &[(100, on(60)), (9_000, off(60))], SECOND / 4);
+    let events = [(100, note_on(60)), (9_000, Event::NoteOff { note: SoundingNote(60) })];
+    assert!(heard == offline(&events, SECOND / 4));
+    play_on(&mut notes, 64, &[(0, Word::Set("Embouchure zeta", 0.625))], 64);
+    let saved = notes.plugin.save_state().unwrap();
+    full.plugin.load_state(&saved).unwrap();
+    assert_eq!(full.plugin.save_state().unwrap(), saved);
+    notes.plugin.load_state(&saved).unwrap();
+    assert_eq!(notes.plugin.save_state().unwrap(), saved);
 }
 
 #[test]
