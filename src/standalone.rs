@@ -2,20 +2,27 @@
 //!
 //! The framework opens one backend. Asked for *auto*, it may silently choose one that makes no sound. So this program
 //! tries each backend by itself. If none opens, it prints which ones it tried, why they failed, and what to do.
+//!
+//! - `arguments`: the command line; `log`: what the framework logs; `quit`: the end on Ctrl-C
+//! - `standalone_plugin`: the plugin as the framework runs it here
+//! - `jack`: plays to a JACK server, and survives its death
 
 mod arguments;
+mod jack;
 mod log;
+mod quit;
+mod standalone_plugin;
 
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Parser;
 use nice_plug::prelude::nice_export_standalone_with_args;
 
-use crate::plugin::Chalumeau;
 use crate::plugin::launch_options::LaunchOptions;
 use arguments::{Args, Backend};
+use jack::{JackClient, JackLink};
+use standalone_plugin::StandalonePlugin;
 
 /// Reads the arguments and plays until the user quits. Exit codes: 0, it has played; 1, no backend opened; 2, a mistake in
 /// the arguments.
@@ -34,11 +41,11 @@ pub fn main() -> ExitCode {
         instrument_file,
         a4_hz: args.a4,
         has_window: !args.no_window && !lacks_display,
-        before_window: listen_for_signals,
-        quit: Arc::default(),
+        quit: AtomicBool::new(false),
         window_failed: AtomicBool::new(false),
     }
     .set();
+    quit::listen(options);
     // Without this, the program would go on without sound after a panic on a backend's thread.
     std::panic::set_hook(Box::new(|why| {
         eprintln!("chalumeau-standalone: {why}");
@@ -47,7 +54,19 @@ pub fn main() -> ExitCode {
     let mut tried = Vec::new();
     for backend in args.backends() {
         last_error.clear();
-        if nice_export_standalone_with_args::<Chalumeau, _>(args.for_framework(backend)) {
+        let words = match (backend == Backend::Jack).then(JackClient::open) {
+            None => args.for_framework(backend, args.sample_rate),
+            Some(Ok(client)) => {
+                let words = args.for_framework(Backend::Dummy, client.rate_hz());
+                JackLink::offer(client, args.jack_ports());
+                words
+            }
+            Some(Err(reason)) => {
+                tried.push((backend, reason));
+                continue;
+            }
+        };
+        if nice_export_standalone_with_args::<StandalonePlugin, _>(words) {
             return ExitCode::SUCCESS;
         }
         if options.window_failed.load(Ordering::Relaxed) {
@@ -58,22 +77,10 @@ pub fn main() -> ExitCode {
         if let Some(code) = device_list_answer(&reason) {
             return code;
         }
-        tried.push((backend, plain_reason(&reason)));
+        tried.push((backend, reason));
     }
     eprintln!("{}", no_backend_message(&tried));
     ExitCode::FAILURE
-}
-
-/// Makes Ctrl-C and its like set `quit`, which closes the window. The framework, once it has a window, waits only for
-/// that; and it would remove a handler that was registered before the window opens.
-fn listen_for_signals(quit: &Arc<AtomicBool>) {
-    #[cfg(unix)]
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        // If this fails, the user can still close the window.
-        let _ = signal_hook::flag::register(signal, quit.clone());
-    }
-    #[cfg(not(unix))]
-    let _ = quit;
 }
 
 /// Whether windows need X11 here and it is missing.
@@ -94,11 +101,6 @@ fn device_list_answer(reason: &str) -> Option<ExitCode> {
     }
     eprintln!("chalumeau-standalone: {asked}; available devices:\n{list}");
     Some(ExitCode::from(2))
-}
-
-/// A reason in words, where the library gives only the names of status bits.
-fn plain_reason(reason: &str) -> String {
-    if reason.contains("SERVER_FAILED") { "no JACK server is running".to_owned() } else { reason.to_owned() }
 }
 
 /// Which backends were tried, why they failed, what to do.
@@ -126,7 +128,7 @@ mod tests {
     #[test]
     fn the_message_says_what_was_tried_why_it_failed_and_what_to_do() {
         let text = no_backend_message(&[
-            (Backend::Jack, plain_reason("client error, status is ClientStatus(FAILURE | SERVER_FAILED)")),
+            (Backend::Jack, "no JACK server is running".to_owned()),
             (arguments::SYSTEM, "no card".to_owned()),
         ]);
         for word in ["tried jack: no JACK server is running", "no card", "--output-device", "--backend dummy"]

@@ -4,7 +4,7 @@
 //! the plugin. The standalone sets them once, before it starts the framework. In a host nobody sets them.
 
 use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, OnceLock};
+use std::sync::OnceLock;
 
 use super::params::instrument::InstrumentChoice;
 
@@ -21,10 +21,8 @@ pub struct LaunchOptions {
     pub a4_hz: f32,
     /// Whether the plugin has a window.
     pub has_window: bool,
-    /// The plugin calls this with `quit` just before its window opens.
-    pub before_window: fn(&Arc<AtomicBool>),
-    /// The open window closes when this is set.
-    pub quit: Arc<AtomicBool>,
+    /// The user wants the program to end: the open window closes.
+    pub quit: AtomicBool,
     /// The plugin sets this when its window could not open.
     pub window_failed: AtomicBool,
 }

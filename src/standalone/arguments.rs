@@ -2,6 +2,7 @@
 
 use clap::{Parser, ValueEnum};
 
+use super::jack::JackPorts;
 use crate::plugin::InstrumentChoice;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
@@ -31,7 +32,7 @@ pub struct Args {
     pub backend: Backend,
     /// Sample rate, 1000..1536000 Hz; JACK sets its own.
     #[arg(short = 'r', long, value_name = "HZ", default_value = "48000", value_parser = rate)]
-    sample_rate: f32,
+    pub sample_rate: f32,
     /// Samples per block, 16..8192; JACK sets its own. Small blocks respond faster, but the sound may drop out.
     #[arg(short, long, value_name = "SAMPLES", default_value = "256",
           value_parser = clap::value_parser!(u32).range(16..=8192))]
@@ -144,25 +145,31 @@ fn instrument(text: &str) -> Result<(InstrumentChoice, String), String> {
 }
 
 impl Args {
-    /// The arguments for the framework.
-    pub fn for_framework(&self, backend: Backend) -> Vec<String> {
+    /// The arguments for the framework. With JACK it runs the dummy backend at the server's rate, Hz.
+    pub fn for_framework(&self, backend: Backend, rate_hz: f32) -> Vec<String> {
         let mut words = vec!["chalumeau-standalone".to_owned()];
         let mut add = |name: &str, value: String| words.push(format!("--{name}={value}"));
         add("backend", backend.name());
-        add("sample-rate", self.sample_rate.to_string());
+        add("sample-rate", rate_hz.to_string());
         add("period-size", self.period_size.to_string());
         for (name, value) in [
             ("output-device", &self.output_device),
             ("midi-input", &self.midi_input),
             ("midi-output", &self.midi_output),
-            ("connect-jack-midi-input", &self.connect_jack_midi_input),
-            ("connect-jack-midi-output", &self.connect_jack_midi_output),
         ] {
             if let Some(value) = value {
                 add(name, value.clone());
             }
         }
         words
+    }
+
+    /// The JACK ports to connect to.
+    pub fn jack_ports(&self) -> JackPorts {
+        JackPorts {
+            midi_input: self.connect_jack_midi_input.clone(),
+            midi_output: self.connect_jack_midi_output.clone(),
+        }
     }
 
     /// The backends to try, in this order. A user who names a sound card or a MIDI port of the system wants the system's
@@ -213,7 +220,8 @@ mod tests {
 
     #[test]
     fn the_framework_gets_the_arguments_of_the_user() {
-        let words = args(&["-r", "44100", "-o", "", "-m", "Wind"]).for_framework(SYSTEM);
+        let args = args(&["-r", "44100", "-o", "", "-m", "Wind"]);
+        let words = args.for_framework(SYSTEM, args.sample_rate);
         for word in ["--sample-rate=44100", "--output-device=", "--midi-input=Wind"] {
             assert!(words.iter().any(|said| said == word), "{words:?}");
         }

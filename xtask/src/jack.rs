@@ -15,7 +15,11 @@ const KILLS: &str = "when_its_host_is_killed";
 /// shows only now and then may pass here; the knob's other steps, without JACK, are run once.
 const ATTEMPTS: usize = 3;
 
-/// Starts the server and runs `crates/test-host/tests/knob_midi.rs` and the ignored test of `standalone.rs`.
+/// Of the server that the tests start and kill by themselves.
+const MORTAL: &str = "chalumeau-mortal";
+
+/// Starts the server and runs `crates/test-host/tests/knob_midi.rs` and the ignored test of `standalone.rs`; then
+/// `jack_death.rs`, which starts servers and kills them.
 pub fn test() -> Result<()> {
     let Programs { plugin, program, standalone } = programs()?;
     // Killed clients leave a server in a state in which it may run no new ones: the test that kills comes last, alone.
@@ -44,5 +48,14 @@ pub fn test() -> Result<()> {
         .args(TESTS)
         .args(["--test", "standalone", "--", "--ignored", "it_plays_to_jack"])
         .env(artefacts::STANDALONE, standalone);
-    machine::run(server.for_clients(&mut command))
+    machine::run(server.for_clients(&mut command))?;
+    drop(server);
+    let mut command = machine::cargo();
+    command
+        .args(TESTS)
+        .args(["--test", "jack_death", "--", "--ignored", "--nocapture", "--test-threads=1"])
+        .env(artefacts::STANDALONE, standalone)
+        .env("JACK_DEFAULT_SERVER", MORTAL)
+        .env("JACK_NO_START_SERVER", "1");
+    machine::run(&mut command)
 }

@@ -1,13 +1,16 @@
 //! A JACK server without a sound card or real-time priority, so that programs under test can exchange MIDI and sound.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 
 use crate::machine;
+
+/// Rate of a server whose rate does not matter, Hz.
+const RATE_HZ: u32 = 48_000;
 
 /// Frames of a JACK period at 48 kHz: a message takes up to two of them, 11 ms.
 const PERIOD_FRAMES: &str = "256";
@@ -24,7 +27,7 @@ const NAMES: [&str; 3] = ["chalumeau-1", "chalumeau-2", "chalumeau-3"];
 
 /// A JACK server with neither sound card nor real-time priority; ends when dropped.
 pub struct JackServer {
-    name: &'static str,
+    name: String,
     child: Child,
 }
 
@@ -33,7 +36,7 @@ impl JackServer {
     pub fn start() -> Result<Self> {
         let mut complaints = String::new();
         for name in NAMES {
-            match Self::named(name) {
+            match Self::named(name, RATE_HZ) {
                 Ok(server) => return Ok(server),
                 Err(reason) => complaints += &format!("\n{name}: {reason:#}"),
             }
@@ -41,7 +44,19 @@ impl JackServer {
         bail!("jackd does not run here:{complaints}")
     }
 
-    fn named(name: &'static str) -> Result<Self> {
+    /// Starts a server of this name at this rate, Hz, and waits until it answers.
+    pub fn named(name: &str, rate_hz: u32) -> Result<Self> {
+        let (mut server, log) = Self::spawn(name, rate_hz)?;
+        server.wait(&log)?;
+        Ok(server)
+    }
+
+    /// As [`named`](Self::named), but does not wait.
+    pub fn beginning(name: &str, rate_hz: u32) -> Result<Self> {
+        Ok(Self::spawn(name, rate_hz)?.0)
+    }
+
+    fn spawn(name: &str, rate_hz: u32) -> Result<(Self, PathBuf)> {
         let folder = machine::target().join("jack");
         fs::create_dir_all(&folder)?;
         let log = folder.join(format!("{name}.log"));
@@ -55,7 +70,7 @@ impl JackServer {
                 "-d",
                 "dummy",
                 "-r",
-                "48000",
+                &rate_hz.to_string(),
                 "-p",
                 PERIOD_FRAMES,
             ])
@@ -65,9 +80,21 @@ impl JackServer {
             .stdout(out)
             .spawn()
             .context("cannot start jackd")?;
-        let mut server = Self { name, child };
-        server.wait(&log)?;
-        Ok(server)
+        Ok((Self { name: name.to_owned(), child }, log))
+    }
+
+    /// Kills the server as a crash would.
+    pub fn kill(mut self) -> Result<()> {
+        self.child.kill()?;
+        self.child.wait()?;
+        Ok(())
+    }
+
+    /// Stops the server, which then answers nobody, or lets it go on.
+    pub fn freeze(&self, frozen: bool) -> Result<()> {
+        let signal = if frozen { "STOP" } else { "CONT" };
+        let command = format!("kill -{signal} {}", self.child.id());
+        machine::run(Command::new("sh").args(["-c", &command]))
     }
 
     /// Until it answers.
@@ -89,13 +116,16 @@ impl JackServer {
 
     /// Makes a program, and those it starts, clients of this server and of no other.
     pub fn for_clients<'a>(&self, command: &'a mut Command) -> &'a mut Command {
-        command.env("JACK_DEFAULT_SERVER", self.name).env("JACK_NO_START_SERVER", "1")
+        command.env("JACK_DEFAULT_SERVER", &self.name).env("JACK_NO_START_SERVER", "1")
     }
 }
 
 impl Drop for JackServer {
     fn drop(&mut self) {
-        // Asked, it removes its shared memory.
-        let _ = machine::terminate(&mut self.child);
+        if matches!(self.child.try_wait(), Ok(None)) {
+            // A frozen one hears nothing. Asked, it removes its shared memory.
+            let _ = self.freeze(false);
+            let _ = machine::terminate(&mut self.child);
+        }
     }
 }

@@ -57,9 +57,6 @@ impl Editor for HostWindow {
         gui: GuiContext,
         host: Option<HostMethods>,
     ) -> Result<SpawnedEditor<Self::Handle>, Box<dyn Error>> {
-        if let Some(options) = LaunchOptions::get() {
-            (options.before_window)(&options.quit);
-        }
         let (size, zoom, _) = self.measures();
         // The framework's state of the window lasts from opening to closing; the project keeps the rest.
         let state = EguiEditorState::from_size(size, zoom);

@@ -1,0 +1,282 @@
+//! The link to the JACK server: begins to play, watches the server, and waits for the next one when it has gone.
+
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use nice_plug::context::PluginApi;
+use nice_plug::prelude::*;
+
+use super::client::{Connection, Health, JackClient, MIDI_INPUT, MIDI_OUTPUT, PlayingClient};
+use crate::plugin::Chalumeau;
+
+/// How often the link looks at the server.
+const POLL: Duration = Duration::from_millis(50);
+/// How often it tries to open a client while no server answers.
+const RETRY: Duration = Duration::from_millis(300);
+/// How often it notes or makes connections.
+const CONNECTING: Duration = Duration::from_secs(1);
+/// How long the program waits for the client to close when it ends.
+const CLOSING: Duration = Duration::from_millis(800);
+
+const GONE: &str = "the JACK server has ended; no sound until it runs again (Ctrl-C quits)";
+const STALLED: &str = "the JACK server does not call; no sound until it does (Ctrl-C quits)";
+const BACK: &str = "the JACK server is back; playing";
+
+/// An opened client on its way from `main` to the plugin, which the framework makes by itself.
+static OFFERED: Mutex<Option<(JackClient, JackPorts)>> = Mutex::new(None);
+
+/// Ports of other programs that the user wants to be connected.
+#[derive(Clone, Debug, Default)]
+pub struct JackPorts {
+    /// Its MIDI plays the plugin.
+    pub midi_input: Option<String>,
+    /// It receives a knob's breath.
+    pub midi_output: Option<String>,
+}
+
+impl JackPorts {
+    fn connections(self) -> Vec<Connection> {
+        let midi = [(MIDI_INPUT, self.midi_input), (MIDI_OUTPUT, self.midi_output)];
+        let midi = midi.into_iter().filter_map(|(own, other)| Some(Connection { own, other: other? }));
+        Connection::to_sound_card().chain(midi).collect()
+    }
+}
+
+/// The link of one plugin to the JACK server. Dropping it closes the client.
+pub struct JackLink {
+    plugin: Arc<Mutex<Chalumeau>>,
+    shared: Arc<LinkShared>,
+    first: Mutex<Option<(JackClient, JackPorts)>>,
+    thread: Mutex<Option<JoinHandle<()>>>,
+}
+
+/// What the link thread shares with the main thread.
+struct LinkShared {
+    /// The server's sample rate, the bits of an f32, Hz.
+    rate_hz: AtomicU32,
+    stop: AtomicBool,
+}
+
+impl LinkShared {
+    fn rate_hz(&self) -> f32 {
+        f32::from_bits(self.rate_hz.load(Ordering::Relaxed))
+    }
+}
+
+impl JackLink {
+    /// Offers a client to the plugin that is made next.
+    pub fn offer(client: JackClient, ports: JackPorts) {
+        *OFFERED.lock().unwrap_or_else(PoisonError::into_inner) = Some((client, ports));
+    }
+
+    /// Takes the offered client; `None` if JACK does not play this plugin.
+    pub fn claim(plugin: &Arc<Mutex<Chalumeau>>) -> Option<Self> {
+        let offered = OFFERED.lock().unwrap_or_else(PoisonError::into_inner).take()?;
+        let rate_hz = AtomicU32::new(offered.0.rate_hz().to_bits());
+        Some(Self {
+            plugin: plugin.clone(),
+            shared: Arc::new(LinkShared { rate_hz, stop: AtomicBool::new(false) }),
+            first: Mutex::new(Some(offered)),
+            thread: Mutex::default(),
+        })
+    }
+
+    /// Starts the plugin at the server's rate and, at the first call, begins to play. `false` if that fails.
+    pub fn start(&self) -> bool {
+        if !start_plugin(&self.plugin, self.shared.rate_hz()) {
+            return false;
+        }
+        let Some((client, ports)) = self.first.lock().unwrap_or_else(PoisonError::into_inner).take() else {
+            return true;
+        };
+        let link = LinkThread {
+            plugin: self.plugin.clone(),
+            shared: self.shared.clone(),
+            pending: ports.connections(),
+            noted: [const { Vec::new() }; 2],
+            connected_at: None,
+            stalls: false,
+            last_words: String::new(),
+        };
+        let thread = std::thread::Builder::new().name("JackLink".to_owned()).spawn(move || link.run(client));
+        let is_running = thread.is_ok();
+        *self.thread.lock().unwrap_or_else(PoisonError::into_inner) = thread.ok();
+        is_running
+    }
+}
+
+impl Drop for JackLink {
+    fn drop(&mut self) {
+        self.shared.stop.store(true, Ordering::Relaxed);
+        let thread = self.thread.get_mut().unwrap_or_else(PoisonError::into_inner).take();
+        let began = Instant::now();
+        // A server that hangs never answers, so the thread is left to end with the program.
+        while thread.as_ref().is_some_and(|thread| !thread.is_finished()) && began.elapsed() < CLOSING {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+/// Starts the plugin at a rate, Hz.
+fn start_plugin(plugin: &Mutex<Chalumeau>, sample_rate: f32) -> bool {
+    let config = BufferConfig {
+        sample_rate,
+        min_buffer_size: None,
+        // JACK allows no longer cycles.
+        max_buffer_size: 8_192,
+        process_mode: ProcessMode::Realtime,
+    };
+    plugin.lock().unwrap_or_else(PoisonError::into_inner).start::<Chalumeau>(&config, &mut NoHost)
+}
+
+/// The link thread's state.
+struct LinkThread {
+    plugin: Arc<Mutex<Chalumeau>>,
+    shared: Arc<LinkShared>,
+    /// Connections to make as soon as the other port is there.
+    pending: Vec<Connection>,
+    /// The connections of the last looks, the latest last. A server that ends breaks them one by one, so the older look
+    /// counts.
+    noted: [Vec<Connection>; 2],
+    connected_at: Option<Instant>,
+    stalls: bool,
+    /// What was said last.
+    last_words: String,
+}
+
+impl LinkThread {
+    fn run(mut self, first: JackClient) {
+        let mut playing = self.play(first);
+        if let Some(client) = &playing {
+            self.connect_first(client);
+            // A server without a sound card lacks the others, which is no mistake of the user.
+            for Connection { other, .. } in self.pending.iter().filter(|connection| connection.is_midi()) {
+                eprintln!(
+                    "chalumeau-standalone: JACK has no port {other:?} yet; `jack_lsp` lists what it has"
+                );
+            }
+        }
+        let mut tried_at = Instant::now();
+        while !self.shared.stop.load(Ordering::Relaxed) {
+            playing = match playing {
+                Some(client) => self.watch(client),
+                None if tried_at.elapsed() >= RETRY => {
+                    tried_at = Instant::now();
+                    JackClient::open().ok().and_then(|client| self.play_again(client))
+                }
+                None => None,
+            };
+            std::thread::sleep(POLL);
+        }
+    }
+
+    /// Says something, unless it was just said.
+    fn say(&mut self, text: &str) {
+        if self.last_words != text {
+            eprintln!("chalumeau-standalone: {text}");
+            text.clone_into(&mut self.last_words);
+        }
+    }
+
+    fn play(&mut self, client: JackClient) -> Option<PlayingClient> {
+        match client.play(self.plugin.clone()) {
+            Ok(client) => Some(client),
+            Err(reason) => {
+                self.say(&format!("the JACK server lets nobody play: {reason}"));
+                None
+            }
+        }
+    }
+
+    /// Plays to a new server, whose rate may be another.
+    fn play_again(&mut self, client: JackClient) -> Option<PlayingClient> {
+        let rate_hz = client.rate_hz();
+        if !start_plugin(&self.plugin, rate_hz) {
+            self.say(&format!("cannot play at the JACK server's rate of {rate_hz} Hz"));
+            return None;
+        }
+        self.shared.rate_hz.store(rate_hz.to_bits(), Ordering::Relaxed);
+        let client = self.play(client)?;
+        self.connect_first(&client);
+        self.say(BACK);
+        Some(client)
+    }
+
+    /// Looks at the server; `None` once it has gone.
+    fn watch(&mut self, mut client: PlayingClient) -> Option<PlayingClient> {
+        match client.health() {
+            Health::Plays => {
+                if std::mem::take(&mut self.stalls) {
+                    self.say(BACK);
+                }
+                self.look_after_connections(&client);
+            }
+            Health::Stalls => {
+                if !std::mem::replace(&mut self.stalls, true) {
+                    self.forget();
+                    self.say(STALLED);
+                }
+            }
+            Health::IsOver => {
+                self.stalls = false;
+                self.forget();
+                self.say(GONE);
+                self.keep_connections();
+                return None;
+            }
+        }
+        Some(client)
+    }
+
+    /// Ends the notes: whoever played them cannot release them any more.
+    fn forget(&self) {
+        self.plugin.lock().unwrap_or_else(PoisonError::into_inner).forget();
+    }
+
+    fn look_after_connections(&mut self, client: &PlayingClient) {
+        if self.connected_at.is_some_and(|at| at.elapsed() < CONNECTING) {
+            return;
+        }
+        self.connect(client);
+        self.noted.swap(0, 1);
+        self.noted[1] = client.connections();
+    }
+
+    /// Makes the connections of a new client.
+    fn connect_first(&mut self, client: &PlayingClient) {
+        self.connect(client);
+        self.noted = [client.connections(), client.connections()];
+    }
+
+    /// Makes the connections whose ports are there.
+    fn connect(&mut self, client: &PlayingClient) {
+        self.connected_at = Some(Instant::now());
+        self.pending.retain(|connection| !client.connect(connection));
+    }
+
+    /// Wants what was connected to be connected again.
+    fn keep_connections(&mut self) {
+        for connection in std::mem::take(&mut self.noted).into_iter().next().unwrap_or_default() {
+            if !self.pending.contains(&connection) {
+                self.pending.push(connection);
+            }
+        }
+    }
+}
+
+/// Nobody is told of a latency.
+struct NoHost;
+
+impl ActivateContext<Chalumeau> for NoHost {
+    fn plugin_api(&self) -> PluginApi {
+        PluginApi::Standalone
+    }
+
+    fn execute(&self, _: <Chalumeau as Plugin>::BackgroundTask) {}
+
+    fn set_latency_samples(&self, _: u32) {}
+
+    fn set_current_voice_capacity(&self, _: u32) {}
+}

@@ -1,0 +1,141 @@
+//! Plays the plugin in the cycles of a JACK server. Real-time safe. [JACK thread]
+
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Arc, Mutex};
+
+use jack::{AudioOut, Client, ClientStatus, Control, MidiIn, MidiIter, MidiOut, Port, ProcessScope, RawMidi};
+use nice_plug::context::PluginApi;
+use nice_plug::context::process::SendEventError;
+use nice_plug::midi::MidiResult;
+use nice_plug::prelude::*;
+
+use crate::plugin::Chalumeau;
+
+/// Events that one cycle can send: the breath of a knob, twice each 64 samples, in the longest cycle of 8192 samples.
+const SENT_MOST: usize = 2 * 8_192 / 64;
+
+/// What the JACK thread tells the link thread.
+#[derive(Debug, Default)]
+pub struct JackSigns {
+    /// Counts the cycles, and wraps.
+    pub cycles: AtomicU32,
+    /// The server has gone.
+    pub is_over: AtomicBool,
+}
+
+/// The ports of the plugin.
+pub struct JackPlayerPorts {
+    pub outputs: [Port<AudioOut>; 2],
+    pub midi_input: Port<MidiIn>,
+    pub midi_output: Port<MidiOut>,
+}
+
+/// Plays the plugin into its ports.
+pub struct JackPlayer {
+    plugin: Arc<Mutex<Chalumeau>>,
+    signs: Arc<JackSigns>,
+    ports: JackPlayerPorts,
+    sent: Vec<NoteEvent<()>>,
+    transport: Transport,
+}
+
+impl JackPlayer {
+    /// Plays at `rate_hz`. Allocates. [link thread]
+    pub fn new(
+        plugin: Arc<Mutex<Chalumeau>>,
+        signs: Arc<JackSigns>,
+        ports: JackPlayerPorts,
+        rate_hz: f32,
+    ) -> Self {
+        Self { plugin, signs, ports, sent: Vec::with_capacity(SENT_MOST), transport: Transport::new(rate_hz) }
+    }
+
+    fn play(&mut self, scope: &ProcessScope) {
+        let JackPlayerPorts { outputs, midi_input, midi_output } = &mut self.ports;
+        let mut channels = outputs.each_mut().map(|port| port.as_mut_slice(scope));
+        self.sent.clear();
+        let mut context = CycleContext {
+            incoming: midi_input.iter(scope),
+            frames: scope.n_frames(),
+            sent: &mut self.sent,
+            transport: &self.transport,
+        };
+        // The link thread holds the lock while it starts the plugin.
+        let status = match self.plugin.try_lock() {
+            Ok(mut plugin) => plugin.play::<Chalumeau>(&mut channels, &mut context),
+            Err(_) => ProcessStatus::Error("not started"),
+        };
+        if matches!(status, ProcessStatus::Error(_)) {
+            channels.into_iter().for_each(|channel| channel.fill(0.0));
+        }
+        let mut writer = midi_output.writer(scope);
+        for event in self.sent.drain(..) {
+            if let Some(MidiResult::Basic(bytes)) = event.as_midi() {
+                // A full buffer costs the listener a breath value; the next one is 64 samples away.
+                let _ = writer.write(&RawMidi { time: event.timing(), bytes: &bytes });
+            }
+        }
+    }
+}
+
+impl jack::ProcessHandler for JackPlayer {
+    fn process(&mut self, _: &Client, scope: &ProcessScope) -> Control {
+        self.signs.cycles.fetch_add(1, Ordering::Relaxed);
+        // A debug build checks this, as in the framework's own backends.
+        nice_assert_no_alloc::assert_no_alloc(|| self.play(scope));
+        Control::Continue
+    }
+}
+
+/// Hears of the server's end.
+pub struct JackNotices(pub Arc<JackSigns>);
+
+impl jack::NotificationHandler for JackNotices {
+    #[allow(unsafe_code)] // The trait demands it: this may run like a signal handler. It only sets a flag.
+    unsafe fn shutdown(&mut self, _: ClientStatus, _: &str) {
+        self.0.is_over.store(true, Ordering::Relaxed);
+    }
+}
+
+/// One cycle, as the plugin sees it.
+struct CycleContext<'a> {
+    incoming: MidiIter<'a>,
+    frames: u32,
+    sent: &'a mut Vec<NoteEvent<()>>,
+    transport: &'a Transport,
+}
+
+impl ProcessContext<Chalumeau> for CycleContext<'_> {
+    fn plugin_api(&self) -> PluginApi {
+        PluginApi::Standalone
+    }
+
+    // Only the framework's wrapper runs tasks.
+    fn execute_background(&self, _: <Chalumeau as Plugin>::BackgroundTask) {}
+
+    fn execute_gui(&self, _: <Chalumeau as Plugin>::BackgroundTask) {}
+
+    fn transport(&self) -> &Transport {
+        self.transport
+    }
+
+    fn next_event(&mut self) -> Option<NoteEvent<()>> {
+        let last = self.frames.saturating_sub(1);
+        // What is no note event is skipped.
+        self.incoming.find_map(|midi| NoteEvent::from_midi(midi.time.min(last), midi.bytes).ok())
+    }
+
+    fn try_send_event(&mut self, event: NoteEvent<()>) -> Result<(), (NoteEvent<()>, SendEventError)> {
+        if self.sent.len() == self.sent.capacity() {
+            return Err((event, SendEventError::HostBufferFull));
+        }
+        self.sent.push(event);
+        Ok(())
+    }
+
+    fn set_latency_samples(&self, _: u32) {}
+
+    fn request_restart(&self) {}
+
+    fn set_current_voice_capacity(&self, _: u32) {}
+}

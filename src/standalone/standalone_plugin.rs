@@ -1,0 +1,126 @@
+//! The plugin as the framework runs it here. A JACK server plays it directly.
+//!
+//! The framework's own JACK backend waits forever for a server that has died. So with JACK, the framework only keeps the
+//! window and the parameters: it runs its backend without sound, and [`JackLink`] plays the plugin.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use nice_plug::context::gui::AsyncExecutor;
+use nice_plug::prelude::*;
+
+use super::jack::JackLink;
+use crate::plugin::{Chalumeau, executor_of};
+
+/// The plugin that plays, for [`StandalonePlugin::end`]. The framework keeps the plugin to itself.
+static PLAYING: Mutex<Option<StandalonePlugin>> = Mutex::new(None);
+
+/// The plugin in the standalone program. Clones are the same plugin.
+#[derive(Clone)]
+pub struct StandalonePlugin {
+    plugin: Arc<Mutex<Chalumeau>>,
+    /// The link to the JACK server, while JACK plays the plugin.
+    jack: Arc<Mutex<Option<JackLink>>>,
+    /// JACK plays the plugin, not the framework.
+    uses_jack: bool,
+}
+
+impl Default for StandalonePlugin {
+    /// The framework makes the plugin, and passes nothing to it. The JACK client waits in a global.
+    fn default() -> Self {
+        let plugin = Arc::<Mutex<Chalumeau>>::default();
+        let jack = JackLink::claim(&plugin);
+        let uses_jack = jack.is_some();
+        let this = Self { plugin, jack: Arc::new(Mutex::new(jack)), uses_jack };
+        *locked(&PLAYING) = Some(this.clone());
+        this
+    }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Plugin for StandalonePlugin {
+    const NAME: &'static str = Chalumeau::NAME;
+    const VENDOR: &'static str = Chalumeau::VENDOR;
+    const URL: &'static str = Chalumeau::URL;
+    const EMAIL: &'static str = Chalumeau::EMAIL;
+    const VERSION: &'static str = Chalumeau::VERSION;
+    const AUDIO_IO_LAYOUTS: &'static [AudioIOLayout] = Chalumeau::AUDIO_IO_LAYOUTS;
+    const MIDI_INPUT: MidiConfig = Chalumeau::MIDI_INPUT;
+    const MIDI_OUTPUT: MidiConfig = Chalumeau::MIDI_OUTPUT;
+    const SAMPLE_ACCURATE_AUTOMATION: bool = Chalumeau::SAMPLE_ACCURATE_AUTOMATION;
+    const INPUT_EVENT_CAPACITY: usize = Chalumeau::INPUT_EVENT_CAPACITY;
+
+    type Editor = <Chalumeau as Plugin>::Editor;
+    type SysExMessage = ();
+    type BackgroundTask = <Chalumeau as Plugin>::BackgroundTask;
+
+    fn task_executor(&mut self) -> TaskExecutor<Self> {
+        locked(&self.plugin).task_executor()
+    }
+
+    fn params(&self) -> Arc<dyn Params> {
+        locked(&self.plugin).params()
+    }
+
+    fn editor(&mut self, executor: AsyncExecutor<Self>) -> Option<Self::Editor> {
+        locked(&self.plugin).editor(executor_of(executor))
+    }
+
+    fn filter_state(state: &mut PluginState) {
+        Chalumeau::filter_state(state);
+    }
+
+    fn activate(
+        &mut self,
+        _layout: &AudioIOLayout,
+        config: &BufferConfig,
+        context: &mut impl ActivateContext<Self>,
+    ) -> bool {
+        match &*locked(&self.jack) {
+            Some(jack) => jack.start(),
+            None => locked(&self.plugin).start(config, context),
+        }
+    }
+
+    fn reset(&mut self) {
+        locked(&self.plugin).forget();
+    }
+
+    fn process(
+        &mut self,
+        buffer: &mut Buffer,
+        _aux: &mut AuxiliaryBuffers,
+        context: &mut impl ProcessContext<Self>,
+    ) -> ProcessStatus {
+        // Nobody else holds the lock while the framework plays.
+        match self.plugin.try_lock() {
+            Ok(mut plugin) if !self.uses_jack => plugin.play(buffer.as_slice(), context),
+            _ => ProcessStatus::KeepAlive,
+        }
+    }
+
+    fn deactivate(&mut self) {
+        self.silence();
+    }
+}
+
+impl StandalonePlugin {
+    /// Silences the plugin that plays and leaves the JACK server, before the program ends.
+    pub fn end() {
+        // In a statement of its own: the framework may be about to do the same.
+        let playing = locked(&PLAYING).take();
+        if let Some(playing) = playing {
+            playing.silence();
+        }
+    }
+
+    fn silence(&self) {
+        // Closes the client. The lock is free again before that.
+        let jack = locked(&self.jack).take();
+        let mut plugin = locked(&self.plugin);
+        plugin.forget();
+        drop((plugin, jack));
+    }
+}
