@@ -16,12 +16,14 @@ use crate::machine::{
     VALGRIND, VENV, X11_XCB, XCB, XKB, XVFB,
 };
 use crate::programs::{TESTS, programs, test_files};
-use crate::{COMMANDS, bundle, firmware};
+use crate::{COMMANDS, bundle, firmware, validate};
 #[cfg(target_os = "linux")]
 use crate::{jack, window};
 
 /// DawDreamer's version is pinned: a new one may host differently.
 const DAWDREAMER_PACKAGES: &[&str] = &["dawdreamer==0.9.0", "numpy<3"];
+/// What pedalboard's test needs, pinned likewise.
+const PEDALBOARD_PACKAGES: &[&str] = &["pedalboard==0.9.26", "mido==1.3.3", "numpy<3"];
 /// What the programs in `examples/` need, pinned for the same reason.
 const EXAMPLE_PACKAGES: &[&str] =
     &["numpy==2.4.6", "matplotlib==3.11.2", "libmapper==2.6.1", "python-osc==1.10.2"];
@@ -55,8 +57,10 @@ const STEPS: &[Step] = &[
     ("MIDI over JACK", jack::test),
     ("VST3 in vst3-host", || machine::run(&mut host_tests(&["vst3"]))),
     ("VST3 in DawDreamer", dawdreamer),
+    ("VST3 in pedalboard", pedalboard),
     #[cfg(target_os = "linux")]
     ("VST3's window in Ardour", ardour::test),
+    ("validators", validate::installed),
     ("Python examples", python_examples),
     ("instructions", || machine::run(&mut Command::new("benches/instructions.sh"))),
 ];
@@ -189,7 +193,9 @@ const CLAP_TESTS: &[&str] =
 
 fn clap() -> Result<()> {
     let program = &programs()?.program;
-    machine::run(host_tests(CLAP_TESTS).env(artefacts::PROGRAM, program))
+    // Its time to be scanned is the bundle's.
+    let names = [CLAP_TESTS, &["clap_checks"]].concat();
+    machine::run(host_tests(&names).env(artefacts::PROGRAM, program))
 }
 
 /// The same tests on a debug build, where the framework aborts on any allocation while processing.
@@ -208,6 +214,12 @@ fn standalone() -> Result<()> {
 fn dawdreamer() -> Result<()> {
     let python = python("venv", "dawdreamer, numpy", DAWDREAMER_PACKAGES)?;
     let script = machine::root().join("crates/test-host/tests/vst3_in_dawdreamer.py");
+    machine::run(Command::new(&python).arg(script).arg(artefacts::vst3()?))
+}
+
+fn pedalboard() -> Result<()> {
+    let python = python("venv-pedalboard", "pedalboard, mido, numpy", PEDALBOARD_PACKAGES)?;
+    let script = machine::root().join("crates/test-host/tests/vst3_in_pedalboard.py");
     machine::run(Command::new(&python).arg(script).arg(artefacts::vst3()?))
 }
 

@@ -13,6 +13,7 @@ pub mod prepared;
 pub mod programs;
 pub mod simulator;
 pub mod touch_demo;
+pub mod validate;
 #[cfg(target_os = "linux")]
 pub mod window;
 pub mod wire_vectors;
@@ -46,6 +47,12 @@ pub const COMMANDS: &[Command] = &[
         name: "bundle",
         about: "build Chalumeau.clap and Chalumeau.vst3 into target/bundled; takes cargo build's options",
         run: bundle::run,
+        checks: false,
+    },
+    Command {
+        name: "validate",
+        about: "build the bundles, run Steinberg's tests, clap-validator and pluginval as far as they are there; --all needs all",
+        run: validate::run,
         checks: false,
     },
     Command {
