@@ -3,8 +3,8 @@
 //! The framework constructs the plugin by itself and passes nothing to it. These options are therefore the one global of
 //! the plugin. The standalone sets them once, before it starts the framework. In a host nobody sets them.
 
-use std::sync::atomic::AtomicBool;
 use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
 
 use super::params::instrument::InstrumentChoice;
 

@@ -1,19 +1,206 @@
-//! The checks of clap-validator 0.4.1 that a host of ours can make. Each test has the name of the check, with underscores.
+//! The checks of clap-validator 0.4.1 that `clap_rules.rs` leaves open, each under its name, with underscores.
 //!
-//! Eight checks of its list have nothing to check here, and it skips them: the plugin has no presets to discover
-//! (preset-discovery-crawl, -descriptor-consistency, -load), no 64-bit ports (process-audio-double-out-of-place, -in-place),
-//! no audio input that could be denormal (process-audio-denormals), and its one port is fixed
-//! (layout-audio-ports-activation, layout-configurable-audio-ports). If it grows one of these, `what_is_skipped` fails.
+//! Eight checks of its list have nothing to check here: the plugin has no presets to discover (preset-discovery-crawl,
+//! -descriptor-consistency, -load), no 64-bit ports (process-audio-double-out-of-place, -in-place), no audio input that
+//! could be denormal (process-audio-denormals), and its one port is fixed (layout-audio-ports-activation,
+//! layout-configurable-audio-ports). If it grows one of these, `what_is_skipped` fails.
 
-#[path = "clap_checks/bench.rs"]
-mod bench;
-#[path = "clap_checks/keyboard.rs"]
-mod keyboard;
-#[path = "clap_checks/library.rs"]
-mod library;
-#[path = "clap_checks/params.rs"]
-mod params;
-#[path = "clap_checks/process.rs"]
-mod process;
-#[path = "clap_checks/state.rs"]
-mod state;
+use std::ffi::CString;
+use std::time::{Duration, Instant};
+
+use chalumeau_test_host::artefacts;
+use clack_extensions::audio_ports::{AudioPortFlags, AudioPortInfoBuffer, PluginAudioPorts};
+use clack_host::events::event_types::*;
+use clack_host::events::{EventFlags, EventHeader};
+use clack_host::prelude::*;
+use fastrand::Rng;
+
+/// Samples of a block.
+const BLOCK: usize = 2_048;
+
+struct Shared;
+struct Main;
+struct Host;
+
+impl SharedHandler<'_> for Shared {
+    fn request_restart(&self) {}
+    fn request_process(&self) {}
+    fn request_callback(&self) {}
+}
+
+impl MainThreadHandler<'_> for Main {}
+
+impl HostHandlers for Host {
+    type Shared<'a> = Shared;
+    type MainThread<'a> = Main;
+    type AudioProcessor<'a> = ();
+}
+
+/// The bundled library. It is never unloaded; see `chalumeau_test_host::clap::Plugin::load`.
+fn library() -> PluginEntry {
+    // SAFETY: the file is the plugin this project has just built.
+    let entry = unsafe { PluginEntry::load(artefacts::clap().unwrap()) }.unwrap();
+    std::mem::forget(entry.clone());
+    entry
+}
+
+fn instance(entry: &PluginEntry) -> PluginInstance<Host> {
+    let factory = entry.get_plugin_factory().unwrap();
+    let id: CString = factory.plugin_descriptors().next().unwrap().id().unwrap().to_owned();
+    let info = HostInfo::new("checks", "Chalumeau", "", "1").unwrap();
+    PluginInstance::new(|_| Shared, |_| Main, entry, &id, &info).unwrap()
+}
+
+/// Plays `blocks` blocks at a rate: a key is pressed in the second block and released before the last one. `transport` is
+/// the transport of a block, and may say more of it. Asserts that every sample is a number, none is subnormal, and that
+/// something sounds.
+#[track_caller]
+fn play(rate_hz: f64, blocks: usize, mut transport: impl FnMut(&mut EventBuffer) -> Option<TransportEvent>) {
+    let mut instance = instance(&library());
+    let config = PluginAudioConfiguration {
+        sample_rate: rate_hz,
+        min_frames_count: 1,
+        max_frames_count: BLOCK as u32,
+    };
+    let stopped = instance.activate(|_, _| (), config);
+    let stopped = stopped.unwrap_or_else(|reason| panic!("activate at {rate_hz} Hz: {reason}"));
+    let mut processor = stopped.start_processing().ok().expect("starts processing");
+    let mut peak = 0.0_f32;
+    for block in 0..blocks {
+        let mut said = EventBuffer::new();
+        if block == 1 {
+            said.push(&MidiEvent::new(7, 0, [0x90, 58, 100]));
+        } else if block + 1 == blocks {
+            said.push(&MidiEvent::new(0, 0, [0x80, 58, 0]));
+        }
+        let now = transport(&mut said);
+        said.sort();
+        let mut channels = [vec![0.0_f32; BLOCK], vec![0.0; BLOCK]];
+        let mut ports = AudioPorts::with_capacity(2, 1);
+        let mut out = ports.with_output_buffers([AudioPortBuffer {
+            latency: 0,
+            channels: AudioPortBufferType::f32_output_only(channels.iter_mut().map(Vec::as_mut_slice)),
+        }]);
+        let mut answered = EventBuffer::new();
+        processor
+            .process(
+                &InputAudioBuffers::empty(),
+                &mut out,
+                &InputEvents::from_buffer(&said),
+                &mut OutputEvents::from_buffer(&mut answered),
+                Some((block * BLOCK) as u64),
+                now.as_ref(),
+            )
+            .unwrap();
+        for sample in channels.iter().flatten() {
+            assert!(sample.is_finite() && !sample.is_subnormal(), "{sample} at {rate_hz} Hz");
+            peak = peak.max(sample.abs());
+        }
+    }
+    assert!(peak > 1e-3, "something sounds at {rate_hz} Hz: {peak}");
+    instance.deactivate(processor.stop_processing());
+}
+
+#[cfg(unix)]
+#[test]
+fn scan_rtld_now() {
+    use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
+    // SAFETY: the file is the plugin this project has just built.
+    let library = unsafe { Library::open(Some(artefacts::clap().unwrap()), RTLD_NOW | RTLD_LOCAL) }.unwrap();
+    // SAFETY: the type is not used.
+    assert!(unsafe { library.get::<*const ()>(b"clap_entry\0") }.is_ok());
+    std::mem::forget(library);
+}
+
+#[test]
+fn scan_time() {
+    // Another test of this process may have loaded the library, so a copy is scanned.
+    let folder = tempfile::tempdir().unwrap();
+    let copy = folder.path().join("Copy.clap");
+    std::fs::copy(artefacts::clap().unwrap(), &copy).unwrap();
+    let began = Instant::now();
+    // SAFETY: the file is the plugin this project has just built.
+    let entry = unsafe { PluginEntry::load(&copy) }.unwrap();
+    let count = entry.get_plugin_factory().unwrap().plugin_descriptors().count();
+    let took = began.elapsed();
+    std::mem::forget(entry);
+    assert_eq!(count, 1);
+    assert!(took < Duration::from_millis(100), "{took:?}");
+}
+
+#[test]
+fn what_is_skipped() {
+    let entry = library();
+    let get = entry.raw_entry().get_factory.expect("the library has factories");
+    for factory in [c"clap.preset-discovery-factory/2", c"clap.preset-discovery-factory/draft-2"] {
+        // SAFETY: the entry is initialised, and the name ends with NUL.
+        assert!(unsafe { get(factory.as_ptr()) }.is_null(), "check preset-discovery-*");
+    }
+    let mut instance = instance(&entry);
+    let raw = instance.raw_instance();
+    let extension = raw.get_extension.expect("the plugin has extensions");
+    for (name, check) in [
+        (c"clap.audio-ports-activation/2", "layout-audio-ports-activation"),
+        (c"clap.configurable-audio-ports/1", "layout-configurable-audio-ports"),
+    ] {
+        // SAFETY: the plugin lives, and the name ends with NUL.
+        assert!(unsafe { extension(raw, name.as_ptr()) }.is_null(), "check {check}");
+    }
+    let handle = instance.plugin_handle();
+    let ports: PluginAudioPorts = handle.get_extension().unwrap();
+    assert_eq!(ports.count(&handle, true), 0, "check process-audio-denormals");
+    let mut buffer = AudioPortInfoBuffer::new();
+    let out = ports.get(&handle, 0, false, &mut buffer).unwrap();
+    assert!(!out.flags.contains(AudioPortFlags::SUPPORTS_64BITS), "check process-audio-double-*");
+}
+
+#[test]
+fn process_varying_sample_rates() {
+    for rate_hz in [
+        1_000.0, 8_000.0, 12_345.678, 16_000.0, 22_050.0, 44_100.0, 48_000.0, 88_200.5, 96_000.0, 176_400.0,
+        192_000.0, 384_000.0, 705_600.0, 768_000.0,
+    ] {
+        // A low note takes 0.1 s to speak.
+        let blocks = (0.3 * rate_hz / BLOCK as f64) as usize + 4;
+        play(rate_hz, blocks, |_| None);
+    }
+}
+
+/// A transport that is somewhere.
+fn random_transport(rng: &mut Rng, at: u32) -> TransportEvent {
+    TransportEvent {
+        header: EventHeader::new_core(at, EventFlags::empty()),
+        flags: TransportFlags::from_bits_truncate(rng.u32(..)),
+        song_pos_beats: (1_000.0 * rng.f64()).into(),
+        song_pos_seconds: (1_000.0 * rng.f64()).into(),
+        tempo: 1.0 + 500.0 * rng.f64(),
+        tempo_inc: rng.f64() - 0.5,
+        loop_start_beats: (100.0 * rng.f64()).into(),
+        loop_end_beats: (100.0 * rng.f64()).into(),
+        loop_start_seconds: (100.0 * rng.f64()).into(),
+        loop_end_seconds: (100.0 * rng.f64()).into(),
+        bar_start: (100.0 * rng.f64()).into(),
+        bar_number: rng.i32(-10..1_000),
+        time_signature_numerator: rng.u16(1..=16),
+        time_signature_denominator: 1 << rng.u16(0..6),
+    }
+}
+
+#[test]
+fn transport_fuzz() {
+    let mut rng = Rng::with_seed(31);
+    play(44_100.0, 50, |_| Some(random_transport(&mut rng, 0)));
+}
+
+#[test]
+fn transport_fuzz_sample_accurate() {
+    let mut rng = Rng::with_seed(37);
+    for every in [1, 100, 1_000] {
+        play(44_100.0, 10, |said| {
+            for at in (0..BLOCK).step_by(every) {
+                said.push(&random_transport(&mut rng, at as u32));
+            }
+            None
+        });
+    }
+}

@@ -21,9 +21,7 @@
 //! | `process-varying-block-sizes`, `process-random-block-sizes` | `clap.rs`: `block_size_is_inaudible` |
 //! | `process-reset-reactivate` | `clap.rs`: `reset_is_a_new_beginning` |
 //!
-//! Not made here: `scan-*` (time and way of loading), `process-audio-double-*`, `process-audio-denormals`,
-//! `layout-*`, `preset-discovery-*` (the plugin has no such port, layout or presets), `transport-fuzz*` (it reads no
-//! transport).
+//! `clap_checks.rs` makes `scan-*`, `process-varying-sample-rates` and `transport-fuzz*`, and says what has nothing to check.
 
 #[path = "support/rules.rs"]
 mod rules;
