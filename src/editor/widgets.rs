@@ -71,6 +71,7 @@ pub fn choice(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
         });
         response.response
     };
+    host_marks::offer_menu(ui, hands, id, &response);
     if chosen != now {
         hands.put(id, chosen as f32 / steps as f32);
     }

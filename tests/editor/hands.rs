@@ -404,7 +404,7 @@ fn a_right_click_asks_for_the_hosts_menu_and_moves_nothing() {
     let at = (contrast.x.round() as i32, contrast.y.round() as i32);
     assert_eq!(window.host.menus(), [("contr".to_owned(), at)]);
     for (role, name, id) in
-        [(Role::Label, "Feel order", "order"), (Role::Switch, "OSC from network", "oscany")]
+        [(Role::ComboBox, "Feel order", "order"), (Role::Switch, "OSC from network", "oscany")]
     {
         window.harness.get_by_role_and_label(role, name).click_secondary();
         window.harness.run();
