@@ -94,7 +94,9 @@ impl HostInputs {
     fn take(&mut self, event: NoteEvent<()>, drives: [ReedSource; 2]) {
         (self.at, self.count, self.handed) = (event.timing() as usize, 0, 0);
         let channel = match event {
-            NoteEvent::MidiCC { channel, .. } => Some(channel),
+            NoteEvent::MidiCC { channel, .. } | NoteEvent::MidiChannelPressure { channel, .. } => {
+                Some(channel)
+            }
             _ => None,
         };
         let was_snapshot = channel.is_some_and(|channel| self.translator.is_snapshot(channel));
@@ -204,7 +206,7 @@ mod tests {
 
     #[test]
     fn a_start_that_sends_every_controller_names_no_source_and_leaves_velocity_and_reed() {
-        let reeds = [ReedSource::Wheel, ReedSource::Cc16];
+        let reeds = [ReedSource::Wheel, ReedSource::Pressure];
         for value in [0, 1, 64, 127] {
             let mut inputs = HostInputs::default();
             for _ in 0..2 {
@@ -223,6 +225,8 @@ mod tests {
             // A player who blows now is named.
             midi(&mut inputs, reeds, &[[0xB0, 2, 40], [0xB0, 2, 45]]);
             assert_eq!(named(&mut inputs), Some(BreathInput::Breath));
+            midi(&mut inputs, reeds, &[[0xB0, 1, 127]]);
+            assert!(inputs.reed_factors(reeds)[0] > 1.5, "and a wheel that moves is a wheel");
         }
     }
 

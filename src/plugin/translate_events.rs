@@ -35,7 +35,8 @@ impl EventTranslator {
                 self.midi.choke(address(voice_id, channel, key))
             }
             NoteEvent::MidiCC { channel, cc, value, .. } => self.midi.controller(channel, cc, raw7(value)),
-            NoteEvent::MidiChannelPressure { channel, pressure, .. } if !is_reeds => {
+            NoteEvent::MidiChannelPressure { channel, .. } if is_reeds => self.midi.other_pressure(channel),
+            NoteEvent::MidiChannelPressure { channel, pressure, .. } => {
                 self.midi.pressure(channel, raw7(pressure))
             }
             NoteEvent::MidiPitchBend { channel, value, .. } => self.midi.bend(channel, raw14(value)),

@@ -288,6 +288,14 @@ impl MidiDecoder {
         self.said.events()
     }
 
+    /// Channel pressure that is used for something other than breath; it only counts among the channel's controllers.
+    /// Real-time safe.
+    pub fn other_pressure(&mut self, channel: u8) -> &[Event] {
+        self.begin();
+        self.place(usize::from(channel % 16), PRESSURE);
+        self.said.events()
+    }
+
     /// The bend wheel, 0..=16383, 8192 at rest. Real-time safe.
     pub fn bend(&mut self, channel: u8, value14: u16) -> &[Event] {
         self.begin();

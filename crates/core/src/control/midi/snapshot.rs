@@ -5,8 +5,8 @@
 //! note between them, are a snapshot. What it says is where the host believes the controllers to be, not what anybody
 //! plays. The rule needs no clock, so a snapshot over a slow cable is known like one that comes within one sample.
 
-/// Different controllers without a repeat and without a note that make a snapshot. The longest setup of a General MIDI 2 file
-/// counts 31 (bank, RPN, NRPN and all its sound controllers); hosts send 120 or more.
+/// Different controllers without a repeat and without a note that make a snapshot, by judgement: more than a file sets up for
+/// a General MIDI device, and far fewer than the 120 or more that hosts send.
 const SNAPSHOT: u32 = 32;
 /// Channel pressure, as the number of a controller.
 pub const PRESSURE: u8 = 128;
