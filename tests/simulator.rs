@@ -410,14 +410,14 @@ fn inflict(harm: Harm, host: &mut TestHost, played: Feel, between: &mut dyn FnMu
         }
         Harm::BusFails => host.knob.inject(fault(FaultKind::I2c)),
         Harm::VersionChanges => {
-            host.send(&Message::Hello { major: 2, minor: 0, session: host.session });
+            host.send(&Message::Hello { major: 2, minor: 1, session: host.session });
         }
         Harm::BrownOut => host.knob.inject(fault(FaultKind::BrownOut)),
         Harm::Reboot => host.knob.inject(Fault::new(FaultKind::Reboot, t_s).lasting(between(0.05, 0.5))),
         Harm::Free => host.send(&Message::Free),
         Harm::Bye => host.send(&Message::Bye { session: host.session }),
         Harm::OtherSession => {
-            host.send(&Message::Hello { major: 1, minor: 0, session: host.session ^ 1 });
+            host.send(&Message::Hello { major: 1, minor: 1, session: host.session ^ 1 });
         }
     }
 }
@@ -465,7 +465,7 @@ fn break_it(harm: Harm, midi: bool, seed: u64) -> f64 {
 
     // The host is back, or never went: it says hello, sends ALIVE and FEEL, and must not be given torque.
     host.is_alive = true;
-    host.send(&Message::Hello { major: 1, minor: 0, session: host.session });
+    host.send(&Message::Hello { major: 1, minor: 1, session: host.session });
     host.send(&Message::Feel(played));
     host.run(0.5, |knob| {
         watch(knob);

@@ -9,8 +9,8 @@ use std::collections::HashSet;
 use chalumeau_knob::wire::frame::FrameError;
 use chalumeau_knob::wire::midi::{FromKnob, MidiReceiver, encode_sysex};
 use chalumeau_knob::wire::{
-    Arm, Capabilities, Decoder, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Message, TorqueLaw,
-    encode, limits,
+    Arm, Capabilities, Counters, Decoder, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Message,
+    Stamp, TorqueLaw, encode, limits,
 };
 use proptest::prelude::*;
 
@@ -72,6 +72,11 @@ prop_compose! {
     }
 }
 
+fn counters() -> impl Strategy<Value = Option<Counters>> {
+    any::<Option<(u16, u16)>>()
+        .prop_map(|counted| counted.map(|(overruns, bus_errors)| Counters { overruns, bus_errors }))
+}
+
 prop_compose! {
     fn info()(
         (major, minor, capabilities) in (any::<u8>(), any::<u8>(), any::<u16>()),
@@ -85,10 +90,11 @@ prop_compose! {
         ceiling_mnm: u16,
         stiffness_limit: u16,
         push_limit: u16,
+        counters in counters(),
     ) -> Info {
         Info {
             major, minor, capabilities: Capabilities(capabilities), firmware, name, serial, counts_per_turn, loop_hz,
-            watchdog_ms, fade_ms, ceiling_mnm, session, stiffness_limit, push_limit,
+            watchdog_ms, fade_ms, ceiling_mnm, session, stiffness_limit, push_limit, counters,
         }
     }
 }
@@ -96,9 +102,9 @@ prop_compose! {
 prop_compose! {
     fn state()(
         t_us: u32, angle: i32, velocity: i16, torque: i16, flags: u16,
-        feel_id: u8, slaps: u8, events: u8, fault: u8,
+        feel_id: u8, slaps: u8, events: u8, fault: u8, epoch: Option<u16>,
     ) -> DeviceState {
-        DeviceState { t_us, angle, velocity, torque, flags: Flags(flags), feel_id, slaps, events, fault }
+        DeviceState { t_us, angle, velocity, torque, flags: Flags(flags), feel_id, slaps, events, fault, epoch }
     }
 }
 
@@ -116,7 +122,10 @@ prop_compose! {
 }
 
 fn arm() -> impl Strategy<Value = Arm> {
-    (any::<u32>(), 0u16..=450).prop_map(|(session, ceiling_mnm)| Arm { session, ceiling_mnm })
+    (any::<u32>(), 0u16..=450, any::<Option<(u16, u32)>>()).prop_map(|(session, ceiling_mnm, stamp)| {
+        let stamp = stamp.map(|(epoch, heard_us)| Stamp { epoch, heard_us });
+        Arm { session, ceiling_mnm, stamp }
+    })
 }
 
 fn message() -> impl Strategy<Value = Message> {

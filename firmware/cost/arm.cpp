@@ -10,6 +10,7 @@ using namespace chalumeau;
 
 alignas(Device) static unsigned char memory[sizeof(Device)];
 static Device* device;
+static CountRounding rounding;
 
 extern "C" {
 
@@ -26,7 +27,8 @@ void knob_tick(std::uint32_t t_us, const std::uint8_t* read, std::uint8_t* write
     reading.counts = motor.angle;
     reading.velocity_rpm = motor.rpm;
     MotorCommand command;
-    command.torque_counts = counts_of(device->tick(t_us, reading), MOTEUS_UNIT);
+    const float torque = device->tick(t_us, reading);
+    command.torque_counts = rounding.counts(torque, device->ceiling_mnm(), MOTEUS_UNIT);
     encode_command(command, write);
 }
 

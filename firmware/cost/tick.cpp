@@ -1,5 +1,5 @@
 // A knob at work, for callgrind to count: `tick average N` runs N ticks with the traffic of play (FEEL 100 a second, ALIVE
-// 50, STATE 500), `tick busy N` with a FEEL and a STATE in every single tick, the most a tick can have.
+// 50, STATE 500), `tick busy N` with a FEEL in every single tick and a STATE in every second, the most there can be.
 
 #include <cstdio>
 #include <cstdlib>
@@ -28,6 +28,7 @@ int main(int count, char** arguments) {
     const long ticks = std::strtol(arguments[2], nullptr, 10);
     Config config;
     config.knob_damping_nms = 2e-3F;  // so that the wall below is allowed
+    config.probe_mnm = 0.0F;          // no motor moves this shaft
     Device device{config};
     std::uint8_t wire[SERIAL_FRAME_MAX];
     Feel feel;
@@ -49,8 +50,11 @@ int main(int count, char** arguments) {
     device.receive(wire, wire_of(Type::Hello, 0, Hello{}.encode(), wire));
     Reading reading;
     device.tick(0, reading);
-    device.receive(wire, wire_of(Type::Arm, 1, Arm{0, 450}.encode(), wire));
-    const std::size_t alive = wire_of(Type::Alive, 5, Arm{0, 450}.encode(), wire);
+    const auto permission = [&device] {
+        const State now = device.state();
+        return Arm{0, 450, now.epoch, now.t_us, true}.encode();
+    };
+    device.receive(wire, wire_of(Type::Arm, 1, permission(), wire));
     std::uint8_t rate[SERIAL_FRAME_MAX];
     if (busy) {
         device.receive(rate, wire_of(Type::Rate, 4, Rate{1000}.encode(), rate));
@@ -59,7 +63,7 @@ int main(int count, char** arguments) {
     std::uint32_t t_us = 0;
     float sum = 0.0F;
     for (long i = 0; i < ticks; ++i) {
-        t_us += busy ? 1000 : 500;
+        t_us += 500;
         // To and fro over the whole law, 0 to 360 degrees.
         const long phase = i % 7200;
         reading.counts = static_cast<std::int32_t>(phase < 3600 ? phase : 7200 - phase);
@@ -69,7 +73,7 @@ int main(int count, char** arguments) {
             device.receive(feels[which], feel_length[which]);
         }
         if (i % 40 == 0) {
-            device.receive(wire, alive);
+            device.receive(wire, wire_of(Type::Alive, 5, permission(), wire));
         }
         sum += device.tick(t_us, reading);
         device.transmit(out, sizeof out);

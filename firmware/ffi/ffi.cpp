@@ -3,10 +3,18 @@
 #include <new>
 
 #include "chalumeau/device.hpp"
+#include "chalumeau/i2c.hpp"
 
 using namespace chalumeau;
 
-static_assert(alignof(Device) <= 8, "the Rust side stores it in u64 words");
+/// The device, and the rounding of its torque to the motor board's counts.
+struct Knob {
+    Device device;
+    CountRounding rounding;
+    TorqueUnit unit;  // 0 mNm per count: a board that takes any torque
+};
+
+static_assert(alignof(Knob) <= 8, "the Rust side stores it in u64 words");
 
 extern "C" {
 
@@ -18,6 +26,11 @@ struct FwSetup {
     std::uint16_t ceiling_mnm;
     std::uint8_t midi;
     std::uint8_t major;
+    std::uint16_t epoch;
+    float mnm_per_count;
+    float board_clips_mnm;
+    std::uint8_t probes;
+    std::uint8_t calibrated;
 };
 
 struct FwReading {
@@ -26,6 +39,8 @@ struct FwReading {
     std::uint8_t bus_ok;
     std::uint8_t supply_ok;
     std::uint8_t button;
+    std::uint8_t stop;
+    std::uint8_t tells_velocity;
 };
 
 struct FwCounts {
@@ -37,7 +52,7 @@ struct FwVerdict {
     float value;
 };
 
-std::size_t fw_size() { return sizeof(Device); }
+std::size_t fw_size() { return sizeof(Knob); }
 
 void fw_init(void* memory, const FwSetup* setup) {
     Config config;
@@ -49,44 +64,57 @@ void fw_init(void* memory, const FwSetup* setup) {
     config.counts_per_turn = setup->counts_per_turn;
     config.knob_damping_nms = setup->knob_damping_nms;
     config.ceiling_mnm = setup->ceiling_mnm;
-    new (memory) Device(config);
+    config.epoch = setup->epoch;
+    config.probe_mnm = setup->probes != 0 ? PROBE_MNM : 0.0F;
+    config.calibrated = setup->calibrated != 0;
+    new (memory) Knob{Device(config), CountRounding{}, TorqueUnit{setup->mnm_per_count, setup->board_clips_mnm}};
 }
 
-void fw_receive(Device* device, const std::uint8_t* bytes, std::size_t length) { device->receive(bytes, length); }
+void fw_receive(Knob* knob, const std::uint8_t* bytes, std::size_t length) { knob->device.receive(bytes, length); }
 
-void fw_receive_midi(Device* device, const std::uint8_t* bytes, std::size_t length) {
-    device->receive_midi(bytes, length);
+void fw_receive_midi(Knob* knob, const std::uint8_t* bytes, std::size_t length) {
+    knob->device.receive_midi(bytes, length);
 }
 
-std::size_t fw_transmit(Device* device, std::uint8_t* out, std::size_t room) { return device->transmit(out, room); }
+std::size_t fw_transmit(Knob* knob, std::uint8_t* out, std::size_t room) { return knob->device.transmit(out, room); }
 
-float fw_tick(Device* device, std::uint64_t t_us, const FwReading* reading) {
+float fw_tick(Knob* knob, std::uint64_t t_us, const FwReading* reading) {
     Reading sensed;
     sensed.counts = static_cast<std::int32_t>(static_cast<std::uint64_t>(reading->counts));
     sensed.velocity_rpm = reading->velocity_rpm;
     sensed.bus_ok = reading->bus_ok != 0;
     sensed.supply_ok = reading->supply_ok != 0;
     sensed.button = reading->button != 0;
-    return device->tick(static_cast<std::uint32_t>(t_us), sensed);
+    sensed.stop = reading->stop != 0;
+    sensed.has_velocity = reading->tells_velocity != 0;
+    return knob->device.tick(static_cast<std::uint32_t>(t_us), sensed);
 }
 
-std::uint8_t fw_armed(const Device* device) { return device->armed() ? 1 : 0; }
-std::uint8_t fw_fault(const Device* device) { return static_cast<std::uint8_t>(device->fault()); }
-std::uint32_t fw_dropped(const Device* device) { return device->dropped(); }
-
-void fw_state(const Device* device, std::uint8_t* payload) {
-    std::memcpy(payload, device->state().encode().bytes, State::LENGTH);
+/// The torque of a tick as the motor board is told it, mNm.
+float fw_command(Knob* knob, float torque_mnm) {
+    if (!(knob->unit.mnm_per_count > 0.0F)) {
+        return torque_mnm;
+    }
+    return mnm_of(knob->rounding.counts(torque_mnm, knob->device.ceiling_mnm(), knob->unit), knob->unit);
 }
 
-void fw_info(const Device* device, std::uint8_t* payload) {
-    std::memcpy(payload, device->info().encode().bytes, Info::LENGTH);
+std::uint8_t fw_armed(const Knob* knob) { return knob->device.armed() ? 1 : 0; }
+std::uint8_t fw_fault(const Knob* knob) { return static_cast<std::uint8_t>(knob->device.fault()); }
+std::uint32_t fw_dropped(const Knob* knob) { return knob->device.dropped(); }
+
+void fw_state(const Knob* knob, std::uint8_t* payload) {
+    std::memcpy(payload, knob->device.state().encode().bytes, State::STAMPED_LENGTH);
+}
+
+void fw_info(const Knob* knob, std::uint8_t* payload) {
+    std::memcpy(payload, knob->device.info().encode().bytes, Info::COUNTED_LENGTH);
 }
 
 static FwCounts counts_of_reader(const FrameCounts& counts) {
     return FwCounts{counts.frames, counts.junk, counts.crc_errors, counts.gaps, counts.duplicates};
 }
 
-FwCounts fw_counts(const Device* device) { return counts_of_reader(device->counts()); }
+FwCounts fw_counts(const Knob* knob) { return counts_of_reader(knob->device.counts()); }
 
 float fw_law(const std::uint8_t* payload, float angle_deg) {
     Feel feel;

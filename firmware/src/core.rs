@@ -12,6 +12,11 @@ struct RawSetup {
     ceiling_mnm: u16,
     midi: u8,
     major: u8,
+    epoch: u16,
+    mnm_per_count: f32,
+    board_clips_mnm: f32,
+    probes: u8,
+    calibrated: u8,
 }
 
 #[repr(C)]
@@ -21,6 +26,8 @@ struct RawReading {
     bus_ok: u8,
     supply_ok: u8,
     button: u8,
+    stop: u8,
+    tells_velocity: u8,
 }
 
 #[repr(C)]
@@ -36,6 +43,7 @@ unsafe extern "C" {
     fn fw_receive_midi(device: *mut u64, bytes: *const u8, length: usize);
     fn fw_transmit(device: *mut u64, out: *mut u8, room: usize) -> usize;
     fn fw_tick(device: *mut u64, t_us: u64, reading: *const RawReading) -> f32;
+    fn fw_command(device: *mut u64, torque_mnm: f32) -> f32;
     fn fw_armed(device: *const u64) -> u8;
     fn fw_fault(device: *const u64) -> u8;
     fn fw_dropped(device: *const u64) -> u32;
@@ -74,6 +82,11 @@ impl RawDevice {
             ceiling_mnm: setup.ceiling_mnm,
             midi: u8::from(setup.midi),
             major: setup.major,
+            epoch: setup.epoch,
+            mnm_per_count: setup.mnm_per_count,
+            board_clips_mnm: setup.board_clips_mnm,
+            probes: u8::from(setup.probes),
+            calibrated: u8::from(setup.calibrated),
         };
         // SAFETY: takes nothing, returns a constant.
         let words = unsafe { fw_size() }.div_ceil(8);
@@ -105,9 +118,16 @@ impl RawDevice {
             bus_ok: u8::from(reading.bus_ok),
             supply_ok: u8::from(reading.supply_ok),
             button: u8::from(reading.button),
+            stop: u8::from(reading.stop),
+            tells_velocity: u8::from(reading.tells_velocity),
         };
         // SAFETY: a device initialised in `new`; the reading lives through the call.
         unsafe { fw_tick(self.memory.as_mut_ptr(), t_us, &raw) }
+    }
+
+    pub fn command(&mut self, torque_mnm: f32) -> f32 {
+        // SAFETY: as above.
+        unsafe { fw_command(self.memory.as_mut_ptr(), torque_mnm) }
     }
 
     pub fn armed(&self) -> bool {
@@ -130,16 +150,16 @@ impl RawDevice {
         unsafe { fw_counts(self.memory.as_ptr()) }
     }
 
-    pub fn state(&self) -> [u8; 18] {
-        let mut payload = [0; 18];
-        // SAFETY: as above; it writes the 18 bytes of a STATE.
+    pub fn state(&self) -> [u8; 20] {
+        let mut payload = [0; 20];
+        // SAFETY: as above; it writes the 20 bytes of a STATE.
         unsafe { fw_state(self.memory.as_ptr(), payload.as_mut_ptr()) };
         payload
     }
 
-    pub fn info(&self) -> [u8; 52] {
-        let mut payload = [0; 52];
-        // SAFETY: as above; it writes the 52 bytes of an INFO.
+    pub fn info(&self) -> [u8; 56] {
+        let mut payload = [0; 56];
+        // SAFETY: as above; it writes the 56 bytes of an INFO.
         unsafe { fw_info(self.memory.as_ptr(), payload.as_mut_ptr()) };
         payload
     }

@@ -28,6 +28,17 @@ pub struct Setup {
     pub ceiling_mnm: u16,
     /// Counts per turn of its encoder.
     pub counts_per_turn: u32,
+    /// Where its count of disarmings begins; a real knob draws it at random at each start.
+    pub epoch: u16,
+    /// It moves the motor to and fro before the first arming of a session, to see its signs. `false`: for a shaft that
+    /// obeys no motor.
+    pub probes: bool,
+    /// Its damping, signs and torque per count were measured; without, its ceiling is 50 mNm.
+    pub calibrated: bool,
+    /// Smallest step of torque that its motor board takes, mNm; 0: any torque.
+    pub mnm_per_count: f32,
+    /// Most that its motor board takes, mNm.
+    pub board_clips_mnm: f32,
 }
 
 impl Default for Setup {
@@ -40,6 +51,11 @@ impl Default for Setup {
             knob_damping_nms: 5e-4,
             ceiling_mnm: 450,
             counts_per_turn: 3600,
+            epoch: 0,
+            probes: true,
+            calibrated: true,
+            mnm_per_count: 0.0,
+            board_clips_mnm: 450.0,
         }
     }
 }
@@ -58,11 +74,23 @@ pub struct Reading {
     pub supply_ok: bool,
     /// The button is down.
     pub button: bool,
+    /// The local stop is pressed.
+    pub stop: bool,
+    /// The board tells a speed; otherwise the counts do.
+    pub tells_velocity: bool,
 }
 
 impl Default for Reading {
     fn default() -> Self {
-        Self { counts: 0, velocity_rpm: 0.0, bus_ok: true, supply_ok: true, button: false }
+        Self {
+            counts: 0,
+            velocity_rpm: 0.0,
+            bus_ok: true,
+            supply_ok: true,
+            button: false,
+            stop: false,
+            tells_velocity: true,
+        }
     }
 }
 
@@ -137,6 +165,12 @@ impl Firmware {
         self.device.tick(t_us, reading)
     }
 
+    /// The torque of the last tick as the motor board is told it, mNm: in whole counts, whose rounding errors cancel over
+    /// the ticks. Call it once a tick. Real-time safe.
+    pub fn command(&mut self, torque_mnm: f32) -> f32 {
+        self.device.command(torque_mnm)
+    }
+
     /// Bytes for the host, serial; the number written. Call often: what does not fit 1024 bytes is dropped and counted.
     pub fn transmit(&mut self, out: &mut [u8]) -> usize {
         self.device.transmit(out)
@@ -168,12 +202,12 @@ impl Firmware {
     }
 
     /// The STATE it would send now, payload only.
-    pub fn state(&self) -> [u8; 18] {
+    pub fn state(&self) -> [u8; 20] {
         self.device.state()
     }
 
     /// The INFO it would send now, payload only.
-    pub fn info(&self) -> [u8; 52] {
+    pub fn info(&self) -> [u8; 56] {
         self.device.info()
     }
 }
@@ -249,15 +283,18 @@ mod tests {
         wire
     }
 
-    fn arm(session: u32, ceiling_mnm: u16) -> Vec<u8> {
+    /// ARM or ALIVE of a host that has just heard the knob.
+    fn arm(session: u32, ceiling_mnm: u16, knob: &Firmware) -> Vec<u8> {
+        let state = knob.state();
         let mut payload = session.to_le_bytes().to_vec();
         payload.extend_from_slice(&ceiling_mnm.to_le_bytes());
-        payload.extend_from_slice(&[0, 0]);
+        payload.extend_from_slice(&state[18..20]); // epoch
+        payload.extend_from_slice(&state[0..4]); // the knob's time
         payload
     }
 
     fn hello(session: u32) -> Vec<u8> {
-        let mut payload = b"TTLK\x01\x00\x00\x00".to_vec();
+        let mut payload = b"TTLK\x01\x01\x00\x00".to_vec();
         payload.extend_from_slice(&session.to_le_bytes());
         payload
     }
@@ -276,14 +313,15 @@ mod tests {
     #[test]
     fn says_hello_arms_pushes_and_lets_go_when_the_host_falls_silent() {
         // Damped enough for the wall of the feel below.
-        let mut knob = Firmware::new(&Setup { knob_damping_nms: 2e-3, ..Setup::default() });
-        let held = Reading { counts: 1200, ..Reading::default() };
+        let setup = Setup { knob_damping_nms: 2e-3, probes: false, ..Setup::default() };
+        let mut knob = Firmware::new(&setup);
+        let held = Reading { counts: 1200, tells_velocity: false, ..Reading::default() };
         // Zero is where the knob stood at power-up.
-        knob.tick(0, &Reading::default());
+        knob.tick(0, &Reading { counts: 0, ..held });
         let mut t_us = 0;
-        for _ in 0..200 {
+        for tick in 1..=400 {
             t_us += 500;
-            knob.tick(t_us, &held);
+            knob.tick(t_us, &Reading { counts: held.counts.min(10 * tick), ..held });
         }
         knob.transmit(&mut [0; 1024]);
         knob.receive(&framed(1, 0, &hello(SESSION)));
@@ -291,12 +329,12 @@ mod tests {
         let sent = knob.transmit(&mut wire);
         assert!(sent > 52 && wire.windows(4).any(|w| w == SESSION.to_le_bytes()), "INFO names the session");
         knob.receive(&framed(2, 1, &flow(80.0)));
-        knob.receive(&framed(3, 2, &arm(SESSION, 100)));
+        knob.receive(&framed(3, 2, &arm(SESSION, 100, &knob)));
         assert!(knob.is_armed());
         let mut seq = 3;
         for tick in 0..1000 {
             if tick % 40 == 0 {
-                knob.receive(&framed(4, seq, &arm(SESSION, 100)));
+                knob.receive(&framed(4, seq, &arm(SESSION, 100, &knob)));
                 seq += 1;
             }
             t_us += 500;
@@ -330,9 +368,10 @@ mod tests {
     #[test]
     fn counts_what_was_no_frame() {
         let mut wire = b"ets Jul 29 2019 12:21:46\r\n".to_vec();
-        wire.extend(framed(4, 5, &arm(1, 2)));
-        wire.extend(framed(4, 8, &arm(1, 2)));
-        let mut broken = framed(4, 9, &arm(1, 2));
+        let bye = SESSION.to_le_bytes();
+        wire.extend(framed(8, 5, &bye));
+        wire.extend(framed(8, 8, &bye));
+        let mut broken = framed(8, 9, &bye);
         let at = broken.len() - 2;
         broken[at] ^= 0x10;
         wire.extend(broken);

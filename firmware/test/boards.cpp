@@ -1,5 +1,7 @@
 // Frames of the motor boards and their units.
 
+#include <algorithm>
+
 #include "../include/chalumeau/i2c.hpp"
 #include "check.hpp"
 
@@ -57,4 +59,59 @@ CLAIM(counts_are_the_nearest_and_never_exceed_what_the_board_takes) {
         CHECK(counts_of(NAN, unit) == 0 && counts_of(INFINITY, unit) == 0);
     }
     CHECK(counts_of(108.0F, mechaduino) == 208);
+}
+
+CLAIM(counts_what_a_tick_rounds_off_is_given_in_the_next_so_that_the_mean_of_10_ms_is_right) {
+    // Torque as a hand feels it: slow turns through the whole range, small ones, and torque held still.
+    const auto wanted_at = [](int kind, int tick) {
+        const float t = 5e-4F * static_cast<float>(tick);
+        if (kind == 0) {
+            return 45.0F + 40.0F * std::sin(6.2831853F * 0.37F * t);
+        }
+        if (kind == 1) {
+            return -20.0F + 3.0F * std::sin(6.2831853F * 5.0F * t);
+        }
+        return 2.0F + 0.31F * static_cast<float>(tick / 2000);
+    };
+    for (int kind = 0; kind < 3; ++kind) {
+        CountRounding rounding;
+        double nearest_squares = 0.0;
+        double carried_squares = 0.0;
+        double nearest[20] = {};
+        double carried[20] = {};
+        constexpr int TICKS = 200000;
+        for (int i = 0; i < TICKS; ++i) {
+            const float wanted = wanted_at(kind, i);
+            nearest[i % 20] = static_cast<double>(mnm_of(counts_of(wanted, MOTEUS_UNIT), MOTEUS_UNIT) - wanted);
+            const std::int16_t counts = rounding.counts(wanted, 450.0F, MOTEUS_UNIT);
+            carried[i % 20] = static_cast<double>(mnm_of(counts, MOTEUS_UNIT) - wanted);
+            double sums[2] = {0.0, 0.0};
+            for (int k = 0; k < 20; ++k) {
+                sums[0] += nearest[k] / 20.0;
+                sums[1] += carried[k] / 20.0;
+            }
+            nearest_squares += sums[0] * sums[0] / TICKS;
+            carried_squares += sums[1] * sums[1] / TICKS;
+        }
+        std::printf("    mean of 10 ms: %.2f mNm rms to the nearest count, %.3f with what was rounded off\n",
+                    std::sqrt(nearest_squares), std::sqrt(carried_squares));
+        CHECK(std::sqrt(nearest_squares) > 1.0);
+        CHECK(std::sqrt(carried_squares) < 0.12);
+    }
+}
+
+CLAIM(counts_never_exceed_the_ceiling_nor_the_board_and_no_torque_owes_nothing) {
+    test::Random random(9);
+    CountRounding rounding;
+    for (int i = 0; i < 200000; ++i) {
+        const float ceiling = random.between(0.0F, 450.0F);
+        const float wanted = random.between(-ceiling, ceiling);
+        const std::int16_t counts = rounding.counts(wanted, ceiling, MOTEUS_UNIT);
+        CHECK(std::fabs(mnm_of(counts, MOTEUS_UNIT)) <= std::min(ceiling + 0.005F, MOTEUS_UNIT.clips_at_mnm));
+        if (random.below(10) == 0) {
+            CHECK(rounding.counts(0.0F, ceiling, MOTEUS_UNIT) == 0);
+            CHECK(rounding.counts(1.0F, 450.0F, MOTEUS_UNIT) == 0);
+            CHECK(rounding.counts(NAN, 450.0F, MOTEUS_UNIT) == 0 && rounding.counts(INFINITY, 450.0F, MOTEUS_UNIT) == 0);
+        }
+    }
 }

@@ -27,6 +27,7 @@ struct Register {
 struct Options {
     std::string golden = "firmware/golden";
     unsigned long long fuzz_bytes = 100000000;
+    unsigned long anarchy = 1000000;  // ticks
     unsigned long trials = 100000;  // FEEL changes of the slew claim; others take a share of it
 };
 

@@ -114,6 +114,9 @@ Read read_message(const Frame& frame, std::map<std::string, std::string> fields)
             if (opens(m, frame, read)) {
                 judge(m, read);
                 FIELD(m, session, u), FIELD(m, ceiling_mnm, u);
+                if (m.stamped) {
+                    FIELD(m, epoch, u), FIELD(m, heard_us, u);
+                }
             }
             break;
         }
@@ -150,6 +153,9 @@ Read read_message(const Frame& frame, std::map<std::string, std::string> fields)
                 FIELD(m, firmware_minor, u), FIELD(m, firmware_patch, u), FIELD(m, serial, u);
                 FIELD(m, counts_per_turn, u), FIELD(m, loop_hz, u), FIELD(m, watchdog_ms, u), FIELD(m, fade_ms, u);
                 FIELD(m, ceiling_mnm, u), FIELD(m, session, u), FIELD(m, stiffness_limit, u), FIELD(m, push_limit, u);
+                if (m.counted) {
+                    FIELD(m, overruns, u), FIELD(m, bus_errors, u);
+                }
                 const std::vector<std::uint8_t> name = from_hex(fields["name"]);
                 ++read.fields;
                 read.same = read.same && (std::strcmp(read.verdict, "ok") != 0 ||
@@ -164,6 +170,9 @@ Read read_message(const Frame& frame, std::map<std::string, std::string> fields)
                 FIELD(m, t_us, u), FIELD(m, angle, std::int32_t), FIELD(m, velocity, std::int32_t);
                 FIELD(m, torque, std::int32_t), FIELD(m, flags, u), FIELD(m, feel_id, u), FIELD(m, slaps, u);
                 FIELD(m, events, u), FIELD(m, fault, u);
+                if (m.stamped) {
+                    FIELD(m, epoch, u);
+                }
             }
             break;
         }

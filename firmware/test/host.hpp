@@ -30,10 +30,12 @@ inline Feel pressure_feel() {
     return feel;
 }
 
-/// A knob that damps well, so that the stiff feels of these tests are allowed: 2 N m/rad.
+/// A knob that damps well, so that the stiff feels of these tests are allowed: 2 N m/rad. Its shaft obeys no motor, so
+/// that it has no sign to probe.
 inline Config damped() {
     Config config;
     config.knob_damping_nms = 2e-3F;
+    config.probe_mnm = 0.0F;
     return config;
 }
 
@@ -61,15 +63,21 @@ class Bench {
     }
     void feel(const Feel& feel) { send(Type::Feel, feel.encode()); }
     void arm(std::uint16_t ceiling_mnm = 450, std::uint32_t session = SESSION) {
-        send(Type::Arm, Arm{session, ceiling_mnm}.encode());
+        send(Type::Arm, permission(session, ceiling_mnm).encode());
     }
     void alive(std::uint16_t ceiling_mnm = 450, std::uint32_t session = SESSION) {
-        send(Type::Alive, Arm{session, ceiling_mnm}.encode());
+        send(Type::Alive, permission(session, ceiling_mnm).encode());
+    }
+    /// ARM or ALIVE of a host that hears the knob without delay.
+    Arm permission(std::uint32_t session, std::uint16_t ceiling_mnm) const {
+        const State now = device.state();
+        return Arm{session, ceiling_mnm, now.epoch, now.t_us, true};
     }
 
     /// One tick of 0.5 ms with what is in `reading`; hears what the device says.
     float tick() {
         t_us += 500;
+        reading.counts += counts_per_tick;
         const float torque = device.tick(t_us, reading);
         listen();
         return torque;
@@ -164,6 +172,7 @@ class Bench {
   public:
     Device device;
     Reading reading;
+    std::int32_t counts_per_tick = 0;
     std::uint32_t t_us = 0;
     std::uint16_t ceiling_mnm = 450;
     bool beats = true;

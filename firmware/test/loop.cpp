@@ -47,6 +47,7 @@ struct Rest {
 Rest let_go(const Feel& feel, double start_deg, double inertia, double damping, int late, int seconds) {
     Config config;
     config.knob_damping_nms = static_cast<float>(damping);
+    config.probe_mnm = 0.0F;  // it would begin elsewhere
     test::Bench bench(config);
     Knob knob{inertia, damping, late};
     bench.run(1);

@@ -1,4 +1,4 @@
-// Runs the claims. `firmware-tests [word..] [--golden FOLDER] [--fuzz BYTES] [--trials N]`: those whose name contains a
+// Runs the claims. `firmware-tests [word..] [--golden FOLDER] [--fuzz BYTES] [--anarchy TICKS] [--trials N]`: those whose name contains a
 // word, or all.
 
 #include <cstdint>
@@ -15,6 +15,8 @@ int main(int count, char** arguments) {
             test::options().golden = arguments[++i];
         } else if (word == "--fuzz" && has_value) {
             test::options().fuzz_bytes = std::strtoull(arguments[++i], nullptr, 10);
+        } else if (word == "--anarchy" && has_value) {
+            test::options().anarchy = std::strtoul(arguments[++i], nullptr, 10);
         } else if (word == "--trials" && has_value) {
             test::options().trials = std::strtoul(arguments[++i], nullptr, 10);
         } else {

@@ -183,8 +183,15 @@ CLAIM(rule_2_over_speed_i2c_brown_out_and_not_a_number_fade_at_once) {
         void (*end)(Bench&);
     };
     const Trip trips[] = {
-        {Cause::OverSpeed, [](Bench& b) { b.reading.velocity_rpm = 700.0F; },
-         [](Bench& b) { b.reading.velocity_rpm = 0.0F; }},
+        {Cause::OverSpeed,
+         [](Bench& b) {
+             b.reading.velocity_rpm = 700.0F;
+             b.counts_per_tick = 42;
+         },
+         [](Bench& b) {
+             b.reading.velocity_rpm = 0.0F;
+             b.counts_per_tick = 0;
+         }},
         {Cause::I2c, [](Bench& b) { b.reading.bus_ok = false; }, [](Bench& b) { b.reading.bus_ok = true; }},
         {Cause::BrownOut, [](Bench& b) { b.reading.supply_ok = false; }, [](Bench& b) { b.reading.supply_ok = true; }},
         {Cause::NotFinite, [](Bench& b) { b.reading.velocity_rpm = NAN; },
@@ -261,12 +268,16 @@ CLAIM(rule_3_a_line_that_repeats_an_old_arm_does_not_undo_a_free) {
     Bench bench;
     bench.run(1);
     bench.hello();
-    bench.send_numbered(Type::Arm, Arm{SESSION, 100}.encode(), 40);
+    const Payload arm = bench.permission(SESSION, 100).encode();
+    bench.send_numbered(Type::Arm, arm, 40);
     CHECK(bench.device.armed());
     bench.send_numbered(Type::Free, Payload{}, 41);
-    bench.send_numbered(Type::Arm, Arm{SESSION, 100}.encode(), 40);
-    bench.run(1);
-    CHECK(bench.refused(Refusal::Repeated) && !bench.device.armed());
+    // With its old number, and with one that a later frame would have.
+    for (std::uint8_t seq : {40, 42, 200}) {
+        bench.send_numbered(Type::Arm, arm, seq);
+        bench.run(1);
+        CHECK(bench.refused(Refusal::Stale) && !bench.device.armed());
+    }
 }
 
 CLAIM(another_major_version_of_either_side_never_arms) {
@@ -295,6 +306,7 @@ CLAIM(rule_4_no_command_exceeds_the_least_of_all_ceilings) {
         Config config = test::damped();
         config.ceiling_mnm = static_cast<std::uint16_t>(50 + random.below(600));
         Bench bench(config);
+        bench.reading.has_velocity = false;
         std::uint16_t user = static_cast<std::uint16_t>(random.below(451));
         Feel feel = held_feel();
         feel.scale_mnm = random.between(0.0F, 450.0F);
@@ -497,6 +509,7 @@ CLAIM(state_says_what_is) {
     bench.reading.velocity_rpm = -12.34F;
     bench.run(40);
     CHECK(bench.state.velocity == -123);
+    bench.reading.velocity_rpm = 0.0F;
     const int before = bench.states;
     bench.run(2000);
     CHECK(bench.states - before == 500);

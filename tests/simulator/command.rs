@@ -87,7 +87,7 @@ fn greet(transport: &mut dyn Transport, session: u32) -> Info {
     let is_midi = transport.binding() == Binding::Midi;
     let mut info = None;
     while info.is_none() && Instant::now() < end {
-        let hello = Message::Hello { major: 1, minor: 0, session };
+        let hello = Message::Hello { major: 1, minor: 1, session };
         let sent = if is_midi {
             transport.send(&encode_sysex(&hello, 0))
         } else {

@@ -2,7 +2,7 @@
 
 use chalumeau_knob::simulator::knob::SimulatedKnob;
 use chalumeau_knob::wire::midi::{FromKnob, MidiReceiver, encode_sysex};
-use chalumeau_knob::wire::{Arm, Decoder, DeviceEvent, DeviceState, Info, Message, encode};
+use chalumeau_knob::wire::{Arm, Decoder, DeviceEvent, DeviceState, Info, Message, Stamp, encode};
 
 /// Knob and host on one line.
 pub struct TestHost {
@@ -56,19 +56,26 @@ impl TestHost {
 
     /// Says hello and waits for the answer.
     pub fn greet(&mut self) {
-        self.send(&Message::Hello { major: 1, minor: 0, session: self.session });
+        self.send(&Message::Hello { major: 1, minor: 1, session: self.session });
         self.run(0.05, |_| {});
         assert_eq!(self.info.expect("INFO").session, self.session);
     }
 
-    /// What the user's act does.
+    /// What the user's act does: ARM, and time for the probe of the signs.
     pub fn arm(&mut self) {
         self.send(&Message::Arm(self.arming()));
         self.run(0.03, |_| {});
+        for _ in 0..50 {
+            if self.knob.is_armed() {
+                break;
+            }
+            self.run(0.01, |_| {});
+        }
     }
 
     fn arming(&self) -> Arm {
-        Arm { session: self.session, ceiling_mnm: self.ceiling_mnm }
+        let stamp = Stamp { epoch: self.last.epoch.unwrap_or(0), heard_us: self.last.t_us };
+        Arm { session: self.session, ceiling_mnm: self.ceiling_mnm, stamp: Some(stamp) }
     }
 
     /// Lets time pass; `each` sees the knob after every period.

@@ -14,10 +14,11 @@ pub use codes::{FaultCode, RefusedCode};
 pub use frame::{Decoder, EncodedFrame, FrameError, WireStats, encode};
 pub use limits::{FieldRange, OutOfRange};
 pub use message::{
-    Arm, Capabilities, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Message, TorqueLaw,
+    Arm, Capabilities, Counters, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Message, Stamp,
+    TorqueLaw,
 };
 
 /// Version of the protocol spoken here: another major one is never armed.
 pub const MAJOR: u8 = 1;
 /// Of two minor versions the lower one is spoken.
-pub const MINOR: u8 = 0;
+pub const MINOR: u8 = 1;

@@ -4,12 +4,14 @@
 
 #include "encoder.hpp"
 #include "frame.hpp"
+#include "health.hpp"
 #include "law.hpp"
 #include "limits.hpp"
 #include "messages.hpp"
 #include "midi.hpp"
 #include "morph.hpp"
 #include "outbox.hpp"
+#include "probe.hpp"
 #include "session.hpp"
 #include "timing.hpp"
 #include "watchdog.hpp"
@@ -17,7 +19,7 @@
 namespace chalumeau {
 
 constexpr std::uint8_t FIRMWARE_MAJOR = 0;
-constexpr std::uint8_t FIRMWARE_MINOR = 1;
+constexpr std::uint8_t FIRMWARE_MINOR = 2;
 constexpr std::uint16_t FIRMWARE_PATCH = 0;
 
 constexpr std::uint16_t STATE_HZ_SERIAL = 500;
@@ -26,8 +28,10 @@ constexpr std::uint32_t CONTROLLER_US = 2000;       // controllers no faster tha
 constexpr std::uint32_t TICK_LONGEST_US = 1000000;  // a longer pause counts as this: the watchdogs have long fired
 constexpr std::uint32_t BUTTON_US = 5000;           // contacts bounce for less (judgement)
 constexpr std::uint32_t LIMIT_EVENT_US = 1000000;   // a limit is told once a second at most
+constexpr std::uint32_t STALE_EVENT_US = 1000000;   // and a stale ALIVE likewise
 constexpr float SLAP_LEAVES_DEG = 1.0F;             // hysteresis of the slap region's edge
-constexpr std::uint8_t BUS_FAILURES = 3;
+/// A knob nobody has measured is not trusted with more, mNm: a finger holds it (judgement).
+constexpr std::uint16_t UNCALIBRATED_MNM = 50;
 
 /// What is built in, and what was measured on the knob.
 struct Config {
@@ -43,6 +47,9 @@ struct Config {
     std::uint16_t ceiling_mnm = 450;
     std::uint16_t rating_mnm = 200;  // may be held for ever (judgement: not measured on a motor)
     float push_limit = 0.2F;         // N m/rad (judgement: less than a relaxed grip's stiffness)
+    float probe_mnm = PROBE_MNM;     // torque of the sign probe; 0: none, only for a bench without a motor
+    std::uint16_t epoch = 0;         // where the count of disarmings begins; draw it at random at each start
+    bool calibrated = true;          // false: damping, signs and torque per count are guesses, and the ceiling is low
 };
 
 /// Of one tick.
@@ -53,14 +60,15 @@ struct Reading {
     bool bus_ok = true;        // the last exchange with the motor board succeeded
     bool supply_ok = true;
     bool button = false;
+    bool stop = false;  // the local stop is pressed: FREE, and no arming until it is released
 };
 
 class Device {
   public:
     explicit Device(const Config& config)
         : config_(config), encoder_(config.counts_per_turn, config.wraps_at),
-          limits_(config.ceiling_mnm, config.rating_mnm),
-          session_(config.major, config.binding == Binding::Serial ? WATCHDOG_SERIAL_MS : WATCHDOG_MIDI_MS),
+          limits_(config.calibrated ? config.ceiling_mnm : least(config.ceiling_mnm, UNCALIBRATED_MNM), config.rating_mnm),
+          session_(config.major, config.binding == Binding::Serial ? WATCHDOG_SERIAL_MS : WATCHDOG_MIDI_MS, config.epoch),
           outbox_(config.binding), state_hz_(config.binding == Binding::Serial ? STATE_HZ_SERIAL : STATE_HZ_MIDI) {
         // Sampling alone allows 2 b / T; a period of delay on the bus leaves a third of it (Colgate and Brown 1994,
         // b > K (T/2 + delay)); a quarter is calm under any load (docs/simulator.md).
@@ -97,6 +105,7 @@ class Device {
         const float dt_s = advance(t_us);
         sense(reading, dt_s);
         watch();
+        stop(reading.stop);
         if (session_.tick(dt_s)) {
             released(fault_);
         }
@@ -114,7 +123,13 @@ class Device {
         return config_.binding == Binding::Serial ? serial_.reader.counts : midi_.reader.counts;
     }
     std::uint32_t dropped() const { return outbox_.dropped(); }
+    /// What the torque of the last tick must not exceed, in counts of the board too.
+    float ceiling_mnm() const { return limits_.ceiling_mnm(); }
     const Feel& feel() const { return feel_; }
+    std::uint16_t epoch() const { return session_.epoch(); }
+    std::uint16_t overruns() const { return pace_.overruns(); }
+    std::uint16_t bus_errors() const { return bus_.errors(); }
+    std::uint16_t glitches() const { return encoder_.glitches(); }
     float angle_deg() const { return encoder_.degrees(); }
     float velocity() const { return encoder_.velocity(); }
     const FeelLimits& allowed() const { return allowed_; }
@@ -122,7 +137,9 @@ class Device {
     Info info() const {
         Info info;
         info.major = config_.major;
-        info.capabilities = config_.capabilities;
+        info.capabilities = static_cast<std::uint16_t>(
+            config_.calibrated ? config_.capabilities | capability::CALIBRATED
+                               : config_.capabilities & ~static_cast<unsigned>(capability::CALIBRATED));
         info.firmware_major = FIRMWARE_MAJOR;
         info.firmware_minor = FIRMWARE_MINOR;
         info.firmware_patch = FIRMWARE_PATCH;
@@ -137,6 +154,9 @@ class Device {
         info.session = session_.id();
         info.stiffness_limit = thousandths(allowed_.stiffness);
         info.push_limit = thousandths(allowed_.push);
+        info.overruns = pace_.overruns();
+        info.bus_errors = bus_.errors();
+        info.counted = true;
         return info;
     }
 
@@ -144,18 +164,20 @@ class Device {
         State state;
         state.t_us = t_us_;
         state.angle = encoder_.hundredths();
-        state.velocity = saturated(encoder_.velocity() * (10.0F / RAD_PER_S_PER_RPM));
+        state.velocity = saturated(encoder_.told() * (10.0F / RAD_PER_S_PER_RPM));
         state.torque = saturated(torque_);
         const auto when = [](bool on, std::uint16_t bit) { return on ? static_cast<unsigned>(bit) : 0U; };
         state.flags = static_cast<std::uint16_t>(
             when(armed(), flag::ARMED) | when(limits_.limited() && session_.gain() > 0.0F, flag::LIMITED) |
             when(session_.standing.any(), flag::FAULT) | when(in_slap_, flag::SLAP) | when(button_, flag::BUTTON) |
             when(session_.phase() == Phase::Fading, flag::FADING) | when(morph_.active(), flag::MORPHING) |
-            when(limits_.hot(), flag::THERMAL));
+            when(limits_.hot(), flag::THERMAL) | when(session_.phase() == Phase::Probing, flag::PROBING));
         state.feel_id = feel_.feel_id;
         state.slaps = slaps_;
         state.events = events_;
         state.fault = static_cast<std::uint8_t>(fault());
+        state.epoch = session_.epoch();
+        state.stamped = true;
         return state;
     }
 
@@ -172,34 +194,50 @@ class Device {
         t_us_ = t_us;
         clock_us_ += passed;
         passed_us_ = passed;
+        pace_.tick(passed);
         return static_cast<float>(passed) * 1e-6F;
     }
 
     void sense(const Reading& reading, float dt_s) {
         const bool finite = !reading.has_velocity || is_finite(reading.velocity_rpm);
-        if (reading.bus_ok) {
-            bus_failures_ = 0;
-            if (finite) {
-                encoder_.read(reading.counts, reading.has_velocity, reading.velocity_rpm, dt_s);
-            }
-        } else if (bus_failures_ < BUS_FAILURES) {
-            ++bus_failures_;
+        bus_.exchange(reading.bus_ok);
+        Look look = Look::Taken;
+        if (reading.bus_ok && finite) {
+            look = encoder_.read(reading.counts, reading.has_velocity, reading.velocity_rpm, dt_s);
+        } else {
+            encoder_.miss(dt_s);
         }
-        stand(Cause::I2c, bus_failures_ >= BUS_FAILURES, static_cast<float>(bus_failures_));
+        stand(Cause::I2c, bus_.ill(), static_cast<float>(bus_.in_row()));
         stand(Cause::BrownOut, !reading.supply_ok, 0.0F);
         stand(Cause::NotFinite, (reading.bus_ok && !finite) || feel_not_finite_, 0.0F);
         // Spinning a disarmed knob is nobody's fault; it only keeps ARM away.
-        stand(Cause::OverSpeed, encoder_.speed() > OVER_SPEED && session_.phase() != Phase::Disarmed, encoder_.speed());
+        const bool held = session_.phase() != Phase::Disarmed;
+        stand(Cause::OverSpeed, encoder_.speed() > OVER_SPEED && held, encoder_.speed());
+        stand(Cause::Speed, encoder_.contradicts(), encoder_.told());
+        stand(Cause::Angle, look == Look::Jump || encoder_.frozen(), encoder_.degrees());
+        stand(Cause::Slow, pace_.slow(), static_cast<float>(passed_us_));
     }
 
     /// A condition that ends torque begins or ends.
     void stand(Cause cause, bool stands, float value) {
         if (stands && !session_.standing.has(cause)) {
-            fault_ = cause;
+            // The reason of a disarming is the first.
+            fault_ = session_.phase() == Phase::Fading ? fault_ : cause;
             send_event(EventKind::Fault, static_cast<std::uint8_t>(cause), value);
-            session_.fade();
+            if (session_.fade()) {
+                released(cause);
+            }
         }
         session_.standing.set(cause, stands);
+    }
+
+    /// The local stop is FREE, and keeps ARM away while it is pressed.
+    void stop(bool pressed) {
+        session_.standing.set(Cause::Stop, pressed);
+        if (pressed && session_.phase() != Phase::Disarmed) {
+            fault_ = Cause::Stop;
+            cut(Cause::Stop);
+        }
     }
 
     void watch() {
@@ -215,6 +253,9 @@ class Device {
         if (session_.phase() == Phase::Disarmed) {
             return 0.0F;
         }
+        if (session_.phase() == Phase::Probing) {
+            return probe(dt_s);
+        }
         const float wanted = curve_.torque(encoder_.degrees(), encoder_.velocity()) + owed;
         if (!is_finite(wanted)) {
             // Nothing to fade from.
@@ -229,6 +270,29 @@ class Device {
             send_event(EventKind::Limit, 0, wanted);
         }
         return allowed * session_.gain();
+    }
+
+    /// The sign probe's torque of this tick, mNm, until it has found something.
+    float probe(float dt_s) {
+        switch (probe_.tick(encoder_, dt_s)) {
+            case Finding::Probing: return limits_.clamp(probe_.torque_mnm(), dt_s);
+            case Finding::Right: session_.probed(); break;
+            case Finding::Reversed: fail(Cause::Sign); break;
+            case Finding::SpeedReversed: fail(Cause::Speed); break;
+            case Finding::Unmoved:
+                session_.cut();
+                limits_.disarm();
+                refuse({Refusal::Unmoved, config_.probe_mnm});
+                break;
+        }
+        return 0.0F;
+    }
+
+    /// The probe shows that this motor must not be used.
+    void fail(Cause cause) {
+        fault_ = cause;
+        send_event(EventKind::Fault, static_cast<std::uint8_t>(cause), 0.0F);
+        cut(cause);
     }
 
     /// Torque has ended.
@@ -304,10 +368,9 @@ class Device {
         if (ended != Cause::None) {
             cut(ended);
         }
-        if (session_.fresh()) {
+        if (session_.begins()) {
             adopt(Feel{});  // the last host's feel is not this one's
             morph_.clear();
-            feel_not_finite_ = false;
         }
         outbox_.send(Type::Info, info().encode());
     }
@@ -321,10 +384,13 @@ class Device {
             return refuse({Refusal::Version, static_cast<float>(config_.major)}, feel.feel_id);
         }
         const Verdict verdict = check_feel(feel, allowed_);
-        feel_not_finite_ = verdict.code == Refusal::NotFinite;
+        if (verdict.code == Refusal::NotFinite) {
+            feel_not_finite_ = true;  // until a FEEL is accepted: one refused for another reason proves nothing
+        }
         if (verdict.code != Refusal::None) {
             return refuse(verdict, feel.feel_id);
         }
+        feel_not_finite_ = false;
         adopt(feel);
     }
 
@@ -347,24 +413,24 @@ class Device {
         if (arm.ranges().code != Refusal::None) {
             return refuse(arm.ranges());
         }
-        // A line that repeats an old ARM must not undo a FREE.
-        if (frame.repeated) {
-            return refuse({Refusal::Repeated, static_cast<float>(frame.seq)});
-        }
-        const bool was = armed();
-        const Refusal why = session_.arm(arm, encoder_.speed(), clock_us_);
-        switch (why) {
+        const bool was = session_.phase() != Phase::Disarmed;
+        const std::uint32_t age_us = session_.age_us(arm, t_us_);
+        switch (const Refusal why = session_.arm(arm, age_us, encoder_.speed(), clock_us_, config_.probe_mnm > 0.0F)) {
             case Refusal::None: break;
             case Refusal::Fault: return refuse({why, static_cast<float>(fault())});
             case Refusal::Moving: return refuse({why, encoder_.speed()});
+            case Refusal::Stale: return refuse({why, milliseconds(age_us)});
             default: return refuse({why, static_cast<float>(config_.major)});
         }
         if (was) {
             limits_.allow(arm.ceiling_mnm);
-        } else {
-            fault_ = Cause::None;
-            morph_.clear();
-            limits_.arm(arm.ceiling_mnm);
+            return;
+        }
+        fault_ = Cause::None;
+        morph_.clear();
+        limits_.arm(arm.ceiling_mnm);
+        if (session_.phase() == Phase::Probing) {
+            probe_.begin(encoder_.counts(), config_.probe_mnm);
         }
     }
 
@@ -374,7 +440,17 @@ class Device {
             !session_.knows(alive.session)) {
             return;  // fifty a second: silence, and with it the watchdog, is the answer
         }
-        session_.alive(clock_us_);
+        const std::uint32_t age_us = session_.age_us(alive, t_us_);
+        if (age_us > FRESH_US) {
+            // Of an armed knob the host should know why it will be let go. An ALIVE that crossed a disarming is usual.
+            const bool is_late = alive.stamped && alive.epoch == session_.epoch() && session_.phase() == Phase::Armed;
+            if (is_late && clock_us_ - stale_told_us_ > STALE_EVENT_US) {
+                stale_told_us_ = clock_us_;
+                refuse({Refusal::Stale, milliseconds(age_us)});
+            }
+            return;
+        }
+        session_.alive(age_us, clock_us_);
         limits_.allow(alive.ceiling_mnm);
     }
 
@@ -467,12 +543,17 @@ class Device {
         return static_cast<std::int16_t>(least(32767.0F, most(-32768.0F, rounded)));
     }
 
+    static float milliseconds(std::uint32_t us) { return 1e-3F * static_cast<float>(us); }
+
     static std::uint16_t thousandths(float value) {
         return static_cast<std::uint16_t>(least(65535.0F, 1000.0F * value + 0.5F));
     }
 
     Config config_;
     Encoder encoder_;
+    Pace pace_;
+    BusHealth bus_;
+    Probe probe_;
     Limits limits_;
     Session session_;
     Outbox outbox_;
@@ -491,11 +572,11 @@ class Device {
     std::uint32_t state_due_ = 0;
     std::uint32_t controllers_us_ = 0;
     std::uint32_t limit_told_us_ = 0;
+    std::uint32_t stale_told_us_ = 0;
     std::uint32_t button_since_us_ = 0;
     std::uint16_t state_hz_;
     std::uint16_t breath_sent_ = 0xFFFF;
     std::uint16_t angle_sent_ = 0xFFFF;
-    std::uint8_t bus_failures_ = 0;
     std::uint8_t slaps_ = 0;
     std::uint8_t events_ = 0;
     bool feel_not_finite_ = false;

@@ -29,7 +29,6 @@ struct Frame {
     std::uint8_t seq = 0;
     const std::uint8_t* payload = nullptr;
     std::size_t length = 0;
-    bool repeated = false;  // its number is not ahead of the last one
 };
 
 /// Writes type..crc to `out` (FRAME_MAX bytes). Returns the length, 0 when the payload is too long.
@@ -76,10 +75,9 @@ class FrameReader {
             return false;
         }
         ++counts.frames;
-        frame = Frame{bytes[0], bytes[1], bytes + 2, length - 6, false};
+        frame = Frame{bytes[0], bytes[1], bytes + 2, length - 6};
         if (begun_) {
             const auto ahead = static_cast<std::uint8_t>(frame.seq - last_);
-            frame.repeated = ahead == 0 || ahead >= 128;
             if (ahead == 0) {
                 ++counts.duplicates;
             } else {

@@ -38,7 +38,7 @@ class Limits {
     /// The torque allowed of the torque wanted, mNm. Call once per tick, with the motor's share of it.
     float clamp(float wanted, float dt_s) {
         now_ = least(user_, now_ + SLEW_MNM_PER_S * dt_s);
-        const float ceiling = least(now_, thermal_);
+        const float ceiling = ceiling_mnm();
         limited_ = wanted > ceiling || wanted < -ceiling;
         return wanted > ceiling ? ceiling : (wanted < -ceiling ? -ceiling : wanted);
     }
@@ -56,6 +56,8 @@ class Limits {
         thermal_ = hot_ ? most(rating_, thermal_ - step) : least(device_, thermal_ + step);
     }
 
+    /// The present ceiling of all but the board.
+    float ceiling_mnm() const { return least(now_, thermal_); }
     bool limited() const { return limited_; }
     bool hot() const { return hot_ || thermal_ < device_; }
     float device_mnm() const { return device_; }

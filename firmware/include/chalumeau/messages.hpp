@@ -9,7 +9,7 @@
 namespace chalumeau {
 
 constexpr std::uint8_t PROTOCOL_MAJOR = 1;
-constexpr std::uint8_t PROTOCOL_MINOR = 0;
+constexpr std::uint8_t PROTOCOL_MINOR = 1;
 
 enum class Type : std::uint8_t {
     Hello = 0x01,
@@ -41,6 +41,11 @@ enum class Cause : std::uint8_t {
     Bye = 7,
     NewSession = 8,
     Version = 9,
+    Speed = 10,
+    Angle = 11,
+    Stop = 12,
+    Slow = 13,
+    Sign = 14,
 };
 
 /// Codes of the event `refused`.
@@ -58,7 +63,9 @@ enum class Refusal : std::uint8_t {
     ZeroWhileArmed = 10,
     Session = 11,
     Version = 12,
-    Repeated = 13,
+    // 13 was a repeated ARM in version 1.0; a stale one includes it.
+    Stale = 14,
+    Unmoved = 15,
 };
 
 namespace capability {
@@ -69,6 +76,7 @@ constexpr std::uint16_t DETENT = 1U << 3U;
 constexpr std::uint16_t BUTTON = 1U << 4U;
 constexpr std::uint16_t MOTOR = 1U << 5U;
 constexpr std::uint16_t SIMULATED = 1U << 6U;
+constexpr std::uint16_t CALIBRATED = 1U << 7U;
 }  // namespace capability
 
 namespace flag {
@@ -80,6 +88,7 @@ constexpr std::uint16_t BUTTON = 1U << 4U;
 constexpr std::uint16_t FADING = 1U << 5U;
 constexpr std::uint16_t MORPHING = 1U << 6U;
 constexpr std::uint16_t THERMAL = 1U << 7U;
+constexpr std::uint16_t PROBING = 1U << 8U;
 }  // namespace flag
 
 /// Finite, told from the bits, so that no compiler option (-ffast-math) can remove the question.
@@ -284,8 +293,12 @@ struct Feel {
 /// ARM and ALIVE.
 struct Arm {
     static constexpr std::size_t LENGTH = 8;
+    static constexpr std::size_t STAMPED_LENGTH = 12;
     std::uint32_t session = 0;
     std::uint16_t ceiling_mnm = 0;
+    std::uint16_t epoch = 0;
+    std::uint32_t heard_us = 0;
+    bool stamped = false;  // a host of version 1.0 sends neither epoch nor time
 
     bool decode(const std::uint8_t* payload, std::size_t length) {
         if (length < LENGTH) {
@@ -294,6 +307,9 @@ struct Arm {
         Bytes bytes(payload);
         session = bytes.u32();
         ceiling_mnm = bytes.u16();
+        stamped = length >= STAMPED_LENGTH;
+        epoch = stamped ? bytes.u16() : std::uint16_t{0};
+        heard_us = stamped ? bytes.u32() : 0;
         return true;
     }
     Verdict ranges() const {
@@ -301,8 +317,8 @@ struct Arm {
     }
     Payload encode() const {
         Payload to;
-        to.u32(session).u16(ceiling_mnm).u16(0);
-        return to;
+        to.u32(session).u16(ceiling_mnm).u16(epoch);
+        return stamped ? to.u32(heard_us) : to;
     }
 };
 
@@ -368,6 +384,7 @@ struct Bye {
 
 struct Info {
     static constexpr std::size_t LENGTH = 52;
+    static constexpr std::size_t COUNTED_LENGTH = 56;
     std::uint8_t major = PROTOCOL_MAJOR;
     std::uint8_t minor = PROTOCOL_MINOR;
     std::uint16_t capabilities = 0;
@@ -384,6 +401,9 @@ struct Info {
     std::uint32_t session = 0;
     std::uint16_t stiffness_limit = 0;
     std::uint16_t push_limit = 0;
+    std::uint16_t overruns = 0;
+    std::uint16_t bus_errors = 0;
+    bool counted = false;  // a device of version 1.0 sends no counters
 
     bool decode(const std::uint8_t* payload, std::size_t length) {
         if (length < LENGTH) {
@@ -405,6 +425,9 @@ struct Info {
         session = bytes.u32();
         stiffness_limit = bytes.u16();
         push_limit = bytes.u16();
+        counted = length >= COUNTED_LENGTH;
+        overruns = counted ? bytes.u16() : std::uint16_t{0};
+        bus_errors = counted ? bytes.u16() : std::uint16_t{0};
         return true;
     }
     Verdict ranges() const { return serial == 0 ? Verdict{Refusal::Range, 0.0F} : Verdict{}; }
@@ -414,12 +437,13 @@ struct Info {
         to.copy(name, sizeof name).u64(serial).u32(counts_per_turn);
         to.u16(loop_hz).u16(watchdog_ms).u16(fade_ms).u16(ceiling_mnm);
         to.u32(session).u16(stiffness_limit).u16(push_limit);
-        return to;
+        return counted ? to.u16(overruns).u16(bus_errors) : to;
     }
 };
 
 struct State {
     static constexpr std::size_t LENGTH = 18;
+    static constexpr std::size_t STAMPED_LENGTH = 20;
     std::uint32_t t_us = 0;
     std::int32_t angle = 0;
     std::int16_t velocity = 0;
@@ -429,6 +453,8 @@ struct State {
     std::uint8_t slaps = 0;
     std::uint8_t events = 0;
     std::uint8_t fault = 0;
+    std::uint16_t epoch = 0;
+    bool stamped = false;  // a device of version 1.0 sends no epoch
 
     bool decode(const std::uint8_t* payload, std::size_t length) {
         if (length < LENGTH) {
@@ -444,12 +470,14 @@ struct State {
         slaps = bytes.u8();
         events = bytes.u8();
         fault = bytes.u8();
+        stamped = length >= STAMPED_LENGTH;
+        epoch = stamped ? bytes.u16() : std::uint16_t{0};
         return true;
     }
     Payload encode() const {
         Payload to;
         to.u32(t_us).i32(angle).i16(velocity).i16(torque).u16(flags).u8(feel_id).u8(slaps).u8(events).u8(fault);
-        return to;
+        return stamped ? to.u16(epoch) : to;
     }
 };
 

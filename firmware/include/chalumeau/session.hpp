@@ -1,5 +1,5 @@
-// Decides whether the motor may turn: session, arming, standing faults and the share of torque they leave.
-// `docs/protocol.md`, "Session" and "Safety". The watchdog is in `watchdog.hpp`.
+// Decides whether the motor may turn: session, arming, freshness, standing faults and the share of torque they leave.
+// `docs/protocol.md`, "Session" and "Safety". The watchdog is in `watchdog.hpp`, the sign probe in `probe.hpp`.
 #pragma once
 
 #include "limits.hpp"
@@ -9,18 +9,20 @@
 
 namespace chalumeau {
 
+/// What the host answers, ARM or ALIVE, may be this old: a knob that hears an old permission must not follow it.
+constexpr std::uint32_t FRESH_US = 100000;
 
-/// Faults that last as long as their cause does, each one bit of a byte.
+/// Faults that last as long as their cause does, each one bit.
 class StandingFaults {
   public:
     void set(Cause cause, bool stands) {
-        const auto bit = static_cast<std::uint8_t>(1U << static_cast<unsigned>(cause));
-        bits_ = static_cast<std::uint8_t>(stands ? bits_ | bit : bits_ & ~bit);
+        const auto bit = static_cast<std::uint16_t>(1U << static_cast<unsigned>(cause));
+        bits_ = static_cast<std::uint16_t>(stands ? bits_ | bit : bits_ & ~bit);
     }
     bool any() const { return bits_ != 0; }
     bool has(Cause cause) const { return (bits_ >> static_cast<unsigned>(cause) & 1U) != 0; }
     Cause first() const {
-        for (std::uint8_t cause = 1; cause < 8; ++cause) {
+        for (std::uint8_t cause = 1; cause < 16; ++cause) {
             if (has(static_cast<Cause>(cause))) {
                 return static_cast<Cause>(cause);
             }
@@ -29,14 +31,16 @@ class StandingFaults {
     }
 
   private:
-    std::uint8_t bits_ = 0;
+    std::uint16_t bits_ = 0;
 };
 
-enum class Phase : std::uint8_t { Disarmed, Armed, Fading };
+enum class Phase : std::uint8_t { Disarmed, Probing, Armed, Fading };
 
 class Session {
   public:
-    Session(std::uint8_t major, std::uint32_t watchdog_ms) : major_(major), watchdog_(watchdog_ms) {}
+    /// `epoch` is where the count of disarmings begins: at random, so that a recording of another day does not fit.
+    Session(std::uint8_t major, std::uint32_t watchdog_ms, std::uint16_t epoch)
+        : major_(major), watchdog_(watchdog_ms), epoch_(epoch) {}
 
     /// A host sends HELLO. Returns why an armed session ended: None, NewSession or Version.
     Cause hello(const Hello& hello) {
@@ -46,9 +50,11 @@ class Session {
         known_ = true;
         id_ = hello.session;
         version_fits_ = fits;
-        fresh_ = !same;
-        if (fresh_) {
+        begins_ = !same;
+        if (begins_) {
             standing.set(Cause::Watchdog, false);  // the silence was another host's
+            probed_ = false;
+            ++epoch_;
         }
         if (!fits && held) {
             return Cause::Version;
@@ -57,37 +63,59 @@ class Session {
     }
 
     /// Whether the last HELLO began a session.
-    bool fresh() const { return fresh_; }
+    bool begins() const { return begins_; }
     bool knows(std::uint32_t session) const { return known_ && session == id_; }
     bool version_fits() const { return version_fits_; }
     std::uint32_t id() const { return id_; }
 
-    /// Arms, or says why not. `speed` is a magnitude, rad/s.
-    Refusal arm(const Arm& arm, float speed, std::uint32_t now_us) {
+    /// Changes with each disarming. A permission for an earlier epoch is void.
+    std::uint16_t epoch() const { return epoch_; }
+
+    /// Age of a permission given at the knob's time `t_us`; more than FRESH_US if it is none of this epoch.
+    std::uint32_t age_us(const Arm& permission, std::uint32_t t_us) const {
+        const bool is_ours = permission.stamped && permission.epoch == epoch_;
+        return is_ours ? t_us - permission.heard_us : UINT32_MAX;
+    }
+
+    /// Arms, or says why not. `speed` is a magnitude, rad/s; `probes`: this knob probes its signs first.
+    Refusal arm(const Arm& arm, std::uint32_t age_us, float speed, std::uint32_t now_us, bool probes) {
         if (!version_fits_) {
             return known_ ? Refusal::Version : Refusal::Session;
         }
         if (!knows(arm.session)) {
             return Refusal::Session;
         }
+        if (!arm.stamped) {
+            return Refusal::Version;  // a host that cannot say when it heard the knob
+        }
+        if (age_us > FRESH_US) {
+            return Refusal::Stale;
+        }
         if (standing.any() || phase_ == Phase::Fading) {
             return Refusal::Fault;
         }
-        if (phase_ == Phase::Armed) {
+        if (phase_ == Phase::Armed || phase_ == Phase::Probing) {
             return Refusal::None;  // a second ARM sets its ceiling, but does not feed the watchdog
         }
         if (!(speed < ARM_SPEED)) {
             return Refusal::Moving;
         }
-        phase_ = Phase::Armed;
+        phase_ = probes && !probed_ ? Phase::Probing : Phase::Armed;
         gain_ = 0.0F;
-        watchdog_.feed(now_us);
+        watchdog_.start(now_us - age_us);
         return Refusal::None;
     }
 
-    /// A valid ALIVE of this session.
-    void alive(std::uint32_t now_us) {
-        watchdog_.feed(now_us);
+    /// The probe has found both signs right.
+    void probed() {
+        probed_ = true;
+        phase_ = Phase::Armed;
+        gain_ = 0.0F;
+    }
+
+    /// A fresh ALIVE of this session.
+    void alive(std::uint32_t age_us, std::uint32_t now_us) {
+        watchdog_.feed(now_us - age_us);
         standing.set(Cause::Watchdog, false);
     }
 
@@ -95,17 +123,25 @@ class Session {
     void cut() {
         phase_ = Phase::Disarmed;
         gain_ = 0.0F;
+        ++epoch_;
     }
     void forget() { known_ = false; }
 
-    /// Torque fades from here.
-    void fade() {
+    /// Torque fades from here. Returns true if it ends at once: a probe has none to fade.
+    bool fade() {
         if (phase_ == Phase::Armed) {
             phase_ = Phase::Fading;
+            ++epoch_;
+        } else if (phase_ == Phase::Probing) {
+            cut();
+            return true;
         }
+        return false;
     }
 
-    bool silent(std::uint32_t now_us) const { return phase_ == Phase::Armed && watchdog_.expired(now_us); }
+    bool silent(std::uint32_t now_us) const {
+        return (phase_ == Phase::Armed || phase_ == Phase::Probing) && watchdog_.expired(now_us);
+    }
 
     /// The share of torque this tick may have, 0 to 1. Returns true in the tick a fade ends.
     bool tick(float dt_s) {
@@ -131,9 +167,11 @@ class Session {
     std::uint8_t major_;
     Watchdog watchdog_;
     std::uint32_t id_ = 0;
+    std::uint16_t epoch_;
     bool known_ = false;
-    bool fresh_ = false;
+    bool begins_ = false;
     bool version_fits_ = false;
+    bool probed_ = false;
     Phase phase_ = Phase::Disarmed;
     float gain_ = 0.0F;
 };

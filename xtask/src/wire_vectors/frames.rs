@@ -3,7 +3,7 @@
 use chalumeau_knob::wire::frame::{FrameBody, MAX_PAYLOAD, encode};
 use chalumeau_knob::wire::limits::{self, FieldRange};
 use chalumeau_knob::wire::midi::encode_sysex;
-use chalumeau_knob::wire::{Arm, DeviceEvent, DeviceState, EventKind, Feel, Message};
+use chalumeau_knob::wire::{Arm, DeviceEvent, DeviceState, EventKind, Feel, Message, Stamp};
 
 use crate::wire_vectors::golden_frame::GoldenFrame;
 use crate::wire_vectors::messages::{device_info, messages, reference_feel};
@@ -64,7 +64,7 @@ fn later_versions() -> Vec<GoldenFrame> {
         payload.resize(length, filling);
         good(name, seq, message, framed((kind, seq, payload)), false)
     };
-    let state = DeviceState { t_us: 5, angle: 6, ..DeviceState::default() };
+    let state = DeviceState { t_us: 5, angle: 6, epoch: Some(0), ..DeviceState::default() };
     vec![
         longer("later_free", 1, Message::Free, 3, 0xAA),
         longer("later_free_of_full_length", 2, Message::Free, MAX_PAYLOAD, 0xFF),
@@ -104,14 +104,26 @@ fn damaged() -> Vec<GoldenFrame> {
     ]
 }
 
+/// Payloads one byte shorter than the least, which is that of TTLink 1.0.
 fn short_payloads() -> Vec<GoldenFrame> {
     let sample = |wanted: u8| messages().into_iter().find(|(_, _, message)| message.kind() == wanted);
-    [0x01, 0x02, 0x03, 0x04, 0x06, 0x07, 0x08, 0x81, 0x82, 0x83]
+    [
+        (0x01, 12),
+        (0x02, 56),
+        (0x03, 8),
+        (0x04, 8),
+        (0x06, 4),
+        (0x07, 2),
+        (0x08, 4),
+        (0x81, 52),
+        (0x82, 18),
+        (0x83, 12),
+    ]
         .into_iter()
-        .filter_map(sample)
-        .map(|(_, seq, message)| {
+        .filter_map(|(kind, least)| Some((sample(kind)?, least)))
+        .map(|((_, seq, message), least)| {
             let (kind, seq, mut payload) = parts(&message, seq);
-            payload.pop();
+            payload.truncate(least - 1);
             let name = format!("length_short_{}", message.name().to_lowercase());
             bad(&name, "length", Some((kind, seq)), framed((kind, seq, payload)))
         })
@@ -148,8 +160,8 @@ fn out_of_range() -> Vec<GoldenFrame> {
         t_us: 1,
         value: 1.0,
     });
-    let arm = Arm { session: 1, ceiling_mnm: 451 };
-    let hello = Message::Hello { major: 1, minor: 0, session: 1 };
+    let arm = Arm { session: 1, ceiling_mnm: 451, stamp: Some(Stamp::default()) };
+    let hello = Message::Hello { major: 1, minor: 1, session: 1 };
     found.extend([
         refused("range_feel_law", "law", patched(Message::Feel(reference_feel()), 3, 1, &[3])),
         refused("range_feel_morph_ms_below", "morph_ms", feel(&|feel| feel.morph_ms = 19)),

@@ -71,7 +71,8 @@ fn fields(message: &Message) -> String {
             f.detent
         ),
         Message::Arm(arm) | Message::Alive(arm) => {
-            format!("session={} ceiling_mnm={}", arm.session, arm.ceiling_mnm)
+            let stamp = arm.stamp.map(|stamp| format!(" epoch={} heard_us={}", stamp.epoch, stamp.heard_us));
+            format!("session={} ceiling_mnm={}{}", arm.session, arm.ceiling_mnm, stamp.unwrap_or_default())
         }
         Message::Free => String::new(),
         Message::Zero(angle) => format!("angle={angle}"),
@@ -80,7 +81,7 @@ fn fields(message: &Message) -> String {
         Message::Info(i) => format!(
             "major={} minor={} capabilities={} firmware_major={} firmware_minor={} firmware_patch={} name={} serial={} \
              counts_per_turn={} loop_hz={} watchdog_ms={} fade_ms={} ceiling_mnm={} session={} stiffness_limit={} \
-             push_limit={}",
+             push_limit={}{}",
             i.major,
             i.minor,
             i.capabilities.0,
@@ -96,11 +97,24 @@ fn fields(message: &Message) -> String {
             i.ceiling_mnm,
             i.session,
             i.stiffness_limit,
-            i.push_limit
+            i.push_limit,
+            i.counters.map_or_else(String::new, |counters| format!(
+                " overruns={} bus_errors={}",
+                counters.overruns, counters.bus_errors
+            ))
         ),
         Message::State(s) => format!(
-            "t_us={} angle={} velocity={} torque={} flags={} feel_id={} slaps={} events={} fault={}",
-            s.t_us, s.angle, s.velocity, s.torque, s.flags.0, s.feel_id, s.slaps, s.events, s.fault
+            "t_us={} angle={} velocity={} torque={} flags={} feel_id={} slaps={} events={} fault={}{}",
+            s.t_us,
+            s.angle,
+            s.velocity,
+            s.torque,
+            s.flags.0,
+            s.feel_id,
+            s.slaps,
+            s.events,
+            s.fault,
+            s.epoch.map_or_else(String::new, |epoch| format!(" epoch={epoch}"))
         ),
         Message::Event(e) => format!(
             "kind={} counter={} code={} feel_id={} t_us={} value={}",

@@ -1,7 +1,8 @@
 //! The messages that every implementation must write byte for byte.
 
 use chalumeau_knob::wire::{
-    Arm, Capabilities, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Message, TorqueLaw,
+    Arm, Capabilities, Counters, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Message, Stamp,
+    TorqueLaw,
 };
 
 /// The reference reed at TorqueTuner's own scale, with everything switched on.
@@ -23,9 +24,14 @@ pub fn reference_feel() -> Feel {
 pub fn device_info() -> Info {
     Info {
         major: 1,
-        minor: 0,
+        minor: 1,
         capabilities: Capabilities(
-            Capabilities::FLOW | Capabilities::PRESSURE | Capabilities::SLAP | Capabilities::DETENT,
+            Capabilities::FLOW
+                | Capabilities::PRESSURE
+                | Capabilities::SLAP
+                | Capabilities::DETENT
+                | Capabilities::MOTOR
+                | Capabilities::CALIBRATED,
         ),
         firmware: (0, 2, 345),
         name: Info::name_bytes("TorqueTuner"),
@@ -38,7 +44,13 @@ pub fn device_info() -> Info {
         session: 0xDEAD_BEEF,
         stiffness_limit: 2_000,
         push_limit: 60,
+        counters: Some(Counters { overruns: 3, bus_errors: 260 }),
     }
+}
+
+/// The same of TTLink 1.0.
+fn older_info() -> Info {
+    Info { minor: 0, counters: None, ..device_info() }
 }
 
 /// A message, the name of its file without the ending, and its sequence number.
@@ -51,16 +63,23 @@ pub fn messages() -> Vec<Named> {
 
 /// What a host sends, FEEL aside.
 fn host_messages() -> Vec<Named> {
-    let arm = |session, ceiling_mnm| Arm { session, ceiling_mnm };
+    let older = |session, ceiling_mnm| Arm { session, ceiling_mnm, stamp: None };
+    let arm = |session, ceiling_mnm, epoch, heard_us| Arm {
+        session,
+        ceiling_mnm,
+        stamp: Some(Stamp { epoch, heard_us }),
+    };
     vec![
-        ("hello", 0, Message::Hello { major: 1, minor: 0, session: 0xDEAD_BEEF }),
+        ("hello", 0, Message::Hello { major: 1, minor: 1, session: 0xDEAD_BEEF }),
         ("hello_zeros", 1, Message::Hello { major: 0, minor: 0, session: 0 }),
         ("hello_most", 255, Message::Hello { major: 255, minor: 255, session: u32::MAX }),
-        ("arm", 6, Message::Arm(arm(0xDEAD_BEEF, 100))),
-        ("arm_zeros", 0, Message::Arm(arm(0, 0))),
-        ("arm_most", 7, Message::Arm(arm(u32::MAX, 450))),
-        ("alive", 8, Message::Alive(arm(0xDEAD_BEEF, 250))),
-        ("alive_zeros", 0, Message::Alive(arm(0, 0))),
+        ("arm", 6, Message::Arm(arm(0xDEAD_BEEF, 100, 0x1234, 1_234_567))),
+        ("arm_zeros", 0, Message::Arm(arm(0, 0, 0, 0))),
+        ("arm_most", 7, Message::Arm(arm(u32::MAX, 450, u16::MAX, u32::MAX))),
+        ("arm_1_0", 6, Message::Arm(older(0xDEAD_BEEF, 100))),
+        ("alive", 8, Message::Alive(arm(0xDEAD_BEEF, 250, 7, 0x8000_0000))),
+        ("alive_zeros", 0, Message::Alive(arm(0, 0, 0, 0))),
+        ("alive_1_0", 8, Message::Alive(older(0xDEAD_BEEF, 250))),
         ("free", 9, Message::Free),
         ("free_seq_0", 0, Message::Free),
         ("zero", 10, Message::Zero(0)),
@@ -138,6 +157,7 @@ fn infos() -> Vec<Named> {
         session: u32::MAX,
         stiffness_limit: u16::MAX,
         push_limit: u16::MAX,
+        counters: Some(Counters { overruns: u16::MAX, bus_errors: u16::MAX }),
     };
     let least = Info {
         major: 0,
@@ -154,11 +174,13 @@ fn infos() -> Vec<Named> {
         session: 0,
         stiffness_limit: 0,
         push_limit: 0,
+        counters: Some(Counters::default()),
     };
     vec![
         ("info", 0, Message::Info(device_info())),
         ("info_least", 1, Message::Info(least)),
         ("info_most", 2, Message::Info(most)),
+        ("info_1_0", 0, Message::Info(older_info())),
     ]
 }
 
@@ -173,12 +195,14 @@ fn states() -> Vec<Named> {
         slaps: 3,
         events: 9,
         fault: 0,
+        epoch: Some(0x1234),
     };
     let least = DeviceState {
         t_us: 0,
         angle: i32::MIN,
         velocity: i16::MIN,
         torque: i16::MIN,
+        epoch: Some(0),
         ..DeviceState::default()
     };
     let most = DeviceState {
@@ -191,10 +215,12 @@ fn states() -> Vec<Named> {
         slaps: 255,
         events: 255,
         fault: 255,
+        epoch: Some(u16::MAX),
     };
     vec![
         ("state", 3, Message::State(state)),
-        ("state_zeros", 0, Message::State(DeviceState::default())),
+        ("state_zeros", 0, Message::State(DeviceState { epoch: Some(0), ..DeviceState::default() })),
+        ("state_1_0", 3, Message::State(DeviceState { epoch: None, ..state })),
         ("state_least", 4, Message::State(least)),
         ("state_most", 255, Message::State(most)),
     ]

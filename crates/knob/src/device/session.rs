@@ -17,7 +17,7 @@ use crate::device::stats::{LinkStats, Meter};
 use crate::device::transport::Binding;
 use crate::wire;
 use crate::wire::midi::{BREATH_MAX, FromKnob, MidiReceiver};
-use crate::wire::{Arm, DeviceEvent, DeviceState, EventKind, Feel, Info, Message, WireStats};
+use crate::wire::{Arm, DeviceEvent, DeviceState, EventKind, Feel, Info, Message, Stamp, WireStats};
 
 /// Time between two ALIVE on a serial line, us.
 const ALIVE_US: i64 = 20_000;
@@ -356,13 +356,15 @@ impl HostSession {
         if self.info.as_ref().is_some_and(|info| !info.speaks_our_major()) {
             return None; // nobody knows what it would make of it
         }
-        let arm = Arm { session: self.number, ceiling_mnm: self.arming.ceiling_mnm() };
+        // Without a STATE there is nothing that a permission could answer.
+        let stamp = self.state().map(|state| Stamp { epoch: state.epoch.unwrap_or(0), heard_us: state.t_us });
+        let arm = Arm { session: self.number, ceiling_mnm: self.arming.ceiling_mnm(), stamp };
         match self.arming.poll(now_us) {
             Some(arming::ArmingMessage::Free) => return Some(Message::Free),
             Some(arming::ArmingMessage::Arm) => return Some(Message::Arm(arm)),
             None => {}
         }
-        if self.info.is_some() && now_us >= self.next_alive_us {
+        if self.info.is_some() && stamp.is_some() && now_us >= self.next_alive_us {
             let period_us = if self.binding == Binding::Midi { ALIVE_MIDI_US } else { ALIVE_US };
             // Counted from when it was due, so that the rate holds; after a stall from now.
             self.next_alive_us = (self.next_alive_us + period_us).max(now_us);

@@ -50,11 +50,16 @@ pub struct SimulatedKnob {
     command_nm: f64,
     report: Option<[(&'static str, OscValue); 8]>,
     extra_button: bool,
+    stop: bool,
 }
 
 impl SimulatedKnob {
     /// A knob with our firmware. The seed is that of noise and faults; the hand has its own.
     pub fn new(setup: Setup, plant: PlantDesign, hand: SimulatedHand, seed: u64) -> Self {
+        // The firmware counts in the steps of the board that is built in.
+        let mnm_per_count = (1000.0 * plant.torque_step_nm) as f32;
+        let board_clips_mnm = (1000.0 * plant.ceiling_nm) as f32;
+        let setup = Setup { mnm_per_count, board_clips_mnm, ..setup };
         let brain = Controller::Link(Box::new(Firmware::new(&setup)));
         Self::with_brain(brain, Some(setup), plant, hand, seed)
     }
@@ -87,6 +92,7 @@ impl SimulatedKnob {
             command_nm: 0.0,
             report: None,
             extra_button: false,
+            stop: false,
         }
     }
 
@@ -118,6 +124,8 @@ impl SimulatedKnob {
             bus_ok,
             supply_ok: !self.is_faulty(FaultKind::BrownOut),
             button: self.hand.button() || self.extra_button,
+            stop: self.stop,
+            tells_velocity: true,
         };
         let mut arrived = Vec::new();
         self.to_device.take(t_s, &self.faults, &mut arrived);
@@ -131,7 +139,8 @@ impl SimulatedKnob {
                     firmware.receive(&arrived);
                 }
                 let t_us = (self.tick - self.booted_at_tick) * PERIOD_US;
-                command_nm = Some(f64::from(firmware.tick(t_us, &reading)) / 1000.0);
+                let torque_mnm = firmware.tick(t_us, &reading);
+                command_nm = Some(f64::from(firmware.command(torque_mnm)) / 1000.0);
                 let mut bytes = [0; TRANSMIT_MAX];
                 let length = firmware.transmit(&mut bytes);
                 self.to_host.push(t_s, &self.faults, &bytes[..length]);
@@ -176,7 +185,11 @@ impl SimulatedKnob {
     fn boot(&mut self) {
         self.booted_at_tick = self.tick;
         self.brain = match &self.setup {
-            Some(setup) => Controller::Link(Box::new(Firmware::new(setup))),
+            Some(setup) => {
+                // As a real one draws it at each start.
+                let epoch = setup.epoch.wrapping_add(self.booted_at_tick as u16).wrapping_add(1);
+                Controller::Link(Box::new(Firmware::new(&Setup { epoch, ..setup.clone() })))
+            }
             None => Controller::Stock(Box::default()),
         };
         // What arrived while nobody was there is lost.
@@ -267,6 +280,11 @@ impl SimulatedKnob {
     /// The knob itself, to be put somewhere.
     pub fn plant(&mut self) -> &mut Plant {
         &mut self.plant
+    }
+
+    /// Presses the local stop, or releases it.
+    pub fn press_stop(&mut self, is_down: bool) {
+        self.stop = is_down;
     }
 
     /// Holds the button down, or not, beside what the script says.

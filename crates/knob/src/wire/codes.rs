@@ -24,11 +24,21 @@ pub enum FaultCode {
     NewSession = 8,
     /// Another major version.
     Version = 9,
+    /// The motor board's speed contradicts the counts.
+    Speed = 10,
+    /// The angle jumped, or stands still while the motor board tells of motion.
+    Angle = 11,
+    /// The local stop was pressed.
+    Stop = 12,
+    /// The haptic loop is slower than the limits of the slopes assume.
+    Slow = 13,
+    /// The probe found that the motor turns the knob the wrong way.
+    Sign = 14,
 }
 
 impl FaultCode {
     /// All of them, by number.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 14] = [
         Self::Watchdog,
         Self::OverSpeed,
         Self::I2c,
@@ -38,6 +48,11 @@ impl FaultCode {
         Self::Bye,
         Self::NewSession,
         Self::Version,
+        Self::Speed,
+        Self::Angle,
+        Self::Stop,
+        Self::Slow,
+        Self::Sign,
     ];
 
     /// The code of a number; `None` for 0 (no fault) and for codes of a later version.
@@ -57,6 +72,15 @@ impl FaultCode {
             Self::Bye => "the program that used the knob has closed the link",
             Self::NewSession => "another program opened the knob",
             Self::Version => "the knob speaks another version of the protocol",
+            Self::Speed => {
+                "the motor board's speed contradicts the angle: check the sign of the speed (firmware/README.md)"
+            }
+            Self::Angle => "the knob's angle jumped, or stands still while the knob turns",
+            Self::Stop => "the stop button at the knob was pressed",
+            Self::Slow => "the knob's loop is too slow to be safe",
+            Self::Sign => {
+                "the motor turns the knob the wrong way: set the sign of its torque (firmware/README.md)"
+            }
         }
     }
 }
@@ -95,13 +119,17 @@ pub enum RefusedCode {
     WrongSession = 11,
     /// Another major version.
     Version = 12,
-    /// ARM whose sequence number is not newer than the last: the line repeated an old frame.
+    /// ARM whose sequence number is not newer than the last; only TTLink 1.0 sends this code.
     Repeated = 13,
+    /// ARM or ALIVE older than 100 ms, or of before the last disarming.
+    Stale = 14,
+    /// Not armed: the knob did not move when its signs were probed.
+    Unmoved = 15,
 }
 
 impl RefusedCode {
     /// All of them, by number.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 15] = [
         Self::HTimesK,
         Self::TooStiff,
         Self::WouldPush,
@@ -115,6 +143,8 @@ impl RefusedCode {
         Self::WrongSession,
         Self::Version,
         Self::Repeated,
+        Self::Stale,
+        Self::Unmoved,
     ];
 
     /// The code of a number; `None` for codes of a later version.
@@ -140,6 +170,10 @@ impl RefusedCode {
             Self::WrongSession => "another program is using the knob",
             Self::Version => "the knob speaks another version of the protocol",
             Self::Repeated => "not armed: the request came twice or out of order; arm again",
+            Self::Stale => "the line to the knob is late: what reached it was older than 100 ms",
+            Self::Unmoved => {
+                "not armed: the knob did not move in the test of its motor; let it go, or hold it lightly, and arm again"
+            }
         }
     }
 }
@@ -157,8 +191,8 @@ mod tests {
     #[test]
     fn numbers_and_codes_belong_together() {
         for code in 0..=255 {
-            assert_eq!(FaultCode::from_u8(code).is_some(), (1..=9).contains(&code), "fault {code}");
-            assert_eq!(RefusedCode::from_u8(code).is_some(), (1..=13).contains(&code), "refused {code}");
+            assert_eq!(FaultCode::from_u8(code).is_some(), (1..=14).contains(&code), "fault {code}");
+            assert_eq!(RefusedCode::from_u8(code).is_some(), (1..=15).contains(&code), "refused {code}");
             assert!(FaultCode::from_u8(code).is_none_or(|known| known as u8 == code));
             assert!(RefusedCode::from_u8(code).is_none_or(|known| known as u8 == code));
         }

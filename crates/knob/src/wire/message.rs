@@ -6,6 +6,15 @@ use crate::wire::codes::{FaultCode, RefusedCode};
 use chalumeau_core::haptics::TorqueLimits;
 pub use chalumeau_core::haptics::{Feel, TorqueLaw};
 
+/// What a permission answers: it dates ARM and ALIVE by the knob's own clock, so that the knob can refuse an old one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Stamp {
+    /// The knob's count of disarmings, as the host last heard it in STATE.
+    pub epoch: u16,
+    /// The knob's clock, microseconds, as the host last heard it in STATE.
+    pub heard_us: u32,
+}
+
 /// Content of ARM and of ALIVE.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Arm {
@@ -13,6 +22,8 @@ pub struct Arm {
     pub session: u32,
     /// Most torque the user allows, mNm, 0..=450.
     pub ceiling_mnm: u16,
+    /// Absent in TTLink 1.0.
+    pub stamp: Option<Stamp>,
 }
 
 /// What a device can do, see INFO. `docs/protocol.md` lists all bits; those that the program uses have names here.
@@ -30,13 +41,26 @@ impl Capabilities {
     pub const DETENT: u16 = 1 << 3;
     /// Has a button.
     pub const BUTTON: u16 = 1 << 4;
+    /// Has a motor.
+    pub const MOTOR: u16 = 1 << 5;
     /// Is a simulation.
     pub const SIMULATED: u16 = 1 << 6;
+    /// Its damping, signs and torque per count were measured (since TTLink 1.1).
+    pub const CALIBRATED: u16 = 1 << 7;
 
     /// Whether all of `bits` are set.
     pub fn has(self, bits: u16) -> bool {
         self.0 & bits == bits
     }
+}
+
+/// What a device has counted since its start; each stops at 65535.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Turns of its loop that came too late.
+    pub overruns: u16,
+    /// Exchanges with its motor board that failed.
+    pub bus_errors: u16,
 }
 
 /// Message INFO: the device describes itself.
@@ -70,7 +94,13 @@ pub struct Info {
     pub stiffness_limit: u16,
     /// Steepest positive-feedback slope it accepts, 0.001 N m/rad.
     pub push_limit: u16,
+    /// Absent in TTLink 1.0.
+    pub counters: Option<Counters>,
 }
+
+/// Most torque that a device of TTLink 1.0 is asked for, mNm: it cannot tell an old permission from a new one, so that a
+/// late or repeated ARM may arm it. A finger holds this much (judgement).
+pub const UNDATED_CEILING_MNM: u16 = 50;
 
 impl Info {
     /// A name as INFO carries it: cut at the last whole character that fits 16 bytes.
@@ -87,10 +117,20 @@ impl Info {
         String::from_utf8_lossy(&self.name[..length])
     }
 
+    /// Whether the device checks the age of a permission.
+    pub fn checks_age(&self) -> bool {
+        self.minor >= 1
+    }
+
+    /// Most torque that this device may be asked for, mNm.
+    pub fn most_mnm(&self) -> u16 {
+        if self.checks_age() { self.ceiling_mnm } else { self.ceiling_mnm.min(UNDATED_CEILING_MNM) }
+    }
+
     /// The limits a feel must keep on this device, under a ceiling of `allowed_mnm` that the user allows.
     pub fn torque_limits(&self, allowed_mnm: u16) -> TorqueLimits {
         TorqueLimits {
-            ceiling_mnm: f64::from(self.ceiling_mnm.min(allowed_mnm)),
+            ceiling_mnm: f64::from(self.most_mnm().min(allowed_mnm)),
             stiffness_nm_per_rad: 1e-3 * f64::from(self.stiffness_limit),
             push_nm_per_rad: 1e-3 * f64::from(self.push_limit),
         }
@@ -115,6 +155,10 @@ impl Flags {
     pub const SLAP: u16 = 1 << 3;
     /// The button is down.
     pub const BUTTON: u16 = 1 << 4;
+    /// Torque fades.
+    pub const FADING: u16 = 1 << 5;
+    /// The knob probes its signs before it arms (since TTLink 1.1).
+    pub const PROBING: u16 = 1 << 8;
 
     /// Whether all of `bits` are set.
     pub fn has(self, bits: u16) -> bool {
@@ -164,6 +208,8 @@ pub struct DeviceState {
     pub events: u8,
     /// Code of the present fault; 0 if there is none.
     pub fault: u8,
+    /// Count of disarmings; absent in TTLink 1.0.
+    pub epoch: Option<u16>,
 }
 
 impl DeviceState {
@@ -285,6 +331,7 @@ mod tests {
             session: 0,
             stiffness_limit: 0,
             push_limit: 0,
+            counters: None,
         };
         assert_eq!(info("TorqueTuner").name_text(), "TorqueTuner");
         assert_eq!(info("exactly 16 bytes").name_text(), "exactly 16 bytes");

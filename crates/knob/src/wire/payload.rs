@@ -3,7 +3,8 @@
 use crate::wire::frame::{FrameError, MAX_PAYLOAD};
 use crate::wire::limits::{self, FieldRange, OutOfRange};
 use crate::wire::message::{
-    Arm, Capabilities, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Message, TorqueLaw,
+    Arm, Capabilities, Counters, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Message, Stamp,
+    TorqueLaw,
 };
 
 const MAGIC: [u8; 4] = *b"TTLK";
@@ -19,6 +20,11 @@ const BYE: u8 = 0x08;
 const INFO: u8 = 0x81;
 const STATE: u8 = 0x82;
 const EVENT: u8 = 0x83;
+
+/// Lengths from which on a payload has the fields that TTLink 1.1 appended.
+const ARM_STAMPED: usize = 12;
+const INFO_COUNTED: usize = 56;
+const STATE_STAMPED: usize = 20;
 
 /// Name of a type and the least length of its payload.
 fn layout(kind: u8) -> Option<(&'static str, usize)> {
@@ -121,7 +127,10 @@ pub(super) fn write(message: &Message, bytes: &mut [u8; MAX_PAYLOAD]) -> usize {
             out.f32(feel.damping_mnms).u16(feel.friction).u16(feel.detent);
         }
         Message::Arm(arm) | Message::Alive(arm) => {
-            out.u32(arm.session).u16(arm.ceiling_mnm).u16(0);
+            out.u32(arm.session).u16(arm.ceiling_mnm).u16(arm.stamp.map_or(0, |stamp| stamp.epoch));
+            if let Some(stamp) = arm.stamp {
+                out.u32(stamp.heard_us);
+            }
         }
         Message::Free => {}
         Message::Zero(angle) => {
@@ -139,11 +148,17 @@ pub(super) fn write(message: &Message, bytes: &mut [u8; MAX_PAYLOAD]) -> usize {
             out.u8(major).u8(minor).u16(patch).put(info.name).put(info.serial.to_le_bytes());
             out.u32(info.counts_per_turn).u16(info.loop_hz).u16(info.watchdog_ms).u16(info.fade_ms);
             out.u16(info.ceiling_mnm).u32(info.session).u16(info.stiffness_limit).u16(info.push_limit);
+            if let Some(counters) = info.counters {
+                out.u16(counters.overruns).u16(counters.bus_errors);
+            }
         }
         Message::State(state) => {
             out.u32(state.t_us).put(state.angle.to_le_bytes()).put(state.velocity.to_le_bytes());
             out.put(state.torque.to_le_bytes()).u16(state.flags.0);
             out.u8(state.feel_id).u8(state.slaps).u8(state.events).u8(state.fault);
+            if let Some(epoch) = state.epoch {
+                out.u16(epoch);
+            }
         }
         Message::Event(event) => {
             out.u8(event.kind as u8).u8(event.counter).u8(event.code).u8(event.feel_id);
@@ -157,7 +172,8 @@ pub(super) fn write(message: &Message, bytes: &mut [u8; MAX_PAYLOAD]) -> usize {
 struct Reader<'a>(&'a [u8]);
 
 impl Reader<'_> {
-    // PANIC: `read` has compared the length with `layout`, whose lengths end behind the last field read.
+    // PANIC: `read` has compared the length with `layout`, whose lengths end behind the last field read; appended fields
+    // are read only behind a comparison of their own.
     fn take<const N: usize>(&self, at: usize) -> [u8; N] {
         let mut bytes = [0; N];
         bytes.copy_from_slice(&self.0[at..at + N]);
@@ -180,8 +196,13 @@ impl Reader<'_> {
         f32::from_le_bytes(self.take(at))
     }
 
+    fn has(&self, length: usize) -> bool {
+        self.0.len() >= length
+    }
+
     fn arm(&self) -> Arm {
-        Arm { session: self.u32(0), ceiling_mnm: self.u16(4) }
+        let stamp = self.has(ARM_STAMPED).then(|| Stamp { epoch: self.u16(6), heard_us: self.u32(8) });
+        Arm { session: self.u32(0), ceiling_mnm: self.u16(4), stamp }
     }
 
     fn feel(&self) -> Result<Feel, OutOfRange> {
@@ -228,6 +249,9 @@ impl Reader<'_> {
             session: self.u32(44),
             stiffness_limit: self.u16(48),
             push_limit: self.u16(50),
+            counters: self
+                .has(INFO_COUNTED)
+                .then(|| Counters { overruns: self.u16(52), bus_errors: self.u16(54) }),
         }
     }
 
@@ -242,6 +266,7 @@ impl Reader<'_> {
             slaps: self.u8(15),
             events: self.u8(16),
             fault: self.u8(17),
+            epoch: self.has(STATE_STAMPED).then(|| self.u16(18)),
         }
     }
 

@@ -74,7 +74,7 @@ impl Arming {
     /// The user allows torque. Above [`OFFERED_CEILING_MNM`] only with a `further_act`; the least limit wins, last of all.
     pub fn arm(&mut self, ceiling_mnm: u16, further_act: bool, info: &Info, now_us: i64) {
         let offered = if further_act { HARD_CEILING_MNM } else { OFFERED_CEILING_MNM };
-        self.ceiling_mnm = ceiling_mnm.min(offered).min(info.ceiling_mnm).min(HARD_CEILING_MNM);
+        self.ceiling_mnm = ceiling_mnm.min(offered).min(info.most_mnm()).min(HARD_CEILING_MNM);
         self.want = Goal::Arming { tries: 0 };
         self.next_us = now_us;
         self.say_free = false;
@@ -146,7 +146,7 @@ pub(super) mod tests {
     pub fn info(ceiling_mnm: u16) -> Info {
         Info {
             major: 1,
-            minor: 0,
+            minor: 1,
             capabilities: Capabilities(Capabilities::FLOW),
             firmware: (0, 1, 0),
             name: Info::name_bytes("TorqueTuner"),
@@ -159,6 +159,7 @@ pub(super) mod tests {
             session: 7,
             stiffness_limit: 8000,
             push_limit: 500,
+            counters: None,
         }
     }
 
