@@ -79,6 +79,8 @@ pub enum Action {
     ChooseDevice(String),
     /// The feel of a test, which replaces the feel of the notes; `None` ends the test.
     FeelTest(Option<Feel>),
+    /// The knob must let go, now.
+    StopKnob,
     /// An instrument of the list.
     ChooseInstrument(usize),
     /// An instrument file.
@@ -272,6 +274,11 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     let tab = kept.tab;
     let is_blind = compare.is_blind();
 
+    // In every view, whatever has the focus.
+    let wants_torque = snapshot.knob.is_armed || hands.step("arm") == 1;
+    if wants_torque && ui.input(|input| input.key_pressed(egui::Key::Escape)) {
+        knob_view::stop(&mut hands, &mut actions);
+    }
     breath.look(&snapshot.sources);
 
     let ground = |x: i8, y: i8| Frame::new().fill(c.ground).inner_margin(Margin::symmetric(x, y));

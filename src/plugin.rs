@@ -46,11 +46,22 @@ use breath_sources::BreathInput;
 use chalumeau_core::control::notes::Note;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::{Clarinet, Settings};
+#[cfg(feature = "devices")]
+use chalumeau_knob::device::Release;
 use host_inputs::HostInputs;
 use instrument_loading::{InstrumentLoader, InstrumentSwap, SharedInstrument};
 pub use notes_only::NotesOnly;
 use params::moment::Moment;
 use window::{HostWindow, PluginWindow, WindowAudio};
+
+/// What the framework hands on to a plugin instance.
+pub enum Task {
+    /// The CLAP's layer asks who it is.
+    Introduce(clap::Introduction),
+    /// The knob's controller asks whether the main thread lives.
+    #[cfg(feature = "devices")]
+    Pulse,
+}
 
 /// The plugin. It has parameters from the start, and a clarinet from the first activation.
 #[derive(Default)]
@@ -66,6 +77,13 @@ pub struct Chalumeau {
     #[cfg(feature = "devices")]
     knob: Option<(knob::PluginKnob, knob::KnobAudio)>,
     window: Option<(PluginWindow, WindowAudio)>,
+    /// Answers for the host's main thread, and how to ask it.
+    #[cfg(feature = "devices")]
+    main_pulse: Arc<knob::MainPulse>,
+    #[cfg(feature = "devices")]
+    executor: Option<AsyncExecutor<Self>>,
+    /// Whether the host's transport ran in the last block.
+    transport_ran: bool,
     /// Whether the host renders a file, in which a live knob has no effect.
     offline: bool,
 }
@@ -88,14 +106,20 @@ impl Plugin for Chalumeau {
 
     type Editor = HostWindow;
     type SysExMessage = ();
-    type BackgroundTask = clap::Introduction;
+    type BackgroundTask = Task;
 
     fn task_executor(&mut self) -> TaskExecutor<Self> {
         let (params, instrument) = (self.params.clone(), self.shared_instrument.clone());
-        Box::new(move |clap::Introduction(tell)| {
-            let (params, instrument) = (params.clone(), instrument.clone());
-            // Who asks waits for the answer.
-            let _ = tell.send(clap::Introduced { params, instrument });
+        #[cfg(feature = "devices")]
+        let pulse = self.main_pulse.clone();
+        Box::new(move |task| match task {
+            Task::Introduce(clap::Introduction(tell)) => {
+                let (params, instrument) = (params.clone(), instrument.clone());
+                // Who asks waits for the answer.
+                let _ = tell.send(clap::Introduced { params, instrument });
+            }
+            #[cfg(feature = "devices")]
+            Task::Pulse => pulse.answer(),
         })
     }
 
@@ -103,7 +127,13 @@ impl Plugin for Chalumeau {
         self.params.clone()
     }
 
-    fn editor(&mut self, _: AsyncExecutor<Self>) -> Option<Self::Editor> {
+    fn editor(&mut self, executor: AsyncExecutor<Self>) -> Option<Self::Editor> {
+        #[cfg(feature = "devices")]
+        {
+            self.executor = Some(executor);
+        }
+        #[cfg(not(feature = "devices"))]
+        drop(executor);
         self.start_threads();
         self.window.as_mut()?.0.host_window()
     }
@@ -202,6 +232,12 @@ impl Chalumeau {
         }
         instrument.receive();
 
+        let transport_runs = context.transport().playing;
+        let has_stopped = std::mem::replace(&mut self.transport_ran, transport_runs) && !transport_runs;
+        #[cfg(feature = "devices")]
+        if let Some((_, audio)) = self.knob.as_ref().filter(|_| has_stopped) {
+            audio.let_go(Release::TransportStopped);
+        }
         let inputs = &mut self.inputs;
         inputs.begin_block();
         let panic = if self.params.moments.take(Moment::Panic) { inputs.silence() } else { [None; 2] };
@@ -259,8 +295,12 @@ impl Chalumeau {
         let (params, instrument) = (&self.params, &self.shared_instrument);
         self.loader.get_or_insert_with(|| InstrumentLoader::start(params.clone(), instrument.clone()));
         #[cfg(feature = "devices")]
-        let (knob, _) =
-            self.knob.get_or_insert_with(|| knob::PluginKnob::start(params.clone(), instrument.clone()));
+        let (knob, _) = self.knob.get_or_insert_with(|| {
+            let executor = self.executor.take();
+            let ask_main =
+                executor.map(|main| Box::new(move || main.execute_gui(Task::Pulse)) as Box<dyn Fn() + Send>);
+            knob::PluginKnob::start(params.clone(), instrument.clone(), self.main_pulse.clone(), ask_main)
+        });
         let handles = || SharedHandles {
             params: params.clone(),
             instrument: instrument.clone(),

@@ -51,6 +51,11 @@ fn setup(midi: bool, knob_damping_nms: f64) -> Setup {
     Setup { midi, knob_damping_nms: knob_damping_nms as f32, ..Setup::default() }
 }
 
+/// A flywheel does not move when its signs are probed.
+fn setup_of(plant: &PlantDesign) -> Setup {
+    Setup { probes: plant.inertia_kgm2 < 1.0, ..setup(false, plant.viscous_nms) }
+}
+
 /// A knob without a hand at an angle, armed with a feel; none if the firmware refuses it.
 fn released(feel: Feel, plant: PlantDesign, angle_deg: f64) -> Option<TestHost> {
     released_by(HandDesign::default(), feel, plant, angle_deg)
@@ -59,10 +64,9 @@ fn released(feel: Feel, plant: PlantDesign, angle_deg: f64) -> Option<TestHost> 
 /// The same, with a certain hand ready to take hold.
 fn released_by(hand: HandDesign, feel: Feel, plant: PlantDesign, angle_deg: f64) -> Option<TestHost> {
     let hand = SimulatedHand::new(hand, 1);
-    let mut host =
-        TestHost::new(SimulatedKnob::new(setup(false, plant.viscous_nms), plant, hand, 1), false, 450);
-    host.greet(); // zero is where the knob stood when it started
-    host.knob.plant().set(angle_deg.to_radians(), 0.0);
+    let mut host = TestHost::new(SimulatedKnob::new(setup_of(&plant), plant, hand, 1), false, 450);
+    host.greet();
+    host.put(angle_deg);
     host.send(&Message::Feel(feel));
     host.run(0.1, |_| {}); // until its speed is forgotten
     if host.state().feel_id != feel.feel_id {
@@ -442,7 +446,7 @@ fn break_it(harm: Harm, midi: bool, seed: u64) -> f64 {
     let mut host = TestHost::new(knob, midi, ceiling_mnm as u16);
     let context = format!("{harm:?}, midi {midi}, seed {seed}");
     host.greet();
-    host.knob.plant().set(angle_deg.to_radians(), 0.0);
+    host.put(angle_deg);
     host.knob.hand().aim(Aim::Angle(angle_deg));
     host.send(&Message::Feel(played));
     host.run(0.1, |_| {});

@@ -423,11 +423,12 @@ CLAIM(calibration_comes_back_and_any_bit_changed_is_none) {
     stored.damping_nms = 1.2e-3F;
     stored.mnm_per_count = 0.52F;
     stored.torque_sign = -1;
+    stored.rpm_per_unit = -60.0F;
     std::uint8_t bytes[CALIBRATION_SIZE];
     stored.encode(bytes);
     Calibration read;
     CHECK(read.decode(bytes, sizeof bytes));
-    CHECK(read.damping_nms == 1.2e-3F && read.mnm_per_count == 0.52F && read.torque_sign == -1 && read.speed_sign == 1);
+    CHECK(read.damping_nms == 1.2e-3F && read.mnm_per_count == 0.52F && read.torque_sign == -1 && read.rpm_per_unit == -60.0F);
     for (std::size_t bit = 0; bit < 8 * sizeof bytes; ++bit) {
         std::uint8_t damaged[CALIBRATION_SIZE];
         std::memcpy(damaged, bytes, sizeof bytes);
@@ -439,8 +440,9 @@ CLAIM(calibration_comes_back_and_any_bit_changed_is_none) {
     std::uint8_t empty[CALIBRATION_SIZE] = {};
     CHECK(!read.decode(empty, sizeof empty));
     // A checksum does not make sense of nonsense.
-    for (int kind = 0; kind < 4; ++kind) {
+    for (int kind = 0; kind < 5; ++kind) {
         Calibration odd;
+        odd.rpm_per_unit = kind == 4 ? 0.0F : 1.0F;
         odd.damping_nms = kind == 0 ? NAN : (kind == 1 ? 1.0F : 1e-3F);
         odd.mnm_per_count = kind == 2 ? 0.0F : 4.8F;
         odd.torque_sign = kind == 3 ? std::int8_t{0} : std::int8_t{1};

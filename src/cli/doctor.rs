@@ -6,6 +6,7 @@ use crate::identity::VERSION;
 use chalumeau_knob::device::discover::{PortKind, candidates, chip, ports};
 use chalumeau_knob::device::{Hooks, KnobChoice, KnobLink, LinkStatus, Phase, RuntimeDir, serial_text};
 use chalumeau_knob::device::{midi, osc};
+use chalumeau_knob::wire::plain_text::plain;
 use chalumeau_knob::wire::{Capabilities, Feel, Info, MAJOR, MINOR};
 use clap::Args;
 use serialport::SerialPortType;
@@ -84,7 +85,7 @@ impl DoctorCommand {
             KnobChoice::Midi { name } => name.clone().unwrap_or_default(),
             KnobChoice::Off | KnobChoice::Serial { .. } | KnobChoice::Osc { .. } => String::new(),
         };
-        writeln!(out, "\n{name}")?;
+        writeln!(out, "\n{}", plain(&name))?;
         out.flush()?;
         // Law free: whatever these numbers are, they make no torque, and nothing is armed.
         let (mut feel, mut changed) = (Feel::default(), Instant::now());
@@ -191,7 +192,7 @@ fn list_serial(out: &mut impl Write, places: &RuntimeDir) -> io::Result<()> {
         let what = match &port.port_type {
             SerialPortType::UsbPort(usb) => {
                 let known = chip(usb.vid, usb.pid).map_or("not known: asked only with --path", |chip| chip);
-                let product = usb.product.as_deref().unwrap_or("");
+                let product = plain(usb.product.as_deref().unwrap_or(""));
                 format!("USB {:04x}:{:04x} {product} ({known})", usb.vid, usb.pid)
             }
             _ => "no USB device: asked only with --path".into(),
@@ -201,7 +202,7 @@ fn list_serial(out: &mut impl Write, places: &RuntimeDir) -> io::Result<()> {
     for candidate in candidates(places) {
         if let PortKind::Simulated { serial, name } = &candidate.kind {
             let path = candidate.path.display().to_string();
-            writeln!(out, "  {path:<16} simulated: {name}, {}", serial_text(*serial))?;
+            writeln!(out, "  {path:<16} simulated: {}, {}", plain(name), serial_text(*serial))?;
         }
     }
     if ports.is_empty() && candidates(places).is_empty() {
@@ -221,7 +222,7 @@ fn list_midi(out: &mut impl Write) -> io::Result<Vec<String>> {
             for name in all {
                 let is_known =
                     if known.contains(&name) { "" } else { " (not the name of a knob: not asked)" };
-                writeln!(out, "  {name}{is_known}")?;
+                writeln!(out, "  {}{is_known}", plain(&name))?;
             }
         }
     }
@@ -247,8 +248,19 @@ fn tell_info(out: &mut impl Write, info: &Info) -> io::Result<()> {
         info.loop_hz,
         info.counts_per_turn,
         info.ceiling_mnm,
-        info.watchdog_ms + info.fade_ms
-    )
+        u32::from(info.watchdog_ms) + u32::from(info.fade_ms)
+    )?;
+    if info.speaks_our_major() && info.checks_age() && !info.capabilities.has(Capabilities::CALIBRATED) {
+        writeln!(out, "  not calibrated, and therefore weak: firmware/README.md, \"Calibrate it\"")?;
+    }
+    match info.counters {
+        Some(counters) => writeln!(
+            out,
+            "  since its start: {} late turns of its loop, {} failed exchanges with its motor board",
+            counters.overruns, counters.bus_errors
+        ),
+        None => Ok(()),
+    }
 }
 
 fn tell_link(out: &mut impl Write, status: &LinkStatus) -> io::Result<()> {
@@ -256,7 +268,10 @@ fn tell_link(out: &mut impl Write, status: &LinkStatus) -> io::Result<()> {
     let ms = |us: u32| f64::from(us) * 1e-3;
     let slow =
         if status.is_slow { " at 115200 baud: the cable or its driver may not support 921600" } else { "" };
-    writeln!(out, "  angle: {:.2} degrees", status.angle_deg.unwrap_or(0.0))?;
+    match status.angle_deg {
+        Some(degrees) => writeln!(out, "  angle: {degrees:.2} degrees")?,
+        None => writeln!(out, "  angle: none that can be believed")?,
+    }
     writeln!(out, "  rate: {:.0} positions a second{slow}", stats.rate_hz)?;
     writeln!(out, "  jitter: {:.2} ms p50, {:.2} ms p99", ms(stats.jitter_p50_us), ms(stats.jitter_p99_us))?;
     let wire = &stats.wire;
@@ -273,8 +288,6 @@ fn tell_link(out: &mut impl Write, status: &LinkStatus) -> io::Result<()> {
     let (hello, feel) = (trip(stats.hello_round_trip_us), trip(stats.feel_round_trip_us));
     writeln!(out, "  round trip: HELLO to INFO {hello}, FEEL to its echo {feel}")?;
     writeln!(out, "  clocks differ by {:.0} ppm", stats.skew_ppm)?;
-    match &status.notice {
-        Some(notice) => writeln!(out, "  {notice}"),
-        None => Ok(()),
-    }
+    let words = [&status.alarm, &status.restriction, &status.last_refusal, &status.notice];
+    words.into_iter().flatten().try_for_each(|text| writeln!(out, "  {text}"))
 }

@@ -8,6 +8,9 @@ use chalumeau_core::units::WrittenNote;
 use chalumeau_knob::wire::message::TorqueLaw;
 use clap::{Args, ValueEnum};
 
+/// Strength without --torque, mNm: a finger feels it and holds it.
+const USUAL_MNM: f64 = 60.0;
+
 /// Torque laws by name.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum LawArg {
@@ -44,9 +47,9 @@ pub struct FeelArgs {
     /// Written note that contrast does not change [default: C5 or, without one, the middle of the chart]
     #[arg(long, value_name = "NOTE", value_parser = note)]
     reference: Option<u8>,
-    /// Torque per unit of flow (flow) or at closure (pressure) on the reference note, mNm, 0..450
-    #[arg(long, value_name = "MNM", default_value = "60", value_parser = |s: &str| within(s, 0.0, 450.0))]
-    torque: f64,
+    /// Torque per unit of flow (flow) or at closure (pressure) on the reference note, mNm, 0..450 [default: 60]
+    #[arg(long, value_name = "MNM", value_parser = |s: &str| within(s, 0.0, 450.0))]
+    torque: Option<f64>,
     /// Angle at which the reference reed closes on the reference note, degrees, 120..1080
     #[arg(long, value_name = "DEG", default_value = "360", value_parser = |s: &str| within(s, 120.0, 1_080.0))]
     travel: f64,
@@ -73,11 +76,16 @@ impl FeelArgs {
                 OrderArg::CoveredHoles => NoteOrder::CoveredHoles,
                 OrderArg::CoveredHolesReversed => NoteOrder::CoveredHolesReversed,
             },
-            strength_mnm: self.torque,
+            strength_mnm: self.torque.unwrap_or(USUAL_MNM),
             travel_deg: self.travel,
             detent_mnm: self.detent,
             ..FeelDesign::default()
         })
+    }
+
+    /// Whether the strength was left to the program.
+    pub fn may_weaken(&self) -> bool {
+        self.torque.is_none()
     }
 
     /// How much the differences between notes are exaggerated.

@@ -5,22 +5,29 @@ use crate::cli::feel_args::FeelArgs;
 use crate::cli::shared_args::{InstrumentArg, check_fingering, note, within};
 use crate::output::OutputError;
 use crate::take_file::TakeFile;
-use chalumeau_core::haptics::{NoteFeel, TorqueLimits};
+use chalumeau_core::haptics::{FeelRefused, NoteFeel, TorqueLimits};
 use chalumeau_core::instrument::{Settings, Wanted};
 use chalumeau_core::units::WrittenNote;
 use chalumeau_knob::device::{
-    Hooks, KnobChoice, KnobLink, LinkStatus, OFFERED_CEILING_MNM, Phase, StateSample,
+    HARD_CEILING_MNM, Hooks, KnobChoice, KnobLink, LinkStatus, OFFERED_CEILING_MNM, Phase, Release,
+    StateSample,
 };
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::touch::take::{TakeMarks, TakeRow};
 use clap::{ArgGroup, Args};
-use std::io::{IsTerminal, Write};
+use std::io::{BufRead, IsTerminal, Write};
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 /// Time between two updates of the line on the screen.
 const SHOWN_EVERY: Duration = Duration::from_millis(100);
+/// After Ctrl-C the program ends within this time even if it waits for its terminal.
+const END_BY_FORCE: Duration = Duration::from_millis(300);
+/// What a shell expects of a program that was interrupted.
+const INTERRUPTED: i32 = 130;
 /// How long to look for a knob before giving up.
 const PATIENCE: Duration = Duration::from_secs(10);
 
@@ -30,6 +37,8 @@ Examples:
       Finds a knob behind a known serial board, real or simulated, and shows angle, gamma and torque.
   chalumeau knob --written E3 --arm 60
       The resistance of the lowest note, with at most 60 mNm. Ctrl-C lets go at once.
+  chalumeau knob --arm 300 --torque 200
+      Above 250 mNm the program asks a second time.
   chalumeau knob --written E3 --law pressure --arm 60
   chalumeau knob --osc 8000
       A TorqueTuner with its stock firmware.
@@ -39,7 +48,8 @@ Examples:
 /// Watch a knob, feel a note on it, record a take
 ///
 /// The knob makes torque only with --arm, and never more than --arm and its own limits allow. Torque ends with the program,
-/// however the program ends. Without --arm the knob turns freely and is only read.
+/// however the program ends, and within a second when it stands still, for example after Ctrl-S in its terminal. Without
+/// --arm the knob turns freely and is only read.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 #[command(group = ArgGroup::new("which").args(["serial", "path", "midi", "osc"]))]
@@ -62,8 +72,8 @@ pub struct KnobCommand {
     /// Written note whose resistance is felt
     #[arg(long, value_name = "NOTE", default_value = "C5", value_parser = note)]
     written: u8,
-    /// Let the knob make torque, at most this many mNm (10..250)
-    #[arg(long, value_name = "MNM", value_parser = |s: &str| within(s, 10.0, f64::from(OFFERED_CEILING_MNM)))]
+    /// Let the knob make torque, at most this many mNm, 10..450; above 250 the program asks a second time
+    #[arg(long, value_name = "MNM", value_parser = |s: &str| within(s, 10.0, f64::from(HARD_CEILING_MNM)))]
     arm: Option<f64>,
     /// First make the present position zero
     #[arg(long)]
@@ -93,11 +103,28 @@ impl KnobCommand {
         let limits = TorqueLimits { ceiling_mnm, ..TorqueLimits::default() };
         let settings = Settings::default();
         // The knob gets this note only, so the hardest note does not matter.
-        let design = self.feel.design(&file)?;
-        let table = feels.table(&settings, &design, &NO_MOTOR)?;
+        let mut design = self.feel.design(&file)?;
+        let asked_mnm = design.strength_mnm;
         let fingering = feels.requirements().written().position(|note| note == written).unwrap_or(0);
-        table.accepts(fingering, &design, &limits)?;
-        let note = table.note(fingering).copied().unwrap_or(*table.reference());
+        let note = loop {
+            let table = feels.table(&settings, &design, &NO_MOTOR)?;
+            match table.accepts(fingering, &design, &limits) {
+                Ok(()) => break table.note(fingering).copied().unwrap_or(*table.reference()),
+                Err(FeelRefused::Ceiling { strength_mnm, .. })
+                    if self.feel.may_weaken() && strength_mnm < design.strength_mnm && strength_mnm > 0.0 =>
+                {
+                    design.strength_mnm = strength_mnm;
+                }
+                Err(refused) => return Err(refused.into()),
+            }
+        };
+        if design.strength_mnm < asked_mnm {
+            eprintln!(
+                "the feel is weakened from {asked_mnm:.0} to {:.0} mNm to stay below --arm {ceiling_mnm:.0}",
+                design.strength_mnm
+            );
+        }
+        self.ask_again()?;
         let take = match &self.record {
             Some(path) => {
                 let remarks = [format!("written {} of {}, {design:?}", written.0, file.name)];
@@ -116,6 +143,25 @@ impl KnobCommand {
         let (link, _reader) = KnobLink::spawn("chalumeau knob", hooks);
         link.choose(self.choice());
         self.watch(&link, &heard, &note, settings.closing_pa(), take)
+    }
+
+    /// The further act that more than the usual ceiling needs.
+    fn ask_again(&self) -> Result<(), Failure> {
+        let Some(mnm) = self.arm.filter(|&mnm| mnm > f64::from(OFFERED_CEILING_MNM)) else { return Ok(()) };
+        let number = format!("{mnm:.0}");
+        eprint!(
+            "{number} mNm is as much as opening a tight jar lid. Nothing on the knob may catch a finger, a ring or a cable.\n\
+             Type {number} and Enter to allow it: "
+        );
+        std::io::stderr().flush()?;
+        let mut answer = String::new();
+        std::io::stdin().lock().read_line(&mut answer)?;
+        if answer.trim() == number {
+            return Ok(());
+        }
+        Err(Failure::Usage(format!(
+            "not armed: {number} was not typed. Up to {OFFERED_CEILING_MNM} mNm needs no second question"
+        )))
     }
 
     fn choice(&self) -> KnobChoice {
@@ -143,8 +189,26 @@ impl KnobCommand {
         let mut live_since = None;
         let mut shown = Instant::now();
         let mut said = String::new();
+        // This thread obeys the user: what it prints is what the user sees. When it waits for its terminal, it beats no more.
+        let heart = link.heartbeat("this program");
+        let [stop, ends] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
+        let (stopped, ending, hand) = (stop.clone(), ends.clone(), heart.clone());
+        ctrlc::set_handler(move || {
+            hand.let_go(Release::Interrupted);
+            stopped.store(true, Ordering::Relaxed);
+            std::thread::sleep(END_BY_FORCE);
+            if !ending.load(Ordering::Relaxed) {
+                std::process::exit(INTERRUPTED);
+            }
+        })
+        .map_err(|e| Failure::Usage(format!("cannot listen for Ctrl-C: {e}")))?;
         loop {
             std::thread::sleep(Duration::from_millis(5));
+            heart.beat();
+            if stop.load(Ordering::Relaxed) {
+                ends.store(true, Ordering::Relaxed);
+                break;
+            }
             let status = link.status();
             let live = matches!(status.phase, Phase::Live | Phase::ReadOnly);
             if live && live_since.is_none() {
@@ -152,8 +216,10 @@ impl KnobCommand {
                 if self.zero {
                     link.zero();
                 }
-                if let Some(mnm) = self.arm {
-                    link.arm(mnm.round() as u16);
+                match self.arm.map(|mnm| mnm.round() as u16) {
+                    Some(mnm) if mnm > OFFERED_CEILING_MNM => link.arm_beyond_offer(mnm),
+                    Some(mnm) => link.arm(mnm),
+                    None => {}
                 }
             }
             if live_since.is_none() && began.elapsed() > PATIENCE {
@@ -218,7 +284,9 @@ fn write(take: &mut TakeFile, state: &StateSample, note: &NoteFeel, gamma: f64) 
 /// On a terminal one line that changes; elsewhere a line for each change of the link.
 fn show(status: &LinkStatus, note: &NoteFeel, closing_pa: f64, said: &mut String) {
     let mut words = status.text.clone();
-    for more in [&status.last_refusal, &status.notice].into_iter().flatten() {
+    for more in
+        [&status.alarm, &status.restriction, &status.last_refusal, &status.notice].into_iter().flatten()
+    {
         words = format!("{words}; {more}");
     }
     if words != *said {

@@ -63,7 +63,7 @@ impl KnobView {
         ui.horizontal_top(|ui| {
             ui.spacing_mut().item_spacing = vec2(GAP, 4.0);
             group(ui, c, vec2(0.56 * width - 0.5 * GAP, top), |ui| devices(ui, hands, snapshot, actions));
-            group(ui, c, vec2(0.44 * width - 0.5 * GAP, top), |ui| arming(ui, hands, snapshot));
+            group(ui, c, vec2(0.44 * width - 0.5 * GAP, top), |ui| arming(ui, hands, snapshot, actions));
         });
         let names: Vec<String> = PAGES.iter().map(|(_, name)| (*name).to_owned()).collect();
         let mut page = PAGES.iter().position(|(page, _)| *page == self.page).unwrap_or(0);
@@ -224,13 +224,19 @@ fn device_row(ui: &mut Ui, c: &Colours, device: &KnobDevice, actions: &mut Vec<A
     }
 }
 
-/// The large arming button, and the ceiling of the torque.
-fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
+/// Torque off, now: by the button, by Escape, and with the switch that asked for it.
+pub fn stop(hands: &mut Hands, actions: &mut Vec<Action>) {
+    actions.push(Action::StopKnob);
+    hands.put("arm", 0.0);
+}
+
+/// The large button that arms, and stops what is armed; and the ceiling of the torque.
+fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
     let c = Colours::here(ui);
     let knob = &snapshot.knob;
     let is_wanted = hands.step("arm") == 1;
     let (title, line, fill, ink): (&str, &str, Color32, Color32) = match (knob.is_armed, is_wanted) {
-        (true, _) => ("ARMED", "press to disarm", c.danger, c.panel),
+        (true, _) => ("STOP", "armed: press here, or Escape", c.danger, c.panel),
         (false, true) => ("DISARMED", "disarmed by the knob: press, then arm again", c.raised, c.beats),
         (false, false) if knob.is_live => ("ARM", "lets the knob make torque", c.accent, c.on_accent),
         (false, false) => ("ARM", "no knob connected", c.raised, c.quiet),
@@ -256,10 +262,14 @@ fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     );
     let below = rect.center() + vec2(0.0, if is_low { 11.0 } else { 16.0 });
     painter.text(below, Align2::CENTER_CENTER, line, theme::small(), ink);
-    let name = if is_wanted || knob.is_armed { "Disarm the knob" } else { "Arm the knob" };
+    let name = if is_wanted || knob.is_armed { "Stop the knob" } else { "Arm the knob" };
     response.widget_info(|| WidgetInfo::selected(Role::Switch, true, knob.is_armed, name));
     if response.clicked() {
-        hands.put("arm", f32::from(!(is_wanted || knob.is_armed)));
+        if is_wanted || knob.is_armed {
+            stop(hands, actions);
+        } else {
+            hands.put("arm", 1.0);
+        }
     }
     response.on_hover_ui(|ui| teach(ui, "arm", ""));
     slider(ui, hands, "ceil");

@@ -14,25 +14,28 @@ mod feels_cache;
 mod knob_audio;
 mod knob_controller;
 mod knob_switches;
+mod main_pulse;
 mod take_recorder;
 
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::thread::JoinHandle;
 
 pub use feel_design::feel_design;
 pub use knob_audio::{BlockContext, KnobAudio};
+pub use main_pulse::MainPulse;
 
 use crate::plugin::instrument_loading::SharedInstrument;
 use crate::plugin::params::ChalumeauParams;
 use chalumeau_core::haptics::FeelTable;
 use chalumeau_core::units::SoundingNote;
-use chalumeau_knob::device::LinkStatus;
+use chalumeau_knob::device::{Heartbeat, LinkStatus, Release};
 use chalumeau_knob::touch::breath_from_angle::BreathMapping;
 use chalumeau_knob::touch::feel::InstrumentFeel;
 use chalumeau_knob::touch::take::Take;
 use chalumeau_knob::wire::message;
 use knob_controller::KnobController;
+use main_pulse::MainPulseAsker;
 
 /// Number that stands for no note.
 const NO_NOTE: u8 = 255;
@@ -55,6 +58,10 @@ pub struct SharedKnob {
     test: Mutex<Option<message::Feel>>,
     /// The user has chosen a device, so that even the same choice counts as new.
     device_chosen: AtomicBool,
+    /// The sign of life of the audio thread, once there is a link.
+    audio_heart: OnceLock<Heartbeat>,
+    /// The sign of life of the host's main thread.
+    main_pulse: Arc<MainPulse>,
     /// The state of the link. Only the controller and the window lock it.
     status: Mutex<Option<LinkStatus>>,
     /// The host has activated this instance. An instance that was never active leaves the knob to the others.
@@ -63,7 +70,7 @@ pub struct SharedKnob {
 }
 
 impl SharedKnob {
-    fn new() -> Self {
+    fn new(main_pulse: Arc<MainPulse>) -> Self {
         let one = || AtomicU32::new(1.0_f32.to_bits());
         Self {
             note: AtomicU8::new(NO_NOTE),
@@ -72,6 +79,8 @@ impl SharedKnob {
             feel: Mutex::new(None),
             test: Mutex::default(),
             device_chosen: AtomicBool::new(false),
+            audio_heart: OnceLock::new(),
+            main_pulse,
             status: Mutex::default(),
             is_active: AtomicBool::new(false),
             stop: AtomicBool::new(false),
@@ -86,6 +95,13 @@ impl SharedKnob {
     pub fn test(&self, feel: Option<message::Feel>) {
         if let Ok(mut test) = self.test.lock() {
             *test = feel;
+        }
+    }
+
+    /// Torque off, now. Real-time safe.
+    pub fn let_go(&self, reason: Release) {
+        if let Some(heart) = self.audio_heart.get() {
+            heart.let_go(reason);
         }
     }
 
@@ -115,14 +131,21 @@ pub struct PluginKnob {
 }
 
 impl PluginKnob {
-    /// Starts the controller, which starts the link when the user wants a knob. Allocates.
-    pub fn start(params: Arc<ChalumeauParams>, instrument: Arc<SharedInstrument>) -> (Self, KnobAudio) {
-        let shared = Arc::new(SharedKnob::new());
+    /// Starts the controller, which starts the link when the user wants a knob. `ask_main` makes the host's main thread
+    /// answer to `main_pulse`. Allocates.
+    pub fn start(
+        params: Arc<ChalumeauParams>,
+        instrument: Arc<SharedInstrument>,
+        main_pulse: Arc<MainPulse>,
+        ask_main: Option<Box<dyn Fn() + Send>>,
+    ) -> (Self, KnobAudio) {
+        let shared = Arc::new(SharedKnob::new(main_pulse));
         let (hand_in, hand) = triple_buffer::triple_buffer(&BreathMapping::default());
         let (take_in, take) = triple_buffer::triple_buffer(&None::<Arc<Take>>);
         let (readers_in, readers) = rtrb::RingBuffer::new(1);
+        let asker = MainPulseAsker::new(ask_main);
         let controller =
-            KnobController::new(params, shared.clone(), instrument, readers_in, hand_in, take_in);
+            KnobController::new(params, shared.clone(), instrument, asker, readers_in, hand_in, take_in);
         let controller =
             std::thread::Builder::new().name("KnobController".to_owned()).spawn(move || controller.run());
         let audio = KnobAudio::new(shared.clone(), readers, hand, take);
@@ -139,7 +162,9 @@ impl PluginKnob {
 impl Drop for PluginKnob {
     fn drop(&mut self) {
         self.shared.stop.store(true, Ordering::Relaxed);
-        if let Some(controller) = self.controller.take() {
+        // The controller asks the host's main thread through the plugin's frame, and may be the last to hold it.
+        let is_other = |thread: &JoinHandle<()>| thread.thread().id() != std::thread::current().id();
+        if let Some(controller) = self.controller.take().filter(is_other) {
             // The panic of a thread was reported when it happened.
             let _ = controller.join();
         }

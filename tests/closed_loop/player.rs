@@ -106,6 +106,7 @@ impl LoopPlayer {
     fn period(&mut self) {
         self.knob.step();
         let (now_us, mut bytes) = (self.now_us(), Vec::new());
+        self.session.obeyed(now_us, "the player");
         self.knob.receive(&mut bytes);
         let writer = &mut self.writer;
         let mut tell = |happening: SessionEvent| {

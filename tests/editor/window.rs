@@ -24,7 +24,7 @@ fn tabs_lead_to_views_and_are_kept() {
         (Tab::Clarinet, "Fingering C4"),
         (Tab::Breath, "Rest here"),
         (Tab::Sound, "Spectrum of the sound"),
-        (Tab::Knob, "Disarm the knob"),
+        (Tab::Knob, "Stop the knob"),
         (Tab::Instrument, "Instrument Bass clarinet"),
         (Tab::Reed, "Peak of the flow: H"),
     ] {
@@ -232,15 +232,47 @@ fn the_knob_is_armed_by_the_large_button_alone() {
     assert_eq!(window.host.value("arm"), 1.0);
     window.snapshot.borrow_mut().knob.is_armed = true;
     window.harness.run();
-    click(&mut window, "Disarm the knob");
+    click(&mut window, "Stop the knob");
     assert_eq!(window.host.value("arm"), 0.0);
+    assert_eq!(window.actions(), [Action::StopKnob]);
     // Undo takes back no arming.
     assert!(window.harness.get_by_label("Undo").accesskit_node().is_disabled());
     // A knob that let go by itself: the first press takes the wish back.
     window.host.automate("arm", 1.0);
     window.snapshot.borrow_mut().knob.is_armed = false;
     window.harness.run();
-    click(&mut window, "Disarm the knob");
+    click(&mut window, "Stop the knob");
+    assert_eq!(window.host.value("arm"), 0.0);
+}
+
+#[test]
+fn escape_stops_the_knob_in_every_view_and_the_large_button_takes_keys() {
+    for tab in Tab::ALL {
+        let mut window = Window::tall(tab);
+        window.host.automate("arm", 1.0);
+        window.snapshot.borrow_mut().knob.is_armed = true;
+        window.harness.run();
+        window.actions();
+        window.harness.key_press(Key::Escape);
+        window.harness.run();
+        assert_eq!(window.actions(), [Action::StopKnob], "{}", tab.name());
+        assert_eq!(window.host.value("arm"), 0.0, "{}", tab.name());
+        // Of a knob that is limp Escape wants nothing.
+        window.snapshot.borrow_mut().knob.is_armed = false;
+        window.harness.run();
+        window.harness.key_press(Key::Escape);
+        window.harness.run();
+        assert_eq!(window.actions(), [], "{}", tab.name());
+    }
+    let mut window = Window::tall(Tab::Knob);
+    window.host.automate("arm", 1.0);
+    window.snapshot.borrow_mut().knob.is_armed = true;
+    window.harness.run();
+    window.harness.get_by_label("Stop the knob").focus();
+    window.harness.run();
+    window.harness.key_press(Key::Space);
+    window.harness.run();
+    assert_eq!(window.actions(), [Action::StopKnob]);
     assert_eq!(window.host.value("arm"), 0.0);
 }
 

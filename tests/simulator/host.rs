@@ -61,6 +61,15 @@ impl TestHost {
         assert_eq!(self.info.expect("INFO").session, self.session);
     }
 
+    /// Puts the shaft of a knob that nobody has armed at an angle, and calls it so: a shaft that leaps is a fault of its
+    /// encoder to the firmware, and changes no position.
+    pub fn put(&mut self, angle_deg: f64) {
+        self.knob.plant().set(angle_deg.to_radians(), 0.0);
+        self.run(0.01, |_| {});
+        self.send(&Message::Zero((100.0 * angle_deg).round() as i32));
+        self.run(0.01, |_| {});
+    }
+
     /// What the user's act does: ARM, and time for the probe of the signs.
     pub fn arm(&mut self) {
         self.send(&Message::Arm(self.arming()));

@@ -1,7 +1,7 @@
 //! A knob for tests: the firmware itself, compiled for this machine, in simulated time or behind a pseudo-terminal.
 
 use chalumeau_firmware::{Firmware, Reading, Setup};
-use chalumeau_knob::device::{Announcement, RuntimeDir};
+use chalumeau_knob::device::{Announcement, KnobLink, RuntimeDir};
 use chalumeau_knob::wire::{Decoder, Message};
 use serialport::{SerialPort, TTYPort};
 use std::io::{Read, Write};
@@ -13,18 +13,23 @@ use std::thread;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// The firmware with a shaft that is where it is put.
+/// Fastest that a shaft turns to where it is put, counts a tick: 35 rad/s.
+const COUNTS_A_TICK: i64 = 10;
+
+/// The firmware with a shaft that turns to where it is put, whatever the motor does.
 pub struct FirmwareKnob {
     pub firmware: Firmware,
-    /// Where the shaft is, 0.1 degrees.
+    /// Where the shaft shall be, 0.1 degrees.
     pub counts: i64,
+    at: i64,
     setup: Setup,
     ticks: u64,
 }
 
 impl FirmwareKnob {
     pub fn new(setup: Setup) -> Self {
-        Self { firmware: Firmware::new(&setup), counts: 0, setup, ticks: 0 }
+        let setup = Setup { probes: false, ..setup };
+        Self { firmware: Firmware::new(&setup), counts: 0, at: 0, setup, ticks: 0 }
     }
 
     /// Switched off and on.
@@ -36,7 +41,8 @@ impl FirmwareKnob {
     /// Lives until it has been on for `t_us`.
     pub fn run_until(&mut self, t_us: u64) {
         while self.ticks * 500 <= t_us {
-            let reading = Reading { counts: self.counts, ..Reading::default() };
+            self.at += (self.counts - self.at).clamp(-COUNTS_A_TICK, COUNTS_A_TICK);
+            let reading = Reading { counts: self.at, tells_velocity: false, ..Reading::default() };
             self.firmware.tick(self.ticks * 500, &reading);
             self.ticks += 1;
         }
@@ -158,6 +164,35 @@ impl Life {
                 said.extend(noise.to_le_bytes().map(|byte| byte.max(1)));
             }
             let _ = self.master.write_all(&said);
+        }
+    }
+}
+
+/// A program that obeys the user, until dropped.
+pub struct Obeying {
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Obeying {
+    pub fn of(link: &KnobLink) -> Self {
+        let (heart, stop) = (link.heartbeat("the test"), Arc::new(AtomicBool::new(false)));
+        let stopped = stop.clone();
+        let thread = thread::spawn(move || {
+            while !stopped.load(Ordering::Relaxed) {
+                heart.beat();
+                thread::sleep(Duration::from_millis(20));
+            }
+        });
+        Self { stop, thread: Some(thread) }
+    }
+}
+
+impl Drop for Obeying {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            thread.join().unwrap();
         }
     }
 }

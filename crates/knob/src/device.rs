@@ -6,6 +6,7 @@
 pub mod clock;
 pub mod discover;
 pub mod feel_osc;
+pub mod heartbeat;
 pub mod link;
 pub mod lock;
 pub mod memory;
@@ -20,6 +21,7 @@ pub mod stock;
 pub mod transport;
 
 pub use discover::{Announcement, Candidate, candidates};
+pub use heartbeat::{Heartbeat, Heartbeats, Release};
 pub use link::{Hooks, KnobChoice, KnobLink, LinkStatus, Phase};
 pub use reader::{KnobReader, Pose};
 pub use runtime_dir::{RuntimeDir, serial_number, serial_text};

@@ -9,13 +9,14 @@ pub mod limits;
 pub mod message;
 pub mod midi;
 mod payload;
+pub mod plain_text;
 
 pub use codes::{FaultCode, RefusedCode};
 pub use frame::{Decoder, EncodedFrame, FrameError, WireStats, encode};
 pub use limits::{FieldRange, OutOfRange};
 pub use message::{
     Arm, Capabilities, Counters, DeviceEvent, DeviceState, EventKind, Feel, Flags, Info, Message, Stamp,
-    TorqueLaw,
+    TorqueLaw, UNDATED_CEILING_MNM,
 };
 
 /// Version of the protocol spoken here: another major one is never armed.

@@ -29,7 +29,7 @@ use super::note_names::NoteNames;
 use super::out_events::OutEvents;
 use super::{Introduced, Introduction, indication, note_names, note_ports, params, state};
 use crate::parameters::{self, InUse, Parameter};
-use crate::plugin::Chalumeau;
+use crate::plugin::{Chalumeau, Task};
 use crate::plugin::host_link::HostCalls;
 use chalumeau_core::instrument::Clarinet;
 
@@ -73,7 +73,7 @@ impl Instance {
         // SAFETY: as above.
         let (wrapper, host) = unsafe { (Wrapper::<Chalumeau>::new(host), Host::new(host)) };
         let (tell, told) = mpsc::channel();
-        (wrapper.task_executor.lock())(Introduction(tell));
+        (wrapper.task_executor.lock())(Task::Introduce(Introduction(tell)));
         let Ok(introduced) = told.try_recv() else { return std::ptr::null() };
         let map = introduced.params.param_map();
         let entries = map.iter().filter_map(|(id, pointer, _)| {

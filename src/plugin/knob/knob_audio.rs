@@ -12,7 +12,7 @@ use crate::plugin::params::ChalumeauParams;
 use chalumeau_core::control::knob::slap_strength;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::Settings;
-use chalumeau_knob::device::KnobReader;
+use chalumeau_knob::device::{KnobReader, Release};
 use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, Breath14, BreathMapping, GRID};
 use chalumeau_knob::touch::feel::NO_MOTOR;
 use chalumeau_knob::touch::take::Take;
@@ -126,8 +126,19 @@ impl KnobAudio {
         }
     }
 
-    /// Forgets notes and breath; the link stays.
+    /// Torque off, now.
+    pub fn let_go(&self, reason: Release) {
+        self.shared.let_go(reason);
+    }
+
+    /// Whether a knob may start a sound at any time, so that the host must go on calling.
+    pub fn is_played(&self) -> bool {
+        self.breath_from == BlockBreath::Knob
+    }
+
+    /// Forgets notes and breath, and lets go of the knob; the link stays.
     pub fn reset(&mut self) {
+        self.let_go(Release::Deactivated);
         self.blower.reset();
         self.breath_from = BlockBreath::Host;
         self.replayed = 0;
@@ -146,6 +157,15 @@ impl KnobAudio {
         if self.reader.is_none() {
             self.reader = self.readers.pop().ok();
         }
+        if let Some(heart) = self.shared.audio_heart.get().filter(|_| !context.offline) {
+            heart.beat();
+        }
+        let shared = &self.shared;
+        let host = host.inspect(|event| {
+            if matches!(event.event, Event::Panic) {
+                shared.let_go(Release::Panic);
+            }
+        });
         self.sent.count = 0;
         let samples = out.len();
         let (hand, take) = (self.hand.read(), self.take.read());

@@ -9,6 +9,7 @@ use super::calibrator::Calibrator;
 use super::feel_design::{feel_design, knob_design};
 use super::feels_cache::FeelsCache;
 use super::knob_switches::{KnobSwitches, is_live};
+use super::main_pulse::MainPulseAsker;
 use super::take_recorder::{TakeRecorder, load_take, marks};
 use crate::plugin::instrument_loading::SharedInstrument;
 use crate::plugin::params::knob::KnobKind;
@@ -32,6 +33,7 @@ pub struct KnobController {
     params: Arc<ChalumeauParams>,
     shared: Arc<SharedKnob>,
     instrument: Arc<SharedInstrument>,
+    main_thread: MainPulseAsker,
     feels_cache: FeelsCache,
     readers: rtrb::Producer<KnobReader>,
     hand_in: triple_buffer::Input<BreathMapping>,
@@ -61,6 +63,7 @@ impl KnobController {
         params: Arc<ChalumeauParams>,
         shared: Arc<SharedKnob>,
         instrument: Arc<SharedInstrument>,
+        main_thread: MainPulseAsker,
         readers: rtrb::Producer<KnobReader>,
         hand_in: triple_buffer::Input<BreathMapping>,
         take: triple_buffer::Input<Option<Arc<Take>>>,
@@ -69,6 +72,7 @@ impl KnobController {
             params,
             shared,
             instrument,
+            main_thread,
             feels_cache: FeelsCache::default(),
             readers,
             hand_in,
@@ -105,6 +109,9 @@ impl KnobController {
         let params = self.params.clone();
         let knob = &params.knob;
         self.choose_device(knob);
+        if let Some(link) = &self.link {
+            self.main_thread.cycle(&self.shared.main_pulse, link);
+        }
         if self.choice != KnobChoice::Off || knob.replay.value() {
             let status = self.link.as_ref().map(KnobLink::status);
             self.update_feel(&params, status.as_ref());
@@ -162,6 +169,7 @@ impl KnobController {
             let (link, reader) = KnobLink::spawn("Chalumeau", self.hooks());
             // The ring has room for one reader, and only one is ever made.
             let _ = self.readers.push(reader);
+            let _ = self.shared.audio_heart.set(link.heartbeat("the host's audio thread"));
             self.link = Some(link);
         }
         if let Some(link) = &self.link {
@@ -324,7 +332,8 @@ impl KnobController {
         let own = [self.switches.hint(), self.refused.as_ref(), self.short_breath.as_ref()];
         words.extend(own.into_iter().chain([self.take_message.as_ref()]).flatten().cloned());
         if let Some(status) = status {
-            words.extend([&status.last_refusal, &status.notice].into_iter().flatten().cloned());
+            let texts = [&status.alarm, &status.restriction, &status.last_refusal, &status.notice];
+            words.extend(texts.into_iter().flatten().cloned());
         }
         let text = words.join("; ");
         if let Ok(mut shown) = self.params.knob_status.write()

@@ -74,8 +74,10 @@ impl WindowMemory {
             }
             #[cfg(feature = "devices")]
             Action::FeelTest(feel) => self.handles.knob.test(feel),
+            #[cfg(feature = "devices")]
+            Action::StopKnob => self.handles.knob.let_go(chalumeau_knob::device::Release::Stop),
             #[cfg(not(feature = "devices"))]
-            Action::ChooseDevice(_) | Action::FeelTest(_) => {}
+            Action::ChooseDevice(_) | Action::FeelTest(_) | Action::StopKnob => {}
         }
     }
 

@@ -270,7 +270,9 @@ fn knob_view(status: &LinkStatus, feel: Option<&Feel>) -> KnobState {
                 chalumeau_core::haptics::torque_law::torque_mnm(feel, tables, f64::from(angle_deg));
             if status.armed { torque_mnm as f32 } else { 0.0 }
         }),
-        notice: status.last_refusal.clone().or_else(|| status.notice.clone()),
+        notice: [&status.alarm, &status.last_refusal, &status.notice, &status.restriction]
+            .into_iter()
+            .find_map(Clone::clone),
         rate_hz: stats.rate_hz,
         jitter_us: (stats.jitter_p50_us, stats.jitter_p99_us),
         round_trip_us: stats.feel_round_trip_us,

@@ -119,15 +119,15 @@ fn short_payloads() -> Vec<GoldenFrame> {
         (0x82, 18),
         (0x83, 12),
     ]
-        .into_iter()
-        .filter_map(|(kind, least)| Some((sample(kind)?, least)))
-        .map(|((_, seq, message), least)| {
-            let (kind, seq, mut payload) = parts(&message, seq);
-            payload.truncate(least - 1);
-            let name = format!("length_short_{}", message.name().to_lowercase());
-            bad(&name, "length", Some((kind, seq)), framed((kind, seq, payload)))
-        })
-        .collect()
+    .into_iter()
+    .filter_map(|(kind, least)| Some((sample(kind)?, least)))
+    .map(|((_, seq, message), least)| {
+        let (kind, seq, mut payload) = parts(&message, seq);
+        payload.truncate(least - 1);
+        let name = format!("length_short_{}", message.name().to_lowercase());
+        bad(&name, "length", Some((kind, seq)), framed((kind, seq, payload)))
+    })
+    .collect()
 }
 
 fn out_of_range() -> Vec<GoldenFrame> {

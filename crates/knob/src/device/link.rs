@@ -7,6 +7,7 @@ mod connection;
 mod status;
 mod worker;
 
+use crate::device::heartbeat::{Heartbeat, Heartbeats, Monitor};
 use crate::device::link::worker::{LinkCommand, Worker};
 use crate::device::reader::{KnobReader, ring};
 use crate::device::runtime_dir::RuntimeDir;
@@ -71,6 +72,7 @@ pub struct KnobLink {
     commands: Option<Sender<LinkCommand>>,
     status: Arc<Mutex<LinkStatus>>,
     thread: Option<JoinHandle<()>>,
+    heartbeats: Heartbeats,
     epoch: Instant,
 }
 
@@ -86,10 +88,12 @@ impl KnobLink {
         let (writer, reader) = ring(epoch);
         let (commands, queue) = channel();
         let status = Arc::new(Mutex::new(LinkStatus::default()));
-        let worker = Worker::new(places, label, hooks, queue, status.clone(), writer, epoch);
+        let heartbeats = Heartbeats::default();
+        let monitor = Monitor::new(heartbeats.clone());
+        let worker = Worker::new(places, label, hooks, queue, monitor, status.clone(), writer, epoch);
         // A system without another thread to give plays without a knob.
         let thread = thread::Builder::new().name("chalumeau knob".into()).spawn(move || worker.run()).ok();
-        (Self { commands: Some(commands), status, thread, epoch }, reader)
+        (Self { commands: Some(commands), status, thread, heartbeats, epoch }, reader)
     }
 
     /// Links to another knob; the one before is left, disarmed.
@@ -100,6 +104,12 @@ impl KnobLink {
     /// Links to a port that is open already, until it fails; for tests and simulators within the program.
     pub fn attach(&self, transport: Box<dyn Transport>) {
         self.tell(LinkCommand::Attach(transport));
+    }
+
+    /// The sign of life of a thread that obeys the user; `name` completes "... has stood still". A knob is armed, and stays
+    /// so, only while there is one and all of them beat, see [`heartbeat`](crate::device::heartbeat).
+    pub fn heartbeat(&self, name: &'static str) -> Heartbeat {
+        self.heartbeats.register(name)
     }
 
     /// Allows torque up to `ceiling_mnm`, at most 250: only ever call it for an act of the user.

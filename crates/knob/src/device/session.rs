@@ -1,28 +1,35 @@
 //! The host's side of a TTLink session, without ports and clocks: time and bytes go in, bytes come out.
 //!
-//! Three rules always hold. After INFO, the session sends ALIVE at its rate whatever else happens. It sends ARM only after
-//! an act of the user. It never sends torque, only parameters and a ceiling. Rates, codes and layouts: `docs/protocol.md`.
+//! Three rules always hold. The session sends ALIVE only while somebody obeys the user ([`HostSession::obeyed`]) and the
+//! knob can be believed ([`trust`]). It sends ARM only after an act of the user. It never sends torque, only parameters and
+//! a ceiling. Rates, codes and layouts: `docs/protocol.md`.
 
 pub mod arming;
 pub mod feeling;
 pub mod greeting;
+mod hearing;
 mod slaps;
+pub mod trust;
 
 use crate::device::clock::DeviceClock;
+use crate::device::heartbeat::OBEDIENCE_US;
 use crate::device::session::arming::Arming;
 use crate::device::session::feeling::Feeling;
 use crate::device::session::greeting::Greeting;
 use crate::device::session::slaps::Slaps;
+use crate::device::session::trust::{Doubt, Trust};
 use crate::device::stats::{LinkStats, Meter};
 use crate::device::transport::Binding;
 use crate::wire;
-use crate::wire::midi::{BREATH_MAX, FromKnob, MidiReceiver};
-use crate::wire::{Arm, DeviceEvent, DeviceState, EventKind, Feel, Info, Message, Stamp, WireStats};
+use crate::wire::midi::MidiReceiver;
+use crate::wire::{Arm, DeviceState, Feel, Info, Message, Stamp, WireStats};
 
 /// Time between two ALIVE on a serial line, us.
 const ALIVE_US: i64 = 20_000;
 /// Time between two ALIVE over MIDI, us.
 const ALIVE_MIDI_US: i64 = 100_000;
+/// Time between two HELLO to a device that counts, us: INFO tells the counts, and whether it is still the same device.
+const AGAIN_US: i64 = 2_000_000;
 /// Least time between two frames over MIDI, us.
 const MIDI_SLOT_US: i64 = 20_000;
 /// STATE this old no longer says what the knob does, us: a hundred periods, twice the device's own watchdog.
@@ -117,8 +124,13 @@ pub struct HostSession {
     arming: Arming,
     feeling: Feeling,
     slaps: Slaps,
+    trust: Trust,
+    /// When those who obey the user were last all alive, us, and who was heard longest ago.
+    obeyed: Option<(i64, &'static str)>,
     info: Option<Info>,
     info_us: Option<i64>,
+    hello_us: i64,
+    zero_us: Option<i64>,
     next_alive_us: i64,
     next_slot_us: i64,
     zero_due: bool,
@@ -150,8 +162,12 @@ impl HostSession {
             arming: Arming::default(),
             feeling: Feeling::default(),
             slaps: Slaps::default(),
+            trust: Trust::default(),
+            obeyed: None,
             info: None,
             info_us: None,
+            hello_us: now_us,
+            zero_us: None,
             next_alive_us: now_us,
             has_plain_angle: false,
             next_slot_us: now_us,
@@ -213,6 +229,29 @@ impl HostSession {
         self.notice.as_deref()
     }
 
+    /// Why the knob is not trusted with torque, and what to do.
+    pub fn alarm(&self) -> Option<String> {
+        let doubt = self.trust.doubt()?;
+        let next = if self.trust.is_lost() {
+            "this program keeps it disarmed until it is connected again"
+        } else {
+            "it was told to let go; arm it again if you trust it"
+        };
+        Some(format!("WARNING: {doubt}; {next}"))
+    }
+
+    /// What limits the torque of a knob whose firmware is of TTLink 1.0.
+    pub fn restriction(&self) -> Option<String> {
+        let info = self.info.as_ref().filter(|info| info.speaks_our_major() && !info.checks_age())?;
+        Some(format!(
+            "this knob's firmware speaks TTLink {}.{} and cannot tell a late command from a new one: at most {} mNm; flash \
+             the firmware in firmware/ for more",
+            info.major,
+            info.minor,
+            info.most_mnm()
+        ))
+    }
+
     /// Counts and times. Sorts about 1,000 values: call it a few times a second at most.
     pub fn stats(&self) -> LinkStats {
         LinkStats { wire: self.wire_stats(), skew_ppm: self.clock.skew_ppm() as f32, ..self.meter.picture() }
@@ -249,13 +288,51 @@ impl HostSession {
                 "not armed: the knob speaks another version of the protocol"
             }
             Some(_) if !self.is_heard(now_us) => "not armed: the knob sends nothing",
+            Some(_) if self.trust.is_lost() => "not armed: the knob is not trusted",
+            Some(_) if self.disobedient(now_us).is_some() => "not armed: nobody is there to obey you",
             Some(info) => {
+                self.trust.forgive();
                 self.arming.arm(ceiling_mnm, further_act, info, now_us);
                 (self.refusal, self.notice, self.zero_due) = (None, None, false);
                 return;
             }
         };
         self.refusal = Some(why_not.into());
+    }
+
+    /// Those who obey the user were all alive at `at_us`; `who` was heard longest ago. Without this, called again and
+    /// again, the knob is let go after [`OBEDIENCE_US`].
+    pub fn obeyed(&mut self, at_us: i64, who: &'static str) {
+        self.obeyed = Some((at_us, who));
+    }
+
+    /// Nobody obeys the user any more.
+    pub fn unobeyed(&mut self) {
+        self.obeyed = None;
+    }
+
+    /// Somebody who obeys the user wants no torque, now.
+    pub fn let_go(&mut self, why: &str, now_us: i64) {
+        if self.arming.is_wanted() {
+            self.notice = Some(format!("disarmed: {why}"));
+        }
+        self.arming.disarm(now_us);
+    }
+
+    /// Who should obey the user and does not.
+    fn disobedient(&self, now_us: i64) -> Option<&'static str> {
+        match self.obeyed {
+            Some((at_us, _)) if now_us - at_us <= OBEDIENCE_US => None,
+            Some((_, who)) => Some(who),
+            None => Some("the program that used the knob"),
+        }
+    }
+
+    /// The knob cannot be believed: torque off, and people are told why.
+    fn distrust(&mut self, doubt: Doubt, now_us: i64) {
+        if self.trust.doubts(doubt) {
+            self.arming.disarm(now_us);
+        }
     }
 
     /// Lowers the ceiling at once; never raises it.
@@ -265,6 +342,7 @@ impl HostSession {
 
     /// Torque off.
     pub fn disarm(&mut self, now_us: i64) {
+        self.notice = None;
         self.arming.disarm(now_us);
     }
 
@@ -297,8 +375,20 @@ impl HostSession {
         if let Incoming::Midi(_) = &self.ears {
             self.hear_midi(&[], now_us, tell);
         }
+        if let Some(who) = self.disobedient(now_us)
+            && self.arming.is_wanted()
+        {
+            self.let_go(&format!("{who} has stood still"), now_us);
+        }
+        if self.arming.take_ignored() {
+            self.distrust(Doubt::DeafToArm, now_us);
+        }
         if self.info.is_some() && !self.is_heard(now_us) {
             // It may have started anew; whatever it was, it is not armed by us any more.
+            // A knob that is only mute hears FREE, and its watchdog what no longer comes.
+            if self.arming.is_wanted() {
+                self.let_go("the knob sends nothing any more", now_us);
+            }
             self.arming.forget();
         }
         // Most urgent first: over MIDI only one frame goes out at a time.
@@ -364,7 +454,8 @@ impl HostSession {
             Some(arming::ArmingMessage::Arm) => return Some(Message::Arm(arm)),
             None => {}
         }
-        if self.info.is_some() && stamp.is_some() && now_us >= self.next_alive_us {
+        let may_live = self.disobedient(now_us).is_none() && !self.trust.is_lost() && self.is_heard(now_us);
+        if self.info.is_some() && stamp.is_some() && may_live && now_us >= self.next_alive_us {
             let period_us = if self.binding == Binding::Midi { ALIVE_MIDI_US } else { ALIVE_US };
             // Counted from when it was due, so that the rate holds; after a stall from now.
             self.next_alive_us = (self.next_alive_us + period_us).max(now_us);
@@ -377,16 +468,19 @@ impl HostSession {
                     greeting::GreetingStep::Baud(baud) => send(SessionOutput::Baud(baud)),
                     greeting::GreetingStep::Question => send(SessionOutput::Send(greeting::QUESTION)),
                     greeting::GreetingStep::Hello => {
-                        let (major, minor) = (wire::MAJOR, wire::MINOR);
-                        return Some(Message::Hello { major, minor, session: self.number });
+                        return Some(self.hello(now_us));
                     }
                 }
             }
         }
-        self.info.as_ref()?;
+        let info = self.info.as_ref()?;
+        if info.checks_age() && now_us - self.hello_us >= AGAIN_US {
+            return Some(self.hello(now_us));
+        }
         // A knob that has just been told FREE may still say that it is armed, and would refuse.
         let is_free = self.state().is_none_or(|state| !state.flags.armed());
         if is_free && std::mem::take(&mut self.zero_due) {
+            self.zero_us = Some(now_us);
             return Some(Message::Zero(0));
         }
         if std::mem::take(&mut self.rate_due) {
@@ -395,170 +489,16 @@ impl HostSession {
         self.feeling.poll(now_us, self.is_heard(now_us)).map(Message::Feel)
     }
 
+    fn hello(&mut self, now_us: i64) -> Message {
+        self.hello_us = now_us;
+        Message::Hello { major: wire::MAJOR, minor: wire::MINOR, session: self.number }
+    }
+
     fn say(&mut self, message: &Message, send: &mut dyn FnMut(SessionOutput)) {
         match self.binding {
             Binding::Midi => send(SessionOutput::Send(&wire::midi::encode_sysex(message, self.seq))),
             Binding::Serial | Binding::Osc => send(SessionOutput::Send(&wire::encode(message, self.seq))),
         }
         self.seq = self.seq.wrapping_add(1);
-    }
-
-    fn hear_midi(&mut self, bytes: &[u8], now_us: i64, tell: &mut dyn FnMut(SessionEvent)) {
-        let Incoming::Midi(receiver) = &mut self.ears else { return };
-        // A block of bytes holds few values; those of one call are taken in after it.
-        let mut heard = Vec::new();
-        if bytes.is_empty() {
-            receiver.poll(now_us as u64, |what| heard.push(what));
-        } else {
-            receiver.feed(bytes, now_us as u64, |what| heard.push(what));
-        }
-        for what in heard {
-            match what {
-                FromKnob::Frame(Ok((_, message))) => self.hear(&message, now_us, tell),
-                FromKnob::Frame(Err(_)) => {}
-                // STATE says it all and better.
-                _ if self.state.is_some() => {}
-                FromKnob::Button(down) => tell(SessionEvent::Button(down)),
-                FromKnob::Angle(tenths) => {
-                    self.has_plain_angle = true;
-                    self.hear_plain(0.1 * tenths as f32, now_us, tell);
-                }
-                // The same position a second time, and only half of it.
-                FromKnob::Breath(_) if self.has_plain_angle => {}
-                FromKnob::Breath(breath) => {
-                    let wall_deg = self.feeling.wanted().unwrap_or_default().wall_deg;
-                    self.hear_plain(f32::from(breath) / f32::from(BREATH_MAX) * wall_deg, now_us, tell);
-                }
-            }
-        }
-    }
-
-    /// An angle without a clock.
-    fn hear_plain(&mut self, angle_deg: f32, now_us: i64, tell: &mut dyn FnMut(SessionEvent)) {
-        let velocity_deg_s = match self.plain {
-            Some(before) if (1..PLAIN_GAP_US).contains(&(now_us - before.host_us)) => {
-                (angle_deg - before.angle_deg) / ((now_us - before.host_us) as f32 * 1e-6)
-            }
-            _ => 0.0,
-        };
-        let sample = StateSample {
-            host_us: now_us,
-            t_us: now_us as u32,
-            angle_deg,
-            velocity_deg_s,
-            period_us: PLAIN_PERIOD_US,
-            ..StateSample::default()
-        };
-        self.plain = Some(sample);
-        self.meter.state(0);
-        tell(SessionEvent::State(sample));
-    }
-
-    fn hear(&mut self, message: &Message, now_us: i64, tell: &mut dyn FnMut(SessionEvent)) {
-        match message {
-            Message::Info(info) => self.hear_info(info, now_us),
-            Message::State(state) => self.hear_state(state, now_us, tell),
-            Message::Event(event) => self.hear_event(event, tell),
-            // What a host says: an echo of our own, or two hosts wired together.
-            _ => {}
-        }
-    }
-
-    fn hear_info(&mut self, info: &Info, now_us: i64) {
-        if info.session != self.number {
-            return; // an answer to somebody else
-        }
-        if let Some(hello_us) = self.greeting.hello_us() {
-            self.meter.hello_round_trip_us = u32::try_from(now_us - hello_us).ok();
-        }
-        self.info_us = Some(now_us);
-        // Answered again: it was silent, not gone.
-        if self.info.replace(*info).is_none() {
-            self.rate_due = self.binding == Binding::Serial;
-            self.feeling.forget();
-            // What had piled up on the line before anybody read it is no loss of this session.
-            match &mut self.ears {
-                Incoming::Midi(receiver) => receiver.forget_counts(),
-                Incoming::Stream(decoder) => decoder.forget_counts(),
-            }
-        }
-    }
-
-    fn hear_state(&mut self, state: &DeviceState, now_us: i64, tell: &mut dyn FnMut(SessionEvent)) {
-        if self.clock.observe(state.t_us, now_us) && self.info.is_some() {
-            self.notice = Some("the knob has restarted and is disarmed".into());
-            self.arming.disarm(now_us);
-            self.feeling.forget();
-            self.slaps = Slaps::default();
-            self.last_event = None;
-            self.info = None;
-            self.greeting.again(now_us);
-        }
-        if let Some((before, _)) = &self.state {
-            let step_us = state.t_us.wrapping_sub(before.t_us);
-            if (1..LONGEST_PERIOD_US).contains(&step_us) {
-                self.mean_step_us += (step_us as f32 - self.mean_step_us) / 64.0;
-            }
-        }
-        let host_us = self.clock.host_us(state.t_us).unwrap_or(now_us);
-        self.meter.state(now_us - host_us);
-        self.state = Some((*state, now_us));
-        self.slaps.state(state.slaps, now_us);
-        if self.arming.hear(state.flags.armed()) && self.notice.is_none() {
-            let why = state.fault_code().map_or("the knob has disarmed itself", |code| code.text());
-            self.notice = Some(format!("disarmed: {why}"));
-        }
-        if let Some(round_trip_us) = self.feeling.echoed(state.feel_id, now_us) {
-            self.meter.feel_echoed(round_trip_us);
-        }
-        tell(SessionEvent::State(StateSample {
-            host_us,
-            t_us: state.t_us,
-            angle_deg: state.angle_deg() as f32,
-            // 0.1 rpm
-            velocity_deg_s: 0.6 * f32::from(state.velocity),
-            torque_mnm: f32::from(state.torque),
-            feel_id: state.feel_id,
-            flags: state.flags.0,
-            period_us: self.period_us(),
-        }));
-    }
-
-    /// Time between two STATE as a rule. In steps, so that one that is lost does not move the breath.
-    fn period_us(&self) -> u32 {
-        (self.mean_step_us / 500.0).round().max(1.0) as u32 * 500
-    }
-
-    fn hear_event(&mut self, event: &DeviceEvent, tell: &mut dyn FnMut(SessionEvent)) {
-        if self.last_event.replace(event.counter) == Some(event.counter) {
-            return;
-        }
-        let text = event.code_text().unwrap_or_default();
-        match event.kind {
-            EventKind::Slap => {
-                self.slaps.event();
-                tell(SessionEvent::Slap(event.value));
-            }
-            EventKind::Button => tell(SessionEvent::Button(event.value > 0.5)),
-            EventKind::Limit => {}
-            EventKind::Fault => self.notice = Some(format!("fault: {text}")),
-            EventKind::Disarmed => {
-                self.notice =
-                    (event.code != wire::FaultCode::Free as u8).then(|| format!("disarmed: {text}"));
-            }
-            // The codes up to 7 are about FEEL, of which the one refused is named.
-            EventKind::Refused if event.code <= wire::RefusedCode::LawUnknown as u8 => {
-                if self.feeling.refused(event.feel_id) {
-                    self.refusal = Some(format!("{text} ({})", event.value));
-                }
-            }
-            EventKind::Refused => {
-                // Of the rest only this one is not about ARM.
-                if event.code != wire::RefusedCode::ZeroWhileArmed as u8 {
-                    self.arming.forget();
-                }
-                self.refusal = Some(text.into());
-            }
-        }
     }
 }

@@ -1,8 +1,7 @@
 //! The messages of TTLink 1 as values. Offsets, units and ranges: `docs/protocol.md`.
 
-use std::borrow::Cow;
-
 use crate::wire::codes::{FaultCode, RefusedCode};
+use crate::wire::plain_text::plain;
 use chalumeau_core::haptics::TorqueLimits;
 pub use chalumeau_core::haptics::{Feel, TorqueLaw};
 
@@ -111,10 +110,11 @@ impl Info {
         bytes
     }
 
-    /// The name up to its padding; bytes that are no UTF-8 show as replacement characters.
-    pub fn name_text(&self) -> Cow<'_, str> {
+    /// The name up to its padding, without control characters; bytes that are no UTF-8 show as replacement characters.
+    /// Allocates.
+    pub fn name_text(&self) -> String {
         let length = self.name.iter().position(|&byte| byte == 0).unwrap_or(self.name.len());
-        String::from_utf8_lossy(&self.name[..length])
+        plain(&String::from_utf8_lossy(&self.name[..length]))
     }
 
     /// Whether the device checks the age of a permission.

@@ -72,7 +72,7 @@ void store_calibration() {
     measured.damping_nms = CALIBRATION_DAMPING_NMS;
     measured.mnm_per_count = CALIBRATION_MNM_PER_COUNT;
     measured.torque_sign = CALIBRATION_TORQUE_SIGN;
-    measured.speed_sign = CALIBRATION_SPEED_SIGN;
+    measured.rpm_per_unit = CALIBRATION_RPM_PER_UNIT;
     std::uint8_t bytes[CALIBRATION_SIZE];
     measured.encode(bytes);
     Preferences store;
@@ -128,7 +128,7 @@ bool read_motor() {
         return false;
     }
     reading.counts = motor.angle;
-    reading.velocity_rpm = static_cast<float>(calibration.speed_sign) * motor.rpm;
+    reading.velocity_rpm = calibration.rpm_per_unit * motor.rpm;
     return true;
 }
 

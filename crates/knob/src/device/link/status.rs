@@ -3,6 +3,7 @@
 use crate::device::runtime_dir::serial_text;
 use crate::device::stats::LinkStats;
 use crate::wire::Info;
+use crate::wire::plain_text::plain;
 
 /// Where a link stands.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -55,6 +56,8 @@ impl Phase {
 
     /// The status in one line for people.
     pub(super) fn text(&self, port: &str, info: Option<&Info>) -> String {
+        // A MIDI device names its port.
+        let port = plain(port);
         let knob = || {
             let Some(info) = info else { return "the knob".into() };
             let (major, minor, patch) = info.firmware;
@@ -115,6 +118,10 @@ pub struct LinkStatus {
     pub last_refusal: Option<String>,
     /// What the knob reported last of faults and of disarming by itself.
     pub notice: Option<String>,
+    /// Why the knob is not trusted with torque, and what to do: to be shown before anything else.
+    pub alarm: Option<String>,
+    /// Why this knob is asked for less torque than the user allows.
+    pub restriction: Option<String>,
     /// Position as it came last, degrees.
     pub angle_deg: Option<f32>,
     /// The knob's button is down.

@@ -3,6 +3,7 @@
 use crate::device::discover;
 use crate::device::discover::Candidate;
 use crate::device::feel_osc::FeelSender;
+use crate::device::heartbeat::Monitor;
 use crate::device::link::connection::{Connection, ConnectionEnd, Outlet};
 use crate::device::link::status::{LinkStatus, Phase};
 use crate::device::link::{Hooks, KnobChoice};
@@ -66,6 +67,7 @@ pub struct Worker {
     label: String,
     hooks: Hooks,
     commands: Receiver<LinkCommand>,
+    monitor: Monitor,
     status: Arc<Mutex<LinkStatus>>,
     writer: KnobWriter,
     epoch: Instant,
@@ -110,6 +112,7 @@ impl Worker {
         label: &str,
         hooks: Hooks,
         commands: Receiver<LinkCommand>,
+        monitor: Monitor,
         status: Arc<Mutex<LinkStatus>>,
         writer: KnobWriter,
         epoch: Instant,
@@ -119,6 +122,7 @@ impl Worker {
             label: label.into(),
             hooks,
             commands,
+            monitor,
             status,
             writer,
             epoch,
@@ -156,6 +160,7 @@ impl Worker {
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => break,
             }
+            self.watch_heartbeats();
             let feel = (self.hooks.feel)();
             let now_us = self.now_us();
             if let (Some(sender), Some(feel)) = (&mut self.feel_sender, &feel) {
@@ -189,6 +194,20 @@ impl Worker {
         self.epoch.elapsed().as_micros() as i64
     }
 
+    /// Tells the session who still obeys the user.
+    fn watch_heartbeats(&mut self) {
+        let now_us = self.now_us();
+        let pulse = self.monitor.look(now_us);
+        let Some(session) = self.connection.as_mut().and_then(Connection::session) else { return };
+        match pulse.oldest {
+            Some((at_us, who)) => session.obeyed(at_us, who),
+            None => session.unobeyed(),
+        }
+        if let Some(release) = pulse.released {
+            session.let_go(release.text(), now_us);
+        }
+    }
+
     fn rest(&self) -> Duration {
         match self.choice {
             KnobChoice::Off => 5 * REST,
@@ -208,7 +227,17 @@ impl Worker {
             }
             (LinkCommand::Arm { ceiling_mnm, further_act }, Some(session)) => {
                 self.refusal = None;
-                session.arm(ceiling_mnm, further_act, now_us);
+                // Whoever has just registered counts from now on.
+                let pulse = self.monitor.look(now_us);
+                match pulse.oldest {
+                    Some((at_us, who)) => session.obeyed(at_us, who),
+                    None => session.unobeyed(),
+                }
+                match pulse.released {
+                    // Which of the two came first is not known.
+                    Some(release) => session.let_go(release.text(), now_us),
+                    None => session.arm(ceiling_mnm, further_act, now_us),
+                }
             }
             (LinkCommand::Arm { .. }, None) => {
                 let why = if self.connection.is_some() {
@@ -501,6 +530,7 @@ impl Worker {
                         status.ceiling_mnm = session.ceiling_mnm();
                         status.is_slow = session.is_slow();
                         status.notice = session.notice().map(str::to_owned);
+                        (status.alarm, status.restriction) = (session.alarm(), session.restriction());
                         if let Some(refusal) = session.refusal() {
                             status.last_refusal = Some(refusal.into());
                         }

@@ -46,6 +46,8 @@ pub struct Arming {
     next_us: i64,
     say_free: bool,
     is_armed: bool,
+    /// All tries of an act have had their time, and the knob has not answered.
+    is_ignored: bool,
 }
 
 impl Default for Arming {
@@ -56,6 +58,7 @@ impl Default for Arming {
             next_us: i64::MIN,
             say_free: false,
             is_armed: false,
+            is_ignored: false,
         }
     }
 }
@@ -69,6 +72,16 @@ impl Arming {
     /// True while the knob is armed and shall be.
     pub fn is_armed(&self) -> bool {
         self.is_armed && self.want == Goal::Armed
+    }
+
+    /// True while the user wants torque, whether or not it has come yet.
+    pub fn is_wanted(&self) -> bool {
+        self.want != Goal::Free
+    }
+
+    /// True once after an act that the knob has not answered at all.
+    pub fn take_ignored(&mut self) -> bool {
+        std::mem::take(&mut self.is_ignored)
     }
 
     /// The user allows torque. Above [`OFFERED_CEILING_MNM`] only with a `further_act`; the least limit wins, last of all.
@@ -98,11 +111,17 @@ impl Arming {
         self.is_armed = false;
     }
 
-    /// Takes in whether the knob says that it is armed; true when it has disarmed by itself.
-    pub fn hear(&mut self, is_armed: bool) -> bool {
+    /// Takes in whether the knob says that it is armed, or that it probes its signs before; true when it has disarmed by
+    /// itself.
+    pub fn hear(&mut self, is_armed: bool, is_probing: bool, now_us: i64) -> bool {
         let was_armed = std::mem::replace(&mut self.is_armed, is_armed);
         match self.want {
             Goal::Arming { .. } if is_armed => self.want = Goal::Armed,
+            // ARM has arrived: it need not be said again. The knob says itself how the probe ends.
+            Goal::Arming { .. } if is_probing => {
+                self.want = Goal::Arming { tries: TRIES };
+                self.next_us = now_us + INSIST_US;
+            }
             Goal::Armed if was_armed && !is_armed => {
                 self.want = Goal::Free;
                 return true;
@@ -131,6 +150,7 @@ impl Arming {
             // All tries are through and the last has had its time.
             Goal::Arming { .. } => {
                 self.want = Goal::Free;
+                self.is_ignored = true;
                 None
             }
             Goal::Free | Goal::Armed => None,
@@ -191,10 +211,10 @@ pub(super) mod tests {
         assert_eq!(said(&mut arming, 0, 100), []);
         arming.arm(100, false, &info(450), 100_000);
         assert_eq!(said(&mut arming, 100, 120), [ArmingMessage::Arm]);
-        assert!(!arming.hear(true));
+        assert!(!arming.hear(true, false, 0));
         assert!(arming.is_armed());
         assert_eq!(said(&mut arming, 120, 1000), []);
-        assert!(arming.hear(false), "the knob disarmed by itself");
+        assert!(arming.hear(false, false, 0), "the knob disarmed by itself");
         assert_eq!(said(&mut arming, 1000, 3000), [], "and stays so");
     }
 
@@ -203,7 +223,7 @@ pub(super) mod tests {
         let mut arming = Arming::default();
         arming.arm(100, false, &info(450), 0);
         assert_eq!(said(&mut arming, 0, 3000), [ArmingMessage::Arm; 4]);
-        arming.hear(true);
+        arming.hear(true, false, 0);
         assert_eq!(
             said(&mut arming, 3000, 3001),
             [ArmingMessage::Free],
@@ -214,9 +234,9 @@ pub(super) mod tests {
     #[test]
     fn an_armed_knob_nobody_wants_is_freed_until_it_is() {
         let mut arming = Arming::default();
-        arming.hear(true);
+        arming.hear(true, false, 0);
         assert_eq!(said(&mut arming, 0, 200), [ArmingMessage::Free; 4]);
-        arming.hear(false);
+        arming.hear(false, false, 0);
         assert_eq!(said(&mut arming, 200, 400), []);
         arming.disarm(400_000);
         assert_eq!(said(&mut arming, 400, 600), [ArmingMessage::Free], "said even if the knob seems free");

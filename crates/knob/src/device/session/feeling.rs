@@ -27,6 +27,10 @@ pub struct Feeling {
     sent: Option<Sent>,
     last_us: Option<i64>,
     feel_id: u8,
+    /// Since when the device has echoed none of what it was sent, us.
+    unechoed_us: Option<i64>,
+    /// Number that STATE told last.
+    echo: Option<u8>,
     /// The last one refused on this side, and why.
     unsendable: Option<(Feel, String)>,
 }
@@ -61,7 +65,12 @@ impl Feeling {
 
     /// The device knows nothing any more.
     pub fn forget(&mut self) {
-        self.sent = None;
+        (self.sent, self.unechoed_us) = (None, None);
+    }
+
+    /// How long the device has echoed none of what it was sent, us; 0 if it echoes.
+    pub fn unechoed_us(&self, now_us: i64) -> i64 {
+        self.unechoed_us.map_or(0, |since_us| now_us - since_us)
     }
 
     /// The FEEL to send now. `hears_echo`: STATE comes, so that a FEEL without an echo was lost.
@@ -91,6 +100,7 @@ impl Feeling {
                     is_refused: false,
                 });
                 self.last_us = Some(now_us);
+                self.unechoed_us.get_or_insert(now_us);
                 Some(feel)
             }
         }
@@ -98,9 +108,20 @@ impl Feeling {
 
     /// Takes in the number STATE echoes; gives the way there and back in us when it is new.
     pub fn echoed(&mut self, feel_id: u8, now_us: i64) -> Option<i64> {
-        let sent = self.sent.as_mut().filter(|sent| !sent.is_echoed && sent.feel.feel_id == feel_id)?;
-        sent.is_echoed = true;
-        Some(now_us - sent.first_us)
+        // While notes follow each other faster than the line answers, a new number is news enough.
+        if self.echo.replace(feel_id) != Some(feel_id) && self.unechoed_us.is_some() {
+            self.unechoed_us = Some(now_us);
+        }
+        let sent = self.sent.as_mut()?;
+        if sent.feel.feel_id != feel_id {
+            if std::mem::take(&mut sent.is_echoed) {
+                self.unechoed_us = Some(now_us); // it has forgotten what it had
+            }
+            return None;
+        }
+        self.unechoed_us = None;
+        let is_news = !std::mem::replace(&mut sent.is_echoed, true);
+        is_news.then(|| now_us - sent.first_us)
     }
 
     /// The device refused the FEEL of this number; true if that is the one it should have now.
@@ -108,6 +129,7 @@ impl Feeling {
         match self.sent.as_mut().filter(|sent| sent.feel.feel_id == feel_id) {
             Some(sent) => {
                 sent.is_refused = true;
+                self.unechoed_us = None;
                 true
             }
             None => false,
