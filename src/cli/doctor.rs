@@ -102,7 +102,8 @@ impl DoctorCommand {
         let status =
             wait(&link, ANSWER, |phase| !matches!(phase, Phase::Off | Phase::Searching | Phase::Waiting));
         if !matches!(status.phase, Phase::Live | Phase::VersionMismatch | Phase::ReadOnly) {
-            for line in status.text.split(". ") {
+            let words = [Some(&status.text), status.notice.as_ref()];
+            for line in words.into_iter().flatten().flat_map(|text| text.split(". ")) {
                 writeln!(out, "  {line}")?;
             }
             return Ok(false);

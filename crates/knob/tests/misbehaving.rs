@@ -1,6 +1,7 @@
 //! A host session against knobs that misbehave, in simulated time: each gets its message, none keeps its torque.
 #![cfg(feature = "devices")]
 
+#[allow(dead_code, reason = "other tests use the rest")]
 #[path = "support/misbehaving_knobs.rs"]
 mod misbehaving_knobs;
 

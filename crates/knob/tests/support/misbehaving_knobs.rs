@@ -25,7 +25,6 @@ pub struct Misbehaving {
     /// What the host says of it, in alarm, refusal, notice, restriction or status.
     pub says: &'static str,
     /// What `doctor` says of it, which arms nothing and so cannot see everything.
-    #[allow(dead_code, reason = "each test reads one of the two")]
     pub doctor: &'static str,
     /// It is odd, but nothing forbids to arm it.
     pub may_arm: bool,
@@ -133,8 +132,8 @@ pub fn all() -> Vec<Misbehaving> {
         },
         Misbehaving {
             name: "answers another host",
-            says: "no knob with Chalumeau's firmware has answered",
-            doctor: "no known device answers",
+            says: "the knob answers another program",
+            doctor: "the knob answers another program",
             info: |info, _| info.session ^= 1,
             ..HONEST
         },

@@ -77,7 +77,8 @@ impl HostSession {
 
     fn hear_info(&mut self, info: &Info, now_us: i64) {
         if info.session != self.number {
-            return; // an answer to somebody else
+            self.notice = Some("the knob answers another program".into());
+            return;
         }
         self.meter.hello_round_trip_us = u32::try_from(now_us - self.hello_us).ok();
         self.info_us = Some(now_us);
@@ -88,6 +89,7 @@ impl HostSession {
         }
         // Answered again: it was silent, not gone.
         if self.info.replace(*info).is_none() {
+            self.notice = self.notice.take().filter(|text| !text.contains("another program"));
             self.rate_due = self.binding == Binding::Serial;
             self.feeling.forget();
             // What had piled up on the line before anybody read it is no loss of this session.
