@@ -415,7 +415,10 @@ fn felt_closure_is_where_the_resting_reed_shuts() {
         assert!((felt_close / shut_deg - 1.0).abs() < 0.01, "{felt_close} {shut_deg}");
         assert!(opening.iter().all(|x| if x.0 < 0.995 { x.1 > 0.0 } else { x.0 < 1.005 || x.1 == 0.0 }));
         assert!(friction.abs() < 1.5, "friction alone: {friction}");
-        assert!(made.iter().filter(|x| x.0 > 1.02 * a_close).all(|x| x.1 == 0.0), "the motor rests");
+        // The motor rests, but for that friction, of which it makes whole counts now and then.
+        let beyond: Vec<f64> = made.iter().filter(|x| x.0 > 1.02 * a_close).map(|x| x.1).collect();
+        let rest = beyond.iter().sum::<f64>() / beyond.len() as f64;
+        assert!((rest - friction).abs() < 0.1, "the motor makes {rest} mNm");
         // The curved lay of the standard clarinet.
         let lay = Settings::default().lay;
         let (_, curved) = static_reed(&table, note, lay, 0.98, 1.14);
@@ -437,17 +440,20 @@ fn tongued_beyond_closure_a_reed_on_a_sharp_lay_stays_shut_and_the_motor_at_rest
         player.run(5.0, |_| {}, |_| {});
         finger(&mut player, note);
         player.run(0.3, |_| {}, |_| {});
-        let (mut widest, mut loudest, mut torque, mut gamma) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0);
+        let (mut widest, mut loudest, mut torque, mut gamma) = (0.0_f64, 0.0_f64, Vec::new(), 0.0);
         player.run(
             2.0,
-            |knob| torque = torque.max(knob.motor_mnm().abs()),
+            |knob| torque.push(knob.motor_mnm()),
             |probe| {
                 (widest, loudest) = (widest.max(probe.opening), loudest.max(probe.p_radiated_pa.abs()));
                 gamma = probe.gamma;
             },
         );
         println!("{}: gamma {gamma:.3}, opening {widest}, {loudest:.1e} Pa at 1 m", note.written);
-        assert!(gamma > 1.02 && widest == 0.0 && torque == 0.0, "{gamma} {widest} {torque}");
+        assert!(gamma > 1.02 && widest == 0.0, "{gamma} {widest}");
+        // Damping against the tremor, in whole counts now and then.
+        let mean = torque.iter().sum::<f64>() / torque.len() as f64;
+        assert!(mean.abs() < 0.1 && torque.iter().all(|mnm| mnm.abs() < 5.0), "{mean} mNm");
         assert!(loudest < 1e-3, "{loudest}");
     }
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "../include/chalumeau/i2c.hpp"
+#include "../motor_board/bridge_watch.hpp"
 #include "check.hpp"
 
 using namespace chalumeau;
@@ -114,4 +115,27 @@ CLAIM(counts_never_exceed_the_ceiling_nor_the_board_and_no_torque_owes_nothing) 
             CHECK(rounding.counts(NAN, 450.0F, MOTEUS_UNIT) == 0 && rounding.counts(INFINITY, 450.0F, MOTEUS_UNIT) == 0);
         }
     }
+}
+
+CLAIM(bridge_passes_every_frame_on_stops_after_100_ms_and_once_more_before_it_goes_on) {
+    BridgeWatch watch;
+    const std::uint32_t start = 0xFFFFFF00U;  // its clock wraps on the way
+    CHECK(watch.poll(start) == BridgeOrder::Nothing);
+    CHECK(watch.frame(start) == BridgeOrder::StopAndTorque);
+    std::uint32_t now = start;
+    for (int i = 0; i < 2000; ++i) {
+        // The same torque again and again, now and then late by 90 ms.
+        now += i % 50 == 0 ? 90 : 1;
+        CHECK(watch.poll(now) == BridgeOrder::Nothing);
+        CHECK(watch.frame(now) == BridgeOrder::Torque);
+    }
+    int stops = 0;
+    for (std::uint32_t ms = 1; ms < 5000; ++ms) {
+        const BridgeOrder order = watch.poll(now + ms);
+        CHECK((order == BridgeOrder::Stop) == (ms == BRIDGE_TIMEOUT_MS));
+        stops += order == BridgeOrder::Stop ? 1 : 0;
+    }
+    CHECK(stops == 1);
+    CHECK(watch.frame(now + 5000) == BridgeOrder::StopAndTorque);
+    CHECK(watch.frame(now + 5001) == BridgeOrder::Torque);
 }

@@ -24,14 +24,25 @@ const MOST_PER_TICK: u64 = 2400;
 /// To and fro over the whole law, so that the two runs differ by whole passes.
 const TICKS: u64 = 7200;
 
-/// `cargo xtask firmware`: all of it.
+/// `cargo xtask firmware`: all of it; with `--long` ten times the anarchy under the sanitizers, which takes minutes.
 pub fn run(args: &[String]) -> Result<()> {
-    ensure!(args.is_empty(), "takes nothing, got {args:?}");
-    all()
+    match args {
+        [] => all(),
+        [flag] if flag == "--long" => everything(LONG_ANARCHY),
+        _ => bail!("takes nothing or --long, got {args:?}"),
+    }
 }
+
+/// Ticks of anarchy under the sanitizers, in `ci` and by command.
+const SHORT_ANARCHY: u32 = 1_000_000;
+const LONG_ANARCHY: u32 = 10_000_000;
 
 /// The step of `ci`.
 pub fn all() -> Result<()> {
+    everything(SHORT_ANARCHY)
+}
+
+fn everything(anarchy: u32) -> Result<()> {
     let folder = machine::target().join("firmware");
     fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let built = |name: &str| folder.join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
@@ -51,7 +62,10 @@ pub fn all() -> Result<()> {
             "-fno-omit-frame-pointer",
         ],
     )?;
-    machine::run(Command::new(&sanitized).args(["--fuzz", "3000000", "--trials", "10000"]))?;
+    let anarchy = anarchy.to_string();
+    machine::run(
+        Command::new(&sanitized).args(["--fuzz", "3000000", "--trials", "10000", "--anarchy", &anarchy]),
+    )?;
 
     // The example against stand-ins of the Arduino names it uses: its types fit the core's.
     machine::run(Command::new("g++").args(STRICT).args([

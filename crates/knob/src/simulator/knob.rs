@@ -140,6 +140,8 @@ impl SimulatedKnob {
                 }
                 let t_us = (self.tick - self.booted_at_tick) * PERIOD_US;
                 let torque_mnm = firmware.tick(t_us, &reading);
+                self.command_nm = f64::from(torque_mnm) / 1000.0;
+                // In whole counts of the board.
                 command_nm = Some(f64::from(firmware.command(torque_mnm)) / 1000.0);
                 let mut bytes = [0; TRANSMIT_MAX];
                 let length = firmware.transmit(&mut bytes);
@@ -147,11 +149,11 @@ impl SimulatedKnob {
             }
             Controller::Stock(firmware) => {
                 command_nm = Some(firmware.tick(reading.counts, self.plant.rpm(), reading.button));
+                self.command_nm = command_nm.unwrap_or(0.0);
                 self.report = firmware.report().or(self.report.take());
             }
-            Controller::Absent => {}
+            Controller::Absent => self.command_nm = 0.0,
         }
-        self.command_nm = command_nm.unwrap_or(0.0);
         let mut pull = self.hand.pull(t_s, self.plant.angle_rad(), self.is_armed());
         if self.is_faulty(FaultKind::OverSpeed) {
             pull = Default::default();
@@ -233,7 +235,7 @@ impl SimulatedKnob {
         self.plant.motor_nm() * 1000.0
     }
 
-    /// What the firmware said in the last period, mNm.
+    /// What the firmware wanted in the last period, before the board's counts, mNm.
     pub fn command_mnm(&self) -> f64 {
         self.command_nm * 1000.0
     }

@@ -16,6 +16,27 @@ pub use chalumeau_firmware::LOOP_HZ;
 /// Steps of integration in a period: 32 kHz, three hundred times the fastest pole of knob and hand.
 const SUBSTEPS: u32 = 16;
 
+/// How the motor board treats silence on its bus (`firmware/motor_board/README.md`). Read from the public source of the
+/// TorqueTuner's Moteus bridge and of the moteus firmware; not tried on hardware.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MotorBoard {
+    /// As it comes: without a timeout it holds the last torque for ever.
+    Stock,
+    /// The stock bridge with the board's timeout switched on, and its usual mode 12. The bridge forwards a command only when
+    /// it differs from the one before, so that a torque that stays the same, 0 included, times out; then the board brakes
+    /// until it hears a stop command, which the bridge never sends.
+    StockTimeout,
+    /// The patched bridge: it forwards each command; after the timeout the motor is limp, and follows again when commands
+    /// come again.
+    Patched,
+}
+
+/// Silence after which a board with a timeout acts, s.
+const BOARD_TIMEOUT_S: f64 = 0.1;
+
+/// Damping of mode 12, N m s/rad: 1 N m per turn a second, as the board comes; its own limit of 5 N m is above any motor's.
+const BRAKE_NMS: f64 = 0.159;
+
 /// What a maker would measure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlantDesign {
@@ -38,9 +59,8 @@ pub struct PlantDesign {
     pub encoder_noise_deg: f64,
     /// Corner of the board's velocity filter, Hz. Judgement: a first-order low-pass on the board's own position.
     pub velocity_filter_hz: f64,
-    /// Silence on the bus after which the motor board lets go, s. **The stock boards never do** (infinity); ours must be
-    /// told to, see docs/simulator.md.
-    pub motor_timeout_s: f64,
+    /// What the motor board does when the bus is silent. **The stock boards never let go**; see docs/simulator.md.
+    pub board: MotorBoard,
 }
 
 impl Default for PlantDesign {
@@ -55,7 +75,7 @@ impl Default for PlantDesign {
             counts_per_turn: 3600,
             encoder_noise_deg: 0.015,
             velocity_filter_hz: 100.0,
-            motor_timeout_s: 0.1,
+            board: MotorBoard::Patched,
         }
     }
 }
@@ -99,6 +119,10 @@ pub struct Plant {
     underway_nm: Option<f64>,
     motor_nm: f64,
     since_command_s: f64,
+    /// The board has timed out and waits for a stop command.
+    is_braking: bool,
+    /// What the bridge forwarded last, N m.
+    forwarded_nm: Option<f64>,
     /// Position the board saw last, in its own counts.
     board_counts: f64,
     filtered_rads: f64,
@@ -116,6 +140,8 @@ impl Plant {
             underway_nm: None,
             motor_nm: 0.0,
             since_command_s: 0.0,
+            is_braking: false,
+            forwarded_nm: None,
             board_counts: 0.0,
             filtered_rads: 0.0,
             hand_nm: 0.0,
@@ -177,11 +203,14 @@ impl Plant {
             } else {
                 arrived
             };
-            self.motor_nm = steps.clamp(-d.ceiling_nm, d.ceiling_nm);
-            self.since_command_s = 0.0;
+            self.hear(steps.clamp(-d.ceiling_nm, d.ceiling_nm));
         }
-        if self.since_command_s >= d.motor_timeout_s {
-            self.motor_nm = 0.0;
+        if self.since_command_s >= BOARD_TIMEOUT_S {
+            match d.board {
+                MotorBoard::Stock => {}
+                MotorBoard::StockTimeout => self.is_braking = true,
+                MotorBoard::Patched => self.motor_nm = 0.0,
+            }
         }
         let dt = period_s / f64::from(SUBSTEPS);
         let smoothing = 1.0 - (-TAU * d.velocity_filter_hz * dt).exp();
@@ -196,8 +225,20 @@ impl Plant {
         }
     }
 
+    /// A command reaches the board's bridge.
+    fn hear(&mut self, command_nm: f64) {
+        let is_news = self.forwarded_nm.replace(command_nm) != Some(command_nm);
+        if self.design.board == MotorBoard::Patched || is_news {
+            self.since_command_s = 0.0;
+            self.motor_nm = command_nm;
+        }
+    }
+
     fn turn(&mut self, dt: f64) {
         let d = &self.design;
+        if self.is_braking {
+            self.motor_nm = (-BRAKE_NMS * self.speed_rads).clamp(-d.ceiling_nm, d.ceiling_nm);
+        }
         let driving = self.motor_nm + self.hand_nm - d.viscous_nms * self.speed_rads;
         if self.speed_rads == 0.0 && driving.abs() <= d.static_nm {
             return;
