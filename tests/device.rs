@@ -1,11 +1,10 @@
 //! The link to a knob as the plugin uses it, with the real firmware at the other end of a pseudo-terminal.
-//!
-//! Only without the plugin: its framework brings an allocation check of its own.
-#![cfg(all(unix, not(feature = "plugin")))]
+#![cfg(unix)]
 
 #[path = "support/knob.rs"]
 mod knob;
 
+#[cfg(not(feature = "plugin"))]
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use chalumeau_core::analysis::pitch::fundamental_hz;
 use chalumeau_core::analysis::to_f64;
@@ -41,6 +40,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
+/// The plugin's framework brings an allocation check of its own.
+#[cfg(not(feature = "plugin"))]
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
 
@@ -132,6 +133,7 @@ fn a_simulated_knob_is_found_played_armed_and_left_in_peace() {
     assert!(alive > 25.0 * seconds && alive < 60.0 * seconds + 2.0, "{alive} ALIVE in {seconds} s");
 }
 
+#[cfg(not(feature = "plugin"))]
 #[test]
 fn the_audio_threads_end_allocates_nothing() {
     let (_directory, places) = places();

@@ -1,8 +1,6 @@
 //! `chalumeau knob` and `chalumeau doctor` as programs, at the other end of a pseudo-terminal: how torque ends when the
 //! program is stopped, its terminal held or the program interrupted; and what both make of knobs that misbehave.
-//!
-//! Only without the plugin, as `device.rs`.
-#![cfg(all(unix, feature = "simulator", not(feature = "plugin")))]
+#![cfg(unix)]
 
 #[allow(dead_code, reason = "other tests use the rest")]
 #[path = "support/knob.rs"]

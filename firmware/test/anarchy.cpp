@@ -99,7 +99,6 @@ class Anarchy {
             permit(what < 45 ? Type::Arm : Type::Alive);
         } else if (what == 80 && random_.below(40) == 0) {
             send(Type::Free, Payload{});
-            judge.permitted = false;
         } else if (what == 81 && random_.below(40) == 0) {
             const bool is_ours = device_.info().session == SESSION;
             has_host_ = !(send(Type::Bye, Bye{SESSION}.encode()) && is_ours) && has_host_;

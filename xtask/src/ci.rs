@@ -189,7 +189,7 @@ fn host_tests(names: &[&str]) -> Command {
 
 /// Test files that play the bundled CLAP.
 const CLAP_TESTS: &[&str] =
-    &["clap", "clap_rules", "clap_sleep", "note_ids", "keyboard", "instrument", "knob"];
+    &["clap", "clap_rules", "clap_sleep", "note_ids", "keyboard", "instrument", "knob", "knob_stop"];
 
 fn clap() -> Result<()> {
     let program = &programs()?.program;

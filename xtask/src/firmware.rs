@@ -24,7 +24,7 @@ const MOST_PER_TICK: u64 = 2400;
 /// To and fro over the whole law, so that the two runs differ by whole passes.
 const TICKS: u64 = 7200;
 
-/// `cargo xtask firmware`: all of it; with `--long` ten times the anarchy under the sanitizers, which takes minutes.
+/// `cargo xtask firmware`: all of it; with `--long` a hundred times the anarchy under the sanitizers, which takes minutes.
 pub fn run(args: &[String]) -> Result<()> {
     match args {
         [] => all(),
@@ -34,8 +34,8 @@ pub fn run(args: &[String]) -> Result<()> {
 }
 
 /// Ticks of anarchy under the sanitizers, in `ci` and by command.
-const SHORT_ANARCHY: u32 = 1_000_000;
-const LONG_ANARCHY: u32 = 10_000_000;
+const SHORT_ANARCHY: u32 = 10_000_000;
+const LONG_ANARCHY: u32 = 1_000_000_000;
 
 /// The step of `ci`.
 pub fn all() -> Result<()> {

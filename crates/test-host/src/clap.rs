@@ -26,10 +26,13 @@ use clack_host::events::Match;
 pub use clack_host::events::event_types::NoteExpressionType;
 use clack_host::events::event_types::{
     MidiEvent, NoteChokeEvent, NoteExpressionEvent, NoteOffEvent, NoteOnEvent, ParamModEvent, ParamValueEvent,
+    TransportEvent, TransportFlags,
 };
 use clack_host::events::spaces::CoreEventSpace;
+use clack_host::events::{EventFlags, EventHeader};
 pub use clack_host::prelude::ProcessStatus;
 use clack_host::prelude::*;
+use clack_host::utils::FixedPoint;
 use clap_sys::events::clap_event_header;
 
 pub use extensions::{Description, RemotePage};
@@ -181,7 +184,7 @@ impl Plugin {
             Ok(processor) => {
                 let (answers, ends, hands) = (Vec::new(), Vec::new(), Vec::new());
                 let status = ProcessStatus::Continue;
-                Ok(Session { processor, block, answers, ends, hands, status, played: 0 })
+                Ok(Session { processor, block, answers, ends, hands, status, played: 0, transport: None })
             }
             Err(_) => bail!("the plugin does not start at {rate_hz} Hz"),
         }
@@ -400,6 +403,8 @@ pub struct Session {
     /// What the plugin said of going on, after the last block.
     status: ProcessStatus,
     played: usize,
+    /// The host's transport, if it has one.
+    transport: Option<TransportEvent>,
 }
 
 impl Session {
@@ -483,7 +488,7 @@ impl Session {
                 &InputEvents::from_buffer(&events),
                 &mut OutputEvents::from_buffer(&mut answered),
                 Some((self.played + start) as u64),
-                None,
+                self.transport.as_ref(),
             )?;
             let mut latest = 0;
             for event in &answered {
@@ -520,6 +525,27 @@ impl Session {
             &mut OutputEvents::from_buffer(&mut answered),
         );
         Ok(answered.iter().filter_map(hand).collect())
+    }
+
+    /// Gives the host a transport, which plays or stands.
+    pub fn set_playing(&mut self, is_playing: bool) {
+        let flags = if is_playing { TransportFlags::IS_PLAYING } else { TransportFlags::empty() };
+        self.transport = Some(TransportEvent {
+            header: EventHeader::new_core(0, EventFlags::empty()),
+            flags,
+            song_pos_beats: FixedPoint::from_int(0),
+            song_pos_seconds: FixedPoint::from_int(0),
+            tempo: 120.0,
+            tempo_inc: 0.0,
+            loop_start_beats: FixedPoint::from_int(0),
+            loop_end_beats: FixedPoint::from_int(0),
+            loop_start_seconds: FixedPoint::from_int(0),
+            loop_end_seconds: FixedPoint::from_int(0),
+            bar_start: FixedPoint::from_int(0),
+            bar_number: 0,
+            time_signature_numerator: 4,
+            time_signature_denominator: 4,
+        });
     }
 
     /// As when a host's transport jumps.
