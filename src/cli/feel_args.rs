@@ -38,22 +38,28 @@ pub struct FeelArgs {
     /// Torque law
     #[arg(long, value_enum, default_value_t = LawArg::Flow)]
     law: LawArg,
-    /// Exaggeration of the differences between notes, 1 (physical) ..5
+    /// Exaggeration of the differences in torque between notes, 1 (physical) ..5
     #[arg(long, value_name = "X", default_value = "3", value_parser = |s: &str| within(s, 1.0, 5.0))]
     contrast: f64,
+    /// Exaggeration of the differences in angle at which notes speak, 1 (physical) ..5
+    #[arg(long, value_name = "X", default_value = "1", value_parser = |s: &str| within(s, 1.0, 5.0))]
+    place: f64,
+    /// Notes speak and close at the angles of the reference reed, whatever reed is played: as in a study
+    #[arg(long)]
+    equal_travel: bool,
     /// Which note feels harder
     #[arg(long, value_enum, default_value_t = OrderArg::Physical)]
     order: OrderArg,
-    /// Written note that contrast does not change [default: C5 or, without one, the middle of the chart]
+    /// Written note that contrast and place do not change [default: C5 or, without one, the middle of the chart]
     #[arg(long, value_name = "NOTE", value_parser = note)]
     reference: Option<u8>,
-    /// Torque per unit of flow (flow) or at closure (pressure) on the reference note, mNm, 0..450 [default: 60]
+    /// Torque per unit of flow (flow) or at closure (pressure) on the reference note, mNm, 0..450 [default: 55]
     #[arg(long, value_name = "MNM", value_parser = |s: &str| within(s, 0.0, 450.0))]
     torque: Option<f64>,
     /// Angle at which the reference reed closes on the reference note, degrees, 120..1080
     #[arg(long, value_name = "DEG", default_value = "360", value_parser = |s: &str| within(s, 120.0, 1_080.0))]
     travel: f64,
-    /// Height of the step at the threshold, mNm, 0..100 [default: none under flow, 6 under pressure]
+    /// Height of the mark at the threshold, mNm, 0..100 [default: 9 under flow, 6 under pressure]
     #[arg(long, value_name = "MNM", value_parser = |s: &str| within(s, 0.0, 100.0))]
     detent: Option<f64>,
 }
@@ -71,6 +77,8 @@ impl FeelArgs {
             },
             reference: self.reference.map(WrittenNote),
             contrast: self.contrast,
+            place: self.place,
+            equal_travel: self.equal_travel,
             order: match self.order {
                 OrderArg::Physical => NoteOrder::Physical,
                 OrderArg::CoveredHoles => NoteOrder::CoveredHoles,
@@ -88,8 +96,8 @@ impl FeelArgs {
         self.torque.is_none()
     }
 
-    /// How much the differences between notes are exaggerated.
-    pub fn contrast(&self) -> f64 {
-        self.contrast
+    /// Contrast and Place in words.
+    pub fn exaggeration(&self) -> String {
+        format!("Contrast {}, Place {}", self.contrast, self.place)
     }
 }

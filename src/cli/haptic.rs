@@ -6,7 +6,7 @@ use crate::cli::feel_args::FeelArgs;
 use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within, within_f32};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::torque_law;
-use chalumeau_core::haptics::{FeelTable, NoteFeel, RequirementSolver, TorqueLimits};
+use chalumeau_core::haptics::{FeelTable, NoteFeel, NoteRequirement, RequirementSolver, TorqueLimits};
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::instrument::feel_inputs::played_reed;
 use chalumeau_core::reed::ReedTables;
@@ -24,17 +24,19 @@ Examples:
   chalumeau haptic --all --zeta 0.3 --contrast 1 --csv -
   chalumeau haptic --written 52 --law flow --curve --csv e3.csv
   chalumeau haptic --all --H 3 --k 0.3849          a wider reed, as stiff as before
+  chalumeau haptic --all --H 3 --equal-travel      the same as a study has it
   chalumeau haptic --all --order covered-holes --contrast 2";
 
 /// Calculate the torque of a force-feedback knob for each note
 ///
 /// Every note has its own pressure requirement p_req_pa = p_M gamma_on (see `threshold`), above which it sounds, and an
 /// extinction gamma_off above which the shut reed is silent. On the knob they lie at a_on_deg and a_off_deg; at
-/// a_close_deg a resting reed would be shut. Contrast above 1 exaggerates the differences between notes: the angles and
-/// the torque change, the requirement itself does not.
+/// a_close_deg a resting reed would be shut. Contrast above 1 exaggerates how the torque differs between notes, Place above 1
+/// how their angles differ; the requirement itself does not change. At a_on_deg the knob blows with gamma_sounding, where the
+/// reed as it moves begins to sound.
 ///
-/// Columns: written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k; a note that cannot
-/// sound has nan for its pressures. With --curve: angle_deg,torque_mnm in steps of 0.1 degrees, at rest, positive
+/// Columns: written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding; a note
+/// that cannot sound has nan for its pressures. With --curve: angle_deg,torque_mnm in steps of 0.1 degrees, at rest, positive
 /// against the breath.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
@@ -85,24 +87,25 @@ impl HapticCommand {
         if self.curve {
             return feel.notes().iter().filter(wanted).try_for_each(|note| self.curve(note));
         }
-        let mut table = self
-            .table
-            .open("written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k")?;
+        let mut table = self.table.open(
+            "written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding",
+        )?;
         table.comment(format_args!(
-            "{}; zeta {}, Contrast {} about {}",
+            "{}; zeta {}, {} about {}",
             file.name,
             self.zeta,
-            self.feel.contrast(),
+            self.feel.exaggeration(),
             feel.reference().written
         ))?;
         for note in feel.notes().iter().filter(wanted) {
             let asked = note.requirement;
-            let (gamma_on, gamma_off, p_req) = asked.map_or((f64::NAN, f64::NAN, f64::NAN), |asked| {
-                (asked.gamma_on, asked.gamma_off, asked.p_req_pa)
-            });
+            let pressure =
+                |of: fn(&NoteRequirement) -> f64| asked.as_ref().map_or(f64::NAN, of);
+            let (gamma_on, gamma_off) = (pressure(|asked| asked.gamma_on), pressure(|asked| asked.gamma_off));
+            let (p_req, sounding) = (pressure(|asked| asked.p_req_pa), pressure(|asked| asked.gamma_sounding));
             let (a, feel) = (note.landmarks, note.feel);
             table.line(format_args!(
-                "{},{},{},{},{:.4},{:.4},{:.4},{:.4},{},{}",
+                "{},{},{},{},{:.4},{:.4},{:.4},{:.4},{},{},{}",
                 note.written.0,
                 number(gamma_on, 6),
                 number(gamma_off, 4),
@@ -112,7 +115,8 @@ impl HapticCommand {
                 a.a_close_deg,
                 feel.scale_mnm,
                 feel.h,
-                feel.k
+                feel.k,
+                number(sounding, 6)
             ))?;
         }
         table.finish()

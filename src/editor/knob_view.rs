@@ -340,7 +340,9 @@ fn column(ui: &mut Ui, hands: &mut Hands, page: Page) {
             for id in ["law", "order"] {
                 choice(ui, hands, id);
             }
-            for id in ["contr", "torque", "detent", "kdamp", "kfric", "refnot"] {
+            // Each law has a mark of its own at the threshold.
+            let mark = if hands.step("law") == 1 { "detent" } else { "mark" };
+            for id in ["contr", "place", "torque", mark, "kdamp", "kfric", "refnot"] {
                 slider(ui, hands, id);
             }
             heading(ui, "Calibration");

@@ -329,15 +329,15 @@ pub static PARAMETERS: &[Parameter] = &[
         .help(
             "Law of the torque",
             "",
-            "Flow: the reed's own curve, which rises to the threshold and falls to closure. Pressure: a spring with a step at the threshold. Free: no torque.",
+            "Flow: the reed's own curve, which rises to the threshold, with a mark there, and falls to closure. Pressure: a spring with a step at the threshold. Free: no torque.",
         )
         .flag("--law")
         .setup(),
     entry("contr", KNOB, "Feel contrast", number([1.0, 5.0], 3.0, 2, " x"))
         .help(
-            "Exaggerates the differences between notes",
+            "Exaggerates how the torque differs between notes",
             "Does not change the sound.",
-            "1 is what the bore needs: differences of about 15 % over the compass, at the limit of what fingers can tell apart. 3 makes them plain.",
+            "Hands tell two torques apart if they differ by about 13 %. At 1, what the bore needs, only the very hardest notes do from the easiest; at 3 and 5 about half of all pairs do, most of them across the break. A semitone within a register does not.",
         )
         .flag("--contrast")
         .setup(),
@@ -358,11 +358,11 @@ pub static PARAMETERS: &[Parameter] = &[
         .help(
             "Written note that feels the same at every contrast, as a MIDI number",
             "",
-            "Contrast moves the other notes away from this one.",
+            "Contrast and place move the other notes away from this one.",
         )
         .flag("--reference")
         .setup(),
-    entry("torque", KNOB, "Feel torque", number([0.0, MOST_TORQUE_MNM], 60.0, 0, " mNm"))
+    entry("torque", KNOB, "Feel torque", number([0.0, MOST_TORQUE_MNM], 55.0, 0, " mNm"))
         .help("Torque of the reference note", "", "Sets how strong everything feels.")
         .flag("--torque")
         .setup(),
@@ -380,7 +380,7 @@ pub static PARAMETERS: &[Parameter] = &[
         .help(
             "Height of the step at the threshold, under the pressure law",
             "",
-            "You feel a click where the note speaks. The flow law already has its peak there.",
+            "You feel a click where the note speaks. *Feel mark* is its counterpart under the flow law.",
         )
         .flag("--detent")
         .setup(),
@@ -465,6 +465,22 @@ pub static PARAMETERS: &[Parameter] = &[
         .setup()
         .act()
         .never_restored(),
+    entry("place", KNOB, "Feel place", number([1.0, 5.0], 1.0, 2, " x"))
+        .help(
+            "Exaggerates how the angle at which notes speak differs between notes",
+            "A new note keeps the pressure of a hand that does not move.",
+            "1 is what the bore needs. Above 1 hard notes speak farther from rest, so the hand has to follow the notes.",
+        )
+        .flag("--place")
+        .setup(),
+    entry("mark", KNOB, "Feel mark", number([0.0, 12.0], 9.0, 1, " mNm"))
+        .help(
+            "Height of the mark at the threshold, under the flow law",
+            "",
+            "A bump where the note speaks. Without it the torque there is so flat that a hand cannot find the place.",
+        )
+        .flag("--detent")
+        .setup(),
     entry(
         "instr",
         INSTRUMENT,

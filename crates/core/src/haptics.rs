@@ -2,7 +2,7 @@
 //!
 //! 1. A [`RequirementSolver`] analyses the bore of an instrument once. With a [`PlayedReed`] it gives the mouth pressures of
 //!    each note ([`NoteRequirement`]).
-//! 2. A [`FeelDesign`] holds the choices of the user: torque law, strength, travel, Contrast.
+//! 2. A [`FeelDesign`] holds the choices of the user: torque law, strength, travel, Contrast, Place.
 //! 3. A [`FeelTable`] joins the two. For each note ([`NoteFeel`]) it holds the parameters for the knob ([`Feel`]), the angles
 //!    at which the note starts, beats, closes and stops ([`Landmarks`]), and the map from angle to mouth pressure
 //!    ([`AngleMap`]). A feel that a knob would refuse is an error ([`FeelRefused`]).

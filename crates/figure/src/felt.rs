@@ -78,7 +78,7 @@ pub struct FeltThresholds {
     pub law: String,
     /// Mouth pressure at the mark of the torque (its top, or the middle of its step): written note (MIDI), kPa.
     pub at_kpa: Vec<(u8, f64)>,
-    /// Contrast, and the felt threshold of each note, degrees.
+    /// Place, and the felt threshold of each note, degrees.
     pub on_deg: Vec<(f64, Vec<(u8, f64)>)>,
 }
 
@@ -109,10 +109,10 @@ pub fn thresholds(note: &str, sounds_kpa: &[(u8, f64)], laws: &[FeltThresholds])
             written_axis(notes()),
             Axis::linear("felt threshold, degrees from rest"),
         );
-        for (index, (contrast, on_deg)) in felt.on_deg.iter().enumerate() {
+        for (index, (place, on_deg)) in felt.on_deg.iter().enumerate() {
             let colour = Colour::of_family(index, felt.on_deg.len());
             panel = panel
-                .with(Line::new(format!("Contrast {contrast}"), along(on_deg)).colour(colour))
+                .with(Line::new(format!("Place {place}"), along(on_deg)).colour(colour))
                 .with(Points::new("", along(on_deg)).colour(colour).size(4.5));
         }
         figure = figure.panel(panel);

@@ -17,8 +17,8 @@ use chalumeau_figure::report::{Chapter, Plate, ReportTable, TableCell};
 use chalumeau_knob::touch::feel::InstrumentFeel;
 use chalumeau_knob::wire::message::TorqueLaw;
 
-/// Contrasts shown.
-const CONTRASTS: [f64; 3] = [1.0, 3.0, 5.0];
+/// Contrasts, and Places, shown.
+const EXPONENTS: [f64; 3] = [1.0, 3.0, 5.0];
 /// Both laws that push.
 const LAWS: [TorqueLaw; 2] = [TorqueLaw::Flow, TorqueLaw::Pressure];
 /// Greatest mouth pressure of the instrument, kPa.
@@ -216,7 +216,7 @@ impl<'a> BreathAndHaptics<'a> {
             }
         };
         let all: Vec<Turn> = few.iter().map(turn).collect();
-        let design = format!("{} law, Contrast {}", law_name(self.design.law), self.design.contrast);
+        let design = format!("{} law, Place {}", law_name(self.design.law), self.design.place);
         Plate {
             figure: turns(&format!("{design}; {}", self.reed()), self.closing_kpa(), &all),
             caption: "The mouth pressure of an angle, for each note: the sound begins (disc) at the mark of the torque, and the reed \
@@ -277,7 +277,8 @@ impl<'a> BreathAndHaptics<'a> {
         let ceiling_mnm = self.limits.ceiling_mnm;
         let mut words = vec![format!(
             "The feel of a force-feedback knob for these notes, at {} mNm. Contrast 1 follows the bore; a larger contrast \
-             exaggerates how notes differ, in the hand only. The figures show the torque that the knob's firmware calculates, at \
+             exaggerates how the torque of notes differs, Place where they speak. Hands tell two torques apart if they differ \
+             by about 13 % (Jandura and Srinivasan 1994). The figures show the torque that the knob's firmware calculates, at \
              rest and without friction. It must not pass {ceiling_mnm:.0} mNm, must not be steeper than {:.2} N m/rad, up to \
              which a sampled knob stays passive, and must not push the hand along with more than {:.1} N m/rad.",
             self.design.strength_mnm, self.limits.stiffness_nm_per_rad, self.limits.push_nm_per_rad
@@ -289,18 +290,21 @@ impl<'a> BreathAndHaptics<'a> {
             let mut on_deg = Vec::new();
             let mut at_kpa = Vec::new();
             let mut panels = Vec::new();
-            for contrast in CONTRASTS {
+            for place in EXPONENTS {
+                // Contrast moves no threshold, and at 1 the torque is least likely to be refused.
+                let design = FeelDesign { law, place, contrast: 1.0, ..self.design };
+                let Ok(table) = self.table(&design) else { continue };
+                let sounding = || table.notes().iter().filter(|note| note.requirement.is_some());
+                let on = sounding().map(|note| (note.written.0, note.landmarks.a_on_deg));
+                on_deg.push((place, on.collect()));
+                if at_kpa.is_empty() {
+                    at_kpa = sounding().map(|note| (note.written.0, marked_kpa(note))).collect();
+                }
+            }
+            for contrast in EXPONENTS {
                 let design = FeelDesign { law, contrast, ..self.design };
                 let table = self.table(&design);
                 refusals.push(self.refusal(&design, table.as_ref().err()));
-                if let Ok(table) = &table {
-                    let sounding = || table.notes().iter().filter(|note| note.requirement.is_some());
-                    let on = sounding().map(|note| (note.written.0, note.landmarks.a_on_deg));
-                    on_deg.push((contrast, on.collect()));
-                    if at_kpa.is_empty() {
-                        at_kpa = sounding().map(|note| (note.written.0, marked_kpa(note))).collect();
-                    }
-                }
                 let notes = table.map(|table| self.few(&table).into_iter().map(torque).collect());
                 panels.push(AtContrast { contrast, notes: notes.map_err(|reason| reason.to_string()) });
             }
@@ -323,7 +327,7 @@ impl<'a> BreathAndHaptics<'a> {
             .filter_map(|at| at.notes.as_ref().err().map(|why| format!("Contrast {}: {why}.", at.contrast)))
             .collect();
         let shape = match law {
-            TorqueLaw::Flow => "It rises to the threshold and falls to nothing where the reed shuts.",
+            TorqueLaw::Flow => "It rises to the mark at the threshold and falls to nothing where the reed shuts.",
             _ => "A spring with a step at the threshold.",
         };
         Plate {
@@ -359,10 +363,10 @@ impl<'a> BreathAndHaptics<'a> {
         );
         Plate {
             figure: thresholds(&self.reed(), &sounds, felt),
-            caption: format!("{outcome} Contrast moves both on the knob."),
+            caption: format!("{outcome} Place moves both on the knob."),
             alternative: format!(
                 "Over the written notes: mouth pressure where each begins to sound and where the torque has its mark, and \
-                 the angle of the felt threshold at Contrast 1, 3 and 5 under both laws. {outcome}"
+                 the angle of the felt threshold at Place 1, 3 and 5 under both laws. {outcome}"
             ),
         }
     }
@@ -389,9 +393,10 @@ impl<'a> BreathAndHaptics<'a> {
         ReportTable {
             title: "Feel sent to the knob".to_owned(),
             about: format!(
-                "FEEL of every note, {} law, Contrast {} about {}: where it is felt to start, beats, closes and chokes.",
+                "FEEL of every note, {} law, Contrast {}, Place {} about {}: where it is felt to start, beats, closes and chokes.",
                 law_name(self.design.law),
                 self.design.contrast,
+                self.design.place,
                 table.reference().written
             ),
             head: head.map(str::to_owned).to_vec(),

@@ -8,8 +8,8 @@ use chalumeau_core::units::WrittenNote;
 use chalumeau_knob::wire::TorqueLaw;
 
 /// Highest torque of the reference note in a study, mNm. With it, both sides of every trial stay under the first ceiling
-/// at the default contrast (the test below checks this).
-const STUDY_MNM: f64 = 50.0;
+/// at the default contrast and mark (the test below checks this).
+const STUDY_MNM: f64 = 45.0;
 
 /// The feel that the parameters describe.
 pub fn feel_design(knob: &KnobParams) -> FeelDesign {
@@ -22,6 +22,9 @@ pub fn feel_design(knob: &KnobParams) -> FeelDesign {
         },
         reference: u8::try_from(knob.reference.value()).ok().map(WrittenNote),
         contrast: f64::from(knob.contrast.value()),
+        place: f64::from(knob.place.value()),
+        // So that the two sides of a trial differ in the reed, not in how far the hand has to turn.
+        equal_travel: knob.study().is_some(),
         order: match knob.order.value() {
             OrderChoice::Physical => NoteOrder::Physical,
             OrderChoice::CoveredHoles => NoteOrder::CoveredHoles,
@@ -34,7 +37,11 @@ pub fn feel_design(knob: &KnobParams) -> FeelDesign {
         travel_deg: calibration.travel_deg,
         damping_mnms: f64::from(knob.damping.value()),
         friction_mnm: f64::from(knob.friction.value()),
-        detent_mnm: (knob.law.value() == LawChoice::Pressure).then(|| f64::from(knob.detent.value())),
+        detent_mnm: match knob.law.value() {
+            LawChoice::Flow => Some(f64::from(knob.mark.value())),
+            LawChoice::Pressure => Some(f64::from(knob.detent.value())),
+            LawChoice::Free => None,
+        },
         ..FeelDesign::default()
     }
 }
@@ -64,7 +71,8 @@ mod tests {
                     coupled: false,
                     ..Settings::default()
                 };
-                let design = FeelDesign { strength_mnm: STUDY_MNM, ..FeelDesign::default() };
+                let design =
+                    FeelDesign { strength_mnm: STUDY_MNM, equal_travel: true, ..FeelDesign::default() };
                 let refused = feels.table(&settings, &design, &TorqueLimits::default()).err();
                 assert_eq!(refused, None, "H {} {}", trial.h, condition.name());
             }

@@ -183,16 +183,16 @@ pub struct KnobParams {
     /// Torque law. Default flow.
     #[id = "law"]
     pub law: EnumParam<LawChoice>,
-    /// Exaggeration of the differences between notes: 1 is physical. Default 3.
+    /// Exaggeration of the differences in torque between notes: 1 is physical. Default 3.
     #[id = "contr"]
     pub contrast: FloatParam,
     /// What makes a note harder. Default physical.
     #[id = "order"]
     pub order: EnumParam<OrderChoice>,
-    /// Written note that is felt as it is at every contrast, MIDI number.
+    /// Written note that is felt as it is at every contrast and place, MIDI number.
     #[id = "refnot"]
     pub reference: IntParam,
-    /// Torque of the reference note per unit of flow, mNm. Default 60.
+    /// Torque of the reference note per unit of flow, mNm. Default 55.
     #[id = "torque"]
     pub torque: FloatParam,
     /// Damping beside the knob's own, mNm s/rad.
@@ -201,7 +201,7 @@ pub struct KnobParams {
     /// Friction, mNm.
     #[id = "kfric"]
     pub friction: FloatParam,
-    /// Height of the step at the threshold, mNm; pressure law only, the flow law has its peak there. Default 6.
+    /// Height of the step at the threshold, mNm; pressure law only. Default 6.
     #[id = "detent"]
     pub detent: FloatParam,
     /// Exponent of the way from rest to full blow, on knobs that do not feel. Default 1.
@@ -246,6 +246,12 @@ pub struct KnobParams {
     /// Says how the link is; its value means nothing.
     #[id = "kstat"]
     pub status: BoolParam,
+    /// Exaggeration of the differences in angle at which notes speak: 1 is physical. Default 1.
+    #[id = "place"]
+    pub place: FloatParam,
+    /// Height of the mark at the threshold, mNm; flow law only. Default 9.
+    #[id = "mark"]
+    pub mark: FloatParam,
 }
 
 impl KnobParams {
@@ -284,6 +290,8 @@ impl KnobParams {
             h_source: choice("hsrc", ReedSource::Parameter),
             k_source: choice("ksrc", ReedSource::Parameter),
             status: status("kstat", link),
+            place: number("place"),
+            mark: number("mark"),
         }
     }
 

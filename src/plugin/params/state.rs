@@ -1,5 +1,7 @@
 //! Saved states: what may stand in one, and how any state is made fit to load.
 
+use std::collections::BTreeMap;
+
 use nice_plug::plugin::ParamValue;
 use nice_plug::prelude::*;
 use serde::{Serialize, de::DeserializeOwned};
@@ -27,6 +29,7 @@ pub(super) fn starting(id: &str, number: &Number) -> f32 {
 /// dropped, and what the state does not mention set to its default, so that a state means the same in every session.
 pub fn mend(state: &mut PluginState) {
     let mut old = std::mem::take(&mut state.params);
+    keep_the_feel(&mut old);
     for parameter in PARAMETERS {
         let value = mended(parameter, old.remove(parameter.id));
         state.params.insert(parameter.id.to_owned(), value);
@@ -51,6 +54,17 @@ pub fn mend(state: &mut PluginState) {
 pub fn without_moments(state: &mut PluginState) {
     for parameter in PARAMETERS.iter().filter(|parameter| !parameter.is_restored) {
         state.params.insert(parameter.id.to_owned(), mended(parameter, None));
+    }
+}
+
+/// A state from before *Feel place* and *Feel mark* feels as it did: its *Feel contrast* moved the angles too, and the flow law
+/// had no mark.
+fn keep_the_feel(old: &mut BTreeMap<String, ParamValue>) {
+    let Some(ParamValue::F32(contrast)) = old.get("contr") else { return };
+    let contrast = *contrast;
+    if !old.contains_key("place") {
+        old.insert("place".to_owned(), ParamValue::F32(contrast));
+        old.entry("mark".to_owned()).or_insert(ParamValue::F32(0.0));
     }
 }
 
@@ -92,8 +106,6 @@ fn mend_field<T: Default + Serialize + DeserializeOwned>(
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
     use super::*;
 
     #[test]
@@ -154,6 +166,20 @@ mod tests {
         without_moments(&mut state);
         for (id, stays) in [("arm", false), ("rec", false), ("panic", false), ("replay", true)] {
             assert!(matches!(state.params[id], ParamValue::Bool(on) if on == stays), "{id}");
+        }
+    }
+
+    #[test]
+    fn a_state_from_before_place_and_mark_feels_as_it_did() {
+        let old = [("contr", 5.0)];
+        let new = [("contr", 5.0), ("place", 2.0), ("mark", 8.0)];
+        for (saved, wanted) in [(&old[..], [5.0, 5.0, 0.0]), (&new[..], [5.0, 2.0, 8.0]), (&[], [3.0, 1.0, 9.0])] {
+            let params = saved.iter().map(|&(id, value)| (id.to_owned(), ParamValue::F32(value))).collect();
+            let mut state = PluginState { version: String::new(), params, fields: BTreeMap::new() };
+            mend(&mut state);
+            for (id, wanted) in ["contr", "place", "mark"].into_iter().zip(wanted) {
+                assert!(matches!(state.params[id], ParamValue::F32(value) if value == wanted), "{saved:?} {id}");
+            }
         }
     }
 }

@@ -24,18 +24,25 @@ pub enum NoteOrder {
 pub struct FeelDesign {
     /// Torque law. Default: flow.
     pub law: TorqueLaw,
-    /// The reference note, which Contrast does not change. `None` is written C5, or the middle of the chart if the
+    /// The reference note, which Contrast and Place do not change. `None` is written C5, or the middle of the chart if the
     /// instrument has no C5.
     ///
     /// C5 requires nearly the most of the notes that are played often. Contrast therefore mostly lowers torque, and stays
     /// below the ceiling.
     pub reference: Option<WrittenNote>,
-    /// Contrast: the exponent of the differences between notes, 1 (physical) to 5. Default 3.
+    /// Contrast: the exponent of the differences in torque between notes, 1 (physical) to 5. Default 3. It changes no
+    /// pressure.
     pub contrast: f64,
+    /// Place: the exponent of the differences in angle at which notes speak, 1 (physical) to 5. Default 1. Above 1 a hand
+    /// that stays where it is blows the next note with another pressure, once it has moved.
+    pub place: f64,
+    /// Every note speaks and closes at the angle of the reference reed, whatever reed is played. Default false. For
+    /// comparing reeds: with equal travel, a movement of the hand means the same on both.
+    pub equal_travel: bool,
     /// What decides which note feels harder. Default: the physical order.
     pub order: NoteOrder,
-    /// Torque per unit of flow (flow law) or at closure (pressure law) on the reference note, mNm, 0 to 450. Default 60,
-    /// under a first ceiling of 100 (by judgement).
+    /// Torque per unit of flow (flow law) or at closure (pressure law) on the reference note, mNm, 0 to 450. Default 55: with
+    /// mark and friction, the hardest note at Contrast 5 stays under a first ceiling of 100.
     pub strength_mnm: f64,
     /// Angle at which the reference reed closes on the reference note, degrees, 120 to 1080. Default one turn, as
     /// TorqueTuner has it at stretch 1.
@@ -50,8 +57,8 @@ pub struct FeelDesign {
     pub wall_mnm_per_deg: f64,
     /// Spring of the slap region, mNm per degree, 0 to 20. Default 0.5.
     pub slap_mnm_per_deg: f64,
-    /// Height of the mark at the threshold, mNm, 0 to 100. `None` is 0 under the flow law, whose peak marks the threshold,
-    /// and 6 under the pressure law, a tenth of the default strength, which a hand can just feel on a knob (by judgement).
+    /// Height of the mark at the threshold, mNm, 0 to 100. `None` is 9 under the flow law and 6 under the pressure law; see
+    /// [`mark_mnm`](Self::mark_mnm).
     pub detent_mnm: Option<f64>,
     /// Time in which the feel of one note changes into that of the next, ms, 20 to 1000. Default 30.
     pub morph_ms: u16,
@@ -63,8 +70,10 @@ impl Default for FeelDesign {
             law: TorqueLaw::Flow,
             reference: None,
             contrast: 3.0,
+            place: 1.0,
+            equal_travel: false,
             order: NoteOrder::Physical,
-            strength_mnm: 60.0,
+            strength_mnm: 55.0,
             travel_deg: 360.0,
             damping_mnms: 1.0,
             friction_mnm: 1.0,
@@ -79,14 +88,24 @@ impl Default for FeelDesign {
 
 impl FeelDesign {
     /// Height of the mark at the threshold, mNm: `detent_mnm`, or the default of the torque law.
+    ///
+    /// Under the flow law the torque about the peak is flat: it stays within 12.7 % of the peak, the smallest difference that
+    /// hands tell apart (Jandura and Srinivasan 1994), over more than a third of the travel. A mark of 9 mNm is 16 % of the
+    /// default strength, so that a hand finds the threshold, and its slope is 0.13 N m/rad, below the limit of 0.2 for torque
+    /// that pushes. Under the pressure law the step of 6 mNm stands on a spring that is still weak there.
     pub fn mark_mnm(&self) -> f64 {
-        self.detent_mnm.unwrap_or(if self.law == TorqueLaw::Pressure { 6.0 } else { 0.0 })
+        self.detent_mnm.unwrap_or(match self.law {
+            TorqueLaw::Flow => 9.0,
+            TorqueLaw::Pressure => 6.0,
+            TorqueLaw::Free => 0.0,
+        })
     }
 
     /// Whether every value lies in its range.
     pub(super) fn check(&self) -> Result<(), FeelRefused> {
         for (name, given, low, high) in [
             ("Contrast", self.contrast, 1.0, 5.0),
+            ("Place", self.place, 1.0, 5.0),
             ("strength (mNm)", self.strength_mnm, 0.0, 450.0),
             ("travel (degrees)", self.travel_deg, 120.0, 1_080.0),
             ("damping (mNm s/rad)", self.damping_mnms, 0.0, 20.0),

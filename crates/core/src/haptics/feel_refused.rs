@@ -47,10 +47,10 @@ pub enum FeelRefused {
         /// Largest closure allowed, degrees.
         limit_deg: f64,
     },
-    /// Contrast would put the felt threshold of a note too near its closure, or beyond it.
+    /// Place would put the felt threshold of a note too near its closure, or beyond it.
     #[error(
         "{note} would be felt to start at {a_on_deg:.0} degrees, too near closure at {a_close_deg:.0}; \
-         lower Contrast, raise zeta, or use the flow law"
+         lower Place, raise zeta, or use the flow law"
     )]
     Crossed {
         /// The note with the largest threshold.
@@ -91,7 +91,7 @@ pub enum FeelRefused {
     /// The torque falls more steeply than a hand can hold.
     #[error(
         "{note} would push the hand along with {wanted:.3} N m/rad, the limit is {limit:.3}; \
-         lower the strength, lengthen the travel, or use the pressure law"
+         lower the mark or the strength, lengthen the travel, or use the pressure law"
     )]
     Push {
         /// The note with the steepest fall.

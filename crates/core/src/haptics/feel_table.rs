@@ -1,11 +1,12 @@
 //! From what each note requires to what the hand feels: the parameters for the knob and the maps from angle to mouth
 //! pressure, for all notes at once.
 //!
-//! One number describes a note: `r = (P / P_ref)^Contrast`, its required pressure over that of the reference note. The felt
-//! threshold `A_on` is `r` times that of the reference note, and the torque is `r` times as strong. Contrast 1 gives the
-//! physical differences. A higher Contrast exaggerates them, because their true spread (4 to 19 %) is close to the smallest
-//! difference that fingers can feel on a knob. Under the flow law the threshold is the peak of the law, so closure lies at
-//! `3 A_on`. Under the pressure law closure is the angle at which the resting reed would shut, the same for every note.
+//! One number describes a note: `P / P_ref`, its required pressure over that of the reference note. The torque is
+//! `(P / P_ref)^Contrast` times as strong, the felt threshold `A_on` lies at `(P / P_ref)^Place` times the angle. Exponents of 1
+//! give the physical differences. A higher Contrast exaggerates them for the hand, because their true spread (4 to 19 %) is
+//! close to the smallest difference that hands can tell apart; a higher Place also moves where notes speak. Under the flow law
+//! the threshold is the peak of the law, so closure lies at `3 A_on`. Under the pressure law closure is the angle at which the
+//! resting reed would shut, the same for every note.
 //!
 //! A feel that a device would refuse is refused here, with numbers and a way out. Nothing is clipped.
 
@@ -100,29 +101,37 @@ impl FeelTable {
         let Some(own) = asked.get(reference).copied().flatten() else {
             return Err(FeelRefused::Silent { zeta: reed.flow_strength() });
         };
+        let standard_reed = PlayedReed::quasi_static(REFERENCE_ZETA);
         // How many degrees a pascal is belongs to the knob. The reference reed fixes it, whatever reed is played.
         let degrees_per_pa = match design.law {
             TorqueLaw::Flow => {
-                let reed = PlayedReed::quasi_static(REFERENCE_ZETA);
-                let standard = bore.note(reference, &reed).unwrap_or(own);
+                let standard = bore.note(reference, &standard_reed).unwrap_or(own);
                 design.travel_deg / 3.0 / standard.p_req_pa
             }
             TorqueLaw::Pressure | TorqueLaw::Free => design.travel_deg / P_REF_PA,
         };
-        let a_ref_deg = degrees_per_pa * own.p_req_pa;
-        let felt = felt_pressures(bore, design, &asked);
-        let felt_ref = felt[reference].unwrap_or(own.p_req_pa);
+        // The reed whose pressures lay out the travel.
+        let of_travel = design.equal_travel.then(|| bore.with(&standard_reed));
+        let (laid_out, travel_reed) = match &of_travel {
+            Some(standard) => (standard, &standard_reed),
+            None => (&asked, reed),
+        };
+        let p_ref_pa = laid_out[reference].map_or(own.p_req_pa, |required| required.p_req_pa);
+        let a_ref_deg = degrees_per_pa * p_ref_pa;
+        let felt = felt_pressures(bore, design, laid_out);
+        let felt_ref = felt[reference].unwrap_or(p_ref_pa);
         let notes: Box<[NoteFeel]> = bore
             .written()
             .zip(asked.iter().zip(&felt))
             .map(|(written, (&asked, &felt))| {
-                let r = (felt.unwrap_or(felt_ref) / felt_ref).powf(design.contrast);
-                let a_on_deg = a_ref_deg * r;
+                let ratio = felt.unwrap_or(felt_ref) / felt_ref;
+                let a_on_deg = a_ref_deg * ratio.powf(design.place);
                 let a_close_deg = match design.law {
                     TorqueLaw::Flow => 3.0 * a_on_deg,
-                    TorqueLaw::Pressure | TorqueLaw::Free => degrees_per_pa * reed.closing_pa(),
+                    TorqueLaw::Pressure | TorqueLaw::Free => degrees_per_pa * travel_reed.closing_pa(),
                 };
-                note(written, asked, asked.unwrap_or(own), design, reed, (r, a_on_deg, a_close_deg))
+                let torque = ratio.powf(design.contrast);
+                note(written, asked, asked.unwrap_or(own), design, reed, (torque, a_on_deg, a_close_deg))
             })
             .collect();
         refuse(&notes, design, limits)?;
@@ -155,7 +164,7 @@ impl FeelTable {
         refuse(std::slice::from_ref(note), design, limits)
     }
 
-    /// The reference note, which Contrast does not change.
+    /// The reference note, which Contrast and Place do not change.
     pub fn reference(&self) -> &NoteFeel {
         &self.notes[self.reference]
     }
@@ -213,14 +222,15 @@ fn felt_pressures(
         .collect()
 }
 
-/// The feel of one note. `sounds_like` is its own requirement, or the reference note's for a note that cannot sound.
+/// The feel of one note. `sounds_like` is its own requirement, or the reference note's for a note that cannot sound; `torque`
+/// is its torque over that of the reference note.
 fn note(
     written: WrittenNote,
     requirement: Option<NoteRequirement>,
     sounds_like: NoteRequirement,
     design: &FeelDesign,
     reed: &PlayedReed,
-    (r, a_on_deg, a_close_deg): (f64, f64, f64),
+    (torque, a_on_deg, a_close_deg): (f64, f64, f64),
 ) -> NoteFeel {
     let p_close = reed.closing_pa();
     let a_off_deg = a_close_deg * sounds_like.gamma_off;
@@ -242,7 +252,7 @@ fn note(
         morph_ms: design.morph_ms,
         h: h as f32,
         k: k as f32,
-        scale_mnm: (design.strength_mnm * r) as f32,
+        scale_mnm: (design.strength_mnm * torque) as f32,
         stretch: (360.0 * h * k / a_close_deg) as f32,
         offset_deg: 0.0,
         a_on_deg: a_on_deg as f32,
@@ -272,7 +282,7 @@ fn refuse(notes: &[NoteFeel], design: &FeelDesign, limits: &TorqueLimits) -> Res
     if wanted_deg > CLOSURE_MAX_DEG {
         return Err(FeelRefused::Travel { note, wanted_deg, limit_deg: CLOSURE_MAX_DEG });
     }
-    // Under the pressure law closure stays where it is while Contrast moves the threshold.
+    // Under the pressure law closure stays where it is while Place moves the threshold.
     let latest = |a: &&NoteFeel, b: &&NoteFeel| a.landmarks.a_on_deg.total_cmp(&b.landmarks.a_on_deg);
     if let Some(note) = notes.iter().max_by(latest)
         && note.landmarks.a_on_deg > START_TO_CLOSURE * note.landmarks.a_close_deg

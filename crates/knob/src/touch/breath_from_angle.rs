@@ -1,8 +1,12 @@
 //! Turns a knob's angle into breath, note by note.
 //!
 //! Breath goes out on a grid of samples counted from the start, so that it does not depend on the host's blocks, and in
-//! the steps of a 14-bit controller, so that a host that records it plays the very same breath back.
+//! the steps of a 14-bit controller, so that a host that records it plays the very same breath back. A new note takes over the
+//! pressure that the hand blows with (`carry`).
 
+mod carry;
+
+use crate::touch::breath_from_angle::carry::Carry;
 use crate::touch::feel::PitchMaps;
 use chalumeau_core::control::keys::Keys;
 use chalumeau_core::control::knob::{KnobBreath, KnobDesign};
@@ -11,9 +15,6 @@ use chalumeau_core::units::SoundingNote;
 
 /// Samples between two values of breath: 1.3 ms at 48 kHz, a quarter of the time the player's breath takes to follow.
 pub const GRID: u64 = 64;
-/// Samples in which one note's map gives way to the next's: 30 ms at 48 kHz, as the feel under the hand does. A hand needs
-/// longer; without it a slur over the break would jump.
-const GLIDE: u64 = 1_440;
 /// Steps of a 14-bit controller.
 const STEPS: f32 = 16_383.0;
 
@@ -50,9 +51,9 @@ pub struct BreathMapping {
 pub struct Blower {
     keys: Keys,
     fingered: Option<SoundingNote>,
-    /// The note before it, and when it gave way.
-    before: Option<SoundingNote>,
-    changed_at: u64,
+    /// The note whose map made the latest breath, once a note has been fingered.
+    blown: Option<SoundingNote>,
+    carry: Carry,
     blowing: bool,
     unfelt: Option<KnobBreath>,
     sent: Option<Breath14>,
@@ -74,11 +75,7 @@ impl Blower {
             Event::Panic => self.keys = Keys::default(),
             _ => return,
         }
-        let fingered = self.keys.last().or(self.fingered);
-        if fingered != self.fingered {
-            (self.before, self.fingered) = (self.fingered, fingered);
-            self.changed_at = self.clock + event.at as u64;
-        }
+        self.fingered = self.keys.last().or(self.fingered);
     }
 
     /// The fingered note; it stays after its key is released.
@@ -102,23 +99,19 @@ impl Blower {
         self.clock += samples as u64;
     }
 
-    /// Breath at a knob angle (degrees), at sample `at` of the block that begins now; `None` if it has not changed.
-    /// `full_pa` is the mouth pressure of full breath, Pa.
-    pub fn blow(
-        &mut self,
-        hand: &BreathMapping,
-        at: usize,
-        angle_deg: f64,
-        full_pa: f64,
-    ) -> Option<Breath14> {
+    /// Breath at a knob angle, degrees; `None` if it has not changed. `full_pa` is the mouth pressure of full breath, Pa.
+    pub fn blow(&mut self, hand: &BreathMapping, angle_deg: f64, full_pa: f64) -> Option<Breath14> {
         let angle_deg =
             if hand.feels { self.beyond_rest(hand, angle_deg) } else { self.unfelt(hand, angle_deg) };
-        let mut pressure_pa = hand.maps.pressure_pa(self.fingered, angle_deg);
-        let since = (self.clock + at as u64).saturating_sub(self.changed_at);
-        if let (Some(before), true) = (self.before, since < GLIDE) {
-            let before_pa = hand.maps.pressure_pa(Some(before), angle_deg);
-            pressure_pa = before_pa + (pressure_pa - before_pa) * since as f64 / GLIDE as f64;
+        if self.fingered != self.blown {
+            // Before the first note nothing sounded, and while no breath is sent none can be taken over.
+            if let (Some(before), Some(_)) = (self.blown, self.sent) {
+                let pressure_pa = hand.maps.pressure_pa(Some(before), self.carry.effective_deg(angle_deg));
+                self.carry = Carry::new(angle_deg, hand.maps.angle_deg(self.fingered, pressure_pa));
+            }
+            self.blown = self.fingered;
         }
+        let pressure_pa = hand.maps.pressure_pa(self.fingered, self.carry.effective_deg(angle_deg));
         let unit = pressure_pa / full_pa;
         let breath = Breath14((unit.clamp(0.0, 1.0) * f64::from(STEPS)).round() as u16);
         (self.sent.replace(breath) != Some(breath)).then_some(breath)
@@ -144,6 +137,7 @@ impl Blower {
 
     /// Call it when the knob is gone: returns breath 0 if breath was sent before.
     pub fn fall_silent(&mut self) -> Option<Breath14> {
+        self.carry = Carry::default();
         self.sent.take().filter(|&sent| sent != Breath14(0)).map(|_| Breath14(0))
     }
 }
@@ -198,8 +192,7 @@ impl<I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Iterator 
                 return None;
             }
             self.next = at + GRID as usize;
-            let blown =
-                (self.angle)(at).and_then(|angle| self.blower.blow(self.hand, at, angle, self.full_pa));
+            let blown = (self.angle)(at).and_then(|angle| self.blower.blow(self.hand, angle, self.full_pa));
             if let Some(breath) = blown {
                 (self.heard)(at, breath);
                 return Some(Timed { at, event: Event::Breath(breath.unit()) });
@@ -265,7 +258,7 @@ mod tests {
         let blown = |note: u8| {
             let mut blower = Blower::default();
             blower.heed(&note_on(0, note));
-            blower.blow(&HAND, 0, 200.0, full_pa).unwrap().unit()
+            blower.blow(&HAND, 200.0, full_pa).unwrap().unit()
         };
         // Sounding G4 needs less than sounding A5 (clarion): at one angle it is blown harder.
         assert!(
@@ -275,20 +268,85 @@ mod tests {
         assert!(blown(65) > blown(69), "{} {}", blown(65), blown(69));
     }
 
-    #[test]
-    fn one_notes_map_gives_way_to_the_next_without_a_jump() {
+    /// Written A4 and B4, across the break: easy and hard.
+    const SLUR: [u8; 2] = [67, 69];
+
+    fn hand(place: f64) -> BreathMapping {
+        let feels = InstrumentFeel::built_in().unwrap();
+        let design = FeelDesign { place, ..FeelDesign::default() };
+        let table = feels.table(&Settings::default(), &design, &NO_MOTOR).unwrap();
+        BreathMapping { maps: feels.maps(&table), ..*HAND }
+    }
+
+    /// A blower that blew the first note of [`SLUR`] at an angle and now blows the second, and the breath of the first.
+    fn slurred(hand: &BreathMapping, angle_deg: f64) -> (Blower, f64) {
         let mut blower = Blower::default();
-        blower.heed(&note_on(0, 65));
-        blower.advance(10_000);
-        let low = blower.blow(&HAND, 0, 200.0, 6_000.0).unwrap().0;
-        blower.heed(&note_on(0, 69));
-        let (mut last, mut largest) = (low, 0);
-        for at in (0..=GLIDE as usize).step_by(GRID as usize) {
-            let now = blower.blow(&HAND, at, 200.0, 6_000.0).map_or(last, |breath| breath.0);
-            (largest, last) = (now.abs_diff(last).max(largest), now);
+        blower.heed(&note_on(0, SLUR[0]));
+        let before = f64::from(blower.blow(hand, angle_deg, 6_000.0).unwrap().unit());
+        blower.heed(&note_on(0, SLUR[1]));
+        blower.blow(hand, angle_deg, 6_000.0);
+        (blower, before)
+    }
+
+    #[test]
+    fn a_still_hand_keeps_its_pressure_at_any_place() {
+        for place in [1.0, 3.0, 5.0] {
+            let hand = hand(place);
+            for angle_deg in [20.0, 130.0, 180.0, 300.0] {
+                let (mut blower, before) = slurred(&hand, angle_deg);
+                for n in 0..2_000 {
+                    let tremor_deg = 0.3 * f64::from(n).sin();
+                    let Some(now) = blower.blow(&hand, angle_deg + tremor_deg, 6_000.0) else { continue };
+                    let off = f64::from(now.unit()) - before;
+                    assert!(off.abs() < 0.01, "Place {place}, {angle_deg} degrees: {off}");
+                }
+                // There and back again it is the same pressure.
+                blower.heed(&Timed { at: 0, event: Event::NoteOff { note: SoundingNote(SLUR[1]) } });
+                let back = blower.blow(&hand, angle_deg, 6_000.0).map_or(before, |now| f64::from(now.unit()));
+                assert!((back - before).abs() < 0.01, "{back} {before}");
+            }
         }
-        let all = low.abs_diff(blower.blow(&HAND, 9_999, 200.0, 6_000.0).map_or(last, |breath| breath.0));
-        assert!(all > 500 && u32::from(largest) < u32::from(all) / 15, "{largest} of {all}");
+    }
+
+    #[test]
+    fn a_hand_that_has_moved_blows_the_notes_own_map() {
+        let (hand, full_pa) = (hand(3.0), 6_000.0);
+        let own = |angle_deg: f64| hand.maps.pressure_pa(Some(SoundingNote(SLUR[1])), angle_deg) / full_pa;
+        let (blower, before) = slurred(&hand, 150.0);
+        assert!(before - own(150.0) > 0.05, "the second note is the harder one: {before}");
+        let caught_deg = hand.maps.angle_deg(Some(SoundingNote(SLUR[1])), before * full_pa);
+        for (to_deg, step_deg) in [(caught_deg + 40.0, 0.5), (2.0, -0.5), (60.0, -40.0), (caught_deg, 90.0)] {
+            let (mut blower, mut angle_deg, mut last) = (blower.clone(), 150.0_f64, before);
+            while (angle_deg - to_deg).abs() > 1e-9 {
+                angle_deg += (to_deg - angle_deg).clamp(-f64::abs(step_deg), f64::abs(step_deg));
+                let now = blower.blow(&hand, angle_deg, full_pa).map_or(last, |now| f64::from(now.unit()));
+                assert!((now - last) * step_deg >= -1e-4, "turning {step_deg} at {angle_deg}: {last} {now}");
+                last = now;
+            }
+            assert!((last - own(to_deg)).abs() < 1e-3, "{to_deg}: {last} {}", own(to_deg));
+        }
+        // On the way to where the note has this pressure nothing changes.
+        let mut blower = blower;
+        let halfway_deg = 0.5 * (150.0 + caught_deg);
+        let halfway = blower.blow(&hand, halfway_deg, full_pa).map_or(before, |now| f64::from(now.unit()));
+        assert!((halfway - before).abs() < 1e-3, "{halfway} {before}");
+    }
+
+    #[test]
+    fn a_note_that_follows_no_breath_takes_nothing_over() {
+        let hand = hand(3.0);
+        let own = hand.maps.pressure_pa(Some(SoundingNote(SLUR[1])), 150.0) / 6_000.0;
+        let mut at_rest = Blower::default();
+        at_rest.heed(&note_on(0, SLUR[0]));
+        at_rest.blow(&hand, 0.0, 6_000.0);
+        at_rest.heed(&note_on(0, SLUR[1]));
+        at_rest.blow(&hand, 0.0, 6_000.0);
+        let (mut unplugged, _) = slurred(&hand, 150.0);
+        unplugged.fall_silent();
+        for mut blower in [at_rest, unplugged] {
+            let blown = f64::from(blower.blow(&hand, 150.0, 6_000.0).unwrap().unit());
+            assert!((blown - own).abs() < 1e-4, "{blown} {own}");
+        }
     }
 
     #[test]
@@ -297,13 +355,13 @@ mod tests {
         let mut sent = 0;
         for n in 0..1_000 {
             let tremor_deg = 0.9 * f64::from(n).sin();
-            sent += u32::from(blower.blow(&HAND, 0, tremor_deg, 6_000.0).is_some_and(|breath| breath.0 > 0));
+            sent += u32::from(blower.blow(&HAND, tremor_deg, 6_000.0).is_some_and(|breath| breath.0 > 0));
         }
         assert_eq!(sent, 0);
-        assert!(blower.blow(&HAND, 0, 3.0, 6_000.0).unwrap().0 > 0);
-        assert!(blower.blow(&HAND, 0, 0.8, 6_000.0).unwrap().0 > 0, "breath ends later than it begins");
-        assert_eq!(blower.blow(&HAND, 0, 0.2, 6_000.0), Some(Breath14(0)));
-        assert_eq!(blower.blow(&HAND, 0, f64::NAN, 6_000.0), None, "what is no angle is no breath");
+        assert!(blower.blow(&HAND, 3.0, 6_000.0).unwrap().0 > 0);
+        assert!(blower.blow(&HAND, 0.8, 6_000.0).unwrap().0 > 0, "breath ends later than it begins");
+        assert_eq!(blower.blow(&HAND, 0.2, 6_000.0), Some(Breath14(0)));
+        assert_eq!(blower.blow(&HAND, f64::NAN, 6_000.0), None, "what is no angle is no breath");
         assert_eq!(blower.fall_silent(), None);
     }
 
@@ -316,9 +374,9 @@ mod tests {
         };
         let mut blower = Blower::default();
         let travel = hand.maps.pressure_pa(None, 180.0);
-        let full = blower.blow(&hand, 0, 180.0, 6_000.0).unwrap();
+        let full = blower.blow(&hand, 180.0, 6_000.0).unwrap();
         assert!((f64::from(full.unit()) - travel / 6_000.0).abs() < 1e-3);
-        assert_eq!(blower.blow(&hand, 0, 500.0, 6_000.0), None, "full is full");
+        assert_eq!(blower.blow(&hand, 500.0, 6_000.0), None, "full is full");
     }
 
     #[test]

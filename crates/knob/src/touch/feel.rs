@@ -99,8 +99,18 @@ impl PitchMaps {
     /// Mouth pressure, Pa, with a note fingered (none: as on the reference note) and the knob turned so far from rest.
     /// Real-time safe.
     pub fn pressure_pa(&self, note: Option<SoundingNote>, angle_deg: f64) -> f64 {
+        self.map(note).map_or(0.0, |map| map.pressure_pa(angle_deg))
+    }
+
+    /// Angle from rest, degrees, at which a fingered note (none: the reference note) is blown with `pressure_pa`. Real-time
+    /// safe.
+    pub fn angle_deg(&self, note: Option<SoundingNote>, pressure_pa: f64) -> f64 {
+        self.map(note).map_or(0.0, |map| map.angle_deg(pressure_pa))
+    }
+
+    fn map(&self, note: Option<SoundingNote>) -> Option<AngleMap> {
         let own = note.and_then(|note| self.by_pitch.get(usize::from(note.0)).copied().flatten());
-        own.or(self.otherwise).map_or(0.0, |map| map.pressure_pa(angle_deg))
+        own.or(self.otherwise)
     }
 
     /// Whether any map is there.
