@@ -12,6 +12,8 @@ NUMBERS = (
 WORDS = ("side", "condition")
 # These may be empty: no note is fingered, no study runs, or the reed is unknown.
 MAY_BE_EMPTY = ("written_midi", "feel_id", "h", "k", "participant", "trial")
+# Columns that older logs, and logs without sound, do not have.
+OPTIONAL = ("gamma_sounding", "level_db", "f0_hz", "heard_us")
 SIDES = ("A", "B")
 CONDITIONS = ("coupled", "free")
 
@@ -26,8 +28,8 @@ class BadInput(Exception):
     """A file that cannot be used; the text says which file, where and why."""
 
 
-def read_table(path, needed):
-    """The needed columns of a CSV file, by name in lower case, and the line number of each row.
+def read_table(path, needed, optional=()):
+    """The columns of a CSV file, by name in lower case, and the line number of each row. Optional columns may be missing.
 
     Lines that begin with # are remarks. Raises BadInput.
     """
@@ -42,7 +44,7 @@ def read_table(path, needed):
                     missing = [name for name in needed if name not in header]
                     if missing:
                         raise BadInput(f"{path}: the first line has no column {', '.join(missing)}")
-                    twice = {name for name in needed if header.count(name) > 1}
+                    twice = {name for name in (*needed, *optional) if header.count(name) > 1}
                     if twice:
                         raise BadInput(f"{path}: the first line has {', '.join(sorted(twice))} twice")
                 elif len(row) < len(header):
@@ -61,7 +63,8 @@ def read_table(path, needed):
     if not rows:
         raise BadInput(f"{path}: has no rows")
     columns = list(zip(*rows))
-    return {name: columns[header.index(name)] for name in needed}, lines
+    present = (*needed, *(name for name in optional if name in header))
+    return {name: columns[header.index(name)] for name in present}, lines
 
 
 def numbers(path, name, cells, lines, may_be_empty):
@@ -96,8 +99,14 @@ class Piece:
     gamma: np.ndarray
     gamma_on: np.ndarray
     feel_id: np.ndarray
+    # What was heard: level, pitch, and when the latest onset was heard, on the clock of t_s; nan where not known.
+    level_db: np.ndarray
+    f0_hz: np.ndarray
+    heard_s: np.ndarray
     h: float
     k: float
+    # True if the log says where its notes begin to sound.
+    has_threshold: bool
     # False if the piece only continues after a gap.
     is_visit: bool
     # Number of the log, so that times of two logs are never subtracted.
@@ -106,8 +115,10 @@ class Piece:
 
 def read_log(path, log, onset):
     """The pieces of a log, in order of time. Raises BadInput."""
-    cells, lines = read_table(path, NUMBERS + WORDS)
+    cells, lines = read_table(path, NUMBERS + WORDS, OPTIONAL)
     data = {name: numbers(path, name, cells[name], lines, name in MAY_BE_EMPTY) for name in NUMBERS}
+    for name in OPTIONAL:
+        data[name] = numbers(path, name, cells[name], lines, True) if name in cells else np.full(len(lines), np.nan)
     words = {name: np.array([cell.strip() for cell in cells[name]]) for name in WORDS}
     back = np.flatnonzero(np.diff(data["t_us"]) < 0)
     if back.size:
@@ -125,7 +136,7 @@ def read_log(path, log, onset):
     if bad.size:
         raise BadInput(f"{path}: line {lines[bad[0]]}: trial is empty, but a participant is named")
 
-    t_s = 1e-6 * (data["t_us"] - data["t_us"][0])
+    t_s, heard_s = (1e-6 * (data[name] - data["t_us"][0]) for name in ("t_us", "heard_us"))
     key = [(p, n, s, c) for p, n, s, c in zip(data["participant"], data["trial"], words["side"], words["condition"])]
     changes = np.array([now != before for before, now in zip(key, key[1:])], dtype=bool)
     cuts = np.flatnonzero(changes | (np.diff(t_s) > GAP_S)) + 1
@@ -136,13 +147,16 @@ def read_log(path, log, onset):
         rows = slice(begin, end)
         participant, trial, side, condition = key[begin]
         h, k, written = data["h"][rows], data["k"][rows], data["written_midi"][rows]
+        sounding = data["gamma_sounding"][rows]
         pieces.append(
             Piece(
                 int(participant), int(trial), str(side), str(condition), t_s[rows], data["angle_deg"][rows],
-                data["torque_mnm"][rows], written, data["gamma"][rows], onset.gamma(written, h, k),
-                data["feel_id"][rows],
+                data["torque_mnm"][rows], written, data["gamma"][rows],
+                np.where(np.isfinite(sounding), sounding, onset.gamma(written, h, k)),
+                data["feel_id"][rows], data["level_db"][rows], data["f0_hz"][rows], heard_s[rows],
                 # Side and parameters do not change at exactly the same time, so the median of the rows counts.
-                float(np.median(h)), float(np.median(k)), begin == 0 or bool(changes[begin - 1]), log,
+                float(np.median(h)), float(np.median(k)), bool(np.isfinite(sounding).any()),
+                begin == 0 or bool(changes[begin - 1]), log,
             )
         )
     return pieces

@@ -8,19 +8,10 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from study_log import CONDITIONS
+from study_questions import QUESTIONS
 
 # Okabe and Ito's colours, distinct for all common kinds of colour vision; shapes and dashes distinguish them in grey.
 STYLE = {"coupled": {"color": "#0072B2", "marker": "o"}, "free": {"color": "#D55E00", "marker": "s"}}
-
-# The measures compared: column of the summary, unit, label for plots.
-METRICS = {
-    "gamma_rms": ("1", "unsteadiness of gamma, rms"),
-    "onset_s": ("s", "note to onset, s"),
-    "onset_overshoot": ("1", "overshoot of gamma at onset"),
-    "torque_mean_mnm": ("mNm", "mean of |torque|, mNm"),
-    "power_mw": ("mW", "work against the motor, mW"),
-    "time_s": ("s", "time spent, s"),
-}
 
 
 def plot_timeline(path, title, pieces):
@@ -110,7 +101,7 @@ def plot_paired(path, pairs):
     """The two sides of each trial, joined by a line; one panel for each metric, one place for each opening. Bars are means."""
     openings = sorted({h for trials in pairs.values() for h, _ in trials if math.isfinite(h)})
     place = {h: n for n, h in enumerate(openings)}
-    names = ["preference", *METRICS]
+    names = ["preference", *QUESTIONS]
     figure, axes = plt.subplots(2, 4, figsize=(15, 7.5), layout="constrained")
     axes.flat[-1].set_visible(False)
     for axis, name in zip(axes.flat, names):
@@ -147,7 +138,7 @@ def plot_paired(path, pairs):
             axis.axhline(0.5, color="black", lw=0.9, ls=":")
             axis.set_ylabel("share of trials that ended there")
         else:
-            axis.set_ylabel(METRICS[name][1])
+            axis.set_ylabel(QUESTIONS[name][1])
     handles = [plt.Line2D([], [], ls="", **STYLE[c], label=c) for c in CONDITIONS]
     handles += [plt.Line2D([], [], color="black", lw=2, label="mean")]
     handles += [plt.Line2D([], [], color="0.6", label="one trial")]

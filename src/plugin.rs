@@ -279,7 +279,10 @@ impl Chalumeau {
         #[cfg(not(feature = "devices"))]
         let blown = std::iter::empty();
         answer(context, self.inputs.ended(), blown);
-
+        #[cfg(feature = "devices")]
+        if let Some((_, audio)) = &mut self.knob {
+            audio.send_sound(instrument.rate_hz(), out);
+        }
         if let Some((_, window)) = &mut self.window {
             window.send(instrument, self.inputs.breath_sources(), out);
         }

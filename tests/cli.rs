@@ -448,9 +448,11 @@ fn a_take_blows_and_a_damaged_one_is_refused_by_line() {
     fs::write(d.path().join("take.csv"), "t_us,angle_deg\n0,0\n100000,180\n900000,180\n").unwrap();
     let render = "render --written C4 --seconds 0.8 --rate 44100";
     succeeds(d.path(), &format!("{render} --replay take.csv --out a.wav"));
-    succeeds(d.path(), &format!("{render} --replay take.csv --contrast 5 --out b.wav"));
+    succeeds(d.path(), &format!("{render} --replay take.csv --place 5 --out b.wav"));
+    succeeds(d.path(), &format!("{render} --replay take.csv --contrast 5 --out c.wav"));
     let sound = |name: &str| fs::read(d.path().join(name)).unwrap();
-    assert_ne!(sound("a.wav"), sound("b.wav"), "contrast bends the angle's pressure");
+    assert_ne!(sound("a.wav"), sound("b.wav"), "Place bends the angle's pressure");
+    assert_eq!(sound("a.wav"), sound("c.wav"), "Contrast does not");
     fs::write(d.path().join("bad.csv"), "t_us,angle_deg\n0,0\n5,far\n").unwrap();
     refused(&d, &format!("{render} --replay bad.csv --out x.wav"), &["bad.csv", "line 3", "`far`"]);
     refused(&d, &format!("{render} --replay none.csv --out x.wav"), &["none.csv"]);

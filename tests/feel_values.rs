@@ -7,7 +7,7 @@ use chalumeau_core::bore::instrument_file::InstrumentFile;
 use std::collections::BTreeMap;
 use std::process::Command;
 
-const COLUMNS: [&str; 10] = [
+const COLUMNS: [&str; 11] = [
     "written_midi",
     "gamma_on",
     "gamma_off",
@@ -18,8 +18,9 @@ const COLUMNS: [&str; 10] = [
     "scale_mnm",
     "h",
     "k",
+    "gamma_sounding",
 ];
-/// The reference note, which Contrast does not change: C5.
+/// The reference note, which Contrast and Place do not change: C5.
 const REFERENCE_NOTE: u8 = 72;
 
 /// Largest deviation from the reference table, as docs/measured.md has it.
@@ -92,7 +93,7 @@ fn physical_feel_is_the_reference_table_for_three_embouchures_under_both_laws() 
 }
 
 #[test]
-fn physical_order_is_that_of_the_pressures_and_contrast_widens_it() {
+fn physical_order_is_that_of_the_pressures_and_contrast_and_place_widen_it() {
     let expected = reference::by_written("thresholds_tuned.csv", "gamma_th_zeta0.3");
     let physical = over_reference(&haptic("--contrast 1"), "a_on_deg");
     for (a, hard) in &expected {
@@ -103,13 +104,37 @@ fn physical_order_is_that_of_the_pressures_and_contrast_widens_it() {
             }
         }
     }
-    for contrast in [3, 5] {
-        for column in ["a_on_deg", "scale_mnm"] {
-            let wider = over_reference(&haptic(&format!("--contrast {contrast}")), column);
+    // Contrast is the exponent of the torque, Place that of the angle.
+    for (contrast, place) in [(3, 1), (5, 1), (1, 3), (3, 5)] {
+        let notes = haptic(&format!("--contrast {contrast} --place {place}"));
+        for (column, exponent) in [("a_on_deg", place), ("scale_mnm", contrast)] {
+            let wider = over_reference(&notes, column);
             for (written, ratio) in &physical {
-                assert!((wider[written] / ratio.powi(contrast) - 1.0).abs() < 1e-3, "{written} {column}");
+                assert!((wider[written] / ratio.powi(exponent) - 1.0).abs() < 1e-3, "{written} {column}");
             }
         }
+    }
+}
+
+/// With equal travel, every note speaks and closes at the angle that the reference reed has, whatever reed is played; its
+/// pressures are those of the reed.
+#[test]
+fn equal_travel_is_that_of_the_reference_reed() {
+    let standard = haptic("");
+    for reed in ["--H 2 --k 0.3849", "--H 2", "--H 3.3 --k 0.3849", "--H 3.3"] {
+        let (own, equal) =
+            (haptic(&format!("{reed} --torque 30")), haptic(&format!("{reed} --torque 30 --equal-travel")));
+        let mut farthest = 0.0_f64;
+        for (written, note) in &equal {
+            for column in ["a_on_deg", "a_close_deg"] {
+                assert!((note[column] / standard[written][column] - 1.0).abs() < 1e-4, "{reed} {written} {column}");
+            }
+            for column in ["gamma_on", "p_req_pa", "gamma_sounding", "h", "k"] {
+                assert_eq!(note[column], own[written][column], "{reed} {written} {column}");
+            }
+            farthest = farthest.max((own[written]["a_close_deg"] / note["a_close_deg"]).ln().abs());
+        }
+        assert!(farthest > 0.2, "{reed}: without it closure lies elsewhere");
     }
 }
 

@@ -491,7 +491,7 @@ fn breath_and_feel_are_figures_of_one_instrument() {
     for (law, name) in [(TorqueLaw::Flow, "flow"), (TorqueLaw::Pressure, "pressure")] {
         let (mut all, mut on_deg) = (Vec::new(), Vec::new());
         for contrast in [1.0, 5.0] {
-            let design = FeelDesign { law, contrast, ..FeelDesign::default() };
+            let design = FeelDesign { law, contrast, place: contrast, ..FeelDesign::default() };
             let table = FeelTable::new(&bore, &design, &reed, &TorqueLimits::default()).unwrap();
             let notes = table.notes().iter().step_by(20).map(|note| {
                 let at = |deg: f64| (deg, torque_law::torque_mnm(&note.feel, ReedTables::reference(), deg));

@@ -12,7 +12,7 @@ use std::sync::LazyLock;
 
 use chalumeau_core::haptics::torque_law;
 use chalumeau_core::haptics::{
-    FeelDesign, FeelRefused, FeelTable, NoteOrder, NoteRequirement, PlayedReed, RequirementSolver,
+    FeelDesign, FeelRefused, FeelTable, NoteFeel, NoteOrder, NoteRequirement, PlayedReed, RequirementSolver,
     TorqueLimits,
 };
 use chalumeau_core::instrument::feel_inputs::{played_reed, requirements};
@@ -28,8 +28,9 @@ use parallel::each;
 static MODEL: LazyLock<Model> = LazyLock::new(|| Model::built_in(48_000.0).unwrap());
 static BORE: LazyLock<RequirementSolver> = LazyLock::new(|| requirements(&MODEL));
 
-fn design(law: TorqueLaw, contrast: f64) -> FeelDesign {
-    FeelDesign { law, contrast, ..FeelDesign::default() }
+/// The same exaggeration of torques and of places.
+fn design(law: TorqueLaw, exponent: f64) -> FeelDesign {
+    FeelDesign { law, contrast: exponent, place: exponent, ..FeelDesign::default() }
 }
 
 fn table(design: &FeelDesign, settings: &Settings) -> Result<FeelTable, FeelRefused> {
@@ -100,7 +101,8 @@ fn landmarks_torque_and_pressure_agree_at_any_contrast() {
                     // The torque is lower a twentieth before and after the threshold than at it.
                     let torque = |share: f64| torque_law::torque_mnm(&note.feel, tables, share * a.a_on_deg);
                     assert!(torque(1.0) > torque(0.95) && torque(1.0) > torque(1.05));
-                    assert!((torque(1.0) / f64::from(note.feel.scale_mnm) - 1.0).abs() < 2e-3);
+                    let law_mnm = torque(1.0) - 0.1 * f64::from(note.feel.detent);
+                    assert!((law_mnm / f64::from(note.feel.scale_mnm) - 1.0).abs() < 2e-3);
                 }
                 note.feel.check().unwrap();
             }
@@ -108,23 +110,101 @@ fn landmarks_torque_and_pressure_agree_at_any_contrast() {
     }
 }
 
+fn spread_of(table: &FeelTable, value: impl Fn(&NoteFeel) -> f64) -> f64 {
+    let all = || table.notes().iter().map(&value);
+    all().fold(0.0, f64::max) / all().fold(f64::INFINITY, f64::min)
+}
+
 fn spread(table: &FeelTable) -> f64 {
-    let all = table.notes().iter().map(|note| note.landmarks.a_on_deg);
-    all.clone().fold(0.0, f64::max) / all.fold(f64::INFINITY, f64::min)
+    spread_of(table, |note| note.landmarks.a_on_deg)
 }
 
 #[test]
-fn contrast_is_a_power_of_the_physical_spread_about_the_reference() {
-    let at = |contrast: f64| table(&design(TorqueLaw::Flow, contrast), &Settings::default()).unwrap();
-    let physical = spread(&at(1.0));
-    println!(
-        "spread of thresholds: physical {physical:.3}, 3 {:.3}, 5 {:.3}",
-        spread(&at(3.0)),
-        spread(&at(5.0))
-    );
-    for contrast in [2.0, 3.0, 5.0] {
-        assert!((spread(&at(contrast)) / physical.powf(contrast) - 1.0).abs() < 1e-9);
-        assert!((at(contrast).reference().landmarks.a_on_deg - 120.0).abs() < 1e-4);
+fn contrast_and_place_are_powers_of_the_physical_spread_about_the_reference() {
+    let at = |contrast: f64, place: f64| {
+        let design = FeelDesign { contrast, place, ..FeelDesign::default() };
+        table(&design, &Settings::default()).unwrap()
+    };
+    let torque = |note: &NoteFeel| f64::from(note.feel.scale_mnm);
+    let physical = spread(&at(1.0, 1.0));
+    println!("spread: physical {physical:.3}, 3 {:.3}, 5 {:.3}", physical.powi(3), physical.powi(5));
+    for (contrast, place) in [(1.0, 2.0), (2.0, 1.0), (3.0, 1.0), (3.0, 5.0), (5.0, 3.0)] {
+        let table = at(contrast, place);
+        assert!((spread(&table) / physical.powf(place) - 1.0).abs() < 1e-9, "{contrast} {place}");
+        assert!((spread_of(&table, torque) / physical.powf(contrast) - 1.0).abs() < 1e-6, "{contrast} {place}");
+        let reference = table.reference();
+        assert!((reference.landmarks.a_on_deg - 120.0).abs() < 1e-4);
+        assert!((torque(reference) / FeelDesign::default().strength_mnm - 1.0).abs() < 1e-6);
+    }
+    // Contrast changes no pressure.
+    for (a, b) in at(1.0, 1.0).notes().iter().zip(at(5.0, 1.0).notes()) {
+        assert_eq!((a.map, a.landmarks), (b.map, b.landmarks), "{}", a.written);
+    }
+}
+
+/// Smallest difference between torques that hands tell apart, relative (Jandura and Srinivasan 1994).
+const TORQUE_JND: f64 = 0.127;
+
+/// Without its mark the flow law has no place that a hand could find: its torque stays within one just noticeable
+/// difference of the peak over more than a third of the travel. The mark is that large, for every note up to Contrast 3 and
+/// for all up to G6 at 5, and the torque falls off on both sides of it.
+#[test]
+fn a_hand_can_find_the_threshold_of_the_flow_law_by_its_mark() {
+    let tables = ReedTables::reference();
+    let about = |note: &NoteFeel| {
+        let torque = |deg: f64| torque_law::torque_mnm(&note.feel, tables, deg);
+        let top = torque(note.landmarks.a_on_deg);
+        let within: Vec<f64> = (0..=4_000)
+            .map(|step| 1e-3 * f64::from(step) * note.landmarks.a_on_deg)
+            .filter(|&deg| torque(deg) >= top / (1.0 + TORQUE_JND))
+            .collect();
+        (within[0], within[within.len() - 1])
+    };
+    let bare = FeelDesign { detent_mnm: Some(0.0), ..design(TorqueLaw::Flow, 1.0) };
+    let (from_deg, to_deg) = about(table(&bare, &Settings::default()).unwrap().reference());
+    println!("reference note without a mark: within one JND of the peak from {from_deg:.0} to {to_deg:.0} degrees");
+    assert!(to_deg - from_deg > 120.0, "{from_deg} {to_deg}");
+    for contrast in [1.0, 3.0, 5.0] {
+        let table = table(&design(TorqueLaw::Flow, contrast), &Settings::default()).unwrap();
+        let (mut least, mut widest) = (f64::INFINITY, 0.0_f64);
+        for note in table.notes().iter().filter(|note| contrast < 5.0 || note.written.0 <= 91) {
+            let share = 0.1 * f64::from(note.feel.detent) / f64::from(note.feel.scale_mnm);
+            assert!(share >= TORQUE_JND, "Contrast {contrast} {}: {share}", note.written);
+            let (from_deg, to_deg) = about(note);
+            (least, widest) = (least.min(share), widest.max(to_deg - from_deg));
+            assert!(torque_law::extremes(&note.feel).push_nm_per_rad < 0.75 * TorqueLimits::default().push_nm_per_rad);
+        }
+        println!("Contrast {contrast}: mark at least {:.1} %, found within {widest:.0} degrees", 100.0 * least);
+        assert!(widest < 12.0, "{widest}");
+    }
+}
+
+/// With equal travel, notes lie where the reference reed puts them, under both laws; pressures and law are the reed's.
+#[test]
+fn equal_travel_moves_the_map_and_not_the_knob() {
+    for law in [TorqueLaw::Flow, TorqueLaw::Pressure] {
+        let design = FeelDesign { law, equal_travel: true, strength_mnm: 30.0, ..FeelDesign::default() };
+        let standard = FeelTable::new(
+            &BORE,
+            &FeelDesign { equal_travel: false, ..design },
+            &PlayedReed::quasi_static(0.3),
+            &TorqueLimits::default(),
+        )
+        .unwrap();
+        for (h, k) in [(2.0, 0.843_75), (2.0, 0.384_9), (3.3, 0.187_8), (3.3, 0.384_9)] {
+            let settings = Settings { reed_h: h, reed_k: k, coupled: false, ..Settings::default() };
+            let table = table(&design, &settings).unwrap();
+            for (note, standard) in table.notes().iter().zip(standard.notes()) {
+                let (a, required) = (note.landmarks, note.requirement.unwrap());
+                assert!((a.a_on_deg / standard.landmarks.a_on_deg - 1.0).abs() < 1e-9, "{law:?} H {h}");
+                assert!((a.a_close_deg / standard.landmarks.a_close_deg - 1.0).abs() < 1e-9, "{law:?} H {h}");
+                assert_eq!(note.feel.scale_mnm, standard.feel.scale_mnm);
+                let gamma = |deg: f64| note.map.pressure_pa(deg) / settings.closing_pa();
+                assert!((gamma(a.a_on_deg) - required.gamma_sounding).abs() < 1e-6);
+                assert!((gamma(a.a_close_deg) - 1.0).abs() < 1e-6);
+                assert!((torque_law::closure_deg(&note.feel) - a.a_close_deg).abs() < 1e-3);
+            }
+        }
     }
 }
 
@@ -427,13 +507,15 @@ fn requests_a_knob_cannot_take_are_refused_with_numbers() {
     );
     says(FeelDesign { contrast: 6.0, ..default }, standard, &["Contrast must lie in 1..5, got 6"]);
     says(FeelDesign { contrast: f64::NAN, ..default }, standard, &["Contrast", "NaN"]);
+    says(FeelDesign { place: 0.5, ..default }, standard, &["Place must lie in 1..5, got 0.5"]);
+    says(FeelDesign { detent_mnm: Some(15.0), ..default }, standard, &["push the hand", "lower the mark"]);
     says(FeelDesign { wall_mnm_per_deg: 60.0, ..default }, standard, &["N m/rad", "soften the wall"]);
     says(FeelDesign { reference: Some(WrittenNote(20)), ..default }, standard, &["does not sound"]);
     says(default, Settings { reed_a: 0.1, ..standard }, &["too weak"]);
     says(
-        FeelDesign { law: TorqueLaw::Pressure, contrast: 5.0, ..default },
+        FeelDesign { law: TorqueLaw::Pressure, place: 5.0, ..default },
         Settings { zeta: 0.1, ..standard },
-        &["too near closure", "lower Contrast"],
+        &["too near closure", "lower Place"],
     );
     let slip = Settings { reed_h: 3.674_234_6, ..standard };
     says(default, slip, &["sqrt(27/2)", "2.598"]);
@@ -494,6 +576,8 @@ fn every_allowed_setting_gives_a_feel_or_a_reason() {
         let design = FeelDesign {
             law: [TorqueLaw::Free, TorqueLaw::Flow, TorqueLaw::Pressure][run % 3],
             contrast: random(1.0, 5.0),
+            place: random(1.0, 5.0),
+            equal_travel: run % 5 == 0,
             strength_mnm: random(0.0, 150.0),
             travel_deg: random(120.0, 1_080.0),
             wall_share: random(0.5, 4.0),
@@ -658,12 +742,12 @@ mod command {
     }
 
     const TABLE: &str =
-        "written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k";
+        "written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding";
 
     #[test]
     fn table_of_all_notes_and_curve_of_one() {
         let all = rows("haptic --all --zeta 0.3 --contrast 1 --csv -", TABLE);
-        assert_eq!((all.len(), all[0].len(), all[0][0]), (46, 10, 52.0));
+        assert_eq!((all.len(), all[0].len(), all[0][0]), (46, 11, 52.0));
         for row in &all {
             assert!((row[3] / (6_000.0 * row[1]) - 1.0).abs() < 1e-5);
             assert!(row[4] < row[6] && row[6] <= row[5] && (row[6] / row[4] - 3.0).abs() < 1e-3);
@@ -675,7 +759,8 @@ mod command {
         assert!(curve.iter().any(|row| row[0] == 0.0 && row[1] == 0.0));
         let most = curve.iter().filter(|row| row[0] < 300.0).max_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
         let table = rows("haptic --written 52", TABLE);
-        assert!((most[0] - table[0][4]).abs() < 1.0 && (most[1] / table[0][7] - 1.0).abs() < 2e-3);
+        // The peak of the law with its mark.
+        assert!((most[0] - table[0][4]).abs() < 1.0 && (most[1] / (table[0][7] + 9.0) - 1.0).abs() < 2e-3);
     }
 
     #[test]

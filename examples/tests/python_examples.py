@@ -9,6 +9,7 @@ import sys
 
 import python_bridge
 import python_kit
+import python_null_study
 import python_study
 
 
@@ -19,7 +20,7 @@ def help_tells_what_there_is():
         assert told.returncode == 0 and all(word in told.stdout for word in words), told.stdout
 
 
-TESTS = [help_tells_what_there_is, *python_study.TESTS, *python_kit.TESTS, *python_bridge.TESTS]
+TESTS = [help_tells_what_there_is, *python_study.TESTS, *python_kit.TESTS, *python_bridge.TESTS, *python_null_study.TESTS]
 
 os.environ.pop("DISPLAY", None)
 chosen = [test for test in TESTS if len(sys.argv) < 2 or any(word in test.__name__ for word in sys.argv[1:])]

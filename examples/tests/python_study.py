@@ -14,11 +14,14 @@ import numpy as np
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 ANALYSE = ROOT / "examples/analyse_study.py"
 sys.path.insert(0, str(ANALYSE.parent))
-import analyse_study  # noqa: E402
 import study_log  # noqa: E402
+import study_questions  # noqa: E402
 
 SCRATCH = pathlib.Path(tempfile.mkdtemp())
-HEADER = "t_us,angle_deg,velocity_deg_s,torque_mnm,written_midi,gamma,feel_id,h,k,participant,trial,side,condition"
+HEADER = (
+    "t_us,angle_deg,velocity_deg_s,torque_mnm,written_midi,gamma,feel_id,h,k,participant,trial,side,condition,"
+    "gamma_sounding,level_db,f0_hz,heard_us"
+)
 
 RATE_HZ = 200
 # What the hand of the made-up logs does on either condition: slope of gamma after a note, 1/s; wobble of gamma, peak
@@ -29,6 +32,8 @@ CONDITIONS = ("coupled", "free")
 WINDOWS = ({"coupled": 2 * 6 + 4, "free": 2 * 5}, {"coupled": 10, "free": 9})
 HOLD = 0.5
 NOTE_AFTER_S = 0.2
+# What is heard of it: the onset so long after gamma's, level and pitch with a wobble, peak, in dB and cents.
+HEARD_AFTER_S, LEVEL_DB, PITCH_CENTS = 0.03, 3.0, 5.0
 
 
 def visit(t_s, seconds, participant, trial, side, condition, h, hands):
@@ -44,12 +49,16 @@ def visit(t_s, seconds, participant, trial, side, condition, h, hands):
         if gamma == HOLD:
             gamma += wobble * math.sin(2 * math.pi * 10 * t)
         note = 60 if t >= NOTE_AFTER_S else ""
+        heard_s = NOTE_AFTER_S + 1 / 3 / slope + HEARD_AFTER_S
+        heard = round(1e6 * (t_s + heard_s)) if t >= heard_s else ""
+        sway = math.sin(2 * math.pi * 10 * t)
+        sound = f"{-20 + LEVEL_DB * sway:.3f},{220 * 2 ** (PITCH_CENTS * sway / 1200):.4f}"
         phase = (t + 0.25 / RATE_HZ) % 1.0
         angle = 180 * min(phase, 1 - phase)
         size = -torque if phase < 0.5 else -torque / 2
         rows.append(
             f"{round(1e6 * (t_s + t))},{angle:.3f},0.0,{size:.1f},{note},{gamma:.6f},{feel_id},{h:.5f},{k:.5f},"
-            f"{participant},{trial},{side},{condition}"
+            f"{participant},{trial},{side},{condition},,{sound},{heard}"
         )
     return rows
 
@@ -103,9 +112,13 @@ def figures_are_those_the_log_was_made_with():
         near(row["gamma_rms"], wobble / math.sqrt(2), 0.03, what)
         near(row["onset_s"], 1 / 3 / slope, 0.01, what)
         peak = HOLD + wobble if slope == 1.0 else 1 / 3 + 0.2 * slope
-        near(row["onset_overshoot"], peak - 1 / 3, 0.06, what)
+        near(row["gamma_overshoot"], peak - 1 / 3, 0.06, what)
+        near(row["heard_s"], 1 / 3 / slope + HEARD_AFTER_S, 0.01, what)
+        near(row["level_rms_db"], LEVEL_DB / math.sqrt(2), 0.03, what)
+        near(row["pitch_rms_cents"], PITCH_CENTS / math.sqrt(2), 0.03, what)
+        near(float(row["pressure_rms_pa"]), 6000 * float(row["h"]) * float(row["k"]) * float(row["gamma_rms"]), 1e-3, what)
         # Held and settled: a stay of 4 s has 6 or 5 whole windows, one of 3 s 4.
-        near(row["gamma_windows"], WINDOWS[row["trial"] == "8"][row["condition"]], 0, what)
+        near(row["held_windows"], WINDOWS[row["trial"] == "8"][row["condition"]], 0, what)
         near(row["torque_mean_mnm"], 0.75 * torque, 0.02, what)
         near(row["torque_peak_mnm"], torque, 0, what)
         # Up against all of it, back down with half of it given back: pi/2 rad each way, once a second.
@@ -130,12 +143,17 @@ def comparison_pairs_the_sides_of_a_trial():
     # 0.01 / sqrt(2) times 1.05, 1.1 .. 1.4: the mean is 1.225 and the spread 0.05 sqrt(6) of that.
     near(unsteady["difference"], -0.01 / math.sqrt(2) * 1.225, 0.03, "difference")
     near(unsteady["dz"], -1.225 / 0.05 / math.sqrt(6), 0.05, "effect size")
-    near(unsteady["p"], 2 / 256, 1e-4, "p of 8 in 8")
-    assert unsteady["n"] == "8" and unsteady["test"] == "exact", unsteady
+    assert (unsteady["n"], unsteady["about"], unsteady["p"]) == ("8", "reed and hand", ""), unsteady
+    onset = rows["participant 7", "all", "onset_s"]
+    near(onset["p"], 2 / 256, 1e-4, "p of 8 in 8")
+    near(onset["p_holm"], study_questions.FAMILY * 2 / 256, 1e-4, "for all questions asked")
+    assert (onset["n"], onset["about"], onset["test"]) == ("8", "player", "exact"), onset
     assert rows["participant 7", "3.3", "torque_mean_mnm"]["n"] == "2"
     assert {h for _, h, _ in rows} == {"all", "below", "above", "2", "2.3", "2.9", "3.3"}
     assert [rows["participant 7", side, "onset_s"]["n"] for side in ("below", "above")] == ["4", "4"]
-    assert all(float(r["p_holm"]) >= float(r["p"]) for r in rows.values())
+    asked = [row for row in rows.values() if row["about"] == "player"]
+    assert all(float(row["p_holm"]) >= float(row["p"]) for row in asked)
+    assert {row["metric"] for row in asked} <= {"preference", *study_questions.QUESTIONS}
 
 
 def plots_are_drawn():
@@ -155,17 +173,52 @@ def plots_are_drawn():
 def persons_are_compared_and_not_their_trials():
     logs = []
     for who in range(1, 7):
-        # Five persons are steadier on coupled, one on free.
+        # Five persons begin sooner on coupled, one on free.
         hands = HANDS if who < 6 else {"coupled": HANDS["free"], "free": HANDS["coupled"]}
         logs.append(log(f"p{who}.csv", who, eight_trials()[:4], hands))
     out = SCRATCH / "persons"
     told = analyse(*logs, "--out", out, "--no-timelines")
     assert told.returncode == 0, told.stderr
     rows = [r for r in table(out / "comparison.csv") if r["scope"] == "participants" and r["opening_h"] == "all"]
-    unsteady = next(r for r in rows if r["metric"] == "gamma_rms")
-    assert unsteady["n"] == "6", unsteady
-    near(unsteady["p"], 2 * 7 / 64, 1e-4, "p of 5 in 6 with equal differences")
+    onset = next(r for r in rows if r["metric"] == "onset_s")
+    assert onset["n"] == "6", onset
+    near(onset["p"], 2 * 7 / 64, 1e-4, "p of 5 in 6 with equal differences")
     assert not list(out.glob("timeline*")) and "n counts participants" in told.stdout
+    assert "9 are the fewest, and 20 are advised" in told.stdout, told.stdout
+
+
+def the_hand_is_measured_in_degrees_and_seconds():
+    """Three notes on each side: from 60 degrees at known speeds to 150, 8 degrees beyond and back, with a wobble."""
+    rows, t_s = [HEADER], 0.0
+    for side in "AB":
+        condition = CONDITIONS["AB".index(side)]
+        for written, speed in ((60, 150.0), (62, 200.0), (64, 250.0)):
+            for n in range(2 * RATE_HZ):
+                t = n / RATE_HZ
+                turned = speed * max(0.0, t - 0.3)
+                angle = 60 + min(turned, 90.0)
+                if turned >= 90.0:
+                    angle += 8 * math.exp(-(t - 0.3 - 90.0 / speed) / 0.05) + 0.4 * math.sin(2 * math.pi * 10 * t)
+                # The reeds differ in what an angle blows and in where the note begins, at 129.6 degrees on both.
+                gamma_on = (0.36, 0.4)["AB".index(side)]
+                gamma = gamma_on * angle / 129.6
+                note = written if t >= 0.1 else ""
+                rows.append(
+                    f"{round(1e6 * (t_s + t))},{angle:.4f},0,-40,{note},{gamma:.6f},1,2.0,0.4,1,1,{side},{condition},"
+                    f"{gamma_on},,,"
+                )
+            t_s += 2.0
+    path = SCRATCH / "hand.csv"
+    path.write_text("\n".join(rows))
+    told = analyse(path, "--out", SCRATCH / "hand", "--no-timelines")
+    assert told.returncode == 0 and "1/3" not in told.stdout, told.stdout + told.stderr
+    onsets = [0.2 + 69.6 / speed for speed in (150.0, 200.0, 250.0)]
+    for row in table(SCRATCH / "hand/summary.csv"):
+        near(row["onset_s"], onsets[1], 0.01, "onset")
+        near(row["onset_spread_s"], float(np.std(onsets, ddof=1)), 0.02, "spread of onsets")
+        near(row["overshoot_deg"], 8.0, 0.06, "overshoot")
+        near(row["angle_rms_deg"], 0.4 / math.sqrt(2), 0.05, "unsteadiness")
+        assert (row["onsets"], row["silent_share"], row["heard_s"]) == ("3", "0", ""), row
 
 
 def a_gap_and_a_glance_count_for_nothing():
@@ -174,7 +227,7 @@ def a_gap_and_a_glance_count_for_nothing():
     at = 2 + 2 * RATE_HZ
     # A second is missing in trial 1, and rows outside the study stand in front.
     kept = [line for n, line in enumerate(lines) if not at <= n < at + RATE_HZ]
-    kept[2:2] = ["4900000,0.00,0.0,0,,0.00000,1,2.59808,0.38490,,,,"] * 3
+    kept[2:2] = ["4900000,0.00,0.0,0,,0.00000,1,2.59808,0.38490,,,,,,,,"] * 3
     path = SCRATCH / "gap.csv"
     path.write_text("\n".join(kept))
     out = SCRATCH / "gap"
@@ -218,7 +271,7 @@ def notes_that_never_speak_are_counted():
         note = 60 + part % 3 if t % 0.5 > 0.1 else ""
         gamma = (0.2 if part % 2 else 0.45) * (t % 0.5 > 0.2)
         condition = "coupled" if side == "A" else "free"
-        rows.append(f"{round(1e6 * t)},0,0,0,{note},{gamma},1,2.0,0.4,1,1,{side},{condition}")
+        rows.append(f"{round(1e6 * t)},0,0,0,{note},{gamma},1,2.0,0.4,1,1,{side},{condition},,,,")
     path = SCRATCH / "silent.csv"
     path.write_text("\n".join(rows))
     told = analyse(path, "--out", SCRATCH / "silent", "--no-timelines")
@@ -226,6 +279,7 @@ def notes_that_never_speak_are_counted():
     # The last note of each side is cut off by the switch or the end: it might have spoken yet.
     for row in table(SCRATCH / "silent/summary.csv"):
         assert (row["onsets"], row["silent_notes"]) == ("4", "3"), row
+        near(row["silent_share"], 3 / 7, 1e-4, "share")
 
 
 def thresholds_follow_the_reed():
@@ -236,14 +290,14 @@ def thresholds_follow_the_reed():
         + "60,0.364955,1.2483,2189.73,112.2803,420.4819,336.8408,18.7134,2.598076,0.3849002\n"
         + "97,nan,nan,nan,112.2803,420.4819,336.8408,18.7134,2.598076,0.3849002\n"
     )
-    onset = analyse_study.Onset(path)
+    onset = study_log.Onset(path)
     # What `chalumeau haptic --written 60 --H H --k k` itself says.
     for h, k, wanted in ((3.3, 0.3849, 0.361248), (2.0, 0.3849, 0.369603), (2.0, 0.84375, 0.388727)):
         near(onset.gamma(np.array([60.0]), np.array([h]), np.array([k]))[0], wanted, 0.002, f"H {h} k {k}")
     unknown = onset.gamma(np.array([np.nan, 97.0, 60.0]), np.full(3, np.nan), np.full(3, np.nan))
     assert np.isnan(unknown[:2]).all() and abs(unknown[2] - 0.364955) < 1e-5, unknown
     out = SCRATCH / "thresholds"
-    plan = [(1, analyse_study.H_REFERENCE, "coupled", [("A", 4), ("B", 4)])]
+    plan = [(1, study_log.H_REFERENCE, "coupled", [("A", 4), ("B", 4)])]
     told = analyse(log("thresholds.csv", 1, plan), "--thresholds", path, "--out", out, "--no-timelines")
     assert told.returncode == 0, told.stderr
     near(table(out / "summary.csv")[0]["onset_s"], 0.364955, 0.005, "time to the note's own onset")
@@ -251,19 +305,28 @@ def thresholds_follow_the_reed():
 
 def permutation_test_is_right():
     random_ = np.random.default_rng(5)
-    for n in (1, 2, 5, 9):
+    sign_flip_p, exact_pairs = study_questions.sign_flip_p, study_questions.EXACT_PAIRS
+    for n in (1, 2, 5, 9, 14):
         d = random_.normal(0.5, 1, n)
         patterns = [sum(s * x for s, x in zip(signs, d)) for signs in itertools.product((-1, 1), repeat=n)]
         wanted = np.mean([abs(total) >= abs(sum(d)) - 1e-12 for total in patterns])
-        assert abs(analyse_study.sign_flip_p(d)[0] - wanted) < 1e-12, n
-    d = random_.normal(0.4, 1, analyse_study.EXACT_PAIRS)
-    exact, _ = analyse_study.sign_flip_p(d)
-    drawn, method = analyse_study.sign_flip_p(np.append(d, 0.0))
+        assert abs(sign_flip_p(d)[0] - wanted) < 1e-12, n
+    assert sign_flip_p([1.0, -1.0])[0] == 1.0 and sign_flip_p([0.0, 0.0, 0.0])[0] == 1.0
+    d = random_.normal(0.2, 1, exact_pairs)
+    exact, _ = sign_flip_p(d)
+    drawn, method = sign_flip_p(np.append(d, 0.0))
+    assert 0.02 < exact < 0.98, exact
     assert "draws" in method and abs(exact - drawn) < 0.01, (exact, drawn)
     # Where nothing is to be found it is found in at most one of twenty.
-    found = [analyse_study.sign_flip_p(random_.normal(0, 1, 9))[0] <= 0.05 for _ in range(2000)]
+    found = [sign_flip_p(random_.normal(0, 1, 9))[0] <= 0.05 for _ in range(2000)]
     assert 0.03 < np.mean(found) < 0.065, np.mean(found)
-    assert np.allclose(analyse_study.holm([0.01, 0.04, 0.03]), [0.03, 0.06, 0.06])
+    assert np.allclose(study_questions.holm([0.01, 0.04, 0.03]), [0.03, 0.06, 0.06])
+    assert np.allclose(study_questions.holm([0.01, 0.04, 0.03], 5), [0.05, 0.12, 0.12])
+    # With the fewest participants, and no fewer, something can be found.
+    for n in (study_questions.LEAST_PARTICIPANTS - 1, study_questions.LEAST_PARTICIPANTS):
+        p, _ = sign_flip_p(np.linspace(1, 2, n))
+        found = study_questions.holm([p], study_questions.FAMILY)[0] <= 0.05
+        assert found == (n >= study_questions.LEAST_PARTICIPANTS), (n, p)
 
 
 def bad_files_are_named_with_the_place():
@@ -299,7 +362,8 @@ def bad_files_are_named_with_the_place():
         ([changed("side.csv", 9, "side", "C")], "line 10: side is `C`"),
         ([changed("condition.csv", 9, "condition", "")], "line 10: condition is ``"),
         ([changed("trial.csv", 9, "trial", "")], "line 10: trial is empty"),
-        ([written("off.csv", f"{HEADER}\n0,1,0,0,60,0.5,1,2,0.4,,,,\n")], "no row belongs to a study"),
+        ([written("off.csv", f"{HEADER}\n0,1,0,0,60,0.5,1,2,0.4,,,,,,,,\n")], "no row belongs to a study"),
+        ([changed("heard.csv", 9, "f0_hz", "high")], "line 10: f0_hz is `high`"),
         ([good, good], "given twice"),
         ([good, other_seed], "two orders"),
         ([good, "--thresholds", written("t.csv", "written_midi,gamma_on,h,k\n60,0.1,2,1\n")], "1/3..1"),
@@ -316,7 +380,22 @@ def columns_are_those_the_plugin_writes():
     source = (ROOT / "crates/knob/src/touch/take_csv.rs").read_text()
     header = re.search(r'HEADER: &str = "(.*?)";', source, re.DOTALL).group(1)
     header = re.sub(r"\\\s+", "", header)
-    assert header == HEADER and set(study_log.NUMBERS + study_log.WORDS) <= set(header.split(",")), header
+    read = study_log.NUMBERS + study_log.WORDS + study_log.OPTIONAL
+    assert header == HEADER and set(read) <= set(header.split(",")), header
+
+
+def older_logs_are_read():
+    """A log from before the columns of the sound gives the same, without what was heard."""
+    new = log("new.csv", 4, eight_trials()[:2])
+    lines = [line if line.startswith("#") else ",".join(line.split(",")[:13]) for line in new.read_text().splitlines()]
+    old = SCRATCH / "old.csv"
+    old.write_text("\n".join(lines))
+    for path in (new, old):
+        told = analyse(path, "--out", SCRATCH / path.stem, "--no-timelines")
+        assert told.returncode == 0, told.stderr
+    for a, b in zip(table(SCRATCH / "new/summary.csv"), table(SCRATCH / "old/summary.csv")):
+        assert b["heard_s"] == b["level_rms_db"] == "" != a["heard_s"], b
+        assert all(a[name] == b[name] for name in a if name not in ("heard_s", "level_rms_db", "pitch_rms_cents"))
 
 
 TESTS = [
@@ -324,6 +403,7 @@ TESTS = [
     comparison_pairs_the_sides_of_a_trial,
     plots_are_drawn,
     persons_are_compared_and_not_their_trials,
+    the_hand_is_measured_in_degrees_and_seconds,
     a_gap_and_a_glance_count_for_nothing,
     a_feel_that_does_not_follow_is_told,
     notes_that_never_speak_are_counted,
@@ -331,4 +411,5 @@ TESTS = [
     permutation_test_is_right,
     bad_files_are_named_with_the_place,
     columns_are_those_the_plugin_writes,
+    older_logs_are_read,
 ]

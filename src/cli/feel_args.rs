@@ -9,7 +9,7 @@ use chalumeau_knob::wire::message::TorqueLaw;
 use clap::{Args, ValueEnum};
 
 /// Strength without --torque, mNm: a finger feels it and holds it.
-const USUAL_MNM: f64 = 60.0;
+const USUAL_MNM: f64 = 55.0;
 
 /// Torque laws by name.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]

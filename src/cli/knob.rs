@@ -277,7 +277,8 @@ fn write(take: &mut TakeFile, state: &StateSample, note: &NoteFeel, gamma: f64) 
         feel_id: state.feel_id,
     };
     let reed = Some((f64::from(note.feel.h), f64::from(note.feel.k)));
-    take.write(&moment, &TakeMarks { reed, study: None })
+    let sounds_from = note.requirement.map(|required| required.gamma_sounding);
+    take.write(&moment, &TakeMarks { reed, sounds_from, ..TakeMarks::default() })
         .map_err(|source| OutputError::Write { path: take.path().to_owned(), source })
 }
 

@@ -11,6 +11,7 @@
 mod calibrator;
 mod feel_design;
 mod feels_cache;
+mod heard_sound;
 mod knob_audio;
 mod knob_controller;
 mod knob_switches;
@@ -64,6 +65,8 @@ pub struct SharedKnob {
     main_pulse: Arc<MainPulse>,
     /// The state of the link. Only the controller and the window lock it.
     status: Mutex<Option<LinkStatus>>,
+    /// A take is recorded, so the audio thread sends its sound.
+    is_recording: AtomicBool,
     /// The host has activated this instance. An instance that was never active leaves the knob to the others.
     is_active: AtomicBool,
     stop: AtomicBool,
@@ -82,6 +85,7 @@ impl SharedKnob {
             audio_heart: OnceLock::new(),
             main_pulse,
             status: Mutex::default(),
+            is_recording: AtomicBool::new(false),
             is_active: AtomicBool::new(false),
             stop: AtomicBool::new(false),
         }
@@ -144,11 +148,12 @@ impl PluginKnob {
         let (take_in, take) = triple_buffer::triple_buffer(&None::<Arc<Take>>);
         let (readers_in, readers) = rtrb::RingBuffer::new(1);
         let asker = MainPulseAsker::new(ask_main);
+        let (sound, listener) = heard_sound::sound_channel(shared.clone());
         let controller =
-            KnobController::new(params, shared.clone(), instrument, asker, readers_in, hand_in, take_in);
+            KnobController::new(params, shared.clone(), instrument, asker, readers_in, hand_in, take_in, listener);
         let controller =
             std::thread::Builder::new().name("KnobController".to_owned()).spawn(move || controller.run());
-        let audio = KnobAudio::new(shared.clone(), readers, hand, take);
+        let audio = KnobAudio::new(shared.clone(), readers, hand, take, sound);
         // Without a thread there is no knob, but the instrument plays.
         (Self { shared, controller: controller.ok() }, audio)
     }

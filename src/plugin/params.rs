@@ -283,9 +283,11 @@ impl ChalumeauParams {
         };
         settings = self.physical.over(settings);
         if let Some((_, trial, side)) = self.knob.study() {
-            settings.reed_h = trial.h as f32;
-            settings.reed_k = trial.condition(side).k(trial.h) as f32;
-            settings.coupled = false;
+            let with = |k: f64| Settings { reed_h: trial.h as f32, reed_k: k as f32, coupled: false, ..settings };
+            let [own, other] = [side, side.other()].map(|side| with(trial.condition(side).k(trial.h)));
+            // Full breath closes either reed, so that the knob can do the same on both.
+            let full_kpa = 1e-3 * own.closing_pa().max(other.closing_pa());
+            settings = Settings { breath_full_kpa: own.breath_full_kpa.max(full_kpa as f32), ..own };
         } else if self.knob.k_source.value() != ReedSource::Parameter {
             // What a controller drives follows nothing else.
             settings.coupled = false;

@@ -4,8 +4,8 @@
 //! measures, one of what the firmware commanded, one of what the motor made of it, which on a board of 208 counts to the
 //! newton metre are stairs of 4.8 mNm. Neither knows where the threshold was meant to be:
 //!
-//! - *flow*, commanded: the top of a cubic through the upper tenth. Made: the top is a landing of the stairs; the law
-//!   `sqrt(x) (1 - x)` has the same torque at both its ends y and z, so that its top is at `(y + sqrt(y z) + z) / 3`.
+//! - *flow*, commanded and made: the place of a bump of the protocol's form, of any height, on any parabola, that leaves least
+//!   over, about the highest torque commanded.
 //! - *pressure*, commanded: the middle of the steepest rise. Made: the place of a step of the protocol's form, of any
 //!   height, on any line, that leaves least over.
 
@@ -16,10 +16,10 @@ use chalumeau_knob::simulator::knob::SimulatedKnob;
 const BIN_DEG: f64 = 0.25;
 /// A bin passed in less than this many periods is left out.
 const LEAST_PERIODS: u32 = 100;
-/// Half the width of the step, degrees (docs/protocol.md); a rise is the difference between the means of as much behind
-/// and before.
+/// Half the width of bump and step, degrees (docs/protocol.md); a rise is the difference between the means of as much
+/// behind and before.
 const STEP_DEG: f64 = 6.0;
-/// How far about the steepest rise the step is fitted, degrees: a few stairs on both sides.
+/// How far about the steepest rise or the top the mark is fitted, degrees: a few stairs on both sides.
 const AROUND_DEG: f64 = 40.0;
 /// And how far its place is looked for, degrees.
 const SEARCH_DEG: f64 = 10.0;
@@ -41,7 +41,7 @@ pub struct FeltThreshold {
     pub commanded_deg: f64,
     /// In what the motor made.
     pub made_deg: f64,
-    /// Where the motor's torque rises most steeply, stairs and all (pressure); middle of its highest landing (flow).
+    /// Where the motor's torque rises most steeply, stairs and all (pressure); middle of where it is highest (flow).
     pub plain_deg: f64,
 }
 
@@ -71,19 +71,16 @@ impl Fingers {
         self.curve(|bin| bin.1)
     }
 
-    /// The threshold of the flow law, on a motor with stairs of `stair_mnm`.
-    pub fn peak(&self, stair_mnm: f64) -> Option<FeltThreshold> {
+    /// The threshold of the flow law.
+    pub fn bump(&self) -> Option<FeltThreshold> {
         let (commanded, made) = (self.commanded(), self.made());
-        let most = commanded.iter().map(|x| x.1).fold(0.0, f64::max);
-        // The highest riser that is clearly below the top.
-        let riser = stair_mnm * ((0.97 * most / stair_mnm - 0.5).floor() + 0.5);
-        let crosses = |w: &[(f64, f64)]| w[0].0 + (riser - w[0].1) / (w[1].1 - w[0].1) * (w[1].0 - w[0].0);
-        let y = made.windows(2).find(|w| w[0].1 < riser && w[1].1 >= riser).map(crosses)?;
-        let z = made.windows(2).rev().find(|w| w[0].1 >= riser && w[1].1 < riser).map(crosses)?;
+        let top_deg = commanded.iter().max_by(|a, b| a.1.total_cmp(&b.1))?.0;
+        let most = made.iter().map(|x| x.1).fold(0.0, f64::max);
+        let highest: Vec<f64> = made.iter().filter(|x| x.1 > most - 0.5).map(|x| x.0).collect();
         Some(FeltThreshold {
-            commanded_deg: top(&commanded, 0.9 * most)?,
-            made_deg: (y + (y * z).sqrt() + z) / 3.0,
-            plain_deg: 0.5 * (y + z),
+            commanded_deg: bump(&commanded, top_deg)?,
+            made_deg: bump(&made, top_deg)?,
+            plain_deg: highest.iter().sum::<f64>() / highest.len() as f64,
         })
     }
 
@@ -99,18 +96,6 @@ impl Fingers {
     }
 }
 
-/// Top of a cubic through what is above `level`.
-fn top(curve: &Curve, level: f64) -> Option<f64> {
-    let above: Curve = curve.iter().copied().filter(|x| x.1 > level).collect();
-    let middle = 0.5 * (above.first()?.0 + above.last()?.0);
-    let rows: Vec<[f64; 4]> =
-        above.iter().map(|x| x.0 / middle - 1.0).map(|e| [1.0, e, e * e, e * e * e]).collect();
-    let torques: Vec<f64> = above.iter().map(|x| x.1).collect();
-    let ([_, c1, c2, c3], _) = least_squares(&rows, &torques)?;
-    // The root of the slope at which the slope falls.
-    Some(middle * (1.0 + 2.0 * c1 / (-2.0 * c2 + (4.0 * c2 * c2 - 12.0 * c1 * c3).sqrt())))
-}
-
 fn mean_between(curve: &Curve, from_deg: f64, to_deg: f64) -> f64 {
     let within: Vec<f64> = curve.iter().filter(|x| x.0 > from_deg && x.0 < to_deg).map(|x| x.1).collect();
     within.iter().sum::<f64>() / within.len() as f64
@@ -123,15 +108,25 @@ fn steepest(curve: &Curve) -> Option<f64> {
     grid.map(|at| (at, rise(at))).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(at, _)| at)
 }
 
+/// Place of the step that leaves least over on a line.
 fn step(curve: &Curve, near_deg: f64) -> Option<f64> {
+    fitted(curve, near_deg, |x, e| {
+        let x = x.clamp(-1.0, 1.0);
+        [1.0, e, 0.5 + x * (0.75 - 0.25 * x * x)]
+    })
+}
+
+/// Place of the bump that leaves least over on a parabola.
+fn bump(curve: &Curve, near_deg: f64) -> Option<f64> {
+    fitted(curve, near_deg, |x, e| [1.0, e, e * e, (1.0 - x * x).max(0.0).powi(2)])
+}
+
+/// The place, in `form` of the distance from it in half widths and of the distance from `near_deg`, that leaves least over.
+fn fitted<const N: usize>(curve: &Curve, near_deg: f64, form: impl Fn(f64, f64) -> [f64; N]) -> Option<f64> {
     let near: Curve = curve.iter().copied().filter(|x| (x.0 - near_deg).abs() < AROUND_DEG).collect();
     let torques: Vec<f64> = near.iter().map(|x| x.1).collect();
     let left_over = |at: f64| {
-        let form = |angle: f64| {
-            let x = ((angle - at) / STEP_DEG).clamp(-1.0, 1.0);
-            0.5 + x * (0.75 - 0.25 * x * x)
-        };
-        let rows: Vec<[f64; 3]> = near.iter().map(|x| [1.0, x.0 - near_deg, form(x.0)]).collect();
+        let rows: Vec<[f64; N]> = near.iter().map(|x| form((x.0 - at) / STEP_DEG, x.0 - near_deg)).collect();
         least_squares(&rows, &torques).map_or(f64::INFINITY, |(_, rest)| rest)
     };
     let steps = (SEARCH_DEG / BIN_DEG) as i32;

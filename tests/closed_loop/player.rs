@@ -12,7 +12,7 @@ use chalumeau_knob::device::transport::Binding;
 use chalumeau_knob::simulator::hand::{HandDesign, SimulatedHand};
 use chalumeau_knob::simulator::knob::{PERIOD_US, SimulatedKnob};
 use chalumeau_knob::simulator::plant::PlantDesign;
-use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, BreathMapping, GRID};
+use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, Breath14, BreathMapping, GRID};
 use chalumeau_knob::touch::feel::PitchMaps;
 use chalumeau_knob::wire::Feel;
 use std::sync::Arc;
@@ -30,10 +30,12 @@ pub struct LoopPlayer {
     blower: Blower,
     hand: BreathMapping,
     full_pa: f64,
+    /// The latest breath, over full breath.
+    breath_unit: f64,
     rendered: u64,
     is_sounding: bool,
-    /// Note to be fingered with the next block.
-    due: Option<SoundingNote>,
+    /// What happens with the next block.
+    due: Vec<Event>,
 }
 
 impl LoopPlayer {
@@ -59,9 +61,10 @@ impl LoopPlayer {
             blower: Blower::default(),
             hand: BreathMapping { maps, design: KnobDesign::default(), feels: true },
             full_pa: 1e3 * f64::from(settings.breath_full_kpa),
+            breath_unit: 0.0,
             rendered: 0,
             is_sounding: false,
-            due: None,
+            due: Vec::new(),
         };
         player.session.want_feel(feel);
         player.run(0.5, |_| {}, |_| {});
@@ -77,7 +80,23 @@ impl LoopPlayer {
 
     /// Fingers a note; the clarinet is rendered from here on.
     pub fn finger(&mut self, note: SoundingNote) {
-        (self.due, self.is_sounding) = (Some(note), true);
+        self.play(Event::NoteOn { note, velocity: 0.8 });
+    }
+
+    /// Plays an event with the next block; the clarinet is rendered from here on.
+    pub fn play(&mut self, event: Event) {
+        self.due.push(event);
+        self.is_sounding = true;
+    }
+
+    /// The mouth pressure that the hand makes, Pa, whether or not a key lets it into the reed.
+    pub fn blown_pa(&self) -> f64 {
+        self.breath_unit * self.full_pa
+    }
+
+    /// What the link does when another note is fingered.
+    pub fn want_feel(&mut self, feel: Feel) {
+        self.session.want_feel(feel);
     }
 
     /// The clarinet is not rendered any more.
@@ -137,18 +156,19 @@ impl LoopPlayer {
     fn block(&mut self, now_us: i64, probe: &mut dyn FnMut(Probe)) {
         const SAMPLES: usize = GRID as usize;
         self.reader.begin_block_at(now_us, SAMPLES, RATE_HZ);
-        let note = self.due.take().map(|note| Timed { at: 0, event: Event::NoteOn { note, velocity: 0.8 } });
+        let due: Vec<_> = self.due.drain(..).map(|event| Timed { at: 0, event }).collect();
         let reader = &self.reader;
         let angle = |at: usize| reader.pose(at).map(|pose| f64::from(pose.angle_deg));
-        let mut ignore = |_, _| {};
+        let breath_unit = &mut self.breath_unit;
+        let mut heard = |_, breath: Breath14| *breath_unit = f64::from(breath.unit());
         let events = BlownEvents::new(
-            note.into_iter(),
+            due.into_iter(),
             &mut self.blower,
             &self.hand,
             self.full_pa,
             SAMPLES,
             angle,
-            &mut ignore,
+            &mut heard,
         );
         // A block is one step of the breath's grid: everything happens at its first sample.
         for event in events {

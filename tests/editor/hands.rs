@@ -17,7 +17,7 @@ const SLIDERS: &[(Tab, &[&str])] = &[
     (Tab::Sound, &["a4", "noise", "zeta", "lay", "vent", "gain"]),
     (
         Tab::Knob,
-        &["ceil", "contr", "torque", "detent", "kdamp", "kfric", "refnot", "curve", "oscprt", "oscfl"],
+        &["ceil", "contr", "place", "torque", "mark", "kdamp", "kfric", "refnot", "curve", "oscprt", "oscfl"],
     ),
     (Tab::Instrument, &["a4", "temp", "vent", "tongue", "legato", "noise", "bendr", "gain"]),
 ];

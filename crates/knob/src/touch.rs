@@ -4,6 +4,7 @@
 
 pub mod breath_from_angle;
 pub mod feel;
+pub mod heard;
 pub mod study;
 pub mod take;
 pub mod take_csv;

@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 
 use super::feel_design::{feel_design, knob_design};
 use super::feels_cache::FeelsCache;
+use super::heard_sound::SoundSender;
 use super::take_recorder::load_take;
 use super::{NO_NOTE, SharedKnob};
 use crate::plugin::instrument_loading::{InstrumentSwap, SharedInstrument};
@@ -41,6 +42,7 @@ pub struct KnobAudio {
     blower: Blower,
     breath_from: BlockBreath,
     sent: SentBreath,
+    sound: SoundSender,
     /// Samples of a take that have been played.
     replayed: u64,
     /// A replay that was loaded before playing began; it takes precedence over what the controller has loaded since.
@@ -85,6 +87,7 @@ impl KnobAudio {
         readers: rtrb::Consumer<KnobReader>,
         hand: triple_buffer::Output<BreathMapping>,
         take: triple_buffer::Output<Option<Arc<Take>>>,
+        sound: SoundSender,
     ) -> Self {
         Self {
             shared,
@@ -95,6 +98,7 @@ impl KnobAudio {
             blower: Blower::default(),
             breath_from: BlockBreath::Host,
             sent: SentBreath { values: [(0, Breath14(0)); SENT_MOST], count: 0 },
+            sound,
             replayed: 0,
             prepared: None,
         }
@@ -224,6 +228,13 @@ impl KnobAudio {
         self.blower.advance(samples);
         let note = self.blower.fingered().map_or(NO_NOTE, |note| note.0);
         self.shared.note.store(note, Ordering::Relaxed);
+    }
+
+    /// Sends the sound of the last block to the take that is recorded, if one is.
+    pub fn send_sound(&mut self, rate_hz: f64, sound: &[f32]) {
+        if let Some(reader) = &self.reader {
+            self.sound.send(reader.due_us(), rate_hz, sound);
+        }
     }
 
     /// The breath values of the last block and their sample positions, in order of time, for the host to record.

@@ -8,6 +8,7 @@ use super::SharedKnob;
 use super::calibrator::Calibrator;
 use super::feel_design::{feel_design, knob_design};
 use super::feels_cache::FeelsCache;
+use super::heard_sound::SoundListener;
 use super::knob_switches::{KnobSwitches, is_live};
 use super::main_pulse::MainPulseAsker;
 use super::take_recorder::{TakeRecorder, load_take, marks};
@@ -67,6 +68,7 @@ impl KnobController {
         readers: rtrb::Producer<KnobReader>,
         hand_in: triple_buffer::Input<BreathMapping>,
         take: triple_buffer::Input<Option<Arc<Take>>>,
+        sound: SoundListener,
     ) -> Self {
         Self {
             params,
@@ -84,7 +86,7 @@ impl KnobController {
             link: None,
             choice: KnobChoice::Off,
             rows: mpsc::channel(),
-            recorder: TakeRecorder::default(),
+            recorder: TakeRecorder::new(sound),
             replay_path: String::new(),
             take_message: None,
             switches: KnobSwitches::default(),
@@ -304,12 +306,22 @@ impl KnobController {
             // The feel did not follow the sound, so these rows do not belong to a study.
             marks.study = None;
         }
+        self.shared.is_recording.store(wanted, Ordering::Relaxed);
         for moment in rows {
-            self.recorder.write(moment, &marks);
+            marks.sounds_from = moment.written.and_then(|written| self.sounds_from(WrittenNote(written)));
+            self.recorder.take_in(moment, &marks);
         }
+        self.recorder.write_known();
         if !wanted && let Some(text) = self.recorder.end(&self.params) {
             self.take_message = Some(text);
         }
+    }
+
+    /// Gamma at which a note begins to sound with the feel in force.
+    fn sounds_from(&self, written: WrittenNote) -> Option<f64> {
+        let feel = self.shared.feel.lock().ok()?.clone()?;
+        let note = feel.1.notes().iter().find(|note| note.written == written)?;
+        note.requirement.map(|required| required.gamma_sounding)
     }
 
     /// Stores the serial number of a live device in the project.

@@ -1,10 +1,12 @@
 //! Records takes: their folder, their remarks, the marks of their rows. Also reads a take back.
 
+use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use super::feel_design::feel_design;
+use super::heard_sound::SoundListener;
 use crate::plugin::params::ChalumeauParams;
 use crate::take_file::TakeFile;
 use chalumeau_core::instrument::Settings;
@@ -14,10 +16,16 @@ use chalumeau_knob::touch::take::{Take, TakeMarks, TakeRow};
 /// Environment variable that names another folder for takes.
 const TAKES: &str = "CHALUMEAU_TAKES";
 
+/// How long a row waits for what was heard at its time, us: the analysis is a quarter of a second behind, and a host may be
+/// slow. After that it is written without.
+const WAITS_US: u64 = 600_000;
+
 /// Writes at most one take at a time.
-#[derive(Default)]
 pub struct TakeRecorder {
     recording: Option<Recording>,
+    sound: SoundListener,
+    /// Rows that wait for what was heard.
+    waiting: VecDeque<(TakeRow, TakeMarks)>,
 }
 
 /// A take that is being written.
@@ -30,6 +38,11 @@ struct Recording {
 }
 
 impl TakeRecorder {
+    /// No take is open; `sound` brings what is heard.
+    pub fn new(sound: SoundListener) -> Self {
+        Self { recording: None, sound, waiting: VecDeque::new() }
+    }
+
     /// Opens a new take, if none is open.
     pub fn begin(&mut self, params: &ChalumeauParams) -> Result<(), String> {
         if self.recording.is_none() {
@@ -38,10 +51,25 @@ impl TakeRecorder {
         Ok(())
     }
 
-    /// Adds a row to the take, if one is open.
-    pub fn write(&mut self, moment: &TakeRow, marks: &TakeMarks) {
-        if let Some(recording) = &mut self.recording {
-            match recording.writer.write(moment, marks) {
+    /// Adds a row to the take, if one is open. It is written once it is known what was heard.
+    pub fn take_in(&mut self, moment: &TakeRow, marks: &TakeMarks) {
+        if self.recording.is_some() {
+            self.waiting.push_back((*moment, *marks));
+        }
+    }
+
+    /// Writes the rows of which it is known what was heard, and those that have waited in vain.
+    pub fn write_known(&mut self) {
+        self.sound.listen();
+        let newest_us = self.waiting.back().map_or(0, |(newest, _)| newest.t_us);
+        self.write_until(self.sound.known_until_us().max(newest_us.saturating_sub(WAITS_US)));
+    }
+
+    fn write_until(&mut self, until_us: u64) {
+        let Some(recording) = &mut self.recording else { return };
+        while let Some((moment, mut marks)) = self.waiting.pop_front_if(|(moment, _)| moment.t_us <= until_us) {
+            marks.heard = self.sound.at(moment.t_us);
+            match recording.writer.write(&moment, &marks) {
                 Ok(()) => recording.rows += 1,
                 Err(reason) => recording.error = Some(reason.to_string()),
             }
@@ -55,6 +83,7 @@ impl TakeRecorder {
 
     /// Completes the open take and makes it the take of the project. Returns a message for the user, if a take was open.
     pub fn end(&mut self, params: &ChalumeauParams) -> Option<String> {
+        self.write_until(u64::MAX);
         let Recording { writer, path, rows, error } = self.recording.take()?;
         if rows == 0 {
             return Some("nothing recorded: the knob sent nothing".to_owned());
@@ -88,7 +117,7 @@ pub fn marks(params: &ChalumeauParams, settings: &Settings) -> TakeMarks {
         .knob
         .study()
         .map(|(participant, trial, side)| (participant, trial.number, side, trial.condition(side)));
-    TakeMarks { reed: Some((law.h(), law.k())), study }
+    TakeMarks { reed: Some((law.h(), law.k())), study, ..TakeMarks::default() }
 }
 
 /// Creates a new take in the folder of takes.
@@ -124,7 +153,7 @@ fn remarks(params: &ChalumeauParams) -> Vec<String> {
     let knob = &params.knob;
     let mut remarks = vec![
         format!(
-            "Chalumeau {} take; t_us is the host's clock, angle from the knob's zero",
+            "Chalumeau {} take; t_us and heard_us are the host's clock, angle from the knob's zero",
             env!("CARGO_PKG_VERSION")
         ),
         format!("feel {:?}", feel_design(knob)),

@@ -90,9 +90,9 @@ impl FeelDesign {
     /// Height of the mark at the threshold, mNm: `detent_mnm`, or the default of the torque law.
     ///
     /// Under the flow law the torque about the peak is flat: it stays within 12.7 % of the peak, the smallest difference that
-    /// hands tell apart (Jandura and Srinivasan 1994), over more than a third of the travel. A mark of 9 mNm is 16 % of the
-    /// default strength, so that a hand finds the threshold, and its slope is 0.13 N m/rad, below the limit of 0.2 for torque
-    /// that pushes. Under the pressure law the step of 6 mNm stands on a spring that is still weak there.
+    /// hands tell apart (Jandura and Srinivasan 1994; see `docs/feel.md`), over more than a third of the travel. A mark of 9
+    /// mNm is 16 % of the default strength, so that a hand finds the threshold, and its slope is 0.13 N m/rad, below the limit
+    /// of 0.2 for torque that pushes. Under the pressure law the step of 6 mNm stands on a spring that is still weak there.
     pub fn mark_mnm(&self) -> f64 {
         self.detent_mnm.unwrap_or(match self.law {
             TorqueLaw::Flow => 9.0,

@@ -96,6 +96,8 @@ pub struct KnobReader {
     /// Samples rendered since the timeline began, in microseconds.
     rendered_us: f64,
     last_call_us: i64,
+    /// Host time at which this block was due, on the audio thread's own timeline.
+    due_us: i64,
     /// Host time that the first sample of this block stands for.
     block_us: i64,
     is_live: bool,
@@ -116,6 +118,7 @@ pub fn ring(epoch: Instant) -> (KnobWriter, KnobReader) {
         rate_hz: 0.0,
         rendered_us: 0.0,
         last_call_us: i64::MIN,
+        due_us: 0,
         block_us: 0,
         is_live: false,
     };
@@ -145,7 +148,14 @@ impl KnobReader {
         let newest = self.kept[self.newest];
         self.is_live = self.used > 0 && now_us - newest.host_us <= STALE_US;
         let delay_us = block as i64 + i64::from(newest.period_us) + MARGIN_US;
-        self.block_us = self.timeline.local_us(start_us as i64) - delay_us;
+        self.due_us = self.timeline.local_us(start_us as i64);
+        self.block_us = self.due_us - delay_us;
+    }
+
+    /// Host time at which the present block was due, us since the link's epoch, however late the host called: the clock of the
+    /// knob's states for what is heard.
+    pub fn due_us(&self) -> i64 {
+        self.due_us
     }
 
     /// Where the knob was, at the constant delay, for sample `offset` of the block; `None` with no live knob.

@@ -50,6 +50,16 @@ pub enum StudySide {
     B,
 }
 
+impl StudySide {
+    /// The side that is not this one.
+    pub fn other(self) -> Self {
+        match self {
+            Self::A => Self::B,
+            Self::B => Self::A,
+        }
+    }
+}
+
 /// One comparison of two sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trial {

@@ -1,6 +1,7 @@
 //! Takes: what a hand did on a knob, to be replayed and analysed. [`take_csv`](crate::touch::take_csv) reads and writes
 //! them.
 
+use crate::touch::heard::Heard;
 use crate::touch::study::{Condition, StudySide};
 
 /// One row of a take: one moment.
@@ -29,6 +30,10 @@ pub struct TakeMarks {
     pub reed: Option<(f64, f64)>,
     /// Participant, trial, side and condition, during a study.
     pub study: Option<(u32, u32, StudySide, Condition)>,
+    /// Gamma at which the fingered note begins to sound on this reed: the felt threshold, if known.
+    pub sounds_from: Option<f64>,
+    /// What was heard at that moment.
+    pub heard: Heard,
 }
 
 /// A take in memory, never empty.

@@ -10,7 +10,7 @@ use std::io::{self, Read, Write};
 
 /// Column names in the order they are written.
 pub const HEADER: &str = "t_us,angle_deg,velocity_deg_s,torque_mnm,written_midi,gamma,feel_id,h,k,\
-                          participant,trial,side,condition";
+                          participant,trial,side,condition,gamma_sounding,level_db,f0_hz,heard_us";
 /// Rows a file may have: ten hours at 500 a second.
 const MOST_ROWS: usize = 18_000_000;
 /// Largest angle that makes sense, degrees: a hundred turns.
@@ -200,10 +200,21 @@ impl<W: Write> TakeWriter<W> {
                     StudySide::A => "A",
                     StudySide::B => "B",
                 };
-                writeln!(self.out, "{participant},{trial},{side},{}", condition.name())
+                write!(self.out, "{participant},{trial},{side},{},", condition.name())?;
             }
-            None => writeln!(self.out, ",,,"),
+            None => write!(self.out, ",,,,")?,
         }
+        let cell = |value: Option<f64>, digits: usize| {
+            value.map_or_else(String::new, |value| format!("{value:.digits$}"))
+        };
+        let onset_us = marks.heard.onset_us.map_or_else(String::new, |t_us| t_us.to_string());
+        writeln!(
+            self.out,
+            "{},{},{},{onset_us}",
+            cell(marks.sounds_from, 5),
+            cell(marks.heard.level_db, 1),
+            cell(marks.heard.f0_hz, 2)
+        )
     }
 
     /// The output.
@@ -220,6 +231,8 @@ impl<W: Write> TakeWriter<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::touch::heard::Heard;
+    use crate::touch::study::Condition;
 
     fn read(text: &str) -> Result<Take, TakeError> {
         Take::read(text.as_bytes())
@@ -245,6 +258,32 @@ mod tests {
         let take = Take::read(&*writer.into_inner()).unwrap();
         assert_eq!(take.rows(), rows);
         assert!((take.seconds() - 0.098).abs() < 1e-12);
+    }
+
+    #[test]
+    fn marks_stand_in_their_columns_and_are_empty_where_nothing_is_known() {
+        let heard = Heard { level_db: Some(-23.46), f0_hz: Some(233.082), onset_us: Some(1_234_567) };
+        let study = Some((7, 3, StudySide::B, Condition::Free));
+        let known = TakeMarks { reed: Some((2.0, 0.3849)), study, sounds_from: Some(0.371_234), heard };
+        let mut writer = TakeWriter::new(Vec::new(), &[]).unwrap();
+        for marks in [known, TakeMarks::default()] {
+            writer.write(&TakeRow::default(), &marks).unwrap();
+        }
+        let text = String::from_utf8(writer.into_inner()).unwrap();
+        let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+        assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{text}");
+        let cell = |row: usize, name: &str| rows[row][rows[0].iter().position(|column| *column == name).unwrap()];
+        for (name, text) in [
+            ("h", "2.00000"),
+            ("side", "B"),
+            ("condition", "free"),
+            ("gamma_sounding", "0.37123"),
+            ("level_db", "-23.5"),
+            ("f0_hz", "233.08"),
+            ("heard_us", "1234567"),
+        ] {
+            assert_eq!((cell(1, name), cell(2, name)), (text, ""), "{name}");
+        }
     }
 
     #[test]
