@@ -38,6 +38,7 @@ const CHOICES: &[(Tab, &[&str])] = &[
 const OTHERWISE: &[(&str, &str)] = &[
     ("reedk", "a slider while the reed is not coupled"),
     ("arm", "the large button"),
+    ("detent", "a slider under the pressure law"),
     ("instr", "the cards of the instrument view, as an action: the plugin tells the host"),
     ("kstat", "its value means nothing; its text is the line of the knob's panel"),
     ("istat", "its value means nothing; its text is the line below the cards"),
@@ -56,7 +57,7 @@ const MOMENTARY: &[(Tab, &str, &str)] = &[
 #[test]
 fn every_parameter_has_a_place() {
     let host = crate::support::Fake::default();
-    assert_eq!(host.ids().len(), 57);
+    assert_eq!(host.ids().len(), 59);
     let lists = [SLIDERS, SWITCHES, CHOICES].into_iter().flatten().flat_map(|(_, ids)| ids.iter());
     let placed: Vec<&str> = lists
         .chain([STUDY_SLIDERS, STUDY_SWITCHES, STUDY_CHOICES, MAKER_SLIDERS].into_iter().flatten())
@@ -147,6 +148,10 @@ fn every_slider_drags_types_and_resets() {
     window.harness.get_by_label("Reed coupled").click();
     window.harness.run();
     drags_types_and_resets(&mut window, "reedk");
+    let mut window = Window::tall(Tab::Knob);
+    window.harness.get_by_label("Feel: Pressure").click();
+    window.harness.run();
+    drags_types_and_resets(&mut window, "detent");
     let mut window = Window::tall(Tab::Reed);
     window.harness.get_by_label("Reed face: Physical").click();
     window.harness.run();
