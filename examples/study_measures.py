@@ -43,10 +43,19 @@ class Notes:
 LISTS = tuple(field.name for field in dataclasses.fields(Notes) if field.name not in ("sounded", "silent"))
 
 
+def middle(values):
+    """The median of an array that is not empty. On windows of some hundred rows it is much faster than numpy's."""
+    ordered = np.sort(values)
+    return 0.5 * float(ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2])
+
+
 def rms_about_median(values):
     """Root mean square about the median; nan where less than WINDOW_ROWS values are known."""
     values = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean((values - np.median(values)) ** 2))) if len(values) >= WINDOW_ROWS else math.nan
+    if len(values) < WINDOW_ROWS:
+        return math.nan
+    off = values - middle(values)
+    return math.sqrt(np.dot(off, off) / len(off))
 
 
 def notes_of(piece):
@@ -55,7 +64,7 @@ def notes_of(piece):
     t, gamma, on, written = piece.t_s, piece.gamma, piece.gamma_on, piece.written
     changes = np.flatnonzero(np.nan_to_num(np.diff(np.nan_to_num(written, nan=-1.0))) != 0) + 1
     for begin, end in zip([0, *changes], [*changes, len(t)]):
-        if not math.isfinite(on[begin]):
+        if not math.isfinite(written[begin]) or not math.isfinite(on[begin]):
             continue
         above = np.flatnonzero(gamma[begin:end] >= on[begin:end])
         if not above.size:
@@ -77,7 +86,7 @@ def notes_of(piece):
         while start + WINDOW_S <= t[end - 1]:
             rows = slice(*np.searchsorted(t, (start, start + WINDOW_S)))
             start += WINDOW_S
-            if rows.stop - rows.start >= WINDOW_ROWS and np.median(gamma[rows]) >= np.median(on[rows]):
+            if rows.stop - rows.start >= WINDOW_ROWS and middle(gamma[rows]) >= middle(on[rows]):
                 found.angle_rms_deg.append(rms_about_median(piece.angle_deg[rows]))
                 found.gamma_rms.append(rms_about_median(gamma[rows]))
                 found.level_rms_db.append(rms_about_median(piece.level_db[rows]))
@@ -97,13 +106,13 @@ def measure_onset(found, piece, begin, speaks, end):
     held = slice(*np.minimum(end, np.searchsorted(t, t[speaks] + np.array([SETTLE_S, SETTLE_S + WINDOW_S]))))
     if held.stop - held.start >= WINDOW_ROWS:
         reached = slice(speaks, min(end, np.searchsorted(t, t[speaks] + SETTLE_S)))
-        found.overshoot_deg.append(float(np.max(angle[reached]) - np.median(angle[held])))
+        found.overshoot_deg.append(float(np.max(angle[reached]) - middle(angle[held])))
 
 
 def median(values):
     """Median of what is known, or nan."""
     known = [value for value in values if math.isfinite(value)]
-    return float(np.median(known)) if known else math.nan
+    return middle(known) if known else math.nan
 
 
 def integrals(piece):

@@ -22,15 +22,22 @@ def help_tells_what_there_is():
 
 TESTS = [help_tells_what_there_is, *python_study.TESTS, *python_kit.TESTS, *python_bridge.TESTS, *python_null_study.TESTS]
 
-os.environ.pop("DISPLAY", None)
-chosen = [test for test in TESTS if len(sys.argv) < 2 or any(word in test.__name__ for word in sys.argv[1:])]
-failed = 0
-for test in chosen:
-    try:
-        test()
-        print(f"test {test.__name__} ... ok", flush=True)
-    except Exception as error:  # each test is to be heard
-        failed += 1
-        print(f"test {test.__name__} ... FAILED: {type(error).__name__} {error}", flush=True)
-print(f"Python examples: {len(chosen) - failed} passed, {failed} failed")
-sys.exit(failed != 0)
+
+def main():
+    os.environ.pop("DISPLAY", None)
+    chosen = [test for test in TESTS if len(sys.argv) < 2 or any(word in test.__name__ for word in sys.argv[1:])]
+    failed = 0
+    for test in chosen:
+        try:
+            test()
+            print(f"test {test.__name__} ... ok", flush=True)
+        except Exception as error:  # each test is to be heard
+            failed += 1
+            print(f"test {test.__name__} ... FAILED: {type(error).__name__} {error}", flush=True)
+    print(f"Python examples: {len(chosen) - failed} passed, {failed} failed")
+    return failed != 0
+
+
+# Processes that a test starts import this file.
+if __name__ == "__main__":
+    sys.exit(main())
