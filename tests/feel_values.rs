@@ -127,7 +127,10 @@ fn equal_travel_is_that_of_the_reference_reed() {
         let mut farthest = 0.0_f64;
         for (written, note) in &equal {
             for column in ["a_on_deg", "a_close_deg"] {
-                assert!((note[column] / standard[written][column] - 1.0).abs() < 1e-4, "{reed} {written} {column}");
+                assert!(
+                    (note[column] / standard[written][column] - 1.0).abs() < 1e-4,
+                    "{reed} {written} {column}"
+                );
             }
             for column in ["gamma_on", "p_req_pa", "gamma_sounding", "h", "k"] {
                 assert_eq!(note[column], own[written][column], "{reed} {written} {column}");

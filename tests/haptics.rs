@@ -131,7 +131,10 @@ fn contrast_and_place_are_powers_of_the_physical_spread_about_the_reference() {
     for (contrast, place) in [(1.0, 2.0), (2.0, 1.0), (3.0, 1.0), (3.0, 5.0), (5.0, 3.0)] {
         let table = at(contrast, place);
         assert!((spread(&table) / physical.powf(place) - 1.0).abs() < 1e-9, "{contrast} {place}");
-        assert!((spread_of(&table, torque) / physical.powf(contrast) - 1.0).abs() < 1e-6, "{contrast} {place}");
+        assert!(
+            (spread_of(&table, torque) / physical.powf(contrast) - 1.0).abs() < 1e-6,
+            "{contrast} {place}"
+        );
         let reference = table.reference();
         assert!((reference.landmarks.a_on_deg - 120.0).abs() < 1e-4);
         assert!((torque(reference) / FeelDesign::default().strength_mnm - 1.0).abs() < 1e-6);
@@ -162,7 +165,9 @@ fn a_hand_can_find_the_threshold_of_the_flow_law_by_its_mark() {
     };
     let bare = FeelDesign { detent_mnm: Some(0.0), ..design(TorqueLaw::Flow, 1.0) };
     let (from_deg, to_deg) = about(table(&bare, &Settings::default()).unwrap().reference());
-    println!("reference note without a mark: within one JND of the peak from {from_deg:.0} to {to_deg:.0} degrees");
+    println!(
+        "reference note without a mark: within one JND of the peak from {from_deg:.0} to {to_deg:.0} degrees"
+    );
     assert!(to_deg - from_deg > 120.0, "{from_deg} {to_deg}");
     for contrast in [1.0, 3.0, 5.0] {
         let table = table(&design(TorqueLaw::Flow, contrast), &Settings::default()).unwrap();
@@ -172,9 +177,15 @@ fn a_hand_can_find_the_threshold_of_the_flow_law_by_its_mark() {
             assert!(share >= TORQUE_JND, "Contrast {contrast} {}: {share}", note.written);
             let (from_deg, to_deg) = about(note);
             (least, widest) = (least.min(share), widest.max(to_deg - from_deg));
-            assert!(torque_law::extremes(&note.feel).push_nm_per_rad < 0.75 * TorqueLimits::default().push_nm_per_rad);
+            assert!(
+                torque_law::extremes(&note.feel).push_nm_per_rad
+                    < 0.75 * TorqueLimits::default().push_nm_per_rad
+            );
         }
-        println!("Contrast {contrast}: mark at least {:.1} %, found within {widest:.0} degrees", 100.0 * least);
+        println!(
+            "Contrast {contrast}: mark at least {:.1} %, found within {widest:.0} degrees",
+            100.0 * least
+        );
         assert!(widest < 12.0, "{widest}");
     }
 }
@@ -741,8 +752,7 @@ mod command {
             .collect()
     }
 
-    const TABLE: &str =
-        "written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding";
+    const TABLE: &str = "written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding";
 
     #[test]
     fn table_of_all_notes_and_curve_of_one() {

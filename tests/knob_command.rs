@@ -128,7 +128,7 @@ fn a_program_whose_terminal_is_held_lets_go() {
     // What it sends goes on: the link's thread runs.
     let alive = |message: &&(Instant, Message)| matches!(message.1, Message::Alive(_));
     let heard = knob.heard();
-    let last = heard.iter().filter(alive).next_back().unwrap().0;
+    let last = heard.iter().rfind(alive).unwrap().0;
     assert!(heard.iter().any(|(at, message)| matches!(message, Message::Free) && *at > last));
     terminal.write_all(&[0x11]).unwrap(); // Ctrl-Q
     stays_limp(&knob);

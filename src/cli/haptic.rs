@@ -99,10 +99,10 @@ impl HapticCommand {
         ))?;
         for note in feel.notes().iter().filter(wanted) {
             let asked = note.requirement;
-            let pressure =
-                |of: fn(&NoteRequirement) -> f64| asked.as_ref().map_or(f64::NAN, of);
+            let pressure = |of: fn(&NoteRequirement) -> f64| asked.as_ref().map_or(f64::NAN, of);
             let (gamma_on, gamma_off) = (pressure(|asked| asked.gamma_on), pressure(|asked| asked.gamma_off));
-            let (p_req, sounding) = (pressure(|asked| asked.p_req_pa), pressure(|asked| asked.gamma_sounding));
+            let (p_req, sounding) =
+                (pressure(|asked| asked.p_req_pa), pressure(|asked| asked.gamma_sounding));
             let (a, feel) = (note.landmarks, note.feel);
             table.line(format_args!(
                 "{},{},{},{},{:.4},{:.4},{:.4},{:.4},{},{},{}",

@@ -35,7 +35,7 @@ use chalumeau_knob::touch::breath_from_angle::BreathMapping;
 use chalumeau_knob::touch::feel::InstrumentFeel;
 use chalumeau_knob::touch::take::Take;
 use chalumeau_knob::wire::message;
-use knob_controller::KnobController;
+use knob_controller::{AudioEnds, KnobController};
 use main_pulse::MainPulseAsker;
 
 /// Number that stands for no note.
@@ -149,8 +149,8 @@ impl PluginKnob {
         let (readers_in, readers) = rtrb::RingBuffer::new(1);
         let asker = MainPulseAsker::new(ask_main);
         let (sound, listener) = heard_sound::sound_channel(shared.clone());
-        let controller =
-            KnobController::new(params, shared.clone(), instrument, asker, readers_in, hand_in, take_in, listener);
+        let ends = AudioEnds { readers: readers_in, hand: hand_in, take: take_in, sound: listener };
+        let controller = KnobController::new(params, shared.clone(), instrument, asker, ends);
         let controller =
             std::thread::Builder::new().name("KnobController".to_owned()).spawn(move || controller.run());
         let audio = KnobAudio::new(shared.clone(), readers, hand, take, sound);

@@ -283,7 +283,8 @@ impl ChalumeauParams {
         };
         settings = self.physical.over(settings);
         if let Some((_, trial, side)) = self.knob.study() {
-            let with = |k: f64| Settings { reed_h: trial.h as f32, reed_k: k as f32, coupled: false, ..settings };
+            let with =
+                |k: f64| Settings { reed_h: trial.h as f32, reed_k: k as f32, coupled: false, ..settings };
             let [own, other] = [side, side.other()].map(|side| with(trial.condition(side).k(trial.h)));
             // Full breath closes either reed, so that the knob can do the same on both.
             let full_kpa = 1e-3 * own.closing_pa().max(other.closing_pa());

@@ -61,15 +61,22 @@ fn in_a_slur_a_still_hand_keeps_its_pressure() {
     for law in LAWS {
         for exaggeration in exaggerations() {
             for pair in SLURS {
-                for (gamma, hand) in [(0.5, HandDesign::default()), (0.8, HandDesign::default()), (0.5, HandDesign::listening())] {
+                for (gamma, hand) in [
+                    (0.5, HandDesign::default()),
+                    (0.8, HandDesign::default()),
+                    (0.5, HandDesign::listening()),
+                ] {
                     runs.push((law, exaggeration, pair, gamma, hand));
                 }
             }
         }
     }
-    let found = each(&runs, |&(law, exaggeration, pair, gamma, hand)| slur(&table(law, exaggeration), pair, gamma, hand));
+    let found = each(&runs, |&(law, exaggeration, pair, gamma, hand)| {
+        slur(&table(law, exaggeration), pair, gamma, hand)
+    });
     let mut worst = 0.0_f64;
-    for (&(law, (contrast, place), (first, second), gamma, hand), [at_once, later]) in runs.iter().zip(found) {
+    for (&(law, (contrast, place), (first, second), gamma, hand), [at_once, later]) in runs.iter().zip(found)
+    {
         println!(
             "{law:?} Contrast {contrast} Place {place} {} {}: gamma {gamma} changes by {at_once:.4} within 30 ms, {later:.4} later; \
              listening: {}",
@@ -167,7 +174,11 @@ fn melody_through_the_knob(table: &FeelTable, follows: Follows) -> (f64, usize) 
             if leap > worst {
                 worst = leap;
                 if leap > LEAP {
-                    println!("  {follows:?} {}: {leap:.3} at {t_s:.2} s, {:.0} ms after the note", fingered.written, 1e3 * (t_s - since_s));
+                    println!(
+                        "  {follows:?} {}: {leap:.3} at {t_s:.2} s, {:.0} ms after the note",
+                        fingered.written,
+                        1e3 * (t_s - since_s)
+                    );
                 }
             }
         }
@@ -188,7 +199,9 @@ fn the_melody_through_the_knob_has_no_spikes() {
     });
     let mut most = 0.0_f64;
     for (&((contrast, place), follows), (leap, changes)) in runs.iter().zip(found) {
-        println!("Contrast {contrast} Place {place}, the hand follows {follows:?}: {leap:.4} over {changes} changes of note");
+        println!(
+            "Contrast {contrast} Place {place}, the hand follows {follows:?}: {leap:.4} over {changes} changes of note"
+        );
         assert!(changes > 40, "{changes}");
         most = most.max(leap);
     }

@@ -63,9 +63,14 @@ fn everything(anarchy: u32) -> Result<()> {
         ],
     )?;
     let anarchy = anarchy.to_string();
-    machine::run(
-        Command::new(&sanitized).args(["--fuzz", "3000000", "--trials", "10000", "--anarchy", &anarchy]),
-    )?;
+    machine::run(Command::new(&sanitized).args([
+        "--fuzz",
+        "3000000",
+        "--trials",
+        "10000",
+        "--anarchy",
+        &anarchy,
+    ]))?;
 
     // The example against stand-ins of the Arduino names it uses: its types fit the core's.
     machine::run(Command::new("g++").args(STRICT).args([

@@ -64,7 +64,9 @@ fn play(rate_hz: f64, blocks: usize, mut transport: impl FnMut(&mut EventBuffer)
     };
     let stopped = instance.activate(|_, _| (), config);
     let stopped = stopped.unwrap_or_else(|reason| panic!("activate at {rate_hz} Hz: {reason}"));
-    let mut processor = stopped.start_processing().ok().expect("starts processing");
+    let Ok(mut processor) = stopped.start_processing() else {
+        panic!("does not start processing at {rate_hz} Hz")
+    };
     let mut peak = 0.0_f32;
     for block in 0..blocks {
         let mut said = EventBuffer::new();

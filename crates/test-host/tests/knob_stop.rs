@@ -1,6 +1,8 @@
 //! How torque ends at a knob that the bundled CLAP has armed: the simulated knob's own log tells for how long there was any.
 //! `cargo xtask bundle` first.
 
+// This file needs only a part of what those tests share.
+#[allow(dead_code)]
 #[path = "support/live.rs"]
 mod live;
 
@@ -58,7 +60,12 @@ fn attended(plugin: &mut Plugin, session: &mut Session, said: &[At], seconds: f6
 fn course(plugin: &mut Plugin, mut session: Session, stop: Stop) -> (Session, f64) {
     let [arm, panic] = ["Arm knob", "Panic"].map(|name| plugin.param(name).unwrap().id);
     session.set_playing(true);
-    attended(plugin, &mut session, &[At(0, on(E3)), At(0, Say::Set(arm, 0.0)), At(0, Say::Set(panic, 0.0))], 0.8);
+    attended(
+        plugin,
+        &mut session,
+        &[At(0, on(E3)), At(0, Say::Set(arm, 0.0)), At(0, Say::Set(panic, 0.0))],
+        0.8,
+    );
     let armed = Instant::now();
     attended(plugin, &mut session, &[At(0, Say::Set(arm, 1.0))], 1.5);
     let held_s = armed.elapsed().as_secs_f64();
@@ -135,7 +142,10 @@ fn late(round: usize) -> Vec<String> {
     for ((stop, held_s), (torque_s, most)) in STOPS.iter().zip(held_s).zip(found) {
         // Torque begins a moment after the act of arming: what is measured is a little too short.
         let after_s = torque_s - held_s;
-        println!("{round} {stop:?}: torque for {:.0} ms after it, {most:.0} mNm at most", 1e3 * after_s.max(0.0));
+        println!(
+            "{round} {stop:?}: torque for {:.0} ms after it, {most:.0} mNm at most",
+            1e3 * after_s.max(0.0)
+        );
         if most < 15.0 || torque_s < held_s - 0.3 {
             late.push(format!("{stop:?}: armed for {torque_s:.2} s of {held_s:.2} with {most:.0} mNm"));
         } else if after_s > stop.limit_s() {

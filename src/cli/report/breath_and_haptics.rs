@@ -327,7 +327,9 @@ impl<'a> BreathAndHaptics<'a> {
             .filter_map(|at| at.notes.as_ref().err().map(|why| format!("Contrast {}: {why}.", at.contrast)))
             .collect();
         let shape = match law {
-            TorqueLaw::Flow => "It rises to the mark at the threshold and falls to nothing where the reed shuts.",
+            TorqueLaw::Flow => {
+                "It rises to the mark at the threshold and falls to nothing where the reed shuts."
+            }
             _ => "A spring with a step at the threshold.",
         };
         Plate {

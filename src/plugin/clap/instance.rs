@@ -29,8 +29,8 @@ use super::note_names::NoteNames;
 use super::out_events::OutEvents;
 use super::{Introduced, Introduction, indication, note_names, note_ports, params, state};
 use crate::parameters::{self, InUse, Parameter};
-use crate::plugin::{Chalumeau, Task};
 use crate::plugin::host_link::HostCalls;
+use crate::plugin::{Chalumeau, Task};
 use chalumeau_core::instrument::Clarinet;
 
 /// A parameter of the framework and what the table says of it.

@@ -86,9 +86,10 @@ mod tests {
 
     #[test]
     fn the_sound_of_a_recording_arrives_with_its_time() {
-        let shared = Arc::new(SharedKnob::new());
+        let shared = Arc::new(SharedKnob::new(Arc::default()));
         let (mut sender, mut listener) = sound_channel(shared.clone());
-        let block: Vec<f32> = (0..480).map(|n| 0.1 * (std::f32::consts::TAU * n as f32 / 48.0).sin()).collect();
+        let block: Vec<f32> =
+            (0..480).map(|n| 0.1 * (std::f32::consts::TAU * n as f32 / 48.0).sin()).collect();
         let play = |sender: &mut SoundSender, listener: &mut SoundListener| {
             for n in 0..100 {
                 sender.send(5_000_000 + 10_000 * n, 48_000.0, &block);

@@ -135,11 +135,6 @@ impl KnobAudio {
         self.shared.let_go(reason);
     }
 
-    /// Whether a knob may start a sound at any time, so that the host must go on calling.
-    pub fn is_played(&self) -> bool {
-        self.breath_from == BlockBreath::Knob
-    }
-
     /// Forgets notes and breath, and lets go of the knob; the link stays.
     pub fn reset(&mut self) {
         self.let_go(Release::Deactivated);

@@ -29,6 +29,14 @@ use chalumeau_knob::touch::take::{Take, TakeRow};
 /// Time between two cycles of the thread.
 const CYCLE: Duration = Duration::from_millis(10);
 
+/// The controller's ends of what it shares with the audio thread.
+pub struct AudioEnds {
+    pub readers: rtrb::Producer<KnobReader>,
+    pub hand: triple_buffer::Input<BreathMapping>,
+    pub take: triple_buffer::Input<Option<Arc<Take>>>,
+    pub sound: SoundListener,
+}
+
 /// The state of the controller's thread.
 pub struct KnobController {
     params: Arc<ChalumeauParams>,
@@ -65,10 +73,7 @@ impl KnobController {
         shared: Arc<SharedKnob>,
         instrument: Arc<SharedInstrument>,
         main_thread: MainPulseAsker,
-        readers: rtrb::Producer<KnobReader>,
-        hand_in: triple_buffer::Input<BreathMapping>,
-        take: triple_buffer::Input<Option<Arc<Take>>>,
-        sound: SoundListener,
+        AudioEnds { readers, hand: hand_in, take, sound }: AudioEnds,
     ) -> Self {
         Self {
             params,

@@ -67,7 +67,8 @@ impl TakeRecorder {
 
     fn write_until(&mut self, until_us: u64) {
         let Some(recording) = &mut self.recording else { return };
-        while let Some((moment, mut marks)) = self.waiting.pop_front_if(|(moment, _)| moment.t_us <= until_us) {
+        while let Some((moment, mut marks)) = self.waiting.pop_front_if(|(moment, _)| moment.t_us <= until_us)
+        {
             marks.heard = self.sound.at(moment.t_us);
             match recording.writer.write(&moment, &marks) {
                 Ok(()) => recording.rows += 1,

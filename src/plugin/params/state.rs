@@ -173,12 +173,17 @@ mod tests {
     fn a_state_from_before_place_and_mark_feels_as_it_did() {
         let old = [("contr", 5.0)];
         let new = [("contr", 5.0), ("place", 2.0), ("mark", 8.0)];
-        for (saved, wanted) in [(&old[..], [5.0, 5.0, 0.0]), (&new[..], [5.0, 2.0, 8.0]), (&[], [3.0, 1.0, 9.0])] {
+        for (saved, wanted) in
+            [(&old[..], [5.0, 5.0, 0.0]), (&new[..], [5.0, 2.0, 8.0]), (&[], [3.0, 1.0, 9.0])]
+        {
             let params = saved.iter().map(|&(id, value)| (id.to_owned(), ParamValue::F32(value))).collect();
             let mut state = PluginState { version: String::new(), params, fields: BTreeMap::new() };
             mend(&mut state);
             for (id, wanted) in ["contr", "place", "mark"].into_iter().zip(wanted) {
-                assert!(matches!(state.params[id], ParamValue::F32(value) if value == wanted), "{saved:?} {id}");
+                assert!(
+                    matches!(state.params[id], ParamValue::F32(value) if value == wanted),
+                    "{saved:?} {id}"
+                );
             }
         }
     }

@@ -8,7 +8,7 @@ mod status;
 mod worker;
 
 use crate::device::heartbeat::{Heartbeat, Heartbeats, Monitor};
-use crate::device::link::worker::{LinkCommand, Worker};
+use crate::device::link::worker::{LinkCommand, Worker, WorkerEnds};
 use crate::device::reader::{KnobReader, ring};
 use crate::device::runtime_dir::RuntimeDir;
 use crate::device::session::StateSample;
@@ -90,7 +90,8 @@ impl KnobLink {
         let status = Arc::new(Mutex::new(LinkStatus::default()));
         let heartbeats = Heartbeats::default();
         let monitor = Monitor::new(heartbeats.clone());
-        let worker = Worker::new(places, label, hooks, queue, monitor, status.clone(), writer, epoch);
+        let ends = WorkerEnds { commands: queue, monitor, status: status.clone(), writer };
+        let worker = Worker::new(places, label, hooks, ends, epoch);
         // A system without another thread to give plays without a knob.
         let thread = thread::Builder::new().name("chalumeau knob".into()).spawn(move || worker.run()).ok();
         (Self { commands: Some(commands), status, thread, heartbeats, epoch }, reader)

@@ -75,7 +75,7 @@ impl HeardTrack {
         }
         self.begins_us = begins_us as f64 - length_us(self.sound.len());
         self.sound.extend(block.iter().map(|&x| if x.is_finite() { f64::from(x) } else { 0.0 }));
-        while self.sound.len() >= self.samples(PIECE_S + WINDOW_S) + 1 {
+        while self.sound.len() > self.samples(PIECE_S + WINDOW_S) {
             self.analyse();
         }
     }
@@ -90,7 +90,8 @@ impl HeardTrack {
     pub fn at(&self, t_us: u64) -> Heard {
         let onset_us = self.onsets_us.iter().rev().find(|&&onset_us| onset_us <= t_us).copied();
         let next = self.moments.partition_point(|moment| moment.t_us < t_us as f64);
-        let near = |at: usize| self.moments.get(at).filter(|near| (near.t_us - t_us as f64).abs() < 1e6 * LEVEL_S);
+        let near =
+            |at: usize| self.moments.get(at).filter(|near| (near.t_us - t_us as f64).abs() < 1e6 * LEVEL_S);
         let nearest = [next.checked_sub(1).and_then(near), near(next)]
             .into_iter()
             .flatten()

@@ -272,7 +272,8 @@ mod tests {
         let text = String::from_utf8(writer.into_inner()).unwrap();
         let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
         assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{text}");
-        let cell = |row: usize, name: &str| rows[row][rows[0].iter().position(|column| *column == name).unwrap()];
+        let cell =
+            |row: usize, name: &str| rows[row][rows[0].iter().position(|column| *column == name).unwrap()];
         for (name, text) in [
             ("h", "2.00000"),
             ("side", "B"),

@@ -61,6 +61,14 @@ pub enum LinkCommand {
     FeelOsc(Option<SocketAddr>),
 }
 
+/// The worker's ends of what it shares with the link and its users.
+pub struct WorkerEnds {
+    pub commands: Receiver<LinkCommand>,
+    pub monitor: Monitor,
+    pub status: Arc<Mutex<LinkStatus>>,
+    pub writer: KnobWriter,
+}
+
 /// See the module.
 pub struct Worker {
     places: RuntimeDir,
@@ -111,10 +119,7 @@ impl Worker {
         places: RuntimeDir,
         label: &str,
         hooks: Hooks,
-        commands: Receiver<LinkCommand>,
-        monitor: Monitor,
-        status: Arc<Mutex<LinkStatus>>,
-        writer: KnobWriter,
+        WorkerEnds { commands, monitor, status, writer }: WorkerEnds,
         epoch: Instant,
     ) -> Self {
         Self {

@@ -77,7 +77,9 @@ mod tests {
             }
             assert_eq!(before, 0.0);
         }
-        for (from, own) in [(0.0, 30.0), (50.0, f64::NAN), (50.0, f64::INFINITY), (f64::NAN, 30.0), (50.0, 50.0)] {
+        for (from, own) in
+            [(0.0, 30.0), (50.0, f64::NAN), (50.0, f64::INFINITY), (f64::NAN, 30.0), (50.0, 50.0)]
+        {
             assert_eq!(Carry::new(from, own).effective_deg(70.0), 70.0, "{from} {own}");
         }
         let mut carry = Carry::new(100.0, 130.0);
