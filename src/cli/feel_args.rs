@@ -92,6 +92,7 @@ impl FeelArgs {
     }
 
     /// Whether the strength was left to the program.
+    #[cfg(feature = "devices")]
     pub fn may_weaken(&self) -> bool {
         self.torque.is_none()
     }
