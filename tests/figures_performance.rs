@@ -516,13 +516,14 @@ fn breath_and_feel_are_figures_of_one_instrument() {
         // What is refused is said where it would be drawn, and the same scale serves all.
         assert!(figure.panels.iter().all(|panel| panel.y.range == figure.panels[0].y.range));
         assert!(figure.panels[2].title.ends_with("refused") && lines(&figure.panels[2]).is_empty());
-        // Under the flow law the felt threshold is the top of the curve up to closure.
+        // Under the flow law the felt threshold is the top of the curve up to closure. The curve has a point every four degrees,
+        // so it may miss the tip of the mark: 3 % of the torque.
         if law == TorqueLaw::Flow {
             for note in all.iter().filter_map(|at| at.notes.as_ref().ok()).flatten() {
                 let up_to_closure = note.curve.iter().filter(|(deg, _)| *deg < note.close.0);
                 let top = up_to_closure.map(|&(_, mnm)| mnm).fold(0.0, f64::max);
                 assert!(
-                    top <= note.on.1 + 1e-3 && top > 0.99 * note.on.1,
+                    top <= note.on.1 + 1e-3 && top > 0.97 * note.on.1,
                     "{}: {top} {:?}",
                     note.name,
                     note.on

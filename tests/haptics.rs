@@ -157,8 +157,9 @@ fn a_hand_can_find_the_threshold_of_the_flow_law_by_its_mark() {
     let about = |note: &NoteFeel| {
         let torque = |deg: f64| torque_law::torque_mnm(&note.feel, tables, deg);
         let top = torque(note.landmarks.a_on_deg);
+        // Beyond closure is the wall.
         let within: Vec<f64> = (0..=4_000)
-            .map(|step| 1e-3 * f64::from(step) * note.landmarks.a_on_deg)
+            .map(|step| 0.25e-3 * f64::from(step) * note.landmarks.a_close_deg)
             .filter(|&deg| torque(deg) >= top / (1.0 + TORQUE_JND))
             .collect();
         (within[0], within[within.len() - 1])

@@ -176,7 +176,7 @@ fn arming_with_the_usual_feel_works_and_more_than_250_mnm_needs_an_answer() {
     };
     let (ok, said, ceilings) = run("60", "");
     assert!(ok && ceilings == [60], "{ceilings:?}: {said}");
-    assert!(said.contains("weakened from 60 to"), "{said}");
+    assert!(said.contains("weakened from 55 to"), "{said}");
     let (ok, said, ceilings) = run("300", "yes\n");
     assert!(!ok && ceilings.is_empty(), "{ceilings:?}");
     assert!(said.contains("Type 300 and Enter") && said.contains("300 was not typed"), "{said}");

@@ -202,7 +202,7 @@ fn the_melody_through_the_knob_has_no_spikes() {
         println!(
             "Contrast {contrast} Place {place}, the hand follows {follows:?}: {leap:.4} over {changes} changes of note"
         );
-        assert!(changes > 40, "{changes}");
+        assert!(changes > 30, "{changes} changes are too few to judge by");
         most = most.max(leap);
     }
     println!("melody: largest leap of gamma {most:.4}");

@@ -12,7 +12,7 @@
 
 use crate::haptics::angle_map::AngleMap;
 use crate::haptics::feel_design::{FeelDesign, NoteOrder};
-use crate::haptics::feel_parameters::{Feel, TorqueLaw};
+use crate::haptics::feel_parameters::{Feel, STRETCH, TorqueLaw};
 use crate::haptics::feel_refused::FeelRefused;
 use crate::haptics::played_reed::PlayedReed;
 use crate::haptics::requirement::{NoteRequirement, RequirementSolver};
@@ -246,13 +246,15 @@ fn note(
         a_off_deg,
     };
     let (h, k) = (reed.law.h(), reed.law.k());
+    // A free knob makes no torque, whatever the strength.
+    let scale_mnm = if design.law == TorqueLaw::Free { 0.0 } else { design.strength_mnm * torque };
     let feel = Feel {
         feel_id: 0,
         law: design.law,
         morph_ms: design.morph_ms,
         h: h as f32,
         k: k as f32,
-        scale_mnm: (design.strength_mnm * torque) as f32,
+        scale_mnm: scale_mnm as f32,
         stretch: (360.0 * h * k / a_close_deg) as f32,
         offset_deg: 0.0,
         a_on_deg: a_on_deg as f32,
@@ -279,8 +281,11 @@ fn refuse(notes: &[NoteFeel], design: &FeelDesign, limits: &TorqueLimits) -> Res
         each.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((WrittenNote(0), 0.0))
     };
     let (note, wanted_deg) = worst(|close_deg, _| close_deg);
-    if wanted_deg > CLOSURE_MAX_DEG {
-        return Err(FeelRefused::Travel { note, wanted_deg, limit_deg: CLOSURE_MAX_DEG });
+    // The stretch of the law has a least value, too.
+    let longest_deg = |note: &NoteFeel| 360.0 * f64::from(note.feel.h * note.feel.k / STRETCH.low);
+    let limit_deg = notes.iter().map(longest_deg).fold(CLOSURE_MAX_DEG, f64::min);
+    if wanted_deg > limit_deg {
+        return Err(FeelRefused::Travel { note, wanted_deg, limit_deg });
     }
     // Under the pressure law closure stays where it is while Place moves the threshold.
     let latest = |a: &&NoteFeel, b: &&NoteFeel| a.landmarks.a_on_deg.total_cmp(&b.landmarks.a_on_deg);

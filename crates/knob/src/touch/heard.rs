@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 /// Level from which a sound counts as a note, dB (rms over full scale): 7 dB above the breath noise of the standard clarinet
 /// just below its threshold (-52 dB), 14 dB below its softest steady notes (-31 dB).
 pub const HEARD_DB: f64 = -45.0;
-/// Rise of the level within [`FLOOR_S`] that is a new attack, dB. Tongued notes fall and rise by 15 dB and more (by judgement).
+/// Rise of the level within 0.1 s that is a new attack, dB. Tongued notes fall and rise by 15 dB and more (by judgement).
 pub const ATTACK_DB: f64 = 10.0;
 /// Time over which the lowest level counts as what was before, s.
 const FLOOR_S: f64 = 0.1;
