@@ -168,6 +168,8 @@ fn clap_validator(program: &Path) -> Result<()> {
 
 /// The number of failed tests in clap-validator's summary: "44 tests run, 32 passed, 4 failed, 0 warnings, 8 skipped".
 fn failed_tests(said: &str) -> Option<u32> {
+    // It colours its numbers even where nobody sees colours.
+    let said = anstream::adapter::strip_str(said).to_string();
     let summary = said.lines().rev().find(|line| line.contains(" tests run, "))?;
     summary.split(", ").find_map(|part| part.trim().strip_suffix(" failed"))?.trim().parse().ok()
 }
@@ -194,6 +196,8 @@ mod tests {
         let said = "...\n44 tests run, 32 passed, 4 failed, 0 warnings, 8 skipped\n";
         assert_eq!(failed_tests(said), Some(4));
         assert_eq!(failed_tests("44 tests run, 36 passed, 0 failed, 0 warnings, 8 skipped"), Some(0));
+        let coloured = "44 tests run, \x1b[1;32m36\x1b[0m passed, \x1b[1;31m2\x1b[0m failed, \x1b[1;33m0\x1b[0m warnings";
+        assert_eq!(failed_tests(coloured), Some(2));
         assert_eq!(failed_tests("4 failed"), None);
     }
 }

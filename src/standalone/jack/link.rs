@@ -1,6 +1,7 @@
 //! The link to the JACK server: begins to play, watches the server, and waits for the next one when it has gone.
 
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -17,6 +18,8 @@ const POLL: Duration = Duration::from_millis(50);
 const RETRY: Duration = Duration::from_millis(300);
 /// How often it notes or makes connections.
 const CONNECTING: Duration = Duration::from_secs(1);
+/// How long the program waits at its start for the server to begin. A busy server takes a few tenths of a second.
+const BEGINNING: Duration = Duration::from_secs(2);
 /// How long the program waits for the client to close when it ends.
 const CLOSING: Duration = Duration::from_millis(800);
 
@@ -100,8 +103,14 @@ impl JackLink {
             stalls: false,
             last_words: String::new(),
         };
-        let thread = std::thread::Builder::new().name("JackLink".to_owned()).spawn(move || link.run(client));
+        let (tell, told) = channel();
+        let thread =
+            std::thread::Builder::new().name("JackLink".to_owned()).spawn(move || link.run(client, tell));
         let is_running = thread.is_ok();
+        // A program that says that it plays shall do so. A server that hangs is said here: the thread waits for it.
+        if told.recv_timeout(BEGINNING) == Err(RecvTimeoutError::Timeout) {
+            eprintln!("chalumeau-standalone: {STALLED}");
+        }
         *self.thread.lock().unwrap_or_else(PoisonError::into_inner) = thread.ok();
         is_running
     }
@@ -147,8 +156,15 @@ struct LinkThread {
 }
 
 impl LinkThread {
-    fn run(mut self, first: JackClient) {
+    /// Plays until it is told to stop. `begun` hears when the first client plays or cannot.
+    fn run(mut self, first: JackClient, begun: Sender<()>) {
+        let asked_at = Instant::now();
         let mut playing = self.play(first);
+        // By now, nobody may wait any more.
+        let _ = begun.send(());
+        if playing.is_some() && asked_at.elapsed() > BEGINNING {
+            self.say(BACK);
+        }
         if let Some(client) = &playing {
             self.connect_first(client);
             // A server without a sound card lacks the others, which is no mistake of the user.
