@@ -405,10 +405,10 @@ fn what_is_felt_is_what_sounds() {
     println!("worst {:.2} % of the angle", 100.0 * worst);
 }
 
-/// Notes that start on another mode than their own: three of the clarion, by less than 1 %, and all from G#6 up, whose
-/// fingerings have no resonances in the right order.
+/// Notes that start on another mode than their own: F5, by a hair, and all from A#6 up, whose fingerings have no resonances
+/// in the right order.
 #[test]
-fn up_to_g6_a_note_starts_itself() {
+fn up_to_a6_a_note_starts_itself() {
     let mut elsewhere = Vec::new();
     for (note, asked) in BORE.with(&played_reed(&MODEL.file, &Settings::default())).into_iter().enumerate() {
         let asked = asked.unwrap();
@@ -422,11 +422,11 @@ fn up_to_g6_a_note_starts_itself() {
                 MODEL.notes_hz[note],
                 100.0 * (own / asked.gamma_sounding - 1.0)
             );
-            assert!(written(note) > 91 || own < 1.01 * asked.gamma_sounding);
+            assert!(written(note) > 93 || own < 1.001 * asked.gamma_sounding);
             elsewhere.push(written(note));
         }
     }
-    assert_eq!(elsewhere, [76, 77, 78, 92, 93, 94, 95, 96, 97]);
+    assert_eq!(elsewhere, [77, 94, 95, 96, 97]);
 }
 
 /// Gamma above which a loud note is silent, in a slow crescendo.

@@ -176,7 +176,7 @@ fn say_what_tuning_found(model: &Model, wanted: &Wanted) {
     };
     for (what, notes) in [
         (
-            "do not sound in their register at any pressure and get the tuning of their neighbours",
+            "sound in their register at one pressure of five or at none, and get the tuning of their neighbours",
             names(|n| n.silent),
         ),
         ("cannot be tuned by the delay alone", names(|n| !n.silent && n.off_cents != 0.0)),

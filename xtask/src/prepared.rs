@@ -8,7 +8,7 @@ use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::cells::Cells;
 use chalumeau_core::instrument::held_note::HeldNote;
 use chalumeau_core::instrument::internal_rate::INTERNAL_RATES_HZ;
-use chalumeau_core::instrument::prepare::auto_tune;
+use chalumeau_core::instrument::prepare::auto_tune::{self, Accuracy};
 use chalumeau_core::instrument::prepare::{self, Preparation, PreparedInstrument, Progress};
 use chalumeau_core::instrument::tuning_table::{GAMMA_NODES, NATURAL_GAMMA};
 use chalumeau_core::instrument::{Model, Quality, Wanted};
@@ -182,7 +182,7 @@ pub fn tune(args: &[String]) -> Result<()> {
         };
         let offsets =
             auto_tune::offsets(&model, &mut |_| ControlFlow::Continue(())).context("not cancelled")?;
-        let tuning = auto_tune::tune(&model, &offsets, &mut on).context("not cancelled")?;
+        let tuning = auto_tune::tune(&model, &offsets, Accuracy::FINE, &mut on).context("not cancelled")?;
         keep(instrument, PreparedInstrument::of(&Model { tuning, ..model }))?;
     }
     Ok(())

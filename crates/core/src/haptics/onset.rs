@@ -15,8 +15,8 @@
 //! inertia.
 //!
 //! The lattice moves its reed in samples of length T. With `z = exp(j w T)`, `d = 1 / (1 + q w_r T)`, `A = d (T w_r)^2`, its
-//! response is `D = A z / ((z - 1)(z - d) + A z)`, and `(1 - 1/z) / T` takes the place of `j w`. The difference is 1 % at
-//! 1 kHz and 5 % at 1.8 kHz.
+//! response is `D = A z / ((z - 1)(z - d) + A z)`, and `(z - 1/z) / 2 T` takes the place of `j w`: its flow is that
+//! of the mean speed of the sample. A continuous reed would start up to 0.45 % later, at 1.8 kHz.
 //!
 //! The loss of jets in open holes is left out: once the steady flow leaves through the bell, it is of second order in the
 //! amplitude.
@@ -79,7 +79,7 @@ impl MovingReed {
                 let z = Complex64::from_polar(1.0, TAU * f_hz / rate_hz);
                 let kept = 1.0 / (1.0 + damping * turn);
                 let drive = kept * turn * turn;
-                (drive * z / ((z - 1.0) * (z - kept) + drive * z), rate_hz * (1.0 - z.inv()))
+                (drive * z / ((z - 1.0) * (z - kept) + drive * z), 0.5 * rate_hz * (z - z.inv()))
             }
         }
     }

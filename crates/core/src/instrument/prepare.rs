@@ -33,6 +33,8 @@ use std::sync::Arc;
 use crate::bore::bundled::Bundled;
 use crate::instrument::concert_pitch::A4_HZ;
 use crate::instrument::model::{BuildError, Model};
+#[cfg(feature = "fit")]
+use crate::instrument::prepare::auto_tune::Accuracy;
 use crate::instrument::store::Store;
 #[cfg(feature = "fit")]
 use crate::instrument::tuning_table::TuningTable;
@@ -149,7 +151,8 @@ impl Preparation<'_> {
             offsets = heard_offsets(&model, on)?;
         }
         let mut tuning_share = |share| on(Progress::Tuning(HEARD + (1.0 - HEARD) * share));
-        let tuning = auto_tune::tune(&model, &offsets, &mut tuning_share).ok_or(BuildError::Cancelled)?;
+        let tuning = auto_tune::tune(&model, &offsets, Accuracy::QUICK, &mut tuning_share)
+            .ok_or(BuildError::Cancelled)?;
         let model = Model { tuning, ..Model::clone(&model) };
         self.keep(Stored::Tuned, &model)?;
         Ok(model)

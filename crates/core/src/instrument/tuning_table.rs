@@ -30,7 +30,7 @@ pub struct NoteTuning {
     /// Remaining error at [`NATURAL_GAMMA`] where the delay has no more to give, cents above the note; else 0.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub off_cents: f64,
-    /// True if the note does not sound in its register at any of these pressures; its trims are those of its neighbours.
+    /// True if the note sounds in its register at one of these pressures or at none; its trims are those of its neighbours.
     #[serde(default, skip_serializing_if = "is_false")]
     pub silent: bool,
 }

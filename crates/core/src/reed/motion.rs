@@ -8,6 +8,12 @@
 //! the same entries: `u = zeta (x_a[p] (B + r p) - r x_b[p])`, the table's quasi-static law plus inertia, which for exact tables
 //! is `zeta B sqrt(p)`.
 //!
+//! The reed's motion makes flow, too. In the sample from speed `v` to `v'` it is that of the mean speed, `(v + v') / 2`. Then
+//! the reed takes from the bore exactly what its motion gives to the bore, and without breath the energy of reed and bore
+//! together can only fall: the mean speed times the spring's force telescopes to a change of `e e' / 2`, times the damping to
+//! a loss. With the speed before the sample instead, a weak reed on a high note sang by itself. `v'` depends on the pressure
+//! difference linearly, so that the quadratic stays one, with X and kappa divided by a constant.
+//!
 //! The lay rounds the closure: the opening is linear until `lay` before contact and then a parabola, zero at `lay`
 //! beyond. The closing pressure p_M is therefore the *extrapolated* one. With `lay` 0 the corner is averaged over one
 //! sample, which removes most of its aliasing and is the same parabola with half-width |v| T / 2.
@@ -71,11 +77,13 @@ pub struct ReedCoeffs {
     lay: f64,
     /// The same, per speed, of the parabola that averages a sharp corner over one sample.
     averaged: f64,
-    /// Acceleration per force and sample: T w_r^2.
-    drive: f64,
     /// 1 / (1 + q w_r T).
     damp: f64,
-    /// Flow the reed's own motion makes, per speed: V / (S c), s.
+    /// Speed gained in a sample per force: T w_r^2 / (1 + q w_r T).
+    drive: f64,
+    /// The same per pressure difference.
+    yields: f64,
+    /// Flow the reed's own motion makes, per sum of the speeds before and after the sample: V / (2 S c), s.
     swept: f64,
 }
 
@@ -87,17 +95,21 @@ impl ReedCoeffs {
         let closing = law.h() * K_INIT;
         // w_r T stays below 1, well inside the integrator's stability limit of 2.
         let angular = std::f64::consts::TAU * resonance_hz.min(0.15 * rate_hz);
+        let damp = 1.0 / (1.0 + damping * angular * period);
+        let drive = period * angular * angular * damp;
+        let compliance = K_INIT / law.k();
         Self {
             period,
             strength: zeta * law.a(),
             closing,
             per_closing: 1.0 / closing,
-            compliance: K_INIT / law.k(),
+            compliance,
             lay: lay.max(1e-9),
             averaged: 0.5 * period / closing,
-            drive: period * angular * angular,
-            damp: 1.0 / (1.0 + damping * angular * period),
-            swept: swept_s,
+            damp,
+            drive,
+            yields: drive * compliance,
+            swept: 0.5 * swept_s,
         }
     }
 
@@ -123,6 +135,17 @@ pub struct ReedState {
 }
 
 impl ReedState {
+    /// Energy of the reed's motion and spring, in the units of
+    /// [`Lattice::stored_energy`](crate::bore::lattice::Lattice::stored_energy); `reed` is that of the last sample. Without
+    /// breath, noise and tongue the sum of both falls in every sample. For tests.
+    pub fn stored_energy(&self, reed: &ReedCoeffs) -> f64 {
+        let Self { closing, speed, .. } = *self;
+        let motion = (1.0 + reed.damp) / (2.0 * reed.drive) * speed * speed;
+        // Closing times the closing one sample earlier.
+        let spring = closing * (closing - reed.period * speed) / reed.period;
+        reed.swept / reed.compliance * (motion + spring)
+    }
+
     /// One sample: takes mouth pressure, the wave arriving from the bore, extra flow (noise) and the tongue's force,
     /// and gives the wave leaving into the bore. `kappa` is 1 over the admittance of the first bore cell.
     /// Real-time safe; `zeta kappa B` may be anything, the solution is unique. [audio thread]
@@ -150,7 +173,11 @@ impl ReedState {
             knee * knee / (4.0 * half)
         };
         let b = rest * opening;
-        let x = p_mouth - 2.0 * p_minus - kappa * (reed.swept * self.speed + noise);
+        // The speed after this sample, but for what the pressure difference adds.
+        let free = reed.damp * self.speed + reed.drive * (tongue - self.closing);
+        let share = 1.0 / (1.0 + kappa * reed.swept * reed.yields);
+        let x = share * (p_mouth - 2.0 * p_minus - kappa * (reed.swept * (self.speed + free) + noise));
+        let kappa = share * kappa;
         let magnitude = x.abs();
         let half_load = 0.5 * kappa * reed.strength * b;
         let load = (half_load * half_load + magnitude).sqrt();
@@ -167,7 +194,7 @@ impl ReedState {
         self.p_mouthpiece = p_mouth - p;
         self.flow = sign * reed.strength * table_flow;
         self.opening = opening;
-        self.speed = (self.speed + reed.drive * (r * p + tongue - self.closing)) * reed.damp;
+        self.speed = free + reed.yields * p;
         self.closing += reed.period * self.speed;
         self.p_mouthpiece - p_minus
     }

@@ -1,8 +1,8 @@
 //! Finds the trims of a [`TuningTable`] by playing: it holds every note, measures its pitch, and moves its delay until the
 //! pitch is right.
 //!
-//! The notes are independent, so the result does not depend on how many processor cores share them. A note that does not
-//! sound in its register gets the trims of its neighbours and is marked. Units: cents above the wanted pitch, rows of
+//! The notes are independent, so the result does not depend on how many processor cores share them. A note that hardly ever
+//! sounds in its register gets the trims of its neighbours and is marked. Units: cents above the wanted pitch, rows of
 //! round-trip delay, mouth pressure over the closing pressure (gamma).
 
 use std::ops::ControlFlow;
@@ -14,23 +14,41 @@ use crate::instrument::tuning_table::{GAMMA_NODES, NATURAL_GAMMA, NoteTuning, Tu
 use crate::parallel;
 use crate::units::cents;
 
-/// Largest error of a note that needs no further trim, cents.
-const CLOSE_CENTS: f64 = 0.1;
 /// A note with a larger error than this after trimming is reported as out of tune, cents.
 const OFF_CENTS: f64 = 0.5;
-/// How far a note is moved to measure its sensitivity to the delay, cents: down, where the delay has more room.
-const PROBE_CENTS: f64 = -20.0;
+/// How far a note is moved up and down to measure its sensitivity to the delay, cents.
+const PROBE_CENTS: f64 = 20.0;
 /// A pitch further off than this is another note, cents: after trimming, and before. Before trimming a note must also be
 /// nearer to its own mode than to a neighbouring one.
 const OTHER_NOTE_CENTS: (f64, f64) = (150.0, 300.0);
 /// Largest number of times a note is played for one trim.
 const PLAYS: usize = 6;
-/// A last step of less than this is not played again, cents: the sensitivity is known to a few per cent by then.
-const SURE_CENTS: f64 = 2.0;
 /// A move by more than this measures the sensitivity, cents.
 const MEASURING_CENTS: f64 = 10.0;
+/// At fewer of the five pressures than this a note does not speak. One alone is chance: there written A#6 of the bundled
+/// clarinets can be trimmed to its pitch at some rates and not at others, and it leaves its register when played softer or
+/// louder.
+const FEWEST_PRESSURES: usize = 2;
 /// Lowest note of the B flat clarinet, Hz. A larger instrument takes longer to settle, in proportion to its size.
 const LOWEST_HZ: f64 = 146.83;
+
+/// How exactly notes are tuned.
+#[derive(Clone, Copy, Debug)]
+pub struct Accuracy {
+    /// Largest error of a note that needs no further trim, cents.
+    close_cents: f64,
+    /// A last step of less than this is not played again, cents: the sensitivity is known to a few per cent by then.
+    sure_cents: f64,
+    /// Whether the sensitivity is measured around the trim, by two more plays, or taken from the way there.
+    around: bool,
+}
+
+impl Accuracy {
+    /// Within 0.1 cents: for a user who waits.
+    pub const QUICK: Self = Self { close_cents: 0.1, sure_cents: 2.0, around: false };
+    /// Within 0.03 cents: for the instruments that come with the program. Takes half as long again.
+    pub const FINE: Self = Self { close_cents: 0.02, sure_cents: 0.2, around: true };
+}
 
 /// From when to when the pitch of a held note is measured, s: near the threshold a note grows slowly.
 fn listening_s(model: &Model, gamma: f64) -> (f64, f64) {
@@ -58,6 +76,7 @@ struct Trial<'a> {
     model: &'a Model,
     fingering: usize,
     gamma: f64,
+    accuracy: Accuracy,
 }
 
 /// A trim that was played.
@@ -89,14 +108,18 @@ impl Trial<'_> {
         let (mut best, mut before) = (from, from);
         let mut rows = from.rows;
         for _ in 1..PLAYS {
-            if best.off_cents.abs() < CLOSE_CENTS {
+            if best.off_cents.abs() < self.accuracy.close_cents {
                 break;
             }
             let wanted = (before.rows - sensitivity * estimate(before.off_cents)).clamp(low, high);
             if wanted == rows {
                 break;
             }
-            if heard.is_some() && before.off_cents.abs() < SURE_CENTS && wanted > low && wanted < high {
+            if heard.is_some()
+                && before.off_cents.abs() < self.accuracy.sure_cents
+                && wanted > low
+                && wanted < high
+            {
                 best = PlayedTrim { rows: wanted, off_cents: 0.0 };
                 break;
             }
@@ -122,26 +145,37 @@ impl Trial<'_> {
         (best, heard)
     }
 
-    /// Rows per cent near a trim, over [`Model::rows_for_cents`]; measured by moving the note.
+    /// Rows per cent near a trim, over [`Model::rows_for_cents`]; measured by moving the note both ways, or the one way for
+    /// which the delay has room.
     fn sensitivity(&self, at: PlayedTrim) -> Option<f64> {
-        let probe = self.model.rows_for_cents(self.fingering, PROBE_CENTS);
         let (low, high) = self.model.coeffs.tuning_range();
-        // Move the note up where the delay has no room to move it down.
-        let probe = if at.rows + probe > high { (-probe).max(low - at.rows) } else { probe };
-        let moved = self.play(at.rows + probe)?.off_cents - at.off_cents;
-        Some((probe / self.model.rows_for_cents(self.fingering, moved)).clamp(0.5, 3.0))
+        let moved = |cents: f64| {
+            let rows = at.rows + self.model.rows_for_cents(self.fingering, cents);
+            (low..=high).contains(&rows).then(|| self.play(rows)).flatten()
+        };
+        let (down, up) = (moved(-PROBE_CENTS), moved(PROBE_CENTS));
+        let (from, to) = (down.or(up.map(|_| at))?, up.unwrap_or(at));
+        let estimate = |trim: PlayedTrim| self.model.rows_for_cents(self.fingering, trim.off_cents);
+        Some(((to.rows - from.rows) / (estimate(to) - estimate(from))).clamp(0.5, 3.0))
     }
 }
 
 /// The trims of one note. `untrimmed_cents` is its error without a trim at [`NATURAL_GAMMA`], `None` if it is silent
 /// there.
-fn tune_note(model: &Model, fingering: usize, untrimmed_cents: Option<f64>) -> NoteTuning {
-    let at = |gamma: f64| Trial { model, fingering, gamma };
+fn tune_note(
+    model: &Model,
+    fingering: usize,
+    untrimmed_cents: Option<f64>,
+    accuracy: Accuracy,
+) -> NoteTuning {
+    let at = |gamma: f64| Trial { model, fingering, gamma, accuracy };
     let mut note = model.tuning.notes[fingering];
     let (natural, heard) = match untrimmed_cents {
         Some(off_cents) => {
             let (found, heard) = at(NATURAL_GAMMA).trim(PlayedTrim { rows: 0.0, off_cents }, None);
-            (Some(found), heard.or_else(|| at(NATURAL_GAMMA).sensitivity(found)))
+            let around = || at(NATURAL_GAMMA).sensitivity(found);
+            let heard = if accuracy.around { around().or(heard) } else { heard.or_else(around) };
+            (Some(found), heard)
         }
         None => (None, None),
     };
@@ -154,8 +188,9 @@ fn tune_note(model: &Model, fingering: usize, untrimmed_cents: Option<f64>) -> N
         found
     });
     // A note that does not speak at the natural pressure is tuned at the first pressure where it does.
-    let first = natural.or_else(|| nodes.into_iter().flatten().next());
-    note.silent = first.is_none();
+    let speaks = natural.iter().chain(nodes.iter().flatten()).count() >= FEWEST_PRESSURES;
+    let first = natural.or_else(|| nodes.into_iter().flatten().next()).filter(|_| speaks);
+    note.silent = !speaks;
     note.sensitivity = heard.unwrap_or(1.0);
     note.natural = first.map_or(0.0, |found| found.rows);
     note.off_cents = first.map_or(0.0, |found| found.off_cents);
@@ -174,7 +209,7 @@ fn tune_note(model: &Model, fingering: usize, untrimmed_cents: Option<f64>) -> N
 /// its register. `on` receives the share done, 0..=1; if it breaks, the result is `None`.
 pub fn offsets(model: &Model, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Option<Vec<Option<f64>>> {
     let untrimmed = |fingering: usize| {
-        let trial = Trial { model, fingering, gamma: NATURAL_GAMMA };
+        let trial = Trial { model, fingering, gamma: NATURAL_GAMMA, accuracy: Accuracy::QUICK };
         trial.play(0.0).map(|found| found.off_cents)
     };
     parallel::each(model.file.fingerings.len(), untrimmed, on)
@@ -185,10 +220,12 @@ pub fn offsets(model: &Model, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Opt
 pub fn tune(
     model: &Model,
     offsets: &[Option<f64>],
+    accuracy: Accuracy,
     on: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Option<TuningTable> {
     let count = model.file.fingerings.len();
-    let note = |fingering: usize| tune_note(model, fingering, offsets.get(fingering).copied().flatten());
+    let note =
+        |fingering: usize| tune_note(model, fingering, offsets.get(fingering).copied().flatten(), accuracy);
     let mut table = TuningTable { notes: parallel::each(count, note, on)? };
     fill_silent(model, &mut table);
     Some(table)

@@ -31,3 +31,24 @@ pub fn find(file: &InstrumentFile, rate_hz: f64, a4_hz: f64) -> Result<Option<Mo
     let found = prepared.find(|prepared| prepared.cells.rate_hz == rate_hz && prepared.a4_hz == a4_hz);
     Ok(found.and_then(|prepared| prepared.model(file)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The tuner decides it for each rate anew; a player must find the same keys at all of them.
+    #[test]
+    fn the_same_keys_are_silent_on_every_instrument_at_every_rate() {
+        for instrument in Bundled::ALL {
+            let file = instrument.file();
+            let models = parse_generated(generated(instrument)).unwrap();
+            assert_eq!(models.len(), 4, "live and high quality, two families of rates");
+            for prepared in models {
+                let model = prepared.model(&file).unwrap();
+                let silent = (0..file.fingerings.len()).filter(|&fingering| !model.speaks(fingering));
+                let written: Vec<_> = silent.map(|at| file.fingerings[at].written.to_string()).collect();
+                assert_eq!(written, ["A#6", "B6", "C#7"], "{}, {} Hz", file.name, model.coeffs.rate_hz);
+            }
+        }
+    }
+}
