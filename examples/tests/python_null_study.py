@@ -80,12 +80,15 @@ def without_equal_travel_the_reed_is_measured():
 
 def a_planted_effect_of_one_standard_deviation_is_found():
     players, metric, own_spread = study_questions.ENOUGH_PARTICIPANTS, "angle_rms_deg", 0.05
-    # How far a hand that trembles a fifth more moves the measure, and how much the differences of equal hands scatter.
-    many = 40
-    pilots = studies(many, [1_000, 1_000], trembles=[np.full(many, size) for size in (1.0, 1.2)])
-    equal, more = (study["all"][metric] for study in pilots)
-    slope = (equal["difference"] - more["difference"]) / 0.2
-    spread = float(np.hypot(equal["sd"] / slope, own_spread))
+    # How far a hand that trembles a tenth more moves the measure, and how much the differences of such hands scatter: each
+    # from 160 hands, so that the scatter is known within 6 %.
+    many, step, pilot_seeds = 40, 0.1, range(1_000, 1_004)
+    sizes = [np.full(many, size) for size in (1.0, 1.0 + step) for _ in pilot_seeds]
+    pilots = [study["all"][metric] for study in studies(many, [*pilot_seeds, *pilot_seeds], trembles=sizes)]
+    equal, more = pilots[: len(pilot_seeds)], pilots[len(pilot_seeds) :]
+    slope = np.mean([a["difference"] - b["difference"] for a, b in zip(equal, more)]) / step
+    scatter = np.sqrt(np.mean([row["sd"] ** 2 for row in more]))
+    spread = float(np.hypot(scatter / slope, own_spread))
 
     # People differ in how much more they tremble; the mean is one standard deviation of all differences.
     def planted(seed):
