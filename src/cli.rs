@@ -19,6 +19,7 @@ mod knob;
 mod knob_sim;
 mod parameters;
 mod plot_args;
+mod radiation;
 mod reed;
 mod reed_physical;
 mod render;
@@ -77,6 +78,7 @@ enum Command {
     Render(Box<render::RenderCommand>),
     Report(Box<report::ReportCommand>),
     Impedance(Box<impedance::ImpedanceCommand>),
+    Radiation(Box<radiation::RadiationCommand>),
     Bore(Box<bore::BoreCommand>),
     Instrument(Box<instrument::InstrumentCommand>),
     Threshold(threshold::ThresholdCommand),
@@ -184,6 +186,7 @@ pub fn main() -> ExitCode {
         Command::Render(command) => command.run(),
         Command::Report(command) => command.run(),
         Command::Impedance(command) => command.run(),
+        Command::Radiation(command) => command.run(),
         Command::Bore(command) => command.run(),
         Command::Instrument(command) => {
             return match command.run() {

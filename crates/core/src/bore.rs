@@ -26,6 +26,7 @@ pub mod fit;
 pub mod instrument_file;
 pub mod lattice;
 pub mod radiation;
+pub mod sound_sources;
 pub mod tone_hole;
 pub mod transfer_matrix;
 pub mod wall_loss;

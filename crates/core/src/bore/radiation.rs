@@ -12,6 +12,10 @@ pub const END_CORRECTION: f64 = 0.6133;
 /// Radiation resistance of an unflanged end over `(k r)^2` and its characteristic impedance.
 pub const RESISTANCE: f64 = 0.25;
 
+/// `ka` above which an unflanged end gives less power than a point of the same flow: by 3 dB here, then by 6 dB an octave.
+/// That is the real part of its impedance below.
+pub const BELL_CORNER: f64 = END_CORRECTION / RESISTANCE;
+
 /// Radiation impedance of an unflanged pipe of `radius_m` at `omega` rad/s, Pa s/m3.
 pub(super) fn impedance(omega: f64, radius_m: f64, air: &Air) -> Complex64 {
     let kr = omega * radius_m / air.c;

@@ -16,6 +16,7 @@
 //! | b, a, h: radii of hole and bore, chimney height, m | `radius_m`, `bore_radius_m`, `chimney_m` |
 //! | Z/Zc of the nominal bore | `over_zc` |
 
+mod outflow;
 mod standing;
 
 use std::collections::HashMap;
@@ -101,6 +102,8 @@ struct AtFrequency {
     spans: Box<[Matrix]>,
     /// Shunt admittance of each hole, `[closed, open]`, m3/(Pa s).
     shunts: Box<[[Complex64; 2]]>,
+    /// Flow outside each open hole over that into its chimney.
+    chimneys: Box<[Complex64]>,
     /// Lossy characteristic impedance of the bore at each hole, Pa s/m3.
     bore_z_c: Box<[Complex64]>,
     bell: Complex64,
@@ -377,10 +380,16 @@ impl TransferMatrix {
             let chimney_open = z_c * (z_rad + z_c * tanh) / (z_c + z_rad * tanh);
             [(z_c / tanh + under).inv(), (chimney_open + under).inv()]
         });
+        let chimneys = self.holes.iter().map(|hole| {
+            let z_rad = radiation::impedance(omega, self.radii_m[hole.radius], &self.air);
+            let chimney = losses[hole.radius].cylinder(hole.chimney_m);
+            (chimney.up * z_rad + chimney.uu).inv()
+        });
         AtFrequency {
             omega,
             spans: spans.collect(),
             shunts: shunts.collect(),
+            chimneys: chimneys.collect(),
             bore_z_c: self.holes.iter().map(|hole| losses[hole.bore_radius].z_c).collect(),
             bell: radiation::impedance(omega, self.bell_radius_m, &self.air),
         }
