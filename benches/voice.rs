@@ -5,7 +5,7 @@
 
 use std::hint::black_box;
 
-use chalumeau_core::bore::lattice::{Lattice, Tip};
+use chalumeau_core::bore::lattice::{LANES, Lattice, Tip};
 use chalumeau_core::event::Event;
 use chalumeau_core::instrument::held_note::HeldNote;
 use chalumeau_core::instrument::voice::{Drive, TICK};
@@ -51,8 +51,13 @@ impl Tip<f32> for Push {
     }
 
     #[inline(always)]
-    fn radiated(&mut self, flow: f32) {
+    fn bell(&mut self, flow: f32) {
         self.heard += flow;
+    }
+
+    #[inline(always)]
+    fn holes(&mut self, _: usize, flows: &[f32; LANES]) {
+        self.heard += flows.iter().sum::<f32>();
     }
 }
 

@@ -8,7 +8,7 @@ mod spelling;
 mod table;
 mod text;
 
-use chalumeau_core::instrument::{Settings, Tuning};
+use chalumeau_core::instrument::{ListeningMode, Settings, Tuning};
 use chalumeau_core::reed::PhysicalReed;
 
 pub use table::PARAMETERS;
@@ -131,6 +131,8 @@ pub enum Sets {
     Switch(fn(&mut Settings) -> &mut bool),
     /// [`Settings::tuning`]: a choice of natural and tempered.
     Tuning,
+    /// The way of listening, [`Settings::listening`]: a choice in the order of [`LISTENING_MODES`].
+    Listening,
     /// A number of the reed as its maker measures it, and how many of the parameter's units make one SI unit.
     Reed(fn(&mut PhysicalReed) -> &mut f64, f64),
     /// Whether the measured reed is in use: a choice of dimensionless and physical.
@@ -148,6 +150,10 @@ pub enum Value {
     Switch(bool),
 }
 
+/// Ways of listening in the order of the parameter that chooses one.
+pub const LISTENING_MODES: [ListeningMode; 3] =
+    [ListeningMode::Everywhere, ListeningMode::Position, ListeningMode::Point];
+
 /// The parameter with this id.
 pub fn find(id: &str) -> Option<&'static Parameter> {
     PARAMETERS.iter().find(|parameter| parameter.id == id)
@@ -161,6 +167,9 @@ impl Parameter {
             (Some(Sets::Switch(field)), Value::Switch(on)) => *field(settings) = on,
             (Some(Sets::Tuning), Value::Choice(index)) => {
                 settings.tuning = if index == 0 { Tuning::Natural } else { Tuning::Tempered };
+            }
+            (Some(Sets::Listening), Value::Choice(index)) => {
+                settings.listening.mode = LISTENING_MODES.get(index).copied().unwrap_or_default();
             }
             _ => {}
         }

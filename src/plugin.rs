@@ -45,7 +45,7 @@ use crate::parameters::InUse;
 use breath_sources::BreathInput;
 use chalumeau_core::control::notes::Note;
 use chalumeau_core::event::{Event, Timed};
-use chalumeau_core::instrument::{Clarinet, Settings};
+use chalumeau_core::instrument::{Channels, Clarinet, Settings};
 #[cfg(feature = "devices")]
 use chalumeau_knob::device::Release;
 use host_inputs::HostInputs;
@@ -217,7 +217,12 @@ impl Chalumeau {
         channels: &mut [&mut [f32]],
         context: &mut impl ProcessContext<P>,
     ) -> ProcessStatus {
-        let [out, others @ ..] = channels else { return ProcessStatus::Normal };
+        let [left, others @ ..] = channels else { return ProcessStatus::Normal };
+        let samples = left.len();
+        let out = match others {
+            [right, ..] => Channels::two(left, right),
+            [] => Channels::one(left),
+        };
         let Some(instrument) = &mut self.instrument else {
             return ProcessStatus::Error("not activated");
         };
@@ -267,7 +272,7 @@ impl Chalumeau {
         instrument.render_events(events, out);
 
         if instrument.clarinet().is_silent() {
-            self.inputs.fall_silent(out.len().saturating_sub(1) as u32);
+            self.inputs.fall_silent(samples.saturating_sub(1) as u32);
         }
         #[cfg(feature = "devices")]
         for &(_, breath) in self.knob.iter().flat_map(|(_, audio)| audio.sent()) {
@@ -281,13 +286,13 @@ impl Chalumeau {
         answer(context, self.inputs.ended(), blown);
         #[cfg(feature = "devices")]
         if let Some((_, audio)) = &mut self.knob {
-            audio.send_sound(instrument.rate_hz(), out);
+            audio.send_sound(instrument.rate_hz(), left);
         }
         if let Some((_, window)) = &mut self.window {
-            window.send(instrument, self.inputs.breath_sources(), out);
+            window.send(instrument, self.inputs.breath_sources(), left);
         }
         if let Some(right) = others.first_mut() {
-            instrument.spread(out, right);
+            instrument.pan(left, right);
         }
         let is_watched = self.window.as_ref().is_some_and(|(_, window)| window.is_open());
         rest_status(&self.params, instrument, is_watched)

@@ -167,8 +167,6 @@ impl Tip<f64> for Impulse {
         self.arrived.push(p_minus);
         std::mem::take(&mut self.first)
     }
-    #[inline(always)]
-    fn radiated(&mut self, _flow: f64) {}
 }
 
 fn fingered(coeffs: &LatticeCoeffs, opening: &[f64]) -> Lattice<f64> {
@@ -287,8 +285,6 @@ impl Tip<f64> for Wall {
     fn reflect(&mut self, p_minus: f64) -> f64 {
         p_minus
     }
-    #[inline(always)]
-    fn radiated(&mut self, _flow: f64) {}
 }
 
 /// From random states behind a closed tip, holes still and moving, jets on and off, any fixed delay.

@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use chalumeau_core::analysis::{pitch, spectrum};
 use chalumeau_core::event::{Event, Timed};
-use chalumeau_core::instrument::{Clarinet, Model, Settings, Tuning};
+use chalumeau_core::instrument::{Clarinet, Listening, ListeningMode, Model, Settings, Tuning};
 use chalumeau_core::units::{SoundingNote, WrittenNote, cents};
 
 #[global_allocator]
@@ -124,6 +124,14 @@ impl Random {
             temperature_c: self.wild(10.0, 40.0),
             vent_loss: self.wild(0.0, 4.0),
             gain_db: self.wild(-60.0, 24.0),
+            listening: Listening {
+                mode: [ListeningMode::Everywhere, ListeningMode::Position, ListeningMode::Point]
+                    [self.below(3)],
+                distance_m: self.wild(0.2, 10.0),
+                angle_deg: self.wild(-180.0, 180.0),
+                height_m: self.wild(-1.0, 2.0),
+                width_deg: self.wild(0.0, 180.0),
+            },
         }
     }
 

@@ -11,9 +11,9 @@ use std::sync::Arc;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::prepare::{Preparation, Wanted};
-use chalumeau_core::instrument::{Clarinet, Quality, Settings, Tuning};
+use chalumeau_core::instrument::{Clarinet, Listening, ListeningMode, Quality, Settings, Tuning};
 use chalumeau_core::score::Score;
-use chalumeau_core::score::{midi_file, play};
+use chalumeau_core::score::{midi_file, play, play_stereo};
 use chalumeau_core::units::SoundingNote;
 use sha2::{Digest, Sha256};
 
@@ -24,6 +24,8 @@ mod parallel;
 const RATES_HZ: [u32; 3] = [44_100, 48_000, 96_000];
 /// Random scores.
 const SCORES: u64 = 200;
+/// Random scores that are heard in other ways than from one point.
+const LISTENED_SCORES: u64 = 20;
 /// Length of a random score, s.
 const SECONDS: f64 = 0.8;
 /// Hex digits kept of a hash: 64 bits.
@@ -79,6 +81,7 @@ fn settings(random: &mut Random) -> Settings {
         temperature_c: random.within(10.0, 40.0),
         vent_loss: random.within(0.0, 4.0),
         gain_db: random.within(-12.0, 6.0),
+        ..default
     }
 }
 
@@ -120,13 +123,19 @@ fn random_score(seed: u64, rate_hz: u32) -> (Bundled, Quality, Settings, Score, 
     (instrument, quality, settings, Score { events, samples }, block)
 }
 
-fn hash(clarinet: &mut Clarinet, score: &Score, block: usize) -> String {
+/// One point in mono, other ways of listening in stereo.
+fn hash(clarinet: &mut Clarinet, listening: ListeningMode, score: &Score, block: usize) -> String {
     let mut hasher = Sha256::new();
-    play(clarinet, score, block, |out| {
+    let mut take = |out: &[f32]| {
         out.iter().for_each(|sample| hasher.update(sample.to_le_bytes()));
         Ok::<_, Infallible>(())
-    })
-    .unwrap();
+    };
+    if listening == ListeningMode::Point {
+        play(clarinet, score, block, take).unwrap();
+    } else {
+        play_stereo(clarinet, score, block, &mut |_| (), |left, right| take(left).and_then(|()| take(right)))
+            .unwrap();
+    }
     let bytes = hasher.finalize();
     bytes.iter().take(DIGITS / 2).fold(String::new(), |mut text, byte| {
         write!(text, "{byte:02x}").unwrap();
@@ -140,25 +149,38 @@ fn clarinet(instrument: Bundled, quality: Quality, rate_hz: u32) -> Clarinet {
     Clarinet::new(Arc::new(model), f64::from(rate_hz))
 }
 
-fn rendered(rate_hz: u32, seed: Option<u64>) -> String {
-    let Some(seed) = seed else {
-        let score = midi_file::read(include_bytes!("../examples/melody.mid"), rate_hz).unwrap();
-        return hash(&mut clarinet(Bundled::BFlat, Quality::Live, rate_hz), &score, 512);
+fn rendered(rate_hz: u32, seed: Option<u64>, mode: ListeningMode) -> String {
+    let (mut clarinet, settings, score, block) = match seed {
+        None => {
+            let score = midi_file::read(include_bytes!("../examples/melody.mid"), rate_hz).unwrap();
+            (clarinet(Bundled::BFlat, Quality::Live, rate_hz), Settings::default(), score, 512)
+        }
+        Some(seed) => {
+            let (instrument, quality, settings, score, block) = random_score(seed, rate_hz);
+            (clarinet(instrument, quality, rate_hz), settings, score, block)
+        }
     };
-    let (instrument, quality, settings, score, block) = random_score(seed, rate_hz);
-    let mut clarinet = clarinet(instrument, quality, rate_hz);
-    clarinet.set_settings(&settings);
-    hash(&mut clarinet, &score, block)
+    let listening = Listening { mode, ..Listening::default() };
+    clarinet.set_settings(&Settings { listening, ..settings });
+    hash(&mut clarinet, mode, &score, block)
 }
 
 #[test]
 fn every_render_is_the_same_to_the_bit() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/renders.tsv");
-    let seeds: Vec<Option<u64>> = std::iter::once(None).chain((1..=SCORES).map(Some)).collect();
-    let lines = parallel::each(&seeds, |&seed| {
+    let seeds = |scores: u64| std::iter::once(None).chain((1..=scores).map(Some));
+    let renders: Vec<(Option<u64>, ListeningMode, &str)> = [
+        (SCORES, ListeningMode::Point, ""),
+        (LISTENED_SCORES, ListeningMode::Everywhere, " from everywhere"),
+        (LISTENED_SCORES, ListeningMode::Position, " from two places"),
+    ]
+    .into_iter()
+    .flat_map(|(scores, mode, words)| seeds(scores).map(move |seed| (seed, mode, words)))
+    .collect();
+    let lines = parallel::each(&renders, |&(seed, mode, words)| {
         let name = seed.map_or("melody".to_owned(), |seed| format!("random {seed}"));
-        let hashes = RATES_HZ.map(|rate_hz| rendered(rate_hz, seed));
-        format!("{name}\t{}", hashes.join("\t"))
+        let hashes = RATES_HZ.map(|rate_hz| rendered(rate_hz, seed, mode));
+        format!("{name}{words}\t{}", hashes.join("\t"))
     });
     let text = format!("score\t{}\n{}\n", RATES_HZ.map(|rate| rate.to_string()).join("\t"), lines.join("\n"));
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
@@ -171,6 +193,6 @@ fn every_render_is_the_same_to_the_bit() {
         different.is_empty() && text.lines().count() == kept.lines().count(),
         "{} of {} renderings changed: {different:#?}",
         different.len(),
-        seeds.len()
+        renders.len()
     );
 }

@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 
 use chalumeau_core::analysis::impedance::{Impedance, reflectance};
 use chalumeau_core::bore::cells::networks;
-use chalumeau_core::bore::lattice::{Lattice, LatticeCoeffs, Real, Tip};
+use chalumeau_core::bore::lattice::{LANES, Lattice, LatticeCoeffs, Real, Tip};
 use chalumeau_core::bore::transfer_matrix::{TransferMatrix, find_peaks, threshold_gamma};
 use chalumeau_core::instrument::Model;
 use chalumeau_core::instrument::held_note::HeldNote;
@@ -83,8 +83,6 @@ impl<F: Real> Tip<F> for Impulse {
         self.arrived.push(p_minus.wide());
         F::of(std::mem::take(&mut self.first))
     }
-    #[inline(always)]
-    fn radiated(&mut self, _flow: F) {}
 }
 
 /// What comes back to the tip after an impulse. After a second 1e-8 is left of the lowest note.
@@ -238,8 +236,6 @@ impl Tip<f64> for Pushed {
         self.went_in = self.y * (p_plus * p_plus - p_minus * p_minus);
         p_plus
     }
-    #[inline(always)]
-    fn radiated(&mut self, _flow: f64) {}
 }
 
 /// Moves holes between fingerings, sample by sample.
@@ -453,8 +449,13 @@ impl<F: Real> Tip<F> for Blown<'_> {
         F::of(self.blow(p_minus.wide()))
     }
     #[inline(always)]
-    fn radiated(&mut self, flow: F) {
+    fn bell(&mut self, flow: F) {
         self.flow.push(flow.wide());
+    }
+
+    fn holes(&mut self, _: usize, flows: &[F; LANES]) {
+        let holes: f64 = flows.iter().map(|flow| flow.wide()).sum();
+        self.flow.last_mut().into_iter().for_each(|flow| *flow += holes);
     }
 }
 
@@ -748,8 +749,6 @@ impl<R: FnMut(f64) -> f64> Tip<f64> for Ringing<R> {
         self.pressure.push(p_plus + p_minus);
         p_plus
     }
-    #[inline(always)]
-    fn radiated(&mut self, _flow: f64) {}
 }
 
 /// Time constant of the mouthpiece pressure at `f_hz`, from 50 to 100 ms after a push.

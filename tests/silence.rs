@@ -14,7 +14,7 @@ use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::control::midi::MidiDecoder;
 use chalumeau_core::event::Event;
 use chalumeau_core::instrument::prepare::{Preparation, Wanted};
-use chalumeau_core::instrument::{Clarinet, Model, Settings, Tuning};
+use chalumeau_core::instrument::{Clarinet, Listening, ListeningMode, Model, Settings, Tuning};
 use chalumeau_core::reed::PhysicalReed;
 use chalumeau_core::units::{SoundingNote, WrittenNote};
 
@@ -135,6 +135,14 @@ fn any_settings(random: &mut Random) -> Settings {
         temperature_c: random.between(10.0, 40.0),
         vent_loss: random.between(0.0, 4.0),
         gain_db: random.between(-20.0, 24.0),
+        listening: Listening {
+            mode: [ListeningMode::Everywhere, ListeningMode::Position, ListeningMode::Point]
+                [random.below(3) as usize],
+            distance_m: random.between(0.2, 10.0),
+            angle_deg: random.between(-180.0, 180.0),
+            height_m: random.between(-1.0, 2.0),
+            width_deg: random.between(0.0, 180.0),
+        },
     }
 }
 

@@ -91,18 +91,13 @@ impl RadiationCommand {
         let heard: Vec<Vec<RadiatedBand>> = fingerings
             .iter()
             .map(|fingering| {
-                if self.harmonics {
-                    bands.harmonics(fingering, &paths)
-                } else {
-                    bands.of(fingering, &paths)
-                }
+                if self.harmonics { bands.harmonics(fingering, &paths) } else { bands.of(fingering, &paths) }
             })
             .collect();
         table.comment(format_args!("{}; {} C, dB over one point", file.name, air.temperature_c))?;
-        for (name, of) in [
-            ("heard", (|band| band.heard_db) as fn(&RadiatedBand) -> f64),
-            ("one point", |_| 0.0),
-        ] {
+        for (name, of) in
+            [("heard", (|band| band.heard_db) as fn(&RadiatedBand) -> f64), ("one point", |_| 0.0)]
+        {
             let (rms_db, worst_db) = rms_and_worst(heard.iter().flatten(), of);
             table.comment(format_args!(
                 "{name} against the average, up to {COUNTED_HZ} Hz: rms {rms_db:.2} dB, at most {worst_db:.1} dB"

@@ -60,7 +60,7 @@ pub struct RenderCommand {
     /// Bits per sample: integers rounded without dither, or floats as computed
     #[arg(long, value_enum, default_value_t = Bits::Float32, help_heading = "Output")]
     bits: Bits,
-    /// Channels: 1, or 2, which differ where pan (CC10) leaves the middle
+    /// Channels: 1, or 2, which differ where pan (CC10) leaves the middle, or if the instrument is heard from two places (--set heard=place)
     #[arg(long, value_name = "N", default_value = "1", help_heading = "Output", value_parser = clap::value_parser!(u16).range(1..=2))]
     channels: u16,
     /// CSV file of internal signals over time: mouth pressure, reed opening, flow, mouthpiece and radiated pressure
@@ -101,29 +101,36 @@ impl RenderCommand {
         let watch = watch.map(RefCell::new);
         // One channel is the instrument itself; pan (CC10) places it between two.
         let mut stereo = (self.channels == 2).then(|| StereoBlocks::new(score, *rate));
-        let mut write = |block: &[f32]| {
+        let hear = |block: &[f32]| {
             bar.inc(block.len() as u64);
             if let Some(watch) = &watch {
                 watch.borrow_mut().hear(block);
             }
-            let written = match &mut stereo {
-                Some(stereo) => wav.write(&stereo.spread(block)),
-                None => wav.write(&[block]),
-            };
-            written.map_err(Failure::from)
         };
-        if probe.is_some() || watch.is_some() {
-            let mut inside = |moment| {
-                if let Some(probe) = &mut probe {
-                    probe.write(moment);
-                }
-                if let Some(watch) = &watch {
-                    watch.borrow_mut().inside(moment);
-                }
-            };
-            player::play_probed(&mut clarinet, score, BLOCK, &mut inside, &mut write)?;
+        let looks_inside = probe.is_some() || watch.is_some();
+        let mut inside = |moment| {
+            if let Some(probe) = &mut probe {
+                probe.write(moment);
+            }
+            if let Some(watch) = &watch {
+                watch.borrow_mut().inside(moment);
+            }
+        };
+        if let Some(stereo) = &mut stereo {
+            player::play_stereo(&mut clarinet, score, BLOCK, &mut inside, |left, right| {
+                hear(left);
+                wav.write(&stereo.pan(left, right)).map_err(Failure::from)
+            })?;
         } else {
-            player::play(&mut clarinet, score, BLOCK, &mut write)?;
+            let write = |block: &[f32]| {
+                hear(block);
+                wav.write(&[block]).map_err(Failure::from)
+            };
+            if looks_inside {
+                player::play_probed(&mut clarinet, score, BLOCK, &mut inside, write)?;
+            } else {
+                player::play(&mut clarinet, score, BLOCK, write)?;
+            }
         }
         let level = wav.finish()?;
         bar.finish_and_clear();

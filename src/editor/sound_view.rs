@@ -191,6 +191,11 @@ fn column(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     for id in ["noise", "zeta", "lay", "vent", "gain"] {
         slider(ui, hands, id);
     }
+    heading(ui, "Listening");
+    choice(ui, hands, "heard");
+    for id in ["ldist", "langle", "lheigh", "lwidth"] {
+        slider(ui, hands, id);
+    }
 }
 
 /// Power of the odd over that of the even harmonics, dB.

@@ -14,6 +14,7 @@ const OUTPUT: &str = "Output";
 const KNOB: &str = "Knob";
 const INSTRUMENT: &str = "Instrument";
 const PHYSICAL_REED: &str = "Reed, physical";
+const LISTENING: &str = "Listening";
 
 /// Largest torque that the user can allow, mNm (`docs/protocol.md`, safety).
 const MOST_TORQUE_MNM: f32 = 250.0;
@@ -559,4 +560,48 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Reed(|reed| &mut reed.tip_opening_m, 1e3))
         .flag("--reed-opening"),
+    entry(
+        "heard",
+        LISTENING,
+        "Heard from",
+        choice(&[("all", "Everywhere"), ("place", "Position"), ("point", "One point")]),
+    )
+    .help(
+        "Where the instrument is heard from",
+        "Bell and open holes each send out sound. Everywhere is the mean over all directions, the same in both channels. Position is one place or two. One point is as if all sound came from one hole: above 1 kHz too soft.",
+        "",
+    )
+    .sets(Sets::Listening),
+    entry("ldist", LISTENING, "Listening distance", number([0.2, 10.0], 1.0, 2, " m"))
+        .help(
+            "Distance from the middle of the instrument, for Position",
+            "From near, the holes next to the listener are louder. The level as a whole stays.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.listening.distance_m))
+        .flag("--listening-distance"),
+    entry("langle", LISTENING, "Listening angle", number([-180.0, 180.0], 30.0, 0, " \u{b0}"))
+        .help(
+            "Angle around the player, for Position: 0 in front, 90 at the player's right",
+            "In front of the bell the sound is brighter than beside or behind it.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.listening.angle_deg))
+        .flag("--listening-angle"),
+    entry("lheigh", LISTENING, "Listening height", number([-1.0, 2.0], 0.0, 2, " m"))
+        .help(
+            "Height above the middle of the instrument, for Position",
+            "Low places look into the bell, high ones onto the holes.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.listening.height_m))
+        .flag("--listening-height"),
+    entry("lwidth", LISTENING, "Listening width", number([0.0, 180.0], 60.0, 0, " \u{b0}"))
+        .help(
+            "Angle between the left and the right place, as the player sees them, for Position",
+            "Wider is more spacious. At 0 both channels are the same, and so is a render in mono, which hears the place between.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.listening.width_deg))
+        .flag("--listening-width"),
 ];

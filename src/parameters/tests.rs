@@ -1,4 +1,5 @@
 use super::*;
+use chalumeau_core::instrument::Listening;
 
 /// Id, group, name, default, and whether a host can automate it, in the order of hosts. A frozen copy: saved projects and
 /// automation lanes depend on it. Append only.
@@ -62,6 +63,11 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
     ("rarea", "Reed, physical", "Reed area", "101.50 mm²", true),
     ("rwidth", "Reed, physical", "Reed width", "15.21 mm", true),
     ("ropen", "Reed, physical", "Reed opening", "0.500 mm", true),
+    ("heard", "Listening", "Heard from", "Everywhere", true),
+    ("ldist", "Listening", "Listening distance", "1.00 m", true),
+    ("langle", "Listening", "Listening angle", "30 °", true),
+    ("lheigh", "Listening", "Listening height", "0.00 m", true),
+    ("lwidth", "Listening", "Listening width", "60 °", true),
 ];
 
 /// Ids of choices in saved states. Append only.
@@ -75,6 +81,7 @@ const FROZEN_CHOICES: &[(&str, &[&str])] = &[
     ("instr", &["bflat", "a", "eflat", "c", "bass", "user"]),
     ("qual", &["live", "high"]),
     ("rface", &["seed", "phys"]),
+    ("heard", &["all", "place", "point"]),
 ];
 
 fn numbers() -> impl Iterator<Item = (&'static Parameter, Number)> {
@@ -129,8 +136,13 @@ fn nothing_that_moves_a_motor_or_plays_travels_with_undo_or_is_automated() {
 #[test]
 fn defaults_and_ranges_are_those_of_the_instrument() {
     let d = Settings::default();
-    let mut filled = Settings { coupled: !d.coupled, tuning: Tuning::Tempered, ..d };
-    let mut fields = 2;
+    let mut filled = Settings {
+        coupled: !d.coupled,
+        tuning: Tuning::Tempered,
+        listening: Listening { mode: ListeningMode::Point, ..d.listening },
+        ..d
+    };
+    let mut fields = 3;
     for (parameter, number) in numbers() {
         let Some(Sets::Number(field)) = parameter.sets else { continue };
         fields += 1;
@@ -146,6 +158,7 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
     }
     find("reedc").unwrap().set(&mut filled, Value::Switch(true));
     find("tune").unwrap().set(&mut filled, Value::Choice(0));
+    find("heard").unwrap().set(&mut filled, Value::Choice(0));
     assert_eq!(filled, d, "the table reaches every field");
     // All fields of the settings, each by one parameter.
     let Settings {
@@ -167,8 +180,9 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         temperature_c: _,
         vent_loss: _,
         gain_db: _,
+        listening: Listening { mode: _, distance_m: _, angle_deg: _, height_m: _, width_deg: _ },
     } = d;
-    assert_eq!(fields, 18);
+    assert_eq!(fields, 23);
 }
 
 #[test]

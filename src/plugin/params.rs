@@ -16,6 +16,7 @@ use chalumeau_core::instrument::{Settings, Tuning};
 mod entry;
 pub mod instrument;
 pub mod knob;
+pub mod listening;
 pub mod moment;
 pub mod reed;
 mod state;
@@ -24,6 +25,7 @@ use entry::{choice, number_from, status_text, switch};
 pub use instrument::InstrumentParams;
 pub use knob::KnobParams;
 use knob::{KnobKind, ReedSource};
+pub use listening::ListeningParams;
 use moment::{Moment, Moments};
 pub use reed::PhysicalReedParams;
 pub use state::{SCHEMA, mend, without_moments};
@@ -61,6 +63,9 @@ pub struct ChalumeauParams {
     /// The reed in newtons and millimetres.
     #[nested(group = "Reed, physical")]
     pub physical: PhysicalReedParams,
+    /// Where it is heard from.
+    #[nested(group = "Listening")]
+    pub listening: ListeningParams,
     /// State of the instrument as text, written by whoever loads it.
     pub instrument_status: Arc<RwLock<String>>,
     /// Size, zoom, theme and view of the window.
@@ -210,6 +215,7 @@ impl ChalumeauParams {
             instrument_status,
             physical: PhysicalReedParams::default(),
             knob: KnobParams::new(knob_status.clone(), &moments),
+            listening: ListeningParams::new(&number),
             knob_status,
             schema: AtomicU32::new(SCHEMA),
             window: RwLock::default(),
@@ -280,6 +286,7 @@ impl ChalumeauParams {
             temperature_c: settled(&tuning.temperature),
             vent_loss: settled(&tuning.vent_loss),
             gain_db: settled(&output.gain),
+            listening: self.listening.listening(),
         };
         settings = self.physical.over(settings);
         if let Some((_, trial, side)) = self.knob.study() {

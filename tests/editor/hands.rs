@@ -14,7 +14,7 @@ use crate::support::Told;
 const SLIDERS: &[(Tab, &[&str])] = &[
     (Tab::Reed, &["stren", "lip", "zeta", "damp", "reedh", "reeda", "lay"]),
     (Tab::Breath, &["breath", "full", "curve", "tongue", "legato", "noise"]),
-    (Tab::Sound, &["a4", "noise", "zeta", "lay", "vent", "gain"]),
+    (Tab::Sound, &["a4", "noise", "zeta", "lay", "vent", "gain", "ldist", "langle", "lheigh", "lwidth"]),
     (
         Tab::Knob,
         &["ceil", "contr", "place", "torque", "mark", "kdamp", "kfric", "refnot", "curve", "oscprt", "oscfl"],
@@ -30,7 +30,7 @@ const STUDY_SWITCHES: &[&str] = &["rec", "replay", "study"];
 const STUDY_CHOICES: &[&str] = &["side"];
 const CHOICES: &[(Tab, &[&str])] = &[
     (Tab::Reed, &["rface", "hsrc", "ksrc"]),
-    (Tab::Sound, &["tune"]),
+    (Tab::Sound, &["tune", "heard"]),
     (Tab::Knob, &["knob", "law", "order"]),
     (Tab::Instrument, &["tune", "qual"]),
 ];
@@ -57,7 +57,7 @@ const MOMENTARY: &[(Tab, &str, &str)] = &[
 #[test]
 fn every_parameter_has_a_place() {
     let host = crate::support::Fake::default();
-    assert_eq!(host.ids().len(), 59);
+    assert_eq!(host.ids().len(), 64);
     let lists = [SLIDERS, SWITCHES, CHOICES].into_iter().flatten().flat_map(|(_, ids)| ids.iter());
     let placed: Vec<&str> = lists
         .chain([STUDY_SLIDERS, STUDY_SWITCHES, STUDY_CHOICES, MAKER_SLIDERS].into_iter().flatten())

@@ -16,7 +16,7 @@ use chalumeau::editor::{EditorState, Tab, WindowState, draw};
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::event::Event;
 use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, PlayedReed, RequirementSolver, TorqueLimits};
-use chalumeau_core::instrument::{Clarinet, Probe, Settings, Tuning, feel_inputs};
+use chalumeau_core::instrument::{Clarinet, Listening, ListeningMode, Probe, Settings, Tuning, feel_inputs};
 use chalumeau_core::reed::PhysicalReed;
 use chalumeau_core::units::WrittenNote;
 use egui_kittest::Harness;
@@ -177,6 +177,14 @@ impl Fake {
             temperature_c: self.plain("temp"),
             vent_loss: self.plain("vent"),
             gain_db: self.plain("gain"),
+            listening: Listening {
+                mode: [ListeningMode::Everywhere, ListeningMode::Position, ListeningMode::Point]
+                    [self.plain("heard") as usize],
+                distance_m: self.plain("ldist"),
+                angle_deg: self.plain("langle"),
+                height_m: self.plain("lheigh"),
+                width_deg: self.plain("lwidth"),
+            },
         };
         if self.plain("rface") < 0.5 {
             return settings;

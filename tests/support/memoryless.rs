@@ -39,9 +39,6 @@ impl Tip<f64> for Mouth {
         self.heard.push(self.state.p_mouthpiece);
         p_plus
     }
-
-    #[inline(always)]
-    fn radiated(&mut self, _flow: f64) {}
 }
 
 impl<'a> MemorylessVoice<'a> {

@@ -1,9 +1,10 @@
 //! Holds one note and prints a checksum of its samples, nothing else: the program to count instructions of.
 //!
-//! `cargo run --release -p chalumeau-core --example instructions -- SECONDS [RATE] [avx2|plain] [BEND] [watched]`
+//! `cargo run --release -p chalumeau-core --example instructions -- SECONDS [RATE] [avx2|plain] [BEND] [watched] [point|places]`
 //!
 //! Written C4 at breath 0.5 of full scale; `plain` keeps off AVX2, a bend is in cents, and `watched` takes pictures of
-//! the inside and copies pictures and sound away, as while the plugin's window is open. What a sample costs is the
+//! the inside and copies pictures and sound away, as while the plugin's window is open. It is heard from everywhere, or from
+//! one point, or from two places in two channels. What a sample costs is the
 //! difference of two run lengths, so that building the instrument cancels; `benches/peers/run.sh` does that under
 //! callgrind and by the thread's CPU time, which is printed where Linux tells it.
 
@@ -11,8 +12,8 @@ use std::error::Error;
 use std::hint::black_box;
 
 use chalumeau_core::event::Event;
-use chalumeau_core::instrument::Clarinet;
 use chalumeau_core::instrument::scope::{SCOPE_SAMPLES, ScopeSample};
+use chalumeau_core::instrument::{Channels, Clarinet, Listening, ListeningMode, Settings};
 use chalumeau_core::units::WrittenNote;
 
 /// Samples per call, as a host at a common setting would ask for.
@@ -50,12 +51,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let seconds: f64 = arguments
         .next()
-        .ok_or("usage: instructions SECONDS [RATE] [avx2|plain] [BEND] [watched]")?
+        .ok_or("usage: instructions SECONDS [RATE] [avx2|plain] [BEND] [watched] [point|places]")?
         .parse()?;
     let rate_hz: f64 = arguments.next().as_deref().unwrap_or("48000").parse()?;
     let plain = arguments.next().is_some_and(|word| word == "plain");
     let bend_cents: f32 = arguments.next().as_deref().unwrap_or("0").parse()?;
     let watched = arguments.next().is_some_and(|word| word == "watched");
+    let mode = match arguments.next().as_deref() {
+        Some("point") => ListeningMode::Point,
+        Some("places") => ListeningMode::Position,
+        _ => ListeningMode::Everywhere,
+    };
     let blocks = (seconds * rate_hz / BLOCK as f64).round() as usize;
 
     let mut clarinet = Clarinet::built_in(rate_hz)?;
@@ -63,6 +69,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         clarinet = clarinet.without_avx2();
     }
     let note = WrittenNote(60).sounding(2).ok_or("no such note")?;
+    let listening = Listening { mode, ..Listening::default() };
+    clarinet.set_settings(&Settings { listening, ..Settings::default() });
     clarinet.apply(Event::Bend { cents: bend_cents });
     clarinet.apply(Event::Breath(0.5));
     clarinet.apply(Event::NoteOn { note, velocity: 0.8 });
@@ -70,11 +78,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut screen =
         Screen { heard: [0.0; BLOCK], moments: [ScopeSample::default(); SCOPE_SAMPLES], shown: 0 };
 
-    let mut block = [0.0; BLOCK];
+    let (mut block, mut right) = ([0.0; BLOCK], [0.0; BLOCK]);
     let mut checksum = 0_u32;
     let start = thread_cpu_ns();
     for _ in 0..blocks {
-        clarinet.render(&mut block);
+        if mode == ListeningMode::Position {
+            clarinet.render_channels(Channels::two(&mut block, &mut right));
+        } else {
+            clarinet.render(&mut block);
+        }
         if watched {
             screen.see(&clarinet, &block);
         }

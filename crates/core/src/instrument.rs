@@ -20,6 +20,7 @@
 pub mod bend;
 mod breath_noise;
 mod choke;
+mod channels;
 mod clarinet;
 pub mod concert_pitch;
 mod control_tick;
@@ -27,8 +28,10 @@ pub mod feel_inputs;
 pub mod held_note;
 pub mod internal_rate;
 pub mod lip;
+pub mod listening;
 pub mod model;
 mod output_level;
+mod outside;
 pub mod player;
 pub mod prepare;
 pub mod scope;
@@ -39,7 +42,9 @@ pub mod store;
 pub mod tuning_table;
 pub mod voice;
 
+pub use channels::Channels;
 pub use clarinet::Clarinet;
+pub use listening::{Listening, ListeningMode};
 pub use model::{BuildError, Model};
 pub use prepare::{Preparation, Quality, Wanted};
 pub use settings::{Settings, Tuning};

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use super::{SharedInstrument, SwapCandidate};
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::stereo::Stereo;
-use chalumeau_core::instrument::{Clarinet, Settings};
+use chalumeau_core::instrument::{Channels, Clarinet, Settings};
 
 /// Time for which a new instrument plays unheard, s. The lowest notes of a B flat clarinet speak after 50 ms, those of a
 /// bass clarinet after 100 ms.
@@ -177,49 +177,63 @@ impl InstrumentSwap {
         }
     }
 
-    /// See [`Clarinet::render_events`]; both instruments receive the events.
-    pub fn render_events(&mut self, events: impl IntoIterator<Item = Timed<Event>>, out: &mut [f32]) {
+    /// See [`Clarinet::render_events_channels`]; both instruments receive the events.
+    pub fn render_events(&mut self, events: impl IntoIterator<Item = Timed<Event>>, mut out: Channels) {
         if self.next.is_none() {
             let stereo = &mut self.stereo;
-            return self.playing.render_events(events.into_iter().inspect(|event| stereo.heed(event)), out);
+            let events = events.into_iter().inspect(|event| stereo.heed(event));
+            return self.playing.render_events_channels(events, out);
         }
-        let mut done = 0;
+        let (mut done, end) = (0, out.len());
         for Timed { at, event } in events {
             self.stereo.heed(&Timed { at, event });
-            let at = at.clamp(done, out.len());
-            self.render(&mut out[done..at]);
+            let at = at.clamp(done, end);
+            self.render(out.part(done..at));
             self.playing.apply(event);
             if let Some(next) = &mut self.next {
                 next.clarinet.apply(event);
             }
             done = at;
         }
-        self.render(&mut out[done..]);
+        self.render(out.part(done..end));
     }
 
-    /// Makes two channels of the block that was rendered last: `left` holds it. See [`Stereo`].
-    pub fn spread(&mut self, left: &mut [f32], right: &mut [f32]) {
-        self.stereo.spread(left, right);
+    /// Pans the two channels of the block that was rendered last. See [`Stereo`].
+    pub fn pan(&mut self, left: &mut [f32], right: &mut [f32]) {
+        self.stereo.pan(left, right);
     }
 
-    fn render(&mut self, out: &mut [f32]) {
-        let mut new_out = [0.0; CHUNK];
-        for out in out.chunks_mut(CHUNK) {
-            self.playing.render(out);
+    fn render(&mut self, mut out: Channels) {
+        let (mut new_left, mut new_right) = ([0.0; CHUNK], [0.0; CHUNK]);
+        let end = out.len();
+        for begin in (0..end).step_by(CHUNK) {
+            let mut out = out.part(begin..end.min(begin + CHUNK));
+            self.playing.render_channels(out.part(0..out.len()));
             let Some(next) = &mut self.next else { continue };
-            let new_out = &mut new_out[..out.len()];
-            next.clarinet.render(new_out);
-            for (old, new) in out.iter_mut().zip(new_out) {
-                let faded = next.played.saturating_sub(self.warm_up);
-                // Equal power, because the two have different phases. At the end the output is the new one to the bit.
-                *old = if faded < self.fade {
-                    let angle = std::f32::consts::FRAC_PI_2 * faded as f32 / self.fade as f32;
-                    *old * angle.cos() + *new * angle.sin()
-                } else {
-                    *new
-                };
-                next.played += 1;
+            let (new_left, new_right) = (&mut new_left[..out.len()], &mut new_right[..out.len()]);
+            next.clarinet.render_channels(if out.is_stereo() {
+                Channels::two(new_left, new_right)
+            } else {
+                Channels::one(new_left)
+            });
+            let (warm_up, fade) = (self.warm_up, self.fade);
+            let mix = |old: &mut [f32], new: &[f32]| {
+                for (played, (old, new)) in (next.played..).zip(old.iter_mut().zip(new)) {
+                    let faded = played.saturating_sub(warm_up);
+                    // Equal power, because the two have different phases. At the end the output is the new one to the bit.
+                    *old = if faded < fade {
+                        let angle = std::f32::consts::FRAC_PI_2 * faded as f32 / fade as f32;
+                        *old * angle.cos() + *new * angle.sin()
+                    } else {
+                        *new
+                    };
+                }
+            };
+            mix(out.left(), new_left);
+            if let Some(right) = out.right() {
+                mix(right, new_right);
             }
+            next.played += out.len();
             self.finish_swap();
         }
     }
@@ -268,7 +282,7 @@ mod tests {
                 assert!(ends.send.push(SwapCandidate { activation: 1, clarinet }).is_ok());
             }
             ends.swap.receive();
-            ends.swap.render_events(said.take().into_iter().flatten(), out);
+            ends.swap.render_events(said.take().into_iter().flatten(), Channels::one(out));
         }
         (out, ends)
     }
@@ -310,16 +324,16 @@ mod tests {
     fn held_keys_stay_held() {
         let mut ends = swap_ends();
         let mut out = vec![0.0; AT];
-        ends.swap.render_events(held(), &mut out);
+        ends.swap.render_events(held(), Channels::one(&mut out));
         let clarinet = Box::new(Clarinet::built_in(RATE).unwrap());
         assert!(ends.send.push(SwapCandidate { activation: 1, clarinet }).is_ok());
         ends.swap.receive();
-        ends.swap.render_events([], &mut out);
+        ends.swap.render_events([], Channels::one(&mut out));
         let loud = rms(&out[AT / 2..]);
         assert!(loud > 1e-3, "the key is still down");
         // The release reaches the new instrument.
         let off = Timed { at: 0, event: Event::NoteOff { note: SoundingNote(60) } };
-        ends.swap.render_events([off], &mut out);
+        ends.swap.render_events([off], Channels::one(&mut out));
         assert!(rms(&out[AT / 2..]) < 1e-3 * loud, "{} of {loud}", rms(&out[AT / 2..]));
     }
 
@@ -327,7 +341,7 @@ mod tests {
     fn a_silent_instrument_is_exchanged_at_once_and_one_of_another_activation_never() {
         let mut ends = swap_ends();
         let mut out = vec![0.0; AT];
-        ends.swap.render_events([], &mut out);
+        ends.swap.render_events([], Channels::one(&mut out));
         let clarinet = || Box::new(Clarinet::built_in(RATE).unwrap());
         let model = clarinet();
         let model = model.model();

@@ -12,7 +12,7 @@ use crate::plugin::instrument_loading::{InstrumentSwap, SharedInstrument};
 use crate::plugin::params::ChalumeauParams;
 use chalumeau_core::control::knob::slap_strength;
 use chalumeau_core::event::{Event, Timed};
-use chalumeau_core::instrument::Settings;
+use chalumeau_core::instrument::{Channels, Settings};
 use chalumeau_knob::device::{KnobReader, Release};
 use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, Breath14, BreathMapping, GRID};
 use chalumeau_knob::touch::feel::NO_MOTOR;
@@ -151,7 +151,7 @@ impl KnobAudio {
         settings: &Settings,
         host: impl Iterator<Item = Timed<Event>>,
         context: BlockContext,
-        out: &mut [f32],
+        out: Channels,
     ) {
         if self.reader.is_none() {
             self.reader = self.readers.pop().ok();

@@ -13,8 +13,8 @@ use crate::parameters::{Kind, Number, PARAMETERS, Parameter};
 use crate::plugin::launch_options::LaunchOptions;
 
 /// Layout of the saved state. 1: ids and units as below. 2: the instrument and its file, the physical reed; a state of 1
-/// is the B flat clarinet.
-pub const SCHEMA: u32 = 2;
+/// is the B flat clarinet. 3: listening; a state of 1 or 2 is heard as from one point.
+pub const SCHEMA: u32 = 3;
 const SCHEMA_FIELD: &str = "schema";
 
 /// A number's default in this process: the table's, or what the program was started with.
@@ -30,6 +30,11 @@ pub(super) fn starting(id: &str, number: &Number) -> f32 {
 pub fn mend(state: &mut PluginState) {
     let mut old = std::mem::take(&mut state.params);
     keep_the_feel(&mut old);
+    let schema: Option<u32> = state.fields.get(SCHEMA_FIELD).and_then(|text| text.parse().ok());
+    if schema.is_some_and(|schema| schema < 3) {
+        // What was saved then goes on sounding as it did.
+        old.entry("heard".to_owned()).or_insert_with(|| ParamValue::String("point".to_owned()));
+    }
     for parameter in PARAMETERS {
         let value = mended(parameter, old.remove(parameter.id));
         state.params.insert(parameter.id.to_owned(), value);
@@ -185,6 +190,19 @@ mod tests {
                     "{saved:?} {id}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn what_was_saved_before_listening_is_heard_as_it_was() {
+        for (schema, heard) in [("1", "point"), ("2", "point"), ("3", "all")] {
+            let mut state = PluginState {
+                version: String::new(),
+                params: BTreeMap::new(),
+                fields: BTreeMap::from([("schema".to_owned(), schema.to_owned())]),
+            };
+            mend(&mut state);
+            assert!(matches!(&state.params["heard"], ParamValue::String(id) if id == heard), "{schema}");
         }
     }
 }

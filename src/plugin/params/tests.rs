@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::instrument::{InstrumentChoice, QualityChoice};
 use super::knob::{KnobKind, LawChoice, OrderChoice};
+use super::listening::ListeningChoice;
 use super::reed::ReedFace;
 use super::*;
 use crate::parameters::{Choice, Kind, PARAMETERS, Sets, Value, find};
@@ -49,6 +50,7 @@ fn choices_have_the_ids_and_texts_of_the_table() {
     same::<InstrumentChoice>("instr");
     same::<QualityChoice>("qual");
     same::<ReedFace>("rface");
+    same::<ListeningChoice>("heard");
 }
 
 #[test]
@@ -61,7 +63,7 @@ fn each_parameter_sets_the_field_that_the_table_says() {
     // Every number somewhere else in its range, so that two fields that are exchanged are noticed.
     let place = |id: &str, number: &Number| {
         let at = PARAMETERS.iter().position(|p| p.id == id).unwrap() as f32;
-        number.min + (number.max - number.min) * (at + 1.0) / 64.0
+        number.min + (number.max - number.min) * (at + 1.0) / 80.0
     };
     let played = ChalumeauParams::new(&place).settings();
     let mut filled = Settings::default();

@@ -59,12 +59,20 @@ const TINY: f64 = 1e-18;
 
 /// The reed end of the bore: takes the arriving wave, gives the leaving one, and is told what radiates.
 ///
-/// Implementations mark both `#[inline(always)]` so that they are compiled with the lattice's vector features.
+/// Implementations mark all `#[inline(always)]` so that they are compiled with the lattice's vector features.
 pub trait Tip<F> {
     /// Wave leaving into the bore, for the wave arriving from it.
     fn reflect(&mut self, p_minus: F) -> F;
-    /// Total volume flow leaving through holes and bell in this sample.
-    fn radiated(&mut self, flow: F);
+    /// Volume flow leaving through the bell in this sample.
+    #[inline(always)]
+    fn bell(&mut self, _flow: F) {}
+    /// Volume flows leaving in the same sample through a chunk of holes, in their [lanes](LatticeCoeffs::hole_slots);
+    /// called after [`bell`](Self::bell) for one chunk after the other.
+    #[inline(always)]
+    fn holes(&mut self, _chunk: usize, _flows: &[F; LANES]) {}
+    /// The last sample of a [`run`](Lattice::run) is done.
+    #[inline(always)]
+    fn ended(&mut self) {}
 }
 
 /// The playing lattice: state, and the coefficients that move with the fingers.
@@ -194,10 +202,7 @@ impl<F: Real> Lattice<F> {
             mask,
             steps,
             holes,
-            hole_lanes: (0..coeffs.holes.len())
-                .map(|hole| coeffs.lane_of(coeffs.hole_junctions[hole]))
-                .map(|lane| (lane / LANES - coeffs.step_chunks(), lane % LANES))
-                .collect(),
+            hole_lanes: coeffs.hole_slots().collect(),
             jets: coeffs.jets.clone().into(),
             base: 0,
             tip: end(0, back_rows(coeffs.rows(0).1, BACK + coeffs.lane_of(0))),
@@ -272,6 +277,17 @@ impl<F: Real> Lattice<F> {
     pub fn opening(&self, hole: usize) -> f64 {
         let (chunk, lane) = self.hole_lanes[hole];
         self.holes[chunk].opening[lane].wide()
+    }
+
+    /// Whether a hole is open at all, or on its way there.
+    pub fn is_open(&self, hole: usize) -> bool {
+        let (chunk, lane) = self.hole_lanes[hole];
+        self.holes[chunk].is_open(lane)
+    }
+
+    /// Whether holes move, or have moved since the last [`run`](Self::run).
+    pub fn is_moving(&self) -> bool {
+        self.moved
     }
 
     /// Strength of the jet's loss in all holes: K, 0 (linear) ..= 4; 2 is physical for sharp edges. Real-time safe.
@@ -403,24 +419,18 @@ fn run_body<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, sampl
         lattice.bell_state = lattice.bell_state + lattice.bell_g2 * p_end;
         let reflected = p_end - arriving;
         ring[usize::from(base | (BACK + END_SLOT) as u16)] = reflected;
-        let mut flow = lattice.bell_y * (arriving - reflected);
+        tip.bell(lattice.bell_y * (arriving - reflected));
 
         let mut slot = 0;
         for steps in &mut *lattice.steps {
             steps.tick(ring, base, mask, slot);
             slot += LANES;
         }
-        let mut lanes = Octet::<F>::default();
-        for holes in &mut *lattice.holes {
-            let radiated = holes.tick(ring, base, mask, slot);
+        for (chunk, holes) in lattice.holes.iter_mut().enumerate() {
+            let leaving = holes.tick(ring, base, mask, slot);
+            tip.holes(chunk, &leaving);
             slot += LANES;
-            for k in 0..LANES {
-                lanes[k] = lanes[k] + radiated[k];
-            }
         }
-        for lane in lanes {
-            flow = flow + lane;
-        }
-        tip.radiated(flow);
     }
+    tip.ended();
 }

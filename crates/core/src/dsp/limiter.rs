@@ -57,6 +57,17 @@ impl Limiter {
         self.envelope <= CEILING
     }
 
+    /// As [`process`](Self::process) for two channels of the same length, which keep their balance. Real-time safe.
+    pub fn process_two(&mut self, left: &mut [f32], right: &mut [f32]) {
+        let loud = |sample: &f32| sample.abs() > CEILING;
+        if self.envelope <= CEILING && !left.iter().any(loud) && !right.iter().any(loud) {
+            return;
+        }
+        for (left, right) in left.iter_mut().zip(right) {
+            self.process_pair(left, right);
+        }
+    }
+
     /// Forgets the envelope, as after [`new`](Self::new). Real-time safe.
     pub fn reset(&mut self) {
         self.envelope = 0.0;
@@ -99,6 +110,20 @@ mod tests {
             .sum();
         let whole: f64 = tail.iter().map(|&x| f64::from(x).powi(2)).sum();
         assert!(rest / whole < 1e-5, "{}", rest / whole);
+    }
+
+    #[test]
+    fn two_channels_keep_their_balance_and_equal_ones_sound_as_one() {
+        let (mut one, mut two) = (Limiter::new(48_000.0), Limiter::new(48_000.0));
+        let (mut mono, mut left, mut right) = (sine(4.0), sine(4.0), sine(4.0));
+        one.process(&mut mono);
+        two.process_two(&mut left, &mut right);
+        assert!(left == mono && right == mono);
+        let (mut left, mut right) = (sine(4.0), sine(1.0));
+        two.process_two(&mut left, &mut right);
+        for (left, right) in left.iter().zip(&right) {
+            assert!(left.abs() <= 1.0 && (left - 4.0 * right).abs() < 1e-5);
+        }
     }
 
     #[test]

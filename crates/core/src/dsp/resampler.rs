@@ -284,6 +284,16 @@ impl Resampler {
         self.warp.choose(1.0);
     }
 
+    /// Goes on as another converter between the same rates would. Real-time safe.
+    pub fn follow(&mut self, other: &Self) {
+        self.history.copy_from_slice(&other.history);
+        (self.next, self.end, self.phase) = (other.next, other.end, other.phase);
+        (self.warping, self.fraction, self.from) = (other.warping, other.fraction, other.from);
+        (self.speed, self.speed_glide, self.speed_wanted) =
+            (other.speed, other.speed_glide, other.speed_wanted);
+        self.warp.follow(&other.warp);
+    }
+
     /// Delay of the output behind the input at speed 1, output samples: a signal at input time 0 comes out around this
     /// index. At other speeds the same to a sample, as long as the input is worth no less than the lower of the rates;
     /// below that it grows as the speed falls.
@@ -294,6 +304,11 @@ impl Resampler {
     /// Upper edge of the pass band and lower edge of the stop band, Hz. Both half the rate for equal rates.
     pub fn transition_hz(&self) -> (f64, f64) {
         (self.pass_hz, self.stop_hz)
+    }
+
+    /// Most inputs that an output hears.
+    pub fn reach(&self) -> usize {
+        self.reach
     }
 
     /// Length of one output's dot product. Ratios above 512 phases and speeds other than 1 do two.

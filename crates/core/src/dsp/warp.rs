@@ -91,6 +91,11 @@ impl Warp {
         self.chosen = self.windows.iter().rposition(|window| window.taps <= most).unwrap_or(0);
     }
 
+    /// Takes the window that another one between the same rates has. Real-time safe.
+    pub fn follow(&mut self, other: &Self) {
+        self.chosen = other.chosen;
+    }
+
     /// The output at `fraction` (parts of [`ONE`]) of an input sample after the input before `end`, at a speed no lower
     /// than the chosen one. Inputs from `end` on, of which there must be [`BEYOND`], count for nothing. Real-time safe.
     #[inline]

@@ -1,5 +1,7 @@
 //! The end of a note that is cut off: a short fade, and then nothing of it is left in bore and reed.
 
+use crate::instrument::channels::Channels;
+
 /// Length of the fade, s: as long as a drum machine's choke needs not to click, and below the 5 ms in which it must be
 /// silent, with room for the filter behind it.
 const FADE_S: f64 = 0.003;
@@ -36,14 +38,14 @@ impl Choke {
     }
 
     /// Fades samples, as many as [`reach`](Self::reach) allows. True at the end of the fade.
-    pub fn fade(&mut self, out: &mut [f32]) -> bool {
+    pub fn fade(&mut self, mut out: Channels) -> bool {
         if self.left == 0 {
             return false;
         }
-        for sample in out {
+        out.each_moment(|| {
             self.left -= 1;
-            *sample *= self.left as f32 / self.samples as f32;
-        }
+            self.left as f32 / self.samples as f32
+        });
         self.left == 0
     }
 }

@@ -6,17 +6,20 @@
 
 use std::sync::Arc;
 
+use crate::bore::sound_sources::SoundSources;
 use crate::dsp::limiter::Limiter;
 use crate::dsp::resampler::Resampler;
 use crate::event::{Event, Timed};
+use crate::instrument::channels::Channels;
 use crate::instrument::choke::Choke;
 use crate::instrument::lip::embouchure;
+use crate::instrument::listening::Listening;
 use crate::instrument::model::{BuildError, Model};
 use crate::instrument::output_level::OutputLevel;
 use crate::instrument::player::{Player, PlayerState};
 use crate::instrument::scope::Scope;
 use crate::instrument::settings::Settings;
-use crate::instrument::voice::{Probe, Voice};
+use crate::instrument::voice::{Probe, TICK, Voice};
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
 use crate::reed::{MovingReed, ReedCoeffs};
@@ -73,6 +76,12 @@ pub struct Clarinet {
     player: Player,
     voice: AnyVoice,
     resampler: Resampler,
+    /// The right channel's, while it is not the same as the left.
+    right: Resampler,
+    /// Ticks for which the right channel may still differ: those that its filter hears.
+    apart: u32,
+    /// The last block had a right channel.
+    stereo: bool,
     limiter: Limiter,
     scope: Scope,
     scope_on: bool,
@@ -112,12 +121,16 @@ impl Clarinet {
             rate,
         );
         let tables = ReedTables::reference();
+        let sources = SoundSources::of(&model.file);
         let mut voice = if rate > SINGLE_BELOW_HZ {
-            AnyVoice::Double(Box::new(Voice::new(&model.coeffs, &model.air, tables, reed)))
+            AnyVoice::Double(Box::new(Voice::new(&model.coeffs, sources, &model.air, tables, reed)))
         } else {
-            AnyVoice::Single(Box::new(Voice::new(&model.coeffs, &model.air, tables, reed)))
+            AnyVoice::Single(Box::new(Voice::new(&model.coeffs, sources, &model.air, tables, reed)))
         };
-        with_voice!(&mut voice, voice => voice.reset());
+        with_voice!(&mut voice, voice => {
+            voice.listen(&Listening::default(), false);
+            voice.reset();
+        });
         let resampler = Resampler::new(rate, host_rate_hz);
         let level = OutputLevel::new(model.file.nominal_radius_m, host_rate_hz);
         let scope = Scope::new(rate, model.lowest_hz);
@@ -125,7 +138,10 @@ impl Clarinet {
             model,
             player: Player::default(),
             voice,
+            right: resampler.clone(),
             resampler,
+            apart: 0,
+            stereo: false,
             limiter: Limiter::new(host_rate_hz),
             scope,
             scope_on: false,
@@ -140,6 +156,12 @@ impl Clarinet {
     pub fn set_settings(&mut self, settings: &Settings) {
         self.player.set_settings(settings);
         self.level.set(self.player.settings());
+        self.listen();
+    }
+
+    fn listen(&mut self) {
+        let listening = self.player.settings().listening;
+        with_voice!(&mut self.voice, voice => voice.listen(&listening, self.stereo));
     }
 
     /// Handles an event now. Real-time safe.
@@ -161,24 +183,43 @@ impl Clarinet {
 
     /// Overwrites `out` with the next samples, mono. Real-time safe.
     pub fn render(&mut self, out: &mut [f32]) {
+        self.render_with(Channels::one(out), &mut None);
+    }
+
+    /// Overwrites one or two channels with the next samples. Real-time safe.
+    pub fn render_channels(&mut self, out: Channels) {
         self.render_with(out, &mut None);
     }
 
     /// Renders one block with its events, which must be in order of time. An event at or after the end of the block is
     /// applied at its end. Real-time safe.
     pub fn render_events(&mut self, events: impl IntoIterator<Item = Timed<Event>>, out: &mut [f32]) {
-        let mut done = 0;
+        self.render_events_channels(events, Channels::one(out));
+    }
+
+    /// As [`render_events`](Self::render_events), into one or two channels. Real-time safe.
+    pub fn render_events_channels(
+        &mut self,
+        events: impl IntoIterator<Item = Timed<Event>>,
+        mut out: Channels,
+    ) {
+        let (mut done, end) = (0, out.len());
         for Timed { at, event } in events {
-            let at = at.clamp(done, out.len());
-            self.render(&mut out[done..at]);
+            let at = at.clamp(done, end);
+            self.render_channels(out.part(done..at));
             self.apply(event);
             done = at;
         }
-        self.render(&mut out[done..]);
+        self.render_channels(out.part(done..end));
     }
 
     /// As [`render`](Self::render), and calls `probe` once for each internal sample, in order of time.
     pub fn render_probed(&mut self, out: &mut [f32], probe: &mut dyn FnMut(Probe)) {
+        self.render_probed_channels(Channels::one(out), probe);
+    }
+
+    /// As [`render_probed`](Self::render_probed), into one or two channels.
+    pub fn render_probed_channels(&mut self, out: Channels, probe: &mut dyn FnMut(Probe)) {
         with_voice!(&mut self.voice, voice => voice.set_probing(true));
         self.render_with(out, &mut Some(probe));
         with_voice!(&mut self.voice, voice => voice.set_probing(false));
@@ -203,53 +244,109 @@ impl Clarinet {
         self.player.state()
     }
 
-    fn render_with(&mut self, out: &mut [f32], probe: &mut Option<&mut dyn FnMut(Probe)>) {
-        let mut rest = out;
-        while !rest.is_empty() {
+    fn render_with(&mut self, mut out: Channels, probe: &mut Option<&mut dyn FnMut(Probe)>) {
+        if self.stereo != out.is_stereo() {
+            (self.stereo, self.apart) = (out.is_stereo(), 0);
+            self.listen();
+        }
+        let (mut begin, samples) = (0, out.len());
+        while begin < samples {
             // A choke ends at its sample, not at the end of a chunk.
-            let (out, later) = rest.split_at_mut(self.choke.reach(CHUNK.min(rest.len())));
-            rest = later;
-            let mut made = self.resampler.pull(out);
+            let end = begin + self.choke.reach(CHUNK.min(samples - begin));
+            let mut out = out.part(begin..end);
+            begin = end;
+            let mut made = self.pull(&mut out, 0);
             while made < out.len() {
-                with_voice!(&mut self.voice, voice => {
-                    let drive = self.player.tick(&self.model, voice);
-                    let samples = voice.tick(&drive);
-                    self.resampler.push(samples, self.player.speed());
-                    if let Some(probes) = voice.probes() {
-                        if let Some(probe) = probe.as_mut() {
-                            probes.iter().for_each(|&moment| probe(moment));
-                        }
-                        if self.scope_on && self.scope.record(probes) {
-                            voice.set_probing(probe.is_some());
-                        }
-                    } else if self.scope_on && self.scope.rest() {
-                        voice.set_probing(true);
-                    }
-                });
-                made += self.resampler.pull(&mut out[made..]);
+                self.tick(probe);
+                made += self.pull(&mut out, made);
             }
-            self.level.apply(out);
-            if out.iter().sum::<f32>().is_finite() {
-                // The loudest altissimo comes within 1 dB of full scale; the limiter acts only above that.
-                self.limiter.process(out);
-                if self.choke.fade(out) {
-                    self.cut();
-                }
-                let silence = SILENCE * self.level.boost();
-                let audible = out.iter().any(|sample| sample.abs() > silence);
-                self.quiet = if audible || !self.player.is_resting() {
-                    0
-                } else {
-                    self.quiet.saturating_add(out.len() as u32)
-                };
+            self.finish(out);
+        }
+    }
+
+    /// Fills both channels from sample `from` on, as far as they can be; returns how far that is.
+    fn pull(&mut self, out: &mut Channels, from: usize) -> usize {
+        let made = self.resampler.pull(&mut out.left[from..]);
+        let range = from..from + made;
+        if let Some(right) = &mut out.right {
+            if self.apart > 0 {
+                // Both have heard as many samples, so both make as many.
+                self.right.pull(&mut right[range]);
             } else {
-                out.fill(0.0);
-                with_voice!(&mut self.voice, voice => voice.silence());
-                self.resampler.reset();
-                self.limiter.reset();
-                self.resets += 1;
+                right[range.clone()].copy_from_slice(&out.left[range]);
             }
         }
+        made
+    }
+
+    /// One control tick of player and voice.
+    fn tick(&mut self, probe: &mut Option<&mut dyn FnMut(Probe)>) {
+        with_voice!(&mut self.voice, voice => {
+            let drive = self.player.tick(&self.model, voice);
+            let speed = self.player.speed();
+            voice.tick(&drive);
+            let (left, right) = voice.heard();
+            let right = right.filter(|_| self.stereo);
+            if right.is_some() {
+                if self.apart == 0 {
+                    self.right.follow(&self.resampler);
+                }
+                self.apart = (self.resampler.reach() / TICK) as u32 + 2;
+            }
+            if self.apart > 0 {
+                self.right.push(right.unwrap_or(left), speed);
+                self.apart -= 1;
+            }
+            self.resampler.push(left, speed);
+            if let Some(probes) = voice.probes() {
+                if let Some(probe) = probe.as_mut() {
+                    probes.iter().for_each(|&moment| probe(moment));
+                }
+                if self.scope_on && self.scope.record(probes) {
+                    voice.set_probing(probe.is_some());
+                }
+            } else if self.scope_on && self.scope.rest() {
+                voice.set_probing(true);
+            }
+        });
+    }
+
+    /// From pascals to samples: level, limiter, and whether anything is heard.
+    fn finish(&mut self, mut out: Channels) {
+        self.level.apply(out.part(0..out.len()));
+        let mut sum: f32 = out.left.iter().sum();
+        if let Some(right) = out.right() {
+            sum += right.iter().sum::<f32>();
+        }
+        if !sum.is_finite() {
+            out.each(|channel| channel.fill(0.0));
+            with_voice!(&mut self.voice, voice => voice.silence());
+            self.forget_sound();
+            self.resets += 1;
+            return;
+        }
+        // The loudest altissimo comes within 1 dB of full scale; the limiter acts only above that.
+        match &mut out.right {
+            None => self.limiter.process(out.left),
+            Some(right) => self.limiter.process_two(out.left, right),
+        }
+        if self.choke.fade(out.part(0..out.len())) {
+            self.cut();
+        }
+        let (silence, mut audible) = (SILENCE * self.level.boost(), false);
+        out.each(|channel| audible |= channel.iter().any(|sample| sample.abs() > silence));
+        self.quiet = if audible || !self.player.is_resting() {
+            0
+        } else {
+            self.quiet.saturating_add(out.len() as u32)
+        };
+    }
+
+    /// Silences what has left the voice.
+    fn forget_sound(&mut self) {
+        self.resampler.reset();
+        self.apart = 0;
+        self.limiter.reset();
     }
 
     /// Takes away what is left of a choked note, in the bore and in the output filter. The fingers stay.
@@ -257,13 +354,13 @@ impl Clarinet {
         with_voice!(&mut self.voice, voice => voice.cut());
         self.player.end_choke();
         self.resampler.reset();
+        self.apart = 0;
     }
 
     /// Silences and resets everything; settings stay. Real-time safe.
     pub fn reset(&mut self) {
         with_voice!(&mut self.voice, voice => self.player.reset(voice));
-        self.resampler.reset();
-        self.limiter.reset();
+        self.forget_sound();
         self.level.reset();
         self.choke.reset();
         self.quiet = 0;

@@ -2,6 +2,7 @@
 //!
 //! Tuning, thresholds and the tests of physics play it; a musician plays through the [`player`](super::player).
 
+use crate::bore::sound_sources::SoundSources;
 use crate::instrument::lip::embouchure;
 use crate::instrument::model::Model;
 use crate::instrument::voice::{Drive, TICK, Voice};
@@ -82,7 +83,9 @@ impl HeldNote {
 
     /// A silent voice with the fingering, delay and reed of this note. Allocates.
     pub fn voice<F: crate::bore::lattice::Real>(&self, model: &Model) -> Voice<F> {
-        let mut voice = Voice::new(&model.coeffs, &model.air, ReedTables::reference(), self.reed(model));
+        let sources = SoundSources::of(&model.file);
+        let mut voice =
+            Voice::new(&model.coeffs, sources, &model.air, ReedTables::reference(), self.reed(model));
         for (hole, &open) in model.file.fingerings[self.fingering].open.iter().enumerate() {
             voice.lattice_mut().set_opening(hole, f64::from(u8::from(open)));
         }

@@ -1,6 +1,7 @@
 //! Output level: from radiated pressure to full scale, the gain on top of it, and the volume of controllers and notes.
 
 use crate::dsp::glide::Glide;
+use crate::instrument::channels::Channels;
 use crate::instrument::settings::Settings;
 use crate::units::REFERENCE_RADIUS_M;
 
@@ -78,19 +79,21 @@ impl OutputLevel {
     }
 
     /// Pascals become samples.
-    pub fn apply(&mut self, out: &mut [f32]) {
+    pub fn apply(&mut self, mut out: Channels) {
         self.is_fresh = false;
-        for sample in &mut *out {
-            if self.gain != self.target {
-                let step = (self.target - self.gain) * self.step;
-                self.gain = if step.abs() < 1e-9 { self.target } else { self.gain + step };
-            }
-            *sample *= self.gain;
+        if self.gain == self.target {
+            out.each(|channel| channel.iter_mut().for_each(|sample| *sample *= self.gain));
+        } else {
+            out.each_moment(|| {
+                if self.gain != self.target {
+                    let step = (self.target - self.gain) * self.step;
+                    self.gain = if step.abs() < 1e-9 { self.target } else { self.gain + step };
+                }
+                self.gain
+            });
         }
         if !self.volume.rests_at(1.0) {
-            for sample in out {
-                *sample *= self.volume.next();
-            }
+            out.each_moment(|| self.volume.next());
         }
     }
 }

@@ -1,5 +1,6 @@
 //! What a player can set, as plain numbers in the units that a player uses. They are clamped once, where they come in.
 
+use crate::instrument::listening::Listening;
 use crate::reed::ReedLaw;
 use crate::reed::law::coupled_k;
 use crate::reed::physical::{DimensionlessReed, P_REF_PA, PhysicalReed};
@@ -65,6 +66,8 @@ pub struct Settings {
     pub vent_loss: f32,
     /// Output gain, dB, -60..=24. At 0 dB, the default, 1 Pa at 1 m from a B flat clarinet is -6 dBFS.
     pub gain_db: f32,
+    /// Where the instrument is heard from.
+    pub listening: Listening,
 }
 
 impl Default for Settings {
@@ -88,6 +91,7 @@ impl Default for Settings {
             temperature_c: 25.0,
             vent_loss: 2.0,
             gain_db: 0.0,
+            listening: Listening::default(),
         }
     }
 }
@@ -206,6 +210,13 @@ impl Settings {
             temperature_c: fix(self.temperature_c, 10.0, 40.0, d.temperature_c),
             vent_loss: fix(self.vent_loss, 0.0, 4.0, d.vent_loss),
             gain_db: fix(self.gain_db, -60.0, 24.0, d.gain_db),
+            listening: Listening {
+                mode: self.listening.mode,
+                distance_m: fix(self.listening.distance_m, 0.2, 10.0, d.listening.distance_m),
+                angle_deg: fix(self.listening.angle_deg, -180.0, 180.0, d.listening.angle_deg),
+                height_m: fix(self.listening.height_m, -1.0, 2.0, d.listening.height_m),
+                width_deg: fix(self.listening.width_deg, 0.0, 180.0, d.listening.width_deg),
+            },
         }
     }
 }

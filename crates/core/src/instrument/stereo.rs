@@ -68,8 +68,13 @@ impl Stereo {
 
     /// Ends the block: `left` holds the mono sound; afterwards it is the left channel.
     pub fn spread(&mut self, left: &mut [f32], right: &mut [f32]) {
+        right[..left.len()].copy_from_slice(left);
+        self.pan(left, right);
+    }
+
+    /// Ends the block: pans two channels of the same length.
+    pub fn pan(&mut self, left: &mut [f32], right: &mut [f32]) {
         let right = &mut right[..left.len()];
-        right.copy_from_slice(left);
         let mut done = 0;
         for change in 0..=self.changes.len() {
             let next = self.changes.get(change).copied();

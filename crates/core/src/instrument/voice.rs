@@ -2,9 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::bore::lattice::{Lattice, LatticeCoeffs, Real, Tip};
+use crate::bore::lattice::{LANES, Lattice, LatticeCoeffs, Real, Tip};
+use crate::bore::sound_sources::SoundSources;
 use crate::instrument::breath_noise::BreathNoise;
 pub use crate::instrument::control_tick::TICK;
+use crate::instrument::listening::Listening;
+use crate::instrument::outside::Outside;
 use crate::reed::ReedCoeffs;
 use crate::reed::ReedState;
 use crate::reed::ReedTables;
@@ -26,7 +29,7 @@ pub struct Probe {
     pub flow_m3s: f64,
     /// Pressure in the mouthpiece, Pa.
     pub p_mouthpiece_pa: f64,
-    /// Radiated pressure at 1 m, Pa.
+    /// Radiated pressure as it is heard, in the left channel of two, Pa.
     pub p_radiated_pa: f64,
 }
 
@@ -46,13 +49,13 @@ pub struct Drive {
 /// A sounding reed and bore. `F` is `f32` for playing live, `f64` for high quality and for proofs.
 pub struct Voice<F = f32> {
     lattice: Lattice<F>,
-    mouth: Mouth,
+    mouth: Mouth<F>,
     ticks: u32,
     resets: u64,
 }
 
 /// Everything at the reed end, and the listener outside.
-struct Mouth {
+struct Mouth<F> {
     tables: &'static ReedTables,
     reed: ReedCoeffs,
     state: ReedState,
@@ -62,24 +65,19 @@ struct Mouth {
     tongue: f64,
     tongue_glide: f64,
     noise: BreathNoise,
-    flows: [f64; TICK],
-    last_flow: f64,
-    /// Radiated pressure at 1 m per change of flow, Pa.
-    loudness: f64,
-    out: [f32; TICK],
+    outside: Outside<F>,
     probes: Option<[Probe; TICK]>,
     at: usize,
     flow_unit: f64,
 }
 
-impl Mouth {
+impl<F: Real> Mouth<F> {
     /// No pressure, no motion, no tongue, and the noise from its beginning.
     fn silence(&mut self) {
         self.state = ReedState::default();
         (self.p_mouth, self.p_mouth_glide, self.tongue, self.tongue_glide) = (0.0, 0.0, 0.0, 0.0);
-        self.last_flow = 0.0;
+        self.outside.silence();
         self.noise.reset();
-        self.out = [0.0; TICK];
     }
 
     /// The reed is where the tongue holds it: no movement, no thump.
@@ -87,24 +85,9 @@ impl Mouth {
         self.state.closing = TONGUE_FORCE;
         self.tongue = TONGUE_FORCE;
     }
-
-    /// Radiates a tick's flows: the pressure of a small source is proportional to the change of its flow.
-    fn radiate(&mut self) {
-        let mut before = self.last_flow;
-        for (out, &flow) in self.out.iter_mut().zip(&self.flows) {
-            *out = ((flow - before) * self.loudness) as f32;
-            before = flow;
-        }
-        self.last_flow = before;
-        if let Some(probes) = &mut self.probes {
-            for (probe, &pressure) in probes.iter_mut().zip(&self.out) {
-                probe.p_radiated_pa = f64::from(pressure);
-            }
-        }
-    }
 }
 
-impl<F: Real> Tip<F> for Mouth {
+impl<F: Real> Tip<F> for Mouth<F> {
     #[inline(always)]
     fn reflect(&mut self, p_minus: F) -> F {
         self.p_mouth += self.p_mouth_glide;
@@ -123,11 +106,9 @@ impl<F: Real> Tip<F> for Mouth {
     }
 
     #[inline(always)]
-    fn radiated(&mut self, flow: F) {
-        let at = self.at & (TICK - 1);
-        self.flows[at] = flow.wide();
+    fn bell(&mut self, flow: F) {
         if let Some(probes) = &mut self.probes {
-            probes[at] = Probe {
+            probes[self.at & (TICK - 1)] = Probe {
                 gamma: self.p_mouth / self.reed.closing_pressure(),
                 opening: self.state.opening,
                 flow_m3s: self.state.flow * self.flow_unit,
@@ -135,20 +116,37 @@ impl<F: Real> Tip<F> for Mouth {
                 p_radiated_pa: 0.0,
             };
         }
+        self.outside.bell(self.at, flow);
         self.at += 1;
+    }
+
+    #[inline(always)]
+    fn holes(&mut self, chunk: usize, flows: &[F; LANES]) {
+        self.outside.holes(chunk, flows);
+    }
+
+    #[inline(always)]
+    fn ended(&mut self) {
+        // A run may end within a tick, where a delay arrives.
+        if self.at == TICK {
+            self.outside.radiate();
+        }
     }
 }
 
 impl<F: Real> Voice<F> {
-    /// A silent voice with closed holes. Allocates.
+    /// A silent voice with closed holes, whose `sources` are heard in one point. Allocates.
     pub fn new(
         coeffs: &Arc<LatticeCoeffs>,
+        sources: SoundSources,
         air: &Air,
         tables: &'static ReedTables,
         reed: ReedCoeffs,
     ) -> Self {
         let rate = coeffs.rate_hz;
         let flow_unit = P_REF_PA / air.z_c(coeffs.nominal_radius_m);
+        // Pressure at 1 m per change of flow in one sample, Pa.
+        let loudness = air.rho / (4.0 * std::f64::consts::PI) * flow_unit * rate;
         Self {
             lattice: Lattice::new(coeffs),
             mouth: Mouth {
@@ -161,10 +159,7 @@ impl<F: Real> Voice<F> {
                 tongue: 0.0,
                 tongue_glide: 0.0,
                 noise: BreathNoise::new(rate),
-                flows: [0.0; TICK],
-                last_flow: 0.0,
-                loudness: air.rho / (4.0 * std::f64::consts::PI) * flow_unit * rate,
-                out: [0.0; TICK],
+                outside: Outside::new(coeffs, sources, air, loudness),
                 probes: None,
                 at: 0,
                 flow_unit,
@@ -200,7 +195,18 @@ impl<F: Real> Voice<F> {
         self.mouth.probes.as_ref()
     }
 
-    /// Advances one control tick and returns the radiated pressure at 1 m, Pa. Real-time safe. [audio thread]
+    /// Listens in another way from the next tick on, with a right channel if `stereo`. Real-time safe.
+    pub fn listen(&mut self, listening: &Listening, stereo: bool) {
+        self.mouth.outside.listen(listening, stereo);
+    }
+
+    /// What the last tick sounded like, Pa: in the left or only channel, and in the right one where that is not the same.
+    pub fn heard(&self) -> (&[f32; TICK], Option<&[f32; TICK]>) {
+        self.mouth.outside.heard()
+    }
+
+    /// Advances one control tick and returns the radiated pressure, Pa, as it is heard in the left or only channel: at 1 m,
+    /// or as if at 1 m. Real-time safe. [audio thread]
     ///
     /// A state that is no longer finite is reset to silence and counted; nothing else can fail.
     pub fn tick(&mut self, drive: &Drive) -> &[f32; TICK] {
@@ -209,22 +215,28 @@ impl<F: Real> Voice<F> {
         mouth.p_mouth_glide = (drive.p_mouth - mouth.p_mouth) / TICK as f64;
         mouth.tongue_glide = (drive.tongue - mouth.tongue) / TICK as f64;
         mouth.at = 0;
+        let lattice = &self.lattice;
+        mouth.outside.heed(lattice.is_moving(), |hole| lattice.is_open(hole));
         mouth.noise.fill(drive.noise);
         self.lattice.run(TICK, mouth);
-        mouth.radiate();
+        if let Some(probes) = &mut mouth.probes {
+            for (probe, &pressure) in probes.iter_mut().zip(mouth.outside.heard().0) {
+                probe.p_radiated_pa = f64::from(pressure);
+            }
+        }
         (mouth.p_mouth, mouth.tongue) = (drive.p_mouth, drive.tongue);
         self.ticks = self.ticks.wrapping_add(1);
         if self.ticks.is_multiple_of(FLUSH_TICKS) {
             self.lattice.flush();
         }
         let state = self.mouth.state;
-        if !(self.mouth.out.iter().sum::<f32>() + (state.closing + state.speed + state.p_mouthpiece) as f32)
-            .is_finite()
-        {
+        let (heard, right) = self.heard();
+        let sum = heard.iter().sum::<f32>() + right.map_or(0.0, |right| right.iter().sum());
+        if !(sum + (state.closing + state.speed + state.p_mouthpiece) as f32).is_finite() {
             self.silence();
             self.resets += 1;
         }
-        &self.mouth.out
+        self.heard().0
     }
 
     /// Back to the beginning: silence, all holes closed, the tongue on the reed. Real-time safe.

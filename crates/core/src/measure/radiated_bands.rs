@@ -130,7 +130,9 @@ mod tests {
         let everywhere = all(&bands, &[Listening::everywhere(bands.sources(), &Air::default())]);
         let (rms_db, worst_db) = rms_and_worst(&everywhere, |band| band.heard_db);
         let (point_db, point_worst_db) = rms_and_worst(&everywhere, |_| 0.0);
-        println!("everywhere {rms_db:.2} dB, at most {worst_db:.1}; point {point_db:.2}, {point_worst_db:.1}");
+        println!(
+            "everywhere {rms_db:.2} dB, at most {worst_db:.1}; point {point_db:.2}, {point_worst_db:.1}"
+        );
         assert!(rms_db < 1.25 && worst_db < 5.2, "{rms_db} {worst_db}");
         assert!(point_db > 3.0, "{point_db}");
         for angle_deg in [0.0, 30.0, 60.0, 90.0, 180.0] {

@@ -4,7 +4,7 @@
 //! on the size of the blocks. The latency of the instrument is not removed.
 
 use crate::event::{Event, Timed};
-use crate::instrument::{Clarinet, Probe};
+use crate::instrument::{Channels, Clarinet, Probe};
 use crate::score::timeline::Score;
 
 /// Plays `score` in blocks of `block` samples (at least 1) and hands each block to `each`. Allocates one block.
@@ -51,6 +51,37 @@ pub fn play_probed<E>(
     in_blocks(score, block, render, each)
 }
 
+/// As [`play_probed`] in stereo: `each` gets a block of the left channel and one of the right.
+///
+/// # Errors
+///
+/// The first error that `each` returns; it ends the playing.
+pub fn play_stereo<E>(
+    clarinet: &mut Clarinet,
+    score: &Score,
+    block: usize,
+    probe: &mut dyn FnMut(Probe),
+    mut each: impl FnMut(&[f32], &[f32]) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut right = vec![0.0; block.max(1)];
+    // The right channel leaves beside the left one, which the blocks are cut from.
+    let heard = std::cell::RefCell::new(&mut right);
+    let render = |events: &[Timed<Event>], begun: usize, left: &mut [f32]| {
+        let mut right = heard.borrow_mut();
+        let samples = left.len();
+        let mut out = Channels::two(left, &mut right[..samples]);
+        let mut done = 0;
+        for event in events {
+            let at = event.at - begun;
+            clarinet.render_probed_channels(out.part(done..at), probe);
+            clarinet.apply(event.event);
+            done = at;
+        }
+        clarinet.render_probed_channels(out.part(done..samples), probe);
+    };
+    in_blocks(score, block, render, |left| each(left, &heard.borrow()[..left.len()]))
+}
+
 /// Cuts a score into blocks. `render` gets the events of a block, the sample at which it begins, and where to write.
 fn in_blocks<E>(
     score: &Score,
@@ -81,6 +112,7 @@ pub(super) fn take_before<'a, E>(events: &mut &'a [Timed<E>], end: usize) -> &'a
 mod tests {
     use super::*;
     use crate::event::Event;
+    use crate::instrument::{Listening, ListeningMode, Settings};
     use crate::units::SoundingNote;
     use std::convert::Infallible;
 
@@ -113,6 +145,27 @@ mod tests {
         for block in [1, 17, 64, 512, 4096] {
             assert!(samples(block) == whole, "block of {block}");
         }
+    }
+
+    #[test]
+    fn everywhere_is_the_same_in_both_channels_and_two_places_are_not() {
+        let two = |settings: &Settings| {
+            let mut clarinet = Clarinet::built_in(48_000.0).unwrap();
+            clarinet.set_settings(settings);
+            let (mut left, mut right) = (Vec::new(), Vec::new());
+            play_stereo(&mut clarinet, &score(), 300, &mut |_| (), |a, b| {
+                left.extend_from_slice(a);
+                right.extend_from_slice(b);
+                Ok::<_, Infallible>(())
+            })
+            .unwrap();
+            (left, right)
+        };
+        let (left, right) = two(&Settings::default());
+        assert!(left == right && left == samples(512));
+        let place = Listening { mode: ListeningMode::Position, ..Listening::default() };
+        let (left, right) = two(&Settings { listening: place, ..Settings::default() });
+        assert!(left != right && right.len() == left.len());
     }
 
     #[test]

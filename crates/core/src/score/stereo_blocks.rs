@@ -5,7 +5,8 @@ use crate::instrument::stereo::Stereo;
 use crate::score::play::take_before;
 use crate::score::timeline::Score;
 
-/// Makes two channels of the mono blocks that [`play`](super::play) hands out, in their order.
+/// Makes two channels of the blocks that [`play`](super::play) or [`play_stereo`](super::play_stereo) hands out, in their
+/// order.
 ///
 /// ```
 /// use chalumeau_core::score::{Score, StereoBlocks};
@@ -35,18 +36,24 @@ impl<'a> StereoBlocks<'a> {
         }
     }
 
-    /// Left and right of the next block.
+    /// Left and right of the next block, of a mono sound.
     pub fn spread(&mut self, mono: &[f32]) -> [&[f32]; 2] {
-        let end = self.begun + mono.len();
+        self.pan(mono, mono)
+    }
+
+    /// Left and right of the next block, of a sound with two channels of the same length.
+    pub fn pan(&mut self, left_in: &[f32], right_in: &[f32]) -> [&[f32]; 2] {
+        let end = self.begun + left_in.len();
         for event in take_before(&mut self.events, end) {
             self.stereo.heed(&Timed { at: event.at - self.begun, event: event.event });
         }
         self.begun = end;
         let [left, right] = &mut self.channels;
-        left.clear();
-        left.extend_from_slice(mono);
-        right.resize(mono.len(), 0.0);
-        self.stereo.spread(left, right);
+        for (channel, sound) in [(&mut *left, left_in), (&mut *right, right_in)] {
+            channel.clear();
+            channel.extend_from_slice(sound);
+        }
+        self.stereo.pan(left, right);
         [left, right]
     }
 }

@@ -190,8 +190,15 @@ impl LatticeCoeffs {
         })
     }
 
-    pub(super) fn hole_chunks(&self) -> usize {
+    /// Chunks that the tone holes take.
+    pub fn hole_chunks(&self) -> usize {
         hole_chunks(self.holes.len())
+    }
+
+    /// Chunk and lane of each hole in the flows that a [`Tip`](super::Tip) is told, in the order of the file.
+    pub fn hole_slots(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let lanes = self.hole_junctions.iter().map(|&junction| self.lane_of(junction));
+        lanes.map(|lane| (lane / LANES - self.step_chunks(), lane % LANES))
     }
 
     pub(super) fn step_chunks(&self) -> usize {

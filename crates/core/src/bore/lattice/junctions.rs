@@ -181,6 +181,11 @@ impl<F: Real> Holes<F> {
         self.range[1][k] = high;
     }
 
+    /// Whether the hole in lane `k` is open at all, or on its way there.
+    pub(super) fn is_open(&self, k: usize) -> bool {
+        self.opening[k] != F::default() || self.glide[k] != F::default()
+    }
+
     /// A hole opened by `a` passes its jet through `a^2` of its area (its mass, too, is 1 / a^2 of the open one's). Seen
     /// behind the transformer the loss is then 1 / a^2 of the open hole's: it is what quietens the air column when the
     /// fingers leave many holes at once. Held below a bound where no air passes anyway.

@@ -1,0 +1,251 @@
+//! The sound outside: what leaves bell and holes, on its way to one or two places.
+//!
+//! The flows of one control tick are kept as the lattice gives them, eight lanes beside each other. At the end of the tick
+//! those of the sources that are open are copied into a line each, every place adds up the lines along its [`Paths`](super::listening::Paths), and
+//! a small source sounds as its flow changes. Delays are whole samples of the internal rate, 1.8 mm of way to either side.
+//! A closed hole costs nothing. A new way of listening fades in.
+//!
+//! All of it is plain loops over arrays, compiled with the lattice's vector features; the same bits with and without AVX2.
+
+mod ear;
+mod lines;
+#[cfg(test)]
+mod tests;
+
+use crate::bore::lattice::{LANES, LatticeCoeffs, MAX_CHUNKS, Real};
+use crate::bore::sound_sources::SoundSources;
+use crate::instrument::control_tick::TICK;
+use crate::instrument::listening::{Listening, ListeningMode};
+use crate::units::Air;
+use ear::Ear;
+use lines::Lines;
+
+/// Ticks in which one way of listening fades into another: 5 ms at 96 kHz, too slow to click.
+const FADE_TICKS: u32 = 30;
+
+/// Flows of a tick, and the way to the listener.
+pub(super) struct Outside<F> {
+    /// Flow of the bell in the last sample of the tick before, and in those of this one.
+    bell: [F; TICK + 1],
+    /// The same of each chunk of holes.
+    holes: [[[F; LANES]; TICK + 1]; MAX_CHUNKS],
+    chunks: usize,
+    /// Row of `bell` and `holes` that this sample goes to, 1..=TICK.
+    row: usize,
+    lines: Lines<F>,
+    sources: SoundSources,
+    air: Air,
+    rate_hz: f64,
+    /// Pressure at 1 m per change of flow in one sample, Pa.
+    loudness: f64,
+    /// How one shall listen, and whether there is a right channel; and what `now` was made for.
+    wanted: (Listening, bool),
+    chosen: (Listening, bool),
+    now: Places<F>,
+    before: Places<F>,
+    /// Ticks until the former way of listening is gone.
+    fading: u32,
+    /// Ticks until the lines hold all that can be heard of them; they are not kept while everything is in one point.
+    filling: u32,
+    /// Nothing has sounded since the last silence: another way of listening need not fade in.
+    fresh: bool,
+    out: [[f32; TICK]; 2],
+}
+
+/// One or two places.
+#[derive(Clone)]
+struct Places<F> {
+    /// Everything in one point instead.
+    point: bool,
+    two: bool,
+    ears: [Ear<F>; 2],
+}
+
+impl<F: Real> Places<F> {
+    fn new(
+        listening: &Listening,
+        stereo: bool,
+        (sources, air): (&SoundSources, &Air),
+        lines: &Lines<F>,
+        rate_hz: f64,
+    ) -> Self {
+        let two = stereo && listening.mode == ListeningMode::Position && listening.width_deg > 0.0;
+        let ear = |side: f64| {
+            let paths = match listening.mode {
+                ListeningMode::Position => listening.position(side, sources, air),
+                _ => Listening::everywhere(sources, air),
+            };
+            Ear::new(&paths, lines, rate_hz)
+        };
+        let ears = if two { [ear(-1.0), ear(1.0)] } else { [ear(0.0), ear(0.0)] };
+        Self { point: listening.mode == ListeningMode::Point, two, ears }
+    }
+}
+
+impl<F: Real> Outside<F> {
+    /// All in one point, silent. Allocates.
+    pub fn new(coeffs: &LatticeCoeffs, sources: SoundSources, air: &Air, loudness: f64) -> Self {
+        let rate_hz = coeffs.rate_hz;
+        let reach = (Listening::longest_s(&sources, air) * rate_hz).ceil() as usize + 1;
+        let wanted = (Listening::point(), false);
+        let lines = Lines::new(coeffs, reach);
+        let places = Places::new(&wanted.0, wanted.1, (&sources, air), &lines, rate_hz);
+        Self {
+            bell: [F::default(); TICK + 1],
+            holes: [[[F::default(); LANES]; TICK + 1]; MAX_CHUNKS],
+            chunks: coeffs.hole_chunks().min(MAX_CHUNKS),
+            row: 1,
+            lines,
+            sources,
+            air: *air,
+            rate_hz,
+            loudness,
+            wanted,
+            chosen: wanted,
+            before: places.clone(),
+            now: places,
+            fading: 0,
+            filling: 0,
+            fresh: true,
+            out: [[0.0; TICK]; 2],
+        }
+    }
+
+    /// Listens in another way from the next tick on; `stereo` if there is a right channel. Real-time safe.
+    pub fn listen(&mut self, listening: &Listening, stereo: bool) {
+        self.wanted = (*listening, stereo);
+    }
+
+    /// Tells which holes are open or opening. Call it before each tick with `moved` if any hole moves. Real-time safe.
+    #[inline(always)]
+    pub fn heed(&mut self, moved: bool, is_open: impl Fn(usize) -> bool) {
+        self.lines.heed(moved, is_open);
+    }
+
+    /// Takes the bell's flow in sample `at` of a tick.
+    #[inline(always)]
+    pub fn bell(&mut self, at: usize, flow: F) {
+        self.row = (at & (TICK - 1)) + 1;
+        self.bell[self.row] = flow;
+    }
+
+    /// Takes the flows of a chunk of holes in the same sample.
+    #[inline(always)]
+    pub fn holes(&mut self, chunk: usize, flows: &[F; LANES]) {
+        if chunk < MAX_CHUNKS && self.row <= TICK {
+            self.holes[chunk][self.row] = *flows;
+        }
+    }
+
+    /// Sends a whole tick on its way.
+    #[inline(always)]
+    pub fn radiate(&mut self) {
+        if self.wanted != self.chosen && self.fading == 0 {
+            self.change();
+        }
+        self.fresh = false;
+        if !self.now.point || self.fading > 0 || self.filling > 0 {
+            self.lines.write(&self.bell, &self.holes);
+        }
+        self.out = self.hear_now();
+        if self.fading > 0 {
+            self.fade();
+        }
+        self.bell[0] = self.bell[TICK];
+        for rows in self.holes.iter_mut().take(self.chunks) {
+            rows[0] = rows[TICK];
+        }
+    }
+
+    /// Begins to fade into the way that is wanted. Not inlined: it is seldom called.
+    #[inline(never)]
+    fn change(&mut self) {
+        let (listening, stereo) = self.wanted;
+        let of = (&self.sources, &self.air);
+        let mut next = Places::new(&listening, stereo, of, &self.lines, self.rate_hz);
+        if self.now.point && !next.point && !self.fresh {
+            // What is in the lines is old: one point needs none.
+            if self.filling == 0 {
+                self.lines.clear();
+                self.filling = self.lines.ticks() + 1;
+            }
+            self.filling -= 1;
+            if self.filling > 0 {
+                return;
+            }
+        }
+        for (next, now) in next.ears.iter_mut().zip(&self.now.ears) {
+            next.go_on((!self.now.point).then_some(now), &self.lines);
+        }
+        self.before = std::mem::replace(&mut self.now, next);
+        self.chosen = self.wanted;
+        self.filling = 0;
+        self.fading = if self.fresh { 0 } else { FADE_TICKS };
+    }
+
+    /// What is heard: the left or only place, and the right one if there are two.
+    pub fn heard(&self) -> (&[f32; TICK], Option<&[f32; TICK]>) {
+        let two = self.now.two || (self.fading > 0 && self.before.two);
+        (&self.out[0], two.then_some(&self.out[1]))
+    }
+
+    /// Silence, and at once the way of listening that is wanted. Real-time safe.
+    pub fn silence(&mut self) {
+        self.bell = [F::default(); TICK + 1];
+        self.holes = [[[F::default(); LANES]; TICK + 1]; MAX_CHUNKS];
+        self.lines.clear();
+        self.out = [[0.0; TICK]; 2];
+        (self.fresh, self.fading, self.filling) = (true, 0, 0);
+        self.now.ears.iter_mut().chain(&mut self.before.ears).for_each(Ear::silence);
+    }
+
+    /// The flows of all sources in one point, sample by sample.
+    #[inline(always)]
+    fn point(&self) -> [f32; TICK] {
+        let flow = |n: usize| {
+            let mut lanes = [F::default(); LANES];
+            for rows in self.holes.iter().take(self.chunks) {
+                for lane in 0..LANES {
+                    lanes[lane] = lanes[lane] + rows[n][lane];
+                }
+            }
+            lanes.into_iter().fold(self.bell[n], |flow, lane| flow + lane).wide()
+        };
+        let mut before = flow(0);
+        std::array::from_fn(|n| {
+            let after = flow(n + 1);
+            let change = (after - before) * self.loudness;
+            before = after;
+            change as f32
+        })
+    }
+
+    #[inline(always)]
+    fn hear_now(&mut self) -> [[f32; TICK]; 2] {
+        if self.now.point {
+            return [self.point(); 2];
+        }
+        let loudness = F::of(self.loudness);
+        let pressure = |changes: [F; TICK]| changes.map(|change| (change * loudness).wide() as f32);
+        let [left, right] = &mut self.now.ears;
+        let heard = pressure(left.listen(&self.lines));
+        [heard, if self.now.two { pressure(right.listen(&self.lines)) } else { heard }]
+    }
+
+    /// Mixes in what the former way of listening hears. Not inlined: it is seldom called.
+    #[inline(never)]
+    fn fade(&mut self) {
+        std::mem::swap(&mut self.now, &mut self.before);
+        let old = self.hear_now();
+        std::mem::swap(&mut self.now, &mut self.before);
+        let ticks = FADE_TICKS as usize;
+        let done = (ticks - self.fading as usize) * TICK;
+        for (new, old) in self.out.iter_mut().zip(old) {
+            for (n, (new, old)) in new.iter_mut().zip(old).enumerate() {
+                let part = (done + n + 1) as f32 / (ticks * TICK) as f32;
+                *new = old + part * (*new - old);
+            }
+        }
+        self.fading -= 1;
+    }
+}

@@ -1,0 +1,111 @@
+//! One place: its ways from all sources, and the filter of the bell at its angle.
+
+use super::lines::Lines;
+use crate::bore::lattice::Real;
+use crate::instrument::control_tick::TICK;
+use crate::instrument::listening::{MAX_SOURCES, Paths};
+
+/// States below this are set to 0.
+const TINY: f64 = 1e-18;
+
+/// One place.
+#[derive(Clone)]
+pub(super) struct Ear<F> {
+    /// Of each hole and the bell: a line's length beyond where its delayed line begins when a tick is at 0, and its gain.
+    taps: [(usize, F); MAX_SOURCES],
+    bell: Shelf<F>,
+    /// Sum of all flows in the last sample.
+    last: F,
+}
+
+/// A filter of first order: `y = b0 x + b1 x' + a1 y'`.
+#[derive(Clone, Copy, Default)]
+struct Shelf<F> {
+    b0: F,
+    b1: F,
+    a1: F,
+    x: F,
+    y: F,
+}
+
+impl<F: Real> Shelf<F> {
+    /// `(1 + b s) / (1 + a s)` at a sample rate, by the trapezoidal rule.
+    fn new((b_s, a_s): (f64, f64), rate_hz: f64) -> Self {
+        let (b, a) = (2.0 * rate_hz * b_s, 2.0 * rate_hz * a_s);
+        let [b0, b1, a1] = [(1.0 + b) / (1.0 + a), (1.0 - b) / (1.0 + a), (a - 1.0) / (1.0 + a)].map(F::of);
+        Self { b0, b1, a1, x: F::default(), y: F::default() }
+    }
+
+    #[inline(always)]
+    fn run(&mut self, block: &mut [F; TICK]) {
+        let x = *block;
+        for n in 0..TICK {
+            let before = if n == 0 { self.x } else { x[n - 1] };
+            block[n] = self.b0 * x[n] + self.b1 * before;
+        }
+        self.x = x[TICK - 1];
+        for y in block {
+            *y = *y + self.a1 * self.y;
+            self.y = *y;
+        }
+        // A filter at rest would stay on the smallest number there is, which is slow to compute with.
+        if self.y.magnitude() < F::of(TINY) {
+            self.y = F::default();
+        }
+    }
+}
+
+impl<F: Real> Ear<F> {
+    /// Along these paths, at the internal rate, Hz. Real-time safe.
+    pub(super) fn new(paths: &Paths, lines: &Lines<F>, rate_hz: f64) -> Self {
+        let mut taps = [(0, F::default()); MAX_SOURCES];
+        for (number, (tap, path)) in taps.iter_mut().zip(&paths.paths).enumerate().take(lines.slots.len() + 1)
+        {
+            let delay = ((path.delay_s * rate_hz).round() as usize).min(lines.reach);
+            *tap = ((number + 1) * lines.stride() - delay, F::of(path.gain));
+        }
+        Self { taps, bell: Shelf::new(paths.bell_s, rate_hz), last: F::default() }
+    }
+
+    /// Goes on from the flows in the lines, and with what the filter of the bell has heard in another ear, if there is one.
+    pub(super) fn go_on(&mut self, other: Option<&Self>, lines: &Lines<F>) {
+        let flow = |(begin, gain): (usize, F)| gain * lines.newest(begin);
+        // A steady flow passes the filter as it is.
+        let steady = flow(self.taps[lines.slots.len()]);
+        (self.bell.x, self.bell.y) = other.map_or((steady, steady), |other| (other.bell.x, other.bell.y));
+        let holes = lines.active[..lines.count].iter().map(|&hole| flow(self.taps[usize::from(hole)]));
+        self.last = holes.fold(self.bell.y, |sum, flow| sum + flow);
+    }
+
+    /// Silence.
+    pub(super) fn silence(&mut self) {
+        (self.bell.x, self.bell.y, self.last) = (F::default(), F::default(), F::default());
+    }
+
+    /// Adds up a tick: changes of flow.
+    #[inline(always)]
+    pub(super) fn listen(&mut self, lines: &Lines<F>) -> [F; TICK] {
+        let mut sum = [F::default(); TICK];
+        let (begin, gain) = self.taps[lines.slots.len().min(MAX_SOURCES - 1)];
+        if let Some(past) = lines.tick(begin) {
+            for n in 0..TICK {
+                sum[n] = gain * past[n];
+            }
+        }
+        self.bell.run(&mut sum);
+        for &hole in lines.active.iter().take(lines.count) {
+            let (begin, gain) = self.taps[usize::from(hole).min(MAX_SOURCES - 1)];
+            if let Some(past) = lines.tick(begin) {
+                for n in 0..TICK {
+                    sum[n] = sum[n] + gain * past[n];
+                }
+            }
+        }
+        let mut changes = sum;
+        for n in 0..TICK {
+            changes[n] = sum[n] - if n == 0 { self.last } else { sum[n - 1] };
+        }
+        self.last = sum[TICK - 1];
+        changes
+    }
+}
