@@ -7,6 +7,7 @@
 
 use std::sync::LazyLock;
 
+use chalumeau_core::bore::sound_sources::SoundSources;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::lattice::Real;
 use chalumeau_core::instrument::internal_rate::INTERNAL_RATES_HZ;
@@ -105,7 +106,8 @@ fn follow<F: Real>(case: usize, model: &Model, random: &mut Random) -> Left {
     let settings = any_settings(random);
     let fingering = random.below(model.file.fingerings.len());
     let reed = ReedCoeffs::new(any_reed(random, &settings, model, fingering), model.coeffs.rate_hz);
-    let mut voice: Voice<F> = Voice::new(&model.coeffs, &model.air, ReedTables::reference(), reed);
+    let sources = SoundSources::of(&model.file);
+    let mut voice: Voice<F> = Voice::new(&model.coeffs, sources, &model.air, ReedTables::reference(), reed);
     let holes = model.coeffs.holes();
     for (hole, &open) in model.file.fingerings[fingering].open.iter().enumerate() {
         voice.lattice_mut().set_opening(hole, f64::from(u8::from(open)));

@@ -108,7 +108,7 @@ mod tests {
 
     fn applied(level: &mut OutputLevel) -> [f32; 4] {
         let mut out = [1.0; 4];
-        level.apply(&mut out);
+        level.apply(Channels::one(&mut out));
         out
     }
 
