@@ -5,7 +5,7 @@
 
 use std::hint::black_box;
 
-use chalumeau_core::bore::lattice::{LANES, Lattice, Tip};
+use chalumeau_core::bore::lattice::{HoleFlows, Lattice, Tip};
 use chalumeau_core::event::Event;
 use chalumeau_core::instrument::held_note::HeldNote;
 use chalumeau_core::instrument::voice::{Drive, TICK};
@@ -42,6 +42,7 @@ fn reed(criterion: &mut Criterion) {
 /// A stiff end that pushes a little: the bore without the reed.
 struct Push {
     heard: f32,
+    holes: HoleFlows<f32>,
 }
 
 impl Tip<f32> for Push {
@@ -51,13 +52,13 @@ impl Tip<f32> for Push {
     }
 
     #[inline(always)]
-    fn bell(&mut self, flow: f32) {
-        self.heard += flow;
+    fn holes(&mut self) -> Option<&mut HoleFlows<f32>> {
+        Some(&mut self.holes)
     }
 
     #[inline(always)]
-    fn holes(&mut self, _: usize, flows: &[f32; LANES]) {
-        self.heard += flows.iter().sum::<f32>();
+    fn radiated(&mut self, bell: f32) {
+        self.heard += bell;
     }
 }
 
@@ -74,7 +75,7 @@ fn bore(criterion: &mut Criterion) {
         if plain { lattice.without_avx2() } else { lattice }
     };
     for (name, plain) in [("as detected", false), ("plain", true)] {
-        let (mut lattice, mut tip) = (bore(plain), Push { heard: 0.0 });
+        let (mut lattice, mut tip) = (bore(plain), Push { heard: 0.0, holes: HoleFlows::default() });
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
                 lattice.run(TICK, &mut tip);

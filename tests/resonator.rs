@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 
 use chalumeau_core::analysis::impedance::{Impedance, reflectance};
 use chalumeau_core::bore::cells::networks;
-use chalumeau_core::bore::lattice::{LANES, Lattice, LatticeCoeffs, Real, Tip};
+use chalumeau_core::bore::lattice::{HoleFlows, Lattice, LatticeCoeffs, Real, Tip};
 use chalumeau_core::bore::transfer_matrix::{TransferMatrix, find_peaks, threshold_gamma};
 use chalumeau_core::instrument::Model;
 use chalumeau_core::instrument::held_note::HeldNote;
@@ -410,7 +410,7 @@ fn independent_lattice_answers_an_impulse_alike() {
 }
 
 /// The dynamic reed on a bore, breath rising over 20 ms; keeps the mouthpiece pressure and the flow that radiates.
-struct Blown<'a> {
+struct Blown<'a, F> {
     reed: &'a ReedCoeffs,
     state: ReedState,
     kappa: f64,
@@ -418,9 +418,12 @@ struct Blown<'a> {
     n: usize,
     pressure: Vec<f64>,
     flow: Vec<f64>,
+    /// Places of the holes, and what leaves through them in this sample.
+    slots: Vec<(usize, usize)>,
+    holes: HoleFlows<F>,
 }
 
-impl<'a> Blown<'a> {
+impl<'a, F: Real> Blown<'a, F> {
     fn new(reed: &'a ReedCoeffs, model: &Model) -> Self {
         Self {
             reed,
@@ -430,6 +433,8 @@ impl<'a> Blown<'a> {
             n: 0,
             pressure: Vec::new(),
             flow: Vec::new(),
+            slots: model.coeffs.hole_slots().collect(),
+            holes: HoleFlows::default(),
         }
     }
 
@@ -443,23 +448,23 @@ impl<'a> Blown<'a> {
     }
 }
 
-impl<F: Real> Tip<F> for Blown<'_> {
+impl<F: Real> Tip<F> for Blown<'_, F> {
     #[inline(always)]
     fn reflect(&mut self, p_minus: F) -> F {
         F::of(self.blow(p_minus.wide()))
     }
     #[inline(always)]
-    fn bell(&mut self, flow: F) {
-        self.flow.push(flow.wide());
+    fn holes(&mut self) -> Option<&mut HoleFlows<F>> {
+        Some(&mut self.holes)
     }
-
-    fn holes(&mut self, _: usize, flows: &[F; LANES]) {
-        let holes: f64 = flows.iter().map(|flow| flow.wide()).sum();
-        self.flow.last_mut().into_iter().for_each(|flow| *flow += holes);
+    #[inline(always)]
+    fn radiated(&mut self, bell: F) {
+        let holes: f64 = self.slots.iter().map(|&(chunk, lane)| self.holes[chunk][lane].wide()).sum();
+        self.flow.push(bell.wide() + holes);
     }
 }
 
-fn blown<'a, F: Real>(model: &Model, note: &HeldNote, reed: &'a ReedCoeffs, samples: usize) -> Blown<'a> {
+fn blown<'a, F: Real>(model: &Model, note: &HeldNote, reed: &'a ReedCoeffs, samples: usize) -> Blown<'a, F> {
     let mut lattice = fingered::<F>(model, &openings(model, note.fingering));
     lattice.set_jet_loss(note.jet_loss);
     lattice.glide_delay(note.rows, 0);
@@ -484,7 +489,7 @@ fn reed_plays_the_same_on_the_independent_lattice() {
         let holes = networks(&model.file, &model.air, &model.cells);
         let mut bore =
             Oracle::new(&model.cells, &holes, P_REF_PA, &model.air, &opening, note.jet_loss, note.rows);
-        let mut slow = Blown::new(&reed, model);
+        let mut slow = Blown::<f64>::new(&reed, model);
         let flows: Vec<Vec<f64>> = (0..samples)
             .map(|_| {
                 bore.sample(|p_minus| slow.blow(p_minus));

@@ -19,8 +19,8 @@
 
 pub mod bend;
 mod breath_noise;
-mod choke;
 mod channels;
+mod choke;
 mod clarinet;
 pub mod concert_pitch;
 mod control_tick;

@@ -57,19 +57,26 @@ pub const MAX_CHUNKS: usize = 7;
 /// States below this are set to 0, so that no denormal number slows a held note.
 const TINY: f64 = 1e-18;
 
+/// Volume flows leaving through holes in one sample, by chunk and lane, see [`LatticeCoeffs::hole_slots`]. A power of two
+/// chunks, one more than there may be: so it costs no multiplication to find a row of them.
+pub type HoleFlows<F> = [[F; LANES]; MAX_CHUNKS.next_power_of_two()];
+
 /// The reed end of the bore: takes the arriving wave, gives the leaving one, and is told what radiates.
 ///
 /// Implementations mark all `#[inline(always)]` so that they are compiled with the lattice's vector features.
 pub trait Tip<F> {
     /// Wave leaving into the bore, for the wave arriving from it.
     fn reflect(&mut self, p_minus: F) -> F;
-    /// Volume flow leaving through the bell in this sample.
+    /// Room for the volume flows that leave through the holes in this sample; none if they are not asked for. A lane without
+    /// a hole gets 0, a chunk without holes nothing.
     #[inline(always)]
-    fn bell(&mut self, _flow: F) {}
-    /// Volume flows leaving in the same sample through a chunk of holes, in their [lanes](LatticeCoeffs::hole_slots);
-    /// called after [`bell`](Self::bell) for one chunk after the other.
+    fn holes(&mut self) -> Option<&mut HoleFlows<F>> {
+        None
+    }
+    /// The sample is done: its volume flow leaving through the bell, after those through the [`holes`](Self::holes) have
+    /// been written.
     #[inline(always)]
-    fn holes(&mut self, _chunk: usize, _flows: &[F; LANES]) {}
+    fn radiated(&mut self, _bell: F) {}
     /// The last sample of a [`run`](Lattice::run) is done.
     #[inline(always)]
     fn ended(&mut self) {}
@@ -394,6 +401,7 @@ fn run_body<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, sampl
     let ring = &mut *lattice.ring;
     let mask = if MASK == 0 { lattice.mask } else { MASK };
     let row_mask = mask & !(STRIDE as u16 - 1);
+    let mut unheard = HoleFlows::default();
     for _ in 0..samples {
         let base = lattice.base.wrapping_add(STRIDE as u16) & row_mask;
         lattice.base = base;
@@ -419,18 +427,19 @@ fn run_body<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, sampl
         lattice.bell_state = lattice.bell_state + lattice.bell_g2 * p_end;
         let reflected = p_end - arriving;
         ring[usize::from(base | (BACK + END_SLOT) as u16)] = reflected;
-        tip.bell(lattice.bell_y * (arriving - reflected));
+        let bell = lattice.bell_y * (arriving - reflected);
 
         let mut slot = 0;
         for steps in &mut *lattice.steps {
             steps.tick(ring, base, mask, slot);
             slot += LANES;
         }
-        for (chunk, holes) in lattice.holes.iter_mut().enumerate() {
-            let leaving = holes.tick(ring, base, mask, slot);
-            tip.holes(chunk, &leaving);
+        let leaving = tip.holes().unwrap_or(&mut unheard);
+        for (holes, leaving) in lattice.holes.iter_mut().zip(leaving) {
+            *leaving = holes.tick(ring, base, mask, slot);
             slot += LANES;
         }
+        tip.radiated(bell);
     }
     tip.ended();
 }

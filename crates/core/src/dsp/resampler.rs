@@ -27,7 +27,9 @@
 //! | 96 000 -> 50 000 | 72 | 0.365 | 20 833 | 29 167 | 0.0001 | -114 | -98 |
 //! | 96 000 -> 47 999 (mixed phases) | 72 | 0.365 | 20 000 | 27 999 | 0.0002 | -115 | -94 |
 
-use crate::dsp::low_pass::{Kernel, LANES, TRANSITION, dot, normalised};
+use std::sync::Arc;
+
+use crate::dsp::low_pass::{Kernel, LANES, TRANSITION, TapRow, dot, normalised, tap_rows};
 use crate::dsp::warp::{BEYOND, ONE, SPEEDS, Warp};
 
 /// Largest number of phases stored exactly; above it, neighbouring phases are mixed linearly.
@@ -68,8 +70,8 @@ pub struct Resampler {
     /// Position of the next output after the newest input it hears, in parts of `1 / l` input samples; below `l`.
     phase: u64,
     taps: usize,
-    /// `[phase][tap]`, oldest tap first. `l` rows, or `PHASES + 1` when mixed; none for equal rates.
-    coeffs: Box<[[f32; LANES]]>,
+    /// `[phase][tap]`, oldest tap first. `l` rows, or `PHASES + 1` when mixed; none for equal rates. Shared with clones.
+    coeffs: Arc<[TapRow]>,
     /// The last inputs in order; when it is full, what can still be heard moves to its beginning.
     history: Box<[f32]>,
     /// Inputs that can still be heard.
@@ -133,7 +135,7 @@ impl Resampler {
             part,
             phase: 0,
             taps,
-            coeffs: coeffs.as_chunks().0.into(),
+            coeffs: tap_rows(&coeffs).collect(),
             history: vec![0.0; reach + ROOM].into_boxed_slice(),
             reach,
             next: 0,
@@ -327,7 +329,7 @@ impl Resampler {
     }
 
     #[inline]
-    fn row(&self, phase: usize) -> &[[f32; LANES]] {
+    fn row(&self, phase: usize) -> &[TapRow] {
         let chunks = self.taps / LANES;
         &self.coeffs[phase * chunks..][..chunks]
     }

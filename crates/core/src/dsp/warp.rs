@@ -6,7 +6,9 @@
 //! close enough to mix two neighbours linearly (rest -96 dB at the pass edge, 12 dB less per octave below it); speeds
 //! between two steps take the shorter window, whose stop band begins up to 1.2 times higher: -92 dB from there on.
 
-use crate::dsp::low_pass::{Kernel, LANES, dot, normalised};
+use std::sync::Arc;
+
+use crate::dsp::low_pass::{Kernel, LANES, TapRow, dot, normalised, tap_rows};
 
 /// Slowest and fastest clock: two octaves down and up.
 pub const SPEEDS: (f64, f64) = (0.25, 4.0);
@@ -29,14 +31,14 @@ struct Window {
     taps: usize,
     phases: u64,
     /// `phases + 1` rows, oldest tap first.
-    rows: Box<[[f32; LANES]]>,
+    rows: Box<[TapRow]>,
 }
 
 /// Windows for every speed, and the one in use.
 #[derive(Clone, Debug)]
 pub struct Warp {
-    /// Shortest first.
-    windows: Box<[Window]>,
+    /// Shortest first. Shared with clones.
+    windows: Arc<[Window]>,
     chosen: usize,
     /// Taps at speed 1.
     taps: f64,
@@ -136,7 +138,7 @@ impl Window {
             row.iter_mut().enumerate().for_each(|(tap, value)| *value = height(first + tap as f64));
             rows.extend(normalised(&row));
         }
-        Self { taps, phases: phases as u64, rows: rows.as_chunks().0.into() }
+        Self { taps, phases: phases as u64, rows: tap_rows(&rows).collect() }
     }
 }
 

@@ -12,7 +12,7 @@ mod lines;
 #[cfg(test)]
 mod tests;
 
-use crate::bore::lattice::{LANES, LatticeCoeffs, MAX_CHUNKS, Real};
+use crate::bore::lattice::{HoleFlows, LANES, LatticeCoeffs, Real};
 use crate::bore::sound_sources::SoundSources;
 use crate::instrument::control_tick::TICK;
 use crate::instrument::listening::{Listening, ListeningMode};
@@ -25,13 +25,13 @@ const FADE_TICKS: u32 = 30;
 
 /// Flows of a tick, and the way to the listener.
 pub(super) struct Outside<F> {
-    /// Flow of the bell in the last sample of the tick before, and in those of this one.
-    bell: [F; TICK + 1],
-    /// The same of each chunk of holes.
-    holes: [[[F; LANES]; TICK + 1]; MAX_CHUNKS],
+    /// Flows of the bell and of the holes in each sample of a tick.
+    bell: [F; TICK],
+    holes: [HoleFlows<F>; TICK],
+    /// Chunks of holes that the instrument has.
     chunks: usize,
-    /// Row of `bell` and `holes` that this sample goes to, 1..=TICK.
-    row: usize,
+    /// All flows together in the last sample of the tick before.
+    last: f64,
     lines: Lines<F>,
     sources: SoundSources,
     air: Air,
@@ -91,10 +91,10 @@ impl<F: Real> Outside<F> {
         let lines = Lines::new(coeffs, reach);
         let places = Places::new(&wanted.0, wanted.1, (&sources, air), &lines, rate_hz);
         Self {
-            bell: [F::default(); TICK + 1],
-            holes: [[[F::default(); LANES]; TICK + 1]; MAX_CHUNKS],
-            chunks: coeffs.hole_chunks().min(MAX_CHUNKS),
-            row: 1,
+            bell: [F::default(); TICK],
+            holes: [HoleFlows::default(); TICK],
+            chunks: coeffs.hole_chunks(),
+            last: 0.0,
             lines,
             sources,
             air: *air,
@@ -125,16 +125,13 @@ impl<F: Real> Outside<F> {
     /// Takes the bell's flow in sample `at` of a tick.
     #[inline(always)]
     pub fn bell(&mut self, at: usize, flow: F) {
-        self.row = (at & (TICK - 1)) + 1;
-        self.bell[self.row] = flow;
+        self.bell[at & (TICK - 1)] = flow;
     }
 
-    /// Takes the flows of a chunk of holes in the same sample.
+    /// Room for the holes' flows in sample `at` of a tick.
     #[inline(always)]
-    pub fn holes(&mut self, chunk: usize, flows: &[F; LANES]) {
-        if chunk < MAX_CHUNKS && self.row <= TICK {
-            self.holes[chunk][self.row] = *flows;
-        }
+    pub fn holes(&mut self, at: usize) -> &mut HoleFlows<F> {
+        &mut self.holes[at & (TICK - 1)]
     }
 
     /// Sends a whole tick on its way.
@@ -151,10 +148,7 @@ impl<F: Real> Outside<F> {
         if self.fading > 0 {
             self.fade();
         }
-        self.bell[0] = self.bell[TICK];
-        for rows in self.holes.iter_mut().take(self.chunks) {
-            rows[0] = rows[TICK];
-        }
+        self.last = self.together(TICK - 1);
     }
 
     /// Begins to fade into the way that is wanted. Not inlined: it is seldom called.
@@ -191,33 +185,39 @@ impl<F: Real> Outside<F> {
 
     /// Silence, and at once the way of listening that is wanted. Real-time safe.
     pub fn silence(&mut self) {
-        self.bell = [F::default(); TICK + 1];
-        self.holes = [[[F::default(); LANES]; TICK + 1]; MAX_CHUNKS];
+        self.last = 0.0;
         self.lines.clear();
         self.out = [[0.0; TICK]; 2];
         (self.fresh, self.fading, self.filling) = (true, 0, 0);
         self.now.ears.iter_mut().chain(&mut self.before.ears).for_each(Ear::silence);
     }
 
-    /// The flows of all sources in one point, sample by sample.
+    /// All flows together in a sample of the tick.
+    #[inline(always)]
+    fn together(&self, at: usize) -> f64 {
+        let mut lanes = [F::default(); LANES];
+        for chunk in self.holes[at].iter().take(self.chunks) {
+            for lane in 0..LANES {
+                lanes[lane] = lanes[lane] + chunk[lane];
+            }
+        }
+        let mut flow = self.bell[at];
+        for lane in lanes {
+            flow = flow + lane;
+        }
+        flow.wide()
+    }
+
+    /// All flows in one point.
     #[inline(always)]
     fn point(&self) -> [f32; TICK] {
-        let flow = |n: usize| {
-            let mut lanes = [F::default(); LANES];
-            for rows in self.holes.iter().take(self.chunks) {
-                for lane in 0..LANES {
-                    lanes[lane] = lanes[lane] + rows[n][lane];
-                }
-            }
-            lanes.into_iter().fold(self.bell[n], |flow, lane| flow + lane).wide()
-        };
-        let mut before = flow(0);
-        std::array::from_fn(|n| {
-            let after = flow(n + 1);
-            let change = (after - before) * self.loudness;
-            before = after;
-            change as f32
-        })
+        let (mut before, mut pressure) = (self.last, [0.0; TICK]);
+        for (at, pressure) in pressure.iter_mut().enumerate() {
+            let flow = self.together(at);
+            *pressure = ((flow - before) * self.loudness) as f32;
+            before = flow;
+        }
+        pressure
     }
 
     #[inline(always)]

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::bore::lattice::{LANES, Lattice, LatticeCoeffs, Real, Tip};
+use crate::bore::lattice::{HoleFlows, Lattice, LatticeCoeffs, Real, Tip};
 use crate::bore::sound_sources::SoundSources;
 use crate::instrument::breath_noise::BreathNoise;
 pub use crate::instrument::control_tick::TICK;
@@ -106,7 +106,12 @@ impl<F: Real> Tip<F> for Mouth<F> {
     }
 
     #[inline(always)]
-    fn bell(&mut self, flow: F) {
+    fn holes(&mut self) -> Option<&mut HoleFlows<F>> {
+        Some(self.outside.holes(self.at))
+    }
+
+    #[inline(always)]
+    fn radiated(&mut self, bell: F) {
         if let Some(probes) = &mut self.probes {
             probes[self.at & (TICK - 1)] = Probe {
                 gamma: self.p_mouth / self.reed.closing_pressure(),
@@ -116,13 +121,8 @@ impl<F: Real> Tip<F> for Mouth<F> {
                 p_radiated_pa: 0.0,
             };
         }
-        self.outside.bell(self.at, flow);
+        self.outside.bell(self.at, bell);
         self.at += 1;
-    }
-
-    #[inline(always)]
-    fn holes(&mut self, chunk: usize, flows: &[F; LANES]) {
-        self.outside.holes(chunk, flows);
     }
 
     #[inline(always)]

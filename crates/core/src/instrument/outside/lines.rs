@@ -1,6 +1,6 @@
 //! The last flows of all sources, to be heard later.
 
-use crate::bore::lattice::{LANES, LatticeCoeffs, MAX_CHUNKS, Real};
+use crate::bore::lattice::{HoleFlows, LANES, LatticeCoeffs, Real};
 use crate::instrument::control_tick::TICK;
 use crate::instrument::listening::MAX_SOURCES;
 
@@ -16,8 +16,8 @@ pub(super) struct Lines<F> {
     pub(super) reach: usize,
     /// Where this tick stands in each line.
     at: usize,
-    /// Chunk and lane of each hole, in the order of the file.
-    pub(super) slots: Box<[(usize, usize)]>,
+    /// Place of each hole among the flows of a sample, in the order of the file.
+    pub(super) slots: Box<[usize]>,
     /// Holes whose lines are not all 0.
     pub(super) active: [u16; MAX_SOURCES],
     pub(super) count: usize,
@@ -28,7 +28,7 @@ pub(super) struct Lines<F> {
 impl<F: Real> Lines<F> {
     /// Silent lines that reach back so many samples. Allocates.
     pub(super) fn new(coeffs: &LatticeCoeffs, reach: usize) -> Self {
-        let slots: Box<[(usize, usize)]> = coeffs.hole_slots().collect();
+        let slots: Box<[usize]> = coeffs.hole_slots().map(|(chunk, lane)| chunk * LANES + lane).collect();
         let mut lines = Self {
             past: [].into(),
             reach,
@@ -100,25 +100,25 @@ impl<F: Real> Lines<F> {
 
     /// Writes the flows of a tick.
     #[inline(always)]
-    pub(super) fn write(&mut self, bell: &[F; TICK + 1], holes: &[[[F; LANES]; TICK + 1]; MAX_CHUNKS]) {
+    pub(super) fn write(&mut self, bell: &[F; TICK], holes: &[HoleFlows<F>; TICK]) {
         self.at += TICK;
         if self.at + TICK > self.stride() {
             self.begin_again();
         }
         let (stride, at) = (self.stride(), self.at);
         for &hole in self.active.iter().take(self.count) {
-            let Some(&(chunk, lane)) = self.slots.get(usize::from(hole)) else { continue };
-            let Some(rows) = holes.get(chunk) else { continue };
-            let (begin, lane) = (usize::from(hole) * stride + at, lane & (LANES - 1));
+            let Some(&slot) = self.slots.get(usize::from(hole)) else { continue };
+            let begin = usize::from(hole) * stride + at;
             if let Some(place) = self.past.get_mut(begin..begin + TICK) {
-                for n in 0..TICK {
-                    place[n] = rows[n + 1][lane];
+                for (flow, row) in place.iter_mut().zip(holes) {
+                    let row = row.as_flattened();
+                    *flow = row[slot & (row.len() - 1)];
                 }
             }
         }
         let begin = self.slots.len() * stride + at;
         if let Some(place) = self.past.get_mut(begin..begin + TICK) {
-            place.copy_from_slice(&bell[1..]);
+            place.copy_from_slice(bell);
         }
     }
 

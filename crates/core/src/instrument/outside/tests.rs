@@ -30,13 +30,13 @@ impl Tip<f64> for Impulse {
         leaving
     }
 
-    fn bell(&mut self, flow: f64) {
-        self.outside.bell(self.at, flow);
-        self.at += 1;
+    fn holes(&mut self) -> Option<&mut HoleFlows<f64>> {
+        Some(self.outside.holes(self.at))
     }
 
-    fn holes(&mut self, chunk: usize, flows: &[f64; LANES]) {
-        self.outside.holes(chunk, flows);
+    fn radiated(&mut self, bell: f64) {
+        self.outside.bell(self.at, bell);
+        self.at += 1;
     }
 
     fn ended(&mut self) {
