@@ -591,7 +591,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("lheigh", LISTENING, "Listening height", number([-1.0, 2.0], 0.0, 2, " m"))
         .help(
             "Height above the middle of the instrument, for Position",
-            "Low places look into the bell, high ones onto the holes.",
+            "Low places are in front of the bell, high ones in front of the holes.",
             "",
         )
         .sets(Sets::Number(|settings| &mut settings.listening.height_m))
