@@ -3,6 +3,7 @@
 //! A closed pipe favours the odd harmonics, which is why a clarinet's low register sounds hollow; the even ones come with
 //! the beating reed, the bell and the tone holes.
 
+use chalumeau_core::instrument::ListeningMode;
 use egui::{Align2, Ui};
 use egui_plot::Points;
 
@@ -13,6 +14,7 @@ use crate::editor::pitch_needle;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::sound_analysis::FLOOR_DB;
 use crate::editor::theme::{Colours, GAP, panel};
+use crate::parameters::LISTENING_MODES;
 
 /// Highest harmonic marked.
 const HARMONICS: usize = 24;
@@ -193,8 +195,10 @@ fn column(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     }
     heading(ui, "Listening");
     choice(ui, hands, "heard");
-    for id in ["ldist", "langle", "lheigh", "lwidth"] {
-        slider(ui, hands, id);
+    if LISTENING_MODES.get(hands.step("heard")) == Some(&ListeningMode::Position) {
+        for id in ["ldist", "langle", "lheigh", "lwidth"] {
+            slider(ui, hands, id);
+        }
     }
 }
 

@@ -14,7 +14,7 @@ use crate::support::Told;
 const SLIDERS: &[(Tab, &[&str])] = &[
     (Tab::Reed, &["stren", "lip", "zeta", "damp", "reedh", "reeda", "lay"]),
     (Tab::Breath, &["breath", "full", "curve", "tongue", "legato", "noise"]),
-    (Tab::Sound, &["a4", "noise", "zeta", "lay", "vent", "gain", "ldist", "langle", "lheigh", "lwidth"]),
+    (Tab::Sound, &["a4", "noise", "zeta", "lay", "vent", "gain"]),
     (
         Tab::Knob,
         &["ceil", "contr", "place", "torque", "mark", "kdamp", "kfric", "refnot", "curve", "oscprt", "oscfl"],
@@ -23,6 +23,8 @@ const SLIDERS: &[(Tab, &[&str])] = &[
 ];
 /// Where the reed is named as its maker measures it.
 const MAKER_SLIDERS: &[&str] = &["rstiff", "rarea", "rwidth", "ropen"];
+/// While the instrument is heard from a position.
+const LISTENING_SLIDERS: &[&str] = &["ldist", "langle", "lheigh", "lwidth"];
 /// On the last page of the knob's panel.
 const STUDY_SLIDERS: &[&str] = &["part", "seed", "trial"];
 const SWITCHES: &[(Tab, &[&str])] = &[(Tab::Reed, &["reedc"]), (Tab::Knob, &["oscany"])];
@@ -60,7 +62,8 @@ fn every_parameter_has_a_place() {
     assert_eq!(host.ids().len(), 64);
     let lists = [SLIDERS, SWITCHES, CHOICES].into_iter().flatten().flat_map(|(_, ids)| ids.iter());
     let placed: Vec<&str> = lists
-        .chain([STUDY_SLIDERS, STUDY_SWITCHES, STUDY_CHOICES, MAKER_SLIDERS].into_iter().flatten())
+        .chain([STUDY_SLIDERS, STUDY_SWITCHES, STUDY_CHOICES].into_iter().flatten())
+        .chain([MAKER_SLIDERS, LISTENING_SLIDERS].into_iter().flatten())
         .chain(MOMENTARY.iter().map(|(_, id, _)| id))
         .chain(OTHERWISE.iter().map(|(id, _)| id))
         .copied()
@@ -156,6 +159,10 @@ fn every_slider_drags_types_and_resets() {
     window.harness.get_by_label("Reed face: Physical").click();
     window.harness.run();
     MAKER_SLIDERS.iter().for_each(|id| drags_types_and_resets(&mut window, id));
+    let mut window = Window::tall(Tab::Sound);
+    window.host.automate("heard", 0.5);
+    window.harness.run();
+    LISTENING_SLIDERS.iter().for_each(|id| drags_types_and_resets(&mut window, id));
 }
 
 fn study() -> Window {
