@@ -173,6 +173,10 @@ fn pictures_of_pages() {
     window.harness.get_by_label("Hole L3, open").hover();
     window.harness.run_steps(60);
     save(&mut window, "trying");
+    let mut window = Window::new(Tab::Sound, (1100.0, 900.0));
+    window.host.automate("heard", 0.5);
+    window.harness.run();
+    save(&mut window, "listening");
     let mut window = Window::new(Tab::Reed, (1100.0, 720.0));
     window.harness.get_by_role_and_label(Role::Slider, "Embouchure zeta").hover();
     window.harness.run_steps(60);

@@ -97,6 +97,7 @@ fn parameters_are_described_by_the_rules() {
         "Instrument",
         "Offline quality",
         "Reed face",
+        "Heard from",
     ];
     assert_eq!(flagged(ParamInfoFlags::IS_ENUM), choices);
     assert_eq!(flagged(ParamInfoFlags::REQUIRES_PROCESS), ["Breath", "Panic"]);
@@ -421,6 +422,7 @@ fn pages_for_control_surfaces_hold_what_a_player_turns() {
     let expected = [
         ("Player", "Breath and lip"),
         ("Player", "Tuning"),
+        ("Player", "Listening"),
         ("Reed", "Reed"),
         ("Reed", "Reed, physical"),
         ("Knob", "Feel"),

@@ -9,7 +9,17 @@ use crate::plugin::params::ChalumeauParams;
 /// Defines the pages. They are shown in this order.
 pub fn define(params: &ChalumeauParams, context: &mut impl RemoteControlsContext) {
     let ChalumeauParams {
-        breath, embouchure, reed, tuning, noise, output, knob, instrument, physical, ..
+        breath,
+        embouchure,
+        reed,
+        tuning,
+        noise,
+        output,
+        knob,
+        instrument,
+        physical,
+        listening,
+        ..
     } = params;
     context.add_section("Player", |section| {
         section.add_page("Breath and lip", |page| {
@@ -29,6 +39,13 @@ pub fn define(params: &ChalumeauParams, context: &mut impl RemoteControlsContext
             page.add_param(&tuning.vent_loss);
             page.add_param(&instrument.bend_range);
             page.add_param(&instrument.choice);
+        });
+        section.add_page("Listening", |page| {
+            page.add_param(&listening.mode);
+            page.add_param(&listening.distance);
+            page.add_param(&listening.angle);
+            page.add_param(&listening.height);
+            page.add_param(&listening.width);
         });
     });
     context.add_section("Reed", |section| {
