@@ -137,7 +137,7 @@ fn any_settings(random: &mut Random) -> Settings {
         gain_db: random.between(-20.0, 24.0),
         listening: Listening {
             mode: [ListeningMode::Everywhere, ListeningMode::Position, ListeningMode::Point]
-                [random.below(3) as usize],
+                [random.below(3)],
             distance_m: random.between(0.2, 10.0),
             angle_deg: random.between(-180.0, 180.0),
             height_m: random.between(-1.0, 2.0),

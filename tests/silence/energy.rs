@@ -7,9 +7,9 @@
 
 use std::sync::LazyLock;
 
-use chalumeau_core::bore::sound_sources::SoundSources;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::lattice::Real;
+use chalumeau_core::bore::sound_sources::SoundSources;
 use chalumeau_core::instrument::internal_rate::INTERNAL_RATES_HZ;
 use chalumeau_core::instrument::lip::embouchure;
 use chalumeau_core::instrument::prepare::Preparation;

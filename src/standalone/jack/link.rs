@@ -156,17 +156,19 @@ struct LinkThread {
 }
 
 impl LinkThread {
-    /// Plays until it is told to stop. `begun` hears when the first client plays or cannot.
+    /// Plays until it is told to stop. `begun` hears when the first client plays and is connected, or cannot play.
     fn run(mut self, first: JackClient, begun: Sender<()>) {
         let asked_at = Instant::now();
         let mut playing = self.play(first);
-        // By now, nobody may wait any more.
-        let _ = begun.send(());
-        if playing.is_some() && asked_at.elapsed() > BEGINNING {
-            self.say(BACK);
-        }
         if let Some(client) = &playing {
             self.connect_first(client);
+        }
+        // By now, nobody may wait any more.
+        let _ = begun.send(());
+        if playing.is_some() {
+            if asked_at.elapsed() > BEGINNING {
+                self.say(BACK);
+            }
             // A server without a sound card lacks the others, which is no mistake of the user.
             for Connection { other, .. } in self.pending.iter().filter(|connection| connection.is_midi()) {
                 eprintln!(
