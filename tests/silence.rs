@@ -136,8 +136,7 @@ fn any_settings(random: &mut Random) -> Settings {
         vent_loss: random.between(0.0, 4.0),
         gain_db: random.between(-20.0, 24.0),
         listening: Listening {
-            mode: [ListeningMode::Everywhere, ListeningMode::Position, ListeningMode::Point]
-                [random.below(3)],
+            mode: [ListeningMode::Everywhere, ListeningMode::Position, ListeningMode::Point][random.below(3)],
             distance_m: random.between(0.2, 10.0),
             angle_deg: random.between(-180.0, 180.0),
             height_m: random.between(-1.0, 2.0),
