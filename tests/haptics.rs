@@ -394,7 +394,7 @@ fn what_is_felt_is_what_sounds() {
                 let heard_deg = note.map.angle_deg(gamma * P_REF_PA);
                 let off = heard_deg / felt_deg - 1.0;
                 assert!(
-                    off.abs() < 0.025,
+                    off.abs() < 0.021,
                     "{law:?} Contrast {contrast}, {}: felt at {felt_deg:.1} degrees, heard at {heard_deg:.1}",
                     note.written
                 );
@@ -477,7 +477,8 @@ fn extinction_is_within_a_tenth_of_the_instruments() {
         worst = worst.max(off.abs());
     }
     println!("worst {:.1} %", 100.0 * worst);
-    assert!(worst < 0.085, "{worst}");
+    // Measured 0.078.
+    assert!(worst < 0.08, "{worst}");
 }
 
 #[test]
