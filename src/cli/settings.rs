@@ -288,7 +288,7 @@ mod tests {
             assert_eq!(read(&["--set", &format!("{}={text}{}", parameter.id, number.unit)]), Ok(by_flag));
             given += 1;
         }
-        assert_eq!(given, 16, "all numbers of the settings have a flag");
+        assert_eq!(given, 20, "all numbers of the settings have a flag");
         assert_eq!(read(&["--set", "tune=tempered"]), read(&["--tempered"]));
         assert_eq!(read(&["--set", "noise=0 %"]), read(&["--no-noise"]));
         let several = read(&["--set", "vent=2.5", "--set", "temp=20 °C", "--set", "reedc=free"]).unwrap();
