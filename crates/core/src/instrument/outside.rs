@@ -242,7 +242,9 @@ impl<F: Real> Outside<F> {
         let done = (ticks - self.fading as usize) * TICK;
         for (new, old) in self.out.iter_mut().zip(old) {
             for (n, (new, old)) in new.iter_mut().zip(old).enumerate() {
-                let part = (done + n + 1) as f32 / (ticks * TICK) as f32;
+                // Without a kink at either end, which would be heard as a faint click.
+                let way = (done + n + 1) as f32 / (ticks * TICK) as f32;
+                let part = way * way * (3.0 - 2.0 * way);
                 *new = old + part * (*new - old);
             }
         }
