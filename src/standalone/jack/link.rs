@@ -268,10 +268,16 @@ impl LinkThread {
         self.noted = [client.connections(), client.connections()];
     }
 
-    /// Makes the connections whose ports are there.
+    /// Makes the connections whose ports are there. They are wanted again even if the server ends before the next look.
     fn connect(&mut self, client: &PlayingClient) {
         self.connected_at = Some(Instant::now());
-        self.pending.retain(|connection| !client.connect(connection));
+        let pending = std::mem::take(&mut self.pending);
+        let (made, pending): (Vec<_>, _) =
+            pending.into_iter().partition(|connection| client.connect(connection));
+        self.pending = pending;
+        for noted in &mut self.noted {
+            noted.extend(made.iter().filter(|made| !noted.contains(made)).cloned().collect::<Vec<_>>());
+        }
     }
 
     /// Wants what was connected to be connected again.
