@@ -20,6 +20,7 @@ mod knob_sim;
 mod parameters;
 mod plot_args;
 mod radiation;
+mod realism;
 mod reed;
 mod reed_physical;
 mod render;
@@ -84,6 +85,7 @@ enum Command {
     Threshold(threshold::ThresholdCommand),
     Bifurcation(Box<bifurcation::BifurcationCommand>),
     Tune(Box<tune::TuneCommand>),
+    Realism(Box<realism::RealismCommand>),
     Reed(reed::ReedCommand),
     Study(study::StudyCommand),
     Parameters(parameters::ParametersCommand),
@@ -197,6 +199,7 @@ pub fn main() -> ExitCode {
         Command::Threshold(command) => command.run(),
         Command::Bifurcation(command) => command.run(),
         Command::Tune(command) => command.run(),
+        Command::Realism(command) => command.run(),
         Command::Reed(command) => command.run(),
         Command::Study(command) => command.run(),
         Command::Parameters(command) => command.run(),

@@ -20,10 +20,14 @@ use realfft::RealFftPlanner;
 use std::f64::consts::PI;
 
 pub mod impedance;
+pub mod noise_bands;
 pub mod onset;
 pub mod overview;
+pub mod partials;
 pub mod pitch;
 pub mod spectrum;
+pub mod steady_note;
+pub mod yin;
 
 /// Samples as the functions here want them. Allocates.
 pub fn to_f64(samples: &[f32]) -> Vec<f64> {

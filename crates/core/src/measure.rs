@@ -7,4 +7,5 @@
 pub mod bifurcation;
 pub mod notes;
 pub mod radiated_bands;
+pub mod realism;
 pub mod steady_period;

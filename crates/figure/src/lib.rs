@@ -41,6 +41,7 @@ pub mod felt;
 pub mod impedance;
 pub mod palette;
 pub mod performance;
+pub mod realism;
 pub mod reed;
 pub mod reed_orbit;
 pub mod reed_sweep;

@@ -1,0 +1,341 @@
+//! `chalumeau realism`: plays the recorded notes and measures how near they come to the recordings.
+
+use crate::cli::Failure;
+use crate::cli::csv_table::{CsvTable, TableArgs};
+use crate::cli::plot_args::PlotArgs;
+use crate::cli::render::progress;
+use crate::cli::settings::SettingsArgs;
+use crate::cli::shared_args::{PlayedArgs, within};
+use chalumeau_core::analysis::noise_bands::{BANDS_HZ, noise_db};
+use chalumeau_core::analysis::partials::{Partial, Wander};
+use chalumeau_core::analysis::pitch;
+use chalumeau_core::analysis::spectrum::steady_segment;
+use chalumeau_core::analysis::steady_note::{RATE_HZ, SECONDS, SteadyNote};
+use chalumeau_core::analysis::to_f64;
+use chalumeau_core::instrument::{Clarinet, Model, Settings};
+use chalumeau_core::measure::realism::{
+    CENTROID_RATIOS, Dynamic, NoteScore, REGISTERS, RecordedNote, Summary, louder_is_brighter, mean, median,
+    register,
+};
+use chalumeau_core::parallel;
+use chalumeau_core::score;
+use chalumeau_core::score::Score;
+use chalumeau_core::score::breath::{BreathCurve, GAMMA_MAX};
+use chalumeau_core::units::SoundingNote;
+use chalumeau_figure::realism::{ComparedDynamic, ComparedNote, figure};
+use clap::Args;
+use std::convert::Infallible;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// Renders are this much softer, so that no peak meets the limiter; levels are given without it, dB.
+const HEADROOM_DB: f64 = 20.0;
+/// Gamma at pp, mf and ff where nothing else is said: what fits the recorded notes best with one gamma for each dynamic.
+const GAMMAS: [f64; 3] = [0.42, 0.56, 0.78];
+/// Harmonics of which the beginning is timed.
+const TIMED: [usize; 3] = [1, 3, 5];
+
+const EXAMPLES: &str = "\
+Examples:
+  chalumeau realism --csv realism.csv --plot realism.png
+  chalumeau realism --gamma 0.43,0.56,0.8 --zeta 0.25
+  chalumeau realism --noise 0 --csv -
+
+The recordings are TinySOL's (Cella, Ghisi, Lostanlen, Levy, Fineberg, Maresz 2020, CC BY 4.0): one player, one take for
+each note. A recorded note differs from its recorded neighbours by 2.7, 6.8 and 4.8 dB at pp, mf and ff.";
+
+/// Play the recorded notes and measure how near they come to the recordings
+///
+/// Plays every other note from sounding D#3 to G6 for 4 s at pp, mf and ff, and measures it as the recordings were measured
+/// (tests/reference/clarinet_spectra_method.md). error_db is the mean distance of harmonics 2 to 10, each spectrum against its
+/// strongest harmonic and clipped at -60 dB; a note that does not sound, or sounds in another register, counts 20 dB. d1 to
+/// d10 are the differences, played less recorded. Noise is that between the harmonics, by bands, against the whole tone; t90 is
+/// the time in which a harmonic reaches 90 % of its level; wander is that of the steady part. Comments sum up.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub struct RealismCommand {
+    /// Constant mouth pressure over closing pressure at pp, mf and ff, each 0..3 [default: 0.42,0.56,0.78]
+    #[arg(long, value_name = "G,G,G", value_delimiter = ',', num_args = 1, value_parser = |s: &str| within(s, 0.0, f64::from(GAMMA_MAX)))]
+    gamma: Vec<f64>,
+    #[command(flatten)]
+    instrument: PlayedArgs,
+    #[command(flatten)]
+    table: TableArgs,
+    #[command(flatten)]
+    plot: PlotArgs,
+    #[command(flatten)]
+    settings: SettingsArgs,
+}
+
+/// A note that was played for a recording.
+struct Heard {
+    score: NoteScore,
+    /// Level of the noise in [`BANDS_HZ`] re the tone, dB.
+    noise_db: Vec<f64>,
+    /// Time to 90 % of the harmonics [`TIMED`], s.
+    t90_s: [Option<f64>; 3],
+    wander: Option<Wander>,
+}
+
+impl RealismCommand {
+    pub fn run(&self) -> Result<(), Failure> {
+        let gammas = match self.gamma.as_slice() {
+            [] => GAMMAS,
+            &[pp, mf, ff] => [pp, mf, ff],
+            other => {
+                return Err(Failure::Usage(format!(
+                    "--gamma takes three numbers, for pp, mf and ff, got {}; for example --gamma 0.42,0.56,0.78",
+                    other.len()
+                )));
+            }
+        };
+        let file = self.instrument.load()?;
+        let highest = gammas.into_iter().fold(0.0, f64::max);
+        let mut settings =
+            self.settings.blown_by(Some(&BreathCurve::constant(highest as f32)), &file)?;
+        settings.gain_db -= HEADROOM_DB as f32;
+        let mut table = self.table.open(&header())?;
+        let plot = self.plot.open(self.table.force())?;
+        let name = file.name.clone();
+        let model = self.instrument.model(file, RATE_HZ as u32, settings.a4_hz)?;
+        let heard = play_all(&model, &settings, &gammas);
+        let about = vec![
+            format!("{name}; gamma {} at pp, mf, ff; zeta {}, strength {}, breath noise {}", words(&gammas),
+                settings.zeta, settings.strength, settings.noise),
+            "recordings: TinySOL (Cella, Ghisi, Lostanlen, Levy, Fineberg, Maresz 2020), CC BY 4.0, one take for each note"
+                .to_owned(),
+        ];
+        for line in about.iter().chain(&summary(&heard)) {
+            table.comment(format_args!("{line}"))?;
+        }
+        for note in &heard {
+            write(&mut table, note)?;
+        }
+        table.finish()?;
+        plot.draw(|| figure("Realism", &about, CENTROID_RATIOS, &compared(&heard)))
+    }
+}
+
+fn words(numbers: &[f64]) -> String {
+    numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(", ")
+}
+
+/// Plays a note for every recording, on all cores.
+fn play_all(model: &Arc<Model>, settings: &Settings, gammas: &[f64; 3]) -> Vec<Heard> {
+    let recorded = RecordedNote::all();
+    let bar = progress(recorded.len());
+    let play = |at: usize| {
+        let note = &recorded[at];
+        let gamma = gammas[note.dynamic as usize];
+        listen(note, &rendered(model, settings, note.midi, gamma))
+    };
+    // Nothing ends it early, so there is always an answer.
+    let heard = parallel::each(recorded.len(), play, &mut |_| {
+        bar.inc(1);
+        ControlFlow::Continue(())
+    });
+    bar.finish_and_clear();
+    heard.unwrap_or_default()
+}
+
+fn rendered(model: &Arc<Model>, settings: &Settings, midi: u8, gamma: f64) -> Vec<f64> {
+    let rate = RATE_HZ as u32;
+    let mut clarinet = Clarinet::new(model.clone(), RATE_HZ);
+    clarinet.set_settings(settings);
+    clarinet.reset();
+    let score = Score::note(SoundingNote(midi), SECONDS, rate).blown(
+        &BreathCurve::constant(gamma as f32),
+        settings,
+        rate,
+    );
+    let mut samples = Vec::with_capacity(score.samples);
+    let Ok(()) = score::play(&mut clarinet, &score, 4096, |block| {
+        samples.extend(to_f64(block));
+        Ok::<_, Infallible>(())
+    });
+    samples
+}
+
+fn listen(recorded: &RecordedNote, samples: &[f64]) -> Heard {
+    let played = SteadyNote::measure(samples)
+        .map(|note| SteadyNote { rms_dbfs: note.rms_dbfs + HEADROOM_DB, ..note });
+    let score = NoteScore::new(recorded.clone(), played);
+    let segment = steady_segment(samples, RATE_HZ).map_or(&[][..], |range| &samples[range]);
+    let near_hz = score.played.as_ref().map(|played| played.f0_hz);
+    let f0_hz = near_hz.and_then(|hz| pitch::refine_hz(segment, RATE_HZ, hz));
+    Heard {
+        noise_db: f0_hz.map_or_else(Vec::new, |hz| noise_db(segment, RATE_HZ, hz, &BANDS_HZ)),
+        t90_s: TIMED.map(|harmonic| Partial::watch(samples, RATE_HZ, f0_hz?, harmonic).t90_s()),
+        wander: f0_hz.and_then(|hz| Wander::measure(segment, RATE_HZ, hz)),
+        score,
+    }
+}
+
+/// The end of a band as it is written: 300, 1k.
+fn hertz(hz: f64) -> String {
+    if hz < 1_000.0 { hz.to_string() } else { format!("{}k", hz / 1_000.0) }
+}
+
+fn band((low_hz, high_hz): (f64, f64)) -> String {
+    format!("{}_{}", hertz(low_hz), hertz(high_hz))
+}
+
+fn header() -> String {
+    let mut columns: Vec<String> = "sounding_midi,register,dynamic,cents,error_db,centroid_hz,centroid_ratio,h3_h2_db,\
+         recorded_h3_h2_db,level_db,recorded_level_db"
+        .split(',')
+        .map(str::to_owned)
+        .collect();
+    columns.extend((1..=10).map(|harmonic| format!("d{harmonic}_db")));
+    columns.extend(BANDS_HZ.map(|range| format!("noise_{}_db", band(range))));
+    columns.extend(TIMED.map(|harmonic| format!("t90_h{harmonic}_ms")));
+    columns.extend(
+        ["range_cents", "slow_cents", "fast_cents", "level_wander_db", "h3_wander_db", "h5_wander_db"]
+            .map(str::to_owned),
+    );
+    columns.join(",")
+}
+
+/// A number with so many digits; "nan" where there is none.
+fn digits(value: Option<f64>, digits: usize) -> String {
+    value.filter(|value| value.is_finite()).map_or_else(|| "nan".to_owned(), |value| format!("{value:.digits$}"))
+}
+
+fn write(table: &mut CsvTable, note: &Heard) -> Result<(), Failure> {
+    let (score, recorded) = (&note.score, &note.score.recorded);
+    let played = score.played.as_ref();
+    let wanted_hz = SoundingNote(recorded.midi).frequency_hz(440.0);
+    let (third, recorded_third) = score.third_over_second_db();
+    let mut fields = vec![
+        recorded.midi.to_string(),
+        register(recorded.midi).to_owned(),
+        recorded.dynamic.name().to_owned(),
+        digits(played.map(|played| chalumeau_core::units::cents(played.f0_hz, wanted_hz)), 1),
+        digits(Some(score.error_db), 2),
+        digits(played.map(|played| played.centroid_hz), 1),
+        digits(score.centroid_ratio(), 3),
+        digits(third, 1),
+        digits(Some(recorded_third), 1),
+        digits(played.map(|played| played.rms_dbfs), 1),
+        digits(Some(recorded.rms_dbfs), 1),
+    ];
+    fields.extend((0..10).map(|harmonic| digits(score.differences_db.get(harmonic).copied(), 1)));
+    fields.extend((0..BANDS_HZ.len()).map(|band| digits(note.noise_db.get(band).copied(), 1)));
+    fields.extend(note.t90_s.map(|t90_s| digits(t90_s.map(|s| 1e3 * s), 0)));
+    let wander = |value: fn(&Wander) -> f64, places: usize| digits(note.wander.as_ref().map(value), places);
+    fields.extend([
+        wander(|wander| wander.range_cents, 2),
+        wander(|wander| wander.slow_cents, 3),
+        wander(|wander| wander.fast_cents, 3),
+        wander(|wander| wander.level_db, 3),
+        wander(|wander| wander.harmonics_db[1], 3),
+        wander(|wander| wander.harmonics_db[2], 3),
+    ]);
+    table.line(format_args!("{}", fields.join(",")))
+}
+
+fn of(heard: &[Heard], dynamic: Dynamic) -> impl Iterator<Item = &Heard> {
+    heard.iter().filter(move |note| note.score.recorded.dynamic == dynamic)
+}
+
+/// What the comments say.
+fn summary(heard: &[Heard]) -> Vec<String> {
+    let summaries = Dynamic::ALL.map(|dynamic| (dynamic, Summary::of(of(heard, dynamic).map(|note| &note.score))));
+    let mut lines: Vec<String> = summaries.iter().map(|(dynamic, summary)| line(*dynamic, summary, heard)).collect();
+    let [(_, pp), (_, mf), (_, ff)] = &summaries;
+    let step = |from: &Summary, to: &Summary| {
+        format!(
+            "{:.1} ({:.1})",
+            to.level_db.0 - from.level_db.0,
+            to.level_db.1 - from.level_db.1
+        )
+    };
+    lines.push(format!(
+        "level, dB (recorded): pp to mf {}, mf to ff {}, pp to ff {}",
+        step(pp, mf),
+        step(mf, ff),
+        step(pp, ff)
+    ));
+    let scores: Vec<NoteScore> = heard.iter().map(|note| note.score.clone()).collect();
+    lines.push(format!("louder is brighter on {:.0} % of steps", 100.0 * louder_is_brighter(&scores)));
+    let noise: Vec<String> = BANDS_HZ
+        .iter()
+        .enumerate()
+        .map(|(at, &range)| {
+            let levels = of(heard, Dynamic::Mf).filter_map(|note| note.noise_db.get(at).copied());
+            format!("{} {:.0}", band(range).replace('_', "-"), median(levels))
+        })
+        .collect();
+    lines.push(format!("noise at mf, median dB re the tone, by Hz: {}", noise.join(", ")));
+    let t90: Vec<String> = TIMED
+        .iter()
+        .enumerate()
+        .map(|(at, harmonic)| {
+            let times = heard.iter().filter_map(|note| note.t90_s[at]);
+            format!("h{harmonic} {:.0}", 1e3 * median(times))
+        })
+        .collect();
+    lines.push(format!("t90, median ms: {}", t90.join(", ")));
+    let wander = |value: fn(&Wander) -> f64| {
+        median(heard.iter().filter_map(|note| note.wander.as_ref()).map(value))
+    };
+    lines.push(format!(
+        "wander, medians: range {:.2} cents, {:.3} cents slow, {:.3} fast; level {:.3} dB, h3 {:.3}, h5 {:.3}",
+        wander(|w| w.range_cents),
+        wander(|w| w.slow_cents),
+        wander(|w| w.fast_cents),
+        wander(|w| w.level_db),
+        wander(|w| w.harmonics_db[1]),
+        wander(|w| w.harmonics_db[2])
+    ));
+    lines
+}
+
+/// The line of one dynamic.
+fn line(dynamic: Dynamic, summary: &Summary, heard: &[Heard]) -> String {
+    let registers: Vec<String> = REGISTERS
+        .iter()
+        .map(|(name, low, high)| {
+            let own = of(heard, dynamic).filter(|note| (*low..=*high).contains(&note.score.recorded.midi));
+            format!("{name} {:.1}", mean(own.map(|note| note.score.error_db)))
+        })
+        .collect();
+    let (third, recorded_third) = summary.third_over_second_db;
+    format!(
+        "{}: error {:.2} dB (odd takes out {:.2}; {}), centroid right on {:.0} % of {} notes, median ratio {:.2}, h3 over h2 up to B3 \
+         {third:.1} dB (recorded {recorded_third:.1}), {} failed",
+        dynamic.name(),
+        summary.error_db,
+        summary.clean_error_db,
+        registers.join(", "),
+        100.0 * summary.centroid_share,
+        summary.notes,
+        summary.centroid_ratio,
+        summary.failed
+    )
+}
+
+/// For the figure.
+fn compared(heard: &[Heard]) -> Vec<ComparedDynamic> {
+    Dynamic::ALL
+        .into_iter()
+        .map(|dynamic| {
+            let scores: Vec<&NoteScore> = of(heard, dynamic).map(|note| &note.score).collect();
+            let note = |score: &&NoteScore| ComparedNote {
+                midi: score.recorded.midi,
+                error_db: score.error_db,
+                centroid_ratio: score.centroid_ratio(),
+                level_db: score.played.as_ref().map(|played| played.rms_dbfs),
+                recorded_level_db: score.recorded.rms_dbfs,
+            };
+            let difference =
+                |at: usize| mean(scores.iter().filter_map(|score| score.differences_db.get(at).copied()));
+            ComparedDynamic {
+                name: dynamic.name().to_owned(),
+                notes: scores.iter().map(note).collect(),
+                error_db: mean(scores.iter().map(|score| score.error_db)),
+                differences_db: (0..10).map(difference).collect(),
+            }
+        })
+        .collect()
+}
