@@ -1,7 +1,8 @@
 //! Noise of a steady note in bands of frequency, relative to the whole tone.
 //!
-//! The power between the harmonics is measured where no harmonic is near, and stands for the whole band: its mean per hertz
-//! times the width of the band. So the figure does not depend on how much of the band the harmonics hide.
+//! The power between the harmonics is measured where no harmonic is near, and stands for the whole band: the median of its
+//! bins times their number. So neither the share of the band that harmonics hide nor a foreign line counts. The median of
+//! noise lies 1.6 dB below its mean; recordings were read in the same way.
 
 use crate::analysis::{BLACKMAN_HARRIS, cosine_window, transform, without_mean};
 use realfft::RealFftPlanner;
@@ -35,14 +36,16 @@ pub fn noise_db(samples: &[f64], rate_hz: f64, f0_hz: f64, bands_hz: &[(f64, f64
         .iter()
         .map(|&(low_hz, high_hz)| {
             let (first, last) = ((low_hz / bin_hz).ceil() as usize, (high_hz / bin_hz) as usize);
-            let measured = (first..=last.min(bins.len().saturating_sub(1)))
+            let mut measured: Vec<f64> = (first..=last.min(bins.len().saturating_sub(1)))
                 .filter(|&bin| between(bin as f64 * bin_hz))
-                .map(|bin| bins[bin].norm_sqr());
-            let (count, power) = measured.fold((0_usize, 0.0), |(count, sum), power| (count + 1, sum + power));
+                .map(|bin| bins[bin].norm_sqr())
+                .collect();
+            measured.sort_by(f64::total_cmp);
+            let Some(power) = measured.get(measured.len() / 2) else { return f64::NEG_INFINITY };
             // One-sided power per bin of white noise with variance v: v times the sum of the squared window.
-            let per_bin = 2.0 * power / count as f64 / gain / windowed.len() as f64;
+            let per_bin = 2.0 * power / gain / windowed.len() as f64;
             let whole = per_bin * (high_hz - low_hz) / bin_hz;
-            if count > 0 && whole > 0.0 { 10.0 * (whole / total).log10() } else { f64::NEG_INFINITY }
+            if whole > 0.0 { 10.0 * (whole / total).log10() } else { f64::NEG_INFINITY }
         })
         .collect()
 }
@@ -60,7 +63,8 @@ mod tests {
         for ((low_hz, high_hz), heard) in
             BANDS_HZ.into_iter().zip(noise_db(&noisy, 44_100.0, 196.0, &BANDS_HZ))
         {
-            let expected = 10.0 * (1e-4 * (high_hz - low_hz) / 22_050.0 / total).log10();
+            let median = std::f64::consts::LN_2;
+            let expected = 10.0 * (1e-4 * median * (high_hz - low_hz) / 22_050.0 / total).log10();
             assert!((heard - expected).abs() < 0.7, "{low_hz}: {heard}, expected {expected}");
         }
         let silent = noise_db(&clean, 44_100.0, 196.0, &BANDS_HZ);
