@@ -53,7 +53,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     });
 
     let feels = InstrumentFeel::built_in()?;
-    let settings = Settings::default();
+    let settings = Settings::physical();
     let table = feels.table(&settings, &FeelDesign::default(), &NO_MOTOR)?;
     let hand = BreathMapping { maps: feels.maps(&table), design: KnobDesign::default(), feels: true };
     let feel = table.reference().feel;
@@ -65,6 +65,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
 
     let mut clarinet = Clarinet::built_in(RATE_HZ)?;
+    clarinet.set_settings(&settings);
     let (mut blower, mut out) = (Blower::default(), [0.0; BLOCK]);
     let mut first = Some(Timed { at: 0, event: Event::NoteOn { note: NOTE, velocity: 0.8 } });
     let mut blown: Vec<(Instant, f64)> = Vec::new();

@@ -8,7 +8,7 @@ mod spelling;
 mod table;
 mod text;
 
-use chalumeau_core::instrument::{ListeningMode, Settings, Tuning};
+use chalumeau_core::instrument::{BreathResponse, ListeningMode, Settings, Tuning};
 use chalumeau_core::reed::PhysicalReed;
 
 pub use table::PARAMETERS;
@@ -107,8 +107,10 @@ pub struct Whole {
 /// One of several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Choice {
-    /// Id in saved states, and text. The first is the default.
+    /// Id in saved states, and text.
     pub all: &'static [(&'static str, &'static str)],
+    /// Place of the default in the list.
+    pub default: usize,
 }
 
 /// On or off.
@@ -133,6 +135,8 @@ pub enum Sets {
     Tuning,
     /// The way of listening, [`Settings::listening`]: a choice in the order of [`LISTENING_MODES`].
     Listening,
+    /// [`Settings::breath_response`]: a choice of played and physical.
+    BreathResponse,
     /// A number of the reed as its maker measures it, and how many of the parameter's units make one SI unit.
     Reed(fn(&mut PhysicalReed) -> &mut f64, f64),
     /// Whether the measured reed is in use: a choice of dimensionless and physical.
@@ -171,6 +175,10 @@ impl Parameter {
             (Some(Sets::Listening), Value::Choice(index)) => {
                 settings.listening.mode = LISTENING_MODES.get(index).copied().unwrap_or_default();
             }
+            (Some(Sets::BreathResponse), Value::Choice(index)) => {
+                settings.breath_response =
+                    if index == 0 { BreathResponse::Played } else { BreathResponse::Physical };
+            }
             _ => {}
         }
     }
@@ -191,7 +199,8 @@ impl Parameter {
             Kind::Number(number) => (number.default - number.min) / (number.max - number.min),
             Kind::Whole(whole) => (whole.default - whole.min) as f32 / (whole.max - whole.min) as f32,
             Kind::Switch(switch) => f32::from(u8::from(switch.default)),
-            Kind::Choice(_) | Kind::Status(_) => 0.0,
+            Kind::Choice(choice) => choice.default as f32 / (choice.all.len() - 1) as f32,
+            Kind::Status(_) => 0.0,
         }
     }
 }

@@ -23,8 +23,8 @@ const GAMMA: f32 = 0.8;
 fn steady(model: &Arc<Model>, written: u8, gamma: f32, lay: f32) -> Vec<f64> {
     let mut clarinet = Clarinet::new(model.clone(), RATE_HZ);
     // So quiet that the limiter, which is not the instrument, has nothing to do.
-    clarinet.set_settings(&Settings { noise: 0.0, lay, gain_db: -12.0, ..Settings::default() });
-    clarinet.apply(Event::Breath(gamma * 6.0 / Settings::default().breath_full_kpa));
+    clarinet.set_settings(&Settings { noise: 0.0, lay, gain_db: -12.0, ..Settings::physical() });
+    clarinet.apply(Event::Breath(gamma * 6.0 / Settings::physical().breath_full_kpa));
     let note = WrittenNote(written).sounding(model.file.transposition).unwrap();
     clarinet.apply(Event::NoteOn { note, velocity: 0.7 });
     let mut sound = vec![0.0; (1.8 * RATE_HZ) as usize];

@@ -22,7 +22,7 @@ static MODEL: LazyLock<Arc<Model>> = LazyLock::new(|| Arc::new(Model::built_in(R
 
 /// A note blown at a constant gamma, without noise.
 fn blown(written: u8, gamma: f32) -> Clarinet {
-    blown_at(RATE_HZ, &MODEL, written, gamma, &Settings { noise: 0.0, ..Settings::default() })
+    blown_at(RATE_HZ, &MODEL, written, gamma, &Settings { noise: 0.0, ..Settings::physical() })
 }
 
 fn blown_at(rate_hz: f64, model: &Arc<Model>, written: u8, gamma: f32, settings: &Settings) -> Clarinet {
@@ -213,7 +213,7 @@ fn every_a4_from_415_to_466_is_in_tune_from_the_first_sample() {
         .flat_map(|written| [415.0, 430.0, 450.0, 466.0].map(|a4| (written, a4)))
         .collect();
     let off = each(&runs, |&(written, a4_hz)| {
-        let settings = Settings { noise: 0.0, a4_hz, ..Settings::default() };
+        let settings = Settings { noise: 0.0, a4_hz, ..Settings::physical() };
         let mut clarinet = blown_at(RATE_HZ, &MODEL, written, 0.5, &settings);
         render(&mut clarinet, 0.6);
         let sounding = WrittenNote(written).sounding(2).unwrap();
@@ -231,7 +231,7 @@ fn nothing_folds_back_that_could_be_heard() {
     let runs: Vec<(u8, f64)> =
         [52, 60, 67, 72, 79].into_iter().flat_map(|written| bends.map(|bend| (written, bend))).collect();
     let levels = each(&runs, |&(written, bend)| {
-        let settings = Settings { noise: 0.0, gain_db: -12.0, ..Settings::default() };
+        let settings = Settings { noise: 0.0, gain_db: -12.0, ..Settings::physical() };
         let mut clarinet = blown_at(RATE_HZ, &MODEL, written, 0.8, &settings);
         clarinet.apply(Event::Bend { cents: bend as f32 });
         // A larger instrument takes longer to settle, and its harmonics are closer.
@@ -275,6 +275,7 @@ fn no_note_of_fifteen_channels_is_stuck_or_has_anothers_bend() {
     let mut random = Random(7);
     let mut midi = MidiDecoder::new().with_mpe();
     let mut clarinet = Clarinet::new(MODEL.clone(), RATE_HZ);
+    clarinet.set_settings(&Settings::physical());
     // A slow model of the held keys, oldest first: as the instrument was told, and (key, channel) as they were played.
     let (mut told, mut held): (Vec<u8>, Vec<(u8, u8)>) = (Vec::new(), Vec::new());
     let (mut wheels, mut bent) = ([8192_u16; 16], 0.0_f32);

@@ -45,7 +45,7 @@ fn design(law: TorqueLaw, contrast: f64) -> FeelDesign {
 }
 
 fn table(law: TorqueLaw, contrast: f64) -> FeelTable {
-    FEELS.table(&Settings::default(), &design(law, contrast), &TorqueLimits::default()).unwrap()
+    FEELS.table(&Settings::physical(), &design(law, contrast), &TorqueLimits::default()).unwrap()
 }
 
 fn note(table: &FeelTable, written: u8) -> &NoteFeel {
@@ -87,7 +87,7 @@ struct Passage {
 fn passage(table: &FeelTable, note: &NoteFeel) -> Passage {
     const PER_S: f64 = 0.01;
     const STEP_S: f64 = 0.2;
-    let (a_on, settings) = (note.landmarks.a_on_deg, Settings::default());
+    let (a_on, settings) = (note.landmarks.a_on_deg, Settings::physical());
     let closing_pa = settings.closing_pa();
     let gamma_felt = note.map.pressure_pa(a_on) / closing_pa;
     let mut player = seated(table, note, &settings, HandDesign::listening());
@@ -154,7 +154,7 @@ fn in_a_slow_crescendo_the_sound_begins_where_the_hand_feels_the_threshold() {
         let table = &conditions[condition].2;
         passage(table, &table.notes()[note])
     });
-    let closing_pa = Settings::default().closing_pa();
+    let closing_pa = Settings::physical().closing_pa();
     let (mut missed, mut worst) = (Vec::new(), [0.0_f64; 8]);
     for (at, (&(condition, index), passage)) in runs.iter().zip(&passages).enumerate() {
         let (law, contrast, ref table) = conditions[condition];
@@ -220,7 +220,7 @@ fn in_a_slow_crescendo_the_sound_begins_where_the_hand_feels_the_threshold() {
 #[test]
 fn what_begins_in_another_register_becomes_the_note() {
     const OWN_FROM_GAMMA: f64 = 0.47;
-    let (settings, table) = (Settings::default(), table(TorqueLaw::Flow, 1.0));
+    let (settings, table) = (Settings::physical(), table(TorqueLaw::Flow, 1.0));
     let closing_pa = settings.closing_pa();
     let tracks = each(&ELSEWHERE, |&written| {
         let note = note(&table, written);
@@ -258,7 +258,7 @@ fn what_begins_in_another_register_becomes_the_note() {
 /// Acceptance: a simulated hand holds gamma 0.5 within 0.02 under both laws, measured at the reed.
 #[test]
 fn a_hand_holds_gamma_one_half_at_the_reed_under_both_laws() {
-    let settings = Settings::default();
+    let settings = Settings::physical();
     let closing_pa = settings.closing_pa();
     let mut runs = Vec::new();
     for law in LAWS {
@@ -314,7 +314,7 @@ fn a_hand_holds_gamma_one_half_at_the_reed_under_both_laws() {
 /// and keeps what it had.
 #[test]
 fn what_would_push_or_shake_is_refused_before_the_wire_and_behind_it() {
-    let settings = Settings::default();
+    let settings = Settings::physical();
     let table = table(TorqueLaw::Flow, 3.0);
     let note = note(&table, 72);
     let (flow, pressure) = (design(TorqueLaw::Flow, 1.0), design(TorqueLaw::Pressure, 1.0));
@@ -368,8 +368,13 @@ fn static_reed(
     from: f64,
     to: f64,
 ) -> (Fingers, Vec<(f64, f64)>) {
-    let settings =
-        Settings { reed_a: 0.0, noise: 0.0, lay, breath_full_kpa: BEYOND_CLOSURE_KPA, ..Settings::default() };
+    let settings = Settings {
+        reed_a: 0.0,
+        noise: 0.0,
+        lay,
+        breath_full_kpa: BEYOND_CLOSURE_KPA,
+        ..Settings::physical()
+    };
     let a_close = note.landmarks.a_close_deg;
     let mut player = seated(table, note, &settings, HandDesign::listening());
     let script = crescendo(from * a_close, to * a_close, 0.01 * a_close);
@@ -417,7 +422,7 @@ fn felt_closure_is_where_the_resting_reed_shuts() {
         let ([t0, t1, _], _) = least_squares(&rows, &torques).unwrap();
         let felt_close = a_close * (1.0 - t0 / t1);
         let shut = opening.iter().find(|x| x.1 <= 0.0).unwrap().0;
-        let closing_pa = Settings::default().closing_pa();
+        let closing_pa = Settings::physical().closing_pa();
         let shut_deg = note.map.angle_deg(shut * closing_pa);
         println!(
             "Contrast {contrast} {}: torque gone at {felt_close:.1} degrees, reed shut at {shut_deg:.1} (gamma {shut:.4}); \
@@ -432,7 +437,7 @@ fn felt_closure_is_where_the_resting_reed_shuts() {
         let rest = beyond.iter().sum::<f64>() / beyond.len() as f64;
         assert!((rest - friction).abs() < 0.1, "the motor makes {rest} mNm");
         // The curved lay of the standard clarinet.
-        let lay = Settings::default().lay;
+        let lay = Settings::physical().lay;
         let (_, curved) = static_reed(&table, note, lay, 0.98, 1.14);
         let at = curved.iter().min_by(|a, b| (a.0 - 1.0).abs().total_cmp(&(b.0 - 1.0).abs())).unwrap();
         println!("  lay {lay}: open by {:.3} at gamma {:.3}", at.1, at.0);
@@ -443,7 +448,7 @@ fn felt_closure_is_where_the_resting_reed_shuts() {
 /// A tongue lets go of a reed that the breath holds shut: nothing sounds, nothing is felt.
 #[test]
 fn tongued_beyond_closure_a_reed_on_a_sharp_lay_stays_shut_and_the_motor_at_rest() {
-    let settings = Settings { lay: 0.0, breath_full_kpa: BEYOND_CLOSURE_KPA, ..Settings::default() };
+    let settings = Settings { lay: 0.0, breath_full_kpa: BEYOND_CLOSURE_KPA, ..Settings::physical() };
     let table = table(TorqueLaw::Flow, 3.0);
     for written in [52, 72, 84] {
         let note = note(&table, written);

@@ -542,7 +542,7 @@ fn over_midi_a_hand_on_the_knob_is_heard_with_and_without_sysex() {
     const RATE_HZ: f64 = 48_000.0;
     const BLOCK: usize = 128;
     let feels = InstrumentFeel::built_in().unwrap();
-    let table = feels.table(&Settings::default(), &FeelDesign::default(), &NO_MOTOR).unwrap();
+    let table = feels.table(&Settings::physical(), &FeelDesign::default(), &NO_MOTOR).unwrap();
     for is_plain in [false, true] {
         let (_directory, places) = places();
         let (device, host) = pair(Binding::Midi, "TorqueTuner MIDI");
@@ -563,7 +563,8 @@ fn over_midi_a_hand_on_the_knob_is_heard_with_and_without_sysex() {
         let hand =
             BreathMapping { maps: feels.maps(&table), design: KnobDesign::default(), feels: !is_plain };
         let (mut blower, mut clarinet) = (Blower::default(), Clarinet::built_in(RATE_HZ).unwrap());
-        let full_pa = 1e3 * f64::from(Settings::default().breath_full_kpa);
+        clarinet.set_settings(&Settings::physical());
+        let full_pa = 1e3 * f64::from(Settings::physical().breath_full_kpa);
         // The lowest note, written E3.
         let note = Event::NoteOn { note: SoundingNote(50), velocity: 0.8 };
         let mut host = Some(Timed { at: 0, event: note });

@@ -240,7 +240,7 @@ fn a_bore_shows_which_holes_are_open() {
 
 /// Written G4, then written C5, half a second each, seen in few columns.
 fn played() -> (Overview, Envelope, ReedCloseUp, Vec<Note>) {
-    let settings = Settings { noise: 0.0, ..Settings::default() };
+    let settings = Settings { noise: 0.0, ..Settings::physical() };
     let score = Score::scale(WrittenNote(67), WrittenNote(68), 2, 0.5, false, 48_000).unwrap().blown(
         &BreathCurve::constant(0.6),
         &settings,
@@ -464,7 +464,7 @@ fn turns_of(table: &FeelTable, closing_kpa: f64) -> Figure {
 
 #[test]
 fn breath_and_feel_are_figures_of_one_instrument() {
-    let (file, settings) = (InstrumentFile::built_in(), Settings { noise: 0.0, ..Settings::default() });
+    let (file, settings) = (InstrumentFile::built_in(), Settings { noise: 0.0, ..Settings::physical() });
     let bore = RequirementSolver::new(&file, Air::default());
     let reed = played_reed(&file, &settings);
     let closing_kpa = 1e-3 * reed.closing_pa();
@@ -538,7 +538,7 @@ fn breath_and_feel_are_figures_of_one_instrument() {
 
 #[test]
 fn a_swell_shows_where_it_sounds() {
-    let settings = Settings { noise: 0.0, ..Settings::default() };
+    let settings = Settings { noise: 0.0, ..Settings::physical() };
     let model = std::sync::Arc::new(chalumeau_core::instrument::Model::built_in(48_000.0).unwrap());
     let played = bifurcation::measure(&model, &settings, SoundingNote(58), 0.9, 1.0, 48_000, |_| {});
     let course: Vec<[f64; 4]> = played

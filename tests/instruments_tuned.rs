@@ -128,7 +128,7 @@ struct Keyed {
 
 impl Keyed {
     fn steady(&self, model: &Arc<Model>, fingering: usize) -> Vec<f64> {
-        let settings = Settings { noise: 0.0, gain_db: self.gain_db, ..Settings::default() };
+        let settings = Settings { noise: 0.0, gain_db: self.gain_db, ..Settings::physical() };
         let mut clarinet = Clarinet::new(model.clone(), self.host_rate_hz);
         clarinet.set_settings(&settings);
         clarinet.apply(Event::Breath(self.gamma * 6.0 / settings.breath_full_kpa));

@@ -11,7 +11,9 @@ use std::time::{Duration, Instant};
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use chalumeau_core::analysis::{pitch, spectrum};
 use chalumeau_core::event::{Event, Timed};
-use chalumeau_core::instrument::{Clarinet, Listening, ListeningMode, Model, Settings, Tuning};
+use chalumeau_core::instrument::{
+    BreathResponse, Clarinet, Listening, ListeningMode, Model, Settings, Tuning,
+};
 use chalumeau_core::units::{SoundingNote, WrittenNote, cents};
 
 #[global_allocator]
@@ -106,6 +108,12 @@ impl Random {
 
     fn settings(&mut self) -> Settings {
         Settings {
+            breath_response: if self.below(2) == 0 {
+                BreathResponse::Played
+            } else {
+                BreathResponse::Physical
+            },
+            breath_curve: self.wild(0.5, 2.0),
             breath_full_kpa: self.wild(2.0, 20.0),
             noise: self.wild(0.0, 1.0),
             tongue_ms: self.wild(1.0, 20.0),
@@ -268,7 +276,7 @@ fn the_lowest_note_is_in_tune_at_every_rate() {
     let mut worst = 0.0_f64;
     for host_hz in ALL_RATES_HZ {
         let mut clarinet = clarinet(host_hz);
-        clarinet.set_settings(&Settings { noise: 0.0, ..Settings::default() });
+        clarinet.set_settings(&Settings { noise: 0.0, ..Settings::physical() });
         clarinet.apply(Event::Breath(0.5));
         clarinet.apply(note_on(52));
         render(&mut clarinet, 0.6, host_hz);
@@ -311,7 +319,7 @@ fn silence_is_silent_a_second_after_the_breath_or_the_key() {
 fn steady_note_has_no_constant_part() {
     for written in [52, 65, 79] {
         let mut clarinet = clarinet(48_000.0);
-        clarinet.set_settings(&Settings { noise: 0.0, ..Settings::default() });
+        clarinet.set_settings(&Settings { noise: 0.0, ..Settings::physical() });
         clarinet.apply(Event::Breath(0.5));
         clarinet.apply(note_on(written));
         render(&mut clarinet, 1.0, 48_000.0);
@@ -337,7 +345,7 @@ fn largest_step(samples: &[f32]) -> f32 {
 #[test]
 fn moving_fingers_do_not_click() {
     let host_hz = 48_000.0;
-    let settings = Settings { noise: 0.0, ..Settings::default() };
+    let settings = Settings { noise: 0.0, ..Settings::physical() };
     let steady: Vec<f32> = (52..=84)
         .map(|written| {
             let mut clarinet = clarinet(host_hz);
@@ -438,7 +446,7 @@ fn overblowing_shuts_the_reed_and_letting_up_brings_the_note_back() {
     let host_hz = 48_000.0;
     for written in [52, 65, 79] {
         let mut clarinet = clarinet(host_hz);
-        let soft = Settings { breath_full_kpa: 20.0, strength: 2.0, noise: 0.0, ..Settings::default() };
+        let soft = Settings { breath_full_kpa: 20.0, strength: 2.0, noise: 0.0, ..Settings::physical() };
         clarinet.set_settings(&soft);
         // Strength 2 closes at 5 kPa: full breath is gamma 4.
         let gamma = |gamma: f32| Event::Breath(gamma / 4.0);
@@ -469,7 +477,7 @@ fn overblowing_shuts_the_reed_and_letting_up_brings_the_note_back() {
 #[test]
 fn held_note_with_closed_holes_leaves_nothing_subnormal() {
     let mut clarinet = clarinet(48_000.0);
-    clarinet.set_settings(&Settings { noise: 0.0, ..Settings::default() });
+    clarinet.set_settings(&Settings { noise: 0.0, ..Settings::physical() });
     clarinet.apply(Event::Breath(0.5));
     clarinet.apply(note_on(60));
     render(&mut clarinet, 0.2, 48_000.0);
@@ -487,7 +495,7 @@ fn every_host_rate_plays_the_same_instrument() {
             .into_iter()
             .map(|host_hz| {
                 let mut clarinet = clarinet(host_hz);
-                clarinet.set_settings(&Settings { noise: 0.0, ..Settings::default() });
+                clarinet.set_settings(&Settings { noise: 0.0, ..Settings::physical() });
                 clarinet.apply(Event::Breath(0.5));
                 clarinet.apply(note_on(written));
                 render(&mut clarinet, 0.9, host_hz);
@@ -518,7 +526,7 @@ fn slurs_across_the_register_key_speak_in_the_clarion() {
     let mut right = Vec::new();
     for low in 52..64_u8 {
         let mut clarinet = clarinet(host_hz);
-        clarinet.set_settings(&Settings { legato_ms: 15.0, noise: 0.0, ..Settings::default() });
+        clarinet.set_settings(&Settings { legato_ms: 15.0, noise: 0.0, ..Settings::physical() });
         clarinet.apply(Event::Breath(0.5));
         clarinet.apply(note_on(low));
         render(&mut clarinet, 0.6, host_hz);

@@ -1,4 +1,5 @@
-//! Renders stay the same to the bit: the example melody and 200 random scores, at three host rates.
+//! Renders stay the same to the bit: the example melody and 200 random scores blown with a physical breath, and the melody
+//! and 20 of the scores as a player plays them, at three host rates.
 //!
 //! `tests/golden/renders.tsv` holds one SHA-256 prefix for each rendering. A change of sound that is meant is written by
 //! `UPDATE_GOLDEN=1 cargo test --test render_hashes` and named in CHANGELOG.md.
@@ -11,7 +12,9 @@ use std::sync::Arc;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::prepare::{Preparation, Wanted};
-use chalumeau_core::instrument::{Clarinet, Listening, ListeningMode, Quality, Settings, Tuning};
+use chalumeau_core::instrument::{
+    BreathResponse, Clarinet, Listening, ListeningMode, Quality, Settings, Tuning,
+};
 use chalumeau_core::score::Score;
 use chalumeau_core::score::{midi_file, play, play_stereo};
 use chalumeau_core::units::SoundingNote;
@@ -26,6 +29,8 @@ const RATES_HZ: [u32; 3] = [44_100, 48_000, 96_000];
 const SCORES: u64 = 200;
 /// Random scores that are heard in other ways than from one point.
 const LISTENED_SCORES: u64 = 20;
+/// Random scores that are also played with a player's breath.
+const PLAYED_SCORES: u64 = 20;
 /// Length of a random score, s.
 const SECONDS: f64 = 0.8;
 /// Hex digits kept of a hash: 64 bits.
@@ -58,11 +63,13 @@ impl Random {
 }
 
 fn settings(random: &mut Random) -> Settings {
-    let default = Settings::default();
+    let default = Settings::physical();
     if random.chance(4) {
         return default;
     }
     Settings {
+        breath_response: BreathResponse::Physical,
+        breath_curve: 1.0,
         breath_full_kpa: random.within(4.0, 12.0),
         noise: random.within(0.0, 1.0),
         tongue_ms: random.within(1.0, 20.0),
@@ -149,38 +156,69 @@ fn clarinet(instrument: Bundled, quality: Quality, rate_hz: u32) -> Clarinet {
     Clarinet::new(Arc::new(model), f64::from(rate_hz))
 }
 
-fn rendered(rate_hz: u32, seed: Option<u64>, mode: ListeningMode) -> String {
-    let (mut clarinet, settings, score, block) = match seed {
-        None => {
-            let score = midi_file::read(include_bytes!("../examples/melody.mid"), rate_hz).unwrap();
-            (clarinet(Bundled::BFlat, Quality::Live, rate_hz), Settings::default(), score, 512)
-        }
-        Some(seed) => {
-            let (instrument, quality, settings, score, block) = random_score(seed, rate_hz);
-            (clarinet(instrument, quality, rate_hz), settings, score, block)
-        }
-    };
-    let listening = Listening { mode, ..Listening::default() };
-    clarinet.set_settings(&Settings { listening, ..settings });
-    hash(&mut clarinet, mode, &score, block)
+/// What is rendered: the melody, or a random score.
+#[derive(Clone, Copy)]
+struct Rendering {
+    seed: Option<u64>,
+    response: BreathResponse,
+    mode: ListeningMode,
+}
+
+impl Rendering {
+    fn all() -> Vec<Self> {
+        let of = |response, mode, count: u64| {
+            std::iter::once(None).chain((1..=count).map(Some)).map(move |seed| Self { seed, response, mode })
+        };
+        of(BreathResponse::Physical, ListeningMode::Point, SCORES)
+            .chain(of(BreathResponse::Physical, ListeningMode::Everywhere, LISTENED_SCORES))
+            .chain(of(BreathResponse::Physical, ListeningMode::Position, LISTENED_SCORES))
+            .chain(of(BreathResponse::Played, ListeningMode::Everywhere, PLAYED_SCORES))
+            .collect()
+    }
+
+    fn name(self) -> String {
+        let score = self.seed.map_or("melody".to_owned(), |seed| format!("random {seed}"));
+        let how = match (self.response, self.mode) {
+            (BreathResponse::Played, _) => " played",
+            (BreathResponse::Physical, ListeningMode::Point) => "",
+            (BreathResponse::Physical, ListeningMode::Everywhere) => " from everywhere",
+            (BreathResponse::Physical, ListeningMode::Position) => " from two places",
+        };
+        score + how
+    }
+
+    fn hash(self, rate_hz: u32) -> String {
+        let (instrument, quality, settings, score, block) = match self.seed {
+            Some(seed) => random_score(seed, rate_hz),
+            None => {
+                let score = midi_file::read(include_bytes!("../examples/melody.mid"), rate_hz).unwrap();
+                (Bundled::BFlat, Quality::Live, Settings::physical(), score, 512)
+            }
+        };
+        // Played, the settings are those of a player who is told nothing, or that are random with a random curve.
+        let settings = match self.response {
+            BreathResponse::Physical => settings,
+            BreathResponse::Played if settings == Settings::physical() => Settings::default(),
+            BreathResponse::Played => Settings {
+                breath_response: BreathResponse::Played,
+                breath_curve: 0.5 + settings.noise,
+                ..settings
+            },
+        };
+        let listening = Listening { mode: self.mode, ..Listening::default() };
+        let mut clarinet = clarinet(instrument, quality, rate_hz);
+        clarinet.set_settings(&Settings { listening, ..settings });
+        hash(&mut clarinet, self.mode, &score, block)
+    }
 }
 
 #[test]
 fn every_render_is_the_same_to_the_bit() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/renders.tsv");
-    let seeds = |scores: u64| std::iter::once(None).chain((1..=scores).map(Some));
-    let renders: Vec<(Option<u64>, ListeningMode, &str)> = [
-        (SCORES, ListeningMode::Point, ""),
-        (LISTENED_SCORES, ListeningMode::Everywhere, " from everywhere"),
-        (LISTENED_SCORES, ListeningMode::Position, " from two places"),
-    ]
-    .into_iter()
-    .flat_map(|(scores, mode, words)| seeds(scores).map(move |seed| (seed, mode, words)))
-    .collect();
-    let lines = parallel::each(&renders, |&(seed, mode, words)| {
-        let name = seed.map_or("melody".to_owned(), |seed| format!("random {seed}"));
-        let hashes = RATES_HZ.map(|rate_hz| rendered(rate_hz, seed, mode));
-        format!("{name}{words}\t{}", hashes.join("\t"))
+    let all = Rendering::all();
+    let lines = parallel::each(&all, |&rendering| {
+        let hashes = RATES_HZ.map(|rate_hz| rendering.hash(rate_hz));
+        format!("{}\t{}", rendering.name(), hashes.join("\t"))
     });
     let text = format!("score\t{}\n{}\n", RATES_HZ.map(|rate| rate.to_string()).join("\t"), lines.join("\n"));
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
@@ -193,6 +231,6 @@ fn every_render_is_the_same_to_the_bit() {
         different.is_empty() && text.lines().count() == kept.lines().count(),
         "{} of {} renderings changed: {different:#?}",
         different.len(),
-        renders.len()
+        all.len()
     );
 }

@@ -14,7 +14,9 @@ use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::control::midi::MidiDecoder;
 use chalumeau_core::event::Event;
 use chalumeau_core::instrument::prepare::{Preparation, Wanted};
-use chalumeau_core::instrument::{Clarinet, Listening, ListeningMode, Model, Settings, Tuning};
+use chalumeau_core::instrument::{
+    BreathResponse, Clarinet, Listening, ListeningMode, Model, Settings, Tuning,
+};
 use chalumeau_core::reed::PhysicalReed;
 use chalumeau_core::units::{SoundingNote, WrittenNote};
 
@@ -101,7 +103,7 @@ fn a_slur_cut_off_does_not_sing_by_itself() {
             for way in 0..4 {
                 let mut clarinet = Clarinet::new(MODEL.clone(), HOST_HZ);
                 let reed = PhysicalReed { stiffness_n_m, ..reference };
-                clarinet.set_settings(&Settings::default().with_physical_reed(&reed, &reference));
+                clarinet.set_settings(&Settings::physical().with_physical_reed(&reed, &reference));
                 let mut midi = MidiDecoder::new();
                 clarinet.apply(Event::NoteOn { note: sounding(57), velocity: 0.8 });
                 render(&mut clarinet, 0.3);
@@ -117,6 +119,8 @@ fn a_slur_cut_off_does_not_sing_by_itself() {
 /// Settings anywhere in their ranges: reeds, lays, lips, and all that a user may set.
 fn any_settings(random: &mut Random) -> Settings {
     Settings {
+        breath_response: if random.below(2) == 0 { BreathResponse::Played } else { BreathResponse::Physical },
+        breath_curve: random.between(0.5, 2.0),
         breath_full_kpa: random.between(2.0, 20.0),
         noise: random.between(0.0, 1.0),
         tongue_ms: random.between(1.0, 20.0),

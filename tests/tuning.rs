@@ -40,7 +40,7 @@ struct Keyed {
 
 impl Keyed {
     fn new(written: u8, gamma: f32) -> Self {
-        Self { written, gamma, settings: Settings { noise: 0.0, ..Settings::default() }, bend_cents: 0.0 }
+        Self { written, gamma, settings: Settings { noise: 0.0, ..Settings::physical() }, bend_cents: 0.0 }
     }
 
     fn start(&self, model: &Arc<Model>, host_rate_hz: f64) -> Clarinet {

@@ -59,7 +59,7 @@ impl BifurcationCommand {
         let written = WrittenNote(self.written);
         let sounding = sounding(&file, written)?;
         let curve = BreathCurve::swell(self.to as f32, self.seconds);
-        let settings = self.settings.blown_by(Some(&curve), &file)?;
+        let settings = self.settings.blown_by(&curve, &file)?;
         let mut table = self.table.open("direction,gamma,rms,shut")?;
         let plot = self.plot.open(self.table.force())?;
         let threshold = linear_threshold(&file, written, sounding, &settings);

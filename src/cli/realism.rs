@@ -12,7 +12,10 @@ use chalumeau_core::analysis::pitch;
 use chalumeau_core::analysis::spectrum::steady_segment;
 use chalumeau_core::analysis::steady_note::{RATE_HZ, SECONDS, SteadyNote};
 use chalumeau_core::analysis::to_f64;
-use chalumeau_core::instrument::{Clarinet, Model, Settings};
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
+use chalumeau_core::instrument::player::response::breath_of_dynamic;
+use chalumeau_core::instrument::{BreathResponse, Clarinet, Model, Settings};
 use chalumeau_core::measure::realism::{
     CENTROID_RATIOS, Dynamic, NoteScore, REGISTERS, RecordedNote, Summary, louder_is_brighter, mean, median,
     register,
@@ -30,15 +33,16 @@ use std::sync::Arc;
 
 /// Renders are this much softer, so that no peak meets the limiter; levels are given without it, dB.
 const HEADROOM_DB: f64 = 20.0;
-/// Gamma at pp, mf and ff where nothing else is said: what fits the recorded notes best with one gamma for each dynamic.
-const GAMMAS: [f64; 3] = [0.42, 0.56, 0.78];
+/// The player's dynamics for pp, mf and ff where nothing else is said.
+const DYNAMICS: [f64; 3] = [0.0, MEZZO_FORTE, 1.0];
 /// Harmonics of which the beginning is timed.
 const TIMED: [usize; 3] = [1, 3, 5];
 
 const EXAMPLES: &str = "\
 Examples:
   chalumeau realism --csv realism.csv --plot realism.png
-  chalumeau realism --gamma 0.43,0.56,0.8 --zeta 0.25
+  chalumeau realism --gamma 0.42,0.56,0.78 --zeta 0.25
+      One pressure for each dynamic, on a lip that stays.
   chalumeau realism --noise 0 --csv -
 
 The recordings are TinySOL's (Cella, Ghisi, Lostanlen, Levy, Fineberg, Maresz 2020, CC BY 4.0): one player, one take for
@@ -54,7 +58,10 @@ each note. A recorded note differs from its recorded neighbours by 2.7, 6.8 and 
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct RealismCommand {
-    /// Constant mouth pressure over closing pressure at pp, mf and ff, each 0..3 [default: 0.42,0.56,0.78]
+    /// The player's dynamic at pp, mf and ff, each 0..1 [default: 0,0.62,1]
+    #[arg(long, value_name = "D,D,D", value_delimiter = ',', num_args = 1, conflicts_with = "gamma", value_parser = |s: &str| within(s, 0.0, 1.0))]
+    dynamic: Vec<f64>,
+    /// Instead: constant mouth pressure over closing pressure at pp, mf and ff, each 0..3
     #[arg(long, value_name = "G,G,G", value_delimiter = ',', num_args = 1, value_parser = |s: &str| within(s, 0.0, f64::from(GAMMA_MAX)))]
     gamma: Vec<f64>,
     #[command(flatten)]
@@ -79,29 +86,19 @@ struct Heard {
 
 impl RealismCommand {
     pub fn run(&self) -> Result<(), Failure> {
-        let gammas = match self.gamma.as_slice() {
-            [] => GAMMAS,
-            &[pp, mf, ff] => [pp, mf, ff],
-            other => {
-                return Err(Failure::Usage(format!(
-                    "--gamma takes three numbers, for pp, mf and ff, got {}; for example --gamma 0.42,0.56,0.78",
-                    other.len()
-                )));
-            }
-        };
         let file = self.instrument.load()?;
-        let highest = gammas.into_iter().fold(0.0, f64::max);
-        let mut settings =
-            self.settings.blown_by(Some(&BreathCurve::constant(highest as f32)), &file)?;
+        let (breaths, mut settings, blown) = self.blown(&file)?;
         settings.gain_db -= HEADROOM_DB as f32;
         let mut table = self.table.open(&header())?;
         let plot = self.plot.open(self.table.force())?;
         let name = file.name.clone();
         let model = self.instrument.model(file, RATE_HZ as u32, settings.a4_hz)?;
-        let heard = play_all(&model, &settings, &gammas);
+        let heard = play_all(&model, &settings, &breaths);
         let about = vec![
-            format!("{name}; gamma {} at pp, mf, ff; zeta {}, strength {}, breath noise {}", words(&gammas),
-                settings.zeta, settings.strength, settings.noise),
+            format!(
+                "{name}; {blown} at pp, mf, ff; zeta {}, strength {}, breath noise {}",
+                settings.zeta, settings.strength, settings.noise
+            ),
             "recordings: TinySOL (Cella, Ghisi, Lostanlen, Levy, Fineberg, Maresz 2020), CC BY 4.0, one take for each note"
                 .to_owned(),
         ];
@@ -116,18 +113,50 @@ impl RealismCommand {
     }
 }
 
+/// Three numbers of a flag.
+fn three(flag: &str, given: &[f64], default: [f64; 3]) -> Result<[f64; 3], Failure> {
+    match *given {
+        [] => Ok(default),
+        [pp, mf, ff] => Ok([pp, mf, ff]),
+        _ => Err(Failure::Usage(format!(
+            "{flag} takes three numbers, for pp, mf and ff, got {}; for example {flag} {}",
+            given.len(),
+            words(&default)
+        ))),
+    }
+}
+
+impl RealismCommand {
+    /// Values of a breath curve at pp, mf and ff, the settings under which they are played, and both in words.
+    fn blown(&self, file: &InstrumentFile) -> Result<([f32; 3], Settings, String), Failure> {
+        if self.gamma.is_empty() {
+            let dynamics = three("--dynamic", &self.dynamic, DYNAMICS)?;
+            let breaths = dynamics.map(|dynamic| breath_of_dynamic(dynamic) as f32);
+            let settings = self.settings.played(file)?;
+            if settings.breath_response == BreathResponse::Physical {
+                return Err(Failure::Usage("a physical breath has no dynamics; give --gamma".to_owned()));
+            }
+            return Ok((breaths, settings, format!("dynamic {}", words(&dynamics))));
+        }
+        let gammas = three("--gamma", &self.gamma, [0.42, 0.56, 0.78])?;
+        let highest = gammas.into_iter().fold(0.0, f64::max);
+        let settings = self.settings.blown_by(&BreathCurve::constant(highest as f32), file)?;
+        Ok((gammas.map(|gamma| gamma as f32), settings, format!("gamma {}", words(&gammas))))
+    }
+}
+
 fn words(numbers: &[f64]) -> String {
-    numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(", ")
+    numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(",")
 }
 
 /// Plays a note for every recording, on all cores.
-fn play_all(model: &Arc<Model>, settings: &Settings, gammas: &[f64; 3]) -> Vec<Heard> {
+fn play_all(model: &Arc<Model>, settings: &Settings, breaths: &[f32; 3]) -> Vec<Heard> {
     let recorded = RecordedNote::all();
     let bar = progress(recorded.len());
     let play = |at: usize| {
         let note = &recorded[at];
-        let gamma = gammas[note.dynamic as usize];
-        listen(note, &rendered(model, settings, note.midi, gamma))
+        let breath = breaths[note.dynamic as usize];
+        listen(note, &rendered(model, settings, note.midi, breath))
     };
     // Nothing ends it early, so there is always an answer.
     let heard = parallel::each(recorded.len(), play, &mut |_| {
@@ -138,16 +167,13 @@ fn play_all(model: &Arc<Model>, settings: &Settings, gammas: &[f64; 3]) -> Vec<H
     heard.unwrap_or_default()
 }
 
-fn rendered(model: &Arc<Model>, settings: &Settings, midi: u8, gamma: f64) -> Vec<f64> {
+fn rendered(model: &Arc<Model>, settings: &Settings, midi: u8, breath: f32) -> Vec<f64> {
     let rate = RATE_HZ as u32;
     let mut clarinet = Clarinet::new(model.clone(), RATE_HZ);
     clarinet.set_settings(settings);
     clarinet.reset();
-    let score = Score::note(SoundingNote(midi), SECONDS, rate).blown(
-        &BreathCurve::constant(gamma as f32),
-        settings,
-        rate,
-    );
+    let score =
+        Score::note(SoundingNote(midi), SECONDS, rate).blown(&BreathCurve::constant(breath), settings, rate);
     let mut samples = Vec::with_capacity(score.samples);
     let Ok(()) = score::play(&mut clarinet, &score, 4096, |block| {
         samples.extend(to_f64(block));
@@ -157,8 +183,8 @@ fn rendered(model: &Arc<Model>, settings: &Settings, midi: u8, gamma: f64) -> Ve
 }
 
 fn listen(recorded: &RecordedNote, samples: &[f64]) -> Heard {
-    let played = SteadyNote::measure(samples)
-        .map(|note| SteadyNote { rms_dbfs: note.rms_dbfs + HEADROOM_DB, ..note });
+    let played =
+        SteadyNote::measure(samples).map(|note| SteadyNote { rms_dbfs: note.rms_dbfs + HEADROOM_DB, ..note });
     let score = NoteScore::new(recorded.clone(), played);
     let segment = steady_segment(samples, RATE_HZ).map_or(&[][..], |range| &samples[range]);
     let near_hz = score.played.as_ref().map(|played| played.f0_hz);
@@ -181,11 +207,12 @@ fn band((low_hz, high_hz): (f64, f64)) -> String {
 }
 
 fn header() -> String {
-    let mut columns: Vec<String> = "sounding_midi,register,dynamic,cents,error_db,centroid_hz,centroid_ratio,h3_h2_db,\
+    let mut columns: Vec<String> =
+        "sounding_midi,register,dynamic,cents,error_db,centroid_hz,centroid_ratio,h3_h2_db,\
          recorded_h3_h2_db,level_db,recorded_level_db"
-        .split(',')
-        .map(str::to_owned)
-        .collect();
+            .split(',')
+            .map(str::to_owned)
+            .collect();
     columns.extend((1..=10).map(|harmonic| format!("d{harmonic}_db")));
     columns.extend(BANDS_HZ.map(|range| format!("noise_{}_db", band(range))));
     columns.extend(TIMED.map(|harmonic| format!("t90_h{harmonic}_ms")));
@@ -198,7 +225,9 @@ fn header() -> String {
 
 /// A number with so many digits; "nan" where there is none.
 fn digits(value: Option<f64>, digits: usize) -> String {
-    value.filter(|value| value.is_finite()).map_or_else(|| "nan".to_owned(), |value| format!("{value:.digits$}"))
+    value
+        .filter(|value| value.is_finite())
+        .map_or_else(|| "nan".to_owned(), |value| format!("{value:.digits$}"))
 }
 
 fn write(table: &mut CsvTable, note: &Heard) -> Result<(), Failure> {
@@ -240,15 +269,13 @@ fn of(heard: &[Heard], dynamic: Dynamic) -> impl Iterator<Item = &Heard> {
 
 /// What the comments say.
 fn summary(heard: &[Heard]) -> Vec<String> {
-    let summaries = Dynamic::ALL.map(|dynamic| (dynamic, Summary::of(of(heard, dynamic).map(|note| &note.score))));
-    let mut lines: Vec<String> = summaries.iter().map(|(dynamic, summary)| line(*dynamic, summary, heard)).collect();
+    let summaries =
+        Dynamic::ALL.map(|dynamic| (dynamic, Summary::of(of(heard, dynamic).map(|note| &note.score))));
+    let mut lines: Vec<String> =
+        summaries.iter().map(|(dynamic, summary)| line(*dynamic, summary, heard)).collect();
     let [(_, pp), (_, mf), (_, ff)] = &summaries;
     let step = |from: &Summary, to: &Summary| {
-        format!(
-            "{:.1} ({:.1})",
-            to.level_db.0 - from.level_db.0,
-            to.level_db.1 - from.level_db.1
-        )
+        format!("{:.1} ({:.1})", to.level_db.0 - from.level_db.0, to.level_db.1 - from.level_db.1)
     };
     lines.push(format!(
         "level, dB (recorded): pp to mf {}, mf to ff {}, pp to ff {}",
@@ -276,9 +303,8 @@ fn summary(heard: &[Heard]) -> Vec<String> {
         })
         .collect();
     lines.push(format!("t90, median ms: {}", t90.join(", ")));
-    let wander = |value: fn(&Wander) -> f64| {
-        median(heard.iter().filter_map(|note| note.wander.as_ref()).map(value))
-    };
+    let wander =
+        |value: fn(&Wander) -> f64| median(heard.iter().filter_map(|note| note.wander.as_ref()).map(value));
     lines.push(format!(
         "wander, medians: range {:.2} cents, {:.3} cents slow, {:.3} fast; level {:.3} dB, h3 {:.3}, h5 {:.3}",
         wander(|w| w.range_cents),

@@ -214,6 +214,8 @@ struct ProbeTable {
     rate_hz: f64,
     seen: u64,
     failed: Option<Failure>,
+    /// Closing pressure that gamma is over, Pa.
+    closing_pa: f64,
 }
 
 impl ProbeTable {
@@ -232,13 +234,21 @@ impl ProbeTable {
             prepared.settings.zeta,
             prepared.model.air.z_c(prepared.model.file.nominal_radius_m)
         ))?;
-        Ok(Self { table, every: u64::from(render.probe_every), rate_hz, seen: 0, failed: None })
+        Ok(Self {
+            table,
+            every: u64::from(render.probe_every),
+            rate_hz,
+            seen: 0,
+            failed: None,
+            closing_pa: prepared.settings.closing_pa(),
+        })
     }
 
     fn write(&mut self, inside: Probe) {
         if self.seen.is_multiple_of(self.every) && self.failed.is_none() {
             let t_s = self.seen as f64 / self.rate_hz;
-            let Probe { gamma, opening, flow_m3s, p_mouthpiece_pa, p_radiated_pa } = inside;
+            let Probe { gamma, opening, flow_m3s, p_mouthpiece_pa, p_radiated_pa, .. } =
+                inside.over(self.closing_pa);
             let line = self.table.line(format_args!(
                 "{t_s:.8},{gamma:.7},{opening:.7},{flow_m3s:.7e},{p_mouthpiece_pa:.5},{p_radiated_pa:.7e}"
             ));

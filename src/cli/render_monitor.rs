@@ -91,6 +91,7 @@ impl RenderMonitor {
 
     /// Takes the next internal sample.
     pub fn inside(&mut self, probe: Probe) {
+        let probe = probe.over(self.closing_pa);
         self.gamma.push(probe.gamma as f32);
         if (self.near.0..self.near.1).contains(&self.seen) {
             self.moment.probes.push(probe);

@@ -61,10 +61,12 @@ pub struct ScoreArgs {
     /// Constant mouth pressure over closing pressure, 0..3 [default: 0.5 unless a MIDI file plays]
     #[arg(long, value_name = "G", help_heading = "Breath (replaces that of a MIDI file)", value_parser = |s: &str| within(s, 0.0, f64::from(GAMMA_MAX)))]
     gamma: Option<f64>,
-    /// Mouth pressure over time: a CSV file t_s,gamma, or ramp:FROM:TO:SECONDS, then held
+    /// Mouth pressure over closing pressure over time: a CSV file t_s,gamma, or ramp:FROM:TO:SECONDS, then held. With
+    /// --breath-response played the numbers are shares of full breath, 0..1
     #[arg(long, value_name = "FILE|RAMP", help_heading = "Breath (replaces that of a MIDI file)")]
     breath: Option<String>,
-    /// Mouth pressure from one gamma to another over the whole length, for example 0.4:0.9
+    /// Mouth pressure from one gamma to another over the whole length, for example 0.4:0.9; or shares of full breath, as
+    /// with --breath
     #[arg(long, value_name = "FROM:TO", help_heading = "Breath (replaces that of a MIDI file)")]
     crescendo: Option<String>,
     /// Breath from a recorded take: a CSV file with t_us and angle_deg, from the plugin or `chalumeau knob`. Each note turns
@@ -116,7 +118,10 @@ impl ScoreArgs {
     pub fn prepare(&self) -> Result<RenderJob, Failure> {
         let file = self.instrument.load()?;
         let curve = self.curve()?;
-        let settings = self.settings.blown_by(curve.as_ref(), &file)?;
+        let settings = match &curve {
+            Some(curve) => self.settings.blown_in_either(curve, &file)?,
+            None => self.settings.played(&file)?,
+        };
         let mut score = self.score(&file)?;
         if let Some(curve) = &curve {
             score = score.blown(curve, &settings, self.rate);
@@ -163,7 +168,7 @@ impl ScoreArgs {
         let design = self.feel.design(&model.file)?;
         let table = feels.table(settings, &design, &NO_MOTOR)?;
         let knob = KnobDesign { full_deg: design.travel_deg, ..KnobDesign::default() };
-        let hand = BreathMapping { maps: feels.maps(&table), design: knob, feels: true };
+        let hand = BreathMapping { maps: feels.maps_for(&table, settings), design: knob, feels: true };
         let rate_hz = f64::from(self.rate);
         let full_pa = 1e3 * f64::from(settings.breath_full_kpa);
         let events = BlownEvents::new(

@@ -4,7 +4,7 @@ use crate::cli::Failure;
 use crate::cli::reed_physical::PhysicalReedArgs;
 use crate::parameters::{self, Kind, Number, PARAMETERS, Parameter, Sets, Value};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
-use chalumeau_core::instrument::Settings;
+use chalumeau_core::instrument::{BreathResponse, Settings};
 use chalumeau_core::score;
 use chalumeau_core::score::breath::BreathCurve;
 use chalumeau_core::units::REFERENCE_RADIUS_M;
@@ -19,9 +19,16 @@ pub struct SettingsArgs {
     /// No breath noise, for measurements
     #[arg(long, conflicts_with = "noise")]
     no_noise: bool,
-    /// Keep every note in tune at every breath, instead of letting it drift as the bore does
-    #[arg(long)]
+    /// Keep every note in tune at every breath (the default where the breath is played)
+    #[arg(long, conflicts_with = "natural")]
     tempered: bool,
+    /// Let the pitch drift with the breath as the bore does (the default where the breath is a pressure)
+    #[arg(long)]
+    natural: bool,
+    /// What breath sets: played (the dynamic, as a player does) or physical (the mouth pressure) [default: physical where
+    /// gamma is given, else played]
+    #[arg(long, value_name = "RESPONSE", value_parser = breath_response)]
+    breath_response: Option<Given>,
     /// Any parameter of the sound by its id, with the text a host would show, such as vent=2 or "temp=20 °C"; may be
     /// repeated. `chalumeau parameters` lists them
     #[arg(long = "set", value_name = "ID=VALUE", value_parser = assignment)]
@@ -123,6 +130,12 @@ impl FromArgMatches for NumberFlags {
     }
 }
 
+/// Reads `played` or `physical`.
+fn breath_response(text: &str) -> Result<Given, String> {
+    let parameter = parameters::find("resp").ok_or("no such parameter")?;
+    Ok(Given { parameter, value: parameter.read(text)?, typed: "--breath-response".to_owned() })
+}
+
 /// Reads `id=value`.
 fn assignment(text: &str) -> Result<Given, String> {
     let (id, value) = text.split_once('=').ok_or("must be id=value, for example vent=2")?;
@@ -142,7 +155,7 @@ fn assignment(text: &str) -> Result<Given, String> {
     Err(format!("{what}; the parameters that can be set are {}", ids.join(", ")))
 }
 
-/// `--no-noise` and `--tempered` as values of the table.
+/// `--no-noise`, `--tempered` and `--natural` as values of the table.
 fn shorthand(id: &str, text: &str, typed: &str) -> Option<Given> {
     let parameter = parameters::find(id)?;
     Some(Given { parameter, value: parameter.read(text).ok()?, typed: typed.to_owned() })
@@ -153,8 +166,9 @@ impl SettingsArgs {
     fn given(&self) -> Result<Vec<Given>, Failure> {
         let no_noise = self.no_noise.then(|| shorthand("noise", "0", "--no-noise")).flatten();
         let tempered = self.tempered.then(|| shorthand("tune", "Tempered", "--tempered")).flatten();
-        let all: Vec<Given> =
-            self.numbers.0.iter().chain(&no_noise).chain(&tempered).chain(&self.set).cloned().collect();
+        let natural = self.natural.then(|| shorthand("tune", "Natural", "--natural")).flatten();
+        let short = [&no_noise, &tempered, &natural, &self.breath_response].into_iter().flatten();
+        let all: Vec<Given> = self.numbers.0.iter().chain(short).chain(&self.set).cloned().collect();
         for (at, later) in all.iter().enumerate() {
             if let Some(earlier) = all[..at].iter().find(|other| other.parameter.id == later.parameter.id) {
                 return Err(Failure::Usage(format!(
@@ -175,10 +189,21 @@ impl SettingsArgs {
         self.has("noise")
     }
 
-    fn settings(&self, file: &InstrumentFile) -> Result<Settings, Failure> {
+    /// The response to breath that the user has chosen, and as what it was typed.
+    fn response(&self) -> Result<Option<(BreathResponse, String)>, Failure> {
+        let given = self.given()?.into_iter().find(|given| given.parameter.id == "resp");
+        Ok(given.map(|Given { parameter, value, typed }| {
+            let mut settings = Settings::default();
+            parameter.set(&mut settings, value);
+            (settings.breath_response, typed)
+        }))
+    }
+
+    /// What was given, over `base`.
+    fn over(&self, base: Settings, file: &InstrumentFile) -> Result<Settings, Failure> {
         let given = self.given()?;
         let find = |id: &str| given.iter().find(|given| given.parameter.id == id);
-        let mut settings = Settings::default();
+        let mut settings = base;
         for Given { parameter, value, .. } in &given {
             parameter.set(&mut settings, *value);
         }
@@ -224,11 +249,43 @@ impl SettingsArgs {
         }
     }
 
-    /// Settings whose full breath reaches the curve's largest gamma: raised for it unless the user has chosen it.
-    /// A reed given in millimetres is measured against the instrument's nominal bore.
-    pub fn blown_by(&self, curve: Option<&BreathCurve>, file: &InstrumentFile) -> Result<Settings, Failure> {
-        let mut settings = self.settings(file)?;
-        let Some(gamma_max) = curve.map(BreathCurve::gamma_max) else { return Ok(settings) };
+    /// As the user plays: breath is what was chosen, played otherwise. A reed given in millimetres is measured against the
+    /// instrument's nominal bore.
+    pub fn played(&self, file: &InstrumentFile) -> Result<Settings, Failure> {
+        let settings = self.over(Settings::default(), file)?;
+        match settings.breath_response {
+            BreathResponse::Played => Ok(settings),
+            // The pitch of a pressure drifts unless it was asked not to.
+            BreathResponse::Physical => self.over(Settings::physical(), file),
+        }
+    }
+
+    /// For a breath curve: of gamma, unless the user has chosen the played response; then of shares of full breath.
+    pub fn blown_in_either(&self, curve: &BreathCurve, file: &InstrumentFile) -> Result<Settings, Failure> {
+        match self.response()? {
+            Some((BreathResponse::Played, typed)) => {
+                let most = curve.gamma_max();
+                if most > 1.0 {
+                    return Err(Failure::Usage(format!(
+                        "with {typed} breath is a share of full breath, 0..1, got {most}; leave {typed} out to give gamma"
+                    )));
+                }
+                self.played(file)
+            }
+            _ => self.blown_by(curve, file),
+        }
+    }
+
+    /// For a curve of gamma: breath is a pressure, and full breath reaches the largest gamma. It is raised for it unless the
+    /// user has chosen it. A reed given in millimetres is measured against the instrument's nominal bore.
+    pub fn blown_by(&self, curve: &BreathCurve, file: &InstrumentFile) -> Result<Settings, Failure> {
+        if let Some((BreathResponse::Played, typed)) = self.response()? {
+            return Err(Failure::Usage(format!(
+                "{typed}: this command blows with a pressure, gamma; leave {typed} out"
+            )));
+        }
+        let mut settings = self.over(Settings::physical(), file)?;
+        let gamma_max = curve.gamma_max();
         let closing_kpa = score::closing_kpa(&settings);
         // Less what single precision adds to a closing pressure of 6 kPa.
         let needed_kpa = gamma_max * closing_kpa * (1.0 - 4.0 * f32::EPSILON);
@@ -265,7 +322,7 @@ mod tests {
     fn read(words: &[&str]) -> Result<Settings, String> {
         let line =
             Line::try_parse_from(std::iter::once(&"program").chain(words)).map_err(|e| e.to_string())?;
-        line.settings.settings(&InstrumentFile::built_in()).map_err(|failure| failure.to_string())
+        line.settings.played(&InstrumentFile::built_in()).map_err(|failure| failure.to_string())
     }
 
     fn said(words: &[&str]) -> String {
@@ -290,6 +347,9 @@ mod tests {
         }
         assert_eq!(given, 20, "all numbers of the settings have a flag");
         assert_eq!(read(&["--set", "tune=tempered"]), read(&["--tempered"]));
+        assert_eq!(read(&["--set", "tune=natural"]), read(&["--natural"]));
+        assert_eq!(read(&["--set", "resp=physical"]), Ok(Settings::physical()));
+        assert_eq!(read(&["--breath-response", "physical"]), Ok(Settings::physical()));
         assert_eq!(read(&["--set", "noise=0 %"]), read(&["--no-noise"]));
         let several = read(&["--set", "vent=2.5", "--set", "temp=20 °C", "--set", "reedc=free"]).unwrap();
         let d = Settings::default();
@@ -324,6 +384,7 @@ mod tests {
             (&["--set", "lip=1.1", "--set", "lip=1.2"], &["--set lip and --set lip both set"]),
             (&["--no-noise", "--set", "noise=3"], &["--no-noise and --set noise both set"]),
             (&["--tempered", "--set", "tune=natural"], &["--tempered and --set tune both set"]),
+            (&["--breath-response", "loud"], &["must be one of Played, Physical"]),
             (
                 &["--k", "0.5", "--set", "reedc=coupled"],
                 &["--set reedc makes k follow H", "--k has no effect"],

@@ -7,7 +7,8 @@ use crate::cli::render::progress;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{NotesArg, PlayedArgs, within};
 use chalumeau_core::analysis::pitch;
-use chalumeau_core::instrument::{Clarinet, Model, Settings, Tuning};
+use chalumeau_core::instrument::player::response::breath_of_dynamic;
+use chalumeau_core::instrument::{BreathResponse, Clarinet, Model, Settings, Tuning};
 use chalumeau_core::parallel;
 use chalumeau_core::score;
 use chalumeau_core::score::Score;
@@ -23,6 +24,8 @@ use std::sync::Arc;
 const SETTLE_S: f64 = 0.8;
 const MEASURE_S: f64 = 0.6;
 
+/// Gamma where nothing else is said.
+const GAMMA_DEFAULT: f64 = 0.5;
 /// Further than this from its pitch a note is another one, cents. Wide, for breath and reeds that bend a note much.
 const OWN_CENTS: f64 = 80.0;
 
@@ -30,6 +33,7 @@ const EXAMPLES: &str = "\
 Examples:
   chalumeau tune --rate 48000 --gamma 0.5
   chalumeau tune --gamma 0.8 --tempered --csv loud.csv
+  chalumeau tune --dynamic 0 --csv soft.csv
   chalumeau tune --written G5 --strength 3.5
   chalumeau tune --gamma 0.7 --plot tune.png    natural and tempered, as a figure";
 
@@ -43,9 +47,12 @@ Examples:
 pub struct TuneCommand {
     #[command(flatten)]
     notes: NotesArg,
-    /// Mouth pressure over closing pressure, 0..3
-    #[arg(long, value_name = "G", default_value = "0.5", value_parser = |s: &str| within(s, 0.0, f64::from(GAMMA_MAX)))]
-    gamma: f64,
+    /// Mouth pressure over closing pressure, 0..3 [default: 0.5]
+    #[arg(long, value_name = "G", conflicts_with = "dynamic", value_parser = |s: &str| within(s, 0.0, f64::from(GAMMA_MAX)))]
+    gamma: Option<f64>,
+    /// Instead: the player's dynamic, 0 (pianissimo)..1 (fortissimo)
+    #[arg(long, value_name = "D", value_parser = |s: &str| within(s, 0.0, 1.0))]
+    dynamic: Option<f64>,
     /// Sample rate, Hz, 1000..1536000
     #[arg(long, alias = "sr", value_name = "HZ", default_value = "48000", value_parser = clap::value_parser!(u32).range(1_000..=1_536_000))]
     rate: u32,
@@ -63,8 +70,21 @@ impl TuneCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let file = self.instrument.load()?;
         let notes = self.notes.notes(&file)?;
-        let curve = BreathCurve::constant(self.gamma as f32);
-        let mut settings = self.settings.blown_by(Some(&curve), &file)?;
+        let (curve, mut settings, blown) = match self.dynamic {
+            Some(dynamic) => {
+                let curve = BreathCurve::constant(breath_of_dynamic(dynamic) as f32);
+                (curve, self.settings.played(&file)?, format!("dynamic {dynamic}"))
+            }
+            None => {
+                let gamma = self.gamma.unwrap_or(GAMMA_DEFAULT);
+                let curve = BreathCurve::constant(gamma as f32);
+                let settings = self.settings.blown_by(&curve, &file)?;
+                (curve, settings, format!("gamma {gamma}"))
+            }
+        };
+        if self.dynamic.is_some() && settings.breath_response == BreathResponse::Physical {
+            return Err(Failure::Usage("a physical breath has no dynamics; give --gamma".to_owned()));
+        }
         if !self.settings.noise_given() {
             settings.noise = 0.0;
         }
@@ -73,8 +93,8 @@ impl TuneCommand {
         let mut table = self.table.open("written_midi,f_hz,cents,register_ok")?;
         let plot = self.plot.open(self.table.force())?;
         table.comment(format_args!(
-            "{}; gamma {}, {rate} Hz, A4 = {} Hz; tongued, measured from {SETTLE_S} s on",
-            name, self.gamma, settings.a4_hz
+            "{name}; {blown}, {rate} Hz, A4 = {} Hz; tongued, measured from {SETTLE_S} s on",
+            settings.a4_hz
         ))?;
         let model = self.instrument.model(file, rate, settings.a4_hz)?;
         let heard = measure_all(&notes, &model, &curve, &settings, rate);
@@ -99,9 +119,9 @@ impl TuneCommand {
             let mut rounds = [(settings.tuning, heard), beside].map(|(tuning, heard)| round(tuning, &notes, &heard));
             rounds.sort_by(|a, b| a.name.cmp(&b.name));
             let note = format!(
-                "gamma {}, A4 = {} Hz, strength {}, zeta {}, {} Celsius; each note tongued, measured from {SETTLE_S} s on. \
+                "{blown}, A4 = {} Hz, strength {}, zeta {}, {} Celsius; each note tongued, measured from {SETTLE_S} s on. \
                  Natural drifts with the breath as the bore does, tempered is held in tune.",
-                self.gamma, settings.a4_hz, settings.strength, settings.zeta, settings.temperature_c
+                settings.a4_hz, settings.strength, settings.zeta, settings.temperature_c
             );
             tune::figure(&name, &note, &rounds)
         })

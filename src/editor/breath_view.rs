@@ -5,7 +5,7 @@ use egui::{Align2, CornerRadius, FontId, Rect, Role, Sense, Stroke, Ui, WidgetIn
 use crate::editor::breath_meter;
 use crate::editor::chart;
 use crate::editor::chart::Chart;
-use crate::editor::controls::{Hands, heading, momentary, slider};
+use crate::editor::controls::{Hands, choice, heading, momentary, slider};
 use crate::editor::snapshot::{BreathSource, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
@@ -60,7 +60,8 @@ impl BreathView {
             calibrate(ui, hands);
         }
         heading(ui, "Breath");
-        for id in ["breath", "full", "curve"] {
+        choice(ui, hands, "resp");
+        for id in ["breath", "bcurve", "full", "curve"] {
             slider(ui, hands, id);
         }
         heading(ui, "Articulation");

@@ -129,6 +129,8 @@ impl ReedView {
     fn flow(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
         let c = Colours::here(ui);
         let picture = Picture::of(&snapshot.settings, snapshot.instrument.nominal_radius_m);
+        // A player's lip shapes the reed that is set; what is played follows its curve.
+        let played = Picture::of(&snapshot.played(), snapshot.instrument.nominal_radius_m);
         let kpa = f64::from(snapshot.mouth_now_kpa());
         let wanted = (
             even(1.4 * picture.closure_kpa().max(1.5 * kpa), 2.0),
@@ -154,11 +156,14 @@ impl ReedView {
         .show(ui, |plot| {
             chart::lines(plot, &marks);
             law_curve(plot, &picture, right, c);
+            if snapshot.lip.is_some() {
+                plot.line(chart::curve(law_points(&played, right), c.breath, 1.0).id("law under the lip"));
+            }
             if is_sounding {
                 orbit(plot, snapshot, period, c);
             }
             if kpa > 0.02 {
-                let still = Points::new("still reed", [kpa, picture.flow(kpa)]);
+                let still = Points::new("still reed", [kpa, played.flow(kpa)]);
                 plot.points(still.radius(5.0).color(c.breath).filled(false).allow_hover(false));
             }
         });
@@ -166,6 +171,9 @@ impl ReedView {
         if ui.available_width() > 300.0 && transform.frame().height() > 200.0 {
             let sounding = if is_sounding { "one period of the sound" } else { "the reed does not swing" };
             let mut lines = vec![("flow law of the reed", c.accent), (sounding, c.breath)];
+            if snapshot.lip.is_some() {
+                lines.push(("thin: the law under the player's lip", c.breath));
+            }
             if kpa > 0.02 {
                 lines.push(("circle: the reed at rest", c.breath));
             }
@@ -289,13 +297,18 @@ fn even(value: f64, step: f64) -> f64 {
 }
 
 fn law_curve(plot: &mut PlotUi<'_>, picture: &Picture, right: f64, c: &Colours) {
+    let points = law_points(picture, right);
+    plot.line(chart::curve(points, c.accent, 2.5).fill(0.0).fill_alpha(0.10).id("law"));
+}
+
+fn law_points(picture: &Picture, right: f64) -> Vec<[f64; 2]> {
     let end = picture.closure_kpa();
     // Dense where the root rises.
     let back = (0..=POINTS / 8).rev().map(|n| -0.1 * right * (n as f64 / (POINTS / 8) as f64).powi(2));
     let forth = (1..=POINTS).map(|n| end * (n as f64 / POINTS as f64).powi(2));
     let mut points: Vec<[f64; 2]> = back.chain(forth).map(|kpa| [kpa, picture.flow(kpa)]).collect();
     points.push([right, 0.0]);
-    plot.line(chart::curve(points, c.accent, 2.5).fill(0.0).fill_alpha(0.10).id("law"));
+    points
 }
 
 /// The last period, and a fainter trace of those before it.

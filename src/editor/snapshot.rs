@@ -9,6 +9,7 @@ use crate::editor::sound_analysis::SoundAnalysis;
 use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
 use chalumeau_core::haptics::{NoteFeel, NoteRequirement};
 use chalumeau_core::instrument::Settings;
+use chalumeau_core::instrument::player::dynamics::LipShape;
 use chalumeau_core::units::{SoundingNote, WrittenNote};
 
 /// See the module.
@@ -32,6 +33,8 @@ pub struct Snapshot {
     pub openings: Vec<f32>,
     /// Mouth pressure, kPa.
     pub mouth_kpa: f32,
+    /// How the player's lip shapes the reed; `None` where the breath is physical.
+    pub lip: Option<LipShape>,
     /// The pressures that this fingering needs with this reed; `None` if it cannot sound or is not known yet.
     pub requirement: Option<NoteRequirement>,
     /// The settings of the parameters.
@@ -71,6 +74,7 @@ impl Default for Snapshot {
             fingering: 0,
             openings,
             mouth_kpa: 0.0,
+            lip: None,
             requirement: None,
             settings: Settings::default(),
             sources: Vec::new(),
@@ -87,9 +91,14 @@ impl Default for Snapshot {
 }
 
 impl Snapshot {
-    /// Closing pressure of the reed, kPa.
+    /// The settings with the reed as the lip has it now.
+    pub fn played(&self) -> Settings {
+        self.settings.under_lip(self.lip)
+    }
+
+    /// Closing pressure of the reed as the lip has it now, kPa.
     pub fn closing_kpa(&self) -> f32 {
-        (self.settings.closing_pa() * 1e-3) as f32
+        (self.played().closing_pa() * 1e-3) as f32
     }
 
     /// Mouth pressure, kPa, limited to 0..=100.

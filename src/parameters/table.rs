@@ -63,8 +63,9 @@ const fn whole([min, max]: [i32; 2], default: i32, unit: &'static str) -> Kind {
     Kind::Whole(Whole { min, max, default, unit })
 }
 
+/// The first is the default.
 const fn choice(all: &'static [(&'static str, &'static str)]) -> Kind {
-    Kind::Choice(Choice { all })
+    Kind::Choice(Choice { all, default: 0 })
 }
 
 const fn switch(default: bool, [off, on]: [&'static str; 2]) -> Kind {
@@ -123,7 +124,7 @@ pub static PARAMETERS: &[Parameter] = &[
         .act(),
     entry("full", BREATH, "Full breath", number([2.0, 20.0], 6.0, 2, " kPa"))
         .help(
-            "Mouth pressure at full breath",
+            "Mouth pressure at full breath, where the breath response is physical",
             "Sets how hard a controller or the knob blows at its end. A clarinettist plays between 2 and 6 kPa.",
             "Sets how far the knob's whole travel reaches into the note.",
         )
@@ -145,6 +146,22 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Number(|settings| &mut settings.legato_ms))
         .flag("--legato-ms"),
+    entry("resp", BREATH, "Breath response", choice(&[("play", "Played"), ("phys", "Physical")]))
+        .help(
+            "What a breath source sets",
+            "Played: the dynamic. Every note begins at a breath of 4 of 127, equal steps of breath are equal steps of level, and the lip follows as a player's does. Physical: the mouth pressure, in a straight line, on a lip that stays. Projects from before this choice are physical.",
+            "",
+        )
+        .sets(Sets::BreathResponse)
+        .flag("--breath-response"),
+    entry("bcurve", BREATH, "Breath curve", number([0.5, 2.0], 1.0, 2, ""))
+        .help(
+            "Curve from breath to dynamic, where the breath response is played",
+            "Above 1, soft notes have more of the way; below 1, loud notes.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.breath_curve))
+        .flag("--breath-curve"),
     entry("stren", EMBOUCHURE, "Reed strength", number([1.5, 5.0], 2.5, 2, ""))
         .help(
             "Reed strength as printed on the box; 2.5 closes at 6 kPa",
@@ -222,7 +239,12 @@ pub static PARAMETERS: &[Parameter] = &[
         .help("Pitch of A4", "Tunes the whole instrument by changing its length.", "")
         .sets(Sets::Number(|settings| &mut settings.a4_hz))
         .flag("--a4"),
-    entry("tune", TUNING, "Tuning", choice(&[("nat", "Natural"), ("temp", "Tempered")]))
+    entry(
+        "tune",
+        TUNING,
+        "Tuning",
+        Kind::Choice(Choice { all: &[("nat", "Natural"), ("temp", "Tempered")], default: 1 }),
+    )
         .help(
             "How notes are held in tune",
             "Natural: in tune at mezzo-forte; the pitch moves with the breath, as in a real bore. Tempered: in tune at every breath.",

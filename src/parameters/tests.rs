@@ -8,6 +8,8 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
     ("full", "Breath", "Full breath", "6.00 kPa", true),
     ("tongue", "Breath", "Tongue", "2.0 ms", true),
     ("legato", "Breath", "Legato", "8.0 ms", true),
+    ("resp", "Breath", "Breath response", "Played", true),
+    ("bcurve", "Breath", "Breath curve", "1.00", true),
     ("stren", "Embouchure", "Reed strength", "2.50", true),
     ("lip", "Embouchure", "Lip opening", "1.000 x", true),
     ("zeta", "Embouchure", "Embouchure zeta", "0.300", true),
@@ -18,7 +20,7 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
     ("reeda", "Reed", "Reed A", "1.000", true),
     ("lay", "Reed", "Lay curve", "0.400", true),
     ("a4", "Tuning", "A4", "440.0 Hz", true),
-    ("tune", "Tuning", "Tuning", "Natural", true),
+    ("tune", "Tuning", "Tuning", "Tempered", true),
     ("temp", "Tuning", "Temperature", "25.0 °C", true),
     ("vent", "Tuning", "Vent loss", "2.00", true),
     ("noise", "Noise", "Breath noise", "30.0 %", true),
@@ -72,6 +74,7 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
 
 /// Ids of choices in saved states. Append only.
 const FROZEN_CHOICES: &[(&str, &[&str])] = &[
+    ("resp", &["play", "phys"]),
     ("tune", &["nat", "temp"]),
     ("knob", &["off", "serial", "midi", "osc"]),
     ("law", &["flow", "press", "free"]),
@@ -138,11 +141,12 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
     let d = Settings::default();
     let mut filled = Settings {
         coupled: !d.coupled,
-        tuning: Tuning::Tempered,
+        tuning: Tuning::Natural,
+        breath_response: BreathResponse::Physical,
         listening: Listening { mode: ListeningMode::Point, ..d.listening },
         ..d
     };
-    let mut fields = 3;
+    let mut fields = 4;
     for (parameter, number) in numbers() {
         let Some(Sets::Number(field)) = parameter.sets else { continue };
         fields += 1;
@@ -157,11 +161,14 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         parameter.set(&mut filled, Value::Number(number.default));
     }
     find("reedc").unwrap().set(&mut filled, Value::Switch(true));
-    find("tune").unwrap().set(&mut filled, Value::Choice(0));
+    find("tune").unwrap().set(&mut filled, Value::Choice(1));
+    find("resp").unwrap().set(&mut filled, Value::Choice(0));
     find("heard").unwrap().set(&mut filled, Value::Choice(0));
     assert_eq!(filled, d, "the table reaches every field");
     // All fields of the settings, each by one parameter.
     let Settings {
+        breath_response: _,
+        breath_curve: _,
         breath_full_kpa: _,
         noise: _,
         tongue_ms: _,
@@ -182,7 +189,7 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         gain_db: _,
         listening: Listening { mode: _, distance_m: _, angle_deg: _, height_m: _, width_deg: _ },
     } = d;
-    assert_eq!(fields, 23);
+    assert_eq!(fields, 25);
 }
 
 #[test]

@@ -107,7 +107,7 @@ impl Parameter {
         match self.kind {
             Kind::Number(number) => format!("{}{}", number.text(number.default), number.unit),
             Kind::Whole(whole) => format!("{}{}", whole.text(whole.default), whole.unit),
-            Kind::Choice(choice) => choice.all[0].1.to_owned(),
+            Kind::Choice(choice) => choice.all[choice.default].1.to_owned(),
             Kind::Switch(switch) => switch.text(switch.default).to_owned(),
             Kind::Status(first) => first.to_owned(),
         }

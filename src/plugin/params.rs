@@ -11,7 +11,7 @@ use nice_plug::prelude::*;
 use crate::editor::WindowState;
 use crate::parameters::{InUse, Number};
 use crate::plugin::host_link::HostLink;
-use chalumeau_core::instrument::{Settings, Tuning};
+use chalumeau_core::instrument::{BreathResponse, Settings, Tuning};
 
 mod entry;
 pub mod instrument;
@@ -94,6 +94,12 @@ pub struct BreathParams {
     /// [`Settings::legato_ms`].
     #[id = "legato"]
     pub legato: FloatParam,
+    /// [`Settings::breath_response`].
+    #[id = "resp"]
+    pub response: EnumParam<ResponseChoice>,
+    /// [`Settings::breath_curve`].
+    #[id = "bcurve"]
+    pub curve: FloatParam,
 }
 
 /// Lip and reed as a player names them.
@@ -198,6 +204,35 @@ impl From<TuningChoice> for Tuning {
     }
 }
 
+/// [`BreathResponse`] as hosts see it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Enum)]
+pub enum ResponseChoice {
+    /// [`BreathResponse::Played`].
+    #[id = "play"]
+    Played,
+    /// [`BreathResponse::Physical`].
+    #[id = "phys"]
+    Physical,
+}
+
+impl From<BreathResponse> for ResponseChoice {
+    fn from(response: BreathResponse) -> Self {
+        match response {
+            BreathResponse::Played => Self::Played,
+            BreathResponse::Physical => Self::Physical,
+        }
+    }
+}
+
+impl From<ResponseChoice> for BreathResponse {
+    fn from(choice: ResponseChoice) -> Self {
+        match choice {
+            ResponseChoice::Played => Self::Played,
+            ResponseChoice::Physical => Self::Physical,
+        }
+    }
+}
+
 impl Default for ChalumeauParams {
     fn default() -> Self {
         Self::new(&state::starting)
@@ -224,6 +259,8 @@ impl ChalumeauParams {
                 full: number("full"),
                 tongue: number("tongue"),
                 legato: number("legato"),
+                response: choice("resp", Settings::default().breath_response.into()),
+                curve: number("bcurve"),
             },
             embouchure: EmbouchureParams {
                 strength: number("stren"),
@@ -268,6 +305,8 @@ impl ChalumeauParams {
     pub fn settings(&self) -> Settings {
         let Self { breath, embouchure, reed, tuning, noise, output, .. } = self;
         let mut settings = Settings {
+            breath_response: breath.response.value().into(),
+            breath_curve: settled(&breath.curve),
             breath_full_kpa: settled(&breath.full),
             noise: settled(&noise.noise),
             tongue_ms: settled(&breath.tongue),

@@ -13,7 +13,7 @@ use crate::support::Told;
 /// What stands where.
 const SLIDERS: &[(Tab, &[&str])] = &[
     (Tab::Reed, &["stren", "lip", "zeta", "damp", "reedh", "reeda", "lay"]),
-    (Tab::Breath, &["breath", "full", "curve", "tongue", "legato", "noise"]),
+    (Tab::Breath, &["breath", "bcurve", "full", "curve", "tongue", "legato", "noise"]),
     (Tab::Sound, &["a4", "noise", "zeta", "lay", "vent", "gain"]),
     (
         Tab::Knob,
@@ -32,6 +32,7 @@ const STUDY_SWITCHES: &[&str] = &["rec", "replay", "study"];
 const STUDY_CHOICES: &[&str] = &["side"];
 const CHOICES: &[(Tab, &[&str])] = &[
     (Tab::Reed, &["rface", "hsrc", "ksrc"]),
+    (Tab::Breath, &["resp"]),
     (Tab::Sound, &["tune", "heard"]),
     (Tab::Knob, &["knob", "law", "order"]),
     (Tab::Instrument, &["tune", "qual"]),
@@ -59,7 +60,7 @@ const MOMENTARY: &[(Tab, &str, &str)] = &[
 #[test]
 fn every_parameter_has_a_place() {
     let host = crate::support::Fake::default();
-    assert_eq!(host.ids().len(), 64);
+    assert_eq!(host.ids().len(), 66);
     let lists = [SLIDERS, SWITCHES, CHOICES].into_iter().flatten().flat_map(|(_, ids)| ids.iter());
     let placed: Vec<&str> = lists
         .chain([STUDY_SLIDERS, STUDY_SWITCHES, STUDY_CHOICES].into_iter().flatten())

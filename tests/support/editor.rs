@@ -16,7 +16,9 @@ use chalumeau::editor::{EditorState, Tab, WindowState, draw};
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::event::Event;
 use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, PlayedReed, RequirementSolver, TorqueLimits};
-use chalumeau_core::instrument::{Clarinet, Listening, ListeningMode, Probe, Settings, Tuning, feel_inputs};
+use chalumeau_core::instrument::{
+    BreathResponse, Clarinet, Listening, ListeningMode, Probe, Settings, Tuning, feel_inputs,
+};
 use chalumeau_core::reed::PhysicalReed;
 use chalumeau_core::units::WrittenNote;
 use egui_kittest::Harness;
@@ -159,6 +161,12 @@ impl Fake {
     /// The parameters as the instrument reads them.
     pub fn settings(&self) -> Settings {
         let settings = Settings {
+            breath_response: if self.plain("resp") > 0.5 {
+                BreathResponse::Physical
+            } else {
+                BreathResponse::Played
+            },
+            breath_curve: self.plain("bcurve"),
             breath_full_kpa: self.plain("full"),
             noise: 0.01 * self.plain("noise"),
             tongue_ms: self.plain("tongue"),
@@ -373,6 +381,8 @@ fn feel_of(bore: &RequirementSolver, reed: &PlayedReed, fingering: usize) -> Res
 
 /// Plays `written` for five seconds, a swell that settles at `gamma`, and looks at the end of it.
 pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot {
+    // Blown by pressure: the pictures show one.
+    let settings = &Settings { breath_response: BreathResponse::Physical, ..*settings };
     let mut clarinet = Clarinet::built_in(RATE_HZ).unwrap();
     clarinet.set_settings(settings);
     let model = clarinet.model().clone();

@@ -4,6 +4,7 @@ pub mod bundle;
 pub mod ci;
 pub mod demo;
 pub mod firmware;
+pub mod fit_player;
 pub mod generated;
 pub mod jack;
 pub mod licences;
@@ -103,6 +104,12 @@ pub const COMMANDS: &[Command] = &[
         about: "play every note of the bundled instruments and find its delay trims; takes the same",
         run: prepared::tune,
         checks: true,
+    },
+    Command {
+        name: "fit-player",
+        about: "fit the player's rule for breath and lip to recorded notes, and validate it on notes left out; takes minutes",
+        run: fit_player::run,
+        checks: false,
     },
     Command {
         name: "wire-vectors",

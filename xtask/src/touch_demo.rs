@@ -18,6 +18,8 @@ use chalumeau_test_host::simulator::{Simulator, serial_number};
 
 /// Frames of a block: what a musician at a computer plays with.
 const BLOCK: usize = 128;
+/// *Breath response*: physical.
+const PHYSICAL: f64 = 1.0;
 /// The hand begins so long before the notes, s: time for the firmware's torque to come up.
 const LEAD_S: f64 = 1.0;
 /// The hand is ahead of the fingers by what it needs to get there and what the link needs to tell, s.
@@ -42,7 +44,7 @@ pub struct Performance {
 /// Plays the notes of a score through the plugin, its breath through the knob.
 pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -> Result<Performance> {
     let feels = InstrumentFeel::built_in().map_err(|reason| anyhow!("{reason}"))?;
-    let table = feels.table(&Settings::default(), &FeelDesign::default(), &TorqueLimits::default())?;
+    let table = feels.table(&Settings::physical(), &FeelDesign::default(), &TorqueLimits::default())?;
     let hand = folder.join("hand.csv");
     std::fs::write(&hand, script(score, &feels, &table, rate))?;
     let log = folder.join("knob.csv");
@@ -65,6 +67,9 @@ pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -
     let rate_hz = f64::from(rate);
     let mut plugin = Plugin::load(clap)?;
     connect(&mut plugin, number)?;
+    // The hand below turns pressures into angles.
+    let response = plugin.param("Breath response")?.id;
+    plugin.set(response, PHYSICAL)?;
     let arm = plugin.param("Arm knob")?.id;
     let status = plugin.param("Knob status")?.id;
     let played = plugin.session(rate_hz, BLOCK, |session| -> Result<_> {
@@ -87,7 +92,7 @@ pub fn play(clap: &Path, folder: &Path, score: &Score, said: &[At], rate: u32) -
     drop(plugin);
     drop(simulator);
 
-    let settings = Settings::default();
+    let settings = Settings::physical();
     let full = 1e3 * f64::from(settings.breath_full_kpa) / settings.closing_pa();
     Ok(Performance {
         left,
@@ -119,7 +124,7 @@ fn breath_sent(session: &Session, first: usize, rate_hz: f64) -> Vec<[f64; 2]> {
 
 /// What the hand does: for each moment the angle that blows what the score asks of the note in the fingers.
 fn script(score: &Score, feels: &InstrumentFeel, table: &FeelTable, rate: u32) -> String {
-    let full_pa = 1e3 * f64::from(Settings::default().breath_full_kpa);
+    let full_pa = 1e3 * f64::from(Settings::physical().breath_full_kpa);
     let maps = feels.maps(table);
     let mut angles = Vec::new();
     let (mut keys, mut breath, mut note, mut next) = (Keys::default(), 0.0, None, 0);

@@ -16,9 +16,11 @@
 //!
 //! const RATE: u32 = 48_000;
 //! let mut clarinet = Clarinet::built_in(f64::from(RATE))?;
+//! // The curve is one of pressure.
+//! clarinet.set_settings(&Settings::physical());
 //! // Written E3 to G3 on a B flat clarinet, slurred, 0.2 s each, with a crescendo.
 //! let score = Score::scale(WrittenNote(52), WrittenNote(55), 2, 0.2, true, RATE)?;
-//! let score = score.blown(&BreathCurve::parse_crescendo("0.45:0.8")?, &Settings::default(), RATE);
+//! let score = score.blown(&BreathCurve::parse_crescendo("0.45:0.8")?, &Settings::physical(), RATE);
 //!
 //! let mut samples = Vec::new();
 //! play(&mut clarinet, &score, 512, |block| {

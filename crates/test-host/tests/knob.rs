@@ -203,7 +203,11 @@ fn a_take_is_replayed_the_same_by_plugin_and_renderer() {
 
     let feels = InstrumentFeel::built_in().unwrap();
     let table = feels.table(&Settings::default(), &FeelDesign::default(), &NO_MOTOR).unwrap();
-    let hand = BreathMapping { maps: feels.maps(&table), design: KnobDesign::default(), feels: true };
+    let hand = BreathMapping {
+        maps: feels.maps_for(&table, &Settings::default()),
+        design: KnobDesign::default(),
+        feels: true,
+    };
     let take = Take::read(std::fs::File::open(&path).unwrap()).unwrap();
     let note =
         |at, key| Timed { at, event: Event::NoteOn { note: SoundingNote(key), velocity: 100.0 / 127.0 } };

@@ -119,7 +119,8 @@ impl KnobAudio {
         let Ok(table) = feels.table(&params.settings(), &feel_design(&params.knob), &NO_MOTOR) else {
             return;
         };
-        let hand = BreathMapping { maps: feels.maps(&table), design: knob_design(&params.knob), feels: true };
+        let maps = feels.maps_for(&table, &params.settings());
+        let hand = BreathMapping { maps, design: knob_design(&params.knob), feels: true };
         self.prepared = Some(PreparedReplay { hand, take });
     }
 

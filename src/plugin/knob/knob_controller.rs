@@ -236,7 +236,7 @@ impl KnobController {
         self.short_breath = short_breath(&settings);
         match feels.table(&settings, &design, &limits) {
             Ok(table) => {
-                self.hand.maps = feels.maps(&table);
+                self.hand.maps = feels.maps_for(&table, &settings);
                 self.hand_in.write(self.hand);
                 if let Ok(mut feel) = self.shared.feel.lock() {
                     *feel = Some(Arc::new((feels, table)));

@@ -13,9 +13,14 @@ use crate::parameters::{Kind, Number, PARAMETERS, Parameter};
 use crate::plugin::launch_options::LaunchOptions;
 
 /// Layout of the saved state. 1: ids and units as below. 2: the instrument and its file, the physical reed; a state of 1
-/// is the B flat clarinet. 3: listening; a state of 1 or 2 is heard as from one point.
+/// is the B flat clarinet. 3: listening and the breath response; a state of 1 or 2 is heard as from one point, its breath is
+/// physical and its tuning natural, unless it says otherwise.
 pub const SCHEMA: u32 = 3;
 const SCHEMA_FIELD: &str = "schema";
+/// First layout with a breath response and a way of listening.
+const WITH_RESPONSE: u32 = 3;
+/// Choices that meant something else before [`WITH_RESPONSE`], or were not there: id, and what it was.
+const BEFORE_RESPONSE: [(&str, &str); 3] = [("resp", "phys"), ("tune", "nat"), ("heard", "point")];
 
 /// A number's default in this process: the table's, or what the program was started with.
 pub(super) fn starting(id: &str, number: &Number) -> f32 {
@@ -30,10 +35,13 @@ pub(super) fn starting(id: &str, number: &Number) -> f32 {
 pub fn mend(state: &mut PluginState) {
     let mut old = std::mem::take(&mut state.params);
     keep_the_feel(&mut old);
-    let schema: Option<u32> = state.fields.get(SCHEMA_FIELD).and_then(|text| text.parse().ok());
-    if schema.is_some_and(|schema| schema < 3) {
+    // A state without a layout, or with a broken one, was written by hand: it means what a new one does.
+    let schema = state.fields.get(SCHEMA_FIELD).and_then(|text| text.parse::<u32>().ok());
+    if schema.is_some_and(|schema| schema < WITH_RESPONSE) {
         // What was saved then goes on sounding as it did.
-        old.entry("heard".to_owned()).or_insert_with(|| ParamValue::String("point".to_owned()));
+        for (id, was) in BEFORE_RESPONSE {
+            old.entry(id.to_owned()).or_insert_with(|| ParamValue::String(was.to_owned()));
+        }
     }
     for parameter in PARAMETERS {
         let value = mended(parameter, old.remove(parameter.id));
@@ -91,7 +99,7 @@ fn mended(parameter: &Parameter, saved: Option<ParamValue>) -> ParamValue {
         }),
         Kind::Choice(choice) => ParamValue::String(match saved {
             Some(ParamValue::String(value)) if choice.all.iter().any(|(id, _)| *id == value) => value,
-            _ => choice.all[0].0.to_owned(),
+            _ => choice.all[choice.default].0.to_owned(),
         }),
         Kind::Status(_) => ParamValue::Bool(false),
     }
@@ -112,6 +120,30 @@ fn mend_field<T: Default + Serialize + DeserializeOwned>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_old_project_is_played_as_it_was() {
+        let choices = |schema: Option<u32>, tune: Option<&str>| {
+            let params = tune.map(|id| ("tune".to_owned(), ParamValue::String(id.to_owned())));
+            let fields = schema.map(|schema| (SCHEMA_FIELD.to_owned(), schema.to_string()));
+            let mut state = PluginState {
+                version: String::new(),
+                params: params.into_iter().collect(),
+                fields: fields.into_iter().collect(),
+            };
+            mend(&mut state);
+            ["resp", "tune"].map(|id| match &state.params[id] {
+                ParamValue::String(choice) => choice.clone(),
+                _ => String::new(),
+            })
+        };
+        for schema in [1, 2] {
+            assert_eq!(choices(Some(schema), None), ["phys", "nat"]);
+            assert_eq!(choices(Some(schema), Some("temp")), ["phys", "temp"]);
+        }
+        assert_eq!(choices(Some(3), None), ["play", "temp"]);
+        assert_eq!(choices(None, Some("nat")), ["play", "nat"]);
+    }
 
     #[test]
     fn any_state_is_mended() {
@@ -146,7 +178,7 @@ mod tests {
         assert!(matches!(state.params["zeta"], ParamValue::F32(0.3)));
         assert!(matches!(state.params["lip"], ParamValue::F32(1.0)));
         assert!(matches!(state.params["reedc"], ParamValue::Bool(false)));
-        assert!(matches!(&state.params["tune"], ParamValue::String(id) if id == "nat"));
+        assert!(matches!(&state.params["tune"], ParamValue::String(id) if id == "temp"));
         assert_eq!(state.fields["schema"], SCHEMA.to_string());
         for id in ["arm", "rec"] {
             assert!(

@@ -35,13 +35,14 @@ fn hosts_see_the_table() {
 #[test]
 fn choices_have_the_ids_and_texts_of_the_table() {
     fn same<T: Enum>(id: &str) {
-        let Some(Kind::Choice(Choice { all })) = find(id).map(|p| p.kind) else {
+        let Some(Kind::Choice(Choice { all, .. })) = find(id).map(|p| p.kind) else {
             panic!("{id} is no choice")
         };
         assert_eq!(T::variants(), all.iter().map(|(_, text)| *text).collect::<Vec<_>>(), "{id}");
         assert_eq!(T::ids().unwrap(), all.iter().map(|(id, _)| *id).collect::<Vec<_>>(), "{id}");
     }
     same::<TuningChoice>("tune");
+    same::<ResponseChoice>("resp");
     same::<KnobKind>("knob");
     same::<LawChoice>("law");
     same::<OrderChoice>("order");

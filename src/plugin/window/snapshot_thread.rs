@@ -130,7 +130,7 @@ impl SnapshotThread {
             .unwrap_or_else(|| file.fingerings[fingering].open.clone());
         snapshot.fingering = fingering;
         snapshot.openings = open.iter().map(|&open| f32::from(u8::from(open))).collect();
-        snapshot.requirement = analysis.requirement(fingering, &snapshot.settings);
+        snapshot.requirement = analysis.requirement(fingering, &snapshot.played());
         snapshot.feel = analysis.feel(fingering, &snapshot.settings, &design);
         snapshot.standing = analysis.standing_wave(fingering, &open);
         snapshot.instrument = file;
@@ -227,6 +227,7 @@ impl SnapshotThread {
 fn show_inside(snapshot: &mut Snapshot, inside: &AudioSnapshot) {
     snapshot.sounding = inside.now.sounding;
     snapshot.mouth_kpa = inside.now.mouth_kpa;
+    snapshot.lip = inside.now.lip;
     snapshot.sources = source_views(&inside.breath_sources, inside.now.sounding.is_some());
     snapshot.latency_ms = (1e3 * f64::from(inside.latency_samples) / inside.host_rate_hz) as f32;
     snapshot.scope = MouthpieceTraces {

@@ -107,7 +107,9 @@ impl Wander {
         let hop = (HOP_S * rate_hz).round() as usize;
         let level: Vec<f64> = segment
             .chunks_exact(4 * hop)
-            .map(|part| 10.0 * (part.iter().map(|x| x * x).sum::<f64>() / part.len() as f64).max(1e-30).log10())
+            .map(|part| {
+                10.0 * (part.iter().map(|x| x * x).sum::<f64>() / part.len() as f64).max(1e-30).log10()
+            })
             .flat_map(|db| [db; 4])
             .collect();
         Some(Self {
@@ -172,10 +174,12 @@ mod tests {
             // Frequency f0 (1 + e sin 2 pi r t), e = cents * ln 2 / 1200.
             let e = depth_cents * std::f64::consts::LN_2 / 1_200.0;
             let cycles = |t: f64| f0_hz * t - f0_hz * e / (TAU * rate) * (TAU * rate * t).cos();
-            let wander =
-                Wander::measure(&glide(cycles, RATE_HZ, 4.0, &CLARINET_DB), RATE_HZ, f0_hz).unwrap();
-            let (inside, outside) =
-                if slow { (wander.slow_cents, wander.fast_cents) } else { (wander.fast_cents, wander.slow_cents) };
+            let wander = Wander::measure(&glide(cycles, RATE_HZ, 4.0, &CLARINET_DB), RATE_HZ, f0_hz).unwrap();
+            let (inside, outside) = if slow {
+                (wander.slow_cents, wander.fast_cents)
+            } else {
+                (wander.fast_cents, wander.slow_cents)
+            };
             assert!((inside - depth_cents / 2.0_f64.sqrt()).abs() < 0.2, "{rate} Hz: {wander:?}");
             assert!(outside < 0.1, "{rate} Hz: {wander:?}");
         }

@@ -81,9 +81,7 @@ fn difference(samples: &[f64], window: usize, longest: usize) -> Vec<f64> {
         sum
     }));
     let power = |lag: usize| energy[window + lag] - energy[lag];
-    (0..=longest)
-        .map(|lag| (power(0) + power(lag) - 2.0 * correlation[lag] / size as f64).max(0.0))
-        .collect()
+    (0..=longest).map(|lag| (power(0) + power(lag) - 2.0 * correlation[lag] / size as f64).max(0.0)).collect()
 }
 
 #[cfg(test)]

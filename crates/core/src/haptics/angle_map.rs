@@ -30,6 +30,15 @@ impl AngleMap {
         along(&self.angle_deg, &self.pressure_pa, angle_deg)
     }
 
+    /// The same angles for breath that is no pressure: the onset is at `onset_pa` and `full_pa` stays, with straight lines between.
+    /// Real-time safe.
+    pub fn with_onset(&self, onset_pa: f64, full_pa: f64) -> Self {
+        let own = self.pressure_pa[1];
+        let above = (full_pa - onset_pa) / (full_pa - own).max(1.0);
+        let moved = |pa: f64| if pa <= own { pa * onset_pa / own } else { onset_pa + (pa - own) * above };
+        Self { angle_deg: self.angle_deg, pressure_pa: self.pressure_pa.map(moved) }
+    }
+
     /// Angle from rest, degrees, at which the mouth pressure is `pressure_pa`; 0 at and below 0 Pa, and for NaN. Real-time
     /// safe.
     pub fn angle_deg(&self, pressure_pa: f64) -> f64 {
@@ -66,6 +75,15 @@ mod tests {
             assert!((map.angle_deg(pressure) - angle).abs() < 1e-9, "{angle}");
         }
         assert_eq!((map.pressure_pa(-50.0), map.pressure_pa(f64::NAN)), (0.0, 0.0));
+    }
+
+    #[test]
+    fn a_moved_onset_keeps_its_angle_and_full_breath() {
+        let map = AngleMap::new([(120.0, 2_350.0), (360.0, 6_000.0), (700.0, 11_700.0)]);
+        let moved = map.with_onset(189.0, 6_000.0);
+        assert!((moved.pressure_pa(120.0) - 189.0).abs() < 1e-9 && moved.pressure_pa(60.0) < 100.0);
+        assert!((moved.pressure_pa(360.0) - 6_000.0).abs() < 1e-9);
+        assert!((moved.angle_deg(moved.pressure_pa(200.0)) - 200.0).abs() < 1e-9);
     }
 
     #[test]

@@ -11,6 +11,7 @@
 //! instrument's processor time.
 
 use crate::instrument::model::Model;
+use crate::instrument::settings::BreathResponse;
 
 /// Farthest that the lip bends a note, either way, cents. Players go further down than up; this is what the delay can do
 /// in every register while the same mode speaks.
@@ -49,12 +50,16 @@ impl BendSplit {
     }
 }
 
-/// How far the lip may bend a fingering's note towards `offset_cents` (up if positive, else down), cents, 0 or more.
-/// Real-time safe.
-pub fn lip_limit_cents(model: &Model, fingering: usize, offset_cents: f64) -> f64 {
+/// How far the lip may bend a fingering's note towards `offset_cents` (up if positive, else down), cents, 0 or more, beside the
+/// trims of this response to breath. Real-time safe.
+pub fn lip_limit_cents(model: &Model, fingering: usize, offset_cents: f64, response: BreathResponse) -> f64 {
     let Some(note) = model.tuning.notes.get(fingering) else { return 0.0 };
     let (shortest, longest) = model.coeffs.tuning_range();
-    let trims = note.tempered.into_iter().chain([note.natural]);
+    let follows: &[f64] = match response {
+        BreathResponse::Physical => &note.tempered,
+        BreathResponse::Played => &note.played.rows,
+    };
+    let trims = follows.iter().copied().chain([note.natural]);
     let room = if offset_cents > 0.0 {
         trims.fold(f64::INFINITY, f64::min) - shortest
     } else {
@@ -103,16 +108,18 @@ mod tests {
     #[test]
     fn lip_reaches_its_limit_where_the_bore_allows_it() {
         let model = Model::built_in(48_000.0).unwrap();
-        let limits = |side: f64| -> Vec<f64> {
-            (0..model.notes_hz.len()).map(|note| lip_limit_cents(&model, note, side)).collect()
-        };
-        let (up, down) = (limits(1.0), limits(-1.0));
-        println!("up {up:.0?}\ndown {down:.0?}");
-        assert!(up.iter().chain(&down).all(|limit| (10.0..=LIP_CENTS).contains(limit)));
-        for (note, limit) in up.into_iter().enumerate() {
-            let trim = model.tuning.notes[note];
-            let rows = trim.natural + trim.sensitivity * model.rows_for_cents(note, limit);
-            assert!(rows > model.coeffs.tuning_range().0, "note {note}");
+        for response in [BreathResponse::Physical, BreathResponse::Played] {
+            let limits = |side: f64| -> Vec<f64> {
+                (0..model.notes_hz.len()).map(|note| lip_limit_cents(&model, note, side, response)).collect()
+            };
+            let (up, down) = (limits(1.0), limits(-1.0));
+            println!("{response:?}: up {up:.0?}\ndown {down:.0?}");
+            assert!(up.iter().chain(&down).all(|limit| (10.0..=LIP_CENTS).contains(limit)));
+            for (note, limit) in up.into_iter().enumerate() {
+                let trim = model.tuning.notes[note];
+                let rows = trim.natural + trim.sensitivity * model.rows_for_cents(note, limit);
+                assert!(rows > model.coeffs.tuning_range().0, "note {note}");
+            }
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::instrument::voice::{Drive, TICK, Voice};
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
 use crate::reed::motion::TONGUE_FORCE;
+use crate::reed::physical::ZETA_REFERENCE;
 use crate::reed::{MovingReed, ReedCoeffs};
 
 /// How a held note begins.
@@ -30,6 +31,8 @@ pub struct HeldNote {
     pub fingering: usize,
     /// Mouth pressure over the closing pressure.
     pub gamma: f64,
+    /// Law of the reed.
+    pub law: ReedLaw,
     /// Embouchure parameter zeta, the flow strength of the reed.
     pub zeta: f64,
     /// Half-width of the knee of the lay, 0 (sharp)..=0.5.
@@ -53,7 +56,8 @@ impl HeldNote {
         Self {
             fingering,
             gamma,
-            zeta: 0.3,
+            law: ReedLaw::default(),
+            zeta: ZETA_REFERENCE,
             lay: 0.4,
             damping: 1.0,
             jet_loss: 2.0,
@@ -63,14 +67,20 @@ impl HeldNote {
         }
     }
 
+    /// A fingering under the lip that a player has at a dynamic, 0..=1.
+    pub fn played(model: &Model, fingering: usize, dynamic: f64, gamma: f64) -> Self {
+        let lip = model.player.lip(model.place(fingering), dynamic);
+        let law = lip.law(ReedLaw::default());
+        Self { law, zeta: ZETA_REFERENCE * lip.channel, ..Self::new(model, fingering, gamma) }
+    }
+
     /// The reed under the lip of this note.
     pub fn reed(&self, model: &Model) -> ReedCoeffs {
         let lip = embouchure(model.notes_hz[self.fingering], model.lowest_hz);
-        let law = ReedLaw::default();
         let damping = lip.damping * self.damping;
         ReedCoeffs::new(
             MovingReed {
-                law,
+                law: self.law,
                 zeta: self.zeta,
                 lay: self.lay,
                 resonance_hz: lip.resonance_hz,
@@ -94,7 +104,7 @@ impl HeldNote {
         voice
     }
 
-    /// Mouth pressure and tongue force at `t` seconds, over the closing pressure.
+    /// Mouth pressure and tongue force at `t` seconds, over the closing pressure of this reed.
     pub fn breath(&self, t: f64) -> (f64, f64) {
         match self.start {
             Start::Ramp(ms) => (self.gamma * (t / (1e-3 * ms)).min(1.0), 0.0),
@@ -109,10 +119,11 @@ impl HeldNote {
     pub fn play(&self, model: &Model, seconds: f64, mut heard: impl FnMut(&[f32; TICK], &Voice<f32>)) {
         let mut voice: Voice<f32> = self.voice(model);
         let reed = self.reed(model);
-        let rate = model.coeffs.rate_hz;
+        let (rate, closing) = (model.coeffs.rate_hz, reed.closing_pressure());
         let ticks = (seconds * rate / TICK as f64).round() as usize;
         for tick in 0..ticks {
             let (p_mouth, tongue) = self.breath((tick + 1) as f64 * TICK as f64 / rate);
+            let (p_mouth, tongue) = (p_mouth * closing, tongue * closing);
             let out = *voice.tick(&Drive { p_mouth, tongue, noise: self.noise, reed });
             heard(&out, &voice);
         }

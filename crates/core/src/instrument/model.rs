@@ -10,6 +10,7 @@ use crate::bore::cells::networks;
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::lattice::LatticeCoeffs;
 use crate::instrument::concert_pitch::A4_HZ;
+use crate::instrument::player::dynamics::PlayerModel;
 use crate::instrument::tuning_table::TuningTable;
 use crate::reed::PhysicalReed;
 use crate::reed::physical::{P_REF_PA, REFERENCE_VOLUME_M3};
@@ -41,6 +42,8 @@ pub struct Model {
     pub coeffs: Arc<LatticeCoeffs>,
     /// Delay trims of each note, for [`a4_hz`](Self::a4_hz).
     pub tuning: TuningTable,
+    /// What lip and breath do at a dynamic.
+    pub player: PlayerModel,
     /// Pitch of A4 that the instrument is tuned to, Hz.
     pub a4_hz: f64,
     /// Length of the bore over that of its file. Other than 1 for another A4, or where the delay alone could not tune the
@@ -112,6 +115,7 @@ impl Model {
             coeffs,
             cells,
             tuning,
+            player: PlayerModel::FITTED,
             a4_hz,
             scale,
             air,
@@ -141,6 +145,11 @@ impl Model {
         silent
             .filter_map(|fingering| self.file.fingerings[fingering].written.sounding(self.file.transposition))
             .collect()
+    }
+
+    /// Place of a fingering's note over the lowest note, see [`PlayerModel::place`]. Real-time safe.
+    pub fn place(&self, fingering: usize) -> f64 {
+        PlayerModel::place(self.notes_hz[fingering], self.lowest_hz)
     }
 
     /// Rows of round-trip delay that move a fingering's note by `cents`, estimated from the note's quarter-wave length.

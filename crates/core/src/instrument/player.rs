@@ -1,15 +1,19 @@
 //! The player: turns notes, breath and settings into holes, lip, tongue and mouth pressure, tick by tick.
 //!
-//! `breath` makes the mouth pressure from a breath source or from key velocity. `tongue` articulates: overlapping
-//! notes are slurred (the holes move and the tongue stays away); after a gap the tongue holds the reed while the breath
-//! rises behind it, and lets go. `fingers` moves the holes, `tuning` the pitch, and `posture` holds what settings,
-//! fingering and bend ask for.
+//! `breath` follows a breath source or key velocity, and [`response`] makes a mouth pressure of it: directly, or by the rule in
+//! [`dynamics`] that moves breath and lip together. `tongue` articulates: overlapping notes are slurred (the holes move and
+//! the tongue stays away); after a gap the tongue holds the reed while the breath rises behind it, and lets go. `fingers`
+//! moves the holes, `tuning` the pitch, and `posture` holds what settings, fingering and bend ask for.
 
 mod breath;
 mod carry_on;
+pub mod dynamics;
 mod fingers;
+mod fitted;
+mod onset_shift;
 mod posture;
 mod reed_smoothing;
+pub mod response;
 mod tongue;
 mod tuning;
 
@@ -22,9 +26,11 @@ use crate::instrument::voice::{Drive, TICK, Voice};
 use crate::reed::physical::P_REF_PA;
 use crate::units::{SoundingNote, cents};
 use breath::Breath;
+use dynamics::LipShape;
 use fingers::Fingers;
 use posture::{Lags, Posture};
 use reed_smoothing::ReedSmoothing;
+use response::Response;
 use tongue::Tongue;
 use tuning::PlayedTuning;
 
@@ -55,6 +61,8 @@ pub struct PlayerState {
     pub fingering: usize,
     /// Mouth pressure, kPa.
     pub mouth_kpa: f32,
+    /// How a player's lip shapes the reed; `None` where the breath is physical.
+    pub lip: Option<LipShape>,
 }
 
 /// One player of one instrument.
@@ -65,6 +73,7 @@ pub struct Player {
     posture: Option<Posture>,
     keys: Keys,
     breath: Breath,
+    response: Response,
     tongue: Tongue,
     fingers: Fingers,
     tuning: PlayedTuning,
@@ -108,6 +117,7 @@ impl Player {
             sounding: self.keys.last(),
             fingering: self.fingers.fingering().unwrap_or(0),
             mouth_kpa: (1e-3 * P_REF_PA * self.closing() * self.breath.gamma()) as f32,
+            lip: self.posture.as_ref().and_then(Posture::lip),
         }
     }
 
@@ -235,14 +245,18 @@ impl Player {
         }
         let settings = self.settings.with_reed_factors(self.reed.factors());
         let fingering = self.fingers.fingering();
-        let posture = *self.posture.get_or_insert_with(|| {
+        let posture = self.posture.get_or_insert_with(|| {
             voice.lattice_mut().set_jet_loss(f64::from(settings.vent_loss));
             Posture::new(&settings, fingering.unwrap_or(0), self.bend_cents, tick_s, model)
         });
+        let (key_down, tongue_holds) = (!self.keys.is_empty(), self.tongue.is_holding());
+        let asked = self.breath.asked(key_down);
+        let target = self.response.tick(asked, tongue_holds, &settings, posture);
+        let posture = *posture;
         let context = TickContext { tick_s, settings: &settings, posture: &posture };
         let lattice = voice.lattice_mut();
 
-        self.breath.tick(!self.keys.is_empty(), self.tongue.is_holding(), &context);
+        self.breath.tick(target, key_down, tongue_holds, &context);
         let gamma = self.breath.gamma();
         let (p_mouth, tongue) = self.tongue.tick(gamma, self.breath.attack_hardness(), &context);
         if self.tuning.tick(fingering, gamma, &context, model, lattice) {

@@ -22,6 +22,8 @@
 pub mod auto_tune;
 mod bundled;
 mod cut_and_fit;
+#[cfg(feature = "fit")]
+mod play_dynamics;
 mod prepared_file;
 #[cfg(feature = "fit")]
 mod scale;

@@ -1,27 +1,41 @@
 //! What a player can set, as plain numbers in the units that a player uses. They are clamped once, where they come in.
 
 use crate::instrument::listening::Listening;
+use crate::instrument::player::dynamics::LipShape;
 use crate::reed::ReedLaw;
 use crate::reed::law::coupled_k;
 use crate::reed::physical::{DimensionlessReed, P_REF_PA, PhysicalReed};
 use crate::reed::strength;
 
+/// What a breath source sets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum BreathResponse {
+    /// The dynamic, as a player does: the [rule](crate::instrument::player::dynamics) moves breath and lip together, every note
+    /// begins at the same small breath, and equal steps of breath are equal steps of level.
+    #[default]
+    Played,
+    /// The mouth pressure, as a blowing machine does: a share of [`Settings::breath_full_kpa`], on a lip that stays.
+    Physical,
+}
+
 /// How the tuning delay follows the breath.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Tuning {
     /// One trim per note, right at gamma 0.5: the pitch moves with the dynamics as the bore makes it.
-    #[default]
     Natural,
-    /// The trim follows the breath, so that each note stays in tune from gamma 0.45 to 0.9.
+    /// The trim follows the breath, so that each note stays in tune at every dynamic, or from gamma 0.45 to 0.9 where the
+    /// breath is [physical](BreathResponse::Physical).
+    #[default]
     Tempered,
 }
 
-/// Everything that can be set while playing. `Default` is the reference clarinet.
+/// Everything that can be set while playing. `Default` is the reference clarinet as a player plays it;
+/// [`physical`](Self::physical) is the same blown by a machine.
 ///
 /// ```
 /// use chalumeau_core::instrument::{Clarinet, Settings, Tuning};
 ///
-/// let settings = Settings { strength: 3.0, tuning: Tuning::Tempered, ..Settings::default() };
+/// let settings = Settings { strength: 3.0, tuning: Tuning::Natural, ..Settings::default() };
 /// // A harder reed closes at a higher pressure: 20 % for half a number.
 /// assert!((settings.closing_pa() / Settings::default().closing_pa() - 1.2).abs() < 1e-6);
 /// Clarinet::built_in(48_000.0)?.set_settings(&settings);
@@ -29,7 +43,12 @@ pub enum Tuning {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Mouth pressure at full breath, kPa, 2..=20. Default 6, the reference reed's closing pressure.
+    /// What a breath source sets. Default [`BreathResponse::Played`].
+    pub breath_response: BreathResponse,
+    /// Curve of the played response, 0.5..=2: the dynamic is the share of breath above the threshold to this power. Default 1.
+    pub breath_curve: f32,
+    /// Mouth pressure at full breath where the response is physical, kPa, 2..=20. Default 6, the reference reed's closing
+    /// pressure.
     pub breath_full_kpa: f32,
     /// Breath noise, 0 (none)..=1 (much). Default 0.3, by ear.
     pub noise: f32,
@@ -58,7 +77,7 @@ pub struct Settings {
     pub reed_a: f32,
     /// Pitch of A4, Hz, 415..=466. Default 440.
     pub a4_hz: f32,
-    /// How the tuning delay follows the breath. Default [`Tuning::Natural`].
+    /// How the tuning delay follows the breath. Default [`Tuning::Tempered`].
     pub tuning: Tuning,
     /// Air temperature, Celsius, 10..=40. The instrument is tuned at 25, the default; the pitch rises by 3 cents a kelvin.
     pub temperature_c: f32,
@@ -73,6 +92,8 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
+            breath_response: BreathResponse::Played,
+            breath_curve: 1.0,
             breath_full_kpa: 6.0,
             noise: 0.3,
             tongue_ms: 2.0,
@@ -87,7 +108,7 @@ impl Default for Settings {
             coupled: true,
             reed_a: 1.0,
             a4_hz: 440.0,
-            tuning: Tuning::Natural,
+            tuning: Tuning::Tempered,
             temperature_c: 25.0,
             vent_loss: 2.0,
             gain_db: 0.0,
@@ -97,6 +118,12 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// The reference clarinet blown by a machine: breath is mouth pressure, and the pitch moves with it as the bore makes it.
+    /// For measurements.
+    pub fn physical() -> Self {
+        Self { breath_response: BreathResponse::Physical, tuning: Tuning::Natural, ..Self::default() }
+    }
+
     /// The law of the reed under these settings: strength sets the stiffness, the lip the opening. Real-time safe.
     pub fn reed_law(&self) -> ReedLaw {
         let settings = self.clamped();
@@ -115,6 +142,21 @@ impl Settings {
             return self;
         }
         Self { reed_h: self.reed_h * h, reed_k: self.reed_k * k, ..self }.clamped()
+    }
+
+    /// These settings with the reed as a player's lip shapes it: what meters and drawings of the played reed need. Real-time
+    /// safe.
+    pub fn under_lip(self, lip: Option<LipShape>) -> Self {
+        let Some(lip) = lip else { return self };
+        let k = if self.coupled { coupled_k(f64::from(self.reed_h)) as f32 } else { self.reed_k };
+        Self {
+            reed_h: self.reed_h * lip.opening as f32,
+            reed_k: k * lip.stiffness as f32,
+            coupled: false,
+            zeta: self.zeta * lip.channel as f32,
+            ..self
+        }
+        .clamped()
     }
 
     /// The reed in maker's quantities as it lies in its case: from H, k, A and zeta as they are set, without strength and
@@ -192,6 +234,8 @@ impl Settings {
             if x.is_finite() { x.clamp(low, high) } else { default }
         };
         Self {
+            breath_response: self.breath_response,
+            breath_curve: fix(self.breath_curve, 0.5, 2.0, d.breath_curve),
             breath_full_kpa: fix(self.breath_full_kpa, 2.0, 20.0, d.breath_full_kpa),
             noise: fix(self.noise, 0.0, 1.0, d.noise),
             tongue_ms: fix(self.tongue_ms, 1.0, 20.0, d.tongue_ms),
@@ -248,6 +292,15 @@ mod tests {
         near(played.tip_opening_m, 0.8 * 0.6e-3);
         near(played.closing_pa(), set.closing_pa());
         near(strength::of_stiffness(played.stiffness_n_m / 2_000.0), 3.0);
+    }
+
+    #[test]
+    fn a_lip_moves_the_closing_pressure_by_its_factors() {
+        let lip = LipShape { opening: 0.8, stiffness: 1.5, channel: 1.2 };
+        let shaped = Settings::default().under_lip(Some(lip));
+        assert!((shaped.closing_pa() / (1.2 * Settings::default().closing_pa()) - 1.0).abs() < 1e-6);
+        assert!((shaped.zeta - 0.36).abs() < 1e-6);
+        assert_eq!(Settings::default().under_lip(None), Settings::default());
     }
 
     #[test]

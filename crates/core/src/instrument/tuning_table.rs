@@ -6,6 +6,7 @@
 //! are not harmonic and the pitch sags as the reed begins to beat.
 
 use crate::bore::instrument_file::{Fingering, InstrumentFile};
+use crate::instrument::played_note::PlayedNote;
 use crate::instrument::settings::Tuning;
 
 /// Nodes of the tempered trims: mouth pressures over the closing pressure.
@@ -33,6 +34,9 @@ pub struct NoteTuning {
     /// True if the note sounds in its register at one of these pressures or at none; its trims are those of its neighbours.
     #[serde(default, skip_serializing_if = "is_false")]
     pub silent: bool,
+    /// Mouth pressures and trims at the dynamics of a player.
+    #[serde(default)]
+    pub played: PlayedNote,
 }
 
 fn is_zero(x: &f64) -> bool {

@@ -21,8 +21,10 @@ const FLUSH_TICKS: u32 = 64;
 /// One sample of the inside of the instrument, at the internal rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Probe {
-    /// Mouth pressure over the closing pressure of the reed as it is set.
+    /// Mouth pressure over the closing pressure of the reed as the lip has it.
     pub gamma: f64,
+    /// That closing pressure, Pa.
+    pub closing_pa: f64,
     /// Reed opening over the rest opening, 0 closed, 1 at rest.
     pub opening: f64,
     /// Volume flow through the reed channel, m3/s.
@@ -31,6 +33,16 @@ pub struct Probe {
     pub p_mouthpiece_pa: f64,
     /// Radiated pressure as it is heard, in the left channel of two, Pa.
     pub p_radiated_pa: f64,
+}
+
+impl Probe {
+    /// The same with `gamma` over another closing pressure, Pa: one that a moving lip does not change.
+    pub fn over(self, closing_pa: f64) -> Self {
+        if self.closing_pa == closing_pa || self.closing_pa == 0.0 {
+            return self;
+        }
+        Self { gamma: self.gamma * self.closing_pa / closing_pa, closing_pa, ..self }
+    }
 }
 
 /// What breath, lip and tongue do during one control tick. Pressures are over the reference closing pressure.
@@ -115,6 +127,7 @@ impl<F: Real> Tip<F> for Mouth<F> {
         if let Some(probes) = &mut self.probes {
             probes[self.at & (TICK - 1)] = Probe {
                 gamma: self.p_mouth / self.reed.closing_pressure(),
+                closing_pa: self.reed.closing_pressure() * P_REF_PA,
                 opening: self.state.opening,
                 flow_m3s: self.state.flow * self.flow_unit,
                 p_mouthpiece_pa: self.state.p_mouthpiece * P_REF_PA,
@@ -217,7 +230,7 @@ impl<F: Real> Voice<F> {
         mouth.at = 0;
         let lattice = &self.lattice;
         mouth.outside.heed(lattice.is_moving(), |hole| lattice.is_open(hole));
-        mouth.noise.fill(drive.noise);
+        mouth.noise.fill(drive.noise, mouth.state.flow);
         self.lattice.run(TICK, mouth);
         if let Some(probes) = &mut mouth.probes {
             for (probe, &pressure) in probes.iter_mut().zip(mouth.outside.heard().0) {

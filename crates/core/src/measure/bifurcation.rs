@@ -6,7 +6,7 @@
 //! moving ramp passes a threshold before the note has grown (Bergeot, Almeida, Vergez & Gazengel 2013); a slower ramp
 //! passes it by less.
 
-use crate::instrument::{Clarinet, Model, Probe, Settings};
+use crate::instrument::{BreathResponse, Clarinet, Model, Probe, Settings};
 use crate::reed::motion::SHUT;
 use crate::score::breath::BreathCurve;
 use crate::score::{Score, play_probed};
@@ -84,7 +84,7 @@ impl BifurcationDiagram {
 
 /// Plays `note` while gamma goes from 0 to `gamma_max` and back, `seconds` each way. Allocates.
 ///
-/// `settings` must let full breath reach `gamma_max` (`breath_full_kpa`). `rate` is the host's sample rate, Hz. `each` is
+/// The breath is physical whatever `settings` say; they must let full breath reach `gamma_max` (`breath_full_kpa`). `rate` is the host's sample rate, Hz. `each` is
 /// called after every block with its number of samples, to show progress.
 pub fn measure(
     model: &Arc<Model>,
@@ -96,6 +96,7 @@ pub fn measure(
     mut each: impl FnMut(usize),
 ) -> BifurcationDiagram {
     let mut clarinet = Clarinet::new(model.clone(), f64::from(rate));
+    let settings = &Settings { breath_response: BreathResponse::Physical, ..*settings };
     clarinet.set_settings(settings);
     clarinet.reset();
     let score =
@@ -187,7 +188,7 @@ mod tests {
     #[test]
     fn a_low_note_begins_above_a_third_and_beats_near_one_half_on_a_sharp_lay() {
         let model = Arc::new(Model::built_in(48_000.0).unwrap());
-        let settings = Settings { breath_full_kpa: 20.0, lay: 0.0, ..Settings::default() };
+        let settings = Settings { breath_full_kpa: 20.0, lay: 0.0, ..Settings::physical() };
         let mut samples = 0;
         let found = measure(&model, &settings, SoundingNote(50), 0.8, 4.0, 48_000, |block| samples += block);
         assert_eq!(samples, 8 * 48_000);

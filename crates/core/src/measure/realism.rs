@@ -146,8 +146,9 @@ impl NoteScore {
     pub fn new(recorded: RecordedNote, played: Option<SteadyNote>) -> Self {
         let wanted_hz = SoundingNote(recorded.midi).frequency_hz(440.0);
         let played = played.filter(|played| cents(played.f0_hz, wanted_hz).abs() <= OTHER_CENTS);
-        let differences_db =
-            played.as_ref().map_or_else(Vec::new, |played| differences_db(&played.levels_db, &recorded.levels_db));
+        let differences_db = played
+            .as_ref()
+            .map_or_else(Vec::new, |played| differences_db(&played.levels_db, &recorded.levels_db));
         let error_db = match differences_db.get(1..) {
             Some(upper) if !upper.is_empty() => {
                 upper.iter().map(|difference| difference.abs()).sum::<f64>() / upper.len() as f64
@@ -297,7 +298,8 @@ mod tests {
 
     #[test]
     fn brighter_steps_are_counted() {
-        let mut all: Vec<RecordedNote> = RecordedNote::all().into_iter().filter(|note| note.midi <= 53).collect();
+        let mut all: Vec<RecordedNote> =
+            RecordedNote::all().into_iter().filter(|note| note.midi <= 53).collect();
         all.sort_by_key(|note| note.dynamic);
         let scores: Vec<NoteScore> = all
             .into_iter()

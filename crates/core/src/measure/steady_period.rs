@@ -3,7 +3,7 @@
 //! Plotted against each other, they show the orbit of the reed around its static characteristic.
 
 use crate::analysis::pitch;
-use crate::instrument::{Clarinet, Model, Probe, Settings};
+use crate::instrument::{BreathResponse, Clarinet, Model, Probe, Settings};
 use crate::measure::bifurcation::SOUNDING_RMS;
 use crate::score::breath::BreathCurve;
 use crate::score::{Score, play_probed};
@@ -32,7 +32,7 @@ pub struct SteadyPeriod {
 
 /// Plays `note` at a constant `gamma` until it is steady, and returns one period; `None` if it does not sound. Allocates.
 ///
-/// `settings` must let full breath reach `gamma` (`breath_full_kpa`). `rate` is the host's sample rate, Hz.
+/// The breath is physical whatever `settings` say; they must let full breath reach `gamma` (`breath_full_kpa`). `rate` is the host's sample rate, Hz.
 pub fn measure(
     model: &Arc<Model>,
     settings: &Settings,
@@ -41,6 +41,7 @@ pub fn measure(
     rate: u32,
 ) -> Option<SteadyPeriod> {
     let mut clarinet = Clarinet::new(model.clone(), f64::from(rate));
+    let settings = &Settings { breath_response: BreathResponse::Physical, ..*settings };
     clarinet.set_settings(settings);
     clarinet.reset();
     let score = Score::note(note, SETTLE_S + MEASURE_S, rate);
@@ -83,7 +84,7 @@ mod tests {
     #[test]
     fn a_soft_note_stays_open_a_loud_one_beats() {
         let model = Arc::new(Model::built_in(48_000.0).unwrap());
-        let settings = Settings { noise: 0.0, ..Settings::default() };
+        let settings = Settings { noise: 0.0, ..Settings::physical() };
         let shut = |gamma: f32| {
             let period = measure(&model, &settings, SoundingNote(58), gamma, 48_000).unwrap();
             assert!(

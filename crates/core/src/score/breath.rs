@@ -5,7 +5,7 @@
 //! millisecond, finer than any controller; the instrument smooths between them.
 
 use crate::event::{Event, Timed};
-use crate::instrument::Settings;
+use crate::instrument::{BreathResponse, Settings};
 use crate::score::samples::samples_in;
 use std::io;
 use std::io::{BufRead, BufReader};
@@ -96,10 +96,14 @@ fn gamma(gamma: f32) -> Result<f32, BreathError> {
     if (0.0..=GAMMA_MAX).contains(&gamma) { Ok(gamma) } else { Err(BreathError::Gamma(gamma)) }
 }
 
-/// The value of [`Event::Breath`] that gives a mouth pressure of `gamma` times the closing pressure. It exceeds 1 if full
-/// breath does not reach that pressure.
+/// The value of [`Event::Breath`] that gives a mouth pressure of `gamma` times the closing pressure, where the breath is
+/// [physical](BreathResponse::Physical). It exceeds 1 if full breath does not reach that pressure. Where the breath is played,
+/// `gamma` is itself a share of full breath.
 pub fn breath_of_gamma(gamma: f32, settings: &Settings) -> f32 {
-    gamma * closing_kpa(settings) / settings.breath_full_kpa
+    match settings.breath_response {
+        BreathResponse::Physical => gamma * closing_kpa(settings) / settings.breath_full_kpa,
+        BreathResponse::Played => gamma,
+    }
 }
 
 /// Closing pressure of the reed with these settings, kPa.
@@ -240,12 +244,13 @@ mod tests {
 
     #[test]
     fn reference_breath_is_gamma() {
-        let settings = Settings::default();
+        let settings = Settings::physical();
         assert!((breath_of_gamma(0.5, &settings) - 0.5).abs() < 1e-6);
         let wide = Settings { breath_full_kpa: 12.0, ..settings };
         assert!((breath_of_gamma(1.5, &wide) - 0.75).abs() < 1e-6);
         let hard = Settings { strength: 3.5, ..settings };
         assert!((closing_kpa(&hard) - 6.0 * 1.44).abs() < 1e-4);
+        assert_eq!(breath_of_gamma(0.5, &Settings { strength: 3.5, ..Settings::default() }), 0.5, "a share");
     }
 
     fn refusal(text: &str) -> String {
@@ -263,7 +268,7 @@ mod tests {
 
     #[test]
     fn constant_is_one_event_and_a_ramp_one_per_millisecond() {
-        let settings = Settings::default();
+        let settings = Settings::physical();
         assert_eq!(BreathCurve::constant(0.5).events(48_000, 48_000, &settings).len(), 1);
         let ramp = BreathCurve::parse_ramp("ramp:0:1:0.5s").unwrap().events(48_000, 48_000, &settings);
         assert_eq!(ramp.len(), 501);

@@ -114,7 +114,7 @@ mod tests {
     fn breath_comes_before_the_note_it_sounds() {
         let score = Score::note(SoundingNote(60), 1.0, 48_000).blown(
             &BreathCurve::constant(0.5),
-            &Settings::default(),
+            &Settings::physical(),
             48_000,
         );
         assert!(matches!(score.events[0].event, Event::Breath(breath) if (breath - 0.5).abs() < 1e-6));

@@ -5,7 +5,8 @@ use chalumeau_core::haptics::{
     AngleMap, FeelDesign, FeelRefused, FeelTable, RequirementSolver, TorqueLimits,
 };
 use chalumeau_core::instrument::feel_inputs::{played_reed, requirements};
-use chalumeau_core::instrument::{BuildError, Model, Settings};
+use chalumeau_core::instrument::player::response::ONSET;
+use chalumeau_core::instrument::{BreathResponse, BuildError, Model, Settings};
 use chalumeau_core::units::SoundingNote;
 use std::sync::{Arc, LazyLock};
 
@@ -71,7 +72,24 @@ impl InstrumentFeel {
         self.fingerings.get(usize::from(note.0)).copied().flatten().map(usize::from)
     }
 
-    /// The same table by sounding pitch, for the audio thread.
+    /// The same table by sounding pitch, for the audio thread: the mouth pressure that each angle asks for. Where the breath is
+    /// played, a share of full breath that is written as a pressure: sound begins at the angle where it is felt to begin.
+    pub fn maps_for(&self, table: &FeelTable, settings: &Settings) -> PitchMaps {
+        let maps = self.maps(table);
+        match settings.breath_response {
+            BreathResponse::Physical => maps,
+            BreathResponse::Played => {
+                let full_pa = 1e3 * f64::from(settings.breath_full_kpa);
+                let played = |map: AngleMap| map.with_onset(ONSET * full_pa, full_pa);
+                PitchMaps {
+                    by_pitch: maps.by_pitch.map(|map| map.map(played)),
+                    otherwise: maps.otherwise.map(played),
+                }
+            }
+        }
+    }
+
+    /// The same table by sounding pitch: the mouth pressure that each angle asks for.
     pub fn maps(&self, table: &FeelTable) -> PitchMaps {
         let of = |index: u8| table.note(usize::from(index)).map(|note| note.map);
         PitchMaps {

@@ -1,10 +1,10 @@
-//! The breath: a breath source sets the mouth pressure; without one, key velocity sets it.
+//! The breath: a breath source moves it; without one, key velocity sets it.
 //!
-//! Without breath input, a key blows with a constant pressure that its velocity chooses. The first breath event makes
-//! the breath *live*: from then on breath events alone set the pressure, and velocity only shapes the attack.
+//! Without breath input, a key blows constantly, as its velocity chooses. The first breath event makes the breath *live*:
+//! from then on breath events alone set it, and velocity only shapes the attack. [`response`](super::response) makes a mouth
+//! pressure of it.
 
 use super::TickContext;
-use crate::reed::physical::P_REF_PA;
 
 /// Time constant of breath that rises behind the tongue, s.
 pub const BREATH_RISE_S: f64 = 0.002;
@@ -12,8 +12,6 @@ pub const BREATH_RISE_S: f64 = 0.002;
 pub const BREATH_FOLLOW_S: f64 = 0.005;
 /// Time constant of breath that ends, s.
 pub const BREATH_END_S: f64 = 0.012;
-/// Mouth pressure over the closing pressure for velocity 0 and 1: just above the threshold, and loud (by ear).
-const VELOCITY_GAMMA: (f64, f64) = (0.43, 0.85);
 /// A slur of an octave or more is helped by a dip of the breath, as players do; the limit leaves room below the octave,
 /// cents.
 const LEAP_CENTS: f64 = 1_150.0;
@@ -24,6 +22,17 @@ const DIP: (f64, f64) = (0.3, 0.025);
 /// A note is over when its mouth pressure is below this share of the closing pressure.
 const NO_BREATH: f64 = 1e-6;
 
+/// What the breath is asked to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Asked {
+    /// Nothing: no key is down.
+    Nothing,
+    /// What a breath source says, 0..=1.
+    Level(f64),
+    /// What the velocity of the key says, 0..=1.
+    Velocity(f64),
+}
+
 /// State of the breath.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Breath {
@@ -31,7 +40,7 @@ pub struct Breath {
     velocity: f64,
     /// Whether any breath event has arrived.
     live: bool,
-    /// The last breath event, 0..=1 of the full-scale mouth pressure.
+    /// The last breath event, 0..=1 of full breath.
     level: f64,
     /// Mouth pressure over the closing pressure of the reed.
     gamma: f64,
@@ -40,7 +49,7 @@ pub struct Breath {
 }
 
 impl Breath {
-    /// A breath event, 0..=1 of the full-scale mouth pressure; not a number counts as 0.
+    /// A breath event, 0..=1 of full breath; not a number counts as 0.
     pub fn set_level(&mut self, level: f32) {
         self.live = true;
         self.level = f64::from(if level.is_finite() { level.clamp(0.0, 1.0) } else { 0.0 });
@@ -79,20 +88,19 @@ impl Breath {
         Self { velocity: self.velocity, live: self.live, level: self.level, ..Self::default() }
     }
 
-    /// Moves the pressure towards its target. `tongue_holds`: the tongue holds the reed before a note, so that the
-    /// pressure may rise behind it at once.
-    pub fn tick(&mut self, key_down: bool, tongue_holds: bool, context: &TickContext<'_>) {
-        let (settings, posture) = (context.settings, context.posture);
-        let target = match (key_down, self.live) {
-            (false, _) => 0.0,
-            (true, true) => {
-                self.level * 1e3 * f64::from(settings.breath_full_kpa) / (P_REF_PA * posture.closing)
-            }
-            (true, false) => {
-                let (soft, loud) = VELOCITY_GAMMA;
-                soft + (loud - soft) * self.velocity
-            }
-        };
+    /// What breath source or velocity ask for.
+    pub fn asked(&self, key_down: bool) -> Asked {
+        match (key_down, self.live) {
+            (false, _) => Asked::Nothing,
+            (true, true) => Asked::Level(self.level),
+            (true, false) => Asked::Velocity(self.velocity),
+        }
+    }
+
+    /// Moves the pressure towards `target`, over the closing pressure. `tongue_holds`: the tongue holds the reed before a
+    /// note, so that the pressure may rise behind it at once.
+    pub fn tick(&mut self, target: f64, key_down: bool, tongue_holds: bool, context: &TickContext<'_>) {
+        let posture = context.posture;
         let dipping = self.dip_s > 0.0;
         let target = if dipping { target * DIP.0 } else { target };
         self.dip_s -= context.tick_s;

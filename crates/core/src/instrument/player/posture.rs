@@ -1,12 +1,18 @@
 //! What settings, fingering and bend amount to: reed, delay and clock of the note, and how fast they are reached.
 
 use super::breath::{BREATH_END_S, BREATH_FOLLOW_S, BREATH_RISE_S};
+use super::dynamics::{LipShape, PlayerModel};
+use super::onset_shift::ReedAtNote;
+use super::response::LIP_S;
 use super::step_towards;
 use crate::instrument::bend::{self, BendSplit};
-use crate::instrument::lip::embouchure;
+use crate::instrument::lip::{Embouchure, embouchure};
 use crate::instrument::model::Model;
-use crate::instrument::settings::Settings;
-use crate::reed::{MovingReed, ReedCoeffs};
+use crate::instrument::played_note::PlayedNote;
+use crate::instrument::settings::{BreathResponse, Settings};
+use crate::reed::law::K_INIT;
+use crate::reed::physical::ZETA_REFERENCE;
+use crate::reed::{MovingReed, ReedCoeffs, ReedLaw};
 use crate::units::{Air, cents};
 
 /// Targets of the note in the fingers. The player works them out when a setting, the fingering or the bend changes, not
@@ -23,6 +29,25 @@ pub struct Posture {
     pub bore_cents: f64,
     /// How fast delay, clock and breath follow.
     pub lags: Lags,
+    /// The reed as set and fingered, before a player's lip shapes it.
+    free: MovingReed,
+    rate_hz: f64,
+    /// What a player needs; `None` where the breath is physical.
+    played: Option<Played>,
+}
+
+/// What the player's rule needs of a note.
+#[derive(Clone, Copy, Debug)]
+struct Played {
+    rule: PlayerModel,
+    place: f64,
+    note: PlayedNote,
+    /// What these settings add to the mouth over closing pressure, at dynamics 0 and 1.
+    shift: (f64, f64),
+    /// Dynamic of the lip in `Posture::reed`.
+    lip: f64,
+    /// The last dynamic that was asked for, and its mouth over closing pressure.
+    asked: (f64, f64),
 }
 
 /// Share of the way to the target that delay, clock and breath cover in one tick, 0..1.
@@ -36,6 +61,8 @@ pub struct Lags {
     pub breath_follow: f64,
     /// Breath that ends.
     pub breath_end: f64,
+    /// The lip.
+    pub lip: f64,
 }
 
 impl Lags {
@@ -47,6 +74,7 @@ impl Lags {
             breath_rise: step(BREATH_RISE_S),
             breath_follow: step(BREATH_FOLLOW_S),
             breath_end: step(BREATH_END_S),
+            lip: step(LIP_S),
         }
     }
 }
@@ -54,30 +82,118 @@ impl Lags {
 impl Posture {
     /// For a fingering under a bend, with ticks of `tick_s` seconds.
     pub fn new(settings: &Settings, fingering: usize, bend_cents: f64, tick_s: f64, model: &Model) -> Self {
-        let law = settings.reed_law();
         let lip = embouchure(model.notes_hz[fingering], model.lowest_hz);
-        let reed = ReedCoeffs::new(
-            MovingReed {
-                law,
-                zeta: f64::from(settings.zeta),
-                lay: f64::from(settings.lay),
-                resonance_hz: lip.resonance_hz,
-                damping: lip.damping * f64::from(settings.damping),
-                swept_s: model.swept_s,
-            },
-            model.coeffs.rate_hz,
-        );
+        let free = MovingReed {
+            law: settings.reed_law(),
+            zeta: f64::from(settings.zeta),
+            lay: f64::from(settings.lay),
+            resonance_hz: lip.resonance_hz,
+            damping: lip.damping * f64::from(settings.damping),
+            swept_s: model.swept_s,
+        };
         let offset = bend_cents
             + cents(f64::from(settings.a4_hz), model.a4_hz)
             + cents(Air::at(f64::from(settings.temperature_c)).c, model.air.c);
         let sensitivity = model.tuning.notes.get(fingering).map_or(1.0, |note| note.sensitivity);
-        let split = BendSplit::new(offset, bend::lip_limit_cents(model, fingering, offset));
-        Self {
-            closing: law.closing(),
-            reed,
+        let split =
+            BendSplit::new(offset, bend::lip_limit_cents(model, fingering, offset, settings.breath_response));
+        let rate_hz = model.coeffs.rate_hz;
+        let played = match settings.breath_response {
+            BreathResponse::Physical => None,
+            BreathResponse::Played => Some(Played::new(settings, &free, lip, fingering, model)),
+        };
+        let mut posture = Self {
+            closing: free.law.closing(),
+            reed: ReedCoeffs::new(free, rate_hz),
             rows: sensitivity * model.rows_for_cents(fingering, split.lip_cents),
             bore_cents: split.bore_cents,
             lags: Lags::new(settings, tick_s),
+            free,
+            rate_hz,
+            played,
+        };
+        posture.shape_lip(0.0);
+        posture
+    }
+
+    /// Gives the reed the lip of a dynamic, 0..=1; nothing where the breath is physical.
+    pub fn shape_lip(&mut self, dynamic: f64) {
+        let Some(played) = &mut self.played else { return };
+        if played.lip == dynamic {
+            return;
         }
+        played.lip = dynamic;
+        let reed = shaped(&self.free, &played.rule, played.place, dynamic);
+        self.closing = reed.law.closing();
+        self.reed = ReedCoeffs::new(reed, self.rate_hz);
+    }
+
+    /// How the lip shapes the reed now; `None` where the breath is physical.
+    pub fn lip(&self) -> Option<LipShape> {
+        self.played.as_ref().map(|played| played.rule.lip(played.place, played.lip))
+    }
+
+    /// Mouth over closing pressure at a dynamic, 0..=1; 0 where the breath is physical.
+    pub fn played_gamma(&mut self, dynamic: f64) -> f64 {
+        let Some(played) = &mut self.played else { return 0.0 };
+        if played.asked.0 != dynamic {
+            let (soft, loud) = played.shift;
+            let gamma = played.note.gamma(dynamic) + soft + (loud - soft) * dynamic;
+            played.asked = (dynamic, gamma.max(0.0));
+        }
+        played.asked.1
+    }
+
+    /// Trim of the note at the dynamic of the lip, rows; `None` where the breath is physical.
+    pub fn played_rows(&self) -> Option<f64> {
+        self.played.as_ref().map(|played| played.note.rows(played.lip))
+    }
+}
+
+/// A reed under the lip of a dynamic.
+fn shaped(free: &MovingReed, rule: &PlayerModel, place: f64, dynamic: f64) -> MovingReed {
+    let lip = rule.lip(place, dynamic);
+    MovingReed { law: lip.law(free.law), zeta: free.zeta * lip.channel, ..*free }
+}
+
+impl Played {
+    fn new(settings: &Settings, free: &MovingReed, lip: Embouchure, fingering: usize, model: &Model) -> Self {
+        let (rule, place) = (model.player, model.place(fingering));
+        let note = model.tuning.notes.get(fingering).map_or_else(PlayedNote::default, |note| note.played);
+        // The reed that the note was played with.
+        let reference = Settings::default();
+        let known = MovingReed {
+            law: ReedLaw::default(),
+            zeta: ZETA_REFERENCE,
+            lay: f64::from(reference.lay),
+            resonance_hz: lip.resonance_hz,
+            damping: lip.damping * f64::from(reference.damping),
+            swept_s: model.swept_s,
+        };
+        let is_known = settings.reed_law() == reference.reed_law()
+            && [settings.zeta, settings.lay, settings.damping]
+                == [reference.zeta, reference.lay, reference.damping];
+        let note_hz = model.notes_hz[fingering];
+        let shift = |dynamic: f64| {
+            if is_known {
+                return 0.0;
+            }
+            let [own, known] =
+                [free, &known].map(|reed| reed_at_note(&shaped(reed, &rule, place, dynamic), note_hz));
+            own.shift_from(&known, note.onset)
+        };
+        Self { rule, place, note, shift: (shift(0.0), shift(1.0)), lip: f64::NAN, asked: (f64::NAN, 0.0) }
+    }
+}
+
+/// A reed at the frequency of a note, for its onset.
+fn reed_at_note(reed: &MovingReed, note_hz: f64) -> ReedAtNote {
+    let (law, compliance) = (reed.law, K_INIT / reed.law.k());
+    ReedAtNote {
+        zeta: reed.zeta * law.a() * law.h() * K_INIT / law.closing().sqrt(),
+        lay: reed.lay,
+        ratio: note_hz / reed.resonance_hz,
+        damping: reed.damping,
+        swept: std::f64::consts::TAU * note_hz * reed.swept_s * compliance,
     }
 }

@@ -4,6 +4,7 @@ use super::TickContext;
 use crate::bore::lattice::{Lattice, Real};
 use crate::instrument::bend;
 use crate::instrument::model::Model;
+use crate::instrument::settings::Tuning;
 use crate::instrument::voice::TICK;
 
 /// The clock counts as arrived when it is this near to its target, cents.
@@ -43,7 +44,11 @@ impl PlayedTuning {
         lattice: &mut Lattice<F>,
     ) -> bool {
         let posture = context.posture;
-        let trim = model.tuning.rows(fingering.unwrap_or(0), context.settings.tuning, gamma);
+        let fingered = || model.tuning.rows(fingering.unwrap_or(0), context.settings.tuning, gamma);
+        let trim = match context.settings.tuning {
+            Tuning::Natural => fingered(),
+            Tuning::Tempered => posture.played_rows().unwrap_or_else(fingered),
+        };
         let target = trim + posture.rows;
         // The delay follows within the time the fingers take; the first note has it at once.
         let first = self.rows.is_none();

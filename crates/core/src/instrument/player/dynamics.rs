@@ -1,0 +1,165 @@
+//! The player's rule: what lip and breath do together at a dynamic.
+//!
+//! A player does not think of pressures. A *dynamic* from 0 (pianissimo, at the threshold of the note) to 1 (fortissimo)
+//! moves the mouth pressure, the opening of the reed under the lip and the strength of its flow together. Equal steps of
+//! dynamic are equal steps of level: the rule says how loud a note is at each dynamic, and preparing an instrument finds, by
+//! playing, the mouth pressure that makes it so ([`PlayedNote`]). So the rule knows no note and no instrument. Its
+//! functions depend on the dynamic `d` and on the place `x` of a note over the lowest note of the instrument:
+//!
+//! | quantity | function |
+//! |---|---|
+//! | level re that at `d` = 1, dB | `-range (1 - d)` |
+//! | mouth over closing pressure at `d` = 1 | `g0 + g1 x + g2 x^2` |
+//! | flow strength zeta of the reed under the lip | `exp(z0 + z1 x + (z2 + z3 x) d)` |
+//! | closing pressure over the reed's own | `c0 c1^(d^3)` |
+//!
+//! The closing pressure rises because the jaw opens: the rest opening grows and the stiffness stays. So the air that the
+//! reed displaces stays the same, and with it the modes of the bore: a *stiffer* reed of the same closing pressure lost
+//! written A5 to another register. Above the clarion the lip stiffens the reed by up to [`PlayerModel::altissimo_stiffness`],
+//! which holds the altissimo. `cargo xtask fit-player` fits the numbers to recorded notes; `docs/tone.md` tells how and what
+//! they bought.
+
+use crate::reed::ReedLaw;
+use crate::reed::physical::ZETA_REFERENCE;
+
+/// The dynamic of mezzo-forte: as far below fortissimo as its level is, of the recorded notes, within what the reed can do.
+pub const MEZZO_FORTE: f64 = 0.62;
+/// Nodes over the dynamic, evenly from 0 to 1, at which a note's pressure and trim are known.
+pub const NODES: usize = 6;
+/// Distance in octaves from the lowest note to the middle of the compass, and from there to its end: 20.5 semitones, half the
+/// compass of a B flat clarinet up to sounding G6.
+const HALF_COMPASS_OCTAVES: f64 = 20.5 / 12.0;
+/// Places between which the lip begins to stiffen the reed and has done so: written B5 and A6 of a B flat clarinet.
+const STIFFENS: (f64, f64) = (0.5, 1.0);
+/// The place of a note far outside the compass counts as this.
+const FARTHEST: f64 = 1.25;
+
+/// The numbers of the player's rule; see the module.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlayerModel {
+    /// Level at dynamic 1 over that at 0, dB.
+    pub range_db: f64,
+    /// Mouth over closing pressure at dynamic 1: in the middle of the compass, slope and curvature over the place.
+    pub loudest_gamma: [f64; 3],
+    /// Logarithm of zeta: in the middle at dynamic 0, its slope over the place, growth over the dynamic, slope of the growth.
+    pub zeta: [f64; 4],
+    /// Closing pressure at dynamic 0 over the reed's own, and growth from dynamic 0 to 1 as a factor.
+    pub closing: [f64; 2],
+    /// Stiffness of the reed under the lip at the top of the altissimo over that below.
+    pub altissimo_stiffness: f64,
+}
+
+/// The reed as a player's lip shapes it: factors on a reed's own numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LipShape {
+    /// On the rest opening.
+    pub opening: f64,
+    /// On the stiffness.
+    pub stiffness: f64,
+    /// On the embouchure parameter zeta of the channel, so that the flow strength is the rule's.
+    pub channel: f64,
+}
+
+impl PlayerModel {
+    /// The rule that comes with the program.
+    pub const FITTED: Self = super::fitted::FITTED;
+
+    /// Place of a note: -1 at the lowest note of its instrument, 1 three octaves and a fifth above.
+    pub fn place(note_hz: f64, lowest_hz: f64) -> f64 {
+        ((note_hz / lowest_hz).log2() / HALF_COMPASS_OCTAVES - 1.0).clamp(-FARTHEST, FARTHEST)
+    }
+
+    /// Mouth over closing pressure at dynamic 1.
+    pub fn loudest_gamma(&self, place: f64) -> f64 {
+        let [middle, slope, curvature] = self.loudest_gamma;
+        // Below, some note would be nearly silent; above, the reed of a low note may stay shut.
+        (middle + (slope + curvature * place) * place).clamp(0.45, 1.05)
+    }
+
+    /// Level at a dynamic re that at dynamic 1, dB.
+    pub fn level_db(&self, dynamic: f64) -> f64 {
+        -self.range_db * (1.0 - dynamic)
+    }
+
+    /// Flow strength of the reference reed under the lip.
+    pub fn zeta(&self, place: f64, dynamic: f64) -> f64 {
+        let [soft, soft_slope, growth, growth_slope] = self.zeta;
+        (soft + soft_slope * place + (growth + growth_slope * place) * dynamic).exp()
+    }
+
+    /// Closing pressure of the reference reed under the lip, over its own.
+    pub fn closing(&self, dynamic: f64) -> f64 {
+        let [soft, growth] = self.closing;
+        soft * growth.powf(dynamic * dynamic * dynamic)
+    }
+
+    /// The lip at a dynamic. Real-time safe.
+    pub fn lip(&self, place: f64, dynamic: f64) -> LipShape {
+        let (from, to) = STIFFENS;
+        let way = ((place - from) / (to - from)).clamp(0.0, 1.0);
+        let stiffness = 1.0 + (self.altissimo_stiffness - 1.0) * way * way * (3.0 - 2.0 * way);
+        let closing = self.closing(dynamic);
+        // The closing pressure goes with opening times stiffness, the flow strength with the opening over the root of that.
+        let channel = self.zeta(place, dynamic) / ZETA_REFERENCE * stiffness / closing.sqrt();
+        LipShape { opening: closing / stiffness, stiffness, channel }
+    }
+}
+
+impl LipShape {
+    /// The law of a reed under this lip. Real-time safe.
+    pub fn law(&self, reed: ReedLaw) -> ReedLaw {
+        let h = (reed.h() * self.opening).clamp(0.5, 10.0);
+        let k = (reed.k() * self.stiffness).clamp(0.01, 20.0);
+        ReedLaw::free(h, k, reed.a()).unwrap_or(reed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reed::law::K_INIT;
+
+    /// Flow strength of a law, as `haptics::PlayedReed::flow_strength` has it.
+    fn strength(law: ReedLaw, channel: f64) -> f64 {
+        channel * law.a() * law.h() * K_INIT / law.closing().sqrt()
+    }
+
+    #[test]
+    fn the_lip_gives_the_rules_closing_pressure_and_flow_at_every_place() {
+        let rule = PlayerModel::FITTED;
+        for place in [-1.0, 0.0, 0.7, 1.0] {
+            for dynamic in [0.0, 0.3, 1.0] {
+                let lip = rule.lip(place, dynamic);
+                let law = lip.law(ReedLaw::default());
+                assert!((law.closing() / rule.closing(dynamic) - 1.0).abs() < 1e-9);
+                let zeta = strength(law, ZETA_REFERENCE * lip.channel);
+                assert!((zeta / rule.zeta(place, dynamic) - 1.0).abs() < 1e-9, "{place} {dynamic}: {zeta}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_rule_is_smooth_and_rises_with_the_dynamic() {
+        let rule = PlayerModel::FITTED;
+        for place in [-1.0, -0.5, 0.0, 0.5, 1.0] {
+            let values =
+                |dynamic: f64| [rule.closing(dynamic), rule.zeta(place, dynamic), rule.level_db(dynamic)];
+            for step in 1..100 {
+                let [before, here, after] =
+                    [step - 1, step, step + 1].map(|step| values(f64::from(step) / 100.0));
+                for ((a, b), c) in before.into_iter().zip(here).zip(after) {
+                    assert!(b >= a - 1e-3 && (c - 2.0 * b + a).abs() < 2e-3 * b.abs().max(1.0));
+                }
+            }
+            assert!(rule.loudest_gamma(place) < 1.1);
+        }
+    }
+
+    #[test]
+    fn the_place_is_relative_to_the_instrument() {
+        let semitones = |count: f64| 100.0 * (count / 12.0).exp2();
+        assert!((PlayerModel::place(100.0, 100.0) + 1.0).abs() < 1e-12);
+        assert!((PlayerModel::place(semitones(41.0), 100.0) - 1.0).abs() < 1e-12);
+        assert_eq!(PlayerModel::place(1e9, 100.0), FARTHEST);
+    }
+}

@@ -1,0 +1,109 @@
+//! From breath to mouth pressure and lip: physical or played.
+//!
+//! Physical, breath is a mouth pressure. Played, it is a dynamic: every note begins at the same small breath, [`ONSET`], and
+//! from there to full breath the dynamic goes from 0 to 1 along a curve; [`dynamics`](super::dynamics) has the rule. Below
+//! `ONSET` the pressure falls to zero in proportion, and nothing sounds.
+
+use super::breath::Asked;
+use super::posture::Posture;
+use crate::instrument::settings::{BreathResponse, Settings};
+use crate::reed::physical::P_REF_PA;
+
+/// Breath at which every note begins, 0..1: the controller value 4 of 127, above what a sensor at rest sends.
+pub const ONSET: f64 = 4.0 / 127.0;
+/// Mouth pressure over the closing pressure for velocity 0 and 1 where the breath is physical: just above the threshold, and
+/// loud (by ear).
+const VELOCITY_GAMMA: (f64, f64) = (0.43, 0.85);
+/// Dynamic for velocity 0 and 1: soft and loud (by ear).
+const VELOCITY_DYNAMIC: (f64, f64) = (0.15, 1.0);
+/// Time constant with which the lip follows the dynamic, s: slower than the breath, as muscles are, but not heard as late.
+pub const LIP_S: f64 = 0.01;
+/// The lip stays where it is for a smaller change of the dynamic: 0.003 dB.
+const STILL: f64 = 1e-4;
+
+/// Where the lip is.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Response {
+    /// Dynamic of lip and trim, 0..=1; `None` before the first note.
+    lip: Option<f64>,
+}
+
+/// Breath, 0..=1, that a dynamic of 0..=1 asks for, with a curve of 1.
+pub fn breath_of_dynamic(dynamic: f64) -> f64 {
+    ONSET + (1.0 - ONSET) * dynamic
+}
+
+/// Breath, 0..=1, as a dynamic, and the share of the pressure at dynamic 0 that it asks for where it is below [`ONSET`].
+fn dynamic(breath: f64, curve: f64) -> (f64, f64) {
+    let above = ((breath - ONSET) / (1.0 - ONSET)).clamp(0.0, 1.0);
+    let above = if curve == 1.0 { above } else { above.powf(curve) };
+    (above, (breath / ONSET).min(1.0))
+}
+
+impl Response {
+    /// Mouth over closing pressure that is asked for, and the posture's lip moved towards it. `settles`: nothing sounds yet, so
+    /// that the lip may be in place at once. Real-time safe.
+    pub fn tick(&mut self, asked: Asked, settles: bool, settings: &Settings, posture: &mut Posture) -> f64 {
+        match settings.breath_response {
+            BreathResponse::Physical => {
+                self.lip = None;
+                physical(asked, settings, posture.closing)
+            }
+            BreathResponse::Played => self.played(asked, settles, settings, posture),
+        }
+    }
+
+    /// Dynamic of the lip, 0..=1.
+    pub fn lip(&self) -> f64 {
+        self.lip.unwrap_or(0.0)
+    }
+
+    fn played(&mut self, asked: Asked, settles: bool, settings: &Settings, posture: &mut Posture) -> f64 {
+        let (wanted, share) = match asked {
+            // The lip stays while the breath ends.
+            Asked::Nothing => (self.lip(), 0.0),
+            Asked::Level(level) => dynamic(level, f64::from(settings.breath_curve)),
+            Asked::Velocity(velocity) => {
+                let (soft, loud) = VELOCITY_DYNAMIC;
+                (soft + (loud - soft) * velocity, 1.0)
+            }
+        };
+        let lip = match self.lip {
+            Some(lip) if !settles => lip + (wanted - lip) * posture.lags.lip,
+            _ => wanted,
+        };
+        let lip = if (lip - wanted).abs() < STILL { wanted } else { lip };
+        self.lip = Some(lip);
+        posture.shape_lip(lip);
+        share * posture.played_gamma(wanted)
+    }
+}
+
+fn physical(asked: Asked, settings: &Settings, closing: f64) -> f64 {
+    match asked {
+        Asked::Nothing => 0.0,
+        Asked::Level(level) => level * 1e3 * f64::from(settings.breath_full_kpa) / (P_REF_PA * closing),
+        Asked::Velocity(velocity) => {
+            let (soft, loud) = VELOCITY_GAMMA;
+            soft + (loud - soft) * velocity
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn breath_begins_at_four_and_ends_at_127() {
+        for curve in [0.5, 1.0, 2.0] {
+            assert_eq!(dynamic(ONSET, curve), (0.0, 1.0));
+            assert_eq!(dynamic(1.0, curve).0, 1.0);
+            let curve: Vec<f64> = (4..=127).map(|cc| dynamic(f64::from(cc) / 127.0, curve).0).collect();
+            assert!(curve.is_sorted_by(|a, b| a < b));
+        }
+        assert!((dynamic(breath_of_dynamic(0.3), 1.0).0 - 0.3).abs() < 1e-12);
+        assert_eq!(dynamic(2.0 / 127.0, 1.0), (0.0, 0.5));
+        assert_eq!(dynamic(0.0, 1.0), (0.0, 0.0));
+    }
+}
