@@ -1,6 +1,7 @@
-//! What a note asks of the player: the mouth pressure for each dynamic, and the trim that keeps it in tune there.
+//! What a note asks of the player: the mouth pressure for each dynamic, the amplitude that it then has, and the trim that keeps
+//! it in tune there.
 //!
-//! [`auto_tune`](super::prepare::auto_tune) finds both by playing, at a few dynamics; between them lie straight lines. Near
+//! [`auto_tune`](super::prepare::auto_tune) finds them by playing, at a few dynamics; between them lie straight lines. Near
 //! its threshold the power of a note is proportional to the excess of the mouth pressure over the threshold. So the
 //! line is drawn through the logarithm of the excess, in which equal steps are equal steps of level.
 
@@ -15,6 +16,8 @@ pub struct PlayedNote {
     pub onset: f64,
     /// Mouth over closing pressure at dynamics evenly from 0 to 1, rising.
     pub gammas: [f64; NODES],
+    /// Amplitudes of the steady note there, rms of the pressure in the mouthpiece over the closing pressure.
+    pub amplitudes: [f64; NODES],
     /// Trims there, rows of round-trip delay.
     pub rows: [f64; NODES],
 }
@@ -22,7 +25,12 @@ pub struct PlayedNote {
 impl Default for PlayedNote {
     /// A note that nobody has played yet: the median over the bundled clarinet, without trims.
     fn default() -> Self {
-        Self { onset: 0.39, gammas: [0.40, 0.42, 0.46, 0.54, 0.70, 0.92], rows: [0.0; NODES] }
+        Self {
+            onset: 0.39,
+            gammas: [0.40, 0.42, 0.46, 0.54, 0.70, 0.92],
+            amplitudes: [0.06, 0.12, 0.22, 0.36, 0.52, 0.68],
+            rows: [0.0; NODES],
+        }
     }
 }
 
@@ -34,12 +42,12 @@ fn segment(dynamic: f64) -> (usize, f64) {
 }
 
 impl PlayedNote {
-    /// With these mouth pressures and trims; the onset follows from the two lowest pressures, between which the level rises
-    /// by `step_db`.
-    pub fn new(gammas: [f64; NODES], rows: [f64; NODES], step_db: f64) -> Self {
-        let ratio = 10.0_f64.powf(step_db / 10.0);
+    /// From mouth pressures, amplitudes and trims; the onset follows from the two lowest pressures, as where a line through
+    /// them and the squares of their amplitudes meets zero.
+    pub fn new(gammas: [f64; NODES], amplitudes: [f64; NODES], rows: [f64; NODES]) -> Self {
+        let ratio = (amplitudes[1] / amplitudes[0]).powi(2).max(1.5);
         let onset = gammas[0] - (gammas[1] - gammas[0]) / (ratio - 1.0);
-        Self { onset, gammas, rows }
+        Self { onset, gammas, amplitudes, rows }
     }
 
     /// Mouth over closing pressure at a dynamic, 0..=1. Real-time safe.
@@ -48,6 +56,15 @@ impl PlayedNote {
         let [low, high] =
             [self.gammas[left], self.gammas[left + 1]].map(|gamma| (gamma - self.onset).max(1e-6));
         self.onset + low * (high / low).powf(way)
+    }
+
+    /// Amplitude of the steady note at a dynamic, rms of the pressure in the mouthpiece over the closing pressure. Real-time
+    /// safe.
+    pub fn amplitude(&self, dynamic: f64) -> f64 {
+        let (left, way) = segment(dynamic);
+        let [low, high] =
+            [self.amplitudes[left], self.amplitudes[left + 1]].map(|amplitude| amplitude.max(1e-6));
+        low * (high / low).powf(way)
     }
 
     /// Trim at a dynamic, rows. Real-time safe.
@@ -61,12 +78,22 @@ impl PlayedNote {
 mod tests {
     use super::*;
 
+    fn note() -> PlayedNote {
+        PlayedNote::new(
+            [0.38, 0.39, 0.42, 0.5, 0.65, 0.9],
+            [0.05, 0.1, 0.2, 0.3, 0.45, 0.6],
+            [1.0, 2.0, 4.0, 3.0, 2.0, 0.0],
+        )
+    }
+
     #[test]
     fn the_curve_passes_through_its_nodes_and_rises() {
-        let note = PlayedNote::new([0.38, 0.39, 0.42, 0.5, 0.65, 0.9], [1.0, 2.0, 4.0, 3.0, 2.0, 0.0], 5.4);
-        for (node, (gamma, rows)) in note.gammas.into_iter().zip(note.rows).enumerate() {
+        let note = note();
+        for node in 0..NODES {
             let dynamic = node as f64 / (NODES - 1) as f64;
-            assert!((note.gamma(dynamic) - gamma).abs() < 1e-12 && (note.rows(dynamic) - rows).abs() < 1e-9);
+            assert!((note.gamma(dynamic) - note.gammas[node]).abs() < 1e-12);
+            assert!((note.amplitude(dynamic) - note.amplitudes[node]).abs() < 1e-12);
+            assert!((note.rows(dynamic) - note.rows[node]).abs() < 1e-9);
         }
         let curve: Vec<f64> = (0..=1_000).map(|n| note.gamma(f64::from(n) / 1_000.0)).collect();
         assert!(curve.is_sorted_by(|a, b| a < b));
@@ -74,10 +101,10 @@ mod tests {
     }
 
     #[test]
-    fn near_the_onset_equal_steps_are_equal_ratios_of_the_excess() {
-        let note = PlayedNote::new([0.38, 0.39, 0.42, 0.5, 0.65, 0.9], [0.0; NODES], 5.4);
+    fn near_the_onset_the_power_goes_with_the_excess() {
+        let note = note();
         let excess = |dynamic: f64| note.gamma(dynamic) - note.onset;
-        assert!((10.0 * (excess(0.2) / excess(0.0)).log10() - 5.4).abs() < 1e-9);
+        assert!((excess(0.2) / excess(0.0) - 4.0).abs() < 1e-9, "as the squares of the amplitudes");
         assert!((excess(0.1) / excess(0.0) - excess(0.2) / excess(0.1)).abs() < 1e-9);
     }
 }

@@ -1,13 +1,14 @@
 //! The player: turns notes, breath and settings into holes, lip, tongue and mouth pressure, tick by tick.
 //!
 //! `breath` follows a breath source or key velocity, and [`response`] makes a mouth pressure of it: directly, or by the rule in
-//! [`dynamics`] that moves breath and lip together. `tongue` articulates: overlapping notes are slurred (the holes move and
+//! [`dynamics`] that moves breath and lip together; there the [`ear`] pushes what is too soft. `tongue` articulates: overlapping notes are slurred (the holes move and
 //! the tongue stays away); after a gap the tongue holds the reed while the breath rises behind it, and lets go. `fingers`
 //! moves the holes, `tuning` the pitch, and `posture` holds what settings, fingering and bend ask for.
 
 mod breath;
 mod carry_on;
 pub mod dynamics;
+pub mod ear;
 mod fingers;
 mod fitted;
 mod onset_shift;
@@ -27,6 +28,7 @@ use crate::reed::physical::P_REF_PA;
 use crate::units::{SoundingNote, cents};
 use breath::Breath;
 use dynamics::LipShape;
+use ear::Ear;
 use fingers::Fingers;
 use posture::{Lags, Posture};
 use reed_smoothing::ReedSmoothing;
@@ -74,6 +76,7 @@ pub struct Player {
     keys: Keys,
     breath: Breath,
     response: Response,
+    ear: Ear,
     tongue: Tongue,
     fingers: Fingers,
     tuning: PlayedTuning,
@@ -251,7 +254,9 @@ impl Player {
         });
         let (key_down, tongue_holds) = (!self.keys.is_empty(), self.tongue.is_holding());
         let asked = self.breath.asked(key_down);
-        let target = self.response.tick(asked, tongue_holds, &settings, posture);
+        self.ear.hear(voice.p_mouthpiece() / posture.closing, posture.lags.ear);
+        let ear = (self.tongue.is_away() && !self.breath.is_dipping()).then_some(&self.ear);
+        let target = self.response.tick(asked, ear, tongue_holds, &settings, posture);
         let posture = *posture;
         let context = TickContext { tick_s, settings: &settings, posture: &posture };
         let lattice = voice.lattice_mut();
@@ -261,7 +266,7 @@ impl Player {
         let (p_mouth, tongue) = self.tongue.tick(gamma, self.breath.attack_hardness(), &context);
         if self.tuning.tick(fingering, gamma, &context, model, lattice) {
             // The clock's speed has changed, and with it the length of a tick.
-            let lags = Lags::new(&settings, self.tick_s(model));
+            let lags = Lags::new(&settings, self.tick_s(model), model.lowest_hz);
             self.posture = Some(Posture { lags, ..posture });
         }
         Drive { p_mouth, tongue, noise: f64::from(settings.noise), reed: posture.reed }

@@ -67,6 +67,11 @@ impl Breath {
         }
     }
 
+    /// Whether a dip helps a slur now.
+    pub fn is_dipping(&self) -> bool {
+        self.dip_s > 0.0
+    }
+
     /// Mouth pressure over the closing pressure of the reed.
     pub fn gamma(&self) -> f64 {
         self.gamma
@@ -101,7 +106,7 @@ impl Breath {
     /// note, so that the pressure may rise behind it at once.
     pub fn tick(&mut self, target: f64, key_down: bool, tongue_holds: bool, context: &TickContext<'_>) {
         let posture = context.posture;
-        let dipping = self.dip_s > 0.0;
+        let dipping = self.is_dipping();
         let target = if dipping { target * DIP.0 } else { target };
         self.dip_s -= context.tick_s;
         let share = if !key_down {

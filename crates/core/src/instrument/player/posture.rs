@@ -2,6 +2,7 @@
 
 use super::breath::{BREATH_END_S, BREATH_FOLLOW_S, BREATH_RISE_S};
 use super::dynamics::{LipShape, PlayerModel};
+use super::ear;
 use super::onset_shift::ReedAtNote;
 use super::response::LIP_S;
 use super::step_towards;
@@ -46,8 +47,17 @@ struct Played {
     shift: (f64, f64),
     /// Dynamic of the lip in `Posture::reed`.
     lip: f64,
-    /// The last dynamic that was asked for, and its mouth over closing pressure.
-    asked: (f64, f64),
+    /// The last dynamic that was asked for, and what it asks of the breath.
+    asked: (f64, PlayedBreath),
+}
+
+/// What a dynamic asks of the breath.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PlayedBreath {
+    /// Mouth over closing pressure that holds the note.
+    pub gamma: f64,
+    /// Amplitude that the note then has, rms in the mouthpiece over the closing pressure.
+    pub amplitude: f64,
 }
 
 /// Share of the way to the target that delay, clock and breath cover in one tick, 0..1.
@@ -63,11 +73,13 @@ pub struct Lags {
     pub breath_end: f64,
     /// The lip.
     pub lip: f64,
+    /// The ear.
+    pub ear: f64,
 }
 
 impl Lags {
     /// For ticks of `tick_s` seconds.
-    pub fn new(settings: &Settings, tick_s: f64) -> Self {
+    pub fn new(settings: &Settings, tick_s: f64, lowest_hz: f64) -> Self {
         let step = |time_s: f64| step_towards(tick_s, time_s);
         Self {
             tuning: step(0.5e-3 * f64::from(settings.legato_ms)),
@@ -75,6 +87,7 @@ impl Lags {
             breath_follow: step(BREATH_FOLLOW_S),
             breath_end: step(BREATH_END_S),
             lip: step(LIP_S),
+            ear: ear::share(tick_s, lowest_hz),
         }
     }
 }
@@ -107,7 +120,7 @@ impl Posture {
             reed: ReedCoeffs::new(free, rate_hz),
             rows: sensitivity * model.rows_for_cents(fingering, split.lip_cents),
             bore_cents: split.bore_cents,
-            lags: Lags::new(settings, tick_s),
+            lags: Lags::new(settings, tick_s, model.lowest_hz),
             free,
             rate_hz,
             played,
@@ -133,13 +146,13 @@ impl Posture {
         self.played.as_ref().map(|played| played.rule.lip(played.place, played.lip))
     }
 
-    /// Mouth over closing pressure at a dynamic, 0..=1; 0 where the breath is physical.
-    pub fn played_gamma(&mut self, dynamic: f64) -> f64 {
-        let Some(played) = &mut self.played else { return 0.0 };
+    /// What a dynamic, 0..=1, asks of the breath; nothing where the breath is physical.
+    pub fn played_breath(&mut self, dynamic: f64) -> PlayedBreath {
+        let Some(played) = &mut self.played else { return PlayedBreath::default() };
         if played.asked.0 != dynamic {
             let (soft, loud) = played.shift;
-            let gamma = played.note.gamma(dynamic) + soft + (loud - soft) * dynamic;
-            played.asked = (dynamic, gamma.max(0.0));
+            let gamma = (played.note.gamma(dynamic) + soft + (loud - soft) * dynamic).max(0.0);
+            played.asked = (dynamic, PlayedBreath { gamma, amplitude: played.note.amplitude(dynamic) });
         }
         played.asked.1
     }
@@ -182,7 +195,14 @@ impl Played {
                 [free, &known].map(|reed| reed_at_note(&shaped(reed, &rule, place, dynamic), note_hz));
             own.shift_from(&known, note.onset)
         };
-        Self { rule, place, note, shift: (shift(0.0), shift(1.0)), lip: f64::NAN, asked: (f64::NAN, 0.0) }
+        Self {
+            rule,
+            place,
+            note,
+            shift: (shift(0.0), shift(1.0)),
+            lip: f64::NAN,
+            asked: (f64::NAN, PlayedBreath::default()),
+        }
     }
 }
 

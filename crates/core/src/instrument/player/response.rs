@@ -5,6 +5,7 @@
 //! `ONSET` the pressure falls to zero in proportion, and nothing sounds.
 
 use super::breath::Asked;
+use super::ear::Ear;
 use super::posture::Posture;
 use crate::instrument::settings::{BreathResponse, Settings};
 use crate::reed::physical::P_REF_PA;
@@ -42,14 +43,22 @@ fn dynamic(breath: f64, curve: f64) -> (f64, f64) {
 
 impl Response {
     /// Mouth over closing pressure that is asked for, and the posture's lip moved towards it. `settles`: nothing sounds yet, so
-    /// that the lip may be in place at once. Real-time safe.
-    pub fn tick(&mut self, asked: Asked, settles: bool, settings: &Settings, posture: &mut Posture) -> f64 {
+    /// that the lip may be in place at once. `ear`: what the player hears, if anything is to be heard of the note. Real-time
+    /// safe.
+    pub fn tick(
+        &mut self,
+        asked: Asked,
+        ear: Option<&Ear>,
+        settles: bool,
+        settings: &Settings,
+        posture: &mut Posture,
+    ) -> f64 {
         match settings.breath_response {
             BreathResponse::Physical => {
                 self.lip = None;
                 physical(asked, settings, posture.closing)
             }
-            BreathResponse::Played => self.played(asked, settles, settings, posture),
+            BreathResponse::Played => self.played(asked, ear, settles, settings, posture),
         }
     }
 
@@ -58,7 +67,14 @@ impl Response {
         self.lip.unwrap_or(0.0)
     }
 
-    fn played(&mut self, asked: Asked, settles: bool, settings: &Settings, posture: &mut Posture) -> f64 {
+    fn played(
+        &mut self,
+        asked: Asked,
+        ear: Option<&Ear>,
+        settles: bool,
+        settings: &Settings,
+        posture: &mut Posture,
+    ) -> f64 {
         let (wanted, share) = match asked {
             // The lip stays while the breath ends.
             Asked::Nothing => (self.lip(), 0.0),
@@ -75,7 +91,11 @@ impl Response {
         let lip = if (lip - wanted).abs() < STILL { wanted } else { lip };
         self.lip = Some(lip);
         posture.shape_lip(lip);
-        share * posture.played_gamma(wanted)
+        let breath = posture.played_breath(wanted);
+        match ear {
+            Some(ear) if share == 1.0 => ear.pushed(breath.gamma, breath.amplitude),
+            _ => share * breath.gamma,
+        }
     }
 }
 

@@ -74,6 +74,11 @@ impl Tongue {
         matches!(self.position, Position::Holding(_))
     }
 
+    /// Whether the tongue is away from the reed and leaves it alone.
+    pub fn is_away(&self) -> bool {
+        self.position == Position::Away && self.slap.is_none()
+    }
+
     /// Whether a slap pulls at the reed.
     pub fn is_slapping(&self) -> bool {
         self.slap.is_some()

@@ -10,7 +10,9 @@ use crate::instrument::held_note::{HeldNote, Start};
 use crate::instrument::model::Model;
 use crate::instrument::played_note::PlayedNote;
 use crate::instrument::player::dynamics::NODES;
+use crate::instrument::player::ear::{self, Ear};
 use crate::instrument::tuning_table::NoteTuning;
+use crate::instrument::voice::TICK;
 use crate::units::cents;
 
 /// A level this near to the wanted one is right, dB.
@@ -45,6 +47,8 @@ struct HeardPlay {
     gamma: f64,
     /// Mean square of the radiated pressure, Pa^2.
     power: f64,
+    /// Rms of the pressure in the mouthpiece over the closing pressure.
+    amplitude: f64,
     off_cents: f64,
 }
 
@@ -69,20 +73,19 @@ pub fn learn(model: &Model, fingering: usize, tuned: &NoteTuning) -> Option<Play
         onset: LOWEST_ONSET,
         rows: tuned.natural,
     };
-    let (mut gammas, mut rows) = ([0.0; NODES], [0.0; NODES]);
+    let (mut gammas, mut amplitudes, mut rows) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
     let first = learner.loudest()?;
     let loudest = model.player.loudest_gamma(model.place(fingering)).min(first);
     let top = learner.settle(1.0, loudest)?;
-    (gammas[NODES - 1], rows[NODES - 1]) = (top.gamma, learner.rows);
+    (gammas[NODES - 1], amplitudes[NODES - 1], rows[NODES - 1]) = (top.gamma, top.amplitude, learner.rows);
     for (node, ratio) in (0..NODES - 1).rev().zip(RATIOS) {
         let dynamic = node as f64 / (NODES - 1) as f64;
         let wanted = top.power * 10.0_f64.powf(0.1 * model.player.level_db(dynamic));
         let guess = learner.onset + ratio * (gammas[node + 1] - learner.onset);
-        gammas[node] = learner.find(dynamic, wanted, guess, gammas[node + 1])?.gamma;
-        rows[node] = learner.rows;
+        let found = learner.find(dynamic, wanted, guess, gammas[node + 1])?;
+        (gammas[node], amplitudes[node], rows[node]) = (found.gamma, found.amplitude, learner.rows);
     }
-    let step_db = model.player.range_db / (NODES - 1) as f64;
-    gammas.is_sorted_by(|a, b| a < b).then(|| PlayedNote::new(gammas, rows, step_db))
+    gammas.is_sorted_by(|a, b| a < b).then(|| PlayedNote::new(gammas, amplitudes, rows))
 }
 
 impl Learner<'_> {
@@ -93,13 +96,22 @@ impl Learner<'_> {
         let from_s = longer * if dynamic < SOFT { SETTLE_S.0 } else { SETTLE_S.1 };
         let held = HeldNote::played(model, self.fingering, dynamic, gamma);
         let held = HeldNote { rows: self.rows, start: Start::Tongued(2.0), ..held };
-        let sound = held.radiated(model, from_s, from_s + longer * HEAR_S);
         let rate_hz = model.coeffs.rate_hz;
+        let closing = held.reed(model).closing_pressure();
+        let ear_share = ear::share(TICK as f64 / rate_hz, model.lowest_hz);
+        let (mut sound, mut ear, mut heard) = (Vec::new(), Ear::default(), 0);
+        held.play(model, from_s + longer * HEAR_S, |out, voice| {
+            ear.hear(voice.p_mouthpiece() / closing, ear_share);
+            heard += TICK;
+            if heard as f64 > from_s * rate_hz {
+                sound.extend(out.iter().map(|&sample| f64::from(sample)));
+            }
+        });
         let hz = pitch::fundamental_hz(&sound, rate_hz)?;
         let off_cents = cents(hz, model.notes_hz[self.fingering]);
         let is_own = off_cents.abs() < OTHER_CENTS && pitch::periodicity(&sound, rate_hz, hz) > 0.9;
         let power = sound.iter().map(|sample| sample * sample).sum::<f64>() / sound.len().max(1) as f64;
-        is_own.then_some(HeardPlay { gamma, power, off_cents })
+        is_own.then_some(HeardPlay { gamma, power, amplitude: ear.amplitude(), off_cents })
     }
 
     /// Moves the trim against an error of the pitch.

@@ -1,0 +1,78 @@
+//! The ear: the player blows harder while the note is softer than it should be, and less while it is louder.
+//!
+//! Near its threshold a note grows and dies slowly: at the pressure that holds a soft clarion note, the note needs a second to
+//! begin. Players push it and ease off as they hear it speak. Here the push is proportional to the distance, in
+//! logarithms, of the amplitude in the mouthpiece from that of the steady note at the wanted dynamic, which was learnt
+//! when the instrument was prepared. A steady note has no push. The ear also brings a note to its level on a reed or at a
+//! bend for which nothing was learnt.
+
+/// Mouth over closing pressure for a distance of 1 neper. The amplitude grows by some 300 nepers a second and unit of mouth
+/// pressure: a distance falls to 1/e in 25 ms.
+const PUSH: f64 = 0.13;
+/// A push raises the pressure up to here, over the closing pressure: above, notes speak at once by themselves, and
+/// harder pushing would only be an accent.
+const HARDEST: f64 = 0.55;
+/// Easing off takes away at most this share of the pressure: a note must not end.
+const SOFTEST: f64 = 0.06;
+/// Distances that count, nepers: much softer is only silence, much louder another note that has not yet ended.
+const DISTANCES: (f64, f64) = (-1.0, 2.5);
+/// Time over which the ear listens, periods of the lowest note.
+const PERIODS: f64 = 1.5;
+/// Amplitude below which there is nothing to hear, over the closing pressure.
+const SILENCE: f64 = 1e-6;
+
+/// State of the ear.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Ear {
+    /// Mean square of the pressure in the mouthpiece, over the closing pressure squared.
+    power: f64,
+}
+
+/// Share of the way that the ear goes in one tick of `tick_s` seconds on an instrument with this lowest note.
+pub fn share(tick_s: f64, lowest_hz: f64) -> f64 {
+    super::step_towards(tick_s, PERIODS / lowest_hz)
+}
+
+impl Ear {
+    /// Hears the pressure in the mouthpiece at the end of a tick, over the closing pressure. `share` is that of
+    /// [`share`].
+    pub fn hear(&mut self, pressure: f64, share: f64) {
+        self.power += (pressure * pressure - self.power) * share;
+    }
+
+    /// Amplitude now: root mean square over the closing pressure.
+    pub fn amplitude(&self) -> f64 {
+        self.power.sqrt()
+    }
+
+    /// Mouth over closing pressure with the push towards an amplitude, where `gamma` would hold it.
+    pub fn pushed(&self, gamma: f64, amplitude: f64) -> f64 {
+        let distance =
+            0.5 * ((amplitude * amplitude).max(SILENCE * SILENCE) / self.power.max(SILENCE * SILENCE)).ln();
+        let push = PUSH * distance.clamp(DISTANCES.0, DISTANCES.1);
+        (gamma + push).clamp((1.0 - SOFTEST) * gamma, gamma.max(HARDEST))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_soft_note_is_pushed_a_loud_one_eased_a_right_one_left() {
+        let hear = |amplitude: f64| {
+            let mut ear = Ear::default();
+            for n in 0..10_000 {
+                ear.hear(amplitude * 2.0_f64.sqrt() * (0.3 * f64::from(n)).sin(), 0.02);
+            }
+            ear
+        };
+        let right = hear(0.1);
+        assert!((right.amplitude() - 0.1).abs() < 2e-3);
+        assert!((right.pushed(0.4, 0.1) - 0.4).abs() < 3e-3);
+        assert!((0.45..HARDEST).contains(&hear(0.05).pushed(0.4, 0.1)));
+        assert!((0.37..0.39).contains(&hear(0.2).pushed(0.4, 0.1)));
+        assert_eq!(Ear::default().pushed(0.4, 0.1), HARDEST);
+        assert_eq!(Ear::default().pushed(0.8, 0.5), 0.8, "a loud note speaks by itself");
+    }
+}
