@@ -1,68 +1,98 @@
-//! Breath noise: turbulence of the jet through the reed channel, which breaks up where its flow is pulsed.
+//! Breath noise: turbulence of the jet through the reed channel.
 //!
-//! A steady jet is quiet. The noise rides on what the flow does beside its own slow mean. So it pulsates with the reed, twice
-//! a period, grows with the speed to which the reed drives the jet, and below the threshold there is hardly any: a
-//! whisper on the mean flow, as a player's mouth makes. Band and level are those of recorded notes, see `docs/tone.md`.
+//! Two models of the jet. A [steady](Jet::Steady) one hisses in proportion to its flow, as it does in projects from before there
+//! was another. A [pulsed](Jet::Pulsed) one is quiet while it is steady and breaks up where its flow is pulsed: its noise
+//! rides on what the flow does beside its own slow mean. So the noise pulsates with the reed, grows with the speed to which the
+//! reed drives the jet, and below the threshold there is hardly any: a whisper on the mean flow, as a player's mouth makes.
+//! Band and level of the pulsed jet are those of recorded notes, see `docs/tone.md`.
 
 use super::control_tick::TICK;
 
-/// Noise at amount 1: noise flow over the flow it rides on, for turbulence of rms 1 before its band. At the default amount of
-/// 0.3, held notes have the noise of recorded ones at mezzo-forte.
-const NOISE_FLOW: f64 = 0.30;
-/// Share of the mean flow that whispers although nothing is pulsed: -78 dBFS below the threshold (by judgement).
+/// How the jet makes noise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Jet {
+    /// In proportion to its flow.
+    #[default]
+    Steady,
+    /// Where its flow is pulsed.
+    Pulsed,
+}
+
+/// Steady: noise flow at amount 1, rms over the mean flow that it rides on (by level: -40 dB under a mezzo-forte fundamental
+/// at an amount of 0.3).
+const STEADY_NOISE: f64 = 0.018;
+/// Steady: corners of the band, Hz; turbulence in the channel is broad around a few kHz (by judgement).
+const STEADY_BAND_HZ: (f64, f64) = (600.0, 5_000.0);
+/// Pulsed: noise flow at amount 1 over the flow that it rides on, for turbulence of rms 1 before its band. At the default
+/// amount of 0.3, held notes have the noise of recorded ones at mezzo-forte.
+const PULSED_NOISE: f64 = 0.30;
+/// Pulsed: the band, Hz. Above the low corner turbulence falls with 12 dB an octave down to a floor, which ends at the high one.
+const PULSED_BAND_HZ: (f64, f64) = (600.0, 12_000.0);
+/// Pulsed: the floor over the level below the low corner.
+const FLOOR: f64 = 0.04;
+/// Pulsed: share of the mean flow that whispers although nothing is pulsed: -78 dBFS below the threshold (by judgement).
 const WHISPER: f64 = 0.012;
+/// Pulsed: time constant of the slow mean of the flow, s: longer than a period of the lowest note, shorter than a tongued one.
+const MEAN_S: f64 = 0.03;
 /// Below this flow the jet is laminar and silent: a Reynolds number of 25 in a channel 13 mm wide, about a hundredth of
 /// the flow in a soft note. After the breath has ended, the flow in the bore decays only as 1 / t; it must not hiss.
 const LAMINAR_FLOW: f64 = 0.002;
-/// The band, Hz: above the low corner turbulence falls with 12 dB an octave down to a floor, which ends at the high one.
-/// Fitted to the recorded noise in five bands from 0.3 to 15 kHz, all met within 3 dB.
-const NOISE_BAND_HZ: (f64, f64) = (600.0, 12_000.0);
-/// The floor over the level below the low corner.
-const FLOOR: f64 = 0.04;
-/// Time constant of the slow mean of the flow, s: longer than a period of the lowest note, shorter than a tongued one.
-const MEAN_S: f64 = 0.03;
 /// Seed of the noise: any constant does; with a constant, renders repeat.
 const NOISE_SEED: u64 = 0x9E37_79B9_7F4A_7C15;
 
 /// The noise of one voice. Flows are over those of the reference reed.
 pub(super) struct BreathNoise {
-    /// Noise flow over pulsed flow.
-    strength: f64,
-    /// Noise flow of the whisper.
-    whisper: f64,
-    /// Slow mean of the flow.
-    mean: f64,
+    jet: Jet,
+    /// Coefficients of the two corners, for the steady and the pulsed jet.
+    corners: [(f64, f64); 2],
     /// Share of the way that the mean goes in one tick.
     mean_share: f64,
+    /// Noise flow over the flow that it rides on.
+    strength: f64,
+    /// Flow beside which noise rides: the slow mean of a pulsed jet.
+    mean: f64,
+    /// Flow that makes no noise.
+    quiet: f64,
+    /// Noise flow without pulses.
+    whisper: f64,
     random: u64,
     high: f64,
     low: [f64; 2],
-    /// Coefficients of the two corners.
-    corners: (f64, f64),
     hiss: [f64; TICK],
 }
 
 impl BreathNoise {
-    /// Silent, at a sample rate in Hz.
+    /// Silent, with a steady jet, at a sample rate in Hz.
     pub fn new(rate_hz: f64) -> Self {
         let corner = |hz: f64| 1.0 - (-std::f64::consts::TAU * hz / rate_hz).exp();
         Self {
-            strength: 0.0,
-            whisper: 0.0,
-            mean: 0.0,
+            jet: Jet::Steady,
+            corners: [STEADY_BAND_HZ, PULSED_BAND_HZ].map(|(low, high)| (corner(low), corner(high))),
             mean_share: 1.0 - (-(TICK as f64) / (MEAN_S * rate_hz)).exp(),
+            strength: 0.0,
+            mean: 0.0,
+            quiet: LAMINAR_FLOW,
+            whisper: 0.0,
             random: NOISE_SEED,
             high: 0.0,
             low: [0.0; 2],
-            corners: (corner(NOISE_BAND_HZ.0), corner(NOISE_BAND_HZ.1)),
             hiss: [0.0; TICK],
         }
     }
 
-    /// Starts the noise again from its seed.
+    /// Starts the noise again from its seed; the jet stays.
     pub fn reset(&mut self) {
-        (self.mean, self.high, self.low) = (0.0, 0.0, [0.0; 2]);
+        (self.mean, self.whisper, self.high, self.low) = (0.0, 0.0, 0.0, [0.0; 2]);
         self.random = NOISE_SEED;
+    }
+
+    /// Chooses how the jet makes noise. Real-time safe.
+    pub fn set_jet(&mut self, jet: Jet) {
+        if jet != self.jet {
+            self.jet = jet;
+            (self.mean, self.whisper, self.low) = (0.0, 0.0, [0.0; 2]);
+            self.quiet = if jet == Jet::Steady { LAMINAR_FLOW } else { 0.0 };
+        }
     }
 
     /// Turbulence of the next tick at `amount`, 0..=1, after a tick that ended with this flow. Computed outside the loop over
@@ -71,21 +101,40 @@ impl BreathNoise {
     /// The white noise comes from a linear congruential generator (Knuth, The Art of Computer Programming 2, 3.3.4: MMIX);
     /// its upper bits are heard, uniform with unit variance.
     pub fn fill(&mut self, amount: f64, jet_flow: f64) {
-        self.mean += self.mean_share * (jet_flow - self.mean);
-        self.strength = amount * NOISE_FLOW;
-        self.whisper = self.strength * WHISPER * (self.mean.abs() - LAMINAR_FLOW).max(0.0);
+        match self.jet {
+            Jet::Steady => self.strength = amount * STEADY_NOISE,
+            Jet::Pulsed => {
+                self.strength = amount * PULSED_NOISE;
+                self.mean += self.mean_share * (jet_flow - self.mean);
+                self.whisper = self.strength * WHISPER * (self.mean.abs() - LAMINAR_FLOW).max(0.0);
+            }
+        }
         if self.strength == 0.0 {
             return;
         }
-        let (low, high) = self.corners;
+        let (low, high) = self.corners[self.jet as usize];
         let unit = high * 1.732_050_807_568_877_2 / (1_u64 << 63) as f64;
         let (mut random, mut smooth, [mut once, mut twice]) = (self.random, self.high, self.low);
-        for hiss in &mut self.hiss {
+        let mut white = || {
             random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            smooth += unit * (random as i64) as f64 - high * smooth;
-            once += low * (smooth - once);
-            twice += low * (once - twice);
-            *hiss = twice + FLOOR * smooth;
+            unit * (random as i64) as f64
+        };
+        match self.jet {
+            Jet::Steady => {
+                for hiss in &mut self.hiss {
+                    smooth += white() - high * smooth;
+                    once += low * (smooth - once);
+                    *hiss = smooth - once;
+                }
+            }
+            Jet::Pulsed => {
+                for hiss in &mut self.hiss {
+                    smooth += white() - high * smooth;
+                    once += low * (smooth - once);
+                    twice += low * (once - twice);
+                    *hiss = twice + FLOOR * smooth;
+                }
+            }
         }
         (self.random, self.high, self.low) = (random, smooth, [once, twice]);
     }
@@ -93,6 +142,7 @@ impl BreathNoise {
     /// Noise flow of sample `at` of the tick on a jet of this flow.
     #[inline(always)]
     pub fn flow(&self, jet_flow: f64, at: usize) -> f64 {
-        (self.strength * (jet_flow - self.mean).abs() + self.whisper) * self.hiss[at & (TICK - 1)]
+        let turbulent = ((jet_flow - self.mean).abs() - self.quiet).max(0.0);
+        (self.strength * turbulent + self.whisper) * self.hiss[at & (TICK - 1)]
     }
 }

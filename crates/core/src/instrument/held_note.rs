@@ -4,6 +4,7 @@
 
 use crate::bore::sound_sources::SoundSources;
 use crate::instrument::lip::embouchure;
+use crate::instrument::listening::Listening;
 use crate::instrument::model::Model;
 use crate::instrument::voice::{Drive, TICK, Voice};
 use crate::reed::ReedLaw;
@@ -47,6 +48,8 @@ pub struct HeldNote {
     pub rows: f64,
     /// How the note begins.
     pub start: Start,
+    /// From where it is heard.
+    pub listening: Listening,
 }
 
 impl HeldNote {
@@ -64,14 +67,16 @@ impl HeldNote {
             noise: 0.0,
             rows: model.tuning.notes[fingering].natural,
             start: Start::Ramp(20.0),
+            listening: Listening::point(),
         }
     }
 
-    /// A fingering under the lip that a player has at a dynamic, 0..=1.
+    /// A fingering under the lip that a player has at a dynamic, 0..=1, heard as by default.
     pub fn played(model: &Model, fingering: usize, dynamic: f64, gamma: f64) -> Self {
         let lip = model.player.lip(model.place(fingering), dynamic);
         let law = lip.law(ReedLaw::default());
-        Self { law, zeta: ZETA_REFERENCE * lip.channel, ..Self::new(model, fingering, gamma) }
+        let listening = Listening::default();
+        Self { law, zeta: ZETA_REFERENCE * lip.channel, listening, ..Self::new(model, fingering, gamma) }
     }
 
     /// The reed under the lip of this note.
@@ -101,6 +106,7 @@ impl HeldNote {
         }
         voice.lattice_mut().set_jet_loss(self.jet_loss);
         voice.lattice_mut().glide_delay(self.rows, 0);
+        voice.listen(&self.listening, false);
         voice
     }
 

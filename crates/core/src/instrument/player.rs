@@ -21,8 +21,9 @@ mod tuning;
 use crate::bore::lattice::Real;
 use crate::control::keys::Keys;
 use crate::event::Event;
+use crate::instrument::breath_noise::Jet;
 use crate::instrument::model::Model;
-use crate::instrument::settings::Settings;
+use crate::instrument::settings::{BreathResponse, Settings};
 use crate::instrument::voice::{Drive, TICK, Voice};
 use crate::reed::physical::P_REF_PA;
 use crate::units::{SoundingNote, cents};
@@ -250,6 +251,10 @@ impl Player {
         let fingering = self.fingers.fingering();
         let posture = self.posture.get_or_insert_with(|| {
             voice.lattice_mut().set_jet_loss(f64::from(settings.vent_loss));
+            voice.set_jet(match settings.breath_response {
+                BreathResponse::Physical => Jet::Steady,
+                BreathResponse::Played => Jet::Pulsed,
+            });
             Posture::new(&settings, fingering.unwrap_or(0), self.bend_cents, tick_s, model)
         });
         let (key_down, tongue_holds) = (!self.keys.is_empty(), self.tongue.is_holding());
@@ -267,7 +272,7 @@ impl Player {
         if self.tuning.tick(fingering, gamma, &context, model, lattice) {
             // The clock's speed has changed, and with it the length of a tick.
             let lags = Lags::new(&settings, self.tick_s(model), model.lowest_hz);
-            self.posture = Some(Posture { lags, ..posture });
+            self.posture = Some(posture.with_lags(lags));
         }
         Drive { p_mouth, tongue, noise: f64::from(settings.noise), reed: posture.reed }
     }

@@ -2,7 +2,7 @@
 //!
 //! [`Preparation`] is the only way. It looks for the instrument among those that come with the program (`bundled`) and
 //! in a [`Store`]; else it scales the bore by theory (`scale`), cuts it into cells and fits them to the bore's transfer
-//! matrices (`cut_and_fit`), and plays every note until its trim is right ([`auto_tune`]). Where the trims would need
+//! matrices (`cut_and_fit`), and plays every note until its trim is right ([`auto_tune`]), and at every dynamic of a player ([`play_dynamics`]). Where the trims would need
 //! more than the tuning delay can give, it makes the whole bore a little longer or shorter first and fits it again: a
 //! maker's remedy, which keeps the relations between the notes. Callers that cannot wait, or want the bore as it was
 //! built, stop half-way: see the methods of [`Preparation`]. All that makes an instrument needs the feature `fit`. Results do not depend on the number of cores.
@@ -23,7 +23,7 @@ pub mod auto_tune;
 mod bundled;
 mod cut_and_fit;
 #[cfg(feature = "fit")]
-mod play_dynamics;
+pub mod play_dynamics;
 mod prepared_file;
 #[cfg(feature = "fit")]
 mod scale;
@@ -64,6 +64,9 @@ pub type OnProgress<'a> = &'a mut dyn FnMut(Progress<'_>) -> ControlFlow<()>;
 /// Share of the work of tuning that is done when every note has been heard once.
 #[cfg(feature = "fit")]
 const HEARD: f64 = 0.05;
+/// And when every note has its trim.
+#[cfg(feature = "fit")]
+const TUNED: f64 = 0.6;
 
 /// Prepares one instrument. Every method allocates, and refuses a host rate or an A4 out of range with
 /// [`BuildError::Rate`] or [`BuildError::A4`].
@@ -152,10 +155,13 @@ impl Preparation<'_> {
             model = Arc::new(cut_and_fit::fit(&self.wanted.file, scale, rate_hz, a4_hz, on)?);
             offsets = heard_offsets(&model, on)?;
         }
-        let mut tuning_share = |share| on(Progress::Tuning(HEARD + (1.0 - HEARD) * share));
+        let mut tuning_share = |share| on(Progress::Tuning(HEARD + (TUNED - HEARD) * share));
         let tuning = auto_tune::tune(&model, &offsets, Accuracy::QUICK, &mut tuning_share)
             .ok_or(BuildError::Cancelled)?;
         let model = Model { tuning, ..Model::clone(&model) };
+        let mut playing_share = |share| on(Progress::Tuning(TUNED + (1.0 - TUNED) * share));
+        let tuning = play_dynamics::learn(&model, &mut playing_share).ok_or(BuildError::Cancelled)?;
+        let model = Model { tuning, ..model };
         self.keep(Stored::Tuned, &model)?;
         Ok(model)
     }

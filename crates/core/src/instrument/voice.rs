@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::bore::lattice::{HoleFlows, Lattice, LatticeCoeffs, Real, Tip};
 use crate::bore::sound_sources::SoundSources;
-use crate::instrument::breath_noise::BreathNoise;
+use crate::instrument::breath_noise::{BreathNoise, Jet};
 pub use crate::instrument::control_tick::TICK;
 use crate::instrument::listening::Listening;
 use crate::instrument::outside::Outside;
@@ -206,6 +206,11 @@ impl<F: Real> Voice<F> {
     /// The probes of the last tick, if they are recorded.
     pub fn probes(&self) -> Option<&[Probe; TICK]> {
         self.mouth.probes.as_ref()
+    }
+
+    /// Chooses how the jet through the reed channel makes noise; steady at first. Real-time safe.
+    pub fn set_jet(&mut self, jet: Jet) {
+        self.mouth.noise.set_jet(jet);
     }
 
     /// Listens in another way from the next tick on, with a right channel if `stereo`. Real-time safe.

@@ -129,6 +129,11 @@ impl Posture {
         posture
     }
 
+    /// The same for ticks of another length.
+    pub fn with_lags(self, lags: Lags) -> Self {
+        Self { lags, ..self }
+    }
+
     /// Gives the reed the lip of a dynamic, 0..=1; nothing where the breath is physical.
     pub fn shape_lip(&mut self, dynamic: f64) {
         let Some(played) = &mut self.played else { return };

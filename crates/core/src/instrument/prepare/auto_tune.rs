@@ -2,8 +2,8 @@
 //! pitch is right.
 //!
 //! The notes are independent, so the result does not depend on how many processor cores share them. A note that hardly ever
-//! sounds in its register gets the trims of its neighbours and is marked. What a player needs of a note is learnt in
-//! [`play_dynamics`]. Units: cents above the wanted pitch, rows of
+//! sounds in its register gets the trims of its neighbours and is marked. What a player needs of a note is learnt
+//! afterwards, in [`play_dynamics`](super::play_dynamics). Units: cents above the wanted pitch, rows of
 //! round-trip delay, mouth pressure over the closing pressure (gamma).
 
 use std::ops::ControlFlow;
@@ -11,9 +11,6 @@ use std::ops::ControlFlow;
 use crate::analysis::pitch;
 use crate::instrument::held_note::HeldNote;
 use crate::instrument::model::Model;
-use crate::instrument::played_note::PlayedNote;
-use crate::instrument::player::dynamics::NODES;
-use crate::instrument::prepare::play_dynamics;
 use crate::instrument::tuning_table::{GAMMA_NODES, NATURAL_GAMMA, NoteTuning, TuningTable};
 use crate::parallel;
 use crate::units::cents;
@@ -206,9 +203,6 @@ fn tune_note(
         rows = found.map_or(rows, |found| found.rows);
         *trim = rows;
     }
-    let unheard = PlayedNote { rows: [note.natural; NODES], ..PlayedNote::default() };
-    let learnt = if note.silent { None } else { play_dynamics::learn(model, fingering, &note) };
-    note.played = learnt.unwrap_or(unheard);
     note
 }
 
@@ -264,6 +258,5 @@ fn fill_silent(model: &Model, table: &mut TuningTable) {
             between(|note| note.tempered[2]),
             between(|note| note.tempered[3]),
         ];
-        note.played.rows = [note.natural; NODES];
     }
 }
