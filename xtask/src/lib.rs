@@ -106,6 +106,12 @@ pub const COMMANDS: &[Command] = &[
         checks: true,
     },
     Command {
+        name: "play-dynamics",
+        about: "play every note of the bundled instruments at every dynamic and find what it asks of the player; takes the same",
+        run: prepared::play_dynamics,
+        checks: true,
+    },
+    Command {
         name: "fit-player",
         about: "fit the player's rule for breath and lip to recorded notes, and validate it on notes left out; takes minutes",
         run: fit_player::run,

@@ -8,7 +8,9 @@ use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::cells::Cells;
 use chalumeau_core::instrument::held_note::HeldNote;
 use chalumeau_core::instrument::internal_rate::INTERNAL_RATES_HZ;
+use chalumeau_core::instrument::player::dynamics::NODES;
 use chalumeau_core::instrument::prepare::auto_tune::{self, Accuracy};
+use chalumeau_core::instrument::prepare::play_dynamics;
 use chalumeau_core::instrument::prepare::{self, Preparation, PreparedInstrument, Progress};
 use chalumeau_core::instrument::tuning_table::{GAMMA_NODES, NATURAL_GAMMA};
 use chalumeau_core::instrument::{Model, Quality, Wanted};
@@ -23,6 +25,9 @@ const RADIUS_TOLERANCE: f64 = 2e-3;
 const CENTS_TOLERANCE: f64 = 0.12;
 /// Highest written note that is checked; above it fingerings are unreliable.
 const HIGHEST_WRITTEN: u8 = 92;
+/// How far what is learnt of a note's dynamics may differ: mouth over closing pressure, and rows of delay.
+const GAMMA_TOLERANCE: f64 = 1e-3;
+const ROWS_TOLERANCE: f64 = 0.02;
 /// Of all instruments but the first, every so manieth note is checked.
 const CHECKED_NOTES: usize = 7;
 
@@ -183,8 +188,66 @@ pub fn tune(args: &[String]) -> Result<()> {
         let offsets =
             auto_tune::offsets(&model, &mut |_| ControlFlow::Continue(())).context("not cancelled")?;
         let tuning = auto_tune::tune(&model, &offsets, Accuracy::FINE, &mut on).context("not cancelled")?;
-        keep(instrument, PreparedInstrument::of(&Model { tuning, ..model }))?;
+        learn_dynamics(instrument, &name, Model { tuning, ..model })?;
     }
+    Ok(())
+}
+
+/// What notes ask of the player; checked by learning some notes again.
+pub fn play_dynamics(args: &[String]) -> Result<()> {
+    let asked = Asked::parse(args)?;
+    let (instruments, qualities) = if asked.check {
+        ([Bundled::BFlat].as_slice(), [Quality::Live].as_slice())
+    } else {
+        (Bundled::ALL.as_slice(), QUALITIES.as_slice())
+    };
+    for (instrument, wanted) in asked.wanted(instruments, qualities) {
+        let name = name(instrument, &wanted)?;
+        let entry = entry(instrument, &wanted)?;
+        let model = entry.model(&wanted.file).with_context(|| format!("{name}: kept for another chart"))?;
+        if asked.check {
+            check_dynamics(&name, &model)?;
+        } else {
+            learn_dynamics(instrument, &name, model)?;
+        }
+    }
+    Ok(())
+}
+
+fn learn_dynamics(instrument: Bundled, name: &str, model: Model) -> Result<()> {
+    let mut on = |share| {
+        tell(&format!("{name}: playing dynamics"), share);
+        ControlFlow::Continue(())
+    };
+    let tuning = play_dynamics::learn(&model, &mut on).context("not cancelled")?;
+    keep(instrument, PreparedInstrument::of(&Model { tuning, ..model }))
+}
+
+fn check_dynamics(name: &str, model: &Model) -> Result<()> {
+    let notes: Vec<usize> = (0..model.tuning.notes.len())
+        .filter(|&note| model.file.fingerings[note].written.0 <= HIGHEST_WRITTEN)
+        .step_by(CHECKED_NOTES)
+        .collect();
+    let worst_of = |at: usize| {
+        let (kept, again) = (model.tuning.notes[notes[at]], play_dynamics::learn_note(model, notes[at])?);
+        let off = |a: [f64; NODES], b: [f64; NODES]| {
+            a.into_iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
+        Some((off(kept.played.gammas, again.gammas), off(kept.played.rows, again.rows)))
+    };
+    let found = parallel::each(notes.len(), worst_of, &mut |_| ControlFlow::Continue(()));
+    let (mut gamma, mut rows) = (0.0_f64, 0.0_f64);
+    for (note, found) in notes.iter().zip(found.context("not cancelled")?) {
+        let (g, r) = found.with_context(|| {
+            format!("{name}: fingering {note} cannot be played at every dynamic; run `cargo xtask play-dynamics`")
+        })?;
+        (gamma, rows) = (gamma.max(g), rows.max(r));
+    }
+    println!("{name}: learnt again, pressures differ by {gamma:.1e}, trims by {rows:.1e} rows at most");
+    ensure!(
+        gamma < GAMMA_TOLERANCE && rows < ROWS_TOLERANCE,
+        "{name}: dynamics have changed; run `cargo xtask play-dynamics`"
+    );
     Ok(())
 }
 

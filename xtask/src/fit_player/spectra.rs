@@ -1,7 +1,7 @@
 //! One note on a grid of flow strength and mouth pressure, and what lies between the points.
 
 use chalumeau_core::analysis::{pitch, spectrum};
-use chalumeau_core::instrument::Model;
+use chalumeau_core::instrument::{Listening, Model};
 use chalumeau_core::instrument::held_note::{HeldNote, Start};
 use chalumeau_core::instrument::player::dynamics::LipShape;
 use chalumeau_core::reed::ReedLaw;
@@ -97,6 +97,7 @@ impl NoteSpectra {
                     law: lip.law(ReedLaw::default()),
                     zeta: ZETA_REFERENCE * lip.channel,
                     start: Start::Tongued(2.0),
+                    listening: Listening::default(),
                     ..HeldNote::new(model, fingering, gamma)
                 };
                 Some((gamma, PlayedSpectrum::hear(model, &held, f0_hz)?))

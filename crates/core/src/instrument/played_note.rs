@@ -9,12 +9,18 @@ use serde::{Deserialize, Serialize};
 
 use crate::instrument::player::dynamics::NODES;
 
+/// The onset lies at least this far below the pressures of a note: some notes' first dynamics.
+const LEAST_EXCESS: f64 = 2e-3;
+/// Numbers are kept to one part in so many.
+const DIGITS: f64 = 1e5;
+
 /// Mouth pressures and trims of one note.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlayedNote {
     /// Mouth over closing pressure at which the note begins at dynamic 0, as far as its levels tell: below all of `gammas`.
     pub onset: f64,
-    /// Mouth over closing pressure at dynamics evenly from 0 to 1, rising.
+    /// Mouth over closing pressure at dynamics evenly from 0 to 1. It rises, but for the softest dynamics of some notes,
+    /// where the lip alone makes the difference.
     pub gammas: [f64; NODES],
     /// Amplitudes of the steady note there, rms of the pressure in the mouthpiece over the closing pressure.
     pub amplitudes: [f64; NODES],
@@ -46,8 +52,13 @@ impl PlayedNote {
     /// them and the squares of their amplitudes meets zero.
     pub fn new(gammas: [f64; NODES], amplitudes: [f64; NODES], rows: [f64; NODES]) -> Self {
         let ratio = (amplitudes[1] / amplitudes[0]).powi(2).max(1.5);
-        let onset = gammas[0] - (gammas[1] - gammas[0]) / (ratio - 1.0);
-        Self { onset, gammas, amplitudes, rows }
+        // Where the lip alone makes the note softer, the pressures may even fall.
+        let lowest = gammas.into_iter().fold(f64::INFINITY, f64::min);
+        let onset = (gammas[0] - (gammas[1] - gammas[0]) / (ratio - 1.0)).min(lowest - LEAST_EXCESS);
+        // More digits than anyone hears would make the files of the instruments large.
+        let round = |x: f64| (x * DIGITS).round() / DIGITS;
+        let [gammas, amplitudes, rows] = [gammas, amplitudes, rows].map(|numbers| numbers.map(round));
+        Self { onset: round(onset), gammas, amplitudes, rows }
     }
 
     /// Mouth over closing pressure at a dynamic, 0..=1. Real-time safe.

@@ -29,12 +29,15 @@ const PERIODIC: f64 = 0.9;
 /// Largest number of corrections of the trim at one dynamic.
 const TRIMS: usize = 3;
 /// Mouth pressures that are tried for the loudest dynamic, over that of the rule.
-const LOUDEST: [f64; 5] = [1.0, 0.93, 0.86, 0.8, 0.74];
+const LOUDEST: [f64; 4] = [1.0, 0.92, 0.84, 0.76];
+/// Ranges of level that are tried, over that of the rule: a note of the altissimo that falls into another register where it
+/// is soft is not played so softly.
+const RANGES: [f64; 6] = [1.0, 0.8, 0.6, 0.45, 0.3, 0.2];
 /// Excess of the pressure from one dynamic to the next lower one, where the controller begins; from the loudest down.
-const RATIOS: [f64; NODES - 1] = [0.7, 0.6, 0.5, 0.5, 0.6];
+const RATIOS: [f64; NODES - 1] = [0.75, 0.7, 0.65, 0.75, 0.9];
 /// The controller moves the logarithm of the excess of the mouth pressure over this, which is below the onset of any note:
-/// 1/3 without losses.
-const LOWEST_ONSET: f64 = 0.33;
+/// 1/3 for a reed without mass, less near its resonance.
+const LOWEST_ONSET: f64 = 0.25;
 /// The controller: mouth over closing pressure for 1 neper of distance at once, and the rate at which the logarithm of the
 /// excess follows the distance, 1/s. Near its threshold the amplitude grows by some 300 nepers a second and unit of pressure: the
 /// two then settle in a quarter of a second.
@@ -91,7 +94,7 @@ struct Diminuendo<'a> {
 pub fn learn(model: &Model, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Option<TuningTable> {
     let note = |fingering: usize| {
         let note = model.tuning.notes[fingering];
-        let learnt = if note.silent { None } else { learn_note(model, fingering, &note) };
+        let learnt = if note.silent { None } else { learn_note(model, fingering) };
         // What cannot be played gets the pressures of other notes.
         let unheard = || PlayedNote { rows: [note.natural; NODES], ..PlayedNote::default() };
         NoteTuning { played: learnt.unwrap_or_else(unheard), ..note }
@@ -99,26 +102,38 @@ pub fn learn(model: &Model, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Optio
     Some(TuningTable { notes: parallel::each(model.tuning.notes.len(), note, on)? })
 }
 
-/// What one note asks of the player; `None` if it leaves its register at some dynamic.
-fn learn_note(model: &Model, fingering: usize, tuned: &NoteTuning) -> Option<PlayedNote> {
-    let wanted = model.player.loudest_gamma(model.place(fingering));
-    LOUDEST.into_iter().find_map(|share| {
-        let mut note = Diminuendo::begin(model, fingering, tuned, share * wanted)?;
-        let (mut gammas, mut amplitudes, mut rows) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
-        let mut loudest = None;
-        for node in (0..NODES).rev() {
-            let dynamic = node as f64 / (NODES - 1) as f64;
-            if let Some(power) = loudest {
-                note.wanted = Some(power * 10.0_f64.powf(0.1 * model.player.level_db(dynamic)));
-                let excess = RATIOS[NODES - 2 - node] * (note.held.gamma - LOWEST_ONSET).max(1e-3);
-                note.go_to(dynamic, LOWEST_ONSET + excess);
-            }
-            let heard = note.settle(tuned.sensitivity)?;
-            loudest = loudest.or(Some(heard.power));
-            (gammas[node], amplitudes[node], rows[node]) = (heard.gamma, heard.amplitude, note.held.rows);
+/// What one note asks of the player; `None` if it leaves its register whatever is tried.
+pub fn learn_note(model: &Model, fingering: usize) -> Option<PlayedNote> {
+    let tuned = model.tuning.notes.get(fingering)?;
+    let gamma = model.player.loudest_gamma(model.place(fingering));
+    let tries = RANGES.into_iter().flat_map(|range| LOUDEST.map(|share| (range, share)));
+    tries.into_iter().find_map(|(range, share)| descend(model, fingering, tuned, share * gamma, range))
+}
+
+/// Plays the diminuendo from a mouth pressure `gamma`, over a part of the rule's range of level; `None` if the note leaves its
+/// register.
+fn descend(
+    model: &Model,
+    fingering: usize,
+    tuned: &NoteTuning,
+    gamma: f64,
+    range: f64,
+) -> Option<PlayedNote> {
+    let mut note = Diminuendo::begin(model, fingering, tuned, gamma)?;
+    let (mut gammas, mut amplitudes, mut rows) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
+    let mut loudest = None;
+    for node in (0..NODES).rev() {
+        let dynamic = node as f64 / (NODES - 1) as f64;
+        if let Some(power) = loudest {
+            note.wanted = Some(power * 10.0_f64.powf(0.1 * range * model.player.level_db(dynamic)));
+            let excess = RATIOS[NODES - 2 - node].powf(range) * (note.held.gamma - LOWEST_ONSET).max(1e-3);
+            note.go_to(dynamic, LOWEST_ONSET + excess);
         }
-        Some(PlayedNote::new(gammas, amplitudes, rows))
-    })
+        let heard = note.settle(tuned.sensitivity)?;
+        loudest = loudest.or(Some(heard.power));
+        (gammas[node], amplitudes[node], rows[node]) = (heard.gamma, heard.amplitude, note.held.rows);
+    }
+    Some(PlayedNote::new(gammas, amplitudes, rows))
 }
 
 impl<'a> Diminuendo<'a> {
@@ -234,8 +249,11 @@ mod tests {
     fn look() {
         let model = Model::built_in(48_000.0).unwrap();
         let start = std::time::Instant::now();
-        let fingerings: Vec<usize> = (0..model.notes_hz.len()).collect();
-        let learnt = parallel::each(fingerings.len(), |at| learn_note(&model, at, &model.tuning.notes[at]), &mut |_| {
+        let fingerings: Vec<usize> = match std::env::var("LOOK") {
+            Ok(list) => list.split(',').map(|at| at.parse().unwrap()).collect(),
+            Err(_) => (0..model.notes_hz.len()).collect(),
+        };
+        let learnt = parallel::each(fingerings.len(), |at| learn_note(&model, fingerings[at]), &mut |_| {
             ControlFlow::Continue(())
         });
         for (at, note) in learnt.unwrap().iter().enumerate() {
