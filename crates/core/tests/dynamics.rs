@@ -135,3 +135,17 @@ fn look_attacks() {
         println!("{written} {}", text.join(" "));
     }
 }
+
+#[test]
+fn envelope() {
+    let settings = Settings { gain_db: -20.0, ..Settings::default() };
+    for written in [52, 64, 72, 80] {
+        for value in [7, 16, 48] {
+            let note = Event::NoteOn { note: sounding(written), velocity: 0.8 };
+            let out = rendered(&settings, vec![at(0.0, cc(value)), at(0.0, note)], 0.7);
+            let levels: Vec<String> = (0..60).filter(|w| *w < 16 || w % 4 == 0)
+                .map(|w| format!("{:.0}", heard(&out, 0.01 * w as f64, 0.01 * (w + 1) as f64, written).level_db + 20.0)).collect();
+            println!("{written} {value}: {}", levels.join(" "));
+        }
+    }
+}

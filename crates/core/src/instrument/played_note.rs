@@ -7,7 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::instrument::player::dynamics::NODES;
+use crate::instrument::player::dynamics::{NODE_DYNAMICS, NODES};
 
 /// The onset lies at least this far below the pressures of a note: some notes' first dynamics.
 const LEAST_EXCESS: f64 = 2e-3;
@@ -19,7 +19,7 @@ const DIGITS: f64 = 1e5;
 pub struct PlayedNote {
     /// Mouth over closing pressure at which the note begins at dynamic 0, as far as its levels tell: below all of `gammas`.
     pub onset: f64,
-    /// Mouth over closing pressure at dynamics evenly from 0 to 1. It rises, but for the softest dynamics of some notes,
+    /// Mouth over closing pressure at [`NODE_DYNAMICS`]. It rises, but for the softest dynamics of some notes,
     /// where the lip alone makes the difference.
     pub gammas: [f64; NODES],
     /// Amplitudes of the steady note there, rms of the pressure in the mouthpiece over the closing pressure.
@@ -33,8 +33,8 @@ impl Default for PlayedNote {
     fn default() -> Self {
         Self {
             onset: 0.39,
-            gammas: [0.40, 0.42, 0.46, 0.54, 0.70, 0.92],
-            amplitudes: [0.06, 0.12, 0.22, 0.36, 0.52, 0.68],
+            gammas: [0.40, 0.41, 0.44, 0.49, 0.56, 0.65, 0.77, 0.92],
+            amplitudes: [0.06, 0.12, 0.21, 0.31, 0.41, 0.49, 0.57, 0.63],
             rows: [0.0; NODES],
         }
     }
@@ -42,9 +42,10 @@ impl Default for PlayedNote {
 
 /// Segment and share of the way in it of a dynamic, clamped to 0..=1.
 fn segment(dynamic: f64) -> (usize, f64) {
-    let place = dynamic.clamp(0.0, 1.0) * (NODES - 1) as f64;
-    let left = (place as usize).min(NODES - 2);
-    (left, place - left as f64)
+    let dynamic = dynamic.clamp(0.0, 1.0);
+    let right = NODE_DYNAMICS[1..NODES - 1].partition_point(|&node| node < dynamic) + 1;
+    let (from, to) = (NODE_DYNAMICS[right - 1], NODE_DYNAMICS[right]);
+    (right - 1, (dynamic - from) / (to - from))
 }
 
 impl PlayedNote {
@@ -91,9 +92,9 @@ mod tests {
 
     fn note() -> PlayedNote {
         PlayedNote::new(
-            [0.38, 0.39, 0.42, 0.5, 0.65, 0.9],
-            [0.05, 0.1, 0.2, 0.3, 0.45, 0.6],
-            [1.0, 2.0, 4.0, 3.0, 2.0, 0.0],
+            [0.38, 0.39, 0.42, 0.46, 0.5, 0.58, 0.7, 0.9],
+            [0.05, 0.1, 0.2, 0.25, 0.32, 0.4, 0.5, 0.6],
+            [1.0, 2.0, 4.0, 3.5, 3.0, 2.0, 1.0, 0.0],
         )
     }
 
@@ -101,7 +102,7 @@ mod tests {
     fn the_curve_passes_through_its_nodes_and_rises() {
         let note = note();
         for node in 0..NODES {
-            let dynamic = node as f64 / (NODES - 1) as f64;
+            let dynamic = NODE_DYNAMICS[node];
             assert!((note.gamma(dynamic) - note.gammas[node]).abs() < 1e-12);
             assert!((note.amplitude(dynamic) - note.amplitudes[node]).abs() < 1e-12);
             assert!((note.rows(dynamic) - note.rows[node]).abs() < 1e-9);

@@ -24,8 +24,10 @@ use crate::reed::physical::ZETA_REFERENCE;
 
 /// The dynamic of mezzo-forte: as far below fortissimo as its level is, of the recorded notes, within what the reed can do.
 pub const MEZZO_FORTE: f64 = 0.62;
-/// Nodes over the dynamic, evenly from 0 to 1, at which a note's pressure and trim are known.
-pub const NODES: usize = 6;
+/// Number of dynamics at which a note's pressure and trim are known.
+pub const NODES: usize = 8;
+/// These dynamics: closer together where the reed begins to beat, and the pitch bends most.
+pub const NODE_DYNAMICS: [f64; NODES] = [0.0, 0.2, 0.4, 0.56, 0.7, 0.82, 0.92, 1.0];
 /// Distance in octaves from the lowest note to the middle of the compass, and from there to its end: 20.5 semitones, half the
 /// compass of a B flat clarinet up to sounding G6.
 const HALF_COMPASS_OCTAVES: f64 = 20.5 / 12.0;

@@ -11,7 +11,7 @@ use crate::analysis::pitch;
 use crate::instrument::held_note::{HeldNote, TONGUE_HOLD_S};
 use crate::instrument::model::Model;
 use crate::instrument::played_note::PlayedNote;
-use crate::instrument::player::dynamics::NODES;
+use crate::instrument::player::dynamics::{NODE_DYNAMICS, NODES};
 use crate::instrument::tuning_table::{NoteTuning, TuningTable};
 use crate::instrument::voice::{Drive, TICK, Voice};
 use crate::parallel;
@@ -33,8 +33,8 @@ const LOUDEST: [f64; 4] = [1.0, 0.92, 0.84, 0.76];
 /// Ranges of level that are tried, over that of the rule: a note of the altissimo that falls into another register where it
 /// is soft is not played so softly.
 const RANGES: [f64; 6] = [1.0, 0.8, 0.6, 0.45, 0.3, 0.2];
-/// Excess of the pressure from one dynamic to the next lower one, where the controller begins; from the loudest down.
-const RATIOS: [f64; NODES - 1] = [0.75, 0.7, 0.65, 0.75, 0.9];
+/// Excess of the pressure at dynamic 0 over that at 1, where the controller begins.
+const SOFTER: f64 = 0.2;
 /// The controller moves the logarithm of the excess of the mouth pressure over this, which is below the onset of any note:
 /// 1/3 for a reed without mass, less near its resonance.
 const LOWEST_ONSET: f64 = 0.25;
@@ -53,7 +53,7 @@ const PERIODS: f64 = 4.0;
 /// of settling after a new trim, and of listening.
 const BEGIN_S: f64 = 0.6;
 const CHANGE_S: f64 = 0.15;
-const SETTLE_S: f64 = 0.8;
+const SETTLE_S: f64 = 0.6;
 const TRIMMED_S: f64 = 0.25;
 const LISTEN_S: f64 = 0.25;
 /// Lowest note of the B flat clarinet, Hz. A larger instrument takes longer to settle, in proportion to its size.
@@ -123,10 +123,11 @@ fn descend(
     let (mut gammas, mut amplitudes, mut rows) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
     let mut loudest = None;
     for node in (0..NODES).rev() {
-        let dynamic = node as f64 / (NODES - 1) as f64;
+        let dynamic = NODE_DYNAMICS[node];
         if let Some(power) = loudest {
             note.wanted = Some(power * 10.0_f64.powf(0.1 * range * model.player.level_db(dynamic)));
-            let excess = RATIOS[NODES - 2 - node].powf(range) * (note.held.gamma - LOWEST_ONSET).max(1e-3);
+            let softer = range * (note.dynamic - dynamic);
+            let excess = SOFTER.powf(softer) * (note.held.gamma - LOWEST_ONSET).max(1e-3);
             note.go_to(dynamic, LOWEST_ONSET + excess);
         }
         let heard = note.settle(tuned.sensitivity)?;
