@@ -11,9 +11,9 @@ use chalumeau_core::units::{SoundingNote, cents};
 /// Harmonics of a spectrum.
 pub const HARMONICS: usize = 12;
 /// Flow strengths of the grid.
-const ZETAS: [f64; 7] = [0.14, 0.2, 0.28, 0.36, 0.44, 0.54, 0.66];
+const ZETAS: [f64; 6] = [0.14, 0.2, 0.28, 0.38, 0.5, 0.66];
 /// Time until a note is steady, and time that it is heard, s.
-const HEARD_S: (f64, f64) = (1.5, 2.0);
+const HEARD_S: (f64, f64) = (1.0, 1.3);
 /// A note further off than this is another one, cents.
 const OTHER_CENTS: f64 = 150.0;
 /// How far above the loudest point of the grid a level may be asked for, dB.
@@ -21,9 +21,9 @@ const OVER_DB: f64 = 0.7;
 
 /// Mouth pressures of the grid over the closing pressure: close together near the thresholds.
 fn gammas() -> impl Iterator<Item = f64> {
-    let fine = (0..20).map(|n| 0.35 + 0.005 * f64::from(n));
-    let middle = (0..6).map(|n| 0.45 + 0.025 * f64::from(n));
-    fine.chain(middle).chain((0..12).map(|n| 0.6 + 0.04 * f64::from(n)))
+    let fine = (0..12).map(|n| 0.36 + 0.008 * f64::from(n));
+    let middle = (0..6).map(|n| 0.46 + 0.025 * f64::from(n));
+    fine.chain(middle).chain((0..8).map(|n| 0.62 + 0.06 * f64::from(n)))
 }
 
 /// A steady note.

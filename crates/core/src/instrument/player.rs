@@ -213,7 +213,8 @@ impl Player {
 
     /// Slaps the fingering in place, or the first one before any note.
     fn tongue_slap<F: Real>(&mut self, strength: f32, model: &Model, voice: &mut Voice<F>) {
-        let begun = self.tongue.slap(strength, self.closing(), !self.keys.is_empty(), self.breath.gamma());
+        let closing = self.posture.as_ref().map_or(1.0, |posture| posture.free_closing);
+        let begun = self.tongue.slap(strength, closing, !self.keys.is_empty(), self.breath.gamma());
         if begun && self.fingers.fingering().is_none() {
             self.finger(0, false, model, voice);
         }

@@ -6,8 +6,8 @@ use super::dynamics::PlayerModel;
 /// CC BY 4.0).
 pub const FITTED: PlayerModel = PlayerModel {
     range_db: 27.0,
-    loudest_gamma: [0.95, -0.2, -0.15],
-    zeta: [-1.37, 0.3, 0.45, -0.5],
-    closing: [0.73, 2.065],
+    loudest_gamma: [0.9093, -0.1586, -0.1657],
+    zeta: [-1.3916, 0.8455, 0.5127, -1.1157],
+    closing: [0.7300, 1.9759],
     altissimo_stiffness: 1.6,
 };

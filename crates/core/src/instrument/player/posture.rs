@@ -22,6 +22,9 @@ use crate::units::{Air, cents};
 pub struct Posture {
     /// Closing pressure of the reed over the reference.
     pub closing: f64,
+    /// The same before a player's lip shapes the reed: the tongue's force goes with it. A force that followed the lip would move
+    /// the shut reed, and the volume that this sweeps is heard.
+    pub free_closing: f64,
     /// The reed under the lip.
     pub reed: ReedCoeffs,
     /// Delay on top of the note's trim, rows of round trip.
@@ -117,6 +120,7 @@ impl Posture {
         };
         let mut posture = Self {
             closing: free.law.closing(),
+            free_closing: free.law.closing(),
             reed: ReedCoeffs::new(free, rate_hz),
             rows: sensitivity * model.rows_for_cents(fingering, split.lip_cents),
             bore_cents: split.bore_cents,

@@ -57,7 +57,7 @@ impl Tongue {
     }
 
     /// Begins a slap of a strength in 0..=1; false if there is nothing to begin. `closing` is the closing pressure of
-    /// the reed over the reference, `gamma` the mouth pressure over the closing pressure.
+    /// the reed over the reference, before a player's lip shapes it, `gamma` the mouth pressure over the closing pressure.
     pub fn slap(&mut self, strength: f32, closing: f64, key_down: bool, gamma: f64) -> bool {
         let Some(slap) = Slap::begin(strength, self.force / closing, self.slap) else { return false };
         self.slap = Some(slap);
@@ -101,9 +101,10 @@ impl Tongue {
     /// the force on the reed, both over the reference closing pressure.
     pub fn tick(&mut self, gamma: f64, hardness: f64, context: &TickContext<'_>) -> (f64, f64) {
         let (tick_s, closing) = (context.tick_s, context.posture.closing);
+        let free_closing = context.posture.free_closing;
         let share = self.move_on(gamma, hardness, context);
         let p_mouth = gamma * closing;
-        let force = TONGUE_FORCE * closing * share;
+        let force = TONGUE_FORCE * free_closing * share;
         let Some(slap) = &mut self.slap else {
             // Letting go is as quick as asked; pressing takes a moment.
             self.force = if force <= self.force {
@@ -115,7 +116,7 @@ impl Tongue {
         };
         match slap.tick(tick_s) {
             Some(pull) => {
-                self.force = pull.force * closing;
+                self.force = pull.force * free_closing;
                 (p_mouth * (1.0 - pull.seal) + pull.suction * closing, self.force)
             }
             // The tongue comes off within one tick; its next movement begins at the free reed.
