@@ -37,7 +37,7 @@ const STEPS: (usize, usize) = (500, 250);
 const TOLERANCE: f64 = 2e-2;
 
 /// The numbers that are fitted: pressure at fortissimo (3), zeta (4), logarithm of the growth of the closing pressure. The
-/// others (range of levels, closing pressure at dynamic 0, stiffness in the altissimo) are chosen, see `docs/tone.md`.
+/// others (range of levels, closing pressure at dynamic 0, flow strength in the altissimo) are chosen, see `docs/tone.md`.
 const COUNT: usize = 8;
 /// Size of the first steps of the search.
 const FIRST_STEPS: [f64; COUNT] = [0.08, 0.08, 0.08, 0.1, 0.1, 0.1, 0.1, 0.1];
@@ -202,11 +202,11 @@ fn say(what: &str, compared: impl Iterator<Item = (Dynamic, Compared)>) {
 /// The generated file: its head as it is, then the rule.
 fn text(kept: &str, rule: &PlayerModel) -> String {
     let head = kept.split("pub const FITTED").next().unwrap_or_default();
-    let PlayerModel { range_db, loudest_gamma, zeta, closing, altissimo_stiffness } = rule;
+    let PlayerModel { range_db, loudest_gamma, zeta, closing, altissimo_zeta } = rule;
     let round = |numbers: &[f64]| numbers.iter().map(|x| format!("{x:.4}")).collect::<Vec<_>>().join(", ");
     format!(
         "{head}pub const FITTED: PlayerModel = PlayerModel {{\n    range_db: {range_db:?},\n    loudest_gamma: [{}],\n    \
-         zeta: [{}],\n    closing: [{}],\n    altissimo_stiffness: {altissimo_stiffness:?},\n}};\n",
+         zeta: [{}],\n    closing: [{}],\n    altissimo_zeta: {altissimo_zeta:?},\n}};\n",
         round(loudest_gamma),
         round(zeta),
         round(closing)

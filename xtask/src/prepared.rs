@@ -9,9 +9,9 @@ use chalumeau_core::bore::cells::Cells;
 use chalumeau_core::instrument::held_note::HeldNote;
 use chalumeau_core::instrument::internal_rate::INTERNAL_RATES_HZ;
 use chalumeau_core::instrument::player::dynamics::NODES;
+use chalumeau_core::instrument::prepare::{self, Preparation, PreparedInstrument, Progress};
 use chalumeau_core::instrument::prepare::auto_tune::{self, Accuracy};
 use chalumeau_core::instrument::prepare::play_dynamics;
-use chalumeau_core::instrument::prepare::{self, Preparation, PreparedInstrument, Progress};
 use chalumeau_core::instrument::tuning_table::{GAMMA_NODES, NATURAL_GAMMA};
 use chalumeau_core::instrument::{Model, Quality, Wanted};
 use chalumeau_core::parallel;
@@ -239,7 +239,9 @@ fn check_dynamics(name: &str, model: &Model) -> Result<()> {
     let (mut gamma, mut rows) = (0.0_f64, 0.0_f64);
     for (note, found) in notes.iter().zip(found.context("not cancelled")?) {
         let (g, r) = found.with_context(|| {
-            format!("{name}: fingering {note} cannot be played at every dynamic; run `cargo xtask play-dynamics`")
+            format!(
+                "{name}: fingering {note} cannot be played at every dynamic; run `cargo xtask play-dynamics`"
+            )
         })?;
         (gamma, rows) = (gamma.max(g), rows.max(r));
     }

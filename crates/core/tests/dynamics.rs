@@ -71,11 +71,14 @@ fn heard(out: &[f64], from_s: f64, to_s: f64, written: u8) -> Heard {
 
 /// A staircase of controller values on one note, from soft to loud, and what is heard at each.
 fn staircase(settings: &Settings, written: u8) -> Vec<Heard> {
-    let mut events = vec![at(0.0, cc(VALUES[0])), at(0.0, Event::NoteOn { note: sounding(written), velocity: 0.8 })];
+    let mut events =
+        vec![at(0.0, cc(VALUES[0])), at(0.0, Event::NoteOn { note: sounding(written), velocity: 0.8 })];
     events.extend(VALUES.iter().enumerate().map(|(n, &value)| at(n as f64 * STEP_S, cc(value))));
     events.sort_by_key(|event| event.at);
     let out = rendered(settings, events, VALUES.len() as f64 * STEP_S);
-    (0..VALUES.len()).map(|n| heard(&out, (n as f64 + 0.5) * STEP_S, (n as f64 + 1.0) * STEP_S, written)).collect()
+    (0..VALUES.len())
+        .map(|n| heard(&out, (n as f64 + 0.5) * STEP_S, (n as f64 + 1.0) * STEP_S, written))
+        .collect()
 }
 
 #[test]
@@ -86,16 +89,23 @@ fn look() {
         Err(_) => NOTES.collect(),
     };
     let stairs =
-        parallel::each(notes.len(), |n| staircase(&settings, notes[n]), &mut |_| ControlFlow::Continue(())).unwrap();
+        parallel::each(notes.len(), |n| staircase(&settings, notes[n]), &mut |_| ControlFlow::Continue(()))
+            .unwrap();
     for (written, heard) in notes.iter().zip(&stairs) {
         let levels: Vec<String> = heard.iter().map(|h| format!("{:.1}", h.level_db + 20.0)).collect();
         let steps: Vec<f64> = heard.windows(2).map(|w| w[1].level_db - w[0].level_db).collect();
         let mean = steps.iter().sum::<f64>() / steps.len() as f64;
-        let (min, max) = steps.iter().fold((f64::MAX, f64::MIN), |(a, b), &s| (a.min(s / mean), b.max(s / mean)));
+        let (min, max) =
+            steps.iter().fold((f64::MAX, f64::MIN), |(a, b), &s| (a.min(s / mean), b.max(s / mean)));
         let cents: Vec<String> =
             heard.iter().map(|h| h.off_cents.map_or("-".to_owned(), |c| format!("{c:.1}"))).collect();
         let dull = heard.windows(2).filter(|w| w[1].centroid_hz < w[0].centroid_hz).count();
-        println!("{written} range {:.1} steps {min:.2}..{max:.2} duller {dull}\n   {}\n   {}", mean * 17.0, levels.join(" "), cents.join(" "));
+        println!(
+            "{written} range {:.1} steps {min:.2}..{max:.2} duller {dull}\n   {}\n   {}",
+            mean * 17.0,
+            levels.join(" "),
+            cents.join(" ")
+        );
     }
     let _ = Tuning::Natural;
 }
@@ -143,8 +153,15 @@ fn envelope() {
         for value in [7, 16, 48] {
             let note = Event::NoteOn { note: sounding(written), velocity: 0.8 };
             let out = rendered(&settings, vec![at(0.0, cc(value)), at(0.0, note)], 0.7);
-            let levels: Vec<String> = (0..60).filter(|w| *w < 16 || w % 4 == 0)
-                .map(|w| format!("{:.0}", heard(&out, 0.01 * w as f64, 0.01 * (w + 1) as f64, written).level_db + 20.0)).collect();
+            let levels: Vec<String> = (0..60)
+                .filter(|w| *w < 16 || w % 4 == 0)
+                .map(|w| {
+                    format!(
+                        "{:.0}",
+                        heard(&out, 0.01 * w as f64, 0.01 * (w + 1) as f64, written).level_db + 20.0
+                    )
+                })
+                .collect();
             println!("{written} {value}: {}", levels.join(" "));
         }
     }

@@ -1,9 +1,9 @@
 //! One note on a grid of flow strength and mouth pressure, and what lies between the points.
 
 use chalumeau_core::analysis::{pitch, spectrum};
-use chalumeau_core::instrument::{Listening, Model};
 use chalumeau_core::instrument::held_note::{HeldNote, Start};
 use chalumeau_core::instrument::player::dynamics::LipShape;
+use chalumeau_core::instrument::{Listening, Model};
 use chalumeau_core::reed::ReedLaw;
 use chalumeau_core::reed::physical::ZETA_REFERENCE;
 use chalumeau_core::units::{SoundingNote, cents};
@@ -87,11 +87,9 @@ impl NoteSpectra {
     pub fn play(model: &Model, midi: u8) -> Option<Self> {
         let fingering = model.fingering_for(SoundingNote(midi))?;
         let (place, f0_hz) = (model.place(fingering), model.notes_hz[fingering]);
-        let stiffness = model.player.lip(place, 0.0).stiffness;
         let row = |zeta: f64| {
             // The lip of the rule, at the reference closing pressure.
-            let lip =
-                LipShape { opening: 1.0 / stiffness, stiffness, channel: zeta / ZETA_REFERENCE * stiffness };
+            let lip = LipShape { opening: 1.0, channel: zeta / ZETA_REFERENCE };
             let point = |gamma: f64| {
                 let held = HeldNote {
                     law: lip.law(ReedLaw::default()),

@@ -269,7 +269,8 @@ impl Player {
 
         self.breath.tick(target, key_down, tongue_holds, &context);
         let gamma = self.breath.gamma();
-        let (p_mouth, tongue) = self.tongue.tick(gamma, self.breath.attack_hardness(), &context);
+        let hardness = self.breath.attack_hardness() / self.response.release();
+        let (p_mouth, tongue) = self.tongue.tick(gamma, hardness, &context);
         if self.tuning.tick(fingering, gamma, &context, model, lattice) {
             // The clock's speed has changed, and with it the length of a tick.
             let lags = Lags::new(&settings, self.tick_s(model), model.lowest_hz);

@@ -151,7 +151,7 @@ impl Settings {
         let k = if self.coupled { coupled_k(f64::from(self.reed_h)) as f32 } else { self.reed_k };
         Self {
             reed_h: self.reed_h * lip.opening as f32,
-            reed_k: k * lip.stiffness as f32,
+            reed_k: k,
             coupled: false,
             zeta: self.zeta * lip.channel as f32,
             ..self
@@ -296,7 +296,7 @@ mod tests {
 
     #[test]
     fn a_lip_moves_the_closing_pressure_by_its_factors() {
-        let lip = LipShape { opening: 0.8, stiffness: 1.5, channel: 1.2 };
+        let lip = LipShape { opening: 1.2, channel: 1.2 };
         let shaped = Settings::default().under_lip(Some(lip));
         assert!((shaped.closing_pa() / (1.2 * Settings::default().closing_pa()) - 1.0).abs() < 1e-6);
         assert!((shaped.zeta - 0.36).abs() < 1e-6);

@@ -15,8 +15,8 @@
 //!
 //! The closing pressure rises because the jaw opens: the rest opening grows and the stiffness stays. So the air that the
 //! reed displaces stays the same, and with it the modes of the bore: a *stiffer* reed of the same closing pressure lost
-//! written A5 to another register. Above the clarion the lip stiffens the reed by up to [`PlayerModel::altissimo_stiffness`],
-//! which holds the altissimo. `cargo xtask fit-player` fits the numbers to recorded notes; `docs/tone.md` tells how and what
+//! written A5 to another register. From the top of the clarion up the flow strength goes over to
+//! [`PlayerModel::altissimo_zeta`], at which soft notes keep their register. `cargo xtask fit-player` fits the numbers to recorded notes; `docs/tone.md` tells how and what
 //! they bought.
 
 use crate::reed::ReedLaw;
@@ -31,10 +31,19 @@ pub const NODE_DYNAMICS: [f64; NODES] = [0.0, 0.2, 0.4, 0.56, 0.7, 0.82, 0.92, 1
 /// Distance in octaves from the lowest note to the middle of the compass, and from there to its end: 20.5 semitones, half the
 /// compass of a B flat clarinet up to sounding G6.
 const HALF_COMPASS_OCTAVES: f64 = 20.5 / 12.0;
-/// Places between which the lip begins to stiffen the reed and has done so: written B5 and A6 of a B flat clarinet.
-const STIFFENS: (f64, f64) = (0.5, 1.0);
+/// Places between which the flow strength goes over to that of the altissimo: written G5 and D6 of a B flat clarinet.
+const ALTISSIMO: (f64, f64) = (0.3, 0.65);
+/// Flow strengths that the rule may ask for below the altissimo: those at which recorded notes were compared and registers hold.
+const ZETAS: (f64, f64) = (0.14, 0.4);
 /// The place of a note far outside the compass counts as this.
 const FARTHEST: f64 = 1.25;
+
+/// How far a place lies on the way into the altissimo, 0..=1, smoothly.
+fn in_altissimo(place: f64) -> f64 {
+    let (from, to) = ALTISSIMO;
+    let way = ((place - from) / (to - from)).clamp(0.0, 1.0);
+    way * way * (3.0 - 2.0 * way)
+}
 
 /// The numbers of the player's rule; see the module.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,8 +56,8 @@ pub struct PlayerModel {
     pub zeta: [f64; 4],
     /// Closing pressure at dynamic 0 over the reed's own, and growth from dynamic 0 to 1 as a factor.
     pub closing: [f64; 2],
-    /// Stiffness of the reed under the lip at the top of the altissimo over that below.
-    pub altissimo_stiffness: f64,
+    /// Flow strength in the altissimo, at every dynamic.
+    pub altissimo_zeta: f64,
 }
 
 /// The reed as a player's lip shapes it: factors on a reed's own numbers.
@@ -56,8 +65,6 @@ pub struct PlayerModel {
 pub struct LipShape {
     /// On the rest opening.
     pub opening: f64,
-    /// On the stiffness.
-    pub stiffness: f64,
     /// On the embouchure parameter zeta of the channel, so that the flow strength is the rule's.
     pub channel: f64,
 }
@@ -86,7 +93,10 @@ impl PlayerModel {
     /// Flow strength of the reference reed under the lip.
     pub fn zeta(&self, place: f64, dynamic: f64) -> f64 {
         let [soft, soft_slope, growth, growth_slope] = self.zeta;
-        (soft + soft_slope * place + (growth + growth_slope * place) * dynamic).exp()
+        let below = (soft + soft_slope * place + (growth + growth_slope * place) * dynamic).exp();
+        let (lowest, highest) = ZETAS;
+        let below = below.clamp(lowest, highest);
+        below * (self.altissimo_zeta / below).powf(in_altissimo(place))
     }
 
     /// Closing pressure of the reference reed under the lip, over its own.
@@ -97,13 +107,9 @@ impl PlayerModel {
 
     /// The lip at a dynamic. Real-time safe.
     pub fn lip(&self, place: f64, dynamic: f64) -> LipShape {
-        let (from, to) = STIFFENS;
-        let way = ((place - from) / (to - from)).clamp(0.0, 1.0);
-        let stiffness = 1.0 + (self.altissimo_stiffness - 1.0) * way * way * (3.0 - 2.0 * way);
-        let closing = self.closing(dynamic);
-        // The closing pressure goes with opening times stiffness, the flow strength with the opening over the root of that.
-        let channel = self.zeta(place, dynamic) / ZETA_REFERENCE * stiffness / closing.sqrt();
-        LipShape { opening: closing / stiffness, stiffness, channel }
+        // Closing pressure and opening go together; the flow strength goes with the opening over the root of the pressure.
+        let opening = self.closing(dynamic);
+        LipShape { opening, channel: self.zeta(place, dynamic) / ZETA_REFERENCE / opening.sqrt() }
     }
 }
 
@@ -111,8 +117,7 @@ impl LipShape {
     /// The law of a reed under this lip. Real-time safe.
     pub fn law(&self, reed: ReedLaw) -> ReedLaw {
         let h = (reed.h() * self.opening).clamp(0.5, 10.0);
-        let k = (reed.k() * self.stiffness).clamp(0.01, 20.0);
-        ReedLaw::free(h, k, reed.a()).unwrap_or(reed)
+        ReedLaw::free(h, reed.k(), reed.a()).unwrap_or(reed)
     }
 }
 

@@ -9,5 +9,5 @@ pub const FITTED: PlayerModel = PlayerModel {
     loudest_gamma: [0.9093, -0.1586, -0.1657],
     zeta: [-1.3916, 0.8455, 0.5127, -1.1157],
     closing: [0.7300, 1.9759],
-    altissimo_stiffness: 1.6,
+    altissimo_zeta: 0.22,
 };

@@ -19,6 +19,9 @@ const VELOCITY_GAMMA: (f64, f64) = (0.43, 0.85);
 const VELOCITY_DYNAMIC: (f64, f64) = (0.15, 1.0);
 /// Time constant with which the lip follows the dynamic, s: slower than the breath, as muscles are, but not heard as late.
 pub const LIP_S: f64 = 0.01;
+/// How much more slowly the tongue lets go at dynamic 0 than at 1, as a factor less 1: the release is then as loud as the note
+/// (measured).
+const SOFT_RELEASE: f64 = 3.0;
 /// The lip stays where it is for a smaller change of the dynamic: 0.003 dB.
 const STILL: f64 = 1e-4;
 
@@ -60,6 +63,12 @@ impl Response {
             }
             BreathResponse::Played => self.played(asked, ear, settles, settings, posture),
         }
+    }
+
+    /// How much more slowly the tongue lets go of a soft note than of a loud one, as a factor: a quick release would be louder
+    /// than the note.
+    pub fn release(&self) -> f64 {
+        self.lip.map_or(1.0, |lip| 1.0 + SOFT_RELEASE * (1.0 - lip))
     }
 
     /// Dynamic of the lip, 0..=1.
