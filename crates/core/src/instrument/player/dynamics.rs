@@ -31,10 +31,10 @@ pub const NODE_DYNAMICS: [f64; NODES] = [0.0, 0.2, 0.4, 0.56, 0.7, 0.82, 0.92, 1
 /// Distance in octaves from the lowest note to the middle of the compass, and from there to its end: 20.5 semitones, half the
 /// compass of a B flat clarinet up to sounding G6.
 const HALF_COMPASS_OCTAVES: f64 = 20.5 / 12.0;
-/// Places between which the flow strength goes over to that of the altissimo: written G5 and D6 of a B flat clarinet.
-const ALTISSIMO: (f64, f64) = (0.3, 0.65);
+/// Places between which the flow strength goes over to that of the altissimo: written A5 and E flat 6 of a B flat clarinet.
+const ALTISSIMO: (f64, f64) = (0.42, 0.7);
 /// Flow strengths that the rule may ask for below the altissimo: those at which recorded notes were compared and registers hold.
-const ZETAS: (f64, f64) = (0.14, 0.4);
+const ZETAS: (f64, f64) = (0.14, 0.5);
 /// The place of a note far outside the compass counts as this.
 const FARTHEST: f64 = 1.25;
 

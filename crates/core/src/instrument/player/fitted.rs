@@ -6,8 +6,8 @@ use super::dynamics::PlayerModel;
 /// CC BY 4.0).
 pub const FITTED: PlayerModel = PlayerModel {
     range_db: 27.0,
-    loudest_gamma: [0.9093, -0.1586, -0.1657],
-    zeta: [-1.3916, 0.8455, 0.5127, -1.1157],
-    closing: [0.7300, 1.9759],
+    loudest_gamma: [0.9202, 0.0030, -0.0271],
+    zeta: [-1.4531, 0.6785, 0.5108, -0.9396],
+    closing: [0.7300, 2.1986],
     altissimo_zeta: 0.22,
 };

@@ -246,29 +246,25 @@ mod tests {
     use super::*;
 
     #[test]
-    #[ignore = "a look at what is learnt"]
-    fn look() {
-        let mut model = Model::built_in(48_000.0).unwrap();
-        let env = |name: &str, own: f64| std::env::var(name).map_or(own, |text| text.parse().unwrap());
-        model.player.altissimo_zeta = env("P_ZETA", model.player.altissimo_zeta);
-        model.player.loudest_gamma[1] = env("P_G1", model.player.loudest_gamma[1]);
-        let start = std::time::Instant::now();
-        let fingerings: Vec<usize> = match std::env::var("LOOK") {
-            Ok(list) => list.split(',').map(|at| at.parse().unwrap()).collect(),
-            Err(_) => (0..model.notes_hz.len()).collect(),
-        };
-        let learnt = parallel::each(fingerings.len(), |at| learn_note(&model, fingerings[at]), &mut |_| {
-            ControlFlow::Continue(())
-        });
-        for (at, note) in learnt.unwrap().iter().enumerate() {
-            match note {
-                Some(note) => println!(
-                    "{at} {} onset {:.3} {:.3?} {:.3?} {:.2?}",
-                    model.tuning.notes[at].written, note.onset, note.gammas, note.amplitudes, note.rows
-                ),
-                None => println!("{at} {} none", model.tuning.notes[at].written),
+    fn a_note_is_learnt_anew_as_it_came_with_the_program() {
+        let model = Model::built_in(48_000.0).unwrap();
+        for fingering in [0, 24] {
+            let (kept, again) =
+                (model.tuning.notes[fingering].played, learn_note(&model, fingering).unwrap());
+            for node in 0..NODES {
+                assert!((kept.gammas[node] - again.gammas[node]).abs() < 1e-3, "{fingering}: {again:?}");
+                assert!((kept.amplitudes[node] / again.amplitudes[node] - 1.0).abs() < 0.01);
+                assert!((kept.rows[node] - again.rows[node]).abs() < 0.02);
             }
+            assert!(again.amplitudes.is_sorted_by(|soft, loud| soft < loud));
         }
-        println!("{:?}", start.elapsed());
+    }
+
+    #[test]
+    fn a_note_that_leaves_its_register_is_not_learnt() {
+        let model = Model::built_in(48_000.0).unwrap();
+        // Far above its closing pressure a reed stays shut.
+        let tuned = &model.tuning.notes[0];
+        assert!(descend(&model, 0, tuned, 3.0, 1.0).is_none());
     }
 }

@@ -1,0 +1,206 @@
+//! A player's dynamics on the B flat clarinet: what a breath controller does to level, pitch, register and colour of every note.
+//!
+//! Each test prints what it measured. Levels are in dBFS as a project hears them; renders are 20 dB softer, so that no peak
+//! meets the limiter.
+
+use chalumeau_core::analysis::noise_bands::{BANDS_HZ, noise_db};
+use chalumeau_core::analysis::pitch;
+use chalumeau_core::analysis::spectrum::steady_segment;
+use chalumeau_core::analysis::steady_note::{self, SteadyNote};
+use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
+use chalumeau_core::instrument::player::response::breath_of_dynamic;
+use chalumeau_core::instrument::{Clarinet, Model, Settings};
+use chalumeau_core::measure::realism::{
+    Dynamic, NoteScore, RecordedNote, Summary, louder_is_brighter, median,
+};
+use chalumeau_core::parallel;
+use chalumeau_core::score::{Score, play};
+use chalumeau_core::units::{SoundingNote, WrittenNote, cents};
+use std::convert::Infallible;
+use std::ops::ControlFlow;
+use std::sync::{Arc, LazyLock};
+
+const RATE: u32 = 44_100;
+/// Renders are this much softer.
+const HEADROOM_DB: f64 = 20.0;
+/// Written E3 to C6.
+const NOTES: std::ops::RangeInclusive<u8> = 52..=84;
+/// Controller values at which a held note is heard.
+const VALUES: [u8; 18] = [8, 15, 22, 29, 36, 43, 50, 57, 64, 71, 78, 85, 92, 99, 106, 113, 120, 127];
+/// Time at each, s.
+const STEP_S: f64 = 0.5;
+
+static MODEL: LazyLock<Arc<Model>> = LazyLock::new(|| Arc::new(Model::built_in(f64::from(RATE)).unwrap()));
+
+fn sounding(written: u8) -> SoundingNote {
+    WrittenNote(written).sounding(MODEL.file.transposition).unwrap()
+}
+
+fn each<T: Send>(count: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    parallel::each(count, work, &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
+/// Plays events, at times in s, with these settings.
+fn rendered(settings: &Settings, events: &[(f64, Event)], seconds: f64) -> Vec<f64> {
+    let mut clarinet = Clarinet::new(MODEL.clone(), f64::from(RATE));
+    clarinet.set_settings(&Settings { gain_db: -HEADROOM_DB as f32, ..*settings });
+    clarinet.reset();
+    let samples = |s: f64| (s * f64::from(RATE)) as usize;
+    let events = events.iter().map(|&(s, event)| Timed { at: samples(s), event }).collect();
+    let mut out = Vec::with_capacity(samples(seconds));
+    let Ok(()) = play(&mut clarinet, &Score { events, samples: samples(seconds) }, 512, |block| {
+        out.extend(block.iter().map(|&x| f64::from(x)));
+        Ok::<_, Infallible>(())
+    });
+    out
+}
+
+fn controller(value: u8) -> Event {
+    Event::Breath(f32::from(value) / 127.0)
+}
+
+fn key(written: u8) -> Event {
+    Event::NoteOn { note: sounding(written), velocity: 0.8 }
+}
+
+/// Level in dBFS and cents off a note, infinite for no pitch, between two times in s.
+fn heard(out: &[f64], from_s: f64, to_s: f64, written: u8) -> (f64, f64) {
+    let sample = |s: f64| ((s * f64::from(RATE)) as usize).min(out.len());
+    let part = &out[sample(from_s)..sample(to_s)];
+    let power = part.iter().map(|x| x * x).sum::<f64>() / part.len() as f64;
+    let off = pitch::fundamental_hz(part, f64::from(RATE))
+        .map_or(f64::INFINITY, |hz| cents(hz, sounding(written).frequency_hz(440.0)));
+    (10.0 * power.max(1e-20).log10() + HEADROOM_DB, off)
+}
+
+/// A staircase of controller values on one note, from soft to loud: level and cents at each.
+fn staircase(written: u8) -> Vec<(f64, f64)> {
+    let mut events = vec![(0.0, controller(VALUES[0])), (0.0, key(written))];
+    events
+        .extend(VALUES.iter().enumerate().skip(1).map(|(n, &value)| (n as f64 * STEP_S, controller(value))));
+    let out = rendered(&Settings::default(), &events, VALUES.len() as f64 * STEP_S);
+    let step = |n: usize| heard(&out, (n as f64 + 0.5) * STEP_S, (n as f64 + 1.0) * STEP_S, written);
+    (0..VALUES.len()).map(step).collect()
+}
+
+#[test]
+fn equal_steps_of_breath_are_equal_steps_of_level_in_tune() {
+    let notes: Vec<u8> = NOTES.collect();
+    let stairs = each(notes.len(), |n| staircase(notes[n]));
+    let (mut least_range, mut steps, mut off) = (f64::INFINITY, (f64::INFINITY, 0.0_f64), 0.0_f64);
+    for (written, stair) in notes.iter().zip(&stairs) {
+        let range = stair[stair.len() - 1].0 - stair[0].0;
+        let mean = range / (stair.len() - 1) as f64;
+        let own = stair.windows(2).map(|pair| (pair[1].0 - pair[0].0) / mean);
+        let own = own.fold((f64::INFINITY, 0.0_f64), |(low, high), step| (low.min(step), high.max(step)));
+        let own_off = stair.iter().map(|(_, cents)| cents.abs()).fold(0.0, f64::max);
+        println!("written {written}: {range:.1} dB, steps {:.2}..{:.2}, {own_off:.1} cents", own.0, own.1);
+        least_range = least_range.min(range);
+        steps = (steps.0.min(own.0), steps.1.max(own.1));
+        off = off.max(own_off);
+    }
+    println!(
+        "least range {least_range:.1} dB, steps {:.2}..{:.2} of the mean, {off:.1} cents",
+        steps.0, steps.1
+    );
+    assert!(least_range > 24.0);
+    assert!(steps.0 > 0.5 && steps.1 < 2.0);
+    assert!(off < 3.0);
+}
+
+#[test]
+fn every_note_speaks_in_its_register_from_ten_up_and_none_below_four() {
+    const TONGUED: [u8; 9] = [8, 10, 16, 32, 48, 64, 80, 104, 127];
+    let notes: Vec<u8> = NOTES.collect();
+    let played = each(notes.len(), |n| {
+        let tongued = |value: u8| {
+            rendered(&Settings::default(), &[(0.0, controller(value)), (0.0, key(notes[n]))], 0.8)
+        };
+        let silent = heard(&tongued(3), 0.5, 0.8, notes[n]).0;
+        (silent, TONGUED.map(|value| heard(&tongued(value), 0.5, 0.8, notes[n])))
+    });
+    let mut loudest_silence = f64::NEG_INFINITY;
+    for (written, (silent, tongued)) in notes.iter().zip(&played) {
+        println!("written {written}: {silent:.0} dBFS at 3, then {tongued:.1?}");
+        loudest_silence = loudest_silence.max(*silent);
+        for ((level_db, off), value) in tongued.iter().zip(TONGUED) {
+            assert!(
+                off.abs() < 5.0 && *level_db > -45.0,
+                "written {written} at {value}: {level_db} dBFS, {off} cents"
+            );
+        }
+    }
+    println!("at most {loudest_silence:.1} dBFS at 3");
+    assert!(loudest_silence < -75.0);
+}
+
+#[test]
+fn slurs_arrive_at_every_dynamic() {
+    let mut slurs = Vec::new();
+    for from in NOTES.step_by(2) {
+        for interval in [1_i16, -1, 2, -4, 7, -7, 12, -12, 19] {
+            if let Some(to) = u8::try_from(i16::from(from) + interval).ok().filter(|to| NOTES.contains(to)) {
+                slurs.extend([16, 64, 112].map(|value| (from, to, value)));
+            }
+        }
+    }
+    let arrived = each(slurs.len(), |n| {
+        let (from, to, value) = slurs[n];
+        let events = [(0.0, controller(value)), (0.0, key(from)), (0.4, key(to))];
+        heard(&rendered(&Settings::default(), &events, 1.1), 0.9, 1.1, to).1.abs() < 10.0
+    });
+    let lost: Vec<_> =
+        slurs.iter().zip(&arrived).filter(|(_, arrived)| !**arrived).map(|(slur, _)| slur).collect();
+    println!("{} of {} slurs do not arrive: {lost:?}", lost.len(), slurs.len());
+    assert!(lost.is_empty());
+}
+
+#[test]
+fn colour_level_and_noise_are_near_those_of_recorded_notes() {
+    let recorded = RecordedNote::all();
+    let played = each(recorded.len(), |n| {
+        let dynamic = match recorded[n].dynamic {
+            Dynamic::Pp => 0.0,
+            Dynamic::Mf => MEZZO_FORTE,
+            Dynamic::Ff => 1.0,
+        };
+        let note = Event::NoteOn { note: SoundingNote(recorded[n].midi), velocity: 0.8 };
+        let events = [(0.0, Event::Breath(breath_of_dynamic(dynamic) as f32)), (0.0, note)];
+        let out = rendered(&Settings::default(), &events, steady_note::SECONDS);
+        let score = NoteScore::new(recorded[n].clone(), SteadyNote::measure(&out));
+        let segment = steady_segment(&out, f64::from(RATE)).map_or(&[][..], |range| &out[range]);
+        let f0_hz = score.played.as_ref().map(|played| played.f0_hz);
+        let hz = f0_hz.and_then(|hz| pitch::refine_hz(segment, f64::from(RATE), hz));
+        (score, hz.map(|hz| noise_db(segment, f64::from(RATE), hz, &BANDS_HZ)))
+    });
+    let of = |dynamic: Dynamic| played.iter().filter(move |(score, _)| score.recorded.dynamic == dynamic);
+    let [pp, mf, ff] = Dynamic::ALL.map(|dynamic| Summary::of(of(dynamic).map(|(score, _)| score)));
+    for (summary, dynamic) in [(&pp, "pp"), (&mf, "mf"), (&ff, "ff")] {
+        println!(
+            "{dynamic}: {:.2} dB, {} failed, centroid right on {:.2}, median {:.2}",
+            summary.error_db, summary.failed, summary.centroid_share, summary.centroid_ratio
+        );
+    }
+    let step = |from: &Summary, to: &Summary| {
+        let (played, recorded) = (to.level_db.0 - from.level_db.0, to.level_db.1 - from.level_db.1);
+        println!("step {played:.1} dB, recorded {recorded:.1}");
+        played - recorded
+    };
+    let (to_mf, to_ff) = (step(&pp, &mf), step(&mf, &ff));
+    let failed: Vec<_> = played
+        .iter()
+        .filter(|(score, _)| score.played.is_none())
+        .map(|(score, _)| (score.recorded.midi, score.recorded.dynamic))
+        .collect();
+    println!("failed: {failed:?}");
+    let scores: Vec<NoteScore> = played.iter().map(|(score, _)| score.clone()).collect();
+    let brighter = louder_is_brighter(&scores);
+    let noise: Vec<f64> = (0..BANDS_HZ.len())
+        .map(|band| median(of(Dynamic::Mf).filter_map(|(_, noise)| noise.as_ref().map(|noise| noise[band]))))
+        .collect();
+    println!("brighter on {brighter:.2}; noise at mf {noise:.1?} dB");
+    assert!(pp.failed + mf.failed + ff.failed == 0);
+    assert!(to_mf.abs() < 3.0 && to_ff.abs() < 3.0);
+    assert!(brighter >= 0.95);
+}
