@@ -58,7 +58,7 @@ each note. A recorded note differs from its recorded neighbours by 2.7, 6.8 and 
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct RealismCommand {
-    /// The player's dynamic at pp, mf and ff, each 0..1 [default: 0,0.62,1]
+    /// The player's dynamic at pp, mf and ff, each 0..1 [default: 0,0.6,1]
     #[arg(long, value_name = "D,D,D", value_delimiter = ',', num_args = 1, conflicts_with = "gamma", value_parser = |s: &str| within(s, 0.0, 1.0))]
     dynamic: Vec<f64>,
     /// Instead: constant mouth pressure over closing pressure at pp, mf and ff, each 0..3
