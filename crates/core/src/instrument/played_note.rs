@@ -101,8 +101,7 @@ mod tests {
     #[test]
     fn the_curve_passes_through_its_nodes_and_rises() {
         let note = note();
-        for node in 0..NODES {
-            let dynamic = NODE_DYNAMICS[node];
+        for (node, dynamic) in NODE_DYNAMICS.into_iter().enumerate() {
             assert!((note.gamma(dynamic) - note.gammas[node]).abs() < 1e-12);
             assert!((note.amplitude(dynamic) - note.amplitudes[node]).abs() < 1e-12);
             assert!((note.rows(dynamic) - note.rows[node]).abs() < 1e-9);
