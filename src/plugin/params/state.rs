@@ -13,14 +13,12 @@ use crate::parameters::{Kind, Number, PARAMETERS, Parameter};
 use crate::plugin::launch_options::LaunchOptions;
 
 /// Layout of the saved state. 1: ids and units as below. 2: the instrument and its file, the physical reed; a state of 1
-/// is the B flat clarinet. 3: listening and the breath response; a state of 1 or 2 is heard as from one point, its breath is
-/// physical and its tuning natural, unless it says otherwise.
-pub const SCHEMA: u32 = 3;
+/// is the B flat clarinet. 3: listening; a state of 1 or 2 is heard as from one point. 4: the breath response; in an earlier
+/// state breath is physical and the tuning natural, unless it says otherwise.
+pub const SCHEMA: u32 = 4;
 const SCHEMA_FIELD: &str = "schema";
-/// First layout with a breath response and a way of listening.
-const WITH_RESPONSE: u32 = 3;
-/// Choices that meant something else before [`WITH_RESPONSE`], or were not there: id, and what it was.
-const BEFORE_RESPONSE: [(&str, &str); 3] = [("resp", "phys"), ("tune", "nat"), ("heard", "point")];
+/// Choices that meant something else before a layout, or were not there: id, what it was, and the first layout that has it.
+const BEFORE: [(&str, &str, u32); 3] = [("resp", "phys", 4), ("tune", "nat", 4), ("heard", "point", 3)];
 
 /// A number's default in this process: the table's, or what the program was started with.
 pub(super) fn starting(id: &str, number: &Number) -> f32 {
@@ -37,9 +35,9 @@ pub fn mend(state: &mut PluginState) {
     keep_the_feel(&mut old);
     // A state without a layout, or with a broken one, was written by hand: it means what a new one does.
     let schema = state.fields.get(SCHEMA_FIELD).and_then(|text| text.parse::<u32>().ok());
-    if schema.is_some_and(|schema| schema < WITH_RESPONSE) {
-        // What was saved then goes on sounding as it did.
-        for (id, was) in BEFORE_RESPONSE {
+    for (id, was, since) in BEFORE {
+        if schema.is_some_and(|schema| schema < since) {
+            // What was saved then goes on sounding as it did.
             old.entry(id.to_owned()).or_insert_with(|| ParamValue::String(was.to_owned()));
         }
     }
@@ -137,11 +135,11 @@ mod tests {
                 _ => String::new(),
             })
         };
-        for schema in [1, 2] {
+        for schema in [1, 2, 3] {
             assert_eq!(choices(Some(schema), None), ["phys", "nat"]);
             assert_eq!(choices(Some(schema), Some("temp")), ["phys", "temp"]);
         }
-        assert_eq!(choices(Some(3), None), ["play", "temp"]);
+        assert_eq!(choices(Some(SCHEMA), None), ["play", "temp"]);
         assert_eq!(choices(None, Some("nat")), ["play", "nat"]);
     }
 

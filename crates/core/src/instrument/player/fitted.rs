@@ -6,8 +6,8 @@ use super::dynamics::PlayerModel;
 /// CC BY 4.0).
 pub const FITTED: PlayerModel = PlayerModel {
     range_db: 27.0,
-    loudest_gamma: [0.9202, 0.0030, -0.0271],
-    zeta: [-1.4531, 0.6785, 0.5108, -0.9396],
-    closing: [0.7300, 2.1986],
+    loudest_gamma: [0.9207, 0.0083, -0.0113],
+    zeta: [-1.4521, 0.6760, 0.5113, -0.9531],
+    closing: [0.7300, 2.2383],
     altissimo_zeta: 0.22,
 };
