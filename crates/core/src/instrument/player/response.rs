@@ -10,8 +10,9 @@ use super::posture::Posture;
 use crate::instrument::settings::{BreathResponse, Settings};
 use crate::reed::physical::P_REF_PA;
 
-/// Breath at which every note begins, 0..1: the controller value 4 of 127, above what a sensor at rest sends.
-pub const ONSET: f64 = 4.0 / 127.0;
+/// Breath at which every note begins, 0..1: the controller value 4 of 127, above what a sensor at rest sends. Breath comes in
+/// single precision; in double precision this would lie just above the controller's 4.
+pub const ONSET: f64 = (4.0_f32 / 127.0) as f64;
 /// Mouth pressure over the closing pressure for velocity 0 and 1 where the breath is physical: just above the threshold, and
 /// loud (by ear).
 const VELOCITY_GAMMA: (f64, f64) = (0.43, 0.85);
@@ -131,8 +132,13 @@ mod tests {
             let curve: Vec<f64> = (4..=127).map(|cc| dynamic(f64::from(cc) / 127.0, curve).0).collect();
             assert!(curve.is_sorted_by(|a, b| a < b));
         }
+        assert_eq!(
+            dynamic(f64::from(4.0_f32 / 127.0), 1.0),
+            (0.0, 1.0),
+            "the controller's own 4 begins the note"
+        );
         assert!((dynamic(breath_of_dynamic(0.3), 1.0).0 - 0.3).abs() < 1e-12);
-        assert_eq!(dynamic(2.0 / 127.0, 1.0), (0.0, 0.5));
+        assert_eq!(dynamic(0.5 * ONSET, 1.0), (0.0, 0.5));
         assert_eq!(dynamic(0.0, 1.0), (0.0, 0.0));
     }
 }
