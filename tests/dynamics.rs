@@ -7,7 +7,9 @@ use chalumeau_core::analysis::noise_bands::{BANDS_HZ, noise_db};
 use chalumeau_core::analysis::pitch;
 use chalumeau_core::analysis::spectrum::steady_segment;
 use chalumeau_core::analysis::steady_note::{self, SteadyNote};
+use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::haptics::FeelDesign;
 use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
 use chalumeau_core::instrument::{Clarinet, Model, Settings};
@@ -17,6 +19,8 @@ use chalumeau_core::measure::realism::{
 use chalumeau_core::parallel;
 use chalumeau_core::score::{Score, play};
 use chalumeau_core::units::{SoundingNote, WrittenNote, cents};
+use chalumeau_knob::touch::breath_from_angle::{Blower, BreathMapping};
+use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use std::convert::Infallible;
 use std::ops::ControlFlow;
 use std::sync::{Arc, LazyLock};
@@ -135,6 +139,43 @@ fn every_note_speaks_in_its_register_from_ten_up_and_none_below_four() {
     }
     println!("at most {loudest_silence:.1} dBFS at 3");
     assert!(loudest_silence < -75.0);
+}
+
+/// The knob's angle makes breath by its map, as in the plugin; the hand feels each note's threshold at `a_on_deg`.
+#[test]
+fn with_a_knob_sound_begins_where_the_hand_feels_the_threshold() {
+    const PLACES: [f64; 2] = [1.0, 3.0];
+    const BELOW: f64 = 0.99;
+    const ABOVE: f64 = 1.01;
+    let (settings, feels) = (Settings::default(), InstrumentFeel::new(&MODEL));
+    let full_pa = 1e3 * f64::from(settings.breath_full_kpa);
+    for place in PLACES {
+        let table =
+            feels.table(&settings, &FeelDesign { place, ..FeelDesign::default() }, &NO_MOTOR).unwrap();
+        let maps = feels.maps_for(&table, &settings);
+        let hand = BreathMapping { maps, design: KnobDesign::default(), feels: true };
+        let notes: Vec<u8> = NOTES.collect();
+        let heard = each(notes.len(), |n| {
+            let felt = table.notes().iter().find(|note| note.written == WrittenNote(notes[n])).unwrap();
+            [BELOW, ABOVE].map(|share| {
+                let pressed = Timed { at: 0, event: key(notes[n]) };
+                let mut blower = Blower::default();
+                blower.heed(&pressed);
+                let angle_deg = hand.design.zero_deg + share * felt.landmarks.a_on_deg;
+                let breath = blower.blow(&hand, angle_deg, full_pa).unwrap().unit();
+                let events = [(0.0, Event::Breath(breath)), (0.0, pressed.event)];
+                heard(&rendered(&settings, &events, 0.8), 0.5, 0.8, notes[n])
+            })
+        });
+        let loudest = heard.iter().map(|[below, _]| below.0).fold(f64::NEG_INFINITY, f64::max);
+        let softest = heard.iter().map(|[_, above]| above.0).fold(f64::INFINITY, f64::min);
+        let off = heard.iter().map(|[_, above]| above.1.abs()).fold(0.0, f64::max);
+        println!(
+            "place {place}: at most {loudest:.1} dBFS at {BELOW} of the felt threshold, at least {softest:.1} dBFS at {ABOVE}, \
+             within {off:.1} cents"
+        );
+        assert!(loudest < -75.0 && softest > -45.0 && off < 5.0);
+    }
 }
 
 #[test]

@@ -31,6 +31,9 @@ const G6: u8 = 91;
 const TUNED_CENTS: f64 = 0.11;
 /// Largest error of a tempered note, cents; measured 2.3 for the imported instrument, 1.9 for all others.
 const TEMPERED_CENTS: f64 = 2.4;
+/// Least range of level that a player's breath gives to a note up to C6, dB, and the largest error of its pitch, cents.
+const PLAYED_RANGE_DB: f64 = 24.0;
+const PLAYED_CENTS: f64 = 3.0;
 /// Written G#6: up to here every note must hold its register.
 const G_SHARP_6: u8 = 92;
 /// Lowest note of the B flat clarinet, Hz.
@@ -214,6 +217,61 @@ fn tempered_instruments_stay_in_tune_from_piano_to_forte() {
             .map(|((note, gamma), off)| (written(&case.model, *note).to_string(), *gamma, *off))
             .collect();
         assert!(worst.is_empty(), "{}: {worst:.2?}", case.name);
+    }
+}
+
+/// A note as a controller plays it, from soft to loud: level in dB and cents above its pitch at each value.
+fn crescendo(model: &Arc<Model>, fingering: usize, values: &[u8]) -> Vec<(f64, f64)> {
+    const HOST_HZ: f64 = 48_000.0;
+    let mut clarinet = Clarinet::new(model.clone(), HOST_HZ);
+    clarinet.set_settings(&Settings { gain_db: -20.0, ..Settings::default() });
+    let breath = |value: u8| Event::Breath(f32::from(value) / 127.0);
+    clarinet.apply(breath(values[0]));
+    let note = written(model, fingering).sounding(model.file.transposition).unwrap();
+    clarinet.apply(Event::NoteOn { note, velocity: 0.7 });
+    let heard = |&value: &u8| {
+        clarinet.apply(breath(value));
+        let mut sound = vec![0.0; (0.8 * slower(model) * HOST_HZ) as usize];
+        clarinet.render(&mut sound);
+        let steady = to_f64(&sound[sound.len() / 2..]);
+        (spectrum::rms_dbfs(&steady), off_cents(model, fingering, pitch::fundamental_hz(&steady, HOST_HZ)))
+    };
+    values.iter().map(heard).collect()
+}
+
+#[test]
+fn every_instrument_has_a_players_dynamics() {
+    const VALUES: [u8; 4] = [8, 48, 88, 127];
+    for case in at_96_khz() {
+        let notes: Vec<usize> = up_to(&case.model, C6).filter(|&note| case.model.speaks(note)).collect();
+        let heard = each(&notes, |&note| crescendo(&case.model, note, &VALUES));
+        let (mut range, mut step, mut off) = (f64::INFINITY, (f64::INFINITY, 0.0_f64), 0.0_f64);
+        for (note, heard) in notes.iter().zip(&heard) {
+            let whole = heard[VALUES.len() - 1].0 - heard[0].0;
+            let mean = whole / (VALUES.len() - 1) as f64;
+            for pair in heard.windows(2) {
+                let over = (pair[1].0 - pair[0].0) / mean;
+                step = (step.0.min(over), step.1.max(over));
+            }
+            let worst = heard.iter().map(|(_, cents)| cents.abs()).fold(0.0, f64::max);
+            if whole < 24.0 || worst > 3.0 {
+                println!("{}, {}: {heard:.1?}", case.name, written(&case.model, *note));
+            }
+            (range, off) = (range.min(whole), off.max(worst));
+            assert!(heard.iter().all(|(_, cents)| cents.is_finite()), "{}: {heard:?}", case.name);
+        }
+        println!(
+            "{}: {} notes, {range:.1} dB or more from CC 8 to 127, steps {:.2}..{:.2} of their mean, within {off:.1} cents",
+            case.name,
+            notes.len(),
+            step.0,
+            step.1
+        );
+        assert!(
+            range > PLAYED_RANGE_DB && step.0 > 0.5 && step.1 < 2.0 && off < PLAYED_CENTS,
+            "{}",
+            case.name
+        );
     }
 }
 
