@@ -219,7 +219,7 @@ impl Drawing {
         Ok(move || {
             let breath_full_kpa = 20.0;
             let settings =
-                Settings { zeta: self.zeta as f32, noise: 0.0, breath_full_kpa, ..Settings::default() };
+                Settings { zeta: self.zeta as f32, noise: 0.0, breath_full_kpa, ..Settings::physical() };
             let name = file.name.clone();
             let model = self.instrument.model(file, RATE, settings.a4_hz)?;
             let period = steady_period::measure(&model, &settings, sounding, self.gamma as f32, RATE).ok_or_else(|| {
