@@ -1,6 +1,7 @@
 //! The plugin's window, as a pure function of the parameters and a snapshot.
 //! [`draw`] lays out one window: note, pitch and tools on top, the breath meter on the right and the keys below are always
-//! in sight; one view is in the middle. It reads [`Snapshot`] and [`Controls`], changes parameters through [`Controls`], and
+//! in sight; one view is in the middle. The first view, *Play*, has a meter of its own. A musician sees the views that make music,
+//! a laboratory all of them. It reads [`Snapshot`] and [`Controls`], changes parameters through [`Controls`], and
 //! returns everything else that the user did as [`Action`]s. It knows no voice, no link to the knob and no host, it never
 //! blocks, and it asks for no repaint. The design size is 1100 by 720 points, the least usable size 700 by 480. The owner
 //! of the window applies the zoom.
@@ -20,6 +21,7 @@ mod instrument_view;
 mod keyboard;
 mod knob_view;
 mod pitch_needle;
+mod play_view;
 mod reed_view;
 mod slider;
 pub mod snapshot;
@@ -91,29 +93,32 @@ pub enum Action {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Tab {
-    /// Flow through the reed, and torque.
+    /// The clarinet as it is played, and the main controls.
     #[default]
-    Reed,
-    /// Bore, holes, fingerings.
-    Clarinet,
-    /// Breath and where it comes from.
-    Breath,
+    Play,
     /// Spectrum and waves.
     Sound,
-    /// Knob and feel.
-    Knob,
+    /// Breath and where it comes from.
+    Breath,
+    /// Bore, holes, fingerings.
+    Clarinet,
     /// Which instrument, tuning, output.
     Instrument,
+    /// Flow through the reed, and torque.
+    Reed,
+    /// Knob and feel.
+    Knob,
 }
 
 impl Tab {
     /// In their order on the screen.
-    pub const ALL: [Self; 6] =
-        [Self::Reed, Self::Clarinet, Self::Breath, Self::Sound, Self::Knob, Self::Instrument];
+    pub const ALL: [Self; 7] =
+        [Self::Play, Self::Sound, Self::Breath, Self::Clarinet, Self::Instrument, Self::Reed, Self::Knob];
 
     /// The text on the tab.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Play => "Play",
             Self::Reed => "Reed",
             Self::Clarinet => "Clarinet",
             Self::Breath => "Breath",
@@ -126,6 +131,7 @@ impl Tab {
     /// The tool tip of the tab.
     fn about(self) -> &'static str {
         match self {
+            Self::Play => "The clarinet as it is played, and the main controls",
             Self::Reed => "Reed: flow over pressure, and the torque you feel",
             Self::Clarinet => "Bore, tone holes and keys; try fingerings",
             Self::Breath => "Mouth pressure, where it comes from, calibration",
@@ -148,11 +154,13 @@ pub struct WindowState {
     pub is_dark: bool,
     /// The view in front.
     pub tab: Tab,
+    /// The views of a laboratory are offered too.
+    pub is_lab: bool,
 }
 
 impl Default for WindowState {
     fn default() -> Self {
-        Self { size: SIZE, zoom: 1.0, is_dark: true, tab: Tab::Reed }
+        Self { size: SIZE, zoom: 1.0, is_dark: true, tab: Tab::Play, is_lab: false }
     }
 }
 
@@ -169,7 +177,18 @@ impl WindowState {
                 fix(self.size.1, (LEAST_SIZE.1, 8_000.0), d.size.1),
             ),
             zoom: fix(self.zoom, ZOOM, d.zoom),
+            // A project from before the choice may show the reed.
+            is_lab: self.is_lab || self.tab == Tab::Reed,
             ..self
+        }
+    }
+
+    /// Whether a view is offered. `has_knob`: a knob is connected or chosen.
+    pub fn offers(&self, tab: Tab, has_knob: bool) -> bool {
+        match tab {
+            Tab::Reed => self.is_lab,
+            Tab::Knob => self.is_lab || has_knob || self.tab == Tab::Knob,
+            _ => true,
         }
     }
 
@@ -197,6 +216,7 @@ pub struct EditorState {
     reed: reed_view::ReedView,
     clarinet: clarinet_view::ClarinetView,
     breath: breath_view::BreathView,
+    play: play_view::PlayView,
     knob: knob_view::KnobView,
     instrument: instrument_view::InstrumentView,
 }
@@ -222,6 +242,7 @@ impl EditorState {
         self.keyboard.release(&mut actions);
         self.knob.end_test(&mut actions);
         self.clarinet.end_try(&mut actions);
+        self.play.end_try(&mut actions);
         self.entry = None;
         actions
     }
@@ -263,6 +284,7 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
         reed,
         clarinet,
         breath,
+        play,
         knob,
         instrument,
     } = state;
@@ -280,25 +302,30 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
         knob_view::stop(&mut hands, &mut actions);
     }
     breath.look(&snapshot.sources);
+    let has_knob = snapshot.knob.is_live || !snapshot.knob.devices.is_empty() || hands.step("knob") > 0;
 
     let ground = |x: i8, y: i8| Frame::new().fill(c.ground).inner_margin(Margin::symmetric(x, y));
     let line = Panel::top("tools").exact_size(if is_small { 44.0 } else { 52.0 }).show_separator_line(false);
     line.frame(ground(10, 2)).show(ui, |ui| header::tools(ui, kept, compare, &mut hands, snapshot));
     let line = Panel::top("tabs").exact_size(30.0).show_separator_line(true);
     line.frame(Frame::new().fill(c.ground).inner_margin(Margin { left: 2, right: 10, top: 0, bottom: 0 }))
-        .show(ui, |ui| header::tabs(ui, kept, snapshot));
+        .show(ui, |ui| header::tabs(ui, kept, has_knob, snapshot));
     let keys = (0.13 * height).clamp(52.0, 110.0);
     let line = Panel::bottom("keys").exact_size(keys + 10.0).show_separator_line(false);
     line.frame(ground(8, 5)).show(ui, |ui| keyboard.draw(ui, snapshot, &mut actions));
+    let has_meter = tab != Tab::Play || is_blind;
     let line =
         Panel::right("meter").exact_size(if is_small { 96.0 } else { 112.0 }).show_separator_line(false);
-    line.frame(ground(8, 8)).show(ui, |ui| breath_meter::column(ui, snapshot, !is_blind));
+    if has_meter {
+        line.frame(ground(8, 8)).show(ui, |ui| breath_meter::column(ui, snapshot, !is_blind));
+    }
     CentralPanel::default().frame(ground(8, 8)).show(ui, |ui| {
         if is_blind {
             blind_comparison_view::draw(ui, compare, &mut hands);
             return;
         }
         match tab {
+            Tab::Play => play.draw(ui, &mut hands, snapshot, &mut actions),
             Tab::Reed => reed.draw(ui, &mut hands, snapshot),
             Tab::Clarinet => clarinet.draw(ui, snapshot, &mut actions),
             Tab::Breath => breath.draw(ui, &mut hands, snapshot),
@@ -347,11 +374,30 @@ mod tests {
     #[test]
     fn what_a_project_keeps_survives_rubbish() {
         let kept =
-            WindowState { size: (f32::NAN, 1e9), zoom: -3.0, is_dark: false, tab: Tab::Sound }.mended();
-        assert_eq!(kept, WindowState { size: (SIZE.0, 8_000.0), zoom: 0.5, is_dark: false, tab: Tab::Sound });
+            WindowState { size: (f32::NAN, 1e9), zoom: -3.0, is_dark: false, tab: Tab::Sound, is_lab: false }
+                .mended();
+        assert_eq!(
+            kept,
+            WindowState {
+                size: (SIZE.0, 8_000.0),
+                zoom: 0.5,
+                is_dark: false,
+                tab: Tab::Sound,
+                is_lab: false
+            }
+        );
         let text = toml::to_string(&kept).unwrap();
         assert_eq!(toml::from_str::<WindowState>(&text).unwrap(), kept);
         assert_eq!(toml::from_str::<WindowState>("").unwrap(), WindowState::default());
+    }
+
+    #[test]
+    fn a_musician_sees_no_laboratory_until_asked_and_old_projects_keep_their_view() {
+        let musician = WindowState::default();
+        assert!(musician.offers(Tab::Play, false) && !musician.offers(Tab::Reed, true));
+        assert!(!musician.offers(Tab::Knob, false) && musician.offers(Tab::Knob, true));
+        let old = toml::from_str::<WindowState>("tab = \"reed\"").unwrap().mended();
+        assert!(old.is_lab && Tab::ALL.iter().all(|&tab| old.offers(tab, false)));
     }
 
     #[test]

@@ -185,7 +185,7 @@ impl<'a> ClarinetDrawing<'a> {
         self.parts(painter, c);
         // The reed lies on the mouthpiece's lower side.
         let reed = [pos2(self.x(0.0), self.axis + 3.0), pos2(self.x(0.066), self.axis + self.scale * 0.0125)];
-        painter.line_segment(reed, Stroke::new(3.0, c.accent));
+        painter.line_segment(reed, Stroke::new(3.0, c.cane));
     }
 
     /// Joints, as rings.
@@ -243,7 +243,7 @@ impl<'a> ClarinetDrawing<'a> {
                 if opening < 0.99 {
                     let centre = pos2(rect.center().x, outer_y + out * (3.0 + lift));
                     let tip = Rect::from_center_size(centre, vec2(width + 2.0, 7.0));
-                    painter.rect(tip, CornerRadius::same(3), c.accent, edge, egui::StrokeKind::Inside);
+                    painter.rect(tip, CornerRadius::same(3), c.skin, edge, egui::StrokeKind::Inside);
                 } else {
                     painter.hline(rect.x_range().expand(2.0), outer_y, edge);
                 }

@@ -290,7 +290,8 @@ fn chip(ui: &mut Ui, c: &Colours, name: &str, size: Vec2, is_here: bool, is_alte
     response
 }
 
-fn about(ui: &mut Ui, hole: &ToneHole, opening: f32) {
+/// The tool tip of a hole.
+pub(super) fn about(ui: &mut Ui, hole: &ToneHole, opening: f32) {
     let c = Colours::here(ui);
     ui.set_max_width(260.0);
     ui.strong(hole.name.replace('_', " "));

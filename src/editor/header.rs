@@ -7,7 +7,7 @@ use egui::{
 use crate::editor::ab_comparison::AbComparison;
 use crate::editor::ab_comparison::ComparisonSide;
 use crate::editor::controls::Hands;
-use crate::editor::controls::momentary;
+use crate::editor::controls::{momentary, segments};
 use crate::editor::pitch_needle;
 use crate::editor::snapshot::{Severity, Snapshot};
 use crate::editor::theme;
@@ -210,12 +210,13 @@ fn zoom(ui: &mut Ui, kept: &mut WindowState) {
 }
 
 /// The lower line.
-pub fn tabs(ui: &mut Ui, kept: &mut WindowState, snapshot: &Snapshot) {
+pub fn tabs(ui: &mut Ui, kept: &mut WindowState, has_knob: bool, snapshot: &Snapshot) {
     let c = Colours::here(ui);
     let is_wide = ui.available_width() > 900.0;
     ui.horizontal_centered(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
-        for tab in Tab::ALL {
+        let offered = Tab::ALL.map(|tab| kept.offers(tab, has_knob).then_some(tab));
+        for tab in offered.into_iter().flatten() {
             let is_here = kept.tab == tab;
             let galley = ui.painter().layout_no_wrap(tab.name().to_owned(), theme::body(), c.ink);
             let size = vec2(galley.size().x + if is_wide { 26.0 } else { 16.0 }, ui.available_height());
@@ -244,8 +245,30 @@ pub fn tabs(ui: &mut Ui, kept: &mut WindowState, snapshot: &Snapshot) {
             }
             response.on_hover_text(tab.about());
         }
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| status(ui, snapshot));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            laboratory(ui, kept, is_wide);
+            ui.add_space(8.0);
+            status(ui, snapshot);
+        });
     });
+}
+
+/// Musician or laboratory.
+fn laboratory(ui: &mut Ui, kept: &mut WindowState, is_wide: bool) {
+    let mut chosen = usize::from(kept.is_lab);
+    let texts = [if is_wide { "Musician" } else { "Music" }, "Lab"].map(str::to_owned);
+    let (place, _) = ui.allocate_exact_size(vec2(if is_wide { 132.0 } else { 92.0 }, 24.0), Sense::hover());
+    let mut inside =
+        ui.new_child(egui::UiBuilder::new().max_rect(place).layout(Layout::left_to_right(Align::Center)));
+    let response = segments(&mut inside, "Views", &texts, &mut chosen);
+    response.on_hover_text("Musician: what music needs. Lab: also the reed's law, torque and studies.");
+    let is_lab = chosen == 1;
+    if is_lab != kept.is_lab {
+        kept.is_lab = is_lab;
+        if !is_lab && kept.tab == Tab::Reed {
+            kept.tab = Tab::Play;
+        }
+    }
 }
 
 fn status(ui: &mut Ui, snapshot: &Snapshot) {

@@ -200,7 +200,7 @@ impl Keys {
                 let plain = if black { c.ebony } else { c.ivory };
                 let is_down = sounding == Some(note) || held == Some(note);
                 let fill = if is_down {
-                    c.accent
+                    c.breath
                 } else if playable(note) {
                     plain
                 } else {
@@ -218,7 +218,7 @@ impl Keys {
                     painter.rect_stroke(
                         key.shrink(2.0),
                         round,
-                        Stroke::new(2.0, c.breath),
+                        Stroke::new(2.0, c.accent),
                         egui::StrokeKind::Inside,
                     );
                 }

@@ -170,7 +170,7 @@ impl ReedView {
         chart::names(ui, &transform, &marks);
         if ui.available_width() > 300.0 && transform.frame().height() > 200.0 {
             let sounding = if is_sounding { "one period of the sound" } else { "the reed does not swing" };
-            let mut lines = vec![("flow law of the reed", c.accent), (sounding, c.breath)];
+            let mut lines = vec![("flow law of the reed", c.ink), (sounding, c.breath)];
             if snapshot.lip.is_some() {
                 lines.push(("thin: the law under the player's lip", c.breath));
             }
@@ -298,7 +298,7 @@ fn even(value: f64, step: f64) -> f64 {
 
 fn law_curve(plot: &mut PlotUi<'_>, picture: &Picture, right: f64, c: &Colours) {
     let points = law_points(picture, right);
-    plot.line(chart::curve(points, c.accent, 2.5).fill(0.0).fill_alpha(0.10).id("law"));
+    plot.line(chart::curve(points, c.ink, 2.5).fill(0.0).fill_alpha(0.10).id("law"));
 }
 
 fn law_points(picture: &Picture, right: f64) -> Vec<[f64; 2]> {

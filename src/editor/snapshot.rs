@@ -35,13 +35,15 @@ pub struct Snapshot {
     pub mouth_kpa: f32,
     /// How the player's lip shapes the reed; `None` where the breath is physical.
     pub lip: Option<LipShape>,
+    /// The dynamic that is played, 0 (pianissimo) to 1 (fortissimo); `None` where the breath is physical.
+    pub dynamic: Option<f32>,
     /// The pressures that this fingering needs with this reed; `None` if it cannot sound or is not known yet.
     pub requirement: Option<NoteRequirement>,
     /// The settings of the parameters.
     pub settings: Settings,
     /// Where breath can come from.
     pub sources: Vec<BreathSource>,
-    /// The last seconds of mouth pressure.
+    /// The last seconds.
     pub history: Track,
     /// The inside of the mouthpiece, two periods of the lowest note or more.
     pub scope: MouthpieceTraces,
@@ -75,6 +77,7 @@ impl Default for Snapshot {
             openings,
             mouth_kpa: 0.0,
             lip: None,
+            dynamic: None,
             requirement: None,
             settings: Settings::default(),
             sources: Vec::new(),
@@ -167,8 +170,12 @@ impl BreathSource {
 pub struct Track {
     /// Between two values, s.
     pub step_s: f32,
-    /// The values, kPa.
+    /// Mouth pressure, kPa.
     pub kpa: Vec<f32>,
+    /// Level of the sound, dB over full scale, root mean square.
+    pub level_db: Vec<f32>,
+    /// Pitch as a MIDI number with its fraction at A4 = 440 Hz; `None` without one.
+    pub pitch: Vec<Option<f32>>,
 }
 
 /// The inside of the mouthpiece at equal steps, oldest first; all of one length.

@@ -169,7 +169,7 @@ fn waves(ui: &mut Ui, snapshot: &Snapshot) {
     .show(ui, |plot| {
         plot.line(chart::curve(vec![[0.0, 0.0], [to, 0.0]], c.closes, 1.0).id("shut"));
         chart::word(plot, [0.99 * to, 0.0], Align2::RIGHT_TOP, "shut", c.closes);
-        plot.line(chart::curve(track(&scope.opening), c.accent, 1.6).fill(0.0).fill_alpha(0.10).id("gap"));
+        plot.line(chart::curve(track(&scope.opening), c.ink, 1.6).fill(0.0).fill_alpha(0.10).id("gap"));
     });
 }
 

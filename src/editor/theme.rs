@@ -62,8 +62,12 @@ pub struct Colours {
     pub air: Color32,
     /// White keys.
     pub ivory: Color32,
-    /// Black keys.
+    /// Black keys, and the mouthpiece.
     pub ebony: Color32,
+    /// The reed.
+    pub cane: Color32,
+    /// Tips of fingers.
+    pub skin: Color32,
 }
 
 const fn rgb(hex: u32) -> Color32 {
@@ -107,6 +111,8 @@ fn light() -> Colours {
         air: rgb(0xfb_f6ea),
         ivory: rgb(0xff_fefb),
         ebony: rgb(0x2b_2725),
+        cane: rgb(0xd2_bf8c),
+        skin: rgb(0xd9_a283),
     }
 }
 
@@ -132,11 +138,13 @@ fn dark() -> Colours {
         odd_harmonic: toned(Colour::Sky, 0.22),
         even_harmonic: toned(Colour::Orange, 0.30),
         danger: rgb(0xff_6a5a),
-        wood: rgb(0x5a_473c),
-        metal: rgb(0x9a_9ea6),
+        wood: rgb(0x7d_6454),
+        metal: rgb(0xb4_b8c0),
         air: rgb(0x24_2320),
         ivory: rgb(0xd8_d3c9),
         ebony: rgb(0x26_2422),
+        cane: rgb(0xd6_c596),
+        skin: rgb(0xd8_a082),
     }
 }
 
@@ -166,7 +174,7 @@ pub fn body() -> FontId {
 
 /// Names of axes, marks and units.
 pub fn small() -> FontId {
-    FontId::proportional(11.0)
+    FontId::proportional(12.0)
 }
 
 /// Headings inside a view.

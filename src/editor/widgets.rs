@@ -176,7 +176,7 @@ pub fn momentary(ui: &mut Ui, hands: &mut Hands, id: &'static str, text: &str) -
 pub fn heading(ui: &mut Ui, text: &str) {
     let c = Colours::here(ui);
     ui.add_space(4.0);
-    ui.label(egui::RichText::new(text).font(FontId::proportional(12.0)).color(c.accent).strong());
+    ui.label(egui::RichText::new(text).font(FontId::proportional(13.0)).color(c.ink).strong());
 }
 
 /// A handle in a chart: its response, and the place it is dragged to in this frame.

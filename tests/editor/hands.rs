@@ -140,6 +140,64 @@ fn drags_types_and_resets(window: &mut Window, id: &str) {
     assert_eq!(look(window).value, look(window).default, "{id} does not reset by keys");
 }
 
+/// The main controls of the first view: what they are called, and what they move.
+const MACROS: &[(&str, &str)] = &[
+    ("Breath", "bcurve"),
+    ("Lip", "lip"),
+    ("Reed", "stren"),
+    ("Attack", "tongue"),
+    ("Colour", "lay"),
+    ("Air", "noise"),
+    ("Volume", "gain"),
+];
+
+#[test]
+fn every_main_control_drags_resets_and_takes_keys() {
+    let mut window = Window::new(Tab::Play, (1100.0, 720.0));
+    for (name, id) in MACROS {
+        let look = |window: &Window| window.host.look(id).unwrap();
+        let centre = window.harness.get_by_role_and_label(Role::Slider, name).rect().center();
+        window.host.told();
+        let before = look(&window).value;
+        let way = if before < 0.5 { -40.0 } else { 40.0 };
+        window.drag(centre, vec2(0.0, way));
+        assert!((look(&window).value - before) * way < 0.0, "{name} does not drag");
+        let told = window.host.told();
+        assert!(
+            matches!(&told[0], Told::Begin(of) if of == id)
+                && matches!(told.last(), Some(Told::End(of)) if of == id)
+        );
+        window.double_click(centre);
+        assert_eq!(look(&window).value, look(&window).default, "{name} does not reset");
+        window.drag(centre, vec2(0.0, way));
+        let before = look(&window).value;
+        window.harness.get_by_role_and_label(Role::Slider, name).focus();
+        window.harness.run();
+        window.harness.key_press(if way < 0.0 { Key::ArrowDown } else { Key::ArrowUp });
+        window.harness.run();
+        assert!((look(&window).value - before) * way > 0.0, "{name} does not move by keys");
+        window.harness.key_press(Key::Delete);
+        window.harness.run();
+        assert_eq!(look(&window).value, look(&window).default, "{name} does not reset by keys");
+    }
+}
+
+#[test]
+fn a_hole_on_the_stage_is_tried_and_given_back() {
+    let mut window = Window::new(Tab::Play, (1100.0, 720.0));
+    let open = window.snapshot.borrow().openings.clone();
+    let name = window.snapshot.borrow().instrument.holes[0].name.clone();
+    window.harness.get_by_label(&format!("Hole {name}, closed")).click();
+    window.harness.run_steps(30);
+    let mut tried: Vec<bool> = open.iter().map(|&opening| opening > 0.5).collect();
+    tried[0] = true;
+    assert_eq!(window.actions(), [Action::TryFingering(tried)]);
+    window.harness.get_by_label(&format!("Hole {name}, open"));
+    window.harness.get_by_label("Back to the note").click();
+    window.harness.run_steps(30);
+    assert_eq!(window.actions(), [Action::EndTry]);
+}
+
 #[test]
 fn every_slider_drags_types_and_resets() {
     for (tab, ids) in SLIDERS {

@@ -404,6 +404,19 @@ fn an_idle_window_asks_for_five_frames_a_second_at_most() {
 }
 
 #[test]
+fn the_laboratory_is_offered_when_asked_for() {
+    let mut window = Window::new(Tab::Play, (1100.0, 720.0));
+    let has_reed = |window: &Window| window.harness.query_by_role_and_label(Role::Tab, "Reed").is_some();
+    assert!(!has_reed(&window));
+    click(&mut window, "Views: Lab");
+    assert!(has_reed(&window));
+    window.harness.state_mut().kept.tab = Tab::Reed;
+    click(&mut window, "Views: Musician");
+    assert!(!has_reed(&window));
+    assert_eq!(window.harness.state().kept.tab, Tab::Play, "a hidden view is not in front");
+}
+
+#[test]
 fn looking_changes_nothing_that_a_project_keeps() {
     for tab in Tab::ALL {
         for (size, zoom) in [((1100.0, 720.0), 1.0), ((703.0, 481.0), 1.25), ((1601.0, 999.0), 3.0)] {

@@ -379,6 +379,12 @@ fn feel_of(bore: &RequirementSolver, reed: &PlayedReed, fingering: usize) -> Res
         .and_then(|table| table.note(fingering).copied().ok_or_else(|| "this note has no feel".to_owned()))
 }
 
+/// Root mean square, dB over full scale.
+fn rms_db(samples: &[f32]) -> f32 {
+    let power = samples.iter().map(|sample| sample * sample).sum::<f32>() / samples.len() as f32;
+    10.0 * power.max(1e-12).log10()
+}
+
 /// Plays `written` for five seconds, a swell that settles at `gamma`, and looks at the end of it.
 pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot {
     // Blown by pressure: the pictures show one.
@@ -425,6 +431,8 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
             f64::from(deg),
         ) as f32
     });
+    let level_db: Vec<f32> = sound.chunks((STEP_S * RATE_HZ) as usize).map(rms_db).collect();
+    let pitch = 69.0 + 12.0 * (heard.f0_hz.unwrap_or(440.0) / 440.0).log2();
     let standing = TransferMatrix::new(&model.file, model.air).standing_pressure(wanted_hz, open);
     Snapshot {
         instrument: Arc::new(model.file.clone()),
@@ -437,7 +445,12 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
         requirement: bore.note(fingering, &reed),
         settings: *settings,
         sources: breath_sources(breath_at(5.0) as f32),
-        history: Track { step_s: STEP_S as f32, kpa: probes.iter().step_by(every).map(kpa).collect() },
+        history: Track {
+            step_s: STEP_S as f32,
+            kpa: probes.iter().step_by(every).map(kpa).collect(),
+            pitch: level_db.iter().map(|&db| Some(pitch).filter(|_| db > -50.0)).collect(),
+            level_db,
+        },
         scope: MouthpieceTraces {
             rate_hz: (0.5 * inner_hz) as f32,
             mouthpiece_kpa: thin.iter().map(|probe| (1e-3 * probe.p_mouthpiece_pa) as f32).collect(),

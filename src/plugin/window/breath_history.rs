@@ -1,9 +1,10 @@
-//! The last seconds of breath, as the window shows them.
+//! The last seconds of breath, level and pitch, as the window shows them.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use crate::editor::snapshot::Track;
+use chalumeau_core::units::cents;
 
 /// Length of the history, s.
 const HISTORY_S: f32 = 10.0;
@@ -12,9 +13,17 @@ const STEP_S: f32 = 0.05;
 /// A longer pause clears the history, whose values would not show when they were.
 const LONGEST_GAP: Duration = Duration::from_secs(2);
 
-/// Mouth pressures at equal steps, oldest first.
+/// Mouth pressure, level and pitch at one time.
+#[derive(Clone, Copy)]
+struct HistoryEntry {
+    kpa: f32,
+    level_db: f32,
+    pitch: Option<f32>,
+}
+
+/// The history at equal steps, oldest first.
 pub struct BreathHistory {
-    kpa: VecDeque<f32>,
+    entries: VecDeque<HistoryEntry>,
     /// Time of the latest value.
     latest: Instant,
 }
@@ -22,26 +31,33 @@ pub struct BreathHistory {
 impl BreathHistory {
     /// Empty.
     pub fn new() -> Self {
-        Self { kpa: VecDeque::new(), latest: Instant::now() }
+        Self { entries: VecDeque::new(), latest: Instant::now() }
     }
 
-    /// Adds the mouth pressure of now, kPa, for every step since the latest value.
-    pub fn extend(&mut self, kpa: f32) {
+    /// Adds mouth pressure, kPa, level, dB, and pitch of now for every step since the latest value.
+    pub fn extend(&mut self, kpa: f32, level_db: f32, f0_hz: Option<f32>) {
+        let pitch = f0_hz.map(|f0_hz| 69.0 + 0.01 * cents(f64::from(f0_hz), 440.0) as f32);
+        let entry = HistoryEntry { kpa, level_db, pitch };
         let step = Duration::from_secs_f32(STEP_S);
         if self.latest.elapsed() > LONGEST_GAP {
             *self = Self::new();
         }
         while self.latest.elapsed() >= step {
             self.latest += step;
-            self.kpa.push_back(kpa);
-            if self.kpa.len() as f32 * STEP_S > HISTORY_S {
-                self.kpa.pop_front();
+            self.entries.push_back(entry);
+            if self.entries.len() as f32 * STEP_S > HISTORY_S {
+                self.entries.pop_front();
             }
         }
     }
 
     /// The history as a snapshot shows it.
     pub fn track(&self) -> Track {
-        Track { step_s: STEP_S, kpa: self.kpa.iter().copied().collect() }
+        Track {
+            step_s: STEP_S,
+            kpa: self.entries.iter().map(|entry| entry.kpa).collect(),
+            level_db: self.entries.iter().map(|entry| entry.level_db).collect(),
+            pitch: self.entries.iter().map(|entry| entry.pitch).collect(),
+        }
     }
 }

@@ -16,7 +16,7 @@ use crate::editor::Tab;
 use crate::editor::snapshot::{BreathSource, MouthpieceTraces, Severity, Snapshot, Status};
 #[cfg(feature = "devices")]
 use crate::editor::snapshot::{KnobDevice, KnobState};
-use crate::editor::sound_analysis::{SoundAnalyser, SoundAnalysis, WINDOW};
+use crate::editor::sound_analysis::{FLOOR_DB, SoundAnalyser, SoundAnalysis, WINDOW};
 use crate::plugin::SharedHandles;
 use crate::plugin::breath_sources::{BreathInput, BreathSources};
 use crate::plugin::instrument_loading::{CurrentInstrument, Readiness};
@@ -38,6 +38,8 @@ const IDLE: Duration = Duration::from_millis(220);
 /// Time between two searches for devices.
 #[cfg(feature = "devices")]
 const DEVICES_EVERY: Duration = Duration::from_secs(2);
+/// Length of sound whose level is shown, s: some periods of the lowest note.
+const LEVEL_S: f64 = 0.05;
 /// Less mouth pressure than this counts as none, kPa.
 const NO_BREATH_KPA: f32 = 1e-3;
 
@@ -97,7 +99,6 @@ impl SnapshotThread {
         let inside = self.inside.read().clone();
         let current = self.handles.instrument.current();
         self.receive_sound();
-        self.history.extend(inside.now.mouth_kpa);
         self.analyse(current.as_ref());
         let settings = self.handles.params.settings();
         let mut snapshot = Snapshot { settings, ..self.blank.clone() };
@@ -105,9 +106,11 @@ impl SnapshotThread {
         snapshot.silent = current.as_ref().map_or_else(Vec::new, |current| current.model.silent_notes());
         snapshot.chosen = Some(self.handles.params.instrument.choice.value() as usize);
         show_inside(&mut snapshot, &inside);
-        snapshot.history = self.history.track();
         self.show_instrument(&mut snapshot, inside.now.fingering);
         snapshot.heard = self.analyse_sound(inside.host_rate_hz, inside.now.sounding, &settings);
+        let level_db = self.level_db(inside.host_rate_hz);
+        self.history.extend(inside.now.mouth_kpa, level_db, snapshot.heard.f0_hz);
+        snapshot.history = self.history.track();
         #[cfg(feature = "devices")]
         self.show_knob(&mut snapshot);
         snapshot.status = self.status(current.as_ref(), &inside.breath_sources);
@@ -184,6 +187,14 @@ impl SnapshotThread {
         FeelDesign::default()
     }
 
+    /// Level of the latest sound, dB over full scale, root mean square.
+    fn level_db(&mut self, rate_hz: f64) -> f32 {
+        let count = ((LEVEL_S * rate_hz) as usize).clamp(1, WINDOW);
+        let latest = self.heard.iter().rev().take(count);
+        let power: f32 = latest.map(|sample| sample * sample).filter(|power| power.is_finite()).sum();
+        (10.0 * (power / count as f32).max(1e-12).log10()).max(FLOOR_DB)
+    }
+
     fn analyse_sound(
         &mut self,
         rate_hz: f64,
@@ -228,6 +239,7 @@ fn show_inside(snapshot: &mut Snapshot, inside: &AudioSnapshot) {
     snapshot.sounding = inside.now.sounding;
     snapshot.mouth_kpa = inside.now.mouth_kpa;
     snapshot.lip = inside.now.lip;
+    snapshot.dynamic = inside.now.dynamic;
     snapshot.sources = source_views(&inside.breath_sources, inside.now.sounding.is_some());
     snapshot.latency_ms = (1e3 * f64::from(inside.latency_samples) / inside.host_rate_hz) as f32;
     snapshot.scope = MouthpieceTraces {

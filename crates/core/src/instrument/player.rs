@@ -66,6 +66,8 @@ pub struct PlayerState {
     pub mouth_kpa: f32,
     /// How a player's lip shapes the reed; `None` where the breath is physical.
     pub lip: Option<LipShape>,
+    /// The dynamic that is played, 0 (pianissimo) to 1 (fortissimo); `None` where the breath is physical or before the first note.
+    pub dynamic: Option<f32>,
 }
 
 /// One player of one instrument.
@@ -122,6 +124,7 @@ impl Player {
             fingering: self.fingers.fingering().unwrap_or(0),
             mouth_kpa: (1e-3 * P_REF_PA * self.closing() * self.breath.gamma()) as f32,
             lip: self.posture.as_ref().and_then(Posture::lip),
+            dynamic: self.response.dynamic().map(|dynamic| dynamic as f32),
         }
     }
 

@@ -72,6 +72,11 @@ impl Response {
         self.lip.map_or(1.0, |lip| 1.0 + SOFT_RELEASE * (1.0 - lip))
     }
 
+    /// The dynamic that lip and breath have now, 0..=1; `None` where the breath is physical or before the first note.
+    pub fn dynamic(&self) -> Option<f64> {
+        self.lip
+    }
+
     /// Dynamic of the lip, 0..=1.
     pub fn lip(&self) -> f64 {
         self.lip.unwrap_or(0.0)

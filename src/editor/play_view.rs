@@ -1,0 +1,118 @@
+//! The first view: the clarinet as it is played, how loud it is, and the controls that most players need.
+//!
+//! The clarinet fills the view and moves as it is played: fingers and pads, the reed's tip, the sound pressure in the bore, the
+//! light in the holes that sound comes out of. On its left stands the breath in a musician's words, below it the main controls
+//! and the last ten seconds. A click on a hole opens or closes it for a trial, as in the clarinet view.
+
+mod dynamic_meter;
+mod lit_body;
+mod macro_knob;
+mod motion;
+mod stage;
+mod trail;
+
+use egui::{Frame, Margin, Panel, Ui, vec2};
+
+use crate::editor::Action;
+use crate::editor::controls::Hands;
+use crate::editor::snapshot::Snapshot;
+use crate::editor::theme;
+use crate::editor::theme::{Colours, GAP};
+use macro_knob::Macro;
+use motion::Motion;
+
+/// The main controls, in order, with what their ends mean. A control whose parameter does not exist is left out.
+const MACROS: [Macro; 7] = [
+    Macro { id: "bcurve", name: "Breath", ends: "early to late" },
+    Macro { id: "lip", name: "Lip", ends: "firm to loose" },
+    Macro { id: "stren", name: "Reed", ends: "soft to hard" },
+    Macro { id: "tongue", name: "Attack", ends: "hard to soft" },
+    Macro { id: "lay", name: "Colour", ends: "bright to mellow" },
+    Macro { id: "noise", name: "Air", ends: "none to much" },
+    Macro { id: "gain", name: "Volume", ends: "soft to loud" },
+];
+/// Width of a main control, with its words, points.
+const MACRO_WIDTH: f32 = 92.0;
+
+/// What the view remembers.
+#[derive(Clone, Debug, Default)]
+pub struct PlayView {
+    motion: Motion,
+    /// The holes of a trial, which replace the played fingering.
+    tried: Option<Vec<bool>>,
+}
+
+impl PlayView {
+    /// Ends a trial.
+    pub fn end_try(&mut self, actions: &mut Vec<Action>) {
+        if self.tried.take().is_some() {
+            actions.push(Action::EndTry);
+        }
+    }
+
+    /// Draws the view.
+    pub fn draw(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+        let c = Colours::here(ui);
+        if self.tried.as_ref().is_some_and(|tried| tried.len() != snapshot.instrument.holes.len()) {
+            self.end_try(actions);
+        }
+        self.motion.follow(ui, snapshot, self.tried.as_deref());
+        let height = ui.available_height();
+        let is_small = height < 420.0;
+        let clear = Frame::new().inner_margin(Margin::ZERO);
+
+        let trail_height = if is_small { 34.0 } else { (0.12 * height).clamp(48.0, 90.0) };
+        let bottom = Panel::bottom("trail").exact_size(trail_height + GAP).show_separator_line(false);
+        bottom
+            .frame(Frame::new().inner_margin(Margin { top: GAP as i8, ..Margin::ZERO }))
+            .show(ui, |ui| trail::draw(ui, snapshot));
+        let macros: Vec<&Macro> = MACROS.iter().filter(|of| hands.controls.look(of.id).is_some()).collect();
+        let macro_height = macro_knob::height(is_small);
+        let below = Panel::bottom("macros").exact_size(macro_height).show_separator_line(false);
+        below.frame(clear).show(ui, |ui| {
+            let width = (ui.available_width() / macros.len().max(1) as f32).min(1.6 * MACRO_WIDTH);
+            let left = 0.5 * (ui.available_width() - width * macros.len() as f32);
+            ui.horizontal(|ui| {
+                ui.spacing_mut().item_spacing.x = 0.0;
+                ui.add_space(left.max(0.0));
+                for of in macros {
+                    macro_knob::draw(ui, hands, of, vec2(width, macro_height));
+                }
+            });
+        });
+        let side = Panel::left("dynamics")
+            .exact_size(if is_small { 84.0 } else { 108.0 })
+            .show_separator_line(false);
+        side.frame(clear).show(ui, |ui| dynamic_meter::draw(ui, snapshot));
+        egui::CentralPanel::default().frame(clear).show(ui, |ui| {
+            let rect = ui.available_rect_before_wrap();
+            stage::ground(ui, rect);
+            let clicked = stage::draw(ui, rect, snapshot, &self.motion);
+            if let Some(hole) = clicked {
+                self.toggle(hole, snapshot, actions);
+            }
+            if self.tried.is_some() {
+                let place = egui::Rect::from_min_size(rect.left_top() + vec2(12.0, 8.0), vec2(180.0, 26.0));
+                let back = ui.put(place, egui::Button::new("Back to the note"));
+                if back.on_hover_text("Ends the trial; the played note sets the holes again").clicked() {
+                    self.end_try(actions);
+                }
+            } else if snapshot.sounding.is_none() {
+                let at = rect.center_bottom() - vec2(0.0, 10.0);
+                let text = "Play a key below, or blow. Click a hole to try it.";
+                ui.painter().text(at, egui::Align2::CENTER_BOTTOM, text, theme::body(), c.quiet);
+            }
+        });
+    }
+
+    /// Opens or closes a hole for a trial.
+    fn toggle(&mut self, hole: usize, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+        let played = || snapshot.openings.iter().map(|&opening| opening >= 0.5).collect();
+        let mut open = self.tried.take().unwrap_or_else(played);
+        if let Some(is_open) = open.get_mut(hole) {
+            *is_open = !*is_open;
+            actions.push(Action::TryFingering(open.clone()));
+            self.tried = Some(open);
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! A main control as a round knob. It moves by dragging up and down (Shift: ten times finer) and by arrow keys when it has the
+//! focus. A double click or Ctrl-click sets the default.
+
+use egui::accesskit::Action as AccessAction;
+use egui::{
+    Align2, CursorIcon, EventFilter, FontId, Key, Pos2, Response, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo,
+    pos2, vec2,
+};
+
+use crate::editor::controls::{Hands, Look, teach};
+use crate::editor::host_marks;
+use crate::editor::theme;
+use crate::editor::theme::Colours;
+
+/// From end to end, points of dragging.
+const TRAVEL: f32 = 160.0;
+/// Share of the way an arrow key moves; a tenth of that with Shift.
+const KEY_STEP: f32 = 0.02;
+/// The arc, from its low end to its high end, radians clockwise from the right.
+const ARC: (f32, f32) = (0.75 * std::f32::consts::PI, 2.25 * std::f32::consts::PI);
+const HOW: &str = "Drag up or down; Shift: finer. Double click or Ctrl-click: default. Arrow keys move it.";
+
+/// A main control.
+pub struct Macro {
+    /// The parameter it moves.
+    pub id: &'static str,
+    /// What a player calls it.
+    pub name: &'static str,
+    /// What its two ends mean.
+    pub ends: &'static str,
+}
+
+/// Height of a control with its words, points.
+pub fn height(is_small: bool) -> f32 {
+    if is_small { 82.0 } else { 118.0 }
+}
+
+/// Draws a control into a place of this size.
+pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2) {
+    let Some(look) = hands.controls.look(of.id) else { return };
+    let c = Colours::here(ui);
+    let (rect, mut response) = ui.allocate_exact_size(size, Sense::click_and_drag());
+    let mut value = moved_by_pointer(ui, hands, of.id, &look, &response).unwrap_or(look.value);
+    if response.has_focus() {
+        value = moved_by_keys(ui, hands, of.id, &look, &response).unwrap_or(value);
+    }
+    if response.double_clicked() || (response.clicked() && ui.input(|input| input.modifiers.command)) {
+        value = look.default;
+        hands.put(of.id, value);
+    }
+    if value != look.value {
+        response.mark_changed();
+    }
+    let marks = hands.controls.marks(of.id);
+    host_marks::offer_menu(ui, hands, of.id, &response);
+    let is_touched = response.hovered() || response.dragged() || response.has_focus();
+    let text = hands.controls.text(of.id, value);
+
+    let is_small = size.y < 100.0;
+    let radius = if is_small { 19.0 } else { 30.0 };
+    let centre = pos2(rect.center().x, rect.top() + radius + 6.0);
+    paint(ui, c, centre, radius, &look, value, is_touched);
+    let painter = ui.painter();
+    let at = pos2(centre.x, rect.top() + 2.0 * radius + 10.0);
+    let name = painter.text(
+        at,
+        Align2::CENTER_TOP,
+        of.name,
+        FontId::proportional(if is_small { 13.0 } else { 14.0 }),
+        c.ink,
+    );
+    host_marks::paint(ui, &marks, name.right_center());
+    // The value while a hand is near, else what the ends mean.
+    let (words, ink) = if is_touched { (text.as_str(), c.ink) } else { (of.ends, c.quiet) };
+    painter.text(name.center_bottom() + vec2(0.0, 1.0), Align2::CENTER_TOP, words, theme::small(), ink);
+    response.widget_info(|| {
+        let mut info = WidgetInfo::slider(ui.is_enabled(), f64::from(value), of.name);
+        info.current_text_value = Some(text.clone());
+        info
+    });
+    response.on_hover_and_drag_cursor(CursorIcon::ResizeVertical).on_hover_ui(|ui| {
+        ui.label(egui::RichText::new(format!("{}: {text}", look.name)).strong());
+        teach(ui, of.id, HOW);
+        host_marks::explain(ui, &marks);
+    });
+}
+
+fn arc(centre: Pos2, radius: f32, from: f32, to: f32) -> Vec<Pos2> {
+    (0..=40).map(|n| centre + radius * Vec2::angled(from + (to - from) * n as f32 / 40.0)).collect()
+}
+
+fn paint(ui: &Ui, c: &Colours, centre: Pos2, radius: f32, look: &Look, value: f32, is_touched: bool) {
+    let painter = ui.painter();
+    let (from, to) = ARC;
+    let angle = |value: f32| from + (to - from) * value.clamp(0.0, 1.0);
+    let thick = 0.15 * radius;
+    painter.add(Shape::line(arc(centre, radius, from, to), Stroke::new(thick, c.raised)));
+    // From the default, so that an untouched control shows that nothing is set.
+    let (low, high) = (angle(value.min(look.default)), angle(value.max(look.default)));
+    if high - low > 1e-3 {
+        painter.add(Shape::line(arc(centre, radius, low, high), Stroke::new(thick, c.accent)));
+    }
+    let tick = Vec2::angled(angle(look.default));
+    painter.line_segment(
+        [centre + (radius + 1.5) * tick, centre + (radius + 5.0) * tick],
+        Stroke::new(1.5, c.quiet),
+    );
+    let cap = 0.74 * radius;
+    painter.circle(centre + vec2(0.0, 2.0), cap, egui::Color32::from_black_alpha(60), Stroke::NONE);
+    let edge = if is_touched { Stroke::new(1.5, c.quiet) } else { Stroke::new(1.0, c.line) };
+    painter.circle(centre, cap, c.raised, edge);
+    painter.circle_filled(centre - vec2(0.0, 0.18 * cap), 0.72 * cap, c.hovered.gamma_multiply(0.5));
+    let hand = Vec2::angled(angle(value));
+    painter.line_segment([centre + 0.35 * cap * hand, centre + 0.86 * cap * hand], Stroke::new(3.0, c.ink));
+}
+
+fn moved_by_pointer(
+    ui: &Ui,
+    hands: &mut Hands,
+    id: &'static str,
+    look: &Look,
+    response: &Response,
+) -> Option<f32> {
+    // Where the hand would be on a control without steps: else a stepped one never leaves its step.
+    let exact = response.id.with("exact");
+    if response.drag_started() {
+        hands.begin(id);
+        ui.data_mut(|data| data.insert_temp(exact, look.value));
+    }
+    let mut value = None;
+    let drag = response.drag_delta();
+    if response.dragged() && drag != Vec2::ZERO {
+        let fine = if ui.input(|input| input.modifiers.shift) { 0.1 } else { 1.0 };
+        let from = ui.data(|data| data.get_temp::<f32>(exact)).unwrap_or(look.value);
+        let to = (from + fine * (drag.x - drag.y) / TRAVEL).clamp(0.0, 1.0);
+        ui.data_mut(|data| data.insert_temp(exact, to));
+        let to = look
+            .steps
+            .filter(|&steps| steps > 0)
+            .map_or(to, |steps| (to * steps as f32).round() / steps as f32);
+        hands.set(id, to);
+        value = Some(to);
+    }
+    if response.drag_stopped() {
+        hands.end(id);
+    }
+    value
+}
+
+fn moved_by_keys(
+    ui: &Ui,
+    hands: &mut Hands,
+    id: &'static str,
+    look: &Look,
+    response: &Response,
+) -> Option<f32> {
+    let filter = EventFilter { horizontal_arrows: true, vertical_arrows: true, ..EventFilter::default() };
+    ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, filter));
+    let unit = look.steps.map_or(KEY_STEP, |steps| 1.0 / steps.max(1) as f32);
+    let (mut by, mut to) = (0.0, None);
+    ui.input(|input| {
+        let fine = if input.modifiers.shift && look.steps.is_none() { 0.1 } else { 1.0 };
+        let presses = |key| input.num_presses(key) as f32;
+        let up = presses(Key::ArrowRight) + presses(Key::ArrowUp);
+        let down = presses(Key::ArrowLeft) + presses(Key::ArrowDown);
+        by += unit * fine * (up - down);
+        by += unit * input.num_accesskit_action_requests(response.id, AccessAction::Increment) as f32;
+        by -= unit * input.num_accesskit_action_requests(response.id, AccessAction::Decrement) as f32;
+        if input.key_pressed(Key::Home) {
+            to = Some(0.0);
+        } else if input.key_pressed(Key::End) {
+            to = Some(1.0);
+        } else if input.key_pressed(Key::Delete) || input.key_pressed(Key::Backspace) {
+            to = Some(look.default);
+        }
+    });
+    let value = to.or((by != 0.0).then(|| (look.value + by).clamp(0.0, 1.0)))?;
+    hands.put(id, value);
+    Some(value)
+}

@@ -1,0 +1,396 @@
+//! The clarinet on its stage: body, rings, keys, holes, fingers, and the sound pressure above.
+//!
+//! Places and sizes along the bore are those of the instrument file. The body is drawn somewhat thicker than it is, and the outer
+//! shape is plausible: the file knows the bore and the depth of the holes, but not the wood. Finger holes are in front, with
+//! pads that stand open; closed keys are on the upper edge.
+
+use egui::{
+    Color32, CursorIcon, Mesh, Painter, Pos2, Rect, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2,
+};
+
+use super::lit_body::{band, glow, lit, plate, shadow, turned};
+use super::motion::Motion;
+use crate::editor::chart;
+use crate::editor::clarinet_view;
+use crate::editor::snapshot::Snapshot;
+use crate::editor::theme;
+use crate::editor::theme::Colours;
+use chalumeau_core::bore::instrument_file::{HoleKind, InstrumentFile, ToneHole};
+
+/// Thickness of the wood where no hole gives it, and at the rim of the bell, m.
+const WALL_M: f64 = 7e-3;
+const RIM_M: f64 = 2.5e-3;
+/// The body is at least this thick over its length on the screen, or it would be a line in a small window.
+const LEAST_THICKNESS: f32 = 0.056;
+/// Most that the thickness is exaggerated.
+const MOST_EXAGGERATED: f32 = 2.4;
+/// Length of a mouthpiece's beak, m (drawn only).
+const BEAK_M: f64 = 0.055;
+/// Steps along the bore that the outline has.
+const STATIONS: usize = 160;
+/// How far a finger or pad lifts, points.
+const LIFT: f32 = 9.0;
+/// Level at which the picture's light begins, and where it is full, dBFS.
+const LIGHT_DB: (f32, f32) = (-50.0, -12.0);
+
+/// The stage without the instrument.
+pub fn ground(ui: &Ui, rect: Rect) {
+    let c = Colours::here(ui);
+    let painter = ui.painter_at(rect);
+    let light = c.panel;
+    glow(&painter, rect.center(), 0.62 * rect.width(), light);
+}
+
+/// How loud it is now, 0..=1, for the light in the picture.
+fn loudness(snapshot: &Snapshot) -> f32 {
+    let (quiet, loud) = LIGHT_DB;
+    let level = snapshot.history.level_db.last().copied().unwrap_or(quiet);
+    if snapshot.heard.f0_hz.is_none() { 0.0 } else { chart::share((level - quiet) / (loud - quiet)) }
+}
+
+/// Draws the instrument and gives back the hole that was clicked.
+pub fn draw(ui: &mut Ui, rect: Rect, snapshot: &Snapshot, motion: &Motion) -> Option<usize> {
+    let c = Colours::here(ui);
+    let body = Body::new(&snapshot.instrument, rect);
+    let loudness = loudness(snapshot);
+    {
+        let painter = ui.painter_at(rect);
+        body.wave(&painter, c, &snapshot.standing, rect, loudness);
+        let size = vec2(1.04 * body.length(), 0.9 * body.thickness());
+        let under = pos2(body.middle(), body.axis + 1.9 * body.thickness());
+        shadow(&painter, Rect::from_center_size(under, size), 0.28);
+        body.paint(&painter, c, motion.reed(), chart::share(snapshot.mouth_now_kpa() / 3.0));
+        body.rods(&painter, c);
+    }
+    let flows = flows(&snapshot.instrument, &snapshot.standing, motion);
+    let mut clicked = None;
+    // Pads before fingers: a finger lies on its ring.
+    let mut order: Vec<usize> = (0..snapshot.instrument.holes.len()).collect();
+    order.sort_by_key(|&hole| snapshot.instrument.holes[hole].kind == HoleKind::Finger);
+    for hole in order {
+        let tone_hole = &snapshot.instrument.holes[hole];
+        let opening = motion.opening(hole);
+        let place = body.place(tone_hole);
+        let response =
+            ui.interact(place.expand(3.0), ui.scope_id().with(("stage hole", hole)), Sense::click());
+        let is_hot = response.hovered() || response.has_focus();
+        body.hole(&ui.painter_at(rect), c, tone_hole, opening, loudness * flows[hole], is_hot);
+        let state = if opening >= 0.5 { "open" } else { "closed" };
+        response.widget_info(|| {
+            WidgetInfo::selected(Role::Switch, true, opening >= 0.5, format!("Hole {}", tone_hole.name))
+        });
+        let response = response
+            .on_hover_cursor(CursorIcon::PointingHand)
+            .accessible_name(format!("Hole {}, {state}", tone_hole.name));
+        if response.on_hover_ui(|ui| clarinet_view::about(ui, tone_hole, opening)).clicked() {
+            clicked = Some(hole);
+        }
+    }
+    clicked
+}
+
+/// Flow through each open hole over the largest, 0..=1: the pressure inside drives the air of the hole, whose mass over its area
+/// goes as one over its radius.
+fn flows(file: &InstrumentFile, wave: &[(f32, f32)], motion: &Motion) -> Vec<f32> {
+    let pressure = |x_m: f64| {
+        let at = wave.partition_point(|&(x, _)| f64::from(x) < x_m).min(wave.len().saturating_sub(1));
+        wave.get(at).map_or(0.0, |&(_, magnitude)| magnitude)
+    };
+    let flow = |(hole, of): (usize, &ToneHole)| motion.opening(hole) * of.radius_m as f32 * pressure(of.x_m);
+    let flows: Vec<f32> = file.holes.iter().enumerate().map(flow).collect();
+    let most = flows.iter().copied().filter(|flow| flow.is_finite()).fold(1e-9, f32::max);
+    flows.into_iter().map(|flow| chart::share(flow / most)).collect()
+}
+
+/// The body on the screen.
+struct Body<'a> {
+    file: &'a InstrumentFile,
+    left: f32,
+    axis: f32,
+    /// Points per metre, along and across.
+    scale: f32,
+    across: f32,
+    length_m: f64,
+    wall_m: f64,
+    last_hole_m: f64,
+    widest_m: f64,
+}
+
+impl<'a> Body<'a> {
+    fn new(file: &'a InstrumentFile, rect: Rect) -> Self {
+        let length_m = file.length_m();
+        let mut depths: Vec<f64> = file.holes.iter().map(|hole| hole.chimney_m).collect();
+        depths.sort_by(f64::total_cmp);
+        let wall_m = depths.get(depths.len() / 2).copied().unwrap_or(WALL_M).clamp(4e-3, 9e-3);
+        let last_hole_m = file.holes.iter().map(|hole| hole.x_m).fold(0.0, f64::max);
+        let widest_m = file.bore.iter().map(|s| s.r_start_m.max(s.r_end_m)).fold(0.0, f64::max) + RIM_M;
+        let margin = (0.03 * rect.width()).clamp(16.0, 40.0);
+        let scale = (rect.width() - 2.0 * margin) / length_m as f32;
+        let thin = 2.0 * (file.nominal_radius_m + wall_m) / length_m;
+        let exaggerated = (LEAST_THICKNESS / thin as f32).clamp(1.0, MOST_EXAGGERATED);
+        // The bell has at most half of the height.
+        let across = (scale * exaggerated).min(0.25 * rect.height() / widest_m as f32);
+        let axis = rect.top() + 0.62 * rect.height();
+        Self {
+            file,
+            left: rect.left() + margin,
+            axis,
+            scale,
+            across,
+            length_m,
+            wall_m,
+            last_hole_m,
+            widest_m,
+        }
+    }
+
+    fn x(&self, x_m: f64) -> f32 {
+        self.left + self.scale * x_m as f32
+    }
+
+    fn length(&self) -> f32 {
+        self.scale * self.length_m as f32
+    }
+
+    fn middle(&self) -> f32 {
+        self.left + 0.5 * self.length()
+    }
+
+    /// Diameter of the straight part.
+    fn thickness(&self) -> f32 {
+        2.0 * self.across * (self.file.nominal_radius_m + self.wall_m) as f32
+    }
+
+    /// Radius of the outside on the screen.
+    fn outside(&self, x_m: f64) -> f32 {
+        let beak = (x_m / BEAK_M).clamp(0.12, 1.0);
+        let way = (x_m - self.last_hole_m) / (self.length_m - self.last_hole_m).max(1e-6);
+        let wall_m = self.wall_m + (RIM_M - self.wall_m) * way.clamp(0.0, 1.0).sqrt();
+        let bore_m = self.file.radius_at(x_m.min(self.length_m - 1e-9));
+        self.across * (beak * (bore_m + wall_m)) as f32
+    }
+
+    /// End of the part that the reed lies on, m.
+    fn mouthpiece_end_m(&self) -> f64 {
+        let first = self.file.bore.first().map_or("", |segment| &segment.part);
+        let part = self.file.bore.iter().take_while(|segment| segment.part == first);
+        part.map(|segment| segment.x_end_m).last().unwrap_or(0.0).min(0.12)
+    }
+
+    /// The sound pressure over the body, higher and lighter when it is loud.
+    fn wave(&self, painter: &Painter, c: &Colours, wave: &[(f32, f32)], rect: Rect, loudness: f32) {
+        let foot = self.axis - self.outside(0.5 * self.length_m) - 18.0;
+        let room = foot - rect.top() - 16.0;
+        if wave.len() < 2 || room < 20.0 || loudness <= 0.0 {
+            return;
+        }
+        let most =
+            wave.iter().map(|&(_, magnitude)| magnitude).filter(|m| m.is_finite()).fold(1e-6, f32::max);
+        let height = room * (0.25 + 0.75 * loudness);
+        // Over the bell the line rises with it.
+        let lifted = |x_m: f32| self.outside(f64::from(x_m)) - self.outside(0.5 * self.length_m);
+        let floor = |x_m: f32| foot - lifted(x_m).max(0.0);
+        let share = |magnitude: f32| chart::share(magnitude / most);
+        let point = |&(x_m, magnitude): &(f32, f32)| {
+            pos2(self.x(f64::from(x_m)), (floor(x_m) - share(magnitude) * height).max(rect.top() + 8.0))
+        };
+        let mut mesh = Mesh::default();
+        for (index, of) in wave.iter().enumerate() {
+            let at = point(of);
+            mesh.colored_vertex(at, c.breath.gamma_multiply(0.42 * loudness * share(of.1)));
+            mesh.colored_vertex(pos2(at.x, floor(of.0)), c.breath.gamma_multiply(0.05 * share(of.1)));
+            if index > 0 {
+                let n = 2 * index as u32;
+                mesh.add_triangle(n - 2, n - 1, n);
+                mesh.add_triangle(n - 1, n, n + 1);
+            }
+        }
+        painter.add(mesh);
+        painter.add(Shape::line(wave.iter().map(point).collect(), Stroke::new(2.0, c.breath)));
+        if room > 60.0 {
+            let at = rect.left_top() + vec2(self.left - rect.left() + 2.0, 2.0);
+            painter.text(at, egui::Align2::LEFT_TOP, "sound pressure in the bore", theme::small(), c.breath);
+        }
+    }
+
+    /// The body itself, from the reed to the bell. `breath` lights the tip.
+    fn paint(&self, painter: &Painter, c: &Colours, reed: f32, breath: f32) {
+        let mouthpiece_m = self.mouthpiece_end_m();
+        let ebonite = c.ebony.lerp_to_gamma(c.wood, 0.35);
+        let colour = |x_m: f64| if x_m < mouthpiece_m { ebonite } else { c.wood };
+        // Two stations at the end of the mouthpiece, so that its colour ends sharply.
+        let mut places: Vec<f64> =
+            (0..=STATIONS).map(|n| self.length_m * n as f64 / STATIONS as f64).collect();
+        places.extend([mouthpiece_m - 1e-6, mouthpiece_m + 1e-6, BEAK_M]);
+        places.sort_by(f64::total_cmp);
+        turned(
+            painter,
+            self.axis,
+            places.into_iter().map(|x_m| (self.x(x_m), self.outside(x_m), colour(x_m))),
+        );
+        self.bell(painter, c);
+        for pair in self.file.bore.windows(2).filter(|pair| pair[0].part != pair[1].part) {
+            let (x, out) = (self.x(pair[0].x_end_m), self.outside(pair[0].x_end_m));
+            band(painter, self.axis, x - 3.5..=x + 3.5, out + 3.0, c.metal);
+        }
+        self.reed(painter, c, reed);
+        for share in [0.52, 0.64, 0.76] {
+            let x = self.x(share * mouthpiece_m);
+            band(painter, self.axis, x - 3.0..=x + 3.0, self.outside(share * mouthpiece_m) + 2.5, c.metal);
+        }
+        if breath > 0.0 {
+            glow(
+                painter,
+                pos2(self.x(0.0), self.axis + 2.0),
+                9.0 + 9.0 * breath,
+                c.breath.gamma_multiply(0.75 * breath),
+            );
+        }
+    }
+
+    /// The reed on the lower side of the mouthpiece; its tip moves.
+    fn reed(&self, painter: &Painter, c: &Colours, opening: f32) {
+        let mouthpiece_m = self.mouthpiece_end_m();
+        let end_m = 0.78 * mouthpiece_m;
+        let lower = |x_m: f64| self.axis + self.outside(x_m);
+        let tip = pos2(self.x(0.0) - 1.0, self.axis + self.outside(0.0) + 1.0 + 3.5 * opening);
+        let heel = pos2(self.x(end_m), lower(end_m) + 1.5);
+        let middle = pos2(self.x(0.4 * end_m), lower(0.4 * end_m) + 1.5);
+        let heel_low = heel + vec2(0.0, 0.16 * self.thickness());
+        let middle_low = middle + vec2(0.0, 0.10 * self.thickness());
+        let mut mesh = Mesh::default();
+        for (upper, lower) in [(tip, tip + vec2(0.0, 1.5)), (middle, middle_low), (heel, heel_low)] {
+            mesh.colored_vertex(upper, lit(c.cane, 1.1));
+            mesh.colored_vertex(lower, lit(c.cane, 0.78));
+        }
+        for n in [0, 2] {
+            mesh.add_triangle(n, n + 1, n + 2);
+            mesh.add_triangle(n + 1, n + 2, n + 3);
+        }
+        painter.add(mesh);
+    }
+
+    /// The opening of the bell and its rim.
+    fn bell(&self, painter: &Painter, c: &Colours) {
+        let (x, out) = (self.x(self.length_m), self.across * self.widest_m as f32);
+        let centre = pos2(x, self.axis);
+        painter.add(Shape::ellipse_filled(centre, vec2(0.17 * out, out), c.metal));
+        painter.add(Shape::ellipse_filled(
+            centre + vec2(0.5, 0.0),
+            vec2(0.13 * out, 0.94 * out),
+            lit(c.ebony, 0.7),
+        ));
+        let stroke = Stroke::new(1.0, lit(c.metal, 1.4));
+        painter.add(Shape::ellipse_stroke(centre, vec2(0.17 * out, out), stroke));
+    }
+
+    /// The rods that carry the keys: one along each part that has some.
+    fn rods(&self, painter: &Painter, c: &Colours) {
+        let mut parts: Vec<&str> = self.file.bore.iter().map(|segment| &*segment.part).collect();
+        parts.dedup();
+        for part in parts {
+            let mut segments = self.file.bore.iter().filter(|segment| segment.part == part);
+            let Some(first) = segments.next() else { continue };
+            let end_m = segments.last().map_or(first.x_end_m, |last| last.x_end_m);
+            let keys = self.file.holes.iter().filter(|hole| hole.kind == HoleKind::KeyClosed);
+            let places: Vec<f64> =
+                keys.map(|hole| hole.x_m).filter(|&x_m| (first.x_start_m..end_m).contains(&x_m)).collect();
+            let (Some(&from), Some(&to)) = (places.first(), places.last()) else { continue };
+            if places.len() < 2 {
+                continue;
+            }
+            let y = self.axis - self.outside(0.5 * (from + to)) - 5.0;
+            let (left, right) = (self.x(from) - 8.0, self.x(to) + 8.0);
+            band(painter, y, left..=right, 2.0, c.metal);
+            for x in [left, right] {
+                band(painter, y + 1.0, x - 2.5..=x + 2.5, 4.0, c.metal);
+            }
+        }
+    }
+
+    /// Half the width of a hole or its pad on the screen.
+    fn half(&self, hole: &ToneHole) -> f32 {
+        (self.across * hole.radius_m as f32).clamp(3.0, 0.42 * self.thickness())
+    }
+
+    /// Where a hole is.
+    fn place(&self, hole: &ToneHole) -> Rect {
+        let half = self.half(hole);
+        match hole.kind {
+            HoleKind::KeyClosed => {
+                let centre = pos2(self.x(hole.x_m), self.axis - self.outside(hole.x_m) - 4.0);
+                Rect::from_center_size(centre, vec2(2.0 * half + 6.0, 12.0))
+            }
+            HoleKind::Finger | HoleKind::PadOpen => {
+                // The thumb is behind: its hole looks round the lower edge.
+                let low = if hole.name.contains("thumb") { 0.80 * self.outside(hole.x_m) } else { 0.0 };
+                Rect::from_center_size(
+                    pos2(self.x(hole.x_m), self.axis + low),
+                    egui::Vec2::splat(2.0 * half + 6.0),
+                )
+            }
+        }
+    }
+
+    /// One hole with its finger, pad or key. `flow` is the sound that comes out, 0..=1.
+    fn hole(&self, painter: &Painter, c: &Colours, hole: &ToneHole, opening: f32, flow: f32, is_hot: bool) {
+        let (place, half) = (self.place(hole), self.half(hole));
+        let centre = place.center();
+        let edge = if is_hot { Stroke::new(2.0, c.accent) } else { Stroke::new(1.0, lit(c.metal, 0.6)) };
+        let air = lit(c.ebony, 0.6).lerp_to_gamma(c.breath, 0.85 * flow);
+        if flow > 0.02 {
+            glow(
+                painter,
+                self.mouth_of(hole, centre),
+                half + 12.0 * flow,
+                c.breath.gamma_multiply(0.6 * flow),
+            );
+        }
+        match hole.kind {
+            HoleKind::KeyClosed => {
+                let lifted = centre - vec2(0.0, 0.7 * LIFT * opening);
+                if opening > 0.05 {
+                    let mouth = Rect::from_center_size(centre + vec2(0.0, 4.0), vec2(2.0 * half, 4.0));
+                    painter.add(Shape::ellipse_filled(mouth.center(), 0.5 * mouth.size(), air));
+                }
+                plate(painter, lifted, vec2(half + 3.0, 4.5), c.metal, edge);
+            }
+            HoleKind::PadOpen => {
+                painter.circle(centre, half + 1.0, air, Stroke::new(1.5, lit(c.metal, 0.8)));
+                let lifted = centre - vec2(0.0, LIFT * opening);
+                let tilt = 1.0 - 0.45 * opening;
+                plate(painter, lifted, vec2(half + 3.0, (half + 3.0) * tilt), c.metal, edge);
+            }
+            HoleKind::Finger => {
+                painter.circle_filled(centre, half + 3.0, lit(c.metal, 0.85));
+                painter.circle(centre, half, air, edge);
+                if opening < 0.99 {
+                    finger(painter, c, centre - vec2(0.0, LIFT * opening), half, 1.0 - 0.8 * opening);
+                }
+            }
+        }
+    }
+
+    /// Where the sound of a hole comes out.
+    fn mouth_of(&self, hole: &ToneHole, centre: Pos2) -> Pos2 {
+        if hole.kind == HoleKind::KeyClosed { centre + vec2(0.0, 4.0) } else { centre }
+    }
+}
+
+/// The tip of a finger on a hole.
+fn finger(painter: &Painter, c: &Colours, centre: Pos2, half: f32, presence: f32) {
+    let colour = |light: f32| lit(c.skin, light).gamma_multiply(presence);
+    let size = vec2(half + 5.0, half + 3.0);
+    painter.add(Shape::ellipse_filled(
+        centre + vec2(0.0, 2.0),
+        size,
+        Color32::from_black_alpha((70.0 * presence) as u8),
+    ));
+    painter.add(Shape::ellipse_filled(centre, size, colour(0.86)));
+    painter.add(Shape::ellipse_filled(centre - vec2(0.0, 1.0), 0.82 * size, colour(1.0)));
+    painter.add(Shape::ellipse_filled(
+        centre - vec2(0.0, 0.28 * size.y),
+        vec2(0.55 * size.x, 0.42 * size.y),
+        colour(1.16),
+    ));
+}
