@@ -67,10 +67,11 @@ impl PlayView {
             .frame(Frame::new().inner_margin(Margin { top: GAP as i8, ..Margin::ZERO }))
             .show(ui, |ui| trail::draw(ui, snapshot));
         let macros: Vec<&Macro> = MACROS.iter().filter(|of| hands.controls.look(of.id).is_some()).collect();
-        let macro_height = macro_knob::height(is_small);
+        let macro_height = macro_knob::height(height);
         let below = Panel::bottom("macros").exact_size(macro_height).show_separator_line(false);
         below.frame(clear).show(ui, |ui| {
-            let width = (ui.available_width() / macros.len().max(1) as f32).min(1.6 * MACRO_WIDTH);
+            let width =
+                (ui.available_width() / macros.len().max(1) as f32).min(1.35 * macro_height.max(MACRO_WIDTH));
             let left = 0.5 * (ui.available_width() - width * macros.len() as f32);
             ui.horizontal(|ui| {
                 ui.spacing_mut().item_spacing.x = 0.0;

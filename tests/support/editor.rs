@@ -16,6 +16,7 @@ use chalumeau::editor::{EditorState, Tab, WindowState, draw};
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::event::Event;
 use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, PlayedReed, RequirementSolver, TorqueLimits};
+use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
 use chalumeau_core::instrument::{
     BreathResponse, Clarinet, Listening, ListeningMode, Probe, Settings, Tuning, feel_inputs,
 };
@@ -510,9 +511,14 @@ pub fn shot(harness: &mut Harness<'_, EditorState>, scale: f32) -> image::RgbaIm
     image::imageops::crop_imm(&whole, px(FRAME), px(FRAME), px(size.0), px(size.1)).to_image()
 }
 
-/// Both at once.
+/// Both at once. The first view shows the note at mezzo-forte, as a player plays it.
 pub fn picture(kept: &WindowState, controls: &Fake, snapshot: &Snapshot, scale: f32) -> image::RgbaImage {
-    shot(&mut window(kept, controls, snapshot, scale), scale)
+    let mut snapshot = snapshot.clone();
+    if kept.tab == Tab::Play {
+        snapshot.settings.breath_response = BreathResponse::Played;
+        snapshot.dynamic = Some(MEZZO_FORTE as f32);
+    }
+    shot(&mut window(kept, controls, &snapshot, scale), scale)
 }
 
 /// Name and place in the picture of everything that can be moved, pressed or chosen.

@@ -30,9 +30,9 @@ pub struct Macro {
     pub ends: &'static str,
 }
 
-/// Height of a control with its words, points.
-pub fn height(is_small: bool) -> f32 {
-    if is_small { 82.0 } else { 118.0 }
+/// Height of a control with its words in a view of this height, points.
+pub fn height(view: f32) -> f32 {
+    (0.26 * view).clamp(82.0, 160.0)
 }
 
 /// Draws a control into a place of this size.
@@ -57,7 +57,8 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2) {
     let text = hands.controls.text(of.id, value);
 
     let is_small = size.y < 100.0;
-    let radius = if is_small { 19.0 } else { 30.0 };
+    // What the words leave.
+    let radius = 0.5 * (size.y - if is_small { 44.0 } else { 56.0 });
     let centre = pos2(rect.center().x, rect.top() + radius + 6.0);
     paint(ui, c, centre, radius, &look, value, is_touched);
     let painter = ui.painter();
