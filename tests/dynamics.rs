@@ -167,6 +167,9 @@ fn with_a_knob_sound_begins_where_the_hand_feels_the_threshold() {
                 heard(&rendered(&settings, &events, 0.8), 0.5, 0.8, notes[n])
             })
         });
+        for (written, [below, above]) in notes.iter().zip(&heard) {
+            println!("written {written} at place {place}: {below:.1?}, {above:.1?}");
+        }
         let loudest = heard.iter().map(|[below, _]| below.0).fold(f64::NEG_INFINITY, f64::max);
         let softest = heard.iter().map(|[_, above]| above.0).fold(f64::INFINITY, f64::min);
         let off = heard.iter().map(|[_, above]| above.1.abs()).fold(0.0, f64::max);

@@ -16,15 +16,17 @@
 //! The closing pressure rises because the jaw opens: the rest opening grows and the stiffness stays. So the air that the
 //! reed displaces stays the same, and with it the modes of the bore: a *stiffer* reed of the same closing pressure lost
 //! written A5 to another register. From the top of the clarion up the flow strength goes over to
-//! [`PlayerModel::altissimo_zeta`], at which soft notes keep their register. `cargo xtask fit-player` fits the numbers to recorded notes; `docs/tone.md` tells how and what
-//! they bought.
+//! [`PlayerModel::altissimo_zeta`], at which soft notes keep their register. `cargo xtask fit-player` fits the numbers to
+//! recorded notes; `docs/tone.md` tells how and what they bought.
 
 use crate::reed::ReedLaw;
 use crate::reed::physical::ZETA_REFERENCE;
 
-/// The dynamic of mezzo-forte. By the level of the recorded notes it would be 0.54, by their colour 0.62; both steps from here are
-/// within 2 dB of the recorded ones.
+/// The dynamic of mezzo-forte. By the level of the recorded notes it would be 0.54, by their colour 0.62; both steps from
+/// here are within 2.4 dB of the recorded ones.
 pub const MEZZO_FORTE: f64 = 0.6;
+/// Mouth over closing pressure below the onset of any note: 1/3 for a reed without mass, less near its resonance.
+pub const LOWEST_ONSET: f64 = 0.25;
 /// Number of dynamics at which a note's pressure and trim are known.
 pub const NODES: usize = 8;
 /// These dynamics: closer together where the reed begins to beat, and the pitch bends most.

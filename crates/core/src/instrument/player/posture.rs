@@ -59,8 +59,6 @@ struct Played {
 pub struct PlayedBreath {
     /// Mouth over closing pressure that holds the note.
     pub gamma: f64,
-    /// Mouth over closing pressure below which the note does not begin.
-    pub onset: f64,
     /// Amplitude that the note then has, rms in the mouthpiece over the closing pressure.
     pub amplitude: f64,
 }
@@ -163,9 +161,7 @@ impl Posture {
         if played.asked.0 != dynamic {
             let (soft, loud) = played.shift;
             let gamma = (played.note.gamma(dynamic) + soft + (loud - soft) * dynamic).max(0.0);
-            let onset = (played.note.onset + soft).max(0.0);
-            played.asked =
-                (dynamic, PlayedBreath { gamma, onset, amplitude: played.note.amplitude(dynamic) });
+            played.asked = (dynamic, PlayedBreath { gamma, amplitude: played.note.amplitude(dynamic) });
         }
         played.asked.1
     }

@@ -2,9 +2,11 @@
 //!
 //! Physical, breath is a mouth pressure. Played, it is a dynamic: every note begins at the same small breath, [`ONSET`], and
 //! from there to full breath the dynamic goes from 0 to 1 along a curve; [`dynamics`](super::dynamics) has the rule. Below
-//! `ONSET` the pressure stays below the onset of the note and falls to zero in proportion, so that nothing begins to sound.
+//! `ONSET` the pressure is below the onset of any note and falls to zero in proportion: nothing begins, and what sounded dies in a
+//! tenth of a second.
 
 use super::breath::Asked;
+use super::dynamics::LOWEST_ONSET;
 use super::ear::Ear;
 use super::posture::Posture;
 use crate::instrument::settings::{BreathResponse, Settings};
@@ -38,7 +40,7 @@ pub fn breath_of_dynamic(dynamic: f64) -> f64 {
     ONSET + (1.0 - ONSET) * dynamic
 }
 
-/// Breath, 0..=1, as a dynamic, and the share of the note's onset that it asks for where it is below [`ONSET`].
+/// Breath, 0..=1, as a dynamic, and its share of [`ONSET`] where it is below.
 fn dynamic(breath: f64, curve: f64) -> (f64, f64) {
     let above = ((breath - ONSET) / (1.0 - ONSET)).clamp(0.0, 1.0);
     let above = if curve == 1.0 { above } else { above.powf(curve) };
@@ -108,7 +110,7 @@ impl Response {
         posture.shape_lip(lip);
         let breath = posture.played_breath(wanted);
         match ear {
-            _ if share < 1.0 => share * breath.onset,
+            _ if share < 1.0 => share * LOWEST_ONSET,
             Some(ear) => ear.pushed(breath.gamma, breath.amplitude),
             None => breath.gamma,
         }

@@ -11,7 +11,7 @@ use crate::analysis::pitch;
 use crate::instrument::held_note::{HeldNote, TONGUE_HOLD_S};
 use crate::instrument::model::Model;
 use crate::instrument::played_note::PlayedNote;
-use crate::instrument::player::dynamics::{NODE_DYNAMICS, NODES};
+use crate::instrument::player::dynamics::{LOWEST_ONSET, NODE_DYNAMICS, NODES};
 use crate::instrument::tuning_table::{NoteTuning, TuningTable};
 use crate::instrument::voice::{Drive, TICK, Voice};
 use crate::parallel;
@@ -35,10 +35,7 @@ const LOUDEST: [f64; 4] = [1.0, 0.92, 0.84, 0.76];
 const RANGES: [f64; 6] = [1.0, 0.8, 0.6, 0.45, 0.3, 0.2];
 /// Excess of the pressure at dynamic 0 over that at 1, where the controller begins.
 const SOFTER: f64 = 0.2;
-/// The controller moves the logarithm of the excess of the mouth pressure over this, which is below the onset of any note:
-/// 1/3 for a reed without mass, less near its resonance.
-const LOWEST_ONSET: f64 = 0.25;
-/// The controller: mouth over closing pressure for 1 neper of distance at once, and the rate at which the logarithm of the
+/// The controller moves the logarithm of the excess of the mouth pressure over [`LOWEST_ONSET`]: mouth over closing pressure for 1 neper of distance at once, and the rate at which the logarithm of the
 /// excess follows the distance, 1/s. Near its threshold the amplitude grows by some 300 nepers a second and unit of pressure: the
 /// two then settle in a quarter of a second.
 const PUSH: f64 = 0.06;
@@ -89,7 +86,8 @@ struct Diminuendo<'a> {
     longer: f64,
 }
 
-/// What every note of a model asks of the player, on all cores, given the trims of its table; takes some ten seconds on two cores.
+/// What every note of a model asks of the player, on all cores, given the trims of its table; takes some ten
+/// seconds on two cores.
 /// `on` receives the share done, 0..=1; if it breaks, the result is `None`.
 pub fn learn(model: &Model, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Option<TuningTable> {
     let note = |fingering: usize| {
