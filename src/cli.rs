@@ -19,6 +19,7 @@ mod knob;
 mod knob_sim;
 mod parameters;
 mod plot_args;
+mod presets;
 mod radiation;
 mod realism;
 mod reed;
@@ -89,6 +90,7 @@ enum Command {
     Reed(reed::ReedCommand),
     Study(study::StudyCommand),
     Parameters(parameters::ParametersCommand),
+    Presets(presets::PresetsCommand),
     #[cfg(feature = "devices")]
     Knob(Box<knob::KnobCommand>),
     #[cfg(feature = "simulator")]
@@ -203,6 +205,7 @@ pub fn main() -> ExitCode {
         Command::Reed(command) => command.run(),
         Command::Study(command) => command.run(),
         Command::Parameters(command) => command.run(),
+        Command::Presets(command) => command.run(),
         #[cfg(feature = "devices")]
         Command::Knob(command) => command.run(),
         #[cfg(feature = "simulator")]

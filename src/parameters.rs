@@ -148,6 +148,8 @@ pub enum Sets {
 pub enum Value {
     /// Of a [`Number`].
     Number(f32),
+    /// Of a [`Whole`].
+    Whole(i32),
     /// Of a [`Choice`]: its place in the list.
     Choice(usize),
     /// Of a [`Switch`].
@@ -161,6 +163,13 @@ pub const LISTENING_MODES: [ListeningMode; 3] =
 /// The parameter with this id.
 pub fn find(id: &str) -> Option<&'static Parameter> {
     PARAMETERS.iter().find(|parameter| parameter.id == id)
+}
+
+/// By its id.
+impl PartialEq for Parameter {
+    fn eq(&self, other: &Self) -> bool {
+        self.id == other.id
+    }
 }
 
 impl Parameter {
@@ -183,6 +192,37 @@ impl Parameter {
         }
     }
 
+    /// Whether a preset sets it: what undo carries, and the instrument. Left out is what acts, arms or plays, and how finely
+    /// a host renders.
+    pub fn is_in_presets(&self) -> bool {
+        let is_status = matches!(self.kind, Kind::Status(_));
+        (self.is_undoable || self.id == "instr") && self.is_restored && !is_status && self.id != "qual"
+    }
+
+    /// The default.
+    pub fn default_value(&self) -> Value {
+        match self.kind {
+            Kind::Number(number) => Value::Number(number.default),
+            Kind::Whole(whole) => Value::Whole(whole.default),
+            Kind::Choice(choice) => Value::Choice(choice.default),
+            Kind::Switch(switch) => Value::Switch(switch.default),
+            Kind::Status(_) => Value::Switch(false),
+        }
+    }
+
+    /// A value on a scale from 0 to 1; one of another kind is the default.
+    pub fn normalized(&self, value: Value) -> f32 {
+        match (self.kind, value) {
+            (Kind::Number(number), Value::Number(value)) => (value - number.min) / (number.max - number.min),
+            (Kind::Whole(whole), Value::Whole(value)) => {
+                (value - whole.min) as f32 / (whole.max - whole.min) as f32
+            }
+            (Kind::Choice(choice), Value::Choice(index)) => index as f32 / (choice.all.len() - 1) as f32,
+            (Kind::Switch(_), Value::Switch(on)) => f32::from(u8::from(on)),
+            _ => self.default_normalized(),
+        }
+    }
+
     /// Steps from one end to the other: 1 for a switch; `None` for a continuous number.
     pub fn steps(&self) -> Option<usize> {
         match self.kind {
@@ -196,11 +236,8 @@ impl Parameter {
     /// The default on a scale from 0 to 1.
     pub fn default_normalized(&self) -> f32 {
         match self.kind {
-            Kind::Number(number) => (number.default - number.min) / (number.max - number.min),
-            Kind::Whole(whole) => (whole.default - whole.min) as f32 / (whole.max - whole.min) as f32,
-            Kind::Switch(switch) => f32::from(u8::from(switch.default)),
-            Kind::Choice(choice) => choice.default as f32 / (choice.all.len() - 1) as f32,
             Kind::Status(_) => 0.0,
+            _ => self.normalized(self.default_value()),
         }
     }
 }

@@ -499,3 +499,75 @@ fn instruments_are_played_by_name_and_files_are_tuned_once() {
         &["cannot read violin", "b-flat, a, e-flat, c, bass"],
     );
 }
+
+/// A folder of the user's presets with one good and one broken.
+fn users_presets(root: &Path) {
+    let folder = root.join("chalumeau/presets");
+    fs::create_dir_all(&folder).unwrap();
+    let text = "format = 1\nname = \"My jazz\"\ntags = [\"mine\"]\n\n[parameters]\nlip = \"0.900 x\"\n";
+    fs::write(folder.join("mine.toml"), text).unwrap();
+    fs::write(folder.join("bad.toml"), "format = 1\nname = \"Bad\"\n[parameters]\nlipp = 1\n").unwrap();
+}
+
+fn with_presets(directory: &Path, args: &[&str]) -> (Option<i32>, String, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_chalumeau"))
+        .current_dir(directory)
+        .env("CHALUMEAU_DATA_DIR", directory)
+        .args(args)
+        .output()
+        .unwrap();
+    let [said, warned] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    (output.status.code(), said, warned)
+}
+
+#[test]
+fn presets_are_listed_by_tag_and_shown_and_a_broken_one_is_named() {
+    let d = tempfile::tempdir().unwrap();
+    users_presets(d.path());
+    let (code, list, warned) = with_presets(d.path(), &["presets", "list"]);
+    assert_eq!(code, Some(0), "{warned}");
+    assert!(list.starts_with("program,name,tags,author,shows\n0,B flat clarinet,"), "{list}");
+    assert!(list.lines().count() > 48 && list.ends_with(",My jazz,mine,,\n"), "{list}");
+    assert!(
+        warned.contains("bad.toml: line 4: there is no parameter \"lipp\"; did you mean lip?"),
+        "{warned}"
+    );
+    let (_, jazz, _) = with_presets(d.path(), &["presets", "list", "--tag", "jazz", "--tag", "soft"]);
+    assert!(jazz.lines().skip(1).all(|line| line.contains("jazz") && line.contains("soft")));
+    assert!(jazz.contains("Subtone ballad") && !jazz.contains("Swing section"), "{jazz}");
+    let (code, _, said) = with_presets(d.path(), &["presets", "list", "--tag", "jaz"]);
+    assert!(code == Some(2) && said.contains("did you mean jazz?"), "{said}");
+    let (_, mine, _) = with_presets(d.path(), &["presets", "show", "my jazz"]);
+    assert!(mine.contains("name = \"My jazz\"") && mine.contains("lip = \"0.900 x\""), "{mine}");
+    let (code, _, said) = with_presets(d.path(), &["presets", "show", "Subtown ballad"]);
+    assert!(code == Some(2) && said.contains("did you mean \"Subtone ballad\"?"), "{said}");
+}
+
+#[test]
+fn a_preset_is_rendered_and_flags_change_it() {
+    let d = tempfile::tempdir().unwrap();
+    users_presets(d.path());
+    let render = |out: &str, more: &[&str]| {
+        let note = ["render", "--written", "G3", "--seconds", "0.3", "--out", out];
+        let all: Vec<&str> = note.iter().chain(more).copied().collect();
+        let (code, _, said) = with_presets(d.path(), &all);
+        assert_eq!(code, Some(0), "{said}");
+        fs::read(d.path().join(out)).unwrap()
+    };
+    let mine = render("mine.wav", &["--preset", "My jazz"]);
+    let same = ["--breath-response", "played", "--tempered"];
+    assert_eq!(mine, render("same.wav", &[&same[..], &["--set", "lip=0.9"]].concat()));
+    assert_ne!(mine, render("usual.wav", &same));
+    let over = render("over.wav", &["--preset", "My jazz", "--set", "lip=1"]);
+    assert_eq!(over, render("again.wav", &[&same[..], &["--lip", "1"]].concat()));
+    // The instrument is the preset's, unless another is chosen.
+    let bass = render("bass.wav", &["--preset", "Bass pulse"]);
+    assert_ne!(bass, render("small.wav", &["--preset", "Bass pulse", "--instrument", "e-flat"]));
+    let (code, _, said) =
+        with_presets(d.path(), &["render", MELODY, "--preset", "Klezmer", "--out", "no.wav"]);
+    assert!(code == Some(2) && said.contains("did you mean \"Klezmer dance\"?"), "{said}");
+    let crescendo = ["render", MELODY, "--preset", "My jazz", "--crescendo", "0.4:1.2", "--out", "no.wav"];
+    let (code, _, said) = with_presets(d.path(), &crescendo);
+    assert!(code == Some(2) && said.contains("add --breath-response physical"), "{said}");
+    assert!(!d.path().join("no.wav").exists());
+}

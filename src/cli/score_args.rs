@@ -4,6 +4,7 @@ use crate::cli::Failure;
 use crate::cli::feel_args::FeelArgs;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, check_fingering, note, within};
+use crate::presets::{self, Preset};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::control::midi::MidiDecoder;
@@ -77,6 +78,11 @@ pub struct ScoreArgs {
     #[arg(long, alias = "sr", value_name = "HZ", default_value = "48000", help_heading = "Output", value_parser = clap::value_parser!(u32).range(1_000..=1_536_000))]
     rate: u32,
 
+    /// Play a preset, a factory preset or one of yours; other flags and --set change it. Its breath response counts, so
+    /// that breath is mostly a share of full breath. The feel of the knob stays that of its own flags. `chalumeau presets
+    /// list` lists them
+    #[arg(long, value_name = "NAME", value_parser = preset_called)]
+    preset: Option<Preset>,
     #[command(flatten)]
     instrument: PlayedArgs,
     #[command(flatten)]
@@ -89,6 +95,11 @@ pub struct ScoreArgs {
 fn interval(text: &str) -> Result<(u8, u8), String> {
     let (from, to) = text.split_once(':').ok_or("must be two notes, for example E3:C6 or 52:84")?;
     Ok((note(from)?, note(to)?))
+}
+
+/// Finds a preset.
+fn preset_called(name: &str) -> Result<Preset, String> {
+    presets::find(name, &presets::user()).cloned()
 }
 
 /// Everything a rendering needs.
@@ -116,11 +127,16 @@ impl RenderJob {
 impl ScoreArgs {
     /// Reads and checks the arguments and prepares the instrument. Takes seconds for an instrument file.
     pub fn prepare(&self) -> Result<RenderJob, Failure> {
-        let file = self.instrument.load()?;
+        let file = match &self.preset {
+            Some(preset) => self.instrument.load_for(preset)?,
+            None => self.instrument.load()?,
+        };
         let curve = self.curve()?;
-        let settings = match &curve {
-            Some(curve) => self.settings.blown_in_either(curve, &file)?,
-            None => self.settings.played(&file)?,
+        let base = self.preset.as_ref().map(Preset::settings);
+        let settings = match (&curve, &base) {
+            (Some(curve), base) => self.settings.blown_in_either(base.as_ref(), curve, &file)?,
+            (None, Some(base)) => self.settings.over_preset(base, &file)?,
+            (None, None) => self.settings.played(&file)?,
         };
         let mut score = self.score(&file)?;
         if let Some(curve) = &curve {
@@ -212,7 +228,11 @@ impl ScoreArgs {
         let transposition = file.transposition;
         if let Some(path) = &self.midi {
             let bytes = fs::read(path).map_err(|source| Failure::Read { path: path.clone(), source })?;
-            let decoder = if self.mpe { MidiDecoder::new().with_mpe() } else { MidiDecoder::new() };
+            let mut decoder = if self.mpe { MidiDecoder::new().with_mpe() } else { MidiDecoder::new() };
+            if let Some(preset) = &self.preset {
+                // Nothing sounds yet, so this bends nothing.
+                decoder.usual_bend_range(preset.bend_range());
+            }
             let score = midi_file::read_as(decoder, &bytes, self.rate)
                 .map_err(|source| Failure::MidiFile { path: path.clone(), source })?;
             return Ok(score);

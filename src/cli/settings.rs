@@ -260,19 +260,36 @@ impl SettingsArgs {
         }
     }
 
-    /// For a breath curve: of gamma, unless the user has chosen the played response; then of shares of full breath.
-    pub fn blown_in_either(&self, curve: &BreathCurve, file: &InstrumentFile) -> Result<Settings, Failure> {
-        match self.response()? {
+    /// The settings of a preset, and over them what was given.
+    pub fn over_preset(&self, preset: &Settings, file: &InstrumentFile) -> Result<Settings, Failure> {
+        self.over(*preset, file)
+    }
+
+    /// For a breath curve: of gamma, unless the preset or the user has chosen the played response; then of shares of full
+    /// breath.
+    pub fn blown_in_either(
+        &self,
+        preset: Option<&Settings>,
+        curve: &BreathCurve,
+        file: &InstrumentFile,
+    ) -> Result<Settings, Failure> {
+        let of_preset = preset.map(|preset| (preset.breath_response, "--preset".to_owned()));
+        match self.response()?.or(of_preset) {
             Some((BreathResponse::Played, typed)) => {
                 let most = curve.gamma_max();
                 if most > 1.0 {
+                    let instead = if typed == "--preset" {
+                        "add --breath-response physical".to_owned()
+                    } else {
+                        format!("leave {typed} out")
+                    };
                     return Err(Failure::Usage(format!(
-                        "with {typed} breath is a share of full breath, 0..1, got {most}; leave {typed} out to give gamma"
+                        "with {typed} breath is a share of full breath, 0..1, got {most}; {instead} to give gamma"
                     )));
                 }
-                self.played(file)
+                preset.map_or_else(|| self.played(file), |preset| self.over_preset(preset, file))
             }
-            _ => self.blown_by(curve, file),
+            _ => self.reaching(curve, self.over(*preset.unwrap_or(&Settings::physical()), file)?),
         }
     }
 
@@ -284,7 +301,11 @@ impl SettingsArgs {
                 "{typed}: this command blows with a pressure, gamma; leave {typed} out"
             )));
         }
-        let mut settings = self.over(Settings::physical(), file)?;
+        self.reaching(curve, self.over(Settings::physical(), file)?)
+    }
+
+    /// Settings whose full breath reaches the largest gamma of a curve.
+    fn reaching(&self, curve: &BreathCurve, mut settings: Settings) -> Result<Settings, Failure> {
         let gamma_max = curve.gamma_max();
         let closing_kpa = score::closing_kpa(&settings);
         // Less what single precision adds to a closing pressure of 6 kPa.

@@ -3,6 +3,7 @@
 use crate::cache::Cache;
 use crate::cli::Failure;
 use crate::instrument_path::{self, LoadError};
+use crate::presets::Preset;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::instrument::concert_pitch::A4_HZ;
@@ -29,7 +30,12 @@ pub struct InstrumentArg {
 impl InstrumentArg {
     /// Its measurements.
     pub fn load(&self) -> Result<InstrumentFile, Failure> {
-        let Some(path) = &self.instrument else { return Ok(InstrumentFile::built_in()) };
+        self.load_or(Bundled::BFlat)
+    }
+
+    /// Its measurements; those of `usual` if none was chosen.
+    fn load_or(&self, usual: Bundled) -> Result<InstrumentFile, Failure> {
+        let Some(path) = &self.instrument else { return Ok(usual.file()) };
         if let Some(bundled) = path.to_str().and_then(Bundled::from_id) {
             return Ok(bundled.file());
         }
@@ -150,6 +156,20 @@ impl PlayedArgs {
     /// Its measurements.
     pub fn load(&self) -> Result<InstrumentFile, Failure> {
         self.instrument.load()
+    }
+
+    /// Its measurements; those of the instrument of a preset if none was chosen.
+    pub fn load_for(&self, preset: &Preset) -> Result<InstrumentFile, Failure> {
+        if self.instrument.instrument.is_some() {
+            return self.load();
+        }
+        let usual = preset.bundled().ok_or_else(|| {
+            Failure::Usage(format!(
+                "the preset {:?} plays the user's own instrument; add --instrument with its file",
+                preset.name
+            ))
+        })?;
+        self.instrument.load_or(usual)
     }
 
     /// The instrument ready to play, tuned unless that was not wanted.

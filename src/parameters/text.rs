@@ -105,11 +105,21 @@ impl Parameter {
     /// The default as text, with its unit.
     pub fn default_text(&self) -> String {
         match self.kind {
-            Kind::Number(number) => format!("{}{}", number.text(number.default), number.unit),
-            Kind::Whole(whole) => format!("{}{}", whole.text(whole.default), whole.unit),
-            Kind::Choice(choice) => choice.all[choice.default].1.to_owned(),
-            Kind::Switch(switch) => switch.text(switch.default).to_owned(),
             Kind::Status(first) => first.to_owned(),
+            _ => self.text(self.default_value()),
+        }
+    }
+
+    /// A value as text, with its unit; empty for one of another kind.
+    pub fn text(&self, value: Value) -> String {
+        match (self.kind, value) {
+            (Kind::Number(number), Value::Number(value)) => format!("{}{}", number.text(value), number.unit),
+            (Kind::Whole(whole), Value::Whole(value)) => format!("{}{}", whole.text(value), whole.unit),
+            (Kind::Choice(choice), Value::Choice(at)) => {
+                choice.all.get(at).map_or_else(String::new, |(_, text)| (*text).to_owned())
+            }
+            (Kind::Switch(switch), Value::Switch(on)) => switch.text(on).to_owned(),
+            _ => String::new(),
         }
     }
 
@@ -141,7 +151,11 @@ impl Parameter {
                 .parse(text)
                 .map(Value::Switch)
                 .ok_or_else(|| format!("{id} ({name}) must be one of {}, got {text:?}", self.range())),
-            Kind::Whole(_) | Kind::Status(_) => Err(format!("{id} ({name}) is not read from text")),
+            Kind::Whole(whole) => match bare_number(text, whole.unit).parse::<i32>() {
+                Ok(value) if (whole.min..=whole.max).contains(&value) => Ok(Value::Whole(value)),
+                _ => Err(format!("{id} ({name}) must be a whole number in {}, got {text}", self.range())),
+            },
+            Kind::Status(_) => Err(format!("{id} ({name}) is not read from text")),
         }
     }
 }

@@ -13,6 +13,7 @@ mod fingers;
 mod fitted;
 mod onset_shift;
 mod posture;
+mod reed_glide;
 mod reed_smoothing;
 pub mod response;
 mod tongue;
@@ -32,6 +33,7 @@ use dynamics::LipShape;
 use ear::Ear;
 use fingers::Fingers;
 use posture::{Lags, Posture};
+use reed_glide::ReedGlide;
 use reed_smoothing::ReedSmoothing;
 use response::Response;
 use tongue::Tongue;
@@ -84,14 +86,21 @@ pub struct Player {
     fingers: Fingers,
     tuning: PlayedTuning,
     reed: ReedSmoothing,
+    glide: ReedGlide,
     bend_cents: f64,
 }
 
 impl Player {
-    /// Takes new settings, clamped to their ranges; they are heard from the next tick on. Real-time safe.
+    /// Takes new settings, clamped to their ranges; they are heard from the next tick on. A sounding reed glides to them.
+    /// Real-time safe.
     pub fn set_settings(&mut self, settings: &Settings) {
         let settings = settings.clamped();
         if settings != self.settings {
+            if self.is_resting() {
+                self.glide.settle();
+            } else {
+                self.glide.begin(&self.settings, &settings);
+            }
             self.settings = settings;
             self.posture = None;
         }
@@ -248,10 +257,10 @@ impl Player {
     /// Advances one control tick: moves holes and delay, and returns how the reed is driven. Real-time safe.
     pub fn tick<F: Real>(&mut self, model: &Model, voice: &mut Voice<F>) -> Drive {
         let tick_s = self.tick_s(model);
-        if self.reed.tick(tick_s) {
+        if self.reed.tick(tick_s) | self.glide.tick(&self.settings, tick_s) {
             self.posture = None;
         }
-        let settings = self.settings.with_reed_factors(self.reed.factors());
+        let settings = self.glide.over(self.settings).with_reed_factors(self.reed.factors());
         let fingering = self.fingers.fingering();
         let posture = self.posture.get_or_insert_with(|| {
             voice.lattice_mut().set_jet_loss(f64::from(settings.vent_loss));

@@ -1,0 +1,102 @@
+//! New settings of lip and reed, reached in a little time, as a player's lip moves: at once they would click.
+//!
+//! A step of the reed's law is a step of the flow, and what is heard of a flow is its slope. While nothing sounds, new
+//! settings hold at once.
+
+use super::response::LIP_S;
+use super::step_towards;
+use crate::instrument::settings::Settings;
+use crate::reed::law::coupled_k;
+
+/// Numbers that shape the reed: strength, lip, zeta, damping, lay, H, k and A.
+const NUMBERS: usize = 8;
+/// A number counts as arrived when it is this near to its target, as a share of it: 0.001 dB of flow.
+const ARRIVED: f32 = 1e-4;
+
+/// The reed's numbers on their way to those of the [`Settings`].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ReedGlide {
+    /// `None` once they have arrived.
+    under_way: Option<[f32; NUMBERS]>,
+}
+
+/// The numbers of settings; k as it is played.
+fn numbers(settings: &Settings) -> [f32; NUMBERS] {
+    let k = if settings.coupled { coupled_k(f64::from(settings.reed_h)) as f32 } else { settings.reed_k };
+    let Settings { strength, lip, zeta, damping, lay, reed_h, reed_a, .. } = *settings;
+    [strength, lip, zeta, damping, lay, reed_h, k, reed_a]
+}
+
+impl ReedGlide {
+    /// The settings change from `old` to `new` while something sounds.
+    pub fn begin(&mut self, old: &Settings, new: &Settings) {
+        let now = self.under_way.unwrap_or_else(|| numbers(old));
+        self.under_way = (now != numbers(new)).then_some(now);
+    }
+
+    /// Nothing sounds: all numbers are where they should be.
+    pub fn settle(&mut self) {
+        self.under_way = None;
+    }
+
+    /// Moves the numbers, as fast as a player's lip; whether they have changed.
+    pub fn tick(&mut self, target: &Settings, tick_s: f64) -> bool {
+        let Some(now) = &mut self.under_way else { return false };
+        let share = step_towards(tick_s, LIP_S) as f32;
+        let mut has_arrived = true;
+        for (now, target) in now.iter_mut().zip(numbers(target)) {
+            *now += (target - *now) * share;
+            has_arrived &= (*now - target).abs() <= ARRIVED * target.abs().max(ARRIVED);
+        }
+        if has_arrived {
+            self.under_way = None;
+        }
+        true
+    }
+
+    /// The settings with the reed as it is now.
+    pub fn over(&self, settings: Settings) -> Settings {
+        let Some([strength, lip, zeta, damping, lay, reed_h, reed_k, reed_a]) = self.under_way else {
+            return settings;
+        };
+        Settings { strength, lip, zeta, damping, lay, reed_h, reed_k, coupled: false, reed_a, ..settings }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_reed_arrives_within_50_ms_and_never_jumps() {
+        let old = Settings::default();
+        let new = Settings { lip: 0.7, lay: 0.0, reed_h: 2.0, strength: 4.0, ..old };
+        let mut glide = ReedGlide::default();
+        glide.begin(&old, &new);
+        assert_eq!(glide.over(new).reed_law(), old.reed_law(), "where it was");
+        let tick_s = 16.0 / 96_000.0;
+        let (mut last, mut ticks) = (old.closing_pa(), 0);
+        while glide.tick(&new, tick_s) {
+            let closing = glide.over(new).closing_pa();
+            assert!((closing / last - 1.0).abs() < 0.05, "tick {ticks}: {last} to {closing}");
+            (last, ticks) = (closing, ticks + 1);
+            let arrived = (closing / new.closing_pa() - 1.0).abs();
+            assert!(arrived < 0.02 || f64::from(ticks) * tick_s < 0.05, "{arrived} after {ticks} ticks");
+        }
+        assert_eq!(glide.over(new), new);
+        assert!(f64::from(ticks) * tick_s < 0.15, "{ticks}");
+    }
+
+    #[test]
+    fn a_new_target_on_the_way_goes_on_from_there() {
+        let (old, new) = (Settings::default(), Settings { zeta: 0.9, ..Settings::default() });
+        let mut glide = ReedGlide::default();
+        glide.begin(&old, &new);
+        (0..50).for_each(|_| assert!(glide.tick(&new, 1.0 / 6_000.0)));
+        let half = glide.over(new).zeta;
+        glide.begin(&new, &old);
+        assert_eq!(glide.over(old).zeta, half);
+        glide.settle();
+        assert_eq!(glide.over(old), old);
+    }
+}

@@ -1,0 +1,241 @@
+//! Presets: named settings of the whole instrument, as text files.
+//!
+//! A preset holds the values that differ from the default, by the ids and texts of the one table of parameters
+//! ([`crate::parameters`]). Choosing it puts every other parameter that belongs to presets to its default, so that a preset
+//! means the same whatever was set before. Out of presets stay what acts, arms or plays, and how finely a host renders
+//! ([`Parameter::is_in_presets`]).
+//!
+//! - `file`: the text of a preset, read and written
+//! - `factory`: the presets that come with the program, in the order of MIDI programs
+//! - `user_folder`: the user's own, in a folder of the system for data
+
+pub mod factory;
+mod file;
+pub mod user_folder;
+
+use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::instrument::Settings;
+use chalumeau_core::reed::PhysicalReed;
+
+use crate::parameters::{self, PARAMETERS, Parameter, Sets, Value};
+use user_folder::{UserFolder, UserPresets};
+
+pub use file::{FORMAT, PresetError, TAGS_MOST, TEXT_MOST};
+
+/// Longest name, characters: it must fit into the window's header and into a file's name.
+pub const NAME_MOST: usize = 40;
+
+/// A preset.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Preset {
+    /// Its name, by which it is found. No other preset of its folder has it.
+    pub name: String,
+    /// Words to find it by.
+    pub tags: Vec<String>,
+    /// Who made it; may be empty.
+    pub author: String,
+    /// One sentence: what it shows; may be empty.
+    pub shows: String,
+    /// What differs from the default, in the order of the table.
+    values: Vec<(&'static Parameter, Value)>,
+}
+
+impl Preset {
+    /// Reads the text of a preset. The error says the line, what is wrong there, and what would be right.
+    pub fn parse(text: &str) -> Result<Self, PresetError> {
+        file::parse(text)
+    }
+
+    /// The text of this preset, which [`parse`](Self::parse) reads back.
+    pub fn to_text(&self) -> String {
+        file::to_text(self)
+    }
+
+    /// A preset of the values that `look` gives for each parameter; what reads as its default is left out.
+    pub fn of(name: &str, look: impl Fn(&'static Parameter) -> Option<Value>) -> Self {
+        let values = Self::parameters().filter_map(|parameter| {
+            let value = look(parameter)?;
+            (parameter.text(value) != parameter.default_text()).then_some((parameter, value))
+        });
+        Self { name: name.to_owned(), values: values.collect(), ..Self::default() }
+    }
+
+    /// The parameters that a preset sets.
+    pub fn parameters() -> impl Iterator<Item = &'static Parameter> {
+        PARAMETERS.iter().filter(|parameter| parameter.is_in_presets())
+    }
+
+    /// What differs from the default.
+    pub fn changes(&self) -> &[(&'static Parameter, Value)] {
+        &self.values
+    }
+
+    /// The value of a parameter under this preset.
+    pub fn value(&self, parameter: &Parameter) -> Value {
+        let own = self.values.iter().find(|(other, _)| other.id == parameter.id);
+        own.map_or_else(|| parameter.default_value(), |(_, value)| *value)
+    }
+
+    /// Every parameter that a preset sets, with its value.
+    pub fn all_values(&self) -> impl Iterator<Item = (&'static Parameter, Value)> {
+        Self::parameters().map(|parameter| (parameter, self.value(parameter)))
+    }
+
+    /// The settings of the instrument, as the plugin has them under this preset before any controller moves.
+    pub fn settings(&self) -> Settings {
+        let mut settings = Settings::default();
+        let mut reed = PhysicalReed::reference();
+        let (mut is_measured, mut is_driven) = (false, false);
+        for &(parameter, value) in &self.values {
+            parameter.set(&mut settings, value);
+            match (parameter.sets, value) {
+                (Some(Sets::Reed(field, unit)), Value::Number(number)) => {
+                    *field(&mut reed) = f64::from(number) / unit;
+                }
+                (Some(Sets::ReedFace), Value::Choice(face)) => is_measured = face == 1,
+                // What a controller drives follows nothing else.
+                (None, Value::Choice(source)) if parameter.id == "ksrc" => is_driven = source > 0,
+                _ => {}
+            }
+        }
+        if is_measured {
+            settings = settings.with_physical_reed(&reed, &PhysicalReed::reference());
+        }
+        Settings { coupled: settings.coupled && !is_driven, ..settings }
+    }
+
+    /// The instrument, if it is one that comes with the program.
+    pub fn bundled(&self) -> Option<Bundled> {
+        match parameters::find("instr").map(|parameter| self.value(parameter)) {
+            // The parameter has them in this order, and the user's own after them.
+            Some(Value::Choice(index)) => Bundled::ALL.get(index).copied(),
+            _ => Some(Bundled::BFlat),
+        }
+    }
+
+    /// How far the wheel bends, semitones.
+    pub fn bend_range(&self) -> u8 {
+        match parameters::find("bendr").map(|parameter| self.value(parameter)) {
+            Some(Value::Whole(semitones)) => semitones.clamp(0, 127) as u8,
+            _ => 2,
+        }
+    }
+
+    /// Whether it has this tag, in any case of its letters.
+    pub fn has_tag(&self, tag: &str) -> bool {
+        self.tags.iter().any(|own| own.eq_ignore_ascii_case(tag))
+    }
+
+    /// Whether each word of a search stands in its name, tags, author or sentence.
+    pub fn is_found_by(&self, search: &str) -> bool {
+        let all = format!("{}\n{}\n{}\n{}", self.name, self.tags.join("\n"), self.author, self.shows);
+        let all = all.to_lowercase();
+        search.to_lowercase().split_whitespace().all(|word| all.contains(word))
+    }
+}
+
+/// The user's own presets; none where the system has no folder for them.
+pub fn user() -> UserPresets {
+    UserFolder::system().map_or_else(UserPresets::default, |folder| folder.read())
+}
+
+/// The preset of this name, in any case of its letters; the user's own first. The error names the nearest.
+pub fn find<'a>(name: &str, user: &'a UserPresets) -> Result<&'a Preset, String> {
+    let all = || user.presets.iter().chain(factory::all());
+    let exact = all().find(|preset| preset.name == name.trim());
+    let found = exact.or_else(|| all().find(|preset| preset.name.eq_ignore_ascii_case(name.trim())));
+    found.ok_or_else(|| {
+        let near = nearest(name, all().map(|preset| preset.name.as_str()));
+        let meant = near.map_or_else(String::new, |near| format!(" did you mean {near:?}?"));
+        format!("there is no preset {name:?};{meant} `chalumeau presets list` lists them all")
+    })
+}
+
+/// The name that was most likely meant by `typed`; `None` if none is near.
+pub fn nearest<'a>(typed: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let typed = typed.to_lowercase();
+    // What begins alike is near, however long it is.
+    let nearness = |name: &str| strsim::jaro_winkler(&typed, &name.to_lowercase());
+    let near = names.into_iter().map(|name| (nearness(name), name));
+    // Below this, names of different words begin to look alike.
+    near.filter(|(near, _)| *near > 0.75).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
+}
+
+/// A name as presets have it: without white space at its ends; refused if it is empty, too long or holds a line break.
+pub fn checked_name(name: &str) -> Result<String, String> {
+    let name = name.trim();
+    let long = name.chars().count();
+    if name.is_empty() {
+        return Err("a preset needs a name".to_owned());
+    }
+    if long > NAME_MOST {
+        return Err(format!("a name has at most {NAME_MOST} characters, this one has {long}"));
+    }
+    if name.chars().any(char::is_control) {
+        return Err("a name is one line of plain text".to_owned());
+    }
+    Ok(name.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_preset_keeps_what_differs_and_nothing_else() {
+        let preset = Preset::of("Mine", |parameter| match parameter.id {
+            "lip" => parameter.read("0.9").ok(),
+            // Its text is the default's.
+            "stren" => Some(Value::Number(2.501)),
+            "bendr" => Some(Value::Whole(12)),
+            _ => Some(parameter.default_value()),
+        });
+        let ids: Vec<_> = preset.changes().iter().map(|(parameter, _)| parameter.id).collect();
+        assert_eq!(ids, ["lip", "bendr"]);
+        assert_eq!(preset.value(parameters::find("stren").unwrap()), Value::Number(2.5));
+        assert_eq!(Preset::parse(&preset.to_text()).unwrap(), preset);
+    }
+
+    #[test]
+    fn presets_leave_alone_what_acts_arms_or_plays() {
+        let left: Vec<_> =
+            PARAMETERS.iter().filter(|parameter| !parameter.is_in_presets()).map(|p| p.id).collect();
+        for id in
+            ["breath", "panic", "knob", "arm", "ceil", "rec", "replay", "study", "side", "qual", "istat"]
+        {
+            assert!(left.contains(&id), "{id}");
+        }
+        for id in ["instr", "lip", "gain", "law", "bendr", "heard", "a4"] {
+            assert!(!left.contains(&id), "{id}");
+        }
+    }
+
+    #[test]
+    fn a_search_finds_words_wherever_they_stand() {
+        let preset = Preset {
+            name: "Night club".to_owned(),
+            tags: vec!["jazz".to_owned()],
+            shows: "A soft lip.".to_owned(),
+            ..Preset::default()
+        };
+        for (search, found) in [("", true), ("NIGHT lip", true), ("jazz club", true), ("jazz bass", false)] {
+            assert_eq!(preset.is_found_by(search), found, "{search}");
+        }
+    }
+
+    #[test]
+    fn a_mistyped_name_is_near_and_another_word_is_not() {
+        let names = ["Soft subtone", "Klezmer dance", "Deep bass"];
+        assert_eq!(nearest("soft subtown", names), Some("Soft subtone"));
+        assert_eq!(nearest("klezmer", names), Some("Klezmer dance"));
+        assert_eq!(nearest("xyzzy", names), None);
+    }
+
+    #[test]
+    fn names_are_one_line_of_text() {
+        assert_eq!(checked_name("  Mine "), Ok("Mine".to_owned()));
+        for (name, says) in [("  ", "needs a name"), ("a\nb", "one line"), (&"x".repeat(41), "at most 40")] {
+            assert!(checked_name(name).unwrap_err().contains(says), "{name:?}");
+        }
+    }
+}

@@ -1,0 +1,276 @@
+//! The user's own presets: one file each, in the system's folder for the user's data, where an update leaves them.
+//!
+//! Files appear whole or not at all. A file that is no preset is reported with its name and line, and stays as it is. The
+//! folder may be edited by hand and shared: what counts is the name inside a file, not the file's.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use super::factory;
+use super::{Preset, checked_name};
+use crate::output::NewFile;
+
+/// Environment variable that names a directory to use instead of the system's own; for tests and unusual systems.
+pub const VARIABLE: &str = "CHALUMEAU_DATA_DIR";
+/// Upper limit for the size of a preset's file, bytes; a larger file is something else.
+const BYTES_MOST: u64 = 1 << 16;
+/// Most files that are read: a folder with more is not one of presets.
+const FILES_MOST: usize = 4_096;
+/// Extension of presets.
+const SUFFIX: &str = "toml";
+/// The names that the user likes, one a line, beside the presets.
+const FAVOURITES: &str = "favourites.txt";
+
+/// The folder of the user's presets.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UserFolder {
+    folder: PathBuf,
+}
+
+/// What the folder holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct UserPresets {
+    /// The presets, by name.
+    pub presets: Vec<Preset>,
+    /// Names that the user likes, factory presets among them.
+    pub favourites: BTreeSet<String>,
+    /// Files that are no presets: which, and what to do.
+    pub broken: Vec<String>,
+}
+
+impl UserFolder {
+    /// The folder `chalumeau/presets` in the user's data directory, or in the directory that [`VARIABLE`] names; `None` if
+    /// there is neither.
+    pub fn system() -> Option<Self> {
+        let chosen = std::env::var_os(VARIABLE).filter(|chosen| !chosen.is_empty()).map(PathBuf::from);
+        chosen.or_else(dirs::data_dir).map(|root| Self::within(root.join("chalumeau/presets")))
+    }
+
+    /// A folder of presets, which is created when the first one is saved.
+    pub fn within(folder: impl Into<PathBuf>) -> Self {
+        Self { folder: folder.into() }
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Reads everything. A folder that does not exist is empty.
+    pub fn read(&self) -> UserPresets {
+        let mut found = UserPresets::default();
+        for (path, read) in self.files() {
+            match read {
+                Ok(preset) if found.presets.iter().any(|other| other.name == preset.name) => {
+                    let shown = path.display();
+                    found.broken.push(format!(
+                        "{shown}: a second preset with the name {:?}; rename one of them",
+                        preset.name
+                    ));
+                }
+                Ok(preset) => found.presets.push(preset),
+                Err(reason) => found.broken.push(format!("{}: {reason}", path.display())),
+            }
+        }
+        found.presets.sort_by_key(|preset| preset.name.to_lowercase());
+        let text = fs::read_to_string(self.folder.join(FAVOURITES)).unwrap_or_default();
+        found.favourites =
+            text.lines().map(str::trim).filter(|line| !line.is_empty()).map(str::to_owned).collect();
+        found
+    }
+
+    /// Each file that should be a preset, in the order of their names.
+    fn files(&self) -> Vec<(PathBuf, Result<Preset, String>)> {
+        let Ok(entries) = fs::read_dir(&self.folder) else { return Vec::new() };
+        let paths = entries.filter_map(Result::ok).map(|entry| entry.path());
+        let mut paths: Vec<_> =
+            paths.filter(|path| path.extension().is_some_and(|is| is == SUFFIX)).take(FILES_MOST).collect();
+        paths.sort();
+        paths.into_iter().map(|path| (path.clone(), read_file(&path))).collect()
+    }
+
+    /// The file of a preset.
+    fn find(&self, name: &str) -> Option<PathBuf> {
+        let mut files = self.files().into_iter();
+        files.find(|(_, read)| read.as_ref().is_ok_and(|preset| preset.name == name)).map(|(path, _)| path)
+    }
+
+    /// Saves a preset; one of the same name is replaced.
+    pub fn save(&self, preset: &Preset) -> Result<(), String> {
+        let name = checked_name(&preset.name)?;
+        if factory::find(&name).is_some() {
+            return Err(format!("{name:?} is a factory preset; choose another name"));
+        }
+        let path = self.find(&name).unwrap_or_else(|| self.free_path(&name));
+        let text = Preset { name, ..preset.clone() }.to_text();
+        // What cannot be read again is not written.
+        Preset::parse(&text).map_err(|reason| reason.what)?;
+        self.write(&path, &text)
+    }
+
+    /// Gives a preset another name. It stays a favourite if it was one.
+    pub fn rename(&self, old: &str, new: &str) -> Result<(), String> {
+        let new = checked_name(new)?;
+        if new == old {
+            return Ok(());
+        }
+        let path = self.find(old).ok_or_else(|| self.is_missing(old))?;
+        if factory::find(&new).is_some() || self.find(&new).is_some() {
+            return Err(format!("there is a preset {new:?} already; choose another name"));
+        }
+        let preset = Preset { name: new.clone(), ..read_file(&path)? };
+        // The new file first: at every moment one of the two is there.
+        self.write(&self.free_path(&new), &preset.to_text())?;
+        fs::remove_file(&path).map_err(|reason| format!("cannot remove {}: {reason}", path.display()))?;
+        if self.read().favourites.contains(old) {
+            self.set_favourite(old, false)?;
+            self.set_favourite(&new, true)?;
+        }
+        Ok(())
+    }
+
+    /// Deletes a preset.
+    pub fn delete(&self, name: &str) -> Result<(), String> {
+        let path = self.find(name).ok_or_else(|| self.is_missing(name))?;
+        fs::remove_file(&path).map_err(|reason| format!("cannot remove {}: {reason}", path.display()))
+    }
+
+    /// Remembers whether the user likes a preset.
+    pub fn set_favourite(&self, name: &str, is_liked: bool) -> Result<(), String> {
+        let mut favourites = self.read().favourites;
+        let has_changed = if is_liked { favourites.insert(name.to_owned()) } else { favourites.remove(name) };
+        if !has_changed {
+            return Ok(());
+        }
+        let lines: String = favourites.iter().map(|name| format!("{name}\n")).collect();
+        self.write(&self.folder.join(FAVOURITES), &lines)
+    }
+
+    fn is_missing(&self, name: &str) -> String {
+        format!("there is no preset {name:?} in {}", self.folder.display())
+    }
+
+    /// A path that no file has: the name in plain letters, with a number if that is taken.
+    fn free_path(&self, name: &str) -> PathBuf {
+        let plain = |c: char| if c.is_alphanumeric() { c.to_lowercase().next().unwrap_or(c) } else { '_' };
+        let stem: String = name.chars().map(plain).collect();
+        let numbered = |n: usize| match n {
+            1 => format!("{stem}.{SUFFIX}"),
+            n => format!("{stem}_{n}.{SUFFIX}"),
+        };
+        let mut paths = (1..).map(|n| self.folder.join(numbered(n)));
+        // Among more paths than files one is free; the first is never reached.
+        paths.find(|path| !path.exists()).unwrap_or_else(|| self.folder.join(numbered(1)))
+    }
+
+    fn write(&self, path: &Path, text: &str) -> Result<(), String> {
+        let fail = |reason: &dyn std::fmt::Display| format!("cannot write {}: {reason}", path.display());
+        fs::create_dir_all(&self.folder).map_err(|reason| fail(&reason))?;
+        let mut file = NewFile::create(path, true).map_err(|reason| reason.to_string())?;
+        file.write_all(text.as_bytes()).map_err(|reason| fail(&reason))?;
+        file.keep().map_err(|reason| reason.to_string())
+    }
+}
+
+fn read_file(path: &Path) -> Result<Preset, String> {
+    if fs::metadata(path).is_ok_and(|file| file.len() > BYTES_MOST) {
+        return Err(format!("has more than {BYTES_MOST} bytes, so it is no preset; move it elsewhere"));
+    }
+    let text = fs::read_to_string(path).map_err(|reason| format!("cannot be read: {reason}"))?;
+    Preset::parse(&text).map_err(|reason| reason.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder() -> (tempfile::TempDir, UserFolder) {
+        let root = tempfile::tempdir().unwrap();
+        let folder = UserFolder::within(root.path().join("not/there/yet"));
+        (root, folder)
+    }
+
+    fn preset(name: &str) -> Preset {
+        let mut preset =
+            Preset::of(name, |parameter| (parameter.id == "lip").then(|| parameter.read("0.9").unwrap()));
+        preset.tags = vec!["jazz".to_owned()];
+        preset
+    }
+
+    fn names(folder: &UserFolder) -> Vec<String> {
+        folder.read().presets.into_iter().map(|preset| preset.name).collect()
+    }
+
+    #[test]
+    fn what_is_saved_is_found_again_renamed_and_deleted() {
+        let (_root, folder) = folder();
+        assert_eq!(folder.read(), UserPresets::default());
+        for name in ["My jazz", "another", "My/jazz"] {
+            folder.save(&preset(name)).unwrap();
+        }
+        assert_eq!(names(&folder), ["another", "My jazz", "My/jazz"]);
+        assert_eq!(folder.read().presets[1], preset("My jazz"));
+        folder.save(&Preset { shows: "New.".to_owned(), ..preset("My jazz") }).unwrap();
+        assert_eq!(names(&folder).len(), 3, "replaced");
+        assert_eq!(folder.read().presets[1].shows, "New.");
+        folder.set_favourite("My jazz", true).unwrap();
+        folder.rename("My jazz", "Best").unwrap();
+        assert_eq!(names(&folder), ["another", "Best", "My/jazz"]);
+        assert_eq!(folder.read().favourites, BTreeSet::from(["Best".to_owned()]));
+        folder.delete("Best").unwrap();
+        assert_eq!(names(&folder), ["another", "My/jazz"]);
+        for said in [folder.delete("Best"), folder.rename("Best", "x")] {
+            assert!(said.unwrap_err().contains("no preset \"Best\" in"));
+        }
+    }
+
+    #[test]
+    fn names_that_are_taken_are_refused() {
+        let (_root, folder) = folder();
+        let taken = factory::all()[0].name.clone();
+        assert!(folder.save(&preset(&taken)).unwrap_err().contains("is a factory preset"));
+        folder.save(&preset("a")).unwrap();
+        folder.save(&preset("b")).unwrap();
+        for name in ["b", &taken] {
+            assert!(folder.rename("a", name).unwrap_err().contains("already"));
+        }
+        assert_eq!(names(&folder), ["a", "b"]);
+    }
+
+    #[test]
+    fn a_broken_file_is_named_with_its_line_and_left_alone() {
+        let (_root, folder) = folder();
+        folder.save(&preset("good")).unwrap();
+        let broken = "format = 1\nname = \"bad\"\n[parameters]\nlip = 9\n";
+        for (name, text) in [("bad.toml", broken), ("twin.toml", preset("good").to_text().as_str())] {
+            fs::write(folder.path().join(name), text).unwrap();
+        }
+        fs::write(folder.path().join("notes.txt"), "no preset").unwrap();
+        fs::write(folder.path().join("huge.toml"), "x".repeat(1 << 17)).unwrap();
+        fs::write(folder.path().join("binary.toml"), [0xff, 0xfe]).unwrap();
+        let found = folder.read();
+        assert_eq!(found.presets, [preset("good")]);
+        let says = [
+            "bad.toml: line 4: lip (Lip opening) must lie in",
+            "binary.toml: cannot be read",
+            "huge.toml: has more",
+            "twin.toml: a second preset",
+        ];
+        assert_eq!(found.broken.len(), says.len(), "{:?}", found.broken);
+        for (said, wanted) in found.broken.iter().zip(says) {
+            assert!(said.contains(wanted), "{said}");
+        }
+        assert_eq!(fs::read_to_string(folder.path().join("bad.toml")).unwrap(), broken);
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_written_says_so() {
+        let root = tempfile::tempdir().unwrap();
+        let file = root.path().join("file");
+        fs::write(&file, "in the way").unwrap();
+        let said = UserFolder::within(&file).save(&preset("a")).unwrap_err();
+        assert!(said.starts_with("cannot write"), "{said}");
+    }
+}
