@@ -22,6 +22,9 @@ mod keyboard;
 mod knob_view;
 mod pitch_needle;
 mod play_view;
+mod preset_bar;
+mod preset_browser;
+mod preset_values;
 mod reed_view;
 mod slider;
 pub mod snapshot;
@@ -48,7 +51,10 @@ use chalumeau_core::units::SoundingNote;
 use chalumeau_knob::wire::message::Feel;
 use controls::{Entry, Hands, Press};
 use keyboard::Keyboard;
+use preset_browser::PresetBrowser;
 use undo::UndoHistory;
+
+use crate::presets::Preset;
 
 /// Size the window opens with, points.
 pub const SIZE: (f32, f32) = (1100.0, 720.0);
@@ -87,6 +93,28 @@ pub enum Action {
     ChooseInstrument(usize),
     /// An instrument file.
     OpenInstrument(PathBuf),
+    /// The preset of this name has been put on the controls.
+    ChosePreset(String),
+    /// Look again for the user's presets.
+    ReadPresets,
+    /// Save a preset, in place of one of the user's with the same name.
+    SavePreset(Preset),
+    /// Give one of the user's presets another name.
+    RenamePreset {
+        /// Its name now.
+        old: String,
+        /// Its new name.
+        new: String,
+    },
+    /// Delete one of the user's presets.
+    DeletePreset(String),
+    /// The user likes a preset, or no longer.
+    LikePreset {
+        /// Its name.
+        name: String,
+        /// Whether it is liked from now on.
+        is_liked: bool,
+    },
 }
 
 /// The views.
@@ -213,6 +241,7 @@ pub struct EditorState {
     held: Vec<&'static str>,
     presses: Vec<Press>,
     keyboard: Keyboard,
+    presets: PresetBrowser,
     reed: reed_view::ReedView,
     clarinet: clarinet_view::ClarinetView,
     breath: breath_view::BreathView,
@@ -225,6 +254,11 @@ impl EditorState {
     /// With the saved state of a project.
     pub fn new(kept: WindowState) -> Self {
         Self { kept: kept.mended(), ..Self::default() }
+    }
+
+    /// Opens or closes the browser of presets.
+    pub fn show_presets(&mut self, is_open: bool) {
+        self.presets.is_open = is_open;
     }
 
     /// A text field has the focus: only then do keys belong to the editor rather than to the host.
@@ -281,6 +315,7 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
         held,
         presses,
         keyboard,
+        presets,
         reed,
         clarinet,
         breath,
@@ -306,10 +341,12 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
 
     let ground = |x: i8, y: i8| Frame::new().fill(c.ground).inner_margin(Margin::symmetric(x, y));
     let line = Panel::top("tools").exact_size(if is_small { 44.0 } else { 52.0 }).show_separator_line(false);
-    line.frame(ground(10, 2)).show(ui, |ui| header::tools(ui, kept, compare, &mut hands, snapshot));
+    line.frame(ground(10, 2)).show(ui, |ui| {
+        header::tools(ui, kept, compare, presets, &mut hands, snapshot, &mut actions);
+    });
     let line = Panel::top("tabs").exact_size(30.0).show_separator_line(true);
     line.frame(Frame::new().fill(c.ground).inner_margin(Margin { left: 2, right: 10, top: 0, bottom: 0 }))
-        .show(ui, |ui| header::tabs(ui, kept, has_knob, snapshot));
+        .show(ui, |ui| presets.is_open &= !header::tabs(ui, kept, has_knob, snapshot));
     let keys = (0.13 * height).clamp(52.0, 110.0);
     let line = Panel::bottom("keys").exact_size(keys + 10.0).show_separator_line(false);
     line.frame(ground(8, 5)).show(ui, |ui| keyboard.draw(ui, snapshot, &mut actions));
@@ -322,6 +359,10 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     CentralPanel::default().frame(ground(8, 8)).show(ui, |ui| {
         if is_blind {
             blind_comparison_view::draw(ui, compare, &mut hands);
+            return;
+        }
+        if presets.is_open {
+            presets.draw(ui, &mut hands, snapshot, &mut actions);
             return;
         }
         match tab {

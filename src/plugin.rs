@@ -10,6 +10,7 @@
 //! - `instrument_loading`: loads and exchanges instruments
 //! - `knob`: the force-feedback knob (feature `devices`)
 //! - `params`: what hosts automate and projects save
+//! - `preset_keeper`: the user's presets, and MIDI program changes
 //! - `window`: the editor in the host's window
 //! - `host_link`: what the plugin's threads tell the host; `clap`: what the framework's CLAP lacks
 //! - `launch_options`: what the standalone program sets
@@ -25,6 +26,7 @@ mod knob;
 pub mod launch_options;
 mod notes_only;
 mod params;
+mod preset_keeper;
 mod reed_controllers;
 mod translate_events;
 mod window;
@@ -52,6 +54,7 @@ use host_inputs::HostInputs;
 use instrument_loading::{InstrumentLoader, InstrumentSwap, SharedInstrument};
 pub use notes_only::NotesOnly;
 use params::moment::Moment;
+use preset_keeper::{PresetHandle, PresetKeeper};
 use window::{HostWindow, PluginWindow, WindowAudio};
 
 /// What the framework hands on to a plugin instance.
@@ -70,6 +73,7 @@ pub struct Chalumeau {
     shared_instrument: Arc<SharedInstrument>,
     instrument: Option<InstrumentSwap>,
     loader: Option<InstrumentLoader>,
+    presets: Option<PresetKeeper>,
     /// The settings that the instrument has.
     settings: Settings,
     inputs: HostInputs,
@@ -227,6 +231,9 @@ impl Chalumeau {
             return ProcessStatus::Error("not activated");
         };
 
+        if let Some(presets) = self.presets.as_ref().filter(|_| self.offline) {
+            presets.handle().wait();
+        }
         let settings = self.params.settings();
         if settings != self.settings {
             instrument.set_settings(&settings);
@@ -271,6 +278,9 @@ impl Chalumeau {
         #[cfg(not(feature = "devices"))]
         instrument.render_events(events, out);
 
+        if let (Some(program), Some(presets)) = (self.inputs.take_program(), &self.presets) {
+            presets.handle().ask(program);
+        }
         if instrument.clarinet().is_silent() {
             self.inputs.fall_silent(samples.saturating_sub(1) as u32);
         }
@@ -298,10 +308,11 @@ impl Chalumeau {
         rest_status(&self.params, instrument, is_watched)
     }
 
-    /// Starts the threads of loader, knob and window, once.
+    /// Starts the threads of loader, presets, knob and window, once.
     fn start_threads(&mut self) {
         let (params, instrument) = (&self.params, &self.shared_instrument);
         self.loader.get_or_insert_with(|| InstrumentLoader::start(params.clone(), instrument.clone()));
+        let presets = self.presets.get_or_insert_with(|| PresetKeeper::start(params.clone()));
         #[cfg(feature = "devices")]
         let (knob, _) = self.knob.get_or_insert_with(|| {
             let executor = self.executor.take();
@@ -312,6 +323,7 @@ impl Chalumeau {
         let handles = || SharedHandles {
             params: params.clone(),
             instrument: instrument.clone(),
+            presets: presets.handle().clone(),
             #[cfg(feature = "devices")]
             knob: knob.shared().clone(),
         };
@@ -336,6 +348,7 @@ where
 struct SharedHandles {
     params: Arc<ChalumeauParams>,
     instrument: Arc<SharedInstrument>,
+    presets: PresetHandle,
     #[cfg(feature = "devices")]
     knob: Arc<knob::SharedKnob>,
 }

@@ -8,9 +8,11 @@
 //! - `file`: the text of a preset, read and written
 //! - `factory`: the presets that come with the program, in the order of MIDI programs
 //! - `user_folder`: the user's own, in a folder of the system for data
+//! - `shelf`: both in one list
 
 pub mod factory;
 mod file;
+mod shelf;
 pub mod user_folder;
 
 use chalumeau_core::bore::bundled::Bundled;
@@ -21,6 +23,7 @@ use crate::parameters::{self, PARAMETERS, Parameter, Sets, Value};
 use user_folder::{UserFolder, UserPresets};
 
 pub use file::{FORMAT, PresetError, TAGS_MOST, TEXT_MOST};
+pub use shelf::PresetShelf;
 
 /// Longest name, characters: it must fit into the window's header and into a file's name.
 pub const NAME_MOST: usize = 40;

@@ -9,6 +9,8 @@ mod cost;
 mod hands;
 #[path = "editor/looks.rs"]
 mod looks;
+#[path = "editor/presets.rs"]
+mod presets;
 #[path = "editor/window.rs"]
 mod window;
 

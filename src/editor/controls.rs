@@ -6,7 +6,7 @@
 
 use crate::editor::ab_comparison::Values;
 use crate::editor::terms;
-use crate::editor::undo::UndoHistory;
+use crate::editor::undo::{Change, UndoHistory};
 
 pub use crate::editor::slider::slider;
 pub use crate::editor::widgets::{choice, handle, heading, momentary, segments, switch, teach};
@@ -181,6 +181,18 @@ impl Hands<'_> {
         values.iter().for_each(|&(id, _)| self.begin(id));
         values.iter().for_each(|&(id, value)| self.set(id, value));
         values.iter().for_each(|&(id, _)| self.end(id));
+    }
+
+    /// Several at once as one step, whatever undo carries otherwise: a preset brings its instrument.
+    pub fn put_step(&mut self, values: &[(&'static str, f32)]) {
+        let free = values.iter().filter(|(id, _)| !self.held.contains(id));
+        let values: Vec<(&'static str, f32)> = free.copied().collect();
+        let looks = values
+            .iter()
+            .map(|&(id, after)| self.controls.look(id).map(|look| Change { id, before: look.value, after }));
+        let step: Vec<Change> = looks.flatten().collect();
+        self.restore(&values);
+        self.history.record(step);
     }
 
     /// Sets values that are no new step: undo, redo, A/B.

@@ -9,10 +9,12 @@ use crate::editor::ab_comparison::ComparisonSide;
 use crate::editor::controls::Hands;
 use crate::editor::controls::{momentary, segments};
 use crate::editor::pitch_needle;
+use crate::editor::preset_bar;
+use crate::editor::preset_browser::PresetBrowser;
 use crate::editor::snapshot::{Severity, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
-use crate::editor::{Tab, WindowState};
+use crate::editor::{Action, Tab, WindowState};
 
 /// Least and most zoom, and the steps offered.
 pub const ZOOMS: [f32; 8] = [0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0];
@@ -28,15 +30,18 @@ pub fn tools(
     ui: &mut Ui,
     kept: &mut WindowState,
     compare: &mut AbComparison,
+    presets: &mut PresetBrowser,
     hands: &mut Hands,
     snapshot: &Snapshot,
+    actions: &mut Vec<Action>,
 ) {
     let is_wide = ui.available_width() > 900.0;
     ui.horizontal_centered(|ui| {
         // The pitch would tell one setting from another.
         note(ui, snapshot, !compare.is_blind());
-        if !compare.is_blind() {
-            pitch_needle::needle(ui, snapshot, if is_wide { 150.0 } else { 96.0 });
+        // Where there is little room, the measured pitch beside the note says the same.
+        if is_wide && !compare.is_blind() {
+            pitch_needle::needle(ui, snapshot, 150.0);
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             ui.spacing_mut().item_spacing.x = 5.0;
@@ -53,6 +58,7 @@ pub fn tools(
             // Undo would tell what was set, and on which side.
             if !compare.is_blind() {
                 undo(ui, hands);
+                preset_bar::bar(ui, presets, hands, snapshot, actions);
             }
         });
     });
@@ -209,8 +215,9 @@ fn zoom(ui: &mut Ui, kept: &mut WindowState) {
     shown.response.on_hover_text("Size of everything in this window; saved with the project");
 }
 
-/// The lower line.
-pub fn tabs(ui: &mut Ui, kept: &mut WindowState, has_knob: bool, snapshot: &Snapshot) {
+/// The lower line. Whether a tab was clicked.
+pub fn tabs(ui: &mut Ui, kept: &mut WindowState, has_knob: bool, snapshot: &Snapshot) -> bool {
+    let mut is_clicked = false;
     let c = Colours::here(ui);
     let is_wide = ui.available_width() > 900.0;
     ui.horizontal_centered(|ui| {
@@ -242,6 +249,7 @@ pub fn tabs(ui: &mut Ui, kept: &mut WindowState, has_knob: bool, snapshot: &Snap
             response.widget_info(|| WidgetInfo::selected(Role::Tab, true, is_here, tab.name()));
             if response.clicked() {
                 kept.tab = tab;
+                is_clicked = true;
             }
             response.on_hover_text(tab.about());
         }
@@ -251,6 +259,7 @@ pub fn tabs(ui: &mut Ui, kept: &mut WindowState, has_knob: bool, snapshot: &Snap
             status(ui, snapshot);
         });
     });
+    is_clicked
 }
 
 /// Musician or laboratory.

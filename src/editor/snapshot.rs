@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use crate::editor::sound_analysis::SoundAnalysis;
+use crate::presets::PresetShelf;
 use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
 use chalumeau_core::haptics::{NoteFeel, NoteRequirement};
 use chalumeau_core::instrument::Settings;
@@ -25,6 +26,10 @@ pub struct Snapshot {
     pub chosen: Option<usize>,
     /// What is being prepared, and how far, 0..=1.
     pub preparing: Option<(String, f32)>,
+    /// Presets to choose from.
+    pub presets: Arc<PresetShelf>,
+    /// Name of the preset that was chosen last; empty if there is none.
+    pub preset: String,
     /// The note that is fingered, if any key is held.
     pub sounding: Option<SoundingNote>,
     /// Index into the instrument's fingerings: the one in place, held or last held.
@@ -72,6 +77,8 @@ impl Default for Snapshot {
             instruments: Vec::new(),
             chosen: None,
             preparing: None,
+            presets: Arc::default(),
+            preset: String::new(),
             sounding: None,
             fingering: 0,
             openings,

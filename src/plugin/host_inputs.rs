@@ -29,6 +29,8 @@ pub struct HostInputs {
     ended: Vec<(u32, Note)>,
     /// The note whose expressions the reed follows.
     heard: Option<Note>,
+    /// The latest MIDI program change that nobody has taken yet.
+    program: Option<u8>,
 }
 
 impl Default for HostInputs {
@@ -45,6 +47,7 @@ impl Default for HostInputs {
             handed: 0,
             ended: Vec::with_capacity(ENDS),
             heard: None,
+            program: None,
         }
     }
 }
@@ -55,13 +58,18 @@ impl HostInputs {
         self.translator = EventTranslator::default();
         self.reed_controllers = ReedControllers::default();
         self.breath_sources = BreathSources::default();
-        (self.count, self.handed, self.heard) = (0, 0, None);
+        (self.count, self.handed, self.heard, self.program) = (0, 0, None, None);
         self.ended.clear();
     }
 
     /// Begins a block.
     pub fn begin_block(&mut self) {
         self.ended.clear();
+    }
+
+    /// The latest MIDI program change, 0..=127, once.
+    pub fn take_program(&mut self) -> Option<u8> {
+        self.program.take()
     }
 
     /// Which input each breath value came from.
@@ -93,6 +101,9 @@ impl HostInputs {
 
     fn take(&mut self, event: NoteEvent<()>, drives: [ReedSource; 2]) {
         (self.at, self.count, self.handed) = (event.timing() as usize, 0, 0);
+        if let NoteEvent::MidiProgramChange { program, .. } = event {
+            self.program = Some(program & 0x7f);
+        }
         let channel = match event {
             NoteEvent::MidiCC { channel, .. } | NoteEvent::MidiChannelPressure { channel, .. } => {
                 Some(channel)

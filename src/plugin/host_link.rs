@@ -43,6 +43,8 @@ pub struct HostLink {
     may_sleep: AtomicBool,
     /// How often a status text has changed.
     texts: AtomicU32,
+    /// How often the plugin itself has moved parameters.
+    values: AtomicU32,
     has_menu: AtomicBool,
     menu: Mutex<Option<MenuRequest>>,
     marks: Mutex<BTreeMap<(&'static str, u8), Mark>>,
@@ -87,6 +89,17 @@ impl HostLink {
     /// How often a status text has changed; the number wraps around.
     pub fn texts(&self) -> u32 {
         self.texts.load(Ordering::Relaxed)
+    }
+
+    /// The plugin itself has moved parameters: a preset that no hand in the window chose.
+    pub fn values_changed(&self) {
+        self.values.fetch_add(1, Ordering::Relaxed);
+        self.tell();
+    }
+
+    /// How often the plugin itself has moved parameters; the number wraps around.
+    pub fn values(&self) -> u32 {
+        self.values.load(Ordering::Relaxed)
     }
 
     /// Whether the host opens menus of its own in the plugin's window.

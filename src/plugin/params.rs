@@ -11,6 +11,7 @@ use nice_plug::prelude::*;
 use crate::editor::WindowState;
 use crate::parameters::{InUse, Number};
 use crate::plugin::host_link::HostLink;
+use crate::presets::Preset;
 use chalumeau_core::instrument::{BreathResponse, Settings, Tuning};
 
 mod entry;
@@ -71,6 +72,9 @@ pub struct ChalumeauParams {
     /// Size, zoom, theme and view of the window.
     #[persist = "window"]
     pub window: RwLock<WindowState>,
+    /// Name of the preset that was chosen last; empty if there is none.
+    #[persist = "preset"]
+    pub preset: RwLock<String>,
     /// State of the link to the knob as text, written by the link.
     pub knob_status: Arc<RwLock<String>>,
     /// What has happened to the controls of the moment.
@@ -254,6 +258,7 @@ impl ChalumeauParams {
             knob_status,
             schema: AtomicU32::new(SCHEMA),
             window: RwLock::default(),
+            preset: RwLock::new(state::first_preset()),
             breath: BreathParams {
                 breath: number("breath"),
                 full: number("full"),
@@ -286,6 +291,34 @@ impl ChalumeauParams {
             moments,
             host: HostLink::default(),
         }
+    }
+
+    /// Name of the preset that was chosen last; empty if there is none.
+    pub fn preset_name(&self) -> String {
+        self.preset.read().map_or_else(|_| String::new(), |name| name.clone())
+    }
+
+    /// Remembers which preset was chosen.
+    pub fn set_preset_name(&self, name: &str) {
+        if let Ok(mut preset) = self.preset.write() {
+            name.clone_into(&mut preset);
+        }
+    }
+
+    /// Puts a preset on the parameters, without the host's gestures: it is told that the values have changed. Not for the
+    /// audio thread: allocates and locks.
+    #[allow(unsafe_code)] // the framework's setter
+    pub fn put(&self, preset: &Preset) {
+        let pointers = self.param_map();
+        for (parameter, value) in preset.all_values() {
+            if let Some((_, pointer, _)) = pointers.iter().find(|(id, ..)| id == parameter.id) {
+                // SAFETY: the pointer leads into `self`, and the setter stores atomics. The framework keeps it for its
+                // wrappers because a host would not be told; `values_changed` is how it is told.
+                unsafe { pointer._internal_set_normalized_value(parameter.normalized(value)) };
+            }
+        }
+        self.set_preset_name(&preset.name);
+        self.host.values_changed();
     }
 
     /// Whether parameters of this kind have an effect now. Real-time safe.

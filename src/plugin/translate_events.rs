@@ -3,7 +3,8 @@
 //! The decoder is that of the offline renderer. It gets the raw integers that the host's 0..=1 values came from, so that
 //! plugin and renderer hear the same. Note expressions belong to their note: pressure and expression set the breath, tuning
 //! bends in addition to the wheel, volume and pan act after the instrument. Brightness changes the reed where it is chosen
-//! for that, see [`reed_controllers`](super::reed_controllers). Vibrato and program change have no effect.
+//! for that, see [`reed_controllers`](super::reed_controllers). Vibrato has no effect. A program change makes no event; it chooses a
+//! preset, see [`preset_keeper`](super::preset_keeper).
 
 use nice_plug::midi::{Channel, Key, VoiceID};
 use nice_plug::prelude::*;

@@ -8,7 +8,7 @@
 
 use std::path::PathBuf;
 
-use chalumeau::editor::{Tab, WindowState};
+use chalumeau::editor::{Snapshot, Tab, WindowState};
 use egui::{Pos2, Rect};
 use image::{RgbaImage, imageops};
 
@@ -40,6 +40,15 @@ fn differences(a: &RgbaImage, b: &RgbaImage) -> usize {
     a.pixels().zip(b.pixels()).filter(far).count()
 }
 
+/// The browser of presets, in place of a view.
+fn browser(kept: &WindowState, snapshot: &Snapshot) -> RgbaImage {
+    let host = Fake::default();
+    let mut window = window(kept, &host, snapshot, 1.0);
+    window.state_mut().show_presets(true);
+    window.run();
+    shot(&mut window, 1.0)
+}
+
 #[test]
 fn every_view_looks_as_it_did() {
     let is_update = std::env::var_os("UPDATE_SNAPSHOTS").is_some();
@@ -48,12 +57,17 @@ fn every_view_looks_as_it_did() {
     let mut wrong = Vec::new();
     for size in SIZES {
         for is_dark in [false, true] {
-            for tab in Tab::ALL {
-                let kept = WindowState { size, is_dark, tab, ..WindowState::default() };
-                let whole = picture(&kept, &Fake::default(), &snapshot, 1.0);
+            for tab in Tab::ALL.map(Some).into_iter().chain([None]) {
+                let kept =
+                    WindowState { size, is_dark, tab: tab.unwrap_or_default(), ..WindowState::default() };
+                let whole = match tab {
+                    Some(_) => picture(&kept, &Fake::default(), &snapshot, 1.0),
+                    None => browser(&kept, &snapshot),
+                };
                 let small = reduced(&whole);
                 let theme = if is_dark { "dark" } else { "light" };
-                let name = format!("{}-{theme}-{}x{}.png", tab.name().to_lowercase(), size.0, size.1);
+                let view = tab.map_or("presets", Tab::name).to_lowercase();
+                let name = format!("{view}-{theme}-{}x{}.png", size.0, size.1);
                 let path = kept_in.join(&name);
                 if is_update {
                     std::fs::create_dir_all(&kept_in).unwrap();

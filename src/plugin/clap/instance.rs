@@ -9,7 +9,9 @@ use clap_sys::ext::gui::CLAP_EXT_GUI;
 use clap_sys::ext::note_name::CLAP_EXT_NOTE_NAME;
 use clap_sys::ext::note_ports::CLAP_EXT_NOTE_PORTS;
 use clap_sys::ext::param_indication::{CLAP_EXT_PARAM_INDICATION, CLAP_EXT_PARAM_INDICATION_COMPAT};
-use clap_sys::ext::params::{CLAP_EXT_PARAMS, CLAP_PARAM_RESCAN_INFO, CLAP_PARAM_RESCAN_TEXT};
+use clap_sys::ext::params::{
+    CLAP_EXT_PARAMS, CLAP_PARAM_RESCAN_INFO, CLAP_PARAM_RESCAN_TEXT, CLAP_PARAM_RESCAN_VALUES,
+};
 use clap_sys::ext::remote_controls::{CLAP_EXT_REMOTE_CONTROLS, CLAP_EXT_REMOTE_CONTROLS_COMPAT};
 use clap_sys::ext::state::CLAP_EXT_STATE;
 use clap_sys::ext::state_context::CLAP_EXT_STATE_CONTEXT;
@@ -60,6 +62,8 @@ pub struct Instance {
     asked_in_use: AtomicU32,
     told_in_use: AtomicU32,
     told_texts: AtomicU32,
+    /// How often the plugin had moved parameters when the host was last told.
+    told_values: AtomicU32,
 }
 
 static TAIL: clap_plugin_tail = clap_plugin_tail { get: Some(tail) };
@@ -107,6 +111,7 @@ impl Instance {
             asked_in_use: AtomicU32::new(0),
             told_in_use: AtomicU32::new(0),
             told_texts: AtomicU32::new(0),
+            told_values: AtomicU32::new(0),
         };
         let in_use = instance.in_use();
         instance.asked_in_use.store(in_use, Ordering::Relaxed);
@@ -157,13 +162,16 @@ impl Instance {
     /// Tells the host what has changed. [main thread]
     pub fn tell_changes(&self) {
         let link = &self.introduced.params.host;
-        let (in_use, texts) = (self.in_use(), link.texts());
+        let (in_use, texts, values) = (self.in_use(), link.texts(), link.values());
         let mut changed = 0;
         if self.told_in_use.swap(in_use, Ordering::Relaxed) != in_use {
             changed |= CLAP_PARAM_RESCAN_INFO;
         }
         if self.told_texts.swap(texts, Ordering::Relaxed) != texts {
             changed |= CLAP_PARAM_RESCAN_TEXT;
+        }
+        if self.told_values.swap(values, Ordering::Relaxed) != values {
+            changed |= CLAP_PARAM_RESCAN_VALUES;
         }
         if changed != 0 {
             self.host.rescan_params(changed);

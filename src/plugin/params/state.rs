@@ -11,6 +11,7 @@ use super::knob::SavedCalibration;
 use crate::editor::WindowState;
 use crate::parameters::{Kind, Number, PARAMETERS, Parameter};
 use crate::plugin::launch_options::LaunchOptions;
+use crate::presets::{NAME_MOST, Preset, factory};
 
 /// Layout of the saved state. 1: ids and units as below. 2: the instrument and its file, the physical reed; a state of 1
 /// is the B flat clarinet. 3: listening; a state of 1 or 2 is heard as from one point. 4: the breath response; in an earlier
@@ -26,6 +27,12 @@ pub(super) fn starting(id: &str, number: &Number) -> f32 {
         Some(first) if id == "a4" => first.a4_hz,
         _ => number.default,
     }
+}
+
+/// The preset that a new instance has: the one without changes, unless the program was started with some.
+pub(super) fn first_preset() -> String {
+    let is_plain = |preset: &&Preset| preset.changes().is_empty() && LaunchOptions::get().is_none();
+    factory::all().first().filter(is_plain).map_or_else(String::new, |preset| preset.name.clone())
 }
 
 /// Makes a state fit to load, whoever wrote it: numbers inside their ranges, values of the wrong kind and unknown ids
@@ -55,6 +62,8 @@ pub fn mend(state: &mut PluginState) {
     mend_field(state, "midiport", |text: String| text.chars().take(256).collect());
     mend_field(state, "take", |text: String| text);
     mend_field(state, "instrumentfile", |text: String| text.chars().take(instrument::PATH_MOST).collect());
+    // A state from before presets has none.
+    mend_field(state, "preset", |name: String| name.chars().take(NAME_MOST).collect());
     mend_field(state, "calibration", SavedCalibration::mended);
     mend_field(state, "window", WindowState::mended);
     // An older schema lacks what it lacks; a newer one is read as far as its ids are known here.

@@ -13,6 +13,7 @@ use crate::editor::{self, Action, Controls, EditorState, Snapshot, WindowState};
 use crate::plugin::SharedHandles;
 use crate::plugin::launch_options::LaunchOptions;
 use crate::plugin::params::instrument::InstrumentChoice;
+use crate::plugin::preset_keeper::PresetTask;
 use chalumeau_core::event::Event;
 
 /// What the window keeps while it is closed.
@@ -65,6 +66,16 @@ impl WindowMemory {
                 }
                 let user = InstrumentChoice::ALL.len() - 1;
                 self.choose("instr", user, InstrumentChoice::ALL.len(), gui);
+            }
+            Action::ChosePreset(name) => self.handles.params.set_preset_name(&name),
+            Action::ReadPresets => self.handles.presets.send(PresetTask::Read),
+            Action::SavePreset(preset) => self.handles.presets.send(PresetTask::Save(preset)),
+            Action::RenamePreset { old, new } => {
+                self.handles.presets.send(PresetTask::Rename { old, new });
+            }
+            Action::DeletePreset(name) => self.handles.presets.send(PresetTask::Delete(name)),
+            Action::LikePreset { name, is_liked } => {
+                self.handles.presets.send(PresetTask::Like { name, is_liked });
             }
             #[cfg(feature = "devices")]
             Action::ChooseDevice(key) => {
@@ -146,6 +157,8 @@ impl NiceEguiApp for EditorApp {
         let mut snapshot = Snapshot::clone(&self.shared.latest());
         // What the mouse drags must follow in this frame.
         snapshot.settings = params.settings();
+        snapshot.presets = memory.handles.presets.shelf();
+        snapshot.preset = params.preset_name();
         ui.ctx().set_zoom_factor(memory.state.kept.zoom);
         let actions = editor::draw(ui, &mut memory.state, &memory.controls.with(&self.gui), &snapshot);
         for action in actions {

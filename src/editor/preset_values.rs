@@ -1,0 +1,37 @@
+//! A preset and the controls: putting one on, making one of them, and whether they differ.
+
+use crate::editor::Action;
+use crate::editor::controls::{Controls, Hands};
+use crate::presets::Preset;
+
+/// Two normalised values count as one: what a host's single precision loses.
+const SAME: f32 = 1e-6;
+
+/// Puts a preset on the controls as one step of undo, and says so.
+pub fn choose(preset: &Preset, hands: &mut Hands, actions: &mut Vec<Action>) {
+    let wanted = preset.all_values().map(|(parameter, value)| (parameter.id, parameter.normalized(value)));
+    let is_moved = |&(id, value): &(&'static str, f32)| {
+        hands.controls.look(id).is_some_and(|look| (look.value - value).abs() > SAME)
+    };
+    let values: Vec<(&'static str, f32)> = wanted.filter(is_moved).collect();
+    hands.put_step(&values);
+    actions.push(Action::ChosePreset(preset.name.clone()));
+}
+
+/// A preset of the controls as they are.
+pub fn capture(name: &str, controls: &dyn Controls) -> Preset {
+    Preset::of(name, |parameter| {
+        let look = controls.look(parameter.id)?;
+        parameter.read(&controls.text(parameter.id, look.value)).ok()
+    })
+}
+
+/// Whether a control no longer says what the preset set.
+pub fn is_changed(preset: &Preset, controls: &dyn Controls) -> bool {
+    preset.all_values().any(|(parameter, value)| {
+        controls.look(parameter.id).is_some_and(|look| {
+            (look.value - parameter.normalized(value)).abs() > SAME
+                && controls.text(parameter.id, look.value) != parameter.text(value)
+        })
+    })
+}

@@ -1,0 +1,72 @@
+//! What there is to choose from: the factory presets and the user's, in one list.
+
+use super::user_folder::UserPresets;
+use super::{Preset, factory};
+
+/// All presets at one moment.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PresetShelf {
+    /// The user's own, and what the user likes.
+    pub user: UserPresets,
+    /// What became of the last change, if it failed.
+    pub notice: Option<String>,
+}
+
+impl PresetShelf {
+    /// All of them: factory presets in the order of MIDI programs, then the user's by name.
+    pub fn all(&self) -> impl DoubleEndedIterator<Item = &Preset> + Clone {
+        factory::all().iter().chain(&self.user.presets)
+    }
+
+    /// The preset of exactly this name; the user's own first.
+    pub fn find(&self, name: &str) -> Option<&Preset> {
+        self.user.presets.iter().chain(factory::all()).find(|preset| preset.name == name)
+    }
+
+    /// Whether a preset of this name is the user's.
+    pub fn is_users(&self, name: &str) -> bool {
+        self.user.presets.iter().any(|preset| preset.name == name)
+    }
+
+    /// Whether the user likes the preset of this name.
+    pub fn is_liked(&self, name: &str) -> bool {
+        self.user.favourites.contains(name)
+    }
+
+    /// The preset `by` places after the one called `name`, round and round; the first where there is no such.
+    pub fn beside(&self, name: &str, by: isize) -> Option<&Preset> {
+        let count = self.all().count();
+        let at = self.all().position(|preset| preset.name == name);
+        let next = at.map_or(0, |at| (at as isize + by).rem_euclid(count.max(1) as isize) as usize);
+        self.all().nth(next)
+    }
+
+    /// All tags, in the order in which they first appear.
+    pub fn tags(&self) -> Vec<&str> {
+        let mut tags: Vec<&str> = Vec::new();
+        for tag in self.all().flat_map(|preset| &preset.tags) {
+            if !tags.iter().any(|known| known.eq_ignore_ascii_case(tag)) {
+                tags.push(tag);
+            }
+        }
+        tags
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_way_through_the_list_goes_round_and_ends_with_the_users() {
+        let mine = Preset { name: "Mine".to_owned(), tags: vec!["new".to_owned()], ..Preset::default() };
+        let user = UserPresets { presets: vec![mine], ..UserPresets::default() };
+        let shelf = PresetShelf { user, ..PresetShelf::default() };
+        let first = factory::all()[0].name.as_str();
+        let name = |of: &str, by| shelf.beside(of, by).unwrap().name.as_str();
+        assert_eq!((name(first, -1), name("Mine", 1), name("gone", 1)), ("Mine", first, first));
+        assert_eq!(name(first, 1), factory::all()[1].name);
+        assert!(shelf.is_users("Mine") && !shelf.is_users(first));
+        assert_eq!(shelf.tags().last(), Some(&"new"));
+    }
+}
