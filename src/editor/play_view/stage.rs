@@ -291,7 +291,7 @@ impl<'a> Body<'a> {
         for part in parts {
             let mut segments = self.file.bore.iter().filter(|segment| segment.part == part);
             let Some(first) = segments.next() else { continue };
-            let end_m = segments.last().map_or(first.x_end_m, |last| last.x_end_m);
+            let end_m = segments.next_back().map_or(first.x_end_m, |last| last.x_end_m);
             let keys = self.file.holes.iter().filter(|hole| hole.kind == HoleKind::KeyClosed);
             let places: Vec<f64> =
                 keys.map(|hole| hole.x_m).filter(|&x_m| (first.x_start_m..end_m).contains(&x_m)).collect();
