@@ -400,7 +400,7 @@ fn a_report_holds_the_sound_the_cents_and_the_settings() {
         "scale C4 to E4",
         "5 of 5 notes have a pitch",
         "<td>Reed strength</td><td class=\"number\">3</td>",
-        "<td>Embouchure zeta</td><td class=\"number\">0.3</td>",
+        "<td>Embouchure</td><td class=\"number\">0.3</td>",
         "<td>Tuning</td><td class=\"number\">natural</td>",
         concat!("Chalumeau ", env!("CARGO_PKG_VERSION")),
         "chalumeau report --scale 60:64",

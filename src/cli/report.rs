@@ -273,7 +273,7 @@ fn settings(settings: &Settings) -> ReportTable {
         ("Closing pressure", format!("{:.3}", 1e-3 * settings.closing_pa()), "kPa"),
         ("Lip, tip opening", format!("{}", settings.lip), "of the reference"),
         ("Lip damping", format!("{}", settings.damping), "of the usual"),
-        ("Embouchure zeta", format!("{}", settings.zeta), ""),
+        ("Embouchure", format!("{}", settings.zeta), ""),
         ("Curve of the lay", format!("{}", settings.lay), "0 sharp"),
         ("Reed law H", format!("{:.6}", law.h()), ""),
         ("Reed law k", format!("{:.6}", law.k()), if settings.coupled { "follows H" } else { "free" }),

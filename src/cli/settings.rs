@@ -393,15 +393,15 @@ mod tests {
         for (words, says) in [
             (
                 &["--set", "vnt=2"][..],
-                &["no parameter \"vnt\"", "vent (Vent loss), noise (Breath noise)"][..],
+                &["no parameter \"vnt\"", "vent (Register vent), noise (Breath noise)"][..],
             ),
             (&["--set", "vent"], &["must be id=value"]),
-            (&["--set", "vent=9"], &["vent (Vent loss) must lie in 0..4, got 9"]),
+            (&["--set", "vent=9"], &["vent (Register vent) must lie in 0..4, got 9"]),
             (&["--set", "temp=50 °C"], &["temp (Temperature) must lie in 10..40 °C"]),
             (&["--set", "tune=just"], &["must be one of Natural, Tempered"]),
             (&["--set", "instr=bass"], &["instr (Instrument)", "the flag is --instrument"]),
             (&["--set", "arm=on"], &["arm (Arm knob) is only in the plugin"]),
-            (&["--zeta", "0.4", "--set", "zeta=0.5"], &["--zeta and --set zeta both set Embouchure zeta"]),
+            (&["--zeta", "0.4", "--set", "zeta=0.5"], &["--zeta and --set zeta both set Embouchure"]),
             (&["--set", "lip=1.1", "--set", "lip=1.2"], &["--set lip and --set lip both set"]),
             (&["--no-noise", "--set", "noise=3"], &["--no-noise and --set noise both set"]),
             (&["--tempered", "--set", "tune=natural"], &["--tempered and --set tune both set"]),

@@ -178,7 +178,7 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Number(|settings| &mut settings.lip))
         .flag("--lip"),
-    entry("zeta", EMBOUCHURE, "Embouchure zeta", number([0.05, 0.9], 0.3, 3, ""))
+    entry("zeta", EMBOUCHURE, "Embouchure", number([0.05, 0.9], 0.3, 3, ""))
         .help(
             "Embouchure parameter \u{3b6}: strength of the flow through the reed",
             "At higher values notes speak earlier, beat earlier and sound brighter.",
@@ -227,7 +227,7 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Number(|settings| &mut settings.reed_a))
         .flag("--A"),
-    entry("lay", REED, "Lay curve", number([0.0, 0.5], 0.4, 3, ""))
+    entry("lay", REED, "Facing", number([0.0, 0.5], 0.4, 3, ""))
         .help(
             "Curve of the lay that the reed closes on",
             "At 0 the reed closes all at once and sounds bright. At higher values it rolls onto the lay and sounds softer.",
@@ -260,7 +260,7 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Number(|settings| &mut settings.temperature_c))
         .flag("--temperature"),
-    entry("vent", TUNING, "Vent loss", number([0.0, 4.0], 2.0, 2, ""))
+    entry("vent", TUNING, "Register vent", number([0.0, 4.0], 2.0, 2, ""))
         .help(
             "Loss of the air jets in open holes",
             "At 0 there is no loss, and most of the clarion register does not speak: the register key needs this loss to work.",

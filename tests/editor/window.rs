@@ -38,7 +38,7 @@ fn tabs_lead_to_views_and_are_kept() {
 #[test]
 fn undo_and_redo_walk_through_gestures() {
     let mut window = Window::tall(Tab::Reed);
-    for name in ["Lip opening", "Lay curve"] {
+    for name in ["Lip opening", "Facing"] {
         let at = window.harness.get_by_role_and_label(Role::Slider, name).rect().center();
         window.drag(at, vec2(-50.0, 0.0));
     }
@@ -178,7 +178,7 @@ fn pictures_of_pages() {
     window.harness.run();
     save(&mut window, "listening");
     let mut window = Window::new(Tab::Reed, (1100.0, 720.0));
-    window.harness.get_by_role_and_label(Role::Slider, "Embouchure zeta").hover();
+    window.harness.get_by_role_and_label(Role::Slider, "Embouchure").hover();
     window.harness.run_steps(60);
     save(&mut window, "tool-tip");
     click(&mut window, "Setting B");

@@ -53,7 +53,7 @@ fn level_db(samples: &[f32]) -> f64 {
 
 /// A phrase that uses everything at positions that fall anywhere in a block.
 fn phrase(plugin: &mut Plugin) -> Vec<At> {
-    let (gain, zeta) = (plugin.param("Gain").unwrap(), plugin.param("Embouchure zeta").unwrap());
+    let (gain, zeta) = (plugin.param("Gain").unwrap(), plugin.param("Embouchure").unwrap());
     let mut said = vec![At(0, breath(0)), At(311, on(58)), At(20_000, Say::Midi([0xE0, 0, 32]))];
     said.extend((0..100).map(|step| At(320 + 97 * step, breath(step as u8))));
     said.extend([
@@ -289,7 +289,7 @@ fn state_of(json: &str) -> Vec<u8> {
 #[test]
 fn a_broken_state_is_refused_and_changes_nothing() {
     let mut plugin = plugin();
-    let zeta = plugin.param("Embouchure zeta").unwrap();
+    let zeta = plugin.param("Embouchure").unwrap();
     plugin.set(zeta.id, 0.7).unwrap();
     let before = plugin.save().unwrap();
     let mut cut = before.clone();
@@ -305,7 +305,7 @@ fn a_broken_state_is_refused_and_changes_nothing() {
 #[test]
 fn a_strange_state_is_mended() {
     let mut plugin = plugin();
-    let zeta = plugin.param("Embouchure zeta").unwrap();
+    let zeta = plugin.param("Embouchure").unwrap();
     let a4 = plugin.param("A4").unwrap();
     plugin.set(zeta.id, 0.9).unwrap();
     let json = r#"{"version":"9","params":{"a4":{"f32":9999.0},"zeta":{"bool":true},"later":{"i32":3}},"fields":{"schema":"77"}}"#;

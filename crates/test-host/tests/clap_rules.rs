@@ -339,7 +339,7 @@ fn any_values_survive_a_state() {
 #[test]
 fn a_state_survives_streams_that_take_little_at_a_time() {
     let (mut saved, mut loaded) = (plugin(), plugin());
-    let zeta = saved.param("Embouchure zeta").unwrap();
+    let zeta = saved.param("Embouchure").unwrap();
     saved.set(zeta.id, 0.7).unwrap();
     let state = saved.save_slowly(23).unwrap();
     assert_eq!(state, saved.save().unwrap());
@@ -363,7 +363,7 @@ fn rubbish_is_no_state() {
 #[test]
 fn a_state_is_one_for_every_context() {
     let mut plugin = plugin();
-    let zeta = plugin.param("Embouchure zeta").unwrap();
+    let zeta = plugin.param("Embouchure").unwrap();
     plugin.set(zeta.id, 0.25).unwrap();
     let state = plugin.save().unwrap();
     let contexts =

@@ -166,7 +166,7 @@ fn block_size_is_inaudible() {
         (0, cc(2, 0)),
         (311, on(58)),
         (15_001, Word::Set("Gain", 0.6)),
-        (15_500, Word::Set("Embouchure zeta", 0.5)),
+        (15_500, Word::Set("Embouchure", 0.5)),
     ];
     said.extend((0..100).map(|step| (320 + 97 * step, cc(2, step as u8))));
     said.extend([
@@ -218,14 +218,14 @@ fn state_makes_the_round_trip() {
     play_on(
         &mut loaded,
         64,
-        &[(0, Word::Set("Embouchure zeta", 0.625)), (0, Word::Set("Reed coupled", 0.0))],
+        &[(0, Word::Set("Embouchure", 0.625)), (0, Word::Set("Reed coupled", 0.0))],
         64,
     );
     let saved = loaded.plugin.save_state().unwrap();
     let mut other = load_beside(64);
     other.plugin.load_state(&saved).unwrap();
     let value = |loaded: &Loaded, name| loaded.plugin.find_parameter(name).unwrap().value;
-    assert!((value(&other, "Embouchure zeta") - 0.625).abs() < 1e-6);
+    assert!((value(&other, "Embouchure") - 0.625).abs() < 1e-6);
     assert_eq!(value(&other, "Reed coupled"), 0.0);
     assert_eq!(other.plugin.save_state().unwrap(), saved);
 }
@@ -243,7 +243,7 @@ fn without_controllers_it_has_few_parameters_and_the_same_sound_and_state() {
     let heard = play_on(&mut notes, 64, &[(100, on(60)), (9_000, off(60))], SECOND / 4);
     let events = [(100, note_on(60)), (9_000, Event::NoteOff { note: SoundingNote(60) })];
     assert!(heard == offline(&events, SECOND / 4));
-    play_on(&mut notes, 64, &[(0, Word::Set("Embouchure zeta", 0.625))], 64);
+    play_on(&mut notes, 64, &[(0, Word::Set("Embouchure", 0.625))], 64);
     let saved = notes.plugin.save_state().unwrap();
     full.plugin.load_state(&saved).unwrap();
     assert_eq!(full.plugin.save_state().unwrap(), saved);

@@ -12,8 +12,8 @@ RATE = 48_000
 BUNDLE = sys.argv[1]
 SCRATCH = pathlib.Path(tempfile.mkdtemp())
 OURS = [
-    "Breath", "Full breath", "Tongue", "Legato", "Reed strength", "Lip opening", "Embouchure zeta", "Lip damping",
-    "Reed H", "Reed k", "Reed coupled", "Reed A", "Lay curve", "A4", "Tuning", "Temperature", "Vent loss",
+    "Breath", "Full breath", "Tongue", "Legato", "Reed strength", "Lip opening", "Embouchure", "Lip damping",
+    "Reed H", "Reed k", "Reed coupled", "Reed A", "Facing", "A4", "Tuning", "Temperature", "Register vent",
     "Breath noise", "Gain", "Panic",
 ]
 
@@ -126,7 +126,7 @@ def the_breath_parameter_follows_automation():
 
 def state_makes_the_round_trip():
     engine, plugin = load()
-    zeta, coupled = index(plugin, "Embouchure zeta"), index(plugin, "Reed coupled")
+    zeta, coupled = index(plugin, "Embouchure"), index(plugin, "Reed coupled")
     plugin.set_parameter(zeta, 0.625)
     plugin.set_parameter(coupled, 0.0)
     render(engine, plugin, 0.1)  # a change takes effect with the next block

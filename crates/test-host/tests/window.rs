@@ -172,7 +172,7 @@ fn a_thousand_openings_leave_nothing_behind() {
     const SETTLED: usize = 200;
     let screen = screen();
     let mut plugin = plugin();
-    let zeta = plugin.param("Embouchure zeta").unwrap();
+    let zeta = plugin.param("Embouchure").unwrap();
     let session = plugin.activate(RATE, BLOCK).unwrap();
     // A note, and automation that never rests.
     let say = |played: usize| {
@@ -219,7 +219,7 @@ fn a_window_shows_what_automation_has_left() {
     let mut plugin = plugin();
     let params = plugin.params().unwrap();
     let named = |name: &str| params.iter().find(|param| param.name == name).unwrap().clone();
-    let moved = [named("Embouchure zeta"), named("Reed H"), named("Reed k")];
+    let moved = [named("Embouchure"), named("Reed H"), named("Reed k")];
     let mut session = plugin.activate(RATE, BLOCK).unwrap();
     let mut open = Open::new(&screen, &mut plugin);
     let before = open.settled();
@@ -327,7 +327,7 @@ fn two_windows_side_by_side_are_two() {
     let screen = screen();
     let (mut left, mut right) = (plugin(), plugin());
     let params = left.params().unwrap();
-    let zeta = params.iter().find(|param| param.name == "Embouchure zeta").unwrap();
+    let zeta = params.iter().find(|param| param.name == "Embouchure").unwrap();
     let (mut one, mut two) = (left.activate(RATE, BLOCK).unwrap(), right.activate(RATE, BLOCK).unwrap());
     let set = |unit: f64| [At(0, Say::Set(zeta.id, zeta.min + unit * (zeta.max - zeta.min)))];
     one.play(&set(0.25), SECOND / 5).unwrap();
