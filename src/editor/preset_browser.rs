@@ -167,7 +167,9 @@ fn about(ui: &mut Ui, preset: &Preset, hands: &Hands) {
     if is_changed(preset, hands.controls) {
         ui.label(RichText::new("changed since it was chosen").color(c.quiet));
     }
-    ui.label(&preset.shows);
+    if !preset.shows.is_empty() {
+        ui.label(&preset.shows);
+    }
     let mut words = preset.tags.join(", ");
     if !preset.author.is_empty() {
         words += &format!(" \u{b7} by {}", preset.author);

@@ -12,6 +12,7 @@
 //! | `state` | `clap.state`, `clap.state-context` | controls of the moment are no state |
 //! | `note_ports` | `clap.note-ports` | the MPE dialect |
 //! | `note_names` | `clap.note-name` | the written note of each key |
+//! | `presets` | `clap.preset-discovery-factory`, `clap.preset-load` | the host's own browser lists and loads presets |
 //! | `indication` | `clap.param-indication` | the window shows what the host has mapped and automated |
 //!
 //! [`ClapPlugin::remote_controls`](nice_plug::prelude::ClapPlugin) is the framework's; its pages are in `remote_pages`.
@@ -26,6 +27,7 @@ mod note_names;
 mod note_ports;
 mod out_events;
 mod params;
+mod presets;
 mod remote_pages;
 mod state;
 mod text;

@@ -174,7 +174,8 @@ impl UserFolder {
     }
 }
 
-fn read_file(path: &Path) -> Result<Preset, String> {
+/// The preset in a file; the error says what is wrong with it, without its name.
+pub fn read_file(path: &Path) -> Result<Preset, String> {
     if fs::metadata(path).is_ok_and(|file| file.len() > BYTES_MOST) {
         return Err(format!("has more than {BYTES_MOST} bytes, so it is no preset; move it elsewhere"));
     }

@@ -146,6 +146,7 @@ fn ones_own_are_saved_renamed_and_deleted_as_actions() {
     window.harness.get_by_label_contains("Preset B flat").click();
     window.harness.run();
     window.host.automate("lip", 0.25);
+    window.harness.run();
     window.harness.get_by_label_contains("bad.toml: line 4");
     click(&mut window, "Save as");
     window.actions();
@@ -184,27 +185,4 @@ fn a_blind_comparison_hides_the_preset() {
     window.harness.run();
     click(&mut window, "Blind");
     assert!(window.harness.query_by_label_contains("Preset ").is_none());
-}
-
-#[test]
-fn zz_pictures() {
-    let (snapshot, host) = (crate::c4(), crate::support::Fake::default());
-    let mut snapshot = snapshot;
-    snapshot.presets = shelf();
-    for size in [(700.0, 480.0), (1100.0, 720.0), (1600.0, 1000.0)] {
-        for is_dark in [true, false] {
-            for (n, preset) in ["B flat clarinet", "Mine"].into_iter().enumerate() {
-                snapshot.preset = preset.to_owned();
-                let kept = chalumeau::editor::WindowState { size, is_dark, ..Default::default() };
-                let mut window = crate::support::window(&kept, &host, &snapshot, 1.0);
-                if n == 1 {
-                    window.state_mut().show_presets(true);
-                    window.run();
-                }
-                crate::support::shot(&mut window, 1.0)
-                    .save(format!("/tmp/pg/p{n}-{is_dark}-{}.png", size.0))
-                    .unwrap();
-            }
-        }
-    }
 }

@@ -1,6 +1,6 @@
 //! The host of one instance: its extensions, and the calls that any thread may make.
 
-use std::ffi::CStr;
+use std::ffi::{CStr, c_char};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
@@ -11,6 +11,7 @@ use clap_sys::ext::context_menu::{
 use clap_sys::ext::gui::CLAP_EXT_GUI;
 use clap_sys::ext::note_name::{CLAP_EXT_NOTE_NAME, clap_host_note_name};
 use clap_sys::ext::params::{CLAP_EXT_PARAMS, clap_host_params, clap_param_rescan_flags};
+use clap_sys::ext::preset_load::{CLAP_EXT_PRESET_LOAD, CLAP_EXT_PRESET_LOAD_COMPAT, clap_host_preset_load};
 use clap_sys::ext::tail::{CLAP_EXT_TAIL, clap_host_tail};
 use clap_sys::host::clap_host;
 use clap_sys::id::clap_id;
@@ -39,6 +40,7 @@ struct Extensions {
     tail: Option<*const clap_host_tail>,
     note_name: Option<*const clap_host_note_name>,
     menu: Option<*const clap_host_context_menu>,
+    preset_load: Option<*const clap_host_preset_load>,
 }
 
 // SAFETY: the host's tables do not change, they live as long as the plugin, and each call below says from which threads CLAP
@@ -61,11 +63,13 @@ impl Host {
     /// Looks for the host's extensions. [main thread, in `init`]
     pub fn query(&self) {
         let menu = self.extension(CLAP_EXT_CONTEXT_MENU);
+        let preset_load = self.extension(CLAP_EXT_PRESET_LOAD);
         let _ = self.extensions.set(Extensions {
             has_gui: self.extension::<()>(CLAP_EXT_GUI).is_some(),
             params: self.extension(CLAP_EXT_PARAMS),
             tail: self.extension(CLAP_EXT_TAIL),
             note_name: self.extension(CLAP_EXT_NOTE_NAME),
+            preset_load: preset_load.or_else(|| self.extension(CLAP_EXT_PRESET_LOAD_COMPAT)),
             menu: menu.or_else(|| self.extension(CLAP_EXT_CONTEXT_MENU_COMPAT)),
         });
     }
@@ -130,6 +134,23 @@ impl Host {
             {
                 popup(self.raw(), &raw const target, 0, x, y);
             }
+        }
+    }
+
+    /// Tells the host that a preset is on the parameters. [main thread]
+    pub fn preset_loaded(&self, kind: u32, location: *const c_char, key: *const c_char) {
+        if let Some(presets) = self.known().and_then(|known| known.preset_load) {
+            // SAFETY: the host lives and gave both texts; the caller is on the main thread.
+            unsafe { (*presets).loaded.inspect(|loaded| loaded(self.raw(), kind, location, key)) };
+        }
+    }
+
+    /// Tells the host why a preset is not. [main thread]
+    pub fn preset_failed(&self, kind: u32, location: *const c_char, key: *const c_char, why: &CStr) {
+        if let Some(presets) = self.known().and_then(|known| known.preset_load) {
+            let why = why.as_ptr();
+            // SAFETY: as above.
+            unsafe { (*presets).on_error.inspect(|fail| fail(self.raw(), kind, location, key, 0, why)) };
         }
     }
 

@@ -12,6 +12,7 @@ use clap_sys::ext::param_indication::{CLAP_EXT_PARAM_INDICATION, CLAP_EXT_PARAM_
 use clap_sys::ext::params::{
     CLAP_EXT_PARAMS, CLAP_PARAM_RESCAN_INFO, CLAP_PARAM_RESCAN_TEXT, CLAP_PARAM_RESCAN_VALUES,
 };
+use clap_sys::ext::preset_load::{CLAP_EXT_PRESET_LOAD, CLAP_EXT_PRESET_LOAD_COMPAT};
 use clap_sys::ext::remote_controls::{CLAP_EXT_REMOTE_CONTROLS, CLAP_EXT_REMOTE_CONTROLS_COMPAT};
 use clap_sys::ext::state::CLAP_EXT_STATE;
 use clap_sys::ext::state_context::CLAP_EXT_STATE_CONTEXT;
@@ -29,7 +30,7 @@ use nice_plug::wrapper::clap::Wrapper;
 use super::host::Host;
 use super::note_names::NoteNames;
 use super::out_events::OutEvents;
-use super::{Introduced, Introduction, indication, note_names, note_ports, params, state};
+use super::{Introduced, Introduction, indication, note_names, note_ports, params, presets, state};
 use crate::parameters::{self, InUse, Parameter};
 use crate::plugin::host_link::HostCalls;
 use crate::plugin::{Chalumeau, Task};
@@ -295,6 +296,8 @@ unsafe extern "C" fn get_extension(plugin: *const clap_plugin, id: *const c_char
         (&raw const state::STATE).cast()
     } else if id == CLAP_EXT_STATE_CONTEXT {
         (&raw const state::STATE_CONTEXT).cast()
+    } else if id == CLAP_EXT_PRESET_LOAD || id == CLAP_EXT_PRESET_LOAD_COMPAT {
+        (&raw const presets::PRESET_LOAD).cast()
     } else if id == CLAP_EXT_TAIL {
         (&raw const TAIL).cast()
     } else if id == CLAP_EXT_NOTE_PORTS {
