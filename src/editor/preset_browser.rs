@@ -343,7 +343,7 @@ fn row(ui: &mut Ui, preset: &Preset, is_here: bool, shelf: &PresetShelf) -> (Res
 fn paint_star(ui: &Ui, rect: Rect, is_full: bool, ink: egui::Color32) {
     let turn = std::f32::consts::TAU / 10.0;
     let point = |n: usize| {
-        let radius = if n % 2 == 0 { 7.0 } else { 3.0 };
+        let radius = if n.is_multiple_of(2) { 7.0 } else { 3.0 };
         rect.center() + radius * egui::Vec2::angled(n as f32 * turn - 0.25 * std::f32::consts::TAU)
     };
     let outline: Vec<_> = (0..10).map(point).collect();

@@ -6,10 +6,11 @@
 use std::sync::atomic::AtomicU32;
 use std::sync::{Arc, RwLock};
 
+use nice_plug::params::InternalParamMut;
 use nice_plug::prelude::*;
 
 use crate::editor::WindowState;
-use crate::parameters::{InUse, Number};
+use crate::parameters::{InUse, Number, Value};
 use crate::plugin::host_link::HostLink;
 use crate::presets::Preset;
 use chalumeau_core::instrument::{BreathResponse, Settings, Tuning};
@@ -314,7 +315,15 @@ impl ChalumeauParams {
             if let Some((_, pointer, _)) = pointers.iter().find(|(id, ..)| id == parameter.id) {
                 // SAFETY: the pointer leads into `self`, and the setter stores atomics. The framework keeps it for its
                 // wrappers because a host would not be told; `values_changed` is how it is told.
-                unsafe { pointer._internal_set_normalized_value(parameter.normalized(value)) };
+                unsafe {
+                    match (pointer, value) {
+                        // On the way through 0..=1 a number would lose its last bit.
+                        (ParamPtr::FloatParam(param), Value::Number(number)) => {
+                            (**param)._internal_set_plain_value(number)
+                        }
+                        _ => pointer._internal_set_normalized_value(parameter.normalized(value)),
+                    }
+                };
             }
         }
         self.set_preset_name(&preset.name);
