@@ -270,7 +270,7 @@ mod tests {
         assert_eq!(all.len(), 63);
         assert!(all.iter().all(|note| note.midi % 2 == 1 && (51..=91).contains(&note.midi)));
         assert!(all.iter().all(|note| note.levels_db.iter().copied().fold(f64::MIN, f64::max) == 0.0));
-        assert_eq!(all.iter().filter(|note| note.is_odd_take()).count(), 9);
+        assert_eq!(all.iter().filter(|note| note.is_odd_take()).count(), 8);
         let low = &all[1];
         assert_eq!((low.midi, low.dynamic, low.rms_dbfs, low.centroid_hz), (51, Dynamic::Mf, -43.9, 697.7));
         assert!(all.iter().all(|note| !register(note.midi).is_empty()));

@@ -35,9 +35,9 @@ const LOUDEST: [f64; 4] = [1.0, 0.92, 0.84, 0.76];
 const RANGES: [f64; 6] = [1.0, 0.8, 0.6, 0.45, 0.3, 0.2];
 /// Excess of the pressure at dynamic 0 over that at 1, where the controller begins.
 const SOFTER: f64 = 0.2;
-/// The controller moves the logarithm of the excess of the mouth pressure over [`LOWEST_ONSET`]: mouth over closing pressure for 1 neper of distance at once, and the rate at which the logarithm of the
-/// excess follows the distance, 1/s. Near its threshold the amplitude grows by some 300 nepers a second and unit of pressure: the
-/// two then settle in a quarter of a second.
+/// The controller moves the logarithm of the excess of the mouth pressure over [`LOWEST_ONSET`]: mouth over closing pressure for
+/// 1 neper of distance at once, and the rate at which the logarithm of the excess follows the distance, 1/s. Near its threshold
+/// the amplitude grows by some 300 nepers a second and unit of pressure: the two then settle in a quarter of a second.
 const PUSH: f64 = 0.06;
 const RATE: f64 = 12.0;
 /// Distances that count for the controller, nepers.
