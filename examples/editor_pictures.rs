@@ -13,11 +13,9 @@ use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 mod support;
 
 /// View, dark or light.
-const GUIDE: [(Tab, bool); 9] = [
+const GUIDE: [(Tab, bool); 7] = [
     (Tab::Play, true),
-    (Tab::Play, false),
     (Tab::Reed, true),
-    (Tab::Reed, false),
     (Tab::Clarinet, false),
     (Tab::Breath, true),
     (Tab::Sound, true),

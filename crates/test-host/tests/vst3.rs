@@ -215,12 +215,7 @@ fn parameters_have_names_units_and_text() {
 fn state_makes_the_round_trip() {
     let mut loaded = load(64);
     loaded.plugin.start_processing().unwrap();
-    play_on(
-        &mut loaded,
-        64,
-        &[(0, Word::Set("Embouchure", 0.625)), (0, Word::Set("Reed coupled", 0.0))],
-        64,
-    );
+    play_on(&mut loaded, 64, &[(0, Word::Set("Embouchure", 0.625)), (0, Word::Set("Reed coupled", 0.0))], 64);
     let saved = loaded.plugin.save_state().unwrap();
     let mut other = load_beside(64);
     other.plugin.load_state(&saved).unwrap();
