@@ -242,6 +242,7 @@ fn crescendo(model: &Arc<Model>, fingering: usize, values: &[u8]) -> Vec<(f64, f
 #[test]
 fn every_instrument_has_a_players_dynamics() {
     const VALUES: [u8; 4] = [8, 48, 88, 127];
+    let mut failed = Vec::new();
     for case in at_96_khz() {
         let notes: Vec<usize> = up_to(&case.model, C6).filter(|&note| case.model.speaks(note)).collect();
         let heard = each(&notes, |&note| crescendo(&case.model, note, &VALUES));
@@ -253,12 +254,12 @@ fn every_instrument_has_a_players_dynamics() {
                 let over = (pair[1].0 - pair[0].0) / mean;
                 step = (step.0.min(over), step.1.max(over));
             }
-            let worst = heard.iter().map(|(_, cents)| cents.abs()).fold(0.0, f64::max);
+            let of = |cents: f64| if cents.is_nan() { f64::INFINITY } else { cents.abs() };
+            let worst = heard.iter().map(|(_, cents)| of(*cents)).fold(0.0, f64::max);
             if whole < 24.0 || worst > 3.0 {
                 println!("{}, {}: {heard:.1?}", case.name, written(&case.model, *note));
             }
             (range, off) = (range.min(whole), off.max(worst));
-            assert!(heard.iter().all(|(_, cents)| cents.is_finite()), "{}: {heard:?}", case.name);
         }
         println!(
             "{}: {} notes, {range:.1} dB or more from CC 8 to 127, steps {:.2}..{:.2} of their mean, within {off:.1} cents",
@@ -267,12 +268,11 @@ fn every_instrument_has_a_players_dynamics() {
             step.0,
             step.1
         );
-        assert!(
-            range > PLAYED_RANGE_DB && step.0 > 0.5 && step.1 < 2.0 && off < PLAYED_CENTS,
-            "{}",
-            case.name
-        );
+        if !(range > PLAYED_RANGE_DB && step.0 > 0.5 && step.1 < 2.0 && off < PLAYED_CENTS) {
+            failed.push(case.name);
+        }
     }
+    assert!(failed.is_empty(), "{failed:?}");
 }
 
 /// Mouthpiece pressure of a held note, sample by sample, for two seconds.
