@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "../include/chalumeau/calibration.hpp"
+#include "../include/chalumeau/i2c.hpp"
 #include "check.hpp"
 #include "host.hpp"
 #include "plant.hpp"
@@ -146,13 +147,19 @@ CLAIM(probe_a_knob_that_does_not_move_is_not_armed_and_says_so) {
     begin(bench, plant, test::reference_feel());
     bench.arm(450);
     float most = 0.0F;
+    float most_given = 0.0F;
+    CountRounding rounding;
     for (int i = 0; i < 2000; ++i) {
         plant.read(bench.reading);
         const float torque = bench.run(1);
         most = std::max(most, std::fabs(torque));
+        const std::int16_t counts = rounding.counts(torque, bench.device.ceiling_mnm(), MOTEUS_UNIT);
+        most_given = std::max(most_given, std::fabs(mnm_of(counts, MOTEUS_UNIT)));
         plant.push(torque);
     }
     CHECK(most > 11.0F && most <= PROBE_MNM);
+    // Counts of 4.8 mNm: rounding must not add what the probe may not use.
+    CHECK(most_given > 9.0F && most_given <= PROBE_MNM);
     CHECK(bench.refused(Refusal::Unmoved) && !bench.device.armed() && bench.run(1) == 0.0F);
 }
 

@@ -124,7 +124,11 @@ class Device {
     }
     std::uint32_t dropped() const { return outbox_.dropped(); }
     /// What the torque of the last tick must not exceed, in counts of the board too.
-    float ceiling_mnm() const { return limits_.ceiling_mnm(); }
+    float ceiling_mnm() const {
+        const float most = limits_.ceiling_mnm();
+        // Counts too must stay below what the probe may use.
+        return session_.phase() == Phase::Probing ? least(PROBE_MNM, most) : most;
+    }
     const Feel& feel() const { return feel_; }
     std::uint16_t epoch() const { return session_.epoch(); }
     std::uint16_t overruns() const { return pace_.overruns(); }
