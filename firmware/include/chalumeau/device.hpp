@@ -127,7 +127,7 @@ class Device {
     float ceiling_mnm() const {
         const float most = limits_.ceiling_mnm();
         // Counts too must stay below what the probe may use.
-        return session_.phase() == Phase::Probing ? least(PROBE_MNM, most) : most;
+        return session_.phase() == Phase::Probing ? least(probe_.most_mnm(), most) : most;
     }
     const Feel& feel() const { return feel_; }
     std::uint16_t epoch() const { return session_.epoch(); }

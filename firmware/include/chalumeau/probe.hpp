@@ -66,6 +66,9 @@ class Probe {
         return Finding::Probing;
     }
 
+    /// What neither the torque nor its whole counts may exceed, mNm.
+    float most_mnm() const { return most_mnm_; }
+
     float torque_mnm() const {
         const float size = most_mnm_ * least(1.0F, elapsed_s_ / PROBE_RISE_S);
         return forth_ ? size : -size;

@@ -39,14 +39,7 @@ pub fn play_probed<E>(
     each: impl FnMut(&[f32]) -> Result<(), E>,
 ) -> Result<(), E> {
     let render = |events: &[Timed<Event>], begun: usize, out: &mut [f32]| {
-        let mut done = 0;
-        for event in events {
-            let at = event.at - begun;
-            clarinet.render_probed(&mut out[done..at], probe);
-            clarinet.apply(event.event);
-            done = at;
-        }
-        clarinet.render_probed(&mut out[done..], probe);
+        render_probed(clarinet, events, begun, Channels::one(out), probe);
     };
     in_blocks(score, block, render, each)
 }
@@ -69,17 +62,28 @@ pub fn play_stereo<E>(
     let render = |events: &[Timed<Event>], begun: usize, left: &mut [f32]| {
         let mut right = heard.borrow_mut();
         let samples = left.len();
-        let mut out = Channels::two(left, &mut right[..samples]);
-        let mut done = 0;
-        for event in events {
-            let at = event.at - begun;
-            clarinet.render_probed_channels(out.part(done..at), probe);
-            clarinet.apply(event.event);
-            done = at;
-        }
-        clarinet.render_probed_channels(out.part(done..samples), probe);
+        render_probed(clarinet, events, begun, Channels::two(left, &mut right[..samples]), probe);
     };
     in_blocks(score, block, render, |left| each(left, &heard.borrow()[..left.len()]))
+}
+
+/// Fills `out`, which begins at sample `begun` of the score, and applies each event at its sample.
+fn render_probed(
+    clarinet: &mut Clarinet,
+    events: &[Timed<Event>],
+    begun: usize,
+    mut out: Channels,
+    probe: &mut dyn FnMut(Probe),
+) {
+    let mut done = 0;
+    for event in events {
+        let at = event.at - begun;
+        clarinet.render_probed_channels(out.part(done..at), probe);
+        clarinet.apply(event.event);
+        done = at;
+    }
+    let end = out.len();
+    clarinet.render_probed_channels(out.part(done..end), probe);
 }
 
 /// Cuts a score into blocks. `render` gets the events of a block, the sample at which it begins, and where to write.
