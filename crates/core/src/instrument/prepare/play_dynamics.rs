@@ -22,14 +22,17 @@ use crate::units::cents;
 const FAR_DB: f64 = 0.5;
 /// A pitch this near to the wanted one needs no other trim, cents.
 const CLOSE_CENTS: f64 = 0.2;
+/// A note that stays further off, because its trim ends, is played less loudly, cents.
+const IN_TUNE_CENTS: f64 = 2.5;
 /// A pitch further off than this is another note, cents.
 const OTHER_CENTS: f64 = 150.0;
 /// Least periodicity of a note.
 const PERIODIC: f64 = 0.9;
 /// Largest number of corrections of the trim at one dynamic.
 const TRIMS: usize = 3;
-/// Mouth pressures that are tried for the loudest dynamic, over that of the rule.
-const LOUDEST: [f64; 4] = [1.0, 0.92, 0.84, 0.76];
+/// Mouth pressures that are tried for the loudest dynamic, over that of the rule. Tongued harder, some notes begin in another
+/// register: B3 of the bass clarinet above 0.68.
+const LOUDEST: [f64; 6] = [1.0, 0.92, 0.84, 0.76, 0.68, 0.6];
 /// Ranges of level that are tried, over that of the rule: a note of the altissimo that falls into another register where it
 /// is soft is not played so softly.
 const RANGES: [f64; 6] = [1.0, 0.8, 0.6, 0.45, 0.3, 0.2];
@@ -101,25 +104,43 @@ pub fn learn(model: &Model, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Optio
 }
 
 /// What one note asks of the player; `None` if it leaves its register whatever is tried.
+///
+/// A note that is out of tune where it is loudest is played less loudly, as far as [`LOUDEST`] goes; then the best is taken.
 pub fn learn_note(model: &Model, fingering: usize) -> Option<PlayedNote> {
     let tuned = model.tuning.notes.get(fingering)?;
     let gamma = model.player.loudest_gamma(model.place(fingering));
-    let tries = RANGES.into_iter().flat_map(|range| LOUDEST.map(|share| (range, share)));
-    tries.into_iter().find_map(|(range, share)| descend(model, fingering, tuned, share * gamma, range))
+    for range in RANGES {
+        let mut best: Option<(f64, PlayedNote)> = None;
+        for share in LOUDEST {
+            let Some((off_cents, note)) = descend(model, fingering, tuned, share * gamma, range) else {
+                continue;
+            };
+            if off_cents < IN_TUNE_CENTS {
+                return Some(note);
+            }
+            if best.is_none_or(|(least, _)| off_cents < least) {
+                best = Some((off_cents, note));
+            }
+        }
+        if let Some((_, note)) = best {
+            return Some(note);
+        }
+    }
+    None
 }
 
-/// Plays the diminuendo from a mouth pressure `gamma`, over a part of the rule's range of level; `None` if the note leaves its
-/// register.
+/// Plays the diminuendo from a mouth pressure `gamma`, over a part of the rule's range of level. Gives the note and its largest error
+/// of pitch, cents; `None` if the note leaves its register.
 fn descend(
     model: &Model,
     fingering: usize,
     tuned: &NoteTuning,
     gamma: f64,
     range: f64,
-) -> Option<PlayedNote> {
+) -> Option<(f64, PlayedNote)> {
     let mut note = Diminuendo::begin(model, fingering, tuned, gamma)?;
     let (mut gammas, mut amplitudes, mut rows) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
-    let mut loudest = None;
+    let (mut loudest, mut off_cents) = (None, 0.0_f64);
     for node in (0..NODES).rev() {
         let dynamic = NODE_DYNAMICS[node];
         if let Some(power) = loudest {
@@ -130,9 +151,10 @@ fn descend(
         }
         let heard = note.settle(tuned.sensitivity)?;
         loudest = loudest.or(Some(heard.power));
+        off_cents = off_cents.max(heard.off_cents.abs());
         (gammas[node], amplitudes[node], rows[node]) = (heard.gamma, heard.amplitude, note.held.rows);
     }
-    Some(PlayedNote::new(gammas, amplitudes, rows))
+    Some((off_cents, PlayedNote::new(gammas, amplitudes, rows)))
 }
 
 impl<'a> Diminuendo<'a> {
