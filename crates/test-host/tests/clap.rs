@@ -314,9 +314,14 @@ fn a_strange_state_is_mended() {
     let value = plugin.value(zeta.id).unwrap();
     assert_eq!(plugin.text(zeta.id, value).unwrap(), "0.300", "default");
     let mut fresh = self::plugin();
-    let reference = fresh.save().unwrap();
+    let text = |plugin: &mut Plugin| String::from_utf8_lossy(&plugin.save().unwrap()[8..]).into_owned();
+    // The reference clarinet by name; a state without a name has no preset.
+    let named = r#""preset":"\"B flat clarinet\"""#;
+    let reference = text(&mut fresh);
+    assert!(reference.contains(named), "{reference}");
     fresh.restore(&state_of(r#"{"version":"","params":{},"fields":{}}"#)).unwrap();
-    assert_eq!(fresh.save().unwrap(), reference, "an empty state is the reference clarinet");
+    let reference = reference.replace(named, r#""preset":"\"\"""#);
+    assert_eq!(text(&mut fresh), reference, "an empty state is the reference clarinet");
 }
 
 #[test]

@@ -86,6 +86,7 @@ fn parameters_are_described_by_the_rules() {
     }
     assert_eq!(flagged(ParamInfoFlags::IS_READONLY), ["Knob status", "Instrument status"]);
     let choices = [
+        "Breath response",
         "Reed coupled",
         "Tuning",
         "Knob",

@@ -87,7 +87,8 @@ mod tests {
             assert!(arrived < 0.02 || f64::from(ticks) * tick_s < 0.05, "{arrived} after {ticks} ticks");
         }
         assert_eq!(glide.over(new), new);
-        assert!(f64::from(ticks) * tick_s < 0.15, "{ticks}");
+        // To one part in 10^4 takes nine time constants and more, from wherever it was.
+        assert!(f64::from(ticks) * tick_s < 20.0 * LIP_S, "{ticks}");
     }
 
     #[test]

@@ -23,7 +23,7 @@ const FAR_DB: f64 = 0.5;
 /// A pitch this near to the wanted one needs no other trim, cents.
 const CLOSE_CENTS: f64 = 0.2;
 /// A note that stays further off, because its trim ends, is played less loudly, cents.
-const IN_TUNE_CENTS: f64 = 2.5;
+const IN_TUNE_CENTS: f64 = 1.0;
 /// A pitch further off than this is another note, cents.
 const OTHER_CENTS: f64 = 150.0;
 /// Least periodicity of a note.
