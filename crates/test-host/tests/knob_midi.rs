@@ -149,7 +149,7 @@ fn a_hand_on_a_midi_knob_plays_the_plugin() {
     let off = cents(hz, 146.832);
     println!("breath {sent:.3}, {hz:.2} Hz, {off:+.1} cents, {:.1} dBFS", level_db(&heard[SECOND..]));
     assert!(off.abs() < 20.0, "{hz} Hz");
-    assert!((0.4..0.95).contains(&sent), "breath {sent}");
+    assert!((0.35..0.95).contains(&sent), "breath {sent}");
 }
 
 #[test]

@@ -203,7 +203,7 @@ fn parameters_have_names_units_and_text() {
     let ours: Vec<_> = all.iter().filter(|param| !param.name.starts_with("MIDI")).collect();
     assert_eq!(ours.len(), 66, "{:?}", ours.iter().map(|param| &param.name).collect::<Vec<_>>());
     for (name, text) in
-        [("Full breath", "6.00"), ("A4", "440.0"), ("Reed coupled", "Coupled"), ("Tuning", "Natural")]
+        [("Full breath", "6.00"), ("A4", "440.0"), ("Reed coupled", "Coupled"), ("Tuning", "Tempered")]
     {
         let param = loaded.plugin.find_parameter(name).unwrap();
         let shown = loaded.plugin.format_parameter(param.id, param.value).unwrap();

@@ -12,7 +12,7 @@ RATE = 48_000
 BUNDLE = sys.argv[1]
 SCRATCH = pathlib.Path(tempfile.mkdtemp())
 OURS = [
-    "Breath", "Full breath", "Tongue", "Legato", "Reed strength", "Lip opening", "Embouchure", "Lip damping",
+    "Breath", "Full breath", "Tongue", "Legato", "Breath response", "Breath curve", "Reed strength", "Lip opening", "Embouchure", "Lip damping",
     "Reed H", "Reed k", "Reed coupled", "Reed A", "Facing", "A4", "Tuning", "Temperature", "Register vent",
     "Breath noise", "Gain", "Panic",
 ]

@@ -57,13 +57,13 @@ def a_key_sounds_the_same_in_blocks_of_any_size():
 
 
 def parameters_and_state_make_the_round_trip():
-    clarinet.embouchure_zeta = 0.5
+    clarinet.embouchure = 0.5
     play(clarinet)  # a change takes effect with the next block
     kept, sound = clarinet.raw_state, play(clarinet)
-    clarinet.embouchure_zeta = 0.3
+    clarinet.embouchure = 0.3
     play(clarinet)
     clarinet.raw_state = kept
-    assert abs(clarinet.embouchure_zeta - 0.5) < 1e-3, clarinet.embouchure_zeta
+    assert abs(clarinet.embouchure - 0.5) < 1e-3, clarinet.embouchure
     assert np.array_equal(play(clarinet), sound)
 
 
