@@ -347,7 +347,7 @@ fn two_windows_side_by_side_are_two() {
     let after_b = b.settled();
     assert!(after_b.differing(&seen_b) > 0, "the right window has not changed");
     assert!(a.comes_to_show(&seen_a), "the left window has changed with the right one");
-    let (value_a, value_b) = (a.plugin.value(zeta.id).unwrap(), b.plugin.value(zeta.id).unwrap());
+    let (value_a, value_b) = (a.plugin.value(lip.id).unwrap(), b.plugin.value(lip.id).unwrap());
     assert!(value_a < value_b, "{value_a} {value_b}");
     // One may close before the other.
     drop(a);
