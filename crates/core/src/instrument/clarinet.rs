@@ -333,11 +333,14 @@ impl Clarinet {
         if self.choke.fade(out.part(0..out.len())) {
             self.cut();
         }
-        // A subnormal number would slow whatever comes after; a zero keeps its sign.
-        out.each(|channel| {
-            channel.iter_mut().filter(|x| x.abs() < f32::MIN_POSITIVE).for_each(|x| *x *= 0.0);
-        });
         let (silence, mut audible) = (SILENCE * self.level.boost(), false);
+        // Where the sound begins or ends, subnormal numbers would slow whatever comes after; a zero keeps its sign.
+        out.each(|channel| {
+            let is_quiet = |sample: Option<&f32>| sample.is_some_and(|x| x.abs() <= silence);
+            if is_quiet(channel.first()) || is_quiet(channel.last()) {
+                channel.iter_mut().filter(|x| x.abs() < f32::MIN_POSITIVE).for_each(|x| *x *= 0.0);
+            }
+        });
         out.each(|channel| audible |= channel.iter().any(|sample| sample.abs() > silence));
         self.quiet = if audible || !self.player.is_resting() {
             0

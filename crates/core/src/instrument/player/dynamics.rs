@@ -3,7 +3,7 @@
 //! A player does not think of pressures. A *dynamic* from 0 (pianissimo, at the threshold of the note) to 1 (fortissimo)
 //! moves the mouth pressure, the opening of the reed under the lip and the strength of its flow together. Equal steps of
 //! dynamic are equal steps of level: the rule says how loud a note is at each dynamic, and preparing an instrument finds, by
-//! playing, the mouth pressure that makes it so ([`PlayedNote`]). So the rule knows no note and no instrument. Its
+//! playing, the mouth pressure that makes it so ([`PlayedNote`](crate::instrument::played_note::PlayedNote)). So the rule knows no note and no instrument. Its
 //! functions depend on the dynamic `d` and on the place `x` of a note over the lowest note of the instrument:
 //!
 //! | quantity | function |

@@ -105,7 +105,7 @@ pub fn learn(model: &Model, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Optio
 
 /// What one note asks of the player; `None` if it leaves its register whatever is tried.
 ///
-/// A note that is out of tune where it is loudest is played less loudly, as far as [`LOUDEST`] goes; then the best is taken.
+/// A note that is out of tune where it is loudest is played less loudly, down to 0.6 of the rule's pressure; then the best is taken.
 pub fn learn_note(model: &Model, fingering: usize) -> Option<PlayedNote> {
     let tuned = model.tuning.notes.get(fingering)?;
     let gamma = model.player.loudest_gamma(model.place(fingering));
