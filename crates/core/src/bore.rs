@@ -21,6 +21,7 @@ pub mod bundled;
 pub mod cells;
 pub mod check;
 pub mod cylinder;
+pub mod fingering_finder;
 #[cfg(feature = "fit")]
 pub mod fit;
 pub mod instrument_file;

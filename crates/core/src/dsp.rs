@@ -5,3 +5,4 @@ pub mod limiter;
 pub mod low_pass;
 pub mod resampler;
 pub mod warp;
+pub mod white;

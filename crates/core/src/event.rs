@@ -46,11 +46,20 @@ pub enum Event {
         /// On k, 0.1..=10; 1 leaves it.
         k: f32,
     },
+    /// Depth of the vibrato, 0..=1, added to that of the [`Settings`](crate::instrument::Settings).
+    Vibrato(f32),
     /// The tongue pulls the reed off the mouthpiece and lets it slam: a percussive burst on the fingering in place, with
     /// or without breath and held keys.
     TongueSlap {
         /// How hard, 0..=1; 0 is nothing.
         strength: f32,
+    },
+    /// A controller's share of an extended technique; it adds to that of the settings.
+    Technique {
+        /// Which.
+        which: Technique,
+        /// How much, 0..=1; 0 leaves the settings'.
+        amount: f32,
     },
     /// Loudness after the instrument, before the limiter.
     Volume {
@@ -67,6 +76,17 @@ pub enum Event {
     TryHoles(Option<u64>),
     /// Releases all notes, sets the breath to 0 and clears the state.
     Panic,
+}
+
+/// An extended technique that a controller may drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Technique {
+    /// The player sings into the instrument.
+    Growl,
+    /// The tongue rolls an R.
+    Flutter,
+    /// The lip covers the reed.
+    Subtone,
 }
 
 /// An event and when it happens.

@@ -5,6 +5,7 @@
 //! methods that know only samples.
 
 pub mod bifurcation;
+pub mod multiphonics;
 pub mod notes;
 pub mod radiated_bands;
 pub mod realism;

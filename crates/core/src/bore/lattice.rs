@@ -292,6 +292,12 @@ impl<F: Real> Lattice<F> {
         self.holes[chunk].is_open(lane)
     }
 
+    /// Whether a hole is on its way.
+    pub fn is_gliding(&self, hole: usize) -> bool {
+        let (chunk, lane) = self.hole_lanes[hole];
+        self.holes[chunk].is_gliding(lane)
+    }
+
     /// Whether holes move, or have moved since the last [`run`](Self::run).
     pub fn is_moving(&self) -> bool {
         self.moved

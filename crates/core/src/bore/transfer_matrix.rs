@@ -18,6 +18,9 @@
 
 mod outflow;
 mod standing;
+mod survey;
+
+pub use survey::Resonance;
 
 use std::collections::HashMap;
 use std::f64::consts::PI;

@@ -4,8 +4,9 @@
 //! The instrument has one voice, so all channels play it. The last key struck is heard; see [`notes`](super::notes).
 //! [`breath`] says which controller the breath comes from, [`snapshot`] what is left out of the start of a project, [`mix`]
 //! what volume and pan do. Bend follows the heard note's channel and its MPE zone, see [`bends`](super::bends); RPN 0 sets a
-//! bend range, RPN 6 a zone. While the sustain pedal (CC64) is down, the last note goes on after its key has come up, until
-//! the pedal comes up or another key is struck, which slurs; the same key again is tongued. Left out: balance (CC8),
+//! bend range, RPN 6 a zone. [`techniques`] says what the mod wheel and CC18 to CC20 do.
+//!
+//! While the sustain pedal (CC64) is down, the last note goes on after its key has come up, until the pedal comes up or another key is struck, which slurs; the same key again is tongued. Left out: balance (CC8),
 //! portamento, sostenuto and soft pedal, program and bank.
 //!
 //! Source: MIDI 1.0 Detailed Specification 4.2.1 (1996), control change numbers and registered parameters; RP-015 for
@@ -26,6 +27,7 @@ pub mod breath;
 pub mod mix;
 mod said;
 pub mod snapshot;
+pub mod techniques;
 #[cfg(test)]
 mod tests;
 
@@ -38,6 +40,7 @@ use breath::{BreathChoice, BreathController};
 use mix::{Mix, MixControllers};
 use said::Said;
 use snapshot::{PRESSURE, Place, Run};
+use techniques::{TechniqueControllers, Techniques, Wheel};
 
 const BREATH: u8 = 2;
 const DATA_ENTRY: u8 = 6;
@@ -79,13 +82,13 @@ struct Channel {
     rpn: [u8; 2],
     /// Its controllers since the last note.
     run: Run,
-    /// Volume and pan, and the pedal, before the run.
-    before: (MixControllers, bool),
+    /// Volume and pan, techniques, and the pedal, before the run.
+    before: (MixControllers, TechniqueControllers, bool),
 }
 
 impl Default for Channel {
     fn default() -> Self {
-        Self { rpn: RPN_NONE, run: Run::default(), before: (MixControllers::default(), false) }
+        Self { rpn: RPN_NONE, run: Run::default(), before: Default::default() }
     }
 }
 
@@ -99,6 +102,7 @@ pub struct MidiDecoder {
     has_note_breath: bool,
     origin: Option<BreathOrigin>,
     mix: Mix,
+    techniques: Techniques,
     pedal: bool,
     notes: Notes,
     /// The keys as the player holds them, who gets the events.
@@ -149,6 +153,14 @@ impl MidiDecoder {
     /// A MIDI key comes up. Real-time safe.
     pub fn note_off(&mut self, channel: u8, key: u8) -> &[Event] {
         self.release(NoteAddress::of_key(channel % 16, key.min(127)))
+    }
+
+    /// What the mod wheel does. Real-time safe.
+    pub fn set_wheel(&mut self, wheel: Wheel) -> &[Event] {
+        self.begin();
+        self.techniques.wheel = wheel;
+        self.say_techniques();
+        self.said.events()
     }
 
     /// A note begins, with a velocity of 1..=127. Its bend, breath, volume and pan come before it. Real-time safe.
@@ -242,6 +254,10 @@ impl MidiDecoder {
 
     /// A controller that is not breath.
     fn control(&mut self, at: usize, cc: u8, value: u8) {
+        if self.techniques.controllers.set(cc, value) {
+            self.say_techniques();
+            return;
+        }
         let state = &mut self.channels[at];
         match cc {
             VOLUME => {
@@ -273,6 +289,8 @@ impl MidiDecoder {
                     self.bend_anew();
                 }
                 self.set_pedal(false);
+                self.techniques.controllers = TechniqueControllers::default();
+                self.say_techniques();
             }
             ALL_SOUND_OFF | ALL_NOTES_OFF => self.cut_all(),
             _ => {}
@@ -345,20 +363,21 @@ impl MidiDecoder {
         self.notes.heard().map(|held| usize::from(held.note.channel))
     }
 
-    /// The place of a message in its channel's run of controllers. If it shows that the run is a snapshot, volume, pan and
-    /// pedal go back to where they were before it.
+    /// The place of a message in its channel's run of controllers. If it shows that the run is a snapshot, volume, pan,
+    /// techniques and pedal go back to where they were before it.
     fn place(&mut self, at: usize, controller: u8) -> Place {
         let channel = &mut self.channels[at];
         if channel.run.is_empty() || channel.run.has(controller) {
-            channel.before = (self.mix.controllers, self.pedal);
+            channel.before = (self.mix.controllers, self.techniques.controllers, self.pedal);
         }
         let place = channel.run.place(controller);
         if place == Place::Recognised {
             channel.rpn = RPN_NONE;
-            let (controllers, pedal) = channel.before;
+            let (mix, techniques, pedal) = channel.before;
             self.breath.forget_waiting(at);
-            self.mix.controllers = controllers;
+            (self.mix.controllers, self.techniques.controllers) = (mix, techniques);
             self.remix();
+            self.say_techniques();
             self.set_pedal(pedal);
         }
         place
@@ -391,6 +410,13 @@ impl MidiDecoder {
         }
     }
 
+    /// What controllers ask of the techniques, if it has changed.
+    fn say_techniques(&mut self) {
+        for event in self.techniques.changed().into_iter().flatten() {
+            self.said.push(event);
+        }
+    }
+
     fn bend_anew(&mut self) {
         let tuning_cents = self.notes.heard().map_or(0.0, |held| held.tuning_cents);
         self.bent_cents = self.bends.cents(self.heard_channel()) + tuning_cents;
@@ -417,9 +443,11 @@ impl MidiDecoder {
         self.notes.choke(NoteAddress::default());
         self.fingers = Keys::default();
         self.said.push(Event::Panic);
-        // The player forgets its bend, wheels do not.
+        // The player forgets its bend and its techniques, wheels do not.
         self.bent_cents = 0.0;
         self.rebend();
+        self.techniques.forgotten();
+        self.say_techniques();
     }
 
     /// Keys have come up, and `before` sounded until now: what is heard now, and which keys are no longer down.

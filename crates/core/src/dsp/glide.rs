@@ -46,6 +46,11 @@ impl Glide {
         self.left == 0 && self.now == value
     }
 
+    /// Samples until it arrives; without end if it rests.
+    pub fn reach(&self) -> usize {
+        if self.left > 0 { self.left as usize } else { usize::MAX }
+    }
+
     /// The value of the next sample; after the last step exactly the target.
     #[expect(clippy::should_implement_trait, reason = "it never ends")]
     pub fn next(&mut self) -> f32 {

@@ -241,7 +241,7 @@ impl Clarinet {
 
     /// Held note, fingering and mouth pressure now. Real-time safe.
     pub fn player_state(&self) -> PlayerState {
-        self.player.state()
+        self.player.state(&self.model)
     }
 
     fn render_with(&mut self, mut out: Channels, probe: &mut Option<&mut dyn FnMut(Probe)>) {

@@ -10,6 +10,7 @@ use crate::bore::cells::networks;
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::lattice::LatticeCoeffs;
 use crate::instrument::concert_pitch::A4_HZ;
+use crate::instrument::key_pitches::KeyPitches;
 use crate::instrument::player::dynamics::PlayerModel;
 use crate::instrument::tuning_table::TuningTable;
 use crate::reed::PhysicalReed;
@@ -44,6 +45,8 @@ pub struct Model {
     pub tuning: TuningTable,
     /// What lip and breath do at a dynamic.
     pub player: PlayerModel,
+    /// What each key plays. Equal temperament unless it is set.
+    pub keys: KeyPitches,
     /// Pitch of A4 that the instrument is tuned to, Hz.
     pub a4_hz: f64,
     /// Length of the bore over that of its file. Other than 1 for another A4, or where the delay alone could not tune the
@@ -116,6 +119,7 @@ impl Model {
             cells,
             tuning,
             player: PlayerModel::FITTED,
+            keys: KeyPitches::default(),
             a4_hz,
             scale,
             air,

@@ -1,23 +1,37 @@
 //! The player: turns notes, breath and settings into holes, lip, tongue and mouth pressure, tick by tick.
 //!
 //! `breath` follows a breath source or key velocity, and [`response`] makes a mouth pressure of it: directly, or by the rule in
-//! [`dynamics`] that moves breath and lip together; there the [`ear`] pushes what is too soft. `tongue` articulates: overlapping notes are slurred (the holes move and
-//! the tongue stays away); after a gap the tongue holds the reed while the breath rises behind it, and lets go. `fingers`
-//! moves the holes, `tuning` the pitch, and `posture` holds what settings, fingering and bend ask for.
+//! [`dynamics`] that moves breath and lip together; there the [`ear`] pushes what is too soft. `tongue` articulates: overlapping
+//! notes are slurred (the holes move and the tongue stays away); after a gap the tongue holds the reed while the breath rises
+//! behind it, and lets go. `fingers` moves the holes, `tuning` the pitch, and `posture` holds what settings, fingering and bend
+//! ask for. `life` and [`vibrato`] sway all of it, `attack` shapes how a note begins, `slur` helps difficult ones.
+//!
+//! `technique` growls, flutters and covers the reed, `voicing` moves the vocal tract, `glissando` slides the fingers, and
+//! `level_keeper` blows so that the level stays where they lead.
 
+mod attack;
 mod breath;
 mod carry_on;
 pub mod dynamics;
 pub mod ear;
 mod fingers;
 mod fitted;
+mod glissando;
+mod level_keeper;
+mod life;
+mod lip_glide;
 mod onset_shift;
 mod posture;
 mod reed_glide;
 mod reed_smoothing;
 pub mod response;
+mod slur;
+mod sway;
+mod technique;
 mod tongue;
 mod tuning;
+pub mod vibrato;
+mod voicing;
 
 use crate::bore::lattice::Real;
 use crate::control::keys::Keys;
@@ -28,16 +42,27 @@ use crate::instrument::settings::{BreathResponse, Settings};
 use crate::instrument::voice::{Drive, TICK, Voice};
 use crate::reed::physical::P_REF_PA;
 use crate::units::{SoundingNote, cents};
+pub use attack::Attack;
+use attack::Onset;
 use breath::Breath;
 use dynamics::LipShape;
 use ear::Ear;
 use fingers::Fingers;
+use glissando::Slide;
+use level_keeper::{Led, LevelKeeper};
+use life::Life;
+use lip_glide::LipGlide;
 use posture::{Lags, Posture};
 use reed_glide::ReedGlide;
 use reed_smoothing::ReedSmoothing;
-use response::Response;
+use response::{Bodily, Response};
+use slur::Slur;
+use sway::{SWAY_TICKS, Sway};
+use technique::Techniques;
 use tongue::Tongue;
 use tuning::PlayedTuning;
+use vibrato::Swing;
+use voicing::Voicing;
 
 /// Time the fingers take behind the tongue, ms; slurred they take the setting's time.
 const TONGUED_FINGERS_MS: f64 = 5.0;
@@ -57,10 +82,38 @@ fn step_towards(tick_s: f64, time_s: f64) -> f64 {
     1.0 - (-tick_s / time_s).exp()
 }
 
+/// Mean square of what was heard in the last tick, Pa^2; of two channels the mean.
+fn heard_power<F: Real>(voice: &Voice<F>) -> f64 {
+    let power = |channel: &[f32; TICK]| {
+        channel.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>() / TICK as f64
+    };
+    let (left, right) = voice.heard();
+    right.map_or(power(left), |right| 0.5 * (power(left) + power(right)))
+}
+
+/// What moves breath and lip beside what is asked.
+fn sway(
+    life: &mut Life,
+    swing: &mut Swing,
+    settings: &Settings,
+    posture: &Posture,
+    tick_s: f64,
+    model: &Model,
+) -> Sway {
+    let (amount, range_db) = match settings.breath_response {
+        // A blowing machine does not live.
+        BreathResponse::Physical => (0.0, None),
+        BreathResponse::Played => (f64::from(settings.life), Some(model.player.range_db)),
+    };
+    life.step(amount, &posture.lags.life) + swing.step(&settings.vibrato, range_db, tick_s)
+}
+
 /// What the player does now.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlayerState {
-    /// The note that is held, if any.
+    /// The key that is held, if any.
+    pub key: Option<SoundingNote>,
+    /// The note that it plays.
     pub sounding: Option<SoundingNote>,
     /// Index of the fingering in place.
     pub fingering: usize,
@@ -76,6 +129,8 @@ pub struct PlayerState {
 #[derive(Clone, Debug, Default)]
 pub struct Player {
     settings: Settings,
+    /// The same with the reed on its way and under its controllers, as of when `posture` was worked out.
+    now: Settings,
     /// `None` until the next tick works it out.
     posture: Option<Posture>,
     keys: Keys,
@@ -87,7 +142,20 @@ pub struct Player {
     tuning: PlayedTuning,
     reed: ReedSmoothing,
     glide: ReedGlide,
+    techniques: Techniques,
+    voicing: Voicing,
+    slide: Option<Slide>,
+    keeper: LevelKeeper,
     bend_cents: f64,
+    /// Pitch of the key over that of its note, cents.
+    key_cents: f64,
+    lip_glide: LipGlide,
+    onset: Onset,
+    life: Life,
+    swing: Swing,
+    sway: Sway,
+    /// Ticks until `sway` moves on.
+    sway_left: u32,
 }
 
 impl Player {
@@ -99,7 +167,10 @@ impl Player {
             if self.is_resting() {
                 self.glide.settle();
             } else {
-                self.glide.begin(&self.settings, &settings);
+                // A lip that a player has shaped is where another way of blowing begins.
+                let is_other = settings.breath_response != self.settings.breath_response;
+                let lip = self.posture.as_ref().and_then(Posture::lip).filter(|_| is_other);
+                self.glide.begin(&self.settings.under_lip(lip), &settings);
             }
             self.settings = settings;
             self.posture = None;
@@ -127,10 +198,13 @@ impl Player {
     }
 
     /// Held note, fingering and mouth pressure now.
-    pub fn state(&self) -> PlayerState {
+    pub fn state(&self, model: &Model) -> PlayerState {
+        let (key, fingering) = (self.keys.last(), self.fingers.fingering().unwrap_or(0));
+        let written = model.file.fingerings.get(fingering).map(|fingering| fingering.written);
         PlayerState {
-            sounding: self.keys.last(),
-            fingering: self.fingers.fingering().unwrap_or(0),
+            key,
+            sounding: key.and(written).and_then(|written| written.sounding(model.file.transposition)),
+            fingering,
             mouth_kpa: (1e-3 * P_REF_PA * self.closing() * self.breath.gamma()) as f32,
             lip: self.posture.as_ref().and_then(Posture::lip),
             dynamic: self.response.dynamic().map(|dynamic| dynamic as f32),
@@ -157,6 +231,7 @@ impl Player {
                 self.posture = None;
             }
             Event::Reed { h, k } => self.reed.set(h, k),
+            Event::Vibrato(depth) => self.swing.set_controller(depth),
             Event::TongueSlap { strength } => self.tongue_slap(strength, model, voice),
             Event::TryHoles(tried) => {
                 self.fingers.try_holes(tried);
@@ -164,20 +239,30 @@ impl Player {
                     self.move_holes(fingering, 1e-3 * f64::from(self.settings.legato_ms), model, voice);
                 }
             }
+            Event::Technique { which, amount } => self.techniques.set(which, amount),
             // They act after the instrument.
             Event::Volume { .. } | Event::Pan { .. } => {}
             Event::Panic => self.reset(voice),
         }
     }
 
+    /// The fingering that a key plays; its pitch is that of the key from now on.
+    fn take_up(&mut self, key: SoundingNote, model: &Model) -> Option<usize> {
+        let find = |note| model.fingering_for(note);
+        let (pitch, fingering) = self.settings.reach.find(key, &model.keys, find)?;
+        self.key_cents = pitch.cents;
+        Some(fingering)
+    }
+
     fn note_on<F: Real>(&mut self, note: SoundingNote, velocity: f32, model: &Model, voice: &mut Voice<F>) {
         // A note that the instrument does not have is ignored.
-        let Some(fingering) = model.fingering_for(note) else { return };
+        let Some(fingering) = self.take_up(note, model) else { return };
         let slurred = !self.keys.is_empty();
         self.keys.press(note);
         self.breath.set_velocity(velocity);
         if !slurred {
             self.tongue.hold();
+            self.swing.begin_note();
         }
         self.finger(fingering, slurred, model, voice);
     }
@@ -188,7 +273,7 @@ impl Player {
         if !sounding {
             return;
         }
-        match self.keys.last().and_then(|last| model.fingering_for(last)) {
+        match self.keys.last().and_then(|last| self.take_up(last, model)) {
             Some(fingering) => self.finger(fingering, true, model, voice),
             None => self.tongue.stop(),
         }
@@ -206,7 +291,7 @@ impl Player {
         if !sounding {
             return;
         }
-        match self.keys.last().and_then(|last| model.fingering_for(last)) {
+        match self.keys.last().and_then(|last| self.take_up(last, model)) {
             Some(fingering) => {
                 self.tongue.hold();
                 self.finger(fingering, false, model, voice);
@@ -232,15 +317,45 @@ impl Player {
         }
     }
 
-    /// Moves the fingers to a note: slurred within the setting's time, behind the tongue quickly. A slur over a wide
-    /// leap, or into or out of the altissimo, gets a dip of the breath.
+    /// Moves the fingers to a note: slurred within the setting's time, behind the tongue quickly. The breath helps difficult
+    /// slurs with a dip.
     fn finger<F: Real>(&mut self, fingering: usize, slurred: bool, model: &Model, voice: &mut Voice<F>) {
-        if let (true, Some(from)) = (slurred, self.fingers.fingering()) {
-            let interval = cents(model.notes_hz[fingering], model.notes_hz[from]);
-            self.breath.slur(interval, model.registers[from], model.registers[fingering]);
+        let glissando_s = f64::from(self.settings.glissando_s);
+        let from = self.fingers.fingering().filter(|_| slurred);
+        let begun = self.slide.map(|slide| slide.target).or(from);
+        let slides = begun.filter(|&begun| from.is_some() && glissando_s > 0.0 && begun != fingering);
+        self.slide = slides.map(|begun| Slide::new(begun, fingering, glissando_s, model));
+        if let Some(slide) = self.slide {
+            // The lip is the higher note's all the way: a lower one's loses the register.
+            self.fingers.aim(if slide.rises() { fingering } else { slides.unwrap_or(fingering) });
+            self.posture = None;
+            return;
         }
-        let ms = if slurred { f64::from(self.settings.legato_ms) } else { TONGUED_FINGERS_MS };
-        self.move_holes(fingering, 1e-3 * ms, model, voice);
+        if !slurred {
+            return self.move_holes(fingering, 1e-3 * TONGUED_FINGERS_MS, model, voice);
+        }
+        let legato_s = 1e-3 * f64::from(self.settings.legato_ms);
+        let slur = self.fingers.fingering().map(|from| Slur {
+            interval_cents: cents(model.notes_hz[fingering], model.notes_hz[from]),
+            registers: (model.registers[from], model.registers[fingering]),
+            place: model.place(fingering),
+        });
+        match (slur, self.settings.breath_response) {
+            (Some(slur), BreathResponse::Played) => {
+                if let Some(dip) = slur.dip(self.breath.gamma()) {
+                    self.breath.dip(dip);
+                }
+                let ticks = (legato_s / self.tick_s(model)).round() as u32;
+                self.fingers.walk_to(fingering, ticks, slur.finger_share(), model, voice.lattice_mut());
+                self.posture = None;
+            }
+            (slur, _) => {
+                if let Some(Slur { interval_cents, registers: (from, to), .. }) = slur {
+                    self.breath.slur(interval_cents, from, to);
+                }
+                self.move_holes(fingering, legato_s, model, voice);
+            }
+        }
     }
 
     fn move_holes<F: Real>(&mut self, fingering: usize, time_s: f64, model: &Model, voice: &mut Voice<F>) {
@@ -256,38 +371,82 @@ impl Player {
 
     /// Advances one control tick: moves holes and delay, and returns how the reed is driven. Real-time safe.
     pub fn tick<F: Real>(&mut self, model: &Model, voice: &mut Voice<F>) -> Drive {
-        let tick_s = self.tick_s(model);
-        if self.reed.tick(tick_s) | self.glide.tick(&self.settings, tick_s) {
+        let (tick_s, is_resting) = (self.tick_s(model), self.is_resting());
+        let covers = self.techniques.tick(&self.settings, tick_s);
+        if self.reed.tick(tick_s) | self.glide.tick(&self.settings, tick_s) | covers {
             self.posture = None;
         }
-        let settings = self.glide.over(self.settings).with_reed_factors(self.reed.factors());
+        let slide = self.slide;
+        if let Some(mut slide) = slide {
+            self.fingers.slide(slide.fingers(model), model, voice.lattice_mut());
+            self.slide = slide.tick(tick_s).then_some(slide);
+            if self.slide.is_none() {
+                self.move_holes(slide.target, tick_s, model, voice);
+            }
+        }
         let fingering = self.fingers.fingering();
+        let bend_cents = self.bend_cents + self.key_cents;
+        if self.posture.is_none() {
+            self.now = self.glide.over(self.settings).with_reed_factors(self.reed.factors());
+        }
+        let settings = &self.now;
         let posture = self.posture.get_or_insert_with(|| {
             voice.lattice_mut().set_jet_loss(f64::from(settings.vent_loss));
             voice.set_jet(match settings.breath_response {
                 BreathResponse::Physical => Jet::Steady,
                 BreathResponse::Played => Jet::Pulsed,
             });
-            Posture::new(&settings, fingering.unwrap_or(0), self.bend_cents, tick_s, model)
+            let subtone = self.techniques.subtone();
+            Posture::new(settings, fingering.unwrap_or(0), bend_cents, subtone, tick_s, model)
         });
         let (key_down, tongue_holds) = (!self.keys.is_empty(), self.tongue.is_holding());
         let asked = self.breath.asked(key_down);
         self.ear.hear(voice.p_mouthpiece() / posture.closing, posture.lags.ear);
-        let ear = (self.tongue.is_away() && !self.breath.is_dipping()).then_some(&self.ear);
-        let target = self.response.tick(asked, ear, tongue_holds, &settings, posture);
-        let posture = *posture;
-        let context = TickContext { tick_s, settings: &settings, posture: &posture };
+        let led = Led::new(self.voicing.lead(), slide.is_some());
+        let ear = (led == Led::default() && self.tongue.is_away() && !self.breath.is_dipping())
+            .then_some(&self.ear);
+        self.onset.tick(tongue_holds, tick_s);
+        self.sway_left = match self.sway_left {
+            // Nobody sways what nobody holds; a bore that is moved does not fall silent.
+            _ if is_resting => 0,
+            0 => {
+                self.sway = sway(&mut self.life, &mut self.swing, settings, posture, tick_s, model);
+                SWAY_TICKS - 1
+            }
+            left => left - 1,
+        };
+        let note_lip =
+            self.lip_glide.tick(posture.note_lip(), tongue_holds || !key_down, posture.lags.fingers);
+        let bodily = Bodily { note_lip, onset: &self.onset, sway: &self.sway, settles: tongue_holds };
+        let mut target = self.response.tick(asked, ear, &bodily, settings, posture);
+        if let Some(dynamic) = self.response.dynamic() {
+            let level_db = model.player.level_db(dynamic);
+            let kept = self.keeper.tick(heard_power(voice), target, level_db, led, &posture.lags.level);
+            posture.loosen_lip(kept.lip);
+            target = kept.gamma;
+        }
+        let context = TickContext { tick_s, settings, posture };
+        let note_hz = model.notes_hz[fingering.unwrap_or(0)];
+        let bent = slide.and_then(|slide| slide.bend());
+        voice.set_tract(self.voicing.tick(settings, note_hz, bent, tick_s, model.coeffs.rate_hz));
         let lattice = voice.lattice_mut();
+        self.fingers.tick(model, lattice);
 
         self.breath.tick(target, key_down, tongue_holds, &context);
         let gamma = self.breath.gamma();
-        let hardness = self.breath.attack_hardness() / self.response.release();
-        let (p_mouth, tongue) = self.tongue.tick(gamma, hardness, &context);
-        if self.tuning.tick(fingering, gamma, &context, model, lattice) {
+        let shaken = self.techniques.shake(gamma, note_hz * self.tuning.speed(), settings, tick_s);
+        let hardness =
+            self.breath.attack_hardness() * self.response.haste(settings.attack) / self.response.release();
+        let (p_mouth, tongue) = self.tongue.tick(shaken, hardness, &context);
+        let has_other_speed = self.tuning.tick(fingering, gamma, self.sway.cents, &context, model, lattice);
+        let drive = Drive { p_mouth, tongue, noise: f64::from(settings.noise), reed: posture.reed };
+        if has_other_speed {
             // The clock's speed has changed, and with it the length of a tick.
-            let lags = Lags::new(&settings, self.tick_s(model), model.lowest_hz);
-            self.posture = Some(posture.with_lags(lags));
+            let lags = Lags::new(&self.now, self.tick_s(model), model.lowest_hz);
+            if let Some(posture) = &mut self.posture {
+                posture.lags = lags;
+            }
         }
-        Drive { p_mouth, tongue, noise: f64::from(settings.noise), reed: posture.reed }
+        drive
     }
 }

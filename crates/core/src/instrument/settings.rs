@@ -1,11 +1,20 @@
 //! What a player can set, as plain numbers in the units that a player uses. They are clamped once, where they come in.
 
 use crate::instrument::listening::Listening;
+use crate::instrument::player::Attack;
 use crate::instrument::player::dynamics::LipShape;
+use crate::instrument::player::response::ONSET;
+use crate::instrument::player::vibrato::Vibrato;
+use crate::instrument::reach::Reach;
+use crate::instrument::room::Room;
+use crate::instrument::techniques::{Techniques, Tract};
 use crate::reed::ReedLaw;
 use crate::reed::law::coupled_k;
 use crate::reed::physical::{DimensionlessReed, P_REF_PA, PhysicalReed};
 use crate::reed::strength;
+
+/// Softest and loudest breath are at least this far apart.
+const LEAST_BREATH_RANGE: f32 = 0.05;
 
 /// What a breath source sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -47,6 +56,10 @@ pub struct Settings {
     pub breath_response: BreathResponse,
     /// Curve of the played response, 0.5..=2: the dynamic is the share of breath above the threshold to this power. Default 1.
     pub breath_curve: f32,
+    /// Breath at which notes begin where the response is played, 0..=0.5. Default 4/127, the controller value 4.
+    pub breath_softest: f32,
+    /// Breath that plays fortissimo where the response is played, 0.1..=1, and at least 0.05 above the softest. Default 1.
+    pub breath_loudest: f32,
     /// Mouth pressure at full breath where the response is physical, kPa, 2..=20. Default 6, the reference reed's closing
     /// pressure.
     pub breath_full_kpa: f32,
@@ -56,6 +69,13 @@ pub struct Settings {
     pub tongue_ms: f32,
     /// Time that the fingers take between slurred notes, ms, 5..=15. Default 8.
     pub legato_ms: f32,
+    /// How much a held note lives where the breath is [played](BreathResponse::Played): slow wander of breath and lip, 0 (it
+    /// stands still)..=1 (as recorded players). Default 1.
+    pub life: f32,
+    /// Regular swing of breath and lip. Default none.
+    pub vibrato: Vibrato,
+    /// How a tongued note begins where the breath is [played](BreathResponse::Played). Default [`Attack::Normal`].
+    pub attack: Attack,
     /// Reed strength as printed on the box, 1.5..=5. It scales the stiffness. Default 2.5, the reference reed (closing
     /// pressure 6 kPa).
     pub strength: f32,
@@ -87,6 +107,21 @@ pub struct Settings {
     pub gain_db: f32,
     /// Where the instrument is heard from.
     pub listening: Listening,
+    /// Which note a key plays.
+    pub reach: Reach,
+    /// The room around the instrument, on two channels. Default none.
+    pub room: Room,
+    /// Growl, flutter tongue and subtone. All off by default.
+    pub techniques: Techniques,
+    /// The vocal tract's resonance. Off by default.
+    pub tract: Tract,
+    /// Time that a slur slides from note to note, s, 0 (the fingers move at once)..=3. Default 0.
+    pub glissando_s: f32,
+}
+
+/// A number inside its range; one that is not finite becomes the default. Real-time safe.
+pub(super) fn fix(x: f32, low: f32, high: f32, default: f32) -> f32 {
+    if x.is_finite() { x.clamp(low, high) } else { default }
 }
 
 impl Default for Settings {
@@ -94,10 +129,15 @@ impl Default for Settings {
         Self {
             breath_response: BreathResponse::Played,
             breath_curve: 1.0,
+            breath_softest: ONSET as f32,
+            breath_loudest: 1.0,
             breath_full_kpa: 6.0,
             noise: 0.3,
             tongue_ms: 2.0,
             legato_ms: 8.0,
+            life: 1.0,
+            vibrato: Vibrato::default(),
+            attack: Attack::Normal,
             strength: 2.5,
             lip: 1.0,
             zeta: 0.3,
@@ -113,6 +153,11 @@ impl Default for Settings {
             vent_loss: 2.0,
             gain_db: 0.0,
             listening: Listening::default(),
+            reach: Reach::default(),
+            room: Room::default(),
+            techniques: Techniques::default(),
+            tract: Tract::default(),
+            glissando_s: 0.0,
         }
     }
 }
@@ -121,7 +166,12 @@ impl Settings {
     /// The reference clarinet blown by a machine: breath is mouth pressure, and the pitch moves with it as the bore makes it.
     /// For measurements.
     pub fn physical() -> Self {
-        Self { breath_response: BreathResponse::Physical, tuning: Tuning::Natural, ..Self::default() }
+        Self {
+            breath_response: BreathResponse::Physical,
+            tuning: Tuning::Natural,
+            life: 0.0,
+            ..Self::default()
+        }
     }
 
     /// The law of the reed under these settings: strength sets the stiffness, the lip the opening. Real-time safe.
@@ -230,16 +280,20 @@ impl Settings {
     /// These settings with every number inside its range; a number that is not finite becomes its default. Real-time safe.
     pub fn clamped(self) -> Self {
         let d = Self::default();
-        let fix = |x: f32, low: f32, high: f32, default: f32| {
-            if x.is_finite() { x.clamp(low, high) } else { default }
-        };
+        let breath_softest = fix(self.breath_softest, 0.0, 0.5, d.breath_softest);
         Self {
             breath_response: self.breath_response,
             breath_curve: fix(self.breath_curve, 0.5, 2.0, d.breath_curve),
+            breath_softest,
+            breath_loudest: fix(self.breath_loudest, 0.1, 1.0, d.breath_loudest)
+                .max(breath_softest + LEAST_BREATH_RANGE),
             breath_full_kpa: fix(self.breath_full_kpa, 2.0, 20.0, d.breath_full_kpa),
             noise: fix(self.noise, 0.0, 1.0, d.noise),
             tongue_ms: fix(self.tongue_ms, 1.0, 20.0, d.tongue_ms),
             legato_ms: fix(self.legato_ms, 5.0, 15.0, d.legato_ms),
+            life: fix(self.life, 0.0, 1.0, d.life),
+            vibrato: self.vibrato.clamped(),
+            attack: self.attack,
             strength: fix(self.strength, 1.5, 5.0, d.strength),
             lip: fix(self.lip, 0.6, 1.4, d.lip),
             zeta: fix(self.zeta, 0.05, 0.9, d.zeta),
@@ -261,6 +315,11 @@ impl Settings {
                 height_m: fix(self.listening.height_m, -1.0, 2.0, d.listening.height_m),
                 width_deg: fix(self.listening.width_deg, 0.0, 180.0, d.listening.width_deg),
             },
+            reach: self.reach.clamped(),
+            room: self.room.clamped(),
+            techniques: self.techniques.clamped(),
+            tract: self.tract.clamped(),
+            glissando_s: fix(self.glissando_s, 0.0, 3.0, d.glissando_s),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! From the mono instrument to two channels: pan, after the instrument and its limiter.
+//! From the instrument to two channels: the [room](super::room) and the pan, after the instrument and its limiter.
 //!
 //! The law has constant power, with 0 dB on both sides in the middle: `sqrt(2) cos` on the left, `sqrt(2) sin` on the right, of
 //! an angle from 0 to 90 degrees. So a sound in the middle is the instrument's to the bit, on both channels; at a side it is
@@ -12,6 +12,7 @@ use std::f32::consts::{FRAC_PI_4, SQRT_2};
 use crate::dsp::glide::Glide;
 use crate::dsp::limiter::Limiter;
 use crate::event::{Event, Timed};
+use crate::instrument::room::{Room, RoomSound};
 
 /// Time that a change of the pan takes, s.
 const PAN_S: f64 = 0.010;
@@ -36,23 +37,36 @@ pub struct Stereo {
     sides: [Glide; 2],
     /// Changes in the block that begins now, in order of time.
     changes: Vec<(usize, f32)>,
+    room: RoomSound,
     limiter: Limiter,
 }
 
 impl Stereo {
-    /// In the middle, at a sample rate. Allocates.
+    /// In the middle, without a room, at a sample rate. Allocates.
     pub fn new(rate_hz: f64) -> Self {
         Self {
             sides: [Glide::new(1.0, PAN_S, rate_hz); 2],
             changes: Vec::with_capacity(CHANGES),
+            room: RoomSound::new(rate_hz),
             limiter: Limiter::new(rate_hz),
         }
     }
 
-    /// Back to the middle at once.
+    /// Another room from the next block on.
+    pub fn set_room(&mut self, room: &Room) {
+        self.room.set(room);
+    }
+
+    /// The room: whether it still sounds, and how long it can.
+    pub fn room(&self) -> &RoomSound {
+        &self.room
+    }
+
+    /// Back to the middle at once, in a silent room.
     pub fn reset(&mut self) {
         self.sides.iter_mut().for_each(|side| side.set(1.0));
         self.changes.clear();
+        self.room.reset();
         self.limiter.reset();
     }
 
@@ -72,14 +86,15 @@ impl Stereo {
         self.pan(left, right);
     }
 
-    /// Ends the block: pans two channels of the same length.
+    /// Ends the block: room and pan of two channels of the same length.
     pub fn pan(&mut self, left: &mut [f32], right: &mut [f32]) {
         let right = &mut right[..left.len()];
+        let in_room = self.room.add(left, right);
         let mut done = 0;
         for change in 0..=self.changes.len() {
             let next = self.changes.get(change).copied();
             let to = next.map_or(left.len(), |(at, _)| at.clamp(done, left.len()));
-            self.turn(&mut left[done..to], &mut right[done..to]);
+            self.turn(&mut left[done..to], &mut right[done..to], in_room.saturating_sub(done));
             if let Some((_, position)) = next {
                 for (side, gain) in self.sides.iter_mut().zip(gains(position)) {
                     side.go_to(gain);
@@ -91,15 +106,22 @@ impl Stereo {
     }
 
     /// Applies the pan. In the middle nothing is touched, which is decided sample by sample: the host's blocks must not show.
-    fn turn(&mut self, left: &mut [f32], right: &mut [f32]) {
-        for (left, right) in left.iter_mut().zip(right) {
-            if self.sides.iter().all(|side| side.rests_at(1.0)) && self.limiter.is_idle() {
+    /// The first `in_room` samples are of a room, which can be too loud.
+    fn turn(&mut self, left: &mut [f32], right: &mut [f32], in_room: usize) {
+        for (n, (left, right)) in left.iter_mut().zip(right).enumerate() {
+            if n >= in_room && self.sides.iter().all(|side| side.rests_at(1.0)) && self.limiter.is_idle() {
                 // Nothing changes before the next event.
                 return;
             }
             *left *= self.sides[0].next();
             *right *= self.sides[1].next();
             self.limiter.process_pair(left, right);
+            // What a room or a pan has made too small to hear costs a host much time.
+            for sample in [left, right] {
+                if sample.is_subnormal() {
+                    *sample = 0.0;
+                }
+            }
         }
     }
 }

@@ -8,6 +8,7 @@ use crate::instrument::breath_noise::{BreathNoise, Jet};
 pub use crate::instrument::control_tick::TICK;
 use crate::instrument::listening::Listening;
 use crate::instrument::outside::Outside;
+use crate::instrument::vocal_tract::{TractCoeffs, TractState};
 use crate::reed::ReedCoeffs;
 use crate::reed::ReedState;
 use crate::reed::ReedTables;
@@ -77,6 +78,9 @@ struct Mouth<F> {
     tongue: f64,
     tongue_glide: f64,
     noise: BreathNoise,
+    /// The vocal tract, unless the throat is open.
+    tract: Option<TractCoeffs>,
+    tract_state: TractState,
     outside: Outside<F>,
     probes: Option<[Probe; TICK]>,
     at: usize,
@@ -87,6 +91,7 @@ impl<F: Real> Mouth<F> {
     /// No pressure, no motion, no tongue, and the noise from its beginning.
     fn silence(&mut self) {
         self.state = ReedState::default();
+        self.tract_state = TractState::default();
         (self.p_mouth, self.p_mouth_glide, self.tongue, self.tongue_glide) = (0.0, 0.0, 0.0, 0.0);
         self.outside.silence();
         self.noise.reset();
@@ -105,15 +110,21 @@ impl<F: Real> Tip<F> for Mouth<F> {
         self.p_mouth += self.p_mouth_glide;
         self.tongue += self.tongue_glide;
         let noise = self.noise.flow(self.state.flow, self.at);
-        let p_plus = self.state.tick(
-            &self.reed,
-            self.tables,
-            self.kappa,
-            self.p_mouth,
-            p_minus.wide(),
-            noise,
-            self.tongue,
-        );
+        let p_minus = p_minus.wide();
+        // The part of the tract's impedance that acts at once is in series with the bore's.
+        let (p_mouth, kappa) = match &self.tract {
+            Some(tract) => (self.p_mouth - self.tract_state.pressure(tract), self.kappa + tract.at_once()),
+            None => (self.p_mouth, self.kappa),
+        };
+        let mut p_plus =
+            self.state.tick(&self.reed, self.tables, kappa, p_mouth, p_minus, noise, self.tongue);
+        if let Some(tract) = &self.tract {
+            // All that flows into the bore, reed's motion and noise included.
+            let flow = (p_plus - p_minus) / kappa;
+            p_plus -= tract.at_once() * flow;
+            self.state.p_mouthpiece -= tract.at_once() * flow;
+            self.tract_state.tick(tract, flow);
+        }
         F::of(p_plus)
     }
 
@@ -172,6 +183,8 @@ impl<F: Real> Voice<F> {
                 tongue: 0.0,
                 tongue_glide: 0.0,
                 noise: BreathNoise::new(rate),
+                tract: None,
+                tract_state: TractState::default(),
                 outside: Outside::new(coeffs, sources, air, loudness),
                 probes: None,
                 at: 0,
@@ -206,6 +219,14 @@ impl<F: Real> Voice<F> {
     /// The probes of the last tick, if they are recorded.
     pub fn probes(&self) -> Option<&[Probe; TICK]> {
         self.mouth.probes.as_ref()
+    }
+
+    /// Moves the vocal tract's resonance; `None` opens the throat. Real-time safe.
+    pub fn set_tract(&mut self, tract: Option<TractCoeffs>) {
+        if tract.is_none() {
+            self.mouth.tract_state = TractState::default();
+        }
+        self.mouth.tract = tract;
     }
 
     /// Chooses how the jet through the reed channel makes noise; steady at first. Real-time safe.

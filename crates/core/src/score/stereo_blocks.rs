@@ -1,6 +1,7 @@
 //! The blocks of a score on two channels, panned as the plugin pans them.
 
 use crate::event::{Event, Timed};
+use crate::instrument::room::Room;
 use crate::instrument::stereo::Stereo;
 use crate::score::play::take_before;
 use crate::score::timeline::Score;
@@ -34,6 +35,12 @@ impl<'a> StereoBlocks<'a> {
             begun: 0,
             channels: Default::default(),
         }
+    }
+
+    /// In a room.
+    pub fn in_room(mut self, room: &Room) -> Self {
+        self.stereo.set_room(room);
+        self
     }
 
     /// Left and right of the next block, of a mono sound.

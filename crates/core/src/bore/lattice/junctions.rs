@@ -181,6 +181,11 @@ impl<F: Real> Holes<F> {
         self.range[1][k] = high;
     }
 
+    /// Whether the hole in lane `k` is on its way.
+    pub(super) fn is_gliding(&self, k: usize) -> bool {
+        self.glide[k] != F::default()
+    }
+
     /// Whether the hole in lane `k` is open at all, or on its way there.
     pub(super) fn is_open(&self, k: usize) -> bool {
         self.opening[k] != F::default() || self.glide[k] != F::default()

@@ -3,8 +3,8 @@
 use crate::control::notes;
 use crate::event::Event;
 
-/// Bend, breath, volume, pan, a new key, a choke and a release of every held key.
-const MOST: usize = notes::MOST + 8;
+/// Bend, breath, volume, pan, vibrato, three techniques, a new key, a choke and a release of every held key.
+const MOST: usize = notes::MOST + 12;
 
 /// The events of the latest message.
 #[derive(Clone, Debug)]

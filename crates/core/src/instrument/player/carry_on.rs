@@ -16,10 +16,12 @@ impl Player {
             breath: from.breath.carried(),
             bend_cents: from.bend_cents,
             reed: from.reed,
+            techniques: from.techniques.carried(),
+            swing: from.swing.carried(),
             ..Self::default()
         };
         while let Some(last) = self.keys.last() {
-            let Some(fingering) = model.fingering_for(last) else {
+            let Some(fingering) = self.take_up(last, model) else {
                 self.keys.release(last);
                 continue;
             };
@@ -27,5 +29,25 @@ impl Player {
             self.tongue.carry_on(&from.tongue);
             break;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::event::Event;
+    use crate::instrument::{Clarinet, Reach, Settings};
+    use crate::units::SoundingNote;
+
+    #[test]
+    fn a_transposed_key_plays_its_note_on_the_other_instrument_too() {
+        let [mut first, mut other] = [(); 2].map(|()| Clarinet::built_in(48_000.0).unwrap());
+        // The lowest note is D3, 50: this key has no fingering of its own.
+        let settings = Settings { reach: Reach { transpose: 12, ..Reach::default() }, ..Settings::default() };
+        first.set_settings(&settings);
+        other.set_settings(&settings);
+        first.apply(Event::NoteOn { note: SoundingNote(46), velocity: 0.7 });
+        other.carry_on(&first);
+        let state = other.player_state();
+        assert_eq!((state.key, state.sounding), (Some(SoundingNote(46)), Some(SoundingNote(58))));
     }
 }

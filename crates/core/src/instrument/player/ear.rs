@@ -12,6 +12,11 @@ const PUSH: f64 = 0.13;
 /// A push raises the pressure up to here, over the closing pressure: above, notes speak at once by themselves, and
 /// harder pushing would only be an accent.
 const HARDEST: f64 = 0.55;
+/// Low notes grow more slowly, with fewer periods a second: between these places (written C4 and E3 of a B flat clarinet) the push grows by
+/// this share, and the hardest by this much. Above, an eager push squeaks where the lip hardly damps the reed.
+const LOW: (f64, f64) = (-0.6, -1.0);
+/// See [`LOW`].
+const LOW_PUSH: (f64, f64) = (1.2, 0.08);
 /// Easing off takes away at most this share of the pressure: a note must not end.
 const SOFTEST: f64 = 0.06;
 /// Distances that count, nepers: much softer is only silence, much louder another note that has not yet ended.
@@ -45,12 +50,14 @@ impl Ear {
         self.power.sqrt()
     }
 
-    /// Mouth over closing pressure with the push towards an amplitude, where `gamma` would hold it.
-    pub fn pushed(&self, gamma: f64, amplitude: f64) -> f64 {
+    /// Mouth over closing pressure with the push towards an amplitude, where `gamma` would hold it, for a
+    /// note at this [place](super::dynamics::PlayerModel::place).
+    pub fn pushed(&self, gamma: f64, amplitude: f64, place: f64) -> f64 {
         let distance =
             0.5 * ((amplitude * amplitude).max(SILENCE * SILENCE) / self.power.max(SILENCE * SILENCE)).ln();
-        let push = PUSH * distance.clamp(DISTANCES.0, DISTANCES.1);
-        (gamma + push).clamp((1.0 - SOFTEST) * gamma, gamma.max(HARDEST))
+        let low = ((LOW.0 - place) / (LOW.0 - LOW.1)).clamp(0.0, 1.0);
+        let push = PUSH * (1.0 + LOW_PUSH.0 * low) * distance.clamp(DISTANCES.0, DISTANCES.1);
+        (gamma + push).clamp((1.0 - SOFTEST) * gamma, gamma.max(HARDEST + LOW_PUSH.1 * low))
     }
 }
 
@@ -69,10 +76,10 @@ mod tests {
         };
         let right = hear(0.1);
         assert!((right.amplitude() - 0.1).abs() < 2e-3);
-        assert!((right.pushed(0.4, 0.1) - 0.4).abs() < 3e-3);
-        assert!((0.45..HARDEST).contains(&hear(0.05).pushed(0.4, 0.1)));
-        assert!((0.37..0.39).contains(&hear(0.2).pushed(0.4, 0.1)));
-        assert_eq!(Ear::default().pushed(0.4, 0.1), HARDEST);
-        assert_eq!(Ear::default().pushed(0.8, 0.5), 0.8, "a loud note speaks by itself");
+        assert!((right.pushed(0.4, 0.1, 0.0) - 0.4).abs() < 3e-3);
+        assert!((0.45..HARDEST).contains(&hear(0.05).pushed(0.4, 0.1, 0.0)));
+        assert!((0.37..0.39).contains(&hear(0.2).pushed(0.4, 0.1, 0.0)));
+        assert_eq!(Ear::default().pushed(0.4, 0.1, 0.0), HARDEST);
+        assert_eq!(Ear::default().pushed(0.8, 0.5, 0.0), 0.8, "a loud note speaks by itself");
     }
 }

@@ -1,8 +1,14 @@
 //! The fingers: which fingering is in place, and how its holes get there.
 
+use super::glissando::Between;
 use crate::bore::lattice::{Lattice, Real};
 use crate::instrument::model::Model;
 use crate::instrument::voice::TICK;
+
+/// How many fingers are on their way at a time in a slide: a finger begins where the one before is half open.
+const TOGETHER: f64 = 2.0;
+/// Holes that fingers can move: those that a set of holes has bits for.
+const HOLES: usize = 64;
 
 /// State of the fingers.
 #[derive(Clone, Copy, Debug, Default)]
@@ -11,6 +17,25 @@ pub struct Fingers {
     fingering: Option<usize>,
     /// Open holes that replace those of the fingering, one bit each.
     tried: Option<u64>,
+    /// A slur that is under way.
+    walk: Walk,
+}
+
+/// Fingers that move one after another.
+#[derive(Clone, Copy, Debug)]
+struct Walk {
+    /// Ticks until each hole begins to move; 0 for those that have begun.
+    waits: [u16; HOLES],
+    /// Ticks that each takes.
+    ticks: usize,
+    /// Ticks until the last begins.
+    left: u16,
+}
+
+impl Default for Walk {
+    fn default() -> Self {
+        Self { waits: [0; HOLES], ticks: 1, left: 0 }
+    }
 }
 
 impl Fingers {
@@ -25,6 +50,12 @@ impl Fingers {
         self.tried = tried;
     }
 
+    /// Makes a fingering the one in place while [`slide`](Self::slide) moves the holes.
+    pub fn aim(&mut self, fingering: usize) {
+        self.fingering = Some(fingering);
+        self.walk = Walk::default();
+    }
+
     /// Moves the fingers to a fingering within `ticks` control ticks; the first fingering of all is in place at once.
     pub fn move_to<F: Real>(
         &mut self,
@@ -33,6 +64,7 @@ impl Fingers {
         model: &Model,
         lattice: &mut Lattice<F>,
     ) {
+        self.walk = Walk::default();
         let is_first = self.fingering.is_none();
         self.fingering = Some(fingering);
         for hole in 0..model.coeffs.holes() {
@@ -41,6 +73,78 @@ impl Fingers {
                 lattice.set_opening(hole, opening);
             } else {
                 lattice.glide_opening(hole, opening, ticks.max(1) as usize * TICK);
+            }
+        }
+    }
+
+    /// Puts the fingers where a slide has them, within one tick: the holes that change do so one after another.
+    pub fn slide<F: Real>(&self, between: Between, model: &Model, lattice: &mut Lattice<F>) {
+        let Between { from, to, way, rises } = between;
+        let changing = |hole: &usize| (from ^ to) >> hole & 1 == 1;
+        let holes = 0..model.coeffs.holes();
+        let count = holes.clone().filter(changing).count();
+        for (n, hole) in holes.filter(changing).enumerate() {
+            // Holes are in order from the mouth.
+            let turn = if rises { count - 1 - n } else { n };
+            let own = (way * (count as f64 - 1.0 + TOGETHER) - turn as f64) / TOGETHER;
+            let own = own.clamp(0.0, 1.0);
+            lattice.glide_opening(hole, if to >> hole & 1 == 1 { own } else { 1.0 - own }, TICK);
+        }
+    }
+
+    /// Moves the fingers to a fingering one after another within `ticks` control ticks, each in a `share` of them. The hole
+    /// nearest to the bell goes first: what it does is hardly heard, and the hole that makes the new note is the last.
+    pub fn walk_to<F: Real>(
+        &mut self,
+        fingering: usize,
+        ticks: u32,
+        share: f64,
+        model: &Model,
+        lattice: &mut Lattice<F>,
+    ) {
+        if self.fingering.is_none() {
+            return self.move_to(fingering, ticks, model, lattice);
+        }
+        self.fingering = Some(fingering);
+        self.walk = Walk::default();
+        let holes = model.coeffs.holes().min(HOLES);
+        let mut moving = 0_u64;
+        for hole in 0..holes {
+            let moves =
+                lattice.is_gliding(hole) || lattice.opening(hole) != self.opening(fingering, hole, model);
+            moving |= u64::from(moves) << hole;
+        }
+        let count = moving.count_ones();
+        let share = if count > 1 { share } else { 1.0 };
+        self.walk.ticks = ((f64::from(ticks) * share) as usize).max(1);
+        let spread = (f64::from(ticks) - self.walk.ticks as f64).max(0.0) / f64::from(count.max(2) - 1);
+        let mut rank = 0.0;
+        for hole in (0..holes).rev().filter(|hole| moving >> hole & 1 == 1) {
+            self.walk.waits[hole] = 1 + (spread * rank) as u16;
+            rank += 1.0;
+        }
+        self.walk.left = (ticks + 1).min(u32::from(u16::MAX)) as u16;
+        self.step(model, lattice);
+    }
+
+    /// One control tick of fingers that move one after another.
+    pub fn tick<F: Real>(&mut self, model: &Model, lattice: &mut Lattice<F>) {
+        if self.walk.left > 0 {
+            self.step(model, lattice);
+        }
+    }
+
+    fn step<F: Real>(&mut self, model: &Model, lattice: &mut Lattice<F>) {
+        self.walk.left = self.walk.left.saturating_sub(1);
+        let Some(fingering) = self.fingering else { return };
+        for hole in 0..model.coeffs.holes().min(HOLES) {
+            match self.walk.waits[hole] {
+                0 => {}
+                1 => {
+                    self.walk.waits[hole] = 0;
+                    lattice.glide_opening(hole, self.opening(fingering, hole, model), self.walk.ticks * TICK);
+                }
+                wait => self.walk.waits[hole] = wait - 1,
             }
         }
     }

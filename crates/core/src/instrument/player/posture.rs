@@ -3,9 +3,13 @@
 use super::breath::{BREATH_END_S, BREATH_FOLLOW_S, BREATH_RISE_S};
 use super::dynamics::{LipShape, PlayerModel};
 use super::ear;
+use super::level_keeper::KeeperLags;
+use super::life::LifeLags;
+use super::lip_glide::NoteLip;
 use super::onset_shift::ReedAtNote;
 use super::response::LIP_S;
 use super::step_towards;
+use super::technique::subtone::covered;
 use crate::instrument::bend::{self, BendSplit};
 use crate::instrument::lip::{Embouchure, embouchure};
 use crate::instrument::model::Model;
@@ -15,6 +19,9 @@ use crate::reed::law::K_INIT;
 use crate::reed::physical::ZETA_REFERENCE;
 use crate::reed::{MovingReed, ReedCoeffs, ReedLaw};
 use crate::units::{Air, cents};
+
+/// Time constant of the lip from note to note over the time of the fingers.
+const LIP_SHARE: f64 = 0.4;
 
 /// Targets of the note in the fingers. The player works them out when a setting, the fingering or the bend changes, not
 /// at every tick.
@@ -29,6 +36,8 @@ pub struct Posture {
     pub reed: ReedCoeffs,
     /// Delay on top of the note's trim, rows of round trip.
     pub rows: f64,
+    /// Delay for a rise of the pitch by one cent, rows of round trip.
+    pub rows_per_cent: f64,
     /// Share of the bend that the clock makes, cents.
     pub bore_cents: f64,
     /// How fast delay, clock and breath follow.
@@ -50,6 +59,8 @@ struct Played {
     shift: (f64, f64),
     /// Dynamic of the lip in `Posture::reed`.
     lip: f64,
+    /// The note that the lip in `Posture::reed` is for.
+    note_lip: NoteLip,
     /// The last dynamic that was asked for, and what it asks of the breath.
     asked: (f64, PlayedBreath),
 }
@@ -76,8 +87,14 @@ pub struct Lags {
     pub breath_end: f64,
     /// The lip.
     pub lip: f64,
+    /// The lip from note to note.
+    pub fingers: f64,
     /// The ear.
     pub ear: f64,
+    /// Life.
+    pub life: LifeLags,
+    /// The ear for level.
+    pub level: KeeperLags,
 }
 
 impl Lags {
@@ -90,14 +107,24 @@ impl Lags {
             breath_follow: step(BREATH_FOLLOW_S),
             breath_end: step(BREATH_END_S),
             lip: step(LIP_S),
+            fingers: step(LIP_SHARE * 1e-3 * f64::from(settings.legato_ms)),
             ear: ear::share(tick_s, lowest_hz),
+            life: LifeLags::new(tick_s),
+            level: KeeperLags::new(tick_s),
         }
     }
 }
 
 impl Posture {
-    /// For a fingering under a bend, with ticks of `tick_s` seconds.
-    pub fn new(settings: &Settings, fingering: usize, bend_cents: f64, tick_s: f64, model: &Model) -> Self {
+    /// For a fingering under a bend and a lip that covers the reed by `subtone`, with ticks of `tick_s` seconds.
+    pub fn new(
+        settings: &Settings,
+        fingering: usize,
+        bend_cents: f64,
+        subtone: f64,
+        tick_s: f64,
+        model: &Model,
+    ) -> Self {
         let lip = embouchure(model.notes_hz[fingering], model.lowest_hz);
         let free = MovingReed {
             law: settings.reed_law(),
@@ -107,6 +134,7 @@ impl Posture {
             damping: lip.damping * f64::from(settings.damping),
             swept_s: model.swept_s,
         };
+        let free = covered(free, subtone);
         let offset = bend_cents
             + cents(f64::from(settings.a4_hz), model.a4_hz)
             + cents(Air::at(f64::from(settings.temperature_c)).c, model.air.c);
@@ -116,38 +144,49 @@ impl Posture {
         let rate_hz = model.coeffs.rate_hz;
         let played = match settings.breath_response {
             BreathResponse::Physical => None,
-            BreathResponse::Played => Some(Played::new(settings, &free, lip, fingering, model)),
+            BreathResponse::Played => Some(Played::new(settings, &free, lip, subtone, fingering, model)),
         };
         let mut posture = Self {
             closing: free.law.closing(),
             free_closing: free.law.closing(),
             reed: ReedCoeffs::new(free, rate_hz),
             rows: sensitivity * model.rows_for_cents(fingering, split.lip_cents),
+            rows_per_cent: sensitivity * model.rows_for_cents(fingering, 1.0),
             bore_cents: split.bore_cents,
             lags: Lags::new(settings, tick_s, model.lowest_hz),
             free,
             rate_hz,
             played,
         };
-        posture.shape_lip(0.0);
+        posture.shape_lip(0.0, posture.note_lip());
         posture
     }
 
-    /// The same for ticks of another length.
-    pub fn with_lags(self, lags: Lags) -> Self {
-        Self { lags, ..self }
+    /// Where the lip goes for this note.
+    pub fn note_lip(&self) -> NoteLip {
+        let place = self.played.as_ref().map_or(0.0, |played| played.place);
+        [self.free.resonance_hz, self.free.damping, place]
     }
 
-    /// Gives the reed the lip of a dynamic, 0..=1; nothing where the breath is physical.
-    pub fn shape_lip(&mut self, dynamic: f64) {
+    /// Gives the reed the lip of a dynamic, 0..=1, on its way to the note; nothing where the breath is physical.
+    pub fn shape_lip(&mut self, dynamic: f64, note_lip: NoteLip) {
         let Some(played) = &mut self.played else { return };
-        if played.lip == dynamic {
+        if played.lip == dynamic && played.note_lip == note_lip {
             return;
         }
-        played.lip = dynamic;
-        let reed = shaped(&self.free, &played.rule, played.place, dynamic);
+        (played.lip, played.note_lip) = (dynamic, note_lip);
+        let [resonance_hz, damping, place] = note_lip;
+        let free = MovingReed { resonance_hz, damping, ..self.free };
+        let reed = shaped(&free, &played.rule, place, dynamic);
         self.closing = reed.law.closing();
         self.reed = ReedCoeffs::new(reed, self.rate_hz);
+    }
+
+    /// Moves the lip on towards the loudest, by a share of the way.
+    pub fn loosen_lip(&mut self, share: f64) {
+        if let Some(Played { lip, note_lip, .. }) = self.played.as_ref().filter(|_| share > 0.0) {
+            self.shape_lip(lip + (1.0 - lip) * share, *note_lip);
+        }
     }
 
     /// How the lip shapes the reed now; `None` where the breath is physical.
@@ -179,7 +218,14 @@ fn shaped(free: &MovingReed, rule: &PlayerModel, place: f64, dynamic: f64) -> Mo
 }
 
 impl Played {
-    fn new(settings: &Settings, free: &MovingReed, lip: Embouchure, fingering: usize, model: &Model) -> Self {
+    fn new(
+        settings: &Settings,
+        free: &MovingReed,
+        lip: Embouchure,
+        subtone: f64,
+        fingering: usize,
+        model: &Model,
+    ) -> Self {
         let (rule, place) = (model.player, model.place(fingering));
         let note = model.tuning.notes.get(fingering).map_or_else(PlayedNote::default, |note| note.played);
         // The reed that the note was played with.
@@ -192,7 +238,8 @@ impl Played {
             damping: lip.damping * f64::from(reference.damping),
             swept_s: model.swept_s,
         };
-        let is_known = settings.reed_law() == reference.reed_law()
+        let is_known = subtone == 0.0
+            && settings.reed_law() == reference.reed_law()
             && [settings.zeta, settings.lay, settings.damping]
                 == [reference.zeta, reference.lay, reference.damping];
         let note_hz = model.notes_hz[fingering];
@@ -210,6 +257,7 @@ impl Played {
             note,
             shift: (shift(0.0), shift(1.0)),
             lip: f64::NAN,
+            note_lip: [0.0; 3],
             asked: (f64::NAN, PlayedBreath::default()),
         }
     }

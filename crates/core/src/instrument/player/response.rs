@@ -1,18 +1,21 @@
 //! From breath to mouth pressure and lip: physical or played.
 //!
-//! Physical, breath is a mouth pressure. Played, it is a dynamic: every note begins at the same small breath, [`ONSET`], and
-//! from there to full breath the dynamic goes from 0 to 1 along a curve; [`dynamics`](super::dynamics) has the rule. Below
-//! `ONSET` the pressure is below the onset of any note and falls to zero in proportion: nothing begins, and what sounded dies in a
+//! Physical, breath is a mouth pressure. Played, it is a dynamic: every note begins at the same breath, the *softest* of the
+//! settings, and from there to the *loudest* the dynamic goes from 0 to 1 along a curve; [`dynamics`](super::dynamics) has the
+//! rule. Below the softest the pressure is below the onset of any note and falls to zero in proportion: nothing begins, and what sounded dies in a
 //! tenth of a second.
 
+use super::attack::{Attack, Onset};
 use super::breath::Asked;
 use super::dynamics::LOWEST_ONSET;
 use super::ear::Ear;
+use super::lip_glide::NoteLip;
 use super::posture::Posture;
+use super::sway::Sway;
 use crate::instrument::settings::{BreathResponse, Settings};
 use crate::reed::physical::P_REF_PA;
 
-/// Breath at which every note begins, 0..1: the controller value 4 of 127, above what a sensor at rest sends. Breath comes in
+/// Breath at which every note begins unless another is set, 0..1: the controller value 4 of 127, above what a sensor at rest sends. Breath comes in
 /// single precision; in double precision this would lie just above the controller's 4.
 pub const ONSET: f64 = (4.0_f32 / 127.0) as f64;
 /// Mouth pressure over the closing pressure for velocity 0 and 1 where the breath is physical: just above the threshold, and
@@ -28,6 +31,18 @@ const SOFT_RELEASE: f64 = 3.0;
 /// The lip stays where it is for a smaller change of the dynamic: 0.003 dB.
 const STILL: f64 = 1e-4;
 
+/// What a player's body does beside what is asked.
+pub struct Bodily<'a> {
+    /// The tongued note that begins.
+    pub onset: &'a Onset,
+    /// The lip on its way to the note.
+    pub note_lip: NoteLip,
+    /// How breath and lip sway.
+    pub sway: &'a Sway,
+    /// Nothing sounds yet, so that the lip may be in place at once.
+    pub settles: bool,
+}
+
 /// Where the lip is.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Response {
@@ -40,32 +55,38 @@ pub fn breath_of_dynamic(dynamic: f64) -> f64 {
     ONSET + (1.0 - ONSET) * dynamic
 }
 
-/// Breath, 0..=1, as a dynamic, and its share of [`ONSET`] where it is below.
-fn dynamic(breath: f64, curve: f64) -> (f64, f64) {
-    let above = ((breath - ONSET) / (1.0 - ONSET)).clamp(0.0, 1.0);
+/// Breath, 0..=1, as a dynamic, and its share of the softest breath where it is below.
+pub fn dynamic(breath: f64, settings: &Settings) -> (f64, f64) {
+    let [softest, loudest, curve] =
+        [settings.breath_softest, settings.breath_loudest, settings.breath_curve].map(f64::from);
+    let above = ((breath - softest) / (loudest - softest)).clamp(0.0, 1.0);
     let above = if curve == 1.0 { above } else { above.powf(curve) };
-    (above, (breath / ONSET).min(1.0))
+    (above, if softest > 0.0 { (breath / softest).min(1.0) } else { 1.0 })
 }
 
 impl Response {
-    /// Mouth over closing pressure that is asked for, and the posture's lip moved towards it. `settles`: nothing sounds yet, so
-    /// that the lip may be in place at once. `ear`: what the player hears, if anything is to be heard of the note. Real-time
-    /// safe.
+    /// Mouth over closing pressure that is asked for, and the posture's lip moved towards it. `ear`: what the player
+    /// hears, if anything is to be heard of the note. Real-time safe.
     pub fn tick(
         &mut self,
         asked: Asked,
         ear: Option<&Ear>,
-        settles: bool,
+        bodily: &Bodily<'_>,
         settings: &Settings,
         posture: &mut Posture,
     ) -> f64 {
         match settings.breath_response {
             BreathResponse::Physical => {
                 self.lip = None;
-                physical(asked, settings, posture.closing)
+                physical(asked, settings, posture.closing) * (1.0 + bodily.sway.dynamic)
             }
-            BreathResponse::Played => self.played(asked, ear, settles, settings, posture),
+            BreathResponse::Played => self.played(asked, ear, bodily, settings, posture),
         }
+    }
+
+    /// How much faster the tongue lets go for an attack, as a factor.
+    pub fn haste(&self, attack: Attack) -> f64 {
+        self.lip.map_or(1.0, |_| attack.release())
     }
 
     /// How much more slowly the tongue lets go of a soft note than of a loud one, as a factor: a quick release would be louder
@@ -79,39 +100,37 @@ impl Response {
         self.lip
     }
 
-    /// Dynamic of the lip, 0..=1.
-    pub fn lip(&self) -> f64 {
-        self.lip.unwrap_or(0.0)
-    }
-
     fn played(
         &mut self,
         asked: Asked,
         ear: Option<&Ear>,
-        settles: bool,
+        bodily: &Bodily<'_>,
         settings: &Settings,
         posture: &mut Posture,
     ) -> f64 {
         let (wanted, share) = match asked {
             // The lip stays while the breath ends.
-            Asked::Nothing => (self.lip(), 0.0),
-            Asked::Level(level) => dynamic(level, f64::from(settings.breath_curve)),
+            Asked::Nothing => (self.lip.unwrap_or(0.0), 0.0),
+            Asked::Level(level) => dynamic(level, settings),
             Asked::Velocity(velocity) => {
                 let (soft, loud) = VELOCITY_DYNAMIC;
                 (soft + (loud - soft) * velocity, 1.0)
             }
         };
+        let wanted = bodily.onset.shaped(settings.attack, wanted);
         let lip = match self.lip {
-            Some(lip) if !settles => lip + (wanted - lip) * posture.lags.lip,
+            Some(lip) if !bodily.settles => lip + (wanted - lip) * posture.lags.lip,
             _ => wanted,
         };
         let lip = if (lip - wanted).abs() < STILL { wanted } else { lip };
         self.lip = Some(lip);
-        posture.shape_lip(lip);
-        let breath = posture.played_breath(wanted);
+        let [resonance_hz, damping, place] = bodily.note_lip;
+        let note_lip = [resonance_hz * (1.0 + bodily.sway.resonance), damping, place];
+        posture.shape_lip(bodily.sway.of(lip), note_lip);
+        let breath = posture.played_breath(bodily.sway.of(wanted));
         match ear {
             _ if share < 1.0 => share * LOWEST_ONSET,
-            Some(ear) => ear.pushed(breath.gamma, breath.amplitude),
+            Some(ear) => ear.pushed(breath.gamma, breath.amplitude, place),
             None => breath.gamma,
         }
     }
@@ -134,19 +153,36 @@ mod tests {
 
     #[test]
     fn breath_begins_at_four_and_ends_at_127() {
-        for curve in [0.5, 1.0, 2.0] {
-            assert_eq!(dynamic(ONSET, curve), (0.0, 1.0));
-            assert_eq!(dynamic(1.0, curve).0, 1.0);
-            let curve: Vec<f64> = (4..=127).map(|cc| dynamic(f64::from(cc) / 127.0, curve).0).collect();
+        let d = Settings::default();
+        for breath_curve in [0.5, 1.0, 2.0] {
+            let settings = Settings { breath_curve, ..d };
+            assert_eq!(dynamic(ONSET, &settings), (0.0, 1.0));
+            assert_eq!(dynamic(1.0, &settings).0, 1.0);
+            let curve: Vec<f64> = (4..=127).map(|cc| dynamic(f64::from(cc) / 127.0, &settings).0).collect();
             assert!(curve.is_sorted_by(|a, b| a < b));
         }
         assert_eq!(
-            dynamic(f64::from(4.0_f32 / 127.0), 1.0),
+            dynamic(f64::from(4.0_f32 / 127.0), &d),
             (0.0, 1.0),
             "the controller's own 4 begins the note"
         );
-        assert!((dynamic(breath_of_dynamic(0.3), 1.0).0 - 0.3).abs() < 1e-12);
-        assert_eq!(dynamic(0.5 * ONSET, 1.0), (0.0, 0.5));
-        assert_eq!(dynamic(0.0, 1.0), (0.0, 0.0));
+        assert!((dynamic(breath_of_dynamic(0.3), &d).0 - 0.3).abs() < 1e-12);
+        assert_eq!(dynamic(0.5 * ONSET, &d), (0.0, 0.5));
+        assert_eq!(dynamic(0.0, &d), (0.0, 0.0));
+    }
+
+    #[test]
+    fn a_controller_that_never_reaches_its_ends_plays_all_dynamics() {
+        let settings = Settings { breath_softest: 0.125, breath_loudest: 0.75, ..Settings::default() };
+        assert_eq!(dynamic(0.125, &settings), (0.0, 1.0));
+        assert_eq!(dynamic(0.0625, &settings), (0.0, 0.5));
+        assert_eq!(dynamic(0.4375, &settings).0, 0.5);
+        assert_eq!(dynamic(0.75, &settings).0, 1.0);
+        assert_eq!(dynamic(1.0, &settings).0, 1.0);
+        let no_rest = Settings { breath_softest: 0.0, ..settings };
+        assert_eq!(dynamic(0.0, &no_rest), (0.0, 1.0), "every breath sounds");
+        // Ends the wrong way round are apart all the same.
+        let crossed = Settings { breath_softest: 0.5, breath_loudest: 0.2, ..settings }.clamped();
+        assert!(crossed.breath_loudest > crossed.breath_softest);
     }
 }

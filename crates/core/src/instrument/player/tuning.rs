@@ -34,11 +34,12 @@ impl PlayedTuning {
     }
 
     /// Moves delay and clock; whether the speed of the clock has changed. `gamma` is the mouth pressure over the closing
-    /// pressure.
+    /// pressure, `sway_cents` what the lip adds.
     pub fn tick<F: Real>(
         &mut self,
         fingering: Option<usize>,
         gamma: f64,
+        sway_cents: f64,
         context: &TickContext<'_>,
         model: &Model,
         lattice: &mut Lattice<F>,
@@ -49,7 +50,7 @@ impl PlayedTuning {
             Tuning::Natural => fingered(),
             Tuning::Tempered => posture.played_rows().unwrap_or_else(fingered),
         };
-        let target = trim + posture.rows;
+        let target = trim + posture.rows + sway_cents * posture.rows_per_cent;
         // The delay follows within the time the fingers take; the first note has it at once.
         let first = self.rows.is_none();
         match &mut self.rows {

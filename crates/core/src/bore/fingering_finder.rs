@@ -1,0 +1,270 @@
+//! Looks through every fingering that fingers and keys can make, for a note, a trill or two notes at once.
+//!
+//! The [`mechanism`] says which holes the fingers can open together; the [survey](TransferMatrix::survey) finds all resonances
+//! of all these fingerings by transfer matrices, within seconds. A note is ranked by what a player asks of it: in tune, easy to blow,
+//! in no doubt about its register, and easy for the fingers. Dickens, France, Smith & Wolfe (2007) did the same for 39744 fingerings
+//! (The virtual clarinet, Acoustics Australia 35).
+//!
+//! Left out: the vocal tract, and the reed's own pull on the pitch.
+
+pub mod mechanism;
+
+use std::ops::ControlFlow;
+
+use crate::bore::instrument_file::{Fingering, HoleKind, InstrumentFile};
+use crate::bore::transfer_matrix::{Resonance, TransferMatrix, threshold_gamma};
+use crate::units::{Air, WrittenNote, cents};
+use mechanism::{Grip, Mechanism};
+
+/// Embouchure of the thresholds, the default of the instrument.
+const ZETA: f64 = 0.3;
+/// How far off a fingering may be to be found at all, cents: what lips can pull (docs/bend.md).
+const FARTHEST_CENTS: f64 = 40.0;
+/// What a lip holds without effort, cents: a note is easily let down, hardly pushed up.
+const LIP_CENTS: [f64; 2] = [-5.0, 12.0];
+/// Height over the next lower resonance from which no doubt is left, dB.
+pub const SURE_DB: f64 = 6.0;
+/// One finger that changes the pitch by less than this, cents, makes no other fingering.
+const SAME_CENTS: f64 = 3.0;
+/// Fingerings of each note that a trill may use.
+const TRILL_FINGERINGS: usize = 60;
+/// Least distance of a multiphonic's upper note from the harmonics of its lower one, cents: a quarter tone and more.
+const INHARMONIC_CENTS: f64 = 60.0;
+/// Least ratio of its two resonances: nearer ones beat as one rough note.
+const LEAST_RATIO: f64 = 1.2;
+/// By how much the one may be higher than the other, dB.
+const MOST_UNEVEN_DB: f64 = 6.0;
+/// Multiphonics whose notes are nearer than this, cents, are taken as one.
+const ALIKE_CENTS: f64 = 35.0;
+
+/// All fingerings of an instrument with their resonances.
+#[derive(Debug)]
+pub struct FingeringFinder {
+    transposition: i8,
+    /// Holes that fingers cover, from the top.
+    finger_holes: Vec<usize>,
+    grips: Vec<Grip>,
+    resonances: Vec<Vec<Resonance>>,
+    /// What the chart has for each note.
+    chart: Vec<(WrittenNote, Grip)>,
+}
+
+/// A fingering for a note.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// Where the holes are open, and who opens them.
+    pub grip: Grip,
+    /// What the fingers press.
+    pub fingers: String,
+    /// Where it plays, Hz.
+    pub f_hz: f64,
+    /// How far that is from the note, cents.
+    pub cents: f64,
+    /// Mouth pressure at which it begins to sound, over the closing pressure of the reed.
+    pub gamma_on: f64,
+    /// Which of its resonances plays, from 1.
+    pub mode: usize,
+    /// Height of that resonance over the next lower one, dB, at most [`SURE_DB`]: below 0 the lower note may sound instead.
+    pub evenness_db: f64,
+    /// What the ranking goes by, from 0, the best.
+    pub cost: f64,
+}
+
+/// A fingering on which two notes may sound at once.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Multiphonic {
+    /// Where the holes are open, and who opens them.
+    pub grip: Grip,
+    /// What the fingers press.
+    pub fingers: String,
+    /// The two highest resonances, the lower one first, Hz.
+    pub f_hz: [f64; 2],
+    /// How much higher the one is than the other, dB.
+    pub uneven_db: f64,
+    /// Threshold of the weaker one.
+    pub gamma_on: f64,
+    /// What the ranking goes by, from 0, the best.
+    pub cost: f64,
+}
+
+/// What one of these is worth in cost: see [`FingeringFinder::best`].
+mod worth {
+    /// A cent beyond what a lip holds without effort; one within it.
+    pub const CENT: f64 = 0.1;
+    pub const CENT_WITHIN: f64 = 0.02;
+    /// A threshold higher by a tenth of the closing pressure.
+    pub const GAMMA: f64 = 10.0;
+    /// 6 dB less over the next lower resonance, which can take over.
+    pub const DOUBT_DB: f64 = 1.0 / 6.0;
+    /// 3 dB between the two resonances of a multiphonic.
+    pub const UNEVEN_DB: f64 = 1.0 / 3.0;
+    /// A key besides the finger holes.
+    pub const EFFORT: f64 = 0.5;
+    /// A closed hole below an open one.
+    pub const FORK: f64 = 0.5;
+    /// A finger that moves on the way from the note beside, in the chart.
+    pub const WAY: f64 = 0.5;
+    /// A finger more that moves in a trill.
+    pub const MOVE: f64 = 1.0;
+}
+
+/// One bit a hole, set if it is open, in the order of the file from the lowest bit.
+pub fn bits(open: &[bool]) -> u64 {
+    open.iter().rev().fold(0, |bits, &open| bits << 1 | u64::from(open))
+}
+
+impl FingeringFinder {
+    /// Works out all fingerings of an instrument: some seconds. `on` hears the share done and may end it, then the answer is
+    /// `None`. Allocates.
+    pub fn new(file: &InstrumentFile, air: Air, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Option<Self> {
+        let grips = Mechanism::boehm().grips(file);
+        let open: Vec<u64> = grips.iter().map(|grip| grip.open).collect();
+        let model = TransferMatrix::new(file, air);
+        let resonances = model.survey(&open, file.reed_volume_m3, on)?;
+        let fingers = file.holes.iter().enumerate().filter(|(_, hole)| hole.kind == HoleKind::Finger);
+        let finger_holes = fingers.map(|(hole, _)| hole).collect();
+        let of_chart = |fingering: &Fingering| {
+            let at = grips.binary_search_by_key(&bits(&fingering.open), |grip| grip.open).ok()?;
+            Some((fingering.written, grips[at]))
+        };
+        let chart = file.fingerings.iter().filter_map(of_chart).collect();
+        Some(Self { transposition: file.transposition, finger_holes, grips, resonances, chart })
+    }
+
+    /// What the chart of the instrument has for a note, if the fingers can do it.
+    pub fn of_chart(&self, written: WrittenNote) -> Option<&Grip> {
+        self.chart.iter().find(|(note, _)| *note == written).map(|(_, grip)| grip)
+    }
+
+    /// Number of different fingerings that were looked through.
+    pub fn len(&self) -> usize {
+        self.grips.len()
+    }
+
+    /// Whether the instrument has no fingering, which no instrument file allows.
+    pub fn is_empty(&self) -> bool {
+        self.grips.is_empty()
+    }
+
+    /// Fingerings that play a written note, best first. Those that one needless key makes of a better one are left out.
+    ///
+    /// A cost of 1 is 10 cents beyond what a lip holds; a threshold higher by a tenth of the closing pressure; 6 dB less over the
+    /// next lower resonance; two keys besides the finger holes; two closed holes below open ones; or two fingers that move from the notes beside,
+    /// as the chart has them.
+    pub fn best(&self, written: WrittenNote, count: usize) -> Vec<Found> {
+        let Some(sounding) = written.sounding(self.transposition) else { return Vec::new() };
+        let wanted_hz = sounding.frequency_hz(440.0);
+        let mut found: Vec<Found> =
+            (0..self.grips.len()).filter_map(|grip| self.found(grip, wanted_hz)).collect();
+        let beside = [written.0.checked_sub(1), written.0.checked_add(1)]
+            .map(|note| self.of_chart(WrittenNote(note?)));
+        let beside: Vec<&Grip> = beside.into_iter().flatten().collect();
+        for found in &mut found {
+            let moves: usize = beside.iter().map(|grip| grip.moves(&found.grip)).sum();
+            found.cost += worth::WAY * moves as f64 / beside.len().max(1) as f64;
+        }
+        found.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(a.grip.open.cmp(&b.grip.open)));
+        let mut best: Vec<Found> = Vec::new();
+        for one in found {
+            let same = |better: &Found| {
+                better.grip.moves(&one.grip) == 1 && (better.cents - one.cents).abs() < SAME_CENTS
+            };
+            if best.len() < count && !best.iter().any(same) {
+                best.push(Found { fingers: Mechanism::boehm().words(&one.grip), ..one });
+            }
+        }
+        best
+    }
+
+    /// Pairs of fingerings for two notes, those first between which the fewest fingers move, then by cost.
+    pub fn trills(&self, written: WrittenNote, to: WrittenNote, count: usize) -> Vec<(Found, Found)> {
+        let [from, to] = [written, to].map(|written| self.best(written, TRILL_FINGERINGS));
+        let mut pairs: Vec<(&Found, &Found)> =
+            from.iter().flat_map(|from| to.iter().map(move |to| (from, to))).collect();
+        let cost = |(from, to): &(&Found, &Found)| {
+            from.cost + to.cost + worth::MOVE * from.grip.moves(&to.grip).saturating_sub(1) as f64
+        };
+        pairs.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+        pairs.into_iter().take(count).map(|(from, to)| (from.clone(), to.clone())).collect()
+    }
+
+    /// Fingerings whose two strongest resonances belong to no one note, the most even ones first: what may sound as a
+    /// multiphonic. Only playing tells, see [`measure::multiphonics`](crate::measure::multiphonics). No two that are nearly the
+    /// same in both pitches.
+    pub fn multiphonics(&self, count: usize) -> Vec<Multiphonic> {
+        let mut all: Vec<Multiphonic> =
+            (0..self.grips.len()).filter_map(|grip| self.multiphonic(grip)).collect();
+        all.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(a.grip.open.cmp(&b.grip.open)));
+        let mut found: Vec<Multiphonic> = Vec::new();
+        for one in all {
+            let near = |other: &Multiphonic| {
+                one.f_hz.iter().zip(&other.f_hz).all(|(a, b)| cents(*a, *b).abs() < ALIKE_CENTS)
+            };
+            if found.len() < count && !found.iter().any(near) {
+                found.push(Multiphonic { fingers: Mechanism::boehm().words(&one.grip), ..one });
+            }
+        }
+        found
+    }
+
+    fn found(&self, at: usize, wanted_hz: f64) -> Option<Found> {
+        let (grip, resonances) = (self.grips[at], &self.resonances[at]);
+        let off = |resonance: &Resonance| cents(f64::from(resonance.f_hz), wanted_hz);
+        let (index, played) =
+            resonances.iter().enumerate().min_by(|a, b| off(a.1).abs().total_cmp(&off(b.1).abs()))?;
+        let off = off(played);
+        if off.abs() > FARTHEST_CENTS {
+            return None;
+        }
+        let lower = index.checked_sub(1).map(|below| resonances[below].height);
+        let evenness_db =
+            lower.map_or(SURE_DB, |lower| 20.0 * f64::from(played.height / lower).log10()).min(SURE_DB);
+        let gamma_on = threshold_gamma(f64::from(played.height), ZETA);
+        let beyond = (off - LIP_CENTS[1]).max(LIP_CENTS[0] - off).max(0.0);
+        let cost = worth::CENT * beyond
+            + worth::CENT_WITHIN * off.abs()
+            + worth::GAMMA * (gamma_on - 1.0 / 3.0)
+            + worth::DOUBT_DB * (SURE_DB - evenness_db)
+            + worth::EFFORT * f64::from(grip.effort)
+            + worth::FORK * self.forks(grip.open) as f64;
+        let f_hz = f64::from(played.f_hz);
+        Some(Found {
+            grip,
+            fingers: String::new(),
+            f_hz,
+            cents: off,
+            gamma_on,
+            mode: index + 1,
+            evenness_db,
+            cost,
+        })
+    }
+
+    /// Closed finger holes just below open ones.
+    fn forks(&self, open: u64) -> usize {
+        let is_open = |hole: usize| open >> hole & 1 == 1;
+        self.finger_holes.windows(2).filter(|pair| is_open(pair[0]) && !is_open(pair[1])).count()
+    }
+
+    fn multiphonic(&self, at: usize) -> Option<Multiphonic> {
+        let grip = self.grips[at];
+        let mut strong = self.resonances[at].clone();
+        strong.sort_by(|a, b| b.height.total_cmp(&a.height));
+        let [first, second, ..] = strong[..] else { return None };
+        let [low, high] = if first.f_hz < second.f_hz { [first, second] } else { [second, first] };
+        let ratio = f64::from(high.f_hz / low.f_hz);
+        // Cents to the nearest harmonic of the lower one, which would only colour its note.
+        let inharmonic = cents(ratio, ratio.round()).abs();
+        let uneven_db = 20.0 * f64::from(first.height / second.height).log10();
+        if inharmonic < INHARMONIC_CENTS || ratio < LEAST_RATIO || uneven_db > MOST_UNEVEN_DB {
+            return None;
+        }
+        let gamma_on = threshold_gamma(f64::from(second.height), ZETA);
+        let cost = worth::UNEVEN_DB * uneven_db + worth::EFFORT * f64::from(grip.effort);
+        let f_hz = [low, high].map(|resonance| f64::from(resonance.f_hz));
+        Some(Multiphonic { grip, fingers: String::new(), f_hz, uneven_db, gamma_on, cost })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,68 @@
+use super::*;
+use crate::bore::alternate_fingerings::fingering_choices;
+use std::sync::LazyLock;
+
+static FILE: LazyLock<InstrumentFile> = LazyLock::new(InstrumentFile::built_in);
+static FINDER: LazyLock<FingeringFinder> = LazyLock::new(|| {
+    FingeringFinder::new(&FILE, Air::default(), &mut |_| ControlFlow::Continue(())).unwrap()
+});
+
+/// Dickens et al. (2007) looked through 39744.
+#[test]
+fn no_usual_fingering_is_missed() {
+    assert!(FINDER.len() > 39_744, "{}", FINDER.len());
+    for choice in fingering_choices(&FILE) {
+        let open = bits(&choice.open);
+        assert!(FINDER.grips.iter().any(|grip| grip.open == open), "{}: {}", choice.written, choice.fingers);
+    }
+    assert!(FINDER.grips.is_sorted_by_key(|grip| grip.open));
+}
+
+/// Up to G#6 players agree on fingerings; above, charts differ.
+#[test]
+fn what_players_do_is_found_among_the_first_five() {
+    let notes: Vec<WrittenNote> = (52..=92).map(WrittenNote).collect();
+    let known = |note: &&WrittenNote| {
+        let chart = FINDER.of_chart(**note).unwrap();
+        FINDER.best(**note, 5).iter().any(|found| found.grip.open == chart.open)
+    };
+    let found = notes.iter().filter(known).count();
+    assert!(notes.len() == 41 && found >= 38, "{found} of {}", notes.len());
+}
+
+#[test]
+fn the_highest_notes_have_fingerings_in_tune_that_speak() {
+    for note in [95, 97] {
+        let best = FINDER.best(WrittenNote(note), 5);
+        let good = |found: &&Found| found.cents.abs() < 10.0 && found.gamma_on < 0.45;
+        assert!(best.iter().any(|found| good(&found)), "{note}: {best:?}");
+    }
+}
+
+#[test]
+fn trills_move_few_fingers() {
+    // B5 and C6: one finger.
+    let (from, to) = FINDER.trills(WrittenNote(83), WrittenNote(84), 1).remove(0);
+    assert_eq!(from.grip.moves(&to.grip), 1, "{} to {}", from.fingers, to.fingers);
+    for note in 52..90 {
+        let trills = FINDER.trills(WrittenNote(note), WrittenNote(note + 2), 3);
+        assert!(!trills.is_empty(), "{note}");
+    }
+}
+
+#[test]
+fn multiphonics_are_of_no_one_harmonic_series() {
+    let found = FINDER.multiphonics(30);
+    assert_eq!(found.len(), 30);
+    for one in &found {
+        let ratio = one.f_hz[1] / one.f_hz[0];
+        assert!(cents(ratio, ratio.round()).abs() >= INHARMONIC_CENTS && one.uneven_db >= 0.0, "{one:?}");
+    }
+}
+
+#[test]
+fn unknown_holes_are_left_as_they_are_at_rest() {
+    let mut file = FILE.clone();
+    file.holes.iter_mut().for_each(|hole| hole.name.insert(0, 'x'));
+    assert_eq!(Mechanism::boehm().grips(&file).len(), 1);
+}

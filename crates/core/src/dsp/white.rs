@@ -1,0 +1,34 @@
+//! White noise with a seed, so that every render repeats.
+
+/// Numbers without a pattern that can be heard: Knuth's MMIX generator (linear congruential, 64 bits).
+#[derive(Clone, Copy, Debug)]
+pub struct White(u64);
+
+impl White {
+    /// From a seed; any will do.
+    pub const fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    /// The next number, uniform, with mean 0 and variance 1. Real-time safe.
+    #[expect(clippy::should_implement_trait, reason = "it never ends")]
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        1.732_050_807_568_877_2 / (1_u64 << 63) as f64 * (self.0 as i64) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_has_no_mean_the_variance_of_1_and_no_memory() {
+        let mut white = White::new(1);
+        let all: Vec<f64> = (0..100_000).map(|_| white.next()).collect();
+        let mean = |f: &dyn Fn(usize) -> f64| (1..all.len()).map(f).sum::<f64>() / (all.len() - 1) as f64;
+        assert!(mean(&|n| all[n]).abs() < 0.01);
+        assert!((mean(&|n| all[n] * all[n]) - 1.0).abs() < 0.01);
+        assert!(mean(&|n| all[n] * all[n - 1]).abs() < 0.01);
+    }
+}

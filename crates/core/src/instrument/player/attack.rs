@@ -1,0 +1,59 @@
+//! Attacks: how the dynamic gets to where it is asked to be when a note is tongued.
+//!
+//! The partials of a note bloom one after another because breath and lip rise: a soft attack begins well below the asked
+//! dynamic, where there is hardly more than the fundamental. A hard one begins above it and eases off. A normal one is there
+//! at once: the air column alone makes its growth.
+
+/// How a tongued note begins where the breath is [played](crate::instrument::BreathResponse::Played).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Attack {
+    /// The note grows: upper partials come a tenth of a second and more after the fundamental.
+    Soft,
+    /// The note is there as soon as the air column lets it.
+    #[default]
+    Normal,
+    /// The note begins with an accent.
+    Hard,
+}
+
+/// Soft: the share of the dynamic that the beginning lacks, and the time constant with which it comes, s: chosen for the delays of
+/// recorded partials, see `docs/tone.md`.
+const SOFT: (f64, f64) = (0.3, 0.15);
+/// Hard: what the dynamic begins above, and the time until that is gone, s.
+const HARD: (f64, f64) = (0.2, 0.1);
+/// Hard: how much more quickly the tongue lets go.
+const HARD_RELEASE: f64 = 2.0;
+
+/// State: time since the tongue held the reed, s.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Onset {
+    since_s: f64,
+}
+
+impl Attack {
+    /// Factor on the speed with which the tongue lets go.
+    pub fn release(self) -> f64 {
+        if self == Self::Hard { HARD_RELEASE } else { 1.0 }
+    }
+}
+
+impl Onset {
+    /// Time goes on by a tick; while the tongue holds the reed before a note it stands still.
+    pub fn tick(&mut self, tongue_holds: bool, tick_s: f64) {
+        self.since_s = if tongue_holds { 0.0 } else { self.since_s + tick_s };
+    }
+
+    /// The dynamic to play now where `dynamic`, 0..=1, is asked for. Real-time safe.
+    pub fn shaped(&self, attack: Attack, dynamic: f64) -> f64 {
+        let tail = |time_s: f64| (-self.since_s / time_s).exp();
+        let left = |time_s: f64| {
+            let left = (1.0 - self.since_s / time_s).max(0.0);
+            left * left * (3.0 - 2.0 * left)
+        };
+        match attack {
+            Attack::Normal => dynamic,
+            Attack::Soft => dynamic * (1.0 - SOFT.0 * tail(SOFT.1)),
+            Attack::Hard => (dynamic + HARD.0 * left(HARD.1)).min(1.0),
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! Life: the slow wander of a player's breath and lip, without which a held note stands still.
+//!
+//! Recorded held notes wander with a spectrum near 1/f. Here it is made of three first-order processes (of Ornstein and
+//! Uhlenbeck) with corners a factor of six apart, whose spectra add up to nearly that. One such sum moves the dynamic, and with
+//! it breath and lip together; another moves the reed's resonance under the lip, and with it the pitch and the upper partials.
+//! The white noise behind them has a seed, so every render repeats. Left out: that a player corrects what wanders too far, and that it is not the same on all notes.
+
+use super::sway::{SWAY_TICKS, Sway};
+use crate::dsp::white::White;
+
+/// Corners of the processes, Hz.
+const CORNERS_HZ: [f64; 3] = [0.12, 0.8, 5.0];
+/// Their variances.
+const VARIANCES: [f64; 3] = [4.0, 1.0, 0.3];
+/// The sum goes through a low-pass of this corner, Hz, so that no step of it is heard.
+const SMOOTH_HZ: f64 = 12.0;
+/// What a unit of the sum moves: the dynamic, and the reed's resonance as a share of it. Chosen for the medians of recorded held notes, see
+/// `docs/tone.md`.
+const DYNAMIC: f64 = 0.0116;
+/// See [`DYNAMIC`].
+const RESONANCE: f64 = 0.0148;
+/// Seed of the noise: any constant does.
+const SEED: u64 = 0x2545_F491_4F6C_DD1D;
+
+/// How the processes move in one step of [`SWAY_TICKS`].
+#[derive(Clone, Copy, Debug)]
+pub struct LifeLags {
+    /// Share of the way back to 0, and noise that is added, for each process.
+    processes: [(f64, f64); 3],
+    smooth: f64,
+}
+
+impl LifeLags {
+    /// For ticks of `tick_s` seconds.
+    pub fn new(tick_s: f64) -> Self {
+        let share = |hz: f64| -(-std::f64::consts::TAU * hz * f64::from(SWAY_TICKS) * tick_s).exp_m1();
+        let mut processes = [(0.0, 0.0); 3];
+        for (process, (hz, variance)) in processes.iter_mut().zip(CORNERS_HZ.into_iter().zip(VARIANCES)) {
+            let back = share(hz);
+            *process = (back, (variance * back * (2.0 - back)).sqrt());
+        }
+        Self { processes, smooth: share(SMOOTH_HZ) }
+    }
+}
+
+/// One wandering quantity.
+#[derive(Clone, Copy, Debug, Default)]
+struct Wander {
+    processes: [f64; 3],
+    smooth: f64,
+}
+
+impl Wander {
+    fn step(&mut self, lags: &LifeLags, white: &mut White) -> f64 {
+        for (x, (back, noise)) in self.processes.iter_mut().zip(lags.processes) {
+            *x += noise * white.next() - back * *x;
+        }
+        self.smooth += (self.processes.iter().sum::<f64>() - self.smooth) * lags.smooth;
+        self.smooth
+    }
+}
+
+/// State of the wander.
+#[derive(Clone, Copy, Debug)]
+pub struct Life {
+    white: White,
+    breath: Wander,
+    lip: Wander,
+}
+
+impl Default for Life {
+    fn default() -> Self {
+        Self { white: White::new(SEED), breath: Wander::default(), lip: Wander::default() }
+    }
+}
+
+impl Life {
+    /// The wander of the next `SWAY_TICKS` at `amount`, 0..=1; at 0 nothing moves. Real-time safe.
+    pub fn step(&mut self, amount: f64, lags: &LifeLags) -> Sway {
+        if amount == 0.0 {
+            return Sway::default();
+        }
+        let white = &mut self.white;
+        Sway {
+            dynamic: amount * DYNAMIC * self.breath.step(lags, white),
+            room: 0.0,
+            resonance: amount * RESONANCE * self.lip.step(lags, white),
+            cents: 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_wander_is_slow_repeats_and_has_the_variance_of_its_processes() {
+        let lags = LifeLags::new(16.0 / 96_000.0);
+        let play = || {
+            let mut life = Life::default();
+            (0..2_000_000).map(|_| life.step(1.0, &lags).dynamic / DYNAMIC).collect::<Vec<f64>>()
+        };
+        let values = play();
+        assert_eq!(values, play());
+        let variance = values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64;
+        // Half an hour holds a thousand turns of the slowest process; the low-pass takes a little of the fastest.
+        let wanted: f64 = VARIANCES.iter().sum();
+        assert!((variance / wanted - 1.0).abs() < 0.2, "{variance} for {wanted}");
+        let steepest = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f64::max);
+        // A step of 0.15 moves the level by 0.05 dB, 375 times a second.
+        assert!(steepest < 0.15, "{steepest}: no step is heard");
+        assert_eq!(Life::default().step(0.0, &lags), Sway::default());
+    }
+}

@@ -1,0 +1,37 @@
+//! What breath and lip do beside what is asked: the sum of [`life`](super::life) and [`vibrato`](super::vibrato).
+
+/// Ticks between two values: 0.7 ms. The breath's own lag smooths their steps; the lip's are below 0.1 dB.
+pub const SWAY_TICKS: u32 = 4;
+
+/// How far breath and lip are from where they are asked to be.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sway {
+    /// What is added to the dynamic of breath and lip. Where the breath is physical: to the mouth pressure, as a share of it.
+    pub dynamic: f64,
+    /// Room that `dynamic` needs on either side: the asked dynamic keeps so far from 0 and from 1.
+    pub room: f64,
+    /// What is added to the reed's resonance under the lip, as a share of it.
+    pub resonance: f64,
+    /// What the lip adds to the pitch by the tuning delay, cents.
+    pub cents: f64,
+}
+
+impl Sway {
+    /// A dynamic, 0..=1, that sways.
+    pub fn of(&self, dynamic: f64) -> f64 {
+        dynamic.clamp(self.room, 1.0 - self.room) + self.dynamic
+    }
+}
+
+impl std::ops::Add for Sway {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            dynamic: self.dynamic + other.dynamic,
+            room: self.room.max(other.room),
+            resonance: self.resonance + other.resonance,
+            cents: self.cents + other.cents,
+        }
+    }
+}

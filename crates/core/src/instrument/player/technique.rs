@@ -1,0 +1,90 @@
+//! Extended techniques: what settings and controllers ask for, reached smoothly.
+//!
+//! They act on the mouth pressure and on the lip at control ticks. A voice of 400 Hz has fifteen ticks in a period at the live
+//! rate, and what a tick cannot carry lies above 3 kHz, where the glottis has little left. So they cost nothing per sample.
+
+pub mod flutter;
+pub mod growl;
+pub mod subtone;
+
+use super::step_towards;
+use crate::event::Technique;
+use crate::instrument::settings::Settings;
+use crate::instrument::techniques::GrowlPitch;
+use flutter::Flutter;
+use growl::Growl;
+
+/// Time constant with which a technique comes and goes, s: quick to a player, free of clicks.
+const COME_S: f64 = 0.02;
+/// A technique has gone below this amount: -80 dB.
+const GONE: f64 = 1e-4;
+/// Highest mouth over closing pressure that a technique may make. Above, a reed that is shut stays shut; but a technique does
+/// not lower what the breath alone asks for.
+const HIGHEST_GAMMA: f64 = 1.0;
+
+/// State of the techniques.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Techniques {
+    /// What controllers add to the settings: growl, flutter, subtone.
+    added: [f32; 3],
+    /// Amounts now.
+    amounts: [f64; 3],
+    growl: Growl,
+    flutter: Flutter,
+}
+
+impl Techniques {
+    /// A controller's amount, 0..=1; it adds to that of the settings.
+    pub fn set(&mut self, which: Technique, amount: f32) {
+        self.added[which as usize] = if amount.is_finite() { amount.clamp(0.0, 1.0) } else { 0.0 };
+    }
+
+    /// The same controllers for another instrument, whose techniques begin anew.
+    pub fn carried(&self) -> Self {
+        Self { added: self.added, ..Self::default() }
+    }
+
+    /// Moves the amounts towards what is asked; whether the lip's has changed.
+    pub fn tick(&mut self, settings: &Settings, tick_s: f64) -> bool {
+        let set = settings.techniques;
+        let before = self.subtone();
+        for ((now, set), added) in
+            self.amounts.iter_mut().zip([set.growl, set.flutter, set.subtone]).zip(self.added)
+        {
+            let target = f64::from((set + added).min(1.0));
+            if *now != target {
+                *now += (target - *now) * step_towards(tick_s, COME_S);
+                if (*now - target).abs() < GONE {
+                    *now = target;
+                }
+            }
+        }
+        self.subtone() != before
+    }
+
+    /// How much the lip covers the reed, 0..=1.
+    pub fn subtone(&self) -> f64 {
+        self.amounts[Technique::Subtone as usize]
+    }
+
+    /// Whether voice or tongue move the mouth pressure, so that its mean is not what the ear should push.
+    pub fn shakes(&self) -> bool {
+        self.amounts[..2] != [0.0; 2]
+    }
+
+    /// Mouth over closing pressure with voice and tongue in it, for the breath's `gamma`. `note_hz` is the fingered note.
+    pub fn shake(&mut self, gamma: f64, note_hz: f64, settings: &Settings, tick_s: f64) -> f64 {
+        if !self.shakes() {
+            return gamma;
+        }
+        let (set, [growl, flutter, _]) = (settings.techniques, self.amounts);
+        let voice_hz = match set.growl_pitch {
+            GrowlPitch::Fixed => f64::from(set.growl_hz),
+            GrowlPitch::Interval => note_hz * (f64::from(set.growl_semitones) / 12.0).exp2(),
+        };
+        let voice = self.growl.tick(voice_hz, tick_s);
+        let tongue = self.flutter.tick(f64::from(set.flutter_hz), tick_s);
+        let shaken = gamma * (1.0 + growl * voice).max(0.0) * (1.0 + flutter * tongue);
+        shaken.min(HIGHEST_GAMMA.max(gamma))
+    }
+}

@@ -1,0 +1,370 @@
+//! The sound in the room. Everything is done in pieces, line by line, in plain loops that vectorise; each sample comes from
+//! the same sums whatever the pieces are.
+
+use super::Room;
+use super::delay_line::{DelayLine, PIECE};
+use super::room_design::{LINES, LONGEST_EARLY_S, RoomDesign, Tap};
+use crate::dsp::glide::Glide;
+
+/// Time that a change of the amount takes, s.
+const AMOUNT_S: f64 = 0.02;
+/// Time in which one room fades into another, s: longer than the period of the lowest notes.
+const FADE_S: f64 = 0.05;
+/// Samples up to this magnitude are silence, as for the instrument: -120 dBFS.
+const SILENCE: f32 = 1e-6;
+/// Decibels by which the tail decays until it is silence: from full scale, and a room can be 20 dB louder than the direct sound.
+const TAIL_DB: f64 = 140.0;
+/// Rows of the mixing matrix that are the two ears: any two but the first, which is all in phase.
+const EARS: [usize; 2] = [5, 10];
+
+type Piece = [f32; PIECE];
+
+/// A room with what sounds in it. Real-time safe, but for `new`.
+///
+/// ```
+/// use chalumeau_core::instrument::room::{Room, RoomSound};
+///
+/// let mut room = RoomSound::new(48_000.0);
+/// room.set(&Room { amount: 0.5, ..Room::default() });
+/// let (mut left, mut right) = (vec![0.0; 9_600], vec![0.0; 9_600]);
+/// (left[0], right[0]) = (1.0, 1.0);
+/// room.add(&mut left, &mut right);
+/// assert_eq!(left[0], 1.0);
+/// assert!(left[4_800..].iter().any(|sample| *sample != 0.0));
+/// ```
+#[derive(Clone, Debug)]
+pub struct RoomSound {
+    rate_hz: f64,
+    wanted: Room,
+    chosen: Room,
+    amount: Glide,
+    /// How far the door to the instrument is open: a room that is switched on during a note hears it fade in.
+    door: Glide,
+    /// Nothing has passed since the start.
+    fresh: bool,
+    now: Listener,
+    before: Listener,
+    /// Samples until the former room is gone.
+    fading: usize,
+    fade: usize,
+    /// What has left the instrument, less what a wall takes.
+    source: DelayLine,
+    wall: f32,
+    lines: [DelayLine; LINES],
+    heard: Box<Heard>,
+    heard_before: Box<Heard>,
+    /// Samples of silence so far.
+    quiet: usize,
+    /// Nothing sounds, and the delays are empty.
+    asleep: bool,
+}
+
+/// What hears the delays in the way of one room.
+#[derive(Clone, Debug)]
+struct Listener {
+    design: RoomDesign,
+    /// States of the lines' filters.
+    filters: [f32; LINES],
+}
+
+/// What is heard in one piece: the images at the ears, what comes out of the lines, and what goes in.
+#[derive(Clone, Debug)]
+struct Heard {
+    ears: [Piece; 2],
+    lines: [Piece; LINES],
+    into: Piece,
+}
+
+impl Default for Heard {
+    fn default() -> Self {
+        Self { ears: [[0.0; PIECE]; 2], lines: [[0.0; PIECE]; LINES], into: [0.0; PIECE] }
+    }
+}
+
+impl RoomSound {
+    /// No room, at a sample rate. Allocates.
+    pub fn new(rate_hz: f64) -> Self {
+        let room = Room::default();
+        let listener = Listener { design: RoomDesign::new(&room, rate_hz), filters: [0.0; LINES] };
+        let early = (LONGEST_EARLY_S * rate_hz) as usize + PIECE;
+        Self {
+            rate_hz,
+            wanted: room,
+            chosen: room,
+            amount: Glide::new(0.0, AMOUNT_S, rate_hz),
+            door: Glide::new(1.0, AMOUNT_S, rate_hz),
+            fresh: true,
+            before: listener.clone(),
+            now: listener,
+            fading: 0,
+            fade: ((FADE_S * rate_hz) as usize).max(1),
+            source: DelayLine::new(early),
+            wall: 0.0,
+            lines: std::array::from_fn(|_| DelayLine::new(RoomDesign::longest_line(rate_hz))),
+            heard: Box::default(),
+            heard_before: Box::default(),
+            quiet: 0,
+            asleep: true,
+        }
+    }
+
+    /// Another room from the next sample on, clamped. What sounds goes on in it.
+    pub fn set(&mut self, room: &Room) {
+        let was_on = self.is_on();
+        self.wanted = room.clamped();
+        if !was_on && !self.fresh {
+            self.door.set(0.0);
+            self.door.go_to(1.0);
+        }
+        if self.asleep {
+            self.amount.set(self.wanted.amount);
+        } else {
+            self.amount.go_to(self.wanted.amount);
+        }
+    }
+
+    /// Whether anything is added: otherwise [`add`](Self::add) costs nothing.
+    pub fn is_on(&self) -> bool {
+        !self.amount.rests_at(0.0)
+    }
+
+    /// Whether nothing sounds in the room.
+    pub fn is_silent(&self) -> bool {
+        self.asleep
+    }
+
+    /// Longest time for which the room sounds after the instrument, s.
+    pub fn tail_s(&self) -> f64 {
+        if !self.is_on() {
+            return 0.0;
+        }
+        f64::from(self.wanted.decay_s) * TAIL_DB / 60.0 + 2.0 * LONGEST_EARLY_S
+    }
+
+    /// Empties the room; the settings stay.
+    pub fn reset(&mut self) {
+        self.amount.set(self.wanted.amount);
+        self.door.set(1.0);
+        self.fresh = true;
+        self.sleep();
+    }
+
+    fn sleep(&mut self) {
+        if !self.asleep {
+            self.source.clear();
+            self.lines.iter_mut().for_each(DelayLine::clear);
+            self.now.filters = [0.0; LINES];
+            self.before.filters = [0.0; LINES];
+        }
+        (self.wall, self.quiet, self.fading, self.asleep) = (0.0, 0, 0, true);
+    }
+
+    /// Adds the room's sound to two channels of the same length, which sound in it together. Returns for how many samples
+    /// the room was on.
+    pub fn add(&mut self, left: &mut [f32], right: &mut [f32]) -> usize {
+        self.fresh &= left.is_empty();
+        let mut done = 0;
+        while done < left.len() {
+            if !self.is_on() {
+                self.sleep();
+                return done;
+            }
+            if self.asleep {
+                let is_loud = |(l, r): (&f32, &f32)| l.abs() > SILENCE || r.abs() > SILENCE;
+                let Some(from) = left[done..].iter().zip(&right[done..]).position(is_loud) else {
+                    return left.len();
+                };
+                done += from;
+            }
+            self.change();
+            let shortest = self.now.design.delays[0].min(self.before.design.delays[0]);
+            let mut samples = PIECE.min(left.len() - done).min(shortest);
+            if self.fading > 0 {
+                samples = samples.min(self.fading);
+            }
+            // The amount may arrive at 0, and the silence be long enough, within a piece: each ends one.
+            samples = samples.min(self.patience().saturating_sub(self.quiet).max(1)).min(self.amount.reach());
+            self.piece(&mut left[done..done + samples], &mut right[done..done + samples]);
+            done += samples;
+        }
+        done
+    }
+
+    /// Samples of silence after which all delays are silent.
+    fn patience(&self) -> usize {
+        self.now.design.reach.max(self.before.design.reach) + 1
+    }
+
+    /// Begins to fade into the room that is wanted.
+    fn change(&mut self) {
+        let same = Room { amount: self.wanted.amount, ..self.chosen } == self.wanted;
+        if self.fading > 0 || same {
+            return;
+        }
+        self.chosen = self.wanted;
+        self.before = self.now.clone();
+        self.now.design = RoomDesign::new(&self.wanted, self.rate_hz);
+        if self.asleep {
+            self.before.design = self.now.design;
+        } else {
+            self.fading = self.fade;
+        }
+        self.quiet = 0;
+    }
+
+    /// At most [`PIECE`] samples, at most as many as the shortest line has.
+    fn piece(&mut self, left: &mut [f32], right: &mut [f32]) {
+        self.asleep = false;
+        let samples = left.len();
+        let weights = if self.fading > 0 { self.weights() } else { [1.0; PIECE] };
+        let mut source: Piece = [0.0; PIECE];
+        for n in 0..samples {
+            source[n] = 0.5 * (left[n] + right[n]);
+        }
+        if !self.door.rests_at(1.0) {
+            source[..samples].iter_mut().for_each(|x| *x *= self.door.next());
+        }
+        let (new, old) = (self.now.design.wall_pole, self.before.design.wall_pole);
+        let mut y = self.wall;
+        for (x, weight) in source[..samples].iter_mut().zip(&weights) {
+            let pole = old + weight * (new - old);
+            y = *x + pole * (y - *x);
+            *x = y;
+        }
+        self.wall = y;
+        self.source.write(&source[..samples]);
+
+        let heard = &mut *self.heard;
+        self.now.hear(&self.source, &self.lines, samples, heard);
+        let mut gains = [self.now.design.late; PIECE];
+        if self.fading > 0 {
+            let before = &mut *self.heard_before;
+            self.before.hear(&self.source, &self.lines, samples, before);
+            mix(&mut heard.into, &before.into, &weights);
+            heard.ears.iter_mut().zip(&before.ears).for_each(|(new, old)| mix(new, old, &weights));
+            heard.lines.iter_mut().zip(&before.lines).for_each(|(new, old)| mix(new, old, &weights));
+            mix(&mut gains, &[self.before.design.late; PIECE], &weights);
+            self.fading -= samples;
+            if self.fading == 0 {
+                self.before.design = self.now.design;
+            }
+        }
+
+        scatter(&mut heard.lines);
+        for (ear, line) in heard.ears.iter_mut().zip(EARS) {
+            for n in 0..PIECE {
+                ear[n] += gains[n] * heard.lines[line][n];
+            }
+        }
+        for (line, row) in self.lines.iter_mut().zip(&mut heard.lines) {
+            // 1 / sqrt(LINES), so that the matrix keeps the energy, and the sound enters with energy 1.
+            row.iter_mut().zip(&heard.into).for_each(|(row, into)| *row = 0.25 * (*row + into));
+            line.write(&row[..samples]);
+        }
+        self.finish(left, right);
+    }
+
+    /// How much of the new room there is, sample by sample, without a kink at either end.
+    fn weights(&self) -> Piece {
+        let done = self.fade - self.fading;
+        std::array::from_fn(|n| {
+            let way = ((done + n + 1) as f32 / self.fade as f32).min(1.0);
+            way * way * (3.0 - 2.0 * way)
+        })
+    }
+
+    /// Adds what the ears hear, and counts the silence.
+    fn finish(&mut self, left: &mut [f32], right: &mut [f32]) {
+        let samples = left.len();
+        let [ear_left, ear_right] = &self.heard.ears;
+        let (ear_left, ear_right) = (&ear_left[..samples], &ear_right[..samples]);
+        let loud = |sound: &[f32]| sound.iter().rposition(|x| x.abs() > SILENCE);
+        let last = [&*left, &*right, ear_left, ear_right].into_iter().find_map(|sound| {
+            // Usually the last sample already is loud.
+            sound.last().is_some_and(|x| x.abs() > SILENCE).then_some(samples - 1)
+        });
+        let last = last.or_else(|| [&*left, &*right, ear_left, ear_right].into_iter().filter_map(loud).max());
+        self.quiet = last.map_or(self.quiet + samples, |last| samples - 1 - last);
+        if self.amount.reach() == usize::MAX {
+            let amount = self.amount.next();
+            left.iter_mut().zip(ear_left).for_each(|(out, ear)| *out += amount * ear);
+            right.iter_mut().zip(ear_right).for_each(|(out, ear)| *out += amount * ear);
+        } else {
+            for n in 0..samples {
+                let amount = self.amount.next();
+                left[n] += amount * ear_left[n];
+                right[n] += amount * ear_right[n];
+            }
+        }
+        if self.quiet >= self.patience() {
+            self.sleep();
+        }
+    }
+}
+
+impl Listener {
+    /// What the ears hear of the images, what comes out of the lines, and what goes in. Beyond `samples` it has no meaning.
+    fn hear(&mut self, source: &DelayLine, lines: &[DelayLine; LINES], samples: usize, heard: &mut Heard) {
+        let Self { design, filters } = self;
+        for (ear, taps) in heard.ears.iter_mut().zip(&design.early) {
+            let [first, rest @ ..] = taps.as_chunks::<4>().0 else { continue };
+            let sum = |taps: &[Tap; 4]| {
+                let [a, b, c, d] = taps.map(|tap| source.read_written(tap.delay, samples));
+                let [p, q, r, s] = taps.map(|tap| tap.gain);
+                a.iter()
+                    .zip(b)
+                    .zip(c.iter().zip(d))
+                    .map(move |((a, b), (c, d))| p * a + q * b + r * c + s * d)
+            };
+            ear.iter_mut().zip(sum(first)).for_each(|(ear, sum)| *ear = sum);
+            for taps in rest {
+                ear.iter_mut().zip(sum(taps)).for_each(|(ear, sum)| *ear += sum);
+            }
+        }
+        heard.into[..samples].copy_from_slice(source.read_written(design.into_lines, samples));
+        for (line, row) in heard.lines.iter_mut().enumerate() {
+            let (loss, mut y) = (design.losses[line], filters[line]);
+            let arriving = lines[line].read(design.delays[line], samples);
+            let (out, out_rest) = row[..samples].as_chunks_mut::<8>();
+            let (arriving, arriving_rest) = arriving.as_chunks::<8>();
+            for (out, arriving) in out.iter_mut().zip(arriving) {
+                for n in 0..8 {
+                    y = loss.pole * y + loss.gain * arriving[n];
+                    out[n] = y;
+                }
+            }
+            for (out, x) in out_rest.iter_mut().zip(arriving_rest) {
+                y = loss.pole * y + loss.gain * x;
+                *out = y;
+            }
+            filters[line] = y;
+        }
+    }
+}
+
+/// Where `weights` is 1 it is the new sound, where it is 0 the old one.
+fn mix(new: &mut Piece, old: &Piece, weights: &Piece) {
+    for n in 0..PIECE {
+        new[n] = old[n] + weights[n] * (new[n] - old[n]);
+    }
+}
+
+/// The Hadamard matrix, without its factor of 1/4: each line goes into all, with equal power. Two stages at a time.
+fn scatter(lines: &mut [Piece; LINES]) {
+    for stride in [1, 4] {
+        for first in 0..LINES {
+            if first / stride % 4 != 0 {
+                continue;
+            }
+            let Ok([a, b, c, d]) =
+                lines.get_disjoint_mut([first, first + stride, first + 2 * stride, first + 3 * stride])
+            else {
+                continue;
+            };
+            for n in 0..PIECE {
+                let (e, f, g, h) = (a[n] + b[n], a[n] - b[n], c[n] + d[n], c[n] - d[n]);
+                (a[n], b[n], c[n], d[n]) = (e + g, f + h, e - g, f - h);
+            }
+        }
+    }
+}

@@ -1,0 +1,390 @@
+//! What a player does beside notes and breath: life, vibrato, attacks and slurs, on the B flat clarinet, written E3 to C6.
+//!
+//! Each test prints what it measured; `docs/tone.md` has the tables.
+
+use chalumeau_core::analysis::onset::t90_s;
+use chalumeau_core::analysis::partials::{Partial, Wander};
+use chalumeau_core::analysis::pitch;
+use chalumeau_core::analysis::spectrum::moving_rms;
+use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::instrument::{Attack, Clarinet, Model, Settings, Vibrato};
+use chalumeau_core::parallel;
+use chalumeau_core::score::{Score, play};
+use chalumeau_core::units::{SoundingNote, WrittenNote, cents};
+use std::convert::Infallible;
+use std::ops::ControlFlow;
+use std::sync::{Arc, LazyLock};
+
+const RATE_HZ: f64 = 44_100.0;
+/// Written E3 to C6.
+const NOTES: std::ops::RangeInclusive<u8> = 52..=84;
+/// Medians of recorded held notes: range, slow and fast pitch in cents, level, harmonics 3 and 5 in dB.
+const RECORDED: [f64; 6] = [4.5, 0.59, 0.30, 0.32, 0.53, 1.3];
+
+static MODEL: LazyLock<Arc<Model>> = LazyLock::new(|| Arc::new(Model::built_in(RATE_HZ).unwrap()));
+
+fn sounding(written: u8) -> SoundingNote {
+    WrittenNote(written).sounding(MODEL.file.transposition).unwrap()
+}
+
+fn hz(written: u8) -> f64 {
+    sounding(written).frequency_hz(440.0)
+}
+
+fn each<T: Send>(count: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    parallel::each(count, work, &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
+fn sample(s: f64) -> usize {
+    (s * RATE_HZ) as usize
+}
+
+/// Plays events, at times in s, 20 dB softer, so that no peak meets the limiter.
+fn rendered(settings: &Settings, events: &[(f64, Event)], seconds: f64) -> Vec<f64> {
+    let mut clarinet = Clarinet::new(MODEL.clone(), RATE_HZ);
+    clarinet.set_settings(&Settings { gain_db: -20.0, ..*settings });
+    clarinet.reset();
+    let events = events.iter().map(|&(s, event)| Timed { at: sample(s), event }).collect();
+    let mut out = Vec::with_capacity(sample(seconds));
+    let Ok(()) = play(&mut clarinet, &Score { events, samples: sample(seconds) }, 512, |block| {
+        out.extend(block.iter().map(|&x| f64::from(x)));
+        Ok::<_, Infallible>(())
+    });
+    out
+}
+
+fn controller(value: u8) -> (f64, Event) {
+    (0.0, Event::Breath(f32::from(value) / 127.0))
+}
+
+fn key(s: f64, written: u8) -> (f64, Event) {
+    (s, Event::NoteOn { note: sounding(written), velocity: 0.8 })
+}
+
+fn release(s: f64, written: u8) -> (f64, Event) {
+    (s, Event::NoteOff { note: sounding(written) })
+}
+
+fn still() -> Settings {
+    Settings { life: 0.0, ..Settings::default() }
+}
+
+fn db(x: f64) -> f64 {
+    20.0 * x.max(1e-10).log10()
+}
+
+fn level_db(samples: &[f64]) -> f64 {
+    db((samples.iter().map(|x| x * x).sum::<f64>() / samples.len() as f64).sqrt())
+}
+
+/// The value that a share of all lies below.
+fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> f64 {
+    let mut values: Vec<f64> = values.into_iter().collect();
+    values.sort_by(f64::total_cmp);
+    values[((values.len() - 1) as f64 * share).round() as usize]
+}
+
+/// Wander of every note, each held for 4 s after its attack, one after another at each of five dynamics.
+fn wanders(settings: &Settings) -> Vec<Wander> {
+    let notes: Vec<u8> = NOTES.collect();
+    let played = each(20, |n| {
+        let notes: Vec<u8> = notes.iter().copied().skip(n / 5).step_by(4).collect();
+        let begin = |k: usize| 5.0 * k as f64;
+        let mut events = vec![controller([20, 45, 70, 95, 120][n % 5])];
+        for (k, &note) in notes.iter().enumerate() {
+            events.extend([key(begin(k), note), release(begin(k) + 4.9, note)]);
+        }
+        let out = rendered(settings, &events, begin(notes.len()));
+        let of = |k: usize| &out[sample(begin(k) + 0.8)..sample(begin(k) + 4.8)];
+        (0..notes.len()).filter_map(|k| Wander::measure(of(k), RATE_HZ, hz(notes[k]))).collect::<Vec<_>>()
+    });
+    played.into_iter().flatten().collect()
+}
+
+fn medians(wanders: &[Wander]) -> [f64; 6] {
+    let median = |of: fn(&Wander) -> f64| quantile(wanders.iter().map(of), 0.5);
+    [
+        median(|w| w.range_cents),
+        median(|w| w.slow_cents),
+        median(|w| w.fast_cents),
+        median(|w| w.level_db),
+        median(|w| w.harmonics_db[1]),
+        median(|w| w.harmonics_db[2]),
+    ]
+}
+
+#[test]
+fn held_notes_wander_as_recorded_ones_and_stand_still_without_life() {
+    let (lives, stands) = (medians(&wanders(&Settings::default())), medians(&wanders(&still())));
+    println!("lives {lives:.2?}, stands {stands:.2?}, recorded {RECORDED:?}");
+    for (lives, recorded) in lives.into_iter().zip(RECORDED) {
+        assert!((recorded / 1.5..recorded * 1.5).contains(&lives), "{lives} for {recorded}");
+    }
+    // What is left is the breath noise.
+    assert!(stands[0] < 1.0 && stands[1] < 0.2 && stands[3] < 0.03, "{stands:?}");
+}
+
+#[test]
+fn without_life_noise_and_vibrato_a_note_repeats_to_the_bit() {
+    let settings = Settings { noise: 0.0, ..still() };
+    let play = |settings: &Settings| rendered(settings, &[controller(76), key(0.0, 64)], 1.0);
+    assert_eq!(play(&settings), play(&settings));
+    let alive = Settings { life: 1.0, ..settings };
+    assert_eq!(play(&alive), play(&alive), "life has a seed");
+    assert_ne!(play(&settings), play(&alive));
+}
+
+/// Rate in Hz, swing of the pitch in cents and of the level in dB, either way.
+fn vibrato_of(settings: &Settings, events: &[(f64, Event)], written: u8) -> (f64, f64, f64) {
+    let events: Vec<_> = events.iter().copied().chain([key(0.0, written)]).collect();
+    let out = rendered(settings, &events, 6.0);
+    let held = &out[sample(1.6)..sample(5.9)];
+    let pitch: Vec<f64> = Partial::watch(held, RATE_HZ, hz(written), 1).cents().collect();
+    let mean = pitch.iter().sum::<f64>() / pitch.len() as f64;
+    let crossings: Vec<f64> = pitch
+        .windows(2)
+        .enumerate()
+        .filter(|(_, pair)| pair[0] < mean && pair[1] >= mean)
+        .map(|(n, pair)| n as f64 + (mean - pair[0]) / (pair[1] - pair[0]))
+        .collect();
+    let (first, last) = (crossings[0], crossings[crossings.len() - 1]);
+    let rate = (crossings.len() - 1) as f64 / (last - first) / chalumeau_core::analysis::partials::HOP_S;
+    let swing = |values: &[f64]| {
+        0.5 * (quantile(values.iter().copied(), 0.97) - quantile(values.iter().copied(), 0.03))
+    };
+    let level: Vec<f64> = moving_rms(held, RATE_HZ, 0.02).iter().step_by(100).map(|&x| db(x)).collect();
+    (rate, swing(&pitch), swing(&level))
+}
+
+#[test]
+fn vibrato_has_its_rate_and_its_depth_in_cents_and_decibels() {
+    let notes: Vec<u8> = NOTES.step_by(4).collect();
+    let swings = each(3 * notes.len(), |n| {
+        let (note, value) = (notes[n / 3], [20, 76, 110][n % 3]);
+        let rate_hz = [5.2, 3.5, 7.0][n % 3];
+        let vibrato = Vibrato { rate_hz, unevenness: 0.0, depth: 1.0, ..Vibrato::default() };
+        let (rate, cents, db) = vibrato_of(&Settings { vibrato, ..still() }, &[controller(value)], note);
+        (rate / f64::from(rate_hz), cents, db, n % 3)
+    });
+    for &(rate, cents, db, rate_index) in &swings {
+        assert!((rate - 1.0).abs() < 0.02, "{rate}");
+        assert!((20.0..28.0).contains(&cents), "{cents} cents");
+        // What is slow follows further than what is fast.
+        assert!((2.0..4.2).contains(&db), "{db} dB at rate {rate_index}");
+    }
+    let (cents, db) = (quantile(swings.iter().map(|s| s.1), 0.5), quantile(swings.iter().map(|s| s.2), 0.5));
+    println!("{cents:.1} cents, {db:.1} dB");
+    assert!((cents - 25.0).abs() < 2.0 && (db - 3.0).abs() < 0.5);
+}
+
+#[test]
+fn a_controller_adds_to_the_vibrato_and_unevenness_keeps_the_rate() {
+    let uneven = Settings { vibrato: Vibrato { unevenness: 1.0, ..Vibrato::default() }, ..still() };
+    let (rate, half, _) = vibrato_of(&uneven, &[controller(76), (0.0, Event::Vibrato(0.5))], 60);
+    println!("{rate} Hz, {half} cents");
+    assert!((rate / 5.2 - 1.0).abs() < 0.1 && (9.0..20.0).contains(&half));
+}
+
+#[test]
+fn soft_notes_speak_within_90_ms() {
+    let notes: Vec<u8> = NOTES.collect();
+    let t90 = each(notes.len(), |n| {
+        let out = rendered(&still(), &[controller(4), key(0.0, notes[n])], 1.2);
+        1e3 * t90_s(&out, RATE_HZ, 0.0).unwrap_or(f64::INFINITY)
+    });
+    println!("{t90:.0?}");
+    assert!(t90.iter().all(|&ms| ms <= 90.0), "{t90:.0?}");
+}
+
+#[test]
+fn a_soft_attack_blooms() {
+    let notes: Vec<u8> = NOTES.collect();
+    let spread = |attack: Attack| {
+        let settings = Settings { attack, ..still() };
+        let spread = each(notes.len(), |n| {
+            let out = rendered(&settings, &[controller(76), key(0.0, notes[n])], 1.5);
+            let t90 =
+                |harmonic: usize| Partial::watch(&out, RATE_HZ, hz(notes[n]), harmonic).t90_s().unwrap();
+            1e3 * (t90(5) - t90(1))
+        });
+        quantile(spread, 0.5)
+    };
+    let (soft, normal) = (spread(Attack::Soft), spread(Attack::Normal));
+    println!("h5 after h1: soft {soft:.0} ms, normal {normal:.0} ms");
+    assert!(soft >= 100.0 && normal < 50.0);
+}
+
+/// Amplitude at a frequency.
+fn line(samples: &[f64], hz: f64) -> f64 {
+    let (mut re, mut im) = (0.0, 0.0);
+    for (n, x) in samples.iter().enumerate() {
+        let turn = (n as f64 + 0.5) / samples.len() as f64;
+        let window = 0.5 - 0.5 * (std::f64::consts::TAU * turn).cos();
+        let phase = std::f64::consts::TAU * hz * n as f64 / RATE_HZ;
+        re += window * x * phase.cos();
+        im -= window * x * phase.sin();
+    }
+    re.hypot(im)
+}
+
+/// Whether so short a note is in its register: above the modes below (clarion), not far below its third harmonic (chalumeau).
+fn is_in_register(samples: &[f64], written: u8) -> bool {
+    let own = line(samples, hz(written));
+    if written >= 71 {
+        own > 2.0 * line(samples, hz(written) / 3.0)
+    } else {
+        own > 0.4 * line(samples, 3.0 * hz(written))
+    }
+}
+
+#[test]
+fn ten_tongued_notes_a_second_keep_their_register() {
+    let notes: Vec<u8> = NOTES.step_by(2).collect();
+    let wrong = each(notes.len() * 3, |n| {
+        let (note, value) = (notes[n / 3], [8, 76, 120][n % 3]);
+        let mut events = vec![controller(value)];
+        (0..6).for_each(|k| {
+            events.extend([key(0.1 * f64::from(k), note), release(0.1 * f64::from(k) + 0.06, note)])
+        });
+        let out = rendered(&Settings::default(), &events, 0.7);
+        let speaks = |k: i32| {
+            is_in_register(&out[sample(0.1 * f64::from(k) + 0.02)..sample(0.1 * f64::from(k) + 0.068)], note)
+        };
+        (note, value, (0..6).filter(|&k| !speaks(k)).count())
+    });
+    let wrong: Vec<_> = wrong.into_iter().filter(|(_, _, wrong)| *wrong > 0).collect();
+    println!("{wrong:?}");
+    // One of 306 fails, and the wander decides which: at one value of its amount a loud F#3, at another a soft D5.
+    assert!(wrong.iter().map(|(_, _, wrong)| wrong).sum::<usize>() <= 1, "{wrong:?}");
+}
+
+/// What a slur is like.
+struct Slurred {
+    from: u8,
+    to: u8,
+    value: u8,
+    arrives: bool,
+    /// Level below the softer note on the way, above the louder one, dB.
+    hole_db: f64,
+    bump_db: f64,
+    /// Time until the level stays within 3 dB of the new note's, ms.
+    back_ms: f64,
+    /// Loudest 3 ms above 4 kHz over those of the held notes, or over 45 dB below the tone if that is more, dB.
+    click_db: f64,
+}
+
+/// What is above 4 kHz, by two high-passes of second order (Butterworth).
+fn high(samples: &[f64]) -> Vec<f64> {
+    let mut out = samples.to_vec();
+    for _ in 0..2 {
+        let (sine, cosine) = (std::f64::consts::TAU * 4_000.0 / RATE_HZ).sin_cos();
+        let width = sine / 2.0_f64.sqrt();
+        let (b, a1, a2) = (
+            (1.0 + cosine) / 2.0 / (1.0 + width),
+            -2.0 * cosine / (1.0 + width),
+            (1.0 - width) / (1.0 + width),
+        );
+        let ([mut x1, mut x2], [mut y1, mut y2]) = ([0.0; 2], [0.0; 2]);
+        for x in &mut out {
+            let y = b * (*x - 2.0 * x1 + x2) - a1 * y1 - a2 * y2;
+            (x2, x1, y2, y1) = (x1, *x, y1, y);
+            *x = y;
+        }
+    }
+    out
+}
+
+fn slurred(from: u8, to: u8, value: u8) -> Slurred {
+    const AT: f64 = 0.5;
+    const END: f64 = 1.15;
+    let out = rendered(&still(), &[controller(value), key(0.0, from), key(AT, to)], END);
+    let off =
+        pitch::fundamental_hz(&out[sample(0.95)..], RATE_HZ).map_or(f64::INFINITY, |f| cents(f, hz(to)));
+    let period_s = 1.0 / hz(from.min(to));
+    let envelope: Vec<f64> =
+        moving_rms(&out, RATE_HZ, period_s * (0.01 / period_s).ceil()).iter().map(|&x| db(x)).collect();
+    let (before, after) = (level_db(&out[sample(0.38)..sample(0.48)]), level_db(&out[sample(0.95)..]));
+    let way = &envelope[sample(AT)..sample(0.9)];
+    let highs: Vec<f64> = moving_rms(&high(&out), RATE_HZ, 0.003).iter().map(|&x| db(x)).collect();
+    let loudest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let held =
+        loudest(&highs[sample(0.3)..sample(0.48)]).max(loudest(&highs[sample(0.9)..sample(END - 0.01)]));
+    Slurred {
+        from,
+        to,
+        value,
+        arrives: off.abs() < 10.0,
+        hole_db: before.min(after) - way.iter().copied().fold(f64::INFINITY, f64::min),
+        bump_db: loudest(way) - before.max(after),
+        back_ms: way.iter().rposition(|&x| x < after - 3.0).map_or(0.0, |n| 1e3 * (n + 1) as f64 / RATE_HZ),
+        click_db: loudest(&highs[sample(AT)..sample(0.75)]) - held.max(before.max(after) - 45.0),
+    }
+}
+
+type Kind = (&'static str, fn(&Slurred) -> bool);
+
+/// Every so many of all slurs of up to an octave at three dynamics.
+fn slurs(step: usize) -> Vec<Slurred> {
+    let mut all = Vec::new();
+    for (from, to) in NOTES.flat_map(|from| NOTES.map(move |to| (from, to))) {
+        if from != to && from.abs_diff(to) <= 12 {
+            all.extend([58, 76, 108].map(|value| (from, to, value)));
+        }
+    }
+    assert_eq!(all.len(), 1_908);
+    let all: Vec<_> = all.into_iter().step_by(step).collect();
+    let slurs = each(all.len(), |n| slurred(all[n].0, all[n].1, all[n].2));
+    let kinds: [Kind; 5] = [
+        ("all", |_| true),
+        ("up to 2 semitones", |s| s.from.abs_diff(s.to) <= 2),
+        ("3 to 11", |s| (3..12).contains(&s.from.abs_diff(s.to))),
+        ("octaves", |s| s.from.abs_diff(s.to) == 12),
+        ("over the break", |s| (s.from < 71) != (s.to < 71)),
+    ];
+    for (name, is) in kinds {
+        let of = |value: fn(&Slurred) -> f64| {
+            [0.5, 0.9, 1.0].map(|share| quantile(slurs.iter().filter(|s| is(s)).map(value), share))
+        };
+        println!(
+            "{name}: {} slurs, hole {:.1?} dB, back {:.0?} ms, bump {:.1?} dB, click {:.1?} dB",
+            slurs.iter().filter(|s| is(s)).count(),
+            of(|s| s.hole_db),
+            of(|s| s.back_ms),
+            of(|s| s.bump_db),
+            of(|s| s.click_db),
+        );
+    }
+    let lost: Vec<_> = slurs.iter().filter(|s| !s.arrives).map(|s| (s.from, s.to, s.value)).collect();
+    println!("lost: {lost:?}");
+    assert!(lost.is_empty(), "{lost:?}");
+    slurs
+}
+
+/// The ninth tenth of the holes of octaves up and of all octaves, dB, and the time until their level is back, ms.
+fn octaves(slurs: &[Slurred]) -> (f64, f64, f64) {
+    let octaves = || slurs.iter().filter(|s| s.from.abs_diff(s.to) == 12);
+    let up = octaves().filter(|s| s.to > s.from).map(|s| s.hole_db);
+    let [all_db, back_ms] =
+        [|s: &Slurred| s.hole_db, |s: &Slurred| s.back_ms].map(|of| quantile(octaves().map(of), 0.9));
+    (quantile(up, 0.9), all_db, back_ms)
+}
+
+/// Octaves down into the low chalumeau need a deep dip, and a tenth of all octaves are such.
+fn assert_smooth(slurs: &[Slurred]) {
+    let (up_db, all_db, back_ms) = octaves(slurs);
+    println!("octaves: hole {up_db:.1} dB up, {all_db:.1} dB all, back {back_ms:.0} ms");
+    assert!(up_db <= 15.0 && all_db <= 36.0 && back_ms <= 120.0);
+    assert!(quantile(slurs.iter().map(|s| s.bump_db), 0.99) <= 2.0);
+    assert!(quantile(slurs.iter().map(|s| s.click_db), 0.5) <= 3.0);
+}
+
+#[test]
+fn slurs_arrive_without_bumps() {
+    assert_smooth(&slurs(13));
+}
+
+#[test]
+#[ignore = "minutes: all 1908"]
+fn all_slurs_arrive() {
+    assert_smooth(&slurs(1));
+}

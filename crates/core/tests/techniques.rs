@@ -1,0 +1,249 @@
+//! Extended techniques, the vocal tract and the glissando, heard on the built-in clarinet with the default settings.
+
+use chalumeau_core::analysis::pitch::{fundamental_hz, pitch_track};
+use chalumeau_core::event::{Event, Technique};
+use chalumeau_core::instrument::{Clarinet, GrowlPitch, Settings, Techniques, Tract};
+use chalumeau_core::units::{SoundingNote, WrittenNote, cents};
+
+const RATE_HZ: f64 = 48_000.0;
+/// Samples of a step of 1 ms.
+const STEP: usize = 48;
+
+fn sounding(written: u8) -> SoundingNote {
+    WrittenNote(written).sounding(2).unwrap()
+}
+
+fn playing(settings: &Settings, written: u8, breath: f32) -> Clarinet {
+    let mut clarinet = Clarinet::built_in(RATE_HZ).unwrap();
+    clarinet.set_settings(settings);
+    clarinet.apply(Event::Breath(breath));
+    clarinet.apply(Event::NoteOn { note: sounding(written), velocity: 0.7 });
+    clarinet
+}
+
+/// `ms` of sound, with something done before each.
+fn listen(clarinet: &mut Clarinet, ms: usize, mut each: impl FnMut(&mut Clarinet, usize)) -> Vec<f64> {
+    let mut heard = Vec::with_capacity(ms * STEP);
+    for n in 0..ms {
+        each(clarinet, n);
+        let mut block = [0.0; STEP];
+        clarinet.render(&mut block);
+        heard.extend(block.map(f64::from));
+    }
+    heard
+}
+
+/// Half a second of a held note after 0.9 s.
+fn held(settings: &Settings, written: u8, breath: f32) -> Vec<f64> {
+    let mut clarinet = playing(settings, written, breath);
+    listen(&mut clarinet, 900, |_, _| {});
+    listen(&mut clarinet, 500, |_, _| {})
+}
+
+/// Level of a sinusoid, dB, in a Hann window.
+fn level_db(samples: &[f64], hz: f64) -> f64 {
+    let turn = std::f64::consts::TAU;
+    let (mut re, mut im, mut sum) = (0.0, 0.0, 0.0);
+    for (n, x) in samples.iter().enumerate() {
+        let n = n as f64;
+        let weight = 0.5 - 0.5 * (turn * n / samples.len() as f64).cos();
+        let phase = turn * (hz * n / RATE_HZ).fract();
+        re += weight * x * phase.cos();
+        im += weight * x * phase.sin();
+        sum += weight;
+    }
+    20.0 * (2.0 * re.hypot(im) / sum).max(1e-12).log10()
+}
+
+/// Largest change of the pitch between frames 10 ms apart, cents; a frame without pitch is endless. First and last pitch, and
+/// lowest and highest level over the first, dB.
+fn way(heard: &[f64]) -> (f64, f64, f64, [f64; 2]) {
+    let track = pitch_track(heard, RATE_HZ, 0.01);
+    let hz: Vec<f64> = track.iter().map(|point| point.hz.unwrap_or(f64::MIN_POSITIVE)).collect();
+    let step = hz.windows(2).map(|pair| cents(pair[1], pair[0]).abs()).fold(0.0, f64::max);
+    let level = |n: usize| 20.0 * (track[n].rms / track[0].rms).log10();
+    let (low, high) =
+        (0..track.len()).map(level).fold((0.0, 0.0), |(a, b): (f64, f64), x| (a.min(x), b.max(x)));
+    (step, hz[0], hz[hz.len() - 1], [low, high])
+}
+
+#[test]
+fn a_growl_puts_the_voice_beside_every_partial() {
+    for (written, techniques, interval) in [
+        (60, Techniques { growl: 1.0, ..Techniques::default() }, 0.5),
+        (79, Techniques { growl: 1.0, ..Techniques::default() }, 0.5),
+        (
+            64,
+            Techniques { growl: 1.0, growl_pitch: GrowlPitch::Fixed, ..Techniques::default() },
+            110.0 / sounding(64).frequency_hz(440.0),
+        ),
+    ] {
+        // A loud high note is saturated and hides a voice of 392 Hz: -43 dB at breath 0.9.
+        let loudest = if written > 70 { 0.6 } else { 0.9 };
+        for breath in [0.15, 0.5, loudest] {
+            let quiet = Settings { noise: 0.0, ..Settings::default() };
+            let (growled, clean) =
+                (held(&Settings { techniques, ..quiet }, written, breath), held(&quiet, written, breath));
+            let hz = sounding(written).frequency_hz(440.0);
+            for place in [1.0 + interval, 1.0 - interval] {
+                let side = level_db(&growled, place * hz) - level_db(&growled, hz);
+                let before = level_db(&clean, place * hz) - level_db(&clean, hz);
+                println!("{written} breath {breath}: at {place:.2} {side:.1} dB, without {before:.1}");
+                assert!(side > -40.0 && before < -70.0, "{written} {breath} {place}: {side} {before}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_flutter_beats_at_its_rate_and_the_note_goes_on() {
+    for written in [52, 67, 79] {
+        for breath in [0.1, 0.6, 1.0] {
+            let techniques = Techniques { flutter: 1.0, flutter_hz: 20.0, ..Techniques::default() };
+            let quiet = Settings { noise: 0.0, ..Settings::default() };
+            let heard = held(&Settings { techniques, ..quiet }, written, breath);
+            let plain = held(&quiet, written, breath);
+            let power = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64;
+            let change = 10.0 * (power(&heard) / power(&plain)).log10();
+            // The envelope, a level every 5 ms, at the rate and at what is not a multiple of it.
+            let envelope: Vec<f64> = heard.chunks(240).map(|part| 10.0 * power(part).log10()).collect();
+            let at = |hz: f64| {
+                let turn = |n: usize| std::f64::consts::TAU * hz * n as f64 * 0.005;
+                let sum = |f: fn(f64) -> f64| {
+                    envelope.iter().enumerate().map(|(n, level)| level * f(turn(n))).sum::<f64>()
+                };
+                2.0 / envelope.len() as f64 * sum(f64::cos).hypot(sum(f64::sin))
+            };
+            let (rate, beside) = (at(20.0), at(30.0));
+            println!(
+                "{written} breath {breath}: {rate:.1} dB either way at 20 Hz, {beside:.1} at 30, level {change:.1}"
+            );
+            // Loud high notes are saturated.
+            assert!(rate > 0.8 && rate > 2.0 * beside, "{written} {breath}: {rate} {beside}");
+            assert!(change.abs() < 6.0, "{written} {breath}: {change}");
+        }
+    }
+}
+
+#[test]
+fn a_subtone_is_dark_at_the_same_fundamental_and_in_tune() {
+    let quiet = Settings { noise: 0.0, ..Settings::default() };
+    let covered = Settings { techniques: Techniques { subtone: 1.0, ..Techniques::default() }, ..quiet };
+    let mut darkest = 0.0_f64;
+    for written in [52, 55, 60, 64, 67] {
+        let measure = |settings: &Settings, breath: f32| {
+            let heard = held(settings, written, breath);
+            let hz = fundamental_hz(&heard, RATE_HZ).unwrap();
+            let above: f64 = (4..=20).map(|n| 10f64.powf(0.1 * level_db(&heard, f64::from(n) * hz))).sum();
+            (cents(hz, sounding(written).frequency_hz(440.0)), level_db(&heard, hz), 10.0 * above.log10())
+        };
+        let (off, first, above) = measure(&covered, 0.62);
+        let (mut low, mut high) = (0.04_f32, 1.0);
+        for _ in 0..7 {
+            let middle = 0.5 * (low + high);
+            if measure(&quiet, middle).1 < first { low = middle } else { high = middle }
+        }
+        let (_, same, plain) = measure(&quiet, 0.5 * (low + high));
+        let darker = (above - first) - (plain - same);
+        println!("{written}: {off:.1} cents, above h3 {darker:.1} dB at h1 {first:.1} and {same:.1} dBFS");
+        assert!((first - same).abs() < 0.5 && off.abs() < 10.0, "{written}: {first} {same} {off}");
+        assert!(darker < -9.5, "{written}: {darker}");
+        darkest = darkest.min(darker);
+    }
+    assert!(darkest < -14.0);
+}
+
+#[test]
+fn a_tract_bends_a_high_note_by_900_cents_without_a_break_and_keeps_its_level() {
+    for (written, seconds) in [(84, 3.0), (79, 3.0), (84, 2.0), (79, 2.0)] {
+        let at = |semitones: f32| Settings {
+            tract: Tract { amount: 1.0, interval_semitones: semitones },
+            ..Settings::default()
+        };
+        let mut clarinet = playing(&at(7.0), written, 0.6);
+        listen(&mut clarinet, 1_000, |_, _| {});
+        let steps = 1_000.0 * seconds;
+        let heard = listen(&mut clarinet, steps as usize, |clarinet, n| {
+            clarinet.set_settings(&at(7.0 - (15.5 / steps * n as f64) as f32));
+        });
+        let (step, first, last, level) = way(&heard);
+        let bend = cents(last, first);
+        println!("{written} in {seconds} s: {bend:.0} cents, largest step {step:.1}, level {level:.1?} dB");
+        assert!(bend < -900.0 && step < 20.0, "{written}: {bend} {step}");
+        assert!(level[0] > -4.0 && level[1] < 4.0, "{written}: {level:?}");
+    }
+}
+
+#[test]
+fn within_a_register_a_glissando_has_no_step() {
+    for (from, to) in [(52, 67), (67, 52), (72, 84), (84, 72), (60, 64)] {
+        let settings = Settings { glissando_s: 2.5, ..Settings::default() };
+        let mut clarinet = playing(&settings, from, 0.6);
+        listen(&mut clarinet, 800, |_, _| {});
+        let heard = listen(&mut clarinet, 3_000, |clarinet, n| {
+            if n == 150 {
+                clarinet.apply(Event::NoteOn { note: sounding(to), velocity: 0.7 });
+            }
+        });
+        let (step, first, last, level) = way(&heard);
+        println!("{from} to {to}: largest step {step:.1} cents, level {level:.1?} dB");
+        let off = [(first, from), (last, to)].map(|(hz, note)| cents(hz, sounding(note).frequency_hz(440.0)));
+        assert!(off.iter().all(|off| off.abs() < 10.0), "{from} {to}: {off:?}");
+        assert!(step < 20.0, "{from} {to}: {step}");
+    }
+}
+
+/// From register to register the way still has breaks, but it begins and ends where it should.
+#[test]
+fn a_glissando_over_the_registers_arrives() {
+    for (from, to) in [(67, 84), (52, 81), (84, 67)] {
+        let settings = Settings { glissando_s: 2.5, ..Settings::default() };
+        let mut clarinet = playing(&settings, from, 0.6);
+        listen(&mut clarinet, 800, |_, _| {});
+        let heard = listen(&mut clarinet, 3_400, |clarinet, n| {
+            if n == 150 {
+                clarinet.apply(Event::NoteOn { note: sounding(to), velocity: 0.7 });
+            }
+        });
+        let track = pitch_track(&heard, RATE_HZ, 0.01);
+        let hz: Vec<f64> = track.iter().map(|point| point.hz.unwrap_or(1.0)).collect();
+        let breaks: Vec<usize> = (1..hz.len()).filter(|&n| cents(hz[n], hz[n - 1]).abs() > 20.0).collect();
+        println!("{from} to {to}: steps over 20 cents at {breaks:?} x 10 ms");
+        let off = cents(hz[hz.len() - 1], sounding(to).frequency_hz(440.0));
+        assert!(off.abs() < 10.0, "{from} {to}: {off}");
+    }
+}
+
+/// Live rates in single precision and high quality in double: nothing runs away with every technique moving at once.
+#[test]
+fn any_movement_of_all_techniques_stays_bounded() {
+    let mut seed = 1_u64;
+    let mut random = || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 40) as f32 / (1_u64 << 24) as f32
+    };
+    for rate_hz in [44_100.0, 48_000.0, 96_000.0] {
+        let mut clarinet = Clarinet::built_in(rate_hz).unwrap();
+        for n in 0..150 {
+            clarinet.set_settings(&Settings {
+                tract: Tract { amount: random(), interval_semitones: 48.0 * random() - 24.0 },
+                glissando_s: 0.3 * random(),
+                ..Settings::default()
+            });
+            for which in [Technique::Growl, Technique::Flutter, Technique::Subtone] {
+                clarinet.apply(Event::Technique { which, amount: random() });
+            }
+            clarinet.apply(Event::Breath(random()));
+            let note = sounding(52 + (random() * 40.0) as u8);
+            clarinet.apply(if n % 3 == 2 {
+                Event::NoteOff { note }
+            } else {
+                Event::NoteOn { note, velocity: random() }
+            });
+            let mut block = vec![0.0; 2_000];
+            clarinet.render(&mut block);
+            assert!(block.iter().all(|x| x.abs() <= 1.0), "{rate_hz} {n}");
+        }
+        assert_eq!(clarinet.resets(), 0, "{rate_hz}");
+    }
+}
