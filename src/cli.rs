@@ -4,12 +4,14 @@
 //! with `#` that say what was measured, then data. After a user's mistake the exit code is 2, a message
 //! says what was given and what would be right, and no file is written. A reader that closes the pipe early is no error.
 
+mod batch;
 mod bifurcation;
 mod bore;
 mod csv_table;
 #[cfg(feature = "devices")]
 mod doctor;
 mod feel_args;
+mod fingerings;
 mod haptic;
 mod impedance;
 mod instrument;
@@ -78,12 +80,14 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::RenderCommand>),
+    Batch(batch::BatchCommand),
     Report(Box<report::ReportCommand>),
     Impedance(Box<impedance::ImpedanceCommand>),
     Radiation(Box<radiation::RadiationCommand>),
     Bore(Box<bore::BoreCommand>),
     Instrument(Box<instrument::InstrumentCommand>),
     Threshold(threshold::ThresholdCommand),
+    Fingerings(fingerings::FingeringsCommand),
     Bifurcation(Box<bifurcation::BifurcationCommand>),
     Tune(Box<tune::TuneCommand>),
     Realism(Box<realism::RealismCommand>),
@@ -115,6 +119,10 @@ enum Failure {
     InstrumentFile { path: PathBuf, source: InstrumentError },
     #[error("{}: {source}", path.display())]
     Instrument { path: PathBuf, source: BuildError },
+    #[error("cannot write {}: {source}", path.display())]
+    Batch { path: PathBuf, source: io::Error },
+    #[error(transparent)]
+    Scale(#[from] crate::scale_file::ScaleError),
     #[error(transparent)]
     Import(Box<ImportError>),
     #[error(transparent)]
@@ -188,6 +196,7 @@ pub fn main() -> ExitCode {
     }
     let done = match Cli::parse().command {
         Command::Render(command) => command.run(),
+        Command::Batch(command) => command.run(),
         Command::Report(command) => command.run(),
         Command::Impedance(command) => command.run(),
         Command::Radiation(command) => command.run(),
@@ -199,6 +208,7 @@ pub fn main() -> ExitCode {
             };
         }
         Command::Threshold(command) => command.run(),
+        Command::Fingerings(command) => command.run(),
         Command::Bifurcation(command) => command.run(),
         Command::Tune(command) => command.run(),
         Command::Realism(command) => command.run(),

@@ -18,6 +18,7 @@ pub mod feel_test;
 mod header;
 mod host_marks;
 mod instrument_view;
+mod key_steps;
 mod keyboard;
 mod knob_view;
 mod pitch_needle;

@@ -7,7 +7,7 @@
 //! - `cli` and `editor` use neither each other nor the plugin. The editor knows no host, no thread and no knob link.
 //! - `plugin` uses the editor, and puts it into the host's window.
 //! - `standalone` uses the plugin, and runs it without a host. The plugin does not use the standalone.
-//! - `cache`, `instrument_path`, `output`, `picture_file`, `presets`, `take_file` and `wav` read and write files for them;
+//! - `cache`, `instrument_path`, `output`, `picture_file`, `presets`, `scale_file`, `take_file` and `wav` read and write files for them;
 //!   `identity` has the names that hosts know the plugin by. They use none of the four.
 
 pub mod cache;
@@ -24,6 +24,8 @@ pub mod picture_file;
 #[cfg(feature = "plugin")]
 pub mod plugin;
 pub mod presets;
+#[cfg(feature = "cli")]
+pub mod scale_file;
 #[cfg(feature = "standalone")]
 pub mod standalone;
 pub mod take_file;

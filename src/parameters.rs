@@ -8,7 +8,7 @@ mod spelling;
 mod table;
 mod text;
 
-use chalumeau_core::instrument::{BreathResponse, ListeningMode, Settings, Tuning};
+use chalumeau_core::instrument::Settings;
 use chalumeau_core::reed::PhysicalReed;
 
 pub use table::PARAMETERS;
@@ -131,12 +131,10 @@ pub enum Sets {
     Number(fn(&mut Settings) -> &mut f32),
     /// A switch of [`Settings`].
     Switch(fn(&mut Settings) -> &mut bool),
-    /// [`Settings::tuning`]: a choice of natural and tempered.
-    Tuning,
-    /// The way of listening, [`Settings::listening`]: a choice in the order of [`LISTENING_MODES`].
-    Listening,
-    /// [`Settings::breath_response`]: a choice of played and physical.
-    BreathResponse,
+    /// A whole number of [`Settings`].
+    Whole(fn(&mut Settings) -> &mut i32),
+    /// A choice of [`Settings`], by its place in the list.
+    Choice(fn(&mut Settings, usize)),
     /// A number of the reed as its maker measures it, and how many of the parameter's units make one SI unit.
     Reed(fn(&mut PhysicalReed) -> &mut f64, f64),
     /// Whether the measured reed is in use: a choice of dimensionless and physical.
@@ -156,10 +154,6 @@ pub enum Value {
     Switch(bool),
 }
 
-/// Ways of listening in the order of the parameter that chooses one.
-pub const LISTENING_MODES: [ListeningMode; 3] =
-    [ListeningMode::Everywhere, ListeningMode::Position, ListeningMode::Point];
-
 /// The parameter with this id.
 pub fn find(id: &str) -> Option<&'static Parameter> {
     PARAMETERS.iter().find(|parameter| parameter.id == id)
@@ -178,16 +172,8 @@ impl Parameter {
         match (self.sets, value) {
             (Some(Sets::Number(field)), Value::Number(number)) => *field(settings) = number,
             (Some(Sets::Switch(field)), Value::Switch(on)) => *field(settings) = on,
-            (Some(Sets::Tuning), Value::Choice(index)) => {
-                settings.tuning = if index == 0 { Tuning::Natural } else { Tuning::Tempered };
-            }
-            (Some(Sets::Listening), Value::Choice(index)) => {
-                settings.listening.mode = LISTENING_MODES.get(index).copied().unwrap_or_default();
-            }
-            (Some(Sets::BreathResponse), Value::Choice(index)) => {
-                settings.breath_response =
-                    if index == 0 { BreathResponse::Played } else { BreathResponse::Physical };
-            }
+            (Some(Sets::Whole(field)), Value::Whole(number)) => *field(settings) = number,
+            (Some(Sets::Choice(choose)), Value::Choice(index)) => choose(settings, index),
             _ => {}
         }
     }

@@ -47,7 +47,7 @@ use crate::parameters::InUse;
 use breath_sources::BreathInput;
 use chalumeau_core::control::notes::Note;
 use chalumeau_core::event::{Event, Timed};
-use chalumeau_core::instrument::{Channels, Clarinet, Settings};
+use chalumeau_core::instrument::{Channels, Settings};
 #[cfg(feature = "devices")]
 use chalumeau_knob::device::Release;
 use host_inputs::HostInputs;
@@ -252,7 +252,9 @@ impl Chalumeau {
         }
         let inputs = &mut self.inputs;
         inputs.begin_block();
-        let panic = if self.params.moments.take(Moment::Panic) { inputs.silence() } else { [None; 2] };
+        let panic = if self.params.moments.take(Moment::Panic) { Some(inputs.silence()) } else { None };
+        let drives = [self.params.knob.h_source.value(), self.params.knob.k_source.value()];
+        let wheel = inputs.wheel(self.params.expression.wheel.value().into(), drives);
         let breath = self.moved.breath(&self.params);
         let bend_range = inputs.bend_range(self.params.instrument.bend_range.value());
         let keys = self.window.as_mut().map(|(_, window)| window.keys()).unwrap_or_default();
@@ -264,9 +266,9 @@ impl Chalumeau {
             }
         }
         let api = context.plugin_api();
-        let drives = [self.params.knob.h_source.value(), self.params.knob.k_source.value()];
         let played = std::iter::from_fn(|| inputs.next(|| context.next_event(), api, drives));
-        let at_once = panic.into_iter().chain([breath, bend_range]).chain(keys).flatten();
+        let at_once =
+            panic.into_iter().flatten().chain([breath, bend_range]).chain(wheel).chain(keys).flatten();
         let events = at_once.chain(played);
         #[cfg(feature = "devices")]
         if let Some((_, audio)) = &mut self.knob {
@@ -358,10 +360,10 @@ struct SharedHandles {
 fn rest_status(params: &ChalumeauParams, instrument: &InstrumentSwap, is_watched: bool) -> ProcessStatus {
     params.fall_back();
     let clarinet = instrument.clarinet();
-    let may_sleep = clarinet.is_silent() && !is_watched && !params.is_in_use(InUse::WithKnob);
+    let may_sleep = instrument.is_silent() && !is_watched && !params.is_in_use(InUse::WithKnob);
     params.host.set_may_sleep(may_sleep);
     if clarinet.is_resting() {
-        ProcessStatus::Tail((Clarinet::TAIL_S * instrument.rate_hz()) as u32)
+        ProcessStatus::Tail((instrument.tail_s() * instrument.rate_hz()) as u32)
     } else {
         ProcessStatus::KeepAlive
     }

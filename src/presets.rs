@@ -16,6 +16,7 @@ mod shelf;
 pub mod user_folder;
 
 use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::reed::PhysicalReed;
 
@@ -113,6 +114,14 @@ impl Preset {
             // The parameter has them in this order, and the user's own after them.
             Some(Value::Choice(index)) => Bundled::ALL.get(index).copied(),
             _ => Some(Bundled::BFlat),
+        }
+    }
+
+    /// What the mod wheel does.
+    pub fn wheel(&self) -> Wheel {
+        match parameters::find("wheel").map(|parameter| self.value(parameter)) {
+            Some(Value::Choice(index)) => Wheel::ALL.get(index).copied().unwrap_or_default(),
+            _ => Wheel::default(),
         }
     }
 

@@ -34,9 +34,11 @@ pub enum WavError {
 
 /// Level of the samples in a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PeakLevel {
+pub struct Levels {
     /// Largest magnitude, full scale 1.
     pub peak: f32,
+    /// Root mean square over the whole file and all channels, full scale 1.
+    pub rms: f32,
     /// Number of samples clipped at full scale, of all channels; 0 for floats.
     pub clipped: u64,
 }
@@ -46,7 +48,9 @@ pub struct WavFile<W: Write + Seek> {
     writer: WavWriter<BufWriter<W>>,
     depth: Depth,
     channels: u16,
-    level: PeakLevel,
+    level: Levels,
+    /// Sum of the squares, and how many.
+    power: (f64, u64),
 }
 
 impl<W: Write + Seek> WavFile<W> {
@@ -66,7 +70,7 @@ impl<W: Write + Seek> WavFile<W> {
         }
         let spec = WavSpec { channels, sample_rate: rate, bits_per_sample, sample_format };
         let writer = WavWriter::new(BufWriter::new(file), spec)?;
-        Ok(Self { writer, depth, channels, level: PeakLevel::default() })
+        Ok(Self { writer, depth, channels, level: Levels::default(), power: (0.0, 0) })
     }
 
     /// Appends one block: a mono sound, which goes to every channel, or the channels.
@@ -75,6 +79,7 @@ impl<W: Write + Seek> WavFile<W> {
             for channel in 0..usize::from(self.channels) {
                 let sample = block.get(channel).map_or(first, |samples| samples[at]);
                 self.level.peak = self.level.peak.max(sample.abs());
+                self.power = (self.power.0 + f64::from(sample).powi(2), self.power.1 + 1);
                 match self.depth {
                     Depth::Int16 => self.writer.write_sample(round(sample, 32_767.0))?,
                     Depth::Int24 => self.writer.write_sample(round(sample, 8_388_607.0))?,
@@ -87,9 +92,10 @@ impl<W: Write + Seek> WavFile<W> {
     }
 
     /// Completes the header.
-    pub fn finish(self) -> Result<PeakLevel, WavError> {
+    pub fn finish(self) -> Result<Levels, WavError> {
         self.writer.finalize()?;
-        Ok(self.level)
+        let rms = (self.power.0 / self.power.1.max(1) as f64).sqrt() as f32;
+        Ok(Levels { rms, ..self.level })
     }
 }
 
@@ -103,10 +109,7 @@ mod tests {
     use super::*;
     use crate::output::NewFile;
 
-    fn written(
-        depth: Depth,
-        channels: u16,
-    ) -> (PeakLevel, hound::WavReader<std::io::BufReader<std::fs::File>>) {
+    fn written(depth: Depth, channels: u16) -> (Levels, hound::WavReader<std::io::BufReader<std::fs::File>>) {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("x.wav");
         let mut file = NewFile::create(&path, false).unwrap();
@@ -121,7 +124,7 @@ mod tests {
     #[test]
     fn integers_round_and_clipping_is_counted() {
         let (level, mut reader) = written(Depth::Int16, 2);
-        assert_eq!(level, PeakLevel { peak: 1.5, clipped: 2 });
+        assert_eq!((level.peak, level.clipped), (1.5, 2));
         let samples: Vec<i32> = reader.samples().map(Result::unwrap).collect();
         assert_eq!(samples, [16_384, 16_384, -32_767, -32_767, 32_767, 32_767, 0, 0]);
         let (_, mut reader) = written(Depth::Int24, 1);
@@ -136,7 +139,9 @@ mod tests {
         let mut file = NewFile::create(&path, false).unwrap();
         let mut wav = WavFile::new(&mut file, 48_000, Depth::Float32, 2, 2).unwrap();
         wav.write(&[&[0.1, 0.2], &[0.3, -0.4]]).unwrap();
-        assert_eq!(wav.finish().unwrap().peak, 0.4);
+        let levels = wav.finish().unwrap();
+        assert_eq!(levels.peak, 0.4);
+        assert!((levels.rms - (0.3_f32 / 4.0).sqrt()).abs() < 1e-6, "{levels:?}");
         file.keep().unwrap();
         let mut reader = hound::WavReader::open(&path).unwrap();
         let samples: Vec<f32> = reader.samples().map(Result::unwrap).collect();
@@ -146,7 +151,7 @@ mod tests {
     #[test]
     fn floats_stay_as_they_are() {
         let (level, mut reader) = written(Depth::Float32, 1);
-        assert_eq!(level, PeakLevel { peak: 1.5, clipped: 0 });
+        assert_eq!((level.peak, level.clipped), (1.5, 0));
         let samples: Vec<f32> = reader.samples().map(Result::unwrap).collect();
         assert_eq!(samples, [0.5, -1.0, 1.5, 0.0]);
     }

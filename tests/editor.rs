@@ -40,7 +40,8 @@ struct Window {
 impl Window {
     /// High enough that no column scrolls.
     fn tall(tab: Tab) -> Self {
-        Self::new(tab, (1100.0, 1500.0))
+        // The breath view has the longest column.
+        Self::new(tab, (1100.0, if tab == Tab::Breath { 2200.0 } else { 1500.0 }))
     }
 
     fn new(tab: Tab, size: (f32, f32)) -> Self {

@@ -75,21 +75,21 @@ fn case(name: &'static str, wanted: Wanted) -> Case {
     Case { name, model: Arc::new(model), fitting: fitted[0], tuning }
 }
 
-/// Instruments at one host rate of each family.
+/// Every kind of instrument for hosts at 48 kHz, and two of them for hosts at 44.1 kHz: what the rate changes, it changes in all.
 static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
-    let mut cases = Vec::new();
-    for host_rate_hz in [48_000.0, 44_100.0] {
-        let live = |file| Wanted::new(file, host_rate_hz);
-        cases.extend([
-            case("cylinder with two holes", live(local("examples/instruments/cylinder.toml"))),
-            case("B flat x 1.5", live(resized(1.5))),
-            case("B flat x 0.8", live(resized(0.8))),
-            case("A", live(Bundled::A.file())),
-            case("bass", live(Bundled::Bass.file())),
-            case("imported from CSV", live(local("examples/instruments/alto-chalumeau.toml"))),
-        ]);
-    }
-    cases
+    let at_48 = |file| Wanted::new(file, 48_000.0);
+    let at_44 = |file| Wanted::new(file, 44_100.0);
+    let chalumeau = || local("examples/instruments/alto-chalumeau.toml");
+    vec![
+        case("cylinder with two holes", at_48(local("examples/instruments/cylinder.toml"))),
+        case("B flat x 1.5", at_48(resized(1.5))),
+        case("B flat x 0.8", at_48(resized(0.8))),
+        case("A", at_48(Bundled::A.file())),
+        case("bass", at_48(Bundled::Bass.file())),
+        case("imported from CSV", at_48(chalumeau())),
+        case("A", at_44(Bundled::A.file())),
+        case("imported from CSV", at_44(chalumeau())),
+    ]
 });
 
 /// The cases at 96 kHz.
@@ -224,7 +224,8 @@ fn tempered_instruments_stay_in_tune_from_piano_to_forte() {
 fn crescendo(model: &Arc<Model>, fingering: usize, values: &[u8]) -> Vec<(f64, f64)> {
     const HOST_HZ: f64 = 48_000.0;
     let mut clarinet = Clarinet::new(model.clone(), HOST_HZ);
-    clarinet.set_settings(&Settings { gain_db: -20.0, ..Settings::default() });
+    // Without life: what is measured is the rule, not the wander around it.
+    clarinet.set_settings(&Settings { gain_db: -20.0, life: 0.0, ..Settings::default() });
     let breath = |value: u8| Event::Breath(f32::from(value) / 127.0);
     clarinet.apply(breath(values[0]));
     let note = written(model, fingering).sounding(model.file.transposition).unwrap();

@@ -8,6 +8,7 @@ use chalumeau_core::analysis::pitch::refine_hz;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::prepare::Preparation;
+use chalumeau_core::instrument::stereo::Stereo;
 use chalumeau_core::instrument::{Channels, Clarinet, Model, Settings, Wanted};
 use chalumeau_core::units::{Air, SoundingNote, WrittenNote};
 use ebur128::{EbuR128, Mode};
@@ -64,6 +65,15 @@ fn phrase(clarinet: &mut Clarinet, velocity: f32) -> [Vec<f32>; 2] {
     [left, right]
 }
 
+/// The phrase in the preset's room.
+fn in_room(preset: &Preset, clarinet: &mut Clarinet, velocity: f32) -> [Vec<f32>; 2] {
+    let [mut left, mut right] = phrase(clarinet, velocity);
+    let mut stereo = Stereo::new(f64::from(RATE_HZ));
+    stereo.set_room(&preset.settings().room);
+    stereo.pan(&mut left, &mut right);
+    [left, right]
+}
+
 /// Integrated loudness, LUFS.
 fn loudness([left, right]: &[Vec<f32>; 2]) -> f64 {
     let mut meter = EbuR128::new(2, RATE_HZ, Mode::I).unwrap();
@@ -103,9 +113,9 @@ fn each<T: Send>(measure: impl Fn(&Preset) -> T + Sync) -> Vec<(&'static str, T)
 fn all_presets_are_equally_loud_and_none_reaches_the_limiter() {
     let models = models();
     let found = each(|preset| {
-        let usual = loudness(&phrase(&mut clarinet(preset, &models), VELOCITY));
+        let usual = loudness(&in_room(preset, &mut clarinet(preset, &models), VELOCITY));
         let mut loudest = clarinet(preset, &models);
-        let peak = peak(&phrase(&mut loudest, 1.0));
+        let peak = peak(&in_room(preset, &mut loudest, 1.0));
         assert_eq!(loudest.resets(), 0, "{}", preset.name);
         (usual, peak)
     });

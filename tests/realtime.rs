@@ -140,6 +140,7 @@ impl Random {
                 height_m: self.wild(-1.0, 2.0),
                 width_deg: self.wild(0.0, 180.0),
             },
+            ..Settings::default()
         }
     }
 

@@ -15,7 +15,7 @@ use chalumeau_core::control::midi::MidiDecoder;
 use chalumeau_core::event::Event;
 use chalumeau_core::instrument::prepare::{Preparation, Wanted};
 use chalumeau_core::instrument::{
-    BreathResponse, Clarinet, Listening, ListeningMode, Model, Settings, Tuning,
+    Beyond, BreathResponse, Clarinet, Listening, ListeningMode, Model, Reach, Room, Settings, Tuning,
 };
 use chalumeau_core::reed::PhysicalReed;
 use chalumeau_core::units::{SoundingNote, WrittenNote};
@@ -121,6 +121,8 @@ fn any_settings(random: &mut Random) -> Settings {
     Settings {
         breath_response: if random.below(2) == 0 { BreathResponse::Played } else { BreathResponse::Physical },
         breath_curve: random.between(0.5, 2.0),
+        breath_softest: random.between(0.0, 0.5),
+        breath_loudest: random.between(0.1, 1.0),
         breath_full_kpa: random.between(2.0, 20.0),
         noise: random.between(0.0, 1.0),
         tongue_ms: random.between(1.0, 20.0),
@@ -146,6 +148,12 @@ fn any_settings(random: &mut Random) -> Settings {
             height_m: random.between(-1.0, 2.0),
             width_deg: random.between(0.0, 180.0),
         },
+        room: Room::default(),
+        reach: Reach {
+            transpose: random.below(49) as i32 - 24,
+            beyond: if random.below(2) == 0 { Beyond::Silent } else { Beyond::Octave },
+        },
+        ..Settings::default()
     }
 }
 

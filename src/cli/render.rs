@@ -7,11 +7,11 @@ use crate::cli::render_monitor::RenderMonitor;
 use crate::cli::score_args::{RenderJob, ScoreArgs};
 use crate::cli::shared_args::within;
 use crate::output::NewFile;
-use crate::wav::{Depth, PeakLevel, WavFile};
+use crate::wav::{Depth, Levels, WavFile};
 use chalumeau_core::instrument::Probe;
 use chalumeau_core::reed::physical::P_REF_PA;
 use chalumeau_core::score as player;
-use chalumeau_core::score::{Score, StereoBlocks};
+use chalumeau_core::score::StereoBlocks;
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -79,8 +79,27 @@ pub struct RenderCommand {
     plot_at: Option<f64>,
 }
 
+/// What a rendering has made.
+pub struct Rendered {
+    /// Length, s.
+    pub seconds: f64,
+    /// Sample rate, Hz.
+    pub rate: u32,
+    /// Levels of the file.
+    pub level: Levels,
+    /// How often the calculation broke down.
+    pub resets: u64,
+}
+
 impl RenderCommand {
     pub fn run(&self) -> Result<(), Failure> {
+        let rendered = self.render(progress)?;
+        self.report(&rendered);
+        Ok(())
+    }
+
+    /// Writes the files. `bar` makes a progress bar for so many samples.
+    pub fn render(&self, bar: impl FnOnce(usize) -> ProgressBar) -> Result<Rendered, Failure> {
         let prepared = self.play.prepare()?;
         let RenderJob { score, rate, .. } = &prepared;
         self.refuse_same_file()?;
@@ -96,11 +115,12 @@ impl RenderCommand {
             Bits::Float32 => Depth::Float32,
         };
         let mut wav = WavFile::new(&mut out, *rate, depth, self.channels, score.samples)?;
-        let bar = progress(score.samples);
+        let bar = bar(score.samples);
         // Who looks gets samples and insides in turn, hence the cell.
         let watch = watch.map(RefCell::new);
         // One channel is the instrument itself; pan (CC10) places it between two.
-        let mut stereo = (self.channels == 2).then(|| StereoBlocks::new(score, *rate));
+        let in_room = || StereoBlocks::new(score, *rate).in_room(&prepared.settings.room);
+        let mut stereo = (self.channels == 2).then(in_room);
         let hear = |block: &[f32]| {
             bar.inc(block.len() as u64);
             if let Some(watch) = &watch {
@@ -142,8 +162,7 @@ impl RenderCommand {
             plot.draw(|| watched.figure(&self.play.title(), about))?;
         }
         out.keep()?;
-        self.report(score, *rate, level, clarinet.resets());
-        Ok(())
+        Ok(Rendered { seconds: score.seconds(*rate), rate: *rate, level, resets: clarinet.resets() })
     }
 
     fn refuse_same_file(&self) -> Result<(), Failure> {
@@ -161,7 +180,7 @@ impl RenderCommand {
         Ok(())
     }
 
-    fn report(&self, score: &Score, rate: u32, level: PeakLevel, resets: u64) {
+    fn report(&self, &Rendered { seconds, rate, level, resets }: &Rendered) {
         let bits = match self.bits {
             Bits::Int16 => "16 bit",
             Bits::Int24 => "24 bit",
@@ -172,7 +191,7 @@ impl RenderCommand {
             0.0 => "silent".to_owned(),
             peak => format!("peak {:.1} dBFS", 20.0 * peak.log10()),
         };
-        let (out, seconds) = (self.out.display(), score.seconds(rate));
+        let out = self.out.display();
         eprintln!("{out}: {seconds:.3} s, {} Hz, {bits}, {channels}, {peak}", rate);
         if level.clipped > 0 {
             eprintln!("warning: {} samples clipped; lower --gain-db or use --bits 32f", level.clipped);

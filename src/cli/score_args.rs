@@ -5,12 +5,13 @@ use crate::cli::feel_args::FeelArgs;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, check_fingering, note, within};
 use crate::presets::{self, Preset};
+use crate::scale_file;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::control::midi::MidiDecoder;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::haptics::FeelDesign;
-use chalumeau_core::instrument::{Clarinet, Model, Settings};
+use chalumeau_core::instrument::{Clarinet, Model, Reach, Settings};
 use chalumeau_core::score::Score;
 use chalumeau_core::score::breath::BreathCurve;
 use chalumeau_core::score::breath::GAMMA_MAX;
@@ -83,6 +84,12 @@ pub struct ScoreArgs {
     /// list` lists them
     #[arg(long, value_name = "NAME", value_parser = preset_called)]
     preset: Option<Preset>,
+    /// Scale of another tuning: a Scala file. Middle C stays; the keys go through the scale one after another
+    #[arg(long, value_name = "FILE")]
+    scl: Option<PathBuf>,
+    /// Which key plays which degree of the scale, and at what pitch: a Scala keyboard mapping. --a4 moves all of it
+    #[arg(long, value_name = "FILE", requires = "scl")]
+    kbm: Option<PathBuf>,
     #[command(flatten)]
     instrument: PlayedArgs,
     #[command(flatten)]
@@ -142,8 +149,11 @@ impl ScoreArgs {
         if let Some(curve) = &curve {
             score = score.blown(curve, &settings, self.rate);
         }
-        let model = self.instrument.model(file, self.rate, settings.a4_hz)?;
-        warn_of_silent_notes(&score.events, &model);
+        let mut model = self.instrument.model(file, self.rate, settings.a4_hz)?;
+        if let Some(scl) = &self.scl {
+            Arc::make_mut(&mut model).keys = scale_file::read(scl, self.kbm.as_deref())?;
+        }
+        warn_of_silent_notes(&score.events, &model, settings.reach);
         if let Some(take) = &self.replay {
             score.events = self.replayed(take, &model, &settings, &score)?;
         }
@@ -232,6 +242,7 @@ impl ScoreArgs {
             if let Some(preset) = &self.preset {
                 // Nothing sounds yet, so this bends nothing.
                 decoder.usual_bend_range(preset.bend_range());
+                decoder.set_wheel(preset.wheel());
             }
             let score = midi_file::read_as(decoder, &bytes, self.rate)
                 .map_err(|source| Failure::MidiFile { path: path.clone(), source })?;
@@ -265,7 +276,7 @@ impl ScoreArgs {
 }
 
 /// Warns of notes that the instrument cannot play, which stay silent.
-fn warn_of_silent_notes(events: &[Timed<Event>], model: &Model) {
+fn warn_of_silent_notes(events: &[Timed<Event>], model: &Model, reach: Reach) {
     let file = &model.file;
     let sounds =
         |note: WrittenNote| note.sounding(file.transposition).map(|n| n.to_string()).unwrap_or_default();
@@ -273,7 +284,9 @@ fn warn_of_silent_notes(events: &[Timed<Event>], model: &Model) {
         Event::NoteOn { note, .. } => Some(note),
         _ => None,
     });
-    let silent: Vec<_> = asked.filter(|&note| model.fingering_for(note).is_none()).collect();
+    let silent = asked.filter(|&key| reach.fingering(key, model).is_none());
+    let silent: Vec<_> =
+        silent.filter_map(|key| reach.find(key, &model.keys, Some).map(|(pitch, _)| pitch.note)).collect();
     let written = |note: SoundingNote| note.written(file.transposition);
     let (muted, missing): (Vec<_>, Vec<_>) = silent
         .into_iter()

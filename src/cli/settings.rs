@@ -359,14 +359,15 @@ mod tests {
     fn flags_and_assignments_set_the_same() {
         let mut given = 0;
         for (parameter, number) in flagged() {
-            let text = number.text(number.max);
-            let flag = format!("{}={}", parameter.flag, number.max);
+            let end = if number.max == number.default { number.min } else { number.max };
+            let text = number.text(end);
+            let flag = format!("{}={end}", parameter.flag);
             let by_flag = read(&[&flag]).unwrap();
             assert_ne!(by_flag, Settings::default(), "{flag}");
             assert_eq!(read(&["--set", &format!("{}={text}{}", parameter.id, number.unit)]), Ok(by_flag));
             given += 1;
         }
-        assert_eq!(given, 21, "all numbers of the settings have a flag");
+        assert_eq!(given, 41, "all numbers of the settings have a flag");
         assert_eq!(read(&["--set", "tune=tempered"]), read(&["--tempered"]));
         assert_eq!(read(&["--set", "tune=natural"]), read(&["--natural"]));
         assert_eq!(read(&["--set", "resp=physical"]), Ok(Settings::physical()));
@@ -393,7 +394,7 @@ mod tests {
         for (words, says) in [
             (
                 &["--set", "vnt=2"][..],
-                &["no parameter \"vnt\"", "vent (Register vent), noise (Breath noise)"][..],
+                &["no parameter \"vnt\"", "vent (Register vent), transp (Transpose), beyond"][..],
             ),
             (&["--set", "vent"], &["must be id=value"]),
             (&["--set", "vent=9"], &["vent (Register vent) must lie in 0..4, got 9"]),

@@ -1,5 +1,7 @@
 //! The breath view: mouth pressure, its sources, and its history.
 
+mod breath_curve;
+
 use egui::{Align2, CornerRadius, FontId, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
 use crate::editor::breath_meter;
@@ -9,12 +11,18 @@ use crate::editor::controls::{Hands, choice, heading, momentary, slider};
 use crate::editor::snapshot::{BreathSource, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
+use breath_curve::BreathHistogram;
+use chalumeau_core::instrument::BreathResponse;
 
 /// What the view remembers.
 #[derive(Clone, Debug, Default)]
 pub struct BreathView {
     /// Least and greatest value of each source while the window was open, by name.
     ranges: Vec<(String, f32, f32)>,
+    /// What the live source has sent.
+    histogram: BreathHistogram,
+    /// Least and greatest breath since *Calibrate* was pressed; none while it is not on. Both are `None` until the player blows.
+    calibration: Option<Option<(f32, f32)>>,
 }
 
 impl BreathView {
@@ -25,7 +33,7 @@ impl BreathView {
             ui,
             "breath",
             &mut with,
-            |ui, _| pictures(ui, snapshot),
+            |ui, (this, hands)| this.pictures(ui, hands, snapshot),
             |ui, (this, hands)| this.column(ui, hands, snapshot),
         );
     }
@@ -37,6 +45,13 @@ impl BreathView {
             match self.ranges.iter_mut().find(|(name, ..)| *name == source.name) {
                 Some((_, low, high)) => (*low, *high) = (low.min(value), high.max(value)),
                 None => self.ranges.push((source.name.clone(), value, value)),
+            }
+            if source.is_live {
+                self.histogram.look(value);
+                if let Some(range) = self.calibration.as_mut().filter(|_| value > 0.0) {
+                    let (low, high) = range.unwrap_or((value, value));
+                    *range = Some((low.min(value), high.max(value)));
+                }
             }
         }
     }
@@ -61,13 +76,100 @@ impl BreathView {
         }
         heading(ui, "Breath");
         choice(ui, hands, "resp");
-        for id in ["breath", "bcurve", "full", "curve"] {
+        for id in ["breath", "bcurve"] {
+            slider(ui, hands, id);
+        }
+        if hands.step("resp") == PLAYED {
+            self.calibrate_breath(ui, hands, snapshot);
+        }
+        for id in ["bsoft", "bloud", "full", "curve"] {
             slider(ui, hands, id);
         }
         heading(ui, "Articulation");
-        for id in ["tongue", "legato", "noise"] {
+        choice(ui, hands, "attack");
+        for id in ["tongue", "legato", "gliss", "noise", "life"] {
             slider(ui, hands, id);
         }
+        heading(ui, "Vibrato");
+        for id in ["vib", "vibhz", "vibon", "vibun"] {
+            slider(ui, hands, id);
+        }
+        choice(ui, hands, "wheel");
+        heading(ui, "Techniques");
+        slider(ui, hands, "growl");
+        choice(ui, hands, "growlp");
+        for id in ["growli", "growlf", "flut", "fluthz", "subt", "tract", "tractp"] {
+            slider(ui, hands, id);
+        }
+    }
+}
+
+/// The first choice of the breath response.
+const PLAYED: usize = 0;
+/// Least distance of the ends that are worth taking.
+const LEAST_RANGE: f32 = 0.1;
+
+impl BreathView {
+    /// A button that watches the breath, and then takes its softest and its loudest as the ends of the curve.
+    fn calibrate_breath(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
+        let is_keys = snapshot.sources.iter().any(|source| source.is_live && source.is_velocity());
+        let (name, word) = match self.calibration {
+            None if is_keys => {
+                ("Calibrate", "Move a breath source first: the keys' velocity needs no calibration.")
+            }
+            None => ("Calibrate", "Press, then play a note from as soft to as loud as you like to blow."),
+            Some(None) => {
+                ("Done", "Play a note from as soft to as loud as you like to blow, then press Done.")
+            }
+            Some(Some(_)) => ("Done", "Go on, or press Done to take these ends."),
+        };
+        ui.add_space(2.0);
+        let button = ui.add_enabled(!is_keys || self.calibration.is_some(), egui::Button::new(name));
+        if button.clicked() {
+            self.calibration = match self.calibration.take() {
+                None => Some(None),
+                Some(range) => {
+                    if let Some((low, high)) = range.filter(|(low, high)| high - low >= LEAST_RANGE) {
+                        let value =
+                            |id, share: f32| hands.controls.parse(id, &format!("{} %", 100.0 * share));
+                        let ends = [("bsoft", value("bsoft", low)), ("bloud", value("bloud", high))];
+                        let ends: Vec<_> =
+                            ends.into_iter().filter_map(|(id, value)| Some((id, value?))).collect();
+                        hands.put_all(&ends);
+                    }
+                    None
+                }
+            };
+        }
+        let said = match self.calibration {
+            Some(Some((low, high))) => format!("{:.0} to {:.0} %. {word}", 100.0 * low, 100.0 * high),
+            _ => word.to_owned(),
+        };
+        let c = Colours::here(ui);
+        ui.label(egui::RichText::new(said).font(theme::small()).color(c.quiet));
+    }
+
+    fn pictures(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
+        let c = Colours::here(ui);
+        let height = ui.available_height();
+        ui.spacing_mut().item_spacing.y = GAP;
+        let is_played = snapshot.settings.breath_response == BreathResponse::Played;
+        panel(c).show(ui, |ui| {
+            ui.set_width(ui.available_width());
+            if is_played {
+                ui.set_height((0.5 * height - 24.0).clamp(120.0, 320.0));
+                let live = snapshot.sources.iter().find(|source| source.is_live && !source.is_velocity());
+                breath_curve::draw(ui, hands, snapshot, &self.histogram, live.map(|source| source.value));
+            } else {
+                ui.set_height((0.42 * height - 24.0).clamp(96.0, 230.0));
+                gauge(ui, snapshot);
+            }
+        });
+        panel(c).show(ui, |ui| {
+            ui.set_width(ui.available_width());
+            ui.set_height(ui.available_height());
+            history(ui, snapshot);
+        });
     }
 }
 
@@ -80,22 +182,6 @@ fn calibrate(ui: &mut Ui, hands: &mut Hands) {
         momentary(ui, hands, "blow", "Blow hard here");
     });
     ui.add_space(2.0);
-}
-
-fn pictures(ui: &mut Ui, snapshot: &Snapshot) {
-    let c = Colours::here(ui);
-    let height = ui.available_height();
-    ui.spacing_mut().item_spacing.y = GAP;
-    panel(c).show(ui, |ui| {
-        ui.set_width(ui.available_width());
-        ui.set_height((0.42 * height - 24.0).clamp(96.0, 230.0));
-        gauge(ui, snapshot);
-    });
-    panel(c).show(ui, |ui| {
-        ui.set_width(ui.available_width());
-        ui.set_height(ui.available_height());
-        history(ui, snapshot);
-    });
 }
 
 /// Mouth pressure from left to right.
@@ -256,7 +342,7 @@ fn meter_of(ui: &mut Ui, source: &BreathSource, range: Option<(f32, f32)>) {
         });
         if let Some((low, high)) = range {
             let went = format!("Its values so far: {:.0} to {:.0} %.", 100.0 * low, 100.0 * high);
-            ui.label(format!("{went} If a controller does not reach 100 %, raise Full breath."));
+            ui.label(format!("{went} If a controller does not reach its ends, press Calibrate."));
         }
     });
 }

@@ -184,7 +184,8 @@ fn column(ui: &mut Ui, hands: &mut Hands) {
     heading(ui, "Tuning");
     slider(ui, hands, "a4");
     choice(ui, hands, "tune");
-    for id in ["temp", "vent"] {
+    choice(ui, hands, "beyond");
+    for id in ["transp", "temp", "vent"] {
         slider(ui, hands, id);
     }
     heading(ui, "Playing");

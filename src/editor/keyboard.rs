@@ -34,31 +34,21 @@ pub struct Keyboard {
 impl Keyboard {
     /// Draws the keys, and says what they play.
     pub fn draw(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
-        let transposition = snapshot.instrument.transposition;
-        let ends = (
-            snapshot.instrument.lowest().sounding(transposition),
-            snapshot.instrument.highest().sounding(transposition),
-        );
-        let (Some(lowest), Some(highest)) = ends else { return };
+        let Some((lowest, highest)) = snapshot.keys() else { return };
         // From a white key to a white key.
         let from = if is_black(lowest.0) { lowest.0.saturating_sub(1) } else { lowest.0 };
         let to = if is_black(highest.0) { highest.0 + 1 } else { highest.0 };
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
         let keys = Keys::new(rect, from, to);
-        let playable = |note: u8| {
-            (lowest.0..=highest.0).contains(&note) && !snapshot.silent.contains(&SoundingNote(note))
-        };
+        let playable = |key: u8| snapshot.plays(SoundingNote(key)).is_some();
 
         let pointer = response.interact_pointer_pos().filter(|_| response.is_pointer_button_down_on());
         let wanted = pointer.and_then(|at| keys.at(at)).filter(|(note, _)| playable(*note));
         if !self.by_key {
             self.hold(wanted.map(|(note, velocity)| (SoundingNote(note), velocity)), actions);
         }
-        let chosen = self
-            .chosen
-            .or(snapshot.sounding)
-            .map_or((from + to) / 2, |note| note.0)
-            .clamp(lowest.0, highest.0);
+        let chosen =
+            self.chosen.or(snapshot.key).map_or((from + to) / 2, |note| note.0).clamp(lowest.0, highest.0);
         if response.has_focus() {
             self.keys_pressed(ui, response.id, chosen, (lowest.0, highest.0), actions);
         } else if self.by_key {
@@ -68,14 +58,7 @@ impl Keyboard {
 
         let c = Colours::here(ui);
         let focus = response.has_focus().then_some(chosen);
-        keys.paint(
-            ui,
-            c,
-            snapshot.sounding.map(|note| note.0),
-            self.held.map(|note| note.0),
-            focus,
-            playable,
-        );
+        keys.paint(ui, c, snapshot.key.map(|note| note.0), self.held.map(|note| note.0), focus, playable);
         response.widget_info(|| {
             WidgetInfo::labeled(Role::Group, true, format!("Keyboard, {}", note_name(chosen)))
         });

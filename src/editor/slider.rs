@@ -1,14 +1,14 @@
 //! The slider. It moves by dragging (Shift: ten times finer) and by arrow keys when it has the focus. A double click or
 //! Ctrl-click sets the default. A click on its value, or Enter, opens a text field.
 
-use egui::accesskit::Action as AccessAction;
 use egui::{
-    Align2, CornerRadius, CursorIcon, EventFilter, Key, Rect, Response, Role, Sense, Stroke, TextEdit, Ui,
-    WidgetInfo, pos2, vec2,
+    Align2, CornerRadius, CursorIcon, Key, Rect, Response, Role, Sense, Stroke, TextEdit, Ui, WidgetInfo,
+    pos2, vec2,
 };
 
 use crate::editor::controls::{Entry, Hands, Look, Mark, teach};
 use crate::editor::host_marks;
+use crate::editor::key_steps::KeySteps;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
@@ -16,8 +16,8 @@ const HOW_SLIDER: &str =
     "Drag; Shift: finer. Double click or Ctrl-click: default. Click the value or Enter: type.";
 /// Height of a slider, name and track together.
 const SLIDER_HEIGHT: f32 = 36.0;
-/// Share of the track an arrow key moves; a hundredth of that with Shift.
-const KEY_STEP: f32 = 0.01;
+/// The arrows up and down go to the slider above or below.
+const KEYS: KeySteps = KeySteps { share: 0.01, has_vertical: false };
 
 /// A slider with its name, as wide as its place. `None` if there is no such parameter.
 pub fn slider(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Response> {
@@ -41,7 +41,7 @@ pub fn slider(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
     if !is_typing {
         value = moved_by_pointer(ui, hands, id, &look, &response, track.width()).unwrap_or(value);
         if response.has_focus() {
-            value = moved_by_keys(ui, hands, id, &look, &response).unwrap_or(value);
+            value = KEYS.moved(ui, hands, id, &look, &response).unwrap_or(value);
         }
         let is_reset = response.double_clicked() || (response.clicked() && ui.input(|i| i.modifiers.command));
         if is_reset {
@@ -132,37 +132,6 @@ fn stepped(look: &Look, value: f32) -> f32 {
         Some(steps) if steps > 0 => (value * steps as f32).round() / steps as f32,
         _ => value,
     }
-}
-
-fn moved_by_keys(
-    ui: &Ui,
-    hands: &mut Hands,
-    id: &'static str,
-    look: &Look,
-    response: &Response,
-) -> Option<f32> {
-    let filter = EventFilter { horizontal_arrows: true, ..EventFilter::default() };
-    ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, filter));
-    let unit = look.steps.map_or(KEY_STEP, |steps| 1.0 / steps.max(1) as f32);
-    let (mut by, mut to) = (0.0, None);
-    ui.input(|input| {
-        let fine = if input.modifiers.shift && look.steps.is_none() { 0.1 } else { 1.0 };
-        by += unit
-            * fine
-            * (input.num_presses(Key::ArrowRight) as f32 - input.num_presses(Key::ArrowLeft) as f32);
-        by += unit * input.num_accesskit_action_requests(response.id, AccessAction::Increment) as f32;
-        by -= unit * input.num_accesskit_action_requests(response.id, AccessAction::Decrement) as f32;
-        if input.key_pressed(Key::Home) {
-            to = Some(0.0);
-        } else if input.key_pressed(Key::End) {
-            to = Some(1.0);
-        } else if input.key_pressed(Key::Delete) || input.key_pressed(Key::Backspace) {
-            to = Some(look.default);
-        }
-    });
-    let value = to.or((by != 0.0).then(|| (look.value + by).clamp(0.0, 1.0)))?;
-    hands.put(id, value);
-    Some(value)
 }
 
 fn paint_slider(

@@ -9,8 +9,8 @@ use crate::editor::sound_analysis::SoundAnalysis;
 use crate::presets::PresetShelf;
 use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
 use chalumeau_core::haptics::{NoteFeel, NoteRequirement};
-use chalumeau_core::instrument::Settings;
 use chalumeau_core::instrument::player::dynamics::LipShape;
+use chalumeau_core::instrument::{KeyPitches, Settings};
 use chalumeau_core::units::{SoundingNote, WrittenNote};
 
 /// See the module.
@@ -18,6 +18,8 @@ use chalumeau_core::units::{SoundingNote, WrittenNote};
 pub struct Snapshot {
     /// The instrument that sounds.
     pub instrument: Arc<InstrumentFile>,
+    /// What each key plays.
+    pub key_pitches: KeyPitches,
     /// Notes within its range that it cannot play, see [`Model::speaks`](chalumeau_core::instrument::Model::speaks).
     pub silent: Vec<SoundingNote>,
     /// Instruments that can be chosen, by name; the chosen one may be none of them.
@@ -30,7 +32,9 @@ pub struct Snapshot {
     pub presets: Arc<PresetShelf>,
     /// Name of the preset that was chosen last; empty if there is none.
     pub preset: String,
-    /// The note that is fingered, if any key is held.
+    /// The key that is held, if any.
+    pub key: Option<SoundingNote>,
+    /// The note that it plays.
     pub sounding: Option<SoundingNote>,
     /// Index into the instrument's fingerings: the one in place, held or last held.
     pub fingering: usize,
@@ -73,12 +77,14 @@ impl Default for Snapshot {
         let openings = vec![0.0; instrument.holes.len()];
         Self {
             instrument,
+            key_pitches: KeyPitches::default(),
             silent: Vec::new(),
             instruments: Vec::new(),
             chosen: None,
             preparing: None,
             presets: Arc::default(),
             preset: String::new(),
+            key: None,
             sounding: None,
             fingering: 0,
             openings,
@@ -119,6 +125,28 @@ impl Snapshot {
     /// The fingering in place.
     pub fn fingering(&self) -> Option<&Fingering> {
         self.instrument.fingerings.get(self.fingering)
+    }
+
+    /// The lowest and the highest key of the keyboard: those of the instrument's range, before transposition.
+    pub fn keys(&self) -> Option<(SoundingNote, SoundingNote)> {
+        let transpose = self.settings.reach.transpose;
+        let key = |note: WrittenNote| {
+            let key = i32::from(note.sounding(self.instrument.transposition)?.0) - transpose;
+            Some(SoundingNote(u8::try_from(key).ok().filter(|&key| key < 128)?))
+        };
+        Some((key(self.instrument.lowest())?, key(self.instrument.highest())?))
+    }
+
+    /// The note that a key plays, if any.
+    pub fn plays(&self, key: SoundingNote) -> Option<SoundingNote> {
+        let transposition = self.instrument.transposition;
+        let range =
+            [self.instrument.lowest(), self.instrument.highest()].map(|note| note.sounding(transposition));
+        let [Some(lowest), Some(highest)] = range else { return None };
+        let find = |note: SoundingNote| {
+            ((lowest..=highest).contains(&note) && !self.silent.contains(&note)).then_some(())
+        };
+        self.settings.reach.find(key, &self.key_pitches, find).map(|(pitch, ())| pitch.note)
     }
 
     /// The note as it is written, of the held key or of the fingering in place.
@@ -170,6 +198,13 @@ pub struct BreathSource {
 impl BreathSource {
     /// Name of the one that can be calibrated.
     pub const KNOB: &'static str = "Knob";
+    /// Name of the one that no breath source is: it is in use until one moves.
+    pub const KEYS: &'static str = "Keys, by velocity";
+
+    /// Whether it is the keys.
+    pub fn is_velocity(&self) -> bool {
+        self.name == Self::KEYS
+    }
 }
 
 /// Values at equal steps of time, oldest first.

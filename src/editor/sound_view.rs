@@ -14,7 +14,6 @@ use crate::editor::pitch_needle;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::sound_analysis::FLOOR_DB;
 use crate::editor::theme::{Colours, GAP, panel};
-use crate::parameters::LISTENING_MODES;
 
 /// Highest harmonic marked.
 const HARMONICS: usize = 24;
@@ -195,10 +194,14 @@ fn column(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     }
     heading(ui, "Listening");
     choice(ui, hands, "heard");
-    if LISTENING_MODES.get(hands.step("heard")) == Some(&ListeningMode::Position) {
+    if snapshot.settings.listening.mode == ListeningMode::Position {
         for id in ["ldist", "langle", "lheigh", "lwidth"] {
             slider(ui, hands, id);
         }
+    }
+    heading(ui, "Room");
+    for id in ["room", "rsize", "rdecay", "rtone"] {
+        slider(ui, hands, id);
     }
 }
 

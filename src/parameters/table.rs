@@ -1,6 +1,10 @@
 //! The parameters themselves, in the order of hosts. Groups, order and ids are fixed for ever; tests hold a frozen copy.
 
 use chalumeau_core::instrument::concert_pitch::A4_RANGE_HZ;
+use chalumeau_core::instrument::player::Attack;
+use chalumeau_core::instrument::player::response::ONSET;
+use chalumeau_core::instrument::techniques::GrowlPitch;
+use chalumeau_core::instrument::{Beyond, BreathResponse, ListeningMode, Tuning};
 use chalumeau_knob::touch::study::TRIALS;
 
 use crate::parameters::{Choice, InUse, Kind, Number, Parameter, Sets, Switch, Whole};
@@ -15,6 +19,9 @@ const KNOB: &str = "Knob";
 const INSTRUMENT: &str = "Instrument";
 const PHYSICAL_REED: &str = "Reed, physical";
 const LISTENING: &str = "Listening";
+const ROOM: &str = "Room";
+const EXPRESSION: &str = "Expression";
+const TECHNIQUES: &str = "Techniques";
 
 /// Largest torque that the user can allow, mNm (`docs/protocol.md`, safety).
 const MOST_TORQUE_MNM: f32 = 250.0;
@@ -70,6 +77,11 @@ const fn choice(all: &'static [(&'static str, &'static str)]) -> Kind {
 
 const fn switch(default: bool, [off, on]: [&'static str; 2]) -> Kind {
     Kind::Switch(Switch { default, on, off })
+}
+
+/// The choice at a place of the list; the first for a place that is not there.
+fn nth<T: Copy, const N: usize>(at: usize, all: [T; N]) -> T {
+    all[if at < N { at } else { 0 }]
 }
 
 const OFF: Kind = switch(false, ["Off", "On"]);
@@ -152,7 +164,9 @@ pub static PARAMETERS: &[Parameter] = &[
             "Played: the dynamic. Every note begins at a breath of 4 of 127, equal steps of breath are equal steps of level, and the lip follows as a player's does. Physical: the mouth pressure, in a straight line, on a lip that stays. Projects from before this choice are physical.",
             "",
         )
-        .sets(Sets::BreathResponse)
+        .sets(Sets::Choice(|settings, at| {
+            settings.breath_response = nth(at, [BreathResponse::Played, BreathResponse::Physical]);
+        }))
         .flag("--breath-response"),
     entry("bcurve", BREATH, "Breath curve", number([0.5, 2.0], 1.0, 2, ""))
         .help(
@@ -162,6 +176,36 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Number(|settings| &mut settings.breath_curve))
         .flag("--breath-curve"),
+    entry("bsoft", BREATH, "Softest breath", Kind::Number(Number {
+        min: 0.0,
+        max: 0.5,
+        default: ONSET as f32,
+        digits: 1,
+        unit: " %",
+        scale: 100.0,
+    }))
+        .help(
+            "Breath at which notes begin, where the breath response is played",
+            "Set it to what your controller sends when you blow as softly as you can. *Calibrate* does so.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.breath_softest))
+        .flag("--breath-softest"),
+    entry("bloud", BREATH, "Loudest breath", Kind::Number(Number {
+        min: 0.1,
+        max: 1.0,
+        default: 1.0,
+        digits: 1,
+        unit: " %",
+        scale: 100.0,
+    }))
+        .help(
+            "Breath that plays fortissimo, where the breath response is played",
+            "Set it to what your controller sends when you blow as hard as you like to. *Calibrate* does so.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.breath_loudest))
+        .flag("--breath-loudest"),
     entry("stren", EMBOUCHURE, "Reed strength", number([1.5, 5.0], 2.5, 2, ""))
         .help(
             "Reed strength as printed on the box; 2.5 closes at 6 kPa",
@@ -250,7 +294,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "Natural: in tune at mezzo-forte; the pitch moves with the breath, as in a real bore. Tempered: in tune at every breath.",
             "",
         )
-        .sets(Sets::Tuning)
+        .sets(Sets::Choice(|settings, at| settings.tuning = nth(at, [Tuning::Natural, Tuning::Tempered])))
         .flag("--tempered"),
     entry("temp", TUNING, "Temperature", number([10.0, 40.0], 25.0, 1, " \u{b0}C"))
         .help(
@@ -268,6 +312,20 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Number(|settings| &mut settings.vent_loss))
         .flag("--vent-loss"),
+    entry("transp", TUNING, "Transpose", whole([-24, 24], 0, " st"))
+        .help(
+            "Semitones from the key to the note that sounds",
+            "With -2 a B flat clarinet plays what its player reads: written C sounds B flat.",
+            "",
+        )
+        .sets(Sets::Whole(|settings| &mut settings.reach.transpose)),
+    entry("beyond", TUNING, "Beyond the range", choice(&[("silent", "Silent"), ("octave", "Nearest octave")]))
+        .help(
+            "What keys below, above and between the notes of the instrument play",
+            "Silent: nothing. Nearest octave: the same note in the nearest octave that the instrument has.",
+            "",
+        )
+        .sets(Sets::Choice(|settings, at| settings.reach.beyond = nth(at, [Beyond::Silent, Beyond::Octave]))),
     entry("noise", NOISE, "Breath noise", percent(0.3))
         .help("Noise of the breath in the reed channel", "Adds the sound of air.", "")
         .sets(Sets::Number(|settings| &mut settings.noise))
@@ -593,7 +651,10 @@ pub static PARAMETERS: &[Parameter] = &[
         "Bell and open holes each send out sound. Everywhere is the mean over all directions, the same in both channels. Position is one place or two. One point is as if all sound came from one hole: above 1 kHz too soft.",
         "",
     )
-    .sets(Sets::Listening),
+    .sets(Sets::Choice(|settings, at| {
+        settings.listening.mode =
+            nth(at, [ListeningMode::Everywhere, ListeningMode::Position, ListeningMode::Point]);
+    })),
     entry("ldist", LISTENING, "Listening distance", number([0.2, 10.0], 1.0, 2, " m"))
         .help(
             "Distance from the middle of the instrument, for Position",
@@ -626,4 +687,184 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Number(|settings| &mut settings.listening.width_deg))
         .flag("--listening-width"),
+    entry("room", ROOM, "Room", percent(0.0))
+        .help(
+            "How much of a room is heard around the instrument, in stereo",
+            "At 0 the sound is dry. 20 to 50 % is a near microphone, 100 % a seat in the room.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.room.amount))
+        .flag("--room"),
+    entry("rsize", ROOM, "Room size", number([3.0, 40.0], 12.0, 1, " m"))
+        .help(
+            "Length of the room; width and height follow",
+            "A small room answers at once, a large one later.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.room.size_m))
+        .flag("--room-size"),
+    entry("rdecay", ROOM, "Room decay", number([0.2, 4.0], 1.2, 2, " s"))
+        .help(
+            "Time in which the room's sound falls by 60 dB",
+            "A living room has half a second, a concert hall two, a church four.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.room.decay_s))
+        .flag("--room-decay"),
+    entry("rtone", ROOM, "Room tone", percent(0.5))
+        .help(
+            "How long the room's high tones last beside its low ones",
+            "Low is dark, as with curtains and people. High is bright, as with bare stone.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.room.tone))
+        .flag("--room-tone"),
+    entry("life", EXPRESSION, "Life", percent(1.0))
+        .help(
+            "How much a held note wanders, as breath, lip and fingers of a player do",
+            "At 100 % pitch, level and colour move as in recordings of held notes. At 0 the note stands still.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.life))
+        .flag("--life"),
+    entry("vib", EXPRESSION, "Vibrato", percent(0.0))
+        .help(
+            "Depth of the vibrato",
+            "Lip and breath swing together, at 100 % by 25 cents and 3 dB either way. The mod wheel adds to it.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.vibrato.depth))
+        .flag("--vibrato")
+        .midi("CC1, as *Mod wheel* selects"),
+    entry("vibhz", EXPRESSION, "Vibrato rate", number([3.0, 8.0], 5.2, 2, " Hz"))
+        .help("Swings a second", "4 is slow, 5 to 6 usual, 7 nervous.", "")
+        .sets(Sets::Number(|settings| &mut settings.vibrato.rate_hz))
+        .flag("--vibrato-rate"),
+    entry("vibon", EXPRESSION, "Vibrato onset", number([0.0, 2.0], 0.4, 2, " s"))
+        .help(
+            "Time after the beginning of a tongued note until the vibrato has its depth",
+            "A long onset leaves short notes straight.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.vibrato.onset_s))
+        .flag("--vibrato-onset"),
+    entry("vibun", EXPRESSION, "Vibrato unevenness", percent(0.3))
+        .help(
+            "How much one swing differs from the next",
+            "At 0 the vibrato is a machine's.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.vibrato.unevenness))
+        .flag("--vibrato-unevenness"),
+    entry(
+        "attack",
+        EXPRESSION,
+        "Attack",
+        Kind::Choice(Choice {
+            all: &[("soft", "Soft"), ("normal", "Normal"), ("hard", "Hard")],
+            default: 1,
+        }),
+    )
+    .help(
+        "How breath and lip begin a note",
+        "Soft: the partials come one after another, the high ones last. Normal: as the tongue lets go. Hard: with an accent.",
+        "",
+    )
+    .sets(Sets::Choice(|settings, at| {
+        settings.attack = nth(at, [Attack::Soft, Attack::Normal, Attack::Hard]);
+    })),
+    entry("gliss", EXPRESSION, "Glissando", number([0.0, 3.0], 0.0, 2, " s"))
+        .help(
+            "Time that a slur slides from note to note; at 0 the fingers move at once",
+            "The fingers slide off the holes one after another, and the vocal tract leads them.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.glissando_s))
+        .flag("--glissando"),
+    entry(
+        "wheel",
+        EXPRESSION,
+        "Mod wheel",
+        choice(&[
+            ("vib", "Vibrato"),
+            ("growl", "Growl"),
+            ("flut", "Flutter"),
+            ("subt", "Subtone"),
+            ("none", "Nothing"),
+        ]),
+    )
+    .help(
+        "What the mod wheel (CC1) does",
+        "It does nothing else while *H from* or *k from* is CC1. Projects from before vibrato have Nothing.",
+        "",
+    )
+    .setup(),
+    entry("growl", TECHNIQUES, "Growl", percent(0.0))
+        .help(
+            "How much the player sings into the instrument",
+            "The voice's pulses in the mouth make the tone rough, with sums and differences of both pitches.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.techniques.growl))
+        .flag("--growl")
+        .midi("CC18"),
+    entry("growlp", TECHNIQUES, "Growl pitch", choice(&[("int", "Follows the note"), ("fixed", "Fixed")]))
+        .help(
+            "What the voice sings",
+            "Follows the note: an interval to it, *Growl interval*. Fixed: *Growl frequency*.",
+            "",
+        )
+        .sets(Sets::Choice(|settings, at| {
+            settings.techniques.growl_pitch = nth(at, [GrowlPitch::Interval, GrowlPitch::Fixed]);
+        })),
+    entry("growli", TECHNIQUES, "Growl interval", number([-24.0, 12.0], -12.0, 1, " st"))
+        .help(
+            "Interval of the voice from the note",
+            "An octave below is rough and in tune; a fifth or a third makes chords.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.techniques.growl_semitones))
+        .flag("--growl-interval"),
+    entry("growlf", TECHNIQUES, "Growl frequency", number([60.0, 400.0], 110.0, 0, " Hz"))
+        .help("Pitch of the voice, where it is fixed", "", "")
+        .sets(Sets::Number(|settings| &mut settings.techniques.growl_hz))
+        .flag("--growl-frequency"),
+    entry("flut", TECHNIQUES, "Flutter", percent(0.0))
+        .help(
+            "How far the rolling tongue closes the way of the breath",
+            "The note trembles, as with a rolled R.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.techniques.flutter))
+        .flag("--flutter")
+        .midi("CC19"),
+    entry("fluthz", TECHNIQUES, "Flutter rate", number([15.0, 35.0], 25.0, 1, " Hz"))
+        .help("Strokes of the tongue a second", "Players reach 20 to 30.", "")
+        .sets(Sets::Number(|settings| &mut settings.techniques.flutter_hz))
+        .flag("--flutter-rate"),
+    entry("subt", TECHNIQUES, "Subtone", percent(0.0))
+        .help(
+            "How much the lower lip covers and damps the reed",
+            "Low notes lose their high partials and become soft and round.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.techniques.subtone))
+        .flag("--subtone")
+        .midi("CC20"),
+    entry("tract", TECHNIQUES, "Vocal tract", percent(0.0))
+        .help(
+            "How strongly the player tunes the vocal tract: from an open throat to a tuned one",
+            "A tuned tract pulls the note to its own resonance, *Tract interval*: bends, scoops, throat colour.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.tract.amount))
+        .flag("--tract"),
+    entry("tractp", TECHNIQUES, "Tract interval", number([-24.0, 24.0], 0.0, 1, " st"))
+        .help(
+            "Where the vocal tract resonates, from the note",
+            "Move it down from 0 while a clarion note sounds, and the pitch follows, by an octave and more.",
+            "",
+        )
+        .sets(Sets::Number(|settings| &mut settings.tract.interval_semitones))
+        .flag("--tract-interval"),
 ];

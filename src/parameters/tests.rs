@@ -1,5 +1,8 @@
 use super::*;
-use chalumeau_core::instrument::Listening;
+use chalumeau_core::instrument::player::Attack;
+use chalumeau_core::instrument::player::vibrato::Vibrato;
+use chalumeau_core::instrument::techniques::{GrowlPitch, Techniques, Tract};
+use chalumeau_core::instrument::{Beyond, BreathResponse, Listening, ListeningMode, Reach, Room, Tuning};
 
 /// Id, group, name, default, and whether a host can automate it, in the order of hosts. A frozen copy: saved projects and
 /// automation lanes depend on it. Append only.
@@ -10,6 +13,8 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
     ("legato", "Breath", "Legato", "8.0 ms", true),
     ("resp", "Breath", "Breath response", "Played", true),
     ("bcurve", "Breath", "Breath curve", "1.00", true),
+    ("bsoft", "Breath", "Softest breath", "3.1 %", true),
+    ("bloud", "Breath", "Loudest breath", "100.0 %", true),
     ("stren", "Embouchure", "Reed strength", "2.50", true),
     ("lip", "Embouchure", "Lip opening", "1.000 x", true),
     ("zeta", "Embouchure", "Embouchure", "0.300", true),
@@ -23,6 +28,8 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
     ("tune", "Tuning", "Tuning", "Tempered", true),
     ("temp", "Tuning", "Temperature", "25.0 °C", true),
     ("vent", "Tuning", "Register vent", "2.00", true),
+    ("transp", "Tuning", "Transpose", "0 st", true),
+    ("beyond", "Tuning", "Beyond the range", "Silent", true),
     ("noise", "Noise", "Breath noise", "30.0 %", true),
     ("gain", "Output", "Gain", "0.0 dB", true),
     ("panic", "Output", "Panic", "Off", true),
@@ -70,12 +77,34 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
     ("langle", "Listening", "Listening angle", "30 °", true),
     ("lheigh", "Listening", "Listening height", "0.00 m", true),
     ("lwidth", "Listening", "Listening width", "60 °", true),
+    ("room", "Room", "Room", "0.0 %", true),
+    ("rsize", "Room", "Room size", "12.0 m", true),
+    ("rdecay", "Room", "Room decay", "1.20 s", true),
+    ("rtone", "Room", "Room tone", "50.0 %", true),
+    ("life", "Expression", "Life", "100.0 %", true),
+    ("vib", "Expression", "Vibrato", "0.0 %", true),
+    ("vibhz", "Expression", "Vibrato rate", "5.20 Hz", true),
+    ("vibon", "Expression", "Vibrato onset", "0.40 s", true),
+    ("vibun", "Expression", "Vibrato unevenness", "30.0 %", true),
+    ("attack", "Expression", "Attack", "Normal", true),
+    ("gliss", "Expression", "Glissando", "0.00 s", true),
+    ("wheel", "Expression", "Mod wheel", "Vibrato", false),
+    ("growl", "Techniques", "Growl", "0.0 %", true),
+    ("growlp", "Techniques", "Growl pitch", "Follows the note", true),
+    ("growli", "Techniques", "Growl interval", "-12.0 st", true),
+    ("growlf", "Techniques", "Growl frequency", "110 Hz", true),
+    ("flut", "Techniques", "Flutter", "0.0 %", true),
+    ("fluthz", "Techniques", "Flutter rate", "25.0 Hz", true),
+    ("subt", "Techniques", "Subtone", "0.0 %", true),
+    ("tract", "Techniques", "Vocal tract", "0.0 %", true),
+    ("tractp", "Techniques", "Tract interval", "0.0 st", true),
 ];
 
 /// Ids of choices in saved states. Append only.
 const FROZEN_CHOICES: &[(&str, &[&str])] = &[
     ("resp", &["play", "phys"]),
     ("tune", &["nat", "temp"]),
+    ("beyond", &["silent", "octave"]),
     ("knob", &["off", "serial", "midi", "osc"]),
     ("law", &["flow", "press", "free"]),
     ("order", &["phys", "cover", "open"]),
@@ -85,6 +114,9 @@ const FROZEN_CHOICES: &[(&str, &[&str])] = &[
     ("qual", &["live", "high"]),
     ("rface", &["seed", "phys"]),
     ("heard", &["all", "place", "point"]),
+    ("attack", &["soft", "normal", "hard"]),
+    ("wheel", &["vib", "growl", "flut", "subt", "none"]),
+    ("growlp", &["int", "fixed"]),
 ];
 
 fn numbers() -> impl Iterator<Item = (&'static Parameter, Number)> {
@@ -144,9 +176,12 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         tuning: Tuning::Natural,
         breath_response: BreathResponse::Physical,
         listening: Listening { mode: ListeningMode::Point, ..d.listening },
+        reach: Reach { transpose: -2, beyond: Beyond::Octave },
+        attack: Attack::Hard,
+        techniques: Techniques { growl_pitch: GrowlPitch::Fixed, ..d.techniques },
         ..d
     };
-    let mut fields = 4;
+    let mut fields = 8;
     for (parameter, number) in numbers() {
         let Some(Sets::Number(field)) = parameter.sets else { continue };
         fields += 1;
@@ -164,11 +199,17 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
     find("tune").unwrap().set(&mut filled, Value::Choice(1));
     find("resp").unwrap().set(&mut filled, Value::Choice(0));
     find("heard").unwrap().set(&mut filled, Value::Choice(0));
+    find("transp").unwrap().set(&mut filled, Value::Whole(0));
+    find("beyond").unwrap().set(&mut filled, Value::Choice(0));
+    find("attack").unwrap().set(&mut filled, Value::Choice(1));
+    find("growlp").unwrap().set(&mut filled, Value::Choice(0));
     assert_eq!(filled, d, "the table reaches every field");
     // All fields of the settings, each by one parameter.
     let Settings {
         breath_response: _,
         breath_curve: _,
+        breath_softest: _,
+        breath_loudest: _,
         breath_full_kpa: _,
         noise: _,
         tongue_ms: _,
@@ -188,8 +229,25 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         vent_loss: _,
         gain_db: _,
         listening: Listening { mode: _, distance_m: _, angle_deg: _, height_m: _, width_deg: _ },
+        reach: Reach { transpose: _, beyond: _ },
+        room: Room { amount: _, size_m: _, decay_s: _, tone: _ },
+        life: _,
+        vibrato: Vibrato { depth: _, rate_hz: _, onset_s: _, unevenness: _ },
+        attack: _,
+        glissando_s: _,
+        techniques:
+            Techniques {
+                growl: _,
+                growl_pitch: _,
+                growl_semitones: _,
+                growl_hz: _,
+                flutter: _,
+                flutter_hz: _,
+                subtone: _,
+            },
+        tract: Tract { amount: _, interval_semitones: _ },
     } = d;
-    assert_eq!(fields, 25);
+    assert_eq!(fields, 49);
 }
 
 #[test]

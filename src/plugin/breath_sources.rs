@@ -34,7 +34,7 @@ impl BreathInput {
     /// Its name in the window.
     pub fn title(self) -> &'static str {
         match self {
-            Self::Keys => "Keys, by velocity",
+            Self::Keys => BreathSource::KEYS,
             Self::Parameter => "Breath parameter",
             Self::Breath => "CC2 breath",
             Self::Expression => "CC11 expression",

@@ -6,9 +6,12 @@ use super::breath_sources::BreathSources;
 use super::params::knob::ReedSource;
 use super::reed_controllers::ReedControllers;
 use super::translate_events::{EventTranslator, expression, untangled};
+use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::control::notes::Note;
 use chalumeau_core::event::{Event, Timed};
 
+/// Events that end all notes: the panic, the bend and the techniques of controllers that stay where they are.
+const SILENCED: usize = 6;
 /// Events that one event of the host can become: what the decoder says, and a change of the reed.
 const EVENTS: usize = 32;
 /// Ends of notes that one block can hold: each event that the wrapper keeps room for begins at most one note, and 17 notes
@@ -157,10 +160,15 @@ impl HostInputs {
         self.translator.bend_range(semitones).first().map(|&event| Timed { at: 0, event })
     }
 
-    /// Ends all notes at once. Returns at most two events.
-    pub fn silence(&mut self) -> [Option<Timed<Event>>; 2] {
-        let said = self.translator.silence();
-        let events = [0, 1].map(|place| said.get(place).map(|&event| Timed { at: 0, event }));
+    /// Says what the mod wheel does: nothing where it `drives` the reed.
+    pub fn wheel(&mut self, wheel: Wheel, drives: [ReedSource; 2]) -> [Option<Timed<Event>>; 2] {
+        let is_reeds = drives.contains(&ReedSource::Wheel);
+        at_once(self.translator.wheel(if is_reeds { Wheel::Nothing } else { wheel }))
+    }
+
+    /// Ends all notes at once.
+    pub fn silence(&mut self) -> [Option<Timed<Event>>; SILENCED] {
+        let events = at_once(self.translator.silence());
         self.note_ends(0);
         events
     }
@@ -182,6 +190,11 @@ impl HostInputs {
             end(&mut self.ended, at, note);
         }
     }
+}
+
+/// Events at the beginning of the block.
+fn at_once<const N: usize>(said: &[Event]) -> [Option<Timed<Event>>; N] {
+    std::array::from_fn(|place| said.get(place).map(|&event| Timed { at: 0, event }))
 }
 
 /// Adds the end of a note, without allocating.

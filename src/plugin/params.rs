@@ -13,7 +13,7 @@ use crate::editor::WindowState;
 use crate::parameters::{InUse, Number, Value};
 use crate::plugin::host_link::HostLink;
 use crate::presets::Preset;
-use chalumeau_core::instrument::{BreathResponse, Settings, Tuning};
+use chalumeau_core::instrument::{Beyond, BreathResponse, Reach, Settings, Tuning};
 
 mod entry;
 pub mod instrument;
@@ -21,16 +21,20 @@ pub mod knob;
 pub mod listening;
 pub mod moment;
 pub mod reed;
+pub mod room;
 mod state;
+pub mod techniques;
 
-use entry::{choice, number_from, status_text, switch};
+use entry::{choice, number_from, status_text, switch, whole};
 pub use instrument::InstrumentParams;
 pub use knob::KnobParams;
 use knob::{KnobKind, ReedSource};
 pub use listening::ListeningParams;
 use moment::{Moment, Moments};
 pub use reed::PhysicalReedParams;
+pub use room::RoomParams;
 pub use state::{SCHEMA, mend, without_moments};
+pub use techniques::{ExpressionParams, TechniqueParams};
 
 /// All parameters, by group.
 #[derive(Params)]
@@ -68,6 +72,15 @@ pub struct ChalumeauParams {
     /// Where it is heard from.
     #[nested(group = "Listening")]
     pub listening: ListeningParams,
+    /// The room around it.
+    #[nested(group = "Room")]
+    pub room: RoomParams,
+    /// How notes begin, go on and lead into each other.
+    #[nested(group = "Expression")]
+    pub expression: ExpressionParams,
+    /// Extended techniques and the vocal tract.
+    #[nested(group = "Techniques")]
+    pub techniques: TechniqueParams,
     /// State of the instrument as text, written by whoever loads it.
     pub instrument_status: Arc<RwLock<String>>,
     /// Size, zoom, theme and view of the window.
@@ -105,6 +118,12 @@ pub struct BreathParams {
     /// [`Settings::breath_curve`].
     #[id = "bcurve"]
     pub curve: FloatParam,
+    /// [`Settings::breath_softest`].
+    #[id = "bsoft"]
+    pub softest: FloatParam,
+    /// [`Settings::breath_loudest`].
+    #[id = "bloud"]
+    pub loudest: FloatParam,
 }
 
 /// Lip and reed as a player names them.
@@ -159,6 +178,12 @@ pub struct TuningParams {
     /// [`Settings::vent_loss`].
     #[id = "vent"]
     pub vent_loss: FloatParam,
+    /// [`Reach::transpose`].
+    #[id = "transp"]
+    pub transpose: IntParam,
+    /// [`Reach::beyond`].
+    #[id = "beyond"]
+    pub beyond: EnumParam<BeyondChoice>,
 }
 
 /// Breath noise.
@@ -205,6 +230,36 @@ impl From<TuningChoice> for Tuning {
         match choice {
             TuningChoice::Natural => Self::Natural,
             TuningChoice::Tempered => Self::Tempered,
+        }
+    }
+}
+
+/// [`Beyond`] as hosts see it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Enum)]
+pub enum BeyondChoice {
+    /// [`Beyond::Silent`].
+    #[id = "silent"]
+    Silent,
+    /// [`Beyond::Octave`].
+    #[id = "octave"]
+    #[name = "Nearest octave"]
+    Octave,
+}
+
+impl From<Beyond> for BeyondChoice {
+    fn from(beyond: Beyond) -> Self {
+        match beyond {
+            Beyond::Silent => Self::Silent,
+            Beyond::Octave => Self::Octave,
+        }
+    }
+}
+
+impl From<BeyondChoice> for Beyond {
+    fn from(choice: BeyondChoice) -> Self {
+        match choice {
+            BeyondChoice::Silent => Self::Silent,
+            BeyondChoice::Octave => Self::Octave,
         }
     }
 }
@@ -256,6 +311,9 @@ impl ChalumeauParams {
             physical: PhysicalReedParams::default(),
             knob: KnobParams::new(knob_status.clone(), &moments),
             listening: ListeningParams::new(&number),
+            room: RoomParams::new(&number),
+            expression: ExpressionParams::new(&number),
+            techniques: TechniqueParams::new(&number),
             knob_status,
             schema: AtomicU32::new(SCHEMA),
             window: RwLock::default(),
@@ -267,6 +325,8 @@ impl ChalumeauParams {
                 legato: number("legato"),
                 response: choice("resp", Settings::default().breath_response.into()),
                 curve: number("bcurve"),
+                softest: number("bsoft"),
+                loudest: number("bloud"),
             },
             embouchure: EmbouchureParams {
                 strength: number("stren"),
@@ -286,6 +346,8 @@ impl ChalumeauParams {
                 tuning: choice("tune", Settings::default().tuning.into()),
                 temperature: number("temp"),
                 vent_loss: number("vent"),
+                transpose: whole("transp"),
+                beyond: choice("beyond", Settings::default().reach.beyond.into()),
             },
             noise: NoiseParams { noise: number("noise") },
             output: OutputParams { gain: number("gain"), panic: moment::switch(Moment::Panic, &moments) },
@@ -349,6 +411,8 @@ impl ChalumeauParams {
         let mut settings = Settings {
             breath_response: breath.response.value().into(),
             breath_curve: settled(&breath.curve),
+            breath_softest: settled(&breath.softest),
+            breath_loudest: settled(&breath.loudest),
             breath_full_kpa: settled(&breath.full),
             noise: settled(&noise.noise),
             tongue_ms: settled(&breath.tongue),
@@ -368,6 +432,14 @@ impl ChalumeauParams {
             vent_loss: settled(&tuning.vent_loss),
             gain_db: settled(&output.gain),
             listening: self.listening.listening(),
+            reach: Reach { transpose: tuning.transpose.value(), beyond: tuning.beyond.value().into() },
+            room: self.room.room(),
+            life: settled(&self.expression.life),
+            vibrato: self.expression.vibrato(),
+            attack: self.expression.attack.value().into(),
+            glissando_s: settled(&self.expression.glissando),
+            techniques: self.techniques.techniques(),
+            tract: self.techniques.tract(),
         };
         settings = self.physical.over(settings);
         if let Some((_, trial, side)) = self.knob.study() {

@@ -9,6 +9,7 @@
 use nice_plug::midi::{Channel, Key, VoiceID};
 use nice_plug::prelude::*;
 
+use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::control::midi::{BreathOrigin, MidiDecoder};
 use chalumeau_core::control::notes::{HeldNote, Note, NoteAddress, NoteExpression};
 use chalumeau_core::event::Event;
@@ -51,6 +52,11 @@ impl EventTranslator {
     /// Sets how far the wheel bends until RPN 0 says otherwise, semitones.
     pub fn bend_range(&mut self, semitones: i32) -> &[Event] {
         self.midi.usual_bend_range(semitones.clamp(0, 127) as u8)
+    }
+
+    /// Sets what the mod wheel does.
+    pub fn wheel(&mut self, wheel: Wheel) -> &[Event] {
+        self.midi.set_wheel(wheel)
     }
 
     /// Ends all notes at once.

@@ -79,6 +79,10 @@ const TEXTS: &[(&str, &str)] = texts![
     "knob_clear_thresholds",
     "knob_spring",
     "knob_light_hand",
+    "growling_street",
+    "growl_in_fifths",
+    "flutter_cabaret",
+    "rising_glissando",
 ];
 
 static PRESETS: LazyLock<Vec<Preset>> =

@@ -13,13 +13,20 @@ use crate::support::Told;
 /// What stands where.
 const SLIDERS: &[(Tab, &[&str])] = &[
     (Tab::Reed, &["stren", "lip", "zeta", "damp", "reedh", "reeda", "lay"]),
-    (Tab::Breath, &["breath", "bcurve", "full", "curve", "tongue", "legato", "noise"]),
-    (Tab::Sound, &["a4", "noise", "zeta", "lay", "vent", "gain"]),
+    (
+        Tab::Breath,
+        &[
+            "breath", "bcurve", "bsoft", "bloud", "full", "curve", "tongue", "legato", "gliss", "noise",
+            "life", "vib", "vibhz", "vibon", "vibun", "growl", "growli", "growlf", "flut", "fluthz", "subt",
+            "tract", "tractp",
+        ],
+    ),
+    (Tab::Sound, &["a4", "noise", "zeta", "lay", "vent", "gain", "room", "rsize", "rdecay", "rtone"]),
     (
         Tab::Knob,
         &["ceil", "contr", "place", "torque", "mark", "kdamp", "kfric", "refnot", "curve", "oscprt", "oscfl"],
     ),
-    (Tab::Instrument, &["a4", "temp", "vent", "tongue", "legato", "noise", "bendr", "gain"]),
+    (Tab::Instrument, &["a4", "transp", "temp", "vent", "tongue", "legato", "noise", "bendr", "gain"]),
 ];
 /// Where the reed is named as its maker measures it.
 const MAKER_SLIDERS: &[&str] = &["rstiff", "rarea", "rwidth", "ropen"];
@@ -32,10 +39,10 @@ const STUDY_SWITCHES: &[&str] = &["rec", "replay", "study"];
 const STUDY_CHOICES: &[&str] = &["side"];
 const CHOICES: &[(Tab, &[&str])] = &[
     (Tab::Reed, &["rface", "hsrc", "ksrc"]),
-    (Tab::Breath, &["resp"]),
+    (Tab::Breath, &["resp", "attack", "wheel", "growlp"]),
     (Tab::Sound, &["tune", "heard"]),
     (Tab::Knob, &["knob", "law", "order"]),
-    (Tab::Instrument, &["tune", "qual"]),
+    (Tab::Instrument, &["tune", "beyond", "qual"]),
 ];
 /// Parameters that no widget of that kind moves, and how they are reached; each has a test.
 const OTHERWISE: &[(&str, &str)] = &[
@@ -60,7 +67,7 @@ const MOMENTARY: &[(Tab, &str, &str)] = &[
 #[test]
 fn every_parameter_has_a_place() {
     let host = crate::support::Fake::default();
-    assert_eq!(host.ids().len(), 66);
+    assert_eq!(host.ids().len(), 91);
     let lists = [SLIDERS, SWITCHES, CHOICES].into_iter().flatten().flat_map(|(_, ids)| ids.iter());
     let placed: Vec<&str> = lists
         .chain([STUDY_SLIDERS, STUDY_SWITCHES, STUDY_CHOICES].into_iter().flatten())
@@ -268,7 +275,9 @@ fn chooses(window: &mut Window, id: &str) {
         } else {
             window.harness.get_by_role_and_label(Role::ComboBox, &look.name).click();
             window.harness.run();
-            let items = window.harness.get_all_by_label(&text).collect::<Vec<_>>();
+            // A slider of the same name is none of the list.
+            let is_item = |node: &egui_kittest::Node<'_>| node.accesskit_node().role() != Role::Slider;
+            let items = window.harness.get_all_by_label(&text).filter(is_item).collect::<Vec<_>>();
             items.last().unwrap().click();
         }
         window.harness.run();

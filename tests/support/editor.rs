@@ -13,13 +13,12 @@ use chalumeau::editor::snapshot::{
 };
 use chalumeau::editor::sound_analysis::SoundAnalyser;
 use chalumeau::editor::{EditorState, Tab, WindowState, draw};
+use chalumeau::parameters::{self, PARAMETERS, Value};
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::event::Event;
 use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, PlayedReed, RequirementSolver, TorqueLimits};
 use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
-use chalumeau_core::instrument::{
-    BreathResponse, Clarinet, Listening, ListeningMode, Probe, Settings, Tuning, feel_inputs,
-};
+use chalumeau_core::instrument::{BreathResponse, Clarinet, Probe, Settings, feel_inputs};
 use chalumeau_core::reed::PhysicalReed;
 use chalumeau_core::units::WrittenNote;
 use egui_kittest::Harness;
@@ -161,40 +160,18 @@ impl Fake {
 
     /// The parameters as the instrument reads them.
     pub fn settings(&self) -> Settings {
-        let settings = Settings {
-            breath_response: if self.plain("resp") > 0.5 {
-                BreathResponse::Physical
-            } else {
-                BreathResponse::Played
-            },
-            breath_curve: self.plain("bcurve"),
-            breath_full_kpa: self.plain("full"),
-            noise: 0.01 * self.plain("noise"),
-            tongue_ms: self.plain("tongue"),
-            legato_ms: self.plain("legato"),
-            strength: self.plain("stren"),
-            lip: self.plain("lip"),
-            zeta: self.plain("zeta"),
-            damping: self.plain("damp"),
-            lay: self.plain("lay"),
-            reed_h: self.plain("reedh"),
-            reed_k: self.plain("reedk"),
-            coupled: self.plain("reedc") > 0.5,
-            reed_a: self.plain("reeda"),
-            a4_hz: self.plain("a4"),
-            tuning: if self.plain("tune") > 0.5 { Tuning::Tempered } else { Tuning::Natural },
-            temperature_c: self.plain("temp"),
-            vent_loss: self.plain("vent"),
-            gain_db: self.plain("gain"),
-            listening: Listening {
-                mode: [ListeningMode::Everywhere, ListeningMode::Position, ListeningMode::Point]
-                    [self.plain("heard") as usize],
-                distance_m: self.plain("ldist"),
-                angle_deg: self.plain("langle"),
-                height_m: self.plain("lheigh"),
-                width_deg: self.plain("lwidth"),
-            },
-        };
+        let mut settings = Settings::default();
+        for parameter in PARAMETERS {
+            let plain = self.plain(parameter.id);
+            let value = match parameter.kind {
+                parameters::Kind::Number(number) => Value::Number(plain / number.scale),
+                parameters::Kind::Whole(_) => Value::Whole(plain as i32),
+                parameters::Kind::Choice(_) => Value::Choice(plain as usize),
+                parameters::Kind::Switch(_) => Value::Switch(plain > 0.5),
+                parameters::Kind::Status(_) => continue,
+            };
+            parameter.set(&mut settings, value);
+        }
         if self.plain("rface") < 0.5 {
             return settings;
         }
@@ -512,10 +489,10 @@ pub fn shot(harness: &mut Harness<'_, EditorState>, scale: f32) -> image::RgbaIm
     image::imageops::crop_imm(&whole, px(FRAME), px(FRAME), px(size.0), px(size.1)).to_image()
 }
 
-/// Both at once. The first view shows the note at mezzo-forte, as a player plays it.
+/// Both at once. The views of the player show the note at mezzo-forte, as a player plays it.
 pub fn picture(kept: &WindowState, controls: &Fake, snapshot: &Snapshot, scale: f32) -> image::RgbaImage {
     let mut snapshot = snapshot.clone();
-    if kept.tab == Tab::Play {
+    if matches!(kept.tab, Tab::Play | Tab::Breath) {
         snapshot.settings.breath_response = BreathResponse::Played;
         snapshot.dynamic = Some(MEZZO_FORTE as f32);
     }

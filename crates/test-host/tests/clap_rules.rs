@@ -89,6 +89,7 @@ fn parameters_are_described_by_the_rules() {
         "Breath response",
         "Reed coupled",
         "Tuning",
+        "Beyond the range",
         "Knob",
         "Feel",
         "Feel order",
@@ -99,6 +100,9 @@ fn parameters_are_described_by_the_rules() {
         "Offline quality",
         "Reed face",
         "Heard from",
+        "Attack",
+        "Mod wheel",
+        "Growl pitch",
     ];
     assert_eq!(flagged(ParamInfoFlags::IS_ENUM), choices);
     assert_eq!(flagged(ParamInfoFlags::REQUIRES_PROCESS), ["Breath", "Panic"]);
@@ -422,6 +426,9 @@ fn pages_for_control_surfaces_hold_what_a_player_turns() {
     let titles: Vec<_> = pages.iter().map(|page| (page.section.as_str(), page.name.as_str())).collect();
     let expected = [
         ("Player", "Breath and lip"),
+        ("Player", "Expression"),
+        ("Player", "Techniques"),
+        ("Player", "Room"),
         ("Player", "Tuning"),
         ("Player", "Listening"),
         ("Reed", "Reed"),

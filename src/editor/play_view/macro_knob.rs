@@ -1,21 +1,19 @@
 //! A main control as a round knob. It moves by dragging up and down (Shift: ten times finer) and by arrow keys when it has the
 //! focus. A double click or Ctrl-click sets the default.
 
-use egui::accesskit::Action as AccessAction;
 use egui::{
-    Align2, CursorIcon, EventFilter, FontId, Key, Pos2, Response, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo,
-    pos2, vec2,
+    Align2, CursorIcon, FontId, Pos2, Response, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, pos2, vec2,
 };
 
 use crate::editor::controls::{Hands, Look, teach};
 use crate::editor::host_marks;
+use crate::editor::key_steps::KeySteps;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
 /// From end to end, points of dragging.
 const TRAVEL: f32 = 160.0;
-/// Share of the way an arrow key moves; a tenth of that with Shift.
-const KEY_STEP: f32 = 0.02;
+const KEYS: KeySteps = KeySteps { share: 0.02, has_vertical: true };
 /// The arc, from its low end to its high end, radians clockwise from the right.
 const ARC: (f32, f32) = (0.75 * std::f32::consts::PI, 2.25 * std::f32::consts::PI);
 const HOW: &str = "Drag up or down; Shift: finer. Double click or Ctrl-click: default. Arrow keys move it.";
@@ -42,7 +40,7 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2) {
     let (rect, mut response) = ui.allocate_exact_size(size, Sense::click_and_drag());
     let mut value = moved_by_pointer(ui, hands, of.id, &look, &response).unwrap_or(look.value);
     if response.has_focus() {
-        value = moved_by_keys(ui, hands, of.id, &look, &response).unwrap_or(value);
+        value = KEYS.moved(ui, hands, of.id, &look, &response).unwrap_or(value);
     }
     if response.double_clicked() || (response.clicked() && ui.input(|input| input.modifiers.command)) {
         value = look.default;
@@ -146,36 +144,4 @@ fn moved_by_pointer(
         hands.end(id);
     }
     value
-}
-
-fn moved_by_keys(
-    ui: &Ui,
-    hands: &mut Hands,
-    id: &'static str,
-    look: &Look,
-    response: &Response,
-) -> Option<f32> {
-    let filter = EventFilter { horizontal_arrows: true, vertical_arrows: true, ..EventFilter::default() };
-    ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, filter));
-    let unit = look.steps.map_or(KEY_STEP, |steps| 1.0 / steps.max(1) as f32);
-    let (mut by, mut to) = (0.0, None);
-    ui.input(|input| {
-        let fine = if input.modifiers.shift && look.steps.is_none() { 0.1 } else { 1.0 };
-        let presses = |key| input.num_presses(key) as f32;
-        let up = presses(Key::ArrowRight) + presses(Key::ArrowUp);
-        let down = presses(Key::ArrowLeft) + presses(Key::ArrowDown);
-        by += unit * fine * (up - down);
-        by += unit * input.num_accesskit_action_requests(response.id, AccessAction::Increment) as f32;
-        by -= unit * input.num_accesskit_action_requests(response.id, AccessAction::Decrement) as f32;
-        if input.key_pressed(Key::Home) {
-            to = Some(0.0);
-        } else if input.key_pressed(Key::End) {
-            to = Some(1.0);
-        } else if input.key_pressed(Key::Delete) || input.key_pressed(Key::Backspace) {
-            to = Some(look.default);
-        }
-    });
-    let value = to.or((by != 0.0).then(|| (look.value + by).clamp(0.0, 1.0)))?;
-    hands.put(id, value);
-    Some(value)
 }

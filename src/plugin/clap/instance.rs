@@ -33,6 +33,7 @@ use super::out_events::OutEvents;
 use super::{Introduced, Introduction, indication, note_names, note_ports, params, presets, state};
 use crate::parameters::{self, InUse, Parameter};
 use crate::plugin::host_link::HostCalls;
+use crate::plugin::params::BeyondChoice;
 use crate::plugin::{Chalumeau, Task};
 use chalumeau_core::instrument::Clarinet;
 
@@ -59,8 +60,9 @@ pub struct Instance {
     pub note_names: Mutex<NoteNames>,
     /// The tail, samples.
     tail: AtomicU32,
-    /// The groups of parameters that were in use when the host was last asked for a callback, and told.
-    asked_in_use: AtomicU32,
+    /// What [`asked`](Self::asked) was when the host was last asked for a callback.
+    asked: AtomicU32,
+    /// The groups of parameters that were in use when the host was last told.
     told_in_use: AtomicU32,
     told_texts: AtomicU32,
     /// How often the plugin had moved parameters when the host was last told.
@@ -109,13 +111,13 @@ impl Instance {
             entries,
             note_names: Mutex::default(),
             tail: AtomicU32::new(0),
-            asked_in_use: AtomicU32::new(0),
+            asked: AtomicU32::new(0),
             told_in_use: AtomicU32::new(0),
             told_texts: AtomicU32::new(0),
             told_values: AtomicU32::new(0),
         };
-        let in_use = instance.in_use();
-        instance.asked_in_use.store(in_use, Ordering::Relaxed);
+        let (in_use, asked) = (instance.in_use(), instance.asked());
+        instance.asked.store(asked, Ordering::Relaxed);
         instance.told_in_use.store(in_use, Ordering::Relaxed);
         Box::into_raw(Box::new(instance)).cast()
     }
@@ -152,10 +154,18 @@ impl Instance {
             .sum()
     }
 
-    /// After the host has moved parameters: asks for a callback if others are in use now. Real-time safe.
-    pub fn look_at_use(&self) {
-        let in_use = self.in_use();
-        if self.asked_in_use.swap(in_use, Ordering::Relaxed) != in_use {
+    /// Which parameters have an effect and which notes the keys play, as one number. Real-time safe.
+    fn asked(&self) -> u32 {
+        let tuning = &self.introduced.params.tuning;
+        let beyond = u32::from(tuning.beyond.value() == BeyondChoice::Octave);
+        (tuning.transpose.value() as u32) << 8 | beyond << 7 | self.in_use()
+    }
+
+    /// After the host has moved parameters: asks for a callback if others are in use now, or if the keys play other notes.
+    /// Real-time safe.
+    pub fn look_at_params(&self) {
+        let asked = self.asked();
+        if self.asked.swap(asked, Ordering::Relaxed) != asked {
             self.host.calls().request_callback();
         }
     }
@@ -244,7 +254,7 @@ unsafe extern "C" fn process(
     let status =
         this.inner.process.map_or(CLAP_PROCESS_ERROR, |process| unsafe { process(plugin, &raw const asked) });
     out.push_off(&this.introduced.params, last);
-    this.look_at_use();
+    this.look_at_params();
     this.follow_tail(plugin);
     let may_sleep = this.introduced.params.host.may_sleep();
     match status {

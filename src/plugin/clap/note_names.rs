@@ -11,6 +11,7 @@ use super::instance::Instance;
 use super::{Introduced, text};
 use crate::plugin::instrument_loading::instrument_request::InstrumentRequest;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::instrument::{KeyPitches, Reach};
 use chalumeau_core::units::{SoundingNote, WrittenNote};
 
 pub static NOTE_NAME: clap_plugin_note_name = clap_plugin_note_name { count: Some(count), get: Some(get) };
@@ -23,12 +24,17 @@ impl NoteNames {
     /// Takes them from the instrument that plays, or before the first activation from the chosen one. Says whether they have
     /// changed.
     pub fn renew(&mut self, introduced: &Introduced) -> bool {
+        let reach = introduced.params.settings().reach;
         let names = match introduced.instrument.current() {
-            Some(current) => named(&current.model.file, |fingering| current.model.speaks(fingering)),
+            Some(current) => named(&current.model.file, reach, &current.model.keys, |fingering| {
+                current.model.speaks(fingering)
+            }),
             None => {
                 // The rate is no matter for a file. Without a readable file nothing is known to sound.
                 let request = InstrumentRequest::from_params(&introduced.params, 48_000.0, false);
-                request.file().map_or_else(|_| Vec::new(), |file| named(&file, |_| true))
+                request
+                    .file()
+                    .map_or_else(|_| Vec::new(), |file| named(&file, reach, &KeyPitches::default(), |_| true))
             }
         };
         let has_changed = self.0 != names;
@@ -37,17 +43,22 @@ impl NoteNames {
     }
 }
 
-/// The keys of an instrument's fingerings, without those that do not speak in tune and are silent.
-fn named(file: &InstrumentFile, speaks: impl Fn(usize) -> bool) -> Vec<(SoundingNote, WrittenNote)> {
-    let speaking = file.fingerings.iter().enumerate().filter(|(index, _)| speaks(*index));
-    let mut names: Vec<_> = speaking
-        .filter_map(|(_, fingering)| {
-            Some((fingering.written.sounding(file.transposition)?, fingering.written))
-        })
-        .collect();
-    names.sort_unstable();
-    names.dedup();
-    names
+/// The keys that play a fingering of an instrument, without those that do not speak in tune and are silent.
+fn named(
+    file: &InstrumentFile,
+    reach: Reach,
+    keys: &KeyPitches,
+    speaks: impl Fn(usize) -> bool,
+) -> Vec<(SoundingNote, WrittenNote)> {
+    let plays = |note: SoundingNote| {
+        let written = note.written(file.transposition)?;
+        let fingering = file.fingerings.iter().position(|fingering| fingering.written == written)?;
+        speaks(fingering).then_some(written)
+    };
+    (0..128)
+        .map(SoundingNote)
+        .filter_map(|key| reach.find(key, keys, plays).map(|(_, written)| (key, written)))
+        .collect()
 }
 
 unsafe extern "C" fn count(plugin: *const clap_plugin) -> u32 {
@@ -78,17 +89,25 @@ unsafe extern "C" fn get(plugin: *const clap_plugin, index: u32, note_name: *mut
 mod tests {
     use super::*;
     use chalumeau_core::bore::bundled::Bundled;
+    use chalumeau_core::instrument::Beyond;
 
     #[test]
     fn keys_have_the_names_that_the_player_reads() {
         for (instrument, count, lowest) in
             [(Bundled::BFlat, 46, (50, "E3")), (Bundled::A, 46, (49, "E3")), (Bundled::Bass, 46, (38, "E3"))]
         {
-            let names = named(&instrument.file(), |_| true);
+            let all = |reach: Reach, speaks: fn(usize) -> bool| {
+                named(&instrument.file(), reach, &KeyPitches::default(), speaks)
+            };
+            let names = all(Reach::default(), |_| true);
             assert_eq!(names.len(), count, "{instrument:?}");
-            assert_eq!(named(&instrument.file(), |fingering| fingering > 0).len(), count - 1);
+            assert_eq!(all(Reach::default(), |fingering| fingering > 0).len(), count - 1);
             let (sounding, written) = names[0];
             assert_eq!((sounding.0, written.to_string().as_str()), lowest, "{instrument:?}");
+            let up = all(Reach { transpose: 12, ..Reach::default() }, |_| true);
+            assert_eq!(up[0], (SoundingNote(sounding.0 - 12), written));
+            let folded = all(Reach { beyond: Beyond::Octave, ..Reach::default() }, |_| true);
+            assert_eq!(folded.len(), 128, "every key plays");
         }
     }
 }

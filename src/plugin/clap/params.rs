@@ -189,7 +189,7 @@ unsafe extern "C" fn flush(
         .inspect(|flush| unsafe { flush(plugin, in_, list) });
     params.fall_back();
     out.push_off(params, 0);
-    this.look_at_use();
+    this.look_at_params();
     // What was moved may have to be heard.
     this.host.calls().request_process();
 }

@@ -19,6 +19,9 @@ pub fn define(params: &ChalumeauParams, context: &mut impl RemoteControlsContext
         instrument,
         physical,
         listening,
+        room,
+        expression,
+        techniques,
         ..
     } = params;
     context.add_section("Player", |section| {
@@ -32,6 +35,31 @@ pub fn define(params: &ChalumeauParams, context: &mut impl RemoteControlsContext
             page.add_param(&breath.tongue);
             page.add_param(&breath.legato);
         });
+        section.add_page("Expression", |page| {
+            page.add_param(&expression.vibrato);
+            page.add_param(&expression.vibrato_rate);
+            page.add_param(&expression.attack);
+            page.add_param(&expression.glissando);
+            page.add_param(&expression.life);
+            page.add_param(&breath.curve);
+            page.add_param(&breath.softest);
+            page.add_param(&breath.loudest);
+        });
+        section.add_page("Techniques", |page| {
+            page.add_param(&techniques.growl);
+            page.add_param(&techniques.growl_interval);
+            page.add_param(&techniques.flutter);
+            page.add_param(&techniques.flutter_rate);
+            page.add_param(&techniques.subtone);
+            page.add_param(&techniques.tract);
+            page.add_param(&techniques.tract_interval);
+        });
+        section.add_page("Room", |page| {
+            page.add_param(&room.amount);
+            page.add_param(&room.size);
+            page.add_param(&room.decay);
+            page.add_param(&room.tone);
+        });
         section.add_page("Tuning", |page| {
             page.add_param(&tuning.a4);
             page.add_param(&tuning.tuning);
@@ -39,6 +67,8 @@ pub fn define(params: &ChalumeauParams, context: &mut impl RemoteControlsContext
             page.add_param(&tuning.vent_loss);
             page.add_param(&instrument.bend_range);
             page.add_param(&instrument.choice);
+            page.add_param(&tuning.transpose);
+            page.add_param(&tuning.beyond);
         });
         section.add_page("Listening", |page| {
             page.add_param(&listening.mode);

@@ -87,7 +87,7 @@ unsafe extern "C" fn load(plugin: *const clap_plugin, stream: *const clap_istrea
         .and_then(|state| state.load)
         .is_some_and(|load| unsafe { load(plugin, stream) });
     // Other parameters may be in use; hosts load states on the main thread.
-    this.look_at_use();
+    this.look_at_params();
     this.tell_changes();
     this.host.calls().request_process();
     is_loaded

@@ -85,6 +85,7 @@ impl InstrumentSwap {
         (self.activation, self.awaited_choice) = (activation, choice);
         self.rate_hz = rate_hz;
         self.stereo = Stereo::new(rate_hz);
+        self.stereo.set_room(&self.settings.room);
         self.warm_up = (WARM_UP_S * rate_hz) as usize;
         self.fade = (FADE_S * rate_hz) as usize;
     }
@@ -92,6 +93,16 @@ impl InstrumentSwap {
     /// The instrument that plays.
     pub fn clarinet(&self) -> &Clarinet {
         &self.playing
+    }
+
+    /// Whether neither the instrument nor its room sounds: the host may stop calling.
+    pub fn is_silent(&self) -> bool {
+        self.playing.is_silent() && self.stereo.room().is_silent()
+    }
+
+    /// Longest time from rest to silence, s.
+    pub fn tail_s(&self) -> f64 {
+        Clarinet::TAIL_S + self.stereo.room().tail_s()
     }
 
     /// Switches on or off that the instrument keeps its last moments for the window.
@@ -107,6 +118,7 @@ impl InstrumentSwap {
     /// Applies settings to both instruments.
     pub fn set_settings(&mut self, settings: &Settings) {
         self.settings = *settings;
+        self.stereo.set_room(&settings.room);
         self.playing.set_settings(settings);
         if let Some(next) = &mut self.next {
             next.clarinet.set_settings(settings);
@@ -198,7 +210,7 @@ impl InstrumentSwap {
         self.render(out.part(done..end));
     }
 
-    /// Pans the two channels of the block that was rendered last. See [`Stereo`].
+    /// Room and pan of the two channels of the block that was rendered last. See [`Stereo`].
     pub fn pan(&mut self, left: &mut [f32], right: &mut [f32]) {
         self.stereo.pan(left, right);
     }

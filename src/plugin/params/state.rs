@@ -15,11 +15,13 @@ use crate::presets::{NAME_MOST, Preset, factory};
 
 /// Layout of the saved state. 1: ids and units as below. 2: the instrument and its file, the physical reed; a state of 1
 /// is the B flat clarinet. 3: listening; a state of 1 or 2 is heard as from one point. 4: the breath response; in an earlier
-/// state breath is physical and the tuning natural, unless it says otherwise.
-pub const SCHEMA: u32 = 4;
+/// state breath is physical and the tuning natural, unless it says otherwise. 5: life and vibrato; in an earlier state a held note
+/// stands still and the mod wheel does nothing.
+pub const SCHEMA: u32 = 5;
 const SCHEMA_FIELD: &str = "schema";
 /// Choices that meant something else before a layout, or were not there: id, what it was, and the first layout that has it.
-const BEFORE: [(&str, &str, u32); 3] = [("resp", "phys", 4), ("tune", "nat", 4), ("heard", "point", 3)];
+const BEFORE: [(&str, &str, u32); 4] =
+    [("resp", "phys", 4), ("tune", "nat", 4), ("heard", "point", 3), ("wheel", "none", 5)];
 
 /// A number's default in this process: the table's, or what the program was started with.
 pub(super) fn starting(id: &str, number: &Number) -> f32 {
@@ -47,6 +49,9 @@ pub fn mend(state: &mut PluginState) {
             // What was saved then goes on sounding as it did.
             old.entry(id.to_owned()).or_insert_with(|| ParamValue::String(was.to_owned()));
         }
+    }
+    if schema.is_some_and(|schema| schema < 5) {
+        old.entry("life".to_owned()).or_insert(ParamValue::F32(0.0));
     }
     for parameter in PARAMETERS {
         let value = mended(parameter, old.remove(parameter.id));

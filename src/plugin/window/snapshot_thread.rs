@@ -24,7 +24,7 @@ use crate::plugin::instrument_loading::{CurrentInstrument, Readiness};
 use crate::plugin::knob;
 use crate::plugin::params::instrument::InstrumentChoice;
 use chalumeau_core::haptics::FeelDesign;
-use chalumeau_core::instrument::Settings;
+use chalumeau_core::instrument::{KeyPitches, Settings};
 use chalumeau_core::units::SoundingNote;
 #[cfg(feature = "devices")]
 use chalumeau_knob::device::{LinkStatus, Phase, RuntimeDir};
@@ -103,6 +103,8 @@ impl SnapshotThread {
         let settings = self.handles.params.settings();
         let mut snapshot = Snapshot { settings, ..self.blank.clone() };
         snapshot.instruments = InstrumentChoice::ALL.iter().map(|choice| choice.title().to_owned()).collect();
+        snapshot.key_pitches =
+            current.as_ref().map_or_else(KeyPitches::default, |current| current.model.keys.clone());
         snapshot.silent = current.as_ref().map_or_else(Vec::new, |current| current.model.silent_notes());
         snapshot.chosen = Some(self.handles.params.instrument.choice.value() as usize);
         show_inside(&mut snapshot, &inside);
@@ -236,6 +238,7 @@ impl SnapshotThread {
 
 /// Fills in what the audio thread has sent.
 fn show_inside(snapshot: &mut Snapshot, inside: &AudioSnapshot) {
+    snapshot.key = inside.now.key;
     snapshot.sounding = inside.now.sounding;
     snapshot.mouth_kpa = inside.now.mouth_kpa;
     snapshot.lip = inside.now.lip;

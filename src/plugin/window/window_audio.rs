@@ -37,7 +37,14 @@ pub struct AudioSnapshot {
 impl Default for AudioSnapshot {
     fn default() -> Self {
         Self {
-            now: PlayerState { sounding: None, fingering: 0, mouth_kpa: 0.0, lip: None, dynamic: None },
+            now: PlayerState {
+                key: None,
+                sounding: None,
+                fingering: 0,
+                mouth_kpa: 0.0,
+                lip: None,
+                dynamic: None,
+            },
             moments: Box::new([ScopeSample::default(); SCOPE_SAMPLES]),
             moments_hz: 48_000.0,
             host_rate_hz: 48_000.0,

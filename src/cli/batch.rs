@@ -1,0 +1,273 @@
+//! `chalumeau batch`: renders many variations of one command, and a table of what each file is: data sets.
+
+mod plan;
+
+use crate::cli::Failure;
+use crate::cli::csv_table::{CsvTable, quoted};
+use crate::cli::render::{RenderCommand, Rendered};
+use chalumeau_core::parallel;
+use clap::{Args, Parser};
+use indicatif::{ProgressBar, ProgressStyle};
+use plan::{Plan, Variation};
+use std::collections::HashMap;
+use std::fs;
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::Mutex;
+
+/// Name of the table in the folder.
+const MANIFEST: &str = "manifest.csv";
+/// The same while it grows, in the order in which files become ready.
+const GROWING: &str = "manifest.part.csv";
+
+const EXAMPLES: &str = "\
+Examples:
+  chalumeau batch plan.toml --into set
+  chalumeau batch rows.csv --into set --dry-run
+
+A plan is a TOML file. [same] is for every file; of [vary] every combination is rendered:
+  [same]
+  seconds = 1.5
+  no-noise = true
+  [vary]
+  written = [\"E3\", \"C4\", \"G4\"]
+  gamma = { from = 0.4, to = 0.6, steps = 5 }
+  zeta = [0.2, 0.3]
+Names are flags of `chalumeau render` without their dashes, or ids of `chalumeau parameters`; a MIDI file is midi = \"melody.mid\".
+A CSV file has the names in its first line, and one file to render in each other line; an empty field leaves its name out.";
+
+/// Render many variations into a folder, with a table of what each file is
+///
+/// Works on all cores. If it is stopped, the same command goes on where it was: files that are listed with the same arguments stay
+/// as they are. The table, manifest.csv, has a line for each file: its arguments, length, peak and level.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub struct BatchCommand {
+    /// Plan: a TOML file, or a CSV file with a line for each file to render
+    #[arg(value_name = "PLAN")]
+    plan: PathBuf,
+    /// Folder for the WAV files and manifest.csv; it is made if it is not there
+    #[arg(long, value_name = "FOLDER")]
+    into: PathBuf,
+    /// Render all files anew, also those that are there
+    #[arg(long)]
+    force: bool,
+    /// Only check the plan and print the commands
+    #[arg(long)]
+    dry_run: bool,
+}
+
+#[derive(Parser)]
+struct RenderLine {
+    #[command(flatten)]
+    render: RenderCommand,
+}
+
+/// A variation and the command that renders it.
+struct Job {
+    /// Name of the file.
+    file: String,
+    /// Beginning of its line in the table: name and arguments.
+    line: String,
+    words: Vec<String>,
+    render: RenderCommand,
+}
+
+impl BatchCommand {
+    pub fn run(&self) -> Result<(), Failure> {
+        let plan = Plan::read(&self.plan).map_err(|what| self.failure(&what))?;
+        let jobs = self.jobs(&plan)?;
+        if self.dry_run {
+            for job in &jobs {
+                println!("chalumeau {}", job.words.join(" "));
+            }
+            return Ok(());
+        }
+        fs::create_dir_all(&self.into)
+            .map_err(|error| self.failure(&format!("cannot make {}: {error}", self.into.display())))?;
+        let header = format!("file,{},length_s,rate_hz,peak_dbfs,rms_dbfs", plan.names.join(","));
+        let there = if self.force { HashMap::new() } else { self.there(&header) };
+        let growing = self.into.join(GROWING);
+        let mut journal =
+            fs::File::create(&growing).map_err(|source| Failure::Batch { path: growing.clone(), source })?;
+        let mut say = |line: &str| {
+            writeln!(journal, "{line}").map_err(|source| Failure::Batch { path: growing.clone(), source })
+        };
+        say(&header)?;
+        let mut lines = Vec::with_capacity(jobs.len());
+        for job in &jobs {
+            let kept = there.get(&job.line).filter(|_| self.into.join(&job.file).is_file());
+            if let Some(line) = kept {
+                say(line)?;
+            }
+            lines.push(kept.cloned());
+        }
+        let left: Vec<_> = (0..jobs.len()).filter(|&at| lines[at].is_none()).collect();
+        if left.len() < jobs.len() {
+            eprintln!("{} of {} files are there already", jobs.len() - left.len(), jobs.len());
+        }
+        let bar = progress(left.len());
+        let (journal, failed) = (Mutex::new(&mut say), Mutex::new(None));
+        let made = parallel::each(
+            left.len(),
+            |at| {
+                let job = &jobs[left[at]];
+                let line = job.render.render(|_| ProgressBar::hidden()).and_then(|made| {
+                    let line = finished(&job.line, &made);
+                    if let Ok(mut say) = journal.lock() {
+                        (*say)(&line)?;
+                    }
+                    Ok(line)
+                });
+                line.map_err(|failure| {
+                    if let Ok(mut failed) = failed.lock() {
+                        failed.get_or_insert((job.words.join(" "), failure));
+                    }
+                })
+                .ok()
+            },
+            &mut |_| {
+                bar.inc(1);
+                let has_failed = failed.lock().is_ok_and(|failed| failed.is_some());
+                if has_failed { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            },
+        );
+        bar.finish_and_clear();
+        if let Some((words, failure)) = failed.into_inner().ok().flatten() {
+            return Err(Failure::Usage(format!("chalumeau {words}: {failure}")));
+        }
+        for (at, line) in left.into_iter().zip(made.unwrap_or_default()) {
+            lines[at] = line;
+        }
+        let mut table = CsvTable::open(&self.into.join(MANIFEST), true, &header)?;
+        for line in lines.iter().flatten() {
+            table.line(format_args!("{line}"))?;
+        }
+        table.finish()?;
+        let _ = fs::remove_file(&growing);
+        eprintln!("{}: {} files and {MANIFEST}", self.into.display(), jobs.len());
+        Ok(())
+    }
+
+    fn failure(&self, what: &str) -> Failure {
+        Failure::Usage(format!("{}: {what}", self.plan.display()))
+    }
+
+    /// Checks every command before the first is run.
+    fn jobs(&self, plan: &Plan) -> Result<Vec<Job>, Failure> {
+        let digits = plan.variations.len().to_string().len().max(4);
+        let job = |(at, variation): (usize, &Variation)| {
+            let file = format!("{:0digits$}.wav", at + 1);
+            let mut words = vec!["render".to_owned()];
+            words.extend(plan.words(variation).map_err(|what| self.failure(&what))?);
+            words.extend([
+                "--out".to_owned(),
+                self.into.join(&file).to_string_lossy().into_owned(),
+                "--force".to_owned(),
+            ]);
+            let parsed = RenderLine::try_parse_from(&words).map_err(|error| {
+                // Clap's own text without its "error: " and usage.
+                let text = error.to_string();
+                let first = text.lines().next().unwrap_or_default().trim_start_matches("error: ");
+                self.failure(&format!("file {}: {first} (chalumeau {})", at + 1, words.join(" ")))
+            })?;
+            let fields: Vec<_> = variation.values.iter().map(|value| quoted(value)).collect();
+            let line = format!("{file},{}", fields.join(","));
+            Ok(Job { file, line, words, render: parsed.render })
+        };
+        plan.variations.iter().enumerate().map(job).collect()
+    }
+
+    /// The lines of an earlier run with the same columns, by their beginnings.
+    fn there(&self, header: &str) -> HashMap<String, String> {
+        let tables =
+            [MANIFEST, GROWING].map(|name| fs::read_to_string(self.into.join(name)).unwrap_or_default());
+        let columns = MEASURED_COLUMNS;
+        tables
+            .iter()
+            .filter(|text| text.lines().next() == Some(header))
+            .flat_map(|text| text.lines().skip(1))
+            .filter_map(|line| {
+                let begin = line.rsplitn(columns + 1, ',').last()?;
+                Some((begin.to_owned(), line.to_owned()))
+            })
+            .collect()
+    }
+}
+
+/// Columns of a line that are known after the rendering.
+const MEASURED_COLUMNS: usize = 4;
+
+/// The whole line of a file.
+fn finished(begin: &str, made: &Rendered) -> String {
+    let db = |x: f32| if x > 0.0 { format!("{:.2}", 20.0 * x.log10()) } else { "-inf".to_owned() };
+    format!("{begin},{:.4},{},{},{}", made.seconds, made.rate, db(made.level.peak), db(made.level.rms))
+}
+
+/// A progress bar over files; it shows on a terminal only.
+fn progress(files: usize) -> ProgressBar {
+    let bar = ProgressBar::new(files as u64);
+    match ProgressStyle::with_template("{bar:40} {pos} of {len}  {elapsed} (left: {eta})") {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn batch(directory: &Path, plan: &str, text: &str, force: bool) -> (BatchCommand, PathBuf) {
+        let path = directory.join(plan);
+        fs::write(&path, text).unwrap();
+        let into = directory.join("set");
+        (BatchCommand { plan: path, into: into.clone(), force, dry_run: false }, into)
+    }
+
+    #[test]
+    fn a_plan_is_rendered_once_and_goes_on_where_it_was() {
+        let directory = tempfile::tempdir().unwrap();
+        let plan = "[same]\nseconds = 0.05\nno-noise = true\n[vary]\nwritten = [\"E3\", \"C4\"]\ngamma = { from = 0.4, to = 0.5, steps = 2 }\n";
+        let (command, into) = batch(directory.path(), "plan.toml", plan, false);
+        command.run().unwrap();
+        let manifest = fs::read_to_string(into.join(MANIFEST)).unwrap();
+        let lines: Vec<_> = manifest.lines().collect();
+        assert_eq!(lines[0], "file,no-noise,seconds,gamma,written,length_s,rate_hz,peak_dbfs,rms_dbfs");
+        assert_eq!(lines.len(), 5);
+        assert!(lines[2].starts_with("0002.wav,true,0.05,0.4,C4,0.0500,48000,"), "{}", lines[2]);
+        assert!(!into.join(GROWING).exists());
+        // One file is lost: only this one is rendered again.
+        let file = |name: &str| into.join(name);
+        fs::remove_file(file("0003.wav")).unwrap();
+        fs::write(file("0001.wav"), "mine").unwrap();
+        command.run().unwrap();
+        assert_eq!(fs::read(file("0001.wav")).unwrap(), b"mine");
+        assert!(fs::metadata(file("0003.wav")).unwrap().len() > 1_000);
+        assert_eq!(fs::read_to_string(file(MANIFEST)).unwrap(), manifest);
+        // With other arguments all are.
+        let (changed, _) = batch(directory.path(), "plan.toml", &plan.replace("0.05", "0.06"), false);
+        changed.run().unwrap();
+        assert_ne!(fs::read(file("0001.wav")).unwrap(), b"mine");
+    }
+
+    #[test]
+    fn mistakes_are_told_before_anything_is_rendered() {
+        let directory = tempfile::tempdir().unwrap();
+        for (name, text, says) in [
+            ("p.toml", "[vary]\nwritten = [\"H9\"]\n", "file 1"),
+            ("p.toml", "[vary]\nwriten = [\"C4\"]\n", "written"),
+            ("p.toml", "[vary]\nout = [\"x.wav\"]\n", "out"),
+            ("p.toml", "[vary]\n", "nothing varies"),
+            ("p.toml", "vary = 3", "invalid type"),
+            ("r.csv", "written,gamma\nC4\n", "line 2"),
+            ("r.csv", "", "names"),
+        ] {
+            let (command, into) = batch(directory.path(), name, text, false);
+            let said = command.run().unwrap_err().to_string();
+            assert!(said.contains(says), "{text}: {said}");
+            assert!(!into.exists());
+        }
+    }
+}

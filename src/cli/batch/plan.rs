@@ -1,0 +1,202 @@
+//! What a batch renders: names, and their values for each file.
+
+use crate::cli::render::RenderCommand;
+use crate::parameters;
+use clap::{Args, Command};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+/// Most files of one batch.
+const FILES_MOST: usize = 1_000_000;
+/// Flags of `render` that the batch sets itself, or that name further files.
+const OWN: [&str; 6] = ["out", "force", "probe", "plot", "plot-at", "help"];
+
+/// The values of one file, in the order of the plan's names; an empty one leaves its name out.
+pub struct Variation {
+    pub values: Vec<String>,
+}
+
+/// What is set for each file.
+pub struct Plan {
+    /// Names: what is the same for all files, then what varies.
+    pub names: Vec<String>,
+    /// The files to render.
+    pub variations: Vec<Variation>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlanFile {
+    #[serde(default)]
+    same: BTreeMap<String, Scalar>,
+    vary: toml::Table,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Scalar {
+    Switch(bool),
+    Whole(i64),
+    Number(f64),
+    Text(String),
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Values {
+    List(Vec<Scalar>),
+    Steps(Steps),
+}
+
+/// Equal steps from one number to another.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Steps {
+    from: f64,
+    to: f64,
+    steps: usize,
+}
+
+impl Scalar {
+    fn text(self) -> String {
+        match self {
+            Self::Switch(on) => on.to_string(),
+            Self::Whole(number) => number.to_string(),
+            Self::Number(number) => number.to_string(),
+            Self::Text(text) => text,
+        }
+    }
+}
+
+impl Values {
+    fn texts(self, name: &str) -> Result<Vec<String>, String> {
+        let texts: Vec<_> = match self {
+            Self::List(list) => list.into_iter().map(Scalar::text).collect(),
+            Self::Steps(Steps { steps: 1, from, .. }) => vec![from.to_string()],
+            Self::Steps(Steps { from, to, steps }) if (2..=FILES_MOST).contains(&steps) => (0..steps)
+                // Nine digits: the sum of steps is not to show its last bits.
+                .map(|step| from + (to - from) * step as f64 / (steps - 1) as f64)
+                .map(|value| ((value * 1e9).round() / 1e9).to_string())
+                .collect(),
+            Self::Steps(Steps { steps, .. }) => {
+                return Err(format!("{name}: steps must lie in 1..{FILES_MOST}, got {steps}"));
+            }
+        };
+        if texts.is_empty() { Err(format!("{name} has no values")) } else { Ok(texts) }
+    }
+}
+
+impl Plan {
+    /// Reads a plan. What is wrong is said without the name of the file.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        let text = fs::read_to_string(path).map_err(|error| format!("cannot be read: {error}"))?;
+        if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
+            Self::from_csv(&text)
+        } else {
+            Self::from_toml(&text)
+        }
+    }
+
+    fn from_toml(text: &str) -> Result<Self, String> {
+        let PlanFile { same, vary } =
+            toml::from_str(text).map_err(|error| error.to_string().trim().to_owned())?;
+        if vary.is_empty() {
+            return Err("nothing varies: [vary] is empty".to_owned());
+        }
+        let (mut names, same): (Vec<_>, Vec<_>) =
+            same.into_iter().map(|(name, value)| (name, value.text())).unzip();
+        let mut variations = vec![same];
+        for (name, values) in vary {
+            let values: Values = values
+                .try_into()
+                .map_err(|_| format!("{name} must be a list, or {{ from = 0.4, to = 0.6, steps = 5 }}"))?;
+            let texts = values.texts(&name)?;
+            if variations.len() * texts.len() > FILES_MOST {
+                return Err(format!("these are more than {FILES_MOST} files"));
+            }
+            variations = variations
+                .iter()
+                .flat_map(|begun: &Vec<String>| {
+                    texts.iter().map(|text| begun.iter().chain([text]).cloned().collect::<Vec<_>>())
+                })
+                .collect();
+            names.push(name);
+        }
+        Self { names, variations: variations.into_iter().map(|values| Variation { values }).collect() }
+            .checked()
+    }
+
+    fn from_csv(text: &str) -> Result<Self, String> {
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+        let names: Vec<_> =
+            reader.headers().map_err(|error| error.to_string())?.iter().map(str::to_owned).collect();
+        if names.iter().all(String::is_empty) {
+            return Err("the first line must have the names, for example written,gamma".to_owned());
+        }
+        let variations = reader
+            .into_records()
+            .map(|record| {
+                let record = record.map_err(|error| {
+                    let line = error.position().map_or(0, csv::Position::line);
+                    format!("line {line} has not as many fields as the first line")
+                })?;
+                Ok(Variation { values: record.iter().map(str::to_owned).collect() })
+            })
+            .collect::<Result<Vec<_>, String>>()?;
+        if variations.is_empty() {
+            return Err("there is no line below the names".to_owned());
+        }
+        Self { names, variations }.checked()
+    }
+
+    /// Fails if a name is none.
+    fn checked(self) -> Result<Self, String> {
+        let render = RenderCommand::augment_args(Command::new("render"));
+        let known = |name: &str| {
+            name == "midi" || is_flag(&render, name).is_some() || parameters::find(name).is_some()
+        };
+        for name in &self.names {
+            if OWN.contains(&name.as_str()) {
+                return Err(format!("{name} cannot be in a plan: the batch names the files itself"));
+            }
+            if !known(name) {
+                let flags = render.get_arguments().filter_map(clap::Arg::get_long);
+                let near = flags
+                    .chain(parameters::PARAMETERS.iter().map(|parameter| parameter.id))
+                    .max_by(|a, b| strsim::jaro_winkler(a, name).total_cmp(&strsim::jaro_winkler(b, name)));
+                return Err(format!(
+                    "no flag of render and no parameter is called {name:?}; do you mean {}?",
+                    near.unwrap_or_default()
+                ));
+            }
+        }
+        Ok(self)
+    }
+
+    /// The words of the command that renders a variation.
+    pub fn words(&self, variation: &Variation) -> Result<Vec<String>, String> {
+        let render = RenderCommand::augment_args(Command::new("render"));
+        let mut words = Vec::new();
+        for (name, value) in self.names.iter().zip(&variation.values) {
+            match (is_flag(&render, name), value.as_str()) {
+                (_, "") => {}
+                (None, _) if name == "midi" => words.push(value.clone()),
+                (Some(false), "true") => words.push(format!("--{name}")),
+                (Some(false), "false") => {}
+                (Some(false), other) => return Err(format!("{name} must be true or false, got {other}")),
+                // With a = a value may begin with a minus.
+                (Some(true), _) => words.push(format!("--{name}={value}")),
+                (None, _) => words.extend(["--set".to_owned(), format!("{name}={value}")]),
+            }
+        }
+        Ok(words)
+    }
+}
+
+/// Whether `render` has a flag of this name, and whether it takes a value.
+fn is_flag(render: &Command, name: &str) -> Option<bool> {
+    let arg = render.get_arguments().find(|arg| arg.get_long() == Some(name))?;
+    Some(arg.get_action().takes_values())
+}

@@ -1,0 +1,107 @@
+//! `chalumeau fingerings`: every fingering that fingers and keys can make, for a note, a trill or two notes at once.
+
+use crate::cli::Failure;
+use crate::cli::csv_table::TableArgs;
+use crate::cli::shared_args::{AirArg, InstrumentArg, note};
+use chalumeau_core::bore::fingering_finder::{FingeringFinder, Found};
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::units::WrittenNote;
+use clap::Args;
+use std::ops::ControlFlow;
+
+const EXAMPLES: &str = "\
+Examples:
+  chalumeau fingerings --note B6
+  chalumeau fingerings --note B5 --trill-to C6
+  chalumeau fingerings --multiphonic --count 30 --csv multiphonics.csv";
+
+/// Find fingerings: for a note, for a trill, or for two notes at once
+///
+/// Looks through every combination of holes that the fingers can make, by the frequency-domain model. gamma_on is the mouth pressure at
+/// which the note begins over the closing pressure of the reed; evenness is the height of its resonance over the next lower one,
+/// below 0 that may sound instead. Best first.
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub struct FingeringsCommand {
+    /// Written note: a MIDI number (95) or a name (B6)
+    #[arg(long, value_name = "NOTE", value_parser = note, required_unless_present = "multiphonic")]
+    note: Option<u8>,
+    /// Two fingerings for a trill to this written note
+    #[arg(long, value_name = "NOTE", value_parser = note, requires = "note")]
+    trill_to: Option<u8>,
+    /// Fingerings with two strong resonances that belong to no one note
+    #[arg(long, conflicts_with_all = ["note", "trill_to"])]
+    multiphonic: bool,
+    /// How many, 1..1000
+    #[arg(long, value_name = "COUNT", default_value = "10", value_parser = clap::value_parser!(u16).range(1..=1_000))]
+    count: u16,
+    #[command(flatten)]
+    air: AirArg,
+    #[command(flatten)]
+    instrument: InstrumentArg,
+    #[command(flatten)]
+    table: TableArgs,
+}
+
+impl FingeringsCommand {
+    pub fn run(&self) -> Result<(), Failure> {
+        let file = self.instrument.load()?;
+        let count = usize::from(self.count);
+        // It is never ended early.
+        let finder = FingeringFinder::new(&file, self.air.air(), &mut |_| ControlFlow::Continue(()))
+            .ok_or_else(|| Failure::Usage("the search was ended".to_owned()))?;
+        let looked = format!("{}; {} fingerings looked through", file.name, finder.len());
+        let Some(note) = self.note.map(WrittenNote) else {
+            let mut table = self.table.open("fingers,low_hz,high_hz,uneven_db,gamma_on,cost,open")?;
+            table.comment(format_args!("{looked}"))?;
+            for one in finder.multiphonics(count) {
+                let [low, high] = one.f_hz;
+                table.line(format_args!(
+                    "{},{low:.1},{high:.1},{:.1},{:.3},{:.2},{}",
+                    one.fingers,
+                    one.uneven_db,
+                    one.gamma_on,
+                    one.cost,
+                    open(&file, one.grip.open)
+                ))?;
+            }
+            return table.finish();
+        };
+        let one = |found: &Found| {
+            format!(
+                "{},{:.1},{:+.1},{:.3},{},{:.1},{:.2},{}",
+                found.fingers,
+                found.f_hz,
+                found.cents,
+                found.gamma_on,
+                found.mode,
+                found.evenness_db,
+                found.cost,
+                open(&file, found.grip.open)
+            )
+        };
+        if let Some(to) = self.trill_to.map(WrittenNote) {
+            let columns = ["fingers", "hz", "cents", "gamma_on", "mode", "evenness_db", "cost", "open"];
+            let columns = |of: &str| columns.map(|column| format!("{of}_{column}")).join(",");
+            let mut table = self.table.open(&format!("{},{},moves", columns("from"), columns("to")))?;
+            table.comment(format_args!("{looked}; {note} to {to}"))?;
+            for (from, to) in finder.trills(note, to, count) {
+                table.line(format_args!("{},{},{}", one(&from), one(&to), from.grip.moves(&to.grip)))?;
+            }
+            return table.finish();
+        }
+        let mut table = self.table.open("fingers,hz,cents,gamma_on,mode,evenness_db,cost,open,chart")?;
+        table.comment(format_args!("{looked}; {note}"))?;
+        for found in finder.best(note, count) {
+            let chart = finder.of_chart(note).is_some_and(|chart| chart.open == found.grip.open);
+            table.line(format_args!("{},{}", one(&found), if chart { "yes" } else { "" }))?;
+        }
+        table.finish()
+    }
+}
+
+/// Names of the open holes.
+fn open(file: &InstrumentFile, bits: u64) -> String {
+    let open = file.holes.iter().enumerate().filter(|(hole, _)| bits >> hole & 1 == 1);
+    open.map(|(_, hole)| hole.name.as_str()).collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,172 @@
+//! The way from breath to dynamic as a curve over what the live source has sent, with handles at both ends and in the middle.
+
+use egui::{Align2, CornerRadius, Rect, Response, Sense, Stroke, Ui, pos2, vec2};
+
+use crate::editor::chart;
+use crate::editor::controls::{Hands, handle, teach};
+use crate::editor::snapshot::Snapshot;
+use crate::editor::theme;
+use crate::editor::theme::{Colours, SMALL_RADIUS};
+use chalumeau_core::instrument::Settings;
+use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
+use chalumeau_core::instrument::player::response::dynamic;
+
+/// Columns of the histogram: as many as a controller has values.
+const COLUMNS: usize = 128;
+/// Points of the curve.
+const POINTS: usize = 96;
+/// What is left of a column after each look, so that it shows the last half minute at 60 looks a second.
+const KEPT: f32 = 0.999;
+/// Height of the tallest column over that of the chart.
+const TALLEST: f32 = 0.45;
+
+/// How often the live source has had each value.
+#[derive(Clone, Debug)]
+pub struct BreathHistogram {
+    columns: [f32; COLUMNS],
+}
+
+impl Default for BreathHistogram {
+    fn default() -> Self {
+        Self { columns: [0.0; COLUMNS] }
+    }
+}
+
+impl BreathHistogram {
+    /// Counts a value, 0..=1. Rest is not counted: it would hide all else.
+    pub fn look(&mut self, value: f32) {
+        self.columns.iter_mut().for_each(|column| *column *= KEPT);
+        let value = chart::share(value);
+        if value > 0.0 {
+            self.columns[(value * (COLUMNS - 1) as f32).round() as usize] += 1.0;
+        }
+    }
+
+    /// The columns over the tallest one, with their places, 0..=1.
+    fn heights(&self) -> impl Iterator<Item = (f32, f32)> {
+        let tallest = self.columns.iter().copied().fold(1.0, f32::max);
+        let place = |at: usize| at as f32 / (COLUMNS - 1) as f32;
+        self.columns.iter().enumerate().map(move |(at, &count)| (place(at), count / tallest))
+    }
+}
+
+/// Draws the curve into all of the place. `breath`: what the live source says now.
+pub fn draw(
+    ui: &mut Ui,
+    hands: &mut Hands,
+    snapshot: &Snapshot,
+    histogram: &BreathHistogram,
+    breath: Option<f32>,
+) {
+    let c = Colours::here(ui);
+    let settings = snapshot.settings.clamped();
+    let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
+    let frame = Rect::from_min_max(rect.min + vec2(26.0, 20.0), rect.max - vec2(10.0, 38.0));
+    let x = |breath: f32| frame.left() + breath * frame.width();
+    let y = |dynamic: f32| frame.bottom() - dynamic * frame.height();
+    let at = |breath: f32| pos2(x(breath), y(level(breath, &settings)));
+    let painter = ui.painter();
+    painter.text(rect.left_top(), Align2::LEFT_TOP, "From breath to loudness", theme::small(), c.quiet);
+    painter.rect_filled(frame, CornerRadius::same(SMALL_RADIUS), c.raised);
+    let mf = MEZZO_FORTE as f32;
+    for (at, name) in [(0.0, "pp"), (mf, "mf"), (1.0, "ff")] {
+        painter.hline(frame.x_range(), y(at), Stroke::new(1.0, c.grid));
+        painter.text(pos2(frame.left() - 6.0, y(at)), Align2::RIGHT_CENTER, name, theme::small(), c.quiet);
+    }
+    let column = frame.width() / COLUMNS as f32;
+    for (place, height) in histogram.heights().filter(|(_, height)| *height > 0.0) {
+        let top = pos2(x(place) - 0.5 * column, y(TALLEST * height));
+        let bar = Rect::from_min_max(top, pos2(top.x + column, frame.bottom())).intersect(frame);
+        painter.rect_filled(bar, CornerRadius::ZERO, c.breath.gamma_multiply(0.35));
+    }
+    let points: Vec<_> = (0..=POINTS).map(|n| at(n as f32 / POINTS as f32)).collect();
+    painter.line(points, Stroke::new(2.0, c.ink));
+    for (percent, anchor) in [(0, Align2::LEFT_TOP), (50, Align2::CENTER_TOP), (100, Align2::RIGHT_TOP)] {
+        let place = pos2(x(percent as f32 / 100.0), frame.bottom() + 23.0);
+        painter.text(place, anchor, format!("{percent} %"), theme::small(), c.quiet);
+    }
+    if let Some(breath) = breath.map(chart::share) {
+        painter.vline(x(breath), y(level(breath, &settings))..=frame.bottom(), Stroke::new(1.0, c.breath));
+        painter.circle_filled(at(breath), 5.0, c.breath);
+    }
+    let (softest, loudest) = (settings.breath_softest, settings.breath_loudest);
+    let middle = 0.5 * (softest + loudest);
+    let painter = ui.painter();
+    let speaks = pos2(x(softest), frame.bottom() + 11.0);
+    painter.text(speaks + vec2(14.0, 2.0), Align2::LEFT_CENTER, "speaks", theme::small(), c.speaks);
+    let word = "Drag the ends to what your controller sends when you play softest and loudest, and the middle to bend the curve. Blue: what it has sent.";
+    response.on_hover_text_at_pointer(word);
+    let (end, to) = handle(ui, "Curve: where notes begin", speaks, "");
+    drag(hands, &end, to.map(|to| share_of(frame, to.x)), "bsoft");
+    end.on_hover_ui(|ui| teach(ui, "bsoft", "Sideways. Double click: default."));
+    let (end, to) = handle(ui, "Curve: where it is loudest", pos2(x(loudest), frame.top()), "");
+    drag(hands, &end, to.map(|to| share_of(frame, to.x)), "bloud");
+    end.on_hover_ui(|ui| teach(ui, "bloud", "Sideways. Double click: default."));
+    let (bow, to) = handle(ui, "Curve: how it bends", at(middle), "");
+    // Half of the way is this dynamic: 0.5 to the power of the curve.
+    let curve = to.map(|to| ((frame.bottom() - to.y) / frame.height()).clamp(0.05, 0.95).log(0.5));
+    drag(hands, &bow, curve, "bcurve");
+    bow.on_hover_ui(|ui| teach(ui, "bcurve", "Up and down. Double click: default."));
+}
+
+/// The dynamic of a breath, 0..=1 both.
+fn level(breath: f32, settings: &Settings) -> f32 {
+    dynamic(f64::from(breath), settings).0 as f32
+}
+
+/// Percent of the way through the frame.
+fn share_of(frame: Rect, x: f32) -> f32 {
+    100.0 * ((x - frame.left()) / frame.width()).clamp(0.0, 1.0)
+}
+
+/// Moves a parameter to a number in its own unit while its handle is dragged or moved by keys.
+fn drag(hands: &mut Hands, handle: &Response, to: Option<f32>, id: &'static str) {
+    if handle.drag_started() {
+        hands.begin(id);
+    }
+    if let Some(to) = to {
+        let is_key = !handle.dragged();
+        if is_key {
+            hands.begin(id);
+        }
+        hands.set_number(id, f64::from(to));
+        if is_key {
+            hands.end(id);
+        }
+    }
+    if handle.drag_stopped() {
+        hands.end(id);
+    }
+    if handle.double_clicked()
+        && let Some(look) = hands.controls.look(id)
+    {
+        hands.put(id, look.default);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_histogram_shows_what_was_played_and_not_the_rest() {
+        let mut histogram = BreathHistogram::default();
+        for value in [0.0, 0.0, 0.5, 0.5, f32::NAN, 1.0] {
+            histogram.look(value);
+        }
+        let seen: Vec<_> = histogram.heights().filter(|(_, height)| *height > 0.0).collect();
+        assert_eq!(seen.len(), 2);
+        assert!((seen[0].0 - 0.5).abs() < 0.01 && seen[1].0 == 1.0 && seen[0].1 > seen[1].1, "{seen:?}");
+        (0..20_000).for_each(|_| histogram.look(0.0));
+        assert!(histogram.heights().all(|(_, height)| height < 1e-3), "it forgets");
+    }
+
+    #[test]
+    fn the_middle_of_the_curve_is_where_the_handle_is() {
+        for curve in [0.5_f32, 1.0, 2.0] {
+            let settings = Settings { breath_curve: curve, ..Settings::default() };
+            let middle = 0.5 * (settings.breath_softest + settings.breath_loudest);
+            assert!((level(middle, &settings).log(0.5) - curve).abs() < 1e-4);
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! Keys that move a control which has the focus: arrows (Shift: ten times finer), Home and End, Delete for the default; and
+//! the steps that a screen reader asks for.
+
+use egui::accesskit::Action as AccessAction;
+use egui::{EventFilter, Key, Response, Ui};
+
+use crate::editor::controls::{Hands, Look};
+
+/// How the keys move a kind of control.
+pub struct KeySteps {
+    /// Share of the way that an arrow key moves a control without steps.
+    pub share: f32,
+    /// Whether the arrows up and down move it too; else they go to the next control.
+    pub has_vertical: bool,
+}
+
+impl KeySteps {
+    /// Moves a control as the keys ask; its new value, if it moves.
+    pub fn moved(
+        &self,
+        ui: &Ui,
+        hands: &mut Hands,
+        id: &'static str,
+        look: &Look,
+        response: &Response,
+    ) -> Option<f32> {
+        let filter = EventFilter {
+            horizontal_arrows: true,
+            vertical_arrows: self.has_vertical,
+            ..EventFilter::default()
+        };
+        ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, filter));
+        let unit = look.steps.map_or(self.share, |steps| 1.0 / steps.max(1) as f32);
+        let (mut by, mut to) = (0.0, None);
+        ui.input(|input| {
+            let fine = if input.modifiers.shift && look.steps.is_none() { 0.1 } else { 1.0 };
+            let presses = |key| input.num_presses(key) as f32;
+            by += unit * fine * (presses(Key::ArrowRight) - presses(Key::ArrowLeft));
+            if self.has_vertical {
+                by += unit * fine * (presses(Key::ArrowUp) - presses(Key::ArrowDown));
+            }
+            by += unit * input.num_accesskit_action_requests(response.id, AccessAction::Increment) as f32;
+            by -= unit * input.num_accesskit_action_requests(response.id, AccessAction::Decrement) as f32;
+            if input.key_pressed(Key::Home) {
+                to = Some(0.0);
+            } else if input.key_pressed(Key::End) {
+                to = Some(1.0);
+            } else if input.key_pressed(Key::Delete) || input.key_pressed(Key::Backspace) {
+                to = Some(look.default);
+            }
+        });
+        let value = to.or((by != 0.0).then(|| (look.value + by).clamp(0.0, 1.0)))?;
+        hands.put(id, value);
+        Some(value)
+    }
+}

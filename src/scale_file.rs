@@ -1,0 +1,130 @@
+//! Scales from files in the formats of Scala (Manuel Op de Coul): `.scl` has the pitches, `.kbm` says which key plays which.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use tune::key::PianoKey;
+use tune::note::Note;
+use tune::pitch::Pitched;
+use tune::scala::{
+    Kbm, KbmBuildError, KbmImportError, KbmParseErrorKind, KbmStructuralError, Scl, SclBuildError,
+    SclImportError, SclParseErrorKind, SclStructuralError,
+};
+use tune::tuning::KeyboardMapping;
+
+use chalumeau_core::instrument::KeyPitches;
+
+/// Largest file that is read, bytes; a scale of 65,535 notes is smaller.
+const BYTES_MOST: u64 = 4_000_000;
+/// The key that plays the first pitch of a scale without a mapping: middle C, at its equal-tempered pitch.
+const FIRST_KEY: i32 = 60;
+
+/// Why a scale cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ScaleError {
+    /// The system's reason.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: io::Error,
+    },
+    /// The file is not what its format asks for.
+    #[error("{}: {what}", path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with its line where there is one.
+        what: String,
+    },
+}
+
+/// Reads a scale, with a keyboard mapping if there is one. Without, middle C plays the first pitch of the scale, and the keys
+/// go through the scale one after another.
+pub fn read(scl: &Path, kbm: Option<&Path>) -> Result<KeyPitches, ScaleError> {
+    let wrong = |path: &Path, what: String| ScaleError::Format { path: path.to_owned(), what };
+    let scale = Scl::import(text(scl)?.as_bytes()).map_err(|error| wrong(scl, scl_error(&error)))?;
+    let mapping = match kbm {
+        Some(path) => Kbm::import(text(path)?.as_bytes()).map_err(|error| wrong(path, kbm_error(&error)))?,
+        None => Kbm::builder(Note::from_midi_number(FIRST_KEY))
+            .build()
+            .map_err(|_| wrong(scl, "it has no keys".to_owned()))?,
+    };
+    let pitches = (&scale, &mapping);
+    Ok(KeyPitches::from_hz(|key| {
+        let pitch = pitches.maybe_pitch_of(PianoKey::from_midi_number(key))?;
+        Some(pitch.pitch().as_hz())
+    }))
+}
+
+/// The text of a file. Scala's archive is in Latin-1; only comments and names have letters beyond ASCII.
+fn text(path: &Path) -> Result<String, ScaleError> {
+    let refused = |source| ScaleError::Read { path: path.to_owned(), source };
+    let size = fs::metadata(path).map_err(refused)?.len();
+    if size > BYTES_MOST {
+        let what = format!("{size} bytes are too many for a scale");
+        return Err(ScaleError::Format { path: path.to_owned(), what });
+    }
+    Ok(String::from_utf8_lossy(&fs::read(path).map_err(refused)?).into_owned())
+}
+
+fn scl_error(error: &SclImportError) -> String {
+    match error {
+        SclImportError::IoError(error) => error.to_string(),
+        SclImportError::ParseError { line_number, kind } => {
+            let what = match kind {
+                SclParseErrorKind::IntValue => "must be a whole number",
+                SclParseErrorKind::CentsValue => "must be cents with a point, such as 701.955",
+                SclParseErrorKind::Numer | SclParseErrorKind::Denom => "must be a ratio, such as 3/2",
+            };
+            format!("line {line_number} {what}")
+        }
+        SclImportError::StructuralError(SclStructuralError::ExpectingDescription) => {
+            "it is empty; the first line of a scale is its description".to_owned()
+        }
+        SclImportError::StructuralError(SclStructuralError::ExpectingNumberOfNotes) => {
+            "the second line must have the number of notes".to_owned()
+        }
+        SclImportError::StructuralError(SclStructuralError::InconsistentNumberOfNotes) => {
+            "it has not as many pitches as the second line says".to_owned()
+        }
+        SclImportError::BuildError(SclBuildError::ScaleTooLarge) => "it has too many notes".to_owned(),
+    }
+}
+
+fn kbm_error(error: &KbmImportError) -> String {
+    match error {
+        KbmImportError::IoError(error) => error.to_string(),
+        KbmImportError::ParseError { line_number, kind } => {
+            let what = match kind {
+                KbmParseErrorKind::IntValue => "must be a whole number",
+                KbmParseErrorKind::FloatValue => "must be a frequency in Hz, such as 440.0",
+                KbmParseErrorKind::KeyboardMapping => {
+                    "must be a degree of the scale, or x for a key without a pitch"
+                }
+            };
+            format!("line {line_number} {what}")
+        }
+        KbmImportError::StructuralError(part) => {
+            let what = match part {
+                KbmStructuralError::ExpectingMapSize => "the size of the map",
+                KbmStructuralError::ExpectingFirstMidiNote => "the first key",
+                KbmStructuralError::ExpectingLastMidiNote => "the last key",
+                KbmStructuralError::ExpectingOrigin => "the middle key",
+                KbmStructuralError::ExpectingReferenceNote => "the reference key",
+                KbmStructuralError::ExpectingReferencePitch => "the reference frequency",
+                KbmStructuralError::ExpectingFormalOctave => "the degree of the formal octave",
+                KbmStructuralError::InconsistentNumberOfItems => {
+                    return "it has more entries than its first line says".to_owned();
+                }
+            };
+            format!("it ends before {what}")
+        }
+        KbmImportError::BuildError(KbmBuildError::FormalOctaveMissing) => {
+            "it does not say which degree is the formal octave".to_owned()
+        }
+        KbmImportError::BuildError(KbmBuildError::MappingTooLarge) => "its map is too large".to_owned(),
+    }
+}
