@@ -7,6 +7,7 @@
 mod batch;
 mod bifurcation;
 mod bore;
+mod controllers;
 mod csv_table;
 #[cfg(feature = "devices")]
 mod doctor;
@@ -95,6 +96,7 @@ enum Command {
     Study(study::StudyCommand),
     Parameters(parameters::ParametersCommand),
     Presets(presets::PresetsCommand),
+    Controllers(controllers::ControllersCommand),
     #[cfg(feature = "devices")]
     Knob(Box<knob::KnobCommand>),
     #[cfg(feature = "simulator")]
@@ -216,6 +218,7 @@ pub fn main() -> ExitCode {
         Command::Study(command) => command.run(),
         Command::Parameters(command) => command.run(),
         Command::Presets(command) => command.run(),
+        Command::Controllers(command) => command.run(),
         #[cfg(feature = "devices")]
         Command::Knob(command) => command.run(),
         #[cfg(feature = "simulator")]

@@ -21,6 +21,7 @@ mod instrument_view;
 mod key_steps;
 mod keyboard;
 mod knob_view;
+mod linked_controllers;
 mod pitch_needle;
 mod play_view;
 mod preset_bar;

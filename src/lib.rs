@@ -7,12 +7,13 @@
 //! - `cli` and `editor` use neither each other nor the plugin. The editor knows no host, no thread and no knob link.
 //! - `plugin` uses the editor, and puts it into the host's window.
 //! - `standalone` uses the plugin, and runs it without a host. The plugin does not use the standalone.
-//! - `cache`, `instrument_path`, `output`, `picture_file`, `presets`, `scale_file`, `take_file` and `wav` read and write files for them;
+//! - `cache`, `controllers`, `instrument_path`, `output`, `picture_file`, `presets`, `scale_file`, `take_file` and `wav` read and write files for them;
 //!   `identity` has the names that hosts know the plugin by. They use none of the four.
 
 pub mod cache;
 #[cfg(feature = "cli")]
 pub mod cli;
+pub mod controllers;
 #[cfg(feature = "editor")]
 pub mod editor;
 pub mod identity;

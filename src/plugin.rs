@@ -234,7 +234,10 @@ impl Chalumeau {
         if let Some(presets) = self.presets.as_ref().filter(|_| self.offline) {
             presets.handle().wait();
         }
-        let settings = self.params.settings();
+        let own = self.params.settings();
+        self.inputs.set_links(&self.params.links.links(&own));
+        // Where a linked controller has spoken last, its value counts.
+        let settings = self.inputs.linked(own);
         if settings != self.settings {
             instrument.set_settings(&settings);
             self.settings = settings;
@@ -266,7 +269,8 @@ impl Chalumeau {
             }
         }
         let api = context.plugin_api();
-        let played = std::iter::from_fn(|| inputs.next(|| context.next_event(), api, drives));
+        let links = &self.params.links;
+        let played = std::iter::from_fn(|| inputs.next(|| context.next_event(), api, drives, links));
         let at_once =
             panic.into_iter().flatten().chain([breath, bend_range]).chain(wheel).chain(keys).flatten();
         let events = at_once.chain(played);

@@ -571,3 +571,39 @@ fn a_preset_is_rendered_and_flags_change_it() {
     assert!(code == Some(2) && said.contains("add --breath-response physical"), "{said}");
     assert!(!d.path().join("no.wav").exists());
 }
+
+#[test]
+fn linked_controllers_of_a_file_move_parameters() {
+    let directory = TempDir::new().unwrap();
+    // One note with breath; half way the controller 21 goes from 0 to 127.
+    let events: [&[u8]; 6] = [
+        &[0, 0xB0, 2, 90],
+        &[0, 0x90, 60, 100],
+        &[0, 0xB0, 21, 0],
+        &[0x60, 0xB0, 21, 127],
+        &[0x60, 0x80, 60, 0],
+        &[0, 0xFF, 0x2F, 0],
+    ];
+    let track = events.concat();
+    let mut midi = b"MThd\0\0\0\x06\0\0\0\x01\0\x60MTrk".to_vec();
+    midi.extend((track.len() as u32).to_be_bytes());
+    midi.extend(track);
+    fs::write(directory.path().join("one.mid"), midi).unwrap();
+    let map = "format = 1\n\n[[link]]\ncontroller = 21\nparameter = \"growl\"\n";
+    fs::write(directory.path().join("map.toml"), map).unwrap();
+    succeeds(directory.path(), "render one.mid --out plain.wav");
+    succeeds(directory.path(), "render one.mid --controllers map.toml --out linked.wav");
+    let [plain, linked] =
+        ["plain.wav", "linked.wav"].map(|name| fs::read(directory.path().join(name)).unwrap());
+    assert_eq!(plain.len(), linked.len());
+    let differs = plain.iter().zip(&linked).position(|(a, b)| a != b).unwrap();
+    // A quarter note lasts half a second: nothing differs before the controller moves.
+    let at = (differs - (plain.len() - 4 * 96_000)) as f64 / (4.0 * 48_000.0);
+    assert!((0.5..0.56).contains(&at), "they differ from {at} s on");
+    fs::write(directory.path().join("map.toml"), map.replace("growl", "growll")).unwrap();
+    refused(
+        &directory,
+        "render one.mid --controllers map.toml --out bad.wav",
+        &["map.toml", "line 5", "growll"],
+    );
+}

@@ -7,6 +7,8 @@ mod support;
 mod cost;
 #[path = "editor/hands.rs"]
 mod hands;
+#[path = "editor/linked.rs"]
+mod linked;
 #[path = "editor/looks.rs"]
 mod looks;
 #[path = "editor/presets.rs"]
@@ -45,7 +47,11 @@ impl Window {
     }
 
     fn new(tab: Tab, size: (f32, f32)) -> Self {
-        let (host, snapshot) = (Rc::new(Fake::default()), Rc::new(RefCell::new(c4())));
+        Self::with_host(tab, size, Fake::default())
+    }
+
+    fn with_host(tab: Tab, size: (f32, f32), host: Fake) -> Self {
+        let (host, snapshot) = (Rc::new(host), Rc::new(RefCell::new(c4())));
         let actions = Rc::new(RefCell::new(Vec::new()));
         let (h, s, a) = (host.clone(), snapshot.clone(), actions.clone());
         let kept = WindowState { tab, size, ..WindowState::default() };

@@ -1,14 +1,17 @@
 //! Arguments for what is played: a MIDI file, a note or a scale, and its breath. `render` and `report` share them.
 
 use crate::cli::Failure;
+use crate::cli::controllers::named_or_file;
 use crate::cli::feel_args::FeelArgs;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, check_fingering, note, within};
+use crate::controllers::{ControllerMap, as_links};
 use crate::presets::{self, Preset};
 use crate::scale_file;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::control::midi::MidiDecoder;
+use chalumeau_core::control::midi::links::{Link, MOST};
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::haptics::FeelDesign;
 use chalumeau_core::instrument::{Clarinet, Model, Reach, Settings};
@@ -41,6 +44,10 @@ pub struct ScoreArgs {
     /// The file is MPE: channel 1 is the manager, the other channels bend by 48 semitones
     #[arg(long, requires = "midi")]
     mpe: bool,
+    /// Controllers of the file that move parameters: a device, see `chalumeau controllers list`, or a TOML file of links, as
+    /// the window copies them
+    #[arg(long, value_name = "DEVICE|FILE", requires = "midi", value_parser = named_or_file)]
+    controllers: Option<ControllerMap>,
     /// One note as a clarinettist reads it: MIDI number (60) or name (C4)
     #[arg(long, value_name = "NOTE", value_parser = note)]
     written: Option<u8>,
@@ -140,12 +147,14 @@ impl ScoreArgs {
         };
         let curve = self.curve()?;
         let base = self.preset.as_ref().map(Preset::settings);
-        let settings = match (&curve, &base) {
+        let map = self.controllers.clone().unwrap_or_default();
+        let mut settings = match (&curve, &base) {
             (Some(curve), base) => self.settings.blown_in_either(base.as_ref(), curve, &file)?,
             (None, Some(base)) => self.settings.over_preset(base, &file)?,
             (None, None) => self.settings.played(&file)?,
         };
-        let mut score = self.score(&file)?;
+        map.values.iter().for_each(|(parameter, value)| parameter.set(&mut settings, *value));
+        let mut score = self.score(&file, &as_links(&map.links, &settings))?;
         if let Some(curve) = &curve {
             score = score.blown(curve, &settings, self.rate);
         }
@@ -234,11 +243,12 @@ impl ScoreArgs {
         }
     }
 
-    fn score(&self, file: &InstrumentFile) -> Result<Score, Failure> {
+    fn score(&self, file: &InstrumentFile, links: &[Option<Link>; MOST]) -> Result<Score, Failure> {
         let transposition = file.transposition;
         if let Some(path) = &self.midi {
             let bytes = fs::read(path).map_err(|source| Failure::Read { path: path.clone(), source })?;
             let mut decoder = if self.mpe { MidiDecoder::new().with_mpe() } else { MidiDecoder::new() };
+            decoder.set_links(links);
             if let Some(preset) = &self.preset {
                 // Nothing sounds yet, so this bends nothing.
                 decoder.usual_bend_range(preset.bend_range());

@@ -8,6 +8,7 @@ use crate::editor::breath_meter;
 use crate::editor::chart;
 use crate::editor::chart::Chart;
 use crate::editor::controls::{Hands, choice, heading, momentary, slider};
+use crate::editor::linked_controllers;
 use crate::editor::snapshot::{BreathSource, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
@@ -101,6 +102,7 @@ impl BreathView {
         for id in ["growli", "growlf", "flut", "fluthz", "subt", "tract", "tractp"] {
             slider(ui, hands, id);
         }
+        linked_controllers::table(ui, hands);
     }
 }
 

@@ -4,6 +4,7 @@
 //! normalised, 0..=1; text is the parameter's own both ways. Every widget goes through [`Hands`], which remembers what
 //! was done.
 
+use crate::controllers::ControllerLinks;
 use crate::editor::ab_comparison::Values;
 use crate::editor::terms;
 use crate::editor::undo::{Change, UndoHistory};
@@ -52,6 +53,10 @@ pub trait Controls {
     /// What the host has tied to it; nothing where hosts do not tell.
     fn marks(&self, _id: &str) -> Vec<Mark> {
         Vec::new()
+    }
+    /// Controllers that the user links to parameters; `None` where that is not done.
+    fn links(&self) -> Option<&ControllerLinks> {
+        None
     }
     /// Opens the host's own menu for it, at a place of the window in pixels. Nothing happens where the host has none.
     fn menu(&self, _id: &str, _at: (i32, i32)) {}

@@ -1,8 +1,10 @@
-//! What a host ties to a parameter, shown beside its name, and the host's own menu on a right click.
+//! What a host ties to a parameter, shown beside its name, and what a right click offers: to link a controller, and the
+//! host's own menu.
 
 use egui::{Pos2, Response, Ui, vec2};
 
 use crate::editor::controls::{Hands, Mark};
+use crate::editor::linked_controllers;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
@@ -10,14 +12,15 @@ use crate::editor::theme::Colours;
 const STEP: f32 = 9.0;
 const RADIUS: f32 = 3.0;
 
-/// Paints a dot for each mark to the right of `after`.
-pub fn paint(ui: &Ui, marks: &[Mark], after: Pos2) {
+/// Paints a dot for each mark to the right of `after`; returns where the last one is.
+pub fn paint(ui: &Ui, marks: &[Mark], after: Pos2) -> Pos2 {
     let c = Colours::here(ui);
     for (mark, at) in marks.iter().zip(1_u8..) {
         let colour =
             mark.colour.map_or(c.accent, |[red, green, blue]| egui::Color32::from_rgb(red, green, blue));
         ui.painter().circle_filled(after + vec2(STEP * f32::from(at), 0.0), RADIUS, colour);
     }
+    after + vec2(STEP * marks.len() as f32, 0.0)
 }
 
 /// The marks as lines of a tool tip.
@@ -28,12 +31,18 @@ pub fn explain(ui: &mut Ui, marks: &[Mark]) {
     }
 }
 
-/// Opens the host's menu of a parameter where its control is clicked with the right button.
-pub fn offer_menu(ui: &Ui, hands: &Hands, id: &str, response: &Response) {
-    if !response.secondary_clicked() {
-        return;
+/// Where a control is clicked with the right button: the menu of its controllers, or the host's where none can be linked.
+pub fn offer_menu(ui: &Ui, hands: &Hands, id: &'static str, response: &Response) {
+    let at = response.interact_pointer_pos().filter(|_| response.secondary_clicked());
+    if linked_controllers::can_link(hands, id) {
+        linked_controllers::offer(ui, hands, id, response, at);
+    } else if let Some(at) = at {
+        open_host_menu(ui, hands, id, at);
     }
-    let Some(at) = response.interact_pointer_pos() else { return };
+}
+
+/// Opens the host's menu of a parameter.
+pub fn open_host_menu(ui: &Ui, hands: &Hands, id: &str, at: Pos2) {
     // Windows of macOS are counted in points of the system, all others in pixels.
     let scale = if cfg!(target_os = "macos") { ui.ctx().zoom_factor() } else { ui.ctx().pixels_per_point() };
     hands.controls.menu(id, ((scale * at.x).round() as i32, (scale * at.y).round() as i32));

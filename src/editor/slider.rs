@@ -9,6 +9,7 @@ use egui::{
 use crate::editor::controls::{Entry, Hands, Look, Mark, teach};
 use crate::editor::host_marks;
 use crate::editor::key_steps::KeySteps;
+use crate::editor::linked_controllers;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
@@ -58,7 +59,12 @@ pub fn slider(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
     }
 
     let marks = hands.controls.marks(id);
-    paint_slider(ui, c, [rect, track], &look, &marks, value, &response);
+    let after = paint_slider(ui, c, [rect, track], &look, &marks, value, &response);
+    linked_controllers::name(ui, hands, id, after);
+    for linked in linked_controllers::values(hands, id) {
+        let x = track.left() + linked.clamp(0.0, 1.0) * track.width();
+        ui.painter().vline(x, track.top() - 4.0..=track.bottom() + 4.0, Stroke::new(2.0, c.ink));
+    }
     host_marks::offer_menu(ui, hands, id, &response);
     if is_typing {
         type_value(
@@ -134,6 +140,7 @@ fn stepped(look: &Look, value: f32) -> f32 {
     }
 }
 
+/// Paints it; returns where its name and marks end.
 fn paint_slider(
     ui: &Ui,
     c: &Colours,
@@ -142,12 +149,12 @@ fn paint_slider(
     marks: &[Mark],
     value: f32,
     response: &Response,
-) {
+) -> egui::Pos2 {
     let painter = ui.painter();
     let name = if response.hovered() || response.has_focus() { c.ink } else { c.quiet };
     let at = pos2(rect.left(), rect.top() + 9.0);
     let name = painter.text(at, Align2::LEFT_CENTER, &look.name, theme::body(), name);
-    host_marks::paint(ui, marks, name.right_center());
+    let after = host_marks::paint(ui, marks, name.right_center());
     let at = |unit: f32| track.left() + unit.clamp(0.0, 1.0) * track.width();
     let round = CornerRadius::same(2);
     painter.rect_filled(track, round, c.raised);
@@ -161,6 +168,7 @@ fn paint_slider(
     if response.has_focus() {
         painter.circle_stroke(centre, radius + 3.0, Stroke::new(1.0, c.accent));
     }
+    after
 }
 
 /// The text field over a value. Enter takes it, Escape leaves it, and so does a click elsewhere.

@@ -24,12 +24,22 @@ pub enum BreathInput {
     Note,
     /// The knob's angle.
     Knob,
+    /// A controller that the user has linked to the breath.
+    Link,
 }
 
 impl BreathInput {
     /// All inputs, in the order the window shows them.
-    pub const ALL: [Self; 7] =
-        [Self::Keys, Self::Parameter, Self::Breath, Self::Expression, Self::Pressure, Self::Note, Self::Knob];
+    pub const ALL: [Self; 8] = [
+        Self::Keys,
+        Self::Parameter,
+        Self::Breath,
+        Self::Expression,
+        Self::Pressure,
+        Self::Note,
+        Self::Knob,
+        Self::Link,
+    ];
 
     /// Its name in the window.
     pub fn title(self) -> &'static str {
@@ -41,6 +51,7 @@ impl BreathInput {
             Self::Pressure => "Channel pressure",
             Self::Note => "Note expression",
             Self::Knob => BreathSource::KNOB,
+            Self::Link => "Linked controller",
         }
     }
 
@@ -65,6 +76,7 @@ impl From<BreathOrigin> for BreathInput {
             BreathOrigin::Controller(BreathController::Expression) => Self::Expression,
             BreathOrigin::Controller(BreathController::Pressure) => Self::Pressure,
             BreathOrigin::Note => Self::Note,
+            BreathOrigin::Link => Self::Link,
         }
     }
 }

@@ -5,15 +5,18 @@ use nice_plug::prelude::*;
 use super::breath_sources::BreathSources;
 use super::params::knob::ReedSource;
 use super::reed_controllers::ReedControllers;
-use super::translate_events::{EventTranslator, expression, untangled};
+use super::translate_events::{EventTranslator, expression, raw7, untangled};
+use crate::controllers::ControllerLinks;
+use chalumeau_core::control::midi::links::{Link, MOST, Source};
 use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::control::notes::Note;
 use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::instrument::Settings;
 
 /// Events that end all notes: the panic, the bend and the techniques of controllers that stay where they are.
 const SILENCED: usize = 6;
-/// Events that one event of the host can become: what the decoder says, and a change of the reed.
-const EVENTS: usize = 32;
+/// Events that one event of the host can become: what the decoder says, every link among it, and a change of the reed.
+const EVENTS: usize = 32 + MOST;
 /// Ends of notes that one block can hold: each event that the wrapper keeps room for begins at most one note, and 17 notes
 /// may be there before. Later ones are lost to the host, which only loses a hint.
 const ENDS: usize = 4_096 + 17;
@@ -75,6 +78,19 @@ impl HostInputs {
         self.program.take()
     }
 
+    /// Ties controllers to settings.
+    pub fn set_links(&mut self, links: &[Option<Link>; MOST]) {
+        self.translator.set_links(links);
+    }
+
+    /// Settings with the numbers of linked controllers that have spoken.
+    pub fn linked(&self, mut settings: Settings) -> Settings {
+        for (number, value) in self.translator.links().numbers() {
+            *number.of(&mut settings) = value;
+        }
+        settings
+    }
+
     /// Which input each breath value came from.
     pub fn breath_sources(&mut self) -> &mut BreathSources {
         &mut self.breath_sources
@@ -92,13 +108,16 @@ impl HostInputs {
         mut next: impl FnMut() -> Option<NoteEvent<()>>,
         api: PluginApi,
         drives: [ReedSource; 2],
+        links: &ControllerLinks,
     ) -> Option<Timed<Event>> {
         loop {
             if self.handed < self.count {
                 self.handed += 1;
                 return Some(Timed { at: self.at, event: self.events[self.handed - 1] });
             }
-            self.take(untangled(next()?, api), drives);
+            let event = untangled(next()?, api);
+            learn(&event, links);
+            self.take(event, drives);
         }
     }
 
@@ -192,6 +211,15 @@ impl HostInputs {
     }
 }
 
+/// Tells the links what a controller says.
+fn learn(event: &NoteEvent<()>, links: &ControllerLinks) {
+    match *event {
+        NoteEvent::MidiCC { cc, value, .. } => links.hear(Source::Controller(cc.min(127)), raw7(value)),
+        NoteEvent::MidiChannelPressure { pressure, .. } => links.hear(Source::Pressure, raw7(pressure)),
+        _ => {}
+    }
+}
+
 /// Events at the beginning of the block.
 fn at_once<const N: usize>(said: &[Event]) -> [Option<Timed<Event>>; N] {
     std::array::from_fn(|place| said.get(place).map(|&event| Timed { at: 0, event }))
@@ -209,6 +237,7 @@ mod tests {
     use nice_plug::midi::{Channel, Key, VoiceID};
 
     use super::*;
+    use crate::controllers::ParameterLink;
     use crate::plugin::breath_sources::BreathInput;
     use chalumeau_core::units::SoundingNote;
 
@@ -216,7 +245,8 @@ mod tests {
 
     fn midi(inputs: &mut HostInputs, drives: [ReedSource; 2], said: &[[u8; 3]]) -> Vec<Event> {
         let mut said = said.iter().map(|bytes| NoteEvent::from_midi(5, bytes).unwrap());
-        let mut next = || inputs.next(|| said.next(), PluginApi::Clap, drives);
+        let links = ControllerLinks::default();
+        let mut next = || inputs.next(|| said.next(), PluginApi::Clap, drives, &links);
         std::iter::from_fn(|| next().map(|timed| timed.event)).collect()
     }
 
@@ -264,6 +294,26 @@ mod tests {
     }
 
     #[test]
+    fn a_linked_controller_sets_its_parameter_until_a_hand_moves_it() {
+        let links = ControllerLinks::default();
+        let growl = crate::parameters::find("growl").unwrap();
+        let whole = ParameterLink::whole(Source::Controller(21), growl).unwrap();
+        links.replace(&[whole]);
+        let (mut inputs, mut own) = (HostInputs::default(), Settings::default());
+        inputs.set_links(&links.links(&own));
+        assert_eq!(inputs.linked(own).techniques.growl, 0.0, "nothing has moved");
+        let events = midi(&mut inputs, NO_REED, &[[0xB0, 21, 127]]);
+        assert!(matches!(events[..], [Event::Set(_, 1.0)]), "{events:?}");
+        inputs.set_links(&links.links(&own));
+        assert_eq!(inputs.linked(own).techniques.growl, 1.0, "in the next block too");
+        own.techniques.growl = 0.4;
+        inputs.set_links(&links.links(&own));
+        assert_eq!(inputs.linked(own).techniques.growl, 0.4, "moved by hand");
+        midi(&mut inputs, NO_REED, &[[0xB0, 21, 0]]);
+        assert_eq!(inputs.linked(own).techniques.growl, 0.0);
+    }
+
+    #[test]
     fn the_reed_follows_the_heard_note_only() {
         let drives = [ReedSource::Slide, ReedSource::Pressure];
         let mut inputs = HostInputs::default();
@@ -283,7 +333,8 @@ mod tests {
         };
         let mut say = |event: NoteEvent<()>| {
             let mut event = Some(event);
-            while inputs.next(|| event.take(), PluginApi::Clap, drives).is_some() {}
+            let links = ControllerLinks::default();
+            while inputs.next(|| event.take(), PluginApi::Clap, drives, &links).is_some() {}
             inputs.reed_factors(drives)[0]
         };
         say(on(1, 60));

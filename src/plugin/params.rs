@@ -7,8 +7,10 @@ use std::sync::atomic::AtomicU32;
 use std::sync::{Arc, RwLock};
 
 use nice_plug::params::InternalParamMut;
+use nice_plug::params::persist::PersistentField;
 use nice_plug::prelude::*;
 
+use crate::controllers::ControllerLinks;
 use crate::editor::WindowState;
 use crate::parameters::{InUse, Number, Value};
 use crate::plugin::host_link::HostLink;
@@ -86,6 +88,9 @@ pub struct ChalumeauParams {
     /// Size, zoom, theme and view of the window.
     #[persist = "window"]
     pub window: RwLock<WindowState>,
+    /// Controllers that the user has linked to parameters.
+    #[persist = "links"]
+    pub links: ControllerLinks,
     /// Name of the preset that was chosen last; empty if there is none.
     #[persist = "preset"]
     pub preset: RwLock<String>,
@@ -317,6 +322,7 @@ impl ChalumeauParams {
             knob_status,
             schema: AtomicU32::new(SCHEMA),
             window: RwLock::default(),
+            links: ControllerLinks::default(),
             preset: RwLock::new(state::first_preset()),
             breath: BreathParams {
                 breath: number("breath"),
@@ -466,3 +472,17 @@ fn settled(param: &FloatParam) -> f32 {
 
 #[cfg(test)]
 mod tests;
+
+/// A project saves its links as the text of a [`ControllerMap`](crate::controllers::ControllerMap).
+impl PersistentField<'_, String> for ControllerLinks {
+    fn set(&self, text: String) {
+        self.take_text(&text);
+    }
+
+    fn map<F, R>(&self, f: F) -> R
+    where
+        F: Fn(&String) -> R,
+    {
+        f(&self.to_text())
+    }
+}

@@ -9,6 +9,7 @@
 use nice_plug::midi::{Channel, Key, VoiceID};
 use nice_plug::prelude::*;
 
+use chalumeau_core::control::midi::links::{Link, Links, MOST};
 use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::control::midi::{BreathOrigin, MidiDecoder};
 use chalumeau_core::control::notes::{HeldNote, Note, NoteAddress, NoteExpression};
@@ -57,6 +58,16 @@ impl EventTranslator {
     /// Sets what the mod wheel does.
     pub fn wheel(&mut self, wheel: Wheel) -> &[Event] {
         self.midi.set_wheel(wheel)
+    }
+
+    /// See [`MidiDecoder::set_links`].
+    pub fn set_links(&mut self, links: &[Option<Link>; MOST]) {
+        self.midi.set_links(links);
+    }
+
+    /// See [`MidiDecoder::links`].
+    pub fn links(&self) -> &Links {
+        self.midi.links()
     }
 
     /// Ends all notes at once.
@@ -139,7 +150,7 @@ fn address(voice_id: VoiceID, channel: Channel, key: Key) -> NoteAddress {
 }
 
 /// The MIDI data byte that a host's 0..=1 value came from.
-fn raw7(value: f32) -> u8 {
+pub fn raw7(value: f32) -> u8 {
     (value * 127.0).round().clamp(0.0, 127.0) as u8
 }
 

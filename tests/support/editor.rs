@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use chalumeau::controllers::ControllerLinks;
 use chalumeau::editor::controls::{Controls, Look, Mark};
 use chalumeau::editor::snapshot::{
     BreathSource, KnobDevice, KnobState, MouthpieceTraces, Severity, Snapshot, Status, Track,
@@ -81,6 +82,8 @@ pub struct Fake {
     told: RefCell<Vec<Told>>,
     marks: RefCell<BTreeMap<String, Mark>>,
     menus: RefCell<Vec<(String, (i32, i32))>>,
+    /// The user's links, where this host lets controllers be linked.
+    pub links: Option<ControllerLinks>,
 }
 
 impl Default for Fake {
@@ -99,6 +102,7 @@ impl Default for Fake {
             told: RefCell::default(),
             marks: RefCell::default(),
             menus: RefCell::default(),
+            links: None,
         }
     }
 }
@@ -116,6 +120,11 @@ impl Fake {
         host.table.retain(|(known, ..)| *known != id);
         host.ids.retain(|known| *known != id);
         host
+    }
+
+    /// The same where controllers can be linked.
+    pub fn linking() -> Self {
+        Self { links: Some(ControllerLinks::default()), ..Self::default() }
     }
 
     fn kind(&self, id: &str) -> &Kind {
@@ -192,6 +201,10 @@ impl Controls for Fake {
 
     fn marks(&self, id: &str) -> Vec<Mark> {
         self.marks.borrow().get(id).cloned().into_iter().collect()
+    }
+
+    fn links(&self) -> Option<&ControllerLinks> {
+        self.links.as_ref()
     }
 
     fn menu(&self, id: &str, at: (i32, i32)) {

@@ -9,6 +9,7 @@
 //! assert!(score.is_sorted_by_key(|timed| timed.at));
 //! ```
 
+use crate::instrument::SettingNumber;
 use crate::units::SoundingNote;
 
 /// Something the player does, in the units of the instrument.
@@ -71,6 +72,8 @@ pub enum Event {
         /// -1 left, 0 middle, 1 right.
         position: f32,
     },
+    /// A number of the [`Settings`](crate::instrument::Settings) gets a value in its own unit, clamped to its range.
+    Set(SettingNumber, f32),
     /// Open holes whatever is fingered, one bit each in the order of the instrument's file from the lowest bit; `None` goes
     /// back to the fingering of the note.
     TryHoles(Option<u64>),

@@ -8,6 +8,7 @@ use egui::{
 use crate::editor::controls::{Hands, Look, teach};
 use crate::editor::host_marks;
 use crate::editor::key_steps::KeySteps;
+use crate::editor::linked_controllers;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
@@ -68,7 +69,8 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2) {
         FontId::proportional(if is_small { 13.0 } else { 14.0 }),
         c.ink,
     );
-    host_marks::paint(ui, &marks, name.right_center());
+    let after = host_marks::paint(ui, &marks, name.right_center());
+    linked_controllers::name(ui, hands, of.id, after);
     // The value while a hand is near, else what the ends mean.
     let (words, ink) = if is_touched { (text.as_str(), c.ink) } else { (of.ends, c.quiet) };
     painter.text(name.center_bottom() + vec2(0.0, 1.0), Align2::CENTER_TOP, words, theme::small(), ink);

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nice_plug::context::gui::GuiContext;
 use nice_plug::prelude::{ParamPtr, Params};
 
+use crate::controllers::ControllerLinks;
 use crate::editor::controls::Mark;
 use crate::editor::{Controls, Look};
 use crate::plugin::host_link::MenuRequest;
@@ -104,6 +105,10 @@ mod raw {
 
         fn marks(&self, id: &str) -> Vec<Mark> {
             self.controls.params.host.marks(id)
+        }
+
+        fn links(&self) -> Option<&ControllerLinks> {
+            Some(&self.controls.params.links)
         }
 
         fn menu(&self, id: &str, at: (i32, i32)) {

@@ -24,6 +24,7 @@
 //! ```
 
 pub mod breath;
+pub mod links;
 pub mod mix;
 mod said;
 pub mod snapshot;
@@ -37,6 +38,7 @@ use crate::control::notes::{HeldNote, Note, NoteAddress, NoteExpression, Notes};
 use crate::event::Event;
 use crate::units::SoundingNote;
 use breath::{BreathChoice, BreathController};
+use links::{Link, Links, Source};
 use mix::{Mix, MixControllers};
 use said::Said;
 use snapshot::{PRESSURE, Place, Run};
@@ -74,6 +76,8 @@ pub enum BreathOrigin {
     Controller(BreathController),
     /// What belongs to a note.
     Note,
+    /// A controller that the player has [linked](links) to the breath.
+    Link,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -82,8 +86,8 @@ struct Channel {
     rpn: [u8; 2],
     /// Its controllers since the last note.
     run: Run,
-    /// Volume and pan, techniques, and the pedal, before the run.
-    before: (MixControllers, TechniqueControllers, bool),
+    /// Volume and pan, techniques, links, and the pedal, before the run.
+    before: (MixControllers, TechniqueControllers, links::Raws, bool),
 }
 
 impl Default for Channel {
@@ -103,6 +107,7 @@ pub struct MidiDecoder {
     origin: Option<BreathOrigin>,
     mix: Mix,
     techniques: Techniques,
+    links: Links,
     pedal: bool,
     notes: Notes,
     /// The keys as the player holds them, who gets the events.
@@ -161,6 +166,17 @@ impl MidiDecoder {
         self.techniques.wheel = wheel;
         self.say_techniques();
         self.said.events()
+    }
+
+    /// Ties controllers to settings. A controller whose link is new waits until it moves. Whether any link has changed.
+    /// Real-time safe.
+    pub fn set_links(&mut self, links: &[Option<Link>; links::MOST]) -> bool {
+        self.links.set(links)
+    }
+
+    /// The links, and what their controllers have said.
+    pub fn links(&self) -> &Links {
+        &self.links
     }
 
     /// A note begins, with a velocity of 1..=127. Its bend, breath, volume and pan come before it. Real-time safe.
@@ -240,6 +256,7 @@ impl MidiDecoder {
         let (at, cc, value) = (usize::from(channel % 16), cc.min(127), value.min(127));
         let place = self.place(at, cc);
         match cc {
+            _ if self.links.has(Source::Controller(cc)) => self.follow(Source::Controller(cc), value, place),
             BREATH | BREATH_FINE => {
                 self.hear(BreathController::Breath, at, (cc == BREATH_FINE, value), place);
             }
@@ -302,7 +319,11 @@ impl MidiDecoder {
         self.begin();
         let at = usize::from(channel % 16);
         let place = self.place(at, PRESSURE);
-        self.hear(BreathController::Pressure, at, (false, value.min(127)), place);
+        if self.links.has(Source::Pressure) {
+            self.follow(Source::Pressure, value.min(127), place);
+        } else {
+            self.hear(BreathController::Pressure, at, (false, value.min(127)), place);
+        }
         self.said.events()
     }
 
@@ -368,16 +389,18 @@ impl MidiDecoder {
     fn place(&mut self, at: usize, controller: u8) -> Place {
         let channel = &mut self.channels[at];
         if channel.run.is_empty() || channel.run.has(controller) {
-            channel.before = (self.mix.controllers, self.techniques.controllers, self.pedal);
+            channel.before =
+                (self.mix.controllers, self.techniques.controllers, self.links.raws(), self.pedal);
         }
         let place = channel.run.place(controller);
         if place == Place::Recognised {
             channel.rpn = RPN_NONE;
-            let (mix, techniques, pedal) = channel.before;
+            let (mix, techniques, raws, pedal) = channel.before;
             self.breath.forget_waiting(at);
             (self.mix.controllers, self.techniques.controllers) = (mix, techniques);
             self.remix();
             self.say_techniques();
+            self.links.go_back(&raws).for_each(|event| self.said.push(event));
             self.set_pedal(pedal);
         }
         place
@@ -387,6 +410,19 @@ impl MidiDecoder {
         let is_held = self.sounding().is_some();
         if let Some(unit) = self.breath.hear(controller, at, part, place, is_held) {
             self.blow(BreathOrigin::Controller(controller), unit);
+        }
+    }
+
+    /// A linked controller speaks.
+    fn follow(&mut self, source: Source, value: u8, place: Place) {
+        if matches!(place, Place::Recognised | Place::Within) {
+            return;
+        }
+        for event in self.links.hear(source, value) {
+            if matches!(event, Event::Breath(_)) {
+                self.origin = Some(BreathOrigin::Link);
+            }
+            self.said.push(event);
         }
     }
 

@@ -169,6 +169,11 @@ impl Clarinet {
         match event {
             Event::Volume { gain } => self.level.set_volume(gain),
             Event::Choke { note } if self.player.is_heard(note) => self.choke.begin(),
+            Event::Set(number, value) => {
+                let mut settings = *self.player.settings();
+                *number.of(&mut settings) = value;
+                self.set_settings(&settings);
+            }
             _ => {}
         }
         with_voice!(&mut self.voice, voice => self.player.apply(event, &self.model, voice));

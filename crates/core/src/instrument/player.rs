@@ -240,8 +240,8 @@ impl Player {
                 }
             }
             Event::Technique { which, amount } => self.techniques.set(which, amount),
-            // They act after the instrument.
-            Event::Volume { .. } | Event::Pan { .. } => {}
+            // They act after the instrument; settings are set from outside.
+            Event::Volume { .. } | Event::Pan { .. } | Event::Set(..) => {}
             Event::Panic => self.reset(voice),
         }
     }

@@ -119,6 +119,39 @@ pub struct Settings {
     pub glissando_s: f32,
 }
 
+/// One of the numbers of [`Settings`], which an event may set: where it is.
+///
+/// ```
+/// use chalumeau_core::instrument::{SettingNumber, Settings};
+///
+/// let noise = SettingNumber(|settings| &mut settings.noise);
+/// let mut settings = Settings::default();
+/// *noise.of(&mut settings) = 0.5;
+/// assert_eq!(settings.noise, 0.5);
+/// ```
+#[derive(Clone, Copy)]
+pub struct SettingNumber(pub fn(&mut Settings) -> &mut f32);
+
+impl SettingNumber {
+    /// This number of some settings. Real-time safe.
+    pub fn of(self, settings: &mut Settings) -> &mut f32 {
+        (self.0)(settings)
+    }
+}
+
+/// Two that lead to the same number may still differ; the same one never does.
+impl PartialEq for SettingNumber {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::fn_addr_eq(self.0, other.0)
+    }
+}
+
+impl std::fmt::Debug for SettingNumber {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("SettingNumber")
+    }
+}
+
 /// A number inside its range; one that is not finite becomes the default. Real-time safe.
 pub(super) fn fix(x: f32, low: f32, high: f32, default: f32) -> f32 {
     if x.is_finite() { x.clamp(low, high) } else { default }

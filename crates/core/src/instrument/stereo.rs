@@ -12,6 +12,7 @@ use std::f32::consts::{FRAC_PI_4, SQRT_2};
 use crate::dsp::glide::Glide;
 use crate::dsp::limiter::Limiter;
 use crate::event::{Event, Timed};
+use crate::instrument::Settings;
 use crate::instrument::room::{Room, RoomSound};
 
 /// Time that a change of the pan takes, s.
@@ -36,9 +37,20 @@ const CHANGES: usize = 4_096;
 pub struct Stereo {
     sides: [Glide; 2],
     /// Changes in the block that begins now, in order of time.
-    changes: Vec<(usize, f32)>,
+    changes: Vec<(usize, Change)>,
     room: RoomSound,
+    /// The room after these changes.
+    wanted: Room,
     limiter: Limiter,
+}
+
+/// What an event changes.
+#[derive(Clone, Copy, Debug)]
+enum Change {
+    /// Place between left and right, -1..=1.
+    Pan(f32),
+    /// The room around the instrument.
+    Room(Room),
 }
 
 impl Stereo {
@@ -48,12 +60,14 @@ impl Stereo {
             sides: [Glide::new(1.0, PAN_S, rate_hz); 2],
             changes: Vec::with_capacity(CHANGES),
             room: RoomSound::new(rate_hz),
+            wanted: Room::default(),
             limiter: Limiter::new(rate_hz),
         }
     }
 
     /// Another room from the next block on.
     pub fn set_room(&mut self, room: &Room) {
+        self.wanted = *room;
         self.room.set(room);
     }
 
@@ -70,14 +84,26 @@ impl Stereo {
         self.limiter.reset();
     }
 
-    /// Notes an event of the block that begins now; all but [`Event::Pan`] do nothing.
+    /// Notes an event of the block that begins now; all do nothing but [`Event::Pan`] and an [`Event::Set`] of the room.
     pub fn heed(&mut self, event: &Timed<Event>) {
-        let Timed { at, event: Event::Pan { position } } = *event else { return };
-        let position = if position.is_finite() { position.clamp(-1.0, 1.0) } else { 0.0 };
+        let change = match event.event {
+            Event::Pan { position } if position.is_finite() => Change::Pan(position.clamp(-1.0, 1.0)),
+            Event::Pan { .. } => Change::Pan(0.0),
+            Event::Set(number, value) => {
+                let mut settings = Settings { room: self.wanted, ..Settings::default() };
+                *number.of(&mut settings) = value;
+                if settings.room == self.wanted {
+                    return;
+                }
+                self.wanted = settings.room.clamped();
+                Change::Room(self.wanted)
+            }
+            _ => return,
+        };
         if self.changes.len() == CHANGES {
             self.changes.pop();
         }
-        self.changes.push((at, position));
+        self.changes.push((event.at, change));
     }
 
     /// Ends the block: `left` holds the mono sound; afterwards it is the left channel.
@@ -89,16 +115,20 @@ impl Stereo {
     /// Ends the block: room and pan of two channels of the same length.
     pub fn pan(&mut self, left: &mut [f32], right: &mut [f32]) {
         let right = &mut right[..left.len()];
-        let in_room = self.room.add(left, right);
         let mut done = 0;
         for change in 0..=self.changes.len() {
             let next = self.changes.get(change).copied();
             let to = next.map_or(left.len(), |(at, _)| at.clamp(done, left.len()));
-            self.turn(&mut left[done..to], &mut right[done..to], in_room.saturating_sub(done));
-            if let Some((_, position)) = next {
-                for (side, gain) in self.sides.iter_mut().zip(gains(position)) {
-                    side.go_to(gain);
+            let in_room = self.room.add(&mut left[done..to], &mut right[done..to]);
+            self.turn(&mut left[done..to], &mut right[done..to], in_room);
+            match next {
+                Some((_, Change::Pan(position))) => {
+                    for (side, gain) in self.sides.iter_mut().zip(gains(position)) {
+                        side.go_to(gain);
+                    }
                 }
+                Some((_, Change::Room(room))) => self.room.set(&room),
+                None => {}
             }
             done = to;
         }
@@ -139,6 +169,7 @@ fn gains(position: f32) -> [f32; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::instrument::SettingNumber;
 
     const RATE_HZ: f64 = 48_000.0;
 
@@ -188,5 +219,20 @@ mod tests {
         }
         // Back in the middle, both are the instrument's again.
         assert!(whole[0][6_000..] == whole[1][6_000..]);
+    }
+
+    #[test]
+    fn a_room_that_a_controller_opens_does_not_depend_on_blocks() {
+        let amount = SettingNumber(|settings| &mut settings.room.amount);
+        let events = [0.2, 0.9, 0.0]
+            .into_iter()
+            .zip([333, 4_001, 7_777])
+            .map(|(value, at)| Timed { at, event: Event::Set(amount, value) })
+            .collect::<Vec<_>>();
+        let whole = spread(&events, 9_600);
+        assert!(whole[0] != spread(&[], 9_600)[0]);
+        for block in [1, 17, 480] {
+            assert!(spread(&events, block) == whole, "blocks of {block}");
+        }
     }
 }

@@ -1,10 +1,11 @@
 //! The events of one message, in order. No allocation: a message has a few, and never more than fit.
 
+use super::links;
 use crate::control::notes;
 use crate::event::Event;
 
-/// Bend, breath, volume, pan, vibrato, three techniques, a new key, a choke and a release of every held key.
-const MOST: usize = notes::MOST + 12;
+/// Bend, breath, volume, pan, vibrato, three techniques, a new key, a choke, a release of every held key, and every link.
+const MOST: usize = notes::MOST + 12 + links::MOST;
 
 /// The events of the latest message.
 #[derive(Clone, Debug)]

@@ -487,3 +487,55 @@ fn volume_and_pan_follow_their_formulas() {
     midi.strike(note(1, 60), 127);
     assert_eq!(midi.express(id(1), NoteExpression::Pan(1.0)), [Event::Pan { position: 0.0 }], "they add");
 }
+
+mod linked {
+    use super::*;
+    use crate::control::midi::links::{Link, MOST, Source, Target};
+    use crate::instrument::SettingNumber;
+
+    const GROWL: SettingNumber = SettingNumber(|settings| &mut settings.techniques.growl);
+
+    fn decoder(source: Source, target: Target) -> MidiDecoder {
+        let mut midi = MidiDecoder::new();
+        let mut links = [None; MOST];
+        links[0] = Some(Link { source, target, low: 0.0, high: 1.0, curve: 1.0, own: 0.2 });
+        assert!(midi.set_links(&links) && !midi.set_links(&links));
+        midi
+    }
+
+    #[test]
+    fn a_linked_controller_does_what_it_is_linked_to_and_nothing_else() {
+        let mut midi = decoder(Source::Controller(11), Target::Number(GROWL));
+        assert_eq!(midi.controller(3, 11, 127), [Event::Set(GROWL, 1.0)]);
+        let note_on = Event::NoteOn { note: SoundingNote(60), velocity: 1.0 };
+        assert_eq!(midi.note_on(3, 60, 127), [note_on], "it does not blow");
+        let mut midi = decoder(Source::Pressure, Target::Number(GROWL));
+        assert_eq!(midi.pressure(0, 0), [Event::Set(GROWL, 0.0)]);
+    }
+
+    #[test]
+    fn any_controller_can_blow() {
+        let mut midi = decoder(Source::Controller(74), Target::Breath);
+        assert_eq!(midi.controller(0, 74, 127), [Event::Breath(1.0)]);
+        assert_eq!(midi.breath_origin(), Some(BreathOrigin::Link));
+    }
+
+    #[test]
+    fn a_snapshot_of_all_controllers_moves_no_linked_one() {
+        let mut midi = decoder(Source::Controller(21), Target::Number(GROWL));
+        let mut now = 0.2;
+        for _ in 0..3 {
+            for cc in 0..128 {
+                for event in midi.controller(0, cc, 127) {
+                    if let Event::Set(_, value) = event {
+                        now = *value;
+                    }
+                }
+            }
+            assert_eq!(now, 0.2);
+        }
+        // A hand moves it: the second message tells it from another snapshot.
+        midi.controller(0, 21, 100);
+        assert_eq!(midi.controller(0, 21, 127), [Event::Set(GROWL, 1.0)]);
+    }
+}

@@ -1,0 +1,70 @@
+//! `chalumeau controllers`: the devices that the program knows, and what their controllers do.
+
+use crate::cli::Failure;
+use crate::cli::csv_table::{TableArgs, quoted};
+use crate::controllers::{ControllerMap, factory};
+use crate::presets::nearest;
+use clap::{Args, Subcommand};
+use std::io::Write;
+use std::path::Path;
+
+const EXAMPLES: &str = "\
+Examples:
+  chalumeau controllers list
+  chalumeau controllers show EWI
+  chalumeau render melody.mid --controllers EWI --out melody.wav";
+
+/// List the controllers of devices, or show what those of one device do
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub struct ControllersCommand {
+    #[command(subcommand)]
+    command: ControllersSubcommand,
+}
+
+#[derive(Subcommand)]
+enum ControllersSubcommand {
+    /// List all devices, and how to set them
+    List(TableArgs),
+    /// Print the text of one device, to change and to use with --controllers
+    Show {
+        /// Its name
+        name: String,
+    },
+}
+
+impl ControllersCommand {
+    pub fn run(&self) -> Result<(), Failure> {
+        match &self.command {
+            ControllersSubcommand::List(table) => {
+                let mut table = table.open("name,links,shows")?;
+                for map in factory::all() {
+                    let (name, shows) = (quoted(&map.name), quoted(&map.shows));
+                    table.line(format_args!("{name},{},{shows}", map.links.len()))?;
+                }
+                table.finish()
+            }
+            ControllersSubcommand::Show { name } => {
+                write!(std::io::stdout().lock(), "{}", find(name).map_err(Failure::Usage)?.to_text())?;
+                Ok(())
+            }
+        }
+    }
+}
+
+/// The controllers of a device by its name, or of a file.
+pub fn named_or_file(text: &str) -> Result<ControllerMap, String> {
+    if Path::new(text).extension().is_some() {
+        ControllerMap::load(Path::new(text))
+    } else {
+        find(text).cloned()
+    }
+}
+
+fn find(name: &str) -> Result<&'static ControllerMap, String> {
+    factory::find(name).ok_or_else(|| {
+        let meant = nearest(name, factory::all().iter().map(|map| map.name.as_str()));
+        let meant = meant.map_or_else(String::new, |near| format!("did you mean {near:?}? "));
+        format!("no controllers are called {name:?}; {meant}`chalumeau controllers list` lists them; a file ends in .toml")
+    })
+}

@@ -1,0 +1,92 @@
+//! Controllers that the user links: learnt from a menu, listed, changed and forgotten.
+
+use chalumeau::controllers::ParameterLink;
+use chalumeau::editor::Tab;
+use chalumeau::editor::controls::Controls;
+use chalumeau_core::control::midi::links::Source;
+use egui::accesskit::Role;
+use egui_kittest::kittest::Queryable;
+
+use crate::Window;
+use crate::support::Fake;
+
+const KNOB: Source = Source::Controller(21);
+
+fn linking(tab: Tab) -> Window {
+    Window::with_host(tab, (1100.0, 2400.0), Fake::linking())
+}
+
+fn links(window: &Window) -> Vec<ParameterLink> {
+    let links = window.host.links.as_ref().unwrap();
+    links.all().into_iter().map(|(link, _)| link).collect()
+}
+
+fn choose(window: &mut Window, control: &str, item: &str) {
+    window.harness.get_by_role_and_label(Role::Slider, control).click_secondary();
+    window.harness.run();
+    window.harness.get_by_label(item).click();
+    window.harness.run();
+}
+
+#[test]
+fn a_controller_is_learnt_from_the_menu_of_a_slider_and_forgotten_there() {
+    let mut window = linking(Tab::Breath);
+    choose(&mut window, "Growl", "Learn a controller");
+    let board =
+        |window: &Window| window.host.links.as_ref().unwrap().learning().map(|parameter| parameter.id);
+    assert_eq!(board(&window), Some("growl"));
+    for raw in [3, 64] {
+        window.host.links.as_ref().unwrap().hear(KNOB, raw);
+    }
+    window.harness.run();
+    let linked = links(&window);
+    assert_eq!((linked.len(), linked[0].source, linked[0].parameter.id), (1, KNOB, "growl"));
+    window.harness.get_by_label("CC21 moves Growl");
+    choose(&mut window, "Growl", "Forget CC21");
+    assert!(links(&window).is_empty());
+    choose(&mut window, "Growl", "Learn a controller");
+    window.harness.get_by_label("Stop waiting").click();
+    window.harness.run();
+    assert_eq!(board(&window), None);
+    assert!(window.host.told().is_empty(), "no parameter has moved");
+}
+
+#[test]
+fn the_menu_leads_to_the_hosts_own() {
+    let mut window = linking(Tab::Breath);
+    choose(&mut window, "Growl", "Menu of the host");
+    let asked: Vec<_> = window.host.menus().into_iter().map(|(asked, _)| asked).collect();
+    assert_eq!(asked, ["growl"]);
+    // What no controller may move has only the host's.
+    window.harness.get_by_role_and_label(Role::Slider, "Knob curve").click_secondary();
+    window.harness.run();
+    assert_eq!(window.host.menus().len(), 1);
+}
+
+#[test]
+fn a_device_brings_its_links_and_values_and_the_next_takes_them_back() {
+    let mut window = linking(Tab::Breath);
+    for (device, links_now, wheel) in
+        [("EWI", 1, "Nothing"), ("Aerophone", 0, "Growl"), ("Breath controller", 0, "Vibrato")]
+    {
+        window.harness.get_by_role_and_label(Role::ComboBox, "Choose a device").click();
+        window.harness.run();
+        window.harness.get_by_label(device).click();
+        window.harness.run();
+        assert_eq!(links(&window).len(), links_now, "{device}");
+        assert_eq!(window.host.text("wheel", window.host.value("wheel")), wheel, "{device}");
+    }
+}
+
+#[test]
+fn a_row_of_the_table_forgets_its_own_link() {
+    let mut window = linking(Tab::Breath);
+    let of = |id: &str| ParameterLink::whole(KNOB, chalumeau::parameters::find(id).unwrap()).unwrap();
+    window.host.links.as_ref().unwrap().replace(&[of("growl"), of("vib")]);
+    window.harness.run();
+    window.harness.get_by_label("CC21 moves Vibrato");
+    let forget = window.harness.get_all_by_label("Forget").next().unwrap();
+    forget.click();
+    window.harness.run();
+    assert_eq!(links(&window), [of("vib")]);
+}
