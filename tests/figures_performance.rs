@@ -378,6 +378,50 @@ fn a_render_is_the_same_with_a_figure_beside_it() {
     }
 }
 
+/// The sounds of a page: title, and root mean square in dB re full scale of its first channel.
+fn tracks(page: &str) -> Vec<(String, f64)> {
+    let of = |part: &str| {
+        let title = part[..part.find('<').unwrap()].to_owned();
+        let from = part.find("data:audio/wav;base64,").unwrap() + 22;
+        let wav = STANDARD.decode(&part[from..from + part[from..].find('"').unwrap()]).unwrap();
+        let reader = hound::WavReader::new(std::io::Cursor::new(wav)).unwrap();
+        let channels = usize::from(reader.spec().channels);
+        let samples: Vec<f64> = reader
+            .into_samples::<i16>()
+            .step_by(channels)
+            .map(|x| f64::from(x.unwrap()) / 32_768.0)
+            .collect();
+        assert!(samples.iter().all(|x| x.abs() < 0.99), "{title} reaches full scale");
+        let power = samples.iter().map(|x| x * x).sum::<f64>() / samples.len() as f64;
+        (title, 10.0 * power.log10())
+    };
+    page.split("<h3>").skip(1).map(of).collect()
+}
+
+#[test]
+fn a_tour_plays_what_it_says_on_any_instrument() {
+    let d = tempfile::tempdir().unwrap();
+    succeeds(&d, "report --tour --out tour.html");
+    let page = String::from_utf8(read(&d, "tour.html")).unwrap();
+    assert!(!page.contains("http") && !page.contains("<script") && page.contains("<h2>Rooms</h2>"));
+    let sounds = tracks(&page);
+    assert_eq!(sounds.len(), 22);
+    for (title, level_db) in &sounds {
+        assert!(*level_db > -40.0, "{title} is silent: {level_db:.1} dB");
+    }
+    let level = |title: &str| sounds.iter().find(|(other, _)| other == title).unwrap().1;
+    let steps = [level("Scale, mf") - level("Scale, pp"), level("Scale, ff") - level("Scale, mf")];
+    assert!(steps.iter().all(|step| (6.0..18.0).contains(step)), "{steps:.1?} dB from pp to mf to ff");
+    assert!(level("Subtone") < level("A phrase, plain") - 1.0);
+    // An instrument of three notes leaves the others out.
+    let cylinder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/instruments/cylinder.toml");
+    succeeds(&d, &format!("report --tour --untuned --instrument {} --out c.html", cylinder.display()));
+    let page = String::from_utf8(read(&d, "c.html")).unwrap();
+    assert_eq!(page.matches("<audio ").count(), 22);
+    let output = chalumeau(d.path(), "report --tour --gamma 0.5 --out b.html");
+    assert!(!output.status.success() && String::from_utf8_lossy(&output.stderr).contains("--tour"));
+}
+
 #[test]
 fn a_report_holds_the_sound_the_cents_and_the_settings() {
     let d = tempfile::tempdir().unwrap();

@@ -1,6 +1,7 @@
 //! `chalumeau report`: a rendering as one HTML page with its sound, figures and tables.
 
 mod breath_and_haptics;
+mod tour;
 
 use crate::cli::Failure;
 use crate::cli::render::{about, progress};
@@ -30,6 +31,8 @@ const EXAMPLES: &str = "\
 Examples:
   chalumeau report melody.mid --out melody.html
   chalumeau report --scale E3:C6 --gamma 0.5 --no-noise --out scale.html
+  chalumeau report --tour --out tour.html
+      A page to listen to.
   chalumeau report long.mid --wav long.wav --out long.html
       The sound is a separate file beside the page.";
 
@@ -44,6 +47,10 @@ Examples:
 pub struct ReportCommand {
     #[command(flatten)]
     play: ScoreArgs,
+    /// A page to listen to, instead: scales from pp to ff, slurs, attacks, techniques and rooms, each with what to listen for,
+    /// on any instrument
+    #[arg(long, group = "what", conflicts_with_all = ["blown", "wav", "plot_at", "preset", "scl", "seconds", "tail"])]
+    tour: bool,
     /// HTML file to write
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
     out: PathBuf,
@@ -61,6 +68,9 @@ pub struct ReportCommand {
 impl ReportCommand {
     pub fn run(&self) -> Result<(), Failure> {
         self.refuse_names()?;
+        if self.tour {
+            return self.write_tour();
+        }
         let prepared = self.play.prepare()?;
         let seconds = prepared.score.seconds(prepared.rate);
         if self.wav.is_none() && seconds > INSIDE_MAX_S {
@@ -88,6 +98,15 @@ impl ReportCommand {
         if let Some(wav) = wav {
             wav.keep()?;
         }
+        Ok(())
+    }
+
+    fn write_tour(&self) -> Result<(), Failure> {
+        let job = self.play.without_score()?;
+        let mut page = NewFile::create(&self.out, self.force)?;
+        let report = tour::page(&job, command(), progress)?;
+        write(&report, &mut page).map_err(|source| Failure::Report { path: self.out.clone(), source })?;
+        page.keep()?;
         Ok(())
     }
 
@@ -137,7 +156,7 @@ impl ReportCommand {
         let touch = BreathAndHaptics::new(prepared, self.play.feel(file)?, longest);
         Ok(Page {
             about: lines,
-            sound,
+            sound: Some(sound),
             plates: vec![
                 Plate {
                     figure: watched.figure(&title, about(prepared)),

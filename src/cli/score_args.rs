@@ -172,6 +172,14 @@ impl ScoreArgs {
         Ok(RenderJob { model, settings, score, rate: self.rate })
     }
 
+    /// The instrument and the player's settings, with nothing to play.
+    pub fn without_score(&self) -> Result<RenderJob, Failure> {
+        let file = self.instrument.load()?;
+        let settings = self.settings.played(&file)?;
+        let model = self.instrument.model(file, self.rate, settings.a4_hz)?;
+        Ok(RenderJob { model, settings, score: Score::default(), rate: self.rate })
+    }
+
     /// The feel of the knob.
     pub fn feel(&self, file: &InstrumentFile) -> Result<FeelDesign, Failure> {
         self.feel.design(file)

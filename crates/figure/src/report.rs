@@ -28,6 +28,16 @@ pub struct Plate {
     pub alternative: String,
 }
 
+/// A sound with a title.
+pub struct Track {
+    /// What it is.
+    pub title: String,
+    /// What to listen for.
+    pub words: String,
+    /// The sound.
+    pub sound: Sound,
+}
+
 /// A table.
 pub struct ReportTable {
     /// Heading above it.
@@ -40,12 +50,15 @@ pub struct ReportTable {
     pub rows: Vec<Vec<TableCell>>,
 }
 
-/// A part of the page with words, figures and tables of its own.
+/// A part of the page with words, sounds, figures and tables of its own.
+#[derive(Default)]
 pub struct Chapter {
     /// Heading.
     pub title: String,
     /// Paragraphs under it.
     pub words: Vec<String>,
+    /// Sounds, each under a smaller heading.
+    pub tracks: Vec<Track>,
     /// Figures.
     pub plates: Vec<Plate>,
     /// Tables, each under a smaller heading.
@@ -66,8 +79,8 @@ pub struct Report {
     pub title: String,
     /// A few words on how.
     pub about: Vec<String>,
-    /// The sound.
-    pub sound: Sound,
+    /// The sound, if there is one for the whole page.
+    pub sound: Option<Sound>,
     /// Figures, most telling first.
     pub plates: Vec<Plate>,
     /// Between the figures and the tables.
@@ -143,8 +156,10 @@ pub fn write(report: &Report, out: &mut impl Write) -> Result<(), ReportError> {
     for line in &report.about {
         writeln!(out, "<p class=\"quiet\">{}</p>", escaped(line))?;
     }
-    writeln!(out, "<h2>Listen</h2>")?;
-    write_sound(&report.sound, &title, out)?;
+    if let Some(sound) = &report.sound {
+        writeln!(out, "<h2>Listen</h2>")?;
+        write_sound(sound, &title, out)?;
+    }
     if !report.plates.is_empty() {
         writeln!(out, "<h2>Figures</h2>")?;
     }
@@ -160,6 +175,11 @@ pub fn write(report: &Report, out: &mut impl Write) -> Result<(), ReportError> {
         writeln!(out, "<h2>{}</h2>", escaped(&chapter.title))?;
         for line in &chapter.words {
             writeln!(out, "<p>{}</p>", escaped(line))?;
+        }
+        for Track { title, words, sound } in &chapter.tracks {
+            let title = escaped(title);
+            writeln!(out, "<h3>{title}</h3>\n<p>{}</p>", escaped(words))?;
+            write_sound(sound, &title, out)?;
         }
         write_plates(&chapter.plates, out)?;
         write_tables(&chapter.tables, 3, out)?;
@@ -263,7 +283,7 @@ mod tests {
         Report {
             title: "<a> & \"b\"\u{7}".to_owned(),
             about: Vec::new(),
-            sound,
+            sound: Some(sound),
             plates: Vec::new(),
             chapters: Vec::new(),
             tables: vec![ReportTable {

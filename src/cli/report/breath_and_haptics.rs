@@ -123,7 +123,13 @@ impl<'a> BreathAndHaptics<'a> {
             Ok(table) => plates.push(self.turns(&table)),
             Err(reason) => words.push(format!("No knob would take this feel: {reason}.")),
         }
-        Chapter { title: "Breath".to_owned(), words, plates, tables: vec![self.pressures()] }
+        Chapter {
+            title: "Breath".to_owned(),
+            words,
+            plates,
+            tables: vec![self.pressures()],
+            ..Chapter::default()
+        }
     }
 
     /// One note from silence to closure and back.
@@ -317,7 +323,7 @@ impl<'a> BreathAndHaptics<'a> {
             Ok(table) => tables.push(self.feel(&table)),
             Err(reason) => words.push(format!("The feel asked for is refused: {reason}.")),
         }
-        Chapter { title: "Haptics".to_owned(), words, plates, tables }
+        Chapter { title: "Haptics".to_owned(), words, plates, tables, ..Chapter::default() }
     }
 
     fn torques(&self, law: TorqueLaw, panels: &[AtContrast]) -> Plate {
