@@ -10,8 +10,12 @@ mod parallel;
 
 use std::sync::{Arc, LazyLock};
 
+use chalumeau::controllers;
+use chalumeau::controllers::ParameterLink;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::control::midi::MidiDecoder;
+use chalumeau_core::control::midi::links::Source;
+use chalumeau_core::control::notes::{NoteAddress, NoteExpression};
 use chalumeau_core::event::Event;
 use chalumeau_core::instrument::prepare::{Preparation, Wanted};
 use chalumeau_core::instrument::{
@@ -117,6 +121,56 @@ fn a_slur_cut_off_does_not_sing_by_itself() {
 }
 
 /// Settings anywhere in their ranges: reeds, lays, lips, and all that a user may set.
+/// Any MIDI message; of every channel, note, controller and value.
+fn any_message(random: &mut Random, midi: &mut MidiDecoder, clarinet: &mut Clarinet) {
+    let (channel, data) = (random.below(16) as u8, random.next());
+    let (first, second) = (data as u8 & 127, (data >> 8) as u8 & 127);
+    // Keys near the instrument's, so that most of them sound.
+    let key = 40 + first % 60;
+    let said = match random.below(20) {
+        0..6 => midi.note_on(channel, key, second),
+        6..11 => midi.note_off(channel, key),
+        11..16 => midi.controller(channel, first, second),
+        // What players move most.
+        16 => midi.controller(channel, [1, 2, 11, 18, 19, 20, 64, 74][usize::from(first % 8)], second),
+        17 => midi.pressure(channel, first),
+        18 => midi.bend(channel, (data >> 16) as u16 & 16_383),
+        _ => {
+            midi.express(NoteAddress::of_key(channel, key), NoteExpression::Breath(f32::from(second) / 127.0))
+        }
+    };
+    said.iter().for_each(|&event| clarinet.apply(event));
+}
+
+/// Every controller that a user may link, moved with all the others.
+#[test]
+fn a_million_messages_on_sixteen_channels_leave_no_stuck_note() {
+    const MESSAGES: usize = 31_250;
+    const SAMPLES: usize = 8;
+    let linkable: Vec<_> = controllers::linkable().filter(|parameter| parameter.id != "gain").collect();
+    let runs: Vec<usize> = (0..cases(32)).collect();
+    parallel::each(&runs, |&case| {
+        let mut random = random_of(7, case);
+        let mut clarinet = Clarinet::new(MODEL.clone(), HOST_HZ);
+        let links: Vec<_> = (0..8)
+            .filter_map(|_| {
+                let (cc, parameter) = (random.below(120) as u8, linkable[random.below(linkable.len())]);
+                ParameterLink::whole(Source::Controller(cc), parameter)
+            })
+            .collect();
+        let mut midi = MidiDecoder::new();
+        midi.set_links(&controllers::as_links(&links, &Settings::default()));
+        let mut sound = [0.0; SAMPLES];
+        for message in 0..MESSAGES {
+            any_message(&mut random, &mut midi, &mut clarinet);
+            clarinet.render(&mut sound);
+            assert!(sound.iter().all(|x| x.abs() <= 1.0), "case {case}, message {message}: {sound:?}");
+        }
+        ends(&mut clarinet, &mut midi, case % 2);
+        assert_silent(&mut clarinet, &format!("case {case}"));
+    });
+}
+
 fn any_settings(random: &mut Random) -> Settings {
     Settings {
         breath_response: if random.below(2) == 0 { BreathResponse::Played } else { BreathResponse::Physical },
