@@ -97,6 +97,14 @@ impl<F: Real> Mouth<F> {
         self.noise.reset();
     }
 
+    /// Pressure and tongue move on by a sample; the noise of the jet.
+    #[inline(always)]
+    fn blow(&mut self) -> f64 {
+        self.p_mouth += self.p_mouth_glide;
+        self.tongue += self.tongue_glide;
+        self.noise.flow(self.state.flow, self.at)
+    }
+
     /// The reed is where the tongue holds it: no movement, no thump.
     fn hold_reed(&mut self) {
         self.state.closing = TONGUE_FORCE;
@@ -107,25 +115,9 @@ impl<F: Real> Mouth<F> {
 impl<F: Real> Tip<F> for Mouth<F> {
     #[inline(always)]
     fn reflect(&mut self, p_minus: F) -> F {
-        self.p_mouth += self.p_mouth_glide;
-        self.tongue += self.tongue_glide;
-        let noise = self.noise.flow(self.state.flow, self.at);
-        let p_minus = p_minus.wide();
-        // The part of the tract's impedance that acts at once is in series with the bore's.
-        let (p_mouth, kappa) = match &self.tract {
-            Some(tract) => (self.p_mouth - self.tract_state.pressure(tract), self.kappa + tract.at_once()),
-            None => (self.p_mouth, self.kappa),
-        };
-        let mut p_plus =
-            self.state.tick(&self.reed, self.tables, kappa, p_mouth, p_minus, noise, self.tongue);
-        if let Some(tract) = &self.tract {
-            // All that flows into the bore, reed's motion and noise included.
-            let flow = (p_plus - p_minus) / kappa;
-            p_plus -= tract.at_once() * flow;
-            self.state.p_mouthpiece -= tract.at_once() * flow;
-            self.tract_state.tick(tract, flow);
-        }
-        F::of(p_plus)
+        let noise = self.blow();
+        let (p_mouth, kappa) = (self.p_mouth, self.kappa);
+        F::of(self.state.tick(&self.reed, self.tables, kappa, p_mouth, p_minus.wide(), noise, self.tongue))
     }
 
     #[inline(always)]
@@ -155,6 +147,46 @@ impl<F: Real> Tip<F> for Mouth<F> {
         if self.at == TICK {
             self.outside.radiate();
         }
+    }
+}
+
+/// The reed end of a player whose throat is not open. A kind of its own, so that an open throat costs nothing.
+struct ThroughTract<'a, F> {
+    mouth: &'a mut Mouth<F>,
+    tract: TractCoeffs,
+}
+
+impl<F: Real> Tip<F> for ThroughTract<'_, F> {
+    #[inline(always)]
+    fn reflect(&mut self, p_minus: F) -> F {
+        let Self { mouth, tract } = self;
+        let (noise, p_minus) = (mouth.blow(), p_minus.wide());
+        // The part of the tract's impedance that acts at once is in series with the bore's.
+        let p_mouth = mouth.p_mouth - mouth.tract_state.pressure(tract);
+        let kappa = mouth.kappa + tract.at_once();
+        let (reed, tables) = (&mouth.reed, mouth.tables);
+        let mut p_plus = mouth.state.tick(reed, tables, kappa, p_mouth, p_minus, noise, mouth.tongue);
+        // All that flows into the bore, reed's motion and noise included.
+        let flow = (p_plus - p_minus) / kappa;
+        p_plus -= tract.at_once() * flow;
+        mouth.state.p_mouthpiece -= tract.at_once() * flow;
+        mouth.tract_state.tick(tract, flow);
+        F::of(p_plus)
+    }
+
+    #[inline(always)]
+    fn holes(&mut self) -> Option<&mut HoleFlows<F>> {
+        self.mouth.holes()
+    }
+
+    #[inline(always)]
+    fn radiated(&mut self, bell: F) {
+        self.mouth.radiated(bell);
+    }
+
+    #[inline(always)]
+    fn ended(&mut self) {
+        self.mouth.ended();
     }
 }
 
@@ -257,7 +289,10 @@ impl<F: Real> Voice<F> {
         let lattice = &self.lattice;
         mouth.outside.heed(lattice.is_moving(), |hole| lattice.is_open(hole));
         mouth.noise.fill(drive.noise, mouth.state.flow);
-        self.lattice.run(TICK, mouth);
+        match mouth.tract {
+            None => self.lattice.run(TICK, mouth),
+            Some(tract) => self.lattice.run(TICK, &mut ThroughTract { mouth, tract }),
+        }
         if let Some(probes) = &mut mouth.probes {
             for (probe, &pressure) in probes.iter_mut().zip(mouth.outside.heard().0) {
                 probe.p_radiated_pa = f64::from(pressure);
