@@ -92,7 +92,14 @@ impl FingeringsCommand {
         }
         let mut table = self.table.open("fingers,hz,cents,gamma_on,mode,evenness_db,cost,open,chart")?;
         table.comment(format_args!("{looked}; {note}"))?;
-        for found in finder.best(note, count) {
+        let found = finder.best(note, count);
+        if found.is_empty() {
+            let (low, high) = (file.lowest(), file.highest());
+            eprintln!(
+                "warning: no fingering sounds near {note}; the chart of this instrument goes from {low} to {high}"
+            );
+        }
+        for found in found {
             let chart = finder.of_chart(note).is_some_and(|chart| chart.open == found.grip.open);
             table.line(format_args!("{},{}", one(&found), if chart { "yes" } else { "" }))?;
         }

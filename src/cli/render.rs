@@ -27,7 +27,7 @@ Examples:
       Notes are sounding pitch; breath from CC2, else CC11, else channel pressure, else velocity; volume from CC7.
   chalumeau render --written C4 --gamma 0.5 --seconds 1.5 --no-noise --out c4.wav
   chalumeau render --scale E3:C6 --slurred --seconds 0.4 --out scale.wav
-  chalumeau render --written G4 --breath ramp:0:1.2:4 --seconds 5 --probe g4.csv --out g4.wav
+  chalumeau render --written G4 --breath ramp:0:1.6:4 --seconds 5 --probe g4.csv --out g4.wav
       From silence over the threshold to a reed held shut, with pressures, flow and opening.
   chalumeau render melody.mid --out melody.wav --plot melody.png
       Waveform, spectrogram, pitch against the score, breath, and the reed in close-up.
@@ -60,7 +60,7 @@ pub struct RenderCommand {
     /// Bits per sample: integers rounded without dither, or floats as computed
     #[arg(long, value_enum, default_value_t = Bits::Float32, help_heading = "Output")]
     bits: Bits,
-    /// Channels: 1, or 2, which differ where pan (CC10) leaves the middle, or if the instrument is heard from two places (--set heard=place)
+    /// Channels: 1, or 2, which differ where pan (CC10) leaves the middle, in a room (--room), or if the instrument is heard from two places (--set heard=place)
     #[arg(long, value_name = "N", default_value = "1", help_heading = "Output", value_parser = clap::value_parser!(u16).range(1..=2))]
     channels: u16,
     /// CSV file of internal signals over time: mouth pressure, reed opening, flow, mouthpiece and radiated pressure
@@ -102,6 +102,9 @@ impl RenderCommand {
     pub fn render(&self, bar: impl FnOnce(usize) -> ProgressBar) -> Result<Rendered, Failure> {
         let prepared = self.play.prepare()?;
         let RenderJob { score, rate, .. } = &prepared;
+        if self.channels == 1 && prepared.settings.room.amount > 0.0 {
+            eprintln!("warning: a room is heard on two channels only; add --channels 2");
+        }
         self.refuse_same_file()?;
         let mut out = NewFile::create(&self.out, self.force)?;
         let mut probe =

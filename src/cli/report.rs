@@ -72,6 +72,9 @@ impl ReportCommand {
             return self.write_tour();
         }
         let prepared = self.play.prepare()?;
+        if prepared.settings.room.amount > 0.0 {
+            eprintln!("warning: a report has one channel, on which no room is heard");
+        }
         let seconds = prepared.score.seconds(prepared.rate);
         if self.wav.is_none() && seconds > INSIDE_MAX_S {
             return Err(Failure::Usage(format!(

@@ -322,7 +322,7 @@ fn warn_of_silent_notes(events: &[Timed<Event>], model: &Model, reach: Reach) {
         let names: BTreeSet<_> = muted.iter().filter_map(|&note| written(note)).collect();
         let names: Vec<_> = names.iter().map(|note| format!("{note} (sounds {})", sounds(*note))).collect();
         eprintln!(
-            "warning: {} notes stay silent, because their fingering does not speak in tune on this instrument: written {}",
+            "warning: notes that stay silent, because their fingering does not speak in tune on this instrument: {}, written {}",
             muted.len(),
             names.join(", ")
         );

@@ -24,6 +24,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::parameters::{self, Kind, PARAMETERS, Parameter, Sets, Value};
+use crate::presets::nearest;
 use chalumeau_core::control::midi::links::{Link, MOST, Source, Target};
 use chalumeau_core::instrument::{SettingNumber, Settings};
 
@@ -224,7 +225,14 @@ impl ControllerMap {
     /// Reads a file.
     pub fn load(path: &Path) -> Result<Self, String> {
         let shown = path.display();
-        let text = std::fs::read_to_string(path).map_err(|error| format!("{shown}: {error}"))?;
+        let text = std::fs::read_to_string(path).map_err(|error| match error.kind() {
+            std::io::ErrorKind::NotFound => {
+                format!(
+                    "there is no file {shown}; `chalumeau controllers list` lists the devices that need none"
+                )
+            }
+            _ => format!("{shown}: {error}"),
+        })?;
         Self::parse(&text).map_err(|error| format!("{shown}: {error}"))
     }
 
@@ -255,21 +263,36 @@ impl ControllerMap {
 }
 
 fn read_source(value: &toml::Value) -> Result<Source, String> {
+    let number_of = |text: &str| text.trim_start_matches(['C', 'c']).parse::<u8>().ok();
     let source = match value {
+        toml::Value::String(text) if number_of(text).is_some_and(|cc| cc < 128) => {
+            number_of(text).map(Source::Controller)
+        }
         toml::Value::Integer(cc) => u8::try_from(*cc).ok().filter(|cc| *cc < 128).map(Source::Controller),
         toml::Value::String(text) if text == "pressure" => Some(Source::Pressure),
         _ => None,
     };
     match source {
         Some(source) if source.is_free() => Ok(source),
-        Some(source) => Err(format!("{} steers MIDI itself; choose another controller", source_name(source))),
-        None => Err(format!("controller is {value}; it must be a number from 1 to 119, or \"pressure\"")),
+        Some(source) => Err(format!(
+            "{} cannot be linked, as MIDI needs it for something else; choose another controller",
+            source_name(source)
+        )),
+        None => Err(format!(
+            "controller is {value}; it must be a number from 1 to 119, such as 21 for CC21, or \"pressure\""
+        )),
     }
 }
 
 fn find(id: &str) -> Result<&'static Parameter, String> {
-    parameters::find(id)
-        .ok_or_else(|| format!("there is no parameter {id:?}; `chalumeau parameters` lists them all"))
+    parameters::find(id).ok_or_else(|| {
+        // The window shows names.
+        let named = linkable().find(|parameter| parameter.name.eq_ignore_ascii_case(id));
+        let near =
+            named.map(|parameter| parameter.id).or_else(|| nearest(id, linkable().map(|other| other.id)));
+        let meant = near.map_or_else(String::new, |near| format!("did you mean {near:?}? "));
+        format!("there is no parameter {id:?}; {meant}`chalumeau parameters` lists them all")
+    })
 }
 
 /// A value without its quotes.
@@ -313,7 +336,8 @@ mod tests {
         for (text, line, word) in [
             ("controller = 21\nparameter = \"growll\"\n", 6, "growll"),
             ("controller = 200\nparameter = \"growl\"\n", 5, "1 to 119"),
-            ("controller = 64\nparameter = \"growl\"\n", 5, "steers MIDI"),
+            ("controller = 64\nparameter = \"growl\"\n", 5, "cannot be linked"),
+            ("controller = 21\nparameter = \"Growl\"\n", 6, "did you mean \"growl\"?"),
             ("controller = 21\nparameter = \"tune\"\n", 6, "no controller can move Tuning"),
             ("controller = 21\nparameter = \"arm\"\n", 6, "no controller can move"),
             ("controller = 21\nparameter = \"growl\"\nto = \"loud\"\n", 7, "loud"),

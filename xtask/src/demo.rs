@@ -2,6 +2,7 @@
 
 use std::convert::Infallible;
 use std::path::Path;
+use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
@@ -63,6 +64,10 @@ pub fn run(_: &[String]) -> Result<()> {
 
     println!("sound    {}\npicture  {}\n", shown(&wav), shown(&png));
     by_knob(&clap, &folder, &score, &said)?;
+    let page = folder.join("tour.html");
+    let mut tour = Command::new(artefacts::program()?);
+    machine::run(tour.args(["report", "--tour", "--force", "--out"]).arg(&page))?;
+    println!("page to listen to    {}\n", shown(&page));
     println!("To play it in a DAW, copy the bundles from {}:", shown(&machine::target().join("bundled")));
     println!("{}", bundle::HOMES);
     Ok(())

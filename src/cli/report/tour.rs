@@ -127,13 +127,13 @@ fn stops(model: &Model, base: Settings) -> Vec<(&'static str, Vec<Stop>)> {
             vec![
                 stop(
                     "Scale, pp",
-                    "The lowest note to the highest of the clarion. It is dark and even; air is heard only just.",
+                    "The lowest note to the highest of the clarion. It is dark and even; you can just hear the air.",
                     base,
                     scale(PP),
                 ),
                 stop(
                     "Scale, mf",
-                    "The same, about 15 dB louder, with the upper partials of a comfortable breath.",
+                    "The same, about 12 dB louder, with the upper partials of a comfortable breath.",
                     base,
                     scale(MF),
                 ),
@@ -232,7 +232,7 @@ fn stops(model: &Model, base: Settings) -> Vec<(&'static str, Vec<Stop>)> {
                     "The tongue rolls an R in the breath.",
                 ),
                 stop(
-                    "The vocal tract bends C6 by an octave",
+                    "The vocal tract bends C6 by ten semitones",
                     "The fingers stay. The tract's resonance goes down, and the reed follows it, not the bore.",
                     Settings { tract: Tract { amount: 1.0, interval_semitones: 7.0 }, ..base },
                     Line::new(MF)
@@ -300,7 +300,7 @@ pub fn page(
         about: vec![
             "Every sound on this page is computed: a reed, a bore with its tone holes, and a player who blows and fingers."
                 .to_owned(),
-            "Use headphones. The loudest sounds are 26 dB louder than the softest: set the volume by the scale in ff.".to_owned(),
+            "Use headphones. The loudest scale is some 22 dB louder than the softest: set the volume by the scale in ff.".to_owned(),
         ],
         sound: None,
         plates: Vec::new(),
