@@ -8,6 +8,7 @@ mod spelling;
 mod table;
 mod text;
 
+use chalumeau_core::event::SettingNumber;
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::reed::PhysicalReed;
 
@@ -128,7 +129,7 @@ pub struct Switch {
 #[derive(Clone, Copy, Debug)]
 pub enum Sets {
     /// A number of [`Settings`].
-    Number(fn(&mut Settings) -> &mut f32),
+    Number(SettingNumber),
     /// A switch of [`Settings`].
     Switch(fn(&mut Settings) -> &mut bool),
     /// A whole number of [`Settings`].
@@ -170,7 +171,7 @@ impl Parameter {
     /// Puts a value into settings. Does nothing if the parameter sets nothing there, or if the value is of another kind.
     pub fn set(&self, settings: &mut Settings, value: Value) {
         match (self.sets, value) {
-            (Some(Sets::Number(field)), Value::Number(number)) => *field(settings) = number,
+            (Some(Sets::Number(which)), Value::Number(number)) => *settings.number(which) = number,
             (Some(Sets::Switch(field)), Value::Switch(on)) => *field(settings) = on,
             (Some(Sets::Whole(field)), Value::Whole(number)) => *field(settings) = number,
             (Some(Sets::Choice(choose)), Value::Choice(index)) => choose(settings, index),

@@ -26,7 +26,7 @@ use toml::Spanned;
 use crate::parameters::{self, Kind, PARAMETERS, Parameter, Sets, Value};
 use crate::presets::nearest;
 use chalumeau_core::control::midi::links::{Link, MOST, Source, Target};
-use chalumeau_core::instrument::{SettingNumber, Settings};
+use chalumeau_core::instrument::Settings;
 
 /// Layout of the text.
 const FORMAT: i64 = 1;
@@ -104,7 +104,7 @@ pub fn linkable() -> impl Iterator<Item = &'static Parameter> {
 fn target(parameter: &Parameter) -> Option<Target> {
     match parameter.sets {
         _ if parameter.id == "breath" => Some(Target::Breath),
-        Some(Sets::Number(field)) if parameter.is_automatable => Some(Target::Number(SettingNumber(field))),
+        Some(Sets::Number(number)) if parameter.is_automatable => Some(Target::Number(number)),
         _ => None,
     }
 }
@@ -122,7 +122,7 @@ impl ParameterLink {
         let target = target(self.parameter)?;
         let own = match target {
             Target::Breath => 0.0,
-            Target::Number(number) => *number.of(&mut settings.clone()),
+            Target::Number(number) => *settings.clone().number(number),
         };
         Some(Link { source: self.source, target, low: self.low, high: self.high, curve: self.curve, own })
     }

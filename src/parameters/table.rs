@@ -1,5 +1,6 @@
 //! The parameters themselves, in the order of hosts. Groups, order and ids are fixed for ever; tests hold a frozen copy.
 
+use chalumeau_core::event::SettingNumber;
 use chalumeau_core::instrument::concert_pitch::A4_RANGE_HZ;
 use chalumeau_core::instrument::player::Attack;
 use chalumeau_core::instrument::player::response::ONSET;
@@ -140,7 +141,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "Sets how hard a controller or the knob blows at its end. A clarinettist plays between 2 and 6 kPa.",
             "Sets how far the knob's whole travel reaches into the note.",
         )
-        .sets(Sets::Number(|settings| &mut settings.breath_full_kpa))
+        .sets(Sets::Number(SettingNumber::BreathFullKpa))
         .flag("--breath-full"),
     entry("tongue", BREATH, "Tongue", number([1.0, 20.0], 2.0, 1, " ms"))
         .help(
@@ -148,7 +149,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "A short time gives a crisp attack, a long time a soft one.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.tongue_ms))
+        .sets(Sets::Number(SettingNumber::TongueMs))
         .flag("--tongue-ms"),
     entry("legato", BREATH, "Legato", number([5.0, 15.0], 8.0, 1, " ms"))
         .help(
@@ -156,7 +157,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "Holes open and close over this time. In a long slur the notes between speak as well.",
             "The torque changes from one note's curve to the next note's.",
         )
-        .sets(Sets::Number(|settings| &mut settings.legato_ms))
+        .sets(Sets::Number(SettingNumber::LegatoMs))
         .flag("--legato-ms"),
     entry("resp", BREATH, "Breath response", choice(&[("play", "Played"), ("phys", "Physical")]))
         .help(
@@ -174,7 +175,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "Above 1, soft notes have more of the way; below 1, loud notes.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.breath_curve))
+        .sets(Sets::Number(SettingNumber::BreathCurve))
         .flag("--breath-curve"),
     entry("bsoft", BREATH, "Softest breath", Kind::Number(Number {
         min: 0.0,
@@ -189,7 +190,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "Set it to what your controller sends when you blow as softly as you can. *Calibrate* does so.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.breath_softest))
+        .sets(Sets::Number(SettingNumber::BreathSoftest))
         .flag("--breath-softest"),
     entry("bloud", BREATH, "Loudest breath", Kind::Number(Number {
         min: 0.1,
@@ -204,7 +205,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "Set it to what your controller sends when you blow as hard as you like to. *Calibrate* does so.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.breath_loudest))
+        .sets(Sets::Number(SettingNumber::BreathLoudest))
         .flag("--breath-loudest"),
     entry("stren", EMBOUCHURE, "Reed strength", number([1.5, 5.0], 2.5, 2, ""))
         .help(
@@ -212,7 +213,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "A stiffer reed needs more breath and beats later. Half a number is about 20 % more stiffness.",
             "The threshold and the closure move outwards.",
         )
-        .sets(Sets::Number(|settings| &mut settings.strength))
+        .sets(Sets::Number(SettingNumber::Strength))
         .flag("--strength"),
     entry("lip", EMBOUCHURE, "Lip opening", number([0.6, 1.4], 1.0, 3, " x"))
         .help(
@@ -220,7 +221,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "Below 1 the player bites: less air, a thinner sound, and the reed closes early. Above 1 the sound is open and loud.",
             "Changes the torque, and how far away the closure is.",
         )
-        .sets(Sets::Number(|settings| &mut settings.lip))
+        .sets(Sets::Number(SettingNumber::Lip))
         .flag("--lip"),
     entry("zeta", EMBOUCHURE, "Embouchure", number([0.05, 0.9], 0.3, 3, ""))
         .help(
@@ -228,7 +229,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "At higher values notes speak earlier, beat earlier and sound brighter.",
             "At higher values the threshold is nearer.",
         )
-        .sets(Sets::Number(|settings| &mut settings.zeta))
+        .sets(Sets::Number(SettingNumber::Zeta))
         .flag("--zeta"),
     entry("damp", EMBOUCHURE, "Lip damping", number([0.2, 2.0], 1.0, 2, " x"))
         .help(
@@ -236,7 +237,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "At low values the reed squeaks. At high values the sound is dark and the reed does not squeak easily.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.damping))
+        .sets(Sets::Number(SettingNumber::Damping))
         .flag("--damping"),
     entry("reedh", REED, "Reed H", number([1.0, 5.0], 2.598_076, 4, ""))
         .help(
@@ -244,7 +245,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "A wider opening gives more flow. While k is coupled to H, the peak of the flow stays the same and the reed closes earlier.",
             "Changes height and width of the torque curve, which is the same curve as the flow's.",
         )
-        .sets(Sets::Number(|settings| &mut settings.reed_h))
+        .sets(Sets::Number(SettingNumber::ReedH))
         .flag("--H")
         .midi(REED_MIDI),
     entry("reedk", REED, "Reed k", number([0.1, 2.0], 0.384_900_18, 4, ""))
@@ -253,7 +254,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "A stiffer reed closes later, at H\u{b7}k. Has no effect while k is coupled to H.",
             "Moves the end of the torque curve.",
         )
-        .sets(Sets::Number(|settings| &mut settings.reed_k))
+        .sets(Sets::Number(SettingNumber::ReedK))
         .flag("--k")
         .midi(REED_MIDI),
     entry("reedc", REED, "Reed coupled", switch(true, ["Free", "Coupled"]))
@@ -269,7 +270,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "Scales the flow, and with it what a note needs to speak.",
             "Scales the torque.",
         )
-        .sets(Sets::Number(|settings| &mut settings.reed_a))
+        .sets(Sets::Number(SettingNumber::ReedA))
         .flag("--A"),
     entry("lay", REED, "Facing", number([0.0, 0.5], 0.4, 3, ""))
         .help(
@@ -277,11 +278,11 @@ pub static PARAMETERS: &[Parameter] = &[
             "At 0 the reed closes all at once and sounds bright. At higher values it rolls onto the lay and sounds softer.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.lay))
+        .sets(Sets::Number(SettingNumber::Lay))
         .flag("--lay"),
     entry("a4", TUNING, "A4", number([A4_RANGE_HZ.0 as f32, A4_RANGE_HZ.1 as f32], 440.0, 1, " Hz"))
         .help("Pitch of A4", "Tunes the whole instrument by changing its length.", "")
-        .sets(Sets::Number(|settings| &mut settings.a4_hz))
+        .sets(Sets::Number(SettingNumber::A4Hz))
         .flag("--a4"),
     entry(
         "tune",
@@ -302,7 +303,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "Sound travels faster in warm air: the pitch rises by 3 cents per degree.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.temperature_c))
+        .sets(Sets::Number(SettingNumber::TemperatureC))
         .flag("--temperature"),
     entry("vent", TUNING, "Register vent", number([0.0, 4.0], 2.0, 2, ""))
         .help(
@@ -310,7 +311,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "At 0 there is no loss, and most of the clarion register does not speak: the register key needs this loss to work.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.vent_loss))
+        .sets(Sets::Number(SettingNumber::VentLoss))
         .flag("--vent-loss"),
     entry("transp", TUNING, "Transpose", whole([-24, 24], 0, " st"))
         .help(
@@ -328,11 +329,11 @@ pub static PARAMETERS: &[Parameter] = &[
         .sets(Sets::Choice(|settings, at| settings.reach.beyond = nth(at, [Beyond::Silent, Beyond::Octave]))),
     entry("noise", NOISE, "Breath noise", percent(0.3))
         .help("Noise of the breath in the reed channel", "Adds the sound of air.", "")
-        .sets(Sets::Number(|settings| &mut settings.noise))
+        .sets(Sets::Number(SettingNumber::Noise))
         .flag("--noise"),
     entry("gain", OUTPUT, "Gain", number([-60.0, 24.0], 0.0, 1, " dB"))
         .help("Output level", "At 0 dB, 1 Pa at a distance of 1 m is -6 dBFS.", "")
-        .sets(Sets::Number(|settings| &mut settings.gain_db))
+        .sets(Sets::Number(SettingNumber::GainDb))
         .flag("--gain-db"),
     entry("panic", OUTPUT, "Panic", OFF)
         .help(
@@ -661,7 +662,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "From near, the holes next to the listener are louder. The level as a whole stays.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.listening.distance_m))
+        .sets(Sets::Number(SettingNumber::ListeningDistanceM))
         .flag("--listening-distance"),
     entry("langle", LISTENING, "Listening angle", number([-180.0, 180.0], 30.0, 0, " \u{b0}"))
         .help(
@@ -669,7 +670,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "In front of the bell the sound is brighter than beside or behind it.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.listening.angle_deg))
+        .sets(Sets::Number(SettingNumber::ListeningAngleDeg))
         .flag("--listening-angle"),
     entry("lheigh", LISTENING, "Listening height", number([-1.0, 2.0], 0.0, 2, " m"))
         .help(
@@ -677,7 +678,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "Low places are in front of the bell, high ones in front of the holes.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.listening.height_m))
+        .sets(Sets::Number(SettingNumber::ListeningHeightM))
         .flag("--listening-height"),
     entry("lwidth", LISTENING, "Listening width", number([0.0, 180.0], 60.0, 0, " \u{b0}"))
         .help(
@@ -685,7 +686,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "Wider is more spacious. At 0 both channels are the same, and so is a render in mono, which hears the place between.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.listening.width_deg))
+        .sets(Sets::Number(SettingNumber::ListeningWidthDeg))
         .flag("--listening-width"),
     entry("room", ROOM, "Room", percent(0.0))
         .help(
@@ -693,7 +694,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "At 0 the sound is dry. 20 to 50 % is a near microphone, 100 % a seat in the room.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.room.amount))
+        .sets(Sets::Number(SettingNumber::RoomAmount))
         .flag("--room"),
     entry("rsize", ROOM, "Room size", number([3.0, 40.0], 12.0, 1, " m"))
         .help(
@@ -701,7 +702,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "A small room answers at once, a large one later.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.room.size_m))
+        .sets(Sets::Number(SettingNumber::RoomSizeM))
         .flag("--room-size"),
     entry("rdecay", ROOM, "Room decay", number([0.2, 4.0], 1.2, 2, " s"))
         .help(
@@ -709,7 +710,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "A living room has half a second, a concert hall two, a church four.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.room.decay_s))
+        .sets(Sets::Number(SettingNumber::RoomDecayS))
         .flag("--room-decay"),
     entry("rtone", ROOM, "Room tone", percent(0.5))
         .help(
@@ -717,7 +718,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "Low is dark, as with curtains and people. High is bright, as with bare stone.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.room.tone))
+        .sets(Sets::Number(SettingNumber::RoomTone))
         .flag("--room-tone"),
     entry("life", EXPRESSION, "Life", percent(1.0))
         .help(
@@ -725,7 +726,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "At 100 % pitch, level and colour move as in recordings of held notes. At 0 the note stands still.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.life))
+        .sets(Sets::Number(SettingNumber::Life))
         .flag("--life"),
     entry("vib", EXPRESSION, "Vibrato", percent(0.0))
         .help(
@@ -733,12 +734,12 @@ pub static PARAMETERS: &[Parameter] = &[
             "Lip and breath swing together, at 100 % by 25 cents and 3 dB either way. The mod wheel adds to it.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.vibrato.depth))
+        .sets(Sets::Number(SettingNumber::VibratoDepth))
         .flag("--vibrato")
         .midi("CC1, as *Mod wheel* selects"),
     entry("vibhz", EXPRESSION, "Vibrato rate", number([3.0, 8.0], 5.2, 2, " Hz"))
         .help("Swings a second", "4 is slow, 5 to 6 usual, 7 nervous.", "")
-        .sets(Sets::Number(|settings| &mut settings.vibrato.rate_hz))
+        .sets(Sets::Number(SettingNumber::VibratoRateHz))
         .flag("--vibrato-rate"),
     entry("vibon", EXPRESSION, "Vibrato onset", number([0.0, 2.0], 0.4, 2, " s"))
         .help(
@@ -746,7 +747,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "A long onset leaves short notes straight.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.vibrato.onset_s))
+        .sets(Sets::Number(SettingNumber::VibratoOnsetS))
         .flag("--vibrato-onset"),
     entry("vibun", EXPRESSION, "Vibrato unevenness", percent(0.3))
         .help(
@@ -754,7 +755,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "At 0 the vibrato is a machine's.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.vibrato.unevenness))
+        .sets(Sets::Number(SettingNumber::VibratoUnevenness))
         .flag("--vibrato-unevenness"),
     entry(
         "attack",
@@ -779,7 +780,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "The fingers slide off the holes one after another, and the vocal tract leads them.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.glissando_s))
+        .sets(Sets::Number(SettingNumber::GlissandoS))
         .flag("--glissando"),
     entry(
         "wheel",
@@ -805,7 +806,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "The voice's pulses in the mouth make the tone rough, with sums and differences of both pitches.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.techniques.growl))
+        .sets(Sets::Number(SettingNumber::Growl))
         .flag("--growl")
         .midi("CC18"),
     entry("growlp", TECHNIQUES, "Growl pitch", choice(&[("int", "Follows the note"), ("fixed", "Fixed")]))
@@ -823,11 +824,11 @@ pub static PARAMETERS: &[Parameter] = &[
             "An octave below is rough and in tune; a fifth or a third makes chords.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.techniques.growl_semitones))
+        .sets(Sets::Number(SettingNumber::GrowlSemitones))
         .flag("--growl-interval"),
     entry("growlf", TECHNIQUES, "Growl frequency", number([60.0, 400.0], 110.0, 0, " Hz"))
         .help("Pitch of the voice, where it is fixed", "", "")
-        .sets(Sets::Number(|settings| &mut settings.techniques.growl_hz))
+        .sets(Sets::Number(SettingNumber::GrowlHz))
         .flag("--growl-frequency"),
     entry("flut", TECHNIQUES, "Flutter", percent(0.0))
         .help(
@@ -835,12 +836,12 @@ pub static PARAMETERS: &[Parameter] = &[
             "The note trembles, as with a rolled R.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.techniques.flutter))
+        .sets(Sets::Number(SettingNumber::Flutter))
         .flag("--flutter")
         .midi("CC19"),
     entry("fluthz", TECHNIQUES, "Flutter rate", number([15.0, 35.0], 25.0, 1, " Hz"))
         .help("Strokes of the tongue a second", "Players reach 20 to 30.", "")
-        .sets(Sets::Number(|settings| &mut settings.techniques.flutter_hz))
+        .sets(Sets::Number(SettingNumber::FlutterHz))
         .flag("--flutter-rate"),
     entry("subt", TECHNIQUES, "Subtone", percent(0.0))
         .help(
@@ -848,7 +849,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "Low notes lose their high partials and become soft and round.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.techniques.subtone))
+        .sets(Sets::Number(SettingNumber::Subtone))
         .flag("--subtone")
         .midi("CC20"),
     entry("tract", TECHNIQUES, "Vocal tract", percent(0.0))
@@ -857,7 +858,7 @@ pub static PARAMETERS: &[Parameter] = &[
             "A tuned tract pulls the note to its own resonance, *Tract interval*: bends, scoops, throat colour.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.tract.amount))
+        .sets(Sets::Number(SettingNumber::TractAmount))
         .flag("--tract"),
     entry("tractp", TECHNIQUES, "Tract interval", number([-24.0, 24.0], 0.0, 1, " st"))
         .help(
@@ -865,6 +866,6 @@ pub static PARAMETERS: &[Parameter] = &[
             "Move it down from 0 while a clarion note sounds, and the pitch follows, by an octave and more.",
             "",
         )
-        .sets(Sets::Number(|settings| &mut settings.tract.interval_semitones))
+        .sets(Sets::Number(SettingNumber::TractIntervalSemitones))
         .flag("--tract-interval"),
 ];

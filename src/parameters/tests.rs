@@ -183,16 +183,16 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
     };
     let mut fields = 8;
     for (parameter, number) in numbers() {
-        let Some(Sets::Number(field)) = parameter.sets else { continue };
+        let Some(Sets::Number(which)) = parameter.sets else { continue };
         fields += 1;
         let mut copy = d;
-        assert_eq!(*field(&mut copy), number.default, "{}", parameter.id);
+        assert_eq!(*copy.number(which), number.default, "{}", parameter.id);
         for (value, end) in [(-1e9, number.min), (1e9, number.max)] {
             let mut settings = d;
             parameter.set(&mut settings, Value::Number(value));
-            assert_eq!(*field(&mut settings.clamped()), end, "{}", parameter.id);
+            assert_eq!(*settings.clamped().number(which), end, "{}", parameter.id);
         }
-        *field(&mut filled) = f32::NAN;
+        *filled.number(which) = f32::NAN;
         parameter.set(&mut filled, Value::Number(number.default));
     }
     find("reedc").unwrap().set(&mut filled, Value::Switch(true));

@@ -86,7 +86,7 @@ impl HostInputs {
     /// Settings with the numbers of linked controllers that have spoken.
     pub fn linked(&self, mut settings: Settings) -> Settings {
         for (number, value) in self.translator.links().numbers() {
-            *number.of(&mut settings) = value;
+            *settings.number(number) = value;
         }
         settings
     }

@@ -9,7 +9,10 @@
 //! assert!(score.is_sorted_by_key(|timed| timed.at));
 //! ```
 
-use crate::instrument::SettingNumber;
+mod setting_number;
+
+pub use setting_number::SettingNumber;
+
 use crate::units::SoundingNote;
 
 /// Something the player does, in the units of the instrument.

@@ -57,6 +57,6 @@ pub use player::{Attack, vibrato::Vibrato};
 pub use prepare::{Preparation, Quality, Wanted};
 pub use reach::{Beyond, Reach};
 pub use room::Room;
-pub use settings::{BreathResponse, SettingNumber, Settings, Tuning};
+pub use settings::{BreathResponse, Settings, Tuning};
 pub use techniques::{GrowlPitch, Techniques, Tract};
 pub use voice::{Probe, Voice};

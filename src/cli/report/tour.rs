@@ -4,10 +4,10 @@ use crate::cli::Failure;
 use crate::cli::score_args::RenderJob;
 use crate::identity;
 use crate::wav::{Depth, WavFile};
-use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::event::{Event, SettingNumber, Timed};
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
 use chalumeau_core::instrument::player::vibrato::Vibrato;
-use chalumeau_core::instrument::{Attack, Model, Room, SettingNumber, Settings, Techniques, Tract};
+use chalumeau_core::instrument::{Attack, Model, Room, Settings, Techniques, Tract};
 use chalumeau_core::score::{self as player, Score, StereoBlocks};
 use chalumeau_core::units::WrittenNote;
 use chalumeau_figure::report::{Chapter, Report as Page, Sound, Track};
@@ -120,7 +120,7 @@ fn stops(model: &Model, base: Settings) -> Vec<(&'static str, Vec<Stop>)> {
     let attacks = || Line::new(MF).notes(model, [(60, 0.6), (67, 0.6), (76, 0.6)], false);
     let room =
         |amount, size_m, decay_s| Settings { room: Room { amount, size_m, decay_s, ..base.room }, ..base };
-    let interval = SettingNumber(|settings| &mut settings.tract.interval_semitones);
+    let interval = SettingNumber::TractIntervalSemitones;
     vec![
         (
             "From pianissimo to fortissimo",

@@ -171,7 +171,7 @@ impl Clarinet {
             Event::Choke { note } if self.player.is_heard(note) => self.choke.begin(),
             Event::Set(number, value) => {
                 let mut settings = *self.player.settings();
-                *number.of(&mut settings) = value;
+                *settings.number(number) = value;
                 self.set_settings(&settings);
             }
             _ => {}

@@ -1,5 +1,6 @@
 //! What a player can set, as plain numbers in the units that a player uses. They are clamped once, where they come in.
 
+use crate::event::SettingNumber;
 use crate::instrument::listening::Listening;
 use crate::instrument::player::Attack;
 use crate::instrument::player::dynamics::LipShape;
@@ -119,39 +120,6 @@ pub struct Settings {
     pub glissando_s: f32,
 }
 
-/// One of the numbers of [`Settings`], which an event may set: where it is.
-///
-/// ```
-/// use chalumeau_core::instrument::{SettingNumber, Settings};
-///
-/// let noise = SettingNumber(|settings| &mut settings.noise);
-/// let mut settings = Settings::default();
-/// *noise.of(&mut settings) = 0.5;
-/// assert_eq!(settings.noise, 0.5);
-/// ```
-#[derive(Clone, Copy)]
-pub struct SettingNumber(pub fn(&mut Settings) -> &mut f32);
-
-impl SettingNumber {
-    /// This number of some settings. Real-time safe.
-    pub fn of(self, settings: &mut Settings) -> &mut f32 {
-        (self.0)(settings)
-    }
-}
-
-/// Two that lead to the same number may still differ; the same one never does.
-impl PartialEq for SettingNumber {
-    fn eq(&self, other: &Self) -> bool {
-        std::ptr::fn_addr_eq(self.0, other.0)
-    }
-}
-
-impl std::fmt::Debug for SettingNumber {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("SettingNumber")
-    }
-}
-
 /// A number inside its range; one that is not finite becomes the default. Real-time safe.
 pub(super) fn fix(x: f32, low: f32, high: f32, default: f32) -> f32 {
     if x.is_finite() { x.clamp(low, high) } else { default }
@@ -216,6 +184,62 @@ impl Settings {
         let h = (set_h * f64::from(settings.lip)).clamp(0.5, 10.0);
         let k = (set_k * stiffer).clamp(0.01, 20.0);
         ReedLaw::free(h, k, f64::from(settings.reed_a)).unwrap_or_default()
+    }
+
+    /// A number by its name, as [`Event::Set`](crate::event::Event::Set) has it; not clamped. Real-time safe.
+    ///
+    /// ```
+    /// use chalumeau_core::event::SettingNumber;
+    /// use chalumeau_core::instrument::Settings;
+    ///
+    /// let mut settings = Settings::default();
+    /// *settings.number(SettingNumber::Noise) = 0.5;
+    /// assert_eq!(settings.noise, 0.5);
+    /// ```
+    pub fn number(&mut self, which: SettingNumber) -> &mut f32 {
+        match which {
+            SettingNumber::BreathFullKpa => &mut self.breath_full_kpa,
+            SettingNumber::TongueMs => &mut self.tongue_ms,
+            SettingNumber::LegatoMs => &mut self.legato_ms,
+            SettingNumber::BreathCurve => &mut self.breath_curve,
+            SettingNumber::BreathSoftest => &mut self.breath_softest,
+            SettingNumber::BreathLoudest => &mut self.breath_loudest,
+            SettingNumber::Strength => &mut self.strength,
+            SettingNumber::Lip => &mut self.lip,
+            SettingNumber::Zeta => &mut self.zeta,
+            SettingNumber::Damping => &mut self.damping,
+            SettingNumber::ReedH => &mut self.reed_h,
+            SettingNumber::ReedK => &mut self.reed_k,
+            SettingNumber::ReedA => &mut self.reed_a,
+            SettingNumber::Lay => &mut self.lay,
+            SettingNumber::A4Hz => &mut self.a4_hz,
+            SettingNumber::TemperatureC => &mut self.temperature_c,
+            SettingNumber::VentLoss => &mut self.vent_loss,
+            SettingNumber::Noise => &mut self.noise,
+            SettingNumber::GainDb => &mut self.gain_db,
+            SettingNumber::ListeningDistanceM => &mut self.listening.distance_m,
+            SettingNumber::ListeningAngleDeg => &mut self.listening.angle_deg,
+            SettingNumber::ListeningHeightM => &mut self.listening.height_m,
+            SettingNumber::ListeningWidthDeg => &mut self.listening.width_deg,
+            SettingNumber::RoomAmount => &mut self.room.amount,
+            SettingNumber::RoomSizeM => &mut self.room.size_m,
+            SettingNumber::RoomDecayS => &mut self.room.decay_s,
+            SettingNumber::RoomTone => &mut self.room.tone,
+            SettingNumber::Life => &mut self.life,
+            SettingNumber::VibratoDepth => &mut self.vibrato.depth,
+            SettingNumber::VibratoRateHz => &mut self.vibrato.rate_hz,
+            SettingNumber::VibratoOnsetS => &mut self.vibrato.onset_s,
+            SettingNumber::VibratoUnevenness => &mut self.vibrato.unevenness,
+            SettingNumber::GlissandoS => &mut self.glissando_s,
+            SettingNumber::Growl => &mut self.techniques.growl,
+            SettingNumber::GrowlSemitones => &mut self.techniques.growl_semitones,
+            SettingNumber::GrowlHz => &mut self.techniques.growl_hz,
+            SettingNumber::Flutter => &mut self.techniques.flutter,
+            SettingNumber::FlutterHz => &mut self.techniques.flutter_hz,
+            SettingNumber::Subtone => &mut self.techniques.subtone,
+            SettingNumber::TractAmount => &mut self.tract.amount,
+            SettingNumber::TractIntervalSemitones => &mut self.tract.interval_semitones,
+        }
     }
 
     /// These settings with H and k multiplied by the factors of controllers; see

@@ -91,7 +91,7 @@ impl Stereo {
             Event::Pan { .. } => Change::Pan(0.0),
             Event::Set(number, value) => {
                 let mut settings = Settings { room: self.wanted, ..Settings::default() };
-                *number.of(&mut settings) = value;
+                *settings.number(number) = value;
                 if settings.room == self.wanted {
                     return;
                 }
@@ -169,7 +169,7 @@ fn gains(position: f32) -> [f32; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::instrument::SettingNumber;
+    use crate::event::SettingNumber;
 
     const RATE_HZ: f64 = 48_000.0;
 
@@ -223,7 +223,7 @@ mod tests {
 
     #[test]
     fn a_room_that_a_controller_opens_does_not_depend_on_blocks() {
-        let amount = SettingNumber(|settings| &mut settings.room.amount);
+        let amount = SettingNumber::RoomAmount;
         let events = [0.2, 0.9, 0.0]
             .into_iter()
             .zip([333, 4_001, 7_777])

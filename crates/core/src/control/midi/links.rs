@@ -4,8 +4,7 @@
 //! same. Its 128 values go from one end of a range to the other, along a curve. Until it moves, the setting has its own
 //! value, to which it goes back when that is changed or the link is taken away: whoever moved last is heard.
 
-use crate::event::Event;
-use crate::instrument::SettingNumber;
+use crate::event::{Event, SettingNumber};
 
 /// Links that one player can have.
 pub const MOST: usize = 24;
@@ -151,8 +150,8 @@ impl Links {
 mod tests {
     use super::*;
 
-    const GROWL: SettingNumber = SettingNumber(|settings| &mut settings.techniques.growl);
-    const NOISE: SettingNumber = SettingNumber(|settings| &mut settings.noise);
+    const GROWL: SettingNumber = SettingNumber::Growl;
+    const NOISE: SettingNumber = SettingNumber::Noise;
 
     fn link(source: Source, number: SettingNumber, low: f32, high: f32) -> Link {
         Link { source, target: Target::Number(number), low, high, curve: 1.0, own: 0.3 }

@@ -491,9 +491,9 @@ fn volume_and_pan_follow_their_formulas() {
 mod linked {
     use super::*;
     use crate::control::midi::links::{Link, MOST, Source, Target};
-    use crate::instrument::SettingNumber;
+    use crate::event::SettingNumber;
 
-    const GROWL: SettingNumber = SettingNumber(|settings| &mut settings.techniques.growl);
+    const GROWL: SettingNumber = SettingNumber::Growl;
 
     fn decoder(source: Source, target: Target) -> MidiDecoder {
         let mut midi = MidiDecoder::new();

@@ -1,0 +1,89 @@
+//! The numbers of the settings, by name, so that an event can say which one it sets.
+
+/// A number of [`Settings`](crate::instrument::Settings), see [`Settings::number`](crate::instrument::Settings::number). Its
+/// unit and range are that of the field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SettingNumber {
+    /// `breath_full_kpa`.
+    BreathFullKpa,
+    /// `tongue_ms`.
+    TongueMs,
+    /// `legato_ms`.
+    LegatoMs,
+    /// `breath_curve`.
+    BreathCurve,
+    /// `breath_softest`.
+    BreathSoftest,
+    /// `breath_loudest`.
+    BreathLoudest,
+    /// `strength`.
+    Strength,
+    /// `lip`.
+    Lip,
+    /// `zeta`.
+    Zeta,
+    /// `damping`.
+    Damping,
+    /// `reed_h`.
+    ReedH,
+    /// `reed_k`.
+    ReedK,
+    /// `reed_a`.
+    ReedA,
+    /// `lay`.
+    Lay,
+    /// `a4_hz`.
+    A4Hz,
+    /// `temperature_c`.
+    TemperatureC,
+    /// `vent_loss`.
+    VentLoss,
+    /// `noise`.
+    Noise,
+    /// `gain_db`.
+    GainDb,
+    /// `listening.distance_m`.
+    ListeningDistanceM,
+    /// `listening.angle_deg`.
+    ListeningAngleDeg,
+    /// `listening.height_m`.
+    ListeningHeightM,
+    /// `listening.width_deg`.
+    ListeningWidthDeg,
+    /// `room.amount`.
+    RoomAmount,
+    /// `room.size_m`.
+    RoomSizeM,
+    /// `room.decay_s`.
+    RoomDecayS,
+    /// `room.tone`.
+    RoomTone,
+    /// `life`.
+    Life,
+    /// `vibrato.depth`.
+    VibratoDepth,
+    /// `vibrato.rate_hz`.
+    VibratoRateHz,
+    /// `vibrato.onset_s`.
+    VibratoOnsetS,
+    /// `vibrato.unevenness`.
+    VibratoUnevenness,
+    /// `glissando_s`.
+    GlissandoS,
+    /// `techniques.growl`.
+    Growl,
+    /// `techniques.growl_semitones`.
+    GrowlSemitones,
+    /// `techniques.growl_hz`.
+    GrowlHz,
+    /// `techniques.flutter`.
+    Flutter,
+    /// `techniques.flutter_hz`.
+    FlutterHz,
+    /// `techniques.subtone`.
+    Subtone,
+    /// `tract.amount`.
+    TractAmount,
+    /// `tract.interval_semitones`.
+    TractIntervalSemitones,
+}
