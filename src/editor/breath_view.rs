@@ -1,6 +1,7 @@
 //! The breath view: mouth pressure, its sources, and its history.
 
 mod breath_curve;
+mod linked_table;
 
 use egui::{Align2, CornerRadius, FontId, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
@@ -8,7 +9,6 @@ use crate::editor::breath_meter;
 use crate::editor::chart;
 use crate::editor::chart::Chart;
 use crate::editor::controls::{Hands, choice, heading, momentary, slider};
-use crate::editor::linked_controllers;
 use crate::editor::snapshot::{BreathSource, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
@@ -102,7 +102,7 @@ impl BreathView {
         for id in ["growli", "growlf", "flut", "fluthz", "subt", "tract", "tractp"] {
             slider(ui, hands, id);
         }
-        linked_controllers::table(ui, hands);
+        linked_table::draw(ui, hands);
     }
 }
 

@@ -1,10 +1,8 @@
-//! What a host ties to a parameter, shown beside its name, and what a right click offers: to link a controller, and the
-//! host's own menu.
+//! What a host ties to a parameter, shown beside its name, and the host's own menu.
 
-use egui::{Pos2, Response, Ui, vec2};
+use egui::{Pos2, Ui, vec2};
 
 use crate::editor::controls::{Hands, Mark};
-use crate::editor::linked_controllers;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
@@ -31,18 +29,8 @@ pub fn explain(ui: &mut Ui, marks: &[Mark]) {
     }
 }
 
-/// Where a control is clicked with the right button: the menu of its controllers, or the host's where none can be linked.
-pub fn offer_menu(ui: &Ui, hands: &Hands, id: &'static str, response: &Response) {
-    let at = response.interact_pointer_pos().filter(|_| response.secondary_clicked());
-    if linked_controllers::can_link(hands, id) {
-        linked_controllers::offer(ui, hands, id, response, at);
-    } else if let Some(at) = at {
-        open_host_menu(ui, hands, id, at);
-    }
-}
-
 /// Opens the host's menu of a parameter.
-pub fn open_host_menu(ui: &Ui, hands: &Hands, id: &str, at: Pos2) {
+pub fn open_menu(ui: &Ui, hands: &Hands, id: &str, at: Pos2) {
     // Windows of macOS are counted in points of the system, all others in pixels.
     let scale = if cfg!(target_os = "macos") { ui.ctx().zoom_factor() } else { ui.ctx().pixels_per_point() };
     hands.controls.menu(id, ((scale * at.x).round() as i32, (scale * at.y).round() as i32));

@@ -1,11 +1,7 @@
 //! The preset bar of the header: previous, the name with its tags, next. A click on the name opens the browser.
 
-use std::sync::Arc;
-
-use egui::text::{LayoutJob, TextWrapping};
 use egui::{
-    Color32, CornerRadius, FontId, Galley, Pos2, Rect, Response, Role, Sense, Shape, Stroke, StrokeKind, Ui,
-    WidgetInfo, pos2, vec2,
+    CornerRadius, Pos2, Rect, Response, Role, Sense, Shape, Stroke, StrokeKind, Ui, WidgetInfo, pos2, vec2,
 };
 
 use crate::editor::Action;
@@ -15,6 +11,7 @@ use crate::editor::preset_values::{choose, is_changed};
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
+use crate::editor::widgets::one_line;
 
 /// Widest bar, points: a longest name and its tags.
 const WIDEST: f32 = 380.0;
@@ -88,13 +85,6 @@ pub fn bar(
         }
         ui.label("Click for all presets.");
     });
-}
-
-/// Text in one line, cut where it is too long.
-pub fn one_line(ui: &Ui, text: &str, font: FontId, ink: Color32, width: f32) -> Arc<Galley> {
-    let mut job = LayoutJob::simple_singleline(text.to_owned(), font, ink);
-    job.wrap = TextWrapping::truncate_at_width(width.max(1.0));
-    ui.painter().layout_job(job)
 }
 
 fn frame(ui: &Ui, rect: Rect, response: &Response, is_open: bool) {

@@ -12,11 +12,11 @@ use egui::{
 
 use crate::editor::Action;
 use crate::editor::controls::{Hands, heading};
-use crate::editor::preset_bar::one_line;
 use crate::editor::preset_values::{capture, choose, is_changed};
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
+use crate::editor::widgets::one_line;
 use crate::presets::{Preset, PresetShelf, checked_name, factory};
 
 /// Height of a row of the list, points: two lines of text.

@@ -65,7 +65,7 @@ pub fn slider(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
         let x = track.left() + linked.clamp(0.0, 1.0) * track.width();
         ui.painter().vline(x, track.top() - 4.0..=track.bottom() + 4.0, Stroke::new(2.0, c.ink));
     }
-    host_marks::offer_menu(ui, hands, id, &response);
+    linked_controllers::offer_menu(ui, hands, id, &response);
     if is_typing {
         type_value(
             ui,

@@ -1,12 +1,16 @@
-//! Choices, switches, buttons, headings, handles in charts, and tool tips that explain a parameter.
+//! Choices, switches, buttons, headings, lines of text, handles in charts, and tool tips that explain a parameter.
 
+use std::sync::Arc;
+
+use egui::text::{LayoutJob, TextWrapping};
 use egui::{
-    Align2, CornerRadius, CursorIcon, EventFilter, FontId, Key, Pos2, Rect, Response, Role, Sense, Stroke,
-    Ui, Vec2, WidgetInfo, pos2, vec2,
+    Align2, Color32, CornerRadius, CursorIcon, EventFilter, FontId, Galley, Key, Pos2, Rect, Response, Role,
+    Sense, Stroke, Ui, Vec2, WidgetInfo, pos2, vec2,
 };
 
 use crate::editor::controls::Hands;
 use crate::editor::host_marks;
+use crate::editor::linked_controllers;
 use crate::editor::terms;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
@@ -44,7 +48,7 @@ pub fn choice(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
     let marks = hands.controls.marks(id);
     host_marks::paint(ui, &marks, name.rect.right_center());
     let name = name.interact(Sense::CLICK);
-    host_marks::offer_menu(ui, hands, id, &name);
+    linked_controllers::offer_menu(ui, hands, id, &name);
     name.on_hover_ui(|ui| {
         teach(ui, id, "");
         host_marks::explain(ui, &marks);
@@ -71,7 +75,7 @@ pub fn choice(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
         });
         response.response
     };
-    host_marks::offer_menu(ui, hands, id, &response);
+    linked_controllers::offer_menu(ui, hands, id, &response);
     if chosen != now {
         hands.put(id, chosen as f32 / steps as f32);
     }
@@ -119,7 +123,7 @@ pub fn switch(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
     let look = hands.controls.look(id)?;
     let is_on = look.value >= 0.5;
     let mut response = toggle(ui, &look.name, is_on);
-    host_marks::offer_menu(ui, hands, id, &response);
+    linked_controllers::offer_menu(ui, hands, id, &response);
     if response.clicked() {
         let value = if ui.input(|i| i.modifiers.command) { look.default } else { f32::from(!is_on) };
         hands.put(id, value);
@@ -170,6 +174,13 @@ pub fn momentary(ui: &mut Ui, hands: &mut Hands, id: &'static str, text: &str) -
         hands.press(id, ui.input(|i| i.time), is_down);
     }
     Some(response.on_hover_ui(|ui| teach(ui, id, "")))
+}
+
+/// Text in one line, cut where it is too long.
+pub fn one_line(ui: &Ui, text: &str, font: FontId, ink: Color32, width: f32) -> Arc<Galley> {
+    let mut job = LayoutJob::simple_singleline(text.to_owned(), font, ink);
+    job.wrap = TextWrapping::truncate_at_width(width.max(1.0));
+    ui.painter().layout_job(job)
 }
 
 /// A heading between controls.

@@ -51,7 +51,7 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2) {
         response.mark_changed();
     }
     let marks = hands.controls.marks(of.id);
-    host_marks::offer_menu(ui, hands, of.id, &response);
+    linked_controllers::offer_menu(ui, hands, of.id, &response);
     let is_touched = response.hovered() || response.dragged() || response.has_focus();
     let text = hands.controls.text(of.id, value);
 

@@ -1,0 +1,94 @@
+//! The table of controllers that the user has linked to parameters, and the devices to choose from.
+
+use egui::{DragValue, RichText, Role, Ui, WidgetInfo};
+
+use crate::controllers::{ParameterLink, factory, source_name};
+use crate::editor::controls::{Hands, heading};
+use crate::editor::theme;
+use crate::editor::theme::Colours;
+use crate::parameters::Kind;
+
+/// A list of devices; the one that is chosen replaces all links, and sets what devices need.
+fn choose_device(ui: &mut Ui, hands: &mut Hands) {
+    let list = egui::ComboBox::from_id_salt("controllers of a device").width(ui.available_width() - 8.0);
+    let mut chosen = None;
+    let response = list.selected_text("Choose a device").show_ui(ui, |ui| {
+        for map in factory::all() {
+            if ui.selectable_label(false, &map.name).on_hover_text(&map.shows).clicked() {
+                chosen = Some(map);
+            }
+        }
+    });
+    response.response.widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, "Choose a device"));
+    let (Some(map), Some(links)) = (chosen, hands.controls.links()) else { return };
+    links.learn(None);
+    links.replace(&map.links);
+    let values = factory::values(map).into_iter();
+    let values: Vec<_> =
+        values.map(|(parameter, value)| (parameter.id, parameter.normalized(value))).collect();
+    hands.put_all(&values);
+}
+
+/// All links, with their ranges and curves.
+pub fn draw(ui: &mut Ui, hands: &mut Hands) {
+    if hands.controls.links().is_none() {
+        return;
+    }
+    let c = Colours::here(ui);
+    heading(ui, "Linked controllers");
+    choose_device(ui, hands);
+    let Some(links) = hands.controls.links() else { return };
+    let all = links.all();
+    let quiet = |text: String| RichText::new(text).font(theme::small()).color(c.quiet);
+    if let Some(parameter) = links.learning() {
+        ui.label(format!("Move the controller for {}.", parameter.name));
+        if ui.button("Stop waiting").clicked() {
+            links.learn(None);
+        }
+    } else if all.is_empty() {
+        ui.label(quiet("Right-click a control, choose Learn a controller, and move one.".to_owned()));
+    }
+    let before: Vec<ParameterLink> = all.iter().map(|(link, _)| *link).collect();
+    let mut edited = before.clone();
+    let mut gone = None;
+    for (at, link) in edited.iter_mut().enumerate() {
+        let Kind::Number(number) = link.parameter.kind else { continue };
+        ui.push_id(("link", at), |ui| {
+            ui.horizontal(|ui| {
+                ui.label(format!("{} moves {}", source_name(link.source), link.parameter.name));
+                if ui.small_button("Forget").clicked() {
+                    gone = Some(at);
+                }
+            });
+            ui.horizontal_wrapped(|ui| {
+                ui.spacing_mut().item_spacing.x = 4.0;
+                for (word, value) in [("from", &mut link.low), ("to", &mut link.high)] {
+                    let word = ui.label(quiet(word.to_owned()));
+                    ui.add(
+                        DragValue::new(value)
+                            .range(number.min..=number.max)
+                            .speed((number.max - number.min) / 200.0)
+                            .custom_formatter(move |value, _| {
+                                format!("{}{}", number.text(value as f32), number.unit)
+                            })
+                            .custom_parser(move |text| number.parse(text).map(f64::from)),
+                    )
+                    .labelled_by(word.id);
+                }
+                let word = ui.label(quiet("curve".to_owned()));
+                ui.add(DragValue::new(&mut link.curve).range(0.2..=5.0).speed(0.02).fixed_decimals(2))
+                    .labelled_by(word.id);
+            });
+        });
+    }
+    if let Some(at) = gone {
+        edited.remove(at);
+    }
+    // Only what a hand has changed: meanwhile a controller may have been learnt.
+    if edited != before {
+        links.replace(&edited);
+    }
+    if !all.is_empty() && ui.button("Copy as text").clicked() {
+        ui.ctx().copy_text(links.to_text());
+    }
+}
