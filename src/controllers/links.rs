@@ -31,7 +31,7 @@ struct Place {
     low: AtomicU32,
     high: AtomicU32,
     curve: AtomicU32,
-    /// The controller's last value as it was followed, or [`UNHEARD`].
+    /// The controller's last value, followed or not, or [`UNHEARD`].
     raw: AtomicU32,
 }
 
@@ -128,9 +128,7 @@ impl ControllerLinks {
             place.put(ParameterLink::whole(source, parameter).as_ref());
         }
     }
-}
 
-impl ControllerLinks {
     /// The text of a [`ControllerMap`] with these links; empty without any.
     pub fn to_text(&self) -> String {
         let links: Vec<ParameterLink> = self.all().into_iter().map(|(link, _)| link).collect();

@@ -68,7 +68,7 @@ pub fn name(ui: &Ui, hands: &Hands, id: &str, after: Pos2) {
     ui.painter().text(after + vec2(6.0, 0.0), Align2::LEFT_CENTER, text, theme::small(), ink);
 }
 
-/// Where the controllers of a parameter have put it, 0..=1 of its range, if they were the last to move it.
+/// Where the controllers of a parameter stand, as shares of its range, 0..=1.
 pub fn values(hands: &Hands, id: &str) -> Vec<f32> {
     let Some(links) = hands.controls.links() else { return Vec::new() };
     let share = |(link, raw): (ParameterLink, Option<u8>)| {

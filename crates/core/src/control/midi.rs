@@ -108,6 +108,8 @@ pub struct MidiDecoder {
     mix: Mix,
     techniques: Techniques,
     links: Links,
+    /// Breath that a linked controller has sent once, which the next key may show to be meant.
+    linked_breath: Option<f32>,
     pedal: bool,
     notes: Notes,
     /// The keys as the player holds them, who gets the events.
@@ -191,6 +193,9 @@ impl MidiDecoder {
         self.rebend();
         if let Some((controller, unit)) = self.breath.settle() {
             self.blow(BreathOrigin::Controller(controller), unit);
+        }
+        if let Some(unit) = self.linked_breath.take() {
+            self.blow(BreathOrigin::Link, unit);
         }
         self.remix();
         if by_pedal.is_some_and(|held| held.key == note.key) {
@@ -400,7 +405,9 @@ impl MidiDecoder {
             (self.mix.controllers, self.techniques.controllers) = (mix, techniques);
             self.remix();
             self.say_techniques();
-            self.links.go_back(&raws).for_each(|event| self.said.push(event));
+            self.linked_breath = None;
+            let taken_back = self.links.go_back(&raws).filter(|event| !matches!(event, Event::Breath(_)));
+            taken_back.for_each(|event| self.said.push(event));
             self.set_pedal(pedal);
         }
         place
@@ -418,8 +425,14 @@ impl MidiDecoder {
         if matches!(place, Place::Recognised | Place::Within) {
             return;
         }
+        // As any breath source: what has come once may be the beginning of a snapshot.
+        let waits = place == Place::First && self.sounding().is_none();
         for event in self.links.hear(source, value) {
-            if matches!(event, Event::Breath(_)) {
+            if let Event::Breath(unit) = event {
+                self.linked_breath = waits.then_some(unit);
+                if waits {
+                    continue;
+                }
                 self.origin = Some(BreathOrigin::Link);
             }
             self.said.push(event);

@@ -516,8 +516,21 @@ mod linked {
     #[test]
     fn any_controller_can_blow() {
         let mut midi = decoder(Source::Controller(74), Target::Breath);
+        assert_eq!(midi.controller(0, 74, 64), NOTHING, "once may be anything");
+        let blown = Event::Breath(64.0 / 127.0);
+        assert_eq!(midi.note_on(0, 60, 127), [blown, on(60)], "a key shows that it is meant");
         assert_eq!(midi.controller(0, 74, 127), [Event::Breath(1.0)]);
         assert_eq!(midi.breath_origin(), Some(BreathOrigin::Link));
+    }
+
+    #[test]
+    fn a_snapshot_does_not_take_the_breath_from_the_keys() {
+        let mut midi = decoder(Source::Controller(3), Target::Breath);
+        for cc in 0..128 {
+            let said = midi.controller(0, cc, 0);
+            assert!(!said.iter().any(|event| matches!(event, Event::Breath(_))), "CC{cc}");
+        }
+        assert_eq!(midi.note_on(0, 60, 127), [on(60)], "velocity blows");
     }
 
     #[test]
