@@ -15,6 +15,7 @@ mod clarinet_drawing;
 mod clarinet_view;
 pub mod controls;
 pub mod feel_test;
+mod file_browser;
 mod header;
 mod host_marks;
 mod instrument_view;
@@ -52,6 +53,7 @@ pub use snapshot::Snapshot;
 use chalumeau_core::units::SoundingNote;
 use chalumeau_knob::wire::message::Feel;
 use controls::{Entry, Hands, Press};
+use file_browser::FileBrowser;
 use keyboard::Keyboard;
 use preset_browser::PresetBrowser;
 use undo::UndoHistory;
@@ -95,6 +97,12 @@ pub enum Action {
     ChooseInstrument(usize),
     /// An instrument file.
     OpenInstrument(PathBuf),
+    /// A scale or a keyboard mapping.
+    OpenScale(PathBuf),
+    /// Keys play equal temperament again.
+    EqualTemperament,
+    /// Read a folder for the user to choose from; `None` is the user's own.
+    ReadFolder(Option<PathBuf>),
     /// The preset of this name has been put on the controls.
     ChosePreset(String),
     /// Look again for the user's presets.
@@ -249,7 +257,7 @@ pub struct EditorState {
     breath: breath_view::BreathView,
     play: play_view::PlayView,
     knob: knob_view::KnobView,
-    instrument: instrument_view::InstrumentView,
+    files: FileBrowser,
 }
 
 impl EditorState {
@@ -323,7 +331,7 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
         breath,
         play,
         knob,
-        instrument,
+        files,
     } = state;
     theme::apply(ui, if kept.is_dark { Theme::Dark } else { Theme::Light });
     let c = theme::Colours::here(ui);
@@ -348,7 +356,12 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     });
     let line = Panel::top("tabs").exact_size(30.0).show_separator_line(true);
     line.frame(Frame::new().fill(c.ground).inner_margin(Margin { left: 2, right: 10, top: 0, bottom: 0 }))
-        .show(ui, |ui| presets.is_open &= !header::tabs(ui, kept, has_knob, snapshot));
+        .show(ui, |ui| {
+            if header::tabs(ui, kept, has_knob, snapshot) {
+                presets.is_open = false;
+                files.close();
+            }
+        });
     let keys = (0.13 * height).clamp(52.0, 110.0);
     let line = Panel::bottom("keys").exact_size(keys + 10.0).show_separator_line(false);
     line.frame(ground(8, 5)).show(ui, |ui| keyboard.draw(ui, snapshot, &mut actions));
@@ -367,6 +380,10 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
             presets.draw(ui, &mut hands, snapshot, &mut actions);
             return;
         }
+        if files.is_open() {
+            files.draw(ui, &snapshot.folder, &mut actions);
+            return;
+        }
         match tab {
             Tab::Play => play.draw(ui, &mut hands, snapshot, &mut actions),
             Tab::Reed => reed.draw(ui, &mut hands, snapshot),
@@ -374,7 +391,7 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
             Tab::Breath => breath.draw(ui, &mut hands, snapshot),
             Tab::Sound => sound_view::draw(ui, &mut hands, snapshot),
             Tab::Knob => knob.draw(ui, &mut hands, snapshot, &mut actions),
-            Tab::Instrument => instrument.draw(ui, &mut hands, snapshot, &mut actions),
+            Tab::Instrument => instrument_view::draw(ui, &mut hands, snapshot, files, &mut actions),
         }
     });
     // A widget that disappears while it is held, with its view or in a blind comparison, cannot end its gesture.

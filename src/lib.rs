@@ -7,7 +7,7 @@
 //! - `cli` and `editor` use neither each other nor the plugin. The editor knows no host, no thread and no knob link.
 //! - `plugin` uses the editor, and puts it into the host's window.
 //! - `standalone` uses the plugin, and runs it without a host. The plugin does not use the standalone.
-//! - `cache`, `controllers`, `instrument_path`, `output`, `picture_file`, `presets`, `scale_file`, `take_file` and `wav` read and write files for them;
+//! - `cache`, `controllers`, `folder_listing`, `instrument_path`, `output`, `picture_file`, `presets`, `scale_file`, `take_file` and `wav` read and write files for them;
 //!   `identity` has the names that hosts know the plugin by. They use none of the four.
 
 pub mod cache;
@@ -16,6 +16,7 @@ pub mod cli;
 pub mod controllers;
 #[cfg(feature = "editor")]
 pub mod editor;
+pub mod folder_listing;
 pub mod identity;
 pub mod instrument_path;
 pub mod output;
@@ -25,7 +26,7 @@ pub mod picture_file;
 #[cfg(feature = "plugin")]
 pub mod plugin;
 pub mod presets;
-#[cfg(feature = "cli")]
+#[cfg(any(feature = "cli", feature = "plugin"))]
 pub mod scale_file;
 #[cfg(feature = "standalone")]
 pub mod standalone;

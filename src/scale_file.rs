@@ -44,13 +44,43 @@ pub enum ScaleError {
 /// Reads a scale, with a keyboard mapping if there is one. Without, middle C plays the first pitch of the scale, and the keys
 /// go through the scale one after another.
 pub fn read(scl: &Path, kbm: Option<&Path>) -> Result<KeyPitches, ScaleError> {
-    let wrong = |path: &Path, what: String| ScaleError::Format { path: path.to_owned(), what };
-    let scale = Scl::import(text(scl)?.as_bytes()).map_err(|error| wrong(scl, scl_error(&error)))?;
+    let texts = (text(scl)?, kbm.map(text).transpose()?);
+    key_pitches(&texts.0, texts.1.as_deref()).map_err(|fault| {
+        let path = if fault.is_of_mapping { kbm.unwrap_or(scl) } else { scl };
+        ScaleError::Format { path: path.to_owned(), what: fault.what }
+    })
+}
+
+/// What is wrong with the text of a scale or of its keyboard mapping.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ScaleFault {
+    /// The mapping, not the scale.
+    pub is_of_mapping: bool,
+    /// What, with its line where there is one.
+    pub what: String,
+}
+
+/// What every key plays, from the texts of a scale and, if there is one, of a keyboard mapping; see [`read`].
+///
+/// ```
+/// use chalumeau::scale_file::key_pitches;
+/// use chalumeau_core::units::SoundingNote;
+///
+/// let fifths = key_pitches("every key a fifth\n1\n3/2\n", None).unwrap();
+/// // 61 is a pure fifth above middle C.
+/// let fifth = fifths.of(SoundingNote(61)).unwrap();
+/// assert_eq!(fifth.note, SoundingNote(67));
+/// assert!((fifth.cents - 1.955).abs() < 0.001);
+/// ```
+pub fn key_pitches(scl: &str, kbm: Option<&str>) -> Result<KeyPitches, ScaleFault> {
+    let of_scale = |what| ScaleFault { is_of_mapping: false, what };
+    let scale = Scl::import(scl.as_bytes()).map_err(|error| of_scale(scl_error(&error)))?;
     let mapping = match kbm {
-        Some(path) => Kbm::import(text(path)?.as_bytes()).map_err(|error| wrong(path, kbm_error(&error)))?,
+        Some(text) => Kbm::import(text.as_bytes())
+            .map_err(|error| ScaleFault { is_of_mapping: true, what: kbm_error(&error) })?,
         None => Kbm::builder(Note::from_midi_number(FIRST_KEY))
             .build()
-            .map_err(|_| wrong(scl, "it has no keys".to_owned()))?,
+            .map_err(|_| of_scale("it has no keys".to_owned()))?,
     };
     let pitches = (&scale, &mapping);
     Ok(KeyPitches::from_hz(|key| {
@@ -59,8 +89,8 @@ pub fn read(scl: &Path, kbm: Option<&Path>) -> Result<KeyPitches, ScaleError> {
     }))
 }
 
-/// The text of a file. Scala's archive is in Latin-1; only comments and names have letters beyond ASCII.
-fn text(path: &Path) -> Result<String, ScaleError> {
+/// The text of a file of a scale. Scala's archive is in Latin-1; only comments and names have letters beyond ASCII.
+pub fn text(path: &Path) -> Result<String, ScaleError> {
     let refused = |source| ScaleError::Read { path: path.to_owned(), source };
     let size = fs::metadata(path).map_err(refused)?.len();
     if size > BYTES_MOST {

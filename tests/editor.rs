@@ -5,6 +5,8 @@ mod support;
 
 #[path = "editor/cost.rs"]
 mod cost;
+#[path = "editor/files.rs"]
+mod files;
 #[path = "editor/hands.rs"]
 mod hands;
 #[path = "editor/linked.rs"]

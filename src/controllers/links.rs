@@ -21,6 +21,8 @@ pub struct ControllerLinks {
     learning: AtomicU32,
     /// One more than source and value of the controller that was heard first while learning; 0 for none.
     heard: AtomicU32,
+    /// How often the user has changed a link.
+    changes: AtomicU32,
 }
 
 /// A link, or none. Its numbers may be of two moments for as long as one is being written.
@@ -73,6 +75,11 @@ fn index_of(parameter: &Parameter) -> u32 {
 }
 
 impl ControllerLinks {
+    /// How often the user has changed a link; the number wraps around.
+    pub fn changes(&self) -> u32 {
+        self.changes.load(Ordering::Relaxed)
+    }
+
     /// The links as the instrument takes them, with the parameters' own values. Real-time safe.
     pub fn links(&self, settings: &Settings) -> [Option<Link>; MOST] {
         std::array::from_fn(|at| self.places[at].get().and_then(|link| link.link(settings)))
@@ -84,14 +91,24 @@ impl ControllerLinks {
         self.places.iter().filter_map(|place| Some((place.get()?, raw(place)))).collect()
     }
 
-    /// Replaces all links; those beyond the most that fit are left out.
+    /// Replaces all links, as the user does; those beyond the most that fit are left out.
     pub fn replace(&self, links: &[ParameterLink]) {
+        if self.take(links) {
+            self.changes.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Replaces all links; whether any has changed.
+    fn take(&self, links: &[ParameterLink]) -> bool {
+        let mut has_changed = false;
         for (at, place) in self.places.iter().enumerate() {
             let link = links.get(at);
             if place.get().as_ref() != link {
                 place.put(link);
+                has_changed = true;
             }
         }
+        has_changed
     }
 
     /// Waits for a controller that a hand moves, to link it to this parameter; `None` waits no more.
@@ -126,6 +143,7 @@ impl ControllerLinks {
         let free = || self.places.iter().find(|place| place.get().is_none());
         if let Some(place) = self.places.iter().find(is_its).or_else(free) {
             place.put(ParameterLink::whole(source, parameter).as_ref());
+            self.changes.fetch_add(1, Ordering::Relaxed);
         }
     }
 
@@ -136,9 +154,9 @@ impl ControllerLinks {
         if map.links.is_empty() { String::new() } else { map.to_text() }
     }
 
-    /// Takes the links of a text; none where it cannot be read.
+    /// Takes the links of a saved text; none where it cannot be read.
     pub fn take_text(&self, text: &str) {
-        self.replace(&ControllerMap::parse(text).unwrap_or_default().links);
+        self.take(&ControllerMap::parse(text).unwrap_or_default().links);
     }
 }
 

@@ -1,100 +1,115 @@
-//! The instrument view: which clarinet, its tuning, articulation and level.
+//! The instrument view: which clarinet, the scale of its keys, its tuning, articulation and level.
 
-use std::path::PathBuf;
-
-use egui::{Align2, CornerRadius, RichText, Role, Sense, Stroke, TextEdit, Ui, WidgetInfo, vec2};
+use egui::{Align2, CornerRadius, RichText, Role, Sense, Stroke, Ui, WidgetInfo, vec2};
 
 use crate::editor::Action;
 use crate::editor::chart;
 use crate::editor::clarinet_drawing::{ClarinetDrawing, ruler};
 use crate::editor::controls::{Hands, choice, heading, slider, teach};
+use crate::editor::file_browser::{FileBrowser, FileKind};
 use crate::editor::header::note_name;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
+use chalumeau_core::instrument::KeyPitches;
 
-/// What the view remembers.
-#[derive(Clone, Debug, Default)]
-pub struct InstrumentView {
-    path: String,
+/// Draws the view.
+pub fn draw(
+    ui: &mut Ui,
+    hands: &mut Hands,
+    snapshot: &Snapshot,
+    files: &mut FileBrowser,
+    actions: &mut Vec<Action>,
+) {
+    let mut with = (hands, files, actions);
+    crate::editor::beside(
+        ui,
+        "instrument",
+        &mut with,
+        |ui, (hands, files, actions)| left(ui, hands, snapshot, files, actions),
+        |ui, (hands, _, _)| column(ui, hands),
+    );
 }
 
-impl InstrumentView {
-    /// Draws the view.
-    pub fn draw(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
-        let mut with = (self, hands, actions);
-        crate::editor::beside(
-            ui,
-            "instrument",
-            &mut with,
-            |ui, (this, hands, actions)| this.left(ui, hands, snapshot, actions),
-            |ui, (_, hands, _)| column(ui, hands),
-        );
-    }
-
-    fn left(&mut self, ui: &mut Ui, hands: &Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
-        let c = Colours::here(ui);
-        ui.spacing_mut().item_spacing.y = GAP;
-        let height = ui.available_height();
-        panel(c).show(ui, |ui| {
-            ui.set_width(ui.available_width());
-            ui.set_height((0.34 * height - 24.0).max(168.0));
-            egui::ScrollArea::vertical().id_salt("instruments").auto_shrink([false, false]).show(ui, |ui| {
-                self.list(ui, hands, snapshot, actions);
-            });
+fn left(ui: &mut Ui, hands: &Hands, snapshot: &Snapshot, files: &mut FileBrowser, actions: &mut Vec<Action>) {
+    let c = Colours::here(ui);
+    ui.spacing_mut().item_spacing.y = GAP;
+    let height = ui.available_height();
+    panel(c).show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        ui.set_height((0.34 * height - 24.0).max(168.0));
+        egui::ScrollArea::vertical().id_salt("instruments").auto_shrink([false, false]).show(ui, |ui| {
+            list(ui, hands, snapshot, files, actions);
+            scale(ui, snapshot, files, actions);
         });
-        panel(c).show(ui, |ui| {
-            ui.set_width(ui.available_width());
-            ui.set_height(ui.available_height());
-            let all = ui.available_height();
-            // The height that the words leave.
-            let drawn = if all < 260.0 { 0.0 } else { (all - 180.0).min(220.0) };
-            egui::ScrollArea::vertical()
-                .id_salt("facts")
-                .max_height(all - drawn)
-                .auto_shrink([false, false])
-                .show(ui, |ui| facts(ui, snapshot));
-            if drawn > 0.0 {
-                portrait(ui, snapshot);
-            }
-        });
-    }
-
-    fn list(&mut self, ui: &mut Ui, hands: &Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
-        let c = Colours::here(ui);
-        ui.horizontal(|ui| {
-            heading(ui, "Instrument");
-            if let Some(look) = hands.controls.look("istat") {
-                let told = hands.controls.text("istat", look.value);
-                let told = egui::Label::new(RichText::new(told).color(c.quiet)).truncate();
-                ui.add(told).on_hover_ui(|ui| teach(ui, "istat", ""));
-            }
-        });
-        ui.horizontal_wrapped(|ui| {
-            for (index, name) in snapshot.instruments.iter().enumerate() {
-                let is_here = snapshot.chosen == Some(index);
-                if card(ui, c, name, is_here).clicked() && !is_here {
-                    actions.push(Action::ChooseInstrument(index));
-                }
-            }
-        });
-        if let Some((what, part)) = &snapshot.preparing {
-            ui.add(egui::ProgressBar::new(*part).text(what.as_str()).desired_height(16.0).fill(c.accent));
+    });
+    panel(c).show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        ui.set_height(ui.available_height());
+        let all = ui.available_height();
+        // The height that the words leave.
+        let drawn = if all < 260.0 { 0.0 } else { (all - 180.0).min(220.0) };
+        egui::ScrollArea::vertical()
+            .id_salt("facts")
+            .max_height(all - drawn)
+            .auto_shrink([false, false])
+            .show(ui, |ui| facts(ui, snapshot));
+        if drawn > 0.0 {
+            portrait(ui, snapshot);
         }
-        ui.add_space(4.0);
-        ui.label(RichText::new("Your own instrument file (see docs/instrument-file.md)").color(c.quiet));
-        ui.horizontal(|ui| {
-            let width = ui.available_width() - 74.0;
-            let field =
-                TextEdit::singleline(&mut self.path).desired_width(width).hint_text("path of a .toml file");
-            let response = ui.add(field);
-            response.widget_info(|| WidgetInfo::labeled(Role::TextInput, true, "Path of an instrument file"));
-            let is_entered = response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
-            let open = ui.add_enabled(!self.path.trim().is_empty(), egui::Button::new("Open"));
-            if open.clicked() || (is_entered && !self.path.trim().is_empty()) {
-                actions.push(Action::OpenInstrument(PathBuf::from(self.path.trim())));
+    });
+}
+
+fn list(ui: &mut Ui, hands: &Hands, snapshot: &Snapshot, files: &mut FileBrowser, actions: &mut Vec<Action>) {
+    let c = Colours::here(ui);
+    ui.horizontal(|ui| {
+        heading(ui, "Instrument");
+        if let Some(look) = hands.controls.look("istat") {
+            let told = hands.controls.text("istat", look.value);
+            let told = egui::Label::new(RichText::new(told).color(c.quiet)).truncate();
+            ui.add(told).on_hover_ui(|ui| teach(ui, "istat", ""));
+        }
+    });
+    ui.horizontal_wrapped(|ui| {
+        for (index, name) in snapshot.instruments.iter().enumerate() {
+            let is_here = snapshot.chosen == Some(index);
+            if card(ui, c, name, is_here).clicked() && !is_here {
+                actions.push(Action::ChooseInstrument(index));
             }
-        });
+        }
+    });
+    if let Some((what, part)) = &snapshot.preparing {
+        ui.add(egui::ProgressBar::new(*part).text(what.as_str()).desired_height(16.0).fill(c.accent));
+    }
+    ui.horizontal(|ui| {
+        if ui.button("Open an instrument file").clicked() {
+            files.open(FileKind::Instrument, actions);
+        }
+        let about = RichText::new("docs/instrument-file.md describes one").color(c.quiet);
+        ui.add(egui::Label::new(about).truncate());
+    });
+}
+
+/// The scale that the keys play.
+fn scale(ui: &mut Ui, snapshot: &Snapshot, files: &mut FileBrowser, actions: &mut Vec<Action>) {
+    let c = Colours::here(ui);
+    ui.add_space(2.0);
+    ui.horizontal(|ui| {
+        heading(ui, "Scale");
+        ui.add(egui::Label::new(RichText::new(&snapshot.scale).color(c.quiet)).truncate());
+    });
+    ui.horizontal(|ui| {
+        let about = "A scale in Scala's format (.scl), and if you like a keyboard mapping (.kbm). The project keeps both.";
+        if ui.button("Open a scale").on_hover_text(about).clicked() {
+            files.open(FileKind::Scale, actions);
+        }
+        let is_equal = snapshot.key_pitches == KeyPitches::default();
+        if ui.add_enabled(!is_equal, egui::Button::new("Equal temperament")).clicked() {
+            actions.push(Action::EqualTemperament);
+        }
+    });
+    if let Some(refused) = &snapshot.scale_refused {
+        ui.label(RichText::new(refused).color(c.danger));
     }
 }
 

@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use crate::editor::sound_analysis::SoundAnalysis;
+use crate::folder_listing::FolderListing;
 use crate::presets::PresetShelf;
 use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
 use chalumeau_core::haptics::{NoteFeel, NoteRequirement};
@@ -20,6 +21,12 @@ pub struct Snapshot {
     pub instrument: Arc<InstrumentFile>,
     /// What each key plays.
     pub key_pitches: KeyPitches,
+    /// The scale that the keys play, as lists show it.
+    pub scale: String,
+    /// Why the last file of a scale was not taken.
+    pub scale_refused: Option<String>,
+    /// The folder that the user chooses a file from.
+    pub folder: Arc<FolderListing>,
     /// Notes within its range that it cannot play, see [`Model::speaks`](chalumeau_core::instrument::Model::speaks).
     pub silent: Vec<SoundingNote>,
     /// Instruments that can be chosen, by name; the chosen one may be none of them.
@@ -78,6 +85,9 @@ impl Default for Snapshot {
         Self {
             instrument,
             key_pitches: KeyPitches::default(),
+            scale: "Equal temperament".to_owned(),
+            scale_refused: None,
+            folder: Arc::default(),
             silent: Vec::new(),
             instruments: Vec::new(),
             chosen: None,

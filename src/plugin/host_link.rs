@@ -45,6 +45,8 @@ pub struct HostLink {
     texts: AtomicU32,
     /// How often the plugin itself has moved parameters.
     values: AtomicU32,
+    /// How often something has changed that is saved and no parameter.
+    states: AtomicU32,
     has_menu: AtomicBool,
     menu: Mutex<Option<MenuRequest>>,
     marks: Mutex<BTreeMap<(&'static str, u8), Mark>>,
@@ -100,6 +102,17 @@ impl HostLink {
     /// How often the plugin itself has moved parameters; the number wraps around.
     pub fn values(&self) -> u32 {
         self.values.load(Ordering::Relaxed)
+    }
+
+    /// Something has changed that is saved and no parameter: a project that was saved is no longer as it is.
+    pub fn state_changed(&self) {
+        self.states.fetch_add(1, Ordering::Relaxed);
+        self.tell();
+    }
+
+    /// How often that has happened; the number wraps around.
+    pub fn states(&self) -> u32 {
+        self.states.load(Ordering::Relaxed)
     }
 
     /// Whether the host opens menus of its own in the plugin's window.

@@ -24,6 +24,7 @@ pub mod listening;
 pub mod moment;
 pub mod reed;
 pub mod room;
+pub mod scale;
 mod state;
 pub mod techniques;
 
@@ -35,6 +36,7 @@ pub use listening::ListeningParams;
 use moment::{Moment, Moments};
 pub use reed::PhysicalReedParams;
 pub use room::RoomParams;
+use scale::ScaleField;
 pub use state::{SCHEMA, mend, without_moments};
 pub use techniques::{ExpressionParams, TechniqueParams};
 
@@ -91,6 +93,9 @@ pub struct ChalumeauParams {
     /// Controllers that the user has linked to parameters.
     #[persist = "links"]
     pub links: ControllerLinks,
+    /// What the keys play.
+    #[persist = "scale"]
+    pub scale: ScaleField,
     /// Name of the preset that was chosen last; empty if there is none.
     #[persist = "preset"]
     pub preset: RwLock<String>,
@@ -323,6 +328,7 @@ impl ChalumeauParams {
             schema: AtomicU32::new(SCHEMA),
             window: RwLock::default(),
             links: ControllerLinks::default(),
+            scale: ScaleField::default(),
             preset: RwLock::new(state::first_preset()),
             breath: BreathParams {
                 breath: number("breath"),

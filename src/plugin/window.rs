@@ -10,6 +10,7 @@
 mod breath_history;
 mod device_list;
 mod editor_app;
+mod file_tasks;
 #[cfg(target_os = "linux")]
 mod graphics_libraries;
 mod host_controls;
@@ -29,6 +30,7 @@ use crate::editor::{Snapshot, WindowState};
 use crate::plugin::SharedHandles;
 use crate::plugin::params::ChalumeauParams;
 use editor_app::WindowMemory;
+use file_tasks::FileTask;
 pub use host_window::HostWindow;
 use snapshot_thread::SnapshotThread;
 pub use window_audio::WindowAudio;
@@ -42,6 +44,8 @@ struct SharedWindow {
     latest: Mutex<Arc<Snapshot>>,
     /// The holes that the user tries, which the snapshot shows instead of the fingering.
     tried: Mutex<Option<Vec<bool>>>,
+    /// Files that the user asks for, until the snapshot thread has read them.
+    file_tasks: Mutex<Vec<FileTask>>,
     stop: AtomicBool,
 }
 
@@ -62,6 +66,14 @@ impl SharedWindow {
 
     fn set_drawn(&self, window: Option<egui::Context>) {
         *self.drawn.lock().unwrap_or_else(PoisonError::into_inner) = window;
+    }
+
+    fn ask_for_file(&self, task: FileTask) {
+        self.file_tasks.lock().unwrap_or_else(PoisonError::into_inner).push(task);
+    }
+
+    fn take_file_tasks(&self) -> Vec<FileTask> {
+        std::mem::take(&mut self.file_tasks.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     fn tried(&self) -> Option<Vec<bool>> {
@@ -88,6 +100,7 @@ impl PluginWindow {
             drawn: Mutex::default(),
             latest: Mutex::new(Arc::new(Snapshot::default())),
             tried: Mutex::default(),
+            file_tasks: Mutex::default(),
             stop: AtomicBool::new(false),
         });
         let (audio, WindowChannels { inside, sound, keys }) = WindowAudio::new(shared.clone());

@@ -297,12 +297,6 @@ fn devices_tests_and_files_are_asked_for() {
     let mut window = Window::tall(Tab::Instrument);
     click(&mut window, "Instrument Bass clarinet");
     assert_eq!(window.actions(), [Action::ChooseInstrument(4)]);
-    let field = window.harness.get_by_label("Path of an instrument file");
-    field.focus();
-    field.type_text("mine.toml");
-    window.harness.run();
-    click(&mut window, "Open");
-    assert_eq!(window.actions(), [Action::OpenInstrument(PathBuf::from("mine.toml"))]);
 }
 
 #[test]

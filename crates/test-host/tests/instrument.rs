@@ -87,6 +87,37 @@ fn user_state(path: &Path) -> Vec<u8> {
     ))
 }
 
+/// A state with this scale; equal temperament without a text.
+fn scale_state(scl: &str) -> Vec<u8> {
+    let scale = serde_json::json!({ "name": "quarter_tones.scl", "scl": scl }).to_string();
+    let fields = serde_json::json!({ "scale": scale });
+    state_of(&serde_json::json!({ "version": "1", "params": {}, "fields": fields }).to_string())
+}
+
+#[test]
+fn a_project_keeps_its_scale_and_another_comes_while_a_note_sounds() {
+    let quarter_tones = "quarter tones\n1\n50.0\n";
+    let mut plugin = plugin();
+    plugin.restore(&scale_state(quarter_tones)).unwrap();
+    let mut session = plugin.activate(RATE, BLOCK).unwrap();
+    let heard = session.play_live(&[At(0, breath(64)), At(0, on(65))], SECOND, RATE).unwrap()[0].clone();
+    let off = cents(&heard[SECOND / 2..], 62.5);
+    assert!(off.abs() < 2.0, "key 65 is five quarter tones above middle C: {off} cents");
+    // Equal temperament again, under the same key.
+    plugin.restore(&scale_state("")).unwrap();
+    let heard = session.play_live(&[], SECOND, RATE).unwrap()[0].clone();
+    for (at, window) in heard.chunks(SECOND / 50).enumerate() {
+        assert!(level_db(window) > -40.0, "{} dB after {} ms", level_db(window), 20 * at);
+    }
+    let off = cents(&heard[SECOND / 2..], 65.0);
+    assert!(off.abs() < 2.0, "{off} cents");
+    // A damaged scale is none.
+    plugin.restore(&scale_state("quarter tones\n7\n50.0\n")).unwrap();
+    let heard = session.play_live(&[], SECOND, RATE).unwrap()[0].clone();
+    assert!(cents(&heard[SECOND / 2..], 65.0).abs() < 2.0);
+    plugin.deactivate(session);
+}
+
 /// A pipe of three notes: quickly fitted and tuned.
 const PIPE: &str = include_str!("../../core/tests/data/pipe.toml");
 

@@ -12,6 +12,7 @@ use clap_sys::ext::gui::CLAP_EXT_GUI;
 use clap_sys::ext::note_name::{CLAP_EXT_NOTE_NAME, clap_host_note_name};
 use clap_sys::ext::params::{CLAP_EXT_PARAMS, clap_host_params, clap_param_rescan_flags};
 use clap_sys::ext::preset_load::{CLAP_EXT_PRESET_LOAD, CLAP_EXT_PRESET_LOAD_COMPAT, clap_host_preset_load};
+use clap_sys::ext::state::{CLAP_EXT_STATE, clap_host_state};
 use clap_sys::ext::tail::{CLAP_EXT_TAIL, clap_host_tail};
 use clap_sys::host::clap_host;
 use clap_sys::id::clap_id;
@@ -37,6 +38,7 @@ struct Calls {
 struct Extensions {
     has_gui: bool,
     params: Option<*const clap_host_params>,
+    state: Option<*const clap_host_state>,
     tail: Option<*const clap_host_tail>,
     note_name: Option<*const clap_host_note_name>,
     menu: Option<*const clap_host_context_menu>,
@@ -67,6 +69,7 @@ impl Host {
         let _ = self.extensions.set(Extensions {
             has_gui: self.extension::<()>(CLAP_EXT_GUI).is_some(),
             params: self.extension(CLAP_EXT_PARAMS),
+            state: self.extension(CLAP_EXT_STATE),
             tail: self.extension(CLAP_EXT_TAIL),
             note_name: self.extension(CLAP_EXT_NOTE_NAME),
             preset_load: preset_load.or_else(|| self.extension(CLAP_EXT_PRESET_LOAD_COMPAT)),
@@ -104,6 +107,14 @@ impl Host {
         if let Some(params) = self.known().and_then(|known| known.params) {
             // SAFETY: the host lives; the caller is on the main thread.
             unsafe { (*params).rescan.inspect(|rescan| rescan(self.raw(), flags)) };
+        }
+    }
+
+    /// Tells the host that what would be saved has changed. [main thread]
+    pub fn mark_dirty(&self) {
+        if let Some(state) = self.known().and_then(|known| known.state) {
+            // SAFETY: the host lives; the caller is on the main thread.
+            unsafe { (*state).mark_dirty.inspect(|mark_dirty| mark_dirty(self.raw())) };
         }
     }
 

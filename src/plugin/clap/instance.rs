@@ -67,6 +67,7 @@ pub struct Instance {
     told_texts: AtomicU32,
     /// How often the plugin had moved parameters when the host was last told.
     told_values: AtomicU32,
+    told_states: AtomicU32,
 }
 
 static TAIL: clap_plugin_tail = clap_plugin_tail { get: Some(tail) };
@@ -115,6 +116,7 @@ impl Instance {
             told_in_use: AtomicU32::new(0),
             told_texts: AtomicU32::new(0),
             told_values: AtomicU32::new(0),
+            told_states: AtomicU32::new(0),
         };
         let (in_use, asked) = (instance.in_use(), instance.asked());
         instance.asked.store(asked, Ordering::Relaxed);
@@ -186,6 +188,10 @@ impl Instance {
         }
         if changed != 0 {
             self.host.rescan_params(changed);
+        }
+        let states = link.states();
+        if self.told_states.swap(states, Ordering::Relaxed) != states {
+            self.host.mark_dirty();
         }
         if self.note_names.lock().unwrap_or_else(PoisonError::into_inner).renew(&self.introduced) {
             self.host.note_names_changed();

@@ -132,7 +132,8 @@ impl InstrumentLoader {
             });
             (model, readiness) = (made.map_err(|reason| reason.to_string())?, Readiness::Tuned);
         }
-        Ok(CurrentInstrument { request: request.clone(), readiness, model: Arc::new(model) })
+        let model = request.with_keys(Arc::new(model));
+        Ok(CurrentInstrument { request: request.clone(), readiness, model })
     }
 }
 
@@ -240,6 +241,14 @@ impl LoaderThread {
         }
         let same_instrument =
             request.source == current.request.source && request.quality == current.request.quality;
+        let differs_in_keys = current.request.differs_in_keys_at_most(&request) && current.request != request;
+        if differs_in_keys {
+            // The same instrument, with other keys.
+            let (model, readiness) = (current.model.clone(), current.readiness);
+            // Activated anew meanwhile, the host has these keys already.
+            let _ = self.hand_over(&request, activation.number, model, readiness);
+            return;
+        }
         if same_instrument && request != current.request && self.since.elapsed() < SETTLE {
             return;
         }
@@ -383,6 +392,7 @@ impl LoaderThread {
         model: Arc<Model>,
         readiness: Readiness,
     ) -> Result<(), Interrupted> {
+        let model = request.with_keys(model);
         let clarinet = Box::new(Clarinet::new(model.clone(), request.host_rate_hz));
         {
             let mut activation = self.shared.activation();

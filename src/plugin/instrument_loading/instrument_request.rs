@@ -1,6 +1,7 @@
 //! Which instrument the parameters ask for, and its file.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::SystemTime;
 
 use super::Readiness;
@@ -12,7 +13,7 @@ use chalumeau_core::instrument::concert_pitch::A4_BY_DELAY_HZ;
 use chalumeau_core::instrument::concert_pitch::A4_HZ;
 use chalumeau_core::instrument::prepare::{Preparation, Quality, Wanted};
 use chalumeau_core::instrument::store::Store;
-use chalumeau_core::instrument::{BuildError, Model};
+use chalumeau_core::instrument::{BuildError, KeyPitches, Model};
 
 /// Environment variable with the path of the user's instrument file.
 pub const VARIABLE: &str = "CHALUMEAU_INSTRUMENT";
@@ -46,6 +47,8 @@ pub struct InstrumentRequest {
     pub host_rate_hz: f64,
     /// Rendering quality.
     pub quality: Quality,
+    /// What every key plays.
+    pub keys: Arc<KeyPitches>,
 }
 
 impl InstrumentRequest {
@@ -66,7 +69,8 @@ impl InstrumentRequest {
         // The parameter shows a tenth of a hertz; a finer step does not justify a fit of its own.
         let a4_hz = if is_bridged { A4_HZ } else { (10.0 * a4_hz).round() / 10.0 };
         let quality = if offline { params.instrument.quality.value().into() } else { Quality::Live };
-        Self { choice: choice as u32, source, a4_hz, host_rate_hz, quality }
+        let keys = params.scale.key_pitches();
+        Self { choice: choice as u32, source, a4_hz, host_rate_hz, quality, keys }
     }
 
     /// The request that the built-in clarinet answers.
@@ -77,7 +81,21 @@ impl InstrumentRequest {
             a4_hz: A4_HZ,
             host_rate_hz,
             quality: Quality::Live,
+            keys: Arc::default(),
         }
+    }
+
+    /// Whether another request differs in what its keys play at most.
+    pub fn differs_in_keys_at_most(&self, other: &Self) -> bool {
+        *self == Self { keys: self.keys.clone(), ..other.clone() }
+    }
+
+    /// A model with the keys of this request. Allocates if they are others.
+    pub fn with_keys(&self, mut model: Arc<Model>) -> Arc<Model> {
+        if model.keys != *self.keys {
+            Arc::make_mut(&mut model).keys = KeyPitches::clone(&self.keys);
+        }
+        model
     }
 
     /// The instrument's measurements. The error is a message for the user.
@@ -147,7 +165,7 @@ mod tests {
 
     fn user(path: &std::path::Path) -> InstrumentRequest {
         let source = InstrumentSource::User { path: Some(path.to_owned()), changed: None };
-        InstrumentRequest { choice: 5, source, a4_hz: 440.0, host_rate_hz: 48_000.0, quality: Quality::Live }
+        InstrumentRequest { choice: 5, source, ..InstrumentRequest::built_in(48_000.0) }
     }
 
     #[test]

@@ -8,6 +8,7 @@ use serde::{Serialize, de::DeserializeOwned};
 
 use super::instrument;
 use super::knob::SavedCalibration;
+use super::scale::SavedScale;
 use crate::controllers;
 use crate::editor::WindowState;
 use crate::parameters::{Kind, Number, PARAMETERS, Parameter};
@@ -72,6 +73,8 @@ pub fn mend(state: &mut PluginState) {
     mend_field(state, "preset", |name: String| name.chars().take(NAME_MOST).collect());
     // A state from before links has none.
     mend_field(state, "links", controllers::mended);
+    // A state from before scales has none.
+    mend_field(state, "scale", SavedScale::mended);
     mend_field(state, "calibration", SavedCalibration::mended);
     mend_field(state, "window", WindowState::mended);
     // An older schema lacks what it lacks; a newer one is read as far as its ids are known here.

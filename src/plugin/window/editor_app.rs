@@ -7,12 +7,14 @@ use nice_plug::context::gui::GuiContext;
 use nice_plug_egui::baseview::{HandlerError, WindowSize};
 use nice_plug_egui::{Frame, KeyCapture, NiceEguiApp};
 
+use super::file_tasks::FileTask;
 use super::host_controls::HostControls;
 use super::{SharedWindow, kept};
 use crate::editor::{self, Action, Controls, EditorState, Snapshot, WindowState};
 use crate::plugin::SharedHandles;
 use crate::plugin::launch_options::LaunchOptions;
 use crate::plugin::params::instrument::InstrumentChoice;
+use crate::plugin::params::scale::SavedScale;
 use crate::plugin::preset_keeper::PresetTask;
 use chalumeau_core::event::Event;
 
@@ -23,6 +25,8 @@ pub struct WindowMemory {
     state: EditorState,
     /// What the window has written into the project last.
     written: WindowState,
+    /// How often links had changed when the host was told last.
+    links: u32,
     keys: rtrb::Producer<Event>,
     /// Pixels per point without zoom, on the latest screen.
     pub(super) scale: f64,
@@ -35,6 +39,7 @@ impl WindowMemory {
             controls: HostControls::new(handles.params.clone()),
             state: EditorState::new(written.clone()),
             written,
+            links: handles.params.links.changes(),
             handles,
             keys,
             scale: 1.0,
@@ -64,8 +69,15 @@ impl WindowMemory {
                 if let Ok(mut file) = self.handles.params.instrument.file.write() {
                     *file = path.display().to_string();
                 }
+                self.handles.params.host.state_changed();
                 let user = InstrumentChoice::ALL.len() - 1;
                 self.choose("instr", user, InstrumentChoice::ALL.len(), gui);
+            }
+            Action::OpenScale(path) => shared.ask_for_file(FileTask::OpenScale(path)),
+            Action::ReadFolder(path) => shared.ask_for_file(FileTask::ReadFolder(path)),
+            Action::EqualTemperament => {
+                self.handles.params.scale.put(SavedScale::default());
+                self.handles.params.host.state_changed();
             }
             Action::ChosePreset(name) => self.handles.params.set_preset_name(&name),
             Action::ReadPresets => self.handles.presets.send(PresetTask::Read),
@@ -159,10 +171,15 @@ impl NiceEguiApp for EditorApp {
         snapshot.settings = params.settings();
         snapshot.presets = memory.handles.presets.shelf();
         snapshot.preset = params.preset_name();
+        snapshot.scale = params.scale.saved().title();
         ui.ctx().set_zoom_factor(memory.state.kept.zoom);
         let actions = editor::draw(ui, &mut memory.state, &memory.controls.with(&self.gui), &snapshot);
         for action in actions {
             memory.act(action, &self.shared, &self.gui);
+        }
+        let links = params.links.changes();
+        if std::mem::replace(&mut memory.links, links) != links {
+            params.host.state_changed();
         }
         // The host gets the keyboard, unless the user types text here.
         frame.set_key_capture(if memory.state.wants_keyboard(ui.ctx()) {

@@ -9,6 +9,7 @@ use super::SharedWindow;
 use super::breath_history::BreathHistory;
 #[cfg(feature = "devices")]
 use super::device_list;
+use super::file_tasks::FilesRead;
 use super::instrument_analysis::InstrumentAnalysis;
 use super::window_audio::AudioSnapshot;
 #[cfg(feature = "devices")]
@@ -54,6 +55,7 @@ pub struct SnapshotThread {
     /// The values that a snapshot shows where nothing is known. Kept, because making them parses an instrument file.
     blank: Snapshot,
     history: BreathHistory,
+    files: FilesRead,
     analysis: Option<InstrumentAnalysis>,
     /// The devices found, and when.
     #[cfg(feature = "devices")]
@@ -78,6 +80,7 @@ impl SnapshotThread {
             listener: None,
             blank: Snapshot::default(),
             history: BreathHistory::new(),
+            files: FilesRead::default(),
             analysis: None,
             #[cfg(feature = "devices")]
             devices: (Vec::new(), None),
@@ -97,6 +100,9 @@ impl SnapshotThread {
     /// Makes one snapshot and asks the window to draw it. Returns the time from its beginning to the next one's.
     fn publish(&mut self) -> Duration {
         let inside = self.inside.read().clone();
+        for task in self.shared.take_file_tasks() {
+            self.files.act(task, &self.handles.params);
+        }
         let current = self.handles.instrument.current();
         self.receive_sound();
         self.analyse(current.as_ref());
@@ -107,6 +113,7 @@ impl SnapshotThread {
             current.as_ref().map_or_else(KeyPitches::default, |current| current.model.keys.clone());
         snapshot.silent = current.as_ref().map_or_else(Vec::new, |current| current.model.silent_notes());
         snapshot.chosen = Some(self.handles.params.instrument.choice.value() as usize);
+        self.files.show(&mut snapshot);
         show_inside(&mut snapshot, &inside);
         self.show_instrument(&mut snapshot, inside.now.fingering);
         snapshot.heard = self.analyse_sound(inside.host_rate_hz, inside.now.sounding, &settings);

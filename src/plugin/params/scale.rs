@@ -1,0 +1,150 @@
+//! The scale that keys play. A project keeps the texts of its files, so that it sounds the same where the files are not.
+
+use std::path::Path;
+use std::sync::{Arc, PoisonError, RwLock};
+
+use nice_plug::params::persist::PersistentField;
+use serde::{Deserialize, Serialize};
+
+use crate::scale_file::{self, ScaleFault};
+use chalumeau_core::instrument::KeyPitches;
+
+/// Longest text that a project keeps, bytes; a scale of a thousand notes is shorter.
+const BYTES_MOST: usize = 64 << 10;
+
+/// A scale as a project keeps it; equal temperament without a text.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct SavedScale {
+    /// Name of its file.
+    pub name: String,
+    /// Text of the scale, in Scala's format `.scl`.
+    pub scl: String,
+    /// Name of the file of the keyboard mapping; empty without one.
+    pub mapping_name: String,
+    /// Text of the keyboard mapping, in Scala's format `.kbm`; empty without one.
+    pub kbm: String,
+}
+
+impl SavedScale {
+    /// What every key plays.
+    fn key_pitches(&self) -> Result<KeyPitches, ScaleFault> {
+        if self.scl.is_empty() {
+            return Ok(KeyPitches::default());
+        }
+        scale_file::key_pitches(&self.scl, (!self.kbm.is_empty()).then_some(&self.kbm))
+    }
+
+    /// The same if it can be used, else equal temperament.
+    pub fn mended(self) -> Self {
+        let is_short = self.scl.len().max(self.kbm.len()) <= BYTES_MOST && self.name.len() <= 1_024;
+        if is_short && self.key_pitches().is_ok() { self } else { Self::default() }
+    }
+
+    /// What lists show.
+    pub fn title(&self) -> String {
+        match (self.scl.is_empty(), self.kbm.is_empty()) {
+            (true, _) => "Equal temperament".to_owned(),
+            (false, true) => self.name.clone(),
+            (false, false) => format!("{} with {}", self.name, self.mapping_name),
+        }
+    }
+
+    /// The same with the scale or keyboard mapping of a file in it. The error is a message for the user.
+    pub fn with_file(self, path: &Path) -> Result<Self, String> {
+        let text = scale_file::text(path).map_err(|error| error.to_string())?;
+        let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        if text.len() > BYTES_MOST {
+            return Err(format!("{name} has {} bytes; a project keeps at most {BYTES_MOST}", text.len()));
+        }
+        let is_mapping = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("kbm"));
+        let scale = match is_mapping {
+            true if self.scl.is_empty() => {
+                return Err(format!("{name} maps the keys to a scale; open a scale (.scl) first"));
+            }
+            true => Self { mapping_name: name.clone(), kbm: text, ..self },
+            false => Self { name: name.clone(), scl: text, ..Self::default() },
+        };
+        match scale.key_pitches() {
+            Ok(_) => Ok(scale),
+            Err(fault) => Err(format!("{name}: {}", fault.what)),
+        }
+    }
+}
+
+/// The scale of one plugin instance.
+#[derive(Debug, Default)]
+pub struct ScaleField(RwLock<(SavedScale, Arc<KeyPitches>)>);
+
+impl ScaleField {
+    /// The scale as it is saved.
+    pub fn saved(&self) -> SavedScale {
+        self.0.read().unwrap_or_else(PoisonError::into_inner).0.clone()
+    }
+
+    /// What every key plays.
+    pub fn key_pitches(&self) -> Arc<KeyPitches> {
+        self.0.read().unwrap_or_else(PoisonError::into_inner).1.clone()
+    }
+
+    /// Another scale; one that cannot be used is equal temperament.
+    pub fn put(&self, scale: SavedScale) {
+        let scale = scale.mended();
+        let pitches = scale.key_pitches().unwrap_or_default();
+        *self.0.write().unwrap_or_else(PoisonError::into_inner) = (scale, Arc::new(pitches));
+    }
+}
+
+impl PersistentField<'_, SavedScale> for ScaleField {
+    fn set(&self, scale: SavedScale) {
+        self.put(scale);
+    }
+
+    fn map<F, R>(&self, f: F) -> R
+    where
+        F: Fn(&SavedScale) -> R,
+    {
+        f(&self.saved())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chalumeau_core::units::SoundingNote;
+    use std::fs;
+
+    #[test]
+    fn a_project_keeps_scale_and_mapping_and_what_is_damaged_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            fs::write(&path, text).unwrap();
+            path
+        };
+        let scl = file("fifths.scl", "pure fifths\n1\n3/2\n");
+        let kbm = file("from_a.KBM", "0\n0\n127\n69\n69\n440.0\n0\n");
+        let refused = SavedScale::default().with_file(&kbm).unwrap_err();
+        assert!(refused.contains("open a scale"), "{refused}");
+        let scale = SavedScale::default().with_file(&scl).unwrap();
+        assert_eq!(scale.title(), "fifths.scl");
+        let both = scale.clone().with_file(&kbm).unwrap();
+        assert_eq!(both.title(), "fifths.scl with from_a.KBM");
+        let field = ScaleField::default();
+        assert_eq!(*field.key_pitches(), KeyPitches::default());
+        field.put(both.clone());
+        assert_eq!(field.key_pitches().of(SoundingNote(70)).unwrap().note, SoundingNote(76));
+        let text = serde_json::to_string(&field.saved()).unwrap();
+        assert_eq!(serde_json::from_str::<SavedScale>(&text).unwrap().mended(), both);
+
+        let damaged = file("damaged.scl", "three\n3\n100.0\nhundred\n");
+        let refused = both.clone().with_file(&damaged).unwrap_err();
+        assert!(refused.contains("damaged.scl: line 4"), "{refused}");
+        let refused = both.clone().with_file(&folder.path().join("none.scl")).unwrap_err();
+        assert!(refused.contains("none.scl"), "{refused}");
+        let long = file("long.scl", &format!("{}\n1\n2/1\n", "x".repeat(BYTES_MOST)));
+        assert!(both.with_file(&long).unwrap_err().contains("bytes"));
+        let broken = SavedScale { scl: "rubbish".to_owned(), ..scale };
+        assert_eq!(broken.mended(), SavedScale::default());
+    }
+}
