@@ -23,6 +23,7 @@ mod key_steps;
 mod keyboard;
 mod knob_view;
 mod linked_controllers;
+pub mod note_names;
 mod pitch_needle;
 mod play_view;
 mod preset_bar;
@@ -47,7 +48,8 @@ use serde::{Deserialize, Serialize};
 pub use ab_comparison::AbComparison;
 pub use controls::{Controls, Look};
 pub use feel_test::FeelTest;
-pub use header::note_name;
+use note_names::NoteNames;
+pub use note_names::note_name;
 pub use snapshot::Snapshot;
 
 use chalumeau_core::units::SoundingNote;
@@ -194,11 +196,20 @@ pub struct WindowState {
     pub tab: Tab,
     /// The views of a laboratory are offered too.
     pub is_lab: bool,
+    /// Which pitch the names of notes say.
+    pub names: NoteNames,
 }
 
 impl Default for WindowState {
     fn default() -> Self {
-        Self { size: SIZE, zoom: 1.0, is_dark: true, tab: Tab::Play, is_lab: false }
+        Self {
+            size: SIZE,
+            zoom: 1.0,
+            is_dark: true,
+            tab: Tab::Play,
+            is_lab: false,
+            names: NoteNames::Written,
+        }
     }
 }
 
@@ -364,7 +375,7 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
         });
     let keys = (0.13 * height).clamp(52.0, 110.0);
     let line = Panel::bottom("keys").exact_size(keys + 10.0).show_separator_line(false);
-    line.frame(ground(8, 5)).show(ui, |ui| keyboard.draw(ui, snapshot, &mut actions));
+    line.frame(ground(8, 5)).show(ui, |ui| keyboard.draw(ui, kept.names, snapshot, &mut actions));
     let has_meter = tab != Tab::Play || is_blind;
     let line =
         Panel::right("meter").exact_size(if is_small { 96.0 } else { 112.0 }).show_separator_line(false);
@@ -387,11 +398,13 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
         match tab {
             Tab::Play => play.draw(ui, &mut hands, snapshot, &mut actions),
             Tab::Reed => reed.draw(ui, &mut hands, snapshot),
-            Tab::Clarinet => clarinet.draw(ui, snapshot, &mut actions),
+            Tab::Clarinet => clarinet.draw(ui, kept.names, snapshot, &mut actions),
             Tab::Breath => breath.draw(ui, &mut hands, snapshot),
             Tab::Sound => sound_view::draw(ui, &mut hands, snapshot),
             Tab::Knob => knob.draw(ui, &mut hands, snapshot, &mut actions),
-            Tab::Instrument => instrument_view::draw(ui, &mut hands, snapshot, files, &mut actions),
+            Tab::Instrument => {
+                instrument_view::draw(ui, &mut hands, snapshot, &mut kept.names, files, &mut actions)
+            }
         }
     });
     // A widget that disappears while it is held, with its view or in a blind comparison, cannot end its gesture.
@@ -433,9 +446,14 @@ mod tests {
 
     #[test]
     fn what_a_project_keeps_survives_rubbish() {
-        let kept =
-            WindowState { size: (f32::NAN, 1e9), zoom: -3.0, is_dark: false, tab: Tab::Sound, is_lab: false }
-                .mended();
+        let kept = WindowState {
+            size: (f32::NAN, 1e9),
+            zoom: -3.0,
+            is_dark: false,
+            tab: Tab::Sound,
+            ..WindowState::default()
+        }
+        .mended();
         assert_eq!(
             kept,
             WindowState {
@@ -443,7 +461,7 @@ mod tests {
                 zoom: 0.5,
                 is_dark: false,
                 tab: Tab::Sound,
-                is_lab: false
+                ..WindowState::default()
             }
         );
         let text = toml::to_string(&kept).unwrap();

@@ -14,7 +14,7 @@ use egui::{
 use crate::editor::Action;
 use crate::editor::chart;
 use crate::editor::clarinet_drawing::{ClarinetDrawing, part_names, ruler, standing};
-use crate::editor::header::note_name;
+use crate::editor::note_names::{NoteNames, note_name};
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
@@ -42,7 +42,7 @@ impl ClarinetView {
     }
 
     /// Draws the view.
-    pub fn draw(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    pub fn draw(&mut self, ui: &mut Ui, names: NoteNames, snapshot: &Snapshot, actions: &mut Vec<Action>) {
         let c = Colours::here(ui);
         let file = &*snapshot.instrument;
         if self.tried.as_ref().is_some_and(|tried| tried.len() != file.holes.len()) {
@@ -59,7 +59,7 @@ impl ClarinetView {
         panel(c).show(ui, |ui| {
             ui.set_width(ui.available_width());
             ui.set_height(ui.available_height());
-            self.picker(ui, snapshot, actions);
+            self.picker(ui, names, snapshot, actions);
         });
     }
 
@@ -120,7 +120,7 @@ impl ClarinetView {
         self.tried = Some(tried);
     }
 
-    fn picker(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    fn picker(&mut self, ui: &mut Ui, names: NoteNames, snapshot: &Snapshot, actions: &mut Vec<Action>) {
         let c = Colours::here(ui);
         let all = self.choices(&snapshot.instrument);
         let shown = match &self.tried {
@@ -129,8 +129,10 @@ impl ClarinetView {
                 .fingering()
                 .and_then(|fingering| all.iter().position(|choice| choice.open == fingering.open)),
         };
-        let name =
-            |choice: &FingeringChoice| format!("{}{}", note_name(choice.written.0), "'".repeat(choice.nth));
+        let name = |choice: &FingeringChoice| {
+            let note = names.of_written(choice.written, snapshot.instrument.transposition);
+            format!("{}{}", note.map_or_else(String::new, note_name), "'".repeat(choice.nth))
+        };
         ui.horizontal(|ui| {
             ui.set_height(22.0);
             let told = match shown.map(|index| &all[index]) {

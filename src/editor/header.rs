@@ -8,6 +8,7 @@ use crate::editor::ab_comparison::AbComparison;
 use crate::editor::ab_comparison::ComparisonSide;
 use crate::editor::controls::Hands;
 use crate::editor::controls::{momentary, segments};
+use crate::editor::note_names::{NoteNames, note_name};
 use crate::editor::pitch_needle;
 use crate::editor::preset_bar;
 use crate::editor::preset_browser::PresetBrowser;
@@ -18,12 +19,6 @@ use crate::editor::{Action, Tab, WindowState};
 
 /// Least and most zoom, and the steps offered.
 pub const ZOOMS: [f32; 8] = [0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0];
-
-/// The name of a pitch as musicians write it, with the flats they use.
-pub fn note_name(midi: u8) -> String {
-    const NAMES: [&str; 12] = ["C", "C#", "D", "Eb", "E", "F", "F#", "G", "Ab", "A", "Bb", "B"];
-    format!("{}{}", NAMES[usize::from(midi % 12)], i16::from(midi / 12) - 1)
-}
 
 /// The upper line.
 pub fn tools(
@@ -38,7 +33,7 @@ pub fn tools(
     let is_wide = ui.available_width() > 900.0;
     ui.horizontal_centered(|ui| {
         // The pitch would tell one setting from another.
-        note(ui, snapshot, !compare.is_blind());
+        note(ui, kept, snapshot, !compare.is_blind());
         // Where there is little room, the measured pitch beside the note says the same.
         if is_wide && !compare.is_blind() {
             pitch_needle::needle(ui, snapshot, 150.0);
@@ -112,14 +107,15 @@ fn icon(ui: &mut Ui, icon: Icon, name: &str) -> egui::Response {
     named(response, name)
 }
 
-fn note(ui: &mut Ui, snapshot: &Snapshot, has_pitch: bool) {
+/// The note by its name in large, its other name, and the measured pitch. A click exchanges the names, in all views.
+fn note(ui: &mut Ui, kept: &mut WindowState, snapshot: &Snapshot, has_pitch: bool) {
     let c = Colours::here(ui);
-    let (rect, response) = ui.allocate_exact_size(vec2(150.0, ui.available_height()), Sense::hover());
-    let written = snapshot.written().map(|note| note_name(note.0));
-    let sounding = snapshot.written().and_then(|note| note.sounding(snapshot.instrument.transposition));
+    let (rect, response) = ui.allocate_exact_size(vec2(150.0, ui.available_height()), Sense::click());
+    let transposition = snapshot.instrument.transposition;
+    let named = |names: NoteNames| snapshot.written().and_then(|note| names.of_written(note, transposition));
     let painter = ui.painter();
     let ink = if snapshot.sounding.is_some() { c.ink } else { c.quiet };
-    let big = written.clone().unwrap_or_else(|| "\u{2013}".into());
+    let big = named(kept.names).map_or_else(|| "\u{2013}".into(), note_name);
     painter.text(
         pos2(rect.left(), rect.center().y),
         Align2::LEFT_CENTER,
@@ -128,14 +124,31 @@ fn note(ui: &mut Ui, snapshot: &Snapshot, has_pitch: bool) {
         ink,
     );
     let x = rect.left() + 62.0;
-    let below = sounding.map_or_else(String::new, |note| format!("sounds {}", note_name(note.0)));
-    painter.text(pos2(x, rect.center().y - 1.0), Align2::LEFT_BOTTOM, &below, theme::small(), c.quiet);
+    let verb = match kept.names {
+        NoteNames::Written => "sounds",
+        NoteNames::Concert => "written",
+    };
+    let other =
+        named(kept.names.other()).map_or_else(String::new, |note| format!("{verb} {}", note_name(note)));
+    let ink = if response.hovered() { c.ink } else { c.quiet };
+    painter.text(pos2(x, rect.center().y - 1.0), Align2::LEFT_BOTTOM, &other, theme::small(), ink);
     let pitch = snapshot.heard.f0_hz.map_or_else(|| "silent".into(), |hz| format!("{hz:.1} Hz"));
     let pitch = if has_pitch { pitch } else { String::new() };
     painter.text(pos2(x, rect.center().y + 1.0), Align2::LEFT_TOP, &pitch, theme::small(), c.quiet);
-    let said = format!("Written {big}, {below}, {pitch}");
-    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &said));
-    response.on_hover_text("The written note, the note that this instrument sounds, and the measured pitch");
+    let said = format!("{} {big}, {other}, {pitch}", kept.names.title());
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &said));
+    if response.clicked() {
+        kept.names = kept.names.other();
+    }
+    let about = match kept.names {
+        NoteNames::Written => {
+            "The written note, the note that this instrument sounds, and the measured pitch. Click to name notes by concert pitch everywhere."
+        }
+        NoteNames::Concert => {
+            "The sounding note (concert pitch), the note as it is written, and the measured pitch. Click to name notes as they are written everywhere."
+        }
+    };
+    response.on_hover_text(about);
 }
 
 fn undo(ui: &mut Ui, hands: &mut Hands) {

@@ -5,9 +5,9 @@ use egui::{Align2, CornerRadius, RichText, Role, Sense, Stroke, Ui, WidgetInfo, 
 use crate::editor::Action;
 use crate::editor::chart;
 use crate::editor::clarinet_drawing::{ClarinetDrawing, ruler};
-use crate::editor::controls::{Hands, choice, heading, slider, teach};
+use crate::editor::controls::{Hands, choice, heading, segments, slider, teach};
 use crate::editor::file_browser::{FileBrowser, FileKind};
-use crate::editor::header::note_name;
+use crate::editor::note_names::{NoteNames, note_name};
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
@@ -18,6 +18,7 @@ pub fn draw(
     ui: &mut Ui,
     hands: &mut Hands,
     snapshot: &Snapshot,
+    names: &mut NoteNames,
     files: &mut FileBrowser,
     actions: &mut Vec<Action>,
 ) {
@@ -27,7 +28,7 @@ pub fn draw(
         "instrument",
         &mut with,
         |ui, (hands, files, actions)| left(ui, hands, snapshot, files, actions),
-        |ui, (hands, _, _)| column(ui, hands),
+        |ui, (hands, _, _)| column(ui, hands, names),
     );
 }
 
@@ -195,7 +196,14 @@ fn facts(ui: &mut Ui, snapshot: &Snapshot) {
     ui.label(RichText::new(&file.source).font(theme::small()).color(c.quiet));
 }
 
-fn column(ui: &mut Ui, hands: &mut Hands) {
+fn column(ui: &mut Ui, hands: &mut Hands, names: &mut NoteNames) {
+    let c = Colours::here(ui);
+    ui.label(RichText::new("Names of notes").color(c.quiet));
+    let mut chosen = usize::from(*names == NoteNames::Concert);
+    let about = "As they are written for this instrument, or as they sound; in every view and on the keys.";
+    segments(ui, "Names of notes", &NoteNames::ALL.map(|names| names.title().to_owned()), &mut chosen)
+        .on_hover_text(about);
+    *names = NoteNames::ALL[chosen];
     heading(ui, "Tuning");
     slider(ui, hands, "a4");
     choice(ui, hands, "tune");

@@ -1,4 +1,4 @@
-//! The keyboard: the range of the instrument at sounding pitch. A press lower on a key is louder.
+//! The keyboard: the range of the instrument, named by written or sounding notes. A press lower on a key is louder.
 //! Sliding from key to key slurs: the new note starts before the old one ends. With the keyboard focus, the arrow keys
 //! choose a note, and Space plays it while it is held.
 
@@ -8,7 +8,7 @@ use egui::{
 };
 
 use crate::editor::Action;
-use crate::editor::header::note_name;
+use crate::editor::note_names::{NoteNames, note_name};
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
@@ -17,7 +17,7 @@ use chalumeau_core::units::SoundingNote;
 /// Velocity of a note played with Space.
 const PLAIN: f32 = 0.75;
 
-const HELP: &str = "The keys play sounding pitches; the written note is at the top of the window. Press lower on a key to play louder; slide to slur. With the keyboard: Tab to here, choose with the arrow keys, play with Space.";
+const HELP: &str = "The keys have the names of the notes they play, written or sounding as at the top of the window. Press lower on a key to play louder; slide to slur. With the keyboard: Tab to here, choose with the arrow keys, play with Space.";
 const SILENT_KEY: &str = "The instrument does not play this note in tune, so the key is silent.";
 
 /// What the keys remember.
@@ -33,7 +33,7 @@ pub struct Keyboard {
 
 impl Keyboard {
     /// Draws the keys, and says what they play.
-    pub fn draw(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    pub fn draw(&mut self, ui: &mut Ui, names: NoteNames, snapshot: &Snapshot, actions: &mut Vec<Action>) {
         let Some((lowest, highest)) = snapshot.keys() else { return };
         // From a white key to a white key.
         let from = if is_black(lowest.0) { lowest.0.saturating_sub(1) } else { lowest.0 };
@@ -41,6 +41,7 @@ impl Keyboard {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
         let keys = Keys::new(rect, from, to);
         let playable = |key: u8| snapshot.plays(SoundingNote(key)).is_some();
+        let transposition = snapshot.instrument.transposition;
 
         let pointer = response.interact_pointer_pos().filter(|_| response.is_pointer_button_down_on());
         let wanted = pointer.and_then(|at| keys.at(at)).filter(|(note, _)| playable(*note));
@@ -58,9 +59,12 @@ impl Keyboard {
 
         let c = Colours::here(ui);
         let focus = response.has_focus().then_some(chosen);
-        keys.paint(ui, c, snapshot.key.map(|note| note.0), self.held.map(|note| note.0), focus, playable);
+        let named = |key: u8| names.of_sounding(snapshot.plays(SoundingNote(key))?, transposition);
+        let down = [snapshot.key, self.held].map(|key| key.map(|note| note.0));
+        keys.paint(ui, c, down, focus, named);
         response.widget_info(|| {
-            WidgetInfo::labeled(Role::Group, true, format!("Keyboard, {}", note_name(chosen)))
+            let name = named(chosen).map_or_else(|| "silent key".to_owned(), note_name);
+            WidgetInfo::labeled(Role::Group, true, format!("Keyboard, {name}"))
         });
         // A user who plays needs no tool tip.
         if self.held.is_none() {
@@ -167,24 +171,24 @@ impl Keys {
         Some((note, 0.35 + 0.65 * down))
     }
 
+    /// Paints them; `named` gives the note that a key is named by, `None` for a silent one.
     fn paint(
         &self,
         ui: &Ui,
         c: &Colours,
-        sounding: Option<u8>,
-        held: Option<u8>,
+        down: [Option<u8>; 2],
         focus: Option<u8>,
-        playable: impl Fn(u8) -> bool,
+        named: impl Fn(u8) -> Option<u8>,
     ) {
         let painter = ui.painter_at(self.rect);
         for black in [false, true] {
             for note in (self.from..=self.to).filter(|&note| is_black(note) == black) {
                 let key = self.key(note);
                 let plain = if black { c.ebony } else { c.ivory };
-                let is_down = sounding == Some(note) || held == Some(note);
+                let (is_down, name) = (down.contains(&Some(note)), named(note));
                 let fill = if is_down {
                     c.breath
-                } else if playable(note) {
+                } else if name.is_some() {
                     plain
                 } else {
                     plain.lerp_to_gamma(c.ground, 0.5)
@@ -205,12 +209,13 @@ impl Keys {
                         egui::StrokeKind::Inside,
                     );
                 }
-                if note % 12 == 0 || (is_down && !black) {
-                    let ink = if is_down { c.on_accent } else { Color32::from_gray(110) };
+                if let Some(name) = name.filter(|name| name % 12 == 0 || is_down) {
+                    let grey = Color32::from_gray(if black { 190 } else { 110 });
+                    let ink = if is_down { c.on_accent } else { grey };
                     painter.text(
                         key.center_bottom() - vec2(0.0, 3.0),
                         Align2::CENTER_BOTTOM,
-                        note_name(note),
+                        note_name(name),
                         theme::small(),
                         ink,
                     );

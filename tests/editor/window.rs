@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
+use chalumeau::editor::note_names::NoteNames;
 use chalumeau::editor::{Action, FeelTest, Tab};
 use chalumeau_core::units::SoundingNote;
 use egui::accesskit::Role;
@@ -504,4 +505,22 @@ fn rubbish_in_a_snapshot_does_no_harm() {
             window.harness.run();
         }
     }
+}
+
+#[test]
+fn notes_are_named_as_written_or_as_they_sound_in_every_view() {
+    let mut window = Window::tall(Tab::Clarinet);
+    let label = |window: &Window, contains: &str| window.harness.query_by_label_contains(contains).is_some();
+    assert!(label(&window, "Written C4, sounds Bb3") && label(&window, "Keyboard, "));
+    assert!(label(&window, "Fingering E3") && !label(&window, "Fingering D3"));
+    window.harness.get_by_label_contains("Written C4").click();
+    window.harness.run();
+    assert!(label(&window, "Concert Bb3, written C4"));
+    assert!(label(&window, "Fingering D3"), "the lowest fingering has its sounding name");
+    assert_eq!(window.harness.state().kept.names, NoteNames::Concert);
+    // The instrument's view has the same choice.
+    let mut window = Window::tall(Tab::Instrument);
+    click(&mut window, "Names of notes: Concert");
+    assert_eq!(window.harness.state().kept.names, NoteNames::Concert);
+    assert!(label(&window, "Concert Bb3, written C4"));
 }
