@@ -551,3 +551,61 @@ fn voice_info_is_one_voice_with_overlapping_notes() {
     assert_eq!((info.voice_count, info.voice_capacity), (1, 1));
     assert!(info.flags.contains(VoiceInfoFlags::SUPPORTS_OVERLAPPING_NOTES));
 }
+
+/// Anything that a host may say of notes and controllers, on sixteen channels, by MIDI and by notes with ids.
+fn any_event(random: &mut fastrand::Rng) -> Say {
+    let (channel, key) = (random.u8(0..16), random.u8(0..128));
+    let named = |random: &mut fastrand::Rng| NoteName {
+        id: random.bool().then(|| random.u32(0..64)),
+        channel: random.bool().then_some(u16::from(channel)),
+        key: random.bool().then_some(u16::from(key)),
+    };
+    match random.u8(0..12) {
+        0 => Say::Midi([0x90 | channel, key, random.u8(0..128)]),
+        1 => Say::Midi([0x80 | channel, key, 0]),
+        2 | 3 => Say::Midi([0xb0 | channel, random.u8(0..128), random.u8(0..128)]),
+        4 => Say::Midi([0xe0 | channel, random.u8(0..128), random.u8(0..128)]),
+        5 => Say::Midi([0xd0 | channel, random.u8(0..128), 0]),
+        6 => Say::Midi([0xa0 | channel, key, random.u8(0..128)]),
+        7 | 8 => Say::Strike(name(random.u32(0..64), u16::from(channel), u16::from(key)), random.f64()),
+        9 => Say::Release(named(random)),
+        10 => Say::Choke(named(random)),
+        _ => {
+            let which = [
+                NoteExpressionType::Tuning,
+                NoteExpressionType::Pressure,
+                NoteExpressionType::Volume,
+                NoteExpressionType::Pan,
+                NoteExpressionType::Brightness,
+                NoteExpressionType::Expression,
+                NoteExpressionType::Vibrato,
+            ];
+            Say::ExpressNotes(named(random), which[random.usize(0..which.len())], 4.0 * random.f64() - 1.0)
+        }
+    }
+}
+
+#[test]
+fn a_million_events_leave_no_stuck_note() {
+    const EVENTS: usize = 1_000_000;
+    /// Samples from one event to the next.
+    const APART: usize = 4;
+    const PART: usize = 50_000;
+    let path = chalumeau_test_host::artefacts::clap().unwrap();
+    let mut plugin = Plugin::load(&path).unwrap();
+    let mut session = plugin.activate(RATE, 256).unwrap();
+    let mut random = fastrand::Rng::with_seed(11);
+    let is_fine = |heard: &[Vec<f32>; 2]| heard.iter().flatten().all(|x| x.abs() <= 1.0);
+    for part in 0..EVENTS / PART {
+        let said: Vec<At> = (0..PART).map(|n| At(n * APART, any_event(&mut random))).collect();
+        assert!(is_fine(&session.play(&said, PART * APART).unwrap()), "part {part}");
+    }
+    let mut said: Vec<At> = (0..16).map(|channel| At(0, Say::Midi([0xb0 | channel, 123, 0]))).collect();
+    said.push(At(0, Say::Release(ANY)));
+    let fading = session.play(&said, LISTEN * 2).unwrap();
+    assert!(is_fine(&fading));
+    let rest = session.play(&[], 4_800).unwrap();
+    let loudest = rest.iter().flatten().fold(0.0_f32, |most, x| most.max(x.abs()));
+    assert!(loudest < 1e-6, "{loudest} is left");
+    plugin.deactivate(session);
+}

@@ -299,3 +299,45 @@ fn event(status: u8, a: u8, b: u8) -> Option<MidiEvent> {
         _ => return None,
     })
 }
+
+#[test]
+fn a_million_events_on_sixteen_channels_leave_no_stuck_note() {
+    const EVENTS: usize = 1_000_000;
+    const BLOCK: usize = 256;
+    /// Events of a block.
+    const AT_ONCE: usize = 64;
+    let mut loaded = load(BLOCK);
+    loaded.plugin.start_processing().unwrap();
+    let mut random = fastrand::Rng::with_seed(12);
+    for block in 0..EVENTS / AT_ONCE {
+        for n in 0..AT_ONCE {
+            let channel = MidiChannel::from_index(random.u8(0..16)).unwrap();
+            let (note, value) = (random.u8(0..128), random.u8(0..128));
+            let event = match random.u8(0..6) {
+                0 | 1 => MidiEvent::NoteOn { channel, note, velocity: value },
+                2 => MidiEvent::NoteOff { channel, note, velocity: 0 },
+                3 => MidiEvent::ControlChange { channel, controller: note, value },
+                4 => MidiEvent::PitchBend { channel, value: random.u16(0..16_384) },
+                _ => MidiEvent::ChannelAftertouch { channel, pressure: value },
+            };
+            loaded.plugin.send_midi_event_at(event, (n * BLOCK / AT_ONCE) as i32).unwrap();
+        }
+        let mut buffers = AudioBuffers::new(0, 2, BLOCK, RATE);
+        loaded.plugin.process_audio(&mut buffers).unwrap();
+        assert!(buffers.outputs.iter().flatten().all(|x| x.abs() <= 1.0), "block {block}");
+    }
+    for index in 0..16 {
+        let channel = MidiChannel::from_index(index).unwrap();
+        let off = MidiEvent::ControlChange { channel, controller: 123, value: 0 };
+        loaded.plugin.send_midi_event_at(off, 0).unwrap();
+    }
+    let mut rest = 0.0_f32;
+    for block in 0..4 * SECOND / BLOCK {
+        let mut buffers = AudioBuffers::new(0, 2, BLOCK, RATE);
+        loaded.plugin.process_audio(&mut buffers).unwrap();
+        if block > 3 * SECOND / BLOCK {
+            rest = buffers.outputs.iter().flatten().fold(rest, |most, x| most.max(x.abs()));
+        }
+    }
+    assert!(rest < 1e-6, "{rest} is left");
+}
