@@ -1,4 +1,4 @@
-//! New settings of lip and reed, reached in a little time, as a player's lip moves: at once they would click.
+//! New settings of lip, reed and register vent, reached in a little time, as a player's lip moves: at once they would click.
 //!
 //! A step of the reed's law is a step of the flow, and what is heard of a flow is its slope. While nothing sounds, new
 //! settings hold at once.
@@ -8,14 +8,14 @@ use super::step_towards;
 use crate::instrument::settings::Settings;
 use crate::reed::law::coupled_k;
 
-/// Numbers that shape the reed: strength, lip, zeta, damping, lay, H, k and A.
-const NUMBERS: usize = 8;
+/// Numbers that shape reed and flow: strength, lip, zeta, damping, lay, H, k, A, and the loss of open holes.
+const NUMBERS: usize = 9;
 /// A number counts as arrived when it is this near to its target, as a share of it: 0.001 dB of flow. Targets below
 /// [`SMALL`], as a sharp lay's 0, count as that.
 const ARRIVED: f32 = 1e-4;
 const SMALL: f32 = 0.1;
 
-/// The reed's numbers on their way to those of the [`Settings`].
+/// The numbers on their way to those of the [`Settings`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ReedGlide {
     /// `None` once they have arrived.
@@ -25,8 +25,8 @@ pub struct ReedGlide {
 /// The numbers of settings; k as it is played.
 fn numbers(settings: &Settings) -> [f32; NUMBERS] {
     let k = if settings.coupled { coupled_k(f64::from(settings.reed_h)) as f32 } else { settings.reed_k };
-    let Settings { strength, lip, zeta, damping, lay, reed_h, reed_a, .. } = *settings;
-    [strength, lip, zeta, damping, lay, reed_h, k, reed_a]
+    let Settings { strength, lip, zeta, damping, lay, reed_h, reed_a, vent_loss, .. } = *settings;
+    [strength, lip, zeta, damping, lay, reed_h, k, reed_a, vent_loss]
 }
 
 impl ReedGlide {
@@ -58,10 +58,12 @@ impl ReedGlide {
 
     /// The settings with the reed as it is now.
     pub fn over(&self, settings: Settings) -> Settings {
-        let Some([strength, lip, zeta, damping, lay, reed_h, reed_k, reed_a]) = self.under_way else {
+        let Some([strength, lip, zeta, damping, lay, reed_h, reed_k, reed_a, vent_loss]) = self.under_way
+        else {
             return settings;
         };
-        Settings { strength, lip, zeta, damping, lay, reed_h, reed_k, coupled: false, reed_a, ..settings }
+        let coupled = false;
+        Settings { strength, lip, zeta, damping, lay, reed_h, reed_k, coupled, reed_a, vent_loss, ..settings }
     }
 }
 
