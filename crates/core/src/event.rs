@@ -37,6 +37,8 @@ pub enum Event {
     },
     /// Breath from any source, 0..=1 of the full-scale mouth pressure (`Settings::breath_full_kpa`). The first one makes breath *live*.
     Breath(f32),
+    /// The velocity of keys sets the breath again, until the next [`Breath`](Self::Breath).
+    BreathFromKeys,
     /// Pitch bend, cents; two octaves at most. Near the note by the lip, beyond by the bore's size, see
     /// [`bend`](crate::instrument::bend).
     Bend {

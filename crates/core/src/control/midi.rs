@@ -37,7 +37,7 @@ use crate::control::keys::Keys;
 use crate::control::notes::{HeldNote, Note, NoteAddress, NoteExpression, Notes};
 use crate::event::Event;
 use crate::units::SoundingNote;
-use breath::{BreathChoice, BreathController};
+use breath::{BreathChoice, BreathController, BreathFrom};
 use links::{Link, Links, Source};
 use mix::{Mix, MixControllers};
 use said::Said;
@@ -167,6 +167,17 @@ impl MidiDecoder {
         self.begin();
         self.techniques.wheel = wheel;
         self.say_techniques();
+        self.said.events()
+    }
+
+    /// Which controllers may blow. Another choice than before begins anew: keys blow until a controller moves. Breath that belongs
+    /// to notes, and controllers that are linked to the breath, are not asked. Real-time safe.
+    pub fn set_breath_from(&mut self, from: BreathFrom) -> &[Event] {
+        self.begin();
+        if self.breath.set_from(from) {
+            self.origin = None;
+            self.said.push(Event::BreathFromKeys);
+        }
         self.said.events()
     }
 

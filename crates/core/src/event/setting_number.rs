@@ -16,6 +16,8 @@ pub enum SettingNumber {
     BreathSoftest,
     /// `breath_loudest`.
     BreathLoudest,
+    /// `breath_deadband`.
+    BreathDeadband,
     /// `strength`.
     Strength,
     /// `lip`.

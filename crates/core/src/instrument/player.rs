@@ -224,7 +224,8 @@ impl Player {
             Event::NoteOn { note, velocity } => self.note_on(note, velocity, model, voice),
             Event::NoteOff { note } => self.note_off(note, model, voice),
             Event::Choke { note } => self.choke(note, model, voice),
-            Event::Breath(level) => self.breath.set_level(level),
+            Event::Breath(level) => self.breath.set_level(level, self.settings.breath_deadband),
+            Event::BreathFromKeys => self.breath.forget_source(),
             Event::Bend { cents } => {
                 self.bend_cents =
                     f64::from(if cents.is_finite() { cents.clamp(-BEND_CENTS, BEND_CENTS) } else { 0.0 });

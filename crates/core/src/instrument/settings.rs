@@ -61,6 +61,8 @@ pub struct Settings {
     pub breath_softest: f32,
     /// Breath that plays fortissimo where the response is played, 0.1..=1, and at least 0.05 above the softest. Default 1.
     pub breath_loudest: f32,
+    /// Width of the band of breath within which a restless source moves nothing, 0..=0.1. Default 0.
+    pub breath_deadband: f32,
     /// Mouth pressure at full breath where the response is physical, kPa, 2..=20. Default 6, the reference reed's closing
     /// pressure.
     pub breath_full_kpa: f32,
@@ -132,6 +134,7 @@ impl Default for Settings {
             breath_curve: 1.0,
             breath_softest: ONSET as f32,
             breath_loudest: 1.0,
+            breath_deadband: 0.0,
             breath_full_kpa: 6.0,
             noise: 0.3,
             tongue_ms: 2.0,
@@ -204,6 +207,7 @@ impl Settings {
             SettingNumber::BreathCurve => &mut self.breath_curve,
             SettingNumber::BreathSoftest => &mut self.breath_softest,
             SettingNumber::BreathLoudest => &mut self.breath_loudest,
+            SettingNumber::BreathDeadband => &mut self.breath_deadband,
             SettingNumber::Strength => &mut self.strength,
             SettingNumber::Lip => &mut self.lip,
             SettingNumber::Zeta => &mut self.zeta,
@@ -344,6 +348,7 @@ impl Settings {
             breath_softest,
             breath_loudest: fix(self.breath_loudest, 0.1, 1.0, d.breath_loudest)
                 .max(breath_softest + LEAST_BREATH_RANGE),
+            breath_deadband: fix(self.breath_deadband, 0.0, 0.1, d.breath_deadband),
             breath_full_kpa: fix(self.breath_full_kpa, 2.0, 20.0, d.breath_full_kpa),
             noise: fix(self.noise, 0.0, 1.0, d.noise),
             tongue_ms: fix(self.tongue_ms, 1.0, 20.0, d.tongue_ms),

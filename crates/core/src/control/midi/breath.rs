@@ -35,6 +35,28 @@ impl BreathController {
     }
 }
 
+/// Which controllers may blow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BreathFrom {
+    /// Any, the strongest claim first.
+    #[default]
+    Any,
+    /// This one.
+    Only(BreathController),
+    /// None: the velocity of keys blows.
+    Keys,
+}
+
+impl BreathFrom {
+    fn allows(self, controller: BreathController) -> bool {
+        match self {
+            Self::Any => true,
+            Self::Only(only) => only == controller,
+            Self::Keys => false,
+        }
+    }
+}
+
 /// A controller with a coarse and, on some devices, a fine part.
 #[derive(Clone, Copy, Debug, Default)]
 struct Fader {
@@ -80,9 +102,19 @@ pub struct BreathChoice {
     claims: [[Claim; BreathController::ALL.len()]; 16],
     heard: Option<BreathController>,
     messages: u64,
+    from: BreathFrom,
 }
 
 impl BreathChoice {
+    /// Which controllers may blow from now on; none is heard until it moves. Whether that is another choice.
+    pub fn set_from(&mut self, from: BreathFrom) -> bool {
+        if self.from == from {
+            return false;
+        }
+        *self = Self { from, ..Self::default() };
+        true
+    }
+
     /// The controller that is heard, if any has counted yet.
     pub fn heard(&self) -> Option<BreathController> {
         self.heard
@@ -98,6 +130,9 @@ impl BreathChoice {
         place: Place,
         is_held: bool,
     ) -> Option<f32> {
+        if !self.from.allows(controller) {
+            return None;
+        }
         self.messages += 1;
         let is_snapshot = matches!(place, Place::Recognised | Place::Within);
         let claim = &mut self.claims[channel][controller as usize];

@@ -488,6 +488,27 @@ fn volume_and_pan_follow_their_formulas() {
     assert_eq!(midi.express(id(1), NoteExpression::Pan(1.0)), [Event::Pan { position: 0.0 }], "they add");
 }
 
+#[test]
+fn only_the_chosen_controller_blows_and_keys_blow_again_when_none_may() {
+    use super::breath::BreathFrom;
+    let mut midi = MidiDecoder::new();
+    let blown = |midi: &mut MidiDecoder, cc: u8, value: u8| {
+        midi.controller(0, cc, value).iter().any(|event| matches!(event, Event::Breath(_)))
+    };
+    midi.note_on(0, 60, 127);
+    assert!(blown(&mut midi, 11, 50) && blown(&mut midi, 2, 60));
+    let only = BreathFrom::Only(BreathController::Expression);
+    assert_eq!(midi.set_breath_from(only), [Event::BreathFromKeys]);
+    assert_eq!(midi.set_breath_from(only), NOTHING, "the same again");
+    assert!(!blown(&mut midi, 2, 70) && !blown(&mut midi, 2, 80), "the stronger one is not asked");
+    assert!(blown(&mut midi, 11, 70));
+    assert_eq!(midi.set_breath_from(BreathFrom::Keys), [Event::BreathFromKeys]);
+    assert!(!blown(&mut midi, 11, 80) && !blown(&mut midi, 2, 90) && midi.pressure(0, 90).is_empty());
+    assert_eq!(midi.breath_origin(), None);
+    assert_eq!(midi.set_breath_from(BreathFrom::Any), [Event::BreathFromKeys]);
+    assert!(blown(&mut midi, 2, 91));
+}
+
 mod linked {
     use super::*;
     use crate::control::midi::links::{Link, MOST, Source, Target};

@@ -52,10 +52,18 @@ pub struct Breath {
 }
 
 impl Breath {
-    /// A breath event, 0..=1 of full breath; not a number counts as 0.
-    pub fn set_level(&mut self, level: f32) {
+    /// A breath event, 0..=1 of full breath; not a number counts as 0. The breath follows one that leaves a band of half the
+    /// width `deadband`, at its edge: what a restless sensor does within the band is not heard. Rest is rest.
+    pub fn set_level(&mut self, level: f32, deadband: f32) {
         self.live = true;
-        self.level = f64::from(if level.is_finite() { level.clamp(0.0, 1.0) } else { 0.0 });
+        let level = f64::from(if level.is_finite() { level.clamp(0.0, 1.0) } else { 0.0 });
+        let half = 0.5 * f64::from(deadband);
+        self.level = if level > 0.0 { self.level.clamp(level - half, level + half) } else { 0.0 };
+    }
+
+    /// Velocity sets the breath again, until the next breath event.
+    pub fn forget_source(&mut self) {
+        (self.live, self.level) = (false, 0.0);
     }
 
     /// The velocity of a new key, 0..=1; not a number counts as 0.5.
@@ -133,5 +141,39 @@ impl Breath {
         if target == 0.0 && self.gamma < NO_BREATH {
             self.gamma = 0.0;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_restless_within_the_deadband_is_still() {
+        let mut breath = Breath::default();
+        breath.set_level(0.52, 0.04);
+        let still = breath.level;
+        for restless in [0.51, 0.485, 0.5, 0.515] {
+            breath.set_level(restless, 0.04);
+            assert_eq!(breath.level, still, "{restless}");
+        }
+        breath.set_level(0.6, 0.04);
+        assert!((breath.level - 0.58).abs() < 1e-6, "it follows at the edge of the band");
+        breath.set_level(0.0, 0.04);
+        assert_eq!(breath.level, 0.0, "rest is rest");
+        for level in [0.1, 0.7, 1.0] {
+            breath.set_level(level, 0.0);
+            assert_eq!(breath.level, f64::from(level), "without a band");
+        }
+    }
+
+    #[test]
+    fn velocity_blows_again_once_the_source_is_forgotten() {
+        let mut breath = Breath::default();
+        breath.set_velocity(0.7);
+        breath.set_level(0.0, 0.0);
+        assert_eq!(breath.asked(true), Asked::Level(0.0));
+        breath.forget_source();
+        assert_eq!(breath.asked(true), Asked::Velocity(f64::from(0.7_f32)));
     }
 }
