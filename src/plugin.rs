@@ -258,6 +258,7 @@ impl Chalumeau {
         let panic = if self.params.moments.take(Moment::Panic) { Some(inputs.silence()) } else { None };
         let drives = [self.params.knob.h_source.value(), self.params.knob.k_source.value()];
         let wheel = inputs.wheel(self.params.expression.wheel.value().into(), drives);
+        let from = inputs.breath_from(self.params.breath.from.value().into());
         let breath = self.moved.breath(&self.params);
         let bend_range = inputs.bend_range(self.params.instrument.bend_range.value());
         let keys = self.window.as_mut().map(|(_, window)| window.keys()).unwrap_or_default();
@@ -272,7 +273,7 @@ impl Chalumeau {
         let links = &self.params.links;
         let played = std::iter::from_fn(|| inputs.next(|| context.next_event(), api, drives, links));
         let at_once =
-            panic.into_iter().flatten().chain([breath, bend_range]).chain(wheel).chain(keys).flatten();
+            panic.into_iter().flatten().chain([from, breath, bend_range]).chain(wheel).chain(keys).flatten();
         let events = at_once.chain(played);
         #[cfg(feature = "devices")]
         if let Some((_, audio)) = &mut self.knob {

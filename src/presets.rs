@@ -16,6 +16,7 @@ mod shelf;
 pub mod user_folder;
 
 use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::control::midi::breath::BreathFrom;
 use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::reed::PhysicalReed;
@@ -122,6 +123,14 @@ impl Preset {
         match parameters::find("wheel").map(|parameter| self.value(parameter)) {
             Some(Value::Choice(index)) => Wheel::ALL.get(index).copied().unwrap_or_default(),
             _ => Wheel::default(),
+        }
+    }
+
+    /// Which controller blows.
+    pub fn breath_from(&self) -> BreathFrom {
+        match parameters::find("bfrom").map(|parameter| self.value(parameter)) {
+            Some(Value::Choice(index)) => BreathFrom::ALL.get(index).copied().unwrap_or_default(),
+            _ => BreathFrom::default(),
         }
     }
 

@@ -261,6 +261,7 @@ impl ScoreArgs {
                 // Nothing sounds yet, so this bends nothing.
                 decoder.usual_bend_range(preset.bend_range());
                 decoder.set_wheel(preset.wheel());
+                decoder.set_breath_from(preset.breath_from());
             }
             let score = midi_file::read_as(decoder, &bytes, self.rate)
                 .map_err(|source| Failure::MidiFile { path: path.clone(), source })?;

@@ -59,6 +59,7 @@ impl BreathView {
 
     fn column(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
         heading(ui, "Breath sources");
+        choice(ui, hands, "bfrom");
         let mut has_knob = false;
         for source in &snapshot.sources {
             let range = self.ranges.iter().find(|(name, ..)| *name == source.name);
@@ -83,7 +84,7 @@ impl BreathView {
         if hands.step("resp") == PLAYED {
             self.calibrate_breath(ui, hands, snapshot);
         }
-        for id in ["bsoft", "bloud", "full", "curve"] {
+        for id in ["bsoft", "bloud", "bdead", "full", "curve"] {
             slider(ui, hands, id);
         }
         heading(ui, "Articulation");

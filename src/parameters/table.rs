@@ -207,6 +207,31 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Number(SettingNumber::BreathLoudest))
         .flag("--breath-loudest"),
+    entry(
+        "bfrom",
+        BREATH,
+        "Breath from",
+        choice(&[("any", "Any"), ("cc2", "CC2"), ("cc11", "CC11"), ("press", "Pressure"), ("keys", "Keys")]),
+    )
+    .help(
+        "Which controller blows",
+        "Any: the first that moves; CC2 is stronger than CC11, and CC11 than channel pressure. Keys: the velocity, whatever controllers do. Automation of *Breath*, note expressions, linked controllers and the knob blow in any case.",
+        "",
+    ),
+    entry("bdead", BREATH, "Breath deadband", Kind::Number(Number {
+        min: 0.0,
+        max: 0.1,
+        default: 0.0,
+        digits: 1,
+        unit: " %",
+        scale: 100.0,
+    }))
+        .help(
+            "Width of the band of breath within which a restless controller moves nothing",
+            "Widen it if a held note trembles although you blow steadily.",
+            "",
+        )
+        .sets(Sets::Number(SettingNumber::BreathDeadband)),
     entry("stren", EMBOUCHURE, "Reed strength", number([1.5, 5.0], 2.5, 2, ""))
         .help(
             "Reed strength as printed on the box; 2.5 closes at 6 kPa",

@@ -15,6 +15,8 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
     ("bcurve", "Breath", "Breath curve", "1.00", true),
     ("bsoft", "Breath", "Softest breath", "3.1 %", true),
     ("bloud", "Breath", "Loudest breath", "100.0 %", true),
+    ("bfrom", "Breath", "Breath from", "Any", true),
+    ("bdead", "Breath", "Breath deadband", "0.0 %", true),
     ("stren", "Embouchure", "Reed strength", "2.50", true),
     ("lip", "Embouchure", "Lip opening", "1.000 x", true),
     ("zeta", "Embouchure", "Embouchure", "0.300", true),
@@ -103,6 +105,7 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
 /// Ids of choices in saved states. Append only.
 const FROZEN_CHOICES: &[(&str, &[&str])] = &[
     ("resp", &["play", "phys"]),
+    ("bfrom", &["any", "cc2", "cc11", "press", "keys"]),
     ("tune", &["nat", "temp"]),
     ("beyond", &["silent", "octave"]),
     ("knob", &["off", "serial", "midi", "osc"]),
@@ -210,6 +213,7 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         breath_curve: _,
         breath_softest: _,
         breath_loudest: _,
+        breath_deadband: _,
         breath_full_kpa: _,
         noise: _,
         tongue_ms: _,
@@ -247,7 +251,7 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
             },
         tract: Tract { amount: _, interval_semitones: _ },
     } = d;
-    assert_eq!(fields, 49);
+    assert_eq!(fields, 50);
 }
 
 #[test]

@@ -89,6 +89,11 @@ pub struct BreathSources {
 }
 
 impl BreathSources {
+    /// No input blows now but the keys.
+    pub fn forget(&mut self) {
+        self.live = None;
+    }
+
     /// Records a host's event. Whether it is breath the decoder says.
     pub fn record<S>(&mut self, event: &NoteEvent<S>) {
         match BreathInput::of(event) {

@@ -7,6 +7,7 @@ use super::params::knob::ReedSource;
 use super::reed_controllers::ReedControllers;
 use super::translate_events::{EventTranslator, expression, raw7, untangled};
 use crate::controllers::ControllerLinks;
+use chalumeau_core::control::midi::breath::BreathFrom;
 use chalumeau_core::control::midi::links::{Link, MOST, Source};
 use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::control::notes::Note;
@@ -177,6 +178,15 @@ impl HostInputs {
     /// Sets how far the wheel bends until RPN 0 says otherwise, semitones. Returns at most one event.
     pub fn bend_range(&mut self, semitones: i32) -> Option<Timed<Event>> {
         self.translator.bend_range(semitones).first().map(|&event| Timed { at: 0, event })
+    }
+
+    /// Says which controller blows. Returns at most one event.
+    pub fn breath_from(&mut self, from: BreathFrom) -> Option<Timed<Event>> {
+        let event = self.translator.breath_from(from).first().copied();
+        if event.is_some() {
+            self.breath_sources.forget();
+        }
+        event.map(|event| Timed { at: 0, event })
     }
 
     /// Says what the mod wheel does: nothing where it `drives` the reed.

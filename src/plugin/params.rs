@@ -15,6 +15,7 @@ use crate::editor::WindowState;
 use crate::parameters::{InUse, Number, Value};
 use crate::plugin::host_link::HostLink;
 use crate::presets::Preset;
+use chalumeau_core::control::midi::breath::BreathFrom;
 use chalumeau_core::instrument::{Beyond, BreathResponse, Reach, Settings, Tuning};
 
 mod entry;
@@ -134,6 +135,12 @@ pub struct BreathParams {
     /// [`Settings::breath_loudest`].
     #[id = "bloud"]
     pub loudest: FloatParam,
+    /// Which controller blows.
+    #[id = "bfrom"]
+    pub from: EnumParam<BreathFromChoice>,
+    /// [`Settings::breath_deadband`].
+    #[id = "bdead"]
+    pub deadband: FloatParam,
 }
 
 /// Lip and reed as a player names them.
@@ -303,6 +310,37 @@ impl From<ResponseChoice> for BreathResponse {
     }
 }
 
+/// Which controller blows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Enum)]
+pub enum BreathFromChoice {
+    /// [`BreathFrom::Any`].
+    #[id = "any"]
+    #[name = "Any"]
+    Any,
+    /// The breath controller.
+    #[id = "cc2"]
+    #[name = "CC2"]
+    Breath,
+    /// Expression.
+    #[id = "cc11"]
+    #[name = "CC11"]
+    Expression,
+    /// Channel pressure.
+    #[id = "press"]
+    #[name = "Pressure"]
+    Pressure,
+    /// [`BreathFrom::Keys`].
+    #[id = "keys"]
+    #[name = "Keys"]
+    Keys,
+}
+
+impl From<BreathFromChoice> for BreathFrom {
+    fn from(choice: BreathFromChoice) -> Self {
+        Self::ALL[choice as usize]
+    }
+}
+
 impl Default for ChalumeauParams {
     fn default() -> Self {
         Self::new(&state::starting)
@@ -339,6 +377,8 @@ impl ChalumeauParams {
                 curve: number("bcurve"),
                 softest: number("bsoft"),
                 loudest: number("bloud"),
+                from: choice("bfrom", BreathFromChoice::Any),
+                deadband: number("bdead"),
             },
             embouchure: EmbouchureParams {
                 strength: number("stren"),
@@ -425,6 +465,7 @@ impl ChalumeauParams {
             breath_curve: settled(&breath.curve),
             breath_softest: settled(&breath.softest),
             breath_loudest: settled(&breath.loudest),
+            breath_deadband: settled(&breath.deadband),
             breath_full_kpa: settled(&breath.full),
             noise: settled(&noise.noise),
             tongue_ms: settled(&breath.tongue),

@@ -9,6 +9,7 @@
 use nice_plug::midi::{Channel, Key, VoiceID};
 use nice_plug::prelude::*;
 
+use chalumeau_core::control::midi::breath::BreathFrom;
 use chalumeau_core::control::midi::links::{Link, Links, MOST};
 use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::control::midi::{BreathOrigin, MidiDecoder};
@@ -53,6 +54,11 @@ impl EventTranslator {
     /// Sets how far the wheel bends until RPN 0 says otherwise, semitones.
     pub fn bend_range(&mut self, semitones: i32) -> &[Event] {
         self.midi.usual_bend_range(semitones.clamp(0, 127) as u8)
+    }
+
+    /// Sets which controller blows. Returns at most one event.
+    pub fn breath_from(&mut self, from: BreathFrom) -> &[Event] {
+        self.midi.set_breath_from(from)
     }
 
     /// Sets what the mod wheel does.

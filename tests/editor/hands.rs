@@ -16,9 +16,9 @@ const SLIDERS: &[(Tab, &[&str])] = &[
     (
         Tab::Breath,
         &[
-            "breath", "bcurve", "bsoft", "bloud", "full", "curve", "tongue", "legato", "gliss", "noise",
-            "life", "vib", "vibhz", "vibon", "vibun", "growl", "growli", "growlf", "flut", "fluthz", "subt",
-            "tract", "tractp",
+            "breath", "bcurve", "bsoft", "bloud", "bdead", "full", "curve", "tongue", "legato", "gliss",
+            "noise", "life", "vib", "vibhz", "vibon", "vibun", "growl", "growli", "growlf", "flut", "fluthz",
+            "subt", "tract", "tractp",
         ],
     ),
     (Tab::Sound, &["a4", "noise", "zeta", "lay", "vent", "gain", "room", "rsize", "rdecay", "rtone"]),
@@ -39,7 +39,7 @@ const STUDY_SWITCHES: &[&str] = &["rec", "replay", "study"];
 const STUDY_CHOICES: &[&str] = &["side"];
 const CHOICES: &[(Tab, &[&str])] = &[
     (Tab::Reed, &["rface", "hsrc", "ksrc"]),
-    (Tab::Breath, &["resp", "attack", "wheel", "growlp"]),
+    (Tab::Breath, &["bfrom", "resp", "attack", "wheel", "growlp"]),
     (Tab::Sound, &["tune", "heard"]),
     (Tab::Knob, &["knob", "law", "order"]),
     (Tab::Instrument, &["tune", "beyond", "qual"]),
@@ -67,7 +67,7 @@ const MOMENTARY: &[(Tab, &str, &str)] = &[
 #[test]
 fn every_parameter_has_a_place() {
     let host = crate::support::Fake::default();
-    assert_eq!(host.ids().len(), 91);
+    assert_eq!(host.ids().len(), 93);
     let lists = [SLIDERS, SWITCHES, CHOICES].into_iter().flatten().flat_map(|(_, ids)| ids.iter());
     let placed: Vec<&str> = lists
         .chain([STUDY_SLIDERS, STUDY_SWITCHES, STUDY_CHOICES].into_iter().flatten())

@@ -48,6 +48,15 @@ pub enum BreathFrom {
 }
 
 impl BreathFrom {
+    /// All of them.
+    pub const ALL: [Self; 5] = [
+        Self::Any,
+        Self::Only(BreathController::Breath),
+        Self::Only(BreathController::Expression),
+        Self::Only(BreathController::Pressure),
+        Self::Keys,
+    ];
+
     fn allows(self, controller: BreathController) -> bool {
         match self {
             Self::Any => true,
