@@ -17,9 +17,20 @@ Examples:
 
 /// Find fingerings: for a note, for a trill, or for two notes at once
 ///
-/// Looks through every combination of holes that the fingers can make, by the frequency-domain model. gamma_on is the mouth pressure at
-/// which the note begins over the closing pressure of the reed; evenness is the height of its resonance over the next lower one,
-/// below 0 that may sound instead. Best first.
+/// Looks through every combination of holes that the fingers can make, by the frequency-domain model. Best first.
+///
+/// Columns of a note:
+/// fingers: keys and holes that the hands press, T thumb, L left, R right;
+/// hz, cents: where it sounds, and how far that is from the note;
+/// gamma_on: the mouth pressure at which it begins, over the closing pressure of the reed;
+/// mode: which resonance of the bore it plays, 1 the lowest;
+/// evenness_db: how far that resonance stands above the next lower one; below 0 the lower one may sound instead;
+/// cost: what the ranking goes by, less is better: cents, gamma_on, evenness and awkward grips together;
+/// open: holes that are open;
+/// chart: whether the instrument's file has this fingering for the note.
+///
+/// --trill-to has these columns for both notes, and moves: how many fingers move. --multiphonic has low_hz and high_hz, the two
+/// resonances, and uneven_db, the difference of their heights.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct FingeringsCommand {

@@ -26,7 +26,7 @@ const MACROS: [Macro; 10] = [
     Macro { id: "bcurve", name: "Breath", ends: "early to late" },
     Macro { id: "lip", name: "Lip", ends: "firm to loose" },
     Macro { id: "stren", name: "Reed", ends: "soft to hard" },
-    Macro { id: "tongue", name: "Attack", ends: "hard to soft" },
+    Macro { id: "tongue", name: "Tongue", ends: "hard to soft" },
     Macro { id: "lay", name: "Colour", ends: "bright to mellow" },
     Macro { id: "vib", name: "Vibrato", ends: "none to deep" },
     Macro { id: "growl", name: "Growl", ends: "none to rough" },
