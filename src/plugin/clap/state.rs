@@ -2,6 +2,8 @@
 //!
 //! The framework writes eight bytes of length and then JSON. *Arm knob* and *Record take* may be on while a project is saved,
 //! but no loaded state ever has them on: they are written as Off, so that a state that is loaded and saved is the same.
+//! A checksum stands beside them: a state that was damaged on its way is refused as a whole, and the instrument stays as it is. A
+//! state without one, written by hand or by an earlier version, is read as it stands.
 //! A project, a duplicate and a preset of the host are one state: it has nothing that would belong to one of them alone.
 
 use std::ffi::c_void;
@@ -10,6 +12,7 @@ use clap_sys::ext::state::{CLAP_EXT_STATE, clap_plugin_state};
 use clap_sys::ext::state_context::{clap_plugin_state_context, clap_plugin_state_context_type};
 use clap_sys::plugin::clap_plugin;
 use clap_sys::stream::{clap_istream, clap_ostream};
+use crc::{CRC_32_ISO_HDLC, Crc};
 use nice_plug::prelude::PluginState;
 
 use super::instance::Instance;
@@ -22,6 +25,11 @@ pub static STATE_CONTEXT: clap_plugin_state_context =
 
 /// Bytes of the length that stands before the JSON.
 const LENGTH_BYTES: usize = size_of::<u64>();
+/// Field with the checksum of all the others.
+const CHECK: &str = "check";
+const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+/// Longest state that is read, bytes: a scale and links fit many times.
+const BYTES_MOST: usize = 16 << 20;
 
 impl Instance {
     fn framework_state(&self) -> Option<&clap_plugin_state> {
@@ -38,9 +46,58 @@ impl Instance {
         let mut state: PluginState =
             serde_json::from_slice(bytes.get(LENGTH_BYTES..).filter(|_| is_saved)?).ok()?;
         without_moments(&mut state);
+        let check = checksum(&mut state)?;
+        state.fields.insert(CHECK.to_owned(), check);
         let json = serde_json::to_vec(&state).ok()?;
         Some([&(json.len() as u64).to_le_bytes()[..], &json].concat())
     }
+}
+
+/// The checksum of a state without its own, which it loses.
+fn checksum(state: &mut PluginState) -> Option<String> {
+    state.fields.remove(CHECK);
+    Some(format!("{:08x}", CRC.checksum(&serde_json::to_vec(state).ok()?)))
+}
+
+/// Whether the bytes of a state are as they were written, as far as they tell.
+fn is_whole(bytes: &[u8]) -> bool {
+    let Some((length, json)) = bytes.split_first_chunk::<LENGTH_BYTES>() else { return false };
+    // Some hosts hand on more than they were given.
+    let json = usize::try_from(u64::from_le_bytes(*length)).ok().and_then(|length| json.get(..length));
+    let Ok(mut state) = serde_json::from_slice::<PluginState>(json.unwrap_or_default()) else { return false };
+    let told = state.fields.get(CHECK).cloned();
+    told.is_none_or(|told| checksum(&mut state) == Some(told))
+}
+
+/// All that a host's stream has.
+///
+/// # Safety
+/// The stream is valid for this call.
+unsafe fn read_all(stream: *const clap_istream) -> Option<Vec<u8>> {
+    // SAFETY: the caller's promise.
+    let read = unsafe { stream.as_ref()?.read? };
+    let (mut all, mut part) = (Vec::new(), [0_u8; 4_096]);
+    while all.len() < BYTES_MOST {
+        // SAFETY: the host writes at most as many bytes as the part has.
+        let count = unsafe { read(stream, part.as_mut_ptr().cast(), part.len() as u64) };
+        match usize::try_from(count) {
+            Ok(0) => return Some(all),
+            Ok(count) => all.extend_from_slice(part.get(..count)?),
+            Err(_) => return None,
+        }
+    }
+    None
+}
+
+unsafe extern "C" fn take(stream: *const clap_istream, into: *mut c_void, size: u64) -> i64 {
+    // SAFETY: the stream is the one of `load`, whose bytes nothing else uses meanwhile.
+    let Some(left) = (unsafe { (*stream).ctx.cast::<&[u8]>().as_mut() }) else { return -1 };
+    let count = left.len().min(usize::try_from(size).unwrap_or(usize::MAX));
+    let (taken, rest) = left.split_at(count);
+    // SAFETY: the framework has room for `size` bytes.
+    unsafe { std::ptr::copy_nonoverlapping(taken.as_ptr(), into.cast::<u8>(), count) };
+    *left = rest;
+    i64::try_from(count).unwrap_or(-1)
 }
 
 unsafe extern "C" fn append(stream: *const clap_ostream, bytes: *const c_void, size: u64) -> i64 {
@@ -78,14 +135,15 @@ unsafe extern "C" fn save(plugin: *const clap_plugin, stream: *const clap_ostrea
 unsafe extern "C" fn load(plugin: *const clap_plugin, stream: *const clap_istream) -> bool {
     // SAFETY: as above.
     let Some(this) = (unsafe { Instance::of(plugin) }) else { return false };
-    if stream.is_null() {
-        return false;
-    }
-    // SAFETY: as above.
+    // SAFETY: the host's stream is valid for this call, or null.
+    let Some(bytes) = (unsafe { read_all(stream) }).filter(|bytes| is_whole(bytes)) else { return false };
+    let mut left = &bytes[..];
+    let stream = clap_istream { ctx: (&raw mut left).cast::<c_void>(), read: Some(take) };
+    // SAFETY: the stream is valid for this call.
     let is_loaded = this
         .framework_state()
         .and_then(|state| state.load)
-        .is_some_and(|load| unsafe { load(plugin, stream) });
+        .is_some_and(|load| unsafe { load(plugin, &raw const stream) });
     // Other parameters may be in use; hosts load states on the main thread.
     this.look_at_params();
     this.tell_changes();
