@@ -16,7 +16,7 @@ use crate::parameters::{InUse, Number, Value};
 use crate::plugin::host_link::HostLink;
 use crate::presets::Preset;
 use chalumeau_core::control::midi::breath::BreathFrom;
-use chalumeau_core::instrument::{Beyond, BreathResponse, Reach, Settings, Tuning};
+use chalumeau_core::instrument::{Articulation, Beyond, BreathResponse, Reach, Settings, Tuning};
 
 mod entry;
 pub mod instrument;
@@ -491,6 +491,7 @@ impl ChalumeauParams {
             vibrato: self.expression.vibrato(),
             attack: self.expression.attack.value().into(),
             glissando_s: settled(&self.expression.glissando),
+            articulation: Articulation::default(),
             techniques: self.techniques.techniques(),
             tract: self.techniques.tract(),
         };

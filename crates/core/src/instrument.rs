@@ -17,6 +17,7 @@
 //! # Ok::<(), chalumeau_core::instrument::BuildError>(())
 //! ```
 
+mod articulation;
 pub mod bend;
 mod breath_noise;
 mod channels;
@@ -33,6 +34,7 @@ pub mod listening;
 pub mod model;
 mod output_level;
 mod outside;
+mod pads;
 pub mod played_note;
 pub mod player;
 pub mod prepare;
@@ -48,6 +50,7 @@ pub mod tuning_table;
 pub mod vocal_tract;
 pub mod voice;
 
+pub use articulation::Articulation;
 pub use channels::Channels;
 pub use clarinet::Clarinet;
 pub use key_pitches::{KeyPitch, KeyPitches};

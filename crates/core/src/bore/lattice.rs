@@ -280,6 +280,15 @@ impl<F: Real> Lattice<F> {
         self.moved = true;
     }
 
+    /// Pushes air into the chimney of a hole: a volume flow during one sample. The chimney's spring holds what has been pushed until
+    /// it flows on. Real-time safe.
+    pub fn push(&mut self, hole: usize, flow: f64) {
+        let (chunk, lane) = self.hole_lanes[hole];
+        let state = &mut self.holes[chunk].compliance[lane];
+        // By the trapezoidal rule a flow acts half in the sample before and half in this one.
+        *state = *state - F::of(2.0 * flow);
+    }
+
     /// Opening of a hole now, 0 closed ..= 1 open.
     pub fn opening(&self, hole: usize) -> f64 {
         let (chunk, lane) = self.hole_lanes[hole];

@@ -72,6 +72,18 @@ pub enum SettingNumber {
     VibratoUnevenness,
     /// `glissando_s`.
     GlissandoS,
+    /// `articulation.scoop_cents`.
+    ScoopCents,
+    /// `articulation.scoop_s`.
+    ScoopS,
+    /// `articulation.fall_cents`.
+    FallCents,
+    /// `articulation.fall_s`.
+    FallS,
+    /// `articulation.breath_in`.
+    BreathIn,
+    /// `articulation.key_sounds`.
+    KeySounds,
     /// `techniques.growl`.
     Growl,
     /// `techniques.growl_semitones`.

@@ -292,6 +292,14 @@ impl Clarinet {
             voice.tick(&drive);
             let (left, right) = voice.heard();
             let right = right.filter(|_| self.stereo);
+            let breathed = self.player.inhaled().map(|breath| {
+                let with_breath = |channel: &[f32; TICK]| std::array::from_fn(|n| channel[n] + breath[n]);
+                (with_breath(left), right.map(with_breath))
+            });
+            let (left, right) = match &breathed {
+                Some((left, right)) => (left, right.as_ref()),
+                None => (left, right),
+            };
             if right.is_some() {
                 if self.apart == 0 {
                     self.right.follow(&self.resampler);

@@ -4,7 +4,8 @@
 //! [`dynamics`] that moves breath and lip together; there the [`ear`] pushes what is too soft. `tongue` articulates: overlapping
 //! notes are slurred (the holes move and the tongue stays away); after a gap the tongue holds the reed while the breath rises
 //! behind it, and lets go. `fingers` moves the holes, `tuning` the pitch, and `posture` holds what settings, fingering and bend
-//! ask for. `life` and [`vibrato`] sway all of it, `attack` shapes how a note begins, `slur` helps difficult ones.
+//! ask for. `life` and [`vibrato`] sway all of it, `attack` shapes how a note begins, `slur` helps difficult ones, `inflection`
+//! scoops and falls, and `inhalation` is the breath in after a phrase.
 //!
 //! `technique` growls, flutters and covers the reed, `voicing` moves the vocal tract, `glissando` slides the fingers, and
 //! `level_keeper` blows so that the level stays where they lead.
@@ -17,6 +18,8 @@ pub mod ear;
 mod fingers;
 mod fitted;
 mod glissando;
+mod inflection;
+mod inhalation;
 mod level_keeper;
 mod life;
 mod lip_glide;
@@ -49,6 +52,8 @@ use dynamics::LipShape;
 use ear::Ear;
 use fingers::Fingers;
 use glissando::Slide;
+use inflection::Inflection;
+use inhalation::Inhalation;
 use level_keeper::{Led, LevelKeeper};
 use life::Life;
 use lip_glide::LipGlide;
@@ -156,6 +161,8 @@ pub struct Player {
     sway: Sway,
     /// Ticks until `sway` moves on.
     sway_left: u32,
+    inflection: Inflection,
+    inhalation: Inhalation,
 }
 
 impl Player {
@@ -164,7 +171,7 @@ impl Player {
     pub fn set_settings(&mut self, settings: &Settings) {
         let settings = settings.clamped();
         if settings != self.settings {
-            if self.is_resting() {
+            if self.is_idle() {
                 self.glide.settle();
             } else {
                 // A lip that a player has shaped is where another way of blowing begins.
@@ -262,7 +269,7 @@ impl Player {
         self.keys.press(note);
         self.breath.set_velocity(velocity);
         if !slurred {
-            self.tongue.hold();
+            self.prepare();
             self.swing.begin_note();
         }
         self.finger(fingering, slurred, model, voice);
@@ -276,8 +283,19 @@ impl Player {
         }
         match self.keys.last().and_then(|last| self.take_up(last, model)) {
             Some(fingering) => self.finger(fingering, true, model, voice),
-            None => self.tongue.stop(),
+            None => {
+                let may_fall = !self.tongue.is_holding() && !self.tongue.is_slapping();
+                if !(may_fall && self.inflection.fall(&self.settings.articulation, self.breath.gamma())) {
+                    self.tongue.stop();
+                }
+            }
         }
+    }
+
+    /// The tongue holds the reed before a note.
+    fn prepare(&mut self) {
+        self.tongue.hold();
+        self.inflection.begin(&self.settings.articulation);
     }
 
     /// Whether a choke of this note silences something: it sounds, or no key is down and it may fade.
@@ -294,7 +312,7 @@ impl Player {
         }
         match self.keys.last().and_then(|last| self.take_up(last, model)) {
             Some(fingering) => {
-                self.tongue.hold();
+                self.prepare();
                 self.finger(fingering, false, model, voice);
             }
             None => self.tongue.stop(),
@@ -304,6 +322,7 @@ impl Player {
     /// The choked note has been cut: the breath begins again from nothing, and the tongue is on the reed.
     pub fn end_choke(&mut self) {
         self.breath = self.breath.carried();
+        self.inflection.cut();
         if !self.tongue.is_holding() {
             self.tongue = Tongue::default();
         }
@@ -365,14 +384,29 @@ impl Player {
         self.posture = None;
     }
 
-    /// True while no slap sounds, the breath has gone and none is asked for.
+    /// True while no slap sounds, the breath has gone and none is asked for, and none has to come in.
     pub fn is_resting(&self) -> bool {
-        !self.tongue.is_slapping() && self.breath.is_resting(!self.keys.is_empty())
+        self.is_idle() && !self.inflection.is_falling() && !self.inhalation.is_due()
+    }
+
+    /// The same, whether the player breathes in or not.
+    fn is_idle(&self) -> bool {
+        !self.tongue.is_slapping() && self.breath.is_resting(self.holds_note())
+    }
+
+    /// Whether a note is to sound: a key is down, or the note of the last one falls.
+    fn holds_note(&self) -> bool {
+        !self.keys.is_empty() || self.inflection.is_falling()
+    }
+
+    /// The breath that comes in during this tick, Pa at 1 m, if any.
+    pub fn inhaled(&self) -> Option<&[f32; TICK]> {
+        self.inhalation.heard()
     }
 
     /// Advances one control tick: moves holes and delay, and returns how the reed is driven. Real-time safe.
     pub fn tick<F: Real>(&mut self, model: &Model, voice: &mut Voice<F>) -> Drive {
-        let (tick_s, is_resting) = (self.tick_s(model), self.is_resting());
+        let (tick_s, is_idle) = (self.tick_s(model), self.is_idle());
         let covers = self.techniques.tick(&self.settings, tick_s);
         if self.reed.tick(tick_s) | self.glide.tick(&self.settings, tick_s) | covers {
             self.posture = None;
@@ -393,6 +427,7 @@ impl Player {
         let settings = &self.now;
         let posture = self.posture.get_or_insert_with(|| {
             voice.lattice_mut().set_jet_loss(f64::from(settings.vent_loss));
+            voice.set_key_sounds(f64::from(settings.articulation.key_sounds));
             voice.set_jet(match settings.breath_response {
                 BreathResponse::Physical => Jet::Steady,
                 BreathResponse::Played => Jet::Pulsed,
@@ -400,7 +435,13 @@ impl Player {
             let subtone = self.techniques.subtone();
             Posture::new(settings, fingering.unwrap_or(0), bend_cents, subtone, tick_s, model)
         });
-        let (key_down, tongue_holds) = (!self.keys.is_empty(), self.tongue.is_holding());
+        let (articulation, gamma) = (&settings.articulation, self.breath.gamma());
+        self.inhalation.tick(articulation.breath_in, is_idle, gamma, tick_s);
+        if self.inflection.tick(self.tongue.is_holding(), gamma, articulation, tick_s) {
+            self.tongue.stop();
+        }
+        let key_down = !self.keys.is_empty() || self.inflection.is_falling();
+        let tongue_holds = self.tongue.is_holding();
         let asked = self.breath.asked(key_down);
         self.ear.hear(voice.p_mouthpiece() / posture.closing, posture.lags.ear);
         let led = Led::new(self.voicing.lead(), slide.is_some());
@@ -409,7 +450,7 @@ impl Player {
         self.onset.tick(tongue_holds, tick_s);
         self.sway_left = match self.sway_left {
             // Nobody sways what nobody holds; a bore that is moved does not fall silent.
-            _ if is_resting => 0,
+            _ if is_idle => 0,
             0 => {
                 self.sway = sway(&mut self.life, &mut self.swing, settings, posture, tick_s, model);
                 SWAY_TICKS - 1
@@ -418,7 +459,8 @@ impl Player {
         };
         let note_lip =
             self.lip_glide.tick(posture.note_lip(), tongue_holds || !key_down, posture.lags.fingers);
-        let bodily = Bodily { note_lip, onset: &self.onset, sway: &self.sway, settles: tongue_holds };
+        let fade = self.inflection.fade();
+        let bodily = Bodily { note_lip, onset: &self.onset, sway: &self.sway, settles: tongue_holds, fade };
         let mut target = self.response.tick(asked, ear, &bodily, settings, posture);
         if let Some(dynamic) = self.response.dynamic() {
             let level_db = model.player.level_db(dynamic);
@@ -439,7 +481,8 @@ impl Player {
         let hardness =
             self.breath.attack_hardness() * self.response.haste(settings.attack) / self.response.release();
         let (p_mouth, tongue) = self.tongue.tick(shaken, hardness, &context);
-        let has_other_speed = self.tuning.tick(fingering, gamma, self.sway.cents, &context, model, lattice);
+        let added_cents = (self.sway.cents, self.inflection.cents());
+        let has_other_speed = self.tuning.tick(fingering, gamma, added_cents, &context, model, lattice);
         let drive = Drive { p_mouth, tongue, noise: f64::from(settings.noise), reed: posture.reed };
         if has_other_speed {
             // The clock's speed has changed, and with it the length of a tick.

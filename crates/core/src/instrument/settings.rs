@@ -1,6 +1,7 @@
 //! What a player can set, as plain numbers in the units that a player uses. They are clamped once, where they come in.
 
 use crate::event::SettingNumber;
+use crate::instrument::articulation::Articulation;
 use crate::instrument::listening::Listening;
 use crate::instrument::player::Attack;
 use crate::instrument::player::dynamics::LipShape;
@@ -120,6 +121,8 @@ pub struct Settings {
     pub tract: Tract,
     /// Time that a slur slides from note to note, s, 0 (the fingers move at once)..=3. Default 0.
     pub glissando_s: f32,
+    /// Scoop, fall, breath in, and the sounds of the keys. All off by default.
+    pub articulation: Articulation,
 }
 
 /// A number inside its range; one that is not finite becomes the default. Real-time safe.
@@ -162,6 +165,7 @@ impl Default for Settings {
             techniques: Techniques::default(),
             tract: Tract::default(),
             glissando_s: 0.0,
+            articulation: Articulation::default(),
         }
     }
 }
@@ -235,6 +239,12 @@ impl Settings {
             SettingNumber::VibratoOnsetS => &mut self.vibrato.onset_s,
             SettingNumber::VibratoUnevenness => &mut self.vibrato.unevenness,
             SettingNumber::GlissandoS => &mut self.glissando_s,
+            SettingNumber::ScoopCents => &mut self.articulation.scoop_cents,
+            SettingNumber::ScoopS => &mut self.articulation.scoop_s,
+            SettingNumber::FallCents => &mut self.articulation.fall_cents,
+            SettingNumber::FallS => &mut self.articulation.fall_s,
+            SettingNumber::BreathIn => &mut self.articulation.breath_in,
+            SettingNumber::KeySounds => &mut self.articulation.key_sounds,
             SettingNumber::Growl => &mut self.techniques.growl,
             SettingNumber::GrowlSemitones => &mut self.techniques.growl_semitones,
             SettingNumber::GrowlHz => &mut self.techniques.growl_hz,
@@ -382,6 +392,7 @@ impl Settings {
             techniques: self.techniques.clamped(),
             tract: self.tract.clamped(),
             glissando_s: fix(self.glissando_s, 0.0, 3.0, d.glissando_s),
+            articulation: self.articulation.clamped(),
         }
     }
 }

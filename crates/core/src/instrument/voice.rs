@@ -8,6 +8,7 @@ use crate::instrument::breath_noise::{BreathNoise, Jet};
 pub use crate::instrument::control_tick::TICK;
 use crate::instrument::listening::Listening;
 use crate::instrument::outside::Outside;
+use crate::instrument::pads::Pads;
 use crate::instrument::vocal_tract::{TractCoeffs, TractState};
 use crate::reed::ReedCoeffs;
 use crate::reed::ReedState;
@@ -63,6 +64,7 @@ pub struct Drive {
 pub struct Voice<F = f32> {
     lattice: Lattice<F>,
     mouth: Mouth<F>,
+    pads: Pads,
     ticks: u32,
     resets: u64,
 }
@@ -190,6 +192,18 @@ impl<F: Real> Tip<F> for ThroughTract<'_, F> {
     }
 }
 
+/// Runs a tick; sample by sample while pads push air into the holes, so that the loop over samples need not know of them.
+#[inline(always)]
+fn run<F: Real, T: Tip<F>>(lattice: &mut Lattice<F>, pads: &mut Pads, tip: &mut T) {
+    if !pads.attend(lattice) {
+        return lattice.run(TICK, tip);
+    }
+    for _ in 0..TICK {
+        pads.step(lattice);
+        lattice.run(1, tip);
+    }
+}
+
 impl<F: Real> Voice<F> {
     /// A silent voice with closed holes, whose `sources` are heard in one point. Allocates.
     pub fn new(
@@ -222,6 +236,7 @@ impl<F: Real> Voice<F> {
                 at: 0,
                 flow_unit,
             },
+            pads: Pads::new(coeffs, flow_unit),
             ticks: 0,
             resets: 0,
         }
@@ -266,6 +281,11 @@ impl<F: Real> Voice<F> {
         self.mouth.noise.set_jet(jet);
     }
 
+    /// How much is heard of pads and fingers, 0 at first ..= 1. Real-time safe.
+    pub fn set_key_sounds(&mut self, amount: f64) {
+        self.pads.set_amount(amount);
+    }
+
     /// Listens in another way from the next tick on, with a right channel if `stereo`. Real-time safe.
     pub fn listen(&mut self, listening: &Listening, stereo: bool) {
         self.mouth.outside.listen(listening, stereo);
@@ -290,8 +310,8 @@ impl<F: Real> Voice<F> {
         mouth.outside.heed(lattice.is_moving(), |hole| lattice.is_open(hole));
         mouth.noise.fill(drive.noise, mouth.state.flow);
         match mouth.tract {
-            None => self.lattice.run(TICK, mouth),
-            Some(tract) => self.lattice.run(TICK, &mut ThroughTract { mouth, tract }),
+            None => run(&mut self.lattice, &mut self.pads, mouth),
+            Some(tract) => run(&mut self.lattice, &mut self.pads, &mut ThroughTract { mouth, tract }),
         }
         if let Some(probes) = &mut mouth.probes {
             for (probe, &pressure) in probes.iter_mut().zip(mouth.outside.heard().0) {
@@ -316,6 +336,7 @@ impl<F: Real> Voice<F> {
     /// Back to the beginning: silence, all holes closed, the tongue on the reed. Real-time safe.
     pub fn reset(&mut self) {
         self.lattice.reset();
+        self.pads.silence();
         self.mouth.silence();
         self.mouth.hold_reed();
         self.ticks = 0;
@@ -330,6 +351,7 @@ impl<F: Real> Voice<F> {
     /// Takes away all waves and all motion of the reed; openings and delay stay. Real-time safe.
     pub fn silence(&mut self) {
         self.lattice.silence();
+        self.pads.silence();
         self.mouth.silence();
         self.ticks = 0;
     }

@@ -30,6 +30,8 @@ pub struct LatticeCoeffs {
     pub(super) holes: Vec<HoleCoeffs>,
     /// Jet resistance per flow of each hole at K = 1.
     pub(super) jets: Vec<f64>,
+    /// Area of each hole, m2.
+    hole_areas_m2: Vec<f64>,
     pub(super) hole_junctions: Vec<usize>,
     /// Bell: radiation conductance and half-sample conductance of its mass.
     pub(super) bell: (f64, f64),
@@ -70,6 +72,7 @@ impl LatticeCoeffs {
                 })
                 .collect(),
             jets: networks.iter().map(|network| network.jet(p_ref_pa, nominal_radius_m, air)).collect(),
+            hole_areas_m2: networks.iter().map(|network| network.area_m2).collect(),
             hole_junctions: cells.hole_junctions.clone(),
             bell: (
                 radiation::RESISTANCE / (end * end) / z_end,
@@ -86,6 +89,11 @@ impl LatticeCoeffs {
     /// Number of tone holes.
     pub fn holes(&self) -> usize {
         self.holes.len()
+    }
+
+    /// Area of each tone hole, m2, in the order of the file.
+    pub fn hole_areas_m2(&self) -> impl Iterator<Item = f64> + '_ {
+        self.hole_areas_m2.iter().copied()
     }
 
     /// Whether the tone holes of another lattice are the same.

@@ -18,6 +18,8 @@ impl Player {
             reed: from.reed,
             techniques: from.techniques.carried(),
             swing: from.swing.carried(),
+            inflection: from.inflection.carried(),
+            inhalation: from.inhalation,
             ..Self::default()
         };
         while let Some(last) = self.keys.last() {

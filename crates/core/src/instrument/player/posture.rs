@@ -40,6 +40,10 @@ pub struct Posture {
     pub rows_per_cent: f64,
     /// Share of the bend that the clock makes, cents.
     pub bore_cents: f64,
+    /// The bend.
+    offset_cents: f64,
+    fingering: usize,
+    response: BreathResponse,
     /// How fast delay, clock and breath follow.
     pub lags: Lags,
     /// The reed as set and fingered, before a player's lip shapes it.
@@ -139,10 +143,10 @@ impl Posture {
             + cents(f64::from(settings.a4_hz), model.a4_hz)
             + cents(Air::at(f64::from(settings.temperature_c)).c, model.air.c);
         let sensitivity = model.tuning.notes.get(fingering).map_or(1.0, |note| note.sensitivity);
-        let split =
-            BendSplit::new(offset, bend::lip_limit_cents(model, fingering, offset, settings.breath_response));
+        let response = settings.breath_response;
+        let split = BendSplit::new(offset, bend::lip_limit_cents(model, fingering, offset, response));
         let rate_hz = model.coeffs.rate_hz;
-        let played = match settings.breath_response {
+        let played = match response {
             BreathResponse::Physical => None,
             BreathResponse::Played => Some(Played::new(settings, &free, lip, subtone, fingering, model)),
         };
@@ -153,6 +157,9 @@ impl Posture {
             rows: sensitivity * model.rows_for_cents(fingering, split.lip_cents),
             rows_per_cent: sensitivity * model.rows_for_cents(fingering, 1.0),
             bore_cents: split.bore_cents,
+            offset_cents: offset,
+            fingering,
+            response,
             lags: Lags::new(settings, tick_s, model.lowest_hz),
             free,
             rate_hz,
@@ -160,6 +167,20 @@ impl Posture {
         };
         posture.shape_lip(0.0, posture.note_lip());
         posture
+    }
+
+    /// Delay on top of the note's trim, rows of round trip, and the share of the clock, cents, where the player bends the note by so
+    /// many cents more.
+    pub fn bent(&self, cents: f64, model: &Model) -> (f64, f64) {
+        if cents == 0.0 {
+            return (self.rows, self.bore_cents);
+        }
+        let offset = self.offset_cents + cents;
+        let split =
+            BendSplit::new(offset, bend::lip_limit_cents(model, self.fingering, offset, self.response));
+        let rows = self.rows_per_cent / model.rows_for_cents(self.fingering, 1.0)
+            * model.rows_for_cents(self.fingering, split.lip_cents);
+        (rows, split.bore_cents)
     }
 
     /// Where the lip goes for this note.

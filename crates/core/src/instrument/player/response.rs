@@ -41,6 +41,8 @@ pub struct Bodily<'a> {
     pub sway: &'a Sway,
     /// Nothing sounds yet, so that the lip may be in place at once.
     pub settles: bool,
+    /// Share of its dynamic that a note keeps while it falls, 0..=1; 1 otherwise.
+    pub fade: f64,
 }
 
 /// Where the lip is.
@@ -78,7 +80,9 @@ impl Response {
         match settings.breath_response {
             BreathResponse::Physical => {
                 self.lip = None;
-                physical(asked, settings, posture.closing) * (1.0 + bodily.sway.dynamic)
+                let gamma = physical(asked, settings, posture.closing) * (1.0 + bodily.sway.dynamic);
+                // A note that falls fades as far as it holds.
+                if bodily.fade < 1.0 { gamma.min(faded(gamma, bodily.fade)) } else { gamma }
             }
             BreathResponse::Played => self.played(asked, ear, bodily, settings, posture),
         }
@@ -117,7 +121,7 @@ impl Response {
                 (soft + (loud - soft) * velocity, 1.0)
             }
         };
-        let wanted = bodily.onset.shaped(settings.attack, wanted);
+        let wanted = bodily.fade * bodily.onset.shaped(settings.attack, wanted);
         let lip = match self.lip {
             Some(lip) if !bodily.settles => lip + (wanted - lip) * posture.lags.lip,
             _ => wanted,
@@ -134,6 +138,11 @@ impl Response {
             None => breath.gamma,
         }
     }
+}
+
+/// A mouth over closing pressure that goes down to that of the softest key.
+fn faded(gamma: f64, fade: f64) -> f64 {
+    VELOCITY_GAMMA.0 + (gamma - VELOCITY_GAMMA.0) * fade
 }
 
 fn physical(asked: Asked, settings: &Settings, closing: f64) -> f64 {

@@ -34,12 +34,12 @@ impl PlayedTuning {
     }
 
     /// Moves delay and clock; whether the speed of the clock has changed. `gamma` is the mouth pressure over the closing
-    /// pressure, `sway_cents` what the lip adds.
+    /// pressure, `sway_cents` what the lip adds, `bend_cents` what the player adds to the bend of the posture.
     pub fn tick<F: Real>(
         &mut self,
         fingering: Option<usize>,
         gamma: f64,
-        sway_cents: f64,
+        (sway_cents, bend_cents): (f64, f64),
         context: &TickContext<'_>,
         model: &Model,
         lattice: &mut Lattice<F>,
@@ -50,7 +50,8 @@ impl PlayedTuning {
             Tuning::Natural => fingered(),
             Tuning::Tempered => posture.played_rows().unwrap_or_else(fingered),
         };
-        let target = trim + posture.rows + sway_cents * posture.rows_per_cent;
+        let (bent_rows, bore_cents) = posture.bent(bend_cents, model);
+        let target = trim + bent_rows + sway_cents * posture.rows_per_cent;
         // The delay follows within the time the fingers take; the first note has it at once.
         let first = self.rows.is_none();
         match &mut self.rows {
@@ -63,12 +64,12 @@ impl PlayedTuning {
                 lattice.glide_delay(target, 0);
             }
         }
-        if posture.bore_cents == self.bore_cents {
+        if bore_cents == self.bore_cents {
             return false;
         }
-        let away = posture.bore_cents - self.bore_cents;
+        let away = bore_cents - self.bore_cents;
         self.bore_cents = if first || away.abs() < ARRIVED_CENTS {
-            posture.bore_cents
+            bore_cents
         } else {
             self.bore_cents + away * posture.lags.tuning
         };
