@@ -21,7 +21,13 @@ const SLIDERS: &[(Tab, &[&str])] = &[
             "tract", "tractp",
         ],
     ),
-    (Tab::Sound, &["a4", "noise", "zeta", "lay", "vent", "gain", "room", "rsize", "rdecay", "rtone"]),
+    (
+        Tab::Sound,
+        &[
+            "a4", "noise", "zeta", "lay", "vent", "gain", "room", "rsize", "rdecay", "rtone", "player",
+            "spread", "seats",
+        ],
+    ),
     (
         Tab::Knob,
         &["ceil", "contr", "place", "torque", "mark", "kdamp", "kfric", "refnot", "curve", "oscprt", "oscfl"],
@@ -40,7 +46,7 @@ const STUDY_CHOICES: &[&str] = &["side"];
 const CHOICES: &[(Tab, &[&str])] = &[
     (Tab::Reed, &["rface", "hsrc", "ksrc"]),
     (Tab::Breath, &["resp", "attack", "wheel", "growlp"]),
-    (Tab::Sound, &["tune", "heard"]),
+    (Tab::Sound, &["tune", "heard", "split"]),
     (Tab::Knob, &["knob", "law", "order"]),
     (Tab::Instrument, &["tune", "beyond", "qual"]),
 ];

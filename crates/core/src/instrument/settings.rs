@@ -6,6 +6,7 @@ use crate::instrument::player::Attack;
 use crate::instrument::player::dynamics::LipShape;
 use crate::instrument::player::response::ONSET;
 use crate::instrument::player::vibrato::Vibrato;
+use crate::instrument::players::Players;
 use crate::instrument::reach::Reach;
 use crate::instrument::room::Room;
 use crate::instrument::techniques::{Techniques, Tract};
@@ -118,6 +119,8 @@ pub struct Settings {
     pub tract: Tract,
     /// Time that a slur slides from note to note, s, 0 (the fingers move at once)..=3. Default 0.
     pub glissando_s: f32,
+    /// How many players play. Default one.
+    pub players: Players,
 }
 
 /// A number inside its range; one that is not finite becomes the default. Real-time safe.
@@ -159,6 +162,7 @@ impl Default for Settings {
             techniques: Techniques::default(),
             tract: Tract::default(),
             glissando_s: 0.0,
+            players: Players::default(),
         }
     }
 }
@@ -239,6 +243,8 @@ impl Settings {
             SettingNumber::Subtone => &mut self.techniques.subtone,
             SettingNumber::TractAmount => &mut self.tract.amount,
             SettingNumber::TractIntervalSemitones => &mut self.tract.interval_semitones,
+            SettingNumber::PlayersSpreadCents => &mut self.players.spread_cents,
+            SettingNumber::PlayersWidth => &mut self.players.width,
         }
     }
 
@@ -377,6 +383,7 @@ impl Settings {
             techniques: self.techniques.clamped(),
             tract: self.tract.clamped(),
             glissando_s: fix(self.glissando_s, 0.0, 3.0, d.glissando_s),
+            players: self.players.clamped(),
         }
     }
 }
