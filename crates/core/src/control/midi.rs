@@ -1,7 +1,8 @@
 //! Turns MIDI channel messages and the note events of hosts into events, for the plugin and for the offline renderer
 //! alike.
 //!
-//! The instrument has one voice, so all channels play it. The last key struck is heard; see [`notes`](super::notes).
+//! It is for one player, so all channels play it. The last key struck is heard; see [`notes`](super::notes). For several
+//! players, [`parts`](super::parts) has a decoder for each.
 //! [`breath`] says which controller the breath comes from, [`snapshot`] what is left out of the start of a project, [`mix`]
 //! what volume and pan do. Bend follows the heard note's channel and its MPE zone, see [`bends`](super::bends); RPN 0 sets a
 //! bend range, RPN 6 a zone. [`techniques`] says what the mod wheel and CC18 to CC20 do.

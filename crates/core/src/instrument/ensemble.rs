@@ -228,9 +228,12 @@ impl Ensemble {
             return self.set_settings(&settings);
         }
         for (number, seat) in self.seats.iter_mut().enumerate() {
-            let plays = number < count && (all || to == To::Player(number as u8));
-            // Who has gone and still sounds is to be silenced too.
-            if !plays && !(event == Event::Panic && all && !seat.sleeps) {
+            let is_meant = match number < count {
+                true => all || to == To::Player(number as u8),
+                // Who has gone and still sounds is to be silenced too.
+                false => event == Event::Panic && !seat.sleeps,
+            };
+            if !is_meant {
                 continue;
             }
             seat.apply(event);
@@ -317,7 +320,8 @@ impl Ensemble {
             } else {
                 // Without two channels there are no sides; they move on all the same.
                 let middle = || {
-                    (left_side.next(), right_side.next());
+                    left_side.next();
+                    right_side.next();
                     1.0
                 };
                 add(out.left(), left, gain, middle, is_first);
