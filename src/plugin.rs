@@ -46,8 +46,8 @@ use crate::identity;
 use crate::parameters::InUse;
 use breath_sources::BreathInput;
 use chalumeau_core::control::notes::Note;
-use chalumeau_core::event::{Event, Timed};
-use chalumeau_core::instrument::{Channels, Settings};
+use chalumeau_core::event::{Event, PartEvent, To};
+use chalumeau_core::instrument::{Channels, MOST_PLAYERS, Settings};
 #[cfg(feature = "devices")]
 use chalumeau_knob::device::Release;
 use host_inputs::HostInputs;
@@ -197,6 +197,7 @@ impl Chalumeau {
         if let Some(instrument) = &mut self.instrument {
             instrument.set_settings(&self.settings);
             context.set_latency_samples(instrument.clarinet().latency_samples());
+            context.set_current_voice_capacity(self.settings.players.parts() as u32);
         }
         self.forget();
         true
@@ -240,6 +241,9 @@ impl Chalumeau {
         let settings = self.inputs.linked(own);
         if settings != self.settings {
             instrument.set_settings(&settings);
+            if settings.players != self.settings.players {
+                context.set_current_voice_capacity(settings.players.parts() as u32);
+            }
             self.settings = settings;
         }
         if self.offline {
@@ -254,27 +258,31 @@ impl Chalumeau {
             audio.let_go(Release::TransportStopped);
         }
         let inputs = &mut self.inputs;
-        inputs.begin_block();
-        let panic = if self.params.moments.take(Moment::Panic) { Some(inputs.silence()) } else { None };
+        inputs.begin_block(settings.players.parts());
+        if self.params.moments.take(Moment::Panic) {
+            inputs.silence();
+        }
         let drives = [self.params.knob.h_source.value(), self.params.knob.k_source.value()];
-        let wheel = inputs.wheel(self.params.expression.wheel.value().into(), drives);
-        let from = inputs.breath_from(self.params.breath.from.value().into());
-        let breath = self.moved.breath(&self.params);
-        let bend_range = inputs.bend_range(self.params.instrument.bend_range.value());
+        inputs.breath_from(self.params.breath.from.value().into());
+        if let Some(unit) = self.moved.breath(&self.params) {
+            inputs.breath_sources().blow(BreathInput::Parameter, unit);
+            inputs.say(Event::Breath(unit).into());
+        }
+        inputs.bend_range(self.params.instrument.bend_range.value());
+        inputs.wheel(self.params.expression.wheel.value().into(), drives);
         let keys = self.window.as_mut().map(|(_, window)| window.keys()).unwrap_or_default();
-        for Timed { event, .. } in [breath].iter().chain(&keys).flatten() {
-            match *event {
+        for event in keys.into_iter().flatten() {
+            match event {
                 Event::Breath(unit) => inputs.breath_sources().blow(BreathInput::Parameter, unit),
                 Event::NoteOn { velocity, .. } => inputs.breath_sources().key(velocity),
                 _ => {}
             }
+            // The window shows the first player.
+            inputs.say(PartEvent { to: To::Player(0), event });
         }
         let api = context.plugin_api();
         let links = &self.params.links;
-        let played = std::iter::from_fn(|| inputs.next(|| context.next_event(), api, drives, links));
-        let at_once =
-            panic.into_iter().flatten().chain([from, breath, bend_range]).chain(wheel).chain(keys).flatten();
-        let events = at_once.chain(played);
+        let events = std::iter::from_fn(|| inputs.next(|| context.next_event(), api, drives, links));
         #[cfg(feature = "devices")]
         if let Some((_, audio)) = &mut self.knob {
             let replay = self.params.knob.replay.value();
@@ -288,9 +296,9 @@ impl Chalumeau {
         if let (Some(program), Some(presets)) = (self.inputs.take_program(), &self.presets) {
             presets.handle().ask(program);
         }
-        if instrument.clarinet().is_silent() {
-            self.inputs.fall_silent(samples.saturating_sub(1) as u32);
-        }
+        let ensemble = instrument.ensemble();
+        let last = samples.saturating_sub(1) as u32;
+        self.inputs.fall_silent(last, |player| ensemble.is_silent_player(player));
         #[cfg(feature = "devices")]
         for &(_, breath) in self.knob.iter().flat_map(|(_, audio)| audio.sent()) {
             self.inputs.breath_sources().blow(BreathInput::Knob, breath.unit());
@@ -364,10 +372,9 @@ struct SharedHandles {
 /// event. A knob blows without events, and an open window shows what happens. Real-time safe.
 fn rest_status(params: &ChalumeauParams, instrument: &InstrumentSwap, is_watched: bool) -> ProcessStatus {
     params.fall_back();
-    let clarinet = instrument.clarinet();
     let may_sleep = instrument.is_silent() && !is_watched && !params.is_in_use(InUse::WithKnob);
     params.host.set_may_sleep(may_sleep);
-    if clarinet.is_resting() {
+    if instrument.ensemble().is_resting() {
         ProcessStatus::Tail((instrument.tail_s() * instrument.rate_hz()) as u32)
     } else {
         ProcessStatus::KeepAlive
@@ -389,10 +396,10 @@ impl MovedParameters {
     }
 
     /// Where *Breath* has moved since the last block.
-    fn breath(&mut self, params: &ChalumeauParams) -> Option<Timed<Event>> {
+    fn breath(&mut self, params: &ChalumeauParams) -> Option<f32> {
         let breath = params.breath.breath.value();
         let has_moved = std::mem::replace(&mut self.breath, breath) != breath;
-        has_moved.then_some(Timed { at: 0, event: Event::Breath(breath) })
+        has_moved.then_some(breath)
     }
 }
 
@@ -441,9 +448,11 @@ impl ClapPlugin for Chalumeau {
     const CLAP_DESCRIPTION: Option<&'static str> = Some(identity::DESCRIPTION);
     const CLAP_MANUAL_URL: Option<&'static str> = identity::MANUAL_URL;
     const CLAP_SUPPORT_URL: Option<&'static str> = identity::SUPPORT_URL;
-    /// One voice, whose notes are told apart by their ids.
-    const CLAP_POLY_MODULATION_CONFIG: Option<PolyModulationConfig> =
-        Some(PolyModulationConfig { max_voice_capacity: 1, supports_overlapping_voices: true });
+    /// As many notes as players, told apart by their ids.
+    const CLAP_POLY_MODULATION_CONFIG: Option<PolyModulationConfig> = Some(PolyModulationConfig {
+        max_voice_capacity: MOST_PLAYERS as u32,
+        supports_overlapping_voices: true,
+    });
     const CLAP_FEATURES: &'static [ClapFeature] =
         &[ClapFeature::Instrument, ClapFeature::Synthesizer, ClapFeature::Stereo];
 

@@ -8,10 +8,11 @@ use crate::cli::score_args::{RenderJob, ScoreArgs};
 use crate::cli::shared_args::within;
 use crate::output::NewFile;
 use crate::wav::{Depth, Levels, WavFile};
+use chalumeau_core::event::Event;
 use chalumeau_core::instrument::Probe;
 use chalumeau_core::reed::physical::P_REF_PA;
 use chalumeau_core::score as player;
-use chalumeau_core::score::StereoBlocks;
+use chalumeau_core::score::{Score, StereoBlocks};
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -31,6 +32,8 @@ Examples:
       From silence over the threshold to a reed held shut, with pressures, flow and opening.
   chalumeau render melody.mid --out melody.wav --plot melody.png
       Waveform, spectrogram, pitch against the score, breath, and the reed in close-up.
+  chalumeau render chorale.mid --players 4 --channels 2 --out chorale.wav
+      Keys that are held together are played by different players; with --unison all play every note.
   chalumeau render melody.mid --replay take.csv --out again.wav
   chalumeau render melody.mid --crescendo 0.4:0.9 --bits 16 --rate 44100 --out loud.wav";
 
@@ -106,11 +109,17 @@ impl RenderCommand {
             eprintln!("warning: a room is heard on two channels only; add --channels 2");
         }
         self.refuse_same_file()?;
+        let several = prepared.settings.players.count > 1;
+        if several && (self.probe.is_some() || self.plot.wanted()) {
+            let inside = "--probe and --plot look inside one instrument; leave them or --players out";
+            return Err(Failure::Usage(inside.to_owned()));
+        }
         let mut out = NewFile::create(&self.out, self.force)?;
         let mut probe =
             self.probe.as_deref().map(|path| ProbeTable::open(path, self, &prepared)).transpose()?;
         let plot = self.plot.open(self.force)?;
         let watch = plot.wanted().then(|| RenderMonitor::new(&prepared, self.plot_at)).transpose()?;
+        let mut ensemble = several.then(|| prepared.ensemble());
         let mut clarinet = prepared.clarinet();
         let depth = match self.bits {
             Bits::Int16 => Depth::Int16,
@@ -122,7 +131,9 @@ impl RenderCommand {
         // Who looks gets samples and insides in turn, hence the cell.
         let watch = watch.map(RefCell::new);
         // One channel is the instrument itself; pan (CC10) places it between two.
-        let in_room = || StereoBlocks::new(score, *rate).in_room(&prepared.settings.room);
+        let unpanned = several.then(|| without_pan(score));
+        let score_of_room = unpanned.as_ref().unwrap_or(score);
+        let in_room = || StereoBlocks::new(score_of_room, *rate).in_room(&prepared.settings.room);
         let mut stereo = (self.channels == 2).then(in_room);
         let hear = |block: &[f32]| {
             bar.inc(block.len() as u64);
@@ -139,7 +150,17 @@ impl RenderCommand {
                 watch.borrow_mut().inside(moment);
             }
         };
-        if let Some(stereo) = &mut stereo {
+        if let (Some(ensemble), Some(stereo)) = (&mut ensemble, &mut stereo) {
+            player::play_ensemble_stereo(ensemble, &prepared.parts, BLOCK, |left, right| {
+                hear(left);
+                wav.write(&stereo.pan(left, right)).map_err(Failure::from)
+            })?;
+        } else if let Some(ensemble) = &mut ensemble {
+            player::play_ensemble(ensemble, &prepared.parts, BLOCK, |block| {
+                hear(block);
+                wav.write(&[block]).map_err(Failure::from)
+            })?;
+        } else if let Some(stereo) = &mut stereo {
             player::play_stereo(&mut clarinet, score, BLOCK, &mut inside, |left, right| {
                 hear(left);
                 wav.write(&stereo.pan(left, right)).map_err(Failure::from)
@@ -165,7 +186,8 @@ impl RenderCommand {
             plot.draw(|| watched.figure(&self.play.title(), about))?;
         }
         out.keep()?;
-        Ok(Rendered { seconds: score.seconds(*rate), rate: *rate, level, resets: clarinet.resets() })
+        let resets = ensemble.map_or(clarinet.resets(), |ensemble| ensemble.resets());
+        Ok(Rendered { seconds: score.seconds(*rate), rate: *rate, level, resets })
     }
 
     fn refuse_same_file(&self) -> Result<(), Failure> {
@@ -207,9 +229,16 @@ impl RenderCommand {
     }
 }
 
+/// The same score without pan: several players are panned one by one.
+fn without_pan(score: &Score) -> Score {
+    let mut score = score.clone();
+    score.events.retain(|timed| !matches!(timed.event, Event::Pan { .. }));
+    score
+}
+
 /// How it was played, for the lines under a figure's title.
 pub fn about(prepared: &RenderJob) -> Vec<String> {
-    let RenderJob { model, settings, score, rate } = prepared;
+    let RenderJob { model, settings, score, rate, .. } = prepared;
     vec![format!(
         "{}; {:.2} s at {rate} Hz, A4 = {} Hz, zeta {}, the reed shuts at {:.2} kPa",
         model.file.name,

@@ -12,9 +12,10 @@ use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::control::midi::MidiDecoder;
 use chalumeau_core::control::midi::links::{Link, MOST};
-use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::control::parts::Parts;
+use chalumeau_core::event::{Event, PartEvent, Timed};
 use chalumeau_core::haptics::FeelDesign;
-use chalumeau_core::instrument::{Clarinet, Model, Reach, Settings};
+use chalumeau_core::instrument::{Clarinet, Ensemble, Model, Reach, Settings};
 use chalumeau_core::score::Score;
 use chalumeau_core::score::breath::BreathCurve;
 use chalumeau_core::score::breath::GAMMA_MAX;
@@ -124,6 +125,8 @@ pub struct RenderJob {
     pub settings: Settings,
     /// What is played, with its tail.
     pub score: Score,
+    /// The same, with who of several players plays it.
+    pub parts: Score<PartEvent>,
     /// Sample rate, Hz.
     pub rate: u32,
 }
@@ -135,6 +138,14 @@ impl RenderJob {
         clarinet.set_settings(&self.settings);
         clarinet.reset();
         clarinet
+    }
+
+    /// The same for several players.
+    pub fn ensemble(&self) -> Ensemble {
+        let mut ensemble = Ensemble::new(self.model.clone(), f64::from(self.rate));
+        ensemble.set_settings(&self.settings);
+        ensemble.reset();
+        ensemble
     }
 }
 
@@ -154,22 +165,22 @@ impl ScoreArgs {
             (None, None) => self.settings.played(&file)?,
         };
         map.values.iter().for_each(|(parameter, value)| parameter.set(&mut settings, *value));
-        let mut score = self.score(&file, &as_links(&map.links, &settings))?;
+        let mut parts = self.score(&file, &as_links(&map.links, &settings), settings.players.parts())?;
         if let Some(curve) = &curve {
-            score = score.blown(curve, &settings, self.rate);
+            parts = parts.blown(curve, &settings, self.rate);
         }
         let mut model = self.instrument.model(file, self.rate, settings.a4_hz)?;
         if let Some(scl) = &self.scl {
             Arc::make_mut(&mut model).keys = scale_file::read(scl, self.kbm.as_deref())?;
         }
-        warn_of_silent_notes(&score.events, &model, settings.reach);
+        warn_of_silent_notes(&parts.events, &model, settings.reach);
         if let Some(take) = &self.replay {
-            score.events = self.replayed(take, &model, &settings, &score)?;
+            parts.events = self.replayed(take, &model, &settings, &parts)?;
         }
         // A single note lasts as long as was asked; a melody gets time to fade.
         let one_note = self.written.is_some() || self.sounding.is_some();
-        let score = score.with_tail(self.tail.unwrap_or(if one_note { 0.0 } else { 1.0 }), self.rate);
-        Ok(RenderJob { model, settings, score, rate: self.rate })
+        let parts = parts.with_tail(self.tail.unwrap_or(if one_note { 0.0 } else { 1.0 }), self.rate);
+        Ok(RenderJob { model, settings, score: (&parts).into(), parts, rate: self.rate })
     }
 
     /// The instrument and the player's settings, with nothing to play.
@@ -177,7 +188,7 @@ impl ScoreArgs {
         let file = self.instrument.load()?;
         let settings = self.settings.played(&file)?;
         let model = self.instrument.model(file, self.rate, settings.a4_hz)?;
-        Ok(RenderJob { model, settings, score: Score::default(), rate: self.rate })
+        Ok(RenderJob { model, settings, score: Score::default(), parts: Score::default(), rate: self.rate })
     }
 
     /// The feel of the knob.
@@ -203,8 +214,8 @@ impl ScoreArgs {
         path: &Path,
         model: &Model,
         settings: &Settings,
-        score: &Score,
-    ) -> Result<Vec<Timed<Event>>, Failure> {
+        score: &Score<PartEvent>,
+    ) -> Result<Vec<Timed<PartEvent>>, Failure> {
         let from = fs::File::open(path).map_err(|source| Failure::Read { path: path.to_owned(), source })?;
         let take = Take::read(from).map_err(|source| Failure::TakeFile { path: path.to_owned(), source })?;
         let feels = InstrumentFeel::new(model);
@@ -251,7 +262,12 @@ impl ScoreArgs {
         }
     }
 
-    fn score(&self, file: &InstrumentFile, links: &[Option<Link>; MOST]) -> Result<Score, Failure> {
+    fn score(
+        &self,
+        file: &InstrumentFile,
+        links: &[Option<Link>; MOST],
+        parts: usize,
+    ) -> Result<Score<PartEvent>, Failure> {
         let transposition = file.transposition;
         if let Some(path) = &self.midi {
             let bytes = fs::read(path).map_err(|source| Failure::Read { path: path.clone(), source })?;
@@ -263,7 +279,7 @@ impl ScoreArgs {
                 decoder.set_wheel(preset.wheel());
                 decoder.set_breath_from(preset.breath_from());
             }
-            let score = midi_file::read_as(decoder, &bytes, self.rate)
+            let score = midi_file::read_parts(Parts::of(decoder, parts), &bytes, self.rate)
                 .map_err(|source| Failure::MidiFile { path: path.clone(), source })?;
             return Ok(score);
         }
@@ -273,7 +289,8 @@ impl ScoreArgs {
                 check_fingering(file, WrittenNote(written))?;
             }
             let seconds = self.seconds.unwrap_or(0.5);
-            return Ok(Score::scale(from, to, transposition, seconds, self.slurred, self.rate)?);
+            let scale = Score::scale(from, to, transposition, seconds, self.slurred, self.rate)?;
+            return Ok((&scale).into());
         }
         let seconds = self.seconds.unwrap_or(2.0);
         let sounding = match (self.written.map(WrittenNote), self.sounding.map(SoundingNote)) {
@@ -287,7 +304,7 @@ impl ScoreArgs {
         match (sounding, written) {
             (Some(sounding), Some(written)) => {
                 check_fingering(file, written)?;
-                Ok(Score::note(sounding, seconds, self.rate))
+                Ok((&Score::note(sounding, seconds, self.rate)).into())
             }
             _ => Err(Failure::Usage("after transposition this note is outside the range of MIDI".to_owned())),
         }
@@ -295,11 +312,11 @@ impl ScoreArgs {
 }
 
 /// Warns of notes that the instrument cannot play, which stay silent.
-fn warn_of_silent_notes(events: &[Timed<Event>], model: &Model, reach: Reach) {
+fn warn_of_silent_notes(events: &[Timed<PartEvent>], model: &Model, reach: Reach) {
     let file = &model.file;
     let sounds =
         |note: WrittenNote| note.sounding(file.transposition).map(|n| n.to_string()).unwrap_or_default();
-    let asked = events.iter().filter_map(|timed| match timed.event {
+    let asked = events.iter().filter_map(|timed| match timed.event.event {
         Event::NoteOn { note, .. } => Some(note),
         _ => None,
     });

@@ -29,6 +29,12 @@ pub struct SettingsArgs {
     /// gamma is given, else played]
     #[arg(long, value_name = "RESPONSE", value_parser = breath_response)]
     breath_response: Option<Given>,
+    /// How many players play, 1..16; keys that are held together are played by different players [default: 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=16))]
+    players: Option<u8>,
+    /// All players play every note
+    #[arg(long)]
+    unison: bool,
     /// Any parameter of the sound by its id, with the text a host would show, such as vent=2 or "temp=20 °C"; may be
     /// repeated. `chalumeau parameters` lists them
     #[arg(long = "set", value_name = "ID=VALUE", value_parser = assignment)]
@@ -155,7 +161,7 @@ fn assignment(text: &str) -> Result<Given, String> {
     Err(format!("{what}; the parameters that can be set are {}", ids.join(", ")))
 }
 
-/// `--no-noise`, `--tempered` and `--natural` as values of the table.
+/// Flags such as `--no-noise` and `--tempered` as values of the table.
 fn shorthand(id: &str, text: &str, typed: &str) -> Option<Given> {
     let parameter = parameters::find(id)?;
     Some(Given { parameter, value: parameter.read(text).ok()?, typed: typed.to_owned() })
@@ -167,7 +173,10 @@ impl SettingsArgs {
         let no_noise = self.no_noise.then(|| shorthand("noise", "0", "--no-noise")).flatten();
         let tempered = self.tempered.then(|| shorthand("tune", "Tempered", "--tempered")).flatten();
         let natural = self.natural.then(|| shorthand("tune", "Natural", "--natural")).flatten();
-        let short = [&no_noise, &tempered, &natural, &self.breath_response].into_iter().flatten();
+        let players = self.players.and_then(|count| shorthand("player", &count.to_string(), "--players"));
+        let unison = self.unison.then(|| shorthand("split", "Unison", "--unison")).flatten();
+        let short = [&no_noise, &tempered, &natural, &self.breath_response, &players, &unison];
+        let short = short.into_iter().flatten();
         let all: Vec<Given> = self.numbers.0.iter().chain(short).chain(&self.set).cloned().collect();
         for (at, later) in all.iter().enumerate() {
             if let Some(earlier) = all[..at].iter().find(|other| other.parameter.id == later.parameter.id) {

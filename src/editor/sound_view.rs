@@ -203,6 +203,12 @@ fn column(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     for id in ["room", "rsize", "rdecay", "rtone"] {
         slider(ui, hands, id);
     }
+    heading(ui, "Players");
+    slider(ui, hands, "player");
+    choice(ui, hands, "split");
+    for id in ["spread", "seats"] {
+        slider(ui, hands, id);
+    }
 }
 
 /// Power of the odd over that of the even harmonics, dB.

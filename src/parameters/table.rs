@@ -5,7 +5,7 @@ use chalumeau_core::instrument::concert_pitch::A4_RANGE_HZ;
 use chalumeau_core::instrument::player::Attack;
 use chalumeau_core::instrument::player::response::ONSET;
 use chalumeau_core::instrument::techniques::GrowlPitch;
-use chalumeau_core::instrument::{Beyond, BreathResponse, ListeningMode, Tuning};
+use chalumeau_core::instrument::{Beyond, BreathResponse, ListeningMode, Split, Tuning};
 use chalumeau_knob::touch::study::TRIALS;
 
 use crate::parameters::{Choice, InUse, Kind, Number, Parameter, Sets, Switch, Whole};
@@ -23,6 +23,7 @@ const LISTENING: &str = "Listening";
 const ROOM: &str = "Room";
 const EXPRESSION: &str = "Expression";
 const TECHNIQUES: &str = "Techniques";
+const PLAYERS: &str = "Players";
 
 /// Largest torque that the user can allow, mNm (`docs/protocol.md`, safety).
 const MOST_TORQUE_MNM: f32 = 250.0;
@@ -893,4 +894,37 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Number(SettingNumber::TractIntervalSemitones))
         .flag("--tract-interval"),
+    entry("player", PLAYERS, "Players", whole([1, 16], 1, ""))
+        .help(
+            "How many players play the instrument",
+            "Each has a wander, a tuning and a seat of its own. The output stays about as loud when all play. Each costs as much as the first while it sounds.",
+            "",
+        )
+        .sets(Sets::Whole(|settings| &mut settings.players.count))
+        .flag("--players"),
+    entry("split", PLAYERS, "Split", choice(&[("chords", "Chords"), ("unison", "Unison")]))
+        .help(
+            "What several players do with the notes",
+            "Chords: keys that are held together are played by different players. Unison: all play every note.",
+            "",
+        )
+        .sets(Sets::Choice(|settings, at| {
+            settings.players.split = nth(at, [Split::Chords, Split::Unison]);
+        })),
+    entry("spread", PLAYERS, "Spread", number([0.0, 25.0], 6.0, 1, " cents"))
+        .help(
+            "How far the players are out of tune with the first, at most, either way",
+            "They beat with each other; more is a street band.",
+            "",
+        )
+        .sets(Sets::Number(SettingNumber::PlayersSpreadCents))
+        .flag("--spread"),
+    entry("seats", PLAYERS, "Seats", percent(0.7))
+        .help(
+            "How wide the players sit around the first, on two channels",
+            "At 0 all sit in the middle, at 100 % from side to side.",
+            "",
+        )
+        .sets(Sets::Number(SettingNumber::PlayersWidth))
+        .flag("--seats"),
 ];

@@ -2,7 +2,9 @@ use super::*;
 use chalumeau_core::instrument::player::Attack;
 use chalumeau_core::instrument::player::vibrato::Vibrato;
 use chalumeau_core::instrument::techniques::{GrowlPitch, Techniques, Tract};
-use chalumeau_core::instrument::{Beyond, BreathResponse, Listening, ListeningMode, Reach, Room, Tuning};
+use chalumeau_core::instrument::{
+    Beyond, BreathResponse, Listening, ListeningMode, Players, Reach, Room, Split, Tuning,
+};
 
 /// Id, group, name, default, and whether a host can automate it, in the order of hosts. A frozen copy: saved projects and
 /// automation lanes depend on it. Append only.
@@ -100,6 +102,10 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
     ("subt", "Techniques", "Subtone", "0.0 %", true),
     ("tract", "Techniques", "Vocal tract", "0.0 %", true),
     ("tractp", "Techniques", "Tract interval", "0.0 st", true),
+    ("player", "Players", "Players", "1", true),
+    ("split", "Players", "Split", "Chords", true),
+    ("spread", "Players", "Spread", "6.0 cents", true),
+    ("seats", "Players", "Seats", "70.0 %", true),
 ];
 
 /// Ids of choices in saved states. Append only.
@@ -120,6 +126,7 @@ const FROZEN_CHOICES: &[(&str, &[&str])] = &[
     ("attack", &["soft", "normal", "hard"]),
     ("wheel", &["vib", "growl", "flut", "subt", "none"]),
     ("growlp", &["int", "fixed"]),
+    ("split", &["chords", "unison"]),
 ];
 
 fn numbers() -> impl Iterator<Item = (&'static Parameter, Number)> {
@@ -182,9 +189,10 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         reach: Reach { transpose: -2, beyond: Beyond::Octave },
         attack: Attack::Hard,
         techniques: Techniques { growl_pitch: GrowlPitch::Fixed, ..d.techniques },
+        players: Players { count: 3, split: Split::Unison, ..d.players },
         ..d
     };
-    let mut fields = 8;
+    let mut fields = 10;
     for (parameter, number) in numbers() {
         let Some(Sets::Number(which)) = parameter.sets else { continue };
         fields += 1;
@@ -206,6 +214,8 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
     find("beyond").unwrap().set(&mut filled, Value::Choice(0));
     find("attack").unwrap().set(&mut filled, Value::Choice(1));
     find("growlp").unwrap().set(&mut filled, Value::Choice(0));
+    find("player").unwrap().set(&mut filled, Value::Whole(1));
+    find("split").unwrap().set(&mut filled, Value::Choice(0));
     assert_eq!(filled, d, "the table reaches every field");
     // All fields of the settings, each by one parameter.
     let Settings {
@@ -251,8 +261,9 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
                 subtone: _,
             },
         tract: Tract { amount: _, interval_semitones: _ },
+        players: Players { count: _, split: _, spread_cents: _, width: _ },
     } = d;
-    assert_eq!(fields, 50);
+    assert_eq!(fields, 54);
 }
 
 #[test]

@@ -11,26 +11,26 @@ use chalumeau_core::control::midi::breath::BreathFrom;
 use chalumeau_core::control::midi::links::{Link, MOST, Source};
 use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::control::notes::Note;
-use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::control::parts;
+use chalumeau_core::event::{Event, PartEvent, Timed};
 use chalumeau_core::instrument::Settings;
 
-/// Events that end all notes: the panic, the bend and the techniques of controllers that stay where they are.
-const SILENCED: usize = 6;
-/// Events that one event of the host can become: what the decoder says, every link among it, and a change of the reed.
-const EVENTS: usize = 32 + MOST;
+/// Events that wait at most: what one event of the host can become, and what a block begins with. Of each part: a note with the
+/// breath that waited for it, or a panic with what controllers keep up, and every link.
+const EVENTS: usize = (64 + MOST) * parts::MOST;
 /// Ends of notes that one block can hold: each event that the wrapper keeps room for begins at most one note, and 17 notes
-/// may be there before. Later ones are lost to the host, which only loses a hint.
-const ENDS: usize = 4_096 + 17;
+/// of each part may be there before. Later ones are lost to the host, which only loses a hint.
+const ENDS: usize = 4_096 + 17 * parts::MOST;
 
 /// Everything that is remembered of the host's events between two blocks.
 pub struct HostInputs {
     translator: EventTranslator,
     reed_controllers: ReedControllers,
     breath_sources: BreathSources,
-    /// Events of the host's event that was taken last, their sample, how many they are, and how many have been handed out.
-    events: [Event; EVENTS],
+    /// Events that the block begins with or that the host's latest event has become, their sample, and how many have been
+    /// handed out.
+    events: Vec<PartEvent>,
     at: usize,
-    count: usize,
     handed: usize,
     /// Notes that have ended in this block, in order of time.
     ended: Vec<(u32, Note)>,
@@ -47,10 +47,8 @@ impl Default for HostInputs {
             translator: EventTranslator::default(),
             reed_controllers: ReedControllers::default(),
             breath_sources: BreathSources::default(),
-            // What lies beyond `count` is never read.
-            events: [Event::Panic; EVENTS],
+            events: Vec::with_capacity(EVENTS),
             at: 0,
-            count: 0,
             handed: 0,
             ended: Vec::with_capacity(ENDS),
             heard: None,
@@ -62,16 +60,27 @@ impl Default for HostInputs {
 impl HostInputs {
     /// Forgets everything.
     pub fn reset(&mut self) {
-        self.translator = EventTranslator::default();
+        self.translator.reset();
         self.reed_controllers = ReedControllers::default();
         self.breath_sources = BreathSources::default();
-        (self.count, self.handed, self.heard, self.program) = (0, 0, None, None);
+        (self.handed, self.heard, self.program) = (0, None, None);
+        self.events.clear();
         self.ended.clear();
     }
 
-    /// Begins a block.
-    pub fn begin_block(&mut self) {
+    /// Begins a block, whose notes are split into so many parts.
+    pub fn begin_block(&mut self, parts: usize) {
         self.ended.clear();
+        self.events.clear();
+        (self.at, self.handed) = (0, 0);
+        if self.translator.set_parts(parts) {
+            self.note_ends(0);
+        }
+    }
+
+    /// Adds an event at the beginning of the block.
+    pub fn say(&mut self, event: PartEvent) {
+        push(&mut self.events, event);
     }
 
     /// The latest MIDI program change, 0..=127, once.
@@ -110,11 +119,11 @@ impl HostInputs {
         api: PluginApi,
         drives: [ReedSource; 2],
         links: &ControllerLinks,
-    ) -> Option<Timed<Event>> {
+    ) -> Option<Timed<PartEvent>> {
         loop {
-            if self.handed < self.count {
+            if let Some(&event) = self.events.get(self.handed) {
                 self.handed += 1;
-                return Some(Timed { at: self.at, event: self.events[self.handed - 1] });
+                return Some(Timed { at: self.at, event });
             }
             let event = untangled(next()?, api);
             learn(&event, links);
@@ -123,7 +132,8 @@ impl HostInputs {
     }
 
     fn take(&mut self, event: NoteEvent<()>, drives: [ReedSource; 2]) {
-        (self.at, self.count, self.handed) = (event.timing() as usize, 0, 0);
+        (self.at, self.handed) = (event.timing() as usize, 0);
+        self.events.clear();
         if let NoteEvent::MidiProgramChange { program, .. } = event {
             self.program = Some(program & 0x7f);
         }
@@ -136,13 +146,11 @@ impl HostInputs {
         let was_snapshot = channel.is_some_and(|channel| self.translator.is_snapshot(channel));
         let reeds = ReedControllers::of(&event, drives);
         self.breath_sources.record(&event);
-        for (place, &event) in self.events.iter_mut().zip(self.translator.translate(&event, reeds.is_some()))
-        {
-            *place = event;
-            self.count += 1;
+        for &event in self.translator.translate(&event, reeds.is_some()) {
+            push(&mut self.events, event);
         }
-        for &event in &self.events[..self.count] {
-            if let (Event::Breath(unit), Some(origin)) = (event, self.translator.breath_origin()) {
+        for event in &self.events {
+            if let (Event::Breath(unit), Some(origin)) = (event.event, self.translator.breath_origin()) {
                 self.breath_sources.blow(origin.into(), unit);
             }
         }
@@ -161,11 +169,8 @@ impl HostInputs {
         {
             self.reed_controllers.follow(heard);
         }
-        if let Some(event) = self.reed_controllers.changed(drives)
-            && let Some(place) = self.events.get_mut(self.count)
-        {
-            *place = event;
-            self.count += 1;
+        if let Some(event) = self.reed_controllers.changed(drives) {
+            push(&mut self.events, event.into());
         }
     }
 
@@ -175,37 +180,46 @@ impl HostInputs {
         self.translator.heard().is_some_and(|heard| address.fits(heard.note))
     }
 
-    /// Sets how far the wheel bends until RPN 0 says otherwise, semitones. Returns at most one event.
-    pub fn bend_range(&mut self, semitones: i32) -> Option<Timed<Event>> {
-        self.translator.bend_range(semitones).first().map(|&event| Timed { at: 0, event })
+    /// Sets how far the wheel bends until RPN 0 says otherwise, semitones, from the beginning of the block on.
+    pub fn bend_range(&mut self, semitones: i32) {
+        for &event in self.translator.bend_range(semitones) {
+            push(&mut self.events, event);
+        }
     }
 
-    /// Says which controller blows. Returns at most one event.
-    pub fn breath_from(&mut self, from: BreathFrom) -> Option<Timed<Event>> {
-        let event = self.translator.breath_from(from).first().copied();
-        if event.is_some() {
+    /// Says which controller blows from the beginning of the block on.
+    pub fn breath_from(&mut self, from: BreathFrom) {
+        let said = self.translator.breath_from(from);
+        if !said.is_empty() {
             self.breath_sources.forget();
         }
-        event.map(|event| Timed { at: 0, event })
+        for &event in said {
+            push(&mut self.events, event);
+        }
     }
 
-    /// Says what the mod wheel does: nothing where it `drives` the reed.
-    pub fn wheel(&mut self, wheel: Wheel, drives: [ReedSource; 2]) -> [Option<Timed<Event>>; 2] {
+    /// Says what the mod wheel does from the beginning of the block on: nothing where it `drives` the reed.
+    pub fn wheel(&mut self, wheel: Wheel, drives: [ReedSource; 2]) {
         let is_reeds = drives.contains(&ReedSource::Wheel);
-        at_once(self.translator.wheel(if is_reeds { Wheel::Nothing } else { wheel }))
+        for &event in self.translator.wheel(if is_reeds { Wheel::Nothing } else { wheel }) {
+            push(&mut self.events, event);
+        }
     }
 
-    /// Ends all notes at once.
-    pub fn silence(&mut self) -> [Option<Timed<Event>>; SILENCED] {
-        let events = at_once(self.translator.silence());
+    /// Ends all notes at the beginning of the block.
+    pub fn silence(&mut self) {
+        for &event in self.translator.silence() {
+            push(&mut self.events, event);
+        }
         self.note_ends(0);
-        events
     }
 
-    /// The instrument is silent at sample `at`: what faded has ended.
-    pub fn fall_silent(&mut self, at: u32) {
-        if let Some(note) = self.translator.take_faded() {
-            end(&mut self.ended, at, note);
+    /// After sample `at`, `is_silent` tells which players are silent: what faded there has ended.
+    pub fn fall_silent(&mut self, at: u32, is_silent: impl Fn(usize) -> bool) {
+        for part in (0..self.translator.parts()).filter(|&part| is_silent(part)) {
+            if let Some(note) = self.translator.take_faded(part) {
+                end(&mut self.ended, at, note);
+            }
         }
     }
 
@@ -230,9 +244,12 @@ fn learn(event: &NoteEvent<()>, links: &ControllerLinks) {
     }
 }
 
-/// Events at the beginning of the block.
-fn at_once<const N: usize>(said: &[Event]) -> [Option<Timed<Event>>; N] {
-    std::array::from_fn(|place| said.get(place).map(|&event| Timed { at: 0, event }))
+/// Adds an event, without allocating.
+fn push(events: &mut Vec<PartEvent>, event: PartEvent) {
+    debug_assert!(events.len() < events.capacity(), "a block has more events than it can");
+    if events.len() < events.capacity() {
+        events.push(event);
+    }
 }
 
 /// Adds the end of a note, without allocating.
@@ -249,6 +266,7 @@ mod tests {
     use super::*;
     use crate::controllers::ParameterLink;
     use crate::plugin::breath_sources::BreathInput;
+    use chalumeau_core::event::To;
     use chalumeau_core::units::SoundingNote;
 
     const NO_REED: [ReedSource; 2] = [ReedSource::Parameter; 2];
@@ -257,7 +275,7 @@ mod tests {
         let mut said = said.iter().map(|bytes| NoteEvent::from_midi(5, bytes).unwrap());
         let links = ControllerLinks::default();
         let mut next = || inputs.next(|| said.next(), PluginApi::Clap, drives, &links);
-        std::iter::from_fn(|| next().map(|timed| timed.event)).collect()
+        std::iter::from_fn(|| next().map(|timed| timed.event.event)).collect()
     }
 
     fn all_controllers(value: u8) -> Vec<[u8; 3]> {
@@ -367,12 +385,31 @@ mod tests {
         midi(&mut inputs, NO_REED, &[[0x90, 60, 100], [0x90, 64, 100], [0x80, 64, 0], [0x80, 60, 0]]);
         let key = |inputs: &HostInputs| inputs.ended().iter().map(|(_, note)| note.key).collect::<Vec<_>>();
         assert_eq!(key(&inputs), [64]);
-        inputs.begin_block();
-        inputs.fall_silent(63);
-        inputs.fall_silent(63);
+        inputs.begin_block(1);
+        inputs.fall_silent(63, |_| true);
+        inputs.fall_silent(63, |_| true);
         assert_eq!((key(&inputs), inputs.ended()[0].0), (vec![60], 63));
-        inputs.begin_block();
+        inputs.begin_block(1);
         midi(&mut inputs, NO_REED, &[[0x90, 60, 100], [0xB0, 120, 0]]);
         assert_eq!(key(&inputs), [60]);
+    }
+
+    #[test]
+    fn a_chord_is_split_and_each_of_its_notes_ends_with_its_player() {
+        let mut inputs = HostInputs::default();
+        inputs.begin_block(2);
+        let said = [[0x90, 60, 100], [0x90, 64, 100], [0x80, 60, 0], [0x80, 64, 0]];
+        let mut said = said.iter().map(|bytes| NoteEvent::from_midi(5, bytes).unwrap());
+        let links = ControllerLinks::default();
+        let mut next = || inputs.next(|| said.next(), PluginApi::Clap, NO_REED, &links);
+        let players: Vec<To> = std::iter::from_fn(|| next().map(|timed| timed.event.to)).collect();
+        assert_eq!(players, [0, 1, 0, 1].map(To::Player));
+        assert_eq!(inputs.ended(), []);
+        inputs.fall_silent(7, |part| part == 1);
+        assert_eq!(inputs.ended(), [(7, Note { id: None, channel: 0, key: 64 })]);
+        // Players who go take their notes along.
+        midi(&mut inputs, NO_REED, &[[0x90, 60, 100], [0x90, 64, 100]]);
+        inputs.begin_block(1);
+        assert_eq!(inputs.ended(), [(0, Note { id: None, channel: 0, key: 64 })]);
     }
 }

@@ -16,7 +16,7 @@ pub mod instrument_swap;
 use std::sync::atomic::{AtomicBool, AtomicU32};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use chalumeau_core::instrument::{Clarinet, Model};
+use chalumeau_core::instrument::{Ensemble, Model};
 use instrument_request::InstrumentRequest;
 
 pub use instrument_loader::InstrumentLoader;
@@ -105,5 +105,5 @@ impl SharedInstrument {
 pub struct SwapCandidate {
     /// Number of the activation that it was built for.
     activation: u64,
-    clarinet: Box<Clarinet>,
+    ensemble: Box<Ensemble>,
 }

@@ -23,6 +23,7 @@ pub mod instrument;
 pub mod knob;
 pub mod listening;
 pub mod moment;
+pub mod players;
 pub mod reed;
 pub mod room;
 pub mod scale;
@@ -35,6 +36,7 @@ pub use knob::KnobParams;
 use knob::{KnobKind, ReedSource};
 pub use listening::ListeningParams;
 use moment::{Moment, Moments};
+pub use players::PlayersParams;
 pub use reed::PhysicalReedParams;
 pub use room::RoomParams;
 use scale::ScaleField;
@@ -86,6 +88,9 @@ pub struct ChalumeauParams {
     /// Extended techniques and the vocal tract.
     #[nested(group = "Techniques")]
     pub techniques: TechniqueParams,
+    /// How many players play.
+    #[nested(group = "Players")]
+    pub players: PlayersParams,
     /// State of the instrument as text, written by whoever loads it.
     pub instrument_status: Arc<RwLock<String>>,
     /// Size, zoom, theme and view of the window.
@@ -362,6 +367,7 @@ impl ChalumeauParams {
             room: RoomParams::new(&number),
             expression: ExpressionParams::new(&number),
             techniques: TechniqueParams::new(&number),
+            players: PlayersParams::new(&number),
             knob_status,
             schema: AtomicU32::new(SCHEMA),
             window: RwLock::default(),
@@ -494,6 +500,7 @@ impl ChalumeauParams {
             articulation: Articulation::default(),
             techniques: self.techniques.techniques(),
             tract: self.techniques.tract(),
+            players: self.players.players(),
         };
         settings = self.physical.over(settings);
         if let Some((_, trial, side)) = self.knob.study() {

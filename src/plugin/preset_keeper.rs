@@ -286,7 +286,8 @@ mod tests {
         let mut loader = InstrumentLoader::start(params.clone(), shared);
         loader.activate(&mut swap, RATE_HZ, false).unwrap();
         let swap = swap.as_mut().unwrap();
-        let mut said = Some(Timed { at: 0, event: Event::NoteOn { note: SoundingNote(58), velocity: 0.6 } });
+        let note_on = Event::NoteOn { note: SoundingNote(58), velocity: 0.6 };
+        let mut said = Some(Timed { at: 0, event: note_on.into() });
         let program = factory::all().iter().position(|preset| preset.bundled() == Some(Bundled::A)).unwrap();
         let mut best = Duration::MAX;
         // A busy machine may be late once.

@@ -9,22 +9,36 @@
 use nice_plug::midi::{Channel, Key, VoiceID};
 use nice_plug::prelude::*;
 
+use chalumeau_core::control::midi::BreathOrigin;
 use chalumeau_core::control::midi::breath::BreathFrom;
 use chalumeau_core::control::midi::links::{Link, Links, MOST};
 use chalumeau_core::control::midi::techniques::Wheel;
-use chalumeau_core::control::midi::{BreathOrigin, MidiDecoder};
 use chalumeau_core::control::notes::{HeldNote, Note, NoteAddress, NoteExpression};
-use chalumeau_core::event::Event;
+use chalumeau_core::control::parts::Parts;
+use chalumeau_core::event::PartEvent;
 
 /// Translates one event at a time, and keeps the state between them. Real-time safe throughout.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct EventTranslator {
-    midi: MidiDecoder,
+    midi: Parts,
 }
 
 impl EventTranslator {
+    /// Forgets everything but the number of parts.
+    pub fn reset(&mut self) {
+        self.midi.reset();
+    }
+
+    /// Splits the notes into so many parts. The notes of parts that go are [over](Self::over). Whether this is another
+    /// number.
+    pub fn set_parts(&mut self, count: usize) -> bool {
+        let is_other = count != self.midi.count();
+        self.midi.set_count(count);
+        is_other
+    }
+
     /// The events of a host's event, in order. `is_reeds`: it changes the reed, so that its pressure is no breath.
-    pub fn translate<S>(&mut self, event: &NoteEvent<S>, is_reeds: bool) -> &[Event] {
+    pub fn translate<S>(&mut self, event: &NoteEvent<S>, is_reeds: bool) -> &[PartEvent] {
         match *event {
             NoteEvent::NoteOn { voice_id, channel, key: Key::Number(key), velocity, .. } => {
                 let note = Note { id: voice_id.id(), channel: channel.number().unwrap_or(0), key };
@@ -52,56 +66,61 @@ impl EventTranslator {
     }
 
     /// Sets how far the wheel bends until RPN 0 says otherwise, semitones.
-    pub fn bend_range(&mut self, semitones: i32) -> &[Event] {
+    pub fn bend_range(&mut self, semitones: i32) -> &[PartEvent] {
         self.midi.usual_bend_range(semitones.clamp(0, 127) as u8)
     }
 
-    /// Sets which controller blows. Returns at most one event.
-    pub fn breath_from(&mut self, from: BreathFrom) -> &[Event] {
+    /// Sets which controller blows.
+    pub fn breath_from(&mut self, from: BreathFrom) -> &[PartEvent] {
         self.midi.set_breath_from(from)
     }
 
     /// Sets what the mod wheel does.
-    pub fn wheel(&mut self, wheel: Wheel) -> &[Event] {
+    pub fn wheel(&mut self, wheel: Wheel) -> &[PartEvent] {
         self.midi.set_wheel(wheel)
     }
 
-    /// See [`MidiDecoder::set_links`].
+    /// See [`Parts::set_links`].
     pub fn set_links(&mut self, links: &[Option<Link>; MOST]) {
         self.midi.set_links(links);
     }
 
-    /// See [`MidiDecoder::links`].
+    /// See [`Parts::links`].
     pub fn links(&self) -> &Links {
         self.midi.links()
     }
 
     /// Ends all notes at once.
-    pub fn silence(&mut self) -> &[Event] {
+    pub fn silence(&mut self) -> &[PartEvent] {
         self.midi.silence()
     }
 
-    /// See [`MidiDecoder::heard`].
+    /// See [`Parts::heard`].
     pub fn heard(&self) -> Option<&HeldNote> {
         self.midi.heard()
     }
 
-    /// See [`MidiDecoder::over`].
+    /// See [`Parts::over`].
     pub fn over(&self) -> &[Note] {
         self.midi.over()
     }
 
-    /// See [`MidiDecoder::take_faded`].
-    pub fn take_faded(&mut self) -> Option<Note> {
-        self.midi.take_faded()
+    /// See [`Parts::take_faded`].
+    pub fn take_faded(&mut self, part: usize) -> Option<Note> {
+        self.midi.take_faded(part)
     }
 
-    /// See [`MidiDecoder::breath_origin`].
+    /// How many parts there are.
+    pub fn parts(&self) -> usize {
+        self.midi.count()
+    }
+
+    /// See [`Parts::breath_origin`].
     pub fn breath_origin(&self) -> Option<BreathOrigin> {
         self.midi.breath_origin()
     }
 
-    /// See [`MidiDecoder::is_snapshot`].
+    /// See [`Parts::is_snapshot`].
     pub fn is_snapshot(&self, channel: u8) -> bool {
         self.midi.is_snapshot(channel)
     }
@@ -168,14 +187,20 @@ fn raw14(value: f32) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use chalumeau_core::control::midi::MidiDecoder;
+    use chalumeau_core::event::Event;
     use chalumeau_core::units::SoundingNote;
 
     type Host = NoteEvent<()>;
 
     const OF_60: (VoiceID, Channel, Key) = (VoiceID::Wildcard, Channel::Number(0), Key::Number(60));
 
+    fn plain(events: &[PartEvent]) -> Vec<Event> {
+        events.iter().map(|event| event.event).collect()
+    }
+
     fn midi(translator: &mut EventTranslator, bytes: [u8; 3]) -> Vec<Event> {
-        translator.translate(&Host::from_midi(0, &bytes).expect("a channel message"), false).to_vec()
+        plain(translator.translate(&Host::from_midi(0, &bytes).expect("a channel message"), false))
     }
 
     #[test]
@@ -194,7 +219,7 @@ mod tests {
         let mut translator = EventTranslator::default();
         assert_eq!(midi(&mut translator, [0xE0, 0, 64]), [Event::Bend { cents: 0.0 }]);
         let half = Host::MidiPitchBend { timing: 0, channel: 0, value: 0.5 };
-        assert_eq!(translator.translate(&half, false), [Event::Bend { cents: 0.0 }]);
+        assert_eq!(plain(translator.translate(&half, false)), [Event::Bend { cents: 0.0 }]);
     }
 
     #[test]
@@ -227,11 +252,11 @@ mod tests {
         midi(&mut translator, [0xE0, 127, 127]);
         midi(&mut translator, [0x90, 60, 90]);
         let tuning = Host::PolyTuning { timing: 0, voice_id, channel, key, tuning: -0.5 };
-        assert_eq!(translator.translate(&tuning, false), [Event::Bend { cents: 150.0 }]);
+        assert_eq!(plain(translator.translate(&tuning, false)), [Event::Bend { cents: 150.0 }]);
         let note = Host::NoteOn { timing: 7, voice_id, channel, key, velocity: 1.0 };
         let note_on = Event::NoteOn { note: SoundingNote(60), velocity: 1.0 };
-        assert_eq!(translator.translate(&note, false), [Event::Bend { cents: 200.0 }, note_on]);
-        assert_eq!(translator.translate(&note, false), [note_on]);
+        assert_eq!(plain(translator.translate(&note, false)), [Event::Bend { cents: 200.0 }, note_on]);
+        assert_eq!(plain(translator.translate(&note, false)), [note_on]);
     }
 
     #[test]
@@ -240,17 +265,20 @@ mod tests {
         let (voice_id, channel, key) = OF_60;
         let press = |pressure| Host::PolyPressure { timing: 0, voice_id, channel, key, pressure };
         midi(&mut translator, [0x90, 60, 90]);
-        assert_eq!(translator.translate(&press(0.0), false), []);
-        assert_eq!(translator.translate(&press(0.6), true), [], "it moves the reed");
-        assert_eq!(translator.translate(&press(0.6), false), [Event::Breath(0.6)]);
-        assert_eq!(translator.translate(&press(0.0), false), [Event::Breath(0.0)]);
+        assert_eq!(plain(translator.translate(&press(0.0), false)), []);
+        assert_eq!(plain(translator.translate(&press(0.6), true)), [], "it moves the reed");
+        assert_eq!(plain(translator.translate(&press(0.6), false)), [Event::Breath(0.6)]);
+        assert_eq!(plain(translator.translate(&press(0.0), false)), [Event::Breath(0.0)]);
         let express = Host::PolyExpression { timing: 0, voice_id, channel, key, expression: 2.0 };
-        assert_eq!(translator.translate(&express, false), [Event::Breath(1.0)]);
+        assert_eq!(plain(translator.translate(&express, false)), [Event::Breath(1.0)]);
         // The framework says brightness where a VST3 host said expression.
         let bright = Host::PolyBrightness { timing: 0, voice_id, channel, key, brightness: 0.25 };
-        assert_eq!(translator.translate(&bright, false), []);
-        assert_eq!(translator.translate(&untangled(bright, PluginApi::Vst3), false), [Event::Breath(0.25)]);
-        assert_eq!(translator.translate(&untangled(express, PluginApi::Vst3), false), []);
+        assert_eq!(plain(translator.translate(&bright, false)), []);
+        assert_eq!(
+            plain(translator.translate(&untangled(bright, PluginApi::Vst3), false)),
+            [Event::Breath(0.25)]
+        );
+        assert_eq!(plain(translator.translate(&untangled(express, PluginApi::Vst3), false)), []);
     }
 
     #[test]
@@ -269,8 +297,8 @@ mod tests {
             translator.translate(&on, false);
         }
         let up = |key| Event::NoteOff { note: SoundingNote(key) };
-        assert_eq!(translator.translate(&off(VoiceID::ID(64)), false), [up(62)]);
-        assert_eq!(translator.translate(&off(VoiceID::ID(64)), false), []);
-        assert_eq!(translator.translate(&off(VoiceID::Wildcard), false), [up(60)]);
+        assert_eq!(plain(translator.translate(&off(VoiceID::ID(64)), false)), [up(62)]);
+        assert_eq!(plain(translator.translate(&off(VoiceID::ID(64)), false)), []);
+        assert_eq!(plain(translator.translate(&off(VoiceID::Wildcard), false)), [up(60)]);
     }
 }

@@ -21,7 +21,13 @@ const SLIDERS: &[(Tab, &[&str])] = &[
             "subt", "tract", "tractp",
         ],
     ),
-    (Tab::Sound, &["a4", "noise", "zeta", "lay", "vent", "gain", "room", "rsize", "rdecay", "rtone"]),
+    (
+        Tab::Sound,
+        &[
+            "a4", "noise", "zeta", "lay", "vent", "gain", "room", "rsize", "rdecay", "rtone", "player",
+            "spread", "seats",
+        ],
+    ),
     (
         Tab::Knob,
         &["ceil", "contr", "place", "torque", "mark", "kdamp", "kfric", "refnot", "curve", "oscprt", "oscfl"],
@@ -40,7 +46,7 @@ const STUDY_CHOICES: &[&str] = &["side"];
 const CHOICES: &[(Tab, &[&str])] = &[
     (Tab::Reed, &["rface", "hsrc", "ksrc"]),
     (Tab::Breath, &["bfrom", "resp", "attack", "wheel", "growlp"]),
-    (Tab::Sound, &["tune", "heard"]),
+    (Tab::Sound, &["tune", "heard", "split"]),
     (Tab::Knob, &["knob", "law", "order"]),
     (Tab::Instrument, &["tune", "beyond", "qual"]),
 ];
@@ -67,7 +73,7 @@ const MOMENTARY: &[(Tab, &str, &str)] = &[
 #[test]
 fn every_parameter_has_a_place() {
     let host = crate::support::Fake::default();
-    assert_eq!(host.ids().len(), 93);
+    assert_eq!(host.ids().len(), 97);
     let lists = [SLIDERS, SWITCHES, CHOICES].into_iter().flatten().flat_map(|(_, ids)| ids.iter());
     let placed: Vec<&str> = lists
         .chain([STUDY_SLIDERS, STUDY_SWITCHES, STUDY_CHOICES].into_iter().flatten())

@@ -5,3 +5,4 @@ pub mod keys;
 pub mod knob;
 pub mod midi;
 pub mod notes;
+pub mod parts;

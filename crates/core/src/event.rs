@@ -97,6 +97,60 @@ pub enum Technique {
     Subtone,
 }
 
+/// Which of several players plays an event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum To {
+    /// All of them.
+    All,
+    /// One, from 0.
+    Player(u8),
+}
+
+/// An event, and who of several players plays it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PartEvent {
+    /// Who.
+    pub to: To,
+    /// What.
+    pub event: Event,
+}
+
+impl From<Event> for PartEvent {
+    /// For all players.
+    fn from(event: Event) -> Self {
+        Self { to: To::All, event }
+    }
+}
+
+/// What is played: an event of one player, or one of several players.
+pub trait Played: Copy + From<Event> {
+    /// What happens.
+    fn event(&self) -> Event;
+
+    /// What the first player does of it.
+    fn of_first(&self) -> Option<Event>;
+}
+
+impl Played for Event {
+    fn event(&self) -> Event {
+        *self
+    }
+
+    fn of_first(&self) -> Option<Event> {
+        Some(*self)
+    }
+}
+
+impl Played for PartEvent {
+    fn event(&self) -> Event {
+        self.event
+    }
+
+    fn of_first(&self) -> Option<Event> {
+        matches!(self.to, To::All | To::Player(0)).then_some(self.event)
+    }
+}
+
 /// An event and when it happens.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timed<E> {

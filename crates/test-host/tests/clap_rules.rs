@@ -428,7 +428,7 @@ fn pages_for_control_surfaces_hold_what_a_player_turns() {
         ("Player", "Breath and lip"),
         ("Player", "Expression"),
         ("Player", "Techniques"),
-        ("Player", "Room"),
+        ("Player", "Room and players"),
         ("Player", "Tuning"),
         ("Player", "Listening"),
         ("Reed", "Reed"),

@@ -546,9 +546,9 @@ fn the_host_is_told_of_a_faded_note_when_nothing_sounds_any_more() {
 }
 
 #[test]
-fn voice_info_is_one_voice_with_overlapping_notes() {
+fn voice_info_is_one_voice_of_as_many_as_there_are_players_with_overlapping_notes() {
     let info = plugin().voice_info().unwrap();
-    assert_eq!((info.voice_count, info.voice_capacity), (1, 1));
+    assert_eq!((info.voice_count, info.voice_capacity), (1, 16));
     assert!(info.flags.contains(VoiceInfoFlags::SUPPORTS_OVERLAPPING_NOTES));
 }
 

@@ -315,7 +315,13 @@ fn sound(job: &RenderJob, settings: Settings, score: &Score) -> Result<Vec<u8>, 
     let channels = if settings.room.amount > 0.0 { 2 } else { 1 };
     let mut bytes = Cursor::new(Vec::new());
     let mut wav = WavFile::new(&mut bytes, job.rate, Depth::Int16, channels, score.samples)?;
-    let stop = RenderJob { model: job.model.clone(), settings, score: Score::default(), rate: job.rate };
+    let stop = RenderJob {
+        model: job.model.clone(),
+        settings,
+        score: Score::default(),
+        parts: Score::default(),
+        rate: job.rate,
+    };
     let mut stereo = StereoBlocks::new(score, job.rate).in_room(&settings.room);
     player::play(&mut stop.clarinet(), score, BLOCK, |block| {
         if channels == 1 {

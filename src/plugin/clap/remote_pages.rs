@@ -22,6 +22,7 @@ pub fn define(params: &ChalumeauParams, context: &mut impl RemoteControlsContext
         room,
         expression,
         techniques,
+        players,
         ..
     } = params;
     context.add_section("Player", |section| {
@@ -54,11 +55,15 @@ pub fn define(params: &ChalumeauParams, context: &mut impl RemoteControlsContext
             page.add_param(&techniques.tract);
             page.add_param(&techniques.tract_interval);
         });
-        section.add_page("Room", |page| {
+        section.add_page("Room and players", |page| {
             page.add_param(&room.amount);
             page.add_param(&room.size);
             page.add_param(&room.decay);
             page.add_param(&room.tone);
+            page.add_param(&players.count);
+            page.add_param(&players.split);
+            page.add_param(&players.spread);
+            page.add_param(&players.seats);
         });
         section.add_page("Tuning", |page| {
             page.add_param(&tuning.a4);

@@ -18,7 +18,7 @@ use super::{
 use crate::cache::Cache;
 use crate::plugin::params::ChalumeauParams;
 use chalumeau_core::instrument::prepare::{Preparation, Progress};
-use chalumeau_core::instrument::{BuildError, Clarinet, Model};
+use chalumeau_core::instrument::{BuildError, Ensemble, Model};
 
 /// How often the thread looks at the parameters.
 const POLL: Duration = Duration::from_millis(20);
@@ -35,7 +35,7 @@ pub struct InstrumentLoader {
     cache: Option<Cache>,
     activations: u64,
     /// The audio thread's ends of the rings, until an [`InstrumentSwap`] takes them.
-    ends: Option<(rtrb::Consumer<SwapCandidate>, rtrb::Producer<Box<Clarinet>>)>,
+    ends: Option<(rtrb::Consumer<SwapCandidate>, rtrb::Producer<Box<Ensemble>>)>,
 }
 
 impl InstrumentLoader {
@@ -93,12 +93,12 @@ impl InstrumentLoader {
         let same = swap.as_ref().is_some_and(|swap| {
             Arc::ptr_eq(swap.clarinet().model(), &current.model) && swap.rate_hz() == host_rate_hz
         });
-        let clarinet = (!same).then(|| Box::new(Clarinet::new(current.model.clone(), host_rate_hz)));
-        match (swap.as_mut(), clarinet) {
-            (Some(swap), clarinet) => swap.activate(clarinet, host_rate_hz, number, request.choice),
-            (None, Some(clarinet)) => {
+        let ensemble = (!same).then(|| Box::new(Ensemble::new(current.model.clone(), host_rate_hz)));
+        match (swap.as_mut(), ensemble) {
+            (Some(swap), ensemble) => swap.activate(ensemble, host_rate_hz, number, request.choice),
+            (None, Some(ensemble)) => {
                 if let Some((incoming, outgoing)) = self.ends.take() {
-                    let mut new = InstrumentSwap::new(self.shared.clone(), clarinet, incoming, outgoing);
+                    let mut new = InstrumentSwap::new(self.shared.clone(), ensemble, incoming, outgoing);
                     new.activate(None, host_rate_hz, number, request.choice);
                     *swap = Some(new);
                 }
@@ -166,7 +166,7 @@ struct LoaderThread {
     shared: Arc<SharedInstrument>,
     cache: Option<Cache>,
     to_audio: rtrb::Producer<SwapCandidate>,
-    from_audio: rtrb::Consumer<Box<Clarinet>>,
+    from_audio: rtrb::Consumer<Box<Ensemble>>,
     /// An instrument that the ring had no room for, because the audio thread does not run.
     waiting: Option<SwapCandidate>,
     /// The latest request, and the time when it came.
@@ -393,7 +393,7 @@ impl LoaderThread {
         readiness: Readiness,
     ) -> Result<(), Interrupted> {
         let model = request.with_keys(model);
-        let clarinet = Box::new(Clarinet::new(model.clone(), request.host_rate_hz));
+        let ensemble = Box::new(Ensemble::new(model.clone(), request.host_rate_hz));
         {
             let mut activation = self.shared.activation();
             if activation.number != number {
@@ -404,7 +404,7 @@ impl LoaderThread {
         // Its keys may have other names.
         self.params.host.tell();
         // This replaces an instrument that still waits for room: that one is worse.
-        self.waiting = Some(SwapCandidate { activation: number, clarinet });
+        self.waiting = Some(SwapCandidate { activation: number, ensemble });
         self.push();
         Ok(())
     }

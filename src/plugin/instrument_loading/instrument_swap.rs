@@ -6,9 +6,9 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use super::{SharedInstrument, SwapCandidate};
-use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::event::{Event, PartEvent, Timed};
 use chalumeau_core::instrument::stereo::Stereo;
-use chalumeau_core::instrument::{Channels, Clarinet, Settings};
+use chalumeau_core::instrument::{Channels, Clarinet, Ensemble, Settings};
 
 /// Time for which a new instrument plays unheard, s. The lowest notes of a B flat clarinet speak after 50 ms, those of a
 /// bass clarinet after 100 ms.
@@ -23,12 +23,12 @@ const LONGEST_WAIT: Duration = Duration::from_secs(600);
 /// The instrument that plays, and the next one while they change over.
 pub struct InstrumentSwap {
     shared: Arc<SharedInstrument>,
-    playing: Box<Clarinet>,
+    playing: Box<Ensemble>,
     next: Option<NextInstrument>,
     /// An old instrument that the ring back had no room for.
-    old: Option<Box<Clarinet>>,
+    old: Option<Box<Ensemble>>,
     incoming: rtrb::Consumer<SwapCandidate>,
-    outgoing: rtrb::Producer<Box<Clarinet>>,
+    outgoing: rtrb::Producer<Box<Ensemble>>,
     settings: Settings,
     stereo: Stereo,
     activation: u64,
@@ -41,7 +41,7 @@ pub struct InstrumentSwap {
 
 /// A new instrument beside the old one.
 struct NextInstrument {
-    clarinet: Box<Clarinet>,
+    ensemble: Box<Ensemble>,
     /// Samples it has played.
     played: usize,
 }
@@ -49,9 +49,9 @@ struct NextInstrument {
 impl InstrumentSwap {
     pub(super) fn new(
         shared: Arc<SharedInstrument>,
-        playing: Box<Clarinet>,
+        playing: Box<Ensemble>,
         incoming: rtrb::Consumer<SwapCandidate>,
-        outgoing: rtrb::Producer<Box<Clarinet>>,
+        outgoing: rtrb::Producer<Box<Ensemble>>,
     ) -> Self {
         Self {
             shared,
@@ -70,17 +70,17 @@ impl InstrumentSwap {
         }
     }
 
-    /// Begins a new activation. `clarinet` replaces the instrument if the old one does not fit. [main thread]
+    /// Begins a new activation. `ensemble` replaces the instrument if the old one does not fit. [main thread]
     pub(super) fn activate(
         &mut self,
-        clarinet: Option<Box<Clarinet>>,
+        ensemble: Option<Box<Ensemble>>,
         rate_hz: f64,
         activation: u64,
         choice: u32,
     ) {
         self.next = None;
-        if let Some(clarinet) = clarinet {
-            self.playing = clarinet;
+        if let Some(ensemble) = ensemble {
+            self.playing = ensemble;
         }
         (self.activation, self.awaited_choice) = (activation, choice);
         self.rate_hz = rate_hz;
@@ -90,8 +90,13 @@ impl InstrumentSwap {
         self.fade = (FADE_S * rate_hz) as usize;
     }
 
-    /// The instrument that plays.
+    /// The instrument of the first player.
     pub fn clarinet(&self) -> &Clarinet {
+        self.playing.first()
+    }
+
+    /// Those who play.
+    pub fn ensemble(&self) -> &Ensemble {
         &self.playing
     }
 
@@ -119,9 +124,15 @@ impl InstrumentSwap {
     pub fn set_settings(&mut self, settings: &Settings) {
         self.settings = *settings;
         self.stereo.set_room(&settings.room);
+        let was_lone = self.playing.is_lone();
         self.playing.set_settings(settings);
+        if self.playing.is_lone() != was_lone {
+            // Several players are panned one by one.
+            let position = if was_lone { 0.0 } else { self.playing.pan() };
+            self.stereo.heed(&Timed { at: 0, event: Event::Pan { position } });
+        }
         if let Some(next) = &mut self.next {
-            next.clarinet.set_settings(settings);
+            next.ensemble.set_settings(settings);
         }
     }
 
@@ -142,15 +153,15 @@ impl InstrumentSwap {
     pub fn receive(&mut self) {
         self.send_back();
         while self.next.is_none() && self.old.is_none() {
-            let Ok(SwapCandidate { activation, mut clarinet }) = self.incoming.pop() else { return };
+            let Ok(SwapCandidate { activation, mut ensemble }) = self.incoming.pop() else { return };
             if activation != self.activation {
-                self.old = Some(clarinet);
+                self.old = Some(ensemble);
             } else {
-                clarinet.set_settings(&self.settings);
-                clarinet.carry_on(&self.playing);
+                ensemble.set_settings(&self.settings);
+                ensemble.carry_on(&self.playing);
                 // Silence needs no fade.
                 let played = if self.playing.is_silent() { self.warm_up + self.fade } else { 0 };
-                self.next = Some(NextInstrument { clarinet, played });
+                self.next = Some(NextInstrument { ensemble, played });
                 self.finish_swap();
             }
             self.send_back();
@@ -172,7 +183,7 @@ impl InstrumentSwap {
             && self.old.is_none()
             && let Some(next) = self.next.take()
         {
-            self.old = Some(std::mem::replace(&mut self.playing, next.clarinet));
+            self.old = Some(std::mem::replace(&mut self.playing, next.ensemble));
         }
     }
 
@@ -185,25 +196,26 @@ impl InstrumentSwap {
         self.stereo.reset();
         self.playing.reset();
         if let Some(next) = &mut self.next {
-            next.clarinet.reset();
+            next.ensemble.reset();
         }
     }
 
-    /// See [`Clarinet::render_events_channels`]; both instruments receive the events.
-    pub fn render_events(&mut self, events: impl IntoIterator<Item = Timed<Event>>, mut out: Channels) {
+    /// See [`Ensemble::render_events_channels`]; both instruments receive the events.
+    pub fn render_events(&mut self, events: impl IntoIterator<Item = Timed<PartEvent>>, mut out: Channels) {
+        let is_lone = self.playing.is_lone();
         if self.next.is_none() {
             let stereo = &mut self.stereo;
-            let events = events.into_iter().inspect(|event| stereo.heed(event));
+            let events = events.into_iter().inspect(|event| heed(stereo, event, is_lone));
             return self.playing.render_events_channels(events, out);
         }
         let (mut done, end) = (0, out.len());
         for Timed { at, event } in events {
-            self.stereo.heed(&Timed { at, event });
+            heed(&mut self.stereo, &Timed { at, event }, is_lone);
             let at = at.clamp(done, end);
             self.render(out.part(done..at));
             self.playing.apply(event);
             if let Some(next) = &mut self.next {
-                next.clarinet.apply(event);
+                next.ensemble.apply(event);
             }
             done = at;
         }
@@ -223,7 +235,7 @@ impl InstrumentSwap {
             self.playing.render_channels(out.part(0..out.len()));
             let Some(next) = &mut self.next else { continue };
             let (new_left, new_right) = (&mut new_left[..out.len()], &mut new_right[..out.len()]);
-            next.clarinet.render_channels(if out.is_stereo() {
+            next.ensemble.render_channels(if out.is_stereo() {
                 Channels::two(new_left, new_right)
             } else {
                 Channels::one(new_left)
@@ -251,6 +263,13 @@ impl InstrumentSwap {
     }
 }
 
+/// Room and pan of the whole instrument; several players are panned one by one.
+fn heed(stereo: &mut Stereo, &Timed { at, event }: &Timed<PartEvent>, is_lone: bool) {
+    if is_lone || !matches!(event.event, Event::Pan { .. }) {
+        stereo.heed(&Timed { at, event: event.event });
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -265,11 +284,11 @@ mod tests {
     struct SwapEnds {
         swap: InstrumentSwap,
         send: rtrb::Producer<SwapCandidate>,
-        back: rtrb::Consumer<Box<Clarinet>>,
+        back: rtrb::Consumer<Box<Ensemble>>,
     }
 
     fn swap_ends() -> SwapEnds {
-        let built_in = || Box::new(Clarinet::built_in(RATE).unwrap());
+        let built_in = || Box::new(Ensemble::built_in(RATE).unwrap());
         let (send, incoming) = rtrb::RingBuffer::new(4);
         let (outgoing, back) = rtrb::RingBuffer::new(8);
         let mut swap = InstrumentSwap::new(Arc::default(), built_in(), incoming, outgoing);
@@ -278,9 +297,9 @@ mod tests {
         SwapEnds { swap, send, back }
     }
 
-    fn held() -> [Timed<Event>; 2] {
+    fn held() -> [Timed<PartEvent>; 2] {
         let note_on = Event::NoteOn { note: SoundingNote(60), velocity: 0.8 };
-        [Event::Breath(0.6), note_on].map(|event| Timed { at: 0, event })
+        [Event::Breath(0.6), note_on].map(|event| Timed { at: 0, event: event.into() })
     }
 
     /// Plays a held note, with another instrument after half a second, in blocks of `block` samples.
@@ -290,8 +309,8 @@ mod tests {
         let mut said = Some(held());
         for (number, out) in out.chunks_mut(block).enumerate() {
             if number * block == AT {
-                let clarinet = Box::new(Clarinet::new(Arc::new(model.clone()), RATE));
-                assert!(ends.send.push(SwapCandidate { activation: 1, clarinet }).is_ok());
+                let ensemble = Box::new(Ensemble::new(Arc::new(model.clone()), RATE));
+                assert!(ends.send.push(SwapCandidate { activation: 1, ensemble }).is_ok());
             }
             ends.swap.receive();
             ends.swap.render_events(said.take().into_iter().flatten(), Channels::one(out));
@@ -337,14 +356,14 @@ mod tests {
         let mut ends = swap_ends();
         let mut out = vec![0.0; AT];
         ends.swap.render_events(held(), Channels::one(&mut out));
-        let clarinet = Box::new(Clarinet::built_in(RATE).unwrap());
-        assert!(ends.send.push(SwapCandidate { activation: 1, clarinet }).is_ok());
+        let ensemble = Box::new(Ensemble::built_in(RATE).unwrap());
+        assert!(ends.send.push(SwapCandidate { activation: 1, ensemble }).is_ok());
         ends.swap.receive();
         ends.swap.render_events([], Channels::one(&mut out));
         let loud = rms(&out[AT / 2..]);
         assert!(loud > 1e-3, "the key is still down");
         // The release reaches the new instrument.
-        let off = Timed { at: 0, event: Event::NoteOff { note: SoundingNote(60) } };
+        let off = Timed { at: 0, event: Event::NoteOff { note: SoundingNote(60) }.into() };
         ends.swap.render_events([off], Channels::one(&mut out));
         assert!(rms(&out[AT / 2..]) < 1e-3 * loud, "{} of {loud}", rms(&out[AT / 2..]));
     }
@@ -354,13 +373,13 @@ mod tests {
         let mut ends = swap_ends();
         let mut out = vec![0.0; AT];
         ends.swap.render_events([], Channels::one(&mut out));
-        let clarinet = || Box::new(Clarinet::built_in(RATE).unwrap());
-        let model = clarinet();
-        let model = model.model();
+        let ensemble = || Box::new(Ensemble::built_in(RATE).unwrap());
+        let model = ensemble();
+        let model = model.first().model();
         assert!(!Arc::ptr_eq(ends.swap.clarinet().model(), model));
-        assert!(ends.send.push(SwapCandidate { activation: 7, clarinet: clarinet() }).is_ok());
-        let new = Box::new(Clarinet::new(model.clone(), RATE));
-        assert!(ends.send.push(SwapCandidate { activation: 1, clarinet: new }).is_ok());
+        assert!(ends.send.push(SwapCandidate { activation: 7, ensemble: ensemble() }).is_ok());
+        let new = Box::new(Ensemble::new(model.clone(), RATE));
+        assert!(ends.send.push(SwapCandidate { activation: 1, ensemble: new }).is_ok());
         ends.swap.receive();
         assert!(Arc::ptr_eq(ends.swap.clarinet().model(), model));
         assert!(ends.back.pop().is_ok() && ends.back.pop().is_ok() && ends.back.pop().is_err());

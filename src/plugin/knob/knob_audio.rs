@@ -11,7 +11,7 @@ use super::{NO_NOTE, SharedKnob};
 use crate::plugin::instrument_loading::{InstrumentSwap, SharedInstrument};
 use crate::plugin::params::ChalumeauParams;
 use chalumeau_core::control::knob::slap_strength;
-use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::event::{Event, PartEvent, Played, Timed, To};
 use chalumeau_core::instrument::{Channels, Settings};
 use chalumeau_knob::device::{KnobReader, Release};
 use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, Breath14, BreathMapping, GRID};
@@ -150,7 +150,7 @@ impl KnobAudio {
         &mut self,
         instrument: &mut InstrumentSwap,
         settings: &Settings,
-        host: impl Iterator<Item = Timed<Event>>,
+        host: impl Iterator<Item = Timed<PartEvent>>,
         context: BlockContext,
         out: Channels,
     ) {
@@ -162,7 +162,7 @@ impl KnobAudio {
         }
         let shared = &self.shared;
         let host = host.inspect(|event| {
-            if matches!(event.event, Event::Panic) {
+            if matches!(event.event.event, Event::Panic) {
                 shared.let_go(Release::Panic);
             }
         });
@@ -204,19 +204,23 @@ impl KnobAudio {
                 self.replayed += samples as u64;
             }
             (BlockBreath::Knob, _, Some(reader)) => {
-                let slap = reader.take_slap().map(|speed| Timed {
-                    at: 0,
-                    event: Event::TongueSlap { strength: slap_strength(speed) },
+                let slap = reader.take_slap().map(|speed| {
+                    let event = Event::TongueSlap { strength: slap_strength(speed) };
+                    Timed { at: 0, event: PartEvent { to: To::Player(0), event } }
                 });
                 let angle = |at: usize| reader.pose(at).map(|pose| f64::from(pose.angle_deg));
                 let events = BlownEvents::new(host, blower, hand, full_pa, samples, angle, &mut on_breath);
                 instrument.render_events(slap.into_iter().chain(events), out);
             }
             _ => {
-                let host = host.inspect(|event| blower.heed(event));
+                let host = host.inspect(|&Timed { at, event }| {
+                    if let Some(event) = event.of_first() {
+                        blower.heed(&Timed { at, event });
+                    }
+                });
                 let last_breath = last_breath.map(|breath| {
                     on_breath(0, breath);
-                    Timed { at: 0, event: Event::Breath(breath.unit()) }
+                    Timed { at: 0, event: Event::Breath(breath.unit()).into() }
                 });
                 instrument.render_events(last_breath.into_iter().chain(host), out);
             }

@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use super::SharedWindow;
 use crate::plugin::breath_sources::BreathSources;
 use crate::plugin::instrument_loading::InstrumentSwap;
-use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::event::Event;
 use chalumeau_core::instrument::player::PlayerState;
 use chalumeau_core::instrument::scope::{SCOPE_SAMPLES, ScopeSample};
 
@@ -90,8 +90,8 @@ impl WindowAudio {
     }
 
     /// The key events of the window since the last block. Real-time safe.
-    pub fn keys(&mut self) -> [Option<Timed<Event>>; KEYS_PER_BLOCK] {
-        std::array::from_fn(|_| self.keys.pop().ok().map(|event| Timed { at: 0, event }))
+    pub fn keys(&mut self) -> [Option<Event>; KEYS_PER_BLOCK] {
+        std::array::from_fn(|_| self.keys.pop().ok())
     }
 
     /// Sends the sound and the inside of the instrument while the window is open. Real-time safe.

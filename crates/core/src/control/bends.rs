@@ -88,6 +88,11 @@ impl Bends {
         }
     }
 
+    /// Whether a channel is a member of a zone.
+    pub fn is_member(&self, channel: usize) -> bool {
+        self.zone_of(channel).is_some_and(|zone| MANAGERS[zone] != channel)
+    }
+
     /// Whether what happens to this channel's wheel is heard now.
     pub fn is_heard(&self, channel: usize, heard: Option<usize>) -> bool {
         let Some(heard) = heard else { return self.common == Some(channel) };

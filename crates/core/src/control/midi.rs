@@ -1,7 +1,8 @@
 //! Turns MIDI channel messages and the note events of hosts into events, for the plugin and for the offline renderer
 //! alike.
 //!
-//! The instrument has one voice, so all channels play it. The last key struck is heard; see [`notes`](super::notes).
+//! It is for one player, so all channels play it. The last key struck is heard; see [`notes`](super::notes). For several
+//! players, [`parts`](super::parts) has a decoder for each.
 //! [`breath`] says which controller the breath comes from, [`snapshot`] what is left out of the start of a project, [`mix`]
 //! what volume and pan do. Bend follows the heard note's channel and its MPE zone, see [`bends`](super::bends); RPN 0 sets a
 //! bend range, RPN 6 a zone. [`techniques`] says what the mod wheel and CC18 to CC20 do.
@@ -60,6 +61,9 @@ const RPN: u8 = 101;
 const ALL_SOUND_OFF: u8 = 120;
 const RESET_CONTROLLERS: u8 = 121;
 const ALL_NOTES_OFF: u8 = 123;
+
+/// Controllers that breath can come from.
+pub(super) const BREATH_LIKE: [u8; 4] = [BREATH, BREATH_FINE, EXPRESSION, EXPRESSION_FINE];
 
 /// From this value on the pedal is down.
 const PEDAL_DOWN: u8 = 64;
@@ -199,7 +203,27 @@ impl MidiDecoder {
         self.velocity = f32::from(velocity.clamp(1, 127)) / 127.0;
         let by_pedal = self.notes.take_by_pedal();
         self.notes.press(note);
-        self.bends.play(usize::from(note.channel));
+        self.prepare_note(note.channel);
+        self.remix();
+        if by_pedal.is_some_and(|held| held.key == note.key) {
+            self.lift(note.key);
+        }
+        self.finger(note.key);
+        self.lift_others(None);
+        self.said.events()
+    }
+
+    /// A note begins on this channel, on another [part](super::parts): what controllers have said before it is meant here
+    /// too. Real-time safe.
+    pub(super) fn strike_elsewhere(&mut self, channel: u8) -> &[Event] {
+        self.begin();
+        self.prepare_note(channel);
+        self.said.events()
+    }
+
+    /// Who strikes a note means what controllers have said.
+    fn prepare_note(&mut self, channel: u8) {
+        self.bends.play(usize::from(channel));
         self.channels.iter_mut().for_each(|channel| channel.run = Run::default());
         self.rebend();
         if let Some((controller, unit)) = self.breath.settle() {
@@ -208,13 +232,12 @@ impl MidiDecoder {
         if let Some(unit) = self.linked_breath.take() {
             self.blow(BreathOrigin::Link, unit);
         }
-        self.remix();
-        if by_pedal.is_some_and(|held| held.key == note.key) {
-            self.lift(note.key);
-        }
-        self.finger(note.key);
-        self.lift_others(None);
-        self.said.events()
+    }
+
+    /// The same without notes: another [part](super::parts) of who has played on this one.
+    pub(super) fn without_notes(&self) -> Self {
+        let (notes, fingers, said) = Default::default();
+        Self { notes, fingers, said, ..self.clone() }
     }
 
     /// Keys come up. The note that sounded before is heard again; the last one ends, or the pedal holds it. Real-time safe.
@@ -365,6 +388,21 @@ impl MidiDecoder {
     /// The note that sounds, or the last one while it fades, and what belongs to it.
     pub fn heard(&self) -> Option<&HeldNote> {
         self.notes.heard()
+    }
+
+    /// The held notes, oldest first.
+    pub fn held(&self) -> &[HeldNote] {
+        self.notes.held()
+    }
+
+    /// Whether only the pedal holds the note that sounds.
+    pub fn is_by_pedal(&self) -> bool {
+        self.notes.is_by_pedal()
+    }
+
+    /// Whether a channel, 0..=15, is a member of an MPE zone.
+    pub fn is_member(&self, channel: u8) -> bool {
+        self.bends.is_member(usize::from(channel % 16))
     }
 
     /// The notes that the latest message has ended. A released note that fades is not among them.

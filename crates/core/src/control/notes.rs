@@ -160,6 +160,11 @@ impl Notes {
         self.sounding().or(self.released.as_ref())
     }
 
+    /// Whether only the pedal holds the note that sounds.
+    pub fn is_by_pedal(&self) -> bool {
+        self.sounding().is_some_and(|held| held.is_by_pedal)
+    }
+
     /// The notes that have ended since [`begin`](Self::begin). A note that fades has not.
     pub fn over(&self) -> &[Note] {
         &self.over[..self.over_count]

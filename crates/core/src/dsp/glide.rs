@@ -36,6 +36,11 @@ impl Glide {
         }
     }
 
+    /// Where it goes, or rests.
+    pub fn target(&self) -> f32 {
+        self.target
+    }
+
     /// Is at `value` at once.
     pub fn set(&mut self, value: f32) {
         *self = Self { now: value, target: value, step: 0.0, left: 0, samples: self.samples };

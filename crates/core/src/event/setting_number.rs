@@ -100,4 +100,8 @@ pub enum SettingNumber {
     TractAmount,
     /// `tract.interval_semitones`.
     TractIntervalSemitones,
+    /// `players.spread_cents`.
+    PlayersSpreadCents,
+    /// `players.width`.
+    PlayersWidth,
 }

@@ -7,6 +7,7 @@
 //! Band and level of the pulsed jet are those of recorded notes, see `docs/tone.md`.
 
 use super::control_tick::TICK;
+use super::person::Person;
 
 /// How the jet makes noise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -55,6 +56,7 @@ pub(super) struct BreathNoise {
     quiet: f64,
     /// Noise flow without pulses.
     whisper: f64,
+    seed: u64,
     random: u64,
     high: f64,
     low: [f64; 2],
@@ -73,6 +75,7 @@ impl BreathNoise {
             mean: 0.0,
             quiet: LAMINAR_FLOW,
             whisper: 0.0,
+            seed: NOISE_SEED,
             random: NOISE_SEED,
             high: 0.0,
             low: [0.0; 2],
@@ -83,7 +86,13 @@ impl BreathNoise {
     /// Starts the noise again from its seed; the jet stays.
     pub fn reset(&mut self) {
         (self.mean, self.whisper, self.high, self.low) = (0.0, 0.0, 0.0, [0.0; 2]);
-        self.random = NOISE_SEED;
+        self.random = self.seed;
+    }
+
+    /// Makes the noise of another player, from its beginning.
+    pub fn play_as(&mut self, person: &Person) {
+        self.seed = person.seed(NOISE_SEED);
+        self.reset();
     }
 
     /// Chooses how the jet makes noise. Real-time safe.

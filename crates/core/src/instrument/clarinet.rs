@@ -16,6 +16,7 @@ use crate::instrument::lip::embouchure;
 use crate::instrument::listening::Listening;
 use crate::instrument::model::{BuildError, Model};
 use crate::instrument::output_level::OutputLevel;
+use crate::instrument::person::Person;
 use crate::instrument::player::{Player, PlayerState};
 use crate::instrument::scope::Scope;
 use crate::instrument::settings::Settings;
@@ -107,6 +108,25 @@ impl Clarinet {
 
     /// Any instrument, from a model that was prepared for this host rate, Hz. Allocates.
     pub fn new(model: Arc<Model>, host_rate_hz: f64) -> Self {
+        Self::of_player(model, host_rate_hz, 0)
+    }
+
+    /// As [`new`](Self::new), played by one of several players, by number: with breath noise, wander and swing of its own,
+    /// and out of tune by its share of [`Players::spread_cents`](super::Players::spread_cents). Number 0 is the lone player.
+    pub fn of_player(model: Arc<Model>, host_rate_hz: f64, number: u8) -> Self {
+        let resampler = Resampler::new(model.coeffs.rate_hz, host_rate_hz);
+        Self::with_resampler(model, host_rate_hz, number, resampler)
+    }
+
+    /// Another player beside this one, at the same rate, at rest. Most of its making is shared. Allocates.
+    pub(super) fn beside(&self, host_rate_hz: f64, number: u8) -> Self {
+        let mut resampler = self.resampler.clone();
+        resampler.reset();
+        Self::with_resampler(self.model.clone(), host_rate_hz, number, resampler)
+    }
+
+    fn with_resampler(model: Arc<Model>, host_rate_hz: f64, number: u8, resampler: Resampler) -> Self {
+        let person = Person::new(number);
         let lip = embouchure(model.lowest_hz, model.lowest_hz);
         let (swept, rate) = (model.swept_s, model.coeffs.rate_hz);
         let reed = ReedCoeffs::new(
@@ -129,14 +149,14 @@ impl Clarinet {
         };
         with_voice!(&mut voice, voice => {
             voice.listen(&Listening::default(), false);
+            voice.play_as(&person);
             voice.reset();
         });
-        let resampler = Resampler::new(rate, host_rate_hz);
         let level = OutputLevel::new(model.file.nominal_radius_m, host_rate_hz);
         let scope = Scope::new(rate, model.lowest_hz);
         Self {
             model,
-            player: Player::default(),
+            player: Player::new(person),
             voice,
             right: resampler.clone(),
             resampler,
@@ -157,6 +177,11 @@ impl Clarinet {
         self.player.set_settings(settings);
         self.level.set(self.player.settings());
         self.listen();
+    }
+
+    /// The settings in use.
+    pub fn settings(&self) -> &Settings {
+        self.player.settings()
     }
 
     fn listen(&mut self) {
@@ -184,6 +209,24 @@ impl Clarinet {
     pub fn carry_on(&mut self, from: &Self) {
         with_voice!(&mut self.voice, voice => self.player.carry_on(&from.player, &self.model, voice));
         self.level.carry_on(&from.level);
+    }
+
+    /// Takes over breath, bend, volume and controllers from another player, without keys. Real-time safe.
+    pub(super) fn follow(&mut self, from: &Self) {
+        self.player.follow(&from.player);
+        self.level.follow(&from.level);
+    }
+
+    /// All keys come up. Real-time safe.
+    pub(super) fn let_go(&mut self) {
+        while let Some(note) = self.player.key() {
+            self.apply(Event::NoteOff { note });
+        }
+    }
+
+    /// Samples up to this magnitude count as silence.
+    pub(super) fn silence(&self) -> f32 {
+        SILENCE * self.level.boost()
     }
 
     /// Overwrites `out` with the next samples, mono. Real-time safe.
@@ -346,7 +389,7 @@ impl Clarinet {
         if self.choke.fade(out.part(0..out.len())) {
             self.cut();
         }
-        let (silence, mut audible) = (SILENCE * self.level.boost(), false);
+        let (silence, mut audible) = (self.silence(), false);
         // Where the sound begins or ends, subnormal numbers would slow whatever comes after; a zero keeps its sign.
         out.each(|channel| {
             let is_quiet = |sample: Option<&f32>| sample.is_some_and(|x| x.abs() <= silence);

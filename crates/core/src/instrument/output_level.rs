@@ -53,6 +53,11 @@ impl OutputLevel {
         self.volume = from.volume;
     }
 
+    /// Goes to the volume of another player.
+    pub fn follow(&mut self, from: &Self) {
+        self.volume.go_to(from.volume.target());
+    }
+
     /// Arrives at once, with the volume at 1.
     pub fn reset(&mut self) {
         self.settle();

@@ -41,6 +41,7 @@ use crate::control::keys::Keys;
 use crate::event::Event;
 use crate::instrument::breath_noise::Jet;
 use crate::instrument::model::Model;
+use crate::instrument::person::Person;
 use crate::instrument::settings::{BreathResponse, Settings};
 use crate::instrument::voice::{Drive, TICK, Voice};
 use crate::reed::physical::P_REF_PA;
@@ -133,6 +134,7 @@ pub struct PlayerState {
 /// One player of one instrument.
 #[derive(Clone, Debug, Default)]
 pub struct Player {
+    person: Person,
     settings: Settings,
     /// The same with the reed on its way and under its controllers, as of when `posture` was worked out.
     now: Settings,
@@ -166,6 +168,17 @@ pub struct Player {
 }
 
 impl Player {
+    /// One of several players, at rest.
+    pub fn new(person: Person) -> Self {
+        Self {
+            person,
+            life: Life::of(&person),
+            swing: Swing::of(&person),
+            techniques: Techniques::of(&person),
+            ..Self::default()
+        }
+    }
+
     /// Takes new settings, clamped to their ranges; they are heard from the next tick on. A sounding reed glides to them.
     /// Real-time safe.
     pub fn set_settings(&mut self, settings: &Settings) {
@@ -187,6 +200,11 @@ impl Player {
     /// The settings in use.
     pub fn settings(&self) -> &Settings {
         &self.settings
+    }
+
+    /// The key that sounds, if one is held.
+    pub fn key(&self) -> Option<SoundingNote> {
+        self.keys.last()
     }
 
     /// Speed of the instrument's clock at the end of the last tick; 1 is the model's rate.
@@ -221,7 +239,7 @@ impl Player {
     /// Puts player, reed and bore back to the beginning; settings stay. The one way to end everything: a player who forgot
     /// while the bore went on would leave fingers under way. Real-time safe.
     pub fn reset<F: Real>(&mut self, voice: &mut Voice<F>) {
-        *self = Self { settings: self.settings, ..Self::default() };
+        *self = Self { settings: self.settings, ..Self::new(self.person) };
         voice.reset();
     }
 
@@ -420,7 +438,8 @@ impl Player {
             }
         }
         let fingering = self.fingers.fingering();
-        let bend_cents = self.bend_cents + self.key_cents;
+        let own_cents = self.person.detune_cents(self.settings.players.spread_cents);
+        let bend_cents = self.bend_cents + self.key_cents + own_cents;
         if self.posture.is_none() {
             self.now = self.glide.over(self.settings).with_reed_factors(self.reed.factors());
         }

@@ -7,6 +7,7 @@ use crate::instrument::player::Attack;
 use crate::instrument::player::dynamics::LipShape;
 use crate::instrument::player::response::ONSET;
 use crate::instrument::player::vibrato::Vibrato;
+use crate::instrument::players::Players;
 use crate::instrument::reach::Reach;
 use crate::instrument::room::Room;
 use crate::instrument::techniques::{Techniques, Tract};
@@ -123,6 +124,8 @@ pub struct Settings {
     pub glissando_s: f32,
     /// Scoop, fall, breath in, and the sounds of the keys. All off by default.
     pub articulation: Articulation,
+    /// How many players play. Default one.
+    pub players: Players,
 }
 
 /// A number inside its range; one that is not finite becomes the default. Real-time safe.
@@ -166,6 +169,7 @@ impl Default for Settings {
             tract: Tract::default(),
             glissando_s: 0.0,
             articulation: Articulation::default(),
+            players: Players::default(),
         }
     }
 }
@@ -253,6 +257,8 @@ impl Settings {
             SettingNumber::Subtone => &mut self.techniques.subtone,
             SettingNumber::TractAmount => &mut self.tract.amount,
             SettingNumber::TractIntervalSemitones => &mut self.tract.interval_semitones,
+            SettingNumber::PlayersSpreadCents => &mut self.players.spread_cents,
+            SettingNumber::PlayersWidth => &mut self.players.width,
         }
     }
 
@@ -393,6 +399,7 @@ impl Settings {
             tract: self.tract.clamped(),
             glissando_s: fix(self.glissando_s, 0.0, 3.0, d.glissando_s),
             articulation: self.articulation.clamped(),
+            players: self.players.clamped(),
         }
     }
 }

@@ -157,7 +157,7 @@ impl Stereo {
 }
 
 /// The gains of left and right.
-fn gains(position: f32) -> [f32; 2] {
+pub(super) fn gains(position: f32) -> [f32; 2] {
     if position == 0.0 {
         // Exactly, so that the middle leaves every bit as it is.
         return [1.0; 2];

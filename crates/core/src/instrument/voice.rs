@@ -9,6 +9,7 @@ pub use crate::instrument::control_tick::TICK;
 use crate::instrument::listening::Listening;
 use crate::instrument::outside::Outside;
 use crate::instrument::pads::Pads;
+use crate::instrument::person::Person;
 use crate::instrument::vocal_tract::{TractCoeffs, TractState};
 use crate::reed::ReedCoeffs;
 use crate::reed::ReedState;
@@ -274,6 +275,11 @@ impl<F: Real> Voice<F> {
             self.mouth.tract_state = TractState::default();
         }
         self.mouth.tract = tract;
+    }
+
+    /// Makes the breath noise of one of several players, from its beginning.
+    pub fn play_as(&mut self, person: &Person) {
+        self.mouth.noise.play_as(person);
     }
 
     /// Chooses how the jet through the reed channel makes noise; steady at first. Real-time safe.

@@ -10,7 +10,8 @@
 
 use crate::control::midi::MidiDecoder;
 use crate::control::notes::{NoteAddress, NoteExpression};
-use crate::event::{Event, Timed};
+use crate::control::parts::Parts;
+use crate::event::{Event, PartEvent, Timed};
 use crate::score::timeline::Score;
 use midly::{EventIter, MetaMessage, MidiMessage, TrackEventKind};
 
@@ -162,14 +163,23 @@ pub fn read(bytes: &[u8], rate: u32) -> Result<Score, MidiFileError> {
 /// # Errors
 ///
 /// As [`read`].
-pub fn read_as(mut decoder: MidiDecoder, bytes: &[u8], rate: u32) -> Result<Score, MidiFileError> {
+pub fn read_as(decoder: MidiDecoder, bytes: &[u8], rate: u32) -> Result<Score, MidiFileError> {
+    Ok((&read_parts(Parts::of(decoder, 1), bytes, rate)?).into())
+}
+
+/// As [`read`], for several players.
+///
+/// # Errors
+///
+/// As [`read`].
+pub fn read_parts(mut parts: Parts, bytes: &[u8], rate: u32) -> Result<Score<PartEvent>, MidiFileError> {
     let (mut clock, messages) = merged(bytes)?;
     let (mut events, mut tick, mut notes) = (Vec::new(), 0, 0usize);
     for message in messages {
         clock.advance(message.tick - tick);
         tick = message.tick;
         let decoded = match message.kind {
-            TrackEventKind::Midi { channel, message } => decode(&mut decoder, channel.as_int(), message),
+            TrackEventKind::Midi { channel, message } => decode(&mut parts, channel.as_int(), message),
             TrackEventKind::Meta(MetaMessage::Tempo(us)) => {
                 clock.set_tempo(us.as_int());
                 &[]
@@ -177,7 +187,7 @@ pub fn read_as(mut decoder: MidiDecoder, bytes: &[u8], rate: u32) -> Result<Scor
             _ => &[],
         };
         for &event in decoded {
-            notes += usize::from(matches!(event, Event::NoteOn { .. }));
+            notes += usize::from(matches!(event.event, Event::NoteOn { .. }));
             events.push(Timed { at: clock.sample(rate)?, event });
         }
     }
@@ -188,18 +198,18 @@ pub fn read_as(mut decoder: MidiDecoder, bytes: &[u8], rate: u32) -> Result<Scor
     Ok(Score { events, samples })
 }
 
-fn decode(decoder: &mut MidiDecoder, channel: u8, message: MidiMessage) -> &[Event] {
+fn decode(parts: &mut Parts, channel: u8, message: MidiMessage) -> &[PartEvent] {
     match message {
-        MidiMessage::NoteOn { key, vel } => decoder.note_on(channel, key.as_int(), vel.as_int()),
-        MidiMessage::NoteOff { key, .. } => decoder.note_off(channel, key.as_int()),
+        MidiMessage::NoteOn { key, vel } => parts.note_on(channel, key.as_int(), vel.as_int()),
+        MidiMessage::NoteOff { key, .. } => parts.note_off(channel, key.as_int()),
         MidiMessage::Controller { controller, value } => {
-            decoder.controller(channel, controller.as_int(), value.as_int())
+            parts.controller(channel, controller.as_int(), value.as_int())
         }
-        MidiMessage::ChannelAftertouch { vel } => decoder.pressure(channel, vel.as_int()),
-        MidiMessage::PitchBend { bend } => decoder.bend(channel, bend.0.as_int()),
+        MidiMessage::ChannelAftertouch { vel } => parts.pressure(channel, vel.as_int()),
+        MidiMessage::PitchBend { bend } => parts.bend(channel, bend.0.as_int()),
         MidiMessage::Aftertouch { key, vel } => {
             let breath = NoteExpression::Breath(f32::from(vel.as_int()) / 127.0);
-            decoder.express(NoteAddress::of_key(channel, key.as_int()), breath)
+            parts.express(NoteAddress::of_key(channel, key.as_int()), breath)
         }
         MidiMessage::ProgramChange { .. } => &[],
     }

@@ -3,8 +3,8 @@
 //! The score is played once, block by block, through the same [`Clarinet`] that the plugin uses. The samples do not depend
 //! on the size of the blocks. The latency of the instrument is not removed.
 
-use crate::event::{Event, Timed};
-use crate::instrument::{Channels, Clarinet, Probe};
+use crate::event::{Event, PartEvent, Timed};
+use crate::instrument::{Channels, Clarinet, Ensemble, Probe};
 use crate::score::timeline::Score;
 
 /// Plays `score` in blocks of `block` samples (at least 1) and hands each block to `each`. Allocates one block.
@@ -21,7 +21,7 @@ pub fn play<E>(
     each: impl FnMut(&[f32]) -> Result<(), E>,
 ) -> Result<(), E> {
     let render = |events: &[Timed<Event>], begun: usize, out: &mut [f32]| {
-        clarinet.render_events(events.iter().map(|e| Timed { at: e.at - begun, event: e.event }), out);
+        clarinet.render_events(from(events, begun), out);
     };
     in_blocks(score, block, render, each)
 }
@@ -67,6 +67,49 @@ pub fn play_stereo<E>(
     in_blocks(score, block, render, |left| each(left, &heard.borrow()[..left.len()]))
 }
 
+/// As [`play`], by several players.
+///
+/// # Errors
+///
+/// The first error that `each` returns; it ends the playing.
+pub fn play_ensemble<E>(
+    ensemble: &mut Ensemble,
+    score: &Score<PartEvent>,
+    block: usize,
+    each: impl FnMut(&[f32]) -> Result<(), E>,
+) -> Result<(), E> {
+    let render = |events: &[Timed<PartEvent>], begun: usize, out: &mut [f32]| {
+        ensemble.render_events_channels(from(events, begun), Channels::one(out));
+    };
+    in_blocks(score, block, render, each)
+}
+
+/// As [`play_stereo`], by several players.
+///
+/// # Errors
+///
+/// The first error that `each` returns; it ends the playing.
+pub fn play_ensemble_stereo<E>(
+    ensemble: &mut Ensemble,
+    score: &Score<PartEvent>,
+    block: usize,
+    mut each: impl FnMut(&[f32], &[f32]) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut right = vec![0.0; block.max(1)];
+    let heard = std::cell::RefCell::new(&mut right);
+    let render = |events: &[Timed<PartEvent>], begun: usize, left: &mut [f32]| {
+        let mut right = heard.borrow_mut();
+        let samples = left.len();
+        ensemble.render_events_channels(from(events, begun), Channels::two(left, &mut right[..samples]));
+    };
+    in_blocks(score, block, render, |left| each(left, &heard.borrow()[..left.len()]))
+}
+
+/// The same events, counted from sample `begun`.
+fn from<E: Copy>(events: &[Timed<E>], begun: usize) -> impl Iterator<Item = Timed<E>> + '_ {
+    events.iter().map(move |e| Timed { at: e.at - begun, event: e.event })
+}
+
 /// Fills `out`, which begins at sample `begun` of the score, and applies each event at its sample.
 fn render_probed(
     clarinet: &mut Clarinet,
@@ -87,10 +130,10 @@ fn render_probed(
 }
 
 /// Cuts a score into blocks. `render` gets the events of a block, the sample at which it begins, and where to write.
-fn in_blocks<E>(
-    score: &Score,
+fn in_blocks<V, E>(
+    score: &Score<V>,
     block: usize,
-    mut render: impl FnMut(&[Timed<Event>], usize, &mut [f32]),
+    mut render: impl FnMut(&[Timed<V>], usize, &mut [f32]),
     mut each: impl FnMut(&[f32]) -> Result<(), E>,
 ) -> Result<(), E> {
     let mut out = vec![0.0; block.max(1)];

@@ -1,6 +1,6 @@
 //! A score: events at sample positions, and how long to listen.
 
-use crate::event::{Event, Timed};
+use crate::event::{Event, PartEvent, Played, Timed, To};
 use crate::instrument::Settings;
 use crate::score::breath::BreathCurve;
 use crate::score::samples::samples_in;
@@ -12,13 +12,13 @@ const TONGUE_GAP_S: f64 = 0.03;
 /// Velocity of a note that no keyboard has played, 0..=1.
 const PLAIN_VELOCITY: f32 = 0.8;
 
-/// What is to be played: events in order of time, at one sample rate.
+/// What is to be played: events in order of time, at one sample rate. Of several players, its events are [`PartEvent`]s.
 ///
 /// Make one with [`note`](Self::note), [`scale`](Self::scale), a MIDI file (feature `midi`), or from your own events.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Score {
+#[derive(Clone, Debug, PartialEq)]
+pub struct Score<E = Event> {
     /// The events, in order of time; positions in samples from the start.
-    pub events: Vec<Timed<Event>>,
+    pub events: Vec<Timed<E>>,
     /// Length of the score, with the time to fade, samples.
     pub samples: usize,
 }
@@ -29,6 +29,30 @@ pub enum ScoreError {
     /// The sounding pitch of a written note would lie outside MIDI's 0 to 127.
     #[error("written note {0} sounds outside MIDI's 0..127; choose one nearer the middle")]
     OutsideMidi(WrittenNote),
+}
+
+impl<E> Default for Score<E> {
+    /// Nothing.
+    fn default() -> Self {
+        Self { events: Vec::new(), samples: 0 }
+    }
+}
+
+impl From<&Score> for Score<PartEvent> {
+    /// The same score for the first player; in unison all play it.
+    fn from(score: &Score) -> Self {
+        let first = |event| PartEvent { to: To::Player(0), event };
+        let events = score.events.iter().map(|&Timed { at, event }| Timed { at, event: first(event) });
+        Self { events: events.collect(), samples: score.samples }
+    }
+}
+
+impl From<&Score<PartEvent>> for Score {
+    /// What all players play together, as one player would get it.
+    fn from(score: &Score<PartEvent>) -> Self {
+        let events = score.events.iter().map(|&Timed { at, event }| Timed { at, event: event.event });
+        Self { events: events.collect(), samples: score.samples }
+    }
 }
 
 impl Score {
@@ -82,11 +106,17 @@ impl Score {
         }
         Ok(Self { events, samples: end })
     }
+}
 
+impl<E> Score<E> {
     /// The same notes with the breath of `curve`, which replaces all breath events of the score.
-    pub fn blown(mut self, curve: &BreathCurve, settings: &Settings, rate: u32) -> Self {
-        self.events.retain(|e| !matches!(e.event, Event::Breath(_)));
-        let mut events = curve.events(self.samples, rate, settings);
+    pub fn blown(mut self, curve: &BreathCurve, settings: &Settings, rate: u32) -> Self
+    where
+        E: Played,
+    {
+        self.events.retain(|e| !matches!(e.event.event(), Event::Breath(_)));
+        let blown = curve.events(self.samples, rate, settings).into_iter();
+        let mut events: Vec<_> = blown.map(|Timed { at, event }| Timed { at, event: event.into() }).collect();
         events.append(&mut self.events);
         // The sort is stable. At one sample breath comes before notes, so that the tongue releases a blown reed.
         events.sort_by_key(|e| e.at);

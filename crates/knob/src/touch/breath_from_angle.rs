@@ -10,7 +10,7 @@ use crate::touch::breath_from_angle::carry::Carry;
 use crate::touch::feel::PitchMaps;
 use chalumeau_core::control::keys::Keys;
 use chalumeau_core::control::knob::{KnobBreath, KnobDesign};
-use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::event::{Event, Played, Timed};
 use chalumeau_core::units::SoundingNote;
 
 /// Samples between two values of breath: 1.3 ms at 48 kHz, a quarter of the time the player's breath takes to follow.
@@ -142,8 +142,9 @@ impl Blower {
     }
 }
 
-/// Iterator over the host's events in order of time, with the knob's breath between them.
-pub struct BlownEvents<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> {
+/// Iterator over the host's events in order of time, with the knob's breath between them. Of several players, the first one's
+/// note makes a pressure of the angle, and all blow it.
+pub struct BlownEvents<'a, E: Played, I: Iterator<Item = Timed<E>>, A: FnMut(usize) -> Option<f64>> {
     host: std::iter::Peekable<I>,
     blower: &'a mut Blower,
     hand: &'a BreathMapping,
@@ -156,7 +157,7 @@ pub struct BlownEvents<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> 
     heard: &'a mut dyn FnMut(usize, Breath14),
 }
 
-impl<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> BlownEvents<'a, I, A> {
+impl<'a, E: Played, I: Iterator<Item = Timed<E>>, A: FnMut(usize) -> Option<f64>> BlownEvents<'a, E, I, A> {
     /// `angle` gives the knob's angle at a sample of the block, degrees; `heard` is called with the sample and value of each
     /// breath.
     pub fn new(
@@ -173,16 +174,20 @@ impl<'a, I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Blown
     }
 }
 
-impl<I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Iterator for BlownEvents<'_, I, A> {
-    type Item = Timed<Event>;
+impl<E: Played, I: Iterator<Item = Timed<E>>, A: FnMut(usize) -> Option<f64>> Iterator
+    for BlownEvents<'_, E, I, A>
+{
+    type Item = Timed<E>;
 
-    fn next(&mut self) -> Option<Timed<Event>> {
+    fn next(&mut self) -> Option<Timed<E>> {
         loop {
             let until = if self.next < self.samples { self.next } else { usize::MAX };
             if let Some(event) = self.host.next_if(|event| event.at <= until) {
-                self.blower.heed(&event);
+                if let Some(first) = event.event.of_first() {
+                    self.blower.heed(&Timed { at: event.at, event: first });
+                }
                 // One breath at a time: while the knob blows, nothing else does.
-                if !matches!(event.event, Event::Breath(_)) {
+                if !matches!(event.event.event(), Event::Breath(_)) {
                     return Some(event);
                 }
                 continue;
@@ -195,7 +200,7 @@ impl<I: Iterator<Item = Timed<Event>>, A: FnMut(usize) -> Option<f64>> Iterator 
             let blown = (self.angle)(at).and_then(|angle| self.blower.blow(self.hand, angle, self.full_pa));
             if let Some(breath) = blown {
                 (self.heard)(at, breath);
-                return Some(Timed { at, event: Event::Breath(breath.unit()) });
+                return Some(Timed { at, event: Event::Breath(breath.unit()).into() });
             }
         }
     }

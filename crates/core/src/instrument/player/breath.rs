@@ -110,6 +110,11 @@ impl Breath {
         Self { velocity: self.velocity, live: self.live, level: self.level, ..Self::default() }
     }
 
+    /// Takes over velocity and breath level of another player; the pressure follows as it does any breath.
+    pub fn follow(&mut self, from: &Self) {
+        (self.velocity, self.live, self.level) = (from.velocity, from.live, from.level);
+    }
+
     /// What breath source or velocity ask for.
     pub fn asked(&self, key_down: bool) -> Asked {
         match (key_down, self.live) {

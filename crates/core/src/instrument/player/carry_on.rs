@@ -16,11 +16,11 @@ impl Player {
             breath: from.breath.carried(),
             bend_cents: from.bend_cents,
             reed: from.reed,
-            techniques: from.techniques.carried(),
-            swing: from.swing.carried(),
+            techniques: from.techniques.carried(&self.person),
+            swing: from.swing.carried(&self.person),
             inflection: from.inflection.carried(),
             inhalation: from.inhalation,
-            ..Self::default()
+            ..Self::new(self.person)
         };
         while let Some(last) = self.keys.last() {
             let Some(fingering) = self.take_up(last, model) else {
@@ -31,6 +31,17 @@ impl Player {
             self.tongue.carry_on(&from.tongue);
             break;
         }
+    }
+
+    /// Takes over breath, bend and controllers of another player, without keys. What plays goes on and follows them.
+    /// Real-time safe.
+    pub fn follow(&mut self, from: &Self) {
+        self.breath.follow(&from.breath);
+        self.bend_cents = from.bend_cents;
+        self.reed = from.reed;
+        self.techniques.follow(&from.techniques);
+        self.swing.follow(&from.swing);
+        self.posture = None;
     }
 }
 

@@ -7,6 +7,7 @@
 
 use super::sway::{SWAY_TICKS, Sway};
 use crate::dsp::white::White;
+use crate::instrument::person::Person;
 
 /// Corners of the processes, Hz.
 const CORNERS_HZ: [f64; 3] = [0.12, 0.8, 5.0];
@@ -70,11 +71,16 @@ pub struct Life {
 
 impl Default for Life {
     fn default() -> Self {
-        Self { white: White::new(SEED), breath: Wander::default(), lip: Wander::default() }
+        Self::of(&Person::default())
     }
 }
 
 impl Life {
+    /// At rest, with this player's own noise.
+    pub fn of(person: &Person) -> Self {
+        Self { white: White::new(person.seed(SEED)), breath: Wander::default(), lip: Wander::default() }
+    }
+
     /// The wander of the next `SWAY_TICKS` at `amount`, 0..=1; at 0 nothing moves. Real-time safe.
     pub fn step(&mut self, amount: f64, lags: &LifeLags) -> Sway {
         if amount == 0.0 {

@@ -9,6 +9,7 @@ pub mod subtone;
 
 use super::step_towards;
 use crate::event::Technique;
+use crate::instrument::person::Person;
 use crate::instrument::settings::Settings;
 use crate::instrument::techniques::GrowlPitch;
 use flutter::Flutter;
@@ -39,9 +40,20 @@ impl Techniques {
         self.added[which as usize] = if amount.is_finite() { amount.clamp(0.0, 1.0) } else { 0.0 };
     }
 
+    /// None, of this player.
+    pub fn of(person: &Person) -> Self {
+        let (growl, flutter) = (Growl::at(person.phase()), Flutter::at(person.phase()));
+        Self { growl, flutter, ..Self::default() }
+    }
+
     /// The same controllers for another instrument, whose techniques begin anew.
-    pub fn carried(&self) -> Self {
-        Self { added: self.added, ..Self::default() }
+    pub fn carried(&self, person: &Person) -> Self {
+        Self { added: self.added, ..Self::of(person) }
+    }
+
+    /// Takes over the controllers of another player.
+    pub fn follow(&mut self, from: &Self) {
+        self.added = from.added;
     }
 
     /// Moves the amounts towards what is asked; whether the lip's has changed.

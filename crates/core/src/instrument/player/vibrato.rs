@@ -6,6 +6,7 @@
 
 use super::sway::{SWAY_TICKS, Sway};
 use crate::dsp::white::White;
+use crate::instrument::person::Person;
 use crate::instrument::settings::fix;
 
 /// Swing of the pitch at depth 1, cents either way.
@@ -65,6 +66,8 @@ pub struct Swing {
     since_s: f64,
     /// Turns since the cycle began, 0..1.
     turn: f64,
+    /// Where the first cycle begins, turns, 0..1.
+    begin: f64,
     /// Factors of this cycle on rate and depth, and the depth's of the cycle before.
     rate: f64,
     strength: [f64; 2],
@@ -73,15 +76,7 @@ pub struct Swing {
 
 impl Default for Swing {
     fn default() -> Self {
-        Self {
-            controller: 0.0,
-            depth: 0.0,
-            since_s: 0.0,
-            turn: 0.0,
-            rate: 1.0,
-            strength: [1.0; 2],
-            white: White::new(SEED),
-        }
+        Self::of(&Person::default())
     }
 }
 
@@ -93,14 +88,33 @@ fn sine(turn: f64) -> f64 {
 }
 
 impl Swing {
+    /// At rest, as this player swings.
+    pub fn of(person: &Person) -> Self {
+        Self {
+            controller: 0.0,
+            depth: 0.0,
+            since_s: 0.0,
+            turn: person.phase(),
+            begin: person.phase(),
+            rate: 1.0,
+            strength: [1.0; 2],
+            white: White::new(person.seed(SEED)),
+        }
+    }
+
     /// The controller adds to the depth of the settings, 0..=1; not a number counts as 0.
     pub fn set_controller(&mut self, depth: f32) {
         self.controller = f64::from(if depth.is_finite() { depth.clamp(0.0, 1.0) } else { 0.0 });
     }
 
     /// The same controller for a player on another instrument.
-    pub fn carried(&self) -> Self {
-        Self { controller: self.controller, ..Self::default() }
+    pub fn carried(&self, person: &Person) -> Self {
+        Self { controller: self.controller, ..Self::of(person) }
+    }
+
+    /// Takes over the controller of another player.
+    pub fn follow(&mut self, from: &Self) {
+        self.controller = from.controller;
     }
 
     /// A note is tongued.
@@ -113,7 +127,7 @@ impl Swing {
     pub fn step(&mut self, vibrato: &Vibrato, range_db: Option<f64>, tick_s: f64) -> Sway {
         let wanted = (f64::from(vibrato.depth) + self.controller).min(1.0);
         if wanted == 0.0 && self.depth == 0.0 {
-            (self.turn, self.strength) = (0.0, [1.0; 2]);
+            (self.turn, self.strength) = (self.begin, [1.0; 2]);
             return Sway::default();
         }
         let step_s = f64::from(SWAY_TICKS) * tick_s;

@@ -18,6 +18,11 @@ pub struct Flutter {
 }
 
 impl Flutter {
+    /// A tongue that begins at a share of its period, 0..1.
+    pub fn at(phase: f64) -> Self {
+        Self { phase }
+    }
+
     /// One tick of a tongue at `hz`: what it adds to the mouth pressure, over that pressure.
     pub fn tick(&mut self, hz: f64, tick_s: f64) -> f64 {
         self.phase = (self.phase + hz * tick_s).fract();

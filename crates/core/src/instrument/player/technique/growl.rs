@@ -42,6 +42,11 @@ fn glottis(phase: f64) -> f64 {
 }
 
 impl Growl {
+    /// A voice that begins at a share of its period, 0..1.
+    pub fn at(phase: f64) -> Self {
+        Self { phase, swing: 0.0 }
+    }
+
     /// One tick of a voice at `hz`: what it adds to the mouth pressure, over that pressure.
     pub fn tick(&mut self, hz: f64, tick_s: f64) -> f64 {
         self.phase = (self.phase + hz * tick_s).fract();

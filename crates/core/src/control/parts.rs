@@ -1,0 +1,331 @@
+//! Distributes messages over the parts of several players, each of which plays one note at a time.
+//!
+//! Each part has a [`MidiDecoder`] of its own, so that it slurs, bends, blows and ends its notes exactly as a lone player does.
+//! With one part every message goes to it. With more:
+//!
+//! - A note that a part holds already goes to that part. Any other goes to the *free* part whose last note is nearest in pitch;
+//!   parts that have played nothing yet come last, and of two alike the lower number is taken. So a line of notes with gaps stays
+//!   with one player, and notes that overlap are a chord.
+//! - Where no part is free, it goes to the nearest of those whose note only the pedal holds, which it replaces, and else to the
+//!   nearest of all, which slurs to it and comes back to its own note afterwards.
+//! - Breath and channel pressure of an MPE member channel go to the parts that play on that channel, and to a note that
+//!   begins on it later. Linked controllers go to all parts, because their links set the instrument.
+//! - What belongs to notes goes to the parts that hold one of them. If no part does, it goes to all, whose notes may fade.
+//! - Everything else goes to all parts, and each takes what is for its note, as a lone player does: bends, for example.
+
+use crate::control::midi::breath::BreathFrom;
+use crate::control::midi::links::{Link, Links, MOST as MOST_LINKS, Source};
+use crate::control::midi::techniques::Wheel;
+use crate::control::midi::{BREATH_LIKE, BreathOrigin, MidiDecoder};
+use crate::control::notes::{HeldNote, MOST as MOST_NOTES, Note, NoteAddress, NoteExpression};
+use crate::event::{Event, PartEvent, To};
+
+/// Most parts.
+pub const MOST: usize = 16;
+/// Events that one message can become: a note with the breath that waited for it, and what the other parts say.
+const EVENTS: usize = 64 * MOST;
+/// Distance of a note from a part that has played none: farther than any key.
+const NEVER: u8 = 128;
+
+/// The state of all parts. Real-time safe, but for `new` and `default`.
+///
+/// ```
+/// use chalumeau_core::control::parts::Parts;
+/// use chalumeau_core::event::To;
+///
+/// let mut parts = Parts::new(2);
+/// assert_eq!(parts.note_on(0, 60, 100)[0].to, To::Player(0));
+/// assert_eq!(parts.note_on(0, 64, 100)[0].to, To::Player(1));
+/// ```
+#[derive(Debug)]
+pub struct Parts {
+    /// At least one.
+    decoders: Vec<MidiDecoder>,
+    said: Vec<PartEvent>,
+    over: Vec<Note>,
+    /// The part of the latest note.
+    latest: usize,
+    origin: Option<BreathOrigin>,
+    /// The latest value of each controller of breath, and of pressure, on each channel, if it is a member's.
+    breaths: [[Option<u8>; BREATH_LIKE.len() + 1]; 16],
+}
+
+impl Default for Parts {
+    fn default() -> Self {
+        Self::of(MidiDecoder::new(), 1)
+    }
+}
+
+impl Parts {
+    /// So many parts, 1..=16, as after switching on. Allocates.
+    pub fn new(count: usize) -> Self {
+        Self::of(MidiDecoder::new(), count)
+    }
+
+    /// Parts that begin as this decoder, which has played nothing. Allocates.
+    pub fn of(decoder: MidiDecoder, count: usize) -> Self {
+        let mut decoders = Vec::with_capacity(MOST);
+        decoders.push(decoder);
+        let mut parts = Self {
+            decoders,
+            said: Vec::with_capacity(EVENTS),
+            over: Vec::with_capacity((MOST_NOTES + 1) * MOST),
+            latest: 0,
+            origin: None,
+            breaths: Default::default(),
+        };
+        parts.set_count(count);
+        parts
+    }
+
+    /// Another number of parts, clamped to 1..=16. The notes of parts that go are [over](Self::over); who plays lets them go.
+    /// New parts know what the first one has heard of controllers.
+    pub fn set_count(&mut self, count: usize) {
+        let count = count.clamp(1, MOST);
+        self.begin();
+        while self.decoders.len() > count {
+            let Some(mut gone) = self.decoders.pop() else { break };
+            gone.silence();
+            self.note_over(gone.over());
+        }
+        while self.decoders.len() < count {
+            let new = self.decoders[0].without_notes();
+            self.decoders.push(new);
+        }
+        self.latest = self.latest.min(count - 1);
+    }
+
+    /// How many parts.
+    pub fn count(&self) -> usize {
+        self.decoders.len()
+    }
+
+    /// Forgets everything but the number of parts.
+    pub fn reset(&mut self) {
+        self.begin();
+        self.decoders.iter_mut().for_each(MidiDecoder::reset);
+        (self.latest, self.origin, self.breaths) = (0, None, Default::default());
+    }
+
+    /// See [`MidiDecoder::usual_bend_range`].
+    pub fn usual_bend_range(&mut self, semitones: u8) -> &[PartEvent] {
+        self.tell_all(|part| part.usual_bend_range(semitones))
+    }
+
+    /// See [`MidiDecoder::set_wheel`].
+    pub fn set_wheel(&mut self, wheel: Wheel) -> &[PartEvent] {
+        self.tell_all(|part| part.set_wheel(wheel))
+    }
+
+    /// See [`MidiDecoder::set_breath_from`].
+    pub fn set_breath_from(&mut self, from: BreathFrom) -> &[PartEvent] {
+        self.tell_all(|part| part.set_breath_from(from))
+    }
+
+    /// See [`MidiDecoder::set_links`].
+    pub fn set_links(&mut self, links: &[Option<Link>; MOST_LINKS]) -> bool {
+        self.decoders.iter_mut().fold(false, |any, part| part.set_links(links) | any)
+    }
+
+    /// See [`MidiDecoder::links`].
+    pub fn links(&self) -> &Links {
+        self.decoders[0].links()
+    }
+
+    /// See [`MidiDecoder::note_on`].
+    pub fn note_on(&mut self, channel: u8, key: u8, velocity: u8) -> &[PartEvent] {
+        if velocity == 0 {
+            return self.note_off(channel, key);
+        }
+        self.strike(Note { id: None, channel, key }, velocity)
+    }
+
+    /// See [`MidiDecoder::note_off`].
+    pub fn note_off(&mut self, channel: u8, key: u8) -> &[PartEvent] {
+        self.release(NoteAddress::of_key(channel % 16, key.min(127)))
+    }
+
+    /// A note begins on the part that the rule above chooses. See [`MidiDecoder::strike`].
+    pub fn strike(&mut self, note: Note, velocity: u8) -> &[PartEvent] {
+        let note = Note { channel: note.channel % 16, key: note.key.min(127), ..note };
+        let chosen = self.part_for(note);
+        self.begin();
+        self.latest = chosen;
+        for part in (0..self.count()).filter(|&part| part != chosen) {
+            self.tell(part, |part| part.strike_elsewhere(note.channel));
+        }
+        if self.count() > 1 {
+            let [pressure, breaths @ ..] = self.breaths[usize::from(note.channel)];
+            if let Some(value) = pressure {
+                self.tell(chosen, |part| part.pressure(note.channel, value));
+            }
+            for (cc, value) in BREATH_LIKE.into_iter().zip(breaths) {
+                if let Some(value) = value {
+                    self.tell(chosen, |part| part.controller(note.channel, cc, value));
+                }
+            }
+        }
+        self.tell(chosen, |part| part.strike(note, velocity));
+        &self.said
+    }
+
+    /// See [`MidiDecoder::release`].
+    pub fn release(&mut self, address: NoteAddress) -> &[PartEvent] {
+        self.tell_all(|part| part.release(address))
+    }
+
+    /// See [`MidiDecoder::choke`].
+    pub fn choke(&mut self, address: NoteAddress) -> &[PartEvent] {
+        self.tell_all(|part| part.choke(address))
+    }
+
+    /// See [`MidiDecoder::silence`].
+    pub fn silence(&mut self) -> &[PartEvent] {
+        self.tell_all(MidiDecoder::silence)
+    }
+
+    /// See [`MidiDecoder::express`].
+    pub fn express(&mut self, address: NoteAddress, expression: NoteExpression) -> &[PartEvent] {
+        self.tell_players(address, |part| part.express(address, expression))
+    }
+
+    /// See [`MidiDecoder::controller`].
+    pub fn controller(&mut self, channel: u8, cc: u8, value: u8) -> &[PartEvent] {
+        let (channel, cc, value) = (channel % 16, cc.min(127), value.min(127));
+        let place = BREATH_LIKE.iter().position(|&breath| breath == cc);
+        if let Some(place) = place.filter(|_| self.is_of_notes(channel, Source::Controller(cc))) {
+            self.breaths[usize::from(channel)][1 + place] = Some(value);
+            return self.tell_channel(channel, |part| part.controller(channel, cc, value));
+        }
+        self.tell_all(|part| part.controller(channel, cc, value))
+    }
+
+    /// See [`MidiDecoder::pressure`].
+    pub fn pressure(&mut self, channel: u8, value: u8) -> &[PartEvent] {
+        let (channel, value) = (channel % 16, value.min(127));
+        if self.is_of_notes(channel, Source::Pressure) {
+            self.breaths[usize::from(channel)][0] = Some(value);
+            return self.tell_channel(channel, |part| part.pressure(channel, value));
+        }
+        self.tell_all(|part| part.pressure(channel, value))
+    }
+
+    /// See [`MidiDecoder::other_pressure`].
+    pub fn other_pressure(&mut self, channel: u8) -> &[PartEvent] {
+        self.tell_all(|part| part.other_pressure(channel))
+    }
+
+    /// See [`MidiDecoder::bend`].
+    pub fn bend(&mut self, channel: u8, value14: u16) -> &[PartEvent] {
+        self.tell_all(|part| part.bend(channel, value14))
+    }
+
+    /// What the part of the latest note hears. See [`MidiDecoder::heard`].
+    pub fn heard(&self) -> Option<&HeldNote> {
+        self.decoders[self.latest].heard()
+    }
+
+    /// The notes that the latest message, or the latest change of the number of parts, has ended.
+    pub fn over(&self) -> &[Note] {
+        &self.over
+    }
+
+    /// The released note of a part that faded until now. Call it when that player is silent: then it has ended.
+    pub fn take_faded(&mut self, part: usize) -> Option<Note> {
+        self.decoders.get_mut(part)?.take_faded()
+    }
+
+    /// Where the latest breath event came from.
+    pub fn breath_origin(&self) -> Option<BreathOrigin> {
+        self.origin
+    }
+
+    /// See [`MidiDecoder::is_snapshot`].
+    pub fn is_snapshot(&self, channel: u8) -> bool {
+        self.decoders[0].is_snapshot(channel)
+    }
+
+    /// The part that a note goes to.
+    fn part_for(&self, note: Note) -> usize {
+        let claim = |part: &MidiDecoder| {
+            let rank = match part.held() {
+                held if held.iter().any(|held| held.note == note) => 0,
+                [] => 1,
+                _ if part.is_by_pedal() => 2,
+                _ => 3,
+            };
+            (rank, part.heard().map_or(NEVER, |last| last.note.key.abs_diff(note.key)))
+        };
+        let nearest = self.decoders.iter().enumerate().min_by_key(|(_, part)| claim(part));
+        nearest.map_or(0, |(part, _)| part)
+    }
+
+    /// Whether what this channel says of breath is for its notes alone.
+    fn is_of_notes(&self, channel: u8, source: Source) -> bool {
+        self.count() > 1 && self.decoders[0].is_member(channel) && !self.links().has(source)
+    }
+
+    fn begin(&mut self) {
+        self.said.clear();
+        self.over.clear();
+    }
+
+    fn note_over(&mut self, notes: &[Note]) {
+        let room = self.over.capacity() - self.over.len();
+        self.over.extend_from_slice(&notes[..notes.len().min(room)]);
+    }
+
+    /// One part gets a message.
+    fn tell(&mut self, number: usize, say: impl FnOnce(&mut MidiDecoder) -> &[Event]) {
+        let room = self.said.capacity() - self.said.len();
+        let part = &mut self.decoders[number];
+        let events = say(part);
+        debug_assert!(events.len() <= room, "a message has more events than it can");
+        let blows = events.iter().any(|event| matches!(event, Event::Breath(_)));
+        let to = To::Player(number as u8);
+        self.said.extend(events.iter().take(room).map(|&event| PartEvent { to, event }));
+        if blows {
+            self.origin = part.breath_origin();
+        }
+        let room = self.over.capacity() - self.over.len();
+        self.over.extend(part.over().iter().take(room));
+    }
+
+    /// Some parts get a message.
+    fn tell_those(
+        &mut self,
+        which: impl Fn(&MidiDecoder) -> bool,
+        say: impl Fn(&mut MidiDecoder) -> &[Event],
+    ) -> &[PartEvent] {
+        self.begin();
+        for part in 0..self.count() {
+            if which(&self.decoders[part]) {
+                self.tell(part, &say);
+            }
+        }
+        &self.said
+    }
+
+    fn tell_all(&mut self, say: impl Fn(&mut MidiDecoder) -> &[Event]) -> &[PartEvent] {
+        self.tell_those(|_| true, say)
+    }
+
+    /// The parts that hold a note on this channel get a message.
+    fn tell_channel(&mut self, channel: u8, say: impl Fn(&mut MidiDecoder) -> &[Event]) -> &[PartEvent] {
+        self.tell_those(|part| part.held().iter().any(|held| held.note.channel == channel), say)
+    }
+
+    /// The parts that hold one of these notes get a message, or all if none does.
+    fn tell_players(
+        &mut self,
+        address: NoteAddress,
+        say: impl Fn(&mut MidiDecoder) -> &[Event],
+    ) -> &[PartEvent] {
+        let holds = |part: &MidiDecoder| part.held().iter().any(|held| address.fits(held.note));
+        let is_held = self.decoders.iter().any(holds);
+        self.tell_those(|part| !is_held || holds(part), say)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,221 @@
+use super::*;
+use crate::dsp::white::White;
+use crate::units::SoundingNote;
+
+fn said(events: &[PartEvent]) -> Vec<(u8, Event)> {
+    let of = |event: &PartEvent| match event.to {
+        To::Player(part) => (part, event.event),
+        To::All => panic!("{event:?}"),
+    };
+    events.iter().map(of).collect()
+}
+
+fn on(part: u8, key: u8) -> (u8, Event) {
+    (part, Event::NoteOn { note: SoundingNote(key), velocity: 100.0 / 127.0 })
+}
+
+fn off(part: u8, key: u8) -> (u8, Event) {
+    (part, Event::NoteOff { note: SoundingNote(key) })
+}
+
+/// Strikes keys on channel 0 and gives what is said of notes.
+fn chord(parts: &mut Parts, keys: &[u8]) -> Vec<(u8, Event)> {
+    keys.iter().flat_map(|&key| said(parts.note_on(0, key, 100))).collect()
+}
+
+fn lift(parts: &mut Parts, keys: &[u8]) -> Vec<(u8, Event)> {
+    keys.iter().flat_map(|&key| said(parts.note_off(0, key))).collect()
+}
+
+/// Numbers below `most`, at random.
+struct Dice(White);
+
+impl Dice {
+    fn roll(&mut self, most: u32) -> u8 {
+        let unit = (self.0.next() / 3.0_f64.sqrt() * 0.5 + 0.5).clamp(0.0, 0.999_999);
+        (unit * f64::from(most)) as u8
+    }
+}
+
+#[test]
+fn one_part_says_what_a_decoder_says() {
+    let (mut parts, mut midi) = (Parts::new(1), MidiDecoder::new());
+    let mut dice = Dice(White::new(4));
+    for _ in 0..10_000 {
+        let (what, channel, key, value) = (dice.roll(8), dice.roll(3), dice.roll(128), dice.roll(128));
+        let address = NoteAddress::of_key(channel, key % 8 + 60);
+        let (said, wanted) = match what {
+            0 | 1 => {
+                (parts.note_on(channel, key % 8 + 60, value), midi.note_on(channel, key % 8 + 60, value))
+            }
+            2 | 3 => (parts.release(address), midi.release(address)),
+            4 => (parts.controller(channel, key, value), midi.controller(channel, key, value)),
+            5 => (parts.pressure(channel, value), midi.pressure(channel, value)),
+            6 => (parts.bend(channel, u16::from(value) << 7), midi.bend(channel, u16::from(value) << 7)),
+            _ => (parts.choke(address), midi.choke(address)),
+        };
+        assert!(said.iter().map(|event| event.event).eq(wanted.iter().copied()));
+        assert!(said.iter().all(|event| event.to == To::Player(0)));
+        assert_eq!((parts.over(), parts.heard()), (midi.over(), midi.heard()));
+        assert_eq!(parts.breath_origin(), midi.breath_origin());
+    }
+}
+
+#[test]
+fn overlapping_notes_are_a_chord_and_a_line_stays_with_one() {
+    let mut parts = Parts::new(3);
+    assert_eq!(chord(&mut parts, &[60]), [on(0, 60)]);
+    assert_eq!(lift(&mut parts, &[60]), [off(0, 60)]);
+    assert_eq!(chord(&mut parts, &[72]), [on(0, 72)], "who has played nothing comes last");
+    assert_eq!(chord(&mut parts, &[60, 64]), [on(1, 60), on(2, 64)]);
+    assert_eq!(lift(&mut parts, &[60, 72, 64]), [off(1, 60), off(0, 72), off(2, 64)]);
+    // Each goes on where it is nearest, in whatever order.
+    assert_eq!(chord(&mut parts, &[71, 62, 65]), [on(0, 71), on(1, 62), on(2, 65)]);
+}
+
+#[test]
+fn where_all_are_busy_the_nearest_slurs_and_comes_back() {
+    let mut parts = Parts::new(2);
+    chord(&mut parts, &[60, 70]);
+    assert_eq!(chord(&mut parts, &[67]), [on(1, 67)], "its own key is still down: a slur");
+    assert_eq!(lift(&mut parts, &[67]), [off(1, 67)]);
+    assert_eq!(lift(&mut parts, &[70, 60]), [off(1, 70), off(0, 60)]);
+    // The same key again goes to who holds it.
+    chord(&mut parts, &[60, 61]);
+    assert_eq!(chord(&mut parts, &[61]), [on(1, 61)]);
+}
+
+#[test]
+fn a_note_that_the_pedal_holds_gives_way_before_a_held_one() {
+    let mut parts = Parts::new(2);
+    parts.controller(0, 64, 127);
+    chord(&mut parts, &[60, 72]);
+    assert_eq!(lift(&mut parts, &[72]), []);
+    assert_eq!(chord(&mut parts, &[61]), [on(1, 61), off(1, 72)]);
+    lift(&mut parts, &[60, 61]);
+    assert_eq!(said(parts.controller(0, 64, 0)), [off(0, 60), off(1, 61)]);
+}
+
+#[test]
+fn bends_pressure_and_breath_of_a_member_channel_are_for_its_note() {
+    let mut parts = Parts::of(MidiDecoder::new().with_mpe(), 3);
+    parts.pressure(1, 40);
+    let first = said(parts.note_on(1, 60, 100));
+    assert_eq!(first, [(0, Event::Breath(40.0 / 127.0)), on(0, 60)], "what came before the note is its");
+    assert_eq!(said(parts.note_on(2, 64, 100)), [on(1, 64)], "and no other's");
+    assert_eq!(said(parts.pressure(2, 80)), [(1, Event::Breath(80.0 / 127.0))]);
+    assert_eq!(said(parts.pressure(1, 50)), [(0, Event::Breath(50.0 / 127.0))]);
+    assert_eq!(said(parts.bend(2, 16_383)), [(1, Event::Bend { cents: 4_800.0 })]);
+    assert_eq!(said(parts.bend(3, 16_383)), [], "nobody plays there");
+    let bent = [(0, 200.0), (1, 5_000.0), (2, 200.0)].map(|(part, cents)| (part, Event::Bend { cents }));
+    assert_eq!(said(parts.bend(0, 16_383)), bent, "the manager's bends all notes");
+    // The manager's breath is everybody's.
+    let all = said(parts.controller(0, 2, 90));
+    assert!(all.starts_with(&[(0, Event::Breath(90.0 / 127.0)), (1, Event::Breath(90.0 / 127.0))]));
+}
+
+#[test]
+fn without_mpe_breath_and_bend_are_everybodys() {
+    let mut parts = Parts::new(2);
+    assert_eq!(said(parts.controller(0, 2, 64)), [], "it waits for a key");
+    let struck = chord(&mut parts, &[60]);
+    assert_eq!(struck.len(), 3);
+    assert!(struck.contains(&(1, Event::Breath(64.0 / 127.0))) && struck.contains(&on(0, 60)));
+    chord(&mut parts, &[64]);
+    let breath = Event::Breath(70.0 / 127.0);
+    assert_eq!(said(parts.controller(0, 2, 70)), [(0, breath), (1, breath)]);
+    let bent = Event::Bend { cents: -200.0 };
+    assert_eq!(said(parts.bend(0, 0)), [(0, bent), (1, bent)]);
+    assert_eq!(parts.breath_origin(), parts.decoders[1].breath_origin());
+}
+
+#[test]
+fn a_note_on_its_own_channel_bends_alone() {
+    let mut parts = Parts::new(2);
+    parts.note_on(4, 60, 100);
+    parts.note_on(5, 64, 100);
+    assert_eq!(said(parts.bend(5, 16_383)), [(1, Event::Bend { cents: 200.0 })]);
+    assert_eq!(said(parts.bend(4, 0)), [(0, Event::Bend { cents: -200.0 })]);
+}
+
+#[test]
+fn expressions_chokes_and_ends_find_their_note() {
+    let mut parts = Parts::new(2);
+    let id = |id| NoteAddress { id: Some(id), ..NoteAddress::default() };
+    for (number, key) in [(7, 60), (8, 64)] {
+        parts.strike(Note { id: Some(number), channel: 0, key }, 100);
+    }
+    assert_eq!(said(parts.express(id(8), NoteExpression::Tuning(30.0))), [(1, Event::Bend { cents: 30.0 })]);
+    assert_eq!(said(parts.express(id(7), NoteExpression::Breath(0.5))), [(0, Event::Breath(0.5))]);
+    assert_eq!(said(parts.choke(id(7))), [(0, Event::Choke { note: SoundingNote(60) })]);
+    assert_eq!(parts.over(), [Note { id: Some(7), channel: 0, key: 60 }]);
+    assert_eq!(said(parts.release(id(8))), [off(1, 64)]);
+    assert_eq!(parts.over(), []);
+    assert_eq!(parts.take_faded(0), None);
+    assert_eq!(parts.take_faded(1), Some(Note { id: Some(8), channel: 0, key: 64 }));
+}
+
+#[test]
+fn all_notes_off_is_for_all() {
+    for cc in [120, 123] {
+        let mut parts = Parts::new(4);
+        chord(&mut parts, &[60, 64, 67, 70]);
+        assert_eq!(said(parts.controller(9, cc, 0)), [0, 1, 2, 3].map(|part| (part, Event::Panic)));
+        assert_eq!(parts.over().len(), 4);
+    }
+}
+
+#[test]
+fn parts_that_come_know_the_controllers_and_parts_that_go_end_their_notes() {
+    let mut parts = Parts::new(1);
+    parts.controller(0, 2, 50);
+    parts.controller(0, 2, 60);
+    chord(&mut parts, &[60]);
+    parts.set_count(3);
+    let breath = Event::Breath(70.0 / 127.0);
+    assert_eq!(said(parts.controller(0, 2, 70)), [0, 1, 2].map(|part| (part, breath)));
+    assert_eq!(chord(&mut parts, &[64, 67]), [on(1, 64), on(2, 67)]);
+    parts.set_count(2);
+    assert_eq!(parts.over(), [Note { id: None, channel: 0, key: 67 }]);
+    assert_eq!(lift(&mut parts, &[67, 64, 60]), [off(1, 64), off(0, 60)]);
+}
+
+/// Whatever happens, each note that was struck ends once, and nothing allocates more room than there was.
+#[test]
+fn every_note_ends_once() {
+    let mut dice = Dice(White::new(9));
+    let mut parts = Parts::new(5);
+    let room = (parts.said.capacity(), parts.over.capacity());
+    let (mut struck, mut over) = (Vec::new(), Vec::new());
+    for number in 0..10_000 {
+        let (channel, key, value) = (dice.roll(16), 48 + dice.roll(30), dice.roll(128));
+        let one = NoteAddress { id: Some(number - i32::from(dice.roll(12))), ..NoteAddress::default() };
+        match dice.roll(16) {
+            0..=5 => {
+                let note = Note { id: Some(number), channel, key };
+                struck.push(note);
+                parts.strike(note, value);
+            }
+            6..=9 => drop(parts.release(one).len()),
+            10 => drop(parts.choke(one).len()),
+            11 => drop(parts.release(NoteAddress::of_key(channel, key)).len()),
+            12 => drop(parts.controller(channel, dice.roll(128), value).len()),
+            13 => drop(parts.pressure(channel, value).len()),
+            14 => drop(parts.express(one, NoteExpression::Breath(f32::from(value) / 127.0)).len()),
+            _ => parts.set_count(usize::from(dice.roll(17))),
+        }
+        over.extend_from_slice(parts.over());
+        if dice.roll(4) == 0 {
+            over.extend((0..MOST).filter_map(|part| parts.take_faded(part)));
+        }
+    }
+    parts.silence();
+    over.extend_from_slice(parts.over());
+    over.extend((0..MOST).filter_map(|part| parts.take_faded(part)));
+    let id = |note: &Note| note.id;
+    struck.sort_by_key(id);
+    over.sort_by_key(id);
+    assert_eq!(over.iter().zip(&struck).find(|(over, struck)| over != struck), None);
+    assert_eq!(over.len(), struck.len());
+    assert_eq!(room, (parts.said.capacity(), parts.over.capacity()));
+}

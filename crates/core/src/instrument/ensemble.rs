@@ -1,0 +1,402 @@
+//! Several players of one instrument, each with a voice of its own, and their sum.
+//!
+//! Every player gets the events that are for it, and no other. So a player in an ensemble gives the samples that it gives
+//! alone, to the bit, and voice, player and events stay apart. The players differ as [`Person`]s do, and sit side by
+//! side: each is panned with constant power, in addition to the pan of its events.
+//!
+//! With `n` players each is `1 / sqrt(n)` as loud as a lone one, whatever they play: all of them at once are about as loud as
+//! one. A limiter after the sum catches what comes together by chance. One player alone is a [`Clarinet`] to the bit.
+//!
+//! A player who is silent and at rest sleeps: nothing of it is computed, and it stands still until a note, a slap or a
+//! breath wakes it. Whether it sleeps is decided on a fixed grid of samples, never on the host's blocks.
+
+use std::sync::Arc;
+
+use crate::dsp::glide::Glide;
+use crate::dsp::limiter::Limiter;
+use crate::event::{Event, PartEvent, Timed, To};
+use crate::instrument::channels::Channels;
+use crate::instrument::clarinet::Clarinet;
+use crate::instrument::model::{BuildError, Model};
+use crate::instrument::person::Person;
+use crate::instrument::players::{MOST_PLAYERS, Players, Split};
+use crate::instrument::settings::Settings;
+use crate::instrument::stereo::gains;
+
+/// Samples of the host between two decisions whether a player sleeps.
+const CELL: usize = 64;
+/// Cells of silence and rest after which a player sleeps: 85 ms at 48 kHz, as long as a [`Clarinet`] takes to count as silent.
+const QUIET_CELLS: u32 = 64;
+/// Time that a change of seat, pan or number takes, s.
+const MOVE_S: f64 = 0.010;
+
+/// One player at its seat.
+struct Seat {
+    clarinet: Clarinet,
+    /// Gains of left and right.
+    sides: [Glide; 2],
+    /// Pan of the player's events, -1..=1.
+    pan: f32,
+    /// Samples since the last decision about sleep.
+    at: usize,
+    /// Whether any of them is heard.
+    is_heard: bool,
+    /// Cells of silence and rest until now.
+    quiet: u32,
+    sleeps: bool,
+    /// A lone player does not sleep: its host stops calling.
+    may_sleep: bool,
+}
+
+impl Seat {
+    fn new(clarinet: Clarinet, rate_hz: f64) -> Self {
+        Self {
+            clarinet,
+            sides: [Glide::new(1.0, MOVE_S, rate_hz); 2],
+            pan: 0.0,
+            at: 0,
+            is_heard: false,
+            quiet: 0,
+            sleeps: true,
+            may_sleep: true,
+        }
+    }
+
+    /// Goes to a place between left and right; who sleeps is there at once.
+    fn sit(&mut self, position: f32) {
+        for (side, gain) in self.sides.iter_mut().zip(gains(position)) {
+            if self.sleeps { side.set(gain) } else { side.go_to(gain) }
+        }
+    }
+
+    fn apply(&mut self, event: Event) {
+        self.clarinet.apply(event);
+        let begins = matches!(event, Event::NoteOn { .. } | Event::TongueSlap { .. });
+        if self.sleeps && (begins || !self.clarinet.is_resting()) {
+            self.wake();
+        }
+    }
+
+    fn wake(&mut self) {
+        (self.sleeps, self.quiet, self.is_heard) = (false, 0, false);
+    }
+
+    /// Samples until the next decision about sleep.
+    fn reach(&self) -> usize {
+        CELL - self.at
+    }
+
+    /// The next samples, as many as [`reach`](Self::reach) at most; whether the player is awake and has made any.
+    fn render(&mut self, mut out: Channels) -> bool {
+        let (samples, is_awake) = (out.len(), !self.sleeps);
+        if is_awake {
+            self.clarinet.render_channels(out.part(0..samples));
+            let silence = self.clarinet.silence();
+            out.each(|channel| self.is_heard |= channel.iter().any(|sample| sample.abs() > silence));
+        }
+        self.at += samples;
+        if self.at == CELL {
+            self.at = 0;
+            let is_quiet = !std::mem::take(&mut self.is_heard) && self.clarinet.is_resting();
+            self.quiet = if is_quiet { self.quiet.saturating_add(1) } else { 0 };
+            self.sleeps |= self.may_sleep && self.quiet >= QUIET_CELLS;
+        }
+        is_awake
+    }
+
+    fn is_silent(&self) -> bool {
+        self.sleeps || self.clarinet.is_silent()
+    }
+
+    fn reset(&mut self) {
+        self.clarinet.reset();
+        (self.pan, self.is_heard, self.quiet) = (0.0, false, 0);
+        self.sleeps = self.may_sleep;
+    }
+}
+
+/// Adds a player's samples to the sum; the first one's take its place, so that a zero keeps its sign.
+fn add(sum: &mut [f32], own: &[f32], gain: &[f32], mut side: impl FnMut() -> f32, is_first: bool) {
+    for ((sum, own), gain) in sum.iter_mut().zip(own).zip(gain) {
+        let own = own * (gain * side());
+        *sum = if is_first { own } else { *sum + own };
+    }
+}
+
+/// One or more players of one instrument: events in, samples out.
+///
+/// ```
+/// use chalumeau_core::event::{Event, PartEvent, To};
+/// use chalumeau_core::instrument::{Ensemble, Players, Settings};
+/// use chalumeau_core::units::SoundingNote;
+///
+/// let mut duet = Ensemble::built_in(48_000.0)?;
+/// let players = Players { count: 2, ..Players::default() };
+/// duet.set_settings(&Settings { players, ..Settings::default() });
+/// for (player, key) in [(0, 60), (1, 64)] {
+///     let event = Event::NoteOn { note: SoundingNote(key), velocity: 0.8 };
+///     duet.apply(PartEvent { to: To::Player(player), event });
+/// }
+/// let mut samples = vec![0.0; 4_800];
+/// duet.render(&mut samples);
+/// assert!(samples.iter().any(|sample| sample.abs() > 0.01));
+/// # Ok::<(), chalumeau_core::instrument::BuildError>(())
+/// ```
+pub struct Ensemble {
+    /// All there can be, so that a change of their number allocates nothing.
+    seats: Vec<Seat>,
+    players: Players,
+    /// Loudness of each.
+    gain: Glide,
+    limiter: Limiter,
+}
+
+impl Ensemble {
+    /// The built-in B flat clarinet at a host rate in Hz, 1000..=1536000, with one player. Allocates.
+    ///
+    /// # Errors
+    /// [`BuildError::Rate`] if the host rate is out of range.
+    pub fn built_in(host_rate_hz: f64) -> Result<Self, BuildError> {
+        Ok(Self::new(Arc::new(Model::built_in(host_rate_hz)?), host_rate_hz))
+    }
+
+    /// Any instrument, from a model that was prepared for this host rate, Hz, with one player. Allocates the voices of all
+    /// players that there can be.
+    pub fn new(model: Arc<Model>, host_rate_hz: f64) -> Self {
+        let mut clarinets = vec![Clarinet::new(model, host_rate_hz)];
+        for number in 1..MOST_PLAYERS as u8 {
+            clarinets.push(clarinets[0].beside(host_rate_hz, number));
+        }
+        let mut ensemble = Self {
+            seats: clarinets.into_iter().map(|clarinet| Seat::new(clarinet, host_rate_hz)).collect(),
+            players: Players::default(),
+            gain: Glide::new(1.0, MOVE_S, host_rate_hz),
+            limiter: Limiter::new(host_rate_hz),
+        };
+        ensemble.arrange();
+        ensemble
+    }
+
+    fn count(&self) -> usize {
+        self.players.number()
+    }
+
+    /// Takes new settings, clamped to their ranges. Players who go stop and fade; players who come play from the next note on.
+    /// Real-time safe.
+    pub fn set_settings(&mut self, settings: &Settings) {
+        let players = settings.players.clamped();
+        let before = std::mem::replace(&mut self.players, players);
+        for seat in &mut self.seats[..players.number()] {
+            seat.clarinet.set_settings(settings);
+        }
+        if before == players {
+            return;
+        }
+        let stay = if before.split == players.split { before.number().min(players.number()) } else { 1 };
+        let (first, others) = self.seats.split_at_mut(stay);
+        for seat in others {
+            seat.clarinet.let_go();
+            seat.clarinet.follow(&first[0].clarinet);
+            seat.pan = first[0].pan;
+        }
+        self.arrange();
+    }
+
+    /// Everybody goes to the seat and the loudness that the number of players asks for.
+    fn arrange(&mut self) {
+        let (count, width) = (self.count(), self.players.width);
+        self.gain.go_to(1.0 / (count as f32).sqrt());
+        for (number, seat) in self.seats.iter_mut().enumerate() {
+            seat.may_sleep = count > 1 || number > 0;
+            if !seat.may_sleep && seat.sleeps {
+                seat.wake();
+            }
+            // The pan of a lone player belongs to who calls.
+            let pan = if count > 1 { seat.pan } else { 0.0 };
+            seat.sit((Person::seat(number, count, width) + pan).clamp(-1.0, 1.0));
+        }
+    }
+
+    /// Handles an event now. Events for a player who does not play are ignored; in unison all play every event. Real-time
+    /// safe.
+    pub fn apply(&mut self, PartEvent { to, event }: PartEvent) {
+        let all = to == To::All || self.players.split == Split::Unison;
+        let (count, width) = (self.count(), self.players.width);
+        if let Event::Set(number, value) = event {
+            let mut settings = *self.seats[0].clarinet.settings();
+            *settings.number(number) = value;
+            return self.set_settings(&settings);
+        }
+        for (number, seat) in self.seats.iter_mut().enumerate() {
+            let is_meant = match number < count {
+                true => all || to == To::Player(number as u8),
+                // Who has gone and still sounds is to be silenced too.
+                false => event == Event::Panic && !seat.sleeps,
+            };
+            if !is_meant {
+                continue;
+            }
+            seat.apply(event);
+            if let Event::Pan { position } = event {
+                seat.pan = if position.is_finite() { position.clamp(-1.0, 1.0) } else { 0.0 };
+                if count > 1 {
+                    seat.sit((Person::seat(number, count, width) + seat.pan).clamp(-1.0, 1.0));
+                }
+            }
+        }
+    }
+
+    /// Takes over keys, breath and bend from another ensemble, which this new one with the same settings replaces. Real-time
+    /// safe.
+    pub fn carry_on(&mut self, from: &Self) {
+        for (seat, before) in self.seats.iter_mut().zip(&from.seats) {
+            seat.clarinet.carry_on(&before.clarinet);
+            (seat.pan, seat.sides) = (before.pan, before.sides);
+            if !before.sleeps {
+                seat.wake();
+            }
+        }
+        self.gain = from.gain;
+    }
+
+    /// Overwrites `out` with the next samples, mono: without seats. Real-time safe.
+    pub fn render(&mut self, out: &mut [f32]) {
+        self.render_channels(Channels::one(out));
+    }
+
+    /// Overwrites one or two channels with the next samples. Real-time safe.
+    pub fn render_channels(&mut self, mut out: Channels) {
+        if self.is_alone() {
+            return self.seats[0].clarinet.render_channels(out);
+        }
+        let (mut begin, samples) = (0, out.len());
+        while begin < samples {
+            // All seats are at the same place of their cells.
+            let end = samples.min(begin + self.seats[0].reach());
+            self.mix(out.part(begin..end));
+            begin = end;
+        }
+    }
+
+    /// Renders one block with its events, which must be in order of time. An event at or after the end of the block is
+    /// applied at its end. Real-time safe.
+    pub fn render_events_channels(
+        &mut self,
+        events: impl IntoIterator<Item = Timed<PartEvent>>,
+        mut out: Channels,
+    ) {
+        let (mut done, end) = (0, out.len());
+        for Timed { at, event } in events {
+            let at = at.clamp(done, end);
+            self.render_channels(out.part(done..at));
+            self.apply(event);
+            done = at;
+        }
+        self.render_channels(out.part(done..end));
+    }
+
+    /// Whether the first player is heard as it is, and nobody else.
+    fn is_alone(&self) -> bool {
+        let is_lone = self.count() == 1 && self.seats[1..].iter().all(|seat| seat.sleeps);
+        is_lone && self.gain.rests_at(1.0) && self.seats[0].sides.iter().all(|side| side.rests_at(1.0))
+    }
+
+    /// The sum of all players, of one cell at most.
+    fn mix(&mut self, mut out: Channels) {
+        let samples = out.len();
+        let (mut left, mut right, mut gain) = ([0.0; CELL], [0.0; CELL], [0.0; CELL]);
+        let (left, right, gain) = (&mut left[..samples], &mut right[..samples], &mut gain[..samples]);
+        gain.iter_mut().for_each(|gain| *gain = self.gain.next());
+        let mut is_first = true;
+        for seat in &mut self.seats {
+            let own = if out.is_stereo() { Channels::two(left, right) } else { Channels::one(left) };
+            if !seat.render(own) {
+                continue;
+            }
+            let [left_side, right_side] = &mut seat.sides;
+            if let Some(sum) = out.right() {
+                add(sum, right, gain, || right_side.next(), is_first);
+                add(out.left(), left, gain, || left_side.next(), is_first);
+            } else {
+                // Without two channels there are no sides; they move on all the same.
+                let middle = || {
+                    left_side.next();
+                    right_side.next();
+                    1.0
+                };
+                add(out.left(), left, gain, middle, is_first);
+            }
+            is_first = false;
+        }
+        if is_first {
+            out.each(|channel| channel.fill(0.0));
+        }
+        match &mut out.right {
+            None => self.limiter.process(out.left),
+            Some(right) => self.limiter.process_two(out.left, right),
+        }
+    }
+
+    /// Silences and resets everything; settings stay. Real-time safe.
+    pub fn reset(&mut self) {
+        self.seats.iter_mut().for_each(Seat::reset);
+        self.limiter.reset();
+        self.arrange();
+        self.gain.set(self.gain.target());
+        for seat in &mut self.seats {
+            seat.sides.iter_mut().for_each(|side| side.set(side.target()));
+            seat.at = 0;
+        }
+    }
+
+    /// The first player: what a window shows, and whose inside a scope sees.
+    pub fn first(&self) -> &Clarinet {
+        &self.seats[0].clarinet
+    }
+
+    /// See [`Clarinet::set_scope_on`], of the first player.
+    pub fn set_scope_on(&mut self, on: bool) {
+        self.seats[0].clarinet.set_scope_on(on);
+    }
+
+    /// Whether one player is all there is: then who calls pans.
+    pub fn is_lone(&self) -> bool {
+        self.count() == 1
+    }
+
+    /// Pan of the first player's events, -1 left..=1 right.
+    pub fn pan(&self) -> f32 {
+        self.seats[0].pan
+    }
+
+    /// Whether one player is silent and at rest. In unison all are, for every player.
+    pub fn is_silent_player(&self, number: usize) -> bool {
+        match self.players.split {
+            Split::Unison => self.is_silent(),
+            Split::Chords => self.seats.get(number).is_none_or(Seat::is_silent),
+        }
+    }
+
+    /// True while no key sounds and nobody blows; the instruments may still ring.
+    pub fn is_resting(&self) -> bool {
+        self.seats.iter().all(|seat| seat.sleeps || seat.clarinet.is_resting())
+    }
+
+    /// True when the output is silent and all players rest: the host may stop calling.
+    pub fn is_silent(&self) -> bool {
+        self.seats.iter().all(Seat::is_silent)
+    }
+
+    /// Players who are awake: those that cost time.
+    pub fn awake(&self) -> usize {
+        self.seats.iter().filter(|seat| !seat.sleeps).count()
+    }
+
+    /// How often a state that was not finite had to be reset since the start.
+    pub fn resets(&self) -> u64 {
+        self.seats.iter().map(|seat| seat.clarinet.resets()).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests;
