@@ -64,7 +64,7 @@ pub struct ScoreArgs {
     /// Length of the note, or of each note of the scale, s, 0.01..3600 [default: 2, scale 0.5]
     #[arg(long, value_name = "S", conflicts_with = "midi", value_parser = |s: &str| within(s, 0.01, 3600.0))]
     seconds: Option<f64>,
-    /// Time to fade after the last event, s, 0..60 [default: 1, one note 0]
+    /// Time to fade after the last event, s, 0..60 [default: 1, one note 0; more with a fall or a breath in]
     #[arg(long, value_name = "S", value_parser = |s: &str| within(s, 0.0, 60.0))]
     tail: Option<f64>,
 
@@ -179,7 +179,8 @@ impl ScoreArgs {
         }
         // A single note lasts as long as was asked; a melody gets time to fade.
         let one_note = self.written.is_some() || self.sounding.is_some();
-        let parts = parts.with_tail(self.tail.unwrap_or(if one_note { 0.0 } else { 1.0 }), self.rate);
+        let usual = if one_note { 0.0 } else { 1.0 } + settings.articulation.tail_s();
+        let parts = parts.with_tail(self.tail.unwrap_or(usual), self.rate);
         Ok(RenderJob { model, settings, score: (&parts).into(), parts, rate: self.rate })
     }
 

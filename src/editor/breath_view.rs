@@ -89,7 +89,9 @@ impl BreathView {
         }
         heading(ui, "Articulation");
         choice(ui, hands, "attack");
-        for id in ["tongue", "legato", "gliss", "noise", "life"] {
+        for id in [
+            "tongue", "legato", "gliss", "scoop", "scoops", "fall", "falls", "noise", "bin", "ksound", "life",
+        ] {
             slider(ui, hands, id);
         }
         heading(ui, "Vibrato");

@@ -232,7 +232,8 @@ pub static PARAMETERS: &[Parameter] = &[
             "Widen it if a held note trembles although you blow steadily.",
             "",
         )
-        .sets(Sets::Number(SettingNumber::BreathDeadband)),
+        .sets(Sets::Number(SettingNumber::BreathDeadband))
+        .flag("--breath-deadband"),
     entry("stren", EMBOUCHURE, "Reed strength", number([1.5, 5.0], 2.5, 2, ""))
         .help(
             "Reed strength as printed on the box; 2.5 closes at 6 kPa",
@@ -826,6 +827,46 @@ pub static PARAMETERS: &[Parameter] = &[
         "",
     )
     .setup(),
+    entry("scoop", EXPRESSION, "Scoop", number([0.0, 300.0], 0.0, 0, " cents"))
+        .help(
+            "How far below its pitch a tongued note begins",
+            "The note rises to its pitch, as in jazz. A slurred note has none.",
+            "",
+        )
+        .sets(Sets::Number(SettingNumber::ScoopCents))
+        .flag("--scoop"),
+    entry("scoops", EXPRESSION, "Scoop time", number([0.02, 1.0], 0.15, 2, " s"))
+        .help("Time from the beginning of a note until it has its pitch, while *Scoop* is on", "", "")
+        .sets(Sets::Number(SettingNumber::ScoopS))
+        .flag("--scoop-time"),
+    entry("fall", EXPRESSION, "Fall", number([0.0, 1_200.0], 0.0, 0, " cents"))
+        .help(
+            "How far the pitch falls when the last key comes up; at 0 the note ends at once",
+            "The note goes on while it falls, and fades.",
+            "",
+        )
+        .sets(Sets::Number(SettingNumber::FallCents))
+        .flag("--fall"),
+    entry("falls", EXPRESSION, "Fall time", number([0.05, 2.0], 0.4, 2, " s"))
+        .help("Time in which a note falls and fades, while *Fall* is on", "", "")
+        .sets(Sets::Number(SettingNumber::FallS))
+        .flag("--fall-time"),
+    entry("bin", EXPRESSION, "Breath in", percent(0.0))
+        .help(
+            "How loud the player breathes in after a phrase",
+            "A quarter of a second after the last note, air rushes in at the mouth. At 100 % it is 40 dB below a mezzo-forte.",
+            "",
+        )
+        .sets(Sets::Number(SettingNumber::BreathIn))
+        .flag("--breath-in"),
+    entry("ksound", EXPRESSION, "Key sounds", percent(0.0))
+        .help(
+            "How loud pads and fingers are",
+            "Each moves air at its hole, and the bore answers with a pop, with and without breath. At 100 % they are 35 dB below a mezzo-forte.",
+            "",
+        )
+        .sets(Sets::Number(SettingNumber::KeySounds))
+        .flag("--key-sounds"),
     entry("growl", TECHNIQUES, "Growl", percent(0.0))
         .help(
             "How much the player sings into the instrument",

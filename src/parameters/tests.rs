@@ -1,4 +1,5 @@
 use super::*;
+use chalumeau_core::instrument::Articulation;
 use chalumeau_core::instrument::player::Attack;
 use chalumeau_core::instrument::player::vibrato::Vibrato;
 use chalumeau_core::instrument::techniques::{GrowlPitch, Techniques, Tract};
@@ -93,6 +94,12 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
     ("attack", "Expression", "Attack", "Normal", true),
     ("gliss", "Expression", "Glissando", "0.00 s", true),
     ("wheel", "Expression", "Mod wheel", "Vibrato", false),
+    ("scoop", "Expression", "Scoop", "0 cents", true),
+    ("scoops", "Expression", "Scoop time", "0.15 s", true),
+    ("fall", "Expression", "Fall", "0 cents", true),
+    ("falls", "Expression", "Fall time", "0.40 s", true),
+    ("bin", "Expression", "Breath in", "0.0 %", true),
+    ("ksound", "Expression", "Key sounds", "0.0 %", true),
     ("growl", "Techniques", "Growl", "0.0 %", true),
     ("growlp", "Techniques", "Growl pitch", "Follows the note", true),
     ("growli", "Techniques", "Growl interval", "-12.0 st", true),
@@ -249,7 +256,8 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         vibrato: Vibrato { depth: _, rate_hz: _, onset_s: _, unevenness: _ },
         attack: _,
         glissando_s: _,
-        articulation: _,
+        articulation:
+            Articulation { scoop_cents: _, scoop_s: _, fall_cents: _, fall_s: _, breath_in: _, key_sounds: _ },
         techniques:
             Techniques {
                 growl: _,
@@ -263,7 +271,7 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         tract: Tract { amount: _, interval_semitones: _ },
         players: Players { count: _, split: _, spread_cents: _, width: _ },
     } = d;
-    assert_eq!(fields, 54);
+    assert_eq!(fields, 60);
 }
 
 #[test]

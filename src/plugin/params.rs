@@ -16,7 +16,7 @@ use crate::parameters::{InUse, Number, Value};
 use crate::plugin::host_link::HostLink;
 use crate::presets::Preset;
 use chalumeau_core::control::midi::breath::BreathFrom;
-use chalumeau_core::instrument::{Articulation, Beyond, BreathResponse, Reach, Settings, Tuning};
+use chalumeau_core::instrument::{Beyond, BreathResponse, Reach, Settings, Tuning};
 
 mod entry;
 pub mod instrument;
@@ -497,7 +497,7 @@ impl ChalumeauParams {
             vibrato: self.expression.vibrato(),
             attack: self.expression.attack.value().into(),
             glissando_s: settled(&self.expression.glissando),
-            articulation: Articulation::default(),
+            articulation: self.expression.articulation(),
             techniques: self.techniques.techniques(),
             tract: self.techniques.tract(),
             players: self.players.players(),

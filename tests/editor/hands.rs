@@ -17,8 +17,8 @@ const SLIDERS: &[(Tab, &[&str])] = &[
         Tab::Breath,
         &[
             "breath", "bcurve", "bsoft", "bloud", "bdead", "full", "curve", "tongue", "legato", "gliss",
-            "noise", "life", "vib", "vibhz", "vibon", "vibun", "growl", "growli", "growlf", "flut", "fluthz",
-            "subt", "tract", "tractp",
+            "scoop", "scoops", "fall", "falls", "bin", "ksound", "noise", "life", "vib", "vibhz", "vibon",
+            "vibun", "growl", "growli", "growlf", "flut", "fluthz", "subt", "tract", "tractp",
         ],
     ),
     (
@@ -73,7 +73,7 @@ const MOMENTARY: &[(Tab, &str, &str)] = &[
 #[test]
 fn every_parameter_has_a_place() {
     let host = crate::support::Fake::default();
-    assert_eq!(host.ids().len(), 97);
+    assert_eq!(host.ids().len(), 103);
     let lists = [SLIDERS, SWITCHES, CHOICES].into_iter().flatten().flat_map(|(_, ids)| ids.iter());
     let placed: Vec<&str> = lists
         .chain([STUDY_SLIDERS, STUDY_SWITCHES, STUDY_CHOICES].into_iter().flatten())

@@ -107,7 +107,8 @@ impl InstrumentSwap {
 
     /// Longest time from rest to silence, s.
     pub fn tail_s(&self) -> f64 {
-        Clarinet::TAIL_S + self.stereo.room().tail_s()
+        let articulation = self.ensemble().first().settings().articulation;
+        Clarinet::TAIL_S + articulation.tail_s() + self.stereo.room().tail_s()
     }
 
     /// Switches on or off that the instrument keeps its last moments for the window.

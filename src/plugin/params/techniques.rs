@@ -5,10 +5,10 @@ use nice_plug::prelude::*;
 use super::entry::choice;
 use super::settled;
 use chalumeau_core::control::midi::techniques::Wheel;
-use chalumeau_core::instrument::Settings;
 use chalumeau_core::instrument::player::Attack;
 use chalumeau_core::instrument::player::vibrato::Vibrato;
 use chalumeau_core::instrument::techniques::{GrowlPitch, Techniques, Tract};
+use chalumeau_core::instrument::{Articulation, Settings};
 
 /// How notes begin, go on and lead into each other.
 #[derive(Params)]
@@ -37,6 +37,24 @@ pub struct ExpressionParams {
     /// What the mod wheel does.
     #[id = "wheel"]
     pub wheel: EnumParam<WheelChoice>,
+    /// [`Articulation::scoop_cents`].
+    #[id = "scoop"]
+    pub scoop: FloatParam,
+    /// [`Articulation::scoop_s`].
+    #[id = "scoops"]
+    pub scoop_time: FloatParam,
+    /// [`Articulation::fall_cents`].
+    #[id = "fall"]
+    pub fall: FloatParam,
+    /// [`Articulation::fall_s`].
+    #[id = "falls"]
+    pub fall_time: FloatParam,
+    /// [`Articulation::breath_in`].
+    #[id = "bin"]
+    pub breath_in: FloatParam,
+    /// [`Articulation::key_sounds`].
+    #[id = "ksound"]
+    pub key_sounds: FloatParam,
 }
 
 /// Extended techniques and the vocal tract.
@@ -173,6 +191,12 @@ impl ExpressionParams {
             attack: choice("attack", Settings::default().attack.into()),
             glissando: number("gliss"),
             wheel: choice("wheel", WheelChoice::Vibrato),
+            scoop: number("scoop"),
+            scoop_time: number("scoops"),
+            fall: number("fall"),
+            fall_time: number("falls"),
+            breath_in: number("bin"),
+            key_sounds: number("ksound"),
         }
     }
 
@@ -183,6 +207,20 @@ impl ExpressionParams {
             rate_hz: settled(&self.vibrato_rate),
             onset_s: settled(&self.vibrato_onset),
             unevenness: settled(&self.vibrato_unevenness),
+        }
+    }
+}
+
+impl ExpressionParams {
+    /// As the instrument reads it. Real-time safe.
+    pub(super) fn articulation(&self) -> Articulation {
+        Articulation {
+            scoop_cents: settled(&self.scoop),
+            scoop_s: settled(&self.scoop_time),
+            fall_cents: settled(&self.fall),
+            fall_s: settled(&self.fall_time),
+            breath_in: settled(&self.breath_in),
+            key_sounds: settled(&self.key_sounds),
         }
     }
 }
