@@ -239,6 +239,10 @@ impl Player {
                     self.move_holes(fingering, 1e-3 * f64::from(self.settings.legato_ms), model, voice);
                 }
             }
+            Event::Hole { hole, opening } => {
+                let ticks = self.legato_ticks(model);
+                self.fingers.hold_hole(usize::from(hole), opening, ticks, model, voice.lattice_mut());
+            }
             Event::Technique { which, amount } => self.techniques.set(which, amount),
             // They act after the instrument; settings are set from outside.
             Event::Volume { .. } | Event::Pan { .. } | Event::Set(..) => {}
@@ -345,7 +349,7 @@ impl Player {
                 if let Some(dip) = slur.dip(self.breath.gamma()) {
                     self.breath.dip(dip);
                 }
-                let ticks = (legato_s / self.tick_s(model)).round() as u32;
+                let ticks = self.legato_ticks(model);
                 self.fingers.walk_to(fingering, ticks, slur.finger_share(), model, voice.lattice_mut());
                 self.posture = None;
             }
@@ -356,6 +360,11 @@ impl Player {
                 self.move_holes(fingering, legato_s, model, voice);
             }
         }
+    }
+
+    /// Control ticks that the fingers take between slurred notes.
+    fn legato_ticks(&self, model: &Model) -> u32 {
+        (1e-3 * f64::from(self.settings.legato_ms) / self.tick_s(model)).round() as u32
     }
 
     fn move_holes<F: Real>(&mut self, fingering: usize, time_s: f64, model: &Model, voice: &mut Voice<F>) {
