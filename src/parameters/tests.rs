@@ -235,6 +235,7 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         vibrato: Vibrato { depth: _, rate_hz: _, onset_s: _, unevenness: _ },
         attack: _,
         glissando_s: _,
+        alternates: _,
         techniques:
             Techniques {
                 growl: _,

@@ -444,6 +444,7 @@ impl ChalumeauParams {
             vibrato: self.expression.vibrato(),
             attack: self.expression.attack.value().into(),
             glissando_s: settled(&self.expression.glissando),
+            alternates: false,
             techniques: self.techniques.techniques(),
             tract: self.techniques.tract(),
         };

@@ -1,10 +1,13 @@
 //! Extended techniques, the vocal tract and the glissando, heard on the built-in clarinet with the default settings.
 
 use chalumeau_core::analysis::pitch::{fundamental_hz, pitch_track};
+use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::bore::context_fingerings::Alternate;
 use chalumeau_core::bore::fingering_finder::bits;
 use chalumeau_core::event::{Event, Technique, Timed};
-use chalumeau_core::instrument::{Clarinet, GrowlPitch, Settings, Techniques, Tract};
+use chalumeau_core::instrument::{Clarinet, GrowlPitch, Preparation, Settings, Techniques, Tract, Wanted};
 use chalumeau_core::units::{SoundingNote, WrittenNote, cents};
+use std::sync::Arc;
 
 const RATE_HZ: f64 = 48_000.0;
 /// Samples of a step of 1 ms.
@@ -409,4 +412,120 @@ fn half_holes_do_not_depend_on_the_block() {
     };
     let whole = render(24_000);
     assert!([1, 37, 512].into_iter().all(|block| render(block) == whole));
+}
+
+/// Which alternate of the model is in place at rest, if all its holes are as it has them and the chart's are not.
+fn in_place(clarinet: &mut Clarinet) -> Option<usize> {
+    let holes = clarinet.model().file.holes.len();
+    let open = (0..holes as u8).fold(0, |bits, hole| {
+        let opening = opening(clarinet, hole);
+        assert!(opening == 0.0 || opening == 1.0, "under way");
+        bits | u64::from(opening == 1.0) << hole
+    });
+    let state = clarinet.player_state();
+    let model = clarinet.model();
+    let chart = bits(&model.file.fingerings[state.fingering].open);
+    let own = |one: &Alternate| one.fingering == state.fingering && one.open == open;
+    let found = model.alternates.all().iter().position(own);
+    assert!(found.is_some() || open == chart, "neither the chart's fingering nor an alternate");
+    found
+}
+
+fn press(clarinet: &mut Clarinet, written: u8) {
+    let note = WrittenNote(written).sounding(clarinet.model().file.transposition).unwrap();
+    clarinet.apply(Event::NoteOn { note, velocity: 0.7 });
+}
+
+fn by_context() -> Settings {
+    Settings { alternates: true, ..still() }
+}
+
+#[test]
+fn chromatic_slurs_take_alternates_and_leaps_do_not() {
+    // From, to, whether an alternate is taken: F5 F#5, E4 D#4; a leap to the same notes; a step that the chart does best.
+    for (from, to, takes) in
+        [(77, 78, true), (64, 63, true), (70, 78, false), (55, 63, false), (65, 67, false)]
+    {
+        for (settings, takes) in [(by_context(), takes), (still(), false)] {
+            let mut clarinet = playing(&settings, from, 0.5);
+            listen(&mut clarinet, 300, |_, _| {});
+            assert_eq!(in_place(&mut clarinet), None, "a tongued note");
+            press(&mut clarinet, to);
+            listen(&mut clarinet, 100, |_, _| {});
+            assert_eq!(in_place(&mut clarinet).is_some(), takes, "{from} {to}");
+        }
+    }
+}
+
+#[test]
+fn a_trill_goes_to_the_alternate_and_back() {
+    let (from, to) = (77, 78);
+    let mut clarinet = playing(&by_context(), from, 0.6);
+    listen(&mut clarinet, 300, |_, _| {});
+    for _ in 0..6 {
+        press(&mut clarinet, to);
+        listen(&mut clarinet, 80, |_, _| {});
+        assert!(in_place(&mut clarinet).is_some());
+        clarinet.apply(Event::NoteOff { note: sounding(to) });
+        listen(&mut clarinet, 80, |_, _| {});
+        assert!(in_place(&mut clarinet).is_none());
+    }
+    listen(&mut clarinet, 200, |_, _| {});
+    let hz = fundamental_hz(&listen(&mut clarinet, 300, |_, _| {}), RATE_HZ).unwrap();
+    assert!(cents(hz, sounding(from).frequency_hz(440.0)).abs() < 3.0);
+}
+
+/// All pairs of fingerings between which an alternate is taken, on every bundled instrument.
+#[test]
+fn each_alternate_that_is_taken_plays_its_note() {
+    for instrument in Bundled::ALL {
+        let model =
+            Preparation::new(&Wanted::new(instrument.file(), RATE_HZ), None).ready().unwrap().unwrap();
+        let model = Arc::new(model);
+        let fingerings = &model.file.fingerings;
+        let notes = 0..fingerings.len();
+        let mut worst = 0.0_f64;
+        let mut count = 0;
+        for (from, to) in notes.clone().flat_map(|from| notes.clone().map(move |to| (from, to))) {
+            let Some(at) = model.alternates.taken(from, None, to) else { continue };
+            for breath in [0.2, 0.5, 0.9] {
+                let mut clarinet = Clarinet::new(model.clone(), RATE_HZ);
+                clarinet.set_settings(&by_context());
+                clarinet.apply(Event::Breath(breath));
+                press(&mut clarinet, fingerings[from].written.0);
+                listen(&mut clarinet, 500, |_, _| {});
+                press(&mut clarinet, fingerings[to].written.0);
+                listen(&mut clarinet, 500, |_, _| {});
+                assert_eq!(in_place(&mut clarinet), Some(usize::from(at)));
+                let hz = fundamental_hz(&listen(&mut clarinet, 300, |_, _| {}), RATE_HZ);
+                let off = hz.map_or(f64::INFINITY, |hz| cents(hz, model.notes_hz[to]));
+                let alternate = model.alternates.get(at).unwrap();
+                println!(
+                    "{} {} {} breath {breath}: {off:+.1} cents, corrected by {:+.1}, threshold x {:.3}",
+                    instrument.id(),
+                    fingerings[from].written,
+                    fingerings[to].written,
+                    -alternate.cents,
+                    alternate.harder
+                );
+                worst = worst.max(off.abs());
+                count += 1;
+            }
+        }
+        assert!(count >= 12, "{}: {count}", instrument.id());
+        assert!(worst < 20.0, "{}: {worst}", instrument.id());
+    }
+}
+
+#[test]
+fn where_no_alternate_is_taken_not_a_bit_changes() {
+    let play = |settings: &Settings| {
+        let mut clarinet = playing(settings, 65, 0.5);
+        listen(&mut clarinet, 900, |clarinet, ms| match ms {
+            300 => press(clarinet, 72),
+            600 => press(clarinet, 79),
+            _ => {}
+        })
+    };
+    assert!(play(&by_context()) == play(&still()));
 }

@@ -52,7 +52,7 @@ use glissando::Slide;
 use level_keeper::{Led, LevelKeeper};
 use life::Life;
 use lip_glide::LipGlide;
-use posture::{Lags, Posture};
+use posture::{Fingered, Lags, Posture};
 use reed_glide::ReedGlide;
 use reed_smoothing::ReedSmoothing;
 use response::{Bodily, Response};
@@ -326,6 +326,9 @@ impl Player {
     fn finger<F: Real>(&mut self, fingering: usize, slurred: bool, model: &Model, voice: &mut Voice<F>) {
         let glissando_s = f64::from(self.settings.glissando_s);
         let from = self.fingers.fingering().filter(|_| slurred);
+        let alternate = from
+            .filter(|_| self.settings.alternates)
+            .and_then(|from| model.alternates.taken(from, self.fingers.alternate(), fingering));
         let begun = self.slide.map(|slide| slide.target).or(from);
         let slides = begun.filter(|&begun| from.is_some() && glissando_s > 0.0 && begun != fingering);
         self.slide = slides.map(|begun| Slide::new(begun, fingering, glissando_s, model));
@@ -335,6 +338,7 @@ impl Player {
             self.posture = None;
             return;
         }
+        self.fingers.choose(alternate);
         if !slurred {
             return self.move_holes(fingering, 1e-3 * TONGUED_FINGERS_MS, model, voice);
         }
@@ -405,8 +409,14 @@ impl Player {
                 BreathResponse::Physical => Jet::Steady,
                 BreathResponse::Played => Jet::Pulsed,
             });
-            let subtone = self.techniques.subtone();
-            Posture::new(settings, fingering.unwrap_or(0), bend_cents, subtone, tick_s, model)
+            let alternate = self.fingers.alternate().and_then(|at| model.alternates.get(at));
+            let fingered = Fingered {
+                fingering: fingering.unwrap_or(0),
+                alternate_cents: alternate.map_or(0.0, |alternate| alternate.cents),
+                bend_cents,
+                subtone: self.techniques.subtone(),
+            };
+            Posture::new(settings, &fingered, tick_s, model)
         });
         let (key_down, tongue_holds) = (!self.keys.is_empty(), self.tongue.is_holding());
         let asked = self.breath.asked(key_down);

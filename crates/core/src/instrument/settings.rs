@@ -118,6 +118,10 @@ pub struct Settings {
     pub tract: Tract,
     /// Time that a slur slides from note to note, s, 0 (the fingers move at once)..=3. Default 0.
     pub glissando_s: f32,
+    /// Whether slurs by a semitone or a tone, as in chromatic runs and trills, take an
+    /// [alternate fingering](crate::bore::context_fingerings) where fewer fingers then move. Not where slurs slide. Default
+    /// false.
+    pub alternates: bool,
 }
 
 /// A number inside its range; one that is not finite becomes the default. Real-time safe.
@@ -159,6 +163,7 @@ impl Default for Settings {
             techniques: Techniques::default(),
             tract: Tract::default(),
             glissando_s: 0.0,
+            alternates: false,
         }
     }
 }
@@ -377,6 +382,7 @@ impl Settings {
             techniques: self.techniques.clamped(),
             tract: self.tract.clamped(),
             glissando_s: fix(self.glissando_s, 0.0, 3.0, d.glissando_s),
+            alternates: self.alternates,
         }
     }
 }

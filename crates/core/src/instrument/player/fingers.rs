@@ -15,6 +15,8 @@ const HOLES: usize = 64;
 pub struct Fingers {
     /// Index of the fingering in place; none before the first note.
     fingering: Option<usize>,
+    /// The alternate that is in place instead of the chart's fingering, by its number in the model.
+    alternate: Option<u8>,
     /// Holes that are open as far as asked, whatever is fingered.
     held: HeldHoles,
     /// A slur that is under way.
@@ -75,6 +77,16 @@ impl Fingers {
         self.fingering
     }
 
+    /// The alternate in place of it, if one is.
+    pub fn alternate(&self) -> Option<u8> {
+        self.alternate
+    }
+
+    /// Chooses an alternate for the fingering that they are moved to next; `None` for that of the chart.
+    pub fn choose(&mut self, alternate: Option<u8>) {
+        self.alternate = alternate;
+    }
+
     /// Replaces the open holes of every fingering, one bit each from the lowest; `None` goes back to the fingering.
     /// [`move_to`](Self::move_to) then moves the holes.
     pub fn try_holes(&mut self, tried: Option<u64>) {
@@ -105,6 +117,7 @@ impl Fingers {
     /// Makes a fingering the one in place while [`slide`](Self::slide) moves the holes.
     pub fn aim(&mut self, fingering: usize) {
         self.fingering = Some(fingering);
+        self.alternate = None;
         self.walk = Walk::default();
     }
 
@@ -203,9 +216,14 @@ impl Fingers {
 
     /// Opening of a hole under a fingering: 1 open, 0 closed.
     fn opening(&self, fingering: usize, hole: usize, model: &Model) -> f64 {
-        match self.held.opening(hole) {
-            Some(opening) => f64::from(opening),
-            None => f64::from(u8::from(model.file.fingerings[fingering].open[hole])),
+        if let Some(opening) = self.held.opening(hole) {
+            return f64::from(opening);
         }
+        let alternate = self.alternate.and_then(|at| model.alternates.get(at));
+        let open = match alternate {
+            Some(alternate) => alternate.open >> hole & 1 == 1,
+            None => model.file.fingerings[fingering].open[hole],
+        };
+        f64::from(u8::from(open))
     }
 }
