@@ -8,7 +8,7 @@ use egui::{Align2, CornerRadius, FontId, Rect, Role, Sense, Stroke, Ui, WidgetIn
 use crate::editor::breath_meter;
 use crate::editor::chart;
 use crate::editor::chart::Chart;
-use crate::editor::controls::{Hands, choice, heading, momentary, slider};
+use crate::editor::controls::{Hands, choice, heading, momentary, slider, switch};
 use crate::editor::snapshot::{BreathSource, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
@@ -94,6 +94,7 @@ impl BreathView {
         ] {
             slider(ui, hands, id);
         }
+        switch(ui, hands, "altf");
         heading(ui, "Vibrato");
         for id in ["vib", "vibhz", "vibon", "vibun"] {
             slider(ui, hands, id);

@@ -867,6 +867,13 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Number(SettingNumber::KeySounds))
         .flag("--key-sounds"),
+    entry("altf", EXPRESSION, "Alternate fingerings", switch(false, ["Chart", "By context"]))
+        .help(
+            "Whether slurs by a semitone or a tone take the fingering that moves the fewest fingers",
+            "As in chromatic runs and trills. An alternate fingering is within 15 cents of the chart's, and corrected.",
+            "",
+        )
+        .sets(Sets::Switch(|settings| &mut settings.alternates)),
     entry("growl", TECHNIQUES, "Growl", percent(0.0))
         .help(
             "How much the player sings into the instrument",

@@ -100,6 +100,7 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
     ("falls", "Expression", "Fall time", "0.40 s", true),
     ("bin", "Expression", "Breath in", "0.0 %", true),
     ("ksound", "Expression", "Key sounds", "0.0 %", true),
+    ("altf", "Expression", "Alternate fingerings", "Chart", true),
     ("growl", "Techniques", "Growl", "0.0 %", true),
     ("growlp", "Techniques", "Growl pitch", "Follows the note", true),
     ("growli", "Techniques", "Growl interval", "-12.0 st", true),
@@ -195,11 +196,12 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         listening: Listening { mode: ListeningMode::Point, ..d.listening },
         reach: Reach { transpose: -2, beyond: Beyond::Octave },
         attack: Attack::Hard,
+        alternates: true,
         techniques: Techniques { growl_pitch: GrowlPitch::Fixed, ..d.techniques },
         players: Players { count: 3, split: Split::Unison, ..d.players },
         ..d
     };
-    let mut fields = 10;
+    let mut fields = 11;
     for (parameter, number) in numbers() {
         let Some(Sets::Number(which)) = parameter.sets else { continue };
         fields += 1;
@@ -214,6 +216,7 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         parameter.set(&mut filled, Value::Number(number.default));
     }
     find("reedc").unwrap().set(&mut filled, Value::Switch(true));
+    find("altf").unwrap().set(&mut filled, Value::Switch(false));
     find("tune").unwrap().set(&mut filled, Value::Choice(1));
     find("resp").unwrap().set(&mut filled, Value::Choice(0));
     find("heard").unwrap().set(&mut filled, Value::Choice(0));
@@ -258,6 +261,7 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         glissando_s: _,
         articulation:
             Articulation { scoop_cents: _, scoop_s: _, fall_cents: _, fall_s: _, breath_in: _, key_sounds: _ },
+        alternates: _,
         techniques:
             Techniques {
                 growl: _,
@@ -271,7 +275,7 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         tract: Tract { amount: _, interval_semitones: _ },
         players: Players { count: _, split: _, spread_cents: _, width: _ },
     } = d;
-    assert_eq!(fields, 60);
+    assert_eq!(fields, 61);
 }
 
 #[test]

@@ -498,6 +498,7 @@ impl ChalumeauParams {
             attack: self.expression.attack.value().into(),
             glissando_s: settled(&self.expression.glissando),
             articulation: self.expression.articulation(),
+            alternates: self.expression.alternates.value(),
             techniques: self.techniques.techniques(),
             tract: self.techniques.tract(),
             players: self.players.players(),

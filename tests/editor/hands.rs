@@ -40,7 +40,8 @@ const MAKER_SLIDERS: &[&str] = &["rstiff", "rarea", "rwidth", "ropen"];
 const LISTENING_SLIDERS: &[&str] = &["ldist", "langle", "lheigh", "lwidth"];
 /// On the last page of the knob's panel.
 const STUDY_SLIDERS: &[&str] = &["part", "seed", "trial"];
-const SWITCHES: &[(Tab, &[&str])] = &[(Tab::Reed, &["reedc"]), (Tab::Knob, &["oscany"])];
+const SWITCHES: &[(Tab, &[&str])] =
+    &[(Tab::Reed, &["reedc"]), (Tab::Breath, &["altf"]), (Tab::Knob, &["oscany"])];
 const STUDY_SWITCHES: &[&str] = &["rec", "replay", "study"];
 const STUDY_CHOICES: &[&str] = &["side"];
 const CHOICES: &[(Tab, &[&str])] = &[
@@ -73,7 +74,7 @@ const MOMENTARY: &[(Tab, &str, &str)] = &[
 #[test]
 fn every_parameter_has_a_place() {
     let host = crate::support::Fake::default();
-    assert_eq!(host.ids().len(), 103);
+    assert_eq!(host.ids().len(), 104);
     let lists = [SLIDERS, SWITCHES, CHOICES].into_iter().flatten().flat_map(|(_, ids)| ids.iter());
     let placed: Vec<&str> = lists
         .chain([STUDY_SLIDERS, STUDY_SWITCHES, STUDY_CHOICES].into_iter().flatten())

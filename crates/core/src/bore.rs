@@ -20,6 +20,7 @@ pub mod alternate_fingerings;
 pub mod bundled;
 pub mod cells;
 pub mod check;
+pub mod context_fingerings;
 pub mod cylinder;
 pub mod fingering_finder;
 #[cfg(feature = "fit")]

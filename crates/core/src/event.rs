@@ -82,6 +82,16 @@ pub enum Event {
     /// Open holes whatever is fingered, one bit each in the order of the instrument's file from the lowest bit; `None` goes
     /// back to the fingering of the note.
     TryHoles(Option<u64>),
+    /// Opens one hole as far as asked, whatever is fingered: half-holes, shadings, quarter tones. It gets there in the time
+    /// of the fingers (`Settings::legato_ms`), and the tuning stays that of the note. [`TryHoles`](Self::TryHoles) takes
+    /// its place, and its `None` gives back this hole too. A hole that the instrument does not have is ignored.
+    Hole {
+        /// Index in the order of the instrument's file, 0..=63.
+        hole: u8,
+        /// 0 closed..=1 open, about the share of the hole's diameter: air passes through the square of it. `None`, or a
+        /// number that is not finite, goes back to the fingering of the note.
+        opening: Option<f32>,
+    },
     /// Releases all notes, sets the breath to 0 and clears the state.
     Panic,
 }

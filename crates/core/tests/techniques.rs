@@ -1,9 +1,13 @@
 //! Extended techniques, the vocal tract and the glissando, heard on the built-in clarinet with the default settings.
 
 use chalumeau_core::analysis::pitch::{fundamental_hz, pitch_track};
-use chalumeau_core::event::{Event, Technique};
-use chalumeau_core::instrument::{Clarinet, GrowlPitch, Settings, Techniques, Tract};
+use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::bore::context_fingerings::Alternate;
+use chalumeau_core::bore::fingering_finder::bits;
+use chalumeau_core::event::{Event, Technique, Timed};
+use chalumeau_core::instrument::{Clarinet, GrowlPitch, Preparation, Settings, Techniques, Tract, Wanted};
 use chalumeau_core::units::{SoundingNote, WrittenNote, cents};
+use std::sync::Arc;
 
 const RATE_HZ: f64 = 48_000.0;
 /// Samples of a step of 1 ms.
@@ -246,4 +250,282 @@ fn any_movement_of_all_techniques_stays_bounded() {
         }
         assert_eq!(clarinet.resets(), 0, "{rate_hz}");
     }
+}
+
+/// Written C4, whose fingering with the left ring finger's hole open is that of D4.
+const HALF_HOLED: u8 = 60;
+
+/// Index of that hole, and the open holes of D4.
+fn ring_finger(clarinet: &Clarinet) -> (u8, u64) {
+    let file = &clarinet.model().file;
+    let hole = file.hole("L3").unwrap();
+    let [low, high] = [60, 62].map(|written| bits(&file.fingering(WrittenNote(written)).unwrap().open));
+    assert_eq!(high, low | 1 << hole);
+    (hole as u8, high)
+}
+
+fn still() -> Settings {
+    Settings { noise: 0.0, life: 0.0, ..Settings::default() }
+}
+
+fn opening(clarinet: &mut Clarinet, hole: u8) -> f64 {
+    clarinet.voice_mut().lattice().opening(usize::from(hole))
+}
+
+/// Loudest 3 ms above about 4 kHz (a first difference, three times, whose gain there is set to 1), dB.
+fn highest_db(heard: &[f64]) -> f64 {
+    let gain = 2.0 * (std::f64::consts::PI * 4_000.0 / RATE_HZ).sin();
+    let third: Vec<f64> = heard.windows(4).map(|x| x[3] - 3.0 * (x[2] - x[1]) - x[0]).collect();
+    let power = |part: &[f64]| part.iter().map(|x| x * x).sum::<f64>() / part.len() as f64;
+    10.0 * (third.chunks(3 * STEP).map(power).fold(1e-20, f64::max) / gain.powi(6)).log10()
+}
+
+/// Level, dB.
+fn rms_db(heard: &[f64]) -> f64 {
+    10.0 * (heard.iter().map(|x| x * x).sum::<f64>() / heard.len() as f64).log10()
+}
+
+#[test]
+fn the_pitch_follows_a_hole_as_it_half_opens() {
+    for breath in [0.2, 0.5, 0.9] {
+        let mut clarinet = playing(&still(), HALF_HOLED, breath);
+        let (hole, open) = ring_finger(&clarinet);
+        listen(&mut clarinet, 600, |_, _| {});
+        let mut pitches = Vec::new();
+        for tenths in 0..=10 {
+            clarinet.apply(Event::Hole { hole, opening: Some(tenths as f32 / 10.0) });
+            listen(&mut clarinet, 300, |_, _| {});
+            pitches.push(fundamental_hz(&listen(&mut clarinet, 300, |_, _| {}), RATE_HZ).unwrap());
+        }
+        let steps: Vec<f64> = pitches.windows(2).map(|pair| cents(pair[1], pair[0])).collect();
+        let whole = cents(pitches[10], pitches[0]);
+        println!("breath {breath}: {whole:.1} cents by {steps:.1?}");
+        assert!(steps.iter().all(|&step| step > 0.0 && step < 0.35 * whole), "{breath}: {steps:?}");
+        assert!((whole - 200.0).abs() < 40.0, "{breath}: a whole tone, in the tuning of C4: {whole}");
+        // The same holes at once.
+        let mut other = playing(&still(), HALF_HOLED, breath);
+        other.apply(Event::TryHoles(Some(open)));
+        listen(&mut other, 900, |_, _| {});
+        let at_once = fundamental_hz(&listen(&mut other, 300, |_, _| {}), RATE_HZ).unwrap();
+        assert!(cents(at_once, pitches[10]).abs() < 0.1, "{at_once} {}", pitches[10]);
+    }
+}
+
+#[test]
+fn a_controller_that_steps_a_hole_neither_clicks_nor_leaves_a_gap() {
+    // How much what is high rises over the held notes, or over 45 dB below the tone; and the frames of the pitch.
+    let move_it = |length_ms: usize, each: &mut dyn FnMut(&mut Clarinet, usize)| {
+        let mut clarinet = playing(&still(), HALF_HOLED, 0.5);
+        listen(&mut clarinet, 600, |_, _| {});
+        let before = listen(&mut clarinet, 300, |_, _| {});
+        let way = listen(&mut clarinet, length_ms + 200, |clarinet, ms| each(clarinet, ms));
+        let after = listen(&mut clarinet, 300, |_, _| {});
+        let held = highest_db(&before).max(highest_db(&after)).max(rms_db(&before) - 45.0);
+        let track = pitch_track(&[before, way.clone(), after].concat(), RATE_HZ, 0.01);
+        let hz: Vec<f64> = track.iter().map(|point| point.hz.unwrap_or(f64::MIN_POSITIVE)).collect();
+        let steps: Vec<f64> = hz[10..hz.len() - 10].windows(2).map(|pair| cents(pair[1], pair[0])).collect();
+        (highest_db(&way) - held, steps)
+    };
+    let (hole, _) = ring_finger(&playing(&still(), HALF_HOLED, 0.5));
+    let open = |share: f32| Event::Hole { hole, opening: Some(share) };
+    let (slur, _) = move_it(0, &mut |clarinet, ms| {
+        if ms == 0 {
+            clarinet.apply(Event::NoteOn { note: sounding(HALF_HOLED + 2), velocity: 0.8 });
+        }
+    });
+    let (at_once, _) = move_it(0, &mut |clarinet, ms| {
+        if ms == 0 {
+            clarinet.apply(open(1.0));
+        }
+    });
+    println!("at once {at_once:.2} dB, the slur {slur:.2} dB");
+    assert!(at_once < slur + 1.0, "as a slur by this finger, {slur} dB: {at_once} dB");
+    // All steps of a MIDI controller, one every 8 ms.
+    let (stepped, steps) = move_it(1_016, &mut |clarinet, ms| {
+        if ms % 8 == 0 && ms < 1_016 {
+            clarinet.apply(open((ms / 8 + 1) as f32 / 127.0));
+        }
+    });
+    let largest = steps.iter().copied().fold(0.0, f64::max);
+    let back = -steps.iter().copied().fold(0.0, f64::min);
+    println!("stepped {stepped:.2} dB, pitch up by {largest:.1} cents in 10 ms at most, back by {back:.2}");
+    assert!(stepped < 1.0, "{stepped} dB");
+    assert!(largest < 12.0 && back < 0.5, "{largest} {back}");
+}
+
+#[test]
+fn a_held_hole_stays_under_every_fingering_until_it_is_given_back() {
+    for glissando_s in [0.0, 0.2] {
+        let mut clarinet = playing(&Settings { glissando_s, ..still() }, HALF_HOLED, 0.5);
+        let (hole, open) = ring_finger(&clarinet);
+        // It comes before the fingers are in place, and twice.
+        clarinet.apply(Event::Hole { hole, opening: Some(3.0) });
+        clarinet.apply(Event::Hole { hole, opening: Some(0.25) });
+        clarinet.apply(Event::Hole { hole: 63, opening: Some(0.5) });
+        listen(&mut clarinet, 100, |_, _| {});
+        assert_eq!(opening(&mut clarinet, hole), 0.25);
+        // Of all these slurs, and of the slides, the hole takes no part.
+        for written in [64, 57, 72, 60] {
+            clarinet.apply(Event::NoteOn { note: sounding(written), velocity: 0.7 });
+            for _ in 0..300 {
+                listen(&mut clarinet, 1, |_, _| {});
+                assert_eq!(opening(&mut clarinet, hole), 0.25, "{written} {glissando_s}");
+            }
+        }
+        clarinet.apply(Event::Hole { hole, opening: None });
+        listen(&mut clarinet, 100, |_, _| {});
+        assert_eq!(opening(&mut clarinet, hole), 0.0);
+        for back in [
+            Event::TryHoles(None),
+            Event::TryHoles(Some(open & !(1 << hole))),
+            Event::Hole { hole, opening: Some(f32::NAN) },
+            Event::Panic,
+        ] {
+            clarinet.apply(Event::Hole { hole, opening: Some(0.7) });
+            listen(&mut clarinet, 50, |_, _| {});
+            assert!((opening(&mut clarinet, hole) - 0.7).abs() < 1e-6);
+            clarinet.apply(back);
+            listen(&mut clarinet, 50, |_, _| {});
+            assert_eq!(opening(&mut clarinet, hole), 0.0, "{back:?}");
+        }
+    }
+}
+
+#[test]
+fn half_holes_do_not_depend_on_the_block() {
+    let note = Event::NoteOn { note: sounding(HALF_HOLED), velocity: 0.7 };
+    let mut events = vec![Timed { at: 0, event: Event::Breath(0.5) }, Timed { at: 0, event: note }];
+    events.extend((0..40).map(|n| Timed {
+        at: 9_000 + 301 * n,
+        event: Event::Hole { hole: (n % 24) as u8, opening: Some((n % 7) as f32 / 6.0) },
+    }));
+    let render = |block: usize| {
+        let mut clarinet = Clarinet::built_in(RATE_HZ).unwrap();
+        let mut out = vec![0.0_f32; 24_000];
+        for (n, part) in out.chunks_mut(block).enumerate() {
+            let begin = n * block;
+            let length = part.len();
+            let own = events.iter().filter(|event| (begin..begin + length).contains(&event.at));
+            clarinet.render_events(own.map(|event| Timed { at: event.at - begin, ..*event }), part);
+        }
+        out
+    };
+    let whole = render(24_000);
+    assert!([1, 37, 512].into_iter().all(|block| render(block) == whole));
+}
+
+/// Which alternate of the model is in place at rest, if all its holes are as it has them and the chart's are not.
+fn in_place(clarinet: &mut Clarinet) -> Option<usize> {
+    let holes = clarinet.model().file.holes.len();
+    let open = (0..holes as u8).fold(0, |bits, hole| {
+        let opening = opening(clarinet, hole);
+        assert!(opening == 0.0 || opening == 1.0, "under way");
+        bits | u64::from(opening == 1.0) << hole
+    });
+    let state = clarinet.player_state();
+    let model = clarinet.model();
+    let chart = bits(&model.file.fingerings[state.fingering].open);
+    let own = |one: &Alternate| one.fingering == state.fingering && one.open == open;
+    let found = model.alternates.all().iter().position(own);
+    assert!(found.is_some() || open == chart, "neither the chart's fingering nor an alternate");
+    found
+}
+
+fn press(clarinet: &mut Clarinet, written: u8) {
+    let note = WrittenNote(written).sounding(clarinet.model().file.transposition).unwrap();
+    clarinet.apply(Event::NoteOn { note, velocity: 0.7 });
+}
+
+fn by_context() -> Settings {
+    Settings { alternates: true, ..still() }
+}
+
+#[test]
+fn chromatic_slurs_take_alternates_and_leaps_do_not() {
+    // From, to, whether an alternate is taken: F5 F#5, E4 D#4; a leap to the same notes; a step that the chart does best.
+    for (from, to, takes) in
+        [(77, 78, true), (64, 63, true), (70, 78, false), (55, 63, false), (65, 67, false)]
+    {
+        for (settings, takes) in [(by_context(), takes), (still(), false)] {
+            let mut clarinet = playing(&settings, from, 0.5);
+            listen(&mut clarinet, 300, |_, _| {});
+            assert_eq!(in_place(&mut clarinet), None, "a tongued note");
+            press(&mut clarinet, to);
+            listen(&mut clarinet, 100, |_, _| {});
+            assert_eq!(in_place(&mut clarinet).is_some(), takes, "{from} {to}");
+        }
+    }
+}
+
+#[test]
+fn a_trill_goes_to_the_alternate_and_back() {
+    let (from, to) = (77, 78);
+    let mut clarinet = playing(&by_context(), from, 0.6);
+    listen(&mut clarinet, 300, |_, _| {});
+    for _ in 0..6 {
+        press(&mut clarinet, to);
+        listen(&mut clarinet, 80, |_, _| {});
+        assert!(in_place(&mut clarinet).is_some());
+        clarinet.apply(Event::NoteOff { note: sounding(to) });
+        listen(&mut clarinet, 80, |_, _| {});
+        assert!(in_place(&mut clarinet).is_none());
+    }
+    listen(&mut clarinet, 200, |_, _| {});
+    let hz = fundamental_hz(&listen(&mut clarinet, 300, |_, _| {}), RATE_HZ).unwrap();
+    assert!(cents(hz, sounding(from).frequency_hz(440.0)).abs() < 3.0);
+}
+
+/// All pairs of fingerings between which an alternate is taken, on every bundled instrument.
+#[test]
+fn each_alternate_that_is_taken_plays_its_note() {
+    for instrument in Bundled::ALL {
+        let model =
+            Preparation::new(&Wanted::new(instrument.file(), RATE_HZ), None).ready().unwrap().unwrap();
+        let model = Arc::new(model);
+        let fingerings = &model.file.fingerings;
+        let notes = 0..fingerings.len();
+        let mut worst = 0.0_f64;
+        let mut count = 0;
+        for (from, to) in notes.clone().flat_map(|from| notes.clone().map(move |to| (from, to))) {
+            let Some(at) = model.alternates.taken(from, None, to) else { continue };
+            for breath in [0.2, 0.5, 0.9] {
+                let mut clarinet = Clarinet::new(model.clone(), RATE_HZ);
+                clarinet.set_settings(&by_context());
+                clarinet.apply(Event::Breath(breath));
+                press(&mut clarinet, fingerings[from].written.0);
+                listen(&mut clarinet, 500, |_, _| {});
+                press(&mut clarinet, fingerings[to].written.0);
+                listen(&mut clarinet, 500, |_, _| {});
+                assert_eq!(in_place(&mut clarinet), Some(usize::from(at)));
+                let hz = fundamental_hz(&listen(&mut clarinet, 300, |_, _| {}), RATE_HZ);
+                let off = hz.map_or(f64::INFINITY, |hz| cents(hz, model.notes_hz[to]));
+                let alternate = model.alternates.get(at).unwrap();
+                println!(
+                    "{} {} {} breath {breath}: {off:+.1} cents, corrected by {:+.1}, threshold x {:.3}",
+                    instrument.id(),
+                    fingerings[from].written,
+                    fingerings[to].written,
+                    -alternate.cents,
+                    alternate.harder
+                );
+                worst = worst.max(off.abs());
+                count += 1;
+            }
+        }
+        assert!(count >= 12, "{}: {count}", instrument.id());
+        assert!(worst < 20.0, "{}: {worst}", instrument.id());
+    }
+}
+
+#[test]
+fn where_no_alternate_is_taken_not_a_bit_changes() {
+    let play = |settings: &Settings| {
+        let mut clarinet = playing(settings, 65, 0.5);
+        listen(&mut clarinet, 900, |clarinet, ms| match ms {
+            300 => press(clarinet, 72),
+            600 => press(clarinet, 79),
+            _ => {}
+        })
+    };
+    assert!(play(&by_context()) == play(&still()));
 }

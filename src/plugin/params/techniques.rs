@@ -2,7 +2,7 @@
 
 use nice_plug::prelude::*;
 
-use super::entry::choice;
+use super::entry::{choice, switch};
 use super::settled;
 use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::instrument::player::Attack;
@@ -55,6 +55,9 @@ pub struct ExpressionParams {
     /// [`Articulation::key_sounds`].
     #[id = "ksound"]
     pub key_sounds: FloatParam,
+    /// [`Settings::alternates`].
+    #[id = "altf"]
+    pub alternates: BoolParam,
 }
 
 /// Extended techniques and the vocal tract.
@@ -197,6 +200,7 @@ impl ExpressionParams {
             fall_time: number("falls"),
             breath_in: number("bin"),
             key_sounds: number("ksound"),
+            alternates: switch("altf"),
         }
     }
 

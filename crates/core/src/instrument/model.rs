@@ -7,6 +7,7 @@ use std::sync::Arc;
 use crate::bore::cells::Cells;
 use crate::bore::cells::CellsError;
 use crate::bore::cells::networks;
+use crate::bore::context_fingerings::ContextFingerings;
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::lattice::LatticeCoeffs;
 use crate::instrument::concert_pitch::A4_HZ;
@@ -60,6 +61,8 @@ pub struct Model {
     pub notes_hz: Vec<f64>,
     /// Register of each fingering: 1 chalumeau and throat, 2 clarion, 3 altissimo.
     pub registers: Vec<u8>,
+    /// Alternate fingerings, and when a player takes them.
+    pub alternates: ContextFingerings,
     /// Volume that the instrument's reed displaces, over the cross-section of the nominal bore and the speed of sound, s.
     pub swept_s: f64,
 }
@@ -106,6 +109,7 @@ impl Model {
                 _ => 1,
             })
             .collect();
+        let alternates = ContextFingerings::new(&file, &air);
         let section = std::f64::consts::PI * file.nominal_radius_m * file.nominal_radius_m;
         // The instrument's own reed by its ratio to the reference, so that a B flat clarinet has exactly the reference.
         let larger = file.reed_volume_m3 / REFERENCE_VOLUME_M3;
@@ -114,6 +118,7 @@ impl Model {
             lowest_hz: file.lowest_hz() * a4_hz / A4_HZ,
             notes_hz,
             registers,
+            alternates,
             swept_s,
             coeffs,
             cells,

@@ -58,7 +58,7 @@ use inhalation::Inhalation;
 use level_keeper::{Led, LevelKeeper};
 use life::Life;
 use lip_glide::LipGlide;
-use posture::{Lags, Posture};
+use posture::{Fingered, Lags, Posture};
 use reed_glide::ReedGlide;
 use reed_smoothing::ReedSmoothing;
 use response::{Bodily, Response};
@@ -265,6 +265,10 @@ impl Player {
                     self.move_holes(fingering, 1e-3 * f64::from(self.settings.legato_ms), model, voice);
                 }
             }
+            Event::Hole { hole, opening } => {
+                let ticks = self.legato_ticks(model);
+                self.fingers.hold_hole(usize::from(hole), opening, ticks, model, voice.lattice_mut());
+            }
             Event::Technique { which, amount } => self.techniques.set(which, amount),
             // They act after the instrument; settings are set from outside.
             Event::Volume { .. } | Event::Pan { .. } | Event::Set(..) => {}
@@ -360,6 +364,9 @@ impl Player {
     fn finger<F: Real>(&mut self, fingering: usize, slurred: bool, model: &Model, voice: &mut Voice<F>) {
         let glissando_s = f64::from(self.settings.glissando_s);
         let from = self.fingers.fingering().filter(|_| slurred);
+        let alternate = from
+            .filter(|_| self.settings.alternates)
+            .and_then(|from| model.alternates.taken(from, self.fingers.alternate(), fingering));
         let begun = self.slide.map(|slide| slide.target).or(from);
         let slides = begun.filter(|&begun| from.is_some() && glissando_s > 0.0 && begun != fingering);
         self.slide = slides.map(|begun| Slide::new(begun, fingering, glissando_s, model));
@@ -369,6 +376,7 @@ impl Player {
             self.posture = None;
             return;
         }
+        self.fingers.choose(alternate);
         if !slurred {
             return self.move_holes(fingering, 1e-3 * TONGUED_FINGERS_MS, model, voice);
         }
@@ -383,7 +391,7 @@ impl Player {
                 if let Some(dip) = slur.dip(self.breath.gamma()) {
                     self.breath.dip(dip);
                 }
-                let ticks = (legato_s / self.tick_s(model)).round() as u32;
+                let ticks = self.legato_ticks(model);
                 self.fingers.walk_to(fingering, ticks, slur.finger_share(), model, voice.lattice_mut());
                 self.posture = None;
             }
@@ -394,6 +402,11 @@ impl Player {
                 self.move_holes(fingering, legato_s, model, voice);
             }
         }
+    }
+
+    /// Control ticks that the fingers take between slurred notes.
+    fn legato_ticks(&self, model: &Model) -> u32 {
+        (1e-3 * f64::from(self.settings.legato_ms) / self.tick_s(model)).round() as u32
     }
 
     fn move_holes<F: Real>(&mut self, fingering: usize, time_s: f64, model: &Model, voice: &mut Voice<F>) {
@@ -451,8 +464,14 @@ impl Player {
                 BreathResponse::Physical => Jet::Steady,
                 BreathResponse::Played => Jet::Pulsed,
             });
-            let subtone = self.techniques.subtone();
-            Posture::new(settings, fingering.unwrap_or(0), bend_cents, subtone, tick_s, model)
+            let alternate = self.fingers.alternate().and_then(|at| model.alternates.get(at));
+            let fingered = Fingered {
+                fingering: fingering.unwrap_or(0),
+                alternate_cents: alternate.map_or(0.0, |alternate| alternate.cents),
+                bend_cents,
+                subtone: self.techniques.subtone(),
+            };
+            Posture::new(settings, &fingered, tick_s, model)
         });
         let (articulation, gamma) = (&settings.articulation, self.breath.gamma());
         self.inhalation.tick(articulation.breath_in, is_idle, gamma, tick_s);

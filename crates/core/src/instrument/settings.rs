@@ -126,6 +126,10 @@ pub struct Settings {
     pub articulation: Articulation,
     /// How many players play. Default one.
     pub players: Players,
+    /// Whether slurs by a semitone or a tone, as in chromatic runs and trills, take an
+    /// [alternate fingering](crate::bore::context_fingerings) where fewer fingers then move. Not where slurs slide. Default
+    /// false.
+    pub alternates: bool,
 }
 
 /// A number inside its range; one that is not finite becomes the default. Real-time safe.
@@ -170,6 +174,7 @@ impl Default for Settings {
             glissando_s: 0.0,
             articulation: Articulation::default(),
             players: Players::default(),
+            alternates: false,
         }
     }
 }
@@ -400,6 +405,7 @@ impl Settings {
             glissando_s: fix(self.glissando_s, 0.0, 3.0, d.glissando_s),
             articulation: self.articulation.clamped(),
             players: self.players.clamped(),
+            alternates: self.alternates,
         }
     }
 }

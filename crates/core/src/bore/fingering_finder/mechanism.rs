@@ -71,51 +71,48 @@ impl Mechanism {
     /// All combinations of open holes that the fingers can make on an instrument, each once, in order of their bits.
     /// Allocates.
     pub fn grips(&self, file: &InstrumentFile) -> Vec<Grip> {
+        let mut grips: BTreeMap<u64, Grip> = BTreeMap::new();
+        self.on(file).each(
+            |_| true,
+            |grip| {
+                let known = grips.entry(grip.open).or_insert(grip);
+                if grip.effort < known.effort {
+                    *known = grip;
+                }
+            },
+        );
+        grips.into_values().collect()
+    }
+
+    /// How the fingers open just these holes, one bit each, with the least effort; `None` if they cannot. Allocates.
+    pub fn grip(&self, file: &InstrumentFile, open: u64) -> Option<Grip> {
+        let mut found: Option<Grip> = None;
+        let fits = |position: &Held| position.closes & open == 0 && position.opens & !open == 0;
+        self.on(file).each(fits, |grip| {
+            if grip.open == open && found.is_none_or(|found| grip.effort < found.effort) {
+                found = Some(grip);
+            }
+        });
+        found
+    }
+
+    /// The mechanism on the holes of an instrument.
+    fn on(&self, file: &InstrumentFile) -> OnInstrument {
         let bits = |names: &str| {
             let holes = names.split_whitespace().filter_map(|name| file.hole(name));
             holes.fold(0_u64, |bits, hole| bits | 1 << hole)
         };
         let at_rest = file.holes.iter().enumerate().filter(|(_, hole)| hole.kind != HoleKind::KeyClosed);
-        let at_rest = at_rest.fold(0_u64, |bits, (hole, _)| bits | 1 << hole);
-        let rings: Vec<(u64, u64)> =
-            self.ring.iter().map(|ring| (bits(&ring.pad), bits(&ring.closed_with))).collect();
-        // Closed and opened holes and effort of each finger's positions.
-        let fingers: Vec<Vec<(u64, u64, u8)>> = self
-            .finger
-            .iter()
-            .take(MAX_FINGERS)
-            .map(|finger| {
-                finger.positions.iter().map(|p| (bits(&p.closes), bits(&p.opens), p.effort)).collect()
-            })
-            .collect();
-        let mut grips: BTreeMap<u64, Grip> = BTreeMap::new();
-        let mut positions = [0_u8; MAX_FINGERS];
-        loop {
-            let (mut closed, mut opened, mut effort) = (0, 0, 0);
-            for (finger, &position) in fingers.iter().zip(&positions) {
-                let (closes, opens, needs) = finger[usize::from(position)];
-                (closed, opened, effort) = (closed | closes, opened | opens, effort + needs);
-            }
-            for &(pad, with) in &rings {
-                if closed & with != 0 {
-                    closed |= pad;
-                }
-            }
-            let open = (at_rest | opened) & !closed;
-            let grip = Grip { open, positions, effort };
-            let known = grips.entry(open).or_insert(grip);
-            if effort < known.effort {
-                *known = grip;
-            }
-            // The next combination, as a counter with a wheel for each finger.
-            let moved = fingers.iter().zip(&mut positions).any(|(finger, position)| {
-                let last = usize::from(*position) + 1 == finger.len();
-                *position = if last { 0 } else { *position + 1 };
-                !last
-            });
-            if !moved {
-                return grips.into_values().collect();
-            }
+        let held = |p: &Position| Held { closes: bits(&p.closes), opens: bits(&p.opens), effort: p.effort };
+        OnInstrument {
+            at_rest: at_rest.fold(0_u64, |bits, (hole, _)| bits | 1 << hole),
+            rings: self.ring.iter().map(|ring| (bits(&ring.pad), bits(&ring.closed_with))).collect(),
+            fingers: self
+                .finger
+                .iter()
+                .take(MAX_FINGERS)
+                .map(|finger| finger.positions.iter().map(held).collect())
+                .collect(),
         }
     }
 
@@ -126,6 +123,61 @@ impl Mechanism {
             (!presses.is_empty()).then_some(presses)
         });
         pressed.collect::<Vec<_>>().join(" ")
+    }
+}
+
+/// What a finger does in a position, holes one bit each.
+struct Held {
+    closes: u64,
+    opens: u64,
+    effort: u8,
+}
+
+/// A mechanism on the holes of an instrument, one bit each.
+struct OnInstrument {
+    at_rest: u64,
+    /// Pads, and the holes that close them.
+    rings: Vec<(u64, u64)>,
+    /// Positions of each finger.
+    fingers: Vec<Vec<Held>>,
+}
+
+impl OnInstrument {
+    /// Calls `found` with each combination of those positions that are `allowed`.
+    fn each(&self, allowed: impl Fn(&Held) -> bool, mut found: impl FnMut(Grip)) {
+        let allowed = |finger: &Vec<Held>| {
+            let positions = finger.iter().enumerate().filter(|(_, held)| allowed(held));
+            positions.map(|(position, _)| position as u8).collect()
+        };
+        let allowed: Vec<Vec<u8>> = self.fingers.iter().map(allowed).collect();
+        if allowed.iter().any(Vec::is_empty) {
+            return;
+        }
+        let mut wheels = [0_usize; MAX_FINGERS];
+        loop {
+            let mut positions = [0; MAX_FINGERS];
+            let (mut closed, mut opened, mut effort) = (0, 0, 0);
+            for (finger, held) in self.fingers.iter().enumerate() {
+                positions[finger] = allowed[finger][wheels[finger]];
+                let Held { closes, opens, effort: needs } = held[usize::from(positions[finger])];
+                (closed, opened, effort) = (closed | closes, opened | opens, effort + needs);
+            }
+            for &(pad, with) in &self.rings {
+                if closed & with != 0 {
+                    closed |= pad;
+                }
+            }
+            found(Grip { open: (self.at_rest | opened) & !closed, positions, effort });
+            // The next combination, as a counter with a wheel for each finger.
+            let moved = allowed.iter().zip(&mut wheels).any(|(positions, wheel)| {
+                let last = *wheel + 1 == positions.len();
+                *wheel = if last { 0 } else { *wheel + 1 };
+                !last
+            });
+            if !moved {
+                return;
+            }
+        }
     }
 }
 

@@ -15,10 +15,43 @@ const HOLES: usize = 64;
 pub struct Fingers {
     /// Index of the fingering in place; none before the first note.
     fingering: Option<usize>,
-    /// Open holes that replace those of the fingering, one bit each.
-    tried: Option<u64>,
+    /// The alternate that is in place instead of the chart's fingering, by its number in the model.
+    alternate: Option<u8>,
+    /// Holes that are open as far as asked, whatever is fingered.
+    held: HeldHoles,
     /// A slur that is under way.
     walk: Walk,
+}
+
+/// Openings that replace those of the fingering.
+#[derive(Clone, Copy, Debug)]
+struct HeldHoles {
+    /// The holes that have one, one bit each.
+    which: u64,
+    /// 0 closed..=1 open.
+    openings: [f32; HOLES],
+}
+
+impl Default for HeldHoles {
+    fn default() -> Self {
+        Self { which: 0, openings: [0.0; HOLES] }
+    }
+}
+
+impl HeldHoles {
+    fn opening(&self, hole: usize) -> Option<f32> {
+        (hole < HOLES && self.which >> hole & 1 == 1).then(|| self.openings[hole])
+    }
+
+    fn set(&mut self, hole: usize, opening: Option<f32>) {
+        match opening {
+            Some(opening) => {
+                self.which |= 1 << hole;
+                self.openings[hole] = opening;
+            }
+            None => self.which &= !(1 << hole),
+        }
+    }
 }
 
 /// Fingers that move one after another.
@@ -44,15 +77,47 @@ impl Fingers {
         self.fingering
     }
 
+    /// The alternate in place of it, if one is.
+    pub fn alternate(&self) -> Option<u8> {
+        self.alternate
+    }
+
+    /// Chooses an alternate for the fingering that they are moved to next; `None` for that of the chart.
+    pub fn choose(&mut self, alternate: Option<u8>) {
+        self.alternate = alternate;
+    }
+
     /// Replaces the open holes of every fingering, one bit each from the lowest; `None` goes back to the fingering.
     /// [`move_to`](Self::move_to) then moves the holes.
     pub fn try_holes(&mut self, tried: Option<u64>) {
-        self.tried = tried;
+        let open = |tried: u64, hole: usize| if tried >> hole & 1 == 1 { 1.0 } else { 0.0 };
+        (0..HOLES).for_each(|hole| self.held.set(hole, tried.map(|tried| open(tried, hole))));
+    }
+
+    /// Holds one hole at an opening, 0..=1, under every fingering; `None`, or a number that is not finite, gives it back to
+    /// the fingering. It moves there within `ticks` control ticks; before the first note it waits for the note.
+    pub fn hold_hole<F: Real>(
+        &mut self,
+        hole: usize,
+        opening: Option<f32>,
+        ticks: u32,
+        model: &Model,
+        lattice: &mut Lattice<F>,
+    ) {
+        if hole >= model.coeffs.holes().min(HOLES) {
+            return;
+        }
+        self.held.set(hole, opening.filter(|x| x.is_finite()).map(|x| x.clamp(0.0, 1.0)));
+        self.walk.waits[hole] = 0;
+        if let Some(fingering) = self.fingering {
+            lattice.glide_opening(hole, self.opening(fingering, hole, model), ticks.max(1) as usize * TICK);
+        }
     }
 
     /// Makes a fingering the one in place while [`slide`](Self::slide) moves the holes.
     pub fn aim(&mut self, fingering: usize) {
         self.fingering = Some(fingering);
+        self.alternate = None;
         self.walk = Walk::default();
     }
 
@@ -80,7 +145,7 @@ impl Fingers {
     /// Puts the fingers where a slide has them, within one tick: the holes that change do so one after another.
     pub fn slide<F: Real>(&self, between: Between, model: &Model, lattice: &mut Lattice<F>) {
         let Between { from, to, way, rises } = between;
-        let changing = |hole: &usize| (from ^ to) >> hole & 1 == 1;
+        let changing = |hole: &usize| ((from ^ to) & !self.held.which) >> hole & 1 == 1;
         let holes = 0..model.coeffs.holes();
         let count = holes.clone().filter(changing).count();
         for (n, hole) in holes.filter(changing).enumerate() {
@@ -151,8 +216,12 @@ impl Fingers {
 
     /// Opening of a hole under a fingering: 1 open, 0 closed.
     fn opening(&self, fingering: usize, hole: usize, model: &Model) -> f64 {
-        let open = match self.tried {
-            Some(tried) => tried >> hole & 1 == 1,
+        if let Some(opening) = self.held.opening(hole) {
+            return f64::from(opening);
+        }
+        let alternate = self.alternate.and_then(|at| model.alternates.get(at));
+        let open = match alternate {
+            Some(alternate) => alternate.open >> hole & 1 == 1,
             None => model.file.fingerings[fingering].open[hole],
         };
         f64::from(u8::from(open))

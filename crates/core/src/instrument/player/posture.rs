@@ -119,16 +119,23 @@ impl Lags {
     }
 }
 
+/// What fingers and lip do.
+#[derive(Clone, Copy, Debug)]
+pub struct Fingered {
+    /// Index of the fingering in the chart.
+    pub fingering: usize,
+    /// How much higher the alternate sounds that is in place of it, cents; the lip corrects it.
+    pub alternate_cents: f64,
+    /// The bend that is asked for, cents.
+    pub bend_cents: f64,
+    /// How much the lip covers the reed, 0..=1.
+    pub subtone: f64,
+}
+
 impl Posture {
-    /// For a fingering under a bend and a lip that covers the reed by `subtone`, with ticks of `tick_s` seconds.
-    pub fn new(
-        settings: &Settings,
-        fingering: usize,
-        bend_cents: f64,
-        subtone: f64,
-        tick_s: f64,
-        model: &Model,
-    ) -> Self {
+    /// For what is fingered, with ticks of `tick_s` seconds.
+    pub fn new(settings: &Settings, fingered: &Fingered, tick_s: f64, model: &Model) -> Self {
+        let Fingered { fingering, alternate_cents, bend_cents, subtone } = *fingered;
         let lip = embouchure(model.notes_hz[fingering], model.lowest_hz);
         let free = MovingReed {
             law: settings.reed_law(),
@@ -154,7 +161,7 @@ impl Posture {
             closing: free.law.closing(),
             free_closing: free.law.closing(),
             reed: ReedCoeffs::new(free, rate_hz),
-            rows: sensitivity * model.rows_for_cents(fingering, split.lip_cents),
+            rows: sensitivity * model.rows_for_cents(fingering, split.lip_cents - alternate_cents),
             rows_per_cent: sensitivity * model.rows_for_cents(fingering, 1.0),
             bore_cents: split.bore_cents,
             offset_cents: offset,
