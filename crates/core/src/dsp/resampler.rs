@@ -228,7 +228,9 @@ impl Resampler {
         let count = out.len();
         for out in out {
             *out = dot(&heard[..self.taps], row);
-            heard = heard.get(self.whole..).unwrap_or_default();
+            // A step is far shorter than what is heard.
+            let Some(next) = heard.get(self.whole..) else { break };
+            heard = next;
         }
         self.end += count * self.whole;
     }
