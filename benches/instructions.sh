@@ -11,7 +11,7 @@ export LC_ALL=C
 
 rate=${1:-48000}
 # Of a note that lives and moves, as it does by default.
-declare -A most=([avx2]=988 [plain]=1533 ["avx2 places"]=1088 ["plain places"]=1643)
+declare -A most=([avx2]=950 [plain]=1487 ["avx2 places"]=1039 ["plain places"]=1584)
 
 if ! command -v valgrind >/dev/null; then
     echo "cannot count instructions without valgrind: apt-get install valgrind" >&2

@@ -17,7 +17,7 @@ use chalumeau_core::instrument::held_note::HeldNote;
 use chalumeau_core::instrument::internal_rate::INTERNAL_RATES_HZ;
 use chalumeau_core::instrument::voice::{Drive, TICK, Voice};
 use chalumeau_core::reed::physical::P_REF_PA;
-use chalumeau_core::reed::{ReedCoeffs, ReedState, ReedTables};
+use chalumeau_core::reed::{ReedCoeffs, ReedLoad, ReedState, ReedTables};
 use chalumeau_core::units::{WrittenNote, cents};
 use num_complex::Complex64;
 use oracle::Oracle;
@@ -413,7 +413,7 @@ fn independent_lattice_answers_an_impulse_alike() {
 struct Blown<'a, F> {
     reed: &'a ReedCoeffs,
     state: ReedState,
-    kappa: f64,
+    load: ReedLoad,
     rate_hz: f64,
     n: usize,
     pressure: Vec<f64>,
@@ -428,7 +428,7 @@ impl<'a, F: Real> Blown<'a, F> {
         Self {
             reed,
             state: ReedState::default(),
-            kappa: 1.0 / model.coeffs.tip_admittance(),
+            load: reed.before(1.0 / model.coeffs.tip_admittance()),
             rate_hz: model.coeffs.rate_hz,
             n: 0,
             pressure: Vec::new(),
@@ -442,7 +442,7 @@ impl<'a, F: Real> Blown<'a, F> {
         self.n += 1;
         let p_mouth = 0.5 * (self.n as f64 / (0.020 * self.rate_hz)).min(1.0);
         let tables = ReedTables::reference();
-        let p_plus = self.state.tick(self.reed, tables, self.kappa, p_mouth, p_minus, 0.0, 0.0);
+        let p_plus = self.state.tick(self.reed, tables, &self.load, p_mouth, p_minus, 0.0, 0.0);
         self.pressure.push(self.state.p_mouthpiece);
         p_plus
     }
@@ -785,9 +785,9 @@ fn mouthpiece_pressure_decays_with_the_q_of_the_bore() {
             let expected_s = number(row, "Q") / (std::f64::consts::PI * f_hz);
             let note = HeldNote { zeta: 0.0, ..HeldNote::new(model, fingering, 0.5) };
             let (coeffs, mut state) = (note.reed(model), ReedState::default());
-            let kappa = 1.0 / model.coeffs.tip_admittance();
+            let load = coeffs.before(1.0 / model.coeffs.tip_admittance());
             let behind_reed = decay_s(model, fingering, f_hz, |p_minus| {
-                state.tick(&coeffs, ReedTables::reference(), kappa, 0.0, p_minus, 0.0, 0.0)
+                state.tick(&coeffs, ReedTables::reference(), &load, 0.0, p_minus, 0.0, 0.0)
             });
             let peak = matrices.peaks(&model.file.fingerings[fingering].open, 0.0, 1)[0];
             let rigid_s = peak.q / (std::f64::consts::PI * peak.f_hz);

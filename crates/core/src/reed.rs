@@ -23,7 +23,7 @@ pub mod strength;
 pub mod tables;
 
 pub use law::ReedLaw;
-pub use motion::{MovingReed, ReedCoeffs, ReedState};
+pub use motion::{MovingReed, ReedCoeffs, ReedLoad, ReedState};
 pub use physical::PhysicalReed;
 pub use quasi_static::{QuasiStaticReed, QuasiStaticState};
 pub use tables::ReedTables;

@@ -377,7 +377,12 @@ impl<F: Real> Lattice<F> {
 
     /// Zeroes states too small to hear before they become denormal. Call every few hundred samples. Real-time safe.
     pub fn flush(&mut self) {
-        self.ring[..=usize::from(self.mask)].iter_mut().for_each(flush);
+        // The slots of the junctions and those at the ends; nobody writes the others.
+        let slots = LANES * (self.steps.len() + self.holes.len());
+        for half_row in self.ring[..=usize::from(self.mask)].as_chunks_mut::<BACK>().0 {
+            half_row[..slots].iter_mut().for_each(flush);
+            half_row[BACK - LANES..].iter_mut().for_each(flush);
+        }
         self.steps.iter_mut().for_each(|steps| steps.arrivals.flush());
         for holes in &mut *self.holes {
             holes.arrivals.flush();

@@ -3,6 +3,8 @@
 //! The gain follows the envelope of the peaks: it falls at once and recovers slowly, so that a steady loud note is
 //! turned down without being distorted. Nothing ever leaves -1..=1.
 
+use super::lanes::any_above;
+
 /// Peaks up to here pass untouched.
 const CEILING: f32 = 0.98;
 /// Time in which the gain recovers by a factor e, s.
@@ -32,7 +34,7 @@ impl Limiter {
     /// Turns down what is too loud; samples must be finite. Real-time safe.
     pub fn process(&mut self, samples: &mut [f32]) {
         // The usual case. An envelope below the ceiling does nothing, now or later, and need not be followed.
-        if self.envelope <= CEILING && samples.iter().all(|sample| sample.abs() <= CEILING) {
+        if self.envelope <= CEILING && !any_above(samples, CEILING) {
             return;
         }
         for sample in samples {
@@ -59,8 +61,7 @@ impl Limiter {
 
     /// As [`process`](Self::process) for two channels of the same length, which keep their balance. Real-time safe.
     pub fn process_two(&mut self, left: &mut [f32], right: &mut [f32]) {
-        let loud = |sample: &f32| sample.abs() > CEILING;
-        if self.envelope <= CEILING && !left.iter().any(loud) && !right.iter().any(loud) {
+        if self.envelope <= CEILING && !any_above(left, CEILING) && !any_above(right, CEILING) {
             return;
         }
         for (left, right) in left.iter_mut().zip(right) {

@@ -208,6 +208,8 @@ impl Resampler {
         let out = &mut out[..count];
         if self.coeffs.is_empty() {
             self.step_through(out, |this, end, _| this.history[end - 1 - this.taps / 2]);
+        } else if self.part == 0 {
+            self.step_whole(out);
         } else if self.l <= PHASES {
             self.step_through(out, |this, end, phase| {
                 dot(&this.history[end - this.taps..end], this.row(phase as usize))
@@ -216,6 +218,21 @@ impl Resampler {
             self.step_through(out, Self::mixed);
         }
         count
+    }
+
+    /// Fills `out` where every output stands in the same phase, as at a ratio of whole numbers: its taps are found once.
+    #[inline(always)]
+    fn step_whole(&mut self, out: &mut [f32]) {
+        let row = self.row(self.phase as usize);
+        let mut heard = &self.history[self.end - self.taps..];
+        let count = out.len();
+        for out in out {
+            *out = dot(&heard[..self.taps], row);
+            // A step is far shorter than what is heard.
+            let Some(next) = heard.get(self.whole..) else { break };
+            heard = next;
+        }
+        self.end += count * self.whole;
     }
 
     /// Fills `out` with what `output` makes of each position.

@@ -7,6 +7,7 @@
 use std::sync::Arc;
 
 use crate::bore::sound_sources::SoundSources;
+use crate::dsp::lanes::sum;
 use crate::dsp::limiter::Limiter;
 use crate::dsp::resampler::Resampler;
 use crate::event::{Event, Timed};
@@ -370,11 +371,8 @@ impl Clarinet {
     /// From pascals to samples: level, limiter, and whether anything is heard.
     fn finish(&mut self, mut out: Channels) {
         self.level.apply(out.part(0..out.len()));
-        let mut sum: f32 = out.left.iter().sum();
-        if let Some(right) = out.right() {
-            sum += right.iter().sum::<f32>();
-        }
-        if !sum.is_finite() {
+        let right = out.right().map_or(0.0, |right| sum(right));
+        if !(sum(out.left) + right).is_finite() {
             out.each(|channel| channel.fill(0.0));
             with_voice!(&mut self.voice, voice => voice.silence());
             self.forget_sound();

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::bore::lattice::{HoleFlows, Lattice, LatticeCoeffs, Real, Tip};
 use crate::bore::sound_sources::SoundSources;
+use crate::dsp::lanes::sum;
 use crate::instrument::breath_noise::{BreathNoise, Jet};
 pub use crate::instrument::control_tick::TICK;
 use crate::instrument::listening::Listening;
@@ -12,6 +13,7 @@ use crate::instrument::pads::Pads;
 use crate::instrument::person::Person;
 use crate::instrument::vocal_tract::{TractCoeffs, TractState};
 use crate::reed::ReedCoeffs;
+use crate::reed::ReedLoad;
 use crate::reed::ReedState;
 use crate::reed::ReedTables;
 use crate::reed::motion::TONGUE_FORCE;
@@ -75,7 +77,10 @@ struct Mouth<F> {
     tables: &'static ReedTables,
     reed: ReedCoeffs,
     state: ReedState,
+    /// 1 over the admittance of the first bore cell.
     kappa: f64,
+    /// The reed before the bore, and before the tract's impedance that acts at once.
+    load: ReedLoad,
     p_mouth: f64,
     p_mouth_glide: f64,
     tongue: f64,
@@ -119,8 +124,8 @@ impl<F: Real> Tip<F> for Mouth<F> {
     #[inline(always)]
     fn reflect(&mut self, p_minus: F) -> F {
         let noise = self.blow();
-        let (p_mouth, kappa) = (self.p_mouth, self.kappa);
-        F::of(self.state.tick(&self.reed, self.tables, kappa, p_mouth, p_minus.wide(), noise, self.tongue))
+        let (load, p_mouth) = (&self.load, self.p_mouth);
+        F::of(self.state.tick(&self.reed, self.tables, load, p_mouth, p_minus.wide(), noise, self.tongue))
     }
 
     #[inline(always)]
@@ -166,11 +171,10 @@ impl<F: Real> Tip<F> for ThroughTract<'_, F> {
         let (noise, p_minus) = (mouth.blow(), p_minus.wide());
         // The part of the tract's impedance that acts at once is in series with the bore's.
         let p_mouth = mouth.p_mouth - mouth.tract_state.pressure(tract);
-        let kappa = mouth.kappa + tract.at_once();
-        let (reed, tables) = (&mouth.reed, mouth.tables);
-        let mut p_plus = mouth.state.tick(reed, tables, kappa, p_mouth, p_minus, noise, mouth.tongue);
+        let (reed, load) = (&mouth.reed, &mouth.load);
+        let mut p_plus = mouth.state.tick(reed, mouth.tables, load, p_mouth, p_minus, noise, mouth.tongue);
         // All that flows into the bore, reed's motion and noise included.
-        let flow = (p_plus - p_minus) / kappa;
+        let flow = (p_plus - p_minus) / load.kappa();
         p_plus -= tract.at_once() * flow;
         mouth.state.p_mouthpiece -= tract.at_once() * flow;
         mouth.tract_state.tick(tract, flow);
@@ -225,6 +229,7 @@ impl<F: Real> Voice<F> {
                 reed,
                 state: ReedState::default(),
                 kappa: 1.0 / coeffs.tip_admittance(),
+                load: ReedLoad::default(),
                 p_mouth: 0.0,
                 p_mouth_glide: 0.0,
                 tongue: 0.0,
@@ -309,6 +314,7 @@ impl<F: Real> Voice<F> {
     pub fn tick(&mut self, drive: &Drive) -> &[f32; TICK] {
         let mouth = &mut self.mouth;
         mouth.reed = drive.reed;
+        mouth.load = drive.reed.before(mouth.kappa + mouth.tract.map_or(0.0, |tract| tract.at_once()));
         mouth.p_mouth_glide = (drive.p_mouth - mouth.p_mouth) / TICK as f64;
         mouth.tongue_glide = (drive.tongue - mouth.tongue) / TICK as f64;
         mouth.at = 0;
@@ -331,7 +337,7 @@ impl<F: Real> Voice<F> {
         }
         let state = self.mouth.state;
         let (heard, right) = self.heard();
-        let sum = heard.iter().sum::<f32>() + right.map_or(0.0, |right| right.iter().sum());
+        let sum = sum(heard) + right.map_or(0.0, |right| sum(right));
         if !(sum + (state.closing + state.speed + state.p_mouthpiece) as f32).is_finite() {
             self.silence();
             self.resets += 1;

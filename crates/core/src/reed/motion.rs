@@ -41,7 +41,7 @@ pub const TONGUE_FORCE: f64 = 1.6;
 /// let coeffs = ReedCoeffs::new(reed, 96_000.0);
 /// let mut state = ReedState::default();
 /// // Blown at 0.4 of the closing pressure into a bore that sends nothing back: air flows into the bore.
-/// let wave = state.tick(&coeffs, ReedTables::reference(), 1.0, 0.4, 0.0, 0.0, 0.0);
+/// let wave = state.tick(&coeffs, ReedTables::reference(), &coeffs.before(1.0), 0.4, 0.0, 0.0, 0.0);
 /// assert!(state.flow > 0.0 && wave > 0.0);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -113,9 +113,42 @@ impl ReedCoeffs {
         }
     }
 
+    /// The reed before a bore; `kappa` is 1 over the admittance of its first cell. Real-time safe.
+    #[inline(always)]
+    pub fn before(&self, kappa: f64) -> ReedLoad {
+        let share = 1.0 / (1.0 + kappa * self.swept * self.yields);
+        let shared = share * kappa;
+        ReedLoad {
+            kappa,
+            share,
+            strength: shared * self.strength,
+            half_strength: 0.5 * shared * self.strength,
+        }
+    }
+
     /// Pressure that closes the reed, extrapolated where the lay is curved, over the reference closing pressure.
     pub fn closing_pressure(&self) -> f64 {
         self.closing / self.compliance
+    }
+}
+
+/// What a reed and the bore before it make of each other: products that stay the same during one control tick.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ReedLoad {
+    /// 1 over the admittance of the first bore cell.
+    kappa: f64,
+    /// Share of the pressure difference that is left by the flow of the reed's own motion.
+    share: f64,
+    /// `kappa` with that share times the flow strength, and half of that.
+    strength: f64,
+    half_strength: f64,
+}
+
+impl ReedLoad {
+    /// 1 over the admittance of the first bore cell.
+    #[inline(always)]
+    pub fn kappa(&self) -> f64 {
+        self.kappa
     }
 }
 
@@ -147,7 +180,7 @@ impl ReedState {
     }
 
     /// One sample: takes mouth pressure, the wave arriving from the bore, extra flow (noise) and the tongue's force,
-    /// and gives the wave leaving into the bore. `kappa` is 1 over the admittance of the first bore cell.
+    /// and gives the wave leaving into the bore. `load` is `reed` [before](ReedCoeffs::before) the bore.
     /// Real-time safe; `zeta kappa B` may be anything, the solution is unique. [audio thread]
     // Called in one place, once a sample: a struct for what comes from four sides would only be taken apart again.
     #[allow(clippy::too_many_arguments)]
@@ -156,7 +189,7 @@ impl ReedState {
         &mut self,
         reed: &ReedCoeffs,
         tables: &ReedTables,
-        kappa: f64,
+        load: &ReedLoad,
         p_mouth: f64,
         p_minus: f64,
         noise: f64,
@@ -175,13 +208,12 @@ impl ReedState {
         let b = rest * opening;
         // The speed after this sample, but for what the pressure difference adds.
         let free = reed.damp * self.speed + reed.drive * (tongue - self.closing);
-        let share = 1.0 / (1.0 + kappa * reed.swept * reed.yields);
-        let x = share * (p_mouth - 2.0 * p_minus - kappa * (reed.swept * (self.speed + free) + noise));
-        let kappa = share * kappa;
+        let moved = reed.swept * (self.speed + free);
+        let x = load.share * (p_mouth - 2.0 * p_minus - load.kappa * (moved + noise));
         let magnitude = x.abs();
-        let half_load = 0.5 * kappa * reed.strength * b;
-        let load = (half_load * half_load + magnitude).sqrt();
-        let root = load - half_load;
+        let half_load = load.half_strength * b;
+        let whole = (half_load * half_load + magnitude).sqrt();
+        let root = whole - half_load;
         let p = root * root;
         let (x_a, x_b) = tables.at(p);
         let r = reed.compliance;
@@ -189,8 +221,8 @@ impl ReedState {
         // Forward the quasi-static reed closes with p, backward it opens: hence the sign inside.
         // A shut reed passes nothing, not even the tables' interpolation error.
         let table_flow = if b > 0.0 { x_a * (b + sign * r * p) - sign * r * x_b } else { 0.0 };
-        let slope = root / load.max(f64::MIN_POSITIVE);
-        let p = sign * (p - kappa * reed.strength * (table_flow - b * root) * slope).max(0.0);
+        let slope = root / whole.max(f64::MIN_POSITIVE);
+        let p = sign * (p - load.strength * (table_flow - b * root) * slope).max(0.0);
         self.p_mouthpiece = p_mouth - p;
         self.flow = sign * reed.strength * table_flow;
         self.opening = opening;
@@ -223,7 +255,7 @@ mod tests {
             let reed = quasi_static(0.95 * random());
             let mut state = ReedState { closing: 3.0 * random() - 1.0, speed: 0.0, ..Default::default() };
             let (gamma, p_minus, closing) = (3.0 * random(), 2.0 * (2.0 * random() - 1.0), state.closing);
-            let p_plus = state.tick(&reed, tables, 1.0, gamma, p_minus, 0.0, 0.0);
+            let p_plus = state.tick(&reed, tables, &reed.before(1.0), gamma, p_minus, 0.0, 0.0);
             let p = gamma - (p_plus + p_minus);
             // Continuity at the tip: u = p_plus - p_minus, and u is the law at that pressure difference.
             let b = (1.0 - closing).clamp(0.0, MAX_OPENING);
@@ -239,8 +271,8 @@ mod tests {
     #[test]
     fn closed_reed_passes_nothing_and_reflects_everything() {
         let mut state = ReedState { closing: 1.5, ..Default::default() };
-        let p_plus =
-            state.tick(&quasi_static(0.3), ReedTables::reference(), 1.0, 2.0, 0.25, 0.0, TONGUE_FORCE);
+        let (reed, tables) = (quasi_static(0.3), ReedTables::reference());
+        let p_plus = state.tick(&reed, tables, &reed.before(1.0), 2.0, 0.25, 0.0, TONGUE_FORCE);
         assert_eq!((state.flow, state.opening), (0.0, 0.0));
         assert!((p_plus - 0.25).abs() < 1e-12);
     }
@@ -251,7 +283,7 @@ mod tests {
             let reed = ReedCoeffs { lay, ..quasi_static(0.3) };
             let opening = |closing: f64| {
                 let mut state = ReedState { closing, ..Default::default() };
-                state.tick(&reed, ReedTables::reference(), 1.0, 0.5, 0.0, 0.0, 0.0);
+                state.tick(&reed, ReedTables::reference(), &reed.before(1.0), 0.5, 0.0, 0.0, 0.0);
                 state.opening
             };
             assert_eq!(opening(0.0), 1.0);
@@ -272,7 +304,8 @@ mod tests {
         bent.x_b[1_800] *= 1.01;
         let sound = |tables: &ReedTables| {
             let mut state = ReedState { closing: 0.5, ..Default::default() };
-            state.tick(&quasi_static(0.3), tables, 1.0, 0.5 + 0.3 * 0.5 * 0.5_f64.sqrt(), 0.0, 0.0, 0.0)
+            let reed = quasi_static(0.3);
+            state.tick(&reed, tables, &reed.before(1.0), 0.5 + 0.3 * 0.5 * 0.5_f64.sqrt(), 0.0, 0.0, 0.0)
         };
         let law = ReedLaw::default();
         assert!((sound(&bent) - sound(reference)).abs() > 1e-4, "audio");
@@ -290,7 +323,7 @@ mod tests {
         let mut state = ReedState { closing: 0.2, ..Default::default() };
         let (mut crossings, mut last) = (0, state.closing);
         for _ in 0..9_600 {
-            state.tick(&reed, ReedTables::reference(), 1.0, 0.0, 0.0, 0.0, 0.0);
+            state.tick(&reed, ReedTables::reference(), &reed.before(1.0), 0.0, 0.0, 0.0, 0.0);
             crossings += i32::from(last < 0.0 && state.closing >= 0.0);
             last = state.closing;
         }

@@ -115,6 +115,8 @@ pub(super) struct Holes<F> {
     pub(super) opening: Octet<F>,
     glide: Octet<F>,
     range: [Octet<F>; 2],
+    /// Squares of the openings.
+    area: Octet<F>,
     pub(super) resistance: Octet<F>,
     pub(super) outer: Octet<F>,
     pub(super) compliance: Octet<F>,
@@ -142,6 +144,7 @@ impl<F: Real> Holes<F> {
             opening: none,
             glide: none,
             range: [none; 2],
+            area: none,
             resistance: none,
             outer: none,
             compliance: none,
@@ -168,6 +171,7 @@ impl<F: Real> Holes<F> {
     pub(super) fn set_opening(&mut self, k: usize, opening: f64) {
         let opening = F::of(opening);
         self.opening[k] = opening;
+        self.area[k] = opening * opening;
         self.glide[k] = F::default();
         self.range.iter_mut().for_each(|bound| bound[k] = opening);
     }
@@ -200,7 +204,7 @@ impl<F: Real> Holes<F> {
     #[inline(never)]
     pub(super) fn throttle(&mut self) -> bool {
         for k in 0..LANES {
-            let area = self.opening[k] * self.opening[k];
+            let area = self.area[k];
             self.jet[k] = self.jet_open[k] / (area + F::of(0.02) * (F::of(1.0) - area));
             let going_up = self.glide[k] > F::default();
             let there = self.opening[k] == self.range[usize::from(going_up)][k];
@@ -215,7 +219,9 @@ impl<F: Real> Holes<F> {
         for k in 0..LANES {
             let next = self.opening[k] + self.glide[k];
             let next = if next < low[k] { low[k] } else { next };
-            self.opening[k] = if next > high[k] { high[k] } else { next };
+            let next = if next > high[k] { high[k] } else { next };
+            self.opening[k] = next;
+            self.area[k] = next * next;
         }
     }
 
@@ -231,7 +237,7 @@ impl<F: Real> Holes<F> {
             let rs = self.resistance[k];
             let k2 = one / (one + rs * self.outside[k]);
             let g2 = self.outside[k] * k2;
-            let gp = self.gc[k] + a * a * g2;
+            let gp = self.gc[k] + self.area[k] * g2;
             let w = one + gp * self.r1[k];
 
             let h2 = self.outer[k] * k2;

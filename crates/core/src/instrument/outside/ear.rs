@@ -93,8 +93,8 @@ impl<F: Real> Ear<F> {
             }
         }
         self.bell.run(&mut sum);
-        for &hole in lines.active.iter().take(lines.count) {
-            let (begin, gain) = self.taps[usize::from(hole).min(MAX_SOURCES - 1)];
+        for &hole in lines.active.get(..lines.count).unwrap_or_default() {
+            let Some(&(begin, gain)) = self.taps.get(usize::from(hole)) else { continue };
             if let Some(past) = lines.tick(begin) {
                 for n in 0..TICK {
                     sum[n] = sum[n] + gain * past[n];

@@ -57,7 +57,7 @@ impl<F: Real> Lines<F> {
     #[inline(always)]
     pub(super) fn tick(&self, tap: usize) -> Option<&[F; TICK]> {
         let begin = (tap + self.at).wrapping_sub(self.stride());
-        self.past.get(begin..begin.wrapping_add(TICK))?.first_chunk()
+        self.past.get(begin..)?.first_chunk()
     }
 
     /// The sample that `tap` hears before the tick that is written next.
@@ -106,10 +106,10 @@ impl<F: Real> Lines<F> {
             self.begin_again();
         }
         let (stride, at) = (self.stride(), self.at);
-        for &hole in self.active.iter().take(self.count) {
+        for &hole in self.active.get(..self.count).unwrap_or_default() {
             let Some(&slot) = self.slots.get(usize::from(hole)) else { continue };
             let begin = usize::from(hole) * stride + at;
-            if let Some(place) = self.past.get_mut(begin..begin + TICK) {
+            if let Some(place) = self.past.get_mut(begin..).and_then(|past| past.first_chunk_mut::<TICK>()) {
                 for (flow, row) in place.iter_mut().zip(holes) {
                     let row = row.as_flattened();
                     *flow = row[slot & (row.len() - 1)];

@@ -99,7 +99,11 @@ impl PlayerModel {
         let below = (soft + soft_slope * place + (growth + growth_slope * place) * dynamic).exp();
         let (lowest, highest) = ZETAS;
         let below = below.clamp(lowest, highest);
-        below * (self.altissimo_zeta / below).powf(in_altissimo(place))
+        match in_altissimo(place) {
+            // A power of 0 is 1, and takes long to find.
+            0.0 => below,
+            way => below * (self.altissimo_zeta / below).powf(way),
+        }
     }
 
     /// Closing pressure of the reference reed under the lip, over its own.

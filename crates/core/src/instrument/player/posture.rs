@@ -63,6 +63,8 @@ struct Played {
     shift: (f64, f64),
     /// Dynamic of the lip in `Posture::reed`.
     lip: f64,
+    /// Trim of the note at that dynamic, rows.
+    rows: f64,
     /// The note that the lip in `Posture::reed` is for.
     note_lip: NoteLip,
     /// The last dynamic that was asked for, and what it asks of the breath.
@@ -203,6 +205,7 @@ impl Posture {
             return;
         }
         (played.lip, played.note_lip) = (dynamic, note_lip);
+        played.rows = played.note.rows(dynamic);
         let [resonance_hz, damping, place] = note_lip;
         let free = MovingReed { resonance_hz, damping, ..self.free };
         let reed = shaped(&free, &played.rule, place, dynamic);
@@ -235,7 +238,7 @@ impl Posture {
 
     /// Trim of the note at the dynamic of the lip, rows; `None` where the breath is physical.
     pub fn played_rows(&self) -> Option<f64> {
-        self.played.as_ref().map(|played| played.note.rows(played.lip))
+        self.played.as_ref().map(|played| played.rows)
     }
 }
 
@@ -285,6 +288,7 @@ impl Played {
             note,
             shift: (shift(0.0), shift(1.0)),
             lip: f64::NAN,
+            rows: 0.0,
             note_lip: [0.0; 3],
             asked: (f64::NAN, PlayedBreath::default()),
         }

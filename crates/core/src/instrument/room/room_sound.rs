@@ -3,7 +3,7 @@
 
 use super::Room;
 use super::delay_line::{DelayLine, PIECE};
-use super::room_design::{LINES, LONGEST_EARLY_S, RoomDesign, Tap};
+use super::room_design::{LINES, LONGEST_EARLY_S, RoomDesign};
 use crate::dsp::glide::Glide;
 
 /// Time that a change of the amount takes, s.
@@ -14,8 +14,6 @@ const FADE_S: f64 = 0.05;
 const SILENCE: f32 = 1e-6;
 /// Decibels by which the tail decays until it is silence: from full scale, and a room can be 20 dB louder than the direct sound.
 const TAIL_DB: f64 = 140.0;
-/// Rows of the mixing matrix that are the two ears: any two but the first, which is all in phase.
-const EARS: [usize; 2] = [5, 10];
 
 type Piece = [f32; PIECE];
 
@@ -250,15 +248,8 @@ impl RoomSound {
             }
         }
 
-        scatter(&mut heard.lines);
-        for (ear, line) in heard.ears.iter_mut().zip(EARS) {
-            for n in 0..PIECE {
-                ear[n] += gains[n] * heard.lines[line][n];
-            }
-        }
-        for (line, row) in self.lines.iter_mut().zip(&mut heard.lines) {
-            // 1 / sqrt(LINES), so that the matrix keeps the energy, and the sound enters with energy 1.
-            row.iter_mut().zip(&heard.into).for_each(|(row, into)| *row = 0.25 * (*row + into));
+        scatter(heard, &gains);
+        for (line, row) in self.lines.iter_mut().zip(&heard.lines) {
             line.write(&row[..samples]);
         }
         self.finish(left, right);
@@ -307,36 +298,35 @@ impl Listener {
     fn hear(&mut self, source: &DelayLine, lines: &[DelayLine; LINES], samples: usize, heard: &mut Heard) {
         let Self { design, filters } = self;
         for (ear, taps) in heard.ears.iter_mut().zip(&design.early) {
-            let [first, rest @ ..] = taps.as_chunks::<4>().0 else { continue };
-            let sum = |taps: &[Tap; 4]| {
-                let [a, b, c, d] = taps.map(|tap| source.read_written(tap.delay, samples));
-                let [p, q, r, s] = taps.map(|tap| tap.gain);
-                a.iter()
-                    .zip(b)
-                    .zip(c.iter().zip(d))
-                    .map(move |((a, b), (c, d))| p * a + q * b + r * c + s * d)
-            };
-            ear.iter_mut().zip(sum(first)).for_each(|(ear, sum)| *ear = sum);
-            for taps in rest {
-                ear.iter_mut().zip(sum(taps)).for_each(|(ear, sum)| *ear += sum);
+            // To -0 anything may be added without a change, even -0.
+            ear[..samples].fill(-0.0);
+            for taps in taps.as_chunks::<8>().0 {
+                let [a, b, c, d, e, f, g, h] = taps.map(|tap| source.read_written(tap.delay, samples));
+                let [p, q, r, s, t, u, v, w] = taps.map(|tap| tap.gain);
+                let first = a.iter().zip(b).zip(c.iter().zip(d));
+                let second = e.iter().zip(f).zip(g.iter().zip(h));
+                for (ear, (((a, b), (c, d)), ((e, f), (g, h)))) in ear.iter_mut().zip(first.zip(second)) {
+                    // In two sums of four.
+                    *ear = *ear + (p * a + q * b + r * c + s * d) + (t * e + u * f + v * g + w * h);
+                }
             }
         }
         heard.into[..samples].copy_from_slice(source.read_written(design.into_lines, samples));
         for (line, row) in heard.lines.iter_mut().enumerate() {
             let (loss, mut y) = (design.losses[line], filters[line]);
             let arriving = lines[line].read(design.delays[line], samples);
-            let (out, out_rest) = row[..samples].as_chunks_mut::<8>();
-            let (arriving, arriving_rest) = arriving.as_chunks::<8>();
-            for (out, arriving) in out.iter_mut().zip(arriving) {
-                for n in 0..8 {
-                    y = loss.pole * y + loss.gain * arriving[n];
-                    out[n] = y;
-                }
+            // What does not wait for the sample before it vectorises in a loop of its own.
+            let row = &mut row[..samples];
+            row.iter_mut().zip(arriving).for_each(|(out, x)| *out = loss.gain * x);
+            let (chunks, rest) = row.as_chunks_mut::<8>();
+            let mut pass = |x: &mut f32| {
+                y = loss.pole * y + *x;
+                *x = y;
+            };
+            for chunk in chunks {
+                chunk.iter_mut().for_each(&mut pass);
             }
-            for (out, x) in out_rest.iter_mut().zip(arriving_rest) {
-                y = loss.pole * y + loss.gain * x;
-                *out = y;
-            }
+            rest.iter_mut().for_each(pass);
             filters[line] = y;
         }
     }
@@ -349,22 +339,31 @@ fn mix(new: &mut Piece, old: &Piece, weights: &Piece) {
     }
 }
 
-/// The Hadamard matrix, without its factor of 1/4: each line goes into all, with equal power. Two stages at a time.
-fn scatter(lines: &mut [Piece; LINES]) {
-    for stride in [1, 4] {
-        for first in 0..LINES {
-            if first / stride % 4 != 0 {
-                continue;
-            }
-            let Ok([a, b, c, d]) =
-                lines.get_disjoint_mut([first, first + stride, first + 2 * stride, first + 3 * stride])
-            else {
-                continue;
-            };
-            for n in 0..PIECE {
-                let (e, f, g, h) = (a[n] + b[n], a[n] - b[n], c[n] + d[n], c[n] - d[n]);
-                (a[n], b[n], c[n], d[n]) = (e + g, f + h, e - g, f - h);
-            }
+/// The Hadamard matrix: each line goes into all, with equal power. What comes out of its rows 5 and 10 is heard by the ears,
+/// any two rows but the first, which is all in phase; then the new sound joins all of them. Two stages at a time.
+fn scatter(heard: &mut Heard, gains: &Piece) {
+    let Heard { ears: [left, right], lines, into } = heard;
+    for quad in lines.as_chunks_mut::<4>().0 {
+        let [a, b, c, d] = quad;
+        for n in 0..PIECE {
+            let (e, f, g, h) = (a[n] + b[n], a[n] - b[n], c[n] + d[n], c[n] - d[n]);
+            (a[n], b[n], c[n], d[n]) = (e + g, f + h, e - g, f - h);
+        }
+    }
+    for n in 0..PIECE {
+        left[n] += gains[n] * ((lines[1][n] - lines[5][n]) + (lines[9][n] - lines[13][n]));
+        right[n] += gains[n] * ((lines[2][n] + lines[6][n]) - (lines[10][n] + lines[14][n]));
+    }
+    // 1 / sqrt(LINES), so that the matrix keeps the energy, and the sound enters with energy 1.
+    let joined = |row: f32, into: f32| 0.25 * (row + into);
+    for first in 0..4 {
+        let Ok([a, b, c, d]) = lines.get_disjoint_mut([first, first + 4, first + 8, first + 12]) else {
+            continue;
+        };
+        for n in 0..PIECE {
+            let (e, f, g, h) = (a[n] + b[n], a[n] - b[n], c[n] + d[n], c[n] - d[n]);
+            (a[n], b[n]) = (joined(e + g, into[n]), joined(f + h, into[n]));
+            (c[n], d[n]) = (joined(e - g, into[n]), joined(f - h, into[n]));
         }
     }
 }
