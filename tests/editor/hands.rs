@@ -159,7 +159,7 @@ const MACROS: &[(&str, &str)] = &[
     ("Breath", "bcurve"),
     ("Lip", "lip"),
     ("Reed", "stren"),
-    ("Attack", "tongue"),
+    ("Tongue", "tongue"),
     ("Colour", "lay"),
     ("Air", "noise"),
     ("Volume", "gain"),
