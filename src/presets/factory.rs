@@ -83,6 +83,10 @@ const TEXTS: &[(&str, &str)] = texts![
     "growl_in_fifths",
     "flutter_cabaret",
     "rising_glissando",
+    "section_of_six",
+    "quartet_for_two_hands",
+    "scoops_and_falls",
+    "close_to_the_keys",
 ];
 
 static PRESETS: LazyLock<Vec<Preset>> =
