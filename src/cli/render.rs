@@ -105,11 +105,14 @@ impl RenderCommand {
     pub fn render(&self, bar: impl FnOnce(usize) -> ProgressBar) -> Result<Rendered, Failure> {
         let prepared = self.play.prepare()?;
         let RenderJob { score, rate, .. } = &prepared;
-        if self.channels == 1 && prepared.settings.room.amount > 0.0 {
-            eprintln!("warning: a room is heard on two channels only; add --channels 2");
+        let several = prepared.settings.players.count > 1;
+        let has_room = prepared.settings.room.amount > 0.0;
+        if let Some(what) = [(has_room, "a room is"), (several, "seats are")].into_iter().find(|(is, _)| *is)
+            && self.channels == 1
+        {
+            eprintln!("warning: {} heard on two channels only; add --channels 2", what.1);
         }
         self.refuse_same_file()?;
-        let several = prepared.settings.players.count > 1;
         if several && (self.probe.is_some() || self.plot.wanted()) {
             let inside = "--probe and --plot look inside one instrument; leave them or --players out";
             return Err(Failure::Usage(inside.to_owned()));

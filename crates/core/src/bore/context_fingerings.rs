@@ -1,7 +1,7 @@
 //! Alternate fingerings by context: those that players take on the way from a note to a near one because fewer fingers move.
 //!
-//! A player who slurs F4 to F#4 keeps the thumb on its hole and opens two side keys instead of changing hands: so in chromatic
-//! runs and in trills. Each [alternate](super::alternate_fingerings) of the instrument is compared with the chart's fingering of its
+//! A player who slurs F5 to F#5 adds a finger to those that are down instead of exchanging two: so in chromatic runs and in trills.
+//! Each [alternate](super::alternate_fingerings) of the instrument is compared with the chart's fingering of its
 //! note by the transfer matrices. One that is much off or much harder to blow is left out, and what is left of its error is for
 //! the player to correct.
 
