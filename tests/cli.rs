@@ -607,3 +607,55 @@ fn linked_controllers_of_a_file_move_parameters() {
         &["map.toml", "line 5", "growll"],
     );
 }
+
+/// A chord of three keys, held for a second, as a MIDI file of 480 ticks a quarter.
+fn chord(keys: [u8; 3]) -> Vec<u8> {
+    let mut track = Vec::new();
+    for key in keys {
+        track.extend([0, 0x90, key, 90]);
+    }
+    // 960 ticks: a second at 120 quarters a minute.
+    track.extend([0x87, 0x40, 0x80, keys[0], 0]);
+    for key in &keys[1..] {
+        track.extend([0, 0x80, *key, 0]);
+    }
+    track.extend([0, 0xff, 0x2f, 0]);
+    let mut file = b"MThd\0\0\0\x06\0\0\0\x01\x01\xe0MTrk".to_vec();
+    file.extend((track.len() as u32).to_be_bytes());
+    file.extend(track);
+    file
+}
+
+#[test]
+fn several_players_play_a_chord_and_one_its_last_key() {
+    let d = tempfile::tempdir().unwrap();
+    let keys = [58, 62, 65];
+    fs::write(d.path().join("chord.mid"), chord(keys)).unwrap();
+    let power = |flags: &str| {
+        succeeds(d.path(), &format!("render chord.mid --rate 48000 --force --no-noise --out c.wav {flags}"));
+        let sound: Vec<f64> = hound::WavReader::open(d.path().join("c.wav"))
+            .unwrap()
+            .into_samples::<f32>()
+            .map(|sample| f64::from(sample.unwrap()))
+            .collect();
+        // By the discrete Fourier transform at the fundamental of each key, over half a second.
+        keys.map(|key| {
+            let turn = std::f64::consts::TAU * 440.0 * ((f64::from(key) - 69.0) / 12.0).exp2() / 48_000.0;
+            let [mut re, mut im] = [0.0; 2];
+            for (n, x) in sound[19_200..43_200].iter().enumerate() {
+                let (sin, cos) = (turn * n as f64).sin_cos();
+                (re, im) = (re + x * cos, im + x * sin);
+            }
+            10.0 * (re * re + im * im).log10()
+        })
+    };
+    let [low, middle, high] = power("");
+    assert!(high > low.max(middle) + 20.0, "one player plays the last key: {low} {middle} {high}");
+    let three = power("--players 3 --spread 0 --set life=0");
+    let (least, most) =
+        (three.iter().copied().fold(f64::INFINITY, f64::min), three.iter().copied().fold(0.0, f64::max));
+    assert!(most - least < 10.0, "three play all: {three:?}");
+    let unison = power("--players 3 --unison --spread 0 --set life=0");
+    assert!(unison[2] > unison[0].max(unison[1]) + 20.0, "all play the last key: {unison:?}");
+    refused(&d, "render chord.mid --players 3 --probe p.csv --out x.wav", &["--players"]);
+}
