@@ -87,6 +87,7 @@ fn parameters_are_described_by_the_rules() {
     assert_eq!(flagged(ParamInfoFlags::IS_READONLY), ["Knob status", "Instrument status"]);
     let choices = [
         "Breath response",
+        "Breath from",
         "Reed coupled",
         "Tuning",
         "Beyond the range",
@@ -102,7 +103,9 @@ fn parameters_are_described_by_the_rules() {
         "Heard from",
         "Attack",
         "Mod wheel",
+        "Alternate fingerings",
         "Growl pitch",
+        "Split",
     ];
     assert_eq!(flagged(ParamInfoFlags::IS_ENUM), choices);
     assert_eq!(flagged(ParamInfoFlags::REQUIRES_PROCESS), ["Breath", "Panic"]);

@@ -547,9 +547,16 @@ fn the_host_is_told_of_a_faded_note_when_nothing_sounds_any_more() {
 
 #[test]
 fn voice_info_is_one_voice_of_as_many_as_there_are_players_with_overlapping_notes() {
-    let info = plugin().voice_info().unwrap();
-    assert_eq!((info.voice_count, info.voice_capacity), (1, 16));
-    assert!(info.flags.contains(VoiceInfoFlags::SUPPORTS_OVERLAPPING_NOTES));
+    let mut plugin = plugin();
+    let players = plugin.param("Players").unwrap().id;
+    for count in [1, 4] {
+        plugin.set(players, f64::from(count)).unwrap();
+        let session = plugin.activate(RATE, 256).unwrap();
+        let info = plugin.voice_info().unwrap();
+        assert_eq!((info.voice_count, info.voice_capacity), (count, 16));
+        assert!(info.flags.contains(VoiceInfoFlags::SUPPORTS_OVERLAPPING_NOTES));
+        plugin.deactivate(session);
+    }
 }
 
 /// Anything that a host may say of notes and controllers, on sixteen channels, by MIDI and by notes with ids.

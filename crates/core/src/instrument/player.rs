@@ -451,8 +451,6 @@ impl Player {
             }
         }
         let fingering = self.fingers.fingering();
-        let own_cents = self.person.detune_cents(self.settings.players.spread_cents);
-        let bend_cents = self.bend_cents + self.key_cents + own_cents;
         if self.posture.is_none() {
             self.now = self.glide.over(self.settings).with_reed_factors(self.reed.factors());
         }
@@ -464,6 +462,8 @@ impl Player {
                 BreathResponse::Physical => Jet::Steady,
                 BreathResponse::Played => Jet::Pulsed,
             });
+            let own_cents = self.person.detune_cents(self.settings.players.spread_cents);
+            let bend_cents = self.bend_cents + self.key_cents + own_cents;
             let alternate = self.fingers.alternate().and_then(|at| model.alternates.get(at));
             let fingered = Fingered {
                 fingering: fingering.unwrap_or(0),

@@ -93,10 +93,13 @@ impl Inflection {
     }
 
     /// One tick; true when a fall has ended. Real-time safe.
+    #[inline(always)] // most of the time the pitch is the note's
     pub fn tick(&mut self, tongue_holds: bool, gamma: f64, articulation: &Articulation, tick_s: f64) -> bool {
-        if self.phase == Phase::Steady {
-            return false;
-        }
+        self.phase != Phase::Steady && self.go_on(tongue_holds, gamma, articulation, tick_s)
+    }
+
+    #[inline(never)]
+    fn go_on(&mut self, tongue_holds: bool, gamma: f64, articulation: &Articulation, tick_s: f64) -> bool {
         self.passed_s += tick_s;
         let arrived = self.passed_s >= self.length_s;
         match self.phase {

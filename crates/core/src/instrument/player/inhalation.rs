@@ -82,10 +82,15 @@ impl Inhalation {
 
     /// One tick of `tick_s` seconds with a breath in of this `amount`, 0..=1. `rests`: nobody blows and nobody asks for it; `gamma` is
     /// the mouth pressure over the closing pressure. Real-time safe.
+    #[inline(always)] // most of the time nothing is due
     pub fn tick(&mut self, amount: f32, rests: bool, gamma: f64, tick_s: f64) {
-        if amount == 0.0 && self.phase == Phase::Full {
-            return;
+        if amount != 0.0 || self.is_due() {
+            self.go_on(amount, rests, gamma, tick_s);
         }
+    }
+
+    #[inline(never)]
+    fn go_on(&mut self, amount: f32, rests: bool, gamma: f64, tick_s: f64) {
         self.phase = match self.phase {
             Phase::Breathes { passed_s, loudest, left } => {
                 self.breathe(passed_s + tick_s, loudest, left, rests, tick_s)
