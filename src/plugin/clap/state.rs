@@ -13,7 +13,7 @@ use clap_sys::ext::state_context::{clap_plugin_state_context, clap_plugin_state_
 use clap_sys::plugin::clap_plugin;
 use clap_sys::stream::{clap_istream, clap_ostream};
 use crc::{CRC_32_ISO_HDLC, Crc};
-use nice_plug::prelude::PluginState;
+use nice_plug::prelude::{PluginState, nice_error};
 
 use super::instance::Instance;
 use crate::plugin::host_link::HostCalls;
@@ -136,7 +136,10 @@ unsafe extern "C" fn load(plugin: *const clap_plugin, stream: *const clap_istrea
     // SAFETY: as above.
     let Some(this) = (unsafe { Instance::of(plugin) }) else { return false };
     // SAFETY: the host's stream is valid for this call, or null.
-    let Some(bytes) = (unsafe { read_all(stream) }).filter(|bytes| is_whole(bytes)) else { return false };
+    let Some(bytes) = (unsafe { read_all(stream) }).filter(|bytes| is_whole(bytes)) else {
+        nice_error!("the saved state is damaged, so nothing of it was taken");
+        return false;
+    };
     let mut left = &bytes[..];
     let stream = clap_istream { ctx: (&raw mut left).cast::<c_void>(), read: Some(take) };
     // SAFETY: the stream is valid for this call.
