@@ -238,7 +238,8 @@ fn values(plugin: &mut Plugin) -> BTreeMap<String, f64> {
 fn a_flush_and_a_block_set_the_same() {
     let mut random = fastrand::Rng::with_seed(1);
     let (mut flushed, mut played) = (plugin(), plugin());
-    let params = movable(&mut flushed);
+    // What may stay on beside a knob is said by another thread, in its time.
+    let params: Vec<_> = movable(&mut flushed).into_iter().filter(|param| param.name != "Knob").collect();
     let is_moment = |id| params.iter().any(|param| param.id == id && MOMENTS.contains(&param.name.as_str()));
     for _ in 0..20 {
         let set: Vec<_> = params.iter().map(|param| (param.id, random_value(&mut random, param))).collect();
