@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Most entries that are listed.
-const ENTRIES_MOST: usize = 5_000;
+pub const ENTRIES_MOST: usize = 5_000;
 
 /// The content of a folder by name, without what is hidden.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -17,6 +17,8 @@ pub struct FolderListing {
     pub files: Vec<String>,
     /// Why it cannot be read; a message for the user.
     pub refused: Option<String>,
+    /// Whether it has more than are listed.
+    pub is_cut: bool,
 }
 
 impl FolderListing {
@@ -32,7 +34,11 @@ impl FolderListing {
                 return listing;
             }
         };
-        for entry in entries.filter_map(Result::ok).take(ENTRIES_MOST) {
+        for (count, entry) in entries.filter_map(Result::ok).enumerate() {
+            if count == ENTRIES_MOST {
+                listing.is_cut = true;
+                break;
+            }
             let name = entry.file_name().to_string_lossy().into_owned();
             if name.starts_with('.') {
                 continue;

@@ -8,7 +8,7 @@ use egui::{Key, RichText, Role, ScrollArea, TextEdit, Ui, WidgetInfo};
 
 use crate::editor::Action;
 use crate::editor::theme::{Colours, GAP, panel};
-use crate::folder_listing::FolderListing;
+use crate::folder_listing::{ENTRIES_MOST, FolderListing};
 
 /// What is looked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,6 +99,11 @@ impl FileBrowser {
             self.path_row(ui, kind, listing, actions);
             if let Some(refused) = &listing.refused {
                 ui.label(RichText::new(refused).color(c.danger));
+            }
+            if listing.is_cut {
+                ui.label(format!(
+                    "This folder has more than {ENTRIES_MOST} entries. If yours is not listed, type its path."
+                ));
             }
             let area = ScrollArea::vertical().id_salt("files").auto_shrink([false, false]);
             area.show(ui, |ui| self.names(ui, kind, listing, actions));

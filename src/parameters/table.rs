@@ -862,7 +862,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("ksound", EXPRESSION, "Key sounds", percent(0.0))
         .help(
             "How loud pads and fingers are",
-            "Each moves air at its hole, and the bore answers with a pop, with and without breath. At 100 % they are 35 dB below a mezzo-forte.",
+            "Each moves air at its hole, and the bore answers with a pop, with and without breath. At 100 % the loudest is 37 dB below a mezzo-forte.",
             "",
         )
         .sets(Sets::Number(SettingNumber::KeySounds))

@@ -43,7 +43,7 @@ pub fn edit(plugin: &mut Plugin, change: impl FnOnce(&mut serde_json::Value)) ->
     change(&mut json);
     // A state that was written by hand has no checksum.
     if let Some(fields) = json["fields"].as_object_mut() {
-        fields.remove("check");
+        fields.remove("crc32");
     }
     let json = serde_json::to_vec(&json)?;
     plugin.restore(&[&(json.len() as u64).to_le_bytes(), json.as_slice()].concat())

@@ -405,7 +405,7 @@ fn a_strange_state_is_mended() {
     // Without the checksum, which is another.
     let text = |plugin: &mut Plugin| {
         let mut state: serde_json::Value = serde_json::from_slice(&plugin.save().unwrap()[8..]).unwrap();
-        assert!(state["fields"].as_object_mut().unwrap().remove("check").is_some());
+        assert!(state["fields"].as_object_mut().unwrap().remove("crc32").is_some());
         state.to_string()
     };
     // The reference clarinet by name; a state without a name has no preset.

@@ -567,7 +567,7 @@ fn with_window(state: &[u8], change: impl FnOnce(&mut serde_json::Value)) -> Vec
     let mut all = json(state);
     all["fields"]["window"] = window.to_string().into();
     // A state that was written by hand has no checksum.
-    all["fields"].as_object_mut().unwrap().remove("check");
+    all["fields"].as_object_mut().unwrap().remove("crc32");
     let text = serde_json::to_vec(&all).unwrap();
     [&(text.len() as u64).to_le_bytes()[..], &text].concat()
 }

@@ -2,11 +2,12 @@
 //!
 //! The framework writes eight bytes of length and then JSON. *Arm knob* and *Record take* may be on while a project is saved,
 //! but no loaded state ever has them on: they are written as Off, so that a state that is loaded and saved is the same.
-//! A checksum stands beside them: a state that was damaged on its way is refused as a whole, and the instrument stays as it is. A
-//! state without one, written by hand or by an earlier version, is read as it stands.
+//! A checksum of the bytes stands among them: a state that was damaged on its way is refused as a whole, and the instrument stays as
+//! it is. A state without one, written by hand or by an earlier version, is read as it stands.
 //! A project, a duplicate and a preset of the host are one state: it has nothing that would belong to one of them alone.
 
 use std::ffi::c_void;
+use std::ops::Range;
 
 use clap_sys::ext::state::{CLAP_EXT_STATE, clap_plugin_state};
 use clap_sys::ext::state_context::{clap_plugin_state_context, clap_plugin_state_context_type};
@@ -25,8 +26,11 @@ pub static STATE_CONTEXT: clap_plugin_state_context =
 
 /// Bytes of the length that stands before the JSON.
 const LENGTH_BYTES: usize = size_of::<u64>();
-/// Field with the checksum of all the others.
-const CHECK: &str = "check";
+/// Field with the checksum of the JSON, in which these digits are zeros.
+const CHECK: &str = "crc32";
+/// What stands before its digits. Nothing else in the JSON reads so: quotes within strings are escaped.
+const BEFORE_DIGITS: &[u8] = b"\"crc32\":\"";
+const ZEROS: &str = "00000000";
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// Longest state that is read, bytes: a scale and links fit many times.
 const BYTES_MOST: usize = 16 << 20;
@@ -46,27 +50,36 @@ impl Instance {
         let mut state: PluginState =
             serde_json::from_slice(bytes.get(LENGTH_BYTES..).filter(|_| is_saved)?).ok()?;
         without_moments(&mut state);
-        let check = checksum(&mut state)?;
-        state.fields.insert(CHECK.to_owned(), check);
-        let json = serde_json::to_vec(&state).ok()?;
+        state.fields.insert(CHECK.to_owned(), ZEROS.to_owned());
+        let mut json = serde_json::to_vec(&state).ok()?;
+        let digits = digits(&json)?;
+        let check = format!("{:08x}", CRC.checksum(&json));
+        json.get_mut(digits)?.copy_from_slice(check.as_bytes());
         Some([&(json.len() as u64).to_le_bytes()[..], &json].concat())
     }
 }
 
-/// The checksum of a state without its own, which it loses.
-fn checksum(state: &mut PluginState) -> Option<String> {
-    state.fields.remove(CHECK);
-    Some(format!("{:08x}", CRC.checksum(&serde_json::to_vec(state).ok()?)))
+/// Where the digits of the checksum stand in the JSON of a state.
+fn digits(json: &[u8]) -> Option<Range<usize>> {
+    let name = json.windows(BEFORE_DIGITS.len()).position(|bytes| bytes == BEFORE_DIGITS)?;
+    let first = name + BEFORE_DIGITS.len();
+    (first + ZEROS.len() <= json.len()).then_some(first..first + ZEROS.len())
 }
 
 /// Whether the bytes of a state are as they were written, as far as they tell.
 fn is_whole(bytes: &[u8]) -> bool {
     let Some((length, json)) = bytes.split_first_chunk::<LENGTH_BYTES>() else { return false };
     // Some hosts hand on more than they were given.
-    let json = usize::try_from(u64::from_le_bytes(*length)).ok().and_then(|length| json.get(..length));
-    let Ok(mut state) = serde_json::from_slice::<PluginState>(json.unwrap_or_default()) else { return false };
-    let told = state.fields.get(CHECK).cloned();
-    told.is_none_or(|told| checksum(&mut state) == Some(told))
+    let Some(json) = usize::try_from(u64::from_le_bytes(*length)).ok().and_then(|length| json.get(..length))
+    else {
+        return false;
+    };
+    let Some(digits) = digits(json) else { return serde_json::from_slice::<PluginState>(json).is_ok() };
+    let mut digest = CRC.digest();
+    for part in [&json[..digits.start], ZEROS.as_bytes(), &json[digits.end..]] {
+        digest.update(part);
+    }
+    json[digits] == *format!("{:08x}", digest.finalize()).as_bytes()
 }
 
 /// All that a host's stream has.

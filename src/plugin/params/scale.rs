@@ -82,6 +82,11 @@ impl ScaleField {
         self.0.read().unwrap_or_else(PoisonError::into_inner).0.clone()
     }
 
+    /// What lists show, without a copy of the texts.
+    pub fn title(&self) -> String {
+        self.0.read().unwrap_or_else(PoisonError::into_inner).0.title()
+    }
+
     /// What every key plays.
     pub fn key_pitches(&self) -> Arc<KeyPitches> {
         self.0.read().unwrap_or_else(PoisonError::into_inner).1.clone()

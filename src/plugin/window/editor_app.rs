@@ -171,7 +171,7 @@ impl NiceEguiApp for EditorApp {
         snapshot.settings = params.settings();
         snapshot.presets = memory.handles.presets.shelf();
         snapshot.preset = params.preset_name();
-        snapshot.scale = params.scale.saved().title();
+        snapshot.scale = params.scale.title();
         ui.ctx().set_zoom_factor(memory.state.kept.zoom);
         let actions = editor::draw(ui, &mut memory.state, &memory.controls.with(&self.gui), &snapshot);
         for action in actions {

@@ -186,8 +186,8 @@ impl<E: Played, I: Iterator<Item = Timed<E>>, A: FnMut(usize) -> Option<f64>> It
                 if let Some(first) = event.event.of_first() {
                     self.blower.heed(&Timed { at: event.at, event: first });
                 }
-                // One breath at a time: while the knob blows, nothing else does.
-                if !matches!(event.event.event(), Event::Breath(_)) {
+                // One breath at a time: while the knob blows, nothing else does, keys without breath neither.
+                if !matches!(event.event.event(), Event::Breath(_) | Event::BreathFromKeys) {
                     return Some(event);
                 }
                 continue;
