@@ -17,6 +17,7 @@ pub mod controls;
 pub mod feel_test;
 mod file_browser;
 mod header;
+mod hole_mover;
 mod host_marks;
 mod instrument_view;
 mod key_steps;
@@ -40,6 +41,7 @@ pub mod undo;
 mod widgets;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 
 use egui::{CentralPanel, Frame, Margin, Panel, Theme, Ui};
@@ -52,6 +54,8 @@ use note_names::NoteNames;
 pub use note_names::note_name;
 pub use snapshot::Snapshot;
 
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::bore::moved_hole::MovedHole;
 use chalumeau_core::units::SoundingNote;
 use chalumeau_knob::wire::message::Feel;
 use controls::{Entry, Hands, Press};
@@ -91,6 +95,10 @@ pub enum Action {
     EndTry,
     /// A device of the list, by its key.
     ChooseDevice(String),
+    /// The user's holes of the instrument are these; the others are as built.
+    MoveHoles(Vec<MovedHole>),
+    /// Save an altered instrument as a file of the user's.
+    SaveInstrument(Arc<InstrumentFile>),
     /// The feel of a test, which replaces the feel of the notes; `None` ends the test.
     FeelTest(Option<Feel>),
     /// The knob must let go, now.

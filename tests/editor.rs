@@ -9,6 +9,8 @@ mod cost;
 mod files;
 #[path = "editor/hands.rs"]
 mod hands;
+#[path = "editor/holes.rs"]
+mod holes;
 #[path = "editor/linked.rs"]
 mod linked;
 #[path = "editor/looks.rs"]
@@ -63,6 +65,11 @@ impl Window {
                     // As a plugin does: settings of this very frame.
                     s.borrow_mut().settings = h.settings();
                     let done = draw(ui, state, &*h, &s.borrow());
+                    for action in &done {
+                        if let Action::MoveHoles(moved) = action {
+                            s.borrow_mut().moved = moved.clone().into();
+                        }
+                    }
                     a.borrow_mut().extend(done);
                 },
                 EditorState::new(kept),

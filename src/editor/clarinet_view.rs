@@ -2,7 +2,7 @@
 //! Both directions have the same scale. Bore, holes and chimneys come from the instrument's file. The file does not give
 //! the thickness of the wood; it is drawn as deep as the holes. Finger holes and rings are on the upper edge and closed
 //! keys on the lower edge, unlike on the real instrument. A click on a hole opens or closes it for a trial, which lasts
-//! until *Back to the note*.
+//! until *Back to the note*. A drag moves it ([`HoleMover`]).
 
 use std::sync::Arc;
 
@@ -14,6 +14,7 @@ use egui::{
 use crate::editor::Action;
 use crate::editor::chart;
 use crate::editor::clarinet_drawing::{ClarinetDrawing, part_names, ruler, standing};
+use crate::editor::hole_mover::HoleMover;
 use crate::editor::note_names::{NoteNames, note_name};
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
@@ -31,6 +32,7 @@ pub struct ClarinetView {
     tried: Option<Vec<bool>>,
     /// The choices of the picker, and the instrument they belong to.
     known: Option<(Arc<InstrumentFile>, Arc<Vec<FingeringChoice>>)>,
+    mover: HoleMover,
 }
 
 impl ClarinetView {
@@ -65,7 +67,7 @@ impl ClarinetView {
 
     fn picture(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
         let c = Colours::here(ui);
-        let file = &*snapshot.instrument;
+        let file = &*HoleMover::shown(snapshot);
         let area = ui.available_rect_before_wrap();
         ui.allocate_rect(area, Sense::hover());
         let painter = ui.painter_at(area.expand(2.0));
@@ -91,9 +93,19 @@ impl ClarinetView {
             let at = body.hole(tone_hole);
             let is_named = area.width() >= NAMED * file.holes.len() as f32;
             let response = button(ui, buttons[hole], tone_hole, opening, is_named);
-            let on_bore =
-                ui.interact(at.rect.expand2(vec2(2.0, 6.0)), response.id.with("bore"), Sense::CLICK);
-            let is_hot = response.hovered() || on_bore.hovered() || response.has_focus();
+            let on_bore = ui.interact(
+                at.rect.expand2(vec2(2.0, 6.0)),
+                response.id.with("bore"),
+                Sense::CLICK | Sense::DRAG,
+            );
+            let is_hot = response.hovered()
+                || on_bore.hovered()
+                || response.has_focus()
+                || self.mover.has_chosen(hole);
+            on_bore.widget_info(|| {
+                WidgetInfo::labeled(Role::Button, true, format!("Hole {} in the bore", tone_hole.name))
+            });
+            self.mover.follow(&on_bore, hole, body.scale, snapshot, actions);
             leader(&painter, c, at.foot, buttons[hole], is_hot, opening);
             body.paint_hole(&painter, c, tone_hole, opening, is_hot);
             if response.clicked() || on_bore.clicked() {
@@ -133,8 +145,9 @@ impl ClarinetView {
             let note = names.of_written(choice.written, snapshot.instrument.transposition);
             format!("{}{}", note.map_or_else(String::new, note_name), "'".repeat(choice.nth))
         };
-        ui.horizontal(|ui| {
-            ui.set_height(22.0);
+        if self.mover.is_open() {
+            self.mover.line(ui, snapshot, actions);
+        } else {
             let told = match shown.map(|index| &all[index]) {
                 Some(choice) => {
                     let fingers =
@@ -149,18 +162,8 @@ impl ClarinetView {
                 }
                 None => "your own fingering".into(),
             };
-            if self.tried.is_some() {
-                if ui
-                    .button("Back to the note")
-                    .on_hover_text("Ends the trial; the played note sets the holes again")
-                    .clicked()
-                {
-                    self.end_try(actions);
-                }
-                ui.colored_label(c.beats, "trying");
-            }
-            ui.label(told);
-        });
+            self.fingering_line(ui, told, snapshot, actions);
+        }
         egui::ScrollArea::vertical().id_salt("picker").auto_shrink([false, false]).show(ui, |ui| {
             // Four registers in the least window.
             let line = ((ui.available_height() - 8.0) / 4.0 - 3.0).clamp(19.0, 24.0);
@@ -194,6 +197,38 @@ impl ClarinetView {
                     }
                 });
             }
+        });
+    }
+
+    /// What is fingered, and the ways to something else.
+    fn fingering_line(&mut self, ui: &mut Ui, told: String, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+        let c = Colours::here(ui);
+        ui.horizontal(|ui| {
+            ui.set_height(22.0);
+            if self.tried.is_some() {
+                if ui
+                    .button("Back to the note")
+                    .on_hover_text("Ends the trial; the played note sets the holes again")
+                    .clicked()
+                {
+                    self.end_try(actions);
+                }
+                ui.colored_label(c.beats, "trying");
+            }
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                let words = match snapshot.moved.len() {
+                    0 => "Move holes".to_owned(),
+                    1 => "1 hole moved".to_owned(),
+                    count => format!("{count} holes moved"),
+                };
+                let about = "Move a hole along the bore, or make it wider or narrower, and hear it";
+                if ui.button(words).on_hover_text(about).clicked() {
+                    self.mover.open();
+                }
+                ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
+                    ui.add(egui::Label::new(told).truncate());
+                });
+            });
         });
     }
 
@@ -311,7 +346,8 @@ pub(super) fn about(ui: &mut Ui, hole: &ToneHole, opening: f32) {
         1e3 * hole.chimney_m,
         1e3 * hole.x_m
     ));
-    ui.label(egui::RichText::new("Click to open or close this hole").font(theme::small()).color(c.quiet));
+    let how = "Click to open or close this hole; drag it to move it, with Shift up to make it wider";
+    ui.label(egui::RichText::new(how).font(theme::small()).color(c.quiet));
 }
 
 fn leader(painter: &Painter, c: &Colours, foot: Pos2, button: Rect, is_hot: bool, opening: f32) {

@@ -3,12 +3,14 @@
 //! The editor knows no voice, no link to the knob and no lock. It shows missing values as missing: every `Option` and every
 //! empty list has its own look.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::editor::sound_analysis::SoundAnalysis;
 use crate::folder_listing::FolderListing;
 use crate::presets::PresetShelf;
 use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
+use chalumeau_core::bore::moved_hole::MovedHole;
 use chalumeau_core::haptics::{NoteFeel, NoteRequirement};
 use chalumeau_core::instrument::player::dynamics::LipShape;
 use chalumeau_core::instrument::{KeyPitches, Settings};
@@ -19,6 +21,12 @@ use chalumeau_core::units::{SoundingNote, WrittenNote};
 pub struct Snapshot {
     /// The instrument that sounds.
     pub instrument: Arc<InstrumentFile>,
+    /// The same as its file has it, before any hole was moved and before scaling.
+    pub as_built: Arc<InstrumentFile>,
+    /// Holes that the user has moved, in lengths of the file.
+    pub moved: Arc<Vec<MovedHole>>,
+    /// Where the altered instrument was saved, or why it was not.
+    pub saved: Option<Result<PathBuf, String>>,
     /// What each key plays.
     pub key_pitches: KeyPitches,
     /// The scale that the keys play, as lists show it.
@@ -83,7 +91,10 @@ impl Default for Snapshot {
         let instrument = Arc::new(InstrumentFile::built_in());
         let openings = vec![0.0; instrument.holes.len()];
         Self {
+            as_built: instrument.clone(),
             instrument,
+            moved: Arc::default(),
+            saved: None,
             key_pitches: KeyPitches::default(),
             scale: "Equal temperament".to_owned(),
             scale_refused: None,

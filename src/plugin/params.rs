@@ -19,6 +19,7 @@ use chalumeau_core::control::midi::breath::BreathFrom;
 use chalumeau_core::instrument::{Beyond, BreathResponse, Reach, Settings, Tuning};
 
 mod entry;
+pub mod holes;
 pub mod instrument;
 pub mod knob;
 pub mod listening;
@@ -31,6 +32,7 @@ mod state;
 pub mod techniques;
 
 use entry::{choice, number_from, status_text, switch, whole};
+use holes::HolesField;
 pub use instrument::InstrumentParams;
 pub use knob::KnobParams;
 use knob::{KnobKind, ReedSource};
@@ -102,6 +104,9 @@ pub struct ChalumeauParams {
     /// What the keys play.
     #[persist = "scale"]
     pub scale: ScaleField,
+    /// Tone holes that the user has moved.
+    #[persist = "holes"]
+    pub holes: HolesField,
     /// Name of the preset that was chosen last; empty if there is none.
     #[persist = "preset"]
     pub preset: RwLock<String>,
@@ -373,6 +378,7 @@ impl ChalumeauParams {
             window: RwLock::default(),
             links: ControllerLinks::default(),
             scale: ScaleField::default(),
+            holes: HolesField::default(),
             preset: RwLock::new(state::first_preset()),
             breath: BreathParams {
                 breath: number("breath"),

@@ -25,6 +25,7 @@ fn browsing(button: &str) -> Window {
         folders: names(&["scales"]),
         files: names(&["fifths.SCL", "from_a.kbm", "mine.toml", "notes.txt"]),
         refused: None,
+        is_cut: false,
     });
     window.harness.run();
     window

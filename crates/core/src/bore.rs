@@ -27,6 +27,7 @@ pub mod fingering_finder;
 pub mod fit;
 pub mod instrument_file;
 pub mod lattice;
+pub mod moved_hole;
 pub mod radiation;
 pub mod sound_sources;
 pub mod tone_hole;

@@ -17,13 +17,15 @@ use super::{
 };
 use crate::cache::Cache;
 use crate::plugin::params::ChalumeauParams;
-use chalumeau_core::instrument::prepare::{Preparation, Progress};
+use chalumeau_core::instrument::prepare::Progress;
 use chalumeau_core::instrument::{BuildError, Ensemble, Model};
 
 /// How often the thread looks at the parameters.
 const POLL: Duration = Duration::from_millis(20);
 /// How long A4 must stay unchanged before an instrument is built for it.
 const SETTLE: Duration = Duration::from_millis(500);
+/// How often an instrument follows a hole that the user drags.
+const DRAG: Duration = Duration::from_millis(150);
 /// Instruments that may be on their way to the audio thread at once.
 const IN_FLIGHT: usize = 4;
 
@@ -53,6 +55,7 @@ impl InstrumentLoader {
             waiting: None,
             request: None,
             since: Instant::now(),
+            since_handed: Instant::now(),
             refused: None,
             job: None,
             ending: Vec::new(),
@@ -125,8 +128,7 @@ impl InstrumentLoader {
         let cache = Cache::store(self.cache.as_ref());
         let (mut model, mut readiness) = request.available_now(cache)?;
         if offline && readiness < Readiness::Tuned {
-            let wanted = request.wanted(request.file()?);
-            let made = Preparation::new(&wanted, cache).tuned(&mut |progress| {
+            let made = request.made(request.file()?, cache, &mut |progress| {
                 report(&self.params, &progress_text(progress));
                 ControlFlow::Continue(())
             });
@@ -172,6 +174,8 @@ struct LoaderThread {
     /// The latest request, and the time when it came.
     request: Option<InstrumentRequest>,
     since: Instant,
+    /// When an instrument was handed over last.
+    since_handed: Instant,
     /// A request that failed; it is not tried again until the request changes.
     refused: Option<InstrumentRequest>,
     job: Option<FittingJob>,
@@ -239,8 +243,12 @@ impl LoaderThread {
         {
             self.cancel_job();
         }
-        let same_instrument =
-            request.source == current.request.source && request.quality == current.request.quality;
+        let same_instrument = request.source == current.request.source
+            && request.quality == current.request.quality
+            && request.moved == current.request.moved;
+        if request.moved != current.request.moved && self.since_handed.elapsed() < DRAG {
+            return;
+        }
         let differs_in_keys = current.request.differs_in_keys_at_most(&request) && current.request != request;
         if differs_in_keys {
             // The same instrument, with other keys.
@@ -283,7 +291,9 @@ impl LoaderThread {
         }
         let mut readiness = (current.request == *request).then_some(current.readiness);
         // The current instrument plays in tune at another A4, because the player corrects the difference.
-        let is_bridged = current.request.source == request.source && current.readiness >= Readiness::OtherA4;
+        let is_bridged = current.request.source == request.source
+            && current.request.moved == request.moved
+            && current.readiness >= Readiness::OtherA4;
         if is_bridged && !self.ending.is_empty() {
             return Ok(());
         }
@@ -310,12 +320,12 @@ impl LoaderThread {
     }
 
     fn start_job(&mut self, request: &InstrumentRequest, activation: u64) -> Result<(), Interrupted> {
-        let wanted = request.wanted(request.file().map_err(Interrupted::Failed)?);
+        let (wanted, file) = (request.clone(), request.file().map_err(Interrupted::Failed)?);
         let (cache, cancelled) = (self.cache.clone(), Arc::new(AtomicBool::new(false)));
         let (send, news) = mpsc::channel();
         let stop = cancelled.clone();
         let work = move || {
-            let made = Preparation::new(&wanted, Cache::store(cache.as_ref())).tuned(&mut |progress| {
+            let made = wanted.made(file, Cache::store(cache.as_ref()), &mut |progress| {
                 let sent = match progress {
                     Progress::Fitted(model) => send.send(FittingNews::Fitted(model.clone())),
                     shares => send.send(FittingNews::Progress(progress_text(shares))),
@@ -405,6 +415,7 @@ impl LoaderThread {
         self.params.host.tell();
         // This replaces an instrument that still waits for room: that one is worse.
         self.waiting = Some(SwapCandidate { activation: number, ensemble });
+        self.since_handed = Instant::now();
         self.push();
         Ok(())
     }

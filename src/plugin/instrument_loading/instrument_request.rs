@@ -1,5 +1,6 @@
 //! Which instrument the parameters ask for, and its file.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::SystemTime;
@@ -9,9 +10,10 @@ use crate::plugin::params::ChalumeauParams;
 use crate::plugin::params::instrument::InstrumentChoice;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::bore::moved_hole::MovedHole;
 use chalumeau_core::instrument::concert_pitch::A4_BY_DELAY_HZ;
 use chalumeau_core::instrument::concert_pitch::A4_HZ;
-use chalumeau_core::instrument::prepare::{Preparation, Quality, Wanted};
+use chalumeau_core::instrument::prepare::{OnProgress, Preparation, Progress, Quality, Wanted, altered};
 use chalumeau_core::instrument::store::Store;
 use chalumeau_core::instrument::{BuildError, KeyPitches, Model};
 
@@ -49,6 +51,8 @@ pub struct InstrumentRequest {
     pub quality: Quality,
     /// What every key plays.
     pub keys: Arc<KeyPitches>,
+    /// Tone holes that the user has moved.
+    pub moved: Arc<Vec<MovedHole>>,
 }
 
 impl InstrumentRequest {
@@ -70,7 +74,8 @@ impl InstrumentRequest {
         let a4_hz = if is_bridged { A4_HZ } else { (10.0 * a4_hz).round() / 10.0 };
         let quality = if offline { params.instrument.quality.value().into() } else { Quality::Live };
         let keys = params.scale.key_pitches();
-        Self { choice: choice as u32, source, a4_hz, host_rate_hz, quality, keys }
+        let moved = params.holes.of(&params.instrument.key());
+        Self { choice: choice as u32, source, a4_hz, host_rate_hz, quality, keys, moved }
     }
 
     /// The request that the built-in clarinet answers.
@@ -82,6 +87,7 @@ impl InstrumentRequest {
             host_rate_hz,
             quality: Quality::Live,
             keys: Arc::default(),
+            moved: Arc::default(),
         }
     }
 
@@ -98,7 +104,13 @@ impl InstrumentRequest {
         model
     }
 
-    /// The instrument's measurements. The error is a message for the user.
+    /// The file with the holes that the user has moved; `None` if all are where they were.
+    fn altered(&self, file: &InstrumentFile) -> Option<InstrumentFile> {
+        let altered = file.with_holes_moved(&self.moved);
+        (altered != *file).then(|| InstrumentFile { name: format!("{}, holes moved", file.name), ..altered })
+    }
+
+    /// The instrument's measurements as they were built. The error is a message for the user.
     pub fn file(&self) -> Result<InstrumentFile, String> {
         let path = match &self.source {
             InstrumentSource::Bundled(bundled) => return Ok(bundled.file()),
@@ -132,11 +144,11 @@ impl InstrumentRequest {
     }
 
     /// The best instrument that needs no fitting and no tuning. Takes up to 50 ms; longer only for a file that was never
-    /// fitted.
+    /// fitted, and for moved holes.
     pub fn available_now(&self, cache: Option<&dyn Store>) -> Result<(Model, Readiness), String> {
         let wanted = self.wanted(self.file()?);
         let at_440 = Wanted { a4_hz: A4_HZ, ..wanted.clone() };
-        let built = || {
+        let built = || -> Result<(Model, Readiness), BuildError> {
             if let Some(model) = Preparation::new(&wanted, cache).ready()? {
                 return Ok((model, Readiness::Tuned));
             }
@@ -145,7 +157,31 @@ impl InstrumentRequest {
                 None => Ok((Preparation::new(&wanted, None).rough()?, Readiness::Rough)),
             }
         };
-        built().map_err(|reason: BuildError| reason.to_string())
+        let altered = || match (built()?, self.altered(&wanted.file)) {
+            (ready, None) => Ok(ready),
+            ((base, _), Some(file)) => Ok((altered::at_once(&base, &file)?, Readiness::Rough)),
+        };
+        altered().map_err(|reason: BuildError| reason.to_string())
+    }
+
+    /// The whole instrument: tuned, or, with holes that the user has moved, fitted with the trims it had before. Takes up to a
+    /// minute.
+    pub fn made(
+        &self,
+        file: InstrumentFile,
+        cache: Option<&dyn Store>,
+        on: OnProgress<'_>,
+    ) -> Result<Model, BuildError> {
+        let altered = self.altered(&file);
+        let wanted = self.wanted(file);
+        let preparation = Preparation::new(&wanted, cache);
+        let Some(file) = altered else { return preparation.tuned(on) };
+        // Nobody asked to hear it with the holes where they were.
+        let base = preparation.tuned(&mut |progress| match progress {
+            Progress::Fitted(_) => ControlFlow::Continue(()),
+            shares => on(shares),
+        })?;
+        altered::fitted(&base, &file, on)
     }
 }
 

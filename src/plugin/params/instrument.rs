@@ -110,6 +110,20 @@ pub struct InstrumentParams {
 }
 
 impl InstrumentParams {
+    /// What names the chosen instrument in a saved project: its identifier, or the path of the user's file.
+    pub fn key(&self) -> String {
+        let choice = self.choice.value();
+        let id = || {
+            InstrumentChoice::ids().and_then(|ids| ids.get(choice.to_index()).copied()).unwrap_or_default()
+        };
+        match choice {
+            InstrumentChoice::User => {
+                format!("user:{}", self.file.read().map_or_else(|_| String::new(), |path| path.clone()))
+            }
+            _ => id().to_owned(),
+        }
+    }
+
     /// Defaults; whoever loads the instrument writes its state to `state`.
     pub fn new(state: Arc<RwLock<String>>) -> Self {
         let (first, file) = LaunchOptions::get().map_or((InstrumentChoice::BFlat, String::new()), |first| {

@@ -73,6 +73,12 @@ impl WindowMemory {
                 let user = InstrumentChoice::ALL.len() - 1;
                 self.choose("instr", user, InstrumentChoice::ALL.len(), gui);
             }
+            Action::MoveHoles(moved) => {
+                let params = &self.handles.params;
+                params.holes.put(params.instrument.key(), moved);
+                params.host.state_changed();
+            }
+            Action::SaveInstrument(file) => shared.ask_for_file(FileTask::SaveInstrument(file)),
             Action::OpenScale(path) => shared.ask_for_file(FileTask::OpenScale(path)),
             Action::ReadFolder(path) => shared.ask_for_file(FileTask::ReadFolder(path)),
             Action::EqualTemperament => {
@@ -172,6 +178,7 @@ impl NiceEguiApp for EditorApp {
         snapshot.presets = memory.handles.presets.shelf();
         snapshot.preset = params.preset_name();
         snapshot.scale = params.scale.title();
+        snapshot.moved = params.holes.of(&params.instrument.key());
         ui.ctx().set_zoom_factor(memory.state.kept.zoom);
         let actions = editor::draw(ui, &mut memory.state, &memory.controls.with(&self.gui), &snapshot);
         for action in actions {

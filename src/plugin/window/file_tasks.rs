@@ -1,19 +1,24 @@
-//! Files that the user looks for and opens in the window: read on the snapshot thread, because a disk may be slow.
+//! Files that the user looks for, opens and saves in the window: on the snapshot thread, because a disk may be slow.
 
-use std::path::PathBuf;
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::editor::Snapshot;
 use crate::folder_listing::FolderListing;
 use crate::plugin::params::ChalumeauParams;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
 
 /// What the window asks for.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum FileTask {
     /// List a folder; `None` is the user's own.
     ReadFolder(Option<PathBuf>),
     /// Take the scale or the keyboard mapping of a file.
     OpenScale(PathBuf),
+    /// Save an instrument beside the user's others.
+    SaveInstrument(Arc<InstrumentFile>),
 }
 
 /// What was read.
@@ -21,6 +26,7 @@ pub enum FileTask {
 pub struct FilesRead {
     folder: Arc<FolderListing>,
     scale_refused: Option<String>,
+    saved: Option<Result<PathBuf, String>>,
 }
 
 impl FilesRead {
@@ -39,6 +45,13 @@ impl FilesRead {
                 }
                 Err(refused) => self.scale_refused = Some(refused),
             },
+            FileTask::SaveInstrument(file) => {
+                let folder = dirs::data_dir().map(|folder| folder.join("chalumeau/instruments"));
+                self.saved = Some(match folder {
+                    Some(folder) => save(&file, &folder),
+                    None => Err("this system has no folder for instrument files".to_owned()),
+                });
+            }
         }
     }
 
@@ -46,13 +59,54 @@ impl FilesRead {
     pub fn show(&self, snapshot: &mut Snapshot) {
         snapshot.folder = self.folder.clone();
         snapshot.scale_refused.clone_from(&self.scale_refused);
+        snapshot.saved.clone_from(&self.saved);
     }
+}
+
+/// Most files with one name and a number.
+const NUMBERS_MOST: usize = 1_000;
+
+/// Writes an instrument into a folder under a name that no file has there yet: whole or not at all. The error is a message for
+/// the user.
+fn save(file: &InstrumentFile, folder: &Path) -> Result<PathBuf, String> {
+    let refused = |reason: std::io::Error| format!("cannot save in {}: {reason}", folder.display());
+    fs::create_dir_all(folder).map_err(refused)?;
+    let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' };
+    let name = file.name.chars().map(plain).collect::<String>().replace("__", "_");
+    let mut written = tempfile::NamedTempFile::new_in(folder).map_err(refused)?;
+    written.write_all(file.to_toml().as_bytes()).map_err(refused)?;
+    for number in 1..=NUMBERS_MOST {
+        let path = folder.join(format!("{name}_{number}.toml"));
+        match written.persist_noclobber(&path) {
+            Ok(_) => return Ok(path),
+            Err(taken) if taken.error.kind() == std::io::ErrorKind::AlreadyExists => written = taken.file,
+            Err(failed) => return Err(refused(failed.error)),
+        }
+    }
+    Err(format!("{} has {NUMBERS_MOST} instruments called {name}; delete some", folder.display()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use chalumeau_core::instrument::KeyPitches;
+
+    #[test]
+    fn an_instrument_is_saved_beside_the_others_and_can_be_read_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = InstrumentFile { name: "B flat, holes moved".to_owned(), ..InstrumentFile::built_in() };
+        let folder = folder.path().join("chalumeau/instruments");
+        let (first, second) = (save(&file, &folder).unwrap(), save(&file, &folder).unwrap());
+        assert!(
+            first.ends_with("b_flat_holes_moved_1.toml") && second.ends_with("b_flat_holes_moved_2.toml")
+        );
+        for path in [first, second] {
+            assert_eq!(InstrumentFile::parse(&fs::read_to_string(path).unwrap()).unwrap(), file);
+        }
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 2, "nothing else is left there");
+        let none = folder.join("b_flat_holes_moved_1.toml/within");
+        assert!(save(&file, &none).unwrap_err().contains("cannot save in"));
+    }
 
     #[test]
     fn a_scale_is_taken_and_one_that_is_none_is_told_and_leaves_it() {

@@ -13,6 +13,7 @@ use chalumeau_knob::touch::feel::InstrumentFeel;
 pub struct InstrumentAnalysis {
     model: Arc<Model>,
     file: Arc<InstrumentFile>,
+    as_built: Arc<InstrumentFile>,
     feels: Arc<InstrumentFeel>,
     bore: TransferMatrix,
     /// The latest feel table, and what it was computed from.
@@ -35,6 +36,7 @@ impl InstrumentAnalysis {
             feels: Arc::new(InstrumentFeel::new(&current.model)),
             bore: TransferMatrix::new(&current.model.file, current.model.air),
             file: Arc::new(current.model.file.clone()),
+            as_built: Arc::new(current.request.file().unwrap_or_else(|_| current.model.file.clone())),
             model: current.model.clone(),
             table: None,
             standing_wave: None,
@@ -49,6 +51,11 @@ impl InstrumentAnalysis {
     /// The instrument's measurements.
     pub fn file(&self) -> &Arc<InstrumentFile> {
         &self.file
+    }
+
+    /// The measurements before any hole was moved and before scaling.
+    pub fn as_built(&self) -> &Arc<InstrumentFile> {
+        &self.as_built
     }
 
     /// What a fingering requires of the breath with this reed; `None` if it does not sound.

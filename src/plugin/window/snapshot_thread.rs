@@ -145,6 +145,7 @@ impl SnapshotThread {
         snapshot.requirement = analysis.requirement(fingering, &snapshot.played());
         snapshot.feel = analysis.feel(fingering, &snapshot.settings, &design);
         snapshot.standing = analysis.standing_wave(fingering, &open);
+        snapshot.as_built = analysis.as_built().clone();
         snapshot.instrument = file;
     }
 

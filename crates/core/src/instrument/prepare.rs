@@ -5,7 +5,7 @@
 //! matrices (`cut_and_fit`), and plays every note until its trim is right ([`auto_tune`]), and at every dynamic of a player ([`play_dynamics`]). Where the trims would need
 //! more than the tuning delay can give, it makes the whole bore a little longer or shorter first and fits it again: a
 //! maker's remedy, which keeps the relations between the notes. Callers that cannot wait, or want the bore as it was
-//! built, stop half-way: see the methods of [`Preparation`]. All that makes an instrument needs the feature `fit`. Results do not depend on the number of cores.
+//! built, stop half-way: see the methods of [`Preparation`]. [`altered`] makes an instrument with other holes from a tuned one. All that makes an instrument needs the feature `fit`. Results do not depend on the number of cores.
 //!
 //! ```
 //! use chalumeau_core::bore::bundled::Bundled;
@@ -18,6 +18,7 @@
 //! # Ok::<(), chalumeau_core::instrument::BuildError>(())
 //! ```
 
+pub mod altered;
 #[cfg(feature = "fit")]
 pub mod auto_tune;
 mod bundled;

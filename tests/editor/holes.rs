@@ -1,0 +1,117 @@
+//! Tone holes that the user drags, gives in millimetres, puts back and saves.
+
+use std::sync::Arc;
+
+use chalumeau::editor::{Action, Tab};
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::bore::moved_hole::MovedHole;
+use egui::{Key, Modifiers, vec2};
+use egui_kittest::kittest::Queryable;
+
+use crate::Window;
+
+const HOLE: &str = "Hole R2 in the bore";
+
+fn built() -> MovedHole {
+    let file = InstrumentFile::built_in();
+    let hole = &file.holes[file.hole("R2").unwrap()];
+    MovedHole { name: hole.name.clone(), x_m: hole.x_m, radius_m: hole.radius_m }
+}
+
+/// The moved holes as the plugin would have them now.
+fn moved(window: &Window) -> Vec<MovedHole> {
+    window.snapshot.borrow().moved.to_vec()
+}
+
+fn click(window: &mut Window, label: &str) {
+    window.harness.get_by_label(label).click();
+    window.harness.run();
+}
+
+/// Drags the hole by so many points and returns where it was in the window.
+fn drag(window: &mut Window, by: egui::Vec2, modifiers: Modifiers) {
+    let centre = window.harness.get_by_label(HOLE).rect().center();
+    window.harness.input_mut().modifiers = modifiers;
+    window.drag(centre, by);
+    window.harness.input_mut().modifiers = Modifiers::NONE;
+}
+
+#[test]
+fn a_hole_is_dragged_undone_and_put_back() {
+    let mut window = Window::new(Tab::Clarinet, (1100.0, 720.0));
+    let before = window.harness.get_by_label(HOLE).rect().center().x;
+    drag(&mut window, vec2(-12.0, 3.0), Modifiers::NONE);
+    let [first] = &moved(&window)[..] else { panic!("{:?}", moved(&window)) };
+    assert_eq!((first.name.as_str(), first.radius_m), ("R2", built().radius_m));
+    let drawn = window.harness.get_by_label(HOLE).rect().center().x;
+    assert!((drawn - before + 12.0).abs() < 0.5, "it is drawn where it was let go: {before} {drawn}");
+    // No trial of a fingering.
+    assert!(window.actions().iter().all(|action| matches!(action, Action::MoveHoles(_))));
+
+    drag(&mut window, vec2(0.0, -20.0), Modifiers::SHIFT);
+    let [wider] = &moved(&window)[..] else { panic!("{:?}", moved(&window)) };
+    assert_eq!(wider.x_m, first.x_m);
+    assert!((wider.radius_m - first.radius_m - 1e-3).abs() < 1e-5, "{wider:?}");
+
+    click(&mut window, "Undo");
+    assert_eq!(moved(&window), [first.clone()]);
+    click(&mut window, "Undo");
+    assert!(moved(&window).is_empty());
+    drag(&mut window, vec2(8.0, 0.0), Modifiers::NONE);
+    click(&mut window, "Put back");
+    assert!(moved(&window).is_empty());
+    // Putting back can be undone too.
+    click(&mut window, "Undo");
+    assert_eq!(moved(&window).len(), 1);
+    click(&mut window, "Done");
+    window.harness.get_by_label("1 hole moved");
+}
+
+#[test]
+fn a_hole_stays_between_its_neighbours() {
+    let mut window = Window::new(Tab::Clarinet, (1100.0, 720.0));
+    let file = InstrumentFile::built_in();
+    let room = file.room_of_hole(file.hole("R2").unwrap()).unwrap();
+    drag(&mut window, vec2(400.0, 0.0), Modifiers::NONE);
+    assert_eq!(moved(&window)[0].x_m, room.x_m.1);
+    click(&mut window, "Put back");
+    drag(&mut window, vec2(-400.0, 0.0), Modifiers::NONE);
+    assert_eq!(moved(&window)[0].x_m, room.x_m.0);
+}
+
+#[test]
+fn a_hole_is_given_in_millimetres_and_saved() {
+    let mut window = Window::new(Tab::Clarinet, (1100.0, 720.0));
+    click(&mut window, "Move holes");
+    window.harness.get_by_label("Drag a hole along the bore. With Shift, up makes it wider.");
+    drag(&mut window, vec2(-4.0, 0.0), Modifiers::NONE);
+    let width = window.harness.get_by_label("Width of the hole R2, mm wide");
+    width.click();
+    window.harness.run();
+    window.harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    window.harness.get_by_label("Width of the hole R2, mm wide").type_text("6.5");
+    window.harness.run();
+    window.harness.key_press(Key::Enter);
+    window.harness.run();
+    let now = moved(&window);
+    assert!((now[0].radius_m - 3.25e-3).abs() < 1e-9, "{now:?}");
+
+    window.actions();
+    click(&mut window, "Save");
+    let [Action::SaveInstrument(file)] = &window.actions()[..] else { panic!("not saved") };
+    let hole = &file.holes[file.hole("R2").unwrap()];
+    assert_eq!((hole.x_m, hole.radius_m), (now[0].x_m, now[0].radius_m));
+    assert!(file.name.ends_with("holes moved") && file.source.ends_with("Moved by hand: R2."));
+    let path = std::path::PathBuf::from("/home/music/mine_1.toml");
+    window.snapshot.borrow_mut().saved = Some(Ok(path.clone()));
+    window.harness.run();
+    window.harness.get_by_label("Saved as /home/music/mine_1.toml");
+    click(&mut window, "Open it");
+    assert_eq!(window.actions(), [Action::OpenInstrument(path)]);
+    // Of another instrument nothing can be undone here.
+    let other = InstrumentFile { name: "other".to_owned(), ..InstrumentFile::built_in() };
+    window.snapshot.borrow_mut().as_built = Arc::new(other);
+    window.harness.run();
+    click(&mut window, "Undo");
+    assert!(window.actions().is_empty());
+}
