@@ -15,7 +15,7 @@ use chalumeau_core::instrument::prepare::{self, Preparation, PreparedInstrument,
 use chalumeau_core::instrument::tuning_table::{GAMMA_NODES, NATURAL_GAMMA};
 use chalumeau_core::instrument::{Model, Quality, Wanted};
 use chalumeau_core::parallel;
-use chalumeau_core::units::cents;
+use chalumeau_core::units::{WrittenNote, cents, midi_of_name};
 
 use crate::generated::{read, write};
 
@@ -31,29 +31,46 @@ const ROWS_TOLERANCE: f64 = 0.02;
 /// Of all instruments but the first, every so manieth note is checked.
 const CHECKED_NOTES: usize = 7;
 
-/// What a command is asked to do: instruments, qualities, whether to compare instead of write.
+/// What a command is asked to do: instruments, qualities, notes, whether to compare instead of write.
 struct Asked {
     check: bool,
     instruments: Vec<Bundled>,
     qualities: Vec<Quality>,
+    /// Written notes that are made again; none: all.
+    notes: Vec<WrittenNote>,
 }
 
 impl Asked {
     fn parse(args: &[String]) -> Result<Self> {
-        let mut asked = Self { check: false, instruments: Vec::new(), qualities: Vec::new() };
+        let mut asked =
+            Self { check: false, instruments: Vec::new(), qualities: Vec::new(), notes: Vec::new() };
         for arg in args {
             match (arg.as_str(), Bundled::from_id(arg)) {
                 ("--check", _) => asked.check = true,
                 ("live", _) => asked.qualities.push(Quality::Live),
                 ("high", _) => asked.qualities.push(Quality::High),
                 (_, Some(instrument)) => asked.instruments.push(instrument),
-                _ => bail!(
-                    "takes --check, live, high and any of {}, got {arg:?}",
-                    Bundled::ALL.map(Bundled::id).join(", ")
-                ),
+                _ => match midi_of_name(arg) {
+                    Some(written) => asked.notes.push(WrittenNote(written)),
+                    None => bail!(
+                        "takes --check, live, high, written notes and any of {}, got {arg:?}",
+                        Bundled::ALL.map(Bundled::id).join(", ")
+                    ),
+                },
             }
         }
+        ensure!(!asked.check || asked.notes.is_empty(), "--check chooses its notes itself");
         Ok(asked)
+    }
+
+    /// Fingerings of the notes that are made again; `None` for all.
+    fn fingerings(&self, model: &Model) -> Result<Option<Vec<usize>>> {
+        let of = |note: &WrittenNote| {
+            let at = model.file.fingerings.iter().position(|fingering| fingering.written == *note);
+            at.with_context(|| format!("{} has no fingering for {note}", model.file.name))
+        };
+        let found: Vec<usize> = self.notes.iter().map(of).collect::<Result<_>>()?;
+        Ok((!found.is_empty()).then_some(found))
     }
 
     /// What is asked for, or else `instruments` at `qualities`; each at both families of rates.
@@ -133,6 +150,7 @@ pub fn scale_bores(args: &[String]) -> Result<()> {
 /// Cells, still untuned; checked by fitting again.
 pub fn fit_bore(args: &[String]) -> Result<()> {
     let asked = Asked::parse(args)?;
+    ensure!(asked.notes.is_empty(), "a bore is fitted to all notes together");
     let (instruments, qualities) = if asked.check {
         ([Bundled::BFlat, Bundled::A].as_slice(), [Quality::Live].as_slice())
     } else {
@@ -185,10 +203,14 @@ pub fn tune(args: &[String]) -> Result<()> {
             tell(&format!("{name}: tuning"), share);
             ControlFlow::Continue(())
         };
-        let offsets =
-            auto_tune::offsets(&model, &mut |_| ControlFlow::Continue(())).context("not cancelled")?;
-        let tuning = auto_tune::tune(&model, &offsets, Accuracy::FINE, &mut on).context("not cancelled")?;
-        learn_dynamics(instrument, &name, Model { tuning, ..model })?;
+        let again = asked.fingerings(&model)?;
+        let tuning = match &again {
+            Some(again) => auto_tune::tune_again(&model, again, Accuracy::FINE, &mut on),
+            None => auto_tune::offsets(&model, &mut |_| ControlFlow::Continue(()))
+                .and_then(|offsets| auto_tune::tune(&model, &offsets, Accuracy::FINE, &mut on)),
+        };
+        let tuning = tuning.context("not cancelled")?;
+        learn_dynamics(instrument, &name, Model { tuning, ..model }, again)?;
     }
     Ok(())
 }
@@ -208,18 +230,23 @@ pub fn play_dynamics(args: &[String]) -> Result<()> {
         if asked.check {
             check_dynamics(&name, &model)?;
         } else {
-            learn_dynamics(instrument, &name, model)?;
+            let again = asked.fingerings(&model)?;
+            learn_dynamics(instrument, &name, model, again)?;
         }
     }
     Ok(())
 }
 
-fn learn_dynamics(instrument: Bundled, name: &str, model: Model) -> Result<()> {
+fn learn_dynamics(instrument: Bundled, name: &str, model: Model, again: Option<Vec<usize>>) -> Result<()> {
     let mut on = |share| {
         tell(&format!("{name}: playing dynamics"), share);
         ControlFlow::Continue(())
     };
-    let tuning = play_dynamics::learn(&model, &mut on).context("not cancelled")?;
+    let tuning = match again {
+        Some(again) => play_dynamics::learn_again(&model, &again, &mut on),
+        None => play_dynamics::learn(&model, &mut on),
+    };
+    let tuning = tuning.context("not cancelled")?;
     keep(instrument, PreparedInstrument::of(&Model { tuning, ..model }))
 }
 

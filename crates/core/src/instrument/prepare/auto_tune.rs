@@ -27,8 +27,8 @@ const PLAYS: usize = 6;
 /// A move by more than this measures the sensitivity, cents.
 const MEASURING_CENTS: f64 = 10.0;
 /// At fewer of the five pressures than this a note does not speak. One alone is chance: there written A#6 of the bundled
-/// clarinets can be trimmed to its pitch at some rates and not at others, and it leaves its register when played softer or
-/// louder.
+/// clarinets, with the maker's fingering, can be trimmed to its pitch at some rates and not at others, and it leaves its
+/// register when played softer or louder.
 const FEWEST_PRESSURES: usize = 2;
 /// Lowest note of the B flat clarinet, Hz. A larger instrument takes longer to settle, in proportion to its size.
 const LOWEST_HZ: f64 = 146.83;
@@ -209,11 +209,13 @@ fn tune_note(
 /// Error of each note without a trim at [`NATURAL_GAMMA`], cents above its pitch; `None` for a note that does not sound in
 /// its register. `on` receives the share done, 0..=1; if it breaks, the result is `None`.
 pub fn offsets(model: &Model, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Option<Vec<Option<f64>>> {
-    let untrimmed = |fingering: usize| {
-        let trial = Trial { model, fingering, gamma: NATURAL_GAMMA, accuracy: Accuracy::QUICK };
-        trial.play(0.0).map(|found| found.off_cents)
-    };
-    parallel::each(model.file.fingerings.len(), untrimmed, on)
+    parallel::each(model.file.fingerings.len(), |fingering| untrimmed_cents(model, fingering), on)
+}
+
+/// Error of one note without a trim.
+fn untrimmed_cents(model: &Model, fingering: usize) -> Option<f64> {
+    let trial = Trial { model, fingering, gamma: NATURAL_GAMMA, accuracy: Accuracy::QUICK };
+    trial.play(0.0).map(|found| found.off_cents)
 }
 
 /// Tunes every fingering of a model by playing it, on all cores. `offsets` is the result of [`offsets`](fn@offsets). Takes
@@ -228,6 +230,29 @@ pub fn tune(
     let note =
         |fingering: usize| tune_note(model, fingering, offsets.get(fingering).copied().flatten(), accuracy);
     let mut table = TuningTable { notes: parallel::each(count, note, on)? };
+    fill_silent(model, &mut table);
+    Some(table)
+}
+
+/// Tunes some fingerings of a tuned model again, as [`tune`](fn@tune) would; the others keep their trims to the bit, except those of silent
+/// notes between. Where `fingerings` has an index that the model lacks, nothing happens.
+pub fn tune_again(
+    model: &Model,
+    fingerings: &[usize],
+    accuracy: Accuracy,
+    on: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Option<TuningTable> {
+    let mut table = model.tuning.clone();
+    let fingerings: Vec<usize> =
+        fingerings.iter().copied().filter(|&fingering| fingering < table.notes.len()).collect();
+    let tuned = |at: usize| {
+        let fingering = fingerings[at];
+        tune_note(model, fingering, untrimmed_cents(model, fingering), accuracy)
+    };
+    let notes = parallel::each(fingerings.len(), tuned, on)?;
+    for (fingering, note) in fingerings.into_iter().zip(notes) {
+        table.notes[fingering] = note;
+    }
     fill_silent(model, &mut table);
     Some(table)
 }

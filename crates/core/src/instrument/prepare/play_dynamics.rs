@@ -93,14 +93,31 @@ struct Diminuendo<'a> {
 /// seconds on two cores.
 /// `on` receives the share done, 0..=1; if it breaks, the result is `None`.
 pub fn learn(model: &Model, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Option<TuningTable> {
-    let note = |fingering: usize| {
-        let note = model.tuning.notes[fingering];
+    let all: Vec<usize> = (0..model.tuning.notes.len()).collect();
+    learn_again(model, &all, on)
+}
+
+/// What some fingerings of a model ask of the player, as [`learn`]; the others stay as they are. An index that the model lacks does
+/// nothing.
+pub fn learn_again(
+    model: &Model,
+    fingerings: &[usize],
+    on: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Option<TuningTable> {
+    let mut notes = model.tuning.notes.clone();
+    let fingerings: Vec<usize> = fingerings.iter().copied().filter(|&at| at < notes.len()).collect();
+    let learnt = |at: usize| {
+        let (fingering, note) = (fingerings[at], model.tuning.notes[fingerings[at]]);
         let learnt = if note.silent { None } else { learn_note(model, fingering) };
         // What cannot be played gets the pressures of other notes.
         let unheard = || PlayedNote { rows: [note.natural; NODES], ..PlayedNote::default() };
         NoteTuning { played: learnt.unwrap_or_else(unheard), ..note }
     };
-    Some(TuningTable { notes: parallel::each(model.tuning.notes.len(), note, on)? })
+    let learnt = parallel::each(fingerings.len(), learnt, on)?;
+    for (&fingering, note) in fingerings.iter().zip(learnt) {
+        notes[fingering] = note;
+    }
+    Some(TuningTable { notes })
 }
 
 /// What one note asks of the player; `None` if it leaves its register whatever is tried.
