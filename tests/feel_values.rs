@@ -49,6 +49,18 @@ fn haptic(words: &str) -> BTreeMap<u8, Note> {
         .collect()
 }
 
+/// A column of the reference, for the notes that are played as in the maker's chart, for which it was computed.
+fn expected(column: &str) -> BTreeMap<u8, f64> {
+    let mut expected = reference::by_written("thresholds_tuned.csv", column);
+    let file = InstrumentFile::built_in();
+    let others = file.fingerings.iter().filter(|fingering| fingering.maker_open.is_some());
+    others.for_each(|fingering| {
+        expected.remove(&fingering.written.0);
+    });
+    assert_eq!(expected.len(), 43);
+    expected
+}
+
 /// A column, over its value for the reference note.
 fn over_reference(notes: &BTreeMap<u8, Note>, column: &str) -> BTreeMap<u8, f64> {
     notes.iter().map(|(&written, note)| (written, note[column] / notes[&REFERENCE_NOTE][column])).collect()
@@ -62,7 +74,7 @@ fn spread(values: &BTreeMap<u8, f64>) -> f64 {
 fn physical_feel_is_the_reference_table_for_three_embouchures_under_both_laws() {
     let mut worst = 0.0_f64;
     for zeta in ["0.2", "0.3", "0.4"] {
-        let expected = reference::by_written("thresholds_tuned.csv", &format!("gamma_th_zeta{zeta}"));
+        let expected = expected(&format!("gamma_th_zeta{zeta}"));
         let standard = expected[&REFERENCE_NOTE];
         for law in ["flow", "pressure"] {
             let notes = haptic(&format!("--zeta {zeta} --contrast 1 --law {law}"));
@@ -76,7 +88,8 @@ fn physical_feel_is_the_reference_table_for_three_embouchures_under_both_laws() 
                     ("a_on_deg", angles[written] * standard),
                     ("scale_mnm", torques[written] * standard),
                 ] {
-                    let off = found / expected[written] - 1.0;
+                    let Some(expected) = expected.get(written) else { continue };
+                    let off = found / expected - 1.0;
                     assert!(off.abs() < DEVIATION_MAX, "zeta {zeta} {law} {written} {what}: {found}, {off}");
                     worst = worst.max(off.abs());
                 }
@@ -94,7 +107,7 @@ fn physical_feel_is_the_reference_table_for_three_embouchures_under_both_laws() 
 
 #[test]
 fn physical_order_is_that_of_the_pressures_and_contrast_and_place_widen_it() {
-    let expected = reference::by_written("thresholds_tuned.csv", "gamma_th_zeta0.3");
+    let expected = expected("gamma_th_zeta0.3");
     let physical = over_reference(&haptic("--contrast 1"), "a_on_deg");
     for (a, hard) in &expected {
         for (b, easy) in &expected {

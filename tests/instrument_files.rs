@@ -72,6 +72,12 @@ fn the_reference_tables_are_the_built_in_clarinet_bit_by_bit() {
         assert!(hole.description.starts_with(&known.description[..3]), "{hole:?}");
         hole.description.clone_from(&known.description);
     }
+    // The tables are the maker's chart: three notes are played with other fingerings.
+    for (fingering, known) in file.fingerings.iter_mut().zip(&built_in.fingerings) {
+        if known.maker_open.as_ref() == Some(&fingering.open) {
+            fingering.clone_from(known);
+        }
+    }
     assert_eq!(file, built_in);
 }
 

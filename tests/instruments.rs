@@ -415,7 +415,8 @@ fn random_instrument(random: &mut Random) -> InstrumentFile {
     file.holes.sort_by(|a, b| a.x_m.total_cmp(&b.x_m));
     let open = (0..file.holes.len()).map(|_| random.unit() < 0.5).collect();
     let (register, fingers) = ("chalumeau".into(), String::new());
-    file.fingerings.push(Fingering { written: WrittenNote(60), register, mode: 1, open, fingers });
+    let written = WrittenNote(60);
+    file.fingerings.push(Fingering { written, register, mode: 1, open, maker_open: None, fingers });
     file
 }
 

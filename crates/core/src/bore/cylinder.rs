@@ -204,6 +204,7 @@ impl Cylinder {
                 register: "chalumeau".to_owned(),
                 mode: 1,
                 open: (0..holes.len()).map(|hole| hole >= vents && holes.len() - hole <= index).collect(),
+                maker_open: None,
                 fingers: String::new(),
             })
             .collect();
@@ -239,7 +240,8 @@ impl Cylinder {
                 let mut open = low.open.clone();
                 open[0] = true;
                 let written = WrittenNote(low.written.0 + TWELFTH);
-                Fingering { written, register: "clarion".to_owned(), mode: 2, open, fingers: String::new() }
+                let register = "clarion".to_owned();
+                Fingering { written, register, mode: 2, open, maker_open: None, fingers: String::new() }
             })
             .filter(|high| !taken.contains(&high.written))
             .collect();

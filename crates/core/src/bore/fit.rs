@@ -2,7 +2,7 @@
 //!
 //! Free are the radii of all cells, the radius of the end, strengths and frequencies of the three loss poles, the vent's
 //! resistance and the share of each chimney before its compliance, each held near where it started. Compared are, for
-//! every fingering of the file, height and place of the first five impedance peaks (through the admittance at the true
+//! every fingering of the maker's chart, height and place of the first five impedance peaks (through the admittance at the true
 //! peak, which is linear in both), and the level of its whole impedance curve, to 6 kHz on a B flat clarinet and
 //! accordingly on others. Levenberg-Marquardt on the lattice's own frequency response, not on an idealisation of it;
 //! derivatives from one reverse sweep. Work is shared between cores; the result does not depend on their number.
@@ -16,7 +16,7 @@ use num_complex::Complex64;
 
 use crate::bore::cells::networks;
 use crate::bore::cells::{Cells, CellsError};
-use crate::bore::instrument_file::InstrumentFile;
+use crate::bore::instrument_file::{Fingering, InstrumentFile};
 use crate::bore::lattice::LatticeCoeffs;
 use crate::bore::lattice::sensitivity::{AtFrequency, Layout, Sweep, hole_admittances};
 use crate::bore::transfer_matrix::TransferMatrix;
@@ -259,11 +259,12 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
     }
 }
 
-/// The fingerings to compare, as holes open, with their weights.
+/// The fingerings to compare, as holes open, with their weights. Those of the maker's chart: a player who takes another
+/// fingering for a note does not change the bore.
 fn fingerings(file: &InstrumentFile) -> Vec<(Vec<bool>, f64)> {
     let register = |mode: usize| if mode <= 2 { 1.0 } else { 0.5 };
-    let mut all: Vec<(Vec<bool>, f64)> =
-        file.fingerings.iter().map(|fingering| (fingering.open.clone(), register(fingering.mode))).collect();
+    let compared = |fingering: &Fingering| (fingering.of_maker().to_vec(), register(fingering.mode));
+    let mut all: Vec<(Vec<bool>, f64)> = file.fingerings.iter().map(compared).collect();
     if all.len() < FEW_FINGERINGS.0 {
         for first in (0..=file.holes.len()).rev() {
             let open: Vec<bool> = (0..file.holes.len()).map(|hole| hole >= first).collect();

@@ -127,8 +127,18 @@ pub struct Fingering {
     pub mode: usize,
     /// Whether each hole is open, `[hole]` in the order of [`InstrumentFile::holes`].
     pub open: Vec<bool>,
+    /// The same of the fingering in the maker's chart, where the note is played with another one. The
+    /// [fit](super::fit) compares it in place of [`open`](Self::open); nothing else uses it.
+    pub maker_open: Option<Vec<bool>>,
     /// What the fingers do, for a reader.
     pub fingers: String,
+}
+
+impl Fingering {
+    /// Whether each hole is open in the maker's chart.
+    pub fn of_maker(&self) -> &[bool] {
+        self.maker_open.as_deref().unwrap_or(&self.open)
+    }
 }
 
 impl InstrumentFile {
@@ -325,29 +335,46 @@ impl InstrumentFile {
                 return Err(word(&place, &words.register, &fingering.register, expected));
             }
             within(&place, &words.mode, f64::from(fingering.mode), &MODE)?;
-            let mut open = vec![false; self.holes.len()];
-            for name in fingering.open.split_whitespace() {
-                let Some(&hole) = index.get(name) else {
-                    let known: Vec<&str> = self.holes.iter().map(|hole| hole.name.as_str()).collect();
-                    let expected = format!("names of holes out of: {}", known.join(" "));
-                    return Err(word(&place, &words.open, name, expected));
-                };
-                if std::mem::replace(&mut open[hole], true) {
-                    let (place, what) = (place.to_string(), "hole".to_owned());
-                    return Err(InstrumentError::Duplicate { place, what, name: name.to_owned() });
-                }
-            }
+            let open = self.open_holes(&fingering.open, &index, &place, &words.open)?;
+            let maker_open = fingering
+                .maker_open
+                .map(|names| self.open_holes(&names, &index, &place, &words.maker_open))
+                .transpose()?;
             let mode = fingering.mode as usize;
             chart.push(Fingering {
                 written,
                 register: fingering.register,
                 mode,
                 open,
+                maker_open,
                 fingers: fingering.fingers,
             });
         }
         chart.sort_by_key(|fingering| fingering.written);
         Ok(chart)
+    }
+
+    /// Whether each hole is open, from the names of those that are.
+    fn open_holes(
+        &self,
+        names: &str,
+        index: &HashMap<&str, usize>,
+        place: &Place,
+        key: &Word,
+    ) -> Result<Vec<bool>, InstrumentError> {
+        let mut open = vec![false; self.holes.len()];
+        for name in names.split_whitespace() {
+            let Some(&hole) = index.get(name) else {
+                let known: Vec<&str> = self.holes.iter().map(|hole| hole.name.as_str()).collect();
+                let expected = format!("names of holes out of: {}", known.join(" "));
+                return Err(word(place, key, name, expected));
+            };
+            if std::mem::replace(&mut open[hole], true) {
+                let (place, what) = (place.to_string(), "hole".to_owned());
+                return Err(InstrumentError::Duplicate { place, what, name: name.to_owned() });
+            }
+        }
+        Ok(open)
     }
 }
 
@@ -511,6 +538,11 @@ mod tests {
                 "one of chalumeau, throat, clarion, altissimo",
             ),
             ("mode = 1", "mode = 0", "fingering 1 (E3): mode is 0; it must be 1 to 12"),
+            (
+                "open = \"\"",
+                "open = \"\"\nmaker_open = \"X\"",
+                "fingering 1 (E3): maker_open is \"X\"; it must be names of holes",
+            ),
         ];
         for (from, to, expected) in cases {
             let text = InstrumentFile::built_in_text().replacen(from, to, 1);

@@ -19,7 +19,8 @@ use crate::reed::physical::{P_REF_PA, REFERENCE_VOLUME_M3};
 use crate::units::{Air, SoundingNote};
 
 /// Largest error of a note that is played, cents. A note further off that the delay cannot mend also leaves its register
-/// at most pressures: written A#6 of the built-in clarinets is 14 to 40 cents flat and speaks at one pressure of five.
+/// at most pressures: with the maker's fingering, written A#6 of the built-in clarinets is 14 to 40 cents flat and speaks at one
+/// pressure of five.
 pub const IN_TUNE_CENTS: f64 = 10.0;
 
 /// An instrument at one internal rate. It does not change: share it in an [`Arc`].

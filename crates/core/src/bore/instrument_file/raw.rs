@@ -108,5 +108,7 @@ pub(super) struct RawFingering {
     pub(super) mode: u32,
     pub(super) open: String,
     #[serde(default)]
+    pub(super) maker_open: Option<String>,
+    #[serde(default)]
     pub(super) fingers: String,
 }

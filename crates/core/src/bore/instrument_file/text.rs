@@ -84,12 +84,13 @@ impl InstrumentFile {
     fn write_fingerings(&self, out: &mut String) {
         out.push_str(
             "\n# One fingering a note: the holes that are open (all others are closed), the register, and the impedance peak\n\
-             # that sounds.\n",
+             # that sounds. maker_open is the fingering in the maker's chart, where the note is played with another.\n",
         );
         for (index, fingering) in self.fingerings.iter().enumerate() {
-            let open: Vec<&str> = (self.holes.iter().zip(&fingering.open))
-                .filter_map(|(hole, open)| open.then_some(hole.name.as_str()))
-                .collect();
+            let names = |open: &[bool]| {
+                let open = self.holes.iter().zip(open).filter(|(_, open)| **open);
+                quoted(&open.map(|(hole, _)| hole.name.as_str()).collect::<Vec<_>>().join(" "))
+            };
             let _ = writeln!(
                 out,
                 "{}[[fingering]]\nwritten = \"{}\"\nregister = {}\nmode = {}\nopen = {}",
@@ -97,8 +98,11 @@ impl InstrumentFile {
                 fingering.written,
                 quoted(&fingering.register),
                 fingering.mode,
-                quoted(&open.join(" ")),
+                names(&fingering.open),
             );
+            if let Some(open) = &fingering.maker_open {
+                let _ = writeln!(out, "maker_open = {}", names(open));
+            }
             if !fingering.fingers.is_empty() {
                 let _ = writeln!(out, "fingers = {}", quoted(&fingering.fingers));
             }

@@ -144,6 +144,7 @@ pub(super) struct Words {
     pub(super) register: Word,
     pub(super) mode: Word,
     pub(super) open: Word,
+    pub(super) maker_open: Word,
 }
 
 impl Words {
@@ -168,6 +169,7 @@ impl Words {
             register: Word::plain("register"),
             mode: Word::plain("mode"),
             open: Word::plain("open"),
+            maker_open: Word::plain("maker_open"),
         }
     }
 }

@@ -157,10 +157,11 @@ fn describe(all: &mut Vec<u8>, file: &InstrumentFile) {
         };
         append(all, &[*x_m, *radius_m, *chimney_m, kind, f64::from(u8::from(*register))]);
     }
-    for Fingering { written, register, mode, open, fingers: _ } in fingerings {
+    for Fingering { written, register, mode, open, maker_open, fingers: _ } in fingerings {
         append(all, &[f64::from(written.0), *mode as f64, register.len() as f64]);
         all.extend(register.as_bytes());
-        all.extend(open.iter().map(|&open| u8::from(open)));
+        let maker_open = maker_open.as_deref().unwrap_or(open);
+        all.extend(open.iter().chain(maker_open).map(|&open| u8::from(open)));
     }
 }
 
@@ -204,6 +205,7 @@ mod tests {
         assert!(changed(|file| file.holes[1].register = true));
         assert!(changed(|file| file.holes[1].chimney_m *= 1.001));
         assert!(changed(|file| file.fingerings[1].open[0] = true));
+        assert!(changed(|file| file.fingerings[1].maker_open = Some(vec![true; file.holes.len()])));
         assert!(changed(|file| file.fingerings[1].mode = 2));
     }
 }

@@ -192,6 +192,7 @@ pub(super) fn read_chart(
             register: row.text(columns.register).to_owned(),
             mode: row.mode(&columns)?,
             open: row.open(&columns)?,
+            maker_open: None,
             fingers: columns.fingers.map(|index| row.text(index)).unwrap_or_default().to_owned(),
         };
         notes.push(Lined { line, value });
