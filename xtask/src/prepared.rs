@@ -23,8 +23,9 @@ use crate::generated::{read, write};
 const RADIUS_TOLERANCE: f64 = 2e-3;
 /// How far a played note may be from its pitch when a committed trim is checked, cents.
 const CENTS_TOLERANCE: f64 = 0.12;
-/// Highest written note that is checked; above it fingerings are unreliable.
-const HIGHEST_WRITTEN: u8 = 92;
+/// Highest written note that is checked of the B flat clarinet, C7: C#7 above it does not speak. And of the others: above it,
+/// notes do not sound at every pressure.
+const HIGHEST_WRITTEN: (u8, u8) = (96, 92);
 /// How far what is learnt of a note's dynamics may differ: mouth over closing pressure, and rows of delay.
 const GAMMA_TOLERANCE: f64 = 1e-3;
 const ROWS_TOLERANCE: f64 = 0.02;
@@ -195,8 +196,11 @@ pub fn tune(args: &[String]) -> Result<()> {
         let entry = entry(instrument, &wanted)?;
         let model = entry.model(&wanted.file).with_context(|| format!("{name}: kept for another chart"))?;
         if asked.check {
-            let every = if instrument == Bundled::BFlat { 1 } else { CHECKED_NOTES };
-            check_tuning(&name, &model, every)?;
+            let (every, highest) = match instrument {
+                Bundled::BFlat => (1, HIGHEST_WRITTEN.0),
+                _ => (CHECKED_NOTES, HIGHEST_WRITTEN.1),
+            };
+            check_tuning(&name, &model, every, highest)?;
             continue;
         }
         let mut on = |share| {
@@ -252,7 +256,7 @@ fn learn_dynamics(instrument: Bundled, name: &str, model: Model, again: Option<V
 
 fn check_dynamics(name: &str, model: &Model) -> Result<()> {
     let notes: Vec<usize> = (0..model.tuning.notes.len())
-        .filter(|&note| model.file.fingerings[note].written.0 <= HIGHEST_WRITTEN)
+        .filter(|&note| model.file.fingerings[note].written.0 <= HIGHEST_WRITTEN.0)
         .step_by(CHECKED_NOTES)
         .collect();
     let worst_of = |at: usize| {
@@ -280,9 +284,9 @@ fn check_dynamics(name: &str, model: &Model) -> Result<()> {
     Ok(())
 }
 
-fn check_tuning(name: &str, model: &Model, every: usize) -> Result<()> {
+fn check_tuning(name: &str, model: &Model, every: usize, highest: u8) -> Result<()> {
     let checked: Vec<usize> = (0..model.file.fingerings.len())
-        .filter(|&note| model.file.fingerings[note].written.0 <= HIGHEST_WRITTEN)
+        .filter(|&note| model.file.fingerings[note].written.0 <= highest)
         .step_by(every)
         .collect();
     let worst_of = |at: usize| -> Option<(f64, String)> {
