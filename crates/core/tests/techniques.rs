@@ -197,24 +197,44 @@ fn within_a_register_a_glissando_has_no_step() {
     }
 }
 
-/// From register to register the way still has breaks, but it begins and ends where it should.
+/// A glissando from note to note: largest step of the pitch, lowest and highest level, and how far off it arrives.
+fn slides(from: u8, to: u8, seconds: f32, breath: f32) -> (f64, [f64; 2], f64) {
+    let settings = Settings { glissando_s: seconds, ..Settings::default() };
+    let mut clarinet = playing(&settings, from, breath);
+    listen(&mut clarinet, 800, |_, _| {});
+    let heard = listen(&mut clarinet, 800 + (1_000.0 * seconds) as usize, |clarinet, n| {
+        if n == 150 {
+            clarinet.apply(Event::NoteOn { note: sounding(to), velocity: 0.7 });
+        }
+    });
+    let (step, _, last, level) = way(&heard);
+    let off = cents(last, sounding(to).frequency_hz(440.0));
+    println!(
+        "{from} to {to}, breath {breath}: largest step {step:.1} cents, level {level:.1?} dB, off {off:.1}"
+    );
+    (step, level, off)
+}
+
+/// The gesture at the beginning of the Rhapsody in Blue, two octaves and a half, up and down; and shorter ones.
 #[test]
-fn a_glissando_over_the_registers_arrives() {
-    for (from, to) in [(67, 84), (52, 81), (84, 67)] {
-        let settings = Settings { glissando_s: 2.5, ..Settings::default() };
-        let mut clarinet = playing(&settings, from, 0.6);
-        listen(&mut clarinet, 800, |_, _| {});
-        let heard = listen(&mut clarinet, 3_400, |clarinet, n| {
-            if n == 150 {
-                clarinet.apply(Event::NoteOn { note: sounding(to), velocity: 0.7 });
-            }
-        });
-        let track = pitch_track(&heard, RATE_HZ, 0.01);
-        let hz: Vec<f64> = track.iter().map(|point| point.hz.unwrap_or(1.0)).collect();
-        let breaks: Vec<usize> = (1..hz.len()).filter(|&n| cents(hz[n], hz[n - 1]).abs() > 20.0).collect();
-        println!("{from} to {to}: steps over 20 cents at {breaks:?} x 10 ms");
-        let off = cents(hz[hz.len() - 1], sounding(to).frequency_hz(440.0));
-        assert!(off.abs() < 10.0, "{from} {to}: {off}");
+fn over_the_registers_a_glissando_has_no_step() {
+    for (from, to, seconds, breath) in
+        [(55, 84, 3.0, 0.6), (60, 84, 3.0, 0.3), (84, 60, 3.0, 0.3), (84, 60, 3.0, 0.6), (82, 64, 2.4, 0.9)]
+    {
+        let (step, _, off) = slides(from, to, seconds, breath);
+        assert!(step < 20.0 && off.abs() < 10.0, "{from} {to} {breath}: {step} {off}");
+    }
+}
+
+/// Where the hands change, or many holes follow each other quickly, some slides move faster than that for a moment.
+#[test]
+fn a_glissando_over_the_registers_is_nearly_even_and_keeps_its_level() {
+    for (from, to, seconds, breath) in
+        [(54, 84, 3.0, 0.9), (60, 84, 3.0, 0.6), (52, 81, 3.0, 0.6), (66, 77, 1.6, 0.3), (84, 54, 3.0, 0.9)]
+    {
+        let (step, level, off) = slides(from, to, seconds, breath);
+        assert!(step < 30.0 && off.abs() < 10.0, "{from} {to} {breath}: {step} {off}");
+        assert!(level[0] > -6.0, "{from} {to} {breath}: {level:?}");
     }
 }
 

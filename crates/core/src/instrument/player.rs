@@ -24,6 +24,7 @@ mod level_keeper;
 mod life;
 mod lip_glide;
 mod onset_shift;
+mod pitch_ear;
 mod posture;
 mod reed_glide;
 mod reed_smoothing;
@@ -371,8 +372,7 @@ impl Player {
         let slides = begun.filter(|&begun| from.is_some() && glissando_s > 0.0 && begun != fingering);
         self.slide = slides.map(|begun| Slide::new(begun, fingering, glissando_s, model));
         if let Some(slide) = self.slide {
-            // The lip is the higher note's all the way: a lower one's loses the register.
-            self.fingers.aim(if slide.rises() { fingering } else { slides.unwrap_or(fingering) });
+            self.fingers.aim(slide.lip(model));
             self.posture = None;
             return;
         }
@@ -442,12 +442,20 @@ impl Player {
         if self.reed.tick(tick_s) | self.glide.tick(&self.settings, tick_s) | covers {
             self.posture = None;
         }
-        let slide = self.slide;
-        if let Some(mut slide) = slide {
-            self.fingers.slide(slide.fingers(model), model, voice.lattice_mut());
-            self.slide = slide.tick(tick_s).then_some(slide);
-            if self.slide.is_none() {
-                self.move_holes(slide.target, tick_s, model, voice);
+        let (slides, mut bent) = (self.slide.is_some(), None);
+        if let Some(slide) = &mut self.slide {
+            self.fingers.slide(slide.fingers(), model, voice.lattice_mut());
+            bent = slide.tract();
+            let lip = slide.lip(model);
+            if self.fingers.fingering() != Some(lip) {
+                self.fingers.aim(lip);
+                self.posture = None;
+            }
+            let target = slide.target;
+            let period_s = TICK as f64 / model.coeffs.rate_hz;
+            if !slide.tick(voice.p_mouthpiece(), (tick_s, period_s)) {
+                self.slide = None;
+                self.move_holes(target, tick_s, model, voice);
             }
         }
         let fingering = self.fingers.fingering();
@@ -482,7 +490,7 @@ impl Player {
         let tongue_holds = self.tongue.is_holding();
         let asked = self.breath.asked(key_down);
         self.ear.hear(voice.p_mouthpiece() / posture.closing, posture.lags.ear);
-        let led = Led::new(self.voicing.lead(), slide.is_some());
+        let led = Led::new(self.voicing.lead(), slides);
         let ear = (led == Led::default() && self.tongue.is_away() && !self.breath.is_dipping())
             .then_some(&self.ear);
         self.onset.tick(tongue_holds, tick_s);
@@ -508,7 +516,6 @@ impl Player {
         }
         let context = TickContext { tick_s, settings, posture };
         let note_hz = model.notes_hz[fingering.unwrap_or(0)];
-        let bent = slide.and_then(|slide| slide.bend());
         voice.set_tract(self.voicing.tick(settings, note_hz, bent, tick_s, model.coeffs.rate_hz));
         let lattice = voice.lattice_mut();
         self.fingers.tick(model, lattice);

@@ -6,7 +6,7 @@ use crate::instrument::model::Model;
 use crate::instrument::voice::TICK;
 
 /// How many fingers are on their way at a time in a slide: a finger begins where the one before is half open.
-const TOGETHER: f64 = 2.0;
+pub const TOGETHER: f64 = 2.0;
 /// Holes that fingers can move: those that a set of holes has bits for.
 const HOLES: usize = 64;
 

@@ -33,6 +33,19 @@ const BENDS: [(f64, f64); 10] = [
     (-9.5, -1_130.0),
 ];
 
+/// What a glissando asks of the vocal tract.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Voiced {
+    /// Pitch of the fingering that is bent, Hz on the clock of the bore.
+    pub note_hz: f64,
+    /// Interval of the resonance from it, octaves.
+    pub octaves: f64,
+    /// Strength, 0..=1.
+    pub amount: f64,
+    /// Quality of the resonance.
+    pub quality: f64,
+}
+
 /// State of the vocal tract's muscles.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Voicing {
@@ -40,6 +53,8 @@ pub struct Voicing {
     amount: f64,
     /// Interval of the resonance from the note now, octaves.
     octaves: f64,
+    /// Its quality now.
+    quality: f64,
 }
 
 /// How near the resonance is to the note from above, 0..=1; 1 from the note down.
@@ -56,6 +71,14 @@ pub fn octaves_for_bend(cents: f64) -> f64 {
     (s0 + way * (s1 - s0)) / 12.0
 }
 
+/// The bend, cents, that a resonance at an interval of so many octaves makes.
+pub fn bend_for_octaves(octaves: f64) -> f64 {
+    let semitones = 12.0 * octaves;
+    let right = BENDS[1..BENDS.len() - 1].partition_point(|&(at, _)| at > semitones) + 1;
+    let ((s0, c0), (s1, c1)) = (BENDS[right - 1], BENDS[right]);
+    c0 + ((semitones - s0) / (s1 - s0)).clamp(0.0, 1.0) * (c1 - c0)
+}
+
 impl Voicing {
     /// How much the tract leads the reed, 0..=1.
     pub fn lead(&self) -> f64 {
@@ -63,23 +86,25 @@ impl Voicing {
     }
 
     /// One tick for a note fingered at `note_hz` on the clock of the bore; `None` while the throat is open. `slides`: what
-    /// a glissando bends, Hz, and how far, cents; it goes before what is set.
+    /// a glissando asks; it goes before what is set.
     pub fn tick(
         &mut self,
         settings: &Settings,
         note_hz: f64,
-        slides: Option<(f64, f64)>,
+        slides: Option<Voiced>,
         tick_s: f64,
         rate_hz: f64,
     ) -> Option<TractCoeffs> {
         let Tract { amount, interval_semitones } = settings.tract;
         let (amount, octaves) = match slides {
-            Some((_, bend)) => (1.0, octaves_for_bend(bend)),
+            Some(Voiced { octaves, amount, .. }) => (amount, octaves),
             None => (f64::from(amount), f64::from(interval_semitones) / 12.0),
         };
+        let quality = slides.map_or(QUALITY, |voiced| voiced.quality);
         if self.amount < OPEN {
             // An open throat is anywhere at once.
             self.octaves = octaves;
+            self.quality = quality;
             if amount == 0.0 {
                 self.amount = 0.0;
                 return None;
@@ -90,10 +115,11 @@ impl Voicing {
         if slides.is_some() || amount > 0.0 {
             self.octaves += (octaves - self.octaves) * share;
         }
+        self.quality += (quality - self.quality) * share;
         let (far, near) = PEAKS;
         let peak = self.amount * (far + (near - far) * nearness(self.octaves));
-        let hz = slides.map_or(note_hz, |(hz, _)| hz) * self.octaves.exp2();
-        Some(TractCoeffs::new(TractResonance { hz, q: QUALITY, peak }, rate_hz))
+        let hz = slides.map_or(note_hz, |voiced| voiced.note_hz) * self.octaves.exp2();
+        Some(TractCoeffs::new(TractResonance { hz, q: self.quality, peak }, rate_hz))
     }
 }
 
@@ -107,6 +133,9 @@ mod tests {
         assert!(octaves.is_sorted_by(|above, below| above >= below), "{octaves:?}");
         assert!((octaves[0] - 7.0 / 12.0).abs() < 1e-9 && octaves[119] < -0.75);
         assert_eq!((nearness(0.5), nearness(0.0), nearness(-1.0)), (0.0, 1.0, 1.0));
+        for bend in [-20.0, -300.0, -800.0, -1_100.0] {
+            assert!((bend_for_octaves(octaves_for_bend(bend)) - bend).abs() < 1e-9);
+        }
     }
 
     #[test]
