@@ -20,6 +20,7 @@ mod instrument;
 mod knob;
 #[cfg(feature = "simulator")]
 mod knob_sim;
+pub mod offline;
 mod parameters;
 mod plot_args;
 mod presets;
@@ -28,6 +29,7 @@ mod realism;
 mod reed;
 mod reed_physical;
 mod render;
+mod render_job;
 mod render_monitor;
 mod report;
 mod score_args;
@@ -36,6 +38,7 @@ mod shared_args;
 mod study;
 mod threshold;
 mod tune;
+mod words;
 
 use crate::output::OutputError;
 use crate::picture_file::PictureError;

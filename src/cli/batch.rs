@@ -1,6 +1,6 @@
 //! `chalumeau batch`: renders many variations of one command, and a table of what each file is: data sets.
 
-mod plan;
+pub(super) mod plan;
 
 use crate::cli::Failure;
 use crate::cli::csv_table::{CsvTable, quoted};

@@ -6,7 +6,9 @@ use crate::cli::feel_args::FeelArgs;
 use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within, within_f32};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::torque_law;
-use chalumeau_core::haptics::{FeelTable, NoteFeel, NoteRequirement, RequirementSolver, TorqueLimits};
+use chalumeau_core::haptics::{
+    FeelTable, NoteFeel, NoteRequirement, PlayedReed, RequirementSolver, TorqueLimits,
+};
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::instrument::feel_inputs::played_reed;
 use chalumeau_core::reed::ReedTables;
@@ -122,7 +124,8 @@ impl HapticCommand {
         table.finish()
     }
 
-    fn feel(&self, file: &InstrumentFile) -> Result<FeelTable, Failure> {
+    /// The bore in this air, and the reed as it is played on it.
+    pub fn bore_and_reed(&self, file: &InstrumentFile) -> (RequirementSolver, PlayedReed) {
         let standard = Settings::default();
         let settings = Settings {
             zeta: self.zeta,
@@ -133,10 +136,15 @@ impl HapticCommand {
             coupled: self.k.is_none(),
             ..standard
         };
+        (RequirementSolver::new(file, self.air.air()), played_reed(file, &settings))
+    }
+
+    /// The feel of every note.
+    pub fn feel(&self, file: &InstrumentFile) -> Result<FeelTable, Failure> {
         let design = self.feel.design(file)?;
         let limits = TorqueLimits { ceiling_mnm: self.ceiling, ..TorqueLimits::default() };
-        let bore = RequirementSolver::new(file, self.air.air());
-        Ok(FeelTable::new(&bore, &design, &played_reed(file, &settings), &limits)?)
+        let (bore, reed) = self.bore_and_reed(file);
+        Ok(FeelTable::new(&bore, &design, &reed, &limits)?)
     }
 
     fn curve(&self, note: &NoteFeel) -> Result<(), Failure> {

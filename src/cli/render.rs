@@ -3,24 +3,18 @@
 use crate::cli::Failure;
 use crate::cli::csv_table::CsvTable;
 use crate::cli::plot_args::PlotArgs;
+use crate::cli::render_job::RenderJob;
 use crate::cli::render_monitor::RenderMonitor;
-use crate::cli::score_args::{RenderJob, ScoreArgs};
+use crate::cli::score_args::ScoreArgs;
 use crate::cli::shared_args::within;
 use crate::output::NewFile;
 use crate::wav::{Depth, Levels, WavFile};
-use chalumeau_core::event::Event;
 use chalumeau_core::instrument::Probe;
 use chalumeau_core::reed::physical::P_REF_PA;
-use chalumeau_core::score as player;
-use chalumeau_core::score::{Score, StereoBlocks};
-
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
-
-/// Samples per block; any number gives the same sound.
-const BLOCK: usize = 512;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -105,7 +99,8 @@ impl RenderCommand {
     pub fn render(&self, bar: impl FnOnce(usize) -> ProgressBar) -> Result<Rendered, Failure> {
         let prepared = self.play.prepare()?;
         let RenderJob { score, rate, .. } = &prepared;
-        let several = prepared.settings.players.count > 1;
+        prepared.warn();
+        let several = prepared.has_several_players();
         let has_room = prepared.settings.room.amount > 0.0;
         if let Some(what) = [(has_room, "a room is"), (several, "seats are")].into_iter().find(|(is, _)| *is)
             && self.channels == 1
@@ -122,8 +117,6 @@ impl RenderCommand {
             self.probe.as_deref().map(|path| ProbeTable::open(path, self, &prepared)).transpose()?;
         let plot = self.plot.open(self.force)?;
         let watch = plot.wanted().then(|| RenderMonitor::new(&prepared, self.plot_at)).transpose()?;
-        let mut ensemble = several.then(|| prepared.ensemble());
-        let mut clarinet = prepared.clarinet();
         let depth = match self.bits {
             Bits::Int16 => Depth::Int16,
             Bits::Int24 => Depth::Int24,
@@ -133,17 +126,6 @@ impl RenderCommand {
         let bar = bar(score.samples);
         // Who looks gets samples and insides in turn, hence the cell.
         let watch = watch.map(RefCell::new);
-        // One channel is the instrument itself; pan (CC10) places it between two.
-        let unpanned = several.then(|| without_pan(score));
-        let score_of_room = unpanned.as_ref().unwrap_or(score);
-        let in_room = || StereoBlocks::new(score_of_room, *rate).in_room(&prepared.settings.room);
-        let mut stereo = (self.channels == 2).then(in_room);
-        let hear = |block: &[f32]| {
-            bar.inc(block.len() as u64);
-            if let Some(watch) = &watch {
-                watch.borrow_mut().hear(block);
-            }
-        };
         let looks_inside = probe.is_some() || watch.is_some();
         let mut inside = |moment| {
             if let Some(probe) = &mut probe {
@@ -153,32 +135,14 @@ impl RenderCommand {
                 watch.borrow_mut().inside(moment);
             }
         };
-        if let (Some(ensemble), Some(stereo)) = (&mut ensemble, &mut stereo) {
-            player::play_ensemble_stereo(ensemble, &prepared.parts, BLOCK, |left, right| {
-                hear(left);
-                wav.write(&stereo.pan(left, right)).map_err(Failure::from)
-            })?;
-        } else if let Some(ensemble) = &mut ensemble {
-            player::play_ensemble(ensemble, &prepared.parts, BLOCK, |block| {
-                hear(block);
-                wav.write(&[block]).map_err(Failure::from)
-            })?;
-        } else if let Some(stereo) = &mut stereo {
-            player::play_stereo(&mut clarinet, score, BLOCK, &mut inside, |left, right| {
-                hear(left);
-                wav.write(&stereo.pan(left, right)).map_err(Failure::from)
-            })?;
-        } else {
-            let write = |block: &[f32]| {
-                hear(block);
-                wav.write(&[block]).map_err(Failure::from)
-            };
-            if looks_inside {
-                player::play_probed(&mut clarinet, score, BLOCK, &mut inside, write)?;
-            } else {
-                player::play(&mut clarinet, score, BLOCK, write)?;
+        let inside: Option<&mut dyn FnMut(Probe)> = if looks_inside { Some(&mut inside) } else { None };
+        let resets = prepared.play(self.channels, inside, |sent, heard| {
+            bar.inc(sent.len() as u64);
+            if let Some(watch) = &watch {
+                watch.borrow_mut().hear(sent);
             }
-        }
+            wav.write(heard).map_err(Failure::from)
+        })?;
         let level = wav.finish()?;
         bar.finish_and_clear();
         if let Some(probe) = probe {
@@ -189,7 +153,6 @@ impl RenderCommand {
             plot.draw(|| watched.figure(&self.play.title(), about))?;
         }
         out.keep()?;
-        let resets = ensemble.map_or(clarinet.resets(), |ensemble| ensemble.resets());
         Ok(Rendered { seconds: score.seconds(*rate), rate: *rate, level, resets })
     }
 
@@ -230,13 +193,6 @@ impl RenderCommand {
             );
         }
     }
-}
-
-/// The same score without pan: several players are panned one by one.
-fn without_pan(score: &Score) -> Score {
-    let mut score = score.clone();
-    score.events.retain(|timed| !matches!(timed.event, Event::Pan { .. }));
-    score
 }
 
 /// How it was played, for the lines under a figure's title.

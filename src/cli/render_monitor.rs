@@ -1,7 +1,7 @@
 //! Analyses a rendering while it runs, for figures and reports. Memory does not grow with the length of the sound.
 
 use crate::cli::Failure;
-use crate::cli::score_args::RenderJob;
+use crate::cli::render_job::RenderJob;
 use chalumeau_core::analysis::overview::{Envelope, Overview, Watcher};
 use chalumeau_core::instrument::Probe;
 use chalumeau_core::measure::notes::{MeasuredNote, NoteMeter};

@@ -5,9 +5,10 @@ mod tour;
 
 use crate::cli::Failure;
 use crate::cli::render::{about, progress};
+use crate::cli::render_job::RenderJob;
 use crate::cli::render_monitor::{RenderMonitor, RenderSummary};
 use crate::cli::report::breath_and_haptics::BreathAndHaptics;
-use crate::cli::score_args::{RenderJob, ScoreArgs};
+use crate::cli::score_args::ScoreArgs;
 use crate::cli::shared_args::within;
 
 use crate::identity;
@@ -72,6 +73,7 @@ impl ReportCommand {
             return self.write_tour();
         }
         let prepared = self.play.prepare()?;
+        prepared.warn();
         if prepared.settings.room.amount > 0.0 {
             eprintln!("warning: a report has one channel, on which no room is heard");
         }

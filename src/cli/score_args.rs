@@ -3,6 +3,7 @@
 use crate::cli::Failure;
 use crate::cli::controllers::named_or_file;
 use crate::cli::feel_args::FeelArgs;
+use crate::cli::render_job::RenderJob;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, check_fingering, note, within};
 use crate::controllers::{ControllerMap, as_links};
@@ -15,7 +16,7 @@ use chalumeau_core::control::midi::links::{Link, MOST};
 use chalumeau_core::control::parts::Parts;
 use chalumeau_core::event::{Event, PartEvent, Timed};
 use chalumeau_core::haptics::FeelDesign;
-use chalumeau_core::instrument::{Clarinet, Ensemble, Model, Reach, Settings};
+use chalumeau_core::instrument::{Model, Reach, Settings};
 use chalumeau_core::score::Score;
 use chalumeau_core::score::breath::BreathCurve;
 use chalumeau_core::score::breath::GAMMA_MAX;
@@ -32,6 +33,27 @@ use std::sync::Arc;
 
 /// Gamma where nothing else is said: a full, easy tone.
 const GAMMA_DEFAULT: f32 = 0.5;
+
+/// What a caller that is a program has in memory.
+pub enum Given {
+    /// A standard MIDI file.
+    Midi(Vec<u8>),
+    /// Notes, to be played at any rate.
+    Notes(Vec<TimedNote>),
+}
+
+/// A note and when it sounds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimedNote {
+    /// When it begins, s, at least 0.
+    pub from_s: f64,
+    /// How long it is held, s, at least 0.
+    pub seconds: f64,
+    /// Its sounding pitch.
+    pub note: SoundingNote,
+    /// Velocity, 0..=1.
+    pub velocity: f32,
+}
 
 /// What to play, on what, and how.
 #[derive(Args)]
@@ -99,11 +121,14 @@ pub struct ScoreArgs {
     #[arg(long, value_name = "FILE", requires = "scl")]
     kbm: Option<PathBuf>,
     #[command(flatten)]
-    instrument: PlayedArgs,
+    pub instrument: PlayedArgs,
     #[command(flatten)]
     settings: SettingsArgs,
     #[command(flatten)]
     feel: FeelArgs,
+    /// In place of the file that `midi` names.
+    #[arg(skip)]
+    pub given: Option<Given>,
 }
 
 /// Two notes with a colon between them.
@@ -115,38 +140,6 @@ fn interval(text: &str) -> Result<(u8, u8), String> {
 /// Finds a preset.
 fn preset_called(name: &str) -> Result<Preset, String> {
     presets::find(name, &presets::user()).cloned()
-}
-
-/// Everything a rendering needs.
-pub struct RenderJob {
-    /// The instrument at this rate.
-    pub model: Arc<Model>,
-    /// What the player has set.
-    pub settings: Settings,
-    /// What is played, with its tail.
-    pub score: Score,
-    /// The same, with who of several players plays it.
-    pub parts: Score<PartEvent>,
-    /// Sample rate, Hz.
-    pub rate: u32,
-}
-
-impl RenderJob {
-    /// The instrument as a host has it before it plays: the settings are in place from the first sample.
-    pub fn clarinet(&self) -> Clarinet {
-        let mut clarinet = Clarinet::new(self.model.clone(), f64::from(self.rate));
-        clarinet.set_settings(&self.settings);
-        clarinet.reset();
-        clarinet
-    }
-
-    /// The same for several players.
-    pub fn ensemble(&self) -> Ensemble {
-        let mut ensemble = Ensemble::new(self.model.clone(), f64::from(self.rate));
-        ensemble.set_settings(&self.settings);
-        ensemble.reset();
-        ensemble
-    }
 }
 
 impl ScoreArgs {
@@ -173,7 +166,7 @@ impl ScoreArgs {
         if let Some(scl) = &self.scl {
             Arc::make_mut(&mut model).keys = scale_file::read(scl, self.kbm.as_deref())?;
         }
-        warn_of_silent_notes(&parts.events, &model, settings.reach);
+        let warnings = silent_notes(&parts.events, &model, settings.reach);
         if let Some(take) = &self.replay {
             parts.events = self.replayed(take, &model, &settings, &parts)?;
         }
@@ -181,15 +174,12 @@ impl ScoreArgs {
         let one_note = self.written.is_some() || self.sounding.is_some();
         let usual = if one_note { 0.0 } else { 1.0 } + settings.articulation.tail_s();
         let parts = parts.with_tail(self.tail.unwrap_or(usual), self.rate);
-        Ok(RenderJob { model, settings, score: (&parts).into(), parts, rate: self.rate })
+        Ok(RenderJob { model, settings, score: (&parts).into(), parts, rate: self.rate, warnings })
     }
 
     /// The instrument and the player's settings, with nothing to play.
     pub fn without_score(&self) -> Result<RenderJob, Failure> {
-        let file = self.instrument.load()?;
-        let settings = self.settings.played(&file)?;
-        let model = self.instrument.model(file, self.rate, settings.a4_hz)?;
-        Ok(RenderJob { model, settings, score: Score::default(), parts: Score::default(), rate: self.rate })
+        RenderJob::without_score(&self.instrument, &self.settings, self.rate)
     }
 
     /// The feel of the knob.
@@ -271,7 +261,11 @@ impl ScoreArgs {
     ) -> Result<Score<PartEvent>, Failure> {
         let transposition = file.transposition;
         if let Some(path) = &self.midi {
-            let bytes = fs::read(path).map_err(|source| Failure::Read { path: path.clone(), source })?;
+            let bytes = match &self.given {
+                Some(Given::Notes(notes)) => return Ok((&score_of(notes, self.rate)).into()),
+                Some(Given::Midi(bytes)) => bytes.clone(),
+                None => fs::read(path).map_err(|source| Failure::Read { path: path.clone(), source })?,
+            };
             let mut decoder = if self.mpe { MidiDecoder::new().with_mpe() } else { MidiDecoder::new() };
             decoder.set_links(links);
             if let Some(preset) = &self.preset {
@@ -312,8 +306,32 @@ impl ScoreArgs {
     }
 }
 
-/// Warns of notes that the instrument cannot play, which stay silent.
-fn warn_of_silent_notes(events: &[Timed<PartEvent>], model: &Model, reach: Reach) {
+/// The score of notes. A key that comes up where another goes down comes up after it: a slur.
+fn score_of(notes: &[TimedNote], rate: u32) -> Score {
+    let at = |seconds: f64| (seconds * f64::from(rate)).round() as usize;
+    let on = notes.iter().map(|one| {
+        let event = Event::NoteOn { note: one.note, velocity: one.velocity };
+        Timed { at: at(one.from_s), event }
+    });
+    let off = notes.iter().map(|one| {
+        let event = Event::NoteOff { note: one.note };
+        Timed { at: at(one.from_s + one.seconds), event }
+    });
+    let mut events: Vec<_> = on.chain(off).collect();
+    // A note struck again at the moment of its end: its own end comes first.
+    let order = |timed: &Timed<Event>| match timed.event {
+        Event::NoteOff { note } => {
+            u8::from(!notes.iter().any(|one| one.note == note && at(one.from_s) == timed.at))
+        }
+        _ => 1,
+    };
+    events.sort_by_key(|timed| (timed.at, order(timed)));
+    let samples = events.last().map_or(0, |last| last.at);
+    Score { events, samples }
+}
+
+/// Says which notes the instrument cannot play, which stay silent.
+fn silent_notes(events: &[Timed<PartEvent>], model: &Model, reach: Reach) -> Vec<String> {
     let file = &model.file;
     let sounds =
         |note: WrittenNote| note.sounding(file.transposition).map(|n| n.to_string()).unwrap_or_default();
@@ -328,22 +346,24 @@ fn warn_of_silent_notes(events: &[Timed<PartEvent>], model: &Model, reach: Reach
     let (muted, missing): (Vec<_>, Vec<_>) = silent
         .into_iter()
         .partition(|&note| written(note).is_some_and(|note| file.fingering(note).is_some()));
+    let mut said = Vec::new();
     if !missing.is_empty() {
         let (low, high) = (file.lowest(), file.highest());
-        eprintln!(
-            "warning: {} notes have no fingering and stay silent; this instrument sounds {} to {} (written {low} to {high})",
+        said.push(format!(
+            "{} notes have no fingering and stay silent; this instrument sounds {} to {} (written {low} to {high})",
             missing.len(),
             sounds(low),
             sounds(high)
-        );
+        ));
     }
     if !muted.is_empty() {
         let names: BTreeSet<_> = muted.iter().filter_map(|&note| written(note)).collect();
         let names: Vec<_> = names.iter().map(|note| format!("{note} (sounds {})", sounds(*note))).collect();
-        eprintln!(
-            "warning: notes that stay silent, because their fingering does not speak in tune on this instrument: {}, written {}",
+        said.push(format!(
+            "notes that stay silent, because their fingering does not speak in tune on this instrument: {}, written {}",
             muted.len(),
             names.join(", ")
-        );
+        ));
     }
+    said
 }

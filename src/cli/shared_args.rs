@@ -17,7 +17,7 @@ use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 /// Which instrument.
 #[derive(Args)]
@@ -25,6 +25,9 @@ pub struct InstrumentArg {
     /// Instrument: b-flat, a, e-flat, c, bass, or a file (TOML: bore, tone holes, fingerings) [default: b-flat]
     #[arg(long, value_name = "NAME|FILE")]
     instrument: Option<PathBuf>,
+    /// Measurements that a caller has in memory, in place of the file.
+    #[arg(skip)]
+    pub given: Option<InstrumentFile>,
 }
 
 impl InstrumentArg {
@@ -35,6 +38,9 @@ impl InstrumentArg {
 
     /// Its measurements; those of `usual` if none was chosen.
     fn load_or(&self, usual: Bundled) -> Result<InstrumentFile, Failure> {
+        if let Some(file) = &self.given {
+            return Ok(file.clone());
+        }
         let Some(path) = &self.instrument else { return Ok(usual.file()) };
         if let Some(bundled) = path.to_str().and_then(Bundled::from_id) {
             return Ok(bundled.file());
@@ -66,6 +72,9 @@ impl InstrumentArg {
 
     /// The instrument ready to play: from the program's own data or the cache, else fitted and tuned now.
     pub fn tuned(&self, wanted: &Wanted) -> Result<Arc<Model>, Failure> {
+        if let Some(model) = kept(wanted) {
+            return Ok(model);
+        }
         let mut fresh = false;
         let model = self.made(|cache, on| {
             Preparation::new(wanted, cache).tuned(&mut |progress| {
@@ -76,6 +85,7 @@ impl InstrumentArg {
         if fresh {
             say_what_tuning_found(&model, wanted);
         }
+        keep(wanted, &model);
         Ok(model)
     }
 
@@ -111,6 +121,30 @@ impl InstrumentArg {
     }
 }
 
+/// Instruments that this program has prepared, the last used at the end: a data set plays one thousands of times, and a short
+/// note takes less time than its preparation, 15 ms.
+static PREPARED: Mutex<Vec<(Wanted, Arc<Model>)>> = Mutex::new(Vec::new());
+/// Most of them: the five bundled instruments at one rate, and some of the user's own.
+const PREPARED_MOST: usize = 8;
+
+fn kept(wanted: &Wanted) -> Option<Arc<Model>> {
+    let mut all = PREPARED.lock().ok()?;
+    let at = all.iter().position(|(of, _)| of == wanted)?;
+    let found = all.remove(at);
+    let model = found.1.clone();
+    all.push(found);
+    Some(model)
+}
+
+fn keep(wanted: &Wanted, model: &Arc<Model>) {
+    if let Ok(mut all) = PREPARED.lock() {
+        if all.len() == PREPARED_MOST {
+            all.remove(0);
+        }
+        all.push((wanted.clone(), model.clone()));
+    }
+}
+
 /// A progress bar; it shows on a terminal only.
 fn preparing() -> ProgressBar {
     let bar = ProgressBar::new(1_000);
@@ -143,7 +177,7 @@ impl From<QualityArg> for Quality {
 #[derive(Args)]
 pub struct PlayedArgs {
     #[command(flatten)]
-    instrument: InstrumentArg,
+    pub instrument: InstrumentArg,
     /// Resolution of the lattice
     #[arg(long, value_enum, default_value_t = QualityArg::Live)]
     quality: QualityArg,
@@ -160,7 +194,7 @@ impl PlayedArgs {
 
     /// Its measurements; those of the instrument of a preset if none was chosen.
     pub fn load_for(&self, preset: &Preset) -> Result<InstrumentFile, Failure> {
-        if self.instrument.instrument.is_some() {
+        if self.instrument.instrument.is_some() || self.instrument.given.is_some() {
             return self.load();
         }
         let usual = preset.bundled().ok_or_else(|| {

@@ -1,8 +1,7 @@
 //! What a batch renders: names, and their values for each file.
 
 use crate::cli::render::RenderCommand;
-use crate::parameters;
-use clap::{Args, Command};
+use crate::cli::words::Names;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fs;
@@ -99,7 +98,7 @@ impl Plan {
         }
     }
 
-    fn from_toml(text: &str) -> Result<Self, String> {
+    pub fn from_toml(text: &str) -> Result<Self, String> {
         let PlanFile { same, vary } =
             toml::from_str(text).map_err(|error| error.to_string().trim().to_owned())?;
         if vary.is_empty() {
@@ -128,7 +127,7 @@ impl Plan {
             .checked()
     }
 
-    fn from_csv(text: &str) -> Result<Self, String> {
+    pub fn from_csv(text: &str) -> Result<Self, String> {
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
         let names: Vec<_> =
             reader.headers().map_err(|error| error.to_string())?.iter().map(str::to_owned).collect();
@@ -153,50 +152,19 @@ impl Plan {
 
     /// Fails if a name is none.
     fn checked(self) -> Result<Self, String> {
-        let render = RenderCommand::augment_args(Command::new("render"));
-        let known = |name: &str| {
-            name == "midi" || is_flag(&render, name).is_some() || parameters::find(name).is_some()
-        };
+        let names = Names::of::<RenderCommand>();
         for name in &self.names {
             if OWN.contains(&name.as_str()) {
                 return Err(format!("{name} cannot be in a plan: the batch names the files itself"));
             }
-            if !known(name) {
-                let flags = render.get_arguments().filter_map(clap::Arg::get_long);
-                let near = flags
-                    .chain(parameters::PARAMETERS.iter().map(|parameter| parameter.id))
-                    .max_by(|a, b| strsim::jaro_winkler(a, name).total_cmp(&strsim::jaro_winkler(b, name)));
-                return Err(format!(
-                    "no flag of render and no parameter is called {name:?}; do you mean {}?",
-                    near.unwrap_or_default()
-                ));
-            }
+            names.check(name)?;
         }
         Ok(self)
     }
 
     /// The words of the command that renders a variation.
     pub fn words(&self, variation: &Variation) -> Result<Vec<String>, String> {
-        let render = RenderCommand::augment_args(Command::new("render"));
-        let mut words = Vec::new();
-        for (name, value) in self.names.iter().zip(&variation.values) {
-            match (is_flag(&render, name), value.as_str()) {
-                (_, "") => {}
-                (None, _) if name == "midi" => words.push(value.clone()),
-                (Some(false), "true") => words.push(format!("--{name}")),
-                (Some(false), "false") => {}
-                (Some(false), other) => return Err(format!("{name} must be true or false, got {other}")),
-                // With a = a value may begin with a minus.
-                (Some(true), _) => words.push(format!("--{name}={value}")),
-                (None, _) => words.extend(["--set".to_owned(), format!("{name}={value}")]),
-            }
-        }
-        Ok(words)
+        let names = Names::of::<RenderCommand>();
+        names.words(self.names.iter().map(String::as_str).zip(variation.values.iter().map(String::as_str)))
     }
-}
-
-/// Whether `render` has a flag of this name, and whether it takes a value.
-fn is_flag(render: &Command, name: &str) -> Option<bool> {
-    let arg = render.get_arguments().find(|arg| arg.get_long() == Some(name))?;
-    Some(arg.get_action().takes_values())
 }

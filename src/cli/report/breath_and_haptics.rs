@@ -1,7 +1,7 @@
 //! The report's chapters "Breath" and "Haptics", for the instrument and the reed that were played.
 
+use crate::cli::render_job::RenderJob;
 use crate::cli::report::{number, word};
-use crate::cli::score_args::RenderJob;
 use chalumeau_core::haptics::torque_law::torque_mnm;
 use chalumeau_core::haptics::{FeelDesign, FeelRefused, FeelTable, NoteFeel, NoteRequirement, TorqueLimits};
 use chalumeau_core::instrument::Settings;

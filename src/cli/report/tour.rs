@@ -1,7 +1,7 @@
 //! `chalumeau report --tour`: a page to listen to. It plays what a clarinettist would try first, and says what to listen for.
 
 use crate::cli::Failure;
-use crate::cli::score_args::RenderJob;
+use crate::cli::render_job::RenderJob;
 use crate::identity;
 use crate::wav::{Depth, WavFile};
 use chalumeau_core::event::{Event, SettingNumber, Timed};
@@ -315,13 +315,7 @@ fn sound(job: &RenderJob, settings: Settings, score: &Score) -> Result<Vec<u8>, 
     let channels = if settings.room.amount > 0.0 { 2 } else { 1 };
     let mut bytes = Cursor::new(Vec::new());
     let mut wav = WavFile::new(&mut bytes, job.rate, Depth::Int16, channels, score.samples)?;
-    let stop = RenderJob {
-        model: job.model.clone(),
-        settings,
-        score: Score::default(),
-        parts: Score::default(),
-        rate: job.rate,
-    };
+    let stop = RenderJob::to_play_later(job.model.clone(), settings, job.rate);
     let mut stereo = StereoBlocks::new(score, job.rate).in_room(&settings.room);
     player::play(&mut stop.clarinet(), score, BLOCK, |block| {
         if channels == 1 {

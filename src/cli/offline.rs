@@ -1,0 +1,200 @@
+//! What the commands do, for callers that are programs: the same names and values make the same job, and nothing is printed.
+//!
+//! The Python package stands on it. Names are flags without their dashes, or ids of parameters; values are texts as on the
+//! command line ([`Names`](super::words::Names)). An error is the text that the command would print.
+
+use crate::cli::batch::plan::Plan;
+use crate::cli::haptic::HapticCommand;
+use crate::cli::settings::SettingsArgs;
+use crate::cli::shared_args::PlayedArgs;
+use crate::cli::words::Names;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::haptics::{FeelTable, PlayedReed, RequirementSolver};
+use chalumeau_core::instrument::Settings;
+use chalumeau_core::score::breath::BreathCurve;
+use clap::{Args, Parser};
+use std::path::Path;
+
+pub use crate::cli::render_job::RenderJob;
+use crate::cli::score_args::ScoreArgs;
+pub use crate::cli::score_args::{Given, TimedNote};
+pub use crate::cli::shared_args::note;
+
+/// Names and their values.
+pub type Pairs = [(String, String)];
+
+/// Arguments alone, as a command of their own.
+#[derive(Parser)]
+struct Line<A: Args> {
+    #[command(flatten)]
+    args: A,
+}
+
+/// An instrument and its player, with nothing to play.
+#[derive(Args)]
+struct LiveArgs {
+    /// Sample rate, Hz, 1000..1536000
+    #[arg(long, default_value = "48000", value_parser = clap::value_parser!(u32).range(1_000..=1_536_000))]
+    rate: u32,
+    #[command(flatten)]
+    instrument: PlayedArgs,
+    #[command(flatten)]
+    settings: SettingsArgs,
+}
+
+/// Reads names and values as the arguments of a command.
+fn read<A: Args>(pairs: &Pairs) -> Result<A, String> {
+    let words = Names::of::<A>().words_of_program(pairs)?;
+    let line = std::iter::once("chalumeau".to_owned()).chain(words);
+    Line::<A>::try_parse_from(line).map(|line| line.args).map_err(|error| {
+        // Clap's own text without its "error: ", usage and hint.
+        let text = error.to_string();
+        let said = text.split("\n\n").next().unwrap_or_default();
+        said.trim_start_matches("error: ").split_whitespace().collect::<Vec<_>>().join(" ")
+    })
+}
+
+/// A rendering, as `chalumeau render` would play it. `instrument` and `given` are what the caller has in memory in place of
+/// files. Takes up to a minute for an instrument file that is new.
+pub fn render_job(
+    pairs: &Pairs,
+    instrument: Option<InstrumentFile>,
+    given: Option<Given>,
+) -> Result<RenderJob, String> {
+    let mut pairs = pairs.to_vec();
+    if given.is_some() {
+        // The command asks for something to play; what is given is played in its place.
+        pairs.push(("midi".to_owned(), "given".to_owned()));
+    }
+    let mut args: ScoreArgs = read(&pairs)?;
+    args.instrument.instrument.given = instrument;
+    args.given = given;
+    args.prepare().map_err(|failure| failure.to_string())
+}
+
+/// Whether these names and values are arguments of `chalumeau render`. Reads no file and prepares nothing.
+pub fn check(pairs: &Pairs) -> Result<(), String> {
+    read::<ScoreArgs>(pairs).map(drop)
+}
+
+/// An instrument ready to be played live, with the player's settings. Takes up to a minute for an instrument file that is
+/// new.
+pub fn live(pairs: &Pairs, instrument: Option<InstrumentFile>) -> Result<RenderJob, String> {
+    let mut args: LiveArgs = read(pairs)?;
+    args.instrument.instrument.given = instrument;
+    RenderJob::without_score(&args.instrument, &args.settings, args.rate)
+        .map_err(|failure| failure.to_string())
+}
+
+/// The same for a breath that rises to `gamma`: a pressure, which full breath reaches.
+pub fn blown(pairs: &Pairs, instrument: InstrumentFile, gamma: f64) -> Result<RenderJob, String> {
+    let args: LiveArgs = read(pairs)?;
+    let said = |failure: crate::cli::Failure| failure.to_string();
+    let settings = args.settings.blown_by(&BreathCurve::constant(gamma as f32), &instrument).map_err(said)?;
+    let model = args.instrument.model(instrument, args.rate, settings.a4_hz).map_err(said)?;
+    Ok(RenderJob::to_play_later(model, settings, args.rate))
+}
+
+/// The player's settings alone, on an instrument whose bore measured reeds refer to.
+pub fn settings(pairs: &Pairs, instrument: &InstrumentFile) -> Result<Settings, String> {
+    let args: LiveArgs = read(pairs)?;
+    args.settings.played(instrument).map_err(|failure| failure.to_string())
+}
+
+/// The feel of every note, as `chalumeau haptic` has it. Takes a second.
+pub fn feel(pairs: &Pairs, instrument: InstrumentFile) -> Result<FeelTable, String> {
+    let args: HapticCommand = read(pairs)?;
+    args.feel(&instrument).map_err(|failure| failure.to_string())
+}
+
+/// A bore and the reed that is played on it, from which thresholds follow, as `chalumeau haptic` has them. Takes a second.
+pub fn bore_and_reed(
+    pairs: &Pairs,
+    instrument: &InstrumentFile,
+) -> Result<(RequirementSolver, PlayedReed), String> {
+    Ok(read::<HapticCommand>(pairs)?.bore_and_reed(instrument))
+}
+
+/// The rows of a plan of `chalumeau batch`, in the order of its files: for each row the names and values.
+pub struct Rows {
+    /// Names, in the order of the columns.
+    pub names: Vec<String>,
+    /// Values of each row; an empty one leaves its name out.
+    pub values: Vec<Vec<String>>,
+}
+
+impl Rows {
+    /// Of a TOML or CSV file.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        Plan::read(path).map(Self::of).map_err(|what| format!("{}: {what}", path.display()))
+    }
+
+    /// Of the text of a TOML plan.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        Plan::from_toml(text).map(Self::of)
+    }
+
+    fn of(plan: Plan) -> Self {
+        let values = plan.variations.into_iter().map(|variation| variation.values).collect();
+        Self { names: plan.names, values }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chalumeau_core::instrument::Split;
+
+    fn pairs(all: &[(&str, &str)]) -> Vec<(String, String)> {
+        all.iter().map(|&(name, value)| (name.to_owned(), value.to_owned())).collect()
+    }
+
+    #[test]
+    fn names_of_programs_hosts_and_flags_set_the_same() {
+        let settings = |name: &str| live(&pairs(&[(name, "3")]), None).map(|job| job.settings);
+        let by_flag = settings("strength").unwrap();
+        assert_eq!(by_flag.strength, 3.0);
+        for name in ["stren", "Reed strength", "reed strength"] {
+            assert_eq!(settings(name), Ok(by_flag), "{name}");
+        }
+        let kpa = |name: &str| live(&pairs(&[(name, "7")]), None).unwrap().settings.breath_full_kpa;
+        assert_eq!((kpa("breath_full"), kpa("breath-full")), (7.0, 7.0));
+        let job = live(&pairs(&[("breath_full", "7 kPa"), ("noise", "40 %")]), None).unwrap();
+        assert_eq!((job.settings.breath_full_kpa, job.settings.noise), (7.0, 0.4));
+        let job =
+            live(&pairs(&[("Breath noise", "40"), ("no_noise", "false"), ("unison", "true")]), None).unwrap();
+        assert_eq!((job.settings.noise, job.settings.players.split), (0.4, Split::Unison));
+        assert!(live(&pairs(&[("noise", ""), ("no-noise", "true")]), None).unwrap().settings.noise == 0.0);
+    }
+
+    #[test]
+    fn mistakes_are_told_in_one_line() {
+        for (all, says) in [
+            (&[("strenght", "3")][..], "do you mean strength"),
+            (&[("strength", "9")], "must lie in 1.5..5"),
+            (&[("zeta", "0.4"), ("Embouchure", "0.5")], "both set Embouchure"),
+            (&[("no_noise", "maybe")], "must be true or false"),
+        ] {
+            let said = live(&pairs(all), None).map(|_| ()).unwrap_err();
+            assert!(said.contains(says) && !said.contains('\n'), "{said}");
+        }
+        let said = render_job(&pairs(&[("seconds", "1")]), None, None).map(|_| ()).unwrap_err();
+        assert!(said.contains("required"), "{said}");
+    }
+
+    #[test]
+    fn notes_that_touch_are_slurred_and_a_repeated_one_ends_first() {
+        use chalumeau_core::event::Event;
+        use chalumeau_core::units::SoundingNote;
+        let note = |from_s, note| TimedNote { from_s, seconds: 0.5, note: SoundingNote(note), velocity: 0.8 };
+        let ons = |notes: Vec<TimedNote>| -> Vec<bool> {
+            let job = render_job(&[], None, Some(Given::Notes(notes))).unwrap();
+            job.score.events.iter().map(|e| matches!(e.event, Event::NoteOn { .. })).collect()
+        };
+        assert_eq!(ons(vec![note(0.0, 60), note(0.5, 62)]), [true, true, false, false]);
+        assert_eq!(ons(vec![note(0.0, 60), note(0.5, 60)]), [true, false, true, false]);
+        let job = render_job(&[], None, Some(Given::Notes(vec![note(0.5, 60)]))).unwrap();
+        // With the time to fade of a melody.
+        assert_eq!(job.score.samples, 2 * 48_000);
+    }
+}

@@ -1,0 +1,135 @@
+//! A checked rendering: instrument, settings and score; and its playing, into whatever takes the samples.
+
+use crate::cli::Failure;
+use crate::cli::settings::SettingsArgs;
+use crate::cli::shared_args::PlayedArgs;
+use chalumeau_core::event::{Event, PartEvent};
+use chalumeau_core::instrument::{Clarinet, Ensemble, Model, Probe, Settings};
+use chalumeau_core::score as player;
+use chalumeau_core::score::{Score, StereoBlocks};
+use std::sync::Arc;
+
+/// Samples per block; any number gives the same sound.
+const BLOCK: usize = 512;
+
+/// Everything a rendering needs.
+pub struct RenderJob {
+    /// The instrument at this rate.
+    pub model: Arc<Model>,
+    /// What the player has set.
+    pub settings: Settings,
+    /// What is played, with its tail.
+    pub score: Score,
+    /// The same, with who of several players plays it.
+    pub parts: Score<PartEvent>,
+    /// Sample rate, Hz.
+    pub rate: u32,
+    /// What the user should know before it plays: notes that stay silent.
+    pub warnings: Vec<String>,
+}
+
+impl RenderJob {
+    /// The instrument and the player's settings, with nothing to play.
+    pub(super) fn without_score(
+        instrument: &PlayedArgs,
+        settings: &SettingsArgs,
+        rate: u32,
+    ) -> Result<Self, Failure> {
+        let file = instrument.load()?;
+        let settings = settings.played(&file)?;
+        let model = instrument.model(file, rate, settings.a4_hz)?;
+        Ok(Self::to_play_later(model, settings, rate))
+    }
+
+    /// An instrument that is ready, with nothing to play.
+    pub(super) fn to_play_later(model: Arc<Model>, settings: Settings, rate: u32) -> Self {
+        Self { model, settings, score: Score::default(), parts: Score::default(), rate, warnings: Vec::new() }
+    }
+
+    /// The instrument as a host has it before it plays: the settings are in place from the first sample.
+    pub fn clarinet(&self) -> Clarinet {
+        let mut clarinet = Clarinet::new(self.model.clone(), f64::from(self.rate));
+        clarinet.set_settings(&self.settings);
+        clarinet.reset();
+        clarinet
+    }
+
+    /// The same for several players.
+    pub fn ensemble(&self) -> Ensemble {
+        let mut ensemble = Ensemble::new(self.model.clone(), f64::from(self.rate));
+        ensemble.set_settings(&self.settings);
+        ensemble.reset();
+        ensemble
+    }
+
+    /// Prints the warnings.
+    pub(super) fn warn(&self) {
+        self.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+    }
+
+    /// Whether several players play.
+    pub fn has_several_players(&self) -> bool {
+        self.settings.players.count > 1
+    }
+
+    /// Plays on one or two channels. `each` gets blocks: what the instrument sends before its place between two channels,
+    /// and what is heard, one channel or left and right. `inside` is called for each sample of the internal rate of a lone
+    /// player. Returns how often the calculation broke down.
+    ///
+    /// # Errors
+    ///
+    /// The first error that `each` returns; it ends the playing.
+    pub fn play<E>(
+        &self,
+        channels: u16,
+        inside: Option<&mut dyn FnMut(Probe)>,
+        mut each: impl FnMut(&[f32], &[&[f32]]) -> Result<(), E>,
+    ) -> Result<u64, E> {
+        let several = self.has_several_players();
+        // One channel is the instrument itself; pan (CC10) places it between two.
+        let unpanned = several.then(|| without_pan(&self.score));
+        let score_of_room = unpanned.as_ref().unwrap_or(&self.score);
+        let in_room = || StereoBlocks::new(score_of_room, self.rate).in_room(&self.settings.room);
+        let stereo = (channels == 2).then(in_room);
+        if several {
+            let mut ensemble = self.ensemble();
+            match stereo {
+                Some(mut stereo) => {
+                    player::play_ensemble_stereo(&mut ensemble, &self.parts, BLOCK, |left, right| {
+                        each(left, &stereo.pan(left, right))
+                    })?;
+                }
+                None => {
+                    player::play_ensemble(&mut ensemble, &self.parts, BLOCK, |block| each(block, &[block]))?
+                }
+            }
+            return Ok(ensemble.resets());
+        }
+        let mut clarinet = self.clarinet();
+        match (stereo, inside) {
+            (Some(mut stereo), inside) => {
+                let inside: &mut dyn FnMut(Probe) = match inside {
+                    Some(inside) => inside,
+                    None => &mut |_| (),
+                };
+                player::play_stereo(&mut clarinet, &self.score, BLOCK, inside, |left, right| {
+                    each(left, &stereo.pan(left, right))
+                })?;
+            }
+            (None, Some(inside)) => {
+                player::play_probed(&mut clarinet, &self.score, BLOCK, inside, |block| {
+                    each(block, &[block])
+                })?;
+            }
+            (None, None) => player::play(&mut clarinet, &self.score, BLOCK, |block| each(block, &[block]))?,
+        }
+        Ok(clarinet.resets())
+    }
+}
+
+/// The same score without pan: several players are panned one by one.
+fn without_pan(score: &Score) -> Score {
+    let mut score = score.clone();
+    score.events.retain(|timed| !matches!(timed.event, Event::Pan { .. }));
+    score
+}

@@ -1,0 +1,105 @@
+//! Names and values as the words of a command: the rows of a batch, and the arguments of a caller that is a program.
+//!
+//! A name is a flag of the command without its dashes, or the id of a parameter. So a command line, a plan, a table and
+//! Python name the same things in the same way.
+
+use crate::parameters::{self, PARAMETERS, Parameter};
+use clap::{Arg, ArgAction, Args, Command};
+
+/// The names that a command knows.
+pub struct Names {
+    command: Command,
+    /// Whether the command has `--set`, for the ids of parameters.
+    sets: bool,
+}
+
+impl Names {
+    /// Those of a command with these arguments.
+    pub fn of<A: Args>() -> Self {
+        let command = A::augment_args(Command::new("chalumeau"));
+        let sets = command.get_arguments().any(|arg| arg.get_long() == Some("set"));
+        Self { command, sets }
+    }
+
+    /// Fails if the command knows no such name, and says the nearest that it knows.
+    pub fn check(&self, name: &str) -> Result<(), String> {
+        if self.takes_value(name).is_some() || self.is_midi(name) || self.is_id(name) {
+            return Ok(());
+        }
+        let flags = self.command.get_arguments().filter_map(Arg::get_long);
+        let ids = PARAMETERS.iter().map(|parameter| parameter.id).filter(|_| self.sets);
+        let near = flags
+            .chain(ids)
+            .max_by(|a, b| strsim::jaro_winkler(a, name).total_cmp(&strsim::jaro_winkler(b, name)));
+        let what = if self.sets { "no flag of render and no parameter" } else { "no argument" };
+        Err(format!("{what} is called {name:?}; do you mean {}?", near.unwrap_or_default()))
+    }
+
+    /// The words of these names and values. An empty value leaves its name out.
+    pub fn words<'a>(
+        &self,
+        pairs: impl IntoIterator<Item = (&'a str, &'a str)>,
+    ) -> Result<Vec<String>, String> {
+        let mut words = Vec::new();
+        for (name, value) in pairs {
+            match (self.takes_value(name), value) {
+                (_, "") => {}
+                (None, _) if self.is_midi(name) => words.push(value.to_owned()),
+                (Some(false), "true") => words.push(format!("--{name}")),
+                (Some(false), "false") => {}
+                (Some(false), other) => return Err(format!("{name} must be true or false, got {other}")),
+                // With a = a value may begin with a minus.
+                (Some(true), _) => words.push(format!("--{name}={value}")),
+                (None, _) => words.extend(["--set".to_owned(), format!("{name}={value}")]),
+            }
+        }
+        Ok(words)
+    }
+
+    /// Whether the flag of this name takes a value; `None` if there is no such flag.
+    fn takes_value(&self, name: &str) -> Option<bool> {
+        let arg = self.command.get_arguments().find(|arg| arg.get_long() == Some(name))?;
+        Some(matches!(arg.get_action(), ArgAction::Set | ArgAction::Append))
+    }
+
+    /// The MIDI file has no dashes.
+    fn is_midi(&self, name: &str) -> bool {
+        name == "midi" && self.command.get_arguments().any(|arg| arg.get_id() == "midi")
+    }
+
+    fn is_id(&self, name: &str) -> bool {
+        self.sets && parameters::find(name).is_some()
+    }
+
+    /// The words of names and values from a program. There a name may have underscores for hyphens, and may be that under
+    /// which hosts list a parameter. A flag takes plain numbers; a value with a unit is set by the id of the same parameter.
+    pub fn words_of_program(&self, pairs: &[(String, String)]) -> Result<Vec<String>, String> {
+        let mut words = Vec::new();
+        for (name, value) in pairs {
+            let find = |same: &dyn Fn(&Parameter) -> bool| {
+                let mut of_sound =
+                    PARAMETERS.iter().filter(|parameter| self.sets && parameter.sets.is_some());
+                of_sound.find(|parameter| same(parameter)).map(|parameter| parameter.id)
+            };
+            let hyphens = name.replace('_', "-");
+            let flag = [name, &hyphens].into_iter().find(|name| self.takes_value(name).is_some());
+            let id = match flag {
+                Some(flag) if self.takes_value(flag) == Some(true) && value.parse::<f64>().is_err() => {
+                    find(&|parameter| parameter.flag.strip_prefix("--") == Some(flag))
+                }
+                Some(_) => None,
+                None => find(&|parameter| parameter.name.eq_ignore_ascii_case(name.trim())),
+            };
+            match id {
+                Some(_) if value.is_empty() => {}
+                Some(id) => words.extend(["--set".to_owned(), format!("{id}={value}")]),
+                None => {
+                    let name = flag.unwrap_or(name);
+                    self.check(name)?;
+                    words.extend(self.words([(name.as_str(), value.as_str())])?);
+                }
+            }
+        }
+        Ok(words)
+    }
+}
