@@ -1,0 +1,229 @@
+"""The physics: bore, thresholds, reed, what a hand feels of them, and measurements of sound."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Union, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from chalumeau import _native
+from chalumeau.arguments import InstrumentLike, NoteLike, Value, instrument_of, note, pairs
+
+#: A written note, or the names of the open holes.
+FingeringLike = Union[NoteLike, Sequence[str]]
+_Floats = npt.NDArray[np.float64]
+
+
+def _fingering(fingering: FingeringLike) -> int | list[str]:
+    if isinstance(fingering, (list, tuple)):
+        return [str(name) for name in fingering]
+    return note(cast(NoteLike, fingering))
+
+
+def _numbers(values: npt.ArrayLike) -> tuple[_Floats, tuple[int, ...]]:
+    array = np.ascontiguousarray(values, np.float64)
+    return array.reshape(-1), np.shape(values)
+
+
+def impedance(
+    fingering: FingeringLike,
+    frequencies_hz: npt.ArrayLike,
+    *,
+    instrument: InstrumentLike = "b-flat",
+    model: str = "tmm",
+    reed_volume: bool = False,
+    temperature: float = 25.0,
+) -> npt.NDArray[np.complex128]:
+    """Input impedance Z/Zc of the bore at the reed, for each frequency.
+
+    ``fingering`` is a written note, or a list of the names of the open holes. Frequencies are 1..20000 Hz. ``model`` is
+    ``"tmm"`` (transfer matrices with exact wall losses, the reference; 10..40 °C, with the air that moves with the reed if
+    ``reed_volume``) or ``"lattice"`` (the waveguide that sounds, at 96 kHz and 25 °C). Zc = rho c / S of the nominal bore.
+
+    Returns complex128 of the shape of ``frequencies_hz``.
+
+    Source: transfer matrices, with wall losses after Zwikker and Kosten (1949) and holes after Dubos et al. (1999); see
+    ``docs/model.md`` in the repository. ``chalumeau impedance`` gives the same numbers.
+
+    >>> import chalumeau, numpy
+    >>> f_hz = numpy.arange(100.0, 1000.0, 0.5)
+    >>> z = chalumeau.impedance("F3", f_hz)
+    >>> float(f_hz[abs(z).argmax()]) == round(chalumeau.impedance_peaks("F3")["f_hz"][0] * 2) / 2
+    True
+    """
+    if model not in ("tmm", "lattice"):
+        raise ValueError(f"model must be 'tmm' or 'lattice', got {model!r}")
+    flat, shape = _numbers(frequencies_hz)
+    z = _native.impedance(
+        instrument_of(instrument), _fingering(fingering), flat, model == "lattice", reed_volume, float(temperature)
+    )
+    return z.reshape(shape)
+
+
+def impedance_peaks(
+    fingering: FingeringLike,
+    count: int = 8,
+    *,
+    instrument: InstrumentLike = "b-flat",
+    reed_volume: bool = False,
+    temperature: float = 25.0,
+) -> dict[str, _Floats]:
+    """The first peaks of \\|Z\\|/Zc of the transfer matrices: ``f_hz``, ``mag_over_zc`` and ``q``, each of shape ``(count,)``.
+
+    ``count`` is 1..30; the other arguments are as in `impedance`.
+
+    >>> import chalumeau
+    >>> f_hz = chalumeau.impedance_peaks("E3", 2)["f_hz"]
+    >>> bool(2.8 < f_hz[1] / f_hz[0] < 3.2)     # a closed tube: odd multiples
+    True
+    """
+    return _native.impedance_peaks(
+        instrument_of(instrument), _fingering(fingering), count, reed_volume, float(temperature)
+    )
+
+
+def thresholds(*, instrument: InstrumentLike = "b-flat", **reed: Value) -> dict[str, Any]:
+    """The mouth pressures between which each note of the chart sounds, over the closing pressure of the reed.
+
+    The reed is that of ``chalumeau haptic``: ``zeta`` (0.05..0.9, 0.3), ``strength`` (1.5..5, 2.5), ``lip`` (0.6..1.4, 1),
+    ``H``, ``k``, and ``temperature`` (°C).
+
+    Returns arrays with one value for each fingering; a note that cannot sound has nan:
+
+    - ``written_midi``;
+    - ``gamma_on``: the oscillation threshold of a reed without inertia, at least 1/3;
+    - ``gamma_sounding``: the dynamic threshold, where the reed as it moves under the lip begins to sound; ``sounding_hz``;
+    - ``gamma_beat``: where the reed begins to touch the lay;
+    - ``gamma_off``: extinction, above which a reed that was blown shut stays silent;
+    - ``p_req_pa``: ``gamma_on`` in Pa; and ``p_closing_pa``, one number.
+
+    Takes a second. Source: the linear threshold of Wilson and Beavers (1974); extinction after the two-state model of Dalmont,
+    Gilbert, Kergomard and Ollivier (2005). `bifurcation` looks for the same by playing.
+
+    >>> import chalumeau
+    >>> found = chalumeau.thresholds(zeta=0.3)
+    >>> len(found["gamma_on"]), bool((found["gamma_on"][:30] >= 1 / 3).all()), round(found["p_closing_pa"])
+    (46, True, 6000)
+    """
+    return _native.thresholds(pairs(reed), instrument_of(instrument))
+
+
+def bifurcation(
+    written: NoteLike,
+    *,
+    to: float = 2.0,
+    seconds: float = 20.0,
+    instrument: InstrumentLike = "b-flat",
+    rate: int = 48_000,
+    **settings: Value,
+) -> dict[str, Any]:
+    """Plays a written note with breath that rises slowly from 0 to gamma ``to`` (0.2..3) in ``seconds`` (0.5..600), and falls.
+
+    ``settings`` are as in `render`. Returns arrays of equal length: ``direction`` (1 rising, -1 falling), ``gamma``, ``rms``
+    (pressure in the mouthpiece over the closing pressure) and ``shut`` (share of time in which the reed is shut); and the
+    gammas at which the note ``begins``, ``beats``, ``chokes``, ``returns``, ``opens`` and ``ends``, None where it does not.
+
+    A moving breath passes a threshold before the note has grown or died (Bergeot, Almeida, Vergez and Gazengel, 2013), so
+    these depend on ``seconds``. The same as ``chalumeau bifurcation``.
+
+    >>> import chalumeau
+    >>> ramp = chalumeau.bifurcation("F3", to=1.0, seconds=1.0)
+    >>> bool(1 / 3 < ramp["begins"] < 0.6), ramp["chokes"]
+    (True, None)
+    """
+    return _native.bifurcation(
+        pairs(settings, {"rate": rate}), instrument_of(instrument), note(written), float(to), float(seconds)
+    )
+
+
+def reed_tables() -> dict[str, npt.NDArray[Any]]:
+    """The reed's tables, which sound, touch and the knob's firmware share: ``p``, ``x_a`` = sqrt(p), ``x_b`` = p^1.5, ``sgn``.
+
+    Shape ``(3601,)``: one entry for each tenth of a degree of one turn; ``p`` is the pressure difference over the closing
+    pressure. The arrays are copies.
+
+    Source: the notebook of the repository Maxw3llGM/TorqueTuner_Reed-Model_DMI.
+
+    >>> import chalumeau
+    >>> tables = chalumeau.reed_tables()
+    >>> [float(tables[name][900]) for name in ("p", "x_a", "x_b")]
+    [0.25, 0.5, 0.125]
+    """
+    return _native.reed_tables()
+
+
+def reed_flow(
+    p: npt.ArrayLike, *, H: float | None = None, k: float | None = None, A: float = 1.0
+) -> _Floats:
+    """Flow through the reed, u = A (H sqrt(p) - p^1.5 / k), and 0 from closure at p = H k on; of the shape of ``p``.
+
+    ``p`` is the pressure difference over the closing pressure of the reference reed; where it is negative the air flows
+    back. ``H`` (0.5..10, sqrt(27)/2) is the opening at rest, ``k`` (0.01..20) the stiffness: without it 27/(4 H^3), which makes
+    the peak of the flow A (0..10).
+
+    Source: Wilson and Beavers (1974), with the constants of Maxw3llGM/TorqueTuner_Reed-Model_DMI.
+
+    >>> import chalumeau
+    >>> [round(float(u), 3) for u in chalumeau.reed_flow([0, 1 / 3, 1, 1.2])]
+    [0.0, 1.0, 0.0, 0.0]
+    """
+    flat, shape = _numbers(p)
+    return _native.reed_flow(flat, H, k, A).reshape(shape)
+
+
+def feel(written: NoteLike, *, instrument: InstrumentLike = "b-flat", **design: Value) -> dict[str, Any]:
+    """What a force-feedback knob is sent for a written note.
+
+    ``design`` are the flags of ``chalumeau haptic``: ``law`` ("flow", "pressure"), ``contrast`` (1..5), ``place`` (1..5),
+    ``equal_travel``, ``order``, ``reference``, ``torque`` (mNm), ``travel`` (degrees), ``detent`` (mNm), ``ceiling`` (mNm), and
+    the reed's ``zeta``, ``strength``, ``lip``, ``H``, ``k``, ``temperature``.
+
+    Returns ``law``, ``h``, ``k``, ``scale_mnm``, ``stretch``, ``offset_deg``, ``wall_deg``, ``wall_mnm_per_deg``,
+    ``slap_mnm_per_deg``, ``damping_mnms``, ``friction_mnm``, ``detent_mnm``, ``morph_ms``, and the angles from rest in degrees
+    at which the note starts, beats, closes and stops: ``a_on_deg``, ``a_beat_deg``, ``a_close_deg``, ``a_off_deg``.
+
+    Raises `ValueError` for a feel that a knob would refuse. Takes a second. Model and sources: ``docs/feel.md``.
+
+    >>> import chalumeau
+    >>> c5 = chalumeau.feel("C5")
+    >>> c5["law"], round(c5["a_on_deg"]), round(c5["a_close_deg"])
+    ('flow', 120, 360)
+    """
+    return _native.feel(pairs(design), instrument_of(instrument), note(written))
+
+
+def torque(
+    written: NoteLike, angles_deg: npt.ArrayLike, *, instrument: InstrumentLike = "b-flat", **design: Value
+) -> _Floats:
+    """The torque of a note at rest at each angle (degrees), in mNm, positive against the breath; of the shape of ``angles_deg``.
+
+    ``design`` is as in `feel`. As the firmware computes it.
+
+    >>> import chalumeau
+    >>> torques = chalumeau.torque("C5", [0, 120, 240, 355])
+    >>> bool(torques[1] > torques[2] > torques[3])
+    True
+    """
+    flat, shape = _numbers(angles_deg)
+    return _native.torque(pairs(design), instrument_of(instrument), note(written), flat).reshape(shape)
+
+
+def features(samples: npt.ArrayLike, rate: float = 48_000) -> dict[str, Any]:
+    """Measures a note: mono samples of shape ``(samples,)``, with its beginning; only its first 4 s count.
+
+    Returns ``f0_hz`` (of the steady part), ``steady_dbfs`` (its rms level), ``centroid_hz`` (power-weighted mean frequency),
+    ``attack_s`` (from 10 to 90 % of the loudest moment) and ``harmonics_db``: the levels of harmonics 1 to 12 over the strongest
+    of them. Without a steady part of 200 ms the first three are nan or -inf, and there are no harmonics.
+
+    >>> import chalumeau
+    >>> note = chalumeau.render(written="E3", seconds=0.6, gamma=0.5, no_noise=True)
+    >>> levels = chalumeau.features(note)["harmonics_db"]
+    >>> levels[1] < levels[2]    # the second harmonic is weaker than the third
+    True
+    """
+    array = np.ascontiguousarray(samples, np.float32)
+    if array.ndim != 1:
+        raise ValueError(f"samples must have one dimension, got the shape {array.shape}; take one channel")
+    return _native.features(array, float(rate))

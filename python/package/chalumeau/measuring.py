@@ -1,0 +1,88 @@
+"""The rows of a plan, and the measurement of one."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any, Union
+
+import numpy as np
+
+from chalumeau import _native
+from chalumeau.acoustics import features
+from chalumeau.arguments import Value, text_of
+from chalumeau.playing import render
+
+#: A plan: the path of a TOML or CSV file, the text of a TOML plan, a dict of its tables, or rows.
+PlanLike = Union[str, "os.PathLike[str]", Mapping[str, Any], Sequence[Mapping[str, Value]]]
+
+#: Harmonics of which the level is measured.
+HARMONICS = 12
+
+
+def rows(plan: PlanLike) -> list[dict[str, str]]:
+    """The rows of a plan, in the order of ``chalumeau batch``: for each the names of flags or parameters, with their values.
+
+    Of ``same`` every row has all, of ``vary`` every combination is a row; ``{"from": 0.4, "to": 0.6, "steps": 5}`` are equal
+    steps. Raises `ValueError` for a name that is none, or a plan in which nothing varies.
+
+    >>> import chalumeau
+    >>> plan = {"same": {"seconds": 0.3}, "vary": {"written": ["E3", "C4"], "gamma": {"from": 0.4, "to": 0.6, "steps": 3}}}
+    >>> len(chalumeau.rows(plan)), chalumeau.rows(plan)[1]
+    (6, {'seconds': '0.3', 'gamma': '0.4', 'written': 'C4'})
+    """
+    if isinstance(plan, Mapping):
+        names, values = _native.rows(json=json.dumps(plan))
+    elif isinstance(plan, str) and "\n" in plan:
+        names, values = _native.rows(text=plan)
+    elif isinstance(plan, (str, os.PathLike)):
+        names, values = _native.rows(path=os.fspath(plan))
+    else:
+        given = [{name: text_of(name, value) for name, value in row.items()} for row in plan]
+        names = list(dict.fromkeys(name for row in given for name in row))
+        return [{name: row.get(name, "") for name in names} for row in given]
+    return [dict(zip(names, of_row)) for of_row in values]
+
+
+def measure(row: Mapping[str, Value], sound: bool = False) -> dict[str, Any]:
+    """Renders one row and measures it: a pure function, the same on every machine.
+
+    Returns the columns that ``chalumeau batch`` has, ``length_s``, ``rate_hz``, ``peak_dbfs``, ``rms_dbfs``; then those of
+    `features` (of the mean of both channels, if there are two): ``f0_hz``, ``steady_dbfs``, ``centroid_hz``, ``attack_s``,
+    ``h1_db`` to ``h12_db``; and ``sha256``, of the samples as little-endian 32-bit floats. With ``sound`` the samples too.
+
+    >>> import chalumeau
+    >>> c4 = chalumeau.measure({"written": "C4", "gamma": 0.5, "seconds": 0.5, "no-noise": True})
+    >>> round(c4["f0_hz"]), c4["length_s"]
+    (233, 0.5)
+    """
+    named: dict[str, Any] = {name: value for name, value in row.items() if value is not None and value != ""}
+    for own in ("bits", "out", "force"):
+        if own in named:
+            raise ValueError(f"{own} is of files of chalumeau batch; samples here are always 32-bit floats")
+    score = named.pop("midi", None)
+    channels, rate = int(named.pop("channels", 1)), int(named.pop("rate", 48_000))
+    samples = render(score, settings=named, rate=rate, channels=channels)
+    power = float(np.mean(np.square(samples, dtype=np.float64))) if samples.size else 0.0
+    peak = float(np.abs(samples).max(initial=0.0))
+    mono = samples if channels == 1 else samples.mean(axis=1, dtype=np.float32)
+    heard = features(mono, rate)
+    harmonics = heard.pop("harmonics_db")
+    levels = harmonics + [math.nan] * (HARMONICS - len(harmonics))
+    measured = {
+        "length_s": len(samples) / rate,
+        "rate_hz": rate,
+        "peak_dbfs": _db(peak),
+        "rms_dbfs": _db(math.sqrt(power)),
+        **heard,
+        **{f"h{n}_db": level for n, level in enumerate(levels, 1)},
+        "sha256": hashlib.sha256(samples.astype("<f4", copy=False).tobytes()).hexdigest(),
+    }
+    return {**measured, "samples": samples} if sound else measured
+
+
+def _db(amplitude: float) -> float:
+    return 20.0 * math.log10(amplitude) if amplitude > 0.0 else -math.inf

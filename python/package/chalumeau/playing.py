@@ -1,0 +1,268 @@
+"""Sound: a clarinet that is played live, and whole renderings."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from chalumeau import _native
+from chalumeau.arguments import InstrumentLike, NoteLike, Value, instrument_of, note, pairs
+
+#: 32-bit float samples, full scale 1.0.
+Samples = npt.NDArray[np.float32]
+
+
+class Note(NamedTuple):
+    """A note of a list that `render` plays."""
+
+    #: When it begins, s.
+    from_s: float
+    #: How long it is held, s. Where it touches the next note, the two are slurred.
+    seconds: float
+    #: Its sounding pitch.
+    note: NoteLike
+    #: How hard the key is struck, 0 to 1; without other breath it sets how loud the note is.
+    velocity: float = 0.8
+
+
+#: What `render` plays: the path of a standard MIDI file, its bytes, or notes.
+Score = Union[str, "os.PathLike[str]", bytes, Iterable[Union[Note, tuple[Any, ...]]]]
+
+
+def render(
+    score: Score | None = None,
+    *,
+    instrument: InstrumentLike | None = None,
+    settings: Mapping[str, Value] | None = None,
+    rate: int = 48_000,
+    channels: int = 1,
+    players: int | None = None,
+    **named: Value,
+) -> Samples:
+    """Renders offline what the plugin would play, and what ``chalumeau render`` writes, sample for sample.
+
+    ``score`` is the path of a standard MIDI file, its bytes, or a list of `Note` or tuples
+    ``(from_s, seconds, note, velocity)``, with sounding pitches. Without it, say ``written="C4"`` or ``sounding=58`` for one
+    note or ``scale="E3:C6"`` for a scale.
+
+    Every flag of ``chalumeau render`` that does not name an output is an argument here, with underscores for hyphens:
+    ``seconds`` (0.01..3600), ``tail`` (s), ``gamma`` (0..3, mouth pressure over closing pressure), ``breath`` ("ramp:0:1:4"),
+    ``crescendo`` ("0.4:0.9"), ``no_noise=True``, ``slurred=True``, ``preset``, ``quality="high"``, ``scl``, ``unison=True`` ...
+    So is every setting by its id, name or flag (see `parameters`). ``settings`` takes them as a dict, also by names with
+    spaces.
+
+    ``instrument`` is the clarinet in B flat unless one is chosen (see `chalumeau.instrument`). The first rendering with an
+    instrument of your own prepares it, up to a minute; the result is kept in your cache folder. ``rate`` is 1000..1536000 Hz.
+    ``players`` is 1..16.
+
+    Returns float32 of shape ``(samples,)``, or ``(samples, 2)`` with ``channels=2``: the memory that was rendered into.
+    Python's other threads run meanwhile.
+
+    Raises `ValueError`, with what was given and what would be right. Warns of notes that stay silent.
+
+    Source: ``docs/model.md`` in the repository. The reed's law is that of Wilson and Beavers (1974), the bore a lattice after
+    Kelly and Lochbaum (1962), with holes after Dubos et al. (1999).
+
+    >>> import chalumeau
+    >>> duet = [(0.0, 0.2, "Bb3"), (0.2, 0.2, "C4", 0.5)]
+    >>> chalumeau.render(duet, tail=0.1).shape
+    (24000,)
+    >>> chalumeau.render(written="G4", seconds=0.1, settings={"Reed strength": 3, "Full breath": "7 kPa"}).shape
+    (4800,)
+    >>> chalumeau.render(written="G4", strenght=3)
+    Traceback (most recent call last):
+    ValueError: no flag of render and no parameter is called "strenght"; do you mean strength?
+    """
+    midi, notes = None, None
+    if isinstance(score, (bytes, bytearray, memoryview)):
+        midi = bytes(score)
+    elif isinstance(score, (str, os.PathLike)):
+        midi = Path(score).read_bytes()
+    elif score is not None:
+        notes = [_listed(one) for one in score]
+    made = _native.render(
+        pairs(settings, named, {"rate": rate, "players": players}),
+        None if instrument is None else instrument_of(instrument),
+        midi,
+        notes,
+        channels,
+    )
+    for warning in made["warnings"]:
+        warnings.warn(warning, stacklevel=2)
+    if made["resets"]:
+        warnings.warn(
+            f"the calculation broke down and the instrument was reset {made['resets']} times; please report this",
+            stacklevel=2,
+        )
+    samples: Samples = made["samples"]
+    return samples
+
+
+def _listed(one: Any) -> tuple[float, float, int, float]:
+    try:
+        from_s, seconds, key, velocity = Note(*one)
+    except TypeError:
+        raise TypeError(
+            f"a note is (from_s, seconds, note) or (from_s, seconds, note, velocity), not {one!r}"
+        ) from None
+    return float(from_s), float(seconds), note(key), float(velocity)
+
+
+class Clarinet:
+    """A clarinet that is played event by event: what a host's audio thread does, at your pace.
+
+    ``instrument``, ``settings`` and all other names are as in `render`. Sound is made only by `render`, `render_into` and
+    `play`; events act between the samples. How the time is cut into pieces does not change a bit of the sound. Mono; for a
+    room or several players use `chalumeau.render`.
+
+    Threads may share one, and take turns. Two clarinets render at the same time on two cores.
+
+    >>> import chalumeau, numpy
+    >>> clarinet = chalumeau.Clarinet(noise=0)
+    >>> clarinet.breath(0.6)
+    >>> clarinet.note_on("Bb3")
+    >>> first = clarinet.render(0.25)
+    >>> second = clarinet.render(0.25)
+    >>> again = chalumeau.Clarinet(noise=0)
+    >>> again.breath(0.6); again.note_on("Bb3")
+    >>> bool((numpy.concatenate([first, second]) == again.render(0.5)).all())
+    True
+    """
+
+    def __init__(
+        self,
+        instrument: InstrumentLike = "b-flat",
+        *,
+        rate: int = 48_000,
+        settings: Mapping[str, Value] | None = None,
+        **named: Value,
+    ) -> None:
+        self._instrument = instrument_of(instrument)
+        self._settings: dict[str, Value] = {**(settings or {}), **named}
+        self._voice = _native.Voice(pairs(self._settings, {"rate": rate}), self._instrument)
+
+    @property
+    def rate(self) -> int:
+        """Sample rate, Hz."""
+        return self._voice.rate_hz
+
+    @property
+    def instrument(self) -> _native.Instrument:
+        """What is played."""
+        return self._instrument
+
+    @property
+    def settings(self) -> dict[str, Value]:
+        """The settings that were named; all others are at their defaults (see `parameters`)."""
+        return dict(self._settings)
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether nothing sounds, and nothing will before the next event."""
+        return self._voice.is_silent
+
+    def set(self, settings: Mapping[str, Value] | None = None, **named: Value) -> None:
+        """Sets what is named, and leaves the rest. Heard from the next control tick (a fraction of a millisecond) on.
+
+        None puts a setting back to its default. Raises `ValueError` and changes nothing if a name or a value is wrong.
+
+        >>> import chalumeau
+        >>> clarinet = chalumeau.Clarinet(strength=3)
+        >>> clarinet.set({"Full breath": "7 kPa"}, lip=1.1)
+        >>> clarinet.set(lip=9)
+        Traceback (most recent call last):
+        ValueError: invalid value '9' for '--lip <X>': must lie in 0.6..1.4
+        >>> clarinet.settings
+        {'strength': 3, 'Full breath': '7 kPa', 'lip': 1.1}
+        """
+        wanted = {**self._settings, **(settings or {}), **named}
+        wanted = {name: value for name, value in wanted.items() if value is not None}
+        self._voice.set(pairs(wanted), self._instrument)
+        self._settings = wanted
+
+    def note_on(self, key: NoteLike, velocity: float = 0.8) -> None:
+        """A key or fingering goes down: sounding pitch, velocity 0..1. Beside a held key it is slurred."""
+        self._voice.note_on(note(key), velocity)
+
+    def note_off(self, key: NoteLike) -> None:
+        """A key comes up."""
+        self._voice.note_off(note(key))
+
+    def breath(self, share: float) -> None:
+        """Breath, 0..1 of full breath. From the first one on, it blows in place of the keys' velocity."""
+        self._voice.breath(share)
+
+    def bend(self, cents: float) -> None:
+        """Pitch bend, -2400..2400 cents: near the note by the lip, beyond by the size of the bore."""
+        self._voice.bend(cents)
+
+    def slap(self, strength: float = 1.0) -> None:
+        """The tongue slaps the reed, 0..1."""
+        self._voice.slap(strength)
+
+    def hole(self, name: str, opening: float | None) -> None:
+        """Opens one hole 0..1, whatever is fingered: half-holes, shadings. None goes back to the fingering.
+
+        >>> import chalumeau
+        >>> clarinet = chalumeau.Clarinet()
+        >>> clarinet.hole("nothing", 0.5)
+        Traceback (most recent call last):
+        ValueError: no hole is called 'nothing'; the holes are ...
+        """
+        names = [hole[0] for hole in self._instrument.holes()]
+        if name not in names:
+            raise ValueError(f"no hole is called {name!r}; the holes are {', '.join(names)}")
+        self._voice.hole(names.index(name), opening)
+
+    def panic(self) -> None:
+        """Releases all notes and the breath, and clears the state."""
+        self._voice.panic()
+
+    def reset(self) -> None:
+        """Silence, as before the first note; the settings stay."""
+        self._voice.reset()
+
+    def render(self, seconds: float) -> Samples:
+        """The next seconds, rounded to whole samples, in a new array of shape ``(samples,)``."""
+        return self._voice.render(self._samples(seconds))
+
+    def render_into(self, out: Samples) -> None:
+        """Overwrites a contiguous float32 array with the next samples; allocates nothing."""
+        self._voice.render_into(out)
+
+    def play(self, events: Iterable[tuple[Any, ...]], seconds: float) -> Samples:
+        """Renders, with events at their times: ``(at_s, method, *arguments)``, for example ``(0.1, "note_on", "C4")``.
+
+        Times are counted from now, and rounded to whole samples.
+
+        >>> import chalumeau
+        >>> events = [(0.0, "breath", 0.5), (0.0, "note_on", "C4"), (0.1, "set", {"lip": 1.1}), (0.2, "note_off", "C4")]
+        >>> chalumeau.Clarinet().play(events, 0.3).shape
+        (14400,)
+        """
+        able = ("note_on", "note_off", "breath", "bend", "slap", "hole", "panic", "set")
+        out = np.zeros(self._samples(seconds), np.float32)
+        done = 0
+        for at_s, name, *arguments in sorted(events, key=lambda event: event[0]):
+            if name not in able:
+                raise ValueError(f"no event is called {name!r}; the events are {', '.join(able)}")
+            at = min(self._samples(at_s), len(out))
+            self._voice.render_into(out[done:at])
+            getattr(self, name)(*arguments)
+            done = at
+        self._voice.render_into(out[done:])
+        return out
+
+    def _samples(self, seconds: float) -> int:
+        if not 0.0 <= seconds <= 86_400.0:
+            raise ValueError(f"seconds must lie in 0..86400, got {seconds}")
+        return round(seconds * self.rate)
+
+    def __repr__(self) -> str:
+        return f"Clarinet({self._instrument!r}, rate={self.rate}, settings={self._settings})"

@@ -1,0 +1,86 @@
+"""The physics: the numbers of the command line, and what must hold of them."""
+
+import chalumeau
+import numpy as np
+import pytest
+
+
+def test_impedance_is_that_of_the_command_line(table):
+    grid = ["--from", "100", "--to", "1000", "--step", "50"]
+    for model in ("tmm", "lattice"):
+        said = table("impedance", "--written", "F4", "--model", model, *grid)
+        z = chalumeau.impedance("F4", said["f_hz"], model=model)
+        assert z.dtype == np.complex128
+        np.testing.assert_allclose(z.real, said["re_z_over_zc"], atol=1e-8)
+        np.testing.assert_allclose(z.imag, said["im_z_over_zc"], atol=1e-8)
+    grown = chalumeau.impedance("F4", [[200.0, 300.0]], reed_volume=True, temperature=20)
+    assert grown.shape == (1, 2)
+    said = table("impedance", "--written", "F4", "--model", "tmm", "--reed-volume", "--temperature", "20", *grid)
+    np.testing.assert_allclose(grown[0].real, [said["re_z_over_zc"][2], said["re_z_over_zc"][4]], atol=1e-8)
+
+
+def test_holes_by_name_are_the_fingering():
+    chart = {one["written"]: one for one in chalumeau.fingerings()}
+    f_hz = np.linspace(100, 2_000, 50)
+    by_name = chalumeau.impedance(chart["G4"]["open"], f_hz)
+    assert (by_name == chalumeau.impedance("G4", f_hz)).all()
+    assert (by_name != chalumeau.impedance([], f_hz)).any()
+
+
+def test_peaks_are_those_of_the_command_line(table):
+    said = table("impedance", "--written", "E3", "--model", "tmm", "--peaks", "5")
+    peaks = chalumeau.impedance_peaks(52, 5)
+    np.testing.assert_allclose(peaks["f_hz"], said["f_hz"], atol=1e-4)
+    np.testing.assert_allclose(peaks["mag_over_zc"], said["mag_over_zc"], atol=1e-6)
+    np.testing.assert_allclose(peaks["q"], said["q"], atol=1e-4)
+
+
+def test_thresholds_are_those_of_the_command_line(table):
+    said = table("haptic", "--all", "--zeta", "0.25", "--contrast", "1")
+    found = chalumeau.thresholds(zeta=0.25)
+    assert list(found["written_midi"]) == said["written_midi"]
+    for name, digits in (("gamma_on", 1e-6), ("gamma_sounding", 1e-6), ("gamma_off", 1e-4), ("p_req_pa", 1e-2)):
+        np.testing.assert_allclose(found[name], said[name], atol=digits, err_msg=name)
+    # `threshold` finds the peak a little differently.
+    linear = table("threshold", "--all", "--zeta", "0.25")
+    np.testing.assert_allclose(found["gamma_on"][:40], linear["gamma_on"][:40], atol=2e-3)
+
+
+def test_feel_and_torque_are_those_of_the_command_line(table):
+    said = table("haptic", "--written", "G4", "--law", "pressure")
+    feel = chalumeau.feel("G4", law="pressure")
+    for name in ("a_on_deg", "a_off_deg", "a_close_deg", "scale_mnm", "h", "k"):
+        assert feel[name] == pytest.approx(said[name][0], abs=1e-4), name
+    curve = table("haptic", "--written", "G4", "--law", "pressure", "--curve")
+    torques = chalumeau.torque("G4", curve["angle_deg"], law="pressure")
+    np.testing.assert_allclose(torques, curve["torque_mnm"], atol=1e-5)
+
+
+def test_bifurcation_is_that_of_the_command_line(table):
+    said = table("bifurcation", "--written", "F3", "--to", "1", "--seconds", "1", "--zeta", "0.4")
+    ramp = chalumeau.bifurcation("F3", to=1, seconds=1, zeta=0.4)
+    assert list(ramp["direction"]) == said["direction"]
+    np.testing.assert_allclose(ramp["gamma"], said["gamma"], atol=1e-6)
+    np.testing.assert_allclose(ramp["rms"], said["rms"], rtol=1e-6, atol=1e-12)
+    up = ramp["direction"] == 1
+    assert ramp["begins"] in ramp["gamma"][up] and ramp["ends"] in ramp["gamma"][~up]
+
+
+def test_reed_tables_and_flow_are_those_of_the_command_line(table):
+    said = table("reed", "--table")
+    tables = chalumeau.reed_tables()
+    for name, column in (("p", "p"), ("x_a", "x_a"), ("x_b", "x_b"), ("sgn", "sgn")):
+        np.testing.assert_allclose(tables[name], said[column], rtol=1e-15, err_msg=name)
+    law = table("reed", "--law", "--H", "3", "--k", "0.3849")
+    np.testing.assert_allclose(chalumeau.reed_flow(law["p"], H=3, k=0.3849), law["u"], rtol=1e-12, atol=1e-12)
+
+
+def test_features_of_a_synthetic_tone():
+    t = np.arange(48_000) / 48_000
+    tone = 0.5 * np.sin(2 * np.pi * 220 * t) + 0.05 * np.sin(2 * np.pi * 660 * t)
+    found = chalumeau.features(tone)
+    assert found["f0_hz"] == pytest.approx(220, abs=0.05)
+    assert found["harmonics_db"][0] == 0 and found["harmonics_db"][2] == pytest.approx(-20, abs=0.1)
+    assert found["steady_dbfs"] == pytest.approx(10 * np.log10(0.5 * (0.25 + 0.0025)), abs=0.05)
+    silent = chalumeau.features(np.zeros(48_000))
+    assert np.isnan(silent["f0_hz"]) and silent["harmonics_db"] == []

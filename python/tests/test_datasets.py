@@ -1,0 +1,120 @@
+"""Data sets: rows as the command line has them, nothing lost, nothing twice."""
+
+import csv
+import subprocess
+import sys
+from pathlib import Path
+
+import chalumeau
+import pytest
+from chalumeau import datasets
+
+parquet = pytest.importorskip("pyarrow.parquet")
+PLAN = """
+[same]
+seconds = 0.5
+no-noise = true
+[vary]
+written = ["E3", "C4", "G4"]
+gamma = { from = 0.4, to = 0.5, steps = 2 }
+zeta = [0.2, 0.3]
+"""
+
+
+def table(folder):
+    with open(Path(folder, "manifest.csv"), newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_manifest_is_that_of_the_command_line(chalumeau_says, tmp_path):
+    (tmp_path / "plan.toml").write_text(PLAN)
+    chalumeau_says("batch", "plan.toml", "--into", "theirs", cwd=tmp_path)
+    report = chalumeau.dataset(tmp_path / "plan.toml", tmp_path / "ours", rows_per_part=5)
+    assert (report.rows, report.rendered) == (12, 12) and report.rows_per_core_s > 0
+    theirs, ours = table(tmp_path / "theirs"), table(tmp_path / "ours")
+    assert list(ours[0])[: len(theirs[0])] == list(theirs[0])
+    for their, our in zip(theirs, ours, strict=True):
+        assert {**their, "file": ""} == {**{name: our[name] for name in their}, "file": ""}
+    assert len({row["sha256"] for row in ours}) == 12
+
+
+def test_a_row_is_a_pure_function(tmp_path):
+    row = chalumeau.rows(PLAN)[3]
+    assert chalumeau.measure(row) == chalumeau.measure(dict(reversed(row.items())))
+    chalumeau.dataset([row], tmp_path, sound=True)
+    stored = parquet.read_table(tmp_path / "parquet").to_pylist()[0]
+    samples = chalumeau.measure(row, sound=True)["samples"]
+    assert stored["samples"] == samples.tolist() and stored["zeta"] == 0.3 and stored["written"] == "C4"
+
+
+def test_what_was_stopped_goes_on(tmp_path):
+    begun = []
+
+    def stopping(work, parts):
+        for part in parts[:2]:
+            begun.append(part.file)
+            yield work(part)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        chalumeau.dataset(PLAN, tmp_path, map=stopping, rows_per_part=3)
+    assert not (tmp_path / "manifest.csv").exists()
+    kept = {file: (tmp_path / file).stat().st_mtime_ns for file in begun}
+    # A file that was damaged is made again.
+    (tmp_path / begun[0]).write_bytes(b"half")
+    report = chalumeau.dataset(PLAN, tmp_path, rows_per_part=3)
+    assert (report.rows, report.rendered) == (12, 9)
+    assert (tmp_path / begun[1]).stat().st_mtime_ns == kept[begun[1]]
+    rows = parquet.read_table(tmp_path / "parquet").to_pylist()
+    assert sorted(row["row"] for row in rows) == list(range(1, 13))
+    # Another sound is another data set.
+    other = chalumeau.dataset(PLAN.replace("0.5\nno", "0.4\nno"), tmp_path, rows_per_part=3)
+    assert other.rendered == 12
+
+
+def test_a_lost_file_is_told(tmp_path):
+    with pytest.raises(RuntimeError, match="4 of 4 files are missing"):
+        chalumeau.dataset(PLAN, tmp_path, map=lambda work, parts: [], rows_per_part=3)
+
+
+def test_processes_make_the_same_rows(tmp_path):
+    alone = chalumeau.dataset(PLAN, tmp_path / "alone", rows_per_part=4)
+    both = chalumeau.dataset(PLAN, tmp_path / "both", rows_per_part=4, workers=2)
+    assert alone.rendered == both.rendered == 12
+    assert table(tmp_path / "alone") == table(tmp_path / "both")
+
+
+def test_mistakes_are_told_before_anything_is_made(tmp_path):
+    for plan, says in [
+        ({"vary": {"writen": ["C4"]}}, "written"),
+        ({"vary": {"written": ["C4", "H9"]}}, "row 2"),
+        ({"same": {"seconds": 1}}, "vary"),
+        ({"vary": {}}, "nothing varies"),
+        ({"vary": {"zeta": [0.3, 3.0], "written": ["C4"]}}, "0.05..0.9"),
+        ([], "no rows"),
+    ]:
+        with pytest.raises(ValueError, match=says):
+            chalumeau.dataset(plan, tmp_path / "set")
+        assert not list(tmp_path.glob("set/*"))
+
+
+def test_the_command_reports_its_throughput(tmp_path):
+    (tmp_path / "plan.toml").write_text(PLAN)
+    words = [sys.executable, "-m", "chalumeau.datasets", "plan.toml", "--into", "set", "--workers", "2", "--growth"]
+    said = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
+    assert said.returncode == 0, said.stderr
+    first, *grown = said.stdout.splitlines()
+    assert "12 rows, 12 rendered" in first and "of one core" in first
+    assert [line.split()[0] for line in grown] == ["1", "2"] and "1.00 times" in grown[0]
+    wrong = subprocess.run([*words[:3], "none.toml", "--into", "set"], cwd=tmp_path, capture_output=True, text=True)
+    assert wrong.returncode == 2 and "none.toml" in wrong.stderr
+
+
+def test_a_killed_worker_of_dask_loses_nothing(root, tmp_path):
+    """The example with fewer rows; `python python/examples/dask_dataset.py` has 1,000."""
+    pytest.importorskip("dask.distributed")
+    words = [sys.executable, root / "python/examples/dask_dataset.py", "--rows", "120", "--into", "set"]
+    said = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert said.returncode == 0, said.stderr
+    assert "a worker was killed" in said.stdout and "120 rows, each once" in said.stdout, said.stdout
+    assert len(table(tmp_path / "set")) == 120

@@ -1,0 +1,70 @@
+"""The package itself: types, documentation, examples that run."""
+
+import ast
+import doctest
+import importlib
+import inspect
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import chalumeau
+import pytest
+from chalumeau import _native
+
+HERE = Path(chalumeau.__file__).parent
+MODULES = ["chalumeau", "chalumeau.arguments", "chalumeau.playing", "chalumeau.acoustics", "chalumeau.measuring", "chalumeau.datasets"]
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples_of_the_documentation_run(name):
+    module = importlib.import_module(name)
+    results = doctest.testmod(module, optionflags=doctest.ELLIPSIS)
+    assert results.attempted > 0 and results.failed == 0
+
+
+def test_everything_public_is_documented_and_has_an_example():
+    for name in set(chalumeau.__all__) - {"__version__", "Instrument", "Note"}:
+        thing = getattr(chalumeau, name)
+        assert ">>>" in inspect.getdoc(thing), name
+
+
+def test_everything_public_has_types():
+    assert (HERE / "py.typed").exists()
+    for name in set(chalumeau.__all__) - {"__version__", "Instrument", "Note", "Clarinet"}:
+        signature = inspect.signature(getattr(chalumeau, name))
+        untyped = [one for one in signature.parameters.values() if one.annotation is one.empty]
+        assert not untyped and signature.return_annotation is not signature.empty, name
+
+
+def test_the_types_of_the_compiled_part_name_all_that_is_there():
+    stub = ast.parse((HERE / "_native.pyi").read_text())
+    named = {node.name for node in stub.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
+    there = {name for name in dir(_native) if not name.startswith("__")}
+    assert named == there - {"_native"}
+    for node in (node for node in stub.body if isinstance(node, ast.ClassDef)):
+        members = {member.name for member in node.body if isinstance(member, ast.FunctionDef)}
+        real = {name for name, value in vars(getattr(_native, node.name)).items() if not name.startswith("__")}
+        assert members - {"__new__", "__eq__"} == real
+
+
+def test_instruments_travel_between_processes():
+    bass = chalumeau.instrument("bass")
+    assert pickle.loads(pickle.dumps(bass)) == bass
+
+
+def test_names_of_hosts_flags_and_ids_set_the_same():
+    by = [
+        chalumeau.render(written="C4", seconds=0.05, settings={name: value})
+        for name, value in [("Reed strength", "3.5"), ("stren", 3.5), ("strength", 3.5)]
+    ]
+    assert all((one == by[0]).all() for one in by)
+    assert (by[0] != chalumeau.render(written="C4", seconds=0.05)).any()
+
+
+def test_types_agree(root, tmp_path):
+    pytest.importorskip("mypy")
+    words = [sys.executable, "-m", "mypy", "--config-file", root / "python/pyproject.toml", "--no-incremental", "-p", "chalumeau"]
+    said = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
+    assert said.returncode == 0, said.stdout
