@@ -1,6 +1,7 @@
 //! Everything that must pass before a change is kept, in one command. Steps go on after a failure, so that one run
 //! tells all; the summary says which ones failed and how long each took.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -27,6 +28,20 @@ const PEDALBOARD_PACKAGES: &[&str] = &["pedalboard==0.9.26", "mido==1.3.3", "num
 /// What the programs in `examples/` need, pinned for the same reason.
 const EXAMPLE_PACKAGES: &[&str] =
     &["numpy==2.4.6", "matplotlib==3.11.2", "libmapper==2.6.1", "python-osc==1.10.2"];
+
+/// What builds the Python package and what its tests need, pinned for the same reason.
+const PACKAGE_PACKAGES: &[&str] = &[
+    "maturin==1.16.0",
+    "pytest==9.2.0",
+    "mypy==2.4.1",
+    "numpy==2.4.6",
+    "pyarrow==26.0.1",
+    "distributed==2026.8.0",
+    "nbformat==5.11.1",
+    "nbclient==0.11.0",
+    "ipykernel==7.4.0",
+    "matplotlib==3.11.2",
+];
 
 type Step = (&'static str, fn() -> Result<()>);
 
@@ -62,6 +77,7 @@ const STEPS: &[Step] = &[
     ("VST3's window in Ardour", ardour::test),
     ("validators", validate::installed),
     ("Python examples", python_examples),
+    ("Python package", python_package),
     ("instructions", || machine::run(&mut Command::new("benches/instructions.sh"))),
 ];
 
@@ -228,6 +244,37 @@ fn python_examples() -> Result<()> {
     let tests = machine::root().join("examples/tests/python_examples.py");
     // The study kit draws what the command line measures.
     machine::run(Command::new(&python).arg(tests).env(artefacts::PROGRAM, &programs()?.program))
+}
+
+/// The wheel as a user gets it: built from the sources, installed where nothing else is, and tested.
+fn python_package() -> Result<()> {
+    let modules =
+        "maturin, pytest, mypy, numpy, pyarrow, distributed, nbformat, nbclient, ipykernel, matplotlib";
+    let python = python("venv-package", modules, PACKAGE_PACKAGES)?;
+    let folder = machine::root().join("python");
+    let wheels = machine::target().join("wheels");
+    // Another version's wheel would be installed beside the new one.
+    let _ = fs::remove_dir_all(&wheels);
+    let build = ["-m", "maturin", "build", "--out"];
+    machine::run(Command::new(&python).args(build).arg(&wheels).current_dir(&folder))?;
+    let wheel = fs::read_dir(&wheels)?.next().context("maturin left no wheel")??.path();
+    let clean = machine::target().join("venv-clean");
+    let system = if cfg!(windows) { "python" } else { "python3" };
+    machine::run(Command::new(system).args(["-m", "venv", "--clear"]).arg(&clean))?;
+    let alone = clean.join(if cfg!(windows) { "Scripts" } else { "bin" }).join("python");
+    let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
+    machine::run(Command::new(&alone).args(install).arg(&wheel))?;
+    let first = "import chalumeau; assert chalumeau.render(written='C4', seconds=0.1).shape == (4800,)";
+    machine::run(Command::new(&alone).args(["-c", first]))?;
+    machine::run(Command::new(&python).args(install).args(["--force-reinstall", "--no-deps"]).arg(&wheel))?;
+    // The command line of the same profile. With both packages chosen, it shares all that was built.
+    cargo(
+        "build --profile wheel -p chalumeau -p chalumeau-python --bin chalumeau --no-default-features --features chalumeau/cli",
+    )?;
+    let program = machine::target().join("wheel").join(format!("chalumeau{}", std::env::consts::EXE_SUFFIX));
+    let mut tests = Command::new(&python);
+    tests.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]).current_dir(&folder);
+    machine::run(tests.env("CHALUMEAU_PROGRAM", program))
 }
 
 /// The Python of a virtual environment in the target folder, which is made if it cannot import `modules` yet.
