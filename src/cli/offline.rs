@@ -1,7 +1,7 @@
-//! What the commands do, for callers that are programs: the same names and values make the same job, and nothing is printed.
+//! What the commands do, for callers that are programs: the same names and values make the same job.
 //!
 //! The Python package stands on it. Names are flags without their dashes, or ids of parameters; values are texts as on the
-//! command line ([`Names`](super::words::Names)). An error is the text that the command would print.
+//! command line. An error is the text that the command would print.
 
 use crate::cli::batch::plan::Plan;
 use crate::cli::haptic::HapticCommand;
