@@ -14,7 +14,14 @@ export function hashOf(left, right) {
 
 export const scores = () => JSON.parse(readFileSync(new URL('scores.json', import.meta.url)));
 
-function play(module, score) {
+/** Time of the processor, ms: what else the machine does is not in it. */
+function worked() {
+  const { user, system } = process.cpuUsage();
+  return (user + system) / 1000;
+}
+
+/** `times` gets the milliseconds of each block. */
+function play(module, score, times) {
   const { exports: clarinet } = new WebAssembly.Instance(module, {});
   assert.equal(clarinet.chalumeau_begin(score.rate, score.instrument), 1);
   const out = [new Float32Array(score.samples), new Float32Array(score.samples)];
@@ -30,7 +37,9 @@ function play(module, score) {
       } else clarinet.chalumeau_midi(what, ...rest);
     }
     const until = score.messages[next]?.[0] ?? Infinity;
+    const began = worked();
     const frames = clarinet.chalumeau_process(Math.min(128, score.samples - done, until - done));
+    times.push(worked() - began);
     out.forEach((channel, at) => {
       channel.set(new Float32Array(clarinet.memory.buffer, clarinet.chalumeau_channel(at), frames), done);
     });
@@ -42,12 +51,15 @@ function play(module, score) {
 if (process.argv[1] === new URL(import.meta.url).pathname) {
   const module = new WebAssembly.Module(readFileSync(join(process.argv[2], 'chalumeau.wasm')));
   assert.deepEqual(WebAssembly.Module.imports(module), [], 'the module asks for nothing');
-  const began = performance.now();
+  const times = [];
   let seconds = 0;
   for (const score of scores()) {
-    assert.equal(play(module, score), score.hash, `${score.name}: other samples than the Rust code plays`);
+    assert.equal(play(module, score, times), score.hash, `${score.name}: other samples than the Rust code plays`);
     seconds += score.samples / score.rate;
   }
-  const times = (1000 * seconds) / (performance.now() - began);
-  console.log(`${scores().length} scores have the hashes of the Rust code, ${times.toFixed(0)} times as fast as they sound`);
+  times.sort((a, b) => a - b);
+  const at = (share) => times[Math.floor(share * (times.length - 1))].toFixed(2);
+  const faster = ((1000 * seconds) / times.reduce((sum, time) => sum + time, 0)).toFixed(0);
+  console.log(`${scores().length} scores have the hashes of the Rust code, made ${faster} times as fast as they sound`);
+  console.log(`a block of 128 samples takes the processor ${at(0.5)} ms; p99 ${at(0.99)}, worst ${at(1)}, of 2.67 at 48 kHz`);
 }

@@ -16,7 +16,7 @@ use crate::machine::{
     VALGRIND, VENV, X11_XCB, XCB, XKB, XVFB,
 };
 use crate::programs::{TESTS, programs, test_files};
-use crate::{COMMANDS, bundle, firmware, validate};
+use crate::{COMMANDS, bundle, firmware, validate, web};
 #[cfg(target_os = "linux")]
 use crate::{jack, window};
 
@@ -62,6 +62,7 @@ const STEPS: &[Step] = &[
     ("VST3's window in Ardour", ardour::test),
     ("validators", validate::installed),
     ("Python examples", python_examples),
+    ("web", web::test),
     ("instructions", || machine::run(&mut Command::new("benches/instructions.sh"))),
 ];
 
