@@ -88,8 +88,10 @@ function breathe(breath) {
 function setInstrument(at) {
   hands.releaseAll();
   instrument = data.instruments[at];
-  engine.instrument = at;
-  engine.send({ instrument: at });
+  if (engine.instrument !== at) {
+    engine.instrument = at;
+    engine.send({ instrument: at });
+  }
   get('instrument').value = at;
   const sounding = (fingering) => fingering.written - instrument.transposition;
   const all = instrument.fingerings.map(sounding);

@@ -4,7 +4,9 @@ const NAME = 'chalumeau-VERSION';
 const FILES = [/* FILES */];
 
 addEventListener('install', (event) => {
-  event.waitUntil(caches.open(NAME).then((cache) => cache.addAll(['./', ...FILES])).then(() => skipWaiting()));
+  // From the server, not from the browser's own store, whose files may be of different versions.
+  const all = ['./', ...FILES].map((file) => new Request(file, { cache: 'reload' }));
+  event.waitUntil(caches.open(NAME).then((cache) => cache.addAll(all)).then(() => skipWaiting()));
 });
 
 addEventListener('activate', (event) => {

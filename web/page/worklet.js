@@ -55,7 +55,11 @@ class Chalumeau extends AudioWorkletProcessor {
       module.chalumeau_set(...message.set);
       module.chalumeau_settle();
     }
-    if ('instrument' in message) module.chalumeau_begin(sampleRate, message.instrument);
+    if ('instrument' in message) {
+      module.chalumeau_begin(sampleRate, message.instrument);
+      // It lies elsewhere now.
+      this.views = null;
+    }
     if ('wheel' in message) module.chalumeau_wheel(message.wheel);
     if ('bend' in message) module.chalumeau_bend_range(message.bend);
     if ('breathFrom' in message) module.chalumeau_breath_from(message.breathFrom);
@@ -97,7 +101,7 @@ class Chalumeau extends AudioWorkletProcessor {
     while (done < frames) {
       const made = this.module.chalumeau_process(this.score ? this.scored(frames - done) : frames - done);
       if (made === 0) return;
-      output.forEach((channel, at) => channel.set(this.samples(at, made), done));
+      for (let at = 0; at < output.length; at += 1) output[at].set(this.samples(at, made), done);
       done += made;
       if (this.score) this.score.at += made;
     }
@@ -107,8 +111,14 @@ class Chalumeau extends AudioWorkletProcessor {
     }
   }
 
+  /** The module's samples. Whole blocks have views that stay, so that playing leaves nothing to collect. */
   samples(channel, count) {
-    return new Float32Array(this.module.memory.buffer, this.module.chalumeau_channel(channel), count);
+    const { memory, chalumeau_channel: place } = this.module;
+    if (this.views?.[0].buffer !== memory.buffer) {
+      this.views = [0, 1].map((at) => new Float32Array(memory.buffer, place(at), this.module.chalumeau_most_frames()));
+      this.wholeBlocks = this.views.map((view) => view.subarray(0, 128));
+    }
+    return count === 128 ? this.wholeBlocks[channel] : this.views[channel].subarray(0, count);
   }
 
   /** Plays the messages of a score that are due; returns the samples until the next, or until the block ends. */

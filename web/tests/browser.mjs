@@ -31,7 +31,7 @@ const silence = (page) => until(page, LEVEL, 0, SILENT);
 /** The tests of one browser, each on a page of its own. */
 const TESTS = {
   async 'a key sounds within two seconds of the gesture, and stops'(browser) {
-    const { page, context, errors } = await open(browser, server.address, { serviceWorkers: 'block' });
+    const { page, context, errors } = await open(browser, server.address, { early: true, serviceWorkers: 'block' });
     const began = Date.now();
     await page.keyboard.down('d');
     await until(page, LEVEL, HEARD);

@@ -43,6 +43,8 @@ export async function open(browser, address, options = {}) {
     addEventListener('chalumeau', ({ detail }) => detail.picture && globalThis.told.push({ at: performance.now(), ...detail }));
   });
   await page.goto(address);
-  await page.waitForFunction(() => globalThis.chalumeau?.engine.node);
+  // From here on it takes keys; the module may still be on its way.
+  await page.waitForFunction(() => globalThis.chalumeau);
+  if (!options.early) await page.waitForFunction(() => globalThis.chalumeau.engine.node);
   return { page, context, errors };
 }
