@@ -2,7 +2,8 @@
 //
 // Air that hits a microphone makes noise: strong at low frequencies, and without a period. A voice has a period. A hissed
 // consonant has hardly anything below 500 Hz. A plosive is wind, but short. So the gate opens after wind alone for ONSET_S, and
-// closes where a period is found or the wind ends. The period is found by the normalised square difference of McLeod & Wyvill
+// closes where a period is found or the wind ends. The clarinet's own sound, which comes back from a loudspeaker, has a period too,
+// but nothing below 90 Hz, where wind is strong and speech weak: that keeps an open gate open. The period is found by the normalised square difference of McLeod & Wyvill
 // (2005), on a signal whose spectrum is flattened first: the slope of wind noise would look like a period.
 //
 // The page asks for two seconds of quiet, which set the floor. The loudest blow so far is fortissimo.
@@ -26,6 +27,8 @@ const PERIODS = [20, 100];
 const VOICED = 0.45;
 /** Least share of a wind's power below 500 Hz, of all above 40 Hz. Wind has 0.2 and more, a hissed s 0.02. */
 const WIND_SHARE = 0.2;
+/** From this share below 90 Hz on it is wind, whatever has a period. Speech stays below 0.045, most wind is above. */
+const DEEP_SHARE = 0.035;
 /** Time over which powers are taken together, s. */
 const MEAN_S = 0.015;
 /** Level of the softest blow over the room, dB. */
@@ -65,6 +68,7 @@ export class BlowMeter {
     this.rate = rate;
     this.rumble = new Filter(true, 40, rate);
     this.low = new Filter(false, 500, rate);
+    this.deep = [new Filter(false, 90, rate), new Filter(false, 90, rate)];
     this.slow = [new Filter(false, 3000, rate), new Filter(false, 3000, rate)];
     this.step = Math.round(STEP_S * rate);
     this.window = new Float32Array(WINDOW);
@@ -72,8 +76,8 @@ export class BlowMeter {
     this.phase = 0;
     this.before = 0;
     this.count = 0;
-    this.power = [0, 0];
-    this.mean = [0, 0];
+    this.power = [0, 0, 0];
+    this.mean = [0, 0, 0];
     this.floor = LEAST_FLOOR_DB;
     this.loud = LOUD_DB;
     this.breath = 0;
@@ -101,6 +105,8 @@ export class BlowMeter {
       const low = this.low.next(x);
       this.power[0] += x * x;
       this.power[1] += low * low;
+      const deep = this.deep[1].next(this.deep[0].next(x));
+      this.power[2] += deep * deep;
       const slow = this.slow[1].next(this.slow[0].next(x));
       this.phase += SLOW_HZ;
       if (this.phase >= this.rate) {
@@ -135,8 +141,8 @@ export class BlowMeter {
   decide() {
     const share = 1 - Math.exp(-STEP_S / MEAN_S);
     this.mean = this.mean.map((mean, n) => mean + share * (this.power[n] / this.step - mean));
-    const [all, low] = this.mean;
-    [this.power, this.count] = [[0, 0], 0];
+    const [all, low, deep] = this.mean;
+    [this.power, this.count] = [[0, 0, 0], 0];
     const level = db(all);
     this.level = level;
     if (this.quiet) {
@@ -153,7 +159,8 @@ export class BlowMeter {
     const softest = this.floor + OVER_ROOM_DB;
     const isLoud = level > softest;
     const isVoiced = isLoud && this.periodicity() > VOICED;
-    const isWind = isLoud && !isVoiced && low > WIND_SHARE * all;
+    const isHeardThrough = this.isOpen && deep > DEEP_SHARE * all;
+    const isWind = isLoud && (!isVoiced || isHeardThrough) && low > WIND_SHARE * all;
     this.unvoiced = isVoiced ? 0 : this.unvoiced + STEP_S;
     this.wind = isWind ? this.wind + STEP_S : Math.max(0, this.wind - 2 * STEP_S);
     this.calm = isWind ? 0 : this.calm + STEP_S;

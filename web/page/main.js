@@ -25,7 +25,10 @@ const ORIGINS = ['', 'CC2', 'CC11', 'channel pressure', 'the note'];
 const IDLE = 'Press a key, or drag across the clarinet. To blow, let the page hear your microphone.';
 
 const get = (id) => document.getElementById(id);
-const data = await (await fetch('data.json')).json();
+const data = await fetch('data.json').then((answer) => answer.json()).catch((error) => {
+  fail(error);
+  throw error;
+});
 const drawing = new ClarinetDrawing(get('clarinet'));
 const meter = new Meter(data.mezzoForte);
 const engine = new Engine(hear);
