@@ -3,7 +3,8 @@
 // Air that hits a microphone makes noise: strong at low frequencies, and without a period. A voice has a period. A hissed
 // consonant has hardly anything below 500 Hz. A plosive is wind, but short. So the gate opens after wind alone for ONSET_S, and
 // closes where a period is found or the wind ends. The clarinet's own sound, which comes back from a loudspeaker, has a period too,
-// but nothing below 90 Hz, where wind is strong and speech weak: that keeps an open gate open. The period is found by the normalised square difference of McLeod & Wyvill
+// but nothing below 90 Hz, where wind is strong and speech weak: that keeps an open gate open, and bounds the breath. Otherwise a
+// loud clarinet would blow itself. The period is found by the normalised square difference of McLeod & Wyvill
 // (2005), on a signal whose spectrum is flattened first: the slope of wind noise would look like a period.
 //
 // The page asks for two seconds of quiet, which set the floor. The loudest blow so far is fortissimo.
@@ -29,8 +30,10 @@ const VOICED = 0.45;
 const WIND_SHARE = 0.2;
 /** From this share below 90 Hz on it is wind, whatever has a period. Speech stays below 0.045, most wind is above. */
 const DEEP_SHARE = 0.035;
-/** Time over which powers are taken together, s. */
-const MEAN_S = 0.015;
+/** Time over which powers are taken together, s, and the power below 90 Hz, of which there is less. */
+const [MEAN_S, DEEP_S] = [0.015, 0.06];
+/** The breath may be so much louder than the wind below 90 Hz makes likely, dB: its power wanders. */
+const SLACK_DB = 5;
 /** Level of the softest blow over the room, dB. */
 const OVER_ROOM_DB = 12;
 /** The room is not believed to be quieter than this, dBFS: the breath of an h is softer than wind. */
@@ -78,6 +81,8 @@ export class BlowMeter {
     this.count = 0;
     this.power = [0, 0, 0];
     this.mean = [0, 0, 0];
+    this.deepMean = 0;
+    this.overDeepDb = 0;
     this.floor = LEAST_FLOOR_DB;
     this.loud = LOUD_DB;
     this.breath = 0;
@@ -145,6 +150,10 @@ export class BlowMeter {
     [this.power, this.count] = [[0, 0, 0], 0];
     const level = db(all);
     this.level = level;
+    this.deepMean += (1 - Math.exp(-STEP_S / DEEP_S)) * (deep - this.deepMean);
+    // How much of this wind lies below 90 Hz is learned before the clarinet sounds.
+    if (!this.isOpen) this.overDeepDb = level - db(this.deepMean);
+    const blown = this.isOpen ? Math.min(level, db(this.deepMean) + this.overDeepDb + SLACK_DB) : level;
     if (this.quiet) {
       this.quiet.levels.push(level);
       this.quiet.left -= 1;
@@ -166,9 +175,9 @@ export class BlowMeter {
     this.calm = isWind ? 0 : this.calm + STEP_S;
     if (!this.isOpen && this.wind >= ONSET_S && this.unvoiced >= UNVOICED_S) this.isOpen = true;
     if (this.isOpen && this.calm >= CLOSE_S) [this.isOpen, this.wind] = [false, 0];
-    if (this.isOpen) this.loud = Math.max(this.loud, level);
+    if (this.isOpen) this.loud = Math.max(this.loud, blown);
     const loudest = Math.max(this.loud, softest + 12);
-    const wanted = this.isOpen ? Math.min(1, Math.max(0.05, (level - softest) / (loudest - softest))) : 0;
+    const wanted = this.isOpen ? Math.min(1, Math.max(0.05, (blown - softest) / (loudest - softest))) : 0;
     const time = wanted > this.breath ? UP_S : DOWN_S;
     this.breath += (1 - Math.exp(-STEP_S / time)) * (wanted - this.breath);
     if (this.breath < 1e-3) this.breath = 0;

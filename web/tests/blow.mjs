@@ -47,6 +47,15 @@ for (const hz of [147, 233, 466]) {
   assert.ok(blown > 0.8, `${hz} Hz: blows for ${blown} of the time`);
   assert.equal(Math.max(...heard(own)), 0, `${hz} Hz alone`);
 }
+// The clarinet does not blow itself where it comes back as loud as the wind.
+const soft = blow(1.5, { level: 0.1 });
+const loud = Float32Array.from({ length: soft.length }, odd(233, 0.08));
+const [alone, beside] = [soft, soft.map((x, n) => x + (n > 0.2 * RATE ? loud[n] : 0))].map((samples) => {
+  const later = heard(samples).slice(Math.round((0.5 * RATE) / 128), Math.round((1.3 * RATE) / 128));
+  return later.reduce((sum, x) => sum + x, 0) / later.length;
+});
+assert.ok(beside < alone + 0.2 && beside > 0.05, `${alone} alone, ${beside} beside its own sound`);
+console.log(`a soft blow gives ${alone.toFixed(2)}, and ${beside.toFixed(2)} beside a clarinet that is as loud`);
 // Who speaks at the end of a blow does not go on blowing.
 for (const voice of ['en-us', 'en-gb+f3', 'en-us+m3']) {
   const after = heard(sequence(blow(0.8), speech(SENTENCES[1], voice, folder)));
