@@ -4,8 +4,8 @@
 //! - [`values`]: the settings as a list of numbers, which the page's presets and controls hold
 //! - `exports`: the C interface of the module
 //!
-//! One module holds one instrument, so that the interface passes no pointer in. The page's audio worklet makes one module for
-//! each instrument that it plays (`web/page/worklet.js`). `cargo xtask web` builds both.
+//! One module holds one instrument at a time, so that the interface passes no pointer in. The page's audio worklet plays one
+//! (`web/page/worklet.js`). `cargo xtask web` builds both.
 
 mod exports;
 pub mod playing;
