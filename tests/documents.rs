@@ -90,8 +90,18 @@ fn every_link_leads_somewhere() {
 
 /// A path of the repository that stands in a document: what begins with the name of one of its folders.
 fn repository_paths(text: &str) -> Vec<&str> {
-    const FOLDERS: [&str; 9] =
-        ["benches/", "crates/", "docs/", "examples/", "firmware/", "packaging/", "src/", "tests/", "xtask/"];
+    const FOLDERS: [&str; 10] = [
+        "benches/",
+        "crates/",
+        "docs/",
+        "examples/",
+        "firmware/",
+        "packaging/",
+        "src/",
+        "tests/",
+        "web/",
+        "xtask/",
+    ];
     let is_part = |c: char| c.is_alphanumeric() || "_-./*".contains(c);
     let words = text.split(|c: char| !is_part(c));
     words

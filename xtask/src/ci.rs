@@ -17,7 +17,7 @@ use crate::machine::{
     VALGRIND, VENV, X11_XCB, XCB, XKB, XVFB,
 };
 use crate::programs::{TESTS, programs, test_files};
-use crate::{COMMANDS, bundle, firmware, validate};
+use crate::{COMMANDS, bundle, firmware, validate, web};
 #[cfg(target_os = "linux")]
 use crate::{jack, window};
 
@@ -78,6 +78,7 @@ const STEPS: &[Step] = &[
     ("validators", validate::installed),
     ("Python examples", python_examples),
     ("Python package", python_package),
+    ("web", web::test),
     ("instructions", || machine::run(&mut Command::new("benches/instructions.sh"))),
 ];
 

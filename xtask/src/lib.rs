@@ -15,6 +15,7 @@ pub mod programs;
 pub mod simulator;
 pub mod touch_demo;
 pub mod validate;
+pub mod web;
 #[cfg(target_os = "linux")]
 pub mod window;
 pub mod wire_vectors;
@@ -60,6 +61,12 @@ pub const COMMANDS: &[Command] = &[
         name: "licences",
         about: "list the licences of all crates in the binaries, in target/bundled; takes targets, all systems by default",
         run: licences::run,
+        checks: false,
+    },
+    Command {
+        name: "web",
+        about: "build the clarinet for browsers into target/web; --serve [port] shows it on this machine",
+        run: web::run,
         checks: false,
     },
     #[cfg(target_os = "linux")]

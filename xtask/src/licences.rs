@@ -13,8 +13,20 @@ use serde_json::Value;
 
 use crate::machine;
 
-/// Every feature that may be handed on in binary form.
-const FEATURES: &str = "standalone,devices,cli";
+/// What is handed on in binary form: a package of ours, and its features.
+struct Product {
+    package: &'static str,
+    features: &'static [&'static str],
+}
+
+/// The plugin and the programs, with every feature that may be handed on.
+const PROGRAMS: Product = Product {
+    package: "chalumeau",
+    features: &["--no-default-features", "--features", "standalone,devices,cli"],
+};
+/// The module of the web page.
+const PAGE: Product = Product { package: "chalumeau-web", features: &[] };
+const PAGE_TARGET: &str = "wasm32-unknown-unknown";
 /// The systems that the plugin is bundled for.
 const TARGETS: &[&str] = &["x86_64-unknown-linux-gnu", "aarch64-apple-darwin", "x86_64-pc-windows-msvc"];
 /// Cargo's name for the system it runs on.
@@ -43,7 +55,7 @@ struct Package {
 /// `cargo xtask licences [target..]`: for all systems unless targets are named. Fetches crates that other systems need.
 pub fn run(args: &[String]) -> Result<()> {
     let named: Vec<_> = args.iter().map(String::as_str).collect();
-    write(if named.is_empty() { TARGETS } else { &named })
+    write(&PROGRAMS, if named.is_empty() { TARGETS } else { &named }, &bundled())
 }
 
 /// The list for the targets of a build with these options: the host unless they name one.
@@ -51,14 +63,24 @@ pub fn beside_bundles(options: &[String]) -> Result<()> {
     let mut words =
         options.iter().flat_map(|option| option.split('=')).skip_while(|word| *word != "--target");
     let target = words.nth(1);
-    write(&[target.unwrap_or(HOST)])
+    write(&PROGRAMS, &[target.unwrap_or(HOST)], &bundled())
 }
 
-fn write(targets: &[&str]) -> Result<()> {
+/// The list for the web page, in its folder.
+pub fn beside_page(folder: &Path) -> Result<()> {
+    write(&PAGE, &[PAGE_TARGET], folder)
+}
+
+fn bundled() -> PathBuf {
+    machine::target().join("bundled")
+}
+
+fn write(product: &Product, targets: &[&str], folder: &Path) -> Result<()> {
     let allowed = allowed(&fs::read_to_string(machine::root().join("deny.toml"))?)?;
     let mut packages = BTreeMap::new();
     for target in targets {
-        packages.extend(shipped(target)?.into_iter().map(|package| (package.title.clone(), package)));
+        packages
+            .extend(shipped(product, target)?.into_iter().map(|package| (package.title.clone(), package)));
     }
     let refused: Vec<_> = packages
         .values()
@@ -68,8 +90,7 @@ fn write(targets: &[&str]) -> Result<()> {
     ensure!(refused.is_empty(), "licences that deny.toml does not allow: {}", refused.join(", "));
     let packages = packages.into_values().map(|package| Ok((texts(&package)?, package)));
     let text = document(&packages.collect::<Result<Vec<_>>>()?);
-    let folder = machine::target().join("bundled");
-    fs::create_dir_all(&folder)?;
+    fs::create_dir_all(folder)?;
     let path = folder.join(FILE);
     fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
     println!("Created the list of licences at '{}'", path.display());
@@ -85,13 +106,12 @@ fn allowed(deny: &str) -> Result<BTreeSet<String>> {
 }
 
 /// The packages inside the binaries of one target; our own are not among them.
-fn shipped(target: &str) -> Result<Vec<Package>> {
-    let features = ["--no-default-features", "--features", FEATURES];
-    let tree = ["tree", "-p", "chalumeau", "-e", "normal,no-proc-macro", "--prefix", "none", "-f", "{p}"];
-    let tree = output(&[&tree[..], &features, &["--target", target]].concat())?;
+fn shipped(product: &Product, target: &str) -> Result<Vec<Package>> {
+    let tree = ["tree", "-p", product.package, "-e", "normal,no-proc-macro", "--prefix", "none", "-f", "{p}"];
+    let tree = output(&[&tree[..], product.features, &["--target", target]].concat())?;
     let inside: BTreeSet<_> = tree.lines().filter_map(title).collect();
     let metadata = ["metadata", "--format-version", "1", "--filter-platform", target];
-    let metadata = output(&[&metadata[..], &features].concat())?;
+    let metadata = output(&[&metadata[..], product.features].concat())?;
     let metadata: Value = serde_json::from_str(&metadata)?;
     let packages = metadata["packages"].as_array().context("cargo metadata names no packages")?;
     let packages: Vec<_> = packages.iter().map(package).collect::<Option<_>>().context("cargo metadata")?;

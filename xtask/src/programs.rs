@@ -54,8 +54,14 @@ fn build() -> Result<Programs> {
 /// Names of the test files that need neither a bundle nor a host, sorted.
 pub fn test_files() -> Result<Vec<String>> {
     let mut names = Vec::new();
-    for folder in ["tests", "crates/core/tests", "crates/knob/tests", "crates/figure/tests", "firmware/tests"]
-    {
+    for folder in [
+        "tests",
+        "crates/core/tests",
+        "crates/knob/tests",
+        "crates/figure/tests",
+        "firmware/tests",
+        "web/tests",
+    ] {
         let folder = machine::root().join(folder);
         if folder.exists() {
             for entry in fs::read_dir(&folder).with_context(|| format!("cannot list {}", folder.display()))? {

@@ -1,13 +1,13 @@
 //! Work on independent items: on all cores with the feature `threads`, one after another without it. The results are the
-//! same in both cases.
+//! same in both cases. WebAssembly has no threads: there the feature changes nothing.
 
 use std::ops::ControlFlow;
 
 /// Most threads for the short work of [`each_part`]: it limits the cost of starting them.
-#[cfg(feature = "threads")]
+#[cfg(all(feature = "threads", not(target_family = "wasm")))]
 const PARTS_MOST: usize = 8;
 
-#[cfg(feature = "threads")]
+#[cfg(all(feature = "threads", not(target_family = "wasm")))]
 fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
@@ -15,7 +15,7 @@ fn cores() -> usize {
 /// Calls `work` for each of `0..count` and returns the results in that order.
 ///
 /// `on` gets the share that is done, 0..=1, after each item. If it breaks, no new item is begun and the answer is `None`.
-#[cfg(feature = "threads")]
+#[cfg(all(feature = "threads", not(target_family = "wasm")))]
 pub fn each<T: Send>(
     count: usize,
     work: impl Fn(usize) -> T + Sync,
@@ -55,7 +55,7 @@ pub fn each<T: Send>(
 /// Calls `work` for each of `0..count` and returns the results in that order.
 ///
 /// `on` gets the share that is done, 0..=1, after each item. If it breaks, no new item is begun and the answer is `None`.
-#[cfg(not(feature = "threads"))]
+#[cfg(not(all(feature = "threads", not(target_family = "wasm"))))]
 pub fn each<T: Send>(
     count: usize,
     work: impl Fn(usize) -> T + Sync,
@@ -89,7 +89,7 @@ pub fn each_part<T: Sync>(
         rest = others;
         parts.push((item, own));
     }
-    #[cfg(feature = "threads")]
+    #[cfg(all(feature = "threads", not(target_family = "wasm")))]
     {
         let share = parts.len().div_ceil(cores().min(PARTS_MOST)).max(1);
         std::thread::scope(|scope| {
@@ -98,7 +98,7 @@ pub fn each_part<T: Sync>(
             }
         });
     }
-    #[cfg(not(feature = "threads"))]
+    #[cfg(not(all(feature = "threads", not(target_family = "wasm"))))]
     parts.into_iter().for_each(|(item, own)| work(item, own));
 }
 

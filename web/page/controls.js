@@ -1,0 +1,131 @@
+// The main controls: what most players need, with the names of the plugin's window.
+
+import { clamp } from './names.js';
+
+/** Id of the parameter, name, and what its ends mean. */
+const NAMES = {
+  lip: ['Lip', 'firm to loose'],
+  stren: ['Reed', 'soft to hard'],
+  tongue: ['Tongue', 'hard to soft'],
+  lay: ['Colour', 'bright to mellow'],
+  noise: ['Air', 'none to much'],
+  vib: ['Vibrato', 'none to deep'],
+  growl: ['Growl', 'none to rough'],
+  subt: ['Subtone', 'open to covered'],
+  room: ['Room', 'dry to far'],
+};
+/** Angle from one end to the other, degrees; pixels of a hand's way. */
+const [SWEEP, WAY] = [270, 180];
+
+const svg = (name, attributes) => {
+  const element = document.createElementNS('http://www.w3.org/2000/svg', name);
+  Object.entries(attributes).forEach(([key, value]) => element.setAttribute(key, value));
+  return element;
+};
+
+const point = (share, radius) => {
+  const angle = ((share - 0.5) * SWEEP * Math.PI) / 180;
+  return [50 + radius * Math.sin(angle), 50 - radius * Math.cos(angle)].map((x) => x.toFixed(2));
+};
+
+const arc = (from, to, radius) => `M ${point(from, radius)} A ${radius} ${radius} 0 ${(to - from) * SWEEP > 180 ? 1 : 0} 1 ${point(to, radius)}`;
+
+export class Control {
+  /** `of` is from data.json; `set` gets every new value. */
+  constructor(of, set) {
+    Object.assign(this, { of, set, value: of.default });
+    const [name, ends] = NAMES[of.id];
+    const element = document.createElement('div');
+    this.element = element;
+    element.className = 'knob';
+    element.id = `control-${of.id}`;
+    element.tabIndex = 0;
+    element.title = `${of.meaning}. ${of.sound}`;
+    Object.entries({ role: 'slider', 'aria-label': name, 'aria-valuemin': of.min, 'aria-valuemax': of.max }).forEach(([key, value]) => element.setAttribute(key, value));
+    const picture = svg('svg', { viewBox: '0 0 100 100', 'aria-hidden': 'true' });
+    const rest = this.share(of.default);
+    this.arc = svg('path', { class: 'value' });
+    this.hand = svg('line', { class: 'hand' });
+    const [x1, y1] = point(rest, 42);
+    const [x2, y2] = point(rest, 49);
+    picture.append(
+      svg('path', { class: 'track', d: arc(0, 1, 42) }),
+      this.arc,
+      svg('line', { class: 'rest', x1, y1, x2, y2 }),
+      svg('circle', { class: 'cap', cx: 50, cy: 50, r: 29 }),
+      this.hand,
+    );
+    this.says = Object.assign(document.createElement('small'), { textContent: ends });
+    this.ends = ends;
+    element.append(picture, Object.assign(document.createElement('b'), { textContent: name }), this.says);
+    element.addEventListener('pointerdown', (event) => this.grab(event));
+    element.addEventListener('dblclick', () => this.change(of.default));
+    element.addEventListener('keydown', (event) => this.key(event));
+    element.addEventListener('wheel', (event) => {
+      event.preventDefault();
+      this.nudge(-0.02 * Math.sign(event.deltaY));
+    }, { passive: false });
+    this.show();
+  }
+
+  share(value) {
+    return (value - this.of.min) / (this.of.max - this.of.min);
+  }
+
+  get text() {
+    return `${(this.value * this.of.scale).toFixed(Math.min(this.of.digits, this.of.scale === 100 ? 0 : 2))}${this.of.unit}`;
+  }
+
+  grab(event) {
+    const element = this.element;
+    const begin = { x: event.clientX, y: event.clientY, share: this.share(this.value) };
+    const move = (now) => {
+      // On a phone sideways scrolls.
+      const way = begin.y - now.clientY + (now.pointerType === 'mouse' ? now.clientX - begin.x : 0);
+      this.change(this.of.min + clamp(begin.share + way / WAY, 0, 1) * (this.of.max - this.of.min));
+    };
+    const end = () => {
+      element.removeEventListener('pointermove', move);
+      this.says.textContent = this.ends;
+    };
+    element.setPointerCapture(event.pointerId);
+    element.addEventListener('pointermove', move);
+    for (const type of ['pointerup', 'pointercancel']) element.addEventListener(type, end, { once: true });
+    this.says.textContent = this.text;
+  }
+
+  key(event) {
+    const steps = { ArrowUp: 0.02, ArrowRight: 0.02, ArrowDown: -0.02, ArrowLeft: -0.02, PageUp: 0.1, PageDown: -0.1 };
+    if (event.key in steps) this.nudge(steps[event.key]);
+    else if (event.key === 'Home') this.change(this.of.min);
+    else if (event.key === 'End') this.change(this.of.max);
+    else if (event.key === 'Delete' || event.key === 'Backspace') this.change(this.of.default);
+    else return;
+    event.preventDefault();
+    event.stopPropagation();
+  }
+
+  nudge(step) {
+    this.change(this.of.min + clamp(this.share(this.value) + step, 0, 1) * (this.of.max - this.of.min));
+  }
+
+  change(value) {
+    this.show(value);
+    this.says.textContent = this.text;
+    clearTimeout(this.later);
+    this.later = setTimeout(() => (this.says.textContent = this.ends), 1500);
+    this.set(this.of.place, this.value);
+  }
+
+  /** Shows a value that was set elsewhere. */
+  show(value = this.value) {
+    this.value = value;
+    const [at, rest] = [clamp(this.share(value), 0, 1), this.share(this.of.default)];
+    // What is set, from where it rests: at its default a control is quiet.
+    this.arc.setAttribute('d', Math.abs(at - rest) < 0.004 ? '' : arc(Math.min(at, rest), Math.max(at, rest), 42));
+    const [[x1, y1], [x2, y2]] = [point(at, 12), point(at, 26)];
+    Object.entries({ x1, y1, x2, y2 }).forEach(([key, place]) => this.hand.setAttribute(key, place));
+    this.element.setAttribute('aria-valuenow', value.toPrecision(4));
+    this.element.setAttribute('aria-valuetext', this.text);
+  }
+}

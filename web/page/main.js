@@ -1,0 +1,210 @@
+// The page: brings sound, hands and pictures together.
+
+import { ClarinetDrawing } from './clarinet.js';
+import { Control } from './controls.js';
+import { Drag } from './drag.js';
+import { Engine } from './engine.js';
+import { Hands } from './hands.js';
+import { Keyboard } from './keyboard.js';
+import { Meter } from './meter.js';
+import { Midi } from './midi.js';
+import { noteName } from './names.js';
+import { Presets } from './presets.js';
+import { Typing } from './typing.js';
+
+/** Places in the worklet's picture. */
+const [KEY, SOUNDING, FINGERING, MOUTH, GAMMA, DYNAMIC, PEAK, LEVEL, ORIGIN] = Array.from({ length: 9 }, (_, n) => n);
+/** Below this level nothing is heard, dBFS. */
+const SILENT_DB = -66;
+/** Range of the output's level, dBFS to full scale. */
+const LEVEL_DB = 48;
+/** Time of silence after which the sound is switched off until the next gesture, s: a page at rest costs nothing. */
+const REST_S = 120;
+/** What breath comes from, by the picture's number. */
+const ORIGINS = ['', 'CC2', 'CC11', 'channel pressure', 'the note'];
+const IDLE = 'Press a key, or drag across the clarinet. To blow, let the page hear your microphone.';
+
+const get = (id) => document.getElementById(id);
+const data = await fetch('data.json').then((answer) => answer.json()).catch((error) => {
+  fail(error);
+  throw error;
+});
+const drawing = new ClarinetDrawing(get('clarinet'));
+const meter = new Meter(data.mezzoForte);
+const engine = new Engine(hear);
+const hands = new Hands((message) => engine.send(message));
+const keyboard = new Keyboard(get('keyboard'), hands, breathe);
+const drag = new Drag(get('clarinet'), hands, breathe, (touches) => {
+  drawing.touch(touches.map(({ x, y, note }) => ({ x, y, name: noteName(note + instrument.transposition) })));
+});
+const typing = new Typing(hands, breathe, (said) => {
+  if (said.letters) keyboard.setLetters(said.letters);
+  if (said.base) keyboard.show(said.base);
+  if (said.start) begin();
+  if (said.silence) hands.silence();
+});
+const controls = data.controls.map((of) => new Control(of, (place, value) => engine.send({ set: [place, value] })));
+get('controls').append(...controls.map((control) => control.element));
+new Presets(data.presets, choose);
+let instrument = data.instruments[0];
+let isTouched = false;
+let blowing = false;
+
+data.instruments.forEach(({ name }, at) => get('instrument').append(new Option(name, at)));
+get('instrument').onchange = (event) => {
+  setInstrument(Number(event.target.value));
+  // The computer's keys are for playing again.
+  event.target.blur();
+};
+setInstrument(0);
+get('lower').onclick = () => keyboard.shift(-1);
+get('higher').onclick = () => keyboard.shift(1);
+get('volume').oninput = (event) => engine.setVolume(event.target.value / 100);
+engine.setVolume(get('volume').value / 100);
+say();
+
+for (const type of ['pointerdown', 'pointerup', 'keydown']) addEventListener(type, begin, { capture: true });
+// A page that nobody sees holds no key.
+document.addEventListener('visibilitychange', () => document.hidden && !blowing && hands.releaseAll());
+
+function begin() {
+  lastHeard = performance.now();
+  engine.start().catch(fail);
+}
+
+function fail(error) {
+  get('hint').classList.add('failed');
+  say(`No sound: ${error.message ?? error}. Reload the page to try again.`);
+}
+
+function say(text = IDLE) {
+  get('hint').textContent = text;
+}
+
+/** Breath of hands on the screen or of arrow keys; null when they let go. The microphone's breath stays what it is. */
+function breathe(breath) {
+  if (blowing || (breath === null && !isTouched)) return;
+  isTouched = breath !== null;
+  engine.send({ breath });
+}
+
+function setInstrument(at) {
+  hands.releaseAll();
+  instrument = data.instruments[at];
+  if (engine.instrument !== at) {
+    engine.instrument = at;
+    engine.send({ instrument: at });
+  }
+  get('instrument').value = at;
+  const sounding = (fingering) => fingering.written - instrument.transposition;
+  const all = instrument.fingerings.map(sounding);
+  const silent = new Set(instrument.fingerings.filter((fingering) => !fingering.speaks).map(sounding));
+  const [first, last] = [Math.min(...all), Math.max(...all)];
+  keyboard.setRange(first, last, silent);
+  typing.setRange(first, last);
+  drag.notes = [...new Set(all)].sort((a, b) => a - b).filter((note) => !silent.has(note));
+  drawing.setInstrument(instrument);
+}
+
+function choose(preset) {
+  const at = preset.instrument;
+  if (data.instruments[at] !== instrument) setInstrument(at);
+  const values = data.defaults.map((value, place) => preset.values[place] ?? value);
+  engine.send({ values, wheel: preset.wheel, bend: preset.bend, breathFrom: preset.breathFrom });
+  controls.forEach((control) => control.show(values[control.of.place]));
+  meter.setPhysical(values[data.defaults.length - 11] === 1);
+}
+
+/** What the worklet tells. */
+function hear(message) {
+  if (message.failed) fail(message.failed);
+  if ('blowing' in message) get('microphone').classList.toggle('blowing', message.blowing);
+  if (message.picture) draw(message.picture, message.microphone);
+  dispatchEvent(new CustomEvent('chalumeau', { detail: message }));
+}
+
+let spoken = '';
+let lastHeard = performance.now();
+
+function draw(picture, room) {
+  const level = 20 * Math.log10(picture[LEVEL] + 1e-9);
+  const sounds = level > SILENT_DB;
+  const note = picture[SOUNDING];
+  const peak = 20 * Math.log10(picture[PEAK] * (engine.gain ?? 1) + 1e-9);
+  get('level').style.transform = `translateY(${(100 * Math.min(1, Math.max(0, -peak / LEVEL_DB))).toFixed(1)}%)`;
+  if (sounds || blowing || hands.held.size > 0) lastHeard = performance.now();
+  else if (performance.now() - lastHeard > 1000 * REST_S) engine.rest();
+  const has = note >= 0 && (sounds || picture[KEY] >= 0);
+  drawing.follow(has || sounds ? picture[FINGERING] : drawing.fingering, sounds ? level : -120, Math.min(1, picture[MOUTH] / 4));
+  keyboard.mark(has && sounds ? note : undefined);
+  if (has) {
+    const written = noteName(note + instrument.transposition);
+    get('written').textContent = written;
+    get('sounding').textContent = instrument.transposition === 0 ? 'written and sounding' : `written · sounds ${noteName(note)}`;
+  }
+  get('written').style.opacity = sounds ? 1 : 0.45;
+  meter.follow(picture[DYNAMIC], picture[GAMMA], picture[MOUTH]);
+  tellBreath(picture[ORIGIN], room);
+}
+
+/** Where the breath comes from, and what the microphone waits for. */
+function tellBreath(origin, room) {
+  let text = isTouched ? 'Breath: your hand' : 'Breath: keys';
+  if (origin > 0 && !isTouched) text = `Breath found: ${ORIGINS[origin]}`;
+  let hint = IDLE;
+  if (room?.calibrating) {
+    hint = 'Measuring the room for two seconds. Please be quiet …';
+    text = 'Microphone';
+  } else if (room) {
+    hint = 'Blow at the microphone. A key or a drag chooses the note.';
+    text = 'Breath: microphone';
+  } else if (engine.isRunning && spoken) hint = '';
+  if (hint !== IDLE) spoken = hint || spoken;
+  if (hands.held.size > 0) spoken ||= ' ';
+  meter.say(text);
+  if (!get('hint').classList.contains('failed') && get('hint').textContent !== hint) say(hint);
+}
+
+async function toggleMicrophone() {
+  const button = get('microphone');
+  if (blowing) {
+    blowing = false;
+    engine.closeMicrophone();
+    hands.blow(false, instrument.transposition);
+  } else {
+    try {
+      await engine.start();
+      await engine.openMicrophone();
+    } catch (error) {
+      say(error.name === 'NotAllowedError' ? 'The browser was not allowed to use the microphone.' : `No microphone: ${error.message}`);
+      return;
+    }
+    blowing = true;
+    hands.blow(true, instrument.transposition);
+  }
+  button.setAttribute('aria-pressed', blowing);
+  button.classList.remove('blowing');
+}
+
+get('microphone').onclick = toggleMicrophone;
+if (!navigator.mediaDevices?.getUserMedia) get('microphone').hidden = true;
+
+const midi = new Midi(hands, (message) => engine.send(message), ({ inputs, message }) => {
+  if (inputs) {
+    get('midi').setAttribute('aria-pressed', inputs.length > 0);
+    get('midi').title = inputs.length > 0 ? inputs.join(', ') : 'No MIDI device is connected.';
+    say(inputs.length > 0 ? `MIDI: ${inputs.join(', ')}` : 'No MIDI device is connected. Plug one in; it is found by itself.');
+  }
+  if (message) begin();
+});
+const openMidi = () => midi.open().catch(() => say('The browser was not allowed to use MIDI.'));
+get('midi').onclick = openMidi;
+get('midi').hidden = !Midi.isHere;
+// Where it has been allowed before, nobody needs to ask again.
+navigator.permissions?.query({ name: 'midi' }).then(({ state }) => state === 'granted' && Midi.isHere && openMidi(), () => {});
+
+if ('serviceWorker' in navigator) navigator.serviceWorker.register('sw.js').catch(() => {});
+
+/** For tests. */
+globalThis.chalumeau = { engine, hands };
+engine.prepare().catch(fail);

@@ -1,0 +1,66 @@
+// The presets: one after another, or by name in a list that can be searched.
+
+export class Presets {
+  /** `choose` gets a preset. */
+  constructor(all, choose) {
+    Object.assign(this, { all, choose, at: 0 });
+    const get = (id) => document.getElementById(id);
+    [this.dialog, this.search, this.list] = ['browser', 'search', 'list'].map(get);
+    get('previous').onclick = () => this.go(this.at - 1);
+    get('next').onclick = () => this.go(this.at + 1);
+    get('browse').onclick = () => this.open();
+    this.search.oninput = () => this.fill();
+    // Enter takes the first that is found.
+    this.search.onkeydown = (event) => {
+      if (event.key !== 'Enter') return;
+      event.preventDefault();
+      this.list.querySelector('button')?.click();
+    };
+    this.dialog.onclick = (event) => event.target === this.dialog && this.dialog.close();
+    this.show();
+  }
+
+  go(at) {
+    this.at = (at + this.all.length) % this.all.length;
+    this.show();
+    this.choose(this.all[this.at]);
+  }
+
+  show() {
+    const { name, tags, shows } = this.all[this.at];
+    document.getElementById('preset').textContent = name;
+    document.getElementById('tags').textContent = tags.join(' · ');
+    document.getElementById('browse').title = shows;
+  }
+
+  open() {
+    this.search.value = '';
+    this.fill();
+    this.dialog.showModal();
+    this.list.querySelector('[aria-current=true]')?.scrollIntoView({ block: 'center' });
+  }
+
+  fill() {
+    const words = this.search.value.toLowerCase().split(/\s+/).filter(Boolean);
+    const found = this.all.map((preset, at) => ({ ...preset, at })).filter(({ name, tags, shows }) => {
+      const text = `${name} ${tags.join(' ')} ${shows}`.toLowerCase();
+      return words.every((word) => text.includes(word));
+    });
+    this.list.replaceChildren(...found.map((preset) => this.row(preset)));
+    if (found.length === 0) this.list.append(Object.assign(document.createElement('li'), { textContent: 'No preset has all these words.', className: 'quiet' }));
+  }
+
+  row({ name, tags, shows, at }) {
+    const button = document.createElement('button');
+    button.setAttribute('aria-current', at === this.at);
+    const part = (kind, textContent) => Object.assign(document.createElement(kind), { textContent });
+    button.append(part('i', tags.join(' · ')), name, part('small', shows));
+    button.onclick = () => {
+      this.dialog.close();
+      this.go(at);
+    };
+    const row = document.createElement('li');
+    row.append(button);
+    return row;
+  }
+}

@@ -1,0 +1,23 @@
+// Keeps the page, so that it opens without a network. `cargo xtask web` fills in version and files.
+
+const NAME = 'chalumeau-VERSION';
+const FILES = [/* FILES */];
+
+addEventListener('install', (event) => {
+  // From the server, not from the browser's own store, whose files may be of different versions.
+  const all = ['./', ...FILES].map((file) => new Request(file, { cache: 'reload' }));
+  event.waitUntil(caches.open(NAME).then((cache) => cache.addAll(all)).then(() => skipWaiting()));
+});
+
+addEventListener('activate', (event) => {
+  const old = (name) => name.startsWith('chalumeau-') && name !== NAME;
+  event.waitUntil(
+    caches.keys().then((names) => Promise.all(names.filter(old).map((name) => caches.delete(name)))).then(() => clients.claim()),
+  );
+});
+
+// One version at a time: what was kept goes together, and a new version comes whole.
+addEventListener('fetch', (event) => {
+  if (event.request.method !== 'GET' || new URL(event.request.url).origin !== location.origin) return;
+  event.respondWith(caches.match(event.request, { cacheName: NAME, ignoreSearch: true }).then((kept) => kept ?? fetch(event.request)));
+});

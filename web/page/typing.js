@@ -1,0 +1,70 @@
+// The computer's keys as a piano: the row of A has the white keys, the row above the black ones. Places on the keyboard count,
+// not letters, so that every layout has the same hand.
+
+import { clamp } from './names.js';
+
+const CODES = ['KeyA', 'KeyW', 'KeyS', 'KeyE', 'KeyD', 'KeyF', 'KeyT', 'KeyG', 'KeyY', 'KeyH', 'KeyU', 'KeyJ', 'KeyK', 'KeyO', 'KeyL', 'KeyP', 'Semicolon', 'Quote'];
+/** Step of the breath, and where it begins. */
+const [STEP, BEGIN] = [0.08, 0.66];
+
+export class Typing {
+  /** `on` gets { letters }, { start } and { silence }; `breathe` the breath that the arrows set, or null. */
+  constructor(hands, breathe, on) {
+    Object.assign(this, { hands, breathe, on, held: new Map(), base: 60, breath: BEGIN });
+    addEventListener('keydown', (event) => this.down(event));
+    addEventListener('keyup', (event) => this.up(event.code));
+    // Keys that come up elsewhere are not told.
+    addEventListener('blur', () => [...this.held.keys()].forEach((code) => this.up(code)));
+    navigator.keyboard?.getLayoutMap?.().then((map) => {
+      this.layout = map;
+      this.tell();
+    }, () => {});
+  }
+
+  setRange(first, last) {
+    [this.first, this.last] = [first, last];
+    this.moveTo(this.base);
+  }
+
+  moveTo(base) {
+    this.base = clamp(base, 12 * Math.floor(this.first / 12), 12 * Math.floor(this.last / 12));
+    this.tell();
+  }
+
+  tell() {
+    const usual = { Semicolon: ';', Quote: "'" };
+    const letter = (code) => (this.layout?.get(code) ?? usual[code] ?? code.slice(3)).toUpperCase();
+    this.on({ letters: new Map(CODES.map((code, n) => [this.base + n, letter(code)])), base: this.base });
+  }
+
+  down(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches?.('input[type=search], dialog *')) return;
+    if (event.code === 'Escape') return this.on({ silence: true });
+    if (event.target.matches?.('select')) return;
+    const onControl = event.target.matches?.('[role=slider], input');
+    const place = CODES.indexOf(event.code);
+    if (place >= 0) {
+      event.preventDefault();
+      if (event.repeat || this.held.has(event.code)) return;
+      const note = this.base + place;
+      if (note < this.first || note > this.last) return;
+      this.held.set(event.code, note);
+      this.on({ start: true });
+      this.hands.press(note, Math.round(127 * this.breath));
+    } else if (event.code === 'KeyZ' || event.code === 'KeyX') {
+      this.moveTo(this.base + (event.code === 'KeyX' ? 12 : -12));
+    } else if (!onControl && (event.code === 'ArrowUp' || event.code === 'ArrowDown')) {
+      event.preventDefault();
+      this.breath = clamp(this.breath + (event.code === 'ArrowUp' ? STEP : -STEP), 0.06, 1);
+      if (this.held.size > 0) this.breathe(this.breath);
+    }
+  }
+
+  up(code) {
+    const note = this.held.get(code);
+    if (note === undefined) return;
+    this.held.delete(code);
+    if (![...this.held.values()].includes(note)) this.hands.release(note);
+    if (this.held.size === 0) this.breathe(null);
+  }
+}

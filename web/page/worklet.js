@@ -1,0 +1,156 @@
+// The audio thread: the WebAssembly module, and the microphone's breath.
+//
+// Messages in: { midi: [status, a, b] }, { breath: 0..1 or null }, { values: [..] }, { set: [place, value] },
+// { instrument: n }, { wheel: n }, { bend: semitones }, { breathFrom: n }, { silence: true },
+// { microphone: true or false, calibrate: seconds }, { score: messages } with the sample of each first, { times: true }.
+// Messages out: { picture: [..], microphone: .. } 30 times a second, { blowing: true or false }, { times: .. }, { failed: text }.
+
+import { BlowMeter } from './blow.js';
+
+/** Time between two pictures, s. */
+const PICTURE_S = 1 / 30;
+/** Blocks of which the times are kept: eleven seconds. */
+const TIMES = 4096;
+
+// Most browsers give this scope no clock but that of milliseconds; their mean over many blocks is finer.
+const now = () => globalThis.performance?.now() ?? Date.now();
+
+class Chalumeau extends AudioWorkletProcessor {
+  constructor({ processorOptions: { module, instrument, score } }) {
+    super();
+    this.module = new WebAssembly.Instance(module, {}).exports;
+    this.until = 0;
+    this.times = new Float32Array(TIMES);
+    this.blocks = 0;
+    this.listening = false;
+    this.wasOpen = false;
+    this.score = null;
+    this.guarded(() => {
+      if (!this.module.chalumeau_begin(sampleRate, instrument)) throw new Error(`no instrument at ${sampleRate} Hz`);
+    });
+    if (score) this.guarded(() => this.take(score));
+    this.port.onmessage = ({ data }) => this.guarded(() => this.take(data));
+  }
+
+  /** What fails is told once, and silent from then on. */
+  guarded(work) {
+    if (this.failed) return;
+    try {
+      work();
+    } catch (error) {
+      this.failed = true;
+      this.port.postMessage({ failed: String(error) });
+    }
+  }
+
+  take(message) {
+    const module = this.module;
+    if (message.midi) module.chalumeau_midi(...message.midi);
+    if ('breath' in message) module.chalumeau_breath(message.breath ?? -1);
+    if (message.values) {
+      message.values.forEach((value, place) => module.chalumeau_set(place, value));
+      module.chalumeau_settle();
+    }
+    if (message.set) {
+      module.chalumeau_set(...message.set);
+      module.chalumeau_settle();
+    }
+    if ('instrument' in message) {
+      module.chalumeau_begin(sampleRate, message.instrument);
+      // It lies elsewhere now.
+      this.views = null;
+    }
+    if ('wheel' in message) module.chalumeau_wheel(message.wheel);
+    if ('bend' in message) module.chalumeau_bend_range(message.bend);
+    if ('breathFrom' in message) module.chalumeau_breath_from(message.breathFrom);
+    if (message.silence) module.chalumeau_silence();
+    if ('microphone' in message) this.listen(message.microphone);
+    if (message.calibrate) this.blow?.calibrate(message.calibrate);
+    if (message.score) this.score = { messages: message.score, at: 0, next: 0 };
+    if (message.times) this.tellTimes();
+  }
+
+  listen(on) {
+    if (on) this.blow ??= new BlowMeter(sampleRate);
+    if (this.listening && !on) this.module.chalumeau_breath(-1);
+    this.listening = on;
+  }
+
+  hear(input) {
+    if (!this.listening) return;
+    // Nobody blows while the room is measured, or before the device is open.
+    this.module.chalumeau_breath(input ? this.blow.process(input) : 0);
+    if (this.blow.isOpen !== this.wasOpen) {
+      this.wasOpen = this.blow.isOpen;
+      this.port.postMessage({ blowing: this.wasOpen });
+    }
+  }
+
+  process([input], [output]) {
+    const began = now();
+    this.guarded(() => this.play(input[0], output));
+    this.times[this.blocks % TIMES] = now() - began;
+    this.blocks += 1;
+    return true;
+  }
+
+  play(input, output) {
+    this.hear(input);
+    const frames = output[0].length;
+    let done = 0;
+    while (done < frames) {
+      const made = this.module.chalumeau_process(this.score ? this.scored(frames - done) : frames - done);
+      if (made === 0) return;
+      for (let at = 0; at < output.length; at += 1) output[at].set(this.samples(at, made), done);
+      done += made;
+      if (this.score) this.score.at += made;
+    }
+    if (currentTime >= this.until) {
+      this.until = currentTime + PICTURE_S;
+      this.tellPicture();
+    }
+  }
+
+  /** The module's samples. Whole blocks have views that stay, so that playing leaves nothing to collect. */
+  samples(channel, count) {
+    const { memory, chalumeau_channel: place } = this.module;
+    if (this.views?.[0].buffer !== memory.buffer) {
+      this.views = [0, 1].map((at) => new Float32Array(memory.buffer, place(at), this.module.chalumeau_most_frames()));
+      this.wholeBlocks = this.views.map((view) => view.subarray(0, 128));
+    }
+    return count === 128 ? this.wholeBlocks[channel] : this.views[channel].subarray(0, count);
+  }
+
+  /** Plays the messages of a score that are due; returns the samples until the next, or until the block ends. */
+  scored(most) {
+    const score = this.score;
+    while (score.next < score.messages.length && score.messages[score.next][0] <= score.at) {
+      const [, what, ...rest] = score.messages[score.next];
+      score.next += 1;
+      if (what === 'breath') this.take({ breath: rest[0] });
+      else if (what === 'set') this.take({ set: rest });
+      else this.take({ midi: [what, ...rest] });
+    }
+    const until = score.messages[score.next]?.[0] ?? Infinity;
+    return Math.min(most, until - score.at);
+  }
+
+  tellPicture() {
+    const picture = new Float32Array(this.module.memory.buffer, this.module.chalumeau_picture(), 11);
+    const room = this.listening
+      ? { level: this.blow.level, floor: this.blow.floor, breath: this.blow.breath, calibrating: this.blow.isCalibrating }
+      : null;
+    this.port.postMessage({ picture: Array.from(picture), microphone: room });
+  }
+
+  tellTimes() {
+    const times = this.times.slice(0, Math.min(this.blocks, TIMES)).sort();
+    const mean = times.reduce((sum, time) => sum + time, 0) / Math.max(1, times.length);
+    const at = (share) => times[Math.floor(share * (times.length - 1))] ?? 0;
+    this.port.postMessage({
+      times: { blocks: times.length, deadline: (1000 * 128) / sampleRate, mean, p99: at(0.99), worst: at(1) },
+    });
+  }
+}
+
+registerProcessor('chalumeau', Chalumeau);

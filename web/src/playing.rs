@@ -1,0 +1,187 @@
+//! The instrument as the page plays it: MIDI messages and breath in, blocks of two channels out.
+//!
+//! MIDI is decoded by the core, as in the plugin. Everything here is real-time safe, but for [`Playing::new`].
+
+use std::sync::Arc;
+
+use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::control::midi::BreathOrigin;
+use chalumeau_core::control::midi::breath::{BreathController, BreathFrom};
+use chalumeau_core::control::midi::techniques::Wheel;
+use chalumeau_core::control::parts::Parts;
+use chalumeau_core::event::{Event, PartEvent, Timed};
+use chalumeau_core::instrument::stereo::Stereo;
+use chalumeau_core::instrument::{BuildError, Channels, Ensemble, Preparation, Settings, Wanted};
+
+use crate::values;
+
+/// Most samples of one block: eight of an audio worklet's.
+pub const MOST_FRAMES: usize = 1_024;
+/// Numbers of a [picture](Playing::picture).
+pub const PICTURE: usize = 11;
+
+/// One instrument with its players, at one sample rate.
+pub struct Playing {
+    ensemble: Ensemble,
+    parts: Parts,
+    stereo: Stereo,
+    settings: Settings,
+    channels: [[f32; MOST_FRAMES]; 2],
+    picture: [f32; PICTURE],
+    peak: f32,
+    /// Sum of squares since the last picture, and of how many samples.
+    energy: (f32, u32),
+}
+
+/// Applies what a message became, in its order.
+fn play(ensemble: &mut Ensemble, stereo: &mut Stereo, said: &[PartEvent]) {
+    for &event in said {
+        if ensemble.is_lone() {
+            stereo.heed(&Timed { at: 0, event: event.event });
+        }
+        ensemble.apply(event);
+    }
+}
+
+impl Playing {
+    /// An instrument at rest, at a host rate in Hz. Allocates.
+    ///
+    /// # Errors
+    /// [`BuildError::Rate`] if the rate lies outside 1000..=1536000.
+    pub fn new(rate_hz: f64, instrument: Bundled) -> Result<Self, BuildError> {
+        let wanted = Wanted::new(instrument.file(), rate_hz);
+        let ready = Preparation::new(&wanted, None).ready()?;
+        let model = ready.ok_or_else(|| BuildError::Data(format!("nothing for {rate_hz} Hz")))?;
+        Ok(Self {
+            ensemble: Ensemble::new(Arc::new(model), rate_hz),
+            parts: Parts::new(1),
+            stereo: Stereo::new(rate_hz),
+            settings: Settings::default(),
+            channels: [[0.0; MOST_FRAMES]; 2],
+            picture: [0.0; PICTURE],
+            peak: 0.0,
+            energy: (0.0, 0),
+        })
+    }
+
+    /// A MIDI channel message. Other messages are ignored; data bytes above 127 are read as 127.
+    pub fn midi(&mut self, status: u8, first: u8, second: u8) {
+        let (channel, parts) = (status & 0x0f, &mut self.parts);
+        let said = match status & 0xf0 {
+            0x80 => parts.note_off(channel, first),
+            0x90 => parts.note_on(channel, first, second),
+            0xb0 => parts.controller(channel, first, second),
+            0xd0 => parts.pressure(channel, first),
+            0xe0 => {
+                let [low, high] = [first, second].map(|byte| u16::from(byte.min(127)));
+                parts.bend(channel, high << 7 | low)
+            }
+            _ => &[],
+        };
+        play(&mut self.ensemble, &mut self.stereo, said);
+    }
+
+    /// Breath of all players, 0..=1; `None`, or what is not a number, gives the breath back to the keys.
+    pub fn breath(&mut self, unit: Option<f32>) {
+        let event = match unit {
+            Some(unit) if !unit.is_nan() => Event::Breath(unit.clamp(0.0, 1.0)),
+            _ => Event::BreathFromKeys,
+        };
+        self.ensemble.apply(event.into());
+    }
+
+    /// Ends everything that sounds, at once.
+    pub fn silence(&mut self) {
+        play(&mut self.ensemble, &mut self.stereo, self.parts.silence());
+    }
+
+    /// Changes one of the [values]; [`settle`](Self::settle) brings it to the instrument.
+    pub fn set(&mut self, at: usize, value: f32) {
+        values::set(&mut self.settings, at, value);
+    }
+
+    /// Takes the settings as they have been set.
+    pub fn settle(&mut self) {
+        self.ensemble.set_settings(&self.settings);
+        self.settings = *self.ensemble.first().settings();
+        self.stereo.set_room(&self.settings.room);
+        self.parts.set_count(self.settings.players.count.clamp(1, 16) as usize);
+    }
+
+    /// What the mod wheel does, by its place in [`Wheel::ALL`].
+    pub fn wheel(&mut self, at: usize) {
+        let said = self.parts.set_wheel(Wheel::ALL.get(at).copied().unwrap_or_default());
+        play(&mut self.ensemble, &mut self.stereo, said);
+    }
+
+    /// How far the bend wheel bends, semitones.
+    pub fn bend_range(&mut self, semitones: u8) {
+        play(&mut self.ensemble, &mut self.stereo, self.parts.usual_bend_range(semitones.min(127)));
+    }
+
+    /// Which controllers may blow, by the place in [`BreathFrom::ALL`].
+    pub fn breath_from(&mut self, at: usize) {
+        let said = self.parts.set_breath_from(BreathFrom::ALL.get(at).copied().unwrap_or_default());
+        play(&mut self.ensemble, &mut self.stereo, said);
+    }
+
+    /// Takes over keys, breath and bend from another instrument, which this one replaces.
+    pub fn carry_on(&mut self, from: Self) {
+        self.parts = from.parts;
+        self.settings = from.settings;
+        self.settle();
+        self.ensemble.carry_on(&from.ensemble);
+    }
+
+    /// Makes the next samples, [`MOST_FRAMES`] at most; returns how many.
+    pub fn process(&mut self, frames: usize) -> usize {
+        let frames = frames.min(MOST_FRAMES);
+        let [left, right] = &mut self.channels;
+        let (left, right) = (&mut left[..frames], &mut right[..frames]);
+        self.ensemble.render_channels(Channels::two(left, right));
+        self.stereo.pan(left, right);
+        for channel in [left, right] {
+            for sample in channel {
+                self.peak = self.peak.max(sample.abs());
+                self.energy.0 += *sample * *sample;
+            }
+        }
+        self.energy.1 = self.energy.1.saturating_add(2 * frames as u32);
+        frames
+    }
+
+    /// The samples of the last block; the left channel is 0.
+    pub fn channel(&self, at: usize) -> &[f32; MOST_FRAMES] {
+        &self.channels[usize::from(at == 1)]
+    }
+
+    /// What the page draws, -1 where there is none: held key and sounding note, index of the fingering, mouth pressure in kPa,
+    /// the same over the closing pressure, dynamic 0..=1, peak and root mean square of the samples since the last picture, origin
+    /// of the breath (1 CC2, 2 CC11, 3 pressure, 4 a note), players awake, and how often the voice was reset.
+    pub fn picture(&mut self) -> &[f32; PICTURE] {
+        let state = self.ensemble.first().player_state();
+        let origin = match self.parts.breath_origin() {
+            None => 0.0,
+            Some(BreathOrigin::Controller(BreathController::Breath)) => 1.0,
+            Some(BreathOrigin::Controller(BreathController::Expression)) => 2.0,
+            Some(BreathOrigin::Controller(BreathController::Pressure)) => 3.0,
+            Some(_) => 4.0,
+        };
+        let (energy, samples) = std::mem::take(&mut self.energy);
+        let closing_kpa = (1e-3 * self.settings.under_lip(state.lip).closing_pa()) as f32;
+        self.picture = [
+            state.key.map_or(-1.0, |note| f32::from(note.0)),
+            state.sounding.map_or(-1.0, |note| f32::from(note.0)),
+            state.fingering as f32,
+            state.mouth_kpa,
+            state.mouth_kpa / closing_kpa,
+            state.dynamic.unwrap_or(-1.0),
+            std::mem::take(&mut self.peak),
+            (energy / samples.max(1) as f32).sqrt(),
+            origin,
+            self.ensemble.awake() as f32,
+            self.ensemble.resets() as f32,
+        ];
+        &self.picture
+    }
+}

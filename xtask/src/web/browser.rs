@@ -1,0 +1,61 @@
+//! Tests of the module in Node and of the page in Chromium.
+
+use std::path::Path;
+use std::process::Command;
+
+use anyhow::{Result, ensure};
+
+use super::build;
+use crate::machine::{self, Package};
+
+/// Drives the browser. Pinned: a new one may expect another Chromium.
+const PLAYWRIGHT: &str = "playwright-core@1.65.1";
+
+const NODE: Package = Package {
+    name: "nodejs",
+    present: || machine::works("node", &["--version"]),
+    purpose: "testing the module",
+};
+const NPM: Package = Package {
+    name: "npm",
+    present: || machine::works("npm", &["--version"]),
+    purpose: "fetching playwright-core",
+};
+const CHROMIUM: Package = Package {
+    name: "chromium",
+    present: || machine::works("chromium", &["--version"]),
+    purpose: "testing the page",
+};
+const ESPEAK: Package = Package {
+    name: "espeak-ng",
+    present: || machine::works("espeak-ng", &["--version"]),
+    purpose: "speech that must not play",
+};
+
+/// The page's tests, in order: the module, the microphone, the page. Each is a program of Node, which gets the page's folder and
+/// one of its own.
+const TESTS: [&str; 3] = ["module.mjs", "blow.mjs", "browser.mjs"];
+
+/// Builds the page and runs its tests; installs what they need.
+pub fn test() -> Result<()> {
+    machine::provide(&[&NODE, &NPM, &CHROMIUM, &ESPEAK])?;
+    let page = build()?;
+    let folder = machine::target().join("web-tests");
+    std::fs::create_dir_all(&folder)?;
+    if !has_playwright(&folder) {
+        let npm = ["install", "--no-save", "--no-audit", "--no-fund", "--ignore-scripts", "--prefix"];
+        machine::run(Command::new("npm").args(npm).arg(&folder).arg(PLAYWRIGHT))?;
+    }
+    for name in TESTS {
+        let script = machine::root().join("web/tests").join(name);
+        ensure!(script.exists(), "{} is missing", script.display());
+        machine::run(Command::new("node").arg(script).arg(&page).arg(&folder))?;
+    }
+    Ok(())
+}
+
+fn has_playwright(folder: &Path) -> bool {
+    let version = PLAYWRIGHT.rsplit('@').next().unwrap_or_default();
+    let package = folder.join("node_modules/playwright-core/package.json");
+    std::fs::read_to_string(package).is_ok_and(|text| text.contains(&format!("\"version\": \"{version}\"")))
+}
