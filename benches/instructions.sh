@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Fails when the whole instrument, heard from everywhere or from two places, costs more instructions per internal sample
-# (96 kHz) than it may, or when a screen that watches it costs the audio thread more than 1 %.
+# (96 kHz) than it may, when a screen that watches it costs the audio thread more than 1 %, or when several players
+# cost more voices than they may.
 #
 #   benches/instructions.sh [RATE]      host rate, default 48000
 #
@@ -11,7 +12,10 @@ export LC_ALL=C
 
 rate=${1:-48000}
 # Of a note that lives and moves, as it does by default.
-declare -A most=([avx2]=957 [plain]=1492 ["avx2 places"]=1045 ["plain places"]=1590)
+declare -A most=([avx2]=957 [plain]=1505 ["avx2 places"]=1045 ["plain places"]=1610)
+
+# Players in unison, in hundredths of the cost of one voice.
+declare -A most_players=(["avx2 8"]=540 ["avx2 16"]=1080 ["plain 8"]=620 ["plain 16"]=1240)
 
 if ! command -v valgrind >/dev/null; then
     echo "cannot count instructions without valgrind: apt-get install valgrind" >&2
@@ -24,8 +28,8 @@ program=$target/plugin/examples/instructions
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 
-collected() { # SECONDS avx2|plain [watched] [places] -> instructions of the whole run
-    local run=("$program" "$1" "$rate" "$2" 0 "${3:-}" "${4:-}")
+collected() { # SECONDS avx2|plain [watched] [places] [PLAYERS] -> instructions of the whole run
+    local run=("$program" "$1" "$rate" "$2" 0 "${3:-}" "${4:-}" "${5:-1}")
     if ! valgrind --tool=callgrind --callgrind-out-file=/dev/null "${run[@]}" >/dev/null 2>"$log"; then
         cat "$log" >&2
         return 1
@@ -68,5 +72,16 @@ for path in "${paths[@]}"; do
         failed=1
     fi
     echo "$path: $(printf '%d.%02d' $((more / 100)) $((more % 100))) % more while watched, at most 1 %: $verdict"
+    for players in 8 16; do
+        short=$(collected 0.5 "$path" "" "" $players)
+        long=$(collected 1.0 "$path" "" "" $players)
+        voices=$(((long - short) * 200 / alone))
+        verdict=ok
+        if ((voices > ${most_players["$path $players"]})); then
+            verdict="too many"
+            failed=1
+        fi
+        echo "$path: $players players cost $voices hundredths of one, at most ${most_players["$path $players"]}: $verdict"
+    done
 done
 exit $failed

@@ -1,19 +1,21 @@
 //! Holds one note and prints a checksum of its samples, nothing else: the program to count instructions of.
 //!
-//! `cargo run --release -p chalumeau-core --example instructions -- SECONDS [RATE] [avx2|plain] [BEND] [watched] [point|places]`
+//! `cargo run --release -p chalumeau-core --example instructions -- SECONDS [RATE] [avx2|plain] [BEND] [watched] [point|places] [PLAYERS] [chord]`
 //!
 //! Written C4 at breath 0.5 of full scale; `plain` keeps off AVX2, a bend is in cents, and `watched` takes pictures of
 //! the inside and copies pictures and sound away, as while the plugin's window is open. It is heard from everywhere, or from
-//! one point, or from two places in two channels. What a sample costs is the
+//! one point, or from two places in two channels. Several players play it in unison, or each a note of its own. What a sample costs is the
 //! difference of two run lengths, so that building the instrument cancels; `benches/peers/run.sh` does that under
 //! callgrind and by the thread's CPU time, which is printed where Linux tells it.
 
 use std::error::Error;
 use std::hint::black_box;
 
-use chalumeau_core::event::Event;
+use chalumeau_core::event::{Event, PartEvent, To};
 use chalumeau_core::instrument::scope::{SCOPE_SAMPLES, ScopeSample};
-use chalumeau_core::instrument::{Channels, Clarinet, Listening, ListeningMode, Settings};
+use chalumeau_core::instrument::{
+    Channels, Clarinet, Ensemble, Listening, ListeningMode, Players, Settings, Split,
+};
 use chalumeau_core::units::WrittenNote;
 
 /// Samples per call, as a host at a common setting would ask for.
@@ -51,7 +53,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let seconds: f64 = arguments
         .next()
-        .ok_or("usage: instructions SECONDS [RATE] [avx2|plain] [BEND] [watched] [point|places]")?
+        .ok_or("usage: instructions SECONDS [RATE] [avx2|plain] [BEND] [watched] [point|places] [PLAYERS] [chord]")?
         .parse()?;
     let rate_hz: f64 = arguments.next().as_deref().unwrap_or("48000").parse()?;
     let plain = arguments.next().is_some_and(|word| word == "plain");
@@ -62,19 +64,30 @@ fn main() -> Result<(), Box<dyn Error>> {
         Some("places") => ListeningMode::Position,
         _ => ListeningMode::Everywhere,
     };
+    let count: i32 = arguments.next().as_deref().unwrap_or("1").parse()?;
+    let chord = arguments.next().is_some_and(|word| word == "chord");
     let blocks = (seconds * rate_hz / BLOCK as f64).round() as usize;
 
-    let mut clarinet = Clarinet::built_in(rate_hz)?;
+    let mut clarinets = Ensemble::built_in(rate_hz)?;
     if plain {
-        clarinet = clarinet.without_avx2();
+        clarinets = clarinets.without_avx2();
     }
-    let note = WrittenNote(60).sounding(2).ok_or("no such note")?;
     let listening = Listening { mode, ..Listening::default() };
-    clarinet.set_settings(&Settings { listening, ..Settings::default() });
-    clarinet.apply(Event::Bend { cents: bend_cents });
-    clarinet.apply(Event::Breath(0.5));
-    clarinet.apply(Event::NoteOn { note, velocity: 0.8 });
-    clarinet.set_scope_on(watched);
+    let players =
+        Players { count, split: if chord { Split::Chords } else { Split::Unison }, ..Players::default() };
+    clarinets.set_settings(&Settings { listening, players, ..Settings::default() });
+    clarinets.apply(Event::Bend { cents: bend_cents }.into());
+    clarinets.apply(Event::Breath(0.5).into());
+    for player in 0..count as u8 {
+        // In unison each event is for all of them: one note is enough.
+        let written = if chord { 55 + 3 * player } else { 60 };
+        let note = WrittenNote(written).sounding(2).ok_or("no such note")?;
+        clarinets.apply(PartEvent { to: To::Player(player), event: Event::NoteOn { note, velocity: 0.8 } });
+        if !chord {
+            break;
+        }
+    }
+    clarinets.set_scope_on(watched);
     let mut screen =
         Screen { heard: [0.0; BLOCK], moments: [ScopeSample::default(); SCOPE_SAMPLES], shown: 0 };
 
@@ -83,12 +96,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let start = thread_cpu_ns();
     for _ in 0..blocks {
         if mode == ListeningMode::Position {
-            clarinet.render_channels(Channels::two(&mut block, &mut right));
+            clarinets.render_channels(Channels::two(&mut block, &mut right));
         } else {
-            clarinet.render(&mut block);
+            clarinets.render(&mut block);
         }
         if watched {
-            screen.see(&clarinet, &block);
+            screen.see(clarinets.first(), &block);
         }
         checksum = block.iter().fold(checksum, |sum, sample| sum.rotate_left(5) ^ sample.to_bits());
     }

@@ -17,6 +17,7 @@
 //!
 //! Pressures over a reference pressure P, flows over P / Zc with Zc of the instrument's nominal bore.
 
+pub mod choir;
 mod coeffs;
 mod diagnostics;
 mod junctions;
@@ -27,7 +28,8 @@ pub mod sensitivity;
 pub use coeffs::{LatticeCoeffs, hole_chunks};
 pub use real::Real;
 
-use junctions::{Holes, Octet, Steps, flush};
+use crate::dsp::lanes::has_avx2;
+use junctions::{Chunk, Holes, Octet, Steps, flush, leave};
 
 /// Junctions processed together.
 pub const LANES: usize = 8;
@@ -88,8 +90,8 @@ pub struct Lattice<F> {
     ring: Box<[F; SPACE]>,
     /// Part of the ring in use, less one: indices wrap with it.
     mask: u16,
-    steps: Box<[Steps<F>]>,
-    holes: Box<[Holes<F>]>,
+    steps: Box<[Chunk<Steps<F>>]>,
+    holes: Box<[Chunk<Holes<F>>]>,
     hole_lanes: Box<[(usize, usize)]>,
     jets: Box<[f64]>,
     /// Where the present row begins in the ring.
@@ -110,6 +112,8 @@ pub struct Lattice<F> {
     delay_left: usize,
     /// Openings or jets have changed since they were last matched.
     moved: bool,
+    /// A lane of a [choir](choir::LatticeChoir) has the waves.
+    lent: bool,
     avx2: bool,
 }
 
@@ -135,53 +139,58 @@ fn back_rows(rows: u32, slot: usize) -> u16 {
     (slot as u16).wrapping_sub(rows as u16 * STRIDE as u16)
 }
 
+/// An opening within its range; closed is never a negative zero, which would change signs of zeros.
+fn held_opening(opening: f64) -> f64 {
+    opening.clamp(0.0, 1.0) + 0.0
+}
+
 /// Chunks of changes of section, and of tone holes.
-type Chunks<F> = (Box<[Steps<F>]>, Box<[Holes<F>]>);
+type Chunks<F> = (Box<[Chunk<Steps<F>>]>, Box<[Chunk<Holes<F>>]>);
 
 /// All chunks of a lattice, silent, each junction in its lane.
 fn junction_chunks<F: Real>(coeffs: &LatticeCoeffs) -> Chunks<F> {
     let junctions = coeffs.ticks.len() - 1;
-    let mut steps = vec![Steps::idle(IDLE_SLOT); coeffs.step_chunks()];
-    let mut holes = vec![Holes::idle(IDLE_SLOT); coeffs.hole_chunks()];
-    let tuned = coeffs.tuned_cell();
+    let mut steps = vec![Chunk::idle(Steps::idle(), IDLE_SLOT); coeffs.step_chunks()];
+    let mut holes = vec![Chunk::idle(Holes::idle(), IDLE_SLOT); coeffs.hole_chunks()];
     for junction in 0..junctions {
         let lane = coeffs.lane_of(junction);
         let (chunk, k) = (lane / LANES, lane % LANES);
-        let (left, right) = (junction, junction + 1);
-        let (y_left, y_right) = (coeffs.admittance[left], coeffs.admittance[right]);
-        let arrivals = match chunk.checked_sub(steps.len()) {
+        let source = match chunk.checked_sub(steps.len()) {
             None => {
-                steps[chunk].weight[k] = F::of(2.0 * y_left / (y_left + y_right));
-                &mut steps[chunk].arrivals
+                steps[chunk].place(k, coeffs, junction);
+                &mut steps[chunk].sources
             }
             Some(chunk) => {
-                let index = coeffs.hole_junctions.partition_point(|&hole| hole < junction);
-                holes[chunk].place(k, &coeffs.holes[index], y_left, y_right);
-                &mut holes[chunk].arrivals
+                holes[chunk].place(k, coeffs, junction);
+                &mut holes[chunk].sources
             }
         };
-        let from_left = if junction == 0 { END_SLOT } else { coeffs.lane_of(junction - 1) };
-        let from_right =
-            if right == junctions { BACK + END_SLOT } else { BACK + coeffs.lane_of(junction + 1) };
-        arrivals.offset[0][k] = back_rows(coeffs.rows(left).0, from_left);
-        arrivals.offset[1][k] =
-            if right == tuned { TUNED_SLOT as u16 } else { back_rows(coeffs.rows(right).1, from_right) };
-        for (side, cell) in [left, right].into_iter().enumerate() {
-            let (amount, q) = coeffs.loss[cell];
-            arrivals.taken[side][k] = F::of(amount * (1.0 - q));
-            arrivals.q[side][k] = F::of(q);
-        }
+        let [from_left, from_right] = sources_of(coeffs, junction);
+        (source.offset[0][k], source.offset[1][k]) = (from_left, from_right);
     }
     (steps.into(), holes.into())
 }
 
-/// A silent ring whose first `mask + 1` values are in memory.
-fn silent_ring<F: Real>(mask: u16) -> Box<[F; SPACE]> {
+/// Where the waves that arrive at a junction from left and right come from, from the beginning of the present row.
+fn sources_of(coeffs: &LatticeCoeffs, junction: usize) -> [u16; 2] {
+    let (left, right) = (junction, junction + 1);
+    let from_left = if junction == 0 { END_SLOT } else { coeffs.lane_of(junction - 1) };
+    let is_last = right == coeffs.ticks.len() - 1;
+    let from_right = BACK + if is_last { END_SLOT } else { coeffs.lane_of(junction + 1) };
+    let from_right = match right == coeffs.tuned_cell() {
+        true => TUNED_SLOT as u16,
+        false => back_rows(coeffs.rows(right).1, from_right),
+    };
+    [back_rows(coeffs.rows(left).0, from_left), from_right]
+}
+
+/// A ring of zeros whose first `mask + 1` values are in memory; `other` is any other value.
+fn silent_ring<T: Copy>(mask: u16, zero: T, other: T) -> Box<[T; SPACE]> {
     // PANIC: the vector has exactly SPACE elements.
-    let mut ring: Box<[F; SPACE]> =
-        vec![F::default(); SPACE].into_boxed_slice().try_into().unwrap_or_else(|_| unreachable!());
+    let mut ring: Box<[T; SPACE]> =
+        vec![zero; SPACE].into_boxed_slice().try_into().unwrap_or_else(|_| unreachable!());
     // The system only promises fresh memory. Writing it here makes sure that it is there before the audio thread reads it.
-    for value in [F::of(1.0), F::default()] {
+    for value in [other, zero] {
         ring[..=usize::from(mask)].fill(value);
         std::hint::black_box(&mut ring);
     }
@@ -205,7 +214,7 @@ impl<F: Real> Lattice<F> {
         let tuned_right = if tuned == junctions { END_SLOT } else { coeffs.lane_of(tuned) };
         let mask = (coeffs.ring_rows() * STRIDE as u32 - 1) as u16;
         Self {
-            ring: silent_ring(mask),
+            ring: silent_ring(mask, F::default(), F::of(1.0)),
             mask,
             steps,
             holes,
@@ -225,6 +234,7 @@ impl<F: Real> Lattice<F> {
             delay_glide: F::default(),
             delay_left: 0,
             moved: true,
+            lent: false,
             avx2: has_avx2(),
         }
     }
@@ -247,7 +257,7 @@ impl<F: Real> Lattice<F> {
     pub fn silence(&mut self) {
         self.ring[..=usize::from(self.mask)].fill(F::default());
         self.steps.iter_mut().for_each(|steps| steps.arrivals.state = Default::default());
-        for holes in &mut *self.holes {
+        for Chunk { lanes: holes, .. } in &mut *self.holes {
             holes.arrivals.state = Default::default();
             holes.resistance = holes.rs0;
             for state in [&mut holes.outer, &mut holes.compliance, &mut holes.inner] {
@@ -258,6 +268,7 @@ impl<F: Real> Lattice<F> {
         self.end.state = F::default();
         self.bell_state = F::default();
         self.base = 0;
+        self.lent = false;
     }
 
     /// Use the plain code path even where AVX2 is there (to prove that both give the same bits).
@@ -269,14 +280,14 @@ impl<F: Real> Lattice<F> {
     /// Opening of a hole, 0 closed ..= 1 open, at once. Real-time safe.
     pub fn set_opening(&mut self, hole: usize, opening: f64) {
         let (chunk, lane) = self.hole_lanes[hole];
-        self.holes[chunk].set_opening(lane, opening.clamp(0.0, 1.0));
+        self.holes[chunk].set_opening(lane, held_opening(opening));
         self.moved = true;
     }
 
     /// Starts a hole towards an opening, 0..=1, where it arrives after `samples` and rests. Real-time safe.
     pub fn glide_opening(&mut self, hole: usize, opening: f64, samples: usize) {
         let (chunk, lane) = self.hole_lanes[hole];
-        self.holes[chunk].glide_opening(lane, opening.clamp(0.0, 1.0), samples);
+        self.holes[chunk].glide_opening(lane, held_opening(opening), samples);
         self.moved = true;
     }
 
@@ -352,10 +363,21 @@ impl<F: Real> Lattice<F> {
             NEXT_MASK => self.run_masked::<T, NEXT_MASK>(samples, tip),
             _ => self.run_masked::<T, 0>(samples, tip),
         }
+        self.end_delay(samples);
+    }
+
+    /// The delay has been on its way for so many samples.
+    fn end_delay(&mut self, samples: usize) {
         self.delay_left = self.delay_left.saturating_sub(samples);
         if self.delay_left == 0 {
             self.delay_glide = F::default();
         }
+    }
+
+    /// Brings the jets of holes that move up to date, and stops the holes that have arrived.
+    #[inline(always)]
+    fn throttle(&mut self) {
+        self.moved = self.holes.iter_mut().fold(false, |moving, holes| holes.throttle() | moving);
     }
 
     /// `MASK` is that of the ring, 0 for any: a mask known beforehand saves 15 instructions a sample, and the two shortest
@@ -364,7 +386,7 @@ impl<F: Real> Lattice<F> {
     fn run_masked<T: Tip<F>, const MASK: u16>(&mut self, samples: usize, tip: &mut T) {
         #[cfg(target_arch = "x86_64")]
         if self.avx2 {
-            // The crate's one unsafe call of its own: the feature was checked when the lattice was built.
+            // The feature was checked when the lattice was built.
             #[allow(unsafe_code)]
             // SAFETY: `avx2` is only set where the processor has AVX2.
             unsafe {
@@ -377,6 +399,10 @@ impl<F: Real> Lattice<F> {
 
     /// Zeroes states too small to hear before they become denormal. Call every few hundred samples. Real-time safe.
     pub fn flush(&mut self) {
+        if self.lent {
+            // Who has the waves does it.
+            return;
+        }
         // The slots of the junctions and those at the ends; nobody writes the others.
         let slots = LANES * (self.steps.len() + self.holes.len());
         for half_row in self.ring[..=usize::from(self.mask)].as_chunks_mut::<BACK>().0 {
@@ -384,7 +410,7 @@ impl<F: Real> Lattice<F> {
             half_row[BACK - LANES..].iter_mut().for_each(flush);
         }
         self.steps.iter_mut().for_each(|steps| steps.arrivals.flush());
-        for holes in &mut *self.holes {
+        for Chunk { lanes: holes, .. } in &mut *self.holes {
             holes.arrivals.flush();
             for state in [&mut holes.outer, &mut holes.compliance, &mut holes.inner] {
                 state.iter_mut().for_each(flush);
@@ -397,16 +423,6 @@ impl<F: Real> Lattice<F> {
 }
 
 #[cfg(target_arch = "x86_64")]
-fn has_avx2() -> bool {
-    std::arch::is_x86_feature_detected!("avx2")
-}
-
-#[cfg(not(target_arch = "x86_64"))]
-fn has_avx2() -> bool {
-    false
-}
-
-#[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn run_avx2<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, samples: usize, tip: &mut T) {
     run_body::<F, T, MASK>(lattice, samples, tip);
@@ -416,7 +432,7 @@ fn run_avx2<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, sampl
 fn run_body<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, samples: usize, tip: &mut T) {
     let moving = lattice.moved;
     if moving {
-        lattice.moved = lattice.holes.iter_mut().fold(false, |moving, holes| holes.throttle() | moving);
+        lattice.throttle();
     }
     let ring = &mut *lattice.ring;
     let mask = if MASK == 0 { lattice.mask } else { MASK };
@@ -426,7 +442,7 @@ fn run_body<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, sampl
         let base = lattice.base.wrapping_add(STRIDE as u16) & row_mask;
         lattice.base = base;
         if moving {
-            lattice.holes.iter_mut().for_each(Holes::glide);
+            lattice.holes.iter_mut().for_each(|holes| holes.glide());
         }
 
         // The returning wave of the tuned cell, delayed by whole rows and a linear part between two.
@@ -451,12 +467,22 @@ fn run_body<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, sampl
 
         let mut slot = 0;
         for steps in &mut *lattice.steps {
-            steps.tick(ring, base, mask, slot);
+            let arriving = [
+                steps.sources.gather::<F, 0>(ring, base, mask),
+                steps.sources.gather::<F, 1>(ring, base, mask),
+            ];
+            leave(ring, base as usize + slot, &steps.scatter(arriving));
             slot += LANES;
         }
-        let leaving = tip.holes().unwrap_or(&mut unheard);
-        for (holes, leaving) in lattice.holes.iter_mut().zip(leaving) {
-            *leaving = holes.tick(ring, base, mask, slot);
+        let flows = tip.holes().unwrap_or(&mut unheard);
+        for (holes, flows) in lattice.holes.iter_mut().zip(flows) {
+            let arriving = [
+                holes.sources.gather::<F, 0>(ring, base, mask),
+                holes.sources.gather::<F, 1>(ring, base, mask),
+            ];
+            let leaving;
+            (leaving, *flows) = holes.scatter(arriving);
+            leave(ring, base as usize + slot, &leaving);
             slot += LANES;
         }
         tip.radiated(bell);

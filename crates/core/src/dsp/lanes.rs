@@ -3,6 +3,18 @@
 /// Values added up beside each other.
 const LANES: usize = 8;
 
+/// Whether the processor has vectors of eight numbers of single precision: AVX2.
+#[cfg(target_arch = "x86_64")]
+pub fn has_avx2() -> bool {
+    std::arch::is_x86_feature_detected!("avx2")
+}
+
+/// Whether the processor has vectors of eight numbers of single precision: AVX2.
+#[cfg(not(target_arch = "x86_64"))]
+pub fn has_avx2() -> bool {
+    false
+}
+
 /// Sum of all samples, in an order that does not depend on the machine. Not finite if any of them is not. Real-time safe.
 #[inline]
 pub fn sum(samples: &[f32]) -> f32 {

@@ -29,6 +29,7 @@
 
 use std::sync::Arc;
 
+use crate::dsp::lanes::has_avx2;
 use crate::dsp::low_pass::{Kernel, LANES, TRANSITION, TapRow, dot, normalised, tap_rows};
 use crate::dsp::warp::{BEYOND, ONE, SPEEDS, Warp};
 
@@ -95,6 +96,13 @@ pub struct Resampler {
     from: usize,
     /// Speed the clock glides to.
     speed_wanted: f64,
+    avx2: bool,
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn pull_plain_avx2(resampler: &mut Resampler, out: &mut [f32]) -> usize {
+    resampler.pull_plain_body(out)
 }
 
 impl Resampler {
@@ -150,9 +158,16 @@ impl Resampler {
             speed_glide: 0.0,
             from: 0,
             speed_wanted: 1.0,
+            avx2: has_avx2(),
         };
         resampler.reset();
         resampler
+    }
+
+    /// Keeps to the code path without AVX2, which gives the same bits.
+    pub fn without_avx2(mut self) -> Self {
+        self.avx2 = false;
+        self
     }
 
     /// More inputs, while whose clock glides to `speed` (0.25..=4, 1 is their rate). At most
@@ -201,6 +216,17 @@ impl Resampler {
     }
 
     fn pull_plain(&mut self, out: &mut [f32]) -> usize {
+        #[cfg(target_arch = "x86_64")]
+        if self.avx2 {
+            #[allow(unsafe_code)]
+            // SAFETY: `avx2` is only set where the processor has AVX2.
+            return unsafe { pull_plain_avx2(self, out) };
+        }
+        self.pull_plain_body(out)
+    }
+
+    #[inline(always)]
+    fn pull_plain_body(&mut self, out: &mut [f32]) -> usize {
         // As many as the inputs allow: the last of them still finds the inputs it hears.
         let left = (self.next - self.end) as u64;
         let most = ((left + 1) * self.l - 1 - self.phase) / self.m + 1;

@@ -63,6 +63,36 @@ pub(super) struct BreathNoise {
     hiss: [f64; TICK],
 }
 
+/// The noises of several voices during a tick, see [`BreathNoise`].
+#[derive(Clone)]
+pub(super) struct NoiseLanes<const N: usize> {
+    strength: [f64; N],
+    mean: [f64; N],
+    quiet: [f64; N],
+    whisper: [f64; N],
+    hiss: [[f64; N]; TICK],
+}
+
+impl<const N: usize> NoiseLanes<N> {
+    /// Silent.
+    pub fn new() -> Self {
+        let none = [0.0; N];
+        Self { strength: none, mean: none, quiet: none, whisper: none, hiss: [none; TICK] }
+    }
+
+    /// See [`BreathNoise::flow`].
+    #[inline(always)]
+    pub fn flow(&self, jet_flow: &[f64; N], at: usize) -> [f64; N] {
+        let mut flow = [0.0; N];
+        for k in 0..N {
+            let moved = (jet_flow[k] - self.mean[k]).abs() - self.quiet[k];
+            let turbulent = if moved > 0.0 { moved } else { 0.0 };
+            flow[k] = (self.strength[k] * turbulent + self.whisper[k]) * self.hiss[at & (TICK - 1)][k];
+        }
+        flow
+    }
+}
+
 impl BreathNoise {
     /// Silent, with a steady jet, at a sample rate in Hz.
     pub fn new(rate_hz: f64) -> Self {
@@ -146,6 +176,17 @@ impl BreathNoise {
             }
         }
         (self.random, self.high, self.low) = (random, smooth, [once, twice]);
+    }
+
+    /// What one lane of several takes over for a tick that has been [filled](Self::fill).
+    pub fn fill_lane<const N: usize>(&self, lane: usize, lanes: &mut NoiseLanes<N>) {
+        lanes.strength[lane] = self.strength;
+        lanes.mean[lane] = self.mean;
+        lanes.quiet[lane] = self.quiet;
+        lanes.whisper[lane] = self.whisper;
+        for (lanes, hiss) in lanes.hiss.iter_mut().zip(&self.hiss) {
+            lanes[lane] = *hiss;
+        }
     }
 
     /// Noise flow of sample `at` of the tick on a jet of this flow.

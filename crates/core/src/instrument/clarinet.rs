@@ -21,7 +21,7 @@ use crate::instrument::person::Person;
 use crate::instrument::player::{Player, PlayerState};
 use crate::instrument::scope::Scope;
 use crate::instrument::settings::Settings;
-use crate::instrument::voice::{Probe, TICK, Voice};
+use crate::instrument::voice::{Drive, Probe, TICK, Voice};
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
 use crate::reed::{MovingReed, ReedCoeffs};
@@ -33,11 +33,6 @@ const SILENCE: f32 = 1e-6;
 const QUIET_SAMPLES: u32 = 4_096;
 /// Host samples between two checks of level and limiter.
 const CHUNK: usize = 64;
-
-/// Up to this rate of the lattice, Hz, single precision is enough. The noise that rounding leaves between the harmonics
-/// grows with the rate over the note: at twice the live rate a bass clarinet had -78 dB; with double precision it has
-/// -126 dB and less (`docs/findings.md`).
-const SINGLE_BELOW_HZ: f64 = 100_000.0;
 
 /// The voice in the precision that its rate needs.
 enum AnyVoice {
@@ -94,6 +89,14 @@ pub struct Clarinet {
     resets: u64,
 }
 
+/// How far a block has been filled.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Progress {
+    /// Where the present piece begins, and how many of its samples there are.
+    begin: usize,
+    made: usize,
+}
+
 impl Clarinet {
     /// Longest time from rest to silence, s: what a host must still play when breath and keys have ended. The bass clarinet
     /// takes 1.74 s (`tests/silence.rs`).
@@ -143,7 +146,7 @@ impl Clarinet {
         );
         let tables = ReedTables::reference();
         let sources = SoundSources::of(&model.file);
-        let mut voice = if rate > SINGLE_BELOW_HZ {
+        let mut voice = if !model.is_single() {
             AnyVoice::Double(Box::new(Voice::new(&model.coeffs, sources, &model.air, tables, reed)))
         } else {
             AnyVoice::Single(Box::new(Voice::new(&model.coeffs, sources, &model.air, tables, reed)))
@@ -294,23 +297,32 @@ impl Clarinet {
     }
 
     fn render_with(&mut self, mut out: Channels, probe: &mut Option<&mut dyn FnMut(Probe)>) {
+        let mut progress = Progress::default();
+        while self.advance(&mut out, &mut progress) {
+            self.tick(probe);
+        }
+    }
+
+    /// Fills `out` as far as it can be; whether another tick is needed before it goes on.
+    pub(super) fn advance(&mut self, out: &mut Channels, progress: &mut Progress) -> bool {
         if self.stereo != out.is_stereo() {
             (self.stereo, self.apart) = (out.is_stereo(), 0);
             self.listen();
         }
-        let (mut begin, samples) = (0, out.len());
-        while begin < samples {
+        let samples = out.len();
+        while progress.begin < samples {
             // A choke ends at its sample, not at the end of a chunk.
-            let end = begin + self.choke.reach(CHUNK.min(samples - begin));
-            let mut out = out.part(begin..end);
-            begin = end;
-            let mut made = self.pull(&mut out, 0);
-            while made < out.len() {
-                self.tick(probe);
-                made += self.pull(&mut out, made);
+            let left = samples - progress.begin;
+            let end = progress.begin + self.choke.reach(CHUNK.min(left));
+            let mut piece = out.part(progress.begin..end);
+            progress.made += self.pull(&mut piece, progress.made);
+            if progress.made < piece.len() {
+                return true;
             }
-            self.finish(out);
+            self.finish(piece);
+            *progress = Progress { begin: end, made: 0 };
         }
+        false
     }
 
     /// Fills both channels from sample `from` on, as far as they can be; returns how far that is.
@@ -332,8 +344,44 @@ impl Clarinet {
     fn tick(&mut self, probe: &mut Option<&mut dyn FnMut(Probe)>) {
         with_voice!(&mut self.voice, voice => {
             let drive = self.player.tick(&self.model, voice);
-            let speed = self.player.speed();
             voice.tick(&drive);
+        });
+        self.hear(probe);
+    }
+
+    /// The player's part of a tick; the voice's must be run, in a lane of a choir or [alone](Self::run_alone), and
+    /// [ended](Self::end_tick).
+    pub(super) fn begin_tick(&mut self) -> Drive {
+        with_voice!(&mut self.voice, voice => {
+            let drive = self.player.tick(&self.model, voice);
+            voice.begin(&drive);
+            drive
+        })
+    }
+
+    /// The voice, if a lane of a choir may play it: double precision has no lanes.
+    pub(super) fn single_voice(&mut self) -> Option<&mut Voice<f32>> {
+        match &mut self.voice {
+            AnyVoice::Single(voice) => Some(voice),
+            AnyVoice::Double(_) => None,
+        }
+    }
+
+    /// The voice's part of a tick that has begun.
+    pub(super) fn run_alone(&mut self) {
+        with_voice!(&mut self.voice, voice => voice.run());
+    }
+
+    /// Ends a tick that has been run.
+    pub(super) fn end_tick(&mut self, drive: &Drive) {
+        with_voice!(&mut self.voice, voice => voice.end(drive));
+        self.hear(&mut None);
+    }
+
+    /// What comes after a tick of the voice: what was heard goes on its way.
+    fn hear(&mut self, probe: &mut Option<&mut dyn FnMut(Probe)>) {
+        let speed = self.player.speed();
+        with_voice!(&mut self.voice, voice => {
             let (left, right) = voice.heard();
             let right = right.filter(|_| self.stereo);
             let breathed = self.player.inhaled().map(|breath| {
@@ -462,6 +510,8 @@ impl Clarinet {
     /// Keeps the plain code path, see [`Lattice::without_avx2`](crate::bore::lattice::Lattice::without_avx2).
     #[doc(hidden)]
     pub fn without_avx2(mut self) -> Self {
+        self.resampler = self.resampler.without_avx2();
+        self.right = self.right.without_avx2();
         self.voice = match self.voice {
             AnyVoice::Single(voice) => AnyVoice::Single(Box::new(voice.without_avx2())),
             AnyVoice::Double(voice) => AnyVoice::Double(Box::new(voice.without_avx2())),

@@ -1,4 +1,4 @@
 //! The grid on which a player moves.
 
 /// Samples of one control tick. Everything a player moves, moves on this grid, counted from the last reset.
-pub const TICK: usize = 16;
+pub use crate::bore::lattice::choir::TICK;

@@ -8,20 +8,24 @@
 //! one. A limiter after the sum catches what comes together by chance. One player alone is a [`Clarinet`] to the bit.
 //!
 //! A player who is silent and at rest sleeps: nothing of it is computed, and it stands still until a note, a slap or a
-//! breath wakes it. Whether it sleeps is decided on a fixed grid of samples, never on the host's blocks.
+//! breath wakes it. Those who are awake play side by side, see [`Choir`](super::voice::choir::Choir). Whether it sleeps is decided on a fixed grid of samples, never on the host's blocks.
+
+mod section;
 
 use std::sync::Arc;
 
 use crate::dsp::glide::Glide;
+use crate::dsp::lanes::any_above;
 use crate::dsp::limiter::Limiter;
 use crate::event::{Event, PartEvent, Timed, To};
 use crate::instrument::channels::Channels;
-use crate::instrument::clarinet::Clarinet;
+use crate::instrument::clarinet::{Clarinet, Progress};
 use crate::instrument::model::{BuildError, Model};
 use crate::instrument::person::Person;
 use crate::instrument::players::{MOST_PLAYERS, Players, Split};
 use crate::instrument::settings::Settings;
 use crate::instrument::stereo::gains;
+use section::Section;
 
 /// Samples of the host between two decisions whether a player sleeps.
 const CELL: usize = 64;
@@ -46,6 +50,8 @@ struct Seat {
     sleeps: bool,
     /// A lone player does not sleep: its host stops calling.
     may_sleep: bool,
+    /// What it plays in a cell, left and right.
+    sound: [[f32; CELL]; 2],
 }
 
 impl Seat {
@@ -59,6 +65,7 @@ impl Seat {
             quiet: 0,
             sleeps: true,
             may_sleep: true,
+            sound: [[0.0; CELL]; 2],
         }
     }
 
@@ -86,13 +93,27 @@ impl Seat {
         CELL - self.at
     }
 
-    /// The next samples, as many as [`reach`](Self::reach) at most; whether the player is awake and has made any.
-    fn render(&mut self, mut out: Channels) -> bool {
-        let (samples, is_awake) = (out.len(), !self.sleeps);
-        if is_awake {
-            self.clarinet.render_channels(out.part(0..samples));
-            let silence = self.clarinet.silence();
-            out.each(|channel| self.is_heard |= channel.iter().any(|sample| sample.abs() > silence));
+    /// Where so many samples of one or two channels go, and who plays them.
+    fn playing(&mut self, samples: usize, is_stereo: bool) -> (Channels<'_>, &mut Clarinet) {
+        let [left, right] = &mut self.sound;
+        let (left, right) = (&mut left[..samples], &mut right[..samples]);
+        let own = if is_stereo { Channels::two(left, right) } else { Channels::one(left) };
+        (own, &mut self.clarinet)
+    }
+
+    /// Fills so many samples as far as they can be; whether a tick is needed before it goes on.
+    fn advance(&mut self, samples: usize, is_stereo: bool, progress: &mut Progress) -> bool {
+        let (mut own, clarinet) = self.playing(samples, is_stereo);
+        clarinet.advance(&mut own, progress)
+    }
+
+    /// So many samples have passed, [`reach`](Self::reach) at most: decides about sleep.
+    fn pass(&mut self, samples: usize, is_stereo: bool) {
+        if !self.sleeps {
+            let (mut own, clarinet) = self.playing(samples, is_stereo);
+            let (silence, mut is_heard) = (clarinet.silence(), false);
+            own.each(|channel| is_heard |= any_above(channel, silence));
+            self.is_heard |= is_heard;
         }
         self.at += samples;
         if self.at == CELL {
@@ -101,7 +122,6 @@ impl Seat {
             self.quiet = if is_quiet { self.quiet.saturating_add(1) } else { 0 };
             self.sleeps |= self.may_sleep && self.quiet >= QUIET_CELLS;
         }
-        is_awake
     }
 
     fn is_silent(&self) -> bool {
@@ -116,7 +136,17 @@ impl Seat {
 }
 
 /// Adds a player's samples to the sum; the first one's take its place, so that a zero keeps its sign.
-fn add(sum: &mut [f32], own: &[f32], gain: &[f32], mut side: impl FnMut() -> f32, is_first: bool) {
+fn add(sum: &mut [f32], own: &[f32], gain: &[f32], side: &mut Glide, is_first: bool) {
+    if side.reach() < usize::MAX {
+        return add_with(sum, own, gain, || side.next(), is_first);
+    }
+    // At rest it is the same for all samples.
+    let side = side.next();
+    add_with(sum, own, gain, || side, is_first);
+}
+
+#[inline(always)]
+fn add_with(sum: &mut [f32], own: &[f32], gain: &[f32], mut side: impl FnMut() -> f32, is_first: bool) {
     for ((sum, own), gain) in sum.iter_mut().zip(own).zip(gain) {
         let own = own * (gain * side());
         *sum = if is_first { own } else { *sum + own };
@@ -149,6 +179,7 @@ pub struct Ensemble {
     /// Loudness of each.
     gain: Glide,
     limiter: Limiter,
+    section: Section,
 }
 
 impl Ensemble {
@@ -167,14 +198,25 @@ impl Ensemble {
         for number in 1..MOST_PLAYERS as u8 {
             clarinets.push(clarinets[0].beside(host_rate_hz, number));
         }
+        let section = Section::new(clarinets[0].model());
         let mut ensemble = Self {
             seats: clarinets.into_iter().map(|clarinet| Seat::new(clarinet, host_rate_hz)).collect(),
             players: Players::default(),
             gain: Glide::new(1.0, MOVE_S, host_rate_hz),
             limiter: Limiter::new(host_rate_hz),
+            section,
         };
         ensemble.arrange();
         ensemble
+    }
+
+    /// See [`Clarinet::without_avx2`].
+    #[doc(hidden)]
+    pub fn without_avx2(mut self) -> Self {
+        let plain = |seat: Seat| Seat { clarinet: seat.clarinet.without_avx2(), ..seat };
+        self.seats = self.seats.into_iter().map(plain).collect();
+        self.section = self.section.without_avx2(self.seats[0].clarinet.model());
+        self
     }
 
     fn count(&self) -> usize {
@@ -267,6 +309,7 @@ impl Ensemble {
     /// Overwrites one or two channels with the next samples. Real-time safe.
     pub fn render_channels(&mut self, mut out: Channels) {
         if self.is_alone() {
+            self.section.arrange(&mut self.seats);
             return self.seats[0].clarinet.render_channels(out);
         }
         let (mut begin, samples) = (0, out.len());
@@ -303,28 +346,31 @@ impl Ensemble {
 
     /// The sum of all players, of one cell at most.
     fn mix(&mut self, mut out: Channels) {
-        let samples = out.len();
-        let (mut left, mut right, mut gain) = ([0.0; CELL], [0.0; CELL], [0.0; CELL]);
-        let (left, right, gain) = (&mut left[..samples], &mut right[..samples], &mut gain[..samples]);
+        let (samples, is_stereo) = (out.len(), out.is_stereo());
+        let mut gain = [0.0; CELL];
+        let gain = &mut gain[..samples];
         gain.iter_mut().for_each(|gain| *gain = self.gain.next());
+        self.play(samples, is_stereo);
         let mut is_first = true;
         for seat in &mut self.seats {
-            let own = if out.is_stereo() { Channels::two(left, right) } else { Channels::one(left) };
-            if !seat.render(own) {
+            let is_awake = !seat.sleeps;
+            seat.pass(samples, is_stereo);
+            if !is_awake {
                 continue;
             }
+            let [left, right] = &seat.sound;
             let [left_side, right_side] = &mut seat.sides;
             if let Some(sum) = out.right() {
-                add(sum, right, gain, || right_side.next(), is_first);
-                add(out.left(), left, gain, || left_side.next(), is_first);
+                add(sum, right, gain, right_side, is_first);
+                add(out.left(), left, gain, left_side, is_first);
             } else {
                 // Without two channels there are no sides; they move on all the same.
-                let middle = || {
-                    left_side.next();
-                    right_side.next();
-                    1.0
-                };
-                add(out.left(), left, gain, middle, is_first);
+                for side in [left_side, right_side] {
+                    if side.reach() < usize::MAX {
+                        (0..samples).for_each(|_| _ = side.next());
+                    }
+                }
+                add_with(out.left(), left, gain, || 1.0, is_first);
             }
             is_first = false;
         }
@@ -334,6 +380,27 @@ impl Ensemble {
         match &mut out.right {
             None => self.limiter.process(out.left),
             Some(right) => self.limiter.process_two(out.left, right),
+        }
+    }
+
+    /// All who are awake play so many samples, each into its own.
+    fn play(&mut self, samples: usize, is_stereo: bool) {
+        self.section.arrange(&mut self.seats);
+        let mut progress = [Progress::default(); MOST_PLAYERS];
+        let mut playing: u32 =
+            (0..).zip(&self.seats).map(|(number, seat)| u32::from(!seat.sleeps) << number).sum();
+        loop {
+            let mut waiting = 0;
+            for (number, (seat, progress)) in self.seats.iter_mut().zip(&mut progress).enumerate() {
+                if playing >> number & 1 == 1 && seat.advance(samples, is_stereo, progress) {
+                    waiting |= 1 << number;
+                }
+            }
+            if waiting == 0 {
+                return;
+            }
+            self.section.tick(&mut self.seats, waiting);
+            playing = waiting;
         }
     }
 

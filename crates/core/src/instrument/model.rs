@@ -18,6 +18,11 @@ use crate::reed::PhysicalReed;
 use crate::reed::physical::{P_REF_PA, REFERENCE_VOLUME_M3};
 use crate::units::{Air, SoundingNote};
 
+/// Up to this rate of the lattice, Hz, single precision is enough. The noise that rounding leaves between the harmonics
+/// grows with the rate over the note: at twice the live rate a bass clarinet had -78 dB; with double precision it has
+/// -126 dB and less (`docs/findings.md`).
+const SINGLE_BELOW_HZ: f64 = 100_000.0;
+
 /// Largest error of a note that is played, cents. A note further off that the delay cannot mend also leaves its register
 /// at most pressures: with the maker's fingering, written A#6 of the built-in clarinets is 14 to 40 cents flat and speaks at one
 /// pressure of five.
@@ -131,6 +136,11 @@ impl Model {
             air,
             file,
         }
+    }
+
+    /// Whether single precision is enough for it.
+    pub(super) fn is_single(&self) -> bool {
+        self.coeffs.rate_hz <= SINGLE_BELOW_HZ
     }
 
     /// Index of the fingering that plays a sounding note; `None` if the instrument has none, or if the fingering does not

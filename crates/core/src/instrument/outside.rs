@@ -12,6 +12,7 @@ mod lines;
 #[cfg(test)]
 mod tests;
 
+use crate::bore::lattice::choir::LatticeChoir;
 use crate::bore::lattice::{HoleFlows, LANES, LatticeCoeffs, Real};
 use crate::bore::sound_sources::SoundSources;
 use crate::instrument::control_tick::TICK;
@@ -30,6 +31,8 @@ pub(super) struct Outside<F> {
     holes: [HoleFlows<F>; TICK],
     /// Chunks of holes that the instrument has.
     chunks: usize,
+    /// All flows together, in the samples of the tick in which that is wanted.
+    sums: [F; TICK],
     /// All flows together in the last sample of the tick before.
     last: f64,
     lines: Lines<F>,
@@ -94,6 +97,7 @@ impl<F: Real> Outside<F> {
             bell: [F::default(); TICK],
             holes: [HoleFlows::default(); TICK],
             chunks: coeffs.hole_chunks(),
+            sums: [F::default(); TICK],
             last: 0.0,
             lines,
             sources,
@@ -137,18 +141,72 @@ impl<F: Real> Outside<F> {
     /// Sends a whole tick on its way.
     #[inline(always)]
     pub fn radiate(&mut self) {
+        self.turn();
+        if self.keeps_lines() {
+            let rows = &self.holes;
+            self.lines.write(&self.bell, |_, slot, line| {
+                for (flow, row) in line.iter_mut().zip(rows) {
+                    let row = row.as_flattened();
+                    *flow = row[slot & (row.len() - 1)];
+                }
+            });
+        }
+        for at in self.added() {
+            self.sums[at & (TICK - 1)] = self.together(at);
+        }
+        self.hear();
+    }
+
+    /// As [`radiate`](Self::radiate), with the flows of a lane of a choir.
+    #[inline(always)]
+    pub fn radiate_lane<const N: usize>(&mut self, lane: usize, choir: &LatticeChoir<N>)
+    where
+        F: From<f32>,
+    {
+        self.turn();
+        let bell = choir.bell_flows().map(|flows| F::from(flows[lane]));
+        if self.keeps_lines() {
+            self.lines.write(&bell, |hole, _, line| {
+                let Some(flows) = choir.hole_flows(hole) else { return };
+                for (flow, flows) in line.iter_mut().zip(flows) {
+                    *flow = F::from(flows[lane]);
+                }
+            });
+        }
+        for at in self.added() {
+            self.sums[at & (TICK - 1)] = F::from(choir.together(at, lane));
+        }
+        self.hear();
+    }
+
+    /// Turns to another way of listening, if one is wanted.
+    #[inline(always)]
+    fn turn(&mut self) {
         if self.wanted != self.chosen && self.fading == 0 {
             self.change();
         }
         self.fresh = false;
-        if !self.now.point || self.fading > 0 || self.filling > 0 {
-            self.lines.write(&self.bell, &self.holes);
-        }
+    }
+
+    #[inline(always)]
+    fn keeps_lines(&self) -> bool {
+        !self.now.point || self.fading > 0 || self.filling > 0
+    }
+
+    /// Samples of the tick in which the sum of all flows is wanted.
+    #[inline(always)]
+    fn added(&self) -> std::ops::Range<usize> {
+        if self.now.point || (self.fading > 0 && self.before.point) { 0..TICK } else { TICK - 1..TICK }
+    }
+
+    /// The tick as it is heard.
+    #[inline(always)]
+    fn hear(&mut self) {
         self.out = self.hear_now();
         if self.fading > 0 {
             self.fade();
         }
-        self.last = self.together(TICK - 1);
+        self.last = self.sums[TICK - 1].wide();
     }
 
     /// Begins to fade into the way that is wanted. Not inlined: it is seldom called.
@@ -194,7 +252,7 @@ impl<F: Real> Outside<F> {
 
     /// All flows together in a sample of the tick.
     #[inline(always)]
-    fn together(&self, at: usize) -> f64 {
+    fn together(&self, at: usize) -> F {
         let mut lanes = [F::default(); LANES];
         for chunk in self.holes[at].iter().take(self.chunks) {
             for lane in 0..LANES {
@@ -205,15 +263,15 @@ impl<F: Real> Outside<F> {
         for lane in lanes {
             flow = flow + lane;
         }
-        flow.wide()
+        flow
     }
 
     /// All flows in one point.
     #[inline(always)]
     fn point(&self) -> [f32; TICK] {
         let (mut before, mut pressure) = (self.last, [0.0; TICK]);
-        for (at, pressure) in pressure.iter_mut().enumerate() {
-            let flow = self.together(at);
+        for (pressure, flow) in pressure.iter_mut().zip(&self.sums) {
+            let flow = flow.wide();
             *pressure = ((flow - before) * self.loudness) as f32;
             before = flow;
         }

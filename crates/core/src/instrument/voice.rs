@@ -1,5 +1,7 @@
 //! One reed on one bore, at the internal rate: it makes the sound. It knows pressures and holes, not notes.
 
+pub(super) mod choir;
+
 use std::sync::Arc;
 
 use crate::bore::lattice::{HoleFlows, Lattice, LatticeCoeffs, Real, Tip};
@@ -312,6 +314,14 @@ impl<F: Real> Voice<F> {
     ///
     /// A state that is no longer finite is reset to silence and counted; nothing else can fail.
     pub fn tick(&mut self, drive: &Drive) -> &[f32; TICK] {
+        self.begin(drive);
+        self.run();
+        self.end(drive);
+        self.heard().0
+    }
+
+    /// What a tick needs to know.
+    pub(super) fn begin(&mut self, drive: &Drive) {
         let mouth = &mut self.mouth;
         mouth.reed = drive.reed;
         mouth.load = drive.reed.before(mouth.kappa + mouth.tract.map_or(0.0, |tract| tract.at_once()));
@@ -321,10 +331,20 @@ impl<F: Real> Voice<F> {
         let lattice = &self.lattice;
         mouth.outside.heed(lattice.is_moving(), |hole| lattice.is_open(hole));
         mouth.noise.fill(drive.noise, mouth.state.flow);
+    }
+
+    /// The samples of a tick.
+    pub(super) fn run(&mut self) {
+        let mouth = &mut self.mouth;
         match mouth.tract {
             None => run(&mut self.lattice, &mut self.pads, mouth),
             Some(tract) => run(&mut self.lattice, &mut self.pads, &mut ThroughTract { mouth, tract }),
         }
+    }
+
+    /// What comes after the samples of a tick.
+    pub(super) fn end(&mut self, drive: &Drive) {
+        let mouth = &mut self.mouth;
         if let Some(probes) = &mut mouth.probes {
             for (probe, &pressure) in probes.iter_mut().zip(mouth.outside.heard().0) {
                 probe.p_radiated_pa = f64::from(pressure);
@@ -342,7 +362,6 @@ impl<F: Real> Voice<F> {
             self.silence();
             self.resets += 1;
         }
-        self.heard().0
     }
 
     /// Back to the beginning: silence, all holes closed, the tongue on the reed. Real-time safe.

@@ -20,6 +20,8 @@
 //!
 //! Pressures over the reference closing pressure P, flows over P / Zc, Zc of the instrument's nominal bore.
 
+pub mod choir;
+
 use crate::reed::law::{K_INIT, ReedLaw};
 use crate::reed::tables::ReedTables;
 

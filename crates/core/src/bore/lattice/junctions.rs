@@ -1,38 +1,101 @@
-//! Eight junctions at a time: arriving waves and their losses, changes of section, tone holes.
+//! Junctions in lanes: arriving waves and their losses, changes of section, tone holes.
+//!
+//! In a lattice a lane is one of eight junctions. In a [choir](super::choir) it is a voice, and all lanes are the same
+//! junction. Each lane computes the same either way.
 
 use super::real::Real;
+use std::ops::{Deref, DerefMut};
+
+use super::coeffs::LatticeCoeffs;
 use super::{BACK, LANES, SPACE, TINY};
-use crate::bore::tone_hole::HoleCoeffs;
 
 pub(super) type Octet<F> = [F; LANES];
 
-/// One-pole loss of both waves arriving at eight junctions, and where they come from: `y = x - m (x - s)` with
-/// `m = A (1 - q)`, then `s += q (x - s)`.
+/// Eight junctions of a lattice, and where the waves that arrive at them come from.
 #[derive(Clone)]
-#[repr(C, align(64))]
-pub(super) struct Arrivals<F> {
-    pub(super) offset: [[u16; LANES]; 2],
-    /// m, see above.
-    pub(super) taken: [Octet<F>; 2],
-    pub(super) q: [Octet<F>; 2],
-    pub(super) state: [Octet<F>; 2],
+#[repr(C)]
+pub(super) struct Chunk<T> {
+    pub(super) sources: Sources,
+    pub(super) lanes: T,
 }
 
-impl<F: Real> Arrivals<F> {
-    pub(super) fn idle(slot: usize) -> Self {
-        let nothing = [Octet::default(); 2];
-        Self { offset: [[slot as u16; LANES]; 2], taken: nothing, q: nothing, state: nothing }
+impl<T> Chunk<T> {
+    /// Without a junction; `slot` is one that nobody writes.
+    pub(super) fn idle(lanes: T, slot: usize) -> Self {
+        Self { sources: Sources { offset: [[slot as u16; LANES]; 2] }, lanes }
     }
+}
 
-    /// Waves arriving at eight junctions on one side, after their cell's loss.
+impl<T> Deref for Chunk<T> {
+    type Target = T;
+
     #[inline(always)]
-    pub(super) fn gather<const SIDE: usize>(&mut self, ring: &[F; SPACE], base: u16, mask: u16) -> Octet<F> {
+    fn deref(&self) -> &T {
+        &self.lanes
+    }
+}
+
+impl<T> DerefMut for Chunk<T> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut T {
+        &mut self.lanes
+    }
+}
+
+/// Where the waves arriving at eight junctions on both sides come from.
+#[derive(Clone)]
+#[repr(C, align(64))]
+pub(super) struct Sources {
+    pub(super) offset: [[u16; LANES]; 2],
+}
+
+impl Sources {
+    /// Waves arriving at eight junctions on one side.
+    #[inline(always)]
+    pub(super) fn gather<F: Real, const SIDE: usize>(
+        &self,
+        ring: &[F; SPACE],
+        base: u16,
+        mask: u16,
+    ) -> Octet<F> {
         let mut wave = Octet::<F>::default();
         for (wave, offset) in wave.iter_mut().zip(self.offset[SIDE]) {
             *wave = ring[usize::from(base.wrapping_add(offset) & mask)];
         }
+        wave
+    }
+}
+
+/// One-pole loss of both waves arriving at junctions: `y = x - m (x - s)` with `m = A (1 - q)`, then `s += q (x - s)`.
+#[derive(Clone)]
+#[repr(C, align(64))]
+pub(super) struct Arrivals<F, const N: usize = LANES> {
+    /// m, see above.
+    pub(super) taken: [[F; N]; 2],
+    pub(super) q: [[F; N]; 2],
+    pub(super) state: [[F; N]; 2],
+}
+
+impl<F: Real, const N: usize> Arrivals<F, N> {
+    pub(super) fn idle() -> Self {
+        let nothing = [[F::default(); N]; 2];
+        Self { taken: nothing, q: nothing, state: nothing }
+    }
+
+    /// Puts the losses on both sides of a junction into lane `k`.
+    fn place(&mut self, k: usize, coeffs: &LatticeCoeffs, junction: usize) {
+        for side in 0..2 {
+            let (amount, q) = coeffs.loss[junction + side];
+            self.taken[side][k] = F::of(amount * (1.0 - q));
+            self.q[side][k] = F::of(q);
+        }
+    }
+
+    /// Waves arriving on one side, after their cell's loss.
+    #[inline(always)]
+    pub(super) fn lose<const SIDE: usize>(&mut self, mut wave: [F; N]) -> [F; N] {
         let (taken, q, state) = (&self.taken[SIDE], &self.q[SIDE], &mut self.state[SIDE]);
-        for k in 0..LANES {
+        for k in 0..N {
             let difference = wave[k] - state[k];
             state[k] = state[k] + q[k] * difference;
             wave[k] = wave[k] - taken[k] * difference;
@@ -54,7 +117,7 @@ pub(super) fn flush<F: Real>(x: &mut F) {
 
 /// Writes the waves leaving eight junctions, down the bore and back.
 #[inline(always)]
-pub(super) fn leave<F: Real>(ring: &mut [F; SPACE], row: usize, down: &Octet<F>, back: &Octet<F>) {
+pub(super) fn leave<F: Real>(ring: &mut [F; SPACE], row: usize, [down, back]: &[Octet<F>; 2]) {
     let row = row & (SPACE - 1) & !(LANES - 1);
     for (side, wave) in [(row, down), (row | BACK, back)] {
         if let Some(slots) = ring.get_mut(side..side + LANES) {
@@ -63,75 +126,83 @@ pub(super) fn leave<F: Real>(ring: &mut [F; SPACE], row: usize, down: &Octet<F>,
     }
 }
 
-/// Eight changes of section.
+/// Changes of section.
 #[derive(Clone)]
 #[repr(C, align(64))]
-pub(super) struct Steps<F> {
-    pub(super) arrivals: Arrivals<F>,
+pub(super) struct Steps<F, const N: usize = LANES> {
+    pub(super) arrivals: Arrivals<F, N>,
     /// Weight of the left wave in the pressure, 2 Y_left / (Y_left + Y_right); 2 less this is that of the right one.
-    pub(super) weight: Octet<F>,
+    pub(super) weight: [F; N],
 }
 
-impl<F: Real> Steps<F> {
-    /// Eight lanes without a junction; `slot` is one that nobody writes.
-    pub(super) fn idle(slot: usize) -> Self {
-        Self { arrivals: Arrivals::idle(slot), weight: [F::of(1.0); LANES] }
+impl<F: Real, const N: usize> Steps<F, N> {
+    /// Lanes without a junction.
+    pub(super) fn idle() -> Self {
+        Self { arrivals: Arrivals::idle(), weight: [F::of(1.0); N] }
     }
 
+    /// Puts a junction into lane `k`.
+    pub(super) fn place(&mut self, k: usize, coeffs: &LatticeCoeffs, junction: usize) {
+        let (y_left, y_right) = (coeffs.admittance[junction], coeffs.admittance[junction + 1]);
+        self.arrivals.place(k, coeffs, junction);
+        self.weight[k] = F::of(2.0 * y_left / (y_left + y_right));
+    }
+
+    /// Waves that arrive from left and right leave downwards and back.
     #[inline(always)]
-    pub(super) fn tick(&mut self, ring: &mut [F; SPACE], base: u16, mask: u16, slot: usize) {
-        let left = self.arrivals.gather::<0>(ring, base, mask);
-        let right = self.arrivals.gather::<1>(ring, base, mask);
-        let (mut down, mut back) = (Octet::<F>::default(), Octet::<F>::default());
-        for k in 0..LANES {
+    pub(super) fn scatter(&mut self, [left, right]: [[F; N]; 2]) -> [[F; N]; 2] {
+        let left = self.arrivals.lose::<0>(left);
+        let right = self.arrivals.lose::<1>(right);
+        let (mut down, mut back) = ([F::default(); N], [F::default(); N]);
+        for k in 0..N {
             let difference = left[k] - right[k];
             down[k] = right[k] + self.weight[k] * difference;
             back[k] = down[k] - difference;
         }
-        leave(ring, base as usize + slot, &down, &back);
+        [down, back]
     }
 }
 
-/// Eight tone holes.
+/// Tone holes.
 #[derive(Clone)]
 #[repr(C, align(64))]
-pub(super) struct Holes<F> {
-    pub(super) arrivals: Arrivals<F>,
-    pub(super) y_left: Octet<F>,
-    pub(super) y_right: Octet<F>,
-    pub(super) y_sum: Octet<F>,
-    pub(super) r1: Octet<F>,
-    pub(super) minus_r1: Octet<F>,
-    pub(super) gc: Octet<F>,
-    pub(super) minus_gc2: Octet<F>,
-    pub(super) gl2: Octet<F>,
-    pub(super) outside: Octet<F>,
-    pub(super) rs0: Octet<F>,
+pub(super) struct Holes<F, const N: usize = LANES> {
+    pub(super) arrivals: Arrivals<F, N>,
+    pub(super) y_left: [F; N],
+    pub(super) y_right: [F; N],
+    pub(super) y_sum: [F; N],
+    pub(super) r1: [F; N],
+    pub(super) minus_r1: [F; N],
+    pub(super) gc: [F; N],
+    pub(super) minus_gc2: [F; N],
+    pub(super) gl2: [F; N],
+    pub(super) outside: [F; N],
+    pub(super) rs0: [F; N],
     /// Jet resistance per flow of the open hole, and as it stands.
-    pub(super) jet_open: Octet<F>,
-    pub(super) jet: Octet<F>,
+    pub(super) jet_open: [F; N],
+    pub(super) jet: [F; N],
     /// Openings, 0 closed ..= 1 open, and their change per sample, 0 at rest. No opening leaves its `range` (low, high): the
     /// way from where the hole began to where it goes.
-    pub(super) opening: Octet<F>,
-    glide: Octet<F>,
-    range: [Octet<F>; 2],
+    pub(super) opening: [F; N],
+    glide: [F; N],
+    range: [[F; N]; 2],
     /// Squares of the openings.
-    area: Octet<F>,
-    pub(super) resistance: Octet<F>,
-    pub(super) outer: Octet<F>,
-    pub(super) compliance: Octet<F>,
-    pub(super) inner: Octet<F>,
+    area: [F; N],
+    pub(super) resistance: [F; N],
+    pub(super) outer: [F; N],
+    pub(super) compliance: [F; N],
+    pub(super) inner: [F; N],
 }
 
-impl<F: Real> Holes<F> {
-    /// Eight lanes without a hole; `slot` is one that nobody writes.
-    pub(super) fn idle(slot: usize) -> Self {
-        let none = Octet::<F>::default();
+impl<F: Real, const N: usize> Holes<F, N> {
+    /// Lanes without a hole.
+    pub(super) fn idle() -> Self {
+        let none = [F::default(); N];
         Self {
-            arrivals: Arrivals::idle(slot),
+            arrivals: Arrivals::idle(),
             y_left: none,
             y_right: none,
-            y_sum: [F::of(1.0); LANES],
+            y_sum: [F::of(1.0); N],
             r1: none,
             minus_r1: none,
             gc: none,
@@ -152,8 +223,11 @@ impl<F: Real> Holes<F> {
         }
     }
 
-    /// Puts a closed hole into lane `k`, between cells of these admittances (over the reference).
-    pub(super) fn place(&mut self, k: usize, hole: &HoleCoeffs, y_left: f64, y_right: f64) {
+    /// Puts the hole at a junction into lane `k`, closed.
+    pub(super) fn place(&mut self, k: usize, coeffs: &LatticeCoeffs, junction: usize) {
+        let hole = &coeffs.holes[coeffs.hole_junctions.partition_point(|&hole| hole < junction)];
+        let (y_left, y_right) = (coeffs.admittance[junction], coeffs.admittance[junction + 1]);
+        self.arrivals.place(k, coeffs, junction);
         self.y_left[k] = F::of(2.0 * y_left);
         self.y_right[k] = F::of(2.0 * y_right);
         self.y_sum[k] = F::of(y_left + y_right);
@@ -203,20 +277,35 @@ impl<F: Real> Holes<F> {
     /// crowd the loop over samples.
     #[inline(never)]
     pub(super) fn throttle(&mut self) -> bool {
-        for k in 0..LANES {
+        for k in 0..N {
             let area = self.area[k];
             self.jet[k] = self.jet_open[k] / (area + F::of(0.02) * (F::of(1.0) - area));
             let going_up = self.glide[k] > F::default();
             let there = self.opening[k] == self.range[usize::from(going_up)][k];
             self.glide[k] = if there { F::default() } else { self.glide[k] };
         }
-        self.glide != Octet::default()
+        self.glide != [F::default(); N]
+    }
+
+    /// Lane `k` moves as lane `from` of others does.
+    pub(super) fn move_as<const M: usize>(&mut self, k: usize, others: &Holes<F, M>, from: usize) {
+        self.arrive_as(k, others, from);
+        self.jet[k] = others.jet[from];
+        self.glide[k] = others.glide[from];
+        for (own, other) in self.range.iter_mut().zip(&others.range) {
+            own[k] = other[from];
+        }
+    }
+
+    /// The hole in lane `k` is where lane `from` of others is.
+    pub(super) fn arrive_as<const M: usize>(&mut self, k: usize, others: &Holes<F, M>, from: usize) {
+        (self.opening[k], self.area[k]) = (others.opening[from], others.area[from]);
     }
 
     #[inline(always)]
     pub(super) fn glide(&mut self) {
         let [low, high] = &self.range;
-        for k in 0..LANES {
+        for k in 0..N {
             let next = self.opening[k] + self.glide[k];
             let next = if next < low[k] { low[k] } else { next };
             let next = if next > high[k] { high[k] } else { next };
@@ -225,14 +314,43 @@ impl<F: Real> Holes<F> {
         }
     }
 
-    /// The network of [`tone_hole`](crate::bore::tone_hole) at eight junctions, one sample; the flows leaving outside.
+    /// Whether the hole in lane `k` is closed, at rest, and nothing flows outside any more: what [`Shut`] takes for granted.
+    pub(super) fn is_shut(&self, k: usize) -> bool {
+        let is_still = self.outer[k].wide().to_bits() == 0 && self.resistance[k] == self.rs0[k];
+        is_still && !self.is_open(k)
+    }
+
+    /// As [`scatter`](Self::scatter) for lanes that are all [shut](Self::is_shut), to the bit: nothing leaves outside.
     #[inline(always)]
-    pub(super) fn tick(&mut self, ring: &mut [F; SPACE], base: u16, mask: u16, slot: usize) -> Octet<F> {
-        let left = self.arrivals.gather::<0>(ring, base, mask);
-        let right = self.arrivals.gather::<1>(ring, base, mask);
+    pub(super) fn scatter_shut(&mut self, shut: &Shut<F, N>, [left, right]: [[F; N]; 2]) -> [[F; N]; 2] {
+        let left = self.arrivals.lose::<0>(left);
+        let right = self.arrivals.lose::<1>(right);
+        let [mut down, mut back] = [[F::default(); N]; 2];
+        for k in 0..N {
+            let (gp, w, inner) = (self.gc[k], shut.w[k], self.inner[k]);
+            // What flows outside is a positive zero, which takes the sign from a negative one.
+            let source = self.compliance[k] + F::default() - gp * inner;
+            let arriving = self.y_left[k] * left[k] + self.y_right[k] * right[k];
+            let p = (arriving * w - source) / shut.divisor[k];
+            let rise = shut.rise[k] * (gp * p + source);
+            let node = p - inner + rise;
+            self.compliance[k] = self.minus_gc2[k] * node - self.compliance[k];
+            self.inner[k] = rise + rise - inner;
+            down[k] = p - right[k];
+            back[k] = p - left[k];
+        }
+        [down, back]
+    }
+
+    /// The network of [`tone_hole`](crate::bore::tone_hole), one sample: waves that arrive from left and right leave downwards
+    /// and back, and flows leave outside.
+    #[inline(always)]
+    pub(super) fn scatter(&mut self, [left, right]: [[F; N]; 2]) -> ([[F; N]; 2], [F; N]) {
+        let left = self.arrivals.lose::<0>(left);
+        let right = self.arrivals.lose::<1>(right);
         let one = F::of(1.0);
-        let (mut down, mut back, mut radiated) = (Octet::default(), Octet::default(), Octet::default());
-        for k in 0..LANES {
+        let [mut down, mut back, mut radiated] = [[F::default(); N]; 3];
+        for k in 0..N {
             let a = self.opening[k];
             let rs = self.resistance[k];
             let k2 = one / (one + rs * self.outside[k]);
@@ -259,7 +377,25 @@ impl<F: Real> Holes<F> {
             down[k] = p - right[k];
             back[k] = p - left[k];
         }
-        leave(ring, base as usize + slot, &down, &back);
-        radiated
+        ([down, back], radiated)
+    }
+}
+
+/// What closed holes have in common with themselves: results of [`Holes::scatter`] that do not change while they are shut.
+#[derive(Clone)]
+#[repr(C, align(64))]
+pub(super) struct Shut<F, const N: usize> {
+    w: [F; N],
+    /// Of the pressure at the junction.
+    divisor: [F; N],
+    /// Of the pressure over the inner mass.
+    rise: [F; N],
+}
+
+impl<F: Real, const N: usize> Shut<F, N> {
+    pub(super) fn new(holes: &Holes<F, N>) -> Self {
+        let w = std::array::from_fn(|k| F::of(1.0) + holes.gc[k] * holes.r1[k]);
+        let divisor = std::array::from_fn(|k| holes.y_sum[k] * w[k] + holes.gc[k]);
+        Self { w, divisor, rise: std::array::from_fn(|k| holes.minus_r1[k] / w[k]) }
     }
 }

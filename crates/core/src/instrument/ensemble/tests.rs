@@ -12,6 +12,22 @@ fn ensemble(players: Players) -> Ensemble {
     ensemble
 }
 
+impl Seat {
+    /// The next samples of a player alone, as many as [`reach`](Self::reach) at most; whether the player is awake and has made any.
+    fn render(&mut self, mut out: Channels) -> bool {
+        let (samples, is_stereo, is_awake) = (out.len(), out.is_stereo(), !self.sleeps);
+        if is_awake {
+            self.clarinet.render_channels(out.part(0..samples));
+            self.sound[0][..samples].copy_from_slice(out.left());
+            if let Some(right) = out.right() {
+                self.sound[1][..samples].copy_from_slice(right);
+            }
+        }
+        self.pass(samples, is_stereo);
+        is_awake
+    }
+}
+
 fn on(key: u8) -> Event {
     Event::NoteOn { note: SoundingNote(key), velocity: 0.7 }
 }

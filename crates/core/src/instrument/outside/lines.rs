@@ -1,6 +1,6 @@
 //! The last flows of all sources, to be heard later.
 
-use crate::bore::lattice::{HoleFlows, LANES, LatticeCoeffs, Real};
+use crate::bore::lattice::{LANES, LatticeCoeffs, Real};
 use crate::instrument::control_tick::TICK;
 use crate::instrument::listening::MAX_SOURCES;
 
@@ -98,22 +98,21 @@ impl<F: Real> Lines<F> {
         self.emptying = if self.emptying == 1 { 0 } else { self.ticks() + 2 };
     }
 
-    /// Writes the flows of a tick.
+    /// Writes the flows of a tick: those of the bell, and those of a hole as `fill` gives them for its number and its place
+    /// among the flows of a sample.
     #[inline(always)]
-    pub(super) fn write(&mut self, bell: &[F; TICK], holes: &[HoleFlows<F>; TICK]) {
+    pub(super) fn write(&mut self, bell: &[F; TICK], fill: impl Fn(usize, usize, &mut [F; TICK])) {
         self.at += TICK;
         if self.at + TICK > self.stride() {
             self.begin_again();
         }
         let (stride, at) = (self.stride(), self.at);
         for &hole in self.active.get(..self.count).unwrap_or_default() {
-            let Some(&slot) = self.slots.get(usize::from(hole)) else { continue };
-            let begin = usize::from(hole) * stride + at;
+            let hole = usize::from(hole);
+            let Some(&slot) = self.slots.get(hole) else { continue };
+            let begin = hole * stride + at;
             if let Some(place) = self.past.get_mut(begin..).and_then(|past| past.first_chunk_mut::<TICK>()) {
-                for (flow, row) in place.iter_mut().zip(holes) {
-                    let row = row.as_flattened();
-                    *flow = row[slot & (row.len() - 1)];
-                }
+                fill(hole, slot, place);
             }
         }
         let begin = self.slots.len() * stride + at;

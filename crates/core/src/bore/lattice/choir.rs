@@ -1,0 +1,507 @@
+//! The bores of several voices of one instrument, side by side: a lane is a voice, and all lanes of a junction are processed
+//! at once.
+//!
+//! A [`Lattice`] alone has its junctions in lanes and gathers the arriving waves one by one. In a choir all voices have the
+//! same delays, so that a junction's waves lie beside each other. Each lane does what a lattice does, in the same order, and
+//! gives the same bits; junctions are processed chunk by chunk, as their waves pass each other within a row.
+//!
+//! A lattice lends its waves to a lane, and keeps what moves the holes and the delay. Only single precision.
+
+use super::junctions::{Holes, Shut, Steps};
+use super::{
+    BACK, END_SLOT, LANES, LEAST_MASK, Lattice, LatticeCoeffs, NEXT_MASK, Real, SPACE, STRIDE, TINY,
+    TUNED_SLOT, back_rows, silent_ring, sources_of,
+};
+
+/// Samples that a choir plays at once.
+pub const TICK: usize = 16;
+/// The reed ends of all lanes. Implementations mark all `#[inline(always)]`, as those of [`Tip`](super::Tip).
+pub trait Tips<const N: usize> {
+    /// Waves leaving into the bores in sample `at` of a tick, for the waves arriving from them.
+    fn reflect(&mut self, at: usize, p_minus: &[f32; N]) -> [f32; N];
+    /// The tick is done: its flows are there.
+    #[inline(always)]
+    fn ended(&mut self, _choir: &LatticeChoir<N>) {}
+}
+
+/// One junction of all voices.
+#[derive(Clone)]
+#[repr(C, align(64))]
+struct Junction<T> {
+    lanes: T,
+    /// Where the waves come from, and where they go.
+    sources: [u16; 2],
+    slot: u16,
+}
+
+/// A tone hole of all voices.
+#[derive(Clone)]
+#[repr(C, align(64))]
+struct Hole<const N: usize> {
+    junction: Junction<Holes<f32, N>>,
+    shut: Shut<f32, N>,
+    /// Flows that leave in a tick.
+    flows: Flows<N>,
+    /// It is shut in all lanes where somebody plays.
+    is_shut: bool,
+}
+
+/// One-pole loss at an end of the bore.
+#[derive(Clone)]
+struct End<const N: usize> {
+    offset: u16,
+    taken: [f32; N],
+    q: [f32; N],
+    state: [f32; N],
+}
+
+/// The bell, see [`Lattice`].
+#[derive(Clone)]
+struct Bell<const N: usize> {
+    y: [f32; N],
+    y2: [f32; N],
+    share: [f32; N],
+    g2: [f32; N],
+    state: [f32; N],
+    flows: Flows<N>,
+}
+
+/// Flows that leave in a tick, sample by sample.
+pub type Flows<const N: usize> = [[f32; N]; TICK];
+
+/// The bores of up to `N` voices.
+#[derive(Clone)]
+pub struct LatticeChoir<const N: usize> {
+    ring: Box<[[f32; N]; SPACE]>,
+    mask: u16,
+    base: u16,
+    steps: Box<[Junction<Steps<f32, N>>]>,
+    /// In the order in which they are processed.
+    holes: Box<[Hole<N>]>,
+    /// Which of these holes stands for each hole, in the order of the file, and chunk and lane of each in a lattice.
+    places: Box<[(usize, usize, usize)]>,
+    tip: End<N>,
+    end: End<N>,
+    bell: Bell<N>,
+    /// All flows together in the last sample of the tick.
+    sum: [f32; N],
+    /// Rows the returning wave of the tuned cell takes, and their change per row.
+    delay: [f32; N],
+    delay_glide: [f32; N],
+    tuned_source: u16,
+    /// Where that wave comes from, and the wave a row before it, while no delay crosses a row in the tick.
+    tuned: [u16; N],
+    whole: [f32; N],
+    before: [f32; N],
+    crossing: bool,
+    /// Slots and how many of their last rows may still be heard.
+    lines: Box<[(u16, u16)]>,
+    /// Lanes whose holes move in this tick.
+    moving: [bool; N],
+    avx2: bool,
+}
+
+impl<const N: usize> LatticeChoir<N> {
+    /// Silent bores. Allocates.
+    pub fn new(coeffs: &LatticeCoeffs) -> Self {
+        let junctions = coeffs.ticks.len() - 1;
+        let (mut steps, mut holes) = (Vec::new(), Vec::new());
+        let mut by_lane: Vec<usize> = (0..junctions).collect();
+        by_lane.sort_by_key(|&junction| coeffs.lane_of(junction));
+        for junction in by_lane {
+            let (sources, slot) = (sources_of(coeffs, junction), coeffs.lane_of(junction) as u16);
+            if coeffs.hole_junctions.contains(&junction) {
+                let mut lanes = Holes::<f32, N>::idle();
+                (0..N).for_each(|lane| lanes.place(lane, coeffs, junction));
+                let shut = Shut::new(&lanes);
+                let junction = Junction { lanes, sources, slot };
+                holes.push(Hole { junction, shut, flows: [[0.0; N]; TICK], is_shut: false });
+            } else {
+                let mut lanes = Steps::<f32, N>::idle();
+                (0..N).for_each(|lane| lanes.place(lane, coeffs, junction));
+                steps.push(Junction { lanes, sources, slot });
+            }
+        }
+        let first_hole = coeffs.step_chunks() * LANES;
+        let places = coeffs.hole_slots().map(|(chunk, lane)| {
+            let slot = first_hole + chunk * LANES + lane;
+            let at =
+                holes.iter().position(|hole| usize::from(hole.junction.slot) == slot).unwrap_or_default();
+            (at, chunk, lane)
+        });
+        let places = places.collect();
+        let own = Lattice::<f32>::new(coeffs);
+        let end = |end: &super::EndLoss<f32>| {
+            let [taken, q, state] = [end.taken, end.q, 0.0].map(|of_all| [of_all; N]);
+            End { offset: end.offset, taken, q, state }
+        };
+        let mut choir = Self {
+            ring: silent_ring(own.mask, [0.0; N], [1.0; N]),
+            mask: own.mask,
+            base: 0,
+            steps: steps.into(),
+            holes: holes.into(),
+            places,
+            tip: end(&own.tip),
+            end: end(&own.end),
+            bell: Bell {
+                y: [own.bell_y; N],
+                y2: [own.bell_y2; N],
+                share: [own.bell_share; N],
+                g2: [own.bell_g2; N],
+                state: [0.0; N],
+                flows: [[0.0; N]; TICK],
+            },
+            sum: [0.0; N],
+            delay: [own.delay; N],
+            delay_glide: [0.0; N],
+            tuned_source: own.tuned_source,
+            tuned: [own.tuned_source; N],
+            whole: [0.0; N],
+            before: [0.0; N],
+            crossing: false,
+            lines: lines(coeffs),
+            moving: [false; N],
+            avx2: own.avx2,
+        };
+        // A lattice that is new has all holes closed.
+        (0..N).for_each(|lane| choir.move_holes(lane, &own));
+        choir
+    }
+
+    /// Keeps to the code path without AVX2.
+    pub fn without_avx2(mut self) -> Self {
+        self.avx2 = false;
+        self
+    }
+
+    /// Before [`begin`](Self::begin) of the first lane: nobody plays. Real-time safe.
+    pub fn clear(&mut self) {
+        self.moving = [false; N];
+        self.crossing = false;
+    }
+
+    /// A lattice lends its waves to a lane. Real-time safe.
+    pub fn borrow(&mut self, lane: usize, lattice: &mut Lattice<f32>) {
+        for &(slot, rows) in &self.lines {
+            for age in 0..rows {
+                let place = back_rows(u32::from(age), usize::from(slot));
+                let own = lattice.ring[usize::from(lattice.base.wrapping_add(place) & lattice.mask)];
+                self.ring[usize::from(self.base.wrapping_add(place) & self.mask)][lane] = own;
+            }
+        }
+        for junction in &mut self.steps {
+            let (chunk, k) = (usize::from(junction.slot) / LANES, usize::from(junction.slot) % LANES);
+            let Some(own) = lattice.steps.get(chunk) else { continue };
+            for (lanes, own) in junction.lanes.arrivals.state.iter_mut().zip(&own.arrivals.state) {
+                lanes[lane] = own[k];
+            }
+        }
+        for &(at, chunk, k) in &self.places {
+            let (Some(hole), Some(own)) = (self.holes.get_mut(at), lattice.holes.get(chunk)) else {
+                continue;
+            };
+            let lanes = &mut hole.junction.lanes;
+            for (lanes, own) in lanes.arrivals.state.iter_mut().zip(&own.arrivals.state) {
+                lanes[lane] = own[k];
+            }
+            lanes.outer[lane] = own.outer[k];
+            lanes.compliance[lane] = own.compliance[k];
+            lanes.inner[lane] = own.inner[k];
+            lanes.resistance[lane] = own.resistance[k];
+        }
+        self.tip.state[lane] = lattice.tip.state;
+        self.end.state[lane] = lattice.end.state;
+        self.bell.state[lane] = lattice.bell_state;
+        self.move_holes(lane, lattice);
+        lattice.lent = true;
+    }
+
+    /// Gives a lattice its waves back, unless it has others by now. Real-time safe.
+    pub fn give_back(&self, lane: usize, lattice: &mut Lattice<f32>) {
+        if !std::mem::take(&mut lattice.lent) {
+            return;
+        }
+        for &(slot, rows) in &self.lines {
+            for age in 0..rows {
+                let place = back_rows(u32::from(age), usize::from(slot));
+                let wave = self.ring[usize::from(self.base.wrapping_add(place) & self.mask)][lane];
+                lattice.ring[usize::from(lattice.base.wrapping_add(place) & lattice.mask)] = wave;
+            }
+        }
+        for junction in &self.steps {
+            let (chunk, k) = (usize::from(junction.slot) / LANES, usize::from(junction.slot) % LANES);
+            let Some(own) = lattice.steps.get_mut(chunk) else { continue };
+            for (own, lanes) in own.arrivals.state.iter_mut().zip(&junction.lanes.arrivals.state) {
+                own[k] = lanes[lane];
+            }
+        }
+        for &(at, chunk, k) in &self.places {
+            let (Some(hole), Some(own)) = (self.holes.get(at), lattice.holes.get_mut(chunk)) else {
+                continue;
+            };
+            let lanes = &hole.junction.lanes;
+            for (own, lanes) in own.arrivals.state.iter_mut().zip(&lanes.arrivals.state) {
+                own[k] = lanes[lane];
+            }
+            own.outer[k] = lanes.outer[lane];
+            own.compliance[k] = lanes.compliance[lane];
+            own.inner[k] = lanes.inner[lane];
+            own.resistance[k] = lanes.resistance[lane];
+        }
+        lattice.tip.state = self.tip.state[lane];
+        lattice.end.state = self.end.state[lane];
+        lattice.bell_state = self.bell.state[lane];
+    }
+
+    /// Takes over what moves a lane's holes.
+    fn move_holes(&mut self, lane: usize, lattice: &Lattice<f32>) {
+        for &(at, chunk, k) in &self.places {
+            if let (Some(hole), Some(own)) = (self.holes.get_mut(at), lattice.holes.get(chunk)) {
+                hole.junction.lanes.move_as(lane, own, k);
+                hole.is_shut &= hole.junction.lanes.is_shut(lane);
+            }
+        }
+    }
+
+    /// Prepares a lane for the next tick of its lattice: holes and delay move on. Real-time safe.
+    pub fn begin(&mut self, lane: usize, lattice: &mut Lattice<f32>) {
+        if !lattice.lent {
+            self.borrow(lane, lattice);
+        }
+        self.moving[lane] = lattice.moved;
+        if lattice.moved {
+            lattice.throttle();
+            self.move_holes(lane, lattice);
+        }
+        (self.delay[lane], self.delay_glide[lane]) = (lattice.delay, lattice.delay_glide);
+        // The delay goes one way, so that its ends tell whether it crosses a row.
+        let (glide, mut last) = (lattice.delay_glide, lattice.delay);
+        (0..TICK).for_each(|_| last += glide);
+        let whole = (lattice.delay + glide).whole();
+        self.crossing |= whole != last.whole();
+        self.whole[lane] = f32::from(whole);
+        self.tuned[lane] = self.tuned_source.wrapping_sub(whole.wrapping_mul(STRIDE as u16));
+        let before = self.base.wrapping_add(self.tuned[lane]) & self.mask;
+        self.before[lane] = self.ring[usize::from(before)][lane];
+    }
+
+    /// Ends the tick of a lane. Real-time safe.
+    pub fn end(&mut self, lane: usize, lattice: &mut Lattice<f32>) {
+        if self.moving[lane] {
+            for &(at, chunk, k) in &self.places {
+                if let (Some(hole), Some(own)) = (self.holes.get(at), lattice.holes.get_mut(chunk)) {
+                    own.arrive_as(k, &hole.junction.lanes, lane);
+                }
+            }
+        }
+        lattice.delay = self.delay[lane];
+        lattice.end_delay(TICK);
+    }
+
+    /// Plays a tick of all lanes that have [begun](Self::begin) it; what the others do is of no account. Real-time safe.
+    /// [audio thread]
+    pub fn run<T: Tips<N>>(&mut self, tips: &mut T) {
+        match self.mask {
+            LEAST_MASK => self.run_masked::<T, LEAST_MASK>(tips),
+            NEXT_MASK => self.run_masked::<T, NEXT_MASK>(tips),
+            _ => self.run_masked::<T, 0>(tips),
+        }
+    }
+
+    /// See [`Lattice::run_masked`].
+    #[inline(always)]
+    fn run_masked<T: Tips<N>, const MASK: u16>(&mut self, tips: &mut T) {
+        #[cfg(target_arch = "x86_64")]
+        if self.avx2 {
+            #[allow(unsafe_code)]
+            // SAFETY: `avx2` is only set where the processor has AVX2.
+            unsafe {
+                run_avx2::<T, N, MASK>(self, tips)
+            };
+            return;
+        }
+        run_body::<T, N, MASK>(self, tips);
+    }
+
+    /// Flows out of a hole in the last tick, by its number in the file.
+    pub fn hole_flows(&self, hole: usize) -> Option<&Flows<N>> {
+        Some(&self.holes.get(self.places.get(hole)?.0)?.flows)
+    }
+
+    /// Flows out of the bell in the last tick.
+    pub fn bell_flows(&self) -> &Flows<N> {
+        &self.bell.flows
+    }
+
+    /// All flows of a lane together in a sample of the last tick.
+    #[inline(always)]
+    pub fn together(&self, at: usize, lane: usize) -> f32 {
+        if at == TICK - 1 { self.sum[lane] } else { self.add(at)[lane] }
+    }
+
+    /// All flows together in a sample of the tick, added in the order of a single voice.
+    #[inline(always)]
+    fn add(&self, at: usize) -> [f32; N] {
+        let at = at & (TICK - 1);
+        let mut sums = [[0.0; N]; LANES];
+        // In this order, chunk comes after chunk.
+        for hole in &self.holes {
+            let (sum, flows) = (&mut sums[usize::from(hole.junction.slot) % LANES], &hole.flows[at]);
+            for k in 0..N {
+                sum[k] += flows[k];
+            }
+        }
+        let mut all = self.bell.flows[at];
+        for sum in sums {
+            for k in 0..N {
+                all[k] += sum[k];
+            }
+        }
+        all
+    }
+
+    /// As [`Lattice::flush`], for some of the lanes; `playing` are those where somebody plays. Real-time safe.
+    pub fn flush(&mut self, flushed: [bool; N], playing: [bool; N]) {
+        let least = flushed.map(|flushed| if flushed { TINY as f32 } else { 0.0 });
+        let flush = |of: &mut [f32; N]| {
+            for k in 0..N {
+                of[k] = if of[k].abs() < least[k] { 0.0 } else { of[k] };
+            }
+        };
+        for &(slot, rows) in &self.lines {
+            for age in 0..rows {
+                let place = back_rows(u32::from(age), usize::from(slot));
+                flush(&mut self.ring[usize::from(self.base.wrapping_add(place) & self.mask)]);
+            }
+        }
+        self.steps.iter_mut().for_each(|steps| steps.lanes.arrivals.state.iter_mut().for_each(flush));
+        for Hole { junction: Junction { lanes, .. }, flows, is_shut, .. } in &mut self.holes {
+            lanes.arrivals.state.iter_mut().for_each(flush);
+            [&mut lanes.outer, &mut lanes.compliance, &mut lanes.inner].into_iter().for_each(flush);
+            // A hole that has closed is shut when nothing flows outside any more.
+            if !*is_shut && (0..N).all(|lane| !playing[lane] || lanes.is_shut(lane)) {
+                *is_shut = true;
+                *flows = [[0.0; N]; TICK];
+            }
+        }
+        [&mut self.tip.state, &mut self.end.state, &mut self.bell.state].into_iter().for_each(flush);
+    }
+}
+
+/// Slots that somebody reads, and how many of their last rows may still be read.
+fn lines(coeffs: &LatticeCoeffs) -> Box<[(u16, u16)]> {
+    let last = coeffs.ticks.len() - 1;
+    let mut lines = Vec::new();
+    for (cell, (down, back)) in coeffs.all_rows().enumerate() {
+        let from_left = if cell == 0 { END_SLOT } else { coeffs.lane_of(cell - 1) };
+        let from_right = BACK + if cell == last { END_SLOT } else { coeffs.lane_of(cell) };
+        // The tuned cell's may become as long as the ring.
+        let back = if cell == coeffs.tuned_cell() { coeffs.ring_rows() } else { back };
+        lines.extend([(from_left as u16, down as u16), (from_right as u16, back as u16)]);
+    }
+    lines.into()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn run_avx2<T: Tips<N>, const N: usize, const MASK: u16>(choir: &mut LatticeChoir<N>, tips: &mut T) {
+    run_body::<T, N, MASK>(choir, tips);
+}
+
+impl<const N: usize> End<N> {
+    #[inline(always)]
+    fn take(&mut self, mut wave: [f32; N]) -> [f32; N] {
+        let (taken, q, state) = (&self.taken, &self.q, &mut self.state);
+        for k in 0..N {
+            let difference = wave[k] - state[k];
+            state[k] += q[k] * difference;
+            wave[k] -= taken[k] * difference;
+        }
+        wave
+    }
+}
+
+impl<const N: usize> Bell<N> {
+    /// Waves that the bell reflects.
+    #[inline(always)]
+    fn reflect(&mut self, at: usize, arriving: [f32; N]) -> [f32; N] {
+        let mut reflected = [0.0; N];
+        for k in 0..N {
+            let p_end = (self.y2[k] * arriving[k] - self.state[k]) * self.share[k];
+            self.state[k] += self.g2[k] * p_end;
+            reflected[k] = p_end - arriving[k];
+        }
+        let flows = &mut self.flows[at];
+        for k in 0..N {
+            flows[k] = self.y[k] * (arriving[k] - reflected[k]);
+        }
+        reflected
+    }
+}
+
+#[inline(always)]
+fn run_body<T: Tips<N>, const N: usize, const MASK: u16>(choir: &mut LatticeChoir<N>, tips: &mut T) {
+    let moving = choir.moving.iter().any(|moving| *moving);
+    let ring = &mut *choir.ring;
+    let mask = if MASK == 0 { choir.mask } else { MASK };
+    let row_mask = mask & !(STRIDE as u16 - 1);
+    let mut base = choir.base;
+    for at in 0..TICK {
+        base = base.wrapping_add(STRIDE as u16) & row_mask;
+        let from = |offset: u16| usize::from(base.wrapping_add(offset) & mask);
+        if moving {
+            choir.holes.iter_mut().for_each(|hole| hole.junction.lanes.glide());
+        }
+
+        let (mut near, mut far) = ([0.0; N], choir.before);
+        for k in 0..N {
+            choir.delay[k] += choir.delay_glide[k];
+        }
+        if choir.crossing {
+            for k in 0..N {
+                let whole = choir.delay[k].whole();
+                choir.whole[k] = f32::from(whole);
+                let place = choir.tuned_source.wrapping_sub(whole.wrapping_mul(STRIDE as u16));
+                near[k] = ring[from(place)][k];
+                far[k] = ring[from(place.wrapping_sub(STRIDE as u16))][k];
+            }
+        } else {
+            for k in 0..N {
+                near[k] = ring[from(choir.tuned[k])][k];
+            }
+        }
+        choir.before = near;
+        let mut tuned = near;
+        for k in 0..N {
+            let part = choir.delay[k] - choir.whole[k];
+            tuned[k] += part * (far[k] - near[k]);
+        }
+        ring[usize::from(base | TUNED_SLOT as u16)] = tuned;
+
+        let p_minus = choir.tip.take(ring[from(choir.tip.offset)]);
+        ring[usize::from(base | END_SLOT as u16)] = tips.reflect(at, &p_minus);
+        let arriving = choir.end.take(ring[from(choir.end.offset)]);
+        ring[usize::from(base | (BACK + END_SLOT) as u16)] = choir.bell.reflect(at, arriving);
+
+        for Junction { lanes, sources, slot } in &mut *choir.steps {
+            let [down, back] = lanes.scatter(sources.map(|offset| ring[from(offset)]));
+            ring[usize::from(base | *slot)] = down;
+            ring[usize::from(base | *slot | BACK as u16)] = back;
+        }
+        for Hole { junction: Junction { lanes, sources, slot }, shut, flows, is_shut } in &mut *choir.holes {
+            let arriving = sources.map(|offset| ring[from(offset)]);
+            let [down, back];
+            if *is_shut {
+                [down, back] = lanes.scatter_shut(shut, arriving);
+            } else {
+                ([down, back], flows[at]) = lanes.scatter(arriving);
+            }
+            ring[usize::from(base | *slot)] = down;
+            ring[usize::from(base | *slot | BACK as u16)] = back;
+        }
+    }
+    choir.base = base;
+    choir.sum = choir.add(TICK - 1);
+    tips.ended(choir);
+}
