@@ -49,6 +49,59 @@ impl Screen {
     }
 }
 
+/// A lone player, without the others that an ensemble keeps ready, or several.
+enum Who {
+    One(Box<Clarinet>),
+    Several(Box<Ensemble>),
+}
+
+impl Who {
+    fn new(rate_hz: f64, count: i32, plain: bool) -> Result<Self, Box<dyn Error>> {
+        if count > 1 {
+            let ensemble = Ensemble::built_in(rate_hz)?;
+            let ensemble = if plain { ensemble.without_avx2() } else { ensemble };
+            return Ok(Self::Several(Box::new(ensemble)));
+        }
+        let clarinet = Clarinet::built_in(rate_hz)?;
+        Ok(Self::One(Box::new(if plain { clarinet.without_avx2() } else { clarinet })))
+    }
+
+    fn set_settings(&mut self, settings: &Settings) {
+        match self {
+            Self::One(clarinet) => clarinet.set_settings(settings),
+            Self::Several(ensemble) => ensemble.set_settings(settings),
+        }
+    }
+
+    fn apply(&mut self, event: PartEvent) {
+        match self {
+            Self::One(clarinet) => clarinet.apply(event.event),
+            Self::Several(ensemble) => ensemble.apply(event),
+        }
+    }
+
+    fn set_scope_on(&mut self, on: bool) {
+        match self {
+            Self::One(clarinet) => clarinet.set_scope_on(on),
+            Self::Several(ensemble) => ensemble.set_scope_on(on),
+        }
+    }
+
+    fn render(&mut self, out: Channels) {
+        match self {
+            Self::One(clarinet) => clarinet.render_channels(out),
+            Self::Several(ensemble) => ensemble.render_channels(out),
+        }
+    }
+
+    fn first(&self) -> &Clarinet {
+        match self {
+            Self::One(clarinet) => clarinet,
+            Self::Several(ensemble) => ensemble.first(),
+        }
+    }
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let seconds: f64 = arguments
@@ -68,26 +121,20 @@ fn main() -> Result<(), Box<dyn Error>> {
     let chord = arguments.next().is_some_and(|word| word == "chord");
     let blocks = (seconds * rate_hz / BLOCK as f64).round() as usize;
 
-    let mut clarinets = Ensemble::built_in(rate_hz)?;
-    if plain {
-        clarinets = clarinets.without_avx2();
-    }
     let listening = Listening { mode, ..Listening::default() };
-    let players =
-        Players { count, split: if chord { Split::Chords } else { Split::Unison }, ..Players::default() };
-    clarinets.set_settings(&Settings { listening, players, ..Settings::default() });
-    clarinets.apply(Event::Bend { cents: bend_cents }.into());
-    clarinets.apply(Event::Breath(0.5).into());
-    for player in 0..count as u8 {
-        // In unison each event is for all of them: one note is enough.
+    let split = if chord { Split::Chords } else { Split::Unison };
+    let players = Players { count, split, ..Players::default() };
+    let mut who = Who::new(rate_hz, count, plain)?;
+    who.set_settings(&Settings { listening, players, ..Settings::default() });
+    who.apply(Event::Bend { cents: bend_cents }.into());
+    who.apply(Event::Breath(0.5).into());
+    // In unison each event is for all of them: one note is enough.
+    for player in 0..if chord { count as u8 } else { 1 } {
         let written = if chord { 55 + 3 * player } else { 60 };
         let note = WrittenNote(written).sounding(2).ok_or("no such note")?;
-        clarinets.apply(PartEvent { to: To::Player(player), event: Event::NoteOn { note, velocity: 0.8 } });
-        if !chord {
-            break;
-        }
+        who.apply(PartEvent { to: To::Player(player), event: Event::NoteOn { note, velocity: 0.8 } });
     }
-    clarinets.set_scope_on(watched);
+    who.set_scope_on(watched);
     let mut screen =
         Screen { heard: [0.0; BLOCK], moments: [ScopeSample::default(); SCOPE_SAMPLES], shown: 0 };
 
@@ -96,12 +143,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let start = thread_cpu_ns();
     for _ in 0..blocks {
         if mode == ListeningMode::Position {
-            clarinets.render_channels(Channels::two(&mut block, &mut right));
+            who.render(Channels::two(&mut block, &mut right));
         } else {
-            clarinets.render(&mut block);
+            who.render(Channels::one(&mut block));
         }
         if watched {
-            screen.see(clarinets.first(), &block);
+            screen.see(who.first(), &block);
         }
         checksum = block.iter().fold(checksum, |sum, sample| sum.rotate_left(5) ^ sample.to_bits());
     }
