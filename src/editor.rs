@@ -111,6 +111,8 @@ pub enum Action {
     OpenScale(PathBuf),
     /// Keys play equal temperament again.
     EqualTemperament,
+    /// Keys without a scale of their own follow a tuning program, or no longer.
+    FollowTuningProgram(bool),
     /// Read a folder for the user to choose from; `None` is the user's own.
     ReadFolder(Option<PathBuf>),
     /// The preset of this name has been put on the controls.

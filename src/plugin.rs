@@ -24,6 +24,7 @@ pub mod instrument_loading;
 #[cfg(feature = "devices")]
 mod knob;
 pub mod launch_options;
+pub mod mts_esp;
 mod notes_only;
 mod params;
 mod preset_keeper;

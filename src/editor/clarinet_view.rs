@@ -103,7 +103,7 @@ impl ClarinetView {
                 || response.has_focus()
                 || self.mover.has_chosen(hole);
             on_bore.widget_info(|| {
-                WidgetInfo::labeled(Role::Button, true, format!("Hole {} in the bore", tone_hole.name))
+                WidgetInfo::labeled(Role::Image, true, format!("Hole {} in the bore", tone_hole.name))
             });
             self.mover.follow(&on_bore, hole, body.scale, snapshot, actions);
             leader(&painter, c, at.foot, buttons[hole], is_hot, opening);

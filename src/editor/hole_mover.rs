@@ -155,7 +155,7 @@ impl HoleMover {
             actions.push(Action::MoveHoles(Vec::new()));
         }
         let can_undo = self.of == snapshot.as_built.name && !self.undo.is_empty();
-        let undo = ui.add_enabled(can_undo, egui::Button::new("Undo"));
+        let undo = ui.add_enabled(can_undo, egui::Button::new("Undo move"));
         if undo.on_hover_text("Undo the last move of a hole").clicked()
             && let Some(before) = self.undo.pop()
         {

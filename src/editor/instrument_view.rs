@@ -104,6 +104,13 @@ fn scale(ui: &mut Ui, snapshot: &Snapshot, files: &mut FileBrowser, actions: &mu
         if ui.button("Open a scale").on_hover_text(about).clicked() {
             files.open(FileKind::Scale, actions);
         }
+        if let Some(follows) = snapshot.follows_tuning_program {
+            let mut now = follows;
+            let about = "A tuning program runs (MTS-ESP). Keys follow it unless a scale is opened here.";
+            if ui.checkbox(&mut now, "Follow MTS-ESP").on_hover_text(about).changed() {
+                actions.push(Action::FollowTuningProgram(now));
+            }
+        }
         let is_equal = snapshot.key_pitches == KeyPitches::default();
         if ui.add_enabled(!is_equal, egui::Button::new("Equal temperament")).clicked() {
             actions.push(Action::EqualTemperament);

@@ -31,6 +31,8 @@ pub struct Snapshot {
     pub key_pitches: KeyPitches,
     /// The scale that the keys play, as lists show it.
     pub scale: String,
+    /// Whether the keys follow a tuning program; `None` if none runs.
+    pub follows_tuning_program: Option<bool>,
     /// Why the last file of a scale was not taken.
     pub scale_refused: Option<String>,
     /// The folder that the user chooses a file from.
@@ -97,6 +99,7 @@ impl Default for Snapshot {
             saved: None,
             key_pitches: KeyPitches::default(),
             scale: "Equal temperament".to_owned(),
+            follows_tuning_program: None,
             scale_refused: None,
             folder: Arc::default(),
             silent: Vec::new(),

@@ -16,7 +16,7 @@
 //! | `indication` | `clap.param-indication` | the window shows what the host has mapped and automated |
 //!
 //! [`ClapPlugin::remote_controls`](nice_plug::prelude::ClapPlugin) is the framework's; its pages are in `remote_pages`.
-//! Everything here that handles pointers of the host is `unsafe`, and nothing outside this folder is.
+//! Everything here that handles pointers of the host is `unsafe`; outside this folder only `mts_esp` is.
 #![allow(unsafe_code)] // pointers that the host hands in and takes; each use says why it is sound
 
 mod factory;

@@ -53,15 +53,15 @@ fn a_hole_is_dragged_undone_and_put_back() {
     assert_eq!(wider.x_m, first.x_m);
     assert!((wider.radius_m - first.radius_m - 1e-3).abs() < 1e-5, "{wider:?}");
 
-    click(&mut window, "Undo");
+    click(&mut window, "Undo move");
     assert_eq!(moved(&window), std::slice::from_ref(first));
-    click(&mut window, "Undo");
+    click(&mut window, "Undo move");
     assert!(moved(&window).is_empty());
     drag(&mut window, vec2(8.0, 0.0), Modifiers::NONE);
     click(&mut window, "Put back");
     assert!(moved(&window).is_empty());
     // Putting back can be undone too.
-    click(&mut window, "Undo");
+    click(&mut window, "Undo move");
     assert_eq!(moved(&window).len(), 1);
     click(&mut window, "Done");
     window.harness.get_by_label("1 hole moved");
@@ -84,7 +84,7 @@ fn a_hole_is_given_in_millimetres_and_saved() {
     let mut window = Window::new(Tab::Clarinet, (1100.0, 720.0));
     click(&mut window, "Move holes");
     window.harness.get_by_label("Drag a hole along the bore. With Shift, up makes it wider.");
-    drag(&mut window, vec2(-4.0, 0.0), Modifiers::NONE);
+    drag(&mut window, vec2(-8.0, 0.0), Modifiers::NONE);
     let width = window.harness.get_by_label("Width of the hole R2, mm wide");
     width.click();
     window.harness.run();
@@ -112,6 +112,6 @@ fn a_hole_is_given_in_millimetres_and_saved() {
     let other = InstrumentFile { name: "other".to_owned(), ..InstrumentFile::built_in() };
     window.snapshot.borrow_mut().as_built = Arc::new(other);
     window.harness.run();
-    click(&mut window, "Undo");
+    click(&mut window, "Undo move");
     assert!(window.actions().is_empty());
 }

@@ -16,6 +16,7 @@ use super::{
     Activation, CurrentInstrument, InstrumentSwap, NO_CHOICE, Readiness, SharedInstrument, SwapCandidate,
 };
 use crate::cache::Cache;
+use crate::plugin::mts_esp::MtsClient;
 use crate::plugin::params::ChalumeauParams;
 use chalumeau_core::instrument::prepare::Progress;
 use chalumeau_core::instrument::{BuildError, Ensemble, Model};
@@ -35,6 +36,7 @@ pub struct InstrumentLoader {
     shared: Arc<SharedInstrument>,
     thread: Option<JoinHandle<()>>,
     cache: Option<Cache>,
+    tuning_program: Option<Arc<MtsClient>>,
     activations: u64,
     /// The audio thread's ends of the rings, until an [`InstrumentSwap`] takes them.
     ends: Option<(rtrb::Consumer<SwapCandidate>, rtrb::Producer<Box<Ensemble>>)>,
@@ -46,10 +48,12 @@ impl InstrumentLoader {
         let (to_audio, incoming) = rtrb::RingBuffer::new(IN_FLIGHT);
         let (outgoing, from_audio) = rtrb::RingBuffer::new(2 * IN_FLIGHT);
         let cache = Cache::system();
+        let tuning_program = MtsClient::register().map(Arc::new);
         let thread = LoaderThread {
             params: params.clone(),
             shared: shared.clone(),
             cache: cache.clone(),
+            tuning_program: tuning_program.clone(),
             to_audio,
             from_audio,
             waiting: None,
@@ -63,7 +67,8 @@ impl InstrumentLoader {
         let thread =
             std::thread::Builder::new().name("InstrumentLoader".to_owned()).spawn(move || thread.run());
         // Without a thread the plugin still gets an instrument at each activation.
-        Self { params, shared, thread: thread.ok(), cache, activations: 0, ends: Some((incoming, outgoing)) }
+        let ends = Some((incoming, outgoing));
+        Self { params, shared, thread: thread.ok(), cache, tuning_program, activations: 0, ends }
     }
 
     /// Puts the instrument that the parameters ask for into `swap`: the best one available at once, or, for an offline
@@ -80,6 +85,7 @@ impl InstrumentLoader {
         let before =
             std::mem::replace(&mut *self.shared.activation(), Activation { number, ..Activation::default() });
         self.shared.finished_choice.store(NO_CHOICE, Ordering::Release);
+        receive_tuning(self.tuning_program.as_deref(), &self.params);
         let request = InstrumentRequest::from_params(&self.params, host_rate_hz, offline);
         let at_rate = before.current.filter(|current| current.request.host_rate_hz == host_rate_hz);
         let current = match self.best(&request, at_rate.as_ref(), offline) {
@@ -167,6 +173,7 @@ struct LoaderThread {
     params: Arc<ChalumeauParams>,
     shared: Arc<SharedInstrument>,
     cache: Option<Cache>,
+    tuning_program: Option<Arc<MtsClient>>,
     to_audio: rtrb::Producer<SwapCandidate>,
     from_audio: rtrb::Consumer<Box<Ensemble>>,
     /// An instrument that the ring had no room for, because the audio thread does not run.
@@ -228,6 +235,7 @@ impl LoaderThread {
         let (Some(host_rate_hz), Some(current)) = (activation.host_rate_hz, &activation.current) else {
             return self.cancel_job();
         };
+        receive_tuning(self.tuning_program.as_deref(), &self.params);
         let mut request = InstrumentRequest::from_params(&self.params, host_rate_hz, activation.offline);
         if activation.offline {
             // During an offline render only a new choice exchanges the instrument; the player follows A4.
@@ -426,6 +434,13 @@ impl LoaderThread {
         {
             self.waiting = Some(prepared);
         }
+    }
+}
+
+/// Looks at what a tuning program says.
+fn receive_tuning(program: Option<&MtsClient>, params: &ChalumeauParams) {
+    if let Some(program) = program {
+        params.scale.receive(program.tuning(f64::from(params.settings().a4_hz)));
     }
 }
 

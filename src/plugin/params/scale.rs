@@ -6,6 +6,7 @@ use std::sync::{Arc, PoisonError, RwLock};
 use nice_plug::params::persist::PersistentField;
 use serde::{Deserialize, Serialize};
 
+use crate::plugin::mts_esp::ReceivedTuning;
 use crate::scale_file::{self, ScaleFault};
 use chalumeau_core::instrument::KeyPitches;
 
@@ -24,6 +25,9 @@ pub struct SavedScale {
     pub mapping_name: String,
     /// Text of the keyboard mapping, in Scala's format `.kbm`; empty without one.
     pub kbm: String,
+    /// Whether the keys of equal temperament leave the tuning of a tuning program alone, see
+    /// [`mts_esp`](crate::plugin::mts_esp).
+    pub ignores_tuning_program: bool,
 }
 
 impl SavedScale {
@@ -38,7 +42,12 @@ impl SavedScale {
     /// The same if it can be used, else equal temperament.
     pub fn mended(self) -> Self {
         let is_short = self.scl.len().max(self.kbm.len()) <= BYTES_MOST && self.name.len() <= 1_024;
-        if is_short && self.key_pitches().is_ok() { self } else { Self::default() }
+        if is_short && self.key_pitches().is_ok() { self } else { self.equal() }
+    }
+
+    /// Equal temperament, with the same attitude to tuning programs.
+    pub fn equal(self) -> Self {
+        Self { ignores_tuning_program: self.ignores_tuning_program, ..Self::default() }
     }
 
     /// What lists show.
@@ -63,7 +72,12 @@ impl SavedScale {
                 return Err(format!("{name} maps the keys to a scale; open a scale (.scl) first"));
             }
             true => Self { mapping_name: name.clone(), kbm: text, ..self },
-            false => Self { name: name.clone(), scl: text, ..Self::default() },
+            false => Self {
+                name: name.clone(),
+                scl: text,
+                ignores_tuning_program: self.ignores_tuning_program,
+                ..Self::default()
+            },
         };
         match scale.key_pitches() {
             Ok(_) => Ok(scale),
@@ -74,29 +88,60 @@ impl SavedScale {
 
 /// The scale of one plugin instance.
 #[derive(Debug, Default)]
-pub struct ScaleField(RwLock<(SavedScale, Arc<KeyPitches>)>);
+pub struct ScaleField {
+    own: RwLock<(SavedScale, Arc<KeyPitches>)>,
+    /// What a tuning program says, which no project keeps.
+    received: RwLock<Option<ReceivedTuning>>,
+}
 
 impl ScaleField {
     /// The scale as it is saved.
     pub fn saved(&self) -> SavedScale {
-        self.0.read().unwrap_or_else(PoisonError::into_inner).0.clone()
+        self.own.read().unwrap_or_else(PoisonError::into_inner).0.clone()
     }
 
-    /// What lists show, without a copy of the texts.
+    /// What lists show.
     pub fn title(&self) -> String {
-        self.0.read().unwrap_or_else(PoisonError::into_inner).0.title()
+        match self.followed() {
+            Some(received) => format!("MTS-ESP: {}", received.name),
+            None => self.own.read().unwrap_or_else(PoisonError::into_inner).0.title(),
+        }
     }
 
     /// What every key plays.
     pub fn key_pitches(&self) -> Arc<KeyPitches> {
-        self.0.read().unwrap_or_else(PoisonError::into_inner).1.clone()
+        match self.followed() {
+            Some(received) => received.keys,
+            None => self.own.read().unwrap_or_else(PoisonError::into_inner).1.clone(),
+        }
+    }
+
+    /// The tuning of a tuning program, where the keys follow it: a scale of the user's own comes first.
+    fn followed(&self) -> Option<ReceivedTuning> {
+        let own = self.own.read().unwrap_or_else(PoisonError::into_inner);
+        if !own.0.scl.is_empty() || own.0.ignores_tuning_program {
+            return None;
+        }
+        self.received.read().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Whether a tuning program runs; `Some(true)` if the keys are to follow it where they have no scale of their own.
+    pub fn follows_tuning_program(&self) -> Option<bool> {
+        let own = self.own.read().unwrap_or_else(PoisonError::into_inner);
+        let received = self.received.read().unwrap_or_else(PoisonError::into_inner);
+        received.as_ref().map(|_| !own.0.ignores_tuning_program)
+    }
+
+    /// What a tuning program says now; `None` if none runs.
+    pub fn receive(&self, tuning: Option<ReceivedTuning>) {
+        *self.received.write().unwrap_or_else(PoisonError::into_inner) = tuning;
     }
 
     /// Another scale; one that cannot be used is equal temperament.
     pub fn put(&self, scale: SavedScale) {
         let scale = scale.mended();
         let pitches = scale.key_pitches().unwrap_or_default();
-        *self.0.write().unwrap_or_else(PoisonError::into_inner) = (scale, Arc::new(pitches));
+        *self.own.write().unwrap_or_else(PoisonError::into_inner) = (scale, Arc::new(pitches));
     }
 }
 

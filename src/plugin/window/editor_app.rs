@@ -82,7 +82,13 @@ impl WindowMemory {
             Action::OpenScale(path) => shared.ask_for_file(FileTask::OpenScale(path)),
             Action::ReadFolder(path) => shared.ask_for_file(FileTask::ReadFolder(path)),
             Action::EqualTemperament => {
-                self.handles.params.scale.put(SavedScale::default());
+                let scale = &self.handles.params.scale;
+                scale.put(scale.saved().equal());
+                self.handles.params.host.state_changed();
+            }
+            Action::FollowTuningProgram(follows) => {
+                let scale = &self.handles.params.scale;
+                scale.put(SavedScale { ignores_tuning_program: !follows, ..scale.saved() });
                 self.handles.params.host.state_changed();
             }
             Action::ChosePreset(name) => self.handles.params.set_preset_name(&name),
@@ -178,6 +184,7 @@ impl NiceEguiApp for EditorApp {
         snapshot.presets = memory.handles.presets.shelf();
         snapshot.preset = params.preset_name();
         snapshot.scale = params.scale.title();
+        snapshot.follows_tuning_program = params.scale.follows_tuning_program();
         snapshot.moved = params.holes.of(&params.instrument.key());
         ui.ctx().set_zoom_factor(memory.state.kept.zoom);
         let actions = editor::draw(ui, &mut memory.state, &memory.controls.with(&self.gui), &snapshot);
