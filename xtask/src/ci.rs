@@ -205,8 +205,17 @@ fn host_tests(names: &[&str]) -> Command {
 }
 
 /// Test files that play the bundled CLAP.
-const CLAP_TESTS: &[&str] =
-    &["clap", "clap_rules", "clap_sleep", "note_ids", "keyboard", "instrument", "knob", "knob_stop", "mts_esp"];
+const CLAP_TESTS: &[&str] = &[
+    "clap",
+    "clap_rules",
+    "clap_sleep",
+    "note_ids",
+    "keyboard",
+    "instrument",
+    "knob",
+    "knob_stop",
+    "mts_esp",
+];
 
 fn clap() -> Result<()> {
     let program = &programs()?.program;

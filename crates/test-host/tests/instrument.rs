@@ -6,6 +6,10 @@ use std::time::{Duration, Instant};
 
 use chalumeau_core::analysis::pitch::fundamental_hz;
 use chalumeau_core::analysis::to_f64;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::bore::moved_hole::MovedHole;
+use chalumeau_core::bore::transfer_matrix::TransferMatrix;
+use chalumeau_core::units::{Air, WrittenNote};
 use chalumeau_test_host::clap::{At, Plugin, Say, Session};
 
 const RATE: f64 = 48_000.0;
@@ -115,6 +119,54 @@ fn a_project_keeps_its_scale_and_another_comes_while_a_note_sounds() {
     plugin.restore(&scale_state("quarter tones\n7\n50.0\n")).unwrap();
     let heard = session.play_live(&[], SECOND, RATE).unwrap()[0].clone();
     assert!(cents(&heard[SECOND / 2..], 65.0).abs() < 2.0);
+    plugin.deactivate(session);
+}
+
+/// The hole that written G3 opens first, moved towards the reed by 5 mm: G3 rises at once, and exactly as the transfer matrices
+/// say when the bore is fitted; E3, which closes it, stays; the project keeps it.
+#[test]
+fn a_moved_hole_is_heard_at_once_and_kept() {
+    let file = InstrumentFile::built_in();
+    let note = file.fingering(WrittenNote(55)).unwrap();
+    let hole = &file.holes[note.open.iter().position(|open| *open).unwrap()];
+    let moved = MovedHole { name: hole.name.clone(), x_m: hole.x_m - 5e-3, radius_m: hole.radius_m };
+    let peak_hz = |file: &InstrumentFile| {
+        TransferMatrix::new(file, Air::default()).peaks(&note.open, file.reed_volume_m3, 1)[0].f_hz
+    };
+    let rise = 1_200.0 * (peak_hz(&file.with_holes_moved(&[moved.clone()])) / peak_hz(&file)).log2();
+    assert!(rise > 10.0, "{rise}");
+
+    let holes = serde_json::json!({ "instrument": "bflat", "moved": [moved] }).to_string();
+    let fields = serde_json::json!({ "holes": holes });
+    let state = state_of(&serde_json::json!({ "version": "1", "params": {}, "fields": fields }).to_string());
+    let mut plugin = plugin();
+    let mut session = plugin.activate(RATE, BLOCK).unwrap();
+    let mut played = |plugin: &mut Plugin, key: u8| {
+        let heard = session.play_live(&[At(0, breath(80)), At(0, on(key))], SECOND, RATE).unwrap()[0].clone();
+        session.play_live(&[At(0, off(key))], SECOND / 5, RATE).unwrap();
+        (cents(&heard[SECOND / 2..], f64::from(key)), status(plugin))
+    };
+    // Sounding, two semitones below what is written.
+    let (g3, e3) = (53, 50);
+    let built = [played(&mut plugin, g3).0, played(&mut plugin, e3).0];
+    assert!(built.iter().all(|off| off.abs() < 5.0), "{built:?}");
+    plugin.restore(&state).unwrap();
+    let at_once = played(&mut plugin, g3).0 - built[0];
+    assert!((at_once - rise).abs() < 8.0, "{at_once} cents at once, {rise} wanted");
+    let began = Instant::now();
+    loop {
+        let (_, told) = played(&mut plugin, g3);
+        if told.starts_with("ready: ") {
+            assert!(told.ends_with("holes moved"), "{told}");
+            break;
+        }
+        assert!(began.elapsed() < PATIENCE, "{told}");
+    }
+    let fitted = [played(&mut plugin, g3).0 - built[0], played(&mut plugin, e3).0 - built[1]];
+    assert!((fitted[0] - rise).abs() < 2.5, "{} cents, {rise} wanted", fitted[0]);
+    assert!(fitted[1].abs() < 2.5, "{fitted:?}");
+    let saved = String::from_utf8_lossy(&plugin.save().unwrap()).into_owned();
+    assert!(saved.contains(&hole.name), "{saved}");
     plugin.deactivate(session);
 }
 
