@@ -14,6 +14,8 @@ use chalumeau_core::bore::moved_hole::MovedHole;
 
 /// Steps that can be undone.
 const KEPT: usize = 100;
+/// Width of the line below which units lose their words, points.
+const NARROW: f32 = 640.0;
 /// How much wider a hole becomes where the pointer goes up by one point with Shift held, m of the radius.
 const WIDER_M: f32 = 0.05e-3;
 
@@ -172,6 +174,7 @@ impl HoleMover {
         actions: &mut Vec<Action>,
     ) {
         let c = Colours::here(ui);
+        let is_narrow = ui.available_width() < NARROW;
         ui.strong(built.name.replace('_', " "));
         let mut now = here.clone();
         let numbers = [
@@ -190,6 +193,7 @@ impl HoleMover {
             if response.changed() {
                 *metres = mm / factor;
             }
+            let unit = if is_narrow { "mm" } else { unit };
             ui.label(RichText::new(unit).font(theme::small()).color(c.quiet));
         }
         if now != here {
