@@ -40,6 +40,7 @@ pub mod theme;
 pub mod undo;
 mod widgets;
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -111,6 +112,8 @@ pub enum Action {
     OpenScale(PathBuf),
     /// Keys play equal temperament again.
     EqualTemperament,
+    /// Notes, by sounding pitch, are moved by so many tenths of a cent.
+    TrimNotes(BTreeMap<u8, i16>),
     /// Keys without a scale of their own follow a tuning program, or no longer.
     FollowTuningProgram(bool),
     /// Read a folder for the user to choose from; `None` is the user's own.

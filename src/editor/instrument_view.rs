@@ -28,7 +28,7 @@ pub fn draw(
         "instrument",
         &mut with,
         |ui, (hands, files, actions)| left(ui, hands, snapshot, files, actions),
-        |ui, (hands, _, _)| column(ui, hands, names),
+        |ui, (hands, _, actions)| column(ui, hands, snapshot, names, actions),
     );
 }
 
@@ -121,6 +121,37 @@ fn scale(ui: &mut Ui, snapshot: &Snapshot, files: &mut FileBrowser, actions: &mu
     }
 }
 
+/// How far the note that is fingered lies above its pitch in the scale.
+fn trim(ui: &mut Ui, snapshot: &Snapshot, names: NoteNames, actions: &mut Vec<Action>) {
+    let c = Colours::here(ui);
+    let transposition = snapshot.instrument.transposition;
+    let Some(written) = snapshot.fingering().map(|fingering| fingering.written) else { return };
+    let Some(sounding) = written.sounding(transposition) else { return };
+    let name = names.of_written(written, transposition).map_or_else(String::new, note_name);
+    ui.horizontal(|ui| {
+        let about = "Moves this note alone, whichever key plays it. Play another note to trim that one. The project keeps all trims.";
+        ui.label(RichText::new(format!("Trim of {name}")).color(c.quiet)).on_hover_text(about);
+        let tenths = snapshot.trims.get(&sounding.0).copied().unwrap_or(0);
+        let mut cents = 0.1 * f64::from(tenths);
+        let value = egui::DragValue::new(&mut cents).range(-50.0..=50.0).speed(0.1).fixed_decimals(1).suffix(" cents");
+        let response = ui.add(value).on_hover_text(about);
+        let label = format!("Trim of {name}, cents");
+        response.widget_info(|| WidgetInfo::labeled(Role::SpinButton, true, label.clone()));
+        let mut trims = snapshot.trims.clone();
+        if response.changed() {
+            trims.insert(sounding.0, (10.0 * cents).round() as i16);
+            trims.retain(|_, trim| *trim != 0);
+        }
+        let others = snapshot.trims.len();
+        if others > 0 && ui.button("No trims").on_hover_text(format!("Takes back all trims; there are {others}")).clicked() {
+            trims.clear();
+        }
+        if trims != snapshot.trims {
+            actions.push(Action::TrimNotes(trims));
+        }
+    });
+}
+
 fn card(ui: &mut Ui, c: &Colours, name: &str, is_here: bool) -> egui::Response {
     let galley = ui.painter().layout_no_wrap(name.to_owned(), theme::body(), c.ink);
     let size = vec2((galley.size().x + 28.0).max(96.0), 34.0);
@@ -203,7 +234,13 @@ fn facts(ui: &mut Ui, snapshot: &Snapshot) {
     ui.label(RichText::new(&file.source).font(theme::small()).color(c.quiet));
 }
 
-fn column(ui: &mut Ui, hands: &mut Hands, names: &mut NoteNames) {
+fn column(
+    ui: &mut Ui,
+    hands: &mut Hands,
+    snapshot: &Snapshot,
+    names: &mut NoteNames,
+    actions: &mut Vec<Action>,
+) {
     let c = Colours::here(ui);
     ui.label(RichText::new("Names of notes").color(c.quiet));
     let mut chosen = usize::from(*names == NoteNames::Concert);
@@ -218,6 +255,7 @@ fn column(ui: &mut Ui, hands: &mut Hands, names: &mut NoteNames) {
     for id in ["transp", "temp", "vent"] {
         slider(ui, hands, id);
     }
+    trim(ui, snapshot, *names, actions);
     heading(ui, "Playing");
     for id in ["tongue", "legato", "noise", "bendr"] {
         slider(ui, hands, id);

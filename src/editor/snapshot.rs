@@ -3,6 +3,7 @@
 //! The editor knows no voice, no link to the knob and no lock. It shows missing values as missing: every `Option` and every
 //! empty list has its own look.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -31,6 +32,8 @@ pub struct Snapshot {
     pub key_pitches: KeyPitches,
     /// The scale that the keys play, as lists show it.
     pub scale: String,
+    /// Tenths of a cent by which notes, by sounding pitch, are moved.
+    pub trims: BTreeMap<u8, i16>,
     /// Whether the keys follow a tuning program; `None` if none runs.
     pub follows_tuning_program: Option<bool>,
     /// Why the last file of a scale was not taken.
@@ -99,6 +102,7 @@ impl Default for Snapshot {
             saved: None,
             key_pitches: KeyPitches::default(),
             scale: "Equal temperament".to_owned(),
+            trims: BTreeMap::new(),
             follows_tuning_program: None,
             scale_refused: None,
             folder: Arc::default(),

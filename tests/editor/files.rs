@@ -1,5 +1,6 @@
 //! Files that the user chooses: folders are walked through, an instrument file or a scale is opened.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -103,4 +104,22 @@ fn a_typed_path_opens_a_file_or_a_folder_and_escape_leaves() {
     window.harness.get_by_label("cannot read /root: Permission denied");
     assert!(click(&mut window, "Cancel").is_empty());
     window.harness.get_by_label("Open a scale");
+}
+
+#[test]
+fn the_fingered_note_is_trimmed_and_all_trims_go_back() {
+    let mut window = Window::tall(Tab::Instrument);
+    window.harness.get_by_label("Trim of C4, cents").click();
+    window.harness.run();
+    window.harness.key_press_modifiers(egui::Modifiers::COMMAND, Key::A);
+    window.harness.get_by_label("Trim of C4, cents").type_text("-7.5");
+    window.harness.run();
+    window.harness.key_press(Key::Enter);
+    window.harness.run();
+    // Written C4 sounds two semitones lower.
+    let trims = BTreeMap::from([(58, -75)]);
+    assert_eq!(window.actions().last(), Some(&Action::TrimNotes(trims.clone())));
+    window.snapshot.borrow_mut().trims = trims;
+    window.harness.run();
+    assert_eq!(click(&mut window, "No trims"), [Action::TrimNotes(BTreeMap::new())]);
 }

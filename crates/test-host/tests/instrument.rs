@@ -133,7 +133,8 @@ fn a_moved_hole_is_heard_at_once_and_kept() {
     let peak_hz = |file: &InstrumentFile| {
         TransferMatrix::new(file, Air::default()).peaks(&note.open, file.reed_volume_m3, 1)[0].f_hz
     };
-    let rise = 1_200.0 * (peak_hz(&file.with_holes_moved(&[moved.clone()])) / peak_hz(&file)).log2();
+    let rise =
+        1_200.0 * (peak_hz(&file.with_holes_moved(std::slice::from_ref(&moved))) / peak_hz(&file)).log2();
     assert!(rise > 10.0, "{rise}");
 
     let holes = serde_json::json!({ "instrument": "bflat", "moved": [moved] }).to_string();

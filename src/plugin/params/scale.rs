@@ -1,5 +1,6 @@
 //! The scale that keys play. A project keeps the texts of its files, so that it sounds the same where the files are not.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, PoisonError, RwLock};
 
@@ -28,7 +29,15 @@ pub struct SavedScale {
     /// Whether the keys of equal temperament leave the tuning of a tuning program alone, see
     /// [`mts_esp`](crate::plugin::mts_esp).
     pub ignores_tuning_program: bool,
+    /// Tenths of a cent that a sounding note lies above its pitch in the scale.
+    pub trims: Trims,
 }
+
+/// Tenths of a cent by sounding note.
+pub type Trims = BTreeMap<u8, i16>;
+
+/// Largest trim, tenths of a cent.
+pub const TRIM_MOST: i16 = 500;
 
 impl SavedScale {
     /// What every key plays.
@@ -42,12 +51,23 @@ impl SavedScale {
     /// The same if it can be used, else equal temperament.
     pub fn mended(self) -> Self {
         let is_short = self.scl.len().max(self.kbm.len()) <= BYTES_MOST && self.name.len() <= 1_024;
-        if is_short && self.key_pitches().is_ok() { self } else { self.equal() }
+        let mut mended = if is_short && self.key_pitches().is_ok() { self } else { self.equal() };
+        mended.trims.retain(|&note, trim| note < 128 && *trim != 0);
+        for trim in mended.trims.values_mut() {
+            *trim = (*trim).clamp(-TRIM_MOST, TRIM_MOST);
+        }
+        mended
     }
 
-    /// Equal temperament, with the same attitude to tuning programs.
+    /// Equal temperament, with the same trims and the same attitude to tuning programs.
     pub fn equal(self) -> Self {
-        Self { ignores_tuning_program: self.ignores_tuning_program, ..Self::default() }
+        let Self { ignores_tuning_program, trims, .. } = self;
+        Self { ignores_tuning_program, trims, ..Self::default() }
+    }
+
+    /// `keys` with the trims.
+    fn trimmed(&self, keys: &KeyPitches) -> KeyPitches {
+        keys.trimmed(|note| 0.1 * f64::from(self.trims.get(&note.0).copied().unwrap_or(0)))
     }
 
     /// What lists show.
@@ -72,12 +92,7 @@ impl SavedScale {
                 return Err(format!("{name} maps the keys to a scale; open a scale (.scl) first"));
             }
             true => Self { mapping_name: name.clone(), kbm: text, ..self },
-            false => Self {
-                name: name.clone(),
-                scl: text,
-                ignores_tuning_program: self.ignores_tuning_program,
-                ..Self::default()
-            },
+            false => Self { name: name.clone(), scl: text, ..self.equal() },
         };
         match scale.key_pitches() {
             Ok(_) => Ok(scale),
@@ -111,7 +126,10 @@ impl ScaleField {
     /// What every key plays.
     pub fn key_pitches(&self) -> Arc<KeyPitches> {
         match self.followed() {
-            Some(received) => received.keys,
+            Some(received) => {
+                let own = self.own.read().unwrap_or_else(PoisonError::into_inner);
+                if own.0.trims.is_empty() { received.keys } else { Arc::new(own.0.trimmed(&received.keys)) }
+            }
             None => self.own.read().unwrap_or_else(PoisonError::into_inner).1.clone(),
         }
     }
@@ -132,6 +150,11 @@ impl ScaleField {
         received.as_ref().map(|_| !own.0.ignores_tuning_program)
     }
 
+    /// The trims of notes.
+    pub fn trims(&self) -> Trims {
+        self.own.read().unwrap_or_else(PoisonError::into_inner).0.trims.clone()
+    }
+
     /// What a tuning program says now; `None` if none runs.
     pub fn receive(&self, tuning: Option<ReceivedTuning>) {
         *self.received.write().unwrap_or_else(PoisonError::into_inner) = tuning;
@@ -140,7 +163,7 @@ impl ScaleField {
     /// Another scale; one that cannot be used is equal temperament.
     pub fn put(&self, scale: SavedScale) {
         let scale = scale.mended();
-        let pitches = scale.key_pitches().unwrap_or_default();
+        let pitches = scale.trimmed(&scale.key_pitches().unwrap_or_default());
         *self.own.write().unwrap_or_else(PoisonError::into_inner) = (scale, Arc::new(pitches));
     }
 }
@@ -196,5 +219,25 @@ mod tests {
         assert!(both.with_file(&long).unwrap_err().contains("bytes"));
         let broken = SavedScale { scl: "rubbish".to_owned(), ..scale };
         assert_eq!(broken.mended(), SavedScale::default());
+    }
+
+    #[test]
+    fn trims_outlive_the_scale_and_add_to_it() {
+        let field = ScaleField::default();
+        let trims = Trims::from([(60, 125), (61, 0), (62, 9_000), (200, 10)]);
+        field.put(SavedScale { trims, ..SavedScale::default() });
+        assert_eq!(field.trims(), Trims::from([(60, 125), (62, 500)]));
+        let cents = |field: &ScaleField, key| field.key_pitches().of(SoundingNote(key)).unwrap().cents;
+        assert_eq!([60, 61, 62].map(|key| cents(&field, key)), [12.5, 0.0, 50.0]);
+        let text = serde_json::to_string(&field.saved().equal()).unwrap();
+        field.put(serde_json::from_str(&text).unwrap());
+        assert_eq!(cents(&field, 60), 12.5);
+        // A tuning program's pitches are trimmed too.
+        let keys = KeyPitches::from_hz(|key| Some(SoundingNote(key).frequency_hz(440.0) * 1.001));
+        field.receive(Some(ReceivedTuning { name: "high".to_owned(), keys: Arc::new(keys.clone()) }));
+        assert_eq!(cents(&field, 60), keys.of(SoundingNote(60)).unwrap().cents + 12.5);
+        assert_eq!(field.title(), "MTS-ESP: high");
+        field.put(SavedScale { ignores_tuning_program: true, ..field.saved() });
+        assert_eq!((cents(&field, 61), field.follows_tuning_program()), (0.0, Some(false)));
     }
 }

@@ -86,6 +86,11 @@ impl WindowMemory {
                 scale.put(scale.saved().equal());
                 self.handles.params.host.state_changed();
             }
+            Action::TrimNotes(trims) => {
+                let scale = &self.handles.params.scale;
+                scale.put(SavedScale { trims, ..scale.saved() });
+                self.handles.params.host.state_changed();
+            }
             Action::FollowTuningProgram(follows) => {
                 let scale = &self.handles.params.scale;
                 scale.put(SavedScale { ignores_tuning_program: !follows, ..scale.saved() });
@@ -184,6 +189,7 @@ impl NiceEguiApp for EditorApp {
         snapshot.presets = memory.handles.presets.shelf();
         snapshot.preset = params.preset_name();
         snapshot.scale = params.scale.title();
+        snapshot.trims = params.scale.trims();
         snapshot.follows_tuning_program = params.scale.follows_tuning_program();
         snapshot.moved = params.holes.of(&params.instrument.key());
         ui.ctx().set_zoom_factor(memory.state.kept.zoom);

@@ -46,6 +46,17 @@ impl KeyPitches {
         }))
     }
 
+    /// The same with every note moved by so many cents, whichever key plays it. No key comes to lie more than half a semitone
+    /// beside its note.
+    #[must_use]
+    pub fn trimmed(&self, cents_of: impl Fn(SoundingNote) -> f64) -> Self {
+        let trimmed = |KeyPitch { note, cents }| {
+            let trim = Some(cents_of(note)).filter(|trim| trim.is_finite()).unwrap_or(0.0);
+            KeyPitch { note, cents: (cents + trim).clamp(-50.0, 50.0) }
+        };
+        Self(self.0.map(|key| key.map(trimmed)))
+    }
+
     /// What a key plays; `None` if nothing. Real-time safe.
     pub fn of(&self, key: SoundingNote) -> Option<KeyPitch> {
         self.0.get(usize::from(key.0)).copied().flatten()
@@ -69,6 +80,18 @@ mod tests {
             KeyPitches::from_hz(|key| [f64::NAN, 0.0, -1.0, 1e9, 1e-9].get(usize::from(key)).copied());
         assert!((0..128).all(|key| absurd.of(SoundingNote(key)).is_none()));
         assert_eq!(absurd.of(SoundingNote(200)), None);
+    }
+
+    #[test]
+    fn a_trim_belongs_to_its_note() {
+        let trimmed = KeyPitches::default().trimmed(|note| match note.0 {
+            60 => 12.5,
+            61 => -200.0,
+            62 => f64::NAN,
+            _ => 0.0,
+        });
+        let cents = |key| trimmed.of(SoundingNote(key)).unwrap().cents;
+        assert_eq!([59, 60, 61, 62].map(cents), [0.0, 12.5, -50.0, 0.0]);
     }
 
     #[test]
