@@ -69,7 +69,7 @@ use technique::Techniques;
 use tongue::Tongue;
 use tuning::PlayedTuning;
 use vibrato::Swing;
-use voicing::Voicing;
+use voicing::{Voiced, Voicing};
 
 /// Time the fingers take behind the tongue, ms; slurred they take the setting's time.
 const TONGUED_FINGERS_MS: f64 = 5.0;
@@ -435,6 +435,26 @@ impl Player {
         self.inhalation.heard()
     }
 
+    /// One tick of a glissando; what the vocal tract does for it. Apart, so that who does not slide pays nothing.
+    #[inline(never)]
+    fn slide_on<F: Real>(&mut self, tick_s: f64, model: &Model, voice: &mut Voice<F>) -> Option<Voiced> {
+        let slide = self.slide.as_mut()?;
+        self.fingers.slide(slide.fingers(), model, voice.lattice_mut());
+        let bent = slide.tract();
+        let lip = slide.lip(model);
+        if self.fingers.fingering() != Some(lip) {
+            self.fingers.aim(lip);
+            self.posture = None;
+        }
+        let target = slide.target;
+        let period_s = TICK as f64 / model.coeffs.rate_hz;
+        if !slide.tick(voice.p_mouthpiece(), (tick_s, period_s)) {
+            self.slide = None;
+            self.move_holes(target, tick_s, model, voice);
+        }
+        bent
+    }
+
     /// Advances one control tick: moves holes and delay, and returns how the reed is driven. Real-time safe.
     pub fn tick<F: Real>(&mut self, model: &Model, voice: &mut Voice<F>) -> Drive {
         let (tick_s, is_idle) = (self.tick_s(model), self.is_idle());
@@ -442,22 +462,8 @@ impl Player {
         if self.reed.tick(tick_s) | self.glide.tick(&self.settings, tick_s) | covers {
             self.posture = None;
         }
-        let (slides, mut bent) = (self.slide.is_some(), None);
-        if let Some(slide) = &mut self.slide {
-            self.fingers.slide(slide.fingers(), model, voice.lattice_mut());
-            bent = slide.tract();
-            let lip = slide.lip(model);
-            if self.fingers.fingering() != Some(lip) {
-                self.fingers.aim(lip);
-                self.posture = None;
-            }
-            let target = slide.target;
-            let period_s = TICK as f64 / model.coeffs.rate_hz;
-            if !slide.tick(voice.p_mouthpiece(), (tick_s, period_s)) {
-                self.slide = None;
-                self.move_holes(target, tick_s, model, voice);
-            }
-        }
+        let slides = self.slide.is_some();
+        let bent = if slides { self.slide_on(tick_s, model, voice) } else { None };
         let fingering = self.fingers.fingering();
         if self.posture.is_none() {
             self.now = self.glide.over(self.settings).with_reed_factors(self.reed.factors());
