@@ -7,6 +7,7 @@
 //! of the window applies the zoom.
 
 pub mod ab_comparison;
+mod alteration_editor;
 mod blind_comparison_view;
 mod breath_meter;
 mod breath_view;
@@ -17,7 +18,7 @@ pub mod controls;
 pub mod feel_test;
 mod file_browser;
 mod header;
-mod hole_mover;
+mod hole_names;
 mod host_marks;
 mod instrument_view;
 mod key_steps;
@@ -55,8 +56,8 @@ use note_names::NoteNames;
 pub use note_names::note_name;
 pub use snapshot::Snapshot;
 
+use chalumeau_core::bore::alterations::Alterations;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
-use chalumeau_core::bore::moved_hole::MovedHole;
 use chalumeau_core::units::SoundingNote;
 use chalumeau_knob::wire::message::Feel;
 use controls::{Entry, Hands, Press};
@@ -96,8 +97,8 @@ pub enum Action {
     EndTry,
     /// A device of the list, by its key.
     ChooseDevice(String),
-    /// The user's holes of the instrument are these; the others are as built.
-    MoveHoles(Vec<MovedHole>),
+    /// The user alters these holes and joints; all others are as built.
+    Alter(Alterations),
     /// Save an altered instrument as a file of the user's.
     SaveInstrument(Arc<InstrumentFile>),
     /// The feel of a test, which replaces the feel of the notes; `None` ends the test.

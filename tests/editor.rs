@@ -3,14 +3,14 @@
 #[path = "support/editor.rs"]
 mod support;
 
+#[path = "editor/alterations.rs"]
+mod alterations;
 #[path = "editor/cost.rs"]
 mod cost;
 #[path = "editor/files.rs"]
 mod files;
 #[path = "editor/hands.rs"]
 mod hands;
-#[path = "editor/holes.rs"]
-mod holes;
 #[path = "editor/linked.rs"]
 mod linked;
 #[path = "editor/looks.rs"]
@@ -66,8 +66,8 @@ impl Window {
                     s.borrow_mut().settings = h.settings();
                     let done = draw(ui, state, &*h, &s.borrow());
                     for action in &done {
-                        if let Action::MoveHoles(moved) = action {
-                            s.borrow_mut().moved = moved.clone().into();
+                        if let Action::Alter(alterations) = action {
+                            s.borrow_mut().alterations = alterations.clone().into();
                         }
                     }
                     a.borrow_mut().extend(done);

@@ -76,7 +76,7 @@ impl BreathView {
             heading(ui, "Calibrate the knob");
             calibrate(ui, hands);
         }
-        heading(ui, "Breath");
+        heading(ui, "Response");
         choice(ui, hands, "resp");
         for id in ["breath", "bcurve"] {
             slider(ui, hands, id);

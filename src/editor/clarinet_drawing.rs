@@ -1,7 +1,7 @@
 //! The drawing of the clarinet: bore, wood, holes and their covers, and the standing wave above. Both directions have the
 //! same scale.
 
-use egui::{Align2, Color32, CornerRadius, FontId, Mesh, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
+use egui::{Align2, Color32, CornerRadius, Mesh, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 
 use crate::editor::chart;
 use crate::editor::theme;
@@ -33,7 +33,7 @@ pub(super) fn part_names(painter: &Painter, c: &Colours, body: &ClarinetDrawing<
             end_m = next.x_end_m;
         }
         let (left, right) = (body.x(first.x_start_m), body.x(end_m));
-        let galley = painter.layout_no_wrap(first.part.clone(), FontId::proportional(10.0), c.quiet);
+        let galley = painter.layout_no_wrap(first.part.clone(), theme::small(), c.quiet);
         if galley.size().x < right - left {
             painter.galley(pos2(0.5 * (left + right - galley.size().x), y), galley, c.quiet);
         }
@@ -149,12 +149,17 @@ impl<'a> ClarinetDrawing<'a> {
         };
         let mut wood = Mesh::default();
         let mut air = Mesh::default();
+        // A mesh ends in steps of whole pixels; lines do not.
+        let mut edges: [Vec<Pos2>; 4] = Default::default();
         for segment in &self.file.bore {
             for (x_m, r_m, is_end) in
                 [(segment.x_start_m, segment.r_start_m, false), (segment.x_end_m, segment.r_end_m, true)]
             {
                 let (x, bore) = (self.x(x_m), self.scale * r_m as f32);
                 let out = self.scale * self.outside_m(x_m, r_m) as f32;
+                for (edge, along) in edges.iter_mut().zip([-out, -bore, bore, out]) {
+                    edge.push(pos2(x, self.axis + along));
+                }
                 for side in [-1.0, 1.0] {
                     let base = wood.vertices.len() as u32;
                     let shade = if side < 0.0 { 1.0 } else { 0.82 };
@@ -182,10 +187,20 @@ impl<'a> ClarinetDrawing<'a> {
         }
         painter.add(wood);
         painter.add(air);
+        for edge in edges {
+            painter.add(Shape::line(edge, Stroke::new(1.0, c.wood)));
+        }
         self.parts(painter, c);
         // The reed lies on the mouthpiece's lower side.
         let reed = [pos2(self.x(0.0), self.axis + 3.0), pos2(self.x(0.066), self.axis + self.scale * 0.0125)];
         painter.line_segment(reed, Stroke::new(3.0, c.cane));
+    }
+
+    /// Place of the joint below a part, over all of the body.
+    pub(super) fn joint(&self, part: &str) -> Option<Rect> {
+        let x_m = self.file.joint_x_m(part)?;
+        let out = self.scale * self.outside_m(x_m, self.file.radius_at(x_m)) as f32 + 1.5;
+        Some(Rect::from_center_size(pos2(self.x(x_m), self.axis), vec2(4.0, 2.0 * out)))
     }
 
     /// Joints, as rings.

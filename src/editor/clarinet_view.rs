@@ -2,19 +2,21 @@
 //! Both directions have the same scale. Bore, holes and chimneys come from the instrument's file. The file does not give
 //! the thickness of the wood; it is drawn as deep as the holes. Finger holes and rings are on the upper edge and closed
 //! keys on the lower edge, unlike on the real instrument. A click on a hole opens or closes it for a trial, which lasts
-//! until *Back to the note*. A drag moves it ([`HoleMover`]).
+//! until *Back to the note*. A drag moves it, and a drag of a ring pulls
+//! the joint ([`AlterationEditor`]).
 
 use std::sync::Arc;
 
 use egui::{
-    Align2, Color32, CornerRadius, CursorIcon, FontId, Painter, Pos2, Rect, Response, Role, Sense, Shape,
-    Stroke, Ui, Vec2, WidgetInfo, pos2, vec2,
+    Align2, Color32, CornerRadius, CursorIcon, Painter, Pos2, Rect, Response, Role, Sense, Shape, Stroke, Ui,
+    Vec2, WidgetInfo, pos2, vec2,
 };
 
 use crate::editor::Action;
+use crate::editor::alteration_editor::{AlterationEditor, Altered};
 use crate::editor::chart;
 use crate::editor::clarinet_drawing::{ClarinetDrawing, part_names, ruler, standing};
-use crate::editor::hole_mover::HoleMover;
+use crate::editor::hole_names::{hole_title, hole_words};
 use crate::editor::note_names::{NoteNames, note_name};
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
@@ -23,7 +25,7 @@ use chalumeau_core::bore::alternate_fingerings::{self, FingeringChoice};
 use chalumeau_core::bore::instrument_file::{HoleKind, InstrumentFile, REGISTERS, ToneHole};
 
 /// Least distance of two buttons with their names below, points.
-const NAMED: f32 = 34.0;
+const NAMED: f32 = 38.0;
 
 /// What the view remembers.
 #[derive(Clone, Debug, Default)]
@@ -32,7 +34,7 @@ pub struct ClarinetView {
     tried: Option<Vec<bool>>,
     /// The choices of the picker, and the instrument they belong to.
     known: Option<(Arc<InstrumentFile>, Arc<Vec<FingeringChoice>>)>,
-    mover: HoleMover,
+    alterations: AlterationEditor,
 }
 
 impl ClarinetView {
@@ -67,7 +69,7 @@ impl ClarinetView {
 
     fn picture(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
         let c = Colours::here(ui);
-        let file = &*HoleMover::shown(snapshot);
+        let file = &*AlterationEditor::shown(snapshot);
         let area = ui.available_rect_before_wrap();
         ui.allocate_rect(area, Sense::hover());
         let painter = ui.painter_at(area.expand(2.0));
@@ -84,6 +86,7 @@ impl ClarinetView {
         standing(&painter, c, &body, wave, &snapshot.standing);
         part_names(&painter, c, &body, wave.bottom() + 1.0);
         body.paint(&painter, c, &snapshot.standing);
+        self.joints(ui, &body, snapshot, actions);
         let buttons = hole_buttons(area, file.holes.len());
         for (hole, tone_hole) in file.holes.iter().enumerate() {
             let opening = match &self.tried {
@@ -101,11 +104,15 @@ impl ClarinetView {
             let is_hot = response.hovered()
                 || on_bore.hovered()
                 || response.has_focus()
-                || self.mover.has_chosen(hole);
+                || self.alterations.has_chosen(&Altered::Hole(hole));
             on_bore.widget_info(|| {
-                WidgetInfo::labeled(Role::Image, true, format!("Hole {} in the bore", tone_hole.name))
+                WidgetInfo::labeled(
+                    Role::Image,
+                    true,
+                    format!("Hole {} in the bore", hole_title(&tone_hole.name)),
+                )
             });
-            self.mover.follow(&on_bore, hole, body.scale, snapshot, actions);
+            self.alterations.follow(&on_bore, Altered::Hole(hole), body.scale, snapshot, actions);
             leader(&painter, c, at.foot, buttons[hole], is_hot, opening);
             body.paint_hole(&painter, c, tone_hole, opening, is_hot);
             if response.clicked() || on_bore.clicked() {
@@ -114,6 +121,35 @@ impl ClarinetView {
             for response in [response, on_bore.on_hover_cursor(CursorIcon::PointingHand)] {
                 response.on_hover_ui(|ui| about(ui, tone_hole, opening));
             }
+        }
+    }
+
+    /// The rings, to be dragged.
+    fn joints(
+        &mut self,
+        ui: &mut Ui,
+        body: &ClarinetDrawing<'_>,
+        snapshot: &Snapshot,
+        actions: &mut Vec<Action>,
+    ) {
+        let c = Colours::here(ui);
+        for part in body.file.jointed_parts() {
+            let Some(place) = body.joint(part) else { continue };
+            let it = Altered::Joint(part.to_owned());
+            let id = ui.scope_id().with(("joint", part));
+            let response = ui.interact(place.expand2(vec2(3.0, 2.0)), id, Sense::DRAG);
+            if response.hovered() || response.dragged() || self.alterations.has_chosen(&it) {
+                let stroke = Stroke::new(2.0, c.accent);
+                ui.painter().rect_stroke(place, CornerRadius::same(1), stroke, egui::StrokeKind::Outside);
+            }
+            response
+                .widget_info(|| WidgetInfo::labeled(Role::Image, true, format!("Joint below the {part}")));
+            self.alterations.follow(&response, it, body.scale, snapshot, actions);
+            response.on_hover_cursor(CursorIcon::ResizeHorizontal).on_hover_ui(|ui| {
+                ui.set_max_width(260.0);
+                ui.strong(format!("Joint below the {part}"));
+                ui.label("Drag it to make the part longer or shorter, and hear it");
+            });
         }
     }
 
@@ -145,8 +181,8 @@ impl ClarinetView {
             let note = names.of_written(choice.written, snapshot.instrument.transposition);
             format!("{}{}", note.map_or_else(String::new, note_name), "'".repeat(choice.nth))
         };
-        if self.mover.is_open() {
-            self.mover.line(ui, snapshot, actions);
+        if self.alterations.is_open() {
+            self.alterations.line(ui, snapshot, actions);
         } else {
             let told = match shown.map(|index| &all[index]) {
                 Some(choice) => {
@@ -216,14 +252,14 @@ impl ClarinetView {
                 ui.colored_label(c.beats, "trying");
             }
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                let words = match snapshot.moved.len() {
-                    0 => "Move holes".to_owned(),
-                    1 => "1 hole moved".to_owned(),
-                    count => format!("{count} holes moved"),
+                let words = match snapshot.alterations.count() {
+                    0 => "Alter the bore".to_owned(),
+                    1 => "1 alteration".to_owned(),
+                    count => format!("{count} alterations"),
                 };
-                let about = "Move a hole along the bore, or make it wider or narrower, and hear it";
+                let about = "Move a hole, make it wider or narrower, or pull a joint, and hear it";
                 if ui.button(words).on_hover_text(about).clicked() {
-                    self.mover.open();
+                    self.alterations.open();
                 }
                 ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
                     ui.add(egui::Label::new(told).truncate());
@@ -254,7 +290,7 @@ fn wave_rect(area: Rect, body: &ClarinetDrawing<'_>) -> Rect {
 fn hole_buttons(area: Rect, holes: usize) -> Vec<Rect> {
     let width = area.width() / holes.max(1) as f32;
     let size = width.min(24.0) - 3.0;
-    let room = if width >= NAMED { 24.0 } else { 2.0 };
+    let room = if width >= NAMED { 30.0 } else { 2.0 };
     (0..holes)
         .map(|hole| {
             let x = area.left() + (hole as f32 + 0.5) * width;
@@ -291,18 +327,18 @@ fn button(ui: &mut Ui, rect: Rect, hole: &ToneHole, opening: f32, is_named: bool
     if response.has_focus() {
         painter.circle_stroke(rect.center(), radius + 3.0, Stroke::new(1.5, c.accent));
     }
-    let (first, second) = hole.name.split_once('_').unwrap_or((&hole.name, ""));
     if is_named {
-        let font = FontId::proportional(9.0);
-        let below = rect.center_bottom() + vec2(0.0, 2.0);
-        painter.text(below, Align2::CENTER_TOP, first, font.clone(), c.quiet);
-        painter.text(below + vec2(0.0, 10.0), Align2::CENTER_TOP, second, font, c.quiet);
+        let mut below = rect.center_bottom() + vec2(0.0, 2.0);
+        for word in hole_words(&hole.name) {
+            painter.text(below, Align2::CENTER_TOP, word, theme::small(), c.quiet);
+            below.y += 13.0;
+        }
     }
+    let title = hole_title(&hole.name);
     let state = if opening >= 0.5 { "open" } else { "closed" };
-    response.widget_info(|| {
-        WidgetInfo::selected(Role::Switch, true, opening >= 0.5, format!("Hole {}", hole.name))
-    });
-    response.on_hover_cursor(CursorIcon::PointingHand).accessible_name(format!("Hole {}, {state}", hole.name))
+    response
+        .widget_info(|| WidgetInfo::selected(Role::Switch, true, opening >= 0.5, format!("Hole {title}")));
+    response.on_hover_cursor(CursorIcon::PointingHand).accessible_name(format!("Hole {title}, {state}"))
 }
 
 /// A small button of the picker.
@@ -331,7 +367,7 @@ fn chip(ui: &mut Ui, c: &Colours, name: &str, size: Vec2, is_here: bool, is_alte
 pub(super) fn about(ui: &mut Ui, hole: &ToneHole, opening: f32) {
     let c = Colours::here(ui);
     ui.set_max_width(260.0);
-    ui.strong(hole.name.replace('_', " "));
+    ui.strong(hole_title(&hole.name));
     ui.label(&hole.description);
     let state = if opening >= 0.99 {
         "open".into()

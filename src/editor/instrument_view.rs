@@ -248,7 +248,7 @@ fn column(
     segments(ui, "Names of notes", &NoteNames::ALL.map(|names| names.title().to_owned()), &mut chosen)
         .on_hover_text(about);
     *names = NoteNames::ALL[chosen];
-    heading(ui, "Tuning");
+    heading(ui, "Pitch");
     slider(ui, hands, "a4");
     choice(ui, hands, "tune");
     choice(ui, hands, "beyond");

@@ -3,8 +3,8 @@
 //! choose a note, and Space plays it while it is held.
 
 use egui::{
-    Align2, Color32, CornerRadius, Event, EventFilter, Key, Pos2, Rect, Role, Sense, Stroke, Ui, WidgetInfo,
-    pos2, vec2,
+    Color32, CornerRadius, Event, EventFilter, Key, Pos2, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2,
+    vec2,
 };
 
 use crate::editor::Action;
@@ -209,18 +209,21 @@ impl Keys {
                         egui::StrokeKind::Inside,
                     );
                 }
-                if let Some(name) = name.filter(|name| name % 12 == 0 || is_down) {
-                    let grey = Color32::from_gray(if black { 190 } else { 110 });
-                    let ink = if is_down { c.on_accent } else { grey };
-                    painter.text(
-                        key.center_bottom() - vec2(0.0, 3.0),
-                        Align2::CENTER_BOTTOM,
-                        note_name(name),
-                        theme::small(),
-                        ink,
-                    );
-                }
             }
+        }
+        // One name an octave, on a white key, which is wide enough; and that of a key held down.
+        for note in self.from..=self.to {
+            let (key, is_down) = (self.key(note), down.contains(&Some(note)));
+            let Some(name) = named(note).filter(|_| note % 12 == 0 || is_down) else { continue };
+            let ink = if is_down { c.on_accent } else { Color32::from_gray(110) };
+            let words = painter.layout_no_wrap(note_name(name), theme::small(), ink);
+            let left = (key.center().x - 0.5 * words.size().x)
+                .clamp(self.rect.left(), self.rect.right() - words.size().x);
+            let place = Rect::from_min_size(pos2(left, key.bottom() - 3.0 - words.size().y), words.size());
+            if is_down && place.width() > key.width() {
+                painter.rect_filled(place.expand2(vec2(2.0, 0.0)), CornerRadius::same(3), c.breath);
+            }
+            painter.galley(place.min, words, ink);
         }
     }
 }

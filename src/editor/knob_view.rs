@@ -336,7 +336,7 @@ fn line(ui: &mut Ui, snapshot: &Snapshot) {
 fn column(ui: &mut Ui, hands: &mut Hands, page: Page) {
     match page {
         Page::Play | Page::Try => {
-            heading(ui, "Feel");
+            heading(ui, "Torque");
             for id in ["law", "order"] {
                 choice(ui, hands, id);
             }

@@ -75,12 +75,13 @@ impl PlayView {
         below.frame(clear).show(ui, |ui| {
             let width =
                 (ui.available_width() / macros.len().max(1) as f32).min(1.35 * macro_height.max(MACRO_WIDTH));
+            let has_ends = macro_knob::ends_fit(ui, &macros, width);
             let left = 0.5 * (ui.available_width() - width * macros.len() as f32);
             ui.horizontal(|ui| {
                 ui.spacing_mut().item_spacing.x = 0.0;
                 ui.add_space(left.max(0.0));
                 for of in macros {
-                    macro_knob::draw(ui, hands, of, vec2(width, macro_height));
+                    macro_knob::draw(ui, hands, of, vec2(width, macro_height), has_ends);
                 }
             });
         });

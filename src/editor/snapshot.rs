@@ -10,8 +10,8 @@ use std::sync::Arc;
 use crate::editor::sound_analysis::SoundAnalysis;
 use crate::folder_listing::FolderListing;
 use crate::presets::PresetShelf;
+use chalumeau_core::bore::alterations::Alterations;
 use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
-use chalumeau_core::bore::moved_hole::MovedHole;
 use chalumeau_core::haptics::{NoteFeel, NoteRequirement};
 use chalumeau_core::instrument::player::dynamics::LipShape;
 use chalumeau_core::instrument::{KeyPitches, Settings};
@@ -22,10 +22,10 @@ use chalumeau_core::units::{SoundingNote, WrittenNote};
 pub struct Snapshot {
     /// The instrument that sounds.
     pub instrument: Arc<InstrumentFile>,
-    /// The same as its file has it, before any hole was moved and before scaling.
+    /// The same as its file has it, before any alteration and before scaling.
     pub as_built: Arc<InstrumentFile>,
-    /// Holes that the user has moved, in lengths of the file.
-    pub moved: Arc<Vec<MovedHole>>,
+    /// What the user has altered, in lengths of the file.
+    pub alterations: Arc<Alterations>,
     /// Where the altered instrument was saved, or why it was not.
     pub saved: Option<Result<PathBuf, String>>,
     /// What each key plays.
@@ -98,7 +98,7 @@ impl Default for Snapshot {
         Self {
             as_built: instrument.clone(),
             instrument,
-            moved: Arc::default(),
+            alterations: Arc::default(),
             saved: None,
             key_pitches: KeyPitches::default(),
             scale: "Equal temperament".to_owned(),

@@ -4,7 +4,7 @@
 //! the beating reed, the bell and the tone holes.
 
 use chalumeau_core::instrument::ListeningMode;
-use egui::{Align2, Ui};
+use egui::Ui;
 use egui_plot::Points;
 
 use crate::editor::chart;
@@ -161,13 +161,12 @@ fn waves(ui: &mut Ui, snapshot: &Snapshot) {
         x: (0.0, to),
         y: (-0.25, (1.1 * largest(&scope.opening, 1.0)).max(1.2)),
         x_name: "ms",
-        y_name: "reed opening over opening at rest",
+        y_name: "reed opening over opening at rest; at 0 it is shut",
         height: ui.available_height(),
         label: "Opening of the reed over time",
     }
     .show(ui, |plot| {
         plot.line(chart::curve(vec![[0.0, 0.0], [to, 0.0]], c.closes, 1.0).id("shut"));
-        chart::word(plot, [0.99 * to, 0.0], Align2::RIGHT_TOP, "shut", c.closes);
         plot.line(chart::curve(track(&scope.opening), c.ink, 1.6).fill(0.0).fill_alpha(0.10).id("gap"));
     });
 }

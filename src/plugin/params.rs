@@ -18,8 +18,8 @@ use crate::presets::Preset;
 use chalumeau_core::control::midi::breath::BreathFrom;
 use chalumeau_core::instrument::{Beyond, BreathResponse, Reach, Settings, Tuning};
 
+pub mod alterations;
 mod entry;
-pub mod holes;
 pub mod instrument;
 pub mod knob;
 pub mod listening;
@@ -31,8 +31,8 @@ pub mod scale;
 mod state;
 pub mod techniques;
 
+use alterations::AlterationsField;
 use entry::{choice, number_from, status_text, switch, whole};
-use holes::HolesField;
 pub use instrument::InstrumentParams;
 pub use knob::KnobParams;
 use knob::{KnobKind, ReedSource};
@@ -104,9 +104,9 @@ pub struct ChalumeauParams {
     /// What the keys play.
     #[persist = "scale"]
     pub scale: ScaleField,
-    /// Tone holes that the user has moved.
+    /// Holes that the user has moved and joints that the user has pulled.
     #[persist = "holes"]
-    pub holes: HolesField,
+    pub alterations: AlterationsField,
     /// Name of the preset that was chosen last; empty if there is none.
     #[persist = "preset"]
     pub preset: RwLock<String>,
@@ -378,7 +378,7 @@ impl ChalumeauParams {
             window: RwLock::default(),
             links: ControllerLinks::default(),
             scale: ScaleField::default(),
-            holes: HolesField::default(),
+            alterations: AlterationsField::default(),
             preset: RwLock::new(state::first_preset()),
             breath: BreathParams {
                 breath: number("breath"),

@@ -430,6 +430,7 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
         instruments: INSTRUMENTS.map(String::from).to_vec(),
         chosen: Some(0),
         preset: "B flat clarinet".to_owned(),
+        key: Some(note),
         sounding: Some(note),
         fingering,
         openings: open.iter().map(|&open| f32::from(open)).collect(),

@@ -16,6 +16,7 @@
 //! assert!((peak.f_hz - 146.8).abs() < 2.0, "{peak:?}");
 //! ```
 
+pub mod alterations;
 pub mod alternate_fingerings;
 pub mod bundled;
 pub mod cells;
@@ -28,6 +29,7 @@ pub mod fit;
 pub mod instrument_file;
 pub mod lattice;
 pub mod moved_hole;
+pub mod pulled_joint;
 pub mod radiation;
 pub mod sound_sources;
 pub mod tone_hole;

@@ -158,7 +158,7 @@ fn a_moved_hole_is_heard_at_once_and_kept() {
     loop {
         let (_, told) = played(&mut plugin, g3);
         if told.starts_with("ready: ") {
-            assert!(told.ends_with("holes moved"), "{told}");
+            assert!(told.ends_with("altered"), "{told}");
             break;
         }
         assert!(began.elapsed() < PATIENCE, "{told}");

@@ -24,10 +24,10 @@ pub fn lit(colour: Color32, light: f32) -> Color32 {
 }
 
 /// A round body along the x axis: places from left to right with radius and colour.
-pub fn turned(painter: &Painter, axis_y: f32, stations: impl IntoIterator<Item = (f32, f32, Color32)>) {
+pub fn turned(painter: &Painter, axis_y: f32, stations: &[(f32, f32, Color32)]) {
     let mut mesh = Mesh::default();
     let rows = LIGHT.len() as u32;
-    for (index, (x, radius, colour)) in stations.into_iter().enumerate() {
+    for (index, &(x, radius, colour)) in stations.iter().enumerate() {
         for (height, light) in LIGHT {
             mesh.colored_vertex(pos2(x, axis_y + height * radius), lit(colour, light));
         }
@@ -41,11 +41,19 @@ pub fn turned(painter: &Painter, axis_y: f32, stations: impl IntoIterator<Item =
         }
     }
     painter.add(mesh);
+    // A mesh ends in steps of whole pixels; lines do not.
+    for part in stations.chunk_by(|one, next| one.2 == next.2) {
+        for (side, light) in [(-1.0, LIGHT[0].1), (1.0, LIGHT[LIGHT.len() - 1].1)] {
+            let edge: Vec<Pos2> =
+                part.iter().map(|&(x, radius, _)| pos2(x, axis_y + side * radius)).collect();
+            painter.add(Shape::line(edge, Stroke::new(1.0, lit(part[0].2, light))));
+        }
+    }
 }
 
 /// A short cylinder, such as a ring, of one radius.
 pub fn band(painter: &Painter, axis_y: f32, x: std::ops::RangeInclusive<f32>, radius: f32, colour: Color32) {
-    turned(painter, axis_y, [(*x.start(), radius, colour), (*x.end(), radius, colour)]);
+    turned(painter, axis_y, &[(*x.start(), radius, colour), (*x.end(), radius, colour)]);
 }
 
 /// A round plate seen from above, with a light towards its upper left.

@@ -2,7 +2,8 @@
 //! focus. A double click or Ctrl-click sets the default.
 
 use egui::{
-    Align2, CursorIcon, FontId, Pos2, Response, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, pos2, vec2,
+    Align2, Color32, CursorIcon, FontId, Pos2, Response, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, pos2,
+    vec2,
 };
 
 use crate::editor::controls::{Hands, Look, teach};
@@ -34,8 +35,17 @@ pub fn height(view: f32) -> f32 {
     (0.26 * view).clamp(82.0, 160.0)
 }
 
-/// Draws a control into a place of this size.
-pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2) {
+/// Whether what the ends mean fits below every control of this width.
+pub fn ends_fit(ui: &Ui, all: &[&Macro], width: f32) -> bool {
+    let fits = |of: &&Macro| {
+        let words = ui.painter().layout_no_wrap(of.ends.to_owned(), theme::small(), Color32::WHITE);
+        words.size().x + 4.0 <= width
+    };
+    all.iter().all(fits)
+}
+
+/// Draws a control into a place of this size; `has_ends`: it says what its ends mean.
+pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2, has_ends: bool) {
     let Some(look) = hands.controls.look(of.id) else { return };
     let c = Colours::here(ui);
     let (rect, mut response) = ui.allocate_exact_size(size, Sense::click_and_drag());
@@ -72,7 +82,11 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2) {
     let after = host_marks::paint(ui, &marks, name.right_center());
     linked_controllers::name(ui, hands, of.id, after);
     // The value while a hand is near, else what the ends mean.
-    let (words, ink) = if is_touched { (text.as_str(), c.ink) } else { (of.ends, c.quiet) };
+    let (words, ink) = match (is_touched, has_ends) {
+        (true, _) => (text.as_str(), c.ink),
+        (false, true) => (of.ends, c.quiet),
+        (false, false) => ("", c.quiet),
+    };
     painter.text(name.center_bottom() + vec2(0.0, 1.0), Align2::CENTER_TOP, words, theme::small(), ink);
     response.widget_info(|| {
         let mut info = WidgetInfo::slider(ui.is_enabled(), f64::from(value), of.name);
@@ -81,6 +95,7 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2) {
     });
     response.on_hover_and_drag_cursor(CursorIcon::ResizeVertical).on_hover_ui(|ui| {
         ui.label(egui::RichText::new(format!("{}: {text}", look.name)).strong());
+        ui.label(of.ends);
         teach(ui, of.id, HOW);
         host_marks::explain(ui, &marks);
     });

@@ -12,6 +12,7 @@ use super::lit_body::{band, glow, lit, plate, shadow, turned};
 use super::motion::Motion;
 use crate::editor::chart;
 use crate::editor::clarinet_view;
+use crate::editor::hole_names::hole_title;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
@@ -77,11 +78,16 @@ pub fn draw(ui: &mut Ui, rect: Rect, snapshot: &Snapshot, motion: &Motion) -> Op
         body.hole(&ui.painter_at(rect), c, tone_hole, opening, loudness * flows[hole], is_hot);
         let state = if opening >= 0.5 { "open" } else { "closed" };
         response.widget_info(|| {
-            WidgetInfo::selected(Role::Switch, true, opening >= 0.5, format!("Hole {}", tone_hole.name))
+            WidgetInfo::selected(
+                Role::Switch,
+                true,
+                opening >= 0.5,
+                format!("Hole {}", hole_title(&tone_hole.name)),
+            )
         });
         let response = response
             .on_hover_cursor(CursorIcon::PointingHand)
-            .accessible_name(format!("Hole {}, {state}", tone_hole.name));
+            .accessible_name(format!("Hole {}, {state}", hole_title(&tone_hole.name)));
         if response.on_hover_ui(|ui| clarinet_view::about(ui, tone_hole, opening)).clicked() {
             clicked = Some(hole);
         }
@@ -223,11 +229,9 @@ impl<'a> Body<'a> {
             (0..=STATIONS).map(|n| self.length_m * n as f64 / STATIONS as f64).collect();
         places.extend([mouthpiece_m - 1e-6, mouthpiece_m + 1e-6, BEAK_M]);
         places.sort_by(f64::total_cmp);
-        turned(
-            painter,
-            self.axis,
-            places.into_iter().map(|x_m| (self.x(x_m), self.outside(x_m), colour(x_m))),
-        );
+        let stations: Vec<_> =
+            places.into_iter().map(|x_m| (self.x(x_m), self.outside(x_m), colour(x_m))).collect();
+        turned(painter, self.axis, &stations);
         self.bell(painter, c);
         for pair in self.file.bore.windows(2).filter(|pair| pair[0].part != pair[1].part) {
             let (x, out) = (self.x(pair[0].x_end_m), self.outside(pair[0].x_end_m));
@@ -268,6 +272,10 @@ impl<'a> Body<'a> {
             mesh.add_triangle(n + 1, n + 2, n + 3);
         }
         painter.add(mesh);
+        // A mesh ends in steps of whole pixels; lines do not.
+        let low = vec![tip + vec2(0.0, 1.5), middle_low, heel_low];
+        painter.add(Shape::line(low, Stroke::new(1.0, lit(c.cane, 0.78))));
+        painter.add(Shape::line(vec![tip, middle, heel], Stroke::new(1.0, lit(c.cane, 1.1))));
     }
 
     /// The opening of the bell and its rim.

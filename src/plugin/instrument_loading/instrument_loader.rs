@@ -253,8 +253,8 @@ impl LoaderThread {
         }
         let same_instrument = request.source == current.request.source
             && request.quality == current.request.quality
-            && request.moved == current.request.moved;
-        if request.moved != current.request.moved && self.since_handed.elapsed() < DRAG {
+            && request.alterations == current.request.alterations;
+        if request.alterations != current.request.alterations && self.since_handed.elapsed() < DRAG {
             return;
         }
         let differs_in_keys = current.request.differs_in_keys_at_most(&request) && current.request != request;
@@ -300,7 +300,7 @@ impl LoaderThread {
         let mut readiness = (current.request == *request).then_some(current.readiness);
         // The current instrument plays in tune at another A4, because the player corrects the difference.
         let is_bridged = current.request.source == request.source
-            && current.request.moved == request.moved
+            && current.request.alterations == request.alterations
             && current.readiness >= Readiness::OtherA4;
         if is_bridged && !self.ending.is_empty() {
             return Ok(());

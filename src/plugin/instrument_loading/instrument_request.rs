@@ -8,9 +8,9 @@ use std::time::SystemTime;
 use super::Readiness;
 use crate::plugin::params::ChalumeauParams;
 use crate::plugin::params::instrument::InstrumentChoice;
+use chalumeau_core::bore::alterations::Alterations;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
-use chalumeau_core::bore::moved_hole::MovedHole;
 use chalumeau_core::instrument::concert_pitch::A4_BY_DELAY_HZ;
 use chalumeau_core::instrument::concert_pitch::A4_HZ;
 use chalumeau_core::instrument::prepare::{OnProgress, Preparation, Progress, Quality, Wanted, altered};
@@ -51,8 +51,8 @@ pub struct InstrumentRequest {
     pub quality: Quality,
     /// What every key plays.
     pub keys: Arc<KeyPitches>,
-    /// Tone holes that the user has moved.
-    pub moved: Arc<Vec<MovedHole>>,
+    /// What the user has altered.
+    pub alterations: Arc<Alterations>,
 }
 
 impl InstrumentRequest {
@@ -74,8 +74,8 @@ impl InstrumentRequest {
         let a4_hz = if is_bridged { A4_HZ } else { (10.0 * a4_hz).round() / 10.0 };
         let quality = if offline { params.instrument.quality.value().into() } else { Quality::Live };
         let keys = params.scale.key_pitches();
-        let moved = params.holes.of(&params.instrument.key());
-        Self { choice: choice as u32, source, a4_hz, host_rate_hz, quality, keys, moved }
+        let alterations = params.alterations.of(&params.instrument.key());
+        Self { choice: choice as u32, source, a4_hz, host_rate_hz, quality, keys, alterations }
     }
 
     /// The request that the built-in clarinet answers.
@@ -87,7 +87,7 @@ impl InstrumentRequest {
             host_rate_hz,
             quality: Quality::Live,
             keys: Arc::default(),
-            moved: Arc::default(),
+            alterations: Arc::default(),
         }
     }
 
@@ -104,10 +104,10 @@ impl InstrumentRequest {
         model
     }
 
-    /// The file with the holes that the user has moved; `None` if all are where they were.
+    /// The file with what the user has altered; `None` if all is as built.
     fn altered(&self, file: &InstrumentFile) -> Option<InstrumentFile> {
-        let altered = file.with_holes_moved(&self.moved);
-        (altered != *file).then(|| InstrumentFile { name: format!("{}, holes moved", file.name), ..altered })
+        let altered = file.altered(&self.alterations);
+        (altered != *file).then(|| InstrumentFile { name: format!("{}, altered", file.name), ..altered })
     }
 
     /// The instrument's measurements as they were built. The error is a message for the user.
@@ -144,7 +144,7 @@ impl InstrumentRequest {
     }
 
     /// The best instrument that needs no fitting and no tuning. Takes up to 50 ms; longer only for a file that was never
-    /// fitted, and for moved holes.
+    /// fitted, and for an altered one.
     pub fn available_now(&self, cache: Option<&dyn Store>) -> Result<(Model, Readiness), String> {
         let wanted = self.wanted(self.file()?);
         let at_440 = Wanted { a4_hz: A4_HZ, ..wanted.clone() };
@@ -164,7 +164,7 @@ impl InstrumentRequest {
         altered().map_err(|reason: BuildError| reason.to_string())
     }
 
-    /// The whole instrument: tuned, or, with holes that the user has moved, fitted with the trims it had before. Takes up to a
+    /// The whole instrument: tuned, or, where the user has altered it, fitted with the trims it had before. Takes up to a
     /// minute.
     pub fn made(
         &self,
@@ -176,7 +176,7 @@ impl InstrumentRequest {
         let wanted = self.wanted(file);
         let preparation = Preparation::new(&wanted, cache);
         let Some(file) = altered else { return preparation.tuned(on) };
-        // Nobody asked to hear it with the holes where they were.
+        // Nobody asked to hear it as built.
         let base = preparation.tuned(&mut |progress| match progress {
             Progress::Fitted(_) => ControlFlow::Continue(()),
             shares => on(shares),

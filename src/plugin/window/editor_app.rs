@@ -73,9 +73,9 @@ impl WindowMemory {
                 let user = InstrumentChoice::ALL.len() - 1;
                 self.choose("instr", user, InstrumentChoice::ALL.len(), gui);
             }
-            Action::MoveHoles(moved) => {
+            Action::Alter(alterations) => {
                 let params = &self.handles.params;
-                params.holes.put(params.instrument.key(), moved);
+                params.alterations.put(params.instrument.key(), alterations);
                 params.host.state_changed();
             }
             Action::SaveInstrument(file) => shared.ask_for_file(FileTask::SaveInstrument(file)),
@@ -191,7 +191,7 @@ impl NiceEguiApp for EditorApp {
         snapshot.scale = params.scale.title();
         snapshot.trims = params.scale.trims();
         snapshot.follows_tuning_program = params.scale.follows_tuning_program();
-        snapshot.moved = params.holes.of(&params.instrument.key());
+        snapshot.alterations = params.alterations.of(&params.instrument.key());
         ui.ctx().set_zoom_factor(memory.state.kept.zoom);
         let actions = editor::draw(ui, &mut memory.state, &memory.controls.with(&self.gui), &snapshot);
         for action in actions {

@@ -94,17 +94,15 @@ mod tests {
     #[test]
     fn an_instrument_is_saved_beside_the_others_and_can_be_read_again() {
         let folder = tempfile::tempdir().unwrap();
-        let file = InstrumentFile { name: "B flat, holes moved".to_owned(), ..InstrumentFile::built_in() };
+        let file = InstrumentFile { name: "B flat, altered".to_owned(), ..InstrumentFile::built_in() };
         let folder = folder.path().join("chalumeau/instruments");
         let (first, second) = (save(&file, &folder).unwrap(), save(&file, &folder).unwrap());
-        assert!(
-            first.ends_with("b_flat_holes_moved_1.toml") && second.ends_with("b_flat_holes_moved_2.toml")
-        );
+        assert!(first.ends_with("b_flat_altered_1.toml") && second.ends_with("b_flat_altered_2.toml"));
         for path in [first, second] {
             assert_eq!(InstrumentFile::parse(&fs::read_to_string(path).unwrap()).unwrap(), file);
         }
         assert_eq!(fs::read_dir(&folder).unwrap().count(), 2, "nothing else is left there");
-        let none = folder.join("b_flat_holes_moved_1.toml/within");
+        let none = folder.join("b_flat_altered_1.toml/within");
         assert!(save(&file, &none).unwrap_err().contains("cannot save in"));
     }
 

@@ -53,7 +53,7 @@ impl InstrumentAnalysis {
         &self.file
     }
 
-    /// The measurements before any hole was moved and before scaling.
+    /// The measurements before any alteration and before scaling.
     pub fn as_built(&self) -> &Arc<InstrumentFile> {
         &self.as_built
     }

@@ -1,4 +1,4 @@
-//! An instrument with another bore or other holes, made from one that is fitted and tuned.
+//! An instrument with other joints or other holes, made from one that is fitted and tuned.
 //!
 //! It keeps the trims and the dynamics of the instrument that it comes from. So the ear hears what the alteration does to
 //! each note, as on a real instrument when its maker moves a hole; an instrument that is tuned anew would hide it.
@@ -67,6 +67,7 @@ mod tests {
     use super::*;
     use crate::bore::lattice::sensitivity::{AtFrequency, Sweep};
     use crate::bore::moved_hole::MovedHole;
+    use crate::bore::pulled_joint::PulledJoint;
     use crate::bore::transfer_matrix::TransferMatrix;
     use crate::units::{WrittenNote, cents};
 
@@ -86,6 +87,32 @@ mod tests {
             assert!((a.radius_m / b.radius_m - 1.0).abs() < 1e-14 && a.ticks == b.ticks);
         }
         assert_eq!(same.tuning, base.tuning);
+    }
+
+    /// The barrel pulled out by 2 mm, as a player does who is sharp, or cut by 3: written E4 falls or rises as the transfer matrices
+    /// say.
+    #[test]
+    fn a_pulled_joint_moves_its_notes_as_the_transfer_matrices_say() {
+        let base = Model::built_in(48_000.0).unwrap();
+        let note = base.file.fingering(WrittenNote(64)).unwrap().clone();
+        let peak =
+            |file: &InstrumentFile| TransferMatrix::new(file, base.air).peaks(&note.open, 0.0, 1)[0].f_hz;
+        let before = peak(&base.file);
+        for by_m in [2e-3, -3e-3] {
+            let pulled = PulledJoint { part: "barrel".to_owned(), by_m };
+            let file = base.file.with_joints_pulled(&[pulled]);
+            let after = peak(&file);
+            let by = cents(after, before);
+            assert!(by * by_m < 0.0 && by.abs() > 8.0, "{by} cents by {by_m} m");
+            let played_by =
+                |model: &Model| cents(peak_hz(model, &note.open, after), peak_hz(&base, &note.open, before));
+            let at_once = played_by(&super::at_once(&base, &file).unwrap());
+            let fitted = played_by(&super::fitted(&base, &file, &mut |_| ControlFlow::Continue(())).unwrap());
+            assert!(
+                (at_once - by).abs() < 8.0 && (fitted - by).abs() < 1.6,
+                "{by}, at once {at_once}, fitted {fitted}"
+            );
+        }
     }
 
     /// The first hole that a note opens, moved up the bore by 4 mm: the lattice's peak moves as the transfer matrices' does,

@@ -1,4 +1,4 @@
-//! Tone holes that the user drags, gives in millimetres, puts back and saves.
+//! Holes and joints that the user drags, gives in millimetres, puts back and saves.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ fn built() -> MovedHole {
 
 /// The moved holes as the plugin would have them now.
 fn moved(window: &Window) -> Vec<MovedHole> {
-    window.snapshot.borrow().moved.to_vec()
+    window.snapshot.borrow().alterations.holes.clone()
 }
 
 fn click(window: &mut Window, label: &str) {
@@ -46,7 +46,7 @@ fn a_hole_is_dragged_undone_and_put_back() {
     let drawn = window.harness.get_by_label(HOLE).rect().center().x;
     assert!((drawn - before + 12.0).abs() < 0.5, "it is drawn where it was let go: {before} {drawn}");
     // No trial of a fingering.
-    assert!(window.actions().iter().all(|action| matches!(action, Action::MoveHoles(_))));
+    assert!(window.actions().iter().all(|action| matches!(action, Action::Alter(_))));
 
     drag(&mut window, vec2(0.0, -20.0), Modifiers::SHIFT);
     let [wider] = &moved(&window)[..] else { panic!("{:?}", moved(&window)) };
@@ -64,7 +64,7 @@ fn a_hole_is_dragged_undone_and_put_back() {
     click(&mut window, "Undo move");
     assert_eq!(moved(&window).len(), 1);
     click(&mut window, "Done");
-    window.harness.get_by_label("1 hole moved");
+    window.harness.get_by_label("1 alteration");
 }
 
 #[test]
@@ -82,8 +82,10 @@ fn a_hole_stays_between_its_neighbours() {
 #[test]
 fn a_hole_is_given_in_millimetres_and_saved() {
     let mut window = Window::new(Tab::Clarinet, (1100.0, 720.0));
-    click(&mut window, "Move holes");
-    window.harness.get_by_label("Drag a hole along the bore. With Shift, up makes it wider.");
+    click(&mut window, "Alter the bore");
+    window.harness.get_by_label(
+        "Drag a hole along the bore; with Shift, up makes it wider. Drag a ring to pull the joint.",
+    );
     drag(&mut window, vec2(-8.0, 0.0), Modifiers::NONE);
     let width = window.harness.get_by_label("Width of the hole R2, mm wide");
     width.click();
@@ -101,7 +103,7 @@ fn a_hole_is_given_in_millimetres_and_saved() {
     let [Action::SaveInstrument(file)] = &window.actions()[..] else { panic!("not saved") };
     let hole = &file.holes[file.hole("R2").unwrap()];
     assert_eq!((hole.x_m, hole.radius_m), (now[0].x_m, now[0].radius_m));
-    assert!(file.name.ends_with("holes moved") && file.source.ends_with("Moved by hand: R2."));
+    assert!(file.name.ends_with("altered") && file.source.ends_with("Altered by hand: R2."));
     let path = std::path::PathBuf::from("/home/music/mine_1.toml");
     window.snapshot.borrow_mut().saved = Some(Ok(path.clone()));
     window.harness.run();
@@ -114,4 +116,51 @@ fn a_hole_is_given_in_millimetres_and_saved() {
     window.harness.run();
     click(&mut window, "Undo move");
     assert!(window.actions().is_empty());
+}
+
+/// The barrel is pulled out by its ring: all below it follows in the picture, a hole that is moved then keeps its place on its
+/// joint, and the number says how far.
+#[test]
+fn a_joint_is_pulled_by_its_ring() {
+    const RING: &str = "Joint below the barrel";
+    let mut window = Window::new(Tab::Clarinet, (1100.0, 720.0));
+    let pulled = |window: &Window| window.snapshot.borrow().alterations.joints.clone();
+    let file = InstrumentFile::built_in();
+    let x = |part: &str| window.harness.get_by_label(&format!("Joint below the {part}")).rect().center().x;
+    let between_m = file.joint_x_m("lower joint").unwrap() - file.joint_x_m("barrel").unwrap();
+    let points_a_metre = f64::from(x("lower joint") - x("barrel")) / between_m;
+    let ring = window.harness.get_by_label(RING).rect().center();
+    window.drag(ring, vec2(4.0, 0.0));
+    let [joint] = &pulled(&window)[..] else { panic!("{:?}", pulled(&window)) };
+    assert_eq!(joint.part, "barrel");
+    assert!((joint.by_m - 4.0 / points_a_metre).abs() < 2e-4, "{joint:?}");
+
+    let length = "How much longer the barrel is, mm";
+    window.harness.get_by_label(length).click();
+    window.harness.run();
+    window.harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    window.harness.get_by_label(length).type_text("-2.5");
+    window.harness.run();
+    window.harness.key_press(Key::Enter);
+    window.harness.run();
+    let now = pulled(&window);
+    assert!((now[0].by_m + 2.5e-3).abs() < 1e-9, "{now:?}");
+    // Far out it stops where a joint ends.
+    let ring = window.harness.get_by_label(RING).rect().center();
+    window.drag(ring, vec2(300.0, 0.0));
+    assert_eq!(pulled(&window)[0].by_m, file.room_of_joint("barrel").unwrap().1);
+
+    // A hole is drawn where its joint is, and dragged from there.
+    drag(&mut window, vec2(-12.0, 0.0), Modifiers::NONE);
+    assert!((built().x_m - moved(&window)[0].x_m - 12.0 / points_a_metre).abs() < 4e-4);
+    window.harness.get_by_label("Place of the hole R2, mm from the reed");
+    click(&mut window, "Undo move");
+    assert!(moved(&window).is_empty() && !pulled(&window).is_empty());
+    window.actions();
+    click(&mut window, "Save");
+    let [Action::SaveInstrument(saved)] = &window.actions()[..] else { panic!("not saved") };
+    assert!((saved.length_m() - file.length_m() - 15e-3).abs() < 1e-9);
+    assert!(saved.source.ends_with("Altered by hand: barrel."));
+    click(&mut window, "Put back");
+    assert!(pulled(&window).is_empty());
 }

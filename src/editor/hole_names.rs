@@ -1,0 +1,48 @@
+//! Names of holes as musicians write them. Instrument files write `GS_KEY` for the G# key.
+
+/// The words of a hole's name: "GS_KEY" is "G#" and "key".
+pub fn hole_words(name: &str) -> Vec<String> {
+    name.split('_').enumerate().map(|(index, word)| word_of(word, index == 0)).collect()
+}
+
+/// The same on one line.
+pub fn hole_title(name: &str) -> String {
+    hole_words(name).join(" ")
+}
+
+fn word_of(word: &str, is_first: bool) -> String {
+    match word.as_bytes() {
+        [b'A'..=b'G'] => word.to_owned(),
+        &[note @ b'A'..=b'G', b'S' | b's'] => format!("{}#", char::from(note)),
+        &[note @ b'A'..=b'G', b'B' | b'b'] => format!("{}b", char::from(note)),
+        _ => {
+            let mut letters = word.chars();
+            let first = letters.next().map_or_else(String::new, |first| {
+                if is_first { first.to_uppercase().to_string() } else { first.to_lowercase().to_string() }
+            });
+            first + &letters.as_str().to_lowercase()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sharps_and_flats_have_their_signs() {
+        for (name, title) in [
+            ("GS_KEY", "G# key"),
+            ("EB_KEY", "Eb key"),
+            ("SIDE2_Fs", "Side2 F#"),
+            ("TRILL3_Bb", "Trill3 Bb"),
+            ("SLIVER_B", "Sliver B"),
+            ("L2_VENT", "L2 vent"),
+            ("REG", "Reg"),
+            ("R1", "R1"),
+            ("", ""),
+        ] {
+            assert_eq!(hole_title(name), title, "{name}");
+        }
+    }
+}
