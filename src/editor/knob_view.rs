@@ -1,7 +1,8 @@
 //! The knob view: device, status, arming, feel, and a page of feel tests.
 
 use egui::{
-    Align2, Button, Color32, CornerRadius, FontId, RichText, Role, Sense, Stroke, Ui, WidgetInfo, vec2,
+    Align, Align2, Button, Color32, CornerRadius, FontId, RichText, Role, Sense, Stroke, Ui, WidgetInfo,
+    pos2, text::LayoutJob, vec2,
 };
 
 use crate::editor::Action;
@@ -26,7 +27,7 @@ enum Page {
 }
 
 const PAGES: [(Page, &str); 3] =
-    [(Page::Play, "Feel"), (Page::Try, "Feel test"), (Page::Study, "Connection, takes, study")];
+    [(Page::Play, "Feel"), (Page::Try, "Feel test"), (Page::Study, "Connection, takes")];
 
 /// What the panel remembers.
 #[derive(Clone, Debug, Default)]
@@ -236,7 +237,7 @@ fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec
     let knob = &snapshot.knob;
     let is_wanted = hands.step("arm") == 1;
     let (title, line, fill, ink): (&str, &str, Color32, Color32) = match (knob.is_armed, is_wanted) {
-        (true, _) => ("STOP", "armed: press here, or Escape", c.danger, c.panel),
+        (true, _) => ("STOP", "armed: press, or Escape", c.danger, c.panel),
         (false, true) => ("DISARMED", "disarmed by the knob: press, then arm again", c.raised, c.beats),
         (false, false) if knob.is_live => ("ARM", "lets the knob make torque", c.accent, c.on_accent),
         (false, false) => ("ARM", "no knob connected", c.raised, c.quiet),
@@ -252,16 +253,15 @@ fn arming(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec
         painter.rect_stroke(rect.shrink(2.0), round, Stroke::new(2.0, c.ink), egui::StrokeKind::Inside);
     }
     let is_low = height < 60.0;
-    let (up, size) = if is_low { (7.0, 18.0) } else { (8.0, 24.0) };
-    painter.text(
-        rect.center() - vec2(0.0, up),
-        Align2::CENTER_CENTER,
-        title,
-        FontId::proportional(size),
-        ink,
-    );
-    let below = rect.center() + vec2(0.0, if is_low { 11.0 } else { 16.0 });
-    painter.text(below, Align2::CENTER_CENTER, line, theme::small(), ink);
+    let mut words = LayoutJob::simple(line.to_owned(), theme::small(), ink, rect.width() - 12.0);
+    words.halign = Align::Center;
+    let words = painter.layout_job(words);
+    let title_height = if is_low { 22.0 } else { 28.0 };
+    let top = rect.center().y - 0.5 * (title_height + words.size().y);
+    let size = if words.rows.len() > 1 && is_low { 14.0 } else { 0.86 * title_height };
+    let at = pos2(rect.center().x, top + 0.5 * title_height);
+    painter.text(at, Align2::CENTER_CENTER, title, FontId::proportional(size), ink);
+    painter.galley(pos2(rect.center().x, top + title_height), words, ink);
     let name = if is_wanted || knob.is_armed { "Stop the knob" } else { "Arm the knob" };
     response.widget_info(|| WidgetInfo::selected(Role::Switch, true, knob.is_armed, name));
     if response.clicked() {

@@ -240,7 +240,7 @@ fn every_slider_drags_types_and_resets() {
 
 fn study() -> Window {
     let mut window = Window::tall(Tab::Knob);
-    window.harness.get_by_label_contains("Connection, takes, study").click();
+    window.harness.get_by_label_contains("Connection, takes").click();
     window.harness.run();
     window
 }

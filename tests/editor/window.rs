@@ -167,7 +167,7 @@ fn pictures_of_pages() {
     click(&mut window, "Page: Feel test");
     click(&mut window, "Feel test: Threshold");
     save(&mut window, "feel-test");
-    click(&mut window, "Page: Connection, takes, study");
+    click(&mut window, "Page: Connection, takes");
     save(&mut window, "line");
     let mut window = Window::new(Tab::Clarinet, (1100.0, 720.0));
     click(&mut window, "Hole L3, closed");
