@@ -344,6 +344,15 @@ fn a_wav_file_is_as_long_and_deep_as_asked() {
         assert_eq!((wav.spec().bits_per_sample, wav.spec().channels), (stored, 2));
         assert_eq!((wav.spec().sample_rate, wav.duration()), (44_100, 22_050));
     }
+    // Without a number, what is heard differently on two channels has two.
+    for (more, channels) in
+        [("", 1), ("--room 0.3", 2), ("--set heard=place", 2), ("--room 0.3 --channels 1", 1)]
+    {
+        let line = format!("render --written 60 --gamma 0.5 --seconds 0.2 {more} --force --out wide.wav");
+        succeeds(d.path(), &line);
+        let wav = hound::WavReader::open(d.path().join("wide.wav")).unwrap();
+        assert_eq!(wav.spec().channels, channels, "{more}");
+    }
     succeeds(d.path(), "render --written 60 --gamma 1 --breath-full 6 --seconds 0.1 --out full.wav");
     succeeds(d.path(), "render --scale E3:G3 --seconds 0.1 --out scale.wav");
     assert_eq!(hound::WavReader::open(d.path().join("scale.wav")).unwrap().duration(), 19_200 + 48_000);

@@ -10,6 +10,7 @@ use crate::cli::shared_args::within;
 use crate::output::NewFile;
 use crate::wav::{Depth, Levels, WavFile};
 use chalumeau_core::instrument::Probe;
+use chalumeau_core::instrument::listening::ListeningMode;
 use chalumeau_core::reed::physical::P_REF_PA;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -26,7 +27,7 @@ Examples:
       From silence over the threshold to a reed held shut, with pressures, flow and opening.
   chalumeau render melody.mid --out melody.wav --plot melody.png
       Waveform, spectrogram, pitch against the score, breath, and the reed in close-up.
-  chalumeau render chorale.mid --players 4 --channels 2 --out chorale.wav
+  chalumeau render chorale.mid --players 4 --out chorale.wav
       Keys that are held together are played by different players; with --unison all play every note.
   chalumeau render melody.mid --replay take.csv --out again.wav
   chalumeau render melody.mid --crescendo 0.4:0.9 --bits 16 --rate 44100 --out loud.wav";
@@ -57,9 +58,9 @@ pub struct RenderCommand {
     /// Bits per sample: integers rounded without dither, or floats as computed
     #[arg(long, value_enum, default_value_t = Bits::Float32, help_heading = "Output")]
     bits: Bits,
-    /// Channels: 1, or 2, which differ where pan (CC10) leaves the middle, in a room (--room), or if the instrument is heard from two places (--set heard=place)
-    #[arg(long, value_name = "N", default_value = "1", help_heading = "Output", value_parser = clap::value_parser!(u16).range(1..=2))]
-    channels: u16,
+    /// Channels: 1 or 2 [default: 2 in a room (--room), for several players, and from two places (--set heard=place), else 1]. Two channels also follow pan (CC10)
+    #[arg(long, value_name = "N", help_heading = "Output", value_parser = clap::value_parser!(u16).range(1..=2))]
+    channels: Option<u16>,
     /// CSV file of internal signals over time: mouth pressure, reed opening, flow, mouthpiece and radiated pressure
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     probe: Option<PathBuf>,
@@ -82,6 +83,8 @@ pub struct Rendered {
     pub seconds: f64,
     /// Sample rate, Hz.
     pub rate: u32,
+    /// Channels, 1 or 2.
+    pub channels: u16,
     /// Levels of the file.
     pub level: Levels,
     /// How often the calculation broke down.
@@ -101,12 +104,12 @@ impl RenderCommand {
         let RenderJob { score, rate, .. } = &prepared;
         prepared.warn();
         let several = prepared.has_several_players();
-        let has_room = prepared.settings.room.amount > 0.0;
-        if let Some(what) = [(has_room, "a room is"), (several, "seats are")].into_iter().find(|(is, _)| *is)
-            && self.channels == 1
-        {
-            eprintln!("warning: {} heard on two channels only; add --channels 2", what.1);
-        }
+        let channels = self.channels.unwrap_or_else(|| {
+            let settings = &prepared.settings;
+            let is_wide =
+                several || settings.room.amount > 0.0 || settings.listening.mode == ListeningMode::Position;
+            if is_wide { 2 } else { 1 }
+        });
         self.refuse_same_file()?;
         if several && (self.probe.is_some() || self.plot.wanted()) {
             let inside = "--probe and --plot look inside one instrument; leave them or --players out";
@@ -122,7 +125,7 @@ impl RenderCommand {
             Bits::Int24 => Depth::Int24,
             Bits::Float32 => Depth::Float32,
         };
-        let mut wav = WavFile::new(&mut out, *rate, depth, self.channels, score.samples)?;
+        let mut wav = WavFile::new(&mut out, *rate, depth, channels, score.samples)?;
         let bar = bar(score.samples);
         // Who looks gets samples and insides in turn, hence the cell.
         let watch = watch.map(RefCell::new);
@@ -136,7 +139,7 @@ impl RenderCommand {
             }
         };
         let inside: Option<&mut dyn FnMut(Probe)> = if looks_inside { Some(&mut inside) } else { None };
-        let resets = prepared.play(self.channels, inside, |sent, heard| {
+        let resets = prepared.play(channels, inside, |sent, heard| {
             bar.inc(sent.len() as u64);
             if let Some(watch) = &watch {
                 watch.borrow_mut().hear(sent);
@@ -153,7 +156,7 @@ impl RenderCommand {
             plot.draw(|| watched.figure(&self.play.title(), about))?;
         }
         out.keep()?;
-        Ok(Rendered { seconds: score.seconds(*rate), rate: *rate, level, resets })
+        Ok(Rendered { seconds: score.seconds(*rate), rate: *rate, channels, level, resets })
     }
 
     fn refuse_same_file(&self) -> Result<(), Failure> {
@@ -171,13 +174,13 @@ impl RenderCommand {
         Ok(())
     }
 
-    fn report(&self, &Rendered { seconds, rate, level, resets }: &Rendered) {
+    fn report(&self, &Rendered { seconds, rate, channels, level, resets }: &Rendered) {
         let bits = match self.bits {
             Bits::Int16 => "16 bit",
             Bits::Int24 => "24 bit",
             Bits::Float32 => "32 bit float",
         };
-        let channels = if self.channels == 1 { "mono" } else { "two channels" };
+        let channels = if channels == 1 { "mono" } else { "two channels" };
         let peak = match level.peak {
             0.0 => "silent".to_owned(),
             peak => format!("peak {:.1} dBFS", 20.0 * peak.log10()),
