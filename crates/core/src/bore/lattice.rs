@@ -344,8 +344,8 @@ impl<F: Real> Lattice<F> {
         }
     }
 
-    /// Runs `samples` samples (a control tick) with `tip` at the reed end; jets of moving holes are brought up to date
-    /// once a call. Real-time safe. [audio thread]
+    /// Runs `samples` samples (a control tick) with `tip` at the reed end; holes that have arrived come to rest once a
+    /// call. Real-time safe. [audio thread]
     pub fn run<T: Tip<F>>(&mut self, mut samples: usize, tip: &mut T) {
         // A delay that arrives on the way rests from there on.
         while (1..samples).contains(&self.delay_left) {
@@ -374,10 +374,10 @@ impl<F: Real> Lattice<F> {
         }
     }
 
-    /// Brings the jets of holes that move up to date, and stops the holes that have arrived.
+    /// Stops the holes that have arrived.
     #[inline(always)]
-    fn throttle(&mut self) {
-        self.moved = self.holes.iter_mut().fold(false, |moving, holes| holes.throttle() | moving);
+    fn rest(&mut self) {
+        self.moved = self.holes.iter_mut().fold(false, |moving, holes| holes.rest() | moving);
     }
 
     /// `MASK` is that of the ring, 0 for any: a mask known beforehand saves 15 instructions a sample, and the two shortest
@@ -432,7 +432,7 @@ fn run_avx2<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, sampl
 fn run_body<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, samples: usize, tip: &mut T) {
     let moving = lattice.moved;
     if moving {
-        lattice.throttle();
+        lattice.rest();
     }
     let ring = &mut *lattice.ring;
     let mask = if MASK == 0 { lattice.mask } else { MASK };

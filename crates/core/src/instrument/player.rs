@@ -360,8 +360,8 @@ impl Player {
         }
     }
 
-    /// Moves the fingers to a note: slurred within the setting's time, behind the tongue quickly. The breath helps difficult
-    /// slurs with a dip.
+    /// Moves the fingers to a note: slurred within the setting's time, behind the tongue quickly. A player's lip, or a dip of a
+    /// machine's breath, helps difficult slurs.
     fn finger<F: Real>(&mut self, fingering: usize, slurred: bool, model: &Model, voice: &mut Voice<F>) {
         let glissando_s = f64::from(self.settings.glissando_s);
         let from = self.fingers.fingering().filter(|_| slurred);
@@ -388,11 +388,12 @@ impl Player {
         });
         match (slur, self.settings.breath_response) {
             (Some(slur), BreathResponse::Played) => {
-                if let Some(dip) = slur.dip(self.breath.gamma()) {
-                    self.breath.dip(dip);
+                let gamma = self.breath.gamma();
+                if let Some(help) = slur.lip_help(gamma) {
+                    self.lip_glide.help(help);
                 }
                 let ticks = self.legato_ticks(model);
-                self.fingers.walk_to(fingering, ticks, slur.finger_share(), model, voice.lattice_mut());
+                self.fingers.walk_to(fingering, ticks, slur.walk(gamma), model, voice.lattice_mut());
                 self.posture = None;
             }
             (slur, _) => {
@@ -509,8 +510,8 @@ impl Player {
             }
             left => left - 1,
         };
-        let note_lip =
-            self.lip_glide.tick(posture.note_lip(), tongue_holds || !key_down, posture.lags.fingers);
+        let in_place = tongue_holds || !key_down;
+        let note_lip = self.lip_glide.tick(posture.note_lip(), in_place, posture.lags.fingers, tick_s);
         let fade = self.inflection.fade();
         let bodily = Bodily { note_lip, onset: &self.onset, sway: &self.sway, settles: tongue_holds, fade };
         let mut target = self.response.tick(asked, ear, &bodily, settings, posture);

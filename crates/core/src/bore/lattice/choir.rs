@@ -271,7 +271,7 @@ impl<const N: usize> LatticeChoir<N> {
         }
         self.moving[lane] = lattice.moved;
         if lattice.moved {
-            lattice.throttle();
+            lattice.rest();
             self.move_holes(lane, lattice);
         }
         (self.delay[lane], self.delay_glide[lane]) = (lattice.delay, lattice.delay_glide);

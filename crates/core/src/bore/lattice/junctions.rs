@@ -269,17 +269,11 @@ impl<F: Real, const N: usize> Holes<F, N> {
         self.opening[k] != F::default() || self.glide[k] != F::default()
     }
 
-    /// A hole opened by `a` passes its jet through `a^2` of its area (its mass, too, is 1 / a^2 of the open one's). Seen
-    /// behind the transformer the loss is then 1 / a^2 of the open hole's: it is what quietens the air column when the
-    /// fingers leave many holes at once. Held below a bound where no air passes anyway.
-    ///
     /// Stops the holes that have arrived, and is true if a hole is on its way. Seldom called, hence not inlined: it would
     /// crowd the loop over samples.
     #[inline(never)]
-    pub(super) fn throttle(&mut self) -> bool {
+    pub(super) fn rest(&mut self) -> bool {
         for k in 0..N {
-            let area = self.area[k];
-            self.jet[k] = self.jet_open[k] / (area + F::of(0.02) * (F::of(1.0) - area));
             let going_up = self.glide[k] > F::default();
             let there = self.opening[k] == self.range[usize::from(going_up)][k];
             self.glide[k] = if there { F::default() } else { self.glide[k] };
@@ -290,7 +284,7 @@ impl<F: Real, const N: usize> Holes<F, N> {
     /// Lane `k` moves as lane `from` of others does.
     pub(super) fn move_as<const M: usize>(&mut self, k: usize, others: &Holes<F, M>, from: usize) {
         self.arrive_as(k, others, from);
-        self.jet[k] = others.jet[from];
+        self.jet_open[k] = others.jet_open[from];
         self.glide[k] = others.glide[from];
         for (own, other) in self.range.iter_mut().zip(&others.range) {
             own[k] = other[from];
@@ -299,9 +293,16 @@ impl<F: Real, const N: usize> Holes<F, N> {
 
     /// The hole in lane `k` is where lane `from` of others is.
     pub(super) fn arrive_as<const M: usize>(&mut self, k: usize, others: &Holes<F, M>, from: usize) {
-        (self.opening[k], self.area[k]) = (others.opening[from], others.area[from]);
+        (self.opening[k], self.area[k], self.jet[k]) =
+            (others.opening[from], others.area[from], others.jet[from]);
     }
 
+    /// Holes on their way move on by a sample.
+    ///
+    /// A hole opened by `a` passes its jet through `a^2` of its area (its mass, too, is 1 / a^2 of the open one's). Seen
+    /// behind the transformer the loss is then 1 / a^2 of the open hole's: it is what quietens the air column when the
+    /// fingers leave many holes at once. Held below a bound where no air passes anyway. It follows the opening in each
+    /// sample: in a slur it changes by up to a third within a control tick, and such steps clicked.
     #[inline(always)]
     pub(super) fn glide(&mut self) {
         let [low, high] = &self.range;
@@ -309,8 +310,10 @@ impl<F: Real, const N: usize> Holes<F, N> {
             let next = self.opening[k] + self.glide[k];
             let next = if next < low[k] { low[k] } else { next };
             let next = if next > high[k] { high[k] } else { next };
+            let area = next * next;
             self.opening[k] = next;
-            self.area[k] = next * next;
+            self.area[k] = area;
+            self.jet[k] = self.jet_open[k] / (area + F::of(0.02) * (F::of(1.0) - area));
         }
     }
 

@@ -5,7 +5,6 @@
 //! pressure of it.
 
 use super::TickContext;
-use super::slur::Dip;
 
 /// Time constant of breath that rises behind the tongue, s.
 pub const BREATH_RISE_S: f64 = 0.002;
@@ -14,7 +13,7 @@ pub const BREATH_FOLLOW_S: f64 = 0.005;
 /// Time constant of breath that ends, s.
 pub const BREATH_END_S: f64 = 0.012;
 /// Where the breath is physical, a slur of an octave or more is helped by a dip; the limit leaves room below the octave, cents.
-/// [`slur`](super::slur) has the dips of a player.
+/// A player's [`slur`](super::slur) needs none.
 const LEAP_CENTS: f64 = 1_150.0;
 /// The highest register that a slur enters or leaves without a dip: the clarion.
 const CLARION: u8 = 2;
@@ -47,8 +46,6 @@ pub struct Breath {
     gamma: f64,
     /// What is left of the dip, s; 0 or less for none.
     dip_s: f64,
-    /// What the pressure is at most while a player dips; `None` for the dip of a machine.
-    dip_gamma: Option<f64>,
 }
 
 impl Breath {
@@ -71,16 +68,11 @@ impl Breath {
         self.velocity = f64::from(if velocity.is_finite() { velocity.clamp(0.0, 1.0) } else { 0.5 });
     }
 
-    /// A player dips for a slur.
-    pub fn dip(&mut self, dip: Dip) {
-        (self.dip_gamma, self.dip_s) = (Some(dip.gamma), dip.length_s);
-    }
-
     /// A machine slurs over an interval, cents, from one register to another: a difficult slur begins a short dip of the
     /// pressure.
     pub fn slur(&mut self, interval_cents: f64, from: u8, to: u8) {
         if interval_cents.abs() > LEAP_CENTS || (from != to && from.max(to) > CLARION) {
-            (self.dip_gamma, self.dip_s) = (None, DIP.1);
+            self.dip_s = DIP.1;
         }
     }
 
@@ -129,11 +121,7 @@ impl Breath {
     pub fn tick(&mut self, target: f64, key_down: bool, tongue_holds: bool, context: &TickContext<'_>) {
         let posture = context.posture;
         let dipping = self.is_dipping();
-        let target = match self.dip_gamma {
-            _ if !dipping => target,
-            Some(gamma) => target.min(gamma),
-            None => target * DIP.0,
-        };
+        let target = if dipping { target * DIP.0 } else { target };
         self.dip_s -= context.tick_s;
         let share = if !key_down {
             posture.lags.breath_end

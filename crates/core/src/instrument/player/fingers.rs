@@ -1,6 +1,7 @@
 //! The fingers: which fingering is in place, and how its holes get there.
 
 use super::glissando::Between;
+use super::slur;
 use crate::bore::lattice::{Lattice, Real};
 use crate::instrument::model::Model;
 use crate::instrument::voice::TICK;
@@ -157,16 +158,17 @@ impl Fingers {
         }
     }
 
-    /// Moves the fingers to a fingering one after another within `ticks` control ticks, each in a `share` of them. The hole
-    /// nearest to the bell goes first: what it does is hardly heard, and the hole that makes the new note is the last.
+    /// Moves the fingers to a fingering one after another, as a slur has it, whose time is `ticks` control ticks. Where the hole nearest to
+    /// the bell goes first, what it does is hardly heard, and the hole that makes the new note is the last.
     pub fn walk_to<F: Real>(
         &mut self,
         fingering: usize,
         ticks: u32,
-        share: f64,
+        walk: slur::Walk,
         model: &Model,
         lattice: &mut Lattice<F>,
     ) {
+        let ticks = (f64::from(ticks) * walk.time) as u32;
         if self.fingering.is_none() {
             return self.move_to(fingering, ticks, model, lattice);
         }
@@ -180,13 +182,13 @@ impl Fingers {
             moving |= u64::from(moves) << hole;
         }
         let count = moving.count_ones();
-        let share = if count > 1 { share } else { 1.0 };
+        let share = if count > 1 { walk.finger_share } else { 1.0 };
         self.walk.ticks = ((f64::from(ticks) * share) as usize).max(1);
         let spread = (f64::from(ticks) - self.walk.ticks as f64).max(0.0) / f64::from(count.max(2) - 1);
-        let mut rank = 0.0;
-        for hole in (0..holes).rev().filter(|hole| moving >> hole & 1 == 1) {
-            self.walk.waits[hole] = 1 + (spread * rank) as u16;
-            rank += 1.0;
+        // Holes are in order from the mouth.
+        for (n, hole) in (0..holes).filter(|hole| moving >> hole & 1 == 1).enumerate() {
+            let rank = if walk.mouth_first { n } else { count as usize - 1 - n };
+            self.walk.waits[hole] = 1 + (spread * rank as f64) as u16;
         }
         self.walk.left = (ticks + 1).min(u32::from(u16::MAX)) as u16;
         self.step(model, lattice);

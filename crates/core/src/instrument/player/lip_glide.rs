@@ -1,7 +1,9 @@
 //! The lip goes from note to note: resonance and damping that it gives the reed, and the place of the note in the player's rule.
 //!
 //! Slurred, they move while the fingers do; a step of them is a step of the flow, which clicks. Behind the tongue they are in
-//! place at once.
+//! place at once. A difficult [`slur`](super::slur) lets the lip damp the reed for a moment.
+
+use super::slur::LipHelp;
 
 /// These count as arrived when each is this near to its target, as a share of it.
 const ARRIVED: f64 = 1e-4;
@@ -13,11 +15,23 @@ pub type NoteLip = [f64; 3];
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LipGlide {
     now: Option<NoteLip>,
+    /// Factor on the damping, and for how long yet, s; 0 or less for none.
+    help: (f64, f64),
 }
 
 impl LipGlide {
-    /// Moves towards a note by a `share` of the way, or is there `at_once`. Real-time safe.
-    pub fn tick(&mut self, target: NoteLip, at_once: bool, share: f64) -> NoteLip {
+    /// The lip helps a slur.
+    pub fn help(&mut self, help: LipHelp) {
+        self.help = (help.damping, help.length_s);
+    }
+
+    /// Moves towards a note by a `share` of the way in a tick of `tick_s` seconds, or is there `at_once`, without any help. Real-time safe.
+    pub fn tick(&mut self, mut target: NoteLip, at_once: bool, share: f64, tick_s: f64) -> NoteLip {
+        let (damping, left_s) = self.help;
+        if left_s > 0.0 {
+            self.help.1 = if at_once { 0.0 } else { left_s - tick_s };
+            target[1] *= if at_once { 1.0 } else { damping };
+        }
         let now = match self.now {
             Some(now) if !at_once && now != target => {
                 let mut next = now;
@@ -32,5 +46,27 @@ impl LipGlide {
         };
         self.now = Some(now);
         now
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn help_damps_the_reed_for_a_while_and_then_leaves_it_as_it_was() {
+        const TICK_S: f64 = 1.0 / 6_000.0;
+        let target: NoteLip = [1_500.0, 0.8, -0.5];
+        let mut lip = LipGlide::default();
+        assert_eq!(lip.tick(target, true, 0.05, TICK_S), target);
+        lip.help(LipHelp { damping: 1.5, length_s: 0.02 });
+        let helped: Vec<f64> = (0..600).map(|_| lip.tick(target, false, 0.05, TICK_S)[1]).collect();
+        let most = helped.iter().copied().fold(0.0, f64::max);
+        assert!((1.19..=1.2).contains(&most), "{most}");
+        assert!(helped[119] > 1.19 && helped[123] < helped[119], "20 ms");
+        assert_eq!(helped[599], 0.8);
+        lip.help(LipHelp { damping: 1.5, length_s: 0.02 });
+        assert_eq!(lip.tick(target, true, 0.05, TICK_S), target, "behind the tongue there is no slur");
+        assert_eq!(lip.tick(target, false, 0.05, TICK_S), target);
     }
 }
