@@ -10,6 +10,7 @@ use crate::cli::shared_args::within;
 use crate::output::NewFile;
 use crate::wav::{Depth, Levels, WavFile};
 use chalumeau_core::instrument::Probe;
+use chalumeau_core::instrument::side_by_side::{self, Stand};
 use chalumeau_core::reed::physical::P_REF_PA;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -97,6 +98,15 @@ impl RenderCommand {
 
     /// Writes the files. `bar` makes a progress bar for so many samples.
     pub fn render(&self, bar: impl FnOnce(usize) -> ProgressBar) -> Result<Rendered, Failure> {
+        side_by_side::alone(async |stand| self.render_beside(stand, bar).await)
+    }
+
+    /// As [`render`](Self::render), beside other renderings: the same bits.
+    pub async fn render_beside(
+        &self,
+        stand: &Stand,
+        bar: impl FnOnce(usize) -> ProgressBar,
+    ) -> Result<Rendered, Failure> {
         let prepared = self.play.prepare()?;
         let RenderJob { score, rate, .. } = &prepared;
         prepared.warn();
@@ -136,13 +146,17 @@ impl RenderCommand {
             }
         };
         let inside: Option<&mut dyn FnMut(Probe)> = if looks_inside { Some(&mut inside) } else { None };
-        let resets = prepared.play(self.channels, inside, |sent, heard| {
+        let write = |sent: &[f32], heard: &[&[f32]]| {
             bar.inc(sent.len() as u64);
             if let Some(watch) = &watch {
                 watch.borrow_mut().hear(sent);
             }
             wav.write(heard).map_err(Failure::from)
-        })?;
+        };
+        let resets = match inside {
+            None => prepared.play_beside(stand, self.channels, write).await?,
+            inside => prepared.play(self.channels, inside, write)?,
+        };
         let level = wav.finish()?;
         bar.finish_and_clear();
         if let Some(probe) = probe {
