@@ -5,7 +5,7 @@ pub(super) mod plan;
 use crate::cli::Failure;
 use crate::cli::csv_table::{CsvTable, quoted};
 use crate::cli::render::{RenderCommand, Rendered};
-use chalumeau_core::parallel;
+use chalumeau_core::instrument::side_by_side;
 use clap::{Args, Parser};
 use indicatif::{ProgressBar, ProgressStyle};
 use plan::{Plan, Variation};
@@ -39,7 +39,7 @@ A CSV file has the names in its first line, and one file to render in each other
 
 /// Render many variations into a folder, with a table of what each file is
 ///
-/// Works on all cores. If it is stopped, the same command goes on where it was: files that are listed with the same arguments stay
+/// Works on all cores, and on each renders up to eight files of one instrument side by side; a file is the same as if it were rendered by itself. If it is stopped, the same command goes on where it was: files that are listed with the same arguments stay
 /// as they are. The table, manifest.csv, has a line for each file: its arguments, length, peak and level.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
@@ -71,8 +71,13 @@ struct Job {
     /// Beginning of its line in the table: name and arguments.
     line: String,
     words: Vec<String>,
+    /// What it says of the bore.
+    bore: Vec<String>,
     render: RenderCommand,
 }
+
+/// Names that choose or change a bore.
+const OF_THE_BORE: [&str; 6] = ["instrument", "preset", "rate", "quality", "a4", "untuned"];
 
 impl BatchCommand {
     pub fn run(&self) -> Result<(), Failure> {
@@ -103,17 +108,20 @@ impl BatchCommand {
             }
             lines.push(kept.cloned());
         }
-        let left: Vec<_> = (0..jobs.len()).filter(|&at| lines[at].is_none()).collect();
+        let mut left: Vec<_> = (0..jobs.len()).filter(|&at| lines[at].is_none()).collect();
         if left.len() < jobs.len() {
             eprintln!("{} of {} files are there already", jobs.len() - left.len(), jobs.len());
         }
+        // Those of one bore one after another: only they play side by side.
+        left.sort_by(|&one, &other| jobs[one].bore.cmp(&jobs[other].bore));
         let bar = progress(left.len());
         let (journal, failed) = (Mutex::new(&mut say), Mutex::new(None));
-        let made = parallel::each(
+        let made = side_by_side::each(
             left.len(),
-            |at| {
+            async |stand, at| {
                 let job = &jobs[left[at]];
-                let line = job.render.render(|_| ProgressBar::hidden()).and_then(|made| {
+                let made = job.render.render_beside(stand, |_| ProgressBar::hidden()).await;
+                let line = made.and_then(|made| {
                     let line = finished(&job.line, &made);
                     if let Ok(mut say) = journal.lock() {
                         (*say)(&line)?;
@@ -174,7 +182,10 @@ impl BatchCommand {
             })?;
             let fields: Vec<_> = variation.values.iter().map(|value| quoted(value)).collect();
             let line = format!("{file},{}", fields.join(","));
-            Ok(Job { file, line, words, render: parsed.render })
+            let values = plan.names.iter().zip(&variation.values);
+            let bore = values.filter(|(name, _)| OF_THE_BORE.contains(&name.as_str()));
+            let bore = bore.map(|(_, value)| value.clone()).collect();
+            Ok(Job { file, line, words, bore, render: parsed.render })
         };
         plan.variations.iter().enumerate().map(job).collect()
     }

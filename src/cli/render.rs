@@ -11,6 +11,7 @@ use crate::output::NewFile;
 use crate::wav::{Depth, Levels, WavFile};
 use chalumeau_core::instrument::Probe;
 use chalumeau_core::instrument::listening::ListeningMode;
+use chalumeau_core::instrument::side_by_side::{self, Stand};
 use chalumeau_core::reed::physical::P_REF_PA;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -100,6 +101,15 @@ impl RenderCommand {
 
     /// Writes the files. `bar` makes a progress bar for so many samples.
     pub fn render(&self, bar: impl FnOnce(usize) -> ProgressBar) -> Result<Rendered, Failure> {
+        side_by_side::alone(async |stand| self.render_beside(stand, bar).await)
+    }
+
+    /// As [`render`](Self::render), beside other renderings: the same bits.
+    pub async fn render_beside(
+        &self,
+        stand: &Stand,
+        bar: impl FnOnce(usize) -> ProgressBar,
+    ) -> Result<Rendered, Failure> {
         let prepared = self.play.prepare()?;
         let RenderJob { score, rate, .. } = &prepared;
         prepared.warn();
@@ -139,13 +149,17 @@ impl RenderCommand {
             }
         };
         let inside: Option<&mut dyn FnMut(Probe)> = if looks_inside { Some(&mut inside) } else { None };
-        let resets = prepared.play(channels, inside, |sent, heard| {
+        let write = |sent: &[f32], heard: &[&[f32]]| {
             bar.inc(sent.len() as u64);
             if let Some(watch) = &watch {
                 watch.borrow_mut().hear(sent);
             }
             wav.write(heard).map_err(Failure::from)
-        })?;
+        };
+        let resets = match inside {
+            None => prepared.play_beside(stand, channels, write).await?,
+            inside => prepared.play(channels, inside, write)?,
+        };
         let level = wav.finish()?;
         bar.finish_and_clear();
         if let Some(probe) = probe {

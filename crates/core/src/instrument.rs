@@ -45,6 +45,7 @@ mod reach;
 pub mod room;
 pub mod scope;
 mod settings;
+pub mod side_by_side;
 mod slap;
 pub mod stereo;
 pub mod store;

@@ -12,13 +12,40 @@ fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Calls `work` for each of `0..count` and returns the results in that order.
+/// Work that several threads share, item by item: see [`workers`].
+pub struct Queue<'a, T> {
+    /// Most items that a thread should have begun at once, so that all threads have some.
+    pub share: usize,
+    take: &'a dyn Fn() -> Option<usize>,
+    give: &'a dyn Fn(usize, T),
+    stopped: &'a dyn Fn() -> bool,
+}
+
+impl<T> Queue<'_, T> {
+    /// The next item, which nobody else gets; `None` if there is none or if the work has been stopped.
+    pub fn take(&self) -> Option<usize> {
+        (self.take)()
+    }
+
+    /// The result of an item that was taken.
+    pub fn give(&self, item: usize, result: T) {
+        (self.give)(item, result);
+    }
+
+    /// Whether the work has been stopped: then no result is wanted any more.
+    pub fn is_stopped(&self) -> bool {
+        (self.stopped)()
+    }
+}
+
+/// Lets `work` go through a queue of `0..count`, on each core, and returns the results in the order of the items: for those who
+/// work on several items at once. Others take [`each`].
 ///
-/// `on` gets the share that is done, 0..=1, after each item. If it breaks, no new item is begun and the answer is `None`.
+/// `on` gets the share that is done, 0..=1, after each item. If it breaks, the queue is stopped and the answer is `None`.
 #[cfg(all(feature = "threads", not(target_family = "wasm")))]
-pub fn each<T: Send>(
+pub fn workers<T: Send>(
     count: usize,
-    work: impl Fn(usize) -> T + Sync,
+    work: impl Fn(&Queue<'_, T>) + Sync,
     on: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Option<Vec<T>> {
     use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -27,16 +54,20 @@ pub fn each<T: Send>(
     let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
     let (sender, results) = mpsc::channel();
     let mut found: Vec<Option<T>> = (0..count).map(|_| None).collect();
+    let threads = cores().min(count);
     std::thread::scope(|scope| {
-        for _ in 0..cores().min(count) {
+        for _ in 0..threads {
             let (sender, next, stop, work) = (sender.clone(), &next, &stop, &work);
             scope.spawn(move || {
-                while !stop.load(Ordering::Relaxed) {
-                    let at = next.fetch_add(1, Ordering::Relaxed);
-                    if at >= count || sender.send((at, work(at))).is_err() {
-                        break;
-                    }
-                }
+                let stopped = || stop.load(Ordering::Relaxed);
+                let take = || {
+                    let at = if stopped() { count } else { next.fetch_add(1, Ordering::Relaxed) };
+                    (at < count).then_some(at)
+                };
+                // Nobody listens after a stop.
+                let give = |at: usize, result: T| drop(sender.send((at, result)));
+                let share = count.div_ceil(threads);
+                work(&Queue { share, take: &take, give: &give, stopped: &stopped });
             });
         }
         drop(sender);
@@ -52,21 +83,50 @@ pub fn each<T: Send>(
     found.into_iter().collect()
 }
 
+/// Lets `work` go through a queue of `0..count` and returns the results in the order of the items: for those who
+/// work on several items at once. Others take [`each`].
+///
+/// `on` gets the share that is done, 0..=1, after each item. If it breaks, the queue is stopped and the answer is `None`.
+#[cfg(not(all(feature = "threads", not(target_family = "wasm"))))]
+pub fn workers<T: Send>(
+    count: usize,
+    work: impl Fn(&Queue<'_, T>) + Sync,
+    on: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Option<Vec<T>> {
+    use std::cell::{Cell, RefCell};
+
+    let (next, done, stop) = (Cell::new(0), Cell::new(0), Cell::new(false));
+    let found: RefCell<Vec<Option<T>>> = RefCell::new((0..count).map(|_| None).collect());
+    let on = RefCell::new(on);
+    let take = || {
+        let at = next.replace(next.get() + 1);
+        (at < count && !stop.get()).then_some(at)
+    };
+    let give = |at: usize, result: T| {
+        found.borrow_mut()[at] = Some(result);
+        done.set(done.get() + 1);
+        if !stop.get() && (*on.borrow_mut())(done.get() as f64 / count as f64).is_break() {
+            stop.set(true);
+        }
+    };
+    work(&Queue { share: count, take: &take, give: &give, stopped: &|| stop.get() });
+    if stop.get() { None } else { found.into_inner().into_iter().collect() }
+}
+
 /// Calls `work` for each of `0..count` and returns the results in that order.
 ///
 /// `on` gets the share that is done, 0..=1, after each item. If it breaks, no new item is begun and the answer is `None`.
-#[cfg(not(all(feature = "threads", not(target_family = "wasm"))))]
 pub fn each<T: Send>(
     count: usize,
     work: impl Fn(usize) -> T + Sync,
     on: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Option<Vec<T>> {
-    (0..count)
-        .map(|at| {
-            let result = work(at);
-            on((at + 1) as f64 / count as f64).is_continue().then_some(result)
-        })
-        .collect()
+    let go_through = |queue: &Queue<'_, T>| {
+        while let Some(at) = queue.take() {
+            queue.give(at, work(at));
+        }
+    };
+    workers(count, go_through, on)
 }
 
 /// Calls `work` on each item with its own part of `out`.

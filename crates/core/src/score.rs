@@ -42,7 +42,7 @@ mod timeline;
 
 pub use breath::{breath_of_gamma, closing_kpa};
 pub use note_spans::NoteSpan;
-pub use play::{play, play_ensemble, play_ensemble_stereo, play_probed, play_stereo};
+pub use play::{play, play_beside, play_ensemble, play_ensemble_stereo, play_probed, play_stereo};
 pub use samples::samples_in;
 pub use stereo_blocks::StereoBlocks;
 pub use timeline::{Score, ScoreError};

@@ -344,11 +344,16 @@ impl<F: Real> Lattice<F> {
         }
     }
 
+    /// Whether the delay arrives before the end of so many samples: then it rests for the others. Real-time safe.
+    pub fn delay_arrives_within(&self, samples: usize) -> bool {
+        (1..samples).contains(&self.delay_left)
+    }
+
     /// Runs `samples` samples (a control tick) with `tip` at the reed end; holes that have arrived come to rest once a
     /// call. Real-time safe. [audio thread]
     pub fn run<T: Tip<F>>(&mut self, mut samples: usize, tip: &mut T) {
         // A delay that arrives on the way rests from there on.
-        while (1..samples).contains(&self.delay_left) {
+        while self.delay_arrives_within(samples) {
             samples -= self.delay_left;
             self.run_part(self.delay_left, tip);
         }

@@ -10,7 +10,7 @@
 //! A player who is silent and at rest sleeps: nothing of it is computed, and it stands still until a note, a slap or a
 //! breath wakes it. Those who are awake play side by side, see [`Choir`](super::voice::choir::Choir). Whether it sleeps is decided on a fixed grid of samples, never on the host's blocks.
 
-mod section;
+pub(super) mod section;
 
 use std::sync::Arc;
 

@@ -6,6 +6,8 @@ use crate::bore::sound_sources::SoundSources;
 use crate::instrument::lip::embouchure;
 use crate::instrument::listening::Listening;
 use crate::instrument::model::Model;
+#[cfg(feature = "fit")]
+use crate::instrument::side_by_side::{BlownBeside, Stand};
 use crate::instrument::voice::{Drive, TICK, Voice};
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
@@ -125,14 +127,19 @@ impl HeldNote {
     pub fn play(&self, model: &Model, seconds: f64, mut heard: impl FnMut(&[f32; TICK], &Voice<f32>)) {
         let mut voice: Voice<f32> = self.voice(model);
         let reed = self.reed(model);
-        let (rate, closing) = (model.coeffs.rate_hz, reed.closing_pressure());
-        let ticks = (seconds * rate / TICK as f64).round() as usize;
-        for tick in 0..ticks {
-            let (p_mouth, tongue) = self.breath((tick + 1) as f64 * TICK as f64 / rate);
-            let (p_mouth, tongue) = (p_mouth * closing, tongue * closing);
-            let out = *voice.tick(&Drive { p_mouth, tongue, noise: self.noise, reed });
+        let rate_hz = model.coeffs.rate_hz;
+        for tick in 0..ticks(seconds, rate_hz) {
+            let out = *voice.tick(&self.drive(&reed, tick, rate_hz));
             heard(&out, &voice);
         }
+    }
+
+    /// What breath and tongue do in a tick.
+    fn drive(&self, reed: &ReedCoeffs, tick: usize, rate_hz: f64) -> Drive {
+        let (p_mouth, tongue) = self.breath((tick + 1) as f64 * TICK as f64 / rate_hz);
+        let closing = reed.closing_pressure();
+        let (p_mouth, tongue) = (p_mouth * closing, tongue * closing);
+        Drive { p_mouth, tongue, noise: self.noise, reed: *reed }
     }
 
     /// The radiated pressure (Pa at 1 m) from `from_s` to `to_s`, at the internal rate. Allocates.
@@ -141,4 +148,30 @@ impl HeldNote {
         self.play(model, to_s, |out, _| all.extend(out.iter().map(|&x| f64::from(x))));
         all.split_off(((from_s * model.coeffs.rate_hz) as usize).min(all.len()))
     }
+
+    /// As [`radiated`](Self::radiated), beside other notes: the same bits.
+    #[cfg(feature = "fit")]
+    pub(super) async fn radiated_beside(
+        &self,
+        stand: &Stand,
+        model: &Model,
+        from_s: f64,
+        to_s: f64,
+    ) -> Vec<f64> {
+        let (reed, rate_hz) = (self.reed(model), model.coeffs.rate_hz);
+        let voice = BlownBeside::new(model, self.voice(model), self.drive(&reed, 0, rate_hz));
+        let begin = (from_s * rate_hz) as usize;
+        let mut all = Vec::with_capacity(((to_s - from_s) * rate_hz) as usize + 2 * TICK);
+        for tick in 0..ticks(to_s, rate_hz) {
+            voice.tick(stand, self.drive(&reed, tick, rate_hz)).await;
+            let skipped = begin.saturating_sub(tick * TICK).min(TICK);
+            voice.with(|voice| all.extend(voice.heard().0[skipped..].iter().map(|&x| f64::from(x))));
+        }
+        all
+    }
+}
+
+/// Ticks in so many seconds.
+fn ticks(seconds: f64, rate_hz: f64) -> usize {
+    (seconds * rate_hz / TICK as f64).round() as usize
 }

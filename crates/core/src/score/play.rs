@@ -4,6 +4,7 @@
 //! on the size of the blocks. The latency of the instrument is not removed.
 
 use crate::event::{Event, PartEvent, Timed};
+use crate::instrument::side_by_side::{PlayedBeside, Stand};
 use crate::instrument::{Channels, Clarinet, Ensemble, Probe};
 use crate::score::timeline::Score;
 
@@ -65,6 +66,35 @@ pub fn play_stereo<E>(
         render_probed(clarinet, events, begun, Channels::two(left, &mut right[..samples]), probe);
     };
     in_blocks(score, block, render, |left| each(left, &heard.borrow()[..left.len()]))
+}
+
+/// As [`play`] or, with `stereo`, as [`play_stereo`], beside others who play on other [`Stand`]s: the same bits, in less time. Without
+/// `stereo`, `each` gets the one channel twice.
+///
+/// # Errors
+///
+/// The first error that `each` returns; it ends the playing.
+pub async fn play_beside<E>(
+    stand: &Stand,
+    clarinet: &PlayedBeside,
+    score: &Score,
+    block: usize,
+    stereo: bool,
+    mut each: impl FnMut(&[f32], &[f32]) -> Result<(), E>,
+) -> Result<(), E> {
+    let [mut left, mut right] = [(); 2].map(|()| vec![0.0; block.max(1)]);
+    let mut events = score.events.as_slice();
+    let mut done = 0;
+    while done < score.samples {
+        let samples = left.len().min(score.samples - done);
+        let now = take_before(&mut events, done + samples);
+        let (left, right) = (&mut left[..samples], &mut right[..samples]);
+        let out = if stereo { Channels::two(left, right) } else { Channels::one(left) };
+        clarinet.render_events_channels(stand, from(now, done), out).await;
+        each(left, if stereo { right } else { left })?;
+        done += samples;
+    }
+    Ok(())
 }
 
 /// As [`play`], by several players.

@@ -279,7 +279,9 @@ impl<const N: usize> LatticeChoir<N> {
         let (glide, mut last) = (lattice.delay_glide, lattice.delay);
         (0..TICK).for_each(|_| last += glide);
         let whole = (lattice.delay + glide).whole();
-        self.crossing |= whole != last.whole();
+        // Below one row, which rounding reaches where a delay ends at one, the wave a row before is not the one read last: it is written
+        // after that reading.
+        self.crossing |= whole != last.whole() || whole == 0;
         self.whole[lane] = f32::from(whole);
         self.tuned[lane] = self.tuned_source.wrapping_sub(whole.wrapping_mul(STRIDE as u16));
         let before = self.base.wrapping_add(self.tuned[lane]) & self.mask;

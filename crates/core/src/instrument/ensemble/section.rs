@@ -14,9 +14,15 @@ use crate::instrument::voice::Drive;
 use crate::instrument::voice::choir::{Choir, Lanes};
 
 /// Lanes of a choir where the processor has vectors of eight numbers, and elsewhere.
-const WIDE: usize = 8;
+pub(in crate::instrument) const WIDE: usize = 8;
 /// See [`WIDE`].
-const NARROW: usize = 4;
+pub(in crate::instrument) const NARROW: usize = 4;
+
+/// Fewest voices for which a choir of so many lanes is less work than as many voices alone. Counted (`docs/performance.md`): four
+/// voices are as much work as a wide choir of four, and more than two as a narrow one.
+pub(in crate::instrument) const fn least(lanes: usize) -> usize {
+    lanes / 2 + 1
+}
 
 /// The choirs of an ensemble.
 pub(super) enum Section {
@@ -80,9 +86,6 @@ pub(super) struct Choirs<const N: usize> {
 }
 
 impl<const N: usize> Choirs<N> {
-    /// Fewest players for whom a choir is less work than as many voices alone. Counted (`docs/performance.md`): four voices are
-    /// as much work as a wide choir of four, and more than two as a narrow one.
-    const LEAST: usize = N / 2 + 1;
     /// What a tick of a choir costs over what a tick of a voice alone costs, counted in the same way.
     const CHOIR_COST: f64 = 0.5 * N as f64;
     /// What it costs over the same that a lane takes up or gives back its waves: some 600 numbers.
@@ -124,7 +127,7 @@ impl<const N: usize> Choirs<N> {
             self.leave(number, seat);
         }
         let awake = bits.count_ones() as usize;
-        let wanted = awake / N + usize::from(awake % N >= Self::LEAST);
+        let wanted = awake / N + usize::from(awake % N >= least(N));
         // The emptiest are given up.
         let mut members: [(usize, usize); MOST_PLAYERS] = [(0, 0); MOST_PLAYERS];
         let members = &mut members[..self.choirs.len()];

@@ -1,7 +1,8 @@
 //! Finds the trims of a [`TuningTable`] by playing: it holds every note, measures its pitch, and moves its delay until the
 //! pitch is right.
 //!
-//! The notes are independent, so the result does not depend on how many processor cores share them. A note that hardly ever
+//! The notes are independent: several are tried [side by side](crate::instrument::side_by_side), and the result does not depend on how many
+//! processor cores share them. A note that hardly ever
 //! sounds in its register gets the trims of its neighbours and is marked. What a player needs of a note is learnt
 //! afterwards, in [`play_dynamics`](super::play_dynamics). Units: cents above the wanted pitch, rows of
 //! round-trip delay, mouth pressure over the closing pressure (gamma).
@@ -11,8 +12,8 @@ use std::ops::ControlFlow;
 use crate::analysis::pitch;
 use crate::instrument::held_note::HeldNote;
 use crate::instrument::model::Model;
+use crate::instrument::side_by_side::{self, Stand};
 use crate::instrument::tuning_table::{GAMMA_NODES, NATURAL_GAMMA, NoteTuning, TuningTable};
-use crate::parallel;
 use crate::units::cents;
 
 /// A note with a larger error than this after trimming is reported as out of tune, cents.
@@ -61,12 +62,18 @@ fn listening_s(model: &Model, gamma: f64) -> (f64, f64) {
 /// Pitch of a held note, Hz, or `None` if it is not periodic or more than 150 cents from `wanted_hz`. Plays the note for
 /// about a second, longer on larger instruments. Allocates.
 pub fn heard_hz(model: &Model, note: &HeldNote, wanted_hz: f64) -> Option<f64> {
-    heard_within(model, note, wanted_hz, OTHER_NOTE_CENTS.0)
+    side_by_side::alone(async |stand| heard_within(stand, model, note, wanted_hz, OTHER_NOTE_CENTS.0).await)
 }
 
-fn heard_within(model: &Model, note: &HeldNote, wanted_hz: f64, own_cents: f64) -> Option<f64> {
+async fn heard_within(
+    stand: &Stand,
+    model: &Model,
+    note: &HeldNote,
+    wanted_hz: f64,
+    own_cents: f64,
+) -> Option<f64> {
     let (from_s, to_s) = listening_s(model, note.gamma);
-    let sound = note.radiated(model, from_s, to_s);
+    let sound = note.radiated_beside(stand, model, from_s, to_s).await;
     let hz = pitch::fundamental_hz(&sound, model.coeffs.rate_hz)?;
     (cents(hz, wanted_hz).abs() < own_cents && pitch::periodicity(&sound, model.coeffs.rate_hz, hz) > 0.9)
         .then_some(hz)
@@ -74,6 +81,7 @@ fn heard_within(model: &Model, note: &HeldNote, wanted_hz: f64, own_cents: f64) 
 
 /// One note at one mouth pressure.
 struct Trial<'a> {
+    stand: &'a Stand,
     model: &'a Model,
     fingering: usize,
     gamma: f64,
@@ -89,19 +97,20 @@ struct PlayedTrim {
 
 impl Trial<'_> {
     /// Plays the note with a trim of `rows`; `None` if another note or none sounds.
-    fn play(&self, rows: f64) -> Option<PlayedTrim> {
+    async fn play(&self, rows: f64) -> Option<PlayedTrim> {
         let wanted = self.model.notes_hz[self.fingering];
         // The modes are as the odd numbers; the limit is half-way to the next higher one.
         let mode = self.model.file.fingerings[self.fingering].mode as f64;
         let half_way = 600.0 * ((2.0 * mode + 1.0) / (2.0 * mode - 1.0)).log2();
         let note = HeldNote { rows, ..HeldNote::new(self.model, self.fingering, self.gamma) };
-        let hz = heard_within(self.model, &note, wanted, half_way.min(OTHER_NOTE_CENTS.1))?;
+        let own_cents = half_way.min(OTHER_NOTE_CENTS.1);
+        let hz = heard_within(self.stand, self.model, &note, wanted, own_cents).await?;
         Some(PlayedTrim { rows, off_cents: cents(hz, wanted) })
     }
 
     /// Secant steps from a trim that was played. `known` is the sensitivity if it was measured already; it comes back with
     /// the trim, measured if possible.
-    fn trim(&self, from: PlayedTrim, known: Option<f64>) -> (PlayedTrim, Option<f64>) {
+    async fn trim(&self, from: PlayedTrim, known: Option<f64>) -> (PlayedTrim, Option<f64>) {
         let (low, high) = self.model.coeffs.tuning_range();
         let estimate = |off_cents: f64| self.model.rows_for_cents(self.fingering, off_cents);
         let mut sensitivity = known.unwrap_or(1.0);
@@ -125,7 +134,7 @@ impl Trial<'_> {
                 break;
             }
             rows = wanted;
-            let Some(here) = self.play(rows) else {
+            let Some(here) = self.play(rows).await else {
                 // The step went too far and the note left its register: take half of it.
                 sensitivity *= 0.5;
                 before = best;
@@ -148,13 +157,13 @@ impl Trial<'_> {
 
     /// Rows per cent near a trim, over [`Model::rows_for_cents`]; measured by moving the note both ways, or the one way for
     /// which the delay has room.
-    fn sensitivity(&self, at: PlayedTrim) -> Option<f64> {
+    async fn sensitivity(&self, at: PlayedTrim) -> Option<f64> {
         let (low, high) = self.model.coeffs.tuning_range();
-        let moved = |cents: f64| {
+        let moved = async |cents: f64| {
             let rows = at.rows + self.model.rows_for_cents(self.fingering, cents);
-            (low..=high).contains(&rows).then(|| self.play(rows)).flatten()
+            if (low..=high).contains(&rows) { self.play(rows).await } else { None }
         };
-        let (down, up) = (moved(-PROBE_CENTS), moved(PROBE_CENTS));
+        let (down, up) = (moved(-PROBE_CENTS).await, moved(PROBE_CENTS).await);
         let (from, to) = (down.or(up.map(|_| at))?, up.unwrap_or(at));
         let estimate = |trim: PlayedTrim| self.model.rows_for_cents(self.fingering, trim.off_cents);
         Some(((to.rows - from.rows) / (estimate(to) - estimate(from))).clamp(0.5, 3.0))
@@ -163,31 +172,34 @@ impl Trial<'_> {
 
 /// The trims of one note. `untrimmed_cents` is its error without a trim at [`NATURAL_GAMMA`], `None` if it is silent
 /// there.
-fn tune_note(
+async fn tune_note(
+    stand: &Stand,
     model: &Model,
     fingering: usize,
     untrimmed_cents: Option<f64>,
     accuracy: Accuracy,
 ) -> NoteTuning {
-    let at = |gamma: f64| Trial { model, fingering, gamma, accuracy };
+    let at = |gamma: f64| Trial { stand, model, fingering, gamma, accuracy };
     let mut note = model.tuning.notes[fingering];
     let (natural, heard) = match untrimmed_cents {
         Some(off_cents) => {
-            let (found, heard) = at(NATURAL_GAMMA).trim(PlayedTrim { rows: 0.0, off_cents }, None);
-            let around = || at(NATURAL_GAMMA).sensitivity(found);
-            let heard = if accuracy.around { around().or(heard) } else { heard.or_else(around) };
+            let (found, heard) = at(NATURAL_GAMMA).trim(PlayedTrim { rows: 0.0, off_cents }, None).await;
+            let heard = match heard {
+                Some(heard) if !accuracy.around => Some(heard),
+                _ => at(NATURAL_GAMMA).sensitivity(found).await.or(heard),
+            };
             (Some(found), heard)
         }
         None => (None, None),
     };
     let mut guess = natural.map_or(0.0, |found| found.rows);
-    let nodes = GAMMA_NODES.map(|gamma| {
-        let found = at(gamma).play(guess).map(|found| at(gamma).trim(found, heard).0);
-        if let Some(found) = found {
-            guess = found.rows;
-        }
-        found
-    });
+    let mut nodes = [None; GAMMA_NODES.len()];
+    for (node, gamma) in nodes.iter_mut().zip(GAMMA_NODES) {
+        let Some(found) = at(gamma).play(guess).await else { continue };
+        let (found, _) = at(gamma).trim(found, heard).await;
+        guess = found.rows;
+        *node = Some(found);
+    }
     // A note that does not speak at the natural pressure is tuned at the first pressure where it does.
     let speaks = natural.iter().chain(nodes.iter().flatten()).count() >= FEWEST_PRESSURES;
     let first = natural.or_else(|| nodes.into_iter().flatten().next()).filter(|_| speaks);
@@ -209,13 +221,14 @@ fn tune_note(
 /// Error of each note without a trim at [`NATURAL_GAMMA`], cents above its pitch; `None` for a note that does not sound in
 /// its register. `on` receives the share done, 0..=1; if it breaks, the result is `None`.
 pub fn offsets(model: &Model, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Option<Vec<Option<f64>>> {
-    parallel::each(model.file.fingerings.len(), |fingering| untrimmed_cents(model, fingering), on)
+    let untrimmed = async |stand: &Stand, fingering: usize| untrimmed_cents(stand, model, fingering).await;
+    side_by_side::each_from_last(model.file.fingerings.len(), untrimmed, on)
 }
 
 /// Error of one note without a trim.
-fn untrimmed_cents(model: &Model, fingering: usize) -> Option<f64> {
-    let trial = Trial { model, fingering, gamma: NATURAL_GAMMA, accuracy: Accuracy::QUICK };
-    trial.play(0.0).map(|found| found.off_cents)
+async fn untrimmed_cents(stand: &Stand, model: &Model, fingering: usize) -> Option<f64> {
+    let trial = Trial { stand, model, fingering, gamma: NATURAL_GAMMA, accuracy: Accuracy::QUICK };
+    trial.play(0.0).await.map(|found| found.off_cents)
 }
 
 /// Tunes every fingering of a model by playing it, on all cores. `offsets` is the result of [`offsets`](fn@offsets). Takes
@@ -227,9 +240,11 @@ pub fn tune(
     on: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Option<TuningTable> {
     let count = model.file.fingerings.len();
-    let note =
-        |fingering: usize| tune_note(model, fingering, offsets.get(fingering).copied().flatten(), accuracy);
-    let mut table = TuningTable { notes: parallel::each(count, note, on)? };
+    let note = async |stand: &Stand, fingering: usize| {
+        let untrimmed_cents = offsets.get(fingering).copied().flatten();
+        tune_note(stand, model, fingering, untrimmed_cents, accuracy).await
+    };
+    let mut table = TuningTable { notes: side_by_side::each_from_last(count, note, on)? };
     fill_silent(model, &mut table);
     Some(table)
 }
@@ -245,11 +260,12 @@ pub fn tune_again(
     let mut table = model.tuning.clone();
     let fingerings: Vec<usize> =
         fingerings.iter().copied().filter(|&fingering| fingering < table.notes.len()).collect();
-    let tuned = |at: usize| {
+    let tuned = async |stand: &Stand, at: usize| {
         let fingering = fingerings[at];
-        tune_note(model, fingering, untrimmed_cents(model, fingering), accuracy)
+        let untrimmed_cents = untrimmed_cents(stand, model, fingering).await;
+        tune_note(stand, model, fingering, untrimmed_cents, accuracy).await
     };
-    let notes = parallel::each(fingerings.len(), tuned, on)?;
+    let notes = side_by_side::each_from_last(fingerings.len(), tuned, on)?;
     for (fingering, note) in fingerings.into_iter().zip(notes) {
         table.notes[fingering] = note;
     }

@@ -3,7 +3,8 @@
 //! The note begins at the loudest dynamic and goes down to the softest, one dynamic after another, with the lip of each. A
 //! controller moves the mouth pressure until the note is as much softer as the player's rule says; then pressure, amplitude
 //! and pitch are read, and the trim is corrected. So the note never has to begin near its threshold, where that takes seconds, and
-//! a soft note is found as a player finds it: on the way down. Results depend on the note alone.
+//! a soft note is found as a player finds it: on the way down. Results depend on the note alone, although several notes are played
+//! [side by side](crate::instrument::side_by_side).
 
 use std::ops::ControlFlow;
 
@@ -12,9 +13,9 @@ use crate::instrument::held_note::{HeldNote, TONGUE_HOLD_S};
 use crate::instrument::model::Model;
 use crate::instrument::played_note::PlayedNote;
 use crate::instrument::player::dynamics::{LOWEST_ONSET, NODE_DYNAMICS, NODES};
+use crate::instrument::side_by_side::{self, BlownBeside, Stand};
 use crate::instrument::tuning_table::{NoteTuning, TuningTable};
-use crate::instrument::voice::{Drive, TICK, Voice};
-use crate::parallel;
+use crate::instrument::voice::{Drive, TICK};
 use crate::reed::motion::TONGUE_FORCE;
 use crate::units::cents;
 
@@ -75,7 +76,8 @@ struct Heard {
 struct Diminuendo<'a> {
     model: &'a Model,
     fingering: usize,
-    voice: Voice<f32>,
+    stand: &'a Stand,
+    voice: BlownBeside,
     held: HeldNote,
     /// Dynamic of the lip.
     dynamic: f64,
@@ -106,14 +108,14 @@ pub fn learn_again(
 ) -> Option<TuningTable> {
     let mut notes = model.tuning.notes.clone();
     let fingerings: Vec<usize> = fingerings.iter().copied().filter(|&at| at < notes.len()).collect();
-    let learnt = |at: usize| {
+    let learnt = async |stand: &Stand, at: usize| {
         let (fingering, note) = (fingerings[at], model.tuning.notes[fingerings[at]]);
-        let learnt = if note.silent { None } else { learn_note(model, fingering) };
+        let learnt = if note.silent { None } else { learn_beside(stand, model, fingering).await };
         // What cannot be played gets the pressures of other notes.
         let unheard = || PlayedNote { rows: [note.natural; NODES], ..PlayedNote::default() };
         NoteTuning { played: learnt.unwrap_or_else(unheard), ..note }
     };
-    let learnt = parallel::each(fingerings.len(), learnt, on)?;
+    let learnt = side_by_side::each_from_last(fingerings.len(), learnt, on)?;
     for (&fingering, note) in fingerings.iter().zip(learnt) {
         notes[fingering] = note;
     }
@@ -124,19 +126,23 @@ pub fn learn_again(
 ///
 /// A note that is out of tune where it is loudest is played less loudly, down to 0.6 of the rule's pressure; then the best is taken.
 pub fn learn_note(model: &Model, fingering: usize) -> Option<PlayedNote> {
+    side_by_side::alone(async |stand| learn_beside(stand, model, fingering).await)
+}
+
+async fn learn_beside(stand: &Stand, model: &Model, fingering: usize) -> Option<PlayedNote> {
     let tuned = model.tuning.notes.get(fingering)?;
     let gamma = model.player.loudest_gamma(model.place(fingering));
+    // What is lost at the loudest dynamic is lost whatever the range.
+    let mut speaks = [true; LOUDEST.len()];
     for range in RANGES {
         let mut best: Option<(f64, PlayedNote)> = None;
-        for share in LOUDEST {
-            let Some((off_cents, note)) = descend(model, fingering, tuned, share * gamma, range) else {
-                continue;
-            };
-            if off_cents < IN_TUNE_CENTS {
-                return Some(note);
-            }
-            if best.is_none_or(|(least, _)| off_cents < least) {
-                best = Some((off_cents, note));
+        for (share, speaks) in LOUDEST.into_iter().zip(&mut speaks).filter(|(_, speaks)| **speaks) {
+            let most_cents = best.map_or(f64::INFINITY, |(least, _)| least);
+            match descend(stand, model, fingering, tuned, share * gamma, range, most_cents).await {
+                Ok((off_cents, note)) if off_cents < IN_TUNE_CENTS => return Some(note),
+                Ok(found) => best = Some(found),
+                Err(Lost::AtLoudest) => *speaks = false,
+                Err(Lost::Later) => {}
             }
         }
         if let Some((_, note)) = best {
@@ -146,16 +152,25 @@ pub fn learn_note(model: &Model, fingering: usize) -> Option<PlayedNote> {
     None
 }
 
+/// Where a diminuendo is given up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Lost {
+    AtLoudest,
+    Later,
+}
+
 /// Plays the diminuendo from a mouth pressure `gamma`, over a part of the rule's range of level. Gives the note and its largest error
-/// of pitch, cents; `None` if the note leaves its register.
-fn descend(
+/// of pitch, cents; gives up where the note leaves its register, or gets as far out of tune as `most_cents`.
+async fn descend(
+    stand: &Stand,
     model: &Model,
     fingering: usize,
     tuned: &NoteTuning,
     gamma: f64,
     range: f64,
-) -> Option<(f64, PlayedNote)> {
-    let mut note = Diminuendo::begin(model, fingering, tuned, gamma)?;
+    most_cents: f64,
+) -> Result<(f64, PlayedNote), Lost> {
+    let mut note = Diminuendo::begin(stand, model, fingering, tuned, gamma).await.ok_or(Lost::AtLoudest)?;
     let (mut gammas, mut amplitudes, mut rows) = ([0.0; NODES], [0.0; NODES], [0.0; NODES]);
     let (mut loudest, mut off_cents) = (None, 0.0_f64);
     for node in (0..NODES).rev() {
@@ -164,25 +179,40 @@ fn descend(
             note.wanted = Some(power * 10.0_f64.powf(0.1 * range * model.player.level_db(dynamic)));
             let softer = range * (note.dynamic - dynamic);
             let excess = SOFTER.powf(softer) * (note.held.gamma - LOWEST_ONSET).max(1e-3);
-            note.go_to(dynamic, LOWEST_ONSET + excess);
+            note.go_to(dynamic, LOWEST_ONSET + excess).await;
         }
-        let heard = note.settle(tuned.sensitivity)?;
+        let lost = if loudest.is_none() { Lost::AtLoudest } else { Lost::Later };
+        let heard = note.settle(tuned.sensitivity).await.ok_or(lost)?;
         loudest = loudest.or(Some(heard.power));
         off_cents = off_cents.max(heard.off_cents.abs());
+        if off_cents >= most_cents {
+            return Err(Lost::Later);
+        }
         (gammas[node], amplitudes[node], rows[node]) = (heard.gamma, heard.amplitude, note.held.rows);
     }
-    Some((off_cents, PlayedNote::new(gammas, amplitudes, rows)))
+    Ok((off_cents, PlayedNote::new(gammas, amplitudes, rows)))
 }
 
 impl<'a> Diminuendo<'a> {
     /// Tongues the note at dynamic 1; `None` if it does not speak.
-    fn begin(model: &'a Model, fingering: usize, tuned: &NoteTuning, gamma: f64) -> Option<Self> {
+    async fn begin(
+        stand: &'a Stand,
+        model: &'a Model,
+        fingering: usize,
+        tuned: &NoteTuning,
+        gamma: f64,
+    ) -> Option<Self> {
         let held = HeldNote { rows: tuned.natural, ..HeldNote::played(model, fingering, 1.0, gamma) };
         let longer = (LOWEST_HZ / model.lowest_hz).clamp(1.0, 4.0);
         let mut note = Self {
             model,
             fingering,
-            voice: held.voice(model),
+            stand,
+            voice: BlownBeside::new(
+                model,
+                held.voice(model),
+                Drive { p_mouth: 0.0, tongue: 0.0, noise: 0.0, reed: held.reed(model) },
+            ),
             held,
             dynamic: 1.0,
             tongue: 1.0,
@@ -190,15 +220,15 @@ impl<'a> Diminuendo<'a> {
             power: 0.0,
             longer,
         };
-        note.play(TONGUE_HOLD_S, |_, _, _| {});
+        note.play(TONGUE_HOLD_S, |_, _, _| {}).await;
         note.tongue = 0.0;
-        note.play(longer * BEGIN_S, |_, _, _| {});
-        note.listen().map(|_| note)
+        note.play(longer * BEGIN_S, |_, _, _| {}).await;
+        note.listen().await.map(|_| note)
     }
 
     /// Goes on for so long; calls `heard` after each tick with the radiated pressure, the pressure in the mouthpiece over the
     /// closing pressure, and the mouth over closing pressure.
-    fn play(&mut self, seconds: f64, mut heard: impl FnMut(&[f32; TICK], f64, f64)) {
+    async fn play(&mut self, seconds: f64, mut heard: impl FnMut(&[f32; TICK], f64, f64)) {
         let rate_hz = self.model.coeffs.rate_hz;
         let tick_s = TICK as f64 / rate_hz;
         let share = 1.0 - (-tick_s * self.model.notes_hz[self.fingering] / PERIODS).exp();
@@ -215,15 +245,16 @@ impl<'a> Diminuendo<'a> {
             }
             let gamma = self.held.gamma + push;
             let (p_mouth, tongue) = (gamma * closing, TONGUE_FORCE * self.tongue * closing);
-            let out = *self.voice.tick(&Drive { p_mouth, tongue, noise: 0.0, reed });
+            self.voice.tick(self.stand, Drive { p_mouth, tongue, noise: 0.0, reed }).await;
+            let (out, pressure) = self.voice.with(|voice| (*voice.heard().0, voice.p_mouthpiece() / closing));
             let power = out.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>() / TICK as f64;
             self.power += (power - self.power) * share;
-            heard(&out, self.voice.p_mouthpiece() / closing, gamma);
+            heard(&out, pressure, gamma);
         }
     }
 
     /// Moves to the lip of another dynamic, and to a mouth pressure from which the controller goes on.
-    fn go_to(&mut self, dynamic: f64, gamma: f64) {
+    async fn go_to(&mut self, dynamic: f64, gamma: f64) {
         let (from, from_gamma, steps) = (self.dynamic, self.held.gamma, 30);
         let wanted = self.wanted.take();
         for step in 1..=steps {
@@ -231,15 +262,15 @@ impl<'a> Diminuendo<'a> {
             let (dynamic, gamma) = (from + way * (dynamic - from), from_gamma + way * (gamma - from_gamma));
             let lip = HeldNote::played(self.model, self.fingering, dynamic, gamma);
             self.held = HeldNote { rows: self.held.rows, ..lip };
-            self.play(self.longer * CHANGE_S / f64::from(steps), |_, _, _| {});
+            self.play(self.longer * CHANGE_S / f64::from(steps), |_, _, _| {}).await;
         }
         (self.dynamic, self.wanted) = (dynamic, wanted);
-        self.play(self.longer * SETTLE_S, |_, _, _| {});
+        self.play(self.longer * SETTLE_S, |_, _, _| {}).await;
     }
 
     /// Listens until the note is in tune; `None` if it is another note or not as loud as it should be.
-    fn settle(&mut self, sensitivity: f64) -> Option<Heard> {
-        let mut heard = self.listen()?;
+    async fn settle(&mut self, sensitivity: f64) -> Option<Heard> {
+        let mut heard = self.listen().await?;
         for _ in 0..TRIMS {
             if heard.off_cents.abs() < CLOSE_CENTS {
                 break;
@@ -248,23 +279,24 @@ impl<'a> Diminuendo<'a> {
             let rows = sensitivity * self.model.rows_for_cents(self.fingering, heard.off_cents);
             self.held.rows = (self.held.rows - rows).clamp(low, high);
             let ticks = (0.05 * self.model.coeffs.rate_hz) as usize;
-            self.voice.lattice_mut().glide_delay(self.held.rows, ticks);
-            self.play(self.longer * TRIMMED_S, |_, _, _| {});
-            heard = self.listen()?;
+            self.voice.with(|voice| voice.lattice_mut().glide_delay(self.held.rows, ticks));
+            self.play(self.longer * TRIMMED_S, |_, _, _| {}).await;
+            heard = self.listen().await?;
         }
         let off_db = self.wanted.map_or(0.0, |wanted| 10.0 * (heard.power / wanted).log10());
         (off_db.abs() < FAR_DB).then_some(heard)
     }
 
     /// Hears the note as it is; `None` if it is another one.
-    fn listen(&mut self) -> Option<Heard> {
+    async fn listen(&mut self) -> Option<Heard> {
         let (mut sound, mut square, mut sum, mut ticks) = (Vec::new(), 0.0, 0.0, 0.0);
         self.play(self.longer * LISTEN_S, |out, pressure, gamma| {
             sound.extend(out.iter().map(|&x| f64::from(x)));
             square += pressure * pressure;
             sum += gamma;
             ticks += 1.0;
-        });
+        })
+        .await;
         let rate_hz = self.model.coeffs.rate_hz;
         let hz = pitch::fundamental_hz(&sound, rate_hz)?;
         let off_cents = cents(hz, self.model.notes_hz[self.fingering]);
@@ -301,6 +333,10 @@ mod tests {
         let model = Model::built_in(48_000.0).unwrap();
         // Far above its closing pressure a reed stays shut.
         let tuned = &model.tuning.notes[0];
-        assert!(descend(&model, 0, tuned, 3.0, 1.0).is_none());
+        let most_cents = f64::INFINITY;
+        let descent = side_by_side::alone(async |stand| {
+            descend(stand, &model, 0, tuned, 3.0, 1.0, most_cents).await.map(|(off_cents, _)| off_cents)
+        });
+        assert_eq!(descent, Err(Lost::AtLoudest));
     }
 }

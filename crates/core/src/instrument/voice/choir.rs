@@ -140,8 +140,8 @@ impl<const N: usize> Choir<N> {
 
     /// Whether a lane can play the next tick of a voice that has begun it. Real-time safe.
     pub fn can_play(voice: &mut Voice<f32>) -> bool {
-        // Pads push air into the holes sample by sample.
-        !voice.pads.attend(&voice.lattice)
+        // Pads push air into the holes sample by sample; and the lanes of a choir know a delay's glide for whole ticks.
+        !voice.pads.attend(&voice.lattice) && !voice.lattice.delay_arrives_within(TICK)
     }
 
     /// Plays a tick that all voices have begun and that lanes [can play](Self::can_play). Real-time safe. [audio thread]
