@@ -7,6 +7,7 @@
 //! - `cli` and `editor` use neither each other nor the plugin. The editor knows no host, no thread and no knob link.
 //! - `plugin` uses the editor, and puts it into the host's window.
 //! - `standalone` uses the plugin, and runs it without a host. The plugin does not use the standalone.
+//! - `tour` is what the listening pages of the command line and of the browser play.
 //! - `cache`, `controllers`, `folder_listing`, `instrument_path`, `output`, `picture_file`, `presets`, `scale_file`, `take_file` and `wav` read and write files for them;
 //!   `identity` has the names that hosts know the plugin by. They use none of the four.
 
@@ -31,5 +32,6 @@ pub mod scale_file;
 #[cfg(feature = "standalone")]
 pub mod standalone;
 pub mod take_file;
+pub mod tour;
 #[cfg(feature = "cli")]
 pub mod wav;

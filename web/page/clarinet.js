@@ -34,6 +34,7 @@ export class ClarinetDrawing {
     this.loudness = 0;
     this.breath = 0;
     this.fingering = -1;
+    this.chosen = null;
     this.touches = [];
     this.isDrawing = false;
     this.before = 0;
@@ -62,6 +63,27 @@ export class ClarinetDrawing {
   touch(touches) {
     this.touches = touches;
     this.wake();
+  }
+
+  /** The holes where they are now, and which one is chosen to be moved. */
+  setHoles(holes, chosen) {
+    if (!this.file) return;
+    this.file = { ...this.file, holes };
+    this.chosen = chosen;
+    this.wake();
+  }
+
+  /** Where a hole is drawn, pixels. */
+  place(hole) {
+    if (hole.kind === 'key') return [this.x(hole.x), this.axis - this.outside(hole.x) - 4];
+    return [this.x(hole.x), this.axis + (hole.name.includes('thumb') ? 0.8 * this.outside(hole.x) : 0)];
+  }
+
+  /** The hole nearest to a point, within so many pixels; null for none. */
+  holeAt(x, y, near) {
+    const far = this.file.holes.map((hole) => Math.hypot(...this.place(hole).map((at, n) => at - [x, y][n])));
+    const nearest = far.indexOf(Math.min(...far));
+    return far[nearest] <= near ? nearest : null;
   }
 
   wanted() {
@@ -248,7 +270,22 @@ export class ClarinetDrawing {
     // Pads before fingers: a finger lies on its ring.
     const order = this.file.holes.map((_, n) => n).sort((a, b) => Number(this.file.holes[a].kind === 'finger') - Number(this.file.holes[b].kind === 'finger'));
     for (const n of order) this.drawHole(g, this.file.holes[n], this.openings[n], this.loudness * flows[n]);
+    if (this.chosen !== null && this.chosen !== undefined) this.drawChosen(g, this.file.holes[this.chosen]);
     this.drawTouches(g);
+  }
+
+  drawChosen(g, hole) {
+    const [x, y] = this.place(hole);
+    this.ring(g, x, y, 17, 17, css(this.c.accent), 2.5);
+    g.beginPath();
+    for (const side of [-1, 1]) {
+      g.moveTo(x + 21 * side, y - 5);
+      g.lineTo(x + 27 * side, y);
+      g.lineTo(x + 21 * side, y + 5);
+    }
+    g.strokeStyle = css(this.c.accent);
+    g.lineWidth = 2.5;
+    g.stroke();
   }
 
   /** Flow through each open hole over the largest: the pressure drives the hole's air, whose mass over its area goes as one over the radius. */
@@ -314,20 +351,20 @@ export class ClarinetDrawing {
   }
 
   drawHole(g, hole, opening, flow) {
-    const { c, axis } = this;
+    const { c } = this;
     const half = clamp(Math.min(this.across, MOST_OF_HOLE * this.scale) * hole.r, 2.5, 0.42 * this.thickness);
     const air = mix(lit(c.ebony, 0.6), c.breath, 0.85 * flow);
     const x = this.x(hole.x);
     const edge = css(lit(c.metal, 0.6));
     if (hole.kind === 'key') {
-      const y = axis - this.outside(hole.x) - 4;
+      const [, y] = this.place(hole);
       if (flow > 0.02) this.glow(g, x, y + 4, half + 14 * flow, c.breath, 0.6 * flow);
       if (opening > 0.05) this.ellipse(g, x, y + 4, half, 2, css(air));
       this.plate(g, x, y - 0.7 * LIFT * opening, half + 3, 4.5, c.metal, edge);
       return;
     }
     // The thumb is behind: its hole looks round the lower edge.
-    const y = axis + (hole.name.includes('thumb') ? 0.8 * this.outside(hole.x) : 0);
+    const [, y] = this.place(hole);
     if (flow > 0.02) this.glow(g, x, y, half + 14 * flow, c.breath, 0.6 * flow);
     if (hole.kind === 'pad') {
       this.ellipse(g, x, y, half + 1, half + 1, css(air));

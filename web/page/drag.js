@@ -21,7 +21,7 @@ export class Drag {
   }
 
   down(event) {
-    if (this.notes.length === 0) return;
+    if (this.isOff || this.notes.length === 0) return;
     event.preventDefault();
     this.element.setPointerCapture(event.pointerId);
     const touch = this.read(event);

@@ -5,12 +5,15 @@ import { Control } from './controls.js';
 import { Drag } from './drag.js';
 import { Engine } from './engine.js';
 import { Hands } from './hands.js';
+import { Holes } from './holes.js';
 import { Keyboard } from './keyboard.js';
+import { KnobPanel } from './knob-panel.js';
 import { Meter } from './meter.js';
 import { Midi } from './midi.js';
 import { noteName } from './names.js';
 import { Presets } from './presets.js';
 import { Typing } from './typing.js';
+import { Workshop } from './workshop.js';
 
 /** Places in the worklet's picture. */
 const [KEY, SOUNDING, FINGERING, MOUTH, GAMMA, DYNAMIC, PEAK, LEVEL, ORIGIN] = Array.from({ length: 9 }, (_, n) => n);
@@ -21,10 +24,15 @@ const LEVEL_DB = 48;
 /** Time of silence after which the sound is switched off until the next gesture, s: a page at rest costs nothing. */
 const REST_S = 120;
 /** What breath comes from, by the picture's number. */
-const ORIGINS = ['', 'CC2', 'CC11', 'channel pressure', 'the note'];
+const ORIGINS = ['', 'CC2', 'CC11', 'channel pressure', 'the note', 'the knob'];
+const KNOB = ORIGINS.indexOf('the knob');
 const IDLE = 'Press a key, or drag across the clarinet. To blow, let the page hear your microphone.';
 
+/** What was said last stays for a while, ms. */
+const SAID_MS = 6000;
+
 const get = (id) => document.getElementById(id);
+let [values, heldHint, holding] = [[], '', 0];
 const data = await fetch('data.json').then((answer) => answer.json()).catch((error) => {
   fail(error);
   throw error;
@@ -41,11 +49,24 @@ const typing = new Typing(hands, breathe, (said) => {
   if (said.letters) keyboard.setLetters(said.letters);
   if (said.base) keyboard.show(said.base);
   if (said.start) begin();
-  if (said.silence) hands.silence();
+  if (said.silence) {
+    hands.silence();
+    knob.stop();
+  }
 });
-const controls = data.controls.map((of) => new Control(of, (place, value) => engine.send({ set: [place, value] })));
+const controls = data.controls.map((of) => new Control(of, (place, value) => {
+  values[place] = value;
+  engine.send({ set: [place, value] });
+  knob.update();
+}));
 get('controls').append(...controls.map((control) => control.element));
 new Presets(data.presets, choose);
+const workshop = new Workshop();
+const holes = new Holes(engine, workshop, drawing, drag, say, follow);
+const knob = new KnobPanel(engine, workshop, () => ({ ...holes.question(), values }), say, (plays) => {
+  hands.blow(plays || blowing, instrument.transposition);
+});
+values = [...data.defaults];
 let instrument = data.instruments[0];
 let isTouched = false;
 let blowing = false;
@@ -79,6 +100,10 @@ function fail(error) {
 
 function say(text = IDLE) {
   get('hint').textContent = text;
+  if (text === IDLE) return;
+  heldHint = text;
+  clearTimeout(holding);
+  holding = setTimeout(() => (heldHint = ''), SAID_MS);
 }
 
 /** Breath of hands on the screen or of arrow keys; null when they let go. The microphone's breath stays what it is. */
@@ -93,7 +118,7 @@ function setInstrument(at) {
   instrument = data.instruments[at];
   if (engine.instrument !== at) {
     engine.instrument = at;
-    engine.send({ instrument: at });
+    send(instrument);
   }
   get('instrument').value = at;
   const sounding = (fingering) => fingering.written - instrument.transposition;
@@ -104,20 +129,50 @@ function setInstrument(at) {
   typing.setRange(first, last);
   drag.notes = [...new Set(all)].sort((a, b) => a - b).filter((note) => !silent.has(note));
   drawing.setInstrument(instrument);
+  holes.setInstrument(instrument, instrument.own ?? { instrument: at });
+  knob.update();
+}
+
+/** An instrument of the page's, or one that has been opened. */
+function send({ own }) {
+  if (own) engine.send({ prepared: { file: new TextEncoder().encode(own.file), prepared: new TextEncoder().encode(own.prepared) } });
+  else engine.send({ instrument: engine.instrument });
+}
+
+/** What happens to the holes. */
+function follow(said) {
+  if (said.built) send(instrument);
+  if (said.moved) knob.update();
+  if (said.heard) dispatchEvent(new CustomEvent('moved', { detail: said.heard }));
+  if (said.opened) open(said.opened);
+}
+
+function open({ instrument: at, moved, name, file, prepared, drawn }) {
+  if (drawn) {
+    at = data.instruments.length;
+    data.instruments.push({ ...drawn, own: { file, prepared } });
+    get('instrument').append(new Option(drawn.name, at));
+  }
+  setInstrument(at);
+  if (moved?.length > 0) holes.change(moved);
+  else send(instrument);
+  say(`Opened: ${drawn?.name ?? name}`);
 }
 
 function choose(preset) {
   const at = preset.instrument;
   if (data.instruments[at] !== instrument) setInstrument(at);
-  const values = data.defaults.map((value, place) => preset.values[place] ?? value);
+  values = data.defaults.map((value, place) => preset.values[place] ?? value);
   engine.send({ values, wheel: preset.wheel, bend: preset.bend, breathFrom: preset.breathFrom });
   controls.forEach((control) => control.show(values[control.of.place]));
   meter.setPhysical(values[data.defaults.length - 11] === 1);
+  knob.update();
 }
 
 /** What the worklet tells. */
 function hear(message) {
   if (message.failed) fail(message.failed);
+  knob.hear(message);
   if ('blowing' in message) get('microphone').classList.toggle('blowing', message.blowing);
   if (message.picture) draw(message.picture, message.microphone);
   dispatchEvent(new CustomEvent('chalumeau', { detail: message }));
@@ -132,7 +187,7 @@ function draw(picture, room) {
   const note = picture[SOUNDING];
   const peak = 20 * Math.log10(picture[PEAK] * (engine.gain ?? 1) + 1e-9);
   get('level').style.transform = `translateY(${(100 * Math.min(1, Math.max(0, -peak / LEVEL_DB))).toFixed(1)}%)`;
-  if (sounds || blowing || hands.held.size > 0) lastHeard = performance.now();
+  if (sounds || blowing || knob.isConnected || hands.held.size > 0) lastHeard = performance.now();
   else if (performance.now() - lastHeard > 1000 * REST_S) engine.rest();
   const has = note >= 0 && (sounds || picture[KEY] >= 0);
   drawing.follow(has || sounds ? picture[FINGERING] : drawing.fingering, sounds ? level : -120, Math.min(1, picture[MOUTH] / 4));
@@ -143,6 +198,7 @@ function draw(picture, room) {
     get('sounding').textContent = instrument.transposition === 0 ? 'written and sounding' : `written · sounds ${noteName(note)}`;
   }
   get('written').style.opacity = sounds ? 1 : 0.45;
+  knob.follow(picture[ORIGIN] === KNOB);
   meter.follow(picture[DYNAMIC], picture[GAMMA], picture[MOUTH]);
   tellBreath(picture[ORIGIN], room);
 }
@@ -158,11 +214,15 @@ function tellBreath(origin, room) {
   } else if (room) {
     hint = 'Blow at the microphone. A key or a drag chooses the note.';
     text = 'Breath: microphone';
+  } else if (knob.plays) {
+    hint = 'Turn the knob to blow. A key or a drag chooses the note.';
   } else if (engine.isRunning && spoken) hint = '';
+  if (holes.isOpen && hint === IDLE) hint = '';
+  if (heldHint) hint = heldHint;
   if (hint !== IDLE) spoken = hint || spoken;
   if (hands.held.size > 0) spoken ||= ' ';
   meter.say(text);
-  if (!get('hint').classList.contains('failed') && get('hint').textContent !== hint) say(hint);
+  if (!get('hint').classList.contains('failed') && get('hint').textContent !== hint) get('hint').textContent = hint;
 }
 
 async function toggleMicrophone() {
@@ -170,7 +230,7 @@ async function toggleMicrophone() {
   if (blowing) {
     blowing = false;
     engine.closeMicrophone();
-    hands.blow(false, instrument.transposition);
+    hands.blow(knob.plays, instrument.transposition);
   } else {
     try {
       await engine.start();
@@ -206,5 +266,5 @@ navigator.permissions?.query({ name: 'midi' }).then(({ state }) => state === 'gr
 if ('serviceWorker' in navigator) navigator.serviceWorker.register('sw.js').catch(() => {});
 
 /** For tests. */
-globalThis.chalumeau = { engine, hands };
+globalThis.chalumeau = { engine, hands, holes, knob };
 engine.prepare().catch(fail);

@@ -2,6 +2,7 @@
 
 const NAME = 'chalumeau-VERSION';
 const FILES = [/* FILES */];
+const LATER = ['workshop.wasm'];
 
 addEventListener('install', (event) => {
   // From the server, not from the browser's own store, whose files may be of different versions.
@@ -16,8 +17,18 @@ addEventListener('activate', (event) => {
   );
 });
 
+/** What is large and not for everyone is kept once it has been wanted. */
+async function fetched(request) {
+  const answer = await fetch(request);
+  if (answer.ok && LATER.some((file) => new URL(request.url).pathname.endsWith(`/${file}`))) {
+    const copy = answer.clone();
+    caches.open(NAME).then((cache) => cache.put(request, copy)).catch(() => {});
+  }
+  return answer;
+}
+
 // One version at a time: what was kept goes together, and a new version comes whole.
 addEventListener('fetch', (event) => {
   if (event.request.method !== 'GET' || new URL(event.request.url).origin !== location.origin) return;
-  event.respondWith(caches.match(event.request, { cacheName: NAME, ignoreSearch: true }).then((kept) => kept ?? fetch(event.request)));
+  event.respondWith(caches.match(event.request, { cacheName: NAME, ignoreSearch: true }).then((kept) => kept ?? fetched(event.request)));
 });

@@ -2,13 +2,17 @@
 //
 // Messages in: { midi: [status, a, b] }, { breath: 0..1 or null }, { values: [..] }, { set: [place, value] },
 // { instrument: n }, { wheel: n }, { bend: semitones }, { breathFrom: n }, { silence: true },
-// { microphone: true or false, calibrate: seconds }, { score: messages } with the sample of each first, { times: true }.
-// Messages out: { picture: [..], microphone: .. } 30 times a second, { blowing: true or false }, { times: .. }, { failed: text }.
+// { microphone: true or false, calibrate: seconds }, { score: messages } with the sample of each first, { times: true },
+// { prepared: { file, prepared } } in UTF-8, { knob: [what, number] } and { knobBytes, at } as knob.js sends them.
+// Messages out: { picture: [..], microphone: .. } 30 times a second, { blowing: true or false }, { times: .. }, { failed: text },
+// { taken: true or false } of a prepared instrument, { knobSend: bytes }, { knobBaud: n }, { knobFarewell: bytes }, { knobStatus: bytes }.
 
 import { BlowMeter } from './blow.js';
 
 /** Time between two pictures, s. */
 const PICTURE_S = 1 / 30;
+/** Pictures between two statuses of the knob. */
+const STATUS_EVERY = 3;
 /** Blocks of which the times are kept: eleven seconds. */
 const TIMES = 4096;
 
@@ -16,7 +20,7 @@ const TIMES = 4096;
 const now = () => globalThis.performance?.now() ?? Date.now();
 
 class Chalumeau extends AudioWorkletProcessor {
-  constructor({ processorOptions: { module, instrument, score } }) {
+  constructor({ processorOptions: { module, instrument, score, prepared } }) {
     super();
     this.module = new WebAssembly.Instance(module, {}).exports;
     this.until = 0;
@@ -25,9 +29,12 @@ class Chalumeau extends AudioWorkletProcessor {
     this.listening = false;
     this.wasOpen = false;
     this.score = null;
+    this.hasKnob = false;
+    this.pictures = 0;
     this.guarded(() => {
       if (!this.module.chalumeau_begin(sampleRate, instrument)) throw new Error(`no instrument at ${sampleRate} Hz`);
     });
+    if (prepared) this.guarded(() => this.begin(prepared));
     if (score) this.guarded(() => this.take(score));
     this.port.onmessage = ({ data }) => this.guarded(() => this.take(data));
   }
@@ -60,6 +67,12 @@ class Chalumeau extends AudioWorkletProcessor {
       // It lies elsewhere now.
       this.views = null;
     }
+    if (message.prepared) this.begin(message.prepared);
+    if (message.knob) this.turn(...message.knob);
+    if (message.knobBytes && this.hasKnob) {
+      this.give(message.knobBytes);
+      module.chalumeau_knob_receive(message.at);
+    }
     if ('wheel' in message) module.chalumeau_wheel(message.wheel);
     if ('bend' in message) module.chalumeau_bend_range(message.bend);
     if ('breathFrom' in message) module.chalumeau_breath_from(message.breathFrom);
@@ -68,6 +81,56 @@ class Chalumeau extends AudioWorkletProcessor {
     if (message.calibrate) this.blow?.calibrate(message.calibrate);
     if (message.score) this.score = { messages: message.score, at: 0, next: 0 };
     if (message.times) this.tellTimes();
+  }
+
+  /** Writes bytes for the module's next call. */
+  give(...parts) {
+    const length = parts.reduce((sum, part) => sum + part.length, 0);
+    // It may grow, and then its memory lies elsewhere.
+    const place = this.module.chalumeau_inbox(length);
+    const inbox = new Uint8Array(this.module.memory.buffer, place, length);
+    parts.reduce((at, part) => (inbox.set(part, at), at + part.length), 0);
+  }
+
+  /** A copy of the bytes that the module has given. */
+  given(length) {
+    return Uint8Array.from(new Uint8Array(this.module.memory.buffer, this.module.chalumeau_outbox(), length));
+  }
+
+  /** An instrument that a worker has prepared. */
+  begin({ file, prepared }) {
+    this.give(file, prepared);
+    const taken = this.module.chalumeau_begin_prepared(sampleRate, file.length) === 1;
+    this.views = null;
+    this.port.postMessage({ taken });
+  }
+
+  turn(what, value) {
+    const module = this.module;
+    if (what === 'open') {
+      this.hasKnob = true;
+      this.port.postMessage({ knobFarewell: this.given(module.chalumeau_knob_open(value, Date.now())) });
+    } else if (what === 'close') {
+      this.hasKnob = false;
+      module.chalumeau_knob_close();
+    } else if (what === 'beat') module.chalumeau_knob_beat(Date.now());
+    else if (what === 'arm') module.chalumeau_knob_arm(value);
+    else if (what === 'lower') module.chalumeau_knob_lower(value);
+    else if (what === 'free') module.chalumeau_knob_let_go(value);
+    else if (what === 'zero') module.chalumeau_knob_zero();
+    else if (what === 'feel') {
+      this.give(value);
+      module.chalumeau_knob_feel();
+    }
+  }
+
+  /** The knob's session before a block. */
+  tend(frames) {
+    const length = this.module.chalumeau_knob_turn(Date.now(), frames);
+    const bytes = length > 0 ? this.given(length) : null;
+    const baud = this.module.chalumeau_knob_baud();
+    if (baud > 0) this.port.postMessage({ knobBaud: baud });
+    if (bytes) this.port.postMessage({ knobSend: bytes });
   }
 
   listen(on) {
@@ -97,6 +160,7 @@ class Chalumeau extends AudioWorkletProcessor {
   play(input, output) {
     this.hear(input);
     const frames = output[0].length;
+    if (this.hasKnob) this.tend(frames);
     let done = 0;
     while (done < frames) {
       const made = this.module.chalumeau_process(this.score ? this.scored(frames - done) : frames - done);
@@ -141,6 +205,10 @@ class Chalumeau extends AudioWorkletProcessor {
       ? { level: this.blow.level, floor: this.blow.floor, breath: this.blow.breath, calibrating: this.blow.isCalibrating }
       : null;
     this.port.postMessage({ picture: Array.from(picture), microphone: room });
+    this.pictures += 1;
+    if (this.hasKnob && this.pictures % STATUS_EVERY === 0) {
+      this.port.postMessage({ knobStatus: this.given(this.module.chalumeau_knob_status()) });
+    }
   }
 
   tellTimes() {

@@ -11,6 +11,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use chalumeau_core::bore::bundled::Bundled;
 
+use crate::held_knob::HeldKnob;
 use crate::playing::{MOST_FRAMES, Playing};
 
 /// A module in a worklet has one thread: the lock is never waited for.
@@ -113,6 +114,155 @@ pub extern "C" fn chalumeau_picture() -> *const f32 {
     locked().as_deref_mut().map_or(std::ptr::null(), |playing| playing.picture().as_ptr())
 }
 
+/// What the page writes for the next call that takes bytes, and what it reads after one that gives some.
+static INBOX: Mutex<Vec<u8>> = Mutex::new(Vec::new());
+static OUTBOX: Mutex<Vec<u8>> = Mutex::new(Vec::new());
+/// Most bytes of the inbox: an instrument with its preparation, and as much again.
+const MOST_BYTES: usize = 1 << 20;
+
+fn inbox() -> MutexGuard<'static, Vec<u8>> {
+    INBOX.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn outbox() -> MutexGuard<'static, Vec<u8>> {
+    OUTBOX.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Calls `give` with the knob and the outbox; returns how many bytes are in it then.
+fn given(give: impl FnOnce(&mut HeldKnob, &mut Vec<u8>)) -> u32 {
+    let mut out = outbox();
+    out.clear();
+    if let Some(knob) = locked().as_deref_mut().and_then(Playing::knob) {
+        give(knob, &mut out);
+    }
+    out.len() as u32
+}
+
+fn with_knob(change: impl FnOnce(&mut HeldKnob)) {
+    with(|playing| {
+        if let Some(knob) = playing.knob() {
+            change(knob);
+        }
+    });
+}
+
+/// Where so many bytes, a million at most, can be written for the next call that takes bytes. Allocates.
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_inbox(bytes: u32) -> *mut u8 {
+    let mut inbox = inbox();
+    inbox.resize((bytes as usize).min(MOST_BYTES), 0);
+    inbox.as_mut_ptr()
+}
+
+/// Where the bytes of the last call that gave some lie.
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_outbox() -> *const u8 {
+    outbox().as_ptr()
+}
+
+/// [`chalumeau_begin`] with a prepared instrument in the inbox: the text of its file, `file` bytes, and the rest its preparation. 1,
+/// or 0 if they are not what a workshop has made, and then nothing changes. Allocates.
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_begin_prepared(rate_hz: f64, file: u32) -> u32 {
+    let inbox = inbox();
+    let texts = std::str::from_utf8(&inbox).ok().and_then(|text| text.split_at_checked(file as usize));
+    let Some(mut made) = texts.and_then(|(file, prepared)| Playing::prepared(rate_hz, file, prepared)) else {
+        return 0;
+    };
+    let mut playing = locked();
+    if let Some(before) = playing.take() {
+        made.carry_on(*before);
+    }
+    *playing = Some(Box::new(made));
+    1
+}
+
+/// A port with a knob has been opened; `number` is random. Gives the bytes that the page may write at any time to end torque.
+/// Times are milliseconds of one clock. Allocates.
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_knob_open(number: u32, now_ms: f64) -> u32 {
+    with(|playing| playing.set_knob(Some(Box::new(HeldKnob::new(number, now_ms)))));
+    given(|knob, out| knob.farewell(number, out))
+}
+
+/// The port has been closed, or is gone.
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_knob_close() {
+    with(|playing| playing.set_knob(None));
+}
+
+/// The inbox came from the port at this time.
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_knob_receive(now_ms: f64) {
+    with_knob(|knob| knob.receive(now_ms, &inbox()));
+}
+
+/// Lets time pass before a block of samples. Gives the bytes to write.
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_knob_turn(now_ms: f64, frames: u32) -> u32 {
+    with(|playing| playing.turn_knob(now_ms, (frames as usize).min(MOST_FRAMES)));
+    given(HeldKnob::take_out)
+}
+
+/// See [`HeldKnob::take_baud`].
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_knob_baud() -> u32 {
+    locked().as_deref_mut().and_then(Playing::knob).map_or(0, HeldKnob::take_baud)
+}
+
+/// See [`HeldKnob::beat`].
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_knob_beat(now_ms: f64) {
+    with_knob(|knob| knob.beat(now_ms));
+}
+
+/// See [`HeldKnob::arm`].
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_knob_arm(ceiling_mnm: u32) {
+    with_knob(|knob| knob.arm(ceiling_mnm.min(u32::from(u16::MAX)) as u16));
+}
+
+/// See [`HeldKnob::lower_ceiling`].
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_knob_lower(ceiling_mnm: u32) {
+    with_knob(|knob| knob.lower_ceiling(ceiling_mnm.min(u32::from(u16::MAX)) as u16));
+}
+
+/// See [`HeldKnob::let_go`].
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_knob_let_go(reason: u32) {
+    with_knob(|knob| knob.let_go(reason as usize));
+}
+
+/// See [`HeldKnob::zero`].
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_knob_zero() {
+    with_knob(HeldKnob::zero);
+}
+
+/// The inbox is a feel, as a workshop has made it.
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_knob_feel() {
+    with(|playing| playing.set_feel(&inbox()));
+}
+
+/// Gives the text of [`HeldKnob::status`].
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_knob_status() -> u32 {
+    given(|knob, out| out.extend_from_slice(knob.status().as_bytes()))
+}
+
+/// The inbox is a question to the workshop; gives the answer. See [`crate::workshop`]. Takes up to minutes.
+#[cfg(feature = "workshop")]
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_workshop() -> u32 {
+    let question = inbox().clone();
+    let answer = crate::workshop::answer(&question);
+    let mut out = outbox();
+    *out = answer;
+    out.len() as u32
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -137,6 +287,23 @@ mod tests {
                 chalumeau_bend_range(a);
                 chalumeau_breath_from(a);
                 chalumeau_channel(a);
+                chalumeau_inbox(a);
+                let now_ms = 10.0 * f64::from(a % 1_000);
+                for byte in [0, a as u8, 255] {
+                    inbox().fill(byte);
+                    chalumeau_knob_receive(now_ms);
+                    chalumeau_knob_feel();
+                    assert_eq!(chalumeau_begin_prepared(48_000.0, a), 0);
+                }
+                chalumeau_knob_turn(now_ms, a);
+                chalumeau_knob_baud();
+                chalumeau_knob_arm(a);
+                chalumeau_knob_lower(a);
+                chalumeau_knob_let_go(a);
+                chalumeau_knob_beat(f64::NAN);
+                chalumeau_knob_zero();
+                chalumeau_knob_status();
+                chalumeau_outbox();
                 let frames = chalumeau_process(a);
                 assert!(frames <= chalumeau_most_frames() && frames <= a);
                 chalumeau_picture();
@@ -150,6 +317,9 @@ mod tests {
         }
         assert_eq!(chalumeau_begin(48_000.0, 99), 1);
         every_call();
+        assert!(chalumeau_knob_open(7, 0.0) > 0, "a farewell");
+        every_call();
+        chalumeau_knob_close();
         assert!(!chalumeau_picture().is_null() && chalumeau_process(128) == 128);
         let channel = |at| locked().as_deref().map(|playing| *playing.channel(at)).unwrap();
         assert!(channel(0).iter().chain(&channel(1)).all(|sample| sample.abs() <= 1.0));

@@ -13,6 +13,14 @@ use chalumeau_core::event::{Event, PartEvent, Timed};
 use chalumeau_core::instrument::stereo::Stereo;
 use chalumeau_core::instrument::{BuildError, Channels, Ensemble, Preparation, Settings, Wanted};
 
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::control::knob::{KnobDesign, slap_strength};
+use chalumeau_core::event::{Played, To};
+use chalumeau_core::instrument::Model;
+use chalumeau_core::instrument::prepare::PreparedInstrument;
+use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, BreathMapping};
+
+use crate::held_knob::HeldKnob;
 use crate::values;
 
 /// Most samples of one block: eight of an audio worklet's.
@@ -31,6 +39,13 @@ pub struct Playing {
     peak: f32,
     /// Sum of squares since the last picture, and of how many samples.
     energy: (f32, u32),
+    rate_hz: f64,
+    knob: Option<Box<HeldKnob>>,
+    blower: Blower,
+    /// How the knob's angles become breath, copied from its feel.
+    hand: BreathMapping,
+    /// The knob made the breath of the last block.
+    is_blown: bool,
 }
 
 /// Applies what a message became, in its order.
@@ -52,7 +67,20 @@ impl Playing {
         let wanted = Wanted::new(instrument.file(), rate_hz);
         let ready = Preparation::new(&wanted, None).ready()?;
         let model = ready.ok_or_else(|| BuildError::Data(format!("nothing for {rate_hz} Hz")))?;
-        Ok(Self {
+        Ok(Self::of(model, rate_hz))
+    }
+
+    /// The instrument of a file, as a worker of the page has prepared it; `None` if a text is damaged, or the two do not belong
+    /// together. Allocates.
+    pub fn prepared(rate_hz: f64, file: &str, prepared: &str) -> Option<Self> {
+        let file = InstrumentFile::parse(file).ok()?;
+        let wanted_hz = Wanted::new(file.clone(), rate_hz).internal_rate_hz().ok()?;
+        let model = PreparedInstrument::from_text(prepared)?.model(&file)?;
+        (model.cells.rate_hz == wanted_hz).then(|| Self::of(model, rate_hz))
+    }
+
+    fn of(model: Model, rate_hz: f64) -> Self {
+        Self {
             ensemble: Ensemble::new(Arc::new(model), rate_hz),
             parts: Parts::new(1),
             stereo: Stereo::new(rate_hz),
@@ -61,7 +89,12 @@ impl Playing {
             picture: [0.0; PICTURE],
             peak: 0.0,
             energy: (0.0, 0),
-        })
+            rate_hz,
+            knob: None,
+            blower: Blower::default(),
+            hand: BreathMapping { design: KnobDesign::default(), feels: true, ..BreathMapping::default() },
+            is_blown: false,
+        }
     }
 
     /// A MIDI channel message. Other messages are ignored; data bytes above 127 are read as 127.
@@ -78,11 +111,23 @@ impl Playing {
             }
             _ => &[],
         };
-        play(&mut self.ensemble, &mut self.stereo, said);
+        for &event in said {
+            if let Some(event) = event.of_first() {
+                self.blower.heed(&Timed { at: 0, event });
+            }
+            // While the knob blows, nothing else does.
+            if self.is_blown && matches!(event.event, Event::Breath(_) | Event::BreathFromKeys) {
+                continue;
+            }
+            play(&mut self.ensemble, &mut self.stereo, &[event]);
+        }
     }
 
     /// Breath of all players, 0..=1; `None`, or what is not a number, gives the breath back to the keys.
     pub fn breath(&mut self, unit: Option<f32>) {
+        if self.is_blown {
+            return;
+        }
         let event = match unit {
             Some(unit) if !unit.is_nan() => Event::Breath(unit.clamp(0.0, 1.0)),
             _ => Event::BreathFromKeys,
@@ -92,7 +137,34 @@ impl Playing {
 
     /// Ends everything that sounds, at once.
     pub fn silence(&mut self) {
+        self.blower.heed(&Timed { at: 0, event: Event::Panic });
         play(&mut self.ensemble, &mut self.stereo, self.parts.silence());
+    }
+
+    /// A serial port with a knob has been opened, or closed.
+    pub fn set_knob(&mut self, knob: Option<Box<HeldKnob>>) {
+        self.knob = knob;
+    }
+
+    /// The knob, if its port is open.
+    pub fn knob(&mut self) -> Option<&mut HeldKnob> {
+        self.knob.as_deref_mut()
+    }
+
+    /// Lets the knob's time pass before a block of so many samples.
+    pub fn turn_knob(&mut self, now_ms: f64, frames: usize) {
+        let (note, rate_hz) = (self.blower.fingered(), self.rate_hz);
+        if let Some(knob) = &mut self.knob {
+            knob.turn(now_ms, frames, rate_hz, note);
+        }
+    }
+
+    /// What the knob should feel like and what its angles blow, see [`HeldKnob::set_feel`].
+    pub fn set_feel(&mut self, bytes: &[u8]) {
+        if let Some(knob) = &mut self.knob {
+            knob.set_feel(bytes);
+            self.hand.maps = knob.played().maps;
+        }
     }
 
     /// Changes one of the [values]; [`settle`](Self::settle) brings it to the instrument.
@@ -131,6 +203,8 @@ impl Playing {
         self.settings = from.settings;
         self.settle();
         self.ensemble.carry_on(&from.ensemble);
+        (self.knob, self.blower, self.hand, self.is_blown) =
+            (from.knob, from.blower, from.hand, from.is_blown);
     }
 
     /// Makes the next samples, [`MOST_FRAMES`] at most; returns how many.
@@ -138,7 +212,38 @@ impl Playing {
         let frames = frames.min(MOST_FRAMES);
         let [left, right] = &mut self.channels;
         let (left, right) = (&mut left[..frames], &mut right[..frames]);
-        self.ensemble.render_channels(Channels::two(left, right));
+        let mut knob = self.knob.as_deref_mut().filter(|knob| knob.angle_deg(0).is_some());
+        if knob.is_none() && std::mem::take(&mut self.is_blown) {
+            // Breath that nobody holds any more goes back to the keys.
+            if self.blower.fall_silent().is_some() {
+                self.ensemble.apply(Event::Breath(0.0).into());
+            }
+            self.ensemble.apply(Event::BreathFromKeys.into());
+        }
+        match &mut knob {
+            Some(knob) => {
+                self.is_blown = true;
+                if let Some(speed) = knob.take_slap() {
+                    let event = Event::TongueSlap { strength: slap_strength(speed) };
+                    self.ensemble.apply(PartEvent { to: To::Player(0), event });
+                }
+                let full_pa = 1e3 * f64::from(self.settings.breath_full_kpa);
+                let (nobody, angle) = (std::iter::empty::<Timed<PartEvent>>(), |at| knob.angle_deg(at));
+                let mut unheard = |_, _| {};
+                let events = BlownEvents::new(
+                    nobody,
+                    &mut self.blower,
+                    &self.hand,
+                    full_pa,
+                    frames,
+                    angle,
+                    &mut unheard,
+                );
+                self.ensemble.render_events_channels(events, Channels::two(left, right));
+            }
+            None => self.ensemble.render_channels(Channels::two(left, right)),
+        }
+        self.blower.advance(frames);
         self.stereo.pan(left, right);
         for channel in [left, right] {
             for sample in channel {
@@ -157,7 +262,7 @@ impl Playing {
 
     /// What the page draws, -1 where there is none: held key and sounding note, index of the fingering, mouth pressure in kPa,
     /// the same over the closing pressure, dynamic 0..=1, peak and root mean square of the samples since the last picture, origin
-    /// of the breath (1 CC2, 2 CC11, 3 pressure, 4 a note), players awake, and how often the voice was reset.
+    /// of the breath (1 CC2, 2 CC11, 3 pressure, 4 a note, 5 the knob), players awake, and how often the voice was reset.
     pub fn picture(&mut self) -> &[f32; PICTURE] {
         let state = self.ensemble.first().player_state();
         let origin = match self.parts.breath_origin() {
@@ -167,6 +272,7 @@ impl Playing {
             Some(BreathOrigin::Controller(BreathController::Pressure)) => 3.0,
             Some(_) => 4.0,
         };
+        let origin = if self.is_blown { 5.0 } else { origin };
         let (energy, samples) = std::mem::take(&mut self.energy);
         let closing_kpa = (1e-3 * self.settings.under_lip(state.lip).closing_pa()) as f32;
         self.picture = [

@@ -1,7 +1,9 @@
 // The page in Chromium: node browser.mjs PAGE FOLDER. Pictures go to FOLDER.
 
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
+import { goldenFrames, serialPort, simulator, typesOf } from './knob.mjs';
 import { scores } from './module.mjs';
 import { launch, open, serve } from './page.mjs';
 import { QUIET_S, SENTENCES, blow, room, sequence, speech, writeWav } from './sounds.mjs';
@@ -9,6 +11,19 @@ import { QUIET_S, SENTENCES, blow, room, sequence, speech, writeWav } from './so
 const [folder, own] = process.argv.slice(2);
 /** Places in the worklet's picture. */
 const [KEY, SOUNDING, DYNAMIC, LEVEL] = [0, 1, 5, 7];
+/** `chalumeau` with the simulated knob. */
+const PROGRAM = process.env.CHALUMEAU ?? new URL('../../target/debug/chalumeau', import.meta.url).pathname;
+/** Types of frames (docs/protocol.md), and the session of the golden ones. */
+const [HELLO, ARM, FREE] = [0x01, 0x03, 0x05];
+const GOLDEN_SESSION = 0xdeadbeef;
+/** Longest time until a knob is free after a sign of life has stopped: 500 ms of patience, and as much for a busy machine, ms. */
+const FREE_MS = 1000;
+/** Without a graphics processor the pictures would hold the page up for longer than a knob waits. */
+const SLOW = 'globalThis.requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 250)';
+/** A page whose sound runs at the rate of the native code's pitches. */
+const AT_48_KHZ = `globalThis.AudioContext = class extends AudioContext {
+  constructor(options) { super({ ...options, sampleRate: 48000 }); }
+}`;
 /** A sound that is meant, and silence, of full scale. */
 const [HEARD, SILENT] = [0.01, 0.0005];
 const SIZES = { phone: [390, 844], tablet: [820, 1180], desktop: [1440, 900] };
@@ -36,7 +51,102 @@ const settled = async (page, place) => {
     before = now;
   }
 };
+/** Frequency of a steady tone within a semitone of another, Hz: the autocorrelation's peak some periods away. */
+function pitchHz(sound, near) {
+  const periods = 40;
+  const correlation = (lag) => {
+    let sum = 0;
+    for (let n = 0; n + lag < sound.length; n += 1) sum += sound[n] * sound[n + lag];
+    return sum / (sound.length - lag);
+  };
+  const middle = Math.round((periods * 48000) / near);
+  const half = Math.floor(middle / periods / 2) - 1;
+  const values = Array.from({ length: 2 * half + 1 }, (_, n) => correlation(middle - half + n));
+  const top = values.indexOf(Math.max(...values));
+  const [a, b, c] = [values[top - 1], values[top], values[top + 1]];
+  return (periods * 48000) / (middle - half + top + (a - c) / (2 * (a - 2 * b + c)));
+}
 const silence = (page) => until(page, LEVEL, 0, SILENT);
+
+/** Moves a hole by hand and by number, saves and opens it; with the fit, which takes its time, or without. */
+async function dragHole(browser, withFit) {
+  const golden = JSON.parse(readFileSync(new URL('moved_holes.json', import.meta.url)));
+  const [{ name, x_m }] = golden.moved;
+  const { page, context, errors } = await open(browser, server.address, { before: AT_48_KHZ, serviceWorkers: 'block' });
+  await page.evaluate(() => {
+    globalThis.heard = [];
+    addEventListener('moved', ({ detail }) => globalThis.heard.push(detail));
+  });
+  await page.click('#holes');
+  // By hand first: the hole follows the pointer.
+  const at = await page.evaluate((hole) => {
+    const box = document.getElementById('clarinet').getBoundingClientRect();
+    const { drawing, holes } = globalThis.chalumeau.holes;
+    const [x, y] = drawing.place(holes[hole]);
+    return [box.left + x, box.top + y, drawing.scale];
+  }, golden.hole);
+  await page.mouse.move(at[0], at[1]);
+  await page.mouse.down();
+  await page.mouse.move(at[0] - 0.003 * at[2], at[1], { steps: 4 });
+  await page.mouse.up();
+  assert.equal(await page.inputValue('#hole'), String(golden.hole));
+  const place = () => page.inputValue('#hole-place').then(Number);
+  const before = golden.built_mm;
+  assert.ok(Math.abs((await place()) - (before - 3)) < 0.6, `${await place()} mm, from ${before}`);
+  // Then exactly, by its number.
+  await page.fill('#hole-place', (1e3 * x_m).toFixed(1));
+  await page.press('#hole-place', 'Enter');
+  const heard = async (isFitted) => {
+    const found = await page.waitForFunction(
+      ([name, x, isFitted]) => {
+        const it = globalThis.chalumeau.holes.moved.find((hole) => hole.name === name);
+        return Math.abs(it.x_m - x) < 1e-6 && globalThis.heard.filter((heard) => heard.isFitted === isFitted && heard.file.includes(`x_mm = ${(1e3 * x).toFixed(1)}`)).at(-1);
+      },
+      [name, x_m, isFitted],
+      { timeout: 120000 },
+    );
+    return found.jsonValue();
+  };
+  const pitches = {};
+  const sounds = { at_once_hz: await heard(false) };
+  if (withFit) sounds.fitted_hz = await heard(true);
+  for (const [which, { file, prepared }] of Object.entries(sounds)) {
+    const sound = await page.evaluate(async ({ file, prepared, note }) => {
+      const offline = new OfflineAudioContext(2, 72000, 48000);
+      await offline.audioWorklet.addModule('worklet.js');
+      const module = await WebAssembly.compile(await (await fetch('chalumeau.wasm')).arrayBuffer());
+      const bytes = (text) => new TextEncoder().encode(text);
+      const node = new AudioWorkletNode(offline, 'chalumeau', {
+        outputChannelCount: [2],
+        processorOptions: { module, instrument: 0, prepared: { file: bytes(file), prepared: bytes(prepared) }, score: { score: [[0, 0x90, note, 100]] } },
+      });
+      node.connect(offline.destination);
+      return Array.from((await offline.startRendering()).getChannelData(0).slice(36000));
+    }, { file, prepared, note: golden.note });
+    pitches[which] = 1200 * Math.log2(pitchHz(sound, golden[which]) / golden[which]);
+    assert.ok(Math.abs(pitches[which]) < 1, `${which}: ${pitches[which]} cents from the native code`);
+  }
+  // It is what the page plays, too.
+  await page.click('#hole-done');
+  await page.keyboard.down('d');
+  await until(page, LEVEL, HEARD);
+  await page.keyboard.up('d');
+  await page.click('#holes');
+  const [download] = await Promise.all([page.waitForEvent('download'), page.click('#hole-save')]);
+  const saved = await download.path();
+  await page.click('#hole-back');
+  assert.equal(await place(), before);
+  await page.click('#hole-undo');
+  assert.ok(Math.abs((await place()) - 1e3 * x_m) < 0.06);
+  await page.click('#hole-back');
+  await page.setInputFiles('#hole-file', saved);
+  await page.waitForFunction(([name, x]) => globalThis.chalumeau.holes.moved.some((hole) => hole.name === name && Math.abs(hole.x_m - x) < 1e-6), [name, x_m]);
+  await page.setInputFiles('#hole-file', { name: 'none.toml', mimeType: 'text/plain', buffer: Buffer.from('bore = 3') });
+  await page.waitForFunction(() => /none.toml is not opened/.test(document.getElementById('hint').textContent));
+  assert.deepEqual(errors, []);
+  await context.close();
+  return `${Object.entries(pitches).map(([which, cents]) => `${which} ${cents.toFixed(2)} cents`).join(', ')}`;
+}
 
 /** The tests of one browser, each on a page of its own. */
 const TESTS = {
@@ -169,6 +279,82 @@ const TESTS = {
     await context.close();
   },
 
+  async 'a browser without Web Serial says who has it'(browser) {
+    const { page, context, errors } = await open(browser, server.address, { before: 'delete Navigator.prototype.serial', serviceWorkers: 'block' });
+    await page.click('#knob');
+    await page.waitForFunction(() => /Chrome.*Edge.*Firefox/.test(document.getElementById('hint').textContent));
+    assert.deepEqual(errors, []);
+    await context.close();
+  },
+
+  async 'the knob speaks golden frames, and a knob that armed itself is freed'(browser) {
+    const frames = goldenFrames();
+    const frame = (name) => frames.find((frame) => frame.name === name).bytes;
+    const { page, context, errors } = await open(browser, server.address, { before: serialPort(undefined, GOLDEN_SESSION), serviceWorkers: 'block' });
+    await page.click('#knob');
+    await page.waitForFunction(() => globalThis.serialPort.written.length > 0);
+    const written = () => page.evaluate(() => globalThis.serialPort.written);
+    assert.deepEqual((await written()).slice(0, frame('hello').length), frame('hello'), 'the first bytes');
+    const feed = (bytes) => page.evaluate((bytes) => globalThis.serialPort.feed(bytes), bytes);
+    const bad = frames.filter(({ verdict }) => verdict !== 'ok');
+    for (const { bytes } of bad) await feed(bytes);
+    // The line may be between two speeds.
+    const who = () => page.textContent('#knob-who');
+    for (let tries = 0; tries < 100 && !/TorqueTuner [0-9a-f]{16} .firmware 0.2.345.*WARNING/.test(await who()); tries += 1) {
+      await feed([...frame('info'), ...frame('state')]);
+      await page.waitForTimeout(100);
+    }
+    assert.match(await who(), /TorqueTuner [0-9a-f]{16} .firmware 0.2.345.*WARNING/);
+    const types = typesOf(await written());
+    assert.ok(types.includes(FREE) && !types.includes(ARM), `types ${types}`);
+    assert.equal(types[0], HELLO);
+    assert.deepEqual(errors, []);
+    await context.close();
+    return `${bad.length} bad frames did nothing`;
+  },
+
+  async 'the page plays the simulated knob, which stays limp'(browser) {
+    const knob = await simulator(PROGRAM, '--hold', '150');
+    const { page, context, errors } = await open(browser, server.address, { before: `${serialPort(knob.address)};${SLOW}`, serviceWorkers: 'block' });
+    const isFree = (state) => !state.armed && state.torque === 0;
+    try {
+      await page.click('#knob');
+      await page.waitForFunction(() => /TorqueTuner/.test(document.getElementById('knob-who').textContent), null, { timeout: 20000 });
+      await page.waitForFunction(() => globalThis.chalumeau.knob.plays);
+      // The angle is the breath: the note that the page fingers sounds.
+      await page.keyboard.down('d');
+      await until(page, LEVEL, HEARD, Infinity, 30000);
+      await until(page, SOUNDING, 64, 65);
+      await until(page, 8, 5, 6);
+      // A busy machine that also makes a sound answers the knob too late.
+      await page.keyboard.up('d');
+      await page.keyboard.press('Escape');
+      await silence(page);
+      // FEEL has arrived, and nothing but a click arms.
+      await page.evaluate(() => document.getElementById('knob-arm').click());
+      await page.waitForTimeout(300);
+      assert.ok(knob.states.length > 50 && knob.states.every(isFree), 'torque without an act of the user');
+      assert.deepEqual(errors, []);
+    } finally {
+      await context.close();
+      await knob.end();
+    }
+  },
+
+  async 'a knob that is unplugged is said to be'(browser) {
+    const { page, context, errors } = await open(browser, server.address, { before: serialPort(), serviceWorkers: 'block' });
+    await page.click('#knob');
+    await page.waitForFunction(() => globalThis.serialPort.written.length > 0);
+    assert.equal(await page.isVisible('#knob-panel'), true);
+    await page.evaluate(() => globalThis.serialPort.unplug());
+    await page.waitForFunction(() => document.getElementById('hint').textContent.includes('unplugged'));
+    assert.equal(await page.isVisible('#knob-panel'), false);
+    assert.deepEqual(errors, []);
+    await context.close();
+  },
+
+  'a dragged hole is heard as the native code plays it, and goes back': (browser) => dragHole(browser, false),
+
   async 'every preset plays'(browser) {
     const { page, context, errors } = await open(browser, server.address, { serviceWorkers: 'block' });
     await page.keyboard.press('Escape');
@@ -193,6 +379,37 @@ const TESTS = {
     assert.deepEqual(errors, []);
     await context.close();
     return `${count} presets`;
+  },
+
+  async 'the listening page plays what the module makes'(browser) {
+    const { page, context, errors } = await open(browser, `${server.address}listen.html`, { other: true, serviceWorkers: 'block' });
+    await page.waitForFunction(() => globalThis.listen);
+    const cards = page.locator('.stop-card');
+    assert.ok((await cards.count()) > 20);
+    const began = Date.now();
+    await cards.first().click();
+    await page.waitForFunction(() => globalThis.listen.playing());
+    const took = Date.now() - began;
+    await page.screenshot({ path: join(own, 'listen.png') });
+    await cards.nth(1).click();
+    await page.waitForFunction((before) => globalThis.listen.playing() && globalThis.listen.playing() !== before, await cards.first().locator('b').textContent());
+    await cards.nth(1).click();
+    assert.equal(await page.evaluate(() => globalThis.listen.playing()), undefined);
+    // pp is softer than ff by what the page says, and the church rings on.
+    const levels = await page.evaluate(async () => {
+      const { tour, made } = globalThis.listen;
+      const stops = tour.chapters.flatMap(({ stops }) => stops);
+      const find = (title) => stops.find((stop) => stop.title === title);
+      const db = (samples) => 10 * Math.log10(samples.reduce((sum, x) => sum + x * x, 1e-12) / samples.length);
+      const sounds = await Promise.all(['Scale, pp', 'Scale, ff', 'A church', 'Dry'].map((title) => made(find(title))));
+      const [pp, ff] = sounds.map((sound) => db(sound.getChannelData(0)));
+      const [church, dry] = sounds.slice(2).map((sound) => db(sound.getChannelData(1).slice(-12000)));
+      return { pp, ff, church, dry };
+    });
+    assert.ok(levels.ff - levels.pp > 15 && levels.church > levels.dry + 20, JSON.stringify(levels));
+    assert.deepEqual(errors, []);
+    await context.close();
+    return `first sound after ${took} ms`;
   },
 
   async 'controls work without a mouse'(browser) {
@@ -267,6 +484,69 @@ const TESTS = {
   },
 };
 
+/** Run only by their names: real time, or minutes of work, on a machine that does nothing else. */
+const TIMED = {
+  'timed: a hole is heard fitted, as the native code plays it': (browser) => dragHole(browser, true),
+
+  async 'timed: a simulated knob is armed by a click and let go'(browser) {
+    const knob = await simulator(PROGRAM, '--hold', '150');
+    const { page, context, errors } = await open(browser, server.address, { before: `${serialPort(knob.address)};${SLOW}`, serviceWorkers: 'block' });
+    const who = () => page.textContent('#knob-who');
+    const isFree = (state) => !state.armed && state.torque === 0;
+    try {
+      await page.click('#knob');
+      await page.waitForFunction(() => /TorqueTuner/.test(document.getElementById('knob-who').textContent), null, { timeout: 20000 });
+      await until(page, 8, 5, 6);
+      const arm = async () => {
+        // On a busy machine a permission may come too late, or the knob may miss some; a player would press again.
+        for (let tries = 0; tries < 20; tries += 1) {
+          await page.click('#knob-arm', { timeout: 3000 }).catch(() => {});
+          if ((await knob.until((state) => state.armed && state.torque > 5, performance.now(), 1500)) < Infinity) return;
+        }
+        assert.fail(`the knob does not arm: ${await who()}`);
+      };
+      const times = [];
+      const lets = async (name, act, told) => {
+        await arm();
+        const began = performance.now();
+        await act();
+        const took = await knob.until(isFree, began);
+        assert.ok(took < FREE_MS, `${name}: ${took} ms`);
+        if (told) await page.waitForFunction((told) => document.getElementById('knob-who').textContent.includes(told), told);
+        const after = performance.now();
+        await page.waitForTimeout(250);
+        assert.ok(knob.states.filter(({ at }) => at > after).every(isFree), `${name}: it stays free`);
+        times.push(`${name} ${took.toFixed(0)}`);
+      };
+      const button = await page.locator('#knob-stop').boundingBox();
+      await lets('Stop', () => page.mouse.click(button.x + 20, button.y + 20), 'stop was pressed');
+      await lets('Escape', () => page.keyboard.press('Escape'), 'stop was pressed');
+      const hide = (hidden) => page.evaluate((hidden) => {
+        Object.defineProperty(document, 'hidden', { value: hidden, configurable: true });
+        document.dispatchEvent(new Event('visibilitychange'));
+      }, hidden);
+      await lets('hidden', () => hide(true), 'the page was hidden');
+      await hide(false);
+      await lets('no heartbeat', () => page.evaluate(() => clearInterval(globalThis.chalumeau.knob.knob.beating)), 'the page has stood still');
+      await page.evaluate(() => {
+        const { knob } = globalThis.chalumeau.knob;
+        knob.beating = setInterval(() => knob.beat(), 100);
+      });
+      await lets('page hangs', () => page.evaluate(() => void setTimeout(() => {
+        for (const until = performance.now() + 900; performance.now() < until; );
+      }, 0)));
+      await lets('sound stops', () => page.evaluate(() => globalThis.chalumeau.engine.context.suspend()));
+      await page.evaluate(() => globalThis.chalumeau.engine.context.resume());
+      await lets('reload', () => page.evaluate(() => location.assign('about:blank')).catch(() => {}));
+      assert.deepEqual(errors, []);
+      return `ms until no torque: ${times.join(', ')}`;
+    } finally {
+      await context.close();
+      await knob.end();
+    }
+  },
+};
+
 /** Levels while the microphone hears a file, in parts of its time, s. */
 async function microphone(samples, parts) {
   const path = join(own, 'microphone.wav');
@@ -319,6 +599,7 @@ async function run(tests, ...args) {
 
 const browser = await launch(own);
 await run(TESTS, browser);
+if (wanted.startsWith('timed')) await run(TIMED, browser);
 await browser.close();
 await run(MICROPHONE);
 server.close();

@@ -32,19 +32,21 @@ export async function launch(folder, sound) {
 
 /** Opens the page; its errors end the test. */
 export async function open(browser, address, options = {}) {
-  const context = await browser.newContext({ permissions: ['microphone'], ...options });
+  const { before, early, other, ...browserOptions } = options;
+  const context = await browser.newContext({ permissions: ['microphone'], ...browserOptions });
   const page = await context.newPage();
   const errors = [];
   page.on('pageerror', (error) => errors.push(String(error)));
   page.on('console', (message) => message.type() === 'error' && errors.push(message.text()));
-  if (options.before) await page.addInitScript(options.before);
+  if (before) await page.addInitScript(before);
   await page.addInitScript(() => {
     globalThis.told = [];
     addEventListener('chalumeau', ({ detail }) => detail.picture && globalThis.told.push({ at: performance.now(), ...detail }));
   });
   await page.goto(address);
+  if (other) return { page, context, errors };
   // From here on it takes keys; the module may still be on its way.
   await page.waitForFunction(() => globalThis.chalumeau);
-  if (!options.early) await page.waitForFunction(() => globalThis.chalumeau.engine.node);
+  if (!early) await page.waitForFunction(() => globalThis.chalumeau.engine.node);
   return { page, context, errors };
 }

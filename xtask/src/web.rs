@@ -1,6 +1,6 @@
 //! The clarinet as a web page: a static folder, `target/web`, that works from any host and below any path.
 //!
-//! - `toolchain`: builds the WebAssembly module, with the target's library from wherever it can be had
+//! - `toolchain`: builds the WebAssembly modules, with the target's library from wherever it can be had
 //! - `data`: instruments, presets and controls for the page, from the same tables as the plugin's
 //! - `serve`: a server for this machine
 //! - `browser`: the tests in a browser
@@ -42,7 +42,6 @@ pub fn run(args: &[String]) -> Result<()> {
 
 /// Makes the folder anew.
 pub fn build() -> Result<PathBuf> {
-    let module = toolchain::build()?;
     let folder = machine::target().join("web");
     if folder.exists() {
         fs::remove_dir_all(&folder).with_context(|| format!("cannot empty {}", folder.display()))?;
@@ -55,9 +54,10 @@ pub fn build() -> Result<PathBuf> {
         copy(&path, &folder.join(&name))?;
         names.push(name);
     }
-    copy(&module, &folder.join("chalumeau.wasm"))?;
+    names.extend(toolchain::build(&folder)?);
     fs::write(folder.join("data.json"), data::text()?)?;
-    names.extend(["chalumeau.wasm", "data.json"].map(str::to_owned));
+    fs::write(folder.join("tour.json"), data::tour()?)?;
+    names.extend(["data.json", "tour.json"].map(str::to_owned));
     names.retain(|name| name != "sw.js");
     names.sort();
     seal(&folder, &names)?;

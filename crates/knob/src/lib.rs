@@ -33,14 +33,8 @@
 //!
 //! - [`wire`]: the protocol TTLink 1, bytes to messages and back. Needs no port, clock or thread.
 //! - [`touch`]: the angle becomes breath, note by note; takes (recordings of the knob) and the plan of a study.
-#![cfg_attr(
-    feature = "devices",
-    doc = "- [`device`]: links to knobs over serial, MIDI and OSC. [`device::KnobLink`] is the entry point."
-)]
-#![cfg_attr(
-    not(feature = "devices"),
-    doc = "- `device` (feature `devices`): links to knobs over serial, MIDI and OSC."
-)]
+//! - [`device`]: the host's side of a session, without port, thread or clock; with the feature `devices`, links to knobs over
+//!   serial, MIDI and OSC, for which `device::KnobLink` is the entry point.
 #![cfg_attr(
     feature = "simulator",
     doc = "- [`simulator`]: a simulated knob that runs the real firmware, with a simulated hand."
@@ -58,7 +52,6 @@
 //!
 //! No feature is on by default. Not yet tested on hardware; `docs/touch.md` says what was tested in the simulator.
 
-#[cfg(feature = "devices")]
 pub mod device;
 #[cfg(feature = "simulator")]
 pub mod simulator;

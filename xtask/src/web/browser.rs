@@ -7,6 +7,7 @@ use anyhow::{Result, ensure};
 
 use super::build;
 use crate::machine::{self, Package};
+use crate::programs::programs;
 
 /// Drives the browser. Pinned: a new one may expect another Chromium.
 const PLAYWRIGHT: &str = "playwright-core@1.65.1";
@@ -49,7 +50,9 @@ pub fn test() -> Result<()> {
     for name in TESTS {
         let script = machine::root().join("web/tests").join(name);
         ensure!(script.exists(), "{} is missing", script.display());
-        machine::run(Command::new("node").arg(script).arg(&page).arg(&folder))?;
+        let mut node = Command::new("node");
+        node.arg(script).arg(&page).arg(&folder).env("CHALUMEAU", &programs()?.program);
+        machine::run(&mut node)?;
     }
     Ok(())
 }

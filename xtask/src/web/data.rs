@@ -7,23 +7,23 @@
 use anyhow::{Context, Result};
 use chalumeau::parameters::{self, Kind, Sets};
 use chalumeau::presets::{Preset, factory};
+use chalumeau::tour;
 use chalumeau_core::bore::bundled::Bundled;
-use chalumeau_core::bore::instrument_file::HoleKind;
-use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::control::midi::breath::BreathFrom;
 use chalumeau_core::control::midi::techniques::Wheel;
+use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
 use chalumeau_core::instrument::{Preparation, Settings, Wanted};
-use chalumeau_core::units::Air;
+use chalumeau_web::drawn::drawn;
 use chalumeau_web::values;
 use serde_json::{Value, json};
 
+/// Rate at which the listening page plays, Hz.
+const LISTEN_HZ: u32 = 48_000;
 /// The parameters that have a control on the page.
 const CONTROLS: [&str; 9] = ["lip", "stren", "tongue", "lay", "noise", "vib", "growl", "subt", "room"];
 /// Presets with these tags are for devices that the page does not play.
 const NOT_HERE: [&str; 2] = ["knob", "MPE"];
-/// Places of a standing wave on its way from the reed to the bell.
-const PLACES: usize = 64;
 
 /// All of it.
 pub fn text() -> Result<String> {
@@ -44,84 +44,58 @@ pub fn text() -> Result<String> {
     Ok(all.to_string())
 }
 
-/// To a tenth of a millimetre.
-fn metres(length_m: f64) -> f64 {
-    (length_m * 1e4).round() / 1e4
+/// The sounds of the listening page: the [tour](chalumeau::tour), as the module's values and messages.
+pub fn tour() -> Result<String> {
+    let wanted = Wanted::new(Bundled::BFlat.file(), f64::from(LISTEN_HZ));
+    let model = Preparation::new(&wanted, None).ready()?.context("the clarinet is not prepared")?;
+    let chapters: Vec<_> = tour::chapters(&model, Settings::default(), LISTEN_HZ)
+        .into_iter()
+        .map(|(title, stops)| {
+            let stops: Vec<_> = stops.iter().map(heard).collect::<Result<_>>()?;
+            Ok(json!({ "title": title, "stops": stops }))
+        })
+        .collect::<Result<_>>()?;
+    Ok(json!({ "rate": LISTEN_HZ, "chapters": chapters }).to_string())
+}
+
+fn heard(stop: &tour::Stop) -> Result<Value> {
+    let events = stop.score.events.iter().map(|&Timed { at, event }| {
+        Ok(match event {
+            Event::Breath(unit) => json!([at, "breath", unit]),
+            Event::NoteOn { note, velocity } => json!([at, 0x90, note.0, (127.0 * velocity).round()]),
+            Event::NoteOff { note } => json!([at, 0x80, note.0, 0]),
+            Event::Set(number, value) => {
+                let place = values::NUMBERS.iter().position(|&other| other == number);
+                json!([at, "set", place.context("a setting is not among the module's values")?, value])
+            }
+            other => anyhow::bail!("the page cannot play {other:?}"),
+        })
+    });
+    let settings = changes(&stop.settings).into_iter().map(|(place, value)| json!([0, "set", place, value]));
+    let messages = settings.map(Ok).chain(events).collect::<Result<Vec<_>>>()?;
+    Ok(
+        json!({ "title": stop.title, "words": stop.words, "samples": stop.score.samples, "messages": messages }),
+    )
+}
+
+/// The values that differ from the defaults, by their places.
+fn changes(settings: &Settings) -> Vec<(usize, f32)> {
+    let (own, default) = (values::list(settings), values::list(&Settings::default()));
+    (0..values::COUNT).filter(|&at| own[at] != default[at]).map(|at| (at, own[at])).collect()
 }
 
 fn instrument(of: Bundled) -> Result<Value> {
     let file = of.file();
     let model = Preparation::new(&Wanted::new(file.clone(), 48_000.0), None).ready()?;
     let model = model.with_context(|| format!("{} is not prepared", of.id()))?;
-    let bore = TransferMatrix::new(&file, Air::default());
-    let bores: Vec<_> = file
-        .bore
-        .iter()
-        .map(|s| json!([s.part, metres(s.x_start_m), metres(s.x_end_m), s.r_start_m, s.r_end_m]))
-        .collect();
-    let holes: Vec<_> = file
-        .holes
-        .iter()
-        .map(|hole| {
-            let kind = match hole.kind {
-                HoleKind::Finger => "finger",
-                HoleKind::PadOpen => "pad",
-                HoleKind::KeyClosed => "key",
-            };
-            json!({
-                "name": hole.name, "kind": kind, "x": metres(hole.x_m), "r": hole.radius_m, "chimney": hole.chimney_m,
-            })
-        })
-        .collect();
-    let fingerings: Vec<_> = file
-        .fingerings
-        .iter()
-        .enumerate()
-        .map(|(at, fingering)| {
-            let wave = bore.standing_pressure(model.notes_hz[at], &fingering.open);
-            let open: String =
-                fingering.open.iter().map(|&is_open| if is_open { '1' } else { '0' }).collect();
-            json!({
-                "written": fingering.written.0,
-                "speaks": model.speaks(at),
-                "open": open,
-                "wave": resampled(&wave, file.length_m()),
-            })
-        })
-        .collect();
-    Ok(json!({
-        "id": of.id(),
-        "name": file.name.split(',').next(),
-        "transposition": file.transposition,
-        "length": file.length_m(),
-        "radius": file.nominal_radius_m,
-        "bore": bores,
-        "holes": holes,
-        "fingerings": fingerings,
-    }))
-}
-
-/// A wave at equal steps along the bore, as two hexadecimal digits each; ff is its largest value.
-fn resampled(wave: &[(f64, f64)], length_m: f64) -> String {
-    let most = wave.iter().map(|&(_, magnitude)| magnitude).fold(1e-9, f64::max);
-    let at = |x_m: f64| {
-        let above = wave.partition_point(|&(place_m, _)| place_m < x_m).clamp(1, wave.len() - 1);
-        let ((x0, p0), (x1, p1)) = (wave[above - 1], wave[above]);
-        let share = if x1 > x0 { ((x_m - x0) / (x1 - x0)).clamp(0.0, 1.0) } else { 0.0 };
-        p0 + share * (p1 - p0)
-    };
-    (0..PLACES)
-        .map(|place| length_m * place as f64 / (PLACES - 1) as f64)
-        .map(|x_m| format!("{:02x}", (255.0 * at(x_m) / most).round() as u8))
-        .collect()
+    let mut drawn = drawn(&file, &model);
+    drawn["id"] = json!(of.id());
+    Ok(drawn)
 }
 
 fn preset(preset: &Preset) -> Value {
-    let (own, default) = (values::list(&preset.settings()), values::list(&Settings::default()));
-    let changes: serde_json::Map<_, _> = (0..values::COUNT)
-        .filter(|&at| own[at] != default[at])
-        .map(|at| (at.to_string(), json!(own[at])))
-        .collect();
+    let changes = changes(&preset.settings()).into_iter().map(|(at, value)| (at.to_string(), json!(value)));
+    let changes: serde_json::Map<_, _> = changes.collect();
     let place = |found: Option<usize>| found.unwrap_or_default();
     json!({
         "name": preset.name,
@@ -158,6 +132,7 @@ fn control(id: &str) -> Result<Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use chalumeau_web::drawn::PLACES;
 
     #[test]
     fn the_page_gets_every_instrument_and_most_presets() {
@@ -179,8 +154,10 @@ mod tests {
     }
 
     #[test]
-    fn a_wave_keeps_its_shape() {
-        assert_eq!(&resampled(&[(0.0, 1.0), (1.0, 0.0)], 1.0)[..4], "fffb");
-        assert!(resampled(&[(0.0, 2.0), (0.5, 2.0), (0.5, 1.0), (1.0, 1.0)], 1.0).ends_with("8080"));
+    fn the_page_can_play_the_whole_tour() {
+        let all: Value = serde_json::from_str(&tour().unwrap()).unwrap();
+        let chapters = all["chapters"].as_array().unwrap();
+        let stops: usize = chapters.iter().map(|chapter| chapter["stops"].as_array().unwrap().len()).sum();
+        assert!(chapters.len() == 5 && stops > 20, "{stops}");
     }
 }

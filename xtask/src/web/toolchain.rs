@@ -1,4 +1,4 @@
-//! Builds the WebAssembly module. The target's library comes from the installed compiler, from rustup, or, where neither has
+//! Builds the WebAssembly modules. The target's library comes from the installed compiler, from rustup, or, where neither has
 //! it, from a folder with Debian's sid, `target/web-toolchain`, which is made once.
 //!
 //! Debian's packages of the compiler carry the library for the target, and its lld is the linker. The folder is entered with
@@ -32,15 +32,30 @@ const DEBOOTSTRAP: Package = Package {
     purpose: "a compiler for WebAssembly",
 };
 
-/// Builds the module and returns where it is.
-pub fn build() -> Result<PathBuf> {
+/// The modules: their names in the page, and the features that each is built with.
+const MODULES: [(&str, &[&str]); 2] =
+    [("workshop.wasm", &["--features", "workshop"]), ("chalumeau.wasm", &[])];
+
+/// Builds the modules into `page` and returns their names.
+pub fn build(page: &Path) -> Result<Vec<String>> {
+    let mut names = Vec::new();
+    for (name, features) in MODULES {
+        let built = build_module(features)?;
+        fs::copy(&built, page.join(name))
+            .with_context(|| format!("cannot copy {} to {}", built.display(), page.display()))?;
+        names.push(name.to_owned());
+    }
+    Ok(names)
+}
+
+fn build_module(features: &[&str]) -> Result<PathBuf> {
     let folder = machine::target().join("web-build");
     if has_target() {
         let mut cargo = machine::cargo();
-        cargo.args(BUILD).arg(TARGET).env("RUSTFLAGS", FLAGS).env("CARGO_TARGET_DIR", &folder);
+        cargo.args(BUILD).arg(TARGET).args(features).env("RUSTFLAGS", FLAGS).env("CARGO_TARGET_DIR", &folder);
         machine::run(&mut cargo)?;
     } else {
-        in_debian(&folder)?;
+        in_debian(&folder, features)?;
     }
     Ok(folder.join(TARGET).join("release/chalumeau_web.wasm"))
 }
@@ -54,7 +69,7 @@ fn has_target() -> bool {
     installed() || (machine::works("rustup", &["target", "add", TARGET]) && installed())
 }
 
-fn in_debian(target: &Path) -> Result<()> {
+fn in_debian(target: &Path, features: &[&str]) -> Result<()> {
     let root = machine::target().join("web-toolchain");
     make(&root)?;
     let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
@@ -87,7 +102,8 @@ fn in_debian(target: &Path) -> Result<()> {
         .arg(format!("CARGO_TARGET_DIR={}", inner_target.display()))
         .args(["cargo", BUILD[0], "--manifest-path", &format!("{SOURCE}/Cargo.toml")])
         .args(&BUILD[1..])
-        .arg(TARGET);
+        .arg(TARGET)
+        .args(features);
     machine::run(&mut command)
 }
 

@@ -16,13 +16,18 @@ pub struct AngleMap {
 impl AngleMap {
     /// A map through rest and three landmarks `(angle, pressure)`. A landmark that does not lie above the one before it is
     /// moved just above it, so that the map keeps an inverse.
-    pub(super) fn new(landmarks: [(f64, f64); KNOTS - 1]) -> Self {
+    pub fn new(landmarks: [(f64, f64); KNOTS - 1]) -> Self {
         let (mut angle_deg, mut pressure_pa) = ([0.0; KNOTS], [0.0; KNOTS]);
         for (at, (angle, pressure)) in landmarks.into_iter().enumerate() {
             angle_deg[at + 1] = angle.max(angle_deg[at] + 1e-3);
             pressure_pa[at + 1] = pressure.max(pressure_pa[at] + 1e-3);
         }
         Self { angle_deg, pressure_pa }
+    }
+
+    /// Its three landmarks, (angle in degrees, pressure in Pa): onset, closure, extinction.
+    pub fn landmarks(&self) -> [(f64, f64); KNOTS - 1] {
+        std::array::from_fn(|at| (self.angle_deg[at + 1], self.pressure_pa[at + 1]))
     }
 
     /// Mouth pressure at an angle from rest, Pa; 0 at and below rest, and for NaN. Real-time safe.

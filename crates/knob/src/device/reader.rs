@@ -1,68 +1,19 @@
-//! The knob as the audio thread sees it: breath at a steady delay, whatever the link and the host's callbacks do.
-//!
-//! The link places each sample at the host time at which the knob measured it. The audio thread has a clock of its own,
-//! the count of samples it has rendered; a second [`ClockFit`] maps it to host time, so that callbacks that come late or
-//! in bursts do not shake the breath. Between the two stands a constant delay: one block, because the end of a block is
-//! asked for before it has happened; one period of the knob's samples; and a margin for the link's jitter. Every sample
-//! asked for then lies between two that have arrived, as a rule.
+//! The knob as the audio thread sees it: its [`Poses`] behind a ring, which the link fills.
 //!
 //! All of [`KnobReader`] is real-time safe: no lock, no allocation, no system call (`Instant::now` reads the clock the
 //! kernel maps into the process).
 
-use crate::device::clock::ClockFit;
+use crate::device::pose::Poses;
 use rtrb::{Consumer, Producer, RingBuffer};
 use std::time::Instant;
+
+pub use crate::device::pose::{Pose, Sample};
 
 /// Samples under way from link to audio: a second at 1 kHz; the reader drains them each block.
 const RING: usize = 1024;
 
 /// Slaps under way; a hand makes fewer than ten a second.
 const SLAPS: usize = 16;
-
-/// Samples kept for interpolation: half a second at 500 Hz, above the delay at any block size below 0.4 s.
-const KEPT: usize = 256;
-
-/// On top of a block and a period, us. By judgement: the p99 of the jitter of a USB serial line with 1 ms frames.
-const MARGIN_US: i64 = 1_500;
-
-/// How long a knob that has fallen silent still counts as there, us. The firmware's own watchdog takes 80 + 50 ms.
-const STALE_US: i64 = 150_000;
-
-/// How far a late link is bridged by going on at the last velocity, us. At 2 rad/s that is half a degree too far at most.
-const EXTRAPOLATE_US: i64 = 10_000;
-
-/// Callbacks later than this for longer than [`AUDIO_PATIENCE_US`] mean that the host skipped samples, us.
-const AUDIO_SLACK_US: i64 = 5_000;
-
-/// See [`AUDIO_SLACK_US`]; by judgement longer than one burst of callbacks, shorter than a phrase.
-const AUDIO_PATIENCE_US: i64 = 300_000;
-
-/// A pause between callbacks after which the audio timeline begins anew, us.
-const AUDIO_PAUSE_US: i64 = 500_000;
-
-/// Where the knob was, on the host's clock.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Sample {
-    /// Host time of the measurement, us since the link's epoch.
-    pub host_us: i64,
-    /// Degrees since zero, positive is blowing.
-    pub angle_deg: f32,
-    /// Degrees per second.
-    pub velocity_deg_s: f32,
-    /// `wire::Flags` as sent; 0 from unmodified firmware.
-    pub flags: u16,
-    /// Time until the next sample as a rule, us.
-    pub period_us: u32,
-}
-
-/// Where the knob is at one sample of sound.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Pose {
-    /// Degrees since zero, positive is blowing.
-    pub angle_deg: f32,
-    /// Degrees per second.
-    pub velocity_deg_s: f32,
-}
 
 /// The link's end of the ring.
 pub struct KnobWriter {
@@ -87,41 +38,14 @@ pub struct KnobReader {
     samples: Consumer<Sample>,
     slaps: Consumer<f32>,
     epoch: Instant,
-    /// Ring of the latest samples; `newest` is where the last one stands.
-    kept: [Sample; KEPT],
-    newest: usize,
-    used: usize,
-    timeline: ClockFit,
-    rate_hz: f64,
-    /// Samples rendered since the timeline began, in microseconds.
-    rendered_us: f64,
-    last_call_us: i64,
-    /// Host time at which this block was due, on the audio thread's own timeline.
-    due_us: i64,
-    /// Host time that the first sample of this block stands for.
-    block_us: i64,
-    is_live: bool,
+    poses: Poses,
 }
 
 /// Both ends; host times count from `epoch`. Allocates.
 pub fn ring(epoch: Instant) -> (KnobWriter, KnobReader) {
     let (sample_in, samples) = RingBuffer::new(RING);
     let (slap_in, slaps) = RingBuffer::new(SLAPS);
-    let reader = KnobReader {
-        samples,
-        slaps,
-        epoch,
-        kept: [Sample::default(); KEPT],
-        newest: 0,
-        used: 0,
-        timeline: ClockFit::new(AUDIO_SLACK_US, AUDIO_PATIENCE_US),
-        rate_hz: 0.0,
-        rendered_us: 0.0,
-        last_call_us: i64::MIN,
-        due_us: 0,
-        block_us: 0,
-        is_live: false,
-    };
+    let reader = KnobReader { samples, slaps, epoch, poses: Poses::default() };
     (KnobWriter { samples: sample_in, slaps: slap_in }, reader)
 }
 
@@ -134,37 +58,21 @@ impl KnobReader {
 
     /// [`begin_block`](Self::begin_block) at a given host time, us since the epoch.
     pub fn begin_block_at(&mut self, now_us: i64, block_samples: usize, rate_hz: f64) {
-        self.drain();
-        let block = block_samples as f64 / rate_hz * 1e6;
-        if rate_hz != self.rate_hz || now_us.saturating_sub(self.last_call_us) > AUDIO_PAUSE_US + block as i64
-        {
-            self.timeline.reset();
-            self.rate_hz = rate_hz;
+        while let Ok(sample) = self.samples.pop() {
+            self.poses.take(sample);
         }
-        self.last_call_us = now_us;
-        let start_us = self.rendered_us;
-        self.timeline.observe(start_us as i64, now_us);
-        self.rendered_us += block;
-        let newest = self.kept[self.newest];
-        self.is_live = self.used > 0 && now_us - newest.host_us <= STALE_US;
-        let delay_us = block as i64 + i64::from(newest.period_us) + MARGIN_US;
-        self.due_us = self.timeline.local_us(start_us as i64);
-        self.block_us = self.due_us - delay_us;
+        self.poses.begin_block_at(now_us, block_samples, rate_hz);
     }
 
-    /// Host time at which the present block was due, us since the link's epoch, however late the host called: the clock of the
-    /// knob's states for what is heard.
+    /// Host time at which the present block was due, on the audio thread's own timeline: us since the link's epoch, however late
+    /// the host called.
     pub fn due_us(&self) -> i64 {
-        self.due_us
+        self.poses.due_us()
     }
 
     /// Where the knob was, at the constant delay, for sample `offset` of the block; `None` with no live knob.
     pub fn pose(&self, offset: usize) -> Option<Pose> {
-        if !self.is_live {
-            return None;
-        }
-        let at_us = self.block_us + (offset as f64 / self.rate_hz * 1e6) as i64;
-        Some(self.pose_at(at_us))
+        self.poses.pose(offset)
     }
 
     /// Peak speed of a slap that has not been taken yet, rad/s.
@@ -174,57 +82,7 @@ impl KnobReader {
 
     /// The latest sample as it came, for a state that has no use for the delay.
     pub fn latest(&self) -> Option<Sample> {
-        self.is_live.then(|| self.kept[self.newest])
-    }
-
-    fn drain(&mut self) {
-        while let Ok(sample) = self.samples.pop() {
-            let newest = self.kept[self.newest];
-            if self.used > 0 {
-                let step_us = sample.host_us - newest.host_us;
-                if !(-STALE_US..=STALE_US).contains(&step_us) {
-                    self.used = 0; // another knob, or the same after a while: nothing to interpolate from
-                } else if step_us <= 0 {
-                    continue; // the clock fit moved by less than a period
-                }
-            }
-            self.newest = (self.newest + 1) % KEPT;
-            self.kept[self.newest] = sample;
-            self.used = (self.used + 1).min(KEPT);
-        }
-    }
-
-    /// The newest is 0.
-    fn sample(&self, age: usize) -> Sample {
-        self.kept[(self.newest + KEPT - age) % KEPT]
-    }
-
-    /// Requires `used > 0`.
-    fn pose_at(&self, at_us: i64) -> Pose {
-        let newest = self.sample(0);
-        if at_us >= newest.host_us {
-            let ahead_s = (at_us - newest.host_us).min(EXTRAPOLATE_US) as f32 * 1e-6;
-            return Pose {
-                angle_deg: newest.angle_deg + newest.velocity_deg_s * ahead_s,
-                velocity_deg_s: newest.velocity_deg_s,
-            };
-        }
-        let mut after = newest;
-        for age in 1..self.used {
-            let before = self.sample(age);
-            if before.host_us <= at_us {
-                let span_us = (after.host_us - before.host_us) as f32;
-                let part = (at_us - before.host_us) as f32 / span_us;
-                let mix = |a: f32, b: f32| a + part * (b - a);
-                return Pose {
-                    angle_deg: mix(before.angle_deg, after.angle_deg),
-                    velocity_deg_s: mix(before.velocity_deg_s, after.velocity_deg_s),
-                };
-            }
-            after = before;
-        }
-        // Older than all that is kept: the knob has only just come.
-        Pose { angle_deg: after.angle_deg, velocity_deg_s: after.velocity_deg_s }
+        self.poses.latest()
     }
 }
 

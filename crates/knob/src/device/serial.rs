@@ -4,18 +4,12 @@
 //! other: both are raised on opening, DTR first, and on closing RTS falls first. A pseudo-terminal has no such lines, and
 //! no speed; what it says about them is ignored.
 
-use crate::device::transport::{Binding, Transport};
+use crate::device::transport::{BAUD, Binding, Transport};
 use serialport::{ErrorKind, SerialPort};
 use std::io;
 use std::io::{Read, Write};
 use std::path::Path;
 use std::time::Duration;
-
-/// Speed of TTLink.
-pub const BAUD: u32 = 921_600;
-
-/// Speed for lines that do not carry the first, and of unmodified firmware.
-pub const SLOW_BAUD: u32 = 115_200;
 
 /// Bytes of one read; a millisecond at full speed is 92.
 const READ: usize = 1024;

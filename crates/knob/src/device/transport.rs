@@ -6,6 +6,12 @@
 use std::io;
 use std::time::Duration;
 
+/// Speed of a serial line.
+pub const BAUD: u32 = 921_600;
+
+/// Speed for lines that do not carry the first, and of unmodified firmware.
+pub const SLOW_BAUD: u32 = 115_200;
+
 /// How messages travel over a transport.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Binding {

@@ -10,6 +10,8 @@ use chalumeau_core::instrument::{BreathResponse, BuildError, Model, Settings};
 use chalumeau_core::units::SoundingNote;
 use std::sync::{Arc, LazyLock};
 
+use crate::wire::{Decoder, Feel, Message, encode};
+
 /// MIDI pitches.
 const PITCHES: usize = 128;
 
@@ -89,6 +91,16 @@ impl InstrumentFeel {
         }
     }
 
+    /// Feel and maps by sounding pitch, for a player of these settings. Allocates.
+    pub fn played(&self, table: &FeelTable, settings: &Settings) -> PlayedFeel {
+        let of = |index: u8| table.note(usize::from(index)).map(|note| note.feel);
+        PlayedFeel {
+            maps: self.maps_for(table, settings),
+            feels: self.fingerings.iter().map(|fingering| fingering.and_then(of)).collect(),
+            reference: table.reference().feel,
+        }
+    }
+
     /// The same table by sounding pitch: the mouth pressure that each angle asks for.
     pub fn maps(&self, table: &FeelTable) -> PitchMaps {
         let of = |index: u8| table.note(usize::from(index)).map(|note| note.map);
@@ -96,6 +108,69 @@ impl InstrumentFeel {
             by_pitch: self.fingerings.map(|fingering| fingering.and_then(of)),
             otherwise: Some(table.reference().map),
         }
+    }
+}
+
+/// What plays a knob, by sounding pitch: the feel that it is sent, and the pressure that its angle gives. As bytes it goes from
+/// the thread that computes it to the one that plays, where threads share no memory.
+#[derive(Clone, Debug, Default)]
+pub struct PlayedFeel {
+    /// The maps from angle to mouth pressure.
+    pub maps: PitchMaps,
+    feels: Vec<Option<Feel>>,
+    reference: Feel,
+}
+
+impl PlayedFeel {
+    /// The feel of a fingered note (none, or one that the instrument lacks: of the reference note).
+    pub fn feel(&self, note: Option<SoundingNote>) -> Feel {
+        let own = note.and_then(|note| self.feels.get(usize::from(note.0)).copied().flatten());
+        own.unwrap_or(self.reference)
+    }
+
+    /// For [`from_bytes`](Self::from_bytes) of the same build. Allocates.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let pitches = self.maps.by_pitch.iter().zip(&self.feels).map(|(map, feel)| Some((*map)?).zip(*feel));
+        for entry in pitches.chain([self.maps.otherwise.map(|map| (map, self.reference))]) {
+            let Some((map, feel)) = entry else {
+                bytes.push(0);
+                continue;
+            };
+            let frame = encode(&Message::Feel(feel), 0);
+            bytes.push(frame.len() as u8);
+            bytes.extend_from_slice(&frame);
+            for (angle_deg, pressure_pa) in map.landmarks() {
+                bytes.extend(angle_deg.to_le_bytes().into_iter().chain(pressure_pa.to_le_bytes()));
+            }
+        }
+        bytes
+    }
+
+    /// What [`to_bytes`](Self::to_bytes) has made; `None` for anything else. Allocates.
+    pub fn from_bytes(mut bytes: &[u8]) -> Option<Self> {
+        let mut entry = || {
+            let (&length, rest) = bytes.split_first()?;
+            bytes = rest;
+            if length == 0 {
+                return Some(None);
+            }
+            let (frame, rest) = bytes.split_at_checked(usize::from(length))?;
+            let Some(Ok((_, Message::Feel(feel)))) = Decoder::new().feed(frame).next() else { return None };
+            let (numbers, rest) = rest.split_at_checked(48)?;
+            bytes = rest;
+            let mut numbers =
+                numbers.chunks_exact(8).map(|eight| f64::from_le_bytes(eight.try_into().unwrap_or_default()));
+            let mut pair = || Some((numbers.next()?, numbers.next()?));
+            Some(Some((AngleMap::new([pair()?, pair()?, pair()?]), feel)))
+        };
+        let mut played = Self { feels: vec![None; PITCHES], ..Self::default() };
+        for (map, feel) in played.maps.by_pitch.iter_mut().zip(&mut played.feels) {
+            (*map, *feel) = entry()?.unzip();
+        }
+        let (map, reference) = entry()??;
+        (played.maps.otherwise, played.reference) = (Some(map), reference);
+        bytes.is_empty().then_some(played)
     }
 }
 
@@ -134,5 +209,36 @@ impl PitchMaps {
     /// Whether any map is there.
     pub fn is_ready(&self) -> bool {
         self.otherwise.is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chalumeau_core::haptics::TorqueLimits;
+
+    #[test]
+    fn bytes_give_the_same_feel_and_nothing_else_does() {
+        let feels = InstrumentFeel::built_in().unwrap();
+        let settings = Settings::default();
+        let table = feels.table(&settings, &FeelDesign::default(), &TorqueLimits::default()).unwrap();
+        let played = feels.played(&table, &settings);
+        let bytes = played.to_bytes();
+        let again = PlayedFeel::from_bytes(&bytes).unwrap();
+        for note in (0..=255).map(|pitch| Some(SoundingNote(pitch))).chain([None]) {
+            assert_eq!(again.feel(note), played.feel(note), "{note:?}");
+            for angle_deg in [-5.0, 40.0, 130.0, 300.0, 900.0] {
+                let both = [&again, &played].map(|feel| feel.maps.pressure_pa(note, angle_deg));
+                assert_eq!(both[0], both[1], "{note:?} at {angle_deg}");
+            }
+        }
+        assert_eq!(
+            again.feel(Some(SoundingNote(60))).scale_mnm,
+            table.note(feels.fingering(SoundingNote(60)).unwrap()).unwrap().feel.scale_mnm
+        );
+        for cut in (0..bytes.len()).step_by(37) {
+            assert!(PlayedFeel::from_bytes(&bytes[..cut]).is_none(), "{cut} bytes");
+        }
+        assert!(PlayedFeel::from_bytes(&[&bytes[..], &[0]].concat()).is_none());
     }
 }

@@ -39,14 +39,13 @@ impl PreparedInstrument {
         fits.then(|| Model::assemble(file.scaled(self.scale), self.cells, tuning, self.a4_hz, self.scale))
     }
 
-    /// As TOML, for a store; `None` if a number has no text.
-    #[cfg(feature = "fit")]
-    pub(super) fn to_text(&self) -> Option<String> {
+    /// As TOML, for a store or another thread; `None` if a number has no text. Allocates.
+    pub fn to_text(&self) -> Option<String> {
         toml::to_string(self).ok()
     }
 
-    /// From the TOML of a store; `None` if it is damaged.
-    pub(super) fn from_text(text: &str) -> Option<Self> {
+    /// From such a TOML; `None` if it is damaged. Allocates.
+    pub fn from_text(text: &str) -> Option<Self> {
         toml::from_str(text).ok()
     }
 }

@@ -3,8 +3,7 @@
 //!
 //! The question is `whatareyou`, and nothing else is ever asked: `readconfig` would print the password of the network.
 
-use crate::device::serial::{BAUD, SLOW_BAUD};
-use crate::device::transport::Binding;
+use crate::device::transport::{BAUD, Binding, SLOW_BAUD};
 
 /// Time between two HELLO, us.
 const HELLO_US: i64 = 250_000;

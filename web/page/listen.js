@@ -1,0 +1,99 @@
+// The listening page: each sound is made by the module when it is first asked for, much faster than it sounds, and drawn.
+
+/** Columns of a picture. */
+const COLUMNS = 360;
+const get = (id) => document.getElementById(id);
+const tour = await fetch('tour.json').then((answer) => answer.json());
+let module;
+let context;
+let playing;
+
+for (const { title, stops } of tour.chapters) {
+  const chapter = document.createElement('section');
+  const heading = document.createElement('h2');
+  heading.textContent = title;
+  chapter.append(heading, ...stops.map(card));
+  get('chapters').append(chapter);
+}
+
+function card(stop) {
+  const button = document.createElement('button');
+  button.className = 'stop-card';
+  button.setAttribute('aria-pressed', 'false');
+  const [sign, words, picture, name, what] = ['i', 'span', 'canvas', 'b', 'small'].map((kind) => document.createElement(kind));
+  sign.setAttribute('aria-hidden', 'true');
+  name.textContent = stop.title;
+  what.textContent = `${stop.words} ${(stop.samples / tour.rate).toFixed(0)} s.`;
+  words.append(name, what);
+  picture.setAttribute('aria-hidden', 'true');
+  button.append(sign, words, picture);
+  button.onclick = () => toggle(stop, button, picture).catch((error) => {
+    button.classList.remove('making');
+    get('trouble').textContent = `No sound: ${error.message}`;
+  });
+  return button;
+}
+
+async function toggle(stop, button, picture) {
+  // In the gesture: a browser lets a page sound only then.
+  context ??= new AudioContext({ sampleRate: tour.rate });
+  context.resume();
+  const same = playing?.stop === stop;
+  end();
+  if (same) return;
+  button.classList.add('making');
+  stop.sound ??= await made(stop);
+  button.classList.remove('making');
+  const source = new AudioBufferSourceNode(context, { buffer: stop.sound });
+  source.connect(context.destination);
+  const own = (playing = { stop, button, source, began: context.currentTime });
+  source.onended = () => playing === own && end();
+  source.start();
+  button.setAttribute('aria-pressed', 'true');
+  follow(own, picture);
+}
+
+function end() {
+  if (!playing) return;
+  const { source, button } = playing;
+  playing = null;
+  source.stop();
+  button.setAttribute('aria-pressed', 'false');
+}
+
+/** The sound, by the module in an audio worklet that need not wait for time to pass. */
+async function made({ samples, messages }) {
+  module ??= await WebAssembly.compile(await (await fetch('chalumeau.wasm')).arrayBuffer());
+  const offline = new OfflineAudioContext(2, samples, tour.rate);
+  await offline.audioWorklet.addModule('worklet.js');
+  const processorOptions = { module, instrument: 0, score: { score: messages } };
+  const node = new AudioWorkletNode(offline, 'chalumeau', { outputChannelCount: [2], processorOptions });
+  node.connect(offline.destination);
+  return offline.startRendering();
+}
+
+/** Draws the sound, and how much of it has been heard. */
+function follow(own, canvas) {
+  const ratio = devicePixelRatio || 1;
+  [canvas.width, canvas.height] = [ratio * canvas.clientWidth, ratio * canvas.clientHeight];
+  const g = canvas.getContext('2d');
+  const samples = own.stop.sound.getChannelData(0);
+  const step = Math.ceil(samples.length / COLUMNS);
+  own.stop.peaks ??= Array.from({ length: COLUMNS }, (_, n) => samples.subarray(n * step, (n + 1) * step).reduce((most, x) => Math.max(most, Math.abs(x)), 0));
+  const style = getComputedStyle(document.documentElement);
+  const [heard, ahead] = ['--breath', '--quiet'].map((name) => style.getPropertyValue(name));
+  const draw = () => {
+    const share = playing === own ? (context.currentTime - own.began) / own.stop.sound.duration : 0;
+    g.clearRect(0, 0, canvas.width, canvas.height);
+    own.stop.peaks.forEach((peak, n) => {
+      const height = Math.max(1, peak * canvas.height);
+      g.fillStyle = n / COLUMNS < share ? heard : ahead;
+      g.fillRect((n * canvas.width) / COLUMNS, (canvas.height - height) / 2, Math.max(1, canvas.width / COLUMNS - 0.5), height);
+    });
+    if (playing === own) requestAnimationFrame(draw);
+  };
+  draw();
+}
+
+/** For tests. */
+globalThis.listen = { tour, made, playing: () => playing?.stop.title };

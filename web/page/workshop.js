@@ -1,0 +1,43 @@
+// What takes long, off the page's thread: one worker that answers at once, and one that fits and is ended where its answer has
+// become worthless. Both play the same module, which is fetched when it is first needed.
+
+export class Workshop {
+  /** Asks the worker for what takes milliseconds, or a second. */
+  ask(question) {
+    this.quick ??= this.worker();
+    return this.quick.ask(question);
+  }
+
+  /** Asks for what takes seconds or minutes; a question before it is given up and never answered. */
+  askLong(question) {
+    this.long?.end();
+    this.long = this.worker();
+    return this.long.ask(question);
+  }
+
+  worker() {
+    const worker = new Worker(new URL('workshop-worker.js', import.meta.url), { type: 'module' });
+    const waiting = new Map();
+    let asked = 0;
+    worker.onmessage = ({ data: { number, answer, failed } }) => {
+      const { resolve, reject } = waiting.get(number);
+      waiting.delete(number);
+      if (failed) reject(new Error(failed));
+      else resolve(answer);
+    };
+    const fail = (error) => {
+      waiting.forEach(({ reject }) => reject(new Error(error.message || 'the workshop could not be loaded')));
+      waiting.clear();
+    };
+    worker.onerror = fail;
+    return {
+      ask: (question) =>
+        new Promise((resolve, reject) => {
+          asked += 1;
+          waiting.set(asked, { resolve, reject });
+          worker.postMessage({ number: asked, question });
+        }),
+      end: () => worker.terminate(),
+    };
+  }
+}
