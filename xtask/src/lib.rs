@@ -2,6 +2,7 @@
 
 pub mod bundle;
 pub mod ci;
+pub mod debian;
 pub mod demo;
 pub mod firmware;
 pub mod fit_player;
