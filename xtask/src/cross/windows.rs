@@ -71,7 +71,8 @@ impl<'a> Wine<'a> {
             variable("WINEDEBUG", "-all"),
         ];
         let wine = Self { runner: Runner { built, words: &["wine"], variables }, prefix };
-        // One server for all programs, which would else start anew with each.
+        // One server for all programs, which would else start anew with each. One that was left behind ends first.
+        let _ = wine.runner.helper(WINESERVER).arg("-k").stderr(Stdio::null()).status();
         machine::run(wine.runner.helper(WINESERVER).arg("-p"))?;
         machine::run(wine.runner.helper("wine").args(["wineboot", "--init"]))?;
         Ok(wine)
