@@ -553,7 +553,7 @@ fn over_midi_a_hand_on_the_knob_is_heard_with_and_without_sysex() {
             SimulatedHand::new(HandDesign::default(), 1),
             1,
         );
-        let running = Server::new(knob, Port::Memory(Box::new(device))).spawn().unwrap();
+        let running = Server::new(knob, Port::Wire(Box::new(device))).spawn().unwrap();
         running.tell(Control::Aim(Aim::Angle(200.0)));
         let (link, mut reader) = KnobLink::spawn_in(places, "test", Hooks::default());
         link.attach(if is_plain { Box::new(ControllersOnly(host)) } else { Box::new(host) });

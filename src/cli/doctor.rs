@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 const EXAMPLES: &str = "\
 Examples:
   chalumeau doctor                            every port that may have a knob
-  chalumeau doctor --path /dev/ttyUSB1        this port only
+  chalumeau doctor --path /dev/ttyUSB1        this port only; on Windows --path COM3
   chalumeau doctor --osc --any-address        stock firmware, over Wi-Fi
   chalumeau doctor --seconds 60               a longer look at rate and jitter";
 
@@ -73,7 +73,7 @@ impl DoctorCommand {
             live += u32::from(self.ask(&mut out, KnobChoice::Midi { name: Some(name) })?);
         }
         if live == 0 {
-            writeln!(out, "\n{NO_KNOB}")?;
+            tell_what_next(&mut out)?;
         }
         Ok(())
     }
@@ -168,12 +168,24 @@ impl DoctorCommand {
     }
 }
 
-const NO_KNOB: &str = "\
+/// Where a system has no pseudo-terminals, a simulated knob needs a pair of ports.
+const SIMULATOR: &str = if cfg!(unix) {
+    "run chalumeau knob-sim in another terminal"
+} else {
+    "run chalumeau knob-sim --path PORT at one end of a pair of ports (com0com), then --path"
+};
+
+fn tell_what_next(out: &mut impl Write) -> io::Result<()> {
+    writeln!(
+        out,
+        "
 No knob answers. What to do next:
   A knob with a cable   plug it in and run this again; if its port is listed but not known, --path PORT
   Stock firmware        chalumeau doctor --osc --any-address
-  No knob at all        run chalumeau knob-sim in another terminal
-All steps: docs/touch.md";
+  No knob at all        {SIMULATOR}
+All steps: docs/touch.md"
+    )
+}
 
 fn wait(link: &KnobLink, most: Duration, until: impl Fn(&Phase) -> bool) -> LinkStatus {
     let begun = Instant::now();

@@ -4,6 +4,7 @@ use crate::cli::Failure;
 use crate::cli::shared_args::within;
 use chalumeau_firmware::Setup;
 use chalumeau_knob::device::runtime_dir::RuntimeDir;
+use chalumeau_knob::device::serial::SerialTransport;
 use chalumeau_knob::simulator::fault::Fault;
 use chalumeau_knob::simulator::hand::{HandDesign, SimulatedHand};
 use chalumeau_knob::simulator::knob::SimulatedKnob;
@@ -31,6 +32,7 @@ Examples:
   chalumeau knob-sim --script examples/hands/swell.csv --loop --log knob.csv
   chalumeau knob-sim --hold 120 --fault unplug@5:2 --fault corrupt@10:3
   chalumeau knob-sim --osc 127.0.0.1:8000 --slap --loop the stock firmware
+  chalumeau knob-sim --path COM6                        one end of a pair of ports, as com0com makes on Windows
 
 The first line of standard output says where the knob is: `serial /dev/pts/7`, `midi NAME` or
 `osc HOST:PORT`; a new `serial` line follows when an unplugged cable is put back.
@@ -129,6 +131,9 @@ struct PortArgs {
     /// A virtual MIDI port instead of a serial one
     #[arg(long, value_name = "NAME", num_args = 0..=1, default_missing_value = NAME)]
     midi: Option<String>,
+    /// An existing serial port: one end of a pair, whose other end the host opens. It cannot be unplugged
+    #[arg(long, value_name = "PORT", conflicts_with_all = ["osc", "midi"])]
+    path: Option<PathBuf>,
     /// Serial number of the device, hexadecimal
     #[arg(long, value_name = "HEX", default_value = "5100000000000001", value_parser = serial_number)]
     serial_number: u64,
@@ -242,14 +247,26 @@ impl KnobSimCommand {
             writeln!(out, "osc {to}")?;
         } else if let Some(name) = &self.port.midi {
             writeln!(out, "midi {name}")?;
+        } else if let Some(path) = &self.port.path {
+            writeln!(out, "serial {}", path.display())?;
         }
         Ok(out.flush()?)
     }
 }
 
 impl PortArgs {
-    #[cfg(unix)]
     fn open(&self) -> Result<Port, Failure> {
+        match &self.path {
+            Some(path) => {
+                let port = SerialTransport::open(path).map_err(|e| Failure::Usage(e.to_string()))?;
+                Ok(Port::Wire(Box::new(port)))
+            }
+            None => self.make(),
+        }
+    }
+
+    #[cfg(unix)]
+    fn make(&self) -> Result<Port, Failure> {
         match &self.midi {
             Some(name) => {
                 let midi = VirtualMidi::open(name).map_err(|e| Failure::Usage(e.to_string()))?;
@@ -260,8 +277,9 @@ impl PortArgs {
     }
 
     #[cfg(not(unix))]
-    fn open(&self) -> Result<Port, Failure> {
-        let missing = "this system has neither pseudo-terminals nor virtual MIDI ports; use --osc HOST:PORT";
+    fn make(&self) -> Result<Port, Failure> {
+        let missing = "this system has neither pseudo-terminals nor virtual MIDI ports. Give --path PORT, one end of a \
+                       pair of serial ports (com0com makes such pairs on Windows), or --osc HOST:PORT";
         Err(Failure::Usage(missing.to_owned()))
     }
 }

@@ -11,8 +11,9 @@ use chalumeau_knob::simulator::script::{Aim, Script};
 use chalumeau_knob::simulator::serve::{Control, Port, Server};
 use chalumeau_knob::wire::midi::{FromKnob, MidiReceiver, encode_sysex};
 use chalumeau_knob::wire::{Decoder, Info, Message, encode};
+use serialport::{SerialPort, TTYPort};
 use std::fs;
-use std::io::{BufRead, BufReader};
+use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
@@ -80,6 +81,34 @@ impl Drop for Running {
     }
 }
 
+/// The other end of a pair of ports.
+struct OtherEnd(TTYPort);
+
+impl Transport for OtherEnd {
+    fn binding(&self) -> Binding {
+        Binding::Serial
+    }
+
+    fn poll(&mut self, wait: Duration, sink: &mut dyn FnMut(&[u8])) -> io::Result<()> {
+        self.0.set_timeout(wait)?;
+        let mut buffer = [0; 1024];
+        match self.0.read(&mut buffer) {
+            Ok(read) => sink(&buffer[..read]),
+            Err(e) if e.kind() == io::ErrorKind::TimedOut => {}
+            Err(e) => return Err(e),
+        }
+        Ok(())
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.0.write_all(bytes)
+    }
+
+    fn describe(&self) -> String {
+        self.0.name().unwrap_or_default()
+    }
+}
+
 /// Says hello until INFO comes.
 fn greet(transport: &mut dyn Transport, session: u32) -> Info {
     let end = Instant::now() + PATIENCE;
@@ -117,6 +146,18 @@ fn greet(transport: &mut dyn Transport, session: u32) -> Info {
         }
     }
     info.expect("no INFO within a minute")
+}
+
+#[test]
+fn it_takes_one_end_of_a_pair_of_ports() {
+    let (host, end) = TTYPort::pair().unwrap();
+    let path = end.name().unwrap();
+    drop(end);
+    let mut simulator = Running::start(&format!("--quiet --serial-number c1a2 --path {path}"));
+    assert_eq!(simulator.line(), format!("serial {path}"));
+    assert_eq!(greet(&mut OtherEnd(host), 7).serial, 0xc1a2);
+    let mut missing = Running::start("--quiet --path /dev/not-there");
+    assert_eq!(missing.end(), Some(2));
 }
 
 #[test]
@@ -219,7 +260,7 @@ fn knob_within_the_program_speaks_midi_and_obeys() {
     let knob =
         SimulatedKnob::new(setup, PlantDesign::default(), SimulatedHand::new(HandDesign::default(), 1), 1);
     let (device, mut host) = memory::pair(Binding::Midi, "a wire");
-    let running = Server::new(knob, Port::Memory(Box::new(device))).spawn().unwrap();
+    let running = Server::new(knob, Port::Wire(Box::new(device))).spawn().unwrap();
     assert_eq!(greet(&mut host, 9).watchdog_ms, 330);
     running.tell(Control::Aim(Aim::Angle(20.0)));
     let (mut receiver, end) = (MidiReceiver::new(), Instant::now() + PATIENCE);

@@ -2,6 +2,9 @@
 
 pub mod bundle;
 pub mod ci;
+#[cfg(target_os = "linux")]
+pub mod cross;
+pub mod debian;
 pub mod demo;
 pub mod firmware;
 pub mod fit_player;
@@ -67,6 +70,13 @@ pub const COMMANDS: &[Command] = &[
         name: "web",
         about: "build the clarinet for browsers into target/web; --serve [port] shows it on this machine",
         run: web::run,
+        checks: false,
+    },
+    #[cfg(target_os = "linux")]
+    Command {
+        name: "cross",
+        about: "build for Windows, macOS and ARM, and compare what they play with Linux; takes web, windows, macos, arm",
+        run: cross::run,
         checks: false,
     },
     #[cfg(target_os = "linux")]

@@ -1,16 +1,14 @@
 //! Builds the WebAssembly modules. The target's library comes from the installed compiler, from rustup, or, where neither has
-//! it, from a folder with Debian's sid, `target/web-toolchain`, which is made once.
-//!
-//! Debian's packages of the compiler carry the library for the target, and its lld is the linker. The folder is entered with
-//! chroot, inside a mount namespace of its own, so that no mount outlives the command. All that needs root.
+//! it, from Debian's packages (`debian`), whose lld is then the linker.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result};
 
-use crate::machine::{self, Package};
+use crate::debian::{Debian, Packages};
+use crate::machine;
 
 const TARGET: &str = "wasm32-unknown-unknown";
 /// Vectors of four numbers, which every browser has had since 2023.
@@ -18,18 +16,10 @@ const FLAGS: &str = "-C target-feature=+simd128";
 const BUILD: [&str; 7] =
     ["build", "--release", "--locked", "--lib", "--package", "chalumeau-web", "--target"];
 /// Debian's compiler, the library for the target, and the linker.
-const PACKAGES: [&str; 4] = ["rustc", "cargo", "libstd-rust-dev-wasm32", "lld"];
-/// Inside the folder: the workspace, cargo's home, and the host's certificates. The package ca-certificates overwrites its own.
-const SOURCE: &str = "/source";
-const CARGO_HOME: &str = "/opt/chalumeau/cargo";
-const CERTIFICATES: &str = "/opt/chalumeau/certificates.crt";
-/// Says that the folder is complete.
-const READY: &str = "opt/chalumeau/ready";
-
-const DEBOOTSTRAP: Package = Package {
-    name: "debootstrap",
-    present: || machine::works("sh", &["-c", "command -v debootstrap"]),
-    purpose: "a compiler for WebAssembly",
+const PACKAGES: Packages = Packages {
+    purpose: "the compiler's library for WebAssembly",
+    processor: None,
+    names: &["rustc", "cargo", "libstd-rust-dev-wasm32", "lld"],
 };
 
 /// The modules: their names in the page, and the features that each is built with.
@@ -55,7 +45,11 @@ fn build_module(features: &[&str]) -> Result<PathBuf> {
         cargo.args(BUILD).arg(TARGET).args(features).env("RUSTFLAGS", FLAGS).env("CARGO_TARGET_DIR", &folder);
         machine::run(&mut cargo)?;
     } else {
-        in_debian(&folder, features)?;
+        let debian =
+            Debian::with(&PACKAGES).with_context(|| format!("`rustup target add {TARGET}` fails"))?;
+        let linker = ("CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER", "wasm-ld");
+        let mut cargo = debian.cargo(&folder, &[("RUSTFLAGS", FLAGS), linker])?;
+        machine::run(cargo.args(BUILD).arg(TARGET).args(features))?;
     }
     Ok(folder.join(TARGET).join("release/chalumeau_web.wasm"))
 }
@@ -67,120 +61,4 @@ fn has_target() -> bool {
         found.is_ok_and(|found| Path::new(String::from_utf8_lossy(&found.stdout).trim()).is_dir())
     };
     installed() || (machine::works("rustup", &["target", "add", TARGET]) && installed())
-}
-
-fn in_debian(target: &Path, features: &[&str]) -> Result<()> {
-    let root = machine::target().join("web-toolchain");
-    make(&root)?;
-    let home = std::env::var_os("CARGO_HOME").map(PathBuf::from);
-    let home = home.or_else(|| Some(PathBuf::from(std::env::var_os("HOME")?).join(".cargo")));
-    let home = home.context("cargo's home is not known; set CARGO_HOME")?;
-    let inner_home = root.join(CARGO_HOME.trim_start_matches('/'));
-    for folder in
-        [&root.join(SOURCE.trim_start_matches('/')), &inner_home.join("registry"), &home.join("registry")]
-    {
-        fs::create_dir_all(folder)?;
-    }
-    // How this machine reaches the registry; it stays below the target folder.
-    for name in ["config.toml", "config"] {
-        if home.join(name).exists() {
-            fs::copy(home.join(name), inner_home.join(name))?;
-        }
-    }
-    fs::create_dir_all(target)?;
-    let inner_target = Path::new(SOURCE).join(target.strip_prefix(machine::root()).context(
-        "the target folder must lie in the workspace, because the compiler sees nothing else; unset CARGO_TARGET_DIR",
-    )?);
-    let mut command = enter(
-        &root,
-        &[(machine::root(), SOURCE), (&home.join("registry"), &format!("{CARGO_HOME}/registry"))],
-    );
-    command
-        .args(["env", "-i", "PATH=/usr/bin:/bin", "HOME=/root", &format!("CARGO_HOME={CARGO_HOME}")])
-        .args([format!("CARGO_HTTP_CAINFO={CERTIFICATES}"), format!("RUSTFLAGS={FLAGS}")])
-        .arg("CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=wasm-ld")
-        .arg(format!("CARGO_TARGET_DIR={}", inner_target.display()))
-        .args(["cargo", BUILD[0], "--manifest-path", &format!("{SOURCE}/Cargo.toml")])
-        .args(&BUILD[1..])
-        .arg(TARGET)
-        .args(features);
-    machine::run(&mut command)
-}
-
-/// Makes the folder with sid, unless it is there.
-fn make(root: &Path) -> Result<()> {
-    if root.join(READY).exists() {
-        return Ok(());
-    }
-    let is_root = Command::new("id").arg("-u").output().is_ok_and(|id| id.stdout.trim_ascii() == b"0");
-    ensure!(
-        is_root && machine::works("apt-get", &["--version"]),
-        "the compiler has no library for {TARGET}. `rustup target add {TARGET}` fetches it; on Debian and as root, this \
-         command makes a folder with Debian's own compiler"
-    );
-    machine::provide(&[&DEBOOTSTRAP])?;
-    let mirror = mirror()?;
-    println!("making {} from Debian's sid, once", root.display());
-    if root.exists() {
-        // The rest of one that did not come to its end; nothing is mounted there.
-        fs::remove_dir_all(root)?;
-    }
-    fs::create_dir_all(root)?;
-    machine::run(Command::new("debootstrap").args(["--variant=minbase", "sid"]).arg(root).arg(mirror))?;
-    // A mirror may be a snapshot.
-    fs::write(root.join("etc/apt/apt.conf.d/99chalumeau"), "Acquire::Check-Valid-Until \"false\";\n")?;
-    for file in ["etc/resolv.conf", "etc/hosts"] {
-        fs::copy(Path::new("/").join(file), root.join(file))
-            .with_context(|| format!("cannot copy /{file}"))?;
-    }
-    let mut install = enter(root, &[]);
-    install.args([
-        "env",
-        "DEBIAN_FRONTEND=noninteractive",
-        "apt-get",
-        "install",
-        "-y",
-        "--no-install-recommends",
-    ]);
-    machine::run(install.args(PACKAGES))?;
-    fs::create_dir_all(root.join("opt/chalumeau"))?;
-    let certificates = std::env::var_os("SSL_CERT_FILE").map(PathBuf::from);
-    let certificates = certificates.unwrap_or_else(|| "/etc/ssl/certs/ca-certificates.crt".into());
-    fs::copy(&certificates, root.join(CERTIFICATES.trim_start_matches('/')))
-        .with_context(|| format!("cannot copy {}", certificates.display()))?;
-    Ok(fs::write(root.join(READY), "")?)
-}
-
-/// A command inside the folder, which sees `binds` of the host; its words follow. The mounts end with the command.
-fn enter(root: &Path, binds: &[(&Path, &str)]) -> Command {
-    let mut script =
-        "set -e; root=$1; shift; mount --rbind /dev \"$root/dev\"; mount -t proc proc \"$root/proc\""
-            .to_owned();
-    for _ in binds {
-        script += "; mount --bind \"$1\" \"$root$2\"; shift 2";
-    }
-    script += "; exec chroot \"$root\" \"$@\"";
-    let mut command = Command::new("unshare");
-    command.args(["--mount", "--propagation", "private", "sh", "-c", &script, "sh"]).arg(root);
-    for (from, to) in binds {
-        command.arg(from).arg(to);
-    }
-    command
-}
-
-/// The mirror of this machine's own Debian, from apt.
-fn mirror() -> Result<String> {
-    let found = Command::new("apt-get")
-        .args(["indextargets", "--format", "$(SITE) $(ORIGIN) $(COMPONENT)", "Created-By: Packages"])
-        .output()
-        .context("cannot start apt-get")?;
-    let found = String::from_utf8_lossy(&found.stdout).into_owned();
-    let main = found.lines().filter_map(|line| line.strip_suffix(" Debian main"));
-    // The security archive has no sid.
-    match main.map(str::trim).find(|site| !site.contains("security")) {
-        Some(site) => Ok(site.to_owned()),
-        None => bail!(
-            "apt knows no mirror of Debian, from which the compiler could come; apt-get update may help"
-        ),
-    }
 }

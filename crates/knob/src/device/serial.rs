@@ -172,7 +172,11 @@ fn explain(error: &serialport::Error, path: &str) -> OpenError {
             OpenError::Missing(format!("{path} is not there: is the knob plugged in?"))
         }
         // Both a locked terminal and a missing one are `NoDevice` on one system or another.
-        ErrorKind::NoDevice if ["busy", "lock", "denied"].iter().any(|word| said.contains(word)) => {
+        // Windows says why in the user's language: a port that is there and does not open belongs to somebody else.
+        ErrorKind::NoDevice
+            if ["busy", "lock", "denied"].iter().any(|word| said.contains(word))
+                || cfg!(windows) && is_listed(path) =>
+        {
             OpenError::Busy(format!(
                 "{path} is in use by another program (a serial monitor, another instance of Chalumeau?): close that program"
             ))
@@ -194,9 +198,17 @@ fn permission_text(path: &str) -> String {
     )
 }
 
+/// Windows has no such refusal: whoever may not open a port finds it in use.
 #[cfg(not(target_os = "linux"))]
 fn permission_text(path: &str) -> String {
     format!("no permission to open {path}: `ls -l {path}` shows which users may open it")
+}
+
+/// Whether the system has a port of this name.
+fn is_listed(path: &str) -> bool {
+    let name = path.trim_start_matches(r"\\.\");
+    let ports = serialport::available_ports().unwrap_or_default();
+    ports.iter().any(|port| port.port_name.eq_ignore_ascii_case(name))
 }
 
 #[cfg(target_os = "linux")]

@@ -49,8 +49,8 @@ pub enum Port {
     Midi(VirtualMidi),
     /// OSC reports of the stock firmware.
     Osc(OscSender),
-    /// One end of a wire within the program.
-    Memory(Box<dyn Transport>),
+    /// One end of a wire that others hold: within the program, or a serial port.
+    Wire(Box<dyn Transport>),
 }
 
 /// Real time in periods.
@@ -181,7 +181,7 @@ impl Server {
             Port::Serial(Some(pty)) => pty.read(&mut self.buffer)?,
             #[cfg(unix)]
             Port::Midi(midi) => midi.read(&mut self.buffer),
-            Port::Memory(transport) => {
+            Port::Wire(transport) => {
                 let buffer = &mut self.buffer;
                 // The other end is gone: a knob does not mind.
                 let _ = transport.poll(Duration::ZERO, &mut |chunk| buffer.extend_from_slice(chunk));
@@ -206,10 +206,10 @@ impl Server {
             Port::Serial(Some(pty)) => pty.write(&self.buffer)?,
             #[cfg(unix)]
             Port::Midi(midi) => self.splitter.split(&self.buffer, |message| midi.write(message)),
-            Port::Memory(transport) if transport.binding() == Binding::Midi => {
+            Port::Wire(transport) if transport.binding() == Binding::Midi => {
                 self.splitter.split(&self.buffer, |message| _ = transport.send(message));
             }
-            Port::Memory(transport) if !self.buffer.is_empty() => _ = transport.send(&self.buffer),
+            Port::Wire(transport) if !self.buffer.is_empty() => _ = transport.send(&self.buffer),
             _ => {}
         }
         #[cfg(unix)]

@@ -1,0 +1,41 @@
+//! The command line for Linux on ARM (64 bits), run by qemu.
+
+use anyhow::Result;
+
+use crate::cross::build::Cargo;
+use crate::cross::comparison::Runner;
+use crate::cross::folder;
+use crate::debian::Packages;
+
+const CARGO: Cargo = Cargo {
+    system: "arm",
+    target: "aarch64-unknown-linux-gnu",
+    packages: Packages {
+        purpose: "the compiler's library for ARM",
+        processor: Some("arm64"),
+        names: &[
+            "rustc",
+            "cargo",
+            "gcc",
+            "libc6-dev",
+            "libstd-rust-dev:arm64",
+            "gcc-aarch64-linux-gnu",
+            "qemu-user",
+        ],
+    },
+    builds_library: false,
+    variables: &[("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER", "aarch64-linux-gnu-gcc")],
+};
+const OPTIONS: &[&str] =
+    &["-p", "chalumeau", "--no-default-features", "--features", "cli", "--test", "render_hashes"];
+
+pub fn run() -> Result<()> {
+    let built = CARGO.build("test", OPTIONS)?;
+    let folder = folder(CARGO.system);
+    built.keep(&folder, &[("chalumeau", "chalumeau")])?;
+    let cache = crate::debian::inside(&folder)?;
+    let variables = vec![("CHALUMEAU_CACHE_DIR".to_owned(), format!("{cache}/cache"))];
+    let runner = Runner { built: &built, words: &["qemu-aarch64"], variables };
+    runner.files("chalumeau", &folder)?;
+    runner.test("render_hashes", &[])
+}
