@@ -1,6 +1,7 @@
 //! Chores of the project, one file each; `cargo xtask` lists them.
 
 pub mod bundle;
+pub mod chroot;
 pub mod ci;
 pub mod demo;
 pub mod firmware;

@@ -1,16 +1,15 @@
 //! Builds the WebAssembly module. The target's library comes from the installed compiler, from rustup, or, where neither has
 //! it, from a folder with Debian's sid, `target/web-toolchain`, which is made once.
 //!
-//! Debian's packages of the compiler carry the library for the target, and its lld is the linker. The folder is entered with
-//! chroot, inside a mount namespace of its own, so that no mount outlives the command. All that needs root.
+//! Debian's packages of the compiler carry the library for the target, and its lld is the linker. Such a folder needs root.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 
-use crate::machine::{self, Package};
+use crate::{chroot, machine};
 
 const TARGET: &str = "wasm32-unknown-unknown";
 /// Vectors of four numbers, which every browser has had since 2023.
@@ -25,12 +24,6 @@ const CARGO_HOME: &str = "/opt/chalumeau/cargo";
 const CERTIFICATES: &str = "/opt/chalumeau/certificates.crt";
 /// Says that the folder is complete.
 const READY: &str = "opt/chalumeau/ready";
-
-const DEBOOTSTRAP: Package = Package {
-    name: "debootstrap",
-    present: || machine::works("sh", &["-c", "command -v debootstrap"]),
-    purpose: "a compiler for WebAssembly",
-};
 
 /// Builds the module and returns where it is.
 pub fn build() -> Result<PathBuf> {
@@ -76,7 +69,7 @@ fn in_debian(target: &Path) -> Result<()> {
     let inner_target = Path::new(SOURCE).join(target.strip_prefix(machine::root()).context(
         "the target folder must lie in the workspace, because the compiler sees nothing else; unset CARGO_TARGET_DIR",
     )?);
-    let mut command = enter(
+    let mut command = chroot::enter(
         &root,
         &[(machine::root(), SOURCE), (&home.join("registry"), &format!("{CARGO_HOME}/registry"))],
     );
@@ -96,75 +89,18 @@ fn make(root: &Path) -> Result<()> {
     if root.join(READY).exists() {
         return Ok(());
     }
-    let is_root = Command::new("id").arg("-u").output().is_ok_and(|id| id.stdout.trim_ascii() == b"0");
     ensure!(
-        is_root && machine::works("apt-get", &["--version"]),
+        chroot::possible(),
         "the compiler has no library for {TARGET}. `rustup target add {TARGET}` fetches it; on Debian and as root, this \
          command makes a folder with Debian's own compiler"
     );
-    machine::provide(&[&DEBOOTSTRAP])?;
-    let mirror = mirror()?;
     println!("making {} from Debian's sid, once", root.display());
-    if root.exists() {
-        // The rest of one that did not come to its end; nothing is mounted there.
-        fs::remove_dir_all(root)?;
-    }
-    fs::create_dir_all(root)?;
-    machine::run(Command::new("debootstrap").args(["--variant=minbase", "sid"]).arg(root).arg(mirror))?;
-    // A mirror may be a snapshot.
-    fs::write(root.join("etc/apt/apt.conf.d/99chalumeau"), "Acquire::Check-Valid-Until \"false\";\n")?;
-    for file in ["etc/resolv.conf", "etc/hosts"] {
-        fs::copy(Path::new("/").join(file), root.join(file))
-            .with_context(|| format!("cannot copy /{file}"))?;
-    }
-    let mut install = enter(root, &[]);
-    install.args([
-        "env",
-        "DEBIAN_FRONTEND=noninteractive",
-        "apt-get",
-        "install",
-        "-y",
-        "--no-install-recommends",
-    ]);
-    machine::run(install.args(PACKAGES))?;
+    chroot::make(root, "sid")?;
+    machine::run(chroot::apt(root).args(["install", "--no-install-recommends"]).args(PACKAGES))?;
     fs::create_dir_all(root.join("opt/chalumeau"))?;
     let certificates = std::env::var_os("SSL_CERT_FILE").map(PathBuf::from);
     let certificates = certificates.unwrap_or_else(|| "/etc/ssl/certs/ca-certificates.crt".into());
     fs::copy(&certificates, root.join(CERTIFICATES.trim_start_matches('/')))
         .with_context(|| format!("cannot copy {}", certificates.display()))?;
     Ok(fs::write(root.join(READY), "")?)
-}
-
-/// A command inside the folder, which sees `binds` of the host; its words follow. The mounts end with the command.
-fn enter(root: &Path, binds: &[(&Path, &str)]) -> Command {
-    let mut script =
-        "set -e; root=$1; shift; mount --rbind /dev \"$root/dev\"; mount -t proc proc \"$root/proc\""
-            .to_owned();
-    for _ in binds {
-        script += "; mount --bind \"$1\" \"$root$2\"; shift 2";
-    }
-    script += "; exec chroot \"$root\" \"$@\"";
-    let mut command = Command::new("unshare");
-    command.args(["--mount", "--propagation", "private", "sh", "-c", &script, "sh"]).arg(root);
-    for (from, to) in binds {
-        command.arg(from).arg(to);
-    }
-    command
-}
-
-/// The mirror of this machine's own Debian, from apt.
-fn mirror() -> Result<String> {
-    let found = Command::new("apt-get")
-        .args(["indextargets", "--format", "$(SITE) $(ORIGIN) $(COMPONENT)", "Created-By: Packages"])
-        .output()
-        .context("cannot start apt-get")?;
-    let found = String::from_utf8_lossy(&found.stdout).into_owned();
-    let main = found.lines().filter_map(|line| line.strip_suffix(" Debian main"));
-    // The security archive has no sid.
-    match main.map(str::trim).find(|site| !site.contains("security")) {
-        Some(site) => Ok(site.to_owned()),
-        None => bail!(
-            "apt knows no mirror of Debian, from which the compiler could come; apt-get update may help"
-        ),
-    }
 }
