@@ -1,7 +1,7 @@
 //! `cargo xtask dist`: what a musician without Rust downloads.
 //!
 //! An archive for this system, one for each other system whose built files lie in `target/cross/`, a Debian package, a parts
-//! list and the checksums, all in `target/dist`. The same commit gives the same bytes in every folder, with the same compiler
+//! list and the checksums, all in `target/dist`. The same commit is to give the same bytes in every folder (`--check`), with the same compiler
 //! and system packages: times are the commit's, entries are sorted, and no path of the machine is in a binary.
 
 mod archive;
