@@ -1,15 +1,14 @@
 //! A folder with Debian's sid, `target/debian`, whose compilers build for systems other than this one. It is made once.
 //!
-//! The folder is entered with chroot, inside a mount namespace of its own, so that no mount outlives the command. The
-//! workspace appears inside at [`SOURCE`]. All that needs root.
+//! The workspace appears inside at [`SOURCE`]. The folder needs root, see [`chroot`].
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 
-use crate::machine::{self, Package};
+use crate::{chroot, machine};
 
 /// The workspace, inside the folder.
 pub const SOURCE: &str = "/source";
@@ -19,12 +18,6 @@ const CARGO_HOME: &str = "/opt/chalumeau/cargo";
 const CERTIFICATES: &str = "/opt/chalumeau/certificates.crt";
 /// Says that the folder has a system, and which packages were added to it.
 const READY: &str = "opt/chalumeau/packages";
-
-const DEBOOTSTRAP: Package = Package {
-    name: "debootstrap",
-    present: || machine::works("sh", &["-c", "command -v debootstrap"]),
-    purpose: "a compiler for other systems",
-};
 
 /// Debian's packages that one system needs.
 pub struct Packages {
@@ -47,9 +40,8 @@ impl Debian {
     pub fn with(packages: &Packages) -> Result<Self> {
         let root = machine::target().join("debian");
         let is_made = root.join(READY).exists();
-        let is_root = Command::new("id").arg("-u").output().is_ok_and(|id| id.stdout.trim_ascii() == b"0");
         ensure!(
-            is_root && (is_made || machine::works("apt-get", &["--version"])),
+            chroot::possible(),
             "{} comes from a folder with Debian's packages, which this command makes on Debian, as root",
             packages.purpose
         );
@@ -64,7 +56,8 @@ impl Debian {
 
     /// A command inside the folder, in the workspace, with these variables and no others of the host; its words follow.
     pub fn command(&self, variables: &[(&str, &str)], program: &str) -> Command {
-        let mut command = enter(&self.root, &self.binds);
+        let binds: Vec<_> = self.binds.iter().map(|(from, to)| (from.as_path(), to.as_str())).collect();
+        let mut command = chroot::enter(&self.root, &binds);
         command.args(["env", "-i", "-C", SOURCE, "PATH=/usr/bin:/bin", "HOME=/root"]);
         command.args(variables.iter().map(|(name, value)| format!("{name}={value}")));
         command.arg(program);
@@ -91,15 +84,12 @@ impl Debian {
             return Ok(());
         }
         println!("adding to {}: {}", self.root.display(), packages.names.join(" "));
-        let run = |words: &[&str]| machine::run(enter(&self.root, &[]).args(words));
+        
         if let Some(processor) = packages.processor {
-            run(&["dpkg", "--add-architecture", processor])?;
+            machine::run(chroot::enter(&self.root, &[]).args(["dpkg", "--add-architecture", processor]))?;
         }
-        run(&["apt-get", "-q", "update"])?;
-        let install = ["env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "-q", "install", "-y"];
-        let mut words = [&install[..], packages.names].concat();
-        words.push("--no-install-recommends");
-        run(&words)?;
+        machine::run(chroot::apt(&self.root).arg("update"))?;
+        machine::run(chroot::apt(&self.root).args(["install", "--no-install-recommends"]).args(packages.names))?;
         for name in packages.names {
             installed.push_str(name);
             installed.push('\n');
@@ -142,59 +132,12 @@ pub fn inside(path: &Path) -> Result<String> {
 }
 
 fn make(root: &Path) -> Result<()> {
-    machine::provide(&[&DEBOOTSTRAP])?;
-    let mirror = mirror()?;
     println!("making {} from Debian's sid, once", root.display());
-    if root.exists() {
-        // The rest of one that did not come to its end; nothing is mounted there.
-        fs::remove_dir_all(root)?;
-    }
-    fs::create_dir_all(root)?;
-    machine::run(Command::new("debootstrap").args(["--variant=minbase", "sid"]).arg(root).arg(mirror))?;
-    // A mirror may be a snapshot.
-    fs::write(root.join("etc/apt/apt.conf.d/99chalumeau"), "Acquire::Check-Valid-Until \"false\";\n")?;
-    for file in ["etc/resolv.conf", "etc/hosts"] {
-        fs::copy(Path::new("/").join(file), root.join(file))
-            .with_context(|| format!("cannot copy /{file}"))?;
-    }
+    chroot::make(root, "sid")?;
     fs::create_dir_all(root.join("opt/chalumeau"))?;
     let certificates = std::env::var_os("SSL_CERT_FILE").map(PathBuf::from);
     let certificates = certificates.unwrap_or_else(|| "/etc/ssl/certs/ca-certificates.crt".into());
     fs::copy(&certificates, root.join(CERTIFICATES.trim_start_matches('/')))
         .with_context(|| format!("cannot copy {}", certificates.display()))?;
     Ok(fs::write(root.join(READY), "")?)
-}
-
-/// A command inside the folder, which sees `binds` of the host; its words follow. The mounts end with the command.
-fn enter(root: &Path, binds: &[(PathBuf, String)]) -> Command {
-    let mut script =
-        "set -e; root=$1; shift; mount --rbind /dev \"$root/dev\"; mount -t proc proc \"$root/proc\""
-            .to_owned();
-    for _ in binds {
-        script += "; mount --bind \"$1\" \"$root$2\"; shift 2";
-    }
-    script += "; exec chroot \"$root\" \"$@\"";
-    let mut command = Command::new("unshare");
-    command.args(["--mount", "--propagation", "private", "sh", "-c", &script, "sh"]).arg(root);
-    for (from, to) in binds {
-        command.arg(from).arg(to);
-    }
-    command
-}
-
-/// The mirror of this machine's own Debian, from apt.
-fn mirror() -> Result<String> {
-    let found = Command::new("apt-get")
-        .args(["indextargets", "--format", "$(SITE) $(ORIGIN) $(COMPONENT)", "Created-By: Packages"])
-        .output()
-        .context("cannot start apt-get")?;
-    let found = String::from_utf8_lossy(&found.stdout).into_owned();
-    let main = found.lines().filter_map(|line| line.strip_suffix(" Debian main"));
-    // The security archive has no sid.
-    match main.map(str::trim).find(|site| !site.contains("security")) {
-        Some(site) => Ok(site.to_owned()),
-        None => bail!(
-            "apt knows no mirror of Debian, from which the compiler could come; apt-get update may help"
-        ),
-    }
 }

@@ -1,11 +1,13 @@
 //! Chores of the project, one file each; `cargo xtask` lists them.
 
 pub mod bundle;
+pub mod chroot;
 pub mod ci;
 #[cfg(target_os = "linux")]
 pub mod cross;
 pub mod debian;
 pub mod demo;
+pub mod dist;
 pub mod firmware;
 pub mod fit_player;
 pub mod generated;
@@ -58,6 +60,12 @@ pub const COMMANDS: &[Command] = &[
         name: "validate",
         about: "build the bundles, run Steinberg's tests, clap-validator and pluginval as far as they are there; --all needs all",
         run: validate::run,
+        checks: false,
+    },
+    Command {
+        name: "dist",
+        about: "what is downloaded, into target/dist: archives, a Debian package; --check builds twice, --try installs in a fresh Debian",
+        run: dist::run,
         checks: false,
     },
     Command {

@@ -22,7 +22,7 @@ struct Product {
 /// The plugin and the programs, with every feature that may be handed on.
 const PROGRAMS: Product = Product {
     package: "chalumeau",
-    features: &["--no-default-features", "--features", "standalone,devices,cli"],
+    features: &["--no-default-features", "--features", "standalone,devices,cli,simulator"],
 };
 /// The module of the web page.
 const PAGE: Product = Product { package: "chalumeau-web", features: &[] };
@@ -32,7 +32,7 @@ const TARGETS: &[&str] = &["x86_64-unknown-linux-gnu", "aarch64-apple-darwin", "
 /// Cargo's name for the system it runs on.
 const HOST: &str = "host-tuple";
 /// The name of the list, beside the bundles.
-const FILE: &str = "THIRD-PARTY-LICENSES.txt";
+pub const FILE: &str = "THIRD-PARTY-LICENSES.txt";
 /// Texts for packages without a licence file, in the order of preference.
 const STANDARD: &[(&str, &str)] = &[
     ("Apache-2.0", include_str!("../../LICENSE-APACHE")),
@@ -75,7 +75,29 @@ fn bundled() -> PathBuf {
     machine::target().join("bundled")
 }
 
+/// The list for the plugin and the programs on one target.
+pub fn list(target: &str) -> Result<String> {
+    text(&PROGRAMS, &[target])
+}
+
+/// The crates inside the plugin and the programs of one target: name and version, and licence.
+pub fn inside(target: &str) -> Result<Vec<(String, String)>> {
+    let packages = shipped(&PROGRAMS, target)?.into_iter().map(|package| (package.title, package.licence));
+    let mut packages: Vec<_> = packages.collect();
+    packages.sort();
+    Ok(packages)
+}
+
 fn write(product: &Product, targets: &[&str], folder: &Path) -> Result<()> {
+    let text = text(product, targets)?;
+    fs::create_dir_all(folder)?;
+    let path = folder.join(FILE);
+    fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
+    println!("Created the list of licences at '{}'", path.display());
+    Ok(())
+}
+
+fn text(product: &Product, targets: &[&str]) -> Result<String> {
     let allowed = allowed(&fs::read_to_string(machine::root().join("deny.toml"))?)?;
     let mut packages = BTreeMap::new();
     for target in targets {
@@ -89,12 +111,7 @@ fn write(product: &Product, targets: &[&str], folder: &Path) -> Result<()> {
         .collect();
     ensure!(refused.is_empty(), "licences that deny.toml does not allow: {}", refused.join(", "));
     let packages = packages.into_values().map(|package| Ok((texts(&package)?, package)));
-    let text = document(&packages.collect::<Result<Vec<_>>>()?);
-    fs::create_dir_all(folder)?;
-    let path = folder.join(FILE);
-    fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
-    println!("Created the list of licences at '{}'", path.display());
-    Ok(())
+    Ok(document(&packages.collect::<Result<Vec<_>>>()?))
 }
 
 /// The licences that deny.toml allows.

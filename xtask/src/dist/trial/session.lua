@@ -1,0 +1,18 @@
+-- A session with the notes and the plugin on a track.
+AudioEngine:set_backend("None (Dummy)", "check", "")
+local session = create_session("SESSION", "s", 48000)
+assert(session, "no session")
+local plugin = ARDOUR.LuaAPI.new_plugin_info("Chalumeau", ARDOUR.PluginType.VST3)
+assert(not plugin:isnil(), "Ardour does not know the plugin")
+print("found " .. plugin.path)
+local midi = ARDOUR.ChanCount(ARDOUR.DataType("midi"), 1)
+local stereo = ARDOUR.ChanCount(ARDOUR.DataType("audio"), 2)
+local order, mode = ARDOUR.PresentationInfo.max_order, ARDOUR.TrackMode.Normal
+local tracks = session:new_midi_track(midi, stereo, true, plugin, nil, nil, 1, "Clarinet", order, mode, true)
+local notes = ARDOUR.LuaAPI.new_luaproc(session, "Chalumeau notes")
+assert(not notes:isnil(), "Ardour does not know the notes")
+assert(tracks:front():add_processor_by_index(notes, 0, nil, true) == 0, "no notes before the plugin")
+session:save_state("")
+print("saved")
+close_session()
+quit()
