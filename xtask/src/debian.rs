@@ -84,12 +84,14 @@ impl Debian {
             return Ok(());
         }
         println!("adding to {}: {}", self.root.display(), packages.names.join(" "));
-        
+
         if let Some(processor) = packages.processor {
             machine::run(chroot::enter(&self.root, &[]).args(["dpkg", "--add-architecture", processor]))?;
         }
         machine::run(chroot::apt(&self.root).arg("update"))?;
-        machine::run(chroot::apt(&self.root).args(["install", "--no-install-recommends"]).args(packages.names))?;
+        machine::run(
+            chroot::apt(&self.root).args(["install", "--no-install-recommends"]).args(packages.names),
+        )?;
         for name in packages.names {
             installed.push_str(name);
             installed.push('\n');
