@@ -2,16 +2,19 @@
 //! at once.
 //!
 //! A [`Lattice`] alone has its junctions in lanes and gathers the arriving waves one by one. In a choir all voices have the
-//! same delays, so that a junction's waves lie beside each other. Each lane does what a lattice does, in the same order, and
-//! gives the same bits; junctions are processed chunk by chunk, as their waves pass each other within a row.
+//! same delays, so that a junction's waves lie beside each other. Each lane does what a lattice does and gives the same bits.
+//! Every wave has a line of its own, and a junction goes on for as many samples as its neighbours' waves allow, in the turns
+//! that `plan` finds: its state then stays in registers, and its places are found once.
 //!
 //! A lattice lends its waves to a lane, and keeps what moves the holes and the delay. Only single precision.
 
+mod lines;
+mod plan;
+
 use super::junctions::{Holes, Shut, Steps};
-use super::{
-    BACK, END_SLOT, LANES, LEAST_MASK, Lattice, LatticeCoeffs, NEXT_MASK, Real, SPACE, STRIDE, TINY,
-    TUNED_SLOT, back_rows, silent_ring, sources_of,
-};
+use super::{LANES, Lattice, LatticeCoeffs, Real, TINY};
+use lines::{Line, Lines, Waves};
+use plan::{Node, Turn, plan};
 
 /// Samples that a choir plays at once.
 pub const TICK: usize = 16;
@@ -29,8 +32,7 @@ pub trait Tips<const N: usize> {
 #[repr(C, align(64))]
 struct Junction<T> {
     lanes: T,
-    /// Where the waves come from, and where they go.
-    sources: [u16; 2],
+    /// Which one it is in a lattice.
     slot: u16,
 }
 
@@ -49,7 +51,6 @@ struct Hole<const N: usize> {
 /// One-pole loss at an end of the bore.
 #[derive(Clone)]
 struct End<const N: usize> {
-    offset: u16,
     taken: [f32; N],
     q: [f32; N],
     state: [f32; N],
@@ -72,9 +73,9 @@ pub type Flows<const N: usize> = [[f32; N]; TICK];
 /// The bores of up to `N` voices.
 #[derive(Clone)]
 pub struct LatticeChoir<const N: usize> {
-    ring: Box<[[f32; N]; SPACE]>,
-    mask: u16,
-    base: u16,
+    lines: Lines<N>,
+    /// Who goes on for how long, in this order, until the tick is done.
+    turns: Box<[Turn]>,
     steps: Box<[Junction<Steps<f32, N>>]>,
     /// In the order in which they are processed.
     holes: Box<[Hole<N>]>,
@@ -88,14 +89,12 @@ pub struct LatticeChoir<const N: usize> {
     /// Rows the returning wave of the tuned cell takes, and their change per row.
     delay: [f32; N],
     delay_glide: [f32; N],
-    tuned_source: u16,
+    tuned_line: Line,
     /// Where that wave comes from, and the wave a row before it, while no delay crosses a row in the tick.
     tuned: [u16; N],
     whole: [f32; N],
     before: [f32; N],
     crossing: bool,
-    /// Slots and how many of their last rows may still be heard.
-    lines: Box<[(u16, u16)]>,
     /// Lanes whose holes move in this tick.
     moving: [bool; N],
     avx2: bool,
@@ -105,21 +104,33 @@ impl<const N: usize> LatticeChoir<N> {
     /// Silent bores. Allocates.
     pub fn new(coeffs: &LatticeCoeffs) -> Self {
         let junctions = coeffs.ticks.len() - 1;
+        let lines = Lines::new(coeffs);
         let (mut steps, mut holes) = (Vec::new(), Vec::new());
+        // Each with the places where its waves come from, from left and right, and where they go, down the bore and back.
+        let mut nodes = vec![(Node::Tip, [lines.back(0).begin, 0, lines.down(0).end(), 0]); junctions + 2];
+        let [at_bell, from_bell] = [lines.down(junctions).begin, lines.back(junctions).end()];
+        nodes[junctions + 1] = (Node::Bell, [at_bell, 0, from_bell, 0]);
         let mut by_lane: Vec<usize> = (0..junctions).collect();
         by_lane.sort_by_key(|&junction| coeffs.lane_of(junction));
         for junction in by_lane {
-            let (sources, slot) = (sources_of(coeffs, junction), coeffs.lane_of(junction) as u16);
+            let slot = coeffs.lane_of(junction) as u16;
+            let [down_here, down_next] = [lines.down(junction), lines.down(junction + 1)];
+            let [back_here, back_next] = [lines.back(junction), lines.back(junction + 1)];
+            let is_tuned = junction + 1 == coeffs.tuned_cell();
+            let from_right = if is_tuned { lines.tuned() } else { back_next.begin };
+            let places = [down_here.begin, from_right, down_next.end(), back_here.end()];
             if coeffs.hole_junctions.contains(&junction) {
                 let mut lanes = Holes::<f32, N>::idle();
                 (0..N).for_each(|lane| lanes.place(lane, coeffs, junction));
                 let shut = Shut::new(&lanes);
-                let junction = Junction { lanes, sources, slot };
+                nodes[junction + 1] = (Node::Hole(holes.len() as u16), places);
+                let junction = Junction { lanes, slot };
                 holes.push(Hole { junction, shut, flows: [[0.0; N]; TICK], is_shut: false });
             } else {
                 let mut lanes = Steps::<f32, N>::idle();
                 (0..N).for_each(|lane| lanes.place(lane, coeffs, junction));
-                steps.push(Junction { lanes, sources, slot });
+                nodes[junction + 1] = (Node::Step(steps.len() as u16), places);
+                steps.push(Junction { lanes, slot });
             }
         }
         let first_hole = coeffs.step_chunks() * LANES;
@@ -133,12 +144,11 @@ impl<const N: usize> LatticeChoir<N> {
         let own = Lattice::<f32>::new(coeffs);
         let end = |end: &super::EndLoss<f32>| {
             let [taken, q, state] = [end.taken, end.q, 0.0].map(|of_all| [of_all; N]);
-            End { offset: end.offset, taken, q, state }
+            End { taken, q, state }
         };
+        let tuned_line = lines.back(coeffs.tuned_cell());
         let mut choir = Self {
-            ring: silent_ring(own.mask, [0.0; N], [1.0; N]),
-            mask: own.mask,
-            base: 0,
+            turns: plan(coeffs, &nodes, lines.tuned()).into(),
             steps: steps.into(),
             holes: holes.into(),
             places,
@@ -155,12 +165,12 @@ impl<const N: usize> LatticeChoir<N> {
             sum: [0.0; N],
             delay: [own.delay; N],
             delay_glide: [0.0; N],
-            tuned_source: own.tuned_source,
-            tuned: [own.tuned_source; N],
+            tuned_line,
+            tuned: [tuned_line.begin; N],
             whole: [0.0; N],
             before: [0.0; N],
             crossing: false,
-            lines: lines(coeffs),
+            lines,
             moving: [false; N],
             avx2: own.avx2,
         };
@@ -183,13 +193,8 @@ impl<const N: usize> LatticeChoir<N> {
 
     /// A lattice lends its waves to a lane. Real-time safe.
     pub fn borrow(&mut self, lane: usize, lattice: &mut Lattice<f32>) {
-        for &(slot, rows) in &self.lines {
-            for age in 0..rows {
-                let place = back_rows(u32::from(age), usize::from(slot));
-                let own = lattice.ring[usize::from(lattice.base.wrapping_add(place) & lattice.mask)];
-                self.ring[usize::from(self.base.wrapping_add(place) & self.mask)][lane] = own;
-            }
-        }
+        let ring = |place: u16| lattice.ring[usize::from(lattice.base.wrapping_add(place) & lattice.mask)];
+        self.lines.each_heard_mut(|place, wave| wave[lane] = ring(place));
         for junction in &mut self.steps {
             let (chunk, k) = (usize::from(junction.slot) / LANES, usize::from(junction.slot) % LANES);
             let Some(own) = lattice.steps.get(chunk) else { continue };
@@ -222,13 +227,10 @@ impl<const N: usize> LatticeChoir<N> {
         if !std::mem::take(&mut lattice.lent) {
             return;
         }
-        for &(slot, rows) in &self.lines {
-            for age in 0..rows {
-                let place = back_rows(u32::from(age), usize::from(slot));
-                let wave = self.ring[usize::from(self.base.wrapping_add(place) & self.mask)][lane];
-                lattice.ring[usize::from(lattice.base.wrapping_add(place) & lattice.mask)] = wave;
-            }
-        }
+        let (base, mask) = (lattice.base, lattice.mask);
+        self.lines.each_heard(|place, wave| {
+            lattice.ring[usize::from(base.wrapping_add(place) & mask)] = wave[lane];
+        });
         for junction in &self.steps {
             let (chunk, k) = (usize::from(junction.slot) / LANES, usize::from(junction.slot) % LANES);
             let Some(own) = lattice.steps.get_mut(chunk) else { continue };
@@ -283,9 +285,8 @@ impl<const N: usize> LatticeChoir<N> {
         // after that reading.
         self.crossing |= whole != last.whole() || whole == 0;
         self.whole[lane] = f32::from(whole);
-        self.tuned[lane] = self.tuned_source.wrapping_sub(whole.wrapping_mul(STRIDE as u16));
-        let before = self.base.wrapping_add(self.tuned[lane]) & self.mask;
-        self.before[lane] = self.ring[usize::from(before)][lane];
+        self.tuned[lane] = self.tuned_line.behind(whole);
+        self.before[lane] = self.lines.waves()[usize::from(self.tuned_line.behind(whole + 1))][lane];
     }
 
     /// Ends the tick of a lane. Real-time safe.
@@ -304,26 +305,16 @@ impl<const N: usize> LatticeChoir<N> {
     /// Plays a tick of all lanes that have [begun](Self::begin) it; what the others do is of no account. Real-time safe.
     /// [audio thread]
     pub fn run<T: Tips<N>>(&mut self, tips: &mut T) {
-        match self.mask {
-            LEAST_MASK => self.run_masked::<T, LEAST_MASK>(tips),
-            NEXT_MASK => self.run_masked::<T, NEXT_MASK>(tips),
-            _ => self.run_masked::<T, 0>(tips),
-        }
-    }
-
-    /// See [`Lattice::run_masked`].
-    #[inline(always)]
-    fn run_masked<T: Tips<N>, const MASK: u16>(&mut self, tips: &mut T) {
         #[cfg(target_arch = "x86_64")]
         if self.avx2 {
             #[allow(unsafe_code)]
             // SAFETY: `avx2` is only set where the processor has AVX2.
             unsafe {
-                run_avx2::<T, N, MASK>(self, tips)
+                run_avx2::<T, N>(self, tips)
             };
             return;
         }
-        run_body::<T, N, MASK>(self, tips);
+        run_body::<T, N>(self, tips);
     }
 
     /// Flows out of a hole in the last tick, by its number in the file.
@@ -371,12 +362,7 @@ impl<const N: usize> LatticeChoir<N> {
                 of[k] = if of[k].abs() < least[k] { 0.0 } else { of[k] };
             }
         };
-        for &(slot, rows) in &self.lines {
-            for age in 0..rows {
-                let place = back_rows(u32::from(age), usize::from(slot));
-                flush(&mut self.ring[usize::from(self.base.wrapping_add(place) & self.mask)]);
-            }
-        }
+        self.lines.each_heard_mut(|_, wave| flush(wave));
         self.steps.iter_mut().for_each(|steps| steps.lanes.arrivals.state.iter_mut().for_each(flush));
         for Hole { junction: Junction { lanes, .. }, flows, is_shut, .. } in &mut self.holes {
             lanes.arrivals.state.iter_mut().for_each(flush);
@@ -391,24 +377,10 @@ impl<const N: usize> LatticeChoir<N> {
     }
 }
 
-/// Slots that somebody reads, and how many of their last rows may still be read.
-fn lines(coeffs: &LatticeCoeffs) -> Box<[(u16, u16)]> {
-    let last = coeffs.ticks.len() - 1;
-    let mut lines = Vec::new();
-    for (cell, (down, back)) in coeffs.all_rows().enumerate() {
-        let from_left = if cell == 0 { END_SLOT } else { coeffs.lane_of(cell - 1) };
-        let from_right = BACK + if cell == last { END_SLOT } else { coeffs.lane_of(cell) };
-        // The tuned cell's may become as long as the ring.
-        let back = if cell == coeffs.tuned_cell() { coeffs.ring_rows() } else { back };
-        lines.extend([(from_left as u16, down as u16), (from_right as u16, back as u16)]);
-    }
-    lines.into()
-}
-
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn run_avx2<T: Tips<N>, const N: usize, const MASK: u16>(choir: &mut LatticeChoir<N>, tips: &mut T) {
-    run_body::<T, N, MASK>(choir, tips);
+fn run_avx2<T: Tips<N>, const N: usize>(choir: &mut LatticeChoir<N>, tips: &mut T) {
+    run_body::<T, N>(choir, tips);
 }
 
 impl<const N: usize> End<N> {
@@ -442,68 +414,107 @@ impl<const N: usize> Bell<N> {
     }
 }
 
-#[inline(always)]
-fn run_body<T: Tips<N>, const N: usize, const MASK: u16>(choir: &mut LatticeChoir<N>, tips: &mut T) {
-    let moving = choir.moving.iter().any(|moving| *moving);
-    let ring = &mut *choir.ring;
-    let mask = if MASK == 0 { choir.mask } else { MASK };
-    let row_mask = mask & !(STRIDE as u16 - 1);
-    let mut base = choir.base;
-    for at in 0..TICK {
-        base = base.wrapping_add(STRIDE as u16) & row_mask;
-        let from = |offset: u16| usize::from(base.wrapping_add(offset) & mask);
-        if moving {
-            choir.holes.iter_mut().for_each(|hole| hole.junction.lanes.glide());
+impl<const N: usize> Junction<Steps<f32, N>> {
+    /// Goes on for a turn.
+    #[inline(always)]
+    fn go_on(&mut self, waves: &mut Waves<N>, turn: &Turn) {
+        let [left, right, down, back] = turn.places();
+        let mut state = self.lanes.arrivals.state;
+        for n in 0..turn.samples() {
+            [waves[down + n], waves[back + n]] =
+                self.lanes.scatter_from(&mut state, [waves[left + n], waves[right + n]]);
         }
+        self.lanes.arrivals.state = state;
+    }
+}
 
-        let (mut near, mut far) = ([0.0; N], choir.before);
-        for k in 0..N {
-            choir.delay[k] += choir.delay_glide[k];
-        }
-        if choir.crossing {
-            for k in 0..N {
-                let whole = choir.delay[k].whole();
-                choir.whole[k] = f32::from(whole);
-                let place = choir.tuned_source.wrapping_sub(whole.wrapping_mul(STRIDE as u16));
-                near[k] = ring[from(place)][k];
-                far[k] = ring[from(place.wrapping_sub(STRIDE as u16))][k];
+impl<const N: usize> Hole<N> {
+    /// Goes on for a turn.
+    #[inline(always)]
+    fn go_on(&mut self, waves: &mut Waves<N>, turn: &Turn, moving: bool) {
+        let Self { junction: Junction { lanes, .. }, shut, flows, is_shut } = self;
+        let [left, right, down, back] = turn.places();
+        if *is_shut {
+            let mut state = lanes.still();
+            for n in 0..turn.samples() {
+                let arriving = [waves[left + n], waves[right + n]];
+                [waves[down + n], waves[back + n]] = lanes.scatter_shut(&mut state, shut, arriving);
             }
-        } else {
-            for k in 0..N {
-                near[k] = ring[from(choir.tuned[k])][k];
+            lanes.stay(state);
+            return;
+        }
+        for n in 0..turn.samples() {
+            if moving {
+                lanes.glide();
             }
-        }
-        choir.before = near;
-        let mut tuned = near;
-        for k in 0..N {
-            let part = choir.delay[k] - choir.whole[k];
-            tuned[k] += part * (far[k] - near[k]);
-        }
-        ring[usize::from(base | TUNED_SLOT as u16)] = tuned;
-
-        let p_minus = choir.tip.take(ring[from(choir.tip.offset)]);
-        ring[usize::from(base | END_SLOT as u16)] = tips.reflect(at, &p_minus);
-        let arriving = choir.end.take(ring[from(choir.end.offset)]);
-        ring[usize::from(base | (BACK + END_SLOT) as u16)] = choir.bell.reflect(at, arriving);
-
-        for Junction { lanes, sources, slot } in &mut *choir.steps {
-            let [down, back] = lanes.scatter(sources.map(|offset| ring[from(offset)]));
-            ring[usize::from(base | *slot)] = down;
-            ring[usize::from(base | *slot | BACK as u16)] = back;
-        }
-        for Hole { junction: Junction { lanes, sources, slot }, shut, flows, is_shut } in &mut *choir.holes {
-            let arriving = sources.map(|offset| ring[from(offset)]);
-            let [down, back];
-            if *is_shut {
-                [down, back] = lanes.scatter_shut(shut, arriving);
-            } else {
-                ([down, back], flows[at]) = lanes.scatter(arriving);
-            }
-            ring[usize::from(base | *slot)] = down;
-            ring[usize::from(base | *slot | BACK as u16)] = back;
+            let (leaving, flow) = lanes.scatter([waves[left + n], waves[right + n]]);
+            [waves[down + n], waves[back + n]] = leaving;
+            flows[turn.at(n)] = flow;
         }
     }
-    choir.base = base;
+}
+
+#[inline(always)]
+fn run_body<T: Tips<N>, const N: usize>(choir: &mut LatticeChoir<N>, tips: &mut T) {
+    let moving = choir.moving.iter().any(|moving| *moving);
+    let waves = choir.lines.waves_mut();
+    for turn in &choir.turns {
+        match turn.node {
+            Node::Step(step) => {
+                if let Some(step) = choir.steps.get_mut(usize::from(step)) {
+                    step.go_on(waves, turn);
+                }
+            }
+            Node::Hole(hole) => {
+                if let Some(hole) = choir.holes.get_mut(usize::from(hole)) {
+                    hole.go_on(waves, turn, moving);
+                }
+            }
+            Node::Tuned => {
+                let [_, _, target, _] = turn.places();
+                for n in 0..turn.samples() {
+                    let (mut near, mut far) = ([0.0; N], choir.before);
+                    for k in 0..N {
+                        choir.delay[k] += choir.delay_glide[k];
+                    }
+                    if choir.crossing {
+                        for k in 0..N {
+                            let whole = choir.delay[k].whole();
+                            choir.whole[k] = f32::from(whole);
+                            near[k] = waves[turn.place(choir.tuned_line.behind(whole)) + n][k];
+                            far[k] = waves[turn.place(choir.tuned_line.behind(whole + 1)) + n][k];
+                        }
+                    } else {
+                        for k in 0..N {
+                            near[k] = waves[turn.place(choir.tuned[k]) + n][k];
+                        }
+                    }
+                    choir.before = near;
+                    let mut tuned = near;
+                    for k in 0..N {
+                        let part = choir.delay[k] - choir.whole[k];
+                        tuned[k] += part * (far[k] - near[k]);
+                    }
+                    waves[target + n] = tuned;
+                }
+            }
+            Node::Tip => {
+                let [source, _, target, _] = turn.places();
+                for n in 0..turn.samples() {
+                    let p_minus = choir.tip.take(waves[source + n]);
+                    waves[target + n] = tips.reflect(turn.at(n), &p_minus);
+                }
+            }
+            Node::Bell => {
+                let [source, _, target, _] = turn.places();
+                for n in 0..turn.samples() {
+                    let arriving = choir.end.take(waves[source + n]);
+                    waves[target + n] = choir.bell.reflect(turn.at(n), arriving);
+                }
+            }
+        }
+    }
+    choir.lines.advance();
     choir.sum = choir.add(TICK - 1);
     tips.ended(choir);
 }

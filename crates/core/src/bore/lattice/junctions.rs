@@ -93,20 +93,38 @@ impl<F: Real, const N: usize> Arrivals<F, N> {
 
     /// Waves arriving on one side, after their cell's loss.
     #[inline(always)]
-    pub(super) fn lose<const SIDE: usize>(&mut self, mut wave: [F; N]) -> [F; N] {
-        let (taken, q, state) = (&self.taken[SIDE], &self.q[SIDE], &mut self.state[SIDE]);
-        for k in 0..N {
-            let difference = wave[k] - state[k];
-            state[k] = state[k] + q[k] * difference;
-            wave[k] = wave[k] - taken[k] * difference;
-        }
-        wave
+    pub(super) fn lose<const SIDE: usize>(&mut self, wave: [F; N]) -> [F; N] {
+        lose(&self.taken[SIDE], &self.q[SIDE], &mut self.state[SIDE], wave)
+    }
+
+    /// As [`lose`](Self::lose), with a state that is kept elsewhere.
+    #[inline(always)]
+    fn lose_from(
+        &self,
+        [state_left, state_right]: &mut [[F; N]; 2],
+        [left, right]: [[F; N]; 2],
+    ) -> [[F; N]; 2] {
+        [
+            lose(&self.taken[0], &self.q[0], state_left, left),
+            lose(&self.taken[1], &self.q[1], state_right, right),
+        ]
     }
 
     #[inline(always)]
     pub(super) fn flush(&mut self) {
         self.state.iter_mut().flatten().for_each(flush);
     }
+}
+
+/// One side of [`Arrivals`].
+#[inline(always)]
+fn lose<F: Real, const N: usize>(taken: &[F; N], q: &[F; N], state: &mut [F; N], mut wave: [F; N]) -> [F; N] {
+    for k in 0..N {
+        let difference = wave[k] - state[k];
+        state[k] = state[k] + q[k] * difference;
+        wave[k] = wave[k] - taken[k] * difference;
+    }
+    wave
 }
 
 /// Written unconditionally: only so do loops over it become vectors.
@@ -150,9 +168,17 @@ impl<F: Real, const N: usize> Steps<F, N> {
 
     /// Waves that arrive from left and right leave downwards and back.
     #[inline(always)]
-    pub(super) fn scatter(&mut self, [left, right]: [[F; N]; 2]) -> [[F; N]; 2] {
-        let left = self.arrivals.lose::<0>(left);
-        let right = self.arrivals.lose::<1>(right);
+    pub(super) fn scatter(&mut self, arriving: [[F; N]; 2]) -> [[F; N]; 2] {
+        let mut state = self.arrivals.state;
+        let leaving = self.scatter_from(&mut state, arriving);
+        self.arrivals.state = state;
+        leaving
+    }
+
+    /// As [`scatter`](Self::scatter), with a state that is kept elsewhere.
+    #[inline(always)]
+    pub(super) fn scatter_from(&self, state: &mut [[F; N]; 2], arriving: [[F; N]; 2]) -> [[F; N]; 2] {
+        let [left, right] = self.arrivals.lose_from(state, arriving);
         let (mut down, mut back) = ([F::default(); N], [F::default(); N]);
         for k in 0..N {
             let difference = left[k] - right[k];
@@ -323,22 +349,38 @@ impl<F: Real, const N: usize> Holes<F, N> {
         is_still && !self.is_open(k)
     }
 
+    /// What changes in lanes that are all [shut](Self::is_shut).
+    #[inline(always)]
+    pub(super) fn still(&self) -> Still<F, N> {
+        Still { arrivals: self.arrivals.state, compliance: self.compliance, inner: self.inner }
+    }
+
+    /// Takes over what has changed in lanes that are all shut.
+    #[inline(always)]
+    pub(super) fn stay(&mut self, still: Still<F, N>) {
+        (self.arrivals.state, self.compliance, self.inner) = (still.arrivals, still.compliance, still.inner);
+    }
+
     /// As [`scatter`](Self::scatter) for lanes that are all [shut](Self::is_shut), to the bit: nothing leaves outside.
     #[inline(always)]
-    pub(super) fn scatter_shut(&mut self, shut: &Shut<F, N>, [left, right]: [[F; N]; 2]) -> [[F; N]; 2] {
-        let left = self.arrivals.lose::<0>(left);
-        let right = self.arrivals.lose::<1>(right);
+    pub(super) fn scatter_shut(
+        &self,
+        still: &mut Still<F, N>,
+        shut: &Shut<F, N>,
+        arriving: [[F; N]; 2],
+    ) -> [[F; N]; 2] {
+        let [left, right] = self.arrivals.lose_from(&mut still.arrivals, arriving);
         let [mut down, mut back] = [[F::default(); N]; 2];
         for k in 0..N {
-            let (gp, w, inner) = (self.gc[k], shut.w[k], self.inner[k]);
+            let (gp, w, inner) = (self.gc[k], shut.w[k], still.inner[k]);
             // What flows outside is a positive zero, which takes the sign from a negative one.
-            let source = self.compliance[k] + F::default() - gp * inner;
+            let source = still.compliance[k] + F::default() - gp * inner;
             let arriving = self.y_left[k] * left[k] + self.y_right[k] * right[k];
             let p = (arriving * w - source) / shut.divisor[k];
             let rise = shut.rise[k] * (gp * p + source);
             let node = p - inner + rise;
-            self.compliance[k] = self.minus_gc2[k] * node - self.compliance[k];
-            self.inner[k] = rise + rise - inner;
+            still.compliance[k] = self.minus_gc2[k] * node - still.compliance[k];
+            still.inner[k] = rise + rise - inner;
             down[k] = p - right[k];
             back[k] = p - left[k];
         }
@@ -382,6 +424,13 @@ impl<F: Real, const N: usize> Holes<F, N> {
         }
         ([down, back], radiated)
     }
+}
+
+/// What changes in shut holes.
+pub(super) struct Still<F, const N: usize> {
+    arrivals: [[F; N]; 2],
+    compliance: [F; N],
+    inner: [F; N],
 }
 
 /// What closed holes have in common with themselves: results of [`Holes::scatter`] that do not change while they are shut.
