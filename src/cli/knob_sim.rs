@@ -94,7 +94,7 @@ struct DeedArgs {
 
 /// The hand.
 #[derive(Args)]
-#[command(next_help_heading = "SimulatedHand")]
+#[command(next_help_heading = "Simulated hand")]
 struct HandArgs {
     #[command(flatten)]
     deed: DeedArgs,

@@ -1,4 +1,4 @@
-//! `chalumeau knob-sim` as a user and a host meet it. TorqueLimits of time are those of a very busy machine.
+//! `chalumeau knob-sim` as a user and a host meet it. Limits of time are those of a very busy machine.
 
 use chalumeau_firmware::Setup;
 use chalumeau_knob::device::memory;
