@@ -641,7 +641,10 @@ fn several_players_play_a_chord_and_one_its_last_key() {
     let keys = [58, 62, 65];
     fs::write(d.path().join("chord.mid"), chord(keys)).unwrap();
     let power = |flags: &str| {
-        succeeds(d.path(), &format!("render chord.mid --rate 48000 --force --no-noise --out c.wav {flags}"));
+        succeeds(
+            d.path(),
+            &format!("render chord.mid --rate 48000 --channels 1 --force --no-noise --out c.wav {flags}"),
+        );
         let sound: Vec<f64> = hound::WavReader::open(d.path().join("c.wav"))
             .unwrap()
             .into_samples::<f32>()

@@ -452,7 +452,8 @@ fn run_body<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, sampl
 
         // The returning wave of the tuned cell, delayed by whole rows and a linear part between two.
         lattice.delay = lattice.delay + lattice.delay_glide;
-        let whole = lattice.delay.whole();
+        // Rounding may take a delay that ends at one row, the shortest, below it; the wave of this row is not there yet.
+        let whole = lattice.delay.whole().max(1);
         let part = lattice.delay - F::from(whole);
         let near = lattice.tuned_source.wrapping_add(base).wrapping_sub(whole.wrapping_mul(STRIDE as u16));
         let (near, far) = (near & mask, near.wrapping_sub(STRIDE as u16) & mask);

@@ -1,5 +1,5 @@
 //! Independent work with one voice each, several of them at once: their voices are computed side by side, in the lanes of a
-//! [`Choir`], although each goes its own way and takes its own time.
+//! `Choir`, although each goes its own way and takes its own time.
 //!
 //! A piece of work is an `async` function with a [`Stand`]. Wherever it needs a tick of its voice it waits; when all have got
 //! there, one tick of the choir serves them. A voice gives the bits that it gives alone, so results depend neither on who stands

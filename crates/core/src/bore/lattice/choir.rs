@@ -280,10 +280,8 @@ impl<const N: usize> LatticeChoir<N> {
         // The delay goes one way, so that its ends tell whether it crosses a row.
         let (glide, mut last) = (lattice.delay_glide, lattice.delay);
         (0..TICK).for_each(|_| last += glide);
-        let whole = (lattice.delay + glide).whole();
-        // Below one row, which rounding reaches where a delay ends at one, the wave a row before is not the one read last: it is written
-        // after that reading.
-        self.crossing |= whole != last.whole() || whole == 0;
+        let whole = (lattice.delay + glide).whole().max(1);
+        self.crossing |= whole != last.whole().max(1);
         self.whole[lane] = f32::from(whole);
         self.tuned[lane] = self.tuned_line.behind(whole);
         self.before[lane] = self.lines.waves()[usize::from(self.tuned_line.behind(whole + 1))][lane];
@@ -479,7 +477,7 @@ fn run_body<T: Tips<N>, const N: usize>(choir: &mut LatticeChoir<N>, tips: &mut 
                     }
                     if choir.crossing {
                         for k in 0..N {
-                            let whole = choir.delay[k].whole();
+                            let whole = choir.delay[k].whole().max(1);
                             choir.whole[k] = f32::from(whole);
                             near[k] = waves[turn.place(choir.tuned_line.behind(whole)) + n][k];
                             far[k] = waves[turn.place(choir.tuned_line.behind(whole + 1)) + n][k];
