@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Fails when the whole instrument, heard from everywhere or from two places, costs more instructions per internal sample
-# (96 kHz) than it may, when a screen that watches it costs the audio thread more than 1.2 %, or when several players
-# cost more voices than they may.
+# (96 kHz) than it may, when a screen that watches it costs the audio thread more than 1.2 %, or when growl and vocal tract, or
+# several players, cost more than they may.
 #
 #   benches/instructions.sh [RATE]      host rate, default 48000
 #
@@ -12,10 +12,13 @@ export LC_ALL=C
 
 rate=${1:-48000}
 # Of a note that lives and moves, as it does by default.
-declare -A most=([avx2]=957 [plain]=1505 ["avx2 places"]=1045 ["plain places"]=1610)
+declare -A most=([avx2]=961 [plain]=1505 ["avx2 places"]=1045 ["plain places"]=1610)
+
+# What growl and vocal tract add together.
+declare -A most_techniques=([avx2]=70 [plain]=88)
 
 # Players in unison, in hundredths of the cost of one voice.
-declare -A most_players=(["avx2 8"]=504 ["avx2 16"]=1080 ["plain 8"]=620 ["plain 16"]=1240)
+declare -A most_players=(["avx2 8"]=508 ["avx2 16"]=1080 ["plain 8"]=620 ["plain 16"]=1240)
 
 if ! command -v valgrind >/dev/null; then
     echo "cannot count instructions without valgrind: apt-get install valgrind" >&2
@@ -28,8 +31,8 @@ program=$target/plugin/examples/instructions
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 
-collected() { # SECONDS avx2|plain [watched] [places] [PLAYERS] -> instructions of the whole run
-    local run=("$program" "$1" "$rate" "$2" 0 "${3:-}" "${4:-}" "${5:-1}")
+collected() { # SECONDS avx2|plain [watched] [places] [PLAYERS] [techniques] -> instructions of the whole run
+    local run=("$program" "$1" "$rate" "$2" 0 "${3:-}" "${4:-}" "${5:-1}" "${6:-}")
     if ! valgrind --tool=callgrind --callgrind-out-file=/dev/null "${run[@]}" >/dev/null 2>"$log"; then
         cat "$log" >&2
         return 1
@@ -72,6 +75,15 @@ for path in "${paths[@]}"; do
         failed=1
     fi
     echo "$path: $(printf '%d.%02d' $((more / 100)) $((more % 100))) % more while watched, at most 1.2 %: $verdict"
+    short=$(collected 0.5 "$path" "" "" 1 techniques)
+    long=$(collected 1.5 "$path" "" "" 1 techniques)
+    more=$(((long - short - alone) / 96000))
+    verdict=ok
+    if ((more > ${most_techniques[$path]})); then
+        verdict="too many"
+        failed=1
+    fi
+    echo "$path: $more more with growl and vocal tract, at most ${most_techniques[$path]}: $verdict"
     for players in 8 16; do
         short=$(collected 0.5 "$path" "" "" $players)
         long=$(collected 1.0 "$path" "" "" $players)

@@ -14,7 +14,7 @@ use std::hint::black_box;
 use chalumeau_core::event::{Event, PartEvent, To};
 use chalumeau_core::instrument::scope::{SCOPE_SAMPLES, ScopeSample};
 use chalumeau_core::instrument::{
-    Channels, Clarinet, Ensemble, Listening, ListeningMode, Players, Settings, Split,
+    Channels, Clarinet, Ensemble, Listening, ListeningMode, Players, Settings, Split, Techniques, Tract,
 };
 use chalumeau_core::units::WrittenNote;
 
@@ -106,7 +106,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let seconds: f64 = arguments
         .next()
-        .ok_or("usage: instructions SECONDS [RATE] [avx2|plain] [BEND] [watched] [point|places] [PLAYERS] [chord]")?
+        .ok_or("usage: instructions SECONDS [RATE] [avx2|plain] [BEND] [watched] [point|places] [PLAYERS] [chord|techniques]")?
         .parse()?;
     let rate_hz: f64 = arguments.next().as_deref().unwrap_or("48000").parse()?;
     let plain = arguments.next().is_some_and(|word| word == "plain");
@@ -118,14 +118,19 @@ fn main() -> Result<(), Box<dyn Error>> {
         _ => ListeningMode::Everywhere,
     };
     let count: i32 = arguments.next().as_deref().unwrap_or("1").parse()?;
-    let chord = arguments.next().is_some_and(|word| word == "chord");
+    let how = arguments.next();
+    let chord = how.as_deref() == Some("chord");
+    // A player who growls through a vocal tract that is half tuned to the note.
+    let voicing = if how.as_deref() == Some("techniques") { 0.5 } else { 0.0 };
     let blocks = (seconds * rate_hz / BLOCK as f64).round() as usize;
 
     let listening = Listening { mode, ..Listening::default() };
     let split = if chord { Split::Chords } else { Split::Unison };
     let players = Players { count, split, ..Players::default() };
     let mut who = Who::new(rate_hz, count, plain)?;
-    who.set_settings(&Settings { listening, players, ..Settings::default() });
+    let techniques = Techniques { growl: voicing, ..Techniques::default() };
+    let tract = Tract { amount: voicing, ..Tract::default() };
+    who.set_settings(&Settings { listening, players, techniques, tract, ..Settings::default() });
     who.apply(Event::Bend { cents: bend_cents }.into());
     who.apply(Event::Breath(0.5).into());
     // In unison each event is for all of them: one note is enough.
