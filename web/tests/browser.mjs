@@ -78,13 +78,18 @@ async function dragHole(browser, withFit) {
     addEventListener('moved', ({ detail }) => globalThis.heard.push(detail));
   });
   await page.click('#holes');
-  // By hand first: the hole follows the pointer.
-  const at = await page.evaluate((hole) => {
+  // By hand first: the hole follows the pointer. The clarinet is drawn anew for the room that the button leaves: wait for it.
+  const seen = () => page.evaluate((hole) => {
     const box = document.getElementById('clarinet').getBoundingClientRect();
     const { drawing, holes } = globalThis.chalumeau.holes;
     const [x, y] = drawing.place(holes[hole]);
     return [box.left + x, box.top + y, drawing.scale];
   }, golden.hole);
+  let at;
+  do {
+    at = await seen();
+    await page.waitForTimeout(100);
+  } while (String(at) !== String(await seen()));
   await page.mouse.move(at[0], at[1]);
   await page.mouse.down();
   await page.mouse.move(at[0] - 0.003 * at[2], at[1], { steps: 4 });
