@@ -155,7 +155,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("legato", BREATH, "Legato", number([5.0, 15.0], 8.0, 1, " ms"))
         .help(
             "Time in which the fingers move between slurred notes",
-            "Holes open and close over this time. In a long slur the notes between speak as well.",
+            "Holes open and close over this time. In a long slur the notes between speak as well. Where the breath response is Played, the player takes half of it up over the break, and 1.8 times as long for a loud leap down into the low chalumeau.",
             "The torque changes from one note's curve to the next note's.",
         )
         .sets(Sets::Number(SettingNumber::LegatoMs))
@@ -358,7 +358,7 @@ pub static PARAMETERS: &[Parameter] = &[
         .help("Noise of the breath in the reed channel", "Adds the sound of air.", "")
         .sets(Sets::Number(SettingNumber::Noise))
         .flag("--noise"),
-    entry("gain", OUTPUT, "Gain", number([-60.0, 24.0], 0.0, 1, " dB"))
+    entry("gain", OUTPUT, "Gain", number([-60.0, 24.0], -1.0, 1, " dB"))
         .help("Output level", "At 0 dB, 1 Pa at a distance of 1 m is -6 dBFS.", "")
         .sets(Sets::Number(SettingNumber::GainDb))
         .flag("--gain-db"),

@@ -1,8 +1,11 @@
-//! One note on a grid of flow strength and mouth pressure, and what lies between the points.
+//! One note on a grid of opening, flow strength and mouth pressure, and what lies between the points.
+//!
+//! The opening belongs to the grid because not everything goes with the closing pressure: jets in the open holes take more from a loud note,
+//! and the knee of the lay is a smaller share of a wider opening.
 
 use chalumeau_core::analysis::{pitch, spectrum};
 use chalumeau_core::instrument::held_note::{HeldNote, Start};
-use chalumeau_core::instrument::player::dynamics::LipShape;
+use chalumeau_core::instrument::player::dynamics::{LipShape, PlayerModel};
 use chalumeau_core::instrument::{Listening, Model};
 use chalumeau_core::reed::ReedLaw;
 use chalumeau_core::reed::physical::ZETA_REFERENCE;
@@ -12,6 +15,9 @@ use chalumeau_core::units::{SoundingNote, cents};
 pub const HARMONICS: usize = 12;
 /// Flow strengths of the grid.
 const ZETAS: [f64; 6] = [0.14, 0.2, 0.28, 0.38, 0.5, 0.66];
+/// Openings of the grid over the rest opening of the reed: of a lip at mezzo-forte and at fortissimo; with the lowest mouth pressure that
+/// is played with each.
+const OPENINGS: [(f64, f64); 2] = [(0.87, 0.0), (1.63, 0.5)];
 /// Time until a note is steady, and time that it is heard, s.
 const HEARD_S: (f64, f64) = (1.0, 1.3);
 /// A note further off than this is another one, cents.
@@ -29,13 +35,13 @@ fn gammas() -> impl Iterator<Item = f64> {
 /// A steady note.
 #[derive(Clone, Copy, Debug)]
 pub struct PlayedSpectrum {
-    /// Level of the radiated pressure, dB re 1 Pa.
+    /// Level of the radiated pressure, dB re 1 Pa at the reference closing pressure, as all levels here.
     pub level_db: f64,
-    /// Levels of harmonics 1.., dB re 1 Pa.
+    /// Levels of harmonics 1.., dB.
     pub harmonics_db: [f64; HARMONICS],
 }
 
-/// One note on the grid, at the reference closing pressure.
+/// One note on the grid.
 pub struct NoteSpectra {
     /// Sounding note, MIDI.
     pub midi: u8,
@@ -43,8 +49,8 @@ pub struct NoteSpectra {
     pub f0_hz: f64,
     /// Place over the lowest note, as the player's rule has it.
     pub place: f64,
-    /// For each of [`ZETAS`]: mouth pressures at which the note sounds, rising, and its spectrum.
-    rows: Vec<Vec<(f64, PlayedSpectrum)>>,
+    /// For each of [`OPENINGS`] and [`ZETAS`]: mouth pressures at which the note sounds, rising, and its spectrum.
+    rows: Vec<Vec<Vec<(f64, PlayedSpectrum)>>>,
 }
 
 impl PlayedSpectrum {
@@ -63,7 +69,7 @@ impl PlayedSpectrum {
         moment / sum
     }
 
-    fn hear(model: &Model, held: &HeldNote, wanted_hz: f64) -> Option<Self> {
+    fn hear(model: &Model, held: &HeldNote, opening: f64, wanted_hz: f64) -> Option<Self> {
         let rate_hz = model.coeffs.rate_hz;
         let sound = held.radiated(model, HEARD_S.0, HEARD_S.1);
         let hz = pitch::fundamental_hz(&sound, rate_hz)?;
@@ -73,7 +79,7 @@ impl PlayedSpectrum {
         if !is_own || relative.len() < HARMONICS {
             return None;
         }
-        let level_db = spectrum::rms_dbfs(&sound);
+        let level_db = spectrum::rms_dbfs(&sound) - 20.0 * opening.log10();
         // The levels are relative to the strongest: their powers add up to that of the whole.
         let sum: f64 = relative.iter().map(|level| 10.0_f64.powf(0.1 * level)).sum();
         let strongest_db = level_db - 10.0 * sum.log10();
@@ -87,40 +93,61 @@ impl NoteSpectra {
     pub fn play(model: &Model, midi: u8) -> Option<Self> {
         let fingering = model.fingering_for(SoundingNote(midi))?;
         let (place, f0_hz) = (model.place(fingering), model.notes_hz[fingering]);
-        let row = |zeta: f64| {
-            // The lip of the rule, at the reference closing pressure.
-            let lip = LipShape { opening: 1.0, channel: zeta / ZETA_REFERENCE };
+        let row = |zeta: f64, (opening, lowest): (f64, f64)| {
+            let channel = zeta / ZETA_REFERENCE / opening.sqrt();
+            let lip = LipShape { opening, channel, knee: PlayerModel::FITTED.knee_at(place, opening) };
             let point = |gamma: f64| {
+                let new = HeldNote::new(model, fingering, gamma);
                 let held = HeldNote {
                     law: lip.law(ReedLaw::default()),
                     zeta: ZETA_REFERENCE * lip.channel,
+                    lay: new.lay * lip.knee,
                     start: Start::Tongued(2.0),
                     listening: Listening::default(),
-                    ..HeldNote::new(model, fingering, gamma)
+                    ..new
                 };
-                Some((gamma, PlayedSpectrum::hear(model, &held, f0_hz)?))
+                Some((gamma, PlayedSpectrum::hear(model, &held, opening, f0_hz)?))
             };
-            gammas().filter_map(point).collect()
+            gammas().filter(|&gamma| gamma >= lowest).filter_map(point).collect()
         };
-        Some(Self { midi, f0_hz, place, rows: ZETAS.into_iter().map(row).collect() })
+        let layer = |opening| ZETAS.into_iter().map(|zeta| row(zeta, opening)).collect();
+        Some(Self { midi, f0_hz, place, rows: OPENINGS.into_iter().map(layer).collect() })
     }
 
-    /// At a flow strength, by lines in its logarithm between two rows of the grid.
+    /// At a flow strength and an opening, by lines in their logarithms.
     fn at(
         &self,
+        zeta: f64,
+        opening: f64,
+        in_row: impl Fn(&[(f64, PlayedSpectrum)]) -> Option<PlayedSpectrum>,
+    ) -> Option<PlayedSpectrum> {
+        let [(narrow, _), (wide, _)] = OPENINGS;
+        let way = ((opening / narrow).ln() / (wide / narrow).ln()).clamp(0.0, 1.0);
+        let narrow = || Self::in_layer(self.rows.first()?, zeta, &in_row);
+        let wide = || Self::in_layer(self.rows.last()?, zeta, &in_row);
+        match way {
+            0.0 => narrow(),
+            1.0 => wide(),
+            way => Some(narrow()?.mixed(&wide()?, way)),
+        }
+    }
+
+    /// At a flow strength, by lines in its logarithm between two rows.
+    fn in_layer(
+        rows: &[Vec<(f64, PlayedSpectrum)>],
         zeta: f64,
         in_row: impl Fn(&[(f64, PlayedSpectrum)]) -> Option<PlayedSpectrum>,
     ) -> Option<PlayedSpectrum> {
         let right = ZETAS.partition_point(|&at| at < zeta).clamp(1, ZETAS.len() - 1);
         let (low, high) = (ZETAS[right - 1].ln(), ZETAS[right].ln());
         let way = ((zeta.ln() - low) / (high - low)).clamp(0.0, 1.0);
-        let low = in_row(&self.rows[right - 1])?;
-        Some(if way == 0.0 { low } else { low.mixed(&in_row(&self.rows[right])?, way) })
+        let low = in_row(&rows[right - 1])?;
+        Some(if way == 0.0 { low } else { low.mixed(&in_row(&rows[right])?, way) })
     }
 
     /// At a mouth pressure; `None` if the note does not sound there.
-    pub fn at_gamma(&self, zeta: f64, gamma: f64) -> Option<PlayedSpectrum> {
-        self.at(zeta, |row| {
+    pub fn at_gamma(&self, zeta: f64, opening: f64, gamma: f64) -> Option<PlayedSpectrum> {
+        self.at(zeta, opening, |row| {
             let right = row.partition_point(|(at, _)| *at < gamma).min(row.len().checked_sub(1)?).max(1);
             let ((low, below), (high, above)) = (row.get(right - 1)?, row.get(right)?);
             let way = (gamma - low) / (high - low);
@@ -129,8 +156,8 @@ impl NoteSpectra {
     }
 
     /// At a level, on the way up; below the softest point the harmonics fall as near a threshold, the n-th n times as fast.
-    pub fn at_level(&self, zeta: f64, level_db: f64) -> Option<PlayedSpectrum> {
-        self.at(zeta, |row| {
+    pub fn at_level(&self, zeta: f64, opening: f64, level_db: f64) -> Option<PlayedSpectrum> {
+        self.at(zeta, opening, |row| {
             let (_, softest) = row.first()?;
             if level_db < softest.level_db {
                 let fall = level_db - softest.level_db;

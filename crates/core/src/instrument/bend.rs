@@ -114,7 +114,7 @@ mod tests {
             };
             let (up, down) = (limits(1.0), limits(-1.0));
             println!("{response:?}: up {up:.0?}\ndown {down:.0?}");
-            assert!(up.iter().chain(&down).all(|limit| (10.0..=LIP_CENTS).contains(limit)));
+            assert!(up.iter().chain(&down).all(|limit| (8.0..=LIP_CENTS).contains(limit)));
             for (note, limit) in up.into_iter().enumerate() {
                 let trim = model.tuning.notes[note];
                 let rows = trim.natural + trim.sensitivity * model.rows_for_cents(note, limit);

@@ -78,7 +78,8 @@ impl HeldNote {
         let lip = model.player.lip(model.place(fingering), dynamic);
         let law = lip.law(ReedLaw::default());
         let listening = Listening::default();
-        Self { law, zeta: ZETA_REFERENCE * lip.channel, listening, ..Self::new(model, fingering, gamma) }
+        let new = Self::new(model, fingering, gamma);
+        Self { law, zeta: new.zeta * lip.channel, lay: new.lay * lip.knee, listening, ..new }
     }
 
     /// The reed under the lip of this note.

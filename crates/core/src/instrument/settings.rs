@@ -108,7 +108,7 @@ pub struct Settings {
     pub temperature_c: f32,
     /// Nonlinear flow loss K of open holes, 0..=4. At 0 fewer notes of clarion and altissimo hold their register. Default 2.
     pub vent_loss: f32,
-    /// Output gain, dB, -60..=24. At 0 dB, the default, 1 Pa at 1 m from a B flat clarinet is -6 dBFS.
+    /// Output gain, dB, -60..=24. At 0 dB 1 Pa at 1 m from a B flat clarinet is -6 dBFS. Default -1: the loudest keys stay below the limiter.
     pub gain_db: f32,
     /// Where the instrument is heard from.
     pub listening: Listening,
@@ -165,7 +165,7 @@ impl Default for Settings {
             tuning: Tuning::Tempered,
             temperature_c: 25.0,
             vent_loss: 2.0,
-            gain_db: 0.0,
+            gain_db: -1.0,
             listening: Listening::default(),
             reach: Reach::default(),
             room: Room::default(),
@@ -286,6 +286,7 @@ impl Settings {
             reed_k: k,
             coupled: false,
             zeta: self.zeta * lip.channel as f32,
+            lay: self.lay * lip.knee as f32,
             ..self
         }
         .clamped()
@@ -441,10 +442,10 @@ mod tests {
 
     #[test]
     fn a_lip_moves_the_closing_pressure_by_its_factors() {
-        let lip = LipShape { opening: 1.2, channel: 1.2 };
+        let lip = LipShape { opening: 1.2, channel: 1.2, knee: 0.8 };
         let shaped = Settings::default().under_lip(Some(lip));
         assert!((shaped.closing_pa() / (1.2 * Settings::default().closing_pa()) - 1.0).abs() < 1e-6);
-        assert!((shaped.zeta - 0.36).abs() < 1e-6);
+        assert!((shaped.zeta - 0.36).abs() < 1e-6 && (shaped.lay - 0.32).abs() < 1e-6);
         assert_eq!(Settings::default().under_lip(None), Settings::default());
     }
 

@@ -12,12 +12,16 @@
 //! | mouth over closing pressure at `d` = 1 | `g0 + g1 x + g2 x^2` |
 //! | flow strength zeta of the reed under the lip | `exp(z0 + z1 x + (z2 + z3 x) d)` |
 //! | closing pressure over the reed's own | `c0 c1^(d^3)` |
+//! | half-width of the knee of the lay over the rest opening | `lay f / closing` |
 //!
 //! The closing pressure rises because the jaw opens: the rest opening grows and the stiffness stays. So the air that the
 //! reed displaces stays the same, and with it the modes of the bore: a *stiffer* reed of the same closing pressure lost
-//! written A5 to another register. From the top of the clarion up the flow strength goes over to
-//! [`PlayerModel::altissimo_zeta`], at which soft notes keep their register. `cargo xtask fit-player` fits the numbers to
-//! recorded notes; `docs/tone.md` tells how and what they bought.
+//! written A5 to another register. The knee of the lay is a length on the mouthpiece: measured with various lip forces, a reed on
+//! its lay has one characteristic, which the lip only shifts (Gazengel, Dalmont, Gaillard, Brasseur and Taillard, *Characterization of single
+//! reed mouthpiece interaction in quasi-static regime*). So the further the lip lets the reed open, the smaller a share of the opening the
+//! knee is, and the sharper the reed closes. From the top of the clarion up the flow strength goes over to
+//! [`PlayerModel::altissimo_zeta`], at which soft notes keep their register, and the knee to that of the settings. `cargo xtask fit-player`
+//! fits the numbers to recorded notes; `docs/tone.md` tells how and what they bought.
 
 use crate::reed::ReedLaw;
 use crate::reed::physical::ZETA_REFERENCE;
@@ -61,6 +65,8 @@ pub struct PlayerModel {
     pub closing: [f64; 2],
     /// Flow strength in the altissimo, at every dynamic.
     pub altissimo_zeta: f64,
+    /// Half-width of the knee of the lay over that of the settings, where the closing pressure is the reed's own.
+    pub knee: f64,
 }
 
 /// The reed as a player's lip shapes it: factors on a reed's own numbers.
@@ -70,6 +76,8 @@ pub struct LipShape {
     pub opening: f64,
     /// On the embouchure parameter zeta of the channel, so that the flow strength is the rule's.
     pub channel: f64,
+    /// On the half-width of the knee of the lay, over the rest opening.
+    pub knee: f64,
 }
 
 impl PlayerModel {
@@ -112,11 +120,26 @@ impl PlayerModel {
         soft * growth.powf(dynamic * dynamic * dynamic)
     }
 
+    /// Half-width of the knee of the lay over the rest opening, over that of the settings.
+    pub fn knee(&self, place: f64, dynamic: f64) -> f64 {
+        self.knee_at(place, self.closing(dynamic))
+    }
+
+    /// The same under a lip that opens the reed by this factor.
+    pub fn knee_at(&self, place: f64, opening: f64) -> f64 {
+        let below = self.knee / opening;
+        match in_altissimo(place) {
+            0.0 => below,
+            way => below.powf(1.0 - way),
+        }
+    }
+
     /// The lip at a dynamic. Real-time safe.
     pub fn lip(&self, place: f64, dynamic: f64) -> LipShape {
         // Closing pressure and opening go together; the flow strength goes with the opening over the root of the pressure.
         let opening = self.closing(dynamic);
-        LipShape { opening, channel: self.zeta(place, dynamic) / ZETA_REFERENCE / opening.sqrt() }
+        let channel = self.zeta(place, dynamic) / ZETA_REFERENCE / opening.sqrt();
+        LipShape { opening, channel, knee: self.knee(place, dynamic) }
     }
 }
 

@@ -8,7 +8,7 @@
 
 /// Mouth over closing pressure for a distance of 1 neper. The amplitude grows by some 300 nepers a second and unit of mouth
 /// pressure: a distance falls to 1/e in 25 ms.
-const PUSH: f64 = 0.13;
+const PUSH: f64 = 0.16;
 /// A push raises the pressure up to here, over the closing pressure: above, notes speak at once by themselves, and
 /// harder pushing would only be an accent.
 const HARDEST: f64 = 0.55;

@@ -6,8 +6,9 @@ use super::dynamics::PlayerModel;
 /// CC BY 4.0).
 pub const FITTED: PlayerModel = PlayerModel {
     range_db: 27.0,
-    loudest_gamma: [0.9207, 0.0083, -0.0113],
-    zeta: [-1.4521, 0.6760, 0.5113, -0.9531],
-    closing: [0.7300, 2.2383],
+    loudest_gamma: [0.8132, 0.0426, 0.0334],
+    zeta: [-1.4642, 0.3620, 0.4308, -0.7583],
+    closing: [0.7300, 2.4983],
     altissimo_zeta: 0.22,
+    knee: 0.725,
 };

@@ -48,6 +48,8 @@ pub struct Posture {
     pub lags: Lags,
     /// The reed as set and fingered, before a player's lip shapes it.
     free: MovingReed,
+    /// How much the lip covers the reed, 0..=1.
+    subtone: f64,
     rate_hz: f64,
     /// What a player needs; `None` where the breath is physical.
     played: Option<Played>,
@@ -171,6 +173,7 @@ impl Posture {
             response,
             lags: Lags::new(settings, tick_s, model.lowest_hz),
             free,
+            subtone,
             rate_hz,
             played,
         };
@@ -208,7 +211,7 @@ impl Posture {
         played.rows = played.note.rows(dynamic);
         let [resonance_hz, damping, place] = note_lip;
         let free = MovingReed { resonance_hz, damping, ..self.free };
-        let reed = shaped(&free, &played.rule, place, dynamic);
+        let reed = shaped(&free, self.subtone, &played.rule, place, dynamic);
         self.closing = reed.law.closing();
         self.reed = ReedCoeffs::new(reed, self.rate_hz);
     }
@@ -242,10 +245,11 @@ impl Posture {
     }
 }
 
-/// A reed under the lip of a dynamic.
-fn shaped(free: &MovingReed, rule: &PlayerModel, place: f64, dynamic: f64) -> MovingReed {
+/// A reed under the lip of a dynamic. A lip that covers the reed holds it to the curve of the lay, however far it opens.
+fn shaped(free: &MovingReed, subtone: f64, rule: &PlayerModel, place: f64, dynamic: f64) -> MovingReed {
     let lip = rule.lip(place, dynamic);
-    MovingReed { law: lip.law(free.law), zeta: free.zeta * lip.channel, ..*free }
+    let knee = if subtone == 0.0 { lip.knee } else { lip.knee.powf(1.0 - subtone) };
+    MovingReed { law: lip.law(free.law), zeta: free.zeta * lip.channel, lay: free.lay * knee, ..*free }
 }
 
 impl Played {
@@ -278,8 +282,8 @@ impl Played {
             if is_known {
                 return 0.0;
             }
-            let [own, known] =
-                [free, &known].map(|reed| reed_at_note(&shaped(reed, &rule, place, dynamic), note_hz));
+            let [own, known] = [(free, subtone), (&known, 0.0)]
+                .map(|(reed, subtone)| reed_at_note(&shaped(reed, subtone, &rule, place, dynamic), note_hz));
             own.shift_from(&known, note.onset)
         };
         Self {

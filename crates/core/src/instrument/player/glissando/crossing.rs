@@ -16,7 +16,7 @@ use crate::instrument::player::voicing::{Voiced, bend_for_octaves, octaves_for_b
 use crate::units::cents;
 
 /// The hands change at this interval above the fingering with no finger down, cents.
-const CHANGE_CENTS: f64 = 135.0;
+const CHANGE_CENTS: f64 = 140.0;
 /// The tract's resonance lies there meanwhile. All holes open and the fingering that the hands change to then sound within some 20
 /// cents of each other; a whole tone higher or lower they do not (measured).
 const RESONANCE_CENTS: f64 = 300.0;
