@@ -59,7 +59,9 @@ pub fn plays(system: &Fresh, plugin: &str) -> Result<()> {
 /// A command inside, at home where Ardour is.
 fn in_home(system: &Fresh) -> Command {
     let mut command = system.user();
-    command.args([
+    // Before 8.5 Ardour writes behind the end of a buffer where it mixes with AVX-512, and may abort when an export ends. These
+    // flags choose SSE2.
+    command.arg("ARDOUR_FPU_FLAGS=15").args([
         &format!("HOME={HOME}"),
         &format!("XDG_RUNTIME_DIR={HOME}"),
         &format!("CHALUMEAU_CACHE_DIR={HOME}/cache"),
