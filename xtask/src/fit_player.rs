@@ -1,9 +1,9 @@
 //! Fits the player's rule to the committed half of the recorded notes, and says how well it does on notes left out.
 //!
-//! Every recorded note is played on a grid of flow strength and mouth pressure, once (`spectra`). A rule then picks a point for
+//! Every recorded note is played on a grid of opening, flow strength and mouth pressure, once (`spectra`). A rule then picks a point for
 //! each note and dynamic: fortissimo by its pressure, the others by level below fortissimo, as a player does. The loss is
 //! the mean distance of harmonics 2 to 10 at pp, mf and ff, plus a charge for each centroid outside the range that counts as
-//! right. Upper harmonics are first lowered by what the pitch of a held note costs them that wanders as recorded ones do
+//! right, and for loud dynamics that are not reached. Upper harmonics are first lowered by what the pitch of a held note costs them that wanders as recorded ones do
 //! (`wander`). A simplex search finds the rule (`simplex`), and again without each note in turn.
 
 mod simplex;

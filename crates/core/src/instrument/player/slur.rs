@@ -16,15 +16,15 @@ const LEAP_CENTS: f64 = 650.0;
 /// The least mouth over closing pressure at which a slur needs help: where the reed beats. Measured: at 0.47 a slur from written B4 to B3 is
 /// lost at CC 58.
 const BEATING: f64 = 0.45;
-/// What the lip does in such a leap: factor on the reed's damping, and for how long, s. With factors of 1.75 and 2 all of these slurs
-/// arrive, with 1.5 some do not; the stronger, the deeper the hole (`docs/tone.md`).
-const DAMPED: LipHelp = LipHelp { damping: 1.75, length_s: 0.02 };
+/// What the lip does in such a leap: factor on the reed's damping, and for how long, s. With factors of 1.85 and 2 all of these slurs
+/// arrive, with 1.5 and 1.75 some do not; the stronger, the deeper the hole (`docs/tone.md`).
+const DAMPED: LipHelp = LipHelp { damping: 1.85, length_s: 0.02 };
 /// Factor on the legato time in such a leap. Measured: the largest bump is 3.8 dB at 1.4, 2.4 dB here.
 const LEAP_TIME: f64 = 1.8;
 /// Factor on the legato time of a slur up over the break: the shorter, the shallower the hole and the louder the click. Measured at 0.6 and
 /// 0.4: nine tenths of the holes of octaves are 10.5 and 8.6 dB deep, of all clicks 2.8 and 3.7 dB loud. Without breath nobody hurries: the
 /// keys would be heard.
-const UP_TIME: f64 = 0.47;
+const UP_TIME: f64 = 0.44;
 /// Share of the time of the slur that each finger takes where the register changes: the air column then nearly always has one clear length.
 /// Measured: clicks are 0.4 dB softer than with 0.5.
 const ACROSS_SHARE: f64 = 0.55;
