@@ -14,6 +14,8 @@ pub mod generated;
 pub mod jack;
 pub mod licences;
 pub mod parameter_reference;
+#[cfg(target_os = "linux")]
+pub mod perf;
 pub mod picture;
 pub mod prepared;
 pub mod programs;
@@ -85,6 +87,13 @@ pub const COMMANDS: &[Command] = &[
         name: "cross",
         about: "build for Windows, macOS and ARM, and compare what they play with Linux; takes web, windows, macos, arm",
         run: cross::run,
+        checks: false,
+    },
+    #[cfg(target_os = "linux")]
+    Command {
+        name: "perf",
+        about: "measure how the cost of playing grows, a page in target/perf; --full plays a million blocks",
+        run: perf::run,
         checks: false,
     },
     #[cfg(target_os = "linux")]
