@@ -24,7 +24,7 @@ const LEAP_TIME: f64 = 1.8;
 /// Factor on the legato time of a slur up over the break: the shorter, the shallower the hole and the louder the click. Measured at 0.6 and
 /// 0.4: nine tenths of the holes of octaves are 10.5 and 8.6 dB deep, of all clicks 2.8 and 3.7 dB loud. Without breath nobody hurries: the
 /// keys would be heard.
-const UP_TIME: f64 = 0.44;
+const UP_TIME: f64 = 0.46;
 /// Share of the time of the slur that each finger takes where the register changes: the air column then nearly always has one clear length.
 /// Measured: clicks are 0.4 dB softer than with 0.5.
 const ACROSS_SHARE: f64 = 0.55;
