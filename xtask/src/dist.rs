@@ -167,12 +167,13 @@ fn same_in_a_clone(folder: &Path) -> Result<()> {
         let clone_here = ["clone", "--quiet", "--no-local"];
         machine::run(Command::new("git").args(clone_here).arg(machine::root()).arg(&clone))?;
     }
-    let cross = machine::target().join("cross");
-    if cross.exists() {
-        // Others build these; here only their packing is compared.
-        let to = clone.join("target");
-        fs::create_dir_all(&to)?;
-        machine::run(Command::new("cp").arg("-r").arg(cross).arg(&to))?;
+    // Others build these; here only their packing is compared.
+    let to = clone.join("target/cross");
+    let _ = fs::remove_dir_all(&to);
+    fs::create_dir_all(&to)?;
+    for system in build::elsewhere()? {
+        let from = machine::target().join("cross").join(system.system.cross);
+        machine::run(Command::new("cp").arg("-r").arg(from).arg(&to))?;
     }
     let mut again = machine::cargo();
     again.args(["run", "--locked", "--package", "xtask", "--", "dist"]).current_dir(&clone);
