@@ -21,6 +21,8 @@ const SAMPLES: usize = 4 * NOTE;
 const SUPERCLOCK_PER_SECOND: usize = 282_240_000;
 /// Ardour 8.12's Lua sometimes ends with "exception not rethrown" before it has saved.
 const ATTEMPTS: usize = 8;
+/// How long an attempt may take, s: both take a few on a machine that is not busy. Ardour's export sometimes does not end.
+const PATIENCE_S: &str = "180";
 /// What a note's level must be at least, rms of full scale: -40 dB.
 const AUDIBLE: f64 = 0.01;
 
@@ -69,6 +71,13 @@ fn in_home(system: &Fresh) -> Command {
     command
 }
 
+/// The same, ended when it takes too long: asked first, and killed when it does not listen.
+fn with_patience(system: &Fresh) -> Command {
+    let mut command = in_home(system);
+    command.args(["timeout", "--kill-after=5", PATIENCE_S]);
+    command
+}
+
 /// "ardour8".
 fn version(system: &Fresh) -> Result<String> {
     let folders = fs::read_dir(system.inside("/usr/lib"))?.filter_map(|entry| Some(entry.ok()?.path()));
@@ -87,7 +96,7 @@ fn session(system: &Fresh, name: &str, plugin: &str) -> Result<PathBuf> {
             fs::remove_dir_all(&folder)?;
         }
         let output =
-            in_home(system).args([&format!("{name}-lua"), &format!("{HOME}/session.lua")]).output()?;
+            with_patience(system).args([&format!("{name}-lua"), &format!("{HOME}/session.lua")]).output()?;
         said =
             String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
         if said.contains("saved") && file.exists() {
@@ -120,7 +129,7 @@ fn export(system: &Fresh, name: &str) -> Result<Vec<f32>> {
     for _ in 0..ATTEMPTS {
         let _ = fs::remove_file(&wav);
         let export = [&format!("{name}-export"), "-b", "float", "-o", &format!("{HOME}/sound.wav")];
-        let output = in_home(system).args(export).args([&format!("{HOME}/session"), "s"]).output()?;
+        let output = with_patience(system).args(export).args([&format!("{HOME}/session"), "s"]).output()?;
         said =
             String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
         let left = hound::WavReader::open(&wav).ok().map(|reader| {
