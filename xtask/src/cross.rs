@@ -2,8 +2,11 @@
 //!
 //! - `build`: cargo in the folder of Debian's packages, and what it has made
 //! - `comparison`: the same scores, files and tests on another system
-//! - `windows`: the command line for Windows, under Wine
+//! - `windows`: plugin, standalone and command line for Windows, under Wine
 //! - `arm`: the command line for Linux on ARM, under qemu
+//!
+//! All of them, this system and WebAssembly in Node among them, play the same twenty scores and the melody, whose hashes
+//! web/tests/scores.json keeps.
 //!
 //! For macOS there is neither a linker nor a way to run a program here: it is type-checked. Wine is not Windows, and qemu is no
 //! ARM processor; .github/workflows/ci.yml has the jobs for real systems.
@@ -24,8 +27,13 @@ use build::Cargo;
 type System = (&'static str, fn() -> Result<()>);
 
 /// What `cargo xtask cross` knows to build for.
-const SYSTEMS: [System; 4] =
-    [("web", || web::build().map(drop)), ("windows", windows::run), ("macos", macos), ("arm", arm::run)];
+const SYSTEMS: [System; 5] = [
+    ("here", here),
+    ("web", web::test_module),
+    ("windows", windows::run),
+    ("macos", macos),
+    ("arm", arm::run),
+];
 
 /// `cargo xtask cross [system..]`: all of them unless some are named. Goes on after a failure.
 pub fn run(names: &[String]) -> Result<()> {
@@ -35,22 +43,38 @@ pub fn run(names: &[String]) -> Result<()> {
             SYSTEMS.map(|(name, _)| name).join(", ")
         );
     }
-    let mut failed = Vec::new();
+    let (mut passed, mut failed) = (Vec::new(), Vec::new());
     for (name, system) in SYSTEMS {
         if names.is_empty() || names.iter().any(|named| named == name) {
             println!("\n=== {name}");
-            if let Err(error) = system() {
-                println!("FAILED: {error:#}");
-                failed.push(name);
+            match system() {
+                Ok(()) => passed.push(name),
+                Err(error) => {
+                    println!("FAILED: {error:#}");
+                    failed.push(name);
+                }
             }
         }
     }
+    println!("\npassed: {}", passed.join(", "));
     if failed.is_empty() { Ok(()) } else { bail!("failed: {}", failed.join(", ")) }
 }
 
 /// Where the results for a system are.
 fn folder(system: &str) -> PathBuf {
     machine::target().join("cross").join(system)
+}
+
+/// The scores on this system.
+fn here() -> Result<()> {
+    machine::run(machine::cargo().args([
+        "test",
+        "-p",
+        "chalumeau-web",
+        "--test",
+        "scores",
+        comparison::SCORES,
+    ]))
 }
 
 /// Plugin, standalone, command line and devices, type-checked without a warning.

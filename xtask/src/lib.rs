@@ -85,7 +85,7 @@ pub const COMMANDS: &[Command] = &[
     #[cfg(target_os = "linux")]
     Command {
         name: "cross",
-        about: "build for Windows, macOS and ARM, and compare what they play with Linux; takes web, windows, macos, arm",
+        about: "build for Windows, macOS and ARM, and compare what they play with Linux; takes here, web, windows, macos, arm",
         run: cross::run,
         checks: false,
     },

@@ -18,7 +18,7 @@ use sha2::{Digest, Sha256};
 
 use crate::{licences, machine};
 
-pub use browser::test;
+pub use browser::{test, test_module};
 
 /// The port of `--serve` without a number.
 const PORT: u16 = 8_000;

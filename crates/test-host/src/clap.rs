@@ -117,6 +117,24 @@ pub struct Param {
     pub flags: ParamInfoFlags,
 }
 
+/// The window around a plugin's: of X11, or of Windows.
+#[cfg(not(windows))]
+pub type Around = u32;
+/// The window around a plugin's: of X11, or of Windows.
+#[cfg(windows)]
+pub type Around = *mut std::ffi::c_void;
+
+#[cfg(not(windows))]
+fn handle_of(window: Around) -> Handle<'static, 'static> {
+    Handle::from_x11_handle(window.into())
+}
+
+#[cfg(windows)]
+fn handle_of(window: Around) -> Handle<'static, 'static> {
+    // SAFETY: who opens a plugin's window keeps this one, as `Plugin::open_window` asks.
+    unsafe { Handle::from_win32_hwnd(window) }
+}
+
 /// Left and right.
 pub type Stereo = [Vec<f32>; 2];
 
@@ -308,20 +326,21 @@ impl Plugin {
         Ok(render.set(&handle, if offline { RenderMode::Offline } else { RenderMode::Realtime })?)
     }
 
-    /// Opens the plugin's window inside an X11 window that `place` makes for the size it is told. The window must stay
-    /// until [`close_window`](Self::close_window).
-    pub fn open_window(&mut self, place: impl FnOnce(u32, u32) -> Result<u32>) -> Result<()> {
+    /// Opens the plugin's window inside a window that `place` makes for the size it is told. The window must stay until
+    /// [`close_window`](Self::close_window).
+    pub fn open_window(&mut self, place: impl FnOnce(u32, u32) -> Result<Around>) -> Result<()> {
         let handle = self.instance.plugin_handle();
         let gui: PluginGui = handle.get_extension().context("no window")?;
-        let embedded = GuiConfiguration { api_type: GuiApiType::X11, is_floating: false };
+        let api_type = if cfg!(windows) { GuiApiType::WIN32 } else { GuiApiType::X11 };
+        let embedded = GuiConfiguration { api_type, is_floating: false };
         if !gui.is_api_supported(&handle, embedded) {
-            bail!("the window does not go into an X11 window");
+            bail!("the window does not go into a window of this system");
         }
         let size = gui.get_size(&handle).context("the window has no size")?;
         let parent = place(size.width, size.height)?;
         gui.create(&handle, embedded)?;
         // SAFETY: the caller keeps the window until it is closed.
-        unsafe { gui.set_parent(&handle, Handle::from_x11_handle(parent.into())) }?;
+        unsafe { gui.set_parent(&handle, handle_of(parent)) }?;
         Ok(gui.show(&handle)?)
     }
 

@@ -9,6 +9,8 @@ pub mod artefacts;
 pub mod clap;
 #[cfg(target_os = "linux")]
 pub mod display;
+#[cfg(windows)]
+pub mod frame;
 pub mod jack;
 pub mod knob_setup;
 pub mod machine;

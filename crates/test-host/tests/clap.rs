@@ -1,5 +1,7 @@
 //! The bundled CLAP, as a host sees and hears it. `cargo xtask bundle` first; CHALUMEAU_CLAP names another file.
 
+#[path = "support/kept_melody.rs"]
+mod kept_melody;
 #[path = "support/rules.rs"]
 mod rules;
 
@@ -455,4 +457,5 @@ fn the_melody_is_the_renderers_bit_for_bit() {
         let [left, right] = plugin().play(RATE, block, &said, score.samples).unwrap();
         assert!(left == rendered && right == rendered, "blocks of {block}");
     }
+    kept_melody::assert_is_kept(&rendered, &rendered);
 }

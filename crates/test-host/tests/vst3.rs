@@ -1,5 +1,8 @@
 //! The bundled VST3, as a host sees and hears it. `cargo xtask bundle` first; CHALUMEAU_VST3 names another bundle.
 
+#[path = "support/kept_melody.rs"]
+mod kept_melody;
+
 use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 
 use chalumeau_core::event::{Event, Timed};
@@ -286,6 +289,7 @@ fn the_melody_is_the_renderers() {
         })
         .collect();
     assert!(play(512, &said, score.samples) == rendered);
+    kept_melody::assert_is_kept(&rendered, &rendered);
 }
 
 fn event(status: u8, a: u8, b: u8) -> Option<MidiEvent> {

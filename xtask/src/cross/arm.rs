@@ -20,14 +20,33 @@ const CARGO: Cargo = Cargo {
             "libc6-dev",
             "libstd-rust-dev:arm64",
             "gcc-aarch64-linux-gnu",
+            "g++-aarch64-linux-gnu",
+            // The tests of the page's module build a knob's links too.
+            "pkgconf",
+            "libasound2-dev:arm64",
             "qemu-user",
         ],
     },
     builds_library: false,
-    variables: &[("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER", "aarch64-linux-gnu-gcc")],
+    variables: &[
+        ("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER", "aarch64-linux-gnu-gcc"),
+        ("PKG_CONFIG_ALLOW_CROSS", "1"),
+        ("PKG_CONFIG_LIBDIR", "/usr/lib/aarch64-linux-gnu/pkgconfig"),
+    ],
 };
-const OPTIONS: &[&str] =
-    &["-p", "chalumeau", "--no-default-features", "--features", "cli", "--test", "render_hashes"];
+const OPTIONS: &[&str] = &[
+    "-p",
+    "chalumeau",
+    "-p",
+    "chalumeau-web",
+    "--no-default-features",
+    "--features",
+    "chalumeau/cli",
+    "--test",
+    "render_hashes",
+    "--test",
+    "scores",
+];
 
 pub fn run() -> Result<()> {
     let built = CARGO.build("test", OPTIONS)?;
@@ -37,5 +56,6 @@ pub fn run() -> Result<()> {
     let variables = vec![("CHALUMEAU_CACHE_DIR".to_owned(), format!("{cache}/cache"))];
     let runner = Runner { built: &built, words: &["qemu-aarch64"], variables };
     runner.files("chalumeau", &folder)?;
+    runner.scores()?;
     runner.test("render_hashes", &[])
 }

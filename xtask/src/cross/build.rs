@@ -32,14 +32,15 @@ pub struct Cargo {
     pub variables: &'static [(&'static str, &'static str)],
 }
 
-/// Programs and test programs, by name.
+/// What cargo has made.
 pub struct Built {
     pub debian: Debian,
+    /// Programs and test programs by the name of their target in Cargo.toml, libraries that others load by their own name.
     pub files: BTreeMap<String, PathBuf>,
 }
 
 impl Built {
-    /// A file by the name of its target in Cargo.toml.
+    /// A file by its name in `files`.
     pub fn file(&self, name: &str) -> Result<&Path> {
         self.files.get(name).map(PathBuf::as_path).with_context(|| format!("cargo has not built {name}"))
     }
@@ -90,16 +91,23 @@ impl Cargo {
     }
 }
 
-/// Where cargo's messages say that programs are.
+/// Where cargo's messages say that programs and libraries are.
 fn files(messages: &str) -> Result<BTreeMap<String, PathBuf>> {
+    let here = |path: &str| {
+        machine::root().join(Path::new(path).strip_prefix(debian::SOURCE).unwrap_or(Path::new(path)))
+    };
     let mut files = BTreeMap::new();
     for line in messages.lines().filter(|line| line.starts_with('{')) {
         let message: Value = serde_json::from_str(line)?;
-        if let (Some(name), Some(program)) =
-            (message["target"]["name"].as_str(), message["executable"].as_str())
-        {
-            let below = Path::new(program).strip_prefix(debian::SOURCE).unwrap_or(Path::new(program));
-            files.insert(name.to_owned(), machine::root().join(below));
+        let name = message["target"]["name"].as_str();
+        if let (Some(name), Some(program)) = (name, message["executable"].as_str()) {
+            files.insert(name.to_owned(), here(program));
+        }
+        let made = message["filenames"].as_array().into_iter().flatten().filter_map(Value::as_str);
+        for library in made.filter(|path| path.ends_with(".dll")) {
+            let path = here(library);
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            files.insert(name, path);
         }
     }
     Ok(files)

@@ -15,6 +15,9 @@ use crate::machine;
 /// Hashes that tests/program_files.rs keeps.
 const FILES: &str = "tests/golden/program_files.tsv";
 
+/// The test of web/tests/scores.rs that compares twenty scores and the melody with the hashes in web/tests/scores.json.
+pub const SCORES: &str = "the_module_plays_the_bits_of_the_clarinet";
+
 /// Runs programs of another system here.
 pub struct Runner<'a> {
     pub built: &'a Built,
@@ -44,6 +47,11 @@ impl Runner<'_> {
         machine::run(self.command(self.built.file(name)?)?.args(arguments))?;
         println!("{name}: passed in {:.0} s", began.elapsed().as_secs_f64());
         Ok(())
+    }
+
+    /// Plays the scores and compares the hashes with Linux's.
+    pub fn scores(&self) -> Result<()> {
+        self.test("scores", &[SCORES])
     }
 
     /// Writes every file of the list with the system's program and compares the hashes with Linux's.

@@ -57,6 +57,13 @@ pub fn test() -> Result<()> {
     Ok(())
 }
 
+/// Builds the page and has Node play the scores through its module: they have the hashes of the Rust code.
+pub fn test_module() -> Result<()> {
+    machine::provide(&[&NODE])?;
+    let page = build()?;
+    machine::run(Command::new("node").arg(machine::root().join("web/tests").join(TESTS[0])).arg(page))
+}
+
 fn has_playwright(folder: &Path) -> bool {
     let version = PLAYWRIGHT.rsplit('@').next().unwrap_or_default();
     let package = folder.join("node_modules/playwright-core/package.json");
