@@ -12,8 +12,11 @@ use super::{CARGO, Wine};
 use crate::cross::folder;
 use crate::machine;
 
-/// How long a window is looked at before its picture is kept, so that it has drawn what it hears.
+/// How long a window is looked at after something is seen, until it has drawn all.
 const LOOK: Duration = Duration::from_secs(3);
+/// A note that sounds changes at least so many of a window's 792,000 pixels: meter, breath, holes and the line of the last
+/// 10 s. It was 60,000.
+const PIXELS_OF_A_NOTE: usize = 10_000;
 /// How long a program may take to end once its window is closed.
 const PATIENCE: Duration = Duration::from_secs(30);
 /// A window that has drawn itself has more colours than its background, its frame and a line of text.
@@ -24,21 +27,27 @@ pub fn look(wine: &Wine) -> Result<()> {
     let screen = Screen::open(Some(wine.display.name()))?;
     let built = wine.runner.built;
     let mut alone = wine.runner.command(built.file("chalumeau-standalone")?)?;
-    window(&screen, alone.args(["--backend", "dummy"]), "Chalumeau", "standalone")?;
+    window(&screen, alone.args(["--backend", "dummy"]), "Chalumeau", "standalone", false)?;
     for (test, title, name) in [("the_clap", "The CLAP", "clap"), ("the_vst3", "The VST3", "vst3")] {
         let mut host = wine.runner.command(built.file("window_on_windows")?)?;
         host.args(["--ignored", "--exact", test, "--test-threads=1", "--nocapture"]);
-        window(&screen, &mut host, title, name)?;
+        window(&screen, &mut host, title, name, true)?;
     }
     Ok(())
 }
 
-/// Starts a program, keeps a picture of its window as `windows-NAME.png`, closes the window and waits for the program's end.
-fn window(screen: &Screen, command: &mut Command, title: &str, name: &str) -> Result<()> {
+/// Starts a program, keeps a picture of its window as `NAME.png`, closes the window and waits for the program's end. Where a
+/// note sounds, the window must show it.
+fn window(screen: &Screen, command: &mut Command, title: &str, name: &str, sounds: bool) -> Result<()> {
     let described = machine::described(command);
     let mut running = command.spawn().with_context(|| format!("cannot start `{described}`"))?;
     let seen = screen.titled(title).and_then(|window| {
-        screen.drawn(window)?;
+        let first = screen.drawn(window)?;
+        if sounds {
+            screen.wait("a picture of the note that sounds", || {
+                Ok((screen.picture(window)?.differing(&first) >= PIXELS_OF_A_NOTE).then_some(()))
+            })?;
+        }
         thread::sleep(LOOK);
         let picture = screen.picture(window)?;
         screen.ask_to_close(window)?;
