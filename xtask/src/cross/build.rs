@@ -58,14 +58,11 @@ impl Built {
 }
 
 impl Cargo {
-    /// Runs `cargo build`, or `cargo test` without running the tests.
-    pub fn build(&self, command: &str, options: &[&str]) -> Result<Built> {
+    /// Builds programs, libraries and tests.
+    pub fn build(&self, options: &[&str]) -> Result<Built> {
         let debian = Debian::with(&self.packages)?;
-        let mut cargo = self.cargo(&debian, command)?;
+        let mut cargo = self.cargo(&debian, "build")?;
         cargo.args(["--profile", PROFILE, "--message-format", "json-render-diagnostics"]).args(options);
-        if command == "test" {
-            cargo.arg("--no-run");
-        }
         let name = machine::described(&cargo);
         let output = cargo.stderr(Stdio::inherit()).output().context("cannot start unshare")?;
         ensure!(output.status.success(), "`{name}` failed: {}", output.status);

@@ -72,7 +72,7 @@ const VST3: &str = "Chalumeau.vst3";
 const INSIDE_VST3: &str = "Chalumeau.vst3/Contents/x86_64-win/Chalumeau.vst3";
 
 pub fn run() -> Result<()> {
-    let built = CARGO.build("build", OPTIONS)?;
+    let built = CARGO.build(OPTIONS)?;
     let folder = folder(CARGO.system);
     built.keep(
         &folder,

@@ -46,7 +46,8 @@ impl<'a> Wine<'a> {
         let wine = Self { runner: Runner { built, words: &["wine"], variables }, prefix, display };
         // One server for all programs, which would else start anew with each. One that was left behind ends first.
         let _ = wine.runner.helper(WINESERVER).arg("-k").stderr(Stdio::null()).status();
-        machine::run(wine.runner.helper(WINESERVER).arg("-p"))?;
+        // At its end it would list what it still holds.
+        machine::run(wine.runner.helper(WINESERVER).arg("-p").stderr(Stdio::null()))?;
         machine::run(wine.runner.helper("wine").args(["wineboot", "--init"]))?;
         Ok(wine)
     }
