@@ -20,6 +20,9 @@ use plan::{Node, Turn, plan};
 pub const TICK: usize = 16;
 /// The reed ends of all lanes. Implementations mark all `#[inline(always)]`, as those of [`Tip`](super::Tip).
 pub trait Tips<const N: usize> {
+    /// A tick begins.
+    #[inline(always)]
+    fn begin(&mut self) {}
     /// Waves leaving into the bores in sample `at` of a tick, for the waves arriving from them.
     fn reflect(&mut self, at: usize, p_minus: &[f32; N]) -> [f32; N];
     /// The tick is done: its flows are there.
@@ -67,6 +70,21 @@ struct Bell<const N: usize> {
     flows: Flows<N>,
 }
 
+/// The returning wave of the tuned cell.
+#[derive(Clone)]
+struct Tuned<const N: usize> {
+    cell: Line,
+    /// Rows that it takes, and their change per row.
+    delay: [f32; N],
+    glide: [f32; N],
+    /// Where it comes from, whole rows of the delay, and the wave a row before it, while no delay crosses a row in the tick.
+    places: [u16; N],
+    whole: [f32; N],
+    before: [f32; N],
+    /// Some delay crosses a row in this tick.
+    crossing: bool,
+}
+
 /// Flows that leave in a tick, sample by sample.
 pub type Flows<const N: usize> = [[f32; N]; TICK];
 
@@ -86,15 +104,7 @@ pub struct LatticeChoir<const N: usize> {
     bell: Bell<N>,
     /// All flows together in the last sample of the tick.
     sum: [f32; N],
-    /// Rows the returning wave of the tuned cell takes, and their change per row.
-    delay: [f32; N],
-    delay_glide: [f32; N],
-    tuned_line: Line,
-    /// Where that wave comes from, and the wave a row before it, while no delay crosses a row in the tick.
-    tuned: [u16; N],
-    whole: [f32; N],
-    before: [f32; N],
-    crossing: bool,
+    tuned: Tuned<N>,
     /// Lanes whose holes move in this tick.
     moving: [bool; N],
     avx2: bool,
@@ -163,13 +173,15 @@ impl<const N: usize> LatticeChoir<N> {
                 flows: [[0.0; N]; TICK],
             },
             sum: [0.0; N],
-            delay: [own.delay; N],
-            delay_glide: [0.0; N],
-            tuned_line,
-            tuned: [tuned_line.begin; N],
-            whole: [0.0; N],
-            before: [0.0; N],
-            crossing: false,
+            tuned: Tuned {
+                cell: tuned_line,
+                delay: [own.delay; N],
+                glide: [0.0; N],
+                places: [tuned_line.begin; N],
+                whole: [0.0; N],
+                before: [0.0; N],
+                crossing: false,
+            },
             lines,
             moving: [false; N],
             avx2: own.avx2,
@@ -188,7 +200,7 @@ impl<const N: usize> LatticeChoir<N> {
     /// Before [`begin`](Self::begin) of the first lane: nobody plays. Real-time safe.
     pub fn clear(&mut self) {
         self.moving = [false; N];
-        self.crossing = false;
+        self.tuned.crossing = false;
     }
 
     /// A lattice lends its waves to a lane. Real-time safe.
@@ -276,15 +288,16 @@ impl<const N: usize> LatticeChoir<N> {
             lattice.rest();
             self.move_holes(lane, lattice);
         }
-        (self.delay[lane], self.delay_glide[lane]) = (lattice.delay, lattice.delay_glide);
+        let tuned = &mut self.tuned;
+        (tuned.delay[lane], tuned.glide[lane]) = (lattice.delay, lattice.delay_glide);
         // The delay goes one way, so that its ends tell whether it crosses a row.
         let (glide, mut last) = (lattice.delay_glide, lattice.delay);
         (0..TICK).for_each(|_| last += glide);
         let whole = (lattice.delay + glide).whole().max(1);
-        self.crossing |= whole != last.whole().max(1);
-        self.whole[lane] = f32::from(whole);
-        self.tuned[lane] = self.tuned_line.behind(whole);
-        self.before[lane] = self.lines.waves()[usize::from(self.tuned_line.behind(whole + 1))][lane];
+        tuned.crossing |= whole != last.whole().max(1);
+        tuned.whole[lane] = f32::from(whole);
+        tuned.places[lane] = tuned.cell.behind(whole);
+        tuned.before[lane] = self.lines.waves()[usize::from(tuned.cell.behind(whole + 1))][lane];
     }
 
     /// Ends the tick of a lane. Real-time safe.
@@ -296,7 +309,7 @@ impl<const N: usize> LatticeChoir<N> {
                 }
             }
         }
-        lattice.delay = self.delay[lane];
+        lattice.delay = self.tuned.delay[lane];
         lattice.end_delay(TICK);
     }
 
@@ -454,6 +467,7 @@ impl<const N: usize> Hole<N> {
 
 #[inline(always)]
 fn run_body<T: Tips<N>, const N: usize>(choir: &mut LatticeChoir<N>, tips: &mut T) {
+    tips.begin();
     let moving = choir.moving.iter().any(|moving| *moving);
     let waves = choir.lines.waves_mut();
     for turn in &choir.turns {
@@ -469,32 +483,37 @@ fn run_body<T: Tips<N>, const N: usize>(choir: &mut LatticeChoir<N>, tips: &mut 
                 }
             }
             Node::Tuned => {
+                let Tuned { cell, delay, glide, places, whole, before, crossing } = &mut choir.tuned;
                 let [_, _, target, _] = turn.places();
+                let places = places.map(|place| turn.place(place));
+                // What goes from sample to sample stays in registers.
+                let (mut now, mut last) = (*delay, *before);
                 for n in 0..turn.samples() {
-                    let (mut near, mut far) = ([0.0; N], choir.before);
                     for k in 0..N {
-                        choir.delay[k] += choir.delay_glide[k];
+                        now[k] += glide[k];
                     }
-                    if choir.crossing {
+                    let (mut near, mut far) = ([0.0; N], last);
+                    if *crossing {
                         for k in 0..N {
-                            let whole = choir.delay[k].whole().max(1);
-                            choir.whole[k] = f32::from(whole);
-                            near[k] = waves[turn.place(choir.tuned_line.behind(whole)) + n][k];
-                            far[k] = waves[turn.place(choir.tuned_line.behind(whole + 1)) + n][k];
+                            let rows = now[k].whole().max(1);
+                            whole[k] = f32::from(rows);
+                            near[k] = waves[turn.place(cell.behind(rows)) + n][k];
+                            far[k] = waves[turn.place(cell.behind(rows + 1)) + n][k];
                         }
                     } else {
                         for k in 0..N {
-                            near[k] = waves[turn.place(choir.tuned[k]) + n][k];
+                            near[k] = waves[places[k] + n][k];
                         }
                     }
-                    choir.before = near;
+                    last = near;
                     let mut tuned = near;
                     for k in 0..N {
-                        let part = choir.delay[k] - choir.whole[k];
+                        let part = now[k] - whole[k];
                         tuned[k] += part * (far[k] - near[k]);
                     }
                     waves[target + n] = tuned;
                 }
+                (*delay, *before) = (now, last);
             }
             Node::Tip => {
                 let [source, _, target, _] = turn.places();

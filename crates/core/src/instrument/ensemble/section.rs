@@ -10,7 +10,6 @@ use crate::dsp::lanes::has_avx2;
 use crate::instrument::ensemble::Seat;
 use crate::instrument::model::Model;
 use crate::instrument::players::MOST_PLAYERS;
-use crate::instrument::voice::Drive;
 use crate::instrument::voice::choir::{Choir, Lanes};
 
 /// Lanes of a choir where the processor has vectors of eight numbers, and elsewhere.
@@ -152,12 +151,11 @@ impl<const N: usize> Choirs<N> {
     }
 
     fn tick(&mut self, seats: &mut [Seat], waiting: u32) {
-        let mut drives: [Option<Drive>; MOST_PLAYERS] = [None; MOST_PLAYERS];
         // Who plays in a lane, as bits.
         let mut side_by_side = 0_u32;
-        for (number, (seat, drive)) in seats.iter_mut().zip(&mut drives).enumerate() {
+        for (number, seat) in seats.iter_mut().enumerate() {
             if waiting >> number & 1 == 1 {
-                *drive = Some(seat.clarinet.begin_tick());
+                seat.clarinet.begin_tick();
                 let fits = self.places[number].is_some()
                     && seat.clarinet.single_voice().is_some_and(Choir::<N>::can_play);
                 side_by_side |= u32::from(fits) << number;
@@ -166,8 +164,7 @@ impl<const N: usize> Choirs<N> {
         for choir in 0..self.choirs.len() {
             side_by_side &= !self.tick_choir(choir, seats, side_by_side);
         }
-        for (number, (seat, drive)) in seats.iter_mut().zip(&drives).enumerate() {
-            let Some(drive) = drive else { continue };
+        for (number, seat) in seats.iter_mut().enumerate().filter(|(number, _)| waiting >> number & 1 == 1) {
             if side_by_side >> number & 1 == 0 {
                 if let (Some((choir, lane)), Some(voice)) =
                     (self.places[number], seat.clarinet.single_voice())
@@ -176,7 +173,7 @@ impl<const N: usize> Choirs<N> {
                 }
                 seat.clarinet.run_alone();
             }
-            seat.clarinet.end_tick(drive);
+            seat.clarinet.end_tick();
         }
     }
 

@@ -31,19 +31,23 @@ pub(super) struct Turn {
     first: u8,
     more: u8,
     /// Where the waves of the first sample come from, from left and right, and where they go, down the bore and back.
-    places: [u16; 4],
+    /// Not an array: it would be read in one piece and taken apart again, turn by turn.
+    left: u16,
+    right: u16,
+    down: u16,
+    back: u16,
 }
 
 impl Turn {
     fn new(node: Node, places: [u16; 4], first: u32, end: u32) -> Self {
-        let places = places.map(|place| place + first as u16);
-        Self { node, first: first as u8, more: (end - 1 - first) as u8, places }
+        let [left, right, down, back] = places.map(|place| place + first as u16);
+        Self { node, first: first as u8, more: (end - 1 - first) as u8, left, right, down, back }
     }
 
     /// Where the waves of the first sample come from, from left and right, and where they go, down the bore and back.
     #[inline(always)]
     pub(super) fn places(&self) -> [usize; 4] {
-        self.places.map(usize::from)
+        [usize::from(self.left), usize::from(self.right), usize::from(self.down), usize::from(self.back)]
     }
 
     /// Where the first sample of the turn is, for the place of the tick's first sample.
