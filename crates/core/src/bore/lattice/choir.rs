@@ -425,6 +425,59 @@ impl<const N: usize> Bell<N> {
     }
 }
 
+impl<const N: usize> Tuned<N> {
+    /// Goes on for a turn.
+    #[inline(always)]
+    fn go_on(&mut self, waves: &mut Waves<N>, turn: &Turn) {
+        if self.crossing {
+            return self.cross(waves, turn);
+        }
+        let [_, _, target, _] = turn.places();
+        let (places, glide, whole) = (self.places.map(|place| turn.place(place)), self.glide, self.whole);
+        // What goes from sample to sample stays in registers.
+        let (mut delay, mut before) = (self.delay, self.before);
+        for n in 0..turn.samples() {
+            let mut near = [0.0; N];
+            for k in 0..N {
+                delay[k] += glide[k];
+                near[k] = waves[places[k] + n][k];
+            }
+            waves[target + n] = between(&delay, &whole, &near, &before);
+            before = near;
+        }
+        (self.delay, self.before) = (delay, before);
+    }
+
+    /// Goes on for a turn of a tick in which some delay crosses a row. Not inlined: that is seldom.
+    #[inline(never)]
+    fn cross(&mut self, waves: &mut Waves<N>, turn: &Turn) {
+        let [_, _, target, _] = turn.places();
+        for n in 0..turn.samples() {
+            let [mut near, mut far] = [[0.0; N]; 2];
+            for k in 0..N {
+                self.delay[k] += self.glide[k];
+                let whole = self.delay[k].whole().max(1);
+                self.whole[k] = f32::from(whole);
+                near[k] = waves[turn.place(self.cell.behind(whole)) + n][k];
+                far[k] = waves[turn.place(self.cell.behind(whole + 1)) + n][k];
+            }
+            waves[target + n] = between(&self.delay, &self.whole, &near, &far);
+            self.before = near;
+        }
+    }
+}
+
+/// Waves after so many rows, between those after the whole ones and those a row before.
+#[inline(always)]
+fn between<const N: usize>(delay: &[f32; N], whole: &[f32; N], near: &[f32; N], far: &[f32; N]) -> [f32; N] {
+    let mut tuned = *near;
+    for k in 0..N {
+        let part = delay[k] - whole[k];
+        tuned[k] += part * (far[k] - near[k]);
+    }
+    tuned
+}
+
 impl<const N: usize> Junction<Steps<f32, N>> {
     /// Goes on for a turn.
     #[inline(always)]
@@ -463,6 +516,37 @@ impl<const N: usize> Hole<N> {
             flows[turn.at(n)] = flow;
         }
     }
+
+    /// Goes on for a turn, and so does a neighbour, sample by sample after it.
+    #[inline(always)]
+    fn go_on_with(
+        &mut self,
+        next: &mut Self,
+        waves: &mut Waves<N>,
+        [turn, next_turn]: [&Turn; 2],
+        moving: bool,
+    ) {
+        if !(self.is_shut && next.is_shut) {
+            for n in 0..turn.samples() {
+                self.go_on(waves, &turn.sample(n), moving);
+                next.go_on(waves, &next_turn.sample(n), moving);
+            }
+            return;
+        }
+        let (lanes, next_lanes) = (&mut self.junction.lanes, &mut next.junction.lanes);
+        let (mut state, mut next_state) = (lanes.still(), next_lanes.still());
+        let ([left, right, down, back], [next_left, next_right, next_down, next_back]) =
+            (turn.places(), next_turn.places());
+        for n in 0..turn.samples() {
+            let arriving = [waves[left + n], waves[right + n]];
+            [waves[down + n], waves[back + n]] = lanes.scatter_shut(&mut state, &self.shut, arriving);
+            let arriving = [waves[next_left + n], waves[next_right + n]];
+            [waves[next_down + n], waves[next_back + n]] =
+                next_lanes.scatter_shut(&mut next_state, &next.shut, arriving);
+        }
+        lanes.stay(state);
+        next_lanes.stay(next_state);
+    }
 }
 
 #[inline(always)]
@@ -470,7 +554,8 @@ fn run_body<T: Tips<N>, const N: usize>(choir: &mut LatticeChoir<N>, tips: &mut 
     tips.begin();
     let moving = choir.moving.iter().any(|moving| *moving);
     let waves = choir.lines.waves_mut();
-    for turn in &choir.turns {
+    let mut turns = choir.turns.iter();
+    while let Some(turn) = turns.next() {
         match turn.node {
             Node::Step(step) => {
                 if let Some(step) = choir.steps.get_mut(usize::from(step)) {
@@ -482,38 +567,17 @@ fn run_body<T: Tips<N>, const N: usize>(choir: &mut LatticeChoir<N>, tips: &mut 
                     hole.go_on(waves, turn, moving);
                 }
             }
-            Node::Tuned => {
-                let Tuned { cell, delay, glide, places, whole, before, crossing } = &mut choir.tuned;
-                let [_, _, target, _] = turn.places();
-                let places = places.map(|place| turn.place(place));
-                // What goes from sample to sample stays in registers.
-                let (mut now, mut last) = (*delay, *before);
-                for n in 0..turn.samples() {
-                    for k in 0..N {
-                        now[k] += glide[k];
-                    }
-                    let (mut near, mut far) = ([0.0; N], last);
-                    if *crossing {
-                        for k in 0..N {
-                            let rows = now[k].whole().max(1);
-                            whole[k] = f32::from(rows);
-                            near[k] = waves[turn.place(cell.behind(rows)) + n][k];
-                            far[k] = waves[turn.place(cell.behind(rows + 1)) + n][k];
-                        }
-                    } else {
-                        for k in 0..N {
-                            near[k] = waves[places[k] + n][k];
-                        }
-                    }
-                    last = near;
-                    let mut tuned = near;
-                    for k in 0..N {
-                        let part = now[k] - whole[k];
-                        tuned[k] += part * (far[k] - near[k]);
-                    }
-                    waves[target + n] = tuned;
+            Node::Pair(hole) => {
+                if let Some(next) = turns.next()
+                    && let Node::Hole(neighbour) = next.node
+                    && let Ok([hole, neighbour]) =
+                        choir.holes.get_disjoint_mut([usize::from(hole), usize::from(neighbour)])
+                {
+                    hole.go_on_with(neighbour, waves, [turn, next], moving);
                 }
-                (*delay, *before) = (now, last);
+            }
+            Node::Tuned => {
+                choir.tuned.go_on(waves, turn);
             }
             Node::Tip => {
                 let [source, _, target, _] = turn.places();
