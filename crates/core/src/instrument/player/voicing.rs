@@ -55,8 +55,10 @@ pub struct Voicing {
     octaves: f64,
     /// Its quality now.
     quality: f64,
-    /// The interval as a ratio of frequencies.
-    ratio: Known<f64, f64>,
+    /// How near that is to the note, as of the last tick.
+    near: f64,
+    /// The interval as a ratio of frequencies, and how near it is.
+    ratio: Known<f64, (f64, f64)>,
     /// The resonance at the rate of the bore.
     coeffs: Known<TractResonance, TractCoeffs>,
 }
@@ -86,7 +88,7 @@ pub fn bend_for_octaves(octaves: f64) -> f64 {
 impl Voicing {
     /// How much the tract leads the reed, 0..=1.
     pub fn lead(&self) -> f64 {
-        if self.amount == 0.0 { 0.0 } else { self.amount * nearness(self.octaves) }
+        if self.amount == 0.0 { 0.0 } else { self.amount * self.near }
     }
 
     /// One tick, in which the tract goes a `share` of its way, for a note fingered at `note_hz` on the clock of the bore; `None`
@@ -119,9 +121,10 @@ impl Voicing {
             self.octaves += (octaves - self.octaves) * share;
         }
         self.quality += (quality - self.quality) * share;
+        let (ratio, nearness) = self.ratio.of(self.octaves, |octaves| (octaves.exp2(), nearness(octaves)));
+        self.near = nearness;
         let (far, near) = PEAKS;
-        let peak = self.amount * (far + (near - far) * nearness(self.octaves));
-        let ratio = self.ratio.of(self.octaves, f64::exp2);
+        let peak = self.amount * (far + (near - far) * nearness);
         let hz = slides.map_or(note_hz, |voiced| voiced.note_hz) * ratio;
         let resonance = TractResonance { hz, q: self.quality, peak };
         Some(self.coeffs.of(resonance, |resonance| TractCoeffs::new(resonance, rate_hz)))
