@@ -65,7 +65,7 @@ for players in 1 8; do
             named += count[$1]
         }
         END {
-            printf "%d player%s: %d instructions for an internal sample\n", players, players > 1 ? "s" : "", all / samples
+            printf "%d player%s: %d instructions for an internal sample\n", players, (players > 1 ? "s" : ""), all / samples
             printf "  %5d compute with vectors\n", sum["vector"] / samples
             printf "  %5d compute with single numbers\n", sum["single"] / samples
             printf "  %5d move numbers of these: between memory, registers and lanes\n", sum["move"] / samples
