@@ -10,11 +10,13 @@
 
 mod lines;
 mod plan;
+mod tuned;
 
 use super::junctions::{Holes, Shut, Steps};
 use super::{LANES, Lattice, LatticeCoeffs, Real, TINY};
-use lines::{Line, Lines, Waves};
+use lines::{Lines, Waves};
 use plan::{Node, Turn, plan};
+use tuned::Tuned;
 
 /// Samples that a choir plays at once.
 pub const TICK: usize = 16;
@@ -68,21 +70,6 @@ struct Bell<const N: usize> {
     g2: [f32; N],
     state: [f32; N],
     flows: Flows<N>,
-}
-
-/// The returning wave of the tuned cell.
-#[derive(Clone)]
-struct Tuned<const N: usize> {
-    cell: Line,
-    /// Rows that it takes, and their change per row.
-    delay: [f32; N],
-    glide: [f32; N],
-    /// Where it comes from, whole rows of the delay, and the wave a row before it, while no delay crosses a row in the tick.
-    places: [u16; N],
-    whole: [f32; N],
-    before: [f32; N],
-    /// Some delay crosses a row in this tick.
-    crossing: bool,
 }
 
 /// Flows that leave in a tick, sample by sample.
@@ -156,7 +143,6 @@ impl<const N: usize> LatticeChoir<N> {
             let [taken, q, state] = [end.taken, end.q, 0.0].map(|of_all| [of_all; N]);
             End { taken, q, state }
         };
-        let tuned_line = lines.back(coeffs.tuned_cell());
         let mut choir = Self {
             turns: plan(coeffs, &nodes, lines.tuned()).into(),
             steps: steps.into(),
@@ -173,15 +159,7 @@ impl<const N: usize> LatticeChoir<N> {
                 flows: [[0.0; N]; TICK],
             },
             sum: [0.0; N],
-            tuned: Tuned {
-                cell: tuned_line,
-                delay: [own.delay; N],
-                glide: [0.0; N],
-                places: [tuned_line.begin; N],
-                whole: [0.0; N],
-                before: [0.0; N],
-                crossing: false,
-            },
+            tuned: Tuned::new(lines.back(coeffs.tuned_cell()), own.delay),
             lines,
             moving: [false; N],
             avx2: own.avx2,
@@ -288,16 +266,7 @@ impl<const N: usize> LatticeChoir<N> {
             lattice.rest();
             self.move_holes(lane, lattice);
         }
-        let tuned = &mut self.tuned;
-        (tuned.delay[lane], tuned.glide[lane]) = (lattice.delay, lattice.delay_glide);
-        // The delay goes one way, so that its ends tell whether it crosses a row.
-        let (glide, mut last) = (lattice.delay_glide, lattice.delay);
-        (0..TICK).for_each(|_| last += glide);
-        let whole = (lattice.delay + glide).whole().max(1);
-        tuned.crossing |= whole != last.whole().max(1);
-        tuned.whole[lane] = f32::from(whole);
-        tuned.places[lane] = tuned.cell.behind(whole);
-        tuned.before[lane] = self.lines.waves()[usize::from(tuned.cell.behind(whole + 1))][lane];
+        self.tuned.begin(lane, lattice, &self.lines);
     }
 
     /// Ends the tick of a lane. Real-time safe.
@@ -423,59 +392,6 @@ impl<const N: usize> Bell<N> {
         }
         reflected
     }
-}
-
-impl<const N: usize> Tuned<N> {
-    /// Goes on for a turn.
-    #[inline(always)]
-    fn go_on(&mut self, waves: &mut Waves<N>, turn: &Turn) {
-        if self.crossing {
-            return self.cross(waves, turn);
-        }
-        let [_, _, target, _] = turn.places();
-        let (places, glide, whole) = (self.places.map(|place| turn.place(place)), self.glide, self.whole);
-        // What goes from sample to sample stays in registers.
-        let (mut delay, mut before) = (self.delay, self.before);
-        for n in 0..turn.samples() {
-            let mut near = [0.0; N];
-            for k in 0..N {
-                delay[k] += glide[k];
-                near[k] = waves[places[k] + n][k];
-            }
-            waves[target + n] = between(&delay, &whole, &near, &before);
-            before = near;
-        }
-        (self.delay, self.before) = (delay, before);
-    }
-
-    /// Goes on for a turn of a tick in which some delay crosses a row. Not inlined: that is seldom.
-    #[inline(never)]
-    fn cross(&mut self, waves: &mut Waves<N>, turn: &Turn) {
-        let [_, _, target, _] = turn.places();
-        for n in 0..turn.samples() {
-            let [mut near, mut far] = [[0.0; N]; 2];
-            for k in 0..N {
-                self.delay[k] += self.glide[k];
-                let whole = self.delay[k].whole().max(1);
-                self.whole[k] = f32::from(whole);
-                near[k] = waves[turn.place(self.cell.behind(whole)) + n][k];
-                far[k] = waves[turn.place(self.cell.behind(whole + 1)) + n][k];
-            }
-            waves[target + n] = between(&self.delay, &self.whole, &near, &far);
-            self.before = near;
-        }
-    }
-}
-
-/// Waves after so many rows, between those after the whole ones and those a row before.
-#[inline(always)]
-fn between<const N: usize>(delay: &[f32; N], whole: &[f32; N], near: &[f32; N], far: &[f32; N]) -> [f32; N] {
-    let mut tuned = *near;
-    for k in 0..N {
-        let part = delay[k] - whole[k];
-        tuned[k] += part * (far[k] - near[k]);
-    }
-    tuned
 }
 
 impl<const N: usize> Junction<Steps<f32, N>> {
