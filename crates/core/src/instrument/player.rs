@@ -8,7 +8,7 @@
 //! scoops and falls, and `inhalation` is the breath in after a phrase.
 //!
 //! `technique` growls, flutters and covers the reed, `voicing` moves the vocal tract, `glissando` slides the fingers, and
-//! `level_keeper` blows so that the level stays where they lead.
+//! `level_keeper` blows so that the level stays where they lead. `known` keeps what follows from numbers that rest.
 
 mod attack;
 mod breath;
