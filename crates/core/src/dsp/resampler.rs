@@ -30,13 +30,15 @@
 use std::sync::Arc;
 
 use crate::dsp::lanes::has_avx2;
-use crate::dsp::low_pass::{Kernel, LANES, TRANSITION, TapRow, dot, normalised, tap_rows};
+use crate::dsp::low_pass::{Kernel, LANES, TRANSITION, TapRow, dot, dot_of, normalised, tap_rows};
 use crate::dsp::warp::{BEYOND, ONE, SPEEDS, Warp};
 
 /// Largest number of phases stored exactly; above it, neighbouring phases are mixed linearly.
 const PHASES: u64 = 512;
 /// Room for new inputs behind the ones still heard.
 const ROOM: usize = 1024;
+/// Rows of taps at the host's usual rates: half the internal ones, 48 000 and 44 100 Hz.
+const USUAL_ROWS: usize = 72 / LANES;
 /// Rates are reduced to a fraction after rounding to this part of a hertz.
 const PARTS_PER_HZ: f64 = 1000.0;
 /// How fast a clock of speed 1 drifts back onto the grid, of its speed: a sixth of a cent, half a sample in 50 ms.
@@ -250,13 +252,11 @@ impl Resampler {
     #[inline(always)]
     fn step_whole(&mut self, out: &mut [f32]) {
         let row = self.row(self.phase as usize);
-        let mut heard = &self.history[self.end - self.taps..];
+        let heard = &self.history[self.end - self.taps..];
         let count = out.len();
-        for out in out {
-            *out = dot(&heard[..self.taps], row);
-            // A step is far shorter than what is heard.
-            let Some(next) = heard.get(self.whole..) else { break };
-            heard = next;
+        match <&[TapRow; USUAL_ROWS]>::try_from(row) {
+            Ok(row) => step_along(heard, self.whole, out, |heard| dot_of(heard, row)),
+            Err(_) => step_along(heard, self.whole, out, |heard| Some(dot(heard.get(..self.taps)?, row))),
         }
         self.end += count * self.whole;
     }
@@ -375,6 +375,18 @@ impl Resampler {
     fn row(&self, phase: usize) -> &[TapRow] {
         let chunks = self.taps / LANES;
         &self.coeffs[phase * chunks..][..chunks]
+    }
+}
+
+/// Fills `out` with what `output` makes of the samples heard, which go on by `step` after each.
+#[inline(always)]
+fn step_along(mut heard: &[f32], step: usize, out: &mut [f32], output: impl Fn(&[f32]) -> Option<f32>) {
+    for out in out {
+        let Some(made) = output(heard) else { break };
+        *out = made;
+        // A step is far shorter than what is heard.
+        let Some(next) = heard.get(step..) else { break };
+        heard = next;
     }
 }
 

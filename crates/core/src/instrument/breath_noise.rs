@@ -6,8 +6,11 @@
 //! reed drives the jet, and below the threshold there is hardly any: a whisper on the mean flow, as a player's mouth makes.
 //! Band and level of the pulsed jet are those of recorded notes, see `docs/tone.md`.
 
+mod lanes;
+
 use super::control_tick::TICK;
 use super::person::Person;
+pub(super) use lanes::NoiseLanes;
 
 /// How the jet makes noise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,6 +44,16 @@ const LAMINAR_FLOW: f64 = 0.002;
 /// Seed of the noise: any constant does; with a constant, renders repeat.
 const NOISE_SEED: u64 = 0x9E37_79B9_7F4A_7C15;
 
+/// From a whole number of 64 bits to white noise of unit variance.
+const UNIT: f64 = 1.732_050_807_568_877_2 / (1_u64 << 63) as f64;
+
+/// The number after this one: a linear congruential generator (Knuth, The Art of Computer Programming 2, 3.3.4: MMIX). Its upper
+/// bits are heard, uniform.
+#[inline(always)]
+fn next(random: u64) -> u64 {
+    random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407)
+}
+
 /// The noise of one voice. Flows are over those of the reference reed.
 pub(super) struct BreathNoise {
     jet: Jet,
@@ -61,36 +74,6 @@ pub(super) struct BreathNoise {
     high: f64,
     low: [f64; 2],
     hiss: [f64; TICK],
-}
-
-/// The noises of several voices during a tick, see [`BreathNoise`].
-#[derive(Clone)]
-pub(super) struct NoiseLanes<const N: usize> {
-    strength: [f64; N],
-    mean: [f64; N],
-    quiet: [f64; N],
-    whisper: [f64; N],
-    hiss: [[f64; N]; TICK],
-}
-
-impl<const N: usize> NoiseLanes<N> {
-    /// Silent.
-    pub fn new() -> Self {
-        let none = [0.0; N];
-        Self { strength: none, mean: none, quiet: none, whisper: none, hiss: [none; TICK] }
-    }
-
-    /// See [`BreathNoise::flow`].
-    #[inline(always)]
-    pub fn flow(&self, jet_flow: &[f64; N], at: usize) -> [f64; N] {
-        let mut flow = [0.0; N];
-        for k in 0..N {
-            let moved = (jet_flow[k] - self.mean[k]).abs() - self.quiet[k];
-            let turbulent = if moved > 0.0 { moved } else { 0.0 };
-            flow[k] = (self.strength[k] * turbulent + self.whisper[k]) * self.hiss[at & (TICK - 1)][k];
-        }
-        flow
-    }
 }
 
 impl BreathNoise {
@@ -134,12 +117,9 @@ impl BreathNoise {
         }
     }
 
-    /// Turbulence of the next tick at `amount`, 0..=1, after a tick that ended with this flow. Computed outside the loop over
-    /// samples, which has no registers to spare.
-    ///
-    /// The white noise comes from a linear congruential generator (Knuth, The Art of Computer Programming 2, 3.3.4: MMIX);
-    /// its upper bits are heard, uniform with unit variance.
-    pub fn fill(&mut self, amount: f64, jet_flow: f64) {
+    /// A tick begins at `amount`, 0..=1, after one that ended with this flow. Its turbulence is [filled](Self::fill) in before its
+    /// samples, here or in a lane of [`NoiseLanes`].
+    pub fn begin(&mut self, amount: f64, jet_flow: f64) {
         match self.jet {
             Jet::Steady => self.strength = amount * STEADY_NOISE,
             Jet::Pulsed => {
@@ -148,14 +128,24 @@ impl BreathNoise {
                 self.whisper = self.strength * WHISPER * (self.mean.abs() - LAMINAR_FLOW).max(0.0);
             }
         }
+    }
+
+    /// Whether the turbulence of the tick that has begun may be filled in together with that of other voices.
+    pub fn is_turbulent(&self) -> bool {
+        self.jet == Jet::Pulsed && self.strength != 0.0
+    }
+
+    /// Turbulence of the tick that has begun. Computed outside the loop over samples, which has no registers to spare.
+    pub fn fill(&mut self) {
         if self.strength == 0.0 {
+            self.hiss = [0.0; TICK];
             return;
         }
         let (low, high) = self.corners[self.jet as usize];
-        let unit = high * 1.732_050_807_568_877_2 / (1_u64 << 63) as f64;
+        let unit = high * UNIT;
         let (mut random, mut smooth, [mut once, mut twice]) = (self.random, self.high, self.low);
         let mut white = || {
-            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            random = next(random);
             unit * (random as i64) as f64
         };
         match self.jet {
@@ -176,17 +166,6 @@ impl BreathNoise {
             }
         }
         (self.random, self.high, self.low) = (random, smooth, [once, twice]);
-    }
-
-    /// What one lane of several takes over for a tick that has been [filled](Self::fill).
-    pub fn fill_lane<const N: usize>(&self, lane: usize, lanes: &mut NoiseLanes<N>) {
-        lanes.strength[lane] = self.strength;
-        lanes.mean[lane] = self.mean;
-        lanes.quiet[lane] = self.quiet;
-        lanes.whisper[lane] = self.whisper;
-        for (lanes, hiss) in lanes.hiss.iter_mut().zip(&self.hiss) {
-            lanes[lane] = *hiss;
-        }
     }
 
     /// Noise flow of sample `at` of the tick on a jet of this flow.

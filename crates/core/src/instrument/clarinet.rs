@@ -21,7 +21,7 @@ use crate::instrument::person::Person;
 use crate::instrument::player::{Player, PlayerState};
 use crate::instrument::scope::Scope;
 use crate::instrument::settings::Settings;
-use crate::instrument::voice::{Drive, Probe, TICK, Voice};
+use crate::instrument::voice::{Probe, TICK, Voice};
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
 use crate::reed::{MovingReed, ReedCoeffs};
@@ -351,12 +351,11 @@ impl Clarinet {
 
     /// The player's part of a tick; the voice's must be run, in a lane of a choir or [alone](Self::run_alone), and
     /// [ended](Self::end_tick).
-    pub(super) fn begin_tick(&mut self) -> Drive {
+    pub(super) fn begin_tick(&mut self) {
         with_voice!(&mut self.voice, voice => {
             let drive = self.player.tick(&self.model, voice);
             voice.begin(&drive);
-            drive
-        })
+        });
     }
 
     /// The voice, if a lane of a choir may play it: double precision has no lanes.
@@ -373,8 +372,8 @@ impl Clarinet {
     }
 
     /// Ends a tick that has been run.
-    pub(super) fn end_tick(&mut self, drive: &Drive) {
-        with_voice!(&mut self.voice, voice => voice.end(drive));
+    pub(super) fn end_tick(&mut self) {
+        with_voice!(&mut self.voice, voice => voice.end());
         self.hear(&mut None);
     }
 

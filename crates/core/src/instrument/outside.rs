@@ -164,7 +164,8 @@ impl<F: Real> Outside<F> {
         F: From<f32>,
     {
         self.turn();
-        let bell = choir.bell_flows().map(|flows| F::from(flows[lane]));
+        let bell = choir.bell_flows();
+        let bell = std::array::from_fn(|at| F::from(bell[at][lane]));
         if self.keeps_lines() {
             self.lines.write(&bell, |hole, _, line| {
                 let Some(flows) = choir.hole_flows(hole) else { return };

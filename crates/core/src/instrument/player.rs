@@ -8,7 +8,7 @@
 //! scoops and falls, and `inhalation` is the breath in after a phrase.
 //!
 //! `technique` growls, flutters and covers the reed, `voicing` moves the vocal tract, `glissando` slides the fingers, and
-//! `level_keeper` blows so that the level stays where they lead.
+//! `level_keeper` blows so that the level stays where they lead. `known` keeps what follows from numbers that rest.
 
 mod attack;
 mod breath;
@@ -20,6 +20,7 @@ mod fitted;
 mod glissando;
 mod inflection;
 mod inhalation;
+mod known;
 mod level_keeper;
 mod life;
 mod lip_glide;
@@ -523,7 +524,7 @@ impl Player {
         }
         let context = TickContext { tick_s, settings, posture };
         let note_hz = model.notes_hz[fingering.unwrap_or(0)];
-        voice.set_tract(self.voicing.tick(settings, note_hz, bent, tick_s, model.coeffs.rate_hz));
+        voice.set_tract(self.voicing.tick(settings, note_hz, bent, posture.lags.tract, model.coeffs.rate_hz));
         let lattice = voice.lattice_mut();
         self.fingers.tick(model, lattice);
 

@@ -21,14 +21,16 @@ use crate::instrument::clarinet::{Clarinet, Progress};
 use crate::instrument::ensemble::section::{NARROW, WIDE, least};
 #[cfg(feature = "fit")]
 use crate::instrument::model::Model;
+#[cfg(feature = "fit")]
+use crate::instrument::voice::Drive;
+use crate::instrument::voice::Voice;
 use crate::instrument::voice::choir::{Choir, Lanes};
-use crate::instrument::voice::{Drive, Voice};
 use crate::parallel::{self, Queue};
 
 /// What has a voice, and can do its own part of a tick.
 trait Ticking {
     /// Before the voice's samples.
-    fn begin(&mut self) -> Drive;
+    fn begin(&mut self);
     /// Bore of the voice: voices of one bore share a choir.
     fn coeffs(&self) -> &Arc<LatticeCoeffs>;
     /// The voice, if a lane may play it: double precision has no lanes.
@@ -36,12 +38,12 @@ trait Ticking {
     /// The voice's samples, without a choir.
     fn run_alone(&mut self);
     /// After the voice's samples.
-    fn end(&mut self, drive: &Drive);
+    fn end(&mut self);
 }
 
 impl Ticking for Clarinet {
-    fn begin(&mut self) -> Drive {
-        self.begin_tick()
+    fn begin(&mut self) {
+        self.begin_tick();
     }
 
     fn coeffs(&self) -> &Arc<LatticeCoeffs> {
@@ -56,8 +58,8 @@ impl Ticking for Clarinet {
         Clarinet::run_alone(self);
     }
 
-    fn end(&mut self, drive: &Drive) {
-        self.end_tick(drive);
+    fn end(&mut self) {
+        self.end_tick();
     }
 }
 
@@ -160,9 +162,8 @@ struct Blown {
 
 #[cfg(feature = "fit")]
 impl Ticking for Blown {
-    fn begin(&mut self) -> Drive {
+    fn begin(&mut self) {
         self.voice.begin(&self.drive);
-        self.drive
     }
 
     fn coeffs(&self) -> &Arc<LatticeCoeffs> {
@@ -177,8 +178,8 @@ impl Ticking for Blown {
         self.voice.run();
     }
 
-    fn end(&mut self, drive: &Drive) {
-        self.voice.end(drive);
+    fn end(&mut self) {
+        self.voice.end();
     }
 }
 
@@ -243,9 +244,9 @@ pub fn alone<T>(work: impl AsyncFnOnce(&Stand) -> T) -> T {
         }
         if let Some(who) = stand.asked.take() {
             let mut who = who.borrow_mut();
-            let drive = who.begin();
+            who.begin();
             who.run_alone();
-            who.end(&drive);
+            who.end();
         }
     }
 }
@@ -323,7 +324,7 @@ impl<const N: usize> Together<N> {
                 self.leave(lane, &before);
             }
         }
-        let drives = asked.each_ref().map(|who| who.as_ref().map(|who| who.borrow_mut().begin()));
+        asked.iter().flatten().for_each(|who| who.borrow_mut().begin());
         let playing = asked.each_ref().map(|who| who.as_ref().map(|who| Arc::clone(who.borrow().coeffs())));
         let can_play = |who: &Shared| who.borrow_mut().voice().is_some_and(Choir::<N>::can_play);
         let fits = asked.each_ref().map(|who| who.as_ref().is_some_and(can_play));
@@ -355,11 +356,7 @@ impl<const N: usize> Together<N> {
                 left[lane] = false;
             }
         }
-        for (who, drive) in asked.iter().zip(&drives) {
-            if let (Some(who), Some(drive)) = (who, drive) {
-                who.borrow_mut().end(drive);
-            }
-        }
+        asked.iter().flatten().for_each(|who| who.borrow_mut().end());
     }
 }
 

@@ -32,10 +32,14 @@ pub struct TractResonance {
 pub struct TractCoeffs {
     /// tan(w T / 2): what the circuit turns in half a sample.
     turn: f64,
+    /// Twice that.
+    whole_turn: f64,
     /// Pressure per state, and state per flow: sqrt(Z_p tan(w T / 2) / Q).
     couple: f64,
     /// 1 / (1 + turn / Q + turn^2).
     share: f64,
+    /// `couple` times `share`.
+    shared: f64,
     /// The part of the impedance that acts at once.
     at_once: f64,
 }
@@ -51,7 +55,9 @@ impl TractCoeffs {
         let loss = turn / q.max(0.1);
         let share = 1.0 / (1.0 + loss + turn * turn);
         let squared = peak.max(0.0) * loss;
-        Self { turn, couple: squared.sqrt(), share, at_once: squared * share }
+        let couple = squared.sqrt();
+        let (whole_turn, shared) = (2.0 * turn, couple * share);
+        Self { turn, whole_turn, couple, share, shared, at_once: squared * share }
     }
 
     /// The part of the impedance that acts at once, over Zc.
@@ -72,16 +78,16 @@ impl TractState {
     /// Pressure that this sample's flow does not change.
     #[inline(always)]
     pub fn pressure(&self, coeffs: &TractCoeffs) -> f64 {
-        coeffs.couple * coeffs.share * (self.pressure - coeffs.turn * self.flow)
+        coeffs.shared * (self.pressure - coeffs.turn * self.flow)
     }
 
     /// One sample with this flow out of the mouth. Real-time safe. [audio thread]
     #[inline(always)]
     pub fn tick(&mut self, coeffs: &TractCoeffs, flow: f64) {
-        let TractCoeffs { turn, couple, share, .. } = *coeffs;
+        let TractCoeffs { turn, whole_turn, couple, share, .. } = *coeffs;
         let mean = share * (self.pressure - turn * self.flow + couple * flow);
         self.pressure = 2.0 * mean - self.pressure;
-        self.flow += 2.0 * turn * mean;
+        self.flow += whole_turn * mean;
     }
 
     /// Energy that the circuit holds; in a sample it grows by the mean pressure times the flow, less the loss.

@@ -87,6 +87,8 @@ struct Mouth<F> {
     p_mouth_glide: f64,
     tongue: f64,
     tongue_glide: f64,
+    /// Mouth pressure and force of the tongue at the end of the tick.
+    wanted: (f64, f64),
     noise: BreathNoise,
     /// The vocal tract, unless the throat is open.
     tract: Option<TractCoeffs>,
@@ -236,6 +238,7 @@ impl<F: Real> Voice<F> {
                 p_mouth_glide: 0.0,
                 tongue: 0.0,
                 tongue_glide: 0.0,
+                wanted: (0.0, 0.0),
                 noise: BreathNoise::new(rate),
                 tract: None,
                 tract_state: TractState::default(),
@@ -316,7 +319,7 @@ impl<F: Real> Voice<F> {
     pub fn tick(&mut self, drive: &Drive) -> &[f32; TICK] {
         self.begin(drive);
         self.run();
-        self.end(drive);
+        self.end();
         self.heard().0
     }
 
@@ -327,15 +330,17 @@ impl<F: Real> Voice<F> {
         mouth.load = drive.reed.before(mouth.kappa + mouth.tract.map_or(0.0, |tract| tract.at_once()));
         mouth.p_mouth_glide = (drive.p_mouth - mouth.p_mouth) / TICK as f64;
         mouth.tongue_glide = (drive.tongue - mouth.tongue) / TICK as f64;
+        mouth.wanted = (drive.p_mouth, drive.tongue);
         mouth.at = 0;
         let lattice = &self.lattice;
         mouth.outside.heed(lattice.is_moving(), |hole| lattice.is_open(hole));
-        mouth.noise.fill(drive.noise, mouth.state.flow);
+        mouth.noise.begin(drive.noise, mouth.state.flow);
     }
 
     /// The samples of a tick.
     pub(super) fn run(&mut self) {
         let mouth = &mut self.mouth;
+        mouth.noise.fill();
         match mouth.tract {
             None => run(&mut self.lattice, &mut self.pads, mouth),
             Some(tract) => run(&mut self.lattice, &mut self.pads, &mut ThroughTract { mouth, tract }),
@@ -343,14 +348,14 @@ impl<F: Real> Voice<F> {
     }
 
     /// What comes after the samples of a tick.
-    pub(super) fn end(&mut self, drive: &Drive) {
+    pub(super) fn end(&mut self) {
         let mouth = &mut self.mouth;
         if let Some(probes) = &mut mouth.probes {
             for (probe, &pressure) in probes.iter_mut().zip(mouth.outside.heard().0) {
                 probe.p_radiated_pa = f64::from(pressure);
             }
         }
-        (mouth.p_mouth, mouth.tongue) = (drive.p_mouth, drive.tongue);
+        (mouth.p_mouth, mouth.tongue) = mouth.wanted;
         self.ticks = self.ticks.wrapping_add(1);
         if self.ticks.is_multiple_of(FLUSH_TICKS) {
             self.lattice.flush();

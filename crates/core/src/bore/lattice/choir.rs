@@ -10,16 +10,21 @@
 
 mod lines;
 mod plan;
+mod tuned;
 
 use super::junctions::{Holes, Shut, Steps};
 use super::{LANES, Lattice, LatticeCoeffs, Real, TINY};
-use lines::{Line, Lines, Waves};
+use lines::{Lines, Waves};
 use plan::{Node, Turn, plan};
+use tuned::Tuned;
 
 /// Samples that a choir plays at once.
 pub const TICK: usize = 16;
 /// The reed ends of all lanes. Implementations mark all `#[inline(always)]`, as those of [`Tip`](super::Tip).
 pub trait Tips<const N: usize> {
+    /// A tick begins.
+    #[inline(always)]
+    fn begin(&mut self) {}
     /// Waves leaving into the bores in sample `at` of a tick, for the waves arriving from them.
     fn reflect(&mut self, at: usize, p_minus: &[f32; N]) -> [f32; N];
     /// The tick is done: its flows are there.
@@ -86,15 +91,7 @@ pub struct LatticeChoir<const N: usize> {
     bell: Bell<N>,
     /// All flows together in the last sample of the tick.
     sum: [f32; N],
-    /// Rows the returning wave of the tuned cell takes, and their change per row.
-    delay: [f32; N],
-    delay_glide: [f32; N],
-    tuned_line: Line,
-    /// Where that wave comes from, and the wave a row before it, while no delay crosses a row in the tick.
-    tuned: [u16; N],
-    whole: [f32; N],
-    before: [f32; N],
-    crossing: bool,
+    tuned: Tuned<N>,
     /// Lanes whose holes move in this tick.
     moving: [bool; N],
     avx2: bool,
@@ -146,7 +143,6 @@ impl<const N: usize> LatticeChoir<N> {
             let [taken, q, state] = [end.taken, end.q, 0.0].map(|of_all| [of_all; N]);
             End { taken, q, state }
         };
-        let tuned_line = lines.back(coeffs.tuned_cell());
         let mut choir = Self {
             turns: plan(coeffs, &nodes, lines.tuned()).into(),
             steps: steps.into(),
@@ -163,13 +159,7 @@ impl<const N: usize> LatticeChoir<N> {
                 flows: [[0.0; N]; TICK],
             },
             sum: [0.0; N],
-            delay: [own.delay; N],
-            delay_glide: [0.0; N],
-            tuned_line,
-            tuned: [tuned_line.begin; N],
-            whole: [0.0; N],
-            before: [0.0; N],
-            crossing: false,
+            tuned: Tuned::new(lines.back(coeffs.tuned_cell()), own.delay),
             lines,
             moving: [false; N],
             avx2: own.avx2,
@@ -188,7 +178,7 @@ impl<const N: usize> LatticeChoir<N> {
     /// Before [`begin`](Self::begin) of the first lane: nobody plays. Real-time safe.
     pub fn clear(&mut self) {
         self.moving = [false; N];
-        self.crossing = false;
+        self.tuned.crossing = false;
     }
 
     /// A lattice lends its waves to a lane. Real-time safe.
@@ -276,15 +266,7 @@ impl<const N: usize> LatticeChoir<N> {
             lattice.rest();
             self.move_holes(lane, lattice);
         }
-        (self.delay[lane], self.delay_glide[lane]) = (lattice.delay, lattice.delay_glide);
-        // The delay goes one way, so that its ends tell whether it crosses a row.
-        let (glide, mut last) = (lattice.delay_glide, lattice.delay);
-        (0..TICK).for_each(|_| last += glide);
-        let whole = (lattice.delay + glide).whole().max(1);
-        self.crossing |= whole != last.whole().max(1);
-        self.whole[lane] = f32::from(whole);
-        self.tuned[lane] = self.tuned_line.behind(whole);
-        self.before[lane] = self.lines.waves()[usize::from(self.tuned_line.behind(whole + 1))][lane];
+        self.tuned.begin(lane, lattice, &self.lines);
     }
 
     /// Ends the tick of a lane. Real-time safe.
@@ -296,7 +278,7 @@ impl<const N: usize> LatticeChoir<N> {
                 }
             }
         }
-        lattice.delay = self.delay[lane];
+        lattice.delay = self.tuned.delay[lane];
         lattice.end_delay(TICK);
     }
 
@@ -450,13 +432,46 @@ impl<const N: usize> Hole<N> {
             flows[turn.at(n)] = flow;
         }
     }
+
+    /// Goes on for a turn, and so does a neighbour, sample by sample after it.
+    #[inline(always)]
+    fn go_on_with(
+        &mut self,
+        next: &mut Self,
+        waves: &mut Waves<N>,
+        [turn, next_turn]: [&Turn; 2],
+        moving: bool,
+    ) {
+        if !(self.is_shut && next.is_shut) {
+            for n in 0..turn.samples() {
+                self.go_on(waves, &turn.sample(n), moving);
+                next.go_on(waves, &next_turn.sample(n), moving);
+            }
+            return;
+        }
+        let (lanes, next_lanes) = (&mut self.junction.lanes, &mut next.junction.lanes);
+        let (mut state, mut next_state) = (lanes.still(), next_lanes.still());
+        let ([left, right, down, back], [next_left, next_right, next_down, next_back]) =
+            (turn.places(), next_turn.places());
+        for n in 0..turn.samples() {
+            let arriving = [waves[left + n], waves[right + n]];
+            [waves[down + n], waves[back + n]] = lanes.scatter_shut(&mut state, &self.shut, arriving);
+            let arriving = [waves[next_left + n], waves[next_right + n]];
+            [waves[next_down + n], waves[next_back + n]] =
+                next_lanes.scatter_shut(&mut next_state, &next.shut, arriving);
+        }
+        lanes.stay(state);
+        next_lanes.stay(next_state);
+    }
 }
 
 #[inline(always)]
 fn run_body<T: Tips<N>, const N: usize>(choir: &mut LatticeChoir<N>, tips: &mut T) {
+    tips.begin();
     let moving = choir.moving.iter().any(|moving| *moving);
     let waves = choir.lines.waves_mut();
-    for turn in &choir.turns {
+    let mut turns = choir.turns.iter();
+    while let Some(turn) = turns.next() {
         match turn.node {
             Node::Step(step) => {
                 if let Some(step) = choir.steps.get_mut(usize::from(step)) {
@@ -468,33 +483,17 @@ fn run_body<T: Tips<N>, const N: usize>(choir: &mut LatticeChoir<N>, tips: &mut 
                     hole.go_on(waves, turn, moving);
                 }
             }
-            Node::Tuned => {
-                let [_, _, target, _] = turn.places();
-                for n in 0..turn.samples() {
-                    let (mut near, mut far) = ([0.0; N], choir.before);
-                    for k in 0..N {
-                        choir.delay[k] += choir.delay_glide[k];
-                    }
-                    if choir.crossing {
-                        for k in 0..N {
-                            let whole = choir.delay[k].whole().max(1);
-                            choir.whole[k] = f32::from(whole);
-                            near[k] = waves[turn.place(choir.tuned_line.behind(whole)) + n][k];
-                            far[k] = waves[turn.place(choir.tuned_line.behind(whole + 1)) + n][k];
-                        }
-                    } else {
-                        for k in 0..N {
-                            near[k] = waves[turn.place(choir.tuned[k]) + n][k];
-                        }
-                    }
-                    choir.before = near;
-                    let mut tuned = near;
-                    for k in 0..N {
-                        let part = choir.delay[k] - choir.whole[k];
-                        tuned[k] += part * (far[k] - near[k]);
-                    }
-                    waves[target + n] = tuned;
+            Node::Pair(hole) => {
+                if let Some(next) = turns.next()
+                    && let Node::Hole(neighbour) = next.node
+                    && let Ok([hole, neighbour]) =
+                        choir.holes.get_disjoint_mut([usize::from(hole), usize::from(neighbour)])
+                {
+                    hole.go_on_with(neighbour, waves, [turn, next], moving);
                 }
+            }
+            Node::Tuned => {
+                choir.tuned.go_on(waves, turn);
             }
             Node::Tip => {
                 let [source, _, target, _] = turn.places();

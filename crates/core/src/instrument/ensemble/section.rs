@@ -10,7 +10,6 @@ use crate::dsp::lanes::has_avx2;
 use crate::instrument::ensemble::Seat;
 use crate::instrument::model::Model;
 use crate::instrument::players::MOST_PLAYERS;
-use crate::instrument::voice::Drive;
 use crate::instrument::voice::choir::{Choir, Lanes};
 
 /// Lanes of a choir where the processor has vectors of eight numbers, and elsewhere.
@@ -81,8 +80,20 @@ pub(super) struct Choirs<const N: usize> {
     choirs: Vec<Choir<N>>,
     /// Choir and lane of each player.
     places: [Option<(usize, usize)>; MOST_PLAYERS],
+    /// The players of each choir, as bits.
+    members: [u32; MOST_PLAYERS],
     /// Who was awake when they were given, as bits.
     awake: u32,
+}
+
+/// The numbers of the bits that are set.
+fn each(mut bits: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let number = bits.trailing_zeros() as usize;
+        // The lowest one goes.
+        bits &= bits.checked_sub(1)?;
+        Some(number)
+    })
 }
 
 impl<const N: usize> Choirs<N> {
@@ -96,13 +107,9 @@ impl<const N: usize> Choirs<N> {
         Self {
             choirs: (0..count).map(|_| Choir::new(&model.coeffs)).collect(),
             places: [None; MOST_PLAYERS],
+            members: [0; MOST_PLAYERS],
             awake: 0,
         }
-    }
-
-    /// Players in a choir.
-    fn members(&self, choir: usize) -> usize {
-        self.places.iter().flatten().filter(|place| place.0 == choir).count()
     }
 
     /// A lane of a choir that nobody has.
@@ -111,9 +118,9 @@ impl<const N: usize> Choirs<N> {
     }
 
     fn leave(&mut self, number: usize, seat: &mut Seat) {
-        if let Some((choir, lane)) = self.places[number].take()
-            && let Some(voice) = seat.clarinet.single_voice()
-        {
+        let Some((choir, lane)) = self.places[number].take() else { return };
+        self.members[choir] &= !(1 << number);
+        if let Some(voice) = seat.clarinet.single_voice() {
             self.choirs[choir].leave(lane, voice);
         }
     }
@@ -132,7 +139,7 @@ impl<const N: usize> Choirs<N> {
         let mut members: [(usize, usize); MOST_PLAYERS] = [(0, 0); MOST_PLAYERS];
         let members = &mut members[..self.choirs.len()];
         for (choir, members) in members.iter_mut().enumerate() {
-            *members = (self.members(choir), choir);
+            *members = (self.members[choir].count_ones() as usize, choir);
         }
         members.sort_unstable_by_key(|&(members, choir)| (Reverse(members), choir));
         for &mut (_, given_up) in &mut members[wanted..] {
@@ -145,29 +152,30 @@ impl<const N: usize> Choirs<N> {
         for (number, seat) in seats.iter().enumerate() {
             if !seat.sleeps && self.places[number].is_none() {
                 let mut choirs = members[..wanted].iter();
-                self.places[number] =
-                    choirs.find_map(|&(_, choir)| self.free_lane(choir).map(|lane| (choir, lane)));
+                let place = choirs.find_map(|&(_, choir)| self.free_lane(choir).map(|lane| (choir, lane)));
+                self.places[number] = place;
+                if let Some((choir, _)) = place {
+                    self.members[choir] |= 1 << number;
+                }
             }
         }
     }
 
     fn tick(&mut self, seats: &mut [Seat], waiting: u32) {
-        let mut drives: [Option<Drive>; MOST_PLAYERS] = [None; MOST_PLAYERS];
         // Who plays in a lane, as bits.
         let mut side_by_side = 0_u32;
-        for (number, (seat, drive)) in seats.iter_mut().zip(&mut drives).enumerate() {
-            if waiting >> number & 1 == 1 {
-                *drive = Some(seat.clarinet.begin_tick());
-                let fits = self.places[number].is_some()
-                    && seat.clarinet.single_voice().is_some_and(Choir::<N>::can_play);
-                side_by_side |= u32::from(fits) << number;
-            }
+        for number in each(waiting) {
+            let Some(seat) = seats.get_mut(number) else { continue };
+            seat.clarinet.begin_tick();
+            let fits = self.places[number].is_some()
+                && seat.clarinet.single_voice().is_some_and(Choir::<N>::can_play);
+            side_by_side |= u32::from(fits) << number;
         }
         for choir in 0..self.choirs.len() {
             side_by_side &= !self.tick_choir(choir, seats, side_by_side);
         }
-        for (number, (seat, drive)) in seats.iter_mut().zip(&drives).enumerate() {
-            let Some(drive) = drive else { continue };
+        for number in each(waiting) {
+            let Some(seat) = seats.get_mut(number) else { continue };
             if side_by_side >> number & 1 == 0 {
                 if let (Some((choir, lane)), Some(voice)) =
                     (self.places[number], seat.clarinet.single_voice())
@@ -176,33 +184,28 @@ impl<const N: usize> Choirs<N> {
                 }
                 seat.clarinet.run_alone();
             }
-            seat.clarinet.end_tick(drive);
+            seat.clarinet.end_tick();
         }
     }
 
     /// Plays a tick of those in a choir whose bits are set, unless it is less work if they play alone; who is to play alone, as
     /// bits.
     fn tick_choir(&mut self, choir: usize, seats: &mut [Seat], wanted: u32) -> u32 {
-        let (mut playing, mut others) = (0_u32, 0_u32);
-        for (number, place) in self.places.iter().enumerate() {
-            if place.is_some_and(|place| place.0 == choir) {
-                let bit = 1 << number;
-                playing |= wanted & bit;
-                others |= !wanted & bit;
-            }
-        }
-        let [count, idle] = [playing, others].map(|bits| f64::from(bits.count_ones()));
-        if count == 0.0 {
+        let members = self.members[choir];
+        let playing = wanted & members;
+        if playing == 0 {
             return 0;
         }
+        let [count, idle] = [playing, members & !playing].map(|bits| f64::from(bits.count_ones()));
         // Who does not play takes its waves back meanwhile; who plays alone takes them back and brings them again.
         if count * (1.0 + 2.0 * Self::LANE_COST) < Self::CHOIR_COST + 2.0 * idle * Self::LANE_COST {
             return playing;
         }
         let mut lanes: Lanes<'_, N> = [const { None }; N];
-        for (number, seat) in seats.iter_mut().enumerate() {
-            let Some((_, lane)) = self.places[number].filter(|place| place.0 == choir) else { continue };
-            let Some(voice) = seat.clarinet.single_voice() else { continue };
+        for (number, seat) in seats.iter_mut().enumerate().filter(|(number, _)| members >> number & 1 == 1) {
+            let (Some((_, lane)), Some(voice)) = (self.places[number], seat.clarinet.single_voice()) else {
+                continue;
+            };
             if playing >> number & 1 == 1 {
                 lanes[lane] = Some(voice);
             } else {

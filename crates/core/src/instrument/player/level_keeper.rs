@@ -3,6 +3,7 @@
 //! not enough. The level to keep is that of the note before, moved by the player's own dynamics.
 
 use super::dynamics::LOWEST_ONSET;
+use super::known::Known;
 use super::step_towards;
 
 /// Window in which the level is heard, s.
@@ -69,6 +70,30 @@ pub struct LevelKeeper {
     push: f64,
     /// A level of the rule, dB, and its power: it seldom changes.
     rule: (f64, f64),
+    /// How far the breath may go, for the note's own and what leads it.
+    range: Known<(f64, Led), Range>,
+}
+
+/// How far a led breath may go.
+#[derive(Clone, Copy, Debug)]
+struct Range {
+    /// Where it begins, mouth over closing pressure.
+    base: f64,
+    /// Logarithms of the least and the greatest factor on that.
+    lowest: f64,
+    highest: f64,
+}
+
+impl Range {
+    /// For a note's own mouth over closing pressure, and what leads it.
+    fn new(gamma: f64, led: Led) -> Self {
+        let raised = |tract: f64, fingers: f64| {
+            gamma + ((tract - gamma).max(0.0) * led.tract).max((fingers - gamma).max(0.0) * led.fingers)
+        };
+        let low = raised(TRACT_GAMMAS.0, FINGERS_GAMMAS.0);
+        let base = raised(TRACT_GAMMAS.1, FINGERS_GAMMAS.1);
+        Self { base, lowest: (low / base).ln().min(0.0), highest: (base.max(MOST) / base).ln() }
+    }
 }
 
 /// What keeps the level.
@@ -98,12 +123,8 @@ impl LevelKeeper {
             self.push = 0.0;
             return Kept { gamma, lip: 0.0 };
         }
-        let raised = |tract: f64, fingers: f64| {
-            gamma + ((tract - gamma).max(0.0) * led.tract).max((fingers - gamma).max(0.0) * led.fingers)
-        };
-        let low = raised(TRACT_GAMMAS.0, FINGERS_GAMMAS.0);
-        let base = raised(TRACT_GAMMAS.1, FINGERS_GAMMAS.1);
-        let high = base.max(MOST);
+        let Range { base, lowest, highest } =
+            self.range.of((gamma, led), |(gamma, led)| Range::new(gamma, led));
         if lead < LEADS {
             self.learn(lags);
             self.push -= self.push * lags.back;
@@ -115,10 +136,9 @@ impl LevelKeeper {
             let distance = 0.5 * (wanted / self.power).ln();
             self.push += lead * lags.tick_s / FOLLOW_S * distance.clamp(-1.0, 1.0);
         }
-        self.push = self.push.clamp((low / base).ln().min(0.0), (high / base).ln());
+        self.push = self.push.clamp(lowest, highest);
         // The lip begins to help where the breath goes beyond its beginning.
-        let room = (high / base).ln();
-        let lip = if room > 0.0 { lead * (self.push / room).clamp(0.0, 1.0) } else { 0.0 };
+        let lip = if highest > 0.0 { lead * (self.push / highest).clamp(0.0, 1.0) } else { 0.0 };
         Kept { gamma: base * self.push.exp(), lip }
     }
 

@@ -10,6 +10,7 @@ use super::onset_shift::ReedAtNote;
 use super::response::LIP_S;
 use super::step_towards;
 use super::technique::subtone::covered;
+use super::voicing;
 use crate::instrument::bend::{self, BendSplit};
 use crate::instrument::lip::{Embouchure, embouchure};
 use crate::instrument::model::Model;
@@ -99,6 +100,8 @@ pub struct Lags {
     pub fingers: f64,
     /// The ear.
     pub ear: f64,
+    /// The vocal tract.
+    pub tract: f64,
     /// Life.
     pub life: LifeLags,
     /// The ear for level.
@@ -117,6 +120,7 @@ impl Lags {
             lip: step(LIP_S),
             fingers: step(LIP_SHARE * 1e-3 * f64::from(settings.legato_ms)),
             ear: ear::share(tick_s, lowest_hz),
+            tract: step(voicing::MOVE_S),
             life: LifeLags::new(tick_s),
             level: KeeperLags::new(tick_s),
         }

@@ -7,6 +7,7 @@ pub mod flutter;
 pub mod growl;
 pub mod subtone;
 
+use super::known::Known;
 use super::step_towards;
 use crate::event::Technique;
 use crate::instrument::person::Person;
@@ -23,6 +24,19 @@ const GONE: f64 = 1e-4;
 /// not lower what the breath alone asks for.
 const HIGHEST_GAMMA: f64 = 1.0;
 
+/// A phase that has gone on, 0 or more, without its whole turns. It rarely has more than one, and the processors of the oldest kind
+/// know no instruction for all of them.
+#[inline(always)]
+fn wrapped(phase: f64) -> f64 {
+    if phase < 1.0 {
+        phase
+    } else if phase < 2.0 {
+        phase - 1.0
+    } else {
+        phase.fract()
+    }
+}
+
 /// State of the techniques.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Techniques {
@@ -32,6 +46,8 @@ pub struct Techniques {
     amounts: [f64; 3],
     growl: Growl,
     flutter: Flutter,
+    /// An interval, semitones, as a ratio of frequencies.
+    interval: Known<f32, f64>,
 }
 
 impl Techniques {
@@ -58,14 +74,19 @@ impl Techniques {
 
     /// Moves the amounts towards what is asked; whether the lip's has changed.
     pub fn tick(&mut self, settings: &Settings, tick_s: f64) -> bool {
-        let set = settings.techniques;
-        let before = self.subtone();
-        for ((now, set), added) in
-            self.amounts.iter_mut().zip([set.growl, set.flutter, set.subtone]).zip(self.added)
-        {
-            let target = f64::from((set + added).min(1.0));
+        let (set, [growl, flutter, subtone]) = (settings.techniques, self.added);
+        let targets = [set.growl + growl, set.flutter + flutter, set.subtone + subtone];
+        let targets = targets.map(|target| f64::from(target.min(1.0)));
+        self.amounts != targets && self.go_on(targets, tick_s)
+    }
+
+    /// Moves the amounts on. Apart, so that those that have arrived need no lag.
+    #[inline(never)]
+    fn go_on(&mut self, targets: [f64; 3], tick_s: f64) -> bool {
+        let (before, share) = (self.subtone(), step_towards(tick_s, COME_S));
+        for (now, target) in self.amounts.iter_mut().zip(targets) {
             if *now != target {
-                *now += (target - *now) * step_towards(tick_s, COME_S);
+                *now += (target - *now) * share;
                 if (*now - target).abs() < GONE {
                     *now = target;
                 }
@@ -92,11 +113,16 @@ impl Techniques {
         let (set, [growl, flutter, _]) = (settings.techniques, self.amounts);
         let voice_hz = match set.growl_pitch {
             GrowlPitch::Fixed => f64::from(set.growl_hz),
-            GrowlPitch::Interval => note_hz * (f64::from(set.growl_semitones) / 12.0).exp2(),
+            GrowlPitch::Interval => {
+                let ratio = |semitones| (f64::from(semitones) / 12.0).exp2();
+                note_hz * self.interval.of(set.growl_semitones, ratio)
+            }
         };
         let voice = self.growl.tick(voice_hz, tick_s);
-        let tongue = self.flutter.tick(f64::from(set.flutter_hz), tick_s);
-        let shaken = gamma * (1.0 + growl * voice).max(0.0) * (1.0 + flutter * tongue);
+        self.flutter.tick(f64::from(set.flutter_hz), tick_s);
+        // A tongue that does not flutter needs no sine: it changes nothing.
+        let tongue = if flutter == 0.0 { 0.0 } else { flutter * self.flutter.swing() };
+        let shaken = gamma * (1.0 + growl * voice).max(0.0) * (1.0 + tongue);
         shaken.min(HIGHEST_GAMMA.max(gamma))
     }
 }

@@ -3,13 +3,13 @@
 //! Above the note the resonance is moderate and only flattens a little. On its way down to the note it grows strong, and from
 //! there it takes the note along: a bend. Players do so with peaks of up to 60 MPa s/m3 (Chen, Smith & Wolfe 2009).
 
-use super::step_towards;
+use super::known::Known;
 use crate::instrument::settings::Settings;
 use crate::instrument::techniques::Tract;
 use crate::instrument::vocal_tract::{TractCoeffs, TractResonance};
 
 /// Time constant with which tongue and throat move, s.
-const MOVE_S: f64 = 0.02;
+pub const MOVE_S: f64 = 0.02;
 /// A tract with less of its strength is open.
 const OPEN: f64 = 1e-3;
 /// Quality of the resonance: of 3, 5 and 8 the one whose bends are the steadiest (measured).
@@ -55,6 +55,12 @@ pub struct Voicing {
     octaves: f64,
     /// Its quality now.
     quality: f64,
+    /// How near that is to the note, as of the last tick.
+    near: f64,
+    /// The interval as a ratio of frequencies, and how near it is.
+    ratio: Known<f64, (f64, f64)>,
+    /// The resonance at the rate of the bore.
+    coeffs: Known<TractResonance, TractCoeffs>,
 }
 
 /// How near the resonance is to the note from above, 0..=1; 1 from the note down.
@@ -82,17 +88,17 @@ pub fn bend_for_octaves(octaves: f64) -> f64 {
 impl Voicing {
     /// How much the tract leads the reed, 0..=1.
     pub fn lead(&self) -> f64 {
-        if self.amount == 0.0 { 0.0 } else { self.amount * nearness(self.octaves) }
+        if self.amount == 0.0 { 0.0 } else { self.amount * self.near }
     }
 
-    /// One tick for a note fingered at `note_hz` on the clock of the bore; `None` while the throat is open. `slides`: what
-    /// a glissando asks; it goes before what is set.
+    /// One tick, in which the tract goes a `share` of its way, for a note fingered at `note_hz` on the clock of the bore; `None`
+    /// while the throat is open. `slides`: what a glissando asks; it goes before what is set. `rate_hz` never changes.
     pub fn tick(
         &mut self,
         settings: &Settings,
         note_hz: f64,
         slides: Option<Voiced>,
-        tick_s: f64,
+        share: f64,
         rate_hz: f64,
     ) -> Option<TractCoeffs> {
         let Tract { amount, interval_semitones } = settings.tract;
@@ -110,22 +116,25 @@ impl Voicing {
                 return None;
             }
         }
-        let share = step_towards(tick_s, MOVE_S);
         self.amount += (amount - self.amount) * share;
         if slides.is_some() || amount > 0.0 {
             self.octaves += (octaves - self.octaves) * share;
         }
         self.quality += (quality - self.quality) * share;
+        let (ratio, nearness) = self.ratio.of(self.octaves, |octaves| (octaves.exp2(), nearness(octaves)));
+        self.near = nearness;
         let (far, near) = PEAKS;
-        let peak = self.amount * (far + (near - far) * nearness(self.octaves));
-        let hz = slides.map_or(note_hz, |voiced| voiced.note_hz) * self.octaves.exp2();
-        Some(TractCoeffs::new(TractResonance { hz, q: self.quality, peak }, rate_hz))
+        let peak = self.amount * (far + (near - far) * nearness);
+        let hz = slides.map_or(note_hz, |voiced| voiced.note_hz) * ratio;
+        let resonance = TractResonance { hz, q: self.quality, peak };
+        Some(self.coeffs.of(resonance, |resonance| TractCoeffs::new(resonance, rate_hz)))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::instrument::player::step_towards;
 
     #[test]
     fn deeper_bends_need_a_lower_resonance_and_a_stronger_one() {
@@ -143,7 +152,8 @@ mod tests {
         let mut voicing = Voicing::default();
         let tuned =
             Settings { tract: Tract { amount: 1.0, interval_semitones: -5.0 }, ..Settings::default() };
-        let mut tick = |settings: &Settings| voicing.tick(settings, 440.0, None, 1.0 / 6_000.0, 96_000.0);
+        let share = step_towards(1.0 / 6_000.0, MOVE_S);
+        let mut tick = |settings: &Settings| voicing.tick(settings, 440.0, None, share, 96_000.0);
         assert_eq!(tick(&Settings::default()), None);
         assert!((0..600).all(|_| tick(&tuned).is_some()));
         assert!((0..6_000).map(|_| tick(&Settings::default())).any(|tract| tract.is_none()));

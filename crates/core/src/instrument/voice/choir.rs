@@ -38,9 +38,18 @@ struct Playing<'a, 'v, const N: usize> {
     voices: &'a mut Lanes<'v, N>,
     /// Some throat is not open, or somebody records the inside.
     is_special: bool,
+    /// The turbulence of all voices is filled in at once.
+    hiss_together: bool,
 }
 
 impl<const N: usize> Tips<N> for Playing<'_, '_, N> {
+    #[inline(always)]
+    fn begin(&mut self) {
+        if self.hiss_together {
+            self.mouths.noise.fill();
+        }
+    }
+
     #[inline(always)]
     fn reflect(&mut self, at: usize, p_minus: &[f32; N]) -> [f32; N] {
         let mouths = &mut *self.mouths;
@@ -148,22 +157,27 @@ impl<const N: usize> Choir<N> {
     pub fn run(&mut self, mut voices: Lanes<'_, N>) {
         self.bores.clear();
         let mut is_special = false;
+        let hiss_together = voices.iter().flatten().all(|voice| voice.mouth.noise.is_turbulent());
         for (lane, voice) in voices.iter_mut().enumerate() {
             let Some(voice) = voice else { continue };
             self.bores.begin(lane, &mut voice.lattice);
-            let (mouth, mouths) = (&voice.mouth, &mut self.mouths);
+            let (mouth, mouths) = (&mut voice.mouth, &mut self.mouths);
             mouths.reeds.take(lane, &mouth.reed, &mouth.load, &mouth.state);
             (mouths.p_mouth[lane], mouths.p_mouth_glide[lane]) = (mouth.p_mouth, mouth.p_mouth_glide);
             (mouths.tongue[lane], mouths.tongue_glide[lane]) = (mouth.tongue, mouth.tongue_glide);
-            mouth.noise.fill_lane(lane, &mut mouths.noise);
+            mouths.noise.take(lane, &mut mouth.noise, hiss_together);
             is_special |= mouth.tract.is_some() || mouth.probes.is_some();
         }
-        self.bores.run(&mut Playing { mouths: &mut self.mouths, voices: &mut voices, is_special });
+        let mouths = &mut self.mouths;
+        self.bores.run(&mut Playing { mouths, voices: &mut voices, is_special, hiss_together });
         // An empty lane is flushed with others: what it holds is of no account, but may not grow too small to compute with.
         let (mut flushed, mut playing, mut any) = ([true; N], [false; N], false);
         for (lane, voice) in voices.iter_mut().enumerate() {
             let Some(voice) = voice else { continue };
             voice.mouth.state = self.mouths.reeds.state(lane);
+            if hiss_together {
+                self.mouths.noise.give_back(lane, &mut voice.mouth.noise);
+            }
             self.bores.end(lane, &mut voice.lattice);
             flushed[lane] = voice.ticks.wrapping_add(1).is_multiple_of(FLUSH_TICKS);
             playing[lane] = true;

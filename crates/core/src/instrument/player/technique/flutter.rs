@@ -5,6 +5,8 @@
 
 use std::f64::consts::TAU;
 
+use super::wrapped;
+
 /// How far the mouth pressure swings about its mean at full flutter. At 0.7 soft low notes die (measured).
 const DEPTH: f64 = 0.5;
 /// How much harder a player blows behind a full flutter: about keeps the level of the note (measured).
@@ -23,9 +25,13 @@ impl Flutter {
         Self { phase }
     }
 
-    /// One tick of a tongue at `hz`: what it adds to the mouth pressure, over that pressure.
-    pub fn tick(&mut self, hz: f64, tick_s: f64) -> f64 {
-        self.phase = (self.phase + hz * tick_s).fract();
+    /// One tick of a tongue at `hz`.
+    pub fn tick(&mut self, hz: f64, tick_s: f64) {
+        self.phase = wrapped(self.phase + hz * tick_s);
+    }
+
+    /// What the tongue adds to the mouth pressure, over that pressure.
+    pub fn swing(&self) -> f64 {
         HARDER - DEPTH * (TAU * self.phase).sin()
     }
 }

@@ -13,6 +13,8 @@
 
 use std::f64::consts::PI;
 
+use super::wrapped;
+
 /// Shares of the period in which the glottis opens and closes: Rosenberg's listeners preferred these.
 const OPENS: f64 = 0.4;
 const CLOSES: f64 = 0.16;
@@ -49,7 +51,7 @@ impl Growl {
 
     /// One tick of a voice at `hz`: what it adds to the mouth pressure, over that pressure.
     pub fn tick(&mut self, hz: f64, tick_s: f64) -> f64 {
-        self.phase = (self.phase + hz * tick_s).fract();
+        self.phase = wrapped(self.phase + hz * tick_s);
         let source = glottis(self.phase) / MEAN - 1.0;
         let share = tick_s / EMPTIES_S;
         self.swing += (source - self.swing) * share / (1.0 + share);
