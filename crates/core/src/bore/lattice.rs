@@ -9,8 +9,9 @@
 //! All junctions are processed eight at a time from one ring of past rows, as long as the longest cell and the tuning
 //! delay need (32 rows for a B flat clarinet at 96 kHz), plain loops over arrays that the compiler
 //! turns into vectors. The same source runs with SSE2 or AVX2 and gives the same bits: no fused multiply-add, sums in
-//! fixed lanes. Holes go round robin into their chunks; two holes one tick apart then lie in different chunks, and the
-//! chunk evaluated first passes its wave on within the row.
+//! fixed lanes. Holes begin round robin in their chunks; two holes one tick apart then lie in different chunks, and the
+//! chunk evaluated first passes its wave on within the row. A chunk whose holes are all shut costs less, so while fingers rest
+//! the shut ones come together (`layout`).
 //!
 //! After van Walstijn & Campbell 2003 (wave digital tone holes) and Kelly & Lochbaum 1962; the network of a hole is in
 //! `bore::tone_hole`, losses in `bore::wall_loss`.
@@ -21,6 +22,7 @@ pub mod choir;
 mod coeffs;
 mod diagnostics;
 mod junctions;
+mod layout;
 mod real;
 #[cfg(feature = "fit")]
 pub mod sensitivity;
@@ -28,8 +30,11 @@ pub mod sensitivity;
 pub use coeffs::{LatticeCoeffs, hole_chunks};
 pub use real::Real;
 
+use std::ops::{Deref, DerefMut};
+
 use crate::dsp::lanes::has_avx2;
-use junctions::{Chunk, Holes, Octet, Steps, flush, leave};
+use junctions::{Chunk, Holes, Octet, Shut, Steps, flush, leave};
+use layout::Layout;
 
 /// Junctions processed together.
 pub const LANES: usize = 8;
@@ -59,8 +64,7 @@ pub const MAX_CHUNKS: usize = 7;
 /// States below this are set to 0, so that no denormal number slows a held note.
 const TINY: f64 = 1e-18;
 
-/// Volume flows leaving through holes in one sample, by chunk and lane, see [`LatticeCoeffs::hole_slots`]. A power of two
-/// chunks, one more than there may be: so it costs no multiplication to find a row of them.
+/// Volume flows leaving through holes in one sample, by chunk and lane, see [`Tip::ended`]. A power of two chunks, one more than there may be: so it costs no multiplication to find a row of them.
 pub type HoleFlows<F> = [[F; LANES]; MAX_CHUNKS.next_power_of_two()];
 
 /// The reed end of the bore: takes the arriving wave, gives the leaving one, and is told what radiates.
@@ -79,9 +83,10 @@ pub trait Tip<F> {
     /// been written.
     #[inline(always)]
     fn radiated(&mut self, _bell: F) {}
-    /// The last sample of a [`run`](Lattice::run) is done.
+    /// The last sample of a [`run`](Lattice::run) is done. In all of its samples, the flows of each hole, in the order of the
+    /// file, were in this chunk and lane.
     #[inline(always)]
-    fn ended(&mut self) {}
+    fn ended(&mut self, _holes: &[(usize, usize)]) {}
 }
 
 /// The playing lattice: state, and the coefficients that move with the fingers.
@@ -91,8 +96,10 @@ pub struct Lattice<F> {
     /// Part of the ring in use, less one: indices wrap with it.
     mask: u16,
     steps: Box<[Chunk<Steps<F>>]>,
-    holes: Box<[Chunk<Holes<F>>]>,
+    holes: Box<[HoleChunk<F>]>,
+    /// Chunk and lane of each hole.
     hole_lanes: Box<[(usize, usize)]>,
+    layout: Layout,
     jets: Box<[f64]>,
     /// Where the present row begins in the ring.
     base: u16,
@@ -115,6 +122,59 @@ pub struct Lattice<F> {
     /// A lane of a [choir](choir::LatticeChoir) has the waves.
     lent: bool,
     avx2: bool,
+}
+
+/// Eight tone holes.
+#[derive(Clone)]
+#[repr(C)]
+struct HoleChunk<F> {
+    junctions: Chunk<Holes<F>>,
+    shut: Shut<F, LANES>,
+    /// All are shut.
+    is_shut: bool,
+}
+
+impl<F> Deref for HoleChunk<F> {
+    type Target = Holes<F>;
+
+    #[inline(always)]
+    fn deref(&self) -> &Holes<F> {
+        &self.junctions.lanes
+    }
+}
+
+impl<F> DerefMut for HoleChunk<F> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut Holes<F> {
+        &mut self.junctions.lanes
+    }
+}
+
+impl<F: Real> HoleChunk<F> {
+    fn new(junctions: Chunk<Holes<F>>) -> Self {
+        let shut = Shut::new(&junctions.lanes);
+        Self { junctions, shut, is_shut: false }
+    }
+
+    /// Other holes may be in the lanes.
+    fn heed(&mut self) {
+        self.shut = Shut::new(self);
+        self.is_shut = (0..LANES).all(|k| self.junctions.lanes.is_shut(k));
+    }
+
+    /// One sample: waves that leave downwards and back, and flows.
+    #[inline(always)]
+    fn scatter(&mut self, ring: &[F; SPACE], base: u16, mask: u16) -> ([Octet<F>; 2], Octet<F>) {
+        let Self { junctions: Chunk { sources, lanes }, shut, is_shut } = self;
+        let arriving = [sources.gather::<F, 0>(ring, base, mask), sources.gather::<F, 1>(ring, base, mask)];
+        if *is_shut {
+            let mut still = lanes.still();
+            let leaving = lanes.scatter_shut(&mut still, shut, arriving);
+            lanes.stay(still);
+            return (leaving, Octet::default());
+        }
+        lanes.scatter(arriving)
+    }
 }
 
 #[derive(Clone, Copy)]
@@ -145,9 +205,9 @@ fn held_opening(opening: f64) -> f64 {
 }
 
 /// Chunks of changes of section, and of tone holes.
-type Chunks<F> = (Box<[Chunk<Steps<F>>]>, Box<[Chunk<Holes<F>>]>);
+type Chunks<F> = (Box<[Chunk<Steps<F>>]>, Box<[HoleChunk<F>]>);
 
-/// All chunks of a lattice, silent, each junction in its lane.
+/// All chunks of a lattice, silent, each junction in its lane, but not yet [connected](Lattice::connect).
 fn junction_chunks<F: Real>(coeffs: &LatticeCoeffs) -> Chunks<F> {
     let junctions = coeffs.ticks.len() - 1;
     let mut steps = vec![Chunk::idle(Steps::idle(), IDLE_SLOT); coeffs.step_chunks()];
@@ -155,33 +215,12 @@ fn junction_chunks<F: Real>(coeffs: &LatticeCoeffs) -> Chunks<F> {
     for junction in 0..junctions {
         let lane = coeffs.lane_of(junction);
         let (chunk, k) = (lane / LANES, lane % LANES);
-        let source = match chunk.checked_sub(steps.len()) {
-            None => {
-                steps[chunk].place(k, coeffs, junction);
-                &mut steps[chunk].sources
-            }
-            Some(chunk) => {
-                holes[chunk].place(k, coeffs, junction);
-                &mut holes[chunk].sources
-            }
-        };
-        let [from_left, from_right] = sources_of(coeffs, junction);
-        (source.offset[0][k], source.offset[1][k]) = (from_left, from_right);
+        match chunk.checked_sub(steps.len()) {
+            None => steps[chunk].place(k, coeffs, junction),
+            Some(chunk) => holes[chunk].place(k, coeffs, junction),
+        }
     }
-    (steps.into(), holes.into())
-}
-
-/// Where the waves that arrive at a junction from left and right come from, from the beginning of the present row.
-fn sources_of(coeffs: &LatticeCoeffs, junction: usize) -> [u16; 2] {
-    let (left, right) = (junction, junction + 1);
-    let from_left = if junction == 0 { END_SLOT } else { coeffs.lane_of(junction - 1) };
-    let is_last = right == coeffs.ticks.len() - 1;
-    let from_right = BACK + if is_last { END_SLOT } else { coeffs.lane_of(junction + 1) };
-    let from_right = match right == coeffs.tuned_cell() {
-        true => TUNED_SLOT as u16,
-        false => back_rows(coeffs.rows(right).1, from_right),
-    };
-    [back_rows(coeffs.rows(left).0, from_left), from_right]
+    (steps.into(), holes.into_iter().map(HoleChunk::new).collect())
 }
 
 /// A ring of zeros whose first `mask + 1` values are in memory; `other` is any other value.
@@ -203,32 +242,31 @@ impl<F: Real> Lattice<F> {
         let junctions = coeffs.ticks.len() - 1;
         let (steps, holes) = junction_chunks(coeffs);
         let tuned = coeffs.tuned_cell();
-        let end = |cell: usize, offset: u16| EndLoss {
-            offset,
+        let end = |cell: usize| EndLoss {
+            offset: 0,
             taken: F::of(coeffs.loss[cell].0 * (1.0 - coeffs.loss[cell].1)),
             q: F::of(coeffs.loss[cell].1),
             state: F::default(),
         };
-        let last_lane = coeffs.lane_of(junctions - 1);
         let bell_y = coeffs.admittance[junctions];
-        let tuned_right = if tuned == junctions { END_SLOT } else { coeffs.lane_of(tuned) };
         let mask = (coeffs.ring_rows() * STRIDE as u32 - 1) as u16;
-        Self {
+        let mut lattice = Self {
             ring: silent_ring(mask, F::default(), F::of(1.0)),
             mask,
             steps,
             holes,
             hole_lanes: coeffs.hole_slots().collect(),
+            layout: Layout::new(coeffs),
             jets: coeffs.jets.clone().into(),
             base: 0,
-            tip: end(0, back_rows(coeffs.rows(0).1, BACK + coeffs.lane_of(0))),
-            end: end(junctions, back_rows(coeffs.rows(junctions).0, last_lane)),
+            tip: end(0),
+            end: end(junctions),
             bell_y: F::of(bell_y),
             bell_y2: F::of(2.0 * bell_y),
             bell_share: F::of(1.0 / (bell_y + coeffs.bell.0 + coeffs.bell.1)),
             bell_g2: F::of(2.0 * coeffs.bell.1),
             bell_state: F::default(),
-            tuned_source: (BACK + tuned_right) as u16,
+            tuned_source: 0,
             tuned_rows: coeffs.rows(tuned).1 as u16,
             delay: F::of(f64::from(coeffs.rows(tuned).1)),
             delay_glide: F::default(),
@@ -236,7 +274,9 @@ impl<F: Real> Lattice<F> {
             moved: true,
             lent: false,
             avx2: has_avx2(),
-        }
+        };
+        lattice.connect();
+        lattice
     }
 
     /// Past rows the ring holds.
@@ -257,7 +297,8 @@ impl<F: Real> Lattice<F> {
     pub fn silence(&mut self) {
         self.ring[..=usize::from(self.mask)].fill(F::default());
         self.steps.iter_mut().for_each(|steps| steps.arrivals.state = Default::default());
-        for Chunk { lanes: holes, .. } in &mut *self.holes {
+        for holes in &mut *self.holes {
+            let holes = &mut holes.junctions.lanes;
             holes.arrivals.state = Default::default();
             holes.resistance = holes.rs0;
             for state in [&mut holes.outer, &mut holes.compliance, &mut holes.inner] {
@@ -281,6 +322,7 @@ impl<F: Real> Lattice<F> {
     pub fn set_opening(&mut self, hole: usize, opening: f64) {
         let (chunk, lane) = self.hole_lanes[hole];
         self.holes[chunk].set_opening(lane, held_opening(opening));
+        self.holes[chunk].is_shut = false;
         self.moved = true;
     }
 
@@ -288,6 +330,7 @@ impl<F: Real> Lattice<F> {
     pub fn glide_opening(&mut self, hole: usize, opening: f64, samples: usize) {
         let (chunk, lane) = self.hole_lanes[hole];
         self.holes[chunk].glide_opening(lane, held_opening(opening), samples);
+        self.holes[chunk].is_shut = false;
         self.moved = true;
     }
 
@@ -402,12 +445,18 @@ impl<F: Real> Lattice<F> {
         run_body::<F, T, MASK>(self, samples, tip);
     }
 
-    /// Zeroes states too small to hear before they become denormal. Call every few hundred samples. Real-time safe.
+    /// Zeroes states too small to hear before they become denormal, and puts shut holes together while fingers rest. Call every few
+    /// hundred samples. Real-time safe.
     pub fn flush(&mut self) {
         if self.lent {
             // Who has the waves does it.
             return;
         }
+        self.flush_states();
+        self.lay();
+    }
+
+    fn flush_states(&mut self) {
         // The slots of the junctions and those at the ends; nobody writes the others.
         let slots = LANES * (self.steps.len() + self.holes.len());
         for half_row in self.ring[..=usize::from(self.mask)].as_chunks_mut::<BACK>().0 {
@@ -415,7 +464,8 @@ impl<F: Real> Lattice<F> {
             half_row[BACK - LANES..].iter_mut().for_each(flush);
         }
         self.steps.iter_mut().for_each(|steps| steps.arrivals.flush());
-        for Chunk { lanes: holes, .. } in &mut *self.holes {
+        for holes in &mut *self.holes {
+            let holes = &mut holes.junctions.lanes;
             holes.arrivals.flush();
             for state in [&mut holes.outer, &mut holes.compliance, &mut holes.inner] {
                 state.iter_mut().for_each(flush);
@@ -447,7 +497,7 @@ fn run_body<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, sampl
         let base = lattice.base.wrapping_add(STRIDE as u16) & row_mask;
         lattice.base = base;
         if moving {
-            lattice.holes.iter_mut().for_each(|holes| holes.glide());
+            lattice.holes.iter_mut().filter(|holes| !holes.is_shut).for_each(|holes| holes.glide());
         }
 
         // The returning wave of the tuned cell, delayed by whole rows and a linear part between two.
@@ -482,16 +532,12 @@ fn run_body<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, sampl
         }
         let flows = tip.holes().unwrap_or(&mut unheard);
         for (holes, flows) in lattice.holes.iter_mut().zip(flows) {
-            let arriving = [
-                holes.sources.gather::<F, 0>(ring, base, mask),
-                holes.sources.gather::<F, 1>(ring, base, mask),
-            ];
             let leaving;
-            (leaving, *flows) = holes.scatter(arriving);
+            (leaving, *flows) = holes.scatter(ring, base, mask);
             leave(ring, base as usize + slot, &leaving);
             slot += LANES;
         }
         tip.radiated(bell);
     }
-    tip.ended();
+    tip.ended(&lattice.hole_lanes);
 }

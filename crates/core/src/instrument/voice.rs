@@ -152,10 +152,10 @@ impl<F: Real> Tip<F> for Mouth<F> {
     }
 
     #[inline(always)]
-    fn ended(&mut self) {
+    fn ended(&mut self, holes: &[(usize, usize)]) {
         // A run may end within a tick, where a delay arrives.
         if self.at == TICK {
-            self.outside.radiate();
+            self.outside.radiate(holes);
         }
     }
 }
@@ -194,8 +194,8 @@ impl<F: Real> Tip<F> for ThroughTract<'_, F> {
     }
 
     #[inline(always)]
-    fn ended(&mut self) {
-        self.mouth.ended();
+    fn ended(&mut self, holes: &[(usize, usize)]) {
+        self.mouth.ended(holes);
     }
 }
 

@@ -267,6 +267,54 @@ impl<F: Real, const N: usize> Holes<F, N> {
         self.resistance[k] = F::of(hole.rs);
     }
 
+    /// Lane `k` and one of others change places.
+    pub(super) fn swap(&mut self, k: usize, others: &mut Self, other: usize) {
+        for (own, others) in self.all_lanes().into_iter().zip(others.all_lanes()) {
+            std::mem::swap(&mut own[k], &mut others[other]);
+        }
+    }
+
+    /// Two lanes change places.
+    pub(super) fn swap_within(&mut self, k: usize, other: usize) {
+        self.all_lanes().into_iter().for_each(|lanes| lanes.swap(k, other));
+    }
+
+    /// All that lanes hold.
+    fn all_lanes(&mut self) -> [&mut [F; N]; 27] {
+        let Arrivals { taken: [taken_left, taken_right], q: [q_left, q_right], state: [left, right] } =
+            &mut self.arrivals;
+        let [low, high] = &mut self.range;
+        [
+            taken_left,
+            taken_right,
+            q_left,
+            q_right,
+            left,
+            right,
+            &mut self.y_left,
+            &mut self.y_right,
+            &mut self.y_sum,
+            &mut self.r1,
+            &mut self.minus_r1,
+            &mut self.gc,
+            &mut self.minus_gc2,
+            &mut self.gl2,
+            &mut self.outside,
+            &mut self.rs0,
+            &mut self.jet_open,
+            &mut self.jet,
+            &mut self.opening,
+            &mut self.glide,
+            low,
+            high,
+            &mut self.area,
+            &mut self.resistance,
+            &mut self.outer,
+            &mut self.compliance,
+            &mut self.inner,
+        ]
+    }
+
     /// Puts the hole in lane `k` at an opening, 0..=1.
     pub(super) fn set_opening(&mut self, k: usize, opening: f64) {
         let opening = F::of(opening);

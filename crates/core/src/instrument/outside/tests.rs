@@ -39,9 +39,9 @@ impl Tip<f64> for Impulse {
         self.at += 1;
     }
 
-    fn ended(&mut self) {
+    fn ended(&mut self, holes: &[(usize, usize)]) {
         self.at = 0;
-        self.outside.radiate();
+        self.outside.radiate(holes);
         let (left, right) = self.outside.heard();
         for (heard, out) in self.heard.iter_mut().zip([left, right.unwrap_or(left)]) {
             heard.extend(out.map(f64::from));
