@@ -166,14 +166,17 @@ impl<F: Real> HoleChunk<F> {
     #[inline(always)]
     fn scatter(&mut self, ring: &[F; SPACE], base: u16, mask: u16) -> ([Octet<F>; 2], Octet<F>) {
         let Self { junctions: Chunk { sources, lanes }, shut, is_shut } = self;
-        let arriving = [sources.gather::<F, 0>(ring, base, mask), sources.gather::<F, 1>(ring, base, mask)];
         if *is_shut {
+            let right = sources.gather::<F, 1>(ring, base, mask);
+            let left = sources.gather::<F, 0>(ring, base, mask);
             let mut still = lanes.still();
-            let leaving = lanes.scatter_shut(&mut still, shut, arriving);
+            let leaving = lanes.scatter_shut(&mut still, shut, [left, right]);
             lanes.stay(still);
             return (leaving, Octet::default());
         }
-        lanes.scatter(arriving)
+        let left = sources.gather::<F, 0>(ring, base, mask);
+        let right = sources.gather::<F, 1>(ring, base, mask);
+        lanes.scatter([left, right])
     }
 }
 
