@@ -33,7 +33,7 @@ pub use real::Real;
 use std::ops::{Deref, DerefMut};
 
 use crate::dsp::lanes::has_avx2;
-use junctions::{Chunk, Holes, Octet, Shut, Steps, flush, leave};
+use junctions::{Chunk, Holes, Octet, Shut, Steps, flush, gather, leave};
 use layout::Layout;
 
 /// Junctions processed together.
@@ -43,6 +43,8 @@ const STRIDE: usize = 128;
 /// Most values the ring can hold: every 16-bit index lies inside, so no access needs a check. Only the rows an instrument
 /// needs are ever touched.
 const SPACE: usize = 1 << 16;
+/// Behind the rows in use stands the first one again: so the row that follows any row lies behind it.
+type Ring<F> = [F; SPACE + STRIDE];
 /// Fewest and most past rows the ring holds; a power of two.
 const ROWS: (u32, u32) = (32, (SPACE / STRIDE) as u32);
 /// Masks of the two shortest rings.
@@ -73,16 +75,15 @@ pub type HoleFlows<F> = [[F; LANES]; MAX_CHUNKS.next_power_of_two()];
 pub trait Tip<F> {
     /// Wave leaving into the bore, for the wave arriving from it.
     fn reflect(&mut self, p_minus: F) -> F;
-    /// Room for the volume flows that leave through the holes in this sample; none if they are not asked for. A lane without
-    /// a hole gets 0, a chunk without holes nothing.
-    #[inline(always)]
-    fn holes(&mut self) -> Option<&mut HoleFlows<F>> {
-        None
-    }
-    /// The sample is done: its volume flow leaving through the bell, after those through the [`holes`](Self::holes) have
-    /// been written.
+    /// The volume flow that leaves through the bell in the same sample.
     #[inline(always)]
     fn radiated(&mut self, _bell: F) {}
+    /// Room for the volume flows that leave through the holes in the latest sample, or in one before; none if they are not asked for.
+    /// A lane without a hole gets 0, a chunk without holes nothing.
+    #[inline(always)]
+    fn holes(&mut self, _before: usize) -> Option<&mut HoleFlows<F>> {
+        None
+    }
     /// The last sample of a [`run`](Lattice::run) is done. In all of its samples, the flows of each hole, in the order of the
     /// file, were in this chunk and lane.
     #[inline(always)]
@@ -92,7 +93,7 @@ pub trait Tip<F> {
 /// The playing lattice: state, and the coefficients that move with the fingers.
 #[derive(Clone)]
 pub struct Lattice<F> {
-    ring: Box<[F; SPACE]>,
+    ring: Box<Ring<F>>,
     /// Part of the ring in use, less one: indices wrap with it.
     mask: u16,
     steps: Box<[Chunk<Steps<F>>]>,
@@ -164,9 +165,11 @@ impl<F: Real> HoleChunk<F> {
 
     /// One sample: waves that leave downwards and back, and flows.
     #[inline(always)]
-    fn scatter(&mut self, ring: &[F; SPACE], base: u16, mask: u16) -> ([Octet<F>; 2], Octet<F>) {
+    fn scatter(&mut self, ring: &Ring<F>, base: u16, mask: u16) -> ([Octet<F>; 2], Octet<F>) {
         let Self { junctions: Chunk { sources, lanes }, shut, is_shut } = self;
         if *is_shut {
+            // In another order than below: otherwise the compiler takes both gathers together, and loads that could be operands
+            // become instructions.
             let right = sources.gather::<F, 1>(ring, base, mask);
             let left = sources.gather::<F, 0>(ring, base, mask);
             let mut still = lanes.still();
@@ -190,7 +193,7 @@ struct EndLoss<F> {
 
 impl<F: Real> EndLoss<F> {
     #[inline(always)]
-    fn take(&mut self, ring: &[F; SPACE], base: u16, mask: u16) -> F {
+    fn take(&mut self, ring: &Ring<F>, base: u16, mask: u16) -> F {
         let wave = ring[usize::from(base.wrapping_add(self.offset) & mask)];
         let difference = wave - self.state;
         self.state = self.state + self.q * difference;
@@ -227,13 +230,13 @@ fn junction_chunks<F: Real>(coeffs: &LatticeCoeffs) -> Chunks<F> {
 }
 
 /// A ring of zeros whose first `mask + 1` values are in memory; `other` is any other value.
-fn silent_ring<T: Copy>(mask: u16, zero: T, other: T) -> Box<[T; SPACE]> {
-    // PANIC: the vector has exactly SPACE elements.
-    let mut ring: Box<[T; SPACE]> =
-        vec![zero; SPACE].into_boxed_slice().try_into().unwrap_or_else(|_| unreachable!());
+fn silent_ring<T: Copy>(mask: u16, zero: T, other: T) -> Box<Ring<T>> {
+    // PANIC: the vector has exactly as many elements as the ring.
+    let mut ring: Box<Ring<T>> =
+        vec![zero; SPACE + STRIDE].into_boxed_slice().try_into().unwrap_or_else(|_| unreachable!());
     // The system only promises fresh memory. Writing it here makes sure that it is there before the audio thread reads it.
     for value in [other, zero] {
-        ring[..=usize::from(mask)].fill(value);
+        ring[..=usize::from(mask) + STRIDE].fill(value);
         std::hint::black_box(&mut ring);
     }
     ring
@@ -261,7 +264,7 @@ impl<F: Real> Lattice<F> {
             hole_lanes: coeffs.hole_slots().collect(),
             layout: Layout::new(coeffs),
             jets: coeffs.jets.clone().into(),
-            base: 0,
+            base: mask & !(STRIDE as u16 - 1),
             tip: end(0),
             end: end(junctions),
             bell_y: F::of(bell_y),
@@ -298,7 +301,7 @@ impl<F: Real> Lattice<F> {
 
     /// Takes all waves away; openings, delay and what moves them stay. Real-time safe.
     pub fn silence(&mut self) {
-        self.ring[..=usize::from(self.mask)].fill(F::default());
+        self.ring[..=usize::from(self.mask) + STRIDE].fill(F::default());
         self.steps.iter_mut().for_each(|steps| steps.arrivals.state = Default::default());
         for holes in &mut *self.holes {
             let holes = &mut holes.junctions.lanes;
@@ -311,7 +314,8 @@ impl<F: Real> Lattice<F> {
         self.tip.state = F::default();
         self.end.state = F::default();
         self.bell_state = F::default();
-        self.base = 0;
+        // The next row is the first.
+        self.base = self.mask & !(STRIDE as u16 - 1);
         self.lent = false;
     }
 
@@ -477,6 +481,13 @@ impl<F: Real> Lattice<F> {
         flush(&mut self.tip.state);
         flush(&mut self.end.state);
         flush(&mut self.bell_state);
+        self.close_ring();
+    }
+
+    /// Has the first row stand behind the last one, too.
+    #[inline(always)]
+    fn close_ring(&mut self) {
+        self.ring.copy_within(..STRIDE, usize::from(self.mask) + 1);
     }
 }
 
@@ -492,25 +503,89 @@ fn run_body<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, sampl
     if moving {
         lattice.rest();
     }
+    let mut delay = Delay::of(lattice, samples);
+    // In pairs, places are found once for two samples. The second row of a pair lies right behind the first.
+    let in_pairs = lattice.layout.in_pairs && delay.least > 1;
+    let before_last = (if MASK == 0 { lattice.mask } else { MASK }) - (2 * STRIDE as u16 - 1);
+    let mut left = samples;
+    while left > 0 {
+        if in_pairs && left > 1 && lattice.base != before_last {
+            advance::<F, T, MASK, 2>(lattice, &mut delay, moving, tip);
+            left -= 2;
+        } else {
+            advance::<F, T, MASK, 1>(lattice, &mut delay, moving, tip);
+            left -= 1;
+        }
+    }
+    tip.ended(&lattice.hole_lanes);
+}
+
+/// The tuning delay in a run.
+struct Delay<F> {
+    /// It crosses a row, so that its whole rows must be found anew in each sample.
+    crossing: bool,
+    /// Whole rows, where the wave is that has taken so many, and the wave a row before it.
+    whole: F,
+    place: u16,
+    before: F,
+    least: u16,
+}
+
+impl<F: Real> Delay<F> {
+    /// It goes one way, so that its ends tell whether it crosses a row.
+    #[inline(always)]
+    fn of(lattice: &Lattice<F>, samples: usize) -> Self {
+        let mut last = lattice.delay;
+        for _ in 0..samples {
+            last = last + lattice.delay_glide;
+        }
+        let (first, last) = (rows_of(lattice.delay + lattice.delay_glide), rows_of(last));
+        let mut delay = Self {
+            crossing: first != last,
+            whole: F::from(first),
+            place: lattice.tuned_source.wrapping_sub(first.wrapping_mul(STRIDE as u16)),
+            before: F::default(),
+            least: first.min(last),
+        };
+        delay.before = lattice.ring[usize::from(lattice.base.wrapping_add(delay.place) & lattice.mask)];
+        delay
+    }
+}
+
+/// Whole rows of a delay. Rounding may take a delay that ends at one row, the shortest, below it; the wave of this row is not
+/// there yet.
+#[inline(always)]
+fn rows_of<F: Real>(delay: F) -> u16 {
+    delay.whole().max(1)
+}
+
+/// One sample or two.
+#[inline(always)]
+fn advance<F: Real, T: Tip<F>, const MASK: u16, const COUNT: usize>(
+    lattice: &mut Lattice<F>,
+    delay: &mut Delay<F>,
+    moving: bool,
+    tip: &mut T,
+) {
     let ring = &mut *lattice.ring;
     let mask = if MASK == 0 { lattice.mask } else { MASK };
     let row_mask = mask & !(STRIDE as u16 - 1);
-    let mut unheard = HoleFlows::default();
-    for _ in 0..samples {
-        let base = lattice.base.wrapping_add(STRIDE as u16) & row_mask;
-        lattice.base = base;
-        if moving {
-            lattice.holes.iter_mut().filter(|holes| !holes.is_shut).for_each(|holes| holes.glide());
-        }
+    let first = lattice.base.wrapping_add(STRIDE as u16) & row_mask;
+    for n in 0..COUNT {
+        let base = first + (n * STRIDE) as u16;
 
         // The returning wave of the tuned cell, delayed by whole rows and a linear part between two.
         lattice.delay = lattice.delay + lattice.delay_glide;
-        // Rounding may take a delay that ends at one row, the shortest, below it; the wave of this row is not there yet.
-        let whole = lattice.delay.whole().max(1);
-        let part = lattice.delay - F::from(whole);
-        let near = lattice.tuned_source.wrapping_add(base).wrapping_sub(whole.wrapping_mul(STRIDE as u16));
-        let (near, far) = (near & mask, near.wrapping_sub(STRIDE as u16) & mask);
-        let wave = ring[usize::from(near)] + part * (ring[usize::from(far)] - ring[usize::from(near)]);
+        if delay.crossing {
+            let whole = rows_of(lattice.delay);
+            delay.whole = F::from(whole);
+            delay.place = lattice.tuned_source.wrapping_sub(whole.wrapping_mul(STRIDE as u16));
+            let far = delay.place.wrapping_sub(STRIDE as u16);
+            delay.before = ring[usize::from(base.wrapping_add(far) & mask)];
+        }
+        let near = ring[usize::from(base.wrapping_add(delay.place) & mask)];
+        let wave = near + (lattice.delay - delay.whole) * (delay.before - near);
+        delay.before = near;
         ring[usize::from(base | TUNED_SLOT as u16)] = wave;
 
         let p_minus = lattice.tip.take(ring, base, mask);
@@ -522,25 +597,36 @@ fn run_body<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, sampl
         lattice.bell_state = lattice.bell_state + lattice.bell_g2 * p_end;
         let reflected = p_end - arriving;
         ring[usize::from(base | (BACK + END_SLOT) as u16)] = reflected;
-        let bell = lattice.bell_y * (arriving - reflected);
+        tip.radiated(lattice.bell_y * (arriving - reflected));
+    }
 
-        let mut slot = 0;
-        for steps in &mut *lattice.steps {
-            let arriving = [
-                steps.sources.gather::<F, 0>(ring, base, mask),
-                steps.sources.gather::<F, 1>(ring, base, mask),
-            ];
-            leave(ring, base as usize + slot, &steps.scatter(arriving));
-            slot += LANES;
+    let step_slots = (lattice.steps.len() * LANES) as u16;
+    for (chunk, steps) in lattice.steps.iter_mut().enumerate().take(MAX_CHUNKS) {
+        let [left, right] = &steps.sources.places(first, mask);
+        let arriving = [gather::<F, 0>(ring, left), gather::<F, 0>(ring, right)];
+        if COUNT == 1 {
+            leave(ring, first, chunk, &steps.scatter(arriving));
+        } else {
+            let next = [gather::<F, 1>(ring, left), gather::<F, 1>(ring, right)];
+            leave(ring, first, chunk, &steps.scatter(arriving));
+            leave(ring, first + STRIDE as u16, chunk, &steps.scatter(next));
         }
-        let flows = tip.holes().unwrap_or(&mut unheard);
-        for (holes, flows) in lattice.holes.iter_mut().zip(flows) {
+    }
+    let mut unheard = HoleFlows::default();
+    for n in 0..COUNT {
+        if moving {
+            lattice.holes.iter_mut().filter(|holes| !holes.is_shut).for_each(|holes| holes.glide());
+        }
+        let base = first + (n * STRIDE) as u16;
+        let flows = tip.holes(COUNT - 1 - n).unwrap_or(&mut unheard);
+        for (chunk, (holes, flows)) in lattice.holes.iter_mut().zip(flows).enumerate().take(MAX_CHUNKS) {
             let leaving;
             (leaving, *flows) = holes.scatter(ring, base, mask);
-            leave(ring, base as usize + slot, &leaving);
-            slot += LANES;
+            leave(ring, base + step_slots, chunk, &leaving);
         }
-        tip.radiated(bell);
     }
-    tip.ended(&lattice.hole_lanes);
+    lattice.base = first + ((COUNT - 1) * STRIDE) as u16;
+    if first == 0 {
+        lattice.close_ring();
+    }
 }

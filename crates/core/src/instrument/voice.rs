@@ -131,11 +131,6 @@ impl<F: Real> Tip<F> for Mouth<F> {
     }
 
     #[inline(always)]
-    fn holes(&mut self) -> Option<&mut HoleFlows<F>> {
-        Some(self.outside.holes(self.at))
-    }
-
-    #[inline(always)]
     fn radiated(&mut self, bell: F) {
         if let Some(probes) = &mut self.probes {
             probes[self.at & (TICK - 1)] = Probe {
@@ -149,6 +144,11 @@ impl<F: Real> Tip<F> for Mouth<F> {
         }
         self.outside.bell(self.at, bell);
         self.at += 1;
+    }
+
+    #[inline(always)]
+    fn holes(&mut self, before: usize) -> Option<&mut HoleFlows<F>> {
+        Some(self.outside.holes(self.at.wrapping_sub(before + 1)))
     }
 
     #[inline(always)]
@@ -184,13 +184,13 @@ impl<F: Real> Tip<F> for ThroughTract<'_, F> {
     }
 
     #[inline(always)]
-    fn holes(&mut self) -> Option<&mut HoleFlows<F>> {
-        self.mouth.holes()
+    fn radiated(&mut self, bell: F) {
+        self.mouth.radiated(bell);
     }
 
     #[inline(always)]
-    fn radiated(&mut self, bell: F) {
-        self.mouth.radiated(bell);
+    fn holes(&mut self, before: usize) -> Option<&mut HoleFlows<F>> {
+        self.mouth.holes(before)
     }
 
     #[inline(always)]

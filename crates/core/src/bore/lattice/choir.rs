@@ -253,6 +253,7 @@ impl<const N: usize> LatticeChoir<N> {
             own.inner[k] = lanes.inner[lane];
             own.resistance[k] = lanes.resistance[lane];
         }
+        lattice.close_ring();
         lattice.tip.state = self.tip.state[lane];
         lattice.end.state = self.end.state[lane];
         lattice.bell_state = self.bell.state[lane];

@@ -102,6 +102,7 @@ impl<F: Real> Lattice<F> {
             self.ring[row * STRIDE + END_SLOT] = next();
             self.ring[row * STRIDE + BACK + END_SLOT] = next();
         }
+        self.close_ring();
         for holes in &mut *self.holes {
             holes.is_shut = false;
             for k in 0..LANES {

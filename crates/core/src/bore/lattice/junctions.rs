@@ -7,7 +7,7 @@ use super::real::Real;
 use std::ops::{Deref, DerefMut};
 
 use super::coeffs::LatticeCoeffs;
-use super::{BACK, LANES, SPACE, TINY};
+use super::{BACK, LANES, Ring, STRIDE, TINY};
 
 pub(super) type Octet<F> = [F; LANES];
 
@@ -54,7 +54,7 @@ impl Sources {
     #[inline(always)]
     pub(super) fn gather<F: Real, const SIDE: usize>(
         &self,
-        ring: &[F; SPACE],
+        ring: &Ring<F>,
         base: u16,
         mask: u16,
     ) -> Octet<F> {
@@ -64,6 +64,27 @@ impl Sources {
         }
         wave
     }
+
+    /// Where these waves are in the ring, whose present row begins at `base`.
+    #[inline(always)]
+    pub(super) fn places(&self, base: u16, mask: u16) -> [[u16; LANES]; 2] {
+        let mut places = self.offset;
+        for place in places.as_flattened_mut() {
+            *place = base.wrapping_add(*place) & mask;
+        }
+        places
+    }
+}
+
+/// Waves at these places, or so many rows behind them: one at most.
+#[inline(always)]
+pub(super) fn gather<F: Real, const ROW: usize>(ring: &Ring<F>, places: &[u16; LANES]) -> Octet<F> {
+    let behind = ROW.min(1) * STRIDE;
+    let mut wave = Octet::<F>::default();
+    for (wave, &place) in wave.iter_mut().zip(places) {
+        *wave = ring[usize::from(place) + behind];
+    }
+    wave
 }
 
 /// One-pole loss of both waves arriving at junctions: `y = x - m (x - s)` with `m = A (1 - q)`, then `s += q (x - s)`.
@@ -133,15 +154,13 @@ pub(super) fn flush<F: Real>(x: &mut F) {
     *x = if x.magnitude() < F::of(TINY) { F::default() } else { *x };
 }
 
-/// Writes the waves leaving eight junctions, down the bore and back.
+/// Writes the waves leaving the eight junctions of a chunk, down the bore and back, into a row.
 #[inline(always)]
-pub(super) fn leave<F: Real>(ring: &mut [F; SPACE], row: usize, [down, back]: &[Octet<F>; 2]) {
-    let row = row & (SPACE - 1) & !(LANES - 1);
-    for (side, wave) in [(row, down), (row | BACK, back)] {
-        if let Some(slots) = ring.get_mut(side..side + LANES) {
-            slots.copy_from_slice(wave);
-        }
-    }
+pub(super) fn leave<F: Real>(ring: &mut Ring<F>, row: u16, chunk: usize, [down, back]: &[Octet<F>; 2]) {
+    let slots = ring.as_chunks_mut::<LANES>().0;
+    let at = usize::from(row) / LANES + chunk % (BACK / LANES);
+    slots[at] = *down;
+    slots[at + BACK / LANES] = *back;
 }
 
 /// Changes of section.

@@ -37,6 +37,8 @@ pub(super) struct Layout {
     /// All holes: those with hops first, and each behind those whose chunks must come before its own.
     order: Box<[u8]>,
     chunks: usize,
+    /// Changes of section and ends may go on for two samples at once: no wave gets there sooner.
+    pub(super) in_pairs: bool,
 }
 
 impl Layout {
@@ -60,7 +62,13 @@ impl Layout {
         }
         let mut order: Vec<u8> = (0..first.len() as u8).collect();
         order.sort_by_key(|hole| (!hops.as_flattened().contains(hole), first[usize::from(*hole)].0));
+        // A cell between two holes may be shorter.
+        let is_inner = |cell: usize| {
+            cell > 0 && seats.get(cell - 1..=cell).is_some_and(|pair| matches!(pair, [Seat::Hole(_), Seat::Hole(_)]))
+        };
+        let in_pairs = rows.iter().enumerate().all(|(cell, rows)| rows.0.min(rows.1) > 1 || is_inner(cell));
         Self {
+            in_pairs,
             rows,
             tuned: coeffs.tuned_cell(),
             seats,
@@ -221,6 +229,7 @@ impl<F: Real> Lattice<F> {
             row.swap(slot, other);
             row.swap(BACK + slot, BACK + other);
         }
+        self.close_ring();
     }
 }
 

@@ -30,13 +30,13 @@ impl Tip<f64> for Impulse {
         leaving
     }
 
-    fn holes(&mut self) -> Option<&mut HoleFlows<f64>> {
-        Some(self.outside.holes(self.at))
-    }
-
     fn radiated(&mut self, bell: f64) {
         self.outside.bell(self.at, bell);
         self.at += 1;
+    }
+
+    fn holes(&mut self, before: usize) -> Option<&mut HoleFlows<f64>> {
+        Some(self.outside.holes(self.at - 1 - before))
     }
 
     fn ended(&mut self, holes: &[(usize, usize)]) {

@@ -36,8 +36,9 @@ impl<F: Real> Tip<F> for Ear<F> {
         p_minus * F::of(0.9) + std::mem::take(&mut self.push)
     }
 
-    fn holes(&mut self) -> Option<&mut HoleFlows<F>> {
-        self.rows.last_mut()
+    fn holes(&mut self, before: usize) -> Option<&mut HoleFlows<F>> {
+        let latest = self.rows.len() - 1;
+        self.rows.get_mut(latest - before)
     }
 
     fn radiated(&mut self, bell: F) {
