@@ -24,6 +24,7 @@ mod diagnostics;
 mod junctions;
 mod layout;
 mod real;
+mod run;
 #[cfg(feature = "fit")]
 pub mod sensitivity;
 
@@ -33,7 +34,7 @@ pub use real::Real;
 use std::ops::{Deref, DerefMut};
 
 use crate::dsp::lanes::has_avx2;
-use junctions::{Chunk, Holes, Octet, Shut, Steps, flush, gather, leave};
+use junctions::{Chunk, Holes, Octet, Shut, Steps, flush};
 use layout::Layout;
 
 /// Junctions processed together.
@@ -445,11 +446,11 @@ impl<F: Real> Lattice<F> {
             #[allow(unsafe_code)]
             // SAFETY: `avx2` is only set where the processor has AVX2.
             unsafe {
-                run_avx2::<F, T, MASK>(self, samples, tip)
+                run::run_avx2::<F, T, MASK>(self, samples, tip)
             };
             return;
         }
-        run_body::<F, T, MASK>(self, samples, tip);
+        run::run_body::<F, T, MASK>(self, samples, tip);
     }
 
     /// Zeroes states too small to hear before they become denormal, and puts shut holes together while fingers rest. Call every few
@@ -488,145 +489,5 @@ impl<F: Real> Lattice<F> {
     #[inline(always)]
     fn close_ring(&mut self) {
         self.ring.copy_within(..STRIDE, usize::from(self.mask) + 1);
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn run_avx2<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, samples: usize, tip: &mut T) {
-    run_body::<F, T, MASK>(lattice, samples, tip);
-}
-
-#[inline(always)]
-fn run_body<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, samples: usize, tip: &mut T) {
-    let moving = lattice.moved;
-    if moving {
-        lattice.rest();
-    }
-    let mut delay = Delay::of(lattice, samples);
-    // In pairs, places are found once for two samples. The second row of a pair lies right behind the first.
-    let in_pairs = lattice.layout.in_pairs && delay.least > 1;
-    let before_last = (if MASK == 0 { lattice.mask } else { MASK }) - (2 * STRIDE as u16 - 1);
-    let mut left = samples;
-    while left > 0 {
-        if in_pairs && left > 1 && lattice.base != before_last {
-            advance::<F, T, MASK, 2>(lattice, &mut delay, moving, tip);
-            left -= 2;
-        } else {
-            advance::<F, T, MASK, 1>(lattice, &mut delay, moving, tip);
-            left -= 1;
-        }
-    }
-    tip.ended(&lattice.hole_lanes);
-}
-
-/// The tuning delay in a run.
-struct Delay<F> {
-    /// It crosses a row, so that its whole rows must be found anew in each sample.
-    crossing: bool,
-    /// Whole rows, where the wave is that has taken so many, and the wave a row before it.
-    whole: F,
-    place: u16,
-    before: F,
-    least: u16,
-}
-
-impl<F: Real> Delay<F> {
-    /// It goes one way, so that its ends tell whether it crosses a row.
-    #[inline(always)]
-    fn of(lattice: &Lattice<F>, samples: usize) -> Self {
-        let mut last = lattice.delay;
-        for _ in 0..samples {
-            last = last + lattice.delay_glide;
-        }
-        let (first, last) = (rows_of(lattice.delay + lattice.delay_glide), rows_of(last));
-        let mut delay = Self {
-            crossing: first != last,
-            whole: F::from(first),
-            place: lattice.tuned_source.wrapping_sub(first.wrapping_mul(STRIDE as u16)),
-            before: F::default(),
-            least: first.min(last),
-        };
-        delay.before = lattice.ring[usize::from(lattice.base.wrapping_add(delay.place) & lattice.mask)];
-        delay
-    }
-}
-
-/// Whole rows of a delay. Rounding may take a delay that ends at one row, the shortest, below it; the wave of this row is not
-/// there yet.
-#[inline(always)]
-fn rows_of<F: Real>(delay: F) -> u16 {
-    delay.whole().max(1)
-}
-
-/// One sample or two.
-#[inline(always)]
-fn advance<F: Real, T: Tip<F>, const MASK: u16, const COUNT: usize>(
-    lattice: &mut Lattice<F>,
-    delay: &mut Delay<F>,
-    moving: bool,
-    tip: &mut T,
-) {
-    let ring = &mut *lattice.ring;
-    let mask = if MASK == 0 { lattice.mask } else { MASK };
-    let row_mask = mask & !(STRIDE as u16 - 1);
-    let first = lattice.base.wrapping_add(STRIDE as u16) & row_mask;
-    for n in 0..COUNT {
-        let base = first + (n * STRIDE) as u16;
-
-        // The returning wave of the tuned cell, delayed by whole rows and a linear part between two.
-        lattice.delay = lattice.delay + lattice.delay_glide;
-        if delay.crossing {
-            let whole = rows_of(lattice.delay);
-            delay.whole = F::from(whole);
-            delay.place = lattice.tuned_source.wrapping_sub(whole.wrapping_mul(STRIDE as u16));
-            let far = delay.place.wrapping_sub(STRIDE as u16);
-            delay.before = ring[usize::from(base.wrapping_add(far) & mask)];
-        }
-        let near = ring[usize::from(base.wrapping_add(delay.place) & mask)];
-        let wave = near + (lattice.delay - delay.whole) * (delay.before - near);
-        delay.before = near;
-        ring[usize::from(base | TUNED_SLOT as u16)] = wave;
-
-        let p_minus = lattice.tip.take(ring, base, mask);
-        ring[usize::from(base | END_SLOT as u16)] = tip.reflect(p_minus);
-
-        // The open end: radiation conductance and mass in parallel.
-        let arriving = lattice.end.take(ring, base, mask);
-        let p_end = (lattice.bell_y2 * arriving - lattice.bell_state) * lattice.bell_share;
-        lattice.bell_state = lattice.bell_state + lattice.bell_g2 * p_end;
-        let reflected = p_end - arriving;
-        ring[usize::from(base | (BACK + END_SLOT) as u16)] = reflected;
-        tip.radiated(lattice.bell_y * (arriving - reflected));
-    }
-
-    let step_slots = (lattice.steps.len() * LANES) as u16;
-    for (chunk, steps) in lattice.steps.iter_mut().enumerate().take(MAX_CHUNKS) {
-        let [left, right] = &steps.sources.places(first, mask);
-        let arriving = [gather::<F, 0>(ring, left), gather::<F, 0>(ring, right)];
-        if COUNT == 1 {
-            leave(ring, first, chunk, &steps.scatter(arriving));
-        } else {
-            let next = [gather::<F, 1>(ring, left), gather::<F, 1>(ring, right)];
-            leave(ring, first, chunk, &steps.scatter(arriving));
-            leave(ring, first + STRIDE as u16, chunk, &steps.scatter(next));
-        }
-    }
-    let mut unheard = HoleFlows::default();
-    for n in 0..COUNT {
-        if moving {
-            lattice.holes.iter_mut().filter(|holes| !holes.is_shut).for_each(|holes| holes.glide());
-        }
-        let base = first + (n * STRIDE) as u16;
-        let flows = tip.holes(COUNT - 1 - n).unwrap_or(&mut unheard);
-        for (chunk, (holes, flows)) in lattice.holes.iter_mut().zip(flows).enumerate().take(MAX_CHUNKS) {
-            let leaving;
-            (leaving, *flows) = holes.scatter(ring, base, mask);
-            leave(ring, base + step_slots, chunk, &leaving);
-        }
-    }
-    lattice.base = first + ((COUNT - 1) * STRIDE) as u16;
-    if first == 0 {
-        lattice.close_ring();
     }
 }

@@ -64,7 +64,10 @@ impl Layout {
         order.sort_by_key(|hole| (!hops.as_flattened().contains(hole), first[usize::from(*hole)].0));
         // A cell between two holes may be shorter.
         let is_inner = |cell: usize| {
-            cell > 0 && seats.get(cell - 1..=cell).is_some_and(|pair| matches!(pair, [Seat::Hole(_), Seat::Hole(_)]))
+            cell > 0
+                && seats
+                    .get(cell - 1..=cell)
+                    .is_some_and(|pair| matches!(pair, [Seat::Hole(_), Seat::Hole(_)]))
         };
         let in_pairs = rows.iter().enumerate().all(|(cell, rows)| rows.0.min(rows.1) > 1 || is_inner(cell));
         Self {
@@ -93,12 +96,18 @@ impl Layout {
     fn fill(&self, is_shut: &[bool; MAX_HOLES], set: u32) -> Option<HoleChunks> {
         let (mut chunks, mut taken) = ([0; MAX_HOLES], [0; MAX_CHUNKS]);
         for &hole in &self.order {
-            let before = self.hops.iter().filter(|hop| hop[1] == hole).map(|hop| chunks[usize::from(hop[0])] + 1);
+            let before =
+                self.hops.iter().filter(|hop| hop[1] == hole).map(|hop| chunks[usize::from(hop[0])] + 1);
             let least = usize::from(before.max().unwrap_or(0));
             let has_room = |for_shut: bool| {
-                (least..self.chunks).find(|&chunk| taken[chunk] < LANES && (set >> chunk & 1 == 1) == for_shut)
+                (least..self.chunks)
+                    .find(|&chunk| taken[chunk] < LANES && (set >> chunk & 1 == 1) == for_shut)
             };
-            let chunk = if is_shut[usize::from(hole)] { has_room(true).or(has_room(false)) } else { has_room(false) }?;
+            let chunk = if is_shut[usize::from(hole)] {
+                has_room(true).or(has_room(false))
+            } else {
+                has_room(false)
+            }?;
             chunks[usize::from(hole)] = chunk as u8;
             taken[chunk] += 1;
         }

@@ -46,7 +46,8 @@ impl<F: Real> Tip<F> for Ear<F> {
     }
 
     fn ended(&mut self, holes: &[(usize, usize)]) {
-        self.holes.extend(self.rows.drain(..).map(|row| holes.iter().map(|&(chunk, k)| row[chunk][k]).collect()));
+        self.holes
+            .extend(self.rows.drain(..).map(|row| holes.iter().map(|&(chunk, k)| row[chunk][k]).collect()));
     }
 }
 
@@ -106,7 +107,11 @@ fn play<F: Real>(coeffs: &LatticeCoeffs, fingerings: &[Vec<bool>], samples: usiz
         moved += usize::from(moving.hole_lanes != first);
         assert!(heard.bits() == expected.bits(), "in tick {ticks}");
     }
-    println!("{} holes, {} hops, {ticks} ticks: {moved} with holes elsewhere, {shut} shut chunks", first.len(), moving.layout.hops.len());
+    println!(
+        "{} holes, {} hops, {ticks} ticks: {moved} with holes elsewhere, {shut} shut chunks",
+        first.len(),
+        moving.layout.hops.len()
+    );
     assert!(shut > ticks / 4 && moved > ticks / 8);
 }
 
