@@ -154,6 +154,8 @@ impl<F: Real> Ends<F> {
 }
 
 /// One sample or two, into the rows from `base` on.
+///
+/// What is done twice stands here twice: before a loop of two rounds, the compiler would copy all that the reed needs.
 #[inline(always)]
 fn advance<F: Real, T: Tip<F>, const COUNT: usize>(
     (ring, steps, holes): (&mut Ring<F>, &mut [Chunk<Steps<F>>], &mut [HoleChunk<F>]),
@@ -162,32 +164,47 @@ fn advance<F: Real, T: Tip<F>, const COUNT: usize>(
     moving: bool,
     tip: &mut T,
 ) {
-    for n in 0..COUNT {
-        ends.advance(ring, base + (n * STRIDE) as u16, mask, tip);
+    let is_pair = COUNT == 2;
+    let next = base.wrapping_add(STRIDE as u16);
+    ends.advance(ring, base, mask, tip);
+    if is_pair {
+        ends.advance(ring, next, mask, tip);
     }
     let step_slots = (steps.len() * LANES) as u16;
     for (chunk, steps) in steps.iter_mut().enumerate().take(MAX_CHUNKS) {
         let [left, right] = &steps.sources.places(base, mask);
         let arriving = [gather::<F, 0>(ring, left), gather::<F, 0>(ring, right)];
-        if COUNT == 1 {
+        if is_pair {
+            let second = [gather::<F, 1>(ring, left), gather::<F, 1>(ring, right)];
             leave(ring, base, chunk, &steps.scatter(arriving));
+            leave(ring, next, chunk, &steps.scatter(second));
         } else {
-            let next = [gather::<F, 1>(ring, left), gather::<F, 1>(ring, right)];
             leave(ring, base, chunk, &steps.scatter(arriving));
-            leave(ring, base + STRIDE as u16, chunk, &steps.scatter(next));
         }
     }
+    pass(ring, holes, (base, mask, step_slots), moving, tip.holes(COUNT - 1));
+    if is_pair {
+        pass(ring, holes, (next, mask, step_slots), moving, tip.holes(0));
+    }
+}
+
+/// The holes go on for a sample.
+#[inline(always)]
+fn pass<F: Real>(
+    ring: &mut Ring<F>,
+    holes: &mut [HoleChunk<F>],
+    (base, mask, first_slot): (u16, u16, u16),
+    moving: bool,
+    flows: Option<&mut HoleFlows<F>>,
+) {
+    if moving {
+        holes.iter_mut().filter(|holes| !holes.is_shut).for_each(|holes| holes.glide());
+    }
     let mut unheard = HoleFlows::default();
-    for n in 0..COUNT {
-        if moving {
-            holes.iter_mut().filter(|holes| !holes.is_shut).for_each(|holes| holes.glide());
-        }
-        let base = base + (n * STRIDE) as u16;
-        let flows = tip.holes(COUNT - 1 - n).unwrap_or(&mut unheard);
-        for (chunk, (holes, flows)) in holes.iter_mut().zip(flows).enumerate().take(MAX_CHUNKS) {
-            let leaving;
-            (leaving, *flows) = holes.scatter(ring, base, mask);
-            leave(ring, base + step_slots, chunk, &leaving);
-        }
+    let flows = flows.unwrap_or(&mut unheard);
+    for (chunk, (holes, flows)) in holes.iter_mut().zip(flows).enumerate().take(MAX_CHUNKS) {
+        let leaving;
+        (leaving, *flows) = holes.scatter(ring, base, mask);
+        leave(ring, base + first_slot, chunk, &leaving);
     }
 }
