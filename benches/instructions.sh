@@ -12,13 +12,13 @@ export LC_ALL=C
 
 rate=${1:-48000}
 # Of a note that lives and moves, as it does by default.
-declare -A most=([avx2]=961 [plain]=1505 ["avx2 places"]=1045 ["plain places"]=1610)
+declare -A most=([avx2]=864 [plain]=1333 ["avx2 places"]=937 ["plain places"]=1430)
 
 # What growl and vocal tract add together.
-declare -A most_techniques=([avx2]=70 [plain]=88)
+declare -A most_techniques=([avx2]=77 [plain]=88)
 
 # Players in unison, in hundredths of the cost of one voice.
-declare -A most_players=(["avx2 8"]=508 ["avx2 16"]=1080 ["plain 8"]=620 ["plain 16"]=1240)
+declare -A most_players=(["avx2 8"]=562 ["avx2 16"]=1115 ["plain 8"]=686 ["plain 16"]=1366)
 
 if ! command -v valgrind >/dev/null; then
     echo "cannot count instructions without valgrind: apt-get install valgrind" >&2
