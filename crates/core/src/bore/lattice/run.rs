@@ -153,12 +153,15 @@ impl<F: Real> Ends<F> {
     }
 }
 
+/// The ring, and all junctions.
+type Parts<'a, F> = (&'a mut Ring<F>, &'a mut [Chunk<Steps<F>>], &'a mut [HoleChunk<F>]);
+
 /// One sample or two, into the rows from `base` on.
 ///
 /// What is done twice stands here twice: before a loop of two rounds, the compiler would copy all that the reed needs.
 #[inline(always)]
 fn advance<F: Real, T: Tip<F>, const COUNT: usize>(
-    (ring, steps, holes): (&mut Ring<F>, &mut [Chunk<Steps<F>>], &mut [HoleChunk<F>]),
+    (ring, steps, holes): Parts<F>,
     ends: &mut Ends<F>,
     (base, mask): (u16, u16),
     moving: bool,
