@@ -12,13 +12,13 @@ export LC_ALL=C
 
 rate=${1:-48000}
 # Of a note that lives and moves, as it does by default.
-declare -A most=([avx2]=950 [plain]=1503 ["avx2 places"]=1017 ["plain places"]=1603)
+declare -A most=([avx2]=864 [plain]=1333 ["avx2 places"]=937 ["plain places"]=1430)
 
 # What growl and vocal tract add together.
-declare -A most_techniques=([avx2]=43 [plain]=60)
+declare -A most_techniques=([avx2]=77 [plain]=88)
 
 # Players in unison, in hundredths of the cost of one voice.
-declare -A most_players=(["avx2 8"]=456 ["avx2 16"]=907 ["plain 8"]=574 ["plain 16"]=1144)
+declare -A most_players=(["avx2 8"]=562 ["avx2 16"]=1115 ["plain 8"]=686 ["plain 16"]=1366)
 
 if ! command -v valgrind >/dev/null; then
     echo "cannot count instructions without valgrind: apt-get install valgrind" >&2

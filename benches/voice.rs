@@ -53,13 +53,13 @@ impl Tip<f32> for Push {
     }
 
     #[inline(always)]
-    fn holes(&mut self) -> Option<&mut HoleFlows<f32>> {
-        Some(&mut self.holes)
+    fn radiated(&mut self, bell: f32) {
+        self.heard += bell;
     }
 
     #[inline(always)]
-    fn radiated(&mut self, bell: f32) {
-        self.heard += bell;
+    fn holes(&mut self, _before: usize) -> Option<&mut HoleFlows<f32>> {
+        Some(&mut self.holes)
     }
 }
 

@@ -418,9 +418,8 @@ struct Blown<'a, F> {
     n: usize,
     pressure: Vec<f64>,
     flow: Vec<f64>,
-    /// Places of the holes, and what leaves through them in this sample.
-    slots: Vec<(usize, usize)>,
-    holes: HoleFlows<F>,
+    /// What leaves through the holes in each sample of a run.
+    holes: Vec<HoleFlows<F>>,
 }
 
 impl<'a, F: Real> Blown<'a, F> {
@@ -433,8 +432,7 @@ impl<'a, F: Real> Blown<'a, F> {
             n: 0,
             pressure: Vec::new(),
             flow: Vec::new(),
-            slots: model.coeffs.hole_slots().collect(),
-            holes: HoleFlows::default(),
+            holes: Vec::new(),
         }
     }
 
@@ -454,13 +452,21 @@ impl<F: Real> Tip<F> for Blown<'_, F> {
         F::of(self.blow(p_minus.wide()))
     }
     #[inline(always)]
-    fn holes(&mut self) -> Option<&mut HoleFlows<F>> {
-        Some(&mut self.holes)
+    fn radiated(&mut self, bell: F) {
+        self.flow.push(bell.wide());
+        self.holes.push(HoleFlows::default());
     }
     #[inline(always)]
-    fn radiated(&mut self, bell: F) {
-        let holes: f64 = self.slots.iter().map(|&(chunk, lane)| self.holes[chunk][lane].wide()).sum();
-        self.flow.push(bell.wide() + holes);
+    fn holes(&mut self, before: usize) -> Option<&mut HoleFlows<F>> {
+        let latest = self.holes.len() - 1;
+        self.holes.get_mut(latest - before)
+    }
+    #[inline(always)]
+    fn ended(&mut self, holes: &[(usize, usize)]) {
+        let begin = self.flow.len() - self.holes.len();
+        for (flow, row) in self.flow[begin..].iter_mut().zip(self.holes.drain(..)) {
+            *flow += holes.iter().map(|&(chunk, lane)| row[chunk][lane].wide()).sum::<f64>();
+        }
     }
 }
 
@@ -469,7 +475,10 @@ fn blown<'a, F: Real>(model: &Model, note: &HeldNote, reed: &'a ReedCoeffs, samp
     lattice.set_jet_loss(note.jet_loss);
     lattice.glide_delay(note.rows, 0);
     let mut tip = Blown::new(reed, model);
-    lattice.run(samples, &mut tip);
+    for _ in 0..samples / 100 {
+        lattice.run(100, &mut tip);
+    }
+    lattice.run(samples % 100, &mut tip);
     tip
 }
 

@@ -9,8 +9,9 @@
 //! All junctions are processed eight at a time from one ring of past rows, as long as the longest cell and the tuning
 //! delay need (32 rows for a B flat clarinet at 96 kHz), plain loops over arrays that the compiler
 //! turns into vectors. The same source runs with SSE2 or AVX2 and gives the same bits: no fused multiply-add, sums in
-//! fixed lanes. Holes go round robin into their chunks; two holes one tick apart then lie in different chunks, and the
-//! chunk evaluated first passes its wave on within the row.
+//! fixed lanes. Holes begin round robin in their chunks; two holes one tick apart then lie in different chunks, and the
+//! chunk evaluated first passes its wave on within the row. A chunk whose holes are all shut costs less, so while fingers rest
+//! the shut ones come together (`layout`).
 //!
 //! After van Walstijn & Campbell 2003 (wave digital tone holes) and Kelly & Lochbaum 1962; the network of a hole is in
 //! `bore::tone_hole`, losses in `bore::wall_loss`.
@@ -21,15 +22,20 @@ pub mod choir;
 mod coeffs;
 mod diagnostics;
 mod junctions;
+mod layout;
 mod real;
+mod run;
 #[cfg(feature = "fit")]
 pub mod sensitivity;
 
 pub use coeffs::{LatticeCoeffs, hole_chunks};
 pub use real::Real;
 
+use std::ops::{Deref, DerefMut};
+
 use crate::dsp::lanes::has_avx2;
-use junctions::{Chunk, Holes, Octet, Steps, flush, leave};
+use junctions::{Chunk, Holes, Octet, Shut, Steps, flush};
+use layout::Layout;
 
 /// Junctions processed together.
 pub const LANES: usize = 8;
@@ -38,6 +44,8 @@ const STRIDE: usize = 128;
 /// Most values the ring can hold: every 16-bit index lies inside, so no access needs a check. Only the rows an instrument
 /// needs are ever touched.
 const SPACE: usize = 1 << 16;
+/// Behind the rows in use stands the first one again: so the row that follows any row lies behind it.
+type Ring<F> = [F; SPACE + STRIDE];
 /// Fewest and most past rows the ring holds; a power of two.
 const ROWS: (u32, u32) = (32, (SPACE / STRIDE) as u32);
 /// Masks of the two shortest rings.
@@ -59,8 +67,7 @@ pub const MAX_CHUNKS: usize = 7;
 /// States below this are set to 0, so that no denormal number slows a held note.
 const TINY: f64 = 1e-18;
 
-/// Volume flows leaving through holes in one sample, by chunk and lane, see [`LatticeCoeffs::hole_slots`]. A power of two
-/// chunks, one more than there may be: so it costs no multiplication to find a row of them.
+/// Volume flows leaving through holes in one sample, by chunk and lane, see [`Tip::ended`]. A power of two chunks, one more than there may be: so it costs no multiplication to find a row of them.
 pub type HoleFlows<F> = [[F; LANES]; MAX_CHUNKS.next_power_of_two()];
 
 /// The reed end of the bore: takes the arriving wave, gives the leaving one, and is told what radiates.
@@ -69,30 +76,32 @@ pub type HoleFlows<F> = [[F; LANES]; MAX_CHUNKS.next_power_of_two()];
 pub trait Tip<F> {
     /// Wave leaving into the bore, for the wave arriving from it.
     fn reflect(&mut self, p_minus: F) -> F;
-    /// Room for the volume flows that leave through the holes in this sample; none if they are not asked for. A lane without
-    /// a hole gets 0, a chunk without holes nothing.
-    #[inline(always)]
-    fn holes(&mut self) -> Option<&mut HoleFlows<F>> {
-        None
-    }
-    /// The sample is done: its volume flow leaving through the bell, after those through the [`holes`](Self::holes) have
-    /// been written.
+    /// The volume flow that leaves through the bell in the same sample.
     #[inline(always)]
     fn radiated(&mut self, _bell: F) {}
-    /// The last sample of a [`run`](Lattice::run) is done.
+    /// Room for the volume flows that leave through the holes in the latest sample, or in one before; none if they are not asked for.
+    /// A lane without a hole gets 0, a chunk without holes nothing.
     #[inline(always)]
-    fn ended(&mut self) {}
+    fn holes(&mut self, _before: usize) -> Option<&mut HoleFlows<F>> {
+        None
+    }
+    /// The last sample of a [`run`](Lattice::run) is done. In all of its samples, the flows of each hole, in the order of the
+    /// file, were in this chunk and lane.
+    #[inline(always)]
+    fn ended(&mut self, _holes: &[(usize, usize)]) {}
 }
 
 /// The playing lattice: state, and the coefficients that move with the fingers.
 #[derive(Clone)]
 pub struct Lattice<F> {
-    ring: Box<[F; SPACE]>,
+    ring: Box<Ring<F>>,
     /// Part of the ring in use, less one: indices wrap with it.
     mask: u16,
     steps: Box<[Chunk<Steps<F>>]>,
-    holes: Box<[Chunk<Holes<F>>]>,
+    holes: Box<[HoleChunk<F>]>,
+    /// Chunk and lane of each hole.
     hole_lanes: Box<[(usize, usize)]>,
+    layout: Layout,
     jets: Box<[f64]>,
     /// Where the present row begins in the ring.
     base: u16,
@@ -117,6 +126,64 @@ pub struct Lattice<F> {
     avx2: bool,
 }
 
+/// Eight tone holes.
+#[derive(Clone)]
+#[repr(C)]
+struct HoleChunk<F> {
+    junctions: Chunk<Holes<F>>,
+    shut: Shut<F, LANES>,
+    /// All are shut.
+    is_shut: bool,
+}
+
+impl<F> Deref for HoleChunk<F> {
+    type Target = Holes<F>;
+
+    #[inline(always)]
+    fn deref(&self) -> &Holes<F> {
+        &self.junctions.lanes
+    }
+}
+
+impl<F> DerefMut for HoleChunk<F> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut Holes<F> {
+        &mut self.junctions.lanes
+    }
+}
+
+impl<F: Real> HoleChunk<F> {
+    fn new(junctions: Chunk<Holes<F>>) -> Self {
+        let shut = Shut::new(&junctions.lanes);
+        Self { junctions, shut, is_shut: false }
+    }
+
+    /// Other holes may be in the lanes.
+    fn heed(&mut self) {
+        self.shut = Shut::new(self);
+        self.is_shut = (0..LANES).all(|k| self.junctions.lanes.is_shut(k));
+    }
+
+    /// One sample: waves that leave downwards and back, and flows.
+    #[inline(always)]
+    fn scatter(&mut self, ring: &Ring<F>, base: u16, mask: u16) -> ([Octet<F>; 2], Octet<F>) {
+        let Self { junctions: Chunk { sources, lanes }, shut, is_shut } = self;
+        if *is_shut {
+            // In another order than below: otherwise the compiler takes both gathers together, and loads that could be operands
+            // become instructions.
+            let right = sources.gather::<F, 1>(ring, base, mask);
+            let left = sources.gather::<F, 0>(ring, base, mask);
+            let mut still = lanes.still();
+            let leaving = lanes.scatter_shut(&mut still, shut, [left, right]);
+            lanes.stay(still);
+            return (leaving, Octet::default());
+        }
+        let left = sources.gather::<F, 0>(ring, base, mask);
+        let right = sources.gather::<F, 1>(ring, base, mask);
+        lanes.scatter([left, right])
+    }
+}
+
 #[derive(Clone, Copy)]
 struct EndLoss<F> {
     offset: u16,
@@ -127,7 +194,7 @@ struct EndLoss<F> {
 
 impl<F: Real> EndLoss<F> {
     #[inline(always)]
-    fn take(&mut self, ring: &[F; SPACE], base: u16, mask: u16) -> F {
+    fn take(&mut self, ring: &Ring<F>, base: u16, mask: u16) -> F {
         let wave = ring[usize::from(base.wrapping_add(self.offset) & mask)];
         let difference = wave - self.state;
         self.state = self.state + self.q * difference;
@@ -145,9 +212,9 @@ fn held_opening(opening: f64) -> f64 {
 }
 
 /// Chunks of changes of section, and of tone holes.
-type Chunks<F> = (Box<[Chunk<Steps<F>>]>, Box<[Chunk<Holes<F>>]>);
+type Chunks<F> = (Box<[Chunk<Steps<F>>]>, Box<[HoleChunk<F>]>);
 
-/// All chunks of a lattice, silent, each junction in its lane.
+/// All chunks of a lattice, silent, each junction in its lane, but not yet [connected](Lattice::connect).
 fn junction_chunks<F: Real>(coeffs: &LatticeCoeffs) -> Chunks<F> {
     let junctions = coeffs.ticks.len() - 1;
     let mut steps = vec![Chunk::idle(Steps::idle(), IDLE_SLOT); coeffs.step_chunks()];
@@ -155,43 +222,22 @@ fn junction_chunks<F: Real>(coeffs: &LatticeCoeffs) -> Chunks<F> {
     for junction in 0..junctions {
         let lane = coeffs.lane_of(junction);
         let (chunk, k) = (lane / LANES, lane % LANES);
-        let source = match chunk.checked_sub(steps.len()) {
-            None => {
-                steps[chunk].place(k, coeffs, junction);
-                &mut steps[chunk].sources
-            }
-            Some(chunk) => {
-                holes[chunk].place(k, coeffs, junction);
-                &mut holes[chunk].sources
-            }
-        };
-        let [from_left, from_right] = sources_of(coeffs, junction);
-        (source.offset[0][k], source.offset[1][k]) = (from_left, from_right);
+        match chunk.checked_sub(steps.len()) {
+            None => steps[chunk].place(k, coeffs, junction),
+            Some(chunk) => holes[chunk].place(k, coeffs, junction),
+        }
     }
-    (steps.into(), holes.into())
-}
-
-/// Where the waves that arrive at a junction from left and right come from, from the beginning of the present row.
-fn sources_of(coeffs: &LatticeCoeffs, junction: usize) -> [u16; 2] {
-    let (left, right) = (junction, junction + 1);
-    let from_left = if junction == 0 { END_SLOT } else { coeffs.lane_of(junction - 1) };
-    let is_last = right == coeffs.ticks.len() - 1;
-    let from_right = BACK + if is_last { END_SLOT } else { coeffs.lane_of(junction + 1) };
-    let from_right = match right == coeffs.tuned_cell() {
-        true => TUNED_SLOT as u16,
-        false => back_rows(coeffs.rows(right).1, from_right),
-    };
-    [back_rows(coeffs.rows(left).0, from_left), from_right]
+    (steps.into(), holes.into_iter().map(HoleChunk::new).collect())
 }
 
 /// A ring of zeros whose first `mask + 1` values are in memory; `other` is any other value.
-fn silent_ring<T: Copy>(mask: u16, zero: T, other: T) -> Box<[T; SPACE]> {
-    // PANIC: the vector has exactly SPACE elements.
-    let mut ring: Box<[T; SPACE]> =
-        vec![zero; SPACE].into_boxed_slice().try_into().unwrap_or_else(|_| unreachable!());
+fn silent_ring<T: Copy>(mask: u16, zero: T, other: T) -> Box<Ring<T>> {
+    // PANIC: the vector has exactly as many elements as the ring.
+    let mut ring: Box<Ring<T>> =
+        vec![zero; SPACE + STRIDE].into_boxed_slice().try_into().unwrap_or_else(|_| unreachable!());
     // The system only promises fresh memory. Writing it here makes sure that it is there before the audio thread reads it.
     for value in [other, zero] {
-        ring[..=usize::from(mask)].fill(value);
+        ring[..=usize::from(mask) + STRIDE].fill(value);
         std::hint::black_box(&mut ring);
     }
     ring
@@ -203,32 +249,31 @@ impl<F: Real> Lattice<F> {
         let junctions = coeffs.ticks.len() - 1;
         let (steps, holes) = junction_chunks(coeffs);
         let tuned = coeffs.tuned_cell();
-        let end = |cell: usize, offset: u16| EndLoss {
-            offset,
+        let end = |cell: usize| EndLoss {
+            offset: 0,
             taken: F::of(coeffs.loss[cell].0 * (1.0 - coeffs.loss[cell].1)),
             q: F::of(coeffs.loss[cell].1),
             state: F::default(),
         };
-        let last_lane = coeffs.lane_of(junctions - 1);
         let bell_y = coeffs.admittance[junctions];
-        let tuned_right = if tuned == junctions { END_SLOT } else { coeffs.lane_of(tuned) };
         let mask = (coeffs.ring_rows() * STRIDE as u32 - 1) as u16;
-        Self {
+        let mut lattice = Self {
             ring: silent_ring(mask, F::default(), F::of(1.0)),
             mask,
             steps,
             holes,
             hole_lanes: coeffs.hole_slots().collect(),
+            layout: Layout::new(coeffs),
             jets: coeffs.jets.clone().into(),
-            base: 0,
-            tip: end(0, back_rows(coeffs.rows(0).1, BACK + coeffs.lane_of(0))),
-            end: end(junctions, back_rows(coeffs.rows(junctions).0, last_lane)),
+            base: mask & !(STRIDE as u16 - 1),
+            tip: end(0),
+            end: end(junctions),
             bell_y: F::of(bell_y),
             bell_y2: F::of(2.0 * bell_y),
             bell_share: F::of(1.0 / (bell_y + coeffs.bell.0 + coeffs.bell.1)),
             bell_g2: F::of(2.0 * coeffs.bell.1),
             bell_state: F::default(),
-            tuned_source: (BACK + tuned_right) as u16,
+            tuned_source: 0,
             tuned_rows: coeffs.rows(tuned).1 as u16,
             delay: F::of(f64::from(coeffs.rows(tuned).1)),
             delay_glide: F::default(),
@@ -236,7 +281,9 @@ impl<F: Real> Lattice<F> {
             moved: true,
             lent: false,
             avx2: has_avx2(),
-        }
+        };
+        lattice.connect();
+        lattice
     }
 
     /// Past rows the ring holds.
@@ -255,9 +302,10 @@ impl<F: Real> Lattice<F> {
 
     /// Takes all waves away; openings, delay and what moves them stay. Real-time safe.
     pub fn silence(&mut self) {
-        self.ring[..=usize::from(self.mask)].fill(F::default());
+        self.ring[..=usize::from(self.mask) + STRIDE].fill(F::default());
         self.steps.iter_mut().for_each(|steps| steps.arrivals.state = Default::default());
-        for Chunk { lanes: holes, .. } in &mut *self.holes {
+        for holes in &mut *self.holes {
+            let holes = &mut holes.junctions.lanes;
             holes.arrivals.state = Default::default();
             holes.resistance = holes.rs0;
             for state in [&mut holes.outer, &mut holes.compliance, &mut holes.inner] {
@@ -267,7 +315,8 @@ impl<F: Real> Lattice<F> {
         self.tip.state = F::default();
         self.end.state = F::default();
         self.bell_state = F::default();
-        self.base = 0;
+        // The next row is the first.
+        self.base = self.mask & !(STRIDE as u16 - 1);
         self.lent = false;
     }
 
@@ -281,6 +330,7 @@ impl<F: Real> Lattice<F> {
     pub fn set_opening(&mut self, hole: usize, opening: f64) {
         let (chunk, lane) = self.hole_lanes[hole];
         self.holes[chunk].set_opening(lane, held_opening(opening));
+        self.holes[chunk].is_shut = false;
         self.moved = true;
     }
 
@@ -288,6 +338,7 @@ impl<F: Real> Lattice<F> {
     pub fn glide_opening(&mut self, hole: usize, opening: f64, samples: usize) {
         let (chunk, lane) = self.hole_lanes[hole];
         self.holes[chunk].glide_opening(lane, held_opening(opening), samples);
+        self.holes[chunk].is_shut = false;
         self.moved = true;
     }
 
@@ -395,19 +446,25 @@ impl<F: Real> Lattice<F> {
             #[allow(unsafe_code)]
             // SAFETY: `avx2` is only set where the processor has AVX2.
             unsafe {
-                run_avx2::<F, T, MASK>(self, samples, tip)
+                run::run_avx2::<F, T, MASK>(self, samples, tip)
             };
             return;
         }
-        run_body::<F, T, MASK>(self, samples, tip);
+        run::run_body::<F, T, MASK>(self, samples, tip);
     }
 
-    /// Zeroes states too small to hear before they become denormal. Call every few hundred samples. Real-time safe.
+    /// Zeroes states too small to hear before they become denormal, and puts shut holes together while fingers rest. Call every few
+    /// hundred samples. Real-time safe.
     pub fn flush(&mut self) {
         if self.lent {
             // Who has the waves does it.
             return;
         }
+        self.flush_states();
+        self.lay();
+    }
+
+    fn flush_states(&mut self) {
         // The slots of the junctions and those at the ends; nobody writes the others.
         let slots = LANES * (self.steps.len() + self.holes.len());
         for half_row in self.ring[..=usize::from(self.mask)].as_chunks_mut::<BACK>().0 {
@@ -415,7 +472,8 @@ impl<F: Real> Lattice<F> {
             half_row[BACK - LANES..].iter_mut().for_each(flush);
         }
         self.steps.iter_mut().for_each(|steps| steps.arrivals.flush());
-        for Chunk { lanes: holes, .. } in &mut *self.holes {
+        for holes in &mut *self.holes {
+            let holes = &mut holes.junctions.lanes;
             holes.arrivals.flush();
             for state in [&mut holes.outer, &mut holes.compliance, &mut holes.inner] {
                 state.iter_mut().for_each(flush);
@@ -424,74 +482,12 @@ impl<F: Real> Lattice<F> {
         flush(&mut self.tip.state);
         flush(&mut self.end.state);
         flush(&mut self.bell_state);
+        self.close_ring();
     }
-}
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn run_avx2<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, samples: usize, tip: &mut T) {
-    run_body::<F, T, MASK>(lattice, samples, tip);
-}
-
-#[inline(always)]
-fn run_body<F: Real, T: Tip<F>, const MASK: u16>(lattice: &mut Lattice<F>, samples: usize, tip: &mut T) {
-    let moving = lattice.moved;
-    if moving {
-        lattice.rest();
+    /// Has the first row stand behind the last one, too.
+    #[inline(always)]
+    fn close_ring(&mut self) {
+        self.ring.copy_within(..STRIDE, usize::from(self.mask) + 1);
     }
-    let ring = &mut *lattice.ring;
-    let mask = if MASK == 0 { lattice.mask } else { MASK };
-    let row_mask = mask & !(STRIDE as u16 - 1);
-    let mut unheard = HoleFlows::default();
-    for _ in 0..samples {
-        let base = lattice.base.wrapping_add(STRIDE as u16) & row_mask;
-        lattice.base = base;
-        if moving {
-            lattice.holes.iter_mut().for_each(|holes| holes.glide());
-        }
-
-        // The returning wave of the tuned cell, delayed by whole rows and a linear part between two.
-        lattice.delay = lattice.delay + lattice.delay_glide;
-        // Rounding may take a delay that ends at one row, the shortest, below it; the wave of this row is not there yet.
-        let whole = lattice.delay.whole().max(1);
-        let part = lattice.delay - F::from(whole);
-        let near = lattice.tuned_source.wrapping_add(base).wrapping_sub(whole.wrapping_mul(STRIDE as u16));
-        let (near, far) = (near & mask, near.wrapping_sub(STRIDE as u16) & mask);
-        let wave = ring[usize::from(near)] + part * (ring[usize::from(far)] - ring[usize::from(near)]);
-        ring[usize::from(base | TUNED_SLOT as u16)] = wave;
-
-        let p_minus = lattice.tip.take(ring, base, mask);
-        ring[usize::from(base | END_SLOT as u16)] = tip.reflect(p_minus);
-
-        // The open end: radiation conductance and mass in parallel.
-        let arriving = lattice.end.take(ring, base, mask);
-        let p_end = (lattice.bell_y2 * arriving - lattice.bell_state) * lattice.bell_share;
-        lattice.bell_state = lattice.bell_state + lattice.bell_g2 * p_end;
-        let reflected = p_end - arriving;
-        ring[usize::from(base | (BACK + END_SLOT) as u16)] = reflected;
-        let bell = lattice.bell_y * (arriving - reflected);
-
-        let mut slot = 0;
-        for steps in &mut *lattice.steps {
-            let arriving = [
-                steps.sources.gather::<F, 0>(ring, base, mask),
-                steps.sources.gather::<F, 1>(ring, base, mask),
-            ];
-            leave(ring, base as usize + slot, &steps.scatter(arriving));
-            slot += LANES;
-        }
-        let flows = tip.holes().unwrap_or(&mut unheard);
-        for (holes, flows) in lattice.holes.iter_mut().zip(flows) {
-            let arriving = [
-                holes.sources.gather::<F, 0>(ring, base, mask),
-                holes.sources.gather::<F, 1>(ring, base, mask),
-            ];
-            let leaving;
-            (leaving, *flows) = holes.scatter(arriving);
-            leave(ring, base as usize + slot, &leaving);
-            slot += LANES;
-        }
-        tip.radiated(bell);
-    }
-    tip.ended();
 }

@@ -29,8 +29,6 @@ pub(super) struct Outside<F> {
     /// Flows of the bell and of the holes in each sample of a tick.
     bell: [F; TICK],
     holes: [HoleFlows<F>; TICK],
-    /// Chunks of holes that the instrument has.
-    chunks: usize,
     /// All flows together, in the samples of the tick in which that is wanted.
     sums: [F; TICK],
     /// All flows together in the last sample of the tick before.
@@ -96,7 +94,6 @@ impl<F: Real> Outside<F> {
         Self {
             bell: [F::default(); TICK],
             holes: [HoleFlows::default(); TICK],
-            chunks: coeffs.hole_chunks(),
             sums: [F::default(); TICK],
             last: 0.0,
             lines,
@@ -138,13 +135,15 @@ impl<F: Real> Outside<F> {
         &mut self.holes[at & (TICK - 1)]
     }
 
-    /// Sends a whole tick on its way.
+    /// Sends a whole tick on its way; the flows of each hole were in this chunk and lane.
     #[inline(always)]
-    pub fn radiate(&mut self) {
+    pub fn radiate(&mut self, holes: &[(usize, usize)]) {
         self.turn();
         if self.keeps_lines() {
             let rows = &self.holes;
-            self.lines.write(&self.bell, |_, slot, line| {
+            self.lines.write(&self.bell, |hole, line| {
+                let Some(&(chunk, lane)) = holes.get(hole) else { return };
+                let slot = chunk * LANES + lane;
                 for (flow, row) in line.iter_mut().zip(rows) {
                     let row = row.as_flattened();
                     *flow = row[slot & (row.len() - 1)];
@@ -152,7 +151,7 @@ impl<F: Real> Outside<F> {
             });
         }
         for at in self.added() {
-            self.sums[at & (TICK - 1)] = self.together(at);
+            self.sums[at & (TICK - 1)] = self.together(at & (TICK - 1), holes);
         }
         self.hear();
     }
@@ -167,7 +166,7 @@ impl<F: Real> Outside<F> {
         let bell = choir.bell_flows();
         let bell = std::array::from_fn(|at| F::from(bell[at][lane]));
         if self.keeps_lines() {
-            self.lines.write(&bell, |hole, _, line| {
+            self.lines.write(&bell, |hole, line| {
                 let Some(flows) = choir.hole_flows(hole) else { return };
                 for (flow, flows) in line.iter_mut().zip(flows) {
                     *flow = F::from(flows[lane]);
@@ -251,14 +250,15 @@ impl<F: Real> Outside<F> {
         self.now.ears.iter_mut().chain(&mut self.before.ears).for_each(Ear::silence);
     }
 
-    /// All flows together in a sample of the tick.
+    /// All flows together in a sample of the tick. They are added in the same order wherever the holes are: nothing comes out of
+    /// those that are not active.
     #[inline(always)]
-    fn together(&self, at: usize) -> F {
-        let mut lanes = [F::default(); LANES];
-        for chunk in self.holes[at].iter().take(self.chunks) {
-            for lane in 0..LANES {
-                lanes[lane] = lanes[lane] + chunk[lane];
-            }
+    fn together(&self, at: usize, holes: &[(usize, usize)]) -> F {
+        let (mut lanes, row) = ([F::default(); LANES], self.holes[at].as_flattened());
+        for (hole, slot) in self.lines.active() {
+            let Some(&(chunk, lane)) = holes.get(hole) else { continue };
+            let sum = &mut lanes[slot % LANES];
+            *sum = *sum + row[(chunk * LANES + lane) & (row.len() - 1)];
         }
         let mut flow = self.bell[at];
         for lane in lanes {

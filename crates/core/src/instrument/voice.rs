@@ -133,11 +133,6 @@ impl<F: Real> Tip<F> for Mouth<F> {
     }
 
     #[inline(always)]
-    fn holes(&mut self) -> Option<&mut HoleFlows<F>> {
-        Some(self.outside.holes(self.at))
-    }
-
-    #[inline(always)]
     fn radiated(&mut self, bell: F) {
         if let Some(probes) = &mut self.probes {
             probes[self.at & (TICK - 1)] = Probe {
@@ -154,10 +149,15 @@ impl<F: Real> Tip<F> for Mouth<F> {
     }
 
     #[inline(always)]
-    fn ended(&mut self) {
+    fn holes(&mut self, before: usize) -> Option<&mut HoleFlows<F>> {
+        Some(self.outside.holes(self.at.wrapping_sub(before + 1)))
+    }
+
+    #[inline(always)]
+    fn ended(&mut self, holes: &[(usize, usize)]) {
         // A run may end within a tick, where a delay arrives.
         if self.at == TICK {
-            self.outside.radiate();
+            self.outside.radiate(holes);
         }
     }
 }
@@ -186,18 +186,18 @@ impl<F: Real> Tip<F> for ThroughTract<'_, F> {
     }
 
     #[inline(always)]
-    fn holes(&mut self) -> Option<&mut HoleFlows<F>> {
-        self.mouth.holes()
-    }
-
-    #[inline(always)]
     fn radiated(&mut self, bell: F) {
         self.mouth.radiated(bell);
     }
 
     #[inline(always)]
-    fn ended(&mut self) {
-        self.mouth.ended();
+    fn holes(&mut self, before: usize) -> Option<&mut HoleFlows<F>> {
+        self.mouth.holes(before)
+    }
+
+    #[inline(always)]
+    fn ended(&mut self, holes: &[(usize, usize)]) {
+        self.mouth.ended(holes);
     }
 }
 

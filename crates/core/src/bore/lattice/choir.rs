@@ -183,6 +183,8 @@ impl<const N: usize> LatticeChoir<N> {
 
     /// A lattice lends its waves to a lane. Real-time safe.
     pub fn borrow(&mut self, lane: usize, lattice: &mut Lattice<f32>) {
+        // From now on each of its holes is where it was at first.
+        lattice.lay_as_at_first();
         let ring = |place: u16| lattice.ring[usize::from(lattice.base.wrapping_add(place) & lattice.mask)];
         self.lines.each_heard_mut(|place, wave| wave[lane] = ring(place));
         for junction in &mut self.steps {
@@ -241,6 +243,7 @@ impl<const N: usize> LatticeChoir<N> {
             own.inner[k] = lanes.inner[lane];
             own.resistance[k] = lanes.resistance[lane];
         }
+        lattice.close_ring();
         lattice.tip.state = self.tip.state[lane];
         lattice.end.state = self.end.state[lane];
         lattice.bell_state = self.bell.state[lane];

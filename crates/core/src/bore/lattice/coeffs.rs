@@ -203,7 +203,7 @@ impl LatticeCoeffs {
         hole_chunks(self.holes.len())
     }
 
-    /// Chunk and lane of each hole in the flows that a [`Tip`](super::Tip) is told, in the order of the file.
+    /// Chunk and lane of each hole in a new lattice, in the order of the file.
     pub fn hole_slots(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         let lanes = self.hole_junctions.iter().map(|&junction| self.lane_of(junction));
         lanes.map(|lane| (lane / LANES - self.step_chunks(), lane % LANES))

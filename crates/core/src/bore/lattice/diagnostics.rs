@@ -46,8 +46,8 @@ impl<F: Real> Lattice<F> {
         };
         let mut energy = 0.0;
         for (cell, (down, back)) in coeffs.all_rows().enumerate() {
-            let from_left = if cell == 0 { END_SLOT } else { coeffs.lane_of(cell - 1) };
-            let from_right = BACK + if cell == last { END_SLOT } else { coeffs.lane_of(cell) };
+            let from_left = if cell == 0 { END_SLOT } else { self.lane_of(cell - 1) };
+            let from_right = BACK + if cell == last { END_SLOT } else { self.lane_of(cell) };
             let mut waves: f64 = (0..down).map(|age| square(from_left, age)).sum();
             if cell == tuned {
                 let rows = self.delay.wide();
@@ -58,8 +58,8 @@ impl<F: Real> Lattice<F> {
                 waves += (0..back).map(|age| square(from_right, age)).sum::<f64>();
             }
             let (amount, q) = coeffs.loss[cell];
-            let at_right = if cell == last { self.end.state } else { self.arrivals(coeffs.lane_of(cell), 0) };
-            let at_left = if cell == 0 { self.tip.state } else { self.arrivals(coeffs.lane_of(cell - 1), 1) };
+            let at_right = if cell == last { self.end.state } else { self.arrivals(self.lane_of(cell), 0) };
+            let at_left = if cell == 0 { self.tip.state } else { self.arrivals(self.lane_of(cell - 1), 1) };
             let filters = at_right.wide().powi(2) + at_left.wide().powi(2);
             energy += coeffs.admittance[cell] * (waves + amount * (1.0 - q) / q * filters);
         }
@@ -102,7 +102,9 @@ impl<F: Real> Lattice<F> {
             self.ring[row * STRIDE + END_SLOT] = next();
             self.ring[row * STRIDE + BACK + END_SLOT] = next();
         }
+        self.close_ring();
         for holes in &mut *self.holes {
+            holes.is_shut = false;
             for k in 0..LANES {
                 (holes.outer[k], holes.compliance[k], holes.inner[k]) = (next(), next(), next());
             }

@@ -7,7 +7,7 @@ use super::real::Real;
 use std::ops::{Deref, DerefMut};
 
 use super::coeffs::LatticeCoeffs;
-use super::{BACK, LANES, SPACE, TINY};
+use super::{BACK, LANES, Ring, STRIDE, TINY};
 
 pub(super) type Octet<F> = [F; LANES];
 
@@ -54,7 +54,7 @@ impl Sources {
     #[inline(always)]
     pub(super) fn gather<F: Real, const SIDE: usize>(
         &self,
-        ring: &[F; SPACE],
+        ring: &Ring<F>,
         base: u16,
         mask: u16,
     ) -> Octet<F> {
@@ -64,6 +64,27 @@ impl Sources {
         }
         wave
     }
+
+    /// Where these waves are in the ring, whose present row begins at `base`.
+    #[inline(always)]
+    pub(super) fn places(&self, base: u16, mask: u16) -> [[u16; LANES]; 2] {
+        let mut places = self.offset;
+        for place in places.as_flattened_mut() {
+            *place = base.wrapping_add(*place) & mask;
+        }
+        places
+    }
+}
+
+/// Waves at these places, or so many rows behind them: one at most.
+#[inline(always)]
+pub(super) fn gather<F: Real, const ROW: usize>(ring: &Ring<F>, places: &[u16; LANES]) -> Octet<F> {
+    let behind = ROW.min(1) * STRIDE;
+    let mut wave = Octet::<F>::default();
+    for (wave, &place) in wave.iter_mut().zip(places) {
+        *wave = ring[usize::from(place) + behind];
+    }
+    wave
 }
 
 /// One-pole loss of both waves arriving at junctions: `y = x - m (x - s)` with `m = A (1 - q)`, then `s += q (x - s)`.
@@ -133,15 +154,13 @@ pub(super) fn flush<F: Real>(x: &mut F) {
     *x = if x.magnitude() < F::of(TINY) { F::default() } else { *x };
 }
 
-/// Writes the waves leaving eight junctions, down the bore and back.
+/// Writes the waves leaving the eight junctions of a chunk, down the bore and back, into a row.
 #[inline(always)]
-pub(super) fn leave<F: Real>(ring: &mut [F; SPACE], row: usize, [down, back]: &[Octet<F>; 2]) {
-    let row = row & (SPACE - 1) & !(LANES - 1);
-    for (side, wave) in [(row, down), (row | BACK, back)] {
-        if let Some(slots) = ring.get_mut(side..side + LANES) {
-            slots.copy_from_slice(wave);
-        }
-    }
+pub(super) fn leave<F: Real>(ring: &mut Ring<F>, row: u16, chunk: usize, [down, back]: &[Octet<F>; 2]) {
+    let slots = ring.as_chunks_mut::<LANES>().0;
+    let at = usize::from(row) / LANES + chunk % (BACK / LANES);
+    slots[at] = *down;
+    slots[at + BACK / LANES] = *back;
 }
 
 /// Changes of section.
@@ -265,6 +284,54 @@ impl<F: Real, const N: usize> Holes<F, N> {
         self.outside[k] = F::of(hole.gl + hole.gp);
         self.rs0[k] = F::of(hole.rs);
         self.resistance[k] = F::of(hole.rs);
+    }
+
+    /// Lane `k` and one of others change places.
+    pub(super) fn swap(&mut self, k: usize, others: &mut Self, other: usize) {
+        for (own, others) in self.all_lanes().into_iter().zip(others.all_lanes()) {
+            std::mem::swap(&mut own[k], &mut others[other]);
+        }
+    }
+
+    /// Two lanes change places.
+    pub(super) fn swap_within(&mut self, k: usize, other: usize) {
+        self.all_lanes().into_iter().for_each(|lanes| lanes.swap(k, other));
+    }
+
+    /// All that lanes hold.
+    fn all_lanes(&mut self) -> [&mut [F; N]; 27] {
+        let Arrivals { taken: [taken_left, taken_right], q: [q_left, q_right], state: [left, right] } =
+            &mut self.arrivals;
+        let [low, high] = &mut self.range;
+        [
+            taken_left,
+            taken_right,
+            q_left,
+            q_right,
+            left,
+            right,
+            &mut self.y_left,
+            &mut self.y_right,
+            &mut self.y_sum,
+            &mut self.r1,
+            &mut self.minus_r1,
+            &mut self.gc,
+            &mut self.minus_gc2,
+            &mut self.gl2,
+            &mut self.outside,
+            &mut self.rs0,
+            &mut self.jet_open,
+            &mut self.jet,
+            &mut self.opening,
+            &mut self.glide,
+            low,
+            high,
+            &mut self.area,
+            &mut self.resistance,
+            &mut self.outer,
+            &mut self.compliance,
+            &mut self.inner,
+        ]
     }
 
     /// Puts the hole in lane `k` at an opening, 0..=1.

@@ -16,7 +16,7 @@ pub(super) struct Lines<F> {
     pub(super) reach: usize,
     /// Where this tick stands in each line.
     at: usize,
-    /// Place of each hole among the flows of a sample, in the order of the file.
+    /// Place of each hole among the flows of a sample at first, in the order of the file: it says in which order flows are added.
     pub(super) slots: Box<[usize]>,
     /// Holes whose lines are not all 0.
     pub(super) active: [u16; MAX_SOURCES],
@@ -98,10 +98,16 @@ impl<F: Real> Lines<F> {
         self.emptying = if self.emptying == 1 { 0 } else { self.ticks() + 2 };
     }
 
-    /// Writes the flows of a tick: those of the bell, and those of a hole as `fill` gives them for its number and its place
-    /// among the flows of a sample.
+    /// Holes whose lines are not all 0, and their slots.
     #[inline(always)]
-    pub(super) fn write(&mut self, bell: &[F; TICK], fill: impl Fn(usize, usize, &mut [F; TICK])) {
+    pub(super) fn active(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let active = self.active.get(..self.count).unwrap_or_default();
+        active.iter().filter_map(|&hole| Some((usize::from(hole), *self.slots.get(usize::from(hole))?)))
+    }
+
+    /// Writes the flows of a tick: those of the bell, and those of a hole as `fill` gives them for its number.
+    #[inline(always)]
+    pub(super) fn write(&mut self, bell: &[F; TICK], fill: impl Fn(usize, &mut [F; TICK])) {
         self.at += TICK;
         if self.at + TICK > self.stride() {
             self.begin_again();
@@ -109,10 +115,9 @@ impl<F: Real> Lines<F> {
         let (stride, at) = (self.stride(), self.at);
         for &hole in self.active.get(..self.count).unwrap_or_default() {
             let hole = usize::from(hole);
-            let Some(&slot) = self.slots.get(hole) else { continue };
             let begin = hole * stride + at;
             if let Some(place) = self.past.get_mut(begin..).and_then(|past| past.first_chunk_mut::<TICK>()) {
-                fill(hole, slot, place);
+                fill(hole, place);
             }
         }
         let begin = self.slots.len() * stride + at;

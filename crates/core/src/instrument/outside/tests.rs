@@ -30,18 +30,18 @@ impl Tip<f64> for Impulse {
         leaving
     }
 
-    fn holes(&mut self) -> Option<&mut HoleFlows<f64>> {
-        Some(self.outside.holes(self.at))
-    }
-
     fn radiated(&mut self, bell: f64) {
         self.outside.bell(self.at, bell);
         self.at += 1;
     }
 
-    fn ended(&mut self) {
+    fn holes(&mut self, before: usize) -> Option<&mut HoleFlows<f64>> {
+        Some(self.outside.holes(self.at - 1 - before))
+    }
+
+    fn ended(&mut self, holes: &[(usize, usize)]) {
         self.at = 0;
-        self.outside.radiate();
+        self.outside.radiate(holes);
         let (left, right) = self.outside.heard();
         for (heard, out) in self.heard.iter_mut().zip([left, right.unwrap_or(left)]) {
             heard.extend(out.map(f64::from));
