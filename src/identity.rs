@@ -29,3 +29,9 @@ pub const VST3_CLASS_ID: [u8; 16] = *b"ChalumeauClarint";
 pub const NOTES_ONLY_NAME: &str = "Chalumeau (notes only)";
 /// VST3 class id of the plugin without MIDI controllers.
 pub const NOTES_ONLY_VST3_CLASS_ID: [u8; 16] = *b"ChalumeauNotesOn";
+/// Name of the VST3 on the track of a microphone.
+pub const BLOWN_NAME: &str = "Chalumeau (microphone)";
+/// VST3 class id of the plugin on the track of a microphone.
+pub const BLOWN_VST3_CLASS_ID: [u8; 16] = *b"ChalumeauMicroph";
+/// Name of the CLAP's side-chain.
+pub const MICROPHONE_NAME: &str = "Microphone";

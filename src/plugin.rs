@@ -14,7 +14,8 @@
 //! - `window`: the editor in the host's window
 //! - `host_link`: what the plugin's threads tell the host; `clap`: what the framework's CLAP lacks
 //! - `launch_options`: what the standalone program sets
-//! - `notes_only`: the VST3 without MIDI controllers
+//! - `microphone`: breath from the audio input
+//! - `vst3`: the classes of the VST3
 
 mod breath_sources;
 mod clap;
@@ -24,12 +25,13 @@ pub mod instrument_loading;
 #[cfg(feature = "devices")]
 mod knob;
 pub mod launch_options;
+mod microphone;
 pub mod mts_esp;
-mod notes_only;
 mod params;
 mod preset_keeper;
 mod reed_controllers;
 mod translate_events;
+mod vst3;
 mod window;
 
 use std::sync::Arc;
@@ -53,7 +55,7 @@ use chalumeau_core::instrument::{Channels, MOST_PLAYERS, Settings};
 use chalumeau_knob::device::Release;
 use host_inputs::HostInputs;
 use instrument_loading::{InstrumentLoader, InstrumentSwap, SharedInstrument};
-pub use notes_only::NotesOnly;
+use microphone::Microphone;
 use params::moment::Moment;
 use preset_keeper::{PresetHandle, PresetKeeper};
 use window::{HostWindow, PluginWindow, WindowAudio};
@@ -78,6 +80,7 @@ pub struct Chalumeau {
     /// The settings that the instrument has.
     settings: Settings,
     inputs: HostInputs,
+    microphone: Microphone,
     moved: MovedParameters,
     #[cfg(feature = "devices")]
     knob: Option<(knob::PluginKnob, knob::KnobAudio)>,
@@ -99,8 +102,13 @@ impl Plugin for Chalumeau {
     const URL: &'static str = identity::URL;
     const EMAIL: &'static str = identity::EMAIL;
     const VERSION: &'static str = identity::VERSION;
-    const AUDIO_IO_LAYOUTS: &'static [AudioIOLayout] =
-        &[AudioIOLayout { main_output_channels: NonZeroU32::new(2), ..AudioIOLayout::const_default() }];
+    /// The CLAP's: a side-chain for a microphone, and two channels of sound.
+    const AUDIO_IO_LAYOUTS: &'static [AudioIOLayout] = &[AudioIOLayout {
+        main_output_channels: NonZeroU32::new(2),
+        aux_input_ports: &[new_nonzero_u32(1)],
+        names: PortNames { aux_inputs: &[identity::MICROPHONE_NAME], ..PortNames::const_default() },
+        ..AudioIOLayout::const_default()
+    }];
     const MIDI_INPUT: MidiConfig = MidiConfig::MidiCCs;
     /// The plugin sends the knob's breath as CC2 and CC34, so that a host can record it.
     const MIDI_OUTPUT: MidiConfig = MidiConfig::MidiCCs;
@@ -163,9 +171,12 @@ impl Plugin for Chalumeau {
     fn process(
         &mut self,
         buffer: &mut Buffer,
-        _aux: &mut AuxiliaryBuffers,
+        aux: &mut AuxiliaryBuffers,
         context: &mut impl ProcessContext<Self>,
     ) -> ProcessStatus {
+        if let Some(side_chain) = aux.inputs.first_mut() {
+            self.hear(side_chain.as_slice());
+        }
         self.play(buffer.as_slice(), context)
     }
 
@@ -194,6 +205,7 @@ impl Chalumeau {
         if let Some((_, audio)) = &mut self.knob {
             audio.prepare(&self.params, &self.shared_instrument);
         }
+        self.microphone.prepare(f64::from(config.sample_rate), config.max_buffer_size);
         self.settings = self.params.settings();
         if let Some(instrument) = &mut self.instrument {
             instrument.set_settings(&self.settings);
@@ -207,6 +219,7 @@ impl Chalumeau {
     /// Silences everything, and forgets notes and breath. Real-time safe.
     pub fn forget(&mut self) {
         self.inputs.reset();
+        self.microphone.reset();
         self.moved.reset(&self.params);
         #[cfg(feature = "devices")]
         if let Some((_, audio)) = &mut self.knob {
@@ -214,6 +227,13 @@ impl Chalumeau {
         }
         if let Some(instrument) = &mut self.instrument {
             instrument.reset();
+        }
+    }
+
+    /// Takes what a microphone has heard of the block that is played next, in as many channels. Real-time safe.
+    pub fn hear<C: AsRef<[f32]>>(&mut self, channels: &[C]) {
+        if self.params.microphone.on.value() {
+            self.microphone.hear(channels);
         }
     }
 
@@ -269,6 +289,10 @@ impl Chalumeau {
             inputs.breath_sources().blow(BreathInput::Parameter, unit);
             inputs.say(Event::Breath(unit).into());
         }
+        if let Some(event) = self.microphone.begin_block(&self.params) {
+            inputs.breath_sources().forget();
+            inputs.say(event.into());
+        }
         inputs.bend_range(self.params.instrument.bend_range.value());
         inputs.wheel(self.params.expression.wheel.value().into(), drives);
         let keys = self.window.as_mut().map(|(_, window)| window.keys()).unwrap_or_default();
@@ -284,6 +308,7 @@ impl Chalumeau {
         let api = context.plugin_api();
         let links = &self.params.links;
         let events = std::iter::from_fn(|| inputs.next(|| context.next_event(), api, drives, links));
+        let events = self.microphone.with(events, samples);
         #[cfg(feature = "devices")]
         if let Some((_, audio)) = &mut self.knob {
             let replay = self.params.knob.replay.value();
@@ -294,6 +319,13 @@ impl Chalumeau {
         #[cfg(not(feature = "devices"))]
         instrument.render_events(events, out);
 
+        if self.microphone.end_block(samples, &self.params) {
+            // A project that was saved has another room.
+            self.params.host.state_changed();
+        }
+        if self.microphone.is_blown() {
+            self.inputs.breath_sources().blow(BreathInput::Microphone, self.microphone.breath());
+        }
         if let (Some(program), Some(presets)) = (self.inputs.take_program(), &self.presets) {
             presets.handle().ask(program);
         }
@@ -373,9 +405,10 @@ struct SharedHandles {
 /// event. A knob blows without events, and an open window shows what happens. Real-time safe.
 fn rest_status(params: &ChalumeauParams, instrument: &InstrumentSwap, is_watched: bool) -> ProcessStatus {
     params.fall_back();
-    let may_sleep = instrument.is_silent() && !is_watched && !params.is_in_use(InUse::WithKnob);
+    let is_heard = params.microphone.on.value();
+    let may_sleep = instrument.is_silent() && !is_watched && !is_heard && !params.is_in_use(InUse::WithKnob);
     params.host.set_may_sleep(may_sleep);
-    if instrument.ensemble().is_resting() {
+    if instrument.ensemble().is_resting() && !is_heard {
         ProcessStatus::Tail((instrument.tail_s() * instrument.rate_hz()) as u32)
     } else {
         ProcessStatus::KeepAlive
@@ -460,19 +493,4 @@ impl ClapPlugin for Chalumeau {
     fn remote_controls(&self, context: &mut impl RemoteControlsContext) {
         clap::define_remote_pages(&self.params, context);
     }
-}
-
-impl Vst3Plugin for Chalumeau {
-    const VST3_CLASS_ID: [u8; 16] = identity::VST3_CLASS_ID;
-    const VST3_SUBCATEGORIES: &'static [Vst3SubCategory] =
-        &[Vst3SubCategory::Instrument, Vst3SubCategory::Synth, Vst3SubCategory::Stereo];
-}
-
-mod export {
-    // The VST3's entry points are C functions, which the macro below defines. The CLAP's are in `clap`.
-    #![allow(unsafe_code)]
-
-    use super::{Chalumeau, NotesOnly};
-
-    nice_plug::nice_export_vst3!(Chalumeau, NotesOnly);
 }

@@ -40,6 +40,7 @@ pub fn main() -> ExitCode {
         instrument,
         instrument_file,
         a4_hz: args.a4,
+        microphone: args.has_microphone(),
         has_window: !args.no_window && !lacks_display,
         quit: AtomicBool::new(false),
         window_failed: AtomicBool::new(false),
@@ -52,12 +53,13 @@ pub fn main() -> ExitCode {
         std::process::exit(1);
     }));
     let mut tried = Vec::new();
-    for backend in args.backends() {
+    let tries = args.backends().into_iter();
+    for (backend, inputs) in tries.flat_map(|one| args.inputs(one).iter().map(move |&inputs| (one, inputs))) {
         last_error.clear();
         let words = match (backend == Backend::Jack).then(JackClient::open) {
-            None => args.for_framework(backend, args.sample_rate),
+            None => args.for_framework(backend, args.sample_rate, inputs),
             Some(Ok(client)) => {
-                let words = args.for_framework(Backend::Dummy, client.rate_hz());
+                let words = args.for_framework(Backend::Dummy, client.rate_hz(), 0);
                 JackLink::offer(client, args.jack_ports());
                 words
             }

@@ -84,9 +84,9 @@ fn arg_id(parameter: &Parameter) -> &'static str {
 
 impl NumberFlags {
     fn arg((parameter, number): (&'static Parameter, Number)) -> Arg {
-        // A flag takes plain numbers: of a percentage, 0..1.
-        let Number { min, max, default, scale, .. } = number;
-        let range = if scale == 1.0 { number.range() } else { format!("{min}..{max}") };
+        let Number { min, max, default, .. } = number;
+        let range =
+            if is_share(&number) { format!("{min}..{max} or {}", number.range()) } else { number.range() };
         let worked_out = WORKED_OUT.iter().find(|(id, _)| *id == parameter.id);
         let default = worked_out.map_or_else(|| default.to_string(), |(_, text)| (*text).to_owned());
         let value_name = match parameter.unit() {
@@ -103,11 +103,43 @@ impl NumberFlags {
             .help(format!("{}, {range} [default: {default}]", parameter.meaning))
             .allow_negative_numbers(min < 0.0)
             .action(ArgAction::Set)
-            .value_parser(move |text: &str| match text.parse::<f32>() {
-                Ok(value) if number.contains(value) => Ok(value),
-                Ok(_) => Err(format!("must lie in {min}..{max}")),
-                Err(_) => Err(format!("must be a number in {min}..{max}")),
-            })
+            .value_parser(move |text: &str| flag_value(&number, text))
+    }
+}
+
+/// Whether a flag takes it as a share, and texts show it as a percentage.
+fn is_share(number: &Number) -> bool {
+    number.scale != 1.0
+}
+
+/// Reads the value of a flag: a plain number, which is a share of what texts show as a percentage, or a percentage with its sign.
+fn flag_value(number: &Number, text: &str) -> Result<f32, String> {
+    let Number { min, max, scale, .. } = number;
+    if is_share(number) && text.ends_with('%') {
+        let value = number.parse(text).filter(|&value| number.contains(value));
+        return value.ok_or_else(|| format!("must lie in {}", number.range()));
+    }
+    match text.parse::<f32>() {
+        Ok(value) if number.contains(value) => Ok(value),
+        Ok(value) if is_share(number) && number.contains(value / scale) => Err(format!(
+            "must lie in {min}..{max}; a percentage has its sign: {}, or {value}%",
+            value / scale
+        )),
+        Ok(_) => Err(format!("must lie in {min}..{max}")),
+        Err(_) => Err(format!("must be a number in {min}..{max}")),
+    }
+}
+
+/// Fails for a number that may be a share or a percentage, where a percentage is meant.
+fn doubtful(id: &str, parameter: &Parameter, text: &str) -> Result<(), String> {
+    match (parameter.kind, text.trim().parse::<f32>()) {
+        (Kind::Number(number), Ok(value)) if is_share(&number) && value > 0.0 && value <= 1.0 => {
+            let percent = number.scale * value;
+            Err(format!(
+                "{id}={value} may mean {value} % or {percent} %: write {id}={value}% or {id}={percent}%"
+            ))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -148,6 +180,7 @@ fn assignment(text: &str) -> Result<Given, String> {
     let id = id.trim();
     let known = parameters::find(id);
     if let Some(parameter) = known.filter(|parameter| parameter.sets.is_some()) {
+        doubtful(id, parameter, value)?;
         let typed = format!("--set {id}");
         return Ok(Given { parameter, value: parameter.read(value)?, typed });
     }
@@ -362,6 +395,24 @@ mod tests {
     #[test]
     fn nothing_given_is_the_reference_clarinet() {
         assert_eq!(read(&[]), Ok(Settings::default()));
+    }
+
+    #[test]
+    fn a_share_and_a_percentage_are_not_taken_for_each_other() {
+        let growl = Ok(0.4);
+        for words in [&["--growl", "0.4"][..], &["--growl", "40%"], &["--growl=40 %"], &["--set", "growl=40"]]
+        {
+            assert_eq!(read(words).map(|settings| settings.techniques.growl), growl, "{words:?}");
+        }
+        let doubted = said(&["--growl", "40"]);
+        assert!(doubted.contains("0..1") && doubted.contains("0.4, or 40%"), "{doubted}");
+        let doubted = said(&["--set", "growl=0.4"]);
+        assert!(doubted.contains("growl=0.4% or growl=40%"), "{doubted}");
+        assert!(said(&["--growl", "140%"]).contains("0..100 %"), "{}", said(&["--growl", "140%"]));
+        let little = read(&["--set", "growl=0.5%"]).unwrap().techniques.growl;
+        assert_eq!((little, read(&["--growl", "0.5%"]).unwrap().techniques.growl), (0.005, little));
+        // What has another unit is not doubted.
+        assert_eq!(read(&["--set", "gliss=0.4"]).unwrap().glissando_s, 0.4);
     }
 
     #[test]

@@ -76,6 +76,9 @@ impl BreathView {
             heading(ui, "Calibrate the knob");
             calibrate(ui, hands);
         }
+        heading(ui, "Microphone");
+        switch(ui, hands, "mic");
+        momentary(ui, hands, "miccal", "Measure the room");
         heading(ui, "Response");
         choice(ui, hands, "resp");
         for id in ["breath", "bcurve"] {

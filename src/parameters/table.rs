@@ -24,6 +24,7 @@ const ROOM: &str = "Room";
 const EXPRESSION: &str = "Expression";
 const TECHNIQUES: &str = "Techniques";
 const PLAYERS: &str = "Players";
+const MICROPHONE: &str = "Microphone";
 
 /// Largest torque that the user can allow, mNm (`docs/protocol.md`, safety).
 const MOST_TORQUE_MNM: f32 = 250.0;
@@ -975,4 +976,21 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Number(SettingNumber::PlayersWidth))
         .flag("--seats"),
+    entry("mic", MICROPHONE, "Microphone", OFF)
+        .help(
+            "Whether wind at a microphone blows: the side-chain of the CLAP, the input of *Chalumeau (microphone)* (VST3), or that of the program",
+            "Blow at the microphone while you hold keys. Speech, singing, music and the room do not blow. While it blows, no other source does but the knob. An input that nothing is connected to changes nothing.",
+            "",
+        )
+        .setup()
+        .act(),
+    entry("miccal", MICROPHONE, "Calibrate microphone", OFF)
+        .help(
+            "Measures the room for two seconds, for *Microphone*",
+            "Keep quiet until it has been. Wind must be 12 dB louder than the room. The project keeps the level.",
+            "",
+        )
+        .setup()
+        .act()
+        .never_restored(),
 ];

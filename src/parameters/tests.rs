@@ -114,6 +114,8 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
     ("split", "Players", "Split", "Chords", true),
     ("spread", "Players", "Spread", "6.0 cents", true),
     ("seats", "Players", "Seats", "70.0 %", true),
+    ("mic", "Microphone", "Microphone", "Off", false),
+    ("miccal", "Microphone", "Calibrate microphone", "Off", false),
 ];
 
 /// Ids of choices in saved states. Append only.
@@ -180,7 +182,7 @@ fn nothing_that_moves_a_motor_or_plays_travels_with_undo_or_is_automated() {
         assert!(!parameter.is_undoable && !parameter.is_automatable, "{id}");
     }
     assert!(!find("breath").unwrap().is_undoable && !find("panic").unwrap().is_undoable);
-    for id in ["arm", "takeov", "rest", "blow", "rec"] {
+    for id in ["arm", "takeov", "rest", "blow", "rec", "miccal"] {
         assert!(!find(id).unwrap().is_restored, "{id} is never on in a loaded state");
     }
     assert!(find("no such").is_none());

@@ -26,11 +26,13 @@ pub enum BreathInput {
     Knob,
     /// A controller that the user has linked to the breath.
     Link,
+    /// Wind at a microphone.
+    Microphone,
 }
 
 impl BreathInput {
     /// All inputs, in the order the window shows them.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Keys,
         Self::Parameter,
         Self::Breath,
@@ -39,6 +41,7 @@ impl BreathInput {
         Self::Note,
         Self::Knob,
         Self::Link,
+        Self::Microphone,
     ];
 
     /// Its name in the window.
@@ -52,6 +55,7 @@ impl BreathInput {
             Self::Note => "Note expression",
             Self::Knob => BreathSource::KNOB,
             Self::Link => "Linked controller",
+            Self::Microphone => "Microphone",
         }
     }
 

@@ -10,6 +10,7 @@
 //! | `params` | `clap.params` | whole numbers, flags, texts, controls of the moment |
 //! | `out_events` | the host's list of output events | whole numbers, in order of time |
 //! | `state` | `clap.state`, `clap.state-context` | controls of the moment are no state |
+//! | `audio_ports` | `clap.audio-ports` | the ids of ports from before the side-chain, and hosts that connect none |
 //! | `note_ports` | `clap.note-ports` | the MPE dialect |
 //! | `note_names` | `clap.note-name` | the written note of each key |
 //! | `presets` | `clap.preset-discovery-factory`, `clap.preset-load` | the host's own browser lists and loads presets |
@@ -19,6 +20,7 @@
 //! Everything here that handles pointers of the host is `unsafe`; outside this folder only `mts_esp` is.
 #![allow(unsafe_code)] // pointers that the host hands in and takes; each use says why it is sound
 
+mod audio_ports;
 mod factory;
 mod host;
 mod indication;

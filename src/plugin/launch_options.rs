@@ -19,6 +19,8 @@ pub struct LaunchOptions {
     pub instrument_file: String,
     /// Default of the parameter *A4*, Hz.
     pub a4_hz: f32,
+    /// The user has named a microphone: it is on.
+    pub microphone: bool,
     /// Whether the plugin has a window.
     pub has_window: bool,
     /// The user wants the program to end: the open window closes.

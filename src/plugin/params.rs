@@ -23,6 +23,7 @@ mod entry;
 pub mod instrument;
 pub mod knob;
 pub mod listening;
+pub mod microphone;
 pub mod moment;
 pub mod players;
 pub mod reed;
@@ -37,6 +38,8 @@ pub use instrument::InstrumentParams;
 pub use knob::KnobParams;
 use knob::{KnobKind, ReedSource};
 pub use listening::ListeningParams;
+pub use microphone::MicrophoneParams;
+use microphone::RoomFloor;
 use moment::{Moment, Moments};
 pub use players::PlayersParams;
 pub use reed::PhysicalReedParams;
@@ -93,6 +96,9 @@ pub struct ChalumeauParams {
     /// How many players play.
     #[nested(group = "Players")]
     pub players: PlayersParams,
+    /// The microphone at the audio input.
+    #[nested(group = "Microphone")]
+    pub microphone: MicrophoneParams,
     /// State of the instrument as text, written by whoever loads it.
     pub instrument_status: Arc<RwLock<String>>,
     /// Size, zoom, theme and view of the window.
@@ -107,6 +113,9 @@ pub struct ChalumeauParams {
     /// Holes that the user has moved and joints that the user has pulled.
     #[persist = "holes"]
     pub alterations: AlterationsField,
+    /// Level of the room, as the microphone has measured it.
+    #[persist = "roomlevel"]
+    pub room_floor: RoomFloor,
     /// Name of the preset that was chosen last; empty if there is none.
     #[persist = "preset"]
     pub preset: RwLock<String>,
@@ -373,12 +382,14 @@ impl ChalumeauParams {
             expression: ExpressionParams::new(&number),
             techniques: TechniqueParams::new(&number),
             players: PlayersParams::new(&number),
+            microphone: MicrophoneParams::new(&moments),
             knob_status,
             schema: AtomicU32::new(SCHEMA),
             window: RwLock::default(),
             links: ControllerLinks::default(),
             scale: ScaleField::default(),
             alterations: AlterationsField::default(),
+            room_floor: RoomFloor::default(),
             preset: RwLock::new(state::first_preset()),
             breath: BreathParams {
                 breath: number("breath"),

@@ -9,6 +9,10 @@ use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::instrument::concert_pitch::A4_RANGE_HZ;
 use chalumeau_core::instrument::internal_rate::HOST_RATES_HZ;
 
+/// Time by which the framework delays a microphone, s, at least: input and output of a sound card come at different times. It takes
+/// three periods where that is longer.
+const LEAST_INPUT_LATENCY_S: f32 = 0.02;
+
 const HELP: &str = "\
 Examples:
   chalumeau-standalone                                    JACK if a server runs, else the system's sound
@@ -16,11 +20,13 @@ Examples:
   chalumeau-standalone --instrument bass --a4 442
   chalumeau-standalone --midi-input \"\"                    lists the MIDI inputs
   chalumeau-standalone --output-device \"\"                 lists the sound cards
+  chalumeau-standalone --input-device \"\"                  lists the microphones
   chalumeau-standalone --no-window                        plays from MIDI or a knob
   chalumeau-standalone --backend dummy                    shows the window, makes no sound
 
 Play it with a MIDI keyboard, a wind controller, a knob, or the keys in the window. CC2 or CC11 sets the breath. Until one
-of them moves, key velocity sets it. Without a display, the program plays without a window. To quit, close the window or
+of them moves, key velocity sets it. With a microphone, hold keys and blow at it; keep quiet for the first two seconds,
+in which the program measures the room. Without a display, the program plays without a window. To quit, close the window or
 press Ctrl-C.";
 
 /// Plays Chalumeau, a physical model of a clarinet, without a DAW.
@@ -40,6 +46,9 @@ pub struct Args {
     /// Name of the sound card; an empty name lists them. Not for JACK.
     #[arg(short, long, value_name = "NAME")]
     output_device: Option<String>,
+    /// Name of the sound card's input with a microphone that you blow at; an empty name lists them. Not for JACK.
+    #[arg(long, value_name = "NAME")]
+    input_device: Option<String>,
     /// Name of the MIDI input; an empty name lists them. Not for JACK.
     #[arg(short, long, value_name = "NAME")]
     midi_input: Option<String>,
@@ -55,6 +64,9 @@ pub struct Args {
     /// Play without a window.
     #[arg(long)]
     pub no_window: bool,
+    /// JACK port of a microphone that you blow at.
+    #[arg(long, value_name = "PORT")]
+    connect_jack_input: Option<String>,
     /// JACK port whose MIDI plays the instrument.
     #[arg(long, value_name = "PORT")]
     connect_jack_midi_input: Option<String>,
@@ -145,13 +157,36 @@ fn instrument(text: &str) -> Result<(InstrumentChoice, String), String> {
 }
 
 impl Args {
-    /// The arguments for the framework. With JACK it runs the dummy backend at the server's rate, Hz.
-    pub fn for_framework(&self, backend: Backend, rate_hz: f32) -> Vec<String> {
+    /// Whether the user has named a microphone.
+    pub fn has_microphone(&self) -> bool {
+        self.input_device.is_some() || self.connect_jack_input.is_some()
+    }
+
+    /// Channels of the microphone to try, in this order.
+    pub fn inputs(&self, backend: Backend) -> &'static [usize] {
+        match backend {
+            Backend::Jack | Backend::Dummy => &[0],
+            _ if self.input_device.is_none() => &[0],
+            // Some devices have two only.
+            _ => &[1, 2],
+        }
+    }
+
+    /// The arguments for the framework. With JACK it runs the dummy backend at the server's rate, Hz. `inputs`: channels of the
+    /// microphone.
+    pub fn for_framework(&self, backend: Backend, rate_hz: f32, inputs: usize) -> Vec<String> {
         let mut words = vec!["chalumeau-standalone".to_owned()];
         let mut add = |name: &str, value: String| words.push(format!("--{name}={value}"));
         add("backend", backend.name());
         add("sample-rate", rate_hz.to_string());
         add("period-size", self.period_size.to_string());
+        // The plugin's layouts are numbered from 1, and have none, one and two.
+        add("audio-layout", (inputs + 1).to_string());
+        if inputs > 0 {
+            let latency_s = (3.0 * self.period_size as f32 / rate_hz).max(LEAST_INPUT_LATENCY_S);
+            add("input-latency", latency_s.to_string());
+            add("input-device", self.input_device.clone().unwrap_or_default());
+        }
         for (name, value) in [
             ("output-device", &self.output_device),
             ("midi-input", &self.midi_input),
@@ -167,6 +202,7 @@ impl Args {
     /// The JACK ports to connect to.
     pub fn jack_ports(&self) -> JackPorts {
         JackPorts {
+            microphone: self.connect_jack_input.clone(),
             midi_input: self.connect_jack_midi_input.clone(),
             midi_output: self.connect_jack_midi_output.clone(),
         }
@@ -175,8 +211,9 @@ impl Args {
     /// The backends to try, in this order. A user who names a sound card or a MIDI port of the system wants the system's
     /// backend.
     pub fn backends(&self) -> Vec<Backend> {
-        let of_system = [&self.output_device, &self.midi_input, &self.midi_output];
-        let of_jack = [&self.connect_jack_midi_input, &self.connect_jack_midi_output];
+        let of_system = [&self.output_device, &self.input_device, &self.midi_input, &self.midi_output];
+        let of_jack =
+            [&self.connect_jack_input, &self.connect_jack_midi_input, &self.connect_jack_midi_output];
         match self.backend {
             Backend::Auto if of_system.iter().any(|name| name.is_some()) => vec![SYSTEM],
             Backend::Auto if of_jack.iter().any(|name| name.is_some()) => vec![Backend::Jack],
@@ -200,6 +237,23 @@ mod tests {
         assert_eq!(args(&["--midi-input", ""]).backends(), [SYSTEM]);
         assert_eq!(args(&["--connect-jack-midi-input", "a:b"]).backends(), [Backend::Jack]);
         assert_eq!(args(&["--backend", "dummy", "-m", "x"]).backends(), [Backend::Dummy]);
+        assert_eq!(args(&["--input-device", "x"]).backends(), [SYSTEM]);
+        assert_eq!(args(&["--connect-jack-input", "a:b"]).backends(), [Backend::Jack]);
+    }
+
+    #[test]
+    fn a_microphone_is_off_until_it_is_named() {
+        let none = args(&[]);
+        assert!(!none.has_microphone());
+        assert_eq!(none.inputs(SYSTEM), [0]);
+        assert!(!none.for_framework(SYSTEM, 48_000.0, 0).iter().any(|word| word.contains("input-device")));
+        let named = args(&["--input-device", "Mic"]);
+        assert!(named.has_microphone() && args(&["--connect-jack-input", "a:b"]).has_microphone());
+        assert_eq!((named.inputs(SYSTEM), named.inputs(Backend::Dummy)), (&[1, 2][..], &[0][..]));
+        let words = named.for_framework(SYSTEM, 48_000.0, 1);
+        for word in ["--input-device=Mic", "--audio-layout=2", "--input-latency=0.02"] {
+            assert!(words.iter().any(|own| own == word), "no {word} in {words:?}");
+        }
     }
 
     #[test]
@@ -221,7 +275,7 @@ mod tests {
     #[test]
     fn the_framework_gets_the_arguments_of_the_user() {
         let args = args(&["-r", "44100", "-o", "", "-m", "Wind"]);
-        let words = args.for_framework(SYSTEM, args.sample_rate);
+        let words = args.for_framework(SYSTEM, args.sample_rate, 0);
         for word in ["--sample-rate=44100", "--output-device=", "--midi-input=Wind"] {
             assert!(words.iter().any(|said| said == word), "{words:?}");
         }

@@ -22,6 +22,8 @@ pub struct StandalonePlugin {
     jack: Arc<Mutex<Option<JackLink>>>,
     /// JACK plays the plugin, not the framework.
     uses_jack: bool,
+    /// Channels of the microphone that the framework has opened.
+    inputs: usize,
 }
 
 impl Default for StandalonePlugin {
@@ -30,9 +32,18 @@ impl Default for StandalonePlugin {
         let plugin = Arc::<Mutex<Chalumeau>>::default();
         let jack = JackLink::claim(&plugin);
         let uses_jack = jack.is_some();
-        let this = Self { plugin, jack: Arc::new(Mutex::new(jack)), uses_jack };
+        let this = Self { plugin, jack: Arc::new(Mutex::new(jack)), uses_jack, inputs: 0 };
         *locked(&PLAYING) = Some(this.clone());
         this
+    }
+}
+
+/// The channels of a microphone, and those of the sound.
+const fn layout(inputs: Option<NonZeroU32>) -> AudioIOLayout {
+    AudioIOLayout {
+        main_input_channels: inputs,
+        main_output_channels: NonZeroU32::new(2),
+        ..AudioIOLayout::const_default()
     }
 }
 
@@ -46,7 +57,8 @@ impl Plugin for StandalonePlugin {
     const URL: &'static str = Chalumeau::URL;
     const EMAIL: &'static str = Chalumeau::EMAIL;
     const VERSION: &'static str = Chalumeau::VERSION;
-    const AUDIO_IO_LAYOUTS: &'static [AudioIOLayout] = Chalumeau::AUDIO_IO_LAYOUTS;
+    const AUDIO_IO_LAYOUTS: &'static [AudioIOLayout] =
+        &[layout(None), layout(NonZeroU32::new(1)), layout(NonZeroU32::new(2))];
     const MIDI_INPUT: MidiConfig = Chalumeau::MIDI_INPUT;
     const MIDI_OUTPUT: MidiConfig = Chalumeau::MIDI_OUTPUT;
     const SAMPLE_ACCURATE_AUTOMATION: bool = Chalumeau::SAMPLE_ACCURATE_AUTOMATION;
@@ -74,10 +86,11 @@ impl Plugin for StandalonePlugin {
 
     fn activate(
         &mut self,
-        _layout: &AudioIOLayout,
+        layout: &AudioIOLayout,
         config: &BufferConfig,
         context: &mut impl ActivateContext<Self>,
     ) -> bool {
+        self.inputs = layout.main_input_channels.map_or(0, |channels| channels.get() as usize);
         match &*locked(&self.jack) {
             Some(jack) => jack.start(),
             None => locked(&self.plugin).start(config, context),
@@ -96,7 +109,12 @@ impl Plugin for StandalonePlugin {
     ) -> ProcessStatus {
         // Nobody else holds the lock while the framework plays.
         match self.plugin.try_lock() {
-            Ok(mut plugin) if !self.uses_jack => plugin.play(buffer.as_slice(), context),
+            Ok(mut plugin) if !self.uses_jack => {
+                let channels = buffer.as_slice();
+                // The framework has put what comes in where the sound goes out.
+                plugin.hear(&channels[..self.inputs.min(channels.len())]);
+                plugin.play(channels, context)
+            }
             _ => ProcessStatus::KeepAlive,
         }
     }

@@ -64,7 +64,7 @@ export class Engine {
     this.stream = await navigator.mediaDevices.getUserMedia({ audio: raw });
     this.input = new MediaStreamAudioSourceNode(this.context, { mediaStream: this.stream });
     this.input.connect(this.node);
-    this.send({ microphone: true, calibrate: 2 });
+    this.send({ microphone: true, calibrate: true });
   }
 
   closeMicrophone() {

@@ -1,13 +1,11 @@
-// The audio thread: the WebAssembly module, and the microphone's breath.
+// The audio thread: the WebAssembly module, which hears the microphone too.
 //
 // Messages in: { midi: [status, a, b] }, { breath: 0..1 or null }, { values: [..] }, { set: [place, value] },
 // { instrument: n }, { wheel: n }, { bend: semitones }, { breathFrom: n }, { silence: true },
-// { microphone: true or false, calibrate: seconds }, { score: messages } with the sample of each first, { times: true },
+// { microphone: true or false, calibrate: true }, { score: messages } with the sample of each first, { times: true },
 // { prepared: { file, prepared } } in UTF-8, { knob: [what, number] } and { knobBytes, at } as knob.js sends them.
 // Messages out: { picture: [..], microphone: .. } 30 times a second, { blowing: true or false }, { times: .. }, { failed: text },
 // { taken: true or false } of a prepared instrument, { knobSend: bytes }, { knobBaud: n }, { knobFarewell: bytes }, { knobStatus: bytes }.
-
-import { BlowMeter } from './blow.js';
 
 /** Time between two pictures, s. */
 const PICTURE_S = 1 / 30;
@@ -65,7 +63,7 @@ class Chalumeau extends AudioWorkletProcessor {
     if ('instrument' in message) {
       module.chalumeau_begin(sampleRate, message.instrument);
       // It lies elsewhere now.
-      this.views = null;
+      this.views = this.input = null;
     }
     if (message.prepared) this.begin(message.prepared);
     if (message.knob) this.turn(...message.knob);
@@ -78,7 +76,7 @@ class Chalumeau extends AudioWorkletProcessor {
     if ('breathFrom' in message) module.chalumeau_breath_from(message.breathFrom);
     if (message.silence) module.chalumeau_silence();
     if ('microphone' in message) this.listen(message.microphone);
-    if (message.calibrate) this.blow?.calibrate(message.calibrate);
+    if (message.calibrate) module.chalumeau_calibrate();
     if (message.score) this.score = { messages: message.score, at: 0, next: 0 };
     if (message.times) this.tellTimes();
   }
@@ -101,7 +99,7 @@ class Chalumeau extends AudioWorkletProcessor {
   begin({ file, prepared }) {
     this.give(file, prepared);
     const taken = this.module.chalumeau_begin_prepared(sampleRate, file.length) === 1;
-    this.views = null;
+    this.views = this.input = null;
     this.port.postMessage({ taken });
   }
 
@@ -134,18 +132,18 @@ class Chalumeau extends AudioWorkletProcessor {
   }
 
   listen(on) {
-    if (on) this.blow ??= new BlowMeter(sampleRate);
-    if (this.listening && !on) this.module.chalumeau_breath(-1);
+    this.module.chalumeau_microphone(on ? 1 : 0);
     this.listening = on;
   }
 
   hear(input) {
     if (!this.listening) return;
-    // Nobody blows while the room is measured, or before the device is open.
-    this.module.chalumeau_breath(input ? this.blow.process(input) : 0);
-    if (this.blow.isOpen !== this.wasOpen) {
-      this.wasOpen = this.blow.isOpen;
-      this.port.postMessage({ blowing: this.wasOpen });
+    // There is none before the device is open.
+    if (input) this.microphone().set(input);
+    const isOpen = this.module.chalumeau_hear(input?.length ?? 0) === 1;
+    if (isOpen !== this.wasOpen) {
+      this.wasOpen = isOpen;
+      this.port.postMessage({ blowing: isOpen });
     }
   }
 
@@ -175,6 +173,13 @@ class Chalumeau extends AudioWorkletProcessor {
     }
   }
 
+  /** Where the module takes what the microphone gives, in a view that stays. */
+  microphone() {
+    const { memory, chalumeau_input: place, chalumeau_most_frames: most } = this.module;
+    if (this.input?.buffer !== memory.buffer) this.input = new Float32Array(memory.buffer, place(), most());
+    return this.input;
+  }
+
   /** The module's samples. Whole blocks have views that stay, so that playing leaves nothing to collect. */
   samples(channel, count) {
     const { memory, chalumeau_channel: place } = this.module;
@@ -201,14 +206,16 @@ class Chalumeau extends AudioWorkletProcessor {
 
   tellPicture() {
     const picture = new Float32Array(this.module.memory.buffer, this.module.chalumeau_picture(), 11);
-    const room = this.listening
-      ? { level: this.blow.level, floor: this.blow.floor, breath: this.blow.breath, calibrating: this.blow.isCalibrating }
-      : null;
-    this.port.postMessage({ picture: Array.from(picture), microphone: room });
+    this.port.postMessage({ picture: Array.from(picture), microphone: this.listening ? this.wind() : null });
     this.pictures += 1;
     if (this.hasKnob && this.pictures % STATUS_EVERY === 0) {
       this.port.postMessage({ knobStatus: this.given(this.module.chalumeau_knob_status()) });
     }
+  }
+
+  wind() {
+    const [level, floor, breath, calibrating] = new Float32Array(this.module.memory.buffer, this.module.chalumeau_wind(), 4);
+    return { level, floor, breath, calibrating: calibrating === 1 };
   }
 
   tellTimes() {

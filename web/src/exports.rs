@@ -72,6 +72,36 @@ pub extern "C" fn chalumeau_breath(unit: f32) {
     with(|playing| playing.breath((unit >= 0.0).then_some(unit)));
 }
 
+/// See [`Playing::set_microphone`].
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_microphone(is_on: u32) {
+    with(|playing| playing.set_microphone(is_on != 0));
+}
+
+/// See [`Playing::calibrate`].
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_calibrate() {
+    with(Playing::calibrate);
+}
+
+/// Where the page writes what the microphone gives, as many samples as a block has at most; null without an instrument.
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_input() -> *mut f32 {
+    locked().as_deref_mut().map_or(std::ptr::null_mut(), |playing| playing.input().as_mut_ptr())
+}
+
+/// See [`Playing::hear`].
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_hear(frames: u32) -> u32 {
+    locked().as_deref_mut().map_or(0, |playing| u32::from(playing.hear(frames as usize)))
+}
+
+/// Where the numbers of [`Playing::wind`] lie; null without an instrument.
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_wind() -> *const f32 {
+    locked().as_deref_mut().map_or(std::ptr::null(), |playing| playing.wind().as_ptr())
+}
+
 /// Ends everything that sounds.
 #[unsafe(no_mangle)]
 pub extern "C" fn chalumeau_silence() {
@@ -288,6 +318,11 @@ mod tests {
                 chalumeau_breath_from(a);
                 chalumeau_channel(a);
                 chalumeau_inbox(a);
+                chalumeau_microphone(a);
+                chalumeau_hear(a);
+                chalumeau_calibrate();
+                chalumeau_input();
+                chalumeau_wind();
                 let now_ms = 10.0 * f64::from(a % 1_000);
                 for byte in [0, a as u8, 255] {
                     inbox().fill(byte);

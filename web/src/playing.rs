@@ -9,6 +9,7 @@ use chalumeau_core::control::midi::BreathOrigin;
 use chalumeau_core::control::midi::breath::{BreathController, BreathFrom};
 use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::control::parts::Parts;
+use chalumeau_core::control::wind::{WindCoeffs, WindDesign, WindMeter};
 use chalumeau_core::event::{Event, PartEvent, Timed};
 use chalumeau_core::instrument::stereo::Stereo;
 use chalumeau_core::instrument::{BuildError, Channels, Ensemble, Preparation, Settings, Wanted};
@@ -28,6 +29,9 @@ pub const MOST_FRAMES: usize = 1_024;
 /// Numbers of a [picture](Playing::picture).
 pub const PICTURE: usize = 11;
 
+/// Numbers of [what the page shows of the microphone](Playing::wind).
+pub const WIND_PICTURE: usize = 4;
+
 /// One instrument with its players, at one sample rate.
 pub struct Playing {
     ensemble: Ensemble,
@@ -46,6 +50,11 @@ pub struct Playing {
     hand: BreathMapping,
     /// The knob made the breath of the last block.
     is_blown: bool,
+    /// The microphone, whether it blows, what it gives next, and what the page shows of it.
+    wind: WindMeter,
+    is_heard: bool,
+    input: [f32; MOST_FRAMES],
+    wind_picture: [f32; WIND_PICTURE],
 }
 
 /// Applies what a message became, in its order.
@@ -94,6 +103,10 @@ impl Playing {
             blower: Blower::default(),
             hand: BreathMapping { design: KnobDesign::default(), feels: true, ..BreathMapping::default() },
             is_blown: false,
+            wind: WindMeter::new(WindCoeffs::new(rate_hz), WindDesign::default()),
+            is_heard: false,
+            input: [0.0; MOST_FRAMES],
+            wind_picture: [0.0; WIND_PICTURE],
         }
     }
 
@@ -133,6 +146,49 @@ impl Playing {
             _ => Event::BreathFromKeys,
         };
         self.ensemble.apply(event.into());
+    }
+
+    /// Whether a microphone blows. Off, the breath goes back to the keys.
+    pub fn set_microphone(&mut self, is_on: bool) {
+        if self.is_heard && !is_on {
+            self.breath(None);
+        }
+        self.is_heard = is_on;
+    }
+
+    /// Measures the room, see [`WindMeter::calibrate`].
+    pub fn calibrate(&mut self) {
+        self.wind.calibrate();
+    }
+
+    /// Where the page writes what the microphone gives.
+    pub fn input(&mut self) -> &mut [f32; MOST_FRAMES] {
+        &mut self.input
+    }
+
+    /// Hears the first samples of the [input](Self::input); its breath counts from the next block on. Whether somebody blows.
+    pub fn hear(&mut self, frames: usize) -> bool {
+        if !self.is_heard {
+            return false;
+        }
+        for &sample in &self.input[..frames.min(MOST_FRAMES)] {
+            self.wind.tick(sample);
+        }
+        // Nobody blows while the room is measured, or before the device is open.
+        self.breath(Some(self.wind.breath()));
+        self.wind.is_open()
+    }
+
+    /// What the page shows of the microphone: level and floor, dBFS, breath, and 1 while the room is measured.
+    pub fn wind(&mut self) -> &[f32; WIND_PICTURE] {
+        let wind = &self.wind;
+        self.wind_picture = [
+            wind.level_dbfs() as f32,
+            wind.design().floor_dbfs,
+            wind.breath(),
+            f32::from(u8::from(wind.is_calibrating())),
+        ];
+        &self.wind_picture
     }
 
     /// Ends everything that sounds, at once.
@@ -205,6 +261,7 @@ impl Playing {
         self.ensemble.carry_on(&from.ensemble);
         (self.knob, self.blower, self.hand, self.is_blown) =
             (from.knob, from.blower, from.hand, from.is_blown);
+        (self.wind, self.is_heard) = (from.wind, from.is_heard);
     }
 
     /// Makes the next samples, [`MOST_FRAMES`] at most; returns how many.

@@ -212,6 +212,7 @@ const CLAP_TESTS: &[&str] = &[
     "note_ids",
     "keyboard",
     "instrument",
+    "microphone",
     "knob",
     "knob_stop",
     "mts_esp",

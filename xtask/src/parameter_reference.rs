@@ -18,10 +18,10 @@ This page is written by `cargo xtask parameter-reference` from the table in `src
 command line use the same table. `chalumeau parameters` prints it as CSV.
 
 Ids are stable: saved projects and `--set` use them. *MIDI* is what drives a parameter over MIDI. *Auto* says whether a host
-can automate it. *Flag* is the command line's flag for the same quantity; a flag takes a number without its unit, and 0..1
-for a percentage. Some flags of the knob and of the measured reed have a wider range than the plugin.
+can automate it. *Flag* is the command line's flag for the same quantity; a flag takes a number without its unit. It takes
+a percentage as 0..1, or with its sign: `--growl 0.4` is `--growl 40%`. Some flags of the knob and of the measured reed have a wider range than the plugin.
 
-`--set` takes any parameter of the sound by its id, with the text that a host would show:
+`--set` takes any parameter of the sound by its id, with the text that a host would show. A percentage from 0 to 1 needs its sign there:
 
 ```sh
 chalumeau render --written C4 --set vent=2 --set tune=tempered --set \"temp=20 \u{b0}C\" --out c4.wav

@@ -6,3 +6,4 @@ pub mod knob;
 pub mod midi;
 pub mod notes;
 pub mod parts;
+pub mod wind;

@@ -202,7 +202,17 @@ impl Plugin {
             Ok(processor) => {
                 let (answers, ends, hands) = (Vec::new(), Vec::new(), Vec::new());
                 let status = ProcessStatus::Continue;
-                Ok(Session { processor, block, answers, ends, hands, status, played: 0, transport: None })
+                Ok(Session {
+                    processor,
+                    block,
+                    answers,
+                    ends,
+                    hands,
+                    status,
+                    played: 0,
+                    transport: None,
+                    side_chain: None,
+                })
             }
             Err(_) => bail!("the plugin does not start at {rate_hz} Hz"),
         }
@@ -424,6 +434,8 @@ pub struct Session {
     played: usize,
     /// The host's transport, if it has one.
     transport: Option<TransportEvent>,
+    /// What the side-chain gives next, if the host has connected it.
+    side_chain: Option<Vec<f32>>,
 }
 
 impl Session {
@@ -439,6 +451,11 @@ impl Session {
             let due = began + Duration::from_secs_f64(start as f64 / rate_hz);
             std::thread::sleep(due.saturating_duration_since(Instant::now()));
         })
+    }
+
+    /// Connects the side-chain, which gives these samples, and then silence.
+    pub fn connect(&mut self, samples: Vec<f32>) {
+        self.side_chain = Some(samples);
     }
 
     /// Samples played since activation.
@@ -482,7 +499,7 @@ impl Session {
         let mut heard = [vec![0.0; samples], vec![0.0; samples]];
         let mut said = said.iter().peekable();
         let mut ports = AudioPorts::with_capacity(2, 1);
-        let mut no_ports = AudioPorts::with_capacity(0, 0);
+        let mut in_ports = AudioPorts::with_capacity(1, 1);
         for start in (0..samples).step_by(self.block) {
             let end = samples.min(start + self.block);
             before(start);
@@ -491,18 +508,22 @@ impl Session {
                 push(&mut events, u32::try_from(at.saturating_sub(start))?, *say);
             }
             let mut answered = EventBuffer::new();
-            let no_input = no_ports.with_input_buffers(std::iter::empty::<
-                AudioPortBuffer<
-                    std::iter::Empty<InputChannel<'_, f32>>,
-                    std::iter::Empty<InputChannel<'_, f64>>,
-                >,
-            >());
+            let mut given = self.side_chain.as_mut().map(|side_chain| {
+                let left = side_chain.split_off(side_chain.len().min(end - start));
+                let mut given = std::mem::replace(side_chain, left);
+                given.resize(end - start, 0.0);
+                given
+            });
+            let input = in_ports.with_input_buffers(given.iter_mut().map(|given| AudioPortBuffer {
+                latency: 0,
+                channels: AudioPortBufferType::f32_input_only([InputChannel::variable(given)].into_iter()),
+            }));
             let mut out = ports.with_output_buffers([AudioPortBuffer {
                 latency: 0,
                 channels: AudioPortBufferType::f32_output_only(heard.iter_mut().map(|c| &mut c[start..end])),
             }]);
             self.status = self.processor.process(
-                &no_input,
+                &input,
                 &mut out,
                 &InputEvents::from_buffer(&events),
                 &mut OutputEvents::from_buffer(&mut answered),

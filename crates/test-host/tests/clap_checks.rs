@@ -147,10 +147,28 @@ fn what_is_skipped() {
     }
     let handle = instance.plugin_handle();
     let ports: PluginAudioPorts = handle.get_extension().unwrap();
-    assert_eq!(ports.count(&handle, true), 0, "check process-audio-denormals");
     let mut buffer = AudioPortInfoBuffer::new();
-    let out = ports.get(&handle, 0, false, &mut buffer).unwrap();
-    assert!(!out.flags.contains(AudioPortFlags::SUPPORTS_64BITS), "check process-audio-double-*");
+    for is_input in [false, true] {
+        let port = ports.get(&handle, 0, is_input, &mut buffer).unwrap();
+        assert!(!port.flags.contains(AudioPortFlags::SUPPORTS_64BITS), "check process-audio-double-*");
+    }
+}
+
+/// A microphone is no main input, and the output has the id that projects from before the side-chain have saved.
+#[test]
+fn the_side_chain_is_beside_the_output_that_was_there_before() {
+    let entry = library();
+    let mut instance = instance(&entry);
+    let handle = instance.plugin_handle();
+    let ports: PluginAudioPorts = handle.get_extension().unwrap();
+    let mut buffer = AudioPortInfoBuffer::new();
+    assert_eq!([true, false].map(|is_input| ports.count(&handle, is_input)), [1, 1]);
+    let input = ports.get(&handle, 0, true, &mut buffer).unwrap();
+    assert_eq!((input.name, input.channel_count), (&b"Microphone"[..], 1));
+    assert!(!input.flags.contains(AudioPortFlags::IS_MAIN));
+    let output = ports.get(&handle, 0, false, &mut buffer).unwrap();
+    assert_eq!((output.id.get(), output.channel_count), (0, 2));
+    assert!(output.flags.contains(AudioPortFlags::IS_MAIN));
 }
 
 /// As a host's browser does: the one provider, its one place of factory presets, and every preset in it, loaded by its key.

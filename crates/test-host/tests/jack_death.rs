@@ -2,16 +2,21 @@
 //! JACK_DEFAULT_SERVER, one after another; CHALUMEAU_JACK_DEATHS says how often (`cargo xtask ci JACK` does all that).
 #![cfg(target_os = "linux")]
 
+#[path = "support/wind.rs"]
+mod wind;
+
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use chalumeau_test_host::artefacts;
 use chalumeau_test_host::jack::JackServer;
-use jack::{AsyncClient, AudioIn, Client, ClientOptions, Control, MidiOut, Port, ProcessScope, RawMidi};
+use jack::{
+    AsyncClient, AudioIn, AudioOut, Client, ClientOptions, Control, MidiOut, Port, ProcessScope, RawMidi,
+};
 
 const PATIENCE: Duration = Duration::from_secs(20);
 /// How soon the program must say that the server has gone.
@@ -22,6 +27,8 @@ const SOUND_WITHIN: Duration = Duration::from_secs(3);
 const END_WITHIN: Duration = Duration::from_secs(2);
 /// Quieter than any note, louder than any silence; full scale is 1.
 const AUDIBLE: f32 = 1e-3;
+/// Louder than the tongue without breath, which has 0.008; quieter than a blown note.
+const BLOWN: f32 = 0.02;
 
 /// One server at a time.
 static TURN: Mutex<()> = Mutex::new(());
@@ -113,7 +120,7 @@ impl Drop for Program {
     }
 }
 
-/// A client that holds a key and listens.
+/// A client that holds a key, listens, and blows when it is told to.
 struct Listener {
     client: AsyncClient<(), Ear>,
     heard: Arc<Heard>,
@@ -126,6 +133,8 @@ struct Heard {
     peak: AtomicU32,
     /// Zero crossings per second.
     crossings_hz: AtomicU32,
+    /// The listener is to blow.
+    blows: AtomicBool,
 }
 
 impl Heard {
@@ -137,6 +146,10 @@ impl Heard {
 struct Ear {
     input: Port<AudioIn>,
     keys: Port<MidiOut>,
+    mouth: Port<AudioOut>,
+    /// What the mouth does at rest, and when it blows: a second each.
+    breaths: [Vec<f32>; 2],
+    blown: usize,
     cycles: u32,
     window: Vec<f32>,
     rate_hz: u32,
@@ -153,6 +166,11 @@ impl jack::ProcessHandler for Ear {
             let _ = keys.write(&RawMidi { time: 0, bytes: &bytes.1 });
         }
         self.cycles += 1;
+        let breath = &self.breaths[usize::from(self.heard.blows.load(Ordering::Relaxed))];
+        for sample in self.mouth.as_mut_slice(scope) {
+            *sample = breath[self.blown % breath.len()];
+            self.blown += 1;
+        }
         self.window.extend_from_slice(self.input.as_slice(scope));
         if self.window.len() >= self.rate_hz as usize / 10 {
             let peak = self.window.iter().fold(0.0_f32, |peak, x| peak.max(x.abs()));
@@ -181,6 +199,9 @@ impl Listener {
         let ear = Ear {
             input: client.register_port("in", AudioIn::default()).unwrap(),
             keys: client.register_port("keys", MidiOut::default()).unwrap(),
+            mouth: client.register_port("mouth", AudioOut::default()).unwrap(),
+            breaths: [wind::quiet(wind::SECOND), wind::wind(2 * wind::SECOND).split_off(wind::SECOND)],
+            blown: 0,
             cycles: 0,
             window: Vec::with_capacity(1 << 16),
             rate_hz: client.sample_rate(),
@@ -264,6 +285,32 @@ fn a_server_at_another_rate_hears_the_same_pitch() {
     let after = listener.hears(Instant::now() + PATIENCE);
     // A program that plays on at the old rate is 8 % flat.
     assert!((after / before - 1.0).abs() < 0.04, "{before} crossings a second, then {after}");
+    program.ends_soon();
+    drop((listener, running));
+}
+
+#[test]
+#[ignore = "kills JACK servers"]
+fn wind_at_the_microphone_that_was_named_blows_held_keys() {
+    let _turn = turn();
+    let running = server(48_000);
+    let mut program = Program::start(&running, &["--connect-jack-input", "listener:mouth"]);
+    let listener = Listener::join();
+    listener.connect();
+    // Until the program has connected the microphone, which is quiet, velocity blows.
+    let until = Instant::now() + PATIENCE;
+    let mut silent_for = 0;
+    while silent_for < 40 {
+        assert!(Instant::now() < until, "keys sound without wind: {:#?}", program.said);
+        silent_for = if listener.heard.peak() < BLOWN { silent_for + 1 } else { 0 };
+        std::thread::sleep(Duration::from_millis(25));
+    }
+    listener.heard.blows.store(true, Ordering::Relaxed);
+    let until = Instant::now() + PATIENCE;
+    while listener.heard.peak() < BLOWN {
+        assert!(Instant::now() < until, "wind does not blow: {:#?}", program.said);
+        std::thread::sleep(Duration::from_millis(25));
+    }
     program.ends_soon();
     drop((listener, running));
 }

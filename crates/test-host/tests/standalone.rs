@@ -115,6 +115,7 @@ fn help_helps_and_mistakes_are_named() {
         (["--sample-rate", "800"], "1000..1536000"),
         (["--backend", "oss"], "jack"),
         (["--output-device", "Nonesuch"], "Nonesuch"),
+        (["--input-device", "Nonesuch"], "Nonesuch"),
     ] {
         let Output { status, stderr, .. } = alone(&args);
         let said = String::from_utf8(stderr).unwrap();
@@ -133,7 +134,7 @@ fn it_plays_to_jack() {
     loop {
         let ports = Command::new("jack_lsp").output().unwrap();
         let ports = String::from_utf8_lossy(&ports.stdout).into_owned();
-        if ["chalumeau:output_1", "chalumeau:output_2", "chalumeau:midi_input"]
+        if ["chalumeau:output_1", "chalumeau:output_2", "chalumeau:microphone", "chalumeau:midi_input"]
             .iter()
             .all(|port| ports.contains(port))
         {

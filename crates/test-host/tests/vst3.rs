@@ -2,6 +2,8 @@
 
 #[path = "support/kept_melody.rs"]
 mod kept_melody;
+#[path = "support/wind.rs"]
+mod wind;
 
 use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 
@@ -11,9 +13,8 @@ use chalumeau_core::units::SoundingNote;
 use chalumeau_test_host::clap::{At, Say};
 use vst3_host::prelude::*;
 use vst3_host::{AudioBuffers, MidiChannel, MidiEvent};
+use wind::{RATE, SECOND, quiet, wind};
 
-const RATE: f64 = 48_000.0;
-const SECOND: usize = 48_000;
 const CHANNEL: MidiChannel = MidiChannel::Ch1;
 
 /// VST3 knows one main thread; the tests take turns at being it.
@@ -21,6 +22,8 @@ static MAIN_THREAD: Mutex<()> = Mutex::new(());
 
 struct Loaded {
     plugin: Plugin,
+    /// What comes in on both channels of a class that has an input.
+    input: Vec<f32>,
     // Both outlive the plugin.
     _host: Vst3Host,
     _turn: Option<MutexGuard<'static, ()>>,
@@ -55,7 +58,7 @@ fn load_class(block: usize, id: Option<&str>) -> Loaded {
     static FIRST: Once = Once::new();
     FIRST.call_once(|| std::mem::forget(load()));
     let (plugin, host) = load();
-    Loaded { plugin, _host: host, _turn: None }
+    Loaded { plugin, input: Vec::new(), _host: host, _turn: None }
 }
 
 /// What is said at a sample position: MIDI, or a parameter's name and 0..=1.
@@ -102,7 +105,10 @@ fn play_on(loaded: &mut Loaded, block: usize, said: &[(usize, Word)], samples: u
                 }
             }
         }
-        let mut buffers = AudioBuffers::new(0, 2, length, RATE);
+        let mut buffers = AudioBuffers::new(loaded.input.len().min(2), 2, length, RATE);
+        for channel in &mut buffers.inputs {
+            channel.copy_from_slice(&loaded.input[start..start + length]);
+        }
         loaded.plugin.process_audio(&mut buffers).unwrap();
         assert!(buffers.outputs[0] == buffers.outputs[1], "both channels carry the same voice");
         heard.extend_from_slice(&buffers.outputs[0][..length]);
@@ -204,7 +210,7 @@ fn parameters_have_names_units_and_text() {
     let all = loaded.plugin.get_parameters().unwrap();
     // Behind them the framework hides one parameter for each MIDI controller of each channel.
     let ours: Vec<_> = all.iter().filter(|param| !param.name.starts_with("MIDI")).collect();
-    assert_eq!(ours.len(), 104, "{:?}", ours.iter().map(|param| &param.name).collect::<Vec<_>>());
+    assert_eq!(ours.len(), 106, "{:?}", ours.iter().map(|param| &param.name).collect::<Vec<_>>());
     for (name, text) in
         [("Full breath", "6.00"), ("A4", "440.0"), ("Reed coupled", "Coupled"), ("Tuning", "Tempered")]
     {
@@ -247,6 +253,23 @@ fn without_controllers_it_has_few_parameters_and_the_same_sound_and_state() {
     assert_eq!(full.plugin.save_state().unwrap(), saved);
     notes.plugin.load_state(&saved).unwrap();
     assert_eq!(notes.plugin.save_state().unwrap(), saved);
+}
+
+#[test]
+fn the_class_of_a_microphone_is_blown_by_wind_and_plays_like_the_others_without_it() {
+    let _turn = turn();
+    // "ChalumeauMicroph".
+    let mut blown = load_class(256, Some("4368616C756D6561754D6963726F7068"));
+    blown.plugin.start_processing().unwrap();
+    blown.input = [quiet(SECOND / 2), wind(SECOND)].concat();
+    let heard = play_on(&mut blown, 256, &[(0, on(60)), (SECOND / 4, off(60))], SECOND / 2);
+    let events = [(0, note_on(60)), (SECOND / 4, Event::NoteOff { note: SoundingNote(60) })];
+    assert!(heard == offline(&events, SECOND / 2), "off, what comes in is not heard");
+    let said = [(0, Word::Set("Microphone", 1.0)), (100, on(60))];
+    let heard = play_on(&mut blown, 256, &said, 3 * SECOND / 2);
+    let peak = |sound: &[f32]| sound.iter().fold(0.0_f32, |peak, x| peak.max(x.abs()));
+    let (before, after) = (peak(&heard[SECOND / 4..SECOND / 2]), peak(&heard[SECOND..]));
+    assert!(before < 1e-3 && after > 0.02, "{before} before the wind, {after} in it");
 }
 
 #[test]

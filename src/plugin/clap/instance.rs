@@ -5,6 +5,7 @@ use std::ffi::{CStr, c_char, c_void};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 
+use clap_sys::ext::audio_ports::CLAP_EXT_AUDIO_PORTS;
 use clap_sys::ext::gui::CLAP_EXT_GUI;
 use clap_sys::ext::note_name::CLAP_EXT_NOTE_NAME;
 use clap_sys::ext::note_ports::CLAP_EXT_NOTE_PORTS;
@@ -30,7 +31,9 @@ use nice_plug::wrapper::clap::Wrapper;
 use super::host::Host;
 use super::note_names::NoteNames;
 use super::out_events::OutEvents;
-use super::{Introduced, Introduction, indication, note_names, note_ports, params, presets, state};
+use super::{
+    Introduced, Introduction, audio_ports, indication, note_names, note_ports, params, presets, state,
+};
 use crate::parameters::{self, InUse, Parameter};
 use crate::plugin::host_link::HostCalls;
 use crate::plugin::params::BeyondChoice;
@@ -255,8 +258,15 @@ unsafe extern "C" fn process(
     let last = asked.frames_count.saturating_sub(1);
     // SAFETY: the host's list of events is valid for this call.
     let mut out = unsafe { OutEvents::new(asked.out_events, &this.entries, last) };
-    let asked = clap_process { out_events: out.as_host(), ..*asked };
-    // SAFETY: as above, and `out` outlives the call.
+    // SAFETY: `asked` is the host's for this call.
+    let input = unsafe { audio_ports::input(asked) };
+    let asked = clap_process {
+        out_events: out.as_host(),
+        audio_inputs: &raw const input,
+        audio_inputs_count: 1,
+        ..*asked
+    };
+    // SAFETY: as above, and `out` and `input` outlive the call.
     let status =
         this.inner.process.map_or(CLAP_PROCESS_ERROR, |process| unsafe { process(plugin, &raw const asked) });
     out.push_off(&this.introduced.params, last);
@@ -316,6 +326,8 @@ unsafe extern "C" fn get_extension(plugin: *const clap_plugin, id: *const c_char
         (&raw const presets::PRESET_LOAD).cast()
     } else if id == CLAP_EXT_TAIL {
         (&raw const TAIL).cast()
+    } else if id == CLAP_EXT_AUDIO_PORTS {
+        (&raw const audio_ports::AUDIO_PORTS).cast()
     } else if id == CLAP_EXT_NOTE_PORTS {
         (&raw const note_ports::NOTE_PORTS).cast()
     } else if id == CLAP_EXT_NOTE_NAME {

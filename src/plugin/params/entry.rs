@@ -45,15 +45,20 @@ pub(super) fn whole(id: &str) -> IntParam {
     if parameter.is_automatable { param } else { param.non_automatable() }
 }
 
-/// A switch of the table.
-pub(super) fn switch(id: &str) -> BoolParam {
+/// A switch of the table; `start` may replace its default.
+pub(super) fn switch_from(id: &str, start: impl FnOnce(bool) -> bool) -> BoolParam {
     let parameter = of(id);
     let Kind::Switch(switch) = parameter.kind else { wrong(id) };
     let Switch { default, .. } = switch;
-    let param = BoolParam::new(parameter.name, default)
+    let param = BoolParam::new(parameter.name, start(default))
         .with_value_to_string(Arc::new(move |on| switch.text(on).to_owned()))
         .with_string_to_value(Arc::new(move |text| switch.parse(text)));
     if parameter.is_automatable { param } else { param.non_automatable() }
+}
+
+/// A switch of the table.
+pub(super) fn switch(id: &str) -> BoolParam {
+    switch_from(id, |default| default)
 }
 
 /// A choice of the table. The framework takes texts and ids from the enum; a test holds them to the table.

@@ -1,6 +1,6 @@
 //! Controls of the moment: switches that act when they are switched on, and are no state.
 //!
-//! *Panic*, *Take over knob*, *Rest here* and *Blow hard here* are commands. Switching one on is remembered as a press until
+//! *Panic*, *Take over knob*, *Rest here*, *Blow hard here* and *Calibrate microphone* are commands. Switching one on is remembered as a press until
 //! the plugin carries it out; the switch itself is Off again at the end of the block. *Arm knob* and *Record take* stay on
 //! as long as a knob makes that possible, and are otherwise Off again at once, as a command is. So a host that saves what it
 //! reads and loads what it saved finds the same values.
@@ -30,11 +30,14 @@ pub enum Moment {
     Arm,
     /// *Record take*.
     Record,
+    /// *Calibrate microphone*.
+    Calibrate,
 }
 
 impl Moment {
     /// All of them.
-    pub const ALL: [Self; 6] = [Self::Panic, Self::TakeOver, Self::Rest, Self::Blow, Self::Arm, Self::Record];
+    pub const ALL: [Self; 7] =
+        [Self::Panic, Self::TakeOver, Self::Rest, Self::Blow, Self::Arm, Self::Record, Self::Calibrate];
 
     /// Its id in the table of parameters.
     pub const fn id(self) -> &'static str {
@@ -45,6 +48,7 @@ impl Moment {
             Self::Blow => "blow",
             Self::Arm => "arm",
             Self::Record => "rec",
+            Self::Calibrate => "miccal",
         }
     }
 
@@ -123,6 +127,7 @@ impl ChalumeauParams {
             Moment::Blow => &self.knob.blow,
             Moment::Arm => &self.knob.arm,
             Moment::Record => &self.knob.record,
+            Moment::Calibrate => &self.microphone.calibrate,
         }
     }
 }

@@ -8,6 +8,7 @@ use serde::{Serialize, de::DeserializeOwned};
 
 use super::instrument;
 use super::knob::SavedCalibration;
+use super::microphone::RoomFloor;
 use super::scale::SavedScale;
 use crate::controllers;
 use crate::editor::WindowState;
@@ -76,6 +77,10 @@ pub fn mend(state: &mut PluginState) {
     // A state from before scales has none.
     mend_field(state, "scale", SavedScale::mended);
     mend_field(state, "calibration", SavedCalibration::mended);
+    // A state from before microphones has 0, which no room is.
+    mend_field(state, "roomlevel", |floor: f32| {
+        if floor < 0.0 { RoomFloor::mended(floor) } else { RoomFloor::mended(f32::NAN) }
+    });
     mend_field(state, "window", WindowState::mended);
     // An older schema lacks what it lacks; a newer one is read as far as its ids are known here.
     state.fields.insert(SCHEMA_FIELD.to_owned(), SCHEMA.to_string());

@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use jack::{AsyncClient, AudioOut, Client, ClientOptions, Error, MidiIn, MidiOut};
+use jack::{AsyncClient, AudioIn, AudioOut, Client, ClientOptions, Error, MidiIn, MidiOut};
 
 use super::player::{JackNotices, JackPlayer, JackPlayerPorts, JackSigns};
 use crate::plugin::Chalumeau;
@@ -12,6 +12,8 @@ use crate::plugin::Chalumeau;
 /// The client's name, unless another program has it.
 const NAME: &str = "chalumeau";
 const OUTPUTS: [&str; 2] = ["output_1", "output_2"];
+/// The port of a microphone.
+pub const MICROPHONE: &str = "microphone";
 /// The port whose MIDI plays the plugin.
 pub const MIDI_INPUT: &str = "midi_input";
 /// The port that sends a knob's breath.
@@ -36,8 +38,8 @@ impl Connection {
             .map(|(own, number)| Self { own, other: format!("system:playback_{number}") })
     }
 
-    /// Whether it carries MIDI.
-    pub fn is_midi(&self) -> bool {
+    /// Whether the user has named it.
+    pub fn is_named(&self) -> bool {
         !OUTPUTS.contains(&self.own)
     }
 }
@@ -59,6 +61,7 @@ impl JackClient {
         let [left, right] = OUTPUTS;
         let ports = JackPlayerPorts {
             outputs: [register(left).map_err(reason)?, register(right).map_err(reason)?],
+            microphone: client.register_port(MICROPHONE, AudioIn::default()).map_err(reason)?,
             midi_input: client.register_port(MIDI_INPUT, MidiIn::default()).map_err(reason)?,
             midi_output: client.register_port(MIDI_OUTPUT, MidiOut::default()).map_err(reason)?,
         };
@@ -116,7 +119,7 @@ impl PlayingClient {
     pub fn connect(&self, connection: &Connection) -> bool {
         let client = self.client.as_client();
         let own = self.full_name(connection.own);
-        let (from, to) = if connection.own == MIDI_INPUT {
+        let (from, to) = if [MICROPHONE, MIDI_INPUT].contains(&connection.own) {
             (connection.other.as_str(), own.as_str())
         } else {
             (own.as_str(), connection.other.as_str())
@@ -128,7 +131,7 @@ impl PlayingClient {
     /// Everything that the ports are connected to.
     pub fn connections(&self) -> Vec<Connection> {
         let client = self.client.as_client();
-        let own = OUTPUTS.into_iter().chain([MIDI_INPUT, MIDI_OUTPUT]);
+        let own = OUTPUTS.into_iter().chain([MICROPHONE, MIDI_INPUT, MIDI_OUTPUT]);
         own.flat_map(|own| {
             let port = client.port_by_name(&self.full_name(own));
             let others = port.map(|port| port.get_connections()).unwrap_or_default();

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use nice_plug::context::PluginApi;
 use nice_plug::prelude::*;
 
-use super::client::{Connection, Health, JackClient, MIDI_INPUT, MIDI_OUTPUT, PlayingClient};
+use super::client::{Connection, Health, JackClient, MICROPHONE, MIDI_INPUT, MIDI_OUTPUT, PlayingClient};
 use crate::plugin::Chalumeau;
 
 /// How often the link looks at the server.
@@ -33,6 +33,8 @@ static OFFERED: Mutex<Option<(JackClient, JackPorts)>> = Mutex::new(None);
 /// Ports of other programs that the user wants to be connected.
 #[derive(Clone, Debug, Default)]
 pub struct JackPorts {
+    /// Wind there blows.
+    pub microphone: Option<String>,
     /// Its MIDI plays the plugin.
     pub midi_input: Option<String>,
     /// It receives a knob's breath.
@@ -41,9 +43,10 @@ pub struct JackPorts {
 
 impl JackPorts {
     fn connections(self) -> Vec<Connection> {
-        let midi = [(MIDI_INPUT, self.midi_input), (MIDI_OUTPUT, self.midi_output)];
-        let midi = midi.into_iter().filter_map(|(own, other)| Some(Connection { own, other: other? }));
-        Connection::to_sound_card().chain(midi).collect()
+        let named =
+            [(MICROPHONE, self.microphone), (MIDI_INPUT, self.midi_input), (MIDI_OUTPUT, self.midi_output)];
+        let named = named.into_iter().filter_map(|(own, other)| Some(Connection { own, other: other? }));
+        Connection::to_sound_card().chain(named).collect()
     }
 }
 
@@ -170,7 +173,7 @@ impl LinkThread {
                 self.say(BACK);
             }
             // A server without a sound card lacks the others, which is no mistake of the user.
-            for Connection { other, .. } in self.pending.iter().filter(|connection| connection.is_midi()) {
+            for Connection { other, .. } in self.pending.iter().filter(|connection| connection.is_named()) {
                 eprintln!(
                     "chalumeau-standalone: JACK has no port {other:?} yet; `jack_lsp` lists what it has"
                 );

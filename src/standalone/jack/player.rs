@@ -3,7 +3,9 @@
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
 
-use jack::{AudioOut, Client, ClientStatus, Control, MidiIn, MidiIter, MidiOut, Port, ProcessScope, RawMidi};
+use jack::{
+    AudioIn, AudioOut, Client, ClientStatus, Control, MidiIn, MidiIter, MidiOut, Port, ProcessScope, RawMidi,
+};
 use nice_plug::context::PluginApi;
 use nice_plug::context::process::SendEventError;
 use nice_plug::midi::MidiResult;
@@ -26,6 +28,7 @@ pub struct JackSigns {
 /// The ports of the plugin.
 pub struct JackPlayerPorts {
     pub outputs: [Port<AudioOut>; 2],
+    pub microphone: Port<AudioIn>,
     pub midi_input: Port<MidiIn>,
     pub midi_output: Port<MidiOut>,
 }
@@ -51,7 +54,7 @@ impl JackPlayer {
     }
 
     fn play(&mut self, scope: &ProcessScope) {
-        let JackPlayerPorts { outputs, midi_input, midi_output } = &mut self.ports;
+        let JackPlayerPorts { outputs, microphone, midi_input, midi_output } = &mut self.ports;
         let mut channels = outputs.each_mut().map(|port| port.as_mut_slice(scope));
         self.sent.clear();
         let mut context = CycleContext {
@@ -62,7 +65,10 @@ impl JackPlayer {
         };
         // The link thread holds the lock while it starts the plugin.
         let status = match self.plugin.try_lock() {
-            Ok(mut plugin) => plugin.play::<Chalumeau>(&mut channels, &mut context),
+            Ok(mut plugin) => {
+                plugin.hear(&[microphone.as_slice(scope)]);
+                plugin.play::<Chalumeau>(&mut channels, &mut context)
+            }
             Err(_) => ProcessStatus::Error("not started"),
         };
         if matches!(status, ProcessStatus::Error(_)) {

@@ -8,8 +8,15 @@ pub fn plugin() -> Plugin {
 
 /// Switches that act when they are switched on, and are Off again.
 #[allow(dead_code)] // each user takes what it needs
-pub const MOMENTS: [&str; 6] =
-    ["Panic", "Take over knob", "Rest here", "Blow hard here", "Arm knob", "Record take"];
+pub const MOMENTS: [&str; 7] = [
+    "Panic",
+    "Take over knob",
+    "Rest here",
+    "Blow hard here",
+    "Arm knob",
+    "Record take",
+    "Calibrate microphone",
+];
 
 /// All parameters but those that only say something.
 #[allow(dead_code)]
