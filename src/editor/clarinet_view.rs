@@ -17,6 +17,7 @@ use crate::editor::alteration_editor::{AlterationEditor, Altered};
 use crate::editor::chart;
 use crate::editor::clarinet_drawing::{ClarinetDrawing, part_names, ruler, standing};
 use crate::editor::hole_names::{hole_title, hole_words};
+use crate::editor::multiphonic_choices;
 use crate::editor::note_names::{NoteNames, note_name};
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
@@ -179,12 +180,18 @@ impl ClarinetView {
         };
         let name = |choice: &FingeringChoice| {
             let note = names.of_written(choice.written, snapshot.instrument.transposition);
+            if choice.register == multiphonic_choices::REGISTER {
+                return format!("M{}", choice.nth + 1);
+            }
             format!("{}{}", note.map_or_else(String::new, note_name), "'".repeat(choice.nth))
         };
         if self.alterations.is_open() {
             self.alterations.line(ui, snapshot, actions);
         } else {
             let told = match shown.map(|index| &all[index]) {
+                Some(choice) if choice.register == multiphonic_choices::REGISTER => {
+                    multiphonic_choices::about(choice, names, snapshot.instrument.transposition)
+                }
                 Some(choice) => {
                     let fingers =
                         if choice.fingers.trim().is_empty() { "no finger" } else { &choice.fingers };
@@ -206,10 +213,11 @@ impl ClarinetView {
             ui.spacing_mut().item_spacing = vec2(3.0, 3.0);
             ui.spacing_mut().interact_size.y = line;
             // The longest register on one line.
+            let registers = || REGISTERS.into_iter().chain([multiphonic_choices::REGISTER]);
             let of = |register: &str| all.iter().filter(|choice| choice.register == register).count();
-            let longest = REGISTERS.iter().map(|register| of(register)).max().unwrap_or(1).max(1);
+            let longest = registers().map(of).max().unwrap_or(1).max(1);
             let width = (ui.available_width() - 76.0) / longest as f32 - 3.0;
-            for register in REGISTERS.into_iter().filter(|register| of(register) > 0) {
+            for register in registers().filter(|register| of(register) > 0) {
                 ui.horizontal_wrapped(|ui| {
                     let (rect, _) = ui.allocate_exact_size(vec2(66.0, line), Sense::hover());
                     let at = rect.left_center();
@@ -225,7 +233,11 @@ impl ClarinetView {
                             WidgetInfo::selected(Role::RadioButton, true, is_here, label)
                         });
                         let alternate = if choice.nth > 0 { " (alternate, not tuned)" } else { "" };
-                        let told = format!("{name}{alternate}: {}", choice.fingers);
+                        let told = if register == multiphonic_choices::REGISTER {
+                            multiphonic_choices::about(choice, names, snapshot.instrument.transposition)
+                        } else {
+                            format!("{name}{alternate}: {}", choice.fingers)
+                        };
                         if response.on_hover_text(told).clicked() {
                             self.tried = Some(choice.open.clone());
                             actions.push(Action::TryFingering(choice.open.clone()));
@@ -273,7 +285,9 @@ impl ClarinetView {
         match &self.known {
             Some((of, choices)) if Arc::ptr_eq(of, file) || of == file => choices.clone(),
             _ => {
-                let choices = Arc::new(alternate_fingerings::fingering_choices(file));
+                let mut choices = alternate_fingerings::fingering_choices(file);
+                choices.extend(multiphonic_choices::choices(file));
+                let choices = Arc::new(choices);
                 self.known = Some((file.clone(), choices.clone()));
                 choices
             }
