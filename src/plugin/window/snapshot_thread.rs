@@ -41,6 +41,8 @@ const IDLE: Duration = Duration::from_millis(220);
 const DEVICES_EVERY: Duration = Duration::from_secs(2);
 /// Length of sound whose level is shown, s: some periods of the lowest note.
 const LEVEL_S: f64 = 0.05;
+/// Time for which a message lights the lamp.
+const MIDI_LIT: Duration = Duration::from_millis(150);
 /// Less mouth pressure than this counts as none, kPa.
 const NO_BREATH_KPA: f32 = 1e-3;
 
@@ -55,6 +57,8 @@ pub struct SnapshotThread {
     /// The values that a snapshot shows where nothing is known. Kept, because making them parses an instrument file.
     blank: Snapshot,
     history: BreathHistory,
+    /// How many messages had arrived, and when there was a new one.
+    midi: (u32, Option<Instant>),
     files: FilesRead,
     analysis: Option<InstrumentAnalysis>,
     /// The devices found, and when.
@@ -80,6 +84,7 @@ impl SnapshotThread {
             listener: None,
             blank: Snapshot::default(),
             history: BreathHistory::new(),
+            midi: (0, None),
             files: FilesRead::default(),
             analysis: None,
             #[cfg(feature = "devices")]
@@ -117,6 +122,8 @@ impl SnapshotThread {
         show_inside(&mut snapshot, &inside);
         self.show_instrument(&mut snapshot, inside.now.fingering);
         snapshot.heard = self.analyse_sound(inside.host_rate_hz, inside.now.sounding, &settings);
+        snapshot.output_peak = f32::from_bits(self.shared.output_peak.swap(0, Ordering::Relaxed));
+        snapshot.hears_midi = self.hears_midi(inside.breath_sources.messages());
         let level_db = self.level_db(inside.host_rate_hz);
         self.history.extend(inside.now.mouth_kpa, level_db, snapshot.heard.f0_hz);
         snapshot.history = self.history.track();
@@ -125,7 +132,9 @@ impl SnapshotThread {
         snapshot.status = self.status(current.as_ref(), &inside.breath_sources);
         *self.shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(snapshot);
         self.shared.draw_again();
-        let is_moving = inside.now.mouth_kpa > NO_BREATH_KPA || inside.now.sounding.is_some();
+        let is_moving = inside.now.mouth_kpa > NO_BREATH_KPA
+            || inside.now.sounding.is_some()
+            || self.midi.1.is_some_and(|at| at.elapsed() < MIDI_LIT);
         if is_moving { MOVING } else { IDLE }
     }
 
@@ -170,6 +179,14 @@ impl SnapshotThread {
             let found = device_list::list(&RuntimeDir::default(), kind, status, &mut self.has_midi);
             self.devices = (found, Some(Instant::now()));
         }
+    }
+
+    /// Whether messages have arrived just now, of which there have been so many.
+    fn hears_midi(&mut self, messages: u32) -> bool {
+        if std::mem::replace(&mut self.midi.0, messages) != messages {
+            self.midi.1 = Some(Instant::now());
+        }
+        self.midi.1.is_some_and(|at| at.elapsed() < MIDI_LIT)
     }
 
     fn receive_sound(&mut self) {
