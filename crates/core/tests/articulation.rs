@@ -251,6 +251,7 @@ fn all() -> Articulation {
         fall_s: 0.2,
         breath_in: 1.0,
         key_sounds: 1.0,
+        slap: 0.6,
     }
 }
 

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::SharedWindow;
@@ -61,6 +62,8 @@ pub struct SnapshotThread {
     midi: (u32, Option<Instant>),
     files: FilesRead,
     analysis: Option<InstrumentAnalysis>,
+    /// A thread that analyses a new instrument meanwhile.
+    analysing: Option<JoinHandle<InstrumentAnalysis>>,
     /// The devices found, and when.
     #[cfg(feature = "devices")]
     devices: (Vec<KnobDevice>, Option<Instant>),
@@ -87,6 +90,7 @@ impl SnapshotThread {
             midi: (0, None),
             files: FilesRead::default(),
             analysis: None,
+            analysing: None,
             #[cfg(feature = "devices")]
             devices: (Vec::new(), None),
             #[cfg(feature = "devices")]
@@ -99,6 +103,10 @@ impl SnapshotThread {
             let began = Instant::now();
             let every = if self.shared.is_open.load(Ordering::Relaxed) { self.publish() } else { IDLE };
             std::thread::park_timeout(every.saturating_sub(began.elapsed()));
+        }
+        // No thread may outlive the plugin's library.
+        if let Some(analysing) = self.analysing.take() {
+            let _ = analysing.join();
         }
     }
 
@@ -120,7 +128,7 @@ impl SnapshotThread {
         snapshot.chosen = Some(self.handles.params.instrument.choice.value() as usize);
         self.files.show(&mut snapshot);
         show_inside(&mut snapshot, &inside);
-        self.show_instrument(&mut snapshot, inside.now.fingering);
+        self.show_instrument(&mut snapshot, current.as_ref(), inside.now.fingering);
         snapshot.heard = self.analyse_sound(inside.host_rate_hz, inside.now.sounding, &settings);
         snapshot.output_peak = f32::from_bits(self.shared.output_peak.swap(0, Ordering::Relaxed));
         snapshot.hears_midi = self.hears_midi(inside.breath_sources.messages());
@@ -139,10 +147,18 @@ impl SnapshotThread {
     }
 
     /// Fills in the fingering, and what the analysis says of it.
-    fn show_instrument(&mut self, snapshot: &mut Snapshot, fingering: usize) {
+    fn show_instrument(
+        &mut self,
+        snapshot: &mut Snapshot,
+        current: Option<&CurrentInstrument>,
+        fingering: usize,
+    ) {
         let design = self.feel_design();
-        let Some(analysis) = &mut self.analysis else { return };
-        let file = analysis.file().clone();
+        let analysed = self.analysis.as_ref().map(|analysis| analysis.file().clone());
+        let Some(file) = analysed.or_else(|| current.map(|current| Arc::new(current.model.file.clone())))
+        else {
+            return;
+        };
         let fingering = fingering.min(file.fingerings.len().saturating_sub(1));
         let open = self
             .shared
@@ -151,11 +167,12 @@ impl SnapshotThread {
             .unwrap_or_else(|| file.fingerings[fingering].open.clone());
         snapshot.fingering = fingering;
         snapshot.openings = open.iter().map(|&open| f32::from(u8::from(open))).collect();
+        snapshot.instrument = file;
+        let Some(analysis) = &mut self.analysis else { return };
         snapshot.requirement = analysis.requirement(fingering, &snapshot.played());
         snapshot.feel = analysis.feel(fingering, &snapshot.settings, &design);
         snapshot.standing = analysis.standing_wave(fingering, &open);
         snapshot.as_built = analysis.as_built().clone();
-        snapshot.instrument = file;
     }
 
     /// Fills in the knob and the list of devices.
@@ -198,12 +215,18 @@ impl SnapshotThread {
         }
     }
 
-    /// Analyses a new instrument (about 1 s); the old view stays until then.
+    /// Analyses a new instrument (about 1 s) on a thread of its own: a window that has just been opened shows from its first
+    /// moment what is played. The old view stays until then.
     fn analyse(&mut self, current: Option<&CurrentInstrument>) {
+        if let Some(done) = self.analysing.take_if(|analysing| analysing.is_finished()) {
+            self.analysis = done.join().ok().or_else(|| self.analysis.take());
+        }
         let Some(current) = current else { return };
         let is_known = self.analysis.as_ref().is_some_and(|analysis| analysis.is_of(current));
-        if current.readiness > Readiness::Rough && !is_known {
-            self.analysis = Some(InstrumentAnalysis::new(current));
+        if current.readiness > Readiness::Rough && !is_known && self.analysing.is_none() {
+            let current = current.clone();
+            let analysing = std::thread::Builder::new().name("InstrumentAnalysis".to_owned());
+            self.analysing = analysing.spawn(move || InstrumentAnalysis::new(&current)).ok();
         }
     }
 
