@@ -19,7 +19,7 @@ const HOLD_S: f64 = 1.5;
 const NO_BREATH_KPA: f32 = 0.01;
 
 /// The highest output of the last moments, and when it was.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy)]
 struct Held {
     db: f32,
     at_s: f64,
@@ -74,7 +74,7 @@ fn meter(ui: &mut Ui, peak: f32, width: f32) {
     let db = 20.0 * peak.max(1e-6).log10();
     let now_s = ui.input(|input| input.time);
     let held = ui.data_mut(|data| {
-        let held = data.get_temp_mut_or_default::<Held>(response.id);
+        let held = data.get_temp_mut_or_insert_with(response.id, || Held { db: FLOOR_DB, at_s: now_s });
         if db >= held.db || now_s - held.at_s > HOLD_S {
             *held = Held { db, at_s: now_s };
         }
