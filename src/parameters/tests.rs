@@ -284,7 +284,7 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         tract: Tract { amount: _, interval_semitones: _ },
         players: Players { count: _, split: _, spread_cents: _, width: _ },
     } = d;
-    assert_eq!(fields, 61);
+    assert_eq!(fields, 62);
 }
 
 #[test]
