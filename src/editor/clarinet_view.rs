@@ -54,7 +54,7 @@ impl ClarinetView {
             self.end_try(actions);
         }
         let height = ui.available_height();
-        let picker = (0.36 * height).clamp(120.0, 156.0);
+        let picker = (0.36 * height).clamp(120.0, 184.0);
         ui.spacing_mut().item_spacing.y = GAP;
         panel(c).show(ui, |ui| {
             ui.set_width(ui.available_width());
@@ -208,8 +208,8 @@ impl ClarinetView {
             self.fingering_line(ui, told, snapshot, actions);
         }
         egui::ScrollArea::vertical().id_salt("picker").auto_shrink([false, false]).show(ui, |ui| {
-            // Four registers in the least window.
-            let line = ((ui.available_height() - 8.0) / 4.0 - 3.0).clamp(19.0, 24.0);
+            // Four registers in the least window, and multiphonics below them where there is more room.
+            let line = ((ui.available_height() - 8.0) / 5.0 - 3.0).clamp(19.0, 24.0);
             ui.spacing_mut().item_spacing = vec2(3.0, 3.0);
             ui.spacing_mut().interact_size.y = line;
             // The longest register on one line.
