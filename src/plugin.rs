@@ -6,7 +6,7 @@
 //! exception: when the user chooses another instrument during live playing, it comes as soon as it is ready.
 //!
 //! - `host_inputs`: what is remembered of the host's events; `translate_events`: what they mean; `breath_sources` and
-//!   `reed_controllers`: where breath and reed changes come from
+//!   `reed_controllers`, `part_reeds`: where breath and reed changes come from
 //! - `instrument_loading`: loads and exchanges instruments
 //! - `knob`: the force-feedback knob (feature `devices`)
 //! - `params`: what hosts automate and projects save
@@ -28,6 +28,7 @@ pub mod launch_options;
 mod microphone;
 pub mod mts_esp;
 mod params;
+mod part_reeds;
 mod preset_keeper;
 mod reed_controllers;
 mod translate_events;
@@ -260,7 +261,8 @@ impl Chalumeau {
         self.inputs.set_links(&self.params.links.links(&own));
         // Where a linked controller has spoken last, its value counts.
         let settings = self.inputs.linked(own);
-        if settings != self.settings {
+        let has_changed = settings != self.settings;
+        if has_changed {
             instrument.set_settings(&settings);
             if settings.players != self.settings.players {
                 context.set_current_voice_capacity(settings.players.parts() as u32);
@@ -280,6 +282,9 @@ impl Chalumeau {
         }
         let inputs = &mut self.inputs;
         inputs.begin_block(settings.players.parts());
+        if has_changed {
+            inputs.say_links();
+        }
         if self.params.moments.take(Moment::Panic) {
             inputs.silence();
         }
@@ -351,6 +356,9 @@ impl Chalumeau {
         }
         if let Some(right) = others.first_mut() {
             instrument.pan(left, right);
+        }
+        if let Some((_, window)) = &self.window {
+            window.send_output([left, others.first().map_or(&*left, |right| right)]);
         }
         let is_watched = self.window.as_ref().is_some_and(|(_, window)| window.is_open());
         rest_status(&self.params, instrument, is_watched)

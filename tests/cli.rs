@@ -671,3 +671,77 @@ fn several_players_play_a_chord_and_one_its_last_key() {
     assert!(unison[2] > unison[0].max(unison[1]) + 20.0, "all play the last key: {unison:?}");
     refused(&d, "render chord.mid --players 3 --probe p.csv --out x.wav", &["--players"]);
 }
+
+/// Two tracks of a note each, 58 and 65, on one channel; the second is panned to the right.
+fn two_tracks() -> Vec<u8> {
+    let track = |key: u8, first: &[u8]| {
+        let mut track = first.to_vec();
+        track.extend([0, 0x90, key, 90, 0x87, 0x40, 0x80, key, 0, 0, 0xff, 0x2f, 0]);
+        [b"MTrk", &(track.len() as u32).to_be_bytes()[..], &track].concat()
+    };
+    let header = b"MThd\0\0\0\x06\0\x01\0\x02\x01\xe0";
+    [&header[..], &track(58, &[]), &track(65, &[0, 0xb0, 10, 127])].concat()
+}
+
+#[test]
+fn each_track_has_a_player_and_a_seat() {
+    let d = tempfile::tempdir().unwrap();
+    fs::write(d.path().join("duet.mid"), two_tracks()).unwrap();
+    fs::write(d.path().join("chord.mid"), chord([58, 62, 65])).unwrap();
+    // Energy at the fundamentals of both keys in each channel.
+    let heard = |flags: &str| {
+        succeeds(d.path(), &format!("render duet.mid --rate 48000 --force --no-noise --out d.wav {flags}"));
+        let wav = hound::WavReader::open(d.path().join("d.wav")).unwrap();
+        assert_eq!(wav.spec().channels, 2);
+        let both: Vec<f64> = wav.into_samples::<f32>().map(|sample| f64::from(sample.unwrap())).collect();
+        [0, 1].map(|side| {
+            let sound: Vec<f64> = both.iter().skip(side).step_by(2).copied().collect();
+            [58_u8, 65].map(|key| {
+                let turn = std::f64::consts::TAU * 440.0 * ((f64::from(key) - 69.0) / 12.0).exp2() / 48_000.0;
+                let [mut re, mut im] = [0.0; 2];
+                for (n, x) in sound[19_200..43_200].iter().enumerate() {
+                    let (sin, cos) = (turn * n as f64).sin_cos();
+                    (re, im) = (re + x * cos, im + x * sin);
+                }
+                10.0 * (re * re + im * im + 1e-9).log10()
+            })
+        })
+    };
+    let [left, right] = heard("--tracks --spread 0 --set life=0 --set seats=0");
+    assert!((left[0] - right[0]).abs() < 0.5, "the first track in the middle: {left:?} {right:?}");
+    assert!(right[1] > left[1] + 20.0, "the second where its pan is: {left:?} {right:?}");
+    let [_, seated] = heard("--tracks --spread 0 --set life=0 --set seats=70");
+    assert!(seated[1] > 20.0 && (seated[0] - right[0]).abs() < 0.5);
+    refused(&d, "render duet.mid --tracks --players 2 --out x.wav", &["--tracks", "players"]);
+    refused(&d, "render --written C4 --tracks --out x.wav", &["--tracks needs a MIDI file"]);
+    succeeds(d.path(), "render chord.mid --tracks --out one.wav");
+}
+
+#[test]
+fn a_trim_moves_its_note_alone() {
+    let d = tempfile::tempdir().unwrap();
+    let hz = |note: &str, flags: &str| {
+        let line =
+            format!("render --written {note} --gamma 0.5 --no-noise --tempered --seconds 1 --rate 48000");
+        succeeds(d.path(), &format!("{line} --force --out t.wav {flags}"));
+        let wav = hound::WavReader::open(d.path().join("t.wav")).unwrap();
+        let sound: Vec<f64> = wav.into_samples::<f32>().map(|sample| f64::from(sample.unwrap())).collect();
+        let near = chalumeau_core::units::SoundingNote(58).frequency_hz(440.0);
+        let near = if note == "C4" { near } else { near * 2.0_f64.powf(1.0 / 6.0) };
+        chalumeau_core::analysis::pitch::refine_hz(&sound[19_200..], 48_000.0, near).unwrap()
+    };
+    let cents = |note: &str, flags: &str| 1_200.0 * (hz(note, flags) / hz(note, "")).log2();
+    let moved = cents("C4", "--trim C4=-12.5,E4=3");
+    assert!((moved + 12.5).abs() < 0.5, "{moved}");
+    let beside = cents("D4", "--trim C4=-12.5");
+    assert!(beside.abs() < 0.05, "{beside}");
+    for (trim, says) in [
+        ("C4", "E4=-12"),
+        ("H4=3", "MIDI number"),
+        ("C4=80", "-50..50"),
+        ("C2=1", "no fingering"),
+        ("C4=1,C4=2", "two values"),
+    ] {
+        refused(&d, &format!("render --written C4 --out x.wav --trim {trim}"), &[says]);
+    }
+}

@@ -30,6 +30,8 @@ Examples:
       Waveform, spectrogram, pitch against the score, breath, and the reed in close-up.
   chalumeau render chorale.mid --players 4 --out chorale.wav
       Keys that are held together are played by different players; with --unison all play every note.
+  chalumeau render quintet.mid --tracks --room 0.3 --out quintet.wav
+      A player and a seat for each track.
   chalumeau render melody.mid --replay take.csv --out again.wav
   chalumeau render melody.mid --crescendo 0.4:0.9 --bits 16 --rate 44100 --out loud.wav";
 
@@ -122,7 +124,8 @@ impl RenderCommand {
         });
         self.refuse_same_file()?;
         if several && (self.probe.is_some() || self.plot.wanted()) {
-            let inside = "--probe and --plot look inside one instrument; leave them or --players out";
+            let inside =
+                "--probe and --plot look inside one instrument; leave them out, or --players and --tracks";
             return Err(Failure::Usage(inside.to_owned()));
         }
         let mut out = NewFile::create(&self.out, self.force)?;

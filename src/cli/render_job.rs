@@ -87,7 +87,7 @@ impl RenderJob {
         if self.has_several_players() {
             return self.play(channels, None, each);
         }
-        let in_room = || StereoBlocks::new(&self.score, self.rate).in_room(&self.settings.room);
+        let in_room = || StereoBlocks::new(&self.score, self.rate).in_room(&self.settings);
         let mut stereo = (channels == 2).then(in_room);
         let clarinet = PlayedBeside::new(self.clarinet());
         let is_stereo = stereo.is_some();
@@ -123,7 +123,7 @@ impl RenderJob {
         // One channel is the instrument itself; pan (CC10) places it between two.
         let unpanned = several.then(|| without_pan(&self.score));
         let score_of_room = unpanned.as_ref().unwrap_or(&self.score);
-        let in_room = || StereoBlocks::new(score_of_room, self.rate).in_room(&self.settings.room);
+        let in_room = || StereoBlocks::new(score_of_room, self.rate).in_room(&self.settings);
         let stereo = (channels == 2).then(in_room);
         if several {
             let mut ensemble = self.ensemble();

@@ -5,7 +5,7 @@ use crate::cli::controllers::named_or_file;
 use crate::cli::feel_args::FeelArgs;
 use crate::cli::render_job::RenderJob;
 use crate::cli::settings::SettingsArgs;
-use crate::cli::shared_args::{PlayedArgs, check_fingering, note, within};
+use crate::cli::shared_args::{PlayedArgs, check_fingering, note, sounding, within};
 use crate::controllers::{ControllerMap, as_links};
 use crate::presets::{self, Preset};
 use crate::scale_file;
@@ -16,7 +16,7 @@ use chalumeau_core::control::midi::links::{Link, MOST};
 use chalumeau_core::control::parts::Parts;
 use chalumeau_core::event::{Event, PartEvent, Timed};
 use chalumeau_core::haptics::FeelDesign;
-use chalumeau_core::instrument::{Model, Reach, Settings};
+use chalumeau_core::instrument::{Model, Players, Reach, Settings, Split};
 use chalumeau_core::score::Score;
 use chalumeau_core::score::breath::BreathCurve;
 use chalumeau_core::score::breath::GAMMA_MAX;
@@ -26,7 +26,7 @@ use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, BreathMappin
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::touch::take::Take;
 use clap::{ArgGroup, Args};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -67,6 +67,10 @@ pub struct ScoreArgs {
     /// The file is MPE: channel 1 is the manager, the other channels bend by 48 semitones
     #[arg(long, requires = "midi")]
     mpe: bool,
+    /// Each track with notes has a player and a seat of its own; in a file of one such track, each channel. Seats and their
+    /// width are those of several players, and pan (CC10) of a track moves its player
+    #[arg(long, requires = "midi")]
+    tracks: bool,
     /// Controllers of the file that move parameters: a device, see `chalumeau controllers list`, or a TOML file of links, as
     /// the window copies them
     #[arg(long, value_name = "DEVICE|FILE", requires = "midi", value_parser = named_or_file)]
@@ -120,6 +124,9 @@ pub struct ScoreArgs {
     /// Which key plays which degree of the scale, and at what pitch: a Scala keyboard mapping. --a4 moves all of it
     #[arg(long, value_name = "FILE", requires = "scl")]
     kbm: Option<PathBuf>,
+    /// Move single written notes, cents, -50..50: for example E4=-12 or E4=-12,F#4=3.5. May be repeated
+    #[arg(long, value_name = "NOTE=CENTS", value_delimiter = ',', value_parser = trim)]
+    trim: Vec<(u8, f64)>,
     #[command(flatten)]
     pub instrument: PlayedArgs,
     #[command(flatten)]
@@ -135,6 +142,12 @@ pub struct ScoreArgs {
 fn interval(text: &str) -> Result<(u8, u8), String> {
     let (from, to) = text.split_once(':').ok_or("must be two notes, for example E3:C6 or 52:84")?;
     Ok((note(from)?, note(to)?))
+}
+
+/// A written note and its trim, cents.
+fn trim(text: &str) -> Result<(u8, f64), String> {
+    let (name, cents) = text.split_once('=').ok_or("must be a note and its cents, for example E4=-12")?;
+    Ok((note(name)?, within(cents, -50.0, 50.0)?))
 }
 
 /// Finds a preset.
@@ -158,13 +171,19 @@ impl ScoreArgs {
             (None, None) => self.settings.played(&file)?,
         };
         map.values.iter().for_each(|(parameter, value)| parameter.set(&mut settings, *value));
-        let mut parts = self.score(&file, &as_links(&map.links, &settings), settings.players.parts())?;
+        let trims = self.trims(&file)?;
+        let mut parts = self.score(&file, &as_links(&map.links, &settings), &mut settings.players)?;
         if let Some(curve) = &curve {
             parts = parts.blown(curve, &settings, self.rate);
         }
         let mut model = self.instrument.model(file, self.rate, settings.a4_hz)?;
         if let Some(scl) = &self.scl {
             Arc::make_mut(&mut model).keys = scale_file::read(scl, self.kbm.as_deref())?;
+        }
+        if !trims.is_empty() {
+            let cents = |note: SoundingNote| trims.get(&note.0).copied().unwrap_or(0.0);
+            let keys = model.keys.trimmed(cents);
+            Arc::make_mut(&mut model).keys = keys;
         }
         let warnings = silent_notes(&parts.events, &model, settings.reach);
         if let Some(take) = &self.replay {
@@ -175,6 +194,18 @@ impl ScoreArgs {
         let usual = if one_note { 0.0 } else { 1.0 } + settings.articulation.tail_s();
         let parts = parts.with_tail(self.tail.unwrap_or(usual), self.rate);
         Ok(RenderJob { model, settings, score: (&parts).into(), parts, rate: self.rate, warnings })
+    }
+
+    /// The trim of each note by its sounding pitch, cents.
+    fn trims(&self, file: &InstrumentFile) -> Result<BTreeMap<u8, f64>, Failure> {
+        let mut trims = BTreeMap::new();
+        for &(written, cents) in &self.trim {
+            let note = sounding(file, WrittenNote(written))?;
+            if trims.insert(note.0, cents).is_some() {
+                return Err(Failure::Usage(format!("--trim has two values for {}", WrittenNote(written))));
+            }
+        }
+        Ok(trims)
     }
 
     /// The instrument and the player's settings, with nothing to play.
@@ -257,9 +288,18 @@ impl ScoreArgs {
         &self,
         file: &InstrumentFile,
         links: &[Option<Link>; MOST],
-        parts: usize,
+        players: &mut Players,
     ) -> Result<Score<PartEvent>, Failure> {
         let transposition = file.transposition;
+        if self.tracks && (self.midi.is_none() || matches!(self.given, Some(Given::Notes(_)))) {
+            return Err(Failure::Usage(
+                "--tracks needs a MIDI file, each track of which has a player".to_owned(),
+            ));
+        }
+        if self.tracks && self.settings.players_given() {
+            let usage = "--tracks gives each track a player of its own; leave it out, or the number and split of players";
+            return Err(Failure::Usage(usage.to_owned()));
+        }
         if let Some(path) = &self.midi {
             let bytes = match &self.given {
                 Some(Given::Notes(notes)) => return Ok((&score_of(notes, self.rate)).into()),
@@ -274,9 +314,14 @@ impl ScoreArgs {
                 decoder.set_wheel(preset.wheel());
                 decoder.set_breath_from(preset.breath_from());
             }
-            let score = midi_file::read_parts(Parts::of(decoder, parts), &bytes, self.rate)
-                .map_err(|source| Failure::MidiFile { path: path.clone(), source })?;
-            return Ok(score);
+            let refused = |source| Failure::MidiFile { path: path.clone(), source };
+            if self.tracks {
+                let (score, count) = midi_file::read_tracks(&decoder, &bytes, self.rate).map_err(refused)?;
+                *players = Players { count: count as i32, split: Split::Chords, ..*players };
+                return Ok(score);
+            }
+            let parts = Parts::of(decoder, players.parts());
+            return midi_file::read_parts(parts, &bytes, self.rate).map_err(refused);
         }
         if let Some((from, to)) = self.scale {
             let (from, to) = (WrittenNote(from), WrittenNote(to));

@@ -231,6 +231,11 @@ impl SettingsArgs {
         self.has("noise")
     }
 
+    /// Whether the user has chosen how many players play, or what they do with the notes.
+    pub fn players_given(&self) -> bool {
+        self.players.is_some() || self.unison || self.has("player") || self.has("split")
+    }
+
     /// The response to breath that the user has chosen, and as what it was typed.
     fn response(&self) -> Result<Option<(BreathResponse, String)>, Failure> {
         let given = self.given()?.into_iter().find(|given| given.parameter.id == "resp");
@@ -427,7 +432,7 @@ mod tests {
             assert_eq!(read(&["--set", &format!("{}={text}{}", parameter.id, number.unit)]), Ok(by_flag));
             given += 1;
         }
-        assert_eq!(given, 50, "all numbers of the settings have a flag");
+        assert_eq!(given, 51, "all numbers of the settings have a flag");
         assert_eq!(read(&["--set", "tune=tempered"]), read(&["--tempered"]));
         assert_eq!(read(&["--set", "tune=natural"]), read(&["--natural"]));
         assert_eq!(read(&["--set", "resp=physical"]), Ok(Settings::physical()));

@@ -93,7 +93,8 @@ impl BreathView {
         heading(ui, "Articulation");
         choice(ui, hands, "attack");
         for id in [
-            "tongue", "legato", "gliss", "scoop", "scoops", "fall", "falls", "noise", "bin", "ksound", "life",
+            "tongue", "legato", "gliss", "scoop", "scoops", "fall", "falls", "slap", "noise", "bin",
+            "ksound", "life",
         ] {
             slider(ui, hands, id);
         }

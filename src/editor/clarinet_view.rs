@@ -17,6 +17,7 @@ use crate::editor::alteration_editor::{AlterationEditor, Altered};
 use crate::editor::chart;
 use crate::editor::clarinet_drawing::{ClarinetDrawing, part_names, ruler, standing};
 use crate::editor::hole_names::{hole_title, hole_words};
+use crate::editor::multiphonic_choices;
 use crate::editor::note_names::{NoteNames, note_name};
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
@@ -53,7 +54,7 @@ impl ClarinetView {
             self.end_try(actions);
         }
         let height = ui.available_height();
-        let picker = (0.36 * height).clamp(120.0, 156.0);
+        let picker = (0.36 * height).clamp(120.0, 184.0);
         ui.spacing_mut().item_spacing.y = GAP;
         panel(c).show(ui, |ui| {
             ui.set_width(ui.available_width());
@@ -179,12 +180,18 @@ impl ClarinetView {
         };
         let name = |choice: &FingeringChoice| {
             let note = names.of_written(choice.written, snapshot.instrument.transposition);
+            if choice.register == multiphonic_choices::REGISTER {
+                return format!("M{}", choice.nth + 1);
+            }
             format!("{}{}", note.map_or_else(String::new, note_name), "'".repeat(choice.nth))
         };
         if self.alterations.is_open() {
             self.alterations.line(ui, snapshot, actions);
         } else {
             let told = match shown.map(|index| &all[index]) {
+                Some(choice) if choice.register == multiphonic_choices::REGISTER => {
+                    multiphonic_choices::about(choice, names, snapshot.instrument.transposition)
+                }
                 Some(choice) => {
                     let fingers =
                         if choice.fingers.trim().is_empty() { "no finger" } else { &choice.fingers };
@@ -201,15 +208,16 @@ impl ClarinetView {
             self.fingering_line(ui, told, snapshot, actions);
         }
         egui::ScrollArea::vertical().id_salt("picker").auto_shrink([false, false]).show(ui, |ui| {
-            // Four registers in the least window.
-            let line = ((ui.available_height() - 8.0) / 4.0 - 3.0).clamp(19.0, 24.0);
+            // Four registers in the least window, and multiphonics below them where there is more room.
+            let line = ((ui.available_height() - 8.0) / 5.0 - 3.0).clamp(19.0, 24.0);
             ui.spacing_mut().item_spacing = vec2(3.0, 3.0);
             ui.spacing_mut().interact_size.y = line;
             // The longest register on one line.
+            let registers = || REGISTERS.into_iter().chain([multiphonic_choices::REGISTER]);
             let of = |register: &str| all.iter().filter(|choice| choice.register == register).count();
-            let longest = REGISTERS.iter().map(|register| of(register)).max().unwrap_or(1).max(1);
+            let longest = registers().map(of).max().unwrap_or(1).max(1);
             let width = (ui.available_width() - 76.0) / longest as f32 - 3.0;
-            for register in REGISTERS.into_iter().filter(|register| of(register) > 0) {
+            for register in registers().filter(|register| of(register) > 0) {
                 ui.horizontal_wrapped(|ui| {
                     let (rect, _) = ui.allocate_exact_size(vec2(66.0, line), Sense::hover());
                     let at = rect.left_center();
@@ -225,7 +233,11 @@ impl ClarinetView {
                             WidgetInfo::selected(Role::RadioButton, true, is_here, label)
                         });
                         let alternate = if choice.nth > 0 { " (alternate, not tuned)" } else { "" };
-                        let told = format!("{name}{alternate}: {}", choice.fingers);
+                        let told = if register == multiphonic_choices::REGISTER {
+                            multiphonic_choices::about(choice, names, snapshot.instrument.transposition)
+                        } else {
+                            format!("{name}{alternate}: {}", choice.fingers)
+                        };
                         if response.on_hover_text(told).clicked() {
                             self.tried = Some(choice.open.clone());
                             actions.push(Action::TryFingering(choice.open.clone()));
@@ -273,7 +285,9 @@ impl ClarinetView {
         match &self.known {
             Some((of, choices)) if Arc::ptr_eq(of, file) || of == file => choices.clone(),
             _ => {
-                let choices = Arc::new(alternate_fingerings::fingering_choices(file));
+                let mut choices = alternate_fingerings::fingering_choices(file);
+                choices.extend(multiphonic_choices::choices(file));
+                let choices = Arc::new(choices);
                 self.known = Some((file.clone(), choices.clone()));
                 choices
             }

@@ -8,6 +8,7 @@ use crate::editor::ab_comparison::AbComparison;
 use crate::editor::ab_comparison::ComparisonSide;
 use crate::editor::controls::Hands;
 use crate::editor::controls::{momentary, segments};
+use crate::editor::lamps;
 use crate::editor::note_names::{NoteNames, note_name};
 use crate::editor::pitch_needle;
 use crate::editor::preset_bar;
@@ -268,6 +269,8 @@ pub fn tabs(ui: &mut Ui, kept: &mut WindowState, has_knob: bool, snapshot: &Snap
         }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             laboratory(ui, kept, is_wide);
+            ui.add_space(8.0);
+            lamps::draw(ui, snapshot, is_wide);
             ui.add_space(8.0);
             status(ui, snapshot);
         });

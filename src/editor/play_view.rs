@@ -22,7 +22,7 @@ use macro_knob::Macro;
 use motion::Motion;
 
 /// The main controls, in order, with what their ends mean. A control whose parameter does not exist is left out.
-const MACROS: [Macro; 10] = [
+const MACROS: [Macro; 11] = [
     Macro { id: "bcurve", name: "Breath", ends: "early to late" },
     Macro { id: "lip", name: "Lip", ends: "firm to loose" },
     Macro { id: "stren", name: "Reed", ends: "soft to hard" },
@@ -30,6 +30,7 @@ const MACROS: [Macro; 10] = [
     Macro { id: "lay", name: "Colour", ends: "bright to mellow" },
     Macro { id: "vib", name: "Vibrato", ends: "none to deep" },
     Macro { id: "growl", name: "Growl", ends: "none to rough" },
+    Macro { id: "tract", name: "Tract", ends: "open to tuned" },
     Macro { id: "noise", name: "Air", ends: "none to much" },
     Macro { id: "room", name: "Room", ends: "dry to far" },
     Macro { id: "gain", name: "Volume", ends: "soft to loud" },

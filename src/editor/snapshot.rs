@@ -78,6 +78,10 @@ pub struct Snapshot {
     pub scope: MouthpieceTraces,
     /// The sound that comes out.
     pub heard: SoundAnalysis,
+    /// Highest magnitude of the output since the last snapshot, both channels, with pan and room; 1 is full scale.
+    pub output_peak: f32,
+    /// Whether notes or controllers of the host have arrived just now.
+    pub hears_midi: bool,
     /// Standing wave of the fingering at the pitch of the note: place, m from the reed, and magnitude over that at the
     /// reed.
     pub standing: Vec<(f32, f32)>,
@@ -125,6 +129,8 @@ impl Default for Snapshot {
             history: Track::default(),
             scope: MouthpieceTraces::default(),
             heard: SoundAnalysis::default(),
+            output_peak: 0.0,
+            hears_midi: false,
             standing: Vec::new(),
             status: Vec::new(),
             feel: Err("no knob feel yet".into()),

@@ -868,6 +868,14 @@ pub static PARAMETERS: &[Parameter] = &[
         )
         .sets(Sets::Number(SettingNumber::KeySounds))
         .flag("--key-sounds"),
+    entry("slap", EXPRESSION, "Slap", percent(0.0))
+        .help(
+            "How hard the tongue slaps the reed at the beginning of a note, times the velocity",
+            "The tongue sucks at the reed and lets it slam: a pop with the pitch of the fingering, also without breath. Slurred notes have none.",
+            "",
+        )
+        .sets(Sets::Number(SettingNumber::Slap))
+        .flag("--slap"),
     entry("altf", EXPRESSION, "Alternate fingerings", switch(false, ["Chart", "By context"]))
         .help(
             "Whether slurs by a semitone or a tone take the fingering that moves the fewest fingers",

@@ -100,6 +100,7 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
     ("falls", "Expression", "Fall time", "0.40 s", true),
     ("bin", "Expression", "Breath in", "0.0 %", true),
     ("ksound", "Expression", "Key sounds", "0.0 %", true),
+    ("slap", "Expression", "Slap", "0.0 %", true),
     ("altf", "Expression", "Alternate fingerings", "Chart", true),
     ("growl", "Techniques", "Growl", "0.0 %", true),
     ("growlp", "Techniques", "Growl pitch", "Follows the note", true),
@@ -262,7 +263,15 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         attack: _,
         glissando_s: _,
         articulation:
-            Articulation { scoop_cents: _, scoop_s: _, fall_cents: _, fall_s: _, breath_in: _, key_sounds: _ },
+            Articulation {
+                scoop_cents: _,
+                scoop_s: _,
+                fall_cents: _,
+                fall_s: _,
+                breath_in: _,
+                key_sounds: _,
+                slap: _,
+            },
         alternates: _,
         techniques:
             Techniques {
@@ -277,7 +286,7 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         tract: Tract { amount: _, interval_semitones: _ },
         players: Players { count: _, split: _, spread_cents: _, width: _ },
     } = d;
-    assert_eq!(fields, 61);
+    assert_eq!(fields, 62);
 }
 
 #[test]

@@ -90,6 +90,8 @@ impl From<BreathOrigin> for BreathInput {
 pub struct BreathSources {
     values: [Option<f32>; BreathInput::ALL.len()],
     live: Option<BreathInput>,
+    /// How many events the host has sent; it wraps around.
+    messages: u32,
 }
 
 impl BreathSources {
@@ -100,6 +102,7 @@ impl BreathSources {
 
     /// Records a host's event. Whether it is breath the decoder says.
     pub fn record<S>(&mut self, event: &NoteEvent<S>) {
+        self.messages = self.messages.wrapping_add(1);
         match BreathInput::of(event) {
             Some((BreathInput::Keys, velocity)) => self.key(velocity),
             Some((input, value)) => self.set(input, value),
@@ -126,6 +129,11 @@ impl BreathSources {
     /// The latest value of an input, 0..=1; `None` if it has sent nothing.
     pub fn value(&self, input: BreathInput) -> Option<f32> {
         self.values[input as usize]
+    }
+
+    /// How many events the host has sent; it wraps around.
+    pub fn messages(&self) -> u32 {
+        self.messages
     }
 
     /// Whether this input blows now.

@@ -4,15 +4,16 @@ use nice_plug::prelude::*;
 
 use super::breath_sources::BreathSources;
 use super::params::knob::ReedSource;
+use super::part_reeds::PartReeds;
 use super::reed_controllers::ReedControllers;
-use super::translate_events::{EventTranslator, expression, raw7, untangled};
+use super::translate_events::{EventTranslator, raw7, untangled};
 use crate::controllers::ControllerLinks;
 use chalumeau_core::control::midi::breath::BreathFrom;
 use chalumeau_core::control::midi::links::{Link, MOST, Source};
 use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::control::notes::Note;
 use chalumeau_core::control::parts;
-use chalumeau_core::event::{Event, PartEvent, Timed};
+use chalumeau_core::event::{Event, PartEvent, Timed, To};
 use chalumeau_core::instrument::Settings;
 
 /// Events that wait at most: what one event of the host can become, and what a block begins with. Of each part: a note with the
@@ -25,7 +26,7 @@ const ENDS: usize = 4_096 + 17 * parts::MOST;
 /// Everything that is remembered of the host's events between two blocks.
 pub struct HostInputs {
     translator: EventTranslator,
-    reed_controllers: ReedControllers,
+    reeds: PartReeds,
     breath_sources: BreathSources,
     /// Events that the block begins with or that the host's latest event has become, their sample, and how many have been
     /// handed out.
@@ -34,8 +35,6 @@ pub struct HostInputs {
     handed: usize,
     /// Notes that have ended in this block, in order of time.
     ended: Vec<(u32, Note)>,
-    /// The note whose expressions the reed follows.
-    heard: Option<Note>,
     /// The latest MIDI program change that nobody has taken yet.
     program: Option<u8>,
 }
@@ -45,13 +44,12 @@ impl Default for HostInputs {
     fn default() -> Self {
         Self {
             translator: EventTranslator::default(),
-            reed_controllers: ReedControllers::default(),
+            reeds: PartReeds::default(),
             breath_sources: BreathSources::default(),
             events: Vec::with_capacity(EVENTS),
             at: 0,
             handed: 0,
             ended: Vec::with_capacity(ENDS),
-            heard: None,
             program: None,
         }
     }
@@ -61,9 +59,9 @@ impl HostInputs {
     /// Forgets everything.
     pub fn reset(&mut self) {
         self.translator.reset();
-        self.reed_controllers = ReedControllers::default();
+        self.reeds = PartReeds::default();
         self.breath_sources = BreathSources::default();
-        (self.handed, self.heard, self.program) = (0, None, None);
+        (self.handed, self.program) = (0, None);
         self.events.clear();
         self.ended.clear();
     }
@@ -73,8 +71,10 @@ impl HostInputs {
         self.ended.clear();
         self.events.clear();
         (self.at, self.handed) = (0, 0);
+        let before = self.translator.parts();
         if self.translator.set_parts(parts) {
             self.note_ends(0);
+            self.reeds.follow_first(before.min(parts));
         }
     }
 
@@ -93,7 +93,18 @@ impl HostInputs {
         self.translator.set_links(links);
     }
 
-    /// Settings with the numbers of linked controllers that have spoken.
+    /// Adds at the beginning of the block what linked controllers have said to single players. Call it where all have got the
+    /// settings of the first.
+    pub fn say_links(&mut self) {
+        for part in 1..self.translator.parts() {
+            let to = To::Player(part as u8);
+            for (number, value) in self.translator.links_of(part).beside(self.translator.links()) {
+                push(&mut self.events, PartEvent { to, event: Event::Set(number, value) });
+            }
+        }
+    }
+
+    /// Settings with the numbers of linked controllers that have spoken to the first player.
     pub fn linked(&self, mut settings: Settings) -> Settings {
         for (number, value) in self.translator.links().numbers() {
             *settings.number(number) = value;
@@ -106,9 +117,9 @@ impl HostInputs {
         &mut self.breath_sources
     }
 
-    /// The factors that controllers and notes put on H and k.
+    /// The factors that controllers and notes put on H and k of the first player.
     pub fn reed_factors(&self, drives: [ReedSource; 2]) -> [f32; 2] {
-        self.reed_controllers.factors(drives)
+        self.reeds.factors(drives)
     }
 
     /// The next event of the instrument; `next` gives the host's. Events of what `drives` H or k change the reed and nothing
@@ -157,27 +168,14 @@ impl HostInputs {
         self.note_ends(event.timing());
         let is_snapshot = channel.is_some_and(|channel| self.translator.is_snapshot(channel));
         match reeds {
-            _ if is_snapshot && !was_snapshot => self.reed_controllers.go_back(),
-            Some(moved) if !is_snapshot && self.is_heard(&event) => self.reed_controllers.set(moved),
+            _ if is_snapshot && !was_snapshot => self.reeds.go_back(),
+            Some(moved) if !is_snapshot => self.reeds.set(&event, moved, &self.translator),
             _ => {}
         }
-        if matches!(event, NoteEvent::NoteOn { .. }) {
-            self.reed_controllers.keep();
+        self.reeds.follow(matches!(event, NoteEvent::NoteOn { .. }), &self.translator);
+        for event in self.reeds.changed(drives, self.translator.parts()) {
+            push(&mut self.events, event);
         }
-        if let Some(heard) = self.translator.heard()
-            && self.heard.replace(heard.note) != Some(heard.note)
-        {
-            self.reed_controllers.follow(heard);
-        }
-        if let Some(event) = self.reed_controllers.changed(drives) {
-            push(&mut self.events, event.into());
-        }
-    }
-
-    /// Whether an event is for the heard note, or for no note in particular.
-    fn is_heard(&self, event: &NoteEvent<()>) -> bool {
-        let Some((address, _)) = expression(event, true) else { return true };
-        self.translator.heard().is_some_and(|heard| address.fits(heard.note))
     }
 
     /// Sets how far the wheel bends until RPN 0 says otherwise, semitones, from the beginning of the block on.
@@ -266,7 +264,6 @@ mod tests {
     use super::*;
     use crate::controllers::ParameterLink;
     use crate::plugin::breath_sources::BreathInput;
-    use chalumeau_core::event::To;
     use chalumeau_core::units::SoundingNote;
 
     const NO_REED: [ReedSource; 2] = [ReedSource::Parameter; 2];
@@ -377,6 +374,80 @@ mod tests {
             velocity: 0.0,
         };
         assert!((say(off) - 1.6).abs() < 1e-3, "its own, now that it is heard");
+    }
+
+    /// Says of MIDI messages who does what.
+    fn parted(inputs: &mut HostInputs, drives: [ReedSource; 2], said: &[[u8; 3]]) -> Vec<(To, Event)> {
+        let mut said = said.iter().map(|bytes| NoteEvent::from_midi(5, bytes).unwrap());
+        let links = ControllerLinks::default();
+        let mut next = || inputs.next(|| said.next(), PluginApi::Clap, drives, &links);
+        std::iter::from_fn(|| next().map(|timed| (timed.event.to, timed.event.event))).collect()
+    }
+
+    /// RPN 6 on channel 1: all other channels are members.
+    const MPE: [[u8; 3]; 3] = [[0xB0, 101, 0], [0xB0, 100, 6], [0xB0, 6, 15]];
+
+    fn of_reeds(events: Vec<(To, Event)>) -> Vec<(To, bool)> {
+        let reed = |(to, event)| match event {
+            Event::Reed { h, .. } => Some((to, h > 1.0)),
+            _ => None,
+        };
+        events.into_iter().filter_map(reed).collect()
+    }
+
+    #[test]
+    fn each_finger_of_a_chord_moves_the_reed_of_its_player() {
+        let drives = [ReedSource::Slide, ReedSource::Parameter];
+        let mut inputs = HostInputs::default();
+        inputs.begin_block(2);
+        parted(&mut inputs, drives, &MPE);
+        parted(&mut inputs, drives, &[[0x91, 60, 100], [0x92, 64, 100]]);
+        let [first, second] = [0, 1].map(To::Player);
+        assert_eq!(of_reeds(parted(&mut inputs, drives, &[[0xB1, 74, 127]])), [(first, true)]);
+        assert_eq!(of_reeds(parted(&mut inputs, drives, &[[0xB2, 74, 0]])), [(second, false)]);
+        assert!(inputs.reed_factors(drives)[0] > 1.5, "the knob feels the first");
+        let all = parted(&mut inputs, drives, &[[0xB0, 74, 0]]);
+        assert_eq!(
+            of_reeds(all),
+            [(first, false)],
+            "the manager's is everybody's; the second has it already"
+        );
+        // What a channel said before its note is the note's.
+        parted(&mut inputs, drives, &[[0x82, 64, 0], [0xB3, 74, 127]]);
+        assert_eq!(of_reeds(parted(&mut inputs, drives, &[[0x93, 66, 100]])), [(second, true)]);
+        // Without an MPE zone a controller is everybody's.
+        let mut inputs = HostInputs::default();
+        inputs.begin_block(2);
+        parted(&mut inputs, drives, &[[0x90, 60, 100], [0x90, 64, 100]]);
+        assert_eq!(
+            of_reeds(parted(&mut inputs, drives, &[[0xB0, 74, 127]])),
+            [(first, true), (second, true)]
+        );
+    }
+
+    #[test]
+    fn a_linked_controller_of_one_player_outlives_new_settings() {
+        let links = ControllerLinks::default();
+        let growl = crate::parameters::find("growl").unwrap();
+        links.replace(&[ParameterLink::whole(Source::Controller(21), growl).unwrap()]);
+        let (mut inputs, own) = (HostInputs::default(), Settings::default());
+        inputs.begin_block(2);
+        inputs.set_links(&links.links(&own));
+        parted(&mut inputs, NO_REED, &MPE);
+        parted(&mut inputs, NO_REED, &[[0x91, 60, 100], [0x92, 64, 100]]);
+        let second = To::Player(1);
+        let growls = |events: Vec<(To, Event)>| -> Vec<(To, f32)> {
+            let set = |(to, event)| match event {
+                Event::Set(_, value) => Some((to, value)),
+                _ => None,
+            };
+            events.into_iter().filter_map(set).collect()
+        };
+        assert_eq!(growls(parted(&mut inputs, NO_REED, &[[0xB2, 21, 127]])), [(second, 1.0)]);
+        assert_eq!(inputs.linked(own).techniques.growl, 0.0, "the first was told nothing");
+        inputs.begin_block(2);
+        inputs.say_links();
+        assert_eq!(growls(parted(&mut inputs, NO_REED, &[])), [(second, 1.0)]);
     }
 
     #[test]

@@ -60,6 +60,13 @@ impl ReedControllers {
         self.values[at] = Some(if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 });
     }
 
+    /// Takes the values that another has heard.
+    pub fn take(&mut self, other: &Self) {
+        for (value, other) in self.values.iter_mut().zip(other.values) {
+            *value = other.or(*value);
+        }
+    }
+
     /// Another note is heard: what belongs to it acts now.
     pub fn follow(&mut self, heard: &HeldNote) {
         let [.., slide, pressure] = &mut self.values;

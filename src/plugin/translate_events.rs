@@ -90,14 +90,24 @@ impl EventTranslator {
         self.midi.links()
     }
 
+    /// See [`Parts::links_of`].
+    pub fn links_of(&self, part: usize) -> &Links {
+        self.midi.links_of(part)
+    }
+
     /// Ends all notes at once.
     pub fn silence(&mut self) -> &[PartEvent] {
         self.midi.silence()
     }
 
-    /// See [`Parts::heard`].
-    pub fn heard(&self) -> Option<&HeldNote> {
-        self.midi.heard()
+    /// See [`Parts::heard_by`].
+    pub fn heard_by(&self, part: usize) -> Option<&HeldNote> {
+        self.midi.heard_by(part)
+    }
+
+    /// See [`Parts::is_of_one_part`].
+    pub fn is_of_one_part(&self, channel: u8) -> bool {
+        self.midi.is_of_one_part(channel)
     }
 
     /// See [`Parts::over`].

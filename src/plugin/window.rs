@@ -21,7 +21,7 @@ mod parameters_match_tests;
 mod snapshot_thread;
 mod window_audio;
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -47,6 +47,8 @@ struct SharedWindow {
     /// Files that the user asks for, until the snapshot thread has read them.
     file_tasks: Mutex<Vec<FileTask>>,
     stop: AtomicBool,
+    /// Highest magnitude of the output since it was last read: the bits of a number that is not negative, which sort as it does.
+    output_peak: AtomicU32,
 }
 
 impl SharedWindow {
@@ -102,6 +104,7 @@ impl PluginWindow {
             tried: Mutex::default(),
             file_tasks: Mutex::default(),
             stop: AtomicBool::new(false),
+            output_peak: AtomicU32::new(0),
         });
         let (audio, WindowChannels { inside, sound, keys }) = WindowAudio::new(shared.clone());
         let snapshots = SnapshotThread::new(shared.clone(), handles.clone(), inside, sound);

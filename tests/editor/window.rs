@@ -118,6 +118,21 @@ fn keys_play_slur_and_let_go() {
 }
 
 #[test]
+fn a_multiphonic_is_tried_like_any_fingering() {
+    let mut window = Window::tall(Tab::Clarinet);
+    click(&mut window, "Fingering M3");
+    let done = window.actions();
+    let [Action::TryFingering(open)] = &done[..] else { panic!("{done:?}") };
+    let file = window.snapshot.borrow().instrument.clone();
+    let names: Vec<&str> =
+        file.holes.iter().zip(open).filter(|(_, open)| **open).map(|(hole, _)| hole.name.as_str()).collect();
+    let known = &chalumeau_core::measure::multiphonics::built_in()[2];
+    assert_eq!(names.len(), known.open.split_whitespace().count(), "{names:?}");
+    assert!(known.open.split_whitespace().all(|name| names.contains(&name)), "{names:?}");
+    window.harness.get_by_label_contains("Tones at 1091, 1433, 2866 Hz");
+}
+
+#[test]
 fn what_vanishes_under_the_hand_is_let_go() {
     let mut window = Window::tall(Tab::Reed);
     window.host.told();

@@ -451,6 +451,8 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
             flow_cm3s: thin.iter().map(|probe| (1e6 * probe.flow_m3s) as f32).collect(),
         },
         heard,
+        output_peak: sound[sound.len() - 2_400..].iter().fold(0.0, |most, sample| sample.abs().max(most)),
+        hears_midi: true,
         standing: standing.into_iter().map(|(x_m, magnitude)| (x_m as f32, magnitude as f32)).collect(),
         status: vec![
             Status {

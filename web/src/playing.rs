@@ -232,7 +232,7 @@ impl Playing {
     pub fn settle(&mut self) {
         self.ensemble.set_settings(&self.settings);
         self.settings = *self.ensemble.first().settings();
-        self.stereo.set_room(&self.settings.room);
+        self.stereo.set_space(&self.settings);
         self.parts.set_count(self.settings.players.count.clamp(1, 16) as usize);
     }
 

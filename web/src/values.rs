@@ -9,7 +9,7 @@ use chalumeau_core::instrument::{
 };
 
 /// The numbers, in the order of the list.
-pub const NUMBERS: [N; 50] = [
+pub const NUMBERS: [N; 51] = [
     N::BreathFullKpa,
     N::TongueMs,
     N::LegatoMs,
@@ -50,6 +50,7 @@ pub const NUMBERS: [N; 50] = [
     N::FallS,
     N::BreathIn,
     N::KeySounds,
+    N::Slap,
     N::Growl,
     N::GrowlSemitones,
     N::GrowlHz,

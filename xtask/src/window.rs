@@ -19,7 +19,9 @@ const PICTURES: [(&str, &str); 2] = [("window", "every_view"), ("standalone", "i
 pub fn test() -> Result<()> {
     let programs = programs()?;
     let display = Display::start()?;
-    machine::run(&mut tests(programs, &display, "window", ""))?;
+    for file in ["window", "journeys"] {
+        machine::run(&mut tests(programs, &display, file, ""))?;
+    }
     machine::run(&mut tests(programs, &display, "standalone", "its_window"))
 }
 

@@ -47,6 +47,7 @@ pub mod scope;
 mod settings;
 pub mod side_by_side;
 mod slap;
+mod stage;
 pub mod stereo;
 pub mod store;
 pub mod techniques;

@@ -251,6 +251,7 @@ fn all() -> Articulation {
         fall_s: 0.2,
         breath_in: 1.0,
         key_sounds: 1.0,
+        slap: 0.6,
     }
 }
 
@@ -298,6 +299,32 @@ fn another_instrument_goes_on_with_the_scoop_and_the_breath() {
 }
 
 #[test]
+fn a_slap_begins_a_tongued_note_and_the_note_goes_on() {
+    let events = [on(0.0, 55), on(0.6, 57), off(0.65, 55), off(1.2, 57)];
+    let [with, without] = [1.0, 0.0].map(|slap| {
+        let articulation = Articulation { slap, ..Articulation::default() };
+        heard(&still(articulation), &events, 1.5)
+    });
+    let highest = |sound: &[f64]| sound.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let louder_db = |from_s, to_s| {
+        20.0 * (highest(part(&with, from_s, to_s)) / highest(part(&without, from_s, to_s))).log10()
+    };
+    let (first, held, slurred) = (louder_db(0.0, 0.03), louder_db(0.4, 0.6), louder_db(0.6, 0.63));
+    println!("the first 30 ms {first:+.1} dB, the held note {held:+.1}, a slurred beginning {slurred:+.1}");
+    assert!(first > 12.0, "{first} dB");
+    assert!(held.abs() < 0.5 && slurred.abs() < 0.5, "{held} and {slurred} dB");
+    assert!(pitch_cents(part(&with, 0.4, 0.6), hz(55)).abs() < 5.0);
+    // Struck softly it is softer.
+    let of = |velocity| {
+        let mut clarinet = clarinet(&still(Articulation { slap: 1.0, ..Articulation::default() }));
+        let note = Event::NoteOn { note: sounding(55), velocity };
+        let sound = played(&mut clarinet, &[(0.0, Event::Breath(0.0)), (0.0, note)], 0.1, 512);
+        sound.iter().fold(0.0_f32, |most, x| most.max(x.abs()))
+    };
+    assert!(of(1.0) > 2.0 * of(0.25) && of(0.25) > 1e-4, "{} {}", of(1.0), of(0.25));
+}
+
+#[test]
 fn numbers_out_of_range_are_clamped_where_they_come_in() {
     let mut clarinet = clarinet(&Settings::default());
     let numbers = [
@@ -307,6 +334,7 @@ fn numbers_out_of_range_are_clamped_where_they_come_in() {
         (SettingNumber::FallS, [0.05, 2.0]),
         (SettingNumber::BreathIn, [0.0, 1.0]),
         (SettingNumber::KeySounds, [0.0, 1.0]),
+        (SettingNumber::Slap, [0.0, 1.0]),
     ];
     for (number, ends) in numbers {
         for (asked, end) in [-1e9, 1e9].into_iter().zip(ends) {

@@ -61,7 +61,7 @@ fn sound(job: &RenderJob, settings: Settings, score: &Score) -> Result<Vec<u8>, 
     let mut bytes = Cursor::new(Vec::new());
     let mut wav = WavFile::new(&mut bytes, job.rate, Depth::Int16, channels, score.samples)?;
     let stop = RenderJob::to_play_later(job.model.clone(), settings, job.rate);
-    let mut stereo = StereoBlocks::new(score, job.rate).in_room(&settings.room);
+    let mut stereo = StereoBlocks::new(score, job.rate).in_room(&settings);
     player::play(&mut stop.clarinet(), score, BLOCK, |block| {
         if channels == 1 {
             return wav.write(&[block]).map_err(Failure::from);

@@ -54,6 +54,7 @@ pub fn define(params: &ChalumeauParams, context: &mut impl RemoteControlsContext
             page.add_param(&techniques.subtone);
             page.add_param(&techniques.tract);
             page.add_param(&techniques.tract_interval);
+            page.add_param(&expression.slap);
         });
         section.add_page("Room and players", |page| {
             page.add_param(&room.amount);

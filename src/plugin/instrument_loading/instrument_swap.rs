@@ -85,7 +85,7 @@ impl InstrumentSwap {
         (self.activation, self.awaited_choice) = (activation, choice);
         self.rate_hz = rate_hz;
         self.stereo = Stereo::new(rate_hz);
-        self.stereo.set_room(&self.settings.room);
+        self.stereo.set_space(&self.settings);
         self.warm_up = (WARM_UP_S * rate_hz) as usize;
         self.fade = (FADE_S * rate_hz) as usize;
     }
@@ -124,7 +124,7 @@ impl InstrumentSwap {
     /// Applies settings to both instruments.
     pub fn set_settings(&mut self, settings: &Settings) {
         self.settings = *settings;
-        self.stereo.set_room(&settings.room);
+        self.stereo.set_space(settings);
         let was_lone = self.playing.is_lone();
         self.playing.set_settings(settings);
         if self.playing.is_lone() != was_lone {

@@ -55,6 +55,9 @@ pub struct ExpressionParams {
     /// [`Articulation::key_sounds`].
     #[id = "ksound"]
     pub key_sounds: FloatParam,
+    /// [`Articulation::slap`].
+    #[id = "slap"]
+    pub slap: FloatParam,
     /// [`Settings::alternates`].
     #[id = "altf"]
     pub alternates: BoolParam,
@@ -200,6 +203,7 @@ impl ExpressionParams {
             fall_time: number("falls"),
             breath_in: number("bin"),
             key_sounds: number("ksound"),
+            slap: number("slap"),
             alternates: switch("altf"),
         }
     }
@@ -225,6 +229,7 @@ impl ExpressionParams {
             fall_s: settled(&self.fall_time),
             breath_in: settled(&self.breath_in),
             key_sounds: settled(&self.key_sounds),
+            slap: settled(&self.slap),
         }
     }
 }

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::SharedWindow;
@@ -41,6 +42,8 @@ const IDLE: Duration = Duration::from_millis(220);
 const DEVICES_EVERY: Duration = Duration::from_secs(2);
 /// Length of sound whose level is shown, s: some periods of the lowest note.
 const LEVEL_S: f64 = 0.05;
+/// Time for which a message lights the lamp.
+const MIDI_LIT: Duration = Duration::from_millis(150);
 /// Less mouth pressure than this counts as none, kPa.
 const NO_BREATH_KPA: f32 = 1e-3;
 
@@ -55,8 +58,12 @@ pub struct SnapshotThread {
     /// The values that a snapshot shows where nothing is known. Kept, because making them parses an instrument file.
     blank: Snapshot,
     history: BreathHistory,
+    /// How many messages had arrived, and when there was a new one.
+    midi: (u32, Option<Instant>),
     files: FilesRead,
     analysis: Option<InstrumentAnalysis>,
+    /// A thread that analyses a new instrument meanwhile.
+    analysing: Option<JoinHandle<InstrumentAnalysis>>,
     /// The devices found, and when.
     #[cfg(feature = "devices")]
     devices: (Vec<KnobDevice>, Option<Instant>),
@@ -80,8 +87,10 @@ impl SnapshotThread {
             listener: None,
             blank: Snapshot::default(),
             history: BreathHistory::new(),
+            midi: (0, None),
             files: FilesRead::default(),
             analysis: None,
+            analysing: None,
             #[cfg(feature = "devices")]
             devices: (Vec::new(), None),
             #[cfg(feature = "devices")]
@@ -94,6 +103,10 @@ impl SnapshotThread {
             let began = Instant::now();
             let every = if self.shared.is_open.load(Ordering::Relaxed) { self.publish() } else { IDLE };
             std::thread::park_timeout(every.saturating_sub(began.elapsed()));
+        }
+        // No thread may outlive the plugin's library.
+        if let Some(analysing) = self.analysing.take() {
+            let _ = analysing.join();
         }
     }
 
@@ -115,8 +128,10 @@ impl SnapshotThread {
         snapshot.chosen = Some(self.handles.params.instrument.choice.value() as usize);
         self.files.show(&mut snapshot);
         show_inside(&mut snapshot, &inside);
-        self.show_instrument(&mut snapshot, inside.now.fingering);
+        self.show_instrument(&mut snapshot, current.as_ref(), inside.now.fingering);
         snapshot.heard = self.analyse_sound(inside.host_rate_hz, inside.now.sounding, &settings);
+        snapshot.output_peak = f32::from_bits(self.shared.output_peak.swap(0, Ordering::Relaxed));
+        snapshot.hears_midi = self.hears_midi(inside.breath_sources.messages());
         let level_db = self.level_db(inside.host_rate_hz);
         self.history.extend(inside.now.mouth_kpa, level_db, snapshot.heard.f0_hz);
         snapshot.history = self.history.track();
@@ -125,15 +140,25 @@ impl SnapshotThread {
         snapshot.status = self.status(current.as_ref(), &inside.breath_sources);
         *self.shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(snapshot);
         self.shared.draw_again();
-        let is_moving = inside.now.mouth_kpa > NO_BREATH_KPA || inside.now.sounding.is_some();
+        let is_moving = inside.now.mouth_kpa > NO_BREATH_KPA
+            || inside.now.sounding.is_some()
+            || self.midi.1.is_some_and(|at| at.elapsed() < MIDI_LIT);
         if is_moving { MOVING } else { IDLE }
     }
 
     /// Fills in the fingering, and what the analysis says of it.
-    fn show_instrument(&mut self, snapshot: &mut Snapshot, fingering: usize) {
+    fn show_instrument(
+        &mut self,
+        snapshot: &mut Snapshot,
+        current: Option<&CurrentInstrument>,
+        fingering: usize,
+    ) {
         let design = self.feel_design();
-        let Some(analysis) = &mut self.analysis else { return };
-        let file = analysis.file().clone();
+        let analysed = self.analysis.as_ref().map(|analysis| analysis.file().clone());
+        let Some(file) = analysed.or_else(|| current.map(|current| Arc::new(current.model.file.clone())))
+        else {
+            return;
+        };
         let fingering = fingering.min(file.fingerings.len().saturating_sub(1));
         let open = self
             .shared
@@ -142,11 +167,12 @@ impl SnapshotThread {
             .unwrap_or_else(|| file.fingerings[fingering].open.clone());
         snapshot.fingering = fingering;
         snapshot.openings = open.iter().map(|&open| f32::from(u8::from(open))).collect();
+        snapshot.instrument = file;
+        let Some(analysis) = &mut self.analysis else { return };
         snapshot.requirement = analysis.requirement(fingering, &snapshot.played());
         snapshot.feel = analysis.feel(fingering, &snapshot.settings, &design);
         snapshot.standing = analysis.standing_wave(fingering, &open);
         snapshot.as_built = analysis.as_built().clone();
-        snapshot.instrument = file;
     }
 
     /// Fills in the knob and the list of devices.
@@ -172,6 +198,14 @@ impl SnapshotThread {
         }
     }
 
+    /// Whether messages have arrived just now, of which there have been so many.
+    fn hears_midi(&mut self, messages: u32) -> bool {
+        if std::mem::replace(&mut self.midi.0, messages) != messages {
+            self.midi.1 = Some(Instant::now());
+        }
+        self.midi.1.is_some_and(|at| at.elapsed() < MIDI_LIT)
+    }
+
     fn receive_sound(&mut self) {
         while let Ok(sample) = self.sound.pop() {
             if self.heard.len() == WINDOW {
@@ -181,12 +215,18 @@ impl SnapshotThread {
         }
     }
 
-    /// Analyses a new instrument (about 1 s); the old view stays until then.
+    /// Analyses a new instrument (about 1 s) on a thread of its own: a window that has just been opened shows from its first
+    /// moment what is played. The old view stays until then.
     fn analyse(&mut self, current: Option<&CurrentInstrument>) {
+        if let Some(done) = self.analysing.take_if(|analysing| analysing.is_finished()) {
+            self.analysis = done.join().ok().or_else(|| self.analysis.take());
+        }
         let Some(current) = current else { return };
         let is_known = self.analysis.as_ref().is_some_and(|analysis| analysis.is_of(current));
-        if current.readiness > Readiness::Rough && !is_known {
-            self.analysis = Some(InstrumentAnalysis::new(current));
+        if current.readiness > Readiness::Rough && !is_known && self.analysing.is_none() {
+            let current = current.clone();
+            let analysing = std::thread::Builder::new().name("InstrumentAnalysis".to_owned());
+            self.analysing = analysing.spawn(move || InstrumentAnalysis::new(&current)).ok();
         }
     }
 

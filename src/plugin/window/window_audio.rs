@@ -94,6 +94,16 @@ impl WindowAudio {
         std::array::from_fn(|_| self.keys.pop().ok())
     }
 
+    /// Notes how loud the output is while the window is open. Real-time safe.
+    pub fn send_output(&self, channels: [&[f32]; 2]) {
+        if self.is_open() {
+            // Magnitudes sort as their bits do, and whole numbers are compared many at a time.
+            let bits = |sample: &f32| sample.abs().to_bits();
+            let highest = channels.into_iter().flatten().map(bits).fold(0, u32::max);
+            self.shared.output_peak.fetch_max(highest, Ordering::Relaxed);
+        }
+    }
+
     /// Sends the sound and the inside of the instrument while the window is open. Real-time safe.
     pub fn send(&mut self, instrument: &mut InstrumentSwap, breath_sources: &BreathSources, sound: &[f32]) {
         let is_open = self.is_open();

@@ -9,7 +9,7 @@
 //! - Where no part is free, it goes to the nearest of those whose note only the pedal holds, which it replaces, and else to the
 //!   nearest of all, which slurs to it and comes back to its own note afterwards.
 //! - Breath and channel pressure of an MPE member channel go to the parts that play on that channel, and to a note that
-//!   begins on it later. Linked controllers go to all parts, because their links set the instrument.
+//!   begins on it later. So do linked controllers there, unless their links set what belongs to all players.
 //! - What belongs to notes goes to the parts that hold one of them. If no part does, it goes to all, whose notes may fade.
 //! - Everything else goes to all parts, and each takes what is for its note, as a lone player does: bends, for example.
 
@@ -24,6 +24,10 @@ use crate::event::{Event, PartEvent, To};
 pub const MOST: usize = 16;
 /// Events that one message can become: a note with the breath that waited for it, and what the other parts say.
 const EVENTS: usize = 64 * MOST;
+/// Sources that a channel has: its controllers, and its pressure.
+const SOURCES: usize = PRESSURE + 1;
+/// Place of the pressure, after those of the controllers.
+const PRESSURE: usize = 128;
 /// Distance of a note from a part that has played none: farther than any key.
 const NEVER: u8 = 128;
 
@@ -46,8 +50,8 @@ pub struct Parts {
     /// The part of the latest note.
     latest: usize,
     origin: Option<BreathOrigin>,
-    /// The latest value of each controller of breath, and of pressure, on each channel, if it is a member's.
-    breaths: [[Option<u8>; BREATH_LIKE.len() + 1]; 16],
+    /// The latest value of each source on each channel, where it is for the notes of that channel.
+    of_notes: Vec<[Option<u8>; SOURCES]>,
 }
 
 impl Default for Parts {
@@ -72,7 +76,7 @@ impl Parts {
             over: Vec::with_capacity((MOST_NOTES + 1) * MOST),
             latest: 0,
             origin: None,
-            breaths: Default::default(),
+            of_notes: vec![[None; SOURCES]; 16],
         };
         parts.set_count(count);
         parts
@@ -104,7 +108,8 @@ impl Parts {
     pub fn reset(&mut self) {
         self.begin();
         self.decoders.iter_mut().for_each(MidiDecoder::reset);
-        (self.latest, self.origin, self.breaths) = (0, None, Default::default());
+        (self.latest, self.origin) = (0, None);
+        self.of_notes.fill([None; SOURCES]);
     }
 
     /// See [`MidiDecoder::usual_bend_range`].
@@ -124,12 +129,29 @@ impl Parts {
 
     /// See [`MidiDecoder::set_links`].
     pub fn set_links(&mut self, links: &[Option<Link>; MOST_LINKS]) -> bool {
-        self.decoders.iter_mut().fold(false, |any, part| part.set_links(links) | any)
+        let before = *self.links();
+        let has_changed = self.decoders.iter_mut().fold(false, |any, part| part.set_links(links) | any);
+        if has_changed {
+            // What a controller said of a link that is no more is no word for a later note.
+            for cc in 0..SOURCES as u8 {
+                let source =
+                    if usize::from(cc) == PRESSURE { Source::Pressure } else { Source::Controller(cc) };
+                if before.has(source) {
+                    self.of_notes.iter_mut().for_each(|channel| channel[usize::from(cc)] = None);
+                }
+            }
+        }
+        has_changed
     }
 
-    /// See [`MidiDecoder::links`].
+    /// See [`MidiDecoder::links`]; of the first part.
     pub fn links(&self) -> &Links {
         self.decoders[0].links()
+    }
+
+    /// See [`MidiDecoder::links`]; of a part, which must be one of them.
+    pub fn links_of(&self, part: usize) -> &Links {
+        self.decoders[part].links()
     }
 
     /// See [`MidiDecoder::note_on`].
@@ -155,12 +177,13 @@ impl Parts {
             self.tell(part, |part| part.strike_elsewhere(note.channel));
         }
         if self.count() > 1 {
-            let [pressure, breaths @ ..] = self.breaths[usize::from(note.channel)];
-            if let Some(value) = pressure {
+            let said = self.of_notes[usize::from(note.channel)];
+            if let Some(value) = said[PRESSURE] {
                 self.tell(chosen, |part| part.pressure(note.channel, value));
             }
-            for (cc, value) in BREATH_LIKE.into_iter().zip(breaths) {
-                if let Some(value) = value {
+            let others = (0..PRESSURE as u8).filter(|cc| !BREATH_LIKE.contains(cc));
+            for cc in BREATH_LIKE.into_iter().chain(others) {
+                if let Some(value) = said[usize::from(cc)] {
                     self.tell(chosen, |part| part.controller(note.channel, cc, value));
                 }
             }
@@ -192,9 +215,8 @@ impl Parts {
     /// See [`MidiDecoder::controller`].
     pub fn controller(&mut self, channel: u8, cc: u8, value: u8) -> &[PartEvent] {
         let (channel, cc, value) = (channel % 16, cc.min(127), value.min(127));
-        let place = BREATH_LIKE.iter().position(|&breath| breath == cc);
-        if let Some(place) = place.filter(|_| self.is_of_notes(channel, Source::Controller(cc))) {
-            self.breaths[usize::from(channel)][1 + place] = Some(value);
+        if self.is_of_notes(channel, Source::Controller(cc)) {
+            self.of_notes[usize::from(channel)][usize::from(cc)] = Some(value);
             return self.tell_channel(channel, |part| part.controller(channel, cc, value));
         }
         self.tell_all(|part| part.controller(channel, cc, value))
@@ -204,7 +226,7 @@ impl Parts {
     pub fn pressure(&mut self, channel: u8, value: u8) -> &[PartEvent] {
         let (channel, value) = (channel % 16, value.min(127));
         if self.is_of_notes(channel, Source::Pressure) {
-            self.breaths[usize::from(channel)][0] = Some(value);
+            self.of_notes[usize::from(channel)][PRESSURE] = Some(value);
             return self.tell_channel(channel, |part| part.pressure(channel, value));
         }
         self.tell_all(|part| part.pressure(channel, value))
@@ -223,6 +245,16 @@ impl Parts {
     /// What the part of the latest note hears. See [`MidiDecoder::heard`].
     pub fn heard(&self) -> Option<&HeldNote> {
         self.decoders[self.latest].heard()
+    }
+
+    /// What a part hears; it must be one of them.
+    pub fn heard_by(&self, part: usize) -> Option<&HeldNote> {
+        self.decoders[part].heard()
+    }
+
+    /// Whether what comes on a channel is for the notes of that channel: there are several parts, and it is a member of an MPE zone.
+    pub fn is_of_one_part(&self, channel: u8) -> bool {
+        self.count() > 1 && self.decoders[0].is_member(channel)
     }
 
     /// The notes that the latest message, or the latest change of the number of parts, has ended.
@@ -260,9 +292,13 @@ impl Parts {
         nearest.map_or(0, |(part, _)| part)
     }
 
-    /// Whether what this channel says of breath is for its notes alone.
+    /// Whether what this channel says is for its notes alone: breath, and what is linked to what each player has for itself.
     fn is_of_notes(&self, channel: u8, source: Source) -> bool {
-        self.count() > 1 && self.decoders[0].is_member(channel) && !self.links().has(source)
+        let is_breath = match source {
+            Source::Pressure => true,
+            Source::Controller(cc) => BREATH_LIKE.contains(&cc),
+        };
+        self.is_of_one_part(channel) && self.links().is_of_player(source).unwrap_or(is_breath)
     }
 
     fn begin(&mut self) {

@@ -84,6 +84,8 @@ pub enum SettingNumber {
     BreathIn,
     /// `articulation.key_sounds`.
     KeySounds,
+    /// `articulation.slap`.
+    Slap,
     /// `techniques.growl`.
     Growl,
     /// `techniques.growl_semitones`.
@@ -104,4 +106,26 @@ pub enum SettingNumber {
     PlayersSpreadCents,
     /// `players.width`.
     PlayersWidth,
+}
+
+impl SettingNumber {
+    /// Whether each of several players can have a value of its own: what lip, breath, tongue, fingers and reed do. The others
+    /// belong to all of them: pitch, air, seats, listening and room.
+    pub fn is_of_player(self) -> bool {
+        !matches!(
+            self,
+            Self::A4Hz
+                | Self::TemperatureC
+                | Self::ListeningDistanceM
+                | Self::ListeningAngleDeg
+                | Self::ListeningHeightM
+                | Self::ListeningWidthDeg
+                | Self::RoomAmount
+                | Self::RoomSizeM
+                | Self::RoomDecayS
+                | Self::RoomTone
+                | Self::PlayersSpreadCents
+                | Self::PlayersWidth
+        )
+    }
 }

@@ -8,7 +8,7 @@ const BREATH_IN_S: f64 = 1.0;
 /// Most that a fall adds beside its own time, s: the air column that it leaves rings on a slower clock.
 const AFTER_FALL_S: f64 = 0.5;
 
-/// Scoop, fall, breath in, and the sounds of the keys.
+/// Scoop, fall, breath in, the sounds of the keys, and the slap of the tongue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Articulation {
     /// How far below its pitch a tongued note begins, cents, 0 (not)..=300. Default 0.
@@ -24,6 +24,8 @@ pub struct Articulation {
     pub breath_in: f32,
     /// How much is heard of pads and fingers, 0 (nothing)..=1 (at most 35 dB below a mezzo-forte). Default 0.
     pub key_sounds: f32,
+    /// How hard the tongue slaps the reed where a note is tongued, 0 (it does not)..=1, times the velocity. Default 0.
+    pub slap: f32,
 }
 
 impl Default for Articulation {
@@ -35,6 +37,7 @@ impl Default for Articulation {
             fall_s: 0.4,
             breath_in: 0.0,
             key_sounds: 0.0,
+            slap: 0.0,
         }
     }
 }
@@ -50,6 +53,7 @@ impl Articulation {
             fall_s: fix(self.fall_s, 0.05, 2.0, d.fall_s),
             breath_in: fix(self.breath_in, 0.0, 1.0, d.breath_in),
             key_sounds: fix(self.key_sounds, 0.0, 1.0, d.key_sounds),
+            slap: fix(self.slap, 0.0, 1.0, d.slap),
         }
     }
 

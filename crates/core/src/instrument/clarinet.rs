@@ -21,6 +21,7 @@ use crate::instrument::person::Person;
 use crate::instrument::player::{Player, PlayerState};
 use crate::instrument::scope::Scope;
 use crate::instrument::settings::Settings;
+use crate::instrument::stage::Chair;
 use crate::instrument::voice::{Probe, TICK, Voice};
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
@@ -83,6 +84,8 @@ pub struct Clarinet {
     scope: Scope,
     scope_on: bool,
     level: OutputLevel,
+    /// Where it is heard from depends on where its player sits among several.
+    chair: Chair,
     choke: Choke,
     /// Samples of silence since the player came to rest.
     quiet: u32,
@@ -170,6 +173,7 @@ impl Clarinet {
             scope,
             scope_on: false,
             level,
+            chair: Chair::default(),
             choke: Choke::new(host_rate_hz),
             quiet: 0,
             resets: 0,
@@ -183,13 +187,21 @@ impl Clarinet {
         self.listen();
     }
 
+    /// Sits down on a chair. Real-time safe.
+    pub(super) fn sit(&mut self, chair: Chair) {
+        if self.chair != chair {
+            self.chair = chair;
+            self.listen();
+        }
+    }
+
     /// The settings in use.
     pub fn settings(&self) -> &Settings {
         self.player.settings()
     }
 
     fn listen(&mut self) {
-        let listening = self.player.settings().listening;
+        let listening = self.chair.listening(&self.player.settings().listening);
         with_voice!(&mut self.voice, voice => voice.listen(&listening, self.stereo));
     }
 

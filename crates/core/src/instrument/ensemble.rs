@@ -2,7 +2,8 @@
 //!
 //! Every player gets the events that are for it, and no other. So a player in an ensemble gives the samples that it gives
 //! alone, to the bit, and voice, player and events stay apart. The players differ as [`Person`]s do, and sit side by
-//! side: each is panned with constant power, in addition to the pan of its events.
+//! side: each is panned with constant power, in addition to the pan of its events; from two places each is heard from its
+//! [`Chair`].
 //!
 //! With `n` players each is `1 / sqrt(n)` as loud as a lone one, whatever they play: all of them at once are about as loud as
 //! one. A limiter after the sum catches what comes together by chance. One player alone is a [`Clarinet`] to the bit.
@@ -17,13 +18,15 @@ use std::sync::Arc;
 use crate::dsp::glide::Glide;
 use crate::dsp::lanes::any_above;
 use crate::dsp::limiter::Limiter;
-use crate::event::{Event, PartEvent, Timed, To};
+use crate::event::{Event, PartEvent, SettingNumber, Timed, To};
 use crate::instrument::channels::Channels;
 use crate::instrument::clarinet::{Clarinet, Progress};
+use crate::instrument::listening::ListeningMode;
 use crate::instrument::model::{BuildError, Model};
 use crate::instrument::person::Person;
 use crate::instrument::players::{MOST_PLAYERS, Players, Split};
 use crate::instrument::settings::Settings;
+use crate::instrument::stage::Chair;
 use crate::instrument::stereo::gains;
 use section::Section;
 
@@ -69,9 +72,18 @@ impl Seat {
         }
     }
 
-    /// Goes to a place between left and right; who sleeps is there at once.
-    fn sit(&mut self, position: f32) {
-        for (side, gain) in self.sides.iter_mut().zip(gains(position)) {
+    /// Goes to a seat between left and right, from which its pan moves it; who sleeps is there at once.
+    fn sit(&mut self, seat: f32, pan: f32) {
+        let chair = Chair::new(seat);
+        self.clarinet.sit(chair);
+        let listening = self.clarinet.settings().listening;
+        let sides = if listening.mode == ListeningMode::Position {
+            let ([left, right], [left_pan, right_pan]) = (chair.gains(&listening), gains(pan));
+            [left * left_pan, right * right_pan]
+        } else {
+            gains((seat + pan).clamp(-1.0, 1.0))
+        };
+        for (side, gain) in self.sides.iter_mut().zip(sides) {
             if self.sleeps { side.set(gain) } else { side.go_to(gain) }
         }
     }
@@ -228,10 +240,14 @@ impl Ensemble {
     pub fn set_settings(&mut self, settings: &Settings) {
         let players = settings.players.clamped();
         let before = std::mem::replace(&mut self.players, players);
+        let listening = self.seats[0].clarinet.settings().listening;
         for seat in &mut self.seats[..players.number()] {
             seat.clarinet.set_settings(settings);
         }
         if before == players {
+            if listening != self.seats[0].clarinet.settings().listening {
+                self.arrange();
+            }
             return;
         }
         let stay = if before.split == players.split { before.number().min(players.number()) } else { 1 };
@@ -255,7 +271,27 @@ impl Ensemble {
             }
             // The pan of a lone player belongs to who calls.
             let pan = if count > 1 { seat.pan } else { 0.0 };
-            seat.sit((Person::seat(number, count, width) + pan).clamp(-1.0, 1.0));
+            seat.sit(Person::seat(number, count, width), pan);
+        }
+    }
+
+    /// A number of the settings of one player, or of all.
+    fn set_number(&mut self, number: SettingNumber, value: f32, player: Option<usize>) {
+        let (count, before) = (self.count(), (self.players, self.seats[0].clarinet.settings().listening));
+        for (_, seat) in self.seats[..count]
+            .iter_mut()
+            .enumerate()
+            .filter(|(at, _)| player.is_none_or(|player| player == *at))
+        {
+            let mut settings = *seat.clarinet.settings();
+            *settings.number(number) = value;
+            seat.clarinet.set_settings(&settings);
+        }
+        // The number of players and what they do with the notes are no such numbers: only seats and places can have moved.
+        let settings = self.seats[0].clarinet.settings();
+        self.players = settings.players;
+        if before != (settings.players, settings.listening) {
+            self.arrange();
         }
     }
 
@@ -265,9 +301,11 @@ impl Ensemble {
         let all = to == To::All || self.players.split == Split::Unison;
         let (count, width) = (self.count(), self.players.width);
         if let Event::Set(number, value) = event {
-            let mut settings = *self.seats[0].clarinet.settings();
-            *settings.number(number) = value;
-            return self.set_settings(&settings);
+            let player = match to {
+                To::Player(player) if !all && number.is_of_player() => Some(usize::from(player)),
+                _ => None,
+            };
+            return self.set_number(number, value, player);
         }
         for (number, seat) in self.seats.iter_mut().enumerate() {
             let is_meant = match number < count {
@@ -282,16 +320,20 @@ impl Ensemble {
             if let Event::Pan { position } = event {
                 seat.pan = if position.is_finite() { position.clamp(-1.0, 1.0) } else { 0.0 };
                 if count > 1 {
-                    seat.sit((Person::seat(number, count, width) + seat.pan).clamp(-1.0, 1.0));
+                    seat.sit(Person::seat(number, count, width), seat.pan);
                 }
             }
         }
     }
 
-    /// Takes over keys, breath and bend from another ensemble, which this new one with the same settings replaces. Real-time
-    /// safe.
+    /// Takes over keys, breath, bend and what single players have set from another ensemble, which this new one with the same
+    /// settings replaces. Real-time safe.
     pub fn carry_on(&mut self, from: &Self) {
-        for (seat, before) in self.seats.iter_mut().zip(&from.seats) {
+        let count = self.count();
+        for (number, (seat, before)) in self.seats.iter_mut().zip(&from.seats).enumerate() {
+            if number < count {
+                seat.clarinet.set_settings(before.clarinet.settings());
+            }
             seat.clarinet.carry_on(&before.clarinet);
             (seat.pan, seat.sides) = (before.pan, before.sides);
             if !before.sleeps {

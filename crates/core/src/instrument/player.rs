@@ -297,6 +297,10 @@ impl Player {
             self.swing.begin_note();
         }
         self.finger(fingering, slurred, model, voice);
+        let slap = self.settings.articulation.slap;
+        if !slurred && slap > 0.0 {
+            self.tongue_slap(slap * velocity, model, voice);
+        }
     }
 
     fn note_off<F: Real>(&mut self, note: SoundingNote, model: &Model, voice: &mut Voice<F>) {

@@ -55,6 +55,11 @@ impl Players {
         }
     }
 
+    /// Whether there are several who do not all sit in the middle.
+    pub fn sit_apart(&self) -> bool {
+        self.number() > 1 && self.clamped().width > 0.0
+    }
+
     /// How many, at least one.
     pub(super) fn number(&self) -> usize {
         self.clamped().count as usize

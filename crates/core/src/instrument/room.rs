@@ -3,7 +3,7 @@
 //! - [`Room`]: what a player can set, a part of [`Settings`](super::Settings)
 //! - `shoebox` (Design): where player and listener are, the images behind the walls, and how loud the room is
 //! - `room_design` (Coeffs): delays, gains and filters at one sample rate
-//! - `room_sound` (State): what is in the air, in `delay_line`s
+//! - `room_sound` (State): what is in the air, in `delay_line`s; `seats` is what comes from several players
 //!
 //! The dry sound stays as it is, and stands for the direct sound. Images of order 1 and 2 are exact in time and level
 //! (Allen & Berkley 1979, Image method for efficiently simulating small-room acoustics). Everything later comes from a
@@ -17,6 +17,7 @@
 mod delay_line;
 mod room_design;
 mod room_sound;
+mod seats;
 mod shoebox;
 #[cfg(test)]
 mod tests;

@@ -254,6 +254,7 @@ impl Settings {
             SettingNumber::FallS => &mut self.articulation.fall_s,
             SettingNumber::BreathIn => &mut self.articulation.breath_in,
             SettingNumber::KeySounds => &mut self.articulation.key_sounds,
+            SettingNumber::Slap => &mut self.articulation.slap,
             SettingNumber::Growl => &mut self.techniques.growl,
             SettingNumber::GrowlSemitones => &mut self.techniques.growl_semitones,
             SettingNumber::GrowlHz => &mut self.techniques.growl_hz,

@@ -71,6 +71,12 @@ impl Stereo {
         self.room.set(room);
     }
 
+    /// The room of these settings from the next block on, and whether several players sit apart in it.
+    pub fn set_space(&mut self, settings: &Settings) {
+        self.set_room(&settings.room);
+        self.room.set_apart(settings.players.sit_apart());
+    }
+
     /// The room: whether it still sounds, and how long it can.
     pub fn room(&self) -> &RoomSound {
         &self.room

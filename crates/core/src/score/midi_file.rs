@@ -8,12 +8,15 @@
 //! A damaged file is refused with the byte at which reading stopped; it is not played up to there.
 //! Source: Standard MIDI Files 1.0 (RP-001, 1988).
 
+mod tracks;
+
 use crate::control::midi::MidiDecoder;
 use crate::control::notes::{NoteAddress, NoteExpression};
 use crate::control::parts::Parts;
 use crate::event::{Event, PartEvent, Timed};
 use crate::score::timeline::Score;
 use midly::{EventIter, MetaMessage, MidiMessage, TrackEventKind};
+pub use tracks::read_tracks;
 
 /// Longest score, s. Sample positions stay far below the largest integer.
 const SECONDS_MAX: u32 = 6 * 3600;
@@ -76,6 +79,16 @@ pub enum MidiFileError {
     /// The file holds no notes.
     #[error("MIDI file holds no notes; expected at least one note-on")]
     NoNotes,
+    /// The file has more lines than there can be players.
+    #[error(
+        "MIDI file has {found} tracks or channels with notes; at most {most} can have a player each: play all of them together, or leave some out"
+    )]
+    Lines {
+        /// Tracks or channels with notes.
+        found: usize,
+        /// Most players.
+        most: usize,
+    },
     /// The file lasts longer than 6 hours.
     #[error("MIDI file lasts {hours:.1} hours; at most {} can be rendered", SECONDS_MAX / 3600)]
     TooLong {
@@ -95,6 +108,8 @@ fn begins(bytes: &[u8]) -> String {
 /// A message of any track, with its position in ticks.
 struct Message<'a> {
     tick: u64,
+    /// Track, counted from 1.
+    track: usize,
     kind: TrackEventKind<'a>,
 }
 
@@ -273,7 +288,7 @@ fn read_track<'a>(
         match track_events.next() {
             Some(Ok(event)) => {
                 tick += u64::from(event.delta.as_int());
-                messages.push(Message { tick, kind: event.kind });
+                messages.push(Message { tick, track, kind: event.kind });
                 if event.kind == TrackEventKind::Meta(MetaMessage::EndOfTrack) {
                     return Ok(());
                 }
@@ -297,7 +312,7 @@ mod tests {
     use crate::units::SoundingNote;
 
     /// A file from a division and the bodies of its tracks.
-    fn file(format: u8, division: [u8; 2], tracks: &[&[u8]]) -> Vec<u8> {
+    pub(super) fn file(format: u8, division: [u8; 2], tracks: &[&[u8]]) -> Vec<u8> {
         let mut bytes = b"MThd\0\0\0\x06\0".to_vec();
         bytes.extend([format, 0, tracks.len() as u8, division[0], division[1]]);
         for track in tracks {

@@ -1,7 +1,7 @@
 //! The blocks of a score on two channels, panned as the plugin pans them.
 
 use crate::event::{Event, Timed};
-use crate::instrument::room::Room;
+use crate::instrument::Settings;
 use crate::instrument::stereo::Stereo;
 use crate::score::play::take_before;
 use crate::score::timeline::Score;
@@ -37,9 +37,9 @@ impl<'a> StereoBlocks<'a> {
         }
     }
 
-    /// In a room.
-    pub fn in_room(mut self, room: &Room) -> Self {
-        self.stereo.set_room(room);
+    /// In the room of these settings.
+    pub fn in_room(mut self, settings: &Settings) -> Self {
+        self.stereo.set_space(settings);
         self
     }
 

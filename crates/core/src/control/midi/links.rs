@@ -94,6 +94,16 @@ impl Links {
         self.all.iter().flatten().any(|link| link.source == source)
     }
 
+    /// Whether a source moves only what each of several players can have for itself; `None` if it is not linked.
+    pub fn is_of_player(&self, source: Source) -> Option<bool> {
+        let mut its = self.all.iter().flatten().filter(|link| link.source == source).peekable();
+        its.peek()?;
+        Some(its.all(|link| match link.target {
+            Target::Breath => true,
+            Target::Number(number) => number.is_of_player(),
+        }))
+    }
+
     /// A source speaks; the events that this makes.
     pub fn hear(&mut self, source: Source, raw: u8) -> impl Iterator<Item = Event> + '_ {
         self.all.iter().zip(&mut self.raws).filter_map(move |(link, place)| {
@@ -140,6 +150,17 @@ impl Links {
         })
     }
 
+    /// What these links of one of several players say otherwise than those of the first, where each can have a value of its own: a
+    /// controller that has spoken to the first alone leaves the setting its own value here.
+    pub fn beside<'a>(&'a self, first: &'a Self) -> impl Iterator<Item = (SettingNumber, f32)> + 'a {
+        let of_first = first.raws.iter().map(Option::is_some);
+        let own = self.all.iter().zip(of_first).filter_map(|(link, spoken)| match link {
+            Some(link @ Link { target: Target::Number(number), .. }) if spoken => Some((*number, link.own)),
+            _ => None,
+        });
+        own.chain(self.numbers()).filter(|(number, _)| number.is_of_player())
+    }
+
     /// All controllers count as if they had not spoken.
     pub fn forget(&mut self) {
         self.raws = [None; MOST];
@@ -176,6 +197,25 @@ mod tests {
         assert_eq!(links.hear(b, 0).collect::<Vec<_>>(), [Event::Set(GROWL, 0.5)]);
         let numbers: Vec<f32> = links.numbers().map(|(_, value)| value).collect();
         assert_eq!(numbers, [1.0, 0.0, 0.5]);
+    }
+
+    #[test]
+    fn who_is_beside_the_first_has_values_of_its_own() {
+        let [a, b] = [Source::Controller(21), Source::Controller(22)];
+        let all = of(&[link(a, GROWL, 0.0, 1.0), link(b, SettingNumber::RoomAmount, 0.0, 1.0)]);
+        let [mut first, mut second] = [Links::default(); 2];
+        first.set(&all);
+        second.set(&all);
+        assert_eq!((first.is_of_player(a), first.is_of_player(b)), (Some(true), Some(false)));
+        assert_eq!(first.is_of_player(Source::Pressure), None);
+        first.hear(a, 127).for_each(drop);
+        for links in [&mut first, &mut second] {
+            links.hear(b, 127).for_each(drop);
+        }
+        let last = |links: &Links| links.beside(&first).last();
+        assert_eq!(last(&second), Some((GROWL, 0.3)), "not what the first was told; the room is the same");
+        second.hear(a, 0).for_each(drop);
+        assert_eq!(last(&second), Some((GROWL, 0.0)));
     }
 
     #[test]

@@ -1,5 +1,7 @@
 use super::*;
+use crate::control::midi::links::Target;
 use crate::dsp::white::White;
+use crate::event::SettingNumber;
 use crate::units::SoundingNote;
 
 fn said(events: &[PartEvent]) -> Vec<(u8, Event)> {
@@ -112,6 +114,42 @@ fn bends_pressure_and_breath_of_a_member_channel_are_for_its_note() {
     // The manager's breath is everybody's.
     let all = said(parts.controller(0, 2, 90));
     assert!(all.starts_with(&[(0, Event::Breath(90.0 / 127.0)), (1, Event::Breath(90.0 / 127.0))]));
+}
+
+/// Controller 74 opens the lip, controller 21 the room.
+fn linked() -> [Option<Link>; MOST_LINKS] {
+    let link = |cc, number| {
+        let (source, target) = (Source::Controller(cc), Target::Number(number));
+        Link { source, target, low: 0.0, high: 1.0, curve: 1.0, own: 0.5 }
+    };
+    let mut links = [None; MOST_LINKS];
+    links[0] = Some(link(74, SettingNumber::Lip));
+    links[1] = Some(link(21, SettingNumber::RoomAmount));
+    links
+}
+
+#[test]
+fn a_linked_controller_of_a_member_channel_is_for_its_note_unless_all_share_what_it_sets() {
+    let mut parts = Parts::of(MidiDecoder::new().with_mpe(), 2);
+    parts.set_links(&linked());
+    assert_eq!(said(parts.controller(1, 74, 127)), [], "nobody plays there yet");
+    let lip = |part, value| (part, Event::Set(SettingNumber::Lip, value));
+    assert_eq!(said(parts.note_on(1, 60, 100)), [lip(0, 1.0), on(0, 60)], "what came before the note is its");
+    assert_eq!(said(parts.note_on(2, 64, 100)), [on(1, 64)]);
+    assert_eq!(said(parts.controller(2, 74, 0)), [lip(1, 0.0)]);
+    assert_eq!(
+        said(parts.controller(0, 74, 127)),
+        [lip(0, 1.0), lip(1, 1.0)],
+        "the manager's is everybody's"
+    );
+    let room = |part| (part, Event::Set(SettingNumber::RoomAmount, 1.0));
+    assert_eq!(said(parts.controller(1, 21, 127)), [room(0), room(1)]);
+    // Who takes the setting in hand takes it from the next note too.
+    let mut by_hand = linked();
+    by_hand[0].as_mut().unwrap().own = 0.2;
+    assert!(parts.set_links(&by_hand));
+    parts.note_off(1, 60);
+    assert_eq!(said(parts.note_on(1, 60, 100)), [on(0, 60)]);
 }
 
 #[test]

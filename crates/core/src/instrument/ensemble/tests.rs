@@ -1,6 +1,7 @@
 use super::*;
 use crate::analysis::pitch;
 use crate::dsp::white::White;
+use crate::instrument::listening::Listening;
 use crate::units::SoundingNote;
 
 const RATE_HZ: f64 = 48_000.0;
@@ -224,6 +225,51 @@ fn every_player_is_out_of_tune_by_its_share_of_the_spread() {
         let in_tune = Players { spread_cents: 0.0, ..players };
         let cents = 1_200.0 * (hz(player, in_tune) / first).log2();
         assert!(cents.abs() < 0.1, "{player}: {cents}");
+    }
+}
+
+#[test]
+fn a_number_of_one_player_leaves_the_others_alone() {
+    let duet = |to: To| {
+        let mut duet = ensemble(Players { count: 2, ..Players::default() });
+        duet.apply(PartEvent { to, event: Event::Set(SettingNumber::Lip, 0.8) });
+        duet
+    };
+    let lips = |duet: &Ensemble| [0, 1].map(|player| duet.seats[player].clarinet.settings().lip);
+    let usual = Settings::default().lip;
+    assert_eq!(lips(&duet(To::Player(1))), [usual, 0.8]);
+    assert_eq!(lips(&duet(To::All)), [0.8, 0.8]);
+    // What belongs to all is set for all, and leaves each its own.
+    let mut one = duet(To::Player(0));
+    one.apply(to(1, Event::Set(SettingNumber::PlayersWidth, 0.1)));
+    assert_eq!((lips(&one), one.players.width), ([0.8, usual], 0.1));
+    // Another instrument goes on so; settings are for all.
+    let mut next = ensemble(one.players);
+    next.carry_on(&one);
+    assert_eq!(lips(&next), [0.8, usual]);
+    one.set_settings(&Settings { players: one.players, ..Settings::default() });
+    assert_eq!(lips(&one), [usual; 2]);
+}
+
+#[test]
+fn from_two_places_the_nearer_player_is_louder_and_the_first_is_as_alone() {
+    let listening = Listening { mode: ListeningMode::Position, angle_deg: 0.0, ..Listening::default() };
+    let still = Settings { life: 0.0, noise: 0.0, listening, ..Settings::default() };
+    let players = Players { count: 3, spread_cents: 0.0, width: 0.7, split: Split::Chords };
+    let powers = [0, 1, 2].map(|player| heard(player, players, &still).map(|side| power(&side)));
+    // Distances by hand: the right player is at 0.572 m, 1.4 m; the places at 0.866 m, 0.5 m to either side.
+    let wanted = 20.0 * (0.294_f64.hypot(1.9) / 0.294_f64.hypot(0.9)).log10();
+    let [_, right, left] = powers.map(|[left, right]| db(right / left));
+    // Each is also heard from other angles at the two places: some decibels.
+    assert!(
+        (right - wanted).abs() < 3.0 && (left + wanted).abs() < 3.0,
+        "{right} and {left} dB for {wanted}"
+    );
+    let alone = heard(0, Players::default(), &still);
+    let [left, right] = heard(0, players, &still);
+    let gain = 3.0_f32.sqrt();
+    for (a, b) in alone.iter().flatten().zip(left.iter().chain(&right)) {
+        assert!((a - gain * b).abs() < 1e-6, "{a} {b}");
     }
 }
 

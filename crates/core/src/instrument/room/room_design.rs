@@ -57,6 +57,8 @@ pub struct Tap {
 pub struct RoomDesign {
     /// Images for the left and the right ear.
     pub early: [[Tap; IMAGES]; 2],
+    /// The same of who sits at the left and the right end of several players.
+    pub ends: [[[Tap; IMAGES]; 2]; 2],
     /// Pole of what a wall takes away from high tones, a low-pass that leaves the low ones.
     pub wall_pole: f32,
     /// Samples after which the sound enters the lines.
@@ -104,10 +106,13 @@ impl RoomDesign {
         let mut times = images[0].map(|image| image.delay_s);
         times.sort_by(f64::total_cmp);
         let early = images.map(|ear| ear.map(tap));
+        let ends = [-1.0, 1.0].map(|end| [-1.0, 1.0].map(|side| box_.images_of_end(end, side).map(tap)));
         let into_lines = samples(times[IMAGES / 2]).saturating_sub(delays[0]);
-        let longest = early.iter().flatten().map(|tap| tap.delay).fold(into_lines, usize::max);
+        let all_taps = early.iter().flatten().chain(ends.iter().flatten().flatten());
+        let longest = all_taps.map(|tap| tap.delay).fold(into_lines, usize::max);
         Self {
             early,
+            ends,
             wall_pole: OnePole::new(1.0, box_.reflection(bright_s) / box_.reflection(decay_s), w).pole,
             into_lines,
             delays,

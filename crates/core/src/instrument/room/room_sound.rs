@@ -3,7 +3,8 @@
 
 use super::Room;
 use super::delay_line::{DelayLine, PIECE};
-use super::room_design::{LINES, LONGEST_EARLY_S, RoomDesign};
+use super::room_design::{LINES, LONGEST_EARLY_S, RoomDesign, Tap};
+use super::seats::Seats;
 use crate::dsp::glide::Glide;
 
 /// Time that a change of the amount takes, s.
@@ -48,6 +49,8 @@ pub struct RoomSound {
     /// What has left the instrument, less what a wall takes.
     source: DelayLine,
     wall: f32,
+    /// The same from the seats of several players.
+    seats: Seats,
     lines: [DelayLine; LINES],
     heard: Box<Heard>,
     heard_before: Box<Heard>,
@@ -71,11 +74,18 @@ struct Heard {
     ears: [Piece; 2],
     lines: [Piece; LINES],
     into: Piece,
+    /// What goes in from the left and from the right end of several players, into every other line.
+    ends_into: [Piece; 2],
 }
 
 impl Default for Heard {
     fn default() -> Self {
-        Self { ears: [[0.0; PIECE]; 2], lines: [[0.0; PIECE]; LINES], into: [0.0; PIECE] }
+        Self {
+            ears: [[0.0; PIECE]; 2],
+            lines: [[0.0; PIECE]; LINES],
+            into: [0.0; PIECE],
+            ends_into: [[0.0; PIECE]; 2],
+        }
     }
 }
 
@@ -98,6 +108,7 @@ impl RoomSound {
             fade: ((FADE_S * rate_hz) as usize).max(1),
             source: DelayLine::new(early),
             wall: 0.0,
+            seats: Seats::new(early, rate_hz),
             lines: std::array::from_fn(|_| DelayLine::new(RoomDesign::longest_line(rate_hz))),
             heard: Box::default(),
             heard_before: Box::default(),
@@ -119,6 +130,11 @@ impl RoomSound {
         } else {
             self.amount.go_to(self.wanted.amount);
         }
+    }
+
+    /// Whether the two channels sound from two places, as several players do who sit apart, or together from one.
+    pub fn set_apart(&mut self, apart: bool) {
+        self.seats.set(apart, self.asleep);
     }
 
     /// Whether anything is added: otherwise [`add`](Self::add) costs nothing.
@@ -151,6 +167,7 @@ impl RoomSound {
         if !self.asleep {
             self.source.clear();
             self.lines.iter_mut().for_each(DelayLine::clear);
+            self.seats.clear();
             self.now.filters = [0.0; LINES];
             self.before.filters = [0.0; LINES];
         }
@@ -219,26 +236,33 @@ impl RoomSound {
         for n in 0..samples {
             source[n] = 0.5 * (left[n] + right[n]);
         }
+        let door = self.door;
         if !self.door.rests_at(1.0) {
             source[..samples].iter_mut().for_each(|x| *x *= self.door.next());
         }
         let (new, old) = (self.now.design.wall_pole, self.before.design.wall_pole);
+        let poles = weights.map(|weight| old + weight * (new - old));
+        let has_seats = self.seats.are_heard();
+        if has_seats {
+            self.seats.write(left, right, &mut source[..samples], &poles, door);
+        }
         let mut y = self.wall;
-        for (x, weight) in source[..samples].iter_mut().zip(&weights) {
-            let pole = old + weight * (new - old);
+        for (x, pole) in source[..samples].iter_mut().zip(&poles) {
             y = *x + pole * (y - *x);
             *x = y;
         }
         self.wall = y;
         self.source.write(&source[..samples]);
+        let seats = has_seats.then_some(&self.seats);
 
         let heard = &mut *self.heard;
-        self.now.hear(&self.source, &self.lines, samples, heard);
+        self.now.hear(&self.source, seats, &self.lines, samples, heard);
         let mut gains = [self.now.design.late; PIECE];
         if self.fading > 0 {
             let before = &mut *self.heard_before;
-            self.before.hear(&self.source, &self.lines, samples, before);
+            self.before.hear(&self.source, seats, &self.lines, samples, before);
             mix(&mut heard.into, &before.into, &weights);
+            heard.ends_into.iter_mut().zip(&before.ends_into).for_each(|(new, old)| mix(new, old, &weights));
             heard.ears.iter_mut().zip(&before.ears).for_each(|(new, old)| mix(new, old, &weights));
             heard.lines.iter_mut().zip(&before.lines).for_each(|(new, old)| mix(new, old, &weights));
             mix(&mut gains, &[self.before.design.late; PIECE], &weights);
@@ -249,6 +273,9 @@ impl RoomSound {
         }
 
         scatter(heard, &gains);
+        if has_seats {
+            enter_from_seats(heard);
+        }
         for (line, row) in self.lines.iter_mut().zip(&heard.lines) {
             line.write(&row[..samples]);
         }
@@ -295,23 +322,27 @@ impl RoomSound {
 
 impl Listener {
     /// What the ears hear of the images, what comes out of the lines, and what goes in. Beyond `samples` it has no meaning.
-    fn hear(&mut self, source: &DelayLine, lines: &[DelayLine; LINES], samples: usize, heard: &mut Heard) {
+    fn hear(
+        &mut self,
+        source: &DelayLine,
+        seats: Option<&Seats>,
+        lines: &[DelayLine; LINES],
+        samples: usize,
+        heard: &mut Heard,
+    ) {
         let Self { design, filters } = self;
         for (ear, taps) in heard.ears.iter_mut().zip(&design.early) {
             // To -0 anything may be added without a change, even -0.
             ear[..samples].fill(-0.0);
-            for taps in taps.as_chunks::<8>().0 {
-                let [a, b, c, d, e, f, g, h] = taps.map(|tap| source.read_written(tap.delay, samples));
-                let [p, q, r, s, t, u, v, w] = taps.map(|tap| tap.gain);
-                let first = a.iter().zip(b).zip(c.iter().zip(d));
-                let second = e.iter().zip(f).zip(g.iter().zip(h));
-                for (ear, (((a, b), (c, d)), ((e, f), (g, h)))) in ear.iter_mut().zip(first.zip(second)) {
-                    // In two sums of four.
-                    *ear = *ear + (p * a + q * b + r * c + s * d) + (t * e + u * f + v * g + w * h);
-                }
-            }
+            hear(source, taps, &mut ear[..samples]);
         }
         heard.into[..samples].copy_from_slice(source.read_written(design.into_lines, samples));
+        if let Some(seats) = seats {
+            seats.hear(design, &mut heard.ears, samples);
+            for (own, entering) in heard.ends_into.iter_mut().zip(seats.enter(design, samples)) {
+                own[..samples].copy_from_slice(entering);
+            }
+        }
         for (line, row) in heard.lines.iter_mut().enumerate() {
             let (loss, mut y) = (design.losses[line], filters[line]);
             let arriving = lines[line].read(design.delays[line], samples);
@@ -332,6 +363,22 @@ impl Listener {
     }
 }
 
+/// Adds what an ear hears of images.
+#[inline(always)]
+pub(super) fn hear(source: &DelayLine, taps: &[Tap], ear: &mut [f32]) {
+    let samples = ear.len();
+    for taps in taps.as_chunks::<8>().0 {
+        let [a, b, c, d, e, f, g, h] = taps.map(|tap| source.read_written(tap.delay, samples));
+        let [p, q, r, s, t, u, v, w] = taps.map(|tap| tap.gain);
+        let first = a.iter().zip(b).zip(c.iter().zip(d));
+        let second = e.iter().zip(f).zip(g.iter().zip(h));
+        for (ear, (((a, b), (c, d)), ((e, f), (g, h)))) in ear.iter_mut().zip(first.zip(second)) {
+            // In two sums of four.
+            *ear = *ear + (p * a + q * b + r * c + s * d) + (t * e + u * f + v * g + w * h);
+        }
+    }
+}
+
 /// Where `weights` is 1 it is the new sound, where it is 0 the old one.
 fn mix(new: &mut Piece, old: &Piece, weights: &Piece) {
     for n in 0..PIECE {
@@ -339,10 +386,20 @@ fn mix(new: &mut Piece, old: &Piece, weights: &Piece) {
     }
 }
 
+/// What comes from the left and the right end of the seats joins every other line: as much energy as joins all lines from one
+/// place.
+fn enter_from_seats(heard: &mut Heard) {
+    for (row, line) in heard.lines.iter_mut().enumerate() {
+        for (line, into) in line.iter_mut().zip(&heard.ends_into[row % 2]) {
+            *line += 0.25 * std::f32::consts::SQRT_2 * into;
+        }
+    }
+}
+
 /// The Hadamard matrix: each line goes into all, with equal power. What comes out of its rows 5 and 10 is heard by the ears,
 /// any two rows but the first, which is all in phase; then the new sound joins all of them. Two stages at a time.
 fn scatter(heard: &mut Heard, gains: &Piece) {
-    let Heard { ears: [left, right], lines, into } = heard;
+    let Heard { ears: [left, right], lines, into, .. } = heard;
     for quad in lines.as_chunks_mut::<4>().0 {
         let [a, b, c, d] = quad;
         for n in 0..PIECE {

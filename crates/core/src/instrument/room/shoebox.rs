@@ -18,6 +18,9 @@ const RISE: f64 = 0.25;
 /// Where player and listener are, over length and width; not in the middle, where images coincide.
 const PLAYER: [f64; 2] = [0.25, 0.45];
 const LISTENER: [f64; 2] = [0.5, 0.55];
+/// How far to either side of the player several players sit at most, over the width: nobody sits in a wall, and from where the
+/// listener is the outermost are 45 degrees to the side, as the pan has them.
+const SEATS: f64 = 0.35;
 /// Heights of the middle of a clarinet and of ears, of people who sit, m.
 const PLAYER_M: f64 = 0.9;
 const LISTENER_M: f64 = 1.2;
@@ -97,8 +100,20 @@ impl Shoebox {
 
     /// All images up to order 2 at the left (`side` -1) or right (1) ear of a listener who looks at the player.
     pub fn images(&self, side: f64) -> [Image; IMAGES] {
-        let (player, mut ear) = (self.player(), self.listener());
+        self.images_of(self.player(), side)
+    }
+
+    /// The same for who sits at the left (`end` -1) or right (1) end of several players.
+    pub fn images_of_end(&self, end: f64, side: f64) -> [Image; IMAGES] {
+        let [along, across, up] = self.player();
+        self.images_of([along, across + end * SEATS * self.size_m[1], up], side)
+    }
+
+    fn images_of(&self, player: [f64; 3], side: f64) -> [Image; IMAGES] {
+        let mut ear = self.listener();
         let direct = self.distance_m(player, ear);
+        // All are as loud, wherever they sit.
+        let usual = self.distance_m(self.player(), ear);
         // The listener looks along the length, towards smaller x.
         ear[1] += side * EAR_M;
         let reflection = self.reflection(self.decay_s);
@@ -110,7 +125,7 @@ impl Shoebox {
             let way = self.distance_m(place, ear);
             // An ear may be nearer than the middle of the head, but no reflection comes before the direct sound.
             image.delay_s = (way - direct).max(0.0) / self.sound_m_s;
-            image.gain = direct / way * reflection.powi(order(&cell));
+            image.gain = usual / way * reflection.powi(order(&cell));
         }
         images
     }

@@ -292,3 +292,98 @@ fn changes_do_not_click() {
         assert!(moved < 3.0 * still + 1e-4, "{what}: {moved} against {still}");
     }
 }
+
+/// The answers of a room to an impulse between left (-1) and right (1), of several players.
+fn answer_at(room: &Room, position: f32, seconds: f64) -> [Vec<f32>; 2] {
+    let mut sound = RoomSound::new(48_000.0);
+    sound.set(room);
+    sound.set_apart(true);
+    let dry = crate::instrument::stereo::gains(position).map(|gain| {
+        let mut dry = vec![0.0; (seconds * 48_000.0) as usize];
+        dry[0] = gain;
+        dry
+    });
+    let [mut left, mut right] = dry.clone();
+    sound.add(&mut left, &mut right);
+    let less = |heard: Vec<f32>, dry: &[f32]| heard.iter().zip(dry).map(|(wet, dry)| wet - dry).collect();
+    [less(left, &dry[0]), less(right, &dry[1])]
+}
+
+#[test]
+fn each_seat_has_its_own_reflections_and_the_same_loudness() {
+    for size_m in ALL_SIZES_M {
+        let here = room(size_m, 1.2, 0.5);
+        let [lone, _] = impulse_response(&here, 48_000.0, 1.8);
+        let heard = [-1.0, -0.5, 0.0, 0.5, 1.0].map(|position| answer_at(&here, position, 1.8));
+        for [left, right] in &heard {
+            let level = 10.0 * (0.5 * (energy(left) + energy(right)) / energy(&lone)).log10();
+            assert!(level.abs() < 1.0, "{size_m} m: {level:+.2} dB");
+        }
+        // The first reflections of who sits at an end come from there: nearer to that ear, by the way between the ears.
+        let images = |end: f64, side: f64| Shoebox::new(&here).images_of_end(end, side);
+        for (answer, end) in [(&heard[0], -1.0), (&heard[4], 1.0)] {
+            for (ear, side) in answer.iter().zip([-1.0, 1.0]) {
+                let first_s = images(end, side).iter().map(|image| image.delay_s).fold(1.0, f64::min);
+                let at = ear.iter().position(|&x| x.abs() > 1e-4).unwrap();
+                assert_eq!(at, (first_s * 48_000.0).round() as usize, "{size_m} m, {end}");
+            }
+        }
+        // Two ends have little in common.
+        let both: f64 = heard[0][0].iter().zip(&heard[4][0]).map(|(a, b)| f64::from(a * b)).sum();
+        let apart = (both / (energy(&heard[0][0]) * energy(&heard[4][0])).sqrt()).abs();
+        assert!(apart < 0.2, "{size_m} m: {apart}");
+    }
+}
+
+/// Noise on both channels for a second, and silence: players sit down and one stays, in blocks of so many samples.
+fn with_seats(block: usize) -> [Vec<f32>; 2] {
+    let mut sound = RoomSound::new(48_000.0);
+    sound.set(&room(6.0, 0.4, 0.3));
+    let mut left = noise(48_000);
+    let mut right: Vec<f32> = left.iter().rev().copied().collect();
+    for channel in [&mut left, &mut right] {
+        channel.resize(144_000, 0.0);
+    }
+    let mut done = 0;
+    for (end, apart) in [(9_000, true), (9_500, false), (20_000, true), (45_000, false), (144_000, false)] {
+        while done < end {
+            let to = end.min(done + block);
+            sound.add(&mut left[done..to], &mut right[done..to]);
+            done = to;
+        }
+        sound.set_apart(apart);
+    }
+    assert!(sound.is_silent());
+    [left, right]
+}
+
+#[test]
+fn seats_do_not_depend_on_blocks_and_leave_silence() {
+    let whole = with_seats(144_000);
+    for block in [1, 17, 64, 1_000] {
+        assert!(with_seats(block) == whole, "blocks of {block}");
+    }
+    assert!(whole.iter().all(|channel| channel[140_000..].iter().all(|&x| x == 0.0)));
+}
+
+#[test]
+fn to_sit_down_during_a_note_does_not_click() {
+    let tone: Vec<f32> = (0..96_000).map(|n| 0.3 * (n as f32 * 0.01).sin()).collect();
+    let roughest = |seats: &[(usize, bool)]| {
+        let mut sound = RoomSound::new(48_000.0);
+        sound.set(&room(12.0, 1.2, 0.5));
+        let (mut left, mut right) = (tone.clone(), tone.clone());
+        for (n, (left, right)) in left.chunks_mut(480).zip(right.chunks_mut(480)).enumerate() {
+            for &(_, apart) in seats.iter().filter(|(at, _)| *at == n) {
+                sound.set_apart(apart);
+            }
+            sound.add(left, right);
+        }
+        left[48_000..].windows(3).map(|x| (x[2] - 2.0 * x[1] + x[0]).abs()).fold(0.0, f32::max)
+    };
+    let still = roughest(&[]);
+    for seats in [&[(120, true)][..], &[(10, true), (120, false)]] {
+        let moved = roughest(seats);
+        assert!(moved < 3.0 * still + 1e-4, "{seats:?}: {moved} against {still}");
+    }
+}

@@ -1,0 +1,196 @@
+//! A MIDI file as the lines of several players: one for each track.
+//!
+//! Each track that holds notes is a line. Where all notes are in one track, as in every file of format 0, each channel with
+//! notes is a line. A player hears the messages of its line and no others, so that each has a breath, volume and place of its
+//! own. A message of no line, for example a controller in a track without notes, goes to the lines with notes on its channel,
+//! or to all if there are none.
+
+use super::{MidiFileError, decode, merged};
+use crate::control::midi::MidiDecoder;
+use crate::control::parts::{MOST, Parts};
+use crate::event::{Event, PartEvent, Timed, To};
+use crate::score::timeline::Score;
+use midly::{MetaMessage, MidiMessage, TrackEventKind};
+
+/// One track, or one channel of the only track with notes.
+struct Line {
+    track: usize,
+    /// Channels with notes, as bits.
+    channels: u16,
+    /// Whether messages on other channels are of another line, or of none.
+    is_channel: bool,
+    parts: Parts,
+}
+
+impl Line {
+    /// Whether a message of this track and channel is this line's.
+    fn has(&self, track: usize, channel: u8) -> bool {
+        track == self.track && (!self.is_channel || self.is_on(channel))
+    }
+
+    fn is_on(&self, channel: u8) -> bool {
+        self.channels >> channel & 1 == 1
+    }
+}
+
+/// Reads the bytes of a file as a score at the sample rate `rate`, Hz, with a player for each line, the first one first. Returns how
+/// many there are, too. Each line has a decoder that begins as `decoder`.
+///
+/// # Errors
+///
+/// As [`read`](super::read), and [`MidiFileError::Lines`] if there are more lines than players.
+pub fn read_tracks(
+    decoder: &MidiDecoder,
+    bytes: &[u8],
+    rate: u32,
+) -> Result<(Score<PartEvent>, usize), MidiFileError> {
+    let (mut clock, messages) = merged(bytes)?;
+    let noted = messages.iter().filter_map(|message| match message.kind {
+        TrackEventKind::Midi { channel, message: MidiMessage::NoteOn { vel, .. } } if vel > 0 => {
+            Some((message.track, channel.as_int()))
+        }
+        _ => None,
+    });
+    let mut lines = lines(noted, decoder);
+    match lines.len() {
+        0 => return Err(MidiFileError::NoNotes),
+        found if found > MOST => return Err(MidiFileError::Lines { found, most: MOST }),
+        _ => {}
+    }
+    let (mut events, mut tick, mut notes) = (Vec::new(), 0, 0_usize);
+    for message in messages {
+        clock.advance(message.tick - tick);
+        tick = message.tick;
+        let (channel, midi) = match message.kind {
+            TrackEventKind::Midi { channel, message } => (channel.as_int(), message),
+            TrackEventKind::Meta(MetaMessage::Tempo(us)) => {
+                clock.set_tempo(us.as_int());
+                continue;
+            }
+            _ => continue,
+        };
+        let at = clock.sample(rate)?;
+        let (is_owned, is_shared) = (
+            lines.iter().any(|line| line.has(message.track, channel)),
+            lines.iter().any(|line| line.is_on(channel)),
+        );
+        for (player, line) in lines.iter_mut().enumerate() {
+            let hears = match (is_owned, is_shared) {
+                (true, _) => line.has(message.track, channel),
+                (false, true) => line.is_on(channel),
+                (false, false) => true,
+            };
+            if !hears {
+                continue;
+            }
+            for &PartEvent { event, .. } in decode(&mut line.parts, channel, midi) {
+                notes += usize::from(matches!(event, Event::NoteOn { .. }));
+                events.push(Timed { at, event: PartEvent { to: To::Player(player as u8), event } });
+            }
+        }
+    }
+    if notes == 0 {
+        return Err(MidiFileError::NoNotes);
+    }
+    let samples = events.last().map_or(0, |last| last.at);
+    Ok((Score { events, samples }, lines.len()))
+}
+
+/// The lines of notes on these tracks and channels, in the order of the file.
+fn lines(noted: impl Iterator<Item = (usize, u8)>, decoder: &MidiDecoder) -> Vec<Line> {
+    let mut tracks: Vec<(usize, u16)> = Vec::new();
+    for (track, channel) in noted {
+        match tracks.iter_mut().find(|(known, _)| *known == track) {
+            Some((_, channels)) => *channels |= 1 << channel,
+            None => tracks.push((track, 1 << channel)),
+        }
+    }
+    tracks.sort_unstable();
+    let is_channel = tracks.len() == 1;
+    if let [(track, channels)] = tracks[..] {
+        let each = (0..16).map(|channel| channels & 1 << channel).filter(|&channel| channel != 0);
+        tracks = each.map(|channel| (track, channel)).collect();
+    }
+    let line = |(track, channels)| Line { track, channels, is_channel, parts: Parts::of(decoder.clone(), 1) };
+    tracks.into_iter().map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::file;
+    use super::*;
+    use crate::units::SoundingNote;
+
+    const END: [u8; 4] = [0, 0xFF, 0x2F, 0];
+
+    /// A track with a note of this key on this channel, after other messages at its beginning.
+    fn track(channel: u8, key: u8, first: &[u8]) -> Vec<u8> {
+        let note = [0, 0x90 | channel, key, 64, 96, 0x80 | channel, key, 0];
+        [first, &note, &END].concat()
+    }
+
+    fn lines_of(format: u8, tracks: &[&[u8]]) -> (Vec<PartEvent>, usize) {
+        let (score, lines) =
+            read_tracks(&MidiDecoder::new(), &file(format, [0, 96], tracks), 48_000).unwrap();
+        (score.events.iter().map(|timed| timed.event).collect(), lines)
+    }
+
+    /// Who begins which note.
+    fn notes(events: &[PartEvent]) -> Vec<(To, u8)> {
+        let begins = |event: &PartEvent| match event.event {
+            Event::NoteOn { note: SoundingNote(key), .. } => Some((event.to, key)),
+            _ => None,
+        };
+        events.iter().filter_map(begins).collect()
+    }
+
+    /// Who gets a pan, and which.
+    fn pans(events: &[PartEvent]) -> Vec<(To, bool)> {
+        let pan = |event: &PartEvent| match event.event {
+            Event::Pan { position } => Some((event.to, position > 0.0)),
+            _ => None,
+        };
+        events.iter().filter_map(pan).collect()
+    }
+
+    #[test]
+    fn each_track_with_notes_has_a_player_and_hears_itself_alone() {
+        // Both play on channel 1; the second is panned to the right. The first track has a tempo and no notes.
+        let tempo = [&[0, 0xFF, 0x51, 3, 0x0F, 0x42, 0x40][..], &END].concat();
+        let (one, two) = (track(0, 60, &[]), track(0, 64, &[0, 0xB0, 10, 100]));
+        let (events, lines) = lines_of(1, &[&tempo, &one, &two]);
+        assert_eq!(lines, 2);
+        assert_eq!(notes(&events), [(To::Player(0), 60), (To::Player(1), 64)]);
+        assert_eq!(pans(&events), [(To::Player(1), true)]);
+        let bytes = file(1, [0, 96], &[&tempo, &one, &two]);
+        let (score, _) = read_tracks(&MidiDecoder::new(), &bytes, 48_000).unwrap();
+        assert_eq!(score.samples, 48_000, "a beat of a second");
+    }
+
+    #[test]
+    fn in_one_track_each_channel_has_a_player() {
+        let body = [&[0, 0x90, 60, 64, 0, 0x93, 64, 64, 0, 0xB3, 10, 0][..], &END].concat();
+        let (events, lines) = lines_of(0, &[&body]);
+        assert_eq!((lines, notes(&events)), (2, vec![(To::Player(0), 60), (To::Player(1), 64)]));
+        assert_eq!(pans(&events), [(To::Player(1), false)]);
+    }
+
+    #[test]
+    fn a_message_of_no_line_goes_to_its_channel_or_to_all() {
+        let (one, two) = (track(0, 60, &[]), track(1, 64, &[]));
+        let of_second = [&[0, 0xB1, 10, 0][..], &END].concat();
+        let (events, _) = lines_of(1, &[&of_second, &one, &two]);
+        assert_eq!(pans(&events), [(To::Player(1), false)]);
+        let of_none = [&[0, 0xB5, 10, 0][..], &END].concat();
+        let (events, _) = lines_of(1, &[&of_none, &one, &two]);
+        assert_eq!(pans(&events), [(To::Player(0), false), (To::Player(1), false)]);
+    }
+
+    #[test]
+    fn more_lines_than_players_are_refused() {
+        let one = track(0, 60, &[]);
+        let tracks = vec![&one[..]; MOST + 1];
+        let refused = read_tracks(&MidiDecoder::new(), &file(1, [0, 96], &tracks), 48_000).unwrap_err();
+        assert_eq!(refused, MidiFileError::Lines { found: 17, most: 16 });
+    }
+}
