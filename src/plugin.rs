@@ -358,7 +358,7 @@ impl Chalumeau {
             instrument.pan(left, right);
         }
         if let Some((_, window)) = &self.window {
-            window.send_output([left, others.first().map_or(&*left, |right| right)]);
+            window.send_output([left, others.first().map_or(left, |right| right)]);
         }
         let is_watched = self.window.as_ref().is_some_and(|(_, window)| window.is_open());
         rest_status(&self.params, instrument, is_watched)

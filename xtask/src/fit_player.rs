@@ -4,8 +4,10 @@
 //! each note and dynamic: fortissimo by its pressure, the others by level below fortissimo, as a player does. The loss is
 //! the mean distance of harmonics 2 to 10 at pp, mf and ff, plus a charge for each centroid outside the range that counts as
 //! right, and for loud dynamics that are not reached. Upper harmonics are first lowered by what the pitch of a held note costs them that wanders as recorded ones do
-//! (`wander`). A simplex search finds the rule (`simplex`), and again without each note in turn.
+//! (`wander`). A simplex search finds the rule (`simplex`), and again without each note in turn. `bound` says how near any smooth rule
+//! could come.
 
+mod bound;
 mod simplex;
 mod spectra;
 mod wander;
@@ -68,13 +70,17 @@ struct Compared {
     ratio: f64,
 }
 
-/// What a rule plays for a dynamic.
-fn played(rule: &PlayerModel, note: &NoteSpectra, dynamic: Dynamic) -> Option<PlayedSpectrum> {
-    let d = match dynamic {
+fn dynamic_number(dynamic: Dynamic) -> f64 {
+    match dynamic {
         Dynamic::Pp => 0.0,
         Dynamic::Mf => MEZZO_FORTE,
         Dynamic::Ff => 1.0,
-    };
+    }
+}
+
+/// What a rule plays for a dynamic.
+fn played(rule: &PlayerModel, note: &NoteSpectra, dynamic: Dynamic) -> Option<PlayedSpectrum> {
+    let d = dynamic_number(dynamic);
     let loudest = loudest(rule, note)?;
     if dynamic == Dynamic::Ff {
         return Some(loudest);
@@ -103,7 +109,16 @@ fn short_db(rule: &PlayerModel, note: &NoteSpectra) -> f64 {
 }
 
 fn compare(rule: &PlayerModel, note: &NoteSpectra, recorded: &RecordedNote, lost_db: &[f64]) -> Compared {
-    let Some(played) = played(rule, note, recorded.dynamic) else {
+    compare_played(played(rule, note, recorded.dynamic), note, recorded, lost_db)
+}
+
+fn compare_played(
+    played: Option<PlayedSpectrum>,
+    note: &NoteSpectra,
+    recorded: &RecordedNote,
+    lost_db: &[f64],
+) -> Compared {
+    let Some(played) = played else {
         return Compared { error_db: FAIL_DB, ratio: f64::NAN };
     };
     let heard: Vec<f64> = played.harmonics_db.iter().zip(lost_db).map(|(level, lost)| level - lost).collect();
@@ -149,12 +164,16 @@ impl Data {
     }
 }
 
-/// Fits the rule and writes it; with `--check` compares it with the committed one.
+/// Fits the rule and writes it; with `--check` compares it with the committed one, with `--bound` says how near any smooth rule can come.
 pub fn run(args: &[String]) -> Result<()> {
     let check = match args {
         [] => false,
         [arg] if arg == "--check" => true,
-        _ => bail!("takes --check or nothing, got {}", args.join(" ")),
+        [arg] if arg == "--bound" => {
+            bound::run(&data()?);
+            return Ok(());
+        }
+        _ => bail!("takes --check, --bound or nothing, got {}", args.join(" ")),
     };
     let data = data()?;
     let start = numbers(&PlayerModel::FITTED);
