@@ -228,11 +228,14 @@ fn data() -> Result<Data> {
     Ok(Data { recorded: notes.iter().map(of).collect(), lost_db: notes.iter().map(lost).collect(), notes })
 }
 
-/// Prints error and centroids of each dynamic.
+/// Prints error and centroids of each dynamic that was compared.
 fn say(what: &str, compared: impl Iterator<Item = (Dynamic, Compared)>) {
     let compared: Vec<_> = compared.collect();
     for dynamic in Dynamic::ALL {
         let own = || compared.iter().filter(|(of, _)| *of == dynamic).map(|(_, compared)| compared);
+        if own().next().is_none() {
+            continue;
+        }
         let right =
             |ratio: f64| f64::from(u8::from((CENTROID_RATIOS.0..=CENTROID_RATIOS.1).contains(&ratio)));
         println!(

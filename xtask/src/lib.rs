@@ -147,7 +147,7 @@ pub const COMMANDS: &[Command] = &[
     },
     Command {
         name: "fit-player",
-        about: "fit the player's rule for breath and lip to recorded notes, and validate it on notes left out; takes minutes",
+        about: "fit the player's rule for breath and lip to recorded notes, and validate it on notes left out; with --bound say how near any smooth rule can come; takes minutes",
         run: fit_player::run,
         checks: false,
     },
