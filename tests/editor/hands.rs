@@ -17,8 +17,8 @@ const SLIDERS: &[(Tab, &[&str])] = &[
         Tab::Breath,
         &[
             "breath", "bcurve", "bsoft", "bloud", "bdead", "full", "curve", "tongue", "legato", "gliss",
-            "scoop", "scoops", "fall", "falls", "bin", "ksound", "noise", "life", "vib", "vibhz", "vibon",
-            "vibun", "growl", "growli", "growlf", "flut", "fluthz", "subt", "tract", "tractp",
+            "scoop", "scoops", "fall", "falls", "slap", "bin", "ksound", "noise", "life", "vib", "vibhz",
+            "vibon", "vibun", "growl", "growli", "growlf", "flut", "fluthz", "subt", "tract", "tractp",
         ],
     ),
     (
@@ -41,7 +41,7 @@ const LISTENING_SLIDERS: &[&str] = &["ldist", "langle", "lheigh", "lwidth"];
 /// On the last page of the knob's panel.
 const STUDY_SLIDERS: &[&str] = &["part", "seed", "trial"];
 const SWITCHES: &[(Tab, &[&str])] =
-    &[(Tab::Reed, &["reedc"]), (Tab::Breath, &["altf"]), (Tab::Knob, &["oscany"])];
+    &[(Tab::Reed, &["reedc"]), (Tab::Breath, &["altf", "mic"]), (Tab::Knob, &["oscany"])];
 const STUDY_SWITCHES: &[&str] = &["rec", "replay", "study"];
 const STUDY_CHOICES: &[&str] = &["side"];
 const CHOICES: &[(Tab, &[&str])] = &[
@@ -64,6 +64,7 @@ const MOMENTARY: &[(Tab, &str, &str)] = &[
     (Tab::Reed, "panic", "Panic"),
     (Tab::Breath, "rest", "Rest here"),
     (Tab::Breath, "blow", "Blow hard here"),
+    (Tab::Breath, "miccal", "Measure the room"),
     (Tab::Knob, "takeov", "Take over"),
     (Tab::Knob, "rest", "Rest here"),
     (Tab::Knob, "blow", "Blow hard here"),
@@ -74,7 +75,7 @@ const MOMENTARY: &[(Tab, &str, &str)] = &[
 #[test]
 fn every_parameter_has_a_place() {
     let host = crate::support::Fake::default();
-    assert_eq!(host.ids().len(), 104);
+    assert_eq!(host.ids().len(), 107);
     let lists = [SLIDERS, SWITCHES, CHOICES].into_iter().flatten().flat_map(|(_, ids)| ids.iter());
     let placed: Vec<&str> = lists
         .chain([STUDY_SLIDERS, STUDY_SWITCHES, STUDY_CHOICES].into_iter().flatten())
