@@ -139,8 +139,14 @@ fn a_moved_hole_is_heard_at_once_and_kept() {
 
     let holes = serde_json::json!({ "instrument": "bflat", "moved": [moved] }).to_string();
     let fields = serde_json::json!({ "holes": holes });
-    let state = state_of(&serde_json::json!({ "version": "1", "params": {}, "fields": fields }).to_string());
+    // Without life: how far a note has wandered when it is heard goes with how long the fit takes.
+    let params = serde_json::json!({ "life": { "f32": 0.0 } });
+    let still = |fields: serde_json::Value| {
+        state_of(&serde_json::json!({ "version": "1", "params": params, "fields": fields }).to_string())
+    };
+    let state = still(fields);
     let mut plugin = plugin();
+    plugin.restore(&still(serde_json::json!({}))).unwrap();
     let mut session = plugin.activate(RATE, BLOCK).unwrap();
     let mut played = |plugin: &mut Plugin, key: u8| {
         let heard = session.play_live(&[At(0, breath(80)), At(0, on(key))], SECOND, RATE).unwrap()[0].clone();
