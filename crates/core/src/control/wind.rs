@@ -2,7 +2,7 @@
 //!
 //! Air that hits a microphone makes noise: strong at low frequencies, and without a period. A voice has a period. A hissed
 //! consonant has hardly anything below 500 Hz. A plosive is wind, but short. So the gate opens after wind alone for
-//! [`ONSET_S`], and closes where a period is found or the wind ends. The clarinet's own sound, which comes back from a
+//! `ONSET_S`, and closes where a period is found or the wind ends. The clarinet's own sound, which comes back from a
 //! loudspeaker, has a period too, but nothing below 90 Hz, where wind is strong and speech weak: that keeps an open gate open, and
 //! bounds the breath. Otherwise a loud clarinet would blow itself.
 //!
