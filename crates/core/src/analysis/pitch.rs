@@ -12,7 +12,14 @@
 use crate::analysis::{BLACKMAN_HARRIS, cosine_window, parabola, rms, transform, without_mean};
 use num_complex::Complex64;
 use realfft::RealFftPlanner;
+use std::array;
+use std::cell::RefCell;
 use std::f64::consts::PI;
+
+thread_local! {
+    /// Sizes are powers of two, so few plans are ever made; making one takes longer than using it.
+    static PLANNER: RefCell<RealFftPlanner<f64>> = RefCell::new(RealFftPlanner::new());
+}
 
 /// Lowest fundamental looked for, Hz.
 pub const LOWEST_HZ: f64 = 50.0;
@@ -34,6 +41,8 @@ const HARMONICS: usize = 8;
 const WINDOW_PERIODS: f64 = 16.0;
 /// A weaker harmonic than this, relative to the strongest, has no say, power ratio (-40 dB).
 const HEARD: f64 = 1e-4;
+/// Samples of the interpolated copy that [`periodicity`] sums at once.
+const SIDE_BY_SIDE: usize = 8;
 /// Quieter than this is silence, rms.
 const SILENCE: f64 = 1e-12;
 
@@ -66,7 +75,7 @@ pub struct TrackPoint {
 /// ```
 pub fn fundamental_hz(samples: &[f64], rate_hz: f64) -> Option<f64> {
     let tail = &samples[samples.len().saturating_sub(rate_hz as usize)..];
-    let coarse = coarse_hz(&mut RealFftPlanner::new(), tail, rate_hz)?;
+    let coarse = PLANNER.with_borrow_mut(|planner| coarse_hz(planner, tail, rate_hz))?;
     Some(refine_hz(samples, rate_hz, coarse).unwrap_or(coarse))
 }
 
@@ -116,12 +125,21 @@ pub fn periodicity(samples: &[f64], rate_hz: f64, f0_hz: f64) -> f64 {
     let first = (HALF - 1).saturating_sub(whole);
     let last = samples.len() - whole - HALF;
     let (mut both, mut here, mut there) = (0.0, 0.0, 0.0);
-    for n in first..last {
-        let at = n + whole + 1 - HALF;
-        let shifted: f64 = samples[at..at + 2 * HALF].iter().zip(&taps).map(|(x, tap)| x * tap).sum();
-        both += samples[n] * shifted;
-        here += samples[n] * samples[n];
-        there += shifted * shifted;
+    // Several sums side by side: each alone waits for its last addition.
+    for block in (first..last).step_by(SIDE_BY_SIDE) {
+        let count = SIDE_BY_SIDE.min(last - block);
+        let at = block + whole + 1 - HALF;
+        let mut shifted = [0.0; SIDE_BY_SIDE];
+        for (tap, offset) in taps.iter().zip(at..) {
+            for (sum, x) in shifted.iter_mut().zip(&samples[offset..offset + count]) {
+                *sum += x * tap;
+            }
+        }
+        for (&x, shifted) in samples[block..block + count].iter().zip(shifted) {
+            both += x * shifted;
+            here += x * x;
+            there += shifted * shifted;
+        }
     }
     if here * there > 0.0 { both / (here * there).sqrt() } else { 0.0 }
 }
@@ -201,21 +219,16 @@ fn correction_hz(samples: &[f64], rate_hz: f64, hz: f64) -> Option<f64> {
     let starts: Vec<usize> = (0..frames).map(|frame| frame * (len - window_len) / (frames - 1)).collect();
     let window: Vec<f64> = cosine_window(window_len, &BLACKMAN_HARRIS).collect();
     let harmonics = HARMONICS.min((0.45 * period) as usize);
+    let steps: [f64; HARMONICS] = array::from_fn(|at| -2.0 * PI * (at as f64 + 1.0) * hz / rate_hz);
+    let turn_steps = steps.map(Complex64::cis);
     let mut seen = vec![Vec::with_capacity(frames); harmonics];
     let mut windowed = vec![0.0; window_len];
     for &start in &starts {
         for ((to, x), w) in windowed.iter_mut().zip(&samples[start..]).zip(&window) {
             *to = x * w;
         }
-        for (seen, harmonic) in seen.iter_mut().zip(1..) {
-            let step = -2.0 * PI * f64::from(harmonic) * hz / rate_hz;
-            let mut sum = Complex64::default();
-            let (mut turn, turn_step) =
-                (Complex64::cis((step * start as f64) % (2.0 * PI)), Complex64::cis(step));
-            for x in &windowed {
-                sum += turn * x;
-                turn *= turn_step;
-            }
+        let turns = array::from_fn(|at| Complex64::cis((steps[at] * start as f64) % (2.0 * PI)));
+        for (seen, sum) in seen.iter_mut().zip(turned_sums(&windowed, turns, turn_steps)) {
             seen.push(sum);
         }
     }
@@ -247,6 +260,27 @@ fn correction_hz(samples: &[f64], rate_hz: f64, hz: f64) -> Option<f64> {
         }
     }
     (denominator > 0.0).then(|| numerator / denominator * rate_hz / (2.0 * PI))
+}
+
+/// Sum of the samples, each turned one step further than the one before it; all harmonics side by side, because each alone waits
+/// for its last multiplication.
+fn turned_sums(
+    samples: &[f64],
+    turns: [Complex64; HARMONICS],
+    steps: [Complex64; HARMONICS],
+) -> [Complex64; HARMONICS] {
+    let (mut re, mut im) = (turns.map(|turn| turn.re), turns.map(|turn| turn.im));
+    let (step_re, step_im) = (steps.map(|step| step.re), steps.map(|step| step.im));
+    let (mut sum_re, mut sum_im) = ([0.0; HARMONICS], [0.0; HARMONICS]);
+    for x in samples {
+        for at in 0..HARMONICS {
+            sum_re[at] += re[at] * x;
+            sum_im[at] += im[at] * x;
+            (re[at], im[at]) =
+                (re[at] * step_re[at] - im[at] * step_im[at], re[at] * step_im[at] + im[at] * step_re[at]);
+        }
+    }
+    array::from_fn(|at| Complex64::new(sum_re[at], sum_im[at]))
 }
 
 #[cfg(test)]
