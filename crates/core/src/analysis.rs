@@ -43,7 +43,8 @@ pub(crate) fn cosine_window(len: usize, terms: &[f64]) -> impl Iterator<Item = f
         let turn = 2.0 * PI * n as f64 / len as f64;
         let mut sign = 1.0;
         terms.iter().enumerate().fold(0.0, |sum, (k, term)| {
-            let value = sum + sign * term * (turn * k as f64).cos();
+            let cosine = if k == 0 { 1.0 } else { (turn * k as f64).cos() };
+            let value = sum + sign * term * cosine;
             sign = -sign;
             value
         })

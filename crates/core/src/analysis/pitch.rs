@@ -86,9 +86,9 @@ pub fn refine_hz(samples: &[f64], rate_hz: f64, near_hz: f64) -> Option<f64> {
         return None;
     }
     let samples = without_mean(samples);
-    let mut hz = near_hz;
+    let (mut hz, mut window) = (near_hz, Vec::new());
     for _ in 0..6 {
-        let step = correction_hz(&samples, rate_hz, hz)?;
+        let step = correction_hz(&samples, rate_hz, hz, &mut window)?;
         hz += step;
         if !(0.97..=1.03).contains(&(hz / near_hz)) {
             return None;
@@ -207,8 +207,8 @@ fn coarse_hz(planner: &mut RealFftPlanner<f64>, samples: &[f64], rate_hz: f64) -
     Some(rate_hz / lag)
 }
 
-/// What to add to `hz`: slope of the phases of its harmonics, by weighted least squares.
-fn correction_hz(samples: &[f64], rate_hz: f64, hz: f64) -> Option<f64> {
+/// What to add to `hz`: slope of the phases of its harmonics, by weighted least squares. `window` is what the last call left.
+fn correction_hz(samples: &[f64], rate_hz: f64, hz: f64, window: &mut Vec<f64>) -> Option<f64> {
     let period = rate_hz / hz;
     let len = samples.len();
     let window_len = (WINDOW_PERIODS * period).min(len as f64 * 2.0 / 3.0) as usize;
@@ -217,14 +217,16 @@ fn correction_hz(samples: &[f64], rate_hz: f64, hz: f64) -> Option<f64> {
     }
     let frames = (((len - window_len) as f64 / (2.0 * period)) as usize + 1).max(4);
     let starts: Vec<usize> = (0..frames).map(|frame| frame * (len - window_len) / (frames - 1)).collect();
-    let window: Vec<f64> = cosine_window(window_len, &BLACKMAN_HARRIS).collect();
+    if window.len() != window_len {
+        *window = cosine_window(window_len, &BLACKMAN_HARRIS).collect();
+    }
     let harmonics = HARMONICS.min((0.45 * period) as usize);
     let steps: [f64; HARMONICS] = array::from_fn(|at| -2.0 * PI * (at as f64 + 1.0) * hz / rate_hz);
     let turn_steps = steps.map(Complex64::cis);
     let mut seen = vec![Vec::with_capacity(frames); harmonics];
     let mut windowed = vec![0.0; window_len];
     for &start in &starts {
-        for ((to, x), w) in windowed.iter_mut().zip(&samples[start..]).zip(&window) {
+        for ((to, x), w) in windowed.iter_mut().zip(&samples[start..]).zip(&*window) {
             *to = x * w;
         }
         let turns = array::from_fn(|at| Complex64::cis((steps[at] * start as f64) % (2.0 * PI)));
