@@ -17,9 +17,10 @@ pub struct Sway {
 }
 
 impl Sway {
-    /// A dynamic, 0..=1, that sways.
+    /// A dynamic, 0..=1, that sways, to 1 at most: a note has neither pressure nor trim for a lip that opens further. Softer than 0 it
+    /// may become, where only the lip follows and the pitch hardly moves.
     pub fn of(&self, dynamic: f64) -> f64 {
-        dynamic.clamp(self.room, 1.0 - self.room) + self.dynamic
+        (dynamic.clamp(self.room, 1.0 - self.room) + self.dynamic).min(1.0)
     }
 }
 
@@ -33,5 +34,17 @@ impl std::ops::Add for Sway {
             resonance: self.resonance + other.resonance,
             cents: self.cents + other.cents,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_louder_than_the_loudest() {
+        let [up, down] = [0.02, -0.02].map(|dynamic| Sway { dynamic, ..Sway::default() });
+        assert_eq!((up.of(1.0), up.of(0.5), down.of(1.0)), (1.0, 0.52, 0.98));
+        assert_eq!(Sway { room: 0.1, ..up }.of(1.0), 0.92);
     }
 }
