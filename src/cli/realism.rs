@@ -20,6 +20,7 @@ use chalumeau_core::measure::realism::{
     CENTROID_RATIOS, Dynamic, NoteScore, REGISTERS, RecordedNote, Summary, louder_is_brighter, mean, median,
     register,
 };
+use chalumeau_core::measure::shelf::Shelf;
 use chalumeau_core::parallel;
 use chalumeau_core::score;
 use chalumeau_core::score::Score;
@@ -44,6 +45,8 @@ Examples:
   chalumeau realism --gamma 0.42,0.56,0.78 --zeta 0.25
       One pressure for each dynamic, on a lip that stays.
   chalumeau realism --noise 0 --csv -
+  chalumeau realism --shelf 4000,2
+      As a microphone in front may hear it.
 
 The recordings are TinySOL's (Cella, Ghisi, Lostanlen, Levy, Fineberg, Maresz 2020, CC BY 4.0): one player, one take for
 each note. A recorded note differs from its recorded neighbours by 2.7, 6.8 and 4.8 dB at pp, mf and ff.";
@@ -64,6 +67,9 @@ pub struct RealismCommand {
     /// Instead: constant mouth pressure over closing pressure at pp, mf and ff, each 0..3
     #[arg(long, value_name = "G,G,G", value_delimiter = ',', num_args = 1, value_parser = |s: &str| within(s, 0.0, f64::from(GAMMA_MAX)))]
     gamma: Vec<f64>,
+    /// Hear the notes behind a shelf of first order: frequency where half of the lift is reached, Hz, and lift of the highs, dB
+    #[arg(long, value_name = "HZ,DB", value_parser = shelf)]
+    shelf: Option<Shelf>,
     #[command(flatten)]
     instrument: PlayedArgs,
     #[command(flatten)]
@@ -93,10 +99,13 @@ impl RealismCommand {
         let plot = self.plot.open(self.table.force())?;
         let name = file.name.clone();
         let model = self.instrument.model(file, RATE_HZ as u32, settings.a4_hz)?;
-        let heard = play_all(&model, &settings, &breaths);
+        let heard = play_all(&model, &settings, &breaths, self.shelf);
+        let shelf = self.shelf.map_or_else(String::new, |shelf| {
+            format!("; behind a shelf of {} dB at {} Hz", shelf.lift_db, shelf.middle_hz)
+        });
         let about = vec![
             format!(
-                "{name}; {blown} at pp, mf, ff; zeta {}, strength {}, breath noise {}",
+                "{name}; {blown} at pp, mf, ff; zeta {}, strength {}, breath noise {}{shelf}",
                 settings.zeta, settings.strength, settings.noise
             ),
             "recordings: TinySOL (Cella, Ghisi, Lostanlen, Levy, Fineberg, Maresz 2020), CC BY 4.0, one take for each note"
@@ -111,6 +120,17 @@ impl RealismCommand {
         table.finish()?;
         plot.draw(|| figure("Realism", &about, CENTROID_RATIOS, &compared(&heard)))
     }
+}
+
+/// A shelf as it is written: 4000,2.
+fn shelf(text: &str) -> Result<Shelf, String> {
+    let numbers = text.split_once(',').and_then(|(hz, db)| Some((hz.parse().ok()?, db.parse().ok()?)));
+    let (middle_hz, lift_db) =
+        numbers.ok_or("write a frequency in Hz and a lift in dB, for example 4000,2")?;
+    if !(20.0..=20_000.0).contains(&middle_hz) || !(-24.0..=24.0).contains(&lift_db) {
+        return Err(format!("{middle_hz} Hz, {lift_db} dB: from 20 to 20000 Hz, from -24 to 24 dB"));
+    }
+    Ok(Shelf { middle_hz, lift_db })
 }
 
 /// Three numbers of a flag.
@@ -150,13 +170,17 @@ fn words(numbers: &[f64]) -> String {
 }
 
 /// Plays a note for every recording, on all cores.
-fn play_all(model: &Arc<Model>, settings: &Settings, breaths: &[f32; 3]) -> Vec<Heard> {
+fn play_all(model: &Arc<Model>, settings: &Settings, breaths: &[f32; 3], shelf: Option<Shelf>) -> Vec<Heard> {
     let recorded = RecordedNote::all();
     let bar = progress(recorded.len());
     let play = |at: usize| {
         let note = &recorded[at];
         let breath = breaths[note.dynamic as usize];
-        listen(note, &rendered(model, settings, note.midi, breath))
+        let mut samples = rendered(model, settings, note.midi, breath);
+        if let Some(shelf) = shelf {
+            shelf.apply(&mut samples, RATE_HZ);
+        }
+        listen(note, &samples)
     };
     // Nothing ends it early, so there is always an answer.
     let heard = parallel::each(recorded.len(), play, &mut |_| {

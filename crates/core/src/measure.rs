@@ -9,4 +9,5 @@ pub mod multiphonics;
 pub mod notes;
 pub mod radiated_bands;
 pub mod realism;
+pub mod shelf;
 pub mod steady_period;
