@@ -12,13 +12,13 @@ export LC_ALL=C
 
 rate=${1:-48000}
 # Of a note that lives and moves, as it does by default.
-declare -A most=([avx2]=864 [plain]=1333 ["avx2 places"]=937 ["plain places"]=1430)
+declare -A most=([avx2]=850 [plain]=1330 ["avx2 places"]=920 ["plain places"]=1430)
 
 # What growl and vocal tract add together.
-declare -A most_techniques=([avx2]=77 [plain]=88)
+declare -A most_techniques=([avx2]=55 [plain]=55)
 
 # Players in unison, in hundredths of the cost of one voice.
-declare -A most_players=(["avx2 8"]=562 ["avx2 16"]=1115 ["plain 8"]=686 ["plain 16"]=1366)
+declare -A most_players=(["avx2 8"]=510 ["avx2 16"]=1015 ["plain 8"]=650 ["plain 16"]=1300)
 
 if ! command -v valgrind >/dev/null; then
     echo "cannot count instructions without valgrind: apt-get install valgrind" >&2

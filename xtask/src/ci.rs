@@ -228,7 +228,9 @@ fn clap() -> Result<()> {
 /// The same tests on a debug build, where the framework aborts on any allocation while processing.
 fn clap_checked() -> Result<()> {
     let programs = programs()?;
-    let mut tests = host_tests(CLAP_TESTS);
+    // How soon torque ends takes a minute to tell, and knows no allocation.
+    let names: Vec<_> = CLAP_TESTS.iter().copied().filter(|&name| name != "knob_stop").collect();
+    let mut tests = host_tests(&names);
     tests.env(artefacts::CLAP, &programs.plugin).env(artefacts::PROGRAM, &programs.program);
     machine::run(&mut tests)
 }
