@@ -9,6 +9,7 @@
 use nice_plug::midi::{Channel, Key, VoiceID};
 use nice_plug::prelude::*;
 
+use chalumeau_core::control::key_switches::KeySwitches;
 use chalumeau_core::control::midi::BreathOrigin;
 use chalumeau_core::control::midi::breath::BreathFrom;
 use chalumeau_core::control::midi::links::{Link, Links, MOST};
@@ -78,6 +79,11 @@ impl EventTranslator {
     /// Sets what the mod wheel does.
     pub fn wheel(&mut self, wheel: Wheel) -> &[PartEvent] {
         self.midi.set_wheel(wheel)
+    }
+
+    /// See [`Parts::set_key_switches`].
+    pub fn set_key_switches(&mut self, key_switches: KeySwitches) {
+        self.midi.set_key_switches(key_switches);
     }
 
     /// See [`Parts::set_links`].

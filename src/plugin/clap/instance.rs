@@ -163,7 +163,8 @@ impl Instance {
     fn asked(&self) -> u32 {
         let tuning = &self.introduced.params.tuning;
         let beyond = u32::from(tuning.beyond.value() == BeyondChoice::Octave);
-        (tuning.transpose.value() as u32) << 8 | beyond << 7 | self.in_use()
+        let switches = self.introduced.params.expression.key_switches.value().to_index() as u32;
+        (tuning.transpose.value() as u32) << 8 | beyond << 7 | switches << 5 | self.in_use()
     }
 
     /// After the host has moved parameters: asks for a callback if others are in use now, or if the keys play other notes.
