@@ -662,5 +662,6 @@ fn each_alternate_that_a_key_chooses_plays_its_note() {
             worst = worst.max(off.abs());
         }
     }
-    assert!(worst < 20.0, "{worst}");
+    // F#4 with two side keys at the loudest of the three.
+    assert!(worst < 17.0, "{worst}");
 }

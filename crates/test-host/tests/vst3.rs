@@ -7,7 +7,7 @@ mod wind;
 
 use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 
-use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::event::{Event, Fingerings, Timed};
 use chalumeau_core::instrument::{Clarinet, Settings};
 use chalumeau_core::units::SoundingNote;
 use chalumeau_test_host::clap::{At, Say};
@@ -167,6 +167,28 @@ fn controllers_pressure_and_wheel_reach_the_instrument() {
         (33_000, Event::NoteOff { note: SoundingNote(58) }),
     ];
     assert!(play(512, &said, SECOND) == offline(&events, SECOND));
+}
+
+#[test]
+fn key_switches_choose_the_fingering_of_the_next_note() {
+    // The second of three places.
+    let said = [
+        (0, Word::Set("Key switches", 0.5)),
+        (1_024, on(63)),
+        (6_000, on(25)),
+        (7_000, off(25)),
+        (9_600, on(61)),
+        (9_601, off(63)),
+    ];
+    let events = [
+        (1_024, note_on(63)),
+        (6_000, Event::Fingerings(Fingerings::Alternate(1))),
+        (9_600, note_on(61)),
+        (9_601, Event::NoteOff { note: SoundingNote(63) }),
+    ];
+    let heard = play(512, &said, SECOND / 2);
+    assert!(heard == offline(&events, SECOND / 2));
+    assert!(heard != offline(&[events[0], events[2], events[3]], SECOND / 2));
 }
 
 #[test]
