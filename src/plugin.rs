@@ -300,6 +300,8 @@ impl Chalumeau {
         }
         inputs.bend_range(self.params.instrument.bend_range.value());
         inputs.wheel(self.params.expression.wheel.value().into(), drives);
+        let key_switches = settings.reach.key_switches;
+        inputs.key_switches(key_switches);
         let keys = self.window.as_mut().map(|(_, window)| window.keys()).unwrap_or_default();
         for event in keys.into_iter().flatten() {
             match event {
@@ -307,8 +309,15 @@ impl Chalumeau {
                 Event::NoteOn { velocity, .. } => inputs.breath_sources().key(velocity),
                 _ => {}
             }
-            // The window shows the first player.
-            inputs.say(PartEvent { to: To::Player(0), event });
+            let chosen = match event {
+                Event::NoteOn { note, .. } => key_switches.chosen(note.0),
+                _ => None,
+            };
+            inputs.say(match chosen {
+                Some(fingerings) => Event::Fingerings(fingerings).into(),
+                // The window shows the first player.
+                None => PartEvent { to: To::Player(0), event },
+            });
         }
         let api = context.plugin_api();
         let links = &self.params.links;

@@ -617,6 +617,51 @@ fn linked_controllers_of_a_file_move_parameters() {
     );
 }
 
+/// Keys one after another for half a second each, but those below 50 for no time: a format 0 file.
+fn one_after_another(keys: &[u8]) -> Vec<u8> {
+    let mut track = Vec::new();
+    for &key in keys {
+        track.extend([0, 0x90, key, 90, if key < 50 { 0 } else { 0x60 }, 0x80, key, 0]);
+    }
+    track.extend([0, 0xff, 0x2f, 0]);
+    let mut file = b"MThd\0\0\0\x06\0\0\0\x01\0\x60MTrk".to_vec();
+    file.extend((track.len() as u32).to_be_bytes());
+    file.extend(track);
+    file
+}
+
+/// Written E flat 4 (key 61) has an alternate, D4 (60) none.
+#[test]
+fn key_switches_of_a_file_choose_fingerings_and_make_no_sound() {
+    let d = tempfile::tempdir().unwrap();
+    let render = |keys: &[u8], flags: &str| {
+        fs::write(d.path().join("keys.mid"), one_after_another(keys)).unwrap();
+        let said = succeeds(d.path(), &format!("render keys.mid --force --out k.wav {flags}"));
+        (fs::read(d.path().join("k.wav")).unwrap(), said)
+    };
+    let on = "--set keysw=c1";
+    let plain = render(&[63, 61], "").0;
+    assert!(render(&[63, 61], on).0 == plain, "the row alone changes nothing");
+    assert!(render(&[63, 24, 61], on).0 == plain, "the chart's fingerings");
+    let alternate = render(&[63, 25, 61], on).0;
+    let differs = plain.iter().zip(&alternate).position(|(a, b)| a != b).unwrap();
+    let at_s = (differs - (plain.len() - 4 * 96_000)) as f64 / (4.0 * 48_000.0);
+    assert!((0.5..0.52).contains(&at_s), "from {at_s} s on, where the next note begins");
+    assert!(render(&[63, 26, 61], on).0 != alternate, "the second one");
+    assert!(render(&[63, 25, 60], on).0 == render(&[63, 60], "").0, "a note without alternates");
+    assert!(render(&[63, 37, 61], "--set keysw=c2").0 == alternate, "the row at its other place");
+    assert!(!render(&[63, 25, 61], on).1.contains("stay silent"));
+    for beside in ["--written C4", "--sounding C4", "--scale E3:C4"] {
+        for alone in ["--mpe", "--controllers EWI"] {
+            refused(
+                &d,
+                &format!("render {beside} {alone} --out x.wav"),
+                &[&alone[..5], "cannot be used with"],
+            );
+        }
+    }
+}
+
 /// A chord of three keys, held for a second, as a MIDI file of 480 ticks a quarter.
 fn chord(keys: [u8; 3]) -> Vec<u8> {
     let mut track = Vec::new();

@@ -206,6 +206,7 @@ fn any_settings(random: &mut Random) -> Settings {
         reach: Reach {
             transpose: random.below(49) as i32 - 24,
             beyond: if random.below(2) == 0 { Beyond::Silent } else { Beyond::Octave },
+            ..Reach::default()
         },
         ..Settings::default()
     }

@@ -65,7 +65,7 @@ pub struct ScoreArgs {
     #[arg(value_name = "MIDI")]
     midi: Option<PathBuf>,
     /// The file is MPE: channel 1 is the manager, the other channels bend by 48 semitones
-    #[arg(long, requires = "midi")]
+    #[arg(long, requires = "midi", conflicts_with = "note")]
     mpe: bool,
     /// Each track with notes has a player and a seat of its own; in a file of one such track, each channel. Seats and their
     /// width are those of several players, and pan (CC10) of a track moves its player
@@ -73,7 +73,7 @@ pub struct ScoreArgs {
     tracks: bool,
     /// Controllers of the file that move parameters: a device, see `chalumeau controllers list`, or a TOML file of links, as
     /// the window copies them
-    #[arg(long, value_name = "DEVICE|FILE", requires = "midi", value_parser = named_or_file)]
+    #[arg(long, value_name = "DEVICE|FILE", requires = "midi", conflicts_with = "note", value_parser = named_or_file)]
     controllers: Option<ControllerMap>,
     /// One note as a clarinettist reads it: MIDI number (60) or name (C4)
     #[arg(long, value_name = "NOTE", value_parser = note)]
@@ -172,7 +172,7 @@ impl ScoreArgs {
         };
         map.values.iter().for_each(|(parameter, value)| parameter.set(&mut settings, *value));
         let trims = self.trims(&file)?;
-        let mut parts = self.score(&file, &as_links(&map.links, &settings), &mut settings.players)?;
+        let mut parts = self.score(&file, &as_links(&map.links, &settings), &mut settings)?;
         if let Some(curve) = &curve {
             parts = parts.blown(curve, &settings, self.rate);
         }
@@ -288,9 +288,10 @@ impl ScoreArgs {
         &self,
         file: &InstrumentFile,
         links: &[Option<Link>; MOST],
-        players: &mut Players,
+        settings: &mut Settings,
     ) -> Result<Score<PartEvent>, Failure> {
         let transposition = file.transposition;
+        let (players, key_switches) = (&mut settings.players, settings.reach.key_switches);
         if self.tracks && (self.midi.is_none() || matches!(self.given, Some(Given::Notes(_)))) {
             return Err(Failure::Usage(
                 "--tracks needs a MIDI file, each track of which has a player".to_owned(),
@@ -308,6 +309,7 @@ impl ScoreArgs {
             };
             let mut decoder = if self.mpe { MidiDecoder::new().with_mpe() } else { MidiDecoder::new() };
             decoder.set_links(links);
+            decoder.set_key_switches(key_switches);
             if let Some(preset) = &self.preset {
                 // Nothing sounds yet, so this bends nothing.
                 decoder.usual_bend_range(preset.bend_range());

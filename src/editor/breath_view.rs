@@ -99,6 +99,7 @@ impl BreathView {
             slider(ui, hands, id);
         }
         switch(ui, hands, "altf");
+        choice(ui, hands, "keysw");
         heading(ui, "Vibrato");
         for id in ["vib", "vibhz", "vibon", "vibun"] {
             slider(ui, hands, id);

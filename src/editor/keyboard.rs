@@ -1,6 +1,9 @@
-//! The keyboard: the range of the instrument, named by written or sounding notes. A press lower on a key is louder.
+//! The keyboard: the range of the instrument, named by written or sounding notes; and the key switches at its left, if there are
+//! any. A press lower on a key is louder.
 //! Sliding from key to key slurs: the new note starts before the old one ends. With the keyboard focus, the arrow keys
 //! choose a note, and Space plays it while it is held.
+
+mod switch_row;
 
 use egui::{
     Color32, CornerRadius, Event, EventFilter, Key, Pos2, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2,
@@ -13,11 +16,13 @@ use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 use chalumeau_core::units::SoundingNote;
+use switch_row::SwitchRow;
 
 /// Velocity of a note played with Space.
 const PLAIN: f32 = 0.75;
 
 const HELP: &str = "The keys have the names of the notes they play, written or sounding as at the top of the window. Press lower on a key to play louder; slide to slur. With the keyboard: Tab to here, choose with the arrow keys, play with Space.";
+const SWITCH_KEY: &str = "This key makes no sound: the notes that follow take these fingerings, until another key of the row is struck. The colour shows which. *Key switches* in the Breath view moves the row.";
 const SILENT_KEY: &str = "The instrument does not play this note in tune, so the key is silent.";
 
 /// What the keys remember.
@@ -39,12 +44,16 @@ impl Keyboard {
         let from = if is_black(lowest.0) { lowest.0.saturating_sub(1) } else { lowest.0 };
         let to = if is_black(highest.0) { highest.0 + 1 } else { highest.0 };
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
+        let switches = snapshot.settings.reach.key_switches;
+        let (row, rect) = SwitchRow::beside(switches, rect);
         let keys = Keys::new(rect, from, to);
-        let playable = |key: u8| snapshot.plays(SoundingNote(key)).is_some();
+        let at = |point: Pos2| row.as_ref().and_then(|row| row.at(point)).or_else(|| keys.at(point));
+        let chooses = |key: u8| switches.chosen(key);
+        let playable = |key: u8| chooses(key).is_some() || snapshot.plays(SoundingNote(key)).is_some();
         let transposition = snapshot.instrument.transposition;
 
         let pointer = response.interact_pointer_pos().filter(|_| response.is_pointer_button_down_on());
-        let wanted = pointer.and_then(|at| keys.at(at)).filter(|(note, _)| playable(*note));
+        let wanted = pointer.and_then(at).filter(|(note, _)| playable(*note));
         if !self.by_key {
             self.hold(wanted.map(|(note, velocity)| (SoundingNote(note), velocity)), actions);
         }
@@ -62,15 +71,23 @@ impl Keyboard {
         let named = |key: u8| names.of_sounding(snapshot.plays(SoundingNote(key))?, transposition);
         let down = [snapshot.key, self.held].map(|key| key.map(|note| note.0));
         keys.paint(ui, c, down, focus, named);
+        if let Some(row) = &row {
+            row.paint(ui, c, snapshot.next_fingerings());
+        }
         response.widget_info(|| {
             let name = named(chosen).map_or_else(|| "silent key".to_owned(), note_name);
             WidgetInfo::labeled(Role::Group, true, format!("Keyboard, {name}"))
         });
         // A user who plays needs no tool tip.
         if self.held.is_none() {
-            let pointed = response.hover_pos().and_then(|at| keys.at(at));
-            let is_silent = pointed.is_some_and(|(note, _)| !playable(note));
-            response.on_hover_text(if is_silent { SILENT_KEY } else { HELP });
+            let pointed = response.hover_pos().and_then(at).map(|(note, _)| note);
+            match pointed.map(|note| (chooses(note), playable(note))) {
+                Some((Some(fingerings), _)) => {
+                    response.on_hover_text(format!("Key switch, {fingerings}. {SWITCH_KEY}"))
+                }
+                Some((None, false)) => response.on_hover_text(SILENT_KEY),
+                _ => response.on_hover_text(HELP),
+            };
         }
     }
 

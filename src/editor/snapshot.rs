@@ -12,6 +12,7 @@ use crate::folder_listing::FolderListing;
 use crate::presets::PresetShelf;
 use chalumeau_core::bore::alterations::Alterations;
 use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
+use chalumeau_core::event::Fingerings;
 use chalumeau_core::haptics::{NoteFeel, NoteRequirement};
 use chalumeau_core::instrument::player::dynamics::LipShape;
 use chalumeau_core::instrument::{KeyPitches, Settings};
@@ -66,6 +67,8 @@ pub struct Snapshot {
     pub lip: Option<LipShape>,
     /// The dynamic that is played, 0 (pianissimo) to 1 (fortissimo); `None` where the breath is physical.
     pub dynamic: Option<f32>,
+    /// The fingerings that a key switch has chosen, if one has.
+    pub fingerings: Option<Fingerings>,
     /// The pressures that this fingering needs with this reed; `None` if it cannot sound or is not known yet.
     pub requirement: Option<NoteRequirement>,
     /// The settings of the parameters.
@@ -123,6 +126,7 @@ impl Default for Snapshot {
             mouth_kpa: 0.0,
             lip: None,
             dynamic: None,
+            fingerings: None,
             requirement: None,
             settings: Settings::default(),
             sources: Vec::new(),
@@ -188,6 +192,12 @@ impl Snapshot {
         self.sounding
             .and_then(|note| note.written(self.instrument.transposition))
             .or_else(|| self.fingering().map(|fingering| fingering.written))
+    }
+
+    /// Which fingerings the next note takes.
+    pub fn next_fingerings(&self) -> Fingerings {
+        let by_setting = if self.settings.alternates { Fingerings::ByContext } else { Fingerings::Chart };
+        self.fingerings.unwrap_or(by_setting)
     }
 
     /// The pressures that matter for this note.

@@ -1,5 +1,6 @@
 //! The parameters themselves, in the order of hosts. Groups, order and ids are fixed for ever; tests hold a frozen copy.
 
+use chalumeau_core::control::key_switches::KeySwitches;
 use chalumeau_core::event::SettingNumber;
 use chalumeau_core::instrument::concert_pitch::A4_RANGE_HZ;
 use chalumeau_core::instrument::player::Attack;
@@ -883,6 +884,14 @@ pub static PARAMETERS: &[Parameter] = &[
             "",
         )
         .sets(Sets::Switch(|settings| &mut settings.alternates)),
+    entry("keysw", EXPRESSION, "Key switches", choice(&[("off", "Off"), ("c1", "C1 to E1"), ("c2", "C2 to E2")]))
+        .help(
+            "Five keys that make no sound and choose the fingerings of the notes that follow",
+            "From the lowest: chart, 1st, 2nd, 3rd alternate, by context. A choice stays until the next. C1 is MIDI key 24, C2 is 36.",
+            "",
+        )
+        .sets(Sets::Choice(|settings, at| settings.reach.key_switches = nth(at, KeySwitches::ALL)))
+        .setup(),
     entry("growl", TECHNIQUES, "Growl", percent(0.0))
         .help(
             "How much the player sings into the instrument",

@@ -1,4 +1,5 @@
 use super::*;
+use chalumeau_core::control::key_switches::KeySwitches;
 use chalumeau_core::instrument::Articulation;
 use chalumeau_core::instrument::player::Attack;
 use chalumeau_core::instrument::player::vibrato::Vibrato;
@@ -102,6 +103,7 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
     ("ksound", "Expression", "Key sounds", "0.0 %", true),
     ("slap", "Expression", "Slap", "0.0 %", true),
     ("altf", "Expression", "Alternate fingerings", "Chart", true),
+    ("keysw", "Expression", "Key switches", "Off", false),
     ("growl", "Techniques", "Growl", "0.0 %", true),
     ("growlp", "Techniques", "Growl pitch", "Follows the note", true),
     ("growli", "Techniques", "Growl interval", "-12.0 st", true),
@@ -136,6 +138,7 @@ const FROZEN_CHOICES: &[(&str, &[&str])] = &[
     ("heard", &["all", "place", "point"]),
     ("attack", &["soft", "normal", "hard"]),
     ("wheel", &["vib", "growl", "flut", "subt", "none"]),
+    ("keysw", &["off", "c1", "c2"]),
     ("growlp", &["int", "fixed"]),
     ("split", &["chords", "unison"]),
 ];
@@ -197,14 +200,14 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         tuning: Tuning::Natural,
         breath_response: BreathResponse::Physical,
         listening: Listening { mode: ListeningMode::Point, ..d.listening },
-        reach: Reach { transpose: -2, beyond: Beyond::Octave },
+        reach: Reach { transpose: -2, beyond: Beyond::Octave, key_switches: KeySwitches::C2 },
         attack: Attack::Hard,
         alternates: true,
         techniques: Techniques { growl_pitch: GrowlPitch::Fixed, ..d.techniques },
         players: Players { count: 3, split: Split::Unison, ..d.players },
         ..d
     };
-    let mut fields = 11;
+    let mut fields = 12;
     for (parameter, number) in numbers() {
         let Some(Sets::Number(which)) = parameter.sets else { continue };
         fields += 1;
@@ -225,6 +228,7 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
     find("heard").unwrap().set(&mut filled, Value::Choice(0));
     find("transp").unwrap().set(&mut filled, Value::Whole(0));
     find("beyond").unwrap().set(&mut filled, Value::Choice(0));
+    find("keysw").unwrap().set(&mut filled, Value::Choice(0));
     find("attack").unwrap().set(&mut filled, Value::Choice(1));
     find("growlp").unwrap().set(&mut filled, Value::Choice(0));
     find("player").unwrap().set(&mut filled, Value::Whole(1));
@@ -256,7 +260,7 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         vent_loss: _,
         gain_db: _,
         listening: Listening { mode: _, distance_m: _, angle_deg: _, height_m: _, width_deg: _ },
-        reach: Reach { transpose: _, beyond: _ },
+        reach: Reach { transpose: _, beyond: _, key_switches: _ },
         room: Room { amount: _, size_m: _, decay_s: _, tone: _ },
         life: _,
         vibrato: Vibrato { depth: _, rate_hz: _, onset_s: _, unevenness: _ },
@@ -286,7 +290,7 @@ fn defaults_and_ranges_are_those_of_the_instrument() {
         tract: Tract { amount: _, interval_semitones: _ },
         players: Players { count: _, split: _, spread_cents: _, width: _ },
     } = d;
-    assert_eq!(fields, 62);
+    assert_eq!(fields, 63);
 }
 
 #[test]

@@ -8,6 +8,7 @@ use super::part_reeds::PartReeds;
 use super::reed_controllers::ReedControllers;
 use super::translate_events::{EventTranslator, raw7, untangled};
 use crate::controllers::ControllerLinks;
+use chalumeau_core::control::key_switches::KeySwitches;
 use chalumeau_core::control::midi::breath::BreathFrom;
 use chalumeau_core::control::midi::links::{Link, MOST, Source};
 use chalumeau_core::control::midi::techniques::Wheel;
@@ -202,6 +203,11 @@ impl HostInputs {
         for &event in self.translator.wheel(if is_reeds { Wheel::Nothing } else { wheel }) {
             push(&mut self.events, event);
         }
+    }
+
+    /// Says which keys choose fingerings.
+    pub fn key_switches(&mut self, key_switches: KeySwitches) {
+        self.translator.set_key_switches(key_switches);
     }
 
     /// Ends all notes at the beginning of the block.

@@ -508,7 +508,11 @@ impl ChalumeauParams {
             vent_loss: settled(&tuning.vent_loss),
             gain_db: settled(&output.gain),
             listening: self.listening.listening(),
-            reach: Reach { transpose: tuning.transpose.value(), beyond: tuning.beyond.value().into() },
+            reach: Reach {
+                transpose: tuning.transpose.value(),
+                beyond: tuning.beyond.value().into(),
+                key_switches: self.expression.key_switches.value().into(),
+            },
             room: self.room.room(),
             life: settled(&self.expression.life),
             vibrato: self.expression.vibrato(),

@@ -9,6 +9,7 @@
 use nice_plug::midi::{Channel, Key, VoiceID};
 use nice_plug::prelude::*;
 
+use chalumeau_core::control::key_switches::KeySwitches;
 use chalumeau_core::control::midi::BreathOrigin;
 use chalumeau_core::control::midi::breath::BreathFrom;
 use chalumeau_core::control::midi::links::{Link, Links, MOST};
@@ -78,6 +79,11 @@ impl EventTranslator {
     /// Sets what the mod wheel does.
     pub fn wheel(&mut self, wheel: Wheel) -> &[PartEvent] {
         self.midi.set_wheel(wheel)
+    }
+
+    /// See [`Parts::set_key_switches`].
+    pub fn set_key_switches(&mut self, key_switches: KeySwitches) {
+        self.midi.set_key_switches(key_switches);
     }
 
     /// See [`Parts::set_links`].
@@ -236,6 +242,8 @@ mod tests {
     fn plugin_and_renderer_hear_the_same_midi() {
         let mut translator = EventTranslator::default();
         let mut decoder = MidiDecoder::new();
+        translator.set_key_switches(KeySwitches::C1);
+        decoder.set_key_switches(KeySwitches::C1);
         for value in 0..=127u8 {
             for cc in [2, 7, 10, 11, 34, 64, 123] {
                 assert_eq!(midi(&mut translator, [0xB3, cc, value]), decoder.controller(3, cc, value));

@@ -46,7 +46,7 @@ const STUDY_SWITCHES: &[&str] = &["rec", "replay", "study"];
 const STUDY_CHOICES: &[&str] = &["side"];
 const CHOICES: &[(Tab, &[&str])] = &[
     (Tab::Reed, &["rface", "hsrc", "ksrc"]),
-    (Tab::Breath, &["bfrom", "resp", "attack", "wheel", "growlp"]),
+    (Tab::Breath, &["bfrom", "resp", "attack", "keysw", "wheel", "growlp"]),
     (Tab::Sound, &["tune", "heard", "split"]),
     (Tab::Knob, &["knob", "law", "order"]),
     (Tab::Instrument, &["tune", "beyond", "qual"]),
@@ -75,7 +75,7 @@ const MOMENTARY: &[(Tab, &str, &str)] = &[
 #[test]
 fn every_parameter_has_a_place() {
     let host = crate::support::Fake::default();
-    assert_eq!(host.ids().len(), 107);
+    assert_eq!(host.ids().len(), 108);
     let lists = [SLIDERS, SWITCHES, CHOICES].into_iter().flatten().flat_map(|(_, ids)| ids.iter());
     let placed: Vec<&str> = lists
         .chain([STUDY_SLIDERS, STUDY_SWITCHES, STUDY_CHOICES].into_iter().flatten())

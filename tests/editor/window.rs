@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use chalumeau::editor::note_names::NoteNames;
 use chalumeau::editor::{Action, FeelTest, Tab};
+use chalumeau_core::control::key_switches::KeySwitches;
 use chalumeau_core::units::SoundingNote;
 use egui::accesskit::Role;
 use egui::{Key, vec2};
@@ -16,6 +17,31 @@ use crate::support::Told;
 fn click(window: &mut Window, label: &str) {
     window.harness.get_by_label(label).click();
     window.harness.run();
+}
+
+/// The row is drawn at the left of the keys; the keys that play move aside.
+#[test]
+fn key_switches_stand_beside_the_keys_and_are_struck_like_them() {
+    let mut window = Window::new(Tab::Breath, (1100.0, 720.0));
+    let rect = window.harness.get_by_label_contains("Keyboard").rect();
+    let corner = rect.left_bottom() + vec2(8.0, -6.0);
+    let struck = |window: &mut Window, at: egui::Pos2| {
+        window.drag(at, vec2(0.0, -1.0));
+        let first = window.actions().first().cloned();
+        let Some(Action::NoteOn { note, .. }) = first else { panic!("{first:?}") };
+        note.0
+    };
+    assert_eq!(struck(&mut window, corner), 50);
+    for (switches, lowest) in [(KeySwitches::C1, 24), (KeySwitches::C2, 36)] {
+        window.snapshot.borrow_mut().settings.reach.key_switches = switches;
+        window.harness.run();
+        // Three white keys, and a black one between the first two.
+        for (x, key) in [(8.0, 0), (60.0, 2), (112.0, 4)] {
+            assert_eq!(struck(&mut window, rect.left_bottom() + vec2(x, -6.0)), lowest + key);
+        }
+        assert_eq!(struck(&mut window, rect.left_top() + vec2(52.0, 8.0)), lowest + 1);
+        assert_eq!(struck(&mut window, corner + vec2(170.0, 0.0)), 50, "the keys that play");
+    }
 }
 
 #[test]

@@ -234,6 +234,7 @@ impl Playing {
         self.settings = *self.ensemble.first().settings();
         self.stereo.set_space(&self.settings);
         self.parts.set_count(self.settings.players.count.clamp(1, 16) as usize);
+        self.parts.set_key_switches(self.settings.reach.key_switches);
     }
 
     /// What the mod wheel does, by its place in [`Wheel::ALL`].

@@ -3,6 +3,7 @@
 //! First the numbers of [`Settings`], in the order of [`NUMBERS`] and in their own units, then switches as 0 or 1, choices by
 //! their place, and whole numbers. The list lives as long as one build of the page: its order may change with every version.
 
+use chalumeau_core::control::key_switches::KeySwitches;
 use chalumeau_core::event::SettingNumber as N;
 use chalumeau_core::instrument::{
     Attack, Beyond, BreathResponse, GrowlPitch, ListeningMode, Settings, Split, Tuning,
@@ -63,7 +64,7 @@ pub const NUMBERS: [N; 51] = [
     N::PlayersWidth,
 ];
 /// Switches, choices and whole numbers.
-const OTHERS: usize = 11;
+const OTHERS: usize = 12;
 /// Length of the list.
 pub const COUNT: usize = NUMBERS.len() + OTHERS;
 
@@ -82,6 +83,7 @@ pub fn list(settings: &Settings) -> [f32; COUNT] {
         settings.players.count as f32,
         f32::from(settings.players.split as u8),
         f32::from(u8::from(settings.alternates)),
+        f32::from(settings.reach.key_switches as u8),
     ];
     std::array::from_fn(|at| match NUMBERS.get(at) {
         Some(&number) => *copy.number(number),
@@ -118,6 +120,7 @@ pub fn set(settings: &mut Settings, at: usize, value: f32) {
         8 => settings.players.count = value as i32,
         9 => settings.players.split = nth([Split::Chords, Split::Unison], value),
         10 => settings.alternates = value > 0.5,
+        11 => settings.reach.key_switches = nth(KeySwitches::ALL, value),
         _ => {}
     }
 }

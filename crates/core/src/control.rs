@@ -1,6 +1,7 @@
 //! Turns what controllers send into [`Event`](crate::event::Event)s. Nothing here depends on an instrument.
 
 pub mod bends;
+pub mod key_switches;
 pub mod keys;
 pub mod knob;
 pub mod midi;

@@ -14,6 +14,7 @@ mod setting_number;
 pub use setting_number::SettingNumber;
 
 use crate::units::SoundingNote;
+use std::fmt;
 
 /// Something the player does, in the units of the instrument.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,8 +93,34 @@ pub enum Event {
         /// number that is not finite, goes back to the fingering of the note.
         opening: Option<f32>,
     },
-    /// Releases all notes, sets the breath to 0 and clears the state.
+    /// Which fingerings the notes take from the next one on, whatever `Settings::alternates` says.
+    Fingerings(Fingerings),
+    /// Releases all notes, sets the breath to 0 and clears the state; chosen [fingerings](Self::Fingerings) stay.
     Panic,
+}
+
+/// Which of a note's fingerings is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fingerings {
+    /// That of the chart.
+    Chart,
+    /// Its first alternate, its second and so on, from 1; a note that has not so many takes that of the chart.
+    Alternate(u8),
+    /// In slurs by a semitone or a tone the one that moves the fewest fingers, else that of the chart.
+    ByContext,
+}
+
+impl fmt::Display for Fingerings {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Chart => f.write_str("chart fingerings"),
+            Self::Alternate(1) => f.write_str("1st alternate"),
+            Self::Alternate(2) => f.write_str("2nd alternate"),
+            Self::Alternate(3) => f.write_str("3rd alternate"),
+            Self::Alternate(nth) => write!(f, "{nth}th alternate"),
+            Self::ByContext => f.write_str("by context"),
+        }
+    }
 }
 
 /// An extended technique that a controller may drive.

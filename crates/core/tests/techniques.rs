@@ -4,8 +4,12 @@ use chalumeau_core::analysis::pitch::{fundamental_hz, pitch_track};
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::context_fingerings::Alternate;
 use chalumeau_core::bore::fingering_finder::bits;
-use chalumeau_core::event::{Event, Technique, Timed};
-use chalumeau_core::instrument::{Clarinet, GrowlPitch, Preparation, Settings, Techniques, Tract, Wanted};
+use chalumeau_core::control::key_switches::KeySwitches;
+use chalumeau_core::event::{Event, Fingerings, Technique, Timed};
+use chalumeau_core::instrument::player::PlayerState;
+use chalumeau_core::instrument::{
+    Beyond, Clarinet, GrowlPitch, Preparation, Reach, Settings, Techniques, Tract, Wanted,
+};
 use chalumeau_core::units::{SoundingNote, WrittenNote, cents};
 use std::sync::Arc;
 
@@ -555,4 +559,109 @@ fn where_no_alternate_is_taken_not_a_bit_changes() {
         })
     };
     assert!(play(&by_context()) == play(&still()));
+}
+
+/// Eb4 has two alternates, F#5 one, F4 none.
+#[test]
+fn key_switches_choose_the_fingering_of_the_next_note() {
+    let settings = Settings { reach: Reach { key_switches: KeySwitches::C1, ..Reach::default() }, ..still() };
+    let mut clarinet = playing(&settings, 65, 0.5);
+    // Struck without a decoder: as the window and Python strike keys.
+    let switch = |clarinet: &mut Clarinet, key| {
+        let note = SoundingNote(key);
+        clarinet.apply(Event::NoteOn { note, velocity: 0.7 });
+        clarinet.apply(Event::NoteOff { note });
+    };
+    let nth = |clarinet: &mut Clarinet, written: u8, is_slurred: bool| {
+        let before = clarinet.player_state().key;
+        if let (Some(note), false) = (before, is_slurred) {
+            clarinet.apply(Event::NoteOff { note });
+            listen(clarinet, 50, |_, _| {});
+        }
+        press(clarinet, written);
+        listen(clarinet, 100, |_, _| {});
+        let found = in_place(clarinet);
+        if let (Some(note), true) = (before, is_slurred) {
+            clarinet.apply(Event::NoteOff { note });
+        }
+        found.map_or(0, |at| clarinet.model().alternates.all()[at].nth)
+    };
+    for is_slurred in [true, false] {
+        for (key, of_d_sharp, of_f_sharp) in [(25, 1, 1), (26, 2, 0), (27, 0, 0), (24, 0, 0)] {
+            assert_eq!(nth(&mut clarinet, 65, is_slurred), 0);
+            let before = clarinet.player_state();
+            switch(&mut clarinet, key);
+            let PlayerState { key: held, fingering, .. } = clarinet.player_state();
+            assert_eq!((held, fingering), (before.key, before.fingering), "the note goes on");
+            listen(&mut clarinet, 50, |_, _| {});
+            assert_eq!(in_place(&mut clarinet), None, "with its fingering");
+            assert_eq!(nth(&mut clarinet, 63, is_slurred), of_d_sharp, "{key} {is_slurred}");
+            assert_eq!(nth(&mut clarinet, 65, is_slurred), 0);
+            assert_eq!(nth(&mut clarinet, 78, is_slurred), of_f_sharp, "{key} {is_slurred}");
+        }
+        switch(&mut clarinet, 28);
+        nth(&mut clarinet, 77, is_slurred);
+        assert_eq!(nth(&mut clarinet, 78, true), 1, "by context");
+        switch(&mut clarinet, 24);
+    }
+    // What was chosen last counts, key or setting; a panic leaves it, a reset does not.
+    switch(&mut clarinet, 25);
+    clarinet.apply(Event::Panic);
+    assert_eq!(clarinet.player_state().chosen, Some(Fingerings::Alternate(1)));
+    clarinet.set_settings(&Settings { noise: 0.1, ..settings });
+    assert!(clarinet.player_state().chosen.is_some(), "another setting");
+    clarinet.set_settings(&Settings { alternates: true, ..settings });
+    assert_eq!(clarinet.player_state().chosen, None);
+    switch(&mut clarinet, 25);
+    clarinet.reset();
+    assert_eq!(clarinet.player_state().chosen, None);
+}
+
+#[test]
+fn key_switches_alone_are_silent_and_off_they_do_nothing() {
+    let reach = |key_switches| Reach { key_switches, beyond: Beyond::Octave, ..Reach::default() };
+    let play = |key_switches, keys: &[u8]| {
+        let mut clarinet = Clarinet::built_in(RATE_HZ).unwrap();
+        clarinet.set_settings(&Settings { reach: reach(key_switches), ..still() });
+        clarinet.apply(Event::Breath(0.6));
+        listen(&mut clarinet, 400, |clarinet, ms| {
+            if let Some(&key) = keys.get(ms / 50).filter(|_| ms % 50 == 0) {
+                clarinet.apply(Event::NoteOn { note: SoundingNote(key), velocity: 0.9 });
+            }
+        })
+    };
+    let row = [36, 37, 38, 39, 40];
+    let nothing = play(KeySwitches::C2, &[]);
+    assert!(play(KeySwitches::C2, &row) == nothing);
+    assert!(play(KeySwitches::Off, &row) != nothing, "off, they play an octave higher");
+}
+
+/// Every alternate that a key can choose on the bundled B flat clarinet.
+#[test]
+fn each_alternate_that_a_key_chooses_plays_its_note() {
+    let settings = Settings { reach: Reach { key_switches: KeySwitches::C1, ..Reach::default() }, ..still() };
+    let model = Clarinet::built_in(RATE_HZ).unwrap().model().clone();
+    let mut worst = 0.0_f64;
+    for alternate in model.alternates.all() {
+        for breath in [0.2, 0.5, 0.9] {
+            let mut clarinet = Clarinet::new(model.clone(), RATE_HZ);
+            clarinet.set_settings(&settings);
+            clarinet.apply(Event::Breath(breath));
+            clarinet.apply(Event::Fingerings(Fingerings::Alternate(alternate.nth as u8)));
+            press(&mut clarinet, model.file.fingerings[alternate.fingering].written.0);
+            listen(&mut clarinet, 600, |_, _| {});
+            let hz = fundamental_hz(&listen(&mut clarinet, 300, |_, _| {}), RATE_HZ);
+            let off = hz.map_or(f64::INFINITY, |hz| cents(hz, model.notes_hz[alternate.fingering]));
+            println!(
+                "{} alternate {} breath {breath}: {off:+.1} cents, corrected by {:+.1}, threshold x {:.3}",
+                model.file.fingerings[alternate.fingering].written,
+                alternate.nth,
+                -alternate.cents,
+                alternate.harder
+            );
+            worst = worst.max(off.abs());
+        }
+    }
+    // F#4 with two side keys at the loudest of the three.
+    assert!(worst < 17.0, "{worst}");
 }

@@ -7,8 +7,9 @@ mod rules;
 
 use chalumeau_core::analysis::pitch::fundamental_hz;
 use chalumeau_core::analysis::to_f64;
-use chalumeau_core::event::{Event, Timed};
-use chalumeau_core::instrument::{Clarinet, Settings};
+use chalumeau_core::control::key_switches::{KeySwitches, ROW};
+use chalumeau_core::event::{Event, Fingerings, Timed};
+use chalumeau_core::instrument::{Clarinet, Reach, Settings};
 use chalumeau_core::units::SoundingNote;
 use chalumeau_test_host::clap::{At, NoteExpressionType, Plugin, Say, Stereo};
 use rules::plugin;
@@ -145,6 +146,39 @@ fn the_breath_parameter_blows_when_it_moves() {
     ];
     let heard = play(&said, SECOND);
     assert!(heard == offline(Settings::default(), &events, SECOND));
+}
+
+/// As in MIDI files (`tests/cli.rs`) and in the VST3 beside this test: the row's keys are no notes. Written E flat 4 is key 61.
+#[test]
+fn key_switches_choose_the_fingering_of_the_next_note() {
+    let id = plugin().param("Key switches").unwrap().id;
+    let said = |switch: u8| {
+        [
+            At(0, Say::Set(id, 1.0)),
+            At(1_024, on(63)),
+            At(6_000, on(switch)),
+            At(7_000, off(switch)),
+            At(9_600, on(61)),
+            At(9_600, off(63)),
+        ]
+    };
+    let wanted = |fingerings| {
+        let reach = Reach { key_switches: KeySwitches::C1, ..Reach::default() };
+        let events = [
+            (1_024, note_on(63)),
+            (6_000, Event::Fingerings(fingerings)),
+            (9_600, note_on(61)),
+            (9_600, Event::NoteOff { note: SoundingNote(63) }),
+        ];
+        offline(Settings { reach, ..Settings::default() }, &events, SECOND / 2)
+    };
+    let chart = wanted(Fingerings::Chart);
+    for (switch, fingerings) in (24..).zip(ROW) {
+        let heard = play(&said(switch), SECOND / 2);
+        assert!(heard == wanted(fingerings), "{fingerings}");
+        let is_other = !matches!(fingerings, Fingerings::Chart | Fingerings::Alternate(3));
+        assert_eq!(heard != chart, is_other, "{fingerings}");
+    }
 }
 
 #[test]

@@ -104,6 +104,7 @@ fn parameters_are_described_by_the_rules() {
         "Attack",
         "Mod wheel",
         "Alternate fingerings",
+        "Key switches",
         "Growl pitch",
         "Split",
     ];

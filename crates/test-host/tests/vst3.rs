@@ -7,7 +7,7 @@ mod wind;
 
 use std::sync::{Mutex, MutexGuard, Once, PoisonError};
 
-use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::event::{Event, Fingerings, Timed};
 use chalumeau_core::instrument::{Clarinet, Settings};
 use chalumeau_core::units::SoundingNote;
 use chalumeau_test_host::clap::{At, Say};
@@ -170,6 +170,28 @@ fn controllers_pressure_and_wheel_reach_the_instrument() {
 }
 
 #[test]
+fn key_switches_choose_the_fingering_of_the_next_note() {
+    // The second of three places.
+    let said = [
+        (0, Word::Set("Key switches", 0.5)),
+        (1_024, on(63)),
+        (6_000, on(25)),
+        (7_000, off(25)),
+        (9_600, on(61)),
+        (9_601, off(63)),
+    ];
+    let events = [
+        (1_024, note_on(63)),
+        (6_000, Event::Fingerings(Fingerings::Alternate(1))),
+        (9_600, note_on(61)),
+        (9_601, Event::NoteOff { note: SoundingNote(63) }),
+    ];
+    let heard = play(512, &said, SECOND / 2);
+    assert!(heard == offline(&events, SECOND / 2));
+    assert!(heard != offline(&[events[0], events[2], events[3]], SECOND / 2));
+}
+
+#[test]
 fn block_size_is_inaudible() {
     let mut said = vec![
         (0, cc(2, 0)),
@@ -210,7 +232,7 @@ fn parameters_have_names_units_and_text() {
     let all = loaded.plugin.get_parameters().unwrap();
     // Behind them the framework hides one parameter for each MIDI controller of each channel.
     let ours: Vec<_> = all.iter().filter(|param| !param.name.starts_with("MIDI")).collect();
-    assert_eq!(ours.len(), 107, "{:?}", ours.iter().map(|param| &param.name).collect::<Vec<_>>());
+    assert_eq!(ours.len(), 108, "{:?}", ours.iter().map(|param| &param.name).collect::<Vec<_>>());
     for (name, text) in
         [("Full breath", "6.00"), ("A4", "440.0"), ("Reed coupled", "Coupled"), ("Tuning", "Tempered")]
     {

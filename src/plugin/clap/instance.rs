@@ -38,6 +38,7 @@ use crate::parameters::{self, InUse, Parameter};
 use crate::plugin::host_link::HostCalls;
 use crate::plugin::params::BeyondChoice;
 use crate::plugin::{Chalumeau, Task};
+use chalumeau_core::control::key_switches::KeySwitches;
 use chalumeau_core::instrument::Clarinet;
 
 /// A parameter of the framework and what the table says of it.
@@ -163,7 +164,8 @@ impl Instance {
     fn asked(&self) -> u32 {
         let tuning = &self.introduced.params.tuning;
         let beyond = u32::from(tuning.beyond.value() == BeyondChoice::Octave);
-        (tuning.transpose.value() as u32) << 8 | beyond << 7 | self.in_use()
+        let switches = KeySwitches::from(self.introduced.params.expression.key_switches.value()) as u32;
+        (tuning.transpose.value() as u32) << 8 | beyond << 7 | switches << 5 | self.in_use()
     }
 
     /// After the host has moved parameters: asks for a callback if others are in use now, or if the keys play other notes.

@@ -1,7 +1,8 @@
-//! Names of the keys that sound: the note that a clarinettist reads for each.
+//! Names of the keys that do something: the note that a clarinettist reads for each that sounds, and what a key switch chooses.
 //!
 //! A host shows them beside its keys, which are sounding pitch. They follow the instrument and its transposition.
 
+use std::fmt;
 use std::sync::PoisonError;
 
 use clap_sys::ext::note_name::{clap_note_name, clap_plugin_note_name};
@@ -11,14 +12,31 @@ use super::instance::Instance;
 use super::{Introduced, text};
 use crate::plugin::instrument_loading::instrument_request::InstrumentRequest;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::event::Fingerings;
 use chalumeau_core::instrument::{KeyPitches, Reach};
 use chalumeau_core::units::{SoundingNote, WrittenNote};
 
 pub static NOTE_NAME: clap_plugin_note_name = clap_plugin_note_name { count: Some(count), get: Some(get) };
 
-/// The keys that sound and their written notes, in order of pitch.
+/// What a key does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Does {
+    Plays(WrittenNote),
+    Chooses(Fingerings),
+}
+
+impl fmt::Display for Does {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Plays(written) => write!(f, "{written} written"),
+            Self::Chooses(fingerings) => write!(f, "{fingerings}"),
+        }
+    }
+}
+
+/// The keys that do something, in order of pitch.
 #[derive(Default)]
-pub struct NoteNames(Vec<(SoundingNote, WrittenNote)>);
+pub struct NoteNames(Vec<(SoundingNote, Does)>);
 
 impl NoteNames {
     /// Takes them from the instrument that plays, or before the first activation from the chosen one. Says whether they have
@@ -43,22 +61,24 @@ impl NoteNames {
     }
 }
 
-/// The keys that play a fingering of an instrument, without those that do not speak in tune and are silent.
+/// The keys that play a fingering of an instrument, without those that do not speak in tune and are silent; and the key
+/// switches.
 fn named(
     file: &InstrumentFile,
     reach: Reach,
     keys: &KeyPitches,
     speaks: impl Fn(usize) -> bool,
-) -> Vec<(SoundingNote, WrittenNote)> {
+) -> Vec<(SoundingNote, Does)> {
     let plays = |note: SoundingNote| {
         let written = note.written(file.transposition)?;
         let fingering = file.fingerings.iter().position(|fingering| fingering.written == written)?;
         speaks(fingering).then_some(written)
     };
-    (0..128)
-        .map(SoundingNote)
-        .filter_map(|key| reach.find(key, keys, plays).map(|(_, written)| (key, written)))
-        .collect()
+    let does = |key: SoundingNote| match reach.key_switches.chosen(key.0) {
+        Some(fingerings) => Some(Does::Chooses(fingerings)),
+        None => reach.find(key, keys, plays).map(|(_, written)| Does::Plays(written)),
+    };
+    (0..128).map(SoundingNote).filter_map(|key| Some((key, does(key)?))).collect()
 }
 
 unsafe extern "C" fn count(plugin: *const clap_plugin) -> u32 {
@@ -73,11 +93,11 @@ unsafe extern "C" fn get(plugin: *const clap_plugin, index: u32, note_name: *mut
     // SAFETY: as above.
     let Some(this) = (unsafe { Instance::of(plugin) }) else { return false };
     let names = this.note_names.lock().unwrap_or_else(PoisonError::into_inner);
-    let Some((sounding, written)) = names.0.get(index as usize).filter(|_| !note_name.is_null()) else {
+    let Some((sounding, does)) = names.0.get(index as usize).filter(|_| !note_name.is_null()) else {
         return false;
     };
     let mut name = [0; _];
-    text::write(&format!("{written} written"), &mut name);
+    text::write(&does.to_string(), &mut name);
     // Every port, every channel.
     let named = clap_note_name { name, port: -1, key: i16::from(sounding.0), channel: -1 };
     // SAFETY: `note_name` has room for one.
@@ -89,6 +109,7 @@ unsafe extern "C" fn get(plugin: *const clap_plugin, index: u32, note_name: *mut
 mod tests {
     use super::*;
     use chalumeau_core::bore::bundled::Bundled;
+    use chalumeau_core::control::key_switches::KeySwitches;
     use chalumeau_core::instrument::Beyond;
 
     #[test]
@@ -102,12 +123,17 @@ mod tests {
             let names = all(Reach::default(), |_| true);
             assert_eq!(names.len(), count, "{instrument:?}");
             assert_eq!(all(Reach::default(), |fingering| fingering > 0).len(), count - 1);
-            let (sounding, written) = names[0];
-            assert_eq!((sounding.0, written.to_string().as_str()), lowest, "{instrument:?}");
+            let (sounding, does) = names[0];
+            assert_eq!((sounding.0, does.to_string()), (lowest.0, format!("{} written", lowest.1)));
             let up = all(Reach { transpose: 12, ..Reach::default() }, |_| true);
-            assert_eq!(up[0], (SoundingNote(sounding.0 - 12), written));
+            assert_eq!(up[0], (SoundingNote(sounding.0 - 12), does));
             let folded = all(Reach { beyond: Beyond::Octave, ..Reach::default() }, |_| true);
             assert_eq!(folded.len(), 128, "every key plays");
+            let switched = all(Reach { key_switches: KeySwitches::C1, ..Reach::default() }, |_| true);
+            let texts: Vec<_> = switched[..6].iter().map(|(key, does)| (key.0, does.to_string())).collect();
+            let said = ["chart fingerings", "1st alternate", "2nd alternate", "3rd alternate", "by context"];
+            assert!((24..).zip(said).eq(texts[..5].iter().map(|(key, text)| (*key, text.as_str()))));
+            assert_eq!(texts[5].0, lowest.0);
         }
     }
 }

@@ -4,6 +4,7 @@ use nice_plug::prelude::*;
 
 use super::entry::{choice, switch};
 use super::settled;
+use chalumeau_core::control::key_switches::KeySwitches;
 use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::instrument::player::Attack;
 use chalumeau_core::instrument::player::vibrato::Vibrato;
@@ -61,6 +62,9 @@ pub struct ExpressionParams {
     /// [`Settings::alternates`].
     #[id = "altf"]
     pub alternates: BoolParam,
+    /// [`Reach::key_switches`](chalumeau_core::instrument::Reach::key_switches).
+    #[id = "keysw"]
+    pub key_switches: EnumParam<KeySwitchesChoice>,
 }
 
 /// Extended techniques and the vocal tract.
@@ -179,6 +183,28 @@ pub enum WheelChoice {
     Nothing,
 }
 
+/// [`KeySwitches`] as hosts see it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Enum)]
+pub enum KeySwitchesChoice {
+    /// [`KeySwitches::Off`].
+    #[id = "off"]
+    Off,
+    /// [`KeySwitches::C1`].
+    #[id = "c1"]
+    #[name = "C1 to E1"]
+    C1,
+    /// [`KeySwitches::C2`].
+    #[id = "c2"]
+    #[name = "C2 to E2"]
+    C2,
+}
+
+impl From<KeySwitchesChoice> for KeySwitches {
+    fn from(choice: KeySwitchesChoice) -> Self {
+        Self::ALL[choice.to_index()]
+    }
+}
+
 impl From<WheelChoice> for Wheel {
     fn from(choice: WheelChoice) -> Self {
         Self::ALL[choice.to_index()]
@@ -205,6 +231,7 @@ impl ExpressionParams {
             key_sounds: number("ksound"),
             slap: number("slap"),
             alternates: switch("altf"),
+            key_switches: choice("keysw", KeySwitchesChoice::Off),
         }
     }
 

@@ -44,6 +44,7 @@ impl Default for AudioSnapshot {
                 mouth_kpa: 0.0,
                 lip: None,
                 dynamic: None,
+                chosen: None,
             },
             moments: Box::new([ScopeSample::default(); SCOPE_SAMPLES]),
             moments_hz: 48_000.0,

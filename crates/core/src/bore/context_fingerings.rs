@@ -2,8 +2,8 @@
 //!
 //! A player who slurs F5 to F#5 adds a finger to those that are down instead of exchanging two: so in chromatic runs and in trills.
 //! Each [alternate](super::alternate_fingerings) of the instrument is compared with the chart's fingering of its
-//! note by the transfer matrices. One that is much off or much harder to blow is left out, and what is left of its error is for
-//! the player to correct.
+//! note by the transfer matrices. One that is much off or much harder to blow is taken only when the player asks for it; its error
+//! is for the player to correct.
 
 use crate::bore::alternate_fingerings::fingering_choices;
 use crate::bore::fingering_finder::bits;
@@ -27,7 +27,7 @@ const SECANTS: usize = 4;
 /// Embouchure of the thresholds, the default of the instrument.
 const ZETA: f64 = 0.3;
 
-/// An alternate that may be taken.
+/// An alternate, and what it is like beside the chart's fingering.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Alternate {
     /// Index of the chart's fingering of its note.
@@ -38,6 +38,15 @@ pub struct Alternate {
     pub cents: f64,
     /// Mouth pressure at which it begins to sound, over that of the chart's fingering.
     pub harder: f64,
+    /// The first, second ... alternate of its note, from 1.
+    pub nth: usize,
+}
+
+impl Alternate {
+    /// Whether a player takes it without being asked: a lip corrects it unnoticed, and it speaks about as easily.
+    fn is_good(&self) -> bool {
+        self.cents.abs() <= FARTHEST_CENTS && self.harder <= HARDEST
+    }
 }
 
 /// The alternates of an instrument, and when they are taken.
@@ -93,9 +102,9 @@ impl ContextFingerings {
                     open: bits(&choice.open),
                     cents: cents(hz, chart_hz),
                     harder: threshold_gamma(height, ZETA) / threshold_gamma(chart_height, ZETA),
+                    nth: choice.nth,
                 })
             })
-            .filter(|one| one.cents.abs() <= FARTHEST_CENTS && one.harder <= HARDEST)
             .take(usize::from(u8::MAX))
             .collect();
         let chart = file.fingerings.iter().enumerate().map(|(at, one)| (at, bits(&one.open)));
@@ -109,7 +118,8 @@ impl ContextFingerings {
         let take = |from: &(usize, Option<Grip>), to: usize| {
             let grip = from.1.filter(|_| near(from.0, to))?;
             let moves = |form: usize| Some(grip.moves(&forms[form].1?));
-            let own = (0..alternates.len()).filter(|&at| alternates[at].fingering == to);
+            let own = (0..alternates.len())
+                .filter(|&at| alternates[at].fingering == to && alternates[at].is_good());
             let fewest = own.filter_map(|at| Some((moves(notes + at)?, at))).min()?;
             (fewest.0 < moves(to)?).then_some(fewest.1 as u8)
         };
@@ -117,9 +127,16 @@ impl ContextFingerings {
         Self { alternates, notes, taken }
     }
 
-    /// All that may be taken, by their numbers.
+    /// All, by their numbers.
     pub fn all(&self) -> &[Alternate] {
         &self.alternates
+    }
+
+    /// The number of the first, second ... alternate of a fingering, from 1, if it has so many. Real-time safe.
+    pub fn nth(&self, fingering: usize, nth: u8) -> Option<u8> {
+        let is_it = |one: &Alternate| one.fingering == fingering && one.nth == usize::from(nth);
+        // There are no more than a byte counts.
+        self.alternates.iter().position(is_it).map(|at| at as u8)
     }
 
     /// One by its number. Real-time safe.
@@ -146,7 +163,6 @@ mod tests {
         let context = ContextFingerings::new(&file, &Air::default());
         for one in context.all() {
             println!("{} {one:?}", file.fingerings[one.fingering].written);
-            assert!(one.cents.abs() <= 15.0 && one.harder <= 1.15);
         }
         let grip = |open: u64| Mechanism::boehm().grip(&file, open).unwrap();
         let chart: Vec<Grip> = file.fingerings.iter().map(|one| grip(bits(&one.open))).collect();
@@ -155,6 +171,7 @@ mod tests {
             let Some(at) = context.taken(from, None, to) else { continue };
             let one = context.get(at).unwrap();
             assert_eq!(one.fingering, to);
+            assert!(one.cents.abs() <= 15.0 && one.harder <= 1.15);
             assert!(chart[from].moves(&grip(one.open)) < chart[from].moves(&chart[to]), "{from} {to}");
             let [low, high] = [from, to].map(|note| file.fingerings[note].written);
             assert!((1..=2).contains(&low.0.abs_diff(high.0)), "{low} {high}");

@@ -11,8 +11,10 @@
 //! - Breath and channel pressure of an MPE member channel go to the parts that play on that channel, and to a note that
 //!   begins on it later. So do linked controllers there, unless their links set what belongs to all players.
 //! - What belongs to notes goes to the parts that hold one of them. If no part does, it goes to all, whose notes may fade.
+//! - A [key switch](super::key_switches) goes to all.
 //! - Everything else goes to all parts, and each takes what is for its note, as a lone player does: bends, for example.
 
+use crate::control::key_switches::KeySwitches;
 use crate::control::midi::breath::BreathFrom;
 use crate::control::midi::links::{Link, Links, MOST as MOST_LINKS, Source};
 use crate::control::midi::techniques::Wheel;
@@ -122,6 +124,11 @@ impl Parts {
         self.tell_all(|part| part.set_wheel(wheel))
     }
 
+    /// See [`MidiDecoder::set_key_switches`].
+    pub fn set_key_switches(&mut self, key_switches: KeySwitches) {
+        self.decoders.iter_mut().for_each(|part| part.set_key_switches(key_switches));
+    }
+
     /// See [`MidiDecoder::set_breath_from`].
     pub fn set_breath_from(&mut self, from: BreathFrom) -> &[PartEvent] {
         self.tell_all(|part| part.set_breath_from(from))
@@ -170,6 +177,12 @@ impl Parts {
     /// A note begins on the part that the rule above chooses. See [`MidiDecoder::strike`].
     pub fn strike(&mut self, note: Note, velocity: u8) -> &[PartEvent] {
         let note = Note { channel: note.channel % 16, key: note.key.min(127), ..note };
+        if self.decoders[0].is_key_switch(note.key) {
+            self.tell_all(|part| part.strike(note, velocity));
+            // Each part says that the key is over; it is one note.
+            self.over.truncate(1);
+            return &self.said;
+        }
         let chosen = self.part_for(note);
         self.begin();
         self.latest = chosen;

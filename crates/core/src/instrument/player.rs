@@ -40,7 +40,7 @@ mod voicing;
 
 use crate::bore::lattice::Real;
 use crate::control::keys::Keys;
-use crate::event::Event;
+use crate::event::{Event, Fingerings};
 use crate::instrument::breath_noise::Jet;
 use crate::instrument::model::Model;
 use crate::instrument::person::Person;
@@ -131,6 +131,8 @@ pub struct PlayerState {
     pub lip: Option<LipShape>,
     /// The dynamic that is played, 0 (pianissimo) to 1 (fortissimo); `None` where the breath is physical or before the first note.
     pub dynamic: Option<f32>,
+    /// The fingerings that a key switch has chosen, if one has.
+    pub chosen: Option<Fingerings>,
 }
 
 /// One player of one instrument.
@@ -148,6 +150,8 @@ pub struct Player {
     ear: Ear,
     tongue: Tongue,
     fingers: Fingers,
+    /// What a key switch has chosen; `None` leaves it to the settings.
+    chosen: Option<Fingerings>,
     tuning: PlayedTuning,
     reed: ReedSmoothing,
     glide: ReedGlide,
@@ -194,6 +198,12 @@ impl Player {
                 let lip = self.posture.as_ref().and_then(Posture::lip).filter(|_| is_other);
                 self.glide.begin(&self.settings.under_lip(lip), &settings);
             }
+            // What has been chosen last counts.
+            let is_chosen_anew = settings.alternates != self.settings.alternates;
+            let is_other_row = settings.reach.key_switches != self.settings.reach.key_switches;
+            if is_chosen_anew || is_other_row {
+                self.chosen = None;
+            }
             self.settings = settings;
             self.posture = None;
         }
@@ -235,6 +245,7 @@ impl Player {
             mouth_kpa: (1e-3 * P_REF_PA * self.closing() * self.breath.gamma()) as f32,
             lip: self.posture.as_ref().and_then(Posture::lip),
             dynamic: self.response.dynamic().map(|dynamic| dynamic as f32),
+            chosen: self.chosen,
         }
     }
 
@@ -272,9 +283,15 @@ impl Player {
                 self.fingers.hold_hole(usize::from(hole), opening, ticks, model, voice.lattice_mut());
             }
             Event::Technique { which, amount } => self.techniques.set(which, amount),
+            Event::Fingerings(chosen) => self.chosen = Some(chosen),
             // They act after the instrument; settings are set from outside.
             Event::Volume { .. } | Event::Pan { .. } | Event::Set(..) => {}
-            Event::Panic => self.reset(voice),
+            Event::Panic => {
+                // Hosts silence everything wherever they stop; the player still means the same fingerings.
+                let chosen = self.chosen;
+                self.reset(voice);
+                self.chosen = chosen;
+            }
         }
     }
 
@@ -287,6 +304,11 @@ impl Player {
     }
 
     fn note_on<F: Real>(&mut self, note: SoundingNote, velocity: f32, model: &Model, voice: &mut Voice<F>) {
+        // Who plays without a decoder has the key switches too.
+        if let Some(chosen) = self.settings.reach.key_switches.chosen(note.0) {
+            self.chosen = Some(chosen);
+            return;
+        }
         // A note that the instrument does not have is ignored.
         let Some(fingering) = self.take_up(note, model) else { return };
         let slurred = !self.keys.is_empty();
@@ -370,9 +392,13 @@ impl Player {
     fn finger<F: Real>(&mut self, fingering: usize, slurred: bool, model: &Model, voice: &mut Voice<F>) {
         let glissando_s = f64::from(self.settings.glissando_s);
         let from = self.fingers.fingering().filter(|_| slurred);
-        let alternate = from
-            .filter(|_| self.settings.alternates)
-            .and_then(|from| model.alternates.taken(from, self.fingers.alternate(), fingering));
+        let alternate = match self.fingerings() {
+            Fingerings::Chart => None,
+            Fingerings::Alternate(nth) => model.alternates.nth(fingering, nth),
+            Fingerings::ByContext => {
+                from.and_then(|from| model.alternates.taken(from, self.fingers.alternate(), fingering))
+            }
+        };
         let begun = self.slide.map(|slide| slide.target).or(from);
         let slides = begun.filter(|&begun| from.is_some() && glissando_s > 0.0 && begun != fingering);
         self.slide = slides.map(|begun| Slide::new(begun, fingering, glissando_s, model));
@@ -408,6 +434,12 @@ impl Player {
                 self.move_holes(fingering, legato_s, model, voice);
             }
         }
+    }
+
+    /// Which fingerings the next note takes.
+    fn fingerings(&self) -> Fingerings {
+        let by_setting = if self.settings.alternates { Fingerings::ByContext } else { Fingerings::Chart };
+        self.chosen.unwrap_or(by_setting)
     }
 
     /// Control ticks that the fingers take between slurred notes.

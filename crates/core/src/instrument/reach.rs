@@ -1,5 +1,6 @@
 //! Which note a key plays: transposed, and what becomes of keys outside the instrument's range.
 
+use crate::control::key_switches::KeySwitches;
 use crate::instrument::key_pitches::{KeyPitch, KeyPitches};
 use crate::instrument::model::Model;
 use crate::units::SoundingNote;
@@ -27,6 +28,8 @@ pub struct Reach {
     pub transpose: i32,
     /// What a key outside the instrument's range plays. Default [`Beyond::Silent`].
     pub beyond: Beyond,
+    /// Keys that choose fingerings and play nothing. Default [`KeySwitches::Off`].
+    pub key_switches: KeySwitches,
 }
 
 impl Reach {
@@ -61,6 +64,9 @@ impl Reach {
         keys: &KeyPitches,
         find: impl Fn(SoundingNote) -> Option<T>,
     ) -> Option<(KeyPitch, T)> {
+        if self.key_switches.chosen(key.0).is_some() {
+            return None;
+        }
         let key = i32::from(key.0) + self.clamped().transpose;
         let KeyPitch { note, cents } = keys.of(SoundingNote(u8::try_from(key).ok()?))?;
         let wanted = i16::from(note.0);
@@ -87,7 +93,8 @@ mod tests {
     }
 
     fn note(transpose: i32, beyond: Beyond, key: u8) -> Option<u8> {
-        let found = Reach { transpose, beyond }.find(SoundingNote(key), &KeyPitches::default(), plays);
+        let reach = Reach { transpose, beyond, ..Reach::default() };
+        let found = reach.find(SoundingNote(key), &KeyPitches::default(), plays);
         found.map(|(pitch, ())| pitch.note.0)
     }
 
@@ -99,6 +106,19 @@ mod tests {
         assert_eq!(note(99, Beyond::Silent, 60), Some(84), "clamped");
         assert_eq!(note(24, Beyond::Silent, 120), None, "no such note");
         assert_eq!(note(-24, Beyond::Silent, 3), None);
+    }
+
+    #[test]
+    fn key_switches_play_nothing_wherever_they_are() {
+        let plays = |key_switches, key| {
+            let reach = Reach { transpose: 24, beyond: Beyond::Octave, key_switches };
+            reach.find(SoundingNote(key), &KeyPitches::default(), plays).is_some()
+        };
+        for key in 0..100 {
+            assert!(plays(KeySwitches::Off, key));
+            assert_eq!(plays(KeySwitches::C1, key), !(24..=28).contains(&key), "{key}");
+            assert_eq!(plays(KeySwitches::C2, key), !(36..=40).contains(&key), "{key}");
+        }
     }
 
     #[test]

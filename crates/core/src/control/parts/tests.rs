@@ -1,7 +1,7 @@
 use super::*;
 use crate::control::midi::links::Target;
 use crate::dsp::white::White;
-use crate::event::SettingNumber;
+use crate::event::{Fingerings, SettingNumber};
 use crate::units::SoundingNote;
 
 fn said(events: &[PartEvent]) -> Vec<(u8, Event)> {
@@ -256,4 +256,16 @@ fn every_note_ends_once() {
     assert_eq!(over.iter().zip(&struck).find(|(over, struck)| over != struck), None);
     assert_eq!(over.len(), struck.len());
     assert_eq!(room, (parts.said.capacity(), parts.over.capacity()));
+}
+
+#[test]
+fn a_key_switch_is_for_all_parts_and_ends_once() {
+    let mut parts = Parts::new(3);
+    parts.set_key_switches(KeySwitches::C2);
+    chord(&mut parts, &[60, 64]);
+    let choice = Event::Fingerings(Fingerings::Alternate(1));
+    assert_eq!(said(parts.note_on(0, 37, 100)), [0, 1, 2].map(|part| (part, choice)));
+    assert_eq!(parts.over(), [Note { id: None, channel: 0, key: 37 }]);
+    assert_eq!(said(parts.note_off(0, 37)), []);
+    assert_eq!(chord(&mut parts, &[67]), [on(2, 67)], "it took no part");
 }

@@ -20,6 +20,7 @@ impl Player {
             swing: from.swing.carried(&self.person),
             inflection: from.inflection.carried(),
             inhalation: from.inhalation,
+            chosen: from.chosen,
             ..Self::new(self.person)
         };
         while let Some(last) = self.keys.last() {
@@ -41,6 +42,7 @@ impl Player {
         self.reed = from.reed;
         self.techniques.follow(&from.techniques);
         self.swing.follow(&from.swing);
+        self.chosen = from.chosen;
         self.posture = None;
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Each track that holds notes is a line. Where all notes are in one track, as in every file of format 0, each channel with
 //! notes is a line. A player hears the messages of its line and no others, so that each has a breath, volume and place of its
-//! own. A message of no line, for example a controller in a track without notes, goes to the lines with notes on its channel,
+//! own. Key switches are no notes, and make no line. A message of no line, for example a controller in a track without notes, goes to the lines with notes on its channel,
 //! or to all if there are none.
 
 use super::{MidiFileError, decode, merged};
@@ -46,8 +46,9 @@ pub fn read_tracks(
 ) -> Result<(Score<PartEvent>, usize), MidiFileError> {
     let (mut clock, messages) = merged(bytes)?;
     let noted = messages.iter().filter_map(|message| match message.kind {
-        TrackEventKind::Midi { channel, message: MidiMessage::NoteOn { vel, .. } } if vel > 0 => {
-            Some((message.track, channel.as_int()))
+        TrackEventKind::Midi { channel, message: MidiMessage::NoteOn { key, vel } } => {
+            let is_note = vel > 0 && !decoder.is_key_switch(key.as_int());
+            is_note.then_some((message.track, channel.as_int()))
         }
         _ => None,
     });
@@ -119,6 +120,8 @@ fn lines(noted: impl Iterator<Item = (usize, u8)>, decoder: &MidiDecoder) -> Vec
 mod tests {
     use super::super::tests::file;
     use super::*;
+    use crate::control::key_switches::KeySwitches;
+    use crate::event::Fingerings;
     use crate::units::SoundingNote;
 
     const END: [u8; 4] = [0, 0xFF, 0x2F, 0];
@@ -192,5 +195,24 @@ mod tests {
         let tracks = vec![&one[..]; MOST + 1];
         let refused = read_tracks(&MidiDecoder::new(), &file(1, [0, 96], &tracks), 48_000).unwrap_err();
         assert_eq!(refused, MidiFileError::Lines { found: 17, most: 16 });
+    }
+
+    /// The row in a track of its own, as a user writes it.
+    #[test]
+    fn key_switches_in_a_track_of_their_own_are_no_line_and_choose_for_all() {
+        let tracks: [&[u8]; 3] = [&track(0, 60, &[]), &track(0, 64, &[]), &track(0, 25, &[])];
+        let mut decoder = MidiDecoder::new();
+        decoder.set_key_switches(KeySwitches::C1);
+        let (score, count) = read_tracks(&decoder, &file(1, [0, 96], &tracks), 48_000).unwrap();
+        assert_eq!(count, 2);
+        let choices: Vec<_> = score
+            .events
+            .iter()
+            .filter(|timed| matches!(timed.event.event, Event::Fingerings(Fingerings::Alternate(1))))
+            .map(|timed| (timed.at, timed.event.to))
+            .collect();
+        assert_eq!(choices, [(0, To::Player(0)), (0, To::Player(1))]);
+        let (_, count) = read_tracks(&MidiDecoder::new(), &file(1, [0, 96], &tracks), 48_000).unwrap();
+        assert_eq!(count, 3, "off, they are notes");
     }
 }
