@@ -16,6 +16,7 @@ use crate::plugin::launch_options::LaunchOptions;
 use crate::plugin::params::instrument::InstrumentChoice;
 use crate::plugin::params::scale::SavedScale;
 use crate::plugin::preset_keeper::PresetTask;
+use chalumeau_core::bore::fingering_finder;
 use chalumeau_core::event::Event;
 
 /// What the window keeps while it is closed.
@@ -56,14 +57,14 @@ impl WindowMemory {
                 let _ = self.keys.push(Event::NoteOff { note });
             }
             Action::TryFingering(open) => {
-                let bits = open.iter().enumerate().map(|(hole, &open)| u64::from(open) << hole).sum();
-                let _ = self.keys.push(Event::TryHoles(Some(bits)));
+                let _ = self.keys.push(try_holes(&open));
                 shared.try_holes(Some(open));
             }
             Action::EndTry => {
                 let _ = self.keys.push(Event::TryHoles(None));
                 shared.try_holes(None);
             }
+            Action::FindFingerings(question) => shared.find_fingerings(question),
             Action::ChooseInstrument(index) => self.choose("instr", index, InstrumentChoice::ALL.len(), gui),
             Action::OpenInstrument(path) => {
                 if let Ok(mut file) = self.handles.params.instrument.file.write() {
@@ -135,6 +136,11 @@ impl WindowMemory {
             self.act(action, shared, gui);
         }
     }
+}
+
+/// What the voice hears of a trial.
+pub(super) fn try_holes(open: &[bool]) -> Event {
+    Event::TryHoles(Some(fingering_finder::bits(open)))
 }
 
 /// The open window. It releases held keys and parameters when it closes. [main thread]
