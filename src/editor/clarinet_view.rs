@@ -59,7 +59,9 @@ impl ClarinetView {
             self.end_try(actions);
         }
         let height = ui.available_height();
-        let picker = (0.36 * height).clamp(120.0, 184.0);
+        // A list is worth more room than buttons.
+        let most = if self.search.is_open() { 320.0 } else { 184.0 };
+        let picker = (0.36 * height).clamp(120.0, most);
         ui.spacing_mut().item_spacing.y = GAP;
         panel(c).show(ui, |ui| {
             ui.set_width(ui.available_width());

@@ -152,10 +152,9 @@ fn fingers(ui: &Ui, place: Rect, found: &Found, ink: Color32) {
 /// What the fingers press, as a reader says it.
 fn presses(found: &Found) -> String {
     if found.fingers.trim().is_empty() {
-        "no finger".to_owned()
-    } else {
-        found.fingers.replace("key", " key")
+        return "no finger".to_owned();
     }
+    found.fingers.replace("key", " key").replace("sliver", "sliver ").replace("side", "side ")
 }
 
 /// The ground of a fingering that can be clicked.
