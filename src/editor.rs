@@ -17,6 +17,7 @@ mod clarinet_view;
 pub mod controls;
 pub mod feel_test;
 mod file_browser;
+pub mod fingering_search;
 mod header;
 mod hole_names;
 mod host_marks;
@@ -64,6 +65,7 @@ use chalumeau_core::units::SoundingNote;
 use chalumeau_knob::wire::message::Feel;
 use controls::{Entry, Hands, Press};
 use file_browser::FileBrowser;
+use fingering_search::FingeringQuestion;
 use keyboard::Keyboard;
 use preset_browser::PresetBrowser;
 use undo::UndoHistory;
@@ -97,6 +99,8 @@ pub enum Action {
     TryFingering(Vec<bool>),
     /// Back to the fingering of the note.
     EndTry,
+    /// Look for fingerings for this; `None` looks no longer.
+    FindFingerings(Option<FingeringQuestion>),
     /// A device of the list, by its key.
     ChooseDevice(String),
     /// The user alters these holes and joints; all others are as built.

@@ -261,6 +261,7 @@ impl Chalumeau {
         self.inputs.set_links(&self.params.links.links(&own));
         // Where a linked controller has spoken last, its value counts.
         let settings = self.inputs.linked(own);
+        self.inputs.set_curves(self.params.curves.now(&settings));
         let has_changed = settings != self.settings;
         if has_changed {
             instrument.set_settings(&settings);

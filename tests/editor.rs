@@ -9,6 +9,8 @@ mod alterations;
 mod cost;
 #[path = "editor/files.rs"]
 mod files;
+#[path = "editor/fingerings.rs"]
+mod fingerings;
 #[path = "editor/hands.rs"]
 mod hands;
 #[path = "editor/linked.rs"]

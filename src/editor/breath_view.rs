@@ -12,7 +12,7 @@ use crate::editor::controls::{Hands, choice, heading, momentary, slider, switch}
 use crate::editor::snapshot::{BreathSource, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
-use breath_curve::BreathHistogram;
+use breath_curve::{BreathHistogram, OfSource};
 use chalumeau_core::instrument::BreathResponse;
 
 /// What the view remembers.
@@ -20,8 +20,8 @@ use chalumeau_core::instrument::BreathResponse;
 pub struct BreathView {
     /// Least and greatest value of each source while the window was open, by name.
     ranges: Vec<(String, f32, f32)>,
-    /// What the live source has sent.
-    histogram: BreathHistogram,
+    /// What each source has sent while it was live, by name.
+    histograms: Vec<(String, BreathHistogram)>,
     /// Least and greatest breath since *Calibrate* was pressed; none while it is not on. Both are `None` until the player blows.
     calibration: Option<Option<(f32, f32)>>,
 }
@@ -48,13 +48,22 @@ impl BreathView {
                 None => self.ranges.push((source.name.clone(), value, value)),
             }
             if source.is_live {
-                self.histogram.look(value);
+                self.histogram(&source.name).look(value);
                 if let Some(range) = self.calibration.as_mut().filter(|_| value > 0.0) {
                     let (low, high) = range.unwrap_or((value, value));
                     *range = Some((low.min(value), high.max(value)));
                 }
             }
         }
+    }
+
+    fn histogram(&mut self, source: &str) -> &mut BreathHistogram {
+        let known = self.histograms.iter().position(|(name, _)| name == source);
+        let at = known.unwrap_or_else(|| {
+            self.histograms.push((source.to_owned(), BreathHistogram::default()));
+            self.histograms.len() - 1
+        });
+        &mut self.histograms[at].1
     }
 
     fn column(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
@@ -83,6 +92,11 @@ impl BreathView {
         choice(ui, hands, "resp");
         for id in ["breath", "bcurve"] {
             slider(ui, hands, id);
+        }
+        if let Some(of) = OfSource::live(hands, snapshot).filter(OfSource::is_own) {
+            let said = format!("{} has its own curve, in the picture.", of.title());
+            let c = Colours::here(ui);
+            ui.label(egui::RichText::new(said).font(theme::small()).color(c.quiet));
         }
         if hands.step("resp") == PLAYED {
             self.calibrate_breath(ui, hands, snapshot);
@@ -140,7 +154,12 @@ impl BreathView {
             self.calibration = match self.calibration.take() {
                 None => Some(None),
                 Some(range) => {
-                    if let Some((low, high)) = range.filter(|(low, high)| high - low >= LEAST_RANGE) {
+                    let of = OfSource::live(hands, snapshot);
+                    if let Some((low, high)) = range.filter(|(low, high)| high - low >= LEAST_RANGE)
+                        && !of.is_some_and(|of| {
+                            of.change(hands, |own| (own.softest, own.loudest) = (low, high))
+                        })
+                    {
                         let value =
                             |id, share: f32| hands.controls.parse(id, &format!("{} %", 100.0 * share));
                         let ends = [("bsoft", value("bsoft", low)), ("bloud", value("bloud", high))];
@@ -170,7 +189,9 @@ impl BreathView {
             if is_played {
                 ui.set_height((0.5 * height - 24.0).clamp(120.0, 320.0));
                 let live = snapshot.sources.iter().find(|source| source.is_live && !source.is_velocity());
-                breath_curve::draw(ui, hands, snapshot, &self.histogram, live.map(|source| source.value));
+                let histogram =
+                    self.histogram(live.map_or(BreathSource::KEYS, |source| &source.name)).clone();
+                breath_curve::draw(ui, hands, snapshot, &histogram, live);
             } else {
                 ui.set_height((0.42 * height - 24.0).clamp(96.0, 230.0));
                 gauge(ui, snapshot);

@@ -2,8 +2,11 @@
 //! Both directions have the same scale. Bore, holes and chimneys come from the instrument's file. The file does not give
 //! the thickness of the wood; it is drawn as deep as the holes. Finger holes and rings are on the upper edge and closed
 //! keys on the lower edge, unlike on the real instrument. A click on a hole opens or closes it for a trial, which lasts
-//! until *Back to the note*. A drag moves it, and a drag of a ring pulls
-//! the joint ([`AlterationEditor`]).
+//! until *Back to the note*. A drag moves it, and a drag of a ring pulls the joint ([`AlterationEditor`]). In place of the
+//! picker, a search lists the fingerings of a note.
+
+mod fingering_panel;
+mod fingering_rows;
 
 use std::sync::Arc;
 
@@ -24,6 +27,7 @@ use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
 use chalumeau_core::bore::alternate_fingerings::{self, FingeringChoice};
 use chalumeau_core::bore::instrument_file::{HoleKind, InstrumentFile, REGISTERS, ToneHole};
+use fingering_panel::{Chosen, FingeringPanel};
 
 /// Least distance of two buttons with their names below, points.
 const NAMED: f32 = 38.0;
@@ -36,6 +40,7 @@ pub struct ClarinetView {
     /// The choices of the picker, and the instrument they belong to.
     known: Option<(Arc<InstrumentFile>, Arc<Vec<FingeringChoice>>)>,
     alterations: AlterationEditor,
+    search: FingeringPanel,
 }
 
 impl ClarinetView {
@@ -54,7 +59,9 @@ impl ClarinetView {
             self.end_try(actions);
         }
         let height = ui.available_height();
-        let picker = (0.36 * height).clamp(120.0, 184.0);
+        // A list is worth more room than buttons.
+        let most = if self.search.is_open() { 320.0 } else { 184.0 };
+        let picker = (0.36 * height).clamp(120.0, most);
         ui.spacing_mut().item_spacing.y = GAP;
         panel(c).show(ui, |ui| {
             ui.set_width(ui.available_width());
@@ -64,7 +71,15 @@ impl ClarinetView {
         panel(c).show(ui, |ui| {
             ui.set_width(ui.available_width());
             ui.set_height(ui.available_height());
-            self.picker(ui, names, snapshot, actions);
+            if self.alterations.is_open() || !self.search.is_open() {
+                self.picker(ui, names, snapshot, actions);
+                return;
+            }
+            match self.search.draw(ui, names, snapshot, self.tried.as_deref(), actions) {
+                Some(Chosen::Try(open)) => self.try_holes(open, actions),
+                Some(Chosen::EndTry) => self.end_try(actions),
+                None => {}
+            }
         });
     }
 
@@ -165,8 +180,12 @@ impl ClarinetView {
         if let Some(open) = tried.get_mut(hole) {
             *open = !*open;
         }
-        actions.push(Action::TryFingering(tried.clone()));
-        self.tried = Some(tried);
+        self.try_holes(tried, actions);
+    }
+
+    fn try_holes(&mut self, open: Vec<bool>, actions: &mut Vec<Action>) {
+        actions.push(Action::TryFingering(open.clone()));
+        self.tried = Some(open);
     }
 
     fn picker(&mut self, ui: &mut Ui, names: NoteNames, snapshot: &Snapshot, actions: &mut Vec<Action>) {
@@ -239,8 +258,7 @@ impl ClarinetView {
                             format!("{name}{alternate}: {}", choice.fingers)
                         };
                         if response.on_hover_text(told).clicked() {
-                            self.tried = Some(choice.open.clone());
-                            actions.push(Action::TryFingering(choice.open.clone()));
+                            self.try_holes(choice.open.clone(), actions);
                         }
                     }
                 });
@@ -272,6 +290,11 @@ impl ClarinetView {
                 let about = "Move a hole, make it wider or narrower, or pull a joint, and hear it";
                 if ui.button(words).on_hover_text(about).clicked() {
                     self.alterations.open();
+                }
+                let about =
+                    "Look through every fingering that fingers and keys can make, for a note or a trill";
+                if ui.button("Find fingerings").on_hover_text(about).clicked() {
+                    self.search.open(snapshot, actions);
                 }
                 ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
                     ui.add(egui::Label::new(told).truncate());

@@ -5,6 +5,7 @@
 //! was done.
 
 use crate::controllers::ControllerLinks;
+use crate::controllers::source_curves::SourceCurves;
 use crate::editor::ab_comparison::Values;
 use crate::editor::terms;
 use crate::editor::undo::{Change, UndoHistory};
@@ -56,6 +57,10 @@ pub trait Controls {
     }
     /// Controllers that the user links to parameters; `None` where that is not done.
     fn links(&self) -> Option<&ControllerLinks> {
+        None
+    }
+    /// The own curves of sources of breath; `None` where there are none.
+    fn curves(&self) -> Option<&SourceCurves> {
         None
     }
     /// Opens the host's own menu for it, at a place of the window in pixels. Nothing happens where the host has none.

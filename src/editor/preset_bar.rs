@@ -99,7 +99,7 @@ fn frame(ui: &Ui, rect: Rect, response: &Response, is_open: bool) {
 }
 
 /// A triangle that points left (-1) or right (1).
-fn arrow(ui: &Ui, rect: Rect, side: f32, word: &str) -> Response {
+pub(super) fn arrow(ui: &Ui, rect: Rect, side: f32, word: &str) -> Response {
     let response = ui.interact(rect, ui.scope_id().with(word), Sense::click());
     frame(ui, rect, &response, false);
     let c = Colours::here(ui);

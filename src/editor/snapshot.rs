@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::editor::fingering_search::FingeringSearch;
 use crate::editor::sound_analysis::SoundAnalysis;
 use crate::folder_listing::FolderListing;
 use crate::presets::PresetShelf;
@@ -61,6 +62,8 @@ pub struct Snapshot {
     pub fingering: usize,
     /// How far each hole is open, 0..=1, in the order of the file.
     pub openings: Vec<f32>,
+    /// The fingerings that the user looks for.
+    pub fingerings: FingeringSearch,
     /// Mouth pressure, kPa.
     pub mouth_kpa: f32,
     /// How the player's lip shapes the reed; `None` where the breath is physical.
@@ -123,6 +126,7 @@ impl Default for Snapshot {
             sounding: None,
             fingering: 0,
             openings,
+            fingerings: FingeringSearch::Resting,
             mouth_kpa: 0.0,
             lip: None,
             dynamic: None,

@@ -3,6 +3,7 @@
 
 use nice_plug::prelude::NoteEvent;
 
+use crate::controllers::source_curves::CurveSource;
 use crate::editor::snapshot::BreathSource;
 use chalumeau_core::control::midi::BreathOrigin;
 use chalumeau_core::control::midi::breath::BreathController;
@@ -49,10 +50,10 @@ impl BreathInput {
         match self {
             Self::Keys => BreathSource::KEYS,
             Self::Parameter => "Breath parameter",
-            Self::Breath => "CC2 breath",
-            Self::Expression => "CC11 expression",
-            Self::Pressure => "Channel pressure",
-            Self::Note => "Note expression",
+            Self::Breath => CurveSource::Breath.title(),
+            Self::Expression => CurveSource::Expression.title(),
+            Self::Pressure => CurveSource::Pressure.title(),
+            Self::Note => CurveSource::Note.title(),
             Self::Knob => BreathSource::KNOB,
             Self::Link => "Linked controller",
             Self::Microphone => "Microphone",

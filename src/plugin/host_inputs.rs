@@ -8,6 +8,7 @@ use super::part_reeds::PartReeds;
 use super::reed_controllers::ReedControllers;
 use super::translate_events::{EventTranslator, raw7, untangled};
 use crate::controllers::ControllerLinks;
+use crate::controllers::source_curves::CurvesNow;
 use chalumeau_core::control::key_switches::KeySwitches;
 use chalumeau_core::control::midi::breath::BreathFrom;
 use chalumeau_core::control::midi::links::{Link, MOST, Source};
@@ -29,6 +30,7 @@ pub struct HostInputs {
     translator: EventTranslator,
     reeds: PartReeds,
     breath_sources: BreathSources,
+    curves: CurvesNow,
     /// Events that the block begins with or that the host's latest event has become, their sample, and how many have been
     /// handed out.
     events: Vec<PartEvent>,
@@ -47,6 +49,7 @@ impl Default for HostInputs {
             translator: EventTranslator::default(),
             reeds: PartReeds::default(),
             breath_sources: BreathSources::default(),
+            curves: CurvesNow::default(),
             events: Vec::with_capacity(EVENTS),
             at: 0,
             handed: 0,
@@ -92,6 +95,11 @@ impl HostInputs {
     /// Ties controllers to settings.
     pub fn set_links(&mut self, links: &[Option<Link>; MOST]) {
         self.translator.set_links(links);
+    }
+
+    /// Gives sources their own curves.
+    pub fn set_curves(&mut self, curves: CurvesNow) {
+        self.curves = curves;
     }
 
     /// Adds at the beginning of the block what linked controllers have said to single players. Call it where all have got the
@@ -161,9 +169,10 @@ impl HostInputs {
         for &event in self.translator.translate(&event, reeds.is_some()) {
             push(&mut self.events, event);
         }
-        for event in &self.events {
+        for event in &mut self.events {
             if let (Event::Breath(unit), Some(origin)) = (event.event, self.translator.breath_origin()) {
                 self.breath_sources.blow(origin.into(), unit);
+                event.event = Event::Breath(self.curves.breath(origin, unit));
             }
         }
         self.note_ends(event.timing());
@@ -269,6 +278,7 @@ mod tests {
 
     use super::*;
     use crate::controllers::ParameterLink;
+    use crate::controllers::source_curves::{CurveSource, SourceCurve, SourceCurves};
     use crate::plugin::breath_sources::BreathInput;
     use chalumeau_core::units::SoundingNote;
 
@@ -322,6 +332,33 @@ mod tests {
         assert!(!inputs.breath_sources().is_live(BreathInput::Expression));
         midi(&mut inputs, NO_REED, &[[0x90, 60, 100]]);
         assert!(inputs.breath_sources().is_live(BreathInput::Expression));
+    }
+
+    #[test]
+    fn a_source_with_its_own_curve_is_shown_as_it_is_and_heard_by_its_curve() {
+        let (curves, settings) = (SourceCurves::default(), Settings::default());
+        curves.put(CurveSource::Breath, Some(SourceCurve { softest: 0.1, loudest: 0.6, curve: 1.0 }));
+        let said = [[0xB0, 2, 30], [0xB0, 2, 80], [0xB0, 2, 90]];
+        let breaths = |curves: &SourceCurves, said: &[[u8; 3]]| -> Vec<f32> {
+            let mut inputs = HostInputs::default();
+            inputs.set_curves(curves.now(&settings));
+            midi(&mut inputs, NO_REED, &[[0x90, 60, 100]]);
+            let breath = |event| if let Event::Breath(unit) = event { Some(unit) } else { None };
+            let heard = midi(&mut inputs, NO_REED, said).into_iter().filter_map(breath).collect();
+            let shown = BreathInput::ALL.into_iter().find(|&input| inputs.breath_sources().is_live(input));
+            let last = f32::from(said[said.len() - 1][2]) / 127.0;
+            assert!((inputs.breath_sources().value(shown.unwrap()).unwrap() - last).abs() < 1e-6);
+            heard
+        };
+        let (own, common) = (breaths(&curves, &said), breaths(&SourceCurves::default(), &said));
+        assert_eq!(own.len(), common.len());
+        assert!(
+            own.len() >= 2 && own.iter().zip(&common).all(|(own, common)| own > common),
+            "{own:?} {common:?}"
+        );
+        assert_eq!(own.last(), Some(&1.0), "above its loudest breath");
+        let expression = said.map(|[status, _, value]| [status, 11, value]);
+        assert_eq!(breaths(&curves, &expression), breaths(&SourceCurves::default(), &expression));
     }
 
     #[test]

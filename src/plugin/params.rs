@@ -11,6 +11,7 @@ use nice_plug::params::persist::PersistentField;
 use nice_plug::prelude::*;
 
 use crate::controllers::ControllerLinks;
+use crate::controllers::source_curves::{SavedCurves, SourceCurves};
 use crate::editor::WindowState;
 use crate::parameters::{InUse, Number, Value};
 use crate::plugin::host_link::HostLink;
@@ -107,6 +108,9 @@ pub struct ChalumeauParams {
     /// Controllers that the user has linked to parameters.
     #[persist = "links"]
     pub links: ControllerLinks,
+    /// The own curves of sources of breath.
+    #[persist = "curves"]
+    pub curves: SourceCurves,
     /// What the keys play.
     #[persist = "scale"]
     pub scale: ScaleField,
@@ -387,6 +391,7 @@ impl ChalumeauParams {
             schema: AtomicU32::new(SCHEMA),
             window: RwLock::default(),
             links: ControllerLinks::default(),
+            curves: SourceCurves::default(),
             scale: ScaleField::default(),
             alterations: AlterationsField::default(),
             room_floor: RoomFloor::default(),
@@ -549,6 +554,19 @@ fn settled(param: &FloatParam) -> f32 {
 
 #[cfg(test)]
 mod tests;
+
+impl PersistentField<'_, SavedCurves> for SourceCurves {
+    fn set(&self, saved: SavedCurves) {
+        self.take(&saved);
+    }
+
+    fn map<F, R>(&self, f: F) -> R
+    where
+        F: Fn(&SavedCurves) -> R,
+    {
+        f(&self.saved())
+    }
+}
 
 /// A project saves its links as the text of a [`ControllerMap`](crate::controllers::ControllerMap).
 impl PersistentField<'_, String> for ControllerLinks {

@@ -11,6 +11,7 @@ mod breath_history;
 mod device_list;
 mod editor_app;
 mod file_tasks;
+mod fingering_searcher;
 #[cfg(target_os = "linux")]
 mod graphics_libraries;
 mod host_controls;
@@ -26,6 +27,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use crate::editor::fingering_search::FingeringQuestion;
 use crate::editor::{Snapshot, WindowState};
 use crate::plugin::SharedHandles;
 use crate::plugin::params::ChalumeauParams;
@@ -44,6 +46,8 @@ struct SharedWindow {
     latest: Mutex<Arc<Snapshot>>,
     /// The holes that the user tries, which the snapshot shows instead of the fingering.
     tried: Mutex<Option<Vec<bool>>>,
+    /// What the user looks fingerings for.
+    fingerings_for: Mutex<Option<FingeringQuestion>>,
     /// Files that the user asks for, until the snapshot thread has read them.
     file_tasks: Mutex<Vec<FileTask>>,
     stop: AtomicBool,
@@ -82,6 +86,14 @@ impl SharedWindow {
         self.tried.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
+    fn fingerings_for(&self) -> Option<FingeringQuestion> {
+        *self.fingerings_for.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn find_fingerings(&self, question: Option<FingeringQuestion>) {
+        *self.fingerings_for.lock().unwrap_or_else(PoisonError::into_inner) = question;
+    }
+
     fn try_holes(&self, open: Option<Vec<bool>>) {
         *self.tried.lock().unwrap_or_else(PoisonError::into_inner) = open;
     }
@@ -102,6 +114,7 @@ impl PluginWindow {
             drawn: Mutex::default(),
             latest: Mutex::new(Arc::new(Snapshot::default())),
             tried: Mutex::default(),
+            fingerings_for: Mutex::default(),
             file_tasks: Mutex::default(),
             stop: AtomicBool::new(false),
             output_peak: AtomicU32::new(0),

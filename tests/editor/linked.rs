@@ -1,6 +1,7 @@
 //! Controllers that the user links: learnt from a menu, listed, changed and forgotten.
 
 use chalumeau::controllers::ParameterLink;
+use chalumeau::controllers::source_curves::{CurveSource, SourceCurve};
 use chalumeau::editor::Tab;
 use chalumeau::editor::controls::Controls;
 use chalumeau_core::control::midi::links::Source;
@@ -89,4 +90,59 @@ fn a_row_of_the_table_forgets_its_own_link() {
     forget.click();
     window.harness.run();
     assert_eq!(links(&window), [of("vib")]);
+}
+
+/// CC11 blows instead of the knob.
+fn blown_by_expression() -> Window {
+    let mut window = Window::new(Tab::Breath, (1100.0, 720.0));
+    for source in &mut window.snapshot.borrow_mut().sources {
+        source.is_live = source.name == CurveSource::Expression.title();
+    }
+    window.harness.run();
+    window
+}
+
+#[test]
+fn a_source_gets_its_own_curve_and_leaves_that_of_all_others() {
+    const OWN: &str = "Own curve for CC11 expression";
+    let mut window = blown_by_expression();
+    let common = SourceCurve::common(&window.host.settings());
+    let own = |window: &Window| window.host.curves.get(CurveSource::Expression);
+    assert_eq!(own(&window), None);
+    window.harness.get_by_label(OWN).click();
+    window.harness.run();
+    assert_eq!(own(&window), Some(common), "at first nothing sounds otherwise");
+    window.harness.get_by_label("CC11 expression has its own curve, in the picture.");
+
+    let bow = window.harness.get_by_label("Curve: how it bends").rect().center();
+    window.drag(bow, egui::vec2(0.0, 40.0));
+    let end = window.harness.get_by_label("Curve: where it is loudest").rect().center();
+    window.drag(end, egui::vec2(-60.0, 0.0));
+    let bent = own(&window).unwrap();
+    assert!(
+        bent.curve > common.curve + 0.1 && bent.loudest < 0.95 && bent.softest == common.softest,
+        "{bent:?}"
+    );
+    assert!(window.host.told().is_empty(), "no parameter has moved");
+    window.double_click(end + egui::vec2(-60.0, 0.0));
+    assert_eq!(own(&window).unwrap().loudest, 1.0);
+
+    // Its ends are measured for it alone.
+    window.harness.get_by_label("Calibrate").click();
+    window.harness.run();
+    for value in [0.2, 0.6] {
+        window.snapshot.borrow_mut().sources[3].value = value;
+        window.harness.run();
+    }
+    window.harness.get_by_label("Done").click();
+    window.harness.run();
+    let measured = own(&window).unwrap();
+    assert!(
+        (measured.softest, measured.loudest) == (0.2, 0.6) && window.host.told().is_empty(),
+        "{measured:?}"
+    );
+
+    window.harness.get_by_label(OWN).click();
+    window.harness.run();
+    assert_eq!(own(&window), None);
 }

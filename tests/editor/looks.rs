@@ -10,9 +10,11 @@ use std::path::PathBuf;
 
 use chalumeau::editor::{Snapshot, Tab, WindowState};
 use egui::{Pos2, Rect};
+use egui_kittest::kittest::Queryable;
 use image::{RgbaImage, imageops};
 
 use crate::c4;
+use crate::fingerings::found;
 use crate::support::{Fake, picture, shot, things, window};
 
 const SIZES: [(f32, f32); 3] = [(1100.0, 720.0), (700.0, 480.0), (1600.0, 1000.0)];
@@ -49,6 +51,16 @@ fn browser(kept: &WindowState, snapshot: &Snapshot) -> RgbaImage {
     shot(&mut window, 1.0)
 }
 
+/// The clarinet view while fingerings of its note are looked for.
+fn search(kept: &WindowState, snapshot: &Snapshot) -> RgbaImage {
+    let host = Fake::default();
+    let snapshot = Snapshot { fingerings: found(60, None), ..snapshot.clone() };
+    let mut window = window(kept, &host, &snapshot, 1.0);
+    window.get_by_label("Find fingerings").click();
+    window.run();
+    shot(&mut window, 1.0)
+}
+
 #[test]
 fn every_view_looks_as_it_did() {
     let is_update = std::env::var_os("UPDATE_SNAPSHOTS").is_some();
@@ -57,16 +69,17 @@ fn every_view_looks_as_it_did() {
     let mut wrong = Vec::new();
     for size in SIZES {
         for is_dark in [false, true] {
-            for tab in Tab::ALL.map(Some).into_iter().chain([None]) {
-                let kept =
-                    WindowState { size, is_dark, tab: tab.unwrap_or_default(), ..WindowState::default() };
-                let whole = match tab {
-                    Some(_) => picture(&kept, &Fake::default(), &snapshot, 1.0),
-                    None => browser(&kept, &snapshot),
+            let views = Tab::ALL.map(|tab| (tab, tab.name().to_lowercase()));
+            let beside = [(Tab::Play, "presets"), (Tab::Clarinet, "fingerings")];
+            for (tab, view) in views.into_iter().chain(beside.map(|(tab, name)| (tab, name.to_owned()))) {
+                let kept = WindowState { size, is_dark, tab, ..WindowState::default() };
+                let whole = match view.as_str() {
+                    "presets" => browser(&kept, &snapshot),
+                    "fingerings" => search(&kept, &snapshot),
+                    _ => picture(&kept, &Fake::default(), &snapshot, 1.0),
                 };
                 let small = reduced(&whole);
                 let theme = if is_dark { "dark" } else { "light" };
-                let view = tab.map_or("presets", Tab::name).to_lowercase();
                 let name = format!("{view}-{theme}-{}x{}.png", size.0, size.1);
                 let path = kept_in.join(&name);
                 if is_update {

@@ -8,6 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use chalumeau::controllers::ControllerLinks;
+use chalumeau::controllers::source_curves::SourceCurves;
 use chalumeau::editor::controls::{Controls, Look, Mark};
 use chalumeau::editor::snapshot::{
     BreathSource, KnobDevice, KnobState, MouthpieceTraces, Severity, Snapshot, Status, Track,
@@ -84,6 +85,8 @@ pub struct Fake {
     menus: RefCell<Vec<(String, (i32, i32))>>,
     /// The user's links, where this host lets controllers be linked.
     pub links: Option<ControllerLinks>,
+    /// The own curves of sources of breath.
+    pub curves: SourceCurves,
 }
 
 impl Default for Fake {
@@ -103,6 +106,7 @@ impl Default for Fake {
             marks: RefCell::default(),
             menus: RefCell::default(),
             links: None,
+            curves: SourceCurves::default(),
         }
     }
 }
@@ -205,6 +209,10 @@ impl Controls for Fake {
 
     fn links(&self) -> Option<&ControllerLinks> {
         self.links.as_ref()
+    }
+
+    fn curves(&self) -> Option<&SourceCurves> {
+        Some(&self.curves)
     }
 
     fn menu(&self, id: &str, at: (i32, i32)) {

@@ -1,10 +1,12 @@
-//! The way from breath to dynamic as a curve over what the live source has sent, with handles at both ends and in the middle.
+//! The way from breath to dynamic as a curve over what the live source has sent, with handles at both ends and in the middle. A
+//! source may have a curve of its own; all others share the one of the parameters.
 
-use egui::{Align2, CornerRadius, Rect, Response, Sense, Stroke, Ui, pos2, vec2};
+use egui::{Align2, CornerRadius, Rect, Response, RichText, Sense, Stroke, Ui, pos2, vec2};
 
+use crate::controllers::source_curves::{CurveSource, SourceCurve};
 use crate::editor::chart;
 use crate::editor::controls::{Hands, handle, teach};
-use crate::editor::snapshot::Snapshot;
+use crate::editor::snapshot::{BreathSource, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::{Colours, SMALL_RADIUS};
 use chalumeau_core::instrument::Settings;
@@ -50,16 +52,69 @@ impl BreathHistogram {
     }
 }
 
-/// Draws the curve into all of the place. `breath`: what the live source says now.
+/// The source that blows, if it may have its own curve here, and that curve.
+#[derive(Clone, Copy, Debug)]
+pub struct OfSource {
+    source: CurveSource,
+    own: Option<SourceCurve>,
+}
+
+impl OfSource {
+    /// Of the live source.
+    pub fn live(hands: &Hands, snapshot: &Snapshot) -> Option<Self> {
+        let curves = hands.controls.curves()?;
+        let live = snapshot.sources.iter().find(|source| source.is_live)?;
+        let source = CurveSource::titled(&live.name)?;
+        Some(Self { source, own: curves.get(source) })
+    }
+
+    /// Whether it has its own curve.
+    pub fn is_own(&self) -> bool {
+        self.own.is_some()
+    }
+
+    /// Its name.
+    pub fn title(&self) -> &'static str {
+        self.source.title()
+    }
+
+    /// Changes its own curve; whether it has one.
+    pub fn change(&self, hands: &Hands, change: impl FnOnce(&mut SourceCurve)) -> bool {
+        let (Some(mut own), Some(curves)) = (self.own, hands.controls.curves()) else { return false };
+        change(&mut own);
+        curves.put(self.source, Some(own));
+        true
+    }
+
+    /// A button that gives it its own curve, or the common one again.
+    fn offer(&self, ui: &mut Ui, hands: &Hands, settings: &Settings, rect: Rect) {
+        let text = RichText::new(format!("Own curve for {}", self.title())).font(theme::small());
+        let button = egui::Button::selectable(self.is_own(), text).frame_when_inactive(true);
+        let size = vec2(176.0_f32.min(0.62 * rect.width()), 20.0);
+        let place = Rect::from_min_size(pos2(rect.right() - size.x, rect.top() - 4.0), size);
+        let about = "On: this source has a curve of its own. Off: it has the curve that all sources share.";
+        if ui.put(place, button).on_hover_text(about).clicked()
+            && let Some(curves) = hands.controls.curves()
+        {
+            let own = (!self.is_own()).then(|| SourceCurve::common(settings));
+            curves.put(self.source, own);
+        }
+    }
+}
+
+/// Draws the curve into all of the place. `live`: the source that blows, if it is not the keys.
 pub fn draw(
     ui: &mut Ui,
     hands: &mut Hands,
     snapshot: &Snapshot,
     histogram: &BreathHistogram,
-    breath: Option<f32>,
+    live: Option<&BreathSource>,
 ) {
     let c = Colours::here(ui);
-    let settings = snapshot.settings.clamped();
+    let of = live.and_then(|_| OfSource::live(hands, snapshot));
+    let own = of.and_then(|of| of.own);
+    let settings = own.map_or_else(|| snapshot.settings.clamped(), |own| own.over(&snapshot.settings));
+    let breath = live.map(|source| source.value);
     let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
     let frame = Rect::from_min_max(rect.min + vec2(26.0, 20.0), rect.max - vec2(10.0, 38.0));
     let x = |breath: f32| frame.left() + breath * frame.width();
@@ -89,6 +144,9 @@ pub fn draw(
         painter.vline(x(breath), y(level(breath, &settings))..=frame.bottom(), Stroke::new(1.0, c.breath));
         painter.circle_filled(at(breath), 5.0, c.breath);
     }
+    if let Some(of) = of {
+        of.offer(ui, hands, &snapshot.settings, rect);
+    }
     let (softest, loudest) = (settings.breath_softest, settings.breath_loudest);
     let middle = 0.5 * (softest + loudest);
     let painter = ui.painter();
@@ -97,15 +155,17 @@ pub fn draw(
     let word = "Drag the ends to what your controller sends when you play softest and loudest, and the middle to bend the curve. Blue: what it has sent.";
     response.on_hover_text_at_pointer(word);
     let (end, to) = handle(ui, "Curve: where notes begin", speaks, "");
-    drag(hands, &end, to.map(|to| share_of(frame, to.x)), "bsoft");
+    let hand = Hand { of, id: "bsoft" };
+    hand.drag(hands, &end, to.map(|to| share_of(frame, to.x)));
     end.on_hover_ui(|ui| teach(ui, "bsoft", "Sideways. Double click: default."));
     let (end, to) = handle(ui, "Curve: where it is loudest", pos2(x(loudest), frame.top()), "");
-    drag(hands, &end, to.map(|to| share_of(frame, to.x)), "bloud");
+    let hand = Hand { of, id: "bloud" };
+    hand.drag(hands, &end, to.map(|to| share_of(frame, to.x)));
     end.on_hover_ui(|ui| teach(ui, "bloud", "Sideways. Double click: default."));
     let (bow, to) = handle(ui, "Curve: how it bends", at(middle), "");
     // Half of the way is this dynamic: 0.5 to the power of the curve.
     let curve = to.map(|to| ((frame.bottom() - to.y) / frame.height()).clamp(0.05, 0.95).log(0.5));
-    drag(hands, &bow, curve, "bcurve");
+    Hand { of, id: "bcurve" }.drag(hands, &bow, curve);
     bow.on_hover_ui(|ui| teach(ui, "bcurve", "Up and down. Double click: default."));
 }
 
@@ -119,28 +179,53 @@ fn share_of(frame: Rect, x: f32) -> f32 {
     100.0 * ((x - frame.left()) / frame.width()).clamp(0.0, 1.0)
 }
 
-/// Moves a parameter to a number in its own unit while its handle is dragged or moved by keys.
-fn drag(hands: &mut Hands, handle: &Response, to: Option<f32>, id: &'static str) {
-    if handle.drag_started() {
-        hands.begin(id);
-    }
-    if let Some(to) = to {
-        let is_key = !handle.dragged();
-        if is_key {
-            hands.begin(id);
+/// What a handle moves: a number of the source's own curve, or the parameter of all sources.
+struct Hand {
+    of: Option<OfSource>,
+    id: &'static str,
+}
+
+impl Hand {
+    /// Moves it to a number in the parameter's unit while its handle is dragged or moved by keys.
+    fn drag(&self, hands: &mut Hands, handle: &Response, to: Option<f32>) {
+        if let Some(of) = self.of.filter(OfSource::is_own) {
+            let to = to.map(|to| if self.id == "bcurve" { to } else { 0.01 * to });
+            let default = SourceCurve::common(&Settings::default());
+            let to = if handle.double_clicked() { Some(*self.number(&mut { default })) } else { to };
+            if let Some(to) = to {
+                of.change(hands, |own| *self.number(own) = to);
+            }
+            return;
         }
-        hands.set_number(id, f64::from(to));
-        if is_key {
-            hands.end(id);
+        if handle.drag_started() {
+            hands.begin(self.id);
+        }
+        if let Some(to) = to {
+            let is_key = !handle.dragged();
+            if is_key {
+                hands.begin(self.id);
+            }
+            hands.set_number(self.id, f64::from(to));
+            if is_key {
+                hands.end(self.id);
+            }
+        }
+        if handle.drag_stopped() {
+            hands.end(self.id);
+        }
+        if handle.double_clicked()
+            && let Some(look) = hands.controls.look(self.id)
+        {
+            hands.put(self.id, look.default);
         }
     }
-    if handle.drag_stopped() {
-        hands.end(id);
-    }
-    if handle.double_clicked()
-        && let Some(look) = hands.controls.look(id)
-    {
-        hands.put(id, look.default);
+
+    fn number<'a>(&self, own: &'a mut SourceCurve) -> &'a mut f32 {
+        match self.id {
+            "bsoft" => &mut own.softest,
+            "bloud" => &mut own.loudest,
+            _ => &mut own.curve,
+        }
     }
 }
 

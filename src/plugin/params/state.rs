@@ -11,6 +11,7 @@ use super::knob::SavedCalibration;
 use super::microphone::RoomFloor;
 use super::scale::SavedScale;
 use crate::controllers;
+use crate::controllers::source_curves::SourceCurves;
 use crate::editor::WindowState;
 use crate::parameters::{Kind, Number, PARAMETERS, Parameter};
 use crate::plugin::launch_options::LaunchOptions;
@@ -74,6 +75,8 @@ pub fn mend(state: &mut PluginState) {
     mend_field(state, "preset", |name: String| name.chars().take(NAME_MOST).collect());
     // A state from before links has none.
     mend_field(state, "links", controllers::mended);
+    // A state from before own curves has none: all sources follow the common one.
+    mend_field(state, "curves", SourceCurves::mended);
     // A state from before scales has none.
     mend_field(state, "scale", SavedScale::mended);
     mend_field(state, "calibration", SavedCalibration::mended);

@@ -13,9 +13,11 @@ use super::{SharedWindow, kept};
 use crate::editor::{self, Action, Controls, EditorState, Snapshot, WindowState};
 use crate::plugin::SharedHandles;
 use crate::plugin::launch_options::LaunchOptions;
+use crate::plugin::params::ChalumeauParams;
 use crate::plugin::params::instrument::InstrumentChoice;
 use crate::plugin::params::scale::SavedScale;
 use crate::plugin::preset_keeper::PresetTask;
+use chalumeau_core::bore::fingering_finder;
 use chalumeau_core::event::Event;
 
 /// What the window keeps while it is closed.
@@ -25,7 +27,7 @@ pub struct WindowMemory {
     state: EditorState,
     /// What the window has written into the project last.
     written: WindowState,
-    /// How often links had changed when the host was told last.
+    /// How often links and curves had changed when the host was told last.
     links: u32,
     keys: rtrb::Producer<Event>,
     /// Pixels per point without zoom, on the latest screen.
@@ -39,7 +41,7 @@ impl WindowMemory {
             controls: HostControls::new(handles.params.clone()),
             state: EditorState::new(written.clone()),
             written,
-            links: handles.params.links.changes(),
+            links: changes(&handles.params),
             handles,
             keys,
             scale: 1.0,
@@ -56,14 +58,14 @@ impl WindowMemory {
                 let _ = self.keys.push(Event::NoteOff { note });
             }
             Action::TryFingering(open) => {
-                let bits = open.iter().enumerate().map(|(hole, &open)| u64::from(open) << hole).sum();
-                let _ = self.keys.push(Event::TryHoles(Some(bits)));
+                let _ = self.keys.push(try_holes(&open));
                 shared.try_holes(Some(open));
             }
             Action::EndTry => {
                 let _ = self.keys.push(Event::TryHoles(None));
                 shared.try_holes(None);
             }
+            Action::FindFingerings(question) => shared.find_fingerings(question),
             Action::ChooseInstrument(index) => self.choose("instr", index, InstrumentChoice::ALL.len(), gui),
             Action::OpenInstrument(path) => {
                 if let Ok(mut file) = self.handles.params.instrument.file.write() {
@@ -137,6 +139,16 @@ impl WindowMemory {
     }
 }
 
+/// How often links and curves have changed.
+fn changes(params: &ChalumeauParams) -> u32 {
+    params.links.changes().wrapping_add(params.curves.changes())
+}
+
+/// What the voice hears of a trial.
+pub(super) fn try_holes(open: &[bool]) -> Event {
+    Event::TryHoles(Some(fingering_finder::bits(open)))
+}
+
 /// The open window. It releases held keys and parameters when it closes. [main thread]
 pub struct EditorApp {
     shared: Arc<SharedWindow>,
@@ -197,7 +209,7 @@ impl NiceEguiApp for EditorApp {
         for action in actions {
             memory.act(action, &self.shared, &self.gui);
         }
-        let links = params.links.changes();
+        let links = changes(&params);
         if std::mem::replace(&mut memory.links, links) != links {
             params.host.state_changed();
         }

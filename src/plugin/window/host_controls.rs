@@ -7,6 +7,7 @@ use nice_plug::context::gui::GuiContext;
 use nice_plug::prelude::{ParamPtr, Params};
 
 use crate::controllers::ControllerLinks;
+use crate::controllers::source_curves::SourceCurves;
 use crate::editor::controls::Mark;
 use crate::editor::{Controls, Look};
 use crate::plugin::host_link::MenuRequest;
@@ -109,6 +110,10 @@ mod raw {
 
         fn links(&self) -> Option<&ControllerLinks> {
             Some(&self.controls.params.links)
+        }
+
+        fn curves(&self) -> Option<&SourceCurves> {
+            Some(&self.controls.params.curves)
         }
 
         fn menu(&self, id: &str, at: (i32, i32)) {

@@ -11,10 +11,12 @@ use super::breath_history::BreathHistory;
 #[cfg(feature = "devices")]
 use super::device_list;
 use super::file_tasks::FilesRead;
+use super::fingering_searcher::FingeringSearcher;
 use super::instrument_analysis::InstrumentAnalysis;
 use super::window_audio::AudioSnapshot;
 #[cfg(feature = "devices")]
 use crate::editor::Tab;
+use crate::editor::fingering_search::FingeringSearch;
 use crate::editor::snapshot::{BreathSource, MouthpieceTraces, Severity, Snapshot, Status};
 #[cfg(feature = "devices")]
 use crate::editor::snapshot::{KnobDevice, KnobState};
@@ -27,7 +29,7 @@ use crate::plugin::knob;
 use crate::plugin::params::instrument::InstrumentChoice;
 use chalumeau_core::haptics::FeelDesign;
 use chalumeau_core::instrument::{KeyPitches, Settings};
-use chalumeau_core::units::SoundingNote;
+use chalumeau_core::units::{Air, SoundingNote};
 #[cfg(feature = "devices")]
 use chalumeau_knob::device::{LinkStatus, Phase, RuntimeDir};
 #[cfg(feature = "devices")]
@@ -61,6 +63,7 @@ pub struct SnapshotThread {
     /// How many messages had arrived, and when there was a new one.
     midi: (u32, Option<Instant>),
     files: FilesRead,
+    fingerings: FingeringSearcher,
     analysis: Option<InstrumentAnalysis>,
     /// A thread that analyses a new instrument meanwhile.
     analysing: Option<JoinHandle<InstrumentAnalysis>>,
@@ -89,6 +92,7 @@ impl SnapshotThread {
             history: BreathHistory::new(),
             midi: (0, None),
             files: FilesRead::default(),
+            fingerings: FingeringSearcher::default(),
             analysis: None,
             analysing: None,
             #[cfg(feature = "devices")]
@@ -137,10 +141,12 @@ impl SnapshotThread {
         snapshot.history = self.history.track();
         #[cfg(feature = "devices")]
         self.show_knob(&mut snapshot);
+        let is_looking = matches!(snapshot.fingerings, FingeringSearch::Looking(_));
         snapshot.status = self.status(current.as_ref(), &inside.breath_sources);
         *self.shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(snapshot);
         self.shared.draw_again();
-        let is_moving = inside.now.mouth_kpa > NO_BREATH_KPA
+        let is_moving = is_looking
+            || inside.now.mouth_kpa > NO_BREATH_KPA
             || inside.now.sounding.is_some()
             || self.midi.1.is_some_and(|at| at.elapsed() < MIDI_LIT);
         if is_moving { MOVING } else { IDLE }
@@ -166,6 +172,8 @@ impl SnapshotThread {
             .filter(|open| open.len() == file.holes.len())
             .unwrap_or_else(|| file.fingerings[fingering].open.clone());
         snapshot.fingering = fingering;
+        let air = current.map_or_else(Air::default, |current| current.model.air);
+        snapshot.fingerings = self.fingerings.look(self.shared.fingerings_for(), &file, air);
         snapshot.openings = open.iter().map(|&open| f32::from(u8::from(open))).collect();
         snapshot.instrument = file;
         let Some(analysis) = &mut self.analysis else { return };

@@ -19,7 +19,7 @@ use mechanism::{Grip, Mechanism};
 /// Embouchure of the thresholds, the default of the instrument.
 const ZETA: f64 = 0.3;
 /// How far off a fingering may be to be found at all, cents: what lips can pull (docs/bend.md).
-const FARTHEST_CENTS: f64 = 40.0;
+pub const FARTHEST_CENTS: f64 = 40.0;
 /// What a lip holds without effort, cents: a note is easily let down, hardly pushed up.
 const LIP_CENTS: [f64; 2] = [-5.0, 12.0];
 /// Height over the next lower resonance from which no doubt is left, dB.
