@@ -71,7 +71,7 @@ pub struct Snapshot {
     /// The dynamic that is played, 0 (pianissimo) to 1 (fortissimo); `None` where the breath is physical.
     pub dynamic: Option<f32>,
     /// The fingerings that a key switch has chosen, if one has.
-    pub fingerings: Option<Fingerings>,
+    pub switched_fingerings: Option<Fingerings>,
     /// The pressures that this fingering needs with this reed; `None` if it cannot sound or is not known yet.
     pub requirement: Option<NoteRequirement>,
     /// The settings of the parameters.
@@ -130,7 +130,7 @@ impl Default for Snapshot {
             mouth_kpa: 0.0,
             lip: None,
             dynamic: None,
-            fingerings: None,
+            switched_fingerings: None,
             requirement: None,
             settings: Settings::default(),
             sources: Vec::new(),
@@ -201,7 +201,7 @@ impl Snapshot {
     /// Which fingerings the next note takes.
     pub fn next_fingerings(&self) -> Fingerings {
         let by_setting = if self.settings.alternates { Fingerings::ByContext } else { Fingerings::Chart };
-        self.fingerings.unwrap_or(by_setting)
+        self.switched_fingerings.unwrap_or(by_setting)
     }
 
     /// The pressures that matter for this note.

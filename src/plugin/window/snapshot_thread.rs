@@ -299,7 +299,7 @@ fn show_inside(snapshot: &mut Snapshot, inside: &AudioSnapshot) {
     snapshot.mouth_kpa = inside.now.mouth_kpa;
     snapshot.lip = inside.now.lip;
     snapshot.dynamic = inside.now.dynamic;
-    snapshot.fingerings = inside.now.chosen;
+    snapshot.switched_fingerings = inside.now.chosen;
     snapshot.sources = source_views(&inside.breath_sources, inside.now.sounding.is_some());
     snapshot.latency_ms = (1e3 * f64::from(inside.latency_samples) / inside.host_rate_hz) as f32;
     snapshot.scope = MouthpieceTraces {
