@@ -94,7 +94,7 @@ fn a_row_of_the_table_forgets_its_own_link() {
 
 /// CC11 blows instead of the knob.
 fn blown_by_expression() -> Window {
-    let mut window = Window::new(Tab::Breath, (1100.0, 720.0));
+    let mut window = Window::tall(Tab::Breath);
     for source in &mut window.snapshot.borrow_mut().sources {
         source.is_live = source.name == CurveSource::Expression.title();
     }
@@ -130,7 +130,7 @@ fn a_source_gets_its_own_curve_and_leaves_that_of_all_others() {
     // Its ends are measured for it alone.
     window.harness.get_by_label("Calibrate").click();
     window.harness.run();
-    for value in [0.2, 0.6] {
+    for value in [0.2, 0.7] {
         window.snapshot.borrow_mut().sources[3].value = value;
         window.harness.run();
     }
@@ -138,7 +138,7 @@ fn a_source_gets_its_own_curve_and_leaves_that_of_all_others() {
     window.harness.run();
     let measured = own(&window).unwrap();
     assert!(
-        (measured.softest, measured.loudest) == (0.2, 0.6) && window.host.told().is_empty(),
+        (measured.softest, measured.loudest) == (0.2, 0.7) && window.host.told().is_empty(),
         "{measured:?}"
     );
 
