@@ -416,7 +416,7 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
             return;
         }
         match tab {
-            Tab::Play => play.draw(ui, &mut hands, snapshot, &mut actions),
+            Tab::Play => play.draw(ui, &mut hands, snapshot, clarinet.alterations(), &mut actions),
             Tab::Reed => reed.draw(ui, &mut hands, snapshot),
             Tab::Clarinet => clarinet.draw(ui, kept.names, snapshot, &mut actions),
             Tab::Breath => breath.draw(ui, &mut hands, snapshot),

@@ -163,7 +163,17 @@ impl AlterationEditor {
         }
     }
 
-    fn files_and_undo(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    /// Whether something is altered, or a change can be undone.
+    pub fn has_changes(&self, snapshot: &Snapshot) -> bool {
+        !snapshot.alterations.is_empty() || self.can_undo(snapshot)
+    }
+
+    fn can_undo(&self, snapshot: &Snapshot) -> bool {
+        self.of == snapshot.as_built.name && !self.undo.is_empty()
+    }
+
+    /// Buttons that save what is altered, put it back, and undo the last change, from the right.
+    pub fn files_and_undo(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
         let is_altered = !snapshot.alterations.is_empty();
         let about = "Saves the instrument as it is now. A saved instrument can be opened in the Instrument view and is \
              tuned as a whole.";
@@ -179,8 +189,7 @@ impl AlterationEditor {
             self.remember(snapshot);
             actions.push(Action::Alter(Alterations::default()));
         }
-        let can_undo = self.of == snapshot.as_built.name && !self.undo.is_empty();
-        let undo = ui.add_enabled(can_undo, egui::Button::new("Undo move"));
+        let undo = ui.add_enabled(self.can_undo(snapshot), egui::Button::new("Undo move"));
         if undo.on_hover_text("Undo the last move of a hole or a joint").clicked()
             && let Some(before) = self.undo.pop()
         {

@@ -44,6 +44,11 @@ pub struct ClarinetView {
 }
 
 impl ClarinetView {
+    /// How the user alters the bore, in every view.
+    pub fn alterations(&mut self) -> &mut AlterationEditor {
+        &mut self.alterations
+    }
+
     /// Ends a trial.
     pub fn end_try(&mut self, actions: &mut Vec<Action>) {
         if self.tried.take().is_some() {

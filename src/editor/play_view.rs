@@ -2,7 +2,7 @@
 //!
 //! The clarinet fills the view and moves as it is played: fingers and pads, the reed's tip, the sound pressure in the bore, the
 //! light in the holes that sound comes out of. On its left stands the breath in a musician's words, below it the main controls
-//! and the last ten seconds. A click on a hole opens or closes it for a trial, as in the clarinet view.
+//! and the last ten seconds. A click on a hole opens or closes it for a trial and a drag moves it, as in the clarinet view.
 
 mod dynamic_meter;
 mod lit_body;
@@ -11,9 +11,10 @@ mod motion;
 mod stage;
 mod trail;
 
-use egui::{Frame, Margin, Panel, Ui, vec2};
+use egui::{Frame, Margin, Panel, Rect, Ui, pos2, vec2};
 
 use crate::editor::Action;
+use crate::editor::alteration_editor::AlterationEditor;
 use crate::editor::controls::Hands;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
@@ -55,7 +56,14 @@ impl PlayView {
     }
 
     /// Draws the view.
-    pub fn draw(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    pub fn draw(
+        &mut self,
+        ui: &mut Ui,
+        hands: &mut Hands,
+        snapshot: &Snapshot,
+        alterations: &mut AlterationEditor,
+        actions: &mut Vec<Action>,
+    ) {
         let c = Colours::here(ui);
         if self.tried.as_ref().is_some_and(|tried| tried.len() != snapshot.instrument.holes.len()) {
             self.end_try(actions);
@@ -93,19 +101,29 @@ impl PlayView {
         egui::CentralPanel::default().frame(clear).show(ui, |ui| {
             let rect = ui.available_rect_before_wrap();
             stage::ground(ui, rect);
-            let clicked = stage::draw(ui, rect, snapshot, &self.motion);
+            let clicked = stage::draw(ui, rect, snapshot, &self.motion, alterations, actions);
             if let Some(hole) = clicked {
                 self.toggle(hole, snapshot, actions);
             }
+            if alterations.has_changes(snapshot) {
+                let place = Rect::from_min_max(
+                    rect.min + vec2(200.0, 8.0),
+                    pos2(rect.right() - 12.0, rect.top() + 34.0),
+                );
+                let layout = egui::Layout::right_to_left(egui::Align::Center);
+                ui.scope_builder(egui::UiBuilder::new().max_rect(place).layout(layout), |ui| {
+                    alterations.files_and_undo(ui, snapshot, actions);
+                });
+            }
             if self.tried.is_some() {
-                let place = egui::Rect::from_min_size(rect.left_top() + vec2(12.0, 8.0), vec2(180.0, 26.0));
+                let place = Rect::from_min_size(rect.left_top() + vec2(12.0, 8.0), vec2(180.0, 26.0));
                 let back = ui.put(place, egui::Button::new("Back to the note"));
                 if back.on_hover_text("Ends the trial; the played note sets the holes again").clicked() {
                     self.end_try(actions);
                 }
             } else if snapshot.sounding.is_none() {
                 let at = rect.center_bottom() - vec2(0.0, 10.0);
-                let text = "Play a key below, or blow. Click a hole to try it.";
+                let text = "Play a key below, or blow. Click a hole to try it, drag it to move it.";
                 ui.painter().text(at, egui::Align2::CENTER_BOTTOM, text, theme::body(), c.quiet);
             }
         });

@@ -68,6 +68,22 @@ fn a_hole_is_dragged_undone_and_put_back() {
 }
 
 #[test]
+fn a_hole_of_the_play_view_is_dragged_and_undone() {
+    let mut window = Window::new(Tab::Play, (1100.0, 720.0));
+    let place = |window: &Window| window.harness.get_by_label_contains("Hole R2, ").rect().center();
+    let before = place(&window);
+    window.drag(before, vec2(-12.0, 3.0));
+    assert!((place(&window).x - before.x + 12.0).abs() < 0.5, "it is drawn where it was let go");
+    let [first] = &moved(&window)[..] else { panic!("{:?}", moved(&window)) };
+    assert_eq!((first.name.as_str(), first.radius_m), ("R2", built().radius_m));
+    assert!(first.x_m < built().x_m);
+    assert!(window.actions().iter().all(|action| matches!(action, Action::Alter(_))), "no trial");
+    click(&mut window, "Undo move");
+    assert!(moved(&window).is_empty());
+    assert!(window.harness.query_by_label("Undo move").is_none(), "nothing is left to undo");
+}
+
+#[test]
 fn a_hole_stays_between_its_neighbours() {
     let mut window = Window::new(Tab::Clarinet, (1100.0, 720.0));
     let file = InstrumentFile::built_in();

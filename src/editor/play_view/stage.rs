@@ -10,6 +10,8 @@ use egui::{
 
 use super::lit_body::{band, glow, lit, plate, shadow, turned};
 use super::motion::Motion;
+use crate::editor::Action;
+use crate::editor::alteration_editor::{AlterationEditor, Altered};
 use crate::editor::chart;
 use crate::editor::clarinet_view;
 use crate::editor::hole_names::hole_title;
@@ -49,10 +51,18 @@ fn loudness(snapshot: &Snapshot) -> f32 {
     if snapshot.heard.f0_hz.is_none() { 0.0 } else { chart::share((level - quiet) / (loud - quiet)) }
 }
 
-/// Draws the instrument and gives back the hole that was clicked.
-pub fn draw(ui: &mut Ui, rect: Rect, snapshot: &Snapshot, motion: &Motion) -> Option<usize> {
+/// Draws the instrument as the user has altered it, lets holes be dragged, and gives back the hole that was clicked.
+pub fn draw(
+    ui: &mut Ui,
+    rect: Rect,
+    snapshot: &Snapshot,
+    motion: &Motion,
+    alterations: &mut AlterationEditor,
+    actions: &mut Vec<Action>,
+) -> Option<usize> {
+    let file = &*AlterationEditor::shown(snapshot);
     let c = Colours::here(ui);
-    let body = Body::new(&snapshot.instrument, rect);
+    let body = Body::new(file, rect);
     let loudness = loudness(snapshot);
     {
         let painter = ui.painter_at(rect);
@@ -63,18 +73,22 @@ pub fn draw(ui: &mut Ui, rect: Rect, snapshot: &Snapshot, motion: &Motion) -> Op
         body.paint(&painter, c, motion.reed(), chart::share(snapshot.mouth_now_kpa() / 3.0));
         body.rods(&painter, c);
     }
-    let flows = flows(&snapshot.instrument, &snapshot.standing, motion);
+    let flows = flows(file, &snapshot.standing, motion);
     let mut clicked = None;
     // Pads before fingers: a finger lies on its ring.
-    let mut order: Vec<usize> = (0..snapshot.instrument.holes.len()).collect();
-    order.sort_by_key(|&hole| snapshot.instrument.holes[hole].kind == HoleKind::Finger);
+    let mut order: Vec<usize> = (0..file.holes.len()).collect();
+    order.sort_by_key(|&hole| file.holes[hole].kind == HoleKind::Finger);
     for hole in order {
-        let tone_hole = &snapshot.instrument.holes[hole];
+        let tone_hole = &file.holes[hole];
         let opening = motion.opening(hole);
         let place = body.place(tone_hole);
-        let response =
-            ui.interact(place.expand(3.0), ui.scope_id().with(("stage hole", hole)), Sense::click());
-        let is_hot = response.hovered() || response.has_focus();
+        let response = ui.interact(
+            place.expand(3.0),
+            ui.scope_id().with(("stage hole", hole)),
+            Sense::CLICK | Sense::DRAG,
+        );
+        let is_hot = response.hovered() || response.has_focus() || response.dragged();
+        alterations.follow(&response, Altered::Hole(hole), body.scale, snapshot, actions);
         body.hole(&ui.painter_at(rect), c, tone_hole, opening, loudness * flows[hole], is_hot);
         let state = if opening >= 0.5 { "open" } else { "closed" };
         response.widget_info(|| {
