@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use chalumeau::editor::note_names::NoteNames;
 use chalumeau::editor::{Action, FeelTest, Tab};
-use chalumeau_core::control::key_switches::KeySwitches;
 use chalumeau_core::units::SoundingNote;
 use egui::accesskit::Role;
 use egui::{Key, vec2};
@@ -32,8 +31,8 @@ fn key_switches_stand_beside_the_keys_and_are_struck_like_them() {
         note.0
     };
     assert_eq!(struck(&mut window, corner), 50);
-    for (switches, lowest) in [(KeySwitches::C1, 24), (KeySwitches::C2, 36)] {
-        window.snapshot.borrow_mut().settings.reach.key_switches = switches;
+    for (switches, lowest) in [(0.5, 24), (1.0, 36)] {
+        window.host.automate("keysw", switches);
         window.harness.run();
         // Three white keys, and a black one between the first two.
         for (x, key) in [(8.0, 0), (60.0, 2), (112.0, 4)] {

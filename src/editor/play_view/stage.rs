@@ -82,11 +82,8 @@ pub fn draw(
         let tone_hole = &file.holes[hole];
         let opening = motion.opening(hole);
         let place = body.place(tone_hole);
-        let response = ui.interact(
-            place.expand(3.0),
-            ui.scope_id().with(("stage hole", hole)),
-            Sense::CLICK | Sense::DRAG,
-        );
+        let response =
+            ui.interact(place.expand(3.0), ui.scope_id().with(("stage hole", hole)), Sense::click_and_drag());
         let is_hot = response.hovered() || response.has_focus() || response.dragged();
         alterations.follow(&response, Altered::Hole(hole), body.scale, snapshot, actions);
         body.hole(&ui.painter_at(rect), c, tone_hole, opening, loudness * flows[hole], is_hot);
