@@ -309,7 +309,6 @@ impl ScoreArgs {
             };
             let mut decoder = if self.mpe { MidiDecoder::new().with_mpe() } else { MidiDecoder::new() };
             decoder.set_links(links);
-            decoder.set_key_switches(key_switches);
             if let Some(preset) = &self.preset {
                 // Nothing sounds yet, so this bends nothing.
                 decoder.usual_bend_range(preset.bend_range());
@@ -318,11 +317,13 @@ impl ScoreArgs {
             }
             let refused = |source| Failure::MidiFile { path: path.clone(), source };
             if self.tracks {
-                let (score, count) = midi_file::read_tracks(&decoder, &bytes, self.rate).map_err(refused)?;
+                let (score, count) =
+                    midi_file::read_tracks(&decoder, key_switches, &bytes, self.rate).map_err(refused)?;
                 *players = Players { count: count as i32, split: Split::Chords, ..*players };
                 return Ok(score);
             }
-            let parts = Parts::of(decoder, players.parts());
+            let mut parts = Parts::of(decoder, players.parts());
+            parts.set_key_switches(key_switches);
             return midi_file::read_parts(parts, &bytes, self.rate).map_err(refused);
         }
         if let Some((from, to)) = self.scale {

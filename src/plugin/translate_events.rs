@@ -242,8 +242,6 @@ mod tests {
     fn plugin_and_renderer_hear_the_same_midi() {
         let mut translator = EventTranslator::default();
         let mut decoder = MidiDecoder::new();
-        translator.set_key_switches(KeySwitches::C1);
-        decoder.set_key_switches(KeySwitches::C1);
         for value in 0..=127u8 {
             for cc in [2, 7, 10, 11, 34, 64, 123] {
                 assert_eq!(midi(&mut translator, [0xB3, cc, value]), decoder.controller(3, cc, value));

@@ -5,6 +5,7 @@
 //! E1 lies below every bundled instrument, C2 to E2 below the sopranos, where a keyboard of five octaves has it. A key of the row is
 //! silent even where the instrument has a note for it. Left out: multiphonics, which are more than a row holds.
 
+use crate::control::notes::{Note, NoteAddress};
 use crate::event::Fingerings;
 
 /// What the keys of the row choose, from its lowest key up.
@@ -53,5 +54,40 @@ impl KeySwitches {
     /// What a key chooses, if it is one of the row. Real-time safe.
     pub fn chosen(self, key: u8) -> Option<Fingerings> {
         ROW.get(usize::from(key.checked_sub(self.lowest()?)?)).copied()
+    }
+}
+
+/// The row, and where one of its keys is down.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SwitchKeys {
+    /// Where the row is.
+    pub row: KeySwitches,
+    /// Channels on which one is down, one bit each.
+    down: u16,
+}
+
+impl SwitchKeys {
+    /// What a key chooses that goes down, if it is one of the row. The channel is 0..=15.
+    pub fn press(&mut self, note: Note) -> Option<Fingerings> {
+        let chosen = self.row.chosen(note.key)?;
+        self.down |= 1 << note.channel;
+        Some(chosen)
+    }
+
+    /// Keys come up.
+    pub fn release(&mut self, address: NoteAddress) {
+        if address.key.is_none_or(|key| self.row.chosen(key).is_some()) {
+            self.down &= address.channel.map_or(0, |channel| !(1 << (channel % 16)));
+        }
+    }
+
+    /// All keys come up.
+    pub fn release_all(&mut self) {
+        self.down = 0;
+    }
+
+    /// Whether one is down on this channel, 0..=15.
+    pub fn is_down_on(&self, channel: u8) -> bool {
+        self.down >> channel & 1 == 1
     }
 }

@@ -4,7 +4,7 @@
 //! It is for one player, so all channels play it. The last key struck is heard; see [`notes`](super::notes). For several
 //! players, [`parts`](super::parts) has a decoder for each.
 //! [`breath`] says which controller the breath comes from, [`snapshot`] what is left out of the start of a project, [`mix`]
-//! what volume and pan do. Key switches are no notes, see [`key_switches`](super::key_switches). Bend follows the heard note's channel and its MPE zone, see [`bends`](super::bends); RPN 0 sets a
+//! what volume and pan do. [Key switches](super::key_switches) do not reach it. Bend follows the heard note's channel and its MPE zone, see [`bends`](super::bends); RPN 0 sets a
 //! bend range, RPN 6 a zone. [`techniques`] says what the mod wheel and CC18 to CC20 do.
 //!
 //! While the sustain pedal (CC64) is down, the last note goes on after its key has come up, until the pedal comes up or another key is struck, which slurs; the same key again is tongued. Left out: balance (CC8),
@@ -34,7 +34,6 @@ pub mod techniques;
 mod tests;
 
 use crate::control::bends::Bends;
-use crate::control::key_switches::KeySwitches;
 use crate::control::keys::Keys;
 use crate::control::notes::{HeldNote, Note, NoteAddress, NoteExpression, Notes};
 use crate::event::Event;
@@ -121,9 +120,6 @@ pub struct MidiDecoder {
     fingers: Keys,
     /// Velocity of the last key, 0..=1.
     velocity: f32,
-    key_switches: KeySwitches,
-    /// Channels on which a key switch is down, one bit each.
-    switching: u16,
     bends: Bends,
     /// The last bend there was an event for.
     bent_cents: f32,
@@ -178,16 +174,6 @@ impl MidiDecoder {
         self.said.events()
     }
 
-    /// Which keys choose fingerings and are no notes. Notes that are held go on. Real-time safe.
-    pub fn set_key_switches(&mut self, key_switches: KeySwitches) {
-        self.key_switches = key_switches;
-    }
-
-    /// Whether a key chooses fingerings and is no note.
-    pub fn is_key_switch(&self, key: u8) -> bool {
-        self.key_switches.chosen(key).is_some()
-    }
-
     /// Which controllers may blow. Another choice than before begins anew: keys blow until a controller moves. Breath that belongs
     /// to notes, and controllers that are linked to the breath, are not asked. Real-time safe.
     pub fn set_breath_from(&mut self, from: BreathFrom) -> &[Event] {
@@ -214,12 +200,6 @@ impl MidiDecoder {
     pub fn strike(&mut self, note: Note, velocity: u8) -> &[Event] {
         self.begin();
         let note = Note { channel: note.channel % 16, key: note.key.min(127), ..note };
-        if let Some(chosen) = self.key_switches.chosen(note.key) {
-            self.switching |= 1 << note.channel;
-            self.notes.end(note);
-            self.said.push(Event::Fingerings(chosen));
-            return self.said.events();
-        }
         self.velocity = f32::from(velocity.clamp(1, 127)) / 127.0;
         let by_pedal = self.notes.take_by_pedal();
         self.notes.press(note);
@@ -263,7 +243,6 @@ impl MidiDecoder {
     /// Keys come up. The note that sounded before is heard again; the last one ends, or the pedal holds it. Real-time safe.
     pub fn release(&mut self, address: NoteAddress) -> &[Event] {
         self.begin();
-        self.lift_switch(address);
         let before = self.sounding();
         self.notes.release(address, self.pedal);
         self.hear_next(before);
@@ -273,7 +252,6 @@ impl MidiDecoder {
     /// Notes end at once, whatever the pedal does. Real-time safe.
     pub fn choke(&mut self, address: NoteAddress) -> &[Event] {
         self.begin();
-        self.lift_switch(address);
         let before = self.sounding();
         let heard = self.notes.choke(address);
         // The others first: none of them is to be heard in between.
@@ -297,9 +275,6 @@ impl MidiDecoder {
     /// Real-time safe.
     pub fn express(&mut self, address: NoteAddress, expression: NoteExpression) -> &[Event] {
         self.begin();
-        if address.key.is_some_and(|key| self.is_key_switch(key)) {
-            return self.said.events();
-        }
         if let NoteExpression::Breath(unit) = expression {
             self.has_note_breath |= unit > 0.0;
         }
@@ -318,9 +293,6 @@ impl MidiDecoder {
     pub fn controller(&mut self, channel: u8, cc: u8, value: u8) -> &[Event] {
         self.begin();
         let (at, cc, value) = (usize::from(channel % 16), cc.min(127), value.min(127));
-        if self.is_of_switch(at) && (BREATH_LIKE.contains(&cc) || self.links.has(Source::Controller(cc))) {
-            return self.said.events();
-        }
         let place = self.place(at, cc);
         match cc {
             _ if self.links.has(Source::Controller(cc)) => self.follow(Source::Controller(cc), value, place),
@@ -385,9 +357,6 @@ impl MidiDecoder {
     pub fn pressure(&mut self, channel: u8, value: u8) -> &[Event] {
         self.begin();
         let at = usize::from(channel % 16);
-        if self.is_of_switch(at) {
-            return self.said.events();
-        }
         let place = self.place(at, PRESSURE);
         if self.links.has(Source::Pressure) {
             self.follow(Source::Pressure, value.min(127), place);
@@ -454,19 +423,6 @@ impl MidiDecoder {
     /// Whether what this channel's controllers have sent since the last note is a snapshot.
     pub fn is_snapshot(&self, channel: u8) -> bool {
         self.channels[usize::from(channel % 16)].run.is_snapshot()
-    }
-
-    /// Key switches come up.
-    fn lift_switch(&mut self, address: NoteAddress) {
-        if address.key.is_none_or(|key| self.is_key_switch(key)) {
-            self.switching &= address.channel.map_or(0, |channel| !(1 << (channel % 16)));
-        }
-    }
-
-    /// Whether what a channel says is of a key switch and of no note: an MPE controller sends the finger's pressure with it.
-    fn is_of_switch(&self, at: usize) -> bool {
-        let is_of_note = || self.notes.held().iter().any(|held| usize::from(held.note.channel) == at);
-        self.switching >> at & 1 == 1 && self.bends.is_member(at) && !is_of_note()
     }
 
     fn begin(&mut self) {
@@ -583,7 +539,6 @@ impl MidiDecoder {
 
     fn cut_all(&mut self) {
         self.notes.choke(NoteAddress::default());
-        self.switching = 0;
         self.fingers = Keys::default();
         self.said.push(Event::Panic);
         // The player forgets its bend and its techniques, wheels do not.

@@ -262,8 +262,7 @@ impl Notes {
         is_heard
     }
 
-    /// A note is over, or a key that made no sound.
-    pub fn end(&mut self, note: Note) {
+    fn end(&mut self, note: Note) {
         if let Some(place) = self.over.get_mut(self.over_count) {
             *place = note;
             self.over_count += 1;

@@ -11,10 +11,11 @@
 //! - Breath and channel pressure of an MPE member channel go to the parts that play on that channel, and to a note that
 //!   begins on it later. So do linked controllers there, unless their links set what belongs to all players.
 //! - What belongs to notes goes to the parts that hold one of them. If no part does, it goes to all, whose notes may fade.
-//! - A [key switch](super::key_switches) goes to all.
+//! - A [key switch](super::key_switches) is no note and chooses for all. What an MPE controller says of the finger on it goes to
+//!   none.
 //! - Everything else goes to all parts, and each takes what is for its note, as a lone player does: bends, for example.
 
-use crate::control::key_switches::KeySwitches;
+use crate::control::key_switches::{KeySwitches, SwitchKeys};
 use crate::control::midi::breath::BreathFrom;
 use crate::control::midi::links::{Link, Links, MOST as MOST_LINKS, Source};
 use crate::control::midi::techniques::Wheel;
@@ -52,6 +53,7 @@ pub struct Parts {
     /// The part of the latest note.
     latest: usize,
     origin: Option<BreathOrigin>,
+    switches: SwitchKeys,
     /// The latest value of each source on each channel, where it is for the notes of that channel.
     of_notes: Vec<[Option<u8>; SOURCES]>,
 }
@@ -78,6 +80,7 @@ impl Parts {
             over: Vec::with_capacity((MOST_NOTES + 1) * MOST),
             latest: 0,
             origin: None,
+            switches: SwitchKeys::default(),
             of_notes: vec![[None; SOURCES]; 16],
         };
         parts.set_count(count);
@@ -106,9 +109,10 @@ impl Parts {
         self.decoders.len()
     }
 
-    /// Forgets everything but the number of parts.
+    /// Forgets everything but the number of parts and the place of the key switches.
     pub fn reset(&mut self) {
         self.begin();
+        self.switches.release_all();
         self.decoders.iter_mut().for_each(MidiDecoder::reset);
         (self.latest, self.origin) = (0, None);
         self.of_notes.fill([None; SOURCES]);
@@ -124,9 +128,9 @@ impl Parts {
         self.tell_all(|part| part.set_wheel(wheel))
     }
 
-    /// See [`MidiDecoder::set_key_switches`].
+    /// Which keys choose fingerings and are no notes. Notes that are held go on.
     pub fn set_key_switches(&mut self, key_switches: KeySwitches) {
-        self.decoders.iter_mut().for_each(|part| part.set_key_switches(key_switches));
+        self.switches.row = key_switches;
     }
 
     /// See [`MidiDecoder::set_breath_from`].
@@ -177,14 +181,14 @@ impl Parts {
     /// A note begins on the part that the rule above chooses. See [`MidiDecoder::strike`].
     pub fn strike(&mut self, note: Note, velocity: u8) -> &[PartEvent] {
         let note = Note { channel: note.channel % 16, key: note.key.min(127), ..note };
-        if self.decoders[0].is_key_switch(note.key) {
-            self.tell_all(|part| part.strike(note, velocity));
-            // Each part says that the key is over; it is one note.
-            self.over.truncate(1);
+        self.begin();
+        if let Some(fingerings) = self.switches.press(note) {
+            // A host waits for the end of every key.
+            self.over.push(note);
+            self.said.push(Event::Fingerings(fingerings).into());
             return &self.said;
         }
         let chosen = self.part_for(note);
-        self.begin();
         self.latest = chosen;
         for part in (0..self.count()).filter(|&part| part != chosen) {
             self.tell(part, |part| part.strike_elsewhere(note.channel));
@@ -207,11 +211,13 @@ impl Parts {
 
     /// See [`MidiDecoder::release`].
     pub fn release(&mut self, address: NoteAddress) -> &[PartEvent] {
+        self.switches.release(address);
         self.tell_all(|part| part.release(address))
     }
 
     /// See [`MidiDecoder::choke`].
     pub fn choke(&mut self, address: NoteAddress) -> &[PartEvent] {
+        self.switches.release(address);
         self.tell_all(|part| part.choke(address))
     }
 
@@ -222,12 +228,21 @@ impl Parts {
 
     /// See [`MidiDecoder::express`].
     pub fn express(&mut self, address: NoteAddress, expression: NoteExpression) -> &[PartEvent] {
+        if address.key.is_some_and(|key| self.switches.row.chosen(key).is_some()) {
+            self.begin();
+            return &self.said;
+        }
         self.tell_players(address, |part| part.express(address, expression))
     }
 
     /// See [`MidiDecoder::controller`].
     pub fn controller(&mut self, channel: u8, cc: u8, value: u8) -> &[PartEvent] {
         let (channel, cc, value) = (channel % 16, cc.min(127), value.min(127));
+        let is_of_finger = BREATH_LIKE.contains(&cc) || self.links().has(Source::Controller(cc));
+        if is_of_finger && self.is_of_switch(channel) {
+            self.begin();
+            return &self.said;
+        }
         if self.is_of_notes(channel, Source::Controller(cc)) {
             self.of_notes[usize::from(channel)][usize::from(cc)] = Some(value);
             return self.tell_channel(channel, |part| part.controller(channel, cc, value));
@@ -238,6 +253,10 @@ impl Parts {
     /// See [`MidiDecoder::pressure`].
     pub fn pressure(&mut self, channel: u8, value: u8) -> &[PartEvent] {
         let (channel, value) = (channel % 16, value.min(127));
+        if self.is_of_switch(channel) {
+            self.begin();
+            return &self.said;
+        }
         if self.is_of_notes(channel, Source::Pressure) {
             self.of_notes[usize::from(channel)][PRESSURE] = Some(value);
             return self.tell_channel(channel, |part| part.pressure(channel, value));
@@ -312,6 +331,14 @@ impl Parts {
             Source::Controller(cc) => BREATH_LIKE.contains(&cc),
         };
         self.is_of_one_part(channel) && self.links().is_of_player(source).unwrap_or(is_breath)
+    }
+
+    /// Whether what a channel says is of the finger on a key switch: it is a member of an MPE zone and has no note.
+    fn is_of_switch(&self, channel: u8) -> bool {
+        let is_of_note = |part: &MidiDecoder| part.held().iter().any(|held| held.note.channel == channel);
+        self.switches.is_down_on(channel)
+            && self.decoders[0].is_member(channel)
+            && !self.decoders.iter().any(is_of_note)
     }
 
     fn begin(&mut self) {

@@ -1,7 +1,6 @@
 //! Tests of the decoder as a whole: messages in, events out.
 
 use super::*;
-use crate::control::key_switches::ROW;
 
 const NOTHING: [Event; 0] = [];
 
@@ -573,38 +572,4 @@ mod linked {
         midi.controller(0, 21, 100);
         assert_eq!(midi.controller(0, 21, 127), [Event::Set(GROWL, 1.0)]);
     }
-}
-
-#[test]
-fn key_switches_choose_and_are_no_notes() {
-    let mut midi = MidiDecoder::new();
-    midi.set_key_switches(KeySwitches::C1);
-    assert_eq!(midi.note_on(0, 60, 127), [on(60)]);
-    let before = (midi.heard().copied(), midi.held().len());
-    for (key, chosen) in (24..).zip(ROW) {
-        assert_eq!(midi.note_on(0, key, 127), [Event::Fingerings(chosen)]);
-        assert_eq!(midi.over(), [Note { id: None, channel: 0, key }], "a host waits for its end");
-        assert_eq!((midi.heard().copied(), midi.held().len()), before, "the note goes on");
-        let pressed = NoteExpression::Breath(0.9);
-        assert_eq!(midi.express(NoteAddress::of_key(0, key), pressed), NOTHING);
-        assert_eq!(midi.note_off(0, key), NOTHING);
-    }
-    assert_eq!(midi.note_on(0, 23, 127), [on(23)]);
-    assert_eq!(midi.note_on(0, 29, 127), [on(29)]);
-    midi.set_key_switches(KeySwitches::Off);
-    assert_eq!(midi.note_on(0, 24, 127), [on(24)]);
-}
-
-#[test]
-fn the_finger_on_a_key_switch_does_not_blow() {
-    let mut midi = MidiDecoder::new().with_mpe();
-    midi.set_key_switches(KeySwitches::C2);
-    midi.note_on(1, 60, 127);
-    assert_eq!(midi.pressure(1, 90), [breath(90)]);
-    midi.note_on(2, 37, 127);
-    assert_eq!(midi.pressure(2, 20), NOTHING);
-    assert_eq!(midi.pressure(1, 91), [breath(91)], "the note's finger does");
-    midi.note_off(2, 37);
-    midi.note_on(2, 62, 127);
-    assert_eq!(midi.pressure(2, 50), [breath(50)]);
 }

@@ -1,7 +1,8 @@
 use super::*;
+use crate::control::key_switches::ROW;
 use crate::control::midi::links::Target;
 use crate::dsp::white::White;
-use crate::event::{Fingerings, SettingNumber};
+use crate::event::SettingNumber;
 use crate::units::SoundingNote;
 
 fn said(events: &[PartEvent]) -> Vec<(u8, Event)> {
@@ -259,13 +260,46 @@ fn every_note_ends_once() {
 }
 
 #[test]
-fn a_key_switch_is_for_all_parts_and_ends_once() {
-    let mut parts = Parts::new(3);
-    parts.set_key_switches(KeySwitches::C2);
-    chord(&mut parts, &[60, 64]);
-    let choice = Event::Fingerings(Fingerings::Alternate(1));
-    assert_eq!(said(parts.note_on(0, 37, 100)), [0, 1, 2].map(|part| (part, choice)));
-    assert_eq!(parts.over(), [Note { id: None, channel: 0, key: 37 }]);
-    assert_eq!(said(parts.note_off(0, 37)), []);
-    assert_eq!(chord(&mut parts, &[67]), [on(2, 67)], "it took no part");
+fn key_switches_choose_and_are_no_notes() {
+    for count in [1, 3] {
+        let mut parts = Parts::new(count);
+        parts.set_key_switches(KeySwitches::C1);
+        chord(&mut parts, &[60]);
+        let before = (parts.heard().copied(), parts.decoders[0].held().len());
+        for (key, chosen) in (24..).zip(ROW) {
+            assert_eq!(parts.note_on(0, key, 127), [Event::Fingerings(chosen).into()], "for all, once");
+            assert_eq!(parts.over(), [Note { id: None, channel: 0, key }], "a host waits for its end");
+            assert_eq!((parts.heard().copied(), parts.decoders[0].held().len()), before, "the note goes on");
+            let pressed = NoteExpression::Breath(0.9);
+            assert_eq!(parts.express(NoteAddress::of_key(0, key), pressed), []);
+            assert_eq!(parts.note_off(0, key), []);
+        }
+        let next = |part: u8| part.min(count as u8 - 1);
+        assert_eq!(chord(&mut parts, &[64])[0], on(next(1), 64), "the row took no part");
+        assert_eq!(chord(&mut parts, &[23])[0].1, on(0, 23).1, "below the row");
+        assert_eq!(chord(&mut parts, &[29])[0].1, on(0, 29).1, "above it");
+        parts.reset();
+        assert_eq!(parts.note_on(0, 24, 127).len(), 1);
+        assert!(parts.heard().is_none(), "the row stays");
+        parts.set_key_switches(KeySwitches::Off);
+        assert!(matches!(parts.note_on(0, 24, 127).last().unwrap().event, Event::NoteOn { .. }));
+    }
+}
+
+#[test]
+fn the_finger_on_a_key_switch_does_not_blow() {
+    for count in [1, 2] {
+        let mut parts = Parts::of(MidiDecoder::new().with_mpe(), count);
+        parts.set_key_switches(KeySwitches::C2);
+        let breath = |value: f32| vec![(0, Event::Breath(value / 127.0))];
+        parts.note_on(1, 60, 127);
+        assert_eq!(said(parts.pressure(1, 90)), breath(90.0));
+        parts.note_on(2, 37, 127);
+        assert_eq!(parts.pressure(2, 20), []);
+        assert_eq!(parts.controller(2, 11, 20), []);
+        assert_eq!(said(parts.pressure(1, 91)), breath(91.0), "the note's finger does");
+        parts.note_off(2, 37);
+        parts.note_on(2, 62, 127);
+        assert!(!parts.pressure(2, 50).is_empty());
+    }
 }

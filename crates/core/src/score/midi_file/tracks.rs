@@ -6,6 +6,7 @@
 //! or to all if there are none.
 
 use super::{MidiFileError, decode, merged};
+use crate::control::key_switches::KeySwitches;
 use crate::control::midi::MidiDecoder;
 use crate::control::parts::{MOST, Parts};
 use crate::event::{Event, PartEvent, Timed, To};
@@ -34,25 +35,27 @@ impl Line {
 }
 
 /// Reads the bytes of a file as a score at the sample rate `rate`, Hz, with a player for each line, the first one first. Returns how
-/// many there are, too. Each line has a decoder that begins as `decoder`.
+/// many there are, too. Each line has a decoder that begins as `decoder`, and key switches choose for all.
 ///
 /// # Errors
 ///
 /// As [`read`](super::read), and [`MidiFileError::Lines`] if there are more lines than players.
 pub fn read_tracks(
     decoder: &MidiDecoder,
+    key_switches: KeySwitches,
     bytes: &[u8],
     rate: u32,
 ) -> Result<(Score<PartEvent>, usize), MidiFileError> {
     let (mut clock, messages) = merged(bytes)?;
     let noted = messages.iter().filter_map(|message| match message.kind {
         TrackEventKind::Midi { channel, message: MidiMessage::NoteOn { key, vel } } => {
-            let is_note = vel > 0 && !decoder.is_key_switch(key.as_int());
+            let is_note = vel > 0 && key_switches.chosen(key.as_int()).is_none();
             is_note.then_some((message.track, channel.as_int()))
         }
         _ => None,
     });
     let mut lines = lines(noted, decoder);
+    lines.iter_mut().for_each(|line| line.parts.set_key_switches(key_switches));
     match lines.len() {
         0 => return Err(MidiFileError::NoNotes),
         found if found > MOST => return Err(MidiFileError::Lines { found, most: MOST }),
@@ -120,7 +123,6 @@ fn lines(noted: impl Iterator<Item = (usize, u8)>, decoder: &MidiDecoder) -> Vec
 mod tests {
     use super::super::tests::file;
     use super::*;
-    use crate::control::key_switches::KeySwitches;
     use crate::event::Fingerings;
     use crate::units::SoundingNote;
 
@@ -134,7 +136,8 @@ mod tests {
 
     fn lines_of(format: u8, tracks: &[&[u8]]) -> (Vec<PartEvent>, usize) {
         let (score, lines) =
-            read_tracks(&MidiDecoder::new(), &file(format, [0, 96], tracks), 48_000).unwrap();
+            read_tracks(&MidiDecoder::new(), KeySwitches::Off, &file(format, [0, 96], tracks), 48_000)
+                .unwrap();
         (score.events.iter().map(|timed| timed.event).collect(), lines)
     }
 
@@ -166,7 +169,7 @@ mod tests {
         assert_eq!(notes(&events), [(To::Player(0), 60), (To::Player(1), 64)]);
         assert_eq!(pans(&events), [(To::Player(1), true)]);
         let bytes = file(1, [0, 96], &[&tempo, &one, &two]);
-        let (score, _) = read_tracks(&MidiDecoder::new(), &bytes, 48_000).unwrap();
+        let (score, _) = read_tracks(&MidiDecoder::new(), KeySwitches::Off, &bytes, 48_000).unwrap();
         assert_eq!(score.samples, 48_000, "a beat of a second");
     }
 
@@ -193,7 +196,8 @@ mod tests {
     fn more_lines_than_players_are_refused() {
         let one = track(0, 60, &[]);
         let tracks = vec![&one[..]; MOST + 1];
-        let refused = read_tracks(&MidiDecoder::new(), &file(1, [0, 96], &tracks), 48_000).unwrap_err();
+        let refused = read_tracks(&MidiDecoder::new(), KeySwitches::Off, &file(1, [0, 96], &tracks), 48_000)
+            .unwrap_err();
         assert_eq!(refused, MidiFileError::Lines { found: 17, most: 16 });
     }
 
@@ -201,9 +205,9 @@ mod tests {
     #[test]
     fn key_switches_in_a_track_of_their_own_are_no_line_and_choose_for_all() {
         let tracks: [&[u8]; 3] = [&track(0, 60, &[]), &track(0, 64, &[]), &track(0, 25, &[])];
-        let mut decoder = MidiDecoder::new();
-        decoder.set_key_switches(KeySwitches::C1);
-        let (score, count) = read_tracks(&decoder, &file(1, [0, 96], &tracks), 48_000).unwrap();
+        let bytes = file(1, [0, 96], &tracks);
+        let read = |row| read_tracks(&MidiDecoder::new(), row, &bytes, 48_000).unwrap();
+        let (score, count) = read(KeySwitches::C1);
         assert_eq!(count, 2);
         let choices: Vec<_> = score
             .events
@@ -212,7 +216,7 @@ mod tests {
             .map(|timed| (timed.at, timed.event.to))
             .collect();
         assert_eq!(choices, [(0, To::Player(0)), (0, To::Player(1))]);
-        let (_, count) = read_tracks(&MidiDecoder::new(), &file(1, [0, 96], &tracks), 48_000).unwrap();
+        let (_, count) = read(KeySwitches::Off);
         assert_eq!(count, 3, "off, they are notes");
     }
 }
