@@ -3,7 +3,8 @@
     python python/examples/dask_dataset.py --into set
 
 renders 1,000 notes of 0.5 s, which differ in pitch, mouth pressure, embouchure and reed, into Parquet files and a manifest. On a
-cluster, give `Client` the address of its scheduler instead of the two workers, and a folder that all machines see.
+cluster, give `Client` the address of its scheduler instead of the two workers, give a folder that all machines see, and leave out
+what kills a worker: it knows processes of this machine only.
 """
 
 import argparse

@@ -22,6 +22,9 @@ use midly::{Smf, Timing, TrackEventKind};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
+#[path = "../../tests/support/part.rs"]
+mod part;
+
 /// Optimised builds without debug assertions only compare the bits.
 #[cfg(debug_assertions)]
 #[global_allocator]
@@ -275,23 +278,27 @@ fn through_clarinet(piece: &Piece) -> [Vec<f32>; 2] {
 
 #[test]
 fn the_module_plays_the_bits_of_the_clarinet() {
+    let all = pieces();
+    let chosen = part::of(all.len());
     let mut made = Vec::new();
-    for piece in pieces() {
-        let [left, right] = through_module(&piece);
+    for piece in &all[chosen.clone()] {
+        let [left, right] = through_module(piece);
         let heard = left.iter().chain(&right).fold(0.0_f32, |most, sample| most.max(sample.abs()));
         assert!(heard > 0.01 && heard <= 1.0, "{}: {heard}", piece.name);
         let own = hash(&left, &right);
-        let [left, right] = through_clarinet(&piece);
+        let [left, right] = through_clarinet(piece);
         assert_eq!(own, hash(&left, &right), "{}", piece.name);
-        made.push(as_json(&piece, &own));
+        made.push(as_json(piece, &own).to_string());
     }
-    let text = made.iter().map(Value::to_string).collect::<Vec<_>>().join(",\n");
-    let text = format!("[\n{text}\n]\n");
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
-        std::fs::write(FILE, text).unwrap();
-    } else {
-        let kept = std::fs::read_to_string(Path::new(FILE)).unwrap();
-        assert!(kept == text, "{FILE} is out of date; is the change of sound meant?");
+        std::fs::write(FILE, format!("[\n{}\n]\n", made.join(",\n"))).unwrap();
+    }
+    let kept = std::fs::read_to_string(Path::new(FILE)).unwrap();
+    let kept: Vec<_> = kept.lines().filter(|line| line.starts_with('{')).collect();
+    assert_eq!(kept.len(), all.len(), "{FILE} has other scores");
+    for (number, made) in chosen.zip(&made) {
+        let kept = kept[number].trim_end_matches(',');
+        assert!(kept == made, "{}: {FILE} is out of date; is the change of sound meant?", all[number].name);
     }
 }
 

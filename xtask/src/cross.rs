@@ -2,6 +2,7 @@
 //!
 //! - `build`: cargo in the folder of Debian's packages, and what it has made
 //! - `comparison`: the same scores, files and tests on another system
+//! - `passed`: what need not be compared again
 //! - `windows`: plugin, standalone and command line for Windows, under Wine
 //! - `arm`: the command line for Linux on ARM, under qemu
 //!
@@ -14,6 +15,7 @@
 mod arm;
 mod build;
 mod comparison;
+mod passed;
 mod windows;
 
 use std::path::PathBuf;
@@ -73,7 +75,7 @@ fn here() -> Result<()> {
         "chalumeau-web",
         "--test",
         "scores",
-        comparison::SCORES,
+        comparison::SCORES.name,
     ]))
 }
 

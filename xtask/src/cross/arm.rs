@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use crate::cross::build::Cargo;
-use crate::cross::comparison::Runner;
+use crate::cross::comparison::{Parts, Runner};
 use crate::cross::folder;
 use crate::debian::Packages;
 
@@ -37,20 +37,24 @@ const CARGO: Cargo = Cargo {
 const OPTIONS: &[&str] =
     &["-p", "chalumeau", "-p", "chalumeau-web", "--no-default-features", "--features", "chalumeau/cli"];
 
-/// What tells most for its time, and what takes longest.
-const FIRST: &[&str] = &["--bin", "chalumeau", "--test", "scores"];
-const LAST: &[&str] = &["--test", "render_hashes"];
+const PROGRAMS: &[&str] = &["--bin", "chalumeau", "--test", "scores", "--test", "render_hashes"];
+
+/// Each part has twelve renderings; the first 22 parts have every rendering once.
+const RENDERINGS: Parts = Parts {
+    file: "render_hashes",
+    name: "every_render_is_the_same_to_the_bit",
+    hashes: "tests/golden/renders.tsv",
+    parts: 66,
+};
 
 pub fn run() -> Result<()> {
-    let built = CARGO.build(&[OPTIONS, FIRST].concat())?;
+    let built = CARGO.build(&[OPTIONS, PROGRAMS].concat())?;
     let folder = folder(CARGO.system);
     built.keep(&folder, &[("chalumeau", "chalumeau")])?;
     let cache = crate::debian::inside(&folder)?;
     let variables = vec![("CHALUMEAU_CACHE_DIR".to_owned(), format!("{cache}/cache"))];
-    let words = &["qemu-aarch64"];
-    let runner = Runner { built: &built, words, variables: variables.clone() };
-    runner.scores()?;
-    runner.files("chalumeau", &folder)?;
-    let built = CARGO.build(&[OPTIONS, LAST].concat())?;
-    Runner { built: &built, words, variables }.test("render_hashes", &[])
+    let runner = Runner { built: &built, words: &["qemu-aarch64"], variables };
+    runner.scores(&folder)?;
+    runner.parts(&RENDERINGS, &folder)?;
+    runner.files("chalumeau", &folder)
 }

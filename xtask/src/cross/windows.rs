@@ -85,7 +85,7 @@ pub fn run() -> Result<()> {
     )?;
     let wine = Wine::start(&built)?;
     wine.runner.files("chalumeau", &folder)?;
-    wine.runner.scores()?;
+    wine.runner.scores(&folder)?;
     hosts(&wine)?;
     pictures::look(&wine)?;
     knob::play(&wine, &folder)
