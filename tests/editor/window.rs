@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
+use chalumeau::controllers::source_curves::CurveSource;
 use chalumeau::editor::note_names::NoteNames;
 use chalumeau::editor::{Action, FeelTest, Tab};
 use chalumeau_core::units::SoundingNote;
@@ -214,6 +215,14 @@ fn pictures_of_pages() {
     window.harness.get_by_label("Hole L3, open").hover();
     window.harness.run_steps(60);
     save(&mut window, "trying");
+    let mut window = Window::new(Tab::Breath, (1100.0, 720.0));
+    for source in &mut window.snapshot.borrow_mut().sources {
+        source.is_live = source.name == CurveSource::Expression.title();
+    }
+    window.host.automate("keysw", 0.5);
+    window.harness.run();
+    click(&mut window, "Own curve for CC11 expression");
+    save(&mut window, "own-curve");
     let mut window = Window::new(Tab::Sound, (1100.0, 900.0));
     window.host.automate("heard", 0.5);
     window.harness.run();

@@ -47,6 +47,7 @@ fn tests(programs: &Programs, display: &Display, file: &str, name: &str) -> Comm
         // One after another: they look at one display and move one pointer.
         .args(["--ignored", "--nocapture", "--test-threads=1", name])
         .env(artefacts::STANDALONE, &programs.standalone)
+        .env(artefacts::PROGRAM, &programs.program)
         .env(artefacts::CACHE, machine::target().join("cache"));
     display.for_clients(&mut command);
     command

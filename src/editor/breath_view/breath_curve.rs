@@ -89,8 +89,10 @@ impl OfSource {
     /// A button that gives it its own curve, or the common one again.
     fn offer(&self, ui: &mut Ui, hands: &Hands, settings: &Settings, rect: Rect) {
         let text = RichText::new(format!("Own curve for {}", self.title())).font(theme::small());
-        let button = egui::Button::selectable(self.is_own(), text).frame_when_inactive(true);
-        let size = vec2(176.0_f32.min(0.62 * rect.width()), 20.0);
+        let button = egui::Button::selectable(self.is_own(), text)
+            .frame_when_inactive(true)
+            .wrap_mode(egui::TextWrapMode::Extend);
+        let size = vec2(220.0_f32.min(0.62 * rect.width()), 22.0);
         let place = Rect::from_min_size(pos2(rect.right() - size.x, rect.top() - 4.0), size);
         let about = "On: this source has a curve of its own. Off: it has the curve that all sources share.";
         if ui.put(place, button).on_hover_text(about).clicked()
@@ -116,7 +118,9 @@ pub fn draw(
     let settings = own.map_or_else(|| snapshot.settings.clamped(), |own| own.over(&snapshot.settings));
     let breath = live.map(|source| source.value);
     let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
-    let frame = Rect::from_min_max(rect.min + vec2(26.0, 20.0), rect.max - vec2(10.0, 38.0));
+    // The upper handle stays clear of the button of an own curve.
+    let top = if of.is_some() { 36.0 } else { 20.0 };
+    let frame = Rect::from_min_max(rect.min + vec2(26.0, top), rect.max - vec2(10.0, 38.0));
     let x = |breath: f32| frame.left() + breath * frame.width();
     let y = |dynamic: f32| frame.bottom() - dynamic * frame.height();
     let at = |breath: f32| pos2(x(breath), y(level(breath, &settings)));
