@@ -11,7 +11,7 @@ use crate::editor::hole_names::hole_title;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 use crate::editor::widgets::one_line;
-use chalumeau_core::bore::fingering_finder::{Found, SURE_DB};
+use chalumeau_core::bore::fingering_finder::{Found, SURE_DB, bits};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 
 /// Height of a row, points.
@@ -127,10 +127,7 @@ pub fn draw_row<'a>(
 }
 
 fn is_tried(found: &Found, file: &InstrumentFile, tried: Option<&[bool]>) -> bool {
-    let is_open = |hole: usize| found.grip.open >> hole & 1 == 1;
-    tried.is_some_and(|tried| {
-        tried.len() == file.holes.len() && tried.iter().enumerate().all(|(hole, &open)| open == is_open(hole))
-    })
+    tried.is_some_and(|tried| tried.len() == file.holes.len() && bits(tried) == found.grip.open)
 }
 
 fn ink(c: &Colours, is_here: bool) -> Color32 {
