@@ -149,6 +149,8 @@ impl Fresh {
         let screen = Screen::open(Some(display.name()))?;
         let mut command = self.user();
         command.args([&format!("DISPLAY={}", display.name()), "LIBGL_ALWAYS_SOFTWARE=1", "LP_NUM_THREADS=1"]);
+        // Mesa keeps compiled shaders in the user's home, for every program that draws: they are no trace of the package.
+        command.arg("MESA_SHADER_CACHE_DISABLE=true");
         let mut running = command.args(["chalumeau-standalone", "--backend", "dummy"]).spawn()?;
         let drawn = screen.titled("Chalumeau").and_then(|window| {
             let picture = screen.settled(window, Duration::from_millis(600))?;
