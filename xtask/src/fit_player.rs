@@ -127,12 +127,13 @@ fn compare_played(
     Compared { error_db, ratio: played.centroid_hz(note.f0_hz) / recorded.centroid_hz }
 }
 
-fn cost(compared: &Compared) -> f64 {
+/// Error and, as far as the centroid is wrong, what a wrong one costs, dB.
+fn cost(compared: &Compared, centroid_cost_db: f64) -> f64 {
     let (low, high) = CENTROID_RATIOS;
     let far = (compared.ratio.ln() / (if compared.ratio > 1.0 { high } else { low }).ln() - 1.0) * high.ln();
     let outside =
         if far.is_nan() { 1.0 } else { ((far + 0.5 * CENTROID_SLOPE) / CENTROID_SLOPE).clamp(0.0, 1.0) };
-    compared.error_db + CENTROID_COST_DB * outside
+    compared.error_db + centroid_cost_db * outside
 }
 
 /// Everything that a fit needs.
@@ -156,7 +157,12 @@ impl Data {
         let rule = rule_of(numbers);
         let notes = (0..self.notes.len()).filter(|&at| Some(at) != without);
         let short = SHORT_COST * mean(notes.clone().map(|at| short_db(&rule, &self.notes[at])));
-        short + mean(notes.flat_map(|at| self.compare(&rule, at)).map(|(_, compared)| cost(&compared)))
+        short
+            + mean(
+                notes
+                    .flat_map(|at| self.compare(&rule, at))
+                    .map(|(_, compared)| cost(&compared, CENTROID_COST_DB)),
+            )
     }
 
     fn fit(&self, from: &[f64; COUNT], without: Option<usize>, steps: usize) -> Vec<f64> {
