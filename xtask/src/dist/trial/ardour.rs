@@ -11,8 +11,8 @@ use crate::machine;
 
 const NOTES: &str = include_str!("notes.lua");
 const SESSION: &str = include_str!("session.lua");
-/// A home for Ardour alone, so that the user's stays as it is.
-const HOME: &str = "/tmp/ardour";
+/// Where Ardour keeps its own files, so that the user's home stays as it is.
+const PLACE: &str = "/tmp/ardour";
 /// Samples a second of the session, how many the notes last, and how many a note.
 const RATE: usize = 48_000;
 const NOTE: usize = RATE / 2;
@@ -29,22 +29,18 @@ const AUDIBLE: f64 = 0.01;
 /// Fails unless Ardour finds the plugin at this path and all four notes are heard.
 pub fn plays(system: &Fresh, plugin: &str) -> Result<()> {
     let name = version(system)?;
-    let home = system.inside(HOME);
-    if home.exists() {
-        fs::remove_dir_all(&home)?;
+    let place = system.inside(PLACE);
+    if place.exists() {
+        fs::remove_dir_all(&place)?;
     }
-    let scripts = home.join(".config").join(&name).join("scripts");
+    let scripts = place.join("config").join(&name).join("scripts");
     fs::create_dir_all(&scripts)?;
     fs::write(scripts.join("notes.lua"), NOTES)?;
-    fs::write(home.join("session.lua"), SESSION.replace("SESSION", &format!("{HOME}/session")))?;
-    if let Some(folder) = plugin.strip_suffix("/Chalumeau.vst3").filter(|folder| folder.ends_with("/.vst3")) {
-        // Ardour looks for the user's plugins in its own home.
-        std::os::unix::fs::symlink(folder, home.join(".vst3"))?;
-    }
-    machine::run(Command::new("chmod").args(["-R", "a+rwX"]).arg(&home))?;
+    fs::write(place.join("session.lua"), SESSION.replace("SESSION", &format!("{PLACE}/session")))?;
+    machine::run(Command::new("chmod").args(["-R", "a+rwX"]).arg(&place))?;
     let library = format!("/usr/lib/{name}");
     let scan = [format!("LD_LIBRARY_PATH={library}"), format!("{library}/ardour-vst3-scanner")];
-    machine::run(in_home(system).args(scan).args(["-f", "-q", plugin]))?;
+    machine::run(beside(system).args(scan).args(["-f", "-q", plugin]))?;
     let session = session(system, &name, plugin)?;
     let text = fs::read_to_string(&session)?;
     fs::write(&session, with_range(&text).context("Ardour's session has no list of places")?)?;
@@ -55,25 +51,32 @@ pub fn plays(system: &Fresh, plugin: &str) -> Result<()> {
         "in {name} the notes have levels {levels:?}"
     );
     println!("{plugin} plays in {name}: rms of its four notes {:.3?}", &levels[..4]);
-    Ok(fs::remove_dir_all(&home)?)
+    Ok(fs::remove_dir_all(&place)?)
 }
 
-/// A command inside, at home where Ardour is.
-fn in_home(system: &Fresh) -> Command {
+/// A command inside, as the user, who keeps nothing of it at home.
+fn beside(system: &Fresh) -> Command {
     let mut command = system.user();
     // Before 8.5 Ardour writes behind the end of a buffer where it mixes with AVX-512, and may abort when an export ends. These
     // flags choose SSE2.
-    command.arg("ARDOUR_FPU_FLAGS=15").args([
-        &format!("HOME={HOME}"),
-        &format!("XDG_RUNTIME_DIR={HOME}"),
-        &format!("CHALUMEAU_CACHE_DIR={HOME}/cache"),
-    ]);
+    command.arg("ARDOUR_FPU_FLAGS=15");
+    // Ardour finds the plugins of the home itself, and follows no link to them.
+    for (folder, of) in [
+        ("XDG_CONFIG_HOME", "/config"),
+        ("XDG_CACHE_HOME", "/cache"),
+        ("XDG_DATA_HOME", "/data"),
+        ("XDG_STATE_HOME", "/state"),
+        ("XDG_RUNTIME_DIR", ""),
+        ("CHALUMEAU_CACHE_DIR", "/cache"),
+    ] {
+        command.arg(format!("{folder}={PLACE}{of}"));
+    }
     command
 }
 
 /// The same, ended when it takes too long: asked first, and killed when it does not listen.
 fn with_patience(system: &Fresh) -> Command {
-    let mut command = in_home(system);
+    let mut command = beside(system);
     command.args(["timeout", "--kill-after=5", PATIENCE_S]);
     command
 }
@@ -88,7 +91,7 @@ fn version(system: &Fresh) -> Result<String> {
 
 /// Has the session written; its file. Ardour may fail while it ends: what it has saved counts.
 fn session(system: &Fresh, name: &str, plugin: &str) -> Result<PathBuf> {
-    let folder = system.inside(HOME).join("session");
+    let folder = system.inside(PLACE).join("session");
     let file = folder.join("s.ardour");
     let mut said = String::new();
     for _ in 0..ATTEMPTS {
@@ -96,13 +99,12 @@ fn session(system: &Fresh, name: &str, plugin: &str) -> Result<PathBuf> {
             fs::remove_dir_all(&folder)?;
         }
         let output =
-            with_patience(system).args([&format!("{name}-lua"), &format!("{HOME}/session.lua")]).output()?;
+            with_patience(system).args([&format!("{name}-lua"), &format!("{PLACE}/session.lua")]).output()?;
         said =
             String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
         if said.contains("saved") && file.exists() {
             let path = said.lines().find_map(|line| line.strip_prefix("found ")).unwrap_or_default();
-            let place = plugin.split_once("/.vst3").map_or(plugin, |(_, rest)| rest);
-            ensure!(path.contains(place), "{name} found another plugin, {path}, where {plugin} is");
+            ensure!(path.starts_with(plugin), "{name} found another plugin, {path}, where {plugin} is");
             return Ok(file);
         }
     }
@@ -124,12 +126,12 @@ fn with_range(session: &str) -> Option<String> {
 
 /// Plays the session into a file, and returns its left channel.
 fn export(system: &Fresh, name: &str) -> Result<Vec<f32>> {
-    let wav = system.inside(HOME).join("sound.wav");
+    let wav = system.inside(PLACE).join("sound.wav");
     let mut said = String::new();
     for _ in 0..ATTEMPTS {
         let _ = fs::remove_file(&wav);
-        let export = [&format!("{name}-export"), "-b", "float", "-o", &format!("{HOME}/sound.wav")];
-        let output = with_patience(system).args(export).args([&format!("{HOME}/session"), "s"]).output()?;
+        let export = [&format!("{name}-export"), "-b", "float", "-o", &format!("{PLACE}/sound.wav")];
+        let output = with_patience(system).args(export).args([&format!("{PLACE}/session"), "s"]).output()?;
         said =
             String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
         let left = hound::WavReader::open(&wav).ok().map(|reader| {
