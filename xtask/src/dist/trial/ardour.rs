@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
+use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};
 
@@ -40,6 +41,8 @@ pub fn plays(system: &Fresh, plugin: &str) -> Result<()> {
     machine::run(Command::new("chmod").args(["-R", "a+rwX"]).arg(&place))?;
     let library = format!("/usr/lib/{name}");
     let scan = [format!("LD_LIBRARY_PATH={library}"), format!("{library}/ardour-vst3-scanner")];
+    // Ardour does not trust what it knows of a plugin that is as old as the file, and what it knows is dated in whole seconds.
+    std::thread::sleep(Duration::from_secs(2));
     machine::run(beside(system).args(scan).args(["-f", "-q", plugin]))?;
     let session = session(system, &name, plugin)?;
     let text = fs::read_to_string(&session)?;
