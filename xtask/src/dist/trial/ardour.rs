@@ -41,7 +41,7 @@ pub fn plays(system: &Fresh, plugin: &str) -> Result<()> {
     machine::run(Command::new("chmod").args(["-R", "a+rwX"]).arg(&place))?;
     let library = format!("/usr/lib/{name}");
     let scan = [format!("LD_LIBRARY_PATH={library}"), format!("{library}/ardour-vst3-scanner")];
-    // Ardour does not trust what it knows of a plugin that is as old as the file, and what it knows is dated in whole seconds.
+    // Ardour passes over a plugin that is newer than its scan, and it dates scans in whole seconds.
     std::thread::sleep(Duration::from_secs(2));
     machine::run(beside(system).args(scan).args(["-f", "-q", plugin]))?;
     let session = session(system, &name, plugin)?;
