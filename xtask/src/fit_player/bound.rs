@@ -1,6 +1,6 @@
 //! How near to the recordings a smooth rule can come: at each dynamic by itself, mouth pressure and flow strength are free
-//! functions of the place of a note, bound to no level; without filters, and with three that are the same for all notes. What these
-//! cannot reach, no rule of a player can that is smooth in pitch and moves pressure and flow.
+//! functions of the place of a note, bound to no level; without filters, and with three that are the same for all notes of that
+//! dynamic. The search is local: it shows what can be reached, and not that more cannot.
 
 use std::ops::ControlFlow;
 
