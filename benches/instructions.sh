@@ -12,13 +12,13 @@ export LC_ALL=C
 
 rate=${1:-48000}
 # Of a note that lives and moves, as it does by default.
-declare -A most=([avx2]=850 [plain]=1330 ["avx2 places"]=920 ["plain places"]=1430)
+declare -A most=([avx2]=845 [plain]=1325 ["avx2 places"]=912 ["plain places"]=1425)
 
 # What growl and vocal tract add together.
 declare -A most_techniques=([avx2]=55 [plain]=55)
 
 # Players in unison, in hundredths of the cost of one voice.
-declare -A most_players=(["avx2 8"]=510 ["avx2 16"]=1015 ["plain 8"]=650 ["plain 16"]=1300)
+declare -A most_players=(["avx2 8"]=512 ["avx2 16"]=1020 ["plain 8"]=650 ["plain 16"]=1300)
 
 if ! command -v valgrind >/dev/null; then
     echo "cannot count instructions without valgrind: apt-get install valgrind" >&2

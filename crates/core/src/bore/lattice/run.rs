@@ -174,7 +174,8 @@ fn advance<F: Real, T: Tip<F>, const COUNT: usize>(
         ends.advance(ring, next, mask, tip);
     }
     let step_slots = (steps.len() * LANES) as u16;
-    for (chunk, steps) in steps.iter_mut().enumerate().take(MAX_CHUNKS) {
+    let count = steps.len().min(MAX_CHUNKS);
+    for (chunk, steps) in steps[..count].iter_mut().enumerate() {
         let [left, right] = &steps.sources.places(base, mask);
         let arriving = [gather::<F, 0>(ring, left), gather::<F, 0>(ring, right)];
         if is_pair {
@@ -205,7 +206,8 @@ fn pass<F: Real>(
     }
     let mut unheard = HoleFlows::default();
     let flows = flows.unwrap_or(&mut unheard);
-    for (chunk, (holes, flows)) in holes.iter_mut().zip(flows).enumerate().take(MAX_CHUNKS) {
+    let count = holes.len().min(MAX_CHUNKS);
+    for (chunk, (holes, flows)) in holes[..count].iter_mut().zip(flows).enumerate() {
         let leaving;
         (leaving, *flows) = holes.scatter(ring, base, mask);
         leave(ring, base + first_slot, chunk, &leaving);
