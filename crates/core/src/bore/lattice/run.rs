@@ -174,6 +174,7 @@ fn advance<F: Real, T: Tip<F>, const COUNT: usize>(
         ends.advance(ring, next, mask, tip);
     }
     let step_slots = (steps.len() * LANES) as u16;
+    // The slice ends the loop: a count beside it would cost some ten instructions a sample.
     let count = steps.len().min(MAX_CHUNKS);
     for (chunk, steps) in steps[..count].iter_mut().enumerate() {
         let [left, right] = &steps.sources.places(base, mask);
@@ -206,6 +207,7 @@ fn pass<F: Real>(
     }
     let mut unheard = HoleFlows::default();
     let flows = flows.unwrap_or(&mut unheard);
+    // As above.
     let count = holes.len().min(MAX_CHUNKS);
     for (chunk, (holes, flows)) in holes[..count].iter_mut().zip(flows).enumerate() {
         let leaving;
