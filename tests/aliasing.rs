@@ -43,7 +43,7 @@ fn non_harmonic_db(model: &Arc<Model>, written: u8, lay: f32) -> f64 {
 fn loud_notes_are_clean_between_their_harmonics() {
     let model = Arc::new(Model::built_in(RATE_HZ).unwrap());
     // Measured levels rounded up by half a decibel; `docs/measured.md` quotes the first.
-    let limits_db = [-99.6, -96.4, -88.5, -86.6, -85.4, -82.8];
+    let limits_db = [-98.3, -96.0, -88.7, -87.4, -84.8, -81.4];
     let runs: Vec<(u8, f32)> =
         [0.4, 0.0].into_iter().flat_map(|lay| [60, 79, 86].map(|written| (written, lay))).collect();
     let levels = each(&runs, |&(written, lay)| non_harmonic_db(&model, written, lay));
@@ -56,7 +56,7 @@ fn loud_notes_are_clean_between_their_harmonics() {
 }
 
 #[test]
-fn half_of_all_notes_are_cleaner_than_100_db() {
+fn half_of_all_notes_are_cleaner_than_99_db() {
     let model = Arc::new(Model::built_in(RATE_HZ).unwrap());
     let notes: Vec<u8> = (52..=92).collect();
     let levels = each(&notes, |&written| non_harmonic_db(&model, written, 0.4));
@@ -64,7 +64,7 @@ fn half_of_all_notes_are_cleaner_than_100_db() {
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (median, worst) = (sorted[sorted.len() / 2].0, &sorted[sorted.len() - 5..]);
     println!("median {median:.1} dB, best {:?}, worst {worst:.1?}", sorted[0]);
-    assert!(median <= -100.6, "{median}");
+    assert!(median <= -99.0, "{median}");
 }
 
 /// In the chalumeau and the throat at every step. In the clarion tone saturates once the reed beats, and the highest

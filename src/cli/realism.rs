@@ -10,25 +10,21 @@ use chalumeau_core::analysis::noise_bands::{BANDS_HZ, noise_db};
 use chalumeau_core::analysis::partials::{Partial, Wander};
 use chalumeau_core::analysis::pitch;
 use chalumeau_core::analysis::spectrum::steady_segment;
-use chalumeau_core::analysis::steady_note::{RATE_HZ, SECONDS, SteadyNote};
-use chalumeau_core::analysis::to_f64;
+use chalumeau_core::analysis::steady_note::{RATE_HZ, SteadyNote};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
-use chalumeau_core::instrument::{BreathResponse, Clarinet, Model, Settings};
+use chalumeau_core::instrument::{BreathResponse, Model, Settings};
 use chalumeau_core::measure::realism::{
     CENTROID_RATIOS, Dynamic, NoteScore, REGISTERS, RecordedNote, Summary, louder_is_brighter, mean, median,
-    register,
+    register, render,
 };
 use chalumeau_core::measure::shelf::Shelf;
 use chalumeau_core::parallel;
-use chalumeau_core::score;
-use chalumeau_core::score::Score;
 use chalumeau_core::score::breath::{BreathCurve, GAMMA_MAX};
 use chalumeau_core::units::SoundingNote;
 use chalumeau_figure::realism::{ComparedDynamic, ComparedNote, figure};
 use clap::Args;
-use std::convert::Infallible;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -176,7 +172,7 @@ fn play_all(model: &Arc<Model>, settings: &Settings, breaths: &[f32; 3], shelf: 
     let play = |at: usize| {
         let note = &recorded[at];
         let breath = breaths[note.dynamic as usize];
-        let mut samples = rendered(model, settings, note.midi, breath);
+        let mut samples = render(model, settings, SoundingNote(note.midi), breath);
         if let Some(shelf) = shelf {
             shelf.apply(&mut samples, RATE_HZ);
         }
@@ -189,21 +185,6 @@ fn play_all(model: &Arc<Model>, settings: &Settings, breaths: &[f32; 3], shelf: 
     });
     bar.finish_and_clear();
     heard.unwrap_or_default()
-}
-
-fn rendered(model: &Arc<Model>, settings: &Settings, midi: u8, breath: f32) -> Vec<f64> {
-    let rate = RATE_HZ as u32;
-    let mut clarinet = Clarinet::new(model.clone(), RATE_HZ);
-    clarinet.set_settings(settings);
-    clarinet.reset();
-    let score =
-        Score::note(SoundingNote(midi), SECONDS, rate).blown(&BreathCurve::constant(breath), settings, rate);
-    let mut samples = Vec::with_capacity(score.samples);
-    let Ok(()) = score::play(&mut clarinet, &score, 4096, |block| {
-        samples.extend(to_f64(block));
-        Ok::<_, Infallible>(())
-    });
-    samples
 }
 
 fn listen(recorded: &RecordedNote, samples: &[f64]) -> Heard {

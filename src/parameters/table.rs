@@ -360,7 +360,7 @@ pub static PARAMETERS: &[Parameter] = &[
         .help("Noise of the breath in the reed channel", "Adds the sound of air.", "")
         .sets(Sets::Number(SettingNumber::Noise))
         .flag("--noise"),
-    entry("gain", OUTPUT, "Gain", number([-60.0, 24.0], -1.0, 1, " dB"))
+    entry("gain", OUTPUT, "Gain", number([-60.0, 24.0], -2.5, 1, " dB"))
         .help("Output level", "At 0 dB, 1 Pa at a distance of 1 m is -6 dBFS.", "")
         .sets(Sets::Number(SettingNumber::GainDb))
         .flag("--gain-db"),

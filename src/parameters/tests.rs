@@ -37,7 +37,7 @@ const FROZEN: &[(&str, &str, &str, &str, bool)] = &[
     ("transp", "Tuning", "Transpose", "0 st", true),
     ("beyond", "Tuning", "Beyond the range", "Silent", true),
     ("noise", "Noise", "Breath noise", "30.0 %", true),
-    ("gain", "Output", "Gain", "-1.0 dB", true),
+    ("gain", "Output", "Gain", "-2.5 dB", true),
     ("panic", "Output", "Panic", "Off", true),
     ("knob", "Knob", "Knob", "Off", false),
     ("arm", "Knob", "Arm knob", "Off", false),

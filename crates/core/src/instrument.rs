@@ -41,6 +41,7 @@ pub mod played_note;
 pub mod player;
 mod players;
 pub mod prepare;
+pub mod presence;
 mod reach;
 pub mod room;
 pub mod scope;

@@ -90,7 +90,12 @@ pub fn steady_segment(samples: &[f64], rate_hz: f64) -> Option<Range<usize>> {
 /// Mean removed, one periodic Hann window, zero-padded to the next power of two at or above four lengths; the largest
 /// magnitude within 3 % of each multiple of `f0_hz`. Not rounded.
 pub fn harmonic_levels_db(segment: &[f64], rate_hz: f64, f0_hz: f64) -> Vec<f64> {
-    let count = HARMONICS.min((0.45 * rate_hz / f0_hz) as usize);
+    levels_of_harmonics_db(segment, rate_hz, f0_hz, HARMONICS)
+}
+
+/// As [`harmonic_levels_db`], of harmonics 1..=`most`.
+pub fn levels_of_harmonics_db(segment: &[f64], rate_hz: f64, f0_hz: f64, most: usize) -> Vec<f64> {
+    let count = most.min((0.45 * rate_hz / f0_hz) as usize);
     let size = (4 * segment.len()).next_power_of_two();
     let bins = transform(&mut RealFftPlanner::new(), &hann(segment), size);
     let bin_hz = rate_hz / size as f64;

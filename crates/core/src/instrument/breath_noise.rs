@@ -29,15 +29,20 @@ const STEADY_NOISE: f64 = 0.018;
 const STEADY_BAND_HZ: (f64, f64) = (600.0, 5_000.0);
 /// Pulsed: noise flow at amount 1 over the flow that it rides on, for turbulence of rms 1 before its band. At the default
 /// amount of 0.3, held notes have the noise of recorded ones at mezzo-forte, within 4 dB in five bands from 0.3 to 15 kHz.
-const PULSED_NOISE: f64 = 0.66;
+const PULSED_NOISE: f64 = 0.88;
 /// Pulsed: the band, Hz. Above the low corner turbulence falls with 12 dB an octave down to a floor, which ends at the high one.
 const PULSED_BAND_HZ: (f64, f64) = (600.0, 12_000.0);
 /// Pulsed: the floor over the level below the low corner.
-const FLOOR: f64 = 0.04;
+const FLOOR: f64 = 0.035;
 /// Pulsed: share of the mean flow that whispers although nothing is pulsed: -78 dBFS below the threshold (by judgement).
-const WHISPER: f64 = 0.012;
+const WHISPER: f64 = 0.009;
 /// Pulsed: time constant of the slow mean of the flow, s: longer than a period of the lowest note, shorter than a tongued one.
 const MEAN_S: f64 = 0.03;
+/// Pulsed: time constant with which turbulence follows the flow, s: a jet 0.5 to 1 mm high takes some ten heights downstream to break up, 5 to
+/// 10 mm, and its eddies travel at half its speed of 30 m/s or less. Without it the corners of the pulses put too much of the noise above 1 kHz.
+const BREAK_UP_S: f64 = 0.5e-3;
+/// Turbulence below this is none: smaller numbers are slow to compute with.
+const STILL: f64 = 1e-30;
 /// Below this flow the jet is laminar and silent: a Reynolds number of 25 in a channel 13 mm wide, about a hundredth of
 /// the flow in a soft note. After the breath has ended, the flow in the bore decays only as 1 / t; it must not hiss.
 const LAMINAR_FLOW: f64 = 0.002;
@@ -54,6 +59,11 @@ fn next(random: u64) -> u64 {
     random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407)
 }
 
+/// Turbulence that is not too small to compute with.
+fn still(built: f64) -> f64 {
+    if built < STILL { 0.0 } else { built }
+}
+
 /// The noise of one voice. Flows are over those of the reference reed.
 pub(super) struct BreathNoise {
     jet: Jet,
@@ -63,6 +73,12 @@ pub(super) struct BreathNoise {
     mean_share: f64,
     /// Noise flow over the flow that it rides on.
     strength: f64,
+    /// Share of the turbulence that is left after a sample.
+    keep: f64,
+    /// The same for a pulsed jet.
+    pulsed_keep: f64,
+    /// Turbulence: the flow that makes noise, summed over the samples in which it breaks up.
+    built: f64,
     /// Flow beside which noise rides: the slow mean of a pulsed jet.
     mean: f64,
     /// Flow that makes no noise.
@@ -85,6 +101,9 @@ impl BreathNoise {
             corners: [STEADY_BAND_HZ, PULSED_BAND_HZ].map(|(low, high)| (corner(low), corner(high))),
             mean_share: 1.0 - (-(TICK as f64) / (MEAN_S * rate_hz)).exp(),
             strength: 0.0,
+            keep: 0.0,
+            pulsed_keep: (-1.0 / (BREAK_UP_S * rate_hz)).exp(),
+            built: 0.0,
             mean: 0.0,
             quiet: LAMINAR_FLOW,
             whisper: 0.0,
@@ -98,7 +117,7 @@ impl BreathNoise {
 
     /// Starts the noise again from its seed; the jet stays.
     pub fn reset(&mut self) {
-        (self.mean, self.whisper, self.high, self.low) = (0.0, 0.0, 0.0, [0.0; 2]);
+        (self.built, self.mean, self.whisper, self.high, self.low) = (0.0, 0.0, 0.0, 0.0, [0.0; 2]);
         self.random = self.seed;
     }
 
@@ -112,8 +131,11 @@ impl BreathNoise {
     pub fn set_jet(&mut self, jet: Jet) {
         if jet != self.jet {
             self.jet = jet;
-            (self.mean, self.whisper, self.low) = (0.0, 0.0, [0.0; 2]);
-            self.quiet = if jet == Jet::Steady { LAMINAR_FLOW } else { 0.0 };
+            (self.built, self.mean, self.whisper, self.low) = (0.0, 0.0, 0.0, [0.0; 2]);
+            (self.quiet, self.keep) = match jet {
+                Jet::Steady => (LAMINAR_FLOW, 0.0),
+                Jet::Pulsed => (0.0, self.pulsed_keep),
+            };
         }
     }
 
@@ -123,9 +145,11 @@ impl BreathNoise {
         match self.jet {
             Jet::Steady => self.strength = amount * STEADY_NOISE,
             Jet::Pulsed => {
-                self.strength = amount * PULSED_NOISE;
+                let strength = amount * PULSED_NOISE;
+                self.strength = strength * (1.0 - self.keep);
+                self.built = still(self.built);
                 self.mean += self.mean_share * (jet_flow - self.mean);
-                self.whisper = self.strength * WHISPER * (self.mean.abs() - LAMINAR_FLOW).max(0.0);
+                self.whisper = strength * WHISPER * (self.mean.abs() - LAMINAR_FLOW).max(0.0);
             }
         }
     }
@@ -170,8 +194,9 @@ impl BreathNoise {
 
     /// Noise flow of sample `at` of the tick on a jet of this flow.
     #[inline(always)]
-    pub fn flow(&self, jet_flow: f64, at: usize) -> f64 {
+    pub fn flow(&mut self, jet_flow: f64, at: usize) -> f64 {
         let turbulent = ((jet_flow - self.mean).abs() - self.quiet).max(0.0);
-        (self.strength * turbulent + self.whisper) * self.hiss[at & (TICK - 1)]
+        self.built = turbulent + self.keep * self.built;
+        (self.strength * self.built + self.whisper) * self.hiss[at & (TICK - 1)]
     }
 }

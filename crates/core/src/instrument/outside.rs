@@ -17,12 +17,14 @@ use crate::bore::lattice::{HoleFlows, LANES, LatticeCoeffs, Real};
 use crate::bore::sound_sources::SoundSources;
 use crate::instrument::control_tick::TICK;
 use crate::instrument::listening::{Listening, ListeningMode};
+use crate::instrument::presence::Presence;
 use crate::units::Air;
 use ear::Ear;
 use lines::Lines;
 
-/// Ticks in which one way of listening fades into another: 5 ms at 96 kHz, too slow to click.
-const FADE_TICKS: u32 = 30;
+/// Ticks in which one way of listening fades into another: 13 ms at 96 kHz, too slow to click, and as long as the gain and the reed of another
+/// preset take: the old reed is not heard in the new way with the new gain.
+const FADE_TICKS: u32 = 80;
 
 /// Flows of a tick, and the way to the listener.
 pub(super) struct Outside<F> {
@@ -72,11 +74,11 @@ impl<F: Real> Places<F> {
     ) -> Self {
         let two = stereo && listening.mode == ListeningMode::Position && listening.width_deg > 0.0;
         let ear = |side: f64| {
-            let paths = match listening.mode {
-                ListeningMode::Position => listening.position(side, sources, air),
-                _ => Listening::everywhere(sources, air),
+            let (paths, presence) = match listening.mode {
+                ListeningMode::Position => (listening.position(side, sources, air), None),
+                _ => (Listening::everywhere(sources, air), Some(Presence::of(sources))),
             };
-            Ear::new(&paths, lines, rate_hz)
+            Ear::new(&paths, presence, lines, rate_hz)
         };
         let ears = if two { [ear(-1.0), ear(1.0)] } else { [ear(0.0), ear(0.0)] };
         Self { point: listening.mode == ListeningMode::Point, two, ears }

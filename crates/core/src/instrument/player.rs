@@ -16,7 +16,7 @@ mod carry_on;
 pub mod dynamics;
 pub mod ear;
 mod fingers;
-mod fitted;
+pub(crate) mod fitted;
 mod glissando;
 mod inflection;
 mod inhalation;
@@ -408,6 +408,7 @@ impl Player {
             return;
         }
         self.fingers.choose(alternate);
+        self.ear.begin(false);
         if !slurred {
             return self.move_holes(fingering, 1e-3 * TONGUED_FINGERS_MS, model, voice);
         }
@@ -424,6 +425,7 @@ impl Player {
                     self.lip_glide.help(help);
                 }
                 let ticks = self.legato_ticks(model);
+                self.ear.begin(slur.is_within_a_register());
                 self.fingers.walk_to(fingering, ticks, slur.walk(gamma), model, voice.lattice_mut());
                 self.posture = None;
             }
@@ -548,7 +550,12 @@ impl Player {
             left => left - 1,
         };
         let in_place = tongue_holds || !key_down;
-        let note_lip = self.lip_glide.tick(posture.note_lip(), in_place, posture.lags.fingers, tick_s);
+        let note_lip = self.lip_glide.tick(
+            posture.note_lip(),
+            in_place,
+            (posture.lags.fingers, posture.lags.shape),
+            tick_s,
+        );
         let fade = self.inflection.fade();
         let bodily = Bodily { note_lip, onset: &self.onset, sway: &self.sway, settles: tongue_holds, fade };
         let mut target = self.response.tick(asked, ear, &bodily, settings, posture);

@@ -108,7 +108,7 @@ pub struct Settings {
     pub temperature_c: f32,
     /// Nonlinear flow loss K of open holes, 0..=4. At 0 fewer notes of clarion and altissimo hold their register. Default 2.
     pub vent_loss: f32,
-    /// Output gain, dB, -60..=24. At 0 dB 1 Pa at 1 m from a B flat clarinet is -6 dBFS. Default -1: the loudest keys stay below the limiter.
+    /// Output gain, dB, -60..=24. At 0 dB 1 Pa at 1 m from a B flat clarinet is -6 dBFS. Default -2.5: the loudest keys stay below the limiter.
     pub gain_db: f32,
     /// Where the instrument is heard from.
     pub listening: Listening,
@@ -165,7 +165,7 @@ impl Default for Settings {
             tuning: Tuning::Tempered,
             temperature_c: 25.0,
             vent_loss: 2.0,
-            gain_db: -1.0,
+            gain_db: -2.5,
             listening: Listening::default(),
             reach: Reach::default(),
             room: Room::default(),

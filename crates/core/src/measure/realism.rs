@@ -5,7 +5,14 @@
 //! measured in the same way by [`SteadyNote`]. One take per note scatters: a recorded note differs from its recorded
 //! neighbours by 2.7, 6.8 and 4.8 dB at pp, mf and ff. So an error of that size is as near as such data can tell.
 
-use crate::analysis::steady_note::SteadyNote;
+use std::convert::Infallible;
+use std::sync::Arc;
+
+use crate::analysis::steady_note::{RATE_HZ, SECONDS, SteadyNote};
+use crate::analysis::to_f64;
+use crate::instrument::{Clarinet, Model, Settings};
+use crate::score::breath::BreathCurve;
+use crate::score::{self, Score};
 use crate::units::{SoundingNote, cents};
 
 /// The committed half of the recorded notes.
@@ -19,7 +26,7 @@ const OTHER_CENTS: f64 = 150.0;
 /// Range of centroid ratios that counts as right.
 pub const CENTROID_RATIOS: (f64, f64) = (0.8, 1.25);
 /// Highest sounding note of which the third harmonic is compared with the second: sounding B3.
-const ODD_UP_TO: u8 = 59;
+pub const ODD_UP_TO: u8 = 59;
 /// Takes that are unsteady or far from their neighbours, by the notes on the recordings.
 const ODD_TAKES: [(u8, Dynamic); 13] = [
     (69, Dynamic::Ff),
@@ -114,6 +121,22 @@ impl RecordedNote {
     pub fn is_odd_take(&self) -> bool {
         ODD_TAKES.contains(&(self.midi, self.dynamic))
     }
+}
+
+/// Plays a note for as long as a recording is measured, at [`RATE_HZ`]. The breath is constant, 0..=1 under the settings' breath curve.
+/// Allocates.
+pub fn render(model: &Arc<Model>, settings: &Settings, note: SoundingNote, breath: f32) -> Vec<f64> {
+    let rate = RATE_HZ as u32;
+    let mut clarinet = Clarinet::new(model.clone(), RATE_HZ);
+    clarinet.set_settings(settings);
+    clarinet.reset();
+    let score = Score::note(note, SECONDS, rate).blown(&BreathCurve::constant(breath), settings, rate);
+    let mut samples = Vec::with_capacity(score.samples);
+    let Ok(()) = score::play(&mut clarinet, &score, 4096, |block| {
+        samples.extend(to_f64(block));
+        Ok::<_, Infallible>(())
+    });
+    samples
 }
 
 /// Difference of each harmonic h1..h10, played less recorded, dB: each spectrum re the strongest of its own h1..h10,

@@ -1,13 +1,15 @@
 //! The noises of several voices during a tick: a lane is a voice. Each does what a [`BreathNoise`] does alone, in the same order,
 //! and gives the same bits.
 
-use super::{BreathNoise, FLOOR, Jet, UNIT, next};
+use super::{BreathNoise, FLOOR, Jet, UNIT, next, still};
 use crate::instrument::control_tick::TICK;
 
 /// See [`BreathNoise`].
 #[derive(Clone)]
 pub(in crate::instrument) struct NoiseLanes<const N: usize> {
     strength: [f64; N],
+    keep: [f64; N],
+    built: [f64; N],
     mean: [f64; N],
     quiet: [f64; N],
     whisper: [f64; N],
@@ -33,6 +35,8 @@ impl<const N: usize> NoiseLanes<N> {
         let none = [0.0; N];
         Self {
             strength: none,
+            keep: none,
+            built: none,
             mean: none,
             quiet: none,
             whisper: none,
@@ -48,6 +52,7 @@ impl<const N: usize> NoiseLanes<N> {
     /// others, which must be [turbulent](BreathNoise::is_turbulent) too.
     pub fn take(&mut self, lane: usize, noise: &mut BreathNoise, together: bool) {
         self.strength[lane] = noise.strength;
+        (self.keep[lane], self.built[lane]) = (noise.keep, noise.built);
         self.mean[lane] = noise.mean;
         self.quiet[lane] = noise.quiet;
         self.whisper[lane] = noise.whisper;
@@ -82,21 +87,31 @@ impl<const N: usize> NoiseLanes<N> {
         (self.random, self.high, self.low) = (random, smooth, [once, twice]);
     }
 
-    /// A voice takes its noise back that has been filled in together with others.
-    pub fn give_back(&self, lane: usize, noise: &mut BreathNoise) {
+    /// A voice takes its noise back, which has been filled in `together` with others or alone.
+    pub fn give_back(&self, lane: usize, noise: &mut BreathNoise, together: bool) {
+        noise.built = self.built[lane];
+        if !together {
+            return;
+        }
         noise.random = self.random[lane];
         noise.high = self.high[lane];
         noise.low = [self.low[0][lane], self.low[1][lane]];
     }
 
+    /// Numbers that have become too small to compute with are 0 again, in empty lanes too.
+    pub fn flush(&mut self) {
+        self.built = self.built.map(still);
+    }
+
     /// See [`BreathNoise::flow`].
     #[inline(always)]
-    pub fn flow(&self, jet_flow: &[f64; N], at: usize) -> [f64; N] {
+    pub fn flow(&mut self, jet_flow: &[f64; N], at: usize) -> [f64; N] {
         let mut flow = [0.0; N];
         for k in 0..N {
             let moved = (jet_flow[k] - self.mean[k]).abs() - self.quiet[k];
             let turbulent = if moved > 0.0 { moved } else { 0.0 };
-            flow[k] = (self.strength[k] * turbulent + self.whisper[k]) * self.hiss[at & (TICK - 1)][k];
+            self.built[k] = turbulent + self.keep[k] * self.built[k];
+            flow[k] = (self.strength[k] * self.built[k] + self.whisper[k]) * self.hiss[at & (TICK - 1)][k];
         }
         flow
     }

@@ -1,9 +1,10 @@
-//! One place: its ways from all sources, and the filter of the bell at its angle.
+//! One place: its ways from all sources, the filter of the bell at its angle, and presence.
 
 use super::lines::Lines;
 use crate::bore::lattice::Real;
 use crate::instrument::control_tick::TICK;
 use crate::instrument::listening::{MAX_SOURCES, Paths};
+use crate::instrument::presence::{Presence, Section};
 
 /// States below this are set to 0.
 const TINY: f64 = 1e-18;
@@ -16,6 +17,7 @@ pub(super) struct Ear<F> {
     bell: Shelf<F>,
     /// Sum of all flows in the last sample.
     last: F,
+    presence: Option<(Shelf<F>, Resonance<F>)>,
 }
 
 /// A filter of first order: `y = b0 x + b1 x' + a1 y'`.
@@ -55,16 +57,55 @@ impl<F: Real> Shelf<F> {
     }
 }
 
+/// A filter of second order: `y = b0 x + b1 x' + b2 x'' + a1 y' + a2 y''`.
+#[derive(Clone, Copy)]
+struct Resonance<F> {
+    forward: [F; 3],
+    back: [F; 2],
+    x: [F; 2],
+    y: [F; 2],
+}
+
+impl<F: Real> Resonance<F> {
+    fn new(section: Section) -> Self {
+        let nothing = [F::default(); 2];
+        Self { forward: section.forward.map(F::of), back: section.back.map(F::of), x: nothing, y: nothing }
+    }
+
+    #[inline(always)]
+    fn run(&mut self, block: &mut [F; TICK]) {
+        let ([b0, b1, b2], [a1, a2], x) = (self.forward, self.back, *block);
+        for n in 0..TICK {
+            let before = if n == 0 { self.x[0] } else { x[n - 1] };
+            let earlier = if n < 2 { self.x[1 - n] } else { x[n - 2] };
+            block[n] = b0 * x[n] + b1 * before + b2 * earlier;
+        }
+        self.x = [x[TICK - 1], x[TICK - 2]];
+        let [mut before, mut earlier] = self.y;
+        for y in block {
+            // What is known first is added first.
+            *y = *y + a2 * earlier + a1 * before;
+            (before, earlier) = (*y, before);
+        }
+        // As in a shelf.
+        let rests = before.magnitude() < F::of(TINY) && earlier.magnitude() < F::of(TINY);
+        self.y = if rests { [F::default(); 2] } else { [before, earlier] };
+    }
+}
+
 impl<F: Real> Ear<F> {
     /// Along these paths, at the internal rate, Hz. Real-time safe.
-    pub(super) fn new(paths: &Paths, lines: &Lines<F>, rate_hz: f64) -> Self {
+    pub(super) fn new(paths: &Paths, presence: Option<Presence>, lines: &Lines<F>, rate_hz: f64) -> Self {
         let mut taps = [(0, F::default()); MAX_SOURCES];
         for (number, (tap, path)) in taps.iter_mut().zip(&paths.paths).enumerate().take(lines.slots.len() + 1)
         {
             let delay = ((path.delay_s * rate_hz).round() as usize).min(lines.reach);
             *tap = ((number + 1) * lines.stride() - delay, F::of(path.gain));
         }
-        Self { taps, bell: Shelf::new(paths.bell_s, rate_hz), last: F::default() }
+        let presence = presence.map(|presence| {
+            (Shelf::new(presence.shelf_s(), rate_hz), Resonance::new(presence.bell(rate_hz)))
+        });
+        Self { taps, bell: Shelf::new(paths.bell_s, rate_hz), last: F::default(), presence }
     }
 
     /// Goes on from the flows in the lines, and with what the filter of the bell has heard in another ear, if there is one.
@@ -75,11 +116,19 @@ impl<F: Real> Ear<F> {
         (self.bell.x, self.bell.y) = other.map_or((steady, steady), |other| (other.bell.x, other.bell.y));
         let holes = lines.active[..lines.count].iter().map(|&hole| flow(self.taps[usize::from(hole)]));
         self.last = holes.fold(self.bell.y, |sum, flow| sum + flow);
+        // A steady flow is silent.
+        if let (Some(own), Some(Self { presence: Some(other), .. })) = (&mut self.presence, other) {
+            *own = *other;
+        }
     }
 
     /// Silence.
     pub(super) fn silence(&mut self) {
         (self.bell.x, self.bell.y, self.last) = (F::default(), F::default(), F::default());
+        if let Some((shelf, bell)) = &mut self.presence {
+            (shelf.x, shelf.y) = (F::default(), F::default());
+            (bell.x, bell.y) = ([F::default(); 2], [F::default(); 2]);
+        }
     }
 
     /// Adds up a tick: changes of flow.
@@ -106,6 +155,10 @@ impl<F: Real> Ear<F> {
             changes[n] = sum[n] - if n == 0 { self.last } else { sum[n - 1] };
         }
         self.last = sum[TICK - 1];
+        if let Some((shelf, bell)) = &mut self.presence {
+            shelf.run(&mut changes);
+            bell.run(&mut changes);
+        }
         changes
     }
 }

@@ -100,6 +100,7 @@ fn everywhere_sounds_as_the_power_average_of_the_transfer_matrices() {
     let matrix = TransferMatrix::new(&model.file, model.air);
     let sources = SoundSources::of(&model.file);
     let paths = Listening::everywhere(&sources, &model.air);
+    let presence = Presence::of(&sources);
     let mut flows = vec![Complex64::ZERO; sources.places_m.len()];
     let centres: Vec<f64> = (-10..=7).map(|n| 1_000.0 * (f64::from(n) / 3.0).exp2()).collect();
     let lines = |centre_hz: f64| {
@@ -123,9 +124,15 @@ fn everywhere_sounds_as_the_power_average_of_the_transfer_matrices() {
             let power = |heard: &[[Complex64; 2]]| -> f64 {
                 heard[range.clone()].iter().map(|[left, _]| left.norm_sqr()).sum()
             };
+            // What presence adds is not of the average.
+            let plain = |heard: &[[Complex64; 2]]| -> f64 {
+                let gain = |f_hz: f64| 10.0_f64.powf(0.1 * presence.gain_db(f_hz));
+                let lines = heard[range.clone()].iter().zip(lines(centre_hz));
+                lines.map(|([left, _], f_hz)| left.norm_sqr() / gain(f_hz)).sum()
+            };
             let off_db = |power: f64, from: f64| 10.0 * (power / from).log10();
-            offs.push(off_db(power(&everywhere), average));
-            path_offs.push(off_db(power(&everywhere), along_paths));
+            offs.push(off_db(plain(&everywhere), average));
+            path_offs.push(off_db(plain(&everywhere), along_paths));
             point_offs.push(off_db(power(&point), average));
         }
     }

@@ -18,7 +18,7 @@ pub enum Attack {
 
 /// Soft: the share of the dynamic that the beginning lacks, and the time constant with which it comes, s: chosen for the delays of
 /// recorded partials, see `docs/tone.md`.
-const SOFT: (f64, f64) = (0.3, 0.15);
+const SOFT: (f64, f64) = (0.3, 0.18);
 /// Hard: what the dynamic begins above, and the time until that is gone, s.
 const HARD: (f64, f64) = (0.2, 0.1);
 /// Hard: how much more quickly the tongue lets go.

@@ -17,9 +17,9 @@ const VARIANCES: [f64; 3] = [4.0, 1.0, 0.3];
 const SMOOTH_HZ: f64 = 12.0;
 /// What a unit of the sum moves: the dynamic, and the reed's resonance as a share of it. Chosen for the medians of recorded held notes, see
 /// `docs/tone.md`.
-const DYNAMIC: f64 = 0.0116;
+const DYNAMIC: f64 = 0.0111;
 /// See [`DYNAMIC`].
-const RESONANCE: f64 = 0.0148;
+const RESONANCE: f64 = 0.0152;
 /// Seed of the noise: any constant does.
 const SEED: u64 = 0x2545_F491_4F6C_DD1D;
 

@@ -1,4 +1,4 @@
-//! The lip goes from note to note: resonance and damping that it gives the reed, and the place of the note in the player's rule.
+//! The lip goes from note to note: resonance and damping that it gives the reed, and the numbers of the player's rule for the place of the note.
 //!
 //! Slurred, they move while the fingers do; a step of them is a step of the flow, which clicks. Behind the tongue they are in
 //! place at once. A difficult [`slur`](super::slur) lets the lip damp the reed for a moment.
@@ -8,13 +8,19 @@ use super::slur::LipHelp;
 /// These count as arrived when each is this near to its target, as a share of it.
 const ARRIVED: f64 = 1e-4;
 
-/// Where the lip is for a note: resonance of the reed, Hz; its damping; the place of the note.
-pub type NoteLip = [f64; 3];
+/// Where the lip is for a note: resonance of the reed, Hz; its damping; the place of the note; and what goes with the place
+/// ([`AtPlace`](super::dynamics::AtPlace)).
+pub type NoteLip = [f64; 7];
+
+/// Of these, what is added to the closing pressure between the softest and the loudest dynamic.
+const BETWEEN: usize = 3;
 
 /// The lip on its way.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LipGlide {
     now: Option<NoteLip>,
+    /// Where its closing between the dynamics goes: it gathers speed.
+    ahead: f64,
     /// Factor on the damping, and for how long yet, s; 0 or less for none.
     help: (f64, f64),
 }
@@ -26,7 +32,13 @@ impl LipGlide {
     }
 
     /// Moves towards a note by a `share` of the way in a tick of `tick_s` seconds, or is there `at_once`, without any help. Real-time safe.
-    pub fn tick(&mut self, mut target: NoteLip, at_once: bool, share: f64, tick_s: f64) -> NoteLip {
+    pub fn tick(
+        &mut self,
+        mut target: NoteLip,
+        at_once: bool,
+        (share, slow): (f64, f64),
+        tick_s: f64,
+    ) -> NoteLip {
         let (damping, left_s) = self.help;
         if left_s > 0.0 {
             self.help.1 = if at_once { 0.0 } else { left_s - tick_s };
@@ -36,13 +48,21 @@ impl LipGlide {
             Some(now) if !at_once && now != target => {
                 let mut next = now;
                 let mut arrived = true;
-                for (next, target) in next.iter_mut().zip(target) {
-                    *next += (target - *next) * share;
+                for (n, (next, target)) in next.iter_mut().zip(target).enumerate() {
+                    if n == BETWEEN {
+                        self.ahead += (target - self.ahead) * slow;
+                        *next += (self.ahead - *next) * slow;
+                    } else {
+                        *next += (target - *next) * share;
+                    }
                     arrived &= (target - *next).abs() <= ARRIVED * target.abs().max(1.0);
                 }
                 if arrived { target } else { next }
             }
-            _ => target,
+            _ => {
+                self.ahead = target[BETWEEN];
+                target
+            }
         };
         self.now = Some(now);
         now
@@ -56,17 +76,21 @@ mod tests {
     #[test]
     fn help_damps_the_reed_for_a_while_and_then_leaves_it_as_it_was() {
         const TICK_S: f64 = 1.0 / 6_000.0;
-        let target: NoteLip = [1_500.0, 0.8, -0.5];
+        let target: NoteLip = [1_500.0, 0.8, -0.5, -0.1, -1.3, 0.1, 0.0];
         let mut lip = LipGlide::default();
-        assert_eq!(lip.tick(target, true, 0.05, TICK_S), target);
+        assert_eq!(lip.tick(target, true, (0.05, 0.05), TICK_S), target);
         lip.help(LipHelp { damping: 1.5, length_s: 0.02 });
-        let helped: Vec<f64> = (0..600).map(|_| lip.tick(target, false, 0.05, TICK_S)[1]).collect();
+        let helped: Vec<f64> = (0..600).map(|_| lip.tick(target, false, (0.05, 0.05), TICK_S)[1]).collect();
         let most = helped.iter().copied().fold(0.0, f64::max);
         assert!((1.19..=1.2).contains(&most), "{most}");
         assert!(helped[119] > 1.19 && helped[123] < helped[119], "20 ms");
         assert_eq!(helped[599], 0.8);
         lip.help(LipHelp { damping: 1.5, length_s: 0.02 });
-        assert_eq!(lip.tick(target, true, 0.05, TICK_S), target, "behind the tongue there is no slur");
-        assert_eq!(lip.tick(target, false, 0.05, TICK_S), target);
+        assert_eq!(
+            lip.tick(target, true, (0.05, 0.05), TICK_S),
+            target,
+            "behind the tongue there is no slur"
+        );
+        assert_eq!(lip.tick(target, false, (0.05, 0.05), TICK_S), target);
     }
 }

@@ -1,7 +1,7 @@
 //! What settings, fingering and bend amount to: reed, delay and clock of the note, and how fast they are reached.
 
 use super::breath::{BREATH_END_S, BREATH_FOLLOW_S, BREATH_RISE_S};
-use super::dynamics::{LipShape, PlayerModel};
+use super::dynamics::{AtPlace, LipShape, PlacedRule, PlayerModel};
 use super::ear;
 use super::level_keeper::KeeperLags;
 use super::life::LifeLags;
@@ -21,6 +21,9 @@ use crate::reed::physical::ZETA_REFERENCE;
 use crate::reed::{MovingReed, ReedCoeffs, ReedLaw};
 use crate::units::{Air, cents};
 
+/// Each of two time constants with which the lip goes to the closing pressure that a note has between the softest and the loudest dynamic, s: in
+/// steps of a control tick a quicker one would click (measured on slurs to and from throat notes).
+const SHAPE_S: f64 = 0.01;
 /// Time constant of the lip from note to note over the time of the fingers.
 const LIP_SHARE: f64 = 0.4;
 
@@ -52,6 +55,9 @@ pub struct Posture {
     /// How much the lip covers the reed, 0..=1.
     subtone: f64,
     rate_hz: f64,
+    /// Place of the note, and what goes with it. A lip whose breath is physical keeps them for one that is played.
+    place: f64,
+    at: AtPlace,
     /// What a player needs; `None` where the breath is physical.
     played: Option<Played>,
 }
@@ -61,6 +67,8 @@ pub struct Posture {
 struct Played {
     rule: PlayerModel,
     place: f64,
+    /// The rule where the lip is, which goes from note to note.
+    placed: PlacedRule,
     note: PlayedNote,
     /// What these settings add to the mouth over closing pressure, at dynamics 0 and 1.
     shift: (f64, f64),
@@ -98,6 +106,8 @@ pub struct Lags {
     pub lip: f64,
     /// The lip from note to note.
     pub fingers: f64,
+    /// What the lip does for the place of a note.
+    pub shape: f64,
     /// The ear.
     pub ear: f64,
     /// The vocal tract.
@@ -118,6 +128,7 @@ impl Lags {
             breath_follow: step(BREATH_FOLLOW_S),
             breath_end: step(BREATH_END_S),
             lip: step(LIP_S),
+            shape: step(SHAPE_S),
             fingers: step(LIP_SHARE * 1e-3 * f64::from(settings.legato_ms)),
             ear: ear::share(tick_s, lowest_hz),
             tract: step(voicing::MOVE_S),
@@ -161,6 +172,7 @@ impl Posture {
         let response = settings.breath_response;
         let split = BendSplit::new(offset, bend::lip_limit_cents(model, fingering, offset, response));
         let rate_hz = model.coeffs.rate_hz;
+        let place = model.place(fingering);
         let played = match response {
             BreathResponse::Physical => None,
             BreathResponse::Played => Some(Played::new(settings, &free, lip, subtone, fingering, model)),
@@ -179,6 +191,8 @@ impl Posture {
             free,
             subtone,
             rate_hz,
+            place,
+            at: model.player.at(place).at,
             played,
         };
         posture.shape_lip(0.0, posture.note_lip());
@@ -199,10 +213,15 @@ impl Posture {
         (rows, split.bore_cents)
     }
 
+    /// Closing pressure to which the lip goes for this note, over that which it gives now.
+    pub fn closing_ahead(&self) -> f64 {
+        self.played.as_ref().map_or(1.0, |played| played.placed.closing_ahead(&self.at, played.lip))
+    }
+
     /// Where the lip goes for this note.
     pub fn note_lip(&self) -> NoteLip {
-        let place = self.played.as_ref().map_or(0.0, |played| played.place);
-        [self.free.resonance_hz, self.free.damping, place]
+        let [between, zeta, growth, altissimo] = self.at;
+        [self.free.resonance_hz, self.free.damping, self.place, between, zeta, growth, altissimo]
     }
 
     /// Gives the reed the lip of a dynamic, 0..=1, on its way to the note; nothing where the breath is physical.
@@ -213,9 +232,10 @@ impl Posture {
         }
         (played.lip, played.note_lip) = (dynamic, note_lip);
         played.rows = played.note.rows(dynamic);
-        let [resonance_hz, damping, place] = note_lip;
+        let [resonance_hz, damping, _, at @ ..] = note_lip;
         let free = MovingReed { resonance_hz, damping, ..self.free };
-        let reed = shaped(&free, self.subtone, &played.rule, place, dynamic);
+        played.placed.at = at;
+        let reed = shaped(&free, self.subtone, &played.placed, dynamic);
         self.closing = reed.law.closing();
         self.reed = ReedCoeffs::new(reed, self.rate_hz);
     }
@@ -250,8 +270,8 @@ impl Posture {
 }
 
 /// A reed under the lip of a dynamic. A lip that covers the reed holds it to the curve of the lay, however far it opens.
-fn shaped(free: &MovingReed, subtone: f64, rule: &PlayerModel, place: f64, dynamic: f64) -> MovingReed {
-    let lip = rule.lip(place, dynamic);
+fn shaped(free: &MovingReed, subtone: f64, rule: &PlacedRule, dynamic: f64) -> MovingReed {
+    let lip = rule.lip(dynamic);
     let knee = if subtone == 0.0 { lip.knee } else { lip.knee.powf(1.0 - subtone) };
     MovingReed { law: lip.law(free.law), zeta: free.zeta * lip.channel, lay: free.lay * knee, ..*free }
 }
@@ -266,6 +286,7 @@ impl Played {
         model: &Model,
     ) -> Self {
         let (rule, place) = (model.player, model.place(fingering));
+        let placed = rule.at(place);
         let note = model.tuning.notes.get(fingering).map_or_else(PlayedNote::default, |note| note.played);
         // The reed that the note was played with.
         let reference = Settings::default();
@@ -287,17 +308,18 @@ impl Played {
                 return 0.0;
             }
             let [own, known] = [(free, subtone), (&known, 0.0)]
-                .map(|(reed, subtone)| reed_at_note(&shaped(reed, subtone, &rule, place, dynamic), note_hz));
+                .map(|(reed, subtone)| reed_at_note(&shaped(reed, subtone, &placed, dynamic), note_hz));
             own.shift_from(&known, note.onset)
         };
         Self {
             rule,
             place,
+            placed,
             note,
             shift: (shift(0.0), shift(1.0)),
             lip: f64::NAN,
             rows: 0.0,
-            note_lip: [0.0; 3],
+            note_lip: NoteLip::default(),
             asked: (f64::NAN, PlayedBreath::default()),
         }
     }

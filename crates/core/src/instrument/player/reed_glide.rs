@@ -1,9 +1,8 @@
 //! New settings of lip, reed and register vent, reached in a little time, as a player's lip moves: at once they would click.
 //!
-//! A step of the reed's law is a step of the flow, and what is heard of a flow is its slope. While nothing sounds, new
-//! settings hold at once.
+//! A step of the reed's law is a step of the flow, and what is heard of a flow is its slope: the numbers gather speed. While nothing
+//! sounds, new settings hold at once.
 
-use super::response::LIP_S;
 use super::step_towards;
 use crate::instrument::settings::Settings;
 use crate::reed::law::coupled_k;
@@ -14,12 +13,21 @@ const NUMBERS: usize = 9;
 /// [`SMALL`], as a sharp lay's 0, count as that.
 const ARRIVED: f32 = 1e-4;
 const SMALL: f32 = 0.1;
+/// Each of two time constants, s: 99 % of the way in 37 ms.
+const MOVE_S: f64 = 0.0055;
 
 /// The numbers on their way to those of the [`Settings`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ReedGlide {
     /// `None` once they have arrived.
-    under_way: Option<[f32; NUMBERS]>,
+    under_way: Option<Way>,
+}
+
+/// Where the numbers are, and what they follow, which goes ahead.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Way {
+    now: [f32; NUMBERS],
+    ahead: [f32; NUMBERS],
 }
 
 /// The numbers of settings; k as it is played.
@@ -32,8 +40,9 @@ fn numbers(settings: &Settings) -> [f32; NUMBERS] {
 impl ReedGlide {
     /// The settings change from `old` to `new` while something sounds.
     pub fn begin(&mut self, old: &Settings, new: &Settings) {
-        let now = self.under_way.unwrap_or_else(|| numbers(old));
-        self.under_way = (now != numbers(new)).then_some(now);
+        let way = self.under_way.unwrap_or_else(|| Way { now: numbers(old), ahead: numbers(old) });
+        let arrived = Way { now: numbers(new), ahead: numbers(new) };
+        self.under_way = (way != arrived).then_some(way);
     }
 
     /// Nothing sounds: all numbers are where they should be.
@@ -41,14 +50,16 @@ impl ReedGlide {
         self.under_way = None;
     }
 
-    /// Moves the numbers, as fast as a player's lip; whether they have changed.
+    /// Moves the numbers; whether they have changed.
     pub fn tick(&mut self, target: &Settings, tick_s: f64) -> bool {
-        let Some(now) = &mut self.under_way else { return false };
-        let share = step_towards(tick_s, LIP_S) as f32;
+        let Some(Way { now, ahead }) = &mut self.under_way else { return false };
+        let share = step_towards(tick_s, MOVE_S) as f32;
         let mut has_arrived = true;
-        for (now, target) in now.iter_mut().zip(numbers(target)) {
-            *now += (target - *now) * share;
-            has_arrived &= (*now - target).abs() <= ARRIVED * target.abs().max(SMALL);
+        for ((now, ahead), target) in now.iter_mut().zip(ahead).zip(numbers(target)) {
+            *ahead += (target - *ahead) * share;
+            *now += (*ahead - *now) * share;
+            let far = ARRIVED * target.abs().max(SMALL);
+            has_arrived &= (*now - target).abs() <= far && (*ahead - target).abs() <= far;
         }
         if has_arrived {
             self.under_way = None;
@@ -58,10 +69,8 @@ impl ReedGlide {
 
     /// The settings with the reed as it is now.
     pub fn over(&self, settings: Settings) -> Settings {
-        let Some([strength, lip, zeta, damping, lay, reed_h, reed_k, reed_a, vent_loss]) = self.under_way
-        else {
-            return settings;
-        };
+        let Some(Way { now, .. }) = self.under_way else { return settings };
+        let [strength, lip, zeta, damping, lay, reed_h, reed_k, reed_a, vent_loss] = now;
         let coupled = false;
         Settings { strength, lip, zeta, damping, lay, reed_h, reed_k, coupled, reed_a, vent_loss, ..settings }
     }

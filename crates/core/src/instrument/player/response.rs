@@ -10,7 +10,7 @@ use super::breath::Asked;
 use super::dynamics::LOWEST_ONSET;
 use super::ear::Ear;
 use super::lip_glide::NoteLip;
-use super::posture::Posture;
+use super::posture::{PlayedBreath, Posture};
 use super::sway::Sway;
 use crate::instrument::settings::{BreathResponse, Settings};
 use crate::reed::physical::P_REF_PA;
@@ -27,9 +27,12 @@ const VELOCITY_DYNAMIC: (f64, f64) = (0.15, 1.0);
 pub const LIP_S: f64 = 0.01;
 /// How much more slowly the tongue lets go at dynamic 0 than at 1, as a factor less 1: the release is then as loud as the note
 /// (measured).
-const SOFT_RELEASE: f64 = 3.0;
+const SOFT_RELEASE: f64 = 2.0;
 /// The lip stays where it is for a smaller change of the dynamic: 0.003 dB.
 const STILL: f64 = 1e-4;
+
+/// No amplitude that is expected is below this, over the closing pressure.
+const QUIETEST: f64 = 1e-6;
 
 /// What a player's body does beside what is asked.
 pub struct Bodily<'a> {
@@ -50,6 +53,8 @@ pub struct Bodily<'a> {
 pub struct Response {
     /// Dynamic of lip and trim, 0..=1; `None` before the first note.
     lip: Option<f64>,
+    /// Logarithm of the amplitude that the player expects to hear.
+    expected: f64,
 }
 
 /// Breath, 0..=1, that a dynamic of 0..=1 asks for, with a curve of 1.
@@ -112,7 +117,7 @@ impl Response {
         settings: &Settings,
         posture: &mut Posture,
     ) -> f64 {
-        let (wanted, share) = match asked {
+        let (wanted, of_softest) = match asked {
             // The lip stays while the breath ends.
             Asked::Nothing => (self.lip.unwrap_or(0.0), 0.0),
             Asked::Level(level) => dynamic(level, settings),
@@ -128,12 +133,21 @@ impl Response {
         };
         let lip = if (lip - wanted).abs() < STILL { wanted } else { lip };
         self.lip = Some(lip);
-        let [resonance_hz, damping, place] = bodily.note_lip;
-        let note_lip = [resonance_hz * (1.0 + bodily.sway.resonance), damping, place];
+        let mut note_lip = bodily.note_lip;
+        let [_, _, place, ..] = note_lip;
+        note_lip[0] *= 1.0 + bodily.sway.resonance;
         posture.shape_lip(bodily.sway.of(lip), note_lip);
         let breath = posture.played_breath(bodily.sway.of(wanted));
+        // The lip is on its way, and the mouth pressure is half the way ahead of it, in logarithms: with that of the new note at once, a slur
+        // to a firmer lip would be loud on the way; with the old note's, one to a looser lip would.
+        let ahead = posture.closing_ahead().sqrt();
+        // What a change does is heard as late as everything else.
+        let amplitude = (ahead * breath.amplitude).max(QUIETEST).ln();
+        let heard = if bodily.settles { 1.0 } else { posture.lags.ear };
+        self.expected += (amplitude - self.expected) * heard;
+        let breath = PlayedBreath { gamma: ahead * breath.gamma, amplitude: self.expected.exp() };
         match ear {
-            _ if share < 1.0 => share * LOWEST_ONSET,
+            _ if of_softest < 1.0 => of_softest * LOWEST_ONSET,
             Some(ear) => ear.pushed(breath.gamma, breath.amplitude, place),
             None => breath.gamma,
         }

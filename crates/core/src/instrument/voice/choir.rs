@@ -175,9 +175,7 @@ impl<const N: usize> Choir<N> {
         for (lane, voice) in voices.iter_mut().enumerate() {
             let Some(voice) = voice else { continue };
             voice.mouth.state = self.mouths.reeds.state(lane);
-            if hiss_together {
-                self.mouths.noise.give_back(lane, &mut voice.mouth.noise);
-            }
+            self.mouths.noise.give_back(lane, &mut voice.mouth.noise, hiss_together);
             self.bores.end(lane, &mut voice.lattice);
             flushed[lane] = voice.ticks.wrapping_add(1).is_multiple_of(FLUSH_TICKS);
             playing[lane] = true;
@@ -185,6 +183,7 @@ impl<const N: usize> Choir<N> {
         }
         if any {
             self.bores.flush(flushed, playing);
+            self.mouths.noise.flush();
         }
     }
 
