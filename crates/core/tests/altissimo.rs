@@ -97,10 +97,10 @@ fn the_highest_notes_speak_in_tune_on_the_b_flat_clarinet() {
     assert!(off_cents < 4.0 && begins_s < 0.25, "{off_cents} cents, {begins_s} s");
 }
 
-/// On the small clarinet at 48 kHz C7 begins after 0.9 s, and so does B6 at full breath.
+/// On the small clarinet at 48 kHz C7 begins after 0.9 s at three quarters of the breath, and at full breath sounds in another register.
 #[test]
 fn the_highest_notes_speak_in_tune_on_the_other_clarinets() {
-    let late = [(48_000.0, 95, 1.0), (48_000.0, 96, 0.75), (48_000.0, 96, 0.9), (48_000.0, 96, 1.0)];
+    let late = [(48_000.0, 96, 0.75), (48_000.0, 96, 1.0)];
     for instrument in [Bundled::A, Bundled::EFlat, Bundled::C, Bundled::Bass] {
         let left_out = if instrument == Bundled::EFlat { late.as_slice() } else { &[] };
         let (off_cents, begins_s) = worst(instrument, left_out);

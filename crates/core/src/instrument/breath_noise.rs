@@ -28,7 +28,7 @@ const STEADY_NOISE: f64 = 0.018;
 /// Steady: corners of the band, Hz; turbulence in the channel is broad around a few kHz (by judgement).
 const STEADY_BAND_HZ: (f64, f64) = (600.0, 5_000.0);
 /// Pulsed: noise flow at amount 1 over the flow that it rides on, for turbulence of rms 1 before its band. At the default
-/// amount of 0.3, held notes have the noise of recorded ones at mezzo-forte, within 4 dB in five bands from 0.3 to 15 kHz.
+/// amount of 0.3, held notes have the noise of recorded ones at mezzo-forte, within 4.5 dB in five bands from 0.3 to 15 kHz.
 const PULSED_NOISE: f64 = 0.88;
 /// Pulsed: the band, Hz. Above the low corner turbulence falls with 12 dB an octave down to a floor, which ends at the high one.
 const PULSED_BAND_HZ: (f64, f64) = (600.0, 12_000.0);

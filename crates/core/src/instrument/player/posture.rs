@@ -1,7 +1,7 @@
 //! What settings, fingering and bend amount to: reed, delay and clock of the note, and how fast they are reached.
 
 use super::breath::{BREATH_END_S, BREATH_FOLLOW_S, BREATH_RISE_S};
-use super::dynamics::{AtPlace, LipShape, PlacedRule, PlayerModel};
+use super::dynamics::{AtPlace, LipShape, PlacedRule};
 use super::ear;
 use super::level_keeper::KeeperLags;
 use super::life::LifeLags;
@@ -65,8 +65,6 @@ pub struct Posture {
 /// What the player's rule needs of a note.
 #[derive(Clone, Copy, Debug)]
 struct Played {
-    rule: PlayerModel,
-    place: f64,
     /// The rule where the lip is, which goes from note to note.
     placed: PlacedRule,
     note: PlayedNote,
@@ -173,9 +171,12 @@ impl Posture {
         let split = BendSplit::new(offset, bend::lip_limit_cents(model, fingering, offset, response));
         let rate_hz = model.coeffs.rate_hz;
         let place = model.place(fingering);
+        let placed = model.player.at(place);
         let played = match response {
             BreathResponse::Physical => None,
-            BreathResponse::Played => Some(Played::new(settings, &free, lip, subtone, fingering, model)),
+            BreathResponse::Played => {
+                Some(Played::new(settings, &free, lip, subtone, (fingering, placed), model))
+            }
         };
         let mut posture = Self {
             closing: free.law.closing(),
@@ -192,7 +193,7 @@ impl Posture {
             subtone,
             rate_hz,
             place,
-            at: model.player.at(place).at,
+            at: placed.at,
             played,
         };
         posture.shape_lip(0.0, posture.note_lip());
@@ -247,9 +248,11 @@ impl Posture {
         }
     }
 
-    /// How the lip shapes the reed now; `None` where the breath is physical.
+    /// How the lip shapes the reed at this dynamic, once it has arrived at the note; `None` where the breath is physical.
     pub fn lip(&self) -> Option<LipShape> {
-        self.played.as_ref().map(|played| played.rule.lip(played.place, played.lip))
+        let Played { mut placed, lip, .. } = self.played?;
+        placed.at = self.at;
+        Some(placed.lip(lip))
     }
 
     /// What a dynamic, 0..=1, asks of the breath; nothing where the breath is physical.
@@ -282,11 +285,9 @@ impl Played {
         free: &MovingReed,
         lip: Embouchure,
         subtone: f64,
-        fingering: usize,
+        (fingering, placed): (usize, PlacedRule),
         model: &Model,
     ) -> Self {
-        let (rule, place) = (model.player, model.place(fingering));
-        let placed = rule.at(place);
         let note = model.tuning.notes.get(fingering).map_or_else(PlayedNote::default, |note| note.played);
         // The reed that the note was played with.
         let reference = Settings::default();
@@ -312,8 +313,6 @@ impl Played {
             own.shift_from(&known, note.onset)
         };
         Self {
-            rule,
-            place,
             placed,
             note,
             shift: (shift(0.0), shift(1.0)),
