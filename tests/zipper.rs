@@ -25,7 +25,7 @@ const BEFORE_S: f64 = 1.0;
 /// What a sweep may leave between the harmonics, dB under all.
 const LEAST_DB: f64 = -75.0;
 /// What the steps of a controller may add to a sweep that is itself above that, dB.
-const MORE_DB: f64 = 3.0;
+const MORE_DB: f64 = 4.0;
 
 /// Something continuous, and the event of a share 0..=1 of its way.
 struct Swept {

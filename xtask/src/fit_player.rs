@@ -65,9 +65,9 @@ const SHORT_COST: f64 = 2.0;
 const LOUD: [f64; 3] = [0.7, 0.82, 0.92];
 /// The bell around the throat is no narrower than this, three semitones on a B flat clarinet: it is to be a register, not a note.
 const NARROWEST: f64 = 0.15;
-/// Least that the throat adds to the logarithm of the closing pressure: a lip that closes further has to open and close in every slur
-/// from and to the throat, which is heard.
-const THROAT: f64 = 0.4;
+/// Most that the throat may add to the logarithm of the closing pressure, either way: a lip that closes further has to open and close in every
+/// slur from and to the throat, which is heard.
+const THROAT: f64 = 0.8;
 /// Most that shelf and bell lift or cut, dB, and the highest quality of the bell: a colour, not a tone of its own.
 const SHELF_DB: f64 = 7.0;
 const BELL_DB: f64 = 6.0;

@@ -238,24 +238,25 @@ fn is_in_register(samples: &[f64], written: u8) -> bool {
 }
 
 #[test]
-fn ten_tongued_notes_a_second_keep_their_register() {
-    let notes: Vec<u8> = NOTES.step_by(2).collect();
-    let wrong = each(notes.len() * 3, |n| {
-        let (note, value) = (notes[n / 3], [8, 76, 120][n % 3]);
-        let mut events = vec![controller(value)];
-        (0..6).for_each(|k| {
-            events.extend([key(0.1 * f64::from(k), note), release(0.1 * f64::from(k) + 0.06, note)])
+fn tongued_notes_keep_their_register() {
+    let notes: Vec<u8> = NOTES.collect();
+    // From note to note, and how long each is, s: ten a second, and with little time between them.
+    for (period_s, length_s) in [(0.1, 0.06), (0.12, 0.09)] {
+        let wrong = each(notes.len() * 3, |n| {
+            let (note, value) = (notes[n / 3], [8, 76, 120][n % 3]);
+            let begin_s = |k: u8| period_s * f64::from(k);
+            let events = (0..6).flat_map(|k| [key(begin_s(k), note), release(begin_s(k) + length_s, note)]);
+            let events: Vec<_> = std::iter::once(controller(value)).chain(events).collect();
+            let out = rendered(&Settings::default(), &events, 0.8);
+            let speaks = |k: &u8| {
+                let (begin, end) = (begin_s(*k) + 0.02, begin_s(*k) + length_s + 0.008);
+                is_in_register(&out[sample(begin)..sample(end)], note)
+            };
+            (note, value, (0..6).filter(|k| !speaks(k)).count())
         });
-        let out = rendered(&Settings::default(), &events, 0.7);
-        let speaks = |k: i32| {
-            is_in_register(&out[sample(0.1 * f64::from(k) + 0.02)..sample(0.1 * f64::from(k) + 0.068)], note)
-        };
-        (note, value, (0..6).filter(|&k| !speaks(k)).count())
-    });
-    let wrong: Vec<_> = wrong.into_iter().filter(|(_, _, wrong)| *wrong > 0).collect();
-    println!("{wrong:?}");
-    // One of 306 fails, and the wander decides which: at one value of its amount a loud F#3, at another a soft D5.
-    assert!(wrong.iter().map(|(_, _, wrong)| wrong).sum::<usize>() <= 1, "{wrong:?}");
+        let wrong: Vec<_> = wrong.into_iter().filter(|(_, _, wrong)| *wrong > 0).collect();
+        assert!(wrong.is_empty(), "{period_s} s: {wrong:?}");
+    }
 }
 
 /// What a slur is like.
@@ -373,7 +374,7 @@ fn assert_smooth(slurs: &[Slurred]) {
     let clicks_db = [0.5, 0.9].map(|share| quantile(slurs.iter().map(|s| s.click_db), share));
     println!("octaves: hole {hole_db:.1} dB, back {back_ms:.0} ms; clicks {clicks_db:.1?} dB");
     assert!(hole_db <= 10.2 && back_ms <= 45.0);
-    assert!(quantile(slurs.iter().map(|s| s.bump_db), 0.99) <= 2.0);
+    assert!(slurs.iter().all(|s| s.bump_db <= 2.0));
     assert!(clicks_db[0] <= 1.0 && clicks_db[1] <= 3.0);
 }
 

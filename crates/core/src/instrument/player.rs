@@ -30,6 +30,7 @@ mod posture;
 mod reed_glide;
 mod reed_smoothing;
 pub mod response;
+mod retongued;
 mod slur;
 mod sway;
 mod technique;
@@ -317,6 +318,7 @@ impl Player {
         if !slurred {
             self.prepare();
             self.swing.begin_note();
+            self.lip_glide.help(retongued::lip_help(self.ear.amplitude(), model.place(fingering)));
         }
         self.finger(fingering, slurred, model, voice);
         let slap = self.settings.articulation.slap;
@@ -421,9 +423,7 @@ impl Player {
         match (slur, self.settings.breath_response) {
             (Some(slur), BreathResponse::Played) => {
                 let gamma = self.breath.gamma();
-                if let Some(help) = slur.lip_help(gamma) {
-                    self.lip_glide.help(help);
-                }
+                self.lip_glide.help(slur.lip_help(gamma));
                 let ticks = self.legato_ticks(model);
                 self.ear.begin(slur.is_within_a_register());
                 self.fingers.walk_to(fingering, ticks, slur.walk(gamma), model, voice.lattice_mut());

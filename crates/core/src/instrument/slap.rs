@@ -67,6 +67,7 @@ mod tests {
     use crate::analysis::spectrum::power_spectrum_db;
     use crate::bore::transfer_matrix::TransferMatrix;
     use crate::event::Event;
+    use crate::instrument::listening::Listening;
     use crate::instrument::{Clarinet, Model, Settings};
     use crate::units::WrittenNote;
 
@@ -131,12 +132,14 @@ mod tests {
     }
 
     /// The loudest within a quarter of each of the first three resonances is that resonance, of the bore with a rigid end:
-    /// the reed is shut.
+    /// the reed is shut. Heard in one point, because presence lifts what lies above the third.
     #[test]
     fn slap_rings_at_the_resonances_of_the_fingering() {
         let matrices = TransferMatrix::new(&MODEL.file, MODEL.air);
         for written in [52, 55, 58, 62] {
-            let out = slap(&mut fingered(written), 0.6, 0.5);
+            let mut clarinet = fingered(written);
+            clarinet.set_settings(&Settings { listening: Listening::point(), ..Settings::default() });
+            let out = slap(&mut clarinet, 0.6, 0.5);
             let ringing: Vec<f64> = out[480..].iter().map(|&sample| f64::from(sample)).collect();
             let spectrum = power_spectrum_db(&[vec![0.0; ringing.len()], ringing].concat(), RATE_HZ);
             let highest = |low_hz: f64, high_hz: f64| {

@@ -7,15 +7,15 @@ use crate::instrument::presence::Presence;
 /// CC BY 4.0).
 pub const FITTED: PlayerModel = PlayerModel {
     range_db: 27.0,
-    loudest_gamma: [0.7881, 0.0176, 0.0980],
-    zeta: [-1.3822, 0.1249, 0.1217, -0.4148],
-    closing: [0.7300, 2.1077],
-    closing_between: [-0.3419, -0.1758],
-    throat: [-0.4000, -0.4509, 0.1500],
+    loudest_gamma: [0.7339, -0.0023, 0.1369],
+    zeta: [-1.3712, 0.1271, 0.0917, -0.4063],
+    closing: [0.7300, 2.2620],
+    closing_between: [-0.4029, -0.3020],
+    throat: [-0.7533, -0.3863, 0.1500],
     altissimo_zeta: 0.22,
     knee: 0.725,
 };
 
 /// Fitted with it.
 pub const PRESENCE: Presence =
-    Presence { shelf_hz: 2773.0, shelf_db: 7.000, bell_hz: 1414.0, bell_db: 4.577, bell_quality: 2.087 };
+    Presence { shelf_hz: 2759.4, shelf_db: 7.000, bell_hz: 1525.2, bell_db: 4.573, bell_quality: 2.242 };

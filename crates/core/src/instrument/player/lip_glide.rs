@@ -1,7 +1,7 @@
 //! The lip goes from note to note: resonance and damping that it gives the reed, and the numbers of the player's rule for the place of the note.
 //!
 //! Slurred, they move while the fingers do; a step of them is a step of the flow, which clicks. Behind the tongue they are in
-//! place at once. A difficult [`slur`](super::slur) lets the lip damp the reed for a moment.
+//! place at once. A difficult [`slur`](super::slur), and a note that the tongue begins again while it still rings, let the lip damp the reed for a moment.
 
 use super::slur::LipHelp;
 
@@ -26,12 +26,12 @@ pub struct LipGlide {
 }
 
 impl LipGlide {
-    /// The lip helps a slur.
-    pub fn help(&mut self, help: LipHelp) {
-        self.help = (help.damping, help.length_s);
+    /// The lip helps a slur, or a note behind the tongue from now until so long after the tongue; `None` ends any help.
+    pub fn help(&mut self, help: Option<LipHelp>) {
+        self.help = help.map_or((1.0, 0.0), |help| (help.damping, help.length_s));
     }
 
-    /// Moves towards a note by a `share` of the way in a tick of `tick_s` seconds, or is there `at_once`, without any help. Real-time safe.
+    /// Moves towards a note by a `share` of the way in a tick of `tick_s` seconds, or is there `at_once`. Real-time safe.
     pub fn tick(
         &mut self,
         mut target: NoteLip,
@@ -41,8 +41,10 @@ impl LipGlide {
     ) -> NoteLip {
         let (damping, left_s) = self.help;
         if left_s > 0.0 {
-            self.help.1 = if at_once { 0.0 } else { left_s - tick_s };
-            target[1] *= if at_once { 1.0 } else { damping };
+            if !at_once {
+                self.help.1 = left_s - tick_s;
+            }
+            target[1] *= damping;
         }
         let now = match self.now {
             Some(now) if !at_once && now != target => {
@@ -79,18 +81,20 @@ mod tests {
         let target: NoteLip = [1_500.0, 0.8, -0.5, -0.1, -1.3, 0.1, 0.0];
         let mut lip = LipGlide::default();
         assert_eq!(lip.tick(target, true, (0.05, 0.05), TICK_S), target);
-        lip.help(LipHelp { damping: 1.5, length_s: 0.02 });
+        lip.help(Some(LipHelp { damping: 1.5, length_s: 0.02 }));
         let helped: Vec<f64> = (0..600).map(|_| lip.tick(target, false, (0.05, 0.05), TICK_S)[1]).collect();
         let most = helped.iter().copied().fold(0.0, f64::max);
         assert!((1.19..=1.2).contains(&most), "{most}");
         assert!(helped[119] > 1.19 && helped[123] < helped[119], "20 ms");
         assert_eq!(helped[599], 0.8);
-        lip.help(LipHelp { damping: 1.5, length_s: 0.02 });
+        lip.help(Some(LipHelp { damping: 1.5, length_s: 0.02 }));
+        (0..600).for_each(|_| assert_eq!(lip.tick(target, true, (0.05, 0.05), TICK_S)[1], 0.8 * 1.5));
         assert_eq!(
-            lip.tick(target, true, (0.05, 0.05), TICK_S),
-            target,
-            "behind the tongue there is no slur"
+            lip.tick(target, false, (0.05, 0.05), TICK_S)[1],
+            0.8 * 1.5,
+            "it lasts until after the tongue"
         );
-        assert_eq!(lip.tick(target, false, (0.05, 0.05), TICK_S), target);
+        lip.help(None);
+        assert_eq!(lip.tick(target, true, (0.05, 0.05), TICK_S), target);
     }
 }
