@@ -3,8 +3,6 @@
 //! Slurred, they move while the fingers do; a step of them is a step of the flow, which clicks. Behind the tongue they are in
 //! place at once. A difficult [`slur`](super::slur), and a note that the tongue begins again while it still rings, let the lip damp the reed for a moment.
 
-use super::slur::LipHelp;
-
 /// These count as arrived when each is this near to its target, as a share of it.
 const ARRIVED: f64 = 1e-4;
 
@@ -14,6 +12,15 @@ pub type NoteLip = [f64; 7];
 
 /// Of these, what is added to the closing pressure between the softest and the loudest dynamic.
 const BETWEEN: usize = 3;
+
+/// The lip damps the reed for a moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LipHelp {
+    /// Factor on the damping of the reed.
+    pub damping: f64,
+    /// For how long, s.
+    pub length_s: f64,
+}
 
 /// The lip on its way.
 #[derive(Clone, Copy, Debug, Default)]

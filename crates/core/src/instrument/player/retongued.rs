@@ -4,7 +4,8 @@
 //! and leave the lead to the second, which a beating reed holds as well. So the lip damps the reed while it begins, which
 //! weakens the second mode more than the first, as in a difficult [`slur`](super::slur).
 
-use super::slur::{LOW_PLACE, LipHelp};
+use super::lip_glide::LipHelp;
+use super::slur::LOW_PLACE;
 
 /// Amplitude in the mouthpiece above which the air column rings, rms over the closing pressure.
 const RINGS: f64 = 0.01;

@@ -9,20 +9,23 @@
 //! little. Meanwhile the lip damps the reed a little more, which weakens the second mode more than the first. The breath goes on: a dip of
 //! it did the same, but left a hole of 30 dB. Softer, or into the throat, the same order of the fingers would only make a bump.
 
+use super::lip_glide::LipHelp;
+
 /// Notes below this place of the compass (between written D#4 and E4 of a B flat clarinet) hold on to their second mode.
 pub(super) const LOW_PLACE: f64 = -0.43;
 /// Slurs down over at least so many cents from clarion to low chalumeau.
 const LEAP_CENTS: f64 = 650.0;
-/// Wide ones, cents.
-const WIDE_CENTS: f64 = 950.0;
-/// The least mouth over closing pressure at which a wide slur and any other needs help: where the reed beats. Measured: at 0.47 a slur from
-/// written B4 to B3 is lost at CC 58; with help from 0.45 on, slurs of 8 and 9 semitones are up to 3.5 dB louder on the way than either note.
-const BEATING: [f64; 2] = [0.45, 0.5];
+/// The least mouth over closing pressure at which a slur needs help: where the reed beats. Measured: at 0.47 a slur from written B4 to B3 is
+/// lost at CC 58.
+const BEATING: f64 = 0.45;
+/// The same for slurs of less than so many cents. Measured: with help from 0.45 on, those of 8 and 9 semitones are up to 3.5 dB louder on the way
+/// than either note.
+const NARROW: (f64, f64) = (950.0, 0.5);
 /// What the lip does in such a leap: factor on the reed's damping, and for how long, s. With factors of 1.85 and 2 all of these slurs
 /// arrive, with 1.5 and 1.75 some do not; the stronger, the deeper the hole (`docs/tone.md`). In 20 ms a slur from written B4 to B3 is 2.8 dB
 /// louder on the way at CC 58.
 const DAMPED: LipHelp = LipHelp { damping: 1.85, length_s: 0.025 };
-/// Factor on the legato time in such a leap. Measured: the largest bump is 3.8 dB at 1.4, 2.4 dB here.
+/// Factor on the legato time in such a leap. Measured: six slurs are more than 2 dB louder on the way than either note at 1.6, none here; at 2.2 three are lost.
 const LEAP_TIME: f64 = 1.8;
 /// Factor on the legato time of a slur up over the break: the shorter, the shallower the hole and the louder the click. Measured at 0.6 and
 /// 0.4: nine tenths of the holes of octaves are 10.5 and 8.6 dB deep, of all clicks 2.8 and 3.7 dB loud. Without breath nobody hurries: the
@@ -40,15 +43,6 @@ const OTHER_TIME: f64 = 1.1;
 const ACROSS_SHARE: f64 = 0.55;
 /// The same within a register: the fingers overlap, which clicks less.
 const WITHIN_SHARE: f64 = 0.8;
-
-/// The lip damps the reed for a moment.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LipHelp {
-    /// Factor on the damping of the reed.
-    pub damping: f64,
-    /// For how long, s.
-    pub length_s: f64,
-}
 
 /// How the fingers move.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,7 +71,7 @@ impl Slur {
     fn is_hard(&self, gamma: f64) -> bool {
         let leap_cents = -self.interval_cents;
         let leaps = self.registers == (2, 1) && self.place < LOW_PLACE && leap_cents > LEAP_CENTS;
-        leaps && gamma >= BEATING[usize::from(leap_cents < WIDE_CENTS)]
+        leaps && gamma >= if leap_cents < NARROW.0 { NARROW.1 } else { BEATING }
     }
 
     /// Whether both notes lie in one register, so that the air column goes on as it swings.
