@@ -12,13 +12,13 @@ export LC_ALL=C
 
 rate=${1:-48000}
 # Of a note that lives and moves, as it does by default.
-declare -A most=([avx2]=888 [plain]=1366 ["avx2 places"]=935 ["plain places"]=1436)
+declare -A most=([avx2]=850 [plain]=1330 ["avx2 places"]=901 ["plain places"]=1404)
 
 # What growl and vocal tract add together.
 declare -A most_techniques=([avx2]=55 [plain]=55)
 
 # Players in unison, in hundredths of the cost of one voice.
-declare -A most_players=(["avx2 8"]=519 ["avx2 16"]=1032 ["plain 8"]=650 ["plain 16"]=1300)
+declare -A most_players=(["avx2 8"]=527 ["avx2 16"]=1053 ["plain 8"]=658 ["plain 16"]=1313)
 
 if ! command -v valgrind >/dev/null; then
     echo "cannot count instructions without valgrind: apt-get install valgrind" >&2

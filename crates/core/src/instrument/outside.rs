@@ -31,10 +31,10 @@ pub(super) struct Outside<F> {
     /// Flows of the bell and of the holes in each sample of a tick.
     bell: [F; TICK],
     holes: [HoleFlows<F>; TICK],
-    /// All flows together, in the samples of the tick in which that is wanted.
+    /// All flows together, while that is wanted.
     sums: [F; TICK],
-    /// All flows together in the last sample of the tick before.
-    last: f64,
+    /// All flows together in the last sample of the tick before, while that is wanted.
+    last: F,
     lines: Lines<F>,
     sources: SoundSources,
     air: Air,
@@ -97,7 +97,7 @@ impl<F: Real> Outside<F> {
             bell: [F::default(); TICK],
             holes: [HoleFlows::default(); TICK],
             sums: [F::default(); TICK],
-            last: 0.0,
+            last: F::default(),
             lines,
             sources,
             air: *air,
@@ -152,8 +152,10 @@ impl<F: Real> Outside<F> {
                 }
             });
         }
-        for at in self.added() {
-            self.sums[at & (TICK - 1)] = self.together(at & (TICK - 1), holes);
+        if self.adds_up() {
+            for at in 0..TICK {
+                self.sums[at] = self.together(at, holes);
+            }
         }
         self.hear();
     }
@@ -175,8 +177,10 @@ impl<F: Real> Outside<F> {
                 }
             });
         }
-        for at in self.added() {
-            self.sums[at & (TICK - 1)] = F::from(choir.together(at, lane));
+        if self.adds_up() {
+            for at in 0..TICK {
+                self.sums[at] = F::from(choir.together(at, lane));
+            }
         }
         self.hear();
     }
@@ -195,10 +199,10 @@ impl<F: Real> Outside<F> {
         !self.now.point || self.fading > 0 || self.filling > 0
     }
 
-    /// Samples of the tick in which the sum of all flows is wanted.
+    /// Whether the sum of all flows is wanted.
     #[inline(always)]
-    fn added(&self) -> std::ops::Range<usize> {
-        if self.now.point || (self.fading > 0 && self.before.point) { 0..TICK } else { TICK - 1..TICK }
+    fn adds_up(&self) -> bool {
+        self.now.point || (self.fading > 0 && self.before.point)
     }
 
     /// The tick as it is heard.
@@ -208,7 +212,7 @@ impl<F: Real> Outside<F> {
         if self.fading > 0 {
             self.fade();
         }
-        self.last = self.sums[TICK - 1].wide();
+        self.last = self.sums[TICK - 1];
     }
 
     /// Begins to fade into the way that is wanted. Not inlined: it is seldom called.
@@ -228,6 +232,10 @@ impl<F: Real> Outside<F> {
                 return;
             }
         }
+        if next.point && !self.now.point {
+            // Until now nobody wanted it.
+            self.last = self.lines.together();
+        }
         for (next, now) in next.ears.iter_mut().zip(&self.now.ears) {
             next.go_on((!self.now.point).then_some(now), &self.lines);
         }
@@ -245,34 +253,28 @@ impl<F: Real> Outside<F> {
 
     /// Silence, and at once the way of listening that is wanted. Real-time safe.
     pub fn silence(&mut self) {
-        self.last = 0.0;
+        self.last = F::default();
         self.lines.clear();
         self.out = [[0.0; TICK]; 2];
         (self.fresh, self.fading, self.filling) = (true, 0, 0);
         self.now.ears.iter_mut().chain(&mut self.before.ears).for_each(Ear::silence);
     }
 
-    /// All flows together in a sample of the tick. They are added in the same order wherever the holes are: nothing comes out of
-    /// those that are not active.
+    /// All flows together in a sample of the tick.
     #[inline(always)]
     fn together(&self, at: usize, holes: &[(usize, usize)]) -> F {
-        let (mut lanes, row) = ([F::default(); LANES], self.holes[at].as_flattened());
-        for (hole, slot) in self.lines.active() {
-            let Some(&(chunk, lane)) = holes.get(hole) else { continue };
-            let sum = &mut lanes[slot % LANES];
-            *sum = *sum + row[(chunk * LANES + lane) & (row.len() - 1)];
-        }
-        let mut flow = self.bell[at];
-        for lane in lanes {
-            flow = flow + lane;
-        }
-        flow
+        let row = self.holes[at].as_flattened();
+        self.lines.add_up(self.bell[at], |hole| {
+            holes
+                .get(hole)
+                .map_or(F::default(), |&(chunk, lane)| row[(chunk * LANES + lane) & (row.len() - 1)])
+        })
     }
 
     /// All flows in one point.
     #[inline(always)]
     fn point(&self) -> [f32; TICK] {
-        let (mut before, mut pressure) = (self.last, [0.0; TICK]);
+        let (mut before, mut pressure) = (self.last.wide(), [0.0; TICK]);
         for (pressure, flow) in pressure.iter_mut().zip(&self.sums) {
             let flow = flow.wide();
             *pressure = ((flow - before) * self.loudness) as f32;

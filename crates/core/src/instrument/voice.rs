@@ -23,7 +23,7 @@ use crate::reed::physical::P_REF_PA;
 use crate::units::Air;
 
 /// Ticks between two flushes of states that are too small to hear.
-const FLUSH_TICKS: u32 = 64;
+const FLUSH_TICKS: u32 = 256;
 
 /// One sample of the inside of the instrument, at the internal rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

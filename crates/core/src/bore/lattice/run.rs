@@ -174,22 +174,41 @@ fn advance<F: Real, T: Tip<F>, const COUNT: usize>(
         ends.advance(ring, next, mask, tip);
     }
     let step_slots = (steps.len() * LANES) as u16;
-    // The slice ends the loop: a count beside it would cost some ten instructions a sample.
-    let count = steps.len().min(MAX_CHUNKS);
-    for (chunk, steps) in steps[..count].iter_mut().enumerate() {
-        let [left, right] = &steps.sources.places(base, mask);
-        let arriving = [gather::<F, 0>(ring, left), gather::<F, 0>(ring, right)];
-        if is_pair {
-            let second = [gather::<F, 1>(ring, left), gather::<F, 1>(ring, right)];
-            leave(ring, base, chunk, &steps.scatter(arriving));
-            leave(ring, next, chunk, &steps.scatter(second));
-        } else {
-            leave(ring, base, chunk, &steps.scatter(arriving));
+    let rows = (base, mask);
+    match steps {
+        // As many as most instruments have: written out, their places are known.
+        [first, second] => {
+            advance_steps::<F, COUNT>(ring, first, 0, rows);
+            advance_steps::<F, COUNT>(ring, second, 1, rows);
+        }
+        _ => {
+            for (chunk, steps) in steps.iter_mut().take(MAX_CHUNKS).enumerate() {
+                advance_steps::<F, COUNT>(ring, steps, chunk, rows);
+            }
         }
     }
     pass(ring, holes, (base, mask, step_slots), moving, tip.holes(COUNT - 1));
     if is_pair {
         pass(ring, holes, (next, mask, step_slots), moving, tip.holes(0));
+    }
+}
+
+/// A chunk of changes of section goes on for one sample or two.
+#[inline(always)]
+fn advance_steps<F: Real, const COUNT: usize>(
+    ring: &mut Ring<F>,
+    steps: &mut Chunk<Steps<F>>,
+    chunk: usize,
+    (base, mask): (u16, u16),
+) {
+    let [left, right] = &steps.sources.places(base, mask);
+    let arriving = [gather::<F, 0>(ring, left), gather::<F, 0>(ring, right)];
+    if COUNT == 2 {
+        let second = [gather::<F, 1>(ring, left), gather::<F, 1>(ring, right)];
+        leave(ring, base, chunk, &steps.scatter(arriving));
+        leave(ring, base.wrapping_add(STRIDE as u16), chunk, &steps.scatter(second));
+    } else {
+        leave(ring, base, chunk, &steps.scatter(arriving));
     }
 }
 
@@ -207,11 +226,32 @@ fn pass<F: Real>(
     }
     let mut unheard = HoleFlows::default();
     let flows = flows.unwrap_or(&mut unheard);
-    // As above.
-    let count = holes.len().min(MAX_CHUNKS);
-    for (chunk, (holes, flows)) in holes[..count].iter_mut().zip(flows).enumerate() {
-        let leaving;
-        (leaving, *flows) = holes.scatter(ring, base, mask);
-        leave(ring, base + first_slot, chunk, &leaving);
+    let places = (base, mask, first_slot);
+    match holes {
+        // As many as most instruments have: written out, their places are known.
+        [first, second, third] => {
+            pass_chunk(ring, first, 0, places, flows);
+            pass_chunk(ring, second, 1, places, flows);
+            pass_chunk(ring, third, 2, places, flows);
+        }
+        _ => {
+            for (chunk, holes) in holes.iter_mut().take(MAX_CHUNKS).enumerate() {
+                pass_chunk(ring, holes, chunk, places, flows);
+            }
+        }
     }
+}
+
+/// A chunk of holes goes on for a sample.
+#[inline(always)]
+fn pass_chunk<F: Real>(
+    ring: &mut Ring<F>,
+    holes: &mut HoleChunk<F>,
+    chunk: usize,
+    (base, mask, first_slot): (u16, u16, u16),
+    flows: &mut HoleFlows<F>,
+) {
+    let leaving;
+    (leaving, flows[chunk]) = holes.scatter(ring, base, mask);
+    leave(ring, base + first_slot, chunk, &leaving);
 }

@@ -1,5 +1,7 @@
 //! One place: its ways from all sources, the filter of the bell at its angle, and presence.
 
+use std::hint::black_box;
+
 use super::lines::Lines;
 use crate::bore::lattice::Real;
 use crate::instrument::control_tick::TICK;
@@ -8,6 +10,22 @@ use crate::instrument::presence::{Presence, Section};
 
 /// States below this are set to 0.
 const TINY: f64 = 1e-18;
+
+/// Through memory: else the compiler, which sees single numbers in a recursion, makes all that comes before of single numbers, too.
+#[inline(always)]
+fn through_memory<T>(samples: T) -> T {
+    black_box(samples)
+}
+
+/// A tick behind the samples before it, from where vectors can be read.
+#[inline(always)]
+fn behind<F: Real, const BEFORE: usize, const ALL: usize>(before: [F; BEFORE], tick: &[F; TICK]) -> [F; ALL] {
+    const { assert!(ALL == BEFORE + TICK) };
+    let mut all = [F::default(); ALL];
+    all[..BEFORE].copy_from_slice(&before);
+    all[BEFORE..].copy_from_slice(tick);
+    through_memory(all)
+}
 
 /// One place.
 #[derive(Clone)]
@@ -40,12 +58,12 @@ impl<F: Real> Shelf<F> {
 
     #[inline(always)]
     fn run(&mut self, block: &mut [F; TICK]) {
-        let x = *block;
+        let x: [F; TICK + 1] = behind([self.x], block);
         for n in 0..TICK {
-            let before = if n == 0 { self.x } else { x[n - 1] };
-            block[n] = self.b0 * x[n] + self.b1 * before;
+            block[n] = self.b0 * x[n + 1] + self.b1 * x[n];
         }
-        self.x = x[TICK - 1];
+        self.x = x[TICK];
+        *block = through_memory(*block);
         for y in block {
             *y = *y + self.a1 * self.y;
             self.y = *y;
@@ -74,13 +92,13 @@ impl<F: Real> Resonance<F> {
 
     #[inline(always)]
     fn run(&mut self, block: &mut [F; TICK]) {
-        let ([b0, b1, b2], [a1, a2], x) = (self.forward, self.back, *block);
+        let ([b0, b1, b2], [a1, a2]) = (self.forward, self.back);
+        let x: [F; TICK + 2] = behind([self.x[1], self.x[0]], block);
         for n in 0..TICK {
-            let before = if n == 0 { self.x[0] } else { x[n - 1] };
-            let earlier = if n < 2 { self.x[1 - n] } else { x[n - 2] };
-            block[n] = b0 * x[n] + b1 * before + b2 * earlier;
+            block[n] = b0 * x[n + 2] + b1 * x[n + 1] + b2 * x[n];
         }
-        self.x = [x[TICK - 1], x[TICK - 2]];
+        self.x = [x[TICK + 1], x[TICK]];
+        *block = through_memory(*block);
         let [mut before, mut earlier] = self.y;
         for y in block {
             // What is known first is added first.
@@ -150,11 +168,12 @@ impl<F: Real> Ear<F> {
                 }
             }
         }
-        let mut changes = sum;
+        let sum: [F; TICK + 1] = behind([self.last], &sum);
+        let mut changes = [F::default(); TICK];
         for n in 0..TICK {
-            changes[n] = sum[n] - if n == 0 { self.last } else { sum[n - 1] };
+            changes[n] = sum[n + 1] - sum[n];
         }
-        self.last = sum[TICK - 1];
+        self.last = sum[TICK];
         if let Some((shelf, bell)) = &mut self.presence {
             shelf.run(&mut changes);
             bell.run(&mut changes);

@@ -98,11 +98,23 @@ impl<F: Real> Lines<F> {
         self.emptying = if self.emptying == 1 { 0 } else { self.ticks() + 2 };
     }
 
-    /// Holes whose lines are not all 0, and their slots.
+    /// The flow of the bell and those of all holes, as `flow` gives them for their numbers, together. They are added in the same
+    /// order wherever the holes are: nothing comes out of those that are not active.
     #[inline(always)]
-    pub(super) fn active(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
-        let active = self.active.get(..self.count).unwrap_or_default();
-        active.iter().filter_map(|&hole| Some((usize::from(hole), *self.slots.get(usize::from(hole))?)))
+    pub(super) fn add_up(&self, bell: F, flow: impl Fn(usize) -> F) -> F {
+        let mut lanes = [F::default(); LANES];
+        for &hole in self.active.get(..self.count).unwrap_or_default() {
+            let Some(slot) = self.slots.get(usize::from(hole)) else { continue };
+            let sum = &mut lanes[slot % LANES];
+            *sum = *sum + flow(usize::from(hole));
+        }
+        lanes.into_iter().fold(bell, |sum, lane| sum + lane)
+    }
+
+    /// All flows of the sample before the tick that is written next, together.
+    pub(super) fn together(&self) -> F {
+        let newest = |number: usize| self.newest((number + 1) * self.stride());
+        self.add_up(newest(self.slots.len()), newest)
     }
 
     /// Writes the flows of a tick: those of the bell, and those of a hole as `fill` gives them for its number.

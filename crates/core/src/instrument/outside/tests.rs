@@ -235,3 +235,36 @@ fn another_way_of_listening_fades_in_without_a_click() {
         }
     }
 }
+
+/// Who begins to listen in one point hears at once what was heard there all along: the sum of all flows before was not kept.
+#[test]
+fn a_point_that_fades_in_begins_with_the_flows_of_the_tick_before() {
+    let model = Model::built_in(48_000.0).unwrap();
+    let open = &model.file.fingering(crate::units::WrittenNote(60)).unwrap().open;
+    let everywhere = Listening { mode: ListeningMode::Everywhere, ..Listening::default() };
+    let heard = |first: &Listening, then: &Listening| {
+        let mut lattice = Lattice::<f64>::new(&model.coeffs);
+        for (hole, &open) in open.iter().enumerate() {
+            lattice.set_opening(hole, f64::from(u8::from(open)));
+        }
+        let sources = SoundSources::of(&model.file);
+        let mut outside = Outside::new(&model.coeffs, sources, &model.air, 1.0);
+        outside.silence();
+        outside.listen(first, false);
+        outside.heed(true, |hole| open[hole]);
+        let y_tip = model.coeffs.tip_admittance();
+        let mut tip =
+            Impulse { outside, first: 1.0, y_tip, at: 0, into: Vec::new(), heard: [Vec::new(), Vec::new()] };
+        (0..20).for_each(|_| lattice.run(TICK, &mut tip));
+        tip.outside.listen(then, false);
+        lattice.run(TICK, &mut tip);
+        tip.outside.out[0]
+    };
+    let [old, new] = [everywhere, Listening::point()].map(|listening| heard(&listening, &listening));
+    let faded = heard(&everywhere, &Listening::point());
+    for n in 0..TICK {
+        let way = (n + 1) as f32 / (FADE_TICKS as usize * TICK) as f32;
+        assert_eq!(faded[n], old[n] + way * way * (3.0 - 2.0 * way) * (new[n] - old[n]), "sample {n}");
+    }
+    assert!(old.iter().zip(&new).any(|(old, new)| (old - new).abs() > 1e-6));
+}

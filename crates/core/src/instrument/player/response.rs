@@ -9,6 +9,7 @@ use super::attack::{Attack, Onset};
 use super::breath::Asked;
 use super::dynamics::LOWEST_ONSET;
 use super::ear::Ear;
+use super::known::Known;
 use super::lip_glide::NoteLip;
 use super::posture::{PlayedBreath, Posture};
 use super::sway::Sway;
@@ -53,8 +54,9 @@ pub struct Bodily<'a> {
 pub struct Response {
     /// Dynamic of lip and trim, 0..=1; `None` before the first note.
     lip: Option<f64>,
-    /// Logarithm of the amplitude that the player expects to hear.
+    /// Logarithm of the amplitude that the player expects to hear, and of that to which it goes.
     expected: f64,
+    wanted: Known<f64, f64>,
 }
 
 /// Breath, 0..=1, that a dynamic of 0..=1 asks for, with a curve of 1.
@@ -142,7 +144,7 @@ impl Response {
         // to a firmer lip would be loud on the way; with the old note's, one to a looser lip would.
         let ahead = posture.closing_ahead().sqrt();
         // What a change does is heard as late as everything else.
-        let amplitude = (ahead * breath.amplitude).max(QUIETEST).ln();
+        let amplitude = self.wanted.of((ahead * breath.amplitude).max(QUIETEST), f64::ln);
         let heard = if bodily.settles { 1.0 } else { posture.lags.ear };
         self.expected += (amplitude - self.expected) * heard;
         let breath = PlayedBreath { gamma: ahead * breath.gamma, amplitude: self.expected.exp() };
