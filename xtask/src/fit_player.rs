@@ -10,8 +10,8 @@
 //! the points. So each round learns and plays the recorded notes by the best rule so far, as `chalumeau realism` plays them, and the
 //! search adds what they have beyond the grid (`Beyond`) to what the grid says. This is space mapping (Bandler, Biernacki, Chen,
 //! Grobelny and Hemmers 1994) with the grid as the coarse model. A rule is better if it is better as played. The search is CMA-ES (Hansen and Ostermeier
-//! 2001), with a seed, and begins at the committed rule. It is made again without each note in turn. How much can be wanted there says a smooth
-//! curve through the recordings themselves (`smooth`).
+//! 2001), with a seed, and begins at the committed rule. It is made again without each note in turn. Beside it stands what smooth
+//! curves through the recordings themselves say of a note left out (`smooth`).
 
 mod smooth;
 mod spectra;
@@ -441,7 +441,7 @@ pub fn run(args: &[String]) -> Result<()> {
         let own: Vec<&RecordedNote> =
             data.recorded.iter().flatten().filter(|note| note.dynamic == dynamic).collect();
         println!(
-            "no smooth curve through the recordings themselves, left out, {}: centroid right on more than {:.0} %",
+            "best smooth curve through the recordings themselves, left out, {}: centroid right on {:.0} %",
             dynamic.name(),
             100.0 * smooth::best_share(&own)
         );

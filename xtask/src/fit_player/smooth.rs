@@ -1,22 +1,24 @@
-//! What a smooth curve through the recordings themselves says of a note that is left out: a bound for any rule that is smooth in pitch.
+//! What a smooth curve through the recordings themselves says of a note that is left out: how smooth in pitch they are. It is no bound for a
+//! rule, which plays through an instrument whose notes are not smooth in pitch.
 //!
 //! The logarithm of the recorded centroid is fitted over pitch without one note, and asked for that note: by polynomials, and by
-//! polynomials near the note with Gaussian weights (local regression; Cleveland 1979). Of all these curves the one that is right on the most notes
-//! is given, so the bound favours none of the notes but is chosen with a view to all of them: a rule that knew less would do worse.
+//! polynomials near the note with Gaussian weights (local regression; Cleveland 1979). The best curve of all is chosen with a view to all notes, so
+//! one that was chosen beforehand would do worse.
 
 use chalumeau_core::measure::realism::{CENTROID_RATIOS, RecordedNote};
 use nalgebra::{DMatrix, DVector};
 
 /// Degrees of polynomials over the whole compass.
 const DEGREES: std::ops::RangeInclusive<usize> = 0..=7;
-/// Degrees near the note, and standard deviations of the weights, semitones.
+/// Degrees near the note, and standard deviations of the weights, in steps of so many semitones.
 const LOCAL_DEGREES: std::ops::RangeInclusive<usize> = 0..=2;
 const WIDTHS: std::ops::Range<u8> = 6..64;
 const WIDTH_STEP: f64 = 0.25;
 /// Semitones that count as 1 in a polynomial, so that its powers are of one size.
 const UNIT: f64 = 20.0;
 
-/// Share of these recordings, all of one dynamic, whose centroid lies within [`CENTROID_RATIOS`] of what a smooth curve through the others says, 0..=1.
+/// Greatest share of these recordings, all of one dynamic, whose centroid lies within [`CENTROID_RATIOS`] of what one of the curves through the others
+/// says, 0..=1.
 pub(super) fn best_share(recorded: &[&RecordedNote]) -> f64 {
     let points: Vec<(f64, f64)> =
         recorded.iter().map(|note| (f64::from(note.midi), note.centroid_hz.ln())).collect();

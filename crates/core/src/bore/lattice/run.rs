@@ -182,7 +182,7 @@ fn advance<F: Real, T: Tip<F>, const COUNT: usize>(
             advance_steps::<F, COUNT>(ring, second, 1, rows);
         }
         _ => {
-            for (chunk, steps) in steps.iter_mut().take(MAX_CHUNKS).enumerate() {
+            for (chunk, steps) in steps.iter_mut().enumerate() {
                 advance_steps::<F, COUNT>(ring, steps, chunk, rows);
             }
         }
@@ -234,6 +234,7 @@ fn pass<F: Real>(
             pass_chunk(ring, second, 1, places, flows);
             pass_chunk(ring, third, 2, places, flows);
         }
+        // No lattice has more than `MAX_CHUNKS`; to say so spares a check of `flows`.
         _ => {
             for (chunk, holes) in holes.iter_mut().take(MAX_CHUNKS).enumerate() {
                 pass_chunk(ring, holes, chunk, places, flows);
