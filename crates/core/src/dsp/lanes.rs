@@ -1,5 +1,7 @@
 //! What a block of samples amounts to, in eight lanes beside each other: an eighth of the steps.
 
+use std::hint::black_box;
+
 /// Values added up beside each other.
 const LANES: usize = 8;
 
@@ -13,6 +15,13 @@ pub fn has_avx2() -> bool {
 #[cfg(not(target_arch = "x86_64"))]
 pub fn has_avx2() -> bool {
     false
+}
+
+/// The same numbers, which have been in memory: where single numbers follow, as in a recursion or a sum in order, the compiler
+/// otherwise makes all that comes before of single numbers, too. By value, since what is lent to memory stays there before, too.
+#[inline(always)]
+pub fn through_memory<T>(numbers: T) -> T {
+    black_box(numbers)
 }
 
 /// Sum of all samples, in an order that does not depend on the machine. Not finite if any of them is not. Real-time safe.

@@ -4,7 +4,8 @@
 //! function, ISCAS 1974. Time counts in input samples, in f64; rows of taps are f32.
 
 use std::f64::consts::PI;
-use std::hint::black_box;
+
+use crate::dsp::lanes::through_memory;
 
 /// Lanes of the dot product; tap counts are multiples of it.
 pub const LANES: usize = 8;
@@ -76,7 +77,7 @@ pub fn dot(a: &[f32], b: &[TapRow]) -> f32 {
     for (a, b) in a_rest.iter().zip(b_rest) {
         add(&mut lanes, a, b);
     }
-    total(&lanes)
+    total(lanes)
 }
 
 /// [`dot`] with a number of rows that is known beforehand: the compiler counts no turns and keeps the taps in registers from one
@@ -88,14 +89,13 @@ pub fn dot_of<const ROWS: usize>(a: &[f32], b: &[TapRow; ROWS]) -> Option<f32> {
     for row in 0..ROWS {
         add(&mut lanes, &a[row], &b[row]);
     }
-    Some(total(&lanes))
+    Some(total(lanes))
 }
 
-/// The lanes one by one. They go through memory: else the compiler, which sees single numbers in the end, makes all sums of single
-/// numbers or of pairs, at twice the cost.
+/// The lanes one by one.
 #[inline(always)]
-fn total(lanes: &[f32; LANES]) -> f32 {
-    black_box(lanes).iter().sum()
+fn total(lanes: [f32; LANES]) -> f32 {
+    through_memory(lanes).iter().sum()
 }
 
 #[inline(always)]

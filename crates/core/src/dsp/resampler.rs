@@ -107,6 +107,12 @@ fn pull_plain_avx2(resampler: &mut Resampler, out: &mut [f32]) -> usize {
     resampler.pull_plain_body(out)
 }
 
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn pull_warped_avx2(resampler: &mut Resampler, out: &mut [f32]) -> usize {
+    resampler.pull_warped_body(out)
+}
+
 impl Resampler {
     /// Most inputs that may be pushed at once.
     pub const PUSH_MOST: usize = ROOM / 2;
@@ -280,6 +286,17 @@ impl Resampler {
     /// Beside the plain way, which is taken every few samples and should not prepare for this one.
     #[inline(never)]
     fn pull_warped(&mut self, out: &mut [f32]) -> usize {
+        #[cfg(target_arch = "x86_64")]
+        if self.avx2 {
+            #[allow(unsafe_code)]
+            // SAFETY: `avx2` is only set where the processor has AVX2.
+            return unsafe { pull_warped_avx2(self, out) };
+        }
+        self.pull_warped_body(out)
+    }
+
+    #[inline(always)]
+    fn pull_warped_body(&mut self, out: &mut [f32]) -> usize {
         let mut made = 0;
         let step = self.m as f64 / self.l as f64 * ONE as f64;
         for out in out {
@@ -299,6 +316,7 @@ impl Resampler {
         made
     }
 
+    #[inline(always)]
     fn advance(&mut self, step: u64) {
         let position = self.fraction + step;
         self.end += (position >> 32) as usize;

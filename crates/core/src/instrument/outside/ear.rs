@@ -1,21 +1,14 @@
 //! One place: its ways from all sources, the filter of the bell at its angle, and presence.
 
-use std::hint::black_box;
-
 use super::lines::Lines;
 use crate::bore::lattice::Real;
+use crate::dsp::lanes::through_memory;
 use crate::instrument::control_tick::TICK;
 use crate::instrument::listening::{MAX_SOURCES, Paths};
 use crate::instrument::presence::{Presence, Section};
 
 /// States below this are set to 0.
 const TINY: f64 = 1e-18;
-
-/// Through memory: else the compiler, which sees single numbers in a recursion, makes all that comes before of single numbers, too.
-#[inline(always)]
-fn through_memory<T>(samples: T) -> T {
-    black_box(samples)
-}
 
 /// A tick behind the samples before it, from where vectors can be read.
 #[inline(always)]
