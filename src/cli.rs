@@ -40,7 +40,7 @@ mod threshold;
 mod tune;
 mod words;
 
-use crate::output::OutputError;
+use crate::output::{OutputError, remove_unfinished_and_exit};
 use crate::picture_file::PictureError;
 use crate::wav::WavError;
 use chalumeau_core::bore::cylinder::CylinderError;
@@ -57,6 +57,9 @@ use clap::{Parser, Subcommand};
 use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
+
+/// Exit code that a shell expects of a program that was interrupted.
+const INTERRUPTED: i32 = 130;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -107,6 +110,21 @@ enum Command {
     Haptic(Box<haptic::HapticCommand>),
     #[cfg(feature = "devices")]
     Doctor(doctor::DoctorCommand),
+}
+
+impl Command {
+    /// Ctrl-C leaves no unfinished file behind. Commands that hold a knob have their own way to stop.
+    fn listen_for_interrupts(&self) {
+        match self {
+            #[cfg(feature = "devices")]
+            Self::Knob(_) => return,
+            #[cfg(feature = "simulator")]
+            Self::KnobSim(_) => return,
+            _ => {}
+        }
+        // Without it the process still stops, and leaves what it has begun.
+        let _ = ctrlc::set_handler(|| remove_unfinished_and_exit(INTERRUPTED));
+    }
 }
 
 /// Why a command ended early.
@@ -199,7 +217,9 @@ pub fn main() -> ExitCode {
             "{command} is not in this build, which has no devices; `cargo build --release` builds all commands"
         )));
     }
-    let done = match Cli::parse().command {
+    let command = Cli::parse().command;
+    command.listen_for_interrupts();
+    let done = match command {
         Command::Render(command) => command.run(),
         Command::Batch(command) => command.run(),
         Command::Report(command) => command.run(),

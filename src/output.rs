@@ -7,7 +7,12 @@ use std::fs;
 use std::io;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
 use tempfile::NamedTempFile;
+
+/// Temporary files of this process.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Why a file cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -36,6 +41,36 @@ pub struct NewFile {
     path: PathBuf,
     force: bool,
     temp: BufWriter<NamedTempFile>,
+    /// Dropped last: until then, the temporary file may be there.
+    _listed: Listed,
+}
+
+/// One of the [`UNFINISHED`] files.
+struct Listed(PathBuf);
+
+impl Listed {
+    fn new(path: &Path) -> Self {
+        UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_owned());
+        Self(path.to_owned())
+    }
+}
+
+impl Drop for Listed {
+    fn drop(&mut self) {
+        UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).retain(|path| *path != self.0);
+    }
+}
+
+/// Removes the temporary files of all [`NewFile`]s, then ends the process with this exit code. For a process that is told
+/// to stop: nobody is left then who could drop them.
+pub fn remove_unfinished_and_exit(code: i32) -> ! {
+    // Nobody begins another file until the end.
+    let unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    for path in unfinished.iter() {
+        // It may have its name already, or be gone.
+        let _ = fs::remove_file(path);
+    }
+    std::process::exit(code)
 }
 
 impl NewFile {
@@ -64,7 +99,10 @@ impl NewFile {
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         match builder.tempfile_in(directory) {
-            Ok(temp) => Ok(Self { temp: BufWriter::new(temp), path, force }),
+            Ok(temp) => {
+                let listed = Listed::new(temp.path());
+                Ok(Self { temp: BufWriter::new(temp), path, force, _listed: listed })
+            }
             // The message of `tempfile` has the temporary name, which does not help the user.
             Err(error) => Err(OutputError::Write { source: plain(error), path }),
         }
@@ -77,7 +115,7 @@ impl NewFile {
 
     /// Gives the file its name.
     pub fn keep(self) -> Result<(), OutputError> {
-        let Self { path, force, temp } = self;
+        let Self { path, force, temp, _listed } = self;
         let written = temp.into_inner().map_err(io::IntoInnerError::into_error);
         let kept = written.and_then(|temp| {
             let persisted = if force { temp.persist(&path) } else { temp.persist_noclobber(&path) };

@@ -790,3 +790,30 @@ fn a_trim_moves_its_note_alone() {
         refused(&d, &format!("render --written C4 --out x.wav --trim {trim}"), &[says]);
     }
 }
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_rendering_leaves_nothing_behind() {
+    use std::time::{Duration, Instant};
+
+    let d = tempfile::tempdir().unwrap();
+    let mut rendering = Command::new(env!("CARGO_BIN_EXE_chalumeau"))
+        .current_dir(d.path())
+        .env("CHALUMEAU_CACHE_DIR", env!("CARGO_TARGET_TMPDIR"))
+        .args(words("render --written C4 --seconds 3000 --out long.wav"))
+        .stdin(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let begun = Instant::now();
+    while names(d.path()).is_empty() {
+        assert!(rendering.try_wait().unwrap().is_none(), "it ended by itself");
+        assert!(begun.elapsed() < Duration::from_secs(60), "it wrote nothing");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    assert!(names(d.path())[0].ends_with(".part"), "{:?}", names(d.path()));
+    let killed = Command::new("kill").args(["-INT", &rendering.id().to_string()]).status().unwrap();
+    assert!(killed.success());
+    assert_eq!(rendering.wait().unwrap().code(), Some(130));
+    assert_eq!(names(d.path()), Vec::<String>::new());
+}

@@ -1,6 +1,6 @@
 //! `chalumeau knob`: uses a knob without a DAW: watch it, feel a note on it, record a take.
 
-use crate::cli::Failure;
+use crate::cli::{Failure, INTERRUPTED};
 use crate::cli::feel_args::FeelArgs;
 use crate::cli::shared_args::{InstrumentArg, check_fingering, note, within};
 use crate::output::OutputError;
@@ -26,8 +26,6 @@ use std::time::{Duration, Instant};
 const SHOWN_EVERY: Duration = Duration::from_millis(100);
 /// After Ctrl-C the program ends within this time even if it waits for its terminal.
 const END_BY_FORCE: Duration = Duration::from_millis(300);
-/// What a shell expects of a program that was interrupted.
-const INTERRUPTED: i32 = 130;
 /// How long to look for a knob before giving up.
 const PATIENCE: Duration = Duration::from_secs(10);
 

@@ -200,8 +200,7 @@ impl Snapshot {
 
     /// Which fingerings the next note takes.
     pub fn next_fingerings(&self) -> Fingerings {
-        let by_setting = if self.settings.alternates { Fingerings::ByContext } else { Fingerings::Chart };
-        self.switched_fingerings.unwrap_or(by_setting)
+        self.settings.fingerings(self.switched_fingerings)
     }
 
     /// The pressures that matter for this note.

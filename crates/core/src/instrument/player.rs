@@ -394,7 +394,7 @@ impl Player {
     fn finger<F: Real>(&mut self, fingering: usize, slurred: bool, model: &Model, voice: &mut Voice<F>) {
         let glissando_s = f64::from(self.settings.glissando_s);
         let from = self.fingers.fingering().filter(|_| slurred);
-        let alternate = match self.fingerings() {
+        let alternate = match self.settings.fingerings(self.chosen) {
             Fingerings::Chart => None,
             Fingerings::Alternate(nth) => model.alternates.nth(fingering, nth),
             Fingerings::ByContext => {
@@ -436,12 +436,6 @@ impl Player {
                 self.move_holes(fingering, legato_s, model, voice);
             }
         }
-    }
-
-    /// Which fingerings the next note takes.
-    fn fingerings(&self) -> Fingerings {
-        let by_setting = if self.settings.alternates { Fingerings::ByContext } else { Fingerings::Chart };
-        self.chosen.unwrap_or(by_setting)
     }
 
     /// Control ticks that the fingers take between slurred notes.

@@ -1,6 +1,6 @@
 //! What a player can set, as plain numbers in the units that a player uses. They are clamped once, where they come in.
 
-use crate::event::SettingNumber;
+use crate::event::{Fingerings, SettingNumber};
 use crate::instrument::articulation::Articulation;
 use crate::instrument::listening::Listening;
 use crate::instrument::player::Attack;
@@ -189,6 +189,12 @@ impl Settings {
             life: 0.0,
             ..Self::default()
         }
+    }
+
+    /// Which fingerings the next note takes, if the player has [`chosen`](crate::event::Event::Fingerings) any.
+    pub fn fingerings(&self, chosen: Option<Fingerings>) -> Fingerings {
+        let by_setting = if self.alternates { Fingerings::ByContext } else { Fingerings::Chart };
+        chosen.unwrap_or(by_setting)
     }
 
     /// The law of the reed under these settings: strength sets the stiffness, the lip the opening. Real-time safe.
