@@ -741,6 +741,28 @@ fn zero_is_not_moved_under_an_armed_hand() {
     assert_eq!(bench.session.state().unwrap().angle, 0, "one after the other, at once");
 }
 
+#[test]
+fn zero_and_arm_in_one_breath_zero_first() {
+    let mut bench = Bench::new(Binding::Serial);
+    bench.device.counts = 500;
+    bench.run(300);
+    bench.device.counts = 700;
+    bench.run(50);
+    bench.session.zero();
+    bench.session.arm(100, false, bench.now_us);
+    bench.run(200);
+    assert_eq!(bench.session.state().unwrap().angle, 0);
+    assert!(bench.session.is_armed(), "{:?}", bench.session.refusal());
+    // A zero that waits for an armed knob to let go is not caught up with after it is armed again.
+    bench.device.counts = 705;
+    bench.run(10);
+    bench.session.disarm(bench.now_us);
+    bench.session.zero();
+    bench.session.arm(100, false, bench.now_us);
+    bench.run(200);
+    assert_eq!(bench.session.state().unwrap().angle, 50);
+}
+
 /// 300 lives of a knob with a bad line, a host that stalls and a supply that fails: once disarmed, always disarmed.
 #[test]
 fn no_fault_ever_arms_a_knob() {

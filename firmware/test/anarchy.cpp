@@ -145,7 +145,8 @@ class Anarchy {
             default: break;
         }
         const std::uint32_t age = now.t_us - permission.heard_us;
-        const bool is_fresh = permission.stamped && permission.epoch == now.epoch &&
+        const bool is_overtaken = has_heeded_ && heeded_epoch_ == now.epoch && static_cast<std::int32_t>(permission.heard_us - heeded_us_) < 0;
+        const bool is_fresh = permission.stamped && permission.epoch == now.epoch && !is_overtaken &&
                               has_host_ && permission.session == device_.info().session && age <= FRESH_US && permission.ceiling_mnm <= CEILING_MOST_MNM;
         const bool held = (now.flags & (flag::ARMED | flag::PROBING)) != 0;
         const bool arrived = send(type, permission.encode());
@@ -161,7 +162,12 @@ class Anarchy {
             judge.lived_us = std::max(judge.lived_us, real_us_ > age ? real_us_ - age : 0);
         }
         if (holds || type == Type::Alive) {
-            judge.ceiling = static_cast<float>(permission.ceiling_mnm);
+            // Only ARM raises it.
+            const auto ceiling = static_cast<float>(permission.ceiling_mnm);
+            judge.ceiling = type == Type::Arm ? ceiling : std::min(judge.ceiling, ceiling);
+            has_heeded_ = true;
+            heeded_epoch_ = permission.epoch;
+            heeded_us_ = permission.heard_us;
         }
     }
 
@@ -211,6 +217,9 @@ class Anarchy {
     Reading reading_;
     std::int32_t step_ = 0;
     bool has_host_ = false;
+    bool has_heeded_ = false;
+    std::uint16_t heeded_epoch_ = 0;
+    std::uint32_t heeded_us_ = 0;
     std::uint32_t t_us_ = 0;
     std::uint64_t real_us_ = 0;
     std::uint8_t seq_ = 0;

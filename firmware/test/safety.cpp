@@ -195,9 +195,18 @@ CLAIM(rule_2_over_speed_i2c_brown_out_and_not_a_number_fade_at_once) {
         {Cause::I2c, [](Bench& b) { b.reading.bus_ok = false; }, [](Bench& b) { b.reading.bus_ok = true; }},
         {Cause::BrownOut, [](Bench& b) { b.reading.supply_ok = false; }, [](Bench& b) { b.reading.supply_ok = true; }},
         {Cause::NotFinite, [](Bench& b) { b.reading.velocity_rpm = NAN; },
-         [](Bench& b) { b.reading.velocity_rpm = 0.0F; }},
-        {Cause::NotFinite, [](Bench& b) { b.reading.velocity_rpm = -INFINITY; },
-         [](Bench& b) { b.reading.velocity_rpm = 0.0F; }},
+         [](Bench& b) {
+             b.reading.velocity_rpm = 0.0F;
+             b.feel(held_feel());
+         }},
+        // A single reading is enough: the fault stands until a feel is accepted.
+        {Cause::NotFinite,
+         [](Bench& b) {
+             b.reading.velocity_rpm = -INFINITY;
+             b.run(1);
+             b.reading.velocity_rpm = 0.0F;
+         },
+         [](Bench& b) { b.feel(held_feel()); }},
         {Cause::NotFinite,
          [](Bench& b) {
              Feel feel = held_feel();
@@ -317,7 +326,7 @@ CLAIM(rule_4_no_command_exceeds_the_least_of_all_ceilings) {
         for (int i = 0; i < 400; ++i) {
             if (random.below(20) == 0) {
                 bench.ceiling_mnm = user = static_cast<std::uint16_t>(random.below(451));
-                bench.alive(user);
+                bench.arm(user);
             }
             bench.reading.counts += static_cast<std::int32_t>(random.below(33)) - (trial % 2 == 0 ? 12 : 20);
             const float torque = std::fabs(bench.run(1));
@@ -337,8 +346,13 @@ CLAIM(rule_4_a_ceiling_falls_at_once_and_rises_at_5_nm_per_s) {
     bench.run(2000);
     const Event* limit = bench.last(EventKind::Limit);
     CHECK(limit != nullptr && std::fabs(limit->value + 100.0F) < 0.1F);
+    // ALIVE does not raise it again, nor does an ARM that came before.
+    const Arm before = bench.permission(SESSION, 450);
     bench.ceiling_mnm = 450;
-    bench.alive(450);
+    bench.run(100);
+    bench.send(Type::Arm, before.encode());
+    CHECK(bench.run(20) == -30.0F && bench.refused(Refusal::Stale));
+    bench.arm(450);
     float last = -30.0F;
     for (int i = 0; i < 28; ++i) {
         const float torque = bench.run(1);
@@ -485,6 +499,29 @@ CLAIM(rule_5_a_small_change_is_over_after_morph_ms) {
     CHECK((bench.state.flags & flag::MORPHING) == 0);
 }
 
+CLAIM(rule_5_repeating_a_feel_does_not_prolong_the_change_to_it) {
+    Bench bench;
+    bench.ready(held_feel(), 1200);
+    Feel feel = held_feel();
+    feel.law = static_cast<std::uint8_t>(Law::Free);
+    feel.morph_ms = 1000;
+    for (int i = 0; i < 100; ++i) {
+        bench.feel(feel);
+        bench.run(20);
+    }
+    CHECK(std::fabs(bench.run(1)) < 1e-3F);
+    // And a quick change among slow ones ends all of them by the end of the slowest.
+    feel = held_feel();
+    feel.morph_ms = 1000;
+    bench.feel(feel);
+    bench.run(200);
+    feel.scale_mnm = 60.0F;
+    feel.morph_ms = 20;
+    bench.feel(feel);
+    bench.run(1800);
+    CHECK((bench.state.flags & flag::MORPHING) == 0 && std::fabs(bench.run(1) + 60.0F) < 0.1F);
+}
+
 CLAIM(rule_6_a_refused_feel_leaves_the_one_before_and_says_why) {
     Bench bench;
     bench.ready(held_feel(), 1200);
@@ -520,6 +557,11 @@ CLAIM(state_says_what_is) {
     bench.send(Type::Rate, Rate{5}.encode());
     bench.run(1);
     CHECK(bench.refused(Refusal::Range));
+    // The next host finds the rate as it is without RATE.
+    bench.hello(SESSION + 1);
+    const int at_usual = bench.states;
+    bench.run(2000);
+    CHECK(bench.states - at_usual == 500);
     CHECK(bench.heard().gaps == 0 && bench.heard().crc_errors == 0);
 }
 

@@ -1,11 +1,11 @@
 //! `chalumeau knob`: uses a knob without a DAW: watch it, feel a note on it, record a take.
 
-use crate::cli::{Failure, INTERRUPTED};
 use crate::cli::feel_args::FeelArgs;
 use crate::cli::shared_args::{InstrumentArg, check_fingering, note, within};
+use crate::cli::{Failure, INTERRUPTED};
 use crate::output::OutputError;
 use crate::take_file::TakeFile;
-use chalumeau_core::haptics::{FeelRefused, NoteFeel, TorqueLimits};
+use chalumeau_core::haptics::{FeelDesign, FeelRefused, NoteFeel, TorqueLimits};
 use chalumeau_core::instrument::{Settings, Wanted};
 use chalumeau_core::units::WrittenNote;
 use chalumeau_knob::device::{
@@ -17,9 +17,9 @@ use chalumeau_knob::touch::take::{TakeMarks, TakeRow};
 use clap::{ArgGroup, Args};
 use std::io::{BufRead, IsTerminal, Write};
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Time between two updates of the line on the screen.
@@ -91,37 +91,49 @@ pub struct KnobCommand {
     feel: FeelArgs,
 }
 
+/// The feel that was asked for.
+struct WantedFeel {
+    feels: InstrumentFeel,
+    design: FeelDesign,
+    fingering: usize,
+    may_weaken: bool,
+}
+
+impl WantedFeel {
+    /// The feel of the note, and its design, weakened as far as the limits ask for and the user allows.
+    fn under(&self, limits: &TorqueLimits) -> Result<(NoteFeel, FeelDesign), Failure> {
+        let mut design = self.design;
+        loop {
+            let table = self.feels.table(&Settings::default(), &design, &NO_MOTOR)?;
+            match table.accepts(self.fingering, &design, limits) {
+                Ok(()) => {
+                    let note = table.note(self.fingering).copied().unwrap_or(*table.reference());
+                    return Ok((note, design));
+                }
+                Err(FeelRefused::Ceiling { strength_mnm, .. })
+                    if self.may_weaken && strength_mnm < design.strength_mnm && strength_mnm > 0.0 =>
+                {
+                    design.strength_mnm = strength_mnm;
+                }
+                Err(refused) => return Err(refused.into()),
+            }
+        }
+    }
+}
+
 impl KnobCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let file = self.instrument.load()?;
         let written = WrittenNote(self.written);
         check_fingering(&file, written)?;
         let feels = InstrumentFeel::new(&*self.instrument.tuned(&Wanted::new(file.clone(), 48_000.0))?);
-        let ceiling_mnm = self.arm.unwrap_or(100.0);
-        let limits = TorqueLimits { ceiling_mnm, ..TorqueLimits::default() };
-        let settings = Settings::default();
         // The knob gets this note only, so the hardest note does not matter.
-        let mut design = self.feel.design(&file)?;
-        let asked_mnm = design.strength_mnm;
         let fingering = feels.requirements().written().position(|note| note == written).unwrap_or(0);
-        let note = loop {
-            let table = feels.table(&settings, &design, &NO_MOTOR)?;
-            match table.accepts(fingering, &design, &limits) {
-                Ok(()) => break table.note(fingering).copied().unwrap_or(*table.reference()),
-                Err(FeelRefused::Ceiling { strength_mnm, .. })
-                    if self.feel.may_weaken() && strength_mnm < design.strength_mnm && strength_mnm > 0.0 =>
-                {
-                    design.strength_mnm = strength_mnm;
-                }
-                Err(refused) => return Err(refused.into()),
-            }
-        };
-        if design.strength_mnm < asked_mnm {
-            eprintln!(
-                "the feel is weakened from {asked_mnm:.0} to {:.0} mNm to stay below --arm {ceiling_mnm:.0}",
-                design.strength_mnm
-            );
-        }
+        let design = self.feel.design(&file)?;
+        let wanted = WantedFeel { feels, design, fingering, may_weaken: self.feel.may_weaken() };
+        let ceiling_mnm = self.arm.unwrap_or(100.0);
+        // What is refused on any knob is refused before one is looked for.
+        let (note, design) = wanted.under(&TorqueLimits { ceiling_mnm, ..TorqueLimits::default() })?;
         self.ask_again()?;
         let take = match &self.record {
             Some(path) => {
@@ -132,15 +144,38 @@ impl KnobCommand {
         };
 
         let (rows, heard) = channel();
+        // None until the knob has told its limits.
+        let feel = Arc::new(Mutex::new(None));
+        let sent = feel.clone();
         let hooks = Hooks {
-            feel: Box::new(move || Some(note.feel)),
+            feel: Box::new(move || sent.lock().map_or(None, |feel| *feel)),
             on_state: Box::new(move |state: &StateSample| {
                 let _ = rows.send(*state);
             }),
         };
         let (link, _reader) = KnobLink::spawn("chalumeau knob", hooks);
         link.choose(self.choice());
-        self.watch(&link, &heard, &note, settings.closing_pa(), take)
+        let settle = |status: &LinkStatus| {
+            let Some(info) = &status.info else { return Ok(note) };
+            let limits = info.torque_limits(ceiling_mnm.round() as u16);
+            let (note, design) = match wanted.under(&limits) {
+                // It is only watched.
+                Err(_) if self.arm.is_none() => return Ok(note),
+                settled => settled?,
+            };
+            let (asked_mnm, strength_mnm) = (wanted.design.strength_mnm, design.strength_mnm);
+            if strength_mnm < asked_mnm && self.arm.is_some() {
+                eprintln!(
+                    "the feel is weakened from {asked_mnm:.0} to {strength_mnm:.0} mNm to stay below {:.0} mNm, which --arm and this knob allow",
+                    limits.ceiling_mnm
+                );
+            }
+            if let Ok(mut feel) = feel.lock() {
+                *feel = Some(note.feel);
+            }
+            Ok(note)
+        };
+        self.watch(&link, &heard, note, &settle, take)
     }
 
     /// The further act that more than the usual ceiling needs.
@@ -179,10 +214,11 @@ impl KnobCommand {
         &self,
         link: &KnobLink,
         heard: &Receiver<StateSample>,
-        note: &NoteFeel,
-        closing_pa: f64,
+        mut note: NoteFeel,
+        settle: &dyn Fn(&LinkStatus) -> Result<NoteFeel, Failure>,
         mut take: Option<TakeFile>,
     ) -> Result<(), Failure> {
+        let closing_pa = Settings::default().closing_pa();
         let began = Instant::now();
         let mut live_since = None;
         let mut shown = Instant::now();
@@ -211,6 +247,7 @@ impl KnobCommand {
             let live = matches!(status.phase, Phase::Live | Phase::ReadOnly);
             if live && live_since.is_none() {
                 live_since = Some(Instant::now());
+                note = settle(&status)?;
                 if self.zero {
                     link.zero();
                 }
@@ -230,12 +267,12 @@ impl KnobCommand {
             for state in heard.try_iter() {
                 let gamma = note.map.pressure_pa(f64::from(state.angle_deg)) / closing_pa;
                 if let (Some(take), true) = (&mut take, live_since.is_some()) {
-                    write(take, &state, note, gamma)?;
+                    write(take, &state, &note, gamma)?;
                 }
             }
             if shown.elapsed() >= SHOWN_EVERY {
                 shown = Instant::now();
-                show(&status, note, closing_pa, &mut said);
+                show(&status, &note, closing_pa, &mut said);
             }
             if let (Some(limit), Some(since)) = (self.seconds, live_since)
                 && since.elapsed().as_secs_f64() >= limit

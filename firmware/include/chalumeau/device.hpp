@@ -19,7 +19,7 @@
 namespace chalumeau {
 
 constexpr std::uint8_t FIRMWARE_MAJOR = 0;
-constexpr std::uint8_t FIRMWARE_MINOR = 2;
+constexpr std::uint8_t FIRMWARE_MINOR = 3;
 constexpr std::uint16_t FIRMWARE_PATCH = 0;
 
 constexpr std::uint16_t STATE_HZ_SERIAL = 500;
@@ -213,7 +213,8 @@ class Device {
         }
         stand(Cause::I2c, bus_.ill(), static_cast<float>(bus_.in_row()));
         stand(Cause::BrownOut, !reading.supply_ok, 0.0F);
-        stand(Cause::NotFinite, (reading.bus_ok && !finite) || feel_not_finite_, 0.0F);
+        not_finite_ = not_finite_ || (reading.bus_ok && !finite);
+        stand(Cause::NotFinite, not_finite_, 0.0F);
         // Spinning a disarmed knob is nobody's fault; it only keeps ARM away.
         const bool held = session_.phase() != Phase::Disarmed;
         stand(Cause::OverSpeed, encoder_.speed() > OVER_SPEED && held, encoder_.speed());
@@ -263,6 +264,7 @@ class Device {
         const float wanted = curve_.torque(encoder_.degrees(), encoder_.velocity()) + owed;
         if (!is_finite(wanted)) {
             // Nothing to fade from.
+            not_finite_ = true;
             stand(Cause::NotFinite, true, 0.0F);
             session_.cut();
             released(Cause::NotFinite);
@@ -373,8 +375,9 @@ class Device {
             cut(ended);
         }
         if (session_.begins()) {
-            adopt(Feel{});  // the last host's feel is not this one's
+            adopt(Feel{});  // the last host's feel is not this one's, nor is its rate
             morph_.clear();
+            state_hz_ = config_.binding == Binding::Serial ? STATE_HZ_SERIAL : STATE_HZ_MIDI;
         }
         outbox_.send(Type::Info, info().encode());
     }
@@ -389,12 +392,12 @@ class Device {
         }
         const Verdict verdict = check_feel(feel, allowed_);
         if (verdict.code == Refusal::NotFinite) {
-            feel_not_finite_ = true;  // until a FEEL is accepted: one refused for another reason proves nothing
+            not_finite_ = true;
         }
         if (verdict.code != Refusal::None) {
             return refuse(verdict, feel.feel_id);
         }
-        feel_not_finite_ = false;
+        not_finite_ = false;
         adopt(feel);
     }
 
@@ -454,8 +457,11 @@ class Device {
             }
             return;
         }
-        session_.alive(age_us, clock_us_);
-        limits_.allow(alive.ceiling_mnm);
+        if (session_.is_overtaken(alive, clock_us_)) {
+            return;
+        }
+        session_.alive(alive, age_us, clock_us_);
+        limits_.lower(alive.ceiling_mnm);
     }
 
     void take_zero(const Frame& frame) {
@@ -583,7 +589,7 @@ class Device {
     std::uint16_t angle_sent_ = 0xFFFF;
     std::uint8_t slaps_ = 0;
     std::uint8_t events_ = 0;
-    bool feel_not_finite_ = false;
+    bool not_finite_ = false;  // until a FEEL is accepted: one refused for another reason proves nothing
     bool begun_ = false;
     bool in_slap_ = false;
     bool button_ = false;

@@ -25,8 +25,11 @@ class Limits {
     Limits(float device_mnm, float rating_mnm)
         : device_(least(device_mnm, HARD_CAP_MNM)), rating_(least(rating_mnm, device_)), thermal_(device_) {}
 
-    /// What ARM or ALIVE allows; lower at once, higher at the slew rate of rule 5: see `clamp`.
+    /// What another ARM allows; lower at once, higher at the slew rate of rule 5: see `clamp`.
     void allow(float user_mnm) { user_ = least(user_mnm, device_); }
+
+    /// What ALIVE allows: never more than before, since no act of the user stands behind it.
+    void lower(float user_mnm) { user_ = least(user_mnm, user_); }
 
     void disarm() {
         now_ = 0.0F;

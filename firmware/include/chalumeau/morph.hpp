@@ -12,11 +12,14 @@ constexpr float SLEW_MNM_PER_S = 5000.0F;
 class Morph {
   public:
     /// The law has changed where the hand is: `before` and `after` are the two laws' torques there. Several changes in a
-    /// row add up, so that what is felt stays continuous.
+    /// row add up, so that what is felt stays continuous; and so do their rates, so that a later change never slows an
+    /// earlier one: each is over after its own `morph_ms`, but where the slew rate forbids.
     void begin(float before, float after, std::uint16_t morph_ms) {
-        owed_ += before - after;
-        const float size = owed_ < 0.0F ? -owed_ : owed_;
-        rate_ = least(SLEW_MNM_PER_S, size * 1000.0F / static_cast<float>(morph_ms));
+        const float change = before - after;
+        const float size = change < 0.0F ? -change : change;
+        const float rate = active() ? rate_ : 0.0F;
+        owed_ += change;
+        rate_ = least(SLEW_MNM_PER_S, rate + size * 1000.0F / static_cast<float>(morph_ms));
     }
 
     /// What to add to the law's torque in this tick, mNm.

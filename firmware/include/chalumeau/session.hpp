@@ -77,6 +77,13 @@ class Session {
         return is_ours ? t_us - permission.heard_us : UINT32_MAX;
     }
 
+    /// A permission was given before one of this epoch that was heeded: the line repeats itself. What was heeded longer ago
+    /// than FRESH_US cannot overtake a fresh one.
+    bool is_overtaken(const Arm& permission, std::uint32_t now_us) const {
+        return heeded_ && heeded_epoch_ == epoch_ && now_us - heeded_at_us_ <= FRESH_US &&
+               static_cast<std::int32_t>(permission.heard_us - heeded_us_) < 0;
+    }
+
     /// Arms, or says why not. `speed` is a magnitude, rad/s; `probes`: this knob probes its signs first.
     Refusal arm(const Arm& arm, std::uint32_t age_us, float speed, std::uint32_t now_us, bool probes) {
         if (!version_fits_) {
@@ -88,18 +95,20 @@ class Session {
         if (!arm.stamped) {
             return Refusal::Version;  // a host that cannot say when it heard the knob
         }
-        if (age_us > FRESH_US) {
+        if (age_us > FRESH_US || is_overtaken(arm, now_us)) {
             return Refusal::Stale;
         }
         if (standing.any() || phase_ == Phase::Fading) {
             return Refusal::Fault;
         }
         if (phase_ == Phase::Armed || phase_ == Phase::Probing) {
+            heed(arm, now_us);
             return Refusal::None;  // a second ARM sets its ceiling, but does not feed the watchdog
         }
         if (!(speed < ARM_SPEED)) {
             return Refusal::Moving;
         }
+        heed(arm, now_us);
         phase_ = probes && !probed_ ? Phase::Probing : Phase::Armed;
         gain_ = 0.0F;
         watchdog_.start(now_us - age_us);
@@ -113,8 +122,9 @@ class Session {
         gain_ = 0.0F;
     }
 
-    /// A fresh ALIVE of this session.
-    void alive(std::uint32_t age_us, std::uint32_t now_us) {
+    /// A fresh ALIVE of this session, which nothing has overtaken.
+    void alive(const Arm& alive, std::uint32_t age_us, std::uint32_t now_us) {
+        heed(alive, now_us);
         watchdog_.feed(now_us - age_us);
         standing.set(Cause::Watchdog, false);
     }
@@ -164,9 +174,20 @@ class Session {
     StandingFaults standing;
 
   private:
+    void heed(const Arm& permission, std::uint32_t now_us) {
+        heeded_ = true;
+        heeded_at_us_ = now_us;
+        heeded_epoch_ = permission.epoch;
+        heeded_us_ = permission.heard_us;
+    }
+
     std::uint8_t major_;
     Watchdog watchdog_;
     std::uint32_t id_ = 0;
+    std::uint32_t heeded_us_ = 0;     // what the newest permission heeded answers
+    std::uint32_t heeded_at_us_ = 0;  // and when it was heeded
+    std::uint16_t heeded_epoch_ = 0;
+    bool heeded_ = false;
     std::uint16_t epoch_;
     bool known_ = false;
     bool begins_ = false;

@@ -293,7 +293,9 @@ impl HostSession {
             Some(info) => {
                 self.trust.forgive();
                 self.arming.arm(ceiling_mnm, further_act, info, now_us);
-                (self.refusal, self.notice, self.zero_due) = (None, None, false);
+                // A zero that waits for the knob to let go comes too late. One that does not wait is sent before ARM.
+                self.zero_due &= self.is_free();
+                (self.refusal, self.notice) = (None, None);
                 return;
             }
         };
@@ -438,6 +440,19 @@ impl HostSession {
         }
     }
 
+    /// The knob does not say that it is armed. One that has just been told FREE may still say so, and would refuse ZERO.
+    fn is_free(&self) -> bool {
+        self.state().is_none_or(|state| !state.flags.armed())
+    }
+
+    fn take_zero(&mut self, now_us: i64) -> Option<Message> {
+        let due = self.info.is_some() && self.is_free() && std::mem::take(&mut self.zero_due);
+        due.then(|| {
+            self.zero_us = Some(now_us);
+            Message::Zero(0)
+        })
+    }
+
     fn has_slot(&self, now_us: i64) -> bool {
         self.binding != Binding::Midi || now_us >= self.next_slot_us
     }
@@ -445,6 +460,12 @@ impl HostSession {
     fn next_message(&mut self, now_us: i64, send: &mut dyn FnMut(SessionOutput)) -> Option<Message> {
         if self.info.as_ref().is_some_and(|info| !info.speaks_our_major()) {
             return None; // nobody knows what it would make of it
+        }
+        // Before ARM, after which the knob would refuse it; but nothing comes before FREE.
+        if self.arming.is_wanted()
+            && let Some(zero) = self.take_zero(now_us)
+        {
+            return Some(zero);
         }
         // Without a STATE there is nothing that a permission could answer.
         let stamp = self.state().map(|state| Stamp { epoch: state.epoch.unwrap_or(0), heard_us: state.t_us });
@@ -477,11 +498,8 @@ impl HostSession {
         if info.checks_age() && now_us - self.hello_us >= AGAIN_US {
             return Some(self.hello(now_us));
         }
-        // A knob that has just been told FREE may still say that it is armed, and would refuse.
-        let is_free = self.state().is_none_or(|state| !state.flags.armed());
-        if is_free && std::mem::take(&mut self.zero_due) {
-            self.zero_us = Some(now_us);
-            return Some(Message::Zero(0));
+        if let Some(zero) = self.take_zero(now_us) {
+            return Some(zero);
         }
         if std::mem::take(&mut self.rate_due) {
             return Some(Message::Rate(if self.is_slow() { SLOW_RATE_HZ } else { RATE_HZ }));

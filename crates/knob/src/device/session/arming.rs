@@ -18,6 +18,8 @@ const INSIST_US: i64 = 50_000;
 
 /// ARM of one act at most.
 const TRIES: u32 = 4;
+/// ARM that sets another ceiling of an armed knob. Nothing tells whether it has come, and ALIVE does not raise the ceiling.
+const CEILING_TRIES: u32 = 2;
 
 /// What is due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,6 +48,8 @@ pub struct Arming {
     next_us: i64,
     say_free: bool,
     is_armed: bool,
+    /// ARM still due to set another ceiling of an armed knob.
+    ceiling_tries: u32,
     /// All tries of an act have had their time, and the knob has not answered.
     is_ignored: bool,
 }
@@ -58,6 +62,7 @@ impl Default for Arming {
             next_us: i64::MIN,
             say_free: false,
             is_armed: false,
+            ceiling_tries: 0,
             is_ignored: false,
         }
     }
@@ -88,7 +93,11 @@ impl Arming {
     pub fn arm(&mut self, ceiling_mnm: u16, further_act: bool, info: &Info, now_us: i64) {
         let offered = if further_act { HARD_CEILING_MNM } else { OFFERED_CEILING_MNM };
         self.ceiling_mnm = ceiling_mnm.min(offered).min(info.most_mnm()).min(HARD_CEILING_MNM);
-        self.want = Goal::Arming { tries: 0 };
+        if self.is_armed() {
+            self.ceiling_tries = CEILING_TRIES;
+        } else {
+            self.want = Goal::Arming { tries: 0 };
+        }
         self.next_us = now_us;
         self.say_free = false;
     }
@@ -100,14 +109,14 @@ impl Arming {
 
     /// The user, or whoever runs this, wants no torque.
     pub fn disarm(&mut self, now_us: i64) {
-        self.want = Goal::Free;
+        (self.want, self.ceiling_tries) = (Goal::Free, 0);
         self.say_free = true;
         self.next_us = now_us;
     }
 
     /// The knob is gone, or has refused: nothing to say, and a new act needed.
     pub fn forget(&mut self) {
-        self.want = Goal::Free;
+        (self.want, self.ceiling_tries) = (Goal::Free, 0);
         self.is_armed = false;
     }
 
@@ -123,7 +132,7 @@ impl Arming {
                 self.next_us = now_us + INSIST_US;
             }
             Goal::Armed if was_armed && !is_armed => {
-                self.want = Goal::Free;
+                (self.want, self.ceiling_tries) = (Goal::Free, 0);
                 return true;
             }
             _ => {}
@@ -152,6 +161,11 @@ impl Arming {
                 self.want = Goal::Free;
                 self.is_ignored = true;
                 None
+            }
+            Goal::Armed if self.ceiling_tries > 0 => {
+                self.ceiling_tries -= 1;
+                self.next_us = now_us + INSIST_US;
+                Some(ArmingMessage::Arm)
             }
             Goal::Free | Goal::Armed => None,
         }
@@ -216,6 +230,21 @@ pub(super) mod tests {
         assert_eq!(said(&mut arming, 120, 1000), []);
         assert!(arming.hear(false, false, 0), "the knob disarmed by itself");
         assert_eq!(said(&mut arming, 1000, 3000), [], "and stays so");
+    }
+
+    #[test]
+    fn another_ceiling_of_an_armed_knob_is_said_twice_and_only_while_it_is_armed() {
+        let mut arming = Arming::default();
+        arming.arm(100, false, &info(450), 0);
+        assert_eq!(said(&mut arming, 0, 10), [ArmingMessage::Arm]);
+        arming.hear(true, false, 10_000);
+        arming.arm(200, false, &info(450), 100_000);
+        assert!(arming.is_armed());
+        assert_eq!(said(&mut arming, 100, 1000), [ArmingMessage::Arm; 2]);
+        arming.arm(150, false, &info(450), 1_000_000);
+        assert_eq!(said(&mut arming, 1000, 1020), [ArmingMessage::Arm]);
+        assert!(arming.hear(false, false, 1_020_000));
+        assert_eq!(said(&mut arming, 1020, 2000), [], "it has let go by itself");
     }
 
     #[test]
