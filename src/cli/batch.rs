@@ -5,15 +5,16 @@ pub(super) mod plan;
 use crate::cli::Failure;
 use crate::cli::csv_table::{CsvTable, quoted};
 use crate::cli::render::{RenderCommand, Rendered};
+use crate::cli::shared_args::counted;
 use chalumeau_core::instrument::side_by_side;
 use clap::{Args, Parser};
 use indicatif::{ProgressBar, ProgressStyle};
 use plan::{Plan, Variation};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::fs;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 /// Name of the table in the folder.
@@ -40,7 +41,7 @@ A CSV file has the names in its first line, and one file to render in each other
 /// Render many variations into a folder, with a table of what each file is
 ///
 /// Works on all cores, and on each renders up to eight files of one instrument side by side; a file is the same as if it were rendered by itself. If it is stopped, the same command goes on where it was: files that are listed with the same arguments stay
-/// as they are. The table, manifest.csv, has a line for each file: its arguments, length, peak and level.
+/// as they are. A folder with files of another plan is refused. The table, manifest.csv, has a line for each file: its arguments, length, peak and level.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct BatchCommand {
@@ -50,7 +51,7 @@ pub struct BatchCommand {
     /// Folder for the WAV files and manifest.csv; it is made if it is not there
     #[arg(long, value_name = "FOLDER")]
     into: PathBuf,
-    /// Render all files anew, also those that are there
+    /// Render all files anew, in place of those that are there, also those of another plan
     #[arg(long)]
     force: bool,
     /// Only check the plan and print the commands
@@ -92,12 +93,24 @@ impl BatchCommand {
         fs::create_dir_all(&self.into)
             .map_err(|error| self.failure(&format!("cannot make {}: {error}", self.into.display())))?;
         let header = format!("file,{},length_s,rate_hz,peak_dbfs,rms_dbfs", plan.names.join(","));
-        let there = if self.force { HashMap::new() } else { self.there(&header) };
+        let earlier = Earlier::read(&self.into)?;
+        if !self.force {
+            earlier.check(&self.into, &header, &jobs)?;
+        }
+        let there = if self.force { HashMap::new() } else { earlier.lines_by_arguments() };
+        if self.force {
+            // From the first file on it lists what is there no more; the same command without --force can then go on.
+            let _ = fs::remove_file(self.into.join(MANIFEST));
+        }
         let growing = self.into.join(GROWING);
         let mut journal =
             fs::File::create(&growing).map_err(|source| Failure::Batch { path: growing.clone(), source })?;
+        // In one piece: a run that is stopped leaves whole lines.
         let mut say = |line: &str| {
-            writeln!(journal, "{line}").map_err(|source| Failure::Batch { path: growing.clone(), source })
+            let line = format!("{line}\n");
+            journal
+                .write_all(line.as_bytes())
+                .map_err(|source| Failure::Batch { path: growing.clone(), source })
         };
         say(&header)?;
         let mut lines = Vec::with_capacity(jobs.len());
@@ -110,7 +123,8 @@ impl BatchCommand {
         }
         let mut left: Vec<_> = (0..jobs.len()).filter(|&at| lines[at].is_none()).collect();
         if left.len() < jobs.len() {
-            eprintln!("{} of {} files are there already", jobs.len() - left.len(), jobs.len());
+            let are = if jobs.len() == 1 { "is" } else { "are" };
+            eprintln!("{} of {} {are} there already", jobs.len() - left.len(), counted(jobs.len(), "file"));
         }
         // Those of one bore one after another: only they play side by side.
         left.sort_by(|&one, &other| jobs[one].bore.cmp(&jobs[other].bore));
@@ -154,7 +168,10 @@ impl BatchCommand {
         }
         table.finish()?;
         let _ = fs::remove_file(&growing);
-        eprintln!("{}: {} files and {MANIFEST}", self.into.display(), jobs.len());
+        eprintln!("{}: {} and {MANIFEST}", self.into.display(), counted(jobs.len(), "file"));
+        if let Some(left_over) = earlier.left_over(&self.into, &jobs) {
+            eprintln!("{left_over}");
+        }
         Ok(())
     }
 
@@ -189,22 +206,96 @@ impl BatchCommand {
         };
         plan.variations.iter().enumerate().map(job).collect()
     }
+}
 
-    /// The lines of an earlier run with the same columns, by their beginnings.
-    fn there(&self, header: &str) -> HashMap<String, String> {
-        let tables =
-            [MANIFEST, GROWING].map(|name| fs::read_to_string(self.into.join(name)).unwrap_or_default());
-        let columns = MEASURED_COLUMNS;
-        tables
-            .iter()
-            .filter(|text| text.lines().next() == Some(header))
-            .flat_map(|text| text.lines().skip(1))
-            .filter_map(|line| {
-                let begin = line.rsplitn(columns + 1, ',').last()?;
-                Some((begin.to_owned(), line.to_owned()))
-            })
-            .collect()
+/// The tables that earlier runs left in the folder, without lines that were cut off.
+struct Earlier {
+    finished: String,
+    growing: String,
+}
+
+impl Earlier {
+    fn read(folder: &Path) -> Result<Self, Failure> {
+        let table = |name: &str| match fs::read(folder.join(name)) {
+            Ok(bytes) => {
+                let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
+                Ok(String::from_utf8_lossy(&bytes[..whole]).into_owned())
+            }
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(String::new()),
+            Err(source) => Err(Failure::Read { path: folder.join(name), source }),
+        };
+        Ok(Self { finished: table(MANIFEST)?, growing: table(GROWING)? })
     }
+
+    /// The lines of both tables without their headers.
+    fn lines(&self) -> impl Iterator<Item = &str> {
+        [&self.finished, &self.growing].into_iter().flat_map(|text| text.lines().skip(1))
+    }
+
+    /// The lines by their beginnings: file and arguments.
+    fn lines_by_arguments(&self) -> HashMap<String, String> {
+        self.lines().map(|line| (beginning(line).to_owned(), line.to_owned())).collect()
+    }
+
+    /// Refuses a folder with files that this plan has not made and would replace.
+    fn check(&self, folder: &Path, header: &str, jobs: &[Job]) -> Result<(), Failure> {
+        let refuse = |name: &str, is: &str| {
+            Failure::Usage(format!(
+                "{} {is}; choose another folder, or add --force to render all anew",
+                folder.join(name).display()
+            ))
+        };
+        for (name, text) in [(MANIFEST, &self.finished), (GROWING, &self.growing)] {
+            if text.lines().next().is_some_and(|first| first != header) {
+                return Err(refuse(name, "is of another plan"));
+            }
+        }
+        let listed: HashMap<_, _> = self.lines().map(|line| (file_name(line), beginning(line))).collect();
+        for job in jobs {
+            match listed.get(job.file.as_str()) {
+                Some(&line) if line == job.line => {}
+                Some(_) => return Err(refuse(&job.file, "is of another plan")),
+                // A stopped run has finished files that it had no time to list.
+                None if !self.growing.is_empty() => {}
+                None if folder.join(&job.file).exists() => {
+                    return Err(refuse(&job.file, "is there and is not of this plan"));
+                }
+                None => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Says which listed files are still there and are not of this plan.
+    fn left_over(&self, folder: &Path, jobs: &[Job]) -> Option<String> {
+        let ours: HashSet<_> = jobs.iter().map(|job| job.file.as_str()).collect();
+        let is_numbered = |name: &str| {
+            let number = name.strip_suffix(".wav").unwrap_or_default();
+            !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())
+        };
+        let others: BTreeSet<_> = self
+            .lines()
+            .map(file_name)
+            .filter(|&name| is_numbered(name) && !ours.contains(name) && folder.join(name).is_file())
+            .collect();
+        let (first, last) = (others.first()?, others.last()?);
+        let which = if first == last { (*first).to_owned() } else { format!("{first} to {last}") };
+        Some(format!(
+            "{} holds {} of an earlier plan, which {MANIFEST} does not list: {which}",
+            folder.display(),
+            counted(others.len(), "file")
+        ))
+    }
+}
+
+/// File and arguments: a line without what is known after the rendering.
+fn beginning(line: &str) -> &str {
+    line.rsplitn(MEASURED_COLUMNS + 1, ',').last().unwrap_or_default()
+}
+
+/// The first field of a line.
+fn file_name(line: &str) -> &str {
+    line.split(',').next().unwrap_or_default()
 }
 
 /// Columns of a line that are known after the rendering.
@@ -228,7 +319,9 @@ fn progress(files: usize) -> ProgressBar {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
+
+    /// The last columns of a table.
+    const REST: &str = "length_s,rate_hz,peak_dbfs,rms_dbfs";
 
     fn batch(directory: &Path, plan: &str, text: &str, force: bool) -> (BatchCommand, PathBuf) {
         let path = directory.join(plan);
@@ -257,10 +350,56 @@ mod tests {
         assert_eq!(fs::read(file("0001.wav")).unwrap(), b"mine");
         assert!(fs::metadata(file("0003.wav")).unwrap().len() > 1_000);
         assert_eq!(fs::read_to_string(file(MANIFEST)).unwrap(), manifest);
-        // With other arguments all are.
-        let (changed, _) = batch(directory.path(), "plan.toml", &plan.replace("0.05", "0.06"), false);
-        changed.run().unwrap();
-        assert_ne!(fs::read(file("0001.wav")).unwrap(), b"mine");
+    }
+
+    #[test]
+    fn what_this_plan_has_not_made_is_kept_unless_forced() {
+        let directory = tempfile::tempdir().unwrap();
+        let plan = "[same]\nseconds = 0.05\n[vary]\nwritten = [\"E3\", \"C4\", \"G4\"]\n";
+        let (command, into) = batch(directory.path(), "plan.toml", plan, false);
+        let file = |name: &str| into.join(name);
+        let first = "0001.wav,0.05,E3,0.0500,48000,-1.00,-2.00";
+        let with_header = |line: &str| format!("file,seconds,written,{REST}\n{line}\n");
+        // A file without a table, one that a finished table does not list, one with other arguments, and other columns.
+        for (manifest, growing, says) in [
+            (None, None, "0001.wav is there and is not of this plan; choose another folder, or add --force"),
+            (Some(with_header(&first.replace("0001", "0009"))), None, "0001.wav is there and is not"),
+            (Some(with_header(&first.replace("E3", "F3"))), None, "0001.wav is of another plan"),
+            (None, Some(with_header(&first.replace("E3", "F3"))), "0001.wav is of another plan"),
+            (Some(format!("file,written,{REST}\n")), None, "manifest.csv is of another plan"),
+            (None, Some(format!("file,written,{REST}\n")), "manifest.part.csv is of another plan"),
+        ] {
+            let _ = fs::remove_dir_all(&into);
+            fs::create_dir(&into).unwrap();
+            fs::write(file("0001.wav"), "mine").unwrap();
+            for (name, text) in [(MANIFEST, &manifest), (GROWING, &growing)] {
+                if let Some(text) = text {
+                    fs::write(file(name), text).unwrap();
+                }
+            }
+            let said = command.run().unwrap_err().to_string();
+            assert!(said.contains(says), "{said}");
+            assert_eq!(fs::read(file("0001.wav")).unwrap(), b"mine");
+            assert!(!file("0002.wav").exists());
+            assert_eq!(fs::read_to_string(file(GROWING)).ok(), growing);
+        }
+        // A stopped run goes on: its last line is cut off, and a file is not listed yet.
+        fs::write(file(GROWING), with_header(&format!("{first}\n0002.wav,0.0")).trim_end()).unwrap();
+        fs::write(file("0002.wav"), "not listed").unwrap();
+        command.run().unwrap();
+        assert_eq!(fs::read(file("0001.wav")).unwrap(), b"mine");
+        assert!(["0002.wav", "0003.wav"].iter().all(|name| fs::metadata(file(name)).unwrap().len() > 1_000));
+        // By force, a shorter plan replaces its own files and names the others.
+        let shorter = plan.replace("\"E3\", ", "");
+        let (forced, _) = batch(directory.path(), "plan.toml", &shorter, true);
+        let jobs = forced.jobs(&Plan::read(&forced.plan).unwrap()).unwrap();
+        let left_over = Earlier::read(&into).unwrap().left_over(&into, &jobs).unwrap();
+        assert!(left_over.contains("holds 1 file of an earlier plan"), "{left_over}");
+        assert!(left_over.ends_with("manifest.csv does not list: 0003.wav"), "{left_over}");
+        forced.run().unwrap();
+        assert!(fs::metadata(file("0001.wav")).unwrap().len() > 1_000);
+        assert_eq!(fs::read_to_string(file(MANIFEST)).unwrap().lines().count(), 3);
+        assert!(file("0003.wav").exists());
     }
 
     #[test]

@@ -305,6 +305,11 @@ pub fn sounding(file: &InstrumentFile, written: WrittenNote) -> Result<SoundingN
     Ok(written.sounding(file.transposition).ok_or(ScoreError::OutsideMidi(written))?)
 }
 
+/// A number of things, each with this name: 1 file, 2 files.
+pub fn counted(count: usize, name: &str) -> String {
+    format!("{count} {name}{}", if count == 1 { "" } else { "s" })
+}
+
 /// A number inside a range, or what would be right.
 pub fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
     match text.parse::<f64>() {
