@@ -817,3 +817,13 @@ fn an_interrupted_rendering_leaves_nothing_behind() {
     assert_eq!(rendering.wait().unwrap().code(), Some(130));
     assert_eq!(names(d.path()), Vec::<String>::new());
 }
+
+#[test]
+fn silence_has_no_pitch() {
+    let d = tempfile::tempdir().unwrap();
+    for (n, blown) in ["--gamma 0", "--gamma 0.2 --no-noise"].iter().enumerate() {
+        succeeds(d.path(), &format!("report --written C4 {blown} --seconds 1 --out {n}.html"));
+        let page = fs::read_to_string(d.path().join(format!("{n}.html"))).unwrap();
+        assert!(page.contains("No note has a pitch"), "{blown}");
+    }
+}

@@ -12,12 +12,16 @@ use crate::units::cents;
 /// Longest part of a note that is measured, s: ten times what a pitch within 0.1 cents needs.
 pub const LONGEST_S: f64 = 3.0;
 
+/// Softer notes have no pitch, dBFS. Without breath the click of the tongue rings on at -88 dBFS in a note of 0.2 s, and at
+/// less than -120 in one of 0.5 s. The softest dynamic of a player is above -45.
+pub const LEAST_DBFS: f64 = -75.0;
+
 /// Pitch and level of one note.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeasuredNote {
     /// Which note, and when it is heard.
     pub span: NoteSpan,
-    /// Its pitch, Hz; `None` if it has none.
+    /// Its pitch, Hz; `None` if it has none, or is softer than [`LEAST_DBFS`].
     pub hz: Option<f64>,
     /// Its deviation from equal temperament, cents; `None` if it has no pitch.
     pub cents: Option<f64>,
@@ -80,14 +84,13 @@ impl NoteMeter {
 
     fn measure(&mut self, span: NoteSpan) {
         let wanted_hz = span.note.frequency_hz(self.a4_hz);
-        let hz = refine_hz(&self.kept, self.rate_hz, wanted_hz)
-            .or_else(|| fundamental_hz(&self.kept, self.rate_hz));
-        self.measured.push(MeasuredNote {
-            span,
-            hz,
-            cents: hz.map(|hz| cents(hz, wanted_hz)),
-            level_dbfs: rms_dbfs(&self.kept),
-        });
+        let level_dbfs = rms_dbfs(&self.kept);
+        let pitch = || {
+            refine_hz(&self.kept, self.rate_hz, wanted_hz)
+                .or_else(|| fundamental_hz(&self.kept, self.rate_hz))
+        };
+        let hz = if level_dbfs < LEAST_DBFS { None } else { pitch() };
+        self.measured.push(MeasuredNote { span, hz, cents: hz.map(|hz| cents(hz, wanted_hz)), level_dbfs });
         self.kept.clear();
     }
 }
@@ -149,5 +152,19 @@ mod tests {
         assert!(heard[0].cents.is_some());
         assert_eq!((heard[1].hz, heard[2].cents), (None, None));
         assert_eq!(heard[2].level_dbfs, f64::NEG_INFINITY);
+    }
+
+    #[test]
+    fn what_is_softer_than_any_note_has_no_pitch() {
+        let (notes, samples) = tones();
+        // The tones are at -9 dBFS.
+        for (down_db, pitches) in [(65.0, 3), (67.0, 0)] {
+            let factor = 10f32.powf(-down_db / 20.0);
+            let mut meter = NoteMeter::new(notes.clone(), 48_000.0, 440.0);
+            meter.hear(&samples.iter().map(|sample| factor * sample).collect::<Vec<_>>());
+            let heard = meter.finish();
+            assert_eq!(heard.iter().filter(|note| note.hz.is_some()).count(), pitches, "{heard:?}");
+            assert!(heard.iter().all(|note| note.level_dbfs.is_finite()));
+        }
     }
 }
