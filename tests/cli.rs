@@ -818,6 +818,33 @@ fn an_interrupted_rendering_leaves_nothing_behind() {
     assert_eq!(names(d.path()), Vec::<String>::new());
 }
 
+const EXAMPLE_INSTRUMENTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/instruments");
+
+#[test]
+fn fingerings_of_the_chart_are_listed_and_holes_that_no_finger_moves_are_named() {
+    let d = tempfile::tempdir().unwrap();
+    for (line, unmoved, yes) in [
+        ("--instrument alto-chalumeau.toml --note C4", Some("K1 K2 R4"), 1),
+        ("--instrument cylinder.toml --note E3", Some("H2 H1"), 1),
+        ("--instrument alto-chalumeau.toml --multiphonic", Some("K1 K2 R4"), 0),
+        ("--instrument b-flat --note C4 --count 3", None, 1),
+    ] {
+        let line = line.replace("--instrument ", &format!("--instrument {EXAMPLE_INSTRUMENTS}/"));
+        let line = line.replace(&format!("{EXAMPLE_INSTRUMENTS}/b-flat"), "b-flat");
+        let output = chalumeau(d.path(), words(&format!("fingerings {line}")));
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{line}: {message}");
+        match unmoved {
+            Some(holes) => {
+                assert!(message.contains(&format!("{holes} cannot be moved")), "{line}: {message}")
+            }
+            None => assert_eq!(message, "", "{line}"),
+        }
+        let rows = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(rows.lines().filter(|row| row.ends_with(",yes")).count(), yes, "{line}: {rows}");
+    }
+}
+
 #[test]
 fn silence_has_no_pitch() {
     let d = tempfile::tempdir().unwrap();

@@ -2,7 +2,7 @@
 
 use crate::cli::Failure;
 use crate::cli::csv_table::TableArgs;
-use crate::cli::shared_args::{AirArg, InstrumentArg, note};
+use crate::cli::shared_args::{AirArg, InstrumentArg, counted, note};
 use chalumeau_core::bore::fingering_finder::{FingeringFinder, Found};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::units::WrittenNote;
@@ -17,10 +17,12 @@ Examples:
 
 /// Find fingerings: for a note, for a trill, or for two notes at once
 ///
-/// Looks through every combination of holes that the fingers can make, by the frequency-domain model. Best first.
+/// Looks through every combination of holes that the fingers of a Boehm clarinet can make, by the frequency-domain model. Best first.
+/// Holes are known by the names they have in the bundled instruments; those with other names are not moved, and a warning names them. The fingering
+/// of the chart is always listed, last if it is not among the best.
 ///
 /// Columns of a note:
-/// fingers: keys and holes that the hands press, T thumb, L left, R right;
+/// fingers: keys and holes that the hands press, T thumb, L left, R right; empty where only the chart knows how;
 /// hz, cents: where it sounds, and how far that is from the note;
 /// gamma_on: the mouth pressure at which it begins, over the closing pressure of the reed;
 /// mode: which resonance of the bore it plays, 1 the lowest;
@@ -43,7 +45,7 @@ pub struct FingeringsCommand {
     /// Fingerings with two strong resonances that belong to no one note
     #[arg(long, conflicts_with_all = ["note", "trill_to"])]
     multiphonic: bool,
-    /// How many, 1..1000
+    /// How many of the best, 1..1000
     #[arg(long, value_name = "COUNT", default_value = "10", value_parser = clap::value_parser!(u16).range(1..=1_000))]
     count: u16,
     #[command(flatten)]
@@ -61,7 +63,13 @@ impl FingeringsCommand {
         // It is never ended early.
         let finder = FingeringFinder::new(&file, self.air.air(), &mut |_| ControlFlow::Continue(()))
             .ok_or_else(|| Failure::Usage("the search was ended".to_owned()))?;
-        let looked = format!("{}; {} fingerings looked through", file.name, finder.len());
+        if !finder.unmoved().is_empty() {
+            eprintln!(
+                "warning: {} cannot be moved, as a Boehm clarinet has no holes of these names; the search leaves them as they are at rest",
+                finder.unmoved().join(" ")
+            );
+        }
+        let looked = format!("{}; {} looked through", file.name, counted(finder.len(), "fingering"));
         let Some(note) = self.note.map(WrittenNote) else {
             let mut table = self.table.open("fingers,low_hz,high_hz,uneven_db,gamma_on,cost,open")?;
             table.comment(format_args!("{looked}"))?;
@@ -103,7 +111,12 @@ impl FingeringsCommand {
         }
         let mut table = self.table.open("fingers,hz,cents,gamma_on,mode,evenness_db,cost,open,chart")?;
         table.comment(format_args!("{looked}; {note}"))?;
-        let found = finder.best(note, count);
+        let mut found = finder.best(note, count);
+        let chart = finder.played_by_chart(note);
+        let is_of_chart = |found: &Found| chart.as_ref().is_some_and(|of| of.grip.open == found.grip.open);
+        if let Some(chart) = chart.as_ref().filter(|_| !found.iter().any(is_of_chart)) {
+            found.push(chart.clone());
+        }
         if found.is_empty() {
             let (low, high) = (file.lowest(), file.highest());
             eprintln!(
@@ -111,8 +124,7 @@ impl FingeringsCommand {
             );
         }
         for found in found {
-            let chart = finder.of_chart(note).is_some_and(|chart| chart.open == found.grip.open);
-            table.line(format_args!("{},{}", one(&found), if chart { "yes" } else { "" }))?;
+            table.line(format_args!("{},{}", one(&found), if is_of_chart(&found) { "yes" } else { "" }))?;
         }
         table.finish()
     }

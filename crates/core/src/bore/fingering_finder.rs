@@ -14,7 +14,7 @@ use std::ops::ControlFlow;
 use crate::bore::instrument_file::{Fingering, HoleKind, InstrumentFile};
 use crate::bore::transfer_matrix::{Resonance, TransferMatrix, threshold_gamma};
 use crate::units::{Air, WrittenNote, cents};
-use mechanism::{Grip, Mechanism};
+use mechanism::{Grip, MAX_FINGERS, Mechanism};
 
 /// Embouchure of the thresholds, the default of the instrument.
 const ZETA: f64 = 0.3;
@@ -47,6 +47,10 @@ pub struct FingeringFinder {
     resonances: Vec<Vec<Resonance>>,
     /// What the chart has for each note.
     chart: Vec<(WrittenNote, Grip)>,
+    /// What the chart has for notes for which the fingers cannot open these holes: the open ones, and the resonances.
+    out_of_reach: Vec<(WrittenNote, u64, Vec<Resonance>)>,
+    /// Names of holes that no finger moves.
+    unmoved: Vec<String>,
 }
 
 /// A fingering for a note.
@@ -128,7 +132,45 @@ impl FingeringFinder {
             Some((fingering.written, grips[at]))
         };
         let chart = file.fingerings.iter().filter_map(of_chart).collect();
-        Some(Self { transposition: file.transposition, finger_holes, grips, resonances, chart })
+        let others: Vec<(WrittenNote, u64)> = file
+            .fingerings
+            .iter()
+            .filter(|fingering| of_chart(fingering).is_none())
+            .map(|fingering| (fingering.written, bits(&fingering.open)))
+            .collect();
+        let open: Vec<u64> = others.iter().map(|&(_, open)| open).collect();
+        let of_others = model.survey(&open, file.reed_volume_m3, &mut |_| ControlFlow::Continue(()))?;
+        let out_of_reach = others.into_iter().zip(of_others).map(|((note, open), all)| (note, open, all));
+        Some(Self {
+            transposition: file.transposition,
+            finger_holes,
+            out_of_reach: out_of_reach.collect(),
+            unmoved: Mechanism::boehm().unmoved(file),
+            grips,
+            resonances,
+            chart,
+        })
+    }
+
+    /// Names of the holes that no finger of the mechanism moves: they have other names than those of a Boehm clarinet. They
+    /// stay as they are at rest in every fingering that is looked through.
+    pub fn unmoved(&self) -> &[String] {
+        &self.unmoved
+    }
+
+    /// The chart's own fingering of a note, at the resonance nearest to it however far that is; `None` for a note that is not
+    /// in the chart. Where the fingers cannot open these holes, `fingers` is empty and nothing is added to the cost for them.
+    pub fn played_by_chart(&self, written: WrittenNote) -> Option<Found> {
+        let wanted_hz = written.sounding(self.transposition)?.frequency_hz(440.0);
+        if let Some(grip) = self.of_chart(written) {
+            let at = self.grips.binary_search_by_key(&grip.open, |grip| grip.open).ok()?;
+            let mut found = self.found(*grip, &self.resonances[at], wanted_hz, f64::INFINITY)?;
+            found.cost += self.cost_of_the_way(written, grip);
+            return Some(Found { fingers: Mechanism::boehm().words(grip), ..found });
+        }
+        let (_, open, resonances) = self.out_of_reach.iter().find(|(note, ..)| *note == written)?;
+        let grip = Grip { open: *open, positions: [0; MAX_FINGERS], effort: 0 };
+        self.found(grip, resonances, wanted_hz, f64::INFINITY)
     }
 
     /// What the chart of the instrument has for a note, if the fingers can do it.
@@ -154,14 +196,11 @@ impl FingeringFinder {
     pub fn best(&self, written: WrittenNote, count: usize) -> Vec<Found> {
         let Some(sounding) = written.sounding(self.transposition) else { return Vec::new() };
         let wanted_hz = sounding.frequency_hz(440.0);
-        let mut found: Vec<Found> =
-            (0..self.grips.len()).filter_map(|grip| self.found(grip, wanted_hz)).collect();
-        let beside = [written.0.checked_sub(1), written.0.checked_add(1)]
-            .map(|note| self.of_chart(WrittenNote(note?)));
-        let beside: Vec<&Grip> = beside.into_iter().flatten().collect();
+        let near =
+            |(grip, resonances): (&Grip, &Vec<_>)| self.found(*grip, resonances, wanted_hz, FARTHEST_CENTS);
+        let mut found: Vec<Found> = self.grips.iter().zip(&self.resonances).filter_map(near).collect();
         for found in &mut found {
-            let moves: usize = beside.iter().map(|grip| grip.moves(&found.grip)).sum();
-            found.cost += worth::WAY * moves as f64 / beside.len().max(1) as f64;
+            found.cost += self.cost_of_the_way(written, &found.grip);
         }
         found.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(a.grip.open.cmp(&b.grip.open)));
         let mut best: Vec<Found> = Vec::new();
@@ -207,13 +246,28 @@ impl FingeringFinder {
         found
     }
 
-    fn found(&self, at: usize, wanted_hz: f64) -> Option<Found> {
-        let (grip, resonances) = (self.grips[at], &self.resonances[at]);
+    /// What the fingers that move from the notes beside, as the chart has them, add to the cost of a grip.
+    fn cost_of_the_way(&self, written: WrittenNote, grip: &Grip) -> f64 {
+        let beside = [written.0.checked_sub(1), written.0.checked_add(1)];
+        let beside: Vec<&Grip> =
+            beside.into_iter().filter_map(|note| self.of_chart(WrittenNote(note?))).collect();
+        let moves: usize = beside.iter().map(|of_chart| of_chart.moves(grip)).sum();
+        worth::WAY * moves as f64 / beside.len().max(1) as f64
+    }
+
+    /// A grip with these resonances, for a note that is at most so many cents away.
+    fn found(
+        &self,
+        grip: Grip,
+        resonances: &[Resonance],
+        wanted_hz: f64,
+        farthest_cents: f64,
+    ) -> Option<Found> {
         let off = |resonance: &Resonance| cents(f64::from(resonance.f_hz), wanted_hz);
         let (index, played) =
             resonances.iter().enumerate().min_by(|a, b| off(a.1).abs().total_cmp(&off(b.1).abs()))?;
         let off = off(played);
-        if off.abs() > FARTHEST_CENTS {
+        if off.abs() > farthest_cents {
             return None;
         }
         let lower = index.checked_sub(1).map(|below| resonances[below].height);

@@ -96,6 +96,15 @@ impl Mechanism {
         found
     }
 
+    /// Names of the holes of an instrument that no finger opens or closes, from the top. Allocates.
+    pub fn unmoved(&self, file: &InstrumentFile) -> Vec<String> {
+        let on = self.on(file);
+        let pads = on.rings.iter().fold(0, |bits, (pad, _)| bits | pad);
+        let moved = on.fingers.iter().flatten().fold(pads, |bits, held| bits | held.closes | held.opens);
+        let unmoved = file.holes.iter().enumerate().filter(|(hole, _)| moved >> hole & 1 == 0);
+        unmoved.map(|(_, hole)| hole.name.clone()).collect()
+    }
+
     /// The mechanism on the holes of an instrument.
     fn on(&self, file: &InstrumentFile) -> OnInstrument {
         let bits = |names: &str| {
