@@ -73,8 +73,9 @@ Examples:
 
 Notes are MIDI numbers (60) or names (C4, F#5, Bb3). The player of a B flat clarinet reads
 *written* notes, which sound two semitones lower. Mouth pressure is given as gamma: the pressure
-in the mouth over the pressure that shuts the reed. Below about 1/3 nothing sounds; near 0.5 the
-reed begins to beat against the lay; at 1 a resting reed would be shut; well above, the note chokes.";
+in the mouth over the pressure that shuts the reed. Notes begin between 0.31 and 0.41; near 0.5
+the reed begins to beat against the lay; at 1 a resting reed would be shut; well above, the note
+chokes.";
 
 /// A clarinet you play by touch: reed, bore with real tone holes, sound.
 #[derive(Parser)]

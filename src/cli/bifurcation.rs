@@ -28,6 +28,9 @@ Examples:
 /// or -1 (falling), rms is the pressure in the mouthpiece over the closing pressure, shut is the fraction of time the reed
 /// is shut. Comments say where the note begins, beats, chokes, returns and ends. Up and down differ because a moving breath
 /// passes a threshold before the note has grown or died. A difference that remains with more --seconds is true hysteresis.
+///
+/// The linear threshold among the comments is that of `chalumeau threshold`: the theory of a reed without inertia. As the reed has inertia,
+/// some high notes, such as C6, begin below it.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct BifurcationCommand {

@@ -164,7 +164,7 @@ fn breath(of: &PerformanceFigure<'_>) -> Panel {
     let top = of.gamma.range().map_or(1.0, |[_, high]| f64::from(high)).max(1.0);
     let axis = Axis::linear("gamma").range(0.0, 1.08 * top);
     let title =
-        "Mouth pressure over the pressure that shuts the reed (dashed: 1/3, below which no note speaks)";
+        "Mouth pressure over the pressure that shuts the reed (dashed: 1/3, the threshold of an ideal reed)";
     Panel::new(title, time("time, s", of.overview), axis)
         .right(SecondAxis::times(1e-3 * of.closing_pa, "kPa"))
         .with(Mark::new(Direction::Y, 1.0 / 3.0, ""))
