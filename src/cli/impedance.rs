@@ -43,6 +43,8 @@ enum Model {
 /// spoils the first one so that the second sounds, a twelfth higher. The reed itself adds a little volume that lowers the
 /// peaks; it is left out unless --reed-volume is given.
 ///
+/// A curve is of one note: choose it with --written. All notes need --peaks.
+///
 /// Columns: f_hz,re_z_over_zc,im_z_over_zc, or with --peaks written_midi,n,f_hz,mag_over_zc,q.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
