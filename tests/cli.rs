@@ -854,3 +854,24 @@ fn silence_has_no_pitch() {
         assert!(page.contains("No note has a pitch"), "{blown}");
     }
 }
+
+#[test]
+fn options_that_would_do_nothing_are_refused() {
+    let d = tempfile::tempdir().unwrap();
+    fs::copy(MELODY, d.path().join("melody.mid")).unwrap();
+    for (line, says) in [
+        ("impedance --all", "add --peaks 8"),
+        ("impedance --all --peaks 3 --from 1000", "--peaks finds peaks wherever they are"),
+        ("radiation --written F4 --width 70", "add --heard position"),
+        ("radiation --written F4 --heard point --distance 2", "add --heard position"),
+        ("reed --law --gamma 0.5", "--gamma"),
+        ("reed --table --zeta 0.2", "--zeta"),
+        ("reed --figure unit --gamma 0.5 --out unit.svg", "--figure orbit"),
+        ("render melody.mid --slurred --out x.wav", "--slurred"),
+        ("render --written C4 --slurred --out x.wav", "--slurred"),
+    ] {
+        refused(&d, line, &[says]);
+    }
+    succeeds(d.path(), "radiation --written F4 --heard position --width 70");
+    succeeds(d.path(), "reed --physical --zeta 0.2");
+}

@@ -37,6 +37,42 @@ enum Model {
     Tmm,
 }
 
+/// Frequencies of the curve.
+#[derive(Args)]
+struct CurveRange {
+    /// First frequency of the curve, Hz [default: 20]
+    #[arg(long, value_name = "HZ", value_parser = |s: &str| within(s, 1.0, 20_000.0))]
+    from: Option<f64>,
+    /// Last frequency of the curve, Hz [default: 4000]
+    #[arg(long, value_name = "HZ", value_parser = |s: &str| within(s, 1.0, 20_000.0))]
+    to: Option<f64>,
+    /// Step of the curve, Hz [default: 1]
+    #[arg(long, value_name = "HZ", value_parser = |s: &str| within(s, 0.001, 1_000.0))]
+    step: Option<f64>,
+}
+
+impl CurveRange {
+    fn is_given(&self) -> bool {
+        self.from.or(self.to).or(self.step).is_some()
+    }
+
+    fn first_hz(&self) -> f64 {
+        self.from.unwrap_or(20.0)
+    }
+
+    fn last_hz(&self) -> f64 {
+        self.to.unwrap_or(4_000.0)
+    }
+
+    fn step_hz(&self) -> f64 {
+        self.step.unwrap_or(1.0)
+    }
+
+    fn steps(&self) -> f64 {
+        ((self.last_hz() - self.first_hz()) / self.step_hz() + 1e-9).floor()
+    }
+}
+
 /// Calculate the input impedance of a fingering at the reed: a curve, or its peaks
 ///
 /// Values are over Zc = rho c / S of the nominal bore, 14.9 mm wide unless the instrument file names another. A clarinet sounds near a peak of its impedance; the register key
@@ -60,15 +96,8 @@ pub struct ImpedanceCommand {
     /// Put the reed's equivalent volume in parallel, as when the clarinet is played
     #[arg(long)]
     reed_volume: bool,
-    /// First frequency of the curve, Hz
-    #[arg(long, value_name = "HZ", default_value = "20", value_parser = |s: &str| within(s, 1.0, 20_000.0))]
-    from: f64,
-    /// Last frequency of the curve, Hz
-    #[arg(long, value_name = "HZ", default_value = "4000", value_parser = |s: &str| within(s, 1.0, 20_000.0))]
-    to: f64,
-    /// Step of the curve, Hz
-    #[arg(long, value_name = "HZ", default_value = "1", value_parser = |s: &str| within(s, 0.001, 1_000.0))]
-    step: f64,
+    #[command(flatten)]
+    range: CurveRange,
     #[command(flatten)]
     air: AirArg,
     #[command(flatten)]
@@ -87,18 +116,24 @@ impl ImpedanceCommand {
         let file = self.instrument.load()?;
         let notes = self.notes.notes(&file)?;
         let (air, volume_m3) = (self.air.air(), if self.reed_volume { file.reed_volume_m3 } else { 0.0 });
-        let steps = ((self.to - self.from) / self.step + 1e-9).floor();
+        let steps = self.range.steps();
         if self.peaks.is_none() && self.notes.one().is_none() {
             let right = "add --peaks 8 for the peaks of all notes, or choose one note with --written";
             return Err(Failure::Usage(format!("a table holds one curve only; {right}")));
         }
         let curve = self.peaks.is_none() || (self.notes.one().is_some() && self.plot.wanted());
+        if !curve && self.range.is_given() {
+            return Err(Failure::Usage(
+                "--from, --to and --step are for a curve, and --peaks finds peaks wherever they are; leave them out, or draw the curve of one note with --written and --plot"
+                    .to_owned(),
+            ));
+        }
         if curve && !(0.0..=POINTS_MAX).contains(&steps) {
             return Err(Failure::Usage(format!(
                 "--from {} --to {} --step {} is {} points; expected 1 to {POINTS_MAX}, with --to above --from",
-                self.from,
-                self.to,
-                self.step,
+                self.range.first_hz(),
+                self.range.last_hz(),
+                self.range.step_hz(),
                 steps + 1.0
             )));
         }
@@ -150,9 +185,9 @@ impl ImpedanceCommand {
         open: &'a [bool],
         volume_m3: f64,
     ) -> impl Iterator<Item = (f64, Complex64)> + 'a {
-        let steps = ((self.to - self.from) / self.step + 1e-9).floor() as u32;
+        let steps = self.range.steps() as u32;
         (0..=steps).map(move |step| {
-            let f_hz = self.from + f64::from(step) * self.step;
+            let f_hz = self.range.first_hz() + f64::from(step) * self.range.step_hz();
             ((f_hz * 1e6).round() / 1e6, bore.impedance(f_hz, open, volume_m3))
         })
     }
@@ -182,7 +217,7 @@ impl ImpedanceCommand {
             let apart: Vec<(f64, f64)> = modes
                 .iter()
                 .zip(&theirs)
-                .filter(|(mode, _)| mode.f_hz <= self.to)
+                .filter(|(mode, _)| mode.f_hz <= self.range.last_hz())
                 .map(|(a, b)| {
                     (cents(a.f_hz, b.f_hz).abs(), 20.0 * (a.mag_over_zc / b.mag_over_zc).log10().abs())
                 })

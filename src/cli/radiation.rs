@@ -2,7 +2,7 @@
 
 use crate::cli::Failure;
 use crate::cli::csv_table::TableArgs;
-use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within};
+use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within_f32};
 use chalumeau_core::instrument::listening::{Listening, ListeningMode};
 use chalumeau_core::measure::radiated_bands::{COUNTED_HZ, RadiatedBand, RadiatedBands, rms_and_worst};
 
@@ -42,18 +42,18 @@ pub struct RadiationCommand {
     /// How one listens
     #[arg(long, value_enum, default_value_t = Heard::Everywhere)]
     heard: Heard,
-    /// Distance from the instrument, m, 0.2..10
-    #[arg(long, value_name = "M", default_value = "1", value_parser = |s: &str| within(s, 0.2, 10.0).map(|x| x as f32))]
-    distance: f32,
-    /// Angle around the player, degrees, -180..180: 0 in front, 90 at the right
-    #[arg(long, value_name = "DEG", default_value = "30", allow_negative_numbers = true, value_parser = |s: &str| within(s, -180.0, 180.0).map(|x| x as f32))]
-    angle: f32,
-    /// Height above the middle of the instrument, m, -1..2
-    #[arg(long, value_name = "M", default_value = "0", allow_negative_numbers = true, value_parser = |s: &str| within(s, -1.0, 2.0).map(|x| x as f32))]
-    height: f32,
-    /// Angle between the left and the right place, degrees, 0..180; 0 is one place
-    #[arg(long, value_name = "DEG", default_value = "0", value_parser = |s: &str| within(s, 0.0, 180.0).map(|x| x as f32))]
-    width: f32,
+    /// Distance from the instrument, m, 0.2..10 [default: 1]
+    #[arg(long, value_name = "M", value_parser = |s: &str| within_f32(s, 0.2, 10.0))]
+    distance: Option<f32>,
+    /// Angle around the player, degrees, -180..180: 0 in front, 90 at the right [default: 30]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = |s: &str| within_f32(s, -180.0, 180.0))]
+    angle: Option<f32>,
+    /// Height above the middle of the instrument, m, -1..2 [default: 0]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = |s: &str| within_f32(s, -1.0, 2.0))]
+    height: Option<f32>,
+    /// Angle between the left and the right place, degrees, 0..180; 0 is one place [default: 0]
+    #[arg(long, value_name = "DEG", value_parser = |s: &str| within_f32(s, 0.0, 180.0))]
+    width: Option<f32>,
     /// At each harmonic of the note instead of in third octaves
     #[arg(long)]
     harmonics: bool,
@@ -67,6 +67,14 @@ pub struct RadiationCommand {
 
 impl RadiationCommand {
     pub fn run(&self) -> Result<(), Failure> {
+        let place = self.distance.or(self.angle).or(self.height).or(self.width);
+        if place.is_some() && self.heard != Heard::Position {
+            return Err(Failure::Usage(
+                "--distance, --angle, --height and --width are for one who listens from a place; add --heard position"
+                    .to_owned(),
+            ));
+        }
+        let width_deg = self.width.unwrap_or(0.0);
         let file = self.instrument.load()?;
         let notes = self.notes.notes(&file)?;
         let air = self.air.air();
@@ -74,14 +82,14 @@ impl RadiationCommand {
         let bands = RadiatedBands::new(&file, air);
         let listening = Listening {
             mode: ListeningMode::Position,
-            distance_m: self.distance,
-            angle_deg: self.angle,
-            height_m: self.height,
-            width_deg: self.width,
+            distance_m: self.distance.unwrap_or(1.0),
+            angle_deg: self.angle.unwrap_or(30.0),
+            height_m: self.height.unwrap_or(0.0),
+            width_deg,
         };
         let paths = match self.heard {
             Heard::Everywhere => vec![Listening::everywhere(bands.sources(), &air)],
-            Heard::Position if self.width > 0.0 => {
+            Heard::Position if width_deg > 0.0 => {
                 [-1.0, 1.0].map(|side| listening.position(side, bands.sources(), &air)).into()
             }
             Heard::Position => vec![listening.position(0.0, bands.sources(), &air)],

@@ -38,6 +38,9 @@ Examples:
 
 /// Host rate at which the note of the orbit is played, Hz.
 const RATE: u32 = 48_000;
+/// Note and mouth pressure of the orbit, unless others are given.
+const ORBIT_NOTE: WrittenNote = WrittenNote(60);
+const ORBIT_GAMMA: f64 = 0.8;
 /// Frames of the sweep and how long each stands, s: ten seconds, smooth enough for the eye.
 const FRAMES: usize = 199;
 const FRAME_S: f64 = 0.05;
@@ -128,15 +131,15 @@ struct Drawing {
     /// Size of a figure, pixels, 400..4000 each way, for example 1600x1000 [default: depends on the figure]
     #[arg(long, value_name = "WxH", requires = "figure")]
     size: Option<Size>,
-    /// Written note of the orbit: a MIDI number (60) or a name
-    #[arg(long, value_name = "NOTE", default_value = "C4", value_parser = note)]
-    written: u8,
-    /// Mouth pressure of the orbit over closing pressure, 0..3
-    #[arg(long, value_name = "G", default_value = "0.8", value_parser = |s: &str| within(s, 0.0, 3.0))]
-    gamma: f64,
-    /// Embouchure of the orbit, or of --physical: flow strength of the reed, 0.05..0.9
-    #[arg(long, value_name = "ZETA", default_value = "0.3", value_parser = |s: &str| within(s, 0.05, 0.9))]
-    zeta: f64,
+    /// Written note of the orbit: a MIDI number (60) or a name [default: C4]
+    #[arg(long, value_name = "NOTE", requires = "figure", conflicts_with_all = ["table", "law", "physical"], value_parser = note)]
+    written: Option<u8>,
+    /// Mouth pressure of the orbit over closing pressure, 0..3 [default: 0.8]
+    #[arg(long, value_name = "G", requires = "figure", conflicts_with_all = ["table", "law", "physical"], value_parser = |s: &str| within(s, 0.0, 3.0))]
+    gamma: Option<f64>,
+    /// Embouchure of the orbit, or of --physical: flow strength of the reed, 0.05..0.9 [default: 0.3]
+    #[arg(long, value_name = "ZETA", conflicts_with_all = ["table", "law"], value_parser = |s: &str| within(s, 0.05, 0.9))]
+    zeta: Option<f64>,
     #[command(flatten)]
     instrument: PlayedArgs,
 }
@@ -163,6 +166,10 @@ impl Which {
 }
 
 impl Drawing {
+    fn zeta(&self) -> f64 {
+        self.zeta.unwrap_or(0.3)
+    }
+
     /// The file of one figure, open before anything is measured.
     fn sheet(&self, which: Which, out: &Path, force: bool) -> Result<(Which, PictureFile), Failure> {
         let mut path = out.to_owned();
@@ -193,6 +200,13 @@ impl Drawing {
             Which::All => Which::value_variants().iter().copied().filter(|&w| w != Which::All).collect(),
             one => vec![one],
         };
+        let of_the_orbit = self.written.is_some() || self.gamma.is_some() || self.zeta.is_some();
+        if of_the_orbit && !wanted.contains(&Which::Orbit) {
+            return Err(Failure::Usage(format!(
+                "--written, --gamma and --zeta are for the orbit, which --figure {} does not draw; leave them out, or take --figure orbit",
+                which.name()
+            )));
+        }
         let orbit = wanted.contains(&Which::Orbit).then(|| self.prepare_orbit()).transpose()?;
         let sheets =
             wanted.iter().map(|&which| self.sheet(which, out, force)).collect::<Result<Vec<_>, _>>()?;
@@ -214,19 +228,20 @@ impl Drawing {
     /// Checks the arguments of the orbit; the returned function plays it.
     fn prepare_orbit(&self) -> Result<impl FnOnce() -> Result<ReedOrbit, Failure> + '_, Failure> {
         let file = self.instrument.load()?;
-        let written = WrittenNote(self.written);
+        let written = self.written.map_or(ORBIT_NOTE, WrittenNote);
+        let gamma = self.gamma.unwrap_or(ORBIT_GAMMA);
+        let zeta = self.zeta();
         let sounding = sounding(&file, written)?;
         Ok(move || {
             let breath_full_kpa = 20.0;
             let settings =
-                Settings { zeta: self.zeta as f32, noise: 0.0, breath_full_kpa, ..Settings::physical() };
+                Settings { zeta: zeta as f32, noise: 0.0, breath_full_kpa, ..Settings::physical() };
             let name = file.name.clone();
             let model = self.instrument.model(file, RATE, settings.a4_hz)?;
-            let period = steady_period::measure(&model, &settings, sounding, self.gamma as f32, RATE).ok_or_else(|| {
+            let period = steady_period::measure(&model, &settings, sounding, gamma as f32, RATE).ok_or_else(|| {
                 Failure::Usage(format!(
-                    "written {written} does not sound at gamma {} and zeta {}; `chalumeau threshold` and `chalumeau \
-                     bifurcation` show where it does",
-                    self.gamma, self.zeta
+                    "written {written} does not sound at gamma {gamma} and zeta {zeta}; `chalumeau threshold` and `chalumeau \
+                     bifurcation` show where it does"
                 ))
             })?;
             let law = settings.reed_law();
@@ -234,11 +249,11 @@ impl Drawing {
             Ok(ReedOrbit {
                 title: format!("{name}, written {written}"),
                 note: format!(
-                    "gamma {}, zeta {}, lay {}; {:.1} Hz. The reed has inertia and damping, so it leaves its curve.",
-                    self.gamma, self.zeta, settings.lay, period.f_hz
+                    "gamma {gamma}, zeta {zeta}, lay {}; {:.1} Hz. The reed has inertia and damping, so it leaves its curve.",
+                    settings.lay, period.f_hz
                 ),
                 closing_pa: settings.closing_pa(),
-                peak_m3s: K_INIT * self.zeta * law.peak_flow() * flow_unit_m3s,
+                peak_m3s: K_INIT * zeta * law.peak_flow() * flow_unit_m3s,
                 lay: f64::from(settings.lay),
                 gamma: period.gamma,
                 step_s: period.step_s,
@@ -282,7 +297,7 @@ impl ReedCommand {
             None => ReedLaw::coupled(h, a)?,
         };
         if self.physical {
-            let zeta = self.drawing.zeta;
+            let zeta = self.drawing.zeta();
             let seed = measured.unwrap_or(DimensionlessReed { h, k: law.k(), a, zeta, area: 1.0 });
             let reed = PhysicalReed::from_dimensionless(&seed, &reference);
             let lay = f64::from(Settings::default().lay);

@@ -85,7 +85,7 @@ pub struct ScoreArgs {
     #[arg(long, value_name = "FROM:TO", value_parser = interval)]
     scale: Option<(u8, u8)>,
     /// Slur the scale instead of tonguing each note
-    #[arg(long, requires = "scale")]
+    #[arg(long, requires = "scale", conflicts_with_all = ["midi", "written", "sounding"])]
     slurred: bool,
     /// Length of the note, or of each note of the scale, s, 0.01..3600 [default: 2, scale 0.5]
     #[arg(long, value_name = "S", conflicts_with = "midi", value_parser = |s: &str| within(s, 0.01, 3600.0))]
