@@ -53,7 +53,7 @@ use chalumeau_core::score::breath::BreathError;
 use chalumeau_core::score::midi_file::MidiFileError;
 use chalumeau_figure::report::ReportError;
 use chalumeau_knob::touch::take_csv::TakeError;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -194,11 +194,23 @@ impl Failure {
 /// Checks that these words, without the program's name, are a valid command. Runs nothing. A test checks the commands in
 /// the documents with it.
 pub fn understands<'a>(words: impl IntoIterator<Item = &'a str>) -> Result<(), String> {
-    match Cli::try_parse_from(std::iter::once("chalumeau").chain(words)) {
+    let words = std::iter::once("chalumeau").chain(words);
+    match hearing_negative_numbers(Cli::command()).try_get_matches_from(words) {
         Err(error) if error.use_stderr() => Err(error.to_string()),
         // Help and version are answers too.
         _ => Ok(()),
     }
+}
+
+/// The command, in which a negative number after an option is its value, so that a range can refuse it. Otherwise it would
+/// be taken for another option.
+fn hearing_negative_numbers(command: clap::Command) -> clap::Command {
+    command
+        .mut_args(|arg| {
+            let takes_value = arg.get_action().takes_values() && !arg.is_positional();
+            if takes_value { arg.allow_negative_numbers(true) } else { arg }
+        })
+        .mut_subcommands(hearing_negative_numbers)
 }
 
 /// Commands that this build lacks.
@@ -218,7 +230,11 @@ pub fn main() -> ExitCode {
             "{command} is not in this build, which has no devices; `cargo build --release` builds all commands"
         )));
     }
-    let command = Cli::parse().command;
+    let matches = hearing_negative_numbers(Cli::command()).get_matches();
+    let command = match Cli::from_arg_matches(&matches) {
+        Ok(parsed) => parsed.command,
+        Err(error) => error.format(&mut Cli::command()).exit(),
+    };
     command.listen_for_interrupts();
     let done = match command {
         Command::Render(command) => command.run(),

@@ -875,3 +875,17 @@ fn options_that_would_do_nothing_are_refused() {
     succeeds(d.path(), "radiation --written F4 --heard position --width 70");
     succeeds(d.path(), "reed --physical --zeta 0.2");
 }
+
+#[test]
+fn negative_numbers_out_of_range_say_what_would_be_right() {
+    let d = tempfile::tempdir().unwrap();
+    for (line, says) in [
+        ("render --written C4 --gamma -1 --out x.wav", "must lie in 0..3"),
+        ("render --written C4 --zeta -0.1 --out x.wav", "must lie in 0.05..0.9"),
+        ("render --written -5 --out x.wav", "must be a MIDI number"),
+        ("threshold --temperature -10", "must lie in 10..40"),
+        ("instrument new --scale -2 --out x.toml", "must lie in 0.2..5"),
+    ] {
+        refused(&d, line, &[says]);
+    }
+}
