@@ -156,7 +156,7 @@ fn instruments_are_made_checked_and_shown() {
     refused(&d, "instrument new --out x.toml", &["--notes", "--scale"]);
     refused(&d, "instrument new --notes E4,C4 --out x.toml", &["C4 comes after E4"]);
     refused(&d, "instrument new --notes C4,X4 --out x.toml", &["\"X4\" must be a MIDI number"]);
-    refused(&d, "instrument new --scale 5 --out x.toml", &["x.toml", "reed_volume_mm3 is 150000"]);
+    refused(&d, "instrument new --scale 5 --out x.toml", &["reed_volume_mm3 is 150000"]);
     refused(&d, "instrument new --notes C-1 --out x.toml", &["an octave of C-1"]);
     refused(&d, "instrument check none.toml", &["cannot read none.toml"]);
     // In tune for the pitch it was made for.
@@ -888,4 +888,17 @@ fn negative_numbers_out_of_range_say_what_would_be_right() {
     ] {
         refused(&d, line, &[says]);
     }
+}
+
+#[test]
+fn a_scale_that_no_file_can_hold_says_which_one_it_can() {
+    let d = tempfile::tempdir().unwrap();
+    for scale in ["5", "2.56", "0.25", "0.2"] {
+        let line = format!("instrument new --scale {scale} --out x.toml");
+        let given = format!("--scale {scale} makes");
+        let says = [given.as_str(), "reed_volume_mm3", "scaled by 0.26 to 2.55"];
+        refused(&d, &line, &says);
+    }
+    succeeds(d.path(), "instrument new --scale 2.55 --out large.toml");
+    succeeds(d.path(), "instrument new --scale 0.26 --out small.toml");
 }

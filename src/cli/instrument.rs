@@ -226,8 +226,9 @@ struct New {
     /// Notes of a cylinder, lowest first, e.g. "D3 E3 F3"
     #[arg(long, value_name = "NOTES")]
     notes: Option<String>,
-    /// Scale factor, 0.2..5; 1.5 is a fifth lower
-    #[arg(long, value_name = "X", value_parser = |s: &str| within(s, 0.2, 5.0))]
+    /// Scale factor, 0.2..5; 1.5 is a fifth lower. The limits of the file format may allow less: the B flat clarinet can be
+    /// scaled by 0.26 to 2.55
+    #[arg(long, value_name = "X", value_parser = |s: &str| within(s, LIMITS_OF_SCALE[0], LIMITS_OF_SCALE[1]))]
     scale: Option<f64>,
     /// Bore of the cylinder, mm, 4..60
     #[arg(long, value_name = "MM", default_value = "14.9", conflicts_with = "scale", value_parser = |s: &str| within(s, 4.0, 60.0))]
@@ -289,6 +290,16 @@ impl New {
 
     fn scaled(&self, factor: f64) -> Result<InstrumentFile, Failure> {
         let original = self.from.load()?;
+        let fits = |factor: f64| InstrumentFile::parse(&original.scaled(factor).to_toml());
+        if let Err(why) = fits(factor) {
+            let [least, most] = LIMITS_OF_SCALE.map(|limit| nearest_to_limit(limit, |f| fits(f).is_ok()));
+            // What a person who typed the number may have meant does not help here.
+            let why = why.to_string();
+            let why = why.split("; this looks like").next().unwrap_or_default();
+            return Err(Failure::Usage(format!(
+                "--scale {factor} makes an instrument that no file can hold: {why}; this instrument can be scaled by {least} to {most}"
+            )));
+        }
         let mut file = original.scaled(factor);
         file.name = self.new.name.clone().unwrap_or_else(|| format!("{} x {factor}", original.name));
         file.source =
@@ -298,6 +309,28 @@ impl New {
         }
         Ok(file)
     }
+}
+
+/// Least and largest scale factor.
+const LIMITS_OF_SCALE: [f64; 2] = [0.2, 5.0];
+
+/// The factor nearest to a limit, in hundredths, that `fits`, as 1 does and those between 1 and it.
+fn nearest_to_limit(limit: f64, fits: impl Fn(f64) -> bool) -> f64 {
+    let hundredths = |factor: f64| (100.0 * factor).round() as i32;
+    let (mut good, mut tried) = (100, hundredths(limit));
+    let mut bad = None;
+    while bad.is_none_or(|bad: i32| (bad - good).abs() > 1) {
+        if fits(f64::from(tried) / 100.0) {
+            good = tried;
+        } else {
+            bad = Some(tried);
+        }
+        match bad {
+            Some(bad) => tried = (good + bad) / 2,
+            None => break,
+        }
+    }
+    f64::from(good) / 100.0
 }
 
 /// Print an instrument as one table: cones, holes, notes
