@@ -4,6 +4,7 @@ use crate::cli::Failure;
 use crate::cli::csv_table::TableArgs;
 use crate::cli::plot_args::PlotArgs;
 use crate::cli::render::progress;
+use crate::cli::score_args::silent_keys;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, note, sounding, within};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
@@ -68,6 +69,9 @@ impl BifurcationCommand {
         let threshold = linear_threshold(&file, written, sounding, &settings);
         let name = file.name.clone();
         let model = self.instrument.model(file, self.rate, settings.a4_hz)?;
+        silent_keys(&[sounding], &model, settings.reach)
+            .iter()
+            .for_each(|warning| eprintln!("warning: {warning}"));
         let bar = progress((2.0 * self.seconds * f64::from(self.rate)) as usize);
         let found = bifurcation::measure(
             &model,

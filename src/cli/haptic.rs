@@ -38,7 +38,7 @@ Examples:
 /// reed as it moves begins to sound.
 ///
 /// Columns: written_midi,gamma_on,gamma_off,p_req_pa,a_on_deg,a_off_deg,a_close_deg,scale_mnm,h,k,gamma_sounding; a note
-/// that cannot sound has nan for its pressures. With --curve: angle_deg,torque_mnm in steps of 0.1 degrees, at rest, positive
+/// for which the theory finds no pressures has nan for them. A note that does not speak in tune and stays silent, such as C#7, has numbers. With --curve: angle_deg,torque_mnm in steps of 0.1 degrees, at rest, positive
 /// against the breath.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]

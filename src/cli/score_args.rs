@@ -380,14 +380,19 @@ fn score_of(notes: &[TimedNote], rate: u32) -> Score {
 
 /// Says which notes the instrument cannot play, which stay silent.
 fn silent_notes(events: &[Timed<PartEvent>], model: &Model, reach: Reach) -> Vec<String> {
-    let file = &model.file;
-    let sounds =
-        |note: WrittenNote| note.sounding(file.transposition).map(|n| n.to_string()).unwrap_or_default();
     let asked = events.iter().filter_map(|timed| match timed.event.event {
         Event::NoteOn { note, .. } => Some(note),
         _ => None,
     });
-    let silent = asked.filter(|&key| reach.fingering(key, model).is_none());
+    silent_keys(&asked.collect::<Vec<_>>(), model, reach)
+}
+
+/// Says which of these keys the instrument cannot play, which stay silent.
+pub(super) fn silent_keys(asked: &[SoundingNote], model: &Model, reach: Reach) -> Vec<String> {
+    let file = &model.file;
+    let sounds =
+        |note: WrittenNote| note.sounding(file.transposition).map(|n| n.to_string()).unwrap_or_default();
+    let silent = asked.iter().copied().filter(|&key| reach.fingering(key, model).is_none());
     let silent: Vec<_> =
         silent.filter_map(|key| reach.find(key, &model.keys, Some).map(|(pitch, _)| pitch.note)).collect();
     let written = |note: SoundingNote| note.written(file.transposition);
