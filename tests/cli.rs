@@ -916,3 +916,20 @@ fn a_note_that_stays_silent_is_told_where_it_is_rendered_and_where_its_breath_sw
     let rows = succeeds(d.path(), "haptic --written C#7");
     assert!(rows.lines().last().unwrap().starts_with("97,0.4"), "{rows}");
 }
+
+#[test]
+fn one_is_not_several() {
+    let d = tempfile::tempdir().unwrap();
+    let made = chalumeau(d.path(), words("instrument new --notes D3,E3 --transposition -3 --out one.toml"));
+    let message = String::from_utf8(made.stderr).unwrap();
+    assert!(message.contains("1 hole, 2 notes "), "{message}");
+    let shown = succeeds(d.path(), "instrument show --instrument one.toml");
+    assert!(shown.contains("sounds 3 semitones above what is written"), "{shown}");
+    fs::write(d.path().join("low.mid"), one_after_another(&[40])).unwrap();
+    let output = chalumeau(d.path(), words("render low.mid --out x.wav"));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("1 note has no fingering and stays silent"), "{message}");
+    // The summary of a command is its first paragraph.
+    let help = succeeds(d.path(), "instrument import -h");
+    assert!(help.starts_with("Make an instrument file from three CSV tables\n\n"), "{help}");
+}

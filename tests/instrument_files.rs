@@ -160,7 +160,7 @@ fn messages_say_which_line_of_which_table() {
             BORE,
             "0.044787,0.0069000",
             "0.044787,\"0,0069\"",
-            "line 5: r_start_m is \"0,0069\"; it must be a number, with a point",
+            "line 5: r_start_m is \"0,0069\"; it must be a number; write it with a point for decimals",
         ),
         (BORE, "0.044787,0.0069000", "0.044787", "bore.csv, line 5: 5 fields; there must be 6"),
         (

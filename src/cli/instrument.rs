@@ -2,7 +2,7 @@
 
 use crate::cli::Failure;
 use crate::cli::csv_table::{TableArgs, quoted};
-use crate::cli::shared_args::{AirArg, InstrumentArg, note, within};
+use crate::cli::shared_args::{AirArg, InstrumentArg, counted, note, within};
 use crate::instrument_path::{self, LoadError};
 use crate::output::NewFile;
 use chalumeau_core::bore::check::Check;
@@ -82,12 +82,12 @@ impl NewInstrument {
         out.write_all(text.as_bytes())?;
         out.keep()?;
         eprintln!(
-            "{}: {}, bore {:.1} mm, {} holes, {} notes {} to {}",
+            "{}: {}, bore {:.1} mm, {}, {} {} to {}",
             self.out.display(),
             file.name,
             1e3 * file.length_m(),
-            file.holes.len(),
-            file.fingerings.len(),
+            counted(file.holes.len(), "hole"),
+            counted(file.fingerings.len(), "note"),
             file.lowest(),
             file.highest()
         );
@@ -99,6 +99,7 @@ impl NewInstrument {
 }
 
 /// Make an instrument file from three CSV tables
+///
 /// The tables have one line for each cone of the bore, each tone hole and each note. The first line names the columns;
 /// lines that begin with # are comments. Column names contain the unit, and radius or diameter: bore x_start_m, x_end_m, r_start_m, r_end_m [part];
 /// holes hole, x_m, hole_radius_m, chimney_height_m [kind, register, description]; fingerings written_note, register, and
@@ -344,14 +345,24 @@ struct Show {
     table: TableArgs,
 }
 
+/// How far an instrument of this transposition sounds below what is written, or above it.
+fn below_what_is_written(transposition: i8) -> String {
+    let semitones = counted(usize::from(transposition.unsigned_abs()), "semitone");
+    match transposition {
+        0 => "what is written".to_owned(),
+        1.. => format!("{semitones} below what is written"),
+        _ => format!("{semitones} above what is written"),
+    }
+}
+
 impl Show {
     fn run(&self) -> Result<(), Failure> {
         let file = self.instrument.load()?;
         let mut table = self.table.open("what,name,x_mm,length_mm,diameter_mm,end_diameter_mm,detail")?;
         table.comment(format_args!("{}", file.name))?;
         table.comment(format_args!(
-            "sounds {} semitones below what is written, {} to {}; reed volume {:.0} mm3",
-            file.transposition,
+            "sounds {}, {} to {}; reed volume {:.0} mm3",
+            below_what_is_written(file.transposition),
             file.lowest(),
             file.highest(),
             1e9 * file.reed_volume_m3

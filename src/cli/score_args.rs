@@ -403,8 +403,13 @@ pub(super) fn silent_keys(asked: &[SoundingNote], model: &Model, reach: Reach) -
     if !missing.is_empty() {
         let (low, high) = (file.lowest(), file.highest());
         said.push(format!(
-            "{} notes have no fingering and stay silent; this instrument sounds {} to {} (written {low} to {high})",
-            missing.len(),
+            "{} no fingering and {} silent; this instrument sounds {} to {} (written {low} to {high})",
+            if missing.len() == 1 {
+                "1 note has".to_owned()
+            } else {
+                format!("{} notes have", missing.len())
+            },
+            if missing.len() == 1 { "stays" } else { "stay" },
             sounds(low),
             sounds(high)
         ));

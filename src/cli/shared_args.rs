@@ -228,15 +228,22 @@ fn say_what_tuning_found(model: &Model, wanted: &Wanted) {
         let notes = model.tuning.notes.iter().filter(|note| which(note));
         notes.map(|note| WrittenNote(note.written).to_string()).collect()
     };
-    for (what, notes) in [
+    for (one, several, notes) in [
         (
-            "sound in their register at one pressure of five or at none, and get the tuning of their neighbours",
+            "sounds in its register at one pressure of five or at none: its key is silent, and it has the tuning of its neighbours",
+            "sound in their register at one pressure of five or at none: their keys are silent, and they have the tuning of their neighbours",
             names(|n| n.silent),
         ),
-        ("cannot be tuned by the delay alone", names(|n| !n.silent && n.off_cents != 0.0)),
+        (
+            "cannot be tuned by the delay alone",
+            "cannot be tuned by the delay alone",
+            names(|n| !n.silent && n.off_cents != 0.0),
+        ),
     ] {
-        if !notes.is_empty() {
-            eprintln!("note: {} {what}", notes.join(" "));
+        match notes.as_slice() {
+            [] => {}
+            [note] => eprintln!("note: {note} {one}"),
+            notes => eprintln!("note: {} {several}", notes.join(" ")),
         }
     }
 }

@@ -92,11 +92,13 @@ pub enum CellsError {
     /// Two junctions are closer than the grid can tell apart.
     #[error(
         "{place} cannot be placed at {rate_hz} Hz: half a sample is {tick_mm:.2} mm, and it would have to move by \
-         {moved_mm:.2} mm to keep its distance from what lies above; a larger instrument or twice the rate has room"
+         {moved_mm:.2} mm to keep its distance from {above}; `--quality high`, with twice the rate, has more room, and so has a larger instrument"
     )]
     Crowded {
         /// What is crowded.
         place: String,
+        /// What lies above it.
+        above: String,
         /// Rate of the grid, Hz.
         rate_hz: f64,
         /// Step of the grid, mm.
@@ -309,7 +311,8 @@ impl Cells {
             let moved = placed as f64 - position - shift;
             if moved > MOVED_TICKS {
                 let (tick_mm, moved_mm) = (1e3 * tick_m, 1e3 * tick_m * moved);
-                return Err(CellsError::Crowded { place: name(Some(index)), rate_hz, tick_mm, moved_mm });
+                let (place, above) = (name(Some(index)), name(index.checked_sub(1)));
+                return Err(CellsError::Crowded { place, above, rate_hz, tick_mm, moved_mm });
             }
             cells.push(Cell { ticks: u32::try_from(ticks).unwrap_or(u32::MAX), radius_m });
         }

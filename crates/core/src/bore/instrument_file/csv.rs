@@ -291,11 +291,14 @@ impl Table {
     fn mm(&self, line: u64, row: &StringRecord, length: &Length) -> Result<f64, ImportError> {
         let given = row.get(length.index).unwrap_or_default();
         let shift = if length.word.unit == Unit::Metres { 3 } else { 0 };
-        shifted(given, shift).map(|mm| if length.word.radius { 2.0 * mm } else { mm }).ok_or_else(|| {
-            self.field(line, length.index, given, "a number, with a point if it is no whole one")
-        })
+        shifted(given, shift)
+            .map(|mm| if length.word.radius { 2.0 * mm } else { mm })
+            .ok_or_else(|| self.field(line, length.index, given, NUMBER))
     }
 }
+
+/// What a length must be: some programs write decimals with a comma.
+const NUMBER: &str = "a number; write it with a point for decimals, such as 7.45";
 
 /// Line, from 1, of the record the reader found beginning at `byte`: past the comments and empty lines before it, which the
 /// reader's own count passes over.

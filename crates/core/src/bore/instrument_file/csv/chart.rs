@@ -131,7 +131,8 @@ impl ChartRow<'_> {
             && right != lower
         {
             let why = if wanted.is_some() { "asked for" } else { "of the lines before" };
-            let lower = format!("{right} semitones below the written note as {why}");
+            let s = if right == 1 { "" } else { "s" };
+            let lower = format!("{right} semitone{s} below the written note as {why}");
             let note = u8::try_from(i64::from(plays) - right).ok().filter(|&midi| midi < 128);
             let expected = match note {
                 Some(midi) => format!("{} ({midi}), {lower}", WrittenNote(midi)),
