@@ -24,7 +24,7 @@ pub enum LoadError {
 pub fn load(path: impl AsRef<Path>) -> Result<InstrumentFile, LoadError> {
     let path = path.as_ref();
     let text =
-        std::fs::read_to_string(path).map_err(|error| LoadError::Read { path: path.to_path_buf(), error })?;
+        crate::text_file::read(path).map_err(|error| LoadError::Read { path: path.to_path_buf(), error })?;
     Ok(InstrumentFile::parse(&text)?)
 }
 

@@ -32,6 +32,7 @@ pub mod scale_file;
 #[cfg(feature = "standalone")]
 pub mod standalone;
 pub mod take_file;
+pub mod text_file;
 pub mod tour;
 #[cfg(feature = "cli")]
 pub mod wav;

@@ -83,6 +83,15 @@ fn missing_files_are_named() {
 }
 
 #[test]
+fn files_in_another_encoding_are_named() {
+    let d = tempfile::tempdir().unwrap();
+    fs::write(d.path().join("latin1.toml"), b"name = \"Fl\xf6te\"\n").unwrap();
+    for line in ["impedance --written C4 --instrument latin1.toml", "batch latin1.toml --into set"] {
+        refused(&d, line, &["latin1.toml", "save it as UTF-8"]);
+    }
+}
+
+#[test]
 fn instrument_files_are_refused_by_field() {
     let d = tempfile::tempdir().unwrap();
     let good = include_str!("../crates/core/data/b_flat_clarinet.toml");
@@ -242,9 +251,10 @@ fn numbers_out_of_range_say_what_would_be_right() {
         ("--gamma 3.5", "must lie in 0..3"),
         ("--gamma nan", "must lie in 0..3"),
         ("--gamma soft", "must be a number in 0..3"),
-        ("--rate 800", "1000..=1536000"),
+        ("--rate 800", "must be a whole number of Hz in 1000..1536000"),
+        ("--rate 44100.5", "must be a whole number of Hz"),
         ("--bits 20", "possible values: 16, 24, 32f"),
-        ("--channels 3", "1..=2"),
+        ("--channels 3", "must be a whole number in 1..2"),
         ("--seconds 0", "must lie in 0.01..3600"),
         ("--zeta 1", "must lie in 0.05..0.9"),
         ("--lay 1", "must lie in 0..0.5"),
@@ -259,7 +269,7 @@ fn numbers_out_of_range_say_what_would_be_right() {
         ("--gamma 2 --breath-full 6", "needs 12.0 kPa"),
         ("--gamma 2 --strength 5", "below gamma 1.34"),
         ("--probe x.wav", "give them different names"),
-        ("--probe-every 0 --probe p.csv", "1..=1000000"),
+        ("--probe-every 0 --probe p.csv", "must be a whole number in 1..1000000"),
         ("--sounding 58", "cannot be used with"),
     ] {
         refused(&d, &format!("{note} {option}"), &[says]);

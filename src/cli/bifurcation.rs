@@ -6,7 +6,7 @@ use crate::cli::plot_args::PlotArgs;
 use crate::cli::render::progress;
 use crate::cli::score_args::silent_keys;
 use crate::cli::settings::SettingsArgs;
-use crate::cli::shared_args::{PlayedArgs, note, sounding, within};
+use crate::cli::shared_args::{PlayedArgs, note, rate, sounding, within};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::bore::transfer_matrix::{TransferMatrix, threshold_gamma};
 use chalumeau_core::instrument::Settings;
@@ -45,7 +45,7 @@ pub struct BifurcationCommand {
     #[arg(long, value_name = "S", default_value = "20", value_parser = |s: &str| within(s, 0.5, 600.0))]
     seconds: f64,
     /// Sample rate, Hz, 1000..1536000
-    #[arg(long, alias = "sr", value_name = "HZ", default_value = "48000", value_parser = clap::value_parser!(u32).range(1_000..=1_536_000))]
+    #[arg(long, alias = "sr", value_name = "HZ", default_value = "48000", value_parser = rate)]
     rate: u32,
     #[command(flatten)]
     instrument: PlayedArgs,

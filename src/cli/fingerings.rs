@@ -2,7 +2,7 @@
 
 use crate::cli::Failure;
 use crate::cli::csv_table::TableArgs;
-use crate::cli::shared_args::{AirArg, InstrumentArg, counted, note};
+use crate::cli::shared_args::{AirArg, InstrumentArg, counted, note, whole};
 use chalumeau_core::bore::fingering_finder::{FingeringFinder, Found};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::units::WrittenNote;
@@ -46,7 +46,7 @@ pub struct FingeringsCommand {
     #[arg(long, conflicts_with_all = ["note", "trill_to"])]
     multiphonic: bool,
     /// How many of the best, 1..1000
-    #[arg(long, value_name = "COUNT", default_value = "10", value_parser = clap::value_parser!(u16).range(1..=1_000))]
+    #[arg(long, value_name = "COUNT", default_value = "10", value_parser = |s: &str| whole::<u16>(s, 1, 1_000))]
     count: u16,
     #[command(flatten)]
     air: AirArg,

@@ -3,7 +3,7 @@
 use crate::cli::Failure;
 use crate::cli::csv_table::TableArgs;
 use crate::cli::plot_args::PlotArgs;
-use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, QualityArg, within};
+use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, QualityArg, whole, within};
 use chalumeau_core::analysis::impedance::cutoff_hz;
 use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
 use chalumeau_core::bore::transfer_matrix::{Peak, TransferMatrix, find_peaks};
@@ -88,7 +88,7 @@ pub struct ImpedanceCommand {
     #[command(flatten)]
     notes: NotesArg,
     /// Table of the first N peaks instead of the curve, 1..30
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=30))]
+    #[arg(long, value_name = "N", value_parser = |s: &str| whole::<u8>(s, 1, 30))]
     peaks: Option<u8>,
     /// Which model calculates the impedance
     #[arg(long, value_enum, default_value_t = Model::Lattice)]

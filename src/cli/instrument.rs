@@ -2,16 +2,16 @@
 
 use crate::cli::Failure;
 use crate::cli::csv_table::{TableArgs, quoted};
-use crate::cli::shared_args::{AirArg, InstrumentArg, counted, note, within};
+use crate::cli::shared_args::{AirArg, InstrumentArg, counted, note, whole, within};
 use crate::instrument_path::{self, LoadError};
 use crate::output::NewFile;
+use crate::text_file;
 use chalumeau_core::bore::check::Check;
 use chalumeau_core::bore::cylinder::Cylinder;
 use chalumeau_core::bore::instrument_file::{ImportDetails, ImportError, InstrumentFile, Sheet};
 use chalumeau_core::instrument::concert_pitch::A4_HZ;
 use chalumeau_core::units::{Air, WrittenNote};
 use clap::{Args, Subcommand};
-use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -67,7 +67,7 @@ struct NewInstrument {
     #[arg(long, value_name = "TEXT")]
     name: Option<String>,
     /// Semitones it sounds below what is written: B flat 2, A 3, E flat -3, bass 14
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(i8).range(-12..=36))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = |s: &str| whole::<i8>(s, -12, 36))]
     transposition: Option<i8>,
 }
 
@@ -132,7 +132,7 @@ struct Import {
 impl Import {
     fn run(&self) -> Result<(), Failure> {
         let read = |path: &Path| {
-            fs::read_to_string(path).map_err(|source| Failure::Read { path: path.to_owned(), source })
+            text_file::read(path).map_err(|source| Failure::Read { path: path.to_owned(), source })
         };
         let texts = [read(&self.bore)?, read(&self.holes)?, read(&self.fingerings)?];
         let names = [&self.bore, &self.holes, &self.fingerings].map(|path| path.display().to_string());

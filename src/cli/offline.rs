@@ -6,7 +6,7 @@
 use crate::cli::batch::plan::Plan;
 use crate::cli::haptic::HapticCommand;
 use crate::cli::settings::SettingsArgs;
-use crate::cli::shared_args::PlayedArgs;
+use crate::cli::shared_args::{PlayedArgs, rate};
 use crate::cli::words::Names;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::{FeelTable, PlayedReed, RequirementSolver};
@@ -34,7 +34,7 @@ struct Line<A: Args> {
 #[derive(Args)]
 struct LiveArgs {
     /// Sample rate, Hz, 1000..1536000
-    #[arg(long, default_value = "48000", value_parser = clap::value_parser!(u32).range(1_000..=1_536_000))]
+    #[arg(long, default_value = "48000", value_parser = rate)]
     rate: u32,
     #[command(flatten)]
     instrument: PlayedArgs,

@@ -6,7 +6,7 @@ use crate::cli::plot_args::PlotArgs;
 use crate::cli::render_job::RenderJob;
 use crate::cli::render_monitor::RenderMonitor;
 use crate::cli::score_args::ScoreArgs;
-use crate::cli::shared_args::within;
+use crate::cli::shared_args::{whole, within};
 use crate::output::NewFile;
 use crate::wav::{Depth, Levels, WavFile};
 use chalumeau_core::instrument::Probe;
@@ -62,13 +62,13 @@ pub struct RenderCommand {
     #[arg(long, value_enum, default_value_t = Bits::Float32, help_heading = "Output")]
     bits: Bits,
     /// Channels: 1 or 2 [default: 2 in a room (--room), for several players, and from two places (--set heard=place), else 1]. Two channels also follow pan (CC10)
-    #[arg(long, value_name = "N", help_heading = "Output", value_parser = clap::value_parser!(u16).range(1..=2))]
+    #[arg(long, value_name = "N", help_heading = "Output", value_parser = |s: &str| whole::<u16>(s, 1, 2))]
     channels: Option<u16>,
     /// CSV file of internal signals over time: mouth pressure, reed opening, flow, mouthpiece and radiated pressure
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     probe: Option<PathBuf>,
     /// Write every Nth internal sample (96 or 88.2 thousand a second) to the probe file
-    #[arg(long, value_name = "N", default_value = "1", requires = "probe", help_heading = "Output", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", default_value = "1", requires = "probe", help_heading = "Output", value_parser = |s: &str| whole::<u32>(s, 1, 1_000_000))]
     probe_every: u32,
     /// Replace existing files
     #[arg(long, help_heading = "Output")]

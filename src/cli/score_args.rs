@@ -5,7 +5,7 @@ use crate::cli::controllers::named_or_file;
 use crate::cli::feel_args::FeelArgs;
 use crate::cli::render_job::RenderJob;
 use crate::cli::settings::SettingsArgs;
-use crate::cli::shared_args::{PlayedArgs, check_fingering, note, sounding, within};
+use crate::cli::shared_args::{PlayedArgs, check_fingering, note, rate, sounding, within};
 use crate::controllers::{ControllerMap, as_links};
 use crate::presets::{self, Preset};
 use crate::scale_file;
@@ -110,7 +110,7 @@ pub struct ScoreArgs {
     #[arg(long, value_name = "FILE", help_heading = "Breath (replaces that of a MIDI file)")]
     replay: Option<PathBuf>,
     /// Sample rate, Hz, 1000..1536000
-    #[arg(long, alias = "sr", value_name = "HZ", default_value = "48000", help_heading = "Output", value_parser = clap::value_parser!(u32).range(1_000..=1_536_000))]
+    #[arg(long, alias = "sr", value_name = "HZ", default_value = "48000", help_heading = "Output", value_parser = rate)]
     rate: u32,
 
     /// Play a preset, a factory preset or one of yours; other flags and --set change it. Its breath response counts, so

@@ -2,6 +2,7 @@
 
 use crate::cli::Failure;
 use crate::cli::reed_physical::PhysicalReedArgs;
+use crate::cli::shared_args::whole;
 use crate::parameters::{self, Kind, Number, PARAMETERS, Parameter, Sets, Value};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::instrument::{BreathResponse, Settings};
@@ -30,7 +31,7 @@ pub struct SettingsArgs {
     #[arg(long, value_name = "RESPONSE", value_parser = breath_response)]
     breath_response: Option<Given>,
     /// How many players play, 1..16; keys that are held together are played by different players [default: 1]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=16))]
+    #[arg(long, value_name = "N", value_parser = |s: &str| whole::<u8>(s, 1, 16))]
     players: Option<u8>,
     /// All players play every note
     #[arg(long)]

@@ -326,6 +326,18 @@ pub fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
     }
 }
 
+/// A whole number inside a range, or what would be right.
+pub fn whole<T: TryFrom<i64>>(text: &str, low: i64, high: i64) -> Result<T, String> {
+    let number = text.parse::<i64>().ok().filter(|number| (low..=high).contains(number));
+    let number = number.and_then(|number| T::try_from(number).ok());
+    number.ok_or_else(|| format!("must be a whole number in {low}..{high}"))
+}
+
+/// A sample rate, Hz, or what would be right.
+pub fn rate(text: &str) -> Result<u32, String> {
+    whole(text, 1_000, 1_536_000).map_err(|_| "must be a whole number of Hz in 1000..1536000".to_owned())
+}
+
 /// As [`within`], for what is stored in single precision.
 pub fn within_f32(text: &str, low: f64, high: f64) -> Result<f32, String> {
     within(text, low, high).map(|x| x as f32)

@@ -2,6 +2,7 @@
 
 use crate::cli::Failure;
 use crate::cli::csv_table::TableArgs;
+use crate::cli::shared_args::whole;
 use chalumeau_knob::touch::study::{StudySide, plan};
 use clap::Args;
 
@@ -20,10 +21,10 @@ Examples:
 #[command(after_help = EXAMPLES)]
 pub struct StudyCommand {
     /// Number of the participant, 1..9999
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=9_999))]
+    #[arg(long, value_name = "N", value_parser = |s: &str| whole::<u32>(s, 1, 9_999))]
     participant: u32,
     /// Seed of the study, 1..9999: the same for all participants
-    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=9_999))]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = |s: &str| whole::<u32>(s, 1, 9_999))]
     seed: u32,
     #[command(flatten)]
     table: TableArgs,

@@ -5,7 +5,7 @@ use crate::cli::csv_table::TableArgs;
 use crate::cli::plot_args::PlotArgs;
 use crate::cli::render::progress;
 use crate::cli::settings::SettingsArgs;
-use crate::cli::shared_args::{NotesArg, PlayedArgs, within};
+use crate::cli::shared_args::{NotesArg, PlayedArgs, rate, within};
 use chalumeau_core::analysis::pitch;
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
 use chalumeau_core::instrument::{BreathResponse, Clarinet, Model, Settings, Tuning};
@@ -54,7 +54,7 @@ pub struct TuneCommand {
     #[arg(long, value_name = "D", value_parser = |s: &str| within(s, 0.0, 1.0))]
     dynamic: Option<f64>,
     /// Sample rate, Hz, 1000..1536000
-    #[arg(long, alias = "sr", value_name = "HZ", default_value = "48000", value_parser = clap::value_parser!(u32).range(1_000..=1_536_000))]
+    #[arg(long, alias = "sr", value_name = "HZ", default_value = "48000", value_parser = rate)]
     rate: u32,
     #[command(flatten)]
     instrument: PlayedArgs,

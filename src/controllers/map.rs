@@ -225,7 +225,7 @@ impl ControllerMap {
     /// Reads a file.
     pub fn load(path: &Path) -> Result<Self, String> {
         let shown = path.display();
-        let text = std::fs::read_to_string(path).map_err(|error| match error.kind() {
+        let text = crate::text_file::read(path).map_err(|error| match error.kind() {
             std::io::ErrorKind::NotFound => {
                 format!(
                     "there is no file {shown}; `chalumeau controllers list` lists the devices that need none"

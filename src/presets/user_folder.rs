@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use super::factory;
 use super::{Preset, checked_name};
 use crate::output::NewFile;
+use crate::text_file;
 
 /// Environment variable that names a directory to use instead of the system's own; for tests and unusual systems.
 pub const VARIABLE: &str = "CHALUMEAU_DATA_DIR";
@@ -179,7 +180,7 @@ pub fn read_file(path: &Path) -> Result<Preset, String> {
     if fs::metadata(path).is_ok_and(|file| file.len() > BYTES_MOST) {
         return Err(format!("has more than {BYTES_MOST} bytes, so it is no preset; move it elsewhere"));
     }
-    let text = fs::read_to_string(path).map_err(|reason| format!("cannot be read: {reason}"))?;
+    let text = text_file::read(path).map_err(|reason| format!("cannot be read: {reason}"))?;
     Preset::parse(&text).map_err(|reason| reason.to_string())
 }
 

@@ -150,7 +150,7 @@ fn instrument(text: &str) -> Result<(InstrumentChoice, String), String> {
         return Ok((choice, String::new()));
     }
     let ids = Bundled::ALL.map(Bundled::id).join(", ");
-    let found = std::fs::read_to_string(text)
+    let found = crate::text_file::read(text)
         .map_err(|reason| format!("{reason}; instruments without a file are {ids}"))?;
     InstrumentFile::parse(&found).map_err(|reason| reason.to_string())?;
     Ok((InstrumentChoice::User, text.to_owned()))

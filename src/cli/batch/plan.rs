@@ -2,9 +2,9 @@
 
 use crate::cli::render::RenderCommand;
 use crate::cli::words::Names;
+use crate::text_file;
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 /// Most files of one batch.
@@ -90,7 +90,7 @@ impl Values {
 impl Plan {
     /// Reads a plan. What is wrong is said without the name of the file.
     pub fn read(path: &Path) -> Result<Self, String> {
-        let text = fs::read_to_string(path).map_err(|error| format!("cannot be read: {error}"))?;
+        let text = text_file::read(path).map_err(|error| format!("cannot be read: {error}"))?;
         if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
             Self::from_csv(&text)
         } else {

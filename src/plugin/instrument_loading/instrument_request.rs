@@ -132,7 +132,7 @@ impl InstrumentRequest {
             Ok(is) if !is.is_file() => return Err(format!("{shown} is not a file")),
             _ => {}
         }
-        let text = std::fs::read_to_string(path)
+        let text = crate::text_file::read(path)
             .map_err(|reason| format!("cannot read {shown}: {reason}; put an instrument file there"))?;
         InstrumentFile::parse(&text).map_err(|reason| format!("{shown}: {reason}"))
     }
