@@ -11,7 +11,7 @@ use std::time::{Duration, SystemTime};
 
 use chalumeau_core::instrument::store::{Key, Store};
 
-use crate::output::NewFile;
+use crate::output::{NewFile, OutputError};
 
 /// Environment variable that names a directory to use instead of the system's own; for tests and unusual systems.
 pub const VARIABLE: &str = "CHALUMEAU_CACHE_DIR";
@@ -58,6 +58,21 @@ impl Cache {
         self.folder.join(format!("{key}.{SUFFIX}"))
     }
 
+    /// Keeps a text under a key, and removes the least recently used entries.
+    ///
+    /// # Errors
+    /// Those of the system, if the folder cannot be written.
+    pub fn keep(&self, key: &Key, body: &str) -> Result<(), OutputError> {
+        let path = self.path(key);
+        fs::create_dir_all(&self.folder)
+            .map_err(|source| OutputError::Write { path: self.folder.clone(), source })?;
+        let mut file = NewFile::create(&path, true)?;
+        write!(file, "{}\n{body}", heading(body)).map_err(|source| OutputError::Write { path, source })?;
+        file.keep()?;
+        self.prune();
+        Ok(())
+    }
+
     fn prune(&self) {
         let Ok(entries) = fs::read_dir(&self.folder) else { return };
         let dated = entries.filter_map(Result::ok).filter_map(|entry| {
@@ -99,18 +114,10 @@ impl Store for Cache {
         })
     }
 
-    /// Keeps a text under a key, and removes the least recently used entries. Reports nothing if the cache cannot be
-    /// written: the program works without it.
+    /// Keeps a text under a key, see [`keep`](Cache::keep). Reports nothing if the cache cannot be written: the program works
+    /// without it.
     fn put(&self, key: &Key, body: &str) {
-        let write = || -> Option<()> {
-            fs::create_dir_all(&self.folder).ok()?;
-            let mut file = NewFile::create(&self.path(key), true).ok()?;
-            write!(file, "{}\n{body}", heading(body)).ok()?;
-            file.keep().ok()
-        };
-        if write().is_some() {
-            self.prune();
-        }
+        let _ = self.keep(key, body);
     }
 }
 
@@ -165,6 +172,7 @@ mod tests {
         fs::write(&file, "in the way").unwrap();
         let cache = Cache::within(&file);
         cache.put(&Key::of(b"one"), "text");
+        assert!(cache.keep(&Key::of(b"one"), "text").unwrap_err().to_string().contains("file"));
         assert_eq!(cache.get(&Key::of(b"one")), None);
         assert_eq!(fs::read(&file).unwrap(), b"in the way");
     }

@@ -943,3 +943,20 @@ fn one_is_not_several() {
     let help = succeeds(d.path(), "instrument import -h");
     assert!(help.starts_with("Make an instrument file from three CSV tables\n\n"), "{help}");
 }
+
+#[test]
+fn a_cache_that_cannot_be_written_is_told_once() {
+    let d = tempfile::tempdir().unwrap();
+    fs::write(d.path().join("in-the-way"), "a file").unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_chalumeau"))
+        .current_dir(d.path())
+        .env("CHALUMEAU_CACHE_DIR", "in-the-way")
+        .args(words("render --written E3 --seconds 0.05 --out x.wav --instrument"))
+        .arg(Path::new(EXAMPLE_INSTRUMENTS).join("cylinder.toml"))
+        .output()
+        .unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{message}");
+    assert!(message.contains("in-the-way"), "{message}");
+    assert_eq!(message.matches("cannot be written").count(), 1, "{message}");
+}

@@ -1,6 +1,6 @@
 //! Arguments that several commands share, and the functions that read them.
 
-use crate::cache::Cache;
+use crate::cache::{Cache, VARIABLE};
 use crate::cli::Failure;
 use crate::instrument_path::{self, LoadError};
 use crate::presets::Preset;
@@ -8,7 +8,7 @@ use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::instrument::concert_pitch::A4_HZ;
 use chalumeau_core::instrument::prepare::{Preparation, Progress};
-use chalumeau_core::instrument::store::Store;
+use chalumeau_core::instrument::store::{Key, Store};
 use chalumeau_core::instrument::tuning_table::NoteTuning;
 use chalumeau_core::instrument::{BuildError, Model, Quality, Wanted};
 use chalumeau_core::score::ScoreError;
@@ -17,7 +17,7 @@ use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, Once};
 
 /// Which instrument.
 #[derive(Args)]
@@ -98,8 +98,8 @@ impl InstrumentArg {
         ) -> Result<Model, BuildError>,
     ) -> Result<Arc<Model>, Failure> {
         let mut bar = None;
-        let cache = Cache::system();
-        let made = make(Cache::store(cache.as_ref()), &mut |progress| {
+        let cache = Cache::system().map(WarningCache);
+        let made = make(cache.as_ref().map(|cache| cache as &dyn Store), &mut |progress| {
             let bar = bar.get_or_insert_with(preparing);
             let (doing, share) = match progress {
                 Progress::Fitting(share) => ("fitting the bore", share),
@@ -117,6 +117,28 @@ impl InstrumentArg {
             (Ok(model), _) => Ok(Arc::new(model)),
             (Err(source), Some(path)) => Err(Failure::Instrument { path: path.clone(), source }),
             (Err(source), None) => Err(source.into()),
+        }
+    }
+}
+
+/// The cache; where it cannot be written, a warning says so once.
+struct WarningCache(Cache);
+
+impl Store for WarningCache {
+    fn get(&self, key: &Key) -> Option<String> {
+        self.0.get(key)
+    }
+
+    fn put(&self, key: &Key, body: &str) {
+        static WARNED: Once = Once::new();
+        if self.0.keep(key, body).is_err() {
+            let folder = self.0.folder().display();
+            WARNED.call_once(|| {
+                eprintln!(
+                    "warning: {folder} cannot be written, so the prepared instrument is not kept, and the next command prepares it again; \
+                     {VARIABLE} names another folder"
+                );
+            });
         }
     }
 }
