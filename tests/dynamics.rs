@@ -188,7 +188,7 @@ fn with_a_knob_sound_begins_where_the_hand_feels_the_threshold() {
 fn slurs_arrive_at_every_dynamic() {
     let mut slurs = Vec::new();
     for from in NOTES.step_by(2) {
-        for interval in [1_i16, -1, 2, -4, 7, -7, 12, -12, 19] {
+        for interval in [1_i16, -1, 2, -4, 7, -7, 12, -12, -13, -16, 19, -19, -24] {
             if let Some(to) = u8::try_from(i16::from(from) + interval).ok().filter(|to| NOTES.contains(to)) {
                 slurs.extend([16, 64, 112].map(|value| (from, to, value)));
             }
@@ -201,6 +201,25 @@ fn slurs_arrive_at_every_dynamic() {
     });
     let lost: Vec<_> =
         slurs.iter().zip(&arrived).filter(|(_, arrived)| !**arrived).map(|(slur, _)| slur).collect();
+    println!("{} of {} slurs do not arrive: {lost:?}", lost.len(), slurs.len());
+    assert!(lost.is_empty());
+}
+
+/// From the clarion and the throat to written E flat 6..F#6; softer, F#6 falls into a lower mode.
+#[test]
+fn slurs_into_the_altissimo_arrive() {
+    let mut slurs = Vec::new();
+    for from in (69..=84).step_by(3) {
+        for to in 87..=90 {
+            slurs.extend([44, 78, 112].map(|value| (from, to, value)));
+        }
+    }
+    let off: Vec<f64> = each(slurs.len(), |n| {
+        let (from, to, value) = slurs[n];
+        let events = [(0.0, controller(value)), (0.0, key(from)), (0.4, key(to))];
+        heard(&rendered(&still(), &events, 1.1), 0.8, 1.1, to).1
+    });
+    let lost: Vec<_> = slurs.iter().zip(&off).filter(|(_, off)| off.abs() > 20.0).collect();
     println!("{} of {} slurs do not arrive: {lost:?}", lost.len(), slurs.len());
     assert!(lost.is_empty());
 }

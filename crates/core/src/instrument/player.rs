@@ -421,6 +421,10 @@ impl Player {
             place: model.place(fingering),
         });
         match (slur, self.settings.breath_response) {
+            (Some(slur), BreathResponse::Played) if slur.is_tongued() => {
+                self.tongue.hold_for(slur::HIGH_TONGUE_S);
+                self.move_holes(fingering, 1e-3 * TONGUED_FINGERS_MS, model, voice);
+            }
             (Some(slur), BreathResponse::Played) => {
                 let gamma = self.breath.gamma();
                 self.lip_glide.help(slur.lip_help(gamma));

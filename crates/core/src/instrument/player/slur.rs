@@ -8,6 +8,9 @@
 //! leak in the middle of the bore, where the old note, as the second mode of the long tube, has its pressure, and the new one has
 //! little. Meanwhile the lip damps the reed a little more, which weakens the second mode more than the first. The breath goes on: a dip of
 //! it did the same, but left a hole of 30 dB. Softer, or into the throat, the same order of the fingers would only make a bump.
+//!
+//! Two kinds of slur do not arrive so. Leaps down into the chalumeau by more than an octave keep the twelfth at any dynamic: the lip takes
+//! nearly all of the old note away, which is heard as a light tongue. And from below nothing leads to the highest notes: these are tongued.
 
 use super::lip_glide::LipHelp;
 
@@ -25,7 +28,21 @@ const NARROW: (f64, f64) = (950.0, 0.5);
 /// arrive, with 1.5 and 1.75 some do not; the stronger, the deeper the hole (`docs/tone.md`). In 20 ms a slur from written B4 to B3 is 2.8 dB
 /// louder on the way at CC 58.
 const DAMPED: LipHelp = LipHelp { damping: 1.85, length_s: 0.025 };
-/// Factor on the legato time in such a leap. Measured: six slurs are more than 2 dB louder on the way than either note at 1.6, none here; at 2.2 three are lost.
+/// Leaps down into the chalumeau over more than so many cents: more than an octave.
+const WIDE_CENTS: f64 = 1_250.0;
+/// What the lip does in these. Of 188 from written B4..C6 into E3..A#4, each at CC 16, 58, 78 and 108, 345 of 752 stay on the old mode without
+/// it, 79 with a factor of 3 for 50 ms, 4 with 4 for 60 ms, and none with 6 for 70 ms, at CC 8 to 127. A bump on the way, of up to 14 dB,
+/// goes too (`docs/tone.md`).
+const WIDE_DAMPED: LipHelp = LipHelp { damping: 6.0, length_s: 0.07 };
+/// Factor on the legato time in these. Measured with a factor of 4: at 1.8 the holes are 3 to 4 dB deeper, and as many slurs arrive.
+const WIDE_TIME: f64 = 1.0;
+/// Notes above this place (written E flat 6 and higher of a B flat clarinet) are tongued where a slur comes from a lower register. Slurred to
+/// F#6, the clarion stays a fifth lower at any breath, and to F6 and E flat 6 at some, whatever fingers and lip do.
+const HIGH_PLACE: f64 = 0.7;
+/// How long the tongue holds the reed there, s. Measured at CC 30 to 127, from written A4..C6: after 20 ms 20 slurs to these notes are lost, after 30 ms
+/// one. Other notes take 8 ms.
+pub(super) const HIGH_TONGUE_S: f64 = 0.03;
+/// Factor on the legato time in a leap that begins at the mouth. Measured: six slurs are more than 2 dB louder on the way than either note at 1.6, none here; at 2.2 three are lost.
 const LEAP_TIME: f64 = 1.8;
 /// Factor on the legato time of a slur up over the break: the shorter, the shallower the hole and the louder the click. Measured at 0.6 and
 /// 0.4: nine tenths of the holes of octaves are 10.5 and 8.6 dB deep, of all clicks 2.8 and 3.7 dB loud. Without breath nobody hurries: the
@@ -74,6 +91,16 @@ impl Slur {
         leaps && gamma >= if leap_cents < NARROW.0 { NARROW.1 } else { BEATING }
     }
 
+    /// Whether it leaps down into the chalumeau by more than an octave.
+    fn is_wide(&self) -> bool {
+        self.registers.0 > self.registers.1 && self.registers.1 == 1 && -self.interval_cents > WIDE_CENTS
+    }
+
+    /// Whether the tongue begins the new note all the same.
+    pub fn is_tongued(&self) -> bool {
+        self.registers.0 < self.registers.1 && self.place > HIGH_PLACE
+    }
+
     /// Whether both notes lie in one register, so that the air column goes on as it swings.
     pub fn is_within_a_register(&self) -> bool {
         self.registers.0 == self.registers.1
@@ -81,14 +108,19 @@ impl Slur {
 
     /// What a player's lip does at a mouth over closing pressure; `None` where the fingers are enough.
     pub fn lip_help(&self, gamma: f64) -> Option<LipHelp> {
+        if self.is_wide() {
+            return Some(WIDE_DAMPED);
+        }
         self.is_hard(gamma).then_some(DAMPED)
     }
 
     /// What a player's fingers do at a mouth over closing pressure.
     pub fn walk(&self, gamma: f64) -> Walk {
-        let mouth_first = self.is_hard(gamma);
+        let is_wide = self.is_wide();
+        let mouth_first = is_wide || self.is_hard(gamma);
         Walk {
             time: match self.registers {
+                _ if is_wide => WIDE_TIME,
                 _ if mouth_first => LEAP_TIME,
                 (1, 2) if gamma > 0.0 => UP_TIME,
                 (2, 1) => DOWN_TIME,
@@ -118,13 +150,26 @@ mod tests {
             (slur(12.0, (1, 2), 0.1), 0.9),
             (slur(-2.0, (2, 1), -0.5), 0.9),
             (slur(-11.0, (2, 2), 0.0), 0.9),
-            (slur(-12.0, (3, 2), 0.2), 0.9),
+            (slur(-14.0, (3, 2), 0.2), 0.9),
         ];
         assert!(leap.lip_help(0.46).is_some() && leap.walk(0.6).mouth_first);
         assert!(slur(-8.0, (2, 1), -0.6).lip_help(0.51).is_some());
         for (other, gamma) in others {
             assert_eq!(other.lip_help(gamma), None, "{other:?}");
             assert!(!other.walk(gamma).mouth_first, "{other:?}");
+        }
+    }
+
+    #[test]
+    fn leaps_down_by_more_than_an_octave_always_need_the_lip_and_the_highest_notes_the_tongue() {
+        for registers in [(2, 1), (3, 1)] {
+            let leap = slur(-13.0, registers, -0.1);
+            assert_eq!(leap.lip_help(0.1), Some(WIDE_DAMPED));
+            assert!(leap.walk(0.1).mouth_first && leap.walk(0.1).time == WIDE_TIME && !leap.is_tongued());
+        }
+        assert!(slur(7.0, (2, 3), 0.72).is_tongued() && slur(19.0, (1, 3), 0.72).is_tongued());
+        for other in [slur(4.0, (2, 3), 0.67), slur(1.0, (3, 3), 0.8), slur(-1.0, (3, 3), 0.72)] {
+            assert!(!other.is_tongued(), "{other:?}");
         }
     }
 

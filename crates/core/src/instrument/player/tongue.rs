@@ -48,7 +48,12 @@ impl Default for Tongue {
 impl Tongue {
     /// Prepares a tongued note.
     pub fn hold(&mut self) {
-        self.position = Position::Holding(HOLD_S);
+        self.hold_for(HOLD_S);
+    }
+
+    /// Prepares a note that begins this much later, s, while the one before still sounds.
+    pub fn hold_for(&mut self, seconds: f64) {
+        self.position = Position::Holding(seconds);
     }
 
     /// Stops the note.
