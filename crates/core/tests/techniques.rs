@@ -163,6 +163,27 @@ fn a_subtone_is_dark_at_the_same_fundamental_and_in_tune() {
     assert!(darkest < -14.0);
 }
 
+/// Written A4 to C6, tongued into the subtone, softly and loud: the note of the key, and hardly softer.
+#[test]
+fn above_the_break_a_subtone_neither_silences_a_note_nor_leaves_it_to_a_lower_mode() {
+    let plain = Settings { noise: 0.0, life: 0.0, ..Settings::default() };
+    let covered = Settings { techniques: Techniques { subtone: 1.0, ..Techniques::default() }, ..plain };
+    for written in [71, 72, 74, 77, 81, 84] {
+        for breath in [0.3, 0.62] {
+            let [without, with] = [&plain, &covered].map(|settings| held(settings, written, breath));
+            let off =
+                fundamental_hz(&with, RATE_HZ).map(|hz| cents(hz, sounding(written).frequency_hz(440.0)));
+            let hz = sounding(written).frequency_hz(440.0);
+            let softer = level_db(&without, hz) - level_db(&with, hz);
+            println!("{written} at {breath}: {off:?} cents, {softer:.1} dB softer");
+            assert!(
+                off.is_some_and(|off| off.abs() < 15.0) && softer < 4.0,
+                "{written} at {breath}: {off:?} {softer}"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_tract_bends_a_high_note_by_900_cents_without_a_break_and_keeps_its_level() {
     for (written, seconds) in [(84, 3.0), (79, 3.0), (84, 2.0), (79, 2.0)] {

@@ -9,7 +9,7 @@ use super::lip_glide::NoteLip;
 use super::onset_shift::ReedAtNote;
 use super::response::LIP_S;
 use super::step_towards;
-use super::technique::subtone::covered;
+use super::technique::subtone::{at_place, covered};
 use super::voicing;
 use crate::instrument::bend::{self, BendSplit};
 use crate::instrument::lip::{Embouchure, embouchure};
@@ -162,6 +162,8 @@ impl Posture {
             damping: lip.damping * f64::from(settings.damping),
             swept_s: model.swept_s,
         };
+        let place = model.place(fingering);
+        let subtone = at_place(subtone, place);
         let free = covered(free, subtone);
         let offset = bend_cents
             + cents(f64::from(settings.a4_hz), model.a4_hz)
@@ -170,7 +172,6 @@ impl Posture {
         let response = settings.breath_response;
         let split = BendSplit::new(offset, bend::lip_limit_cents(model, fingering, offset, response));
         let rate_hz = model.coeffs.rate_hz;
-        let place = model.place(fingering);
         let placed = model.player.at(place);
         let played = match response {
             BreathResponse::Physical => None,
