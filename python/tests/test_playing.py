@@ -108,7 +108,7 @@ def test_instruments_come_as_path_text_dict_and_object(tmp_path):
 
 
 def test_silent_notes_are_warned_of():
-    with pytest.warns(UserWarning, match="1 notes have no fingering"):
+    with pytest.warns(UserWarning, match="1 note has no fingering"):
         chalumeau.render([(0.0, 0.1, 20)])
 
 
