@@ -53,7 +53,8 @@ use chalumeau_core::score::breath::BreathError;
 use chalumeau_core::score::midi_file::MidiFileError;
 use chalumeau_figure::report::ReportError;
 use chalumeau_knob::touch::take_csv::TakeError;
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{Parser, Subcommand};
+use std::ffi::OsString;
 use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -194,12 +195,18 @@ impl Failure {
 /// Checks that these words, without the program's name, are a valid command. Runs nothing. A test checks the commands in
 /// the documents with it.
 pub fn understands<'a>(words: impl IntoIterator<Item = &'a str>) -> Result<(), String> {
-    let words = std::iter::once("chalumeau").chain(words);
-    match hearing_negative_numbers(Cli::command()).try_get_matches_from(words) {
+    match parse::<Cli>(std::iter::once("chalumeau").chain(words)) {
         Err(error) if error.use_stderr() => Err(error.to_string()),
         // Help and version are answers too.
         _ => Ok(()),
     }
+}
+
+/// As [`Parser::try_parse_from`], but hears negative numbers as values.
+fn parse<P: Parser>(words: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> Result<P, clap::Error> {
+    let mut command = hearing_negative_numbers(P::command());
+    let matches = command.try_get_matches_from_mut(words)?;
+    P::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
 }
 
 /// The command, in which a negative number after an option is its value, so that a range can refuse it. Otherwise it would
@@ -230,10 +237,9 @@ pub fn main() -> ExitCode {
             "{command} is not in this build, which has no devices; `cargo build --release` builds all commands"
         )));
     }
-    let matches = hearing_negative_numbers(Cli::command()).get_matches();
-    let command = match Cli::from_arg_matches(&matches) {
+    let command = match parse::<Cli>(std::env::args_os()) {
         Ok(parsed) => parsed.command,
-        Err(error) => error.format(&mut Cli::command()).exit(),
+        Err(error) => error.exit(),
     };
     command.listen_for_interrupts();
     let done = match command {

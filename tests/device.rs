@@ -716,13 +716,19 @@ fn a_refused_feel_is_explained_and_not_repeated() {
     assert_eq!(bench.count(|m| matches!(m, Message::Feel(_))), 1, "what has no sense is not sent at all");
 }
 
-#[test]
-fn zero_is_not_moved_under_an_armed_hand() {
+/// A knob that has been turned since its power-up.
+fn turned() -> Bench {
     let mut bench = Bench::new(Binding::Serial);
     bench.device.counts = 500;
     bench.run(300);
     bench.device.counts = 700;
     bench.run(50);
+    bench
+}
+
+#[test]
+fn zero_is_not_moved_under_an_armed_hand() {
+    let mut bench = turned();
     bench.session.zero();
     bench.run(100);
     assert_eq!(bench.session.state().unwrap().angle, 0);
@@ -743,11 +749,7 @@ fn zero_is_not_moved_under_an_armed_hand() {
 
 #[test]
 fn zero_and_arm_in_one_breath_zero_first() {
-    let mut bench = Bench::new(Binding::Serial);
-    bench.device.counts = 500;
-    bench.run(300);
-    bench.device.counts = 700;
-    bench.run(50);
+    let mut bench = turned();
     bench.session.zero();
     bench.session.arm(100, false, bench.now_us);
     bench.run(200);

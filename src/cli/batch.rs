@@ -2,10 +2,10 @@
 
 pub(super) mod plan;
 
-use crate::cli::Failure;
 use crate::cli::csv_table::{CsvTable, quoted};
 use crate::cli::render::{RenderCommand, Rendered};
 use crate::cli::shared_args::counted;
+use crate::cli::{Failure, parse};
 use chalumeau_core::instrument::side_by_side;
 use clap::{Args, Parser};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -99,7 +99,7 @@ impl BatchCommand {
         }
         let there = if self.force { HashMap::new() } else { earlier.lines_by_arguments() };
         if self.force {
-            // From the first file on it lists what is there no more; the same command without --force can then go on.
+            // It lists files that are about to be replaced. Without it, the same command can go on after a stop, without --force.
             let _ = fs::remove_file(self.into.join(MANIFEST));
         }
         let growing = self.into.join(GROWING);
@@ -191,7 +191,7 @@ impl BatchCommand {
                 self.into.join(&file).to_string_lossy().into_owned(),
                 "--force".to_owned(),
             ]);
-            let parsed = RenderLine::try_parse_from(&words).map_err(|error| {
+            let parsed = parse::<RenderLine>(&words).map_err(|error| {
                 // Clap's own text without its "error: " and usage.
                 let text = error.to_string();
                 let first = text.lines().next().unwrap_or_default().trim_start_matches("error: ");

@@ -67,7 +67,7 @@ struct NewInstrument {
     #[arg(long, value_name = "TEXT")]
     name: Option<String>,
     /// Semitones it sounds below what is written: B flat 2, A 3, E flat -3, bass 14
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = |s: &str| whole::<i8>(s, -12, 36))]
+    #[arg(long, value_name = "N", value_parser = |s: &str| whole::<i8>(s, -12, 36))]
     transposition: Option<i8>,
 }
 

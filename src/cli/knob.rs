@@ -133,11 +133,12 @@ impl KnobCommand {
         let wanted = WantedFeel { feels, design, fingering, may_weaken: self.feel.may_weaken() };
         let ceiling_mnm = self.arm.unwrap_or(100.0);
         // What is refused on any knob is refused before one is looked for.
-        let (note, design) = wanted.under(&TorqueLimits { ceiling_mnm, ..TorqueLimits::default() })?;
+        let (note, _) = wanted.under(&TorqueLimits { ceiling_mnm, ..TorqueLimits::default() })?;
         self.ask_again()?;
         let take = match &self.record {
             Some(path) => {
-                let remarks = [format!("written {} of {}, {design:?}", written.0, file.name)];
+                let remarks =
+                    [format!("written {} of {}, asked for {:?}", written.0, file.name, wanted.design)];
                 Some(TakeFile::create(path, self.force, &remarks)?)
             }
             None => None,

@@ -5,6 +5,7 @@
 
 use crate::cli::batch::plan::Plan;
 use crate::cli::haptic::HapticCommand;
+use crate::cli::parse;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, rate};
 use crate::cli::words::Names;
@@ -46,7 +47,7 @@ struct LiveArgs {
 fn read<A: Args>(pairs: &Pairs) -> Result<A, String> {
     let words = Names::of::<A>().words_of_program(pairs)?;
     let line = std::iter::once("chalumeau".to_owned()).chain(words);
-    Line::<A>::try_parse_from(line).map(|line| line.args).map_err(|error| {
+    parse::<Line<A>>(line).map(|line| line.args).map_err(|error| {
         // Clap's own text without its "error: ", usage and hint.
         let text = error.to_string();
         let said = text.split("\n\n").next().unwrap_or_default();

@@ -46,10 +46,10 @@ pub struct RadiationCommand {
     #[arg(long, value_name = "M", value_parser = |s: &str| within_f32(s, 0.2, 10.0))]
     distance: Option<f32>,
     /// Angle around the player, degrees, -180..180: 0 in front, 90 at the right [default: 30]
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = |s: &str| within_f32(s, -180.0, 180.0))]
+    #[arg(long, value_name = "DEG", value_parser = |s: &str| within_f32(s, -180.0, 180.0))]
     angle: Option<f32>,
     /// Height above the middle of the instrument, m, -1..2 [default: 0]
-    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = |s: &str| within_f32(s, -1.0, 2.0))]
+    #[arg(long, value_name = "M", value_parser = |s: &str| within_f32(s, -1.0, 2.0))]
     height: Option<f32>,
     /// Angle between the left and the right place, degrees, 0..180; 0 is one place [default: 0]
     #[arg(long, value_name = "DEG", value_parser = |s: &str| within_f32(s, 0.0, 180.0))]

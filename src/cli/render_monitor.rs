@@ -3,7 +3,7 @@
 use crate::cli::Failure;
 use crate::cli::render_job::RenderJob;
 use chalumeau_core::analysis::overview::{Envelope, Overview, Watcher};
-use chalumeau_core::instrument::Probe;
+use chalumeau_core::instrument::{Probe, Settings};
 use chalumeau_core::measure::notes::{MeasuredNote, NoteMeter};
 use chalumeau_core::score::NoteSpan;
 use chalumeau_figure::Figure;
@@ -63,6 +63,7 @@ impl RenderMonitor {
             (sounding.from as f64..sounding.to as f64).contains(&at)
         };
         let a4_hz = f64::from(prepared.settings.a4_hz);
+        let gain_db = f64::from(prepared.settings.gain_db - Settings::default().gain_db);
         let period_s = soundings
             .iter()
             .find(within)
@@ -73,7 +74,7 @@ impl RenderMonitor {
         let internal = (seconds * internal_hz).ceil() as usize;
         Ok(Self {
             watcher: Watcher::new(score.samples, rate_hz, COLUMNS),
-            listener: NoteMeter::new(soundings.clone(), rate_hz, a4_hz),
+            listener: NoteMeter::new(soundings.clone(), rate_hz, a4_hz, gain_db),
             gamma: Envelope::new(internal, COLUMNS),
             moment: ReedCloseUp {
                 from_s: near.0 as f64 / internal_hz,

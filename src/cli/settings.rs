@@ -102,7 +102,6 @@ impl NumberFlags {
             .long(long(parameter))
             .value_name(value_name)
             .help(format!("{}, {range} [default: {default}]", parameter.meaning))
-            .allow_negative_numbers(min < 0.0)
             .action(ArgAction::Set)
             .value_parser(move |text: &str| flag_value(&number, text))
     }
@@ -379,6 +378,7 @@ impl SettingsArgs {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::parse;
     use clap::Parser;
 
     #[derive(Parser)]
@@ -389,8 +389,7 @@ mod tests {
 
     /// Settings of a command line, or what is said against it.
     fn read(words: &[&str]) -> Result<Settings, String> {
-        let line =
-            Line::try_parse_from(std::iter::once(&"program").chain(words)).map_err(|e| e.to_string())?;
+        let line = parse::<Line>(std::iter::once(&"program").chain(words)).map_err(|e| e.to_string())?;
         line.settings.played(&InstrumentFile::built_in()).map_err(|failure| failure.to_string())
     }
 

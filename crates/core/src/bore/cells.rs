@@ -92,7 +92,7 @@ pub enum CellsError {
     /// Two junctions are closer than the grid can tell apart.
     #[error(
         "{place} cannot be placed at {rate_hz} Hz: half a sample is {tick_mm:.2} mm, and it would have to move by \
-         {moved_mm:.2} mm to keep its distance from {above}; `--quality high`, with twice the rate, has more room, and so has a larger instrument"
+         {moved_mm:.2} mm to keep its distance from {above}; quality High, with twice the rate, has more room, and so has a larger instrument"
     )]
     Crowded {
         /// What is crowded.

@@ -2,7 +2,7 @@
 //!
 //! `breath` follows a breath source or key velocity, and [`response`] makes a mouth pressure of it: directly, or by the rule in
 //! [`dynamics`] that moves breath and lip together; there the [`ear`] pushes what is too soft. `tongue` articulates: overlapping
-//! notes are slurred (the holes move and the tongue stays away); after a gap the tongue holds the reed while the breath rises
+//! notes are slurred (the holes move and the tongue stays away, but before the highest notes); after a gap the tongue holds the reed while the breath rises
 //! behind it, and lets go. `fingers` moves the holes, `tuning` the pitch, and `posture` holds what settings, fingering and bend
 //! ask for. `life` and [`vibrato`] sway all of it, `attack` shapes how a note begins, `slur` helps difficult ones, `inflection`
 //! scoops and falls, and `inhalation` is the breath in after a phrase.
@@ -422,6 +422,7 @@ impl Player {
         });
         match (slur, self.settings.breath_response) {
             (Some(slur), BreathResponse::Played) if slur.is_tongued() => {
+                self.lip_glide.help(None);
                 self.tongue.hold_for(slur::HIGH_TONGUE_S);
                 self.move_holes(fingering, 1e-3 * TONGUED_FINGERS_MS, model, voice);
             }

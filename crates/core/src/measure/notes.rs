@@ -12,7 +12,7 @@ use crate::units::cents;
 /// Longest part of a note that is measured, s: ten times what a pitch within 0.1 cents needs.
 pub const LONGEST_S: f64 = 3.0;
 
-/// Softer notes have no pitch, dBFS. Without breath the click of the tongue rings on at -88 dBFS in a note of 0.2 s, and at
+/// Softer notes have no pitch, dBFS at the usual gain. Without breath the click of the tongue rings on at -88 dBFS in a note of 0.2 s, and at
 /// less than -120 in one of 0.5 s. The softest dynamic of a player is above -45.
 pub const LEAST_DBFS: f64 = -75.0;
 
@@ -21,7 +21,7 @@ pub const LEAST_DBFS: f64 = -75.0;
 pub struct MeasuredNote {
     /// Which note, and when it is heard.
     pub span: NoteSpan,
-    /// Its pitch, Hz; `None` if it has none, or is softer than [`LEAST_DBFS`].
+    /// Its pitch, Hz; `None` if it has none, or is too soft for one: see [`NoteMeter::new`].
     pub hz: Option<f64>,
     /// Its deviation from equal temperament, cents; `None` if it has no pitch.
     pub cents: Option<f64>,
@@ -33,6 +33,7 @@ pub struct MeasuredNote {
 pub struct NoteMeter {
     rate_hz: f64,
     a4_hz: f64,
+    least_dbfs: f64,
     notes: std::vec::IntoIter<NoteSpan>,
     now: Option<NoteSpan>,
     kept: Vec<f64>,
@@ -42,11 +43,13 @@ pub struct NoteMeter {
 
 impl NoteMeter {
     /// A meter for the [`note_spans`](crate::score::Score::note_spans) of a score, which must be in order of time. `rate_hz` is
-    /// that of the samples; `a4_hz` is the pitch of A4 for the deviation in cents.
-    pub fn new(notes: Vec<NoteSpan>, rate_hz: f64, a4_hz: f64) -> Self {
+    /// that of the samples; `a4_hz` is the pitch of A4 for the deviation in cents. What is softer than [`LEAST_DBFS`] and `gain_db`,
+    /// which lies above the usual gain, together has no pitch.
+    pub fn new(notes: Vec<NoteSpan>, rate_hz: f64, a4_hz: f64, gain_db: f64) -> Self {
         let mut notes = notes.into_iter();
         let now = notes.next();
-        Self { rate_hz, a4_hz, notes, now, kept: Vec::new(), at: 0, measured: Vec::new() }
+        let least_dbfs = LEAST_DBFS + gain_db;
+        Self { rate_hz, a4_hz, least_dbfs, notes, now, kept: Vec::new(), at: 0, measured: Vec::new() }
     }
 
     /// Takes the next samples. Allocates.
@@ -89,7 +92,7 @@ impl NoteMeter {
             refine_hz(&self.kept, self.rate_hz, wanted_hz)
                 .or_else(|| fundamental_hz(&self.kept, self.rate_hz))
         };
-        let hz = if level_dbfs < LEAST_DBFS { None } else { pitch() };
+        let hz = if level_dbfs < self.least_dbfs { None } else { pitch() };
         self.measured.push(MeasuredNote { span, hz, cents: hz.map(|hz| cents(hz, wanted_hz)), level_dbfs });
         self.kept.clear();
     }
@@ -129,7 +132,7 @@ mod tests {
         let (notes, samples) = tones();
         let mut all = Vec::new();
         for block in [64, 4_800, 1_000_000] {
-            let mut meter = NoteMeter::new(notes.clone(), 48_000.0, 440.0);
+            let mut meter = NoteMeter::new(notes.clone(), 48_000.0, 440.0, 0.0);
             samples.chunks(block).for_each(|block| meter.hear(block));
             all.push(meter.finish());
         }
@@ -146,7 +149,7 @@ mod tests {
     #[test]
     fn a_note_cut_off_is_measured_and_silence_has_no_pitch() {
         let (notes, samples) = tones();
-        let mut meter = NoteMeter::new(notes, 48_000.0, 440.0);
+        let mut meter = NoteMeter::new(notes, 48_000.0, 440.0, 0.0);
         meter.hear(&samples[..18_000]);
         let heard = meter.finish();
         assert!(heard[0].cents.is_some());
@@ -158,9 +161,11 @@ mod tests {
     fn what_is_softer_than_any_note_has_no_pitch() {
         let (notes, samples) = tones();
         // The tones are at -9 dBFS.
-        for (down_db, pitches) in [(65.0, 3), (67.0, 0)] {
+        for (down_db, gain_db, pitches) in
+            [(65.0, 0.0, 3), (67.0, 0.0, 0), (77.0, -12.0, 3), (79.0, -12.0, 0)]
+        {
             let factor = 10f32.powf(-down_db / 20.0);
-            let mut meter = NoteMeter::new(notes.clone(), 48_000.0, 440.0);
+            let mut meter = NoteMeter::new(notes.clone(), 48_000.0, 440.0, gain_db);
             meter.hear(&samples.iter().map(|sample| factor * sample).collect::<Vec<_>>());
             let heard = meter.finish();
             assert_eq!(heard.iter().filter(|note| note.hz.is_some()).count(), pitches, "{heard:?}");

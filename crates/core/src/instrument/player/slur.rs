@@ -37,7 +37,8 @@ const WIDE_DAMPED: LipHelp = LipHelp { damping: 6.0, length_s: 0.07 };
 /// Factor on the legato time in these. Measured with a factor of 4: at 1.8 the holes are 3 to 4 dB deeper, and as many slurs arrive.
 const WIDE_TIME: f64 = 1.0;
 /// Notes above this place (written E flat 6 and higher of a B flat clarinet) are tongued where a slur comes from a lower register. Slurred to
-/// F#6, the clarion stays a fifth lower at any breath, and to F6 and E flat 6 at some, whatever fingers and lip do.
+/// F#6, the clarion stays a fifth lower at any breath, and to F6 and E flat 6 at some, whatever the fingers do; a lip that damps the reed less
+/// makes them arrive, but 10 dB louder on the way.
 const HIGH_PLACE: f64 = 0.7;
 /// How long the tongue holds the reed there, s. Measured at CC 30 to 127, from written A4..C6: after 20 ms 20 slurs to these notes are lost, after 30 ms
 /// one. Other notes take 8 ms.
