@@ -410,6 +410,7 @@ mod tests {
             ("p.toml", "[vary]\nwriten = [\"C4\"]\n", "written"),
             ("p.toml", "[vary]\nout = [\"x.wav\"]\n", "out"),
             ("p.toml", "[vary]\n", "nothing varies"),
+            ("p.toml", "[vary]\ngamma = [-1]\n", "0..3"),
             ("p.toml", "vary = 3", "invalid type"),
             ("r.csv", "written,gamma\nC4\n", "line 2"),
             ("r.csv", "", "names"),
