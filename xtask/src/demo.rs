@@ -109,7 +109,7 @@ fn comparison(left: &[f32], right: &[f32], rendered: &[f32]) -> String {
 }
 
 fn table(samples: &[f32], score: &Score) -> String {
-    let mut listener = NoteMeter::new(score.note_spans(), f64::from(RATE), A4_HZ);
+    let mut listener = NoteMeter::new(score.note_spans(), f64::from(RATE), A4_HZ, 0.0);
     listener.hear(samples);
     let heard = listener.finish();
     let mut text = "   at   sounds  written   length       Hz    cents   level\n".to_owned();
