@@ -21,6 +21,7 @@ use anyhow::{Context, Result, bail, ensure};
 use chalumeau_core::analysis::steady_note::SteadyNote;
 use chalumeau_core::instrument::player::dynamics::{MEZZO_FORTE, PlayerModel};
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
+use chalumeau_core::instrument::prepare::auto_tune::Accuracy;
 use chalumeau_core::instrument::prepare::play_dynamics;
 use chalumeau_core::instrument::presence::Presence;
 use chalumeau_core::instrument::{Model, Settings};
@@ -312,7 +313,8 @@ impl Data {
         let fingerings: Vec<usize> =
             self.notes.iter().filter_map(|note| model.fingering_for(SoundingNote(note.midi))).collect();
         let go_on = &mut |_| ControlFlow::Continue(());
-        model.tuning = play_dynamics::learn_again(&model, &fingerings, go_on).context("not cancelled")?;
+        model.tuning = play_dynamics::learn_again(&model, &fingerings, Accuracy::FINE, go_on)
+            .context("not cancelled")?;
         let model = Arc::new(model);
         let settings = Settings::default();
         let settings = Settings { gain_db: settings.gain_db - HEADROOM_DB, ..settings };

@@ -247,8 +247,8 @@ fn learn_dynamics(instrument: Bundled, name: &str, model: Model, again: Option<V
         ControlFlow::Continue(())
     };
     let tuning = match again {
-        Some(again) => play_dynamics::learn_again(&model, &again, &mut on),
-        None => play_dynamics::learn(&model, &mut on),
+        Some(again) => play_dynamics::learn_again(&model, &again, Accuracy::FINE, &mut on),
+        None => play_dynamics::learn(&model, Accuracy::FINE, &mut on),
     };
     let tuning = tuning.context("not cancelled")?;
     keep(instrument, PreparedInstrument::of(&Model { tuning, ..model }))
@@ -260,7 +260,8 @@ fn check_dynamics(name: &str, model: &Model) -> Result<()> {
         .step_by(CHECKED_NOTES)
         .collect();
     let worst_of = |at: usize| {
-        let (kept, again) = (model.tuning.notes[notes[at]], play_dynamics::learn_note(model, notes[at])?);
+        let (kept, again) =
+            (model.tuning.notes[notes[at]], play_dynamics::learn_note(model, notes[at], Accuracy::FINE)?);
         let off = |a: [f64; NODES], b: [f64; NODES]| {
             a.into_iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
         };

@@ -55,7 +55,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let on = &mut |_| ControlFlow::Continue(());
         let tuning = auto_tune::tune_again(&model, &notes, Accuracy::QUICK, on).ok_or("ended")?;
         let model = Model { tuning, ..model };
-        let tuning = play_dynamics::learn_again(&model, &notes, on).ok_or("ended")?;
+        let tuning = play_dynamics::learn_again(&model, &notes, Accuracy::QUICK, on).ok_or("ended")?;
         println!(
             "{name} {rate_hz} tuned cpu_s {:.2} sum {:016x}",
             cpu_s() - cpu,

@@ -25,6 +25,8 @@ pub mod onset;
 pub mod overview;
 pub mod partials;
 pub mod pitch;
+#[cfg(feature = "fit")]
+pub(crate) mod slower;
 pub mod spectrum;
 pub mod steady_note;
 pub mod yin;

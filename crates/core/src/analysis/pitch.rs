@@ -15,6 +15,7 @@ use realfft::RealFftPlanner;
 use std::array;
 use std::cell::RefCell;
 use std::f64::consts::PI;
+use std::sync::LazyLock;
 
 thread_local! {
     /// Sizes are powers of two, so few plans are ever made; making one takes longer than using it.
@@ -113,7 +114,9 @@ pub fn periodicity(samples: &[f64], rate_hz: f64, f0_hz: f64) -> f64 {
     }
     let samples = without_mean(samples);
     // Taps stand at whole + 1 - HALF ..= whole + HALF after the sample compared.
-    let window: Vec<f64> = cosine_window(2 * HALF * 64, &BLACKMAN_HARRIS).collect();
+    static WINDOW: LazyLock<Vec<f64>> =
+        LazyLock::new(|| cosine_window(2 * HALF * 64, &BLACKMAN_HARRIS).collect());
+    let window = &*WINDOW;
     let taps: Vec<f64> = (0..2 * HALF)
         .map(|tap| {
             let x = tap as f64 + 1.0 - HALF as f64 - part;

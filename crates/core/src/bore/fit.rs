@@ -20,7 +20,7 @@ use crate::bore::instrument_file::{Fingering, InstrumentFile};
 use crate::bore::lattice::LatticeCoeffs;
 use crate::bore::lattice::sensitivity::{AtFrequency, Layout, Sweep, hole_admittances};
 use crate::bore::transfer_matrix::TransferMatrix;
-use crate::parallel::each_part;
+use crate::parallel::{self, each_part};
 use crate::units::Air;
 
 /// A relative change of a radius or loss that costs as much as two cents on one peak.
@@ -285,30 +285,43 @@ fn targets(
 ) -> Option<Vec<Group>> {
     let model = TransferMatrix::new(file, *air);
     model.prepare_peaks(&mut |share| on(SHARES.0 * 0.9 * share))?;
-    let mut groups = Vec::new();
-    for (open, (holes, weight)) in fingerings.iter().enumerate() {
-        for (n, peak) in model.peaks(holes, 0.0, 5).iter().enumerate() {
-            // A peak lower than a few Zc is a shoulder of its neighbour: nothing sounds there.
-            if peak.mag_over_zc > 3.0 {
-                let z = model.impedance(peak.f_hz, holes, 0.0);
-                let weight = weight * if n < 3 { 1.0 } else { 0.2 };
-                let targets = vec![Target { open, z, weight, q: Some(peak.q) }];
-                groups.push(Group { f_hz: peak.f_hz, targets });
-            }
-        }
-    }
+    let on = &mut |share: f64| on(SHARES.0 * (0.9 + 0.1 * share));
     let size = file.length_m() / LENGTH_M;
-    for n in 0..CURVE_POINTS {
-        let nominal_hz = CURVE_HZ.0 + (CURVE_HZ.1 - CURVE_HZ.0) * (n as f64 + 0.5) / CURVE_POINTS as f64;
-        let f_hz = nominal_hz / size;
-        let weight = CURVE_WEIGHT * if nominal_hz < CURVE_FULL_HZ { 1.0 } else { 0.3 };
-        let target = |(open, (holes, _)): (usize, &(Vec<bool>, f64))| {
-            let z = model.impedance(f_hz, holes, 0.0);
-            Target { open, z, weight, q: None }
-        };
-        groups.push(Group { f_hz, targets: fingerings.iter().enumerate().map(target).collect() });
-    }
-    on(SHARES.0).is_continue().then_some(groups)
+    let groups = parallel::each(
+        fingerings.len() + CURVE_POINTS,
+        |at| match fingerings.get(at) {
+            Some((holes, weight)) => peak_groups(&model, at, holes, *weight),
+            None => vec![curve_group(&model, at - fingerings.len(), size, fingerings)],
+        },
+        on,
+    )?;
+    Some(groups.into_iter().flatten().collect())
+}
+
+/// One group for each of the first five peaks of a fingering.
+fn peak_groups(model: &TransferMatrix, open: usize, holes: &[bool], weight: f64) -> Vec<Group> {
+    let peaks = model.peaks(holes, 0.0, 5);
+    // A peak lower than a few Zc is a shoulder of its neighbour: nothing sounds there.
+    let heard = peaks.iter().enumerate().filter(|(_, peak)| peak.mag_over_zc > 3.0);
+    heard
+        .map(|(n, peak)| {
+            let z = model.impedance(peak.f_hz, holes, 0.0);
+            let weight = weight * if n < 3 { 1.0 } else { 0.2 };
+            Group { f_hz: peak.f_hz, targets: vec![Target { open, z, weight, q: Some(peak.q) }] }
+        })
+        .collect()
+}
+
+/// Point `n` of the impedance curve, for all fingerings.
+fn curve_group(model: &TransferMatrix, n: usize, size: f64, fingerings: &[(Vec<bool>, f64)]) -> Group {
+    let nominal_hz = CURVE_HZ.0 + (CURVE_HZ.1 - CURVE_HZ.0) * (n as f64 + 0.5) / CURVE_POINTS as f64;
+    let f_hz = nominal_hz / size;
+    let weight = CURVE_WEIGHT * if nominal_hz < CURVE_FULL_HZ { 1.0 } else { 0.3 };
+    let target = |(open, (holes, _)): (usize, &(Vec<bool>, f64))| {
+        let z = model.impedance(f_hz, holes, 0.0);
+        Target { open, z, weight, q: None }
+    };
+    Group { f_hz, targets: fingerings.iter().enumerate().map(target).collect() }
 }
 
 /// Cuts and fits a bore for the lattice at `rate_hz`; `on` hears the share done and may end it, then there is no result.

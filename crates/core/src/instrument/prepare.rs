@@ -28,6 +28,8 @@ pub mod play_dynamics;
 mod prepared_file;
 #[cfg(feature = "fit")]
 mod scale;
+#[cfg(feature = "fit")]
+mod trial_pitch;
 mod wanted;
 
 use std::ops::ControlFlow;
@@ -161,7 +163,8 @@ impl Preparation<'_> {
             .ok_or(BuildError::Cancelled)?;
         let model = Model { tuning, ..Model::clone(&model) };
         let mut playing_share = |share| on(Progress::Tuning(TUNED + (1.0 - TUNED) * share));
-        let tuning = play_dynamics::learn(&model, &mut playing_share).ok_or(BuildError::Cancelled)?;
+        let tuning =
+            play_dynamics::learn(&model, Accuracy::QUICK, &mut playing_share).ok_or(BuildError::Cancelled)?;
         let model = Model { tuning, ..model };
         self.keep(Stored::Tuned, &model)?;
         Ok(model)

@@ -9,9 +9,9 @@
 
 use std::ops::ControlFlow;
 
-use crate::analysis::pitch;
 use crate::instrument::held_note::HeldNote;
 use crate::instrument::model::Model;
+use crate::instrument::prepare::trial_pitch::trial_pitch_hz;
 use crate::instrument::side_by_side::{self, Stand};
 use crate::instrument::tuning_table::{GAMMA_NODES, NATURAL_GAMMA, NoteTuning, TuningTable};
 use crate::units::cents;
@@ -43,13 +43,16 @@ pub struct Accuracy {
     sure_cents: f64,
     /// Whether the sensitivity is measured around the trim, by two more plays, or taken from the way there.
     around: bool,
+    /// Whether a note that is lost where it is soft is tried from every softer beginning before its range of level is narrowed; else
+    /// only while that brings it further down. Concerns some of the highest notes.
+    pub(super) every_beginning: bool,
 }
 
 impl Accuracy {
     /// Within 0.1 cents: for a user who waits.
-    pub const QUICK: Self = Self { close_cents: 0.1, sure_cents: 2.0, around: false };
+    pub const QUICK: Self = Self { close_cents: 0.1, sure_cents: 2.0, around: false, every_beginning: false };
     /// Within 0.03 cents: for the instruments that come with the program. Takes half as long again.
-    pub const FINE: Self = Self { close_cents: 0.02, sure_cents: 0.2, around: true };
+    pub const FINE: Self = Self { close_cents: 0.02, sure_cents: 0.2, around: true, every_beginning: true };
 }
 
 /// From when to when the pitch of a held note is measured, s: near the threshold a note grows slowly.
@@ -74,9 +77,7 @@ async fn heard_within(
 ) -> Option<f64> {
     let (from_s, to_s) = listening_s(model, note.gamma);
     let sound = note.radiated_beside(stand, model, from_s, to_s).await;
-    let hz = pitch::fundamental_hz(&sound, model.coeffs.rate_hz)?;
-    (cents(hz, wanted_hz).abs() < own_cents && pitch::periodicity(&sound, model.coeffs.rate_hz, hz) > 0.9)
-        .then_some(hz)
+    trial_pitch_hz(&sound, model.coeffs.rate_hz).filter(|hz| cents(*hz, wanted_hz).abs() < own_cents)
 }
 
 /// One note at one mouth pressure.

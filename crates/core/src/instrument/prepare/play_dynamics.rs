@@ -8,11 +8,12 @@
 
 use std::ops::ControlFlow;
 
-use crate::analysis::pitch;
 use crate::instrument::held_note::{HeldNote, TONGUE_HOLD_S};
 use crate::instrument::model::Model;
 use crate::instrument::played_note::PlayedNote;
 use crate::instrument::player::dynamics::{LOWEST_ONSET, NODE_DYNAMICS, NODES};
+use crate::instrument::prepare::auto_tune::Accuracy;
+use crate::instrument::prepare::trial_pitch::trial_pitch_hz;
 use crate::instrument::side_by_side::{self, BlownBeside, Stand};
 use crate::instrument::tuning_table::{NoteTuning, TuningTable};
 use crate::instrument::voice::{Drive, TICK};
@@ -27,8 +28,6 @@ const CLOSE_CENTS: f64 = 0.2;
 const IN_TUNE_CENTS: f64 = 1.0;
 /// A pitch further off than this is another note, cents.
 const OTHER_CENTS: f64 = 150.0;
-/// Least periodicity of a note.
-const PERIODIC: f64 = 0.9;
 /// Largest number of corrections of the trim at one dynamic.
 const TRIMS: usize = 3;
 /// Mouth pressures that are tried for the loudest dynamic, over that of the rule. Tongued harder, some notes begin in another
@@ -37,6 +36,8 @@ const LOUDEST: [f64; 6] = [1.0, 0.92, 0.84, 0.76, 0.68, 0.6];
 /// Ranges of level that are tried, over that of the rule: a note of the altissimo that falls into another register where it
 /// is soft is not played so softly.
 const RANGES: [f64; 6] = [1.0, 0.8, 0.6, 0.45, 0.3, 0.2];
+/// The loudest dynamics, from this one on, may be lost because the note is too loud; those below, because it is too soft.
+const SOFT: usize = NODES - 2;
 /// Excess of the pressure at dynamic 0 over that at 1, where the controller begins.
 const SOFTER: f64 = 0.2;
 /// The controller moves the logarithm of the excess of the mouth pressure over [`LOWEST_ONSET`]: mouth over closing pressure for
@@ -91,12 +92,15 @@ struct Diminuendo<'a> {
     longer: f64,
 }
 
-/// What every note of a model asks of the player, on all cores, given the trims of its table; takes some ten
-/// seconds on two cores.
-/// `on` receives the share done, 0..=1; if it breaks, the result is `None`.
-pub fn learn(model: &Model, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Option<TuningTable> {
+/// What every note of a model asks of the player, on all cores, given the trims of its table; takes some seconds on
+/// two cores. `on` receives the share done, 0..=1; if it breaks, the result is `None`.
+pub fn learn(
+    model: &Model,
+    accuracy: Accuracy,
+    on: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Option<TuningTable> {
     let all: Vec<usize> = (0..model.tuning.notes.len()).collect();
-    learn_again(model, &all, on)
+    learn_again(model, &all, accuracy, on)
 }
 
 /// What some fingerings of a model ask of the player, as [`learn`]; the others stay as they are. An index that the model lacks does
@@ -104,13 +108,14 @@ pub fn learn(model: &Model, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Optio
 pub fn learn_again(
     model: &Model,
     fingerings: &[usize],
+    accuracy: Accuracy,
     on: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Option<TuningTable> {
     let mut notes = model.tuning.notes.clone();
     let fingerings: Vec<usize> = fingerings.iter().copied().filter(|&at| at < notes.len()).collect();
     let learnt = async |stand: &Stand, at: usize| {
         let (fingering, note) = (fingerings[at], model.tuning.notes[fingerings[at]]);
-        let learnt = if note.silent { None } else { learn_beside(stand, model, fingering).await };
+        let learnt = if note.silent { None } else { learn_beside(stand, model, fingering, accuracy).await };
         // What cannot be played gets the pressures of other notes.
         let unheard = || PlayedNote { rows: [note.natural; NODES], ..PlayedNote::default() };
         NoteTuning { played: learnt.unwrap_or_else(unheard), ..note }
@@ -125,24 +130,33 @@ pub fn learn_again(
 /// What one note asks of the player; `None` if it leaves its register whatever is tried.
 ///
 /// A note that is out of tune where it is loudest is played less loudly, down to 0.6 of the rule's pressure; then the best is taken.
-pub fn learn_note(model: &Model, fingering: usize) -> Option<PlayedNote> {
-    side_by_side::alone(async |stand| learn_beside(stand, model, fingering).await)
+pub fn learn_note(model: &Model, fingering: usize, accuracy: Accuracy) -> Option<PlayedNote> {
+    side_by_side::alone(async |stand| learn_beside(stand, model, fingering, accuracy).await)
 }
 
-async fn learn_beside(stand: &Stand, model: &Model, fingering: usize) -> Option<PlayedNote> {
+async fn learn_beside(
+    stand: &Stand,
+    model: &Model,
+    fingering: usize,
+    accuracy: Accuracy,
+) -> Option<PlayedNote> {
     let tuned = model.tuning.notes.get(fingering)?;
     let gamma = model.player.loudest_gamma(model.place(fingering));
     // What is lost at the loudest dynamic is lost whatever the range.
     let mut speaks = [true; LOUDEST.len()];
     for range in RANGES {
         let mut best: Option<(f64, PlayedNote)> = None;
+        let mut softest = NODES;
         for (share, speaks) in LOUDEST.into_iter().zip(&mut speaks).filter(|(_, speaks)| **speaks) {
             let most_cents = best.map_or(f64::INFINITY, |(least, _)| least);
             match descend(stand, model, fingering, tuned, share * gamma, range, most_cents).await {
                 Ok((off_cents, note)) if off_cents < IN_TUNE_CENTS => return Some(note),
                 Ok(found) => best = Some(found),
                 Err(Lost::AtLoudest) => *speaks = false,
-                Err(Lost::Later) => {}
+                Err(Lost::At(node)) if node < softest.min(SOFT) => softest = node,
+                // Where a note is lost because it is soft, it is mostly lost if it begins more softly, too.
+                Err(Lost::At(node)) if node < SOFT && !accuracy.every_beginning => break,
+                Err(Lost::At(_) | Lost::OutOfTune) => {}
             }
         }
         if let Some((_, note)) = best {
@@ -156,7 +170,10 @@ async fn learn_beside(stand: &Stand, model: &Model, fingering: usize) -> Option<
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Lost {
     AtLoudest,
-    Later,
+    /// At a softer one, by its number.
+    At(usize),
+    /// Not better in tune than what is known.
+    OutOfTune,
 }
 
 /// Plays the diminuendo from a mouth pressure `gamma`, over a part of the rule's range of level. Gives the note and its largest error
@@ -181,12 +198,12 @@ async fn descend(
             let excess = SOFTER.powf(softer) * (note.held.gamma - LOWEST_ONSET).max(1e-3);
             note.go_to(dynamic, LOWEST_ONSET + excess).await;
         }
-        let lost = if loudest.is_none() { Lost::AtLoudest } else { Lost::Later };
+        let lost = if loudest.is_none() { Lost::AtLoudest } else { Lost::At(node) };
         let heard = note.settle(tuned.sensitivity).await.ok_or(lost)?;
         loudest = loudest.or(Some(heard.power));
         off_cents = off_cents.max(heard.off_cents.abs());
         if off_cents >= most_cents {
-            return Err(Lost::Later);
+            return Err(Lost::OutOfTune);
         }
         (gammas[node], amplitudes[node], rows[node]) = (heard.gamma, heard.amplitude, note.held.rows);
     }
@@ -298,10 +315,8 @@ impl<'a> Diminuendo<'a> {
         })
         .await;
         let rate_hz = self.model.coeffs.rate_hz;
-        let hz = pitch::fundamental_hz(&sound, rate_hz)?;
-        let off_cents = cents(hz, self.model.notes_hz[self.fingering]);
-        let is_own = off_cents.abs() < OTHER_CENTS && pitch::periodicity(&sound, rate_hz, hz) > PERIODIC;
-        is_own.then_some(Heard {
+        let off_cents = cents(trial_pitch_hz(&sound, rate_hz)?, self.model.notes_hz[self.fingering]);
+        (off_cents.abs() < OTHER_CENTS).then_some(Heard {
             gamma: sum / ticks,
             power: sound.iter().map(|x| x * x).sum::<f64>() / sound.len() as f64,
             amplitude: (square / ticks).sqrt(),
@@ -318,8 +333,10 @@ mod tests {
     fn a_note_is_learnt_anew_as_it_came_with_the_program() {
         let model = Model::built_in(48_000.0).unwrap();
         for fingering in [0, 24] {
-            let (kept, again) =
-                (model.tuning.notes[fingering].played, learn_note(&model, fingering).unwrap());
+            let (kept, again) = (
+                model.tuning.notes[fingering].played,
+                learn_note(&model, fingering, Accuracy::QUICK).unwrap(),
+            );
             for node in 0..NODES {
                 assert!((kept.gammas[node] - again.gammas[node]).abs() < 1e-3, "{fingering}: {again:?}");
                 assert!((kept.amplitudes[node] / again.amplitudes[node] - 1.0).abs() < 0.01);

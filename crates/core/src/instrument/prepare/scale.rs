@@ -4,10 +4,13 @@
 //! resonance moves by the same interval. Theory gives a first factor, so that hardly any instrument has to be fitted twice;
 //! the played notes give a second one where it is needed. Factors above 1 make the bore longer and the pitch lower.
 
-use crate::bore::instrument_file::InstrumentFile;
+use std::ops::ControlFlow;
+
+use crate::bore::instrument_file::{Fingering, InstrumentFile};
 use crate::bore::transfer_matrix::TransferMatrix;
 use crate::instrument::concert_pitch::A4_HZ;
 use crate::instrument::model::Model;
+use crate::parallel;
 use crate::units::{Air, cents};
 
 /// Error of the theory (a reed without inertia or damping), cents: notes of the built-in clarinet play 20 to 70 cents
@@ -35,16 +38,14 @@ fn leave_out_wrong_names<T>(notes: &mut Vec<T>, off: impl Fn(&T) -> f64) {
 /// Factor for a pitch of A4, Hz; also corrects an instrument whose notes lie elsewhere than its chart says.
 pub fn by_theory(file: &InstrumentFile, air: &Air, a4_hz: f64) -> f64 {
     let model = TransferMatrix::new(file, *air);
-    let mut offsets: Vec<f64> = file
-        .fingerings
-        .iter()
-        .filter(|fingering| fingering.mode <= 2)
-        .filter_map(|fingering| {
-            let wanted = fingering.written.sounding(file.transposition)?.frequency_hz(A4_HZ);
-            let (hz, _) = model.playing_frequency(&fingering.open, file.reed_volume_m3, wanted)?;
-            Some(cents(hz, wanted))
-        })
-        .collect();
+    let low: Vec<&Fingering> = file.fingerings.iter().filter(|fingering| fingering.mode <= 2).collect();
+    let off_cents = |at: usize| {
+        let wanted = low[at].written.sounding(file.transposition)?.frequency_hz(A4_HZ);
+        let (hz, _) = model.playing_frequency(&low[at].open, file.reed_volume_m3, wanted)?;
+        Some(cents(hz, wanted))
+    };
+    let heard = parallel::each(low.len(), off_cents, &mut |_| ControlFlow::Continue(()));
+    let mut offsets: Vec<f64> = heard.into_iter().flatten().flatten().collect();
     leave_out_wrong_names(&mut offsets, |&off| off);
     let mean = offsets.iter().sum::<f64>() / offsets.len().max(1) as f64;
     let sharp = if (THEORY_CENTS..MOST_CENTS).contains(&mean.abs()) { mean } else { 0.0 };
