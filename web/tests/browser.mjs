@@ -442,6 +442,8 @@ const TESTS = {
     const { page, context, errors } = await open(browser, server.address);
     await page.evaluate(() => navigator.serviceWorker.ready);
     await page.waitForFunction(async () => (await caches.keys()).some((name) => name.startsWith('chalumeau-')) && navigator.serviceWorker.controller);
+    // What is still on its way would fail, which the browser notes as an error.
+    await page.waitForLoadState('networkidle');
     await context.setOffline(true);
     await page.reload();
     await page.waitForFunction(() => globalThis.chalumeau?.engine.node);

@@ -37,7 +37,7 @@ export async function open(browser, address, options = {}) {
   const page = await context.newPage();
   const errors = [];
   page.on('pageerror', (error) => errors.push(String(error)));
-  page.on('console', (message) => message.type() === 'error' && errors.push(message.text()));
+  page.on('console', (message) => message.type() === 'error' && errors.push(`${message.text()} ${message.location().url}`.trim()));
   if (before) await page.addInitScript(before);
   await page.addInitScript(() => {
     globalThis.told = [];
