@@ -18,7 +18,7 @@ declare -A most=([avx2]=850 [plain]=1330 ["avx2 places"]=901 ["plain places"]=14
 declare -A most_techniques=([avx2]=55 [plain]=55)
 
 # Players in unison, in hundredths of the cost of one voice.
-# Both counts vary by half a percent with how memory is given, so the limits lie 1.5 % above.
+# Both counts vary by half a percent with how memory is given, so the limits lie 1 to 2 % above.
 declare -A most_players=(["avx2 8"]=535 ["avx2 16"]=1067 ["plain 8"]=662 ["plain 16"]=1325)
 
 if ! command -v valgrind >/dev/null; then
