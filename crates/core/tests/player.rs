@@ -125,6 +125,34 @@ fn held_notes_wander_as_recorded_ones_and_stand_still_without_life() {
 }
 
 #[test]
+fn every_note_wanders_as_far_as_a_recorded_one() {
+    // Written E3 to A6; the high ones softly and loudly, too. They wandered five times as far while the lip moved the resonance of the reed
+    // as far on every note.
+    let high = 83..=93;
+    let all: Vec<(u8, u8)> = (52..=93)
+        .map(|note| (note, 78))
+        .chain(high.flat_map(|note| [20, 120].map(|value| (note, value))))
+        .collect();
+    let wanders = each(all.len(), |n| {
+        let (note, value) = all[n];
+        let out = rendered(&Settings::default(), &[controller(value), key(0.0, note)], 9.0);
+        Wander::measure(&out[sample(0.8)..], RATE_HZ, hz(note)).unwrap()
+    });
+    let [_, slow, fast, level, ..] = RECORDED;
+    let wandering: [fn(&Wander) -> f64; 2] = [|w| w.slow_cents, |w| w.fast_cents];
+    for (of, recorded) in wandering.into_iter().zip([slow, fast]) {
+        let cents: Vec<f64> = wanders.iter().map(of).collect();
+        println!("{:.2?} cents for {recorded}", [0.0, 0.5, 1.0].map(|share| quantile(cents.clone(), share)));
+        for (cents, (note, value)) in cents.into_iter().zip(&all) {
+            let range = recorded / 1.5..recorded * 1.5;
+            assert!(range.contains(&cents), "{note} at {value}: {cents} cents for {recorded}");
+        }
+    }
+    let median_db = quantile(wanders.iter().map(|w| w.level_db), 0.5);
+    assert!((level / 1.5..level * 1.5).contains(&median_db), "{median_db} dB for {level}");
+}
+
+#[test]
 fn without_life_noise_and_vibrato_a_note_repeats_to_the_bit() {
     let settings = Settings { noise: 0.0, ..still() };
     let play = |settings: &Settings| rendered(settings, &[controller(76), key(0.0, 64)], 1.0);

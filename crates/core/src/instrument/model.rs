@@ -8,7 +8,7 @@ use crate::bore::cells::Cells;
 use crate::bore::cells::CellsError;
 use crate::bore::cells::networks;
 use crate::bore::context_fingerings::ContextFingerings;
-use crate::bore::instrument_file::InstrumentFile;
+use crate::bore::instrument_file::{Fingering, InstrumentFile};
 use crate::bore::lattice::LatticeCoeffs;
 use crate::instrument::concert_pitch::A4_HZ;
 use crate::instrument::key_pitches::KeyPitches;
@@ -67,6 +67,8 @@ pub struct Model {
     pub notes_hz: Vec<f64>,
     /// Register of each fingering: 1 chalumeau and throat, 2 clarion, 3 altissimo.
     pub registers: Vec<u8>,
+    /// How fast the susceptance of the bore, over that of the nominal bore, rises at each fingering's note with the logarithm of the frequency.
+    pub susceptance_slopes: Vec<f64>,
     /// Alternate fingerings, and when a player takes them.
     pub alternates: ContextFingerings,
     /// Volume that the instrument's reed displaces, over the cross-section of the nominal bore and the speed of sound, s.
@@ -100,12 +102,19 @@ impl Model {
     pub fn assemble(file: InstrumentFile, cells: Cells, tuning: TuningTable, a4_hz: f64, scale: f64) -> Self {
         let air = Air::default();
         let coeffs = Arc::new(LatticeCoeffs::new(&cells, &networks(&file, &air, &cells), P_REF_PA, &air));
-        let notes_hz = file
+        let notes_hz: Vec<f64> = file
             .fingerings
             .iter()
             .map(|fingering| fingering.written.sounding(file.transposition).unwrap_or(SoundingNote(0)))
             .map(|note| note.frequency_hz(a4_hz))
             .collect();
+        let slope = |(fingering, &note_hz): (&Fingering, &f64)| {
+            let opening: Vec<f64> =
+                fingering.open.iter().map(|&is_open| f64::from(u8::from(is_open))).collect();
+            // Fewer digits than differ between one system's sine and another's.
+            (1e3 * coeffs.susceptance_slope(note_hz, &opening)).round() * 1e-3
+        };
+        let susceptance_slopes = file.fingerings.iter().zip(&notes_hz).map(slope).collect();
         let registers = file
             .fingerings
             .iter()
@@ -124,6 +133,7 @@ impl Model {
             lowest_hz: file.lowest_hz() * a4_hz / A4_HZ,
             notes_hz,
             registers,
+            susceptance_slopes,
             alternates,
             swept_s,
             coeffs,

@@ -157,6 +157,15 @@ impl LatticeCoeffs {
         (1.0 + r) / (1.0 - r) / self.admittance[0]
     }
 
+    /// How fast the susceptance at the tip, over the reference, rises at `f_hz` with the logarithm of the frequency. A susceptance of the
+    /// reed's, over this, is how far it lowers a note there, as a share of its frequency.
+    pub fn susceptance_slope(&self, f_hz: f64, opening: &[f64]) -> f64 {
+        // 9 cents either way, well within the width of a resonance.
+        const STEP: f64 = 0.005;
+        let susceptance = |f_hz: f64| self.impedance(f_hz, opening).inv().im;
+        (susceptance(f_hz * (1.0 + STEP)) - susceptance(f_hz * (1.0 - STEP))) / (2.0 * STEP)
+    }
+
     /// The cell that holds the tuning delay: the longest between the first junction and the first hole.
     pub(super) fn tuned_cell(&self) -> usize {
         let end = self.hole_junctions.first().copied().unwrap_or(self.ticks.len() - 1).max(1);

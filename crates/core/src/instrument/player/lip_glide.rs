@@ -6,9 +6,9 @@
 /// These count as arrived when each is this near to its target, as a share of it.
 const ARRIVED: f64 = 1e-4;
 
-/// Where the lip is for a note: resonance of the reed, Hz; its damping; the place of the note; and what goes with the place
-/// ([`AtPlace`](super::dynamics::AtPlace)).
-pub type NoteLip = [f64; 7];
+/// Where the lip is for a note: resonance of the reed, Hz; its damping; the place of the note; what goes with the place
+/// ([`AtPlace`](super::dynamics::AtPlace)); and how far the resonance moves for a cent, as a share of itself.
+pub type NoteLip = [f64; 8];
 
 /// Of these, what is added to the closing pressure between the softest and the loudest dynamic.
 const BETWEEN: usize = 3;
@@ -85,7 +85,7 @@ mod tests {
     #[test]
     fn help_damps_the_reed_for_a_while_and_then_leaves_it_as_it_was() {
         const TICK_S: f64 = 1.0 / 6_000.0;
-        let target: NoteLip = [1_500.0, 0.8, -0.5, -0.1, -1.3, 0.1, 0.0];
+        let target: NoteLip = [1_500.0, 0.8, -0.5, -0.1, -1.3, 0.1, 0.0, 0.03];
         let mut lip = LipGlide::default();
         assert_eq!(lip.tick(target, true, (0.05, 0.05), TICK_S), target);
         lip.help(Some(LipHelp { damping: 1.5, length_s: 0.02 }));

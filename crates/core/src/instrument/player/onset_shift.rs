@@ -7,7 +7,8 @@
 //! ```
 //!
 //! with the opening `B` at `gamma`, `B' = -dB/dgamma` and the flow `s` of the reed's motion ([`haptics`](crate::haptics) solves
-//! the same balance with the whole bore). What the bore takes follows from the onset that was found by playing with the
+//! the same balance with the whole bore). The imaginary part of the same is the susceptance that the reed takes, and with it the pitch goes.
+//! What the bore takes follows from the onset that was found by playing with the
 //! reference settings. So only the reed is computed, at the note's frequency. What this leaves out: that the other reed
 //! also moves the frequency a little.
 
@@ -17,6 +18,8 @@ use num_complex::Complex64;
 const RANGE: (f64, f64) = (0.2, 0.95);
 /// Halvings of the range: to 1e-6.
 const HALVINGS: usize = 20;
+/// Step of the resonance for a slope over it, as a share: [`life`](super::life) moves it about as far.
+const STEP: f64 = 0.02;
 
 /// A reed at one frequency, with pressures over its own closing pressure.
 #[derive(Clone, Copy, Debug)]
@@ -34,18 +37,39 @@ pub struct ReedAtNote {
 }
 
 impl ReedAtNote {
+    /// Opening of the reed at a mouth pressure, and how it falls with the pressure.
+    fn opening(&self, gamma: f64) -> (f64, f64) {
+        let gap = 1.0 - gamma;
+        if gap >= self.lay {
+            return (gap, 1.0);
+        }
+        let knee = (gap + self.lay).max(0.0);
+        (knee * knee / (4.0 * self.lay), knee / (2.0 * self.lay))
+    }
+
+    /// What the reed yields to an oscillating pressure, over what it yields to a steady one.
+    fn response(&self) -> Complex64 {
+        Complex64::new(1.0 - self.ratio * self.ratio, self.damping * self.ratio).inv()
+    }
+
     /// Conductance that the reed gives at a mouth pressure.
     fn conductance(&self, gamma: f64) -> f64 {
-        let gap = 1.0 - gamma;
-        let (opening, slope) = if gap >= self.lay {
-            (gap, 1.0)
-        } else {
-            let knee = (gap + self.lay).max(0.0);
-            (knee * knee / (4.0 * self.lay), knee / (2.0 * self.lay))
-        };
-        let response = Complex64::new(1.0 - self.ratio * self.ratio, self.damping * self.ratio).inv();
+        let ((opening, slope), response) = (self.opening(gamma), self.response());
         let root = gamma.sqrt();
         self.zeta * (root * slope * response.re - opening / (2.0 * root)) + self.swept * response.im
+    }
+
+    /// Susceptance that the reed takes at a mouth pressure.
+    fn susceptance(&self, gamma: f64) -> f64 {
+        let ((_, slope), response) = (self.opening(gamma), self.response());
+        self.swept * response.re - self.zeta * gamma.sqrt() * slope * response.im
+    }
+
+    /// How fast the susceptance that the reed takes at a mouth pressure falls while its resonance rises, over the logarithm of the
+    /// resonance. Real-time safe.
+    pub fn pull(&self, gamma: f64) -> f64 {
+        let at = |resonance: f64| Self { ratio: self.ratio / resonance, ..*self }.susceptance(gamma);
+        (at(1.0 - STEP) - at(1.0 + STEP)) / (2.0 * STEP)
     }
 
     /// What must be added to the mouth over closing pressure of a note that begins at `onset` with the reed `reference`, for
@@ -68,6 +92,17 @@ mod tests {
 
     fn still(zeta: f64) -> ReedAtNote {
         ReedAtNote { zeta, lay: 0.4, ratio: 0.0, damping: 0.8, swept: 0.0 }
+    }
+
+    #[test]
+    fn a_resonance_that_rises_takes_less_and_the_more_so_the_nearer_it_is() {
+        let pulls = [0.1, 0.3, 0.5, 0.645].map(|ratio| {
+            let reed = ReedAtNote { zeta: 0.25, lay: 0.4, ratio, damping: 0.25, swept: 0.2 * ratio };
+            let away = |resonance: f64| ReedAtNote { ratio: ratio / resonance, ..reed }.susceptance(0.5);
+            assert!(away(1.01) < away(0.99));
+            reed.pull(0.5)
+        });
+        assert!(pulls[0] > 0.0 && pulls.is_sorted_by(|far, near| 2.0 * far < *near), "{pulls:?}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! What settings, fingering and bend amount to: reed, delay and clock of the note, and how fast they are reached.
 
 use super::breath::{BREATH_END_S, BREATH_FOLLOW_S, BREATH_RISE_S};
-use super::dynamics::{AtPlace, LipShape, PlacedRule};
+use super::dynamics::{AtPlace, LipShape, MEZZO_FORTE, PlacedRule};
 use super::ear;
 use super::level_keeper::KeeperLags;
 use super::life::LifeLags;
@@ -24,6 +24,11 @@ use crate::units::{Air, cents};
 /// Each of two time constants with which the lip goes to the closing pressure that a note has between the softest and the loudest dynamic, s:
 /// a quicker lip clicks. Measured at 8, 10, 12 and 17 ms: nine tenths of the clicks of all slurs are below 3.5, 3.1, 2.7 and 2.5 dB.
 const SHAPE_S: f64 = 0.012;
+/// Cents of a small rise of the frequency, as a share of it.
+const CENTS_PER_SHARE: f64 = 1_200.0 / std::f64::consts::LN_2;
+/// Most that the resonance moves for a cent, as a share of itself: hardly more than on the lowest note of a B flat clarinet, which takes 0.045. A
+/// note whose pitch hardly goes with the resonance leaves the lip alone.
+const MOST_RESONANCE_PER_CENT: f64 = 0.06;
 /// Time constant of the lip from note to note over the time of the fingers.
 const LIP_SHARE: f64 = 0.4;
 
@@ -68,6 +73,8 @@ struct Played {
     /// The rule where the lip is, which goes from note to note.
     placed: PlacedRule,
     note: PlayedNote,
+    /// How far the resonance of the reed moves for a cent, as a share of itself.
+    resonance_per_cent: f64,
     /// What these settings add to the mouth over closing pressure, at dynamics 0 and 1.
     shift: (f64, f64),
     /// Dynamic of the lip in `Posture::reed`.
@@ -223,7 +230,8 @@ impl Posture {
     /// Where the lip goes for this note.
     pub fn note_lip(&self) -> NoteLip {
         let [between, zeta, growth, altissimo] = self.at;
-        [self.free.resonance_hz, self.free.damping, self.place, between, zeta, growth, altissimo]
+        let per_cent = self.played.as_ref().map_or(0.0, |played| played.resonance_per_cent);
+        [self.free.resonance_hz, self.free.damping, self.place, between, zeta, growth, altissimo, per_cent]
     }
 
     /// Gives the reed the lip of a dynamic, 0..=1, on its way to the note; nothing where the breath is physical.
@@ -234,7 +242,7 @@ impl Posture {
         }
         (played.lip, played.note_lip) = (dynamic, note_lip);
         played.rows = played.note.rows(dynamic);
-        let [resonance_hz, damping, _, at @ ..] = note_lip;
+        let [resonance_hz, damping, _, at @ .., _] = note_lip;
         let free = MovingReed { resonance_hz, damping, ..self.free };
         played.placed.at = at;
         let reed = shaped(&free, self.subtone, &played.placed, dynamic);
@@ -313,10 +321,20 @@ impl Played {
                 .map(|(reed, subtone)| reed_at_note(&shaped(reed, subtone, &placed, dynamic), note_hz));
             own.shift_from(&known, note.onset)
         };
+        let shift = (shift(0.0), shift(1.0));
+        let gamma = note.gamma(MEZZO_FORTE) + shift.0 + (shift.1 - shift.0) * MEZZO_FORTE;
+        // Of a small oscillation, at mezzo-forte: a reed that beats goes up to 1.5 times less far or farther.
+        let pull = reed_at_note(&shaped(free, subtone, &placed, MEZZO_FORTE), note_hz).pull(gamma);
+        let slope = model.susceptance_slopes[fingering];
         Self {
             placed,
             note,
-            shift: (shift(0.0), shift(1.0)),
+            resonance_per_cent: if pull > 0.0 && slope > 0.0 {
+                (slope / (CENTS_PER_SHARE * pull)).min(MOST_RESONANCE_PER_CENT)
+            } else {
+                MOST_RESONANCE_PER_CENT
+            },
+            shift,
             lip: f64::NAN,
             rows: 0.0,
             note_lip: NoteLip::default(),

@@ -10,9 +10,9 @@ pub struct Sway {
     pub dynamic: f64,
     /// Room that `dynamic` needs on either side: the asked dynamic keeps so far from 0 and from 1.
     pub room: f64,
-    /// What is added to the reed's resonance under the lip, as a share of it.
-    pub resonance: f64,
-    /// What the lip adds to the pitch by the tuning delay, cents.
+    /// What the lip adds to the pitch by the reed's resonance, cents.
+    pub reed_cents: f64,
+    /// What it adds by the tuning delay, cents.
     pub cents: f64,
 }
 
@@ -31,7 +31,7 @@ impl std::ops::Add for Sway {
         Self {
             dynamic: self.dynamic + other.dynamic,
             room: self.room.max(other.room),
-            resonance: self.resonance + other.resonance,
+            reed_cents: self.reed_cents + other.reed_cents,
             cents: self.cents + other.cents,
         }
     }

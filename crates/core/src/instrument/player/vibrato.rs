@@ -153,7 +153,7 @@ impl Swing {
         Sway {
             dynamic: swing * dynamic,
             room: if range_db.is_some() { depth * dynamic } else { 0.0 },
-            resonance: 0.0,
+            reed_cents: 0.0,
             cents: swing * DEEPEST_CENTS,
         }
     }
