@@ -4,6 +4,8 @@
 //! was another. A [pulsed](Jet::Pulsed) one is quiet while it is steady and breaks up where its flow is pulsed: its noise
 //! rides on what the flow does beside its own slow mean. So the noise pulsates with the reed, grows with the speed to which the
 //! reed drives the jet, and below the threshold there is hardly any: a whisper on the mean flow, as a player's mouth makes.
+//! Where tongue, breath or lip change the flow, the mean follows at once, by as much as the flow of a reed at rest changes. A mean that only
+//! followed slowly took the beginning and the end of a note for pulses, and soft notes puffed.
 //! Band and level of the pulsed jet are those of recorded notes, see `docs/tone.md`.
 
 mod lanes;
@@ -81,6 +83,8 @@ pub(super) struct BreathNoise {
     built: f64,
     /// Flow beside which noise rides: the slow mean of a pulsed jet.
     mean: f64,
+    /// Flow of the reed at rest, up to which the mean has followed.
+    rest: f64,
     /// Flow that makes no noise.
     quiet: f64,
     /// Noise flow without pulses.
@@ -105,6 +109,7 @@ impl BreathNoise {
             pulsed_keep: (-1.0 / (BREAK_UP_S * rate_hz)).exp(),
             built: 0.0,
             mean: 0.0,
+            rest: 0.0,
             quiet: LAMINAR_FLOW,
             whisper: 0.0,
             seed: NOISE_SEED,
@@ -117,7 +122,8 @@ impl BreathNoise {
 
     /// Starts the noise again from its seed; the jet stays.
     pub fn reset(&mut self) {
-        (self.built, self.mean, self.whisper, self.high, self.low) = (0.0, 0.0, 0.0, 0.0, [0.0; 2]);
+        (self.built, self.mean, self.rest) = (0.0, 0.0, 0.0);
+        (self.whisper, self.high, self.low) = (0.0, 0.0, [0.0; 2]);
         self.random = self.seed;
     }
 
@@ -131,7 +137,8 @@ impl BreathNoise {
     pub fn set_jet(&mut self, jet: Jet) {
         if jet != self.jet {
             self.jet = jet;
-            (self.built, self.mean, self.whisper, self.low) = (0.0, 0.0, 0.0, [0.0; 2]);
+            (self.built, self.mean, self.rest) = (0.0, 0.0, 0.0);
+            (self.whisper, self.low) = (0.0, [0.0; 2]);
             (self.quiet, self.keep) = match jet {
                 Jet::Steady => (LAMINAR_FLOW, 0.0),
                 Jet::Pulsed => (0.0, self.pulsed_keep),
@@ -139,16 +146,18 @@ impl BreathNoise {
         }
     }
 
-    /// A tick begins at `amount`, 0..=1, after one that ended with this flow. Its turbulence is [filled](Self::fill) in before its
+    /// A tick begins at `amount`, 0..=1, after one that ended with this flow; through a reed at rest `rest_flow` would flow. Its turbulence is [filled](Self::fill) in before its
     /// samples, here or in a lane of [`NoiseLanes`].
-    pub fn begin(&mut self, amount: f64, jet_flow: f64) {
+    pub fn begin(&mut self, amount: f64, jet_flow: f64, rest_flow: f64) {
         match self.jet {
             Jet::Steady => self.strength = amount * STEADY_NOISE,
             Jet::Pulsed => {
                 let strength = amount * PULSED_NOISE;
                 self.strength = strength * (1.0 - self.keep);
                 self.built = still(self.built);
-                self.mean += self.mean_share * (jet_flow - self.mean);
+                let led = self.mean + (rest_flow - self.rest);
+                self.rest = rest_flow;
+                self.mean = (led + self.mean_share * (jet_flow - led)).max(0.0);
                 self.whisper = strength * WHISPER * (self.mean.abs() - LAMINAR_FLOW).max(0.0);
             }
         }

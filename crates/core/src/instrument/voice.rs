@@ -326,6 +326,8 @@ impl<F: Real> Voice<F> {
     /// What a tick needs to know.
     pub(super) fn begin(&mut self, drive: &Drive) {
         let mouth = &mut self.mouth;
+        let rest_flow = mouth.reed.rest_flow(mouth.p_mouth, mouth.tongue);
+        mouth.noise.begin(drive.noise, mouth.state.flow, rest_flow);
         mouth.reed = drive.reed;
         mouth.load = drive.reed.before(mouth.kappa + mouth.tract.map_or(0.0, |tract| tract.at_once()));
         mouth.p_mouth_glide = (drive.p_mouth - mouth.p_mouth) / TICK as f64;
@@ -334,7 +336,6 @@ impl<F: Real> Voice<F> {
         mouth.at = 0;
         let lattice = &self.lattice;
         mouth.outside.heed(lattice.is_moving(), |hole| lattice.is_open(hole));
-        mouth.noise.begin(drive.noise, mouth.state.flow);
     }
 
     /// The samples of a tick.
