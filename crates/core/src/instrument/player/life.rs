@@ -22,7 +22,7 @@ const LIP_VARIANCES: [f64; 3] = [8.0, 1.0, 1.3];
 const SMOOTH_HZ: f64 = 12.0;
 /// What a unit of the sum moves: the dynamic, and the pitch by the reed's resonance, cents. Chosen for the medians of recorded held notes, see
 /// `docs/tone.md`.
-const DYNAMIC: f64 = 0.0111;
+const DYNAMIC: f64 = 0.0117;
 /// See [`DYNAMIC`].
 const REED_CENTS: f64 = 0.46;
 /// Seed of the noise: any constant does.
