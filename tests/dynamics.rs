@@ -6,7 +6,7 @@
 use chalumeau_core::analysis::noise_bands::{BANDS_HZ, noise_db};
 use chalumeau_core::analysis::pitch;
 use chalumeau_core::analysis::spectrum::steady_segment;
-use chalumeau_core::analysis::steady_note::{self, SteadyNote};
+use chalumeau_core::analysis::steady_note::SteadyNote;
 use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::haptics::FeelDesign;
@@ -14,7 +14,7 @@ use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
 use chalumeau_core::instrument::{Clarinet, Model, Settings};
 use chalumeau_core::measure::realism::{
-    Dynamic, NoteScore, RecordedNote, Summary, louder_is_brighter, median,
+    self, Dynamic, NoteScore, RecordedNote, Summary, louder_is_brighter, median,
 };
 use chalumeau_core::parallel;
 use chalumeau_core::score::{Score, play};
@@ -233,9 +233,9 @@ fn colour_level_and_noise_are_near_those_of_recorded_notes() {
             Dynamic::Mf => MEZZO_FORTE,
             Dynamic::Ff => 1.0,
         };
-        let note = Event::NoteOn { note: SoundingNote(recorded[n].midi), velocity: 0.8 };
-        let events = [(0.0, Event::Breath(breath_of_dynamic(dynamic) as f32)), (0.0, note)];
-        let out = rendered(&Settings::default(), &events, steady_note::SECONDS);
+        let settings = Settings { gain_db: -HEADROOM_DB as f32, ..Settings::default() };
+        let (note, breath) = (SoundingNote(recorded[n].midi), breath_of_dynamic(dynamic) as f32);
+        let out = realism::render(&MODEL, &settings, note, breath, n);
         let score = NoteScore::new(recorded[n].clone(), SteadyNote::measure(&out));
         let segment = steady_segment(&out, f64::from(RATE)).map_or(&[][..], |range| &out[range]);
         let f0_hz = score.played.as_ref().map(|played| played.f0_hz);

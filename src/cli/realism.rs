@@ -49,9 +49,9 @@ each note. A recorded note differs from its recorded neighbours by 2.7, 6.8 and 
 
 /// Play the recorded notes and measure how near they come to the recordings
 ///
-/// Plays every other note from sounding D#3 to G6 for 4 s at pp, mf and ff, and measures it as the recordings were measured
-/// (tests/reference/clarinet_spectra_method.md). error_db is the mean distance of harmonics 2 to 10, each spectrum against its
-/// strongest harmonic and clipped at -60 dB; a note that does not sound, or sounds in another register, counts 20 dB. d1 to
+/// Plays every other note from sounding D#3 to G6 for 4 s at pp, mf and ff, four takes of each, and measures them as the
+/// recordings were measured (tests/reference/clarinet_spectra_method.md). error_db is the mean distance of harmonics 2 to 10, each spectrum against its
+/// strongest harmonic and clipped at -60 dB; a take that does not sound, or sounds in another register, counts 20 dB. d1 to
 /// d10 are the differences, played less recorded. Noise is that between the harmonics, by bands, against the whole tone; t90 is
 /// the time in which a harmonic reaches 90 % of its level; wander is that of the steady part. Comments sum up.
 #[derive(Args)]
@@ -66,6 +66,9 @@ pub struct RealismCommand {
     /// Hear the notes behind a shelf of first order: frequency where half of the lift is reached, Hz, and lift of the highs, dB
     #[arg(long, value_name = "HZ,DB", value_parser = shelf)]
     shelf: Option<Shelf>,
+    /// How often to play each note, 1..16: takes differ in breath noise and Life, as those of a player do
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=16))]
+    takes: u8,
     #[command(flatten)]
     instrument: PlayedArgs,
     #[command(flatten)]
@@ -78,6 +81,8 @@ pub struct RealismCommand {
 
 /// A note that was played for a recording.
 struct Heard {
+    /// Number of the take, from 1.
+    take: usize,
     score: NoteScore,
     /// Level of the noise in [`BANDS_HZ`] re the tone, dB.
     noise_db: Vec<f64>,
@@ -95,7 +100,7 @@ impl RealismCommand {
         let plot = self.plot.open(self.table.force())?;
         let name = file.name.clone();
         let model = self.instrument.model(file, RATE_HZ as u32, settings.a4_hz)?;
-        let heard = play_all(&model, &settings, &breaths, self.shelf);
+        let heard = self.play_all(&model, &settings, &breaths);
         let shelf = self.shelf.map_or_else(String::new, |shelf| {
             format!("; behind a shelf of {} dB at {} Hz", shelf.lift_db, shelf.middle_hz)
         });
@@ -159,35 +164,35 @@ impl RealismCommand {
         let settings = self.settings.blown_by(&BreathCurve::constant(highest as f32), file)?;
         Ok((gammas.map(|gamma| gamma as f32), settings, format!("gamma {}", words(&gammas))))
     }
+
+    /// Plays all takes of a note for every recording, on all cores.
+    fn play_all(&self, model: &Arc<Model>, settings: &Settings, breaths: &[f32; 3]) -> Vec<Heard> {
+        let (recorded, takes) = (RecordedNote::all(), usize::from(self.takes));
+        let bar = progress(recorded.len() * takes);
+        let play = |at: usize| {
+            let note = &recorded[at / takes];
+            let breath = breaths[note.dynamic as usize];
+            let mut samples = render(model, settings, SoundingNote(note.midi), breath, at);
+            if let Some(shelf) = self.shelf {
+                shelf.apply(&mut samples, RATE_HZ);
+            }
+            listen(note, &samples, 1 + at % takes)
+        };
+        // Nothing ends it early, so there is always an answer.
+        let heard = parallel::each(recorded.len() * takes, play, &mut |_| {
+            bar.inc(1);
+            ControlFlow::Continue(())
+        });
+        bar.finish_and_clear();
+        heard.unwrap_or_default()
+    }
 }
 
 fn words(numbers: &[f64]) -> String {
     numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(",")
 }
 
-/// Plays a note for every recording, on all cores.
-fn play_all(model: &Arc<Model>, settings: &Settings, breaths: &[f32; 3], shelf: Option<Shelf>) -> Vec<Heard> {
-    let recorded = RecordedNote::all();
-    let bar = progress(recorded.len());
-    let play = |at: usize| {
-        let note = &recorded[at];
-        let breath = breaths[note.dynamic as usize];
-        let mut samples = render(model, settings, SoundingNote(note.midi), breath);
-        if let Some(shelf) = shelf {
-            shelf.apply(&mut samples, RATE_HZ);
-        }
-        listen(note, &samples)
-    };
-    // Nothing ends it early, so there is always an answer.
-    let heard = parallel::each(recorded.len(), play, &mut |_| {
-        bar.inc(1);
-        ControlFlow::Continue(())
-    });
-    bar.finish_and_clear();
-    heard.unwrap_or_default()
-}
-
-fn listen(recorded: &RecordedNote, samples: &[f64]) -> Heard {
+fn listen(recorded: &RecordedNote, samples: &[f64], take: usize) -> Heard {
     let played =
         SteadyNote::measure(samples).map(|note| SteadyNote { rms_dbfs: note.rms_dbfs + HEADROOM_DB, ..note });
     let score = NoteScore::new(recorded.clone(), played);
@@ -195,6 +200,7 @@ fn listen(recorded: &RecordedNote, samples: &[f64]) -> Heard {
     let near_hz = score.played.as_ref().map(|played| played.f0_hz);
     let f0_hz = near_hz.and_then(|hz| pitch::refine_hz(segment, RATE_HZ, hz));
     Heard {
+        take,
         noise_db: f0_hz.map_or_else(Vec::new, |hz| noise_db(segment, RATE_HZ, hz, &BANDS_HZ)),
         t90_s: TIMED.map(|harmonic| Partial::watch(samples, RATE_HZ, f0_hz?, harmonic).t90_s()),
         wander: f0_hz.and_then(|hz| Wander::measure(segment, RATE_HZ, hz)),
@@ -213,7 +219,7 @@ fn band((low_hz, high_hz): (f64, f64)) -> String {
 
 fn header() -> String {
     let mut columns: Vec<String> =
-        "sounding_midi,register,dynamic,cents,error_db,centroid_hz,centroid_ratio,h3_h2_db,\
+        "sounding_midi,register,dynamic,take,cents,error_db,centroid_hz,centroid_ratio,h3_h2_db,\
          recorded_h3_h2_db,level_db,recorded_level_db"
             .split(',')
             .map(str::to_owned)
@@ -244,6 +250,7 @@ fn write(table: &mut CsvTable, note: &Heard) -> Result<(), Failure> {
         recorded.midi.to_string(),
         register(recorded.midi).to_owned(),
         recorded.dynamic.name().to_owned(),
+        note.take.to_string(),
         digits(played.map(|played| chalumeau_core::units::cents(played.f0_hz, wanted_hz)), 1),
         digits(Some(score.error_db), 2),
         digits(played.map(|played| played.centroid_hz), 1),
@@ -288,8 +295,12 @@ fn summary(heard: &[Heard]) -> Vec<String> {
         step(mf, ff),
         step(pp, ff)
     ));
-    let scores: Vec<NoteScore> = heard.iter().map(|note| note.score.clone()).collect();
-    lines.push(format!("louder is brighter on {:.0} % of steps", 100.0 * louder_is_brighter(&scores)));
+    let takes = heard.iter().map(|note| note.take).max().unwrap_or(1);
+    let brighter = mean((1..=takes).map(|take| {
+        let own = heard.iter().filter(|note| note.take == take);
+        louder_is_brighter(&own.map(|note| note.score.clone()).collect::<Vec<_>>())
+    }));
+    lines.push(format!("louder is brighter on {:.0} % of steps", 100.0 * brighter));
     let noise: Vec<String> = BANDS_HZ
         .iter()
         .enumerate()
@@ -333,7 +344,7 @@ fn line(dynamic: Dynamic, summary: &Summary, heard: &[Heard]) -> String {
         .collect();
     let (third, recorded_third) = summary.third_over_second_db;
     format!(
-        "{}: error {:.2} dB (odd takes out {:.2}; {}), centroid right on {:.0} % of {} notes, median ratio {:.2}, h3 over h2 up to B3 \
+        "{}: error {:.2} dB (odd takes out {:.2}; {}), centroid right on {:.0} % of {} takes, median ratio {:.2}, h3 over h2 up to B3 \
          {third:.1} dB (recorded {recorded_third:.1}), {} failed",
         dynamic.name(),
         summary.error_db,

@@ -43,6 +43,8 @@ const RATE_HZ: f64 = 44_100.0;
 const PATH: &str = "crates/core/src/instrument/player/fitted.rs";
 /// Harmonics that are compared.
 const COMPARED: usize = 10;
+/// How often each recorded note is played: takes differ in breath noise and *Life*, by half a decibel of error and a tenth of the centroid.
+const TAKES: usize = 8;
 /// Renders are this much softer, so that no peak meets the limiter, dB.
 const HEADROOM_DB: f32 = 20.0;
 /// What a note counts that the rule cannot play, dB.
@@ -79,12 +81,12 @@ const SHARPEST: f64 = 2.5;
 /// first step away from what was played costs, because what notes have beyond the grid is known only there.
 const SEED: u64 = 1;
 const EVALUATIONS: usize = 20_000;
-const SIZES: [f64; 4] = [0.4, 0.2, 0.1, 0.05];
+const SIZES: [f64; 6] = [0.1, 0.1, 0.05, 0.05, 0.03, 0.02];
 const AWAY_COST: f64 = 0.01;
 /// The same without a note.
 const LEFT_OUT: (usize, f64) = (4_000, 0.1);
-/// `--check`: the committed rule may be worse than what is found by this.
-const TOLERANCE: f64 = 0.3;
+/// `--check`: the committed rule may be worse than what is found by this, less than what one wrong centroid costs.
+const TOLERANCE: f64 = 0.7;
 
 /// The numbers that are fitted: pressure at fortissimo (3), zeta (4), logarithm of the growth of the closing pressure, closing pressure
 /// between (2), throat (3, the width by its logarithm); presence (5, frequencies and quality by their logarithms). The
@@ -279,6 +281,18 @@ impl Beyond {
     }
 }
 
+impl Beyond {
+    fn mean(takes: &[Self]) -> Self {
+        if takes.is_empty() {
+            return Self::default();
+        }
+        Self {
+            harmonics_db: std::array::from_fn(|h| mean(takes.iter().map(|take| take.harmonics_db[h]))),
+            centroid: mean(takes.iter().map(|take| take.centroid)),
+        }
+    }
+}
+
 /// A rule whose notes were played.
 struct Played {
     numbers: [f64; COUNT],
@@ -322,19 +336,23 @@ impl Data {
             .flat_map(|at| (0..self.recorded[at].len()).map(move |take| (at, take)))
             .collect();
         let score = |n: usize| {
-            let recorded = &self.recorded[all[n].0][all[n].1];
+            let recorded = &self.recorded[all[n / TAKES].0][all[n / TAKES].1];
             let breath = breath_of_dynamic(dynamic_number(recorded.dynamic)) as f32;
-            let samples = realism::render(&model, &settings, SoundingNote(recorded.midi), breath);
+            let samples =
+                realism::render(&model, &settings, SoundingNote(recorded.midi), breath, n % TAKES);
             NoteScore::new(recorded.clone(), SteadyNote::measure(&samples))
         };
-        let scores = parallel::each(all.len(), score, &mut |_| ControlFlow::Continue(()));
+        let scores = parallel::each(TAKES * all.len(), score, &mut |_| ControlFlow::Continue(()));
         let scores = scores.context("not cancelled")?;
-        for (&(at, take), score) in all.iter().zip(&scores) {
+        for (&(at, dynamic), takes) in all.iter().zip(scores.chunks(TAKES)) {
             let note = &self.notes[at];
-            let on_grid = played(&rule, note, score.recorded.dynamic);
-            let both = score.played.as_ref().zip(on_grid);
-            let beyond = both.map(|(played, grid)| Beyond::of(played, &grid, note.f0_hz, &self.lost_db[at]));
-            self.beyond[at][take] = beyond.unwrap_or_default();
+            let on_grid = played(&rule, note, takes[0].recorded.dynamic);
+            let beyond: Vec<Beyond> = takes
+                .iter()
+                .filter_map(|score| score.played.as_ref().zip(on_grid.as_ref()))
+                .map(|(played, grid)| Beyond::of(played, grid, note.f0_hz, &self.lost_db[at]))
+                .collect();
+            self.beyond[at][dynamic] = Beyond::mean(&beyond);
         }
         let compared: Vec<_> =
             scores.iter().map(|score| (score.recorded.dynamic, Compared::of(score))).collect();
@@ -417,12 +435,14 @@ pub fn run(args: &[String]) -> Result<()> {
     let mut data = data()?;
     let committed = data.play(&Rule::COMMITTED.numbers())?;
     say("committed, as played", &committed.compared);
+    println!("loss {:.2}", committed.loss);
     let kept = committed.loss;
     let mut best = committed;
     for (size, seed) in SIZES.into_iter().zip(SEED..) {
         data.beyond.clone_from(&best.beyond);
         let fitted = data.fit(&best.numbers, None, EVALUATIONS, size, seed)?;
         let played = data.play(&fitted)?;
+        say("played", &played.compared);
         println!("steps of {size}: loss {:.2}, as played {:.2}", data.loss(&fitted, None), played.loss);
         if played.loss < best.loss {
             best = played;
