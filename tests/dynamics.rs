@@ -268,10 +268,10 @@ fn colour_level_and_noise_are_near_those_of_recorded_notes() {
         .map(|band| median(of(Dynamic::Mf).filter_map(|(_, noise)| noise.as_ref().map(|noise| noise[band]))))
         .collect();
     println!("brighter on {brighter:.2}; noise at mf {noise:.1?} dB");
-    // Sounding G6, the highest, is not held at pp and ff.
-    assert!(failed.iter().all(|(midi, _)| *midi == 91), "{failed:?}");
-    assert!(pp.error_db < 5.3 && mf.error_db < 7.3 && ff.error_db < 7.0);
-    assert!(pp.centroid_share > 0.8);
+    assert!(failed.is_empty(), "{failed:?}");
+    // Wanted are 4, 7 and 6 dB. One take tells them to 0.1 dB, and the shares to 5 %.
+    assert!(pp.error_db < 4.1 && mf.error_db < 6.7 && ff.error_db < 6.1);
+    assert!(pp.centroid_share > 0.9 && mf.centroid_share > 0.7 && ff.centroid_share > 0.75);
     assert!(to_mf.abs() < 3.0 && to_ff.abs() < 3.0);
     assert!(brighter >= 0.95);
     for (noise, (recorded, band)) in noise.iter().zip(RECORDED_NOISE_DB.into_iter().zip(BANDS_HZ)) {
