@@ -1,4 +1,4 @@
-//! The highest notes as a host plays them: written A6 to C7 of the bundled instruments with everything at its default, and tongued notes from E6 to A6 at
+//! The highest notes as a host plays them: written A6 to C7 of the bundled instruments with everything at its default, and tongued notes from C#6 to A6 at
 //! every breath.
 //!
 //! The test prints what it measured; `docs/fingerings.md` has the table.
@@ -135,13 +135,13 @@ fn tongued(model: &Arc<Model>, written: u8, controller: u8) -> (f64, f64) {
     (off, 10.0 * (most / power(held)).log10())
 }
 
-/// F#6 and its neighbours began with a lower mode beside them that was as loud, and took a second to grow out of it where the breath was soft.
+/// Between soft and loud E flat 6 had an undertone. F#6 and its neighbours began with a lower mode beside them that was as loud, and took a second to grow out of it where the breath was soft.
 #[test]
 fn tongued_high_notes_speak_at_every_breath_and_without_an_accent() {
     for instrument in [Bundled::BFlat, Bundled::Bass] {
         let wanted = Wanted::new(instrument.file(), RATE_HZ);
         let model = Arc::new(Preparation::new(&wanted, None).ready().unwrap().unwrap());
-        let cases: Vec<(u8, u8)> = (88..=93)
+        let cases: Vec<(u8, u8)> = (85..=93)
             .flat_map(|written| (4..=124).step_by(8).map(move |controller| (written, controller)))
             .collect();
         let play = |at: usize| tongued(&model, cases[at].0, cases[at].1);
@@ -154,6 +154,6 @@ fn tongued_high_notes_speak_at_every_breath_and_without_an_accent() {
             lost.len(),
             cases.len()
         );
-        assert!(lost.is_empty() && louder_db < 4.0);
+        assert!(lost.is_empty() && louder_db < 5.0);
     }
 }
