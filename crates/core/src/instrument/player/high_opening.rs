@@ -10,7 +10,7 @@ use super::lip_glide::NoteLip;
 const PLACES: (f64, f64) = (0.57, 0.7);
 /// Most that is added to the logarithm of opening and closing pressure, halfway between soft and loud; nothing at either end. Half of it is taken back from the
 /// mouth pressure over the closing pressure, as on the way of a lip from note to note. Measured on the B flat and bass clarinets: the undertone of E flat 6 lies 33 and 26 dB under the note with
-/// 0.25, 35 and 34 with 0.35, which moves level and pitch of others by up to 0.4 dB and 1 cent.
+/// 0.25, 33 and 30 with 0.3, 35 and 34 with 0.35. With 0.3 the levels of high notes move by -0.6 to 0.5 dB, and their pitches by up to 0.8 cents.
 const MOST: f64 = 0.3;
 /// Index of what is added between the softest and the loudest dynamic.
 const BETWEEN: usize = 3;
