@@ -338,8 +338,7 @@ impl Data {
         let score = |n: usize| {
             let recorded = &self.recorded[all[n / TAKES].0][all[n / TAKES].1];
             let breath = breath_of_dynamic(dynamic_number(recorded.dynamic)) as f32;
-            let samples =
-                realism::render(&model, &settings, SoundingNote(recorded.midi), breath, n % TAKES);
+            let samples = realism::render(&model, &settings, SoundingNote(recorded.midi), breath, n % TAKES);
             NoteScore::new(recorded.clone(), SteadyNote::measure(&samples))
         };
         let scores = parallel::each(TAKES * all.len(), score, &mut |_| ControlFlow::Continue(()));

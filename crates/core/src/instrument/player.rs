@@ -527,6 +527,7 @@ impl Player {
                 alternate_cents: alternate.map_or(0.0, |alternate| alternate.cents),
                 bend_cents,
                 subtone: self.techniques.subtone(),
+                follows: self.glide.follows(),
             };
             Posture::new(settings, &fingered, tick_s, model)
         });

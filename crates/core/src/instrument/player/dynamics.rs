@@ -206,6 +206,15 @@ impl PlacedRule {
 }
 
 impl LipShape {
+    /// The lip on its way to this one from that of the free reed, in logarithms: 0 there, 1 here. Real-time safe.
+    pub fn of_the_way(self, way: f64) -> Self {
+        if way == 1.0 {
+            return self;
+        }
+        let Self { opening, channel, knee } = self;
+        Self { opening: opening.powf(way), channel: channel.powf(way), knee: knee.powf(way) }
+    }
+
     /// The law of a reed under this lip. Real-time safe.
     pub fn law(&self, reed: ReedLaw) -> ReedLaw {
         let h = (reed.h() * self.opening).clamp(0.5, 10.0);

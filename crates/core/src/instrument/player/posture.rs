@@ -59,6 +59,8 @@ pub struct Posture {
     free: MovingReed,
     /// How much the lip covers the reed, 0..=1.
     subtone: f64,
+    /// How far the lip follows the player's rule, 0..=1.
+    follows: f64,
     rate_hz: f64,
     /// Place of the note, and what goes with it. A lip whose breath is physical keeps them for one that is played.
     place: f64,
@@ -154,12 +156,14 @@ pub struct Fingered {
     pub bend_cents: f64,
     /// How much the lip covers the reed, 0..=1.
     pub subtone: f64,
+    /// How far the lip follows the player's rule, 0..=1, where the breath is played.
+    pub follows: f64,
 }
 
 impl Posture {
     /// For what is fingered, with ticks of `tick_s` seconds.
     pub fn new(settings: &Settings, fingered: &Fingered, tick_s: f64, model: &Model) -> Self {
-        let Fingered { fingering, alternate_cents, bend_cents, subtone } = *fingered;
+        let Fingered { fingering, alternate_cents, bend_cents, subtone, follows } = *fingered;
         let lip = embouchure(model.notes_hz[fingering], model.lowest_hz);
         let free = MovingReed {
             law: settings.reed_law(),
@@ -199,6 +203,7 @@ impl Posture {
             lags: Lags::new(settings, tick_s, model.lowest_hz),
             free,
             subtone,
+            follows,
             rate_hz,
             place,
             at: placed.at,
@@ -250,7 +255,7 @@ impl Posture {
         let [resonance_hz, damping, _, at @ .., _] = note_lip;
         let free = MovingReed { resonance_hz, damping, ..self.free };
         played.placed.at = at;
-        let reed = shaped(&free, self.subtone, &played.placed, dynamic);
+        let reed = shaped(&free, self.subtone, played.placed.lip(dynamic).of_the_way(self.follows));
         self.closing = reed.law.closing();
         self.reed = ReedCoeffs::new(reed, self.rate_hz);
     }
@@ -287,8 +292,7 @@ impl Posture {
 }
 
 /// A reed under the lip of a dynamic. A lip that covers the reed holds it to the curve of the lay, however far it opens.
-fn shaped(free: &MovingReed, subtone: f64, rule: &PlacedRule, dynamic: f64) -> MovingReed {
-    let lip = rule.lip(dynamic);
+fn shaped(free: &MovingReed, subtone: f64, lip: LipShape) -> MovingReed {
     let knee = if subtone == 0.0 { lip.knee } else { lip.knee.powf(1.0 - subtone) };
     MovingReed { law: lip.law(free.law), zeta: free.zeta * lip.channel, lay: free.lay * knee, ..*free }
 }
@@ -323,13 +327,13 @@ impl Played {
                 return 0.0;
             }
             let [own, known] = [(free, subtone), (&known, 0.0)]
-                .map(|(reed, subtone)| reed_at_note(&shaped(reed, subtone, &placed, dynamic), note_hz));
+                .map(|(reed, subtone)| reed_at_note(&shaped(reed, subtone, placed.lip(dynamic)), note_hz));
             own.shift_from(&known, note.onset)
         };
         let shift = (shift(0.0), shift(1.0));
         let gamma = note.gamma(MEZZO_FORTE) + shift.0 + (shift.1 - shift.0) * MEZZO_FORTE;
         // Of a small oscillation, at mezzo-forte: a reed that beats goes up to 1.5 times less far or farther.
-        let pull = reed_at_note(&shaped(free, subtone, &placed, MEZZO_FORTE), note_hz).pull(gamma);
+        let pull = reed_at_note(&shaped(free, subtone, placed.lip(MEZZO_FORTE)), note_hz).pull(gamma);
         let slope = model.susceptance_slopes[fingering];
         Self {
             placed,

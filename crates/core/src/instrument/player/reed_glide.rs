@@ -4,11 +4,14 @@
 //! sounds, new settings hold at once.
 
 use super::step_towards;
-use crate::instrument::settings::Settings;
+use crate::instrument::settings::{BreathResponse, Settings};
 use crate::reed::law::coupled_k;
 
-/// Numbers that shape reed and flow: strength, lip, zeta, damping, lay, H, k, A, and the loss of open holes.
-const NUMBERS: usize = 9;
+/// Numbers that shape reed and flow: strength, lip, zeta, damping, lay, H, k, A, the loss of open holes, and how far the lip follows the
+/// player's rule.
+const NUMBERS: usize = 10;
+/// Index of how far the lip follows the rule.
+const FOLLOWS: usize = NUMBERS - 1;
 /// A number counts as arrived when it is this near to its target, as a share of it: 0.001 dB of flow. Targets below
 /// [`SMALL`], as a sharp lay's 0, count as that.
 const ARRIVED: f32 = 1e-4;
@@ -34,13 +37,18 @@ struct Way {
 fn numbers(settings: &Settings) -> [f32; NUMBERS] {
     let k = if settings.coupled { coupled_k(f64::from(settings.reed_h)) as f32 } else { settings.reed_k };
     let Settings { strength, lip, zeta, damping, lay, reed_h, reed_a, vent_loss, .. } = *settings;
-    [strength, lip, zeta, damping, lay, reed_h, k, reed_a, vent_loss]
+    let follows = f32::from(u8::from(settings.breath_response == BreathResponse::Played));
+    [strength, lip, zeta, damping, lay, reed_h, k, reed_a, vent_loss, follows]
 }
 
 impl ReedGlide {
     /// The settings change from `old` to `new` while something sounds.
     pub fn begin(&mut self, old: &Settings, new: &Settings) {
-        let way = self.under_way.unwrap_or_else(|| Way { now: numbers(old), ahead: numbers(old) });
+        let mut way = self.under_way.unwrap_or_else(|| Way { now: numbers(old), ahead: numbers(old) });
+        if old.breath_response == BreathResponse::Physical {
+            // The lip has followed nothing, whatever it was to follow before.
+            (way.now[FOLLOWS], way.ahead[FOLLOWS]) = (0.0, 0.0);
+        }
         let arrived = Way { now: numbers(new), ahead: numbers(new) };
         self.under_way = (way != arrived).then_some(way);
     }
@@ -70,9 +78,14 @@ impl ReedGlide {
     /// The settings with the reed as it is now.
     pub fn over(&self, settings: Settings) -> Settings {
         let Some(Way { now, .. }) = self.under_way else { return settings };
-        let [strength, lip, zeta, damping, lay, reed_h, reed_k, reed_a, vent_loss] = now;
+        let [strength, lip, zeta, damping, lay, reed_h, reed_k, reed_a, vent_loss, _] = now;
         let coupled = false;
         Settings { strength, lip, zeta, damping, lay, reed_h, reed_k, coupled, reed_a, vent_loss, ..settings }
+    }
+
+    /// How far a lip that is to follow the player's rule does so, 0..=1: it sets out where the breath was physical until now.
+    pub fn follows(&self) -> f64 {
+        self.under_way.map_or(1.0, |Way { now, .. }| f64::from(now[FOLLOWS]))
     }
 }
 
@@ -101,6 +114,27 @@ mod tests {
         }
         assert_eq!(glide.over(new), new);
         assert!(f64::from(ticks) * tick_s < 0.15, "{ticks}");
+    }
+
+    #[test]
+    fn a_lip_that_begins_to_follow_the_rule_sets_out_from_the_free_reed() {
+        let played = Settings { breath_response: BreathResponse::Played, ..Settings::default() };
+        let physical = Settings { breath_response: BreathResponse::Physical, ..played };
+        let mut glide = ReedGlide::default();
+        assert_eq!(glide.follows(), 1.0);
+        for _ in 0..2 {
+            glide.begin(&physical, &played);
+            let mut last = glide.follows();
+            assert_eq!(last, 0.0);
+            for _ in 0..60 {
+                glide.tick(&played, 1.0 / 6_000.0);
+                assert!((0.0..0.02).contains(&(glide.follows() - last)));
+                last = glide.follows();
+            }
+            assert!(last > 0.4, "{last}");
+            // Turned back on the way, it begins anew.
+            glide.begin(&played, &physical);
+        }
     }
 
     #[test]
