@@ -513,9 +513,26 @@ pub fn shot(harness: &mut Harness<'_, EditorState>, scale: f32) -> image::RgbaIm
     image::imageops::crop_imm(&whole, px(FRAME), px(FRAME), px(size.0), px(size.1)).to_image()
 }
 
-/// Both at once. The views of the player show the note at mezzo-forte, as a player plays it.
+/// Leaves the knob away: a breath controller blows instead, as most players have.
+fn blown_by_a_controller(snapshot: &mut Snapshot) {
+    let breath = snapshot.sources.iter().find(|source| source.is_live).map_or(0.0, |source| source.value);
+    for source in &mut snapshot.sources {
+        match source.name.as_str() {
+            "CC2 breath" => (source.value, source.is_live, source.is_seen) = (breath, true, true),
+            BreathSource::KNOB => (source.value, source.is_live, source.is_seen) = (0.0, false, false),
+            _ => {}
+        }
+    }
+    snapshot.status = vec![Status { level: Severity::Good, text: "breath: CC2 breath".into() }];
+    snapshot.knob = KnobState::default();
+}
+
+/// Both at once. A knob is connected in the views that are about it; the views of the player show the note at mezzo-forte, as a player plays it.
 pub fn picture(kept: &WindowState, controls: &Fake, snapshot: &Snapshot, scale: f32) -> image::RgbaImage {
     let mut snapshot = snapshot.clone();
+    if !matches!(kept.tab, Tab::Reed | Tab::Knob) {
+        blown_by_a_controller(&mut snapshot);
+    }
     if matches!(kept.tab, Tab::Play | Tab::Breath) {
         snapshot.settings.breath_response = BreathResponse::Played;
         snapshot.dynamic = Some(MEZZO_FORTE as f32);
