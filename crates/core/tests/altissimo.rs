@@ -146,7 +146,8 @@ fn tongued_high_notes_speak_at_every_breath_and_without_an_accent() {
             .collect();
         let play = |at: usize| tongued(&model, cases[at].0, cases[at].1);
         let found = parallel::each(cases.len(), play, &mut |_| ControlFlow::Continue(())).unwrap();
-        let lost: Vec<_> = cases.iter().zip(&found).filter(|(_, (off, _))| !(off.abs() < 20.0)).collect();
+        let speaks = |off: f64| off.abs() < 20.0;
+        let lost: Vec<_> = cases.iter().zip(&found).filter(|(_, (off, _))| !speaks(*off)).collect();
         let louder_db = found.iter().map(|&(_, louder_db)| louder_db).fold(f64::MIN, f64::max);
         println!(
             "{}: {} of {} lost: {lost:?}; begins up to {louder_db:.1} dB louder",
