@@ -43,7 +43,8 @@ const RATE_HZ: f64 = 44_100.0;
 const PATH: &str = "crates/core/src/instrument/player/fitted.rs";
 /// Harmonics that are compared.
 const COMPARED: usize = 10;
-/// How often each recorded note is played: takes differ in breath noise and *Life*, by half a decibel of error and a tenth of the centroid.
+/// How often each recorded note is played: takes differ in breath noise and *Life*. Of four takes, the errors of the best and the
+/// worst differ by 0.6 dB in the median and 4 dB at most, and their centroids by 1 and 14 %.
 const TAKES: usize = 8;
 /// Renders are this much softer, so that no peak meets the limiter, dB.
 const HEADROOM_DB: f32 = 20.0;

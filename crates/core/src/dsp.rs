@@ -5,5 +5,6 @@ pub mod lanes;
 pub mod limiter;
 pub mod low_pass;
 pub mod resampler;
+pub mod smooth;
 pub mod warp;
 pub mod white;

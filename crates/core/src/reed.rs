@@ -16,6 +16,7 @@
 
 pub mod firmware_header;
 pub mod law;
+pub mod lay;
 pub mod motion;
 pub mod physical;
 pub mod quasi_static;

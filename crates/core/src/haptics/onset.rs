@@ -27,6 +27,7 @@ use std::f64::consts::TAU;
 use crate::bore::transfer_matrix::threshold_gamma;
 use crate::haptics::admittance::AdmittanceGrid;
 use crate::haptics::played_reed::Lip;
+use crate::reed::lay::opening;
 
 /// Most Newton steps. Where there is a solution, ten are enough.
 const STEPS: usize = 60;
@@ -57,13 +58,7 @@ pub(super) struct MovingReed {
 impl MovingReed {
     /// Opening at a steady pressure difference, and minus its slope.
     fn opening(&self, gamma: f64) -> (f64, f64) {
-        let gap = 1.0 - gamma;
-        if gap >= self.lay {
-            (gap, 1.0)
-        } else {
-            let knee = (gap + self.lay).max(0.0);
-            (knee * knee / (4.0 * self.lay), knee / (2.0 * self.lay))
-        }
+        opening(1.0 - gamma, self.lay)
     }
 
     /// Response of the reed to a pressure difference, and the factor that turns a position into a speed, 1/s.

@@ -23,6 +23,7 @@
 pub mod choir;
 
 use crate::reed::law::{K_INIT, ReedLaw};
+use crate::reed::lay::opening;
 use crate::reed::tables::ReedTables;
 
 /// A reed counts as shut below this opening (over the rest opening), in statistics and drawings. With a curved lay the last
@@ -134,13 +135,8 @@ impl ReedCoeffs {
     pub fn rest_flow(&self, p_mouth: f64, tongue: f64) -> f64 {
         let p = p_mouth.max(0.0);
         let gap = 1.0 - (self.compliance * p + tongue) * self.per_closing;
-        let opening = if gap >= self.lay {
-            gap.min(MAX_OPENING)
-        } else {
-            let knee = (gap + self.lay).max(0.0);
-            knee * knee / (4.0 * self.lay)
-        };
-        self.strength * self.closing * opening * p.sqrt()
+        let (opening, _) = opening(gap, self.lay);
+        self.strength * self.closing * opening.min(MAX_OPENING) * p.sqrt()
     }
 
     /// Pressure that closes the reed, extrapolated where the lay is curved, over the reference closing pressure.

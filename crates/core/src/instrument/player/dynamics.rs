@@ -23,6 +23,7 @@
 //! [`PlayerModel::altissimo_zeta`], at which soft notes keep their register, and the knee to that of the settings. `cargo xtask fit-player`
 //! fits the numbers to recorded notes; `docs/tone.md` tells how and what they bought.
 
+use crate::dsp::smooth::smooth;
 use crate::reed::ReedLaw;
 use crate::reed::physical::ZETA_REFERENCE;
 
@@ -48,8 +49,7 @@ const FARTHEST: f64 = 1.25;
 /// How far a place lies on the way into the altissimo, 0..=1, smoothly.
 fn in_altissimo(place: f64) -> f64 {
     let (from, to) = ALTISSIMO;
-    let way = ((place - from) / (to - from)).clamp(0.0, 1.0);
-    way * way * (3.0 - 2.0 * way)
+    smooth((place - from) / (to - from))
 }
 
 /// The numbers of the player's rule; see the module.

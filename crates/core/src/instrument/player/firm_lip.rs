@@ -5,7 +5,8 @@
 //! so that the note outgrows the other one. A reed that is damped less also needs less pressure, so the player blows less, and the note is no
 //! accent. Both ease off before the note is heard as held.
 
-use super::lip_glide::NoteLip;
+use super::lip_glide::{AT_DAMPING, NoteLip};
+use crate::dsp::smooth::smooth;
 
 /// Register from which notes are tongued so: the altissimo, written C#6 and up.
 const REGISTER: u8 = 3;
@@ -15,7 +16,7 @@ const PLACES: (f64, f64) = (0.65, 0.85);
 /// Damping of the reed under the firm lip over that of the held note. Measured on the B flat, A and bass clarinet, written D6 to A6: from 0.7 to 0.8 all notes speak
 /// at all of CC 4 to 124. With 0.85 F#6 on the bass is lost; with 0.5 a pianissimo begins 16 dB louder than it goes on.
 const DAMPING: f64 = 0.75;
-/// Mouth pressure over that which the held note would ask for. Measured: without it soft notes begin up to 7 dB louder than they go on, with it up to 3.5.
+/// Mouth pressure over that which the held note would ask for. Measured: without it soft notes begin up to 7 dB louder than they go on, with it up to 3.5 (4.6 with the wider [opening](super::high_opening)).
 const BREATH: f64 = 0.9;
 /// How long the lip is firm, and how long it takes to ease off, periods of the lowest note: 0.1 s each on a B flat clarinet. Measured: after 10 periods,
 /// F#6 on the bass is lost at 48 kHz and CC 4.
@@ -28,12 +29,6 @@ const HELD: f64 = 1e-4;
 pub struct FirmLip {
     /// 0, as on held notes, to 1.
     firmness: f64,
-}
-
-/// Smoothly from 0 to 1.
-fn smooth(way: f64) -> f64 {
-    let way = way.clamp(0.0, 1.0);
-    way * way * (3.0 - 2.0 * way)
 }
 
 /// How firm a lip is that plays a note at a place, so many periods of the lowest note after the tongue, 0..=1.
@@ -56,7 +51,7 @@ impl FirmLip {
 
     /// Lets the lip damp the reed less.
     pub fn hold(&self, note_lip: &mut NoteLip) {
-        note_lip[1] *= 1.0 - (1.0 - DAMPING) * self.firmness;
+        note_lip[AT_DAMPING] *= 1.0 - (1.0 - DAMPING) * self.firmness;
     }
 
     /// Factor on the mouth pressure.
@@ -77,7 +72,7 @@ mod tests {
             let (mut lip, mut under) = (FirmLip::default(), LIP);
             lip.tick(note, periods, true, 0.02);
             lip.hold(&mut under);
-            (under[1] / LIP[1], lip.breath())
+            (under[AT_DAMPING] / LIP[AT_DAMPING], lip.breath())
         };
         let (damping, breath) = held(Some((3, 0.9)), 5.0);
         assert!((damping - DAMPING).abs() < 1e-12 && (breath - BREATH).abs() < 1e-12);

@@ -4,7 +4,8 @@
 //! note, the reed takes both along: what it mixes of the note and one of them feeds the other. Between soft and loud they grew to 17 to 20 dB below the
 //! note, an undertone that stayed as long as the note. A reed that opens further, and is blown as much harder as keeps the level, mixes less.
 
-use super::lip_glide::NoteLip;
+use super::lip_glide::{AT_BETWEEN, AT_PLACE, NoteLip};
+use crate::dsp::smooth::smooth;
 
 /// [Places](super::dynamics::PlayerModel::place) over which the opening comes: written C6 and E flat 6.
 const PLACES: (f64, f64) = (0.57, 0.7);
@@ -12,18 +13,11 @@ const PLACES: (f64, f64) = (0.57, 0.7);
 /// mouth pressure over the closing pressure, as on the way of a lip from note to note. Measured on the B flat and bass clarinets: the undertone of E flat 6 lies 33 and 26 dB under the note with
 /// 0.25, 33 and 30 with 0.3, 35 and 34 with 0.35. With 0.3 the levels of high notes move by -0.6 to 0.5 dB, and their pitches by up to 0.8 cents.
 const MOST: f64 = 0.3;
-/// Index of what is added between the softest and the loudest dynamic.
-const BETWEEN: usize = 3;
-/// Index of the place.
-const PLACE: usize = 2;
 
 /// Opens the reed further, for the place where the lip is. Real-time safe.
 pub fn open(note_lip: &mut NoteLip) {
     let (from, to) = PLACES;
-    let way = ((note_lip[PLACE] - from) / (to - from)).clamp(0.0, 1.0);
-    if way > 0.0 {
-        note_lip[BETWEEN] += MOST * way * way * (3.0 - 2.0 * way);
-    }
+    note_lip[AT_BETWEEN] += MOST * smooth((note_lip[AT_PLACE] - from) / (to - from));
 }
 
 #[cfg(test)]
@@ -35,7 +29,7 @@ mod tests {
         let opened = |place: f64| {
             let mut lip: NoteLip = [1_500.0, 0.8, place, -0.1, -1.3, 0.1, 1.0, 0.03];
             open(&mut lip);
-            lip[BETWEEN]
+            lip[AT_BETWEEN]
         };
         assert_eq!((opened(-0.5), opened(0.56)), (-0.1, -0.1));
         assert!((opened(0.71) - (MOST - 0.1)).abs() < 1e-12);

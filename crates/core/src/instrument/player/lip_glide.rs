@@ -10,8 +10,12 @@ const ARRIVED: f64 = 1e-4;
 /// ([`AtPlace`](super::dynamics::AtPlace)); and how far the resonance moves for a cent, as a share of itself.
 pub type NoteLip = [f64; 8];
 
+/// Of these, the damping.
+pub const AT_DAMPING: usize = 1;
+/// Of these, the place.
+pub const AT_PLACE: usize = 2;
 /// Of these, what is added to the closing pressure between the softest and the loudest dynamic.
-const BETWEEN: usize = 3;
+pub const AT_BETWEEN: usize = 3;
 
 /// The lip damps the reed for a moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,14 +55,14 @@ impl LipGlide {
             if !at_once {
                 self.help.1 = left_s - tick_s;
             }
-            target[1] *= damping;
+            target[AT_DAMPING] *= damping;
         }
         let now = match self.now {
             Some(now) if !at_once && now != target => {
                 let mut next = now;
                 let mut arrived = true;
                 for (n, (next, target)) in next.iter_mut().zip(target).enumerate() {
-                    if n == BETWEEN {
+                    if n == AT_BETWEEN {
                         self.ahead += (target - self.ahead) * slow;
                         *next += (self.ahead - *next) * slow;
                     } else {
@@ -69,7 +73,7 @@ impl LipGlide {
                 if arrived { target } else { next }
             }
             _ => {
-                self.ahead = target[BETWEEN];
+                self.ahead = target[AT_BETWEEN];
                 target
             }
         };

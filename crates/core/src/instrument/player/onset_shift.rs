@@ -14,6 +14,8 @@
 
 use num_complex::Complex64;
 
+use crate::reed::lay::opening;
+
 /// The onset is looked for between these mouth pressures over the closing pressure.
 const RANGE: (f64, f64) = (0.2, 0.95);
 /// Halvings of the range: to 1e-6.
@@ -39,12 +41,7 @@ pub struct ReedAtNote {
 impl ReedAtNote {
     /// Opening of the reed at a mouth pressure, and how it falls with the pressure.
     fn opening(&self, gamma: f64) -> (f64, f64) {
-        let gap = 1.0 - gamma;
-        if gap >= self.lay {
-            return (gap, 1.0);
-        }
-        let knee = (gap + self.lay).max(0.0);
-        (knee * knee / (4.0 * self.lay), knee / (2.0 * self.lay))
+        opening(1.0 - gamma, self.lay)
     }
 
     /// What the reed yields to an oscillating pressure, over what it yields to a steady one.

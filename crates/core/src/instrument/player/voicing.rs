@@ -4,6 +4,7 @@
 //! there it takes the note along: a bend. Players do so with peaks of up to 60 MPa s/m3 (Chen, Smith & Wolfe 2009).
 
 use super::known::Known;
+use crate::dsp::smooth::smooth;
 use crate::instrument::settings::Settings;
 use crate::instrument::techniques::Tract;
 use crate::instrument::vocal_tract::{TractCoeffs, TractResonance};
@@ -65,8 +66,7 @@ pub struct Voicing {
 
 /// How near the resonance is to the note from above, 0..=1; 1 from the note down.
 fn nearness(octaves: f64) -> f64 {
-    let way = (1.0 - octaves / NEAR_OCTAVES).clamp(0.0, 1.0);
-    way * way * (3.0 - 2.0 * way)
+    smooth(1.0 - octaves / NEAR_OCTAVES)
 }
 
 /// Interval of the resonance, octaves, for a bend of so many cents; 0 and less.

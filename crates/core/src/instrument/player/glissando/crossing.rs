@@ -10,6 +10,7 @@
 
 use super::ladder::{Ladder, highest_open};
 use super::{Between, holes};
+use crate::dsp::smooth::smooth;
 use crate::instrument::model::Model;
 use crate::instrument::player::pitch_ear::PitchEar;
 use crate::instrument::player::voicing::{Voiced, bend_for_octaves, octaves_for_bend};
@@ -154,8 +155,7 @@ impl Crossing {
 
     /// How far the tract has taken over in the chalumeau, 0..=1.
     fn lead(&self) -> f64 {
-        let way = ((self.place - self.begins) / (self.change - self.begins)).clamp(0.0, 1.0);
-        way * way * (3.0 - 2.0 * way)
+        smooth((self.place - self.begins) / (self.change - self.begins))
     }
 
     /// What the fingers correct, cents: at the ends of the slide nothing.
