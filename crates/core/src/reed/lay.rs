@@ -6,9 +6,9 @@
 /// ```
 /// use chalumeau_core::reed::lay::opening;
 ///
-/// assert_eq!(opening(0.5, 0.4), (0.5, 1.0)); // off the curve
-/// assert_eq!(opening(0.0, 0.4), (0.1, 0.5)); // where a straight reed would just be shut
-/// assert_eq!(opening(-0.4, 0.4), (0.0, 0.0));
+/// assert_eq!(opening(0.75, 0.5), (0.75, 1.0)); // off the curve
+/// assert_eq!(opening(0.0, 0.5), (0.125, 0.5)); // where a straight reed would just be shut
+/// assert_eq!(opening(-0.5, 0.5), (0.0, 0.0));
 /// ```
 #[inline(always)]
 pub fn opening(gap: f64, half: f64) -> (f64, f64) {
