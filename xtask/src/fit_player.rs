@@ -91,7 +91,7 @@ const TOLERANCE: f64 = 0.7;
 
 /// The numbers that are fitted: pressure at fortissimo (3), zeta (4), logarithm of the growth of the closing pressure, closing pressure
 /// between (2), throat (3, the width by its logarithm); presence (5, frequencies and quality by their logarithms). The
-/// others (range of levels, closing pressure at dynamic 0, flow strength in the altissimo, knee) are chosen, see `docs/tone.md`.
+/// others (range of levels, closing pressure at dynamic 0 and on the highest notes, flow strength in the altissimo, knee) are chosen, see `docs/tone.md`.
 const COUNT: usize = 18;
 /// Size of the first steps of the search.
 const FIRST_STEPS: [f64; COUNT] =
@@ -535,13 +535,22 @@ fn say(what: &str, compared: &[(Dynamic, Compared)]) {
 /// The generated file: its head as it is, then the rule and the presence.
 fn text(kept: &str, rule: &Rule) -> String {
     let head = kept.split("pub const FITTED").next().unwrap_or_default();
-    let PlayerModel { range_db, loudest_gamma, zeta, closing, closing_between, throat, altissimo_zeta, knee } =
-        rule.player;
+    let PlayerModel {
+        range_db,
+        loudest_gamma,
+        zeta,
+        closing,
+        closing_between,
+        throat,
+        high,
+        altissimo_zeta,
+        knee,
+    } = rule.player;
     let Presence { shelf_hz, shelf_db, bell_hz, bell_db, bell_quality } = rule.presence;
     let round = |numbers: &[f64]| numbers.iter().map(|x| format!("{x:.4}")).collect::<Vec<_>>().join(", ");
     format!(
         "{head}pub const FITTED: PlayerModel = PlayerModel {{\n    range_db: {range_db:?},\n    loudest_gamma: [{}],\n    \
-         zeta: [{}],\n    closing: [{}],\n    closing_between: [{}],\n    throat: [{}],\n    \
+         zeta: [{}],\n    closing: [{}],\n    closing_between: [{}],\n    throat: [{}],\n    high: {high:?},\n    \
          altissimo_zeta: {altissimo_zeta:?},\n    knee: {knee:?},\n}};\n\n\
          /// Fitted with it.\npub const PRESENCE: Presence = Presence {{\n    shelf_hz: {shelf_hz:.1},\n    \
          shelf_db: {shelf_db:.3},\n    bell_hz: {bell_hz:.1},\n    bell_db: {bell_db:.3},\n    \

@@ -19,7 +19,6 @@ mod fingers;
 mod firm_lip;
 pub(crate) mod fitted;
 mod glissando;
-mod high_opening;
 mod inflection;
 mod inhalation;
 mod known;
@@ -565,7 +564,6 @@ impl Player {
         let periods = self.onset.since_s() * model.lowest_hz;
         self.firm_lip.tick(firm, periods, tongue_holds, posture.lags.lip);
         self.firm_lip.hold(&mut note_lip);
-        high_opening::open(&mut note_lip);
         let bodily = Bodily {
             note_lip,
             onset: &self.onset,

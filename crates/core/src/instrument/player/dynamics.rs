@@ -11,7 +11,7 @@
 //! | level re that at `d` = 1, dB | `-range (1 - d)` |
 //! | mouth over closing pressure at `d` = 1 | `g0 + g1 x + g2 x^2`, with `x` held at -1 and 1 |
 //! | flow strength zeta of the reed under the lip | `exp(z0 + z1 x + (z2 + z3 x) d)` |
-//! | closing pressure over the reed's own | `c0 c1^(d^3) exp(4 d (1 - d) (m1 x + m2 x^2 + t exp(-((x - x0) / w)^2 / 2)))` |
+//! | closing pressure over the reed's own | `c0 c1^(d^3) exp(4 d (1 - d) (m1 x + m2 x^2 + t exp(-((x - x0) / w)^2 / 2) + h s(x)))`, `s` from 0 to 1 above C6 |
 //! | half-width of the knee of the lay over the rest opening | `lay f / closing` |
 //!
 //! The closing pressure rises because the jaw opens: the rest opening grows and the stiffness stays. So the air that the
@@ -41,6 +41,8 @@ pub const NODE_DYNAMICS: [f64; NODES] = [0.0, 0.2, 0.4, 0.56, 0.7, 0.82, 0.92, 1
 const HALF_COMPASS_OCTAVES: f64 = 20.5 / 12.0;
 /// Places between which the flow strength goes over to that of the altissimo: written A5 and E flat 6 of a B flat clarinet.
 const ALTISSIMO: (f64, f64) = (0.42, 0.7);
+/// Places between which the lip comes to open the reed further: written C6 and E flat 6.
+const HIGH: (f64, f64) = (0.57, 0.7);
 /// Flow strengths that the rule may ask for below the altissimo: those at which recorded notes were compared and registers hold.
 const ZETAS: (f64, f64) = (0.14, 0.5);
 /// The place of a note far outside the compass counts as this.
@@ -49,6 +51,12 @@ const FARTHEST: f64 = 1.25;
 /// How far a place lies on the way into the altissimo, 0..=1, smoothly.
 fn in_altissimo(place: f64) -> f64 {
     let (from, to) = ALTISSIMO;
+    smooth((place - from) / (to - from))
+}
+
+/// How far a place lies on the way to the notes whose reed the lip opens further, 0..=1, smoothly.
+fn is_high(place: f64) -> f64 {
+    let (from, to) = HIGH;
     smooth((place - from) / (to - from))
 }
 
@@ -68,6 +76,9 @@ pub struct PlayerModel {
     pub closing_between: [f64; 2],
     /// The same around the throat notes: how much, place of the middle, and standard deviation of the bell over the place.
     pub throat: [f64; 3],
+    /// The same on the highest notes. Modes of their fingerings lie as far below a note as above, as on written E flat 6 at 0.70 and 1.30 of it. What
+    /// the reed mixes of the note and one of them feeds the other; a reed that opens further, and is blown as much harder as keeps the level, mixes less.
+    pub high: f64,
     /// Flow strength in the altissimo, at every dynamic.
     pub altissimo_zeta: f64,
     /// Half-width of the knee of the lay over that of the settings, where the closing pressure is the reed's own.
@@ -122,7 +133,8 @@ impl PlayerModel {
             knee: self.knee.ln(),
             at: [
                 (1.0 - in_altissimo(place)) * (slope + curvature * place) * place
-                    + throat * (-0.5 * away * away).exp(),
+                    + throat * (-0.5 * away * away).exp()
+                    + self.high * is_high(place),
                 zeta + zeta_slope * place,
                 zeta_growth + zeta_growth_slope * place,
                 in_altissimo(place),

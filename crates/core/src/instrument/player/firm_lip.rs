@@ -16,7 +16,7 @@ const PLACES: (f64, f64) = (0.65, 0.85);
 /// Damping of the reed under the firm lip over that of the held note. Measured on the B flat, A and bass clarinet, written D6 to A6: from 0.7 to 0.8 all notes speak
 /// at all of CC 4 to 124. With 0.85 F#6 on the bass is lost; with 0.5 a pianissimo begins 16 dB louder than it goes on.
 const DAMPING: f64 = 0.75;
-/// Mouth pressure over that which the held note would ask for. Measured: without it soft notes begin up to 7 dB louder than they go on, with it up to 3.5 (4.6 with the wider [opening](super::high_opening)).
+/// Mouth pressure over that which the held note would ask for. Measured: without it soft notes begin up to 7 dB louder than they go on, with it up to 3.5 (4.6 with the wider [opening](super::dynamics::PlayerModel::high)).
 const BREATH: f64 = 0.9;
 /// How long the lip is firm, and how long it takes to ease off, periods of the lowest note: 0.1 s each on a B flat clarinet. Measured: after 10 periods,
 /// F#6 on the bass is lost at 48 kHz and CC 4.

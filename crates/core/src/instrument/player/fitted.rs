@@ -12,6 +12,7 @@ pub const FITTED: PlayerModel = PlayerModel {
     closing: [0.7300, 2.2620],
     closing_between: [-0.4029, -0.3020],
     throat: [-0.7533, -0.3863, 0.1500],
+    high: 0.3,
     altissimo_zeta: 0.22,
     knee: 0.725,
 };
