@@ -12,8 +12,6 @@ pub type NoteLip = [f64; 8];
 
 /// Of these, the damping.
 pub const AT_DAMPING: usize = 1;
-/// Of these, the place.
-pub const AT_PLACE: usize = 2;
 /// Of these, what is added to the closing pressure between the softest and the loudest dynamic.
 pub const AT_BETWEEN: usize = 3;
 
