@@ -543,6 +543,7 @@ fn text(kept: &str, rule: &Rule) -> String {
         closing_between,
         throat,
         high,
+        top,
         altissimo_zeta,
         knee,
     } = rule.player;
@@ -550,7 +551,7 @@ fn text(kept: &str, rule: &Rule) -> String {
     let round = |numbers: &[f64]| numbers.iter().map(|x| format!("{x:.4}")).collect::<Vec<_>>().join(", ");
     format!(
         "{head}pub const FITTED: PlayerModel = PlayerModel {{\n    range_db: {range_db:?},\n    loudest_gamma: [{}],\n    \
-         zeta: [{}],\n    closing: [{}],\n    closing_between: [{}],\n    throat: [{}],\n    high: {high:?},\n    \
+         zeta: [{}],\n    closing: [{}],\n    closing_between: [{}],\n    throat: [{}],\n    high: {high:?},\n    top: {top:?},\n    \
          altissimo_zeta: {altissimo_zeta:?},\n    knee: {knee:?},\n}};\n\n\
          /// Fitted with it.\npub const PRESENCE: Presence = Presence {{\n    shelf_hz: {shelf_hz:.1},\n    \
          shelf_db: {shelf_db:.3},\n    bell_hz: {bell_hz:.1},\n    bell_db: {bell_db:.3},\n    \

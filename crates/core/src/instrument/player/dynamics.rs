@@ -11,7 +11,7 @@
 //! | level re that at `d` = 1, dB | `-range (1 - d)` |
 //! | mouth over closing pressure at `d` = 1 | `g0 + g1 x + g2 x^2`, with `x` held at -1 and 1 |
 //! | flow strength zeta of the reed under the lip | `exp(z0 + z1 x + (z2 + z3 x) d)` |
-//! | closing pressure over the reed's own | `c0 c1^(d^3) exp(4 d (1 - d) (m1 x + m2 x^2 + t exp(-((x - x0) / w)^2 / 2) + h s(x)))`, `s` from 0 to 1 above C6 |
+//! | closing pressure over the reed's own | `c0 c1^(d^3) exp(4 d (1 - d) (m1 x + m2 x^2 + t exp(-((x - x0) / w)^2 / 2) + h s(x)) + v u(x))`, `s` and `u` from 0 to 1 above C6 and G6 |
 //! | half-width of the knee of the lay over the rest opening | `lay f / closing` |
 //!
 //! The closing pressure rises because the jaw opens: the rest opening grows and the stiffness stays. So the air that the
@@ -54,6 +54,15 @@ fn in_altissimo(place: f64) -> f64 {
     smooth((place - from) / (to - from))
 }
 
+/// Places between which the lip comes to close the reed at every dynamic: written G6 and G#6.
+const TOP: (f64, f64) = (0.905, 0.955);
+
+/// How far a place lies on the way to the topmost notes, 0..=1, smoothly.
+fn is_top(place: f64) -> f64 {
+    let (from, to) = TOP;
+    smooth((place - from) / (to - from))
+}
+
 /// How far a place lies on the way to the notes whose reed the lip opens further, 0..=1, smoothly.
 fn is_high(place: f64) -> f64 {
     let (from, to) = HIGH;
@@ -79,6 +88,9 @@ pub struct PlayerModel {
     /// The same on the highest notes. Modes of their fingerings lie as far below a note as above, as on written E flat 6 at 0.70 and 1.30 of it. What
     /// the reed mixes of the note and one of them feeds the other; a reed that opens further, and is blown as much harder as keeps the level, mixes less.
     pub high: f64,
+    /// What is added to the logarithm of the closing pressure on the topmost notes, at every dynamic: opened as far as below, they are 8 to
+    /// 20 dB louder than their neighbours.
+    pub top: f64,
     /// Flow strength in the altissimo, at every dynamic.
     pub altissimo_zeta: f64,
     /// Half-width of the knee of the lay over that of the settings, where the closing pressure is the reed's own.
@@ -135,6 +147,7 @@ impl PlayerModel {
                 (1.0 - in_altissimo(place)) * (slope + curvature * place) * place
                     + throat * (-0.5 * away * away).exp()
                     + self.high * is_high(place),
+                self.top * is_top(place),
                 zeta + zeta_slope * place,
                 zeta_growth + zeta_growth_slope * place,
                 in_altissimo(place),
@@ -163,11 +176,11 @@ impl PlayerModel {
     }
 }
 
-/// The numbers of the rule that go with the place of a note: what is added to the logarithm of the closing pressure over `4 d (1 - d)`;
-/// logarithm of the flow strength below the altissimo at dynamic 0, and its growth; and how far the place lies on the way into the
+/// The numbers of the rule that go with the place of a note: what is added to the logarithm of the closing pressure over `4 d (1 - d)`, and
+/// what at every dynamic; logarithm of the flow strength below the altissimo at dynamic 0, and its growth; and how far the place lies on the way into the
 /// altissimo, 0..=1. A lip on its way from note to note has numbers between theirs, and not those of the places between: a slur over the
 /// throat does not ask for a throat note's lip.
-pub type AtPlace = [f64; 4];
+pub type AtPlace = [f64; 5];
 
 /// The rule for the notes at one place. All numbers are logarithms but the last of `at`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -182,22 +195,27 @@ pub struct PlacedRule {
     pub at: AtPlace,
 }
 
+/// What the place adds to the logarithm of the closing pressure at a dynamic.
+fn closing_at([between, always, ..]: &AtPlace, dynamic: f64) -> f64 {
+    4.0 * dynamic * (1.0 - dynamic) * between + always
+}
+
 impl PlacedRule {
     fn log_zeta(&self, dynamic: f64) -> f64 {
-        let ([_, soft, growth, altissimo], [lowest, highest]) = (self.at, self.zetas);
+        let ([_, _, soft, growth, altissimo], [lowest, highest]) = (self.at, self.zetas);
         let below = (soft + growth * dynamic).clamp(lowest, highest);
         below + altissimo * (self.altissimo_zeta - below)
     }
 
     fn log_closing(&self, dynamic: f64) -> f64 {
-        let ([soft, growth], [between, ..]) = (self.closing, self.at);
-        soft + growth * dynamic * dynamic * dynamic + 4.0 * dynamic * (1.0 - dynamic) * between
+        let [soft, growth] = self.closing;
+        soft + growth * dynamic * dynamic * dynamic + closing_at(&self.at, dynamic)
     }
 
     /// Closing pressure where the lip goes, over that here. Real-time safe.
     pub fn closing_ahead(&self, to: &AtPlace, dynamic: f64) -> f64 {
-        let ([here, ..], [there, ..]) = (self.at, to);
-        if here == *there { 1.0 } else { (4.0 * dynamic * (1.0 - dynamic) * (there - here)).exp() }
+        let further = closing_at(to, dynamic) - closing_at(&self.at, dynamic);
+        if further == 0.0 { 1.0 } else { further.exp() }
     }
 
     fn log_knee(&self, log_opening: f64) -> f64 {

@@ -64,7 +64,7 @@ impl FirmLip {
 mod tests {
     use super::*;
 
-    const LIP: NoteLip = [1_500.0, 0.8, 0.9, -0.1, -1.3, 0.1, 1.0, 0.03];
+    const LIP: NoteLip = [1_500.0, 0.8, 0.9, -0.1, 0.0, -1.3, 0.1, 1.0, 0.03];
 
     #[test]
     fn only_the_highest_notes_take_it_and_only_while_they_begin() {

@@ -13,6 +13,7 @@ pub const FITTED: PlayerModel = PlayerModel {
     closing_between: [-0.4029, -0.3020],
     throat: [-0.7533, -0.3863, 0.1500],
     high: 0.3,
+    top: -1.0,
     altissimo_zeta: 0.22,
     knee: 0.725,
 };

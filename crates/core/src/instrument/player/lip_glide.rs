@@ -3,17 +3,19 @@
 //! Slurred, they move while the fingers do; a step of them is a step of the flow, which clicks. Behind the tongue they are in
 //! place at once. A difficult [`slur`](super::slur), and a note that the tongue begins again while it still rings, let the lip damp the reed for a moment.
 
+use std::ops::Range;
+
 /// These count as arrived when each is this near to its target, as a share of it.
 const ARRIVED: f64 = 1e-4;
 
 /// Where the lip is for a note: resonance of the reed, Hz; its damping; the place of the note; what goes with the place
 /// ([`AtPlace`](super::dynamics::AtPlace)); and how far the resonance moves for a cent, as a share of itself.
-pub type NoteLip = [f64; 8];
+pub type NoteLip = [f64; 9];
 
 /// Of these, the damping.
 pub const AT_DAMPING: usize = 1;
-/// Of these, what is added to the closing pressure between the softest and the loudest dynamic.
-pub const AT_BETWEEN: usize = 3;
+/// Of these, what is added to the closing pressure: between the softest and the loudest dynamic, and at every dynamic.
+const CLOSING: Range<usize> = 3..5;
 
 /// The lip damps the reed for a moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,8 +30,8 @@ pub struct LipHelp {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LipGlide {
     now: Option<NoteLip>,
-    /// Where its closing between the dynamics goes: it gathers speed.
-    ahead: f64,
+    /// Where its [closing](CLOSING) goes: it gathers speed.
+    ahead: [f64; CLOSING.end - CLOSING.start],
     /// Factor on the damping, and for how long yet, s; 0 or less for none.
     help: (f64, f64),
 }
@@ -60,9 +62,10 @@ impl LipGlide {
                 let mut next = now;
                 let mut arrived = true;
                 for (n, (next, target)) in next.iter_mut().zip(target).enumerate() {
-                    if n == AT_BETWEEN {
-                        self.ahead += (target - self.ahead) * slow;
-                        *next += (self.ahead - *next) * slow;
+                    if CLOSING.contains(&n) {
+                        let ahead = &mut self.ahead[n - CLOSING.start];
+                        *ahead += (target - *ahead) * slow;
+                        *next += (*ahead - *next) * slow;
                     } else {
                         *next += (target - *next) * share;
                     }
@@ -71,7 +74,7 @@ impl LipGlide {
                 if arrived { target } else { next }
             }
             _ => {
-                self.ahead = target[AT_BETWEEN];
+                self.ahead.copy_from_slice(&target[CLOSING]);
                 target
             }
         };
@@ -87,7 +90,7 @@ mod tests {
     #[test]
     fn help_damps_the_reed_for_a_while_and_then_leaves_it_as_it_was() {
         const TICK_S: f64 = 1.0 / 6_000.0;
-        let target: NoteLip = [1_500.0, 0.8, -0.5, -0.1, -1.3, 0.1, 0.0, 0.03];
+        let target: NoteLip = [1_500.0, 0.8, -0.5, -0.1, 0.0, -1.3, 0.1, 0.0, 0.03];
         let mut lip = LipGlide::default();
         assert_eq!(lip.tick(target, true, (0.05, 0.05), TICK_S), target);
         lip.help(Some(LipHelp { damping: 1.5, length_s: 0.02 }));

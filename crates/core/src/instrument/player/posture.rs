@@ -239,9 +239,10 @@ impl Posture {
 
     /// Where the lip goes for this note.
     pub fn note_lip(&self) -> NoteLip {
-        let [between, zeta, growth, altissimo] = self.at;
+        let [between, always, zeta, growth, altissimo] = self.at;
         let per_cent = self.played.as_ref().map_or(0.0, |played| played.resonance_per_cent);
-        [self.free.resonance_hz, self.free.damping, self.place, between, zeta, growth, altissimo, per_cent]
+        let MovingReed { resonance_hz, damping, .. } = self.free;
+        [resonance_hz, damping, self.place, between, always, zeta, growth, altissimo, per_cent]
     }
 
     /// Gives the reed the lip of a dynamic, 0..=1, on its way to the note; nothing where the breath is physical.
