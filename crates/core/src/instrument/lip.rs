@@ -9,15 +9,15 @@
 pub struct Embouchure {
     /// Resonance of the reed with the lip on it, Hz.
     pub resonance_hz: f64,
-    /// Damping q of the reed, 1 / Q; 0.15..=0.8.
+    /// Damping q of the reed, 1 / Q; 0.13..=0.8.
     pub damping: f64,
 }
 
 /// Embouchure for a note sounding at `note_hz` on an instrument whose lowest note sounds at `lowest_hz`. Real-time safe.
 ///
 /// The resonance is `f_r = max(10.2 f_low, 1.55 f)`; the damping `q` goes from 0.8 to 0.25 while `f / f_r` goes from 0.36
-/// to 0.54, and on to 0.15 while `f / f_low` goes from 9.6 to 10, written G6 to G#6: the highest notes only hold softly on a reed that
-/// favours them over the modes below, whose thresholds are lower.
+/// to 0.54, and on to 0.13 while `f / f_low` goes from 7.6 to 11, written E flat 6 to A6: the highest notes only begin and hold softly on a reed
+/// that favours them over the modes below (Wilson and Beavers 1974), whose thresholds are lower.
 ///
 /// ```
 /// use chalumeau_core::instrument::lip::embouchure;
@@ -29,8 +29,8 @@ pub struct Embouchure {
 pub fn embouchure(note_hz: f64, lowest_hz: f64) -> Embouchure {
     let resonance_hz = (10.2 * lowest_hz).max(1.55 * note_hz);
     let way = ((note_hz / resonance_hz - 0.36) / (0.54 - 0.36)).clamp(0.0, 1.0);
-    let highest = ((note_hz / lowest_hz - 9.6) / (10.0 - 9.6)).clamp(0.0, 1.0);
-    Embouchure { resonance_hz, damping: 0.8 + way * (0.25 - 0.8) + highest * (0.15 - 0.25) }
+    let highest = ((note_hz / lowest_hz - 7.6) / (11.0 - 7.6)).clamp(0.0, 1.0);
+    Embouchure { resonance_hz, damping: 0.8 + way * (0.25 - 0.8) + highest * (0.13 - 0.25) }
 }
 
 #[cfg(test)]
@@ -41,9 +41,9 @@ mod tests {
     fn low_notes_are_damped_high_ones_follow_the_reed() {
         let low = embouchure(147.0, 147.0);
         assert_eq!((low.resonance_hz, low.damping), (10.2 * 147.0, 0.8));
-        let high = embouchure(1_390.0, 147.0);
-        assert!((high.resonance_hz - 1.55 * 1_390.0).abs() < 1e-9 && (high.damping - 0.25).abs() < 1e-12);
-        assert!((embouchure(1_568.0, 147.0).damping - 0.15).abs() < 1e-12);
+        let high = embouchure(1_100.0, 147.0);
+        assert!((high.resonance_hz - 1.55 * 1_100.0).abs() < 1e-9 && (high.damping - 0.25).abs() < 1e-12);
+        assert!((embouchure(1_700.0, 147.0).damping - 0.13).abs() < 1e-12);
     }
 
     #[test]

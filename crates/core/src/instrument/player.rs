@@ -2,9 +2,9 @@
 //!
 //! `breath` follows a breath source or key velocity, and [`response`] makes a mouth pressure of it: directly, or by the rule in
 //! [`dynamics`] that moves breath and lip together; there the [`ear`] pushes what is too soft. `tongue` articulates: overlapping
-//! notes are slurred (the holes move and the tongue stays away, but before the highest notes); after a gap the tongue holds the reed while the breath rises
+//! notes are slurred (the holes move and the tongue stays away); after a gap the tongue holds the reed while the breath rises
 //! behind it, and lets go. `fingers` moves the holes, `tuning` the pitch, and `posture` holds what settings, fingering and bend
-//! ask for. `life` and [`vibrato`] sway all of it, `attack` shapes how a note begins, `firm_lip` tongues the highest notes, `slur` helps difficult ones, `inflection`
+//! ask for. `life` and [`vibrato`] sway all of it, `attack` shapes how a note begins, `slur` helps difficult ones, `inflection`
 //! scoops and falls, and `inhalation` is the breath in after a phrase.
 //!
 //! `technique` growls, flutters and covers the reed, `voicing` moves the vocal tract, `glissando` slides the fingers, and
@@ -16,7 +16,6 @@ mod carry_on;
 pub mod dynamics;
 pub mod ear;
 mod fingers;
-mod firm_lip;
 pub(crate) mod fitted;
 mod glissando;
 mod inflection;
@@ -56,7 +55,6 @@ use breath::Breath;
 use dynamics::LipShape;
 use ear::Ear;
 use fingers::Fingers;
-use firm_lip::FirmLip;
 use glissando::Slide;
 use inflection::Inflection;
 use inhalation::Inhalation;
@@ -166,7 +164,6 @@ pub struct Player {
     /// Pitch of the key over that of its note, cents.
     key_cents: f64,
     lip_glide: LipGlide,
-    firm_lip: FirmLip,
     onset: Onset,
     life: Life,
     swing: Swing,
@@ -424,11 +421,6 @@ impl Player {
             place: model.place(fingering),
         });
         match (slur, self.settings.breath_response) {
-            (Some(slur), BreathResponse::Played) if slur.is_tongued() => {
-                self.lip_glide.help(None);
-                self.tongue.hold_for(slur::HIGH_TONGUE_S);
-                self.move_holes(fingering, 1e-3 * TONGUED_FINGERS_MS, model, voice);
-            }
             (Some(slur), BreathResponse::Played) => {
                 let gamma = self.breath.gamma();
                 self.lip_glide.help(slur.lip_help(gamma));
@@ -553,24 +545,18 @@ impl Player {
             left => left - 1,
         };
         let in_place = tongue_holds || !key_down;
-        let mut note_lip = self.lip_glide.tick(
+        let note_lip = self.lip_glide.tick(
             posture.note_lip(),
             in_place,
             (posture.lags.fingers, posture.lags.shape),
             tick_s,
         );
-        let note = fingering.filter(|_| settings.breath_response == BreathResponse::Played && !slides);
-        let firm = note.map(|fingering| (model.registers[fingering], posture.place()));
-        let periods = self.onset.since_s() * model.lowest_hz;
-        self.firm_lip.tick(firm, periods, tongue_holds, posture.lags.lip);
-        self.firm_lip.hold(&mut note_lip);
         let bodily = Bodily {
             note_lip,
             onset: &self.onset,
             sway: &self.sway,
             settles: tongue_holds,
             fade: self.inflection.fade(),
-            blown: self.firm_lip.breath(),
         };
         let mut target = self.response.tick(asked, ear, &bodily, settings, posture);
         if let Some(dynamic) = self.response.dynamic() {

@@ -43,11 +43,6 @@ impl Onset {
         self.since_s = if tongue_holds { 0.0 } else { self.since_s + tick_s };
     }
 
-    /// Time since the tongue held the reed, s.
-    pub fn since_s(&self) -> f64 {
-        self.since_s
-    }
-
     /// The dynamic to play now where `dynamic`, 0..=1, is asked for. Real-time safe.
     pub fn shaped(&self, attack: Attack, dynamic: f64) -> f64 {
         let tail = |time_s: f64| (-self.since_s / time_s).exp();

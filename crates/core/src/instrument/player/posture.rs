@@ -232,11 +232,6 @@ impl Posture {
         self.played.as_ref().map_or(1.0, |played| played.placed.closing_ahead(&self.at, played.lip))
     }
 
-    /// Place of the note, see [`PlayerModel::place`](super::dynamics::PlayerModel::place).
-    pub fn place(&self) -> f64 {
-        self.place
-    }
-
     /// Where the lip goes for this note.
     pub fn note_lip(&self) -> NoteLip {
         let [between, always, zeta, growth, altissimo] = self.at;

@@ -47,8 +47,6 @@ pub struct Bodily<'a> {
     pub settles: bool,
     /// Share of its dynamic that a note keeps while it falls, 0..=1; 1 otherwise.
     pub fade: f64,
-    /// Factor on the mouth pressure of a played note, for how firm the lip is.
-    pub blown: f64,
 }
 
 /// Where the lip is.
@@ -149,8 +147,7 @@ impl Response {
         let amplitude = self.wanted.of((ahead * breath.amplitude).max(QUIETEST), f64::ln);
         let heard = if bodily.settles { 1.0 } else { posture.lags.ear };
         self.expected += (amplitude - self.expected) * heard;
-        let breath =
-            PlayedBreath { gamma: bodily.blown * ahead * breath.gamma, amplitude: self.expected.exp() };
+        let breath = PlayedBreath { gamma: ahead * breath.gamma, amplitude: self.expected.exp() };
         match ear {
             _ if of_softest < 1.0 => of_softest * LOWEST_ONSET,
             Some(ear) => ear.pushed(breath.gamma, breath.amplitude, place),

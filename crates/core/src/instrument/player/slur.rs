@@ -9,8 +9,8 @@
 //! little. Meanwhile the lip damps the reed a little more, which weakens the second mode more than the first. The breath goes on: a dip of
 //! it did the same, but left a hole of 30 dB. Softer, or into the throat, the same order of the fingers would only make a bump.
 //!
-//! Two kinds of slur do not arrive so. Leaps down into the chalumeau by more than an octave keep the twelfth at any dynamic: the lip takes
-//! nearly all of the old note away, which is heard as a light tongue. And from below nothing leads to the highest notes: these are tongued.
+//! Leaps down into the low chalumeau by more than an octave do not arrive so: they keep the twelfth. There the lip takes nearly all of the
+//! old note away, which is heard as a light tongue.
 
 use super::lip_glide::LipHelp;
 
@@ -28,7 +28,8 @@ const NARROW: (f64, f64) = (950.0, 0.5);
 /// arrive, with 1.5 and 1.75 some do not; the stronger, the deeper the hole (`docs/tone.md`). In 20 ms a slur from written B4 to B3 is 2.8 dB
 /// louder on the way at CC 58.
 const DAMPED: LipHelp = LipHelp { damping: 1.85, length_s: 0.025 };
-/// Leaps down into the chalumeau over more than so many cents: more than an octave.
+/// Leaps down into the low chalumeau over more than so many cents: more than an octave. Above it they arrive by themselves; with the lip's help
+/// they fall silent for 0.1 s.
 const WIDE_CENTS: f64 = 1_250.0;
 /// What the lip does in these. Of 188 from written B4..C6 into E3..A#4, each at CC 16, 58, 78 and 108, 345 of 752 stay on the old mode without
 /// it, 79 with a factor of 3 for 50 ms, 4 with 4 for 60 ms, and none with 6 for 70 ms, at CC 8 to 127. A bump on the way, of up to 14 dB,
@@ -36,13 +37,6 @@ const WIDE_CENTS: f64 = 1_250.0;
 const WIDE_DAMPED: LipHelp = LipHelp { damping: 6.0, length_s: 0.07 };
 /// Factor on the legato time in these. Measured with a factor of 4: at 1.8 the holes are 3 to 4 dB deeper, and as many slurs arrive.
 const WIDE_TIME: f64 = 1.0;
-/// Notes above this place (written E flat 6 and higher of a B flat clarinet) are tongued where a slur comes from a lower register. Slurred to
-/// F#6, the clarion stays a fifth lower at any breath, and to F6 and E flat 6 at some, whatever the fingers do; a lip that damps the reed less
-/// makes them arrive, but 10 dB louder on the way.
-const HIGH_PLACE: f64 = 0.7;
-/// How long the tongue holds the reed there, s. Measured at CC 30 to 127, from written A4..C6: after 20 ms 20 slurs to these notes are lost, after 30 ms
-/// one. Other notes take 8 ms.
-pub(super) const HIGH_TONGUE_S: f64 = 0.03;
 /// Factor on the legato time in a leap that begins at the mouth. Measured: six slurs are more than 2 dB louder on the way than either note at 1.6, none here; at 2.2 three are lost.
 const LEAP_TIME: f64 = 1.8;
 /// Factor on the legato time of a slur up over the break: the shorter, the shallower the hole and the louder the click. Measured at 0.6 and
@@ -92,14 +86,10 @@ impl Slur {
         leaps && gamma >= if leap_cents < NARROW.0 { NARROW.1 } else { BEATING }
     }
 
-    /// Whether it leaps down into the chalumeau by more than an octave.
+    /// Whether it leaps down into the low chalumeau by more than an octave.
     fn is_wide(&self) -> bool {
-        self.registers.0 > self.registers.1 && self.registers.1 == 1 && -self.interval_cents > WIDE_CENTS
-    }
-
-    /// Whether the tongue begins the new note all the same.
-    pub fn is_tongued(&self) -> bool {
-        self.registers.0 < self.registers.1 && self.place > HIGH_PLACE
+        let down = self.registers.0 > self.registers.1 && self.registers.1 == 1;
+        down && self.place < LOW_PLACE && -self.interval_cents > WIDE_CENTS
     }
 
     /// Whether both notes lie in one register, so that the air column goes on as it swings.
@@ -162,15 +152,12 @@ mod tests {
     }
 
     #[test]
-    fn leaps_down_by_more_than_an_octave_always_need_the_lip_and_the_highest_notes_the_tongue() {
+    fn leaps_down_by_more_than_an_octave_always_need_the_lip() {
         for registers in [(2, 1), (3, 1)] {
-            let leap = slur(-13.0, registers, -0.1);
+            let leap = slur(-13.0, registers, -0.5);
             assert_eq!(leap.lip_help(0.1), Some(WIDE_DAMPED));
-            assert!(leap.walk(0.1).mouth_first && leap.walk(0.1).time == WIDE_TIME && !leap.is_tongued());
-        }
-        assert!(slur(7.0, (2, 3), 0.72).is_tongued() && slur(19.0, (1, 3), 0.72).is_tongued());
-        for other in [slur(4.0, (2, 3), 0.67), slur(1.0, (3, 3), 0.8), slur(-1.0, (3, 3), 0.72)] {
-            assert!(!other.is_tongued(), "{other:?}");
+            assert!(leap.walk(0.1).mouth_first && leap.walk(0.1).time == WIDE_TIME);
+            assert_eq!(slur(-13.0, registers, -0.4).lip_help(0.9), None, "into the throat");
         }
     }
 

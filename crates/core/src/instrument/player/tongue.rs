@@ -48,12 +48,7 @@ impl Default for Tongue {
 impl Tongue {
     /// Prepares a tongued note.
     pub fn hold(&mut self) {
-        self.hold_for(HOLD_S);
-    }
-
-    /// Prepares a note that begins this much later, s, while the one before still sounds.
-    pub fn hold_for(&mut self, seconds: f64) {
-        self.position = Position::Holding(seconds);
+        self.position = Position::Holding(HOLD_S);
     }
 
     /// Stops the note.
