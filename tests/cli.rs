@@ -6,9 +6,10 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use tempfile::TempDir;
 
-#[path = "../examples/make_melody.rs"]
-mod make_melody;
+#[path = "../examples/make_pieces/main.rs"]
+mod make_pieces;
 
+const EXAMPLES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples");
 const MELODY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/melody.mid");
 
 fn chalumeau<A: AsRef<OsStr>>(directory: &Path, args: impl IntoIterator<Item = A>) -> Output {
@@ -444,10 +445,13 @@ fn a_closed_pipe_is_no_mistake() {
 }
 
 #[test]
-fn the_example_melody_is_what_its_program_writes() {
-    let mut written = Vec::new();
-    make_melody::melody().write_std(&mut written).unwrap();
-    assert!(written == fs::read(MELODY).unwrap(), "run: cargo run --example make_melody");
+fn the_example_pieces_are_what_their_program_writes() {
+    for (name, piece) in make_pieces::PIECES {
+        let mut written = Vec::new();
+        piece().write_std(&mut written).unwrap();
+        let committed = fs::read(Path::new(EXAMPLES).join(name)).unwrap();
+        assert!(written == committed, "{name}: run: cargo run --example make_pieces");
+    }
 }
 
 #[test]
