@@ -454,15 +454,37 @@ fn the_example_pieces_are_what_their_program_writes() {
     }
 }
 
+/// README's recordings, by the commands in CONTRIBUTING.
 #[test]
-fn the_example_melody_plays() {
+fn the_recordings_are_of_a_good_length_and_level() {
     let d = tempfile::tempdir().unwrap();
-    let out = d.path().join("melody.wav");
-    let output = chalumeau(d.path(), ["render".as_ref(), MELODY.as_ref(), "--out".as_ref(), out.as_os_str()]);
-    let message = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success() && !message.contains("warning"), "{message}");
-    let seconds = f64::from(hound::WavReader::open(out).unwrap().duration()) / 48_000.0;
-    assert!((20.0..35.0).contains(&seconds), "{seconds} s");
+    let contributing =
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("CONTRIBUTING.md")).unwrap();
+    let rows: Vec<&str> = contributing.lines().filter(|line| line.starts_with("| `docs/sound/")).collect();
+    assert_eq!(rows.len(), make_pieces::PIECES.len());
+    for row in rows {
+        let (_, command) = row.split_once("`chalumeau ").unwrap();
+        let (command, _) = command.split_once('`').unwrap();
+        // Every second part stands between quotation marks, and is one word.
+        let mut command_words = Vec::new();
+        for (index, part) in command.split('"').enumerate() {
+            let part = part.replace("examples/", &format!("{EXAMPLES}/"));
+            if index % 2 == 0 {
+                command_words.extend(words(&part).map(str::to_owned));
+            } else {
+                command_words.push(part);
+            }
+        }
+        let output = chalumeau(d.path(), &command_words);
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success() && !message.contains("warning"), "{command}: {message}");
+        let mut reader = hound::WavReader::open(d.path().join(command_words.last().unwrap())).unwrap();
+        let seconds = f64::from(reader.duration()) / 48_000.0;
+        assert!((20.0..35.0).contains(&seconds), "{command}: {seconds} s");
+        let peak = reader.samples::<f32>().fold(0.0, |peak: f32, sample| peak.max(sample.unwrap().abs()));
+        // Ogg Vorbis overshoots a little: at most -1 dBFS.
+        assert!((0.3..0.89).contains(&peak), "{command}: peak {peak}");
+    }
 }
 
 #[test]
