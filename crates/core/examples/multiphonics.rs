@@ -12,11 +12,11 @@ use chalumeau_core::parallel;
 use chalumeau_core::units::{Air, SoundingNote};
 
 /// Candidates that are played.
-const CANDIDATES: usize = 600;
+const CANDIDATES: usize = 2_000;
 /// Breaths at which each is tried, from soft to loud.
-const BREATHS: [f32; 4] = [0.4, 0.5, 0.65, 0.85];
-/// Sounding notes whose lips are tried lie here.
-const HELD: [u8; 2] = [50, 90];
+const BREATHS: [f32; 9] = [0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.8, 0.9];
+/// Sounding notes whose lips are tried lie here, up to written E flat 6: above, the lip favours one mode.
+const HELD: [u8; 2] = [50, 85];
 
 /// Open holes, the note that is held, and the breaths to try.
 struct Try {
@@ -38,8 +38,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let known = built_in().iter().map(|one| Try {
         fingers: one.fingers.clone(),
         open: bits(&one.open),
-        held: one.held,
-        breaths: vec![one.breath],
+        held: one.held.min(HELD[1]),
+        breaths: [one.breath].into_iter().chain(BREATHS).collect(),
     });
     let finder = FingeringFinder::new(&model.file, Air::default(), go_on).ok_or("ended")?;
     let new = finder.multiphonics(CANDIDATES).into_iter().flat_map(|one| {
