@@ -963,7 +963,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("player", PLAYERS, "Players", whole([1, 16], 1, ""))
         .help(
             "How many players play the instrument",
-            "Each has a wander, a tuning and a seat of its own. The output stays about as loud when all play. Each costs as much as the first while it sounds.",
+            "Each has a wander, a tuning and a seat of its own. The output stays about as loud when all play. Eight cost some five times as much as one.",
             "",
         )
         .sets(Sets::Whole(|settings| &mut settings.players.count))
