@@ -43,29 +43,15 @@ const HALF_COMPASS_OCTAVES: f64 = 20.5 / 12.0;
 const ALTISSIMO: (f64, f64) = (0.42, 0.7);
 /// Places between which the lip comes to open the reed further: written C6 and E flat 6.
 const HIGH: (f64, f64) = (0.57, 0.7);
+/// Places between which the lip comes to close the reed at every dynamic: written G6 and G#6.
+const TOP: (f64, f64) = (0.905, 0.955);
 /// Flow strengths that the rule may ask for below the altissimo: those at which recorded notes were compared and registers hold.
 const ZETAS: (f64, f64) = (0.14, 0.5);
 /// The place of a note far outside the compass counts as this.
 const FARTHEST: f64 = 1.25;
 
-/// How far a place lies on the way into the altissimo, 0..=1, smoothly.
-fn in_altissimo(place: f64) -> f64 {
-    let (from, to) = ALTISSIMO;
-    smooth((place - from) / (to - from))
-}
-
-/// Places between which the lip comes to close the reed at every dynamic: written G6 and G#6.
-const TOP: (f64, f64) = (0.905, 0.955);
-
-/// How far a place lies on the way to the topmost notes, 0..=1, smoothly.
-fn is_top(place: f64) -> f64 {
-    let (from, to) = TOP;
-    smooth((place - from) / (to - from))
-}
-
-/// How far a place lies on the way to the notes whose reed the lip opens further, 0..=1, smoothly.
-fn is_high(place: f64) -> f64 {
-    let (from, to) = HIGH;
+/// How far a place lies on the way from one to the other, 0..=1, smoothly.
+fn on_the_way(place: f64, (from, to): (f64, f64)) -> f64 {
     smooth((place - from) / (to - from))
 }
 
@@ -144,13 +130,13 @@ impl PlayerModel {
             altissimo_zeta: self.altissimo_zeta.ln(),
             knee: self.knee.ln(),
             at: [
-                (1.0 - in_altissimo(place)) * (slope + curvature * place) * place
+                (1.0 - on_the_way(place, ALTISSIMO)) * (slope + curvature * place) * place
                     + throat * (-0.5 * away * away).exp()
-                    + self.high * is_high(place),
-                self.top * is_top(place),
+                    + self.high * on_the_way(place, HIGH),
+                self.top * on_the_way(place, TOP),
                 zeta + zeta_slope * place,
                 zeta_growth + zeta_growth_slope * place,
-                in_altissimo(place),
+                on_the_way(place, ALTISSIMO),
             ],
         }
     }
