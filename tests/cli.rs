@@ -450,7 +450,10 @@ fn the_example_pieces_are_what_their_program_writes() {
         let mut written = Vec::new();
         piece().write_std(&mut written).unwrap();
         let committed = fs::read(Path::new(EXAMPLES).join(name)).unwrap();
-        assert!(written == committed, "{name}: run: cargo run --example make_pieces");
+        assert!(
+            written == committed,
+            "{name}: run: cargo run --no-default-features --features cli --example make_pieces"
+        );
     }
 }
 

@@ -99,28 +99,113 @@ fn the_highest_notes_speak_in_tune_at_every_breath() {
     }
 }
 
-/// Pitch of a note that is tongued from rest, from 0.5 to 0.8 s, above the written note, cents; and the most that 10 ms of its first 0.4 s are louder
-/// than it is then, dB.
-fn tongued(model: &Arc<Model>, written: u8, controller: u8) -> (f64, f64) {
-    let note = WrittenNote(written).sounding(model.file.transposition).unwrap();
+/// A clarinet on a default player who holds still, blown from the start at a value of CC 2; keys go down at these times, s.
+fn played(model: &Arc<Model>, controller: u8, keys: &[(f64, u8)], length_s: f64) -> Vec<f64> {
     let mut clarinet = Clarinet::new(model.clone(), RATE_HZ);
+    // Below the limiter.
     clarinet.set_settings(&Settings { gain_db: -20.0, life: 0.0, ..Settings::default() });
     clarinet.reset();
-    let events = vec![
-        Timed { at: 0, event: Event::Breath(f32::from(controller) / 127.0) },
-        Timed { at: 0, event: Event::NoteOn { note, velocity: 0.8 } },
-    ];
     let samples = |s: f64| (s * RATE_HZ) as usize;
-    let mut out = Vec::with_capacity(samples(0.8));
-    let Ok(()) = play(&mut clarinet, &Score { events, samples: samples(0.8) }, 512, |block| {
+    let key = |&(at_s, written): &(f64, u8)| {
+        let note = WrittenNote(written).sounding(model.file.transposition).unwrap();
+        Timed { at: samples(at_s), event: Event::NoteOn { note, velocity: 0.8 } }
+    };
+    let blown = Timed { at: 0, event: Event::Breath(f32::from(controller) / 127.0) };
+    let events = [blown].into_iter().chain(keys.iter().map(key)).collect();
+    let mut out = Vec::with_capacity(samples(length_s));
+    let Ok(()) = play(&mut clarinet, &Score { events, samples: samples(length_s) }, 512, |block| {
         out.extend(block.iter().map(|&x| f64::from(x)));
         Ok::<_, Infallible>(())
     });
+    out
+}
+
+fn level_db(sound: &[f64]) -> f64 {
+    10.0 * (sound.iter().map(|x| x * x).sum::<f64>() / sound.len() as f64).log10()
+}
+
+/// From pianissimo to fortissimo, E6 to C7 are about as loud as each other, and have the range of all notes.
+#[test]
+fn the_highest_notes_are_as_loud_as_their_neighbours() {
+    for instrument in Bundled::ALL {
+        let wanted = Wanted::new(instrument.file(), RATE_HZ);
+        let model = Arc::new(Preparation::new(&wanted, None).ready().unwrap().unwrap());
+        let levels = |controller: u8| {
+            let level = |at: usize| {
+                level_db(
+                    &played(&model, controller, &[(0.0, 88 + at as u8)], 1.0)[(0.6 * RATE_HZ) as usize..],
+                )
+            };
+            parallel::each(9, level, &mut |_| ControlFlow::Continue(())).unwrap()
+        };
+        let at = [8, 78, 127].map(levels);
+        println!("{}, E6 to C7 at CC 8, 78, 127: {at:.1?}", instrument.id());
+        for levels in &at {
+            let spread = levels.iter().copied().fold(f64::MIN, f64::max)
+                - levels.iter().copied().fold(f64::MAX, f64::min);
+            assert!(spread < 4.5, "{}: {spread} dB", instrument.id());
+        }
+        for (soft, loud) in at[0].iter().zip(&at[2]) {
+            assert!((24.0..28.0).contains(&(loud - soft)), "{}: {soft} to {loud}", instrument.id());
+        }
+    }
+}
+
+/// Of the slurs below, those that stay on a lower mode: on the bass, softly from F#5 to F6 and F#6 (written notes, CC 2).
+const LOST: [(Bundled, u8, u8, u8); 2] = [(Bundled::Bass, 78, 89, 20), (Bundled::Bass, 78, 90, 20)];
+
+/// Slurs from the clarion to written E flat 6..C7 arrive without the tongue, and wide leaps down into E4..A#4 do not fall silent.
+#[test]
+fn slurs_to_and_from_the_highest_notes_arrive() {
+    let samples = |s: f64| (s * RATE_HZ) as usize;
+    for instrument in [Bundled::BFlat, Bundled::Bass] {
+        let wanted = Wanted::new(instrument.file(), RATE_HZ);
+        let model = Arc::new(Preparation::new(&wanted, None).ready().unwrap().unwrap());
+        let up = (69..=84).step_by(3).flat_map(|from| (87..=96).map(move |to| (from, to)));
+        let down = (83..=88).flat_map(|from| (64..=70).map(move |to| (from, to)));
+        let cases: Vec<(u8, u8, u8)> = up
+            .chain(down)
+            .flat_map(|(from, to)| [20, 44, 78, 112].map(|controller| (from, to, controller)))
+            .filter(|&(from, to, controller)| !LOST.contains(&(instrument, from, to, controller)))
+            .collect();
+        let slur = |at: usize| {
+            let (from, to, controller) = cases[at];
+            let out = played(&model, controller, &[(0.0, from), (0.6, to)], 1.4);
+            let wanted_hz = WrittenNote(to).sounding(model.file.transposition).unwrap().frequency_hz(440.0);
+            let held = &out[samples(1.1)..];
+            let off = pitch::fundamental_hz(held, RATE_HZ).map_or(f64::NAN, |hz| cents(hz, wanted_hz));
+            let way = out[samples(0.6)..samples(1.0)].chunks_exact(samples(0.01)).map(level_db);
+            let softer = level_db(&out[samples(0.4)..samples(0.6)]).min(level_db(held));
+            (off, softer - way.fold(f64::MAX, f64::min))
+        };
+        let found = parallel::each(cases.len(), slur, &mut |_| ControlFlow::Continue(())).unwrap();
+        let arrived = |off: f64| off.abs() < 25.0;
+        let lost: Vec<_> = cases.iter().zip(&found).filter(|(_, (off, _))| !arrived(*off)).collect();
+        let deepest = |going_up: bool| {
+            let own = cases.iter().zip(&found).filter(|((from, to, _), _)| (to > from) == going_up);
+            own.map(|(_, &(_, hole_db))| hole_db).fold(0.0, f64::max)
+        };
+        let [up_db, down_db] = [true, false].map(deepest);
+        println!(
+            "{}: {} of {} slurs lost: {lost:?}; deepest hole {up_db:.1} dB up, {down_db:.1} down",
+            instrument.id(),
+            lost.len(),
+            cases.len()
+        );
+        assert!(lost.is_empty() && up_db < 21.0 && down_db < 30.0);
+    }
+}
+
+/// Pitch of a note that is tongued from rest, from 0.5 to 0.8 s, above the written note, cents; and the most that 10 ms of its first 0.4 s are louder
+/// than it is then, dB.
+fn tongued(model: &Arc<Model>, written: u8, controller: u8) -> (f64, f64) {
+    let wanted_hz = WrittenNote(written).sounding(model.file.transposition).unwrap().frequency_hz(440.0);
+    let samples = |s: f64| (s * RATE_HZ) as usize;
+    let out = played(model, controller, &[(0.0, written)], 0.8);
     let held = &out[samples(0.5)..];
-    let power = |sound: &[f64]| sound.iter().map(|x| x * x).sum::<f64>() / sound.len() as f64;
-    let most = out[..samples(0.4)].chunks_exact(samples(0.01)).map(power).fold(0.0, f64::max);
-    let off = pitch::fundamental_hz(held, RATE_HZ).map_or(f64::NAN, |hz| cents(hz, note.frequency_hz(440.0)));
-    (off, 10.0 * (most / power(held)).log10())
+    let most_db = out[..samples(0.4)].chunks_exact(samples(0.01)).map(level_db).fold(f64::MIN, f64::max);
+    let off = pitch::fundamental_hz(held, RATE_HZ).map_or(f64::NAN, |hz| cents(hz, wanted_hz));
+    (off, most_db - level_db(held))
 }
 
 /// Between soft and loud E flat 6 had an undertone. F#6 and its neighbours began with a lower mode beside them that was as loud, and took a second to grow out

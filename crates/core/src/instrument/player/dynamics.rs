@@ -74,8 +74,8 @@ pub struct PlayerModel {
     /// The same on the highest notes. Modes of their fingerings lie as far below a note as above, as on written E flat 6 at 0.70 and 1.30 of it. What
     /// the reed mixes of the note and one of them feeds the other; a reed that opens further, and is blown as much harder as keeps the level, mixes less.
     pub high: f64,
-    /// What is added to the logarithm of the closing pressure on the topmost notes, at every dynamic: opened as far as below, they are 8 to
-    /// 20 dB louder than their neighbours.
+    /// What is added to the logarithm of the closing pressure on the topmost notes, at every dynamic: opened as far as below, they are some 8 dB
+    /// louder than their neighbours.
     pub top: f64,
     /// Flow strength in the altissimo, at every dynamic.
     pub altissimo_zeta: f64,
