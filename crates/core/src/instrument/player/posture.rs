@@ -6,7 +6,8 @@ use super::ear;
 use super::level_keeper::KeeperLags;
 use super::life::LifeLags;
 use super::lip_glide::NoteLip;
-use super::onset_shift::ReedAtNote;
+use super::other_reed::{Learnt, OtherReed};
+use super::reed_at_note::ReedAtNote;
 use super::response::LIP_S;
 use super::step_towards;
 use super::technique::subtone::{at_place, covered};
@@ -15,7 +16,7 @@ use crate::instrument::bend::{self, BendSplit};
 use crate::instrument::lip::{Embouchure, embouchure};
 use crate::instrument::model::Model;
 use crate::instrument::played_note::PlayedNote;
-use crate::instrument::settings::{BreathResponse, Settings};
+use crate::instrument::settings::{BreathResponse, Settings, Tuning};
 use crate::reed::law::K_INIT;
 use crate::reed::physical::ZETA_REFERENCE;
 use crate::reed::{MovingReed, ReedCoeffs, ReedLaw};
@@ -25,7 +26,7 @@ use crate::units::{Air, cents};
 /// a quicker lip clicks. Measured at 8, 10, 12 and 17 ms: nine tenths of the clicks of all slurs are below 3.5, 3.1, 2.7 and 2.5 dB.
 const SHAPE_S: f64 = 0.012;
 /// Cents of a small rise of the frequency, as a share of it.
-const CENTS_PER_SHARE: f64 = 1_200.0 / std::f64::consts::LN_2;
+pub const CENTS_PER_SHARE: f64 = 1_200.0 / std::f64::consts::LN_2;
 /// Most that the resonance moves for a cent, as a share of itself: hardly more than on the lowest note of a B flat clarinet, which takes 0.045. A
 /// note whose pitch hardly goes with the resonance leaves the lip alone.
 const MOST_RESONANCE_PER_CENT: f64 = 0.06;
@@ -77,8 +78,8 @@ struct Played {
     note: PlayedNote,
     /// How far the resonance of the reed moves for a cent, as a share of itself.
     resonance_per_cent: f64,
-    /// What these settings add to the mouth over closing pressure, at dynamics 0 and 1.
-    shift: (f64, f64),
+    /// What these settings change of it.
+    other_reed: OtherReed,
     /// Dynamic of the lip in `Posture::reed`.
     lip: f64,
     /// Trim of the note at that dynamic, rows.
@@ -176,26 +177,33 @@ impl Posture {
         let place = model.place(fingering);
         let subtone = at_place(subtone, place);
         let free = covered(free, subtone);
-        let offset = bend_cents
-            + cents(f64::from(settings.a4_hz), model.a4_hz)
-            + cents(Air::at(f64::from(settings.temperature_c)).c, model.air.c);
         let sensitivity = model.tuning.notes.get(fingering).map_or(1.0, |note| note.sensitivity);
+        let rows_per_cent = sensitivity * model.rows_for_cents(fingering, 1.0);
         let response = settings.breath_response;
-        let split = BendSplit::new(offset, bend::lip_limit_cents(model, fingering, offset, response));
-        let rate_hz = model.coeffs.rate_hz;
         let placed = model.player.at(place);
         let played = match response {
             BreathResponse::Physical => None,
             BreathResponse::Played => {
-                Some(Played::new(settings, &free, lip, subtone, (fingering, placed), model))
+                Some(Played::new(settings, &free, lip, subtone, (fingering, placed, rows_per_cent), model))
             }
         };
+        // The trims know the reference reed; with another, the player corrects what it takes off.
+        let flat_cents = match (settings.tuning, &played) {
+            (Tuning::Tempered, Some(played)) => played.other_reed.flat_cents(MEZZO_FORTE),
+            _ => 0.0,
+        };
+        let offset = bend_cents
+            + flat_cents
+            + cents(f64::from(settings.a4_hz), model.a4_hz)
+            + cents(Air::at(f64::from(settings.temperature_c)).c, model.air.c);
+        let split = BendSplit::new(offset, bend::lip_limit_cents(model, fingering, offset, response));
+        let rate_hz = model.coeffs.rate_hz;
         let mut posture = Self {
             closing: free.law.closing(),
             free_closing: free.law.closing(),
             reed: ReedCoeffs::new(free, rate_hz),
             rows: sensitivity * model.rows_for_cents(fingering, split.lip_cents - alternate_cents),
-            rows_per_cent: sensitivity * model.rows_for_cents(fingering, 1.0),
+            rows_per_cent,
             bore_cents: split.bore_cents,
             offset_cents: offset,
             fingering,
@@ -247,7 +255,9 @@ impl Posture {
             return;
         }
         (played.lip, played.note_lip) = (dynamic, note_lip);
-        played.rows = played.note.rows(dynamic);
+        let other = &played.other_reed;
+        played.rows = played.note.rows(dynamic)
+            + self.rows_per_cent * (other.flat_cents(dynamic) - other.flat_cents(MEZZO_FORTE));
         let [resonance_hz, damping, _, at @ .., _] = note_lip;
         let free = MovingReed { resonance_hz, damping, ..self.free };
         played.placed.at = at;
@@ -274,8 +284,7 @@ impl Posture {
     pub fn played_breath(&mut self, dynamic: f64) -> PlayedBreath {
         let Some(played) = &mut self.played else { return PlayedBreath::default() };
         if played.asked.0 != dynamic {
-            let (soft, loud) = played.shift;
-            let gamma = (played.note.gamma(dynamic) + soft + (loud - soft) * dynamic).max(0.0);
+            let gamma = (played.note.gamma(dynamic) + played.other_reed.gamma(dynamic)).max(0.0);
             played.asked = (dynamic, PlayedBreath { gamma, amplitude: played.note.amplitude(dynamic) });
         }
         played.asked.1
@@ -299,7 +308,7 @@ impl Played {
         free: &MovingReed,
         lip: Embouchure,
         subtone: f64,
-        (fingering, placed): (usize, PlacedRule),
+        (fingering, placed, rows_per_cent): (usize, PlacedRule, f64),
         model: &Model,
     ) -> Self {
         let note = model.tuning.notes.get(fingering).map_or_else(PlayedNote::default, |note| note.played);
@@ -318,28 +327,29 @@ impl Played {
             && [settings.zeta, settings.lay, settings.damping]
                 == [reference.zeta, reference.lay, reference.damping];
         let note_hz = model.notes_hz[fingering];
-        let shift = |dynamic: f64| {
-            if is_known {
-                return 0.0;
-            }
-            let [own, known] = [(free, subtone), (&known, 0.0)]
-                .map(|(reed, subtone)| reed_at_note(&shaped(reed, subtone, placed.lip(dynamic)), note_hz));
-            own.shift_from(&known, note.onset)
+        let bore_slope = model.susceptance_slopes[fingering];
+        let [own, reference] = [(free, subtone), (&known, 0.0)].map(|(reed, subtone)| {
+            move |dynamic: f64| reed_at_note(&shaped(reed, subtone, placed.lip(dynamic)), note_hz)
+        });
+        let other_reed = if is_known {
+            OtherReed::default()
+        } else {
+            let range = model.player.range_db * std::f64::consts::LN_10 / 20.0;
+            let learnt = Learnt { note: &note, bore_slope, rows_per_cent, range };
+            OtherReed::new(&own, &reference, free.law.closing(), &learnt)
         };
-        let shift = (shift(0.0), shift(1.0));
-        let gamma = note.gamma(MEZZO_FORTE) + shift.0 + (shift.1 - shift.0) * MEZZO_FORTE;
+        let gamma = note.gamma(MEZZO_FORTE) + other_reed.gamma(MEZZO_FORTE);
         // Of a small oscillation, at mezzo-forte: a reed that beats goes up to 1.5 times less far or farther.
-        let pull = reed_at_note(&shaped(free, subtone, placed.lip(MEZZO_FORTE)), note_hz).pull(gamma);
-        let slope = model.susceptance_slopes[fingering];
+        let pull = own(MEZZO_FORTE).pull(gamma);
         Self {
             placed,
             note,
-            resonance_per_cent: if pull > 0.0 && slope > 0.0 {
-                (slope / (CENTS_PER_SHARE * pull)).min(MOST_RESONANCE_PER_CENT)
+            resonance_per_cent: if pull > 0.0 && bore_slope > 0.0 {
+                (bore_slope / (CENTS_PER_SHARE * pull)).min(MOST_RESONANCE_PER_CENT)
             } else {
                 MOST_RESONANCE_PER_CENT
             },
-            shift,
+            other_reed,
             lip: f64::NAN,
             rows: 0.0,
             note_lip: NoteLip::default(),
@@ -353,7 +363,8 @@ fn reed_at_note(reed: &MovingReed, note_hz: f64) -> ReedAtNote {
     let (law, compliance) = (reed.law, K_INIT / reed.law.k());
     ReedAtNote {
         zeta: reed.zeta * law.a() * law.h() * K_INIT / law.closing().sqrt(),
-        lay: reed.lay,
+        // A sharp corner is a very short curve.
+        lay: reed.lay.max(1e-9),
         ratio: note_hz / reed.resonance_hz,
         damping: reed.damping,
         swept: std::f64::consts::TAU * note_hz * reed.swept_s * compliance,
