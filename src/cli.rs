@@ -65,7 +65,7 @@ const INTERRUPTED: i32 = 130;
 const EXAMPLES: &str = "\
 Examples:
   chalumeau render examples/melody.mid --out melody.wav
-  chalumeau render --written C4 --gamma 0.5 --seconds 1.5 --out c4.wav
+  chalumeau render --written C4 --dynamic mf --seconds 1.5 --out c4.wav
   chalumeau impedance --all --peaks 8 --csv peaks.csv
   chalumeau bore --written C5 --plot c5.svg
   chalumeau threshold --all --zeta 0.3
@@ -74,9 +74,9 @@ Examples:
 
 Notes are MIDI numbers (60) or names (C4, F#5, Bb3). The player of a B flat clarinet reads
 *written* notes, which sound two semitones lower. Mouth pressure is given as gamma: the pressure
-in the mouth over the pressure that shuts the reed. Notes begin between 0.31 and 0.41; near 0.5
-the reed begins to beat against the lay; at 1 a resting reed would be shut; well above, the note
-chokes.";
+in the mouth over the pressure that shuts the reed. Notes begin between 0.31 and 0.41; between 0.5
+and 0.7 the reed begins to beat against the lay; at 1 a resting reed would be shut; well above, the
+note chokes. Or it is given as a dynamic: --dynamic pp to ff, as a player plays.";
 
 /// A clarinet you play by touch: reed, bore with real tone holes, sound.
 #[derive(Parser)]

@@ -101,7 +101,7 @@ impl Line {
 }
 
 fn breath(dynamic: f32) -> Event {
-    Event::Breath(breath_of_dynamic(f64::from(dynamic)) as f32)
+    Event::Breath(breath_of_dynamic(f64::from(dynamic), &Settings::default()) as f32)
 }
 
 /// All sounds on an instrument, by chapter, at a sample rate in Hz. `base` are the settings where a sound has none of its own.

@@ -11,6 +11,7 @@ mod make_pieces;
 
 const EXAMPLES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples");
 const MELODY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/melody.mid");
+const KING: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/mountain-king.mid");
 
 fn chalumeau<A: AsRef<OsStr>>(directory: &Path, args: impl IntoIterator<Item = A>) -> Output {
     Command::new(env!("CARGO_BIN_EXE_chalumeau"))
@@ -266,6 +267,10 @@ fn numbers_out_of_range_say_what_would_be_right() {
         ("--breath ramp:0:1", "ramp:FROM:TO:SECONDS"),
         ("--breath ramp:0:9:1", "gamma must lie in 0..3"),
         ("--crescendo 0.5", "FROM:TO"),
+        ("--breath 9", "must lie in 0..3"),
+        ("--dynamic fff", "or one of pp, p, mp, mf, f, ff"),
+        ("--dynamic p --gamma 0.5", "cannot be used with"),
+        ("--dynamic p --breath-response physical", "has no dynamics"),
         ("--gamma 0.5 --crescendo 0.4:0.5", "cannot be used with"),
         ("--gamma 2 --breath-full 6", "needs 12.0 kPa"),
         ("--gamma 2 --strength 5", "below gamma 1.34"),
@@ -285,6 +290,7 @@ fn numbers_out_of_range_say_what_would_be_right() {
     refused(&d, "render --scale 40:60 --out x.wav", &["written 40"]);
     refused(&d, "render --scale 60 --out x.wav", &["E3:C6"]);
     refused(&d, "render --written 60", &["--out"]);
+    refused(&d, "render C4 --out x.wav", &["for one note give --written C4"]);
     refused(&d, "impedance --all", &["--peaks 8"]);
     refused(&d, "impedance --written 60 --from 100 --to 50 --csv x.csv", &["--to above --from"]);
     refused(&d, "impedance --written 60 --step 0.001 --from 1 --to 20000 --csv x.csv", &["points"]);
@@ -333,6 +339,38 @@ fn existing_files_are_kept_unless_forced() {
 }
 
 #[test]
+fn what_is_played_is_never_replaced() {
+    let d = tempfile::tempdir().unwrap();
+    fs::copy(MELODY, d.path().join("piece.mid")).unwrap();
+    fs::write(d.path().join("breath.csv"), "0,0.5\n").unwrap();
+    for line in [
+        "render piece.mid --out piece.mid --force",
+        "render piece.mid --out x.wav --probe ./piece.mid --force",
+        "render --written C4 --breath breath.csv --probe breath.csv --out x.wav --force",
+    ] {
+        refused(&d, line, &["is what is played; give another name"]);
+    }
+    assert_eq!(fs::read(d.path().join("piece.mid")).unwrap(), fs::read(MELODY).unwrap());
+}
+
+#[test]
+fn a_limiter_that_worked_and_an_instrument_that_reaches_are_told() {
+    let d = tempfile::tempdir().unwrap();
+    let said = |line: &str| {
+        let output = chalumeau(d.path(), words(&format!("render --seconds 0.4 --force --out x.wav {line}")));
+        assert!(output.status.success(), "{line}");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    assert!(
+        said("--written G4 --dynamic ff --gain-db 12").contains("warning: the limiter turned peaks down")
+    );
+    assert!(!said("--written G4 --dynamic ff").contains("warning"));
+    let output = chalumeau(d.path(), ["render", KING, "--force", "--out", "x.wav"]);
+    let low = String::from_utf8(output.stderr).unwrap();
+    assert!(low.contains("notes have no fingering") && low.contains("; --instrument bass has them"), "{low}");
+}
+
+#[test]
 fn two_renders_are_identical() {
     let d = tempfile::tempdir().unwrap();
     let line = "--breath ramp:0:1:0.5 --seconds 1 --rate 44100 --bits 24 --probe-every 50";
@@ -343,6 +381,34 @@ fn two_renders_are_identical() {
         let file = |name: &str| fs::read(d.path().join(format!("{name}.{end}"))).unwrap();
         assert!(file("a") == file("b"), "{end}");
     }
+}
+
+/// Softly, at mezzo-forte and loud, each from the softest to the loudest breath of its settings, also of a preset that a machine blows; and a swell.
+#[test]
+fn dynamics_are_as_loud_as_they_are_called() {
+    let d = tempfile::tempdir().unwrap();
+    let level_db = |options: &str, from: usize, to: usize| {
+        let line = format!("render --written C4 --seconds 1 --rate 44100 {options} --force --out x.wav");
+        // A name of two words is one argument.
+        let output = chalumeau(d.path(), words(&line).map(|word| word.replace('~', " ")));
+        assert!(output.status.success(), "{line}");
+        let mut wav = hound::WavReader::open(d.path().join("x.wav")).unwrap();
+        let heard: Vec<f32> = wav.samples::<f32>().map(Result::unwrap).collect();
+        let power = heard[from..to].iter().map(|x| f64::from(x * x)).sum::<f64>() / (to - from) as f64;
+        10.0 * power.log10()
+    };
+    for more in ["", "--breath-curve 2 --breath-softest 0.2", "--preset Blowing~machine --set room=0"] {
+        let [pp, mf, ff] =
+            ["pp", "mf", "ff"].map(|name| level_db(&format!("{more} --dynamic {name}"), 22_050, 44_100));
+        println!("{more}: pp {pp:.1}, mf {mf:.1}, ff {ff:.1} dBFS");
+        assert!(
+            (12.0..20.0).contains(&(mf - pp)) && (7.0..14.0).contains(&(ff - mf)),
+            "{more}: {pp} {mf} {ff}"
+        );
+    }
+    let swell = [(4_000, 8_000), (40_000, 44_000)].map(|(from, to)| level_db("--dynamic pp:ff", from, to));
+    assert!(swell[1] - swell[0] > 15.0, "{swell:?}");
+    assert_eq!(level_db("--dynamic 0.6", 0, 44_100), level_db("--dynamic mf", 0, 44_100));
 }
 
 #[test]
@@ -794,8 +860,9 @@ fn each_track_has_a_player_and_a_seat() {
     let [left, right] = heard("--tracks --spread 0 --set life=0 --set seats=0");
     assert!((left[0] - right[0]).abs() < 0.5, "the first track in the middle: {left:?} {right:?}");
     assert!(right[1] > left[1] + 20.0, "the second where its pan is: {left:?} {right:?}");
-    let [_, seated] = heard("--tracks --spread 0 --set life=0 --set seats=70");
-    assert!(seated[1] > 20.0 && (seated[0] - right[0]).abs() < 0.5);
+    let [left, right] = heard("--tracks --spread 0 --set life=0 --set seats=70");
+    assert!(left[0] > right[0] + 3.0, "the first of two sits to the left: {left:?} {right:?}");
+    assert!(right[1] > left[1] + 20.0, "the second to the right: {left:?} {right:?}");
     refused(&d, "render duet.mid --tracks --players 2 --out x.wav", &["--tracks", "players"]);
     refused(&d, "render --written C4 --tracks --out x.wav", &["--tracks needs a MIDI file"]);
     succeeds(d.path(), "render chord.mid --tracks --out one.wav");

@@ -234,7 +234,7 @@ fn colour_level_and_noise_are_near_those_of_recorded_notes() {
             Dynamic::Ff => 1.0,
         };
         let settings = Settings { gain_db: -HEADROOM_DB as f32, ..Settings::default() };
-        let (note, breath) = (SoundingNote(recorded[n].midi), breath_of_dynamic(dynamic) as f32);
+        let (note, breath) = (SoundingNote(recorded[n].midi), breath_of_dynamic(dynamic, &settings) as f32);
         let out = realism::render(&MODEL, &settings, note, breath, n);
         let score = NoteScore::new(recorded[n].clone(), SteadyNote::measure(&out));
         let segment = steady_segment(&out, f64::from(RATE)).map_or(&[][..], |range| &out[range]);

@@ -86,7 +86,7 @@ impl BatchCommand {
         let jobs = self.jobs(&plan)?;
         if self.dry_run {
             for job in &jobs {
-                println!("chalumeau {}", job.words.join(" "));
+                println!("chalumeau {}", typed(&job.words));
             }
             return Ok(());
         }
@@ -144,7 +144,7 @@ impl BatchCommand {
                 });
                 line.map_err(|failure| {
                     if let Ok(mut failed) = failed.lock() {
-                        failed.get_or_insert((job.words.join(" "), failure));
+                        failed.get_or_insert((typed(&job.words), failure));
                     }
                 })
                 .ok()
@@ -195,7 +195,7 @@ impl BatchCommand {
                 // Clap's own text without its "error: " and usage.
                 let text = error.to_string();
                 let first = text.lines().next().unwrap_or_default().trim_start_matches("error: ");
-                self.failure(&format!("file {}: {first} (chalumeau {})", at + 1, words.join(" ")))
+                self.failure(&format!("file {}: {first} (chalumeau {})", at + 1, typed(&words)))
             })?;
             let fields: Vec<_> = variation.values.iter().map(|value| quoted(value)).collect();
             let line = format!("{file},{}", fields.join(","));
@@ -308,6 +308,19 @@ fn finished(begin: &str, made: &Rendered) -> String {
 }
 
 /// A progress bar over files; it shows on a terminal only.
+/// A command as it is typed in a shell.
+fn typed(words: &[String]) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,+@".contains(c);
+    let word = |word: &String| {
+        if !word.is_empty() && word.chars().all(is_plain) {
+            word.clone()
+        } else {
+            format!("'{}'", word.replace('\'', r"'\''"))
+        }
+    };
+    words.iter().map(word).collect::<Vec<_>>().join(" ")
+}
+
 fn progress(files: usize) -> ProgressBar {
     let bar = ProgressBar::new(files as u64);
     match ProgressStyle::with_template("{bar:40} {pos} of {len}  {elapsed} (left: {eta})") {
@@ -319,6 +332,12 @@ fn progress(files: usize) -> ProgressBar {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn commands_are_quoted_for_a_shell() {
+        let words = ["render", "--noise=50 %", "--preset=Player's own", ""].map(str::to_owned);
+        assert_eq!(typed(&words), r"render '--noise=50 %' '--preset=Player'\''s own' ''");
+    }
 
     /// The last columns of a table.
     const REST: &str = "length_s,rate_hz,peak_dbfs,rms_dbfs";

@@ -37,7 +37,7 @@ Examples:
 #[command(after_help = EXAMPLES)]
 pub struct FingeringsCommand {
     /// Written note: a MIDI number (95) or a name (B6)
-    #[arg(long, value_name = "NOTE", value_parser = note, required_unless_present = "multiphonic")]
+    #[arg(long, visible_alias = "written", value_name = "NOTE", value_parser = note, required_unless_present = "multiphonic")]
     note: Option<u8>,
     /// Two fingerings for a trill to this written note
     #[arg(long, value_name = "NOTE", value_parser = note, requires = "note")]

@@ -152,8 +152,8 @@ impl RealismCommand {
     fn blown(&self, file: &InstrumentFile) -> Result<([f32; 3], Settings, String), Failure> {
         if self.gamma.is_empty() {
             let dynamics = three("--dynamic", &self.dynamic, DYNAMICS)?;
-            let breaths = dynamics.map(|dynamic| breath_of_dynamic(dynamic) as f32);
             let settings = self.settings.played(file)?;
+            let breaths = dynamics.map(|dynamic| breath_of_dynamic(dynamic, &settings) as f32);
             if settings.breath_response == BreathResponse::Physical {
                 return Err(Failure::Usage("a physical breath has no dynamics; give --gamma".to_owned()));
             }

@@ -9,6 +9,7 @@ use crate::cli::score_args::ScoreArgs;
 use crate::cli::shared_args::{whole, within};
 use crate::output::NewFile;
 use crate::wav::{Depth, Levels, WavFile};
+use chalumeau_core::dsp::limiter::CEILING;
 use chalumeau_core::instrument::Probe;
 use chalumeau_core::instrument::listening::ListeningMode;
 use chalumeau_core::instrument::side_by_side::{self, Stand};
@@ -22,7 +23,10 @@ const EXAMPLES: &str = "\
 Examples:
   chalumeau render melody.mid --out melody.wav
       Notes are sounding pitch; breath from CC2, else CC11, else channel pressure, else velocity; volume from CC7.
+  chalumeau render --written C4 --dynamic pp:ff --seconds 4 --out swell.wav
+      As a player plays, from pianissimo to fortissimo.
   chalumeau render --written C4 --gamma 0.5 --seconds 1.5 --no-noise --out c4.wav
+      Blown by a machine, at a constant pressure.
   chalumeau render --scale E3:C6 --slurred --seconds 0.4 --out scale.wav
   chalumeau render --written G4 --breath ramp:0:1.6:4 --seconds 5 --probe g4.csv --out g4.wav
       From silence over the threshold to a reed held shut, with pressures, flow and opening.
@@ -34,6 +38,9 @@ Examples:
       A player and a seat for each track.
   chalumeau render melody.mid --replay take.csv --out again.wav
   chalumeau render melody.mid --crescendo 0.4:0.9 --bits 16 --rate 44100 --out loud.wav";
+
+/// A peak from here on was turned down: the limiter lets none past its ceiling, and hardly any by chance come as near.
+const LIMITED: f32 = 0.999 * CEILING;
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Bits {
@@ -182,6 +189,8 @@ impl RenderCommand {
             let right = "give the name of a file, for example --out note.wav";
             return Err(Failure::Usage(format!("a WAV file cannot go to standard output; {right}")));
         }
+        let written = [Some(&self.out), self.probe.as_ref()];
+        written.into_iter().flatten().try_for_each(|path| self.play.refuse_to_replace(path))?;
         if self.probe.as_ref().is_some_and(|probe| *probe == self.out) {
             return Err(Failure::Usage(format!(
                 "--out and --probe are both {}; give them different names",
@@ -206,6 +215,9 @@ impl RenderCommand {
         eprintln!("{out}: {seconds:.3} s, {} Hz, {bits}, {channels}, {peak}", rate);
         if level.clipped > 0 {
             eprintln!("warning: {} samples clipped; lower --gain-db or use --bits 32f", level.clipped);
+        }
+        if level.peak >= LIMITED {
+            eprintln!("warning: the limiter turned peaks down; lower --gain-db for levels as played");
         }
         if resets > 0 {
             eprintln!(

@@ -5,10 +5,11 @@ use crate::cli::controllers::named_or_file;
 use crate::cli::feel_args::FeelArgs;
 use crate::cli::render_job::RenderJob;
 use crate::cli::settings::SettingsArgs;
-use crate::cli::shared_args::{PlayedArgs, check_fingering, note, rate, sounding, within};
+use crate::cli::shared_args::{PlayedArgs, check_fingering, dynamics, note, rate, sounding, within};
 use crate::controllers::{ControllerMap, as_links};
 use crate::presets::{self, Preset};
 use crate::scale_file;
+use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::control::midi::MidiDecoder;
@@ -59,7 +60,7 @@ pub struct TimedNote {
 #[derive(Args)]
 #[command(group = ArgGroup::new("what").required(true).args(["midi", "written", "sounding", "scale"]))]
 #[command(group = ArgGroup::new("note").args(["written", "sounding", "scale"]))]
-#[command(group = ArgGroup::new("blown").args(["gamma", "breath", "crescendo", "replay"]))]
+#[command(group = ArgGroup::new("blown").args(["dynamic", "gamma", "breath", "crescendo", "replay"]))]
 pub struct ScoreArgs {
     /// Standard MIDI file, format 0 or 1
     #[arg(value_name = "MIDI")]
@@ -94,12 +95,16 @@ pub struct ScoreArgs {
     #[arg(long, value_name = "S", value_parser = |s: &str| within(s, 0.0, 60.0))]
     tail: Option<f64>,
 
+    /// How loud, as a player plays: pp, p, mp, mf, f, ff or a number in 0..1; or two with a colon, for example pp:ff, from the
+    /// one to the other over the whole length
+    #[arg(long, value_name = "D|FROM:TO", help_heading = "Breath (replaces that of a MIDI file)", value_parser = dynamics)]
+    dynamic: Option<(f64, f64)>,
     /// Constant mouth pressure over closing pressure, 0..3 [default: 0.5 unless a MIDI file plays]
     #[arg(long, value_name = "G", help_heading = "Breath (replaces that of a MIDI file)", value_parser = |s: &str| within(s, 0.0, f64::from(GAMMA_MAX)))]
     gamma: Option<f64>,
-    /// Mouth pressure over closing pressure over time: a CSV file t_s,gamma, or ramp:FROM:TO:SECONDS, then held. With
-    /// --breath-response played the numbers are shares of full breath, 0..1
-    #[arg(long, value_name = "FILE|RAMP", help_heading = "Breath (replaces that of a MIDI file)")]
+    /// Mouth pressure over closing pressure over time: a CSV file t_s,gamma, or ramp:FROM:TO:SECONDS, then held, or one number.
+    /// With --breath-response played the numbers are shares of full breath, 0..1
+    #[arg(long, value_name = "FILE|RAMP|G", help_heading = "Breath (replaces that of a MIDI file)")]
     breath: Option<String>,
     /// Mouth pressure from one gamma to another over the whole length, for example 0.4:0.9; or shares of full breath, as
     /// with --breath
@@ -162,15 +167,19 @@ impl ScoreArgs {
             Some(preset) => self.instrument.load_for(preset)?,
             None => self.instrument.load()?,
         };
-        let curve = self.curve()?;
+        let mut curve = self.curve()?;
         let base = self.preset.as_ref().map(Preset::settings);
         let map = self.controllers.clone().unwrap_or_default();
         let mut settings = match (&curve, &base) {
             (Some(curve), base) => self.settings.blown_in_either(base.as_ref(), curve, &file)?,
+            (None, base) if self.dynamic.is_some() => self.settings.with_dynamics(base.as_ref(), &file)?,
             (None, Some(base)) => self.settings.over_preset(base, &file)?,
             (None, None) => self.settings.played(&file)?,
         };
         map.values.iter().for_each(|(parameter, value)| parameter.set(&mut settings, *value));
+        if let Some((from, to)) = self.dynamic {
+            curve = Some(BreathCurve::dynamics(from, to, &settings));
+        }
         let trims = self.trims(&file)?;
         let mut parts = self.score(&file, &as_links(&map.links, &settings), &mut settings)?;
         if let Some(curve) = &curve {
@@ -194,6 +203,24 @@ impl ScoreArgs {
         let usual = if one_note { 0.0 } else { 1.0 } + settings.articulation.tail_s();
         let parts = parts.with_tail(self.tail.unwrap_or(usual), self.rate);
         Ok(RenderJob { model, settings, score: (&parts).into(), parts, rate: self.rate, warnings })
+    }
+
+    /// Refuses to write a file that is being read: --force replaces results, not what they are made of.
+    pub fn refuse_to_replace(&self, path: &Path) -> Result<(), Failure> {
+        let breath = self.breath.as_ref().map(PathBuf::from);
+        let read = [&self.midi, &breath, &self.replay, &self.scl, &self.kbm];
+        let same = |one: &Path| {
+            fs::canonicalize(one).is_ok_and(|one| fs::canonicalize(path).is_ok_and(|to| to == one))
+        };
+        match read.into_iter().flatten().find(|read| same(read)) {
+            Some(_) => {
+                let given = path.display();
+                Err(Failure::Usage(format!(
+                    "{given} is what is played; give another name for what is written"
+                )))
+            }
+            None => Ok(()),
+        }
     }
 
     /// The trim of each note by its sounding pitch, cents.
@@ -261,7 +288,7 @@ impl ScoreArgs {
     }
 
     fn curve(&self) -> Result<Option<BreathCurve>, Failure> {
-        if self.replay.is_some() {
+        if self.replay.is_some() || self.dynamic.is_some() {
             return Ok(None);
         }
         if let Some(text) = &self.crescendo {
@@ -273,6 +300,11 @@ impl ScoreArgs {
         let Some(text) = &self.breath else {
             return Ok(self.midi.is_none().then(|| BreathCurve::constant(GAMMA_DEFAULT)));
         };
+        if text.parse::<f32>().is_ok() {
+            let gamma = within(text, 0.0, f64::from(GAMMA_MAX));
+            let gamma = gamma.map_err(|wrong| Failure::Usage(format!("--breath {text}: {wrong}")))?;
+            return Ok(Some(BreathCurve::constant(gamma as f32)));
+        }
         if text.starts_with("ramp:") {
             return Ok(Some(BreathCurve::parse_ramp(text)?));
         }
@@ -305,7 +337,7 @@ impl ScoreArgs {
             let bytes = match &self.given {
                 Some(Given::Notes(notes)) => return Ok((&score_of(notes, self.rate)).into()),
                 Some(Given::Midi(bytes)) => bytes.clone(),
-                None => fs::read(path).map_err(|source| Failure::Read { path: path.clone(), source })?,
+                None => fs::read(path).map_err(|source| no_such_piece(path, source))?,
             };
             let mut decoder = if self.mpe { MidiDecoder::new().with_mpe() } else { MidiDecoder::new() };
             decoder.set_links(links);
@@ -387,6 +419,26 @@ fn silent_notes(events: &[Timed<PartEvent>], model: &Model, reach: Reach) -> Vec
     silent_keys(&asked.collect::<Vec<_>>(), model, reach)
 }
 
+/// Why a piece cannot be read; who gives the name of a note means one note.
+fn no_such_piece(path: &Path, source: std::io::Error) -> Failure {
+    match path.to_str().filter(|name| note(name).is_ok() && source.kind() == std::io::ErrorKind::NotFound) {
+        Some(name) => Failure::Usage(format!("there is no file {name}; for one note give --written {name}")),
+        None => Failure::Read { path: path.to_owned(), source },
+    }
+}
+
+/// Which bundled instrument has all these notes, in words for the end of a sentence.
+fn who_has(notes: &[SoundingNote]) -> String {
+    let has = |instrument: &&Bundled| {
+        let file = instrument.file();
+        let fingering =
+            |note: &SoundingNote| note.written(file.transposition).and_then(|note| file.fingering(note));
+        notes.iter().all(|note| fingering(note).is_some())
+    };
+    let found = Bundled::ALL.iter().find(has);
+    found.map(|instrument| format!("; --instrument {} has them", instrument.id())).unwrap_or_default()
+}
+
 /// Says which of these keys the instrument cannot play, which stay silent.
 pub(super) fn silent_keys(asked: &[SoundingNote], model: &Model, reach: Reach) -> Vec<String> {
     let file = &model.file;
@@ -403,7 +455,7 @@ pub(super) fn silent_keys(asked: &[SoundingNote], model: &Model, reach: Reach) -
     if !missing.is_empty() {
         let (low, high) = (file.lowest(), file.highest());
         said.push(format!(
-            "{} no fingering and {} silent; this instrument sounds {} to {} (written {low} to {high})",
+            "{} no fingering and {} silent; this instrument sounds {} to {} (written {low} to {high}){}",
             if missing.len() == 1 {
                 "1 note has".to_owned()
             } else {
@@ -411,7 +463,8 @@ pub(super) fn silent_keys(asked: &[SoundingNote], model: &Model, reach: Reach) -
             },
             if missing.len() == 1 { "stays" } else { "stay" },
             sounds(low),
-            sounds(high)
+            sounds(high),
+            who_has(&missing)
         ));
     }
     if !muted.is_empty() {

@@ -312,6 +312,21 @@ impl SettingsArgs {
         self.over(*preset, file)
     }
 
+    /// As a player plays at a dynamic, also a preset that a machine blows.
+    pub fn with_dynamics(
+        &self,
+        preset: Option<&Settings>,
+        file: &InstrumentFile,
+    ) -> Result<Settings, Failure> {
+        if let Some((BreathResponse::Physical, typed)) = self.response()? {
+            return Err(Failure::Usage(format!(
+                "{typed}: a physical breath has no dynamics; leave {typed} out, or give --gamma instead of --dynamic"
+            )));
+        }
+        let played = |base: &Settings| Settings { breath_response: BreathResponse::Played, ..*base };
+        preset.map_or_else(|| self.played(file), |base| self.over_preset(&played(base), file))
+    }
+
     /// For a breath curve: of gamma, unless the preset or the user has chosen the played response; then of shares of full
     /// breath.
     pub fn blown_in_either(

@@ -348,6 +348,28 @@ pub fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
     }
 }
 
+/// Names of dynamics, softest first. They lie at equal distances from 0 to 1, so that mf is the 0.6 of the player's rule.
+const DYNAMIC_NAMES: [&str; 6] = ["pp", "p", "mp", "mf", "f", "ff"];
+
+/// A player's dynamic, 0..=1: a name or a number.
+pub fn dynamic(text: &str) -> Result<f64, String> {
+    let named = DYNAMIC_NAMES.iter().position(|name| *name == text);
+    match named {
+        Some(at) => Ok(at as f64 / (DYNAMIC_NAMES.len() - 1) as f64),
+        None => {
+            within(text, 0.0, 1.0).map_err(|wrong| format!("{wrong}, or one of {}", DYNAMIC_NAMES.join(", ")))
+        }
+    }
+}
+
+/// One dynamic, or two with a colon between them.
+pub fn dynamics(text: &str) -> Result<(f64, f64), String> {
+    match text.split_once(':') {
+        Some((from, to)) => Ok((dynamic(from)?, dynamic(to)?)),
+        None => dynamic(text).map(|held| (held, held)),
+    }
+}
+
 /// A whole number inside a range, or what would be right.
 pub fn whole<T: TryFrom<i64>>(text: &str, low: i64, high: i64) -> Result<T, String> {
     let number = text.parse::<i64>().ok().filter(|number| (low..=high).contains(number));
@@ -376,6 +398,20 @@ pub fn note(text: &str) -> Result<u8, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
+
+    #[test]
+    fn dynamics_have_names_and_numbers() {
+        assert_eq!(["pp", "ff", "0.25"].map(|text| dynamic(text).unwrap()), [0.0, 1.0, 0.25]);
+        assert!(
+            (dynamic("mf").unwrap() - MEZZO_FORTE).abs() < 1e-12,
+            "the one that recordings are compared with"
+        );
+        assert_eq!(dynamics("pp:ff").unwrap(), (0.0, 1.0));
+        assert_eq!(dynamics("0.5").unwrap(), (0.5, 0.5));
+        assert_eq!(dynamic("fff").unwrap_err(), "must be a number in 0..1, or one of pp, p, mp, mf, f, ff");
+        assert!(dynamics("pp:2").unwrap_err().starts_with("must lie in 0..1"));
+    }
 
     #[test]
     fn notes_have_numbers_and_names() {

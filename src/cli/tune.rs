@@ -5,7 +5,7 @@ use crate::cli::csv_table::TableArgs;
 use crate::cli::plot_args::PlotArgs;
 use crate::cli::render::progress;
 use crate::cli::settings::SettingsArgs;
-use crate::cli::shared_args::{NotesArg, PlayedArgs, rate, within};
+use crate::cli::shared_args::{NotesArg, PlayedArgs, dynamic, rate, within};
 use chalumeau_core::analysis::pitch;
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
 use chalumeau_core::instrument::{BreathResponse, Clarinet, Model, Settings, Tuning};
@@ -33,7 +33,7 @@ const EXAMPLES: &str = "\
 Examples:
   chalumeau tune --rate 48000 --gamma 0.5
   chalumeau tune --gamma 0.8 --tempered --csv loud.csv
-  chalumeau tune --dynamic 0 --csv soft.csv
+  chalumeau tune --dynamic pp --csv soft.csv
   chalumeau tune --written G5 --strength 3.5
   chalumeau tune --gamma 0.7 --plot tune.png    natural and tempered, as a figure";
 
@@ -50,8 +50,8 @@ pub struct TuneCommand {
     /// Mouth pressure over closing pressure, 0..3 [default: 0.5]
     #[arg(long, value_name = "G", conflicts_with = "dynamic", value_parser = |s: &str| within(s, 0.0, f64::from(GAMMA_MAX)))]
     gamma: Option<f64>,
-    /// Instead: the player's dynamic, 0 (pianissimo)..1 (fortissimo)
-    #[arg(long, value_name = "D", value_parser = |s: &str| within(s, 0.0, 1.0))]
+    /// Instead: the player's dynamic, 0..1 or pp, p, mp, mf, f, ff
+    #[arg(long, value_name = "D", value_parser = dynamic)]
     dynamic: Option<f64>,
     /// Sample rate, Hz, 1000..1536000
     #[arg(long, alias = "sr", value_name = "HZ", default_value = "48000", value_parser = rate)]
@@ -72,8 +72,9 @@ impl TuneCommand {
         let notes = self.notes.notes(&file)?;
         let (curve, mut settings, blown) = match self.dynamic {
             Some(dynamic) => {
-                let curve = BreathCurve::constant(breath_of_dynamic(dynamic) as f32);
-                (curve, self.settings.played(&file)?, format!("dynamic {dynamic}"))
+                let settings = self.settings.played(&file)?;
+                let curve = BreathCurve::constant(breath_of_dynamic(dynamic, &settings) as f32);
+                (curve, settings, format!("dynamic {dynamic}"))
             }
             None => {
                 let gamma = self.gamma.unwrap_or(GAMMA_DEFAULT);

@@ -24,17 +24,17 @@ use motion::Motion;
 
 /// The main controls, in order, with what their ends mean. A control whose parameter does not exist is left out.
 const MACROS: [Macro; 11] = [
-    Macro { id: "bcurve", name: "Breath", ends: "early to late" },
+    Macro { id: "bcurve", name: "Curve", ends: "early to late" },
     Macro { id: "lip", name: "Lip", ends: "firm to loose" },
     Macro { id: "stren", name: "Reed", ends: "soft to hard" },
     Macro { id: "tongue", name: "Tongue", ends: "hard to soft" },
-    Macro { id: "lay", name: "Colour", ends: "bright to mellow" },
+    Macro { id: "lay", name: "Facing", ends: "bright to mellow" },
     Macro { id: "vib", name: "Vibrato", ends: "none to deep" },
     Macro { id: "growl", name: "Growl", ends: "none to rough" },
     Macro { id: "tract", name: "Tract", ends: "open to tuned" },
-    Macro { id: "noise", name: "Air", ends: "none to much" },
+    Macro { id: "noise", name: "Noise", ends: "none to much" },
     Macro { id: "room", name: "Room", ends: "dry to far" },
-    Macro { id: "gain", name: "Volume", ends: "soft to loud" },
+    Macro { id: "gain", name: "Gain", ends: "soft to loud" },
 ];
 /// Width of a main control, with its words, points.
 const MACRO_WIDTH: f32 = 92.0;
@@ -137,6 +137,22 @@ impl PlayView {
             *is_open = !*is_open;
             actions.push(Action::TryFingering(open.clone()));
             self.tried = Some(open);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parameters::PARAMETERS;
+
+    /// Who learns a control here finds it by the same name in a host's list.
+    #[test]
+    fn every_control_has_a_word_of_its_parameters_name() {
+        for Macro { id, name, .. } in MACROS {
+            let parameter = PARAMETERS.iter().find(|parameter| parameter.id == id).expect(id);
+            let words = parameter.name.split(' ');
+            assert!(words.map(str::to_lowercase).any(|word| word == name.to_lowercase()), "{id}: {name}");
         }
     }
 }

@@ -182,7 +182,7 @@ fn column(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
     if let Some(balance) = balance_db(&heard.harmonics_db) {
         let text = format!("odd over even harmonics {balance:+.0} dB");
         ui.label(egui::RichText::new(text).color(c.quiet)).on_hover_text(
-            "Power of harmonics 1, 3, 5 ... over the power of harmonics 2, 4, 6 ...: 20 dB or more for a low clarinet, about 0 dB for a saxophone",
+            "Power of harmonics 1, 3, 5 ... over the power of harmonics 2, 4, 6 ...: 10 to 25 dB for a low clarinet, most when it is soft; about 0 dB for a saxophone",
         );
     }
     choice(ui, hands, "tune");

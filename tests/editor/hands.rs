@@ -157,13 +157,13 @@ fn drags_types_and_resets(window: &mut Window, id: &str) {
 
 /// The main controls of the first view: what they are called, and what they move.
 const MACROS: &[(&str, &str)] = &[
-    ("Breath", "bcurve"),
+    ("Curve", "bcurve"),
     ("Lip", "lip"),
     ("Reed", "stren"),
     ("Tongue", "tongue"),
-    ("Colour", "lay"),
-    ("Air", "noise"),
-    ("Volume", "gain"),
+    ("Facing", "lay"),
+    ("Noise", "noise"),
+    ("Gain", "gain"),
 ];
 
 #[test]

@@ -338,7 +338,7 @@ impl Data {
             .collect();
         let score = |n: usize| {
             let recorded = &self.recorded[all[n / TAKES].0][all[n / TAKES].1];
-            let breath = breath_of_dynamic(dynamic_number(recorded.dynamic)) as f32;
+            let breath = breath_of_dynamic(dynamic_number(recorded.dynamic), &settings) as f32;
             let samples = realism::render(&model, &settings, SoundingNote(recorded.midi), breath, n % TAKES);
             NoteScore::new(recorded.clone(), SteadyNote::measure(&samples))
         };

@@ -24,7 +24,7 @@ const HOW: &str = "Drag up or down; Shift: finer. Double click or Ctrl-click: de
 pub struct Macro {
     /// The parameter it moves.
     pub id: &'static str,
-    /// What a player calls it.
+    /// A word of the parameter's name.
     pub name: &'static str,
     /// What its two ends mean.
     pub ends: &'static str,

@@ -6,7 +6,7 @@
 use super::lanes::any_above;
 
 /// Peaks up to here pass untouched.
-const CEILING: f32 = 0.98;
+pub const CEILING: f32 = 0.98;
 /// Time in which the gain recovers by a factor e, s.
 const RECOVERY_S: f64 = 0.2;
 

@@ -46,15 +46,16 @@ impl Person {
         self.detune * f64::from(spread_cents)
     }
 
-    /// Place between left (-1) and right (1) of `count` players on a semicircle of `width`, 0..=1: the first in the
-    /// middle, the others alternately to its right and left, the last ones at the ends. One player is in the middle.
+    /// Place between left (-1) and right (1) of `count` players, who sit at equal angles on a semicircle of `width`, 0..=1: the first
+    /// in the middle, or left of it where their number is even, the others alternately to the right and left, the last ones at the ends. One player is in
+    /// the middle.
     pub fn seat(number: usize, count: usize, width: f32) -> f32 {
-        if number == 0 || count < 2 {
+        if count < 2 {
             return 0.0;
         }
-        // Rows of two to a pair of sides; the outermost pair sits at the width.
-        let (row, rows) = (number.div_ceil(2), (count - 1).div_ceil(2));
-        let out = (0.5 * PI * row as f64 / rows as f64).sin() as f32 * width;
+        // Half steps between the middle and the seat, of count - 1 between the middle and an end.
+        let half_steps = if count.is_multiple_of(2) { number / 2 * 2 + 1 } else { number.div_ceil(2) * 2 };
+        let out = (0.5 * PI * half_steps as f64 / (count - 1) as f64).sin() as f32 * width;
         if number % 2 == 1 { out } else { -out }
     }
 }
@@ -97,10 +98,13 @@ mod tests {
     fn seats_are_symmetric_and_reach_the_width() {
         assert_eq!(Person::seat(0, 1, 1.0), 0.0);
         assert_eq!([0, 1, 2].map(|number| Person::seat(number, 3, 0.5)), [0.0, 0.5, -0.5]);
-        for count in [5, 9, 15] {
+        assert_eq!([0, 1].map(|number| Person::seat(number, 2, 0.5)), [-0.5, 0.5]);
+        for count in 2..=16 {
             let seats: Vec<f32> = (0..count).map(|number| Person::seat(number, count, 1.0)).collect();
             assert!(seats.iter().sum::<f32>().abs() < 1e-6, "{seats:?}");
             assert!(seats.iter().all(|seat| seat.abs() <= 1.0) && seats.contains(&1.0));
+            let out: Vec<f32> = seats.iter().map(|seat| seat.abs()).collect();
+            assert!(out.is_sorted(), "from the middle outwards: {seats:?}");
         }
     }
 }

@@ -1,10 +1,11 @@
 //! Mouth pressure over time: gamma, mouth pressure over closing pressure, with straight lines between points.
 //!
-//! A curve is a constant, a ramp, a crescendo over the whole score, or a CSV file `t_s,gamma`. The pressure is constant
+//! A curve is a constant, a ramp, a crescendo over the whole score, a player's dynamics over the whole score, or a CSV file `t_s,gamma`. The pressure is constant
 //! before the first point and after the last one. While the curve moves, it reaches the instrument as one breath event per
 //! millisecond, finer than any controller; the instrument smooths between them.
 
 use crate::event::{Event, Timed};
+use crate::instrument::player::response::breath_of_dynamic;
 use crate::instrument::{BreathResponse, Settings};
 use crate::score::samples::samples_in;
 use std::io;
@@ -135,6 +136,17 @@ impl BreathCurve {
         Ok(Self { points: vec![(0.0, gamma(number(from)?)?), (1.0, gamma(number(to)?)?)], relative: true })
     }
 
+    /// A player's dynamics, 0..=1, from one to another over the whole score, where the breath is [played](BreathResponse::Played).
+    pub fn dynamics(from: f64, to: f64, settings: &Settings) -> Self {
+        // The curve between breath and dynamic may be bent; with as many straight pieces nobody hears them.
+        const PIECES: u32 = 64;
+        let point = |piece: u32| {
+            let way = f64::from(piece) / f64::from(PIECES);
+            (way, breath_of_dynamic(from + way * (to - from), settings) as f32)
+        };
+        Self { points: (0..=PIECES).map(point).collect(), relative: true }
+    }
+
     /// A ramp `ramp:FROM:TO:SECONDS` in gamma, then constant. An `s` after the seconds is allowed.
     ///
     /// # Errors
@@ -241,6 +253,7 @@ impl BreathCurve {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::instrument::player::response::dynamic;
 
     #[test]
     fn reference_breath_is_gamma() {
@@ -251,6 +264,18 @@ mod tests {
         let hard = Settings { strength: 3.5, ..settings };
         assert!((closing_kpa(&hard) - 6.0 * 1.44).abs() < 1e-4);
         assert_eq!(breath_of_gamma(0.5, &Settings { strength: 3.5, ..Settings::default() }), 0.5, "a share");
+    }
+
+    #[test]
+    fn dynamics_are_straight_whatever_the_curve_of_the_breath() {
+        let settings = Settings { breath_curve: 0.5, breath_softest: 0.1, ..Settings::default() };
+        let curve = BreathCurve::dynamics(0.2, 0.8, &settings);
+        for way in [0.0, 0.13, 0.5, 0.99, 1.0] {
+            let played = dynamic(f64::from(curve.at(way)), &settings).0;
+            assert!((played - (0.2 + 0.6 * way)).abs() < 1e-3, "{way}: {played}");
+        }
+        let one = BreathCurve::dynamics(0.6, 0.6, &settings);
+        assert_eq!(one.events(48_000, 48_000, &settings).len(), 1);
     }
 
     fn refusal(text: &str) -> String {

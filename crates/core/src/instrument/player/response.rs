@@ -59,9 +59,12 @@ pub struct Response {
     wanted: Known<f64, f64>,
 }
 
-/// Breath, 0..=1, that a dynamic of 0..=1 asks for, with a curve of 1.
-pub fn breath_of_dynamic(dynamic: f64) -> f64 {
-    ONSET + (1.0 - ONSET) * dynamic
+/// Breath, 0..=1, that a dynamic of 0..=1 asks for; inverse of [`dynamic`].
+pub fn breath_of_dynamic(dynamic: f64, settings: &Settings) -> f64 {
+    let [softest, loudest, curve] =
+        [settings.breath_softest, settings.breath_loudest, settings.breath_curve].map(f64::from);
+    let above = if curve == 1.0 { dynamic } else { dynamic.powf(1.0 / curve) };
+    softest + (loudest - softest) * above
 }
 
 /// Breath, 0..=1, as a dynamic, and its share of the softest breath where it is below.
@@ -191,7 +194,12 @@ mod tests {
             (0.0, 1.0),
             "the controller's own 4 begins the note"
         );
-        assert!((dynamic(breath_of_dynamic(0.3), &d).0 - 0.3).abs() < 1e-12);
+        let curved = Settings { breath_softest: 0.1, breath_loudest: 0.8, breath_curve: 1.5, ..d };
+        for settings in [d, curved] {
+            for wanted in [0.0, 0.3, 1.0] {
+                assert!((dynamic(breath_of_dynamic(wanted, &settings), &settings).0 - wanted).abs() < 1e-12);
+            }
+        }
         assert_eq!(dynamic(0.5 * ONSET, &d), (0.0, 0.5));
         assert_eq!(dynamic(0.0, &d), (0.0, 0.0));
     }
