@@ -237,3 +237,20 @@ fn what_is_typed_is_found_in_a_line() {
     assert!(understands(["tune", "--no-such"]).is_err());
     assert_eq!(anchor(" Play it in five minutes"), "play-it-in-five-minutes");
 }
+
+/// The guide's table of presets is the list that the program gives.
+#[test]
+fn the_guide_lists_every_preset() {
+    let text = std::fs::read_to_string(root().join("docs/guide/presets.md")).unwrap();
+    let (_, table) = text.split_once("## All presets").unwrap();
+    let rows: Vec<(&str, &str)> = table
+        .lines()
+        .filter_map(|line| line.strip_prefix("| ")?.strip_suffix(" |")?.split_once(" | "))
+        .skip(1)
+        .collect();
+    let presets = chalumeau::presets::factory::all();
+    for (at, preset) in presets.iter().enumerate() {
+        assert_eq!(rows.get(at), Some(&(preset.name.as_str(), preset.shows.as_str())), "row {}", at + 1);
+    }
+    assert_eq!(rows.len(), presets.len());
+}
