@@ -157,7 +157,7 @@ impl<'a> BreathAndHaptics<'a> {
         };
         let told = [
             said(found.begins, "begins at"),
-            said(found.beats, "beats from"),
+            said(found.beats, "is shut for a part of each period from"),
             said(found.chokes, "chokes at"),
             said(found.returns, "comes back, fading, at"),
             said(found.ends, "ends at"),
