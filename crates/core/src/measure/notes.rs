@@ -4,7 +4,7 @@
 //! steady part, after the attack or the slur and before the release. A [`NoteMeter`] keeps the samples of one note at a time,
 //! at most [`LONGEST_S`] of it.
 
-use crate::analysis::pitch::{fundamental_hz, refine_hz};
+use crate::analysis::pitch::{fundamental_hz, periodicity, refine_hz};
 use crate::analysis::spectrum::rms_dbfs;
 use crate::score::NoteSpan;
 use crate::units::cents;
@@ -15,6 +15,10 @@ pub const LONGEST_S: f64 = 3.0;
 /// Softer notes have no pitch, dBFS at the usual gain. Without breath the click of the tongue rings on at -88 dBFS in a note of 0.2 s, and at
 /// less than -120 in one of 0.5 s. The softest dynamic of a player is above -45.
 pub const LEAST_DBFS: f64 = -75.0;
+
+/// What repeats itself less than this from period to period has no pitch. Noise of a reed that is blown too softly does so by less than 0.1, also as the
+/// bore colours it; notes with much air, growl or flutter tongue by more than 0.8.
+const PERIODIC: f64 = 0.5;
 
 /// Pitch and level of one note.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,6 +97,7 @@ impl NoteMeter {
                 .or_else(|| fundamental_hz(&self.kept, self.rate_hz))
         };
         let hz = if level_dbfs < self.least_dbfs { None } else { pitch() };
+        let hz = hz.filter(|&hz| periodicity(&self.kept, self.rate_hz, hz) >= PERIODIC);
         self.measured.push(MeasuredNote { span, hz, cents: hz.map(|hz| cents(hz, wanted_hz)), level_dbfs });
         self.kept.clear();
     }
@@ -110,6 +115,7 @@ pub fn spread(measured: &[MeasuredNote]) -> Option<(usize, f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dsp::white::White;
     use crate::units::SoundingNote;
     use std::f64::consts::TAU;
 
@@ -125,6 +131,24 @@ mod tests {
             notes.push(NoteSpan { note, from, to: samples.len() });
         }
         (notes, samples)
+    }
+
+    #[test]
+    fn noise_has_no_pitch_and_a_noisy_tone_has() {
+        let mut white = White::new(1);
+        let note = SoundingNote(58);
+        let hz = note.frequency_hz(440.0);
+        let mut heard = |tone: f64| {
+            let sample =
+                |n: u32| (tone * (TAU * hz * f64::from(n) / 48_000.0).sin() + 0.02 * white.next()) as f32;
+            let samples: Vec<f32> = (0..48_000).map(sample).collect();
+            let mut meter =
+                NoteMeter::new(vec![NoteSpan { note, from: 0, to: samples.len() }], 48_000.0, 440.0, 0.0);
+            meter.hear(&samples);
+            meter.finish()[0].cents
+        };
+        assert_eq!(heard(0.0), None);
+        assert!(heard(0.1).unwrap().abs() < 1.0);
     }
 
     #[test]
