@@ -35,6 +35,8 @@ pub struct LatticeCoeffs {
     pub(super) hole_junctions: Vec<usize>,
     /// Bell: radiation conductance and half-sample conductance of its mass.
     pub(super) bell: (f64, f64),
+    /// See [`tuning_range`](Self::tuning_range): players ask for it at each change of a setting.
+    tuning_range: (f64, f64),
 }
 
 impl LatticeCoeffs {
@@ -57,7 +59,7 @@ impl LatticeCoeffs {
         let radius = cells.end_radius_m;
         let z_end = air.z_c(radius) / air.z_c(nominal_radius_m);
         let end = radiation::END_CORRECTION;
-        Self {
+        let mut coeffs = Self {
             rate_hz,
             nominal_radius_m,
             ticks: cells.cells.iter().map(|cell| cell.ticks).collect(),
@@ -78,7 +80,11 @@ impl LatticeCoeffs {
                 radiation::RESISTANCE / (end * end) / z_end,
                 air.c / (2.0 * rate_hz * end * radius * z_end),
             ),
-        }
+            tuning_range: (0.0, 0.0),
+        };
+        let back = f64::from(coeffs.rows(coeffs.tuned_cell()).1);
+        coeffs.tuning_range = (1.0 - back, f64::from(coeffs.ring_rows() - 2) - back);
+        coeffs
     }
 
     /// Admittance of the first cell, over the reference: what the reed blows into.
@@ -175,8 +181,7 @@ impl LatticeCoeffs {
     /// Range of the tuning delay, rows of the round trip: the tuned cell's returning wave may take from one row to at least
     /// twice as many as it does.
     pub fn tuning_range(&self) -> (f64, f64) {
-        let back = f64::from(self.rows(self.tuned_cell()).1);
-        (1.0 - back, f64::from(self.ring_rows() - 2) - back)
+        self.tuning_range
     }
 
     /// Rows the ring needs: for the longest cell, and for twice the tuned one's returning wave.

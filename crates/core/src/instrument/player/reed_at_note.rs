@@ -62,9 +62,9 @@ impl ReedAtNote {
         Complex64::new(1.0 - self.ratio * self.ratio, self.damping * self.ratio).inv()
     }
 
-    /// Conductance that the reed gives at a mouth pressure.
-    fn conductance(&self, gamma: f64) -> f64 {
-        let ((opening, slope), response) = (self.opening(gamma), self.response());
+    /// Conductance that the reed gives at a mouth pressure, with its [`response`](Self::response).
+    fn conductance(&self, gamma: f64, response: Complex64) -> f64 {
+        let (opening, slope) = self.opening(gamma);
         let root = gamma.sqrt();
         self.zeta * (root * slope * response.re - opening / (2.0 * root)) + self.swept * response.im
     }
@@ -119,11 +119,12 @@ impl ReedAtNote {
     /// What must be added to the mouth over closing pressure of a note that begins at `onset` with the reed `reference`, for
     /// this reed to do the same. Real-time safe.
     pub fn shift_from(&self, reference: &Self, onset: f64) -> f64 {
-        let wanted = reference.conductance(onset);
+        let wanted = reference.conductance(onset, reference.response());
+        let response = self.response();
         let (mut low, mut high) = RANGE;
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
-            if self.conductance(middle) < wanted { low = middle } else { high = middle }
+            if self.conductance(middle, response) < wanted { low = middle } else { high = middle }
         }
         0.5 * (low + high) - onset
     }
