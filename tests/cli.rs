@@ -297,6 +297,7 @@ fn numbers_out_of_range_say_what_would_be_right() {
     refused(&d, "impedance", &["--peaks 8"]);
     refused(&d, "impedance --written 40 --peaks 8", &["written 40 (E2) has no fingering"]);
     refused(&d, "impedance --written 60 --temperature 20", &["25 C", "--model tmm"]);
+    refused(&d, "tune --dynamic mf --breath-response physical", &["has no dynamics"]);
     refused(&d, "tune --gamma 9", &["must lie in 0..3"]);
     refused(&d, "tune --written 40", &["written 40 (E2) has no fingering"]);
     refused(&d, "threshold --all --zeta 2", &["must lie in 0.05..0.9"]);
@@ -343,10 +344,12 @@ fn what_is_played_is_never_replaced() {
     let d = tempfile::tempdir().unwrap();
     fs::copy(MELODY, d.path().join("piece.mid")).unwrap();
     fs::write(d.path().join("breath.csv"), "0,0.5\n").unwrap();
+    fs::copy(format!("{EXAMPLES}/instruments/cylinder.toml"), d.path().join("cylinder.toml")).unwrap();
     for line in [
         "render piece.mid --out piece.mid --force",
         "render piece.mid --out x.wav --probe ./piece.mid --force",
         "render --written C4 --breath breath.csv --probe breath.csv --out x.wav --force",
+        "render --written C4 --instrument cylinder.toml --out cylinder.toml --force",
     ] {
         refused(&d, line, &["is what is played; give another name"]);
     }

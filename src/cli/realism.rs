@@ -14,7 +14,7 @@ use chalumeau_core::analysis::steady_note::{RATE_HZ, SteadyNote};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
-use chalumeau_core::instrument::{BreathResponse, Model, Settings};
+use chalumeau_core::instrument::{Model, Settings};
 use chalumeau_core::measure::realism::{
     CENTROID_RATIOS, Dynamic, NoteScore, REGISTERS, RecordedNote, Summary, louder_is_brighter, mean, median,
     register, render,
@@ -152,11 +152,8 @@ impl RealismCommand {
     fn blown(&self, file: &InstrumentFile) -> Result<([f32; 3], Settings, String), Failure> {
         if self.gamma.is_empty() {
             let dynamics = three("--dynamic", &self.dynamic, DYNAMICS)?;
-            let settings = self.settings.played(file)?;
+            let settings = self.settings.with_dynamics(None, file)?;
             let breaths = dynamics.map(|dynamic| breath_of_dynamic(dynamic, &settings) as f32);
-            if settings.breath_response == BreathResponse::Physical {
-                return Err(Failure::Usage("a physical breath has no dynamics; give --gamma".to_owned()));
-            }
             return Ok((breaths, settings, format!("dynamic {}", words(&dynamics))));
         }
         let gammas = three("--gamma", &self.gamma, [0.42, 0.56, 0.78])?;

@@ -119,6 +119,7 @@ impl RenderCommand {
         stand: &Stand,
         bar: impl FnOnce(usize) -> ProgressBar,
     ) -> Result<Rendered, Failure> {
+        self.refuse_same_file()?;
         let prepared = self.play.prepare()?;
         let RenderJob { score, rate, .. } = &prepared;
         prepared.warn();
@@ -129,7 +130,6 @@ impl RenderCommand {
                 several || settings.room.amount > 0.0 || settings.listening.mode == ListeningMode::Position;
             if is_wide { 2 } else { 1 }
         });
-        self.refuse_same_file()?;
         if several && (self.probe.is_some() || self.plot.wanted()) {
             let inside =
                 "--probe and --plot look inside one instrument; leave them out, or --players and --tracks";

@@ -208,18 +208,19 @@ impl ScoreArgs {
     /// Refuses to write a file that is being read: --force replaces results, not what they are made of.
     pub fn refuse_to_replace(&self, path: &Path) -> Result<(), Failure> {
         let breath = self.breath.as_ref().map(PathBuf::from);
-        let read = [&self.midi, &breath, &self.replay, &self.scl, &self.kbm];
+        let files = [&self.midi, &breath, &self.replay, &self.scl, &self.kbm].map(Option::as_ref);
+        let instrument = self.instrument.instrument.path();
         let same = |one: &Path| {
             fs::canonicalize(one).is_ok_and(|one| fs::canonicalize(path).is_ok_and(|to| to == one))
         };
-        match read.into_iter().flatten().find(|read| same(read)) {
-            Some(_) => {
+        match files.into_iter().chain([instrument]).flatten().any(|read| same(read)) {
+            true => {
                 let given = path.display();
                 Err(Failure::Usage(format!(
                     "{given} is what is played; give another name for what is written"
                 )))
             }
-            None => Ok(()),
+            false => Ok(()),
         }
     }
 

@@ -320,7 +320,7 @@ impl SettingsArgs {
     ) -> Result<Settings, Failure> {
         if let Some((BreathResponse::Physical, typed)) = self.response()? {
             return Err(Failure::Usage(format!(
-                "{typed}: a physical breath has no dynamics; leave {typed} out, or give --gamma instead of --dynamic"
+                "{typed}: a physical breath has no dynamics; leave {typed} out, or give --gamma in place of a dynamic"
             )));
         }
         let played = |base: &Settings| Settings { breath_response: BreathResponse::Played, ..*base };

@@ -31,6 +31,11 @@ pub struct InstrumentArg {
 }
 
 impl InstrumentArg {
+    /// The file that may be read; a bundled instrument has none of this name.
+    pub fn path(&self) -> Option<&PathBuf> {
+        self.instrument.as_ref()
+    }
+
     /// Its measurements.
     pub fn load(&self) -> Result<InstrumentFile, Failure> {
         self.load_or(Bundled::BFlat)

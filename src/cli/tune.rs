@@ -8,7 +8,7 @@ use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{NotesArg, PlayedArgs, dynamic, rate, within};
 use chalumeau_core::analysis::pitch;
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
-use chalumeau_core::instrument::{BreathResponse, Clarinet, Model, Settings, Tuning};
+use chalumeau_core::instrument::{Clarinet, Model, Settings, Tuning};
 use chalumeau_core::parallel;
 use chalumeau_core::score;
 use chalumeau_core::score::Score;
@@ -72,7 +72,7 @@ impl TuneCommand {
         let notes = self.notes.notes(&file)?;
         let (curve, mut settings, blown) = match self.dynamic {
             Some(dynamic) => {
-                let settings = self.settings.played(&file)?;
+                let settings = self.settings.with_dynamics(None, &file)?;
                 let curve = BreathCurve::constant(breath_of_dynamic(dynamic, &settings) as f32);
                 (curve, settings, format!("dynamic {dynamic}"))
             }
@@ -83,9 +83,6 @@ impl TuneCommand {
                 (curve, settings, format!("gamma {gamma}"))
             }
         };
-        if self.dynamic.is_some() && settings.breath_response == BreathResponse::Physical {
-            return Err(Failure::Usage("a physical breath has no dynamics; give --gamma".to_owned()));
-        }
         if !self.settings.noise_given() {
             settings.noise = 0.0;
         }

@@ -321,7 +321,7 @@ pub static PARAMETERS: &[Parameter] = &[
     )
         .help(
             "How notes are held in tune",
-            "Natural: in tune at mezzo-forte; the pitch moves with the breath, as in a real bore. Tempered: in tune at every breath. Where the breath response is Played, the player also corrects what another reed, embouchure or lip does to the pitch. A blowing machine does not: up to some 20 cents are left.",
+            "Natural: in tune at mezzo-forte; the pitch moves with the breath, as in a real bore. Tempered: in tune at every breath. Where the breath response is Played, the player also corrects what another reed, embouchure or lip does to the pitch. Where it is Physical, nobody corrects this, and notes are up to some 20 cents off.",
             "",
         )
         .sets(Sets::Choice(|settings, at| settings.tuning = nth(at, [Tuning::Natural, Tuning::Tempered])))
