@@ -199,7 +199,7 @@ fn names_do_not_break_tables_and_pictures() {
     let bore = succeeds(d.path(), "bore --instrument odd.toml --plot odd.svg");
     assert!(bore.lines().nth(1).unwrap().starts_with("# a b"), "{bore}");
     assert!(bore.contains("bore,\"a,\"\"b\"\"\",0,") && bore.contains("hole,\"H,1\","), "{bore}");
-    let show = succeeds(d.path(), "instrument show --instrument odd.toml");
+    let show = succeeds(d.path(), "instrument show odd.toml");
     assert!(show.contains("note,E3,,,,,\"chalumeau peak 1: H,1\""), "{show}");
     let picture = fs::read_to_string(d.path().join("odd.svg")).unwrap();
     assert!(!picture.contains('\u{7}') && !picture.contains("<i>") && picture.contains("&lt;i&gt;"));
@@ -314,6 +314,7 @@ fn places_that_cannot_be_written_are_refused() {
     refused(&d, "render --written 60 --out none/x.wav", &["directory none does not exist"]);
     refused(&d, "render --written 60 --out directory --force", &["directory is not a regular file"]);
     refused(&d, "render --written 60 --out -", &["cannot go to standard output"]);
+    refused(&d, "render --written 60 --out C4.MP3", &["C4.MP3 would hold a WAV file", "--out C4.wav"]);
     refused(&d, "reed --table --csv none/x.csv", &["directory none does not exist"]);
     // Also true for root, to whom no directory is closed.
     refused(&d, "render --written 60 --out file/x.wav", &["cannot write file/x.wav"]);
@@ -368,6 +369,11 @@ fn a_limiter_that_worked_and_an_instrument_that_reaches_are_told() {
         said("--written G4 --dynamic ff --gain-db 12").contains("warning: the limiter turned peaks down")
     );
     assert!(!said("--written G4 --dynamic ff").contains("warning"));
+    let soft = "warning: C4 begins to sound at gamma 0.36, and the breath reaches 0.2: only air is heard";
+    assert!(
+        said("--written C4 --gamma 0.2").contains(soft) && said("--sounding Bb3 --gamma 0.2").contains(soft)
+    );
+    assert!(!said("--written C4 --breath ramp:0:0.4:1").contains("warning"));
     let output = chalumeau(d.path(), ["render", KING, "--force", "--out", "x.wav"]);
     let low = String::from_utf8(output.stderr).unwrap();
     assert!(low.contains("notes have no fingering") && low.contains("; --instrument bass has them"), "{low}");
@@ -683,6 +689,17 @@ fn a_preset_is_rendered_and_flags_change_it() {
     let (code, _, said) =
         with_presets(d.path(), &["render", MELODY, "--preset", "Klezmer", "--out", "no.wav"]);
     assert!(code == Some(2) && said.contains("did you mean \"Klezmer dance\"?"), "{said}");
+    // tune and realism play it as render does.
+    let tune = |more: &[&str]| {
+        let all: Vec<&str> = ["tune", "--written", "G3"].iter().chain(more).copied().collect();
+        let (code, table, said) = with_presets(d.path(), &all);
+        assert_eq!(code, Some(0), "{said}");
+        table.lines().last().unwrap().to_owned()
+    };
+    let mine = tune(&["--preset", "My jazz", "--set", "life=0"]);
+    assert_eq!(mine, tune(&["--dynamic", "0.6", "--lip", "0.9", "--set", "life=0"]));
+    assert_ne!(mine, tune(&["--dynamic", "0.6", "--set", "life=0"]));
+    assert_ne!(mine, tune(&["--preset", "My jazz", "--set", "life=0", "--gamma", "0.6"]));
     let crescendo = ["render", MELODY, "--preset", "My jazz", "--crescendo", "0.4:1.2", "--out", "no.wav"];
     let (code, _, said) = with_presets(d.path(), &crescendo);
     assert!(code == Some(2) && said.contains("add --breath-response physical"), "{said}");

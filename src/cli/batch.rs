@@ -84,6 +84,12 @@ impl BatchCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let plan = Plan::read(&self.plan).map_err(|what| self.failure(&what))?;
         let jobs = self.jobs(&plan)?;
+        for (at, job) in jobs.iter().enumerate() {
+            let checked = job.render.check();
+            checked.map_err(|failure| {
+                self.failure(&format!("file {}: {failure} (chalumeau {})", at + 1, typed(&job.words)))
+            })?;
+        }
         if self.dry_run {
             for job in &jobs {
                 println!("chalumeau {}", typed(&job.words));
@@ -307,7 +313,6 @@ fn finished(begin: &str, made: &Rendered) -> String {
     format!("{begin},{:.4},{},{},{}", made.seconds, made.rate, db(made.level.peak), db(made.level.rms))
 }
 
-/// A progress bar over files; it shows on a terminal only.
 /// A command as it is typed in a shell.
 fn typed(words: &[String]) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,+@".contains(c);
@@ -321,6 +326,7 @@ fn typed(words: &[String]) -> String {
     words.iter().map(word).collect::<Vec<_>>().join(" ")
 }
 
+/// A progress bar over files; it shows on a terminal only.
 fn progress(files: usize) -> ProgressBar {
     let bar = ProgressBar::new(files as u64);
     match ProgressStyle::with_template("{bar:40} {pos} of {len}  {elapsed} (left: {eta})") {
@@ -426,6 +432,12 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         for (name, text, says) in [
             ("p.toml", "[vary]\nwritten = [\"H9\"]\n", "file 1"),
+            ("p.toml", "[vary]\nwritten = [\"C4\", \"C9\"]\n", "file 2: written 120 (C9) has no fingering"),
+            (
+                "p.toml",
+                "[vary]\nbreath = [\"none.csv\"]\n[same]\nwritten = \"C4\"\n",
+                "file 1: cannot read none.csv",
+            ),
             ("p.toml", "[vary]\nwriten = [\"C4\"]\n", "written"),
             ("p.toml", "[vary]\nout = [\"x.wav\"]\n", "out"),
             ("p.toml", "[vary]\n", "nothing varies"),

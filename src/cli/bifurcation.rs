@@ -7,14 +7,11 @@ use crate::cli::render::progress;
 use crate::cli::score_args::silent_keys;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, note, rate, sounding, within};
-use chalumeau_core::bore::instrument_file::InstrumentFile;
-use chalumeau_core::bore::transfer_matrix::{TransferMatrix, threshold_gamma};
-use chalumeau_core::instrument::Settings;
+use crate::cli::threshold::linear_threshold;
 use chalumeau_core::measure::bifurcation;
 use chalumeau_core::measure::bifurcation::Transitions;
-use chalumeau_core::reed::ReedLaw;
 use chalumeau_core::score::breath::{BreathCurve, GAMMA_MAX};
-use chalumeau_core::units::{Air, SoundingNote, WrittenNote};
+use chalumeau_core::units::WrittenNote;
 use chalumeau_figure::bifurcation::Ramp;
 use clap::Args;
 
@@ -63,10 +60,10 @@ impl BifurcationCommand {
         let written = WrittenNote(self.written);
         let sounding = sounding(&file, written)?;
         let curve = BreathCurve::swell(self.to as f32, self.seconds);
-        let settings = self.settings.blown_by(&curve, &file)?;
+        let settings = self.settings.blown_by(None, &curve, &file)?;
         let mut table = self.table.open("direction,gamma,rms,shut")?;
         let plot = self.plot.open(self.table.force())?;
-        let threshold = linear_threshold(&file, written, sounding, &settings);
+        let threshold = linear_threshold(&file, written, &settings);
         let name = file.name.clone();
         let model = self.instrument.model(file, self.rate, settings.a4_hz)?;
         silent_keys(&[sounding], &model, settings.reach)
@@ -118,24 +115,6 @@ impl BifurcationCommand {
             .figure()
         })
     }
-}
-
-/// Gamma at which the linear theory lets the note begin; `None` where no impedance peak carries it.
-fn linear_threshold(
-    file: &InstrumentFile,
-    written: WrittenNote,
-    sounding: SoundingNote,
-    settings: &Settings,
-) -> Option<f64> {
-    // Flow strength of the reed as strength, lip and H, k, A make it: what the linear theory asks for.
-    let law = settings.reed_law();
-    let opening = law.a() * law.h() / ReedLaw::default().h();
-    let zeta = f64::from(settings.zeta) * opening / law.closing().sqrt();
-    let fingering = file.fingering(written)?;
-    let model = TransferMatrix::new(file, Air::at(f64::from(settings.temperature_c)));
-    let near_hz = sounding.frequency_hz(f64::from(settings.a4_hz));
-    let (_, height) = model.playing_frequency(&fingering.open, file.reed_volume_m3, near_hz)?;
-    (height > 0.0).then(|| threshold_gamma(height, zeta))
 }
 
 /// Gamma of every change of the note, for the comment in the table.

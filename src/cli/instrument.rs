@@ -20,6 +20,7 @@ const EXAMPLES: &str = "\
 Examples:
   chalumeau instrument import --bore bore.csv --holes holes.csv --fingerings chart.csv --name \"My clarinet\" --out my.toml
   chalumeau instrument check my.toml
+  chalumeau instrument show my.toml
   chalumeau instrument new --notes \"D3 E3 F3\" --diameter-mm 14.9 --out cylinder.toml
   chalumeau instrument new --scale 1.5 --transposition 9 --out alto.toml
   chalumeau render --instrument my.toml --written C4 --gamma 0.5 --seconds 1.5 --out c4.wav";
@@ -339,6 +340,9 @@ fn nearest_to_limit(limit: f64, fits: impl Fn(f64) -> bool) -> f64 {
 /// Columns: what,name,x_mm,length_mm,diameter_mm,end_diameter_mm,detail.
 #[derive(Args)]
 struct Show {
+    /// As --instrument
+    #[arg(value_name = "NAME|FILE", conflicts_with = "instrument")]
+    file: Option<PathBuf>,
     #[command(flatten)]
     instrument: InstrumentArg,
     #[command(flatten)]
@@ -357,7 +361,10 @@ fn below_what_is_written(transposition: i8) -> String {
 
 impl Show {
     fn run(&self) -> Result<(), Failure> {
-        let file = self.instrument.load()?;
+        let file = match &self.file {
+            Some(path) => InstrumentArg::named(path.clone()).load()?,
+            None => self.instrument.load()?,
+        };
         let mut table = self.table.open("what,name,x_mm,length_mm,diameter_mm,end_diameter_mm,detail")?;
         table.comment(format_args!("{}", file.name))?;
         table.comment(format_args!(

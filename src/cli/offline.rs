@@ -91,7 +91,8 @@ pub fn live(pairs: &Pairs, instrument: Option<InstrumentFile>) -> Result<RenderJ
 pub fn blown(pairs: &Pairs, instrument: InstrumentFile, gamma: f64) -> Result<RenderJob, String> {
     let args: LiveArgs = read(pairs)?;
     let said = |failure: crate::cli::Failure| failure.to_string();
-    let settings = args.settings.blown_by(&BreathCurve::constant(gamma as f32), &instrument).map_err(said)?;
+    let settings =
+        args.settings.blown_by(None, &BreathCurve::constant(gamma as f32), &instrument).map_err(said)?;
     let model = args.instrument.model(instrument, args.rate, settings.a4_hz).map_err(said)?;
     Ok(RenderJob::to_play_later(model, settings, args.rate))
 }

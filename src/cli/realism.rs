@@ -4,13 +4,17 @@ use crate::cli::Failure;
 use crate::cli::csv_table::{CsvTable, TableArgs};
 use crate::cli::plot_args::PlotArgs;
 use crate::cli::render::progress;
+use crate::cli::score_args::preset_called;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, within};
+use crate::cli::tune::named;
+use crate::presets::Preset;
 use chalumeau_core::analysis::noise_bands::{BANDS_HZ, noise_db};
 use chalumeau_core::analysis::partials::{Partial, Wander};
 use chalumeau_core::analysis::pitch;
 use chalumeau_core::analysis::spectrum::steady_segment;
 use chalumeau_core::analysis::steady_note::{RATE_HZ, SteadyNote};
+use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
@@ -69,6 +73,9 @@ pub struct RealismCommand {
     /// How often to play each note, 1..16: takes differ in breath noise and Life, as those of a player do
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=16))]
     takes: u8,
+    /// Play a preset; other flags and --set change it
+    #[arg(long, value_name = "NAME", value_parser = preset_called)]
+    preset: Option<Preset>,
     #[command(flatten)]
     instrument: PlayedArgs,
     #[command(flatten)]
@@ -93,12 +100,18 @@ struct Heard {
 
 impl RealismCommand {
     pub fn run(&self) -> Result<(), Failure> {
-        let file = self.instrument.load()?;
+        let file = self.instrument.load_for(self.preset.as_ref())?;
         let (breaths, mut settings, blown) = self.blown(&file)?;
         settings.gain_db -= HEADROOM_DB as f32;
         let mut table = self.table.open(&header())?;
         let plot = self.plot.open(self.table.force())?;
-        let name = file.name.clone();
+        let name = named(&file.name, self.preset.as_ref());
+        if file.transposition != Bundled::BFlat.file().transposition {
+            eprintln!(
+                "warning: the recordings are of a B flat clarinet; a note that {} does not have counts as failed",
+                file.name
+            );
+        }
         let model = self.instrument.model(file, RATE_HZ as u32, settings.a4_hz)?;
         let heard = self.play_all(&model, &settings, &breaths);
         let shelf = self.shelf.map_or_else(String::new, |shelf| {
@@ -109,7 +122,7 @@ impl RealismCommand {
                 "{name}; {blown} at pp, mf, ff; zeta {}, strength {}, breath noise {}{shelf}",
                 settings.zeta, settings.strength, settings.noise
             ),
-            "recordings: TinySOL (Cella, Ghisi, Lostanlen, Levy, Fineberg, Maresz 2020), CC BY 4.0, one take for each note"
+            "recordings of a B flat clarinet: TinySOL (Cella, Ghisi, Lostanlen, Levy, Fineberg, Maresz 2020), CC BY 4.0, one take for each note"
                 .to_owned(),
         ];
         for line in about.iter().chain(&summary(&heard)) {
@@ -150,15 +163,16 @@ fn three(flag: &str, given: &[f64], default: [f64; 3]) -> Result<[f64; 3], Failu
 impl RealismCommand {
     /// Values of a breath curve at pp, mf and ff, the settings under which they are played, and both in words.
     fn blown(&self, file: &InstrumentFile) -> Result<([f32; 3], Settings, String), Failure> {
+        let base = self.preset.as_ref().map(Preset::settings);
         if self.gamma.is_empty() {
             let dynamics = three("--dynamic", &self.dynamic, DYNAMICS)?;
-            let settings = self.settings.with_dynamics(None, file)?;
+            let settings = self.settings.with_dynamics(base.as_ref(), file)?;
             let breaths = dynamics.map(|dynamic| breath_of_dynamic(dynamic, &settings) as f32);
             return Ok((breaths, settings, format!("dynamic {}", words(&dynamics))));
         }
         let gammas = three("--gamma", &self.gamma, [0.42, 0.56, 0.78])?;
         let highest = gammas.into_iter().fold(0.0, f64::max);
-        let settings = self.settings.blown_by(&BreathCurve::constant(highest as f32), file)?;
+        let settings = self.settings.blown_by(base.as_ref(), &BreathCurve::constant(highest as f32), file)?;
         Ok((gammas.map(|gamma| gamma as f32), settings, format!("gamma {}", words(&gammas))))
     }
 

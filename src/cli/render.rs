@@ -17,6 +17,7 @@ use chalumeau_core::reed::physical::P_REF_PA;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::cell::RefCell;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -38,6 +39,10 @@ Examples:
       A player and a seat for each track.
   chalumeau render melody.mid --replay take.csv --out again.wav
   chalumeau render melody.mid --crescendo 0.4:0.9 --bits 16 --rate 44100 --out loud.wav";
+
+/// Endings of names for sound in other formats, and for what sound is made of.
+const NO_WAV: [&str; 13] =
+    ["aac", "aif", "aiff", "caf", "flac", "m4a", "mid", "midi", "mp3", "oga", "ogg", "opus", "wma"];
 
 /// A peak from here on was turned down: the limiter lets none past its ceiling, and hardly any by chance come as near.
 const LIMITED: f32 = 0.999 * CEILING;
@@ -119,7 +124,7 @@ impl RenderCommand {
         stand: &Stand,
         bar: impl FnOnce(usize) -> ProgressBar,
     ) -> Result<Rendered, Failure> {
-        self.refuse_same_file()?;
+        self.refuse_names()?;
         let prepared = self.play.prepare()?;
         let RenderJob { score, rate, .. } = &prepared;
         prepared.warn();
@@ -183,7 +188,14 @@ impl RenderCommand {
         Ok(Rendered { seconds: score.seconds(*rate), rate: *rate, channels, level, resets })
     }
 
-    fn refuse_same_file(&self) -> Result<(), Failure> {
+    /// Whether all that can be known without preparing the instrument is in order.
+    pub fn check(&self) -> Result<(), Failure> {
+        self.refuse_names()?;
+        self.play.check()
+    }
+
+    /// Refuses names of files that cannot be meant.
+    fn refuse_names(&self) -> Result<(), Failure> {
         let is = |path: &Path| path == Path::new("-");
         if is(&self.out) {
             let right = "give the name of a file, for example --out note.wav";
@@ -191,6 +203,14 @@ impl RenderCommand {
         }
         let written = [Some(&self.out), self.probe.as_ref()];
         written.into_iter().flatten().try_for_each(|path| self.play.refuse_to_replace(path))?;
+        let ending = self.out.extension().and_then(OsStr::to_str).unwrap_or_default().to_ascii_lowercase();
+        if NO_WAV.contains(&ending.as_str()) {
+            return Err(Failure::Usage(format!(
+                "{} would hold a WAV file, whatever its name says; give --out {}",
+                self.out.display(),
+                self.out.with_extension("wav").display()
+            )));
+        }
         if self.probe.as_ref().is_some_and(|probe| *probe == self.out) {
             return Err(Failure::Usage(format!(
                 "--out and --probe are both {}; give them different names",

@@ -6,6 +6,7 @@ use crate::cli::feel_args::FeelArgs;
 use crate::cli::render_job::RenderJob;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, check_fingering, dynamics, note, rate, sounding, within};
+use crate::cli::threshold::linear_threshold;
 use crate::controllers::{ControllerMap, as_links};
 use crate::presets::{self, Preset};
 use crate::scale_file;
@@ -17,7 +18,7 @@ use chalumeau_core::control::midi::links::{Link, MOST};
 use chalumeau_core::control::parts::Parts;
 use chalumeau_core::event::{Event, PartEvent, Timed};
 use chalumeau_core::haptics::FeelDesign;
-use chalumeau_core::instrument::{Model, Players, Reach, Settings, Split};
+use chalumeau_core::instrument::{BreathResponse, KeyPitches, Model, Players, Reach, Settings, Split};
 use chalumeau_core::score::Score;
 use chalumeau_core::score::breath::BreathCurve;
 use chalumeau_core::score::breath::GAMMA_MAX;
@@ -31,6 +32,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// A reed with inertia begins up to a fifth below the threshold of one without (`chalumeau threshold --help`).
+const INERTIA_LEAST: f64 = 0.8;
 
 /// Gamma where nothing else is said: a full, easy tone.
 const GAMMA_DEFAULT: f32 = 0.5;
@@ -156,17 +160,31 @@ fn trim(text: &str) -> Result<(u8, f64), String> {
 }
 
 /// Finds a preset.
-fn preset_called(name: &str) -> Result<Preset, String> {
+pub(super) fn preset_called(name: &str) -> Result<Preset, String> {
     presets::find(name, &presets::user()).cloned()
 }
 
+/// What is known before the instrument is prepared.
+struct Planned {
+    file: InstrumentFile,
+    settings: Settings,
+    parts: Score<PartEvent>,
+    /// Of another tuning.
+    keys: Option<KeyPitches>,
+    /// The trim of each note by its sounding pitch, cents.
+    trims: BTreeMap<u8, f64>,
+    take: Option<Take>,
+    warnings: Vec<String>,
+}
+
 impl ScoreArgs {
-    /// Reads and checks the arguments and prepares the instrument. Takes seconds for an instrument file.
-    pub fn prepare(&self) -> Result<RenderJob, Failure> {
-        let file = match &self.preset {
-            Some(preset) => self.instrument.load_for(preset)?,
-            None => self.instrument.load()?,
-        };
+    /// Reads and checks the arguments and all files that they name.
+    pub fn check(&self) -> Result<(), Failure> {
+        self.plan().map(|_| ())
+    }
+
+    fn plan(&self) -> Result<Planned, Failure> {
+        let file = self.instrument.load_for(self.preset.as_ref())?;
         let mut curve = self.curve()?;
         let base = self.preset.as_ref().map(Preset::settings);
         let map = self.controllers.clone().unwrap_or_default();
@@ -177,6 +195,10 @@ impl ScoreArgs {
             (None, None) => self.settings.played(&file)?,
         };
         map.values.iter().for_each(|(parameter, value)| parameter.set(&mut settings, *value));
+        let mut warnings = Vec::new();
+        if let Some(curve) = &curve {
+            warnings.extend(self.too_little_breath(curve, &settings, &file));
+        }
         if let Some((from, to)) = self.dynamic {
             curve = Some(BreathCurve::dynamics(from, to, &settings));
         }
@@ -185,17 +207,25 @@ impl ScoreArgs {
         if let Some(curve) = &curve {
             parts = parts.blown(curve, &settings, self.rate);
         }
+        let keys = self.scl.as_ref().map(|scl| scale_file::read(scl, self.kbm.as_deref())).transpose()?;
+        let take = self.replay.as_deref().map(read_take).transpose()?;
+        Ok(Planned { file, settings, parts, keys, trims, take, warnings })
+    }
+
+    /// Reads and checks the arguments and prepares the instrument. Takes seconds for an instrument file.
+    pub fn prepare(&self) -> Result<RenderJob, Failure> {
+        let Planned { file, settings, mut parts, keys, trims, take, mut warnings } = self.plan()?;
         let mut model = self.instrument.model(file, self.rate, settings.a4_hz)?;
-        if let Some(scl) = &self.scl {
-            Arc::make_mut(&mut model).keys = scale_file::read(scl, self.kbm.as_deref())?;
+        if let Some(keys) = keys {
+            Arc::make_mut(&mut model).keys = keys;
         }
         if !trims.is_empty() {
             let cents = |note: SoundingNote| trims.get(&note.0).copied().unwrap_or(0.0);
             let keys = model.keys.trimmed(cents);
             Arc::make_mut(&mut model).keys = keys;
         }
-        let warnings = silent_notes(&parts.events, &model, settings.reach);
-        if let Some(take) = &self.replay {
+        warnings.extend(silent_notes(&parts.events, &model, settings.reach));
+        if let Some(take) = &take {
             parts.events = self.replayed(take, &model, &settings, &parts)?;
         }
         // A single note lasts as long as was asked; a melody gets time to fade.
@@ -222,6 +252,34 @@ impl ScoreArgs {
             }
             false => Ok(()),
         }
+    }
+
+    /// Says which notes of the command line begin above all that a curve of gamma reaches.
+    fn too_little_breath(
+        &self,
+        curve: &BreathCurve,
+        settings: &Settings,
+        file: &InstrumentFile,
+    ) -> Option<String> {
+        let of_sounding = |note: u8| SoundingNote(note).written(file.transposition).map(|note| note.0);
+        let notes = match (self.scale, self.written.or_else(|| of_sounding(self.sounding?))) {
+            (Some((from, to)), _) => from.min(to)..=from.max(to),
+            (None, note) => note.map(|note| note..=note)?,
+        };
+        if settings.breath_response != BreathResponse::Physical {
+            return None;
+        }
+        let begin = |note| linear_threshold(file, WrittenNote(note), settings).map(|gamma| (note, gamma));
+        let reaches = f64::from(curve.gamma_max());
+        let mut late = notes.filter_map(begin).filter(|&(_, gamma)| reaches < INERTIA_LEAST * gamma);
+        let (note, gamma) = late.next()?;
+        let others = late.count();
+        let others = if others > 0 { format!(" (and {others} more)") } else { String::new() };
+        Some(format!(
+            "{}{others} begins to sound at gamma {gamma:.2}, and the breath reaches {}: only air is heard",
+            WrittenNote(note),
+            curve.gamma_max()
+        ))
     }
 
     /// The trim of each note by its sounding pitch, cents.
@@ -261,13 +319,11 @@ impl ScoreArgs {
     /// The events of a score with the breath of a take.
     fn replayed(
         &self,
-        path: &Path,
+        take: &Take,
         model: &Model,
         settings: &Settings,
         score: &Score<PartEvent>,
     ) -> Result<Vec<Timed<PartEvent>>, Failure> {
-        let from = fs::File::open(path).map_err(|source| Failure::Read { path: path.to_owned(), source })?;
-        let take = Take::read(from).map_err(|source| Failure::TakeFile { path: path.to_owned(), source })?;
         let feels = InstrumentFeel::new(model);
         let design = self.feel.design(&model.file)?;
         let table = feels.table(settings, &design, &NO_MOTOR)?;
@@ -385,6 +441,12 @@ impl ScoreArgs {
             _ => Err(Failure::Usage("after transposition this note is outside the range of MIDI".to_owned())),
         }
     }
+}
+
+/// Reads a recorded take.
+fn read_take(path: &Path) -> Result<Take, Failure> {
+    let from = fs::File::open(path).map_err(|source| Failure::Read { path: path.to_owned(), source })?;
+    Take::read(from).map_err(|source| Failure::TakeFile { path: path.to_owned(), source })
 }
 
 /// The score of notes. A key that comes up where another goes down comes up after it: a slur.

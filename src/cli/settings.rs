@@ -355,15 +355,21 @@ impl SettingsArgs {
         }
     }
 
-    /// For a curve of gamma: breath is a pressure, and full breath reaches the largest gamma. It is raised for it unless the
+    /// For a curve of gamma, also on a preset that is played: breath is a pressure, and full breath reaches the largest gamma. It is raised for it unless the
     /// user has chosen it. A reed given in millimetres is measured against the instrument's nominal bore.
-    pub fn blown_by(&self, curve: &BreathCurve, file: &InstrumentFile) -> Result<Settings, Failure> {
+    pub fn blown_by(
+        &self,
+        preset: Option<&Settings>,
+        curve: &BreathCurve,
+        file: &InstrumentFile,
+    ) -> Result<Settings, Failure> {
         if let Some((BreathResponse::Played, typed)) = self.response()? {
             return Err(Failure::Usage(format!(
                 "{typed}: this command blows with a pressure, gamma; leave {typed} out"
             )));
         }
-        self.reaching(curve, self.over(Settings::physical(), file)?)
+        let blown = |base: &Settings| Settings { breath_response: BreathResponse::Physical, ..*base };
+        self.reaching(curve, self.over(preset.map_or_else(Settings::physical, blown), file)?)
     }
 
     /// Settings whose full breath reaches the largest gamma of a curve.

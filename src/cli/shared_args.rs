@@ -31,6 +31,11 @@ pub struct InstrumentArg {
 }
 
 impl InstrumentArg {
+    /// As if it were given by its flag.
+    pub fn named(path: PathBuf) -> Self {
+        Self { instrument: Some(path), given: None }
+    }
+
     /// The file that may be read; a bundled instrument has none of this name.
     pub fn path(&self) -> Option<&PathBuf> {
         self.instrument.as_ref()
@@ -220,7 +225,8 @@ impl PlayedArgs {
     }
 
     /// Its measurements; those of the instrument of a preset if none was chosen.
-    pub fn load_for(&self, preset: &Preset) -> Result<InstrumentFile, Failure> {
+    pub fn load_for(&self, preset: Option<&Preset>) -> Result<InstrumentFile, Failure> {
+        let Some(preset) = preset else { return self.load() };
         if self.instrument.instrument.is_some() || self.instrument.given.is_some() {
             return self.load();
         }

@@ -4,9 +4,11 @@ use crate::cli::Failure;
 use crate::cli::csv_table::TableArgs;
 use crate::cli::plot_args::PlotArgs;
 use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within};
-use chalumeau_core::bore::transfer_matrix::TransferMatrix;
-use chalumeau_core::bore::transfer_matrix::threshold_gamma;
+use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::bore::transfer_matrix::{TransferMatrix, threshold_gamma};
 use chalumeau_core::instrument::Settings;
+use chalumeau_core::reed::ReedLaw;
+use chalumeau_core::units::{Air, WrittenNote};
 use chalumeau_figure::threshold::{self, Strength, Thresholds};
 use clap::Args;
 
@@ -102,4 +104,17 @@ impl ThresholdCommand {
             threshold::figure(&file.name, &embouchures, chosen, &reeds)
         })
     }
+}
+
+/// Gamma at which the linear theory lets the note begin; `None` where no impedance peak carries it.
+pub fn linear_threshold(file: &InstrumentFile, written: WrittenNote, settings: &Settings) -> Option<f64> {
+    // Flow strength of the reed as strength, lip and H, k, A make it: what the linear theory asks for.
+    let law = settings.reed_law();
+    let opening = law.a() * law.h() / ReedLaw::default().h();
+    let zeta = f64::from(settings.zeta) * opening / law.closing().sqrt();
+    let fingering = file.fingering(written)?;
+    let model = TransferMatrix::new(file, Air::at(f64::from(settings.temperature_c)));
+    let near_hz = written.sounding(file.transposition)?.frequency_hz(f64::from(settings.a4_hz));
+    let (_, height) = model.playing_frequency(&fingering.open, file.reed_volume_m3, near_hz)?;
+    (height > 0.0).then(|| threshold_gamma(height, zeta))
 }

@@ -4,9 +4,12 @@ use crate::cli::Failure;
 use crate::cli::csv_table::TableArgs;
 use crate::cli::plot_args::PlotArgs;
 use crate::cli::render::progress;
+use crate::cli::score_args::preset_called;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{NotesArg, PlayedArgs, dynamic, rate, within};
+use crate::presets::Preset;
 use chalumeau_core::analysis::pitch;
+use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
 use chalumeau_core::instrument::{Clarinet, Model, Settings, Tuning};
 use chalumeau_core::parallel;
@@ -34,6 +37,7 @@ Examples:
   chalumeau tune --rate 48000 --gamma 0.5
   chalumeau tune --gamma 0.8 --tempered --csv loud.csv
   chalumeau tune --dynamic pp --csv soft.csv
+  chalumeau tune --preset \"Big band lead\" --dynamic ff
   chalumeau tune --written G5 --strength 3.5
   chalumeau tune --gamma 0.7 --plot tune.png    natural and tempered, as a figure";
 
@@ -56,6 +60,9 @@ pub struct TuneCommand {
     /// Sample rate, Hz, 1000..1536000
     #[arg(long, alias = "sr", value_name = "HZ", default_value = "48000", value_parser = rate)]
     rate: u32,
+    /// Play a preset, at mezzo-forte unless --dynamic or --gamma is given; other flags and --set change it
+    #[arg(long, value_name = "NAME", value_parser = preset_called)]
+    preset: Option<Preset>,
     #[command(flatten)]
     instrument: PlayedArgs,
     #[command(flatten)]
@@ -68,18 +75,20 @@ pub struct TuneCommand {
 
 impl TuneCommand {
     pub fn run(&self) -> Result<(), Failure> {
-        let file = self.instrument.load()?;
+        let file = self.instrument.load_for(self.preset.as_ref())?;
+        let base = self.preset.as_ref().map(Preset::settings);
         let notes = self.notes.notes(&file)?;
-        let (curve, mut settings, blown) = match self.dynamic {
+        let of_preset = base.filter(|_| self.gamma.is_none()).map(|_| MEZZO_FORTE);
+        let (curve, mut settings, blown) = match self.dynamic.or(of_preset) {
             Some(dynamic) => {
-                let settings = self.settings.with_dynamics(None, &file)?;
+                let settings = self.settings.with_dynamics(base.as_ref(), &file)?;
                 let curve = BreathCurve::constant(breath_of_dynamic(dynamic, &settings) as f32);
                 (curve, settings, format!("dynamic {dynamic}"))
             }
             None => {
                 let gamma = self.gamma.unwrap_or(GAMMA_DEFAULT);
                 let curve = BreathCurve::constant(gamma as f32);
-                let settings = self.settings.blown_by(&curve, &file)?;
+                let settings = self.settings.blown_by(base.as_ref(), &curve, &file)?;
                 (curve, settings, format!("gamma {gamma}"))
             }
         };
@@ -87,7 +96,7 @@ impl TuneCommand {
             settings.noise = 0.0;
         }
         let rate = self.rate;
-        let name = file.name.clone();
+        let name = named(&file.name, self.preset.as_ref());
         let mut table = self.table.open("written_midi,f_hz,cents,register_ok")?;
         let plot = self.plot.open(self.table.force())?;
         table.comment(format_args!(
@@ -124,6 +133,11 @@ impl TuneCommand {
             tune::figure(&name, &note, &rounds)
         })
     }
+}
+
+/// An instrument and its preset, in words.
+pub fn named(instrument: &str, preset: Option<&Preset>) -> String {
+    preset.map_or_else(|| instrument.to_owned(), |preset| format!("{instrument}, {}", preset.name))
 }
 
 /// One round for the figure.

@@ -12,6 +12,8 @@ use crate::editor::theme::Colours;
 const FLOOR_DB: f32 = -48.0;
 /// Width of the meter and of a lamp, points, with words and where there is no room for them.
 const METER: [f32; 2] = [72.0, 44.0];
+/// Width of the meter's word, points.
+const METER_WORD: f32 = 46.0;
 const LAMP: [f32; 2] = [54.0, 12.0];
 /// Time for which the highest output stays marked, s.
 const HOLD_S: f64 = 1.5;
@@ -29,7 +31,7 @@ struct Held {
 pub fn draw(ui: &mut Ui, snapshot: &Snapshot, is_wide: bool) {
     let c = Colours::here(ui);
     let narrow = usize::from(!is_wide);
-    meter(ui, snapshot.output_peak, METER[narrow]);
+    meter(ui, snapshot.output_peak, METER[narrow], is_wide);
     let source = snapshot.sources.iter().find(|source| source.is_live);
     let source = source.map_or_else(|| "keys".to_owned(), |source| source.name.clone());
     let blows = snapshot.mouth_kpa > NO_BREATH_KPA;
@@ -68,9 +70,13 @@ fn lamp(ui: &mut Ui, width: f32, word: &str, light: Option<Color32>, said: [&str
     response.on_hover_text(about);
 }
 
-fn meter(ui: &mut Ui, peak: f32, width: f32) {
+fn meter(ui: &mut Ui, peak: f32, width: f32, has_word: bool) {
     let c = Colours::here(ui);
-    let (rect, response) = ui.allocate_exact_size(vec2(width, 16.0), Sense::hover());
+    let word = if has_word { METER_WORD } else { 0.0 };
+    let (rect, response) = ui.allocate_exact_size(vec2(word + width, 16.0), Sense::hover());
+    if has_word {
+        ui.painter().text(rect.left_center(), Align2::LEFT_CENTER, "Output", theme::small(), c.quiet);
+    }
     let db = 20.0 * peak.max(1e-6).log10();
     let now_s = ui.input(|input| input.time);
     let held = ui.data_mut(|data| {
@@ -80,7 +86,7 @@ fn meter(ui: &mut Ui, peak: f32, width: f32) {
         }
         *held
     });
-    let track = Rect::from_center_size(rect.center(), vec2(rect.width(), 6.0));
+    let track = Rect::from_center_size(rect.right_center() - vec2(0.5 * width, 0.0), vec2(width, 6.0));
     let x = |db: f32| track.left() + track.width() * ((db - FLOOR_DB) / -FLOOR_DB).clamp(0.0, 1.0);
     let round = CornerRadius::same(2);
     let painter = ui.painter();

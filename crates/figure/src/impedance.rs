@@ -149,6 +149,9 @@ pub struct NotePeaks {
     pub peaks: Vec<Peak>,
 }
 
+/// Most peaks that the legend of a chart names one by one; of more, it names the first and the last.
+const MOST_NAMED: usize = 8;
+
 /// Peaks of all notes: where they are, how far the one that sounds is from its note, and how high it is.
 pub fn chart(instrument: &str, notes: Vec<String>, rows: &[NotePeaks]) -> Figure {
     let mut figure = Figure::new("Impedance peaks of every fingering").note(instrument);
@@ -169,7 +172,8 @@ pub fn chart(instrument: &str, notes: Vec<String>, rows: &[NotePeaks]) -> Figure
     }
     for mode in 0..count {
         let points = rows.iter().filter_map(|row| Some((x(row), row.peaks.get(mode)?.f_hz)));
-        let name = if mode == 0 || mode + 1 == count { format!("peak {}", mode + 1) } else { String::new() };
+        let is_named = count <= MOST_NAMED || mode == 0 || mode + 1 == count;
+        let name = if is_named { format!("peak {}", mode + 1) } else { String::new() };
         places = places.with(Points::new(name, points).colour(Colour::of_family(mode, count)).size(3.5));
     }
     let own = |row: &NotePeaks| row.peaks.get(row.mode.checked_sub(1)?).cloned();

@@ -196,7 +196,9 @@ impl<'a> Body<'a> {
 
     /// The sound pressure over the body, higher and lighter when it is loud.
     fn wave(&self, painter: &Painter, c: &Colours, wave: &[(f32, f32)], rect: Rect, loudness: f32) {
-        let foot = self.axis - self.outside(0.5 * self.length_m) - 18.0;
+        // Straight, so that only pressure bends the line: above the keys and above the bell.
+        let body = self.outside(0.5 * self.length_m) + 18.0;
+        let foot = self.axis - body.max(self.across * self.widest_m as f32 + 4.0);
         let room = foot - rect.top() - 16.0;
         if wave.len() < 2 || room < 20.0 || loudness <= 0.0 {
             return;
@@ -204,18 +206,14 @@ impl<'a> Body<'a> {
         let most =
             wave.iter().map(|&(_, magnitude)| magnitude).filter(|m| m.is_finite()).fold(1e-6, f32::max);
         let height = room * (0.25 + 0.75 * loudness);
-        // Over the bell the line rises with it.
-        let lifted = |x_m: f32| self.outside(f64::from(x_m)) - self.outside(0.5 * self.length_m);
-        let floor = |x_m: f32| foot - lifted(x_m).max(0.0);
         let share = |magnitude: f32| chart::share(magnitude / most);
-        let point = |&(x_m, magnitude): &(f32, f32)| {
-            pos2(self.x(f64::from(x_m)), (floor(x_m) - share(magnitude) * height).max(rect.top() + 8.0))
-        };
+        let point =
+            |&(x_m, magnitude): &(f32, f32)| pos2(self.x(f64::from(x_m)), foot - share(magnitude) * height);
         let mut mesh = Mesh::default();
         for (index, of) in wave.iter().enumerate() {
             let at = point(of);
             mesh.colored_vertex(at, c.breath.gamma_multiply(0.42 * loudness * share(of.1)));
-            mesh.colored_vertex(pos2(at.x, floor(of.0)), c.breath.gamma_multiply(0.05 * share(of.1)));
+            mesh.colored_vertex(pos2(at.x, foot), c.breath.gamma_multiply(0.05 * share(of.1)));
             if index > 0 {
                 let n = 2 * index as u32;
                 mesh.add_triangle(n - 2, n - 1, n);
@@ -223,6 +221,8 @@ impl<'a> Body<'a> {
             }
         }
         painter.add(mesh);
+        let ends = self.x(0.0)..=self.x(self.length_m);
+        painter.hline(ends, foot, Stroke::new(1.0, c.breath.gamma_multiply(0.3)));
         painter.add(Shape::line(wave.iter().map(point).collect(), Stroke::new(2.0, c.breath)));
         if room > 60.0 {
             let at = rect.left_top() + vec2(self.left - rect.left() + 2.0, 2.0);
