@@ -213,7 +213,8 @@ pub struct PlayedArgs {
     /// Resolution of the lattice
     #[arg(long, value_enum, default_value_t = QualityArg::Live)]
     quality: QualityArg,
-    /// Play an instrument file as measured; tuning it takes up to a minute the first time
+    /// Play the bore as it is built: otherwise a small delay for each note corrects its pitch. Finding the delays of an
+    /// instrument file takes up to a minute the first time
     #[arg(long)]
     untuned: bool,
 }
@@ -239,10 +240,20 @@ impl PlayedArgs {
         self.instrument.load_or(usual)
     }
 
+    /// Whether it plays as it is built, without the tuning of its notes.
+    pub fn is_as_built(&self) -> bool {
+        self.untuned
+    }
+
+    /// The instrument as it is built.
+    pub fn as_built(&self, file: &InstrumentFile, host_rate_hz: u32) -> Result<Arc<Model>, Failure> {
+        self.instrument.bore(file, host_rate_hz, self.quality)
+    }
+
     /// The instrument ready to play, tuned unless that was not wanted.
     pub fn model(&self, file: InstrumentFile, host_rate_hz: u32, a4_hz: f32) -> Result<Arc<Model>, Failure> {
         if self.untuned {
-            return self.instrument.bore(&file, host_rate_hz, self.quality);
+            return self.as_built(&file, host_rate_hz);
         }
         let (a4_hz, quality) = (f64::from(a4_hz), self.quality.into());
         self.instrument.tuned(&Wanted { a4_hz, quality, ..Wanted::new(file, f64::from(host_rate_hz)) })

@@ -25,8 +25,19 @@ pub enum TunedNote {
 /// Band called in tune, cents: about what a listener notices in a melody (by judgement).
 const IN_TUNE_CENTS: f64 = 5.0;
 
-/// Cents over notes for each round; notes in another register or silent stand at the lower edge.
-pub fn figure(instrument: &str, note: &str, rounds: &[Round]) -> Figure {
+/// Cents over notes: the rounds in one panel, if there are any, and in another what the bore does without its notes being
+/// tuned. Notes in another register or silent stand at the lower edge.
+pub fn figure(instrument: &str, note: &str, rounds: &[Round], as_built: &Round) -> Figure {
+    let mut figure = Figure::new(format!("Intonation: {instrument}")).note(note);
+    if !rounds.is_empty() {
+        let what = "As played: natural drifts with the breath as the bore does, tempered is held in tune";
+        figure = figure.panel(panel(what, rounds));
+    }
+    let what = "As built: what bore and reed do before each note is corrected";
+    figure.panel(panel(what, std::slice::from_ref(as_built)))
+}
+
+fn panel(title: &str, rounds: &[Round]) -> Panel {
     let own = rounds.iter().flat_map(|round| &round.notes).filter_map(|(_, heard)| match heard {
         TunedNote::Own(cents) => Some(*cents),
         _ => None,
@@ -39,7 +50,7 @@ pub fn figure(instrument: &str, note: &str, rounds: &[Round]) -> Figure {
     let rows = rounds.len() as f64;
     let edge = low - if failed { rows * room } else { room };
     let mut panel = Panel::new(
-        "",
+        title,
         Axis::notes("written note"),
         Axis::linear("cents from equal temperament")
             .range(edge - if failed { room } else { 0.0 }, high + room),
@@ -82,7 +93,7 @@ pub fn figure(instrument: &str, note: &str, rounds: &[Round]) -> Figure {
             panel = panel.with(Points::new(name, silent).colour(colour).shape(Shape::Ring).size(8.0));
         }
     }
-    Figure::new(format!("Intonation: {instrument}")).note(note).panel(panel)
+    panel
 }
 
 #[cfg(test)]
@@ -98,7 +109,10 @@ mod tests {
             (62, TunedNote::Silence),
             (63, TunedNote::Own(-2.0)),
         ];
-        let figure = figure("test", "", &[Round { name: "natural".to_owned(), notes }]);
+        let round = || Round { name: "natural".to_owned(), notes: notes.clone() };
+        assert_eq!(figure("test", "", &[], &round()).panels.len(), 1);
+        let figure = figure("test", "", &[round()], &round());
+        assert_eq!(figure.panels.len(), 2);
         let panel = &figure.panels[0];
         let [low, high] = panel.y.range.unwrap();
         assert!((-9.0..-6.0).contains(&low) && high < 9.0, "{low} {high}");
