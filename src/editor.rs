@@ -3,7 +3,7 @@
 //! in sight; one view is in the middle. The first view, *Play*, has a meter of its own. A musician sees the views that make music,
 //! a laboratory all of them. It reads [`Snapshot`] and [`Controls`], changes parameters through [`Controls`], and
 //! returns everything else that the user did as [`Action`]s. It knows no voice, no link to the knob and no host, it never
-//! blocks, and it asks for no repaint. The design size is 1100 by 720 points, the least usable size 700 by 480. The owner
+//! blocks. It asks for a repaint only while something moves by itself. The design size is 1100 by 720 points, the least usable size 700 by 480. The owner
 //! of the window applies the zoom.
 
 pub mod ab_comparison;
@@ -41,6 +41,7 @@ pub mod sound_analysis;
 mod sound_view;
 pub mod terms;
 pub mod theme;
+mod trial;
 pub mod undo;
 mod widgets;
 
@@ -68,6 +69,7 @@ use file_browser::FileBrowser;
 use fingering_search::FingeringQuestion;
 use keyboard::Keyboard;
 use preset_browser::PresetBrowser;
+use trial::Trial;
 use undo::UndoHistory;
 
 use crate::presets::Preset;
@@ -285,6 +287,7 @@ pub struct EditorState {
     presets: PresetBrowser,
     reed: reed_view::ReedView,
     clarinet: clarinet_view::ClarinetView,
+    trial: Trial,
     breath: breath_view::BreathView,
     play: play_view::PlayView,
     knob: knob_view::KnobView,
@@ -316,8 +319,7 @@ impl EditorState {
         hands.let_go();
         self.keyboard.release(&mut actions);
         self.knob.end_test(&mut actions);
-        self.clarinet.end_try(&mut actions);
-        self.play.end_try(&mut actions);
+        self.trial.end(&mut actions);
         self.entry = None;
         actions
     }
@@ -359,6 +361,7 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
         presets,
         reed,
         clarinet,
+        trial,
         breath,
         play,
         knob,
@@ -378,6 +381,7 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
         knob_view::stop(&mut hands, &mut actions);
     }
     breath.look(&snapshot.sources);
+    trial.keep_to(snapshot, &mut actions);
     let has_knob = snapshot.knob.is_live || !snapshot.knob.devices.is_empty() || hands.step("knob") > 0;
 
     let ground = |x: i8, y: i8| Frame::new().fill(c.ground).inner_margin(Margin::symmetric(x, y));
@@ -416,9 +420,9 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
             return;
         }
         match tab {
-            Tab::Play => play.draw(ui, &mut hands, snapshot, clarinet.alterations(), &mut actions),
+            Tab::Play => play.draw(ui, &mut hands, snapshot, trial, clarinet.alterations(), &mut actions),
             Tab::Reed => reed.draw(ui, &mut hands, snapshot),
-            Tab::Clarinet => clarinet.draw(ui, kept.names, snapshot, &mut actions),
+            Tab::Clarinet => clarinet.draw(ui, kept.names, snapshot, trial, &mut actions),
             Tab::Breath => breath.draw(ui, &mut hands, snapshot),
             Tab::Sound => sound_view::draw(ui, &mut hands, snapshot),
             Tab::Knob => knob.draw(ui, &mut hands, snapshot, &mut actions),

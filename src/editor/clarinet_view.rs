@@ -25,6 +25,7 @@ use crate::editor::note_names::{NoteNames, note_name};
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP, panel};
+use crate::editor::trial::Trial;
 use chalumeau_core::bore::alternate_fingerings::{self, FingeringChoice};
 use chalumeau_core::bore::instrument_file::{HoleKind, InstrumentFile, REGISTERS, ToneHole};
 use fingering_panel::{Chosen, FingeringPanel};
@@ -35,8 +36,6 @@ const NAMED: f32 = 38.0;
 /// What the view remembers.
 #[derive(Clone, Debug, Default)]
 pub struct ClarinetView {
-    /// The holes of a trial, which replace the played fingering.
-    tried: Option<Vec<bool>>,
     /// The choices of the picker, and the instrument they belong to.
     known: Option<(Arc<InstrumentFile>, Arc<Vec<FingeringChoice>>)>,
     alterations: AlterationEditor,
@@ -49,20 +48,16 @@ impl ClarinetView {
         &mut self.alterations
     }
 
-    /// Ends a trial.
-    pub fn end_try(&mut self, actions: &mut Vec<Action>) {
-        if self.tried.take().is_some() {
-            actions.push(Action::EndTry);
-        }
-    }
-
     /// Draws the view.
-    pub fn draw(&mut self, ui: &mut Ui, names: NoteNames, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    pub fn draw(
+        &mut self,
+        ui: &mut Ui,
+        names: NoteNames,
+        snapshot: &Snapshot,
+        trial: &mut Trial,
+        actions: &mut Vec<Action>,
+    ) {
         let c = Colours::here(ui);
-        let file = &*snapshot.instrument;
-        if self.tried.as_ref().is_some_and(|tried| tried.len() != file.holes.len()) {
-            self.end_try(actions);
-        }
         let height = ui.available_height();
         // A list is worth more room than buttons.
         let most = if self.search.is_open() { 320.0 } else { 184.0 };
@@ -71,24 +66,24 @@ impl ClarinetView {
         panel(c).show(ui, |ui| {
             ui.set_width(ui.available_width());
             ui.set_height((height - picker - GAP - 44.0).max(150.0));
-            self.picture(ui, snapshot, actions);
+            self.picture(ui, snapshot, trial, actions);
         });
         panel(c).show(ui, |ui| {
             ui.set_width(ui.available_width());
             ui.set_height(ui.available_height());
             if self.alterations.is_open() || !self.search.is_open() {
-                self.picker(ui, names, snapshot, actions);
+                self.picker(ui, names, snapshot, trial, actions);
                 return;
             }
-            match self.search.draw(ui, names, snapshot, self.tried.as_deref(), actions) {
-                Some(Chosen::Try(open)) => self.try_holes(open, actions),
-                Some(Chosen::EndTry) => self.end_try(actions),
+            match self.search.draw(ui, names, snapshot, trial.open(), actions) {
+                Some(Chosen::Try(open)) => trial.set(open, actions),
+                Some(Chosen::EndTry) => trial.end(actions),
                 None => {}
             }
         });
     }
 
-    fn picture(&mut self, ui: &mut Ui, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    fn picture(&mut self, ui: &mut Ui, snapshot: &Snapshot, trial: &mut Trial, actions: &mut Vec<Action>) {
         let c = Colours::here(ui);
         let file = &*AlterationEditor::shown(snapshot);
         let area = ui.available_rect_before_wrap();
@@ -110,7 +105,7 @@ impl ClarinetView {
         self.joints(ui, &body, snapshot, actions);
         let buttons = hole_buttons(area, file.holes.len());
         for (hole, tone_hole) in file.holes.iter().enumerate() {
-            let opening = match &self.tried {
+            let opening = match trial.open() {
                 Some(tried) => f32::from(tried[hole]),
                 None => chart::share(snapshot.openings.get(hole).copied().unwrap_or(0.0)),
             };
@@ -137,7 +132,7 @@ impl ClarinetView {
             leader(&painter, c, at.foot, buttons[hole], is_hot, opening);
             body.paint_hole(&painter, c, tone_hole, opening, is_hot);
             if response.clicked() || on_bore.clicked() {
-                self.toggle(hole, snapshot, actions);
+                trial.toggle(hole, snapshot, actions);
             }
             for response in [response, on_bore.on_hover_cursor(CursorIcon::PointingHand)] {
                 response.on_hover_ui(|ui| about(ui, tone_hole, opening));
@@ -174,30 +169,18 @@ impl ClarinetView {
         }
     }
 
-    fn toggle(&mut self, hole: usize, snapshot: &Snapshot, actions: &mut Vec<Action>) {
-        let holes = snapshot.instrument.holes.len();
-        let now = || {
-            (0..holes)
-                .map(|hole| snapshot.openings.get(hole).is_some_and(|&opening| opening >= 0.5))
-                .collect()
-        };
-        let mut tried: Vec<bool> = self.tried.take().unwrap_or_else(now);
-        if let Some(open) = tried.get_mut(hole) {
-            *open = !*open;
-        }
-        self.try_holes(tried, actions);
-    }
-
-    fn try_holes(&mut self, open: Vec<bool>, actions: &mut Vec<Action>) {
-        actions.push(Action::TryFingering(open.clone()));
-        self.tried = Some(open);
-    }
-
-    fn picker(&mut self, ui: &mut Ui, names: NoteNames, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    fn picker(
+        &mut self,
+        ui: &mut Ui,
+        names: NoteNames,
+        snapshot: &Snapshot,
+        trial: &mut Trial,
+        actions: &mut Vec<Action>,
+    ) {
         let c = Colours::here(ui);
         let all = self.choices(&snapshot.instrument);
-        let shown = match &self.tried {
-            Some(tried) => all.iter().position(|choice| choice.open == *tried),
+        let shown = match trial.open() {
+            Some(tried) => all.iter().position(|choice| choice.open == tried),
             None => snapshot
                 .fingering()
                 .and_then(|fingering| all.iter().position(|choice| choice.open == fingering.open)),
@@ -229,7 +212,7 @@ impl ClarinetView {
                 }
                 None => "your own fingering".into(),
             };
-            self.fingering_line(ui, told, snapshot, actions);
+            self.fingering_line(ui, told, snapshot, trial, actions);
         }
         egui::ScrollArea::vertical().id_salt("picker").auto_shrink([false, false]).show(ui, |ui| {
             // Four registers in the least window, and multiphonics below them where there is more room.
@@ -263,7 +246,7 @@ impl ClarinetView {
                             format!("{name}{alternate}: {}", choice.fingers)
                         };
                         if response.on_hover_text(told).clicked() {
-                            self.try_holes(choice.open.clone(), actions);
+                            trial.set(choice.open.clone(), actions);
                         }
                     }
                 });
@@ -272,17 +255,24 @@ impl ClarinetView {
     }
 
     /// What is fingered, and the ways to something else.
-    fn fingering_line(&mut self, ui: &mut Ui, told: String, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    fn fingering_line(
+        &mut self,
+        ui: &mut Ui,
+        told: String,
+        snapshot: &Snapshot,
+        trial: &mut Trial,
+        actions: &mut Vec<Action>,
+    ) {
         let c = Colours::here(ui);
         ui.horizontal(|ui| {
             ui.set_height(22.0);
-            if self.tried.is_some() {
+            if trial.is_on() {
                 if ui
                     .button("Back to the note")
                     .on_hover_text("Ends the trial; the played note sets the holes again")
                     .clicked()
                 {
-                    self.end_try(actions);
+                    trial.end(actions);
                 }
                 ui.colored_label(c.beats, "trying");
             }

@@ -10,10 +10,10 @@ use crate::editor::chart;
 use crate::editor::chart::Chart;
 use crate::editor::controls::{Hands, choice, heading, momentary, segments, slider, switch, teach};
 use crate::editor::feel_test::FeelTest;
-use crate::editor::reed_view::torque_picture;
+use crate::editor::reed_view::{framed, torque_picture};
 use crate::editor::snapshot::{KnobDevice, Snapshot};
 use crate::editor::theme;
-use crate::editor::theme::{Colours, GAP, panel};
+use crate::editor::theme::{Colours, GAP};
 use chalumeau_core::haptics::torque_law;
 use chalumeau_core::reed::ReedTables;
 
@@ -63,8 +63,8 @@ impl KnobView {
         let top = (0.44 * height).clamp(126.0, 250.0);
         ui.horizontal_top(|ui| {
             ui.spacing_mut().item_spacing = vec2(GAP, 4.0);
-            group(ui, c, vec2(0.56 * width - 0.5 * GAP, top), |ui| devices(ui, hands, snapshot, actions));
-            group(ui, c, vec2(0.44 * width - 0.5 * GAP, top), |ui| arming(ui, hands, snapshot, actions));
+            framed(ui, c, vec2(0.56 * width - 0.5 * GAP, top), |ui| devices(ui, hands, snapshot, actions));
+            framed(ui, c, vec2(0.44 * width - 0.5 * GAP, top), |ui| arming(ui, hands, snapshot, actions));
         });
         let names: Vec<String> = PAGES.iter().map(|(_, name)| (*name).to_owned()).collect();
         let mut page = PAGES.iter().position(|(page, _)| *page == self.page).unwrap_or(0);
@@ -75,7 +75,7 @@ impl KnobView {
             self.page = page;
         }
         let rest = vec2(width, ui.available_height());
-        group(ui, c, rest, |ui| match self.page {
+        framed(ui, c, rest, |ui| match self.page {
             Page::Play => torque_picture(ui, snapshot),
             Page::Try => self.tests(ui, snapshot, actions),
             Page::Study => line(ui, snapshot),
@@ -148,16 +148,6 @@ impl KnobView {
             }
         });
     }
-}
-
-fn group(ui: &mut Ui, c: &Colours, size: egui::Vec2, draw: impl FnOnce(&mut Ui)) {
-    let frame = panel(c);
-    let inner = size - frame.total_margin().sum();
-    frame.show(ui, |ui| {
-        ui.set_min_size(inner);
-        ui.set_max_size(inner);
-        ui.vertical(draw);
-    });
 }
 
 fn devices(ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot, actions: &mut Vec<Action>) {

@@ -19,6 +19,7 @@ use crate::editor::controls::Hands;
 use crate::editor::snapshot::Snapshot;
 use crate::editor::theme;
 use crate::editor::theme::{Colours, GAP};
+use crate::editor::trial::Trial;
 use macro_knob::Macro;
 use motion::Motion;
 
@@ -43,32 +44,21 @@ const MACRO_WIDTH: f32 = 92.0;
 #[derive(Clone, Debug, Default)]
 pub struct PlayView {
     motion: Motion,
-    /// The holes of a trial, which replace the played fingering.
-    tried: Option<Vec<bool>>,
 }
 
 impl PlayView {
-    /// Ends a trial.
-    pub fn end_try(&mut self, actions: &mut Vec<Action>) {
-        if self.tried.take().is_some() {
-            actions.push(Action::EndTry);
-        }
-    }
-
     /// Draws the view.
     pub fn draw(
         &mut self,
         ui: &mut Ui,
         hands: &mut Hands,
         snapshot: &Snapshot,
+        trial: &mut Trial,
         alterations: &mut AlterationEditor,
         actions: &mut Vec<Action>,
     ) {
         let c = Colours::here(ui);
-        if self.tried.as_ref().is_some_and(|tried| tried.len() != snapshot.instrument.holes.len()) {
-            self.end_try(actions);
-        }
-        self.motion.follow(ui, snapshot, self.tried.as_deref());
+        self.motion.follow(ui, snapshot, trial.open());
         let height = ui.available_height();
         let is_small = height < 420.0;
         let clear = Frame::new().inner_margin(Margin::ZERO);
@@ -103,7 +93,7 @@ impl PlayView {
             stage::ground(ui, rect);
             let clicked = stage::draw(ui, rect, snapshot, &self.motion, alterations, actions);
             if let Some(hole) = clicked {
-                self.toggle(hole, snapshot, actions);
+                trial.toggle(hole, snapshot, actions);
             }
             if alterations.has_changes(snapshot) {
                 let place = Rect::from_min_max(
@@ -115,11 +105,11 @@ impl PlayView {
                     alterations.files_and_undo(ui, snapshot, actions);
                 });
             }
-            if self.tried.is_some() {
+            if trial.is_on() {
                 let place = Rect::from_min_size(rect.left_top() + vec2(12.0, 8.0), vec2(180.0, 26.0));
                 let back = ui.put(place, egui::Button::new("Back to the note"));
                 if back.on_hover_text("Ends the trial; the played note sets the holes again").clicked() {
-                    self.end_try(actions);
+                    trial.end(actions);
                 }
             } else if snapshot.sounding.is_none() {
                 let at = rect.center_bottom() - vec2(0.0, 10.0);
@@ -127,17 +117,6 @@ impl PlayView {
                 ui.painter().text(at, egui::Align2::CENTER_BOTTOM, text, theme::body(), c.quiet);
             }
         });
-    }
-
-    /// Opens or closes a hole for a trial.
-    fn toggle(&mut self, hole: usize, snapshot: &Snapshot, actions: &mut Vec<Action>) {
-        let played = || snapshot.openings.iter().map(|&opening| opening >= 0.5).collect();
-        let mut open = self.tried.take().unwrap_or_else(played);
-        if let Some(is_open) = open.get_mut(hole) {
-            *is_open = !*is_open;
-            actions.push(Action::TryFingering(open.clone()));
-            self.tried = Some(open);
-        }
     }
 }
 

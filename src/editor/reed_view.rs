@@ -325,7 +325,7 @@ fn orbit(plot: &mut PlotUi<'_>, snapshot: &Snapshot, period: std::ops::Range<usi
 }
 
 /// A group of its own size.
-fn framed(ui: &mut Ui, c: &Colours, size: egui::Vec2, draw: impl FnOnce(&mut Ui)) {
+pub fn framed(ui: &mut Ui, c: &Colours, size: egui::Vec2, draw: impl FnOnce(&mut Ui)) {
     let frame = panel(c);
     let inner = size - frame.total_margin().sum();
     frame.show(ui, |ui| {

@@ -40,7 +40,8 @@ pub fn slider(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
     );
     let mut value = look.value;
     if !is_typing {
-        value = moved_by_pointer(ui, hands, id, &look, &response, track.width()).unwrap_or(value);
+        let share = response.drag_delta().x / track.width();
+        value = moved_by_pointer(ui, hands, id, &look, &response, share).unwrap_or(value);
         if response.has_focus() {
             value = KEYS.moved(ui, hands, id, &look, &response).unwrap_or(value);
         }
@@ -103,27 +104,32 @@ fn pressed_enter(input: &egui::InputState) -> bool {
     input.key_pressed(Key::Enter)
 }
 
-fn moved_by_pointer(
+/// Follows a drag. `share` is how much of the range the pointer has moved by in this frame. Returns the new value, if the drag
+/// has set one.
+pub fn moved_by_pointer(
     ui: &Ui,
     hands: &mut Hands,
     id: &'static str,
     look: &Look,
     response: &Response,
-    width: f32,
+    share: f32,
 ) -> Option<f32> {
-    // Where the hand would be on a track without steps: else a stepped slider never leaves its step.
+    // Where the hand would be on a control without steps: else a stepped one never leaves its step.
     let exact = response.id.with("exact");
     if response.drag_started() {
         hands.begin(id);
         ui.data_mut(|data| data.insert_temp(exact, look.value));
     }
     let mut value = None;
-    if response.dragged() && response.drag_delta().x != 0.0 {
+    if response.dragged() && share != 0.0 {
         let fine = if ui.input(|i| i.modifiers.shift) { 0.1 } else { 1.0 };
         let from = ui.data(|data| data.get_temp::<f32>(exact)).unwrap_or(look.value);
-        let to = (from + fine * response.drag_delta().x / width).clamp(0.0, 1.0);
+        let to = (from + fine * share).clamp(0.0, 1.0);
         ui.data_mut(|data| data.insert_temp(exact, to));
-        let to = stepped(look, to);
+        let to = match look.steps {
+            Some(steps) if steps > 0 => (to * steps as f32).round() / steps as f32,
+            _ => to,
+        };
         hands.set(id, to);
         value = Some(to);
     }
@@ -131,13 +137,6 @@ fn moved_by_pointer(
         hands.end(id);
     }
     value
-}
-
-fn stepped(look: &Look, value: f32) -> f32 {
-    match look.steps {
-        Some(steps) if steps > 0 => (value * steps as f32).round() / steps as f32,
-        _ => value,
-    }
 }
 
 /// Paints it; returns where its name and marks end.

@@ -8,7 +8,7 @@ const KEPT: usize = 200;
 /// One parameter in a step, normalised.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
-    /// A test.
+    /// Of the parameter.
     pub id: &'static str,
     /// Before the gesture.
     pub before: f32,

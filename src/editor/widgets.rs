@@ -132,8 +132,8 @@ pub fn switch(ui: &mut Ui, hands: &mut Hands, id: &'static str) -> Option<Respon
     Some(response.on_hover_ui(|ui| teach(ui, id, "Click: on, off.")))
 }
 
-/// A switch that belongs to no parameter.
-pub fn toggle(ui: &mut Ui, name: &str, is_on: bool) -> Response {
+/// Draws a switch.
+fn toggle(ui: &mut Ui, name: &str, is_on: bool) -> Response {
     let c = Colours::here(ui);
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 24.0), Sense::click());
     let painter = ui.painter();

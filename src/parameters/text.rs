@@ -48,6 +48,11 @@ impl Whole {
         value.to_string()
     }
 
+    /// Whether a number lies inside the range.
+    fn contains(&self, value: f64) -> bool {
+        (f64::from(self.min)..=f64::from(self.max)).contains(&value)
+    }
+
     /// Reads a whole number with or without its unit; `5.0` is one, `5.5` is none. What lies outside the range becomes its
     /// end.
     pub fn parse(&self, text: &str) -> Option<i32> {
@@ -134,7 +139,7 @@ impl Parameter {
         }
     }
 
-    /// Reads a value inside the range, as a host's text entry does, or says what would be right.
+    /// Reads a value, or says what would be right. Stricter than a host's text entry: a number outside the range is refused.
     pub fn read(&self, text: &str) -> Result<Value, String> {
         let Self { id, name, .. } = self;
         match self.kind {
@@ -151,8 +156,8 @@ impl Parameter {
                 .parse(text)
                 .map(Value::Switch)
                 .ok_or_else(|| format!("{id} ({name}) must be one of {}, got {text:?}", self.range())),
-            Kind::Whole(whole) => match bare_number(text, whole.unit).parse::<i32>() {
-                Ok(value) if (whole.min..=whole.max).contains(&value) => Ok(Value::Whole(value)),
+            Kind::Whole(whole) => match bare_number(text, whole.unit).parse::<f64>() {
+                Ok(value) if value.fract() == 0.0 && whole.contains(value) => Ok(Value::Whole(value as i32)),
                 _ => Err(format!("{id} ({name}) must be a whole number in {}, got {text}", self.range())),
             },
             Kind::Status(_) => Err(format!("{id} ({name}) is not read from text")),

@@ -17,7 +17,8 @@
 //! | `indication` | `clap.param-indication` | the window shows what the host has mapped and automated |
 //!
 //! [`ClapPlugin::remote_controls`](nice_plug::prelude::ClapPlugin) is the framework's; its pages are in `remote_pages`.
-//! Everything here that handles pointers of the host is `unsafe`; outside this folder only `mts_esp` is.
+//! Everything here that handles pointers of the host is `unsafe`. Outside this folder few places are, and each says why:
+//! `grep -rn allow.unsafe_code src` lists them.
 #![allow(unsafe_code)] // pointers that the host hands in and takes; each use says why it is sound
 
 mod audio_ports;

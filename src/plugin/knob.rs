@@ -10,6 +10,7 @@
 
 mod calibrator;
 mod feel_design;
+mod feel_in_force;
 mod feels_cache;
 mod heard_sound;
 mod knob_audio;
@@ -28,33 +29,29 @@ pub use main_pulse::MainPulse;
 
 use crate::plugin::instrument_loading::SharedInstrument;
 use crate::plugin::params::ChalumeauParams;
-use chalumeau_core::haptics::FeelTable;
 use chalumeau_core::units::SoundingNote;
 use chalumeau_knob::device::{Heartbeat, LinkStatus, Release};
 use chalumeau_knob::touch::breath_from_angle::BreathMapping;
-use chalumeau_knob::touch::feel::InstrumentFeel;
 use chalumeau_knob::touch::take::Take;
 use chalumeau_knob::wire::message;
+use feel_in_force::FeelInForce;
 use knob_controller::{AudioEnds, KnobController};
 use main_pulse::MainPulseAsker;
 
 /// Number that stands for no note.
 const NO_NOTE: u8 = 255;
 
-/// What an instrument requires of the hand, and the feel of each note under the present design and limits.
-type InstrumentAndFeel = (Arc<InstrumentFeel>, FeelTable);
-
 /// What the threads share about the knob.
 #[derive(Debug)]
 pub struct SharedKnob {
     /// The fingered note, sounding pitch, or [`NO_NOTE`].
     note: AtomicU8,
-    /// Mouth pressure over closing pressure, the bits of an f32.
-    gamma: AtomicU32,
+    /// Share of full breath, the bits of an f32.
+    breath: AtomicU32,
     /// Factors that controllers put on H and k, the bits of f32s.
     reed_factors: [AtomicU32; 2],
     /// The feel in force. Only the controller and the link lock it.
-    feel: Mutex<Option<Arc<InstrumentAndFeel>>>,
+    feel: Mutex<Option<Arc<FeelInForce>>>,
     /// A test feel, which replaces the feel of any note. Only the window, the controller and the link lock it.
     test: Mutex<Option<message::Feel>>,
     /// The user has chosen a device, so that even the same choice counts as new.
@@ -77,7 +74,7 @@ impl SharedKnob {
         let one = || AtomicU32::new(1.0_f32.to_bits());
         Self {
             note: AtomicU8::new(NO_NOTE),
-            gamma: AtomicU32::new(0),
+            breath: AtomicU32::new(0),
             reed_factors: [one(), one()],
             feel: Mutex::new(None),
             test: Mutex::default(),
@@ -119,8 +116,12 @@ impl SharedKnob {
         self.status.lock().ok()?.clone()
     }
 
-    fn gamma(&self) -> f32 {
-        f32::from_bits(self.gamma.load(Ordering::Relaxed))
+    fn breath(&self) -> f32 {
+        f32::from_bits(self.breath.load(Ordering::Relaxed))
+    }
+
+    fn feel_in_force(&self) -> Option<Arc<FeelInForce>> {
+        self.feel.lock().ok()?.clone()
     }
 
     fn reed_factors(&self) -> [f32; 2] {

@@ -267,8 +267,12 @@ fn holes_are_tried_and_given_back() {
     click(&mut window, "Fingering G4");
     let g4 = &file.fingering(chalumeau_core::units::WrittenNote(67)).unwrap().open;
     assert_eq!(window.actions(), [Action::TryFingering(g4.clone())]);
+    // The trial is the same in every view.
+    click(&mut window, "Play");
     click(&mut window, "Back to the note");
     assert_eq!(window.actions(), [Action::EndTry]);
+    click(&mut window, "Clarinet");
+    assert!(window.harness.query_by_label("trying").is_none());
 
     // Alternates stand behind the note they play.
     click(&mut window, "Fingering Eb4''");

@@ -2,14 +2,14 @@
 //! focus. A double click or Ctrl-click sets the default.
 
 use egui::{
-    Align2, Color32, CursorIcon, FontId, Pos2, Response, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, pos2,
-    vec2,
+    Align2, Color32, CursorIcon, FontId, Pos2, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, pos2, vec2,
 };
 
 use crate::editor::controls::{Hands, Look, teach};
 use crate::editor::host_marks;
 use crate::editor::key_steps::KeySteps;
 use crate::editor::linked_controllers;
+use crate::editor::slider::moved_by_pointer;
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
@@ -49,7 +49,9 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2, has_ends: bo
     let Some(look) = hands.controls.look(of.id) else { return };
     let c = Colours::here(ui);
     let (rect, mut response) = ui.allocate_exact_size(size, Sense::click_and_drag());
-    let mut value = moved_by_pointer(ui, hands, of.id, &look, &response).unwrap_or(look.value);
+    let drag = response.drag_delta();
+    let share = (drag.x - drag.y) / TRAVEL;
+    let mut value = moved_by_pointer(ui, hands, of.id, &look, &response, share).unwrap_or(look.value);
     if response.has_focus() {
         value = KEYS.moved(ui, hands, of.id, &look, &response).unwrap_or(value);
     }
@@ -128,37 +130,4 @@ fn paint(ui: &Ui, c: &Colours, centre: Pos2, radius: f32, look: &Look, value: f3
     painter.circle_filled(centre - vec2(0.0, 0.18 * cap), 0.72 * cap, c.hovered.gamma_multiply(0.5));
     let hand = Vec2::angled(angle(value));
     painter.line_segment([centre + 0.35 * cap * hand, centre + 0.86 * cap * hand], Stroke::new(3.0, c.ink));
-}
-
-fn moved_by_pointer(
-    ui: &Ui,
-    hands: &mut Hands,
-    id: &'static str,
-    look: &Look,
-    response: &Response,
-) -> Option<f32> {
-    // Where the hand would be on a control without steps: else a stepped one never leaves its step.
-    let exact = response.id.with("exact");
-    if response.drag_started() {
-        hands.begin(id);
-        ui.data_mut(|data| data.insert_temp(exact, look.value));
-    }
-    let mut value = None;
-    let drag = response.drag_delta();
-    if response.dragged() && drag != Vec2::ZERO {
-        let fine = if ui.input(|input| input.modifiers.shift) { 0.1 } else { 1.0 };
-        let from = ui.data(|data| data.get_temp::<f32>(exact)).unwrap_or(look.value);
-        let to = (from + fine * (drag.x - drag.y) / TRAVEL).clamp(0.0, 1.0);
-        ui.data_mut(|data| data.insert_temp(exact, to));
-        let to = look
-            .steps
-            .filter(|&steps| steps > 0)
-            .map_or(to, |steps| (to * steps as f32).round() / steps as f32);
-        hands.set(id, to);
-        value = Some(to);
-    }
-    if response.drag_stopped() {
-        hands.end(id);
-    }
-    value
 }

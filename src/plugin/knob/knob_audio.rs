@@ -188,10 +188,9 @@ impl KnobAudio {
         let last_breath = has_left.then(|| self.blower.fall_silent()).flatten();
         self.breath_from = breath_from;
         let full_pa = 1e3 * f64::from(settings.breath_full_kpa);
-        let (shared, sent, closing_pa) = (&self.shared, &mut self.sent, settings.closing_pa());
+        let (shared, sent) = (&self.shared, &mut self.sent);
         let mut on_breath = |at: usize, breath: Breath14| {
-            let gamma = f64::from(breath.unit()) * full_pa / closing_pa;
-            shared.gamma.store((gamma as f32).to_bits(), Ordering::Relaxed);
+            shared.breath.store(breath.unit().to_bits(), Ordering::Relaxed);
             sent.push(at, breath);
         };
         let blower = &mut self.blower;

@@ -7,6 +7,7 @@ use std::time::Duration;
 use super::SharedKnob;
 use super::calibrator::Calibrator;
 use super::feel_design::{feel_design, knob_design};
+use super::feel_in_force::FeelInForce;
 use super::feels_cache::FeelsCache;
 use super::heard_sound::SoundListener;
 use super::knob_switches::{KnobSwitches, is_live};
@@ -192,10 +193,7 @@ impl KnobController {
             if let Some(test) = shared.test.lock().ok().and_then(|test| *test) {
                 return Some(test);
             }
-            let feel = shared.feel.lock().ok()?.clone()?;
-            let (feels, table) = &*feel;
-            let index = shared.note().and_then(|note| feels.fingering(note));
-            Some(index.and_then(|index| table.note(index)).unwrap_or(table.reference()).feel)
+            Some(shared.feel_in_force()?.feel(shared.note()))
         };
         let (shared, rows) = (self.shared.clone(), self.rows.0.clone());
         let instrument = self.instrument.clone();
@@ -209,7 +207,7 @@ impl KnobController {
                     .note()
                     .and_then(|note| note.written(instrument.transposition()))
                     .map(|WrittenNote(written)| written),
-                gamma: f64::from(shared.gamma()),
+                gamma: shared.feel_in_force().map_or(0.0, |feel| feel.gamma(shared.note(), shared.breath())),
                 feel_id: state.feel_id,
             });
         };
@@ -236,10 +234,11 @@ impl KnobController {
         self.short_breath = short_breath(&settings);
         match feels.table(&settings, &design, &limits) {
             Ok(table) => {
-                self.hand.maps = feels.maps_for(&table, &settings);
+                let in_force = FeelInForce::new(feels, table, &settings);
+                self.hand.maps = in_force.maps();
                 self.hand_in.write(self.hand);
                 if let Ok(mut feel) = self.shared.feel.lock() {
-                    *feel = Some(Arc::new((feels, table)));
+                    *feel = Some(Arc::new(in_force));
                 }
                 self.refused = None;
             }
@@ -324,9 +323,7 @@ impl KnobController {
 
     /// Gamma at which a note begins to sound with the feel in force.
     fn sounds_from(&self, written: WrittenNote) -> Option<f64> {
-        let feel = self.shared.feel.lock().ok()?.clone()?;
-        let note = feel.1.notes().iter().find(|note| note.written == written)?;
-        note.requirement.map(|required| required.gamma_sounding)
+        self.shared.feel_in_force()?.sounds_from(written)
     }
 
     /// Stores the serial number of a live device in the project.

@@ -6,6 +6,7 @@ use nice_plug::plugin::ParamValue;
 use nice_plug::prelude::*;
 use serde::{Serialize, de::DeserializeOwned};
 
+use super::alterations::SavedAlterations;
 use super::instrument;
 use super::knob::SavedCalibration;
 use super::microphone::RoomFloor;
@@ -79,6 +80,8 @@ pub fn mend(state: &mut PluginState) {
     mend_field(state, "curves", SourceCurves::mended);
     // A state from before scales has none.
     mend_field(state, "scale", SavedScale::mended);
+    // A state from before alterations has none: the bore is as it was built.
+    mend_field(state, "holes", |saved: SavedAlterations| saved);
     mend_field(state, "calibration", SavedCalibration::mended);
     // A state from before microphones has 0, which no room is.
     mend_field(state, "roomlevel", |floor: f32| {
@@ -146,6 +149,20 @@ fn mend_field<T: Default + Serialize + DeserializeOwned>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plugin::params::ChalumeauParams;
+
+    #[test]
+    fn what_a_state_does_not_mention_is_as_in_a_new_project() {
+        let params = ChalumeauParams::default();
+        let mut state =
+            PluginState { version: String::new(), params: BTreeMap::new(), fields: BTreeMap::new() };
+        mend(&mut state);
+        let kept = params.serialize_fields();
+        assert!(kept.contains_key("holes"));
+        for id in kept.keys() {
+            assert!(state.fields.contains_key(id), "{id} stays as it was in the project before");
+        }
+    }
 
     #[test]
     fn an_old_project_is_played_as_it_was() {
