@@ -351,3 +351,21 @@ fn numbers_out_of_range_are_clamped_where_they_come_in() {
     assert!(sound.iter().all(|x| x.abs() <= 1.0));
     assert_eq!(clarinet.resets(), 0);
 }
+
+/// The tongue that prepares a note has not let go of the reed when such a key comes up: landing on it then would be a click, six
+/// times as loud as the note.
+#[test]
+fn a_key_that_hardly_goes_down_plays_a_short_note_and_no_click() {
+    let breath = (0.0, Event::Breath(0.6));
+    for settings in [still(Articulation::default()), machine(Articulation::default())] {
+        let peak = |seconds: f64| {
+            let events = [breath, on(0.3, 60), off(0.3 + seconds, 60)];
+            heard(&settings, &events, 0.6).into_iter().map(f64::abs).fold(0.0, f64::max)
+        };
+        let long = peak(0.1);
+        for ms in [0.0, 1.0, 2.0, 4.0, 7.0, 8.0, 9.0, 10.0, 12.0, 15.0, 20.0] {
+            let short = peak(1e-3 * ms);
+            assert!(short < 1.1 * long && short > 0.02 * long, "{ms} ms: {short}, a note of 0.1 s: {long}");
+        }
+    }
+}

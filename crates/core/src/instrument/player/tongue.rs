@@ -6,6 +6,9 @@ use crate::reed::motion::TONGUE_FORCE;
 
 /// How long the tongue holds the reed before a tongued note, s: long enough for the breath to rise behind it.
 const HOLD_S: f64 = 0.008;
+/// The tongue stays away from the reed for this long at least, s, however short a key is held: about the shortest staccato (by
+/// judgement). Landing earlier, it would find a reed that it has hardly let go.
+const SHORTEST_S: f64 = 0.02;
 /// How long the tongue takes to reach the reed when it stops a note, s.
 const STOP_S: f64 = 0.005;
 /// Time constant with which the force on the reed grows, s, so that the tongue lands softly.
@@ -33,6 +36,10 @@ enum Position {
 #[derive(Clone, Copy, Debug)]
 pub struct Tongue {
     position: Position,
+    /// Time for which it has been away, s, up to [`SHORTEST_S`].
+    away_s: f64,
+    /// The key has come up: it lands as soon as it may.
+    is_due: bool,
     /// The slap that pulls at the reed, if there is one; it overrides the position.
     slap: Option<Slap>,
     /// Force on the reed, smoothed so that the tongue never slaps by accident; negative while a slap pulls.
@@ -41,7 +48,13 @@ pub struct Tongue {
 
 impl Default for Tongue {
     fn default() -> Self {
-        Self { position: Position::Resting, slap: None, force: TONGUE_FORCE }
+        Self {
+            position: Position::Resting,
+            away_s: SHORTEST_S,
+            is_due: false,
+            slap: None,
+            force: TONGUE_FORCE,
+        }
     }
 }
 
@@ -49,11 +62,18 @@ impl Tongue {
     /// Prepares a tongued note.
     pub fn hold(&mut self) {
         self.position = Position::Holding(HOLD_S);
+        (self.away_s, self.is_due) = (0.0, false);
     }
 
-    /// Stops the note.
+    /// Stops the note; one that has hardly begun is played first, as short as may be.
     pub fn stop(&mut self) {
-        self.position = Position::Stopping(0.0);
+        match self.position {
+            // On the reed, where it stays.
+            Position::Resting | Position::AwaitingBreath => self.position = Position::Resting,
+            Position::Stopping(_) => {}
+            _ if self.away_s < SHORTEST_S => self.is_due = true,
+            _ => self.position = Position::Stopping(0.0),
+        }
     }
 
     /// Begins a slap of a strength in 0..=1; false if there is nothing to begin. `closing` is the closing pressure of
@@ -61,6 +81,7 @@ impl Tongue {
     pub fn slap(&mut self, strength: f32, closing: f64, key_down: bool, gamma: f64) -> bool {
         let Some(slap) = Slap::begin(strength, self.force / closing, self.slap) else { return false };
         self.slap = Some(slap);
+        (self.away_s, self.is_due) = (SHORTEST_S, false);
         self.position = match key_down {
             false => Position::Resting,
             true if gamma < BREATH_GAMMA => Position::AwaitingBreath,
@@ -91,6 +112,7 @@ impl Tongue {
             Position::Resting | Position::Stopping(_) => Position::Away,
             position => position,
         };
+        (self.away_s, self.is_due) = (from.away_s, from.is_due);
         if self.position == Position::Away {
             self.force = 0.0;
         }
@@ -133,7 +155,12 @@ impl Tongue {
         let tick_s = context.tick_s;
         let (position, share) = match self.position {
             Position::Resting => (Position::Resting, 1.0),
-            Position::Away => (Position::Away, 0.0),
+            Position::Away => {
+                self.away_s = (self.away_s + tick_s).min(SHORTEST_S);
+                let lands = self.is_due && self.away_s == SHORTEST_S;
+                self.is_due &= !lands;
+                (if lands { Position::Stopping(0.0) } else { Position::Away }, 0.0)
+            }
             Position::Holding(left_s) if left_s > tick_s => (Position::Holding(left_s - tick_s), 1.0),
             Position::Holding(_) => (Position::Leaving(1.0), 1.0),
             Position::Leaving(share) => {
