@@ -87,7 +87,7 @@ impl BifurcationCommand {
         );
         table.comment(format_args!("{name}; written {written}; {note}"))?;
         let changes = found.transitions();
-        table.comment(format_args!("gamma: {}", changes_in_words(threshold, &changes)))?;
+        table.comment(format_args!("gamma: {}", changes_in_words(threshold, &changes, self.to)))?;
         for (direction, way) in [(1, &found.up), (-1, &found.down)] {
             for point in way {
                 table.line(format_args!(
@@ -117,20 +117,38 @@ impl BifurcationCommand {
     }
 }
 
-/// Gamma of every change of the note, for the comment in the table.
-fn changes_in_words(threshold: Option<f64>, changes: &Transitions) -> String {
+/// Gamma of every change of the note on a ramp up to `to`, for the comment in the table. What cannot be, such as the end of a
+/// note that has not begun, is not told.
+fn changes_in_words(threshold: Option<f64>, changes: &Transitions, to: f64) -> String {
+    let Transitions { begins, beats, chokes, returns, opens, ends } = *changes;
+    let up_to = |what: &str| Some(format!("does not {what} up to gamma {to}"));
+    let not = |what: &str, of: Option<f64>| of.map(|_| format!("does not {what}"));
     let all = [
-        ("linear threshold", threshold),
-        ("begins", changes.begins),
-        ("beats", changes.beats),
-        ("chokes", changes.chokes),
-        ("returns", changes.returns),
-        ("stops beating", changes.opens),
-        ("ends", changes.ends),
+        ("linear threshold", threshold, Some("no linear threshold".to_owned())),
+        ("begins", begins, up_to("begin")),
+        ("beats", beats, up_to("beat")),
+        ("chokes", chokes, up_to("choke")),
+        ("returns", returns, not("return", chokes)),
+        ("stops beating", opens, not("stop beating", beats)),
+        ("ends", ends, not("end", begins)),
     ];
-    let words = all.map(|(what, at)| match at {
-        Some(at) => format!("{what} {at:.4}"),
-        None => format!("{what} never"),
+    let words = all.into_iter().filter_map(|(what, at, otherwise)| match at {
+        Some(at) => Some(format!("{what} {at:.4}")),
+        None => otherwise,
     });
-    words.join(", ")
+    words.collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_happen_on_the_ramp_is_not_called_never() {
+        let changes = Transitions { begins: Some(0.4), ..Transitions::default() };
+        assert_eq!(
+            changes_in_words(Some(0.35), &changes, 0.5),
+            "linear threshold 0.3500, begins 0.4000, does not beat up to gamma 0.5, does not choke up to gamma 0.5, does not end"
+        );
+    }
 }

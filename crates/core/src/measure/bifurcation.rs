@@ -16,6 +16,8 @@ use std::sync::Arc;
 
 /// A note counts as sounding above this rms over the closing pressure: a hundredth of that of a loud note.
 pub const SOUNDING_RMS: f64 = 0.01;
+/// Silence before the ramp, s: the tongue leaves the reed, which then stands still.
+const STILL_S: f64 = 0.1;
 /// Shortest window, s.
 const WINDOW_S: f64 = 0.02;
 
@@ -82,7 +84,7 @@ impl BifurcationDiagram {
     }
 }
 
-/// Plays `note` while gamma goes from 0 to `gamma_max` and back, `seconds` each way. Allocates.
+/// Plays `note` while gamma goes from 0 to `gamma_max` and back, `seconds` each way, after a moment of silence. Allocates.
 ///
 /// The breath is physical whatever `settings` say; they must let full breath reach `gamma_max` (`breath_full_kpa`). `rate` is the host's sample rate, Hz. `each` is
 /// called after every block with its number of samples, to show progress.
@@ -99,16 +101,21 @@ pub fn measure(
     let settings = &Settings { breath_response: BreathResponse::Physical, ..*settings };
     clarinet.set_settings(settings);
     clarinet.reset();
-    let score =
-        Score::note(note, 2.0 * seconds, rate).blown(&BreathCurve::swell(gamma_max, seconds), settings, rate);
+    let swell = BreathCurve::swell(gamma_max, seconds).after(STILL_S);
+    let score = Score::note(note, STILL_S + 2.0 * seconds, rate).blown(&swell, settings, rate);
     let inner_hz = clarinet.internal_rate_hz();
     let period = inner_hz / note.frequency_hz(f64::from(settings.a4_hz));
     let window = (period * (WINDOW_S * inner_hz / period).ceil()).round() as usize;
     let closing_pa = settings.closing_pa();
     let half = (seconds * inner_hz) as usize;
+    let mut still = (STILL_S * inner_hz).round() as usize;
     let mut found = BifurcationDiagram::default();
     let (mut seen, mut inside) = (0_usize, Window::default());
     let mut probe = |probe: Probe| {
+        if still > 0 {
+            still -= 1;
+            return;
+        }
         inside.add(&probe, closing_pa);
         seen += 1;
         if inside.count == window {
@@ -191,7 +198,10 @@ mod tests {
         let settings = Settings { breath_full_kpa: 20.0, lay: 0.0, ..Settings::physical() };
         let mut samples = 0;
         let found = measure(&model, &settings, SoundingNote(50), 0.8, 4.0, 48_000, |block| samples += block);
-        assert_eq!(samples, 8 * 48_000);
+        assert_eq!(samples, 8 * 48_000 + 4_800);
+        let first = found.up[0];
+        // What is left is the bend of the breath where the ramp begins.
+        assert!(first.rms < 1e-3 && first.shut == 0.0, "the tongue is not heard: {first:?}");
         let changes = found.transitions();
         let (begins, beats, ends) = (changes.begins.unwrap(), changes.beats.unwrap(), changes.ends.unwrap());
         assert!((1.0 / 3.0..0.5).contains(&begins), "{changes:?}");

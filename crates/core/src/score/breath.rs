@@ -124,6 +124,12 @@ impl BreathCurve {
         Self { points: vec![(0.0, 0.0), top, (2.0 * seconds, 0.0)], relative: false }
     }
 
+    /// The same so many seconds later, and until then what it begins with. Not for a curve over the whole score.
+    pub(crate) fn after(mut self, seconds: f64) -> Self {
+        self.points.iter_mut().for_each(|point| point.0 += seconds);
+        self
+    }
+
     /// A crescendo or diminuendo `FROM:TO` in gamma, over the whole score.
     ///
     /// # Errors
