@@ -96,6 +96,15 @@ pub enum CylinderError {
     },
 }
 
+/// Names of the holes from the bell: those by which the [finder of fingerings](crate::bore::fingering_finder) knows the holes
+/// under the fingers.
+const HOLES: [&str; 7] = ["R3", "R2", "R1", "L3", "L2", "L1", "THUMB"];
+
+/// Name of a hole, counted from the bell, from 1. Those beyond the fingers have a number.
+fn name_of_hole(index: usize) -> String {
+    index.checked_sub(1).and_then(|at| HOLES.get(at)).map_or_else(|| format!("H{index}"), ToString::to_string)
+}
+
 impl Cylinder {
     /// The instrument. Allocates; some tenths of a second.
     pub fn build(&self, air: Air) -> Result<InstrumentFile, CylinderError> {
@@ -192,7 +201,7 @@ impl Cylinder {
         }
         for (index, x_m) in ends_m.iter().enumerate().skip(1).rev() {
             let description = format!("open for {} and above", self.notes[index]);
-            holes.push(hole(format!("H{index}"), *x_m, self.hole_radius_m, false, description));
+            holes.push(hole(name_of_hole(index), *x_m, self.hole_radius_m, false, description));
         }
         let vents = holes.len() + 1 - count;
         let fingerings = self
@@ -254,6 +263,7 @@ impl Cylinder {
 mod tests {
     use super::*;
     use crate::bore::check::{Check, Concern};
+    use crate::bore::fingering_finder::mechanism::Mechanism;
 
     fn cylinder(notes: &[u8]) -> Cylinder {
         Cylinder {
@@ -273,6 +283,7 @@ mod tests {
     fn its_notes_are_in_tune_and_its_file_is_good() {
         let file = cylinder(&[50, 52, 53, 55, 57, 59, 60]).build(Air::default()).unwrap();
         assert_eq!((file.holes.len(), file.fingerings.len()), (6, 7));
+        assert!(Mechanism::boehm().unmoved(&file).is_empty(), "fingers reach all holes");
         let check = Check::new(&file, Air::default(), 440.0);
         assert_eq!(check.concerns, []);
         for note in check.notes {
