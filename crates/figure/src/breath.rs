@@ -103,7 +103,7 @@ pub struct Swell {
 
 /// What a moment of a swell is called, and its colour.
 const STATES: [(&str, Colour); 3] =
-    [("sounds", Colour::Green), ("sounds, the reed beats", Colour::Orange), ("blown shut", Colour::Grey)];
+    [("sounds", Colour::Green), ("sounds, the reed shuts in each cycle", Colour::Orange), ("blown shut", Colour::Grey)];
 
 impl Swell {
     /// Index into [`STATES`], or none for a breath too weak.
@@ -236,7 +236,7 @@ mod tests {
             .iter()
             .filter_map(|layer| if let Layer::Span(span) = layer { Some(span.name.as_str()) } else { None })
             .collect();
-        assert_eq!(spans, ["sounds", "sounds, the reed beats", "blown shut"]);
+        assert_eq!(spans, ["sounds", "sounds, the reed shuts in each cycle", "blown shut"]);
     }
 
     #[test]
