@@ -24,8 +24,10 @@ pub fn profile(file: &InstrumentFile, fingering: Option<&Fingering>) -> Figure {
         None => file.name.clone(),
     };
     let length_mm = 1e3 * file.length_m();
+    let has_bell = file.bore.iter().any(|cone| cone.part.to_lowercase().contains("bell"));
+    let end = if has_bell { "bell" } else { "bore" };
     let mut figure = Figure::new(title).note(format!(
-        "{length_mm:.0} mm from the tip to the end of the bell, {} holes, all shown on one side; bore, chimneys and \
+        "{length_mm:.0} mm from the tip to the end of the {end}, {} holes, all shown on one side; bore, chimneys and \
          diameters to one scale",
         file.holes.len()
     ));
@@ -35,8 +37,10 @@ pub fn profile(file: &InstrumentFile, fingering: Option<&Fingering>) -> Figure {
     // Half the length a row: twice the scale, and the names of the holes have room.
     let half_mm = length_mm / 2.0;
     let mut height = 0.0;
+    // The first of either kind stands in a legend, on whichever half it is.
+    let mut unnamed = [fingering.is_some(); 2];
     for row in [0.0, 1.0] {
-        let (panel, tall_mm) = side(file, fingering, (row * half_mm, (row + 1.0) * half_mm), row == 0.0);
+        let (panel, tall_mm) = side(file, fingering, (row * half_mm, (row + 1.0) * half_mm), &mut unnamed);
         let pixels = tall_mm / half_mm * ACROSS + AROUND;
         height += pixels;
         figure = figure.panel(panel.weight(pixels / AROUND));
@@ -129,12 +133,13 @@ fn outline(file: &InstrumentFile, (from_mm, to_mm): (f64, f64)) -> Vec<(f64, f64
     corners
 }
 
-/// A stretch of the instrument from the side, and how tall it is, mm.
+/// A stretch of the instrument from the side, and how tall it is, mm. `unnamed`: whether closed and open holes have no place in
+/// a legend yet.
 fn side(
     file: &InstrumentFile,
     fingering: Option<&Fingering>,
     (from_mm, to_mm): (f64, f64),
-    legend: bool,
+    unnamed: &mut [bool; 2],
 ) -> (Panel, f64) {
     let holes: Vec<(usize, &ToneHole)> = file
         .holes
@@ -162,8 +167,6 @@ fn side(
     panel = panel.with(
         Polygon::filled("", upper.iter().copied().chain(lower), Colour::Pale, 0.45).stroke(Colour::Ink),
     );
-    // The first of either kind stands in the legend.
-    let mut unnamed = [legend && fingering.is_some(); 2];
     for ((index, hole), label) in holes.into_iter().zip(names) {
         let open = fingering.map(|fingering| fingering.open.get(index).copied().unwrap_or(false));
         let (x, half) = (1e3 * hole.x_m, 1e3 * hole.radius_m);
