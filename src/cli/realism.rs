@@ -29,6 +29,7 @@ use chalumeau_core::score::breath::{BreathCurve, GAMMA_MAX};
 use chalumeau_core::units::SoundingNote;
 use chalumeau_figure::realism::{ComparedDynamic, ComparedNote, figure};
 use clap::Args;
+use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -55,7 +56,7 @@ each note. A recorded note differs from its recorded neighbours by 2.7, 6.8 and 
 ///
 /// Plays every other note from sounding D#3 to G6 for 4 s at pp, mf and ff, four takes of each, and measures them as the
 /// recordings were measured (tests/reference/clarinet_spectra_method.md). error_db is the mean distance of harmonics 2 to 10, each spectrum against its
-/// strongest harmonic and clipped at -60 dB; a take that does not sound, or sounds in another register, counts 20 dB. d1 to
+/// strongest harmonic and clipped at -60 dB; notes that the instrument does not have are left out; a take that does not sound, or sounds in another register, counts 20 dB. d1 to
 /// d10 are the differences, played less recorded. Noise is that between the harmonics, by bands, against the whole tone; t90 is
 /// the time in which a harmonic reaches 90 % of its level; wander is that of the steady part. Comments sum up.
 #[derive(Args)]
@@ -107,13 +108,17 @@ impl RealismCommand {
         let plot = self.plot.open(self.table.force())?;
         let name = named(&file.name, self.preset.as_ref());
         if file.transposition != Bundled::BFlat.file().transposition {
-            eprintln!(
-                "warning: the recordings are of a B flat clarinet; a note that {} does not have counts as failed",
-                file.name
-            );
+            eprintln!("warning: the recordings are of a B flat clarinet");
+        }
+        let (recorded, left_out) = recorded_notes_of(&file);
+        if let Some(left_out) = &left_out {
+            eprintln!("warning: {left_out}; the others are left out");
+        }
+        if recorded.is_empty() {
+            return Err(Failure::Usage(format!("{} has none of the recorded notes", file.name)));
         }
         let model = self.instrument.model(file, RATE_HZ as u32, settings.a4_hz)?;
-        let heard = self.play_all(&model, &settings, &breaths);
+        let heard = self.play_all(&recorded, &model, &settings, &breaths);
         let shelf = self.shelf.map_or_else(String::new, |shelf| {
             format!("; behind a shelf of {} dB at {} Hz", shelf.lift_db, shelf.middle_hz)
         });
@@ -125,7 +130,7 @@ impl RealismCommand {
             "recordings of a B flat clarinet: TinySOL (Cella, Ghisi, Lostanlen, Levy, Fineberg, Maresz 2020), CC BY 4.0, one take for each note"
                 .to_owned(),
         ];
-        for line in about.iter().chain(&summary(&heard)) {
+        for line in about.iter().chain(&left_out).chain(&summary(&heard)) {
             table.comment(format_args!("{line}"))?;
         }
         for note in &heard {
@@ -134,6 +139,20 @@ impl RealismCommand {
         table.finish()?;
         plot.draw(|| figure("Realism", &about, CENTROID_RATIOS, &compared(&heard)))
     }
+}
+
+/// The recorded notes that the chart of an instrument has, and how many of them these are if they are not all.
+fn recorded_notes_of(file: &InstrumentFile) -> (Vec<RecordedNote>, Option<String>) {
+    let all = RecordedNote::all();
+    let pitches = |notes: &[RecordedNote]| notes.iter().map(|note| note.midi).collect::<BTreeSet<_>>().len();
+    let many = pitches(&all);
+    let is_fingered = |note: &RecordedNote| {
+        let written = SoundingNote(note.midi).written(file.transposition);
+        written.is_some_and(|written| file.fingering(written).is_some())
+    };
+    let recorded: Vec<_> = all.into_iter().filter(is_fingered).collect();
+    let count = pitches(&recorded);
+    (recorded, (count < many).then(|| format!("{count} of {many} recorded notes are in this chart")))
 }
 
 /// A shelf as it is written: 4000,2.
@@ -177,8 +196,14 @@ impl RealismCommand {
     }
 
     /// Plays all takes of a note for every recording, on all cores.
-    fn play_all(&self, model: &Arc<Model>, settings: &Settings, breaths: &[f32; 3]) -> Vec<Heard> {
-        let (recorded, takes) = (RecordedNote::all(), usize::from(self.takes));
+    fn play_all(
+        &self,
+        recorded: &[RecordedNote],
+        model: &Arc<Model>,
+        settings: &Settings,
+        breaths: &[f32; 3],
+    ) -> Vec<Heard> {
+        let takes = usize::from(self.takes);
         let bar = progress(recorded.len() * takes);
         let play = |at: usize| {
             let note = &recorded[at / takes];
@@ -348,9 +373,11 @@ fn summary(heard: &[Heard]) -> Vec<String> {
 fn line(dynamic: Dynamic, summary: &Summary, heard: &[Heard]) -> String {
     let registers: Vec<String> = REGISTERS
         .iter()
-        .map(|(name, low, high)| {
+        .filter_map(|(name, low, high)| {
             let own = of(heard, dynamic).filter(|note| (*low..=*high).contains(&note.score.recorded.midi));
-            format!("{name} {:.1}", mean(own.map(|note| note.score.error_db)))
+            let error_db = mean(own.map(|note| note.score.error_db));
+            // An instrument may have no note of a register.
+            error_db.is_finite().then(|| format!("{name} {error_db:.1}"))
         })
         .collect();
     let (third, recorded_third) = summary.third_over_second_db;
