@@ -92,8 +92,9 @@ impl InstrumentArg {
                 on(progress)
             })
         })?;
+        say_how_it_is_scaled(&model, wanted);
         if fresh {
-            say_what_tuning_found(&model, wanted);
+            say_what_tuning_found(&model);
         }
         keep(wanted, &model);
         Ok(model)
@@ -260,14 +261,18 @@ impl PlayedArgs {
     }
 }
 
-/// Tells the maker of an instrument once what the tuning found.
-fn say_what_tuning_found(model: &Model, wanted: &Wanted) {
+/// Says whether the instrument is played in another size than measured: every measurement of it depends on that.
+fn say_how_it_is_scaled(model: &Model, wanted: &Wanted) {
     let own_scale = A4_HZ / wanted.tuned_a4_hz();
     let longer = 100.0 * (model.scale / own_scale - 1.0);
     if longer != 0.0 {
         let (by, how) = (longer.abs(), if longer > 0.0 { "larger" } else { "smaller" });
         eprintln!("note: the whole instrument is played {by:.2} % {how} than measured, to be in tune");
     }
+}
+
+/// Tells the maker of an instrument once what the tuning found.
+fn say_what_tuning_found(model: &Model) {
     let names = |which: fn(&NoteTuning) -> bool| -> Vec<String> {
         let notes = model.tuning.notes.iter().filter(|note| which(note));
         notes.map(|note| WrittenNote(note.written).to_string()).collect()
