@@ -253,7 +253,7 @@ pub fn chapters(model: &Model, base: Settings, rate: u32) -> Vec<(&'static str, 
                 phrase(room(0.0, 10.0, 1.0), "Dry", "As the microphones of a laboratory hear it."),
                 phrase(room(0.35, 8.0, 0.5), "A living room", "Early reflections, and half a second."),
                 phrase(room(0.45, 30.0, 2.0), "A concert hall", "Two seconds."),
-                phrase(room(0.6, 45.0, 4.0), "A church", "Four seconds."),
+                phrase(room(0.6, 40.0, 4.0), "A church", "Four seconds."),
             ],
         ),
     ]
