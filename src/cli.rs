@@ -144,6 +144,8 @@ enum Failure {
     InstrumentFile { path: PathBuf, source: InstrumentError },
     #[error("{}: {source}", path.display())]
     Instrument { path: PathBuf, source: BuildError },
+    #[error("cannot make the directory {}: {source}", path.display())]
+    Folder { path: PathBuf, source: io::Error },
     #[error("cannot write {}: {source}", path.display())]
     Batch { path: PathBuf, source: io::Error },
     #[error(transparent)]

@@ -21,6 +21,8 @@ use chalumeau_figure::reed::LawFigure;
 use chalumeau_figure::reed_orbit::ReedOrbit;
 use chalumeau_figure::reed_sweep::reed_sweep;
 use clap::{Args, ValueEnum};
+use std::ffi::OsStr;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
@@ -122,7 +124,7 @@ pub struct ReedCommand {
 #[derive(Args)]
 #[command(next_help_heading = "Figures")]
 struct Drawing {
-    /// A new .png or .svg file (.json for its data, .gif for the sweep), or a directory that exists
+    /// A new .png or .svg file (.json for its data, .gif for the sweep), or a directory; --figure all makes it if it does not exist
     #[arg(long, value_name = "PATH", requires = "figure")]
     out: Option<PathBuf>,
     /// Kind of file made in a directory
@@ -165,6 +167,11 @@ impl Which {
     }
 }
 
+/// Whether who gives a name with this ending means a file.
+fn is_of_a_file(ending: &OsStr) -> bool {
+    ["png", "svg", "json", "gif"].iter().any(|of| ending.eq_ignore_ascii_case(of))
+}
+
 impl Drawing {
     fn zeta(&self) -> f64 {
         self.zeta.unwrap_or(0.3)
@@ -191,9 +198,9 @@ impl Drawing {
 
     fn run(&self, which: Which, out: &Path, force: bool) -> Result<(), Failure> {
         let wanted: Vec<Which> = match which {
-            Which::All if !out.is_dir() => {
+            Which::All if out.is_file() || out.extension().is_some_and(is_of_a_file) => {
                 return Err(Failure::Usage(format!(
-                    "--figure all makes ten files; --out must be a directory that exists, got {}",
+                    "--figure all makes ten files; --out must be a directory, got {}",
                     out.display()
                 )));
             }
@@ -208,6 +215,9 @@ impl Drawing {
             )));
         }
         let orbit = wanted.contains(&Which::Orbit).then(|| self.prepare_orbit()).transpose()?;
+        if which == Which::All {
+            fs::create_dir_all(out).map_err(|source| Failure::Folder { path: out.to_owned(), source })?;
+        }
         let sheets =
             wanted.iter().map(|&which| self.sheet(which, out, force)).collect::<Result<Vec<_>, _>>()?;
         let orbit = orbit.map(|play| play()).transpose()?;
