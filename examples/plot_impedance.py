@@ -12,6 +12,7 @@ message says why.
 """
 
 import argparse
+import re
 import sys
 
 import kit
@@ -23,23 +24,42 @@ STYLES = (
 )
 
 
+def refuse_magnitude(path):
+    """Refuses a table of magnitude and phase, which many impedance heads give, and says how to convert it. Raises BadInput."""
+    try:
+        with open(path, encoding="utf-8-sig") as file:
+            lines = (line.strip() for line in file)
+            head = next((line for line in lines if line and not line.startswith("#")), "")
+    except (OSError, UnicodeDecodeError):
+        return  # The reader of tables says what is wrong.
+    if "re_z_over_zc" not in head and re.search("phase|mag|abs|arg", head, re.IGNORECASE):
+        raise kit.BadInput(
+            f"{path}: has magnitude and phase ({head}); make columns f_hz,re_z_over_zc,im_z_over_zc of it: "
+            "re = |Z|/Zc cos(phase), im = |Z|/Zc sin(phase), with Zc = rho c / S of the nominal bore"
+        )
+
+
 def draw(args):
     figure, (upper, lower) = kit.plt.subplots(
         2, 1, figsize=(11, 7), sharex=True, layout="constrained", gridspec_kw={"height_ratios": [3, 2]}
     )
     top = -np.inf
     for index, path in enumerate(args.curves):
-        f_hz, re, im = kit.table(path, "f_hz", "re_z_over_zc", "im_z_over_zc")
-        z, style = re + 1j * im, STYLES[index % len(STYLES)]
+        refuse_magnitude(path)
+        f_hz, real, imaginary = kit.table(path, "f_hz", "re_z_over_zc", "im_z_over_zc")
+        z, style = real + 1j * imaginary, STYLES[index % len(STYLES)]
         size_db = 20 * np.log10(np.abs(z))
         top = max(top, size_db.max())
         upper.plot(f_hz, size_db, label=path, **style)
         lower.plot(f_hz, np.degrees(np.angle(z)), **style)
     if args.peaks:
         written, f_hz, size = kit.table(args.peaks, "written_midi", "f_hz", "mag_over_zc")
+        transposition = args.transposition
+        if transposition is None:
+            transposition = kit.remark(args.peaks, "transposition", "semitones")
         if len(set(written)) != 1:
             raise kit.BadInput(f"{args.peaks}: has {len(set(written))} notes; one was expected, as --written F4 gives")
-        played_hz = 440 * 2 ** ((written[0] - args.transposition - 69) / 12)
+        played_hz = 440 * 2 ** ((written[0] - transposition - 69) / 12)
         # The label of a mode nearer than this to the previous one moves up a step; Hz and points.
         near_hz, step_pt, last_hz, lift_pt = 250, 26, -np.inf, 6
         for mode_hz, height in zip(f_hz, size):
@@ -70,8 +90,8 @@ def main():
     parser.add_argument("curves", nargs="+", help="tables of chalumeau impedance --written")
     parser.add_argument("--peaks", metavar="FILE", help="table of the same note, made with --peaks N: marks its modes")
     parser.add_argument(
-        "--transposition", type=int, default=2, metavar="N",
-        help="semitones the instrument sounds below what is written [default: 2, B flat]",
+        "--transposition", type=int, metavar="N",
+        help="semitones the instrument sounds below what is written [default: as the remarks of the table of peaks say]",
     )
     parser.add_argument("--out", default="impedance.png", metavar="FILE", help="picture to write [default: impedance.png]")
     return kit.run("plot_impedance", draw, parser.parse_args())

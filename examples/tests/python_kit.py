@@ -98,12 +98,16 @@ def kit_refuses_what_it_cannot_draw():
     tables()
     (SCRATCH / "word.csv").write_text("p,u\n0,0\n0.5,loud\n")
     (SCRATCH / "bare.csv").write_text("t_s,gamma,flow_m3s,p_mouthpiece_pa\n0,0.5,0,0\n")
+    (SCRATCH / "head.csv").write_text("# an impedance head\nf_hz,mag_z,phase_deg\n100,3,20\n")
+    (SCRATCH / "old.csv").write_text("written_midi,n,f_hz,mag_over_zc,q\n65,1,311,40,30\n")
     for name, words, out, says in (
         ("plot_reed", "none.csv g4.csv", "x.png", "none.csv: cannot be read"),
         ("plot_reed", "word.csv g4.csv", "x.png", "line 3: u is `loud`"),
         ("plot_reed", "law.csv bare.csv", "x.png", "no remark says `closing pressure"),
         ("plot_reed", "law.csv g4.csv --until 9", "x.png", "0 rows before 9 s"),
         ("plot_impedance", "law.csv", "x.png", "no column f_hz"),
+        ("plot_impedance", "head.csv", "x.png", "re = |Z|/Zc cos(phase)"),
+        ("plot_impedance", "f4.csv --peaks old.csv", "x.png", "no remark says `transposition"),
         ("plot_impedance", "f4.csv --peaks threshold.csv", "x.png", "no column f_hz"),
         ("plot_notes", "mf.csv threshold.csv", "x.png", "no column gamma_on"),
         ("plot_notes", "threshold.csv mf.csv", "x.xyz", "must end in one of"),

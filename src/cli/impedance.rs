@@ -138,8 +138,9 @@ impl ImpedanceCommand {
             )));
         }
         let about = format!(
-            "{}; {}, {} C, reed volume {} m3, Zc {:.6e} Pa s/m3",
+            "{}; transposition {} semitones, {}, {} C, reed volume {} m3, Zc {:.6e} Pa s/m3",
             file.name,
+            file.transposition,
             match (self.model, self.quality) {
                 (Model::Tmm, _) => "transfer matrices",
                 (Model::Lattice, QualityArg::Live) => "lattice at 96 kHz",
