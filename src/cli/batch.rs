@@ -5,6 +5,7 @@ pub(super) mod plan;
 use crate::cli::csv_table::{CsvTable, quoted};
 use crate::cli::render::{RenderCommand, Rendered};
 use crate::cli::shared_args::counted;
+use crate::cli::words::typed;
 use crate::cli::{Failure, parse};
 use chalumeau_core::instrument::side_by_side;
 use clap::{Args, Parser};
@@ -71,6 +72,8 @@ struct Job {
     file: String,
     /// Beginning of its line in the table: name and arguments.
     line: String,
+    /// Where the plan has it, for a reader.
+    place: String,
     words: Vec<String>,
     /// What it says of the bore.
     bore: Vec<String>,
@@ -84,10 +87,10 @@ impl BatchCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let plan = Plan::read(&self.plan).map_err(|what| self.failure(&what))?;
         let jobs = self.jobs(&plan)?;
-        for (at, job) in jobs.iter().enumerate() {
+        for job in &jobs {
             let checked = job.render.check();
             checked.map_err(|failure| {
-                self.failure(&format!("file {}: {failure} (chalumeau {})", at + 1, typed(&job.words)))
+                self.failure(&format!("{}: {failure} (chalumeau {})", job.place, typed(&job.words)))
             })?;
         }
         if self.dry_run {
@@ -191,24 +194,26 @@ impl BatchCommand {
         let job = |(at, variation): (usize, &Variation)| {
             let file = format!("{:0digits$}.wav", at + 1);
             let mut words = vec!["render".to_owned()];
-            words.extend(plan.words(variation).map_err(|what| self.failure(&what))?);
+            let place = match variation.line {
+                Some(line) => format!("line {line}"),
+                None => format!("file {}", at + 1),
+            };
+            let values = plan.words(variation);
+            words.extend(values.map_err(|what| self.failure(&format!("{place}: {what}")))?);
             words.extend([
                 "--out".to_owned(),
                 self.into.join(&file).to_string_lossy().into_owned(),
                 "--force".to_owned(),
             ]);
             let parsed = parse::<RenderLine>(&words).map_err(|error| {
-                // Clap's own text without its "error: " and usage.
-                let text = error.to_string();
-                let first = text.lines().next().unwrap_or_default().trim_start_matches("error: ");
-                self.failure(&format!("file {}: {first} (chalumeau {})", at + 1, typed(&words)))
+                self.failure(&format!("{place}: {} (chalumeau {})", in_one_line(&error), typed(&words)))
             })?;
             let fields: Vec<_> = variation.values.iter().map(|value| quoted(value)).collect();
             let line = format!("{file},{}", fields.join(","));
             let values = plan.names.iter().zip(&variation.values);
             let bore = values.filter(|(name, _)| OF_THE_BORE.contains(&name.as_str()));
             let bore = bore.map(|(_, value)| value.clone()).collect();
-            Ok(Job { file, line, words, bore, render: parsed.render })
+            Ok(Job { file, line, place, words, bore, render: parsed.render })
         };
         plan.variations.iter().enumerate().map(job).collect()
     }
@@ -251,6 +256,10 @@ impl Earlier {
                 folder.join(name).display()
             ))
         };
+        // A run whose first file failed has left a table without files.
+        if self.lines().next().is_none() && !has_numbered_files(folder) {
+            return Ok(());
+        }
         for (name, text) in [(MANIFEST, &self.finished), (GROWING, &self.growing)] {
             if text.lines().next().is_some_and(|first| first != header) {
                 return Err(refuse(name, "is of another plan"));
@@ -275,10 +284,6 @@ impl Earlier {
     /// Says which listed files are still there and are not of this plan.
     fn left_over(&self, folder: &Path, jobs: &[Job]) -> Option<String> {
         let ours: HashSet<_> = jobs.iter().map(|job| job.file.as_str()).collect();
-        let is_numbered = |name: &str| {
-            let number = name.strip_suffix(".wav").unwrap_or_default();
-            !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())
-        };
         let others: BTreeSet<_> = self
             .lines()
             .map(file_name)
@@ -292,6 +297,24 @@ impl Earlier {
             counted(others.len(), "file")
         ))
     }
+}
+
+/// Whether a file is called as the batch calls its own.
+fn is_numbered(name: &str) -> bool {
+    let number = name.strip_suffix(".wav").unwrap_or_default();
+    !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+fn has_numbered_files(folder: &Path) -> bool {
+    let files = fs::read_dir(folder).into_iter().flatten().flatten();
+    files.into_iter().any(|file| file.file_name().to_str().is_some_and(is_numbered))
+}
+
+/// Clap's own text without its "error: " and usage: with a list of what is missing, which stands on further lines.
+fn in_one_line(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let lines: Vec<_> = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect();
+    lines.join(" ").trim_start_matches("error: ").to_owned()
 }
 
 /// File and arguments: a line without what is known after the rendering.
@@ -313,19 +336,6 @@ fn finished(begin: &str, made: &Rendered) -> String {
     format!("{begin},{:.4},{},{},{}", made.seconds, made.rate, db(made.level.peak), db(made.level.rms))
 }
 
-/// A command as it is typed in a shell.
-fn typed(words: &[String]) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,+@".contains(c);
-    let word = |word: &String| {
-        if !word.is_empty() && word.chars().all(is_plain) {
-            word.clone()
-        } else {
-            format!("'{}'", word.replace('\'', r"'\''"))
-        }
-    };
-    words.iter().map(word).collect::<Vec<_>>().join(" ")
-}
-
 /// A progress bar over files; it shows on a terminal only.
 fn progress(files: usize) -> ProgressBar {
     let bar = ProgressBar::new(files as u64);
@@ -338,12 +348,6 @@ fn progress(files: usize) -> ProgressBar {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn commands_are_quoted_for_a_shell() {
-        let words = ["render", "--noise=50 %", "--preset=Player's own", ""].map(str::to_owned);
-        assert_eq!(typed(&words), r"render '--noise=50 %' '--preset=Player'\''s own' ''");
-    }
 
     /// The last columns of a table.
     const REST: &str = "length_s,rate_hz,peak_dbfs,rms_dbfs";
@@ -428,6 +432,22 @@ mod tests {
     }
 
     #[test]
+    fn a_plan_that_is_corrected_before_any_file_was_made_is_the_same_plan() {
+        let directory = tempfile::tempdir().unwrap();
+        let plan = "[vary]\nwritten = [\"E3\"]\n[same]\nseconds = 0.02\n";
+        let (command, into) = batch(directory.path(), "plan.toml", plan, false);
+        fs::create_dir(&into).unwrap();
+        fs::write(into.join(GROWING), "file,written,growl,length_s,rate_hz,peak_dbfs,rms_dbfs\n").unwrap();
+        command.run().unwrap();
+        assert!(into.join("0001.wav").exists() && !into.join(GROWING).exists());
+        // With a file that may be of that plan it is refused.
+        fs::rename(into.join(MANIFEST), into.join(GROWING)).unwrap();
+        fs::write(into.join(GROWING), "file,written,growl,length_s,rate_hz,peak_dbfs,rms_dbfs\n").unwrap();
+        let said = command.run().unwrap_err().to_string();
+        assert!(said.contains("is of another plan"), "{said}");
+    }
+
+    #[test]
     fn mistakes_are_told_before_anything_is_rendered() {
         let directory = tempfile::tempdir().unwrap();
         for (name, text, says) in [
@@ -444,6 +464,12 @@ mod tests {
             ("p.toml", "[vary]\ngamma = [-1]\n", "0..3"),
             ("p.toml", "vary = 3", "invalid type"),
             ("r.csv", "written,gamma\nC4\n", "line 2"),
+            ("r.csv", "written,gamma\nC4,0.5\n\nC9,0.5\n", "line 4: written 120 (C9) has no fingering"),
+            (
+                "r.csv",
+                "gamma\n0.5\n0.6\n",
+                "line 2: the following required arguments were not provided: <MIDI|",
+            ),
             ("r.csv", "", "names"),
         ] {
             let (command, into) = batch(directory.path(), name, text, false);

@@ -6,6 +6,29 @@
 use crate::parameters::{self, PARAMETERS, Parameter};
 use clap::{Arg, ArgAction, Args, Command};
 
+/// A command as it is typed in a shell.
+pub fn typed<W: AsRef<str>>(words: impl IntoIterator<Item = W>) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,+@".contains(c);
+    let word = |word: W| {
+        let word = word.as_ref();
+        if !word.is_empty() && word.chars().all(is_plain) {
+            word.to_owned()
+        } else {
+            format!("'{}'", word.replace('\'', r"'\''"))
+        }
+    };
+    words.into_iter().map(word).collect::<Vec<_>>().join(" ")
+}
+
+/// Names as alternatives: reed-stiffness, reed-area or reed-width.
+fn one_of(names: &[&str]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => (*one).to_owned(),
+        [first @ .., last] => format!("{} or {last}", first.join(", ")),
+    }
+}
+
 /// The names that a command knows.
 pub struct Names {
     command: Command,
@@ -28,11 +51,19 @@ impl Names {
         }
         let flags = self.command.get_arguments().filter_map(Arg::get_long);
         let ids = PARAMETERS.iter().map(|parameter| parameter.id).filter(|_| self.sets);
-        let near = flags
-            .chain(ids)
-            .max_by(|a, b| strsim::jaro_winkler(a, name).total_cmp(&strsim::jaro_winkler(b, name)));
+        let known: Vec<_> = flags.chain(ids).collect();
+        let begin: Vec<_> = known.iter().copied().filter(|known| known.starts_with(name)).collect();
+        let near = if name.is_empty() || begin.is_empty() {
+            known
+                .into_iter()
+                .max_by(|a, b| strsim::jaro_winkler(a, name).total_cmp(&strsim::jaro_winkler(b, name)))
+                .unwrap_or_default()
+                .to_owned()
+        } else {
+            one_of(&begin)
+        };
         let what = if self.sets { "no flag of render and no parameter" } else { "no argument" };
-        Err(format!("{what} is called {name:?}; do you mean {}?", near.unwrap_or_default()))
+        Err(format!("{what} is called {name:?}; do you mean {near}?"))
     }
 
     /// The words of these names and values. An empty value leaves its name out.
@@ -101,5 +132,25 @@ impl Names {
             }
         }
         Ok(words)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::render::RenderCommand;
+
+    #[test]
+    fn commands_are_quoted_for_a_shell() {
+        let words = ["render", "--noise=50 %", "--preset=Player's own", ""];
+        assert_eq!(typed(words), r"render '--noise=50 %' '--preset=Player'\''s own' ''");
+    }
+
+    #[test]
+    fn names_that_begin_so_are_meant_before_those_that_look_alike() {
+        let said = |name: &str| Names::of::<RenderCommand>().check(name).unwrap_err();
+        let reed = said("reed");
+        assert!(reed.contains("reed-stiffness") && reed.ends_with("?"), "{reed}");
+        assert!(said("gama").ends_with("do you mean gamma?"), "{}", said("gama"));
     }
 }

@@ -15,6 +15,8 @@ const OWN: [&str; 6] = ["out", "force", "probe", "plot", "plot-at", "help"];
 /// The values of one file, in the order of the plan's names; an empty one leaves its name out.
 pub struct Variation {
     pub values: Vec<String>,
+    /// Its line in the plan, from 1, if it has one of its own.
+    pub line: Option<u64>,
 }
 
 /// What is set for each file.
@@ -123,8 +125,8 @@ impl Plan {
                 .collect();
             names.push(name);
         }
-        Self { names, variations: variations.into_iter().map(|values| Variation { values }).collect() }
-            .checked()
+        let variations = variations.into_iter().map(|values| Variation { values, line: None });
+        Self { names, variations: variations.collect() }.checked()
     }
 
     pub fn from_csv(text: &str) -> Result<Self, String> {
@@ -141,7 +143,8 @@ impl Plan {
                     let line = error.position().map_or(0, csv::Position::line);
                     format!("line {line} has not as many fields as the first line")
                 })?;
-                Ok(Variation { values: record.iter().map(str::to_owned).collect() })
+                let line = record.position().map(csv::Position::line);
+                Ok(Variation { values: record.iter().map(str::to_owned).collect(), line })
             })
             .collect::<Result<Vec<_>, String>>()?;
         if variations.is_empty() {
