@@ -10,21 +10,20 @@ use crate::cli::render_monitor::{RenderMonitor, RenderSummary};
 use crate::cli::report::breath_and_haptics::BreathAndHaptics;
 use crate::cli::score_args::ScoreArgs;
 use crate::cli::shared_args::within;
+use crate::cli::words::typed;
 
 use crate::identity;
 use crate::output::NewFile;
+use crate::parameters::{PARAMETERS, Parameter, Sets, Value};
 use crate::wav::{Depth, WavFile};
-use chalumeau_core::instrument::{Settings, Tuning};
+use chalumeau_core::instrument::Settings;
 use chalumeau_core::measure::notes::{MeasuredNote, spread};
-use chalumeau_core::score as player;
 use chalumeau_figure::report::{Plate, Report as Page, ReportTable, Sound, TableCell, write};
 use clap::Args;
 use std::cell::RefCell;
 use std::io::{Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
 
-/// Samples per block; any number gives the same sound.
-const BLOCK: usize = 512;
 /// Longest sound inside a page, s: 77 MB of text at 48 kHz, about what browsers still open easily.
 const INSIDE_MAX_S: f64 = 600.0;
 
@@ -73,6 +72,7 @@ impl ReportCommand {
             return self.write_tour();
         }
         let prepared = self.play.prepare()?;
+        refuse_several_players(&prepared)?;
         prepared.warn();
         if prepared.settings.room.amount > 0.0 {
             eprintln!("warning: a report has one channel, on which no room is heard");
@@ -108,6 +108,7 @@ impl ReportCommand {
 
     fn write_tour(&self) -> Result<(), Failure> {
         let job = self.play.without_score()?;
+        refuse_several_players(&job)?;
         let mut page = NewFile::create(&self.out, self.force)?;
         let report = tour::page(&job, command(), progress)?;
         write(&report, &mut page).map_err(|source| Failure::Report { path: self.out.clone(), source })?;
@@ -188,6 +189,7 @@ impl ReportCommand {
             chapters: vec![touch.breath(), touch.haptics()],
             tables: vec![
                 notes(prepared, &watched.heard, &outcome),
+                reed(&prepared.settings),
                 settings(&prepared.settings),
                 instrument(prepared),
             ],
@@ -197,29 +199,30 @@ impl ReportCommand {
     }
 }
 
+fn refuse_several_players(prepared: &RenderJob) -> Result<(), Failure> {
+    if prepared.has_several_players() {
+        let inside = "a report looks inside one instrument; leave --players and --tracks out";
+        return Err(Failure::Usage(inside.to_owned()));
+    }
+    Ok(())
+}
+
 /// Plays and analyses; the sound goes to `out` in 16 bits.
 fn played(
     prepared: &RenderJob,
     watch: RenderMonitor,
     out: &mut (impl Write + Seek),
 ) -> Result<RenderSummary, Failure> {
-    let score = &prepared.score;
-    let mut wav = WavFile::new(out, prepared.rate, Depth::Int16, 1, score.samples)?;
-    let mut clarinet = prepared.clarinet();
-    let bar = progress(score.samples);
+    let samples = prepared.score.samples;
+    let mut wav = WavFile::new(out, prepared.rate, Depth::Int16, 1, samples)?;
+    let bar = progress(samples);
     // Samples and insides come in turn.
     let watch = RefCell::new(watch);
-    player::play_probed(
-        &mut clarinet,
-        score,
-        BLOCK,
-        &mut |inside| watch.borrow_mut().inside(inside),
-        |block| {
-            bar.inc(block.len() as u64);
-            watch.borrow_mut().hear(block);
-            wav.write(&[block]).map_err(Failure::from)
-        },
-    )?;
+    prepared.play(1, Some(&mut |inside| watch.borrow_mut().inside(inside)), |sent, heard| {
+        bar.inc(sent.len() as u64);
+        watch.borrow_mut().hear(sent);
+        wav.write(heard).map_err(Failure::from)
+    })?;
     wav.finish()?;
     bar.finish_and_clear();
     Ok(watch.into_inner().finish())
@@ -231,12 +234,7 @@ fn name(path: &Path) -> String {
 
 /// The command as typed, so that a reader can repeat it.
 fn command() -> String {
-    let words = std::env::args().skip(1).map(|word| {
-        let plain =
-            !word.is_empty() && !word.contains(|c: char| c.is_whitespace() || "\"'$&;()<>|*?\\".contains(c));
-        if plain { word } else { format!("'{}'", word.replace('\'', "'\\''")) }
-    });
-    std::iter::once("chalumeau".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+    typed(std::iter::once("chalumeau".to_owned()).chain(std::env::args().skip(1)))
 }
 
 /// Rounded to a tenth, with its sign unless it is 0.
@@ -286,34 +284,64 @@ fn notes(prepared: &RenderJob, heard: &[MeasuredNote], outcome: &str) -> ReportT
     }
 }
 
-fn settings(settings: &Settings) -> ReportTable {
+/// What the settings make of the reed.
+fn reed(settings: &Settings) -> ReportTable {
     let law = settings.reed_law();
     let rows = [
-        ("Full breath", format!("{}", settings.breath_full_kpa), "kPa"),
-        ("Breath noise", format!("{}", settings.noise), "0..1"),
-        ("Tongue release", format!("{}", settings.tongue_ms), "ms"),
-        ("Finger movement", format!("{}", settings.legato_ms), "ms"),
-        ("Reed strength", format!("{}", settings.strength), "as on the box"),
         ("Closing pressure", format!("{:.3}", 1e-3 * settings.closing_pa()), "kPa"),
-        ("Lip, tip opening", format!("{}", settings.lip), "of the reference"),
-        ("Lip damping", format!("{}", settings.damping), "of the usual"),
-        ("Embouchure", format!("{}", settings.zeta), ""),
-        ("Curve of the lay", format!("{}", settings.lay), "0 sharp"),
         ("Reed law H", format!("{:.6}", law.h()), ""),
         ("Reed law k", format!("{:.6}", law.k()), if settings.coupled { "follows H" } else { "free" }),
         ("Reed law A", format!("{}", law.a()), ""),
-        ("A4", format!("{}", settings.a4_hz), "Hz"),
-        ("Tuning", if settings.tuning == Tuning::Tempered { "tempered" } else { "natural" }.to_owned(), ""),
-        ("Air", format!("{}", settings.temperature_c), "Celsius"),
-        ("Loss of open holes", format!("{}", settings.vent_loss), ""),
-        ("Output gain", format!("{}", settings.gain_db), "dB"),
     ];
     let row = |(name, value, unit): (&str, String, &str)| vec![word(name), number(value), word(unit)];
     ReportTable {
-        title: "Settings".to_owned(),
+        title: "Reed as it is played".to_owned(),
         about: String::new(),
-        head: ["setting", "value", "unit or scale"].map(str::to_owned).to_vec(),
+        head: ["quantity", "value", "unit"].map(str::to_owned).to_vec(),
         rows: rows.into_iter().map(row).collect(),
+    }
+}
+
+/// The value of a parameter in these settings; `None` for one that they do not hold, such as another description of the reed.
+fn value(parameter: &Parameter, settings: &Settings) -> Option<Value> {
+    let mut of = *settings;
+    match parameter.sets? {
+        Sets::Number(which) => Some(Value::Number(*of.number(which))),
+        Sets::Switch(field) => Some(Value::Switch(*field(&mut of))),
+        Sets::Whole(field) => Some(Value::Whole(*field(&mut of))),
+        // What leaves the settings as they are is what they are.
+        Sets::Choice(choose) => {
+            let is = |&at: &usize| {
+                let mut chosen = *settings;
+                choose(&mut chosen, at);
+                chosen == *settings
+            };
+            (0..=parameter.steps()?).find(is).map(Value::Choice)
+        }
+        Sets::Reed(..) | Sets::ReedFace => None,
+    }
+}
+
+/// All settings of the sound; where one is not the default, the default stands beside it.
+fn settings(settings: &Settings) -> ReportTable {
+    let row = |parameter: &'static Parameter| {
+        let value = parameter.text(value(parameter, settings)?);
+        let default = parameter.default_text();
+        let default = if value == default { String::new() } else { default };
+        Some(vec![
+            word(parameter.group),
+            word(parameter.name),
+            word(parameter.id),
+            number(value),
+            number(default),
+        ])
+    };
+    ReportTable {
+        title: "Settings".to_owned(),
+        about: "The last column has the default of each setting that was played with another value."
+            .to_owned(),
+        head: ["group", "setting", "id", "value", "default"].map(str::to_owned).to_vec(),
+        rows: PARAMETERS.iter().filter_map(row).collect(),
     }
 }
 

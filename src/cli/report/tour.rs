@@ -6,13 +6,10 @@ use crate::identity;
 use crate::tour;
 use crate::wav::{Depth, WavFile};
 use chalumeau_core::instrument::Settings;
-use chalumeau_core::score::{self as player, Score, StereoBlocks};
+use chalumeau_core::score::Score;
 use chalumeau_figure::report::{Chapter, Report as Page, Sound, Track};
 use indicatif::ProgressBar;
 use std::io::Cursor;
-
-/// Samples per block; any number gives the same sound.
-const BLOCK: usize = 512;
 
 /// Plays everything; `bar` makes a progress bar for so many samples.
 pub fn page(
@@ -61,14 +58,8 @@ fn sound(job: &RenderJob, settings: Settings, score: &Score) -> Result<Vec<u8>, 
     let mut bytes = Cursor::new(Vec::new());
     let mut wav = WavFile::new(&mut bytes, job.rate, Depth::Int16, channels, score.samples)?;
     let stop = RenderJob::to_play_later(job.model.clone(), settings, job.rate);
-    let mut stereo = StereoBlocks::new(score, job.rate).in_room(&settings);
-    player::play(&mut stop.clarinet(), score, BLOCK, |block| {
-        if channels == 1 {
-            return wav.write(&[block]).map_err(Failure::from);
-        }
-        let [left, right] = stereo.spread(block);
-        wav.write(&[left, right]).map_err(Failure::from)
-    })?;
+    let stop = RenderJob { score: score.clone(), ..stop };
+    stop.play(channels, None, |_, heard| wav.write(heard).map_err(Failure::from))?;
     wav.finish()?;
     Ok(bytes.into_inner())
 }
