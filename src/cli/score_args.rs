@@ -8,13 +8,15 @@ use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, check_fingering, dynamics, note, rate, sounding, within};
 use crate::cli::threshold::linear_threshold;
 use crate::controllers::{ControllerMap, as_links};
+use crate::parameters::Value;
 use crate::presets::{self, Preset};
 use crate::scale_file;
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::control::midi::MidiDecoder;
-use chalumeau_core::control::midi::links::{Link, MOST};
+use chalumeau_core::control::midi::breath::BreathFrom;
+use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::control::parts::Parts;
 use chalumeau_core::event::{Event, PartEvent, Timed};
 use chalumeau_core::haptics::FeelDesign;
@@ -86,7 +88,8 @@ pub struct ScoreArgs {
     /// One note by its sounding pitch
     #[arg(long, value_name = "NOTE", value_parser = note)]
     sounding: Option<u8>,
-    /// Chromatic scale between two written notes, up or down, for example E3:C6
+    /// Chromatic scale between two written notes, up or down, for example E3:C6; notes that the instrument does not have are
+    /// left out
     #[arg(long, value_name = "FROM:TO", value_parser = interval)]
     scale: Option<(u8, u8)>,
     /// Slur the scale instead of tonguing each note
@@ -186,24 +189,30 @@ impl ScoreArgs {
     fn plan(&self) -> Result<Planned, Failure> {
         let file = self.instrument.load_for(self.preset.as_ref())?;
         let mut curve = self.curve()?;
-        let base = self.preset.as_ref().map(Preset::settings);
         let map = self.controllers.clone().unwrap_or_default();
+        let mut base = self.preset.as_ref().map(Preset::settings);
+        if !map.values.is_empty() {
+            // Over a preset, and under what the user has given.
+            let mut under = base.map_or_else(|| self.settings.usual(curve.is_some()), Ok)?;
+            map.values.iter().for_each(|(parameter, value)| parameter.set(&mut under, *value));
+            base = Some(under);
+        }
         let mut settings = match (&curve, &base) {
             (Some(curve), base) => self.settings.blown_in_either(base.as_ref(), curve, &file)?,
             (None, base) if self.dynamic.is_some() => self.settings.with_dynamics(base.as_ref(), &file)?,
             (None, Some(base)) => self.settings.over_preset(base, &file)?,
             (None, None) => self.settings.played(&file)?,
         };
-        map.values.iter().for_each(|(parameter, value)| parameter.set(&mut settings, *value));
-        let mut warnings = Vec::new();
+        let mut warnings: Vec<_> = only_in_the_plugin(&map).into_iter().collect();
         if let Some(curve) = &curve {
             warnings.extend(self.too_little_breath(curve, &settings, &file));
         }
         if let Some((from, to)) = self.dynamic {
             curve = Some(BreathCurve::dynamics(from, to, &settings));
         }
+        warnings.extend(self.scale.and_then(|ends| left_out_of_scale(ends, &file)));
         let trims = self.trims(&file)?;
-        let mut parts = self.score(&file, &as_links(&map.links, &settings), &mut settings)?;
+        let mut parts = self.score(&file, &map, &mut settings)?;
         if let Some(curve) = &curve {
             parts = parts.blown(curve, &settings, self.rate);
         }
@@ -365,6 +374,9 @@ impl ScoreArgs {
         if text.starts_with("ramp:") {
             return Ok(Some(BreathCurve::parse_ramp(text)?));
         }
+        if dynamics(text).is_ok() {
+            return Err(Failure::Usage(format!("--breath {text}: for a dynamic give --dynamic {text}")));
+        }
         let path = PathBuf::from(text);
         let from = fs::File::open(&path).map_err(|source| Failure::Read { path: path.clone(), source })?;
         match BreathCurve::read_csv(from) {
@@ -376,9 +388,10 @@ impl ScoreArgs {
     fn score(
         &self,
         file: &InstrumentFile,
-        links: &[Option<Link>; MOST],
+        map: &ControllerMap,
         settings: &mut Settings,
     ) -> Result<Score<PartEvent>, Failure> {
+        let links = as_links(&map.links, settings);
         let transposition = file.transposition;
         let (players, key_switches) = (&mut settings.players, settings.reach.key_switches);
         if self.tracks && (self.midi.is_none() || matches!(self.given, Some(Given::Notes(_)))) {
@@ -397,13 +410,14 @@ impl ScoreArgs {
                 None => fs::read(path).map_err(|source| no_such_piece(path, source))?,
             };
             let mut decoder = if self.mpe { MidiDecoder::new().with_mpe() } else { MidiDecoder::new() };
-            decoder.set_links(links);
+            decoder.set_links(&links);
             if let Some(preset) = &self.preset {
                 // Nothing sounds yet, so this bends nothing.
                 decoder.usual_bend_range(preset.bend_range());
                 decoder.set_wheel(preset.wheel());
                 decoder.set_breath_from(preset.breath_from());
             }
+            set_by_map(&mut decoder, map);
             let refused = |source| Failure::MidiFile { path: path.clone(), source };
             if self.tracks {
                 let (score, count) =
@@ -416,12 +430,15 @@ impl ScoreArgs {
             return midi_file::read_parts(parts, &bytes, self.rate).map_err(refused);
         }
         if let Some((from, to)) = self.scale {
-            let (from, to) = (WrittenNote(from), WrittenNote(to));
-            for written in from.0.min(to.0)..=from.0.max(to.0) {
-                check_fingering(file, WrittenNote(written))?;
+            for end in [from, to] {
+                check_fingering(file, WrittenNote(end))?;
+            }
+            let (mut notes, _) = scale_of_chart((from, to), file);
+            if from > to {
+                notes.reverse();
             }
             let seconds = self.seconds.unwrap_or(0.5);
-            let scale = Score::scale(from, to, transposition, seconds, self.slurred, self.rate)?;
+            let scale = Score::one_after_another(&notes, transposition, seconds, self.slurred, self.rate)?;
             return Ok((&scale).into());
         }
         let seconds = self.seconds.unwrap_or(2.0);
@@ -441,6 +458,50 @@ impl ScoreArgs {
             _ => Err(Failure::Usage("after transposition this note is outside the range of MIDI".to_owned())),
         }
     }
+}
+
+/// The notes between these two, with them, that the chart has, and those that it does not have, both low to high.
+fn scale_of_chart((from, to): (u8, u8), file: &InstrumentFile) -> (Vec<WrittenNote>, Vec<WrittenNote>) {
+    (from.min(to)..=from.max(to)).map(WrittenNote).partition(|&note| file.fingering(note).is_some())
+}
+
+/// Says which notes of a scale the chart does not have.
+fn left_out_of_scale(ends: (u8, u8), file: &InstrumentFile) -> Option<String> {
+    let (_, missing) = scale_of_chart(ends, file);
+    let names: Vec<_> = missing.iter().map(WrittenNote::to_string).collect();
+    (!names.is_empty())
+        .then(|| format!("this instrument has no {}; the scale leaves them out", names.join(" ")))
+}
+
+/// Values of a map that the decoder of MIDI takes, and no instrument.
+const OF_THE_DECODER: [&str; 3] = ["wheel", "bfrom", "bendr"];
+
+/// Sets what a map says of the wheel, of the controller that blows, and of the bend range. Nothing sounds yet, so this bends nothing.
+fn set_by_map(decoder: &mut MidiDecoder, map: &ControllerMap) {
+    for &(parameter, value) in &map.values {
+        match (parameter.id, value) {
+            ("wheel", Value::Choice(at)) => {
+                decoder.set_wheel(Wheel::ALL.get(at).copied().unwrap_or_default());
+            }
+            ("bfrom", Value::Choice(at)) => {
+                decoder.set_breath_from(BreathFrom::ALL.get(at).copied().unwrap_or_default());
+            }
+            ("bendr", Value::Whole(semitones)) => {
+                decoder.usual_bend_range(semitones.clamp(0, 127) as u8);
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Says which values of a map have no effect offline.
+fn only_in_the_plugin(map: &ControllerMap) -> Option<String> {
+    let ids = map.values.iter().map(|(parameter, _)| *parameter);
+    let idle = ids.filter(|of| of.sets.is_none() && !OF_THE_DECODER.contains(&of.id));
+    let names: Vec<_> = idle.map(|of| format!("{} ({})", of.name, of.id)).collect();
+    (!names.is_empty()).then(|| {
+        format!("--controllers sets {}, which only the plugin has: no effect here", names.join(", "))
+    })
 }
 
 /// Reads a recorded take.

@@ -307,6 +307,15 @@ impl SettingsArgs {
         }
     }
 
+    /// What [`played`](Self::played) and [`blown_in_either`](Self::blown_in_either) begin with where there is no preset.
+    pub fn usual(&self, is_blown_by_a_curve: bool) -> Result<Settings, Failure> {
+        Ok(match self.response()? {
+            Some((BreathResponse::Physical, _)) => Settings::physical(),
+            None if is_blown_by_a_curve => Settings::physical(),
+            _ => Settings::default(),
+        })
+    }
+
     /// The settings of a preset, and over them what was given.
     pub fn over_preset(&self, preset: &Settings, file: &InstrumentFile) -> Result<Settings, Failure> {
         self.over(*preset, file)

@@ -84,9 +84,25 @@ impl Score {
     ) -> Result<Self, ScoreError> {
         let semitones: Vec<u8> =
             if from <= to { (from.0..=to.0).collect() } else { (to.0..=from.0).rev().collect() };
+        let notes: Vec<_> = semitones.into_iter().map(WrittenNote).collect();
+        Self::one_after_another(&notes, transposition, seconds, slurred, rate)
+    }
+
+    /// These written notes, each lasting `seconds`; the rest as for [`scale`](Self::scale).
+    ///
+    /// # Errors
+    ///
+    /// [`ScoreError::OutsideMidi`] if a note sounds outside MIDI's range.
+    pub fn one_after_another(
+        notes: &[WrittenNote],
+        transposition: i8,
+        seconds: f64,
+        slurred: bool,
+        rate: u32,
+    ) -> Result<Self, ScoreError> {
         let gap_s = if slurred { 0.0 } else { TONGUE_GAP_S.min(seconds / 4.0) };
         let (mut events, mut end, mut last) = (Vec::new(), 0, None);
-        for (index, written) in semitones.into_iter().map(WrittenNote).enumerate() {
+        for (index, &written) in notes.iter().enumerate() {
             let note = written.sounding(transposition).ok_or(ScoreError::OutsideMidi(written))?;
             let start = samples_in(index as f64 * seconds, rate);
             events.push(Timed { at: start, event: Event::NoteOn { note, velocity: PLAIN_VELOCITY } });
