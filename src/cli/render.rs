@@ -79,7 +79,7 @@ pub struct RenderCommand {
     /// CSV file of internal signals over time: mouth pressure, reed opening, flow, mouthpiece and radiated pressure
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     probe: Option<PathBuf>,
-    /// Write every Nth internal sample (96 or 88.2 thousand a second) to the probe file
+    /// Write every Nth internal sample to the probe file; 96 or 88.2 thousand a second, twice that with --quality high
     #[arg(long, value_name = "N", default_value = "1", requires = "probe", help_heading = "Output", value_parser = |s: &str| whole::<u32>(s, 1, 1_000_000))]
     probe_every: u32,
     /// Replace existing files
