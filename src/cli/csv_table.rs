@@ -81,11 +81,16 @@ impl CsvTable {
     }
 }
 
-/// A field of a table, quoted where its text needs that.
+/// A field of a table, quoted where its text needs that: also where a reader that knows remarks would take # for the beginning of one.
 pub fn quoted(text: &str) -> Cow<'_, str> {
-    if text.contains([',', '"', '\n', '\r']) {
+    if text.contains([',', '"', '\n', '\r', '#']) {
         Cow::Owned(format!("\"{}\"", text.replace('"', "\"\"")))
     } else {
         Cow::Borrowed(text)
     }
+}
+
+/// The name of a note as a field of a table: C#4 is quoted.
+pub fn named(note: impl fmt::Display) -> String {
+    quoted(&note.to_string()).into_owned()
 }

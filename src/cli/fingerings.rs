@@ -1,7 +1,7 @@
 //! `chalumeau fingerings`: every fingering that fingers and keys can make, for a note, a trill or two notes at once.
 
 use crate::cli::Failure;
-use crate::cli::csv_table::TableArgs;
+use crate::cli::csv_table::{TableArgs, quoted};
 use crate::cli::shared_args::{AirArg, InstrumentArg, counted, note, whole};
 use chalumeau_core::bore::fingering_finder::{FingeringFinder, Found};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
@@ -27,6 +27,7 @@ Examples:
 /// gamma_on: the mouth pressure at which it begins, over the closing pressure of the reed;
 /// mode: which resonance of the bore it plays, 1 the lowest;
 /// evenness_db: how far that resonance stands above the next lower one; below 0 the lower one may sound instead;
+/// empty for the lowest;
 /// cost: what the ranking goes by, less is better: cents, gamma_on, evenness and awkward grips together;
 /// open: holes that are open;
 /// chart: whether the instrument's file has this fingering for the note.
@@ -77,26 +78,26 @@ impl FingeringsCommand {
                 let [low, high] = one.f_hz;
                 table.line(format_args!(
                     "{},{low:.1},{high:.1},{:.1},{:.3},{:.2},{}",
-                    one.fingers,
+                    quoted(&one.fingers),
                     one.uneven_db,
                     one.gamma_on,
                     one.cost,
-                    open(&file, one.grip.open)
+                    quoted(&open(&file, one.grip.open))
                 ))?;
             }
             return table.finish();
         };
         let one = |found: &Found| {
             format!(
-                "{},{:.1},{:+.1},{:.3},{},{:.1},{:.2},{}",
-                found.fingers,
+                "{},{:.1},{:+.1},{:.3},{},{},{:.2},{}",
+                quoted(&found.fingers),
                 found.f_hz,
                 found.cents,
                 found.gamma_on,
                 found.mode,
-                found.evenness_db,
+                evenness(found),
                 found.cost,
-                open(&file, found.grip.open)
+                quoted(&open(&file, found.grip.open))
             )
         };
         if let Some(to) = self.trill_to.map(WrittenNote) {
@@ -128,6 +129,11 @@ impl FingeringsCommand {
         }
         table.finish()
     }
+}
+
+/// How far the resonance that plays stands above the next lower one, dB; the lowest one stands above none.
+fn evenness(found: &Found) -> String {
+    if found.mode > 1 { format!("{:.1}", found.evenness_db) } else { String::new() }
 }
 
 /// Names of the open holes.
