@@ -1,14 +1,13 @@
 //! `chalumeau instrument`: makes, imports, checks and shows instrument files.
 
 use crate::cli::Failure;
-use crate::cli::csv_table::{TableArgs, quoted};
+use crate::cli::csv_table::{TableArgs, named, quoted};
 use crate::cli::shared_args::{AirArg, InstrumentArg, counted, note, whole, within};
-use crate::instrument_path::{self, LoadError};
 use crate::output::NewFile;
 use crate::text_file;
 use chalumeau_core::bore::check::Check;
 use chalumeau_core::bore::cylinder::Cylinder;
-use chalumeau_core::bore::instrument_file::{ImportDetails, ImportError, InstrumentFile, Sheet};
+use chalumeau_core::bore::instrument_file::{BoreSegment, ImportDetails, ImportError, InstrumentFile, Sheet};
 use chalumeau_core::instrument::concert_pitch::A4_HZ;
 use chalumeau_core::units::{Air, WrittenNote};
 use clap::{Args, Subcommand};
@@ -103,8 +102,8 @@ impl NewInstrument {
 ///
 /// The tables have one line for each cone of the bore, each tone hole and each note. The first line names the columns;
 /// lines that begin with # are comments. Column names contain the unit, and radius or diameter: bore x_start_m, x_end_m, r_start_m, r_end_m [part];
-/// holes hole, x_m, hole_radius_m, chimney_height_m [kind, register, description]; fingerings written_note, register, and
-/// one column of 0 (closed) and 1 (open) for each hole [mode, fingers, sounding_note]. Any length may be in _mm, any radius
+/// holes hole, x_m, hole_radius_m, chimney_height_m [kind, register, description]; fingerings written_note and
+/// one column of 0 (closed) and 1 (open) for each hole [register, mode, fingers, sounding_note]. Any length may be in _mm, any radius
 /// a diameter (diameter_start_mm).
 #[derive(Args)]
 struct Import {
@@ -147,7 +146,24 @@ impl Import {
             reed_volume_mm3: self.reed_volume,
             nominal_diameter_mm: self.nominal_diameter_mm,
         };
-        self.new.write(&InstrumentFile::from_csv(bore, holes, fingerings, &details)?, A4_HZ)
+        let file = InstrumentFile::from_csv(bore, holes, fingerings, &details)?;
+        self.new.write(&file, A4_HZ)?;
+        if self.nominal_diameter_mm.is_none() {
+            self.say_nominal_diameter(&file);
+        }
+        Ok(())
+    }
+
+    /// Says which bore zeta and the reed's size refer to. The file does not tell which of its cones a maker would name.
+    fn say_nominal_diameter(&self, file: &InstrumentFile) {
+        let length_m = |cone: &BoreSegment| cone.x_end_m - cone.x_start_m;
+        let longest = file.bore.iter().max_by(|a, b| length_m(a).total_cmp(&length_m(b)));
+        let Some(longest) = longest else { return };
+        let (taken_mm, wide_mm) = (2e3 * file.nominal_radius_m, 1e3 * (longest.r_start_m + longest.r_end_m));
+        eprintln!(
+            "note: zeta and the reed's size refer to a bore of {taken_mm:.1} mm, a B flat clarinet's; the longest part of this one is \
+             {wide_mm:.1} mm wide, see --nominal-diameter-mm"
+        );
     }
 }
 
@@ -169,9 +185,8 @@ fn head_comments(text: &str) -> String {
 /// Columns: written,written_midi,register,mode,wanted_hz,peak_hz,cents,mag_over_zc,q.
 #[derive(Args)]
 struct CheckFile {
-    /// Instrument file
-    #[arg(value_name = "FILE")]
-    file: PathBuf,
+    #[command(flatten)]
+    which: Which,
     /// Pitch of A4, Hz, 380..500
     #[arg(long, value_name = "HZ", default_value = "440", value_parser = |s: &str| within(s, 380.0, 500.0))]
     a4: f64,
@@ -183,10 +198,7 @@ struct CheckFile {
 
 impl CheckFile {
     fn run(&self) -> Result<ExitCode, Failure> {
-        let file = instrument_path::load(&self.file).map_err(|error| match error {
-            LoadError::Read { path, error } => Failure::Read { path, source: error },
-            LoadError::Instrument(source) => Failure::InstrumentFile { path: self.file.clone(), source },
-        })?;
+        let file = self.which.load()?;
         let check = Check::new(&file, self.air.air(), self.a4);
         let mut table =
             self.table.open("written,written_midi,register,mode,wanted_hz,peak_hz,cents,mag_over_zc,q")?;
@@ -199,7 +211,10 @@ impl CheckFile {
             };
             table.line(format_args!(
                 "{},{},{register},{},{:.2},{peak_hz:.2},{cents:+.1},{mag:.2},{q:.1}",
-                note.written, note.written.0, note.mode, note.wanted_hz
+                named(note.written),
+                note.written.0,
+                note.mode,
+                note.wanted_hz
             ))?;
         }
         table.finish()?;
@@ -207,12 +222,19 @@ impl CheckFile {
             let weight = if concern.is_fatal() { "error" } else { "warning" };
             eprintln!("{weight}: {concern}");
         }
-        let (path, count) = (self.file.display(), check.concerns.len());
+        if let Some(cents) = check.common_cents() {
+            let how = if cents > 0.0 { "sharp" } else { "flat" };
+            eprintln!(
+                "note: nearly all resonances are some {:.0} cents {how}: that is the length of the bore rather than its holes",
+                cents.abs()
+            );
+        }
+        let (named, count) = (self.which.named(&file), check.concerns.len());
         if !check.is_usable() {
-            eprintln!("{path}: cannot be played");
+            eprintln!("{named}: cannot be played");
             return Ok(ExitCode::from(2));
         }
-        eprintln!("{path}: can be played, {count} warning{}", if count == 1 { "" } else { "s" });
+        eprintln!("{named}: can be played, {}", counted(count, "warning"));
         Ok(ExitCode::SUCCESS)
     }
 }
@@ -220,7 +242,8 @@ impl CheckFile {
 /// Make an instrument: a cylinder that plays given notes, or another one scaled
 ///
 /// With --notes: the lowest note sounds with every hole closed, each further one opens the next hole from the bell; length
-/// and holes are placed so that the model plays them in tune. With --scale: every length is X times as large, so that all frequencies are X times lower; set
+/// and holes are placed so that the resonances, with the reed's volume, are in tune. A note that is played lies some 20 to 50 cents lower:
+/// `chalumeau tune --untuned` shows by how much, and commands that play the file correct it, as `chalumeau tune` shows. With --scale: every length is X times as large, so that all frequencies are X times lower; set
 /// --transposition for how the instrument is then read.
 #[derive(Args)]
 #[group(id = "kind", required = true, multiple = false, args = ["notes", "scale"])]
@@ -340,13 +363,35 @@ fn nearest_to_limit(limit: f64, fits: impl Fn(f64) -> bool) -> f64 {
 /// Columns: what,name,x_mm,length_mm,diameter_mm,end_diameter_mm,detail.
 #[derive(Args)]
 struct Show {
+    #[command(flatten)]
+    which: Which,
+    #[command(flatten)]
+    table: TableArgs,
+}
+
+/// Which instrument `check` and `show` look at: with or without --instrument before it.
+#[derive(Args)]
+struct Which {
     /// As --instrument
     #[arg(value_name = "NAME|FILE", conflicts_with = "instrument")]
     file: Option<PathBuf>,
     #[command(flatten)]
     instrument: InstrumentArg,
-    #[command(flatten)]
-    table: TableArgs,
+}
+
+impl Which {
+    fn load(&self) -> Result<InstrumentFile, Failure> {
+        match &self.file {
+            Some(path) => InstrumentArg::named(path.clone()).load(),
+            None => self.instrument.load(),
+        }
+    }
+
+    /// As the user has called it; a name of its own if the user has not.
+    fn named(&self, loaded: &InstrumentFile) -> String {
+        let given = self.file.as_ref().or_else(|| self.instrument.path());
+        given.map_or_else(|| loaded.name.clone(), |path| path.display().to_string())
+    }
 }
 
 /// How far an instrument of this transposition sounds below what is written, or above it.
@@ -361,10 +406,7 @@ fn below_what_is_written(transposition: i8) -> String {
 
 impl Show {
     fn run(&self) -> Result<(), Failure> {
-        let file = match &self.file {
-            Some(path) => InstrumentArg::named(path.clone()).load()?,
-            None => self.instrument.load()?,
-        };
+        let file = self.which.load()?;
         let mut table = self.table.open("what,name,x_mm,length_mm,diameter_mm,end_diameter_mm,detail")?;
         table.comment(format_args!("{}", file.name))?;
         table.comment(format_args!(
@@ -400,7 +442,7 @@ impl Show {
                 .collect();
             let open = if open.is_empty() { "all closed".to_owned() } else { open.join(" ") };
             let detail = format!("{} peak {}: {open}", fingering.register, fingering.mode);
-            table.line(format_args!("note,{},,,,,{}", fingering.written, quoted(&detail)))?;
+            table.line(format_args!("note,{},,,,,{}", named(fingering.written), quoted(&detail)))?;
         }
         table.finish()
     }

@@ -7,7 +7,7 @@
 //! the automatic tuning takes that and a little more. Beyond [`FAR_CENTS`] it is the file that is wrong.
 
 use crate::bore::cells::{Cells, CellsError};
-use crate::bore::instrument_file::InstrumentFile;
+use crate::bore::instrument_file::{HoleKind, InstrumentFile, ToneHole};
 use crate::bore::tone_hole;
 use crate::bore::transfer_matrix::{Peak, TransferMatrix};
 use crate::bore::wall_loss;
@@ -16,6 +16,9 @@ use crate::units::{Air, WrittenNote, cents};
 /// Further from its note than this a peak is reported, cents: half a semitone is another note, and automatic tuning moves
 /// a note by about as much.
 pub const FAR_CENTS: f64 = 60.0;
+/// A common distance larger than this is told, cents, where three in four notes lie as near to it: about what a player
+/// evens out with the barrel.
+const COMMON_CENTS: f64 = 20.0;
 /// The lattice's own rate, Hz, where holes are tried on the grid; at 44.1 kHz and its multiples it is 88.2 kHz, which
 /// differs by less than a tenth of a tick between holes.
 const GRID_HZ: f64 = 96_000.0;
@@ -59,6 +62,20 @@ pub enum Concern {
         apart_mm: f64,
         /// A half sample, mm.
         least_mm: f64,
+    },
+    /// Two holes under the fingers that run into each other.
+    #[error(
+        "holes {first} and {second} overlap: their centres are {apart_mm:.2} mm apart, and their radii together are {radii_mm:.2} mm"
+    )]
+    HolesOverlap {
+        /// The one nearer to the reed.
+        first: String,
+        /// The other.
+        second: String,
+        /// Distance of the centres, mm.
+        apart_mm: f64,
+        /// Sum of the radii, mm.
+        radii_mm: f64,
     },
     /// A hole the lattice sets elsewhere, because there is no room for all.
     #[error(
@@ -167,6 +184,7 @@ impl Check {
             });
             others.push(peaks.iter().position(|peak| cents(peak.f_hz, wanted_hz).abs() < FAR_CENTS / 2.0));
         }
+        concerns.extend(overlaps(file));
         concerns.extend(tuning(file, &notes, &others));
         for (index, fingering) in file.fingerings.iter().enumerate() {
             let vented = file.holes.iter().zip(&fingering.open).any(|(hole, open)| hole.register && *open);
@@ -184,10 +202,33 @@ impl Check {
         Self { notes, concerns }
     }
 
+    /// How far nearly all notes are from the chart, cents, if that is worth a word and about the same for all: the median.
+    pub fn common_cents(&self) -> Option<f64> {
+        let mut known: Vec<f64> = self.notes.iter().filter_map(|note| note.cents).collect();
+        known.sort_by(f64::total_cmp);
+        let median = *known.get(known.len() / 2)?;
+        let near = known.iter().filter(|cents| (**cents - median).abs() < COMMON_CENTS).count();
+        (known.len() > 2 && median.abs() > COMMON_CENTS && near * 4 > known.len() * 3).then_some(median)
+    }
+
     /// Whether the instrument can be played.
     pub fn is_usable(&self) -> bool {
         !self.concerns.iter().any(Concern::is_fatal)
     }
+}
+
+/// Holes under the fingers stand in a row, except that under the thumb; a key's hole may stand beside another.
+fn overlaps(file: &InstrumentFile) -> Vec<Concern> {
+    let under_fingers: Vec<_> = file.holes.iter().filter(|hole| hole.kind == HoleKind::Finger).collect();
+    let pairs = under_fingers.windows(2).map(|pair| (pair[0], pair[1]));
+    let overlap = pairs.filter(|(first, second)| second.x_m - first.x_m < first.radius_m + second.radius_m);
+    let concern = |(first, second): (&ToneHole, &ToneHole)| Concern::HolesOverlap {
+        first: first.name.clone(),
+        second: second.name.clone(),
+        apart_mm: 1e3 * (second.x_m - first.x_m),
+        radii_mm: 1e3 * (first.radius_m + second.radius_m),
+    };
+    overlap.map(concern).collect()
 }
 
 fn tuning(file: &InstrumentFile, notes: &[NoteCheck], others: &[Option<usize>]) -> Vec<Concern> {
@@ -290,6 +331,7 @@ fn grid(file: &InstrumentFile, air: &Air) -> Vec<Concern> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bore::bundled::Bundled;
 
     fn changed(from: &str, to: &str) -> Check {
         let text = InstrumentFile::built_in_text().replacen(from, to, 1);
@@ -354,6 +396,27 @@ mod tests {
             "{:?}",
             check.concerns
         );
+    }
+
+    #[test]
+    fn bundled_instruments_have_no_holes_that_overlap() {
+        for bundled in Bundled::ALL {
+            assert_eq!(overlaps(&bundled.file()), [], "{}", bundled.id());
+        }
+        let mut file = InstrumentFile::built_in();
+        let fingers: Vec<_> =
+            (0..file.holes.len()).filter(|&hole| file.holes[hole].kind == HoleKind::Finger).collect();
+        file.holes[fingers[2]].x_m = file.holes[fingers[1]].x_m + 1e-3;
+        assert!(matches!(overlaps(&file)[..], [Concern::HolesOverlap { .. }]), "{:?}", overlaps(&file));
+    }
+
+    #[test]
+    fn what_all_notes_have_in_common_is_told() {
+        let mut file = InstrumentFile::built_in();
+        assert_eq!(Check::new(&file, Air::default(), 440.0).common_cents(), None);
+        file = file.scaled(0.98);
+        let common = Check::new(&file, Air::default(), 440.0).common_cents().unwrap();
+        assert!((25.0..50.0).contains(&common), "{common}");
     }
 
     #[test]

@@ -38,7 +38,7 @@ struct ChartColumns<'a> {
     written: usize,
     sounding_note: Option<usize>,
     sounding_midi: Option<usize>,
-    register: usize,
+    register: Option<usize>,
     mode: Option<usize>,
     fingers: Option<usize>,
     /// Name and column of each hole.
@@ -54,7 +54,7 @@ impl<'a> ChartColumns<'a> {
         };
         let (sounding_note, sounding_midi) =
             (table.optional(&["sounding_note"])?, table.optional(&["sounding_midi"])?);
-        let register = table.required(&["register"])?;
+        let register = table.optional(&["register"])?;
         let mode = table.optional(&["mode", "register_mode"])?;
         let fingers = table.optional(&["fingers"])?;
         let mut known = CHART_COLUMNS.to_vec();
@@ -151,11 +151,21 @@ impl ChartRow<'_> {
                 .text(index)
                 .parse::<u32>()
                 .map_err(|_| self.wrong(index, "1 to 12, the number of the impedance peak that sounds")),
-            None => Ok(match self.text(columns.register) {
-                "clarion" => 2,
-                "altissimo" => 3,
+            None => Ok(match columns.register.map(|index| self.text(index)) {
+                Some("clarion") => 2,
+                Some("altissimo") => 3,
                 _ => 1,
             }),
+        }
+    }
+
+    /// The register. Without a column it follows from the peak that sounds.
+    fn register(&self, columns: &ChartColumns<'_>, mode: u32) -> &str {
+        match (columns.register, mode) {
+            (Some(index), _) => self.text(index),
+            (None, 0 | 1) => "chalumeau",
+            (None, 2) => "clarion",
+            (None, _) => "altissimo",
         }
     }
 
@@ -188,10 +198,11 @@ pub(super) fn read_chart(
         let row = ChartRow { table: &table, line, row };
         let Some(plays) = row.pitch(columns.note, columns.midi)? else { continue };
         transposition = row.transposition(&columns, plays, wanted, transposition)?.or(transposition);
+        let mode = row.mode(&columns)?;
         let value = RawFingering {
             written: WrittenNote(plays).to_string(),
-            register: row.text(columns.register).to_owned(),
-            mode: row.mode(&columns)?,
+            register: row.register(&columns, mode).to_owned(),
+            mode,
             open: row.open(&columns)?,
             maker_open: None,
             fingers: columns.fingers.map(|index| row.text(index)).unwrap_or_default().to_owned(),
