@@ -170,6 +170,25 @@ fn instruments_are_made_checked_and_shown() {
     refused(&d, "instrument new --scale 5 --out x.toml", &["reed_volume_mm3 is 150000"]);
     refused(&d, "instrument new --notes C-1 --out x.toml", &["an octave of C-1"]);
     refused(&d, "instrument check none.toml", &["cannot read none.toml"]);
+    for line in
+        ["instrument check --instrument tube.toml", "instrument check b-flat", "instrument show tube.toml"]
+    {
+        succeeds(d.path(), line);
+    }
+    refused(&d, "instrument check tube.toml --instrument tube.toml", &["cannot be used with"]);
+    // The chart needs no registers; the bore it is compared with is told.
+    let chart = fs::read_to_string(d.path().join("fingerings.csv")).unwrap();
+    let without = chart.replace(",register,", ",_register,");
+    assert_ne!(chart, without);
+    fs::write(d.path().join("fingerings.csv"), without).unwrap();
+    fs::copy(folder.join("holes.csv"), d.path().join("holes.csv")).unwrap();
+    let plain = chalumeau(d.path(), words(&format!("instrument import {tables} --out plain.toml")));
+    let message = String::from_utf8(plain.stderr).unwrap();
+    assert!(
+        plain.status.success() && message.contains("14.9 mm") && message.contains("15.0 mm"),
+        "{message}"
+    );
+    assert!(fs::read_to_string(d.path().join("plain.toml")).unwrap().contains("\"chalumeau\""));
     // In tune for the pitch it was made for.
     let old = chalumeau(d.path(), words("instrument new --notes D3,E3,F3 --a4 415 --out old.toml"));
     let message = String::from_utf8(old.stderr).unwrap();
@@ -194,12 +213,18 @@ fn names_do_not_break_tables_and_pictures() {
     let odd = tube
         .replace("name = \"tube\"", "name = \"a\\nb\\u0007<i>\"")
         .replace("part = \"cylinder\"", "part = \"a,\\\"b\\\"\"")
-        .replace("\"H1\"", "\"H,1\"");
+        .replace("\"R3\"", "\"H,1\"");
     fs::write(d.path().join("odd.toml"), odd).unwrap();
     let bore = succeeds(d.path(), "bore --instrument odd.toml --plot odd.svg");
     assert!(bore.lines().nth(1).unwrap().starts_with("# a b"), "{bore}");
     assert!(bore.contains("bore,\"a,\"\"b\"\"\",0,") && bore.contains("hole,\"H,1\","), "{bore}");
     let show = succeeds(d.path(), "instrument show odd.toml");
+    // A reader that knows remarks does not take the rest of the line for one.
+    succeeds(d.path(), "instrument new --notes D3,F#3 --out sharp.toml");
+    for table in ["check", "show"] {
+        let table = succeeds(d.path(), &format!("instrument {table} sharp.toml"));
+        assert!(table.contains("\"F#3\","), "{table}");
+    }
     assert!(show.contains("note,E3,,,,,\"chalumeau peak 1: H,1\""), "{show}");
     let picture = fs::read_to_string(d.path().join("odd.svg")).unwrap();
     assert!(!picture.contains('\u{7}') && !picture.contains("<i>") && picture.contains("&lt;i&gt;"));
@@ -242,6 +267,10 @@ fn breath_files_are_refused_by_line() {
     ] {
         fs::write(d.path().join("breath.csv"), text).unwrap();
         refused(&d, "render --written 60 --breath breath.csv --out x.wav", &["breath.csv", says]);
+    }
+    for dynamic in ["pp", "mf", "p:ff"] {
+        let says = format!("give --dynamic {dynamic}");
+        refused(&d, &format!("render --written 60 --breath {dynamic} --out x.wav"), &[&says]);
     }
 }
 
@@ -614,7 +643,8 @@ fn instruments_are_played_by_name_and_files_are_tuned_once() {
     let entries = || names(&cache.path().join("chalumeau"));
     let first = tuned();
     let kept = entries();
-    assert!(first.0 && kept.len() == 1, "{first:?} {kept:?}");
+    // One as it is built and one that is tuned: the table has both.
+    assert!(first.0 && kept.len() == 2, "{first:?} {kept:?}");
     assert_eq!((tuned(), entries()), (first, kept));
     refused(
         &d,
@@ -740,6 +770,84 @@ fn linked_controllers_of_a_file_move_parameters() {
         "render one.mid --controllers map.toml --out bad.wav",
         &["map.toml", "line 5", "growll"],
     );
+}
+
+#[test]
+fn a_device_sets_what_it_says_and_a_flag_wins() {
+    let d = tempfile::tempdir().unwrap();
+    let render = |line: &str| {
+        let output =
+            chalumeau(d.path(), words(&format!("render one.mid {line} --tail 0 --force --out x.wav")));
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{line}: {message}");
+        (fs::read(d.path().join("x.wav")).unwrap(), message)
+    };
+    // A note with the mod wheel up.
+    let events: [&[u8]; 5] = [
+        &[0, 0xB0, 2, 90],
+        &[0, 0xB0, 1, 127],
+        &[0, 0x90, 60, 100],
+        &[0x60, 0x80, 60, 0],
+        &[0, 0xFF, 0x2F, 0],
+    ];
+    let track = events.concat();
+    let mut midi = b"MThd\0\0\0\x06\0\0\0\x01\0\x60MTrk".to_vec();
+    midi.extend((track.len() as u32).to_be_bytes());
+    midi.extend(track);
+    fs::write(d.path().join("one.mid"), midi).unwrap();
+    let map = |values: &str| {
+        fs::write(d.path().join("map.toml"), format!("format = 1\n\n[parameters]\n{values}")).unwrap();
+        render("--controllers map.toml").0
+    };
+    let plain = render("").0;
+    let vibrato = map("wheel = \"Vibrato\"\n");
+    assert_eq!(plain, vibrato, "what the wheel does where nothing is said");
+    let [growl, nothing] = ["Growl", "Nothing"].map(|wheel| map(&format!("wheel = \"{wheel}\"\n")));
+    assert!(growl != plain && nothing != plain && growl != nothing);
+    assert_ne!(map("bfrom = \"Keys\"\n"), plain);
+    // Under the flags.
+    let lip = map("lip = \"0.9\"\n");
+    assert_ne!(lip, plain);
+    assert_eq!(render("--controllers map.toml --lip 1.1").0, render("--lip 1.1").0);
+    assert_eq!(render("--controllers map.toml --set lip=1").0, plain);
+    map("ksrc = \"CC17\"\n");
+    let (as_it_was, message) = render("--controllers map.toml");
+    assert!(
+        as_it_was == plain && message.contains("ksrc") && message.contains("only the plugin"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_report_is_of_one_player() {
+    let d = tempfile::tempdir().unwrap();
+    fs::write(d.path().join("two.mid"), two_tracks()).unwrap();
+    for line in ["--written C4 --players 4", "two.mid --tracks", "--tour --players 2"] {
+        refused(
+            &d,
+            &format!("report {line} --out a.html"),
+            &["inside one instrument", "--players and --tracks"],
+        );
+    }
+}
+
+#[test]
+fn a_scale_has_the_notes_of_the_chart() {
+    let d = tempfile::tempdir().unwrap();
+    succeeds(d.path(), "instrument new --notes D3,E3,F3 --out new.toml");
+    let scale = |ends: &str| {
+        let line = format!(
+            "render --instrument new.toml --untuned --scale {ends} --seconds 0.1 --tail 0 --force --out x.wav"
+        );
+        let output = chalumeau(d.path(), words(&line));
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{message}");
+        message
+    };
+    let message = scale("F3:D3");
+    assert!(message.contains("no D#3;") && message.contains("0.300 s"), "{message}");
+    assert!(!scale("E3:F3").contains("leaves"));
+    refused(&d, "render --instrument new.toml --scale D3:F#3 --out y.wav", &["F#3", "no fingering"]);
 }
 
 /// Keys one after another for half a second each, but those below 50 for no time: a format 0 file.
@@ -949,14 +1057,17 @@ const EXAMPLE_INSTRUMENTS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples
 #[test]
 fn fingerings_of_the_chart_are_listed_and_holes_that_no_finger_moves_are_named() {
     let d = tempfile::tempdir().unwrap();
+    succeeds(d.path(), "instrument new --notes D3,E3,F3 --out new.toml");
     for (line, unmoved, yes) in [
         ("--instrument alto-chalumeau.toml --note C4", Some("K1 K2 R4"), 1),
         ("--instrument cylinder.toml --note E3", Some("H2 H1"), 1),
+        ("--instrument new.toml --note E3", None, 1),
         ("--instrument alto-chalumeau.toml --multiphonic", Some("K1 K2 R4"), 0),
         ("--instrument b-flat --note C4 --count 3", None, 1),
     ] {
         let line = line.replace("--instrument ", &format!("--instrument {EXAMPLE_INSTRUMENTS}/"));
         let line = line.replace(&format!("{EXAMPLE_INSTRUMENTS}/b-flat"), "b-flat");
+        let line = line.replace(&format!("{EXAMPLE_INSTRUMENTS}/new.toml"), "new.toml");
         let output = chalumeau(d.path(), words(&format!("fingerings {line}")));
         let message = String::from_utf8(output.stderr).unwrap();
         assert!(output.status.success(), "{line}: {message}");
