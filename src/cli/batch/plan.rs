@@ -51,6 +51,13 @@ enum Values {
     Steps(Steps),
 }
 
+/// Line, from 1, of the record that the reader found beginning at `byte`: past the empty lines before it.
+fn line_of_record(text: &str, byte: usize) -> u64 {
+    let (before, rest) = text.split_at_checked(byte).unwrap_or((text, ""));
+    let empty = rest.len() - rest.trim_start_matches(['\n', '\r']).len();
+    1 + (before.matches('\n').count() + rest[..empty].matches('\n').count()) as u64
+}
+
 /// Equal steps from one number to another.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -143,7 +150,7 @@ impl Plan {
                     let line = error.position().map_or(0, csv::Position::line);
                     format!("line {line} has not as many fields as the first line")
                 })?;
-                let line = record.position().map(csv::Position::line);
+                let line = record.position().map(|at| line_of_record(text, at.byte() as usize));
                 Ok(Variation { values: record.iter().map(str::to_owned).collect(), line })
             })
             .collect::<Result<Vec<_>, String>>()?;
