@@ -5,7 +5,7 @@ use crate::cli::csv_table::{TableArgs, named, quoted};
 use crate::cli::shared_args::{AirArg, InstrumentArg, counted, note, whole, within};
 use crate::output::NewFile;
 use crate::text_file;
-use chalumeau_core::bore::check::Check;
+use chalumeau_core::bore::check::{Check, Concern};
 use chalumeau_core::bore::cylinder::Cylinder;
 use chalumeau_core::bore::instrument_file::{BoreSegment, ImportDetails, ImportError, InstrumentFile, Sheet};
 use chalumeau_core::instrument::concert_pitch::A4_HZ;
@@ -222,10 +222,11 @@ impl CheckFile {
             let weight = if concern.is_fatal() { "error" } else { "warning" };
             eprintln!("{weight}: {concern}");
         }
-        if let Some(cents) = check.common_cents() {
+        let is_said = |concern: &Concern| matches!(concern, Concern::AllOff { .. });
+        if let Some(cents) = check.common_cents().filter(|_| !check.concerns.iter().any(is_said)) {
             let how = if cents > 0.0 { "sharp" } else { "flat" };
             eprintln!(
-                "note: nearly all resonances are some {:.0} cents {how}: that is the length of the bore rather than its holes",
+                "note: nearly all resonances are some {:.0} cents {how}; look at the length of the bore, the reed's volume and --a4",
                 cents.abs()
             );
         }
