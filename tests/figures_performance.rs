@@ -453,9 +453,10 @@ fn a_report_holds_the_sound_the_cents_and_the_settings() {
         "prefers-color-scheme: dark",
         "scale C4 to E4",
         "5 of 5 notes have a pitch",
-        "<td>Reed strength</td><td class=\"number\">3</td>",
-        "<td>Embouchure</td><td class=\"number\">0.3</td>",
-        "<td>Tuning</td><td class=\"number\">natural</td>",
+        // All settings, and the default beside one that is not.
+        "<td>Reed strength</td><td>stren</td><td class=\"number\">3.00</td><td class=\"number\">2.50</td>",
+        "<td>Embouchure</td><td>zeta</td><td class=\"number\">0.300</td><td class=\"number\"></td>",
+        "<td>Tuning</td><td>tune</td><td class=\"number\">Natural</td>",
         concat!("Chalumeau ", env!("CARGO_PKG_VERSION")),
         "chalumeau report --scale 60:64",
         "B flat clarinet, Boehm system",
