@@ -102,8 +102,11 @@ pub struct Swell {
 }
 
 /// What a moment of a swell is called, and its colour.
-const STATES: [(&str, Colour); 3] =
-    [("sounds", Colour::Green), ("sounds, the reed shuts in each cycle", Colour::Orange), ("blown shut", Colour::Grey)];
+const STATES: [(&str, Colour); 3] = [
+    ("sounds", Colour::Green),
+    ("sounds, the reed shuts in each cycle", Colour::Orange),
+    ("blown shut", Colour::Grey),
+];
 
 impl Swell {
     /// Index into [`STATES`], or none for a breath too weak.
