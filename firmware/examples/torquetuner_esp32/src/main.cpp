@@ -5,7 +5,7 @@
 // radio's power save or a display's I2C transfer would cost whole ticks. Nothing may be printed but what `transmit` gives.
 //
 // A hardware timer wakes one task, pinned to the core that nothing else uses. The task watchdog restarts the chip if that
-// task hangs; until then the motor board's own timeout has to end the torque (SAFETY.md, "The motor board").
+// task hangs; until then the motor board's own timeout has to end the torque (../../motor_board/README.md).
 
 #include <Arduino.h>
 #include <Preferences.h>
@@ -66,7 +66,7 @@ bool load_calibration() {
 }
 
 #ifdef CALIBRATION_DAMPING_NMS
-/// `pio run -e calibrate -t upload` stores what its build flags say.
+/// `pio run -e calibrate -t upload` stores what its build flags say. What is out of range is not stored.
 void store_calibration() {
     Calibration measured;
     measured.damping_nms = CALIBRATION_DAMPING_NMS;
