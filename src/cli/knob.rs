@@ -32,12 +32,12 @@ const PATIENCE: Duration = Duration::from_secs(10);
 const EXAMPLES: &str = "\
 Examples:
   chalumeau knob
-      Finds a knob behind a known serial board, real or simulated, and shows angle, gamma and torque.
-  chalumeau knob --written E3 --arm 60
+      Finds a knob behind a known serial board, real or simulated, and shows angle, gamma, threshold and whether it is armed.
+  chalumeau knob --zero --written E3 --arm 60
       The resistance of the lowest note, with at most 60 mNm. Ctrl-C lets go at once.
-  chalumeau knob --arm 300 --torque 200
-      Above 250 mNm the program asks a second time.
-  chalumeau knob --written E3 --law pressure --arm 60
+  chalumeau knob --zero --arm 300 --law pressure --torque 260
+      Above 250 mNm the program asks a second time. A knob let go from such a spring disarms itself: hold it until it is back.
+  chalumeau knob --zero --written E3 --law pressure --arm 60
   chalumeau knob --osc 8000
       A TorqueTuner with its stock firmware.
   chalumeau knob --seconds 20 --record take.csv
@@ -46,8 +46,8 @@ Examples:
 /// Watch a knob, feel a note on it, record a take
 ///
 /// The knob makes torque only with --arm, and never more than --arm and its own limits allow. Torque ends with the program,
-/// however the program ends, and within a second when it stands still, for example after Ctrl-S in its terminal. Without
-/// --arm the knob turns freely and is only read.
+/// however the program ends, and within 630 ms (880 over MIDI) when it stands still, for example after Ctrl-S in its
+/// terminal. Without --arm the knob turns freely and is only read.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 #[command(group = ArgGroup::new("which").args(["serial", "path", "midi", "osc"]))]
