@@ -29,7 +29,7 @@ const EXAMPLES: &str = "\
 Examples:
   chalumeau knob-sim                                    a knob nobody holds, at a serial port
   chalumeau knob-sim --crescendo 0:200:6 --wait-armed   a hand that blows once it is armed
-  chalumeau knob-sim --script examples/hands/swell.csv --loop --log knob.csv
+  chalumeau knob-sim --script examples/hands/swell.csv --loop --wait-armed --log knob.csv
   chalumeau knob-sim --hold 120 --fault unplug@5:2 --fault corrupt@10:3
   chalumeau knob-sim --osc 127.0.0.1:8000 --slap --loop the stock firmware
   chalumeau knob-sim --path COM6                        one end of a pair of ports, as com0com makes on Windows
@@ -101,7 +101,7 @@ struct HandArgs {
     /// Repeat the hand's motion
     #[arg(long = "loop", requires = "deed")]
     is_loop: bool,
-    /// Wait until the host has armed the knob
+    /// Wait until the host has armed the knob; a hand that does not wait lets the test of the motor fail
     #[arg(long, requires = "deed")]
     wait_armed: bool,
     /// Spring between fingers and knob, N m/rad [default: 0.5, a pinch grip]
