@@ -92,7 +92,8 @@ def plot_phase(path, participant, trials):
         for c in CONDITIONS
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
-    figure.suptitle(f"Participant {participant}: torque against angle (the area inside a loop is work lost)")
+    says = "on one note the area inside a loop is work lost; changes of note draw loops, too"
+    figure.suptitle(f"Participant {participant}: torque against angle\n({says})")
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
@@ -144,6 +145,8 @@ def plot_paired(path, pairs):
     handles += [plt.Line2D([], [], color="0.6", label="one trial")]
     figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
     trials = sum(map(len, pairs.values()))
-    figure.suptitle(f"Coupled and free k, {trials} trials of {len(pairs)} participant{'s' * (len(pairs) > 1)}")
+    persons = f"{len(pairs)} participant{'s' * (len(pairs) > 1)}"
+    says = "lines and means are over trials; the tests count participants"
+    figure.suptitle(f"Coupled and free k, {trials} trials of {persons}\n({says})")
     figure.savefig(path, dpi=110)
     plt.close(figure)

@@ -1,4 +1,7 @@
-"""Studies of simulated players: equal hands find nothing, a planted effect is found. Run by python_examples.py."""
+"""Studies of simulated players: equal hands find nothing, a planted effect is found: python python_null_study.py [word..]
+
+All studies, or those whose name contains one of the words. python_examples.py runs them, too.
+"""
 
 import concurrent.futures
 import functools
@@ -113,3 +116,11 @@ TESTS = [
     without_equal_travel_the_reed_is_measured,
     a_planted_effect_of_one_standard_deviation_is_found,
 ]
+
+
+# Processes that a study starts import this file.
+if __name__ == "__main__":
+    for test in TESTS:
+        if len(sys.argv) < 2 or any(word in test.__name__ for word in sys.argv[1:]):
+            print(test.__name__, flush=True)
+            test()
