@@ -73,7 +73,7 @@ pub struct KnobCommand {
     /// Let the knob make torque, at most this many mNm, 10..450; above 250 the program asks a second time
     #[arg(long, value_name = "MNM", value_parser = |s: &str| within(s, 10.0, f64::from(HARD_CEILING_MNM)))]
     arm: Option<f64>,
-    /// First make the present position zero
+    /// First make the present position zero; it arms once the knob has shown an angle near zero
     #[arg(long)]
     zero: bool,
     /// End after this time, s
