@@ -52,6 +52,8 @@ pub struct Posture {
     pub bore_cents: f64,
     /// The bend.
     offset_cents: f64,
+    /// How much higher the alternate sounds that is fingered, cents.
+    alternate_cents: f64,
     fingering: usize,
     response: BreathResponse,
     /// How fast delay, clock and breath follow.
@@ -206,6 +208,7 @@ impl Posture {
             rows_per_cent,
             bore_cents: split.bore_cents,
             offset_cents: offset,
+            alternate_cents,
             fingering,
             response,
             lags: Lags::new(settings, tick_s, model.lowest_hz),
@@ -231,7 +234,7 @@ impl Posture {
         let split =
             BendSplit::new(offset, bend::lip_limit_cents(model, self.fingering, offset, self.response));
         let rows = self.rows_per_cent / model.rows_for_cents(self.fingering, 1.0)
-            * model.rows_for_cents(self.fingering, split.lip_cents);
+            * model.rows_for_cents(self.fingering, split.lip_cents - self.alternate_cents);
         (rows, split.bore_cents)
     }
 
@@ -368,5 +371,22 @@ fn reed_at_note(reed: &MovingReed, note_hz: f64) -> ReedAtNote {
         ratio: note_hz / reed.resonance_hz,
         damping: reed.damping,
         swept: std::f64::consts::TAU * note_hz * reed.swept_s * compliance,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bend_begins_and_ends_where_the_alternate_is_in_tune() {
+        let model = Model::built_in(48_000.0).unwrap();
+        for alternate_cents in [0.0, 30.0] {
+            let fingered =
+                Fingered { fingering: 12, alternate_cents, bend_cents: 0.0, subtone: 0.0, follows: 1.0 };
+            let posture = Posture::new(&Settings::default(), &fingered, 1e-3, &model);
+            let steps = [-1e-6, 1e-6].map(|cents| (posture.bent(cents, &model).0 - posture.rows).abs());
+            assert!(steps.iter().all(|rows| *rows < 1e-6), "{steps:?} rows beside {alternate_cents} cents");
+        }
     }
 }
