@@ -7,7 +7,7 @@ use chalumeau_core::analysis::partials::{Partial, Wander};
 use chalumeau_core::analysis::pitch;
 use chalumeau_core::analysis::spectrum::moving_rms;
 use chalumeau_core::event::{Event, Timed};
-use chalumeau_core::instrument::{Attack, Clarinet, Model, Settings, Vibrato};
+use chalumeau_core::instrument::{Attack, Clarinet, Model, Reach, Settings, Vibrato};
 use chalumeau_core::parallel;
 use chalumeau_core::score::{Score, play};
 use chalumeau_core::units::{SoundingNote, WrittenNote, cents};
@@ -409,4 +409,29 @@ fn assert_smooth(slurs: &[Slurred]) {
 #[test]
 fn all_slurs_arrive_without_bumps() {
     assert_smooth(&slurs());
+}
+
+#[test]
+fn a_key_that_has_lost_its_fingering_does_not_keep_the_tongue_on_the_reed() {
+    let ends: [fn(SoundingNote) -> Event; 2] = [|note| Event::NoteOff { note }, |note| Event::Choke { note }];
+    for end in ends {
+        let mut clarinet = Clarinet::new(MODEL.clone(), RATE_HZ);
+        let reach = |transpose| Settings { reach: Reach { transpose, ..Reach::default() }, ..still() };
+        let [dead, upper, next] = [46, 60, 62].map(SoundingNote);
+        let press = |note| Event::NoteOn { note, velocity: 0.8 };
+        let mut out = vec![0.0; sample(0.4)];
+        // D3, 50, is the lowest note: this key needs the transposition.
+        clarinet.set_settings(&reach(12));
+        clarinet.apply(press(dead));
+        clarinet.apply(press(upper));
+        clarinet.render(&mut out);
+        clarinet.set_settings(&reach(0));
+        clarinet.apply(end(upper));
+        clarinet.render(&mut out);
+        clarinet.apply(press(next));
+        clarinet.render(&mut out);
+        let level: f32 = out[sample(0.2)..].iter().map(|x| x * x).sum();
+        assert!(level > 1.0, "the next note is silent: {level}");
+        assert_eq!(clarinet.player_state().sounding, Some(next));
+    }
 }

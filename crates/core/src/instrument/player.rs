@@ -305,6 +305,18 @@ impl Player {
         Some(fingering)
     }
 
+    /// The fingering of the key that sounds now. Held keys that have lost theirs, by another transposition or row of key switches, are
+    /// released: under them the tongue would stay on the reed of the next note. Real-time safe.
+    fn take_up_last(&mut self, model: &Model) -> Option<usize> {
+        while let Some(last) = self.keys.last() {
+            match self.take_up(last, model) {
+                None => self.keys.release(last),
+                fingering => return fingering,
+            }
+        }
+        None
+    }
+
     fn note_on<F: Real>(&mut self, note: SoundingNote, velocity: f32, model: &Model, voice: &mut Voice<F>) {
         // Who plays without a decoder has the key switches too.
         if let Some(chosen) = self.settings.reach.key_switches.chosen(note.0) {
@@ -334,7 +346,7 @@ impl Player {
         if !sounding {
             return;
         }
-        match self.keys.last().and_then(|last| self.take_up(last, model)) {
+        match self.take_up_last(model) {
             Some(fingering) => self.finger(fingering, true, model, voice),
             None => {
                 let may_fall = !self.tongue.is_holding() && !self.tongue.is_slapping();
@@ -363,7 +375,7 @@ impl Player {
         if !sounding {
             return;
         }
-        match self.keys.last().and_then(|last| self.take_up(last, model)) {
+        match self.take_up_last(model) {
             Some(fingering) => {
                 self.prepare();
                 self.finger(fingering, false, model, voice);

@@ -23,14 +23,9 @@ impl Player {
             chosen: from.chosen,
             ..Self::new(self.person)
         };
-        while let Some(last) = self.keys.last() {
-            let Some(fingering) = self.take_up(last, model) else {
-                self.keys.release(last);
-                continue;
-            };
+        if let Some(fingering) = self.take_up_last(model) {
             self.finger(fingering, false, model, voice);
             self.tongue.carry_on(&from.tongue);
-            break;
         }
     }
 
