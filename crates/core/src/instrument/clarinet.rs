@@ -233,6 +233,11 @@ impl Clarinet {
         self.level.follow(&from.level);
     }
 
+    /// Nothing sounds that a choke could cut. Real-time safe.
+    pub(super) fn forget_choke(&mut self) {
+        self.choke.reset();
+    }
+
     /// All keys come up. Real-time safe.
     pub(super) fn let_go(&mut self) {
         while let Some(note) = self.player.key() {

@@ -90,6 +90,10 @@ impl Seat {
 
     fn apply(&mut self, event: Event) {
         self.clarinet.apply(event);
+        if self.sleeps && matches!(event, Event::Choke { .. }) {
+            // The key comes up; a fade that waited for the next note would cut that one.
+            self.clarinet.forget_choke();
+        }
         let begins = matches!(event, Event::NoteOn { .. } | Event::TongueSlap { .. });
         if self.sleeps && (begins || !self.clarinet.is_resting()) {
             self.wake();

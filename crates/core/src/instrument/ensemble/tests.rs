@@ -375,3 +375,18 @@ fn players_who_come_and_go_leave_no_note_and_no_step() {
     assert!(steps(1, 4) < 1.2 * low, "{} of {low}", steps(1, 4));
     assert!(steps(5, 7) < 1.2 * both, "{} of {both}", steps(5, 7));
 }
+
+#[test]
+fn a_choke_of_who_sleeps_does_not_cut_the_next_note() {
+    let duet = |choke: Option<Event>| {
+        let mut duet = ensemble(Players { count: 2, ..Players::default() });
+        choke.into_iter().for_each(|choke| duet.apply(to(1, choke)));
+        let mut out = vec![0.0; 4_800];
+        duet.render(&mut out);
+        // A breath that is there at once, and a slap, which no tongue holds back.
+        duet.apply(Event::TongueSlap { strength: 1.0 }.into());
+        duet.render(&mut out);
+        out
+    };
+    assert!(duet(Some(Event::Choke { note: SoundingNote(60) })) == duet(None));
+}
