@@ -60,13 +60,24 @@ impl KeySwitches {
 /// The row, and where one of its keys is down.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SwitchKeys {
-    /// Where the row is.
-    pub row: KeySwitches,
+    row: KeySwitches,
     /// Channels on which one is down, one bit each.
     down: u16,
 }
 
 impl SwitchKeys {
+    /// Where the row is.
+    pub fn row(&self) -> KeySwitches {
+        self.row
+    }
+
+    /// Moves the row. What was down in it is no key of the new one, so nothing would tell when it comes up.
+    pub fn set_row(&mut self, row: KeySwitches) {
+        if self.row != row {
+            *self = Self { row, down: 0 };
+        }
+    }
+
     /// What a key chooses that goes down, if it is one of the row. The channel is 0..=15.
     pub fn press(&mut self, note: Note) -> Option<Fingerings> {
         let chosen = self.row.chosen(note.key)?;

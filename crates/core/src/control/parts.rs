@@ -130,7 +130,7 @@ impl Parts {
 
     /// Which keys choose fingerings and are no notes. Notes that are held go on.
     pub fn set_key_switches(&mut self, key_switches: KeySwitches) {
-        self.switches.row = key_switches;
+        self.switches.set_row(key_switches);
     }
 
     /// See [`MidiDecoder::set_breath_from`].
@@ -228,7 +228,7 @@ impl Parts {
 
     /// See [`MidiDecoder::express`].
     pub fn express(&mut self, address: NoteAddress, expression: NoteExpression) -> &[PartEvent] {
-        if address.key.is_some_and(|key| self.switches.row.chosen(key).is_some()) {
+        if address.key.is_some_and(|key| self.switches.row().chosen(key).is_some()) {
             self.begin();
             return &self.said;
         }

@@ -303,3 +303,20 @@ fn the_finger_on_a_key_switch_does_not_blow() {
         assert!(!parts.pressure(2, 50).is_empty());
     }
 }
+
+#[test]
+fn a_key_that_is_down_is_no_switch_any_more_where_the_row_has_moved() {
+    let mut parts = Parts::of(MidiDecoder::new().with_mpe(), 1);
+    parts.set_key_switches(KeySwitches::C2);
+    parts.note_on(1, 60, 127);
+    parts.note_on(2, 37, 127);
+    parts.set_key_switches(KeySwitches::C2);
+    assert_eq!(parts.pressure(2, 20), [], "the row is where it was");
+    parts.set_key_switches(KeySwitches::C1);
+    parts.note_off(2, 37);
+    let before = parts.decoders[0].clone();
+    let said = said(parts.pressure(2, 20));
+    let mut decoder = before;
+    assert!(said.iter().map(|(_, event)| *event).eq(decoder.pressure(2, 20).iter().copied()));
+    assert!(!said.is_empty());
+}
