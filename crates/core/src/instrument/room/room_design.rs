@@ -104,7 +104,7 @@ impl RoomDesign {
         let tap = |image: Image| Tap { delay: samples(image.delay_s), gain: (fit * image.gain) as f32 };
         // The lines take over where the images end: half of these are past.
         let mut times = images[0].map(|image| image.delay_s);
-        times.sort_by(f64::total_cmp);
+        times.sort_unstable_by(f64::total_cmp);
         let early = images.map(|ear| ear.map(tap));
         let ends = [-1.0, 1.0].map(|end| [-1.0, 1.0].map(|side| box_.images_of_end(end, side).map(tap)));
         let into_lines = samples(times[IMAGES / 2]).saturating_sub(delays[0]);
