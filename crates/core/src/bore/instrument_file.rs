@@ -141,6 +141,13 @@ impl Fingering {
     }
 }
 
+impl Fingering {
+    /// Opening of each hole, in the order of the file: 1 open, 0 closed. Allocates.
+    pub fn opening(&self) -> Vec<f64> {
+        self.open.iter().map(|&is_open| f64::from(u8::from(is_open))).collect()
+    }
+}
+
 impl InstrumentFile {
     /// Reads and checks the text of an instrument file. Never panics. Allocates.
     pub fn parse(text: &str) -> Result<Self, InstrumentError> {
@@ -237,9 +244,16 @@ impl InstrumentFile {
         self.holes.iter().position(|hole| hole.name == name)
     }
 
+    /// The pitch at which a written note sounds. Every note of a chart that was read sounds within MIDI's range: reading refuses one
+    /// that does not. Of an instrument made by hand, such a note counts as the nearest that MIDI has.
+    pub fn sounding(&self, written: WrittenNote) -> SoundingNote {
+        let nearest = (i16::from(written.0) - i16::from(self.transposition)).clamp(0, 127);
+        SoundingNote(nearest as u8)
+    }
+
     /// Equal-tempered frequency of the lowest note, A4 = 440 Hz.
     pub fn lowest_hz(&self) -> f64 {
-        self.lowest().sounding(self.transposition).unwrap_or(SoundingNote(50)).frequency_hz(440.0)
+        self.sounding(self.lowest()).frequency_hz(440.0)
     }
 
     /// The lowest note of the chart; MIDI note 0 for an instrument made by hand without one.
@@ -444,6 +458,16 @@ mod tests {
         assert_eq!(file.holes.iter().filter(|hole| hole.register).count(), 1);
         assert_eq!((file.transposition, file.reed_volume_m3), (2, 1.2e-6));
         assert!(file.fingering(WrittenNote(51)).is_none());
+    }
+
+    #[test]
+    fn a_note_sounds_where_the_transposition_puts_it_or_at_the_end_of_midi() {
+        let mut file = InstrumentFile::built_in();
+        for written in file.fingerings.iter().map(|fingering| fingering.written) {
+            assert_eq!(Some(file.sounding(written)), written.sounding(file.transposition));
+        }
+        file.transposition = 60;
+        assert_eq!(file.sounding(WrittenNote(52)), SoundingNote(0), "by hand");
     }
 
     #[test]

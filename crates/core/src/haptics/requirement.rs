@@ -22,7 +22,7 @@ use crate::haptics::extinction::EffectiveImpedance;
 use crate::haptics::onset;
 use crate::haptics::onset::MovingReed;
 use crate::haptics::played_reed::PlayedReed;
-use crate::units::{Air, SoundingNote, WrittenNote, cents};
+use crate::units::{Air, WrittenNote, cents};
 
 /// The grid of a note reaches from this share of the lowest note's frequency to the larger of two frequencies: this multiple
 /// of the lowest note and this multiple of the note. The lip puts the resonance of the reed there, above which nothing
@@ -86,9 +86,7 @@ impl RequirementSolver {
     /// Analyses the bore of an instrument: about one second for 46 notes. Allocates; not for the audio thread.
     pub fn new(file: &InstrumentFile, air: Air) -> Self {
         let matrix = TransferMatrix::new(file, air);
-        let sounding_hz = |written: WrittenNote| {
-            written.sounding(file.transposition).unwrap_or(SoundingNote(0)).frequency_hz(440.0)
-        };
+        let sounding_hz = |written: WrittenNote| file.sounding(written).frequency_hz(440.0);
         let lowest_hz = sounding_hz(file.lowest());
         let notes = file
             .fingerings
@@ -131,7 +129,7 @@ impl RequirementSolver {
         tuning_rows: impl Fn(usize) -> f64,
     ) -> Self {
         for (index, (note, fingering)) in self.notes.iter_mut().zip(&file.fingerings).enumerate() {
-            let opening: Vec<f64> = fingering.open.iter().map(|&open| f64::from(u8::from(open))).collect();
+            let opening = fingering.opening();
             let rows = tuning_rows(index);
             note.lattice = Some(AdmittanceGrid::new(note.bore.range_hz(), |f_hz| {
                 let r = coeffs.reflectance(f_hz, &opening, rows);

@@ -5,7 +5,6 @@ use crate::haptics::{Lip, PlayedReed, RequirementSolver};
 use crate::instrument::lip::embouchure;
 use crate::instrument::model::Model;
 use crate::instrument::settings::Settings;
-use crate::units::SoundingNote;
 
 /// The reed under these settings, with the law and the lip that the sound has, for every fingering of a file. Allocates.
 pub fn played_reed(file: &InstrumentFile, settings: &Settings) -> PlayedReed {
@@ -15,8 +14,7 @@ pub fn played_reed(file: &InstrumentFile, settings: &Settings) -> PlayedReed {
         .fingerings
         .iter()
         .map(|fingering| {
-            let sounding = fingering.written.sounding(file.transposition).unwrap_or(SoundingNote(0));
-            let lip = embouchure(sounding.frequency_hz(440.0), lowest_hz);
+            let lip = embouchure(file.sounding(fingering.written).frequency_hz(440.0), lowest_hz);
             Lip { resonance_hz: lip.resonance_hz, damping: lip.damping * f64::from(settings.damping) }
         })
         .collect();

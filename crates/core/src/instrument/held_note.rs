@@ -104,8 +104,8 @@ impl HeldNote {
         let sources = SoundSources::of(&model.file);
         let mut voice =
             Voice::new(&model.coeffs, sources, &model.air, ReedTables::reference(), self.reed(model));
-        for (hole, &open) in model.file.fingerings[self.fingering].open.iter().enumerate() {
-            voice.lattice_mut().set_opening(hole, f64::from(u8::from(open)));
+        for (hole, opening) in model.file.fingerings[self.fingering].opening().into_iter().enumerate() {
+            voice.lattice_mut().set_opening(hole, opening);
         }
         voice.lattice_mut().set_jet_loss(self.jet_loss);
         voice.lattice_mut().glide_delay(self.rows, 0);

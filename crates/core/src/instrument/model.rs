@@ -105,14 +105,11 @@ impl Model {
         let notes_hz: Vec<f64> = file
             .fingerings
             .iter()
-            .map(|fingering| fingering.written.sounding(file.transposition).unwrap_or(SoundingNote(0)))
-            .map(|note| note.frequency_hz(a4_hz))
+            .map(|fingering| file.sounding(fingering.written).frequency_hz(a4_hz))
             .collect();
         let slope = |(fingering, &note_hz): (&Fingering, &f64)| {
-            let opening: Vec<f64> =
-                fingering.open.iter().map(|&is_open| f64::from(u8::from(is_open))).collect();
             // Fewer digits than differ between one system's sine and another's.
-            (1e3 * coeffs.susceptance_slope(note_hz, &opening)).round() * 1e-3
+            (1e3 * coeffs.susceptance_slope(note_hz, &fingering.opening())).round() * 1e-3
         };
         let susceptance_slopes = file.fingerings.iter().zip(&notes_hz).map(slope).collect();
         let registers = file
@@ -172,9 +169,7 @@ impl Model {
     /// Allocates.
     pub fn silent_notes(&self) -> Vec<SoundingNote> {
         let silent = (0..self.file.fingerings.len()).filter(|&fingering| !self.speaks(fingering));
-        silent
-            .filter_map(|fingering| self.file.fingerings[fingering].written.sounding(self.file.transposition))
-            .collect()
+        silent.map(|fingering| self.file.sounding(self.file.fingerings[fingering].written)).collect()
     }
 
     /// Place of a fingering's note over the lowest note, see [`PlayerModel::place`]. Real-time safe.

@@ -10,7 +10,7 @@ use crate::bore::instrument_file::{Fingering, InstrumentFile};
 use crate::bore::sound_sources::SoundSources;
 use crate::bore::transfer_matrix::TransferMatrix;
 use crate::instrument::listening::Paths;
-use crate::units::{Air, SoundingNote};
+use crate::units::Air;
 
 /// Bands, as third octaves from 1 kHz: 100 Hz to 10 kHz.
 const BANDS: std::ops::RangeInclusive<i32> = -10..=10;
@@ -73,8 +73,7 @@ impl<'a> RadiatedBands<'a> {
 
     /// Pitch of a fingering's note at A4 = 440 Hz, Hz.
     fn lowest_hz(&self, fingering: &Fingering) -> f64 {
-        let note = fingering.written.sounding(self.file.transposition);
-        note.unwrap_or(SoundingNote(fingering.written.0)).frequency_hz(440.0)
+        self.file.sounding(fingering.written).frequency_hz(440.0)
     }
 
     fn levels(

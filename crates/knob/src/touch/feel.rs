@@ -46,7 +46,7 @@ impl InstrumentFeel {
         let file = &model.file;
         let mut fingerings = [None; PITCHES];
         for (index, fingering) in file.fingerings.iter().enumerate() {
-            let sounding = fingering.written.sounding(file.transposition).unwrap_or(SoundingNote(0));
+            let sounding = file.sounding(fingering.written);
             if let Some(place) = fingerings.get_mut(usize::from(sounding.0)) {
                 *place = u8::try_from(index).ok();
             }
