@@ -4,7 +4,6 @@
 //! lip.
 
 use crate::reed::ReedLaw;
-use crate::reed::law::K_INIT;
 use crate::reed::physical::P_REF_PA;
 
 /// Resonance and damping of the reed under the lip, for one fingering.
@@ -46,15 +45,12 @@ impl PlayedReed {
 
     /// Compliance relative to that of the reference reed.
     pub fn compliance(&self) -> f64 {
-        K_INIT / self.law.k()
+        self.law.compliance()
     }
 
-    /// Embouchure parameter of this reed relative to its own closing pressure: `zeta A H k_ref / sqrt(H k)`.
-    ///
-    /// It equals `zeta` for the reference reed. A wider reed is stronger (as H^2 if k follows H, as sqrt(H) if k is free), a
-    /// stiffer one weaker.
+    /// Embouchure parameter over this reed's own closing pressure, see [`ReedLaw::flow_strength`].
     pub fn flow_strength(&self) -> f64 {
-        self.zeta * self.law.a() * self.law.h() * K_INIT / self.law.closing().sqrt()
+        self.law.flow_strength(self.zeta)
     }
 }
 

@@ -95,6 +95,17 @@ impl ReedLaw {
         self.h * self.k
     }
 
+    /// Compliance over that of the reference reed, `k_ref / k`.
+    pub fn compliance(self) -> f64 {
+        K_INIT / self.k
+    }
+
+    /// Embouchure parameter over the reed's own closing pressure, `zeta A H k_ref / sqrt(H k)`, where the reference reed has `zeta`. A
+    /// wider reed is stronger (as H^2 if k follows H, as sqrt(H) if k is free), a stiffer one weaker.
+    pub fn flow_strength(self, zeta: f64) -> f64 {
+        zeta * self.a * self.h * K_INIT / self.closing().sqrt()
+    }
+
     /// Pressure difference where the flow peaks, `H k / 3`, over the reference closing pressure.
     pub fn peak_at(self) -> f64 {
         self.closing() / 3.0

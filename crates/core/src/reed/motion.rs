@@ -100,7 +100,7 @@ impl ReedCoeffs {
         let angular = std::f64::consts::TAU * resonance_hz.min(0.15 * rate_hz);
         let damp = 1.0 / (1.0 + damping * angular * period);
         let drive = period * angular * angular * damp;
-        let compliance = K_INIT / law.k();
+        let compliance = law.compliance();
         Self {
             period,
             strength: zeta * law.a(),

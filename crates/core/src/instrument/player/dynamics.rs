@@ -241,12 +241,6 @@ impl LipShape {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reed::law::K_INIT;
-
-    /// Flow strength of a law, as `haptics::PlayedReed::flow_strength` has it.
-    fn strength(law: ReedLaw, channel: f64) -> f64 {
-        channel * law.a() * law.h() * K_INIT / law.closing().sqrt()
-    }
 
     #[test]
     fn the_lip_gives_the_rules_closing_pressure_and_flow_at_every_place() {
@@ -256,7 +250,7 @@ mod tests {
                 let lip = rule.lip(place, dynamic);
                 let law = lip.law(ReedLaw::default());
                 assert!((law.closing() / rule.closing(place, dynamic) - 1.0).abs() < 1e-9);
-                let zeta = strength(law, ZETA_REFERENCE * lip.channel);
+                let zeta = law.flow_strength(ZETA_REFERENCE * lip.channel);
                 assert!((zeta / rule.zeta(place, dynamic) - 1.0).abs() < 1e-9, "{place} {dynamic}: {zeta}");
             }
         }

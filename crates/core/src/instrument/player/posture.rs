@@ -17,7 +17,6 @@ use crate::instrument::lip::{Embouchure, embouchure};
 use crate::instrument::model::Model;
 use crate::instrument::played_note::PlayedNote;
 use crate::instrument::settings::{BreathResponse, Settings, Tuning};
-use crate::reed::law::K_INIT;
 use crate::reed::physical::ZETA_REFERENCE;
 use crate::reed::{MovingReed, ReedCoeffs, ReedLaw};
 use crate::units::{Air, cents};
@@ -363,14 +362,13 @@ impl Played {
 
 /// A reed at the frequency of a note, for its onset.
 fn reed_at_note(reed: &MovingReed, note_hz: f64) -> ReedAtNote {
-    let (law, compliance) = (reed.law, K_INIT / reed.law.k());
     ReedAtNote {
-        zeta: reed.zeta * law.a() * law.h() * K_INIT / law.closing().sqrt(),
+        zeta: reed.law.flow_strength(reed.zeta),
         // A sharp corner is a very short curve.
         lay: reed.lay.max(1e-9),
         ratio: note_hz / reed.resonance_hz,
         damping: reed.damping,
-        swept: std::f64::consts::TAU * note_hz * reed.swept_s * compliance,
+        swept: std::f64::consts::TAU * note_hz * reed.swept_s * reed.law.compliance(),
     }
 }
 
