@@ -7,6 +7,8 @@
 //! hard lay. Its numbers are by judgement, because no measured slap was at hand: at full strength a loud pop, no louder
 //! than a loud note.
 
+use crate::dsp::smooth::smooth;
+
 /// How long the tongue pulls, s.
 const PULL_S: f64 = 0.008;
 /// Force of the strongest pull, over the closing pressure. It bends the reed away by as many rest openings.
@@ -53,8 +55,7 @@ impl Slap {
             return None;
         }
         // Slow at both ends, so that little is heard before the tongue lets go.
-        let way = self.age_s / PULL_S;
-        let seal = way * way * (3.0 - 2.0 * way);
+        let seal = smooth(self.age_s / PULL_S);
         let share = self.strength * seal;
         Some(TonguePull { force: self.from * (1.0 - seal) - PULL * share, suction: -SUCTION * share, seal })
     }

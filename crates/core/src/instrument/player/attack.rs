@@ -4,6 +4,8 @@
 //! dynamic, where there is hardly more than the fundamental. A hard one begins above it and eases off. A normal one is there
 //! at once: the air column alone makes its growth.
 
+use crate::dsp::smooth::smooth;
+
 /// How a tongued note begins where the breath is [played](crate::instrument::BreathResponse::Played).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Attack {
@@ -46,10 +48,7 @@ impl Onset {
     /// The dynamic to play now where `dynamic`, 0..=1, is asked for. Real-time safe.
     pub fn shaped(&self, attack: Attack, dynamic: f64) -> f64 {
         let tail = |time_s: f64| (-self.since_s / time_s).exp();
-        let left = |time_s: f64| {
-            let left = (1.0 - self.since_s / time_s).max(0.0);
-            left * left * (3.0 - 2.0 * left)
-        };
+        let left = |time_s: f64| smooth(1.0 - self.since_s / time_s);
         match attack {
             Attack::Normal => dynamic,
             Attack::Soft => dynamic * (1.0 - SOFT.0 * tail(SOFT.1)),

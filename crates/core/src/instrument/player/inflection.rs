@@ -4,6 +4,7 @@
 //! goes to where the note begins, and rises from when the breath lets the note speak. A fall keeps the breath, which fades with
 //! the pitch; then the tongue ends the note. The pitch comes back when nothing is heard any more, or behind the next tongue.
 
+use crate::dsp::smooth::smooth;
 use crate::instrument::articulation::Articulation;
 use crate::instrument::slap::BREATH_GAMMA;
 
@@ -128,8 +129,7 @@ impl Inflection {
 
     /// Share of the way that has been gone: without a kink at either end.
     fn way(&self) -> f64 {
-        let share = self.share();
-        share * share * (3.0 - 2.0 * share)
+        smooth(self.share())
     }
 }
 
