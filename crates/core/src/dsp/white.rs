@@ -1,6 +1,16 @@
 //! White noise with a seed, so that every render repeats.
 
-/// Numbers without a pattern that can be heard: Knuth's MMIX generator (linear congruential, 64 bits).
+/// From a number of the generator, taken as signed, to white noise of variance 1.
+pub const UNIT: f64 = 1.732_050_807_568_877_2 / (1_u64 << 63) as f64;
+
+/// The number after this one: a linear congruential generator (Knuth, The Art of Computer Programming 2, 3.3.4: MMIX). Its upper
+/// bits are heard, uniform. Real-time safe.
+#[inline(always)]
+pub const fn next(random: u64) -> u64 {
+    random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407)
+}
+
+/// Numbers without a pattern that can be heard.
 #[derive(Clone, Copy, Debug)]
 pub struct White(u64);
 
@@ -13,8 +23,8 @@ impl White {
     /// The next number, uniform, with mean 0 and variance 1. Real-time safe.
     #[expect(clippy::should_implement_trait, reason = "it never ends")]
     pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        1.732_050_807_568_877_2 / (1_u64 << 63) as f64 * (self.0 as i64) as f64
+        self.0 = next(self.0);
+        UNIT * (self.0 as i64) as f64
     }
 }
 

@@ -12,6 +12,7 @@ mod lanes;
 
 use super::control_tick::TICK;
 use super::person::Person;
+use crate::dsp::white::{UNIT, next};
 pub(super) use lanes::NoiseLanes;
 
 /// How the jet makes noise.
@@ -50,16 +51,6 @@ const STILL: f64 = 1e-30;
 const LAMINAR_FLOW: f64 = 0.002;
 /// Seed of the noise: any constant does; with a constant, renders repeat.
 const NOISE_SEED: u64 = 0x9E37_79B9_7F4A_7C15;
-
-/// From a whole number of 64 bits to white noise of unit variance.
-const UNIT: f64 = 1.732_050_807_568_877_2 / (1_u64 << 63) as f64;
-
-/// The number after this one: a linear congruential generator (Knuth, The Art of Computer Programming 2, 3.3.4: MMIX). Its upper
-/// bits are heard, uniform.
-#[inline(always)]
-fn next(random: u64) -> u64 {
-    random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407)
-}
 
 /// Turbulence that is not too small to compute with.
 fn still(built: f64) -> f64 {

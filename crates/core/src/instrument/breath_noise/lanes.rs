@@ -1,7 +1,8 @@
 //! The noises of several voices during a tick: a lane is a voice. Each does what a [`BreathNoise`] does alone, in the same order,
 //! and gives the same bits.
 
-use super::{BreathNoise, FLOOR, Jet, UNIT, next, still};
+use super::{BreathNoise, FLOOR, Jet, still};
+use crate::dsp::white::{UNIT, next};
 use crate::instrument::control_tick::TICK;
 
 /// See [`BreathNoise`].
