@@ -72,6 +72,10 @@ impl Default for Air {
 /// may name another (`nominal_diameter_mm`).
 pub const REFERENCE_RADIUS_M: f64 = 7.45e-3;
 
+/// Length of the built-in B flat clarinet from the tip of the reed to the end of the bell, m. What was fitted to that instrument goes with
+/// the length of another over it.
+pub const REFERENCE_LENGTH_M: f64 = 0.667_587;
+
 /// A note as MIDI, files and hosts know it: MIDI number of the pitch that sounds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SoundingNote(pub u8);

@@ -21,19 +21,17 @@ use crate::bore::lattice::LatticeCoeffs;
 use crate::bore::lattice::sensitivity::{AtFrequency, Layout, Sweep, hole_admittances};
 use crate::bore::transfer_matrix::TransferMatrix;
 use crate::parallel::{self, each_part};
-use crate::units::Air;
+use crate::units::{Air, REFERENCE_LENGTH_M};
 
 /// A relative change of a radius or loss that costs as much as two cents on one peak.
 const STIFFNESS: f64 = 0.15;
-/// The curve is compared at so many points over these frequencies, Hz, of a bore of [`LENGTH_M`]; decibels at one point
+/// The curve is compared at so many points over these frequencies, Hz, of a bore of [`REFERENCE_LENGTH_M`]; decibels at one point
 /// count so much: as little as keeps the curve of every fingering of the B flat clarinet within 1 dB rms to 4 kHz.
 const CURVE_POINTS: usize = 118;
 const CURVE_HZ: (f64, f64) = (80.0, 6_000.0);
 const CURVE_WEIGHT: f64 = 0.22;
-/// Up to here the curve counts in full, Hz, of a bore of [`LENGTH_M`].
+/// Up to here the curve counts in full, Hz, of a bore of [`REFERENCE_LENGTH_M`].
 const CURVE_FULL_HZ: f64 = 4_000.0;
-/// Length of the built-in clarinet, m: frequencies above are for it and go with the inverse length.
-const LENGTH_M: f64 = 0.667_587;
 /// Cents and decibels on one peak that count as one.
 const CENTS: f64 = 2.0;
 const DECIBELS: f64 = 0.4;
@@ -286,7 +284,7 @@ fn targets(
     let model = TransferMatrix::new(file, *air);
     model.prepare_peaks(&mut |share| on(SHARES.0 * 0.9 * share))?;
     let on = &mut |share: f64| on(SHARES.0 * (0.9 + 0.1 * share));
-    let size = file.length_m() / LENGTH_M;
+    let size = file.length_m() / REFERENCE_LENGTH_M;
     let groups = parallel::each(
         fingerings.len() + CURVE_POINTS,
         |at| match fingerings.get(at) {

@@ -19,11 +19,9 @@ use crate::haptics::requirement::{NoteRequirement, RequirementSolver};
 use crate::haptics::torque_law;
 use crate::haptics::torque_law::TorqueExtremes;
 use crate::haptics::torque_limits::TorqueLimits;
-use crate::reed::physical::P_REF_PA;
+use crate::reed::physical::{P_REF_PA, ZETA_REFERENCE};
 use crate::units::WrittenNote;
 
-/// Embouchure parameter of the reference reed, which fixes how many degrees a pascal is.
-const REFERENCE_ZETA: f64 = 0.3;
 /// Reference note of an instrument that has it: written C5.
 const REFERENCE_NOTE: WrittenNote = WrittenNote(72);
 
@@ -101,7 +99,7 @@ impl FeelTable {
         let Some(own) = asked.get(reference).copied().flatten() else {
             return Err(FeelRefused::Silent { zeta: reed.flow_strength() });
         };
-        let standard_reed = PlayedReed::quasi_static(REFERENCE_ZETA);
+        let standard_reed = PlayedReed::quasi_static(ZETA_REFERENCE);
         // How many degrees a pascal is belongs to the knob. The reference reed fixes it, whatever reed is played.
         let degrees_per_pa = match design.law {
             TorqueLaw::Flow => {

@@ -28,6 +28,7 @@ use crate::bore::transfer_matrix::threshold_gamma;
 use crate::haptics::admittance::AdmittanceGrid;
 use crate::haptics::played_reed::Lip;
 use crate::reed::lay::opening;
+use crate::reed::motion::RESONANCE_TO_RATE;
 
 /// Most Newton steps. Where there is a solution, ten are enough.
 const STEPS: usize = 60;
@@ -38,8 +39,6 @@ const LONGEST: f64 = 0.02;
 const START: (f64, f64) = (0.9, 0.35);
 /// The search for the upper end of the unstable range begins beyond closure, by this share of the lay's half-width.
 const SHUT: f64 = 0.8;
-/// Highest resonance of the reed over the sample rate, as in `reed::motion`.
-const RESONANCE_TO_RATE: f64 = 0.15;
 
 /// The reed, with pressures over its own closing pressure.
 pub(super) struct MovingReed {

@@ -25,6 +25,7 @@ use crate::instrument::stage::Chair;
 use crate::instrument::voice::{Probe, TICK, Voice};
 use crate::reed::ReedLaw;
 use crate::reed::ReedTables;
+use crate::reed::physical::ZETA_REFERENCE;
 use crate::reed::{MovingReed, ReedCoeffs};
 
 /// Samples up to this magnitude count as silence: -120 dBFS. A gain that raises them raises it as well: single precision may
@@ -139,7 +140,7 @@ impl Clarinet {
         let reed = ReedCoeffs::new(
             MovingReed {
                 law: ReedLaw::default(),
-                zeta: 0.3,
+                zeta: ZETA_REFERENCE,
                 lay: 0.4,
                 resonance_hz: lip.resonance_hz,
                 damping: lip.damping,

@@ -9,9 +9,7 @@ use std::f64::consts::TAU;
 
 use crate::bore::sound_sources::SoundSources;
 use crate::instrument::player::fitted;
-
-/// Length of the instrument that the fit is for, m: of the B flat clarinet from the tip of the reed to the end of the bell.
-const FITTED_LENGTH_M: f64 = 0.667_587;
+use crate::units::REFERENCE_LENGTH_M;
 
 /// A shelf and a bell.
 ///
@@ -51,7 +49,7 @@ impl Presence {
 
     /// For an instrument of this size.
     pub fn of(sources: &SoundSources) -> Self {
-        let size = sources.length_m() / FITTED_LENGTH_M;
+        let size = sources.length_m() / REFERENCE_LENGTH_M;
         Self { shelf_hz: Self::FITTED.shelf_hz / size, bell_hz: Self::FITTED.bell_hz / size, ..Self::FITTED }
     }
 

@@ -13,7 +13,7 @@ use crate::instrument::room::Room;
 use crate::instrument::techniques::{Techniques, Tract};
 use crate::reed::ReedLaw;
 use crate::reed::law::coupled_k;
-use crate::reed::physical::{DimensionlessReed, P_REF_PA, PhysicalReed};
+use crate::reed::physical::{DimensionlessReed, P_REF_PA, PhysicalReed, ZETA_REFERENCE};
 use crate::reed::strength;
 
 /// Softest and loudest breath are at least this far apart.
@@ -154,7 +154,7 @@ impl Default for Settings {
             attack: Attack::Normal,
             strength: 2.5,
             lip: 1.0,
-            zeta: 0.3,
+            zeta: ZETA_REFERENCE as f32,
             damping: 1.0,
             lay: 0.4,
             reed_h: 2.598_076,

@@ -29,6 +29,8 @@ use crate::reed::tables::ReedTables;
 /// A reed counts as shut below this opening (over the rest opening), in statistics and drawings. With a curved lay the last
 /// of the gap closes only slowly, hence a thousandth. By judgement.
 pub const SHUT: f64 = 1e-3;
+/// Highest resonance of the reed over the sample rate: w_r T stays below 1, well inside the integrator's stability limit of 2.
+pub(crate) const RESONANCE_TO_RATE: f64 = 0.15;
 /// Largest opening, over the rest opening: a reed pushed away from the mouthpiece is stopped by the lip (by judgement).
 const MAX_OPENING: f64 = 2.0;
 /// Force of the tongue that holds the reed shut at any playing pressure, over P. By judgement.
@@ -96,8 +98,7 @@ impl ReedCoeffs {
         let MovingReed { law, zeta, lay, resonance_hz, damping, swept_s } = reed;
         let period = 1.0 / rate_hz;
         let closing = law.h() * K_INIT;
-        // w_r T stays below 1, well inside the integrator's stability limit of 2.
-        let angular = std::f64::consts::TAU * resonance_hz.min(0.15 * rate_hz);
+        let angular = std::f64::consts::TAU * resonance_hz.min(RESONANCE_TO_RATE * rate_hz);
         let damp = 1.0 / (1.0 + damping * angular * period);
         let drive = period * angular * angular * damp;
         let compliance = law.compliance();

@@ -31,7 +31,7 @@ const MEASURING_CENTS: f64 = 10.0;
 /// clarinets, with the maker's fingering, can be trimmed to its pitch at some rates and not at others, and it leaves its
 /// register when played softer or louder.
 const FEWEST_PRESSURES: usize = 2;
-/// Lowest note of the B flat clarinet, Hz. A larger instrument takes longer to settle, in proportion to its size.
+/// Lowest note of the B flat clarinet, Hz.
 const LOWEST_HZ: f64 = 146.83;
 
 /// How exactly notes are tuned.
@@ -55,9 +55,14 @@ impl Accuracy {
     pub const FINE: Self = Self { close_cents: 0.02, sure_cents: 0.2, around: true, every_beginning: true };
 }
 
+/// How much longer than a B flat clarinet an instrument takes to settle: in proportion to its size.
+pub(super) fn longer(model: &Model) -> f64 {
+    (LOWEST_HZ / model.lowest_hz).clamp(1.0, 4.0)
+}
+
 /// From when to when the pitch of a held note is measured, s: near the threshold a note grows slowly.
 fn listening_s(model: &Model, gamma: f64) -> (f64, f64) {
-    let longer = (LOWEST_HZ / model.lowest_hz).clamp(1.0, 4.0);
+    let longer = longer(model);
     let (from_s, to_s) = if gamma < 0.5 { (1.0, 1.3) } else { (0.6, 0.9) };
     (longer * from_s, longer * to_s)
 }

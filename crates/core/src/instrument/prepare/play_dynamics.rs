@@ -12,7 +12,7 @@ use crate::instrument::held_note::{HeldNote, TONGUE_HOLD_S};
 use crate::instrument::model::Model;
 use crate::instrument::played_note::PlayedNote;
 use crate::instrument::player::dynamics::{LOWEST_ONSET, NODE_DYNAMICS, NODES};
-use crate::instrument::prepare::auto_tune::Accuracy;
+use crate::instrument::prepare::auto_tune::{Accuracy, longer};
 use crate::instrument::prepare::trial_pitch::trial_pitch_hz;
 use crate::instrument::side_by_side::{self, BlownBeside, Stand};
 use crate::instrument::tuning_table::{NoteTuning, TuningTable};
@@ -58,8 +58,6 @@ const CHANGE_S: f64 = 0.15;
 const SETTLE_S: f64 = 0.6;
 const TRIMMED_S: f64 = 0.25;
 const LISTEN_S: f64 = 0.25;
-/// Lowest note of the B flat clarinet, Hz. A larger instrument takes longer to settle, in proportion to its size.
-const LOWEST_HZ: f64 = 146.83;
 
 /// A note as it was heard.
 #[derive(Clone, Copy)]
@@ -220,7 +218,7 @@ impl<'a> Diminuendo<'a> {
         gamma: f64,
     ) -> Option<Self> {
         let held = HeldNote { rows: tuned.natural, ..HeldNote::played(model, fingering, 1.0, gamma) };
-        let longer = (LOWEST_HZ / model.lowest_hz).clamp(1.0, 4.0);
+        let longer = longer(model);
         let mut note = Self {
             model,
             fingering,
