@@ -34,6 +34,7 @@ use num_complex::Complex64;
 
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::radiation;
+use crate::bore::tone_hole::series_correction_m;
 use crate::parallel;
 use crate::units::Air;
 
@@ -469,7 +470,7 @@ fn losses(omega: f64, radius_m: f64, air: &Air) -> Losses {
 fn hole_corrections_m(a: f64, b: f64) -> (f64, f64) {
     let delta = b / a;
     let inner_m = b * (0.82 + delta * (-0.193 + delta * (-1.09 + delta * (1.27 - 0.71 * delta))));
-    (inner_m, b * (-0.37 + 0.087 * delta) * delta * delta)
+    (inner_m, series_correction_m(b, a))
 }
 
 /// Acoustic mass of a jump in radius, kg/m4, `None` where there is none. Polynomial as in openwind, after Taillard.
