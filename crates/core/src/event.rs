@@ -46,11 +46,12 @@ pub enum Event {
         /// Cents above the note.
         cents: f32,
     },
-    /// Controllers open and stiffen the reed: factors on [`Settings`](crate::instrument::Settings)' H and k.
+    /// Controllers open and stiffen the reed: factors on [`Settings`](crate::instrument::Settings)' H and k. While these are `coupled`, k
+    /// follows H, and the factor on k does nothing.
     Reed {
         /// On H, 0.1..=10; 1 leaves it.
         h: f32,
-        /// On k, 0.1..=10; 1 leaves it.
+        /// On k, 0.1..=10; 1 leaves it. Nothing while H and k are coupled.
         k: f32,
     },
     /// Depth of the vibrato, 0..=1, added to that of the [`Settings`](crate::instrument::Settings).

@@ -36,7 +36,7 @@
 //! [`Lattice`](bore::lattice::Lattice), [`Voice`](instrument::Voice), [`Clarinet`](instrument::Clarinet). It never allocates
 //! while it plays.
 
-// The one exception, with its proof, is the call of the AVX2 code in `bore::lattice`.
+// The exceptions, each with its proof, are the calls of AVX2 code in `bore::lattice`, its `choir` and `dsp::resampler`.
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
 

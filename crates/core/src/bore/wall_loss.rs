@@ -18,7 +18,7 @@ pub const DELAY: f64 = 2.46e-3;
 /// How much more than a smooth tube a wall with tone holes loses (fitted to the transfer matrices).
 pub const HOLED_WALL: f64 = 1.05;
 
-/// `K_v`, m s^-1/2 per metre of radius: the loss of a tube of radius r and length L is `K_v L sqrt(s) / r`.
+/// `K_v`, s^1/2: the loss of a tube of radius r and length L is `K_v L sqrt(s) / r`.
 pub fn wall_constant(air: &Air) -> f64 {
     let prandtl = air.mu * air.cp / air.kappa;
     HOLED_WALL * (1.0 + (air.gamma - 1.0) / prandtl.sqrt()) * (air.mu / air.rho).sqrt() / air.c

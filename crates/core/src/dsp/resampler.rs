@@ -1,4 +1,5 @@
-//! Sample-rate conversion from the instrument's own rate (96 000 or 88 200 Hz) to the host's (1 000..=1 536 000 Hz).
+//! Sample-rate conversion from the instrument's own rate (96 000 or 88 200 Hz; 192 000 or 176 400 Hz in high quality) to the host's
+//! (1 000..=1 536 000 Hz).
 //!
 //! A polyphase FIR: one Kaiser-windowed sinc, sampled at as many phases as the ratio of the two rates needs. It is
 //! linear-phase and leaves out nothing but steepness: the transition runs from 5/12 to 7/12 of the lower of the two

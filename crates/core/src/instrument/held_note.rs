@@ -57,6 +57,9 @@ pub struct HeldNote {
 impl HeldNote {
     /// A fingering (index in the file) at a mouth pressure over the closing pressure; everything else as on the reference
     /// clarinet, with the natural trim and without noise.
+    ///
+    /// # Panics
+    /// If the model's tuning has no such fingering.
     pub fn new(model: &Model, fingering: usize, gamma: f64) -> Self {
         Self {
             fingering,

@@ -179,6 +179,9 @@ impl Model {
 
     /// Rows of round-trip delay that move a fingering's note by `cents`, estimated from the note's quarter-wave length.
     /// Positive cents are up and give negative rows. Real-time safe.
+    ///
+    /// # Panics
+    /// If the file has no such fingering.
     pub fn rows_for_cents(&self, fingering: usize, cents: f64) -> f64 {
         let quarter_waves = f64::from(2 * self.registers[fingering] - 1);
         let quarter_rows = quarter_waves * self.coeffs.rate_hz / (4.0 * self.notes_hz[fingering]);

@@ -9,7 +9,7 @@ use crate::units::REFERENCE_RADIUS_M;
 /// in proportion to its nominal bore. So two instruments that differ only in size are equally loud, and a bass does not
 /// drive the limiter all the time.
 const FULL_SCALE_PER_PA: f64 = 0.501_187_233_627_272_2;
-/// Time that a change of the gain by a factor of one takes, s.
+/// Time constant with which the gain goes to its setting, s: of first order.
 const GAIN_S: f64 = 0.02;
 /// Time that a change of the volume takes, s.
 const VOLUME_S: f64 = 0.010;

@@ -184,7 +184,7 @@ impl Model {
     /// Allocates.
     ///
     /// # Errors
-    /// [`BuildError::Rate`] if the host's rate lies outside 22.05..=384 kHz.
+    /// [`BuildError::Rate`] if the host's rate lies outside [`HOST_RATES_HZ`](super::internal_rate::HOST_RATES_HZ).
     pub fn built_in(host_rate_hz: f64) -> Result<Self, BuildError> {
         let wanted = Wanted::new(Bundled::BFlat.file(), host_rate_hz);
         Preparation::new(&wanted, None)
