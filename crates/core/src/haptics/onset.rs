@@ -38,7 +38,7 @@ const LONGEST: f64 = 0.02;
 /// far below, where a mode near the resonance of the reed starts.
 const START: (f64, f64) = (0.9, 0.35);
 /// The search for the upper end of the unstable range begins beyond closure, by this share of the lay's half-width.
-const SHUT: f64 = 0.8;
+const BEYOND_CLOSURE: f64 = 0.8;
 
 /// The reed, with pressures over its own closing pressure.
 pub(super) struct MovingReed {
@@ -102,7 +102,7 @@ pub(super) fn onsets<'a>(
 /// `(gamma, frequency in Hz)` at which the steady state becomes stable again, with the reed nearly shut on the curve of the
 /// lay; the search starts at `f_hz`. `None` on a sharp lay, where it becomes stable at closure.
 pub(super) fn shut(grid: &AdmittanceGrid, reed: &MovingReed, f_hz: f64) -> Option<(f64, f64)> {
-    onset(grid, reed, f_hz, 1.0 + SHUT * reed.lay).filter(|&(gamma, _)| gamma > 1.0)
+    onset(grid, reed, f_hz, 1.0 + BEYOND_CLOSURE * reed.lay).filter(|&(gamma, _)| gamma > 1.0)
 }
 
 /// One onset, by Newton's method from a first guess; `None` if the search finds none.

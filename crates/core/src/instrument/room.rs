@@ -2,7 +2,7 @@
 //!
 //! - [`Room`]: what a player can set, a part of [`Settings`](super::Settings)
 //! - `shoebox` (Design): where player and listener are, the images behind the walls, and how loud the room is
-//! - `room_design` (Coeffs): delays, gains and filters at one sample rate
+//! - `room_coeffs` (Coeffs): delays, gains and filters at one sample rate
 //! - `room_sound` (State): what is in the air, in `delay_line`s; `seats` is what comes from several players
 //!
 //! The dry sound stays as it is, and stands for the direct sound. Images of order 1 and 2 are exact in time and level
@@ -15,7 +15,7 @@
 //! which is a part of *tone*.
 
 mod delay_line;
-mod room_design;
+mod room_coeffs;
 mod room_sound;
 mod seats;
 mod shoebox;

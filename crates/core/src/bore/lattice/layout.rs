@@ -8,11 +8,11 @@ use super::coeffs::LatticeCoeffs;
 use super::real::Real;
 use super::{BACK, END_SLOT, IDLE_SLOT, LANES, Lattice, MAX_CHUNKS, STRIDE, TUNED_SLOT, back_rows};
 
-/// Most tone holes.
-const MAX_HOLES: usize = MAX_CHUNKS * LANES;
+/// Lanes for tone holes: as many holes can be laid out, more than a file may have.
+const LAID_HOLES: usize = MAX_CHUNKS * LANES;
 
 /// A chunk for each hole, in the order of the file.
-type HoleChunks = [u8; MAX_HOLES];
+type HoleChunks = [u8; LAID_HOLES];
 
 /// A junction.
 #[derive(Clone, Copy)]
@@ -83,7 +83,7 @@ impl Layout {
     }
 
     /// Chunks for all holes in which more than `least` chunks have none but shut holes, and as many as can be.
-    fn arrange(&self, is_shut: &[bool; MAX_HOLES], least: u32) -> Option<HoleChunks> {
+    fn arrange(&self, is_shut: &[bool; LAID_HOLES], least: u32) -> Option<HoleChunks> {
         let open = is_shut.iter().take(self.first.len()).filter(|is_shut| !**is_shut).count();
         let most = (self.chunks - open.div_ceil(LANES).min(self.chunks)) as u32;
         (least + 1..=most).rev().find_map(|count| {
@@ -93,8 +93,8 @@ impl Layout {
     }
 
     /// Chunks for all holes, where the chunks of a set have none but shut holes; there may be none.
-    fn fill(&self, is_shut: &[bool; MAX_HOLES], set: u32) -> Option<HoleChunks> {
-        let (mut chunks, mut taken) = ([0; MAX_HOLES], [0; MAX_CHUNKS]);
+    fn fill(&self, is_shut: &[bool; LAID_HOLES], set: u32) -> Option<HoleChunks> {
+        let (mut chunks, mut taken) = ([0; LAID_HOLES], [0; MAX_CHUNKS]);
         for &hole in &self.order {
             let before =
                 self.hops.iter().filter(|hop| hop[1] == hole).map(|hop| chunks[usize::from(hop[0])] + 1);
@@ -169,7 +169,7 @@ impl<F: Real> Lattice<F> {
         for holes in &mut self.holes {
             holes.is_shut = (0..LANES).all(|k| holes.junctions.lanes.is_shut(k));
         }
-        let mut is_shut = [false; MAX_HOLES];
+        let mut is_shut = [false; LAID_HOLES];
         for (is_shut, &(chunk, k)) in is_shut.iter_mut().zip(&self.hole_lanes) {
             *is_shut = self.holes[chunk].junctions.lanes.is_shut(k);
         }
@@ -186,8 +186,8 @@ impl<F: Real> Lattice<F> {
     }
 
     /// Lanes in these chunks: who stays in a chunk keeps the lane.
-    fn places_in(&self, chunks: &HoleChunks) -> [(usize, usize); MAX_HOLES] {
-        let (mut places, mut taken) = ([(0, 0); MAX_HOLES], [[false; LANES]; MAX_CHUNKS]);
+    fn places_in(&self, chunks: &HoleChunks) -> [(usize, usize); LAID_HOLES] {
+        let (mut places, mut taken) = ([(0, 0); LAID_HOLES], [[false; LANES]; MAX_CHUNKS]);
         for (hole, &(chunk, k)) in self.hole_lanes.iter().enumerate() {
             if usize::from(chunks[hole]) == chunk {
                 (places[hole], taken[chunk][k]) = ((chunk, k), true);

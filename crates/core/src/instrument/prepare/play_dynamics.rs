@@ -25,7 +25,7 @@ const FAR_DB: f64 = 0.5;
 /// A pitch this near to the wanted one needs no other trim, cents.
 const CLOSE_CENTS: f64 = 0.2;
 /// A note that stays further off, because its trim ends, is played less loudly, cents.
-const IN_TUNE_CENTS: f64 = 1.0;
+const TRIM_ENDS_CENTS: f64 = 1.0;
 /// A pitch further off than this is another note, cents.
 const OTHER_CENTS: f64 = 150.0;
 /// Largest number of corrections of the trim at one dynamic.
@@ -148,7 +148,7 @@ async fn learn_beside(
         for (share, speaks) in LOUDEST.into_iter().zip(&mut speaks).filter(|(_, speaks)| **speaks) {
             let most_cents = best.map_or(f64::INFINITY, |(least, _)| least);
             match descend(stand, model, fingering, tuned, share * gamma, range, most_cents).await {
-                Ok((off_cents, note)) if off_cents < IN_TUNE_CENTS => return Some(note),
+                Ok((off_cents, note)) if off_cents < TRIM_ENDS_CENTS => return Some(note),
                 Ok(found) => best = Some(found),
                 Err(Lost::AtLoudest) => *speaks = false,
                 Err(Lost::At(node)) if node < softest.min(SOFT) => softest = node,

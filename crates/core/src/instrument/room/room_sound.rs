@@ -3,7 +3,7 @@
 
 use super::Room;
 use super::delay_line::{DelayLine, PIECE};
-use super::room_design::{LINES, LONGEST_EARLY_S, RoomDesign, Tap};
+use super::room_coeffs::{LINES, LONGEST_EARLY_S, RoomCoeffs, Tap};
 use super::seats::Seats;
 use crate::dsp::glide::Glide;
 
@@ -63,7 +63,7 @@ pub struct RoomSound {
 /// What hears the delays in the way of one room.
 #[derive(Clone, Debug)]
 struct Listener {
-    design: RoomDesign,
+    coeffs: RoomCoeffs,
     /// States of the lines' filters.
     filters: [f32; LINES],
 }
@@ -93,7 +93,7 @@ impl RoomSound {
     /// No room, at a sample rate. Allocates.
     pub fn new(rate_hz: f64) -> Self {
         let room = Room::default();
-        let listener = Listener { design: RoomDesign::new(&room, rate_hz), filters: [0.0; LINES] };
+        let listener = Listener { coeffs: RoomCoeffs::new(&room, rate_hz), filters: [0.0; LINES] };
         let early = (LONGEST_EARLY_S * rate_hz) as usize + PIECE;
         Self {
             rate_hz,
@@ -109,7 +109,7 @@ impl RoomSound {
             source: DelayLine::new(early),
             wall: 0.0,
             seats: Seats::new(early, rate_hz),
-            lines: std::array::from_fn(|_| DelayLine::new(RoomDesign::longest_line(rate_hz))),
+            lines: std::array::from_fn(|_| DelayLine::new(RoomCoeffs::longest_line(rate_hz))),
             heard: Box::default(),
             heard_before: Box::default(),
             quiet: 0,
@@ -192,7 +192,7 @@ impl RoomSound {
                 done += from;
             }
             self.change();
-            let shortest = self.now.design.delays[0].min(self.before.design.delays[0]);
+            let shortest = self.now.coeffs.delays[0].min(self.before.coeffs.delays[0]);
             let mut samples = PIECE.min(left.len() - done).min(shortest);
             if self.fading > 0 {
                 samples = samples.min(self.fading);
@@ -207,7 +207,7 @@ impl RoomSound {
 
     /// Samples of silence after which all delays are silent.
     fn patience(&self) -> usize {
-        self.now.design.reach.max(self.before.design.reach) + 1
+        self.now.coeffs.reach.max(self.before.coeffs.reach) + 1
     }
 
     /// Begins to fade into the room that is wanted.
@@ -218,9 +218,9 @@ impl RoomSound {
         }
         self.chosen = self.wanted;
         self.before = self.now.clone();
-        self.now.design = RoomDesign::new(&self.wanted, self.rate_hz);
+        self.now.coeffs = RoomCoeffs::new(&self.wanted, self.rate_hz);
         if self.asleep {
-            self.before.design = self.now.design;
+            self.before.coeffs = self.now.coeffs;
         } else {
             self.fading = self.fade;
         }
@@ -240,7 +240,7 @@ impl RoomSound {
         if !self.door.rests_at(1.0) {
             source[..samples].iter_mut().for_each(|x| *x *= self.door.next());
         }
-        let (new, old) = (self.now.design.wall_pole, self.before.design.wall_pole);
+        let (new, old) = (self.now.coeffs.wall_pole, self.before.coeffs.wall_pole);
         let poles = weights.map(|weight| old + weight * (new - old));
         let has_seats = self.seats.are_heard();
         if has_seats {
@@ -257,7 +257,7 @@ impl RoomSound {
 
         let heard = &mut *self.heard;
         self.now.hear(&self.source, seats, &self.lines, samples, heard);
-        let mut gains = [self.now.design.late; PIECE];
+        let mut gains = [self.now.coeffs.late; PIECE];
         if self.fading > 0 {
             let before = &mut *self.heard_before;
             self.before.hear(&self.source, seats, &self.lines, samples, before);
@@ -265,10 +265,10 @@ impl RoomSound {
             heard.ends_into.iter_mut().zip(&before.ends_into).for_each(|(new, old)| mix(new, old, &weights));
             heard.ears.iter_mut().zip(&before.ears).for_each(|(new, old)| mix(new, old, &weights));
             heard.lines.iter_mut().zip(&before.lines).for_each(|(new, old)| mix(new, old, &weights));
-            mix(&mut gains, &[self.before.design.late; PIECE], &weights);
+            mix(&mut gains, &[self.before.coeffs.late; PIECE], &weights);
             self.fading -= samples;
             if self.fading == 0 {
-                self.before.design = self.now.design;
+                self.before.coeffs = self.now.coeffs;
             }
         }
 
@@ -330,22 +330,22 @@ impl Listener {
         samples: usize,
         heard: &mut Heard,
     ) {
-        let Self { design, filters } = self;
-        for (ear, taps) in heard.ears.iter_mut().zip(&design.early) {
+        let Self { coeffs, filters } = self;
+        for (ear, taps) in heard.ears.iter_mut().zip(&coeffs.early) {
             // To -0 anything may be added without a change, even -0.
             ear[..samples].fill(-0.0);
             hear(source, taps, &mut ear[..samples]);
         }
-        heard.into[..samples].copy_from_slice(source.read_written(design.into_lines, samples));
+        heard.into[..samples].copy_from_slice(source.read_written(coeffs.into_lines, samples));
         if let Some(seats) = seats {
-            seats.hear(design, &mut heard.ears, samples);
-            for (own, entering) in heard.ends_into.iter_mut().zip(seats.enter(design, samples)) {
+            seats.hear(coeffs, &mut heard.ears, samples);
+            for (own, entering) in heard.ends_into.iter_mut().zip(seats.enter(coeffs, samples)) {
                 own[..samples].copy_from_slice(entering);
             }
         }
         for (line, row) in heard.lines.iter_mut().enumerate() {
-            let (loss, mut y) = (design.losses[line], filters[line]);
-            let arriving = lines[line].read(design.delays[line], samples);
+            let (loss, mut y) = (coeffs.losses[line], filters[line]);
+            let arriving = lines[line].read(coeffs.delays[line], samples);
             // What does not wait for the sample before it vectorises in a loop of its own.
             let row = &mut row[..samples];
             row.iter_mut().zip(arriving).for_each(|(out, x)| *out = loss.gain * x);

@@ -3,7 +3,7 @@
 //! players as for sixteen.
 
 use super::delay_line::{DelayLine, PIECE};
-use super::room_design::RoomDesign;
+use super::room_coeffs::RoomCoeffs;
 use crate::dsp::glide::Glide;
 
 /// Time in which several players sit down or one stays, s.
@@ -93,8 +93,8 @@ impl Seats {
     }
 
     /// Adds what the ears hear of the images of both ends.
-    pub fn hear(&self, design: &RoomDesign, ears: &mut [[f32; PIECE]; 2], samples: usize) {
-        for (line, images) in self.ends.iter().zip(&design.ends) {
+    pub fn hear(&self, coeffs: &RoomCoeffs, ears: &mut [[f32; PIECE]; 2], samples: usize) {
+        for (line, images) in self.ends.iter().zip(&coeffs.ends) {
             for (ear, taps) in ears.iter_mut().zip(images) {
                 super::room_sound::hear(line, taps, &mut ear[..samples]);
             }
@@ -102,7 +102,7 @@ impl Seats {
     }
 
     /// What enters the lines of the tail from each end.
-    pub fn enter(&self, design: &RoomDesign, samples: usize) -> [&[f32]; 2] {
-        self.ends.each_ref().map(|line| line.read_written(design.into_lines, samples))
+    pub fn enter(&self, coeffs: &RoomCoeffs, samples: usize) -> [&[f32]; 2] {
+        self.ends.each_ref().map(|line| line.read_written(coeffs.into_lines, samples))
     }
 }

@@ -139,7 +139,7 @@ fn every_arrangement_keeps_the_order_of_hops() {
         let mut found = 0;
         for _ in 0..20_000 {
             let most_open = 1 + random.below(24);
-            let mut is_shut = [false; MAX_HOLES];
+            let mut is_shut = [false; LAID_HOLES];
             is_shut.iter_mut().for_each(|is_shut| *is_shut = random.below(24) >= most_open);
             let Some(chunks) = layout.arrange(&is_shut, 0) else { continue };
             found += 1;

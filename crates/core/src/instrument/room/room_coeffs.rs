@@ -54,7 +54,7 @@ pub struct Tap {
 
 /// A room at one sample rate.
 #[derive(Clone, Copy, Debug)]
-pub struct RoomDesign {
+pub struct RoomCoeffs {
     /// Images for the left and the right ear.
     pub early: [[Tap; IMAGES]; 2],
     /// The same of who sits at the left and the right end of several players.
@@ -72,7 +72,7 @@ pub struct RoomDesign {
     pub reach: usize,
 }
 
-impl RoomDesign {
+impl RoomCoeffs {
     /// Of clamped settings. Real-time safe.
     pub fn new(room: &Room, rate_hz: f64) -> Self {
         let decay_s = f64::from(room.decay_s);
