@@ -52,6 +52,6 @@ pub use feel_design::{FeelDesign, NoteOrder};
 pub use feel_parameters::{Feel, FieldRange, OutOfRange, TorqueLaw};
 pub use feel_refused::FeelRefused;
 pub use feel_table::{FeelTable, Landmarks, NoteFeel};
-pub use played_reed::{Lip, PlayedReed};
+pub use played_reed::PlayedReed;
 pub use requirement::{NoteRequirement, RequirementSolver};
 pub use torque_limits::TorqueLimits;

@@ -17,6 +17,7 @@
 pub mod firmware_header;
 pub mod law;
 pub mod lay;
+mod lip;
 pub mod motion;
 pub mod physical;
 pub mod quasi_static;
@@ -24,6 +25,7 @@ pub mod strength;
 pub mod tables;
 
 pub use law::ReedLaw;
+pub use lip::Lip;
 pub use motion::{MovingReed, ReedCoeffs, ReedLoad, ReedState};
 pub use physical::PhysicalReed;
 pub use quasi_static::{QuasiStaticReed, QuasiStaticState};

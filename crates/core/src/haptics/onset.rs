@@ -26,7 +26,7 @@ use std::f64::consts::TAU;
 
 use crate::bore::transfer_matrix::threshold_gamma;
 use crate::haptics::admittance::AdmittanceGrid;
-use crate::haptics::played_reed::Lip;
+use crate::reed::Lip;
 use crate::reed::lay::opening;
 use crate::reed::motion::RESONANCE_TO_RATE;
 

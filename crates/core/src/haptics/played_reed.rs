@@ -3,17 +3,8 @@
 //! [`crate::instrument::feel_inputs::played_reed`] makes one from the settings of the instrument, with the player's rule for the
 //! lip.
 
-use crate::reed::ReedLaw;
 use crate::reed::physical::P_REF_PA;
-
-/// Resonance and damping of the reed under the lip, for one fingering.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lip {
-    /// Resonance of the reed with the lip on it, Hz.
-    pub resonance_hz: f64,
-    /// Damping q, the inverse of the quality factor.
-    pub damping: f64,
-}
+use crate::reed::{Lip, ReedLaw};
 
 /// The reed as it is played. Sound and feel use the same one.
 #[derive(Clone, Debug, PartialEq)]

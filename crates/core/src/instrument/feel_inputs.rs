@@ -1,10 +1,11 @@
 //! What haptics needs to know about an instrument: the reed as it is played, and the pressures its notes need.
 
 use crate::bore::instrument_file::InstrumentFile;
-use crate::haptics::{Lip, PlayedReed, RequirementSolver};
+use crate::haptics::{PlayedReed, RequirementSolver};
 use crate::instrument::lip::embouchure;
 use crate::instrument::model::Model;
 use crate::instrument::settings::Settings;
+use crate::reed::Lip;
 
 /// The reed under these settings, with the law and the lip that the sound has, for every fingering of a file. Allocates.
 pub fn played_reed(file: &InstrumentFile, settings: &Settings) -> PlayedReed {

@@ -4,16 +4,9 @@
 //! It comes from a map of the (resonance, damping) pairs that hold each note in its register: low damping squeaks in the
 //! chalumeau register; high damping loses everything above written B5, where the reed must favour mode 3 over mode 1.
 
-/// Reed resonance and damping under the lip.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Embouchure {
-    /// Resonance of the reed with the lip on it, Hz.
-    pub resonance_hz: f64,
-    /// Damping q of the reed, 1 / Q; 0.13..=0.8.
-    pub damping: f64,
-}
+use crate::reed::Lip;
 
-/// Embouchure for a note sounding at `note_hz` on an instrument whose lowest note sounds at `lowest_hz`. Real-time safe.
+/// The lip for a note sounding at `note_hz` on an instrument whose lowest note sounds at `lowest_hz`. Real-time safe.
 ///
 /// The resonance is `f_r = max(10.2 f_low, 1.55 f)`; the damping `q` goes from 0.8 to 0.25 while `f / f_r` goes from 0.36
 /// to 0.54, and on to 0.13 while `f / f_low` goes from 7.6 to 11, written E flat 6 to A6: the highest notes only begin and hold softly on a reed
@@ -26,11 +19,11 @@ pub struct Embouchure {
 /// let (low, high) = (embouchure(146.8, 146.8), embouchure(932.3, 146.8));
 /// assert!(low.damping == 0.8 && high.damping < 0.3);
 /// ```
-pub fn embouchure(note_hz: f64, lowest_hz: f64) -> Embouchure {
+pub fn embouchure(note_hz: f64, lowest_hz: f64) -> Lip {
     let resonance_hz = (10.2 * lowest_hz).max(1.55 * note_hz);
     let way = ((note_hz / resonance_hz - 0.36) / (0.54 - 0.36)).clamp(0.0, 1.0);
     let highest = ((note_hz / lowest_hz - 7.6) / (11.0 - 7.6)).clamp(0.0, 1.0);
-    Embouchure { resonance_hz, damping: 0.8 + way * (0.25 - 0.8) + highest * (0.13 - 0.25) }
+    Lip { resonance_hz, damping: 0.8 + way * (0.25 - 0.8) + highest * (0.13 - 0.25) }
 }
 
 #[cfg(test)]

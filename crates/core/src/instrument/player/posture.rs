@@ -13,12 +13,12 @@ use super::step_towards;
 use super::technique::subtone::{at_place, covered};
 use super::voicing;
 use crate::instrument::bend::{self, BendSplit};
-use crate::instrument::lip::{Embouchure, embouchure};
+use crate::instrument::lip::embouchure;
 use crate::instrument::model::Model;
 use crate::instrument::played_note::PlayedNote;
 use crate::instrument::settings::{BreathResponse, Settings, Tuning};
 use crate::reed::physical::ZETA_REFERENCE;
-use crate::reed::{MovingReed, ReedCoeffs, ReedLaw};
+use crate::reed::{Lip, MovingReed, ReedCoeffs, ReedLaw};
 use crate::units::{Air, cents};
 
 /// Each of two time constants with which the lip goes to the closing pressure that a note has between the softest and the loudest dynamic, s:
@@ -308,7 +308,7 @@ impl Played {
     fn new(
         settings: &Settings,
         free: &MovingReed,
-        lip: Embouchure,
+        lip: Lip,
         subtone: f64,
         (fingering, placed, rows_per_cent): (usize, PlacedRule, f64),
         model: &Model,
