@@ -16,16 +16,19 @@
 //! | b, a, h: radii of hole and bore, chimney height, m | `radius_m`, `bore_radius_m`, `chimney_m` |
 //! | Z/Zc of the nominal bore | `over_zc` |
 
+mod bessel;
 mod outflow;
+mod peaks;
 mod standing;
 mod survey;
 
+pub use bessel::bessel_ratio;
+pub use peaks::{Peak, find_peaks};
 pub use survey::Resonance;
 
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::f64::consts::TAU;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::PoisonError;
@@ -35,7 +38,6 @@ use num_complex::Complex64;
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::radiation;
 use crate::bore::tone_hole::series_correction_m;
-use crate::parallel;
 use crate::units::Air;
 
 const J: Complex64 = Complex64::new(0.0, 1.0);
@@ -44,9 +46,6 @@ const J: Complex64 = Complex64::new(0.0, 1.0);
 const PIECE: (f64, f64) = (2.5e-3, 2e-4);
 /// Frequencies kept; 8192 of them take about 25 MB for 24 holes.
 const KEPT: usize = 8192;
-/// Where peaks are looked for, Hz, and the grid of the search: a third of the narrowest resonance of a clarinet.
-const SEARCH_HZ: (f64, f64, f64) = (20.0, 6_000.0, 2.0);
-
 /// One instrument in one air, in the frequency domain. Threads may share it.
 ///
 /// ```
@@ -120,17 +119,6 @@ struct Matrix {
     pu: Complex64,
     up: Complex64,
     uu: Complex64,
-}
-
-/// A maximum of the magnitude of an impedance.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Peak {
-    /// Frequency, Hz.
-    pub f_hz: f64,
-    /// |Z| there, over Zc of the nominal bore.
-    pub mag_over_zc: f64,
-    /// Quality factor, `-(f/2) d arg Z / df` at the maximum.
-    pub q: f64,
 }
 
 impl TransferMatrix {
@@ -260,80 +248,6 @@ impl TransferMatrix {
         (pressure, flow) = at.spans[0].apply(pressure, flow);
         flows.iter_mut().for_each(|into| *into /= pressure);
         pressure / flow / self.air.z_c(self.nominal_radius_m)
-    }
-
-    /// The first `count` impedance peaks of a fingering, see [`find_peaks`].
-    pub fn peaks(&self, open: &[bool], reed_volume_m3: f64, count: usize) -> Vec<Peak> {
-        let scan = |f_hz| self.impedance(f_hz, open, reed_volume_m3);
-        maxima(scan, |f_hz| self.between(f_hz, open, reed_volume_m3), count)
-    }
-
-    /// Impedance between the frequencies of the scan, from those kept: a cubic through the four nearest admittances, which
-    /// bend only over the distance of two modes: closer to the peaks than the search for them (see the test).
-    fn between(&self, f_hz: f64, open: &[bool], reed_volume_m3: f64) -> Complex64 {
-        let (lowest, _, step) = SEARCH_HZ;
-        let at = (f_hz - lowest) / step;
-        let (first, part) = ((at.floor() - 1.0).max(0.0), at - (at.floor() - 1.0).max(0.0));
-        (0..4_u8)
-            .map(f64::from)
-            .map(|n| {
-                let others = (0..4_u8).map(f64::from).filter(|&other| other != n);
-                let weight: f64 = others.map(|other| (part - other) / (n - other)).product();
-                weight / self.impedance(lowest + step * (first + n), open, reed_volume_m3)
-            })
-            .sum::<Complex64>()
-            .inv()
-    }
-
-    /// Works out the losses at every frequency that [`peaks`](Self::peaks) may look at, on all cores; `on` hears the share
-    /// done and may end it, then the answer is `None`. Afterwards peaks of any fingering cost little.
-    pub fn prepare_peaks(&self, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Option<()> {
-        let (lowest, highest, step) = SEARCH_HZ;
-        let steps = ((highest - lowest) / step) as usize;
-        const BATCH: usize = 64;
-        let batch = |batch: usize| {
-            let own = (batch * BATCH..=steps).take(BATCH);
-            own.for_each(|k| drop(self.keep(lowest + step * k as f64)));
-        };
-        on(0.0).is_continue().then_some(())?;
-        parallel::each(steps / BATCH + 1, batch, on).map(drop)
-    }
-
-    /// The frequency nearest `near_hz` (as an interval, within an octave) where the phase of the impedance falls through
-    /// zero, Hz, and Re Z/Zc there: where a reed without inertia plays, and the height its threshold needs.
-    pub fn playing_frequency(&self, open: &[bool], reed_volume_m3: f64, near_hz: f64) -> Option<(f64, f64)> {
-        let (lowest, highest, step) = SEARCH_HZ;
-        let from = (near_hz / 2.0).max(lowest / 2.0);
-        let to = (near_hz * 2.0).min(2.0 * highest);
-        // On whole steps, so that every fingering shares the frequencies kept.
-        let grid = ((from / step).floor() as usize..=(to / step).ceil() as usize).map(|k| k as f64 * step);
-        let mut best: Option<f64> = None;
-        let mut before: Option<(f64, f64)> = None;
-        for f_hz in grid {
-            let im = self.impedance(f_hz, open, reed_volume_m3).im;
-            if let Some((f_before, im_before)) = before
-                && im_before > 0.0
-                && im <= 0.0
-            {
-                let (mut low, mut high) = (f_before, f_hz);
-                while high - low > 1e-6 {
-                    let middle = 0.5 * (low + high);
-                    if self.loaded(&self.at(middle), open, reed_volume_m3).im > 0.0 {
-                        low = middle;
-                    } else {
-                        high = middle;
-                    }
-                }
-                let found = 0.5 * (low + high);
-                let distance = |f_hz: f64| (f_hz / near_hz).log2().abs();
-                if best.is_none_or(|best| distance(found) < distance(best)) {
-                    best = Some(found);
-                }
-            }
-            before = Some((f_hz, im));
-        }
-        let f_hz = best.filter(|best| (best / near_hz).log2().abs() <= 1.0)?;
-        Some((f_hz, self.loaded(&self.at(f_hz), open, reed_volume_m3).re))
     }
 
     /// Z/Zc at the tip with the reed volume in parallel.
@@ -496,121 +410,6 @@ fn tanh(z: Complex64) -> Complex64 {
     (1.0 - decay) / (1.0 + decay)
 }
 
-/// J1(z)/J0(z) for complex z of moderate size (both parts below about 1e4), what boundary layers in tubes are made of;
-/// relative error below 1e-13 away from its poles on the real axis.
-///
-/// Up to |z| = 25 the continued fraction 1/(2/z - 1/(4/z - ...)) by the method of Lentz; beyond, the Hankel expansions
-/// of both functions (DLMF 10.10.1 and 10.17.5/6), of which one exponential is left far from the real axis.
-pub fn bessel_ratio(z: Complex64) -> Complex64 {
-    const CROSSOVER: f64 = 25.0;
-    if z.re < 0.0 {
-        return -bessel_ratio(-z);
-    }
-    if z.im > 0.0 {
-        return bessel_ratio(z.conj()).conj();
-    }
-    if z.norm() < CROSSOVER { ratio_by_fraction(z) } else { ratio_by_expansion(z) }
-}
-
-fn ratio_by_fraction(z: Complex64) -> Complex64 {
-    if z == Complex64::ZERO {
-        return z;
-    }
-    const TINY: Complex64 = Complex64::new(1e-300, 0.0);
-    let safe = |value: Complex64| if value == Complex64::ZERO { TINY } else { value };
-    let two_over_z = 2.0 / z;
-    // Denominator of 1 / (2/z - 1/(4/z - 1/(6/z - ...))).
-    let mut fraction = two_over_z;
-    let mut c = fraction;
-    let mut d = Complex64::ZERO;
-    for k in 2..200 {
-        let b = two_over_z * f64::from(k);
-        d = safe(b - d).inv();
-        c = safe(b - c.inv());
-        let change = c * d;
-        fraction *= change;
-        if (change - 1.0).norm_sqr() < 1e-31 {
-            break;
-        }
-    }
-    safe(fraction).inv()
-}
-
-/// For Re z >= 0, Im z <= 0, |z| >= 25.
-fn ratio_by_expansion(z: Complex64) -> Complex64 {
-    // Sums of (+-j)^k a_k(order) / z^k.
-    let step = J / (8.0 * z);
-    let sums = |order: f64| {
-        let (mut plus, mut minus, mut term) = (Complex64::ONE, Complex64::ONE, Complex64::ONE);
-        for k in 1..30 {
-            let odd = f64::from(2 * k - 1);
-            term *= step * ((4.0 * order * order - odd * odd) / f64::from(k));
-            plus += term;
-            minus += if k % 2 == 0 { term } else { -term };
-            if term.norm_sqr() < 1e-34 {
-                break;
-            }
-        }
-        (plus, minus)
-    };
-    let ((plus_0, minus_0), (plus_1, minus_1)) = (sums(0.0), sums(1.0));
-    // exp(-2j(z - pi/4)), at most 1 in this quadrant.
-    let other = J * (-2.0 * J * z).exp();
-    J * (other * minus_1 - plus_1) / (plus_0 + other * minus_0)
-}
-
-/// First `count` maxima of |Z| between 20 Hz and 6 kHz of any impedance function of frequency in Hz, lowest first.
-///
-/// A scan every 2 Hz, then golden section to 0.001 Hz; maxima closer than about 4 Hz are taken as one. `z` is expected in
-/// units of Zc of the nominal bore, as [`TransferMatrix::impedance`] gives it.
-pub fn find_peaks(z: impl Fn(f64) -> Complex64, count: usize) -> Vec<Peak> {
-    maxima(&z, &z, count)
-}
-
-/// As [`find_peaks`], with one function for the scan and one for the refinement.
-fn maxima(scan: impl Fn(f64) -> Complex64, fine: impl Fn(f64) -> Complex64, count: usize) -> Vec<Peak> {
-    let (lowest, highest, step) = SEARCH_HZ;
-    let steps = ((highest - lowest) / step) as usize;
-    let mut peaks = Vec::new();
-    let mut last_two = [f64::INFINITY; 2];
-    for k in 0..=steps {
-        if peaks.len() == count {
-            break;
-        }
-        let f_hz = lowest + step * k as f64;
-        let here = scan(f_hz).norm();
-        let [before, middle] = last_two;
-        if middle > before && middle >= here {
-            let f_hz = golden(|f_hz| fine(f_hz).norm(), f_hz - 2.0 * step, f_hz);
-            // Wide enough for the rounding of the phase, narrow against any resonance.
-            let h = 0.01;
-            let turn = (fine(f_hz + h) / fine(f_hz - h)).arg();
-            peaks.push(Peak { f_hz, mag_over_zc: fine(f_hz).norm(), q: -0.5 * f_hz * turn / (2.0 * h) });
-        }
-        last_two = [middle, here];
-    }
-    peaks
-}
-
-/// Maximum of a function with one maximum between `low` and `high`, to 0.0005 (golden section).
-fn golden(value: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
-    const RATIO: f64 = 0.618_033_988_749_894_8;
-    let (mut a, mut b) = (high - RATIO * (high - low), low + RATIO * (high - low));
-    let (mut value_a, mut value_b) = (value(a), value(b));
-    while high - low > 1e-3 {
-        if value_a > value_b {
-            (high, b, value_b) = (b, a, value_a);
-            a = high - RATIO * (high - low);
-            value_a = value(a);
-        } else {
-            (low, a, value_a) = (a, b, value_b);
-            b = low + RATIO * (high - low);
-            value_b = value(b);
-        }
-    }
-    0.5 * (low + high)
-}
-
 /// Mouth pressure over closing pressure at which a quasi-static reed starts to sound.
 ///
 /// From `3 g - 1 = 2 sqrt(g) / (zeta Z1)`: the reed's slope against a mode of height `z_peak_over_zc` (Re Z at the playing
@@ -627,35 +426,7 @@ mod tests {
     use crate::bore::instrument_file::BoreSegment;
     use crate::units::{REFERENCE_RADIUS_M, cents};
 
-    /// Against mpmath (30 digits).
-    #[test]
-    fn bessel_ratio_is_that_of_mpmath() {
-        let cases = [
-            ([0.001, -0.001], [0.0004999998749999583, -0.0005000001249999583]),
-            ([0.5, -0.5], [0.23319357751878375, -0.2642214402469063]),
-            ([1.7, -1.7], [0.23226879711986625, -0.8717393191227187]),
-            ([5.0, -5.0], [0.052799806066648934, -0.9503859560201866]),
-            ([14.0, -14.0], [0.018187295266211895, -0.9821556086241254]),
-            ([17.6, -17.6], [0.014412011792797441, -0.9858017251067006]),
-            ([17.8, -17.8], [0.014247712409359226, -0.9859611115841213]),
-            ([40.0, -40.0], [0.006289550252139817, -0.9937505078493043]),
-            ([300.0, -300.0], [0.000834028935164107, -0.9991666678301231]),
-            ([3.0, 0.5], [-0.6234172132514337, 0.9799427079362115]),
-            ([26.0, -2.0], [0.024561779419476154, -0.9631629653806216]),
-            ([30.0, 0.3], [1.0913838647660885, 0.7164690670813585]),
-            ([-4.0, -4.0], [-0.06688225859811267, -0.9375597736008432]),
-            ([17.5, 17.7], [0.01433093766363248, 0.9857190879710848]),
-        ];
-        for ([re, im], [expected_re, expected_im]) in cases {
-            let (got, expected) =
-                (bessel_ratio(Complex64::new(re, im)), Complex64::new(expected_re, expected_im));
-            let error = (got - expected).norm() / expected.norm();
-            assert!(error < 1e-13, "{re} {im}: {got}, {expected}, relative error {error:e}");
-        }
-        assert_eq!(bessel_ratio(Complex64::ZERO), Complex64::ZERO);
-    }
-
-    fn tube(length_m: f64, radius_m: f64) -> InstrumentFile {
+    pub(super) fn tube(length_m: f64, radius_m: f64) -> InstrumentFile {
         let (x_start_m, x_end_m, r_start_m, r_end_m) = (0.0, length_m, radius_m, radius_m);
         InstrumentFile {
             name: "tube".into(),
@@ -709,44 +480,6 @@ mod tests {
                 }
             }
         }
-    }
-
-    /// Peaks between the frequencies of the scan are those of the matrices themselves, also of a tube as long as a file may
-    /// have, whose modes lie closest.
-    #[test]
-    fn interpolated_peaks_are_the_exact_ones() {
-        let file = InstrumentFile::built_in();
-        for (file, open) in [
-            (file.clone(), file.fingerings[0].open.clone()),
-            (file.clone(), file.fingerings[32].open.clone()),
-            (file.scaled(2.0), file.fingerings[19].open.clone()),
-            (tube(3.0, 0.012), Vec::new()),
-        ] {
-            let model = TransferMatrix::new(&file, Air::default());
-            let exact = find_peaks(|f_hz| model.loaded(&model.at(f_hz), &open, 0.0), 3);
-            let found = model.peaks(&open, 0.0, 3);
-            assert_eq!((found.len(), exact.len()), (3, 3));
-            for (found, exact) in found.iter().zip(&exact) {
-                let off = cents(found.f_hz, exact.f_hz).abs();
-                let (height, q) = (found.mag_over_zc / exact.mag_over_zc - 1.0, found.q / exact.q - 1.0);
-                // Golden section itself stops at a thousandth of a hertz.
-                assert!(off < 0.05 && height.abs() < 5e-5 && q.abs() < 1e-3, "{found:?} {exact:?}");
-            }
-        }
-    }
-
-    /// A resonance whose height, frequency and Q are known in closed form.
-    #[test]
-    fn peaks_of_a_known_resonance_are_found() {
-        let resonance = |f_hz: f64, at_hz: f64, height: f64, q: f64| {
-            height / Complex64::new(1.0, q * (f_hz / at_hz - at_hz / f_hz))
-        };
-        let peaks = find_peaks(|f_hz| resonance(f_hz, 440.3, 30.0, 40.0), 9);
-        let [Peak { f_hz, mag_over_zc, q }] = peaks[..] else { panic!("{peaks:?}") };
-        assert!((f_hz - 440.3).abs() < 1e-3 && (mag_over_zc - 30.0).abs() < 1e-6 && (q - 40.0).abs() < 0.01);
-        let two = |f_hz| resonance(f_hz, 440.3, 30.0, 40.0) + resonance(f_hz, 1320.7, 20.0, 50.0);
-        assert_eq!([find_peaks(two, 9).len(), find_peaks(two, 1).len(), find_peaks(two, 0).len()], [2, 1, 0]);
-        assert!(find_peaks(|_| Complex64::new(f64::NAN, 0.0), 3).is_empty());
     }
 
     /// The pieces are fine enough: halving them moves no peak of the built-in clarinet by 0.1 cent.
