@@ -3,14 +3,16 @@
 //!
 //! The test prints what it measured; `docs/fingerings.md` has the table.
 
+#[path = "support/rendered.rs"]
+mod rendered;
+
 use chalumeau_core::analysis::pitch;
 use chalumeau_core::bore::bundled::Bundled;
-use chalumeau_core::event::{Event, Timed};
-use chalumeau_core::instrument::{Clarinet, Model, Preparation, Settings, Wanted};
+use chalumeau_core::event::Event;
+use chalumeau_core::instrument::{Model, Preparation, Settings, Wanted};
 use chalumeau_core::parallel;
-use chalumeau_core::score::{Score, play};
 use chalumeau_core::units::{WrittenNote, cents};
-use std::convert::Infallible;
+use rendered::rendered;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -41,20 +43,11 @@ struct Heard {
 fn heard(model: &Arc<Model>, rate_hz: f64, written: u8, breath: f32) -> Heard {
     let note = WrittenNote(written).sounding(model.file.transposition).unwrap();
     let wanted_hz = note.frequency_hz(440.0);
-    let mut clarinet = Clarinet::new(model.clone(), rate_hz);
     // Below the limiter.
-    clarinet.set_settings(&Settings { gain_db: -20.0, ..Settings::default() });
-    clarinet.reset();
-    let events = vec![
-        Timed { at: 0, event: Event::Breath(breath) },
-        Timed { at: 0, event: Event::NoteOn { note, velocity: 0.8 } },
-    ];
+    let settings = Settings { gain_db: -20.0, ..Settings::default() };
+    let events = [(0.0, Event::Breath(breath)), (0.0, Event::NoteOn { note, velocity: 0.8 })];
+    let out = rendered(model, rate_hz, &settings, &events, NOTE_S);
     let samples = |s: f64| (s * rate_hz) as usize;
-    let mut out = Vec::with_capacity(samples(NOTE_S));
-    let Ok(()) = play(&mut clarinet, &Score { events, samples: samples(NOTE_S) }, 512, |block| {
-        out.extend(block.iter().map(|&x| f64::from(x)));
-        Ok::<_, Infallible>(())
-    });
     let off = |sound: &[f64]| pitch::fundamental_hz(sound, rate_hz).map(|hz| cents(hz, wanted_hz));
     let is_own = |at: &usize| off(&out[*at..at + samples(WINDOW_S)]).is_some_and(|off| off.abs() < OWN_CENTS);
     let windows: Vec<usize> = (0..out.len() - samples(WINDOW_S)).step_by(samples(HOP_S)).collect();
@@ -101,23 +94,15 @@ fn the_highest_notes_speak_in_tune_at_every_breath() {
 
 /// A clarinet on a default player who holds still, blown from the start at a value of CC 2; keys go down at these times, s.
 fn played(model: &Arc<Model>, controller: u8, keys: &[(f64, u8)], length_s: f64) -> Vec<f64> {
-    let mut clarinet = Clarinet::new(model.clone(), RATE_HZ);
     // Below the limiter.
-    clarinet.set_settings(&Settings { gain_db: -20.0, life: 0.0, ..Settings::default() });
-    clarinet.reset();
-    let samples = |s: f64| (s * RATE_HZ) as usize;
+    let settings = Settings { gain_db: -20.0, life: 0.0, ..Settings::default() };
     let key = |&(at_s, written): &(f64, u8)| {
         let note = WrittenNote(written).sounding(model.file.transposition).unwrap();
-        Timed { at: samples(at_s), event: Event::NoteOn { note, velocity: 0.8 } }
+        (at_s, Event::NoteOn { note, velocity: 0.8 })
     };
-    let blown = Timed { at: 0, event: Event::Breath(f32::from(controller) / 127.0) };
-    let events = [blown].into_iter().chain(keys.iter().map(key)).collect();
-    let mut out = Vec::with_capacity(samples(length_s));
-    let Ok(()) = play(&mut clarinet, &Score { events, samples: samples(length_s) }, 512, |block| {
-        out.extend(block.iter().map(|&x| f64::from(x)));
-        Ok::<_, Infallible>(())
-    });
-    out
+    let blown = (0.0, Event::Breath(f32::from(controller) / 127.0));
+    let events: Vec<_> = [blown].into_iter().chain(keys.iter().map(key)).collect();
+    rendered(model, RATE_HZ, &settings, &events, length_s)
 }
 
 fn level_db(sound: &[f64]) -> f64 {

@@ -2,12 +2,13 @@
 //!
 //! Above 6 kHz soft notes have hardly any tone, so that what is there is noise. `docs/tone.md` has what is printed.
 
+#[path = "support/rendered.rs"]
+mod support;
+
 use chalumeau_core::analysis::spectrum::moving_rms;
-use chalumeau_core::event::{Event, Timed};
-use chalumeau_core::instrument::{Clarinet, Model, Settings};
-use chalumeau_core::score::{Score, play};
+use chalumeau_core::event::Event;
+use chalumeau_core::instrument::{Model, Settings};
 use chalumeau_core::units::{SoundingNote, WrittenNote};
-use std::convert::Infallible;
 use std::sync::{Arc, LazyLock};
 
 const RATE_HZ: f64 = 44_100.0;
@@ -28,21 +29,13 @@ fn sample(s: f64) -> usize {
 
 /// A note that is tongued and let go, without life.
 fn rendered(note: SoundingNote, value: u8, noise: f32) -> Vec<f64> {
-    let mut clarinet = Clarinet::new(MODEL.clone(), RATE_HZ);
-    clarinet.set_settings(&Settings { noise, life: 0.0, gain_db: -20.0, ..Settings::default() });
-    clarinet.reset();
+    let settings = Settings { noise, life: 0.0, gain_db: -20.0, ..Settings::default() };
     let events = [
         (0.0, Event::Breath(f32::from(value) / 127.0)),
         (BEGIN_S, Event::NoteOn { note, velocity: 0.8 }),
         (END_S, Event::NoteOff { note }),
     ];
-    let events = events.map(|(s, event)| Timed { at: sample(s), event }).to_vec();
-    let mut out = Vec::with_capacity(sample(OVER_S));
-    let Ok(()) = play(&mut clarinet, &Score { events, samples: sample(OVER_S) }, 512, |block| {
-        out.extend(block.iter().map(|&x| f64::from(x)));
-        Ok::<_, Infallible>(())
-    });
-    out
+    support::rendered(&MODEL, RATE_HZ, &settings, &events, OVER_S)
 }
 
 /// What is above 6 kHz, by three high-passes of second order.

@@ -2,14 +2,16 @@
 //!
 //! The test prints what it measured; `docs/tone.md` has the table.
 
+#[path = "support/rendered.rs"]
+mod rendered;
+
 use chalumeau_core::analysis::pitch::fundamental_hz;
 use chalumeau_core::bore::bundled::Bundled;
-use chalumeau_core::event::{Event, Timed};
-use chalumeau_core::instrument::{Clarinet, Model, Preparation, Settings, Tuning, Wanted};
+use chalumeau_core::event::Event;
+use chalumeau_core::instrument::{Model, Preparation, Settings, Tuning, Wanted};
 use chalumeau_core::parallel;
-use chalumeau_core::score::{Score, play};
 use chalumeau_core::units::{WrittenNote, cents};
-use std::convert::Infallible;
+use rendered::rendered;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -48,20 +50,10 @@ fn settings([strength, lip, zeta, damping, lay]: Reed, tuning: Tuning) -> Settin
 /// How much higher a note sounds than it is written, cents; `None` if another one sounds.
 fn off_cents(model: &Arc<Model>, settings: &Settings, written: WrittenNote, breath: u8) -> Option<f64> {
     let note = written.sounding(model.file.transposition)?;
-    let mut clarinet = Clarinet::new(model.clone(), RATE_HZ);
-    clarinet.set_settings(settings);
-    clarinet.reset();
-    let events = vec![
-        Timed { at: 0, event: Event::Breath(f32::from(breath) / 127.0) },
-        Timed { at: 0, event: Event::NoteOn { note, velocity: 0.8 } },
-    ];
-    let samples = |s: f64| (s * RATE_HZ) as usize;
-    let mut heard = Vec::new();
-    let Ok(()) = play(&mut clarinet, &Score { events, samples: samples(NOTE_S) }, 512, |block| {
-        heard.extend(block.iter().map(|&x| f64::from(x)));
-        Ok::<_, Infallible>(())
-    });
-    let hz = fundamental_hz(&heard[samples(STEADY_S)..], RATE_HZ)?;
+    let breath = Event::Breath(f32::from(breath) / 127.0);
+    let events = [(0.0, breath), (0.0, Event::NoteOn { note, velocity: 0.8 })];
+    let heard = rendered(model, RATE_HZ, settings, &events, NOTE_S);
+    let hz = fundamental_hz(&heard[(STEADY_S * RATE_HZ) as usize..], RATE_HZ)?;
     Some(cents(hz, note.frequency_hz(440.0))).filter(|off| off.abs() < OTHER_NOTE_CENTS)
 }
 

@@ -2,16 +2,17 @@
 //!
 //! Each test prints what it measured; `docs/tone.md` has the tables.
 
+#[path = "support/rendered.rs"]
+mod support;
+
 use chalumeau_core::analysis::onset::t90_s;
 use chalumeau_core::analysis::partials::{Partial, Wander};
 use chalumeau_core::analysis::pitch;
 use chalumeau_core::analysis::spectrum::moving_rms;
-use chalumeau_core::event::{Event, Timed};
+use chalumeau_core::event::Event;
 use chalumeau_core::instrument::{Attack, Clarinet, Model, Reach, Settings, Vibrato};
 use chalumeau_core::parallel;
-use chalumeau_core::score::{Score, play};
 use chalumeau_core::units::{SoundingNote, WrittenNote, cents};
-use std::convert::Infallible;
 use std::ops::ControlFlow;
 use std::sync::{Arc, LazyLock};
 
@@ -41,16 +42,7 @@ fn sample(s: f64) -> usize {
 
 /// Plays events, at times in s, 20 dB softer, so that no peak meets the limiter.
 fn rendered(settings: &Settings, events: &[(f64, Event)], seconds: f64) -> Vec<f64> {
-    let mut clarinet = Clarinet::new(MODEL.clone(), RATE_HZ);
-    clarinet.set_settings(&Settings { gain_db: -20.0, ..*settings });
-    clarinet.reset();
-    let events = events.iter().map(|&(s, event)| Timed { at: sample(s), event }).collect();
-    let mut out = Vec::with_capacity(sample(seconds));
-    let Ok(()) = play(&mut clarinet, &Score { events, samples: sample(seconds) }, 512, |block| {
-        out.extend(block.iter().map(|&x| f64::from(x)));
-        Ok::<_, Infallible>(())
-    });
-    out
+    support::rendered(&MODEL, RATE_HZ, &Settings { gain_db: -20.0, ..*settings }, events, seconds)
 }
 
 fn controller(value: u8) -> (f64, Event) {
