@@ -45,7 +45,7 @@ impl Slaps {
             if self.missing == 0 {
                 self.since_us = now_us;
             }
-            self.missing += unannounced;
+            self.missing = self.missing.saturating_add(unannounced);
         }
     }
 
@@ -83,6 +83,16 @@ mod tests {
             }
             assert_eq!(heard, 1, "EVENT at {says_event_ms:?}, STATE from {says_state_ms:?}");
         }
+    }
+
+    #[test]
+    fn more_slaps_without_a_word_than_can_be_counted_are_as_many_as_can() {
+        let mut slaps = Slaps::default();
+        for n in 0..64_u8 {
+            slaps.state(n.wrapping_mul(8), 0);
+        }
+        let heard = (0..1_000).filter(|_| slaps.poll(1_000_000).is_some()).count();
+        assert_eq!(heard, 255);
     }
 
     #[test]
