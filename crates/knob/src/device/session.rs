@@ -108,6 +108,23 @@ pub enum SessionStatus {
     PlainMidi,
 }
 
+/// What was told last of the knob, for people.
+enum Notice {
+    /// It has answered another program. An answer to this one settles it.
+    AnswersAnother,
+    /// What stays until the user acts, or something else is told.
+    Told(String),
+}
+
+impl Notice {
+    fn text(&self) -> &str {
+        match self {
+            Self::AnswersAnother => "the knob answers another program",
+            Self::Told(text) => text,
+        }
+    }
+}
+
 enum Incoming {
     Stream(Box<wire::Decoder>),
     Midi(Box<MidiReceiver>),
@@ -142,7 +159,7 @@ pub struct HostSession {
     plain: Option<StateSample>,
     has_plain_angle: bool,
     refusal: Option<String>,
-    notice: Option<String>,
+    notice: Option<Notice>,
     meter: Meter,
 }
 
@@ -226,7 +243,7 @@ impl HostSession {
 
     /// What the knob reported last of faults and of disarming by itself.
     pub fn notice(&self) -> Option<&str> {
-        self.notice.as_deref()
+        self.notice.as_ref().map(Notice::text)
     }
 
     /// Why the knob is not trusted with torque, and what to do.
@@ -316,7 +333,7 @@ impl HostSession {
     /// Somebody who obeys the user wants no torque, now.
     pub fn let_go(&mut self, why: &str, now_us: i64) {
         if self.arming.is_wanted() {
-            self.notice = Some(format!("disarmed: {why}"));
+            self.notice = Some(Notice::Told(format!("disarmed: {why}")));
         }
         self.arming.disarm(now_us);
     }

@@ -2,7 +2,8 @@
 
 use super::trust::Expected;
 use super::{
-    HostSession, Incoming, LONGEST_PERIOD_US, PLAIN_GAP_US, PLAIN_PERIOD_US, SessionEvent, StateSample,
+    HostSession, Incoming, LONGEST_PERIOD_US, Notice, PLAIN_GAP_US, PLAIN_PERIOD_US, SessionEvent,
+    StateSample,
 };
 use crate::device::session::slaps::Slaps;
 use crate::device::transport::Binding;
@@ -77,7 +78,7 @@ impl HostSession {
 
     fn hear_info(&mut self, info: &Info, now_us: i64) {
         if info.session != self.number {
-            self.notice = Some("the knob answers another program".into());
+            self.notice = Some(Notice::AnswersAnother);
             return;
         }
         self.meter.hello_round_trip_us = u32::try_from(now_us - self.hello_us).ok();
@@ -89,7 +90,7 @@ impl HostSession {
         }
         // Answered again: it was silent, not gone.
         if self.info.replace(*info).is_none() {
-            self.notice = self.notice.take().filter(|text| !text.contains("another program"));
+            self.notice = self.notice.take().filter(|notice| !matches!(notice, Notice::AnswersAnother));
             self.rate_due = self.binding == Binding::Serial;
             self.feeling.forget();
             // What had piled up on the line before anybody read it is no loss of this session.
@@ -102,7 +103,7 @@ impl HostSession {
 
     fn hear_state(&mut self, state: &DeviceState, now_us: i64, tell: &mut dyn FnMut(SessionEvent)) {
         if self.clock.observe(state.t_us, now_us) && self.info.is_some() {
-            self.notice = Some("the knob has restarted and is disarmed".into());
+            self.notice = Some(Notice::Told("the knob has restarted and is disarmed".into()));
             self.arming.disarm(now_us);
             self.trust.restart();
             self.feeling.forget();
@@ -125,7 +126,7 @@ impl HostSession {
         let is_probing = state.flags.has(wire::Flags::PROBING);
         if self.arming.hear(state.flags.armed(), is_probing, now_us) && self.notice.is_none() {
             let why = state.fault_code().map_or("the knob has disarmed itself", |code| code.text());
-            self.notice = Some(format!("disarmed: {why}"));
+            self.notice = Some(Notice::Told(format!("disarmed: {why}")));
         }
         if let Some(round_trip_us) = self.feeling.echoed(state.feel_id, now_us) {
             self.meter.feel_echoed(round_trip_us);
@@ -181,10 +182,10 @@ impl HostSession {
             }
             EventKind::Button => tell(SessionEvent::Button(event.value > 0.5)),
             EventKind::Limit => {}
-            EventKind::Fault => self.notice = Some(format!("fault: {text}")),
+            EventKind::Fault => self.notice = Some(Notice::Told(format!("fault: {text}"))),
             // Of FREE this side knows the reason better.
             EventKind::Disarmed if event.code == wire::FaultCode::Free as u8 => {}
-            EventKind::Disarmed => self.notice = Some(format!("disarmed: {text}")),
+            EventKind::Disarmed => self.notice = Some(Notice::Told(format!("disarmed: {text}"))),
             // The codes up to 7 are about FEEL, of which the one refused is named.
             EventKind::Refused if event.code <= RefusedCode::LawUnknown as u8 => {
                 if self.feeling.refused(event.feel_id) {
@@ -204,5 +205,38 @@ impl HostSession {
                 self.refusal = Some(text.into());
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::session::arming;
+    use crate::wire::FaultCode;
+
+    /// What a session says after these messages.
+    fn notice(messages: &[Message]) -> Option<String> {
+        let mut session = HostSession::new(Binding::Serial, 7, 0);
+        messages.iter().for_each(|message| session.hear(message, 0, &mut |_| {}));
+        session.notice().map(str::to_owned)
+    }
+
+    #[test]
+    fn only_an_answer_to_another_program_is_settled_by_an_answer_to_this_one() {
+        let own = Message::Info(arming::tests::info(450));
+        let other = Message::Info(Info { session: 8, ..arming::tests::info(450) });
+        let answers_another = Some("the knob answers another program".to_owned());
+        assert_eq!(notice(&[other]), answers_another);
+        assert_eq!(notice(&[other, own]), None);
+        let taken = Message::Event(DeviceEvent {
+            kind: EventKind::Disarmed,
+            counter: 1,
+            code: FaultCode::NewSession as u8,
+            feel_id: 0,
+            t_us: 0,
+            value: 0.0,
+        });
+        let text = format!("disarmed: {}", FaultCode::NewSession.text());
+        assert_eq!(notice(&[taken, own]), Some(text));
     }
 }
