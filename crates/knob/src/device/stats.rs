@@ -83,11 +83,6 @@ impl Meter {
         }
     }
 
-    /// STATE counted so far.
-    pub fn states(&self) -> u64 {
-        self.states
-    }
-
     /// The picture, but for what only others know. Sorts: not for every loop.
     pub fn picture(&self) -> LinkStats {
         let mut late = self.late_us.clone();

@@ -50,7 +50,6 @@ pub struct SimulatedKnob {
     command_nm: f64,
     report: Option<[(&'static str, OscValue); 8]>,
     extra_button: bool,
-    stop: bool,
 }
 
 impl SimulatedKnob {
@@ -92,7 +91,6 @@ impl SimulatedKnob {
             command_nm: 0.0,
             report: None,
             extra_button: false,
-            stop: false,
         }
     }
 
@@ -124,7 +122,7 @@ impl SimulatedKnob {
             bus_ok,
             supply_ok: !self.is_faulty(FaultKind::BrownOut),
             button: self.hand.button() || self.extra_button,
-            stop: self.stop,
+            stop: false,
             tells_velocity: true,
         };
         let mut arrived = Vec::new();
@@ -282,11 +280,6 @@ impl SimulatedKnob {
     /// The knob itself, to be put somewhere.
     pub fn plant(&mut self) -> &mut Plant {
         &mut self.plant
-    }
-
-    /// Presses the local stop, or releases it.
-    pub fn press_stop(&mut self, is_down: bool) {
-        self.stop = is_down;
     }
 
     /// Holds the button down, or not, beside what the script says.

@@ -168,11 +168,6 @@ impl Plant {
         self.hand_nm
     }
 
-    /// What the plant was made from.
-    pub fn design(&self) -> &PlantDesign {
-        &self.design
-    }
-
     /// Turns the shaft to an angle and a speed, whatever it did before.
     pub fn set(&mut self, angle_rad: f64, speed_rads: f64) {
         self.angle_rad = angle_rad;

@@ -147,11 +147,6 @@ impl Calibration {
         });
     }
 
-    /// Forgets the step in progress.
-    pub fn cancel(&mut self) {
-        self.0 = None;
-    }
-
     /// How much of the step is done, 0..=1, or `None` while there is none.
     pub fn progress(&self, t_s: f64) -> Option<f64> {
         let collecting = self.0.as_ref()?;

@@ -39,7 +39,6 @@ pub enum GreetingStep {
 pub struct Greeting {
     is_serial: bool,
     is_slow: bool,
-    hello_us: Option<i64>,
     next_hello_us: i64,
     next_speed_us: i64,
     has_asked: bool,
@@ -54,7 +53,6 @@ impl Greeting {
         Self {
             is_serial: binding == Binding::Serial,
             is_slow: false,
-            hello_us: None,
             next_hello_us: now_us,
             next_speed_us: now_us + OTHER_SPEED_US,
             has_asked: false,
@@ -72,11 +70,6 @@ impl Greeting {
     /// Name that unmodified firmware gave.
     pub fn stock_name(&self) -> Option<&str> {
         self.stock_name.as_deref()
-    }
-
-    /// When the last HELLO went out, us.
-    pub fn hello_us(&self) -> Option<i64> {
-        self.hello_us
     }
 
     /// Begins again with a device that has answered before, at the speed it answered at.
@@ -105,7 +98,6 @@ impl Greeting {
         }
         if now_us >= self.next_hello_us {
             self.next_hello_us = now_us + HELLO_US;
-            self.hello_us = Some(now_us);
             return Some(GreetingStep::Hello);
         }
         None
