@@ -1,6 +1,6 @@
 //! How a clarinet shall feel: the choices of the user, with their ranges and defaults.
 
-use crate::haptics::feel_parameters::TorqueLaw;
+use crate::haptics::feel_parameters::{HARD_CEILING_MNM, TorqueLaw};
 use crate::haptics::feel_refused::FeelRefused;
 use crate::units::WrittenNote;
 
@@ -106,7 +106,7 @@ impl FeelDesign {
         for (name, given, low, high) in [
             ("Contrast", self.contrast, 1.0, 5.0),
             ("Place", self.place, 1.0, 5.0),
-            ("strength (mNm)", self.strength_mnm, 0.0, 450.0),
+            ("strength (mNm)", self.strength_mnm, 0.0, f64::from(HARD_CEILING_MNM)),
             ("travel (degrees)", self.travel_deg, 120.0, 1_080.0),
             ("damping (mNm s/rad)", self.damping_mnms, 0.0, 20.0),
             ("friction (mNm)", self.friction_mnm, 0.0, 100.0),

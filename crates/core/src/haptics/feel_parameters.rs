@@ -3,6 +3,9 @@
 //! The knob computes its torque from these; `docs/protocol.md` specifies the same fields as bytes. Ranges are compared in
 //! binary32, as the firmware does, so that both ends agree to the last bit.
 
+/// Most torque that any knob may make, mNm: the nominal force of the TorqueTuner, compiled into its firmware as well.
+pub const HARD_CEILING_MNM: u16 = 450;
+
 /// Range of one field, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldRange {
@@ -156,7 +159,7 @@ pub const K: FieldRange = FieldRange::new("k", 0.01, 20.0);
 /// Product H k. The ranges of H and k imply its lower end.
 pub const H_K: FieldRange = FieldRange::new("h*k", 0.0, 10.0);
 /// Torque per unit of flow (flow law) or at closure (pressure law), mNm.
-pub const SCALE_MNM: FieldRange = FieldRange::new("scale_mnm", 0.0, 450.0);
+pub const SCALE_MNM: FieldRange = FieldRange::new("scale_mnm", 0.0, HARD_CEILING_MNM as f32);
 /// Scale of the angle, TorqueTuner's Stretch.
 pub const STRETCH: FieldRange = FieldRange::new("stretch", 0.1, 30.0);
 /// Origin of the law, degrees.

@@ -3,7 +3,7 @@
 pub use chalumeau_core::haptics::feel_parameters::*;
 
 /// Torque ceiling of ARM and ALIVE, mNm.
-pub const CEILING_MNM: FieldRange = FieldRange::new("ceiling_mnm", 0.0, 450.0);
+pub const CEILING_MNM: FieldRange = FieldRange::new("ceiling_mnm", 0.0, HARD_CEILING_MNM as f32);
 /// Angle of ZERO, 0.01 degrees.
 pub const ZERO_ANGLE: FieldRange = FieldRange::new("angle", -360_000.0, 360_000.0);
 /// STATE a second.

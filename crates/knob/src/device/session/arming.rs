@@ -5,13 +5,12 @@
 //! armed while nobody wants it so is told FREE until it is not.
 
 use crate::wire::Info;
+pub use crate::wire::limits::HARD_CEILING_MNM;
 
 /// Ceiling a host begins with, mNm. By judgement: well felt, and no hand is held by it.
 pub const FIRST_CEILING_MNM: u16 = 100;
 /// Most that is offered without a further act, mNm. By judgement.
 pub const OFFERED_CEILING_MNM: u16 = 250;
-/// Most there is, mNm: the nominal force of the TorqueTuner, compiled into its firmware as well.
-pub const HARD_CEILING_MNM: u16 = 450;
 
 /// ARM and FREE that show no effect are said again after this much, us.
 const INSIST_US: i64 = 50_000;

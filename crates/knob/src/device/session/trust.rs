@@ -3,6 +3,7 @@
 //! Pure bookkeeping: INFO and STATE go in, a [`Doubt`] comes out. Most doubts stand until the connection ends, because a
 //! knob that has lied once cannot be asked whether it has stopped.
 
+use crate::wire::limits::HARD_CEILING_MNM;
 use crate::wire::{Capabilities, DeviceState, Flags, Info};
 use std::fmt;
 
@@ -127,7 +128,7 @@ impl fmt::Display for Doubt {
             Self::CeilingTooHigh(mnm) => {
                 write!(
                     f,
-                    "the knob declares a torque ceiling of {mnm} mNm, more than the 450 that any knob may make"
+                    "the knob declares a torque ceiling of {mnm} mNm, more than the {HARD_CEILING_MNM} that any knob may make"
                 )
             }
             Self::NoMotor => f.write_str("the knob says that it has no motor"),
@@ -258,7 +259,7 @@ impl Trust {
             Some(Doubt::WatchdogTooShort(info.watchdog_ms))
         } else if info.ceiling_mnm == 0 {
             Some(Doubt::NoCeiling)
-        } else if info.ceiling_mnm > 450 {
+        } else if info.ceiling_mnm > HARD_CEILING_MNM {
             Some(Doubt::CeilingTooHigh(info.ceiling_mnm))
         } else if !info.capabilities.has(Capabilities::MOTOR) {
             Some(Doubt::NoMotor)
