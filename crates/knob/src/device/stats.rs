@@ -27,7 +27,7 @@ pub struct LinkStats {
     pub feel_round_trip_us: Option<u32>,
     /// How much faster the host's clock runs than the knob's, parts per million.
     pub skew_ppm: f32,
-    /// Datagrams or MIDI messages that were none of a knob's.
+    /// OSC messages that were none of a knob's, and datagrams that were no OSC; 0 on other links.
     pub ignored: u64,
     /// Times the knob was lost since the link was made.
     pub losses: u32,
