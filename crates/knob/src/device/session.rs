@@ -10,6 +10,7 @@ pub mod greeting;
 mod hearing;
 mod slaps;
 pub mod trust;
+mod zeroing;
 
 use crate::device::clock::DeviceClock;
 use crate::device::heartbeat::OBEDIENCE_US;
@@ -18,6 +19,7 @@ use crate::device::session::feeling::Feeling;
 use crate::device::session::greeting::Greeting;
 use crate::device::session::slaps::Slaps;
 use crate::device::session::trust::{Doubt, Trust};
+use crate::device::session::zeroing::Zeroing;
 use crate::device::stats::{LinkStats, Meter};
 use crate::device::transport::Binding;
 use crate::wire;
@@ -150,7 +152,7 @@ pub struct HostSession {
     zero_us: Option<i64>,
     next_alive_us: i64,
     next_slot_us: i64,
-    zero_due: bool,
+    zeroing: Zeroing,
     rate_due: bool,
     clock: DeviceClock,
     state: Option<(DeviceState, i64)>,
@@ -188,7 +190,7 @@ impl HostSession {
             next_alive_us: now_us,
             has_plain_angle: false,
             next_slot_us: now_us,
-            zero_due: false,
+            zeroing: Zeroing::default(),
             rate_due: false,
             clock: DeviceClock::default(),
             state: None,
@@ -310,8 +312,10 @@ impl HostSession {
             Some(info) => {
                 self.trust.forgive();
                 self.arming.arm(ceiling_mnm, further_act, info, now_us);
-                // A zero that waits for the knob to let go comes too late. One that does not wait is sent before ARM.
-                self.zero_due &= self.is_free();
+                // A zero that waits for the knob to let go comes too late. ARM waits for one that does not.
+                if !self.is_free() {
+                    self.zeroing.forget();
+                }
                 (self.refusal, self.notice) = (None, None);
                 return;
             }
@@ -370,7 +374,7 @@ impl HostSession {
         if self.arming.is_armed() {
             self.refusal = Some(wire::RefusedCode::ZeroWhileArmed.text().into());
         } else {
-            self.zero_due = true;
+            self.zeroing.want();
         }
     }
 
@@ -463,7 +467,14 @@ impl HostSession {
     }
 
     fn take_zero(&mut self, now_us: i64) -> Option<Message> {
-        let due = self.info.is_some() && self.is_free() && std::mem::take(&mut self.zero_due);
+        let due = self.info.is_some() && self.is_free() && self.zeroing.poll(now_us);
+        if self.zeroing.take_ignored() {
+            self.refusal = Some("the knob has not taken its new zero; try again".into());
+            if self.arming.is_wanted() {
+                self.refusal = Some("not armed: the knob has not taken its new zero; try again".into());
+                self.arming.disarm(now_us);
+            }
+        }
         due.then(|| {
             self.zero_us = Some(now_us);
             Message::Zero(0)
@@ -487,7 +498,8 @@ impl HostSession {
         // Without a STATE there is nothing that a permission could answer.
         let stamp = self.state().map(|state| Stamp { epoch: state.epoch.unwrap_or(0), heard_us: state.t_us });
         let arm = Arm { session: self.number, ceiling_mnm: self.arming.ceiling_mnm(), stamp };
-        match self.arming.poll(now_us) {
+        let waits = self.arming.is_wanted() && self.zeroing.is_pending();
+        match if waits { None } else { self.arming.poll(now_us) } {
             Some(arming::ArmingMessage::Free) => return Some(Message::Free),
             Some(arming::ArmingMessage::Arm) => return Some(Message::Arm(arm)),
             None => {}

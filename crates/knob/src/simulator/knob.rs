@@ -116,13 +116,15 @@ impl SimulatedKnob {
         let t_s = self.t_s();
         self.start_faults(t_s);
         let bus_ok = !self.is_faulty(FaultKind::I2c);
+        let pressed = self.hand.button() || self.extra_button;
         let reading = Reading {
             counts: self.plant.counts(),
             velocity_rpm: self.plant.rpm() as f32,
             bus_ok,
             supply_ok: !self.is_faulty(FaultKind::BrownOut),
-            button: self.hand.button() || self.extra_button,
-            stop: false,
+            button: pressed,
+            // The local stop too, as on the TorqueTuner.
+            stop: pressed,
             tells_velocity: true,
         };
         let mut arrived = Vec::new();

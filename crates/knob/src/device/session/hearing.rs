@@ -11,6 +11,8 @@ use crate::wire;
 use crate::wire::midi::{BREATH_MAX, FromKnob};
 use crate::wire::{DeviceEvent, DeviceState, EventKind, Info, Message, RefusedCode};
 
+/// Degrees a second of one step of a velocity: 0.1 rpm.
+const VELOCITY_DEG_S: f64 = 0.6;
 /// Age that stands for a permission of another epoch, ms: none that a line can have.
 const AGELESS_MS: f32 = 1e6;
 
@@ -123,6 +125,7 @@ impl HostSession {
         self.state = Some((*state, now_us));
         self.slaps.state(state.slaps, now_us);
         let is_played = self.judge(state, now_us);
+        self.zeroing.hear(state.angle_deg(), VELOCITY_DEG_S * f64::from(state.velocity), now_us);
         let is_probing = state.flags.has(wire::Flags::PROBING);
         if self.arming.hear(state.flags.armed(), is_probing, now_us) && self.notice.is_none() {
             let why = state.fault_code().map_or("the knob has disarmed itself", |code| code.text());
@@ -138,8 +141,7 @@ impl HostSession {
             host_us,
             t_us: state.t_us,
             angle_deg: state.angle_deg() as f32,
-            // 0.1 rpm
-            velocity_deg_s: 0.6 * f32::from(state.velocity),
+            velocity_deg_s: VELOCITY_DEG_S as f32 * f32::from(state.velocity),
             torque_mnm: f32::from(state.torque),
             feel_id: state.feel_id,
             flags: state.flags.0,
