@@ -765,6 +765,47 @@ fn zero_and_arm_in_one_breath_zero_first() {
     assert_eq!(bench.session.state().unwrap().angle, 50);
 }
 
+/// A line that loses ZERO, so many times.
+fn without_zero(mut left: usize) -> impl FnMut(&mut Vec<u8>) {
+    move |bytes| {
+        let is_zero = |(_, message): (_, Message)| matches!(message, Message::Zero(_));
+        if left > 0 && Decoder::new().feed(bytes).flatten().any(is_zero) {
+            bytes.clear();
+            left -= 1;
+        }
+    }
+}
+
+#[test]
+fn a_zero_that_the_line_loses_is_said_again_and_arm_waits_for_it() {
+    let zeros = |bench: &Bench| bench.count(|m| matches!(m, Message::Zero(_)));
+    let arms = |bench: &Bench| bench.count(|m| matches!(m, Message::Arm(_)));
+    let mut bench = turned();
+    bench.session.zero();
+    bench.session.arm(100, false, bench.now_us);
+    let mut line = without_zero(2);
+    (0..100).for_each(|_| bench.tick(&mut line));
+    assert_eq!((zeros(&bench), arms(&bench)), (2, 0));
+    assert_eq!(bench.session.state().unwrap().angle, 6900, "hundredths of a degree: where it was");
+    (0..300).for_each(|_| bench.tick(&mut line));
+    assert_eq!((zeros(&bench), arms(&bench)), (3, 1));
+    assert_eq!(bench.session.state().unwrap().angle, 0);
+    assert!(bench.session.is_armed(), "{:?}", bench.session.refusal());
+
+    // A knob that never takes it is not armed.
+    let mut bench = turned();
+    bench.session.zero();
+    bench.session.arm(100, false, bench.now_us);
+    let mut line = without_zero(usize::MAX);
+    (0..1000).for_each(|_| bench.tick(&mut line));
+    assert_eq!((zeros(&bench), arms(&bench)), (4, 0));
+    assert!(!bench.session.is_armed());
+    assert!(bench.session.refusal().is_some_and(|why| why.contains("has not taken its new zero")));
+    bench.session.arm(100, false, bench.now_us);
+    bench.run(300);
+    assert!(bench.session.is_armed(), "the user has another go: {:?}", bench.session.refusal());
+}
+
 /// 300 lives of a knob with a bad line, a host that stalls and a supply that fails: once disarmed, always disarmed.
 #[test]
 fn no_fault_ever_arms_a_knob() {

@@ -448,7 +448,7 @@ pub static PARAMETERS: &[Parameter] = &[
         .help(
             "Exaggerates how the torque differs between notes",
             "Does not change the sound.",
-            "Hands tell two torques apart if they differ by about 13 %. At 1, what the bore needs, only the very hardest notes do from the easiest; at 3 and 5 about half of all pairs do, most of them across the break. A semitone within a register does not.",
+            "Hands tell two torques apart if they differ by about 13 %. At 1, what the bore needs, only the very hardest notes do from the easiest; at 3 and 5 about half of all pairs do, most of them across the break. Below A6 a semitone within a register does not.",
         )
         .flag("--contrast")
         .setup(),

@@ -332,8 +332,8 @@ fn armed_knob(angle_deg: Option<f32>, torque_mnm: Option<f32>) -> KnobState {
     KnobState {
         devices: vec![
             KnobDevice {
-                key: "7f3a".into(),
-                name: "TorqueTuner 7f3a".into(),
+                key: "5eed0001".into(),
+                name: "Chalumeau sim 5eed0001".into(),
                 state: "in use here, /dev/ttyACM0".into(),
                 is_chosen: true,
                 is_free: true,
@@ -353,7 +353,7 @@ fn armed_knob(angle_deg: Option<f32>, torque_mnm: Option<f32>) -> KnobState {
                 is_free: false,
             },
         ],
-        text: "TorqueTuner 7f3a (firmware 1.2.0) at /dev/ttyACM0".into(),
+        text: "Chalumeau sim 5eed0001 (firmware 0.3.0) at /dev/pts/3".into(),
         is_live: true,
         is_armed: true,
         ceiling_mnm: 100.0,
@@ -465,7 +465,7 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
         status: vec![
             Status {
                 level: Severity::Good,
-                text: "TorqueTuner 7f3a at /dev/ttyACM0, armed at 100 mNm".into(),
+                text: "Chalumeau sim 5eed0001 at /dev/pts/3, armed at 100 mNm".into(),
             },
             Status { level: Severity::Note, text: "Breath from the knob; CC11 has moved before".into() },
         ],
