@@ -23,6 +23,9 @@ pub enum OutputError {
     /// The path names a directory or a device.
     #[error("{} is not a regular file; give the name of a file to write", .0.display())]
     NotAFile(PathBuf),
+    /// The file exists, and nobody may write to it.
+    #[error("{} is write-protected; choose another name, or allow writing to it", .0.display())]
+    Protected(PathBuf),
     /// The directory does not exist.
     #[error("directory {} does not exist; create it or choose another place", .0.display())]
     NoDirectory(PathBuf),
@@ -43,6 +46,29 @@ pub struct NewFile {
     temp: BufWriter<NamedTempFile>,
     /// Dropped last: until then, the temporary file may be there.
     _listed: Listed,
+}
+
+/// Where a new file will be.
+pub struct Target {
+    path: PathBuf,
+    directory: PathBuf,
+    /// Those of the file that is replaced.
+    permissions: Option<fs::Permissions>,
+}
+
+/// The directory of a file.
+fn directory_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+/// The one path of a file that is there or may be made, whatever it was called; `None` where nothing can be made.
+pub fn resolved(path: &Path) -> Option<PathBuf> {
+    fs::canonicalize(path)
+        .ok()
+        .or_else(|| Some(fs::canonicalize(directory_of(path)).ok()?.join(path.file_name()?)))
 }
 
 /// One of the [`UNFINISHED`] files.
@@ -74,31 +100,26 @@ pub fn remove_unfinished_and_exit(code: i32) -> ! {
 }
 
 impl NewFile {
-    /// Opens a temporary file beside `path`. Checks at once what would fail at the end. `force` replaces an existing file.
+    /// Opens a temporary file beside `path`. Checks at once what would fail at the end. `force` replaces an existing file, whose
+    /// permissions stay.
     pub fn create(path: &Path, force: bool) -> Result<Self, OutputError> {
-        // Follow a link, so that its target is replaced and not the link.
-        let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-        match fs::metadata(&path) {
-            Ok(there) if !there.is_file() => return Err(OutputError::NotAFile(path)),
-            Ok(_) if !force => return Err(OutputError::Exists(path)),
-            _ => {}
-        }
-        let Some(name) = path.file_name() else { return Err(OutputError::NotAFile(path)) };
-        let directory = match path.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
-        if !directory.exists() {
-            return Err(OutputError::NoDirectory(directory.to_owned()));
-        }
-        let mut prefix = name.to_owned();
+        let Target { path, directory, permissions } = Self::check(path, force)?;
+        let mut prefix = path.file_name().unwrap_or_default().to_owned();
         prefix.push(".");
         let mut builder = tempfile::Builder::new();
         builder.prefix(&prefix).suffix(".part");
         // The permissions of any new file, which the user's mask limits, instead of the private ones of a temporary file.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        match builder.tempfile_in(directory) {
+        if let Some(permissions) = &permissions {
+            builder.permissions(permissions.clone());
+        }
+        let opened = builder.tempfile_in(directory).and_then(|temp| match permissions {
+            // Also what the mask took away.
+            Some(permissions) => temp.as_file().set_permissions(permissions).map(|()| temp),
+            None => Ok(temp),
+        });
+        match opened {
             Ok(temp) => {
                 let listed = Listed::new(temp.path());
                 Ok(Self { temp: BufWriter::new(temp), path, force, _listed: listed })
@@ -106,6 +127,34 @@ impl NewFile {
             // The message of `tempfile` has the temporary name, which does not help the user.
             Err(error) => Err(OutputError::Write { source: plain(error), path }),
         }
+    }
+
+    /// Checks what [`create`](Self::create) checks, and opens nothing.
+    pub fn check(path: &Path, force: bool) -> Result<Target, OutputError> {
+        // A name that ends in a slash is one of a directory, also if there is none.
+        if path.as_os_str().as_encoded_bytes().last().is_some_and(|&end| std::path::is_separator(end.into()))
+        {
+            return Err(OutputError::NotAFile(path.to_owned()));
+        }
+        // Follow a link, so that its target is replaced and not the link.
+        let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let permissions = match fs::metadata(&path) {
+            Ok(there) if !there.is_file() => return Err(OutputError::NotAFile(path)),
+            Ok(_) if !force => return Err(OutputError::Exists(path)),
+            Ok(there) if there.permissions().readonly() => return Err(OutputError::Protected(path)),
+            Ok(there) => Some(there.permissions()),
+            // A link to nowhere.
+            Err(_) if !force && path.is_symlink() => return Err(OutputError::Exists(path)),
+            Err(_) => None,
+        };
+        if path.file_name().is_none() {
+            return Err(OutputError::NotAFile(path));
+        }
+        let directory = directory_of(&path);
+        if !directory.exists() {
+            return Err(OutputError::NoDirectory(directory.to_owned()));
+        }
+        Ok(Target { directory: directory.to_owned(), path, permissions })
     }
 
     /// The path that the file will have.
@@ -193,5 +242,26 @@ mod tests {
         assert!(matches!(NewFile::create(directory.path(), true), Err(OutputError::NotAFile(_))));
         let missing = directory.path().join("no/x");
         assert!(matches!(NewFile::create(&missing, true), Err(OutputError::NoDirectory(_))));
+        let unmade = directory.path().join("unmade/");
+        assert!(matches!(NewFile::create(&unmade, true), Err(OutputError::NotAFile(_))));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_replaced_file_keeps_its_permissions_and_a_protected_one_stays() {
+        use std::os::unix::fs::PermissionsExt;
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("x");
+        fs::write(&path, "old").unwrap();
+        for mode in [0o600, 0o664] {
+            fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
+            NewFile::create(&path, true).unwrap().keep().unwrap();
+            assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, mode);
+        }
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o444)).unwrap();
+        assert!(matches!(NewFile::create(&path, true), Err(OutputError::Protected(_))));
+        let link = directory.path().join("link");
+        std::os::unix::fs::symlink(directory.path().join("nowhere"), &link).unwrap();
+        assert!(matches!(NewFile::create(&link, false), Err(OutputError::Exists(_))));
     }
 }
