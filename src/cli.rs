@@ -4,6 +4,11 @@
 //! with `#` that say what was measured, then data. After a user's mistake the exit code is 2, a message
 //! says what was given and what would be right, and no file is written. A reader that closes the pipe early is no error.
 
+/// Tells the user a line on standard error. If that is closed or full, the line is lost, and no result.
+macro_rules! say {
+    ($($text:tt)*) => { $crate::cli::say_line(format_args!($($text)*)) };
+}
+
 mod batch;
 mod bifurcation;
 mod bore;
@@ -55,7 +60,8 @@ use chalumeau_figure::report::ReportError;
 use chalumeau_knob::touch::take_csv::TakeError;
 use clap::{Parser, Subcommand};
 use std::ffi::OsString;
-use std::io;
+use std::fmt;
+use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -285,6 +291,12 @@ fn failed(failure: &Failure) -> ExitCode {
     if failure.is_closed_pipe() {
         return ExitCode::SUCCESS;
     }
-    eprintln!("error: {failure}");
+    say!("error: {failure}");
     ExitCode::from(2)
+}
+
+/// See `say!`.
+fn say_line(text: fmt::Arguments) {
+    // In one piece, beside other programs that write there.
+    let _ = io::stderr().lock().write_all(format!("{text}\n").as_bytes());
 }

@@ -133,7 +133,7 @@ impl BatchCommand {
         let mut left: Vec<_> = (0..jobs.len()).filter(|&at| lines[at].is_none()).collect();
         if left.len() < jobs.len() {
             let are = if jobs.len() == 1 { "is" } else { "are" };
-            eprintln!("{} of {} {are} there already", jobs.len() - left.len(), counted(jobs.len(), "file"));
+            say!("{} of {} {are} there already", jobs.len() - left.len(), counted(jobs.len(), "file"));
         }
         // Those of one bore one after another: only they play side by side.
         left.sort_by(|&one, &other| jobs[one].bore.cmp(&jobs[other].bore));
@@ -177,9 +177,9 @@ impl BatchCommand {
         }
         table.finish()?;
         let _ = fs::remove_file(&growing);
-        eprintln!("{}: {} and {MANIFEST}", self.into.display(), counted(jobs.len(), "file"));
+        say!("{}: {} and {MANIFEST}", self.into.display(), counted(jobs.len(), "file"));
         if let Some(left_over) = earlier.left_over(&self.into, &jobs) {
-            eprintln!("{left_over}");
+            say!("{left_over}");
         }
         Ok(())
     }

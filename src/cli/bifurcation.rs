@@ -68,7 +68,7 @@ impl BifurcationCommand {
         let model = self.instrument.model(file, self.rate, settings.a4_hz)?;
         silent_keys(&[sounding], &model, settings.reach)
             .iter()
-            .for_each(|warning| eprintln!("warning: {warning}"));
+            .for_each(|warning| say!("warning: {warning}"));
         let bar = progress((2.0 * self.seconds * f64::from(self.rate)) as usize);
         let found = bifurcation::measure(
             &model,

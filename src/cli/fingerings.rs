@@ -65,7 +65,7 @@ impl FingeringsCommand {
         let finder = FingeringFinder::new(&file, self.air.air(), &mut |_| ControlFlow::Continue(()))
             .ok_or_else(|| Failure::Usage("the search was ended".to_owned()))?;
         if !finder.unmoved().is_empty() {
-            eprintln!(
+            say!(
                 "warning: {} cannot be moved, as a Boehm clarinet has no holes of these names; the search leaves them as they are at rest",
                 finder.unmoved().join(" ")
             );
@@ -120,7 +120,7 @@ impl FingeringsCommand {
         }
         if found.is_empty() {
             let (low, high) = (file.lowest(), file.highest());
-            eprintln!(
+            say!(
                 "warning: no fingering sounds near {note}; the chart of this instrument goes from {low} to {high}"
             );
         }

@@ -81,7 +81,7 @@ impl NewInstrument {
         let mut out = NewFile::create(&self.out, self.force)?;
         out.write_all(text.as_bytes())?;
         out.keep()?;
-        eprintln!(
+        say!(
             "{}: {}, bore {:.1} mm, {}, {} {} to {}",
             self.out.display(),
             file.name,
@@ -92,7 +92,7 @@ impl NewInstrument {
             file.highest()
         );
         for concern in Check::new(file, Air::default(), a4_hz).concerns {
-            eprintln!("warning: {concern}");
+            say!("warning: {concern}");
         }
         Ok(())
     }
@@ -160,7 +160,7 @@ impl Import {
         let longest = file.bore.iter().max_by(|a, b| length_m(a).total_cmp(&length_m(b)));
         let Some(longest) = longest else { return };
         let (taken_mm, wide_mm) = (2e3 * file.nominal_radius_m, 1e3 * (longest.r_start_m + longest.r_end_m));
-        eprintln!(
+        say!(
             "note: zeta and the reed's size refer to a bore of {taken_mm:.1} mm, a B flat clarinet's; the longest part of this one is \
              {wide_mm:.1} mm wide, see --nominal-diameter-mm"
         );
@@ -220,22 +220,22 @@ impl CheckFile {
         table.finish()?;
         for concern in &check.concerns {
             let weight = if concern.is_fatal() { "error" } else { "warning" };
-            eprintln!("{weight}: {concern}");
+            say!("{weight}: {concern}");
         }
         let is_said = |concern: &Concern| matches!(concern, Concern::AllOff { .. });
         if let Some(cents) = check.common_cents().filter(|_| !check.concerns.iter().any(is_said)) {
             let how = if cents > 0.0 { "sharp" } else { "flat" };
-            eprintln!(
+            say!(
                 "note: nearly all resonances are some {:.0} cents {how}; look at the length of the bore, the reed's volume and --a4",
                 cents.abs()
             );
         }
         let (named, count) = (self.which.named(&file), check.concerns.len());
         if !check.is_usable() {
-            eprintln!("{named}: cannot be played");
+            say!("{named}: cannot be played");
             return Ok(ExitCode::from(2));
         }
-        eprintln!("{named}: can be played, {}", counted(count, "warning"));
+        say!("{named}: can be played, {}", counted(count, "warning"));
         Ok(ExitCode::SUCCESS)
     }
 }

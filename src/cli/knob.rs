@@ -166,7 +166,7 @@ impl KnobCommand {
             };
             let (asked_mnm, strength_mnm) = (wanted.design.strength_mnm, design.strength_mnm);
             if strength_mnm < asked_mnm && self.arm.is_some() {
-                eprintln!(
+                say!(
                     "the feel is weakened from {asked_mnm:.0} to {strength_mnm:.0} mNm to stay below {:.0} mNm, which --arm and this knob allow",
                     limits.ceiling_mnm
                 );
@@ -183,10 +183,11 @@ impl KnobCommand {
     fn ask_again(&self) -> Result<(), Failure> {
         let Some(mnm) = self.arm.filter(|&mnm| mnm > f64::from(OFFERED_CEILING_MNM)) else { return Ok(()) };
         let number = format!("{mnm:.0}");
-        eprint!(
+        write!(
+            std::io::stderr(),
             "{number} mNm is as much as opening a tight jar lid. Nothing on the knob may catch a finger, a ring or a cable.\n\
              Type {number} and Enter to allow it: "
-        );
+        )?;
         std::io::stderr().flush()?;
         let mut answer = String::new();
         std::io::stdin().lock().read_line(&mut answer)?;
@@ -282,10 +283,10 @@ impl KnobCommand {
             }
         }
         if std::io::stderr().is_terminal() {
-            eprintln!();
+            say!("");
         }
         let stats = link.status().stats;
-        eprintln!(
+        say!(
             "{} positions, {:.0} a second; {} lost, {} damaged, {} duplicated; jitter p50 {:.2} ms, p99 {:.2} ms",
             stats.states,
             stats.rate_hz,
@@ -328,14 +329,15 @@ fn show(status: &LinkStatus, note: &NoteFeel, closing_pa: f64, said: &mut String
     }
     if words != *said {
         let fresh = if std::io::stderr().is_terminal() { "\r\x1b[K" } else { "" };
-        eprintln!("{fresh}{words}");
+        say!("{fresh}{words}");
         *said = words;
     }
     if let (Some(angle), true) = (status.angle_deg, std::io::stderr().is_terminal()) {
         let angle = f64::from(angle);
         let gamma = note.map.pressure_pa(angle) / closing_pa;
         let armed = if status.armed { "armed" } else { "not armed" };
-        eprint!(
+        let _ = write!(
+            std::io::stderr(),
             "\r\x1b[K{angle:8.1} degrees   gamma {gamma:.3}   threshold at {:.1}   {armed}",
             note.landmarks.a_on_deg
         );

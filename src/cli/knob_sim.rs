@@ -203,7 +203,7 @@ impl KnobSimCommand {
             if start.elapsed() >= Duration::from_secs(second) {
                 second += 1;
                 if !self.quiet {
-                    eprintln!("{}", status(server));
+                    say!("{}", status(server));
                 }
             }
             let is_over = self.seconds.is_some_and(|seconds| start.elapsed().as_secs_f64() >= seconds);

@@ -55,7 +55,7 @@ impl PresetsCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let user = presets::user();
         for broken in &user.broken {
-            eprintln!("warning: {broken}");
+            say!("warning: {broken}");
         }
         match &self.command {
             PresetsSubcommand::List(command) => command.run(&user),

@@ -108,11 +108,11 @@ impl RealismCommand {
         let plot = self.plot.open(self.table.force())?;
         let name = named(&file.name, self.preset.as_ref());
         if file.transposition != Bundled::BFlat.file().transposition {
-            eprintln!("warning: the recordings are of a B flat clarinet");
+            say!("warning: the recordings are of a B flat clarinet");
         }
         let (recorded, left_out) = recorded_notes_of(&file);
         if let Some(left_out) = &left_out {
-            eprintln!("warning: {left_out}; the others are left out");
+            say!("warning: {left_out}; the others are left out");
         }
         if recorded.is_empty() {
             return Err(Failure::Usage(format!("{} has none of the recorded notes", file.name)));

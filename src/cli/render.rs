@@ -232,15 +232,15 @@ impl RenderCommand {
             peak => format!("peak {:.1} dBFS", 20.0 * peak.log10()),
         };
         let out = self.out.display();
-        eprintln!("{out}: {seconds:.3} s, {} Hz, {bits}, {channels}, {peak}", rate);
+        say!("{out}: {seconds:.3} s, {} Hz, {bits}, {channels}, {peak}", rate);
         if level.clipped > 0 {
-            eprintln!("warning: {} samples clipped; lower --gain-db or use --bits 32f", level.clipped);
+            say!("warning: {} samples clipped; lower --gain-db or use --bits 32f", level.clipped);
         }
         if level.peak >= LIMITED {
-            eprintln!("warning: the limiter turned peaks down; lower --gain-db for levels as played");
+            say!("warning: the limiter turned peaks down; lower --gain-db for levels as played");
         }
         if resets > 0 {
-            eprintln!(
+            say!(
                 "warning: the calculation broke down and the instrument was reset {resets} times; please report this"
             );
         }

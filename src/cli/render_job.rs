@@ -65,7 +65,7 @@ impl RenderJob {
 
     /// Prints the warnings.
     pub(super) fn warn(&self) {
-        self.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+        self.warnings.iter().for_each(|warning| say!("warning: {warning}"));
     }
 
     /// Whether several players play.

@@ -75,7 +75,7 @@ impl ReportCommand {
         refuse_several_players(&prepared)?;
         prepared.warn();
         if prepared.settings.room.amount > 0.0 {
-            eprintln!("warning: a report has one channel, on which no room is heard");
+            say!("warning: a report has one channel, on which no room is heard");
         }
         let seconds = prepared.score.seconds(prepared.rate);
         if self.wav.is_none() && seconds > INSIDE_MAX_S {

@@ -145,7 +145,7 @@ impl Store for WarningCache {
         if self.0.keep(key, body).is_err() {
             let folder = self.0.folder().display();
             WARNED.call_once(|| {
-                eprintln!(
+                say!(
                     "warning: {folder} cannot be written, so the prepared instrument is not kept, and the next command prepares it again; \
                      {VARIABLE} names another folder"
                 );
@@ -267,7 +267,7 @@ fn say_how_it_is_scaled(model: &Model, wanted: &Wanted) {
     let longer = 100.0 * (model.scale / own_scale - 1.0);
     if longer != 0.0 {
         let (by, how) = (longer.abs(), if longer > 0.0 { "larger" } else { "smaller" });
-        eprintln!("note: the whole instrument is played {by:.2} % {how} than measured, to be in tune");
+        say!("note: the whole instrument is played {by:.2} % {how} than measured, to be in tune");
     }
 }
 
@@ -291,8 +291,8 @@ fn say_what_tuning_found(model: &Model) {
     ] {
         match notes.as_slice() {
             [] => {}
-            [note] => eprintln!("note: {note} {one}"),
-            notes => eprintln!("note: {} {several}", notes.join(" ")),
+            [note] => say!("note: {note} {one}"),
+            notes => say!("note: {} {several}", notes.join(" ")),
         }
     }
 }
