@@ -17,6 +17,7 @@ mod csv_table;
 #[cfg(feature = "devices")]
 mod doctor;
 mod feel_args;
+mod files;
 mod fingerings;
 mod haptic;
 mod impedance;
@@ -59,7 +60,7 @@ use chalumeau_core::score::midi_file::MidiFileError;
 use chalumeau_figure::report::ReportError;
 use chalumeau_knob::touch::take_csv::TakeError;
 use clap::{Parser, Subcommand};
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::fmt;
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -240,7 +241,8 @@ const LEFT_OUT: &[&str] = &[
 
 /// Reads the arguments and does what they say.
 pub fn main() -> ExitCode {
-    if let Some(command) = std::env::args().nth(1).filter(|name| LEFT_OUT.contains(&name.as_str())) {
+    let first = std::env::args_os().nth(1);
+    if let Some(command) = first.as_deref().and_then(OsStr::to_str).filter(|name| LEFT_OUT.contains(name)) {
         return failed(&Failure::Usage(format!(
             "{command} is not in this build, which has no devices; `cargo build --release` builds all commands"
         )));

@@ -56,13 +56,14 @@ pub struct BifurcationCommand {
 
 impl BifurcationCommand {
     pub fn run(&self) -> Result<(), Failure> {
+        self.table.check_files(&[self.instrument.instrument.file()], &[self.plot.path()])?;
         let file = self.instrument.load()?;
         let written = WrittenNote(self.written);
         let sounding = sounding(&file, written)?;
         let curve = BreathCurve::swell(self.to as f32, self.seconds);
         let settings = self.settings.blown_by(None, &curve, &file)?;
-        let mut table = self.table.open("direction,gamma,rms,shut")?;
         let plot = self.plot.open(self.table.force())?;
+        let mut table = self.table.open("direction,gamma,rms,shut")?;
         let threshold = linear_threshold(&file, written, &settings);
         let name = file.name.clone();
         let model = self.instrument.model(file, self.rate, settings.a4_hz)?;

@@ -37,6 +37,7 @@ pub struct BoreCommand {
 
 impl BoreCommand {
     pub fn run(&self) -> Result<(), Failure> {
+        self.table.check_files(&[self.instrument.file()], &[self.plot.path()])?;
         let file = self.instrument.load()?;
         let fingering = self.fingering(&file)?;
         let plot = self.plot.open(self.table.force())?;

@@ -6,7 +6,7 @@ use crate::controllers::{ControllerMap, factory};
 use crate::presets::nearest;
 use clap::{Args, Subcommand};
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -52,12 +52,22 @@ impl ControllersCommand {
     }
 }
 
+/// Controllers that a user has chosen.
+#[derive(Clone, Default)]
+pub struct GivenMap {
+    /// The links.
+    pub map: ControllerMap,
+    /// The file they are from, if it is not a device that the program knows.
+    pub path: Option<PathBuf>,
+}
+
 /// The controllers of a device by its name, or of a file.
-pub fn named_or_file(text: &str) -> Result<ControllerMap, String> {
+pub fn named_or_file(text: &str) -> Result<GivenMap, String> {
     if Path::new(text).extension().is_some() {
-        ControllerMap::load(Path::new(text))
+        let path = PathBuf::from(text);
+        Ok(GivenMap { map: ControllerMap::load(&path)?, path: Some(path) })
     } else {
-        find(text).cloned()
+        Ok(GivenMap { map: find(text)?.clone(), path: None })
     }
 }
 

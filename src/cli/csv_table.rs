@@ -1,6 +1,7 @@
 //! CSV tables, to standard output or a new file.
 
 use crate::cli::Failure;
+use crate::cli::files::{self, MaybeFile};
 use crate::output::NewFile;
 use clap::Args;
 use std::borrow::Cow;
@@ -26,6 +27,17 @@ impl TableArgs {
         self.csv != Path::new("-")
     }
 
+    /// Where it goes, for [`files`].
+    pub fn path(&self) -> MaybeFile<'_> {
+        Some(&self.csv)
+    }
+
+    /// Refuses names of the table and of other results that cannot be meant, before anything is measured. `read` is what the
+    /// command reads.
+    pub fn check_files(&self, read: &[MaybeFile], others: &[MaybeFile]) -> Result<(), Failure> {
+        files::check(files::READ, read, &[&[self.path()], others].concat(), self.force)
+    }
+
     /// Whether existing files may be replaced.
     pub fn force(&self) -> bool {
         self.force
@@ -39,6 +51,8 @@ impl TableArgs {
 enum Sink {
     Stdout(BufWriter<StdoutLock<'static>>),
     File(NewFile),
+    /// Its reader has seen enough. The other results of the command are still wanted.
+    Nobody,
 }
 
 /// A table being written. A file appears with [`finish`](CsvTable::finish).
@@ -66,17 +80,26 @@ impl CsvTable {
 
     /// One line of data.
     pub fn line(&mut self, text: fmt::Arguments) -> Result<(), Failure> {
-        Ok(match &mut self.sink {
-            Sink::Stdout(out) => writeln!(out, "{text}"),
-            Sink::File(file) => writeln!(file, "{text}"),
-        }?)
+        match &mut self.sink {
+            Sink::Stdout(out) => match writeln!(out, "{text}") {
+                Err(error) if error.kind() == io::ErrorKind::BrokenPipe => self.sink = Sink::Nobody,
+                written => written?,
+            },
+            Sink::File(file) => writeln!(file, "{text}")?,
+            Sink::Nobody => {}
+        }
+        Ok(())
     }
 
     /// Writes the rest; a file gets its name.
     pub fn finish(self) -> Result<(), Failure> {
         match self.sink {
-            Sink::Stdout(mut out) => Ok(out.flush()?),
+            Sink::Stdout(mut out) => match out.flush() {
+                Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+                written => Ok(written?),
+            },
             Sink::File(file) => Ok(file.keep()?),
+            Sink::Nobody => Ok(()),
         }
     }
 }

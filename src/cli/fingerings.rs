@@ -59,6 +59,7 @@ pub struct FingeringsCommand {
 
 impl FingeringsCommand {
     pub fn run(&self) -> Result<(), Failure> {
+        self.table.check_files(&[self.instrument.file()], &[])?;
         let file = self.instrument.load()?;
         let count = usize::from(self.count);
         // It is never ended early.

@@ -78,6 +78,7 @@ pub struct HapticCommand {
 
 impl HapticCommand {
     pub fn run(&self) -> Result<(), Failure> {
+        self.table.check_files(&[self.instrument.file()], &[])?;
         let file = self.instrument.load()?;
         let notes = self.notes.notes(&file)?;
         if self.curve && self.notes.one().is_none() {

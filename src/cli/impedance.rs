@@ -113,6 +113,7 @@ pub struct ImpedanceCommand {
 
 impl ImpedanceCommand {
     pub fn run(&self) -> Result<(), Failure> {
+        self.table.check_files(&[self.instrument.file()], &[self.plot.path()])?;
         let file = self.instrument.load()?;
         let notes = self.notes.notes(&file)?;
         let (air, volume_m3) = (self.air.air(), if self.reed_volume { file.reed_volume_m3 } else { 0.0 });

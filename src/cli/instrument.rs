@@ -2,9 +2,11 @@
 
 use crate::cli::Failure;
 use crate::cli::csv_table::{TableArgs, named, quoted};
+use crate::cli::files::{self, MaybeFile};
 use crate::cli::shared_args::{AirArg, InstrumentArg, counted, note, whole, within};
 use crate::output::NewFile;
 use crate::text_file;
+use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::check::{Check, Concern};
 use chalumeau_core::bore::cylinder::Cylinder;
 use chalumeau_core::bore::instrument_file::{BoreSegment, ImportDetails, ImportError, InstrumentFile, Sheet};
@@ -72,6 +74,11 @@ struct NewInstrument {
 }
 
 impl NewInstrument {
+    /// Refuses a name for it that cannot be meant. `read` is what the command reads.
+    fn check_files(&self, read: &[MaybeFile]) -> Result<(), Failure> {
+        files::check(files::READ, read, &[Some(&self.out)], self.force)
+    }
+
     /// Writes the instrument, after a check that it can be read again; then prints a summary and warnings for this A4, Hz.
     fn write(&self, file: &InstrumentFile, a4_hz: f64) -> Result<(), Failure> {
         let text = file.to_toml();
@@ -131,6 +138,7 @@ struct Import {
 
 impl Import {
     fn run(&self) -> Result<(), Failure> {
+        self.new.check_files(&[Some(&self.bore), Some(&self.holes), Some(&self.fingerings)])?;
         let read = |path: &Path| {
             text_file::read(path).map_err(|source| Failure::Read { path: path.to_owned(), source })
         };
@@ -198,6 +206,7 @@ struct CheckFile {
 
 impl CheckFile {
     fn run(&self) -> Result<ExitCode, Failure> {
+        self.table.check_files(&[self.which.file()], &[])?;
         let file = self.which.load()?;
         let check = Check::new(&file, self.air.air(), self.a4);
         let mut table =
@@ -282,6 +291,13 @@ struct New {
 
 impl New {
     fn run(&self) -> Result<(), Failure> {
+        self.new.check_files(&[self.from.file()])?;
+        if self.notes.is_some() && self.from.path().is_some() {
+            let right = "leave it out, or give --scale in place of --notes";
+            return Err(Failure::Usage(format!(
+                "--instrument names what --scale makes larger or smaller; {right}"
+            )));
+        }
         let file = match (&self.notes, self.scale) {
             (Some(notes), _) => self.cylinder(notes)?,
             (None, Some(factor)) => self.scaled(factor)?,
@@ -388,6 +404,12 @@ impl Which {
         }
     }
 
+    /// The file that is read.
+    fn file(&self) -> MaybeFile<'_> {
+        let of_name = self.file.as_deref().filter(|path| path.to_str().and_then(Bundled::from_id).is_none());
+        of_name.or_else(|| self.instrument.file())
+    }
+
     /// As the user has called it; a name of its own if the user has not.
     fn named(&self, loaded: &InstrumentFile) -> String {
         let given = self.file.as_ref().or_else(|| self.instrument.path());
@@ -407,6 +429,7 @@ fn below_what_is_written(transposition: i8) -> String {
 
 impl Show {
     fn run(&self) -> Result<(), Failure> {
+        self.table.check_files(&[self.which.file()], &[])?;
         let file = self.which.load()?;
         let mut table = self.table.open("what,name,x_mm,length_mm,diameter_mm,end_diameter_mm,detail")?;
         table.comment(format_args!("{}", file.name))?;

@@ -1,6 +1,7 @@
 //! Arguments for the figure that a command draws.
 
 use crate::cli::Failure;
+use crate::cli::files::MaybeFile;
 use crate::picture_file::PictureFile;
 use chalumeau_figure::Figure;
 use chalumeau_figure::draw::Size;
@@ -19,6 +20,11 @@ pub struct PlotArgs {
 }
 
 impl PlotArgs {
+    /// The file of the figure.
+    pub fn path(&self) -> MaybeFile<'_> {
+        self.plot.as_deref()
+    }
+
     /// Whether a figure is wanted.
     pub fn wanted(&self) -> bool {
         self.plot.is_some()

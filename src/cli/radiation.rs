@@ -67,6 +67,7 @@ pub struct RadiationCommand {
 
 impl RadiationCommand {
     pub fn run(&self) -> Result<(), Failure> {
+        self.table.check_files(&[self.instrument.file()], &[])?;
         let place = self.distance.or(self.angle).or(self.height).or(self.width);
         if place.is_some() && self.heard != Heard::Position {
             return Err(Failure::Usage(

@@ -101,11 +101,12 @@ struct Heard {
 
 impl RealismCommand {
     pub fn run(&self) -> Result<(), Failure> {
+        self.table.check_files(&[self.instrument.instrument.file()], &[self.plot.path()])?;
         let file = self.instrument.load_for(self.preset.as_ref())?;
         let (breaths, mut settings, blown) = self.blown(&file)?;
         settings.gain_db -= HEADROOM_DB as f32;
-        let mut table = self.table.open(&header())?;
         let plot = self.plot.open(self.table.force())?;
+        let mut table = self.table.open(&header())?;
         let name = named(&file.name, self.preset.as_ref());
         if file.transposition != Bundled::BFlat.file().transposition {
             say!("warning: the recordings are of a B flat clarinet");

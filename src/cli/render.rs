@@ -2,6 +2,7 @@
 
 use crate::cli::Failure;
 use crate::cli::csv_table::CsvTable;
+use crate::cli::files::{self, MaybeFile};
 use crate::cli::plot_args::PlotArgs;
 use crate::cli::render_job::RenderJob;
 use crate::cli::render_monitor::RenderMonitor;
@@ -125,6 +126,10 @@ impl RenderCommand {
         bar: impl FnOnce(usize) -> ProgressBar,
     ) -> Result<Rendered, Failure> {
         self.refuse_names()?;
+        self.written().into_iter().flatten().try_for_each(|path| match path == Path::new("-") {
+            true => Ok(()),
+            false => NewFile::check(path, self.force).map(drop),
+        })?;
         let prepared = self.play.prepare()?;
         let RenderJob { score, rate, .. } = &prepared;
         prepared.warn();
@@ -201,8 +206,7 @@ impl RenderCommand {
             let right = "give the name of a file, for example --out note.wav";
             return Err(Failure::Usage(format!("a WAV file cannot go to standard output; {right}")));
         }
-        let written = [Some(&self.out), self.probe.as_ref()];
-        written.into_iter().flatten().try_for_each(|path| self.play.refuse_to_replace(path))?;
+        files::keep_apart("is what is played", &self.play.read_files(), &self.written())?;
         let ending = self.out.extension().and_then(OsStr::to_str).unwrap_or_default().to_ascii_lowercase();
         if NO_WAV.contains(&ending.as_str()) {
             return Err(Failure::Usage(format!(
@@ -211,13 +215,12 @@ impl RenderCommand {
                 self.out.with_extension("wav").display()
             )));
         }
-        if self.probe.as_ref().is_some_and(|probe| *probe == self.out) {
-            return Err(Failure::Usage(format!(
-                "--out and --probe are both {}; give them different names",
-                self.out.display()
-            )));
-        }
         Ok(())
+    }
+
+    /// The files that are written.
+    fn written(&self) -> [MaybeFile<'_>; 3] {
+        [Some(&self.out), self.probe.as_deref(), self.plot.path()]
     }
 
     fn report(&self, &Rendered { seconds, rate, channels, level, resets }: &Rendered) {

@@ -4,6 +4,7 @@ mod breath_and_haptics;
 mod tour;
 
 use crate::cli::Failure;
+use crate::cli::files;
 use crate::cli::render::{about, progress};
 use crate::cli::render_job::RenderJob;
 use crate::cli::render_monitor::{RenderMonitor, RenderSummary};
@@ -13,7 +14,7 @@ use crate::cli::shared_args::within;
 use crate::cli::words::typed;
 
 use crate::identity;
-use crate::output::NewFile;
+use crate::output::{NewFile, resolved};
 use crate::parameters::{PARAMETERS, Parameter, Sets, Value};
 use crate::wav::{Depth, WavFile};
 use chalumeau_core::instrument::Settings;
@@ -125,12 +126,16 @@ impl ReportCommand {
             let right = "give it a name that ends in .html";
             return Err(Failure::Usage(format!("{}: a report is a page; {right}", self.out.display())));
         }
-        let Some(wav) = &self.wav else { return Ok(()) };
+        let written = [Some(self.out.as_path()), self.wav.as_deref()];
+        files::keep_apart(files::READ, &self.play.read_files(), &written)?;
+        let Some(wav) = &self.wav else {
+            return NewFile::check(&self.out, self.force).map(drop).map_err(Failure::from);
+        };
         if !wav.extension().is_some_and(|end| end.eq_ignore_ascii_case("wav")) {
             return Err(Failure::Usage(format!("--wav {}: the name must end in .wav", wav.display())));
         }
         // A page that is moved takes what lies beside it along.
-        let folder = |path: &Path| Path::new(".").join(path.parent().unwrap_or(path));
+        let folder = |path: &Path| resolved(path).and_then(|path| path.parent().map(Path::to_owned));
         if folder(wav) != folder(&self.out) {
             return Err(Failure::Usage(format!(
                 "--wav {} is not in the directory of the page {}; put both into one directory",
@@ -138,7 +143,7 @@ impl ReportCommand {
                 self.out.display()
             )));
         }
-        Ok(())
+        Ok(written.into_iter().flatten().try_for_each(|path| NewFile::check(path, self.force).map(drop))?)
     }
 
     fn page(&self, prepared: &RenderJob, watched: &RenderSummary, sound: Sound) -> Result<Page, Failure> {
@@ -234,7 +239,10 @@ fn name(path: &Path) -> String {
 
 /// The command as typed, so that a reader can repeat it.
 fn command() -> String {
-    typed(std::iter::once("chalumeau".to_owned()).chain(std::env::args().skip(1)))
+    typed(
+        std::iter::once("chalumeau".to_owned())
+            .chain(std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned())),
+    )
 }
 
 /// Rounded to a tenth, with its sign unless it is 0.

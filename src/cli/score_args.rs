@@ -1,8 +1,9 @@
 //! Arguments for what is played: a MIDI file, a note or a scale, and its breath. `render` and `report` share them.
 
 use crate::cli::Failure;
-use crate::cli::controllers::named_or_file;
+use crate::cli::controllers::{GivenMap, named_or_file};
 use crate::cli::feel_args::FeelArgs;
+use crate::cli::files::MaybeFile;
 use crate::cli::render_job::RenderJob;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, check_fingering, dynamics, note, rate, sounding, within};
@@ -81,7 +82,7 @@ pub struct ScoreArgs {
     /// Controllers of the file that move parameters: a device, see `chalumeau controllers list`, or a TOML file of links, as
     /// the window copies them
     #[arg(long, value_name = "DEVICE|FILE", requires = "midi", conflicts_with = "note", value_parser = named_or_file)]
-    controllers: Option<ControllerMap>,
+    controllers: Option<GivenMap>,
     /// One note as a clarinettist reads it: MIDI number (60) or name (C4)
     #[arg(long, value_name = "NOTE", value_parser = note)]
     written: Option<u8>,
@@ -189,7 +190,7 @@ impl ScoreArgs {
     fn plan(&self) -> Result<Planned, Failure> {
         let file = self.instrument.load_for(self.preset.as_ref())?;
         let mut curve = self.curve()?;
-        let map = self.controllers.clone().unwrap_or_default();
+        let map = self.controllers.clone().unwrap_or_default().map;
         let mut base = self.preset.as_ref().map(Preset::settings);
         if !map.values.is_empty() {
             // Over a preset, and under what the user has given.
@@ -244,23 +245,12 @@ impl ScoreArgs {
         Ok(RenderJob { model, settings, score: (&parts).into(), parts, rate: self.rate, warnings })
     }
 
-    /// Refuses to write a file that is being read: --force replaces results, not what they are made of.
-    pub fn refuse_to_replace(&self, path: &Path) -> Result<(), Failure> {
-        let breath = self.breath.as_ref().map(PathBuf::from);
-        let files = [&self.midi, &breath, &self.replay, &self.scl, &self.kbm].map(Option::as_ref);
-        let instrument = self.instrument.instrument.path();
-        let same = |one: &Path| {
-            fs::canonicalize(one).is_ok_and(|one| fs::canonicalize(path).is_ok_and(|to| to == one))
-        };
-        match files.into_iter().chain([instrument]).flatten().any(|read| same(read)) {
-            true => {
-                let given = path.display();
-                Err(Failure::Usage(format!(
-                    "{given} is what is played; give another name for what is written"
-                )))
-            }
-            false => Ok(()),
-        }
+    /// The files that are read.
+    pub fn read_files(&self) -> Vec<MaybeFile<'_>> {
+        let controllers = self.controllers.as_ref().and_then(|map| map.path.as_deref());
+        let breath = self.breath.as_deref().map(Path::new);
+        let files = [&self.midi, &self.replay, &self.scl, &self.kbm].map(Option::as_deref);
+        files.into_iter().chain([breath, controllers, self.instrument.instrument.file()]).collect()
     }
 
     /// Says which notes of the command line begin above all that a curve of gamma reaches.

@@ -2,6 +2,7 @@
 
 use crate::cache::{Cache, VARIABLE};
 use crate::cli::Failure;
+use crate::cli::files::MaybeFile;
 use crate::instrument_path::{self, LoadError};
 use crate::presets::Preset;
 use chalumeau_core::bore::bundled::Bundled;
@@ -16,7 +17,7 @@ use chalumeau_core::units::{Air, SoundingNote, WrittenNote, midi_of_name};
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, Once};
 
 /// Which instrument.
@@ -36,9 +37,15 @@ impl InstrumentArg {
         Self { instrument: Some(path), given: None }
     }
 
-    /// The file that may be read; a bundled instrument has none of this name.
+    /// As it was given: a name or a file.
     pub fn path(&self) -> Option<&PathBuf> {
         self.instrument.as_ref()
+    }
+
+    /// The file that is read; a bundled instrument has none.
+    pub fn file(&self) -> MaybeFile<'_> {
+        let is_bundled = |path: &Path| path.to_str().and_then(Bundled::from_id).is_some();
+        self.instrument.as_deref().filter(|path| self.given.is_none() && !is_bundled(path))
     }
 
     /// Its measurements.
@@ -239,6 +246,11 @@ impl PlayedArgs {
             ))
         })?;
         self.instrument.load_or(usual)
+    }
+
+    /// Whether anything but the usual is given.
+    pub fn is_given(&self) -> bool {
+        self.instrument.instrument.is_some() || self.untuned || self.quality != QualityArg::default()
     }
 
     /// Whether it plays as it is built, without the tuning of its notes.

@@ -77,6 +77,7 @@ pub struct TuneCommand {
 
 impl TuneCommand {
     pub fn run(&self) -> Result<(), Failure> {
+        self.table.check_files(&[self.instrument.instrument.file()], &[self.plot.path()])?;
         let file = self.instrument.load_for(self.preset.as_ref())?;
         let base = self.preset.as_ref().map(Preset::settings);
         let notes = self.notes.notes(&file)?;
@@ -99,8 +100,8 @@ impl TuneCommand {
         }
         let rate = self.rate;
         let name = named(&file.name, self.preset.as_ref());
-        let mut table = self.table.open("written_midi,f_hz,cents,register_ok,as_built_cents")?;
         let plot = self.plot.open(self.table.force())?;
+        let mut table = self.table.open("written_midi,f_hz,cents,register_ok,as_built_cents")?;
         table.comment(format_args!(
             "{name}; {blown}, {rate} Hz, A4 = {} Hz; tongued, measured from {SETTLE_S} s on",
             settings.a4_hz
