@@ -386,6 +386,152 @@ fn what_is_played_is_never_replaced() {
     assert_eq!(fs::read(d.path().join("piece.mid")).unwrap(), fs::read(MELODY).unwrap());
 }
 
+/// Whatever a command reads stays, also where `--force` lets it replace files.
+#[test]
+fn what_is_read_is_never_replaced() {
+    let d = tempfile::tempdir().unwrap();
+    fs::copy(MELODY, d.path().join("piece.mid")).unwrap();
+    fs::copy(MELODY, d.path().join("piece.html")).unwrap();
+    fs::copy(MELODY, d.path().join("piece.wav")).unwrap();
+    fs::copy(format!("{EXAMPLES}/instruments/cylinder.toml"), d.path().join("my.toml")).unwrap();
+    fs::copy(d.path().join("my.toml"), d.path().join("my.png")).unwrap();
+    fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/controllers/ewi.toml"), d.path().join("map.toml"))
+        .unwrap();
+    let before: Vec<_> =
+        names(d.path()).into_iter().map(|name| (fs::read(d.path().join(&name)).unwrap(), name)).collect();
+    for command in [
+        "threshold",
+        "bore",
+        "impedance --written D3 --model tmm",
+        "radiation",
+        "haptic",
+        "fingerings --note D3",
+        "tune",
+    ] {
+        let line = format!("{command} --instrument my.toml --csv ./my.toml --force");
+        refused(&d, &line, &["my.toml is read by this command; give another name"]);
+    }
+    for line in [
+        "bifurcation --written D3 --instrument my.toml --csv my.toml --force",
+        "realism --instrument my.toml --csv my.toml --force",
+        "threshold --instrument my.png --plot my.png --force",
+        "instrument check my.toml --csv my.toml --force",
+        "instrument show --instrument my.toml --csv my.toml --force",
+        "instrument new --scale 1.1 --instrument my.toml --out my.toml --force",
+        "instrument import --bore my.toml --holes h --fingerings f --out my.toml --force",
+        "report piece.html --out piece.html --force",
+        "report piece.wav --wav piece.wav --out x.html --force",
+    ] {
+        refused(&d, line, &["is read by this command; give another name"]);
+    }
+    for line in [
+        "render piece.mid --controllers map.toml --out map.toml --force",
+        "render piece.mid --out x.wav --plot piece.mid --force",
+    ] {
+        refused(&d, line, &["is what is played; give another name"]);
+    }
+    for (bytes, name) in before {
+        assert!(fs::read(d.path().join(&name)).unwrap() == bytes, "{name}");
+    }
+}
+
+#[test]
+fn two_results_never_go_to_one_file() {
+    let d = tempfile::tempdir().unwrap();
+    for line in [
+        "render --written C4 --out d.wav --probe ./d.wav",
+        "render --written C4 --out x.png --plot x.png",
+        "bore --csv b.png --plot ./b.png",
+    ] {
+        refused(&d, line, &["give them different names"]);
+    }
+}
+
+/// Each is refused before the first sample is computed, and a table on standard output has not begun.
+#[test]
+fn names_that_cannot_be_written_are_refused_first() {
+    let d = tempfile::tempdir().unwrap();
+    refused(&d, "render --written C4 --seconds 3600 --out none/", &["none/ is not a regular file"]);
+    refused(&d, "report --written C4 --seconds 500 --out x.html/", &["is not a regular file"]);
+    for command in ["threshold", "tune", "bifurcation --written E3", "realism"] {
+        let output = chalumeau(d.path(), words(&format!("{command} --plot x.jpg")));
+        assert_eq!((output.status.code(), output.stdout.as_slice()), (Some(2), &b""[..]), "{command}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn names_that_are_not_utf8_are_refused_or_kept() {
+    use std::os::unix::ffi::OsStrExt;
+    let d = tempfile::tempdir().unwrap();
+    let odd = OsStr::from_bytes(b"q\xff");
+    let output = chalumeau(d.path(), [odd]);
+    assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stderr));
+    fs::write(d.path().join("plan.toml"), "[vary]\nwritten = [\"E3\"]\n").unwrap();
+    let output =
+        chalumeau(d.path(), ["batch", "plan.toml", "--into"].map(OsStr::new).into_iter().chain([odd]));
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("not in UTF-8"));
+    assert_eq!(names(d.path()), ["plan.toml"]);
+    let page = OsStr::from_bytes(b"q\xff.html");
+    let line = ["report", "--written", "C4", "--seconds", "0.2", "--out"].map(OsStr::new);
+    let output = chalumeau(d.path(), line.into_iter().chain([page]));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(d.path().join(page).exists());
+}
+
+/// Runs a command whose standard output or error is a pipe that nobody reads.
+#[cfg(unix)]
+fn with_closed(directory: &Path, line: &str, is_stdout: bool) -> Option<i32> {
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_chalumeau"));
+    command.current_dir(directory).env("CHALUMEAU_CACHE_DIR", env!("CARGO_TARGET_TMPDIR"));
+    command.args(words(line)).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    let command = if is_stdout { command.stdout(writer) } else { command.stderr(writer) };
+    command.status().unwrap().code()
+}
+
+#[cfg(unix)]
+#[test]
+fn a_reader_that_left_takes_no_other_result_along() {
+    let d = tempfile::tempdir().unwrap();
+    let out = |line: &str| assert_eq!(with_closed(d.path(), line, true), Some(0), "{line}");
+    out("render --written C4 --seconds 0.2 --probe - --out probed.wav");
+    out("bore --plot bore.svg");
+    out("impedance --all --peaks 8 --model tmm --plot peaks.svg");
+    let err = |line: &str| assert_eq!(with_closed(d.path(), line, false), Some(0), "{line}");
+    err("render --written C4 --gamma 0.2 --seconds 0.2 --out soft.wav");
+    fs::write(d.path().join("plan.toml"), "[vary]\nwritten = [\"E3\", \"C4\"]\n[same]\nseconds = 0.1\n")
+        .unwrap();
+    out("batch plan.toml --into set --dry-run");
+    err("batch plan.toml --into set");
+    assert_eq!(names(d.path()), ["bore.svg", "peaks.svg", "plan.toml", "probed.wav", "set", "soft.wav"]);
+    assert_eq!(names(&d.path().join("set")), ["0001.wav", "0002.wav", "manifest.csv"]);
+    assert_eq!(with_closed(d.path(), "render --written 1 --out x.wav", false), Some(2));
+}
+
+#[test]
+fn a_batch_keeps_its_plan_and_what_its_journal_links_to() {
+    let d = tempfile::tempdir().unwrap();
+    let set = d.path().join("set");
+    fs::create_dir(&set).unwrap();
+    for name in ["manifest.csv", "manifest.part.csv"] {
+        fs::write(set.join(name), "written,seconds\nE3,0.1\n").unwrap();
+        refused(&d, &format!("batch set/{name} --into ./set --force"), &["is the plan", "give another name"]);
+        fs::remove_file(set.join(name)).unwrap();
+    }
+    fs::write(d.path().join("plan.csv"), "written,seconds\nE3,0.1\n").unwrap();
+    #[cfg(unix)]
+    {
+        fs::write(d.path().join("other.csv"), "other\n").unwrap();
+        std::os::unix::fs::symlink("../other.csv", set.join("manifest.part.csv")).unwrap();
+        succeeds(d.path(), "batch plan.csv --into set --force");
+        assert_eq!(fs::read_to_string(d.path().join("other.csv")).unwrap(), "other\n");
+        assert_eq!(names(&set), ["0001.wav", "manifest.csv"]);
+    }
+}
+
 #[test]
 fn a_limiter_that_worked_and_an_instrument_that_reaches_are_told() {
     let d = tempfile::tempdir().unwrap();

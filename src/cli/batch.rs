@@ -3,6 +3,7 @@
 pub(super) mod plan;
 
 use crate::cli::csv_table::{CsvTable, quoted};
+use crate::cli::files;
 use crate::cli::render::{RenderCommand, Rendered};
 use crate::cli::shared_args::counted;
 use crate::cli::words::typed;
@@ -13,7 +14,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use plan::{Plan, Variation};
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::fs;
-use std::io::{ErrorKind, Write};
+use std::io::{self, BufWriter, ErrorKind, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -85,6 +86,7 @@ const OF_THE_BORE: [&str; 6] = ["instrument", "preset", "rate", "quality", "a4",
 
 impl BatchCommand {
     pub fn run(&self) -> Result<(), Failure> {
+        self.refuse_names()?;
         let plan = Plan::read(&self.plan).map_err(|what| self.failure(&what))?;
         let jobs = self.jobs(&plan)?;
         for job in &jobs {
@@ -94,10 +96,11 @@ impl BatchCommand {
             })?;
         }
         if self.dry_run {
+            let mut out = BufWriter::new(io::stdout().lock());
             for job in &jobs {
-                println!("chalumeau {}", typed(&job.words));
+                writeln!(out, "chalumeau {}", typed(&job.words))?;
             }
-            return Ok(());
+            return Ok(out.flush()?);
         }
         fs::create_dir_all(&self.into)
             .map_err(|error| self.failure(&format!("cannot make {}: {error}", self.into.display())))?;
@@ -113,7 +116,7 @@ impl BatchCommand {
         }
         let growing = self.into.join(GROWING);
         let mut journal =
-            fs::File::create(&growing).map_err(|source| Failure::Batch { path: growing.clone(), source })?;
+            new_journal(&growing).map_err(|source| Failure::Batch { path: growing.clone(), source })?;
         // In one piece: a run that is stopped leaves whole lines.
         let mut say = |line: &str| {
             let line = format!("{line}\n");
@@ -186,6 +189,22 @@ impl BatchCommand {
 
     fn failure(&self, what: &str) -> Failure {
         Failure::Usage(format!("{}: {what}", self.plan.display()))
+    }
+
+    /// Refuses a folder that cannot be meant, and a plan that the tables in the folder would replace.
+    fn refuse_names(&self) -> Result<(), Failure> {
+        if self.into.to_str().is_none() {
+            return Err(Failure::Usage(format!(
+                "--into {}: the name of the folder is not in UTF-8, in which the commands of a batch are; give another name",
+                self.into.display()
+            )));
+        }
+        let tables = [MANIFEST, GROWING].map(|name| self.into.join(name));
+        files::keep_apart(
+            "is the plan, and is replaced by a table of the files that are made",
+            &[Some(&self.plan)],
+            &tables.each_ref().map(|table| Some(table.as_path())),
+        )
     }
 
     /// Checks every command before the first is run.
@@ -297,6 +316,15 @@ impl Earlier {
             counted(others.len(), "file")
         ))
     }
+}
+
+/// An empty journal in place of an earlier one. What an earlier one links to is not touched.
+fn new_journal(path: &Path) -> io::Result<fs::File> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
+        _ => {}
+    }
+    fs::File::create_new(path)
 }
 
 /// Whether a file is called as the batch calls its own.
