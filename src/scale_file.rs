@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::io;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use tune::key::PianoKey;
@@ -14,11 +15,17 @@ use tune::scala::{
 use tune::tuning::KeyboardMapping;
 
 use chalumeau_core::instrument::KeyPitches;
+use chalumeau_core::units::SoundingNote;
 
 /// Largest file that is read, bytes; a scale of 65,535 notes is smaller.
 const BYTES_MOST: u64 = 4_000_000;
 /// The key that plays the first pitch of a scale without a mapping: middle C, at its equal-tempered pitch.
 const FIRST_KEY: i32 = 60;
+
+/// Farthest pitch of a scale from its first, cents: twice the range of hearing.
+const CENTS_MOST: f64 = 24_000.0;
+/// Frequencies that a reference key may have, Hz: from below the lowest MIDI key to the end of hearing.
+const REFERENCE_HZ: RangeInclusive<f64> = 1.0..=20_000.0;
 
 /// Why a scale cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -74,19 +81,103 @@ pub struct ScaleFault {
 /// ```
 pub fn key_pitches(scl: &str, kbm: Option<&str>) -> Result<KeyPitches, ScaleFault> {
     let of_scale = |what| ScaleFault { is_of_mapping: false, what };
-    let scale = Scl::import(scl.as_bytes()).map_err(|error| of_scale(scl_error(&error)))?;
+    let of_mapping = |what| ScaleFault { is_of_mapping: true, what };
+    let scale = Scl::import(scl.as_bytes()).map_err(|error| of_scale(scl_error(&error, scl)))?;
+    check_pitches(scl).map_err(of_scale)?;
     let mapping = match kbm {
-        Some(text) => Kbm::import(text.as_bytes())
-            .map_err(|error| ScaleFault { is_of_mapping: true, what: kbm_error(&error) })?,
+        Some(text) => {
+            let mapping =
+                Kbm::import(text.as_bytes()).map_err(|error| of_mapping(kbm_error(&error, text)))?;
+            check_mapping(text).map_err(of_mapping)?;
+            mapping
+        }
         None => Kbm::builder(Note::from_midi_number(FIRST_KEY))
             .build()
             .map_err(|_| of_scale("it has no keys".to_owned()))?,
     };
     let pitches = (&scale, &mapping);
-    Ok(KeyPitches::from_hz(|key| {
+    let keys = KeyPitches::from_hz(|key| {
         let pitch = pitches.maybe_pitch_of(PianoKey::from_midi_number(key))?;
         Some(pitch.pitch().as_hz())
-    }))
+    });
+    if (0..128).all(|key| keys.of(SoundingNote(key)).is_none()) {
+        let fault = if kbm.is_some() { of_mapping } else { of_scale };
+        return Err(fault("no key has a pitch that can be heard".to_owned()));
+    }
+    Ok(keys)
+}
+
+/// The lines that are no comments, each with its number, and what counts of it. As the reader of the format sees them.
+fn entries(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    (1..).zip(text.lines()).filter_map(|(number, line)| {
+        let item = line.split_ascii_whitespace().next()?;
+        (!line.trim().starts_with('!')).then_some((number, item))
+    })
+}
+
+/// What stands in a line, for a message.
+fn given(text: &str, number: usize) -> &str {
+    text.lines().nth(number.saturating_sub(1)).unwrap_or_default().trim()
+}
+
+/// Refuses pitches that are none.
+fn check_pitches(scl: &str) -> Result<(), String> {
+    // After the description and the number of notes.
+    for (number, item) in entries(scl).skip(2) {
+        let value = |text: &str| text.parse::<f64>().unwrap_or(f64::NAN);
+        let cents = match item.split_once('/') {
+            _ if item.contains('.') => value(item),
+            Some((upper, lower)) => 1_200.0 * (value(upper) / value(lower)).log2(),
+            None => 1_200.0 * value(item).log2(),
+        };
+        // Also what is not a number.
+        if !(-CENTS_MOST..=CENTS_MOST).contains(&cents) {
+            let octaves = CENTS_MOST / 1_200.0;
+            return Err(format!(
+                "line {number} must be a ratio above 0 or cents, at most {octaves} octaves, got {:?}",
+                given(scl, number)
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a mapping that leaves no key with a pitch.
+fn check_mapping(kbm: &str) -> Result<(), String> {
+    let all: Vec<_> = entries(kbm).collect();
+    let [size, first, last, _, _, reference, _, degrees @ ..] = all.as_slice() else { return Ok(()) };
+    let whole = |entry: &(usize, &str)| entry.1.parse::<i32>().unwrap_or_default();
+    if whole(first) > whole(last) {
+        return Err(format!(
+            "line {} must be the last key, at or above the first, {}, got {:?}",
+            last.0,
+            first.1,
+            given(kbm, last.0)
+        ));
+    }
+    let hz = reference.1.parse().unwrap_or(f64::NAN);
+    if !REFERENCE_HZ.contains(&hz) {
+        return Err(format!(
+            "line {} must be a frequency in {}..{} Hz, got {:?}",
+            reference.0,
+            REFERENCE_HZ.start(),
+            REFERENCE_HZ.end(),
+            given(kbm, reference.0)
+        ));
+    }
+    if whole(size) > 0 && degrees.iter().all(|degree| degree.1.eq_ignore_ascii_case("x")) {
+        return Err(match degrees.last() {
+            Some((number, _)) => format!(
+                "line {number} is {:?}, as are all entries of the map, so that no key has a pitch",
+                given(kbm, *number)
+            ),
+            None => format!(
+                "line {} gives the map a size of {}, and no entries follow, so that no key has a pitch; 0 is a map of all keys",
+                size.0, size.1
+            ),
+        });
+    }
+    Ok(())
 }
 
 /// The text of a file of a scale. Scala's archive is in Latin-1; only comments and names have letters beyond ASCII.
@@ -100,7 +191,7 @@ pub fn text(path: &Path) -> Result<String, ScaleError> {
     Ok(String::from_utf8_lossy(&fs::read(path).map_err(refused)?).into_owned())
 }
 
-fn scl_error(error: &SclImportError) -> String {
+fn scl_error(error: &SclImportError, text: &str) -> String {
     match error {
         SclImportError::IoError(error) => error.to_string(),
         SclImportError::ParseError { line_number, kind } => {
@@ -109,7 +200,7 @@ fn scl_error(error: &SclImportError) -> String {
                 SclParseErrorKind::CentsValue => "must be cents with a point, such as 701.955",
                 SclParseErrorKind::Numer | SclParseErrorKind::Denom => "must be a ratio, such as 3/2",
             };
-            format!("line {line_number} {what}")
+            format!("line {line_number} {what}, got {:?}", given(text, *line_number))
         }
         SclImportError::StructuralError(SclStructuralError::ExpectingDescription) => {
             "it is empty; the first line of a scale is its description".to_owned()
@@ -124,7 +215,7 @@ fn scl_error(error: &SclImportError) -> String {
     }
 }
 
-fn kbm_error(error: &KbmImportError) -> String {
+fn kbm_error(error: &KbmImportError, text: &str) -> String {
     match error {
         KbmImportError::IoError(error) => error.to_string(),
         KbmImportError::ParseError { line_number, kind } => {
@@ -135,7 +226,7 @@ fn kbm_error(error: &KbmImportError) -> String {
                     "must be a degree of the scale, or x for a key without a pitch"
                 }
             };
-            format!("line {line_number} {what}")
+            format!("line {line_number} {what}, got {:?}", given(text, *line_number))
         }
         KbmImportError::StructuralError(part) => {
             let what = match part {

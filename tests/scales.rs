@@ -190,11 +190,11 @@ fn every_key_sounds_where_its_scale_says() {
 
 #[test]
 fn damaged_files_are_told_with_their_line() {
-    let kbm = "12\n0\n127\n60\n69\n440.0\n12\n";
+    let kbm = "0\n0\n127\n60\n69\n440.0\n12\n";
     for (scl, kbm, says) in [
         ("", None, "it is empty"),
         ("name\n", None, "the number of notes"),
-        ("name\ntwelve\n", None, "line 2 must be a whole number"),
+        ("name\ntwelve\n", None, "line 2 must be a whole number, got \"twelve\""),
         ("name\n2\n100.0\n", None, "not as many pitches"),
         ("name\n2\n100.0\n3/x\n", None, "line 4 must be a ratio"),
         ("name\n1\n1200.0.0\n", None, "line 3 must be cents"),
@@ -204,6 +204,31 @@ fn damaged_files_are_told_with_their_line() {
     ] {
         let said = read(scl.as_bytes(), kbm).expect_err(scl);
         assert!(said.contains(says), "{scl:?}: {said}");
+    }
+    // Pitches that would be silence.
+    for pitch in
+        ["0/1", "3/0", "0", "-2", "1e300", "1e300.0", "9999999999999.0", "-99999.5", "nan.", "2/1000000000"]
+    {
+        let scl = format!("! a comment\nname\n2\n100.0\n{pitch}\n");
+        let said = read(scl.as_bytes(), None).expect_err(pitch);
+        assert!(said.contains("line 5 must be") && said.contains(&format!("got {pitch:?}")), "{said}");
+    }
+    for hz in ["0", "-440", "nan", "inf", "1e300", "1e-300"] {
+        let kbm = kbm.replace("440.0", hz);
+        let said = read(b"name\n1\n2/1\n", Some(&kbm)).expect_err(hz);
+        assert!(said.contains(&format!("line 6 must be a frequency in 1..20000 Hz, got {hz:?}")), "{said}");
+    }
+    for (mapping, says) in [
+        (
+            "0\n90\n40\n60\n69\n440.0\n12\n",
+            "line 3 must be the last key, at or above the first, 90, got \"40\"",
+        ),
+        ("2\n0\n127\n60\n69\n440.0\n1\nx\nX\n", "line 9 is \"X\", as are all entries"),
+        ("12\n0\n127\n60\n69\n440.0\n12\n", "no entries follow"),
+        ("0\n-20\n-10\n60\n69\n440.0\n12\n", "no key has a pitch"),
+    ] {
+        let said = read(b"name\n1\n2/1\n", Some(mapping)).expect_err(mapping);
+        assert!(said.contains(says), "{said}");
     }
     // Latin-1 in a comment is no reason to refuse a scale.
     assert!(read(b"! M\xe9taton\nname\n1\n2/1\n", Some(kbm)).is_ok());
