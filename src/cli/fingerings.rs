@@ -36,15 +36,16 @@ Examples:
 /// resonances, and uneven_db, the difference of their heights.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
+#[group(id = "sought", required = true, multiple = false, args = ["note", "multiphonic"])]
 pub struct FingeringsCommand {
     /// Written note: a MIDI number (95) or a name (B6)
-    #[arg(long, visible_alias = "written", value_name = "NOTE", value_parser = note, required_unless_present = "multiphonic")]
+    #[arg(long, visible_alias = "written", value_name = "NOTE", value_parser = note)]
     note: Option<u8>,
     /// Two fingerings for a trill to this written note
     #[arg(long, value_name = "NOTE", value_parser = note, requires = "note")]
     trill_to: Option<u8>,
     /// Fingerings with two strong resonances that belong to no one note
-    #[arg(long, conflicts_with_all = ["note", "trill_to"])]
+    #[arg(long, conflicts_with = "trill_to")]
     multiphonic: bool,
     /// How many of the best, 1..1000
     #[arg(long, value_name = "COUNT", default_value = "10", value_parser = |s: &str| whole::<u16>(s, 1, 1_000))]
@@ -60,6 +61,11 @@ pub struct FingeringsCommand {
 impl FingeringsCommand {
     pub fn run(&self) -> Result<(), Failure> {
         self.table.check_files(&[self.instrument.file()], &[])?;
+        if let Some(note) = self.trill_to.filter(|_| self.trill_to == self.note).map(WrittenNote) {
+            return Err(Failure::Usage(format!(
+                "--trill-to {note}: a trill needs two notes; give another one"
+            )));
+        }
         let file = self.instrument.load()?;
         let count = usize::from(self.count);
         // It is never ended early.
