@@ -7,7 +7,7 @@ use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within, within_f3
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::torque_law;
 use chalumeau_core::haptics::{
-    FeelTable, NoteFeel, NoteRequirement, PlayedReed, RequirementSolver, TorqueLimits,
+    FeelRefused, FeelTable, NoteFeel, NoteRequirement, PlayedReed, RequirementSolver, TorqueLimits,
 };
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::instrument::feel_inputs::played_reed;
@@ -145,7 +145,7 @@ impl HapticCommand {
         let design = self.feel.design(file)?;
         let limits = TorqueLimits { ceiling_mnm: self.ceiling, ..TorqueLimits::default() };
         let (bore, reed) = self.bore_and_reed(file);
-        Ok(FeelTable::new(&bore, &design, &reed, &limits)?)
+        FeelTable::new(&bore, &design, &reed, &limits).map_err(in_flags)
     }
 
     fn curve(&self, note: &NoteFeel) -> Result<(), Failure> {
@@ -170,6 +170,31 @@ impl HapticCommand {
         }
         table.finish()
     }
+}
+
+/// What is refused, with what helps as flags of this command.
+fn in_flags(refused: FeelRefused) -> Failure {
+    let helps = match &refused {
+        FeelRefused::Silent { .. } => "raise --zeta or --H".to_owned(),
+        FeelRefused::Reference(_) => "choose another --reference".to_owned(),
+        FeelRefused::Travel { .. } => "shorten --travel".to_owned(),
+        FeelRefused::Crossed { .. } => "lower --place, raise --zeta, or take --law flow".to_owned(),
+        FeelRefused::Ceiling { strength_mnm, .. } => {
+            format!(
+                "lower the strength (--torque) to {strength_mnm:.0} mNm or less, lower --contrast, or raise --ceiling"
+            )
+        }
+        FeelRefused::Stiffness { .. } => "lower the strength (--torque), or lengthen --travel".to_owned(),
+        FeelRefused::Push { .. } => {
+            "lower the mark (--detent) or the strength (--torque), lengthen --travel, or take --law pressure"
+                .to_owned()
+        }
+        _ => return refused.into(),
+    };
+    // After the first semicolon the library says what helps without the names of flags.
+    let text = refused.to_string();
+    let what = text.split(';').next().unwrap_or_default();
+    Failure::Usage(format!("{what}; {helps}"))
 }
 
 /// A number with so many decimals, or nan.
