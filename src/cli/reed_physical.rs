@@ -76,6 +76,8 @@ impl PhysicalReedArgs {
                     ("--reed-width", "mm", low * unit, high * unit)
                 }
             };
+            // Inwards, so that a limit that is told is allowed.
+            let (low, high) = ((1e2 * low).ceil() / 1e2, (1e2 * high).floor() / 1e2);
             return Err(Failure::Usage(format!(
                 "this reed has {symbol} = {value:.3}, which cannot be played; {what} must lie in {low:.2}..{high:.2} {measure}"
             )));
