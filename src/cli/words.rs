@@ -54,16 +54,21 @@ impl Names {
         let known: Vec<_> = flags.chain(ids).collect();
         let begin: Vec<_> = known.iter().copied().filter(|known| known.starts_with(name)).collect();
         let near = if name.is_empty() || begin.is_empty() {
-            known
-                .into_iter()
-                .max_by(|a, b| strsim::jaro_winkler(a, name).total_cmp(&strsim::jaro_winkler(b, name)))
-                .unwrap_or_default()
-                .to_owned()
+            let distance = |known: &&str| strsim::osa_distance(known, name);
+            let nearest = known.into_iter().min_by_key(distance);
+            // Farther away, it is another word.
+            nearest.filter(|near| 3 * distance(near) <= name.chars().count()).map(str::to_owned)
         } else {
-            one_of(&begin)
+            Some(one_of(&begin))
         };
         let what = if self.sets { "no flag of render and no parameter" } else { "no argument" };
-        Err(format!("{what} is called {name:?}; do you mean {near}?"))
+        Err(match near {
+            Some(near) => format!("{what} is called {name:?}; do you mean {near}?"),
+            None if self.sets => format!(
+                "{what} is called {name:?}; `chalumeau render --help` and `chalumeau parameters` list them"
+            ),
+            None => format!("{what} is called {name:?}"),
+        })
     }
 
     /// The words of these names and values. An empty value leaves its name out.
@@ -152,5 +157,7 @@ mod tests {
         let reed = said("reed");
         assert!(reed.contains("reed-stiffness") && reed.ends_with("?"), "{reed}");
         assert!(said("gama").ends_with("do you mean gamma?"), "{}", said("gama"));
+        let none = said("qqq");
+        assert!(!none.contains("do you mean") && none.contains("render --help"), "{none}");
     }
 }

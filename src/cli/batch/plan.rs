@@ -31,7 +31,7 @@ pub struct Plan {
 #[serde(deny_unknown_fields)]
 struct PlanFile {
     #[serde(default)]
-    same: BTreeMap<String, Scalar>,
+    same: BTreeMap<String, toml::Value>,
     vary: toml::Table,
 }
 
@@ -113,13 +113,21 @@ impl Plan {
         if vary.is_empty() {
             return Err("nothing varies: [vary] is empty".to_owned());
         }
-        let (mut names, same): (Vec<_>, Vec<_>) =
-            same.into_iter().map(|(name, value)| (name, value.text())).unzip();
-        let mut variations = vec![same];
+        let (mut names, mut one) = (Vec::new(), Vec::new());
+        for (name, value) in same {
+            let scalar: Scalar = value.try_into().map_err(|_| {
+                format!("{name} in [same] must be a number, a text in quotes, true or false; a list goes into [vary]")
+            })?;
+            names.push(name);
+            one.push(scalar.text());
+        }
+        let mut variations = vec![one];
         for (name, values) in vary {
             let values: Values = values
                 .try_into()
-                .map_err(|_| format!("{name} must be a list, or {{ from = 0.4, to = 0.6, steps = 5 }}"))?;
+                .map_err(|_| {
+                    format!("{name} must be a list of numbers, of texts in quotes, or of true and false, or {{ from = 0.4, to = 0.6, steps = 5 }}")
+                })?;
             let texts = values.texts(&name)?;
             if variations.len() * texts.len() > FILES_MOST {
                 return Err(format!("these are more than {FILES_MOST} files"));
