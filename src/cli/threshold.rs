@@ -117,5 +117,6 @@ pub fn linear_threshold(file: &InstrumentFile, written: WrittenNote, settings: &
     let model = TransferMatrix::new(file, Air::at(f64::from(settings.temperature_c)));
     let near_hz = written.sounding(file.transposition)?.frequency_hz(f64::from(settings.a4_hz));
     let (_, height) = model.playing_frequency(&fingering.open, file.reed_volume_m3, near_hz)?;
-    (height > 0.0).then(|| threshold_gamma(height, zeta))
+    // Without any flow no breath is enough.
+    (height > 0.0).then(|| threshold_gamma(height, zeta)).filter(|gamma| gamma.is_finite())
 }

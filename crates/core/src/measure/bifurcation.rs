@@ -62,7 +62,9 @@ impl BifurcationDiagram {
     /// The values of gamma at which the note begins, beats, chokes, returns, opens and ends.
     pub fn transitions(&self) -> Transitions {
         let sounds = |point: &RampPoint| point.rms > SOUNDING_RMS;
-        let begins = self.up.iter().position(sounds);
+        // What the tongue leaves behind fades; a note grows.
+        let fading = self.up.windows(2).take_while(|pair| pair[1].rms < pair[0].rms).count();
+        let begins = self.up.iter().skip(fading).position(sounds).map(|after| fading + after);
         let sounding = begins.map_or(&[][..], |begins| &self.up[begins..]);
         let beats = sounding.iter().find(|point| point.shut > 0.0);
         // The first silent window after the last one that sounds.
@@ -190,6 +192,9 @@ mod tests {
         assert_eq!((changes.begins, changes.beats, changes.chokes), (Some(0.4), Some(0.5), Some(1.5)));
         assert_eq!((changes.returns, changes.opens, changes.ends), (Some(1.0), Some(0.45), Some(0.35)));
         assert_eq!(BifurcationDiagram::default().transitions(), Transitions::default());
+        // The release of the tongue alone.
+        let up = [0.04, 0.02, 0.005, 0.001].map(|rms| point(0.1, rms, 0.0)).to_vec();
+        assert_eq!(BifurcationDiagram { up, down: Vec::new() }.transitions(), Transitions::default());
     }
 
     #[test]
