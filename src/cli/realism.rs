@@ -6,7 +6,7 @@ use crate::cli::plot_args::PlotArgs;
 use crate::cli::render::progress;
 use crate::cli::score_args::preset_called;
 use crate::cli::settings::SettingsArgs;
-use crate::cli::shared_args::{PlayedArgs, within};
+use crate::cli::shared_args::{PlayedArgs, dynamic, within};
 use crate::cli::tune::named;
 use crate::presets::Preset;
 use chalumeau_core::analysis::noise_bands::{BANDS_HZ, noise_db};
@@ -62,8 +62,8 @@ each note. A recorded note differs from its recorded neighbours by 2.7, 6.8 and 
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct RealismCommand {
-    /// The player's dynamic at pp, mf and ff, each 0..1 [default: 0,0.6,1]
-    #[arg(long, value_name = "D,D,D", value_delimiter = ',', num_args = 1, conflicts_with = "gamma", value_parser = |s: &str| within(s, 0.0, 1.0))]
+    /// The player's dynamic at pp, mf and ff, each 0..1 or pp, p, mp, mf, f, ff [default: 0,0.6,1]
+    #[arg(long, value_name = "D,D,D", value_delimiter = ',', num_args = 1, conflicts_with = "gamma", value_parser = dynamic)]
     dynamic: Vec<f64>,
     /// Instead: constant mouth pressure over closing pressure at pp, mf and ff, each 0..3
     #[arg(long, value_name = "G,G,G", value_delimiter = ',', num_args = 1, value_parser = |s: &str| within(s, 0.0, f64::from(GAMMA_MAX)))]
@@ -102,6 +102,7 @@ struct Heard {
 impl RealismCommand {
     pub fn run(&self) -> Result<(), Failure> {
         self.table.check_files(&[self.instrument.instrument.file()], &[self.plot.path()])?;
+        self.settings.refuse_room_and_players()?;
         let file = self.instrument.load_for(self.preset.as_ref())?;
         let (breaths, mut settings, blown) = self.blown(&file)?;
         settings.gain_db -= HEADROOM_DB as f32;
@@ -131,7 +132,9 @@ impl RealismCommand {
             "recordings of a B flat clarinet: TinySOL (Cella, Ghisi, Lostanlen, Levy, Fineberg, Maresz 2020), CC BY 4.0, one take for each note"
                 .to_owned(),
         ];
-        for line in about.iter().chain(&left_out).chain(&summary(&heard)) {
+        // A mean of nothing.
+        let summary: Vec<_> = summary(&heard).iter().map(|line| line.replace("NaN", "none")).collect();
+        for line in about.iter().chain(&left_out).chain(&summary) {
             table.comment(format_args!("{line}"))?;
         }
         for note in &heard {

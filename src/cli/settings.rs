@@ -231,6 +231,23 @@ impl SettingsArgs {
         self.has("noise")
     }
 
+    /// Refuses a room and several players, where one instrument is measured.
+    pub fn refuse_room_and_players(&self) -> Result<(), Failure> {
+        let idle = ["player", "split", "room"];
+        match self.given()?.iter().find(|given| idle.contains(&given.parameter.id)) {
+            Some(Given { typed, .. }) => Err(Failure::Usage(format!(
+                "{typed} does nothing here: this command measures one instrument, without a room; leave it out"
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// As what the user typed that all players play every note.
+    pub fn unison_given(&self) -> Result<Option<String>, Failure> {
+        let given = self.given()?.into_iter().find(|given| given.parameter.id == "split");
+        Ok(given.filter(|given| given.value == Value::Choice(1)).map(|given| given.typed))
+    }
+
     /// Whether the user has chosen how many players play, or what they do with the notes.
     pub fn players_given(&self) -> bool {
         self.players.is_some() || self.unison || self.has("player") || self.has("split")

@@ -9,6 +9,7 @@ use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{NotesArg, PlayedArgs, dynamic, rate, within};
 use crate::presets::Preset;
 use chalumeau_core::analysis::pitch;
+use chalumeau_core::analysis::spectrum::rms_dbfs;
 use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
 use chalumeau_core::instrument::{Clarinet, Model, Settings, Tuning};
@@ -31,6 +32,9 @@ const MEASURE_S: f64 = 0.6;
 const GAMMA_DEFAULT: f64 = 0.5;
 /// Further than this from its pitch a note is another one, cents. Wide, for breath and reeds that bend a note much.
 const OWN_CENTS: f64 = 150.0;
+/// Quieter than this is silence, dBFS without the user's gain. The softest note of pianissimo that was met has -42 dBFS; a reed
+/// through which no air flows (--A 0) moves at most as loud as -71 dBFS.
+const SILENT_DBFS: f64 = -65.0;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -78,6 +82,7 @@ pub struct TuneCommand {
 impl TuneCommand {
     pub fn run(&self) -> Result<(), Failure> {
         self.table.check_files(&[self.instrument.instrument.file()], &[self.plot.path()])?;
+        self.settings.refuse_room_and_players()?;
         let file = self.instrument.load_for(self.preset.as_ref())?;
         let base = self.preset.as_ref().map(Preset::settings);
         let notes = self.notes.notes(&file)?;
@@ -209,6 +214,9 @@ fn measure(
         Ok::<_, Infallible>(())
     });
     let steady = &samples[samples.len().min((SETTLE_S * f64::from(rate)) as usize)..];
+    if rms_dbfs(steady) < SILENT_DBFS + f64::from(settings.gain_db) {
+        return None;
+    }
     let heard = pitch::fundamental_hz(steady, f64::from(rate));
     heard.map(|f_hz| (f_hz, cents(f_hz, sounding.frequency_hz(f64::from(settings.a4_hz)))))
 }
