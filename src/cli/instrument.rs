@@ -214,12 +214,14 @@ impl CheckFile {
         table.comment(format_args!("{}, reed volume {:.0} mm3", file.name, 1e9 * file.reed_volume_m3))?;
         for note in &check.notes {
             let register = file.fingering(note.written).map_or("", |fingering| fingering.register.as_str());
-            let (peak_hz, cents, mag, q) = match (note.peak, note.cents) {
-                (Some(peak), Some(cents)) => (peak.f_hz, cents, peak.mag_over_zc, peak.q),
-                _ => (f64::NAN, f64::NAN, f64::NAN, f64::NAN),
+            let peak = match (note.peak, note.cents) {
+                (Some(peak), Some(cents)) => {
+                    format!("{:.2},{cents:+.1},{:.2},{:.1}", peak.f_hz, peak.mag_over_zc, peak.q)
+                }
+                _ => "nan,nan,nan,nan".to_owned(),
             };
             table.line(format_args!(
-                "{},{},{register},{},{:.2},{peak_hz:.2},{cents:+.1},{mag:.2},{q:.1}",
+                "{},{},{register},{},{:.2},{peak}",
                 named(note.written),
                 note.written.0,
                 note.mode,
@@ -327,7 +329,16 @@ impl New {
             vent_radius_m: self.vent_mm.map(|mm| mm / 2e3),
             reed_volume_m3: self.reed_volume / 1e9,
         };
-        Ok(cylinder.build(Air::default())?)
+        let file = cylinder.build(Air::default())?;
+        if file.length_m() > LONGEST_M {
+            return Err(Failure::Usage(format!(
+                "--notes: {} needs a bore {:.0} mm long, and the longest of an instrument file is {:.0} mm; begin with a higher note",
+                file.lowest(),
+                1e3 * file.length_m(),
+                1e3 * LONGEST_M
+            )));
+        }
+        Ok(file)
     }
 
     fn scaled(&self, factor: f64) -> Result<InstrumentFile, Failure> {
@@ -352,6 +363,9 @@ impl New {
         Ok(file)
     }
 }
+
+/// Longest bore of the format, m (docs/instrument-file.md).
+const LONGEST_M: f64 = 3.0;
 
 /// Least and largest scale factor.
 const LIMITS_OF_SCALE: [f64; 2] = [0.2, 5.0];
