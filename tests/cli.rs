@@ -251,7 +251,7 @@ fn a_measured_reed_has_both_faces() {
     refused(
         &d,
         "render --written 60 --reed-opening 2 --out x.wav",
-        &["H = 10.392", "--reed-opening must lie in 0.19..0.96 mm"],
+        &["H = 10.392", "--reed-opening must lie in 0.20..0.96 mm"],
     );
 }
 
@@ -1250,6 +1250,22 @@ fn options_that_would_do_nothing_are_refused() {
         ("reed --law --gamma 0.5", "--gamma"),
         ("reed --table --zeta 0.2", "--zeta"),
         ("reed --figure unit --gamma 0.5 --out unit.svg", "--figure orbit"),
+        ("reed --figure unit --instrument bass --out unit.svg", "--figure orbit"),
+        ("reed --law --out z.png", "--law"),
+        ("reed --law --instrument none", "--figure orbit"),
+        ("reed --table --reed-stiffness 1500", "--law and --physical"),
+        ("reed --table --quality high --untuned", "--figure orbit"),
+        ("reed --figure unit --out u.png --format svg", "files in a directory"),
+        ("instrument new --notes D3,E3 --instrument bass --out x.toml", "--scale in place of --notes"),
+        ("render --written C4 --contrast 2 --out x.wav", "add --replay"),
+        ("render --written C4 --law pressure --out x.wav", "add --replay"),
+        ("render --written C4 --unison --out x.wav", "add --players"),
+        ("render --written C4 --set split=unison --out x.wav", "--set split is for several players"),
+        ("tune --written C4 --players 2", "--players does nothing here"),
+        ("tune --written C4 --room 0.5", "--room does nothing here"),
+        ("bifurcation --written C4 --set room=50", "--set room does nothing here"),
+        ("fingerings --note E3 --trill-to 52", "a trill needs two notes"),
+        ("fingerings", "--multiphonic"),
         ("render melody.mid --slurred --out x.wav", "--slurred"),
         ("render --written C4 --slurred --out x.wav", "--slurred"),
     ] {
@@ -1257,6 +1273,66 @@ fn options_that_would_do_nothing_are_refused() {
     }
     succeeds(d.path(), "radiation --written F4 --heard position --width 70");
     succeeds(d.path(), "reed --physical --zeta 0.2");
+    let output =
+        chalumeau(d.path(), words("render --written C4 --seconds 0.1 --room 0.5 --channels 1 --out x.wav"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("with --channels 1 no room is heard"));
+}
+
+#[test]
+fn silence_has_no_pitch_and_no_beginning() {
+    let d = tempfile::tempdir().unwrap();
+    for silent in ["--gamma 0", "--dynamic 0 --A 0", "--gamma 0 --gain-db 24"] {
+        let rows = succeeds(d.path(), &format!("tune --written C5 {silent}"));
+        assert_eq!(rows.lines().last(), Some("72,nan,nan,0,nan"), "{silent}");
+    }
+    let soft = succeeds(d.path(), "tune --written E3 --dynamic pp --gain-db -60");
+    assert!(soft.lines().last().unwrap().ends_with(|of: char| of.is_ascii_digit()), "{soft}");
+    assert!(soft.lines().last().unwrap().contains(",1,"), "{soft}");
+    let ramp = succeeds(d.path(), "bifurcation --written C5 --A 0 --seconds 0.5");
+    assert!(ramp.contains("no linear threshold, does not begin up to gamma 2"), "{ramp}");
+    let realism = succeeds(d.path(), "realism --gamma 0,0,0 --takes 1");
+    assert!(!realism.contains("NaN") && realism.contains("median ratio none"), "{realism}");
+}
+
+#[test]
+fn a_scale_that_leads_out_of_the_instrument_is_told() {
+    let d = tempfile::tempdir().unwrap();
+    fs::write(d.path().join("fifths.scl"), "fifths\n1\n3/2\n").unwrap();
+    // Of these, middle C and its fifth are on the clarinet; the others are above it, and above MIDI.
+    fs::write(d.path().join("keys.mid"), one_after_another(&[60, 61, 66, 90])).unwrap();
+    let output = chalumeau(d.path(), words("render keys.mid --scl fifths.scl --out x.wav"));
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert!(message.contains("2 notes have no fingering and stay silent"), "{message}");
+}
+
+#[test]
+fn help_names_what_the_command_has() {
+    let d = tempfile::tempdir().unwrap();
+    fs::write(d.path().join("same.toml"), "[same]\nset = [\"vent=2\"]\n[vary]\nwritten = [\"C4\"]\n")
+        .unwrap();
+    for (line, says) in [
+        (
+            "haptic --torque 400",
+            "lower the strength (--torque) to 69 mNm or less, lower --contrast, or raise --ceiling",
+        ),
+        ("haptic --place 5 --law pressure --zeta 0.1", "--place, raise --zeta"),
+        ("render --written C4 --breath= --out x.wav", "--breath is empty"),
+        (
+            "render --sounding 127 --out x.wav",
+            "sounding 127 (G9) has no fingering; this instrument sounds 50 (D3) to 95 (B6)",
+        ),
+        ("render --written C4 --breath ramp:0:1e300:1 --out x.wav", "gamma must lie in 0..3, got 1e300"),
+        ("instrument new --notes A0 --out a0.toml", "A0 needs a bore 3015 mm long"),
+        ("batch same.toml --into set", "set in [same] must be a number, a text in quotes, true or false"),
+        ("realism --dynamic pp,mf,loud", "or one of pp, p, mp, mf, f, ff"),
+    ] {
+        refused(&d, line, &[says]);
+    }
+    // What is beside the page is beside it under any name.
+    let wav = d.path().join("x.wav");
+    let line = ["report", "--written", "C4", "--seconds", "0.2", "--out", "x.html", "--wav"].map(OsStr::new);
+    let output = chalumeau(d.path(), line.into_iter().chain([wav.as_os_str()]));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 #[test]

@@ -11,6 +11,11 @@ use clap::{Args, ValueEnum};
 /// Strength without --torque, mNm: a finger feels it and holds it.
 const USUAL_MNM: f64 = 55.0;
 
+/// Exaggeration of torques and of angles, and travel, where nothing else is said.
+const USUAL_CONTRAST: f64 = 3.0;
+const USUAL_PLACE: f64 = 1.0;
+const USUAL_TRAVEL_DEG: f64 = 360.0;
+
 /// Torque laws by name.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum LawArg {
@@ -35,30 +40,30 @@ enum OrderArg {
 #[derive(Args)]
 #[command(next_help_heading = "Feel of the knob")]
 pub struct FeelArgs {
-    /// Torque law
-    #[arg(long, value_enum, default_value_t = LawArg::Flow)]
-    law: LawArg,
-    /// Exaggeration of the differences in torque between notes, 1 (physical) ..5
-    #[arg(long, value_name = "X", default_value = "3", value_parser = |s: &str| within(s, 1.0, 5.0))]
-    contrast: f64,
-    /// Exaggeration of the differences in angle at which notes speak, 1 (physical) ..5
-    #[arg(long, value_name = "X", default_value = "1", value_parser = |s: &str| within(s, 1.0, 5.0))]
-    place: f64,
+    /// Torque law [default: flow]
+    #[arg(long, value_enum)]
+    law: Option<LawArg>,
+    /// Exaggeration of the differences in torque between notes, 1 (physical) ..5 [default: 3]
+    #[arg(long, value_name = "X", value_parser = |s: &str| within(s, 1.0, 5.0))]
+    contrast: Option<f64>,
+    /// Exaggeration of the differences in angle at which notes speak, 1 (physical) ..5 [default: 1]
+    #[arg(long, value_name = "X", value_parser = |s: &str| within(s, 1.0, 5.0))]
+    place: Option<f64>,
     /// Notes speak and close at the angles of the reference reed, whatever reed is played: as in a study
     #[arg(long)]
     equal_travel: bool,
-    /// Which note feels harder
-    #[arg(long, value_enum, default_value_t = OrderArg::Physical)]
-    order: OrderArg,
+    /// Which note feels harder [default: physical]
+    #[arg(long, value_enum)]
+    order: Option<OrderArg>,
     /// Written note that contrast and place do not change [default: C5 or, without one, the middle of the chart]
     #[arg(long, value_name = "NOTE", value_parser = note)]
     reference: Option<u8>,
     /// Torque per unit of flow (flow) or at closure (pressure) on the reference note, mNm, 0..450 [default: 55]
     #[arg(long, value_name = "MNM", value_parser = |s: &str| within(s, 0.0, 450.0))]
     torque: Option<f64>,
-    /// Angle at which the reference reed closes on the reference note, degrees, 120..1080
-    #[arg(long, value_name = "DEG", default_value = "360", value_parser = |s: &str| within(s, 120.0, 1_080.0))]
-    travel: f64,
+    /// Angle at which the reference reed closes on the reference note, degrees, 120..1080 [default: 360]
+    #[arg(long, value_name = "DEG", value_parser = |s: &str| within(s, 120.0, 1_080.0))]
+    travel: Option<f64>,
     /// Height of the mark at the threshold, mNm, 0..100 [default: 9 under flow, 6 under pressure]
     #[arg(long, value_name = "MNM", value_parser = |s: &str| within(s, 0.0, 100.0))]
     detent: Option<f64>,
@@ -71,24 +76,48 @@ impl FeelArgs {
             check_fingering(file, WrittenNote(reference))?;
         }
         Ok(FeelDesign {
-            law: match self.law {
+            law: match self.law.unwrap_or(LawArg::Flow) {
                 LawArg::Flow => TorqueLaw::Flow,
                 LawArg::Pressure => TorqueLaw::Pressure,
             },
             reference: self.reference.map(WrittenNote),
-            contrast: self.contrast,
-            place: self.place,
+            contrast: self.contrast(),
+            place: self.place(),
             equal_travel: self.equal_travel,
-            order: match self.order {
+            order: match self.order.unwrap_or(OrderArg::Physical) {
                 OrderArg::Physical => NoteOrder::Physical,
                 OrderArg::CoveredHoles => NoteOrder::CoveredHoles,
                 OrderArg::CoveredHolesReversed => NoteOrder::CoveredHolesReversed,
             },
             strength_mnm: self.torque.unwrap_or(USUAL_MNM),
-            travel_deg: self.travel,
+            travel_deg: self.travel.unwrap_or(USUAL_TRAVEL_DEG),
             detent_mnm: self.detent,
             ..FeelDesign::default()
         })
+    }
+
+    fn contrast(&self) -> f64 {
+        self.contrast.unwrap_or(USUAL_CONTRAST)
+    }
+
+    fn place(&self) -> f64 {
+        self.place.unwrap_or(USUAL_PLACE)
+    }
+
+    /// The first of its flags that is given.
+    pub fn given(&self) -> Option<&'static str> {
+        let flags = [
+            ("--law", self.law.is_some()),
+            ("--contrast", self.contrast.is_some()),
+            ("--place", self.place.is_some()),
+            ("--equal-travel", self.equal_travel),
+            ("--order", self.order.is_some()),
+            ("--reference", self.reference.is_some()),
+            ("--torque", self.torque.is_some()),
+            ("--travel", self.travel.is_some()),
+            ("--detent", self.detent.is_some()),
+        ];
+        flags.into_iter().find_map(|(flag, is_given)| is_given.then_some(flag))
     }
 
     /// Whether the strength was left to the program.
@@ -99,6 +128,6 @@ impl FeelArgs {
 
     /// Contrast and Place in words.
     pub fn exaggeration(&self) -> String {
-        format!("Contrast {}, Place {}", self.contrast, self.place)
+        format!("Contrast {}, Place {}", self.contrast(), self.place())
     }
 }

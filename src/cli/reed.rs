@@ -2,6 +2,7 @@
 
 use crate::cli::Failure;
 use crate::cli::csv_table::TableArgs;
+use crate::cli::files;
 use crate::cli::reed_physical::{self, PhysicalReedArgs};
 use crate::cli::render::progress;
 use crate::cli::shared_args::{PlayedArgs, note, sounding, within};
@@ -46,6 +47,10 @@ const ORBIT_GAMMA: f64 = 0.8;
 /// Frames of the sweep and how long each stands, s: ten seconds, smooth enough for the eye.
 const FRAMES: usize = 199;
 const FRAME_S: f64 = 0.05;
+
+/// Said where an instrument would do nothing.
+const IDLE_INSTRUMENT: &str =
+    "--instrument, --quality and --untuned are for the orbit; leave them out, or take --figure orbit";
 
 /// The figures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -125,13 +130,13 @@ pub struct ReedCommand {
 #[command(next_help_heading = "Figures")]
 struct Drawing {
     /// A new .png or .svg file (.json for its data, .gif for the sweep), or a directory; --figure all makes it if it does not exist
-    #[arg(long, value_name = "PATH", requires = "figure")]
+    #[arg(long, value_name = "PATH", requires = "figure", conflicts_with_all = ["table", "law", "physical"])]
     out: Option<PathBuf>,
-    /// Kind of file made in a directory
-    #[arg(long, value_enum, value_name = "KIND", default_value = "png", requires = "figure")]
-    format: Format,
+    /// Kind of file made in a directory [default: png]
+    #[arg(long, value_enum, value_name = "KIND", requires = "figure", conflicts_with_all = ["table", "law", "physical"])]
+    format: Option<Format>,
     /// Size of a figure, pixels, 400..4000 each way, for example 1600x1000 [default: depends on the figure]
-    #[arg(long, value_name = "WxH", requires = "figure")]
+    #[arg(long, value_name = "WxH", requires = "figure", conflicts_with_all = ["table", "law", "physical"])]
     size: Option<Size>,
     /// Written note of the orbit: a MIDI number (60) or a name [default: C4]
     #[arg(long, value_name = "NOTE", requires = "figure", conflicts_with_all = ["table", "law", "physical"], value_parser = note)]
@@ -181,7 +186,7 @@ impl Drawing {
     fn sheet(&self, which: Which, out: &Path, force: bool) -> Result<(Which, PictureFile), Failure> {
         let mut path = out.to_owned();
         if out.is_dir() {
-            let ending = match (which, self.format) {
+            let ending = match (which, self.format.unwrap_or(Format::Png)) {
                 (Which::Sweep, _) => "gif",
                 (_, Format::Png) => "png",
                 (_, Format::Svg) => "svg",
@@ -214,6 +219,16 @@ impl Drawing {
                 which.name()
             )));
         }
+        if self.instrument.is_given() && !wanted.contains(&Which::Orbit) {
+            return Err(Failure::Usage(IDLE_INSTRUMENT.to_owned()));
+        }
+        if self.format.is_some() && which != Which::All && !out.is_dir() {
+            return Err(Failure::Usage(format!(
+                "--format is for files in a directory; {} is a file, whose name says what it is",
+                out.display()
+            )));
+        }
+        files::keep_apart(files::READ, &[self.instrument.instrument.file()], &[Some(out)])?;
         let orbit = wanted.contains(&Which::Orbit).then(|| self.prepare_orbit()).transpose()?;
         if which == Which::All {
             fs::create_dir_all(out).map_err(|source| Failure::Folder { path: out.to_owned(), source })?;
@@ -276,6 +291,12 @@ impl Drawing {
 impl ReedCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let tables = ReedTables::reference();
+        if (self.table || self.figure.is_some()) && self.measured.reed(REFERENCE_RADIUS_M).is_some() {
+            return Err(Failure::Usage(
+                "a reed as measured is for --law and --physical; leave --reed-stiffness, --reed-area, --reed-width and --reed-opening out"
+                    .to_owned(),
+            ));
+        }
         if let (Some(which), Some(out)) = (self.figure, &self.drawing.out) {
             if self.table_args.to_file() {
                 return Err(Failure::Usage(
@@ -283,6 +304,9 @@ impl ReedCommand {
                 ));
             }
             return self.drawing.run(which, out, self.table_args.force());
+        }
+        if self.drawing.instrument.is_given() {
+            return Err(Failure::Usage(IDLE_INSTRUMENT.to_owned()));
         }
         if self.table {
             let mut table = self.table_args.open("i,p,x_a,x_b,sgn")?;

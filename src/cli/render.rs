@@ -25,6 +25,7 @@ const EXAMPLES: &str = "\
 Examples:
   chalumeau render melody.mid --out melody.wav
       Notes are sounding pitch; breath from CC2, else CC11, else channel pressure, else velocity; volume from CC7.
+      Program changes choose no preset: --preset does.
   chalumeau render --written C4 --dynamic pp:ff --seconds 4 --out swell.wav
       As a player plays, from pianissimo to fortissimo.
   chalumeau render --written C4 --gamma 0.5 --seconds 1.5 --no-noise --out c4.wav
@@ -145,6 +146,9 @@ impl RenderCommand {
                 "--probe and --plot look inside one instrument; leave them out, or --players and --tracks";
             return Err(Failure::Usage(inside.to_owned()));
         }
+        if channels == 1 && prepared.settings.room.amount > 0.0 {
+            say!("warning: with --channels 1 no room is heard");
+        }
         let mut out = NewFile::create(&self.out, self.force)?;
         let mut probe =
             self.probe.as_deref().map(|path| ProbeTable::open(path, self, &prepared)).transpose()?;
@@ -206,6 +210,7 @@ impl RenderCommand {
             let right = "give the name of a file, for example --out note.wav";
             return Err(Failure::Usage(format!("a WAV file cannot go to standard output; {right}")));
         }
+        self.play.refuse_idle_feel()?;
         files::keep_apart("is what is played", &self.play.read_files(), &self.written())?;
         let ending = self.out.extension().and_then(OsStr::to_str).unwrap_or_default().to_ascii_lowercase();
         if NO_WAV.contains(&ending.as_str()) {

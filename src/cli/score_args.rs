@@ -204,6 +204,11 @@ impl ScoreArgs {
             (None, Some(base)) => self.settings.over_preset(base, &file)?,
             (None, None) => self.settings.played(&file)?,
         };
+        if let Some(typed) = self.settings.unison_given()?.filter(|_| settings.players.count == 1) {
+            return Err(Failure::Usage(format!(
+                "{typed} is for several players, and one plays; add --players, or leave it out"
+            )));
+        }
         let mut warnings: Vec<_> = only_in_the_plugin(&map).into_iter().collect();
         if let Some(curve) = &curve {
             warnings.extend(self.too_little_breath(curve, &settings, &file));
@@ -243,6 +248,16 @@ impl ScoreArgs {
         let usual = if one_note { 0.0 } else { 1.0 } + settings.articulation.tail_s();
         let parts = parts.with_tail(self.tail.unwrap_or(usual), self.rate);
         Ok(RenderJob { model, settings, score: (&parts).into(), parts, rate: self.rate, warnings })
+    }
+
+    /// Refuses flags of the knob's feel where no take is replayed: they would do nothing.
+    pub fn refuse_idle_feel(&self) -> Result<(), Failure> {
+        match self.feel.given() {
+            Some(flag) if self.replay.is_none() => Err(Failure::Usage(format!(
+                "{flag} is of the knob whose take is replayed; add --replay, or leave it out"
+            ))),
+            _ => Ok(()),
+        }
     }
 
     /// The files that are read.
@@ -356,12 +371,26 @@ impl ScoreArgs {
         let Some(text) = &self.breath else {
             return Ok(self.midi.is_none().then(|| BreathCurve::constant(GAMMA_DEFAULT)));
         };
+        if text.trim().is_empty() {
+            let right = "give a number, ramp:FROM:TO:SECONDS or a CSV file";
+            return Err(Failure::Usage(format!("--breath is empty; {right}")));
+        }
         if text.parse::<f32>().is_ok() {
             let gamma = within(text, 0.0, f64::from(GAMMA_MAX));
             let gamma = gamma.map_err(|wrong| Failure::Usage(format!("--breath {text}: {wrong}")))?;
             return Ok(Some(BreathCurve::constant(gamma as f32)));
         }
         if text.starts_with("ramp:") {
+            // What is too large for single precision is told as it was typed.
+            let is_too_large = |field: &&str| {
+                let number = field.trim().parse::<f64>();
+                number.is_ok_and(|number| number.is_finite() && (number as f32).is_infinite())
+            };
+            if let Some(field) = text.split(':').skip(1).take(2).find(is_too_large) {
+                return Err(Failure::Usage(format!(
+                    "--breath {text}: gamma must lie in 0..{GAMMA_MAX}, got {field}"
+                )));
+            }
             return Ok(Some(BreathCurve::parse_ramp(text)?));
         }
         if dynamics(text).is_ok() {
@@ -445,7 +474,16 @@ impl ScoreArgs {
                 check_fingering(file, written)?;
                 Ok((&Score::note(sounding, seconds, self.rate)).into())
             }
-            _ => Err(Failure::Usage("after transposition this note is outside the range of MIDI".to_owned())),
+            _ => {
+                let given = sounding.or(self.sounding.map(SoundingNote));
+                let name = given.map_or_else(String::new, |note| format!("sounding {} ({note})", note.0));
+                let ends = [file.lowest(), file.highest()].map(|note| note.sounding(transposition));
+                let [low, high] =
+                    ends.map(|note| note.map_or_else(String::new, |note| format!("{} ({note})", note.0)));
+                Err(Failure::Usage(format!(
+                    "{name} has no fingering; this instrument sounds {low} to {high}"
+                )))
+            }
         }
     }
 }
@@ -566,19 +604,21 @@ pub(super) fn silent_keys(asked: &[SoundingNote], model: &Model, reach: Reach) -
         .into_iter()
         .partition(|&note| written(note).is_some_and(|note| file.fingering(note).is_some()));
     let mut said = Vec::new();
-    if !missing.is_empty() {
+    // A scale may have put them beyond the range of MIDI, where they have no name.
+    let is_nowhere = |key: &&SoundingNote| {
+        reach.key_switches.chosen(key.0).is_none() && reach.find(**key, &model.keys, Some).is_none()
+    };
+    let nowhere = asked.iter().filter(is_nowhere).count();
+    let count = missing.len() + nowhere;
+    if count > 0 {
         let (low, high) = (file.lowest(), file.highest());
         said.push(format!(
             "{} no fingering and {} silent; this instrument sounds {} to {} (written {low} to {high}){}",
-            if missing.len() == 1 {
-                "1 note has".to_owned()
-            } else {
-                format!("{} notes have", missing.len())
-            },
-            if missing.len() == 1 { "stays" } else { "stay" },
+            if count == 1 { "1 note has".to_owned() } else { format!("{count} notes have") },
+            if count == 1 { "stays" } else { "stay" },
             sounds(low),
             sounds(high),
-            who_has(&missing)
+            if nowhere == 0 { who_has(&missing) } else { String::new() }
         ));
     }
     if !muted.is_empty() {
