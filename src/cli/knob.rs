@@ -1,6 +1,7 @@
 //! `chalumeau knob`: uses a knob without a DAW: watch it, feel a note on it, record a take.
 
 use crate::cli::feel_args::FeelArgs;
+use crate::cli::files;
 use crate::cli::shared_args::{InstrumentArg, check_fingering, note, within};
 use crate::cli::{Failure, INTERRUPTED};
 use crate::output::OutputError;
@@ -123,6 +124,7 @@ impl WantedFeel {
 
 impl KnobCommand {
     pub fn run(&self) -> Result<(), Failure> {
+        files::check(files::READ, &[self.instrument.file()], &[self.record.as_deref()], self.force)?;
         let file = self.instrument.load()?;
         let written = WrittenNote(self.written);
         check_fingering(&file, written)?;
