@@ -110,10 +110,6 @@ impl BatchCommand {
             earlier.check(&self.into, &header, &jobs)?;
         }
         let there = if self.force { HashMap::new() } else { earlier.lines_by_arguments() };
-        if self.force {
-            // It lists files that are about to be replaced. Without it, the same command can go on after a stop, without --force.
-            let _ = fs::remove_file(self.into.join(MANIFEST));
-        }
         let growing = self.into.join(GROWING);
         let mut journal =
             new_journal(&growing).map_err(|source| Failure::Batch { path: growing.clone(), source })?;
@@ -125,6 +121,10 @@ impl BatchCommand {
                 .map_err(|source| Failure::Batch { path: growing.clone(), source })
         };
         say(&header)?;
+        if self.force {
+            // It lists files that are about to be replaced. Without it, the same command can go on after a stop, without --force.
+            let _ = fs::remove_file(self.into.join(MANIFEST));
+        }
         let mut lines = Vec::with_capacity(jobs.len());
         for job in &jobs {
             let kept = there.get(&job.line).filter(|_| self.into.join(&job.file).is_file());
