@@ -41,6 +41,7 @@ mod report;
 mod score_args;
 mod settings;
 mod shared_args;
+mod silent_keys;
 mod study;
 mod threshold;
 mod tune;

@@ -1,0 +1,70 @@
+//! What a user should know of notes that an instrument cannot play.
+
+use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::event::{Event, PartEvent, Timed};
+use chalumeau_core::instrument::{Model, Reach};
+use chalumeau_core::units::{SoundingNote, WrittenNote};
+use std::collections::BTreeSet;
+
+/// Says which notes the instrument cannot play, which stay silent.
+pub fn silent_notes(events: &[Timed<PartEvent>], model: &Model, reach: Reach) -> Vec<String> {
+    let asked = events.iter().filter_map(|timed| match timed.event.event {
+        Event::NoteOn { note, .. } => Some(note),
+        _ => None,
+    });
+    silent_keys(&asked.collect::<Vec<_>>(), model, reach)
+}
+
+/// Says which of these keys the instrument cannot play, which stay silent.
+pub fn silent_keys(asked: &[SoundingNote], model: &Model, reach: Reach) -> Vec<String> {
+    let file = &model.file;
+    let sounds =
+        |note: WrittenNote| note.sounding(file.transposition).map(|n| n.to_string()).unwrap_or_default();
+    let silent = asked.iter().copied().filter(|&key| reach.fingering(key, model).is_none());
+    let silent: Vec<_> =
+        silent.filter_map(|key| reach.find(key, &model.keys, Some).map(|(pitch, _)| pitch.note)).collect();
+    let written = |note: SoundingNote| note.written(file.transposition);
+    let (muted, missing): (Vec<_>, Vec<_>) = silent
+        .into_iter()
+        .partition(|&note| written(note).is_some_and(|note| file.fingering(note).is_some()));
+    let mut said = Vec::new();
+    // A scale may have put them beyond the range of MIDI, where they have no name.
+    let is_nowhere = |key: &&SoundingNote| {
+        reach.key_switches.chosen(key.0).is_none() && reach.find(**key, &model.keys, Some).is_none()
+    };
+    let nowhere = asked.iter().filter(is_nowhere).count();
+    let count = missing.len() + nowhere;
+    if count > 0 {
+        let (low, high) = (file.lowest(), file.highest());
+        said.push(format!(
+            "{} no fingering and {} silent; this instrument sounds {} to {} (written {low} to {high}){}",
+            if count == 1 { "1 note has".to_owned() } else { format!("{count} notes have") },
+            if count == 1 { "stays" } else { "stay" },
+            sounds(low),
+            sounds(high),
+            if nowhere == 0 { who_has(&missing) } else { String::new() }
+        ));
+    }
+    if !muted.is_empty() {
+        let names: BTreeSet<_> = muted.iter().filter_map(|&note| written(note)).collect();
+        let names: Vec<_> = names.iter().map(|note| format!("{note} (sounds {})", sounds(*note))).collect();
+        said.push(format!(
+            "notes that stay silent, because their fingering does not speak in tune on this instrument: {}, written {}",
+            muted.len(),
+            names.join(", ")
+        ));
+    }
+    said
+}
+
+/// Which bundled instrument has all these notes, in words for the end of a sentence.
+fn who_has(notes: &[SoundingNote]) -> String {
+    let has = |instrument: &&Bundled| {
+        let file = instrument.file();
+        let fingering =
+            |note: &SoundingNote| note.written(file.transposition).and_then(|note| file.fingering(note));
+        notes.iter().all(|note| fingering(note).is_some())
+    };
+    let found = Bundled::ALL.iter().find(has);
+    found.map(|instrument| format!("; --instrument {} has them", instrument.id())).unwrap_or_default()
+}
