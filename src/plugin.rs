@@ -50,13 +50,14 @@ use crate::identity;
 use crate::parameters::InUse;
 use breath_sources::BreathInput;
 use chalumeau_core::control::notes::Note;
-use chalumeau_core::event::{Event, PartEvent, To};
+use chalumeau_core::event::Event;
 use chalumeau_core::instrument::{Channels, MOST_PLAYERS, Settings};
 #[cfg(feature = "devices")]
 use chalumeau_knob::device::Release;
 use host_inputs::HostInputs;
 use instrument_loading::{InstrumentLoader, InstrumentSwap, SharedInstrument};
 use microphone::Microphone;
+use params::knob::ReedSource;
 use params::moment::Moment;
 use preset_keeper::{PresetHandle, PresetKeeper};
 use window::{HostWindow, PluginWindow, WindowAudio};
@@ -250,76 +251,15 @@ impl Chalumeau {
             [right, ..] => Channels::two(left, right),
             [] => Channels::one(left),
         };
+        let Some((settings, has_changed)) = self.follow_settings(context) else {
+            return ProcessStatus::Error("not activated");
+        };
+        self.heed_transport(context.transport().playing);
+        let drives = self.begin_inputs(&settings, has_changed);
         let Some(instrument) = &mut self.instrument else {
             return ProcessStatus::Error("not activated");
         };
-
-        if let Some(presets) = self.presets.as_ref().filter(|_| self.offline) {
-            presets.handle().wait();
-        }
-        let own = self.params.settings();
-        self.inputs.set_links(&self.params.links.links(&own));
-        // Where a linked controller has spoken last, its value counts.
-        let settings = self.inputs.linked(own);
-        self.inputs.set_curves(self.params.curves.now(&settings));
-        let has_changed = settings != self.settings;
-        if has_changed {
-            instrument.set_settings(&settings);
-            if settings.players != self.settings.players {
-                context.set_current_voice_capacity(settings.players.parts() as u32);
-            }
-            self.settings = settings;
-        }
-        if self.offline {
-            instrument.wait_for(self.params.instrument.choice.value() as u32);
-        }
-        instrument.receive();
-
-        let transport_runs = context.transport().playing;
-        let has_stopped = std::mem::replace(&mut self.transport_ran, transport_runs) && !transport_runs;
-        #[cfg(feature = "devices")]
-        if let Some((_, audio)) = self.knob.as_ref().filter(|_| has_stopped) {
-            audio.let_go(Release::TransportStopped);
-        }
         let inputs = &mut self.inputs;
-        inputs.begin_block(settings.players.parts());
-        if has_changed {
-            inputs.say_links();
-        }
-        if self.params.moments.take(Moment::Panic) {
-            inputs.silence();
-        }
-        let drives = [self.params.knob.h_source.value(), self.params.knob.k_source.value()];
-        inputs.breath_from(self.params.breath.from.value().into());
-        if let Some(unit) = self.moved.breath(&self.params) {
-            inputs.breath_sources().blow(BreathInput::Parameter, unit);
-            inputs.say(Event::Breath(unit).into());
-        }
-        if let Some(event) = self.microphone.begin_block(&self.params) {
-            inputs.breath_sources().forget();
-            inputs.say(event.into());
-        }
-        inputs.bend_range(self.params.instrument.bend_range.value());
-        inputs.wheel(self.params.expression.wheel.value().into(), drives);
-        let key_switches = settings.reach.key_switches;
-        inputs.key_switches(key_switches);
-        let keys = self.window.as_mut().map(|(_, window)| window.keys()).unwrap_or_default();
-        for event in keys.into_iter().flatten() {
-            match event {
-                Event::Breath(unit) => inputs.breath_sources().blow(BreathInput::Parameter, unit),
-                Event::NoteOn { velocity, .. } => inputs.breath_sources().key(velocity),
-                _ => {}
-            }
-            let chosen = match event {
-                Event::NoteOn { note, .. } => key_switches.chosen(note.0),
-                _ => None,
-            };
-            inputs.say(match chosen {
-                Some(fingerings) => Event::Fingerings(fingerings).into(),
-                // The window shows the first player.
-                None => PartEvent { to: To::Player(0), event },
-            });
-        }
         let api = context.plugin_api();
         let links = &self.params.links;
         let events = std::iter::from_fn(|| inputs.next(|| context.next_event(), api, drives, links));
@@ -372,6 +312,76 @@ impl Chalumeau {
         }
         let is_watched = self.window.as_ref().is_some_and(|(_, window)| window.is_open());
         rest_status(&self.params, instrument, is_watched)
+    }
+
+    /// Gives the instrument the settings of this block, and says whether they are others than before; `None` without an instrument.
+    /// Real-time safe, unless a host renders offline.
+    fn follow_settings<P: Plugin<SysExMessage = ()>>(
+        &mut self,
+        context: &mut impl ProcessContext<P>,
+    ) -> Option<(Settings, bool)> {
+        let instrument = self.instrument.as_mut()?;
+        if let Some(presets) = self.presets.as_ref().filter(|_| self.offline) {
+            presets.handle().wait();
+        }
+        let own = self.params.settings();
+        self.inputs.set_links(&self.params.links.links(&own));
+        // Where a linked controller has spoken last, its value counts.
+        let settings = self.inputs.linked(own);
+        self.inputs.set_curves(self.params.curves.now(&settings));
+        let has_changed = settings != self.settings;
+        if has_changed {
+            instrument.set_settings(&settings);
+            if settings.players != self.settings.players {
+                context.set_current_voice_capacity(settings.players.parts() as u32);
+            }
+            self.settings = settings;
+        }
+        if self.offline {
+            instrument.wait_for(self.params.instrument.choice.value() as u32);
+        }
+        instrument.receive();
+        Some((settings, has_changed))
+    }
+
+    /// A knob lets go where the host's transport stops. Real-time safe.
+    fn heed_transport(&mut self, runs: bool) {
+        let ran = std::mem::replace(&mut self.transport_ran, runs);
+        if ran && !runs {
+            #[cfg(feature = "devices")]
+            if let Some((_, audio)) = &self.knob {
+                audio.let_go(Release::TransportStopped);
+            }
+        }
+    }
+
+    /// Begins the block of the inputs, and takes in what parameters, microphone and the keys of the window say at its start. Gives
+    /// what drives H and k. Real-time safe.
+    fn begin_inputs(&mut self, settings: &Settings, has_changed: bool) -> [ReedSource; 2] {
+        let inputs = &mut self.inputs;
+        inputs.begin_block(settings.players.parts());
+        if has_changed {
+            inputs.say_links();
+        }
+        if self.params.moments.take(Moment::Panic) {
+            inputs.silence();
+        }
+        let drives = [self.params.knob.h_source.value(), self.params.knob.k_source.value()];
+        inputs.breath_from(self.params.breath.from.value().into());
+        if let Some(unit) = self.moved.breath(&self.params) {
+            inputs.breath_sources().blow(BreathInput::Parameter, unit);
+            inputs.say(Event::Breath(unit).into());
+        }
+        if let Some(event) = self.microphone.begin_block(&self.params) {
+            inputs.breath_sources().forget();
+            inputs.say(event.into());
+        }
+        inputs.bend_range(self.params.instrument.bend_range.value());
+        inputs.wheel(self.params.expression.wheel.value().into(), drives);
+        inputs.key_switches(settings.reach.key_switches);
+        let keys = self.window.as_mut().map(|(_, window)| window.keys()).unwrap_or_default();
+        keys.into_iter().flatten().for_each(|event| inputs.window_key(event, settings.reach.key_switches));
+        drives
     }
 
     /// Starts the threads of loader, presets, knob and window, once.

@@ -2,7 +2,7 @@
 
 use nice_plug::prelude::*;
 
-use super::breath_sources::BreathSources;
+use super::breath_sources::{BreathInput, BreathSources};
 use super::params::knob::ReedSource;
 use super::part_reeds::PartReeds;
 use super::reed_controllers::ReedControllers;
@@ -85,6 +85,23 @@ impl HostInputs {
     /// Adds an event at the beginning of the block.
     pub fn say(&mut self, event: PartEvent) {
         push(&mut self.events, event);
+    }
+
+    /// What the keys of the window say; it shows the first player.
+    pub fn window_key(&mut self, event: Event, key_switches: KeySwitches) {
+        match event {
+            Event::Breath(unit) => self.breath_sources().blow(BreathInput::Parameter, unit),
+            Event::NoteOn { velocity, .. } => self.breath_sources().key(velocity),
+            _ => {}
+        }
+        let chosen = match event {
+            Event::NoteOn { note, .. } => key_switches.chosen(note.0),
+            _ => None,
+        };
+        self.say(match chosen {
+            Some(fingerings) => Event::Fingerings(fingerings).into(),
+            None => PartEvent { to: To::Player(0), event },
+        });
     }
 
     /// The latest MIDI program change, 0..=127, once.
