@@ -882,6 +882,15 @@ fn a_preset_is_rendered_and_flags_change_it() {
     assert!(!d.path().join("no.wav").exists());
 }
 
+/// A MIDI file of one track, with 96 ticks to the quarter note.
+fn one_track(events: &[&[u8]]) -> Vec<u8> {
+    let track = events.concat();
+    let mut midi = b"MThd\0\0\0\x06\0\0\0\x01\0\x60MTrk".to_vec();
+    midi.extend((track.len() as u32).to_be_bytes());
+    midi.extend(track);
+    midi
+}
+
 #[test]
 fn linked_controllers_of_a_file_move_parameters() {
     let directory = TempDir::new().unwrap();
@@ -894,11 +903,7 @@ fn linked_controllers_of_a_file_move_parameters() {
         &[0x60, 0x80, 60, 0],
         &[0, 0xFF, 0x2F, 0],
     ];
-    let track = events.concat();
-    let mut midi = b"MThd\0\0\0\x06\0\0\0\x01\0\x60MTrk".to_vec();
-    midi.extend((track.len() as u32).to_be_bytes());
-    midi.extend(track);
-    fs::write(directory.path().join("one.mid"), midi).unwrap();
+    fs::write(directory.path().join("one.mid"), one_track(&events)).unwrap();
     let map = "format = 1\n\n[[link]]\ncontroller = 21\nparameter = \"growl\"\n";
     fs::write(directory.path().join("map.toml"), map).unwrap();
     succeeds(directory.path(), "render one.mid --out plain.wav");
@@ -936,11 +941,7 @@ fn a_device_sets_what_it_says_and_a_flag_wins() {
         &[0x60, 0x80, 60, 0],
         &[0, 0xFF, 0x2F, 0],
     ];
-    let track = events.concat();
-    let mut midi = b"MThd\0\0\0\x06\0\0\0\x01\0\x60MTrk".to_vec();
-    midi.extend((track.len() as u32).to_be_bytes());
-    midi.extend(track);
-    fs::write(d.path().join("one.mid"), midi).unwrap();
+    fs::write(d.path().join("one.mid"), one_track(&events)).unwrap();
     let map = |values: &str| {
         fs::write(d.path().join("map.toml"), format!("format = 1\n\n[parameters]\n{values}")).unwrap();
         render("--controllers map.toml").0

@@ -113,6 +113,11 @@ pub fn quoted(text: &str) -> Cow<'_, str> {
     }
 }
 
+/// A number with so many decimals, or nan.
+pub fn number(x: f64, decimals: usize) -> String {
+    if x.is_finite() { format!("{x:.decimals$}") } else { "nan".to_owned() }
+}
+
 /// The name of a note as a field of a table: C#4 is quoted.
 pub fn named(note: impl fmt::Display) -> String {
     quoted(&note.to_string()).into_owned()

@@ -1,7 +1,7 @@
 //! `chalumeau haptic`: the torque of a force-feedback knob for each note.
 
 use crate::cli::Failure;
-use crate::cli::csv_table::TableArgs;
+use crate::cli::csv_table::{TableArgs, number};
 use crate::cli::feel_args::FeelArgs;
 use crate::cli::shared_args::{AirArg, InstrumentArg, NotesArg, within, within_f32};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
@@ -195,9 +195,4 @@ fn in_flags(refused: FeelRefused) -> Failure {
     let text = refused.to_string();
     let what = text.split(';').next().unwrap_or_default();
     Failure::Usage(format!("{what}; {helps}"))
-}
-
-/// A number with so many decimals, or nan.
-fn number(x: f64, decimals: usize) -> String {
-    if x.is_nan() { "nan".to_owned() } else { format!("{x:.decimals$}") }
 }

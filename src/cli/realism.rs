@@ -1,13 +1,13 @@
 //! `chalumeau realism`: plays the recorded notes and measures how near they come to the recordings.
 
 use crate::cli::Failure;
-use crate::cli::csv_table::{CsvTable, TableArgs};
+use crate::cli::csv_table::{CsvTable, TableArgs, number};
 use crate::cli::plot_args::PlotArgs;
 use crate::cli::render::progress;
 use crate::cli::score_args::preset_called;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, dynamic, within};
-use crate::cli::tune::named;
+use crate::cli::tune::with_preset;
 use crate::presets::Preset;
 use chalumeau_core::analysis::noise_bands::{BANDS_HZ, noise_db};
 use chalumeau_core::analysis::partials::{Partial, Wander};
@@ -108,7 +108,7 @@ impl RealismCommand {
         settings.gain_db -= HEADROOM_DB as f32;
         let plot = self.plot.open(self.table.force())?;
         let mut table = self.table.open(&header())?;
-        let name = named(&file.name, self.preset.as_ref());
+        let name = with_preset(&file.name, self.preset.as_ref());
         if file.transposition != Bundled::BFlat.file().transposition {
             say!("warning: the recordings are of a B flat clarinet");
         }
@@ -276,9 +276,7 @@ fn header() -> String {
 
 /// A number with so many digits; "nan" where there is none.
 fn digits(value: Option<f64>, digits: usize) -> String {
-    value
-        .filter(|value| value.is_finite())
-        .map_or_else(|| "nan".to_owned(), |value| format!("{value:.digits$}"))
+    number(value.unwrap_or(f64::NAN), digits)
 }
 
 fn write(table: &mut CsvTable, note: &Heard) -> Result<(), Failure> {

@@ -112,6 +112,9 @@ impl RenderCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let rendered = self.render(progress)?;
         self.report(&rendered);
+        if let Some(late) = self.play.too_little_breath() {
+            say!("warning: {late}");
+        }
         Ok(())
     }
 

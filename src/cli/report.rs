@@ -75,6 +75,9 @@ impl ReportCommand {
         let prepared = self.play.prepare()?;
         refuse_several_players(&prepared)?;
         prepared.warn();
+        if let Some(late) = self.play.too_little_breath() {
+            say!("warning: {late}");
+        }
         if prepared.settings.room.amount > 0.0 {
             say!("warning: a report has one channel, on which no room is heard");
         }

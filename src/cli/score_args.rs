@@ -38,6 +38,8 @@ use std::sync::Arc;
 
 /// A reed with inertia begins up to a fifth below the threshold of one without (`chalumeau threshold --help`).
 const INERTIA_LEAST: f64 = 0.8;
+/// Gamma at which every note of a clarinet has begun, also under a firm lip (`chalumeau threshold --zeta 0.15`: 0.54 at most, less a fifth).
+const ALL_BEGIN: f64 = 0.5;
 
 /// Gamma where nothing else is said: a full, easy tone.
 const GAMMA_DEFAULT: f32 = 0.5;
@@ -210,9 +212,6 @@ impl ScoreArgs {
             )));
         }
         let mut warnings: Vec<_> = only_in_the_plugin(&map).into_iter().collect();
-        if let Some(curve) = &curve {
-            warnings.extend(self.too_little_breath(curve, &settings, &file));
-        }
         if let Some((from, to)) = self.dynamic {
             curve = Some(BreathCurve::dynamics(from, to, &settings));
         }
@@ -268,13 +267,15 @@ impl ScoreArgs {
         files.into_iter().chain([breath, controllers, self.instrument.instrument.file()]).collect()
     }
 
-    /// Says which notes of the command line begin above all that a curve of gamma reaches.
-    fn too_little_breath(
-        &self,
-        curve: &BreathCurve,
-        settings: &Settings,
-        file: &InstrumentFile,
-    ) -> Option<String> {
+    /// Says which notes of the command line begin above all that a curve of gamma reaches. Takes some 30 ms for each note, so a batch
+    /// does not ask.
+    pub fn too_little_breath(&self) -> Option<String> {
+        let curve = self.curve().ok()??;
+        let reaches = f64::from(curve.gamma_max());
+        if reaches >= ALL_BEGIN {
+            return None;
+        }
+        let Planned { file, settings, .. } = self.plan().ok()?;
         let of_sounding = |note: u8| SoundingNote(note).written(file.transposition).map(|note| note.0);
         let notes = match (self.scale, self.written.or_else(|| of_sounding(self.sounding?))) {
             (Some((from, to)), _) => from.min(to)..=from.max(to),
@@ -283,8 +284,7 @@ impl ScoreArgs {
         if settings.breath_response != BreathResponse::Physical {
             return None;
         }
-        let begin = |note| linear_threshold(file, WrittenNote(note), settings).map(|gamma| (note, gamma));
-        let reaches = f64::from(curve.gamma_max());
+        let begin = |note| linear_threshold(&file, WrittenNote(note), &settings).map(|gamma| (note, gamma));
         let mut late = notes.filter_map(begin).filter(|&(_, gamma)| reaches < INERTIA_LEAST * gamma);
         let (note, gamma) = late.next()?;
         let others = late.count();

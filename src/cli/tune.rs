@@ -1,7 +1,7 @@
 //! `chalumeau tune`: plays every note and measures its pitch.
 
 use crate::cli::Failure;
-use crate::cli::csv_table::TableArgs;
+use crate::cli::csv_table::{TableArgs, number};
 use crate::cli::plot_args::PlotArgs;
 use crate::cli::render::progress;
 use crate::cli::score_args::preset_called;
@@ -104,24 +104,25 @@ impl TuneCommand {
             settings.noise = 0.0;
         }
         let rate = self.rate;
-        let name = named(&file.name, self.preset.as_ref());
+        let name = with_preset(&file.name, self.preset.as_ref());
         let plot = self.plot.open(self.table.force())?;
         let mut table = self.table.open("written_midi,f_hz,cents,register_ok,as_built_cents")?;
         table.comment(format_args!(
             "{name}; {blown}, {rate} Hz, A4 = {} Hz; tongued, measured from {SETTLE_S} s on",
             settings.a4_hz
         ))?;
-        let as_built = self.instrument.as_built(&file, rate)?;
-        let as_built = measure_all(&notes, &as_built, &curve, &settings, rate);
-        let model = self.instrument.model(file, rate, settings.a4_hz)?;
-        let heard = if self.instrument.is_as_built() {
-            as_built.clone()
-        } else {
-            measure_all(&notes, &model, &curve, &settings, rate)
+        let built = self.instrument.as_built(&file, rate)?;
+        let as_built = measure_all(&notes, &built, &curve, &settings, rate);
+        let tuned = match self.instrument.is_as_built() {
+            true => None,
+            false => Some(self.instrument.model(file, rate, settings.a4_hz)?),
+        };
+        let heard = match &tuned {
+            Some(model) => measure_all(&notes, model, &curve, &settings, rate),
+            None => as_built.clone(),
         };
         for ((WrittenNote(written), heard), as_built) in notes.iter().zip(&heard).zip(&as_built) {
-            let as_built = as_built.map_or(f64::NAN, |(_, cents)| cents);
-            let as_built = format!("{as_built:.3}").replace("NaN", "nan");
+            let as_built = number(as_built.map_or(f64::NAN, |(_, cents)| cents), 3);
             match heard {
                 Some((f_hz, cents)) => {
                     let register_ok = u8::from(cents.abs() <= OWN_CENTS);
@@ -133,14 +134,14 @@ impl TuneCommand {
         table.finish()?;
         plot.draw(|| {
             let mut rounds = Vec::new();
-            if !self.instrument.is_as_built() {
+            if let Some(model) = &tuned {
                 // The other way of tuning beside it.
                 let other = match settings.tuning {
                     Tuning::Natural => Tuning::Tempered,
                     Tuning::Tempered => Tuning::Natural,
                 };
                 let beside = Settings { tuning: other, ..settings };
-                let beside = (other, measure_all(&notes, &model, &curve, &beside, rate));
+                let beside = (other, measure_all(&notes, model, &curve, &beside, rate));
                 let both = [(settings.tuning, heard), beside];
                 rounds.extend(both.map(|(tuning, heard)| round(name_of(tuning), &notes, &heard)));
                 rounds.sort_by(|a, b| a.name.cmp(&b.name));
@@ -155,7 +156,7 @@ impl TuneCommand {
 }
 
 /// An instrument and its preset, in words.
-pub fn named(instrument: &str, preset: Option<&Preset>) -> String {
+pub fn with_preset(instrument: &str, preset: Option<&Preset>) -> String {
     preset.map_or_else(|| instrument.to_owned(), |preset| format!("{instrument}, {}", preset.name))
 }
 

@@ -1,6 +1,7 @@
 //! The instruments that come with the program, each a file in `data/`.
 
 use crate::bore::instrument_file::InstrumentFile;
+use std::sync::OnceLock;
 
 /// One of them. All but the B flat clarinet are that clarinet larger or smaller, which their files say.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -83,8 +84,12 @@ impl Bundled {
 
     /// Its measurements.
     pub fn file(self) -> InstrumentFile {
+        static PARSED: [OnceLock<InstrumentFile>; Bundled::ALL.len()] =
+            [const { OnceLock::new() }; Bundled::ALL.len()];
         // PANIC: the texts are constants of this program and a test below parses them.
-        InstrumentFile::parse(self.text()).expect("bundled instruments are valid")
+        let parse = || InstrumentFile::parse(self.text()).expect("bundled instruments are valid");
+        // PANIC: an instrument is one of all of them. Parsing takes longer than a short note takes to render.
+        PARSED[self as usize].get_or_init(parse).clone()
     }
 }
 

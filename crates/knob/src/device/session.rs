@@ -469,9 +469,10 @@ impl HostSession {
     fn take_zero(&mut self, now_us: i64) -> Option<Message> {
         let due = self.info.is_some() && self.is_free() && self.zeroing.poll(now_us);
         if self.zeroing.take_ignored() {
-            self.refusal = Some("the knob has not taken its new zero; try again".into());
-            if self.arming.is_wanted() {
-                self.refusal = Some("not armed: the knob has not taken its new zero; try again".into());
+            let is_wanted = self.arming.is_wanted();
+            let so = if is_wanted { "not armed: " } else { "" };
+            self.refusal = Some(format!("{so}the knob has not taken its new zero; try again"));
+            if is_wanted {
                 self.arming.disarm(now_us);
             }
         }
