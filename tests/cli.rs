@@ -1004,10 +1004,7 @@ fn one_after_another(keys: &[u8]) -> Vec<u8> {
         track.extend([0, 0x90, key, 90, if key < 50 { 0 } else { 0x60 }, 0x80, key, 0]);
     }
     track.extend([0, 0xff, 0x2f, 0]);
-    let mut file = b"MThd\0\0\0\x06\0\0\0\x01\0\x60MTrk".to_vec();
-    file.extend((track.len() as u32).to_be_bytes());
-    file.extend(track);
-    file
+    one_track(&[&track])
 }
 
 /// Written E flat 4 (key 61) has an alternate, D4 (60) none.
