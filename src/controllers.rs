@@ -1,9 +1,10 @@
 //! MIDI controllers that the user links to parameters: a hardware knob that turns *Growl*, a pedal that blows.
 //!
-//! `map` is their text, `factory` the devices that the program knows, `links` what the audio thread and the window share, `source_curves` the
-//! own curve of a source of breath. What a link does is the core's:
+//! `map` is their text, `factory` the devices that the program knows, `links` what the audio thread and the window share.
+//! `breath_input` names the inputs of breath, `source_curves` gives an input a curve of its own. What a link does is the core's:
 //! [`chalumeau_core::control::midi::links`].
 
+pub mod breath_input;
 pub mod factory;
 mod links;
 mod map;

@@ -46,9 +46,9 @@ pub use params::{BreathParams, ChalumeauParams, EmbouchureParams, KnobParams, No
 pub use params::{InstrumentParams, OutputParams, PhysicalReedParams, ReedParams};
 pub use params::{SCHEMA, TuningChoice, TuningParams};
 
+use crate::controllers::breath_input::BreathInput;
 use crate::identity;
 use crate::parameters::InUse;
-use breath_sources::BreathInput;
 use chalumeau_core::control::notes::Note;
 use chalumeau_core::event::Event;
 use chalumeau_core::instrument::{Channels, MOST_PLAYERS, Settings};

@@ -191,8 +191,5 @@ fn in_flags(refused: FeelRefused) -> Failure {
         }
         _ => return refused.into(),
     };
-    // After the first semicolon the library says what helps without the names of flags.
-    let text = refused.to_string();
-    let what = text.split(';').next().unwrap_or_default();
-    Failure::Usage(format!("{what}; {helps}"))
+    Failure::Usage(format!("{}; {helps}", refused.reason()))
 }

@@ -11,9 +11,10 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use serde::{Deserialize, Serialize};
 
 use chalumeau_core::control::midi::BreathOrigin;
-use chalumeau_core::control::midi::breath::BreathController;
 use chalumeau_core::instrument::player::response::dynamic;
 use chalumeau_core::instrument::{BreathResponse, Settings};
+
+use crate::controllers::breath_input::BreathInput;
 
 /// A source that may have a curve of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,21 +33,6 @@ impl CurveSource {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Breath, Self::Expression, Self::Pressure, Self::Note];
 
-    /// Its name in the window.
-    pub fn title(self) -> &'static str {
-        match self {
-            Self::Breath => "CC2 breath",
-            Self::Expression => "CC11 expression",
-            Self::Pressure => "Channel pressure",
-            Self::Note => "Note expression",
-        }
-    }
-
-    /// The source of that name in the window.
-    pub fn titled(title: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|source| source.title() == title)
-    }
-
     /// Its name in a saved state.
     fn id(self) -> &'static str {
         match self {
@@ -57,13 +43,14 @@ impl CurveSource {
         }
     }
 
-    fn of(origin: BreathOrigin) -> Option<Self> {
-        Some(match origin {
-            BreathOrigin::Controller(BreathController::Breath) => Self::Breath,
-            BreathOrigin::Controller(BreathController::Expression) => Self::Expression,
-            BreathOrigin::Controller(BreathController::Pressure) => Self::Pressure,
-            BreathOrigin::Note => Self::Note,
-            BreathOrigin::Link => return None,
+    /// That of an input; `None` if the input has no curve of its own here.
+    pub fn of(input: BreathInput) -> Option<Self> {
+        Some(match input {
+            BreathInput::Breath => Self::Breath,
+            BreathInput::Expression => Self::Expression,
+            BreathInput::Pressure => Self::Pressure,
+            BreathInput::Note => Self::Note,
+            _ => return None,
         })
     }
 }
@@ -127,7 +114,7 @@ pub struct CurvesNow {
 impl CurvesNow {
     /// The breath that a source sends, for the instrument. Real-time safe.
     pub fn breath(&self, origin: BreathOrigin, breath: f32) -> f32 {
-        let own = CurveSource::of(origin).and_then(|source| self.own[source as usize]);
+        let own = CurveSource::of(origin.into()).and_then(|source| self.own[source as usize]);
         own.map_or(breath, |own| own.as_common(breath, &self.settings))
     }
 }
@@ -207,6 +194,8 @@ impl SourceCurves {
 
 #[cfg(test)]
 mod tests {
+    use chalumeau_core::control::midi::breath::BreathController;
+
     use super::*;
 
     const CC2: BreathOrigin = BreathOrigin::Controller(BreathController::Breath);

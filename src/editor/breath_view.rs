@@ -5,6 +5,7 @@ mod linked_table;
 
 use egui::{Align2, CornerRadius, FontId, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
+use crate::controllers::breath_input::BreathInput;
 use crate::editor::breath_meter;
 use crate::editor::chart;
 use crate::editor::chart::Chart;
@@ -18,10 +19,10 @@ use chalumeau_core::instrument::BreathResponse;
 /// What the view remembers.
 #[derive(Clone, Debug, Default)]
 pub struct BreathView {
-    /// Least and greatest value of each source while the window was open, by name.
-    ranges: Vec<(String, f32, f32)>,
-    /// What each source has sent while it was live, by name.
-    histograms: Vec<(String, BreathHistogram)>,
+    /// Least and greatest value of each source while the window was open; `None` for those that sent none.
+    ranges: [Option<(f32, f32)>; BreathInput::ALL.len()],
+    /// What each source has sent while it was live.
+    histograms: [BreathHistogram; BreathInput::ALL.len()],
     /// Least and greatest breath since *Calibrate* was pressed; none while it is not on. Both are `None` until the player blows.
     calibration: Option<Option<(f32, f32)>>,
 }
@@ -43,12 +44,10 @@ impl BreathView {
     pub fn look(&mut self, sources: &[BreathSource]) {
         for source in sources.iter().filter(|source| source.is_seen) {
             let value = chart::share(source.value);
-            match self.ranges.iter_mut().find(|(name, ..)| *name == source.name) {
-                Some((_, low, high)) => (*low, *high) = (low.min(value), high.max(value)),
-                None => self.ranges.push((source.name.clone(), value, value)),
-            }
+            let range = &mut self.ranges[source.input as usize];
+            *range = Some(range.map_or((value, value), |(low, high)| (low.min(value), high.max(value))));
             if source.is_live {
-                self.histogram(&source.name).look(value);
+                self.histograms[source.input as usize].look(value);
                 if let Some(range) = self.calibration.as_mut().filter(|_| value > 0.0) {
                     let (low, high) = range.unwrap_or((value, value));
                     *range = Some((low.min(value), high.max(value)));
@@ -57,23 +56,13 @@ impl BreathView {
         }
     }
 
-    fn histogram(&mut self, source: &str) -> &mut BreathHistogram {
-        let known = self.histograms.iter().position(|(name, _)| name == source);
-        let at = known.unwrap_or_else(|| {
-            self.histograms.push((source.to_owned(), BreathHistogram::default()));
-            self.histograms.len() - 1
-        });
-        &mut self.histograms[at].1
-    }
-
     fn column(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
         heading(ui, "Breath sources");
         choice(ui, hands, "bfrom");
         let mut has_knob = false;
         for source in &snapshot.sources {
-            let range = self.ranges.iter().find(|(name, ..)| *name == source.name);
-            meter_of(ui, source, range.map(|&(_, low, high)| (low, high)));
-            if source.name == BreathSource::KNOB {
+            meter_of(ui, source, self.ranges[source.input as usize]);
+            if source.input == BreathInput::Knob {
                 has_knob = true;
                 calibrate(ui, hands);
             }
@@ -137,7 +126,8 @@ const LEAST_RANGE: f32 = 0.1;
 impl BreathView {
     /// A button that watches the breath, and then takes its softest and its loudest as the ends of the curve.
     fn calibrate_breath(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
-        let is_keys = snapshot.sources.iter().any(|source| source.is_live && source.is_velocity());
+        let is_keys =
+            snapshot.sources.iter().any(|source| source.is_live && source.input == BreathInput::Keys);
         let (name, word) = match self.calibration {
             None if is_keys => {
                 ("Calibrate", "Move a breath source first: the keys' velocity needs no calibration.")
@@ -188,10 +178,12 @@ impl BreathView {
             ui.set_width(ui.available_width());
             if is_played {
                 ui.set_height((0.5 * height - 24.0).clamp(120.0, 320.0));
-                let live = snapshot.sources.iter().find(|source| source.is_live && !source.is_velocity());
-                let histogram =
-                    self.histogram(live.map_or(BreathSource::KEYS, |source| &source.name)).clone();
-                breath_curve::draw(ui, hands, snapshot, &histogram, live);
+                let live = snapshot
+                    .sources
+                    .iter()
+                    .find(|source| source.is_live && source.input != BreathInput::Keys);
+                let input = live.map_or(BreathInput::Keys, |source| source.input);
+                breath_curve::draw(ui, hands, snapshot, &self.histograms[input as usize], live);
             } else {
                 ui.set_height((0.42 * height - 24.0).clamp(96.0, 230.0));
                 gauge(ui, snapshot);
@@ -338,7 +330,7 @@ fn meter_of(ui: &mut Ui, source: &BreathSource, range: Option<(f32, f32)>) {
         painter.circle_stroke(dot, 3.5, Stroke::new(1.0, c.quiet));
     }
     let at = pos2(rect.left() + 15.0, rect.top() + 8.0);
-    painter.text(at, Align2::LEFT_CENTER, &source.name, theme::body(), ink);
+    painter.text(at, Align2::LEFT_CENTER, source.input.title(), theme::body(), ink);
     let value = chart::share(source.value);
     let state = if source.is_seen { format!("{:.0} %", 100.0 * value) } else { "not seen".to_owned() };
     // Beside the longest name there is no room for words in a narrow column.
@@ -361,7 +353,7 @@ fn meter_of(ui: &mut Ui, source: &BreathSource, range: Option<(f32, f32)>) {
         format!(", from {:.0} to {:.0} %", 100.0 * low, 100.0 * high)
     });
     response.widget_info(|| {
-        WidgetInfo::labeled(Role::Meter, true, format!("{}: {state}{went}{blows}", source.name))
+        WidgetInfo::labeled(Role::Meter, true, format!("{}: {state}{went}{blows}", source.input.title()))
     });
     response.on_hover_ui(|ui| {
         ui.set_max_width(280.0);
@@ -386,12 +378,14 @@ mod tests {
     #[test]
     fn a_source_is_known_by_the_range_it_went_through() {
         let mut view = BreathView::default();
-        let say = |value, is_seen| [BreathSource { name: "CC2".into(), value, is_live: false, is_seen }];
+        let say =
+            |value, is_seen| [BreathSource { input: BreathInput::Breath, value, is_live: false, is_seen }];
         view.look(&say(0.0, false));
-        assert_eq!(view.ranges, []);
+        assert_eq!(view.ranges, [None; BreathInput::ALL.len()]);
         for value in [0.4, 0.1, 0.7, f32::NAN, 9.0] {
             view.look(&say(value, true));
         }
-        assert_eq!(view.ranges, [("CC2".to_owned(), 0.0, 1.0)]);
+        assert_eq!(view.ranges[BreathInput::Breath as usize], Some((0.0, 1.0)));
+        assert_eq!(view.ranges.iter().flatten().count(), 1);
     }
 }

@@ -33,7 +33,7 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot, is_wide: bool) {
     let narrow = usize::from(!is_wide);
     meter(ui, snapshot.output_peak, METER[narrow], is_wide);
     let source = snapshot.sources.iter().find(|source| source.is_live);
-    let source = source.map_or_else(|| "keys".to_owned(), |source| source.name.clone());
+    let source = source.map_or("keys", |source| source.input.title());
     let blows = snapshot.mouth_kpa > NO_BREATH_KPA;
     let about = format!("Lit while the player blows. Breath comes from: {source}");
     let word = |word| if is_wide { word } else { "" };

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::controllers::breath_input::BreathInput;
 use crate::editor::fingering_search::FingeringSearch;
 use crate::editor::sound_analysis::SoundAnalysis;
 use crate::folder_listing::FolderListing;
@@ -232,26 +233,14 @@ pub struct PressureMarks {
 /// A source of breath.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BreathSource {
-    /// As players call it: "CC2 breath", "Knob".
-    pub name: String,
+    /// Which it is.
+    pub input: BreathInput,
     /// Its value, 0..=1.
     pub value: f32,
     /// It sets the breath.
     pub is_live: bool,
     /// It has sent a value since the start.
     pub is_seen: bool,
-}
-
-impl BreathSource {
-    /// Name of the one that can be calibrated.
-    pub const KNOB: &'static str = "Knob";
-    /// Name of the one that no breath source is: it is in use until one moves.
-    pub const KEYS: &'static str = "Keys, by velocity";
-
-    /// Whether it is the keys.
-    pub fn is_velocity(&self) -> bool {
-        self.name == Self::KEYS
-    }
 }
 
 /// Values at equal steps of time, oldest first.

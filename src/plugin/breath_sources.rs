@@ -3,88 +3,7 @@
 
 use nice_plug::prelude::NoteEvent;
 
-use crate::controllers::source_curves::CurveSource;
-use crate::editor::snapshot::BreathSource;
-use chalumeau_core::control::midi::BreathOrigin;
-use chalumeau_core::control::midi::breath::BreathController;
-
-/// An input that breath can come from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BreathInput {
-    /// Velocity of the keys, until another input moves.
-    Keys,
-    /// The parameter *Breath*, which hosts automate.
-    Parameter,
-    /// Breath controller, CC2.
-    Breath,
-    /// Expression, CC11.
-    Expression,
-    /// Channel pressure.
-    Pressure,
-    /// Pressure or expression of a note.
-    Note,
-    /// The knob's angle.
-    Knob,
-    /// A controller that the user has linked to the breath.
-    Link,
-    /// Wind at a microphone.
-    Microphone,
-}
-
-impl BreathInput {
-    /// All inputs, in the order the window shows them.
-    pub const ALL: [Self; 9] = [
-        Self::Keys,
-        Self::Parameter,
-        Self::Breath,
-        Self::Expression,
-        Self::Pressure,
-        Self::Note,
-        Self::Knob,
-        Self::Link,
-        Self::Microphone,
-    ];
-
-    /// Its name in the window.
-    pub fn title(self) -> &'static str {
-        match self {
-            Self::Keys => BreathSource::KEYS,
-            Self::Parameter => "Breath parameter",
-            Self::Breath => CurveSource::Breath.title(),
-            Self::Expression => CurveSource::Expression.title(),
-            Self::Pressure => CurveSource::Pressure.title(),
-            Self::Note => CurveSource::Note.title(),
-            Self::Knob => BreathSource::KNOB,
-            Self::Link => "Linked controller",
-            Self::Microphone => "Microphone",
-        }
-    }
-
-    /// The input of a host's event, and its value.
-    fn of<S>(event: &NoteEvent<S>) -> Option<(Self, f32)> {
-        Some(match *event {
-            NoteEvent::NoteOn { velocity, .. } => (Self::Keys, velocity),
-            NoteEvent::MidiCC { cc: 2, value, .. } => (Self::Breath, value),
-            NoteEvent::MidiCC { cc: 11, value, .. } => (Self::Expression, value),
-            NoteEvent::MidiChannelPressure { pressure, .. } => (Self::Pressure, pressure),
-            NoteEvent::PolyPressure { pressure: value, .. }
-            | NoteEvent::PolyExpression { expression: value, .. } => (Self::Note, value),
-            _ => return None,
-        })
-    }
-}
-
-impl From<BreathOrigin> for BreathInput {
-    fn from(origin: BreathOrigin) -> Self {
-        match origin {
-            BreathOrigin::Controller(BreathController::Breath) => Self::Breath,
-            BreathOrigin::Controller(BreathController::Expression) => Self::Expression,
-            BreathOrigin::Controller(BreathController::Pressure) => Self::Pressure,
-            BreathOrigin::Note => Self::Note,
-            BreathOrigin::Link => Self::Link,
-        }
-    }
-}
+use crate::controllers::breath_input::BreathInput;
 
 /// The latest value of each input, and the input that blows now. Real-time safe.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -104,7 +23,7 @@ impl BreathSources {
     /// Records a host's event. Whether it is breath the decoder says.
     pub fn record<S>(&mut self, event: &NoteEvent<S>) {
         self.messages = self.messages.wrapping_add(1);
-        match BreathInput::of(event) {
+        match input_of(event) {
             Some((BreathInput::Keys, velocity)) => self.key(velocity),
             Some((input, value)) => self.set(input, value),
             None => {}
@@ -143,8 +62,24 @@ impl BreathSources {
     }
 }
 
+/// The input of a host's event, and its value.
+fn input_of<S>(event: &NoteEvent<S>) -> Option<(BreathInput, f32)> {
+    Some(match *event {
+        NoteEvent::NoteOn { velocity, .. } => (BreathInput::Keys, velocity),
+        NoteEvent::MidiCC { cc: 2, value, .. } => (BreathInput::Breath, value),
+        NoteEvent::MidiCC { cc: 11, value, .. } => (BreathInput::Expression, value),
+        NoteEvent::MidiChannelPressure { pressure, .. } => (BreathInput::Pressure, pressure),
+        NoteEvent::PolyPressure { pressure: value, .. }
+        | NoteEvent::PolyExpression { expression: value, .. } => (BreathInput::Note, value),
+        _ => return None,
+    })
+}
+
 #[cfg(test)]
 mod tests {
+    use chalumeau_core::control::midi::BreathOrigin;
+    use chalumeau_core::control::midi::breath::BreathController;
+
     use super::*;
 
     fn controller(cc: u8, value: f32) -> NoteEvent<()> {
@@ -171,12 +106,5 @@ mod tests {
         sources.record(&controller(1, 1.0));
         sources.key(0.9);
         assert!(sources.is_live(BreathInput::Knob));
-    }
-
-    #[test]
-    fn each_input_is_shown_once() {
-        for (place, input) in BreathInput::ALL.into_iter().enumerate() {
-            assert_eq!(input as usize, place);
-        }
     }
 }

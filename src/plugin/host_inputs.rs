@@ -2,12 +2,13 @@
 
 use nice_plug::prelude::*;
 
-use super::breath_sources::{BreathInput, BreathSources};
+use super::breath_sources::BreathSources;
 use super::params::knob::ReedSource;
 use super::part_reeds::PartReeds;
 use super::reed_controllers::ReedControllers;
 use super::translate_events::{EventTranslator, raw7, untangled};
 use crate::controllers::ControllerLinks;
+use crate::controllers::breath_input::BreathInput;
 use crate::controllers::source_curves::CurvesNow;
 use chalumeau_core::control::key_switches::KeySwitches;
 use chalumeau_core::control::midi::breath::BreathFrom;
@@ -143,7 +144,8 @@ impl HostInputs {
         &mut self.breath_sources
     }
 
-    /// The factors that controllers and notes put on H and k of the first player.
+    /// The factors that controllers and notes put on H and k of the first player, which the knob feels.
+    #[cfg(any(feature = "devices", test))]
     pub fn reed_factors(&self, drives: [ReedSource; 2]) -> [f32; 2] {
         self.reeds.factors(drives)
     }
@@ -296,7 +298,6 @@ mod tests {
     use super::*;
     use crate::controllers::ParameterLink;
     use crate::controllers::source_curves::{CurveSource, SourceCurve, SourceCurves};
-    use crate::plugin::breath_sources::BreathInput;
     use chalumeau_core::units::SoundingNote;
 
     const NO_REED: [ReedSource; 2] = [ReedSource::Parameter; 2];

@@ -46,6 +46,7 @@ impl Target {
 
 impl PartReeds {
     /// The factors on H and k of the first part.
+    #[cfg(any(feature = "devices", test))]
     pub fn factors(&self, drives: [ReedSource; 2]) -> [f32; 2] {
         self.parts[0].factors(drives)
     }

@@ -6,8 +6,8 @@
 //! - The *snapshot* thread makes a [`Snapshot`] of this data, the instrument and the knob. All slow work happens there.
 //! - The *main* thread draws the latest snapshot. While nothing moves, it draws less than five times a second.
 
-#[cfg(feature = "devices")]
 mod breath_history;
+#[cfg(feature = "devices")]
 mod device_list;
 mod editor_app;
 mod file_tasks;

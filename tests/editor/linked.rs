@@ -1,6 +1,7 @@
 //! Controllers that the user links: learnt from a menu, listed, changed and forgotten.
 
 use chalumeau::controllers::ParameterLink;
+use chalumeau::controllers::breath_input::BreathInput;
 use chalumeau::controllers::source_curves::{CurveSource, SourceCurve};
 use chalumeau::editor::Tab;
 use chalumeau::editor::controls::Controls;
@@ -96,7 +97,7 @@ fn a_row_of_the_table_forgets_its_own_link() {
 fn blown_by_expression() -> Window {
     let mut window = Window::tall(Tab::Breath);
     for source in &mut window.snapshot.borrow_mut().sources {
-        source.is_live = source.name == CurveSource::Expression.title();
+        source.is_live = source.input == BreathInput::Expression;
     }
     window.harness.run();
     window

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use chalumeau::controllers::source_curves::CurveSource;
+use chalumeau::controllers::breath_input::BreathInput;
 use chalumeau::editor::note_names::NoteNames;
 use chalumeau::editor::{Action, FeelTest, Tab};
 use chalumeau_core::units::SoundingNote;
@@ -218,7 +218,7 @@ fn pictures_of_pages() {
     save(&mut window, "trying");
     let mut window = Window::new(Tab::Breath, (1100.0, 720.0));
     for source in &mut window.snapshot.borrow_mut().sources {
-        source.is_live = source.name == CurveSource::Expression.title();
+        source.is_live = source.input == BreathInput::Expression;
     }
     window.host.automate("keysw", 0.5);
     window.harness.run();

@@ -8,6 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use chalumeau::controllers::ControllerLinks;
+use chalumeau::controllers::breath_input::BreathInput;
 use chalumeau::controllers::source_curves::SourceCurves;
 use chalumeau::editor::controls::{Controls, Look, Mark};
 use chalumeau::editor::snapshot::{
@@ -310,20 +311,15 @@ fn swell(t: f64, gamma: f64) -> f64 {
 
 /// Every source of breath; the knob is the one that blows.
 fn breath_sources(knob: f32) -> Vec<BreathSource> {
-    let source = |name: &str, value: f32, is_live, is_seen| BreathSource {
-        name: name.into(),
-        value,
-        is_live,
-        is_seen,
-    };
+    let source = |input, value, is_live, is_seen| BreathSource { input, value, is_live, is_seen };
     vec![
-        source("Keys, by velocity", 0.8, false, true),
-        source("Breath parameter", 0.0, false, false),
-        source("CC2 breath", 0.0, false, false),
-        source("CC11 expression", 0.62, false, true),
-        source("Channel pressure", 0.0, false, false),
-        source("Note expression", 0.0, false, false),
-        source("Knob", knob, true, true),
+        source(BreathInput::Keys, 0.8, false, true),
+        source(BreathInput::Parameter, 0.0, false, false),
+        source(BreathInput::Breath, 0.0, false, false),
+        source(BreathInput::Expression, 0.62, false, true),
+        source(BreathInput::Pressure, 0.0, false, false),
+        source(BreathInput::Note, 0.0, false, false),
+        source(BreathInput::Knob, knob, true, true),
     ]
 }
 
@@ -517,9 +513,9 @@ pub fn shot(harness: &mut Harness<'_, EditorState>, scale: f32) -> image::RgbaIm
 fn blown_by_a_controller(snapshot: &mut Snapshot) {
     let breath = snapshot.sources.iter().find(|source| source.is_live).map_or(0.0, |source| source.value);
     for source in &mut snapshot.sources {
-        match source.name.as_str() {
-            "CC2 breath" => (source.value, source.is_live, source.is_seen) = (breath, true, true),
-            BreathSource::KNOB => (source.value, source.is_live, source.is_seen) = (0.0, false, false),
+        match source.input {
+            BreathInput::Breath => (source.value, source.is_live, source.is_seen) = (breath, true, true),
+            BreathInput::Knob => (source.value, source.is_live, source.is_seen) = (0.0, false, false),
             _ => {}
         }
     }

@@ -55,6 +55,9 @@ const STEPS: &[Step] = &[
     ("clippy, command line alone", || {
         cargo("clippy -p chalumeau --no-default-features --features cli --all-targets -- -D warnings")
     }),
+    ("clippy, plugin alone", || {
+        cargo("clippy -p chalumeau --no-default-features --features plugin -- -D warnings")
+    }),
     ("tests and programs build", || programs().map(drop)),
     ("tests", tests),
     ("examples in documentation", || cargo("test --workspace --all-features --doc")),

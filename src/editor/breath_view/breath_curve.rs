@@ -3,6 +3,7 @@
 
 use egui::{Align2, CornerRadius, Rect, Response, RichText, Sense, Stroke, Ui, pos2, vec2};
 
+use crate::controllers::breath_input::BreathInput;
 use crate::controllers::source_curves::{CurveSource, SourceCurve};
 use crate::editor::chart;
 use crate::editor::controls::{Hands, handle, teach};
@@ -55,6 +56,7 @@ impl BreathHistogram {
 /// The source that blows, if it may have its own curve here, and that curve.
 #[derive(Clone, Copy, Debug)]
 pub struct OfSource {
+    input: BreathInput,
     source: CurveSource,
     own: Option<SourceCurve>,
 }
@@ -64,8 +66,8 @@ impl OfSource {
     pub fn live(hands: &Hands, snapshot: &Snapshot) -> Option<Self> {
         let curves = hands.controls.curves()?;
         let live = snapshot.sources.iter().find(|source| source.is_live)?;
-        let source = CurveSource::titled(&live.name)?;
-        Some(Self { source, own: curves.get(source) })
+        let source = CurveSource::of(live.input)?;
+        Some(Self { input: live.input, source, own: curves.get(source) })
     }
 
     /// Whether it has its own curve.
@@ -75,7 +77,7 @@ impl OfSource {
 
     /// Its name.
     pub fn title(&self) -> &'static str {
-        self.source.title()
+        self.input.title()
     }
 
     /// Changes its own curve; whether it has one.

@@ -101,7 +101,7 @@ pub fn draw(ui: &mut Ui, snapshot: &Snapshot) {
         }
     }
     let source =
-        snapshot.sources.iter().find(|source| source.is_live).map_or("Breath", |source| &*source.name);
+        snapshot.sources.iter().find(|source| source.is_live).map_or("Breath", |source| source.input.title());
     let at = pos2(rect.left() + 10.0, rect.bottom() - 4.0);
     let name = painter.layout(source.to_owned(), theme::small(), c.quiet, rect.width() - 10.0);
     painter.galley(at - vec2(0.0, name.size().y), name, c.quiet);

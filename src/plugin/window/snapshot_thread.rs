@@ -14,6 +14,7 @@ use super::file_tasks::FilesRead;
 use super::fingering_searcher::FingeringSearcher;
 use super::instrument_analysis::InstrumentAnalysis;
 use super::window_audio::AudioSnapshot;
+use crate::controllers::breath_input::BreathInput;
 #[cfg(feature = "devices")]
 use crate::editor::Tab;
 use crate::editor::fingering_search::FingeringSearch;
@@ -22,7 +23,7 @@ use crate::editor::snapshot::{BreathSource, MouthpieceTraces, Severity, Snapshot
 use crate::editor::snapshot::{KnobDevice, KnobState};
 use crate::editor::sound_analysis::{FLOOR_DB, SoundAnalyser, SoundAnalysis, WINDOW};
 use crate::plugin::SharedHandles;
-use crate::plugin::breath_sources::{BreathInput, BreathSources};
+use crate::plugin::breath_sources::BreathSources;
 use crate::plugin::instrument_loading::{CurrentInstrument, Readiness};
 #[cfg(feature = "devices")]
 use crate::plugin::knob;
@@ -316,12 +317,7 @@ fn source_views(sources: &BreathSources, is_held: bool) -> Vec<BreathSource> {
         let latest = sources.value(input);
         // Velocity makes breath only while a key is down.
         let value = latest.filter(|_| input != BreathInput::Keys || is_held).unwrap_or(0.0);
-        BreathSource {
-            name: input.title().to_owned(),
-            value,
-            is_live: sources.is_live(input),
-            is_seen: latest.is_some(),
-        }
+        BreathSource { input, value, is_live: sources.is_live(input), is_seen: latest.is_some() }
     };
     BreathInput::ALL.map(view).into()
 }
