@@ -3,7 +3,11 @@
 use crate::cli::Failure;
 use crate::cli::csv_table::{TableArgs, quoted};
 use crate::controllers::{ControllerMap, factory};
+use crate::parameters::Value;
 use crate::presets::nearest;
+use chalumeau_core::control::midi::MidiDecoder;
+use chalumeau_core::control::midi::breath::BreathFrom;
+use chalumeau_core::control::midi::techniques::Wheel;
 use clap::{Args, Subcommand};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -76,5 +80,36 @@ fn find(name: &str) -> Result<&'static ControllerMap, String> {
         let meant = nearest(name, factory::all().iter().map(|map| map.name.as_str()));
         let meant = meant.map_or_else(String::new, |near| format!("did you mean {near:?}? "));
         format!("no controllers are called {name:?}; {meant}`chalumeau controllers list` lists them; a file ends in .toml")
+    })
+}
+
+/// Values of a map that the decoder of MIDI takes, and no instrument.
+const OF_THE_DECODER: [&str; 3] = ["wheel", "bfrom", "bendr"];
+
+/// Sets what a map says of the wheel, of the controller that blows, and of the bend range. Nothing sounds yet, so this bends nothing.
+pub fn set_by_map(decoder: &mut MidiDecoder, map: &ControllerMap) {
+    for &(parameter, value) in &map.values {
+        match (parameter.id, value) {
+            ("wheel", Value::Choice(at)) => {
+                decoder.set_wheel(Wheel::ALL.get(at).copied().unwrap_or_default());
+            }
+            ("bfrom", Value::Choice(at)) => {
+                decoder.set_breath_from(BreathFrom::ALL.get(at).copied().unwrap_or_default());
+            }
+            ("bendr", Value::Whole(semitones)) => {
+                decoder.usual_bend_range(semitones.clamp(0, 127) as u8);
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Says which values of a map have no effect offline.
+pub fn only_in_the_plugin(map: &ControllerMap) -> Option<String> {
+    let ids = map.values.iter().map(|(parameter, _)| *parameter);
+    let idle = ids.filter(|of| of.sets.is_none() && !OF_THE_DECODER.contains(&of.id));
+    let names: Vec<_> = idle.map(|of| format!("{} ({})", of.name, of.id)).collect();
+    (!names.is_empty()).then(|| {
+        format!("--controllers sets {}, which only the plugin has: no effect here", names.join(", "))
     })
 }

@@ -1,30 +1,29 @@
 //! Arguments for what is played: a MIDI file, a note or a scale, and its breath. `render` and `report` share them.
 
+mod breath_args;
+mod given;
+
 use crate::cli::Failure;
-use crate::cli::controllers::{GivenMap, named_or_file};
+use crate::cli::controllers::{GivenMap, named_or_file, only_in_the_plugin, set_by_map};
 use crate::cli::feel_args::FeelArgs;
 use crate::cli::files::MaybeFile;
 use crate::cli::render_job::RenderJob;
 use crate::cli::settings::SettingsArgs;
-use crate::cli::shared_args::{PlayedArgs, check_fingering, dynamics, note, rate, sounding, within};
+use crate::cli::shared_args::{PlayedArgs, check_fingering, note, rate, sounding, within};
 use crate::cli::silent_keys::silent_notes;
 use crate::cli::threshold::linear_threshold;
 use crate::controllers::{ControllerMap, as_links};
-use crate::parameters::Value;
 use crate::presets::{self, Preset};
 use crate::scale_file;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::control::midi::MidiDecoder;
-use chalumeau_core::control::midi::breath::BreathFrom;
-use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::control::parts::Parts;
-use chalumeau_core::event::{Event, PartEvent, Timed};
+use chalumeau_core::event::{PartEvent, Timed};
 use chalumeau_core::haptics::FeelDesign;
 use chalumeau_core::instrument::{BreathResponse, KeyPitches, Model, Players, Settings, Split};
 use chalumeau_core::score::Score;
 use chalumeau_core::score::breath::BreathCurve;
-use chalumeau_core::score::breath::GAMMA_MAX;
 use chalumeau_core::score::midi_file;
 use chalumeau_core::units::{SoundingNote, WrittenNote};
 use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, BreathMapping};
@@ -36,40 +35,19 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use breath_args::BreathArgs;
+use given::score_of;
+pub use given::{Given, TimedNote};
+
 /// A reed with inertia begins up to a fifth below the threshold of one without (`chalumeau threshold --help`).
 const INERTIA_LEAST: f64 = 0.8;
 /// Gamma at which every note of a clarinet has begun, also under a firm lip (`chalumeau threshold --zeta 0.15`: 0.54 at most, less a fifth).
 const ALL_BEGIN: f64 = 0.5;
 
-/// Gamma where nothing else is said: a full, easy tone.
-const GAMMA_DEFAULT: f32 = 0.5;
-
-/// What a caller that is a program has in memory.
-pub enum Given {
-    /// A standard MIDI file.
-    Midi(Vec<u8>),
-    /// Notes, to be played at any rate.
-    Notes(Vec<TimedNote>),
-}
-
-/// A note and when it sounds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TimedNote {
-    /// When it begins, s, at least 0.
-    pub from_s: f64,
-    /// How long it is held, s, at least 0.
-    pub seconds: f64,
-    /// Its sounding pitch.
-    pub note: SoundingNote,
-    /// Velocity, 0..=1.
-    pub velocity: f32,
-}
-
 /// What to play, on what, and how.
 #[derive(Args)]
 #[command(group = ArgGroup::new("what").required(true).args(["midi", "written", "sounding", "scale"]))]
 #[command(group = ArgGroup::new("note").args(["written", "sounding", "scale"]))]
-#[command(group = ArgGroup::new("blown").args(["dynamic", "gamma", "breath", "crescendo", "replay"]))]
 pub struct ScoreArgs {
     /// Standard MIDI file, format 0 or 1
     #[arg(value_name = "MIDI")]
@@ -105,25 +83,8 @@ pub struct ScoreArgs {
     #[arg(long, value_name = "S", value_parser = |s: &str| within(s, 0.0, 60.0))]
     tail: Option<f64>,
 
-    /// How loud, as a player plays: pp, p, mp, mf, f, ff or a number in 0..1; or two with a colon, for example pp:ff, from the
-    /// one to the other over the whole length
-    #[arg(long, value_name = "D|FROM:TO", help_heading = "Breath (replaces that of a MIDI file)", value_parser = dynamics)]
-    dynamic: Option<(f64, f64)>,
-    /// Constant mouth pressure over closing pressure, 0..3 [default: 0.5 unless a MIDI file plays]
-    #[arg(long, value_name = "G", help_heading = "Breath (replaces that of a MIDI file)", value_parser = |s: &str| within(s, 0.0, f64::from(GAMMA_MAX)))]
-    gamma: Option<f64>,
-    /// Mouth pressure over closing pressure over time: a CSV file t_s,gamma, or ramp:FROM:TO:SECONDS, then held, or one number.
-    /// With --breath-response played the numbers are shares of full breath, 0..1
-    #[arg(long, value_name = "FILE|RAMP|G", help_heading = "Breath (replaces that of a MIDI file)")]
-    breath: Option<String>,
-    /// Mouth pressure from one gamma to another over the whole length, for example 0.4:0.9; or shares of full breath, as
-    /// with --breath
-    #[arg(long, value_name = "FROM:TO", help_heading = "Breath (replaces that of a MIDI file)")]
-    crescendo: Option<String>,
-    /// Breath from a recorded take: a CSV file with t_us and angle_deg, from the plugin or `chalumeau knob`. Each note turns
-    /// the angle into its own pressure
-    #[arg(long, value_name = "FILE", help_heading = "Breath (replaces that of a MIDI file)")]
-    replay: Option<PathBuf>,
+    #[command(flatten)]
+    breath: BreathArgs,
     /// Sample rate, Hz, 1000..1536000
     #[arg(long, alias = "sr", value_name = "HZ", default_value = "48000", help_heading = "Output", value_parser = rate)]
     rate: u32,
@@ -191,7 +152,7 @@ impl ScoreArgs {
 
     fn plan(&self) -> Result<Planned, Failure> {
         let file = self.instrument.load_for(self.preset.as_ref())?;
-        let mut curve = self.curve()?;
+        let mut curve = self.breath.curve(self.midi.is_some())?;
         let map = self.controllers.clone().unwrap_or_default().map;
         let mut base = self.preset.as_ref().map(Preset::settings);
         if !map.values.is_empty() {
@@ -202,7 +163,9 @@ impl ScoreArgs {
         }
         let mut settings = match (&curve, &base) {
             (Some(curve), base) => self.settings.blown_in_either(base.as_ref(), curve, &file)?,
-            (None, base) if self.dynamic.is_some() => self.settings.with_dynamics(base.as_ref(), &file)?,
+            (None, base) if self.breath.dynamic.is_some() => {
+                self.settings.with_dynamics(base.as_ref(), &file)?
+            }
             (None, Some(base)) => self.settings.over_preset(base, &file)?,
             (None, None) => self.settings.played(&file)?,
         };
@@ -212,7 +175,7 @@ impl ScoreArgs {
             )));
         }
         let mut warnings: Vec<_> = only_in_the_plugin(&map).into_iter().collect();
-        if let Some((from, to)) = self.dynamic {
+        if let Some((from, to)) = self.breath.dynamic {
             curve = Some(BreathCurve::dynamics(from, to, &settings));
         }
         warnings.extend(self.scale.and_then(|ends| left_out_of_scale(ends, &file)));
@@ -222,7 +185,7 @@ impl ScoreArgs {
             parts = parts.blown(curve, &settings, self.rate);
         }
         let keys = self.scl.as_ref().map(|scl| scale_file::read(scl, self.kbm.as_deref())).transpose()?;
-        let take = self.replay.as_deref().map(read_take).transpose()?;
+        let take = self.breath.take()?;
         Ok(Planned { file, settings, parts, keys, trims, take, warnings })
     }
 
@@ -252,7 +215,7 @@ impl ScoreArgs {
     /// Refuses flags of the knob's feel where no take is replayed: they would do nothing.
     pub fn refuse_idle_feel(&self) -> Result<(), Failure> {
         match self.feel.given() {
-            Some(flag) if self.replay.is_none() => Err(Failure::Usage(format!(
+            Some(flag) if self.breath.replay.is_none() => Err(Failure::Usage(format!(
                 "{flag} is of the knob whose take is replayed; add --replay, or leave it out"
             ))),
             _ => Ok(()),
@@ -262,15 +225,15 @@ impl ScoreArgs {
     /// The files that are read.
     pub fn read_files(&self) -> Vec<MaybeFile<'_>> {
         let controllers = self.controllers.as_ref().and_then(|map| map.path.as_deref());
-        let breath = self.breath.as_deref().map(Path::new);
-        let files = [&self.midi, &self.replay, &self.scl, &self.kbm].map(Option::as_deref);
-        files.into_iter().chain([breath, controllers, self.instrument.instrument.file()]).collect()
+        let files = [&self.midi, &self.scl, &self.kbm].map(Option::as_deref);
+        let own = files.into_iter().chain(self.breath.read_files());
+        own.chain([controllers, self.instrument.instrument.file()]).collect()
     }
 
     /// Says which notes of the command line begin above all that a curve of gamma reaches. Takes some 30 ms for each note, so a batch
     /// does not ask.
     pub fn too_little_breath(&self) -> Option<String> {
-        let curve = self.curve().ok()??;
+        let curve = self.breath.curve(self.midi.is_some()).ok()??;
         let reaches = f64::from(curve.gamma_max());
         if reaches >= ALL_BEGIN {
             return None;
@@ -356,52 +319,6 @@ impl ScoreArgs {
         )
         .collect();
         Ok(events)
-    }
-
-    fn curve(&self) -> Result<Option<BreathCurve>, Failure> {
-        if self.replay.is_some() || self.dynamic.is_some() {
-            return Ok(None);
-        }
-        if let Some(text) = &self.crescendo {
-            return Ok(Some(BreathCurve::parse_crescendo(text)?));
-        }
-        if let Some(gamma) = self.gamma {
-            return Ok(Some(BreathCurve::constant(gamma as f32)));
-        }
-        let Some(text) = &self.breath else {
-            return Ok(self.midi.is_none().then(|| BreathCurve::constant(GAMMA_DEFAULT)));
-        };
-        if text.trim().is_empty() {
-            let right = "give a number, ramp:FROM:TO:SECONDS or a CSV file";
-            return Err(Failure::Usage(format!("--breath is empty; {right}")));
-        }
-        if text.parse::<f32>().is_ok() {
-            let gamma = within(text, 0.0, f64::from(GAMMA_MAX));
-            let gamma = gamma.map_err(|wrong| Failure::Usage(format!("--breath {text}: {wrong}")))?;
-            return Ok(Some(BreathCurve::constant(gamma as f32)));
-        }
-        if text.starts_with("ramp:") {
-            // What is too large for single precision is told as it was typed.
-            let is_too_large = |field: &&str| {
-                let number = field.trim().parse::<f64>();
-                number.is_ok_and(|number| number.is_finite() && (number as f32).is_infinite())
-            };
-            if let Some(field) = text.split(':').skip(1).take(2).find(is_too_large) {
-                return Err(Failure::Usage(format!(
-                    "--breath {text}: gamma must lie in 0..{GAMMA_MAX}, got {field}"
-                )));
-            }
-            return Ok(Some(BreathCurve::parse_ramp(text)?));
-        }
-        if dynamics(text).is_ok() {
-            return Err(Failure::Usage(format!("--breath {text}: for a dynamic give --dynamic {text}")));
-        }
-        let path = PathBuf::from(text);
-        let from = fs::File::open(&path).map_err(|source| Failure::Read { path: path.clone(), source })?;
-        match BreathCurve::read_csv(from) {
-            Ok(curve) => Ok(Some(curve)),
-            Err(source) => Err(Failure::BreathFile { path, source }),
-        }
     }
 
     fn score(
@@ -499,67 +416,6 @@ fn left_out_of_scale(ends: (u8, u8), file: &InstrumentFile) -> Option<String> {
     let names: Vec<_> = missing.iter().map(WrittenNote::to_string).collect();
     (!names.is_empty())
         .then(|| format!("this instrument has no {}; the scale leaves them out", names.join(" ")))
-}
-
-/// Values of a map that the decoder of MIDI takes, and no instrument.
-const OF_THE_DECODER: [&str; 3] = ["wheel", "bfrom", "bendr"];
-
-/// Sets what a map says of the wheel, of the controller that blows, and of the bend range. Nothing sounds yet, so this bends nothing.
-fn set_by_map(decoder: &mut MidiDecoder, map: &ControllerMap) {
-    for &(parameter, value) in &map.values {
-        match (parameter.id, value) {
-            ("wheel", Value::Choice(at)) => {
-                decoder.set_wheel(Wheel::ALL.get(at).copied().unwrap_or_default());
-            }
-            ("bfrom", Value::Choice(at)) => {
-                decoder.set_breath_from(BreathFrom::ALL.get(at).copied().unwrap_or_default());
-            }
-            ("bendr", Value::Whole(semitones)) => {
-                decoder.usual_bend_range(semitones.clamp(0, 127) as u8);
-            }
-            _ => {}
-        }
-    }
-}
-
-/// Says which values of a map have no effect offline.
-fn only_in_the_plugin(map: &ControllerMap) -> Option<String> {
-    let ids = map.values.iter().map(|(parameter, _)| *parameter);
-    let idle = ids.filter(|of| of.sets.is_none() && !OF_THE_DECODER.contains(&of.id));
-    let names: Vec<_> = idle.map(|of| format!("{} ({})", of.name, of.id)).collect();
-    (!names.is_empty()).then(|| {
-        format!("--controllers sets {}, which only the plugin has: no effect here", names.join(", "))
-    })
-}
-
-/// Reads a recorded take.
-fn read_take(path: &Path) -> Result<Take, Failure> {
-    let from = fs::File::open(path).map_err(|source| Failure::Read { path: path.to_owned(), source })?;
-    Take::read(from).map_err(|source| Failure::TakeFile { path: path.to_owned(), source })
-}
-
-/// The score of notes. A key that comes up where another goes down comes up after it: a slur.
-fn score_of(notes: &[TimedNote], rate: u32) -> Score {
-    let at = |seconds: f64| (seconds * f64::from(rate)).round() as usize;
-    let on = notes.iter().map(|one| {
-        let event = Event::NoteOn { note: one.note, velocity: one.velocity };
-        Timed { at: at(one.from_s), event }
-    });
-    let off = notes.iter().map(|one| {
-        let event = Event::NoteOff { note: one.note };
-        Timed { at: at(one.from_s + one.seconds), event }
-    });
-    let mut events: Vec<_> = on.chain(off).collect();
-    // A note struck again at the moment of its end: its own end comes first.
-    let order = |timed: &Timed<Event>| match timed.event {
-        Event::NoteOff { note } => {
-            u8::from(!notes.iter().any(|one| one.note == note && at(one.from_s) == timed.at))
-        }
-        _ => 1,
-    };
-    events.sort_by_key(|timed| (timed.at, order(timed)));
-    let samples = events.last().map_or(0, |last| last.at);
-    Score { events, samples }
 }
 
 /// Why a piece cannot be read; who gives the name of a note means one note.
