@@ -15,6 +15,7 @@ pub mod cache;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod controllers;
+pub mod data_folder;
 #[cfg(feature = "editor")]
 pub mod editor;
 pub mod folder_listing;

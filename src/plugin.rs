@@ -365,6 +365,9 @@ impl Chalumeau {
         }
         if self.params.moments.take(Moment::Panic) {
             inputs.silence();
+            // A breath source that hangs is why one presses it.
+            inputs.breath_sources().forget();
+            inputs.say(Event::BreathFromKeys.into());
         }
         let drives = [self.params.knob.h_source.value(), self.params.knob.k_source.value()];
         inputs.breath_from(self.params.breath.from.value().into());
@@ -443,7 +446,7 @@ fn rest_status(params: &ChalumeauParams, instrument: &InstrumentSwap, is_watched
     }
 }
 
-/// The parameters that act when they move: *Breath* and *Panic*. Real-time safe.
+/// The parameter that acts when it moves: *Breath*. Real-time safe.
 #[derive(Default)]
 struct MovedParameters {
     /// The value of *Breath* in the last block.

@@ -279,7 +279,7 @@ fn read_source(value: &toml::Value) -> Result<Source, String> {
             source_name(source)
         )),
         None => Err(format!(
-            "controller is {value}; it must be a number from 1 to 119, such as 21 for CC21, or \"pressure\""
+            "controller is {value}; it must be the number of a controller, such as 21 for CC21, or \"pressure\""
         )),
     }
 }

@@ -140,9 +140,12 @@ impl SourceCurves {
     /// The curve of a source; `None` where it follows the common one. Real-time safe.
     pub fn get(&self, source: CurveSource) -> Option<SourceCurve> {
         let Place { is_own, numbers } = &self.places[source as usize];
-        let [softest, loudest, curve] =
-            numbers.each_ref().map(|bits| f32::from_bits(bits.load(Ordering::Relaxed)));
-        is_own.load(Ordering::Acquire).then_some(SourceCurve { softest, loudest, curve })
+        // The flag first: who sees it sees the numbers that were written before it.
+        is_own.load(Ordering::Acquire).then(|| {
+            let [softest, loudest, curve] =
+                numbers.each_ref().map(|bits| f32::from_bits(bits.load(Ordering::Relaxed)));
+            SourceCurve { softest, loudest, curve }
+        })
     }
 
     /// Gives a source its own curve, or the common one again.

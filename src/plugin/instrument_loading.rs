@@ -13,7 +13,7 @@ pub mod instrument_loader;
 pub mod instrument_request;
 pub mod instrument_swap;
 
-use std::sync::atomic::{AtomicBool, AtomicU32};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use chalumeau_core::instrument::{Ensemble, Model};
@@ -71,6 +71,8 @@ pub struct SharedInstrument {
     activation: Mutex<Activation>,
     /// The value of *Instrument*, as a number, for which the loader has nothing left to do.
     finished_choice: AtomicU32,
+    /// The latest request was refused, and the instrument before it plays on.
+    is_refused: AtomicBool,
     stop: AtomicBool,
 }
 
@@ -79,6 +81,7 @@ impl Default for SharedInstrument {
         Self {
             activation: Mutex::default(),
             finished_choice: AtomicU32::new(NO_CHOICE),
+            is_refused: AtomicBool::new(false),
             stop: AtomicBool::new(false),
         }
     }
@@ -93,6 +96,11 @@ impl SharedInstrument {
     pub fn transposition(&self) -> i8 {
         let activation = self.activation();
         activation.current.as_ref().map_or(BUILT_IN_TRANSPOSITION, |current| current.model.file.transposition)
+    }
+
+    /// Whether the latest request was refused, so that the instrument before it plays on.
+    pub fn is_refused(&self) -> bool {
+        self.is_refused.load(Ordering::Relaxed)
     }
 
     /// The current instrument; `None` before the first activation.

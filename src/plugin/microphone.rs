@@ -21,6 +21,8 @@ pub struct Microphone {
     is_on: bool,
     /// Breath has come from it since it was switched on.
     has_blown: bool,
+    /// The room is being measured for the project.
+    measures: bool,
 }
 
 impl Microphone {
@@ -65,6 +67,7 @@ impl Microphone {
         };
         if params.moments.take(Moment::Calibrate) {
             meter.calibrate();
+            self.measures = true;
         }
         if !meter.is_calibrating() {
             meter.set_design(params.room_floor.design());
@@ -99,7 +102,8 @@ impl Microphone {
         let Some(meter) = self.meter.as_ref().filter(|meter| self.is_on && !meter.is_calibrating()) else {
             return false;
         };
-        params.room_floor.replace(meter.design())
+        // Only what was measured: a project that is being loaded brings a room of its own.
+        std::mem::take(&mut self.measures) && params.room_floor.replace(meter.design())
     }
 
     /// Hears one sample; the breath, if it decides there.

@@ -173,7 +173,7 @@ impl KeeperThread {
     /// The error is a message for the user.
     fn carry_out(&self, task: PresetTask) -> Result<(), String> {
         let Some(folder) = &self.folder else {
-            let variable = crate::presets::user_folder::VARIABLE;
+            let variable = crate::data_folder::VARIABLE;
             return Err(format!("this system has no folder for presets; set {variable} to a path"));
         };
         let is_chosen = |name: &str| self.params.preset_name() == name;

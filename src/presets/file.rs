@@ -118,7 +118,9 @@ fn whole(value: &DeValue) -> Option<i64> {
 fn text_of(id: &str, value: &Spanned<DeValue>) -> Result<String, String> {
     match value.get_ref() {
         DeValue::String(text) => Ok(text.to_string()),
-        DeValue::Integer(number) => Ok(number.as_str().to_owned()),
+        integer @ DeValue::Integer(_) => whole(integer)
+            .map(|number| number.to_string())
+            .ok_or_else(|| format!("{id} is too large a number")),
         DeValue::Float(number) => Ok(number.as_str().to_owned()),
         DeValue::Boolean(on) => Ok(on.to_string()),
         other => Err(format!("{id} is a {}; it must be a text such as {id} = \"...\"", other.type_str())),

@@ -10,11 +10,10 @@ use std::path::{Path, PathBuf};
 
 use super::factory;
 use super::{Preset, checked_name};
+use crate::data_folder;
 use crate::output::NewFile;
 use crate::text_file;
 
-/// Environment variable that names a directory to use instead of the system's own; for tests and unusual systems.
-pub const VARIABLE: &str = "CHALUMEAU_DATA_DIR";
 /// Upper limit for the size of a preset's file, bytes; a larger file is something else.
 const BYTES_MOST: u64 = 1 << 16;
 /// Most files that are read: a folder with more is not one of presets.
@@ -42,11 +41,9 @@ pub struct UserPresets {
 }
 
 impl UserFolder {
-    /// The folder `chalumeau/presets` in the user's data directory, or in the directory that [`VARIABLE`] names; `None` if
-    /// there is neither.
+    /// The folder `presets` in the [user's data](data_folder::folder); `None` if there is none.
     pub fn system() -> Option<Self> {
-        let chosen = std::env::var_os(VARIABLE).filter(|chosen| !chosen.is_empty()).map(PathBuf::from);
-        chosen.or_else(dirs::data_dir).map(|root| Self::within(root.join("chalumeau/presets")))
+        data_folder::folder().map(|folder| Self::within(folder.join("presets")))
     }
 
     /// A folder of presets, which is created when the first one is saved.
@@ -135,7 +132,9 @@ impl UserFolder {
     /// Deletes a preset.
     pub fn delete(&self, name: &str) -> Result<(), String> {
         let path = self.find(name).ok_or_else(|| self.is_missing(name))?;
-        fs::remove_file(&path).map_err(|reason| format!("cannot remove {}: {reason}", path.display()))
+        fs::remove_file(&path).map_err(|reason| format!("cannot remove {}: {reason}", path.display()))?;
+        // Another preset of this name is not liked from the start.
+        self.set_favourite(name, false)
     }
 
     /// Remembers whether the user likes a preset.

@@ -165,7 +165,7 @@ function choose(preset) {
   values = data.defaults.map((value, place) => preset.values[place] ?? value);
   engine.send({ values, wheel: preset.wheel, bend: preset.bend, breathFrom: preset.breathFrom });
   controls.forEach((control) => control.show(values[control.of.place]));
-  meter.setPhysical(values[data.defaults.length - 11] === 1);
+  meter.setPhysical(values[data.breathResponse] === 1);
   knob.update();
 }
 

@@ -3,7 +3,7 @@
 export class Midi {
   /** `on` gets { inputs: names } when devices come and go, and { message: bytes } for the lamp. */
   constructor(hands, send, on) {
-    Object.assign(this, { hands, send, on });
+    Object.assign(this, { hands, send, on, count: 0 });
   }
 
   static get isHere() {
@@ -19,6 +19,9 @@ export class Midi {
   listen() {
     const inputs = [...this.access.inputs.values()].filter((input) => input.state !== 'disconnected');
     inputs.forEach((input) => (input.onmidimessage = ({ data }) => this.hear(data)));
+    // A device that was unplugged does not tell that its keys have come up.
+    if (inputs.length < this.count) this.hands.releaseAll();
+    this.count = inputs.length;
     this.on({ inputs: inputs.map((input) => input.name ?? 'MIDI') });
   }
 

@@ -230,10 +230,14 @@ impl Playing {
 
     /// Takes the settings as they have been set.
     pub fn settle(&mut self) {
+        let was_lone = self.ensemble.is_lone();
         self.ensemble.set_settings(&self.settings);
+        if self.ensemble.is_lone() != was_lone {
+            self.stereo.hand_over_pan(was_lone, self.ensemble.pan());
+        }
         self.settings = *self.ensemble.first().settings();
         self.stereo.set_space(&self.settings);
-        self.parts.set_count(self.settings.players.count.clamp(1, 16) as usize);
+        self.parts.set_count(self.settings.players.parts());
         self.parts.set_key_switches(self.settings.reach.key_switches);
     }
 
@@ -270,6 +274,8 @@ impl Playing {
         let frames = frames.min(MOST_FRAMES);
         let [left, right] = &mut self.channels;
         let (left, right) = (&mut left[..frames], &mut right[..frames]);
+        // A slap is of its moment, whether the knob blows or not.
+        let slap = self.knob.as_mut().and_then(|knob| knob.take_slap());
         let mut knob = self.knob.as_deref_mut().filter(|knob| knob.angle_deg(0).is_some());
         if knob.is_none() && std::mem::take(&mut self.is_blown) {
             // Breath that nobody holds any more goes back to the keys.
@@ -281,7 +287,7 @@ impl Playing {
         match &mut knob {
             Some(knob) => {
                 self.is_blown = true;
-                if let Some(speed) = knob.take_slap() {
+                if let Some(speed) = slap {
                     let event = Event::TongueSlap { strength: slap_strength(speed) };
                     self.ensemble.apply(PartEvent { to: To::Player(0), event });
                 }

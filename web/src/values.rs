@@ -65,6 +65,8 @@ pub const NUMBERS: [N; 51] = [
 ];
 /// Switches, choices and whole numbers.
 const OTHERS: usize = 12;
+/// Place of the breath response: 0 as played, 1 physical.
+pub const BREATH_RESPONSE: usize = NUMBERS.len();
 /// Length of the list.
 pub const COUNT: usize = NUMBERS.len() + OTHERS;
 

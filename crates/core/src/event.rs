@@ -96,7 +96,8 @@ pub enum Event {
     },
     /// Which fingerings the notes take from the next one on, whatever `Settings::alternates` says.
     Fingerings(Fingerings),
-    /// Releases all notes, sets the breath to 0 and clears the state; chosen [fingerings](Self::Fingerings) stay.
+    /// Releases all notes and silences reed and bore at once. What breath sources and controllers have set stays, and so do chosen
+    /// [fingerings](Self::Fingerings) and holes on trial: who sent them does not send them again while they rest.
     Panic,
 }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any, Union
 
@@ -122,6 +123,20 @@ def text_of(name: str, value: Value) -> str:
     if hasattr(value, "__float__"):
         return repr(float(value))
     raise TypeError(f"{name} must be a number, a text, True or False, not {type(value).__name__}")
+
+
+@cache
+def _ids() -> dict[str, str]:
+    known = parameters()
+    ids = {spelling.casefold(): each["id"] for each in known for spelling in (each["name"], each["id"])}
+    # Where a flag and an id are spelt alike, it is the flag.
+    return ids | {each["flag"]: each["id"] for each in known if each["flag"]}
+
+
+def setting_id(name: str) -> str:
+    """The id of a setting that is named by its id, name or flag; the name itself if there is no such setting."""
+    spelling = name.casefold()
+    return _ids().get(spelling, _ids().get(spelling.replace("-", "_"), name))
 
 
 def pairs(*named: Mapping[str, Value] | None) -> list[tuple[str, str]]:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from chalumeau import _native
-from chalumeau.arguments import InstrumentLike, NoteLike, Value, instrument_of, note, pairs
+from chalumeau.arguments import InstrumentLike, NoteLike, Value, instrument_of, note, pairs, setting_id
 
 #: 32-bit float samples, full scale 1.0.
 Samples = npt.NDArray[np.float32]
@@ -178,11 +178,14 @@ class Clarinet:
         >>> clarinet.set(lip=9)
         Traceback (most recent call last):
         ValueError: invalid value '9' for '--lip <X>': must lie in 0.6..1.4
+        >>> clarinet.set({"Reed strength": 4, "Full breath": None})
         >>> clarinet.settings
-        {'strength': 3, 'Full breath': '7 kPa', 'lip': 1.1}
+        {'lip': 1.1, 'Reed strength': 4}
         """
-        wanted = {**self._settings, **(settings or {}), **named}
-        wanted = {name: value for name, value in wanted.items() if value is not None}
+        changes = {**(settings or {}), **named}
+        changed = {setting_id(name) for name in changes}
+        wanted = {name: value for name, value in self._settings.items() if setting_id(name) not in changed}
+        wanted |= {name: value for name, value in changes.items() if value is not None}
         self._voice.set(pairs(wanted), self._instrument)
         self._settings = wanted
 

@@ -270,12 +270,14 @@ impl LoaderThread {
         }
         if request == current.request && current.readiness == Readiness::Tuned {
             self.refused = None;
+            self.shared.is_refused.store(false, Ordering::Relaxed);
             report(&self.params, &status_text(Readiness::Tuned, current));
             self.finish(&request);
         } else if self.refused.as_ref() == Some(&request) {
             self.finish(&request);
         } else if let Err(Interrupted::Failed(reason)) = self.advance(&request, &activation, current) {
             report(&self.params, &refusal_text(&reason, current));
+            self.shared.is_refused.store(true, Ordering::Relaxed);
             self.refused = Some(request);
         }
     }

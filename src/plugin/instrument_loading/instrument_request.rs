@@ -192,7 +192,7 @@ pub fn user_file(named: &str) -> Option<PathBuf> {
         return Some(PathBuf::from(named));
     }
     let chosen = std::env::var_os(VARIABLE).filter(|path| !path.is_empty()).map(PathBuf::from);
-    chosen.or_else(|| dirs::data_dir().map(|folder| folder.join("chalumeau/instruments/user.toml")))
+    chosen.or_else(|| crate::data_folder::folder().map(|folder| folder.join("instruments/user.toml")))
 }
 
 #[cfg(test)]

@@ -128,9 +128,7 @@ impl InstrumentSwap {
         let was_lone = self.playing.is_lone();
         self.playing.set_settings(settings);
         if self.playing.is_lone() != was_lone {
-            // Several players are panned one by one.
-            let position = if was_lone { 0.0 } else { self.playing.pan() };
-            self.stereo.heed(&Timed { at: 0, event: Event::Pan { position } });
+            self.stereo.hand_over_pan(was_lone, self.playing.pan());
         }
         if let Some(next) = &mut self.next {
             next.ensemble.set_settings(settings);

@@ -143,6 +143,10 @@ impl KnobAudio {
         self.breath_from = BlockBreath::Host;
         self.replayed = 0;
         self.shared.note.store(NO_NOTE, Ordering::Relaxed);
+        self.shared.breath.store(0.0_f32.to_bits(), Ordering::Relaxed);
+        if let Some(reader) = &mut self.reader {
+            reader.take_slap();
+        }
     }
 
     /// Renders one block: the host's events, and between them the breath of the knob or the take.
@@ -173,11 +177,12 @@ impl KnobAudio {
             Some(PreparedReplay { hand, take }) if context.replay => (hand, Some(&**take)),
             _ => (hand, take.as_deref().filter(|_| context.replay)),
         };
-        // The ring is emptied even if nothing uses its angles.
+        // The rings are emptied even if nothing uses angles and slaps.
         let mut reader = self.reader.as_mut();
-        if let Some(reader) = &mut reader {
+        let slap = reader.as_mut().and_then(|reader| {
             reader.begin_block(samples, context.rate_hz);
-        }
+            reader.take_slap()
+        });
         let breath_from = match (&take, &reader) {
             _ if !hand.maps.is_ready() => BlockBreath::Host,
             (Some(_), _) => BlockBreath::Take,
@@ -203,7 +208,7 @@ impl KnobAudio {
                 self.replayed += samples as u64;
             }
             (BlockBreath::Knob, _, Some(reader)) => {
-                let slap = reader.take_slap().map(|speed| {
+                let slap = slap.map(|speed| {
                     let event = Event::TongueSlap { strength: slap_strength(speed) };
                     Timed { at: 0, event: PartEvent { to: To::Player(0), event } }
                 });

@@ -57,6 +57,8 @@ pub struct KnobController {
     short_breath: Option<String>,
     link: Option<KnobLink>,
     choice: KnobChoice,
+    /// The serial number that this instance has put into the project for *any knob*.
+    remembered: Option<u64>,
     /// Rows that the link's thread sends.
     rows: (mpsc::Sender<TakeRow>, mpsc::Receiver<TakeRow>),
     recorder: TakeRecorder,
@@ -91,6 +93,7 @@ impl KnobController {
             short_breath: None,
             link: None,
             choice: KnobChoice::Off,
+            remembered: None,
             rows: mpsc::channel(),
             recorder: TakeRecorder::new(sound),
             replay_path: String::new(),
@@ -161,7 +164,9 @@ impl KnobController {
         let chosen_again = self.shared.device_chosen.swap(false, Ordering::Relaxed);
         // The serial number that the linked device has told is not a new choice.
         let same = match (&self.choice, &wanted) {
-            (KnobChoice::Serial { serial: None }, KnobChoice::Serial { .. }) => !chosen_again,
+            (KnobChoice::Serial { serial: None }, KnobChoice::Serial { serial }) => {
+                !chosen_again && (serial.is_none() || *serial == self.remembered)
+            }
             (before, after) => before == after,
         };
         if same {
@@ -282,11 +287,11 @@ impl KnobController {
     }
 
     fn calibrate(&mut self, rows: &[TakeRow], knob: &KnobParams) {
-        let angles = rows.iter().map(|moment| Some(moment.angle_deg));
+        let readings = rows.iter().map(|moment| Some((moment.t_us, moment.angle_deg)));
         // A calibration also counts the time in which the knob sends nothing.
         let silence = rows.is_empty().then_some(None);
-        for angle_deg in angles.chain(silence) {
-            if let Some(text) = self.calibrator.tick(angle_deg, knob, self.link.as_ref(), self.hand.feels) {
+        for reading in readings.chain(silence) {
+            if let Some(text) = self.calibrator.tick(reading, knob, self.link.as_ref(), self.hand.feels) {
                 self.switches.set_hint(text);
             }
         }
@@ -327,13 +332,19 @@ impl KnobController {
     }
 
     /// Stores the serial number of a live device in the project.
-    fn remember_serial(&self, status: Option<&LinkStatus>) {
+    fn remember_serial(&mut self, status: Option<&LinkStatus>) {
         if let Some(status) = status
             && is_live(status)
-            && let (KnobChoice::Serial { .. }, Some(serial)) = (&self.choice, status.serial)
-            && let Ok(mut remembered) = self.params.knob.serial.write()
+            && let (KnobChoice::Serial { serial: chosen }, Some(serial)) = (&self.choice, status.serial)
+            && chosen.is_none_or(|chosen| chosen == serial)
+            && let Ok(mut text) = self.params.knob.serial.write()
         {
-            *remembered = serial_text(serial);
+            // A project that has just been loaded names a knob of its own.
+            let named = serial_number(&text);
+            if named.is_none() || named == self.remembered {
+                *text = serial_text(serial);
+                self.remembered = Some(serial);
+            }
         }
     }
 

@@ -15,7 +15,7 @@ use chalumeau_knob::device::{KnobLink, LinkStatus, Phase};
 /// How long *Arm* must have been off beside a live knob before switching it on arms. A project or a host that sets
 /// switches while it loads is not an act of the user.
 const ARM_AFTER: Duration = Duration::from_millis(500);
-/// How long a knob may take to arm. The link repeats the message for about a second (`device/session/arming.rs`).
+/// How long a knob may take to arm. The link repeats the message for 0.2 s (`device/session/arming.rs`).
 const ARM_WITHIN: Duration = Duration::from_secs(2);
 
 /// The switches as they were last seen, and what arming needs to know.

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::entry::{choice, number, status, switch, whole};
 use super::moment::{self, Moment, Moments};
-use chalumeau_core::control::knob::KnobDesign;
+use chalumeau_core::control::knob::{KnobDesign, TRAVEL_DEG};
 use chalumeau_knob::touch::study::{StudySide, Trial, plan};
 
 /// Which kind of device.
@@ -105,9 +105,6 @@ pub struct SavedCalibration {
 }
 
 impl SavedCalibration {
-    /// What a hand can turn comfortably, degrees.
-    pub const TRAVEL_DEG: (f64, f64) = (120.0, 1_080.0);
-
     /// The same inside its ranges.
     pub fn mended(self) -> Self {
         let fix = |x: f64, low: f64, high: f64, default: f64| {
@@ -117,7 +114,7 @@ impl SavedCalibration {
         let dead_on = fix(self.dead_deg.0, 0.1, 30.0, d.dead_deg.0);
         Self {
             rest_deg: fix(self.rest_deg, -36_000.0, 36_000.0, 0.0),
-            travel_deg: fix(self.travel_deg, Self::TRAVEL_DEG.0, Self::TRAVEL_DEG.1, d.travel_deg),
+            travel_deg: fix(self.travel_deg, TRAVEL_DEG.0, TRAVEL_DEG.1, d.travel_deg),
             dead_deg: (dead_on, fix(self.dead_deg.1, 0.0, 0.9 * dead_on, 0.5 * dead_on)),
         }
     }

@@ -54,7 +54,7 @@ impl Default for PhysicalReedParams {
 impl PhysicalReedParams {
     /// The reed as it is set.
     pub fn reed(&self) -> PhysicalReed {
-        let si = |param: &FloatParam, unit: f64| f64::from(param.value()) / unit;
+        let si = |param: &FloatParam, unit: f64| f64::from(super::settled(param)) / unit;
         PhysicalReed {
             width_m: si(&self.width, 1e3),
             area_m2: si(&self.area, 1e6),

@@ -46,7 +46,7 @@ impl FilesRead {
                 Err(refused) => self.scale_refused = Some(refused),
             },
             FileTask::SaveInstrument(file) => {
-                let folder = dirs::data_dir().map(|folder| folder.join("chalumeau/instruments"));
+                let folder = crate::data_folder::folder().map(|folder| folder.join("instruments"));
                 self.saved = Some(match folder {
                     Some(folder) => save(&file, &folder),
                     None => Err("this system has no folder for instrument files".to_owned()),

@@ -270,19 +270,35 @@ impl SnapshotThread {
             .map_or_else(SoundAnalysis::default, |(_, listener)| listener.hear(samples, wanted))
     }
 
+    /// How much the knob's status concerns the user: an alarm, or a port that does not open, asks for something.
+    fn knob_severity(&self) -> Severity {
+        #[cfg(feature = "devices")]
+        if let Some(status) = self.handles.knob.status() {
+            let is_shut_out = matches!(status.phase, Phase::NoPermission(_) | Phase::Busy(_));
+            return match status.phase {
+                _ if is_shut_out || status.alarm.is_some() => Severity::Warn,
+                Phase::Live | Phase::ReadOnly => Severity::Good,
+                _ => Severity::Note,
+            };
+        }
+        Severity::Good
+    }
+
     /// The messages on the status line.
     fn status(&self, current: Option<&CurrentInstrument>, sources: &BreathSources) -> Vec<Status> {
         let mut status = Vec::new();
         let mut add = |level, text: String| status.push(Status { level, text });
-        if let Ok(text) = self.handles.params.instrument_status.read()
-            && current.is_none_or(|current| current.readiness < Readiness::Tuned)
-        {
-            add(Severity::Note, text.clone());
+        if let Ok(text) = self.handles.params.instrument_status.read() {
+            if self.handles.instrument.is_refused() {
+                add(Severity::Warn, text.clone());
+            } else if current.is_none_or(|current| current.readiness < Readiness::Tuned) {
+                add(Severity::Note, text.clone());
+            }
         }
         if let Ok(text) = self.handles.params.knob_status.read()
             && text.as_str() != "off"
         {
-            add(Severity::Good, text.clone());
+            add(self.knob_severity(), text.clone());
         }
         // A user who has just plugged in a breath controller sees that its messages arrive.
         let live = BreathInput::ALL.into_iter().find(|&input| sources.is_live(input));

@@ -36,6 +36,7 @@ pub fn text() -> Result<String> {
     let controls = CONTROLS.into_iter().map(control).collect::<Result<Vec<_>>>()?;
     let all = json!({
         "mezzoForte": MEZZO_FORTE,
+        "breathResponse": values::BREATH_RESPONSE,
         "defaults": values::list(&Settings::default()).to_vec(),
         "instruments": instruments,
         "presets": presets,

@@ -114,7 +114,7 @@ impl Bends {
 
     /// A wheel goes back to rest, and with a manager's its members'.
     pub fn rest(&mut self, channel: usize) {
-        self.turn(channel, CENTRE);
+        self.wheels[channel].at = CENTRE;
         if let Some(zone) = self.zone_of(channel).filter(|&zone| MANAGERS[zone] == channel) {
             self.members_of(zone).for_each(|member| self.wheels[member].at = CENTRE);
         }

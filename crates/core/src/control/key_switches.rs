@@ -61,8 +61,8 @@ impl KeySwitches {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SwitchKeys {
     row: KeySwitches,
-    /// Channels on which one is down, one bit each.
-    down: u16,
+    /// The one that went down last on each channel, until it comes up.
+    down: [Option<Note>; 16],
 }
 
 impl SwitchKeys {
@@ -74,31 +74,31 @@ impl SwitchKeys {
     /// Moves the row. What was down in it is no key of the new one, so nothing would tell when it comes up.
     pub fn set_row(&mut self, row: KeySwitches) {
         if self.row != row {
-            *self = Self { row, down: 0 };
+            *self = Self { row, ..Self::default() };
         }
     }
 
     /// What a key chooses that goes down, if it is one of the row. The channel is 0..=15.
     pub fn press(&mut self, note: Note) -> Option<Fingerings> {
         let chosen = self.row.chosen(note.key)?;
-        self.down |= 1 << note.channel;
+        self.down[usize::from(note.channel % 16)] = Some(note);
         Some(chosen)
     }
 
     /// Keys come up.
     pub fn release(&mut self, address: NoteAddress) {
-        if address.key.is_none_or(|key| self.row.chosen(key).is_some()) {
-            self.down &= address.channel.map_or(0, |channel| !(1 << (channel % 16)));
+        for down in &mut self.down {
+            down.take_if(|note| address.fits(*note));
         }
     }
 
     /// All keys come up.
     pub fn release_all(&mut self) {
-        self.down = 0;
+        self.down = [None; 16];
     }
 
     /// Whether one is down on this channel, 0..=15.
     pub fn is_down_on(&self, channel: u8) -> bool {
-        self.down >> channel & 1 == 1
+        self.down[usize::from(channel % 16)].is_some()
     }
 }

@@ -22,6 +22,8 @@ pub use slap::slap_strength;
 pub const CURVE: std::ops::RangeInclusive<f64> = 0.25..=4.0;
 /// Least way from the end of the dead zone to full blow, degrees: less is fewer than a hundred steps of 0.1 degrees.
 pub const LEAST_TRAVEL_DEG: f64 = 10.0;
+/// From rest to full blow, degrees: what a hand can turn comfortably, by judgement.
+pub const TRAVEL_DEG: (f64, f64) = (120.0, 1_080.0);
 
 /// How the knob is blown with: what a player sets or calibrates.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -302,6 +302,8 @@ impl MidiDecoder {
             EXPRESSION | EXPRESSION_FINE => {
                 self.hear(BreathController::Expression, at, (cc == EXPRESSION_FINE, value), place);
             }
+            // A host that stops behind a snapshot means it.
+            ALL_SOUND_OFF | ALL_NOTES_OFF => self.cut_all(),
             _ if matches!(place, Place::Recognised | Place::Within) => {}
             _ => self.control(at, cc, value),
         }
@@ -348,7 +350,6 @@ impl MidiDecoder {
                 self.techniques.controllers = TechniqueControllers::default();
                 self.say_techniques();
             }
-            ALL_SOUND_OFF | ALL_NOTES_OFF => self.cut_all(),
             _ => {}
         }
     }
@@ -541,11 +542,8 @@ impl MidiDecoder {
         self.notes.choke(NoteAddress::default());
         self.fingers = Keys::default();
         self.said.push(Event::Panic);
-        // The player forgets its bend and its techniques, wheels do not.
-        self.bent_cents = 0.0;
+        // Without the tuning of the note that was cut.
         self.rebend();
-        self.techniques.forgotten();
-        self.say_techniques();
     }
 
     /// Keys have come up, and `before` sounded until now: what is heard now, and which keys are no longer down.

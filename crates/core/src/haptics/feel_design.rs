@@ -1,5 +1,6 @@
 //! How a clarinet shall feel: the choices of the user, with their ranges and defaults.
 
+use crate::control::knob::TRAVEL_DEG;
 use crate::haptics::feel_parameters::{HARD_CEILING_MNM, TorqueLaw};
 use crate::haptics::feel_refused::FeelRefused;
 use crate::units::WrittenNote;
@@ -107,7 +108,7 @@ impl FeelDesign {
             ("Contrast", self.contrast, 1.0, 5.0),
             ("Place", self.place, 1.0, 5.0),
             ("strength (mNm)", self.strength_mnm, 0.0, f64::from(HARD_CEILING_MNM)),
-            ("travel (degrees)", self.travel_deg, 120.0, 1_080.0),
+            ("travel (degrees)", self.travel_deg, TRAVEL_DEG.0, TRAVEL_DEG.1),
             ("damping (mNm s/rad)", self.damping_mnms, 0.0, 20.0),
             ("friction (mNm)", self.friction_mnm, 0.0, 100.0),
             ("wall (over closure)", self.wall_share, 0.5, 4.0),

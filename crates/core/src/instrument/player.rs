@@ -289,10 +289,9 @@ impl Player {
             // They act after the instrument; settings are set from outside.
             Event::Volume { .. } | Event::Pan { .. } | Event::Set(..) => {}
             Event::Panic => {
-                // Hosts silence everything wherever they stop; the player still means the same fingerings.
-                let chosen = self.chosen;
+                let silenced = self.silenced();
                 self.reset(voice);
-                self.chosen = chosen;
+                *self = silenced;
             }
         }
     }

@@ -77,6 +77,13 @@ impl Stereo {
         self.room.set_apart(settings.players.sit_apart());
     }
 
+    /// One player has become several, who are panned one by one, or the other way round. `position` is the pan of the first, -1
+    /// left..=1 right. Real-time safe.
+    pub fn hand_over_pan(&mut self, was_lone: bool, position: f32) {
+        let position = if was_lone { 0.0 } else { position };
+        self.heed(&Timed { at: 0, event: Event::Pan { position } });
+    }
+
     /// The room: whether it still sounds, and how long it can.
     pub fn room(&self) -> &RoomSound {
         &self.room

@@ -42,11 +42,20 @@ impl Holder {
             since: seconds(),
         }
     }
+
+    /// Who has not said who it is, or is about to.
+    fn unknown() -> Self {
+        let (program, port) = (String::new(), String::new());
+        Self { program, pid: 0, label: "another instance".into(), port, since: seconds() }
+    }
 }
 
 impl fmt::Display for Holder {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { label, program, pid, .. } = self;
+        if program.is_empty() {
+            return f.write_str(label);
+        }
         let minutes = seconds().saturating_sub(self.since) / 60;
         write!(f, "{label} ({program}, process {pid}, for {minutes} min)")
     }
@@ -83,8 +92,7 @@ impl Files {
     }
 
     fn holder(&self) -> Holder {
-        let unknown = || Holder { label: "another instance".into(), ..Holder::me("", "") };
-        read(&self.owner).unwrap_or_else(unknown)
+        read(&self.owner).unwrap_or_else(Holder::unknown)
     }
 }
 

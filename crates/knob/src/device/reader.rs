@@ -75,9 +75,9 @@ impl KnobReader {
         self.poses.pose(offset)
     }
 
-    /// Peak speed of a slap that has not been taken yet, rad/s.
+    /// Peak speed of the latest slap since the last call, rad/s. Call it in every block: a slap is of its moment.
     pub fn take_slap(&mut self) -> Option<f32> {
-        self.slaps.pop().ok()
+        std::iter::from_fn(|| self.slaps.pop().ok()).last()
     }
 
     /// The latest sample as it came, for a state that has no use for the delay.

@@ -34,7 +34,7 @@ const ALIVE_MIDI_US: i64 = 100_000;
 const AGAIN_US: i64 = 2_000_000;
 /// Least time between two frames over MIDI, us.
 const MIDI_SLOT_US: i64 = 20_000;
-/// STATE this old no longer says what the knob does, us: a hundred periods, twice the device's own watchdog.
+/// STATE this old no longer says what the knob does, us: 125 periods, about twice the 130 ms in which serial devices let go.
 const SILENCE_US: i64 = 250_000;
 /// The same over MIDI, us: twice the 380 ms in which MIDI devices let go.
 const SILENCE_MIDI_US: i64 = 800_000;

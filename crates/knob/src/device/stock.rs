@@ -38,6 +38,9 @@ const FADE_US: f64 = 15_000.0;
 /// A sent velocity older than this is not used, us.
 const VELOCITY_US: i64 = 100_000;
 
+/// Time in which the fastest turn of the last moments fades, us: a slap tells how fast it was within a tenth of a second.
+const FASTEST_US: f64 = 50_000.0;
+
 /// Fastest a hand turns a knob, degrees per second: the firmware's own range of 700 rpm.
 const FASTEST_DEG_S: f64 = 4_200.0;
 
@@ -66,7 +69,9 @@ pub struct StockTracker {
     next_us: i64,
     pluck: bool,
     slap_said: bool,
+    /// The fastest of the last tenth of a second: it fades.
     fastest_deg_s: f64,
+    faded_us: i64,
     button: Option<f64>,
     jumps: u32,
     last_jump_deg: f64,
@@ -140,7 +145,9 @@ impl StockTracker {
                 ..StateSample::default()
             });
         }
-        self.fastest_deg_s *= 0.98; // the fastest of the last tenths of a second
+        let since_us = (now_us - self.faded_us).max(0) as f64;
+        self.fastest_deg_s *= (-since_us / FASTEST_US).exp();
+        self.faded_us = now_us;
     }
 
     fn predicted(&self, at_us: i64) -> f64 {

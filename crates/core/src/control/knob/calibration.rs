@@ -4,7 +4,7 @@
 //! of the readings, so nothing here waits or asks a clock. The thresholds are by judgement, for a knob that reads in
 //! steps of 0.1 degrees and a hand whose tremor moves it by half a degree.
 
-use crate::control::knob::{KnobDesign, LEAST_TRAVEL_DEG};
+use crate::control::knob::{KnobDesign, TRAVEL_DEG};
 
 /// How long *Rest* listens, s.
 pub const REST_S: f64 = 1.0;
@@ -20,8 +20,6 @@ const LEAST_DEAD_DEG: f64 = 0.3;
 const DEAD_DEVIATIONS: f64 = 4.0;
 /// Full blow is what is held this long, s, not the peak of a jerk.
 const HELD_S: f64 = 0.02;
-/// Furthest full blow, degrees: what FEEL can describe.
-const FURTHEST_DEG: f64 = 3_600.0;
 
 /// What a step found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,8 +76,12 @@ pub enum CalibrationError {
         /// What is needed, degrees.
         least_deg: f64,
     },
-    /// Full blow further than the protocol can say.
-    #[error("the knob went {travel_deg:.0} degrees from its rest; full blow may lie at most 10 turns away")]
+    /// Full blow further than a hand turns.
+    #[error(
+        "the knob went {travel_deg:.0} degrees from its rest; full blow may lie at most {:.0} degrees away: press Blow \
+         hard again and turn it less far",
+        TRAVEL_DEG.1
+    )]
     TooFar {
         /// From rest, degrees.
         travel_deg: f64,
@@ -95,7 +97,7 @@ pub enum CalibrationError {
 #[derive(Clone, Copy, Debug)]
 enum Step {
     Rest,
-    Blow { zero_deg: f64, dead_on_deg: f64 },
+    Blow { zero_deg: f64 },
 }
 
 /// Readings being collected.
@@ -129,7 +131,7 @@ impl Calibration {
     /// Begins *Blow hard*: the player turns as far as the loudest note shall be, and holds it for a moment. `design`
     /// says where the rest is.
     pub fn blow(&mut self, design: &KnobDesign) {
-        self.begin(Step::Blow { zero_deg: design.zero_deg, dead_on_deg: design.dead_on_deg });
+        self.begin(Step::Blow { zero_deg: design.zero_deg });
     }
 
     fn begin(&mut self, step: Step) {
@@ -210,14 +212,13 @@ impl Collecting {
                 let dead_off_deg = (DEAD_DEVIATIONS * deviation_deg).max(LEAST_DEAD_DEG);
                 Ok(Taken::Rest { zero_deg: self.mean_deg, dead_on_deg: 2.0 * dead_off_deg, dead_off_deg })
             }
-            Step::Blow { zero_deg, dead_on_deg } => {
+            Step::Blow { zero_deg } => {
                 let travel_deg = self.furthest_held_deg - zero_deg;
-                // A degree more than a design needs, so that what is taken can be played whatever rounds.
-                let least_deg = LEAST_TRAVEL_DEG + dead_on_deg + 1.0;
+                let (least_deg, furthest_deg) = TRAVEL_DEG;
                 if travel_deg < least_deg {
                     return Err(CalibrationError::TooLittleTravel { travel_deg, least_deg });
                 }
-                if travel_deg > FURTHEST_DEG {
+                if travel_deg > furthest_deg {
                     return Err(CalibrationError::TooFar { travel_deg });
                 }
                 Ok(Taken::Blow { full_deg: self.furthest_held_deg })
@@ -265,14 +266,14 @@ mod tests {
             let rested = rest(hz, |t| -1_234.0 + tremor(t)).unwrap().applied_to(KnobDesign::default());
             assert!((rested.zero_deg + 1_234.0).abs() < 0.1, "{rested:?}");
             let blown =
-                blow(&rested, hz, |t| -1_234.0 + 90.0 * (2.0 * t).min(1.0)).unwrap().applied_to(rested);
-            assert!((blown.full_deg + 1_144.0).abs() < 1.0, "{blown:?}");
+                blow(&rested, hz, |t| -1_234.0 + 180.0 * (2.0 * t).min(1.0)).unwrap().applied_to(rested);
+            assert!((blown.full_deg + 1_054.0).abs() < 1.0, "{blown:?}");
             let mut knob = KnobBreath::new(blown).unwrap();
             for i in 0..1_000 {
                 let deg = -1_234.0 + tremor(0.002 * f64::from(i));
                 assert_eq!(knob.pressure_unit(deg), 0.0, "tremor is no breath");
             }
-            assert!(knob.pressure_unit(-1_145.0) > 0.97);
+            assert!(knob.pressure_unit(-1_055.0) > 0.97);
         }
     }
 
@@ -295,12 +296,12 @@ mod tests {
 
     #[test]
     fn timid_blow_is_refused_with_the_way_it_went() {
-        let error = blow(&KnobDesign::default(), 500.0, |_| 8.0).unwrap_err();
-        assert_eq!(error, CalibrationError::TooLittleTravel { travel_deg: 8.0, least_deg: 12.0 });
+        let error = blow(&KnobDesign::default(), 500.0, |_| 80.0).unwrap_err();
+        assert_eq!(error, CalibrationError::TooLittleTravel { travel_deg: 80.0, least_deg: 120.0 });
         let other_way = blow(&KnobDesign::default(), 500.0, |t| -90.0 * t).unwrap_err();
         assert!(matches!(other_way, CalibrationError::TooLittleTravel { .. }), "{other_way}");
         assert!(matches!(
-            blow(&KnobDesign::default(), 500.0, |_| 4_000.0),
+            blow(&KnobDesign::default(), 500.0, |_| 1_200.0),
             Err(CalibrationError::TooFar { .. })
         ));
     }
@@ -308,9 +309,9 @@ mod tests {
     #[test]
     fn jerk_of_one_reading_is_not_full_blow() {
         let found =
-            blow(&KnobDesign::default(), 500.0, |t| if (t - 1.0).abs() < 1e-3 { 900.0 } else { 60.0 });
+            blow(&KnobDesign::default(), 500.0, |t| if (t - 1.0).abs() < 1e-3 { 900.0 } else { 160.0 });
         let Ok(Taken::Blow { full_deg }) = found else { panic!("{found:?}") };
-        assert!((60.0..180.0).contains(&full_deg), "{full_deg}");
+        assert!((160.0..260.0).contains(&full_deg), "{full_deg}");
     }
 
     #[test]

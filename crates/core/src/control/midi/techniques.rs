@@ -65,11 +65,6 @@ pub struct Techniques {
 }
 
 impl Techniques {
-    /// The player has forgotten what was said.
-    pub fn forgotten(&mut self) {
-        (self.vibrato, self.said) = (0, [0; ORDER.len()]);
-    }
-
     /// What has changed.
     pub fn changed(&mut self) -> [Option<Event>; 1 + ORDER.len()] {
         let TechniqueControllers { wheel, own } = self.controllers;
@@ -125,7 +120,5 @@ mod tests {
         assert_eq!(said(&mut techniques), [growl(64.0 / 127.0)]);
         techniques.controllers.set(20, 127);
         assert_eq!(said(&mut techniques), [Event::Technique { which: Technique::Subtone, amount: 1.0 }]);
-        techniques.forgotten();
-        assert_eq!(said(&mut techniques).len(), 2, "said again");
     }
 }

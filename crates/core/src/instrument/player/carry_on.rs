@@ -29,6 +29,22 @@ impl Player {
         }
     }
 
+    /// The player at rest, without keys. What controllers, key switches and fingers on trial have set stays: hosts silence everything
+    /// wherever they stop, and a controller that rests does not say again where it is. Real-time safe.
+    pub(super) fn silenced(&self) -> Self {
+        Self {
+            settings: self.settings,
+            breath: self.breath.carried(),
+            bend_cents: self.bend_cents,
+            reed: self.reed,
+            techniques: self.techniques.carried(&self.person),
+            swing: self.swing.carried(&self.person),
+            fingers: self.fingers.lifted(),
+            chosen: self.chosen,
+            ..Self::new(self.person)
+        }
+    }
+
     /// Takes over breath, bend and controllers of another player, without keys. What plays goes on and follows them.
     /// Real-time safe.
     pub fn follow(&mut self, from: &Self) {

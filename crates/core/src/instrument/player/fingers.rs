@@ -73,6 +73,11 @@ impl Default for Walk {
 }
 
 impl Fingers {
+    /// Without a fingering; holes that are held stay so.
+    pub fn lifted(&self) -> Self {
+        Self { held: self.held, ..Self::default() }
+    }
+
     /// Index of the fingering in place, if there was any note.
     pub fn fingering(&self) -> Option<usize> {
         self.fingering
