@@ -40,6 +40,8 @@ pub enum Event {
     Breath(f32),
     /// The velocity of keys sets the breath again, until the next [`Breath`](Self::Breath).
     BreathFromKeys,
+    /// The keys are pressed on, 0..=1: from the loudness of their velocity to the greatest. Nothing once breath is live.
+    KeyPressure(f32),
     /// Pitch bend, cents; two octaves at most. Near the note by the lip, beyond by the bore's size, see
     /// [`bend`](crate::instrument::bend).
     Bend {

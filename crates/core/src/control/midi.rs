@@ -38,7 +38,7 @@ use crate::control::keys::Keys;
 use crate::control::notes::{HeldNote, Note, NoteAddress, NoteExpression, Notes};
 use crate::event::Event;
 use crate::units::SoundingNote;
-use breath::{BreathChoice, BreathController, BreathFrom};
+use breath::{BreathChoice, BreathController, BreathFrom, Heard};
 use links::{Link, Links, Source};
 use mix::{Mix, MixControllers};
 use said::Said;
@@ -120,6 +120,10 @@ pub struct MidiDecoder {
     fingers: Keys,
     /// Velocity of the last key, 0..=1.
     velocity: f32,
+    /// Another decoder of the same keyboard holds a key.
+    is_key_down: bool,
+    /// The last pressure on keys there was an event for.
+    key_pressure: f32,
     bends: Bends,
     /// The last bend there was an event for.
     bent_cents: f32,
@@ -204,6 +208,7 @@ impl MidiDecoder {
         let by_pedal = self.notes.take_by_pedal();
         self.notes.press(note);
         self.prepare_note(note.channel);
+        self.leave_note_breath();
         self.remix();
         if by_pedal.is_some_and(|held| held.key == note.key) {
             self.lift(note.key);
@@ -356,8 +361,14 @@ impl MidiDecoder {
 
     /// Channel pressure (aftertouch). Real-time safe.
     pub fn pressure(&mut self, channel: u8, value: u8) -> &[Event] {
+        self.pressure_beside(channel, value, false)
+    }
+
+    /// The same where other decoders follow the same keyboard; `is_key_down`: one of them holds a key.
+    pub(super) fn pressure_beside(&mut self, channel: u8, value: u8, is_key_down: bool) -> &[Event] {
         self.begin();
         let at = usize::from(channel % 16);
+        self.is_key_down = is_key_down;
         let place = self.place(at, PRESSURE);
         if self.links.has(Source::Pressure) {
             self.follow(Source::Pressure, value.min(127), place);
@@ -465,8 +476,17 @@ impl MidiDecoder {
 
     fn hear(&mut self, controller: BreathController, at: usize, part: (bool, u8), place: Place) {
         let is_held = self.sounding().is_some();
-        if let Some(unit) = self.breath.hear(controller, at, part, place, is_held) {
-            self.blow(BreathOrigin::Controller(controller), unit);
+        let is_key_down = is_held || self.is_key_down;
+        // Without a key no hand presses; and a finger of MPE blows.
+        let may_be_of_keys = controller == BreathController::Pressure
+            && (is_key_down || part.1 == 0)
+            && !self.bends.is_member(at);
+        match self.breath.hear(controller, at, part, place, is_held, may_be_of_keys) {
+            Some(Heard::Breath(unit)) => self.blow(BreathOrigin::Controller(controller), unit),
+            Some(Heard::Keys(unit)) if std::mem::replace(&mut self.key_pressure, unit) != unit => {
+                self.said.push(Event::KeyPressure(unit));
+            }
+            _ => {}
         }
     }
 
@@ -497,8 +517,19 @@ impl MidiDecoder {
     /// The breath of the heard note, if it has one.
     fn blow_note(&mut self) {
         let breath = self.notes.heard().and_then(|held| held.breath);
-        if let Some(unit) = breath.filter(|_| self.has_note_breath) {
-            self.blow(BreathOrigin::Note, unit);
+        match breath.filter(|_| self.has_note_breath) {
+            Some(unit) => self.blow(BreathOrigin::Note, unit),
+            None => self.leave_note_breath(),
+        }
+    }
+
+    /// A note that has no breath of its own plays by its velocity and not with that of the note before. In MPE its breath is on
+    /// its way.
+    fn leave_note_breath(&mut self) {
+        let is_member = self.heard_channel().is_some_and(|channel| self.bends.is_member(channel));
+        if self.origin == Some(BreathOrigin::Note) && !is_member {
+            self.origin = None;
+            self.said.push(Event::BreathFromKeys);
         }
     }
 

@@ -261,7 +261,8 @@ impl Parts {
             self.of_notes[usize::from(channel)][PRESSURE] = Some(value);
             return self.tell_channel(channel, |part| part.pressure(channel, value));
         }
-        self.tell_all(|part| part.pressure(channel, value))
+        let is_key_down = self.decoders.iter().any(|part| !part.held().is_empty());
+        self.tell_all(|part| part.pressure_beside(channel, value, is_key_down))
     }
 
     /// See [`MidiDecoder::other_pressure`].

@@ -173,6 +173,8 @@ pub struct Player {
     sway_left: u32,
     inflection: Inflection,
     inhalation: Inhalation,
+    /// The reed was changed while nothing sounded: it must not move, which would be heard.
+    has_other_reed: bool,
 }
 
 impl Player {
@@ -194,6 +196,7 @@ impl Player {
         if settings != self.settings {
             if self.is_idle() {
                 self.glide.settle();
+                self.has_other_reed = true;
             } else {
                 // A lip that a player has shaped is where another way of blowing begins.
                 let is_other = settings.breath_response != self.settings.breath_response;
@@ -265,6 +268,7 @@ impl Player {
             Event::NoteOff { note } => self.note_off(note, model, voice),
             Event::Choke { note } => self.choke(note, model, voice),
             Event::Breath(level) => self.breath.set_level(level, self.settings.breath_deadband),
+            Event::KeyPressure(pressure) => self.breath.press(pressure),
             Event::BreathFromKeys => self.breath.forget_source(),
             Event::Bend { cents } => {
                 self.bend_cents =
@@ -534,6 +538,12 @@ impl Player {
             };
             Posture::new(settings, &fingered, tick_s, model)
         });
+        if std::mem::take(&mut self.has_other_reed)
+            && is_idle
+            && let Some(force) = self.tongue.rest_on(posture.free_closing)
+        {
+            voice.hold_reed(force);
+        }
         let (articulation, gamma) = (&settings.articulation, self.breath.gamma());
         self.inhalation.tick(articulation.breath_in, is_idle, gamma, tick_s);
         if self.inflection.tick(self.tongue.is_holding(), gamma, articulation, tick_s) {

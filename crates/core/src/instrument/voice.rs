@@ -117,10 +117,10 @@ impl<F: Real> Mouth<F> {
         self.noise.flow(self.state.flow, self.at)
     }
 
-    /// The reed is where the tongue holds it: no movement, no thump.
-    fn hold_reed(&mut self) {
-        self.state.closing = TONGUE_FORCE;
-        self.tongue = TONGUE_FORCE;
+    /// The reed is where the tongue holds it with this force: no movement, no thump.
+    fn hold_reed(&mut self, force: f64) {
+        (self.state.closing, self.state.speed) = (force, 0.0);
+        (self.tongue, self.tongue_glide) = (force, 0.0);
     }
 }
 
@@ -375,14 +375,14 @@ impl<F: Real> Voice<F> {
         self.lattice.reset();
         self.pads.silence();
         self.mouth.silence();
-        self.mouth.hold_reed();
+        self.mouth.hold_reed(TONGUE_FORCE);
         self.ticks = 0;
     }
 
     /// Cuts a note off: [`silence`](Self::silence), with the tongue on the reed. Real-time safe.
     pub fn cut(&mut self) {
         self.silence();
-        self.mouth.hold_reed();
+        self.mouth.hold_reed(TONGUE_FORCE);
     }
 
     /// Takes away all waves and all motion of the reed; openings and delay stay. Real-time safe.
@@ -391,6 +391,11 @@ impl<F: Real> Voice<F> {
         self.pads.silence();
         self.mouth.silence();
         self.ticks = 0;
+    }
+
+    /// Puts the reed where the tongue holds it with a force over the reference closing pressure, without a sound. Real-time safe.
+    pub fn hold_reed(&mut self, force: f64) {
+        self.mouth.hold_reed(force);
     }
 
     /// How often a state that was not finite was reset.

@@ -12,6 +12,10 @@
 //! and never by its value in a [snapshot](super::snapshot), nor by a value at rest that comes once. At rest are 0 and, for
 //! expression, 127: every sequencer sends that as *full*, and it would blow with closing pressure. Once a controller
 //! counts, its 0 means that the player does not blow.
+//!
+//! Channel pressure is also what a keyboard sends of keys that are pressed on. A keyboard has none without a key, a wind controller has: its
+//! player blows before a note begins. So while any controller may blow, pressure under a held key makes notes louder than their velocity
+//! ([`Heard::Keys`]), and counts as breath once it comes without a key.
 
 use super::snapshot::Place;
 
@@ -33,6 +37,15 @@ impl BreathController {
     fn is_rest(self, unit: f32) -> bool {
         unit <= 0.0 || (self == Self::Expression && unit >= 1.0)
     }
+}
+
+/// What a controller that moves means.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Heard {
+    /// Breath, 0..=1.
+    Breath(f32),
+    /// The keys are pressed on, 0..=1.
+    Keys(f32),
 }
 
 /// Which controllers may blow.
@@ -129,8 +142,8 @@ impl BreathChoice {
         self.heard
     }
 
-    /// A controller moves. `place` is its place among the channel's controllers; `is_held`: a key is. Gives breath, 0..=1,
-    /// if it is heard.
+    /// A controller moves. `place` is its place among the channel's controllers; `is_held`: a key is;
+    /// `may_be_of_keys`: a keyboard could send it as pressure on keys. Gives what is heard of it.
     pub fn hear(
         &mut self,
         controller: BreathController,
@@ -138,7 +151,8 @@ impl BreathChoice {
         (is_fine, value): (bool, u8),
         place: Place,
         is_held: bool,
-    ) -> Option<f32> {
+        may_be_of_keys: bool,
+    ) -> Option<Heard> {
         if !self.from.allows(controller) {
             return None;
         }
@@ -154,7 +168,11 @@ impl BreathChoice {
         let unit = claim.fader.unit();
         let before = claim.unit.replace(unit);
         if self.heard >= Some(controller) {
-            return (self.heard == Some(controller)).then_some(unit);
+            return (self.heard == Some(controller)).then_some(Heard::Breath(unit));
+        }
+        if may_be_of_keys && self.from == BreathFrom::Any {
+            claim.waits = false;
+            return (!is_snapshot).then_some(Heard::Keys(unit));
         }
         let has_changed = before.is_some_and(|before| before != unit);
         let counts = match place {
@@ -167,7 +185,7 @@ impl BreathChoice {
         if counts {
             self.heard = Some(controller);
         }
-        counts.then_some(unit)
+        counts.then_some(Heard::Breath(unit))
     }
 
     /// What this channel has sent was a snapshot: nothing of it waits for a key, and it shows no fine part.

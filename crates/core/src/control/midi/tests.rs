@@ -92,14 +92,46 @@ fn fine_breath_rises_with_every_step() {
 #[test]
 fn the_highest_source_that_has_moved_is_heard() {
     let mut midi = playing();
-    assert_eq!(midi.pressure(0, 127), [breath(127)]);
+    assert_eq!(midi.pressure(0, 127), [Event::KeyPressure(1.0)]);
     assert_eq!(midi.controller(3, 11, 1), [breath(1)]);
     assert_eq!(midi.pressure(0, 100), NOTHING);
     assert_eq!(midi.controller(0, 2, 10), [breath(10)]);
     assert_eq!(midi.controller(3, 11, 80), NOTHING);
     assert_eq!(midi.controller(3, 43, 80), NOTHING);
     assert_eq!(midi.breath_origin(), Some(BreathOrigin::Controller(BreathController::Breath)));
-    assert_eq!(playing().pressure(0, 100), [breath(100)]);
+}
+
+#[test]
+fn aftertouch_of_a_keyboard_adds_to_velocity_and_pressure_without_a_key_is_breath() {
+    let pressed = |value: u8| Event::KeyPressure(f32::from(value) / 127.0);
+    let mut midi = MidiDecoder::new();
+    midi.note_on(0, 60, 127);
+    assert_eq!(midi.pressure(0, 28), [pressed(28)]);
+    assert_eq!(midi.pressure(0, 0), [pressed(0)]);
+    midi.note_off(0, 60);
+    // Some keyboards say so after the key has come up.
+    assert_eq!(midi.pressure(0, 0), NOTHING);
+    assert_eq!(midi.note_on(0, 62, 127), [on(62)], "no breath");
+    assert_eq!(midi.breath_origin(), None);
+    midi.note_off(0, 62);
+    midi.pressure(0, 20);
+    assert_eq!(midi.pressure(0, 30), [breath(30)], "a wind controller: nobody presses a key");
+    midi.note_on(0, 64, 127);
+    assert_eq!(midi.pressure(0, 31), [breath(31)]);
+    // Who has chosen pressure means breath.
+    let mut midi = MidiDecoder::new();
+    midi.set_breath_from(BreathFrom::Only(BreathController::Pressure));
+    midi.note_on(0, 60, 127);
+    assert_eq!(midi.pressure(0, 100), [breath(100)]);
+}
+
+#[test]
+fn a_key_without_pressure_plays_by_velocity_beside_one_that_has_had_some() {
+    let mut midi = MidiDecoder::new();
+    midi.strike(note(1, 60), 127);
+    let press = |unit| NoteExpression::Breath(unit);
+    assert_eq!(midi.express(key(60), press(0.4)), [Event::Breath(0.4)]);
+    assert_eq!(midi.strike(note(2, 64), 127)[0], Event::BreathFromKeys);
 }
 
 #[test]
@@ -198,7 +230,8 @@ fn bend_reaches_both_ends_and_follows_rpn_0() {
     midi.controller(0, 6, 1);
     assert_eq!(midi.bend(0, 0), [bend(-1250.0)]);
     assert_eq!(midi.bend(1, 0), [bend(-200.0)], "range is per channel");
-    assert_eq!(midi.controller(0, 121, 0), [bend(0.0)]);
+    assert_eq!(midi.controller(0, 121, 0), NOTHING, "another channel bends");
+    assert_eq!(midi.controller(1, 121, 0), [bend(0.0)]);
 }
 
 #[test]
@@ -411,7 +444,8 @@ fn what_belongs_to_an_unheard_note_waits_for_it() {
     ];
     assert_eq!(midi.release(id(2)), heard_again);
     // A new note has none of it.
-    let fresh = [bend(0.0), Event::Volume { gain: 1.0 }, Event::Pan { position: 0.0 }, on(65)];
+    let fresh =
+        [bend(0.0), Event::BreathFromKeys, Event::Volume { gain: 1.0 }, Event::Pan { position: 0.0 }, on(65)];
     assert_eq!(midi.strike(note(3, 65), 127), fresh);
 }
 

@@ -38,6 +38,8 @@ pub enum Asked {
 pub struct Breath {
     /// Velocity of the last key, 0..=1.
     velocity: f64,
+    /// How far the keys are pressed on, 0..=1.
+    pressed: f64,
     /// Whether any breath event has arrived.
     live: bool,
     /// The last breath event, 0..=1 of full breath.
@@ -66,6 +68,11 @@ impl Breath {
     /// The velocity of a new key, 0..=1; not a number counts as 0.5.
     pub fn set_velocity(&mut self, velocity: f32) {
         self.velocity = f64::from(if velocity.is_finite() { velocity.clamp(0.0, 1.0) } else { 0.5 });
+    }
+
+    /// The keys are pressed on, 0..=1; not a number counts as 0.
+    pub fn press(&mut self, pressure: f32) {
+        self.pressed = f64::from(if pressure.is_finite() { pressure.clamp(0.0, 1.0) } else { 0.0 });
     }
 
     /// A machine slurs over an interval, cents, from one register to another: a difficult slur begins a short dip of the
@@ -99,12 +106,12 @@ impl Breath {
 
     /// The same velocity and breath level for another instrument, whose pressure begins at 0.
     pub fn carried(&self) -> Self {
-        Self { velocity: self.velocity, live: self.live, level: self.level, ..Self::default() }
+        Self { gamma: 0.0, dip_s: 0.0, ..*self }
     }
 
     /// Takes over velocity and breath level of another player; the pressure follows as it does any breath.
     pub fn follow(&mut self, from: &Self) {
-        (self.velocity, self.live, self.level) = (from.velocity, from.live, from.level);
+        *self = Self { gamma: self.gamma, dip_s: self.dip_s, ..*from };
     }
 
     /// What breath source or velocity ask for.
@@ -112,7 +119,7 @@ impl Breath {
         match (key_down, self.live) {
             (false, _) => Asked::Nothing,
             (true, true) => Asked::Level(self.level),
-            (true, false) => Asked::Velocity(self.velocity),
+            (true, false) => Asked::Velocity(self.velocity + (1.0 - self.velocity) * self.pressed),
         }
     }
 

@@ -90,6 +90,15 @@ impl Tongue {
         true
     }
 
+    /// Rests on another reed, with this closing pressure: the force with which it does, if it rests.
+    pub fn rest_on(&mut self, free_closing: f64) -> Option<f64> {
+        if self.position != Position::Resting || self.slap.is_some() {
+            return None;
+        }
+        self.force = TONGUE_FORCE * free_closing;
+        Some(self.force)
+    }
+
     /// Whether the tongue holds the reed before a note.
     pub fn is_holding(&self) -> bool {
         matches!(self.position, Position::Holding(_))
