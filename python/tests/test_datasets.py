@@ -67,9 +67,10 @@ def test_what_was_stopped_goes_on(tmp_path):
     assert (tmp_path / begun[1]).stat().st_mtime_ns == kept[begun[1]]
     rows = parquet.read_table(tmp_path / "parquet").to_pylist()
     assert sorted(row["row"] for row in rows) == list(range(1, 13))
-    # Another sound is another data set.
-    other = chalumeau.dataset(PLAN.replace("0.5\nno", "0.4\nno"), tmp_path, rows_per_part=3)
-    assert other.rendered == 12
+    # Another sound is another data set, which overwrites nothing.
+    with pytest.raises(ValueError, match="another plan"):
+        chalumeau.dataset(PLAN.replace("0.5\nno", "0.4\nno"), tmp_path, rows_per_part=3)
+    assert chalumeau.dataset(PLAN, tmp_path, rows_per_part=3).rendered == 0
 
 
 def test_a_lost_file_is_told(tmp_path):

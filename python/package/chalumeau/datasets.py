@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import argparse
 import csv
+import hashlib
+import json
 import math
 import os
 import tempfile
@@ -29,6 +31,8 @@ __all__ = ["Done", "Part", "Report", "dataset", "growth", "measure", "parts", "r
 
 #: The table of a data set, as ``chalumeau batch`` writes it, with more columns at the end of each line.
 MANIFEST = "manifest.csv"
+#: A hash of the rows that a folder is for.
+PLAN = "plan.sha256"
 
 
 #: Calls a function with each of a list, in any order, on whatever does the work.
@@ -73,7 +77,8 @@ def dataset(
 ) -> Report:
     """Renders and measures every row of a plan into a folder: ``parquet/`` with the table, and ``manifest.csv``.
 
-    ``workers`` are processes on this machine. ``map`` takes the work elsewhere, in two lines; all workers must see ``into``::
+    ``workers`` are processes on this machine; they load your script, so call `dataset` under ``if __name__ == "__main__":`` there.
+    ``map`` takes the work elsewhere, in two lines; all workers must see ``into``::
 
         client = dask.distributed.Client(...)                                    # Dask
         dataset(plan, into, map=lambda work, parts: client.gather(client.map(work, parts)))
@@ -82,7 +87,8 @@ def dataset(
         dataset(plan, into, map=lambda _, parts: ray.get([work.remote(part) for part in parts]))
 
     Each file has some rows, ``rows_per_part``, and appears when it is whole. Whatever is stopped or dies, the same call goes
-    on where it was, and at the end every row is there once: that is checked. Files of other rows must not lie in the folder.
+    on where it was, and at the end every row is there once: that is checked. A folder that holds the rows of another
+    plan is refused.
 
     ``manifest.csv`` has the columns of ``chalumeau batch`` (``file``, the names of the plan, ``length_s``, ``rate_hz``,
     ``peak_dbfs``, ``rms_dbfs``) and then those of `measure`. ``file`` is the Parquet file of the row. With ``sound`` the Parquet
@@ -99,16 +105,24 @@ def dataset(
     (4, 4, 0)
     """
     began = time.monotonic()
+    if workers < 1:
+        raise ValueError(f"workers must be at least 1, got {workers}")
     cut = parts(plan, into, sound=sound, rows_per_part=rows_per_part)
     os.makedirs(into, exist_ok=True)
     ours = {part.file for part in cut}
     foreign = sorted(path.name for path in Path(into).glob(f"{PARQUET}/*.parquet") if f"{PARQUET}/{path.name}" not in ours)
     if foreign:
         raise ValueError(f"{into} has files of another data set: {', '.join(foreign[:3])} ...; take another folder")
+    planned, stamp = _digest(cut), Path(into, PLAN)
+    if stamp.exists() and stamp.read_text() != planned:
+        raise ValueError(f"{into} holds a data set of another plan; take another folder, or remove this one first")
     left = [part for part in cut if not is_there(part)]
     if left:
         # A wrong name or value is told before anything is made.
         _check(left)
+        growing = Path(into, f".{PLAN}.{uuid.uuid4().hex}")
+        growing.write_text(planned)
+        os.replace(growing, stamp)
     if map is not None:
         done = list(map(render_part, left))
     elif workers > 1:
@@ -128,6 +142,11 @@ def dataset(
     )
 
 
+def _digest(cut: Sequence[Part]) -> str:
+    rows = [row for part in cut for row in part.rows]
+    return hashlib.sha256(json.dumps(rows).encode()).hexdigest()
+
+
 def _check(left: Sequence[Part]) -> None:
     """Each value of each name is tried once, in the first row that has it."""
     tried: set[tuple[str, str]] = set()
@@ -145,11 +164,18 @@ def _check(left: Sequence[Part]) -> None:
 def _in_processes(left: Sequence[Part], workers: int) -> list[Done]:
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
+    from concurrent.futures.process import BrokenProcessPool
 
     # Threads of this process are not copied into a worker.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
-        return list(pool.map(render_part, left))
+    try:
+        with ProcessPoolExecutor(workers, mp_context=context) as pool:
+            return list(pool.map(render_part, left))
+    except BrokenProcessPool as error:
+        raise RuntimeError(
+            'a worker ended before its work was done. Workers run your script again, so call dataset under '
+            'if __name__ == "__main__": there; if it is so, the memory may be full: take fewer workers'
+        ) from error
 
 
 def _write_manifest(cut: Sequence[Part], into: str | os.PathLike[str]) -> int:

@@ -86,7 +86,7 @@ def load_parquet() -> Any:
     try:
         import pyarrow.parquet
     except ImportError as error:
-        raise ImportError("a data set needs pyarrow; pip install 'chalumeau[dataset]'") from error
+        raise ImportError("a data set needs pyarrow; pip install pyarrow") from error
     return pyarrow, pyarrow.parquet
 
 
