@@ -13,6 +13,7 @@ use numpy::{Complex64, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::ops::ControlFlow;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 /// The range in which the models hold, Hz, as of `chalumeau impedance`.
 const FREQUENCIES_HZ: (f64, f64) = (1.0, 20_000.0);
@@ -22,6 +23,22 @@ fn air(temperature_c: f64) -> PyResult<Air> {
         return Ok(Air::at(temperature_c));
     }
     Err(wrong(format_args!("temperature must lie in 10..40 °C, got {temperature_c}")))
+}
+
+/// Fails if the user wants to stop (Ctrl-C).
+fn signals() -> PyResult<()> {
+    Python::attach(|py| py.check_signals())
+}
+
+/// Z/Zc at each frequency. Ctrl-C ends it.
+fn at_each(frequencies_hz: &[f64], z: impl Fn(f64) -> Complex64) -> PyResult<Vec<Complex64>> {
+    let mut all = Vec::with_capacity(frequencies_hz.len());
+    // Some ten milliseconds each.
+    for part in frequencies_hz.chunks(256) {
+        signals()?;
+        all.extend(part.iter().map(|&f_hz| z(f_hz)));
+    }
+    Ok(all)
 }
 
 /// Z/Zc of a fingering at each frequency.
@@ -57,13 +74,11 @@ pub fn impedance<'py>(
                 .as_built(&mut |_| ControlFlow::Continue(()))
                 .map_err(wrong)?;
             let opening: Vec<f64> = open.iter().map(|&open| f64::from(u8::from(open))).collect();
-            return Ok(frequencies.iter().map(|&f_hz| model.coeffs.impedance(f_hz, &opening)).collect());
+            return at_each(&frequencies, |f_hz| model.coeffs.impedance(f_hz, &opening));
         }
         let matrix = TransferMatrix::new(file, air);
         let volume_m3 = if reed_volume { file.reed_volume_m3 } else { 0.0 };
-        Ok::<Vec<Complex64>, PyErr>(
-            frequencies.iter().map(|&f_hz| matrix.impedance(f_hz, &open, volume_m3)).collect(),
-        )
+        at_each(&frequencies, |f_hz| matrix.impedance(f_hz, &open, volume_m3))
     })?;
     Ok(PyArray1::from_vec(py, z))
 }
@@ -137,10 +152,15 @@ pub fn bifurcation<'py>(
         wrong(format_args!("written {} sounds outside MIDI's 0..127", WrittenNote(written)))
     })?;
     let found = py.detach(|| {
-        let job = offline::blown(&pairs, file, to)?;
-        Ok(ramp::measure(&job.model, &job.settings, sounding, to as f32, seconds, job.rate, |_| ()))
-    });
-    let found = found.map_err(|what: String| wrong(what))?;
+        let job = offline::blown(&pairs, file, to).map_err(wrong)?;
+        // The ramp tells of its progress and cannot be asked to stop, so Ctrl-C unwinds it; it owns all that it changes.
+        let each = |_| signals().unwrap_or_else(|error| resume_unwind(Box::new(error)));
+        let play = || ramp::measure(&job.model, &job.settings, sounding, to as f32, seconds, job.rate, each);
+        catch_unwind(AssertUnwindSafe(play)).map_err(|thrown| match thrown.downcast::<PyErr>() {
+            Ok(error) => *error,
+            Err(other) => resume_unwind(other),
+        })
+    })?;
     let all = || found.up.iter().chain(&found.down);
     let changes = found.transitions();
     let columns = PyDict::new(py);
@@ -222,6 +242,7 @@ pub fn torque<'py>(
     let note = feel_of(py, &pairs, instrument, written)?;
     let tables = ReedTables::reference();
     let angles = angles_deg.as_array();
-    let torques = angles.iter().map(|&angle| torque_law::torque_mnm(&note.feel, tables, angle));
+    let torque = |&angle: &f64| torque_law::torque_mnm(&note.feel, tables, angle);
+    let torques = angles.iter().map(|angle| if angle.is_nan() { f64::NAN } else { torque(angle) });
     Ok(PyArray1::from_vec(py, torques.collect()))
 }

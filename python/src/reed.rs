@@ -34,6 +34,6 @@ pub fn reed_flow<'py>(
     }
     .map_err(wrong)?;
     let tables = ReedTables::reference();
-    let flows = p.as_array().iter().map(|&p| law.flow(tables, p)).collect();
+    let flows = p.as_array().iter().map(|&p| if p.is_nan() { p } else { law.flow(tables, p) }).collect();
     Ok(PyArray1::from_vec(py, flows))
 }
