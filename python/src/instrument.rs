@@ -7,6 +7,7 @@ use chalumeau_core::bore::instrument_file::{Fingering, InstrumentFile};
 use chalumeau_core::units::WrittenNote;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// A checked instrument file.
 #[pyclass(frozen, module = "chalumeau._native")]
@@ -99,6 +100,12 @@ impl Instrument {
 
     fn __eq__(&self, other: &Self) -> bool {
         self.file == other.file
+    }
+
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        self.file.to_toml().hash(&mut hasher);
+        hasher.finish()
     }
 
     /// It travels between processes as its text.

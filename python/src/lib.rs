@@ -14,6 +14,7 @@ mod rows;
 mod voice;
 
 use chalumeau::parameters::{Kind, PARAMETERS};
+use chalumeau::presets::{factory, user};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -40,6 +41,22 @@ fn parameters(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
         .collect()
 }
 
+/// The presets that come with the program and the user's own: for each its name, tags, author, and what it shows.
+#[pyfunction]
+fn presets(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
+    let user = user();
+    let all = factory::all().iter().chain(&user.presets);
+    all.map(|preset| {
+        let dict = PyDict::new(py);
+        dict.set_item("name", &preset.name)?;
+        dict.set_item("tags", &preset.tags)?;
+        dict.set_item("author", &preset.author)?;
+        dict.set_item("shows", &preset.shows)?;
+        Ok(dict)
+    })
+    .collect()
+}
+
 /// The compiled part of the package `chalumeau`.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -47,6 +64,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<instrument::Instrument>()?;
     module.add_class::<voice::Voice>()?;
     module.add_function(wrap_pyfunction!(parameters, module)?)?;
+    module.add_function(wrap_pyfunction!(presets, module)?)?;
+    module.add_function(wrap_pyfunction!(render::silent, module)?)?;
     module.add_function(wrap_pyfunction!(instrument::note, module)?)?;
     module.add_function(wrap_pyfunction!(render::render, module)?)?;
     module.add_function(wrap_pyfunction!(bore::impedance, module)?)?;

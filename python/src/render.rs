@@ -67,6 +67,19 @@ pub fn render<'py>(
     Ok(dict)
 }
 
+/// What the user should know of a sounding note that is played with these settings: that it stays silent.
+#[pyfunction]
+pub fn silent(
+    py: Python<'_>,
+    pairs: Vec<(String, String)>,
+    instrument: &Instrument,
+    note: u8,
+) -> PyResult<Vec<String>> {
+    let given = Given::Notes(vec![timed((0.0, 0.1, note, 0.8))?]);
+    let file = instrument.file.clone();
+    py.detach(|| offline::render_job(&pairs, Some(file), Some(given))).map(|job| job.warnings).map_err(wrong)
+}
+
 fn timed((from_s, seconds, note, velocity): ListedNote) -> PyResult<TimedNote> {
     let fits = |seconds: f64| (0.0..=86_400.0).contains(&seconds);
     if !fits(from_s) || !fits(seconds) {

@@ -32,7 +32,7 @@ from chalumeau.acoustics import (
     thresholds,
     torque,
 )
-from chalumeau.arguments import fingerings, instrument, instruments, note, parameters
+from chalumeau.arguments import fingerings, instrument, instruments, note, parameters, presets
 from chalumeau.datasets import dataset
 from chalumeau.measuring import measure, rows
 from chalumeau.playing import Clarinet, Note, render
@@ -54,6 +54,7 @@ __all__ = [
     "measure",
     "note",
     "parameters",
+    "presets",
     "reed_flow",
     "reed_tables",
     "render",

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import operator
 import os
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any, Union
+from typing import Any, SupportsFloat, SupportsIndex, Union, cast
+
+import numpy as np
 
 from chalumeau import _native
 from chalumeau._native import Instrument
@@ -15,9 +18,9 @@ from chalumeau._native import Instrument
 #: An instrument: the id of a bundled one, the path or the text of a TOML file, the same as a dict, or an `Instrument`.
 InstrumentLike = Union[str, "os.PathLike[str]", Mapping[str, Any], Instrument]
 #: A MIDI number, 0 to 127, or a name such as ``"C4"``.
-NoteLike = Union[int, str]
+NoteLike = Union[SupportsIndex, SupportsFloat, str]
 #: A value of a setting: a number, a switch, or a text with a unit, such as ``"7 kPa"``.
-Value = Union[bool, int, float, str, None]
+Value = Union[SupportsIndex, SupportsFloat, str, None]
 
 
 def instruments() -> list[str]:
@@ -93,6 +96,45 @@ def parameters() -> list[dict[str, Any]]:
     return _native.parameters()
 
 
+def presets() -> list[dict[str, Any]]:
+    """All presets, those of the program and your own: ``name``, ``tags``, ``author`` and what it ``shows``.
+
+    ``chalumeau.render(..., preset=name)`` plays with one.
+
+    >>> import chalumeau
+    >>> [preset["name"] for preset in chalumeau.presets() if "subtone" in preset["name"].lower()]
+    ['Subtone ballad', 'Subtone bass']
+    """
+    return _native.presets()
+
+
+def plain(name: str, value: Any) -> Any:
+    """A number of numpy as Python has it. Refuses arrays of several values, and masked ones."""
+    if not isinstance(value, (np.ndarray, np.generic)):
+        return value
+    if value.shape != ():
+        raise TypeError(f"{name} must be one value, got an array of the shape {value.shape}; call once for each of its values")
+    if np.ma.is_masked(value):
+        raise ValueError(f"{name} is masked; give a number")
+    return value.item()
+
+
+def number(name: str, value: Any) -> float:
+    """An argument that is a number."""
+    value = plain(name, value)
+    if isinstance(value, str) or not hasattr(value, "__float__") and not hasattr(value, "__index__"):
+        raise TypeError(f"{name} must be a number, not {type(value).__name__}")
+    return float(value)
+
+
+def whole(name: str, value: Any) -> int:
+    """An argument that is a whole number; 2.0 is one."""
+    found = number(name, value)
+    if not found.is_integer():
+        raise ValueError(f"{name} must be a whole number, got {value}")
+    return int(found)
+
+
 def note(what: NoteLike) -> int:
     """The MIDI number of a note. Raises `ValueError` if there is none.
 
@@ -100,29 +142,64 @@ def note(what: NoteLike) -> int:
     >>> chalumeau.note("C4"), chalumeau.note("Bb3"), chalumeau.note(60)
     (60, 58, 60)
     """
+    what = plain("a note", what)
+    if isinstance(what, float) and what.is_integer():
+        what = int(what)
+    if isinstance(what, str):
+        what = _spelt(what)
     if isinstance(what, bool) or not (isinstance(what, str) or hasattr(what, "__index__")):
         raise TypeError(f"a note is a MIDI number or a name such as 'C4', not {type(what).__name__}")
-    return _native.note(what if isinstance(what, str) else str(what.__index__()))
+    return _native.note(what if isinstance(what, str) else str(operator.index(cast(SupportsIndex, what))))
+
+
+def _spelt(name: str) -> str:
+    """The name of a note as the command line has it."""
+    return name.strip().replace("\u266d", "b").replace("\u266f", "#")
 
 
 # Where an argument is called `instrument`, the function of this name is not in sight.
 instrument_of = instrument
 
 
+#: Arguments that are whole numbers, also if they are given as 60.0.
+_WHOLE = ("written", "sounding", "rate", "players")
+
+
 def text_of(name: str, value: Value) -> str:
     """A value as the command line would have it."""
+    value = plain(name, value)
     if isinstance(value, str):
-        return value
+        return _spelt(value) if name in ("written", "sounding") else value
     if value is None:
         return ""
-    # numpy's booleans are no `bool`.
-    if isinstance(value, bool) or type(value).__name__ in ("bool_", "bool"):
+    if isinstance(value, bool) or value in (0, 1) and _is_switch(name):
         return "true" if value else "false"
     if hasattr(value, "__index__"):
         return str(value.__index__())
     if hasattr(value, "__float__"):
-        return repr(float(value))
+        found = float(value)
+        return str(int(found)) if name in _WHOLE and found.is_integer() else repr(found)
     raise TypeError(f"{name} must be a number, a text, True or False, not {type(value).__name__}")
+
+
+@cache
+def _is_switch(name: str) -> bool:
+    """Whether a flag takes True or False."""
+    try:
+        _native.check([(name, "neither")])
+    except ValueError as error:
+        return "must be true or false" in str(error)
+    return False
+
+
+@cache
+def is_of_render(name: str) -> bool:
+    """Whether `render` knows this name."""
+    try:
+        _native.check([(name, "")])
+    except ValueError as error:
+        return " is called " not in str(error)
+    return True
 
 
 @cache
@@ -141,6 +218,9 @@ def setting_id(name: str) -> str:
 
 def pairs(*named: Mapping[str, Value] | None) -> list[tuple[str, str]]:
     """Names and values as texts; what is None is left out."""
+    for group in named:
+        if group is not None and not isinstance(group, Mapping):
+            raise TypeError(f"settings must be a dict such as {{'strength': 3}}, got {group!r}")
     return [
         (name, text_of(name, value))
         for group in named
