@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from chalumeau import _native
-from chalumeau.arguments import InstrumentLike, NoteLike, Value, instrument_of, note, pairs
+from chalumeau.arguments import InstrumentLike, NoteLike, Value, instrument_of, note, number, pairs, whole
 
 #: A written note, or the names of the open holes.
 FingeringLike = Union[NoteLike, Sequence[str]]
@@ -23,8 +23,10 @@ def _fingering(fingering: FingeringLike) -> int | list[str]:
 
 
 def _numbers(values: npt.ArrayLike) -> tuple[_Floats, tuple[int, ...]]:
-    array = np.ascontiguousarray(values, np.float64)
-    return array.reshape(-1), np.shape(values)
+    given = values if isinstance(values, np.ndarray) else np.asarray(values)
+    if np.ma.is_masked(given) or given.dtype == object and any(value is None for value in given.flat):
+        raise ValueError("None and masked values are no numbers; leave them out, or give nan")
+    return np.ascontiguousarray(given, np.float64).reshape(-1), given.shape
 
 
 def impedance(
@@ -57,7 +59,7 @@ def impedance(
         raise ValueError(f"model must be 'tmm' or 'lattice', got {model!r}")
     flat, shape = _numbers(frequencies_hz)
     z = _native.impedance(
-        instrument_of(instrument), _fingering(fingering), flat, model == "lattice", reed_volume, float(temperature)
+        instrument_of(instrument), _fingering(fingering), flat, model == "lattice", reed_volume, number("temperature", temperature)
     )
     return z.reshape(shape)
 
@@ -70,7 +72,7 @@ def impedance_peaks(
     reed_volume: bool = False,
     temperature: float = 25.0,
 ) -> dict[str, _Floats]:
-    """The first peaks of \\|Z\\|/Zc of the transfer matrices: ``f_hz``, ``mag_over_zc`` and ``q``, each of shape ``(count,)``.
+    """The first peaks of \\|Z\\|/Zc of the transfer matrices: ``f_hz``, ``mag_over_zc`` and ``q``, at most ``count`` of each.
 
     ``count`` is 1..30; the other arguments are as in `impedance`.
 
@@ -79,8 +81,11 @@ def impedance_peaks(
     >>> bool(2.8 < f_hz[1] / f_hz[0] < 3.2)     # a closed tube: odd multiples
     True
     """
+    count = whole("count", count)
+    if count < 1:
+        raise ValueError(f"count must lie in 1..30, got {count}")
     return _native.impedance_peaks(
-        instrument_of(instrument), _fingering(fingering), count, reed_volume, float(temperature)
+        instrument_of(instrument), _fingering(fingering), count, reed_volume, number("temperature", temperature)
     )
 
 
@@ -134,7 +139,7 @@ def bifurcation(
     (True, None)
     """
     return _native.bifurcation(
-        pairs(settings, {"rate": rate}), instrument_of(instrument), note(written), float(to), float(seconds)
+        pairs(settings, {"rate": rate}), instrument_of(instrument), note(written), number("to", to), number("seconds", seconds)
     )
 
 
@@ -170,7 +175,8 @@ def reed_flow(
     [0.0, 1.0, 0.0, 0.0]
     """
     flat, shape = _numbers(p)
-    return _native.reed_flow(flat, H, k, A).reshape(shape)
+    opening, stiffness = (None if value is None else number(name, value) for name, value in (("H", H), ("k", k)))
+    return _native.reed_flow(flat, opening, stiffness, number("A", A)).reshape(shape)
 
 
 def feel(written: NoteLike, *, instrument: InstrumentLike = "b-flat", **design: Value) -> dict[str, Any]:
@@ -223,7 +229,9 @@ def features(samples: npt.ArrayLike, rate: float = 48_000) -> dict[str, Any]:
     >>> levels[1] < levels[2]    # the second harmonic is weaker than the third
     True
     """
-    array = np.ascontiguousarray(samples, np.float32)
+    array = _numbers(samples)[0].reshape(np.shape(samples)).astype(np.float32)
+    if not np.isfinite(array).all():
+        raise ValueError("samples hold NaN or infinity, which has no pitch or level; measure a part without them")
     if array.ndim != 1:
         raise ValueError(f"samples must have one dimension, got the shape {array.shape}; take one channel")
-    return _native.features(array, float(rate))
+    return _native.features(array, number("rate", rate))

@@ -13,7 +13,7 @@ import numpy as np
 
 from chalumeau import _native
 from chalumeau.acoustics import features
-from chalumeau.arguments import Value, text_of
+from chalumeau.arguments import Value, is_of_render, plain, text_of
 from chalumeau.playing import render
 
 #: A plan: the path of a TOML or CSV file, the text of a TOML plan, a dict of its tables, or rows.
@@ -35,7 +35,7 @@ def rows(plan: PlanLike) -> list[dict[str, str]]:
     (6, {'seconds': '0.3', 'gamma': '0.4', 'written': 'C4'})
     """
     if isinstance(plan, Mapping):
-        names, values = _native.rows(json=json.dumps(plan))
+        names, values = _native.rows(json=json.dumps(_as_json("plan", plan)))
     elif isinstance(plan, str) and "\n" in plan:
         names, values = _native.rows(text=plan)
     elif isinstance(plan, (str, os.PathLike)):
@@ -43,8 +43,25 @@ def rows(plan: PlanLike) -> list[dict[str, str]]:
     else:
         given = [{name: text_of(name, value) for name, value in row.items()} for row in plan]
         names = list(dict.fromkeys(name for row in given for name in row))
+        for name in names:
+            if name not in ("channels", "bits", "out", "force") and not is_of_render(name):
+                _native.check([(name, "")])
         return [{name: row.get(name, "") for name in names} for row in given]
     return [dict(zip(names, of_row)) for of_row in values]
+
+
+def _as_json(place: str, value: Any) -> Any:
+    """A plan with lists and numbers as JSON has them."""
+    if isinstance(value, Mapping):
+        return {name: _as_json(f"{place}[{name!r}]", each) for name, each in value.items()}
+    if isinstance(value, np.ndarray) and value.shape != ():
+        value = list(value)
+    if isinstance(value, (list, tuple, range)):
+        return [_as_json(f"{place}[{at}]", each) for at, each in enumerate(value)]
+    value = plain(place, value)
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"{place} is {value}; give a finite number, or leave it out")
+    return os.fspath(value) if isinstance(value, os.PathLike) else value
 
 
 def measure(row: Mapping[str, Value], sound: bool = False) -> dict[str, Any]:

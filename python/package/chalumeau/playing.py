@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from chalumeau import _native
-from chalumeau.arguments import InstrumentLike, NoteLike, Value, instrument_of, note, pairs, setting_id
+from chalumeau.arguments import InstrumentLike, NoteLike, Value, instrument_of, is_of_render, note, number, pairs, parameters, setting_id, whole
 
 #: 32-bit float samples, full scale 1.0.
 Samples = npt.NDArray[np.float32]
@@ -83,15 +83,19 @@ def render(
     if isinstance(score, (bytes, bytearray, memoryview)):
         midi = bytes(score)
     elif isinstance(score, (str, os.PathLike)):
+        if score == "":
+            raise ValueError('the score is an empty text; give the path of a MIDI file, or written="C4" for one note')
         midi = Path(score).read_bytes()
     elif score is not None:
+        if not isinstance(score, Iterable):
+            raise TypeError(f"a score is the path of a MIDI file, its bytes or a list of notes, not {score!r}; for one note say written={score!r}")
         notes = [_listed(one) for one in score]
     made = _native.render(
         pairs(settings, named, {"rate": rate, "players": players}),
         None if instrument is None else instrument_of(instrument),
         midi,
         notes,
-        channels,
+        whole("channels", channels),
     )
     for warning in made["warnings"]:
         warnings.warn(warning, stacklevel=2)
@@ -111,13 +115,41 @@ def _listed(one: Any) -> tuple[float, float, int, float]:
         raise TypeError(
             f"a note is (from_s, seconds, note) or (from_s, seconds, note, velocity), not {one!r}"
         ) from None
-    return float(from_s), float(seconds), note(key), float(velocity)
+    return number("from_s", from_s), number("seconds", seconds), note(key), number("velocity", velocity)
+
+
+def _within(name: str, value: Any, low: float, high: float) -> float:
+    found = number(name, value)
+    if not low <= found <= high:
+        raise ValueError(f"{name} must lie in {low}..{high}, got {value}")
+    return found
+
+
+def _refuse_idle(settings: Mapping[str, Value] | None, named: Mapping[str, Value]) -> None:
+    """Refuses what a live clarinet would ignore, or cannot do."""
+    pairs(settings, named)
+    idle = {each["id"]: each["group"] for each in parameters() if each["group"] in ("Players", "Room")}
+    known = {each["id"] for each in parameters()} | {"no_noise", "tempered", "natural", "quality", "untuned"}
+    for name, value in {**(settings or {}), **named}.items():
+        spelt = name.replace("-", "_")
+        if value is None:
+            continue
+        if spelt in ("rate", "instrument"):
+            raise ValueError(f"{name} is chosen when a Clarinet is made: Clarinet({name}=...)")
+        if setting_id(name) in idle or spelt == "unison":
+            raise ValueError(f"{name} does nothing here: a Clarinet is one player, mono and without a room; use chalumeau.render")
+        if setting_id(name) not in known and spelt not in known and not spelt.startswith("reed_") and is_of_render(name):
+            raise ValueError(
+                f"{name} is an argument of chalumeau.render, which plays a whole score; "
+                "a Clarinet takes settings of the sound (chalumeau.parameters()), and is played by breath, note_on ..."
+            )
 
 
 class Clarinet:
     """A clarinet that is played event by event: what a host's audio thread does, at your pace.
 
-    ``instrument``, ``settings`` and all other names are as in `render`. Sound is made only by `render`, `render_into` and
+    ``instrument`` and the settings of the sound are as in `render`; what only a whole rendering has (scores, presets, several
+    players, a room) is refused. Sound is made only by `render`, `render_into` and
     `play`; events act between the samples. How the time is cut into pieces does not change a bit of the sound. Mono; for a
     room or several players use `chalumeau.render`.
 
@@ -144,8 +176,11 @@ class Clarinet:
         **named: Value,
     ) -> None:
         self._instrument = instrument_of(instrument)
+        _refuse_idle(settings, named)
         self._settings: dict[str, Value] = {**(settings or {}), **named}
-        self._voice = _native.Voice(pairs(self._settings, {"rate": rate}), self._instrument)
+        self._rate = {"rate": rate}
+        self._voice = _native.Voice(pairs(self._settings, self._rate), self._instrument)
+        self._silent: dict[int, list[str]] = {}
 
     @property
     def rate(self) -> int:
@@ -182,16 +217,26 @@ class Clarinet:
         >>> clarinet.settings
         {'lip': 1.1, 'Reed strength': 4}
         """
+        _refuse_idle(settings, named)
         changes = {**(settings or {}), **named}
+        fixed = [name for name in changes if name in ("quality", "untuned")]
+        if fixed:
+            raise ValueError(f"{fixed[0]} cannot change while a Clarinet plays; make another: Clarinet({fixed[0]}=...)")
         changed = {setting_id(name) for name in changes}
         wanted = {name: value for name, value in self._settings.items() if setting_id(name) not in changed}
         wanted |= {name: value for name, value in changes.items() if value is not None}
         self._voice.set(pairs(wanted), self._instrument)
         self._settings = wanted
+        self._silent.clear()
 
     def note_on(self, key: NoteLike, velocity: float = 0.8) -> None:
         """A key or fingering goes down: sounding pitch, velocity 0..1. Beside a held key it is slurred."""
-        self._voice.note_on(note(key), velocity)
+        pitch = note(key)
+        self._voice.note_on(pitch, _within("velocity", velocity, 0, 1))
+        if pitch not in self._silent:
+            self._silent[pitch] = _native.silent(pairs(self._settings, self._rate), self._instrument, pitch)
+        for warning in self._silent[pitch]:
+            warnings.warn(warning, stacklevel=2)
 
     def note_off(self, key: NoteLike) -> None:
         """A key comes up."""
@@ -199,15 +244,15 @@ class Clarinet:
 
     def breath(self, share: float) -> None:
         """Breath, 0..1 of full breath. From the first one on, it blows in place of the keys' velocity."""
-        self._voice.breath(share)
+        self._voice.breath(_within("breath", share, 0, 1))
 
     def bend(self, cents: float) -> None:
         """Pitch bend, -2400..2400 cents: near the note by the lip, beyond by the size of the bore."""
-        self._voice.bend(cents)
+        self._voice.bend(_within("bend", cents, -2400, 2400))
 
     def slap(self, strength: float = 1.0) -> None:
         """The tongue slaps the reed, 0..1."""
-        self._voice.slap(strength)
+        self._voice.slap(_within("slap", strength, 0, 1))
 
     def hole(self, name: str, opening: float | None) -> None:
         """Opens one hole 0..1, whatever is fingered: half-holes, shadings. None goes back to the fingering.
@@ -221,7 +266,7 @@ class Clarinet:
         names = [hole[0] for hole in self._instrument.holes()]
         if name not in names:
             raise ValueError(f"no hole is called {name!r}; the holes are {', '.join(names)}")
-        self._voice.hole(names.index(name), opening)
+        self._voice.hole(names.index(name), None if opening is None else _within("opening", opening, 0, 1))
 
     def panic(self) -> None:
         """Releases all notes and the breath, and clears the state."""
@@ -263,6 +308,7 @@ class Clarinet:
         return out
 
     def _samples(self, seconds: float) -> int:
+        seconds = number("seconds", seconds)
         if not 0.0 <= seconds <= 86_400.0:
             raise ValueError(f"seconds must lie in 0..86400, got {seconds}")
         return round(seconds * self.rate)
