@@ -72,7 +72,7 @@ def test_what_a_live_clarinet_cannot_do_is_refused(named, says):
 
 
 def test_settings_that_cannot_change_are_refused():
-    chalumeau.Clarinet(untuned=True)
+    chalumeau.Clarinet(untuned=True, H=2)
     for name, value in [("rate", 44_100), ("quality", "high")]:
         with pytest.raises(ValueError, match=name):
             chalumeau.Clarinet().set({name: value})

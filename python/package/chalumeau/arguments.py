@@ -207,7 +207,7 @@ def _ids() -> dict[str, str]:
     known = parameters()
     ids = {spelling.casefold(): each["id"] for each in known for spelling in (each["name"], each["id"])}
     # Where a flag and an id are spelt alike, it is the flag.
-    return ids | {each["flag"]: each["id"] for each in known if each["flag"]}
+    return ids | {each["flag"].casefold(): each["id"] for each in known if each["flag"]}
 
 
 def setting_id(name: str) -> str:
