@@ -7,7 +7,9 @@ const LATER = ['workshop.wasm'];
 addEventListener('install', (event) => {
   // From the server, not from the browser's own store, whose files may be of different versions.
   const all = ['./', ...FILES].map((file) => new Request(file, { cache: 'reload' }));
-  event.waitUntil(caches.open(NAME).then((cache) => cache.addAll(all)).then(() => skipWaiting()));
+  // Who has had a large file once can go on without a network after an update, too.
+  const had = Promise.all(LATER.map((file) => caches.match(file).then((kept) => (kept ? [new Request(file, { cache: 'reload' })] : []))));
+  event.waitUntil(had.then((more) => caches.open(NAME).then((cache) => cache.addAll([...all, ...more.flat()]))).then(() => skipWaiting()));
 });
 
 addEventListener('activate', (event) => {

@@ -26,6 +26,8 @@ const PORT: u16 = 8_000;
 const VERSION: &str = "VERSION";
 /// Likewise its list of files.
 const FILES: &str = "[/* FILES */]";
+/// Large, and fetched when first needed: `LATER` of sw.js.
+const LATER: [&str; 1] = ["workshop.wasm"];
 
 /// `cargo xtask web [--serve [port]]`.
 pub fn run(args: &[String]) -> Result<()> {
@@ -84,7 +86,8 @@ fn seal(folder: &Path, names: &[String]) -> Result<()> {
     let version: String = hasher.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect();
     let path = folder.join("sw.js");
     let text = fs::read_to_string(&path).context("the page has no sw.js")?;
-    let list = serde_json::to_string(names)?;
+    let at_once: Vec<_> = names.iter().filter(|name| !LATER.contains(&name.as_str())).collect();
+    let list = serde_json::to_string(&at_once)?;
     fs::write(path, text.replacen(VERSION, &version, 1).replacen(FILES, &list, 1))?;
     Ok(())
 }
