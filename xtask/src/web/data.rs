@@ -91,6 +91,10 @@ fn instrument(of: Bundled) -> Result<Value> {
     let model = model.with_context(|| format!("{} is not prepared", of.id()))?;
     let mut drawn = drawn(&file, &model);
     drawn["id"] = json!(of.id());
+    for (at, hole) in file.holes.iter().enumerate() {
+        let says = hole.description.split([',', ';', '(']).next().unwrap_or_default().trim();
+        drawn["holes"][at]["says"] = json!(says);
+    }
     Ok(drawn)
 }
 
