@@ -1,9 +1,14 @@
 // The listening page: each sound is made by the module when it is first asked for, much faster than it sounds, and drawn.
 
+import { json } from './names.js';
+
 /** Columns of a picture. */
 const COLUMNS = 360;
 const get = (id) => document.getElementById(id);
-const tour = await fetch('tour.json').then((answer) => answer.json());
+const tour = await json('tour.json').catch((error) => {
+  get('trouble').textContent = `No sound: ${error.message}`;
+  throw error;
+});
 let module;
 let context;
 let playing;

@@ -8,4 +8,11 @@ export const noteName = (note) => `${NAMES[note % 12]}${Math.floor(note / 12) - 
 /** Whether it is a black key. */
 export const isBlack = (note) => [1, 3, 6, 8, 10].includes(note % 12);
 
+/** A file of the page as JSON. */
+export async function json(file) {
+  const answer = await fetch(file);
+  if (!answer.ok) throw new Error(`${file} is missing (${answer.status}). Build the page again with cargo xtask web.`);
+  return answer.json();
+}
+
 export const clamp = (x, low, high) => Math.min(high, Math.max(low, x));
