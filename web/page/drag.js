@@ -44,6 +44,11 @@ export class Drag {
     this.show([...this.touches.values()]);
   }
 
+  /** Ends every touch: what the pointers do next is not told. */
+  end() {
+    [...this.touches.keys()].forEach((pointerId) => this.up({ pointerId }));
+  }
+
   up(event) {
     const touch = this.touches.get(event.pointerId);
     if (!touch) return;

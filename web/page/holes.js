@@ -13,6 +13,11 @@ const EACH_MS = 200;
 const WIDER_M = 0.05e-3;
 /** The pointer takes a hole that is so near, pixels. */
 const NEAR = 26;
+const HINT = matchMedia('(hover: none)').matches
+  ? 'Drag a hole along the bore. Its width is the second number.'
+  : 'Drag a hole along the bore. With Shift, up makes it wider.';
+/** Least and largest radius, and the least distance between two holes, m. */
+const [NARROWEST, WIDEST, APART] = [5e-4, 0.02, 1e-4];
 const get = (id) => document.getElementById(id);
 const bytes = (text) => new TextEncoder().encode(text);
 
@@ -23,8 +28,15 @@ export class Holes {
     this.canvas = get('clarinet');
     get('holes').onclick = () => this.show(!this.isOpen);
     get('hole-done').onclick = () => this.show(false);
-    get('hole').onchange = () => this.choose(Number(get('hole').value));
-    for (const id of ['hole-place', 'hole-width']) get(id).onchange = () => this.read();
+    // The computer's keys are for playing again after a choice or a number.
+    get('hole').onchange = () => {
+      this.choose(Number(get('hole').value));
+      get('hole').blur();
+    };
+    for (const id of ['hole-place', 'hole-width']) {
+      get(id).onchange = () => this.read();
+      get(id).onkeydown = ({ key, target }) => key === 'Enter' && target.blur();
+    }
     get('hole-undo').onclick = () => this.undo.length > 0 && this.put(this.undo.pop());
     get('hole-back').onclick = () => this.change([]);
     get('hole-save').onclick = () => this.save();
@@ -40,9 +52,9 @@ export class Holes {
     Object.assign(this, { built, base, moved: [], undo: [], chosen: null, held: null, version: this.version + 1 });
     clearTimeout(this.fitting);
     this.workshop.long?.end();
-    get('hole').replaceChildren(...built.holes.map(({ name }, at) => new Option(name.replaceAll('_', ' '), at)));
+    get('hole').replaceChildren(...built.holes.map(({ name, says }, at) => new Option(says || name.replaceAll('_', ' '), at)));
+    this.state(HINT);
     this.choose(null);
-    this.draw();
   }
 
   /** What the sound depends on, for other questions. */
@@ -73,11 +85,12 @@ export class Holes {
     this.draw();
   }
 
-  draw() {
+  /** `all` also writes the field that has the focus. */
+  draw(all = false) {
     this.drawing.setHoles(this.holes, this.isOpen ? this.chosen : null);
     const hole = this.holes[this.chosen];
-    if (hole && document.activeElement !== get('hole-place')) get('hole-place').value = (1e3 * hole.x).toFixed(1);
-    if (hole && document.activeElement !== get('hole-width')) get('hole-width').value = (2e3 * hole.r).toFixed(1);
+    if (hole && (all || document.activeElement !== get('hole-place'))) get('hole-place').value = (1e3 * hole.x).toFixed(1);
+    if (hole && (all || document.activeElement !== get('hole-width'))) get('hole-width').value = (2e3 * hole.r).toFixed(1);
     const built = this.built?.holes[this.chosen];
     if (built) {
       get('hole-place').title = `As built: ${(1e3 * built.x).toFixed(1)} mm`;
@@ -106,11 +119,30 @@ export class Holes {
 
   read() {
     const [place, width] = ['hole-place', 'hole-width'].map((id) => Number(get(id).value));
-    if (this.chosen === null || !(place > 0) || !(width > 0)) return this.draw();
+    if (this.chosen === null) return;
+    const said = this.outside('place', place, this.room()) ?? this.outside('width', width, [2 * NARROWEST, 2 * WIDEST]);
+    if (said) {
+      this.draw(true);
+      this.state(said);
+      return;
+    }
     this.remember();
     // Full precision stays where the number was not touched.
     const { x, r } = this.holes[this.chosen];
     this.set(Math.abs(1e3 * x - place) < 0.051 ? x : place / 1e3, Math.abs(2e3 * r - width) < 0.051 ? r : width / 2e3);
+  }
+
+  /** Between which places the chosen hole can be, m. */
+  room() {
+    const { holes } = this;
+    return [(holes[this.chosen - 1]?.x ?? 0) + APART, (holes[this.chosen + 1]?.x ?? this.built.length) - APART];
+  }
+
+  /** What to say where a number, mm, is not in a range, m. */
+  outside(what, number, range) {
+    const [least, most] = [Math.ceil(1e4 * range[0] - 1e-6) / 10, Math.floor(1e4 * range[1] + 1e-6) / 10];
+    if (number >= least && number <= most) return undefined;
+    return `The ${what} must lie between ${least.toFixed(1)} and ${most.toFixed(1)} mm.`;
   }
 
   remember() {
@@ -125,10 +157,8 @@ export class Holes {
 
   /** The chosen hole at a place and with a radius, m, as far as there is room between its neighbours. */
   set(x, r) {
-    const { holes } = this;
-    const [least, most] = [holes[this.chosen - 1]?.x ?? 0, holes[this.chosen + 1]?.x ?? this.built.length];
-    const { name } = holes[this.chosen];
-    const moved = { name, x_m: clamp(x, least + 1e-4, most - 1e-4), radius_m: clamp(r, 5e-4, 0.02) };
+    const { name } = this.holes[this.chosen];
+    const moved = { name, x_m: clamp(x, ...this.room()), radius_m: clamp(r, NARROWEST, WIDEST) };
     this.put([...this.moved.filter((other) => other.name !== name), moved]);
   }
 
@@ -139,6 +169,7 @@ export class Holes {
     clearTimeout(this.fitting);
     if (moved.length === 0) {
       this.workshop.long?.end();
+      this.state('As built');
       this.on({ built: true });
     } else {
       this.hearAtOnce();

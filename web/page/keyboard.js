@@ -119,6 +119,11 @@ export class Keyboard {
     this.breathe(clamp(TOUCH + (touch.y - event.clientY) / HEIGHT, 0.04, 1));
   }
 
+  /** Ends every touch: what the pointers do next is not told. */
+  end() {
+    [...this.touches.keys()].forEach((pointerId) => this.up({ pointerId }));
+  }
+
   up(event) {
     const touch = this.touches.get(event.pointerId);
     if (!touch) return;

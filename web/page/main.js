@@ -10,7 +10,8 @@ import { Keyboard } from './keyboard.js';
 import { KnobPanel } from './knob-panel.js';
 import { Meter } from './meter.js';
 import { Midi } from './midi.js';
-import { noteName } from './names.js';
+import { Kept } from './kept.js';
+import { json, noteName } from './names.js';
 import { Presets } from './presets.js';
 import { Typing } from './typing.js';
 import { Workshop } from './workshop.js';
@@ -30,10 +31,12 @@ const IDLE = 'Press a key, or drag across the clarinet. To blow, let the page he
 
 /** What was said last stays for a while, ms. */
 const SAID_MS = 6000;
+/** Least time between two notes that a screen reader is told, ms. */
+const ANNOUNCED_MS = 500;
 
 const get = (id) => document.getElementById(id);
 let [values, heldHint, holding] = [[], '', 0];
-const data = await fetch('data.json').then((answer) => answer.json()).catch((error) => {
+const data = await json('data.json').catch((error) => {
   fail(error);
   throw error;
 });
@@ -58,9 +61,10 @@ const controls = data.controls.map((of) => new Control(of, (place, value) => {
   values[place] = value;
   engine.send({ set: [place, value] });
   knob.update();
+  change();
 }));
 get('controls').append(...controls.map((control) => control.element));
-new Presets(data.presets, choose);
+const presets = new Presets(data.presets, choose);
 const workshop = new Workshop();
 const holes = new Holes(engine, workshop, drawing, drag, say, follow);
 const knob = new KnobPanel(engine, workshop, () => ({ ...holes.question(), values }), say, (plays) => {
@@ -70,23 +74,79 @@ values = [...data.defaults];
 let instrument = data.instruments[0];
 let isTouched = false;
 let blowing = false;
+let [isChanged, isRestoring] = [false, false];
 
 data.instruments.forEach(({ name }, at) => get('instrument').append(new Option(name, at)));
 get('instrument').onchange = (event) => {
   setInstrument(Number(event.target.value));
+  change();
   // The computer's keys are for playing again.
   event.target.blur();
 };
 setInstrument(0);
 get('lower').onclick = () => keyboard.shift(-1);
 get('higher').onclick = () => keyboard.shift(1);
-get('volume').oninput = (event) => engine.setVolume(event.target.value / 100);
+get('volume').oninput = (event) => {
+  engine.setVolume(event.target.value / 100);
+  keep();
+};
+restore();
 engine.setVolume(get('volume').value / 100);
 say();
 
 for (const type of ['pointerdown', 'pointerup', 'keydown']) addEventListener(type, begin, { capture: true });
-// A page that nobody sees holds no key.
-document.addEventListener('visibilitychange', () => document.hidden && !blowing && hands.releaseAll());
+// What comes up elsewhere is not told.
+addEventListener('blur', letGo);
+addEventListener('pagehide', hide);
+document.addEventListener('visibilitychange', () => document.hidden && hide());
+
+function letGo() {
+  [typing, drag, keyboard].forEach((part) => part.end());
+  holes.held = null;
+}
+
+/** A page that nobody sees holds no key. */
+function hide() {
+  letGo();
+  if (!blowing) hands.releaseAll();
+}
+
+/** A control, the instrument or a hole is no longer the preset's. */
+function change() {
+  presets.change();
+  isChanged = true;
+  keep();
+}
+
+/** Keeps what the next visit shall find. */
+function keep() {
+  if (isRestoring) return;
+  Kept.write({
+    preset: presets.all[presets.at].name,
+    isChanged,
+    instrument: instrument.own ? undefined : instrument.id,
+    controls: Object.fromEntries(data.controls.map(({ id, place }) => [id, values[place]])),
+    moved: instrument.own ? [] : holes.moved,
+    volume: Number(get('volume').value),
+  });
+}
+
+function restore() {
+  const kept = Kept.read(data);
+  isRestoring = true;
+  if (kept.volume !== undefined) get('volume').value = kept.volume;
+  if (kept.preset !== undefined) presets.go(kept.preset);
+  if (kept.instrument !== undefined) setInstrument(kept.instrument);
+  kept.controls.forEach(([control, value]) => {
+    values[control.place] = value;
+    engine.send({ set: [control.place, value] });
+    controls[data.controls.indexOf(control)].show(value);
+  });
+  if (kept.moved.length > 0) holes.put(kept.moved);
+  isRestoring = false;
+  isChanged = kept.isChanged;
+  if (isChanged) presets.change();
+}
 
 function begin() {
   lastHeard = performance.now();
@@ -142,7 +202,10 @@ function send({ own }) {
 /** What happens to the holes. */
 function follow(said) {
   if (said.built) send(instrument);
-  if (said.moved) knob.update();
+  if (said.moved) {
+    knob.update();
+    change();
+  }
   if (said.heard) dispatchEvent(new CustomEvent('moved', { detail: said.heard }));
   if (said.opened) open(said.opened);
 }
@@ -156,6 +219,7 @@ function open({ instrument: at, moved, name, file, prepared, drawn }) {
   setInstrument(at);
   if (moved?.length > 0) holes.change(moved);
   else send(instrument);
+  change();
   say(`Opened: ${drawn?.name ?? name}`);
 }
 
@@ -167,6 +231,8 @@ function choose(preset) {
   controls.forEach((control) => control.show(values[control.of.place]));
   meter.setPhysical(values[data.breathResponse] === 1);
   knob.update();
+  isChanged = false;
+  keep();
 }
 
 /** What the worklet tells. */
@@ -179,6 +245,7 @@ function hear(message) {
 }
 
 let spoken = '';
+let announced = 0;
 let lastHeard = performance.now();
 
 function draw(picture, room) {
@@ -195,12 +262,20 @@ function draw(picture, room) {
   if (has) {
     const written = noteName(note + instrument.transposition);
     get('written').textContent = written;
+    announce(sounds ? written : '');
     get('sounding').textContent = instrument.transposition === 0 ? 'written and sounding' : `written · sounds ${noteName(note)}`;
   }
   get('written').style.opacity = sounds ? 1 : 0.45;
   knob.follow(picture[ORIGIN] === KNOB);
   meter.follow(picture[DYNAMIC], picture[GAMMA], picture[MOUTH]);
   tellBreath(picture[ORIGIN], room);
+}
+
+/** Tells a screen reader the note, not oftener than twice a second. */
+function announce(text) {
+  if (!text || get('announced').textContent === text || performance.now() - announced < ANNOUNCED_MS) return;
+  announced = performance.now();
+  get('announced').textContent = text;
 }
 
 /** Where the breath comes from, and what the microphone waits for. */

@@ -33,6 +33,11 @@ export class Presets {
     document.getElementById('browse').title = shows;
   }
 
+  /** The settings are no longer those of the preset. */
+  change() {
+    document.getElementById('tags').textContent = ['changed', ...this.all[this.at].tags].join(' · ');
+  }
+
   open() {
     this.search.value = '';
     this.fill();

@@ -7,14 +7,15 @@ const CODES = ['KeyA', 'KeyW', 'KeyS', 'KeyE', 'KeyD', 'KeyF', 'KeyT', 'KeyG', '
 /** Step of the breath, and where it begins. */
 const [STEP, BEGIN] = [0.08, 0.66];
 
+/** A list that is open takes the letters; one that is closed only has the focus, where the browser tells them apart. */
+const OPEN_LIST = CSS.supports('selector(:open)') ? 'select:open' : 'select';
+
 export class Typing {
   /** `on` gets { letters }, { start } and { silence }; `breathe` the breath that the arrows set, or null. */
   constructor(hands, breathe, on) {
     Object.assign(this, { hands, breathe, on, held: new Map(), base: 60, breath: BEGIN });
     addEventListener('keydown', (event) => this.down(event));
     addEventListener('keyup', (event) => this.up(event.code));
-    // Keys that come up elsewhere are not told.
-    addEventListener('blur', () => [...this.held.keys()].forEach((code) => this.up(code)));
     navigator.keyboard?.getLayoutMap?.().then((map) => {
       this.layout = map;
       this.tell();
@@ -40,8 +41,8 @@ export class Typing {
   down(event) {
     if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches?.('input[type=search], input[type=number], dialog *')) return;
     if (event.code === 'Escape') return this.on({ silence: true });
-    if (event.target.matches?.('select')) return;
-    const onControl = event.target.matches?.('[role=slider], input');
+    if (event.target.matches?.(OPEN_LIST)) return;
+    const onControl = event.target.matches?.('[role=slider], input, select');
     const place = CODES.indexOf(event.code);
     if (place >= 0) {
       event.preventDefault();
@@ -58,6 +59,11 @@ export class Typing {
       this.breath = clamp(this.breath + (event.code === 'ArrowUp' ? STEP : -STEP), 0.06, 1);
       if (this.held.size > 0) this.breathe(this.breath);
     }
+  }
+
+  /** Lets every key go. */
+  end() {
+    [...this.held.keys()].forEach((code) => this.up(code));
   }
 
   up(code) {

@@ -360,6 +360,96 @@ const TESTS = {
 
   'a dragged hole is heard as the native code plays it, and goes back': (browser) => dragHole(browser, false),
 
+  async 'playing keys play after a choice and a number, and a number without room is refused'(browser) {
+    const { page, context, errors } = await open(browser, server.address, { serviceWorkers: 'block' });
+    const plays = async () => {
+      await page.keyboard.down('d');
+      await until(page, SOUNDING, 64, 65);
+      await until(page, LEVEL, HEARD);
+      await page.keyboard.up('d');
+      await silence(page);
+    };
+    await page.click('#holes');
+    const middle = await page.$$eval('#hole option', (all) => all.findIndex(({ text }) => text === 'left middle finger hole'));
+    assert.ok(middle > 0, 'holes have names');
+    await page.selectOption('#hole', String(middle));
+    await plays();
+    const before = await page.inputValue('#hole-place');
+    // A number that is refused gives the keys back, too.
+    for (const [field, number] of [['place', '9999'], ['place', ''], ['place', '-5'], ['width', '100']]) {
+      const inForce = await page.inputValue(`#hole-${field}`);
+      await page.fill(`#hole-${field}`, number);
+      await page.press(`#hole-${field}`, 'Enter');
+      assert.match(await page.textContent('#hole-state'), new RegExp(`^The ${field} must lie between [0-9.]+ and [0-9.]+ mm.$`));
+      assert.equal(await page.inputValue(`#hole-${field}`), inForce);
+    }
+    await plays();
+    await page.fill('#hole-place', (Number(before) - 1).toFixed(1));
+    await page.press('#hole-place', 'Enter');
+    await page.click('#hole-undo');
+    assert.equal(await page.inputValue('#hole-place'), before);
+    assert.equal(await page.textContent('#hole-state'), 'As built');
+    assert.deepEqual(errors, []);
+    await context.close();
+  },
+
+  async 'what is held is let go when the page is left or hidden'(browser) {
+    const { page, context, errors } = await open(browser, server.address, { serviceWorkers: 'block' });
+    for (const leave of ["dispatchEvent(new Event('blur'))", "dispatchEvent(new Event('pagehide'))"]) {
+      for (const part of ['#clarinet', '#keyboard']) {
+        const box = await page.locator(part).boundingBox();
+        await page.mouse.move(box.x + 0.4 * box.width, box.y + 0.8 * box.height);
+        await page.mouse.down();
+        await until(page, LEVEL, HEARD);
+        await page.evaluate(leave);
+        await silence(page);
+        await page.mouse.up();
+      }
+      await page.keyboard.down('d');
+      await until(page, LEVEL, HEARD);
+      await page.evaluate(leave);
+      await silence(page);
+      await page.keyboard.up('d');
+    }
+    assert.deepEqual(errors, []);
+    await context.close();
+  },
+
+  async 'a visit finds what the last one left, and broken contents count for nothing'(browser) {
+    const { page, context, errors } = await open(browser, server.address, { serviceWorkers: 'block' });
+    const tags = () => page.textContent('#tags');
+    const again = async () => {
+      await page.reload();
+      await page.waitForFunction(() => globalThis.chalumeau?.engine.node);
+    };
+    await page.click('#next');
+    const name = await page.textContent('#preset');
+    assert.doesNotMatch(await tags(), /changed/);
+    await page.selectOption('#instrument', '1');
+    assert.match(await tags(), /^changed/);
+    await page.fill('#volume', '35');
+    await page.click('#holes');
+    const place = (Number(await page.inputValue('#hole-place')) - 0.5).toFixed(1);
+    await page.fill('#hole-place', place);
+    await page.press('#hole-place', 'Enter');
+    await again();
+    assert.equal(await page.textContent('#preset'), name);
+    assert.match(await tags(), /^changed/);
+    assert.equal(await page.inputValue('#instrument'), '1');
+    assert.equal(await page.inputValue('#volume'), '35');
+    await page.click('#holes');
+    assert.equal(await page.inputValue('#hole-place'), place);
+    const old = ['{', 'null', '[]', '7', '{"preset":3,"instrument":"none","moved":[{"name":"L1"}],"controls":{"lip":"x"},"volume":1e9}'];
+    for (const broken of old) {
+      await page.evaluate((broken) => localStorage.setItem('chalumeau', broken), broken);
+      await again();
+      assert.equal(await page.textContent('#preset'), 'B flat clarinet');
+      assert.equal(await page.inputValue('#volume'), '80');
+    }
+    assert.deepEqual(errors, []);
+    await context.close();
+  },
+
   async 'every preset plays'(browser) {
     const { page, context, errors } = await open(browser, server.address, { serviceWorkers: 'block' });
     await page.keyboard.press('Escape');
