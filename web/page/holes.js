@@ -247,6 +247,8 @@ export class Holes {
     get('hole-file').value = '';
     if (!file) return;
     const text = await file.text();
+    // A fit that began now would end the opening.
+    clearTimeout(this.fitting);
     this.state('Preparing the instrument; one of your own takes minutes …');
     try {
       const told = await this.workshop.askLong({ do: 'open', rate: this.question().rate, text });
@@ -255,6 +257,7 @@ export class Holes {
     } catch (error) {
       this.state('');
       this.say(`${file.name} is not opened: ${error.message}`);
+      if (this.moved.length > 0) this.hearFitted();
     }
   }
 }
