@@ -155,7 +155,7 @@ function begin() {
 
 function fail(error) {
   get('hint').classList.add('failed');
-  say(`No sound: ${error.message ?? error}. Reload the page to try again.`);
+  say(`No sound: ${String(error.message ?? error).replace(/\.$/, '')}. Reload the page to try again.`);
 }
 
 function say(text = IDLE) {
