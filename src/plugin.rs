@@ -227,6 +227,9 @@ impl Chalumeau {
         if let Some((_, audio)) = &mut self.knob {
             audio.reset();
         }
+        if let Some((_, window)) = &mut self.window {
+            window.forget_keys();
+        }
         if let Some(instrument) = &mut self.instrument {
             instrument.reset();
         }

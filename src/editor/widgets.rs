@@ -20,11 +20,14 @@ pub fn teach(ui: &mut Ui, id: &str, how: &str) {
     let c = Colours::here(ui);
     let Some(term) = terms::of(id) else { return };
     ui.set_max_width(300.0);
-    ui.label(egui::RichText::new(term.meaning).strong());
+    // Names of other parameters stand between asterisks, as documents print them.
+    let plain = |text: &str| text.replace('*', "");
+    ui.label(egui::RichText::new(plain(term.meaning)).strong());
     for (what, text) in [("Sound", term.sound), ("Feel", term.feel)] {
+        let text = plain(text);
         if !text.is_empty() {
             ui.label(egui::RichText::new(if term.feel.is_empty() {
-                text.to_owned()
+                text
             } else {
                 format!("{what}: {text}")
             }));

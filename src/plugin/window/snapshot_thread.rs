@@ -143,7 +143,7 @@ impl SnapshotThread {
         #[cfg(feature = "devices")]
         self.show_knob(&mut snapshot);
         let is_looking = matches!(snapshot.fingerings, FingeringSearch::Looking(_));
-        snapshot.status = self.status(current.as_ref(), &inside.breath_sources);
+        snapshot.status = self.status(current.as_ref(), &inside);
         *self.shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(snapshot);
         self.shared.draw_again();
         let is_moving = is_looking
@@ -285,7 +285,7 @@ impl SnapshotThread {
     }
 
     /// The messages on the status line.
-    fn status(&self, current: Option<&CurrentInstrument>, sources: &BreathSources) -> Vec<Status> {
+    fn status(&self, current: Option<&CurrentInstrument>, inside: &AudioSnapshot) -> Vec<Status> {
         let mut status = Vec::new();
         let mut add = |level, text: String| status.push(Status { level, text });
         if let Ok(text) = self.handles.params.instrument_status.read() {
@@ -301,9 +301,16 @@ impl SnapshotThread {
             add(self.knob_severity(), text.clone());
         }
         // A user who has just plugged in a breath controller sees that its messages arrive.
+        let sources = &inside.breath_sources;
         let live = BreathInput::ALL.into_iter().find(|&input| sources.is_live(input));
         if let Some(input) = live.filter(|&input| input != BreathInput::Keys) {
-            add(Severity::Good, format!("breath: {}", input.title()));
+            let (is_key_down, breath) = (inside.now.key.is_some(), sources.value(input).unwrap_or(0.0));
+            if is_key_down && breath == 0.0 {
+                // Else a key that is silent would puzzle who has forgotten a controller.
+                add(Severity::Note, format!("no breath: {} is at 0", input.title()));
+            } else {
+                add(Severity::Good, format!("breath: {}", input.title()));
+            }
         }
         status
     }

@@ -95,6 +95,11 @@ impl WindowAudio {
         std::array::from_fn(|_| self.keys.pop().ok())
     }
 
+    /// Drops the key events that came while nothing played. Real-time safe.
+    pub fn forget_keys(&mut self) {
+        while self.keys.pop().is_ok() {}
+    }
+
     /// Notes how loud the output is while the window is open. Real-time safe.
     pub fn send_output(&self, channels: [&[f32]; 2]) {
         if self.is_open() {
