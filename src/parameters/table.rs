@@ -218,7 +218,7 @@ pub static PARAMETERS: &[Parameter] = &[
     )
     .help(
         "Which controller blows",
-        "Any: the first that moves; CC2 is stronger than CC11, and CC11 than channel pressure. Keys: the velocity, whatever controllers do. Automation of *Breath*, note expressions, linked controllers and the knob blow in any case.",
+        "Any: the first that moves; CC2 is stronger than CC11, and CC11 than channel pressure. Pressure under a held key adds to its velocity; with Pressure it blows. Keys: the velocity, whatever controllers do. Automation of *Breath*, note expressions, linked controllers and the knob blow in any case.",
         "",
     ),
     entry("bdead", BREATH, "Breath deadband", Kind::Number(Number {

@@ -444,7 +444,6 @@ fn a_held_hole_stays_under_every_fingering_until_it_is_given_back() {
             Event::TryHoles(None),
             Event::TryHoles(Some(open & !(1 << hole))),
             Event::Hole { hole, opening: Some(f32::NAN) },
-            Event::Panic,
         ] {
             clarinet.apply(Event::Hole { hole, opening: Some(0.7) });
             listen(&mut clarinet, 50, |_, _| {});

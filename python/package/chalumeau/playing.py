@@ -269,7 +269,7 @@ class Clarinet:
         self._voice.hole(names.index(name), None if opening is None else _within("opening", opening, 0, 1))
 
     def panic(self) -> None:
-        """Releases all notes and the breath, and clears the state."""
+        """Releases all notes and silences them at once; breath and settings stay as they were set."""
         self._voice.panic()
 
     def reset(self) -> None:

@@ -63,6 +63,7 @@ fn event(chance: &mut Chance) -> PartEvent {
         0..=13 => Event::NoteOn { note: key, velocity: chance.unit() },
         14..=22 => Event::NoteOff { note: key },
         23..=25 => Event::Breath(chance.unit()),
+        26 if chance.below(2) == 0 => Event::KeyPressure(chance.unit()),
         26 => Event::BreathFromKeys,
         27 => Event::Bend { cents: 200.0 * chance.unit() - 100.0 },
         28 if chance.below(8) == 0 => Event::Bend { cents: 2_400.0 * chance.unit() - 1_200.0 },
@@ -123,7 +124,7 @@ fn compare(seed: u64, events: usize, mut choirs: Ensemble) -> usize {
         assert!(play(&mut choirs, &mut alone, samples, is_stereo), "seed {seed}, event {number}: {event:?}");
         if number % 1_000 == 999 {
             // A rest, in which players fall asleep.
-            for event in [Event::Breath(0.0), Event::Panic] {
+            for event in [Event::Breath(0.0), Event::Panic, Event::BreathFromKeys] {
                 choirs.apply(event.into());
                 alone.apply(event.into());
                 for _ in 0..2 {
