@@ -8,7 +8,7 @@ use crate::controllers::ControllerLinks;
 use crate::controllers::source_curves::SourceCurves;
 use crate::editor::ab_comparison::Values;
 use crate::editor::terms;
-use crate::editor::undo::{Change, UndoHistory};
+use crate::editor::undo::{Change, Step, UndoHistory};
 
 pub use crate::editor::slider::slider;
 pub use crate::editor::widgets::{choice, handle, heading, momentary, segments, switch, teach};
@@ -194,15 +194,16 @@ impl Hands<'_> {
     }
 
     /// Several at once as one step, whatever undo carries otherwise: a preset brings its instrument.
-    pub fn put_step(&mut self, values: &[(&'static str, f32)]) {
+    /// `preset`: its name, and that of the one before.
+    pub fn put_step(&mut self, values: &[(&'static str, f32)], preset: [String; 2]) {
         let free = values.iter().filter(|(id, _)| !self.held.contains(id));
         let values: Vec<(&'static str, f32)> = free.copied().collect();
         let looks = values
             .iter()
             .map(|&(id, after)| self.controls.look(id).map(|look| Change { id, before: look.value, after }));
-        let step: Vec<Change> = looks.flatten().collect();
+        let changes: Vec<Change> = looks.flatten().collect();
         self.restore(&values);
-        self.history.record(step);
+        self.history.record(Step { changes, preset: Some(preset) });
     }
 
     /// Sets values that are no new step: undo, redo, A/B.

@@ -16,6 +16,7 @@ use crate::editor::preset_browser::PresetBrowser;
 use crate::editor::snapshot::{Severity, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
+use crate::editor::undo::{Restored, Step};
 use crate::editor::{Action, Tab, WindowState};
 
 /// Least and most zoom, and the steps offered.
@@ -53,7 +54,7 @@ pub fn tools(
             ui.add_space(4.0);
             // Undo would tell what was set, and on which side.
             if !compare.is_blind() {
-                undo(ui, hands);
+                undo(ui, hands, actions);
                 preset_bar::bar(ui, presets, hands, snapshot, actions);
             }
         });
@@ -152,25 +153,32 @@ fn note(ui: &mut Ui, kept: &mut WindowState, snapshot: &Snapshot, has_pitch: boo
     response.on_hover_text(about);
 }
 
-fn undo(ui: &mut Ui, hands: &mut Hands) {
-    let name = |hands: &Hands, step: Option<&[crate::editor::undo::Change]>| {
-        step.map(|step| step.iter().map(|change| hands.name(change.id)).collect::<Vec<_>>().join(", "))
+fn undo(ui: &mut Ui, hands: &mut Hands, actions: &mut Vec<Action>) {
+    let name = |hands: &Hands, step: Option<&Step>| {
+        step.map(|Step { changes, preset }| match preset {
+            Some([_, chosen]) => format!("the choice of {chosen}"),
+            None => changes.iter().map(|change| hands.name(change.id)).collect::<Vec<_>>().join(", "),
+        })
+    };
+    let mut restore = |hands: &mut Hands, Restored { values, preset }: Restored| {
+        hands.restore(&values);
+        actions.extend(preset.map(Action::ChosePreset));
     };
     let (undoable, redoable) = (name(hands, hands.history.undoable()), name(hands, hands.history.redoable()));
     ui.add_enabled_ui(redoable.is_some(), |ui| {
         let response = icon(ui, Icon::Redo, "Redo");
         let response = response.on_hover_text(format!("Redo {}", redoable.clone().unwrap_or_default()));
         if response.clicked() {
-            let values = hands.history.redo();
-            hands.restore(&values);
+            let restored = hands.history.redo();
+            restore(hands, restored);
         }
     });
     ui.add_enabled_ui(undoable.is_some(), |ui| {
         let response = icon(ui, Icon::Undo, "Undo");
         let response = response.on_hover_text(format!("Undo {}", undoable.clone().unwrap_or_default()));
         if response.clicked() {
-            let values = hands.history.undo();
-            hands.restore(&values);
+            let restored = hands.history.undo();
+            restore(hands, restored);
         }
     });
 }

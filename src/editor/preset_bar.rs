@@ -47,7 +47,7 @@ pub fn bar(
         if arrow(ui, place, by as f32, word).on_hover_text(hint).clicked()
             && let Some(preset) = preset
         {
-            choose(preset, hands, actions);
+            choose(preset, &snapshot.preset, hands, actions);
         }
     }
 

@@ -126,7 +126,7 @@ impl PresetBrowser {
                     let is_liked = !shelf.is_liked(&preset.name);
                     actions.push(Action::LikePreset { name: preset.name.clone(), is_liked });
                 } else if row.clicked() {
-                    choose(preset, hands, actions);
+                    choose(preset, &snapshot.preset, hands, actions);
                 }
             }
         });

@@ -7,14 +7,14 @@ use crate::presets::Preset;
 /// Two normalised values count as one: what a host's single precision loses.
 const SAME: f32 = 1e-6;
 
-/// Puts a preset on the controls as one step of undo, and says so.
-pub fn choose(preset: &Preset, hands: &mut Hands, actions: &mut Vec<Action>) {
+/// Puts a preset on the controls in place of the one called `before`, as one step of undo, and says so.
+pub fn choose(preset: &Preset, before: &str, hands: &mut Hands, actions: &mut Vec<Action>) {
     let wanted = preset.all_values().map(|(parameter, value)| (parameter.id, parameter.normalized(value)));
     let is_moved = |&(id, value): &(&'static str, f32)| {
         hands.controls.look(id).is_some_and(|look| (look.value - value).abs() > SAME)
     };
     let values: Vec<(&'static str, f32)> = wanted.filter(is_moved).collect();
-    hands.put_step(&values);
+    hands.put_step(&values, [before.to_owned(), preset.name.clone()]);
     actions.push(Action::ChosePreset(preset.name.clone()));
 }
 

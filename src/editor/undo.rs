@@ -16,11 +16,29 @@ pub struct Change {
     pub after: f32,
 }
 
+/// A step: what it changed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Step {
+    /// The parameters.
+    pub changes: Vec<Change>,
+    /// Name of the preset before and after it, if it chose one.
+    pub preset: Option<[String; 2]>,
+}
+
+/// What undo or redo brings back.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Restored {
+    /// Values to set.
+    pub values: Vec<(&'static str, f32)>,
+    /// Name of the preset, if the step chose one.
+    pub preset: Option<String>,
+}
+
 /// The steps that can be undone, and those that can be redone.
 #[derive(Clone, Debug, Default)]
 pub struct UndoHistory {
-    done: Vec<Vec<Change>>,
-    undone: Vec<Vec<Change>>,
+    done: Vec<Step>,
+    undone: Vec<Step>,
     /// Gestures that have begun, with the value they found.
     open: Vec<(&'static str, f32)>,
     /// Finished parts of a gesture of several parameters.
@@ -46,15 +64,15 @@ impl UndoHistory {
         let (_, before) = self.open.remove(at);
         self.parts.push(Change { id, before, after });
         if self.open.is_empty() {
-            let parts = std::mem::take(&mut self.parts);
-            self.record(parts);
+            let changes = std::mem::take(&mut self.parts);
+            self.record(Step { changes, preset: None });
         }
     }
 
     /// A whole step at once.
-    pub fn record(&mut self, mut step: Vec<Change>) {
-        step.retain(|change| change.before != change.after);
-        if step.is_empty() {
+    pub fn record(&mut self, mut step: Step) {
+        step.changes.retain(|change| change.before != change.after);
+        if step.changes.is_empty() {
             return;
         }
         self.undone.clear();
@@ -65,29 +83,31 @@ impl UndoHistory {
     }
 
     /// What undoing would touch.
-    pub fn undoable(&self) -> Option<&[Change]> {
-        self.done.last().map(Vec::as_slice)
+    pub fn undoable(&self) -> Option<&Step> {
+        self.done.last()
     }
 
     /// What redoing would touch.
-    pub fn redoable(&self) -> Option<&[Change]> {
-        self.undone.last().map(Vec::as_slice)
+    pub fn redoable(&self) -> Option<&Step> {
+        self.undone.last()
     }
 
-    /// Takes the last step back: values to set.
-    pub fn undo(&mut self) -> Vec<(&'static str, f32)> {
-        let Some(step) = self.done.pop() else { return Vec::new() };
-        let values = step.iter().rev().map(|change| (change.id, change.before)).collect();
+    /// Takes the last step back.
+    pub fn undo(&mut self) -> Restored {
+        let Some(step) = self.done.pop() else { return Restored::default() };
+        let values = step.changes.iter().rev().map(|change| (change.id, change.before)).collect();
+        let preset = step.preset.as_ref().map(|[before, _]| before.clone());
         self.undone.push(step);
-        values
+        Restored { values, preset }
     }
 
-    /// Does the last undone step again: values to set.
-    pub fn redo(&mut self) -> Vec<(&'static str, f32)> {
-        let Some(step) = self.undone.pop() else { return Vec::new() };
-        let values = step.iter().map(|change| (change.id, change.after)).collect();
+    /// Does the last undone step again.
+    pub fn redo(&mut self) -> Restored {
+        let Some(step) = self.undone.pop() else { return Restored::default() };
+        let values = step.changes.iter().map(|change| (change.id, change.after)).collect();
+        let preset = step.preset.as_ref().map(|[_, after]| after.clone());
         self.done.push(step);
-        values
+        Restored { values, preset }
     }
 }
 
@@ -101,9 +121,9 @@ mod tests {
         history.begin("zeta", 0.1);
         history.begin("zeta", 0.2);
         history.end("zeta", 0.7);
-        assert_eq!(history.undo(), [("zeta", 0.1)]);
-        assert_eq!(history.undo(), []);
-        assert_eq!(history.redo(), [("zeta", 0.7)]);
+        assert_eq!(history.undo().values, [("zeta", 0.1)]);
+        assert_eq!(history.undo().values, []);
+        assert_eq!(history.redo().values, [("zeta", 0.7)]);
     }
 
     #[test]
@@ -114,7 +134,16 @@ mod tests {
         history.end("reedh", 0.3);
         assert!(history.undoable().is_none());
         history.end("reedk", 0.4);
-        assert_eq!(history.undo(), [("reedk", 0.2), ("reedh", 0.1)]);
+        assert_eq!(history.undo().values, [("reedk", 0.2), ("reedh", 0.1)]);
+    }
+
+    #[test]
+    fn a_preset_that_is_taken_back_takes_its_name_along() {
+        let mut history = UndoHistory::default();
+        let changes = vec![Change { id: "lip", before: 0.1, after: 0.2 }];
+        history.record(Step { changes, preset: Some(["Old".to_owned(), "New".to_owned()]) });
+        assert_eq!(history.undo().preset.as_deref(), Some("Old"));
+        assert_eq!(history.redo().preset.as_deref(), Some("New"));
     }
 
     #[test]
@@ -141,6 +170,6 @@ mod tests {
             history.end("lip", n as f32 + 1.0);
         }
         assert_eq!(history.done.len(), KEPT);
-        assert_eq!(history.undo(), [("lip", 999.0)]);
+        assert_eq!(history.undo().values, [("lip", 999.0)]);
     }
 }
