@@ -335,7 +335,7 @@ mod tests {
     fn mistakes_name_their_line_and_what_is_right() {
         for (text, line, word) in [
             ("controller = 21\nparameter = \"growll\"\n", 6, "growll"),
-            ("controller = 200\nparameter = \"growl\"\n", 5, "1 to 119"),
+            ("controller = 200\nparameter = \"growl\"\n", 5, "number of a controller"),
             ("controller = 64\nparameter = \"growl\"\n", 5, "cannot be linked"),
             ("controller = 21\nparameter = \"Growl\"\n", 6, "did you mean \"growl\"?"),
             ("controller = 21\nparameter = \"tune\"\n", 6, "no controller can move Tuning"),
