@@ -170,7 +170,8 @@ impl BreathChoice {
         if self.heard >= Some(controller) {
             return (self.heard == Some(controller)).then_some(Heard::Breath(unit));
         }
-        if may_be_of_keys && self.from == BreathFrom::Any {
+        // What has begun without a key is a wind controller's, its 0 too.
+        if may_be_of_keys && self.from == BreathFrom::Any && (is_held || !claim.waits) {
             claim.waits = false;
             return (!is_snapshot).then_some(Heard::Keys(unit));
         }

@@ -118,6 +118,9 @@ fn aftertouch_of_a_keyboard_adds_to_velocity_and_pressure_without_a_key_is_breat
     assert_eq!(midi.pressure(0, 30), [breath(30)], "a wind controller: nobody presses a key");
     midi.note_on(0, 64, 127);
     assert_eq!(midi.pressure(0, 31), [breath(31)]);
+    let mut midi = MidiDecoder::new();
+    midi.pressure(0, 1);
+    assert_eq!(midi.pressure(0, 0), [breath(0)], "who has blown without a key does not blow");
     // Who has chosen pressure means breath.
     let mut midi = MidiDecoder::new();
     midi.set_breath_from(BreathFrom::Only(BreathController::Pressure));
