@@ -120,8 +120,6 @@ pub struct MidiDecoder {
     fingers: Keys,
     /// Velocity of the last key, 0..=1.
     velocity: f32,
-    /// Another decoder of the same keyboard holds a key.
-    is_key_down: bool,
     /// The last pressure on keys there was an event for.
     key_pressure: f32,
     bends: Bends,
@@ -302,10 +300,10 @@ impl MidiDecoder {
         match cc {
             _ if self.links.has(Source::Controller(cc)) => self.follow(Source::Controller(cc), value, place),
             BREATH | BREATH_FINE => {
-                self.hear(BreathController::Breath, at, (cc == BREATH_FINE, value), place);
+                self.hear(BreathController::Breath, at, (cc == BREATH_FINE, value), place, false);
             }
             EXPRESSION | EXPRESSION_FINE => {
-                self.hear(BreathController::Expression, at, (cc == EXPRESSION_FINE, value), place);
+                self.hear(BreathController::Expression, at, (cc == EXPRESSION_FINE, value), place, false);
             }
             // A host that stops behind a snapshot means it.
             ALL_SOUND_OFF | ALL_NOTES_OFF => self.cut_all(),
@@ -368,12 +366,14 @@ impl MidiDecoder {
     pub(super) fn pressure_beside(&mut self, channel: u8, value: u8, is_key_down: bool) -> &[Event] {
         self.begin();
         let at = usize::from(channel % 16);
-        self.is_key_down = is_key_down;
         let place = self.place(at, PRESSURE);
         if self.links.has(Source::Pressure) {
             self.follow(Source::Pressure, value.min(127), place);
         } else {
-            self.hear(BreathController::Pressure, at, (false, value.min(127)), place);
+            let is_key_down = is_key_down || self.sounding().is_some();
+            // Without a key no hand presses; and a finger of MPE blows.
+            let may_be_of_keys = (is_key_down || value == 0) && !self.bends.is_member(at);
+            self.hear(BreathController::Pressure, at, (false, value.min(127)), place, may_be_of_keys);
         }
         self.said.events()
     }
@@ -474,13 +474,15 @@ impl MidiDecoder {
         place
     }
 
-    fn hear(&mut self, controller: BreathController, at: usize, part: (bool, u8), place: Place) {
+    fn hear(
+        &mut self,
+        controller: BreathController,
+        at: usize,
+        part: (bool, u8),
+        place: Place,
+        may_be_of_keys: bool,
+    ) {
         let is_held = self.sounding().is_some();
-        let is_key_down = is_held || self.is_key_down;
-        // Without a key no hand presses; and a finger of MPE blows.
-        let may_be_of_keys = controller == BreathController::Pressure
-            && (is_key_down || part.1 == 0)
-            && !self.bends.is_member(at);
         match self.breath.hear(controller, at, part, place, is_held, may_be_of_keys) {
             Some(Heard::Breath(unit)) => self.blow(BreathOrigin::Controller(controller), unit),
             Some(Heard::Keys(unit)) if std::mem::replace(&mut self.key_pressure, unit) != unit => {

@@ -185,6 +185,8 @@ impl Player {
             life: Life::of(&person),
             swing: Swing::of(&person),
             techniques: Techniques::of(&person),
+            // The voice at its beginning knows the reference reed alone.
+            has_other_reed: true,
             ..Self::default()
         }
     }

@@ -3,6 +3,7 @@
 use super::Player;
 use crate::bore::lattice::Real;
 use crate::instrument::model::Model;
+use crate::instrument::person::Person;
 use crate::instrument::voice::Voice;
 
 impl Player {
@@ -13,15 +14,9 @@ impl Player {
         *self = Self {
             settings: self.settings,
             keys: from.keys,
-            breath: from.breath.carried(),
-            bend_cents: from.bend_cents,
-            reed: from.reed,
-            techniques: from.techniques.carried(&self.person),
-            swing: from.swing.carried(&self.person),
             inflection: from.inflection.carried(),
             inhalation: from.inhalation,
-            chosen: from.chosen,
-            ..Self::new(self.person)
+            ..from.controlled(self.person)
         };
         if let Some(fingering) = self.take_up_last(model) {
             self.finger(fingering, false, model, voice);
@@ -32,16 +27,19 @@ impl Player {
     /// The player at rest, without keys. What controllers, key switches and fingers on trial have set stays: hosts silence everything
     /// wherever they stop, and a controller that rests does not say again where it is. Real-time safe.
     pub(super) fn silenced(&self) -> Self {
+        Self { settings: self.settings, fingers: self.fingers.lifted(), ..self.controlled(self.person) }
+    }
+
+    /// A player at rest under the same controllers, breath sources and key switches.
+    fn controlled(&self, person: Person) -> Self {
         Self {
-            settings: self.settings,
             breath: self.breath.carried(),
             bend_cents: self.bend_cents,
             reed: self.reed,
-            techniques: self.techniques.carried(&self.person),
-            swing: self.swing.carried(&self.person),
-            fingers: self.fingers.lifted(),
+            techniques: self.techniques.carried(&person),
+            swing: self.swing.carried(&person),
             chosen: self.chosen,
-            ..Self::new(self.person)
+            ..Self::new(person)
         }
     }
 
