@@ -68,11 +68,14 @@ fn after_a_start_that_sends_every_controller_the_first_key_sounds_by_velocity() 
         for times in [1, 2] {
             for velocity in [30, 120] {
                 let mut said = every_controller(0, value);
+                // CC120 and CC123 are among them, and they are meant.
+                let mut events = vec![(0, Event::Panic)];
                 if times == 2 {
                     said.extend(every_controller(256, |number| 127 - value(number)));
+                    events.push((256, Event::Panic));
                 }
                 said.extend([At(1_000, on(58, velocity)), At(30_000, off(58))]);
-                let events = [(1_000, struck(58, velocity)), (30_000, released(58))];
+                events.extend([(1_000, struck(58, velocity)), (30_000, released(58))]);
                 assert!(play(512, &said, SECOND) == rendered(&events, SECOND), "{} {velocity}", value(2));
             }
         }
@@ -86,7 +89,7 @@ fn who_blows_after_such_a_start_is_heard() {
     said.push(At(1_990, on(58, 100)));
     said.sort_by_key(|At(at, _)| *at);
     let blown = (0..60).map(|step| (2_000 + 100 * step, Event::Breath(step as f32 / 127.0)));
-    let events: Vec<_> = [(1_990, struck(58, 100))].into_iter().chain(blown).collect();
+    let events: Vec<_> = [(0, Event::Panic), (1_990, struck(58, 100))].into_iter().chain(blown).collect();
     assert!(play(512, &said, SECOND) == rendered(&events, SECOND));
 }
 
