@@ -300,6 +300,13 @@ impl EditorState {
         Self { kept: kept.mended(), ..Self::default() }
     }
 
+    /// For a window without a host: letters play.
+    #[must_use]
+    pub fn with_letters(mut self) -> Self {
+        self.keyboard.take_letters();
+        self
+    }
+
     /// Opens or closes the browser of presets.
     pub fn show_presets(&mut self, is_open: bool) {
         self.presets.is_open = is_open;
@@ -380,6 +387,9 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
     if wants_torque && ui.input(|input| input.key_pressed(egui::Key::Escape)) {
         knob_view::stop(&mut hands, &mut actions);
     }
+    if ui.input(|input| input.key_pressed(egui::Key::Escape)) {
+        linked_controllers::end_learning(&hands);
+    }
     breath.look(&snapshot.sources);
     trial.keep_to(snapshot, &mut actions);
     let has_knob = snapshot.knob.is_live || !snapshot.knob.devices.is_empty() || hands.step("knob") > 0;
@@ -399,7 +409,8 @@ fn whole(ui: &mut Ui, state: &mut EditorState, controls: &dyn Controls, snapshot
         });
     let keys = (0.13 * height).clamp(52.0, 110.0);
     let line = Panel::bottom("keys").exact_size(keys + 10.0).show_separator_line(false);
-    line.frame(ground(8, 5)).show(ui, |ui| keyboard.draw(ui, kept.names, snapshot, &mut actions));
+    let is_text = hands.entry.is_some() || ui.ctx().text_edit_focused();
+    line.frame(ground(8, 5)).show(ui, |ui| keyboard.draw(ui, kept.names, snapshot, is_text, &mut actions));
     let has_meter = tab != Tab::Play || is_blind;
     let line =
         Panel::right("meter").exact_size(if is_small { 96.0 } else { 112.0 }).show_separator_line(false);

@@ -413,6 +413,14 @@ impl Chalumeau {
     }
 }
 
+#[cfg(feature = "standalone")]
+impl Chalumeau {
+    /// Its parameters, for who keeps them without a host.
+    pub fn shared_params(&self) -> Arc<ChalumeauParams> {
+        self.params.clone()
+    }
+}
+
 /// Hands tasks of the plugin on through the framework's wrapper of a plugin that contains it.
 pub fn executor_of<P>(outer: AsyncExecutor<P>) -> AsyncExecutor<Chalumeau>
 where

@@ -4,13 +4,14 @@
 //! tries each backend by itself. If none opens, it prints which ones it tried, why they failed, and what to do.
 //!
 //! - `arguments`: the command line; `log`: what the framework logs; `quit`: the end on Ctrl-C
-//! - `standalone_plugin`: the plugin as the framework runs it here
+//! - `standalone_plugin`: the plugin as the framework runs it here; `session`: what it remembers from one start to the next
 //! - `jack`: plays to a JACK server, and survives its death
 
 mod arguments;
 mod jack;
 mod log;
 mod quit;
+mod session;
 mod standalone_plugin;
 
 use std::process::ExitCode;
@@ -29,7 +30,6 @@ use standalone_plugin::StandalonePlugin;
 pub fn main() -> ExitCode {
     let args = Args::parse();
     let last_error = log::start();
-    let (instrument, instrument_file) = args.instrument.clone();
     let lacks_display = !args.no_window && lacks_display();
     if lacks_display {
         eprintln!(
@@ -37,8 +37,7 @@ pub fn main() -> ExitCode {
         );
     }
     let options = LaunchOptions {
-        instrument,
-        instrument_file,
+        instrument: args.instrument.clone(),
         a4_hz: args.a4,
         microphone: args.has_microphone(),
         has_window: !args.no_window && !lacks_display,
@@ -47,6 +46,9 @@ pub fn main() -> ExitCode {
     }
     .set();
     quit::listen(options);
+    if args.new_session {
+        session::set_aside();
+    }
     // Without this, the program would go on without sound after a panic on a backend's thread.
     std::panic::set_hook(Box::new(|why| {
         eprintln!("chalumeau-standalone: {why}");

@@ -198,7 +198,7 @@ fn running_lattice_is_what_its_coefficients_say() {
                 let mut tip = Impulse { first: 1.0, arrived: Vec::new() };
                 let mut lattice = fingered(coeffs, &opening);
                 lattice.glide_delay(rows, 0);
-                lattice.run((seconds * size * coeffs.rate_hz) as usize, &mut tip);
+                lattice.run_any((seconds * size * coeffs.rate_hz) as usize, &mut tip);
                 for n in 0..40 {
                     let f_hz = 20.0 * (coeffs.rate_hz / 40.0).powf(f64::from(n) / 39.0);
                     let running = reflectance(&tip.arrived, coeffs.rate_hz, f_hz);
@@ -228,7 +228,7 @@ fn independent_lattice_answers_alike_on_long_rings() {
                 lattice.set_jet_loss(jets);
                 lattice.glide_delay(rows, 0);
                 let mut tip = Impulse { first: 1.0, arrived: Vec::new() };
-                lattice.run(10_000, &mut tip);
+                lattice.run_any(10_000, &mut tip);
                 let mut bore = Oracle::new(cells, &holes, P_REF_PA, &case.air, &opening, jets, rows);
                 let mut first = 1.0;
                 for fast in tip.arrived {
@@ -308,7 +308,7 @@ fn stored_energy_of_no_instrument_grows() {
                             lattice.glide_opening(hole, random.unit(), 400);
                         }
                     }
-                    lattice.run(1, &mut Wall);
+                    lattice.run_any(1, &mut Wall);
                     let energy = lattice.stored_energy(coeffs);
                     worst = worst.max((energy - before) / before);
                     before = energy;
@@ -444,7 +444,7 @@ fn any_geometry_is_cut_or_plainly_refused() {
                     let (low, high) = coeffs.tuning_range();
                     lattice.glide_delay(random.between(low, high), 0);
                     let first = lattice.stored_energy(&coeffs);
-                    lattice.run(64, &mut Wall);
+                    lattice.run_any(64, &mut Wall);
                     let last = lattice.stored_energy(&coeffs);
                     assert!(last.is_finite() && last <= first * (1.0 + 1e-9), "{number}: {first} {last}");
                     cut += 1;

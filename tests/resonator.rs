@@ -89,7 +89,7 @@ impl<F: Real> Tip<F> for Impulse {
 fn impulse_response(model: &Model, opening: &[f64], seconds: f64) -> Vec<f64> {
     let samples = (seconds * model.coeffs.rate_hz) as usize;
     let mut tip = Impulse { first: 1.0, arrived: Vec::with_capacity(samples) };
-    fingered::<f64>(model, opening).run(samples, &mut tip);
+    fingered::<f64>(model, opening).run_any(samples, &mut tip);
     tip.arrived
 }
 
@@ -283,7 +283,7 @@ fn stored_energy_never_grows_by_itself() {
                 fingers.move_on(&mut lattice, model, &mut random);
             }
             tip.push = if pushing { 0.1 * random.both() } else { 0.0 };
-            lattice.run(1, &mut tip);
+            lattice.run_any(1, &mut tip);
             let energy = lattice.stored_energy(&model.coeffs);
             let growth = (energy - before - tip.went_in) / before;
             let worst = if pushing { &mut worst_pushed } else { &mut worst };
@@ -325,7 +325,7 @@ fn without_losses_stored_energy_is_constant() {
         let mut worst = 0.0_f64;
         for _ in 0..20_000 {
             fingers.move_on(&mut lattice, model, &mut random);
-            lattice.run(1, &mut tip);
+            lattice.run_any(1, &mut tip);
             worst = worst.max((lattice.stored_energy(&coeffs) / first - 1.0).abs());
         }
         println!("lossless, fingers moving, {} Hz: energy constant within {worst:.1e}", coeffs.rate_hz);
@@ -356,7 +356,7 @@ fn moving_delay_is_bounded_and_decays() {
                 lattice.glide_delay(target, left);
             }
             left -= 1;
-            lattice.run(1, &mut tip);
+            lattice.run_any(1, &mut tip);
             most = most.max(lattice.stored_energy(&model.coeffs) / first);
         }
         let moving = lattice.stored_energy(&model.coeffs) / first;
@@ -364,7 +364,7 @@ fn moving_delay_is_bounded_and_decays() {
         for (hole, &opening) in fingers.target.iter().enumerate() {
             lattice.set_opening(hole, opening);
         }
-        lattice.run(10 * rate_hz as usize, &mut tip);
+        lattice.run_any(10 * rate_hz as usize, &mut tip);
         let (rest, wave) = (lattice.stored_energy(&model.coeffs) / first, lattice.peak());
         println!(
             "delay and fingers moving, {rate_hz} Hz: energy at most {most:.4} of the start, {moving:.1e} after 100000 \
@@ -394,7 +394,7 @@ fn independent_lattice_answers_an_impulse_alike() {
             lattice.set_jet_loss(jets);
             lattice.glide_delay(rows, 0);
             let mut tip = Impulse { first: 1.0, arrived: Vec::new() };
-            lattice.run(10_000, &mut tip);
+            lattice.run_any(10_000, &mut tip);
             let mut bore = Oracle::new(&model.cells, &holes, P_REF_PA, &model.air, &opening, jets, rows);
             let mut first = 1.0;
             for fast in tip.arrived {
@@ -476,9 +476,9 @@ fn blown<'a, F: Real>(model: &Model, note: &HeldNote, reed: &'a ReedCoeffs, samp
     lattice.glide_delay(note.rows, 0);
     let mut tip = Blown::new(reed, model);
     for _ in 0..samples / 100 {
-        lattice.run(100, &mut tip);
+        lattice.run_any(100, &mut tip);
     }
-    lattice.run(samples % 100, &mut tip);
+    lattice.run_any(samples % 100, &mut tip);
     tip
 }
 
@@ -725,7 +725,7 @@ fn held_note_leaves_no_subnormal_behind() {
         let mut tip = Blown::new(&reed, model);
         let mut subnormal = 0;
         for _ in 0..1_500 {
-            lattice.run(128, &mut tip);
+            lattice.run_any(128, &mut tip);
             if flushed {
                 lattice.flush();
             }
@@ -770,7 +770,7 @@ impl<R: FnMut(f64) -> f64> Tip<f64> for Ringing<R> {
 fn decay_s(model: &Model, fingering: usize, f_hz: f64, reed: impl FnMut(f64) -> f64) -> f64 {
     let rate_hz = model.coeffs.rate_hz;
     let mut tip = Ringing { push: 0.1, reed, pressure: Vec::new() };
-    fingered::<f64>(model, &openings(model, fingering)).run(rate_hz as usize / 4, &mut tip);
+    fingered::<f64>(model, &openings(model, fingering)).run_any(rate_hz as usize / 4, &mut tip);
     let length = (8.0 * rate_hz / f_hz) as usize;
     let at = |start_s: f64| {
         let start = (start_s * rate_hz) as usize;

@@ -84,7 +84,7 @@ fn find(name: &str) -> Result<&'static ControllerMap, String> {
 }
 
 /// Values of a map that the decoder of MIDI takes, and no instrument.
-const OF_THE_DECODER: [&str; 3] = ["wheel", "bfrom", "bendr"];
+pub const OF_THE_DECODER: [&str; 3] = ["wheel", "bfrom", "bendr"];
 
 /// Sets what a map says of the wheel, of the controller that blows, and of the bend range. Nothing sounds yet, so this bends nothing.
 pub fn set_by_map(decoder: &mut MidiDecoder, map: &ControllerMap) {

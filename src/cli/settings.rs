@@ -1,9 +1,11 @@
 //! The player's settings as arguments: a flag for each number of the parameter table, and `--set` for all of it.
 
 use crate::cli::Failure;
+use crate::cli::controllers::OF_THE_DECODER;
 use crate::cli::reed_physical::PhysicalReedArgs;
 use crate::cli::shared_args::whole;
 use crate::parameters::{self, Kind, Number, PARAMETERS, Parameter, Sets, Value};
+use crate::presets::nearest;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::instrument::{BreathResponse, Settings};
 use chalumeau_core::score;
@@ -184,14 +186,23 @@ fn assignment(text: &str) -> Result<Given, String> {
         let typed = format!("--set {id}");
         return Ok(Given { parameter, value: parameter.read(value)?, typed });
     }
-    let what = match known {
+    Err(match known {
+        Some(Parameter { name, flag: "", .. }) if OF_THE_DECODER.contains(&id) => format!(
+            "{id} ({name}) belongs to a controller; for a MIDI file, [parameters] of a --controllers file sets it"
+        ),
         Some(Parameter { name, flag: "", .. }) => format!("{id} ({name}) is only in the plugin"),
         Some(Parameter { name, flag, .. }) => format!("{id} ({name}) is not set so; the flag is {flag}"),
-        None => format!("no parameter {id:?}"),
-    };
-    let ids = PARAMETERS.iter().filter(|parameter| parameter.sets.is_some());
-    let ids: Vec<_> = ids.map(|Parameter { id, name, .. }| format!("{id} ({name})")).collect();
-    Err(format!("{what}; the parameters that can be set are {}", ids.join(", ")))
+        None => {
+            let all = || PARAMETERS.iter().filter(|parameter| parameter.sets.is_some());
+            let near = nearest(id, all().flat_map(|parameter| [parameter.id, parameter.name]));
+            let near = all()
+                .find(|parameter| near.is_some_and(|near| [parameter.id, parameter.name].contains(&near)));
+            let near = near.map_or_else(String::new, |Parameter { id, name, .. }| {
+                format!("; did you mean {id} ({name})?")
+            });
+            format!("no parameter {id:?}{near}; `chalumeau parameters` lists them")
+        }
+    })
 }
 
 /// Flags such as `--no-noise` and `--tempered` as values of the table.
@@ -506,8 +517,10 @@ mod tests {
         for (words, says) in [
             (
                 &["--set", "vnt=2"][..],
-                &["no parameter \"vnt\"", "vent (Register vent), transp (Transpose), beyond"][..],
+                &["no parameter \"vnt\"; did you mean vent (Register vent)?", "chalumeau parameters"][..],
             ),
+            (&["--set", "strength=3"], &["did you mean stren (Reed strength)?"]),
+            (&["--set", "bfrom=keys"], &["bfrom (Breath from) belongs to a controller", "--controllers"]),
             (&["--set", "vent"], &["must be id=value"]),
             (&["--set", "vent=9"], &["vent (Register vent) must lie in 0..4, got 9"]),
             (&["--set", "temp=50 °C"], &["temp (Temperature) must lie in 10..40 °C"]),

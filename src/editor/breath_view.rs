@@ -59,18 +59,18 @@ impl BreathView {
     fn column(&mut self, ui: &mut Ui, hands: &mut Hands, snapshot: &Snapshot) {
         heading(ui, "Breath sources");
         choice(ui, hands, "bfrom");
-        let mut has_knob = false;
+        let mut may_calibrate = snapshot.knob.is_live || hands.step("knob") > 0;
         for source in &snapshot.sources {
             meter_of(ui, source, self.ranges[source.input as usize]);
-            if source.input == BreathInput::Knob {
-                has_knob = true;
+            if source.input == BreathInput::Knob && may_calibrate {
+                may_calibrate = false;
                 calibrate(ui, hands);
             }
         }
         if snapshot.sources.is_empty() {
             ui.label("No source has sent a value yet. Key velocity sets the mouth pressure.");
         }
-        if !has_knob {
+        if may_calibrate {
             heading(ui, "Calibrate the knob");
             calibrate(ui, hands);
         }

@@ -63,6 +63,10 @@ pub trait Controls {
     fn curves(&self) -> Option<&SourceCurves> {
         None
     }
+    /// Whether the host opens menus of its own.
+    fn has_menu(&self) -> bool {
+        false
+    }
     /// Opens the host's own menu for it, at a place of the window in pixels. Nothing happens where the host has none.
     fn menu(&self, _id: &str, _at: (i32, i32)) {}
 }

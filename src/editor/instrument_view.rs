@@ -83,11 +83,10 @@ fn list(ui: &mut Ui, hands: &Hands, snapshot: &Snapshot, files: &mut FileBrowser
         ui.add(egui::ProgressBar::new(*part).text(what.as_str()).desired_height(16.0).fill(c.accent));
     }
     ui.horizontal(|ui| {
-        if ui.button("Open an instrument file").clicked() {
+        let about = "A text file with the bore, the tone holes and the fingerings of a clarinet. You get one to begin with from Alter the bore in the Clarinet view, or from the command line with `chalumeau instrument new`.";
+        if ui.button("Open an instrument file").on_hover_text(about).clicked() {
             files.open(FileKind::Instrument, actions);
         }
-        let about = RichText::new("docs/instrument-file.md describes one").color(c.quiet);
-        ui.add(egui::Label::new(about).truncate());
     });
 }
 

@@ -1,9 +1,10 @@
 //! The keyboard: the range of the instrument, named by written or sounding notes; and the key switches at its left, if there are
 //! any. A press lower on a key is louder.
 //! Sliding from key to key slurs: the new note starts before the old one ends. With the keyboard focus, the arrow keys
-//! choose a note, and Space plays it while it is held.
+//! choose a note, and Space plays it while it is held. In a window without a host, [letters](typed_letters) play too.
 
 mod switch_row;
+mod typed_letters;
 
 use egui::{
     Color32, CornerRadius, Event, EventFilter, Key, Pos2, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2,
@@ -17,11 +18,14 @@ use crate::editor::theme;
 use crate::editor::theme::Colours;
 use chalumeau_core::units::SoundingNote;
 use switch_row::SwitchRow;
+use typed_letters::TypedLetters;
 
-/// Velocity of a note played with Space.
+/// Velocity of a note played with Space or a letter.
 const PLAIN: f32 = 0.75;
 
 const HELP: &str = "The keys have the names of the notes they play, written or sounding as at the top of the window. Press lower on a key to play louder; slide to slur. With the keyboard: Tab to here, choose with the arrow keys, play with Space.";
+const LETTERS_HELP: &str =
+    "The letters on the keys play them, too. Page Up and Page Down move the letters by an octave.";
 const SWITCH_KEY: &str = "This key makes no sound: the notes that follow take these fingerings, until another key of the row is struck. The colour shows which. *Key switches* in the Breath view moves the row.";
 const SILENT_KEY: &str = "The instrument does not play this note in tune, so the key is silent.";
 
@@ -34,11 +38,25 @@ pub struct Keyboard {
     by_key: bool,
     /// The note that the arrow keys have chosen.
     chosen: Option<SoundingNote>,
+    /// In a window without a host.
+    letters: Option<TypedLetters>,
 }
 
 impl Keyboard {
-    /// Draws the keys, and says what they play.
-    pub fn draw(&mut self, ui: &mut Ui, names: NoteNames, snapshot: &Snapshot, actions: &mut Vec<Action>) {
+    /// Letters play from now on.
+    pub fn take_letters(&mut self) {
+        self.letters = Some(TypedLetters::default());
+    }
+
+    /// Draws the keys, and says what they play. `is_text`: letters are text now.
+    pub fn draw(
+        &mut self,
+        ui: &mut Ui,
+        names: NoteNames,
+        snapshot: &Snapshot,
+        is_text: bool,
+        actions: &mut Vec<Action>,
+    ) {
         let Some((lowest, highest)) = snapshot.keys() else { return };
         // From a white key to a white key.
         let from = if is_black(lowest.0) { lowest.0.saturating_sub(1) } else { lowest.0 };
@@ -66,11 +84,16 @@ impl Keyboard {
             self.hold(None, actions);
         }
 
+        if let Some(letters) = &mut self.letters {
+            let plays = |note: SoundingNote| playable(note.0);
+            letters.play(ui, (lowest.0, highest.0), is_text, PLAIN, plays, actions);
+        }
+
         let c = Colours::here(ui);
         let focus = response.has_focus().then_some(chosen);
         let named = |key: u8| names.of_sounding(snapshot.plays(SoundingNote(key))?, transposition);
         let down = [snapshot.key, self.held].map(|key| key.map(|note| note.0));
-        keys.paint(ui, c, down, focus, named);
+        keys.paint(ui, c, down, focus, named, |key| self.letters.as_ref()?.letter(key));
         if let Some(row) = &row {
             row.paint(ui, c, snapshot.next_fingerings());
         }
@@ -86,6 +109,7 @@ impl Keyboard {
                     response.on_hover_text(format!("Key switch, {fingerings}. {SWITCH_KEY}"))
                 }
                 Some((None, false)) => response.on_hover_text(SILENT_KEY),
+                _ if self.letters.is_some() => response.on_hover_text(format!("{HELP} {LETTERS_HELP}")),
                 _ => response.on_hover_text(HELP),
             };
         }
@@ -95,6 +119,9 @@ impl Keyboard {
     pub fn release(&mut self, actions: &mut Vec<Action>) {
         self.by_key = false;
         self.hold(None, actions);
+        if let Some(letters) = &mut self.letters {
+            letters.release(actions);
+        }
     }
 
     fn hold(&mut self, wanted: Option<(SoundingNote, f32)>, actions: &mut Vec<Action>) {
@@ -188,7 +215,7 @@ impl Keys {
         Some((note, 0.35 + 0.65 * down))
     }
 
-    /// Paints them; `named` gives the note that a key is named by, `None` for a silent one.
+    /// Paints them; `named` gives the note that a key is named by, `None` for a silent one; `letter` what is typed to play it.
     fn paint(
         &self,
         ui: &Ui,
@@ -196,6 +223,7 @@ impl Keys {
         down: [Option<u8>; 2],
         focus: Option<u8>,
         named: impl Fn(u8) -> Option<u8>,
+        letter: impl Fn(u8) -> Option<&'static str>,
     ) {
         let painter = ui.painter_at(self.rect);
         for black in [false, true] {
@@ -227,6 +255,15 @@ impl Keys {
                     );
                 }
             }
+        }
+        for note in (self.from..=self.to).filter(|&note| named(note).is_some()) {
+            let Some(letter) = letter(note) else { continue };
+            let (key, ink) = (self.key(note), if is_black(note) { c.ivory } else { Color32::from_gray(90) });
+            let words = painter.layout_no_wrap(letter.to_owned(), theme::small(), ink);
+            // Clear of the names below, and on a white key of the black ones above.
+            let low = if is_black(note) { 4.0 } else { 18.0 };
+            let place = pos2(key.center().x - 0.5 * words.size().x, key.bottom() - low - words.size().y);
+            painter.galley(place, words, ink);
         }
         // One name an octave, on a white key, which is wide enough; and that of a key held down.
         for note in self.from..=self.to {

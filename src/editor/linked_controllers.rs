@@ -32,8 +32,7 @@ fn offer(ui: &Ui, hands: &Hands, id: &'static str, response: &Response, clicked:
         ui.data_mut(|data| data.insert_temp(place, at));
     }
     response.context_menu(|ui| {
-        let learning = links.learning().is_some_and(|parameter| parameter.id == id);
-        if learning {
+        if is_learning(hands, id) {
             if ui.button("Stop waiting for a controller").clicked() {
                 links.learn(None);
             }
@@ -48,19 +47,35 @@ fn offer(ui: &Ui, hands: &Hands, id: &'static str, response: &Response, clicked:
                 links.replace(&others);
             }
         }
-        if ui.button("Menu of the host").clicked() {
+        if hands.controls.has_menu() && ui.button("Menu of the host").clicked() {
             let at = ui.data(|data| data.get_temp::<Pos2>(place)).unwrap_or_default();
             host_marks::open_menu(ui, hands, id, at);
         }
     });
 }
 
+/// What a control says whose controller is about to be learnt.
+pub const ASKS: &str = "move a controller";
+
+/// Whether a controller is about to be learnt for this parameter.
+pub fn is_learning(hands: &Hands, id: &str) -> bool {
+    let learning = hands.controls.links().and_then(ControllerLinks::learning);
+    learning.is_some_and(|parameter| parameter.id == id)
+}
+
+/// No longer waits for a controller.
+pub fn end_learning(hands: &Hands) {
+    if let Some(links) = hands.controls.links().filter(|links| links.learning().is_some()) {
+        links.learn(None);
+    }
+}
+
 /// Names the controllers of a parameter at the right of `after`, or asks for one; nothing where there is none.
 pub fn name(ui: &Ui, hands: &Hands, id: &str, after: Pos2) {
     let Some(links) = hands.controls.links() else { return };
     let c = Colours::here(ui);
-    let (text, ink) = if links.learning().is_some_and(|parameter| parameter.id == id) {
-        ("move a controller".to_owned(), c.accent)
+    let (text, ink) = if is_learning(hands, id) {
+        (ASKS.to_owned(), c.accent)
     } else {
         let names: Vec<String> = of(links, id).map(|(link, _)| source_name(link.source)).collect();
         (names.join(", "), c.quiet)

@@ -48,6 +48,8 @@ impl PresetBrowser {
         self.is_open = !self.is_open;
         self.form = None;
         if self.is_open {
+            // What was looked for the last time hides the rest.
+            self.search.clear();
             actions.push(Action::ReadPresets);
         }
     }
@@ -140,16 +142,22 @@ impl PresetBrowser {
             self.is_open = false;
         }
         heading(ui, if snapshot.preset.is_empty() { "No preset chosen" } else { &snapshot.preset });
-        if let Some(preset) = chosen {
-            about(ui, preset, hands);
-        }
-        ui.add_space(GAP);
+        // Above what the preset sets, which may be long.
         match self.form.take() {
             Some(form) => self.form = draw_form(ui, form, hands, shelf, actions),
-            None => self.form = offer_forms(ui, snapshot),
+            None => {
+                self.form = offer_forms(ui, snapshot);
+                if self.form.is_some() {
+                    ui.memory_mut(|memory| memory.request_focus(first_field()));
+                }
+            }
         }
         if let Some(notice) = &shelf.notice {
             ui.label(RichText::new(notice).color(c.danger));
+        }
+        ui.add_space(GAP);
+        if let Some(preset) = chosen {
+            about(ui, preset, hands);
         }
         if !shelf.user.broken.is_empty() {
             heading(ui, "Files that are no presets");
@@ -213,12 +221,29 @@ fn offer_forms(ui: &mut Ui, snapshot: &Snapshot) -> Option<Form> {
     form
 }
 
+/// The field of a form that text goes to first.
+fn first_field() -> egui::Id {
+    egui::Id::unique("name of a preset")
+}
+
 /// A field with its name above it.
 fn field(ui: &mut Ui, name: &str, text: &mut String) {
+    let edit = TextEdit::singleline(text);
+    add_field(ui, name, edit);
+}
+
+/// The same for a preset's name, which Enter finishes. Whether it has.
+fn name_field(ui: &mut Ui, name: &str, text: &mut String) -> bool {
+    let response = add_field(ui, name, TextEdit::singleline(text).id(first_field()));
+    response.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter))
+}
+
+fn add_field(ui: &mut Ui, name: &str, edit: TextEdit) -> Response {
     let c = Colours::here(ui);
     ui.label(RichText::new(name).color(c.quiet));
-    let response = ui.add(TextEdit::singleline(text).desired_width(ui.available_width() - 8.0));
+    let response = ui.add(edit.desired_width(ui.available_width() - 8.0));
     response.widget_info(|| WidgetInfo::labeled(Role::TextInput, true, name));
+    response
 }
 
 /// Draws a form; `None` once it is done.
@@ -234,7 +259,7 @@ fn draw_form(
     let mut is_done = false;
     match &mut form {
         Form::Save { name, tags, author, shows } => {
-            field(ui, "Name of the preset", name);
+            let is_entered = name_field(ui, "Name of the preset", name);
             field(ui, "Tags, with commas", tags);
             field(ui, "Author", author);
             field(ui, "What it shows", shows);
@@ -251,7 +276,9 @@ fn draw_form(
                 Preset::parse(&preset.to_text()).map_err(|reason| reason.what)
             });
             let word = if shelf.is_users(name.trim()) { "Replace" } else { "Save" };
-            if ui.add_enabled(made.is_ok(), egui::Button::new(word)).clicked()
+            // Enter replaces nothing: who means that presses the button.
+            let is_entered = is_entered && word == "Save";
+            if (ui.add_enabled(made.is_ok(), egui::Button::new(word)).clicked() || is_entered)
                 && let Ok(preset) = &made
             {
                 actions.push(Action::SavePreset(preset.clone()));
@@ -264,13 +291,13 @@ fn draw_form(
             }
         }
         Form::Rename { old, new } => {
-            field(ui, "New name", new);
+            let is_entered = name_field(ui, "New name", new);
             let is_taken = |name: &str| name != old.as_str() && shelf.find(name).is_some();
             let checked = checked_name(new).and_then(|name| match is_taken(&name) {
                 true => Err("another preset has this name".to_owned()),
                 false => Ok(name),
             });
-            if ui.add_enabled(checked.is_ok(), egui::Button::new("Rename")).clicked()
+            if (ui.add_enabled(checked.is_ok(), egui::Button::new("Rename")).clicked() || is_entered)
                 && let Ok(name) = &checked
             {
                 actions.push(Action::RenamePreset { old: old.clone(), new: name.clone() });

@@ -120,9 +120,14 @@ impl HostLink {
         self.has_menu.store(has_menu, Ordering::Relaxed);
     }
 
+    /// See [`set_has_menu`](Self::set_has_menu).
+    pub fn has_menu(&self) -> bool {
+        self.has_menu.load(Ordering::Relaxed)
+    }
+
     /// Asks for the host's menu. Nothing happens if the host has none.
     pub fn ask_menu(&self, request: MenuRequest) {
-        if self.has_menu.load(Ordering::Relaxed) {
+        if self.has_menu() {
             *self.menu.lock().unwrap_or_else(PoisonError::into_inner) = Some(request);
             self.tell();
         }

@@ -13,12 +13,10 @@ static LAUNCH_OPTIONS: OnceLock<LaunchOptions> = OnceLock::new();
 /// Options of this process.
 #[derive(Debug)]
 pub struct LaunchOptions {
-    /// Default of the parameter *Instrument*.
-    pub instrument: InstrumentChoice,
-    /// Path of the user's instrument file; empty for the usual place.
-    pub instrument_file: String,
-    /// Default of the parameter *A4*, Hz.
-    pub a4_hz: f32,
+    /// Default of the parameter *Instrument*, and the path of the user's file, if the user has named an instrument.
+    pub instrument: Option<(InstrumentChoice, String)>,
+    /// Default of the parameter *A4*, Hz, if the user has given one.
+    pub a4_hz: Option<f32>,
     /// The user has named a microphone: it is on.
     pub microphone: bool,
     /// Whether the plugin has a window.
@@ -33,6 +31,11 @@ impl LaunchOptions {
     /// Sets the options of this process and returns them. Only the first call has an effect.
     pub fn set(self) -> &'static Self {
         LAUNCH_OPTIONS.get_or_init(|| self)
+    }
+
+    /// Whether they change what a new instance plays.
+    pub fn has_changes(&self) -> bool {
+        self.instrument.is_some() || self.a4_hz.is_some()
     }
 
     /// The options of this process; `None` in a host.

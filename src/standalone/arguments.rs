@@ -25,7 +25,8 @@ Examples:
   chalumeau-standalone --backend dummy                    shows the window, makes no sound
 
 Play it with a MIDI keyboard, a wind controller, a knob, or the keys in the window. CC2 or CC11 sets the breath. Until one
-of them moves, key velocity sets it. With a microphone, hold keys and blow at it; keep quiet for the first two seconds,
+of them moves, key velocity sets it. On the computer's keyboard, letters play: A S D F G H J K are the white keys from C.
+The next start finds the settings of this one. With a microphone, hold keys and blow at it; keep quiet for the first two seconds,
 in which the program measures the room. Without a display, the program plays without a window. To quit, close the window or
 press Ctrl-C.";
 
@@ -55,12 +56,15 @@ pub struct Args {
     /// Name of the MIDI output for a knob's breath; an empty name lists them. Not for JACK.
     #[arg(long, value_name = "NAME")]
     midi_output: Option<String>,
-    /// Instrument: b-flat, a, e-flat, c, bass, or an instrument file.
-    #[arg(short, long, value_name = "NAME|FILE", default_value = "b-flat", value_parser = instrument)]
-    pub instrument: (InstrumentChoice, String),
-    /// Pitch of A4, 415..466 Hz.
-    #[arg(long, value_name = "HZ", default_value = "440", value_parser = a4)]
-    pub a4: f32,
+    /// Instrument: b-flat, a, e-flat, c, bass, or an instrument file. Without it, that of the last session.
+    #[arg(short, long, value_name = "NAME|FILE", value_parser = instrument)]
+    pub instrument: Option<(InstrumentChoice, String)>,
+    /// Pitch of A4, 415..466 Hz. Without it, that of the last session.
+    #[arg(long, value_name = "HZ", value_parser = a4)]
+    pub a4: Option<f32>,
+    /// Begin with the default settings instead of those of the last session.
+    #[arg(long)]
+    pub new_session: bool,
     /// Play without a window.
     #[arg(long)]
     pub no_window: bool,
@@ -265,8 +269,8 @@ mod tests {
 
     #[test]
     fn instruments_have_the_names_of_the_command_line() {
-        assert_eq!(args(&[]).instrument.0, InstrumentChoice::BFlat);
-        assert_eq!(args(&["--instrument", "bass"]).instrument.0, InstrumentChoice::Bass);
+        assert_eq!(args(&[]).instrument, None);
+        assert_eq!(args(&["--instrument", "bass"]).instrument.unwrap().0, InstrumentChoice::Bass);
         let refused = Args::try_parse_from(["x", "--instrument", "tuba"]).unwrap_err();
         assert!(refused.to_string().contains("e-flat"), "{refused}");
         assert!(Args::try_parse_from(["x", "--a4", "400"]).unwrap_err().to_string().contains("415..466"));

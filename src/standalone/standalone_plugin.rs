@@ -9,6 +9,7 @@ use nice_plug::context::gui::AsyncExecutor;
 use nice_plug::prelude::*;
 
 use super::jack::JackLink;
+use super::session::Session;
 use crate::plugin::{Chalumeau, executor_of};
 
 /// The plugin that plays, for [`StandalonePlugin::end`]. The framework keeps the plugin to itself.
@@ -24,15 +25,18 @@ pub struct StandalonePlugin {
     uses_jack: bool,
     /// Channels of the microphone that the framework has opened.
     inputs: usize,
+    /// `None` on a system without a folder for it.
+    session: Option<Session>,
 }
 
 impl Default for StandalonePlugin {
     /// The framework makes the plugin, and passes nothing to it. The JACK client waits in a global.
     fn default() -> Self {
         let plugin = Arc::<Mutex<Chalumeau>>::default();
+        let session = Session::begin(locked(&plugin).shared_params());
         let jack = JackLink::claim(&plugin);
         let uses_jack = jack.is_some();
-        let this = Self { plugin, jack: Arc::new(Mutex::new(jack)), uses_jack, inputs: 0 };
+        let this = Self { plugin, jack: Arc::new(Mutex::new(jack)), uses_jack, inputs: 0, session };
         *locked(&PLAYING) = Some(this.clone());
         this
     }
@@ -135,6 +139,9 @@ impl StandalonePlugin {
     }
 
     fn silence(&self) {
+        if let Some(session) = &self.session {
+            session.save();
+        }
         // Closes the client. The lock is free again before that.
         let jack = locked(&self.jack).take();
         let mut plugin = locked(&self.plugin);

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use chalumeau::controllers::breath_input::BreathInput;
+use chalumeau::editor::controls::Controls;
 use chalumeau::editor::note_names::NoteNames;
 use chalumeau::editor::{Action, FeelTest, Tab};
 use chalumeau_core::units::SoundingNote;
@@ -141,6 +142,64 @@ fn keys_play_slur_and_let_go() {
         window.harness.state_mut().close(&*host)
     };
     assert!(matches!(left[..], [Action::NoteOff { .. }]), "a window that closes lets go: {left:?}");
+}
+
+#[test]
+fn letters_play_in_a_window_without_a_host_only() {
+    let type_key = |window: &mut Window, keys: &[(Key, bool)]| {
+        for &(key, pressed) in keys {
+            let modifiers = egui::Modifiers::NONE;
+            window.harness.event(egui::Event::Key {
+                key,
+                physical_key: None,
+                pressed,
+                repeat: false,
+                modifiers,
+            });
+        }
+        window.harness.run();
+        window.actions()
+    };
+    let on = |note: u8| Action::NoteOn { note: SoundingNote(note), velocity: 0.75 };
+    let off = |note: u8| Action::NoteOff { note: SoundingNote(note) };
+    let mut window = Window::new(Tab::Play, chalumeau::editor::SIZE);
+    assert_eq!(type_key(&mut window, &[(Key::A, true), (Key::A, false)]), [], "a host has the letters");
+
+    let state = std::mem::take(window.harness.state_mut());
+    *window.harness.state_mut() = state.with_letters();
+    assert_eq!(type_key(&mut window, &[(Key::A, true)]), [on(60)]);
+    assert_eq!(type_key(&mut window, &[(Key::W, true)]), [on(61)]);
+    assert_eq!(type_key(&mut window, &[(Key::A, false)]), [off(60)]);
+    assert_eq!(type_key(&mut window, &[(Key::W, false), (Key::W, true)]), [], "a repeat is no new stroke");
+    assert_eq!(type_key(&mut window, &[(Key::PageUp, true), (Key::PageUp, false)]), []);
+    assert_eq!(type_key(&mut window, &[(Key::W, false), (Key::S, true)]), [off(61), on(74)]);
+    window.harness.event(egui::Event::WindowFocused(false));
+    window.harness.run();
+    assert_eq!(window.actions(), [off(74)], "who leaves the window lets go");
+    assert_eq!(type_key(&mut window, &[(Key::S, false)]), []);
+    // Below the lowest key and above the highest there is nothing.
+    for (key, note) in [(Key::PageUp, 84), (Key::PageDown, 48)] {
+        for _ in 0..9 {
+            type_key(&mut window, &[(key, true), (key, false)]);
+        }
+        let note = if key == Key::PageDown { note + 4 } else { note };
+        let letter = if key == Key::PageDown { Key::D } else { Key::A };
+        assert_eq!(type_key(&mut window, &[(letter, true)]), [on(note)]);
+        assert_eq!(type_key(&mut window, &[(letter, false)]), [off(note)]);
+    }
+    assert_eq!(type_key(&mut window, &[(Key::A, true)]), [], "C3 is below the clarinet");
+    type_key(&mut window, &[(Key::A, false)]);
+
+    window.harness.state_mut().kept.tab = Tab::Reed;
+    window.harness.run();
+    let name = window.host.look("stren").unwrap().name;
+    let value =
+        window.harness.get_by_role_and_label(Role::Slider, &name).rect().right_top() + vec2(-8.0, 9.0);
+    window.harness.drag_at(value);
+    window.harness.drop_at(value);
+    window.harness.run();
+    window.actions();
+    assert_eq!(type_key(&mut window, &[(Key::D, true), (Key::D, false)]), [], "text is text");
 }
 
 #[test]

@@ -216,6 +216,10 @@ impl Controls for Fake {
         Some(&self.curves)
     }
 
+    fn has_menu(&self) -> bool {
+        true
+    }
+
     fn menu(&self, id: &str, at: (i32, i32)) {
         self.menus.borrow_mut().push((id.to_owned(), at));
     }

@@ -70,7 +70,7 @@ impl<'a> MemorylessVoice<'a> {
         let samples = ((seconds * self.model.coeffs.rate_hz) as usize).max(1);
         self.tip.glide = (gamma - self.tip.p_mouth) / samples as f64;
         self.tip.kick = kick;
-        self.lattice.run(samples, &mut self.tip);
+        self.lattice.run_any(samples, &mut self.tip);
         self.tip.p_mouth = gamma;
         self.tip.glide = 0.0;
         std::mem::take(&mut self.tip.heard)

@@ -50,12 +50,16 @@ struct Program {
     child: Child,
     lines: Receiver<String>,
     said: Vec<String>,
+    _home: tempfile::TempDir,
 }
 
 impl Program {
     fn start(server: &JackServer, args: &[&str]) -> Self {
         let mut command = Command::new(artefacts::standalone().unwrap());
         command.args(["--backend", "jack", "--no-window"]).args(args);
+        // None has a session of another one.
+        let home = tempfile::tempdir().unwrap();
+        command.env("CHALUMEAU_DATA_DIR", home.path());
         let mut child = server
             .for_clients(&mut command)
             .stdin(Stdio::null())
@@ -66,7 +70,7 @@ impl Program {
         let stderr = BufReader::new(child.stderr.take().unwrap());
         let (send, lines) = channel();
         std::thread::spawn(move || stderr.lines().map_while(Result::ok).try_for_each(|line| send.send(line)));
-        let mut program = Self { child, lines, said: Vec::new() };
+        let mut program = Self { child, lines, said: Vec::new(), _home: home };
         program.says("playing", PATIENCE);
         program
     }

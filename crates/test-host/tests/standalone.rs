@@ -2,6 +2,7 @@
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
 use std::process::{Child, ChildStderr, Command, ExitStatus, Output, Stdio};
 use std::time::{Duration, Instant};
 
@@ -12,6 +13,7 @@ fn program() -> Command {
     let path = chalumeau_test_host::artefacts::standalone().unwrap();
     let mut command = Command::new(path);
     command
+        .env("CHALUMEAU_DATA_DIR", Path::new(env!("CARGO_TARGET_TMPDIR")).join("standalone"))
         .env_remove("DISPLAY")
         .env_remove("WAYLAND_DISPLAY")
         .env("ALSA_CONFIG_PATH", "/dev/null")
@@ -85,6 +87,31 @@ fn it_plays_to_nobody_and_stops_when_asked() {
     let mut rest = String::new();
     running.said.read_to_string(&mut rest).unwrap();
     assert!(!rest.contains("panicked"), "{rest}");
+}
+
+#[test]
+fn the_next_start_finds_the_settings_of_the_last() {
+    let home = tempfile::tempdir().unwrap();
+    let plays = |args: &[&str]| {
+        let mut command = program();
+        command.args(["--backend", "dummy"]).args(args).env("CHALUMEAU_DATA_DIR", home.path());
+        let mut running = Running::spawn(&mut command);
+        running.wait();
+        std::thread::sleep(Duration::from_millis(300));
+        assert!(running.interrupt().success());
+        let mut said = String::new();
+        running.said.read_to_string(&mut said).unwrap();
+        let kept = std::fs::read_to_string(home.path().join("chalumeau/session.json")).unwrap();
+        let state: serde_json::Value = serde_json::from_str(&kept).unwrap();
+        ["instr", "a4"].map(|id| state["params"][id].to_string())
+    };
+    let first = [r#"{"string":"bflat"}"#, r#"{"f32":440.0}"#];
+    let asked = [r#"{"string":"bass"}"#, r#"{"f32":442.0}"#];
+    assert_eq!(plays(&[]), first);
+    assert_eq!(plays(&["--instrument", "bass", "--a4", "442"]), asked);
+    assert_eq!(plays(&[]), asked);
+    assert_eq!(plays(&["--new-session"]), first);
+    assert!(home.path().join("chalumeau/session-before.json").exists());
 }
 
 #[test]

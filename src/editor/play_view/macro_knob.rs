@@ -82,9 +82,13 @@ pub fn draw(ui: &mut Ui, hands: &mut Hands, of: &Macro, size: Vec2, has_ends: bo
         c.ink,
     );
     let after = host_marks::paint(ui, &marks, name.right_center());
-    linked_controllers::name(ui, hands, of.id, after);
-    // The value while a hand is near, else what the ends mean.
+    let is_learning = linked_controllers::is_learning(hands, of.id);
+    if !is_learning {
+        linked_controllers::name(ui, hands, of.id, after);
+    }
+    // The value while a hand is near, else what the ends mean. Beside the name there is no room to ask for a controller.
     let (words, ink) = match (is_touched, has_ends) {
+        _ if is_learning => (linked_controllers::ASKS, c.accent),
         (true, _) => (text.as_str(), c.ink),
         (false, true) => (of.ends, c.quiet),
         (false, false) => ("", c.quiet),

@@ -53,6 +53,11 @@ impl InstrumentChoice {
         Self::variants()[self.to_index()]
     }
 
+    /// In a saved state.
+    pub fn id(self) -> &'static str {
+        Self::ids().and_then(|ids| ids.get(self.to_index()).copied()).unwrap_or_default()
+    }
+
     /// The one that comes with the program, if it does.
     pub fn bundled(self) -> Option<Bundled> {
         match self {
@@ -112,23 +117,18 @@ pub struct InstrumentParams {
 impl InstrumentParams {
     /// What names the chosen instrument in a saved project: its identifier, or the path of the user's file.
     pub fn key(&self) -> String {
-        let choice = self.choice.value();
-        let id = || {
-            InstrumentChoice::ids().and_then(|ids| ids.get(choice.to_index()).copied()).unwrap_or_default()
-        };
-        match choice {
+        match self.choice.value() {
             InstrumentChoice::User => {
                 format!("user:{}", self.file.read().map_or_else(|_| String::new(), |path| path.clone()))
             }
-            _ => id().to_owned(),
+            bundled => bundled.id().to_owned(),
         }
     }
 
     /// Defaults; whoever loads the instrument writes its state to `state`.
     pub fn new(state: Arc<RwLock<String>>) -> Self {
-        let (first, file) = LaunchOptions::get().map_or((InstrumentChoice::BFlat, String::new()), |first| {
-            (first.instrument, first.instrument_file.clone())
-        });
+        let named = LaunchOptions::get().and_then(|options| options.instrument.clone());
+        let (first, file) = named.unwrap_or((InstrumentChoice::BFlat, String::new()));
         Self {
             file: RwLock::new(file),
             choice: choice("instr", first),

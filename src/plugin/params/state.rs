@@ -2,10 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use nice_plug::params::InternalParamMut;
 use nice_plug::plugin::ParamValue;
 use nice_plug::prelude::*;
 use serde::{Serialize, de::DeserializeOwned};
 
+use super::ChalumeauParams;
 use super::alterations::SavedAlterations;
 use super::instrument;
 use super::knob::SavedCalibration;
@@ -30,15 +32,14 @@ const BEFORE: [(&str, &str, u32); 4] =
 
 /// A number's default in this process: the table's, or what the program was started with.
 pub(super) fn starting(id: &str, number: &Number) -> f32 {
-    match LaunchOptions::get() {
-        Some(first) if id == "a4" => first.a4_hz,
-        _ => number.default,
-    }
+    let first = LaunchOptions::get().filter(|_| id == "a4").and_then(|options| options.a4_hz);
+    first.unwrap_or(number.default)
 }
 
 /// The preset that a new instance has: the one without changes, unless the program was started with some.
 pub(super) fn first_preset() -> String {
-    let is_plain = |preset: &&Preset| preset.changes().is_empty() && LaunchOptions::get().is_none();
+    let has_changes = LaunchOptions::get().is_some_and(LaunchOptions::has_changes);
+    let is_plain = |preset: &&Preset| preset.changes().is_empty() && !has_changes;
     factory::all().first().filter(is_plain).map_or_else(String::new, |preset| preset.name.clone())
 }
 
@@ -110,6 +111,60 @@ fn keep_the_feel(old: &mut BTreeMap<String, ParamValue>) {
     }
 }
 
+// The framework's parameter pointers are raw; they point into the parameters.
+#[allow(unsafe_code)]
+impl ChalumeauParams {
+    /// All that a project saves, without the controls of the moment. Not for the audio thread: allocates and locks.
+    pub fn saved(&self) -> PluginState {
+        let value = |pointer: ParamPtr| {
+            // SAFETY: the pointer leads into `self`, and the getters read atomics.
+            unsafe {
+                match pointer {
+                    ParamPtr::FloatParam(param) => ParamValue::F32((*param).unmodulated_plain_value()),
+                    ParamPtr::IntParam(param) => ParamValue::I32((*param).unmodulated_plain_value()),
+                    ParamPtr::BoolParam(param) => ParamValue::Bool((*param).unmodulated_plain_value()),
+                    ParamPtr::EnumParam(param) => {
+                        ParamValue::String((*param).unmodulated_plain_id().unwrap_or_default().to_owned())
+                    }
+                }
+            }
+        };
+        let params = self.param_map().into_iter().map(|(id, pointer, _)| (id, value(pointer))).collect();
+        let version = env!("CARGO_PKG_VERSION").to_owned();
+        let mut state = PluginState { version, params, fields: self.serialize_fields() };
+        without_moments(&mut state);
+        state
+    }
+
+    /// Puts a saved state on the parameters, made fit by [`mend`]. For a start without a host, before anything plays: nobody is told.
+    /// Not for the audio thread: allocates and locks.
+    pub fn restore(&self, mut state: PluginState) {
+        mend(&mut state);
+        for (id, pointer, _) in self.param_map() {
+            // SAFETY: the pointer leads into `self`, and the setters store atomics.
+            unsafe {
+                match (pointer, state.params.get(&id)) {
+                    (ParamPtr::FloatParam(param), Some(&ParamValue::F32(value))) => {
+                        (*param)._internal_set_plain_value(value);
+                    }
+                    (ParamPtr::IntParam(param), Some(&ParamValue::I32(value))) => {
+                        (*param)._internal_set_plain_value(value);
+                    }
+                    (ParamPtr::BoolParam(param), Some(&ParamValue::Bool(value))) => {
+                        (*param)._internal_set_plain_value(value);
+                    }
+                    (ParamPtr::EnumParam(param), Some(ParamValue::String(id))) => {
+                        (*param).set_from_id(id);
+                    }
+                    // `mend` leaves none of another kind.
+                    _ => {}
+                }
+            }
+        }
+        self.deserialize_fields(&state.fields);
+    }
+}
+
 /// A parameter's value as it may be, or its default.
 fn mended(parameter: &Parameter, saved: Option<ParamValue>) -> ParamValue {
     let saved = saved.filter(|_| parameter.is_restored);
@@ -149,7 +204,30 @@ fn mend_field<T: Default + Serialize + DeserializeOwned>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plugin::params::ChalumeauParams;
+
+    #[test]
+    fn what_is_saved_is_restored() {
+        let (old, new) = (ChalumeauParams::default(), ChalumeauParams::default());
+        let defaults = serde_json::to_string(&old.saved()).unwrap();
+        let mut state = old.saved();
+        for (id, value) in [
+            ("stren", ParamValue::F32(3.25)),
+            ("transp", ParamValue::I32(-2)),
+            ("reedc", ParamValue::Bool(false)),
+            ("instr", ParamValue::String("bass".to_owned())),
+            ("arm", ParamValue::Bool(true)),
+        ] {
+            state.params.insert(id.to_owned(), value);
+        }
+        old.restore(state);
+        old.set_preset_name("Mine");
+        new.restore(old.saved());
+        assert!(new.embouchure.strength.value() == 3.25 && new.tuning.transpose.value() == -2);
+        assert!(!new.reed.coupled.value() && new.instrument.key() == "bass" && new.preset_name() == "Mine");
+        assert!(!new.knob.arm.value(), "an armed knob is not restored");
+        let texts = [&old, &new].map(|params| serde_json::to_string(&params.saved()).unwrap());
+        assert!(texts[0] == texts[1] && texts[0] != defaults);
+    }
 
     #[test]
     fn what_a_state_does_not_mention_is_as_in_a_new_project() {

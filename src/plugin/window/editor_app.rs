@@ -37,9 +37,11 @@ pub struct WindowMemory {
 impl WindowMemory {
     pub(super) fn new(handles: SharedHandles, keys: rtrb::Producer<Event>) -> Self {
         let written = kept(&handles.params);
+        let state = EditorState::new(written.clone());
         Self {
             controls: HostControls::new(handles.params.clone()),
-            state: EditorState::new(written.clone()),
+            // A host has commands on its letters.
+            state: if LaunchOptions::get().is_some() { state.with_letters() } else { state },
             written,
             links: changes(&handles.params),
             handles,

@@ -116,6 +116,10 @@ mod raw {
             Some(&self.controls.params.curves)
         }
 
+        fn has_menu(&self) -> bool {
+            self.controls.params.host.has_menu()
+        }
+
         fn menu(&self, id: &str, at: (i32, i32)) {
             if let Some(&id) = self.controls.ids.iter().find(|known| **known == id) {
                 self.controls.params.host.ask_menu(MenuRequest { id, at });

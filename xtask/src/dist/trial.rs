@@ -151,6 +151,8 @@ impl Fresh {
         command.args([&format!("DISPLAY={}", display.name()), "LIBGL_ALWAYS_SOFTWARE=1", "LP_NUM_THREADS=1"]);
         // Mesa keeps compiled shaders in the user's home, for every program that draws: they are no trace of the package.
         command.arg("MESA_SHADER_CACHE_DISABLE=true");
+        // The session is the user's, who keeps it.
+        command.arg("CHALUMEAU_DATA_DIR=/tmp/cache");
         let mut running = command.args(["chalumeau-standalone", "--backend", "dummy"]).spawn()?;
         let drawn = screen.titled("Chalumeau").and_then(|window| {
             let picture = screen.settled(window, Duration::from_millis(600))?;

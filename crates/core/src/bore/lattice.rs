@@ -91,6 +91,31 @@ pub trait Tip<F> {
     fn ended(&mut self, _holes: &[(usize, usize)]) {}
 }
 
+/// A tip that is asked through a table of its functions.
+struct Asked<'a, F>(&'a mut dyn Tip<F>);
+
+impl<F> Tip<F> for Asked<'_, F> {
+    #[inline(always)]
+    fn reflect(&mut self, p_minus: F) -> F {
+        self.0.reflect(p_minus)
+    }
+
+    #[inline(always)]
+    fn radiated(&mut self, bell: F) {
+        self.0.radiated(bell);
+    }
+
+    #[inline(always)]
+    fn holes(&mut self, before: usize) -> Option<&mut HoleFlows<F>> {
+        self.0.holes(before)
+    }
+
+    #[inline(always)]
+    fn ended(&mut self, holes: &[(usize, usize)]) {
+        self.0.ended(holes);
+    }
+}
+
 /// The playing lattice: state, and the coefficients that move with the fingers.
 #[derive(Clone)]
 pub struct Lattice<F> {
@@ -402,24 +427,30 @@ impl<F: Real> Lattice<F> {
 
     /// Runs `samples` samples (a control tick) with `tip` at the reed end; holes that have arrived come to rest once a
     /// call. Real-time safe. [audio thread]
-    pub fn run<T: Tip<F>>(&mut self, mut samples: usize, tip: &mut T) {
-        // A delay that arrives on the way rests from there on.
-        while self.delay_arrives_within(samples) {
-            samples -= self.delay_left;
-            self.run_part(self.delay_left, tip);
-        }
-        self.run_part(samples, tip);
+    pub fn run<T: Tip<F>>(&mut self, samples: usize, tip: &mut T) {
+        self.in_parts(samples, tip, F::run_part);
     }
 
-    /// Runs no further than to where the delay arrives.
+    /// The same for measurements: slower, because the tip is asked through a table of its functions, and compiled once for all of them. The
+    /// same bits. Real-time safe.
+    pub fn run_any(&mut self, samples: usize, tip: &mut dyn Tip<F>) {
+        F::run_any(self, samples, tip);
+    }
+
+    /// Runs in parts, none of them further than to where the delay arrives.
     #[inline(always)]
-    fn run_part<T: Tip<F>>(&mut self, samples: usize, tip: &mut T) {
-        match self.mask {
-            LEAST_MASK => self.run_masked::<T, LEAST_MASK>(samples, tip),
-            NEXT_MASK => self.run_masked::<T, NEXT_MASK>(samples, tip),
-            _ => self.run_masked::<T, 0>(samples, tip),
+    fn in_parts<T: Tip<F>>(&mut self, samples: usize, tip: &mut T, run: impl Fn(&mut Self, usize, &mut T)) {
+        let mut left = samples;
+        loop {
+            // A delay that arrives on the way rests from there on.
+            let part = if self.delay_arrives_within(left) { self.delay_left } else { left };
+            run(self, part, tip);
+            self.end_delay(part);
+            left -= part;
+            if left == 0 {
+                return;
+            }
         }
-        self.end_delay(samples);
     }
 
     /// The delay has been on its way for so many samples.
@@ -436,8 +467,7 @@ impl<F: Real> Lattice<F> {
         self.moved = self.holes.iter_mut().fold(false, |moving, holes| holes.rest() | moving);
     }
 
-    /// `MASK` is that of the ring, 0 for any: a mask known beforehand saves 15 instructions a sample, and the two shortest
-    /// rings are what clarinets up to the bass play on.
+    /// `MASK` is that of the ring, 0 for any.
     #[inline(always)]
     fn run_masked<T: Tip<F>, const MASK: u16>(&mut self, samples: usize, tip: &mut T) {
         #[cfg(target_arch = "x86_64")]

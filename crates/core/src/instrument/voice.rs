@@ -339,6 +339,7 @@ impl<F: Real> Voice<F> {
     }
 
     /// The samples of a tick.
+    #[inline(never)] // Compiled here for both numbers, so that who uses a voice need not compile it again.
     pub(super) fn run(&mut self) {
         let mouth = &mut self.mouth;
         mouth.noise.fill();
