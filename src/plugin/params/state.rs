@@ -136,7 +136,7 @@ impl ChalumeauParams {
         state
     }
 
-    /// Puts a saved state on the parameters, made fit by [`mend`]. For a start without a host, before anything plays: nobody is told.
+    /// Puts a saved state on the parameters, made fit by `mend`. For a start without a host, before anything plays: nobody is told.
     /// Not for the audio thread: allocates and locks.
     pub fn restore(&self, mut state: PluginState) {
         mend(&mut state);
