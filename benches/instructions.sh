@@ -14,7 +14,7 @@ rate=${1:-48000}
 # Of a note that lives and moves, as it does by default.
 declare -A most=([avx2]=850 [plain]=1315 ["avx2 places"]=901 ["plain places"]=1390)
 
-# What growl and vocal tract add together.
+# What growl and vocal tract add together. On the plain path it is more, because the voice alone is cheaper there than it was.
 declare -A most_techniques=([avx2]=55 [plain]=65)
 
 # Players in unison, in hundredths of the cost of one voice.

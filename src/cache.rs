@@ -5,13 +5,12 @@
 //! make the same one write the same bytes.
 
 use std::fs;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use chalumeau_core::instrument::store::{Key, Store};
 
-use crate::output::{NewFile, OutputError};
+use crate::output::{self, OutputError};
 
 /// Environment variable that names a directory to use instead of the system's own; for tests and unusual systems.
 pub const VARIABLE: &str = "CHALUMEAU_CACHE_DIR";
@@ -63,12 +62,7 @@ impl Cache {
     /// # Errors
     /// Those of the system, if the folder cannot be written.
     pub fn keep(&self, key: &Key, body: &str) -> Result<(), OutputError> {
-        let path = self.path(key);
-        fs::create_dir_all(&self.folder)
-            .map_err(|source| OutputError::Write { path: self.folder.clone(), source })?;
-        let mut file = NewFile::create(&path, true)?;
-        write!(file, "{}\n{body}", heading(body)).map_err(|source| OutputError::Write { path, source })?;
-        file.keep()?;
+        output::replace(&self.path(key), format!("{}\n{body}", heading(body)).as_bytes())?;
         self.prune();
         Ok(())
     }

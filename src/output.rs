@@ -178,6 +178,19 @@ impl NewFile {
     }
 }
 
+/// Writes a small file of the program's own, in place of what was there. Its folder is made.
+pub fn replace(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    let refused = |path: &Path| {
+        let path = path.to_owned();
+        move |source| OutputError::Write { path, source }
+    };
+    let folder = directory_of(path);
+    fs::create_dir_all(folder).map_err(refused(folder))?;
+    let mut file = NewFile::create(path, true)?;
+    io::Write::write_all(&mut file, bytes).map_err(refused(path))?;
+    file.keep()
+}
+
 /// The system's error, without the text that a library has added.
 fn plain(error: io::Error) -> io::Error {
     match error.raw_os_error() {

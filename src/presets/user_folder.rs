@@ -5,13 +5,12 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::factory;
 use super::{Preset, checked_name};
 use crate::data_folder;
-use crate::output::NewFile;
+use crate::output;
 use crate::text_file;
 
 /// Upper limit for the size of a preset's file, bytes; a larger file is something else.
@@ -166,11 +165,7 @@ impl UserFolder {
     }
 
     fn write(&self, path: &Path, text: &str) -> Result<(), String> {
-        let fail = |reason: &dyn std::fmt::Display| format!("cannot write {}: {reason}", path.display());
-        fs::create_dir_all(&self.folder).map_err(|reason| fail(&reason))?;
-        let mut file = NewFile::create(path, true).map_err(|reason| reason.to_string())?;
-        file.write_all(text.as_bytes()).map_err(|reason| fail(&reason))?;
-        file.keep().map_err(|reason| reason.to_string())
+        output::replace(path, text.as_bytes()).map_err(|reason| reason.to_string())
     }
 }
 

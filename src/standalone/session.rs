@@ -4,7 +4,6 @@
 //! ends and, should it end otherwise, every [`INTERVAL`] while something has changed.
 
 use std::fs;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -12,14 +11,14 @@ use std::time::Duration;
 use nice_plug::plugin::{ParamValue, PluginState};
 
 use crate::data_folder;
-use crate::output::NewFile;
+use crate::output;
 use crate::plugin::ChalumeauParams;
 use crate::plugin::launch_options::LaunchOptions;
 
 /// How often a session that changes is written.
 const INTERVAL: Duration = Duration::from_secs(2);
 const FILE: &str = "session.json";
-/// What was set aside by `--new-session`, or could not be read.
+/// The first session that was set aside by `--new-session`, or could not be read; the next one is `session-before-2.json`.
 const SET_ASIDE: &str = "session-before.json";
 
 /// The session of this process. Clones are the same session.
@@ -45,7 +44,10 @@ fn path() -> Option<PathBuf> {
 }
 
 fn rename(path: &Path) {
-    let beside = path.with_file_name(SET_ASIDE);
+    // None takes the place of an earlier one.
+    let names = (2..).map(|n| SET_ASIDE.replace(".json", &format!("-{n}.json")));
+    let mut free = std::iter::once(SET_ASIDE.to_owned()).chain(names).map(|name| path.with_file_name(name));
+    let Some(beside) = free.find(|beside| !beside.exists()) else { return };
     match fs::rename(path, &beside) {
         Ok(()) => eprintln!("chalumeau-standalone: the last session is kept as {}", beside.display()),
         Err(reason) => eprintln!("chalumeau-standalone: cannot rename {}: {reason}", path.display()),
@@ -100,8 +102,8 @@ impl Session {
         if *written == bytes {
             return;
         }
-        if let Err(reason) = write(path, &bytes) {
-            eprintln!("chalumeau-standalone: cannot keep the session in {}: {reason}", path.display());
+        if let Err(reason) = output::replace(path, &bytes) {
+            eprintln!("chalumeau-standalone: the next start will not find this session: {reason}");
         }
         // A folder that refuses is not asked again until something else has changed.
         *written = bytes;
@@ -134,15 +136,6 @@ fn ask_for(state: &mut PluginState, options: Option<&LaunchOptions>) {
     }
     // None is open unless the user has named one.
     state.params.insert("mic".to_owned(), ParamValue::Bool(*microphone));
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<(), String> {
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(|reason| reason.to_string())?;
-    }
-    let mut file = NewFile::create(path, true).map_err(|reason| reason.to_string())?;
-    file.write_all(bytes).map_err(|reason| reason.to_string())?;
-    file.keep().map_err(|reason| reason.to_string())
 }
 
 #[cfg(test)]
@@ -213,5 +206,8 @@ mod tests {
         session.save();
         assert_eq!(fs::read_to_string(folder.path().join(SET_ASIDE)).unwrap(), "{ half");
         assert!(read(&path).unwrap().is_some());
+        rename(&path);
+        assert_eq!(fs::read_to_string(folder.path().join(SET_ASIDE)).unwrap(), "{ half");
+        assert!(read(&folder.path().join("session-before-2.json")).unwrap().is_some());
     }
 }

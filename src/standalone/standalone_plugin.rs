@@ -139,13 +139,14 @@ impl StandalonePlugin {
     }
 
     fn silence(&self) {
-        if let Some(session) = &self.session {
-            session.save();
-        }
         // Closes the client. The lock is free again before that.
         let jack = locked(&self.jack).take();
         let mut plugin = locked(&self.plugin);
         plugin.forget();
         drop((plugin, jack));
+        // Last: neither sound nor torque waits for a disk.
+        if let Some(session) = &self.session {
+            session.save();
+        }
     }
 }

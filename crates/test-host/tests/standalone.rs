@@ -2,9 +2,17 @@
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStderr, Command, ExitStatus, Output, Stdio};
+use std::sync::LazyLock;
 use std::time::{Duration, Instant};
+
+/// Where the program keeps its session; empty when the tests begin, so that an earlier run does not count.
+static HOME: LazyLock<PathBuf> = LazyLock::new(|| {
+    let home = Path::new(env!("CARGO_TARGET_TMPDIR")).join("standalone");
+    let _ = std::fs::remove_dir_all(&home);
+    home
+});
 
 const PATIENCE: Duration = Duration::from_secs(20);
 
@@ -13,7 +21,7 @@ fn program() -> Command {
     let path = chalumeau_test_host::artefacts::standalone().unwrap();
     let mut command = Command::new(path);
     command
-        .env("CHALUMEAU_DATA_DIR", Path::new(env!("CARGO_TARGET_TMPDIR")).join("standalone"))
+        .env("CHALUMEAU_DATA_DIR", &*HOME)
         .env_remove("DISPLAY")
         .env_remove("WAYLAND_DISPLAY")
         .env("ALSA_CONFIG_PATH", "/dev/null")
@@ -110,8 +118,10 @@ fn the_next_start_finds_the_settings_of_the_last() {
     assert_eq!(plays(&[]), first);
     assert_eq!(plays(&["--instrument", "bass", "--a4", "442"]), asked);
     assert_eq!(plays(&[]), asked);
-    assert_eq!(plays(&["--new-session"]), first);
-    assert!(home.path().join("chalumeau/session-before.json").exists());
+    for kept in ["session-before.json", "session-before-2.json"] {
+        assert_eq!(plays(&["--new-session"]), first);
+        assert!(home.path().join("chalumeau").join(kept).exists(), "no {kept}");
+    }
 }
 
 #[test]

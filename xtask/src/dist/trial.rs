@@ -40,6 +40,9 @@ const BOOKS: [&str; 9] = [
     "/run/",
 ];
 
+/// Folder inside for what a program keeps of its own; it lies among the [`BOOKS`].
+const SCRATCH: &str = "/tmp/scratch";
+
 /// Tries what lies in `folder` in this suite of Debian; the system is removed when all went well.
 pub fn run(folder: &Path, release: &Release, suite: &str) -> Result<()> {
     machine::provide(&[&XVFB])?;
@@ -123,7 +126,10 @@ impl Fresh {
     fn renders(&self, program: &str, rendered: &str) -> Result<()> {
         let wav = "/tmp/there.wav";
         machine::run(
-            self.user().args(["CHALUMEAU_CACHE_DIR=/tmp/cache", program]).args(NOTE).args(["--out", wav]),
+            self.user()
+                .args([&format!("CHALUMEAU_CACHE_DIR={SCRATCH}"), program])
+                .args(NOTE)
+                .args(["--out", wav]),
         )?;
         let there = sha256(&self.inside(wav))?;
         ensure!(there == rendered, "{program} renders other bits there: {there}, and {rendered} here");
@@ -152,7 +158,7 @@ impl Fresh {
         // Mesa keeps compiled shaders in the user's home, for every program that draws: they are no trace of the package.
         command.arg("MESA_SHADER_CACHE_DISABLE=true");
         // The session is the user's, who keeps it.
-        command.arg("CHALUMEAU_DATA_DIR=/tmp/cache");
+        command.arg(format!("CHALUMEAU_DATA_DIR={SCRATCH}"));
         let mut running = command.args(["chalumeau-standalone", "--backend", "dummy"]).spawn()?;
         let drawn = screen.titled("Chalumeau").and_then(|window| {
             let picture = screen.settled(window, Duration::from_millis(600))?;

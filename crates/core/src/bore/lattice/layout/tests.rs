@@ -63,7 +63,7 @@ impl<F: Real> Ear<F> {
 }
 
 /// Random fingers, some that slide, with rests, pads that push air, jets and tuning; and now and then all as it was at first, as for
-/// a choir. The lattice whose holes stay goes on sample by sample, never for two at once.
+/// a choir. The lattice whose holes stay goes on sample by sample, never for two at once, and every other tick by [`Lattice::run_any`].
 fn play<F: Real>(coeffs: &LatticeCoeffs, fingerings: &[Vec<bool>], samples: usize) {
     let mut random = Random(0x9e37_79b9_7f4a_7c15);
     let [mut moving, mut staying] = [Lattice::<F>::new(coeffs), Lattice::new(coeffs)];
@@ -90,7 +90,10 @@ fn play<F: Real>(coeffs: &LatticeCoeffs, fingerings: &[Vec<bool>], samples: usiz
             if push == 1 {
                 ear.push = F::of(0.5);
             }
-            (0..16 / run).for_each(|_| lattice.run(run, ear));
+            (0..16 / run).for_each(|_| match run == 1 && ticks.is_multiple_of(2) {
+                true => lattice.run_any(run, ear),
+                false => lattice.run(run, ear),
+            });
         }
         ticks += 1;
         rest = if rest == 0 { 50 + 4 * way } else { rest - 1 };
