@@ -215,7 +215,11 @@ pub fn understands<'a>(words: impl IntoIterator<Item = &'a str>) -> Result<(), S
 /// As [`Parser::try_parse_from`], but hears negative numbers as values.
 fn parse<P: Parser>(words: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> Result<P, clap::Error> {
     let mut command = hearing_negative_numbers(P::command());
-    let matches = command.try_get_matches_from_mut(words)?;
+    let words: Vec<OsString> = words.into_iter().map(Into::into).collect();
+    let matches = command.try_get_matches_from_mut(words.clone()).map_err(|error| {
+        let asked = words.iter().skip(1).find_map(|word| command.find_subcommand(word));
+        words::advised(error, asked.unwrap_or(&command))
+    })?;
     P::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
 }
 

@@ -287,6 +287,8 @@ fn numbers_out_of_range_say_what_would_be_right() {
         ("--bits 20", "possible values: 16, 24, 32f"),
         ("--channels 3", "must be a whole number in 1..2"),
         ("--seconds 0", "must lie in 0.01..3600"),
+        ("--transpose 2", "'--set transp=<VALUE>' sets Transpose"),
+        ("--breath-noise 0", "'--noise' sets Breath noise"),
         ("--zeta 1", "must lie in 0.05..0.9"),
         ("--lay 1", "must lie in 0..0.5"),
         ("--strength 9", "must lie in 1.5..5"),
@@ -769,7 +771,7 @@ fn instruments_are_played_by_name_and_files_are_tuned_once() {
             table.lines().last().unwrap().split(',').map(|cell| cell.parse().unwrap()).collect();
         (numbers[1], numbers[2])
     };
-    for (instrument, sounds_hz) in [("a", 220.0), ("bass", 116.54), ("c", 261.63)] {
+    for (instrument, sounds_hz) in [("a", 220.0), ("bass", 116.54), ("c", 261.63), ("Bb", 233.08)] {
         let (hz, off) = cents_of(instrument);
         assert!(
             (hz / sounds_hz - 1.0).abs() < 0.001 && off.abs() < 0.5,

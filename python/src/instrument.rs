@@ -21,7 +21,7 @@ impl Instrument {
     #[staticmethod]
     fn bundled(id: &str) -> PyResult<Self> {
         let ids = || Bundled::ALL.map(Bundled::id).join(", ");
-        let bundled = Bundled::from_id(id).ok_or_else(|| {
+        let bundled = Bundled::named(id).ok_or_else(|| {
             wrong(format_args!("no instrument is called {id:?}; the bundled ones are {}", ids()))
         })?;
         Ok(Self { file: bundled.file() })

@@ -124,10 +124,15 @@ def test_a_script_without_main_is_told_to_have_one(tmp_path):
     "call", ["bifurcation('F3', seconds=600)", "impedance('F3', numpy.linspace(100, 2000, 2_000_000))"]
 )
 def test_ctrl_c_stops_it(call):
-    code = f"import chalumeau, numpy; print(1, flush=True); chalumeau.{call}"
+    # A shell that starts the tests in the background has them ignore SIGINT; Python then keeps ignoring it.
+    heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    code = f"{heard}; import chalumeau, numpy; print(1, flush=True); chalumeau.{call}"
     running = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    running.stdout.readline()
-    time.sleep(1)
-    running.send_signal(signal.SIGINT)
-    _, said = running.communicate(timeout=20)
+    try:
+        running.stdout.readline()
+        time.sleep(1)
+        running.send_signal(signal.SIGINT)
+        _, said = running.communicate(timeout=20)
+    finally:
+        running.kill()
     assert "KeyboardInterrupt" in said, said

@@ -420,7 +420,7 @@ impl Which {
 
     /// The file that is read.
     fn file(&self) -> MaybeFile<'_> {
-        let of_name = self.file.as_deref().filter(|path| path.to_str().and_then(Bundled::from_id).is_none());
+        let of_name = self.file.as_deref().filter(|path| path.to_str().and_then(Bundled::named).is_none());
         of_name.or_else(|| self.instrument.file())
     }
 

@@ -44,7 +44,7 @@ impl InstrumentArg {
 
     /// The file that is read; a bundled instrument has none.
     pub fn file(&self) -> MaybeFile<'_> {
-        let is_bundled = |path: &Path| path.to_str().and_then(Bundled::from_id).is_some();
+        let is_bundled = |path: &Path| path.to_str().and_then(Bundled::named).is_some();
         self.instrument.as_deref().filter(|path| self.given.is_none() && !is_bundled(path))
     }
 
@@ -59,7 +59,7 @@ impl InstrumentArg {
             return Ok(file.clone());
         }
         let Some(path) = &self.instrument else { return Ok(usual.file()) };
-        if let Some(bundled) = path.to_str().and_then(Bundled::from_id) {
+        if let Some(bundled) = path.to_str().and_then(Bundled::named) {
             return Ok(bundled.file());
         }
         instrument_path::load(path).map_err(|source| match source {

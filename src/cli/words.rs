@@ -4,6 +4,7 @@
 //! Python name the same things in the same way.
 
 use crate::parameters::{self, PARAMETERS, Parameter};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, ArgAction, Args, Command};
 
 /// A command as it is typed in a shell.
@@ -27,6 +28,29 @@ fn one_of(names: &[&str]) -> String {
         [one] => (*one).to_owned(),
         [first @ .., last] => format!("{} or {last}", first.join(", ")),
     }
+}
+
+/// The error about a flag that `command` lacks, with advice if its name is that of a parameter: the flag that sets it, or
+/// `--set`. clap knows only names that look alike.
+pub fn advised(mut error: clap::Error, command: &Command) -> clap::Error {
+    let has = |flag: &str| command.get_arguments().any(|arg| arg.get_long() == Some(flag));
+    let unknown = error.get(ContextKind::InvalidArg).map(ToString::to_string);
+    let name = unknown.as_deref().and_then(|flag| flag.strip_prefix("--")).map(|flag| flag.replace('-', " "));
+    let parameter =
+        name.filter(|_| error.kind() == ErrorKind::UnknownArgument && has("set")).and_then(|name| {
+            let mut of_sound = PARAMETERS.iter().filter(|parameter| parameter.sets.is_some());
+            of_sound.find(|parameter| parameter.name.eq_ignore_ascii_case(&name) || parameter.id == name)
+        });
+    if let Some(Parameter { id, name, flag, .. }) = parameter {
+        let how = match flag.strip_prefix("--").filter(|flag| has(flag)) {
+            Some(flag) => format!("'--{flag}'"),
+            None => format!("'--set {id}=<VALUE>'"),
+        };
+        let advice = format!("{how} sets {name}; `chalumeau parameters` lists what can be set");
+        error.remove(ContextKind::SuggestedArg);
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice.into()]));
+    }
+    error
 }
 
 /// The names that a command knows.

@@ -258,10 +258,15 @@ impl Keys {
         }
         for note in (self.from..=self.to).filter(|&note| named(note).is_some()) {
             let Some(letter) = letter(note) else { continue };
-            let (key, ink) = (self.key(note), if is_black(note) { c.ivory } else { Color32::from_gray(90) });
+            let (key, is_down) = (self.key(note), down.contains(&Some(note)));
+            let ink = match (is_down, is_black(note)) {
+                (true, _) => c.on_accent,
+                (_, true) => c.ivory,
+                (_, false) => Color32::from_gray(90),
+            };
             let words = painter.layout_no_wrap(letter.to_owned(), theme::small(), ink);
             // Clear of the names below, and on a white key of the black ones above.
-            let low = if is_black(note) { 4.0 } else { 18.0 };
+            let low = if is_black(note) && !is_down { 4.0 } else { 18.0 };
             let place = pos2(key.center().x - 0.5 * words.size().x, key.bottom() - low - words.size().y);
             painter.galley(place, words, ink);
         }

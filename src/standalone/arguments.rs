@@ -147,7 +147,7 @@ fn a4(text: &str) -> Result<f32, String> {
 
 /// Checks an instrument file already here, while an error can still be reported as a mistake in the arguments.
 fn instrument(text: &str) -> Result<(InstrumentChoice, String), String> {
-    let named = Bundled::from_id(text).and_then(|bundled| {
+    let named = Bundled::named(text).and_then(|bundled| {
         InstrumentChoice::ALL.into_iter().find(|choice| choice.bundled() == Some(bundled))
     });
     if let Some(choice) = named {

@@ -1,6 +1,9 @@
 //! Everything that must pass before a change is kept, in one command. Steps go on after a failure, so that one run
 //! tells all; the summary says which ones failed and how long each took.
 
+mod beside;
+mod tests;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -16,7 +19,7 @@ use crate::machine::{
     self, ALSA, ARM_CXX, ARM_LIBRARY, CC, CXX, EGL, GL, GLIB, JACK, JACKD, MESA, PKG_CONFIG, Package,
     VALGRIND, VENV, X11_XCB, XCB, XKB, XVFB,
 };
-use crate::programs::{TESTS, programs, test_files};
+use crate::programs::{TESTS, programs};
 use crate::{COMMANDS, bundle, firmware, validate, web};
 #[cfg(target_os = "linux")]
 use crate::{jack, window};
@@ -43,78 +46,122 @@ const PACKAGE_PACKAGES: &[&str] = &[
     "matplotlib==3.11.2",
 ];
 
-type Step = (&'static str, fn() -> Result<()>);
+/// One thing that must pass.
+struct Step {
+    name: &'static str,
+    run: fn() -> Result<()>,
+    /// Keeps one core busy and follows no clock, so that another step may run at the same time.
+    beside: bool,
+}
+
+const fn alone(name: &'static str, run: fn() -> Result<()>) -> Step {
+    Step { name, run, beside: false }
+}
+
+const fn beside(name: &'static str, run: fn() -> Result<()>) -> Step {
+    Step { name, run, beside: true }
+}
 
 /// Two builds serve all steps: one debug build of everything (`programs`) and the bundle. Clippy and documentation only
 /// check. A step whose tool is missing fails: a gate that did not run is not green.
-const STEPS: &[Step] = &[
-    ("system packages", packages),
-    ("format", || cargo("fmt --all --check")),
-    ("clippy", || cargo("clippy --workspace --all-features --all-targets -- -D warnings")),
-    ("clippy, core alone", || cargo("clippy -p chalumeau-core --all-targets -- -D warnings")),
-    ("clippy, command line alone", || {
+static STEPS: &[Step] = &[
+    alone("system packages", packages),
+    alone("format", || cargo("fmt --all --check")),
+    alone("clippy", || cargo("clippy --workspace --all-features --all-targets -- -D warnings")),
+    alone("clippy, core alone", || cargo("clippy -p chalumeau-core --all-targets -- -D warnings")),
+    alone("clippy, command line alone", || {
         cargo("clippy -p chalumeau --no-default-features --features cli --all-targets -- -D warnings")
     }),
-    ("clippy, plugin alone", || {
+    alone("clippy, plugin alone", || {
         cargo("clippy -p chalumeau --no-default-features --features plugin -- -D warnings")
     }),
-    ("tests and programs build", || programs().map(drop)),
-    ("tests", tests),
-    ("examples in documentation", || cargo("test --workspace --all-features --doc")),
-    ("documentation", documentation),
-    ("generated files", generated),
-    ("firmware, host and ARM", firmware::all),
-    ("bundle", || bundle::run(&[])),
-    ("CLAP in clack-host", clap),
-    ("CLAP with allocation checks", clap_checked),
-    ("standalone", standalone),
+    alone("tests and programs build", || programs().map(drop)),
+    alone("tests", tests::run),
+    // The longest first.
+    beside("Python package", python_package),
+    beside("bundle", || bundle::run(&[])),
+    beside("web", web::test),
+    beside("Python examples", python_examples),
+    beside("firmware, host and ARM", firmware::all),
+    beside("instructions", || machine::run(&mut Command::new("benches/instructions.sh"))),
+    beside("examples in documentation", || cargo("test --workspace --all-features --doc")),
+    beside("documentation", documentation),
+    beside("generated files", generated),
+    alone("CLAP in clack-host", clap),
+    alone("CLAP with allocation checks", clap_checked),
+    alone("standalone", standalone),
     // Elsewhere there is neither a JACK nor a display that a test could start.
     #[cfg(target_os = "linux")]
-    ("window", window::test),
+    alone("window", window::test),
     #[cfg(target_os = "linux")]
-    ("MIDI over JACK", jack::test),
-    ("VST3 in vst3-host", || machine::run(&mut host_tests(&["vst3"]))),
-    ("VST3 in DawDreamer", dawdreamer),
-    ("VST3 in pedalboard", pedalboard),
+    alone("MIDI over JACK", jack::test),
+    alone("VST3 in vst3-host", || machine::run(&mut host_tests(&["vst3"]))),
+    alone("VST3 in DawDreamer", dawdreamer),
+    alone("VST3 in pedalboard", pedalboard),
     #[cfg(target_os = "linux")]
-    ("VST3's window in Ardour", ardour::test),
-    ("validators", validate::installed),
-    ("Python examples", python_examples),
-    ("Python package", python_package),
-    ("web", web::test),
-    ("instructions", || machine::run(&mut Command::new("benches/instructions.sh"))),
+    alone("VST3's window in Ardour", ardour::test),
+    alone("validators", validate::installed),
 ];
+
+/// Before the whole name of a step, which then runs in this process.
+const EXACTLY: &str = "--exactly";
+
+/// What became of a step.
+struct Done {
+    step: &'static Step,
+    passed: bool,
+    took: Duration,
+}
 
 /// `cargo xtask ci [word..]`: all steps, or those whose name contains one of the words.
 pub fn run(words: &[String]) -> Result<()> {
+    if let [flag, name] = words
+        && flag == EXACTLY
+    {
+        let step = STEPS.iter().find(|step| step.name == *name);
+        return (step.with_context(|| format!("no step is called {name:?}"))?.run)();
+    }
     let chosen: Vec<_> = STEPS
         .iter()
-        .filter(|(name, _)| words.is_empty() || words.iter().any(|word| name.contains(word)))
+        .filter(|step| words.is_empty() || words.iter().any(|word| step.name.contains(word)))
         .collect();
     if chosen.is_empty() {
-        let names: Vec<_> = STEPS.iter().map(|(name, _)| *name).collect();
+        let names: Vec<_> = STEPS.iter().map(|step| step.name).collect();
         bail!("no step is called {words:?}; the steps are: {}", names.join("; "));
     }
     let began = Instant::now();
     let mut report = Vec::new();
-    for (index, (name, step)) in chosen.iter().enumerate() {
-        println!("\n=== {}/{} {name}", index + 1, chosen.len());
-        let started = Instant::now();
-        let result = step();
-        if let Err(error) = &result {
-            println!("FAILED: {error:#}");
+    for steps in chosen.chunk_by(|a, b| a.beside && b.beside) {
+        match steps {
+            [step] => report.push(done(step)),
+            _ => report.extend(beside::run(steps)),
         }
-        println!("=== {name}: {}", spoken(started.elapsed()));
-        report.push((name, result.is_ok(), started.elapsed()));
     }
     println!();
-    for (name, passed, took) in &report {
-        println!("{:>10}  {}  {name}", spoken(*took), if *passed { "passed" } else { "FAILED" });
+    for Done { step, passed, took } in &report {
+        println!("{:>10}  {}  {}", spoken(*took), if *passed { "passed" } else { "FAILED" }, step.name);
     }
-    let failed = report.iter().filter(|(_, passed, _)| !passed).count();
+    let failed = report.iter().filter(|done| !done.passed).count();
     let passed = report.len() - failed;
     println!("ci: {passed} steps passed, {failed} failed, {}", spoken(began.elapsed()));
     if failed > 0 { bail!("{failed} of {} steps failed", report.len()) } else { Ok(()) }
+}
+
+fn done(step: &'static Step) -> Done {
+    println!("\n=== {}", step.name);
+    let began = Instant::now();
+    let result = (step.run)();
+    if let Err(error) = &result {
+        println!("FAILED: {error:#}");
+    }
+    let took = began.elapsed();
+    println!("=== {}: {}", step.name, spoken(took));
+    Done { step, passed: result.is_ok(), took }
+}
+
+/// How many things that keep a core busy run at once.
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
 fn spoken(time: Duration) -> String {
@@ -156,29 +203,6 @@ fn packages() -> Result<()> {
         &[]
     };
     machine::provide(needed)
-}
-
-/// Test files whose tests share what takes minutes to prepare. nextest starts a process for each test, which would prepare
-/// it again each time.
-const SHARED_PREPARATION: &[&str] = &["haptics", "instruments", "instruments_tuned"];
-
-/// All tests that need no host, with nextest where it is installed: it spreads them over the cores.
-fn tests() -> Result<()> {
-    programs()?;
-    let run = |command: &mut Command, files: &[String]| {
-        machine::run(command.args(files.iter().flat_map(|name| ["--test", name])))
-    };
-    let mut plain = machine::cargo();
-    plain.args(TESTS).arg("--no-fail-fast");
-    if !machine::works("cargo", &["nextest", "--version"]) {
-        return run(plain.args(["--lib", "--bins"]), &test_files()?);
-    }
-    let (shared, others): (Vec<_>, Vec<_>) =
-        test_files()?.into_iter().partition(|name| SHARED_PREPARATION.contains(&name.as_str()));
-    let mut nextest = machine::cargo();
-    nextest.args(["nextest", "run"]).args(&TESTS[1..]).args(["--no-fail-fast", "--lib", "--bins"]);
-    let results = [run(&mut nextest, &others), run(&mut plain, &shared)];
-    results.into_iter().collect()
 }
 
 fn documentation() -> Result<()> {
@@ -258,8 +282,11 @@ fn pedalboard() -> Result<()> {
 fn python_examples() -> Result<()> {
     let python = python("venv-examples", "numpy, matplotlib, libmapper, pythonosc", EXAMPLE_PACKAGES)?;
     let tests = machine::root().join("examples/tests/python_examples.py");
+    let mut command = Command::new(&python);
     // The study kit draws what the command line measures.
-    machine::run(Command::new(&python).arg(tests).env(artefacts::PROGRAM, &programs()?.program))
+    command.arg(tests).env(artefacts::PROGRAM, &programs()?.program);
+    // Of the 100 studies of simulated players these tell, too, whether the code is right.
+    machine::run(command.env("CHALUMEAU_STUDIES", "30"))
 }
 
 /// The wheel as a user gets it: built from the sources, installed where nothing else is, and tested.

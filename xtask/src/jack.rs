@@ -21,7 +21,7 @@ const MORTAL: &str = "chalumeau-mortal";
 /// Starts the server and runs `crates/test-host/tests/knob_midi.rs` and the ignored test of `standalone.rs`; then
 /// `jack_death.rs`, which starts servers and kills them.
 pub fn test() -> Result<()> {
-    let Programs { plugin, program, standalone } = programs()?;
+    let Programs { plugin, program, standalone, .. } = programs()?;
     // Killed clients leave a server in a state in which it may run no new ones: the test that kills comes last, alone.
     for which in [["--skip", KILLS].as_slice(), &[KILLS]] {
         let mut left = ATTEMPTS;

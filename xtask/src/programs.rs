@@ -1,11 +1,12 @@
 //! The one debug build of everything: all packages with all features, so that no step of `ci` builds anything again.
 
-use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Stdio;
 use std::sync::OnceLock;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
+use serde_json::Value;
 
 use crate::machine;
 
@@ -20,6 +21,42 @@ pub struct Programs {
     pub program: PathBuf,
     /// `chalumeau-standalone`.
     pub standalone: PathBuf,
+    /// All programs of tests, sorted by name.
+    pub tests: Vec<TestProgram>,
+}
+
+/// The unit tests of a library or program, or a file of a folder `tests`.
+pub struct TestProgram {
+    /// Of the target; that of the core's unit tests is `chalumeau_core`.
+    pub name: String,
+    pub path: PathBuf,
+    /// The package's.
+    pub folder: PathBuf,
+    /// In a folder `tests`.
+    is_file: bool,
+}
+
+impl TestProgram {
+    /// Whether it plays a plugin or a program that a step of its own must build and start.
+    pub fn needs_host(&self) -> bool {
+        self.is_file && self.folder.ends_with("crates/test-host")
+    }
+
+    /// As people call it.
+    pub fn described(&self) -> String {
+        if self.is_file { format!("tests/{}.rs", self.name) } else { format!("unit tests of {}", self.name) }
+    }
+
+    /// What cargo tells of a test that it has built; of anything else nothing.
+    fn told(message: &Value) -> Option<Self> {
+        let target = &message["target"];
+        let kind = target["kind"][0].as_str()?;
+        let is_test = message["profile"]["test"].as_bool()? && !matches!(kind, "bench" | "example");
+        let path = PathBuf::from(message["executable"].as_str()?);
+        let folder = Path::new(message["manifest_path"].as_str()?).parent()?.to_owned();
+        let name = target["name"].as_str()?.to_owned();
+        is_test.then_some(Self { name, path, folder, is_file: kind == "test" })
+    }
 }
 
 /// Builds all tests and programs when first asked.
@@ -32,14 +69,24 @@ pub fn programs() -> Result<&'static Programs> {
     Ok(BUILT.get_or_init(|| built))
 }
 
-/// The programs are copied: a user's next `cargo build` has other features and writes to the same place.
 fn build() -> Result<Programs> {
-    machine::run(machine::cargo().args(TESTS).arg("--no-run"))?;
+    let mut command = machine::cargo();
+    command.args(TESTS).args(["--no-run", "--message-format=json-render-diagnostics"]);
+    let output = command.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
+    ensure!(output.status.success(), "`{}` failed: {}", machine::described(&command), output.status);
+    let told = String::from_utf8_lossy(&output.stdout);
+    let messages = told.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+    let mut tests: Vec<_> = messages.filter_map(|message| TestProgram::told(&message)).collect();
+    tests.sort_by(|a, b| a.name.cmp(&b.name));
     let folder = machine::target().join("programs");
     fs::create_dir_all(&folder)?;
+    // Copies: a user's next `cargo build` has other features and writes to the same place.
     let keep = |built: &str, name: String| -> Result<PathBuf> {
-        let (from, to) = (machine::target().join(built).join(&name), folder.join(name));
-        fs::copy(&from, &to).with_context(|| format!("cannot copy {}", from.display()))?;
+        let (from, to) = (machine::target().join(built).join(&name), folder.join(&name));
+        // Another step may be running the one that is there.
+        let new = folder.join(format!("{name}.{}", std::process::id()));
+        fs::copy(&from, &new).with_context(|| format!("cannot copy {}", from.display()))?;
+        fs::rename(&new, &to).with_context(|| format!("cannot replace {}", to.display()))?;
         Ok(to)
     };
     let (prefix, suffix) = (std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
@@ -48,32 +95,6 @@ fn build() -> Result<Programs> {
         plugin: keep("debug/deps", format!("{prefix}chalumeau{suffix}"))?,
         program: keep("debug", format!("chalumeau{}", std::env::consts::EXE_SUFFIX))?,
         standalone: keep("debug", format!("chalumeau-standalone{}", std::env::consts::EXE_SUFFIX))?,
+        tests,
     })
-}
-
-/// Names of the test files that need neither a bundle nor a host, sorted.
-pub fn test_files() -> Result<Vec<String>> {
-    let mut names = Vec::new();
-    for folder in [
-        "tests",
-        "crates/core/tests",
-        "crates/knob/tests",
-        "crates/figure/tests",
-        "firmware/tests",
-        "web/tests",
-    ] {
-        let folder = machine::root().join(folder);
-        if folder.exists() {
-            for entry in fs::read_dir(&folder).with_context(|| format!("cannot list {}", folder.display()))? {
-                names.extend(stem(&entry?.path()));
-            }
-        }
-    }
-    names.sort();
-    Ok(names)
-}
-
-fn stem(path: &Path) -> Option<String> {
-    let is_rust = path.extension() == Some(OsStr::new("rs"));
-    is_rust.then(|| path.file_stem().map(|stem| stem.to_string_lossy().into_owned()))?
 }

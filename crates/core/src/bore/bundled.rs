@@ -39,6 +39,30 @@ impl Bundled {
         Self::ALL.into_iter().find(|instrument| instrument.id() == id)
     }
 
+    /// The instrument that people call so: by its id, or as players write it.
+    ///
+    /// ```
+    /// use chalumeau_core::bore::bundled::Bundled;
+    ///
+    /// for name in ["b-flat", "Bb", "B\u{266d} clarinet", "B flat"] {
+    ///     assert_eq!(Bundled::named(name), Some(Bundled::BFlat));
+    /// }
+    /// assert_eq!(Bundled::named("bass clarinet"), Some(Bundled::Bass));
+    /// assert_eq!(Bundled::named("oboe"), None);
+    /// ```
+    pub fn named(name: &str) -> Option<Self> {
+        let mut plain = name.to_lowercase().replace('\u{266d}', "b").replace("clarinet", "");
+        plain.retain(|letter| !matches!(letter, ' ' | '-' | '_'));
+        match plain.as_str() {
+            "bflat" | "bb" => Some(Self::BFlat),
+            "a" => Some(Self::A),
+            "eflat" | "eb" => Some(Self::EFlat),
+            "c" => Some(Self::C),
+            "bass" => Some(Self::Bass),
+            _ => None,
+        }
+    }
+
     /// Its files in `data/` begin so.
     pub fn data_name(self) -> &'static str {
         match self {
@@ -101,6 +125,7 @@ mod tests {
     fn each_is_a_whole_instrument_with_a_name_of_its_own() {
         let lengths = Bundled::ALL.map(|instrument| {
             assert_eq!(Bundled::from_id(instrument.id()), Some(instrument));
+            assert_eq!(Bundled::named(instrument.id()), Some(instrument));
             let file = instrument.file();
             assert_eq!((file.holes.len(), file.fingerings.len()), (24, 46), "{}", file.name);
             assert!(file.source.len() > 20, "{}: where it comes from", file.name);
@@ -111,5 +136,8 @@ mod tests {
         sorted.sort_by_key(|(transposition, _)| *transposition);
         assert!(sorted.windows(2).all(|pair| pair[0].1 < pair[1].1), "{lengths:?}");
         assert_eq!(Bundled::from_id("b flat"), None);
+        for file in ["a.toml", "./a", "c/bass", ""] {
+            assert_eq!(Bundled::named(file), None, "{file:?}");
+        }
     }
 }
