@@ -23,6 +23,9 @@ use typed_letters::TypedLetters;
 /// Velocity of a note played with Space or a letter.
 const PLAIN: f32 = 0.75;
 
+/// A white key this wide has room for every name, such as G#4.
+const NAME_WIDTH: f32 = 30.0;
+
 const HELP: &str = "The keys have the names of the notes they play, written or sounding as at the top of the window. Press lower on a key to play louder; slide to slur. With the keyboard: Tab to here, choose with the arrow keys, play with Space.";
 const LETTERS_HELP: &str =
     "The letters on the keys play them, too. Page Up and Page Down move the letters by an octave.";
@@ -270,10 +273,11 @@ impl Keys {
             let place = pos2(key.center().x - 0.5 * words.size().x, key.bottom() - low - words.size().y);
             painter.galley(place, words, ink);
         }
-        // One name an octave, on a white key, which is wide enough; and that of a key held down.
+        // The names of white keys, one an octave where keys are too narrow; and that of a key held down.
         for note in self.from..=self.to {
             let (key, is_down) = (self.key(note), down.contains(&Some(note)));
-            let Some(name) = named(note).filter(|_| note % 12 == 0 || is_down) else { continue };
+            let has_name = note % 12 == 0 || !is_black(note) && key.width() >= NAME_WIDTH || is_down;
+            let Some(name) = named(note).filter(|_| has_name) else { continue };
             let ink = if is_down { c.on_accent } else { Color32::from_gray(110) };
             let words = painter.layout_no_wrap(note_name(name), theme::small(), ink);
             let left = (key.center().x - 0.5 * words.size().x)

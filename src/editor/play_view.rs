@@ -106,7 +106,7 @@ impl PlayView {
                 });
             }
             if trial.is_on() {
-                let place = Rect::from_min_size(rect.left_top() + vec2(12.0, 8.0), vec2(180.0, 26.0));
+                let place = Rect::from_center_size(rect.center_bottom() - vec2(0.0, 21.0), vec2(180.0, 26.0));
                 let back = ui.put(place, egui::Button::new("Back to the note"));
                 if back.on_hover_text("Ends the trial; the played note sets the holes again").clicked() {
                     trial.end(actions);

@@ -166,10 +166,20 @@ mod tests {
     }
 
     #[test]
-    fn no_value_is_wrong() {
+    fn wrong_values_and_places_choose_nothing() {
         for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, 1e30] {
             for at in 0..COUNT + 3 {
-                set(&mut Settings::default(), at, value);
+                let mut settings = Settings::default();
+                set(&mut settings, at, value);
+                assert!(at < COUNT || settings == Settings::default(), "{at}: {value}");
+                // A choice has as many places as before, and a number comes back as it went in, to be clamped in use.
+                let back = list(&settings);
+                assert!(at >= NUMBERS.len() || back[at].to_bits() == value.to_bits(), "{at}: {value}");
+                let others = [0, 1, 3, 4, 7, 9, 11].map(|place| back[NUMBERS.len() + place]);
+                assert!(
+                    others.iter().all(|place| (0.0..KeySwitches::ALL.len() as f32).contains(place)),
+                    "{at}: {value}"
+                );
             }
         }
     }

@@ -267,16 +267,19 @@ fn standalone() -> Result<()> {
     machine::run(host_tests(&["standalone"]).env(artefacts::STANDALONE, &programs()?.standalone))
 }
 
+/// Where no display is: JUCE would take :0 if none were named, and ends on one without a window manager.
+const NO_DISPLAY: &str = ":9999";
+
 fn dawdreamer() -> Result<()> {
     let python = python("venv", "dawdreamer, numpy", DAWDREAMER_PACKAGES)?;
     let script = machine::root().join("crates/test-host/tests/vst3_in_dawdreamer.py");
-    machine::run(Command::new(&python).arg(script).arg(artefacts::vst3()?))
+    machine::run(Command::new(&python).arg(script).arg(artefacts::vst3()?).env("DISPLAY", NO_DISPLAY))
 }
 
 fn pedalboard() -> Result<()> {
     let python = python("venv-pedalboard", "pedalboard, mido, numpy", PEDALBOARD_PACKAGES)?;
     let script = machine::root().join("crates/test-host/tests/vst3_in_pedalboard.py");
-    machine::run(Command::new(&python).arg(script).arg(artefacts::vst3()?))
+    machine::run(Command::new(&python).arg(script).arg(artefacts::vst3()?).env("DISPLAY", NO_DISPLAY))
 }
 
 fn python_examples() -> Result<()> {
