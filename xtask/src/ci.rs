@@ -5,11 +5,14 @@ mod beside;
 mod tests;
 
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
+
+use chalumeau_core::parallel;
 
 #[cfg(target_os = "linux")]
 use chalumeau_test_host::ardour;
@@ -134,7 +137,7 @@ pub fn run(words: &[String]) -> Result<()> {
     for steps in chosen.chunk_by(|a, b| a.beside && b.beside) {
         match steps {
             [step] => report.push(done(step)),
-            _ => report.extend(beside::run(steps)),
+            _ => report.extend(at_once(steps, |step| beside::run(step))),
         }
     }
     println!();
@@ -159,9 +162,10 @@ fn done(step: &'static Step) -> Done {
     Done { step, passed: result.is_ok(), took }
 }
 
-/// How many things that keep a core busy run at once.
-fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
+/// What `work` says of each item, in their order: as many at once as there are cores, the first first.
+fn at_once<I: Sync, T: Send>(items: &[I], work: impl Fn(&I) -> T + Sync) -> Vec<T> {
+    // Nothing stops them, so that all are done.
+    parallel::each(items.len(), |at| work(&items[at]), &mut |_| ControlFlow::Continue(())).unwrap_or_default()
 }
 
 fn spoken(time: Duration) -> String {
@@ -285,11 +289,8 @@ fn pedalboard() -> Result<()> {
 fn python_examples() -> Result<()> {
     let python = python("venv-examples", "numpy, matplotlib, libmapper, pythonosc", EXAMPLE_PACKAGES)?;
     let tests = machine::root().join("examples/tests/python_examples.py");
-    let mut command = Command::new(&python);
     // The study kit draws what the command line measures.
-    command.arg(tests).env(artefacts::PROGRAM, &programs()?.program);
-    // Of the 100 studies of simulated players these tell, too, whether the code is right.
-    machine::run(command.env("CHALUMEAU_STUDIES", "30"))
+    machine::run(Command::new(&python).arg(tests).env(artefacts::PROGRAM, &programs()?.program))
 }
 
 /// The wheel as a user gets it: built from the sources, installed where nothing else is, and tested.

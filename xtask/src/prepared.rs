@@ -46,7 +46,7 @@ impl Asked {
         let mut asked =
             Self { check: false, instruments: Vec::new(), qualities: Vec::new(), notes: Vec::new() };
         for arg in args {
-            match (arg.as_str(), Bundled::from_id(arg)) {
+            match (arg.as_str(), Bundled::named(arg)) {
                 ("--check", _) => asked.check = true,
                 ("live", _) => asked.qualities.push(Quality::Live),
                 ("high", _) => asked.qualities.push(Quality::High),

@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let name = arguments.next().unwrap_or_else(|| "b-flat".to_owned());
     let rate_hz: f64 = arguments.next().as_deref().unwrap_or("48000").parse()?;
     let what = arguments.next().unwrap_or_default();
-    let file = match Bundled::from_id(&name) {
+    let file = match Bundled::named(&name) {
         Some(bundled) => bundled.file(),
         None => InstrumentFile::parse(&std::fs::read_to_string(&name)?)?,
     };

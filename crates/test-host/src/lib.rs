@@ -18,15 +18,3 @@ pub mod midi;
 #[cfg(target_os = "linux")]
 pub mod screen;
 pub mod simulator;
-
-/// How often a long test repeats what it does: what the environment variable says, else `usual`.
-///
-/// # Panics
-/// If the variable is no number.
-pub fn times(variable: &str, usual: usize) -> usize {
-    let said = std::env::var(variable).ok();
-    // PANIC: a test would otherwise do something else than it was asked to.
-    said.map_or(usual, |text| {
-        text.parse().unwrap_or_else(|_| panic!("{variable} must be a number, got {text:?}"))
-    })
-}

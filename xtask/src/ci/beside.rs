@@ -3,37 +3,24 @@
 
 use std::fs::{self, File};
 use std::process::{Command, Stdio};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 
-use super::{Done, EXACTLY, Step, cores, spoken};
+use super::{Done, EXACTLY, Step, spoken};
 use crate::machine;
 
-/// Runs all `steps`, as many at once as there are cores, the first first.
-pub fn run(steps: &[&'static Step]) -> Vec<Done> {
-    let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
-    std::thread::scope(|scope| {
-        for _ in 0..cores() {
-            scope.spawn(|| {
-                while let Some(step) = steps.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let began = Instant::now();
-                    println!("=== {} begins", step.name);
-                    let result = apart(step);
-                    let took = began.elapsed();
-                    if let Err(error) = &result {
-                        println!("FAILED: {}: {error:#}", step.name);
-                    }
-                    println!("=== {}: {}", step.name, spoken(took));
-                    let mut done = done.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-                    done.push(Done { step, passed: result.is_ok(), took });
-                }
-            });
-        }
-    });
-    done.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner())
+/// Runs a step while others run.
+pub fn run(step: &'static Step) -> Done {
+    println!("=== {} begins", step.name);
+    let began = Instant::now();
+    let result = apart(step);
+    let took = began.elapsed();
+    if let Err(error) = &result {
+        println!("FAILED: {}: {error:#}", step.name);
+    }
+    println!("=== {}: {}", step.name, spoken(took));
+    Done { step, passed: result.is_ok(), took }
 }
 
 /// The step in a process of its own, which writes to a file.

@@ -2,13 +2,11 @@
 //! for another's last test, and what takes minutes to prepare is prepared once for all tests of a program.
 
 use std::process::Command;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 
-use super::{cores, spoken};
+use super::{at_once, spoken};
 use crate::programs::{TestProgram, programs};
 
 /// Programs that follow a clock (ports, links, the simulated knob in real time) run while nothing else does.
@@ -28,23 +26,18 @@ const LONG: &[&str] = &[
 
 /// The step of `ci`.
 pub fn run() -> Result<()> {
-    let all = programs()?.tests.iter().filter(|test| !test.needs_host());
+    let all: Vec<_> = programs()?.tests.iter().filter(|test| !test.needs_host()).collect();
+    for &name in BY_THE_CLOCK.iter().chain(LONG) {
+        ensure!(all.iter().any(|test| test.name == name), "no test program is called {name}");
+    }
     let (clock, mut others): (Vec<_>, Vec<_>) =
-        all.partition(|test| BY_THE_CLOCK.contains(&test.name.as_str()));
+        all.into_iter().partition(|test| BY_THE_CLOCK.contains(&test.name.as_str()));
     others.sort_by_key(|test| LONG.iter().position(|name| *name == test.name).unwrap_or(LONG.len()));
-    let mut failed = Vec::new();
-    for test in clock {
-        failed.extend(played(test, &mut command(test)).err());
-    }
-    failed.extend(at_once(&others));
-    if failed.is_empty() {
-        return Ok(());
-    }
-    bail!(
-        "{} failed: {}",
-        failed.len(),
-        failed.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
-    )
+    let mut results: Vec<_> = clock.into_iter().map(|test| played(test, &mut command(test))).collect();
+    results.extend(at_once(&others, |test| played(test, command(test).arg("--test-threads=1"))));
+    let failed: Vec<_> = results.into_iter().filter_map(|result| Some(result.err()?.to_string())).collect();
+    ensure!(failed.is_empty(), "{} failed: {}", failed.len(), failed.join(", "));
+    Ok(())
 }
 
 fn command(test: &TestProgram) -> Command {
@@ -52,23 +45,6 @@ fn command(test: &TestProgram) -> Command {
     // As cargo starts it.
     command.current_dir(&test.folder).env("CARGO_MANIFEST_DIR", &test.folder);
     command
-}
-
-/// As many programs as there are cores, the first of `tests` first.
-fn at_once(tests: &[&TestProgram]) -> Vec<anyhow::Error> {
-    let (next, failed) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
-    std::thread::scope(|scope| {
-        for _ in 0..cores() {
-            scope.spawn(|| {
-                while let Some(test) = tests.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    if let Err(error) = played(test, command(test).arg("--test-threads=1")) {
-                        failed.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).push(error);
-                    }
-                }
-            });
-        }
-    });
-    failed.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
 /// Runs a program and prints what it said in one piece.

@@ -34,11 +34,6 @@ impl Bundled {
         }
     }
 
-    /// The instrument called so.
-    pub fn from_id(id: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|instrument| instrument.id() == id)
-    }
-
     /// The instrument that people call so: by its id, or as players write it.
     ///
     /// ```
@@ -124,7 +119,6 @@ mod tests {
     #[test]
     fn each_is_a_whole_instrument_with_a_name_of_its_own() {
         let lengths = Bundled::ALL.map(|instrument| {
-            assert_eq!(Bundled::from_id(instrument.id()), Some(instrument));
             assert_eq!(Bundled::named(instrument.id()), Some(instrument));
             let file = instrument.file();
             assert_eq!((file.holes.len(), file.fingerings.len()), (24, 46), "{}", file.name);
@@ -135,7 +129,6 @@ mod tests {
         let mut sorted = lengths;
         sorted.sort_by_key(|(transposition, _)| *transposition);
         assert!(sorted.windows(2).all(|pair| pair[0].1 < pair[1].1), "{lengths:?}");
-        assert_eq!(Bundled::from_id("b flat"), None);
         for file in ["a.toml", "./a", "c/bass", ""] {
             assert_eq!(Bundled::named(file), None, "{file:?}");
         }
