@@ -4,11 +4,6 @@
 //! The latest samples go through one Hann window of 2^13 samples (171 ms at 48 kHz, bins of 5.9 Hz); [`pitch`]
 //! measures the pitch. Levels are levels of a sine: 0 dB is amplitude 1. There is no averaging.
 
-use std::sync::Arc;
-
-use realfft::num_complex::Complex32;
-use realfft::{RealFftPlanner, RealToComplex};
-
 use chalumeau_core::analysis::pitch;
 use chalumeau_core::analysis::spectrum;
 use chalumeau_core::units::cents;
@@ -35,58 +30,23 @@ pub struct SoundAnalysis {
     pub cents: Option<f32>,
 }
 
-/// Analyses the sound. Allocates when made; each analysis allocates its result.
-pub struct SoundAnalyser {
-    rate_hz: f64,
-    fft: Arc<dyn RealToComplex<f32>>,
-    window: Vec<f32>,
-    input: Vec<f32>,
-    bins: Vec<Complex32>,
-}
-
-impl SoundAnalyser {
-    /// For samples at this rate.
-    pub fn new(rate_hz: f64) -> Self {
-        let fft = RealFftPlanner::new().plan_fft_forward(WINDOW);
-        let turn = std::f32::consts::TAU / WINDOW as f32;
-        Self {
-            rate_hz,
-            window: (0..WINDOW).map(|n| 0.5 - 0.5 * (turn * n as f32).cos()).collect(),
-            input: fft.make_input_vec(),
-            bins: fft.make_output_vec(),
-            fft,
-        }
-    }
-
-    /// Analyses the end of `samples`; missing samples at the front count as silence. `wanted_hz` is the pitch of the fingered
-    /// note.
-    pub fn hear(&mut self, samples: &[f32], wanted_hz: Option<f64>) -> SoundAnalysis {
+impl SoundAnalysis {
+    /// Of the end of `samples`; missing samples at the front and those that are no numbers count as silence. `wanted_hz` is
+    /// the pitch of the fingered note. Allocates.
+    pub fn of(samples: &[f32], rate_hz: f64, wanted_hz: Option<f64>) -> Self {
         let latest = &samples[samples.len().saturating_sub(WINDOW)..];
-        let missing = WINDOW - latest.len();
-        self.input[..missing].fill(0.0);
-        for ((to, from), window) in self.input[missing..].iter_mut().zip(latest).zip(&self.window[missing..])
-        {
-            *to = if from.is_finite() { from * window } else { 0.0 };
-        }
-        // A sine of amplitude 1 has half its height in the bin, and the window half of that.
-        let gain = 4.0 / WINDOW as f32;
-        let count = (HIGHEST_HZ / self.rate_hz * WINDOW as f64) as usize;
-        let level_db = match self.fft.process(&mut self.input, &mut self.bins) {
-            Ok(()) => self
-                .bins
-                .iter()
-                .take(count)
-                .map(|bin| (20.0 * (gain * bin.norm()).max(1e-12).log10()).max(FLOOR_DB))
-                .collect(),
-            Err(_) => Vec::new(),
+        let mut heard = vec![0.0; WINDOW - latest.len()];
+        heard.extend(latest.iter().map(|&sample| if sample.is_finite() { f64::from(sample) } else { 0.0 }));
+        let spectrum = spectrum::hann_spectrum_db(&heard, rate_hz);
+        let count = (HIGHEST_HZ / spectrum.bin_hz) as usize;
+        let level_db = spectrum.level_db.iter().take(count).map(|&db| (db as f32).max(FLOOR_DB)).collect();
+        let bin_hz = spectrum.bin_hz as f32;
+        let steady = &heard[WINDOW - latest.len()..];
+        let Some(f0_hz) = pitch::fundamental_hz(steady, rate_hz) else {
+            return Self { bin_hz, level_db, ..Self::default() };
         };
-        let bin_hz = (self.rate_hz / WINDOW as f64) as f32;
-        let steady: Vec<f64> = latest.iter().map(|&sample| f64::from(sample)).collect();
-        let Some(f0_hz) = pitch::fundamental_hz(&steady, self.rate_hz) else {
-            return SoundAnalysis { bin_hz, level_db, ..SoundAnalysis::default() };
-        };
-        let harmonics = spectrum::harmonic_levels_db(&steady, self.rate_hz, f0_hz);
-        SoundAnalysis {
+        let harmonics = spectrum::harmonic_levels_db(steady, rate_hz, f0_hz);
+        Self {
             bin_hz,
             level_db,
             harmonics_db: harmonics.into_iter().map(|db| db as f32).collect(),
@@ -112,8 +72,7 @@ mod tests {
     #[test]
     fn a_tone_is_heard_at_its_level_and_pitch() {
         for rate_hz in [44_100.0, 48_000.0, 96_000.0] {
-            let heard =
-                SoundAnalyser::new(rate_hz).hear(&tone(233.0, rate_hz, &[0.5, 0.0, 0.05]), Some(233.082));
+            let heard = SoundAnalysis::of(&tone(233.0, rate_hz, &[0.5, 0.0, 0.05]), rate_hz, Some(233.082));
             let f0_hz = heard.f0_hz.unwrap();
             assert!((f0_hz - 233.0).abs() < 0.1, "{f0_hz}");
             assert!((heard.cents.unwrap() + 0.6).abs() < 0.7, "{:?}", heard.cents);
@@ -128,9 +87,8 @@ mod tests {
 
     #[test]
     fn silence_and_rubbish_have_no_pitch() {
-        let mut listener = SoundAnalyser::new(48_000.0);
         for samples in [vec![], vec![0.0; 100], vec![0.0; 3 * WINDOW], vec![f32::NAN; WINDOW]] {
-            let heard = listener.hear(&samples, Some(440.0));
+            let heard = SoundAnalysis::of(&samples, 48_000.0, Some(440.0));
             assert_eq!((heard.f0_hz, heard.cents), (None, None));
             assert!(heard.level_db.iter().all(|&db| db == FLOOR_DB), "{}", samples.len());
         }

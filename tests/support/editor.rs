@@ -14,7 +14,7 @@ use chalumeau::editor::controls::{Controls, Look, Mark};
 use chalumeau::editor::snapshot::{
     BreathSource, KnobDevice, KnobState, MouthpieceTraces, Severity, Snapshot, Status, Track,
 };
-use chalumeau::editor::sound_analysis::SoundAnalyser;
+use chalumeau::editor::sound_analysis::SoundAnalysis;
 use chalumeau::editor::{EditorState, Tab, WindowState, draw};
 use chalumeau::parameters::{self, PARAMETERS, Value};
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
@@ -415,7 +415,7 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
     let thin: Vec<&Probe> = latest.iter().step_by(2).collect();
     let mouth_kpa = kpa(probes.last().unwrap());
     let wanted_hz = note.frequency_hz(f64::from(settings.a4_hz));
-    let heard = SoundAnalyser::new(RATE_HZ).hear(&sound, Some(wanted_hz));
+    let heard = SoundAnalysis::of(&sound, RATE_HZ, Some(wanted_hz));
 
     let fingering = model.fingering_for(note).unwrap();
     let open = &model.file.fingerings[fingering].open;

@@ -5,14 +5,12 @@ mod beside;
 mod tests;
 
 use std::fs;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
-
-use chalumeau_core::parallel;
+use rayon::iter::{ParallelBridge, ParallelIterator};
 
 #[cfg(target_os = "linux")]
 use chalumeau_test_host::ardour;
@@ -164,8 +162,9 @@ fn done(step: &'static Step) -> Done {
 
 /// What `work` says of each item, in their order: as many at once as there are cores, the first first.
 fn at_once<I: Sync, T: Send>(items: &[I], work: impl Fn(&I) -> T + Sync) -> Vec<T> {
-    // Nothing stops them, so that all are done.
-    parallel::each(items.len(), |at| work(&items[at]), &mut |_| ControlFlow::Continue(())).unwrap_or_default()
+    let mut done: Vec<_> = items.iter().enumerate().par_bridge().map(|(at, item)| (at, work(item))).collect();
+    done.sort_by_key(|(at, _)| *at);
+    done.into_iter().map(|(_, done)| done).collect()
 }
 
 fn spoken(time: Duration) -> String {
@@ -219,9 +218,10 @@ fn documentation() -> Result<()> {
 
 /// Every chore that can compare what it would write with what is there.
 fn generated() -> Result<()> {
+    programs()?;
     for command in COMMANDS.iter().filter(|command| command.checks) {
         println!("{} --check", command.name);
-        (command.run)(&["--check".to_owned()]).with_context(|| command.name)?;
+        command.run(&["--check".to_owned()]).with_context(|| command.name)?;
     }
     Ok(())
 }

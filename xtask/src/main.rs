@@ -23,7 +23,7 @@ fn run(name: &str, args: &[String]) -> Result<()> {
     let command = COMMANDS.iter().find(|command| command.name == name);
     let command = command.with_context(|| format!("no such chore\n\n{}", help()))?;
     xtask::machine::enter_workspace()?;
-    (command.run)(args)
+    command.run(args)
 }
 
 fn help() -> String {

@@ -21,6 +21,8 @@ pub struct Programs {
     pub program: PathBuf,
     /// `chalumeau-standalone`.
     pub standalone: PathBuf,
+    /// `xtask-instrument`.
+    pub instrument: PathBuf,
     /// All programs of tests, sorted by name.
     pub tests: Vec<TestProgram>,
 }
@@ -59,14 +61,20 @@ impl TestProgram {
     }
 }
 
+static BUILT: OnceLock<Programs> = OnceLock::new();
+
 /// Builds all tests and programs when first asked.
 pub fn programs() -> Result<&'static Programs> {
-    static BUILT: OnceLock<Programs> = OnceLock::new();
-    if let Some(built) = BUILT.get() {
+    if let Some(built) = built() {
         return Ok(built);
     }
     let built = build()?;
     Ok(BUILT.get_or_init(|| built))
+}
+
+/// Those that [`programs`] has built.
+pub fn built() -> Option<&'static Programs> {
+    BUILT.get()
 }
 
 fn build() -> Result<Programs> {
@@ -95,6 +103,7 @@ fn build() -> Result<Programs> {
         plugin: keep("debug/deps", format!("{prefix}chalumeau{suffix}"))?,
         program: keep("debug", format!("chalumeau{}", std::env::consts::EXE_SUFFIX))?,
         standalone: keep("debug", format!("chalumeau-standalone{}", std::env::consts::EXE_SUFFIX))?,
+        instrument: keep("debug", format!("xtask-instrument{}", std::env::consts::EXE_SUFFIX))?,
         tests,
     })
 }

@@ -1,12 +1,11 @@
 //! The clarinet as a web page: a static folder, `target/web`, that works from any host and below any path.
 //!
 //! - `toolchain`: builds the WebAssembly modules, with the target's library from wherever it can be had
-//! - `data`: instruments, presets and controls for the page, from the same tables as the plugin's
+//! - [`instrument`] writes instruments, presets and controls for the page, from the same tables as the plugin's
 //! - `serve`: a server for this machine
 //! - `browser`: the tests in a browser
 
 mod browser;
-mod data;
 mod serve;
 mod toolchain;
 
@@ -16,7 +15,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use sha2::{Digest, Sha256};
 
-use crate::{licences, machine};
+use crate::{instrument, licences, machine};
 
 pub use browser::{test, test_module};
 
@@ -57,8 +56,7 @@ pub fn build() -> Result<PathBuf> {
         names.push(name);
     }
     names.extend(toolchain::build(&folder)?);
-    fs::write(folder.join("data.json"), data::text()?)?;
-    fs::write(folder.join("tour.json"), data::tour()?)?;
+    instrument::run("web-data", &[folder.display().to_string()])?;
     names.extend(["data.json", "tour.json"].map(str::to_owned));
     names.retain(|name| name != "sw.js");
     names.sort();

@@ -15,8 +15,6 @@
 //! assert!((levels_db[2] + 6.02).abs() < 0.1);
 //! ```
 
-use num_complex::Complex64;
-use realfft::RealFftPlanner;
 use std::f64::consts::PI;
 
 pub mod impedance;
@@ -39,6 +37,9 @@ pub fn to_f64(samples: &[f32]) -> Vec<f64> {
 /// Four-term Blackman-Harris window, side lobes -92 dB, main lobe +-4 bins. F. J. Harris, Proc. IEEE 66 (1978), table 1.
 pub(crate) const BLACKMAN_HARRIS: [f64; 4] = [0.358_75, 0.488_29, 0.141_28, 0.011_68];
 
+/// Hann's window.
+pub(crate) const HANN: [f64; 2] = [0.5, 0.5];
+
 /// Periodic window of `len` samples made of cosines: `sum (-1)^k c_k cos(2 pi k n / len)`.
 pub(crate) fn cosine_window(len: usize, terms: &[f64]) -> impl Iterator<Item = f64> {
     (0..len).map(move |n| {
@@ -51,19 +52,6 @@ pub(crate) fn cosine_window(len: usize, terms: &[f64]) -> impl Iterator<Item = f
             value
         })
     })
-}
-
-/// Forward transform of real samples, zero-padded or cut to `size`: bins 0..=size/2.
-pub(crate) fn transform(planner: &mut RealFftPlanner<f64>, samples: &[f64], size: usize) -> Vec<Complex64> {
-    let plan = planner.plan_fft_forward(size);
-    let mut input = plan.make_input_vec();
-    for (to, from) in input.iter_mut().zip(samples) {
-        *to = *from;
-    }
-    let mut output = plan.make_output_vec();
-    // PANIC: both buffers were made by this plan, and length is all it checks.
-    plan.process(&mut input, &mut output).unwrap();
-    output
 }
 
 /// The samples less their mean.

@@ -21,7 +21,7 @@ use crate::editor::fingering_search::FingeringSearch;
 use crate::editor::snapshot::{BreathSource, MouthpieceTraces, Severity, Snapshot, Status};
 #[cfg(feature = "devices")]
 use crate::editor::snapshot::{KnobDevice, KnobState};
-use crate::editor::sound_analysis::{FLOOR_DB, SoundAnalyser, SoundAnalysis, WINDOW};
+use crate::editor::sound_analysis::{FLOOR_DB, SoundAnalysis, WINDOW};
 use crate::plugin::SharedHandles;
 use crate::plugin::breath_sources::BreathSources;
 use crate::plugin::instrument_loading::{CurrentInstrument, Readiness};
@@ -57,7 +57,6 @@ pub struct SnapshotThread {
     inside: triple_buffer::Output<AudioSnapshot>,
     sound: rtrb::Consumer<f32>,
     heard: VecDeque<f32>,
-    listener: Option<(f64, SoundAnalyser)>,
     /// The values that a snapshot shows where nothing is known. Kept, because making them parses an instrument file.
     blank: Snapshot,
     history: BreathHistory,
@@ -88,7 +87,6 @@ impl SnapshotThread {
             inside,
             sound,
             heard: VecDeque::with_capacity(2 * WINDOW),
-            listener: None,
             blank: Snapshot::default(),
             history: BreathHistory::new(),
             midi: (0, None),
@@ -260,14 +258,8 @@ impl SnapshotThread {
         sounding: Option<SoundingNote>,
         settings: &Settings,
     ) -> SoundAnalysis {
-        if self.listener.as_ref().is_none_or(|(of, _)| *of != rate_hz) {
-            self.listener = Some((rate_hz, SoundAnalyser::new(rate_hz)));
-        }
         let wanted = sounding.map(|note| note.frequency_hz(f64::from(settings.a4_hz)));
-        let samples = self.heard.make_contiguous();
-        self.listener
-            .as_mut()
-            .map_or_else(SoundAnalysis::default, |(_, listener)| listener.hear(samples, wanted))
+        SoundAnalysis::of(self.heard.make_contiguous(), rate_hz, wanted)
     }
 
     /// How much the knob's status concerns the user: an alarm, or a port that does not open, asks for something.

@@ -40,6 +40,7 @@ const TESTS: [&str; 3] = ["module.mjs", "wind.mjs", "browser.mjs"];
 /// Builds the page and runs its tests; installs what they need.
 pub fn test() -> Result<()> {
     machine::provide(&[&NODE, &NPM, &CHROMIUM, &ESPEAK])?;
+    let program = &programs()?.program;
     let page = build()?;
     let folder = machine::target().join("web-tests");
     std::fs::create_dir_all(&folder)?;
@@ -51,7 +52,7 @@ pub fn test() -> Result<()> {
         let script = machine::root().join("web/tests").join(name);
         ensure!(script.exists(), "{} is missing", script.display());
         let mut node = Command::new("node");
-        node.arg(script).arg(&page).arg(&folder).env("CHALUMEAU", &programs()?.program);
+        node.arg(script).arg(&page).arg(&folder).env("CHALUMEAU", program);
         machine::run(&mut node)?;
     }
     Ok(())

@@ -11,10 +11,9 @@
 //! | Z(f)/Zc | [`Impedance::at`] |
 //! | d ln Z / df = 2 R' / (1 - R^2) | zero real part: a peak; imaginary part: its Q |
 
-use crate::analysis::transform;
 use crate::bore::transfer_matrix::Peak;
+use chalumeau_fft as fft;
 use num_complex::Complex64;
-use realfft::RealFftPlanner;
 use std::f64::consts::PI;
 
 /// Points of the transform that finds the peaks: 0.18 Hz apart at 96 kHz.
@@ -68,7 +67,7 @@ impl Impedance {
     /// above 0). Allocates.
     pub fn from_ir(response: &[f64], rate_hz: f64, y_tip: f64) -> Self {
         let size = POINTS.max(response.len().next_power_of_two());
-        let bins = transform(&mut RealFftPlanner::new(), response, size);
+        let bins = fft::forward(response, size);
         Self { response: response.to_vec(), rate_hz, y_tip, bins, bin_hz: rate_hz / size as f64 }
     }
 

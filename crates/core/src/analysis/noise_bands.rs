@@ -4,8 +4,8 @@
 //! bins times their number. So neither the share of the band that harmonics hide nor a foreign line counts. The median of
 //! noise lies 1.6 dB below its mean; recordings were read in the same way.
 
-use crate::analysis::{BLACKMAN_HARRIS, cosine_window, transform, without_mean};
-use realfft::RealFftPlanner;
+use crate::analysis::{BLACKMAN_HARRIS, cosine_window, without_mean};
+use chalumeau_fft as fft;
 
 /// Bands in which the breath noise of recorded notes was measured, Hz.
 pub const BANDS_HZ: [(f64, f64); 5] =
@@ -26,7 +26,7 @@ pub fn noise_db(samples: &[f64], rate_hz: f64, f0_hz: f64, bands_hz: &[(f64, f64
     if windowed.is_empty() || total <= 0.0 {
         return vec![f64::NEG_INFINITY; bands_hz.len()];
     }
-    let bins = transform(&mut RealFftPlanner::new(), &windowed, windowed.len());
+    let bins = fft::forward(&windowed, windowed.len());
     let bin_hz = rate_hz / windowed.len() as f64;
     let between = |hz: f64| {
         let place = (hz / f0_hz).fract();

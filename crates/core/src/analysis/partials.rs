@@ -6,7 +6,7 @@
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
-use crate::analysis::cosine_window;
+use crate::analysis::{HANN, cosine_window};
 
 /// Step of the windows, s.
 pub const HOP_S: f64 = 0.005;
@@ -52,7 +52,7 @@ impl Partial {
     pub fn watch(samples: &[f64], rate_hz: f64, f0_hz: f64, harmonic: usize) -> Self {
         let hz = harmonic as f64 * f0_hz;
         let len = ((PERIODS / f0_hz).max(SHORTEST_S) * rate_hz).round() as usize;
-        let window: Vec<f64> = cosine_window(len, &[0.5, 0.5]).collect();
+        let window: Vec<f64> = cosine_window(len, &HANN).collect();
         let sum: f64 = window.iter().sum();
         let hop = (HOP_S * rate_hz).round() as usize;
         let step = Complex64::cis(-TAU * hz / rate_hz);

@@ -5,8 +5,8 @@
 //! it leaves out: peak picking under-reads upper harmonics of an unsteady pitch by several dB; the centroid does not.
 //! Levels in dB, full scale 1.0, frequencies in Hz.
 
-use crate::analysis::{BLACKMAN_HARRIS, cosine_window, rms, transform, without_mean};
-use realfft::RealFftPlanner;
+use crate::analysis::{BLACKMAN_HARRIS, HANN, cosine_window, rms, without_mean};
+use chalumeau_fft as fft;
 use std::ops::Range;
 
 /// Harmonics measured by [`harmonic_levels_db`], unless 0.45 of the rate comes first.
@@ -97,7 +97,7 @@ pub fn harmonic_levels_db(segment: &[f64], rate_hz: f64, f0_hz: f64) -> Vec<f64>
 pub fn levels_of_harmonics_db(segment: &[f64], rate_hz: f64, f0_hz: f64, most: usize) -> Vec<f64> {
     let count = most.min((0.45 * rate_hz / f0_hz) as usize);
     let size = (4 * segment.len()).next_power_of_two();
-    let bins = transform(&mut RealFftPlanner::new(), &hann(segment), size);
+    let bins = fft::forward(&hann(segment), size);
     let bin_hz = rate_hz / size as f64;
     let peaks: Vec<f64> = (1..=count)
         .map(|harmonic| {
@@ -117,7 +117,7 @@ pub fn levels_of_harmonics_db(segment: &[f64], rate_hz: f64, f0_hz: f64, most: u
 /// Spectral centroid: power-weighted mean frequency, Hz, from 20 Hz to half the rate, noise included; `None` for silence.
 pub fn centroid_hz(segment: &[f64], rate_hz: f64) -> Option<f64> {
     let size = segment.len().next_power_of_two();
-    let bins = transform(&mut RealFftPlanner::new(), &hann(segment), size);
+    let bins = fft::forward(&hann(segment), size);
     let bin_hz = rate_hz / size as f64;
     let (power, moment) = (bins.iter().enumerate().filter(|&(bin, _)| bin as f64 * bin_hz >= 20.0))
         .fold((0.0, 0.0), |(power, moment), (bin, x)| {
@@ -153,7 +153,7 @@ pub fn non_harmonic_db(
     if windowed.is_empty() {
         return f64::NEG_INFINITY;
     }
-    let bins = transform(&mut RealFftPlanner::new(), &windowed, windowed.len());
+    let bins = fft::forward(&windowed, windowed.len());
     let bin_hz = rate_hz / windowed.len() as f64;
     let exclude_hz = exclude_hz.max(MAIN_LOBE_7 * bin_hz);
     let (mut all, mut between) = (0.0, 0.0);
@@ -182,15 +182,22 @@ pub fn non_harmonic_db(
 /// assert!((spectrum.level_db[32] + 6.02).abs() < 0.01);
 /// ```
 pub fn power_spectrum_db(samples: &[f64], rate_hz: f64) -> PowerSpectrum {
+    windowed_spectrum_db(samples, rate_hz, &BLACKMAN_HARRIS)
+}
+
+/// As [`power_spectrum_db`], through a Hann window: lines are half as wide, and what is much weaker beside them is hidden.
+pub fn hann_spectrum_db(samples: &[f64], rate_hz: f64) -> PowerSpectrum {
+    windowed_spectrum_db(samples, rate_hz, &HANN)
+}
+
+fn windowed_spectrum_db(samples: &[f64], rate_hz: f64, terms: &[f64]) -> PowerSpectrum {
     let len = samples.len().max(1);
-    let windowed: Vec<f64> = samples
-        .iter()
-        .zip(cosine_window(len, &BLACKMAN_HARRIS))
-        .map(|(sample, window)| sample * window)
-        .collect();
+    let windowed: Vec<f64> =
+        samples.iter().zip(cosine_window(len, terms)).map(|(sample, window)| sample * window).collect();
     let size = len.next_power_of_two();
-    let gain = 2.0 / (BLACKMAN_HARRIS[0] * len as f64);
-    let level_db = transform(&mut RealFftPlanner::new(), &windowed, size)
+    // A sine of amplitude 1 has half its height in the bin, and the window its mean of that.
+    let gain = 2.0 / (terms[0] * len as f64);
+    let level_db = fft::forward(&windowed, size)
         .iter()
         .map(|bin| 20.0 * (gain * bin.norm()).max(1e-10).log10())
         .collect();
@@ -200,7 +207,7 @@ pub fn power_spectrum_db(samples: &[f64], rate_hz: f64) -> PowerSpectrum {
 fn hann(segment: &[f64]) -> Vec<f64> {
     without_mean(segment)
         .iter()
-        .zip(cosine_window(segment.len(), &[0.5, 0.5]))
+        .zip(cosine_window(segment.len(), &HANN))
         .map(|(x, window)| x * window)
         .collect()
 }

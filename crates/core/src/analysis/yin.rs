@@ -3,9 +3,9 @@
 //! [`pitch`](super::pitch) is more exact and is used everywhere else. This estimator exists because a comparison with
 //! recordings must find the same period in the same way.
 
-use crate::analysis::{transform, without_mean};
+use crate::analysis::without_mean;
+use chalumeau_fft as fft;
 use num_complex::Complex64;
-use realfft::RealFftPlanner;
 
 /// Range looked at, Hz.
 const LOWEST_HZ: f64 = 50.0;
@@ -61,18 +61,10 @@ pub fn fundamental_hz(samples: &[f64], rate_hz: f64) -> Option<f64> {
 /// `longest`.
 fn difference(samples: &[f64], window: usize, longest: usize) -> Vec<f64> {
     let size = (samples.len() + window).next_power_of_two();
-    let mut planner = RealFftPlanner::new();
-    let first = transform(&mut planner, &samples[..window], size);
-    let all = transform(&mut planner, samples, size);
-    let mut product: Vec<Complex64> = first.iter().zip(&all).map(|(a, b)| a.conj() * b).collect();
-    // Rounding leaves a trace of an imaginary part where there can be none.
-    if let [first, .., last] = product.as_mut_slice() {
-        (first.im, last.im) = (0.0, 0.0);
-    }
-    let plan = planner.plan_fft_inverse(size);
-    let mut correlation = plan.make_output_vec();
-    // PANIC: both buffers have the plan's length, and the ends are real.
-    plan.process(&mut product, &mut correlation).unwrap();
+    let first = fft::forward(&samples[..window], size);
+    let all = fft::forward(samples, size);
+    let product: Vec<Complex64> = first.iter().zip(&all).map(|(a, b)| a.conj() * b).collect();
+    let correlation = fft::inverse(product, size);
     let mut energy = Vec::with_capacity(samples.len() + 1);
     energy.push(0.0);
     let mut sum = 0.0;

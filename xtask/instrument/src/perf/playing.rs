@@ -7,7 +7,7 @@ use std::process::Command;
 use anyhow::{Context, Result, ensure};
 use chalumeau_core::parallel;
 
-use crate::machine;
+use chalumeau_test_host::machine;
 
 /// Lengths whose difference is counted, s: the note is steady by the first.
 pub(super) const COUNTED_S: (f64, f64) = (0.2, 0.4);

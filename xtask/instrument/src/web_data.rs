@@ -4,7 +4,10 @@
 //! plugin. The presets' settings are the module's list of values (`chalumeau_web::values`), as far as they differ from the
 //! defaults.
 
-use anyhow::{Context, Result};
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
 use chalumeau::parameters::{self, Kind, Sets};
 use chalumeau::presets::{Preset, factory};
 use chalumeau::tour;
@@ -25,8 +28,18 @@ const CONTROLS: [&str; 9] = ["lip", "stren", "tongue", "lay", "noise", "vib", "g
 /// Presets with these tags are for devices that the page does not play.
 const NOT_HERE: [&str; 2] = ["knob", "MPE"];
 
+/// `web-data FOLDER`: writes data.json and tour.json.
+pub fn write(args: &[String]) -> Result<()> {
+    let [folder] = args else { bail!("takes a folder, got {args:?}") };
+    for (name, text) in [("data.json", text()?), ("tour.json", tour()?)] {
+        let path = Path::new(folder).join(name);
+        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    Ok(())
+}
+
 /// All of it.
-pub fn text() -> Result<String> {
+fn text() -> Result<String> {
     let instruments = Bundled::ALL.into_iter().map(instrument).collect::<Result<Vec<_>>>()?;
     let presets: Vec<_> = factory::all()
         .iter()
@@ -46,7 +59,7 @@ pub fn text() -> Result<String> {
 }
 
 /// The sounds of the listening page: the [tour](chalumeau::tour), as the module's values and messages.
-pub fn tour() -> Result<String> {
+fn tour() -> Result<String> {
     let wanted = Wanted::new(Bundled::BFlat.file(), f64::from(LISTEN_HZ));
     let model = Preparation::new(&wanted, None).ready()?.context("the clarinet is not prepared")?;
     let chapters: Vec<_> = tour::chapters(&model, Settings::default(), LISTEN_HZ)

@@ -20,7 +20,7 @@ use self::limits::{blocks, memory, notes, plugin};
 use self::peers::peer_rows;
 use self::playing::measure;
 use self::series::{SERIES, series};
-use crate::machine;
+use chalumeau_test_host::machine;
 
 /// Blocks of random playing by default, and with `--full`.
 const BLOCKS: (usize, usize) = (10_000, 1_000_000);

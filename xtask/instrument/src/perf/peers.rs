@@ -8,7 +8,7 @@ use anyhow::Result;
 use chalumeau_figure::report::TableCell;
 
 use super::playing::{COUNTED_S, Cost, Player};
-use crate::machine;
+use chalumeau_test_host::machine;
 
 /// Programs of others that play a note.
 struct Peers {

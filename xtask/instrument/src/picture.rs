@@ -112,7 +112,7 @@ mod tests {
     /// A tone with the demo's score, and a hand that turns the knob with it.
     #[test]
     fn both_pictures_of_the_demo_are_drawn() {
-        let melody = crate::machine::root().join("examples/melody.mid");
+        let melody = chalumeau_test_host::machine::root().join("examples/melody.mid");
         let score = midi_file::read(&std::fs::read(melody).unwrap(), 48_000).unwrap();
         let left: Vec<f32> =
             (0..score.samples).map(|n| 0.3 * (TAU * 233.1 * n as f32 / 48_000.0).sin()).collect();
