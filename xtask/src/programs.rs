@@ -21,7 +21,7 @@ pub struct Programs {
     pub program: PathBuf,
     /// `chalumeau-standalone`.
     pub standalone: PathBuf,
-    /// `xtask-instrument`.
+    /// `xtask-instrument`; its test has cargo build it.
     pub instrument: PathBuf,
     /// All programs of tests, sorted by name.
     pub tests: Vec<TestProgram>,
