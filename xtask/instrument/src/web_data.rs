@@ -58,7 +58,7 @@ fn text() -> Result<String> {
     Ok(all.to_string())
 }
 
-/// The sounds of the listening page: the [tour], as the module's values and messages.
+/// The sounds of the listening page: the [tour](mod@tour), as the module's values and messages.
 fn tour() -> Result<String> {
     let wanted = Wanted::new(Bundled::BFlat.file(), f64::from(LISTEN_HZ));
     let model = Preparation::new(&wanted, None).ready()?.context("the clarinet is not prepared")?;
