@@ -162,6 +162,7 @@ fn done(step: &'static Step) -> Done {
 
 /// What `work` says of each item, in their order: as many at once as there are cores, the first first.
 fn at_once<I: Sync, T: Send>(items: &[I], work: impl Fn(&I) -> T + Sync) -> Vec<T> {
+    // The bridge hands items out one by one; a slice would be parted in halves, which begin together.
     let mut done: Vec<_> = items.iter().enumerate().par_bridge().map(|(at, item)| (at, work(item))).collect();
     done.sort_by_key(|(at, _)| *at);
     done.into_iter().map(|(_, done)| done).collect()
@@ -218,6 +219,7 @@ fn documentation() -> Result<()> {
 
 /// Every chore that can compare what it would write with what is there.
 fn generated() -> Result<()> {
+    // Chores that need the clarinet are in the build that is there: nothing is built again.
     programs()?;
     for command in COMMANDS.iter().filter(|command| command.checks) {
         println!("{} --check", command.name);

@@ -40,6 +40,7 @@ const TESTS: [&str; 3] = ["module.mjs", "wind.mjs", "browser.mjs"];
 /// Builds the page and runs its tests; installs what they need.
 pub fn test() -> Result<()> {
     machine::provide(&[&NODE, &NPM, &CHROMIUM, &ESPEAK])?;
+    // Before the page, whose data a program of this build writes.
     let program = &programs()?.program;
     let page = build()?;
     let folder = machine::target().join("web-tests");

@@ -185,7 +185,17 @@ pub fn power_spectrum_db(samples: &[f64], rate_hz: f64) -> PowerSpectrum {
     windowed_spectrum_db(samples, rate_hz, &BLACKMAN_HARRIS)
 }
 
-/// As [`power_spectrum_db`], through a Hann window: lines are half as wide, and what is much weaker beside them is hidden.
+/// As [`power_spectrum_db`], through a Hann window: lines are half as wide, and what is much weaker beside them is hidden. Allocates.
+///
+/// ```
+/// use chalumeau_core::analysis::spectrum::hann_spectrum_db;
+///
+/// let sine = |n: u32| 0.5 * (std::f64::consts::TAU * 32.0 * f64::from(n) / 1024.0).sin();
+/// let spectrum = hann_spectrum_db(&(0..1024).map(sine).collect::<Vec<f64>>(), 48_000.0);
+/// assert!((spectrum.level_db[32] + 6.02).abs() < 0.01);
+/// // Half of that in the bins beside it, and nothing two bins away.
+/// assert!((spectrum.level_db[33] + 12.04).abs() < 0.01 && spectrum.level_db[34] < -190.0);
+/// ```
 pub fn hann_spectrum_db(samples: &[f64], rate_hz: f64) -> PowerSpectrum {
     windowed_spectrum_db(samples, rate_hz, &HANN)
 }
