@@ -1,5 +1,5 @@
-//! The program's files are the same bytes on every system: 23 renderings and five tables. Instrument files of a user are not
-//! among them: they are fitted with the mathematical functions of the system (docs/systems.md).
+//! The program's files are the same bytes on every system: 25 renderings and five tables. Two renderings are of a user's
+//! instrument files, which the program fits and tunes first.
 //!
 //! `tests/golden/program_files.tsv` holds a SHA-256 prefix for each command line, in which `OUT` stands for the file. The
 //! test runs them on this system, and `cargo xtask cross` runs the same on others. Lines are made by hand; their hashes are

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use chalumeau_core::control::midi::BreathOrigin;
 use chalumeau_core::instrument::player::response::dynamic;
 use chalumeau_core::instrument::{BreathResponse, Settings};
+use chalumeau_core::maths;
 
 use crate::controllers::breath_input::BreathInput;
 
@@ -98,7 +99,7 @@ impl SourceCurve {
         let common = if below < 1.0 {
             below * softest
         } else {
-            softest + (loudest - softest) * above.powf(curve.recip())
+            softest + (loudest - softest) * maths::pow(above, curve.recip())
         };
         common as f32
     }

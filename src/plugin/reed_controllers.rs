@@ -11,6 +11,7 @@ use nice_plug::prelude::NoteEvent;
 use super::params::knob::ReedSource;
 use chalumeau_core::control::notes::HeldNote;
 use chalumeau_core::event::Event;
+use chalumeau_core::maths;
 
 /// Factor at full travel.
 const FULL_FACTOR: f32 = 1.6;
@@ -89,7 +90,7 @@ impl ReedControllers {
             let Some(value) = index(source).and_then(|at| self.values[at]) else { return 1.0 };
             // The middle of a 7-bit value is 64.
             let travel = if source == ReedSource::Slide { (value * 127.0 - 64.0) / 63.0 } else { value };
-            FULL_FACTOR.powf(travel.clamp(-1.0, 1.0))
+            maths::single::pow(FULL_FACTOR, travel.clamp(-1.0, 1.0))
         })
     }
 

@@ -1,4 +1,5 @@
-// The WebAssembly module plays the bits that the Rust code plays: node module.mjs FOLDER, as `cargo xtask web` makes it.
+// The WebAssembly modules have the bits of the Rust code, in what they play and in the instruments that they prepare:
+// node module.mjs FOLDER, as `cargo xtask web` makes it.
 
 import assert from 'node:assert/strict';
 import { createHash } from 'node:crypto';
@@ -48,6 +49,22 @@ function play(module, score, times) {
   return hashOf(...out);
 }
 
+const given = (path) => readFileSync(new URL(path, import.meta.url), 'utf8');
+
+/** Hash of the instrument that the workshop prepares, as web/tests/own_instrument.rs hashes it. */
+function prepared(module, question) {
+  const { exports: workshop } = new WebAssembly.Instance(module, {});
+  if (question.open) question = { ...question, text: given(`../../examples/instruments/${question.open}`) };
+  const bytes = new TextEncoder().encode(JSON.stringify(question));
+  const place = workshop.chalumeau_inbox(bytes.length);
+  new Uint8Array(workshop.memory.buffer, place, bytes.length).set(bytes);
+  const length = workshop.chalumeau_workshop();
+  const told = Buffer.from(workshop.memory.buffer, workshop.chalumeau_outbox(), length).toString();
+  const { failed, prepared } = JSON.parse(told);
+  assert.equal(failed, undefined);
+  return createHash('sha256').update(prepared).digest('hex');
+}
+
 if (process.argv[1] === new URL(import.meta.url).pathname) {
   const module = new WebAssembly.Module(readFileSync(join(process.argv[2], 'chalumeau.wasm')));
   assert.deepEqual(WebAssembly.Module.imports(module), [], 'the module asks for nothing');
@@ -62,4 +79,10 @@ if (process.argv[1] === new URL(import.meta.url).pathname) {
   const faster = ((1000 * seconds) / times.reduce((sum, time) => sum + time, 0)).toFixed(0);
   console.log(`${scores().length} scores have the hashes of the Rust code, made ${faster} times as fast as they sound`);
   console.log(`a block of 128 samples takes the processor ${at(0.5)} ms; p99 ${at(0.99)}, worst ${at(1)}, of 2.67 at 48 kHz`);
+  const workshop = new WebAssembly.Module(readFileSync(join(process.argv[2], 'workshop.wasm')));
+  const cases = JSON.parse(given('own_instrument.json'));
+  for (const { question, hash } of cases) {
+    assert.equal(prepared(workshop, question), hash, `${JSON.stringify(question)}: another instrument than the Rust code's`);
+  }
+  console.log(`${cases.length} instruments are prepared with the numbers of the Rust code`);
 }

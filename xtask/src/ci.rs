@@ -316,14 +316,9 @@ fn python_package() -> Result<()> {
     let first = "import chalumeau; assert chalumeau.render(written='C4', seconds=0.1).shape == (4800,)";
     machine::run(Command::new(&alone).args(["-c", first]))?;
     machine::run(Command::new(&python).args(install).args(["--force-reinstall", "--no-deps"]).arg(&wheel))?;
-    // The command line of the same profile. With both packages chosen, it shares all that was built.
-    cargo(
-        "build --profile wheel -p chalumeau -p chalumeau-python --bin chalumeau --no-default-features --features chalumeau/cli",
-    )?;
-    let program = machine::target().join("wheel").join(format!("chalumeau{}", std::env::consts::EXE_SUFFIX));
     let mut tests = Command::new(&python);
     tests.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider"]).current_dir(&folder);
-    machine::run(tests.env("CHALUMEAU_PROGRAM", program))
+    machine::run(tests.env(artefacts::PROGRAM, &programs()?.program))
 }
 
 /// The Python of a virtual environment in the target folder, which is made if it cannot import `modules` yet.

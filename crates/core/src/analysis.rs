@@ -15,6 +15,7 @@
 //! assert!((levels_db[2] + 6.02).abs() < 0.1);
 //! ```
 
+use crate::maths;
 use std::f64::consts::PI;
 
 pub mod impedance;
@@ -46,7 +47,7 @@ pub(crate) fn cosine_window(len: usize, terms: &[f64]) -> impl Iterator<Item = f
         let turn = 2.0 * PI * n as f64 / len as f64;
         let mut sign = 1.0;
         terms.iter().enumerate().fold(0.0, |sum, (k, term)| {
-            let cosine = if k == 0 { 1.0 } else { (turn * k as f64).cos() };
+            let cosine = if k == 0 { 1.0 } else { maths::cos(turn * k as f64) };
             let value = sum + sign * term * cosine;
             sign = -sign;
             value

@@ -15,6 +15,7 @@
 //! | [`measure`] | measurements of played notes: pitch and level, bifurcation diagram, one period of the reed |
 //! | [`analysis`] | methods for samples: pitch, spectrum, onset, impedance |
 //! | [`haptics`] | the pressure that each note requires, and the torque with which a knob lets a hand feel it |
+//! | [`maths`] | functions with the same bits on every system |
 //! | [`parallel`] | work on independent items, on all cores with the feature `threads` |
 //!
 //! # Units and conventions
@@ -39,6 +40,8 @@
 // The exceptions, each with its proof, are the calls of AVX2 code in `bore::lattice`, its `choir` and `dsp::resampler`.
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
+// `maths` says why. Tests may call the standard library's.
+#![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub mod analysis;
 pub mod bore;
@@ -47,6 +50,7 @@ pub mod dsp;
 pub mod event;
 pub mod haptics;
 pub mod instrument;
+pub mod maths;
 pub mod measure;
 pub mod parallel;
 pub mod reed;

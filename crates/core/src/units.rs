@@ -16,6 +16,7 @@
 //! assert!((rise - 2.9).abs() < 0.1);
 //! ```
 
+use crate::maths;
 use std::fmt;
 
 /// The state of the air in the bore at one temperature (50 % relative humidity, 400 ppm CO2).
@@ -49,8 +50,8 @@ impl Air {
             temperature_c,
             c: 347.132_409_179_073_4 * ratio.sqrt(),
             rho: 1.177_296_156_486_458 / ratio,
-            mu: 1.844_514_355_756_439e-5 * ratio.powf(0.76),
-            kappa: 0.025_932_154_153_163_91 * ratio.powf(0.85),
+            mu: 1.844_514_355_756_439e-5 * maths::pow(ratio, 0.76),
+            kappa: 0.025_932_154_153_163_91 * maths::pow(ratio, 0.85),
             cp: 1_014.699_561_359_552_6,
             gamma: 1.400_530_054_789_436_2,
         }
@@ -87,7 +88,7 @@ pub struct WrittenNote(pub u8);
 impl SoundingNote {
     /// Equal-tempered frequency, Hz, for the given A4.
     pub fn frequency_hz(self, a4_hz: f64) -> f64 {
-        a4_hz * ((f64::from(self.0) - 69.0) / 12.0).exp2()
+        a4_hz * maths::exp2((f64::from(self.0) - 69.0) / 12.0)
     }
 
     /// The note to read for this pitch on an instrument that sounds `transposition` semitones below what is written
@@ -148,7 +149,7 @@ pub fn midi_of_name(name: &str) -> Option<u8> {
 
 /// Interval from `from_hz` up to `to_hz`, cents; negative if `to_hz` is the lower. Both are above 0.
 pub fn cents(to_hz: f64, from_hz: f64) -> f64 {
-    1200.0 * (to_hz / from_hz).log2()
+    1200.0 * maths::log2(to_hz / from_hz)
 }
 
 #[cfg(test)]

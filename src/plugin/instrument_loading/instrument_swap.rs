@@ -9,6 +9,7 @@ use super::{SharedInstrument, SwapCandidate};
 use chalumeau_core::event::{Event, PartEvent, Timed};
 use chalumeau_core::instrument::stereo::Stereo;
 use chalumeau_core::instrument::{Channels, Clarinet, Ensemble, Settings};
+use chalumeau_core::maths;
 
 /// Time for which a new instrument plays unheard, s. The lowest notes of a B flat clarinet speak after 50 ms, those of a
 /// bass clarinet after 100 ms.
@@ -246,7 +247,8 @@ impl InstrumentSwap {
                     // Equal power, because the two have different phases. At the end the output is the new one to the bit.
                     *old = if faded < fade {
                         let angle = std::f32::consts::FRAC_PI_2 * faded as f32 / fade as f32;
-                        *old * angle.cos() + *new * angle.sin()
+                        let (new_share, old_share) = maths::single::sin_cos(angle);
+                        *old * old_share + *new * new_share
                     } else {
                         *new
                     };

@@ -12,6 +12,7 @@
 //! | d ln Z / df = 2 R' / (1 - R^2) | zero real part: a peak; imaginary part: its Q |
 
 use crate::bore::transfer_matrix::Peak;
+use crate::maths;
 use chalumeau_fft as fft;
 use num_complex::Complex64;
 use std::f64::consts::PI;
@@ -40,7 +41,7 @@ pub fn reflectance(response: &[f64], rate_hz: f64, f_hz: f64) -> Complex64 {
 
 /// The reflectance and its derivative by frequency, 1/Hz.
 fn with_slope(response: &[f64], rate_hz: f64, f_hz: f64) -> (Complex64, Complex64) {
-    let (mut turn, step) = (Complex64::from(1.0), Complex64::cis(-2.0 * PI * f_hz / rate_hz));
+    let (mut turn, step) = (Complex64::from(1.0), maths::complex::cis(-2.0 * PI * f_hz / rate_hz));
     let (mut sum, mut moment) = (Complex64::default(), Complex64::default());
     for (n, r) in response.iter().enumerate() {
         let term = turn * r;
@@ -105,7 +106,11 @@ impl Impedance {
             if self.log_slope(middle_hz).re > 0.0 { low_hz = middle_hz } else { high_hz = middle_hz }
         }
         let f_hz = 0.5 * (low_hz + high_hz);
-        Peak { f_hz, mag_over_zc: self.at(f_hz).norm(), q: -0.5 * f_hz * self.log_slope(f_hz).im }
+        Peak {
+            f_hz,
+            mag_over_zc: maths::complex::norm(self.at(f_hz)),
+            q: -0.5 * f_hz * self.log_slope(f_hz).im,
+        }
     }
 
     fn log_slope(&self, f_hz: f64) -> Complex64 {

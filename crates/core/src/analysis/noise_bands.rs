@@ -5,6 +5,7 @@
 //! noise lies 1.6 dB below its mean; recordings were read in the same way.
 
 use crate::analysis::{BLACKMAN_HARRIS, cosine_window, without_mean};
+use crate::maths;
 use chalumeau_fft as fft;
 
 /// Bands in which the breath noise of recorded notes was measured, Hz.
@@ -45,7 +46,7 @@ pub fn noise_db(samples: &[f64], rate_hz: f64, f0_hz: f64, bands_hz: &[(f64, f64
             // One-sided power per bin of white noise with variance v: v times the sum of the squared window.
             let per_bin = 2.0 * power / gain / windowed.len() as f64;
             let whole = per_bin * (high_hz - low_hz) / bin_hz;
-            if whole > 0.0 { 10.0 * (whole / total).log10() } else { f64::NEG_INFINITY }
+            if whole > 0.0 { 10.0 * maths::log10(whole / total) } else { f64::NEG_INFINITY }
         })
         .collect()
 }

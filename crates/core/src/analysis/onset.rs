@@ -6,6 +6,7 @@
 
 use crate::analysis::pitch::fundamental_hz;
 use crate::analysis::spectrum::{moving_rms, note_envelope};
+use crate::maths;
 
 /// Share of the steady level that counts as speaking.
 const SPEAKING: f64 = 0.9;
@@ -65,7 +66,7 @@ pub fn decay_time_constant_s(samples: &[f64], rate_hz: f64) -> Option<f64> {
     for (n, value) in fit.iter().enumerate() {
         let t = n as f64 - centre;
         tt += t * t;
-        ty += t * value.ln();
+        ty += t * maths::ln(*value);
     }
     (ty < 0.0).then(|| -tt / ty / rate_hz)
 }

@@ -7,6 +7,7 @@ use num_complex::Complex64;
 use std::f64::consts::TAU;
 
 use crate::analysis::{HANN, cosine_window};
+use crate::maths;
 
 /// Step of the windows, s.
 pub const HOP_S: f64 = 0.005;
@@ -55,12 +56,12 @@ impl Partial {
         let window: Vec<f64> = cosine_window(len, &HANN).collect();
         let sum: f64 = window.iter().sum();
         let hop = (HOP_S * rate_hz).round() as usize;
-        let step = Complex64::cis(-TAU * hz / rate_hz);
+        let step = maths::complex::cis(-TAU * hz / rate_hz);
         let values = (0..)
             .map(|frame| frame * hop)
             .take_while(|start| start + len <= samples.len())
             .map(|start| {
-                let mut turn = Complex64::cis((-TAU * hz / rate_hz * start as f64) % TAU);
+                let mut turn = maths::complex::cis((-TAU * hz / rate_hz * start as f64) % TAU);
                 let mut value = Complex64::default();
                 for (x, w) in samples[start..].iter().zip(&window) {
                     value += turn * (x * w);
@@ -75,21 +76,23 @@ impl Partial {
     /// Time from the start of the slice to 90 % of the steady amplitude, the median over the last third, s; `None` for
     /// silence.
     pub fn t90_s(&self) -> Option<f64> {
-        let steady = median(self.values[self.values.len() * 2 / 3..].iter().map(|value| value.norm()))?;
-        let begun = self.values.iter().position(|value| value.norm() >= BEGUN * steady)?;
+        let steady = median(
+            self.values[self.values.len() * 2 / 3..].iter().map(|value| maths::complex::norm(*value)),
+        )?;
+        let begun = self.values.iter().position(|value| maths::complex::norm(*value) >= BEGUN * steady)?;
         (steady > 0.0).then_some(begun as f64 * HOP_S)
     }
 
     /// Level, dB.
     pub fn level_db(&self) -> impl Iterator<Item = f64> + '_ {
-        self.values.iter().map(|value| 10.0 * value.norm_sqr().max(1e-30).log10())
+        self.values.iter().map(|value| 10.0 * maths::log10(value.norm_sqr().max(1e-30)))
     }
 
     /// Pitch between two windows, cents above the frequency of the watching.
     pub fn cents(&self) -> impl Iterator<Item = f64> + '_ {
         self.values.windows(2).map(|pair| {
-            let hz = (pair[1] * pair[0].conj()).arg() / TAU / HOP_S;
-            1_200.0 * (1.0 + hz / self.hz).max(1e-3).log2()
+            let hz = maths::complex::arg(pair[1] * pair[0].conj()) / TAU / HOP_S;
+            1_200.0 * maths::log2((1.0 + hz / self.hz).max(1e-3))
         })
     }
 }
@@ -110,7 +113,7 @@ impl Wander {
         let level: Vec<f64> = segment
             .chunks_exact(4 * hop)
             .map(|part| {
-                10.0 * (part.iter().map(|x| x * x).sum::<f64>() / part.len() as f64).max(1e-30).log10()
+                10.0 * maths::log10((part.iter().map(|x| x * x).sum::<f64>() / part.len() as f64).max(1e-30))
             })
             .flat_map(|db| [db; 4])
             .collect();
@@ -128,7 +131,7 @@ impl Wander {
 /// makes no jump at the ends. A kink is left there, which every band hears: the ends, [`END_S`] each, are cut off.
 fn band(values: &[f64], (low_hz, high_hz): (f64, f64)) -> Vec<f64> {
     let len = values.len();
-    let basis = |k: usize, n: usize| (TAU / 2.0 * k as f64 * (n as f64 + 0.5) / len as f64).cos();
+    let basis = |k: usize, n: usize| maths::cos(TAU / 2.0 * k as f64 * (n as f64 + 0.5) / len as f64);
     let mut out = vec![0.0; len];
     for k in 1..len {
         let hz = k as f64 / (2.0 * len as f64 * HOP_S);

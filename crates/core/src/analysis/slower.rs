@@ -1,6 +1,7 @@
 //! A sound at a lower rate: for measurements that need little of its band, and cost less so.
 
 use crate::analysis::{BLACKMAN_HARRIS, cosine_window};
+use crate::maths;
 use std::f64::consts::PI;
 
 /// Length of the low-pass filter, samples of the lower rate.
@@ -24,7 +25,7 @@ pub(crate) fn slower(samples: &[f64], rate_hz: f64, least_hz: f64) -> (Vec<f64>,
         .zip(0..)
         .map(|(window, at)| {
             let x = 2.0 * PI * CUTOFF * (f64::from(at) - middle) / by as f64;
-            let sinc = if x == 0.0 { 1.0 } else { x.sin() / x };
+            let sinc = if x == 0.0 { 1.0 } else { maths::sin(x) / x };
             2.0 * CUTOFF / by as f64 * window * sinc
         })
         .collect();

@@ -6,6 +6,7 @@
 //! Levels in dB, full scale 1.0, frequencies in Hz.
 
 use crate::analysis::{BLACKMAN_HARRIS, HANN, cosine_window, rms, without_mean};
+use crate::maths;
 use chalumeau_fft as fft;
 use std::ops::Range;
 
@@ -111,7 +112,7 @@ pub fn levels_of_harmonics_db(segment: &[f64], rate_hz: f64, f0_hz: f64, most: u
     if strongest <= 0.0 {
         return Vec::new();
     }
-    peaks.iter().map(|peak| 10.0 * (peak / strongest).max(1e-30).log10()).collect()
+    peaks.iter().map(|peak| 10.0 * maths::log10((peak / strongest).max(1e-30))).collect()
 }
 
 /// Spectral centroid: power-weighted mean frequency, Hz, from 20 Hz to half the rate, noise included; `None` for silence.
@@ -128,7 +129,7 @@ pub fn centroid_hz(segment: &[f64], rate_hz: f64) -> Option<f64> {
 
 /// Root mean square, dB re full scale 1.0 (a full-scale sine reads -3.01); minus infinity for silence.
 pub fn rms_dbfs(samples: &[f64]) -> f64 {
-    20.0 * rms(samples).log10()
+    20.0 * maths::log10(rms(samples))
 }
 
 /// Power between the harmonics of `f0_hz` relative to all power, both from `low_hz` to `high_hz`, dB.
@@ -167,7 +168,7 @@ pub fn non_harmonic_db(
             }
         }
     }
-    if all > 0.0 { 10.0 * (between / all).log10() } else { f64::NEG_INFINITY }
+    if all > 0.0 { 10.0 * maths::log10(between / all) } else { f64::NEG_INFINITY }
 }
 
 /// Spectrum of the whole slice through a four-term Blackman-Harris window, floor -200 dB. Allocates.
@@ -209,7 +210,7 @@ fn windowed_spectrum_db(samples: &[f64], rate_hz: f64, terms: &[f64]) -> PowerSp
     let gain = 2.0 / (terms[0] * len as f64);
     let level_db = fft::forward(&windowed, size)
         .iter()
-        .map(|bin| 20.0 * (gain * bin.norm()).max(1e-10).log10())
+        .map(|bin| 20.0 * maths::log10((gain * maths::complex::norm(*bin)).max(1e-10)))
         .collect();
     PowerSpectrum { bin_hz: rate_hz / size as f64, level_db }
 }

@@ -1,6 +1,7 @@
 //! The instruments that come with the program, each a file in `data/`.
 
 use crate::bore::instrument_file::InstrumentFile;
+use crate::maths;
 use std::sync::OnceLock;
 
 /// One of them. All but the B flat clarinet are that clarinet larger or smaller, which their files say.
@@ -73,7 +74,7 @@ impl Bundled {
     pub fn scaled_text(self) -> Option<String> {
         // By equal temperament, so that the trims are nearly the B flat clarinet's. A built bass clarinet is bent, and its
         // bore narrower than this for its length.
-        let semitone = |count: f64| (count / 12.0).exp2();
+        let semitone = |count: f64| maths::exp2(count / 12.0);
         let (name, factor, said, transposition) = match self {
             Self::BFlat => return None,
             Self::A => ("A clarinet", semitone(1.0), "2^(1/12)", 3),

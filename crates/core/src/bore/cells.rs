@@ -8,6 +8,7 @@ use crate::bore::instrument_file::{InstrumentFile, MAX_HOLES};
 use crate::bore::lattice::{LANES, MAX_CHUNKS, MAX_TICKS, hole_chunks};
 use crate::bore::tone_hole::{self, HoleNetwork};
 use crate::bore::wall_loss;
+use crate::maths;
 use crate::units::{Air, REFERENCE_RADIUS_M};
 
 /// How a stretch of bore between two holes, or above or below them all, is cut into cells.
@@ -145,7 +146,7 @@ impl Stretch {
         let at = |n: usize| from_m + (to_m - from_m) * n as f64 / Self::STEPS as f64;
         let (mut measure, mut flared) = (vec![0.0], 0.0);
         for n in 1..=Self::STEPS {
-            let flare = (file.radius_at(at(n)) / file.radius_at(at(n - 1))).ln().abs();
+            let flare = maths::ln(file.radius_at(at(n)) / file.radius_at(at(n - 1))).abs();
             flared += flare;
             measure.push(measure[n - 1] + flare + cutting.length_weight / Self::STEPS as f64);
         }

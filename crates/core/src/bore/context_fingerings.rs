@@ -10,6 +10,7 @@ use crate::bore::fingering_finder::bits;
 use crate::bore::fingering_finder::mechanism::{Grip, Mechanism};
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::transfer_matrix::{TransferMatrix, threshold_gamma};
+use crate::maths;
 use crate::units::{Air, cents};
 
 /// Widest step over which an alternate is taken, semitones: those of chromatic runs and of trills.
@@ -62,7 +63,7 @@ pub struct ContextFingerings {
 /// Frequency near a note where the phase of the impedance falls through zero, Hz, and Re Z over Zc there. The transfer matrices'
 /// [`playing_frequency`](TransferMatrix::playing_frequency) over a range that is known: in a tenth of the time.
 fn resonance(bore: &TransferMatrix, open: &[bool], reed_volume_m3: f64, note_hz: f64) -> Option<(f64, f64)> {
-    let at = |off: f64| bore.impedance(note_hz * (off / 1_200.0).exp2(), open, reed_volume_m3);
+    let at = |off: f64| bore.impedance(note_hz * maths::exp2(off / 1_200.0), open, reed_volume_m3);
     let steps = ((SEARCH_CENTS.1 - SEARCH_CENTS.0) / STEP_CENTS) as usize;
     let (mut low, mut high) = (0..steps)
         .map(|step| SEARCH_CENTS.0 + STEP_CENTS * step as f64)
@@ -79,7 +80,7 @@ fn resonance(bore: &TransferMatrix, open: &[bool], reed_volume_m3: f64, note_hz:
         }
     }
     let found = low + (high - low) * low_im / (low_im - high_im);
-    Some((note_hz * (found / 1_200.0).exp2(), at(found).re))
+    Some((note_hz * maths::exp2(found / 1_200.0), at(found).re))
 }
 
 impl ContextFingerings {

@@ -13,6 +13,7 @@ use std::ops::ControlFlow;
 
 use crate::bore::instrument_file::{Fingering, HoleKind, InstrumentFile};
 use crate::bore::transfer_matrix::{Resonance, TransferMatrix, threshold_gamma};
+use crate::maths;
 use crate::units::{Air, WrittenNote, cents};
 use mechanism::{Grip, MAX_FINGERS, Mechanism};
 
@@ -272,7 +273,7 @@ impl FingeringFinder {
         }
         let lower = index.checked_sub(1).map(|below| resonances[below].height);
         let evenness_db =
-            lower.map_or(SURE_DB, |lower| 20.0 * f64::from(played.height / lower).log10()).min(SURE_DB);
+            lower.map_or(SURE_DB, |lower| 20.0 * maths::log10(f64::from(played.height / lower))).min(SURE_DB);
         let gamma_on = threshold_gamma(f64::from(played.height), ZETA);
         let beyond = (off - LIP_CENTS[1]).max(LIP_CENTS[0] - off).max(0.0);
         let cost = worth::CENT * beyond
@@ -309,7 +310,7 @@ impl FingeringFinder {
         let ratio = f64::from(high.f_hz / low.f_hz);
         // Cents to the nearest harmonic of the lower one, which would only colour its note.
         let inharmonic = cents(ratio, ratio.round()).abs();
-        let uneven_db = 20.0 * f64::from(first.height / second.height).log10();
+        let uneven_db = 20.0 * maths::log10(f64::from(first.height / second.height));
         if inharmonic < INHARMONIC_CENTS || ratio < LEAST_RATIO || uneven_db > MOST_UNEVEN_DB {
             return None;
         }

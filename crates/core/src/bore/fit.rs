@@ -20,6 +20,7 @@ use crate::bore::instrument_file::{Fingering, InstrumentFile};
 use crate::bore::lattice::LatticeCoeffs;
 use crate::bore::lattice::sensitivity::{AtFrequency, Layout, Sweep, hole_admittances};
 use crate::bore::transfer_matrix::TransferMatrix;
+use crate::maths;
 use crate::parallel::{self, each_part};
 use crate::units::{Air, REFERENCE_LENGTH_M};
 
@@ -61,7 +62,7 @@ impl Target {
         match self.q {
             // Near a peak Y = (1 + 2 j Q df/f) / Z_peak.
             Some(q) => self.peak((y - 1.0 / self.z) * self.z, q, out),
-            None => out[0] = -self.weight * 20.0 * (y * self.z).norm().log10(),
+            None => out[0] = -self.weight * 20.0 * maths::log10(maths::complex::norm(y * self.z)),
         }
     }
 
@@ -110,14 +111,14 @@ impl Problem<'_> {
         let mut cells = self.start.clone();
         let count = cells.cells.len();
         for (cell, change) in cells.cells.iter_mut().zip(parameters.iter()) {
-            cell.radius_m *= change.exp();
+            cell.radius_m *= maths::exp(*change);
         }
-        cells.end_radius_m *= parameters[count].exp();
+        cells.end_radius_m *= maths::exp(parameters[count]);
         let losses = cells.loss_strengths.iter_mut().chain(&mut cells.loss_poles_hz);
         for (loss, change) in losses.zip(parameters.iter().skip(count + 1)) {
-            *loss *= change.exp();
+            *loss *= maths::exp(*change);
         }
-        cells.vent_resistance *= parameters[count + 7].exp();
+        cells.vent_resistance *= maths::exp(parameters[count + 7]);
         cells.chimney_split = (cells.chimney_split + parameters[count + 8]).clamp(0.2, 0.6);
         cells
     }

@@ -20,6 +20,7 @@ use num_complex::Complex64;
 
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::radiation::BELL_CORNER;
+use crate::maths;
 use crate::units::Air;
 
 /// The sources of one instrument: its holes in the order of its file, then the bell.
@@ -61,7 +62,7 @@ impl SoundSources {
             sum += (weight(i) * a).norm_sqr();
             for (j, (b, place_b)) in flows.iter().zip(&self.places_m).enumerate().take(i) {
                 let turns = k * (place_a - place_b).abs();
-                let together = if turns < 1e-6 { 1.0 } else { turns.sin() / turns };
+                let together = if turns < 1e-6 { 1.0 } else { maths::sin(turns) / turns };
                 sum += 2.0 * weight(i) * weight(j) * (a * b.conj()).re * together;
             }
         }

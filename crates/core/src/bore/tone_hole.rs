@@ -13,6 +13,7 @@ use num_complex::Complex64;
 use crate::bore::instrument_file::ToneHole;
 use crate::bore::radiation::{END_CORRECTION, RESISTANCE};
 use crate::bore::transfer_matrix::bessel_ratio;
+use crate::maths;
 use crate::units::Air;
 
 /// Design of one hole's network, SI units (acoustic: Pa, m3/s).
@@ -44,7 +45,7 @@ impl HoleNetwork {
         let inner = b * (0.82 - 0.193 * d - 1.09 * d.powi(2) + 1.27 * d.powi(3) - 0.71 * d.powi(4));
         let outer = END_CORRECTION * b;
         let omega = std::f64::consts::TAU * loss_hz;
-        let z = Complex64::new(0.0, -omega * air.rho / air.mu).sqrt() * b;
+        let z = maths::complex::sqrt(Complex64::new(0.0, -omega * air.rho / air.mu)) * b;
         let mass = air.rho / area_m2;
         let series = Complex64::new(0.0, omega * mass) / (1.0 - 2.0 * bessel_ratio(z) / z);
         let viscous = series.im / (omega * mass);

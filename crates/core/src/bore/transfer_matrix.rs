@@ -38,6 +38,7 @@ use num_complex::Complex64;
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::radiation;
 use crate::bore::tone_hole::series_correction_m;
+use crate::maths;
 use crate::units::Air;
 
 const J: Complex64 = Complex64::new(0.0, 1.0);
@@ -357,7 +358,7 @@ struct Losses {
 
 impl Losses {
     fn cylinder(self, length_m: f64) -> Matrix {
-        let grow = (self.gamma * length_m).exp();
+        let grow = maths::complex::exp(self.gamma * length_m);
         let decay = grow.inv();
         let (cosh, sinh) = (0.5 * (grow + decay), 0.5 * (grow - decay));
         Matrix { pp: cosh, pu: self.z_c * sinh, up: sinh / self.z_c, uu: cosh }
@@ -376,7 +377,7 @@ fn losses(omega: f64, radius_m: f64, air: &Air) -> Losses {
     let thermal = layer(air.kappa / (air.rho * air.cp));
     let z_series = J * (omega * air.rho / area) / (1.0 - viscous);
     let y_shunt = J * (omega * area / (air.rho * air.c * air.c)) * (1.0 + (air.gamma - 1.0) * thermal);
-    let gamma = (z_series * y_shunt).sqrt();
+    let gamma = maths::complex::sqrt(z_series * y_shunt);
     Losses { gamma, z_c: z_series / gamma }
 }
 
@@ -406,7 +407,7 @@ fn push(spans: &mut [Vec<Piece>], piece: Piece) {
 }
 
 fn tanh(z: Complex64) -> Complex64 {
-    let decay = (-2.0 * z).exp();
+    let decay = maths::complex::exp(-2.0 * z);
     (1.0 - decay) / (1.0 + decay)
 }
 

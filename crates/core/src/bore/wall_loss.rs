@@ -7,6 +7,7 @@
 //! bore, and answers for the stretch between the midpoints to its neighbours of the same pole: a third of the work of
 //! three poles everywhere, and within 0.1 dB of it.
 
+use crate::maths;
 use crate::units::Air;
 
 /// Frequencies p_k of the three poles, Hz (fitted, see the test).
@@ -39,14 +40,14 @@ pub fn deal(losses: &[f64], strengths: &[f64; 3]) -> Vec<f64> {
         .map(|cell| {
             let from = if cell >= 3 { 0.5 * (middles[cell - 3] + middles[cell]) } else { 0.0 };
             let to = if cell + 3 < losses.len() { 0.5 * (middles[cell] + middles[cell + 3]) } else { total };
-            1.0 - (-strengths[cell % 3] * (to - from)).exp()
+            1.0 - maths::exp(-strengths[cell % 3] * (to - from))
         })
         .collect()
 }
 
 /// Coefficient q of the low-pass inside the filter of pole `p_hz` at `rate_hz`: `l += q (x - l)`.
 pub fn pole_coefficient(p_hz: f64, rate_hz: f64) -> f64 {
-    1.0 - (-std::f64::consts::TAU * p_hz / rate_hz).exp()
+    1.0 - maths::exp(-std::f64::consts::TAU * p_hz / rate_hz)
 }
 
 #[cfg(test)]

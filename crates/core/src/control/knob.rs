@@ -12,6 +12,8 @@
 //! # Ok::<(), chalumeau_core::control::knob::KnobError>(())
 //! ```
 
+use crate::maths;
+
 pub mod calibration;
 pub mod slap;
 
@@ -143,12 +145,12 @@ impl KnobBreath {
         if !self.blowing {
             return 0.0;
         }
-        (beyond_deg * self.per_travel).clamp(0.0, 1.0).powf(self.design.curve) as f32
+        maths::pow((beyond_deg * self.per_travel).clamp(0.0, 1.0), self.design.curve) as f32
     }
 
     /// The angle at which `pressure_unit` gives this breath while blowing, degrees.
     pub fn angle_deg(&self, pressure_unit: f64) -> f64 {
-        self.origin_deg + pressure_unit.clamp(0.0, 1.0).powf(1.0 / self.design.curve) / self.per_travel
+        self.origin_deg + maths::pow(pressure_unit.clamp(0.0, 1.0), 1.0 / self.design.curve) / self.per_travel
     }
 }
 

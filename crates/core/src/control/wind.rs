@@ -12,6 +12,8 @@
 //! It decides every 5 ms of samples, so it does not depend on blocks. It leaves out the direction of the wind: who draws air in
 //! near the microphone plays, too.
 
+use crate::maths;
+
 mod bands;
 mod period;
 
@@ -218,14 +220,14 @@ impl WindMeter {
     }
 
     fn decide(&mut self, powers: [f64; 3]) {
-        let share = 1.0 - (-STEP_S / MEAN_S).exp();
+        let share = 1.0 - maths::exp(-STEP_S / MEAN_S);
         for (mean, power) in self.mean.iter_mut().zip(powers) {
             *mean += share * (power - *mean);
         }
         let [all, low, deep] = self.mean;
         let level = db(all);
         self.level_dbfs = level;
-        self.deep_mean += (1.0 - (-STEP_S / DEEP_S).exp()) * (deep - self.deep_mean);
+        self.deep_mean += (1.0 - maths::exp(-STEP_S / DEEP_S)) * (deep - self.deep_mean);
         if !self.is_open {
             // How much of this wind lies below 90 Hz is learned before the clarinet sounds.
             self.over_deep_db = level - db(self.deep_mean);
@@ -257,7 +259,7 @@ impl WindMeter {
             wanted = ((blown - softest) / (loudest - softest)).clamp(SOFTEST, 1.0);
         }
         let time_s = if wanted > self.breath { UP_S } else { DOWN_S };
-        self.breath += (1.0 - (-STEP_S / time_s).exp()) * (wanted - self.breath);
+        self.breath += (1.0 - maths::exp(-STEP_S / time_s)) * (wanted - self.breath);
         if self.breath < OVER {
             self.breath = 0.0;
         }
@@ -276,7 +278,7 @@ impl WindMeter {
 }
 
 fn db(power: f64) -> f64 {
-    10.0 * (power + 1e-12).log10()
+    10.0 * maths::log10(power + 1e-12)
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 //! turned down without being distorted. Nothing ever leaves -1..=1.
 
 use super::lanes::any_above;
+use crate::maths;
 
 /// Peaks up to here pass untouched.
 pub const CEILING: f32 = 0.98;
@@ -28,7 +29,7 @@ pub struct Limiter {
 impl Limiter {
     /// A limiter at a sample rate.
     pub fn new(rate_hz: f64) -> Self {
-        Self { envelope: 0.0, recovery: (-1.0 / (RECOVERY_S * rate_hz)).exp() as f32 }
+        Self { envelope: 0.0, recovery: maths::exp(-1.0 / (RECOVERY_S * rate_hz)) as f32 }
     }
 
     /// Turns down what is too loud; samples must be finite. Real-time safe.

@@ -6,6 +6,7 @@
 use std::f64::consts::PI;
 
 use crate::dsp::lanes::through_memory;
+use crate::maths;
 
 /// Lanes of the dot product; tap counts are multiples of it.
 pub const LANES: usize = 8;
@@ -108,7 +109,7 @@ fn add(lanes: &mut [f32; LANES], a: &[f32; LANES], b: &TapRow) {
 }
 
 fn sinc(x: f64) -> f64 {
-    if x == 0.0 { 1.0 } else { (PI * x).sin() / (PI * x) }
+    if x == 0.0 { 1.0 } else { maths::sin(PI * x) / (PI * x) }
 }
 
 /// Kaiser window at `x` in -1..=1, 1 in the middle.

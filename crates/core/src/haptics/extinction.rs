@@ -24,6 +24,7 @@ use std::f64::consts::{PI, TAU};
 use crate::bore::instrument_file::InstrumentFile;
 use crate::bore::transfer_matrix::TransferMatrix;
 use crate::haptics::admittance::swept_s;
+use crate::maths;
 use crate::units::Air;
 
 /// Harmonics above this frequency, Hz, are left out: the weight of harmonic n is 1/n^2.
@@ -64,7 +65,7 @@ impl EffectiveImpedance {
             for _ in 0..12 {
                 matrix.impedance_with_jets(f_hz, open, &resistances, &mut flows);
                 for ((resistance, flow), per_pa) in resistances.iter_mut().zip(&flows).zip(&per_pa) {
-                    *resistance = 0.5 * (*resistance + per_pa * flow.norm() * loud_pa);
+                    *resistance = 0.5 * (*resistance + per_pa * maths::complex::norm(*flow) * loud_pa);
                 }
             }
             let sum: f64 = (1_u32..)
@@ -84,7 +85,7 @@ impl EffectiveImpedance {
     /// `Z_e` at a level, linear between the levels of the table.
     fn at(&self, loud_pa: f64) -> f64 {
         let position =
-            if loud_pa < FIRST_PA { loud_pa / FIRST_PA } else { 1.0 + (loud_pa / FIRST_PA).log2() };
+            if loud_pa < FIRST_PA { loud_pa / FIRST_PA } else { 1.0 + maths::log2(loud_pa / FIRST_PA) };
         let i = (position as usize).min(LEVELS - 2);
         let t = (position - i as f64).min(1.0);
         self.z_e[i] + t * (self.z_e[i + 1] - self.z_e[i])

@@ -19,6 +19,7 @@ use crate::haptics::requirement::{NoteRequirement, RequirementSolver};
 use crate::haptics::torque_law;
 use crate::haptics::torque_law::TorqueExtremes;
 use crate::haptics::torque_limits::TorqueLimits;
+use crate::maths;
 use crate::reed::physical::{P_REF_PA, ZETA_REFERENCE};
 use crate::units::WrittenNote;
 
@@ -123,12 +124,12 @@ impl FeelTable {
             .zip(asked.iter().zip(&felt))
             .map(|(written, (&asked, &felt))| {
                 let ratio = felt.unwrap_or(felt_ref) / felt_ref;
-                let a_on_deg = a_ref_deg * ratio.powf(design.place);
+                let a_on_deg = a_ref_deg * maths::pow(ratio, design.place);
                 let a_close_deg = match design.law {
                     TorqueLaw::Flow => 3.0 * a_on_deg,
                     TorqueLaw::Pressure | TorqueLaw::Free => degrees_per_pa * travel_reed.closing_pa(),
                 };
-                let torque = ratio.powf(design.contrast);
+                let torque = maths::pow(ratio, design.contrast);
                 note(written, asked, asked.unwrap_or(own), design, reed, (torque, a_on_deg, a_close_deg))
             })
             .collect();
@@ -215,7 +216,7 @@ fn felt_pressures(
         .map(|(length, asked)| {
             let share = if long > short { (length - short) / (long - short) } else { 0.5 };
             let share = if design.order == NoteOrder::CoveredHoles { share } else { 1.0 - share };
-            asked.map(|_| p_low * (p_high / p_low).powf(share))
+            asked.map(|_| p_low * maths::pow(p_high / p_low, share))
         })
         .collect()
 }

@@ -26,6 +26,7 @@ use std::f64::consts::TAU;
 
 use crate::bore::transfer_matrix::threshold_gamma;
 use crate::haptics::admittance::AdmittanceGrid;
+use crate::maths;
 use crate::reed::Lip;
 use crate::reed::lay::opening;
 use crate::reed::motion::RESONANCE_TO_RATE;
@@ -70,7 +71,7 @@ impl MovingReed {
             }
             Some(rate_hz) => {
                 let turn = TAU * resonance_hz.min(RESONANCE_TO_RATE * rate_hz) / rate_hz;
-                let z = Complex64::from_polar(1.0, TAU * f_hz / rate_hz);
+                let z = maths::complex::cis(TAU * f_hz / rate_hz);
                 let kept = 1.0 / (1.0 + damping * turn);
                 let drive = kept * turn * turn;
                 (drive * z / ((z - 1.0) * (z - kept) + drive * z), 0.5 * rate_hz * (z - z.inv()))

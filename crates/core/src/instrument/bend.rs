@@ -12,6 +12,7 @@
 
 use crate::instrument::model::Model;
 use crate::instrument::settings::BreathResponse;
+use crate::maths;
 
 /// Farthest that the lip bends a note, either way, cents. Players go further down than up; this is what the delay can do
 /// in every register while the same mode speaks.
@@ -71,7 +72,7 @@ pub fn lip_limit_cents(model: &Model, fingering: usize, offset_cents: f64, respo
 
 /// Speed of the clock for the bore's share of a bend, cents; 1 is the model's rate. Real-time safe.
 pub fn speed(bore_cents: f64) -> f64 {
-    (bore_cents / 1_200.0).exp2()
+    maths::exp2(bore_cents / 1_200.0)
 }
 
 #[cfg(test)]

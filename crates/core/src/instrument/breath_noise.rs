@@ -13,6 +13,7 @@ mod lanes;
 use super::control_tick::TICK;
 use super::person::Person;
 use crate::dsp::white::{UNIT, next};
+use crate::maths;
 pub(super) use lanes::NoiseLanes;
 
 /// How the jet makes noise.
@@ -90,14 +91,14 @@ pub(super) struct BreathNoise {
 impl BreathNoise {
     /// Silent, with a steady jet, at a sample rate in Hz.
     pub fn new(rate_hz: f64) -> Self {
-        let corner = |hz: f64| 1.0 - (-std::f64::consts::TAU * hz / rate_hz).exp();
+        let corner = |hz: f64| 1.0 - maths::exp(-std::f64::consts::TAU * hz / rate_hz);
         Self {
             jet: Jet::Steady,
             corners: [STEADY_BAND_HZ, PULSED_BAND_HZ].map(|(low, high)| (corner(low), corner(high))),
-            mean_share: 1.0 - (-(TICK as f64) / (MEAN_S * rate_hz)).exp(),
+            mean_share: 1.0 - maths::exp(-(TICK as f64) / (MEAN_S * rate_hz)),
             strength: 0.0,
             keep: 0.0,
-            pulsed_keep: (-1.0 / (BREAK_UP_S * rate_hz)).exp(),
+            pulsed_keep: maths::exp(-1.0 / (BREAK_UP_S * rate_hz)),
             built: 0.0,
             mean: 0.0,
             rest: 0.0,

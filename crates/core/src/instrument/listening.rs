@@ -20,6 +20,7 @@ use num_complex::Complex64;
 use crate::bore::instrument_file::MAX_HOLES;
 use crate::bore::radiation::BELL_CORNER;
 use crate::bore::sound_sources::SoundSources;
+use crate::maths;
 use crate::units::Air;
 
 /// Most sources of an instrument: holes and bell.
@@ -132,9 +133,9 @@ impl Listening {
     pub fn position(&self, side: f64, sources: &SoundSources, air: &Air) -> Paths {
         let angle = (f64::from(self.angle_deg) + 0.5 * side * f64::from(self.width_deg)).to_radians();
         let distance_m = f64::from(self.distance_m);
-        let ear = [distance_m * angle.cos(), distance_m * angle.sin(), f64::from(self.height_m)];
+        let ear = [distance_m * maths::cos(angle), distance_m * maths::sin(angle), f64::from(self.height_m)];
         // From the reed to the bell: forward and down.
-        let axis = [HELD_RAD.sin(), 0.0, -HELD_RAD.cos()];
+        let axis = [maths::sin(HELD_RAD), 0.0, -maths::cos(HELD_RAD)];
         let length_m = sources.length_m();
         let to_ear = |place_m: f64| {
             let along = place_m - 0.5 * length_m;
@@ -152,7 +153,7 @@ impl Listening {
             *path = Path { delay_s, gain: middle_m / far_m };
         }
         let (_, cosine) = to_ear(length_m);
-        let (b, a) = bell(cosine.acos());
+        let (b, a) = bell(maths::acos(cosine));
         let unit_s = sources.bell_radius_m / air.c;
         Paths { paths, bell_s: (b * unit_s, a * unit_s) }
     }
@@ -177,7 +178,7 @@ impl Paths {
             .enumerate()
             .map(|(source, (flow, path))| {
                 let sent = if source == last { flow * bell } else { *flow };
-                sent * path.gain * (-s * path.delay_s).exp()
+                sent * path.gain * maths::complex::exp(-s * path.delay_s)
             })
             .sum()
     }

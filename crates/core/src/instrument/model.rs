@@ -14,6 +14,7 @@ use crate::instrument::concert_pitch::A4_HZ;
 use crate::instrument::key_pitches::KeyPitches;
 use crate::instrument::player::dynamics::PlayerModel;
 use crate::instrument::tuning_table::TuningTable;
+use crate::maths;
 use crate::reed::PhysicalReed;
 use crate::reed::physical::{P_REF_PA, REFERENCE_VOLUME_M3};
 use crate::units::{Air, SoundingNote};
@@ -185,6 +186,6 @@ impl Model {
     pub fn rows_for_cents(&self, fingering: usize, cents: f64) -> f64 {
         let quarter_waves = f64::from(2 * self.registers[fingering] - 1);
         let quarter_rows = quarter_waves * self.coeffs.rate_hz / (4.0 * self.notes_hz[fingering]);
-        2.0 * quarter_rows * ((-cents / 1_200.0).exp2() - 1.0)
+        2.0 * quarter_rows * (maths::exp2(-cents / 1_200.0) - 1.0)
     }
 }

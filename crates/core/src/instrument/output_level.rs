@@ -3,6 +3,7 @@
 use crate::dsp::glide::Glide;
 use crate::instrument::channels::Channels;
 use crate::instrument::settings::Settings;
+use crate::maths;
 use crate::units::REFERENCE_RADIUS_M;
 
 /// Full scale per pascal at 1 m from a B flat clarinet: 1 Pa is -6 dBFS. A larger instrument is heard from further away,
@@ -104,7 +105,7 @@ impl OutputLevel {
 }
 
 fn gain(settings: &Settings, full_scale_per_pa: f64) -> f32 {
-    (full_scale_per_pa * 10.0_f64.powf(f64::from(settings.gain_db) / 20.0)) as f32
+    (full_scale_per_pa * maths::pow(10.0, f64::from(settings.gain_db) / 20.0)) as f32
 }
 
 #[cfg(test)]

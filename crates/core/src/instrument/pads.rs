@@ -10,6 +10,7 @@
 use std::f64::consts::PI;
 
 use crate::bore::lattice::{Lattice, LatticeCoeffs, Real};
+use crate::maths;
 
 /// Way of a pad over the radius of its hole: 2 to 3 mm, as repairers set it.
 const LIFT: f64 = 0.6;
@@ -55,7 +56,7 @@ impl Pads {
         Self {
             amount: 0.0,
             holes: pads.collect(),
-            share: 1.0 - (-1.0 / (SOFT_S * coeffs.rate_hz)).exp(),
+            share: 1.0 - maths::exp(-1.0 / (SOFT_S * coeffs.rate_hz)),
             busy: false,
         }
     }

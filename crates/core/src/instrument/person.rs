@@ -2,6 +2,7 @@
 //!
 //! The first one is as every lone player is. The others follow from their number alone, so that every render repeats.
 
+use crate::maths;
 use std::f64::consts::PI;
 
 /// Numbers that no simple ratio joins, so that multiples of them spread evenly over a turn: the golden ratio less 1, and the
@@ -55,7 +56,7 @@ impl Person {
         }
         // Half steps between the middle and the seat, of count - 1 between the middle and an end.
         let half_steps = if count.is_multiple_of(2) { number / 2 * 2 + 1 } else { number.div_ceil(2) * 2 };
-        let out = (0.5 * PI * half_steps as f64 / (count - 1) as f64).sin() as f32 * width;
+        let out = maths::sin(0.5 * PI * half_steps as f64 / (count - 1) as f64) as f32 * width;
         if number % 2 == 1 { out } else { -out }
     }
 }

@@ -8,6 +8,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::instrument::player::dynamics::{NODE_DYNAMICS, NODES};
+use crate::maths;
 
 /// The onset lies at least this far below the pressures of a note: some notes' first dynamics.
 const LEAST_EXCESS: f64 = 2e-3;
@@ -48,6 +49,11 @@ fn segment(dynamic: f64) -> (usize, f64) {
     (right - 1, (dynamic - from) / (to - from))
 }
 
+/// What lies `way`, 0..=1, between two levels in logarithms. Half the work of a power.
+fn between(low: f64, high: f64, way: f64) -> f64 {
+    low * maths::exp(way * maths::ln(high / low))
+}
+
 impl PlayedNote {
     /// From mouth pressures, amplitudes and trims; the onset follows from the two lowest pressures, as where a line through
     /// them and the squares of their amplitudes meets zero.
@@ -67,7 +73,7 @@ impl PlayedNote {
         let (left, way) = segment(dynamic);
         let [low, high] =
             [self.gammas[left], self.gammas[left + 1]].map(|gamma| (gamma - self.onset).max(1e-6));
-        self.onset + low * (high / low).powf(way)
+        self.onset + between(low, high, way)
     }
 
     /// Amplitude of the steady note at a dynamic, rms of the pressure in the mouthpiece over the closing pressure. Real-time
@@ -76,7 +82,7 @@ impl PlayedNote {
         let (left, way) = segment(dynamic);
         let [low, high] =
             [self.amplitudes[left], self.amplitudes[left + 1]].map(|amplitude| amplitude.max(1e-6));
-        low * (high / low).powf(way)
+        between(low, high, way)
     }
 
     /// Trim at a dynamic, rows. Real-time safe.

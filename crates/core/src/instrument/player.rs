@@ -48,6 +48,7 @@ use crate::instrument::model::Model;
 use crate::instrument::person::Person;
 use crate::instrument::settings::{BreathResponse, Settings};
 use crate::instrument::voice::{Drive, TICK, Voice};
+use crate::maths;
 use crate::reed::physical::P_REF_PA;
 use crate::units::{SoundingNote, cents};
 pub use attack::Attack;
@@ -89,7 +90,7 @@ struct TickContext<'a> {
 
 /// Share of the way that a first-order lag with the time constant `time_s` covers in `tick_s`, 0..1.
 fn step_towards(tick_s: f64, time_s: f64) -> f64 {
-    1.0 - (-tick_s / time_s).exp()
+    1.0 - maths::exp(-tick_s / time_s)
 }
 
 /// Mean square of what was heard in the last tick, Pa^2; of two channels the mean.

@@ -9,6 +9,7 @@ use std::f64::consts::TAU;
 
 use crate::bore::sound_sources::SoundSources;
 use crate::instrument::player::fitted;
+use crate::maths;
 use crate::units::REFERENCE_LENGTH_M;
 
 /// A shelf and a bell.
@@ -55,7 +56,7 @@ impl Presence {
 
     /// Gain at a frequency, dB.
     pub fn gain_db(&self, f_hz: f64) -> f64 {
-        let db = |above: f64, below: f64| 10.0 * (above / below).log10();
+        let db = |above: f64, below: f64| 10.0 * maths::log10(above / below);
         let (u, root) = (f_hz / self.shelf_hz, root_gain(self.shelf_db));
         let shelf_db = db(1.0 + (u * root).powi(2), 1.0 + (u / root).powi(2));
         let (u, root) = (f_hz / self.bell_hz, root_gain(self.bell_db));
@@ -71,7 +72,7 @@ impl Presence {
 
     /// The bell at a sample rate, Hz: that of Robert Bristow-Johnson, *Cookbook formulae for audio EQ biquad filter coefficients*.
     pub fn bell(&self, rate_hz: f64) -> Section {
-        let turn = (0.5 * TAU * (self.bell_hz / rate_hz).min(0.49)).tan().recip();
+        let turn = maths::tan(0.5 * TAU * (self.bell_hz / rate_hz).min(0.49)).recip();
         let (square, width, root) = (turn * turn, turn / self.bell_quality, root_gain(self.bell_db));
         let (wide, narrow) = (width * root, width / root);
         let scale = square + narrow + 1.0;
@@ -84,7 +85,7 @@ impl Presence {
 
 /// The square root of a gain in dB, as a factor.
 fn root_gain(gain_db: f64) -> f64 {
-    10.0_f64.powf(gain_db / 40.0)
+    maths::pow(10.0, gain_db / 40.0)
 }
 
 #[cfg(test)]

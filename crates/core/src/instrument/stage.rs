@@ -7,6 +7,7 @@
 //! Left out: the time that sound takes longer to the farther of the two places.
 
 use crate::instrument::listening::{Listening, ListeningMode};
+use crate::maths;
 
 /// Radius of the arc, m: chairs of a quintet around its stands (by judgement).
 const ARC_M: f64 = 2.0;
@@ -23,7 +24,7 @@ pub struct Chair {
 impl Chair {
     /// Of a place between left (-1) and right (1), see [`Person::seat`](super::person::Person::seat).
     pub fn new(seat: f32) -> Self {
-        Self { along_rad: f64::from(seat.clamp(-1.0, 1.0)).asin() }
+        Self { along_rad: maths::asin(f64::from(seat.clamp(-1.0, 1.0))) }
     }
 
     /// Distance, m, and angle, rad, of the left (`side` -1), right (1) or middle (0) place from here, as [`Listening`] has them.
@@ -31,10 +32,10 @@ impl Chair {
         let angle =
             (f64::from(listening.angle_deg) + 0.5 * side * f64::from(listening.width_deg)).to_radians();
         let distance_m = f64::from(listening.distance_m);
-        let (sine, cosine) = self.along_rad.sin_cos();
-        let forward = distance_m * angle.cos() - ARC_M * (1.0 - cosine);
-        let across = distance_m * angle.sin() - ARC_M * sine;
-        (forward.hypot(across).max(NEAREST_M), across.atan2(forward) + self.along_rad)
+        let (sine, cosine) = maths::sin_cos(self.along_rad);
+        let forward = distance_m * maths::cos(angle) - ARC_M * (1.0 - cosine);
+        let across = distance_m * maths::sin(angle) - ARC_M * sine;
+        (maths::hypot(forward, across).max(NEAREST_M), maths::atan2(across, forward) + self.along_rad)
     }
 
     /// The same way of listening as this player needs it. Real-time safe.
@@ -65,8 +66,8 @@ impl Chair {
 
 /// The same angle in -pi..=pi.
 fn wrapped(angle_rad: f64) -> f64 {
-    let (sine, cosine) = angle_rad.sin_cos();
-    sine.atan2(cosine)
+    let (sine, cosine) = maths::sin_cos(angle_rad);
+    maths::atan2(sine, cosine)
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ use crate::dsp::limiter::Limiter;
 use crate::event::{Event, Timed};
 use crate::instrument::Settings;
 use crate::instrument::room::{Room, RoomSound};
+use crate::maths;
 
 /// Time that a change of the pan takes, s.
 const PAN_S: f64 = 0.010;
@@ -175,7 +176,7 @@ pub(super) fn gains(position: f32) -> [f32; 2] {
         // Exactly, so that the middle leaves every bit as it is.
         return [1.0; 2];
     }
-    let (right, left) = (FRAC_PI_4 * (1.0 + position)).sin_cos();
+    let (right, left) = maths::single::sin_cos(FRAC_PI_4 * (1.0 + position));
     [SQRT_2 * left, SQRT_2 * right]
 }
 

@@ -16,6 +16,8 @@
 //!
 //! Pressures over the reference closing pressure P, flows over P / Zc, impedances over Zc.
 
+use crate::maths;
+
 /// A resonance of the vocal tract.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TractResonance {
@@ -51,7 +53,7 @@ impl TractCoeffs {
     /// A resonance at `rate_hz`. Real-time safe.
     pub fn new(resonance: TractResonance, rate_hz: f64) -> Self {
         let TractResonance { hz, q, peak } = resonance;
-        let turn = (std::f64::consts::PI * (hz / rate_hz).clamp(1e-6, HIGHEST)).tan();
+        let turn = maths::tan(std::f64::consts::PI * (hz / rate_hz).clamp(1e-6, HIGHEST));
         let loss = turn / q.max(0.1);
         let share = 1.0 / (1.0 + loss + turn * turn);
         let squared = peak.max(0.0) * loss;

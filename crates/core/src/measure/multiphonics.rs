@@ -11,6 +11,7 @@ use serde::Deserialize;
 use crate::analysis::spectrum::power_spectrum_db;
 use crate::event::{Event, Timed};
 use crate::instrument::{Clarinet, Model, Settings};
+use crate::maths;
 use crate::units::SoundingNote;
 
 /// How far below the strongest partial another one counts, dB.
@@ -86,7 +87,7 @@ pub fn play(model: &Arc<Model>, held: SoundingNote, open: u64, breaths: &[f32]) 
             let sound: Vec<f64> = block[PLAYED - LOOKED_AT..].iter().map(|&x| f64::from(x)).collect();
             let (early, late) = sound.split_at(LOOKED_AT / 2);
             let power = |part: &[f64]| part.iter().map(|x| x * x).sum::<f64>();
-            let steady = (10.0 * (power(early) / power(late)).log10()).abs() < 1.0;
+            let steady = (10.0 * maths::log10(power(early) / power(late))).abs() < 1.0;
             if steady { strong_partials(&sound) } else { Vec::new() }
         })
         .collect()

@@ -10,6 +10,7 @@ use crate::bore::instrument_file::{Fingering, InstrumentFile};
 use crate::bore::sound_sources::SoundSources;
 use crate::bore::transfer_matrix::TransferMatrix;
 use crate::instrument::listening::Paths;
+use crate::maths;
 use crate::units::Air;
 
 /// Bands, as third octaves from 1 kHz: 100 Hz to 10 kHz.
@@ -53,12 +54,12 @@ impl<'a> RadiatedBands<'a> {
     /// of two the mean power counts. Allocates.
     pub fn of(&self, fingering: &Fingering, paths: &[Paths]) -> Vec<RadiatedBand> {
         let lowest_hz = self.lowest_hz(fingering);
-        let centres = BANDS.map(|band| 1_000.0 * (f64::from(band) / 3.0).exp2());
+        let centres = BANDS.map(|band| 1_000.0 * maths::exp2(f64::from(band) / 3.0));
         centres
-            .filter(|centre_hz| centre_hz * (1.0_f64 / 6.0).exp2() > lowest_hz)
+            .filter(|centre_hz| centre_hz * maths::exp2(1.0_f64 / 6.0) > lowest_hz)
             .map(|centre_hz| {
                 let part = |line: u32| (f64::from(line) + 0.5) / f64::from(LINES) - 0.5;
-                let at_hz = (0..LINES).map(|line| centre_hz * (part(line) / 3.0).exp2());
+                let at_hz = (0..LINES).map(|line| centre_hz * maths::exp2(part(line) / 3.0));
                 self.levels(fingering, centre_hz, at_hz, paths)
             })
             .collect()
@@ -92,7 +93,7 @@ impl<'a> RadiatedBands<'a> {
             let powers: f64 = paths.iter().map(|paths| paths.heard(f_hz, &flows).norm_sqr()).sum();
             heard += powers / paths.len() as f64;
         }
-        let over_point = |power: f64| 10.0 * (power / point).log10();
+        let over_point = |power: f64| 10.0 * maths::log10(power / point);
         RadiatedBand { centre_hz, average_db: over_point(average), heard_db: over_point(heard) }
     }
 }

@@ -1,5 +1,6 @@
 //! A shelf of first order: what a microphone at one place may add to what the instrument sends everywhere.
 
+use crate::maths;
 use std::f64::consts::PI;
 
 /// A filter that leaves lows as they are and lifts highs.
@@ -24,7 +25,7 @@ pub struct Shelf {
 impl Shelf {
     /// Filters samples at `rate_hz`, from rest.
     pub fn apply(&self, samples: &mut [f64], rate_hz: f64) {
-        let root = 10.0_f64.powf(self.lift_db / 40.0);
+        let root = maths::pow(10.0, self.lift_db / 40.0);
         let turn = rate_hz / (PI * self.middle_hz);
         let (zero, pole) = (turn * root, turn / root);
         let scale = 1.0 / (1.0 + pole);

@@ -15,6 +15,7 @@
 //! | X, the same at zero flow | `x` |
 //! | kappa, 1 over the admittance the reed blows into | `kappa` |
 
+use crate::maths;
 use crate::reed::law::{K_INIT, ReedLaw};
 use crate::reed::tables::{LAST, ReedTables};
 
@@ -128,8 +129,8 @@ fn closing_root(opening: f64, closing: f64, size: f64) -> f64 {
     let third = (opening / closing + 3.0 * shift * shift) / 3.0;
     let constant = size / closing - shift * (2.0 * shift * shift + opening / closing);
     let radius = third.sqrt();
-    let angle = (-0.5 * constant / (third * radius)).clamp(-1.0, 1.0).acos() / 3.0;
-    let root = shift + 2.0 * radius * (angle - std::f64::consts::TAU / 3.0).cos();
+    let angle = maths::acos((-0.5 * constant / (third * radius)).clamp(-1.0, 1.0)) / 3.0;
+    let root = shift + 2.0 * radius * maths::cos(angle - std::f64::consts::TAU / 3.0);
     root * root
 }
 

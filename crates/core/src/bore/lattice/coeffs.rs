@@ -8,6 +8,7 @@ use crate::bore::cells::Cells;
 use crate::bore::radiation;
 use crate::bore::tone_hole::{HoleCoeffs, HoleNetwork};
 use crate::bore::wall_loss;
+use crate::maths;
 use crate::units::Air;
 
 /// Chunks of eight lanes that so many tone holes take: two neighbours never share one, unless there is only one hole.
@@ -116,7 +117,7 @@ impl LatticeCoeffs {
     /// `|R|^2` falling to 1/2 is the cut-off of the tone-hole lattice when `hole` is the first open one.
     pub fn reflectance_below(&self, f_hz: f64, opening: &[f64], hole: usize) -> Complex64 {
         let junction = self.hole_junctions[hole];
-        let z1 = Complex64::from_polar(1.0, -std::f64::consts::TAU * f_hz / self.rate_hz);
+        let z1 = maths::complex::cis(-std::f64::consts::TAU * f_hz / self.rate_hz);
         let r = self.looking_down(junction + 1, f_hz, opening, 0.0);
         let below = self.admittance[junction + 1] * (1.0 - r) / (1.0 + r);
         let y = below + self.holes[hole].admittance(z1, opening[hole]);
@@ -125,8 +126,8 @@ impl LatticeCoeffs {
 
     /// Reflectance at the upper end of cell `top` of all that lies below.
     fn looking_down(&self, top: usize, f_hz: f64, opening: &[f64], tuning_rows: f64) -> Complex64 {
-        let z1 = Complex64::from_polar(1.0, -std::f64::consts::TAU * f_hz / self.rate_hz);
-        let half = Complex64::from_polar(1.0, -std::f64::consts::PI * f_hz / self.rate_hz);
+        let z1 = maths::complex::cis(-std::f64::consts::TAU * f_hz / self.rate_hz);
+        let half = maths::complex::cis(-std::f64::consts::PI * f_hz / self.rate_hz);
         let filters: [Complex64; 3] = std::array::from_fn(|pole| {
             let q = self.loss.get(pole).map_or(0.0, |loss| loss.1);
             q / (1.0 - (1.0 - q) * z1)

@@ -5,6 +5,7 @@
 //! or reverse sweep). In the words of `coeffs`: cell of admittance Y with round trip T = E P^2 (E the delay, P = 1 -
 //! A (1 - F) its loss, F the pole's low-pass), load y: rho = (Y - y) / (Y + y), r = rho T, and Y (1 - r) / (1 + r) above.
 
+use crate::maths;
 use num_complex::Complex64;
 
 use super::coeffs::LatticeCoeffs;
@@ -75,7 +76,7 @@ pub struct Sweep {
 impl<'a> AtFrequency<'a> {
     /// A lattice at `f_hz`.
     pub fn new(coeffs: &'a LatticeCoeffs, f_hz: f64) -> Self {
-        let z1 = Complex64::from_polar(1.0, -std::f64::consts::TAU * f_hz / coeffs.rate_hz);
+        let z1 = maths::complex::cis(-std::f64::consts::TAU * f_hz / coeffs.rate_hz);
         let low_pass = std::array::from_fn(|pole| {
             let q = coeffs.loss.get(pole).map_or(0.0, |loss| loss.1);
             let below = 1.0 - (1.0 - q) * z1;
@@ -83,7 +84,7 @@ impl<'a> AtFrequency<'a> {
         });
         let trip = |(cell, &ticks): (usize, &u32)| {
             let turn = -std::f64::consts::TAU * f_hz / coeffs.rate_hz * f64::from(ticks);
-            (Complex64::from_polar(1.0, turn), 1.0 - coeffs.loss[cell].0 * (1.0 - low_pass[cell % 3].0))
+            (maths::complex::cis(turn), 1.0 - coeffs.loss[cell].0 * (1.0 - low_pass[cell % 3].0))
         };
         Self {
             coeffs,
@@ -149,7 +150,7 @@ impl<'a> AtFrequency<'a> {
 
 /// Admittance of each hole of a lattice at `f_hz`, closed and open, over the reference.
 pub fn hole_admittances(coeffs: &LatticeCoeffs, f_hz: f64) -> Vec<[Complex64; 2]> {
-    let z1 = Complex64::from_polar(1.0, -std::f64::consts::TAU * f_hz / coeffs.rate_hz);
+    let z1 = maths::complex::cis(-std::f64::consts::TAU * f_hz / coeffs.rate_hz);
     coeffs.holes.iter().map(|hole| [0.0, 1.0].map(|opening| hole.admittance(z1, opening))).collect()
 }
 

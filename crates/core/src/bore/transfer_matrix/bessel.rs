@@ -1,5 +1,6 @@
 //! The ratio of Bessel functions of which boundary layers in tubes are made.
 
+use crate::maths;
 use num_complex::Complex64;
 
 use super::J;
@@ -17,7 +18,7 @@ pub fn bessel_ratio(z: Complex64) -> Complex64 {
     if z.im > 0.0 {
         return bessel_ratio(z.conj()).conj();
     }
-    if z.norm() < CROSSOVER { ratio_by_fraction(z) } else { ratio_by_expansion(z) }
+    if maths::complex::norm(z) < CROSSOVER { ratio_by_fraction(z) } else { ratio_by_expansion(z) }
 }
 
 fn ratio_by_fraction(z: Complex64) -> Complex64 {
@@ -63,7 +64,7 @@ fn ratio_by_expansion(z: Complex64) -> Complex64 {
     };
     let ((plus_0, minus_0), (plus_1, minus_1)) = (sums(0.0), sums(1.0));
     // exp(-2j(z - pi/4)), at most 1 in this quadrant.
-    let other = J * (-2.0 * J * z).exp();
+    let other = J * maths::complex::exp(-2.0 * J * z);
     J * (other * minus_1 - plus_1) / (plus_0 + other * minus_0)
 }
 

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use num_complex::Complex64;
 
 use super::TransferMatrix;
+use crate::maths;
 use crate::parallel;
 
 /// Where peaks are looked for, Hz, and the grid of the search: a third of the narrowest resonance of a clarinet.
@@ -85,14 +86,14 @@ impl TransferMatrix {
                     }
                 }
                 let found = 0.5 * (low + high);
-                let distance = |f_hz: f64| (f_hz / near_hz).log2().abs();
+                let distance = |f_hz: f64| maths::log2(f_hz / near_hz).abs();
                 if best.is_none_or(|best| distance(found) < distance(best)) {
                     best = Some(found);
                 }
             }
             before = Some((f_hz, im));
         }
-        let f_hz = best.filter(|best| (best / near_hz).log2().abs() <= 1.0)?;
+        let f_hz = best.filter(|best| maths::log2(best / near_hz).abs() <= 1.0)?;
         Some((f_hz, self.loaded(&self.at(f_hz), open, reed_volume_m3).re))
     }
 }
@@ -116,14 +117,18 @@ fn maxima(scan: impl Fn(f64) -> Complex64, fine: impl Fn(f64) -> Complex64, coun
             break;
         }
         let f_hz = lowest + step * k as f64;
-        let here = scan(f_hz).norm();
+        let here = maths::complex::norm(scan(f_hz));
         let [before, middle] = last_two;
         if middle > before && middle >= here {
-            let f_hz = golden(|f_hz| fine(f_hz).norm(), f_hz - 2.0 * step, f_hz);
+            let f_hz = golden(|f_hz| maths::complex::norm(fine(f_hz)), f_hz - 2.0 * step, f_hz);
             // Wide enough for the rounding of the phase, narrow against any resonance.
             let h = 0.01;
-            let turn = (fine(f_hz + h) / fine(f_hz - h)).arg();
-            peaks.push(Peak { f_hz, mag_over_zc: fine(f_hz).norm(), q: -0.5 * f_hz * turn / (2.0 * h) });
+            let turn = maths::complex::arg(fine(f_hz + h) / fine(f_hz - h));
+            peaks.push(Peak {
+                f_hz,
+                mag_over_zc: maths::complex::norm(fine(f_hz)),
+                q: -0.5 * f_hz * turn / (2.0 * h),
+            });
         }
         last_two = [middle, here];
     }

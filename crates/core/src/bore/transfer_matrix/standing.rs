@@ -4,6 +4,7 @@
 //! after every element instead of at the end only. Linear, one frequency; what is below the open holes is what the
 //! lattice of holes lets through.
 
+use crate::maths;
 use num_complex::Complex64;
 
 use super::{J, Losses, Matrix, Piece, TransferMatrix, losses};
@@ -21,7 +22,7 @@ impl TransferMatrix {
             self.radii_m.iter().map(|&radius_m| losses(omega, radius_m, &self.air)).collect();
         let (mut pressure, mut flow) = (at.bell, Complex64::ONE);
         let mut above_bell_m = 0.0;
-        let mut found = vec![(above_bell_m, pressure.norm())];
+        let mut found = vec![(above_bell_m, maths::complex::norm(pressure))];
         for span in (0..self.spans.len()).rev() {
             let series = |hole: Option<usize>| {
                 let mass = hole.and_then(|hole| self.holes.get(hole)).map_or(0.0, |hole| hole.series_mass);
@@ -35,7 +36,7 @@ impl TransferMatrix {
                 };
                 (pressure, flow) = matrix.apply(pressure, flow);
                 above_bell_m += length_m;
-                found.push((above_bell_m, pressure.norm()));
+                found.push((above_bell_m, maths::complex::norm(pressure)));
             }
             if let Some(hole) = span.checked_sub(1) {
                 (pressure, flow) = series(Some(hole)).apply(pressure, flow);
@@ -43,7 +44,7 @@ impl TransferMatrix {
                 flow += pressure * at.shunts[hole][usize::from(is_open)];
             }
         }
-        let tip = pressure.norm().max(f64::MIN_POSITIVE);
+        let tip = maths::complex::norm(pressure).max(f64::MIN_POSITIVE);
         found.iter().rev().map(|&(up_m, magnitude)| (above_bell_m - up_m, magnitude / tip)).collect()
     }
 }

@@ -5,6 +5,7 @@
 //! steps of 0.1 degrees and a hand whose tremor moves it by half a degree.
 
 use crate::control::knob::{KnobDesign, TRAVEL_DEG};
+use crate::maths;
 
 /// How long *Rest* listens, s.
 pub const REST_S: f64 = 1.0;
@@ -191,7 +192,7 @@ impl Collecting {
         self.squares += off * (angle_deg - self.mean_deg);
         self.least_deg = self.least_deg.min(angle_deg);
         self.greatest_deg = self.greatest_deg.max(angle_deg);
-        let lag = 1.0 - (-(t_s - self.held_at_s).max(0.0) / HELD_S).exp();
+        let lag = 1.0 - maths::exp(-(t_s - self.held_at_s).max(0.0) / HELD_S);
         self.held_deg += lag * (angle_deg - self.held_deg);
         self.held_at_s = t_s;
         self.furthest_held_deg = self.furthest_held_deg.max(self.held_deg);

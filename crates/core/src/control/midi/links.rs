@@ -5,6 +5,7 @@
 //! value, to which it goes back when that is changed or the link is taken away: whoever moved last is heard.
 
 use crate::event::{Event, SettingNumber};
+use crate::maths;
 
 /// Links that one player can have.
 pub const MOST: usize = 24;
@@ -66,7 +67,7 @@ impl Link {
     /// ```
     pub fn value(&self, raw: u8) -> f32 {
         let unit = f32::from(raw.min(127)) / 127.0;
-        let way = if self.curve == 1.0 { unit } else { unit.powf(self.curve) };
+        let way = if self.curve == 1.0 { unit } else { maths::single::pow(unit, self.curve) };
         self.low + (self.high - self.low) * way
     }
 

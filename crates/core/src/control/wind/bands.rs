@@ -1,6 +1,8 @@
 //! The powers of a microphone's signal: of all above 40 Hz, of what is below 500 Hz and below 90 Hz; and the signal at a slow
 //! rate, in which a period is looked for.
 
+use crate::maths;
+
 /// Rate at which a period is looked for, Hz.
 pub const SLOW_HZ: f64 = 8_000.0;
 /// The slow signal's flattening: the difference lifts high frequencies by 6 dB an octave, because the slope of wind noise would look
@@ -20,7 +22,7 @@ impl FilterCoeffs {
     /// Low or high pass of Butterworth.
     fn new(is_high: bool, corner_hz: f64, rate_hz: f64) -> Self {
         let w = std::f64::consts::TAU * (corner_hz / rate_hz).min(0.45);
-        let (cos, alpha) = (w.cos(), w.sin() * std::f64::consts::FRAC_1_SQRT_2);
+        let (cos, alpha) = (maths::cos(w), maths::sin(w) * std::f64::consts::FRAC_1_SQRT_2);
         let a0 = 1.0 + alpha;
         let edge = 0.5 * if is_high { 1.0 + cos } else { 1.0 - cos };
         let middle = if is_high { -2.0 * edge } else { 2.0 * edge };

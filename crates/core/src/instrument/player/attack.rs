@@ -5,6 +5,7 @@
 //! at once: the air column alone makes its growth.
 
 use crate::dsp::smooth::smooth;
+use crate::maths;
 
 /// How a tongued note begins where the breath is [played](crate::instrument::BreathResponse::Played).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -47,7 +48,7 @@ impl Onset {
 
     /// The dynamic to play now where `dynamic`, 0..=1, is asked for. Real-time safe.
     pub fn shaped(&self, attack: Attack, dynamic: f64) -> f64 {
-        let tail = |time_s: f64| (-self.since_s / time_s).exp();
+        let tail = |time_s: f64| maths::exp(-self.since_s / time_s);
         let left = |time_s: f64| smooth(1.0 - self.since_s / time_s);
         match attack {
             Attack::Normal => dynamic,

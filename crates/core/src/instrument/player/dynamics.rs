@@ -24,6 +24,7 @@
 //! fits the numbers to recorded notes; `docs/tone.md` tells how and what they bought.
 
 use crate::dsp::smooth::smooth;
+use crate::maths;
 use crate::reed::ReedLaw;
 use crate::reed::physical::ZETA_REFERENCE;
 
@@ -100,7 +101,7 @@ impl PlayerModel {
 
     /// Place of a note: -1 at the lowest note of its instrument, 1 three octaves and a fifth above.
     pub fn place(note_hz: f64, lowest_hz: f64) -> f64 {
-        ((note_hz / lowest_hz).log2() / HALF_COMPASS_OCTAVES - 1.0).clamp(-FARTHEST, FARTHEST)
+        (maths::log2(note_hz / lowest_hz) / HALF_COMPASS_OCTAVES - 1.0).clamp(-FARTHEST, FARTHEST)
     }
 
     /// Mouth over closing pressure at dynamic 1.
@@ -125,13 +126,13 @@ impl PlayerModel {
         let away = (place - middle) / width;
         let (lowest, highest) = ZETAS;
         PlacedRule {
-            closing: [soft.ln(), growth.ln()],
-            zetas: [lowest.ln(), highest.ln()],
-            altissimo_zeta: self.altissimo_zeta.ln(),
-            knee: self.knee.ln(),
+            closing: [maths::ln(soft), maths::ln(growth)],
+            zetas: [maths::ln(lowest), maths::ln(highest)],
+            altissimo_zeta: maths::ln(self.altissimo_zeta),
+            knee: maths::ln(self.knee),
             at: [
                 (1.0 - on_the_way(place, ALTISSIMO)) * (slope + curvature * place) * place
-                    + throat * (-0.5 * away * away).exp()
+                    + throat * maths::exp(-0.5 * away * away)
                     + self.high * on_the_way(place, HIGH),
                 self.top * on_the_way(place, TOP),
                 zeta + zeta_slope * place,
@@ -143,17 +144,17 @@ impl PlayerModel {
 
     /// Flow strength of the reference reed under the lip.
     pub fn zeta(&self, place: f64, dynamic: f64) -> f64 {
-        self.at(place).log_zeta(dynamic).exp()
+        maths::exp(self.at(place).log_zeta(dynamic))
     }
 
     /// Closing pressure of the reference reed under the lip, over its own.
     pub fn closing(&self, place: f64, dynamic: f64) -> f64 {
-        self.at(place).log_closing(dynamic).exp()
+        maths::exp(self.at(place).log_closing(dynamic))
     }
 
     /// Half-width of the knee of the lay over the rest opening, over that of the settings, under a lip that opens the reed by this factor.
     pub fn knee_at(&self, place: f64, opening: f64) -> f64 {
-        self.at(place).log_knee(opening.ln()).exp()
+        maths::exp(self.at(place).log_knee(maths::ln(opening)))
     }
 
     /// The lip at a dynamic. Real-time safe.
@@ -201,7 +202,7 @@ impl PlacedRule {
     /// Closing pressure where the lip goes, over that here. Real-time safe.
     pub fn closing_ahead(&self, to: &AtPlace, dynamic: f64) -> f64 {
         let further = closing_at(to, dynamic) - closing_at(&self.at, dynamic);
-        if further == 0.0 { 1.0 } else { further.exp() }
+        if further == 0.0 { 1.0 } else { maths::exp(further) }
     }
 
     fn log_knee(&self, log_opening: f64) -> f64 {
@@ -214,9 +215,9 @@ impl PlacedRule {
         // Closing pressure and opening go together; the flow strength goes with the opening over the root of the pressure.
         let opening = self.log_closing(dynamic);
         LipShape {
-            opening: opening.exp(),
-            channel: (self.log_zeta(dynamic) - 0.5 * opening).exp() / ZETA_REFERENCE,
-            knee: self.log_knee(opening).exp(),
+            opening: maths::exp(opening),
+            channel: maths::exp(self.log_zeta(dynamic) - 0.5 * opening) / ZETA_REFERENCE,
+            knee: maths::exp(self.log_knee(opening)),
         }
     }
 }
@@ -228,7 +229,11 @@ impl LipShape {
             return self;
         }
         let Self { opening, channel, knee } = self;
-        Self { opening: opening.powf(way), channel: channel.powf(way), knee: knee.powf(way) }
+        Self {
+            opening: maths::pow(opening, way),
+            channel: maths::pow(channel, way),
+            knee: maths::pow(knee, way),
+        }
     }
 
     /// The law of a reed under this lip. Real-time safe.

@@ -6,6 +6,8 @@
 //! when the instrument was prepared. A steady note has no push. The ear also brings a note to its level on a reed or at a
 //! bend for which nothing was learnt.
 
+use crate::maths;
+
 /// Mouth over closing pressure for a distance of 1 neper. The amplitude grows by some 300 nepers a second and unit of mouth
 /// pressure: a distance falls to 1/e in 25 ms.
 const PUSH: f64 = 0.26;
@@ -62,8 +64,8 @@ impl Ear {
     /// Mouth over closing pressure with the push towards an amplitude, where `gamma` would hold it, for a
     /// note at this [place](super::dynamics::PlayerModel::place).
     pub fn pushed(&self, gamma: f64, amplitude: f64, place: f64) -> f64 {
-        let distance =
-            0.5 * ((amplitude * amplitude).max(SILENCE * SILENCE) / self.power.max(SILENCE * SILENCE)).ln();
+        let distance = 0.5
+            * maths::ln((amplitude * amplitude).max(SILENCE * SILENCE) / self.power.max(SILENCE * SILENCE));
         let low = ((LOW.0 - place) / (LOW.0 - LOW.1)).clamp(0.0, 1.0);
         let (push, hardest) = if self.is_gentle {
             GENTLE

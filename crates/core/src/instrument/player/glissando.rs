@@ -9,6 +9,7 @@ mod ladder;
 use super::voicing::Voiced;
 use crate::bore::fingering_finder::bits;
 use crate::instrument::model::Model;
+use crate::maths;
 use crossing::Crossing;
 
 /// A slide from note to note.
@@ -48,7 +49,7 @@ fn holes(fingering: usize, model: &Model) -> u64 {
 impl Slide {
     /// A slide of `length_s` seconds, above 0, between two fingerings.
     pub fn new(from: usize, to: usize, length_s: f64, model: &Model) -> Self {
-        let octaves = (model.notes_hz[to] / model.notes_hz[from]).log2();
+        let octaves = maths::log2(model.notes_hz[to] / model.notes_hz[from]);
         let rises = octaves > 0.0;
         let (low, high) = if rises { (from, to) } else { (to, from) };
         let crossing = Crossing::new(low, high, rises, model);

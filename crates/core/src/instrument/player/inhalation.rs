@@ -12,6 +12,7 @@ use super::step_towards;
 use crate::dsp::white::White;
 use crate::instrument::control_tick::TICK;
 use crate::instrument::slap::BREATH_GAMMA;
+use crate::maths;
 
 /// How long the player rests before breathing, s: longer than between the notes of a phrase.
 const REST_S: f64 = 0.25;
@@ -115,10 +116,10 @@ impl Inhalation {
             // One that was cut off has brought too little.
             return if rests { Phase::Full } else { Phase::Spent };
         }
-        let amplitude = left * (PI * passed_s / BREATH_S).sin().powf(POWER);
+        let amplitude = left * maths::pow(maths::sin(PI * passed_s / BREATH_S), POWER);
         let rate_hz = TICK as f64 / tick_s;
         let (low_hz, high_hz) = BAND_HZ;
-        let [low, high] = [low_hz, high_hz].map(|hz| 1.0 - (-TAU * hz / rate_hz).exp());
+        let [low, high] = [low_hz, high_hz].map(|hz| 1.0 - maths::exp(-TAU * hz / rate_hz));
         // White noise of variance 1 behind both corners has the power pi f_high^2 / (rate (f_low + f_high)).
         let unit = loudest * (rate_hz * (low_hz + high_hz) / PI).sqrt() / high_hz;
         let step = (amplitude - self.before) / TICK as f64;

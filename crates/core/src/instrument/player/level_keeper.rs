@@ -5,6 +5,7 @@
 use super::dynamics::LOWEST_ONSET;
 use super::known::Known;
 use super::step_towards;
+use crate::maths;
 
 /// Window in which the level is heard, s.
 const WINDOW_S: f64 = 0.02;
@@ -92,7 +93,7 @@ impl Range {
         };
         let low = raised(TRACT_GAMMAS.0, FINGERS_GAMMAS.0);
         let base = raised(TRACT_GAMMAS.1, FINGERS_GAMMAS.1);
-        Self { base, lowest: (low / base).ln().min(0.0), highest: (base.max(MOST) / base).ln() }
+        Self { base, lowest: maths::ln(low / base).min(0.0), highest: maths::ln(base.max(MOST) / base) }
     }
 }
 
@@ -133,13 +134,13 @@ impl LevelKeeper {
             }
         } else if self.learnt > SILENCE && self.power > SILENCE {
             let wanted = self.learnt * self.rule.1;
-            let distance = 0.5 * (wanted / self.power).ln();
+            let distance = 0.5 * maths::ln(wanted / self.power);
             self.push += lead * lags.tick_s / FOLLOW_S * distance.clamp(-1.0, 1.0);
         }
         self.push = self.push.clamp(lowest, highest);
         // The lip begins to help where the breath goes beyond its beginning.
         let lip = if highest > 0.0 { lead * (self.push / highest).clamp(0.0, 1.0) } else { 0.0 };
-        Kept { gamma: base * self.push.exp(), lip }
+        Kept { gamma: base * maths::exp(self.push), lip }
     }
 
     fn learn(&mut self, lags: &KeeperLags) {
@@ -148,7 +149,7 @@ impl LevelKeeper {
 }
 
 fn power(db: f64) -> f64 {
-    (db * (std::f64::consts::LN_10 / 10.0)).exp()
+    maths::exp(db * (std::f64::consts::LN_10 / 10.0))
 }
 
 #[cfg(test)]

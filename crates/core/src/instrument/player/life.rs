@@ -11,6 +11,7 @@
 use super::sway::{SWAY_TICKS, Sway};
 use crate::dsp::white::White;
 use crate::instrument::person::Person;
+use crate::maths;
 
 /// Corners of the processes, Hz.
 const CORNERS_HZ: [f64; 3] = [0.12, 0.8, 5.0];
@@ -42,7 +43,7 @@ pub struct LifeLags {
 impl LifeLags {
     /// For ticks of `tick_s` seconds.
     pub fn new(tick_s: f64) -> Self {
-        let share = |hz: f64| -(-std::f64::consts::TAU * hz * f64::from(SWAY_TICKS) * tick_s).exp_m1();
+        let share = |hz: f64| -maths::exp_m1(-std::f64::consts::TAU * hz * f64::from(SWAY_TICKS) * tick_s);
         let backs = CORNERS_HZ.map(share);
         let lags = |variances: [f64; 3]| {
             std::array::from_fn(|n| (backs[n], (variances[n] * backs[n] * (2.0 - backs[n])).sqrt()))

@@ -13,6 +13,7 @@ use super::dynamics::MEZZO_FORTE;
 use super::posture::CENTS_PER_SHARE;
 use super::reed_at_note::ReedAtNote;
 use crate::instrument::played_note::PlayedNote;
+use crate::maths;
 
 /// Dynamics at which the pitch is worked out, from the softest to the loudest; straight lines between.
 const DYNAMICS: [f64; 4] = [0.0, 0.4, 0.7, 1.0];
@@ -79,7 +80,7 @@ impl OtherReed {
             let (softer, louder) = ((dynamic - NEAR).max(0.0), (dynamic + NEAR).min(1.0));
             let per_neper = (note.rows(louder) - note.rows(softer))
                 / ((louder - softer) * learnt.range * learnt.rows_per_cent);
-            let sooner = SOONER * (closing * own.zeta / reference.zeta).max(LEAST_FLOW).ln();
+            let sooner = SOONER * maths::ln((closing * own.zeta / reference.zeta).max(LEAST_FLOW));
             let flat = CENTS_PER_SHARE * taken / slope + sooner * per_neper;
             (PER_CENT * flat.clamp(-MOST_CENTS, MOST_CENTS)).round() / PER_CENT
         });

@@ -17,6 +17,7 @@ use crate::instrument::lip::embouchure;
 use crate::instrument::model::Model;
 use crate::instrument::played_note::PlayedNote;
 use crate::instrument::settings::{BreathResponse, Settings, Tuning};
+use crate::maths;
 use crate::reed::physical::ZETA_REFERENCE;
 use crate::reed::{Lip, MovingReed, ReedCoeffs, ReedLaw};
 use crate::units::{Air, cents};
@@ -300,7 +301,7 @@ impl Posture {
 
 /// A reed under the lip of a dynamic. A lip that covers the reed holds it to the curve of the lay, however far it opens.
 fn shaped(free: &MovingReed, subtone: f64, lip: LipShape) -> MovingReed {
-    let knee = if subtone == 0.0 { lip.knee } else { lip.knee.powf(1.0 - subtone) };
+    let knee = if subtone == 0.0 { lip.knee } else { maths::pow(lip.knee, 1.0 - subtone) };
     MovingReed { law: lip.law(free.law), zeta: free.zeta * lip.channel, lay: free.lay * knee, ..*free }
 }
 

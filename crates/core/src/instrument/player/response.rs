@@ -14,6 +14,7 @@ use super::lip_glide::NoteLip;
 use super::posture::{PlayedBreath, Posture};
 use super::sway::Sway;
 use crate::instrument::settings::{BreathResponse, Settings};
+use crate::maths;
 use crate::reed::physical::P_REF_PA;
 
 /// Breath at which every note begins unless another is set, 0..1: the controller value 4 of 127, above what a sensor at rest sends. Breath comes in
@@ -63,7 +64,7 @@ pub struct Response {
 pub fn breath_of_dynamic(dynamic: f64, settings: &Settings) -> f64 {
     let [softest, loudest, curve] =
         [settings.breath_softest, settings.breath_loudest, settings.breath_curve].map(f64::from);
-    let above = if curve == 1.0 { dynamic } else { dynamic.powf(1.0 / curve) };
+    let above = if curve == 1.0 { dynamic } else { maths::pow(dynamic, 1.0 / curve) };
     softest + (loudest - softest) * above
 }
 
@@ -72,7 +73,7 @@ pub fn dynamic(breath: f64, settings: &Settings) -> (f64, f64) {
     let [softest, loudest, curve] =
         [settings.breath_softest, settings.breath_loudest, settings.breath_curve].map(f64::from);
     let above = ((breath - softest) / (loudest - softest)).clamp(0.0, 1.0);
-    let above = if curve == 1.0 { above } else { above.powf(curve) };
+    let above = if curve == 1.0 { above } else { maths::pow(above, curve) };
     (above, if softest > 0.0 { (breath / softest).min(1.0) } else { 1.0 })
 }
 
@@ -147,10 +148,10 @@ impl Response {
         // to a firmer lip would be loud on the way; with the old note's, one to a looser lip would.
         let ahead = posture.closing_ahead().sqrt();
         // What a change does is heard as late as everything else.
-        let amplitude = self.wanted.of((ahead * breath.amplitude).max(QUIETEST), f64::ln);
+        let amplitude = self.wanted.of((ahead * breath.amplitude).max(QUIETEST), maths::ln);
         let heard = if bodily.settles { 1.0 } else { posture.lags.ear };
         self.expected += (amplitude - self.expected) * heard;
-        let breath = PlayedBreath { gamma: ahead * breath.gamma, amplitude: self.expected.exp() };
+        let breath = PlayedBreath { gamma: ahead * breath.gamma, amplitude: maths::exp(self.expected) };
         match ear {
             _ if of_softest < 1.0 => of_softest * LOWEST_ONSET,
             Some(ear) => ear.pushed(breath.gamma, breath.amplitude, place),

@@ -13,6 +13,7 @@ use crate::event::Technique;
 use crate::instrument::person::Person;
 use crate::instrument::settings::Settings;
 use crate::instrument::techniques::GrowlPitch;
+use crate::maths;
 use flutter::Flutter;
 use growl::Growl;
 
@@ -114,7 +115,7 @@ impl Techniques {
         let voice_hz = match set.growl_pitch {
             GrowlPitch::Fixed => f64::from(set.growl_hz),
             GrowlPitch::Interval => {
-                let ratio = |semitones| (f64::from(semitones) / 12.0).exp2();
+                let ratio = |semitones| maths::exp2(f64::from(semitones) / 12.0);
                 note_hz * self.interval.of(set.growl_semitones, ratio)
             }
         };

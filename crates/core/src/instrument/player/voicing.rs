@@ -8,6 +8,7 @@ use crate::dsp::smooth::smooth;
 use crate::instrument::settings::Settings;
 use crate::instrument::techniques::Tract;
 use crate::instrument::vocal_tract::{TractCoeffs, TractResonance};
+use crate::maths;
 
 /// Time constant with which tongue and throat move, s.
 pub const MOVE_S: f64 = 0.02;
@@ -121,7 +122,8 @@ impl Voicing {
             self.octaves += (octaves - self.octaves) * share;
         }
         self.quality += (quality - self.quality) * share;
-        let (ratio, nearness) = self.ratio.of(self.octaves, |octaves| (octaves.exp2(), nearness(octaves)));
+        let (ratio, nearness) =
+            self.ratio.of(self.octaves, |octaves| (maths::exp2(octaves), nearness(octaves)));
         self.near = nearness;
         let (far, near) = PEAKS;
         let peak = self.amount * (far + (near - far) * nearness);

@@ -14,6 +14,7 @@ use crate::instrument::model::Model;
 use crate::instrument::prepare::trial_pitch::trial_pitch_hz;
 use crate::instrument::side_by_side::{self, Stand};
 use crate::instrument::tuning_table::{GAMMA_NODES, NATURAL_GAMMA, NoteTuning, TuningTable};
+use crate::maths;
 use crate::units::cents;
 
 /// A note with a larger error than this after trimming is reported as out of tune, cents.
@@ -107,7 +108,7 @@ impl Trial<'_> {
         let wanted = self.model.notes_hz[self.fingering];
         // The modes are as the odd numbers; the limit is half-way to the next higher one.
         let mode = self.model.file.fingerings[self.fingering].mode as f64;
-        let half_way = 600.0 * ((2.0 * mode + 1.0) / (2.0 * mode - 1.0)).log2();
+        let half_way = 600.0 * maths::log2((2.0 * mode + 1.0) / (2.0 * mode - 1.0));
         let note = HeldNote { rows, ..HeldNote::new(self.model, self.fingering, self.gamma) };
         let own_cents = half_way.min(OTHER_NOTE_CENTS.1);
         let hz = heard_within(self.stand, self.model, &note, wanted, own_cents).await?;

@@ -17,6 +17,7 @@ use crate::instrument::prepare::trial_pitch::trial_pitch_hz;
 use crate::instrument::side_by_side::{self, BlownBeside, Stand};
 use crate::instrument::tuning_table::{NoteTuning, TuningTable};
 use crate::instrument::voice::{Drive, TICK};
+use crate::maths;
 use crate::reed::motion::TONGUE_FORCE;
 use crate::units::cents;
 
@@ -191,9 +192,9 @@ async fn descend(
     for node in (0..NODES).rev() {
         let dynamic = NODE_DYNAMICS[node];
         if let Some(power) = loudest {
-            note.wanted = Some(power * 10.0_f64.powf(0.1 * range * model.player.level_db(dynamic)));
+            note.wanted = Some(power * maths::pow(10.0, 0.1 * range * model.player.level_db(dynamic)));
             let softer = range * (note.dynamic - dynamic);
-            let excess = SOFTER.powf(softer) * (note.held.gamma - LOWEST_ONSET).max(1e-3);
+            let excess = maths::pow(SOFTER, softer) * (note.held.gamma - LOWEST_ONSET).max(1e-3);
             note.go_to(dynamic, LOWEST_ONSET + excess).await;
         }
         let lost = if loudest.is_none() { Lost::AtLoudest } else { Lost::At(node) };
@@ -246,15 +247,15 @@ impl<'a> Diminuendo<'a> {
     async fn play(&mut self, seconds: f64, mut heard: impl FnMut(&[f32; TICK], f64, f64)) {
         let rate_hz = self.model.coeffs.rate_hz;
         let tick_s = TICK as f64 / rate_hz;
-        let share = 1.0 - (-tick_s * self.model.notes_hz[self.fingering] / PERIODS).exp();
+        let share = 1.0 - maths::exp(-tick_s * self.model.notes_hz[self.fingering] / PERIODS);
         let reed = self.held.reed(self.model);
         let closing = reed.closing_pressure();
         for _ in 0..(seconds / tick_s).round() as usize {
             let mut push = 0.0;
             if let Some(wanted) = self.wanted {
-                let distance = (0.5 * (wanted / self.power.max(1e-12)).ln()).clamp(-FARTHEST, FARTHEST);
+                let distance = (0.5 * maths::ln(wanted / self.power.max(1e-12))).clamp(-FARTHEST, FARTHEST);
                 let excess = (self.held.gamma - LOWEST_ONSET).max(1e-4);
-                let gamma = LOWEST_ONSET + excess * (RATE / self.longer * tick_s * distance).exp();
+                let gamma = LOWEST_ONSET + excess * maths::exp(RATE / self.longer * tick_s * distance);
                 self.held.gamma = gamma.min(HIGHEST);
                 push = PUSH / self.longer * distance;
             }
@@ -298,7 +299,7 @@ impl<'a> Diminuendo<'a> {
             self.play(self.longer * TRIMMED_S, |_, _, _| {}).await;
             heard = self.listen().await?;
         }
-        let off_db = self.wanted.map_or(0.0, |wanted| 10.0 * (heard.power / wanted).log10());
+        let off_db = self.wanted.map_or(0.0, |wanted| 10.0 * maths::log10(heard.power / wanted));
         (off_db.abs() < FAR_DB).then_some(heard)
     }
 

@@ -10,6 +10,7 @@ use crate::bore::instrument_file::{Fingering, InstrumentFile};
 use crate::bore::transfer_matrix::TransferMatrix;
 use crate::instrument::concert_pitch::A4_HZ;
 use crate::instrument::model::Model;
+use crate::maths;
 use crate::parallel;
 use crate::units::{Air, cents};
 
@@ -23,7 +24,7 @@ const MOST_CENTS: f64 = 300.0;
 const ROOM_CENTS: f64 = 10.0;
 
 fn factor(down_cents: f64) -> f64 {
-    (down_cents / 1_200.0).exp2()
+    maths::exp2(down_cents / 1_200.0)
 }
 
 /// Leaves out the notes with wrong names, by their offsets in cents; the others keep their order.

@@ -1,5 +1,6 @@
 //! The room at one sample rate: delays, gains and filters. Made while playing, without allocating.
 
+use crate::maths;
 use std::f64::consts::TAU;
 
 use super::Room;
@@ -39,7 +40,7 @@ impl OnePole {
             return Self { gain: low as f32, pole: 0.0 };
         }
         // (1 - p)^2 = q (1 - 2 p cos w + p^2)
-        let m = (1.0 - q * w.cos()) / (1.0 - q);
+        let m = (1.0 - q * maths::cos(w)) / (1.0 - q);
         let pole = m - (m * m - 1.0).sqrt();
         Self { gain: (low * (1.0 - pole)) as f32, pole: pole as f32 }
     }
@@ -76,7 +77,7 @@ impl RoomCoeffs {
     /// Of clamped settings. Real-time safe.
     pub fn new(room: &Room, rate_hz: f64) -> Self {
         let decay_s = f64::from(room.decay_s);
-        let bright_s = decay_s * 0.25 * 4.0_f64.powf(f64::from(room.tone));
+        let bright_s = decay_s * 0.25 * maths::pow(4.0, f64::from(room.tone));
         let w = TAU * BRIGHT_HZ.min(0.4 * rate_hz) / rate_hz;
         let box_ = Shoebox::new(room);
 
@@ -87,7 +88,7 @@ impl RoomCoeffs {
             *delay = next_prime(((length * unit_s * rate_hz) as usize).max(above));
             above = *delay + 1;
         }
-        let after = |delay: usize, decay_s: f64| 10.0_f64.powf(-3.0 * delay as f64 / (rate_hz * decay_s));
+        let after = |delay: usize, decay_s: f64| maths::pow(10.0, -3.0 * delay as f64 / (rate_hz * decay_s));
         let losses = delays.map(|delay| OnePole::new(after(delay, decay_s), after(delay, bright_s), w));
 
         let images = [box_.images(-1.0), box_.images(1.0)];

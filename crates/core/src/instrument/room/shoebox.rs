@@ -6,6 +6,7 @@
 use std::f64::consts::{LN_10, PI};
 
 use super::Room;
+use crate::maths;
 use crate::units::Air;
 
 /// Images of order 1 (6) and 2 (18).
@@ -77,7 +78,7 @@ impl Shoebox {
 
     /// Amplitude that a wall reflects where the decay is so long (Eyring).
     pub fn reflection(&self, decay_s: f64) -> f64 {
-        (-0.5 * self.absorption_m2(decay_s) / self.surface_m2()).exp()
+        maths::exp(-0.5 * self.absorption_m2(decay_s) / self.surface_m2())
     }
 
     /// Energy of all reflections over that of the direct sound: the square of the distance over the critical distance.

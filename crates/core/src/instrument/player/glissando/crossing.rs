@@ -14,6 +14,7 @@ use crate::dsp::smooth::smooth;
 use crate::instrument::model::Model;
 use crate::instrument::player::pitch_ear::PitchEar;
 use crate::instrument::player::voicing::{Voiced, bend_for_octaves, octaves_for_bend};
+use crate::maths;
 use crate::units::cents;
 
 /// The hands change at this interval above the fingering with no finger down, cents.
@@ -147,7 +148,7 @@ impl Crossing {
         let goal = f64::from(u8::from(place >= self.change));
         let time_s = if self.rises { CLOSES_S } else { OPENS_S };
         self.hands += (goal - self.hands).clamp(-tick_s / time_s, tick_s / time_s);
-        let wanted_hz = self.low_hz * (place / 1_200.0).exp2();
+        let wanted_hz = self.low_hz * maths::exp2(place / 1_200.0);
         let off = self.ear.hear(pressure, wanted_hz, period_s).unwrap_or(0.0);
         let corrected = self.correction - off * tick_s / CORRECTS_S;
         self.correction = corrected.clamp(-FARTHEST_CENTS, FARTHEST_CENTS);

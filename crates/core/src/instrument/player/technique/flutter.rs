@@ -3,6 +3,7 @@
 //! The tongue lies between lungs and reed. What it holds back gathers behind it and comes when it opens, so the mean stays:
 //! a soft note, whose growth follows the mean pressure, goes on.
 
+use crate::maths;
 use std::f64::consts::TAU;
 
 use super::wrapped;
@@ -32,6 +33,6 @@ impl Flutter {
 
     /// What the tongue adds to the mouth pressure, over that pressure.
     pub fn swing(&self) -> f64 {
-        HARDER - DEPTH * (TAU * self.phase).sin()
+        HARDER - DEPTH * maths::sin(TAU * self.phase)
     }
 }

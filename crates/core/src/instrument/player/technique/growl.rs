@@ -11,6 +11,7 @@
 //! with the volume `V` of the mouth, and the mean flow `U` through the reed. What this leaves out: that pressure in the mouth
 //! holds back the pulses themselves.
 
+use crate::maths;
 use std::f64::consts::PI;
 
 use super::wrapped;
@@ -35,9 +36,9 @@ pub struct Growl {
 /// Opening of the glottis at a share of the period, 0..=1.
 fn glottis(phase: f64) -> f64 {
     if phase < OPENS {
-        0.5 * (1.0 - (PI * phase / OPENS).cos())
+        0.5 * (1.0 - maths::cos(PI * phase / OPENS))
     } else if phase < OPENS + CLOSES {
-        (0.5 * PI * (phase - OPENS) / CLOSES).cos()
+        maths::cos(0.5 * PI * (phase - OPENS) / CLOSES)
     } else {
         0.0
     }

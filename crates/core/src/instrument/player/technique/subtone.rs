@@ -7,6 +7,7 @@
 //! It is a technique of the chalumeau. Above the break so much damping silences a note, or leaves it to a lower mode, so a player covers little of
 //! the reed there.
 
+use crate::maths;
 use crate::reed::MovingReed;
 
 /// Curve of the lay under a full subtone: the reed never quite shuts, even loud (measured: 1 takes too little of the partials
@@ -32,7 +33,7 @@ pub fn covered(reed: MovingReed, amount: f64) -> MovingReed {
         return reed;
     }
     let lay = reed.lay + amount * (LAY - reed.lay).max(0.0);
-    MovingReed { lay, damping: reed.damping * DAMPING.powf(amount), ..reed }
+    MovingReed { lay, damping: reed.damping * maths::pow(DAMPING, amount), ..reed }
 }
 
 #[cfg(test)]
