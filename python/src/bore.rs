@@ -1,10 +1,11 @@
 //! The bore in the frequency domain, what each note needs to sound, and what a hand feels of it.
 
 use crate::instrument::{Instrument, OpenHoles};
-use crate::mistakes::wrong;
+use crate::mistakes::{ended, signals, stop, wrong};
 use chalumeau::cli::offline;
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::haptics::{NoteFeel, TorqueLaw, torque_law};
+use chalumeau_core::instrument::prepare::Progress;
 use chalumeau_core::instrument::{Preparation, Wanted};
 use chalumeau_core::measure::bifurcation as ramp;
 use chalumeau_core::reed::ReedTables;
@@ -23,11 +24,6 @@ fn air(temperature_c: f64) -> PyResult<Air> {
         return Ok(Air::at(temperature_c));
     }
     Err(wrong(format_args!("temperature must lie in 10..40 °C, got {temperature_c}")))
-}
-
-/// Fails if the user wants to stop (Ctrl-C).
-fn signals() -> PyResult<()> {
-    Python::attach(|py| py.check_signals())
 }
 
 /// Z/Zc at each frequency. Ctrl-C ends it.
@@ -70,9 +66,9 @@ pub fn impedance<'py>(
         if lattice {
             // As the command: the bore as it was built, at 48 kHz.
             let wanted = Wanted::new(file.clone(), 48_000.0);
-            let model = Preparation::new(&wanted, None)
-                .as_built(&mut |_| ControlFlow::Continue(()))
-                .map_err(wrong)?;
+            let mut on =
+                |_: Progress<'_>| if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+            let model = Preparation::new(&wanted, None).as_built(&mut on).map_err(ended)?;
             let opening: Vec<f64> = open.iter().map(|&open| f64::from(u8::from(open))).collect();
             return at_each(&frequencies, |f_hz| model.coeffs.impedance(f_hz, &opening));
         }
@@ -115,7 +111,10 @@ pub fn thresholds<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let file = &instrument.file;
     let (bore, reed) = py.detach(|| offline::bore_and_reed(&pairs, file)).map_err(wrong)?;
-    let notes = py.detach(|| bore.with(&reed));
+    let notes: Vec<_> = py.detach(|| {
+        let each = 0..bore.written().len();
+        each.map(|note| signals().map(|()| bore.note(note, &reed))).collect::<PyResult<_>>()
+    })?;
     let column = |of: fn(&chalumeau_core::haptics::NoteRequirement) -> f64| {
         PyArray1::from_iter(py, notes.iter().map(move |note| note.as_ref().map_or(f64::NAN, of)))
     };
@@ -152,7 +151,7 @@ pub fn bifurcation<'py>(
         wrong(format_args!("written {} sounds outside MIDI's 0..127", WrittenNote(written)))
     })?;
     let found = py.detach(|| {
-        let job = offline::blown(&pairs, file, to).map_err(wrong)?;
+        let job = offline::blown(&pairs, file, to, Some(stop)).map_err(ended)?;
         // The ramp tells of its progress and cannot be asked to stop, so Ctrl-C unwinds it; it owns all that it changes.
         let each = |_| signals().unwrap_or_else(|error| resume_unwind(Box::new(error)));
         let play = || ramp::measure(&job.model, &job.settings, sounding, to as f32, seconds, job.rate, each);

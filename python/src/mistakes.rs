@@ -1,8 +1,9 @@
 //! Errors as Python's exceptions: the texts say what was given and what would be right.
 
 use chalumeau::parameters::PARAMETERS;
-use pyo3::PyErr;
 use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use std::cell::Cell;
 use std::fmt::Display;
 
 /// What the command line advises, and the same for Python.
@@ -19,6 +20,26 @@ const ADVICE: [(&str, &str); 3] = [
 pub fn wrong(what: impl Display) -> PyErr {
     let text = ADVICE.iter().fold(what.to_string(), |text, (of_shell, ours)| text.replace(of_shell, ours));
     PyValueError::new_err(in_another_case(&text).unwrap_or(text))
+}
+
+thread_local! {
+    /// What a signal raised while Rust code worked.
+    static RAISED: Cell<Option<PyErr>> = const { Cell::new(None) };
+}
+
+/// Fails if the user wants to stop (Ctrl-C).
+pub fn signals() -> PyResult<()> {
+    Python::attach(|py| py.check_signals())
+}
+
+/// The same for work that can only be told to stop: [`ended`] then gives what the signal raised.
+pub fn stop() -> bool {
+    signals().map_err(|raised| RAISED.set(Some(raised))).is_err()
+}
+
+/// Why work ended that was watched by [`stop`].
+pub fn ended(what: impl Display) -> PyErr {
+    RAISED.take().unwrap_or_else(|| wrong(what))
 }
 
 /// Where a name that is unknown differs from a flag by its case alone (h, H), that flag is meant.

@@ -1,7 +1,7 @@
 //! Rendering: what `chalumeau render` plays, into an array.
 
 use crate::instrument::Instrument;
-use crate::mistakes::wrong;
+use crate::mistakes::{ended, signals, stop, wrong};
 use chalumeau::cli::offline::{self, Given, TimedNote};
 use chalumeau_core::units::SoundingNote;
 use numpy::{PyArray1, PyArrayMethods};
@@ -33,7 +33,7 @@ pub fn render<'py>(
         (None, None) => None,
     };
     let played = py.detach(|| {
-        let job = offline::render_job(&pairs, file, given).map_err(wrong)?;
+        let job = offline::render_job(&pairs, file, given, Some(stop)).map_err(ended)?;
         let mut samples = Vec::with_capacity(job.score.samples * usize::from(channels));
         let mut unheard = 0;
         let resets = job.play(channels, None, |sent, heard| {
@@ -46,7 +46,7 @@ pub fn render<'py>(
             unheard += sent.len();
             if unheard >= job.rate as usize {
                 unheard = 0;
-                return Python::attach(|py| py.check_signals());
+                return signals();
             }
             Ok(())
         })?;
@@ -77,7 +77,8 @@ pub fn silent(
 ) -> PyResult<Vec<String>> {
     let given = Given::Notes(vec![timed((0.0, 0.1, note, 0.8))?]);
     let file = instrument.file.clone();
-    py.detach(|| offline::render_job(&pairs, Some(file), Some(given))).map(|job| job.warnings).map_err(wrong)
+    py.detach(|| offline::render_job(&pairs, Some(file), Some(given), Some(stop)).map_err(ended))
+        .map(|job| job.warnings)
 }
 
 fn timed((from_s, seconds, note, velocity): ListedNote) -> PyResult<TimedNote> {

@@ -1,7 +1,7 @@
 //! A clarinet that is played event by event.
 
 use crate::instrument::Instrument;
-use crate::mistakes::wrong;
+use crate::mistakes::{ended, signals, stop, wrong};
 use chalumeau::cli::offline;
 use chalumeau_core::event::Event;
 use chalumeau_core::instrument::Clarinet;
@@ -35,7 +35,7 @@ impl Voice {
     #[new]
     fn new(py: Python<'_>, pairs: Vec<(String, String)>, instrument: &Instrument) -> PyResult<Self> {
         let file = instrument.file.clone();
-        let job = py.detach(|| offline::live(&pairs, Some(file))).map_err(wrong)?;
+        let job = py.detach(|| offline::live(&pairs, Some(file), Some(stop)).map_err(ended))?;
         Ok(Self { clarinet: Mutex::new(job.clarinet()), rate_hz: job.rate })
     }
 
@@ -95,7 +95,7 @@ impl Voice {
             // Once for each second of sound: Ctrl-C ends a long rendering.
             for part in out.chunks_mut(self.rate_hz as usize) {
                 self.lock().render(part);
-                Python::attach(|py| py.check_signals())?;
+                signals()?;
             }
             Ok::<_, PyErr>(out)
         })?;

@@ -1,5 +1,6 @@
 """What is given: forms that are meant alike are taken, and what is wrong is refused."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -121,13 +122,21 @@ def test_a_script_without_main_is_told_to_have_one(tmp_path):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize(
-    "call", ["bifurcation('F3', seconds=600)", "impedance('F3', numpy.linspace(100, 2000, 2_000_000))"]
+    "call",
+    [
+        "bifurcation('F3', seconds=600)",
+        "impedance('F3', numpy.linspace(100, 2000, 2_000_000))",
+        # Prepared first, for some ten seconds.
+        "render(written='C4', seconds=0.1, instrument='examples/instruments/alto-chalumeau.toml')",
+    ],
 )
-def test_ctrl_c_stops_it(call):
+def test_ctrl_c_stops_it(call, root, tmp_path):
     # A shell that starts the tests in the background has them ignore SIGINT; Python then keeps ignoring it.
     heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
     code = f"{heard}; import chalumeau, numpy; print(1, flush=True); chalumeau.{call}"
-    running = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    nothing_kept = os.environ | {"CHALUMEAU_CACHE_DIR": str(tmp_path)}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    running = subprocess.Popen([sys.executable, "-c", code], cwd=root, env=nothing_kept, **pipes)
     try:
         running.stdout.readline()
         time.sleep(1)

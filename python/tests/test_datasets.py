@@ -71,6 +71,10 @@ def test_what_was_stopped_goes_on(tmp_path):
     with pytest.raises(ValueError, match="another plan"):
         chalumeau.dataset(PLAN.replace("0.5\nno", "0.4\nno"), tmp_path, rows_per_part=3)
     assert chalumeau.dataset(PLAN, tmp_path, rows_per_part=3).rendered == 0
+    # Nor does one whose plan nobody knows.
+    (tmp_path / datasets.PLAN).unlink()
+    with pytest.raises(ValueError, match="another plan"):
+        chalumeau.dataset(PLAN, tmp_path, rows_per_part=3)
 
 
 def test_a_lost_file_is_told(tmp_path):

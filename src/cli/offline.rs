@@ -19,7 +19,7 @@ use std::path::Path;
 pub use crate::cli::render_job::RenderJob;
 use crate::cli::score_args::ScoreArgs;
 pub use crate::cli::score_args::{Given, TimedNote};
-pub use crate::cli::shared_args::note;
+pub use crate::cli::shared_args::{Stop, note};
 
 /// Names and their values.
 pub type Pairs = [(String, String)];
@@ -56,11 +56,12 @@ fn read<A: Args>(pairs: &Pairs) -> Result<A, String> {
 }
 
 /// A rendering, as `chalumeau render` would play it. `instrument` and `given` are what the caller has in memory in place of
-/// files. Takes up to a minute for an instrument file that is new.
+/// files. Takes up to a minute for an instrument file that is new; ends with an error soon after `stop` says so.
 pub fn render_job(
     pairs: &Pairs,
     instrument: Option<InstrumentFile>,
     given: Option<Given>,
+    stop: Option<Stop>,
 ) -> Result<RenderJob, String> {
     let mut pairs = pairs.to_vec();
     if given.is_some() {
@@ -68,7 +69,7 @@ pub fn render_job(
         pairs.push(("midi".to_owned(), "given".to_owned()));
     }
     let mut args: ScoreArgs = read(&pairs)?;
-    args.instrument.instrument.given = instrument;
+    (args.instrument.instrument.given, args.instrument.instrument.stop) = (instrument, stop);
     args.given = given;
     args.prepare().map_err(|failure| failure.to_string())
 }
@@ -79,17 +80,27 @@ pub fn check(pairs: &Pairs) -> Result<(), String> {
 }
 
 /// An instrument ready to be played live, with the player's settings. Takes up to a minute for an instrument file that is
-/// new.
-pub fn live(pairs: &Pairs, instrument: Option<InstrumentFile>) -> Result<RenderJob, String> {
+/// new; ends with an error soon after `stop` says so.
+pub fn live(
+    pairs: &Pairs,
+    instrument: Option<InstrumentFile>,
+    stop: Option<Stop>,
+) -> Result<RenderJob, String> {
     let mut args: LiveArgs = read(pairs)?;
-    args.instrument.instrument.given = instrument;
+    (args.instrument.instrument.given, args.instrument.instrument.stop) = (instrument, stop);
     RenderJob::without_score(&args.instrument, &args.settings, args.rate)
         .map_err(|failure| failure.to_string())
 }
 
 /// The same for a breath that rises to `gamma`: a pressure, which full breath reaches.
-pub fn blown(pairs: &Pairs, instrument: InstrumentFile, gamma: f64) -> Result<RenderJob, String> {
-    let args: LiveArgs = read(pairs)?;
+pub fn blown(
+    pairs: &Pairs,
+    instrument: InstrumentFile,
+    gamma: f64,
+    stop: Option<Stop>,
+) -> Result<RenderJob, String> {
+    let mut args: LiveArgs = read(pairs)?;
+    args.instrument.instrument.stop = stop;
     let said = |failure: crate::cli::Failure| failure.to_string();
     let settings =
         args.settings.blown_by(None, &BreathCurve::constant(gamma as f32), &instrument).map_err(said)?;
@@ -153,20 +164,23 @@ mod tests {
 
     #[test]
     fn names_of_programs_hosts_and_flags_set_the_same() {
-        let settings = |name: &str| live(&pairs(&[(name, "3")]), None).map(|job| job.settings);
+        let settings = |name: &str| live(&pairs(&[(name, "3")]), None, None).map(|job| job.settings);
         let by_flag = settings("strength").unwrap();
         assert_eq!(by_flag.strength, 3.0);
         for name in ["stren", "Reed strength", "reed strength"] {
             assert_eq!(settings(name), Ok(by_flag), "{name}");
         }
-        let kpa = |name: &str| live(&pairs(&[(name, "7")]), None).unwrap().settings.breath_full_kpa;
+        let kpa = |name: &str| live(&pairs(&[(name, "7")]), None, None).unwrap().settings.breath_full_kpa;
         assert_eq!((kpa("breath_full"), kpa("breath-full")), (7.0, 7.0));
-        let job = live(&pairs(&[("breath_full", "7 kPa"), ("noise", "40 %")]), None).unwrap();
+        let job = live(&pairs(&[("breath_full", "7 kPa"), ("noise", "40 %")]), None, None).unwrap();
         assert_eq!((job.settings.breath_full_kpa, job.settings.noise), (7.0, 0.4));
         let job =
-            live(&pairs(&[("Breath noise", "40"), ("no_noise", "false"), ("unison", "true")]), None).unwrap();
+            live(&pairs(&[("Breath noise", "40"), ("no_noise", "false"), ("unison", "true")]), None, None)
+                .unwrap();
         assert_eq!((job.settings.noise, job.settings.players.split), (0.4, Split::Unison));
-        assert!(live(&pairs(&[("noise", ""), ("no-noise", "true")]), None).unwrap().settings.noise == 0.0);
+        assert!(
+            live(&pairs(&[("noise", ""), ("no-noise", "true")]), None, None).unwrap().settings.noise == 0.0
+        );
     }
 
     #[test]
@@ -177,11 +191,20 @@ mod tests {
             (&[("zeta", "0.4"), ("Embouchure", "0.5")], "both set Embouchure"),
             (&[("no_noise", "maybe")], "must be true or false"),
         ] {
-            let said = live(&pairs(all), None).map(|_| ()).unwrap_err();
+            let said = live(&pairs(all), None, None).map(|_| ()).unwrap_err();
             assert!(said.contains(says) && !said.contains('\n'), "{said}");
         }
-        let said = render_job(&pairs(&[("seconds", "1")]), None, None).map(|_| ()).unwrap_err();
+        let said = render_job(&pairs(&[("seconds", "1")]), None, None, None).map(|_| ()).unwrap_err();
         assert!(said.contains("required"), "{said}");
+    }
+
+    #[test]
+    fn a_caller_gives_up_an_instrument_that_is_being_prepared() {
+        let file = InstrumentFile::parse(include_str!("../../examples/instruments/cylinder.toml")).unwrap();
+        // A size that nobody has asked for before: nothing of it is kept.
+        let size = [("a4", "441.37")];
+        let said = live(&pairs(&size), Some(file), Some(|| true)).map(|_| ()).unwrap_err();
+        assert!(said.contains("cancelled"), "{said}");
     }
 
     #[test]
@@ -190,12 +213,12 @@ mod tests {
         use chalumeau_core::units::SoundingNote;
         let note = |from_s, note| TimedNote { from_s, seconds: 0.5, note: SoundingNote(note), velocity: 0.8 };
         let ons = |notes: Vec<TimedNote>| -> Vec<bool> {
-            let job = render_job(&[], None, Some(Given::Notes(notes))).unwrap();
+            let job = render_job(&[], None, Some(Given::Notes(notes)), None).unwrap();
             job.score.events.iter().map(|e| matches!(e.event, Event::NoteOn { .. })).collect()
         };
         assert_eq!(ons(vec![note(0.0, 60), note(0.5, 62)]), [true, true, false, false]);
         assert_eq!(ons(vec![note(0.0, 60), note(0.5, 60)]), [true, false, true, false]);
-        let job = render_job(&[], None, Some(Given::Notes(vec![note(0.5, 60)]))).unwrap();
+        let job = render_job(&[], None, Some(Given::Notes(vec![note(0.5, 60)])), None).unwrap();
         // With the time to fade of a melody.
         assert_eq!(job.score.samples, 2 * 48_000);
     }

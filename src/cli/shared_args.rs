@@ -29,12 +29,18 @@ pub struct InstrumentArg {
     /// Measurements that a caller has in memory, in place of the file.
     #[arg(skip)]
     pub given: Option<InstrumentFile>,
+    /// Asked now and then while it is prepared: whether the caller gives it up.
+    #[arg(skip)]
+    pub stop: Option<Stop>,
 }
+
+/// Whether a caller gives up what takes long.
+pub type Stop = fn() -> bool;
 
 impl InstrumentArg {
     /// As if it were given by its flag.
     pub fn named(path: PathBuf) -> Self {
-        Self { instrument: Some(path), given: None }
+        Self { instrument: Some(path), given: None, stop: None }
     }
 
     /// As it was given: a name or a file.
@@ -126,7 +132,11 @@ impl InstrumentArg {
             };
             bar.set_message(doing);
             bar.set_position((1_000.0 * share) as u64);
-            ControlFlow::Continue(())
+            if self.stop.is_some_and(|stop| stop()) {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
         });
         if let Some(bar) = bar {
             bar.finish_and_clear();

@@ -114,9 +114,11 @@ def dataset(
     if foreign:
         raise ValueError(f"{into} has files of another data set: {', '.join(foreign[:3])} ...; take another folder")
     planned, stamp = _digest(cut), Path(into, PLAN)
-    if stamp.exists() and stamp.read_text() != planned:
-        raise ValueError(f"{into} holds a data set of another plan; take another folder, or remove this one first")
     left = [part for part in cut if not is_there(part)]
+    # The plan is written before any file. Files without one are those of an older version, which kept none.
+    begun = stamp.read_text() if stamp.exists() else None
+    if begun != planned and (begun is not None or len(left) < len(cut)):
+        raise ValueError(f"{into} holds a data set of another plan; take another folder, or remove this one first")
     if left:
         # A wrong name or value is told before anything is made.
         _check(left)
