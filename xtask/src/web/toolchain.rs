@@ -22,15 +22,14 @@ const PACKAGES: Packages = Packages {
     names: &["rustc", "cargo", "libstd-rust-dev-wasm32", "lld"],
 };
 
-/// The modules: their names in the page, and the features that each is built with.
-const MODULES: [(&str, &[&str]); 2] =
-    [("workshop.wasm", &["--features", "workshop"]), ("chalumeau.wasm", &[])];
+/// The modules: their names in the page, and the feature that each is built with.
+const MODULES: [(&str, &str); 2] = [("workshop.wasm", "workshop"), ("chalumeau.wasm", "workshop-packages")];
 
 /// Builds the modules into `page` and returns their names.
 pub fn build(page: &Path) -> Result<Vec<String>> {
     let mut names = Vec::new();
-    for (name, features) in MODULES {
-        let built = build_module(features)?;
+    for (name, feature) in MODULES {
+        let built = build_module(feature)?;
         fs::copy(&built, page.join(name))
             .with_context(|| format!("cannot copy {} to {}", built.display(), page.display()))?;
         names.push(name.to_owned());
@@ -38,18 +37,19 @@ pub fn build(page: &Path) -> Result<Vec<String>> {
     Ok(names)
 }
 
-fn build_module(features: &[&str]) -> Result<PathBuf> {
+fn build_module(feature: &str) -> Result<PathBuf> {
     let folder = machine::target().join("web-build");
+    let words = BUILD.into_iter().chain([TARGET, "--features", feature]);
     if has_target() {
         let mut cargo = machine::cargo();
-        cargo.args(BUILD).arg(TARGET).args(features).env("RUSTFLAGS", FLAGS).env("CARGO_TARGET_DIR", &folder);
+        cargo.args(words).env("RUSTFLAGS", FLAGS).env("CARGO_TARGET_DIR", &folder);
         machine::run(&mut cargo)?;
     } else {
         let debian =
             Debian::with(&PACKAGES).with_context(|| format!("`rustup target add {TARGET}` fails"))?;
         let linker = ("CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER", "wasm-ld");
         let mut cargo = debian.cargo(&folder, &[("RUSTFLAGS", FLAGS), linker])?;
-        machine::run(cargo.args(BUILD).arg(TARGET).args(features))?;
+        machine::run(cargo.args(words))?;
     }
     Ok(folder.join(TARGET).join("release/chalumeau_web.wasm"))
 }
