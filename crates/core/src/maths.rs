@@ -27,6 +27,15 @@ pub mod single {
 }
 
 /// Of complex numbers.
+///
+/// ```
+/// use chalumeau_core::maths::complex;
+/// use num_complex::Complex64;
+///
+/// let z = Complex64::new(0.0, 2.0);
+/// assert_eq!((complex::norm(z), complex::arg(z)), (2.0, std::f64::consts::FRAC_PI_2));
+/// assert!((complex::exp(z) - complex::cis(2.0)).norm() < 1e-15);
+/// ```
 pub mod complex {
     use num_complex::Complex64;
 
@@ -67,5 +76,34 @@ pub mod complex {
         let other = 0.5 * z.im.abs() / half;
         let (re, im) = if z.re >= 0.0 { (half, other) } else { (other, half) };
         Complex64::new(re, im.copysign(z.im))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_complex::Complex64;
+    use proptest::prelude::*;
+
+    /// What both round, and no more: the two differ in the last bit or two.
+    const CLOSE: f64 = 5e-16;
+
+    proptest! {
+        #[test]
+        fn they_are_those_of_the_standard_library_but_for_the_last_bits(x in -20.0..20.0_f64, y in 1e-6..1e6_f64) {
+            let near = |ours: f64, theirs: f64| (ours - theirs).abs() <= CLOSE * theirs.abs().max(f64::MIN_POSITIVE);
+            prop_assert!(near(exp(x), x.exp()) && near(exp2(x), x.exp2()) && near(ln(y), y.ln()));
+            prop_assert!(near(log2(y), y.log2()) && near(log10(y), y.log10()) && near(pow(y, 0.1 * x), y.powf(0.1 * x)));
+            prop_assert!(near(sin(x), x.sin()) && near(cos(x), x.cos()) && near(tan(x), x.tan()));
+            prop_assert!(near(exp_m1(x), x.exp_m1()) && near(hypot(x, y), x.hypot(y)) && near(atan2(x, y), x.atan2(y)));
+        }
+
+        #[test]
+        fn a_complex_root_squared_is_the_number(re in -1e3..1e3_f64, im in -1e3..1e3_f64) {
+            let z = Complex64::new(re, im);
+            let root = complex::sqrt(z);
+            prop_assert!(root.re >= 0.0 && (root * root - z).norm() <= 4.0 * CLOSE * z.norm());
+            prop_assert!((root - z.sqrt()).norm() <= 4.0 * CLOSE * root.norm());
+        }
     }
 }
