@@ -1,11 +1,10 @@
 //! The bore in the frequency domain, what each note needs to sound, and what a hand feels of it.
 
 use crate::instrument::{Instrument, OpenHoles};
-use crate::mistakes::{ended, signals, stop, wrong};
+use crate::mistakes::{signals, watched, wrong};
 use chalumeau::cli::offline;
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::haptics::{NoteFeel, TorqueLaw, torque_law};
-use chalumeau_core::instrument::prepare::Progress;
 use chalumeau_core::instrument::{Preparation, Wanted};
 use chalumeau_core::measure::bifurcation as ramp;
 use chalumeau_core::reed::ReedTables;
@@ -66,9 +65,11 @@ pub fn impedance<'py>(
         if lattice {
             // As the command: the bore as it was built, at 48 kHz.
             let wanted = Wanted::new(file.clone(), 48_000.0);
-            let mut on =
-                |_: Progress<'_>| if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
-            let model = Preparation::new(&wanted, None).as_built(&mut on).map_err(ended)?;
+            let model = watched(|stop| {
+                Preparation::new(&wanted, None).as_built(&mut |_| {
+                    if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                })
+            })?;
             let opening: Vec<f64> = open.iter().map(|&open| f64::from(u8::from(open))).collect();
             return at_each(&frequencies, |f_hz| model.coeffs.impedance(f_hz, &opening));
         }
@@ -151,7 +152,7 @@ pub fn bifurcation<'py>(
         wrong(format_args!("written {} sounds outside MIDI's 0..127", WrittenNote(written)))
     })?;
     let found = py.detach(|| {
-        let job = offline::blown(&pairs, file, to, Some(stop)).map_err(ended)?;
+        let job = watched(|stop| offline::blown(&pairs, file, to, Some(stop)))?;
         // The ramp tells of its progress and cannot be asked to stop, so Ctrl-C unwinds it; it owns all that it changes.
         let each = |_| signals().unwrap_or_else(|error| resume_unwind(Box::new(error)));
         let play = || ramp::measure(&job.model, &job.settings, sounding, to as f32, seconds, job.rate, each);

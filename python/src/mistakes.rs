@@ -32,14 +32,11 @@ pub fn signals() -> PyResult<()> {
     Python::attach(|py| py.check_signals())
 }
 
-/// The same for work that can only be told to stop: [`ended`] then gives what the signal raised.
-pub fn stop() -> bool {
-    signals().map_err(|raised| RAISED.set(Some(raised))).is_err()
-}
-
-/// Why work ended that was watched by [`stop`].
-pub fn ended(what: impl Display) -> PyErr {
-    RAISED.take().unwrap_or_else(|| wrong(what))
+/// The result of work that asks now and then whether it is to stop; what the signal raised (Ctrl-C) if there was one.
+pub fn watched<T, E: Display>(work: impl FnOnce(fn() -> bool) -> Result<T, E>) -> PyResult<T> {
+    let done = work(|| signals().map_err(|raised| RAISED.set(Some(raised))).is_err());
+    // Also where the work was done before it could stop.
+    RAISED.take().map_or_else(|| done.map_err(wrong), Err)
 }
 
 /// Where a name that is unknown differs from a flag by its case alone (h, H), that flag is meant.

@@ -1,7 +1,7 @@
 //! Rendering: what `chalumeau render` plays, into an array.
 
 use crate::instrument::Instrument;
-use crate::mistakes::{ended, signals, stop, wrong};
+use crate::mistakes::{signals, watched, wrong};
 use chalumeau::cli::offline::{self, Given, TimedNote};
 use chalumeau_core::units::SoundingNote;
 use numpy::{PyArray1, PyArrayMethods};
@@ -33,7 +33,7 @@ pub fn render<'py>(
         (None, None) => None,
     };
     let played = py.detach(|| {
-        let job = offline::render_job(&pairs, file, given, Some(stop)).map_err(ended)?;
+        let job = watched(|stop| offline::render_job(&pairs, file, given, Some(stop)))?;
         let mut samples = Vec::with_capacity(job.score.samples * usize::from(channels));
         let mut unheard = 0;
         let resets = job.play(channels, None, |sent, heard| {
@@ -77,7 +77,7 @@ pub fn silent(
 ) -> PyResult<Vec<String>> {
     let given = Given::Notes(vec![timed((0.0, 0.1, note, 0.8))?]);
     let file = instrument.file.clone();
-    py.detach(|| offline::render_job(&pairs, Some(file), Some(given), Some(stop)).map_err(ended))
+    py.detach(|| watched(|stop| offline::render_job(&pairs, Some(file), Some(given), Some(stop))))
         .map(|job| job.warnings)
 }
 

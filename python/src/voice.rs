@@ -1,7 +1,7 @@
 //! A clarinet that is played event by event.
 
 use crate::instrument::Instrument;
-use crate::mistakes::{ended, signals, stop, wrong};
+use crate::mistakes::{signals, watched, wrong};
 use chalumeau::cli::offline;
 use chalumeau_core::event::Event;
 use chalumeau_core::instrument::Clarinet;
@@ -35,7 +35,7 @@ impl Voice {
     #[new]
     fn new(py: Python<'_>, pairs: Vec<(String, String)>, instrument: &Instrument) -> PyResult<Self> {
         let file = instrument.file.clone();
-        let job = py.detach(|| offline::live(&pairs, Some(file), Some(stop)).map_err(ended))?;
+        let job = py.detach(|| watched(|stop| offline::live(&pairs, Some(file), Some(stop))))?;
         Ok(Self { clarinet: Mutex::new(job.clarinet()), rate_hz: job.rate })
     }
 

@@ -5,8 +5,6 @@
 //! change that is meant is written by `UPDATE_GOLDEN=1 cargo test -p chalumeau-web --features workshop --test own_instrument`.
 #![cfg(feature = "workshop")]
 
-use std::fmt::Write as _;
-
 use chalumeau_web::workshop::answer;
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -22,10 +20,7 @@ fn prepared(mut question: Value) -> String {
     let told: Value = serde_json::from_slice(&answer(question.to_string().as_bytes())).unwrap();
     assert_eq!(told["failed"], Value::Null);
     let prepared = told["prepared"].as_str().unwrap();
-    Sha256::digest(prepared).iter().fold(String::new(), |mut text, byte| {
-        write!(text, "{byte:02x}").unwrap();
-        text
-    })
+    Sha256::digest(prepared).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[test]
