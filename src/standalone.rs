@@ -6,9 +6,11 @@
 //! - `arguments`: the command line; `log`: what the framework logs; `quit`: the end on Ctrl-C
 //! - `standalone_plugin`: the plugin as the framework runs it here; `session`: what it remembers from one start to the next
 //! - `jack`: plays to a JACK server, and survives its death
+//! - `keyboards`: opens the system's MIDI inputs where JACK does not play
 
 mod arguments;
 mod jack;
+mod keyboards;
 mod log;
 mod quit;
 mod session;
@@ -23,6 +25,7 @@ use nice_plug::prelude::nice_export_standalone_with_args;
 use crate::plugin::launch_options::LaunchOptions;
 use arguments::{Args, Backend};
 use jack::{JackClient, JackLink};
+use keyboards::Keyboards;
 use standalone_plugin::StandalonePlugin;
 
 /// Reads the arguments and plays until the user quits. Exit codes: 0, it has played; 1, no backend opened; 2, a mistake in
@@ -58,6 +61,8 @@ pub fn main() -> ExitCode {
     let tries = args.backends().into_iter();
     for (backend, inputs) in tries.flat_map(|one| args.inputs(one).iter().map(move |&inputs| (one, inputs))) {
         last_error.clear();
+        // Held while the framework plays.
+        let _keyboards = args.keyboards(backend).map(Keyboards::open);
         let words = match (backend == Backend::Jack).then(JackClient::open) {
             None => args.for_framework(backend, args.sample_rate, inputs),
             Some(Ok(client)) => {

@@ -24,7 +24,8 @@ Examples:
   chalumeau-standalone --no-window                        plays from MIDI or a knob
   chalumeau-standalone --backend dummy                    shows the window, makes no sound
 
-Play it with a MIDI keyboard, a wind controller, a knob, or the keys in the window. CC2 or CC11 sets the breath. Until one
+Play it with a MIDI keyboard, a wind controller, a knob, or the keys in the window. MIDI devices play as soon as you plug
+them in. CC2 or CC11 sets the breath. Until one
 of them moves, key velocity sets it. On the computer's keyboard, letters play: A S D F G H J K are the white keys from C.
 The next start finds the settings of this one. With a microphone, hold keys and blow at it; keep quiet for the first two seconds,
 in which the program measures the room. Without a display, the program plays without a window. To quit, close the window or
@@ -50,7 +51,7 @@ pub struct Args {
     /// Name of the sound card's input with a microphone that you blow at; an empty name lists them. Not for JACK.
     #[arg(long, value_name = "NAME")]
     input_device: Option<String>,
-    /// Name of the MIDI input; an empty name lists them. Not for JACK.
+    /// Part of the name of the MIDI input; an empty name lists them. Without it, all play. Not for JACK.
     #[arg(short, long, value_name = "NAME")]
     midi_input: Option<String>,
     /// Name of the MIDI output for a knob's breath; an empty name lists them. Not for JACK.
@@ -71,7 +72,7 @@ pub struct Args {
     /// JACK port of a microphone that you blow at.
     #[arg(long, value_name = "PORT")]
     connect_jack_input: Option<String>,
-    /// JACK port whose MIDI plays the instrument.
+    /// JACK port whose MIDI plays the instrument. Without it, all MIDI devices play.
     #[arg(long, value_name = "PORT")]
     connect_jack_midi_input: Option<String>,
     /// JACK port that receives a knob's breath.
@@ -157,7 +158,9 @@ fn instrument(text: &str) -> Result<(InstrumentChoice, String), String> {
     let found = crate::text_file::read(text)
         .map_err(|reason| format!("{reason}; instruments without a file are {ids}"))?;
     InstrumentFile::parse(&found).map_err(|reason| reason.to_string())?;
-    Ok((InstrumentChoice::User, text.to_owned()))
+    // The session keeps it, and the next start may be from another folder.
+    let path = std::path::absolute(text).map_err(|reason| format!("{text}: {reason}"))?;
+    Ok((InstrumentChoice::User, path.display().to_string()))
 }
 
 impl Args {
@@ -191,9 +194,11 @@ impl Args {
             add("input-latency", latency_s.to_string());
             add("input-device", self.input_device.clone().unwrap_or_default());
         }
+        // The framework lists the MIDI inputs, and opens none.
+        let listed = self.midi_input.clone().filter(String::is_empty);
         for (name, value) in [
             ("output-device", &self.output_device),
-            ("midi-input", &self.midi_input),
+            ("midi-input", &listed),
             ("midi-output", &self.midi_output),
         ] {
             if let Some(value) = value {
@@ -201,6 +206,13 @@ impl Args {
             }
         }
         words
+    }
+
+    /// Which MIDI inputs to open beside this backend: `None` for none of them, else part of their names, if the user has given it.
+    pub fn keyboards(&self, backend: Backend) -> Option<Option<String>> {
+        let is_listed = self.midi_input.as_deref() == Some("");
+        let has_own = matches!(backend, Backend::Jack | Backend::Dummy);
+        (!is_listed && !has_own).then(|| self.midi_input.clone())
     }
 
     /// The JACK ports to connect to.
@@ -280,8 +292,22 @@ mod tests {
     fn the_framework_gets_the_arguments_of_the_user() {
         let args = args(&["-r", "44100", "-o", "", "-m", "Wind"]);
         let words = args.for_framework(SYSTEM, args.sample_rate, 0);
-        for word in ["--sample-rate=44100", "--output-device=", "--midi-input=Wind"] {
+        for word in ["--sample-rate=44100", "--output-device="] {
             assert!(words.iter().any(|said| said == word), "{words:?}");
         }
+    }
+
+    #[test]
+    fn the_framework_lists_midi_inputs_and_the_program_opens_them() {
+        let frameworks = |args: &Args| args.for_framework(SYSTEM, 48_000.0, 0).join(" ");
+        let named = args(&["-m", "Wind"]);
+        assert!(!frameworks(&named).contains("midi-input"));
+        assert_eq!(named.keyboards(SYSTEM), Some(Some("Wind".to_owned())));
+        let asked = args(&["-m", ""]);
+        assert!(frameworks(&asked).ends_with("--midi-input="));
+        assert_eq!(asked.keyboards(SYSTEM), None);
+        let unasked = args(&[]);
+        assert_eq!(unasked.keyboards(SYSTEM), Some(None));
+        assert_eq!([Backend::Jack, Backend::Dummy].map(|backend| unasked.keyboards(backend)), [None, None]);
     }
 }

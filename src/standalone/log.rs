@@ -16,6 +16,9 @@ const NO_WINDOW: &str = "No GUI available";
 /// How it begins its message that it cannot catch Ctrl-C, which [`quit`](super::quit) does.
 const SIGNALS_TAKEN: &str = "Error setting close signal callback";
 
+/// How it begins its advice to name a MIDI port. The program opens inputs by itself.
+const MIDI_ADVICE: &str = "Use the '--midi-";
+
 /// The last error in the log, if there was one.
 #[derive(Clone, Debug, Default)]
 pub struct LastError(Arc<Mutex<Option<String>>>);
@@ -61,7 +64,7 @@ impl<S: Subscriber> Layer<S> for LogLayer {
         match text.split_once(BACKEND_FAILED).and_then(|(_, rest)| rest.split_once(": ")) {
             Some((_, reason)) => self.0.set(reason),
             None if text.starts_with(NO_WINDOW) => eprintln!("playing; press Ctrl-C to quit"),
-            None if text.starts_with(SIGNALS_TAKEN) => {}
+            None if [SIGNALS_TAKEN, MIDI_ADVICE].iter().any(|begin| text.starts_with(begin)) => {}
             None => {
                 eprintln!("{text}");
                 if level == Level::ERROR {

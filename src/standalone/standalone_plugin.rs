@@ -9,6 +9,7 @@ use nice_plug::context::gui::AsyncExecutor;
 use nice_plug::prelude::*;
 
 use super::jack::JackLink;
+use super::keyboards::WithKeyboards;
 use super::session::Session;
 use crate::plugin::{Chalumeau, executor_of};
 
@@ -111,15 +112,19 @@ impl Plugin for StandalonePlugin {
         _aux: &mut AuxiliaryBuffers,
         context: &mut impl ProcessContext<Self>,
     ) -> ProcessStatus {
-        // Nobody else holds the lock while the framework plays.
+        // Before the lock, which the JACK thread may want in this moment.
+        if self.uses_jack {
+            return ProcessStatus::KeepAlive;
+        }
+        // Nobody else holds it while the framework plays.
         match self.plugin.try_lock() {
-            Ok(mut plugin) if !self.uses_jack => {
+            Ok(mut plugin) => {
                 let channels = buffer.as_slice();
                 // The framework has put what comes in where the sound goes out.
                 plugin.hear(&channels[..self.inputs.min(channels.len())]);
-                plugin.play(channels, context)
+                plugin.play::<Self>(channels, &mut WithKeyboards::new(context))
             }
-            _ => ProcessStatus::KeepAlive,
+            Err(_) => ProcessStatus::KeepAlive,
         }
     }
 

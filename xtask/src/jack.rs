@@ -18,7 +18,7 @@ const ATTEMPTS: usize = 3;
 /// Of the server that the tests start and kill by themselves.
 const MORTAL: &str = "chalumeau-mortal";
 
-/// Starts the server and runs `crates/test-host/tests/knob_midi.rs` and the ignored test of `standalone.rs`; then
+/// Starts the server and runs `crates/test-host/tests/knob_midi.rs` and those tests of `standalone.rs` that need it; then
 /// `jack_death.rs`, which starts servers and kills them.
 pub fn test() -> Result<()> {
     let Programs { plugin, program, standalone, .. } = programs()?;
@@ -46,7 +46,7 @@ pub fn test() -> Result<()> {
     let mut command = machine::cargo();
     command
         .args(TESTS)
-        .args(["--test", "standalone", "--", "--ignored", "it_plays_to_jack"])
+        .args(["--test", "standalone", "--", "--ignored", "jack"])
         .env(artefacts::STANDALONE, standalone);
     machine::run(server.for_clients(&mut command))?;
     drop(server);

@@ -47,3 +47,17 @@ pub use runtime_dir::{RuntimeDir, serial_number, serial_text};
 pub use session::StateSample;
 pub use session::arming::{FIRST_CEILING_MNM, HARD_CEILING_MNM, OFFERED_CEILING_MNM};
 pub use stats::LinkStats;
+
+/// Names under which the MIDI port of a knob is taken without being chosen.
+const MIDI_NAMES: [&str; 2] = ["torquetuner", "chalumeau"];
+
+/// Whether a MIDI port of this name is taken for a knob without being chosen.
+///
+/// ```
+/// assert!(chalumeau_knob::device::is_midi_name_of_knob("TorqueTuner_001 MIDI 1"));
+/// ```
+#[must_use]
+pub fn is_midi_name_of_knob(name: &str) -> bool {
+    let name = name.to_lowercase();
+    MIDI_NAMES.iter().any(|known| name.contains(known))
+}

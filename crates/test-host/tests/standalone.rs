@@ -183,6 +183,62 @@ fn it_plays_to_jack() {
     assert!(running.interrupt().success());
 }
 
+/// A MIDI device, as a server shows it.
+#[cfg(target_os = "linux")]
+struct Device;
+
+// SAFETY: the type of the port is one that servers know, whose buffers have a size of their own.
+#[cfg(target_os = "linux")]
+unsafe impl jack::PortSpec for Device {
+    fn jack_port_type(&self) -> &str {
+        jack::jack_sys::RAW_MIDI_TYPE
+    }
+
+    fn jack_flags(&self) -> jack::PortFlags {
+        jack::PortFlags::IS_OUTPUT | jack::PortFlags::IS_PHYSICAL
+    }
+
+    fn jack_buffer_size(&self) -> std::ffi::c_ulong {
+        0
+    }
+}
+
+/// Run by the step that starts a JACK server.
+#[cfg(target_os = "linux")]
+#[test]
+#[ignore = "needs a JACK server"]
+fn midi_devices_at_jack_play_without_being_named() {
+    let (client, _) = jack::Client::new("devices", jack::ClientOptions::NO_START_SERVER).unwrap();
+    let plug = |name: &str| client.register_port(name, Device).unwrap();
+    let first = plug("keyboard");
+    let others = [plug("TorqueTuner"), plug("Midi Through"), plug("virtual keyboard")];
+    // A program's port is that program's to connect.
+    let program = client.register_port("player", jack::MidiOut::default()).unwrap();
+    let client = client.activate_async((), ()).unwrap();
+    let mut running = Running::start(&["--backend", "jack"]);
+    running.wait();
+    const INPUT: &str = "chalumeau:midi_input";
+    let plays = |port: &jack::Port<Device>| {
+        let began = Instant::now();
+        while !port.is_connected_to(INPUT).unwrap() {
+            assert!(began.elapsed() < PATIENCE, "{} is not connected", port.name().unwrap());
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    };
+    plays(&first);
+    plays(&others[2]);
+    let later = client.as_client().register_port("wind controller", Device).unwrap();
+    plays(&later);
+    // What the user takes apart stays apart; the program looks once a second.
+    client.as_client().disconnect_ports_by_name("devices:keyboard", INPUT).unwrap();
+    std::thread::sleep(Duration::from_millis(2_500));
+    for port in [&first, &others[0], &others[1]] {
+        assert!(!port.is_connected_to(INPUT).unwrap(), "{}", port.name().unwrap());
+    }
+    assert!(!program.is_connected_to(INPUT).unwrap());
+    assert!(running.interrupt().success());
+}
+
 /// Run by the step that starts a display.
 #[cfg(target_os = "linux")]
 #[test]

@@ -4,10 +4,11 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use jack::{AsyncClient, AudioIn, AudioOut, Client, ClientOptions, Error, MidiIn, MidiOut};
+use jack::{AsyncClient, AudioIn, AudioOut, Client, ClientOptions, Error, MidiIn, MidiOut, PortFlags};
 
 use super::player::{JackNotices, JackPlayer, JackPlayerPorts, JackSigns};
 use crate::plugin::Chalumeau;
+use crate::standalone::keyboards::plays_unasked;
 
 /// The client's name, unless another program has it.
 const NAME: &str = "chalumeau";
@@ -126,6 +127,24 @@ impl PlayingClient {
         };
         client.port_by_name(&connection.other).is_some()
             && matches!(client.connect_ports_by_name(from, to), Ok(()) | Err(Error::PortAlreadyConnected(..)))
+    }
+
+    /// Ports of MIDI devices that play without being asked for.
+    pub fn keyboards(&self) -> Vec<String> {
+        let client = self.client.as_client();
+        // Those of other programs are theirs to connect.
+        let devices = client.ports(
+            None,
+            Some(jack::jack_sys::RAW_MIDI_TYPE),
+            PortFlags::IS_OUTPUT | PortFlags::IS_PHYSICAL,
+        );
+        let plays = |name: &String| {
+            // A server names its ports by numbers; the name of the device is an alias.
+            let port = client.port_by_name(name);
+            let aliases = port.and_then(|port| port.aliases().ok()).unwrap_or_default();
+            plays_unasked(aliases.iter().chain([name]).map(String::as_str))
+        };
+        devices.into_iter().filter(plays).collect()
     }
 
     /// Everything that the ports are connected to.

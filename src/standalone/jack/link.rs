@@ -1,5 +1,6 @@
 //! The link to the JACK server: begins to play, watches the server, and waits for the next one when it has gone.
 
+use std::collections::HashSet;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -35,7 +36,7 @@ static OFFERED: Mutex<Option<(JackClient, JackPorts)>> = Mutex::new(None);
 pub struct JackPorts {
     /// Wind there blows.
     pub microphone: Option<String>,
-    /// Its MIDI plays the plugin.
+    /// Its MIDI plays the plugin. Without one, all devices do.
     pub midi_input: Option<String>,
     /// It receives a knob's breath.
     pub midi_output: Option<String>,
@@ -100,6 +101,7 @@ impl JackLink {
         let link = LinkThread {
             plugin: self.plugin.clone(),
             shared: self.shared.clone(),
+            keyboards: ports.midi_input.is_none().then(HashSet::new),
             pending: ports.connections(),
             noted: [const { Vec::new() }; 2],
             connected_at: None,
@@ -153,6 +155,8 @@ struct LinkThread {
     /// counts.
     noted: [Vec<Connection>; 2],
     connected_at: Option<Instant>,
+    /// Devices that were connected when they came; `None` if the user has named one.
+    keyboards: Option<HashSet<String>>,
     stalls: bool,
     /// What was said last.
     last_words: String,
@@ -243,6 +247,8 @@ impl LinkThread {
             Health::IsOver => {
                 self.stalls = false;
                 self.forget();
+                // Those of the next server are new.
+                self.keyboards.as_mut().map(HashSet::clear);
                 self.say(GONE);
                 self.keep_connections();
                 return None;
@@ -274,6 +280,7 @@ impl LinkThread {
     /// Makes the connections whose ports are there. They are wanted again even if the server ends before the next look.
     fn connect(&mut self, client: &PlayingClient) {
         self.connected_at = Some(Instant::now());
+        self.want_keyboards(client);
         let pending = std::mem::take(&mut self.pending);
         let (made, pending): (Vec<_>, _) =
             pending.into_iter().partition(|connection| client.connect(connection));
@@ -281,6 +288,17 @@ impl LinkThread {
         for noted in &mut self.noted {
             noted.extend(made.iter().filter(|made| !noted.contains(made)).cloned().collect::<Vec<_>>());
         }
+    }
+
+    /// Wants devices that are new. What the user takes apart stays apart until the device is plugged in again.
+    fn want_keyboards(&mut self, client: &PlayingClient) {
+        let Some(known) = &mut self.keyboards else { return };
+        let there: HashSet<_> = client.keyboards().into_iter().collect();
+        for other in there.difference(known) {
+            eprintln!("chalumeau-standalone: MIDI input: {other}");
+            self.pending.push(Connection { own: MIDI_INPUT, other: other.clone() });
+        }
+        *known = there;
     }
 
     /// Wants what was connected to be connected again.

@@ -3,6 +3,7 @@
 //! midir calls back on a thread of its own and says nothing when a port goes away, so a second thread looks once a second
 //! whether the port is still listed. Both end with the transport.
 
+use crate::device::is_midi_name_of_knob;
 use crate::device::transport::{Binding, Transport};
 use midir::{MidiIO, MidiInput, MidiInputConnection, MidiOutput, MidiOutputConnection};
 use std::io;
@@ -12,9 +13,6 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::thread;
 use std::thread::{JoinHandle, Thread};
 use std::time::Duration;
-
-/// Names under which a knob is taken without being chosen.
-const KNOWN: [&str; 2] = ["torquetuner", "chalumeau"];
 
 /// What our own ports are called; never a knob.
 const CLIENT: &str = "Chalumeau link";
@@ -59,17 +57,12 @@ pub struct MidiTransport {
 /// Names of the input ports behind which a knob may be; all of them with `any`.
 pub fn ports(any: bool) -> Result<Vec<String>, MidiError> {
     let input = MidiInput::new(CLIENT).map_err(|e| MidiError::Unavailable(e.to_string()))?;
-    Ok(names(&input).into_iter().filter(|name| any || is_known(name)).collect())
+    Ok(names(&input).into_iter().filter(|name| any || is_midi_name_of_knob(name)).collect())
 }
 
 fn names<T: MidiIO>(io: &T) -> Vec<String> {
     let names = io.ports().iter().filter_map(|port| io.port_name(port).ok()).collect::<Vec<_>>();
     names.into_iter().filter(|name| !name.contains(CLIENT)).collect()
-}
-
-fn is_known(name: &str) -> bool {
-    let name = name.to_lowercase();
-    KNOWN.iter().any(|known| name.contains(known))
 }
 
 /// The port whose name is, or contains, the wanted one; without a wish the first known.
@@ -81,7 +74,7 @@ fn find<T: MidiIO>(io: &T, wanted: Option<&str>) -> Option<(T::Port, String)> {
     let close = || {
         named.iter().find(|(_, name)| match wanted {
             Some(wanted) => name.to_lowercase().contains(&wanted.to_lowercase()),
-            None => is_known(name),
+            None => is_midi_name_of_knob(name),
         })
     };
     exact.or_else(close).cloned()
@@ -226,8 +219,8 @@ mod tests {
 
     #[test]
     fn knobs_are_known_by_name_and_we_are_none() {
-        assert!(is_known("TorqueTuner_001 MIDI 1") && is_known("CHALUMEAU knob"));
-        assert!(!is_known("Midi Through Port-0"));
+        assert!(is_midi_name_of_knob("TorqueTuner_001 MIDI 1") && is_midi_name_of_knob("CHALUMEAU knob"));
+        assert!(!is_midi_name_of_knob("Midi Through Port-0"));
     }
 
     #[test]
