@@ -317,6 +317,11 @@ impl EditorState {
         self.entry.is_some() || ctx.text_edit_focused()
     }
 
+    /// Forgets what can be undone and what A and B are: all of it was of a setting that another project has replaced.
+    pub fn forget_settings(&mut self) {
+        (self.history, self.compare) = Default::default();
+    }
+
     /// Lets go of everything that is held: before the window closes.
     pub fn close(&mut self, controls: &dyn Controls) -> Vec<Action> {
         let mut actions = Vec::new();
@@ -324,6 +329,7 @@ impl EditorState {
         let mut hands = Hands { controls, history, entry, held, presses };
         hands.end_presses(None);
         hands.let_go();
+        linked_controllers::end_learning(&hands);
         self.keyboard.release(&mut actions);
         self.knob.end_test(&mut actions);
         self.trial.end(&mut actions);

@@ -314,6 +314,7 @@ impl Chalumeau {
             window.send_output([left, others.first().map_or(left, |right| right)]);
         }
         let is_watched = self.window.as_ref().is_some_and(|(_, window)| window.is_open());
+        self.params.fall_back();
         rest_status(&self.params, instrument, is_watched)
     }
 
@@ -446,7 +447,6 @@ struct SharedHandles {
 /// What the host may do after a block: at rest the sound lasts for the tail, and in silence the host may stop until the next
 /// event. A knob blows without events, and an open window shows what happens. Real-time safe.
 fn rest_status(params: &ChalumeauParams, instrument: &InstrumentSwap, is_watched: bool) -> ProcessStatus {
-    params.fall_back();
     let is_heard = params.microphone.on.value();
     let may_sleep = instrument.is_silent() && !is_watched && !is_heard && !params.is_in_use(InUse::WithKnob);
     params.host.set_may_sleep(may_sleep);

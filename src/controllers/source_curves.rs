@@ -151,9 +151,16 @@ impl SourceCurves {
 
     /// Gives a source its own curve, or the common one again.
     pub fn put(&self, source: CurveSource, own: Option<SourceCurve>) {
+        if self.set(source, own) {
+            self.changes.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    /// The same without counting; whether anything has changed.
+    fn set(&self, source: CurveSource, own: Option<SourceCurve>) -> bool {
         let own = own.map(SourceCurve::mended);
         if self.get(source) == own {
-            return;
+            return false;
         }
         let place = &self.places[source as usize];
         if let Some(SourceCurve { softest, loudest, curve }) = own {
@@ -162,10 +169,10 @@ impl SourceCurves {
             }
         }
         place.is_own.store(own.is_some(), Ordering::Release);
-        self.changes.fetch_add(1, Ordering::Relaxed);
+        true
     }
 
-    /// How often a curve has changed; the number wraps around.
+    /// How often a hand has changed a curve; the number wraps around.
     pub fn changes(&self) -> u32 {
         self.changes.load(Ordering::Relaxed)
     }
@@ -184,7 +191,7 @@ impl SourceCurves {
     /// Takes what a project has saved, and nothing else.
     pub fn take(&self, saved: &SavedCurves) {
         for source in CurveSource::ALL {
-            self.put(source, saved.get(source.id()).copied());
+            self.set(source, saved.get(source.id()).copied());
         }
     }
 

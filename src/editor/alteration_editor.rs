@@ -39,7 +39,7 @@ pub struct AlterationEditor {
     chosen: Option<Altered>,
     /// The alterations as a drag found them.
     held: Option<Arc<Alterations>>,
-    /// The alterations before each change, and the instrument they belong to.
+    /// The alterations before each change, and the key of the instrument they belong to.
     undo: Vec<Arc<Alterations>>,
     of: String,
 }
@@ -110,9 +110,9 @@ impl AlterationEditor {
     }
 
     fn remember(&mut self, snapshot: &Snapshot) {
-        if self.of != snapshot.as_built.name {
+        if self.of != snapshot.instrument_key {
             self.undo.clear();
-            self.of.clone_from(&snapshot.as_built.name);
+            self.of.clone_from(&snapshot.instrument_key);
         }
         if self.undo.len() == KEPT {
             self.undo.remove(0);
@@ -169,7 +169,7 @@ impl AlterationEditor {
     }
 
     fn can_undo(&self, snapshot: &Snapshot) -> bool {
-        self.of == snapshot.as_built.name && !self.undo.is_empty()
+        self.of == snapshot.instrument_key && !self.undo.is_empty()
     }
 
     /// Buttons that save what is altered, put it back, and undo the last change, from the right.

@@ -2,7 +2,7 @@
 
 use egui::{Align2, Color32, CornerRadius, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
-use crate::editor::snapshot::{PressureMarks, Snapshot};
+use crate::editor::snapshot::{NO_BREATH_KPA, PressureMarks, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
@@ -18,7 +18,7 @@ pub fn full_kpa(snapshot: &Snapshot) -> f32 {
 /// The state of the reed at a pressure, in words, and its colour.
 pub fn state(marks: &PressureMarks, kpa: f32, c: &Colours) -> (&'static str, Color32) {
     let above = |mark: Option<f32>| mark.is_some_and(|mark| kpa >= mark);
-    if kpa < 0.02 {
+    if kpa < NO_BREATH_KPA {
         ("at rest", c.quiet)
     } else if above(marks.chokes_kpa) {
         ("shut", c.chokes)
@@ -46,7 +46,7 @@ pub fn marks(snapshot: &Snapshot, c: &Colours) -> Vec<(f32, &'static str, Color3
 
 /// What each mark means, for tool tips.
 pub const LEGEND: &str = "speaks (p_on): the note starts to sound at this pressure, or stops.\n\
-    beats: above this the reed touches the lay in each cycle, and the sound is bright.\n\
+    beats: above this the reed touches the facing in each cycle, and the sound is bright.\n\
     closes: this pressure would shut the reed at rest.\n\
     chokes (p_off): above this the reed stays shut, and there is no sound.";
 

@@ -106,7 +106,7 @@ impl ClarinetView {
         let buttons = hole_buttons(area, file.holes.len());
         for (hole, tone_hole) in file.holes.iter().enumerate() {
             let opening = match trial.open() {
-                Some(tried) => f32::from(tried[hole]),
+                Some(tried) => f32::from(tried.get(hole).copied().unwrap_or(false)),
                 None => chart::share(snapshot.openings.get(hole).copied().unwrap_or(0.0)),
             };
             let at = body.hole(tone_hole);

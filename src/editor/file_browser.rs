@@ -158,7 +158,8 @@ impl FileBrowser {
     }
 
     fn choose(&mut self, kind: FileKind, path: PathBuf, actions: &mut Vec<Action>) {
-        actions.push(kind.open(path));
+        // A project keeps it, and may be opened from another folder.
+        actions.push(kind.open(std::path::absolute(&path).unwrap_or(path)));
         self.close();
     }
 }

@@ -13,7 +13,7 @@ use crate::editor::note_names::{NoteNames, note_name};
 use crate::editor::pitch_needle;
 use crate::editor::preset_bar;
 use crate::editor::preset_browser::PresetBrowser;
-use crate::editor::snapshot::{Severity, Snapshot};
+use crate::editor::snapshot::{Severity, Snapshot, Status};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 use crate::editor::undo::{Restored, Step};
@@ -311,13 +311,7 @@ fn status(ui: &mut Ui, snapshot: &Snapshot) {
         Severity::Note => c.breath,
         Severity::Warn => c.danger,
     };
-    let preparing = snapshot
-        .preparing
-        .as_ref()
-        .map(|(what, part)| (Severity::Note, format!("{what} {:.0} %", 100.0 * part)));
-    let first =
-        preparing.or_else(|| snapshot.status.first().map(|status| (status.level, status.text.clone())));
-    let Some((level, text)) = first else { return };
+    let Some(Status { level, text }) = snapshot.status.first().cloned() else { return };
     let width = ui.available_width() - 20.0;
     let label = egui::Label::new(egui::RichText::new(&text).font(theme::small()).color(c.quiet)).truncate();
     let galley = ui.painter().layout_no_wrap(text.clone(), theme::small(), c.quiet);

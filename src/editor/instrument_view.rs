@@ -79,9 +79,6 @@ fn list(ui: &mut Ui, hands: &Hands, snapshot: &Snapshot, files: &mut FileBrowser
             }
         }
     });
-    if let Some((what, part)) = &snapshot.preparing {
-        ui.add(egui::ProgressBar::new(*part).text(what.as_str()).desired_height(16.0).fill(c.accent));
-    }
     ui.horizontal(|ui| {
         let about = "A text file with the bore, the tone holes and the fingerings of a clarinet. Alter the bore in the Clarinet view saves one to begin with, and so does chalumeau instrument new on the command line.";
         if ui.button("Open an instrument file").on_hover_text(about).clicked() {

@@ -4,7 +4,7 @@
 
 use egui::{Align2, Color32, CornerRadius, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
-use crate::editor::snapshot::Snapshot;
+use crate::editor::snapshot::{NO_BREATH_KPA, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 
@@ -17,8 +17,6 @@ const METER_WORD: f32 = 46.0;
 const LAMP: [f32; 2] = [54.0, 12.0];
 /// Time for which the highest output stays marked, s.
 const HOLD_S: f64 = 1.5;
-/// Less mouth pressure than this is none, kPa.
-const NO_BREATH_KPA: f32 = 0.01;
 
 /// The highest output of the last moments, and when it was.
 #[derive(Clone, Copy)]

@@ -13,7 +13,7 @@ use crate::editor::breath_meter;
 use crate::editor::chart;
 use crate::editor::chart::{Chart, ChartMark};
 use crate::editor::controls::{Hands, choice, handle, heading, slider, switch, teach};
-use crate::editor::snapshot::Snapshot;
+use crate::editor::snapshot::{NO_BREATH_KPA, Snapshot};
 use crate::editor::theme::{Colours, GAP, panel};
 use chalumeau_core::haptics::torque_law;
 use chalumeau_core::instrument::Settings;
@@ -162,7 +162,7 @@ impl ReedView {
             if is_sounding {
                 orbit(plot, snapshot, period, c);
             }
-            if kpa > 0.02 {
+            if kpa > f64::from(NO_BREATH_KPA) {
                 let still = Points::new("still reed", [kpa, played.flow(kpa)]);
                 plot.points(still.radius(5.0).color(c.breath).filled(false).allow_hover(false));
             }
@@ -174,7 +174,7 @@ impl ReedView {
             if snapshot.lip.is_some() {
                 lines.push(("thin: the law under the player's lip", c.breath));
             }
-            if kpa > 0.02 {
+            if kpa > f64::from(NO_BREATH_KPA) {
                 lines.push(("circle: the reed at rest", c.breath));
             }
             // Below, where the closed reed lets nothing through.

@@ -20,6 +20,9 @@ use chalumeau_core::instrument::player::dynamics::LipShape;
 use chalumeau_core::instrument::{KeyPitches, Settings};
 use chalumeau_core::units::{SoundingNote, WrittenNote};
 
+/// Less mouth pressure than this is no breath, kPa.
+pub const NO_BREATH_KPA: f32 = 0.02;
+
 /// See the module.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
@@ -27,6 +30,8 @@ pub struct Snapshot {
     pub instrument: Arc<InstrumentFile>,
     /// The same as its file has it, before any alteration and before scaling.
     pub as_built: Arc<InstrumentFile>,
+    /// What names this instrument in a saved project.
+    pub instrument_key: String,
     /// What the user has altered, in lengths of the file.
     pub alterations: Arc<Alterations>,
     /// Where the altered instrument was saved, or why it was not.
@@ -49,8 +54,6 @@ pub struct Snapshot {
     pub instruments: Vec<String>,
     /// Index into `instruments`.
     pub chosen: Option<usize>,
-    /// What is being prepared, and how far, 0..=1.
-    pub preparing: Option<(String, f32)>,
     /// Presets to choose from.
     pub presets: Arc<PresetShelf>,
     /// Name of the preset that was chosen last; empty if there is none.
@@ -109,6 +112,7 @@ impl Default for Snapshot {
         Self {
             as_built: instrument.clone(),
             instrument,
+            instrument_key: String::new(),
             alterations: Arc::default(),
             saved: None,
             key_pitches: KeyPitches::default(),
@@ -120,7 +124,6 @@ impl Default for Snapshot {
             silent: Vec::new(),
             instruments: Vec::new(),
             chosen: None,
-            preparing: None,
             presets: Arc::default(),
             preset: String::new(),
             key: None,

@@ -3,7 +3,7 @@
 //! The structs say which Rust field is which id. Names, ranges, units, defaults and texts are the table's. *Breath* and
 //! *Panic* are no [`Settings`]: they act by being moved.
 
-use std::sync::atomic::AtomicU32;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, RwLock};
 
 use nice_plug::params::InternalParamMut;
@@ -54,7 +54,7 @@ pub use techniques::{ExpressionParams, TechniqueParams};
 pub struct ChalumeauParams {
     /// Layout of a state as it was saved; see [`SCHEMA`].
     #[persist = "schema"]
-    schema: AtomicU32,
+    schema: LoadedSchema,
     /// Breath and articulation.
     #[nested(group = "Breath")]
     pub breath: BreathParams,
@@ -388,7 +388,7 @@ impl ChalumeauParams {
             players: PlayersParams::new(&number),
             microphone: MicrophoneParams::new(&moments),
             knob_status,
-            schema: AtomicU32::new(SCHEMA),
+            schema: LoadedSchema::default(),
             window: RwLock::default(),
             links: ControllerLinks::default(),
             curves: SourceCurves::default(),
@@ -443,9 +443,17 @@ impl ChalumeauParams {
 
     /// Remembers which preset was chosen.
     pub fn set_preset_name(&self, name: &str) {
-        if let Ok(mut preset) = self.preset.write() {
+        if let Ok(mut preset) = self.preset.write()
+            && *preset != name
+        {
             name.clone_into(&mut preset);
+            self.host.state_changed();
         }
+    }
+
+    /// How often a saved state has been loaded; the number wraps around.
+    pub fn loads(&self) -> u32 {
+        self.schema.loads.load(Ordering::Relaxed)
     }
 
     /// Puts a preset on the parameters, without the host's gestures: it is told that the values have changed. Not for the
@@ -554,6 +562,25 @@ fn settled(param: &FloatParam) -> f32 {
 
 #[cfg(test)]
 mod tests;
+
+/// The schema of a saved state, which is [`SCHEMA`] once it is loaded; counts how often a state was.
+#[derive(Debug, Default)]
+struct LoadedSchema {
+    loads: AtomicU32,
+}
+
+impl PersistentField<'_, u32> for LoadedSchema {
+    fn set(&self, _: u32) {
+        self.loads.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn map<F, R>(&self, f: F) -> R
+    where
+        F: Fn(&u32) -> R,
+    {
+        f(&SCHEMA)
+    }
+}
 
 impl PersistentField<'_, SavedCurves> for SourceCurves {
     fn set(&self, saved: SavedCurves) {

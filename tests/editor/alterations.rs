@@ -1,7 +1,5 @@
 //! Holes and joints that the user drags, gives in millimetres, puts back and saves.
 
-use std::sync::Arc;
-
 use chalumeau::editor::{Action, Tab};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::bore::moved_hole::MovedHole;
@@ -126,9 +124,8 @@ fn a_hole_is_given_in_millimetres_and_saved() {
     window.harness.get_by_label("Saved as /home/music/mine_1.toml");
     click(&mut window, "Open it");
     assert_eq!(window.actions(), [Action::OpenInstrument(path)]);
-    // Of another instrument nothing can be undone here.
-    let other = InstrumentFile { name: "other".to_owned(), ..InstrumentFile::built_in() };
-    window.snapshot.borrow_mut().as_built = Arc::new(other);
+    // Of another instrument nothing can be undone here, though it has the same name.
+    window.snapshot.borrow_mut().instrument_key = "user:/home/music/other.toml".to_owned();
     window.harness.run();
     click(&mut window, "Undo move");
     assert!(window.actions().is_empty());

@@ -80,7 +80,8 @@ fn a_typed_path_opens_a_file_or_a_folder_and_escape_leaves() {
     let mut window = browsing("Open an instrument file");
     for (typed, wanted) in [
         ("/tmp", Action::ReadFolder(Some(PathBuf::from("/tmp")))),
-        ("mine.toml", Action::OpenInstrument(PathBuf::from("mine.toml"))),
+        // A project keeps it, and may be opened from another folder.
+        ("mine.toml", Action::OpenInstrument(std::path::absolute("mine.toml").unwrap())),
     ] {
         let field = window.harness.get_by_label("Path of a folder or file");
         field.focus();

@@ -21,6 +21,7 @@ use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::event::Event;
 use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, PlayedReed, RequirementSolver, TorqueLimits};
 use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
+use chalumeau_core::instrument::player::response::breath_of_dynamic;
 use chalumeau_core::instrument::{BreathResponse, Clarinet, Probe, Settings, feel_inputs};
 use chalumeau_core::reed::PhysicalReed;
 use chalumeau_core::units::WrittenNote;
@@ -435,6 +436,7 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
     let standing = TransferMatrix::new(&model.file, model.air).standing_pressure(wanted_hz, open);
     Snapshot {
         instrument: Arc::new(model.file.clone()),
+        silent: model.silent_notes(),
         instruments: INSTRUMENTS.map(String::from).to_vec(),
         chosen: Some(0),
         preset: "B flat clarinet".to_owned(),
@@ -536,6 +538,8 @@ pub fn picture(kept: &WindowState, controls: &Fake, snapshot: &Snapshot, scale: 
     if matches!(kept.tab, Tab::Play | Tab::Breath) {
         snapshot.settings.breath_response = BreathResponse::Played;
         snapshot.dynamic = Some(MEZZO_FORTE as f32);
+        let breath = breath_of_dynamic(MEZZO_FORTE, &snapshot.settings) as f32;
+        snapshot.sources.iter_mut().filter(|source| source.is_live).for_each(|source| source.value = breath);
     }
     shot(&mut window(kept, controls, &snapshot, scale), scale)
 }

@@ -322,6 +322,64 @@ fn a_hand_on_a_control_is_a_gesture_to_the_host() {
     plugin.deactivate(session);
 }
 
+/// Where they are in a window of this size that shows the Play view.
+const SIZE: (u32, u32) = (1_100, 720);
+const GROWL: (i16, i16) = (649, 449);
+const UNDO: (i16, i16) = (699, 26);
+const REDO: (i16, i16) = (732, 26);
+
+/// A double click begins, sets and ends at once, before the host has heard of it.
+#[test]
+#[ignore = "needs a display"]
+fn undo_takes_back_what_a_double_click_has_set() {
+    let screen = screen();
+    let mut plugin = plugin();
+    let growl = plugin.param("Growl").unwrap();
+    plugin.set(growl.id, 0.6).unwrap();
+    let session = plugin.activate(RATE, BLOCK).unwrap();
+    let mut open = Open::new(&screen, &mut plugin);
+    let inside = open.inside();
+    screen.drawn(open.frame).unwrap();
+    assert_eq!(screen.size(inside).unwrap(), SIZE);
+    let (session, ()) = playing(
+        session,
+        |_| Vec::new(),
+        |_| {
+            let click = |at| {
+                screen.point(inside, at).unwrap();
+                for is_down in [true, false] {
+                    screen.press(is_down).unwrap();
+                    std::thread::sleep(Duration::from_millis(50));
+                }
+            };
+            let mut comes_to = |wanted: f64, after: &str| {
+                let began = Instant::now();
+                loop {
+                    open.attend();
+                    let value = open.plugin.value(growl.id).unwrap();
+                    if (value - wanted).abs() < 1e-3 {
+                        break;
+                    }
+                    assert!(began.elapsed() < PATIENCE, "{value} after {after}");
+                    std::thread::sleep(Duration::from_millis(20));
+                }
+                // Not within the time of a double click.
+                std::thread::sleep(Duration::from_millis(600));
+            };
+            comes_to(0.6, "automation");
+            click(GROWL);
+            click(GROWL);
+            comes_to(growl.default, "a double click");
+            click(UNDO);
+            comes_to(0.6, "undo");
+            click(REDO);
+            comes_to(growl.default, "redo");
+        },
+    );
+    drop(open);
+    plugin.deactivate(session);
+}
+
 #[test]
 #[ignore = "needs a display"]
 fn two_windows_side_by_side_are_two() {

@@ -157,7 +157,7 @@ pub fn draw(
     let middle = 0.5 * (softest + loudest);
     let painter = ui.painter();
     let speaks = pos2(x(softest), frame.bottom() + 11.0);
-    painter.text(speaks + vec2(14.0, 2.0), Align2::LEFT_CENTER, "speaks", theme::small(), c.speaks);
+    painter.text(speaks + vec2(14.0, 2.0), Align2::LEFT_CENTER, "softest", theme::small(), c.speaks);
     let word = "Drag the ends to what your controller sends when you play softest and loudest, and the middle to bend the curve. Blue: what it has sent.";
     response.on_hover_text_at_pointer(word);
     let (end, to) = handle(ui, "Curve: where notes begin", speaks, "");

@@ -6,7 +6,7 @@ use egui::{
 
 use crate::editor::breath_meter;
 use crate::editor::chart;
-use crate::editor::snapshot::Snapshot;
+use crate::editor::snapshot::{NO_BREATH_KPA, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 use chalumeau_core::instrument::BreathResponse;
@@ -123,10 +123,10 @@ fn played(snapshot: &Snapshot, dynamic: Option<f32>, c: &Colours) -> Reading {
     let kpa = snapshot.mouth_now_kpa();
     // The pressure at which the note speaks, with the lip as it is now.
     let speaks_kpa = snapshot.marks().speaks_kpa.unwrap_or(0.0);
-    let is_above = kpa >= 0.98 * speaks_kpa && kpa > 0.02;
+    let is_above = kpa >= 0.98 * speaks_kpa && kpa > NO_BREATH_KPA;
     let (level, word) = match dynamic {
         Some(dynamic) if is_above => (height(dynamic), nearest(dynamic).to_owned()),
-        _ if kpa > 0.02 && speaks_kpa > 0.0 => {
+        _ if kpa > NO_BREATH_KPA && speaks_kpa > 0.0 => {
             (BELOW * (kpa / speaks_kpa).min(1.0), "below the note".to_owned())
         }
         _ => (0.0, "at rest".to_owned()),

@@ -246,10 +246,17 @@ impl LoaderThread {
         }
         if self.request.as_ref() != Some(&request) {
             (self.request, self.since) = (Some(request.clone()), Instant::now());
+            self.refused = None;
+            self.shared.is_refused.store(false, Ordering::Relaxed);
         }
-        if self.job.as_ref().is_some_and(|job| job.request != request || job.activation != activation.number)
-        {
-            self.cancel_job();
+        match &mut self.job {
+            Some(job)
+                if job.activation == activation.number && job.request.differs_in_keys_at_most(&request) =>
+            {
+                // A fit does not depend on them.
+                job.request.keys = request.keys.clone();
+            }
+            _ => self.cancel_job(),
         }
         let same_instrument = request.source == current.request.source
             && request.quality == current.request.quality

@@ -53,6 +53,8 @@ pub struct InstrumentRequest {
     pub keys: Arc<KeyPitches>,
     /// What the user has altered.
     pub alterations: Arc<Alterations>,
+    /// What names the instrument in a saved project, see [`InstrumentParams::key`](crate::plugin::params::instrument::InstrumentParams::key).
+    pub key: String,
 }
 
 impl InstrumentRequest {
@@ -74,8 +76,9 @@ impl InstrumentRequest {
         let a4_hz = if is_bridged { A4_HZ } else { (10.0 * a4_hz).round() / 10.0 };
         let quality = if offline { params.instrument.quality.value().into() } else { Quality::Live };
         let keys = params.scale.key_pitches();
-        let alterations = params.alterations.of(&params.instrument.key());
-        Self { choice: choice as u32, source, a4_hz, host_rate_hz, quality, keys, alterations }
+        let key = params.instrument.key();
+        let alterations = params.alterations.of(&key);
+        Self { choice: choice as u32, source, a4_hz, host_rate_hz, quality, keys, alterations, key }
     }
 
     /// The request that the built-in clarinet answers.
@@ -88,6 +91,7 @@ impl InstrumentRequest {
             quality: Quality::Live,
             keys: Arc::default(),
             alterations: Arc::default(),
+            key: InstrumentChoice::BFlat.id().to_owned(),
         }
     }
 

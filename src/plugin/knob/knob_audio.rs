@@ -12,7 +12,7 @@ use crate::plugin::instrument_loading::{InstrumentSwap, SharedInstrument};
 use crate::plugin::params::ChalumeauParams;
 use chalumeau_core::control::knob::slap_strength;
 use chalumeau_core::event::{Event, PartEvent, Played, Timed, To};
-use chalumeau_core::instrument::{Channels, Settings};
+use chalumeau_core::instrument::{Channels, Reach, Settings};
 use chalumeau_knob::device::{KnobReader, Release};
 use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, Breath14, BreathMapping, GRID};
 use chalumeau_knob::touch::feel::NO_MOTOR;
@@ -45,8 +45,15 @@ pub struct KnobAudio {
     sound: SoundSender,
     /// Samples of a take that have been played.
     replayed: u64,
-    /// A replay that was loaded before playing began; it takes precedence over what the controller has loaded since.
+    /// A replay that was loaded before playing began. Until the first replay ends, it takes precedence over what the controller
+    /// has loaded since.
     prepared: Option<PreparedReplay>,
+    /// The settings and the instrument (its address) whose notes the keys play.
+    notes_of: Option<(Reach, usize)>,
+    /// The last block replayed a take.
+    replays: bool,
+    /// A replay has ended since playing began.
+    has_replayed: bool,
 }
 
 /// What a replay needs from its first sample.
@@ -101,6 +108,9 @@ impl KnobAudio {
             sound,
             replayed: 0,
             prepared: None,
+            notes_of: None,
+            replays: false,
+            has_replayed: false,
         }
     }
 
@@ -108,7 +118,7 @@ impl KnobAudio {
     /// is the same. Allocates; takes about half a second. [main thread]
     pub fn prepare(&mut self, params: &ChalumeauParams, instrument: &SharedInstrument) {
         self.shared.is_active.store(true, Ordering::Relaxed);
-        self.prepared = None;
+        (self.prepared, self.has_replayed) = (None, false);
         if !params.knob.replay.value() {
             return;
         }
@@ -172,9 +182,16 @@ impl KnobAudio {
         });
         self.sent.count = 0;
         let samples = out.len();
+        match (std::mem::replace(&mut self.replays, context.replay), context.replay) {
+            (false, true) => self.replayed = 0,
+            // What was prepared stays in memory: nothing is freed on this thread.
+            (true, false) => self.has_replayed = true,
+            _ => {}
+        }
+        let is_prepared = !self.has_replayed;
         let (hand, take) = (self.hand.read(), self.take.read());
         let (hand, take) = match &self.prepared {
-            Some(PreparedReplay { hand, take }) if context.replay => (hand, Some(&**take)),
+            Some(PreparedReplay { hand, take }) if context.replay && is_prepared => (hand, Some(&**take)),
             _ => (hand, take.as_deref().filter(|_| context.replay)),
         };
         // The rings are emptied even if nothing uses angles and slaps.
@@ -194,6 +211,11 @@ impl KnobAudio {
         self.breath_from = breath_from;
         let full_pa = 1e3 * f64::from(settings.breath_full_kpa);
         let (shared, sent) = (&self.shared, &mut self.sent);
+        let model = instrument.ensemble().first().model();
+        let of = Some((settings.reach, Arc::as_ptr(model).addr()));
+        if std::mem::replace(&mut self.notes_of, of) != of {
+            self.blower.set_notes(settings.reach.key_notes(model));
+        }
         let mut on_breath = |at: usize, breath: Breath14| {
             shared.breath.store(breath.unit().to_bits(), Ordering::Relaxed);
             sent.push(at, breath);

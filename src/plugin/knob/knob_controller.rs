@@ -174,8 +174,11 @@ impl KnobController {
         }
         if wanted == KnobChoice::Off {
             // A user who switches off and on again asks for another device.
-            if let Ok(mut serial) = knob.serial.write() {
+            if let Ok(mut serial) = knob.serial.write()
+                && !serial.is_empty()
+            {
                 serial.clear();
+                self.params.host.state_changed();
             }
         }
         if self.link.is_none() {
@@ -292,6 +295,7 @@ impl KnobController {
         let silence = rows.is_empty().then_some(None);
         for reading in readings.chain(silence) {
             if let Some(text) = self.calibrator.tick(reading, knob, self.link.as_ref(), self.hand.feels) {
+                self.params.host.state_changed();
                 self.switches.set_hint(text);
             }
         }
@@ -342,7 +346,11 @@ impl KnobController {
             // A project that has just been loaded names a knob of its own.
             let named = serial_number(&text);
             if named.is_none() || named == self.remembered {
-                *text = serial_text(serial);
+                let told = serial_text(serial);
+                if *text != told {
+                    *text = told;
+                    self.params.host.state_changed();
+                }
                 self.remembered = Some(serial);
             }
         }

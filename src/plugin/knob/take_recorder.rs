@@ -98,6 +98,7 @@ impl TakeRecorder {
                 if let Ok(mut take) = params.knob.take.write() {
                     *take = path.display().to_string();
                 }
+                params.host.state_changed();
                 format!("take {} has {rows} rows", path.display())
             }
             Err(reason) => format!("take lost: {reason}"),

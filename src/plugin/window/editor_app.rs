@@ -29,6 +29,8 @@ pub struct WindowMemory {
     written: WindowState,
     /// How often links and curves had changed when the host was told last.
     links: u32,
+    /// How often the host had loaded a state when the window looked last.
+    loads: u32,
     keys: rtrb::Producer<Event>,
     /// Pixels per point without zoom, on the latest screen.
     pub(super) scale: f64,
@@ -44,6 +46,7 @@ impl WindowMemory {
             state: if LaunchOptions::get().is_some() { state.with_letters() } else { state },
             written,
             links: changes(&handles.params),
+            loads: handles.params.loads(),
             handles,
             keys,
             scale: 1.0,
@@ -197,6 +200,10 @@ impl NiceEguiApp for EditorApp {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::InnerSize(size));
             memory.state.kept = now;
         }
+        let loads = params.loads();
+        if std::mem::replace(&mut memory.loads, loads) != loads {
+            memory.state.forget_settings();
+        }
         let mut snapshot = Snapshot::clone(&self.shared.latest());
         // What the mouse drags must follow in this frame.
         snapshot.settings = params.settings();
@@ -205,11 +212,16 @@ impl NiceEguiApp for EditorApp {
         snapshot.scale = params.scale.title();
         snapshot.trims = params.scale.trims();
         snapshot.follows_tuning_program = params.scale.follows_tuning_program();
-        snapshot.alterations = params.alterations.of(&params.instrument.key());
+        // While another instrument comes, the window still draws the old one, which cannot be altered any more.
+        let is_shown = snapshot.instrument_key == params.instrument.key();
+        snapshot.alterations =
+            if is_shown { params.alterations.of(&snapshot.instrument_key) } else { Arc::default() };
         ui.ctx().set_zoom_factor(memory.state.kept.zoom);
         let actions = editor::draw(ui, &mut memory.state, &memory.controls.with(&self.gui), &snapshot);
         for action in actions {
-            memory.act(action, &self.shared, &self.gui);
+            if is_shown || !matches!(action, Action::Alter(_)) {
+                memory.act(action, &self.shared, &self.gui);
+            }
         }
         let links = changes(&params);
         if std::mem::replace(&mut memory.links, links) != links {

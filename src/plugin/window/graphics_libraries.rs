@@ -48,6 +48,10 @@ fn is_graphics_library(path: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::ffi::CString;
+    use std::fs;
+    use std::path::Path;
+
     use super::*;
 
     #[test]
@@ -65,8 +69,48 @@ mod tests {
         }
     }
 
+    /// Whether the library of this path is in memory.
+    fn is_loaded(path: &CString) -> bool {
+        // SAFETY: the path ends in a zero byte, and nothing is loaded.
+        let handle = unsafe { libc::dlopen(path.as_ptr(), libc::RTLD_LAZY | libc::RTLD_NOLOAD) };
+        if !handle.is_null() {
+            // SAFETY: the handle is the one from above.
+            unsafe { libc::dlclose(handle) };
+        }
+        !handle.is_null()
+    }
+
+    /// A library that every program of Rust has, by a name of its own.
+    fn copy(folder: &Path, name: &str) -> CString {
+        unsafe extern "C" fn find(info: *mut libc::dl_phdr_info, _size: usize, found: *mut c_void) -> c_int {
+            // SAFETY: the name is a string, and the pointer is the one given below.
+            let (name, found) = unsafe { (CStr::from_ptr((*info).dlpi_name), &mut *found.cast::<String>()) };
+            let name = name.to_string_lossy();
+            if name.contains("libgcc_s") {
+                *found = name.into_owned();
+            }
+            0
+        }
+        let mut source = String::new();
+        // SAFETY: the callback gets the pointer to `source`, which outlives the call.
+        unsafe { libc::dl_iterate_phdr(Some(find), (&raw mut source).cast()) };
+        let path = folder.join(name);
+        fs::copy(&source, &path).unwrap_or_else(|error| panic!("cannot copy {source:?}: {error}"));
+        CString::new(path.to_str().unwrap()).unwrap()
+    }
+
     #[test]
-    fn keeping_what_is_not_there_does_no_harm() {
-        keep_loaded();
+    fn graphics_libraries_stay_and_others_go() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, stays) in [("libEGL_test.so", true), ("libother_test.so", false)] {
+            let path = copy(folder.path(), name);
+            // SAFETY: the library is loaded already under its own name; its code that runs on loading is harmless.
+            let handle = unsafe { libc::dlopen(path.as_ptr(), libc::RTLD_LAZY) };
+            assert!(!handle.is_null() && is_loaded(&path), "{name} cannot be loaded");
+            keep_loaded();
+            // SAFETY: the handle is the one from above.
+            unsafe { libc::dlclose(handle) };
+            assert_eq!(is_loaded(&path), stays, "{name}");
+        }
     }
 }

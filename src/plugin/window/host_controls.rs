@@ -1,7 +1,9 @@
 //! The plugin's parameters as the editor may see them.
 
+use std::cell::RefCell;
 use std::collections::HashMap;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use nice_plug::context::gui::GuiContext;
 use nice_plug::prelude::{ParamPtr, Params};
@@ -13,11 +15,40 @@ use crate::editor::{Controls, Look};
 use crate::plugin::host_link::MenuRequest;
 use crate::plugin::params::ChalumeauParams;
 
+/// How long a value counts that was set and has not arrived. Hosts pass it on with the next block: two blocks of 8192 samples at
+/// 44.1 kHz are 0.4 s. One that never arrives was refused.
+const ARRIVES_WITHIN: Duration = Duration::from_millis(500);
+/// Values that are nearer than this are the same.
+const SAME: f32 = 1e-6;
+
 /// All parameters by their ids. `params` keeps the pointers valid.
 pub struct HostControls {
     ids: Vec<&'static str>,
     pointers: HashMap<&'static str, ParamPtr>,
     params: Arc<ChalumeauParams>,
+    on_the_way: RefCell<OnTheWay>,
+}
+
+/// Values that the window has set and the host has not passed on yet. What looks at a parameter must see them: undo, a
+/// comparison, the choice of another preset.
+#[derive(Default)]
+struct OnTheWay(HashMap<&'static str, (f32, Instant)>);
+
+impl OnTheWay {
+    /// A value was set, as the parameter will have it.
+    fn set(&mut self, id: &'static str, value: f32, now: Instant) {
+        self.0.insert(id, (value, now));
+    }
+
+    /// The value that counts where the parameter has `there`.
+    fn value(&mut self, id: &str, there: f32, now: Instant) -> f32 {
+        let Some(&(value, since)) = self.0.get(id) else { return there };
+        if (value - there).abs() < SAME || now.duration_since(since) > ARRIVES_WITHIN {
+            self.0.remove(id);
+            return there;
+        }
+        value
+    }
 }
 
 /// The parameters together with the host's context, which is told of changes.
@@ -35,7 +66,12 @@ impl HostControls {
             .into_iter()
             .map(|(id, pointer, _)| (&*Box::leak(id.into_boxed_str()), pointer))
             .collect();
-        Self { ids: all.iter().map(|(id, _)| *id).collect(), pointers: all.into_iter().collect(), params }
+        Self {
+            ids: all.iter().map(|(id, _)| *id).collect(),
+            pointers: all.into_iter().collect(),
+            params,
+            on_the_way: RefCell::default(),
+        }
     }
 
     /// The controls for one frame.
@@ -61,9 +97,10 @@ mod raw {
             let param = *self.controls.pointers.get(id)?;
             // SAFETY: `params` keeps the parameter alive.
             unsafe {
+                let there = param.unmodulated_normalized_value();
                 Some(Look {
                     name: param.name().to_owned(),
-                    value: param.unmodulated_normalized_value(),
+                    value: self.controls.on_the_way.borrow_mut().value(id, there, Instant::now()),
                     default: param.default_normalized_value(),
                     steps: param.step_count(),
                 })
@@ -91,9 +128,13 @@ mod raw {
         }
 
         fn set(&self, id: &str, value: f32) {
-            if let Some(&param) = self.controls.pointers.get(id) {
-                // SAFETY: as above.
-                unsafe { self.gui.raw_set_parameter_normalized(param, value) }
+            if let Some((&id, &param)) = self.controls.pointers.get_key_value(id) {
+                // SAFETY: as above. A choice rounds the value to one of its steps.
+                let rounded = unsafe {
+                    self.gui.raw_set_parameter_normalized(param, value);
+                    param.preview_normalized(param.preview_plain(value))
+                };
+                self.controls.on_the_way.borrow_mut().set(id, rounded, Instant::now());
             }
         }
 
@@ -125,5 +166,29 @@ mod raw {
                 self.controls.params.host.ask_menu(MenuRequest { id, at });
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_counts_from_when_it_was_set_until_it_arrives_or_is_refused() {
+        let (mut on_the_way, began) = (OnTheWay::default(), Instant::now());
+        assert_eq!(on_the_way.value("growl", 0.2, began), 0.2);
+        on_the_way.set("growl", 0.7, began);
+        assert_eq!(on_the_way.value("growl", 0.2, began), 0.7);
+        assert_eq!(on_the_way.value("lip", 0.5, began), 0.5);
+        // It has arrived: from then on the host's changes count at once.
+        assert_eq!(on_the_way.value("growl", 0.7, began), 0.7);
+        assert_eq!(on_the_way.value("growl", 0.3, began), 0.3);
+        on_the_way.set("growl", 0.9, began);
+        assert_eq!(on_the_way.value("growl", 0.3, began + ARRIVES_WITHIN), 0.9);
+        assert_eq!(
+            on_the_way.value("growl", 0.3, began + 2 * ARRIVES_WITHIN),
+            0.3,
+            "the host has refused it"
+        );
     }
 }

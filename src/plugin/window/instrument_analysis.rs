@@ -9,11 +9,39 @@ use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, NoteRequirement, 
 use chalumeau_core::instrument::{Model, Settings, feel_inputs};
 use chalumeau_knob::touch::feel::InstrumentFeel;
 
+/// An instrument as the window draws it. It is there before the analysis.
+#[derive(Clone)]
+pub struct DrawnInstrument {
+    /// What sounds.
+    model: Arc<Model>,
+    /// Its measurements.
+    pub file: Arc<InstrumentFile>,
+    /// The measurements before any alteration and before scaling.
+    pub as_built: Arc<InstrumentFile>,
+    /// What names it in a saved project.
+    pub key: String,
+}
+
+impl DrawnInstrument {
+    /// Reads the instrument's file.
+    pub fn new(current: &CurrentInstrument) -> Self {
+        Self {
+            file: Arc::new(current.model.file.clone()),
+            as_built: Arc::new(current.request.file().unwrap_or_else(|_| current.model.file.clone())),
+            model: current.model.clone(),
+            key: current.request.key.clone(),
+        }
+    }
+
+    /// Whether it is that instrument.
+    pub fn is_of(&self, current: &CurrentInstrument) -> bool {
+        Arc::ptr_eq(&self.model, &current.model)
+    }
+}
+
 /// An instrument, analysed once, with the latest results for a fingering.
 pub struct InstrumentAnalysis {
-    model: Arc<Model>,
-    file: Arc<InstrumentFile>,
-    as_built: Arc<InstrumentFile>,
+    drawn: DrawnInstrument,
     feels: Arc<InstrumentFeel>,
     bore: TransferMatrix,
     /// The latest feel table, and what it was computed from.
@@ -35,9 +63,7 @@ impl InstrumentAnalysis {
         Self {
             feels: Arc::new(InstrumentFeel::new(&current.model)),
             bore: TransferMatrix::new(&current.model.file, current.model.air),
-            file: Arc::new(current.model.file.clone()),
-            as_built: Arc::new(current.request.file().unwrap_or_else(|_| current.model.file.clone())),
-            model: current.model.clone(),
+            drawn: DrawnInstrument::new(current),
             table: None,
             standing_wave: None,
         }
@@ -45,22 +71,17 @@ impl InstrumentAnalysis {
 
     /// Whether this is the analysis of that instrument.
     pub fn is_of(&self, current: &CurrentInstrument) -> bool {
-        Arc::ptr_eq(&self.model, &current.model)
+        self.drawn.is_of(current)
     }
 
-    /// The instrument's measurements.
-    pub fn file(&self) -> &Arc<InstrumentFile> {
-        &self.file
-    }
-
-    /// The measurements before any alteration and before scaling.
-    pub fn as_built(&self) -> &Arc<InstrumentFile> {
-        &self.as_built
+    /// The instrument.
+    pub fn drawn(&self) -> &DrawnInstrument {
+        &self.drawn
     }
 
     /// What a fingering requires of the breath with this reed; `None` if it does not sound.
     pub fn requirement(&self, fingering: usize, settings: &Settings) -> Option<NoteRequirement> {
-        let reed = feel_inputs::played_reed(&self.model.file, settings);
+        let reed = feel_inputs::played_reed(&self.drawn.file, settings);
         self.feels.requirements().note(fingering, &reed)
     }
 
@@ -90,7 +111,7 @@ impl InstrumentAnalysis {
         if let Some(known) = known.filter(|known| known.fingering == fingering && known.open == open) {
             return known.wave.clone();
         }
-        let wave = self.bore.standing_pressure(self.model.notes_hz[fingering], open);
+        let wave = self.bore.standing_pressure(self.drawn.model.notes_hz[fingering], open);
         let wave: Vec<_> = wave.into_iter().map(|(x, p)| (x as f32, p as f32)).collect();
         self.standing_wave = Some(StandingWave { fingering, open: open.to_vec(), wave: wave.clone() });
         wave

@@ -12,7 +12,7 @@ use super::breath_history::BreathHistory;
 use super::device_list;
 use super::file_tasks::FilesRead;
 use super::fingering_searcher::FingeringSearcher;
-use super::instrument_analysis::InstrumentAnalysis;
+use super::instrument_analysis::{DrawnInstrument, InstrumentAnalysis};
 use super::window_audio::AudioSnapshot;
 use crate::controllers::breath_input::BreathInput;
 #[cfg(feature = "devices")]
@@ -47,8 +47,8 @@ const DEVICES_EVERY: Duration = Duration::from_secs(2);
 const LEVEL_S: f64 = 0.05;
 /// Time for which a message lights the lamp.
 const MIDI_LIT: Duration = Duration::from_millis(150);
-/// Less mouth pressure than this counts as none, kPa.
-const NO_BREATH_KPA: f32 = 1e-3;
+/// While the mouth pressure is above this, meters may move, kPa.
+const STILL_KPA: f32 = 1e-3;
 
 /// The state of the thread.
 pub struct SnapshotThread {
@@ -64,6 +64,8 @@ pub struct SnapshotThread {
     midi: (u32, Option<Instant>),
     files: FilesRead,
     fingerings: FingeringSearcher,
+    /// What is drawn before the first analysis.
+    first: Option<DrawnInstrument>,
     analysis: Option<InstrumentAnalysis>,
     /// A thread that analyses a new instrument meanwhile.
     analysing: Option<JoinHandle<InstrumentAnalysis>>,
@@ -92,6 +94,7 @@ impl SnapshotThread {
             midi: (0, None),
             files: FilesRead::default(),
             fingerings: FingeringSearcher::default(),
+            first: None,
             analysis: None,
             analysing: None,
             #[cfg(feature = "devices")]
@@ -145,7 +148,7 @@ impl SnapshotThread {
         *self.shared.latest.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(snapshot);
         self.shared.draw_again();
         let is_moving = is_looking
-            || inside.now.mouth_kpa > NO_BREATH_KPA
+            || inside.now.mouth_kpa > STILL_KPA
             || inside.now.sounding.is_some()
             || self.midi.1.is_some_and(|at| at.elapsed() < MIDI_LIT);
         if is_moving { MOVING } else { IDLE }
@@ -159,11 +162,13 @@ impl SnapshotThread {
         fingering: usize,
     ) {
         let design = self.feel_design();
-        let analysed = self.analysis.as_ref().map(|analysis| analysis.file().clone());
-        let Some(file) = analysed.or_else(|| current.map(|current| Arc::new(current.model.file.clone())))
+        let analysed = self.analysis.as_ref().map(|analysis| analysis.drawn().clone());
+        let Some(DrawnInstrument { file, as_built, key, .. }) =
+            analysed.or_else(|| self.drawn_at_first(current))
         else {
             return;
         };
+        (snapshot.as_built, snapshot.instrument_key) = (as_built, key);
         let fingering = fingering.min(file.fingerings.len().saturating_sub(1));
         let open = self
             .shared
@@ -179,7 +184,15 @@ impl SnapshotThread {
         snapshot.requirement = analysis.requirement(fingering, &snapshot.played());
         snapshot.feel = analysis.feel(fingering, &snapshot.settings, &design);
         snapshot.standing = analysis.standing_wave(fingering, &open);
-        snapshot.as_built = analysis.as_built().clone();
+    }
+
+    /// The instrument that sounds while there is no analysis yet: an instrument of the user's own is fitted first, which takes up
+    /// to a minute.
+    fn drawn_at_first(&mut self, current: Option<&CurrentInstrument>) -> Option<DrawnInstrument> {
+        let current = current?;
+        let known = self.first.take().filter(|first| first.is_of(current));
+        self.first = Some(known.unwrap_or_else(|| DrawnInstrument::new(current)));
+        self.first.clone()
     }
 
     /// Fills in the knob and the list of devices.
