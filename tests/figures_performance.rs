@@ -11,7 +11,7 @@ use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, RequirementSolver, TorqueLimits, torque_law};
 use chalumeau_core::instrument::feel_inputs::played_reed;
-use chalumeau_core::instrument::{Clarinet, Settings};
+use chalumeau_core::instrument::{Clarinet, KeyNotes, Settings};
 use chalumeau_core::measure::bifurcation;
 use chalumeau_core::reed::ReedTables;
 use chalumeau_core::score::Score;
@@ -265,7 +265,7 @@ fn played() -> (Overview, Envelope, ReedCloseUp, Vec<Note>) {
         Ok::<_, Infallible>(())
     })
     .unwrap();
-    let notes = score.note_spans().into_iter().map(|sounding| Note {
+    let notes = score.note_spans(&KeyNotes::default()).into_iter().map(|sounding| Note {
         note: sounding.note,
         from_s: sounding.from as f64 / 48_000.0,
         to_s: sounding.to as f64 / 48_000.0,

@@ -49,7 +49,8 @@ impl RenderMonitor {
     /// For a rendering that is about to begin. The close-up is at `near_s`, or in the middle of the longest note.
     pub fn new(prepared: &RenderJob, near_s: Option<f64>) -> Result<Self, Failure> {
         let (score, rate_hz) = (&prepared.score, f64::from(prepared.rate));
-        let (seconds, soundings) = (score.seconds(prepared.rate), score.note_spans());
+        let notes = prepared.settings.reach.key_notes(&prepared.model);
+        let (seconds, soundings) = (score.seconds(prepared.rate), score.note_spans(&notes));
         if let Some(near_s) = near_s.filter(|&near_s| near_s >= seconds) {
             return Err(Failure::Usage(format!(
                 "--plot-at {near_s} is after the end; the sound is {seconds:.3} s long"

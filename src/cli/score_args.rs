@@ -308,9 +308,11 @@ impl ScoreArgs {
         let hand = BreathMapping { maps: feels.maps_for(&table, settings), design: knob, feels: true };
         let rate_hz = f64::from(self.rate);
         let full_pa = 1e3 * f64::from(settings.breath_full_kpa);
+        let mut blower = Blower::default();
+        blower.set_notes(settings.reach.key_notes(model));
         let events = BlownEvents::new(
             score.events.iter().copied(),
-            &mut Blower::default(),
+            &mut blower,
             &hand,
             full_pa,
             score.samples,

@@ -66,7 +66,7 @@ pub use model::{BuildError, Model};
 pub use player::{Attack, vibrato::Vibrato};
 pub use players::{MOST_PLAYERS, Players, Split};
 pub use prepare::{Preparation, Quality, Wanted};
-pub use reach::{Beyond, Reach};
+pub use reach::{Beyond, KeyNotes, Reach};
 pub use room::Room;
 pub use settings::{BreathResponse, Settings, Tuning};
 pub use techniques::{GrowlPitch, Techniques, Tract};

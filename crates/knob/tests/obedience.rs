@@ -208,7 +208,7 @@ fn a_host_that_stops_calling_ends_torque_within_650_ms() {
 }
 
 #[test]
-fn a_program_that_is_stopped_ends_torque_within_650_ms() {
+fn a_program_that_is_stopped_ends_torque_within_its_watchdog_and_the_fade() {
     for binding in BINDINGS {
         let worst = worst_ms("no program", binding, |play| play.runs = false);
         let watchdog_ms = if binding == Binding::Midi { 380 } else { 130 };

@@ -27,12 +27,12 @@ constexpr float WALL_DAMPING_MNMS = 2.0F;         // takes the rebound, by judge
 constexpr float FRICTION_SPEED = 0.5F;            // rad/s at which Coulomb friction begins to be itself, by judgement
 constexpr float VISCOUS_MAX_MNMS = 20.0F;         // slope of damping and friction at rest: more shakes a light knob
 
-/// A table between its points.
+/// A table between its points. An index that is no number counts as one beyond the end.
 inline float table_at(const float* table, float index) {
-    const auto below = static_cast<int>(index);
-    if (below >= 3600) {
+    if (!(index < INDEX_PER_P)) {
         return table[3600];
     }
+    const auto below = static_cast<int>(index);
     return table[below] + (index - static_cast<float>(below)) * (table[below + 1] - table[below]);
 }
 

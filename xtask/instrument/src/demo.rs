@@ -6,7 +6,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use chalumeau_core::instrument::Clarinet;
+use chalumeau_core::instrument::{Clarinet, KeyNotes};
 use chalumeau_core::measure::notes::{MeasuredNote, NoteMeter, spread};
 use chalumeau_core::score;
 use chalumeau_core::score::NoteSpan;
@@ -98,7 +98,7 @@ fn comparison(left: &[f32], right: &[f32], rendered: &[f32]) -> String {
 }
 
 fn table(samples: &[f32], score: &Score) -> String {
-    let mut listener = NoteMeter::new(score.note_spans(), f64::from(RATE), A4_HZ, 0.0);
+    let mut listener = NoteMeter::new(score.note_spans(&KeyNotes::default()), f64::from(RATE), A4_HZ, 0.0);
     listener.hear(samples);
     let heard = listener.finish();
     let mut text = "   at   sounds  written   length       Hz    cents   level\n".to_owned();

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::Result;
 use chalumeau_core::analysis::overview::{Envelope, Overview, Watcher};
 use chalumeau_core::event::Event;
-use chalumeau_core::instrument::Settings;
+use chalumeau_core::instrument::{KeyNotes, Settings};
 use chalumeau_core::score::{Score, closing_kpa};
 use chalumeau_figure::palette::Colour;
 use chalumeau_figure::performance::{Note, PerformanceFigure as Played, outline, performance};
@@ -39,7 +39,7 @@ pub fn write(path: &Path, samples: &[f32], rate_hz: f64, score: &Score, a4_hz: f
         }
         gamma.push(now);
     }
-    let notes = score.note_spans().into_iter().map(|sounding| Note {
+    let notes = score.note_spans(&KeyNotes::default()).into_iter().map(|sounding| Note {
         note: sounding.note,
         from_s: sounding.from as f64 / rate_hz,
         to_s: sounding.to as f64 / rate_hz,
@@ -131,7 +131,7 @@ mod tests {
             let png = std::fs::read(path(name)).unwrap();
             assert!(&png[1..4] == b"PNG" && png.len() > 50_000, "{name}: {} bytes", png.len());
         }
-        // To be looked at: `CHALUMEAU_PICTURES=folder cargo test -p xtask --lib picture`.
+        // To be looked at: `CHALUMEAU_PICTURES=folder cargo test -p xtask-instrument picture`.
         if let Some(to) = std::env::var_os("CHALUMEAU_PICTURES") {
             for name in ["a.png", "b.png"] {
                 std::fs::copy(path(name), Path::new(&to).join(name)).unwrap();

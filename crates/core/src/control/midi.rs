@@ -142,7 +142,8 @@ impl MidiDecoder {
         self
     }
 
-    /// Forgets every note and controller, the breath source, the zones and the bend ranges. Real-time safe.
+    /// Forgets everything: notes, controllers, breath source, zones and bend ranges, and also links, what the wheel does, which
+    /// controllers may blow, and the usual bend range. Real-time safe.
     pub fn reset(&mut self) {
         *self = Self::new();
     }
@@ -183,6 +184,7 @@ impl MidiDecoder {
         if self.breath.set_from(from) {
             self.origin = None;
             self.said.push(Event::BreathFromKeys);
+            self.ease_keys();
         }
         self.said.events()
     }
@@ -207,6 +209,8 @@ impl MidiDecoder {
         self.notes.press(note);
         self.prepare_note(note.channel);
         self.leave_note_breath();
+        // A finger that does not press yet is about to.
+        self.blow_member(|unit| unit > 0.0);
         self.remix();
         if by_pedal.is_some_and(|held| held.key == note.key) {
             self.lift(note.key);
@@ -298,6 +302,8 @@ impl MidiDecoder {
         let (at, cc, value) = (usize::from(channel % 16), cc.min(127), value.min(127));
         let place = self.place(at, cc);
         match cc {
+            // The fine part of a linked controller belongs to it, and a link has 128 steps.
+            BREATH_FINE | EXPRESSION_FINE if self.links.has(Source::Controller(cc - 32)) => {}
             _ if self.links.has(Source::Controller(cc)) => self.follow(Source::Controller(cc), value, place),
             BREATH | BREATH_FINE => {
                 self.hear(BreathController::Breath, at, (cc == BREATH_FINE, value), place, false);
@@ -350,6 +356,7 @@ impl MidiDecoder {
                     self.bend_anew();
                 }
                 self.set_pedal(false);
+                self.ease_keys();
                 self.techniques.controllers = TechniqueControllers::default();
                 self.say_techniques();
             }
@@ -368,6 +375,7 @@ impl MidiDecoder {
         let at = usize::from(channel % 16);
         let place = self.place(at, PRESSURE);
         if self.links.has(Source::Pressure) {
+            self.ease_keys();
             self.follow(Source::Pressure, value.min(127), place);
         } else {
             let is_key_down = is_key_down || self.sounding().is_some();
@@ -383,6 +391,7 @@ impl MidiDecoder {
     pub fn other_pressure(&mut self, channel: u8) -> &[Event] {
         self.begin();
         self.place(usize::from(channel % 16), PRESSURE);
+        self.ease_keys();
         self.said.events()
     }
 
@@ -484,11 +493,37 @@ impl MidiDecoder {
     ) {
         let is_held = self.sounding().is_some();
         match self.breath.hear(controller, at, part, place, is_held, may_be_of_keys) {
+            // In MPE, each finger blows its own note.
+            Some(Heard::Breath(_)) if self.is_unheard_member(at) => {}
             Some(Heard::Breath(unit)) => self.blow(BreathOrigin::Controller(controller), unit),
             Some(Heard::Keys(unit)) if std::mem::replace(&mut self.key_pressure, unit) != unit => {
                 self.said.push(Event::KeyPressure(unit));
             }
             _ => {}
+        }
+    }
+
+    /// Whether a channel belongs to a finger whose note is not heard.
+    fn is_unheard_member(&self, at: usize) -> bool {
+        self.bends.is_member(at) && self.heard_channel().is_some_and(|heard| heard != at)
+    }
+
+    /// The breath of the finger whose note is heard now, if `is_meant`.
+    fn blow_member(&mut self, is_meant: impl Fn(f32) -> bool) {
+        let Some(at) = self.heard_channel().filter(|&at| self.bends.is_member(at)) else { return };
+        let own = self.breath.of(at).filter(|&(_, unit)| is_meant(unit));
+        // What the key has settled is said already.
+        if let Some((controller, unit)) =
+            own.filter(|&(_, unit)| !self.said.events().contains(&Event::Breath(unit)))
+        {
+            self.blow(BreathOrigin::Controller(controller), unit);
+        }
+    }
+
+    /// Pressure is no longer that of pressed keys.
+    fn ease_keys(&mut self) {
+        if std::mem::take(&mut self.key_pressure) != 0.0 {
+            self.said.push(Event::KeyPressure(0.0));
         }
     }
 
@@ -575,8 +610,11 @@ impl MidiDecoder {
         self.notes.choke(NoteAddress::default());
         self.fingers = Keys::default();
         self.said.push(Event::Panic);
-        // Without the tuning of the note that was cut.
+        self.ease_keys();
+        // Without tuning, volume and pan of the note that was cut.
+        self.notes.make_plain();
         self.rebend();
+        self.remix();
     }
 
     /// Keys have come up, and `before` sounded until now: what is heard now, and which keys are no longer down.
@@ -584,6 +622,7 @@ impl MidiDecoder {
         self.rebend();
         if let Some(Note { key, .. }) = self.sounding().filter(|&now| Some(now) != before) {
             self.blow_note();
+            self.blow_member(|_| true);
             self.remix();
             let next = self.fingers.held().iter().rev().find(|finger| self.notes.holds(finger.0));
             if next != Some(&SoundingNote(key)) {

@@ -236,6 +236,11 @@ impl Notes {
         heard.map(|note| note.key)
     }
 
+    /// Forgets what belonged to the last note, which was cut.
+    pub fn make_plain(&mut self) {
+        self.released = self.released.map(|released| HeldNote::new(released.note));
+    }
+
     /// Takes away the note that the pedal holds, which is then held alone.
     pub fn take_by_pedal(&mut self) -> Option<Note> {
         let held = *self.sounding().filter(|held| held.is_by_pedal)?;

@@ -224,7 +224,7 @@ impl Clarinet {
 
     /// Takes over keys, breath and bend from another instrument, which this new one replaces. Real-time safe.
     pub fn carry_on(&mut self, from: &Self) {
-        with_voice!(&mut self.voice, voice => self.player.carry_on(&from.player, &self.model, voice));
+        with_voice!(&mut self.voice, voice => self.player.carry_on(&from.player, &from.model, &self.model, voice));
         self.level.carry_on(&from.level);
     }
 

@@ -21,6 +21,36 @@ pub enum Beyond {
     Octave,
 }
 
+/// Which note each key plays, for what follows the keys of a player and is none: a knob, a measurement.
+///
+/// ```
+/// use chalumeau_core::instrument::{KeyNotes, Model, Reach};
+/// use chalumeau_core::units::SoundingNote;
+///
+/// let model = Model::built_in(48_000.0)?;
+/// let notes = Reach { transpose: -2, ..Reach::default() }.key_notes(&model);
+/// assert_eq!(notes.of(SoundingNote(60)), Some(SoundingNote(58)));
+/// assert_eq!(notes.of(SoundingNote(20)), None, "the clarinet has no such note");
+/// assert_eq!(KeyNotes::default().of(SoundingNote(20)), Some(SoundingNote(20)));
+/// # Ok::<(), chalumeau_core::instrument::BuildError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct KeyNotes([Option<SoundingNote>; 128]);
+
+impl Default for KeyNotes {
+    /// Every key plays its own note.
+    fn default() -> Self {
+        Self(std::array::from_fn(|key| u8::try_from(key).ok().map(SoundingNote)))
+    }
+}
+
+impl KeyNotes {
+    /// The note that a key plays; `None` if it plays nothing. Real-time safe.
+    pub fn of(&self, key: SoundingNote) -> Option<SoundingNote> {
+        self.0.get(usize::from(key.0)).copied().flatten()
+    }
+}
+
 /// Which note a key plays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Reach {
@@ -54,6 +84,14 @@ impl Reach {
     /// ```
     pub fn fingering(self, key: SoundingNote, model: &Model) -> Option<usize> {
         self.find(key, &model.keys, |note| model.fingering_for(note)).map(|(_, fingering)| fingering)
+    }
+
+    /// The notes of all keys on an instrument. Real-time safe.
+    pub fn key_notes(self, model: &Model) -> KeyNotes {
+        let of = |key| self.find(SoundingNote(key), &model.keys, |note| model.fingering_for(note));
+        KeyNotes(std::array::from_fn(|key| {
+            u8::try_from(key).ok().and_then(of).map(|(KeyPitch { note, .. }, _)| note)
+        }))
     }
 
     /// What a key plays, and what `find` knows of its note, where `find` knows which notes an instrument plays. Real-time

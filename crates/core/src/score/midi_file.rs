@@ -272,7 +272,38 @@ fn merged(bytes: &[u8]) -> Result<(Clock, Vec<Message<'_>>), MidiFileError> {
         return Err(MidiFileError::Tracks { announced, found: track });
     }
     messages.sort_by_key(|m: &Message| m.tick);
+    let mut held = [false; 16 * 128];
+    for together in messages.chunk_by_mut(|a, b| a.tick == b.tick) {
+        end_before_beginning(together, &mut held);
+    }
     Ok((clock, messages))
+}
+
+/// Messages of one tick. A key that is held, and struck again where it ends, ends first: otherwise its end would end the new note.
+/// Files with several tracks have these two in any order. `held` says which keys are, of all channels.
+fn end_before_beginning(together: &mut [Message], held: &mut [bool; 16 * 128]) {
+    let note = |message: &Message| match message.kind {
+        TrackEventKind::Midi { channel, message: MidiMessage::NoteOn { key, vel } } => {
+            Some((usize::from(channel.as_int()) * 128 + usize::from(key.as_int()), vel > 0))
+        }
+        TrackEventKind::Midi { channel, message: MidiMessage::NoteOff { key, .. } } => {
+            Some((usize::from(channel.as_int()) * 128 + usize::from(key.as_int()), false))
+        }
+        _ => None,
+    };
+    let mut at = 0;
+    while at < together.len() {
+        if let Some((key, true)) = note(&together[at])
+            && held[key]
+            && let Some(end) = together[at..].iter().position(|message| note(message) == Some((key, false)))
+        {
+            together[at..=at + end].rotate_right(1);
+        }
+        if let Some((key, is_down)) = note(&together[at]) {
+            held[key] = is_down;
+        }
+        at += 1;
+    }
 }
 
 fn read_track<'a>(
@@ -309,6 +340,7 @@ fn find(bytes: &[u8], word: &[u8]) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::instrument::KeyNotes;
     use crate::units::SoundingNote;
 
     /// A file from a division and the bodies of its tracks.
@@ -356,6 +388,22 @@ mod tests {
         let [a, b, _] = score.events[..] else { panic!("{score:?}") };
         assert_eq!(a.event, Event::Breath(2.0 / 127.0));
         assert!(matches!(b.event, Event::NoteOn { note: SoundingNote(60), .. }));
+    }
+
+    #[test]
+    fn a_key_that_ends_where_it_begins_again_ends_first_in_whichever_track_it_is() {
+        let track = |from: u8| [from, 0x90, 60, 64, 96, 0x80, 60, 0, 0, 0xFF, 0x2F, 0];
+        for tracks in [[track(0), track(96)], [track(96), track(0)]] {
+            let score = read(&file(1, [0, 96], &[&tracks[0], &tracks[1]]), 48_000).unwrap();
+            let heard: Vec<_> =
+                score.note_spans(&KeyNotes::default()).iter().map(|span| (span.from, span.to)).collect();
+            assert_eq!(heard, [(0, 24_000), (24_000, 48_000)]);
+        }
+        // A note of no length stays one: the key is not held before it.
+        let brief: &[u8] = &[0, 0x90, 60, 64, 0, 0x80, 60, 0, 96, 0xFF, 0x2F, 0];
+        let score = read(&file(0, [0, 96], &[brief]), 48_000).unwrap();
+        assert!(matches!(score.events[..], [on, off] if matches!(on.event, Event::NoteOn { .. })
+            && matches!(off.event, Event::NoteOff { .. })));
     }
 
     #[test]

@@ -130,7 +130,7 @@ impl<E> Score<E> {
     where
         E: Played,
     {
-        self.events.retain(|e| !matches!(e.event.event(), Event::Breath(_)));
+        self.events.retain(|e| !matches!(e.event.event(), Event::Breath(_) | Event::BreathFromKeys));
         let blown = curve.events(self.samples, rate, settings).into_iter();
         let mut events: Vec<_> = blown.map(|Timed { at, event }| Timed { at, event: event.into() }).collect();
         events.append(&mut self.events);

@@ -5,7 +5,7 @@
 //! obeys the user has a [`Heartbeat`], and the link keeps a knob armed only while all of them beat.
 
 use std::sync::atomic::{AtomicU8, AtomicU32, Ordering};
-use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// A knob is let go when a thread that obeys the user has been silent for this long, us. By judgement: longer than any
 /// audio block and any redraw of a window, shorter than the time in which a user would pull the plug.
@@ -70,7 +70,7 @@ impl Heartbeat {
 
 /// All heartbeats of a link.
 #[derive(Clone, Debug, Default)]
-pub struct Heartbeats(Arc<Mutex<Vec<Weak<Source>>>>);
+pub struct Heartbeats(Arc<Mutex<Vec<Arc<Source>>>>);
 
 impl Heartbeats {
     /// A heartbeat for the thread of this name, which completes the sentence "... has stood still".
@@ -82,8 +82,7 @@ impl Heartbeats {
             reason: AtomicU8::new(0),
         });
         let mut sources = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        sources.retain(|source| source.strong_count() > 0);
-        sources.push(Arc::downgrade(&source));
+        sources.push(source.clone());
         Heartbeat(source)
     }
 }
@@ -99,7 +98,7 @@ pub struct Pulse {
 
 #[derive(Debug)]
 struct Watched {
-    source: Weak<Source>,
+    source: Arc<Source>,
     beats: u32,
     releases: u32,
     heard_us: i64,
@@ -120,22 +119,24 @@ impl Monitor {
 
     /// Looks at all of them. Call it more often than they may be silent.
     pub fn look(&mut self, now_us: i64) -> Pulse {
-        let sources = self.heartbeats.0.lock().unwrap_or_else(PoisonError::into_inner);
-        for source in sources.iter() {
-            if !self.watched.iter().any(|known| known.source.ptr_eq(source)) {
-                // Whoever registers lives.
-                let (source, heard_us) = (source.clone(), now_us);
-                self.watched.push(Watched { source, beats: 0, releases: 0, heard_us });
-            }
-        }
-        drop(sources);
+        // Whoever registers lives. From here on this holds the source, so that a last word is heard though its thread has ended.
+        let registered =
+            std::mem::take(&mut *self.heartbeats.0.lock().unwrap_or_else(PoisonError::into_inner));
+        let new =
+            registered.into_iter().map(|source| Watched { source, beats: 0, releases: 0, heard_us: now_us });
+        self.watched.extend(new);
         let mut pulse = Pulse { oldest: None, released: None };
         self.watched.retain_mut(|known| {
-            let Some(source) = known.source.upgrade() else { return false };
+            let source = &known.source;
+            // Before the last word is read: none comes after it.
+            let is_dropped = Arc::strong_count(source) == 1;
             let releases = source.releases.load(Ordering::Acquire);
             if std::mem::replace(&mut known.releases, releases) != releases {
                 let reason = usize::from(source.reason.load(Ordering::Relaxed));
                 pulse.released = Release::ALL.get(reason).copied();
+            }
+            if is_dropped {
+                return false;
             }
             let beats = source.beats.load(Ordering::Relaxed);
             if std::mem::replace(&mut known.beats, beats) != beats {
@@ -181,5 +182,15 @@ mod tests {
         audio.let_go(Release::Stop);
         assert_eq!(monitor.look(1).released, Some(Release::Stop));
         assert_eq!(monitor.look(2).released, None);
+        // Nor does the thread have to live until the next look.
+        let (brief, _other) = (heartbeats.register("brief"), heartbeats.register("other"));
+        brief.let_go(Release::Panic);
+        drop(brief);
+        assert_eq!(monitor.look(3).released, Some(Release::Panic));
+        audio.let_go(Release::Stop);
+        drop(audio);
+        let Pulse { oldest, released } = monitor.look(4);
+        assert_eq!((oldest.map(|(_, name)| name), released), (Some("other"), Some(Release::Stop)));
+        assert_eq!(monitor.look(5).released, None);
     }
 }

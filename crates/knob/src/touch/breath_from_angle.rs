@@ -11,6 +11,7 @@ use crate::touch::feel::PitchMaps;
 use chalumeau_core::control::keys::Keys;
 use chalumeau_core::control::knob::{KnobBreath, KnobDesign};
 use chalumeau_core::event::{Event, Played, Timed};
+use chalumeau_core::instrument::KeyNotes;
 use chalumeau_core::units::SoundingNote;
 
 /// Samples between two values of breath: 1.3 ms at 48 kHz, a quarter of the time the player's breath takes to follow.
@@ -49,6 +50,8 @@ pub struct BreathMapping {
 /// Follows the notes and turns angles into breath. Real-time safe throughout.
 #[derive(Clone, Debug, Default)]
 pub struct Blower {
+    /// Which note each key plays.
+    notes: KeyNotes,
     keys: Keys,
     fingered: Option<SoundingNote>,
     /// The note whose map made the latest breath, once a note has been fingered.
@@ -62,20 +65,26 @@ pub struct Blower {
 }
 
 impl Blower {
-    /// Returns to the initial state.
+    /// Returns to the initial state; keys play the same notes as before.
     pub fn reset(&mut self) {
-        *self = Self::default();
+        *self = Self { notes: self.notes, ..Self::default() };
     }
 
-    /// Notes an event of the block that begins now.
+    /// Which note each key plays from now on; at first its own.
+    pub fn set_notes(&mut self, notes: KeyNotes) {
+        self.notes = notes;
+    }
+
+    /// Takes notice of an event of the block that begins now. A key that plays nothing changes nothing, as for the player.
     pub fn heed(&mut self, event: &Timed<Event>) {
         match event.event {
+            Event::NoteOn { note, .. } if self.notes.of(note).is_none() => return,
             Event::NoteOn { note, .. } => self.keys.press(note),
             Event::NoteOff { note } | Event::Choke { note } => self.keys.release(note),
             Event::Panic => self.keys = Keys::default(),
             _ => return,
         }
-        self.fingered = self.keys.last().or(self.fingered);
+        self.fingered = self.keys.last().and_then(|key| self.notes.of(key)).or(self.fingered);
     }
 
     /// The fingered note; it stays after its key is released.
@@ -212,7 +221,7 @@ mod tests {
     use crate::touch::feel::{InstrumentFeel, NO_MOTOR};
     use chalumeau_core::control::midi::MidiDecoder;
     use chalumeau_core::haptics::FeelDesign;
-    use chalumeau_core::instrument::Settings;
+    use chalumeau_core::instrument::{Model, Reach, Settings};
     use std::sync::LazyLock;
 
     static HAND: LazyLock<BreathMapping> = LazyLock::new(|| {
@@ -255,6 +264,24 @@ mod tests {
     #[test]
     fn while_the_knob_blows_nothing_else_does() {
         assert!(!phrase(512).contains(&(5_001, Event::Breath(0.9))));
+    }
+
+    #[test]
+    fn the_hand_follows_the_note_that_a_key_plays() {
+        let model = Model::built_in(48_000.0).unwrap();
+        let mut blower = Blower::default();
+        blower.set_notes(Reach { transpose: -2, ..Reach::default() }.key_notes(&model));
+        blower.heed(&note_on(0, 60));
+        assert_eq!(blower.fingered(), Some(SoundingNote(58)));
+        // The clarinet has no such note: the player goes on with the one before.
+        blower.heed(&note_on(0, 40));
+        assert_eq!(blower.fingered(), Some(SoundingNote(58)));
+        blower.heed(&note_on(0, 64));
+        blower.heed(&Timed { at: 0, event: Event::NoteOff { note: SoundingNote(64) } });
+        assert_eq!(blower.fingered(), Some(SoundingNote(58)));
+        blower.reset();
+        blower.heed(&note_on(0, 60));
+        assert_eq!(blower.fingered(), Some(SoundingNote(58)));
     }
 
     #[test]

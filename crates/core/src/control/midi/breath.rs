@@ -142,6 +142,12 @@ impl BreathChoice {
         self.heard
     }
 
+    /// The controller that is heard, and its latest value on a channel, 0..=1, if it has one there.
+    pub fn of(&self, channel: usize) -> Option<(BreathController, f32)> {
+        let controller = self.heard?;
+        Some((controller, self.claims[channel][controller as usize].unit?))
+    }
+
     /// A controller moves. `place` is its place among the channel's controllers; `is_held`: a key is;
     /// `may_be_of_keys`: a keyboard could send it as pressure on keys. Gives what is heard of it.
     pub fn hear(

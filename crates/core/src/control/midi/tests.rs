@@ -32,6 +32,14 @@ fn id(id: i32) -> NoteAddress {
     NoteAddress { id: Some(id), ..NoteAddress::default() }
 }
 
+/// Links with one, to a number.
+fn one_link(source: Source) -> [Option<Link>; links::MOST] {
+    let target = links::Target::Number(crate::event::SettingNumber::Growl);
+    let mut all = [None; links::MOST];
+    all[0] = Some(Link { source, target, low: 0.0, high: 1.0, curve: 1.0, own: 0.2 });
+    all
+}
+
 fn key(key: u8) -> NoteAddress {
     NoteAddress { key: Some(key), ..NoteAddress::default() }
 }
@@ -339,6 +347,25 @@ fn the_upper_zone_counts_down_and_gives_way() {
 }
 
 #[test]
+fn in_mpe_each_finger_blows_its_own_note() {
+    let mut midi = MidiDecoder::new().with_mpe();
+    midi.note_on(1, 60, 90);
+    assert_eq!(midi.pressure(1, 80), [breath(80)]);
+    // What a controller sends of a finger before its note is meant for that note.
+    assert_eq!(midi.pressure(2, 20), NOTHING);
+    assert_eq!(midi.note_on(2, 64, 127), [breath(20), on(64)]);
+    assert_eq!(midi.pressure(1, 79), NOTHING, "the finger below presses on, unheard");
+    assert_eq!(midi.pressure(2, 0), [breath(0)]);
+    assert_eq!(midi.note_off(2, 64), [breath(79), off(64)], "and blows when its note is heard again");
+    assert_eq!(midi.pressure(1, 78), [breath(78)]);
+    // The manager blows all.
+    assert_eq!(midi.pressure(0, 50), [breath(50)]);
+    // A finger at rest is about to press: until it does, the breath goes on.
+    midi.pressure(3, 0);
+    assert_eq!(midi.note_on(3, 67, 127), [on(67)]);
+}
+
+#[test]
 fn each_note_has_its_own_channels_bend() {
     let mut midi = MidiDecoder::new().with_mpe();
     midi.note_on(1, 60, 90);
@@ -351,6 +378,44 @@ fn each_note_has_its_own_channels_bend() {
     assert!((cents - FULL[0] * 4096.0 / 8191.0).abs() < 1e-2 && note == SoundingNote(62));
     assert_eq!(midi.note_off(1, 60), [off(60)], "a fading note keeps its bend");
     assert_eq!(midi.bend(1, 8192), [bend(0.0)], "and follows its wheel");
+}
+
+#[test]
+fn pressed_keys_are_eased_when_pressure_becomes_something_else() {
+    let pressed = || {
+        let mut midi = MidiDecoder::new();
+        midi.note_on(0, 60, 127);
+        assert_eq!(midi.pressure(0, 127), [Event::KeyPressure(1.0)]);
+        midi
+    };
+    const EASED: Event = Event::KeyPressure(0.0);
+    assert_eq!(pressed().set_breath_from(BreathFrom::Keys), [Event::BreathFromKeys, EASED]);
+    assert_eq!(pressed().controller(0, 121, 0), [bend(0.0), EASED]);
+    assert_eq!(pressed().other_pressure(0), [EASED]);
+    assert_eq!(pressed().controller(0, 123, 0), [Event::Panic, EASED]);
+    let mut linked = pressed();
+    linked.set_links(&one_link(Source::Pressure));
+    assert_eq!(linked.pressure(0, 0)[0], EASED);
+}
+
+#[test]
+fn a_linked_breath_controller_takes_its_fine_part_along() {
+    let mut midi = MidiDecoder::new();
+    midi.set_links(&one_link(Source::Controller(2)));
+    midi.note_on(0, 60, 127);
+    assert_ne!(midi.controller(0, 2, 80), NOTHING);
+    for fine in [17, 90] {
+        assert_eq!(midi.controller(0, 34, fine), NOTHING);
+    }
+    assert_eq!(midi.controller(0, 11, 80), [breath(80)], "the other one is free");
+}
+
+#[test]
+fn a_cut_note_leaves_neither_tuning_nor_volume() {
+    let mut midi = MidiDecoder::new();
+    midi.note_on(0, 60, 127);
+    assert_eq!(midi.express(key(60), NoteExpression::Tuning(40.0)), [bend(40.0)]);
+    assert_eq!(midi.silence(), [Event::Panic, bend(0.0)]);
 }
 
 #[test]

@@ -314,6 +314,7 @@ fn a_key_that_is_down_is_no_switch_any_more_where_the_row_has_moved() {
     assert_eq!(parts.pressure(2, 20), [], "the row is where it was");
     parts.set_key_switches(KeySwitches::C1);
     parts.note_off(2, 37);
+    parts.note_on(2, 62, 127);
     let before = parts.decoders[0].clone();
     let said = said(parts.pressure(2, 20));
     let mut decoder = before;

@@ -1,6 +1,7 @@
 //! A player goes on on another instrument.
 
 use super::Player;
+use super::fingers::Fingers;
 use crate::bore::lattice::Real;
 use crate::instrument::model::Model;
 use crate::instrument::person::Person;
@@ -8,11 +9,17 @@ use crate::instrument::voice::Voice;
 
 impl Player {
     /// Takes over keys, breath, lip and bend from the player of another instrument, as if the player had always held
-    /// this one; the note has yet to speak. Keys that this instrument does not have are released. Settings stay.
-    /// Real-time safe.
-    pub fn carry_on<F: Real>(&mut self, from: &Self, model: &Model, voice: &mut Voice<F>) {
+    /// this one; the note has yet to speak. Keys that this instrument does not have are released. Holes that are held stay so where
+    /// the other one, `before`, has the same holes. Settings stay. Real-time safe.
+    pub fn carry_on<F: Real>(&mut self, from: &Self, before: &Model, model: &Model, voice: &mut Voice<F>) {
+        let has_same = before.file.holes.iter().map(|hole| &hole.name).eq(model
+            .file
+            .holes
+            .iter()
+            .map(|hole| &hole.name));
         *self = Self {
             settings: self.settings,
+            fingers: if has_same { from.fingers.lifted() } else { Fingers::default() },
             keys: from.keys,
             inflection: from.inflection.carried(),
             inhalation: from.inhalation,
@@ -52,6 +59,7 @@ impl Player {
         self.techniques.follow(&from.techniques);
         self.swing.follow(&from.swing);
         self.chosen = from.chosen;
+        self.fingers.follow(&from.fingers);
         self.posture = None;
     }
 }
@@ -61,6 +69,19 @@ mod tests {
     use crate::event::Event;
     use crate::instrument::{Clarinet, Reach, Settings};
     use crate::units::SoundingNote;
+
+    #[test]
+    fn holes_on_trial_stay_on_trial_on_another_instrument_with_the_same_holes() {
+        let [mut first, mut other] = [(); 2].map(|()| Clarinet::built_in(48_000.0).unwrap());
+        first.apply(Event::TryHoles(Some(0b101)));
+        other.carry_on(&first);
+        other.apply(Event::NoteOn { note: SoundingNote(58), velocity: 0.7 });
+        let mut sound = vec![0.0; 9_600];
+        other.render(&mut sound);
+        let open: Vec<usize> =
+            (0..24).filter(|&hole| other.voice_mut().lattice().opening(hole) > 0.5).collect();
+        assert_eq!(open, [0, 2]);
+    }
 
     #[test]
     fn a_transposed_key_plays_its_note_on_the_other_instrument_too() {

@@ -25,7 +25,7 @@ pub struct Fingers {
 }
 
 /// Openings that replace those of the fingering.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct HeldHoles {
     /// The holes that have one, one bit each.
     which: u64,
@@ -76,6 +76,13 @@ impl Fingers {
     /// Without a fingering; holes that are held stay so.
     pub fn lifted(&self) -> Self {
         Self { held: self.held, ..Self::default() }
+    }
+
+    /// Those of a player without keys hold the holes that another one holds.
+    pub fn follow(&mut self, from: &Self) {
+        if self.held != from.held {
+            *self = from.lifted();
+        }
     }
 
     /// Index of the fingering in place, if there was any note.

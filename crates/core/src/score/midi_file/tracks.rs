@@ -74,12 +74,19 @@ pub fn read_tracks(
             _ => continue,
         };
         let at = clock.sample(rate)?;
+        let is_switch = match midi {
+            MidiMessage::NoteOn { key, .. } | MidiMessage::NoteOff { key, .. } => {
+                key_switches.chosen(key.as_int()).is_some()
+            }
+            _ => false,
+        };
         let (is_owned, is_shared) = (
             lines.iter().any(|line| line.has(message.track, channel)),
             lines.iter().any(|line| line.is_on(channel)),
         );
         for (player, line) in lines.iter_mut().enumerate() {
             let hears = match (is_owned, is_shared) {
+                _ if is_switch => true,
                 (true, _) => line.has(message.track, channel),
                 (false, true) => line.is_on(channel),
                 (false, false) => true,
@@ -218,5 +225,12 @@ mod tests {
         assert_eq!(choices, [(0, To::Player(0)), (0, To::Player(1))]);
         let (_, count) = read(KeySwitches::Off);
         assert_eq!(count, 3, "off, they are notes");
+        // Nor does it matter in which track or on which channel they are.
+        let with_notes: &[u8] = &[0, 0x90, 25, 64, 0, 0x90, 60, 64, 96, 0x80, 60, 0, 0, 0xFF, 0x2F, 0];
+        let bytes = file(1, [0, 96], &[with_notes, &track(1, 64, &[])]);
+        let (score, _) = read_tracks(&MidiDecoder::new(), KeySwitches::C1, &bytes, 48_000).unwrap();
+        let chosen = score.events.iter().filter(|timed| matches!(timed.event.event, Event::Fingerings(_)));
+        let chosen: Vec<_> = chosen.map(|timed| timed.event.to).collect();
+        assert_eq!(chosen, [To::Player(0), To::Player(1)]);
     }
 }
