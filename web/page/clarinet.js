@@ -110,8 +110,8 @@ export class ClarinetDrawing {
     });
     const wave = this.waves[this.fingering];
     if (wave) this.wave.forEach((x, n) => (this.wave[n] += 2 * share / (1 + share) * (wave[n] - x)));
-    this.draw(time / 1000);
     this.isDrawing = false;
+    this.draw(time / 1000);
     if (moves) this.wake();
   }
 
@@ -132,7 +132,8 @@ export class ClarinetDrawing {
     const file = this.file;
     const depths = file.holes.map((hole) => hole.chimney).sort((a, b) => a - b);
     this.wall = clamp(depths[depths.length >> 1] ?? WALL, 4e-3, 9e-3);
-    this.lastHole = Math.max(...file.holes.map((hole) => hole.x));
+    // An instrument file may have none.
+    this.lastHole = Math.max(0, ...file.holes.map((hole) => hole.x));
     this.widest = Math.max(...file.bore.map(([, , , a, b]) => Math.max(a, b))) + RIM;
     const margin = clamp(0.03 * this.width, 14, 40);
     this.left = margin;
@@ -270,7 +271,8 @@ export class ClarinetDrawing {
     // Pads before fingers: a finger lies on its ring.
     const order = this.file.holes.map((_, n) => n).sort((a, b) => Number(this.file.holes[a].kind === 'finger') - Number(this.file.holes[b].kind === 'finger'));
     for (const n of order) this.drawHole(g, this.file.holes[n], this.openings[n], this.loudness * flows[n]);
-    if (this.chosen !== null && this.chosen !== undefined) this.drawChosen(g, this.file.holes[this.chosen]);
+    const chosen = this.file.holes[this.chosen];
+    if (chosen) this.drawChosen(g, chosen);
     this.drawTouches(g);
   }
 

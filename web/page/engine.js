@@ -7,12 +7,14 @@ export class Engine {
     this.on = on;
     this.instrument = 0;
     this.waiting = [];
+    // Its sample rate is needed before the module is here: what a worker prepares is for that rate.
+    this.context = new AudioContext({ latencyHint: 'interactive' });
+    this.prepared = new Promise((resolve) => (this.tellPrepared = resolve));
   }
 
   /** Fetches and compiles the module, and makes the worklet; silent until `start`. */
   async prepare() {
     const module = await compiled('chalumeau.wasm');
-    this.context = new AudioContext({ latencyHint: 'interactive' });
     this.volume = new GainNode(this.context, { gain: this.gain ?? 0.8 });
     this.volume.connect(this.context.destination);
     await this.context.audioWorklet.addModule('worklet.js');
@@ -29,13 +31,14 @@ export class Engine {
     this.node.connect(this.volume);
     this.waiting.forEach((message) => this.node.port.postMessage(message));
     this.waiting = [];
+    this.tellPrepared();
     if (this.wanted) await this.start();
   }
 
   /** Called in a gesture of the user: browsers let a page sound only then. */
   async start() {
     this.wanted = true;
-    if (this.context && this.context.state !== 'running') await this.context.resume();
+    if (this.context.state !== 'running') await this.context.resume();
   }
 
   /** Switches the sound off until the next `start`. */
@@ -44,7 +47,7 @@ export class Engine {
   }
 
   get isRunning() {
-    return this.context?.state === 'running';
+    return this.context.state === 'running';
   }
 
   send(message) {
@@ -60,10 +63,18 @@ export class Engine {
 
   /** Opens the microphone as it is: what a call would take away is what is wanted. Measures the room for two seconds. */
   async openMicrophone() {
+    await this.prepared;
     const raw = { echoCancellation: false, noiseSuppression: false, autoGainControl: false, channelCount: 1 };
     this.stream = await navigator.mediaDevices.getUserMedia({ audio: raw });
-    this.input = new MediaStreamAudioSourceNode(this.context, { mediaStream: this.stream });
-    this.input.connect(this.node);
+    try {
+      this.input = new MediaStreamAudioSourceNode(this.context, { mediaStream: this.stream });
+      this.input.connect(this.node);
+    } catch (error) {
+      this.closeMicrophone();
+      throw error;
+    }
+    // Unplugged, or taken away by the system.
+    this.stream.getTracks().forEach((track) => (track.onended = () => this.on({ microphoneGone: true })));
     this.send({ microphone: true, calibrate: true });
   }
 

@@ -59,7 +59,7 @@ export class Holes {
 
   /** What the sound depends on, for other questions. */
   question() {
-    return { rate: this.engine.context?.sampleRate ?? 48000, ...this.base, moved: this.moved };
+    return { rate: this.engine.context.sampleRate, ...this.base, moved: this.moved };
   }
 
   get holes() {
@@ -74,7 +74,9 @@ export class Holes {
     this.drag.isOff = isOpen;
     get('holes').setAttribute('aria-pressed', isOpen);
     get('hole-panel').hidden = !isOpen;
-    if (isOpen && this.chosen === null) this.choose(this.built.holes.findIndex(({ kind }) => kind === 'finger'));
+    if (isOpen && this.chosen === null && this.built.holes.length > 0) {
+      this.choose(Math.max(0, this.built.holes.findIndex(({ kind }) => kind === 'finger')));
+    }
     this.draw();
     this.on({ isOpen });
   }
@@ -229,6 +231,11 @@ export class Holes {
     this.state(isFitted ? 'Exact' : 'Right to some 10 cents; fitting the bore …');
   }
 
+  /** What a worker has prepared does not fit the sound. */
+  refuse() {
+    this.state('The moved holes are not heard. Reload the page to try again.');
+  }
+
   state(text) {
     get('hole-state').textContent = text;
   }
@@ -247,17 +254,14 @@ export class Holes {
     get('hole-file').value = '';
     if (!file) return;
     const text = await file.text();
-    // A fit that began now would end the opening.
-    clearTimeout(this.fitting);
     this.state('Preparing the instrument; one of your own takes minutes …');
     try {
-      const told = await this.workshop.askLong({ do: 'open', rate: this.question().rate, text });
+      const told = await this.workshop.askApart({ do: 'open', rate: this.question().rate, text });
       this.state('');
       this.on({ opened: told });
     } catch (error) {
       this.state('');
       this.say(`${file.name} is not opened: ${error.message}`);
-      if (this.moved.length > 0) this.hearFitted();
     }
   }
 }

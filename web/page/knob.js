@@ -69,18 +69,24 @@ export class Knob {
   }
 
   async read(port, opened) {
-    const reader = (this.reader = port.readable.getReader());
-    try {
-      for (;;) {
-        const { value, done } = await reader.read();
-        if (done) break;
-        this.send({ knobBytes: value, at: Date.now() });
+    let [last, trouble] = [null, ''];
+    // After a damaged byte, as where a board starts anew, the port goes on with another stream. Unplugged it has none.
+    while (port.readable && port.readable !== last) {
+      last = port.readable;
+      const reader = (this.reader = last.getReader());
+      try {
+        for (;;) {
+          const { value, done } = await reader.read();
+          if (done) return;
+          this.send({ knobBytes: value, at: Date.now() });
+        }
+      } catch (error) {
+        trouble = error.message;
+      } finally {
+        reader.releaseLock();
       }
-    } catch (error) {
-      if (opened === this.opened) this.lose(`the knob was unplugged (${error.message})`);
-    } finally {
-      reader.releaseLock();
     }
+    if (opened === this.opened) this.lose(`the knob was unplugged (${trouble})`);
   }
 
   /** What the worklet tells of the knob. */
@@ -169,7 +175,11 @@ export class Knob {
 
   /** The port is gone. */
   lose(why) {
+    const { port, writer } = this;
     this.end();
+    // Otherwise it could not be opened again.
+    writer?.releaseLock();
+    port?.close().catch(() => {});
     this.on({ connected: false, who: why });
   }
 

@@ -12,6 +12,8 @@ const tour = await json('tour.json').catch((error) => {
 let module;
 let context;
 let playing;
+/** Which of the clicks is the latest. */
+let clicks = 0;
 
 for (const { title, stops } of tour.chapters) {
   const chapter = document.createElement('section');
@@ -43,11 +45,21 @@ async function toggle(stop, button, picture) {
   // In the gesture: a browser lets a page sound only then.
   context ??= new AudioContext({ sampleRate: tour.rate });
   context.resume();
-  const same = playing?.stop === stop;
+  const same = playing?.stop === stop || button.classList.contains('making');
+  const click = (clicks += 1);
   end();
+  document.querySelectorAll('.making').forEach((other) => other.classList.remove('making'));
   if (same) return;
   button.classList.add('making');
-  stop.sound ??= await made(stop);
+  stop.making ??= made(stop);
+  try {
+    stop.sound = await stop.making;
+  } catch (error) {
+    stop.making = undefined;
+    throw error;
+  }
+  // Another one has been asked for meanwhile, or this one again to stop it.
+  if (click !== clicks) return;
   button.classList.remove('making');
   const source = new AudioBufferSourceNode(context, { buffer: stop.sound });
   source.connect(context.destination);

@@ -73,7 +73,7 @@ const knob = new KnobPanel(engine, workshop, () => ({ ...holes.question(), value
 values = [...data.defaults];
 let instrument = data.instruments[0];
 let isTouched = false;
-let blowing = false;
+let [blowing, isOpening] = [false, false];
 let [isChanged, isRestoring] = [false, false];
 
 data.instruments.forEach(({ name }, at) => get('instrument').append(new Option(name, at)));
@@ -238,6 +238,11 @@ function choose(preset) {
 /** What the worklet tells. */
 function hear(message) {
   if (message.failed) fail(message.failed);
+  if (message.taken === false) holes.refuse();
+  if (message.microphoneGone && blowing) {
+    toggleMicrophone();
+    say('The microphone has gone.');
+  }
   knob.hear(message);
   if ('blowing' in message) get('microphone').classList.toggle('blowing', message.blowing);
   if (message.picture) draw(message.picture, message.microphone);
@@ -302,17 +307,21 @@ function tellBreath(origin, room) {
 
 async function toggleMicrophone() {
   const button = get('microphone');
+  if (isOpening) return;
   if (blowing) {
     blowing = false;
     engine.closeMicrophone();
     hands.blow(knob.plays, instrument.transposition);
   } else {
+    isOpening = true;
     try {
       await engine.start();
       await engine.openMicrophone();
     } catch (error) {
       say(error.name === 'NotAllowedError' ? 'The browser was not allowed to use the microphone.' : `No microphone: ${error.message}`);
       return;
+    } finally {
+      isOpening = false;
     }
     blowing = true;
     hands.blow(true, instrument.transposition);

@@ -9,7 +9,7 @@ addEventListener('install', (event) => {
   const all = ['./', ...FILES].map((file) => new Request(file, { cache: 'reload' }));
   // Who has had a large file once can go on without a network after an update, too.
   const had = Promise.all(LATER.map((file) => caches.match(file).then((kept) => (kept ? [new Request(file, { cache: 'reload' })] : []))));
-  event.waitUntil(had.then((more) => caches.open(NAME).then((cache) => cache.addAll([...all, ...more.flat()]))).then(() => skipWaiting()));
+  event.waitUntil(had.then((more) => caches.open(NAME).then((cache) => cache.addAll([...all, ...more.flat()]))));
 });
 
 addEventListener('activate', (event) => {
@@ -29,7 +29,7 @@ async function fetched(request) {
   return answer;
 }
 
-// One version at a time: what was kept goes together, and a new version comes whole.
+// One version at a time: what was kept goes together, and a new version comes whole, once every page of the old one is closed.
 addEventListener('fetch', (event) => {
   if (event.request.method !== 'GET' || new URL(event.request.url).origin !== location.origin) return;
   event.respondWith(caches.match(event.request, { cacheName: NAME, ignoreSearch: true }).then((kept) => kept ?? fetched(event.request)));

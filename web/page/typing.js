@@ -15,7 +15,11 @@ export class Typing {
   constructor(hands, breathe, on) {
     Object.assign(this, { hands, breathe, on, held: new Map(), base: 60, breath: BEGIN });
     addEventListener('keydown', (event) => this.down(event));
-    addEventListener('keyup', (event) => this.up(event.code));
+    addEventListener('keyup', (event) => {
+      // macOS tells of no key that comes up while Command is down.
+      if (event.key === 'Meta') this.end();
+      else this.up(event.code);
+    });
     navigator.keyboard?.getLayoutMap?.().then((map) => {
       this.layout = map;
       this.tell();

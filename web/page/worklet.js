@@ -86,6 +86,7 @@ class Chalumeau extends AudioWorkletProcessor {
     const length = parts.reduce((sum, part) => sum + part.length, 0);
     // It may grow, and then its memory lies elsewhere.
     const place = this.module.chalumeau_inbox(length);
+    if (place === 0) throw new Error(`a message of ${length} bytes`);
     const inbox = new Uint8Array(this.module.memory.buffer, place, length);
     parts.reduce((at, part) => (inbox.set(part, at), at + part.length), 0);
   }

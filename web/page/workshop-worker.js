@@ -12,6 +12,7 @@ onmessage = async ({ data: { number, question } }) => {
     const module = await loading;
     const bytes = new TextEncoder().encode(JSON.stringify(question));
     const place = module.chalumeau_inbox(bytes.length);
+    if (place === 0) throw new Error('it is larger than a megabyte');
     new Uint8Array(module.memory.buffer, place, bytes.length).set(bytes);
     const length = module.chalumeau_workshop();
     const answer = Uint8Array.from(new Uint8Array(module.memory.buffer, module.chalumeau_outbox(), length));

@@ -1,5 +1,5 @@
 // What takes long, off the page's thread: one worker that answers at once, and one that fits and is ended where its answer has
-// become worthless. Both play the same module, which is fetched when it is first needed.
+// become worthless; a third prepares a file that the user opens. All play the same module, which is fetched when it is first needed.
 
 export class Workshop {
   /** Asks the worker for what takes milliseconds, or a second. */
@@ -13,6 +13,17 @@ export class Workshop {
     this.long?.end();
     this.long = this.worker();
     return this.long.ask(question);
+  }
+
+  /** Asks for what takes minutes and goes on whatever else is asked; only another such question ends it. */
+  async askApart(question) {
+    this.apart?.end();
+    const own = (this.apart = this.worker());
+    try {
+      return await own.ask(question);
+    } finally {
+      own.end();
+    }
   }
 
   worker() {

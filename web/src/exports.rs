@@ -176,11 +176,14 @@ fn with_knob(change: impl FnOnce(&mut HeldKnob)) {
     });
 }
 
-/// Where so many bytes, a million at most, can be written for the next call that takes bytes. Allocates.
+/// Where so many bytes can be written for the next call that takes bytes; null for more than a megabyte. Allocates.
 #[unsafe(no_mangle)]
 pub extern "C" fn chalumeau_inbox(bytes: u32) -> *mut u8 {
+    if bytes as usize > MOST_BYTES {
+        return std::ptr::null_mut();
+    }
     let mut inbox = inbox();
-    inbox.resize((bytes as usize).min(MOST_BYTES), 0);
+    inbox.resize(bytes as usize, 0);
     inbox.as_mut_ptr()
 }
 

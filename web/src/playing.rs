@@ -175,7 +175,8 @@ impl Playing {
             self.wind.tick(sample);
         }
         // Nobody blows while the room is measured, or before the device is open.
-        self.breath(Some(self.wind.breath()));
+        // A microphone that has gone sends nothing.
+        self.breath(Some(if frames == 0 { 0.0 } else { self.wind.breath() }));
         self.wind.is_open()
     }
 
@@ -239,6 +240,7 @@ impl Playing {
         self.stereo.set_space(&self.settings);
         self.parts.set_count(self.settings.players.parts());
         self.parts.set_key_switches(self.settings.reach.key_switches);
+        self.blower.set_notes(self.settings.reach.key_notes(self.ensemble.first().model()));
     }
 
     /// What the mod wheel does, by its place in [`Wheel::ALL`].
@@ -262,10 +264,12 @@ impl Playing {
     pub fn carry_on(&mut self, from: Self) {
         self.parts = from.parts;
         self.settings = from.settings;
-        self.settle();
-        self.ensemble.carry_on(&from.ensemble);
+        // Pan, volume and the sound that is still in the room.
+        self.stereo = from.stereo;
         (self.knob, self.blower, self.hand, self.is_blown) =
             (from.knob, from.blower, from.hand, from.is_blown);
+        self.settle();
+        self.ensemble.carry_on(&from.ensemble);
         (self.wind, self.is_heard) = (from.wind, from.is_heard);
     }
 

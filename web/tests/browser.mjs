@@ -346,6 +346,27 @@ const TESTS = {
     }
   },
 
+  async 'a damaged byte does not lose the knob'(browser) {
+    const { page, context, errors } = await open(browser, server.address, { before: serialPort(), serviceWorkers: 'block' });
+    await page.click('#knob');
+    await page.waitForFunction(() => globalThis.serialPort.written.length > 0);
+    const bytes = () => page.evaluate(() => new Promise((heard) => {
+      const { send } = globalThis.chalumeau.knob.knob;
+      globalThis.chalumeau.knob.knob.send = (message) => {
+        if (message.knobBytes) heard([...message.knobBytes]);
+        send(message);
+      };
+      globalThis.serialPort.feed([1, 2, 3]);
+    }));
+    for (let time = 0; time < 3; time += 1) {
+      await page.evaluate(() => globalThis.serialPort.disturb());
+      assert.deepEqual(await bytes(), [1, 2, 3]);
+    }
+    assert.equal(await page.isVisible('#knob-panel'), true);
+    assert.deepEqual(errors, []);
+    await context.close();
+  },
+
   async 'a knob that is unplugged is said to be'(browser) {
     const { page, context, errors } = await open(browser, server.address, { before: serialPort(), serviceWorkers: 'block' });
     await page.click('#knob');
@@ -354,6 +375,11 @@ const TESTS = {
     await page.evaluate(() => globalThis.serialPort.unplug());
     await page.waitForFunction(() => document.getElementById('hint').textContent.includes('unplugged'));
     assert.equal(await page.isVisible('#knob-panel'), false);
+    // It was closed, so that it can be opened again.
+    const opened = await page.evaluate(() => globalThis.serialPort.speeds.length);
+    await page.click('#knob');
+    await page.waitForFunction((opened) => globalThis.serialPort.speeds.length > opened, opened);
+    assert.equal(await page.isVisible('#knob-panel'), true);
     assert.deepEqual(errors, []);
     await context.close();
   },
@@ -680,10 +706,11 @@ const MICROPHONE = {
 };
 
 const wanted = process.argv[4] ?? '';
-let failed = 0;
+let [failed, ran] = [0, 0];
 async function run(tests, ...args) {
   for (const [name, test] of Object.entries(tests).filter(([name]) => name.includes(wanted))) {
     const began = Date.now();
+    ran += 1;
     try {
       const says = await test(...args);
       console.log(`ok    ${name} (${((Date.now() - began) / 1000).toFixed(1)} s)${says ? `: ${says}` : ''}`);
@@ -700,4 +727,5 @@ if (wanted.startsWith('timed')) await run(TIMED, browser);
 await browser.close();
 await run(MICROPHONE);
 server.close();
-process.exitCode = failed > 0 ? 1 : 0;
+if (ran === 0) console.log(`FAIL  no test has ${wanted} in its name`);
+process.exitCode = failed > 0 || ran === 0 ? 1 : 0;

@@ -11,12 +11,15 @@ export const serialPort = (address, number) => `(() => {
   const port = { written: [], speeds: [], isOpen: false };
   const feed = (bytes) => port.isOpen && port.controller?.enqueue(Uint8Array.from(bytes));
   port.feed = feed;
+  const stream = () => { port.readable = new ReadableStream({ start: (controller) => { port.controller = controller; } }); };
+  // A break or a damaged byte ends one stream, and the port goes on with another.
+  port.disturb = () => { const { controller } = port; stream(); controller.error(new Error('A framing error has occurred.')); };
   port.getInfo = () => ({ usbVendorId: 0x303a, usbProductId: 0x1001 });
   port.open = async ({ baudRate }) => {
     if (port.isOpen) throw new Error('already open');
     port.speeds.push(baudRate);
     port.isOpen = true;
-    port.readable = new ReadableStream({ start: (controller) => { port.controller = controller; } });
+    stream();
     port.writable = new WritableStream({ write: (bytes) => {
       port.written.push(...bytes);
       port.socket?.send(bytes);
@@ -29,7 +32,8 @@ export const serialPort = (address, number) => `(() => {
   };
   port.setSignals = async () => {};
   port.close = async () => { port.isOpen = false; port.socket?.close(); };
-  port.unplug = () => { port.isOpen = false; port.controller.error(new Error('The device has been lost.')); port.socket?.close(); };
+  // It stays open, as far as its owner knows, until it is closed.
+  port.unplug = () => { port.readable = null; port.controller.error(new Error('The device has been lost.')); port.socket?.close(); };
   globalThis.serialPort = port;
   Object.defineProperty(navigator, 'serial', { value: { requestPort: async () => port, getPorts: async () => [port], addEventListener() {} } });
   const random = ${JSON.stringify(number ?? null)};

@@ -339,14 +339,18 @@ fn another_instrument_takes_over_the_note() {
     let mut before = Playing::new(48_000.0, Bundled::BFlat).unwrap();
     before.set(place(SettingNumber::Growl), 0.3);
     before.settle();
+    // At the right: the pan goes on, too.
+    before.midi(0xb0, 10, 127);
     before.midi(0x90, 60, 100);
-    before.process(MOST_FRAMES);
+    (0..8).for_each(|_| drop(before.process(MOST_FRAMES)));
     let mut after = Playing::new(48_000.0, Bundled::Bass).unwrap();
     after.carry_on(before);
-    let heard = (0..24).fold(0.0_f32, |most, _| {
+    let [left, right] = (0..24).fold([0.0_f32; 2], |most, _| {
         let frames = after.process(MOST_FRAMES);
-        after.channel(0)[..frames].iter().fold(most, |most, sample| most.max(sample.abs()))
+        [0, 1].map(|side| {
+            after.channel(side)[..frames].iter().fold(most[side], |most, sample| most.max(sample.abs()))
+        })
     });
     let picture = after.picture();
-    assert!(heard > 0.01 && picture[0] == 60.0, "{heard} {picture:?}");
+    assert!(right > 0.01 && left < 1e-3 && picture[0] == 60.0, "{left} {right} {picture:?}");
 }
