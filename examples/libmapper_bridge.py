@@ -20,7 +20,7 @@ firmware clips torque at 0.1 N m (20.8 counts). For the Mechaduino board 208 cou
 documented. The firmware has no reed law: Scale and Stretch act on the curve of the current mode, and Offset only when a
 mode begins. In its mode Free, Scale is a constant torque that spins the knob: choose the mode before you start this
 program. That firmware has no watchdog and no torque limit. This program therefore sends nothing above --ceiling; raises
-Scale by at most 400 mNm a second; and sets Scale and Damping to 0 when no feel has arrived for 3 seconds, and at the
+Scale from 0 by at most 400 mNm a second once the map is made; and sets Scale and Damping to 0 when no feel has arrived for 3 seconds, and at the
 end (Ctrl-C). If this program, its machine or the network fails, the knob keeps the last torque: keep its power switch
 at hand. A knob that comes back is mapped again; one that vanished without logging off only after libmapper has dropped
 it, which takes half a minute.
@@ -225,7 +225,7 @@ class Wiring:
         return name == self.wanted or name.rpartition(".")[0] == self.wanted
 
     def look(self):
-        """Looks for the device and makes missing maps; call it about once a second."""
+        """Looks for the device and makes missing maps; call it about once a second. Whether Scale is mapped."""
         prop = libmapper.Property
         # A device that has gone may stay listed for a while, without signals.
         devices = {}
@@ -237,10 +237,10 @@ class Wiring:
         names = sorted(devices)
         if not names:
             self.say(f"waiting for {self.wanted} and its {', '.join(self.targets)}")
-            return
+            return False
         if len(names) > 1:
             self.say(f"--map {self.wanted} may be {' or '.join(names)}: nothing new is mapped; name one of them")
-            return
+            return True
         found = devices[names[0]]
         mapped = {
             theirs[prop.NAME]
@@ -257,6 +257,7 @@ class Wiring:
         done = [name for name in self.targets if name in mapped]
         lacks = f"; it has no {', '.join(missing)}" if missing else ""
         self.say(f"mapped to {names[0]}: {', '.join(done) or 'nothing yet'}{lacks}")
+        return "Scale" in mapped
 
 
 class Bridge:
@@ -266,6 +267,8 @@ class Bridge:
         self.limits = limits
         self.fresh = {}
         self.scale = {"wanted": 0.0, "sent": 0.0}
+        # Without a map nobody feels what is sent: it stays 0, so that the torque rises slowly once there is one.
+        self.is_felt = True
         self.heard_at = None
         self.taken = self.ignored = self.refused = 0
         self.said_at = -math.inf
@@ -297,7 +300,7 @@ class Bridge:
         rising = self.scale["wanted"] > self.scale["sent"]
         values, self.fresh = self.fresh, {}
         if "scale" in values or rising:
-            sent = min(self.scale["wanted"], self.scale["sent"] + RISE_MNM_S * dt_s)
+            sent = min(self.scale["wanted"], self.scale["sent"] + RISE_MNM_S * dt_s) if self.is_felt else 0.0
             self.scale["sent"] = values["scale"] = sent
         return values
 
@@ -383,6 +386,7 @@ def main():
 def serve(receiver, signals, bridge, wiring, stop):
     """Receives and sends until `stop` is not empty."""
     sent_at = looked_at = time.monotonic()
+    bridge.is_felt = wiring is None
     while not stop:
         select.select([receiver], [], [], TURN_S)
         for _ in range(MOST_DATAGRAMS):
@@ -397,7 +401,7 @@ def serve(receiver, signals, bridge, wiring, stop):
             signals.send(bridge.due(now, now - sent_at))
             sent_at = now
         if wiring and now - looked_at >= 1.0:
-            wiring.look()
+            bridge.is_felt = wiring.look()
             looked_at = now
 
 

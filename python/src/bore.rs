@@ -241,8 +241,10 @@ pub fn torque<'py>(
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let note = feel_of(py, &pairs, instrument, written)?;
     let tables = ReedTables::reference();
-    let angles = angles_deg.as_array();
-    let torque = |&angle: &f64| torque_law::torque_mnm(&note.feel, tables, angle);
-    let torques = angles.iter().map(|angle| if angle.is_nan() { f64::NAN } else { torque(angle) });
-    Ok(PyArray1::from_vec(py, torques.collect()))
+    let mut torques = angles_deg.as_array().to_vec();
+    py.detach(|| {
+        let angles = torques.iter_mut().filter(|angle| !angle.is_nan());
+        angles.for_each(|angle| *angle = torque_law::torque_mnm(&note.feel, tables, *angle));
+    });
+    Ok(PyArray1::from_vec(py, torques))
 }

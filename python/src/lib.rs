@@ -1,7 +1,7 @@
 //! The compiled part of the Python package `chalumeau`, imported there as `chalumeau._native`.
 //!
 //! It translates and computes nothing itself: what a command of `chalumeau` does, it does by the same code. The package's
-//! Python modules hold the documented functions. Everything that takes longer than a microsecond runs without Python's
+//! Python modules hold the documented functions. What takes longer than a millisecond runs without Python's
 //! lock, and an array that leaves here is the memory that was computed into.
 
 mod bore;

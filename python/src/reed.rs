@@ -34,6 +34,7 @@ pub fn reed_flow<'py>(
     }
     .map_err(wrong)?;
     let tables = ReedTables::reference();
-    let flows = p.as_array().iter().map(|&p| if p.is_nan() { p } else { law.flow(tables, p) }).collect();
+    let mut flows = p.as_array().to_vec();
+    py.detach(|| flows.iter_mut().filter(|p| !p.is_nan()).for_each(|p| *p = law.flow(tables, *p)));
     Ok(PyArray1::from_vec(py, flows))
 }

@@ -23,6 +23,15 @@ impl Voice {
         self.clarinet.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Fills an array with the next samples. Between seconds of sound it asks whether the user wants to stop (Ctrl-C).
+    fn play(&self, out: &mut [f32]) -> PyResult<()> {
+        for part in out.chunks_mut(self.rate_hz as usize) {
+            self.lock().render(part);
+            signals()?;
+        }
+        Ok(())
+    }
+
     /// Waits without Python's lock: another thread may be rendering.
     fn apply(&self, py: Python<'_>, event: Event) {
         py.detach(|| self.lock().apply(event));
@@ -92,11 +101,7 @@ impl Voice {
         }
         let out = py.detach(|| {
             let mut out = vec![0.0; samples];
-            // Once for each second of sound: Ctrl-C ends a long rendering.
-            for part in out.chunks_mut(self.rate_hz as usize) {
-                self.lock().render(part);
-                signals()?;
-            }
+            self.play(&mut out)?;
             Ok::<_, PyErr>(out)
         })?;
         Ok(PyArray1::from_vec(py, out))
@@ -107,8 +112,7 @@ impl Voice {
         let out = out
             .as_slice_mut()
             .map_err(|_| wrong("the array must be contiguous; take numpy.empty(n, numpy.float32)"))?;
-        py.detach(|| self.lock().render(out));
-        Ok(())
+        py.detach(|| self.play(out))
     }
 
     #[getter]

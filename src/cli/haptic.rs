@@ -49,6 +49,17 @@ pub struct HapticCommand {
     #[arg(long)]
     curve: bool,
     #[command(flatten)]
+    felt: FeltReedArgs,
+    #[command(flatten)]
+    instrument: InstrumentArg,
+    #[command(flatten)]
+    table: TableArgs,
+}
+
+/// What is felt: the torque's law, the reed and the air.
+#[derive(Args)]
+pub struct FeltReedArgs {
+    #[command(flatten)]
     feel: FeelArgs,
     /// Most torque allowed, mNm, 0..450
     #[arg(long, value_name = "MNM", default_value = "100", value_parser = |s: &str| within(s, 0.0, 450.0))]
@@ -70,10 +81,31 @@ pub struct HapticCommand {
     k: Option<f32>,
     #[command(flatten)]
     air: AirArg,
-    #[command(flatten)]
-    instrument: InstrumentArg,
-    #[command(flatten)]
-    table: TableArgs,
+}
+
+impl FeltReedArgs {
+    /// The bore in this air, and the reed as it is played on it.
+    pub fn bore_and_reed(&self, file: &InstrumentFile) -> (RequirementSolver, PlayedReed) {
+        let standard = Settings::default();
+        let settings = Settings {
+            zeta: self.zeta,
+            strength: self.strength.unwrap_or(standard.strength),
+            lip: self.lip.unwrap_or(standard.lip),
+            reed_h: self.h.unwrap_or(standard.reed_h),
+            reed_k: self.k.unwrap_or(standard.reed_k),
+            coupled: self.k.is_none(),
+            ..standard
+        };
+        (RequirementSolver::new(file, self.air.air()), played_reed(file, &settings))
+    }
+
+    /// The feel of every note.
+    pub fn feel(&self, file: &InstrumentFile) -> Result<FeelTable, Failure> {
+        let design = self.feel.design(file)?;
+        let limits = TorqueLimits { ceiling_mnm: self.ceiling, ..TorqueLimits::default() };
+        let (bore, reed) = self.bore_and_reed(file);
+        FeelTable::new(&bore, &design, &reed, &limits).map_err(in_flags)
+    }
 }
 
 impl HapticCommand {
@@ -85,7 +117,7 @@ impl HapticCommand {
             let right = "choose a note with --written, or leave --curve out for the table of all notes";
             return Err(Failure::Usage(format!("--curve is for one note; {right}")));
         }
-        let feel = self.feel(&file)?;
+        let feel = self.felt.feel(&file)?;
         let wanted = |feel: &&NoteFeel| notes.contains(&feel.written);
         if self.curve {
             return feel.notes().iter().filter(wanted).try_for_each(|note| self.curve(note));
@@ -96,8 +128,8 @@ impl HapticCommand {
         table.comment(format_args!(
             "{}; zeta {}, {} about {}",
             file.name,
-            self.zeta,
-            self.feel.exaggeration(),
+            self.felt.zeta,
+            self.felt.feel.exaggeration(),
             feel.reference().written
         ))?;
         for note in feel.notes().iter().filter(wanted) {
@@ -123,29 +155,6 @@ impl HapticCommand {
             ))?;
         }
         table.finish()
-    }
-
-    /// The bore in this air, and the reed as it is played on it.
-    pub fn bore_and_reed(&self, file: &InstrumentFile) -> (RequirementSolver, PlayedReed) {
-        let standard = Settings::default();
-        let settings = Settings {
-            zeta: self.zeta,
-            strength: self.strength.unwrap_or(standard.strength),
-            lip: self.lip.unwrap_or(standard.lip),
-            reed_h: self.h.unwrap_or(standard.reed_h),
-            reed_k: self.k.unwrap_or(standard.reed_k),
-            coupled: self.k.is_none(),
-            ..standard
-        };
-        (RequirementSolver::new(file, self.air.air()), played_reed(file, &settings))
-    }
-
-    /// The feel of every note.
-    pub fn feel(&self, file: &InstrumentFile) -> Result<FeelTable, Failure> {
-        let design = self.feel.design(file)?;
-        let limits = TorqueLimits { ceiling_mnm: self.ceiling, ..TorqueLimits::default() };
-        let (bore, reed) = self.bore_and_reed(file);
-        FeelTable::new(&bore, &design, &reed, &limits).map_err(in_flags)
     }
 
     fn curve(&self, note: &NoteFeel) -> Result<(), Failure> {

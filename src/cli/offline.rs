@@ -4,7 +4,7 @@
 //! command line. An error is the text that the command would print.
 
 use crate::cli::batch::plan::Plan;
-use crate::cli::haptic::HapticCommand;
+use crate::cli::haptic::FeltReedArgs;
 use crate::cli::parse;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, rate};
@@ -102,6 +102,7 @@ pub fn blown(
     let mut args: LiveArgs = read(pairs)?;
     args.instrument.instrument.stop = stop;
     let said = |failure: crate::cli::Failure| failure.to_string();
+    args.settings.refuse_room_and_players().map_err(said)?;
     let settings =
         args.settings.blown_by(None, &BreathCurve::constant(gamma as f32), &instrument).map_err(said)?;
     let model = args.instrument.model(instrument, args.rate, settings.a4_hz).map_err(said)?;
@@ -116,7 +117,7 @@ pub fn settings(pairs: &Pairs, instrument: &InstrumentFile) -> Result<Settings, 
 
 /// The feel of every note, as `chalumeau haptic` has it. Takes a second.
 pub fn feel(pairs: &Pairs, instrument: InstrumentFile) -> Result<FeelTable, String> {
-    let args: HapticCommand = read(pairs)?;
+    let args: FeltReedArgs = read(pairs)?;
     args.feel(&instrument).map_err(|failure| failure.to_string())
 }
 
@@ -125,7 +126,7 @@ pub fn bore_and_reed(
     pairs: &Pairs,
     instrument: &InstrumentFile,
 ) -> Result<(RequirementSolver, PlayedReed), String> {
-    Ok(read::<HapticCommand>(pairs)?.bore_and_reed(instrument))
+    Ok(read::<FeltReedArgs>(pairs)?.bore_and_reed(instrument))
 }
 
 /// The rows of a plan of `chalumeau batch`, in the order of its files: for each row the names and values.

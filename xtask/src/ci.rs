@@ -322,17 +322,21 @@ fn python_package() -> Result<()> {
     machine::run(tests.env(artefacts::PROGRAM, &programs()?.program))
 }
 
-/// The Python of a virtual environment in the target folder, which is made if it cannot import `modules` yet.
+/// The Python of a virtual environment in the target folder, which is made if it was not made with these packages or cannot import
+/// `modules`.
 fn python(folder: &str, modules: &str, packages: &[&str]) -> Result<PathBuf> {
     let venv = machine::target().join(folder);
     let bin = venv.join(if cfg!(windows) { "Scripts" } else { "bin" });
     let python = bin.join("python");
-    if !imports(&python, modules) {
-        let system = if cfg!(windows) { "python" } else { "python3" };
-        machine::run(Command::new(system).args(["-m", "venv"]).arg(&venv))?;
-        let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
-        machine::run(Command::new(&python).args(pip).args(packages))?;
+    let (pins, stamp) = (packages.join("\n"), venv.join("pins.txt"));
+    if fs::read_to_string(&stamp).is_ok_and(|made_with| made_with == pins) && imports(&python, modules) {
+        return Ok(python);
     }
+    let system = if cfg!(windows) { "python" } else { "python3" };
+    machine::run(Command::new(system).args(["-m", "venv"]).arg(&venv))?;
+    let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
+    machine::run(Command::new(&python).args(pip).args(packages))?;
+    fs::write(&stamp, pins).with_context(|| format!("cannot write {}", stamp.display()))?;
     Ok(python)
 }
 

@@ -24,8 +24,8 @@ const PROGRAMS: Product = Product {
     package: "chalumeau",
     features: &["--no-default-features", "--features", "standalone,devices,cli,simulator"],
 };
-/// The module of the web page.
-const PAGE: Product = Product { package: "chalumeau-web", features: &[] };
+/// The modules of the web page.
+const PAGE: Product = Product { package: "chalumeau-web", features: &["--features", "workshop"] };
 const PAGE_TARGET: &str = "wasm32-unknown-unknown";
 /// The systems that the plugin is bundled for.
 const TARGETS: &[&str] = &["x86_64-unknown-linux-gnu", "aarch64-apple-darwin", "x86_64-pc-windows-msvc"];

@@ -117,7 +117,8 @@ def dataset(
     left = [part for part in cut if not is_there(part)]
     # The plan is written before any file. Files without one are those of an older version, which kept none.
     begun = stamp.read_text() if stamp.exists() else None
-    if begun != planned and (begun is not None or len(left) < len(cut)):
+    # Where nothing was made, as by a plan with a mistake, another plan may begin.
+    if begun != planned and len(left) < len(cut):
         raise ValueError(f"{into} holds a data set of another plan; take another folder, or remove this one first")
     if left:
         # A wrong name or value is told before anything is made.
