@@ -157,7 +157,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("legato", BREATH, "Legato", number([5.0, 15.0], 8.0, 1, " ms"))
         .help(
             "Time in which the fingers move between slurred notes",
-            "Holes open and close over this time. In a long slur the notes between speak as well. Where the breath response is Played, the player takes half of it up over the break, and 1.8 times as long for a loud leap down into the low chalumeau.",
+            "Holes open and close over this time. In a long slur the notes between speak as well. Where the breath response is Played, slurs up over the break take half of this time, and loud leaps down into the low chalumeau 1.8 times as long.",
             "The torque changes from one note's curve to the next note's.",
         )
         .sets(Sets::Number(SettingNumber::LegatoMs))
@@ -175,7 +175,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("bcurve", BREATH, "Breath curve", number([0.5, 2.0], 1.0, 2, ""))
         .help(
             "Curve from breath to dynamic, where the breath response is played",
-            "Above 1, soft notes have more of the way; below 1, loud notes.",
+            "Above 1, soft notes get more of the controller's range; below 1, loud notes do.",
             "",
         )
         .sets(Sets::Number(SettingNumber::BreathCurve))
@@ -218,7 +218,7 @@ pub static PARAMETERS: &[Parameter] = &[
     )
     .help(
         "Which controller blows",
-        "Any: the first that moves; CC2 is stronger than CC11, and CC11 than channel pressure. Pressure under a held key adds to its velocity; with Pressure it blows. Keys: the velocity, whatever controllers do. Automation of *Breath*, note expressions, linked controllers and the knob blow in any case.",
+        "Any: whichever moves; CC2 overrides CC11, and CC11 overrides channel pressure. Pressure under a held key adds to its velocity; with Pressure it blows. Keys: the velocity, whatever controllers do. Automation of *Breath*, note expressions, linked controllers and the knob blow in any case.",
         "",
     ),
     entry("bdead", BREATH, "Breath deadband", Kind::Number(Number {
@@ -303,8 +303,8 @@ pub static PARAMETERS: &[Parameter] = &[
         .flag("--A"),
     entry("lay", REED, "Facing", number([0.0, 0.5], 0.4, 3, ""))
         .help(
-            "Curve of the lay that the reed closes on",
-            "At 0 the reed closes all at once and sounds bright. At higher values it rolls onto the lay and sounds softer.",
+            "Curve of the mouthpiece's facing (its lay), on which the reed closes",
+            "At 0 the reed closes all at once and sounds bright. At higher values it rolls onto the facing and sounds softer.",
             "",
         )
         .sets(Sets::Number(SettingNumber::Lay))
@@ -428,8 +428,8 @@ pub static PARAMETERS: &[Parameter] = &[
         .only(InUse::WithKnob),
     entry("blow", KNOB, "Blow hard here", OFF)
         .help(
-            "Makes the knob's present angle full breath",
-            "The travel from rest to this angle then means full breath. Turn the knob as far as you want to blow, then press. The switch is then Off again.",
+            "Learns how far you turn the knob for full breath",
+            "Press, then turn the knob within three seconds as far as you want to blow. The travel from rest to there then means full breath. The switch is then Off again.",
             "",
         )
         .setup()
@@ -924,7 +924,7 @@ pub static PARAMETERS: &[Parameter] = &[
         .flag("--growl-frequency"),
     entry("flut", TECHNIQUES, "Flutter", percent(0.0))
         .help(
-            "How far the rolling tongue closes the way of the breath",
+            "How far the rolling tongue blocks the air",
             "The note trembles, as with a rolled R.",
             "",
         )
@@ -987,7 +987,7 @@ pub static PARAMETERS: &[Parameter] = &[
         .flag("--spread"),
     entry("seats", PLAYERS, "Seats", percent(0.7))
         .help(
-            "How wide the players sit around the first, on two channels",
+            "How far apart the players sit, on two channels",
             "At 0 all sit in the middle, at 100 % from side to side.",
             "",
         )
