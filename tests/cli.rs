@@ -1264,6 +1264,7 @@ fn options_that_would_do_nothing_are_refused() {
         ("tune --written C4 --players 2", "--players does nothing here"),
         ("tune --written C4 --room 0.5", "--room does nothing here"),
         ("bifurcation --written C4 --set room=50", "--set room does nothing here"),
+        ("tune --written C4 --set transp=-2", "--set transp does nothing here"),
         ("fingerings --note E3 --trill-to 52", "a trill needs two notes"),
         ("fingerings", "--multiphonic"),
         ("render melody.mid --slurred --out x.wav", "--slurred"),

@@ -34,7 +34,7 @@ fn details(name: &str) -> ImportDetails {
 fn the_example_of_the_manual_is_an_instrument() {
     let manual = text("docs/instrument-file.md");
     let example = manual.split("```toml").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
-    assert_eq!(InstrumentFile::parse(example).unwrap().lowest().to_string(), "F#3");
+    assert_eq!(InstrumentFile::parse(example).unwrap().lowest().to_string(), "G3");
 }
 
 /// The tables the built-in clarinet was made from.

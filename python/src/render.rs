@@ -34,6 +34,10 @@ pub fn render<'py>(
     };
     let played = py.detach(|| {
         let job = watched(|stop| offline::render_job(&pairs, file, given, Some(stop)))?;
+        let mut warnings = job.warnings.clone();
+        if channels == 1 && job.settings.room.amount > 0.0 {
+            warnings.push("with channels=1 no room is heard; channels=2 has it".to_owned());
+        }
         let mut samples = Vec::with_capacity(job.score.samples * usize::from(channels));
         let mut unheard = 0;
         let resets = job.play(channels, None, |sent, heard| {
@@ -50,7 +54,7 @@ pub fn render<'py>(
             }
             Ok(())
         })?;
-        Ok::<_, PyErr>((samples, job.rate, job.warnings, resets))
+        Ok::<_, PyErr>((samples, job.rate, warnings, resets))
     });
     let (samples, rate, warnings, resets) = played?;
     let count = samples.len() / usize::from(channels);

@@ -4,7 +4,7 @@ pub(super) mod plan;
 
 use crate::cli::csv_table::{CsvTable, quoted};
 use crate::cli::files;
-use crate::cli::render::{RenderCommand, Rendered};
+use crate::cli::render::{LIMITED, RenderCommand, Rendered};
 use crate::cli::shared_args::counted;
 use crate::cli::words::typed;
 use crate::cli::{Failure, parse};
@@ -81,6 +81,40 @@ struct Job {
     render: RenderCommand,
 }
 
+/// Files that are not what was asked for, by why.
+#[derive(Default)]
+struct Doubtful {
+    limited: Vec<String>,
+    clipped: Vec<String>,
+    reset: Vec<String>,
+}
+
+impl Doubtful {
+    fn look(&mut self, file: &str, &Rendered { level, resets, .. }: &Rendered) {
+        let kinds = [
+            (level.peak >= LIMITED, &mut self.limited),
+            (level.clipped > 0, &mut self.clipped),
+            (resets > 0, &mut self.reset),
+        ];
+        for (_, files) in kinds.into_iter().filter(|(is_so, _)| *is_so) {
+            files.push(file.to_owned());
+        }
+    }
+
+    fn warn(self) {
+        for (files, what) in [
+            (self.limited, "the limiter turned peaks down; lower gain-db for levels as played"),
+            (self.clipped, "samples clipped; lower gain-db or use bits = \"32f\""),
+            (self.reset, "the calculation broke down and the instrument was reset; please report this"),
+        ] {
+            if let Some(first) = files.iter().min() {
+                let which = if files.len() == 1 { first.clone() } else { format!("{first} and others") };
+                say!("warning: {} ({which}): {what}", counted(files.len(), "file"));
+            }
+        }
+    }
+}
+
 /// Names that choose or change a bore.
 const OF_THE_BORE: [&str; 6] = ["instrument", "preset", "rate", "quality", "a4", "untuned"];
 
@@ -142,6 +176,7 @@ impl BatchCommand {
         left.sort_by(|&one, &other| jobs[one].bore.cmp(&jobs[other].bore));
         let bar = progress(left.len());
         let (journal, failed) = (Mutex::new(&mut say), Mutex::new(None));
+        let doubtful = Mutex::new(Doubtful::default());
         let made = side_by_side::each(
             left.len(),
             async |stand, at| {
@@ -149,6 +184,9 @@ impl BatchCommand {
                 let made = job.render.render_beside(stand, |_| ProgressBar::hidden()).await;
                 let line = made.and_then(|made| {
                     let line = finished(&job.line, &made);
+                    if let Ok(mut doubtful) = doubtful.lock() {
+                        doubtful.look(&job.file, &made);
+                    }
                     if let Ok(mut say) = journal.lock() {
                         (*say)(&line)?;
                     }
@@ -181,6 +219,7 @@ impl BatchCommand {
         table.finish()?;
         let _ = fs::remove_file(&growing);
         say!("{}: {} and {MANIFEST}", self.into.display(), counted(jobs.len(), "file"));
+        doubtful.into_inner().unwrap_or_default().warn();
         if let Some(left_over) = earlier.left_over(&self.into, &jobs) {
             say!("{left_over}");
         }

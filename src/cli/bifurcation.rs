@@ -57,7 +57,7 @@ pub struct BifurcationCommand {
 impl BifurcationCommand {
     pub fn run(&self) -> Result<(), Failure> {
         self.table.check_files(&[self.instrument.instrument.file()], &[self.plot.path()])?;
-        self.settings.refuse_room_and_players()?;
+        self.settings.refuse_room_players_and_keys()?;
         let file = self.instrument.load()?;
         let written = WrittenNote(self.written);
         let sounding = sounding(&file, written)?;

@@ -3,7 +3,7 @@
 use crate::cli::Failure;
 use crate::cli::csv_table::{TableArgs, quoted};
 use crate::controllers::{ControllerMap, factory};
-use crate::parameters::Value;
+use crate::parameters::{Parameter, Sets, Value};
 use crate::presets::nearest;
 use chalumeau_core::control::midi::MidiDecoder;
 use chalumeau_core::control::midi::breath::BreathFrom;
@@ -107,7 +107,8 @@ pub fn set_by_map(decoder: &mut MidiDecoder, map: &ControllerMap) {
 /// Says which values of a map have no effect offline.
 pub fn only_in_the_plugin(map: &ControllerMap) -> Option<String> {
     let ids = map.values.iter().map(|(parameter, _)| *parameter);
-    let idle = ids.filter(|of| of.sets.is_none() && !OF_THE_DECODER.contains(&of.id));
+    let is_reed = |of: &Parameter| matches!(of.sets, Some(Sets::Reed(..) | Sets::ReedFace));
+    let idle = ids.filter(|of| is_reed(of) || (of.sets.is_none() && !OF_THE_DECODER.contains(&of.id)));
     let names: Vec<_> = idle.map(|of| format!("{} ({})", of.name, of.id)).collect();
     (!names.is_empty()).then(|| {
         format!("--controllers sets {}, which only the plugin has: no effect here", names.join(", "))

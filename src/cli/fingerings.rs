@@ -5,6 +5,7 @@ use crate::cli::csv_table::{TableArgs, quoted};
 use crate::cli::shared_args::{AirArg, InstrumentArg, counted, note, whole};
 use chalumeau_core::bore::fingering_finder::{FingeringFinder, Found};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::instrument::concert_pitch::A4_HZ;
 use chalumeau_core::units::WrittenNote;
 use clap::Args;
 use std::ops::ControlFlow;
@@ -69,7 +70,7 @@ impl FingeringsCommand {
         let file = self.instrument.load()?;
         let count = usize::from(self.count);
         // It is never ended early.
-        let finder = FingeringFinder::new(&file, self.air.air(), &mut |_| ControlFlow::Continue(()))
+        let finder = FingeringFinder::new(&file, self.air.air(), A4_HZ, &mut |_| ControlFlow::Continue(()))
             .ok_or_else(|| Failure::Usage("the search was ended".to_owned()))?;
         if !finder.unmoved().is_empty() {
             say!(

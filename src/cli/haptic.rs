@@ -188,6 +188,9 @@ fn in_flags(refused: FeelRefused) -> Failure {
         FeelRefused::Reference(_) => "choose another --reference".to_owned(),
         FeelRefused::Travel { .. } => "shorten --travel".to_owned(),
         FeelRefused::Crossed { .. } => "lower --place, raise --zeta, or take --law flow".to_owned(),
+        FeelRefused::Ceiling { strength_mnm: 0.0, .. } => {
+            "lower the mark (--detent), or raise --ceiling".to_owned()
+        }
         FeelRefused::Ceiling { strength_mnm, .. } => {
             format!(
                 "lower the strength (--torque) to {strength_mnm:.0} mNm or less, lower --contrast, or raise --ceiling"

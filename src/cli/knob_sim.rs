@@ -1,6 +1,7 @@
 //! `chalumeau knob-sim`: simulates a TorqueTuner and the hand that turns it.
 
 use crate::cli::Failure;
+use crate::cli::files;
 use crate::cli::shared_args::within;
 use chalumeau_firmware::Setup;
 use chalumeau_knob::device::runtime_dir::RuntimeDir;
@@ -185,6 +186,7 @@ impl KnobSimCommand {
         let stopped = Arc::clone(&stop);
         ctrlc::set_handler(move || stopped.store(true, Ordering::Relaxed))
             .map_err(|e| Failure::Knob(io::Error::other(e)))?;
+        files::keep_apart(files::READ, &[self.hand.deed.script.as_deref()], &[self.log.as_deref()])?;
         let mut server = self.server()?;
         if let Some(path) = &self.log {
             server.log_to(path).map_err(|source| Failure::Write { path: path.clone(), source })?;

@@ -102,7 +102,7 @@ pub fn blown(
     let mut args: LiveArgs = read(pairs)?;
     args.instrument.instrument.stop = stop;
     let said = |failure: crate::cli::Failure| failure.to_string();
-    args.settings.refuse_room_and_players().map_err(said)?;
+    args.settings.refuse_room_players_and_keys().map_err(said)?;
     let settings =
         args.settings.blown_by(None, &BreathCurve::constant(gamma as f32), &instrument).map_err(said)?;
     let model = args.instrument.model(instrument, args.rate, settings.a4_hz).map_err(said)?;

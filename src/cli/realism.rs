@@ -18,7 +18,7 @@ use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
-use chalumeau_core::instrument::{Model, Settings};
+use chalumeau_core::instrument::{Model, Reach, Settings};
 use chalumeau_core::measure::realism::{
     CENTROID_RATIOS, Dynamic, NoteScore, REGISTERS, RecordedNote, Summary, louder_is_brighter, mean, median,
     register, render,
@@ -102,10 +102,11 @@ struct Heard {
 impl RealismCommand {
     pub fn run(&self) -> Result<(), Failure> {
         self.table.check_files(&[self.instrument.instrument.file()], &[self.plot.path()])?;
-        self.settings.refuse_room_and_players()?;
+        self.settings.refuse_room_players_and_keys()?;
         let file = self.instrument.load_for(self.preset.as_ref())?;
         let (breaths, mut settings, blown) = self.blown(&file)?;
         settings.gain_db -= HEADROOM_DB as f32;
+        settings.reach = Reach::default();
         let plot = self.plot.open(self.table.force())?;
         let mut table = self.table.open(&header())?;
         let name = with_preset(&file.name, self.preset.as_ref());

@@ -13,16 +13,16 @@ use clap::Args;
 #[derive(Args, Clone, Copy)]
 #[command(next_help_heading = "Reed as measured, instead of H, k and zeta")]
 pub struct PhysicalReedArgs {
-    /// Stiffness K, N/m, 100..20000 [default: the reference reed's, 1218]
+    /// Stiffness K, N/m, 100..20000 [default: the reference reed's; 1218 on a B flat clarinet]
     #[arg(long, value_name = "N_PER_M", conflicts_with_all = ["h", "k", "zeta"], value_parser = |s: &str| within(s, 100.0, 20_000.0))]
     reed_stiffness: Option<f64>,
-    /// Effective area A_r, mm2, 10..1000 [default: 101.5]
+    /// Effective area A_r, mm2, 10..1000 [default: 101.5 on a B flat clarinet]
     #[arg(long, value_name = "MM2", conflicts_with_all = ["h", "k", "zeta"], value_parser = |s: &str| within(s, 10.0, 1_000.0))]
     reed_area: Option<f64>,
-    /// Width w of the channel, tip and side slits together, mm, 1..100 [default: 15.2]
+    /// Width w of the channel, tip and side slits together, mm, 1..100 [default: 15.2 on a B flat clarinet]
     #[arg(long, value_name = "MM", conflicts_with_all = ["h", "k", "zeta"], value_parser = |s: &str| within(s, 1.0, 100.0))]
     reed_width: Option<f64>,
-    /// Opening at the tip at rest, mm, 0.1..4 [default: 0.5]
+    /// Opening at the tip at rest, mm, 0.1..4 [default: 0.5 on a B flat clarinet]
     #[arg(long, value_name = "MM", conflicts_with_all = ["h", "k", "zeta"], value_parser = |s: &str| within(s, 0.1, 4.0))]
     reed_opening: Option<f64>,
     /// A reed as measured is in use, even if nothing of it is given.
@@ -31,16 +31,17 @@ pub struct PhysicalReedArgs {
 }
 
 impl PhysicalReedArgs {
-    /// Sets what the parameter `id` of the table is, in its unit; what was given before.
-    pub fn replace(&mut self, id: &str, value: f64) -> Option<f64> {
-        let field = match id {
-            "rstiff" => &mut self.reed_stiffness,
-            "rarea" => &mut self.reed_area,
-            "rwidth" => &mut self.reed_width,
-            "ropen" => &mut self.reed_opening,
+    /// Sets what the parameter `id` of the table is, in its unit, as on a B flat clarinet; what was given before.
+    pub fn replace(&mut self, id: &str, value: f64, nominal_radius_m: f64) -> Option<f64> {
+        let (here, there) = (PhysicalReed::reference_on(nominal_radius_m), PhysicalReed::reference());
+        let (field, scale) = match id {
+            "rstiff" => (&mut self.reed_stiffness, here.stiffness_n_m / there.stiffness_n_m),
+            "rarea" => (&mut self.reed_area, here.area_m2 / there.area_m2),
+            "rwidth" => (&mut self.reed_width, here.width_m / there.width_m),
+            "ropen" => (&mut self.reed_opening, here.tip_opening_m / there.tip_opening_m),
             _ => return None,
         };
-        field.replace(value)
+        field.replace(value * scale)
     }
 
     /// The reed, if anything of it is given, on a nominal bore whose reference reed fills in the rest.

@@ -47,7 +47,7 @@ const NO_WAV: [&str; 13] =
     ["aac", "aif", "aiff", "caf", "flac", "m4a", "mid", "midi", "mp3", "oga", "ogg", "opus", "wma"];
 
 /// A peak from here on was turned down: the limiter lets none past its ceiling, and hardly any by chance come as near.
-const LIMITED: f32 = 0.999 * CEILING;
+pub const LIMITED: f32 = 0.999 * CEILING;
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Bits {

@@ -337,6 +337,10 @@ impl ScoreArgs {
                 "--tracks needs a MIDI file, each track of which has a player".to_owned(),
             ));
         }
+        if matches!(self.given, Some(Given::Notes(_))) && (self.mpe || self.controllers.is_some()) {
+            let usage = "mpe and controllers are for a MIDI file; a list of notes has no controllers";
+            return Err(Failure::Usage(usage.to_owned()));
+        }
         if self.tracks && self.settings.players_given() {
             let usage = "--tracks gives each track a player of its own; leave it out, or the number and split of players";
             return Err(Failure::Usage(usage.to_owned()));

@@ -242,12 +242,12 @@ impl SettingsArgs {
         self.has("noise")
     }
 
-    /// Refuses a room and several players, where one instrument is measured.
-    pub fn refuse_room_and_players(&self) -> Result<(), Failure> {
-        let idle = ["player", "split", "room"];
+    /// Refuses a room, several players and what keys play, where notes of one instrument are measured.
+    pub fn refuse_room_players_and_keys(&self) -> Result<(), Failure> {
+        let idle = ["player", "split", "room", "transp", "beyond", "keysw"];
         match self.given()?.iter().find(|given| idle.contains(&given.parameter.id)) {
             Some(Given { typed, .. }) => Err(Failure::Usage(format!(
-                "{typed} does nothing here: this command measures one instrument, without a room; leave it out"
+                "{typed} does nothing here: this command measures notes of one instrument, without a room and without keys; leave it out"
             ))),
             None => Ok(()),
         }
@@ -291,17 +291,18 @@ impl SettingsArgs {
             }
             settings.coupled = false;
         }
-        self.measured_with(&given)?.over(settings, file.nominal_radius_m)
+        self.measured_with(&given, file.nominal_radius_m)?.over(settings, file.nominal_radius_m)
     }
 
-    /// The measured reed of flags and `--set`.
-    fn measured_with(&self, given: &[Given]) -> Result<PhysicalReedArgs, Failure> {
+    /// The measured reed of flags and `--set`. Flags have the lengths of this instrument's reed; parameters, as in the plugin and in
+    /// presets, those that the reed would have on a B flat clarinet.
+    fn measured_with(&self, given: &[Given], nominal_radius_m: f64) -> Result<PhysicalReedArgs, Failure> {
         let mut measured = self.measured;
         for Given { parameter, value, typed } in given {
             match (parameter.sets, value) {
                 (Some(Sets::ReedFace), Value::Choice(1)) => measured.is_used = true,
                 (Some(Sets::Reed(..)), Value::Number(value))
-                    if measured.replace(parameter.id, f64::from(*value)).is_some() =>
+                    if measured.replace(parameter.id, f64::from(*value), nominal_radius_m).is_some() =>
                 {
                     let Parameter { flag, name, .. } = parameter;
                     return Err(Failure::Usage(format!(

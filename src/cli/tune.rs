@@ -12,7 +12,7 @@ use chalumeau_core::analysis::pitch;
 use chalumeau_core::analysis::spectrum::rms_dbfs;
 use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
-use chalumeau_core::instrument::{Clarinet, Model, Settings, Tuning};
+use chalumeau_core::instrument::{Clarinet, Model, Reach, Settings, Tuning};
 use chalumeau_core::parallel;
 use chalumeau_core::score;
 use chalumeau_core::score::Score;
@@ -82,7 +82,7 @@ pub struct TuneCommand {
 impl TuneCommand {
     pub fn run(&self) -> Result<(), Failure> {
         self.table.check_files(&[self.instrument.instrument.file()], &[self.plot.path()])?;
-        self.settings.refuse_room_and_players()?;
+        self.settings.refuse_room_players_and_keys()?;
         let file = self.instrument.load_for(self.preset.as_ref())?;
         let base = self.preset.as_ref().map(Preset::settings);
         let notes = self.notes.notes(&file)?;
@@ -100,6 +100,8 @@ impl TuneCommand {
                 (curve, settings, format!("gamma {gamma}"))
             }
         };
+        // Written notes are measured, whichever keys a preset moves.
+        settings.reach = Reach::default();
         if !self.settings.noise_given() {
             settings.noise = 0.0;
         }
@@ -218,6 +220,9 @@ fn measure(
     if rms_dbfs(steady) < SILENT_DBFS + f64::from(settings.gain_db) {
         return None;
     }
-    let heard = pitch::fundamental_hz(steady, f64::from(rate));
-    heard.map(|f_hz| (f_hz, cents(f_hz, sounding.frequency_hz(f64::from(settings.a4_hz)))))
+    let wanted_hz = sounding.frequency_hz(f64::from(settings.a4_hz));
+    // A contrabass clarinet goes below what is usually looked for.
+    let least_hz = pitch::LOWEST_HZ.min(0.7 * wanted_hz);
+    let heard = pitch::fundamental_above_hz(steady, f64::from(rate), least_hz);
+    heard.map(|f_hz| (f_hz, cents(f_hz, wanted_hz)))
 }

@@ -15,7 +15,8 @@ use crate::Window;
 /// All fingerings of the B flat clarinet: a second of one core.
 static FINDER: LazyLock<(InstrumentFile, FingeringFinder)> = LazyLock::new(|| {
     let file = InstrumentFile::built_in();
-    let finder = FingeringFinder::new(&file, Air::default(), &mut |_| ControlFlow::Continue(())).unwrap();
+    let finder =
+        FingeringFinder::new(&file, Air::default(), 440.0, &mut |_| ControlFlow::Continue(())).unwrap();
     (file, finder)
 });
 

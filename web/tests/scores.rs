@@ -342,7 +342,9 @@ fn another_instrument_takes_over_the_note() {
     // At the right: the pan goes on, too.
     before.midi(0xb0, 10, 127);
     before.midi(0x90, 60, 100);
-    (0..8).for_each(|_| drop(before.process(MOST_FRAMES)));
+    for _ in 0..8 {
+        before.process(MOST_FRAMES);
+    }
     let mut after = Playing::new(48_000.0, Bundled::Bass).unwrap();
     after.carry_on(before);
     let [left, right] = (0..24).fold([0.0_f32; 2], |most, _| {

@@ -46,7 +46,7 @@ pub fn test() -> Result<()> {
     let mut command = machine::cargo();
     command
         .args(TESTS)
-        .args(["--test", "standalone", "--", "--ignored", "jack"])
+        .args(["--test", "standalone", "--", "--ignored", "jack", "--test-threads=1"])
         .env(artefacts::STANDALONE, standalone);
     machine::run(server.for_clients(&mut command))?;
     drop(server);

@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         held: one.held.min(HELD[1]),
         breaths: [one.breath].into_iter().chain(BREATHS).collect(),
     });
-    let finder = FingeringFinder::new(&model.file, Air::default(), go_on).ok_or("ended")?;
+    let finder = FingeringFinder::new(&model.file, Air::default(), 440.0, go_on).ok_or("ended")?;
     let new = finder.multiphonics(CANDIDATES).into_iter().flat_map(|one| {
         // The lips of the two notes that may sound.
         one.f_hz.map(|hz| {

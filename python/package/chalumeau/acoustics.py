@@ -47,7 +47,7 @@ def impedance(
     Returns complex128 of the shape of ``frequencies_hz``.
 
     Source: transfer matrices, with wall losses after Zwikker and Kosten (1949) and holes after Dubos et al. (1999); see
-    ``docs/model.md`` in the repository. ``chalumeau impedance`` gives the same numbers.
+    ``docs/model.md`` in the repository. ``chalumeau impedance --model tmm`` gives the same numbers (its own default is the lattice).
 
     >>> import chalumeau, numpy
     >>> f_hz = numpy.arange(100.0, 1000.0, 0.5)

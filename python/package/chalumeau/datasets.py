@@ -87,8 +87,8 @@ def dataset(
         dataset(plan, into, map=lambda _, parts: ray.get([work.remote(part) for part in parts]))
 
     Each file has some rows, ``rows_per_part``, and appears when it is whole. Whatever is stopped or dies, the same call goes
-    on where it was, and at the end every row is there once: that is checked. A folder that holds the rows of another
-    plan is refused.
+    on where it was, and at the end every row is there once: that is checked. Rows whose files (instrument, MIDI, scale ...) have
+    changed are rendered again. A folder that holds the rows of another plan is refused.
 
     ``manifest.csv`` has the columns of ``chalumeau batch`` (``file``, the names of the plan, ``length_s``, ``rate_hz``,
     ``peak_dbfs``, ``rms_dbfs``) and then those of `measure`. ``file`` is the Parquet file of the row. With ``sound`` the Parquet
@@ -115,10 +115,11 @@ def dataset(
         raise ValueError(f"{into} has files of another data set: {', '.join(foreign[:3])} ...; take another folder")
     planned, stamp = _digest(cut), Path(into, PLAN)
     left = [part for part in cut if not is_there(part)]
+    is_begun = any(Path(into, part.file).exists() for part in cut)
     # The plan is written before any file. Files without one are those of an older version, which kept none.
     begun = stamp.read_text() if stamp.exists() else None
     # Where nothing was made, as by a plan with a mistake, another plan may begin.
-    if begun != planned and len(left) < len(cut):
+    if begun != planned and is_begun:
         raise ValueError(f"{into} holds a data set of another plan; take another folder, or remove this one first")
     if left:
         # A wrong name or value is told before anything is made.
@@ -211,7 +212,9 @@ def _write_manifest(cut: Sequence[Part], into: str | os.PathLike[str]) -> int:
 
 
 def _shown(name: str, value: Any) -> str:
-    """A value as ``chalumeau batch`` writes it."""
+    """A value as ``chalumeau batch`` writes it; what was asked for is a text already."""
+    if isinstance(value, str):
+        return value
     if name == "length_s":
         return f"{value:.4f}"
     if name.endswith(("_dbfs", "_db")):

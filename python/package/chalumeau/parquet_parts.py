@@ -38,8 +38,10 @@ class Part:
 
     @property
     def digest(self) -> str:
-        """A hash of everything that the file depends on."""
-        about = {**asdict(self), "into": "", "version": _native.__version__}
+        """A hash of everything that the file depends on, files that rows name among it."""
+        named = sorted({value for row in self.rows for _, value in row if os.path.isfile(value)})
+        files = {name: hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in named}
+        about = {**asdict(self), "into": "", "version": _native.__version__, **({"files": files} if files else {})}
         return hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()
 
 

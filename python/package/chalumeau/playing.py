@@ -64,7 +64,8 @@ def render(
     Returns float32 of shape ``(samples,)``, or ``(samples, 2)`` with ``channels=2``: the memory that was rendered into.
     Python's other threads run meanwhile.
 
-    Raises `ValueError`, with what was given and what would be right. Warns of notes that stay silent.
+    Raises `ValueError`, with what was given and what would be right. Warns of notes that stay silent, and of a room that one channel
+    leaves out.
 
     Source: ``docs/model.md`` in the repository. The reed's law is that of Wilson and Beavers (1974), the bore a lattice after
     Kelly and Lochbaum (1962), with holes after Dubos et al. (1999).
@@ -222,8 +223,11 @@ class Clarinet:
         fixed = [name for name in changes if name in ("quality", "untuned")]
         if fixed:
             raise ValueError(f"{fixed[0]} cannot change while a Clarinet plays; make another: Clarinet({fixed[0]}=...)")
-        changed = {setting_id(name) for name in changes}
-        wanted = {name: value for name, value in self._settings.items() if setting_id(name) not in changed}
+        # What a short name sets.
+        short = {"no_noise": "noise", "no-noise": "noise", "tempered": "tune", "natural": "tune"}
+        of = lambda name: short.get(name, setting_id(name))  # noqa: E731
+        changed = {of(name) for name in changes}
+        wanted = {name: value for name, value in self._settings.items() if of(name) not in changed}
         wanted |= {name: value for name, value in changes.items() if value is not None}
         self._voice.set(pairs(wanted), self._instrument)
         self._settings = wanted

@@ -4,8 +4,8 @@ use crate::cli::render_job::RenderJob;
 use crate::cli::report::{number, word};
 use chalumeau_core::haptics::torque_law::torque_mnm;
 use chalumeau_core::haptics::{FeelDesign, FeelRefused, FeelTable, NoteFeel, NoteRequirement, TorqueLimits};
-use chalumeau_core::instrument::Settings;
 use chalumeau_core::instrument::feel_inputs::played_reed;
+use chalumeau_core::instrument::{KeyPitches, Model, Reach, Settings};
 use chalumeau_core::measure::bifurcation;
 use chalumeau_core::measure::bifurcation::SOUNDING_RMS;
 use chalumeau_core::reed::ReedTables;
@@ -16,6 +16,7 @@ use chalumeau_figure::felt::{AtContrast, FeltThresholds, Torque, thresholds, tor
 use chalumeau_figure::report::{Chapter, Plate, ReportTable, TableCell};
 use chalumeau_knob::touch::feel::InstrumentFeel;
 use chalumeau_knob::wire::message::TorqueLaw;
+use std::sync::Arc;
 
 /// Contrasts, and Places, shown.
 const EXPONENTS: [f64; 3] = [1.0, 3.0, 5.0];
@@ -140,11 +141,15 @@ impl<'a> BreathAndHaptics<'a> {
         let sounding = written.sounding(file.transposition)?;
         let most = f64::from(GAMMA_MAX).min(MOST_KPA / closing_kpa);
         let gamma = (BEYOND * asked?.gamma_off).min(most);
-        let settings =
-            Settings { breath_full_kpa: (gamma * closing_kpa).max(1.0) as f32, ..self.prepared.settings };
+        let settings = Settings {
+            breath_full_kpa: (gamma * closing_kpa).max(1.0) as f32,
+            reach: Reach::default(),
+            ..self.prepared.settings
+        };
         let rate = self.prepared.rate;
-        let model = &self.prepared.model;
-        let played = bifurcation::measure(model, &settings, sounding, gamma as f32, SWELL_S, rate, |_| {});
+        // The note itself, whichever key plays it in the score.
+        let model = Arc::new(Model { keys: KeyPitches::default(), ..(*self.prepared.model).clone() });
+        let played = bifurcation::measure(&model, &settings, sounding, gamma as f32, SWELL_S, rate, |_| {});
         let at = |share: f64| share * SWELL_S;
         let moment = |t_s: f64, point: &bifurcation::RampPoint| {
             [t_s, closing_kpa * point.gamma, closing_kpa * point.rms, point.shut]

@@ -14,7 +14,7 @@ use chalumeau_core::units::Air;
 /// The finder of the latest instrument, and the thread that makes it. Dropping it ends the thread.
 #[derive(Default)]
 pub struct FingeringSearcher {
-    of: Option<(Arc<InstrumentFile>, Air)>,
+    of: Option<(Arc<InstrumentFile>, Air, f64)>,
     finder: Option<FingeringFinder>,
     running: Option<Running>,
     answer: Option<Arc<FingeringAnswer>>,
@@ -34,17 +34,18 @@ impl FingeringSearcher {
         question: Option<FingeringQuestion>,
         file: &Arc<InstrumentFile>,
         air: Air,
+        a4_hz: f64,
     ) -> FingeringSearch {
         let Some(question) = question else {
             self.end();
             return FingeringSearch::Resting;
         };
-        let is_known = |(of, in_air): &(Arc<InstrumentFile>, Air)| {
-            *in_air == air && (Arc::ptr_eq(of, file) || of == file)
+        let is_known = |(of, in_air, at_hz): &(Arc<InstrumentFile>, Air, f64)| {
+            *in_air == air && *at_hz == a4_hz && (Arc::ptr_eq(of, file) || of == file)
         };
         if !self.of.as_ref().is_some_and(is_known) {
             self.end();
-            (self.of, self.finder, self.answer) = (Some((file.clone(), air)), None, None);
+            (self.of, self.finder, self.answer) = (Some((file.clone(), air, a4_hz)), None, None);
         }
         if let Some(done) = self.running.take_if(|running| running.thread.is_finished()) {
             // The panic of a thread was reported when it happened.
@@ -52,7 +53,7 @@ impl FingeringSearcher {
         }
         let Some(finder) = &self.finder else {
             if self.running.is_none() {
-                self.running = Running::start(file.clone(), air);
+                self.running = Running::start(file.clone(), air, a4_hz);
             }
             let done = self.running.as_ref().map_or(0, |running| running.done.load(Ordering::Relaxed));
             return FingeringSearch::Looking(f32::from_bits(done));
@@ -80,11 +81,11 @@ impl Drop for FingeringSearcher {
 }
 
 impl Running {
-    fn start(file: Arc<InstrumentFile>, air: Air) -> Option<Self> {
+    fn start(file: Arc<InstrumentFile>, air: Air, a4_hz: f64) -> Option<Self> {
         let (stop, done) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU32::new(0)));
         let (ends, tells) = (stop.clone(), done.clone());
         let search = move || {
-            FingeringFinder::new(&file, air, &mut |share| {
+            FingeringFinder::new(&file, air, a4_hz, &mut |share| {
                 tells.store((share as f32).to_bits(), Ordering::Relaxed);
                 if ends.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })
@@ -114,7 +115,7 @@ mod tests {
     ) -> (Arc<FingeringAnswer>, Vec<f32>) {
         let (began, mut shares) = (Instant::now(), Vec::new());
         loop {
-            match searcher.look(Some(question), file, Air::default()) {
+            match searcher.look(Some(question), file, Air::default(), 440.0) {
                 FingeringSearch::Found(answer) => return (answer, shares),
                 FingeringSearch::Looking(share) => shares.push(share),
                 FingeringSearch::Resting => panic!("a question was put"),
@@ -139,7 +140,7 @@ mod tests {
         assert!(c6.looked_through > 39_744 && c6.rows.iter().take(5).any(|row| row.is_of_chart));
         // Nothing is worked out again for another note.
         assert!(matches!(
-            searcher.look(Some(question(79)), &file, Air::default()),
+            searcher.look(Some(question(79)), &file, Air::default(), 440.0),
             FingeringSearch::Found(answer) if answer.question == question(79)
         ));
 
@@ -166,8 +167,11 @@ mod tests {
         let file = Arc::new(InstrumentFile::built_in());
         let mut searcher = FingeringSearcher::default();
         let question = FingeringQuestion { note: WrittenNote(60), trill_to: None };
-        assert!(matches!(searcher.look(Some(question), &file, Air::default()), FingeringSearch::Looking(_)));
-        assert_eq!(searcher.look(None, &file, Air::default()), FingeringSearch::Resting);
+        assert!(matches!(
+            searcher.look(Some(question), &file, Air::default(), 440.0),
+            FingeringSearch::Looking(_)
+        ));
+        assert_eq!(searcher.look(None, &file, Air::default(), 440.0), FingeringSearch::Resting);
         assert!(searcher.running.is_none() && searcher.finder.is_none());
     }
 }

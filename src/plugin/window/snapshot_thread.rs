@@ -29,6 +29,7 @@ use crate::plugin::instrument_loading::{CurrentInstrument, Readiness};
 use crate::plugin::knob;
 use crate::plugin::params::instrument::InstrumentChoice;
 use chalumeau_core::haptics::FeelDesign;
+use chalumeau_core::instrument::concert_pitch::A4_HZ;
 use chalumeau_core::instrument::{KeyPitches, Settings};
 use chalumeau_core::units::{Air, SoundingNote};
 #[cfg(feature = "devices")]
@@ -176,8 +177,9 @@ impl SnapshotThread {
             .filter(|open| open.len() == file.holes.len())
             .unwrap_or_else(|| file.fingerings[fingering].open.clone());
         snapshot.fingering = fingering;
-        let air = current.map_or_else(Air::default, |current| current.model.air);
-        snapshot.fingerings = self.fingerings.look(self.shared.fingerings_for(), &file, air);
+        let (air, a4_hz) =
+            current.map_or((Air::default(), A4_HZ), |current| (current.model.air, current.model.a4_hz));
+        snapshot.fingerings = self.fingerings.look(self.shared.fingerings_for(), &file, air, a4_hz);
         snapshot.openings = open.iter().map(|&open| f32::from(u8::from(open))).collect();
         snapshot.instrument = file;
         let Some(analysis) = &mut self.analysis else { return };

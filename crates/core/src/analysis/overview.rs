@@ -1,7 +1,7 @@
 //! A long sound in the size of a picture: outline, spectrogram and pitch, gathered while the samples pass by.
 //!
 //! How many columns there are is fixed at the start and does not grow with the length, so an hour costs what a minute
-//! costs; at most a tenth of a second of samples is kept. Columns of a short sound overlap, those of a long one look at
+//! costs; at most three windows of samples are kept, a quarter of a second at 48 kHz. Columns of a short sound overlap, those of a long one look at
 //! one moment each: between them nothing is seen of the spectrum, but all of the outline.
 
 use crate::analysis::pitch::{TrackPoint, WINDOW_S, pitch_track};

@@ -17,7 +17,7 @@ use std::array;
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
-/// Lowest fundamental looked for, Hz.
+/// Lowest fundamental looked for where no other is given, Hz.
 pub const LOWEST_HZ: f64 = 50.0;
 /// Highest fundamental looked for, Hz.
 pub const HIGHEST_HZ: f64 = 2500.0;
@@ -72,8 +72,13 @@ pub struct TrackPoint {
 /// assert_eq!(fundamental_hz(&[0.0; 24_000], 48_000.0), None);
 /// ```
 pub fn fundamental_hz(samples: &[f64], rate_hz: f64) -> Option<f64> {
+    fundamental_above_hz(samples, rate_hz, LOWEST_HZ)
+}
+
+/// The same where the fundamental may be as low as `least_hz`: of a contrabass clarinet.
+pub fn fundamental_above_hz(samples: &[f64], rate_hz: f64, least_hz: f64) -> Option<f64> {
     let tail = &samples[samples.len().saturating_sub(rate_hz as usize)..];
-    let coarse = coarse_hz(tail, rate_hz)?;
+    let coarse = coarse_hz(tail, rate_hz, least_hz)?;
     Some(refine_hz(samples, rate_hz, coarse).unwrap_or(coarse))
 }
 
@@ -155,7 +160,7 @@ pub fn pitch_track(samples: &[f64], rate_hz: f64, hop_s: f64) -> Vec<TrackPoint>
             let frame = &samples[start..start + window];
             TrackPoint {
                 t_s: (start as f64 + 0.5 * window as f64) / rate_hz,
-                hz: coarse_hz(frame, rate_hz),
+                hz: coarse_hz(frame, rate_hz, LOWEST_HZ),
                 rms: rms(frame),
             }
         })
@@ -163,9 +168,9 @@ pub fn pitch_track(samples: &[f64], rate_hz: f64, hop_s: f64) -> Vec<TrackPoint>
 }
 
 /// The shortest of the good periods by autocorrelation.
-fn coarse_hz(samples: &[f64], rate_hz: f64) -> Option<f64> {
+fn coarse_hz(samples: &[f64], rate_hz: f64, least_hz: f64) -> Option<f64> {
     let len = samples.len();
-    let longest = ((rate_hz / LOWEST_HZ * 1.02) as usize).min(len / 3);
+    let longest = ((rate_hz / least_hz * 1.02) as usize).min(len / 3);
     let shortest = ((rate_hz / HIGHEST_HZ * 0.98) as usize).max(1);
     if longest <= shortest + 2 || rms(samples) < SILENCE {
         return None;

@@ -219,7 +219,11 @@ impl Check {
 
 /// Holes under the fingers stand in a row, except that under the thumb; a key's hole may stand beside another.
 fn overlaps(file: &InstrumentFile) -> Vec<Concern> {
-    let under_fingers: Vec<_> = file.holes.iter().filter(|hole| hole.kind == HoleKind::Finger).collect();
+    let under_fingers: Vec<_> = file
+        .holes
+        .iter()
+        .filter(|hole| hole.kind == HoleKind::Finger && !hole.name.eq_ignore_ascii_case("thumb"))
+        .collect();
     let pairs = under_fingers.windows(2).map(|pair| (pair[0], pair[1]));
     let overlap = pairs.filter(|(first, second)| second.x_m - first.x_m < first.radius_m + second.radius_m);
     let concern = |(first, second): (&ToneHole, &ToneHole)| Concern::HolesOverlap {

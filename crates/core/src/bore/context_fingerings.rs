@@ -84,8 +84,8 @@ fn resonance(bore: &TransferMatrix, open: &[bool], reed_volume_m3: f64, note_hz:
 }
 
 impl ContextFingerings {
-    /// Compares the alternates of an instrument with its chart: milliseconds. Allocates.
-    pub fn new(file: &InstrumentFile, air: &Air) -> Self {
+    /// Compares the alternates of an instrument, whose A4 is `a4_hz`, with its chart: milliseconds. Allocates.
+    pub fn new(file: &InstrumentFile, air: &Air, a4_hz: f64) -> Self {
         let mechanism = Mechanism::boehm();
         let notes = file.fingerings.len();
         let bore = TransferMatrix::new(file, *air);
@@ -94,7 +94,7 @@ impl ContextFingerings {
             .filter(|choice| choice.nth > 0)
             .filter_map(|choice| {
                 let fingering = file.fingerings.iter().position(|chart| chart.written == choice.written)?;
-                let wanted_hz = choice.written.sounding(file.transposition)?.frequency_hz(440.0);
+                let wanted_hz = choice.written.sounding(file.transposition)?.frequency_hz(a4_hz);
                 let played = |open: &[bool]| resonance(&bore, open, file.reed_volume_m3, wanted_hz);
                 let (chart_hz, chart_height) = played(&file.fingerings[fingering].open)?;
                 let (hz, height) = played(&choice.open)?;
@@ -161,7 +161,7 @@ mod tests {
     #[test]
     fn what_is_taken_moves_fewer_fingers_on_small_steps_and_is_in_tune() {
         let file = InstrumentFile::built_in();
-        let context = ContextFingerings::new(&file, &Air::default());
+        let context = ContextFingerings::new(&file, &Air::default(), 440.0);
         for one in context.all() {
             println!("{} {one:?}", file.fingerings[one.fingering].written);
         }
@@ -190,6 +190,19 @@ mod tests {
     }
 
     #[test]
+    fn another_pitch_of_a4_has_the_same_alternates() {
+        let file = InstrumentFile::built_in();
+        let of = |a4_hz: f64| {
+            let context = ContextFingerings::new(&file.scaled(440.0 / a4_hz), &Air::default(), a4_hz);
+            context.all().iter().map(|one| (one.fingering, one.nth)).collect::<Vec<_>>()
+        };
+        assert!(!of(440.0).is_empty());
+        for a4_hz in [415.0, 466.0] {
+            assert_eq!(of(a4_hz), of(440.0), "{a4_hz}");
+        }
+    }
+
+    #[test]
     fn resonances_are_those_of_the_whole_search() {
         let file = InstrumentFile::built_in();
         let bore = TransferMatrix::new(&file, Air::default());
@@ -205,7 +218,7 @@ mod tests {
     fn another_mechanism_has_no_alternates() {
         let mut file = InstrumentFile::built_in();
         file.holes.iter_mut().for_each(|hole| hole.name.insert(0, 'x'));
-        let context = ContextFingerings::new(&file, &Air::default());
+        let context = ContextFingerings::new(&file, &Air::default(), 440.0);
         assert!(context.all().is_empty() && context.taken(0, None, 1).is_none());
     }
 }

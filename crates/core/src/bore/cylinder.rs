@@ -193,17 +193,21 @@ impl Cylinder {
             register,
             description,
         };
-        let mut holes = Vec::with_capacity(count);
+        // Each with the number of the note from which on it is open; the register hole has none.
+        let mut holes: Vec<(ToneHole, Option<usize>)> = Vec::with_capacity(count);
         if let (Some(radius_m), Some(highest_m)) = (self.vent_radius_m, ends_m.last()) {
             // Where a third of the column lies, taken between the longest and the shortest.
             let third_m = (ends_m[0] + highest_m) / 6.0;
-            holes.push(hole("REG".to_owned(), third_m, radius_m, true, "register hole".to_owned()));
+            let register = hole("REG".to_owned(), third_m, radius_m, true, "register hole".to_owned());
+            holes.push((register, None));
         }
         for (index, x_m) in ends_m.iter().enumerate().skip(1).rev() {
             let description = format!("open for {} and above", self.notes[index]);
-            holes.push(hole(name_of_hole(index), *x_m, self.hole_radius_m, false, description));
+            let tone_hole = hole(name_of_hole(index), *x_m, self.hole_radius_m, false, description);
+            holes.push((tone_hole, Some(index)));
         }
-        let vents = holes.len() + 1 - count;
+        // Over more than two octaves the topmost holes lie above the register hole.
+        holes.sort_by(|(a, _), (b, _)| a.x_m.total_cmp(&b.x_m));
         let fingerings = self
             .notes
             .iter()
@@ -212,7 +216,7 @@ impl Cylinder {
                 written,
                 register: "chalumeau".to_owned(),
                 mode: 1,
-                open: (0..holes.len()).map(|hole| hole >= vents && holes.len() - hole <= index).collect(),
+                open: holes.iter().map(|(_, from)| from.is_some_and(|from| from <= index)).collect(),
                 maker_open: None,
                 fingers: String::new(),
             })
@@ -235,7 +239,7 @@ impl Cylinder {
                 r_start_m: self.radius_m,
                 r_end_m: self.radius_m,
             }],
-            holes,
+            holes: holes.into_iter().map(|(hole, _)| hole).collect(),
             fingerings,
         }
     }

@@ -42,6 +42,7 @@ const ALIKE_CENTS: f64 = 35.0;
 #[derive(Debug)]
 pub struct FingeringFinder {
     transposition: i8,
+    a4_hz: f64,
     /// Holes that fingers cover, from the top.
     finger_holes: Vec<usize>,
     grips: Vec<Grip>,
@@ -118,14 +119,32 @@ pub fn bits(open: &[bool]) -> u64 {
     open.iter().rev().fold(0, |bits, &open| bits << 1 | u64::from(open))
 }
 
+/// Lowest and highest frequency looked at on a B flat clarinet, Hz, and how far they are from the lowest and the highest note of larger
+/// and smaller ones.
+const RANGE_HZ: (f64, f64) = (100.0, 2_600.0);
+const AROUND: (f64, f64) = (0.7, 1.25);
+
+/// What the resonances of an instrument are looked for in, Hz.
+fn range_hz(file: &InstrumentFile) -> (f64, f64) {
+    let notes = file.fingerings.iter().map(|fingering| file.sounding(fingering.written).frequency_hz(440.0));
+    let highest_hz = notes.fold(0.0, f64::max);
+    (RANGE_HZ.0.min(AROUND.0 * file.lowest_hz()), RANGE_HZ.1.max(AROUND.1 * highest_hz))
+}
+
 impl FingeringFinder {
-    /// Works out all fingerings of an instrument: some seconds. `on` hears the share done and may end it, then the answer is
+    /// Works out all fingerings of an instrument whose A4 is `a4_hz`: some seconds. `on` hears the share done and may end it, then the answer is
     /// `None`. Allocates.
-    pub fn new(file: &InstrumentFile, air: Air, on: &mut dyn FnMut(f64) -> ControlFlow<()>) -> Option<Self> {
+    pub fn new(
+        file: &InstrumentFile,
+        air: Air,
+        a4_hz: f64,
+        on: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> Option<Self> {
         let grips = Mechanism::boehm().grips(file);
         let open: Vec<u64> = grips.iter().map(|grip| grip.open).collect();
         let model = TransferMatrix::new(file, air);
-        let resonances = model.survey(&open, file.reed_volume_m3, on)?;
+        let range_hz = range_hz(file);
+        let resonances = model.survey(&open, file.reed_volume_m3, range_hz, on)?;
         let fingers = file.holes.iter().enumerate().filter(|(_, hole)| hole.kind == HoleKind::Finger);
         let finger_holes = fingers.map(|(hole, _)| hole).collect();
         let of_chart = |fingering: &Fingering| {
@@ -140,10 +159,12 @@ impl FingeringFinder {
             .map(|fingering| (fingering.written, bits(&fingering.open)))
             .collect();
         let open: Vec<u64> = others.iter().map(|&(_, open)| open).collect();
-        let of_others = model.survey(&open, file.reed_volume_m3, &mut |_| ControlFlow::Continue(()))?;
+        let go_on = &mut |_| ControlFlow::Continue(());
+        let of_others = model.survey(&open, file.reed_volume_m3, range_hz, go_on)?;
         let out_of_reach = others.into_iter().zip(of_others).map(|((note, open), all)| (note, open, all));
         Some(Self {
             transposition: file.transposition,
+            a4_hz,
             finger_holes,
             out_of_reach: out_of_reach.collect(),
             unmoved: Mechanism::boehm().unmoved(file),
@@ -162,7 +183,7 @@ impl FingeringFinder {
     /// The chart's own fingering of a note, at the resonance nearest to it however far that is; `None` for a note that is not
     /// in the chart. Where the fingers cannot open these holes, `fingers` is empty and nothing is added to the cost for them.
     pub fn played_by_chart(&self, written: WrittenNote) -> Option<Found> {
-        let wanted_hz = written.sounding(self.transposition)?.frequency_hz(440.0);
+        let wanted_hz = written.sounding(self.transposition)?.frequency_hz(self.a4_hz);
         if let Some(grip) = self.of_chart(written) {
             let at = self.grips.binary_search_by_key(&grip.open, |grip| grip.open).ok()?;
             let mut found = self.found(*grip, &self.resonances[at], wanted_hz, f64::INFINITY)?;
@@ -196,7 +217,7 @@ impl FingeringFinder {
     /// as the chart has them.
     pub fn best(&self, written: WrittenNote, count: usize) -> Vec<Found> {
         let Some(sounding) = written.sounding(self.transposition) else { return Vec::new() };
-        let wanted_hz = sounding.frequency_hz(440.0);
+        let wanted_hz = sounding.frequency_hz(self.a4_hz);
         let near =
             |(grip, resonances): (&Grip, &Vec<_>)| self.found(*grip, resonances, wanted_hz, FARTHEST_CENTS);
         let mut found: Vec<Found> = self.grips.iter().zip(&self.resonances).filter_map(near).collect();
@@ -216,7 +237,7 @@ impl FingeringFinder {
         best
     }
 
-    /// Pairs of fingerings for two notes, those first between which the fewest fingers move, then by cost.
+    /// Pairs of fingerings for two notes, the cheapest first: what both cost, and each finger beyond the first that moves between them.
     pub fn trills(&self, written: WrittenNote, to: WrittenNote, count: usize) -> Vec<(Found, Found)> {
         let [from, to] = [written, to].map(|written| self.best(written, TRILL_FINGERINGS));
         let mut pairs: Vec<(&Found, &Found)> =
@@ -228,8 +249,8 @@ impl FingeringFinder {
         pairs.into_iter().take(count).map(|(from, to)| (from.clone(), to.clone())).collect()
     }
 
-    /// Fingerings whose two strongest resonances belong to no one note, the most even ones first: what may sound as a
-    /// multiphonic. Only playing tells, see [`measure::multiphonics`](crate::measure::multiphonics). No two that are nearly the
+    /// Fingerings whose two strongest resonances belong to no one note, the cheapest first, by how uneven they are and by the
+    /// fingers' effort: what may sound as a multiphonic. Only playing tells, see [`measure::multiphonics`](crate::measure::multiphonics). No two that are nearly the
     /// same in both pitches.
     pub fn multiphonics(&self, count: usize) -> Vec<Multiphonic> {
         let mut all: Vec<Multiphonic> =

@@ -94,13 +94,16 @@ impl InstrumentFile {
             self.bore.insert(last + 1, gap);
         } else if by_m < 0.0 {
             let r_m = self.radius_at(end_m);
-            let mut index = 0;
+            // Another part farther down may have the same name.
+            let (mut index, mut left) = (0, 0);
             self.bore.retain(|segment| {
-                let is_cut_off = segment.part == part && index <= last && segment.x_start_m >= end_m;
+                let is_above = index <= last;
+                let is_cut_off = segment.part == part && is_above && segment.x_start_m >= end_m;
                 index += 1;
+                left += usize::from(is_above && !is_cut_off);
                 !is_cut_off
             });
-            let cut = self.bore.iter_mut().rfind(|segment| segment.part == part);
+            let cut = self.bore[..left].iter_mut().rfind(|segment| segment.part == part);
             if let Some(cut) = cut {
                 (cut.x_end_m, cut.r_end_m) = (end_m, r_m);
             }
@@ -114,6 +117,27 @@ mod tests {
 
     fn pulled(part: &str, by_m: f64) -> PulledJoint {
         PulledJoint { part: part.to_owned(), by_m }
+    }
+
+    #[test]
+    fn a_part_whose_name_comes_twice_is_pulled_where_it_comes_first() {
+        let mut file = InstrumentFile::built_in();
+        let parts: Vec<String> = file.jointed_parts().into_iter().map(str::to_owned).collect();
+        let (first, again) = (parts[1].clone(), parts[2].clone());
+        file.bore
+            .iter_mut()
+            .filter(|segment| segment.part == again)
+            .for_each(|segment| segment.part = format!("{first} 2"));
+        let plain = file.with_joints_pulled(&[pulled(&first, -1e-3)]);
+        // The last segment of the other part has the name too.
+        let last = file.bore.iter().rposition(|segment| segment.part == format!("{first} 2")).unwrap();
+        file.bore[last].part.clone_from(&first);
+        let twice = file.with_joints_pulled(&[pulled(&first, -1e-3)]);
+        let ends = |file: &InstrumentFile| {
+            file.bore.iter().map(|segment| (segment.x_start_m, segment.x_end_m)).collect::<Vec<_>>()
+        };
+        assert_eq!(ends(&twice), ends(&plain));
+        assert!(ends(&twice).iter().all(|(start, end)| start < end));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Sound radiation from an open end: bell and tone holes as unflanged pipes (Levine & Schwinger 1948).
 //!
-//! The lattice takes the low-frequency limit, a conductance beside a mass. The transfer matrices take the Pade form that
-//! openwind uses, which has the same limit.
+//! Lattice and transfer matrices take the same: a conductance beside a mass, which is the Pade form that openwind uses and has the
+//! low-frequency limit of the exact solution.
 
 use num_complex::Complex64;
 

@@ -3,6 +3,8 @@
 //! Straight lines join rest, onset, closure and extinction; the last line continues beyond extinction. The map is monotone
 //! and has an exact inverse. A dead zone around rest is left to the code that reads the knob.
 
+/// Least way from the onset to full breath, over that to closure; by judgement: so that a hand can play between them.
+const LEAST_WAY: f64 = 0.25;
 /// Number of points: rest, onset, closure, extinction.
 const KNOTS: usize = 4;
 
@@ -36,10 +38,12 @@ impl AngleMap {
     }
 
     /// The same angles for breath that is no pressure: the onset is at `onset_pa` and `full_pa` stays, with straight lines between.
-    /// Real-time safe.
+    /// Where full breath would be no or little more than the pressure of the onset, as with a hard reed, it is reached a quarter of the
+    /// way from there to closure. Real-time safe.
     pub fn with_onset(&self, onset_pa: f64, full_pa: f64) -> Self {
-        let own = self.pressure_pa[1];
-        let above = (full_pa - onset_pa) / (full_pa - own).max(1.0);
+        let [_, own, closure, _] = self.pressure_pa;
+        let full_at = full_pa.max(own + LEAST_WAY * (closure - own));
+        let above = (full_pa - onset_pa) / (full_at - own);
         let moved = |pa: f64| if pa <= own { pa * onset_pa / own } else { onset_pa + (pa - own) * above };
         Self { angle_deg: self.angle_deg, pressure_pa: self.pressure_pa.map(moved) }
     }
@@ -89,6 +93,17 @@ mod tests {
         assert!((moved.pressure_pa(120.0) - 189.0).abs() < 1e-9 && moved.pressure_pa(60.0) < 100.0);
         assert!((moved.pressure_pa(360.0) - 6_000.0).abs() < 1e-9);
         assert!((moved.angle_deg(moved.pressure_pa(200.0)) - 200.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn between_onset_and_full_breath_there_is_always_a_way_for_the_hand() {
+        // Of a reed of strength 5: the note begins at more than full breath.
+        let map = AngleMap::new([(130.0, 6_300.0), (360.0, 16_400.0), (700.0, 30_000.0)]);
+        let moved = map.with_onset(189.0, 6_000.0);
+        assert!((moved.pressure_pa(130.0) - 189.0).abs() < 1e-9);
+        let full_deg = moved.angle_deg(6_000.0);
+        assert!((full_deg - (130.0 + 0.25 * 230.0)).abs() < 1e-6, "{full_deg}");
+        assert!(moved.pressure_pa(150.0) < 0.5 * 6_000.0);
     }
 
     #[test]

@@ -127,6 +127,7 @@ impl FeelRefused {
             Self::Slip => "set k apart from H if this reed is meant",
             Self::Travel { .. } => "shorten the travel",
             Self::Crossed { .. } => "lower Place, raise zeta, or use the flow law",
+            Self::Ceiling { strength_mnm: 0.0, .. } => "lower the mark or the friction, or allow more torque",
             Self::Ceiling { strength_mnm, .. } => {
                 return Some(format!(
                     "lower the strength to {strength_mnm:.0} mNm or less, lower Contrast, or allow more torque"

@@ -122,7 +122,7 @@ impl Model {
                 _ => 1,
             })
             .collect();
-        let alternates = ContextFingerings::new(&file, &air);
+        let alternates = ContextFingerings::new(&file, &air, a4_hz);
         let section = std::f64::consts::PI * file.nominal_radius_m * file.nominal_radius_m;
         // The instrument's own reed by its ratio to the reference, so that a B flat clarinet has exactly the reference.
         let larger = file.reed_volume_m3 / REFERENCE_VOLUME_M3;

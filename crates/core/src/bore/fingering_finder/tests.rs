@@ -1,10 +1,11 @@
 use super::*;
 use crate::bore::alternate_fingerings::fingering_choices;
+use crate::bore::bundled::Bundled;
 use std::sync::LazyLock;
 
 static FILE: LazyLock<InstrumentFile> = LazyLock::new(InstrumentFile::built_in);
 static FINDER: LazyLock<FingeringFinder> = LazyLock::new(|| {
-    FingeringFinder::new(&FILE, Air::default(), &mut |_| ControlFlow::Continue(())).unwrap()
+    FingeringFinder::new(&FILE, Air::default(), 440.0, &mut |_| ControlFlow::Continue(())).unwrap()
 });
 
 /// Dickens et al. (2007) looked through 39744.
@@ -16,6 +17,19 @@ fn no_usual_fingering_is_missed() {
         assert!(FINDER.grips.iter().any(|grip| grip.open == open), "{}: {}", choice.written, choice.fingers);
     }
     assert!(FINDER.grips.is_sorted_by_key(|grip| grip.open));
+}
+
+/// Its lowest notes lie below what a B flat clarinet is looked through for, and everything is 101 cents lower.
+#[test]
+fn a_bass_clarinet_at_415_hz_is_found_where_its_chart_plays() {
+    let file = Bundled::Bass.file().scaled(440.0 / 415.0);
+    let finder =
+        FingeringFinder::new(&file, Air::default(), 415.0, &mut |_| ControlFlow::Continue(())).unwrap();
+    for note in (52..=90).map(WrittenNote) {
+        let found = finder.played_by_chart(note).unwrap();
+        assert!(found.cents.abs() < 80.0, "{note}: {} cents", found.cents);
+    }
+    assert!(!finder.best(WrittenNote(52), 3).is_empty());
 }
 
 /// Up to G#6 players agree on fingerings; above, charts differ.

@@ -12,7 +12,8 @@ const DIGITS: usize = 6;
 
 impl InstrumentFile {
     /// The instrument as TOML, see `docs/instrument-file.md`. [`parse`](Self::parse) of it gives the same instrument, every
-    /// length to 1e-9 m and the reed volume to 1e-15 m3; exactly the same when it was itself read from a file.
+    /// length to 1e-9 m and the reed volume to 1e-15 m3; exactly the same when it was itself read from a file with
+    /// at most six decimals of a millimetre.
     pub fn to_toml(&self) -> String {
         // Writing to a `String` cannot fail.
         let mut out = String::new();

@@ -17,10 +17,9 @@ pub struct Resonance {
     pub height: f32,
 }
 
-/// The grid, Hz. Between its points the admittance is taken as straight: half a cent off at the lowest note (see the test).
-const LOWEST_HZ: f64 = 100.0;
-const HIGHEST_HZ: f64 = 2_600.0;
-const STEP_HZ: f64 = 4.0;
+/// Step of the grid over its lowest frequency. Between its points the admittance is taken as straight: half a cent off at the lowest
+/// note (see the test).
+const STEP: f64 = 0.04;
 /// Resonances lower than this are none: the threshold of a reed would be above its closing pressure.
 const LEAST_HEIGHT: f32 = 2.0;
 /// Fingerings that one item of work holds.
@@ -28,6 +27,8 @@ const BATCH: usize = 1_024;
 
 /// What does not depend on the fingering, `[frequency]`.
 struct Grid {
+    /// Lowest frequency, and step, Hz.
+    at_hz: (f64, f64),
     /// `[holes + 1]`
     spans: Vec<Vec<Matrix>>,
     /// `[hole][closed, open]`
@@ -40,16 +41,17 @@ struct Grid {
 type Waves = Vec<(Complex64, Complex64)>;
 
 impl TransferMatrix {
-    /// The resonances from 100 Hz to 2.6 kHz of each fingering, lowest first, on all cores. A fingering is one bit a hole, set if
+    /// The resonances within `range_hz` of each fingering, lowest first, on all cores. A fingering is one bit a hole, set if
     /// it is open, in the order of the file from the lowest bit. `on` hears the share done and may end it, then the answer is
     /// `None`.
     pub fn survey(
         &self,
         fingerings: &[u64],
         reed_volume_m3: f64,
+        range_hz: (f64, f64),
         on: &mut dyn FnMut(f64) -> ControlFlow<()>,
     ) -> Option<Vec<Vec<Resonance>>> {
-        let grid = self.grid(reed_volume_m3);
+        let grid = self.grid(reed_volume_m3, range_hz);
         // Sorted by what is open near the bell: neighbours share most.
         let mut order: Vec<usize> = (0..fingerings.len()).collect();
         order.sort_by_key(|&at| fingerings[at]);
@@ -69,13 +71,15 @@ impl TransferMatrix {
         Some(all)
     }
 
-    fn grid(&self, reed_volume_m3: f64) -> Grid {
-        let steps = ((HIGHEST_HZ - LOWEST_HZ) / STEP_HZ) as usize + 1;
-        let at: Vec<_> = (0..steps).map(|k| self.at(LOWEST_HZ + STEP_HZ * k as f64)).collect();
+    fn grid(&self, reed_volume_m3: f64, (lowest_hz, highest_hz): (f64, f64)) -> Grid {
+        let step_hz = STEP * lowest_hz;
+        let steps = ((highest_hz - lowest_hz) / step_hz) as usize + 1;
+        let at: Vec<_> = (0..steps).map(|k| self.at(lowest_hz + step_hz * k as f64)).collect();
         let compliance = reed_volume_m3 / (self.air.rho * self.air.c * self.air.c);
         let z_c = self.air.z_c(self.nominal_radius_m);
         // Pressures over Zc from here on.
         Grid {
+            at_hz: (lowest_hz, step_hz),
             spans: (0..=self.holes.len()).map(|span| at.iter().map(|at| at.spans[span]).collect()).collect(),
             shunts: (0..self.holes.len())
                 .map(|hole| [0, 1].map(|open| at.iter().map(|at| at.shunts[hole][open]).collect()))
@@ -129,6 +133,7 @@ impl<'a> Climb<'a> {
                 *above = (pressure, flow + pressure * shunt);
             }
         }
+        let (lowest_hz, step_hz) = self.grid.at_hz;
         let mut found = Vec::new();
         let mut before: Option<Complex64> = None;
         let terms = self.grid.spans[0].iter().zip(&self.grid.reed).zip(&self.above[0]);
@@ -141,7 +146,7 @@ impl<'a> Climb<'a> {
             {
                 let part = before.im / (before.im - here.im);
                 let height = 1.0 / (before.re + part * (here.re - before.re));
-                let f_hz = LOWEST_HZ + STEP_HZ * (k as f64 - 1.0 + part);
+                let f_hz = lowest_hz + step_hz * (k as f64 - 1.0 + part);
                 if height as f32 >= LEAST_HEIGHT {
                     found.push(Resonance { f_hz: f_hz as f32, height: height as f32 });
                 }
@@ -164,7 +169,9 @@ mod tests {
         let model = TransferMatrix::new(&file, Air::default());
         let bits = |open: &[bool]| open.iter().rev().fold(0, |bits, &open| bits << 1 | u64::from(open));
         let charts: Vec<u64> = file.fingerings.iter().map(|fingering| bits(&fingering.open)).collect();
-        let all = model.survey(&charts, file.reed_volume_m3, &mut |_| ControlFlow::Continue(())).unwrap();
+        let all = model
+            .survey(&charts, file.reed_volume_m3, (100.0, 2_600.0), &mut |_| ControlFlow::Continue(()))
+            .unwrap();
         for (fingering, found) in file.fingerings.iter().zip(&all) {
             let near_hz = fingering.written.sounding(file.transposition).unwrap().frequency_hz(440.0);
             let (f_hz, height) =

@@ -83,7 +83,8 @@ async fn heard_within(
 ) -> Option<f64> {
     let (from_s, to_s) = listening_s(model, note.gamma);
     let sound = note.radiated_beside(stand, model, from_s, to_s).await;
-    trial_pitch_hz(&sound, model.coeffs.rate_hz).filter(|hz| cents(*hz, wanted_hz).abs() < own_cents)
+    trial_pitch_hz(&sound, model.coeffs.rate_hz, wanted_hz)
+        .filter(|hz| cents(*hz, wanted_hz).abs() < own_cents)
 }
 
 /// One note at one mouth pressure.

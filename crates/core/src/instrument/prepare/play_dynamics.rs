@@ -314,7 +314,8 @@ impl<'a> Diminuendo<'a> {
         })
         .await;
         let rate_hz = self.model.coeffs.rate_hz;
-        let off_cents = cents(trial_pitch_hz(&sound, rate_hz)?, self.model.notes_hz[self.fingering]);
+        let note_hz = self.model.notes_hz[self.fingering];
+        let off_cents = cents(trial_pitch_hz(&sound, rate_hz, note_hz)?, note_hz);
         (off_cents.abs() < OTHER_CENTS).then_some(Heard {
             gamma: sum / ticks,
             power: sound.iter().map(|x| x * x).sum::<f64>() / sound.len() as f64,
