@@ -77,6 +77,24 @@ def test_what_was_stopped_goes_on(tmp_path):
         chalumeau.dataset(PLAN, tmp_path, rows_per_part=3)
 
 
+def test_a_file_that_has_changed_is_rendered_anew_and_levels_stand_as_they_were_asked(tmp_path, root):
+    midi = tmp_path / "piece.mid"
+    melody = (root / "examples/melody.mid").read_bytes()
+    plan = [{"midi": str(midi), "gain_db": -6}]
+    midi.write_bytes(melody)
+    assert [chalumeau.dataset(plan, tmp_path / "set").rendered for _ in range(2)] == [1, 0]
+    # A byte behind its last track.
+    midi.write_bytes(melody + b"\0")
+    assert chalumeau.dataset(plan, tmp_path / "set").rendered == 1
+    assert "-6" in (tmp_path / "set/manifest.csv").read_text().splitlines()[1].split(",")
+
+
+def test_a_mistake_before_the_first_file_leaves_the_folder_free(tmp_path):
+    with pytest.raises(ValueError):
+        chalumeau.dataset([{"written": "C1"}], tmp_path)
+    assert chalumeau.dataset([{"written": "C4", "seconds": 0.1}], tmp_path).rendered == 1
+
+
 def test_a_lost_file_is_told(tmp_path):
     with pytest.raises(RuntimeError, match="4 of 4 files are missing"):
         chalumeau.dataset(PLAN, tmp_path, map=lambda work, parts: [], rows_per_part=3)

@@ -107,6 +107,17 @@ def test_instruments_come_as_path_text_dict_and_object(tmp_path):
     assert sounds == {digest(chalumeau.render(written="E3", seconds=0.2, instrument="bass"))}
 
 
+def test_a_short_name_and_its_setting_are_one():
+    clarinet = chalumeau.Clarinet(no_noise=True, tempered=True)
+    clarinet.set(noise=0.3, natural=True)
+    assert clarinet.settings == {"noise": 0.3, "natural": True}
+
+
+def test_a_room_on_one_channel_is_warned_of():
+    with pytest.warns(UserWarning, match="channels=2"):
+        chalumeau.render(written="C4", seconds=0.1, room=0.4)
+
+
 def test_silent_notes_are_warned_of():
     with pytest.warns(UserWarning, match="1 note has no fingering"):
         chalumeau.render([(0.0, 0.1, 20)])

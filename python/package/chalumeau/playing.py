@@ -146,6 +146,12 @@ def _refuse_idle(settings: Mapping[str, Value] | None, named: Mapping[str, Value
             )
 
 
+def _set_by(name: str) -> str:
+    """The id of the setting that a name sets, short names among them."""
+    short = {"no_noise": "noise", "tempered": "tune", "natural": "tune"}
+    return short.get(name.replace("-", "_"), setting_id(name))
+
+
 class Clarinet:
     """A clarinet that is played event by event: what a host's audio thread does, at your pace.
 
@@ -223,11 +229,8 @@ class Clarinet:
         fixed = [name for name in changes if name in ("quality", "untuned")]
         if fixed:
             raise ValueError(f"{fixed[0]} cannot change while a Clarinet plays; make another: Clarinet({fixed[0]}=...)")
-        # What a short name sets.
-        short = {"no_noise": "noise", "no-noise": "noise", "tempered": "tune", "natural": "tune"}
-        of = lambda name: short.get(name, setting_id(name))  # noqa: E731
-        changed = {of(name) for name in changes}
-        wanted = {name: value for name, value in self._settings.items() if of(name) not in changed}
+        changed = {_set_by(name) for name in changes}
+        wanted = {name: value for name, value in self._settings.items() if _set_by(name) not in changed}
         wanted |= {name: value for name, value in changes.items() if value is not None}
         self._voice.set(pairs(wanted), self._instrument)
         self._settings = wanted
