@@ -224,6 +224,10 @@ class Wiring:
         # libmapper appends a number: TorqueTuner_001 becomes TorqueTuner_001.1.
         return name == self.wanted or name.rpartition(".")[0] == self.wanted
 
+    def is_felt(self):
+        """Whether a map of the scale is ready: what is sent makes torque."""
+        return any(one.ready for one in self.ours.signals["scale"].maps())
+
     def look(self):
         """Looks for the device and makes missing maps; call it about once a second. Whether Scale is mapped."""
         prop = libmapper.Property
@@ -240,7 +244,7 @@ class Wiring:
             return False
         if len(names) > 1:
             self.say(f"--map {self.wanted} may be {' or '.join(names)}: nothing new is mapped; name one of them")
-            return True
+            return self.is_felt()
         found = devices[names[0]]
         mapped = {
             theirs[prop.NAME]
@@ -257,7 +261,7 @@ class Wiring:
         done = [name for name in self.targets if name in mapped]
         lacks = f"; it has no {', '.join(missing)}" if missing else ""
         self.say(f"mapped to {names[0]}: {', '.join(done) or 'nothing yet'}{lacks}")
-        return "Scale" in mapped
+        return self.is_felt()
 
 
 class Bridge:

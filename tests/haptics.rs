@@ -531,6 +531,17 @@ fn requests_a_knob_cannot_take_are_refused_with_numbers() {
         Settings { zeta: 0.1, ..standard },
         &["too near closure", "lower Place"],
     );
+    // Every note closes at the same angle, which is too near for this reed.
+    says(
+        FeelDesign { equal_travel: true, travel_deg: 120.0, strength_mnm: 1.0, ..default },
+        Settings { reed_h: 5.0, reed_k: 2.0, coupled: false, ..standard },
+        &["stretch", "0.1..30", "lengthen the travel"],
+    );
+    // No strength fits below the mark.
+    let weak = TorqueLimits { ceiling_mnm: 5.0, ..TorqueLimits::default() };
+    let refused = FeelTable::new(&BORE, &default, &played_reed(&MODEL.file, &standard), &weak);
+    let message = refused.expect_err("a ceiling").to_string();
+    assert!(message.contains("lower the mark") && !message.contains("strength"), "{message}");
     let slip = Settings { reed_h: 3.674_234_6, ..standard };
     says(default, slip, &["sqrt(27/2)", "2.598"]);
     // The strength that the message advises is accepted.

@@ -221,8 +221,6 @@ fn measure(
         return None;
     }
     let wanted_hz = sounding.frequency_hz(f64::from(settings.a4_hz));
-    // A contrabass clarinet goes below what is usually looked for.
-    let least_hz = pitch::LOWEST_HZ.min(0.7 * wanted_hz);
-    let heard = pitch::fundamental_above_hz(steady, f64::from(rate), least_hz);
+    let heard = pitch::fundamental_near_hz(steady, f64::from(rate), wanted_hz);
     heard.map(|f_hz| (f_hz, cents(f_hz, wanted_hz)))
 }

@@ -22,6 +22,9 @@ pub const LOWEST_HZ: f64 = 50.0;
 /// Highest fundamental looked for, Hz.
 pub const HIGHEST_HZ: f64 = 2500.0;
 
+/// What lies lower than this share of a wanted note is not it.
+const FAR_BELOW: f64 = 0.7;
+
 /// Below this peak of the autocorrelation there is no pitch; the counterpart of 0.3 in YIN's difference function.
 const VOICED: f64 = 0.7;
 /// How much of the missing periodicity a shorter lag may add before it counts as worse: noise lowers all peaks alike.
@@ -75,8 +78,12 @@ pub fn fundamental_hz(samples: &[f64], rate_hz: f64) -> Option<f64> {
     fundamental_above_hz(samples, rate_hz, LOWEST_HZ)
 }
 
-/// The same where the fundamental may be as low as `least_hz`: of a contrabass clarinet.
-pub fn fundamental_above_hz(samples: &[f64], rate_hz: f64, least_hz: f64) -> Option<f64> {
+/// The same of a note that is to be `wanted_hz`: that of a contrabass clarinet is looked for below the lowest otherwise.
+pub fn fundamental_near_hz(samples: &[f64], rate_hz: f64, wanted_hz: f64) -> Option<f64> {
+    fundamental_above_hz(samples, rate_hz, LOWEST_HZ.min(FAR_BELOW * wanted_hz))
+}
+
+fn fundamental_above_hz(samples: &[f64], rate_hz: f64, least_hz: f64) -> Option<f64> {
     let tail = &samples[samples.len().saturating_sub(rate_hz as usize)..];
     let coarse = coarse_hz(tail, rate_hz, least_hz)?;
     Some(refine_hz(samples, rate_hz, coarse).unwrap_or(coarse))

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::haptics::feel_parameters::OutOfRange;
 use crate::units::WrittenNote;
 
 /// Why a feel is refused. Its text is the [`reason`](Self::reason) and, behind a semicolon, the [`advice`](Self::advice).
@@ -17,6 +18,13 @@ pub enum FeelRefused {
         low: f64,
         /// Greatest value allowed.
         high: f64,
+    },
+    /// What a note would be sent exceeds the range of the protocol.
+    Field {
+        /// The note.
+        note: WrittenNote,
+        /// The field of the protocol, and its range.
+        out_of_range: OutOfRange,
     },
     /// The chosen reference note has no fingering or does not sound.
     Reference(WrittenNote),
@@ -85,6 +93,9 @@ impl FeelRefused {
             Self::Range { name, given, low, high } => {
                 format!("{name} must lie in {low}..{high}, got {given}")
             }
+            Self::Field { note, out_of_range: OutOfRange { field, value, low, high } } => {
+                format!("{note} would need a {field} of {value:.1}, the protocol takes {low}..{high}")
+            }
             Self::Reference(note) => {
                 format!("the reference note {note} does not sound on this instrument with this reed")
             }
@@ -121,6 +132,7 @@ impl FeelRefused {
     pub fn advice(&self) -> Option<String> {
         let advice = match *self {
             Self::Range { .. } => return None,
+            Self::Field { .. } => "lengthen the travel, or lower the strength or Place",
             Self::Reference(_) => "choose another",
             Self::Silent { .. } => "raise zeta, A or H",
             Self::Closing(_) => "a knob can follow H k up to 10",

@@ -12,7 +12,7 @@
 
 use crate::haptics::angle_map::AngleMap;
 use crate::haptics::feel_design::{FeelDesign, NoteOrder};
-use crate::haptics::feel_parameters::{Feel, OutOfRange, STRETCH, TorqueLaw};
+use crate::haptics::feel_parameters::{Feel, STRETCH, TorqueLaw};
 use crate::haptics::feel_refused::FeelRefused;
 use crate::haptics::played_reed::PlayedReed;
 use crate::haptics::requirement::{NoteRequirement, RequirementSolver};
@@ -311,9 +311,8 @@ fn refuse(notes: &[NoteFeel], design: &FeelDesign, limits: &TorqueLimits) -> Res
         return Err(FeelRefused::Push { note, wanted, limit: limits.push_nm_per_rad });
     }
     for note in notes {
-        if let Err(OutOfRange { field, value, low, high }) = note.feel.check() {
-            let [given, low, high] = [value, low, high].map(f64::from);
-            return Err(FeelRefused::Range { name: field, given, low, high });
+        if let Err(out_of_range) = note.feel.check() {
+            return Err(FeelRefused::Field { note: note.written, out_of_range });
         }
     }
     Ok(())

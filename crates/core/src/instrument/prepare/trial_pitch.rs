@@ -9,14 +9,10 @@ const PERIODIC: f64 = 0.9;
 /// 96 kHz costs a quarter of the work, and moves the pitch of a tone by less than 1e-4 cents.
 const LEAST_RATE_HZ: f64 = 22_000.0;
 
-/// Below the wanted note by this factor there is no use for a pitch.
-const FAR_BELOW: f64 = 0.7;
-
 /// Fundamental of a radiated sound of some tenths of a second that is to be `wanted_hz`, Hz; `None` if it is not periodic. Allocates.
 pub(super) fn trial_pitch_hz(sound: &[f64], rate_hz: f64, wanted_hz: f64) -> Option<f64> {
     let (sound, rate_hz) = slower(sound, rate_hz, LEAST_RATE_HZ);
-    let least_hz = pitch::LOWEST_HZ.min(FAR_BELOW * wanted_hz);
-    let hz = pitch::fundamental_above_hz(&sound, rate_hz, least_hz)?;
+    let hz = pitch::fundamental_near_hz(&sound, rate_hz, wanted_hz)?;
     (pitch::periodicity(&sound, rate_hz, hz) > PERIODIC).then_some(hz)
 }
 
