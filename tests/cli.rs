@@ -1280,6 +1280,40 @@ fn options_that_would_do_nothing_are_refused() {
 }
 
 #[test]
+fn a_parameter_of_the_measured_reed_is_the_plugins_on_every_instrument() {
+    let d = tempfile::tempdir().unwrap();
+    let rendered = |set: &str| {
+        succeeds(
+            d.path(),
+            &format!("render --instrument bass --written C4 --seconds 0.2 --set {set} --force --out x.wav"),
+        );
+        fs::read(d.path().join("x.wav")).unwrap()
+    };
+    // What the parameter has by itself, as on a B flat clarinet.
+    assert!(rendered("rface=physical") == rendered("ropen=0.5"));
+}
+
+#[test]
+fn a_batch_tells_which_files_are_not_as_played() {
+    let d = tempfile::tempdir().unwrap();
+    let plan =
+        "same = { seconds = 0.3, dynamic = \"ff\", gain-db = 24 }\nvary = { written = [\"E6\", \"C4\"] }\n";
+    fs::write(d.path().join("plan.toml"), plan).unwrap();
+    let output = chalumeau(d.path(), words("batch plan.toml --into set"));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("2 files (0001.wav and others): the limiter turned peaks down"), "{said}");
+}
+
+#[cfg(feature = "simulator")]
+#[test]
+fn a_simulated_knob_does_not_write_over_the_hand_that_it_reads() {
+    let d = tempfile::tempdir().unwrap();
+    fs::write(d.path().join("hand.csv"), "kept").unwrap();
+    refused(&d, "knob-sim --script hand.csv --log hand.csv", &["is read by this command"]);
+    assert_eq!(fs::read_to_string(d.path().join("hand.csv")).unwrap(), "kept");
+}
+
+#[test]
 fn silence_has_no_pitch_and_no_beginning() {
     let d = tempfile::tempdir().unwrap();
     for silent in ["--gamma 0", "--dynamic 0 --A 0", "--gamma 0 --gain-db 24"] {
