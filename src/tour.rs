@@ -8,10 +8,10 @@ use chalumeau_core::instrument::{Attack, Model, Room, Settings, Techniques, Trac
 use chalumeau_core::score::Score;
 use chalumeau_core::units::WrittenNote;
 
-/// Dynamics of pp, mf and ff, 0..=1, as recorded players have them.
-const PP: f32 = 0.15;
-const MF: f32 = 0.6;
-const FF: f32 = 0.95;
+/// Dynamics of soft, middle and loud sounds, 0..=1: a little inside the ends, so that *Life* moves both ways.
+const SOFT: f32 = 0.15;
+const MIDDLE: f32 = 0.6;
+const LOUD: f32 = 0.95;
 /// Time after the last key in which the sound fades, s; in a room.
 const FADE_S: (f64, f64) = (0.4, 3.0);
 /// Steps of a swell or of a controller that moves, a second.
@@ -112,12 +112,13 @@ pub fn chapters(model: &Model, base: Settings, rate: u32) -> Vec<(&'static str, 
     };
     let scale = |dynamic| Line::new(dynamic).notes(model, SCALE.map(|written| (written, 0.25)), true);
     let held = |settings: Settings, title, words| {
-        stop(title, words, settings, Line::new(MF).note(model, 79, 3.0, false))
+        stop(title, words, settings, Line::new(MIDDLE).note(model, 79, 3.0, false))
     };
-    let phrase = |settings: Settings, title, words| stop(title, words, settings, Line::new(MF).phrase(model));
+    let phrase =
+        |settings: Settings, title, words| stop(title, words, settings, Line::new(MIDDLE).phrase(model));
     let technique = |techniques: Techniques| Settings { techniques, ..base };
     let attack = |attack| Settings { attack, ..base };
-    let attacks = || Line::new(MF).notes(model, [(60, 0.6), (67, 0.6), (76, 0.6)], false);
+    let attacks = || Line::new(MIDDLE).notes(model, [(60, 0.6), (67, 0.6), (76, 0.6)], false);
     let room =
         |amount, size_m, decay_s| Settings { room: Room { amount, size_m, decay_s, ..base.room }, ..base };
     let interval = SettingNumber::TractIntervalSemitones;
@@ -129,15 +130,15 @@ pub fn chapters(model: &Model, base: Settings, rate: u32) -> Vec<(&'static str, 
                     "Scale, pp",
                     "The lowest note to the highest of the clarion. It is dark and even; you can just hear the air.",
                     base,
-                    scale(PP),
+                    scale(SOFT),
                 ),
                 stop(
                     "Scale, mf",
                     "The same, about 12 dB louder, with the upper partials of a comfortable breath.",
                     base,
-                    scale(MF),
+                    scale(MIDDLE),
                 ),
-                stop("Scale, ff", "The reed beats: the tone turns bright.", base, scale(FF)),
+                stop("Scale, ff", "The reed beats: the tone turns bright.", base, scale(LOUD)),
                 stop(
                     "Swell on C5",
                     "One breath from pp to ff and back. Loudness and colour grow together, without a step.",
@@ -155,7 +156,7 @@ pub fn chapters(model: &Model, base: Settings, rate: u32) -> Vec<(&'static str, 
                     "Slurs over the break",
                     "A4 to B4 and back: from one finger to nine. Then octaves up and down.",
                     base,
-                    Line::new(MF)
+                    Line::new(MIDDLE)
                         .notes(model, [69, 71, 69, 71, 69, 71, 72, 71].map(|written| (written, 0.3)), true)
                         .rest(0.3)
                         .notes(
@@ -168,7 +169,7 @@ pub fn chapters(model: &Model, base: Settings, rate: u32) -> Vec<(&'static str, 
                     "Staccato",
                     "Ten tongued notes a second.",
                     base,
-                    Line::new(MF).notes(
+                    Line::new(MIDDLE).notes(
                         model,
                         SCALE
                             .map(|written| (written, 0.1))
@@ -235,7 +236,7 @@ pub fn chapters(model: &Model, base: Settings, rate: u32) -> Vec<(&'static str, 
                     "The vocal tract bends C6 by ten semitones",
                     "The fingers stay. The tract's resonance goes down, and the reed follows it, not the bore.",
                     Settings { tract: Tract { amount: 1.0, interval_semitones: 7.0 }, ..base },
-                    Line::new(MF)
+                    Line::new(MIDDLE)
                         .note(model, 84, 4.0, false)
                         .moves(0.8, 3.2, true, |way| Event::Set(interval, 7.0 - 15.5 * way)),
                 ),
@@ -243,7 +244,7 @@ pub fn chapters(model: &Model, base: Settings, rate: u32) -> Vec<(&'static str, 
                     "The rising glissando",
                     "Two octaves and a half in one gesture: the fingers slide off the holes one after another, and the tract leads them.",
                     Settings { glissando_s: 2.2, ..base },
-                    Line::new(FF).note(model, 53, 0.6, true).note(model, 84, 3.4, false),
+                    Line::new(LOUD).note(model, 53, 0.6, true).note(model, 84, 3.4, false),
                 ),
             ],
         ),

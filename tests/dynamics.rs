@@ -10,11 +10,10 @@ use chalumeau_core::analysis::steady_note::SteadyNote;
 use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::haptics::FeelDesign;
-use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
 use chalumeau_core::instrument::{Clarinet, Model, Settings};
 use chalumeau_core::measure::realism::{
-    self, Dynamic, NoteScore, RecordedNote, Summary, louder_is_brighter, median,
+    self, Dynamic, HEADROOM_DB, NoteScore, RecordedNote, Summary, louder_is_brighter, median,
 };
 use chalumeau_core::parallel;
 use chalumeau_core::score::{Score, play};
@@ -26,8 +25,6 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, LazyLock};
 
 const RATE: u32 = 44_100;
-/// Renders are this much softer.
-const HEADROOM_DB: f64 = 20.0;
 /// Written E3 to C6.
 const NOTES: std::ops::RangeInclusive<u8> = 52..=84;
 /// Controller values at which a held note is heard.
@@ -228,11 +225,7 @@ fn slurs_into_the_altissimo_arrive() {
 fn colour_level_and_noise_are_near_those_of_recorded_notes() {
     let recorded = RecordedNote::all();
     let played = each(recorded.len(), |n| {
-        let dynamic = match recorded[n].dynamic {
-            Dynamic::Pp => 0.0,
-            Dynamic::Mf => MEZZO_FORTE,
-            Dynamic::Ff => 1.0,
-        };
+        let dynamic = recorded[n].dynamic.played();
         let settings = Settings { gain_db: -HEADROOM_DB as f32, ..Settings::default() };
         let (note, breath) = (SoundingNote(recorded[n].midi), breath_of_dynamic(dynamic, &settings) as f32);
         let out = realism::render(&MODEL, &settings, note, breath, n);

@@ -10,6 +10,7 @@ mod reference;
 
 use std::sync::LazyLock;
 
+use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::torque_law;
 use chalumeau_core::haptics::{
     FeelDesign, FeelRefused, FeelTable, NoteFeel, NoteOrder, NoteRequirement, PlayedReed, RequirementSolver,
@@ -34,7 +35,7 @@ fn design(law: TorqueLaw, exponent: f64) -> FeelDesign {
 }
 
 fn table(design: &FeelDesign, settings: &Settings) -> Result<FeelTable, FeelRefused> {
-    FeelTable::new(&BORE, design, &played_reed(&MODEL.file, settings), &TorqueLimits::default())
+    FeelTable::new(&BORE, design, &played_reed(&MODEL.file, MODEL.a4_hz, settings), &TorqueLimits::default())
 }
 
 fn written(fingering: usize) -> u8 {
@@ -254,7 +255,7 @@ fn covered_holes_order_notes_by_their_fingers_either_way() {
 
 /// How fast a small oscillation at `f_hz` grows in the whole instrument under a steady breath, 1/s.
 fn growth(fingering: usize, settings: &Settings, gamma: f64, f_hz: f64) -> f64 {
-    let played = played_reed(&MODEL.file, settings);
+    let played = played_reed(&MODEL.file, MODEL.a4_hz, settings);
     let (lip, rate) = (played.lips[fingering], MODEL.coeffs.rate_hz);
     let reed = ReedCoeffs::new(
         MovingReed {
@@ -314,7 +315,7 @@ fn linear_stability_of_the_moving_reed_is_the_instruments_own() {
     let runs: Vec<(usize, usize)> =
         (0..reeds.len()).flat_map(|reed| [0, 8, 16, 20, 27, 33, 36].map(|note| (reed, note))).collect();
     let asked: Vec<Vec<Option<NoteRequirement>>> =
-        reeds.iter().map(|settings| BORE.with(&played_reed(&MODEL.file, settings))).collect();
+        reeds.iter().map(|settings| BORE.with(&played_reed(&MODEL.file, MODEL.a4_hz, settings))).collect();
     let found = each(&runs, |&(reed, note)| {
         let asked = asked[reed][note].unwrap();
         let gamma = asked.gamma_own.unwrap();
@@ -374,7 +375,7 @@ fn heard_onset(fingering: usize, expected: f64) -> f64 {
 /// In a slow crescendo the sound begins where the hand feels the threshold.
 #[test]
 fn what_is_felt_is_what_sounds() {
-    let asked = BORE.with(&played_reed(&MODEL.file, &Settings::default()));
+    let asked = BORE.with(&played_reed(&MODEL.file, MODEL.a4_hz, &Settings::default()));
     let notes: Vec<usize> = (0..asked.len()).collect();
     let heard = each(&notes, |&note| heard_onset(note, asked[note].unwrap().gamma_sounding));
     for (&note, &gamma) in notes.iter().zip(&heard) {
@@ -411,7 +412,9 @@ fn what_is_felt_is_what_sounds() {
 #[test]
 fn every_note_starts_itself() {
     let mut elsewhere = Vec::new();
-    for (note, asked) in BORE.with(&played_reed(&MODEL.file, &Settings::default())).into_iter().enumerate() {
+    for (note, asked) in
+        BORE.with(&played_reed(&MODEL.file, MODEL.a4_hz, &Settings::default())).into_iter().enumerate()
+    {
         let asked = asked.unwrap();
         if asked.gamma_own != Some(asked.gamma_sounding) {
             let own = asked.gamma_own.unwrap();
@@ -464,7 +467,7 @@ fn extinction_is_within_a_tenth_of_the_instruments() {
         .collect();
     let found = each(&runs, |&(note, zeta)| {
         let settings = Settings { zeta: zeta as f32, ..Settings::default() };
-        let expected = BORE.note(note, &played_reed(&MODEL.file, &settings)).unwrap().gamma_off;
+        let expected = BORE.note(note, &played_reed(&MODEL.file, MODEL.a4_hz, &settings)).unwrap().gamma_off;
         (expected, heard_extinction(note, zeta, expected))
     });
     let mut worst = 0.0_f64;
@@ -493,7 +496,9 @@ fn a_reed_in_use_moves_angles_and_keeps_its_own_closure() {
     assert!((hard.map.pressure_pa(hard.landmarks.a_close_deg) - closing * P_REF_PA).abs() < 1e-6);
     assert!(
         (f64::from(hard.feel.k)
-            - played_reed(&MODEL.file, &Settings { strength: 4.0, ..Settings::default() }).law.k())
+            - played_reed(&MODEL.file, MODEL.a4_hz, &Settings { strength: 4.0, ..Settings::default() })
+                .law
+                .k())
         .abs()
             < 1e-6
     );
@@ -539,7 +544,7 @@ fn requests_a_knob_cannot_take_are_refused_with_numbers() {
     );
     // No strength fits below the mark.
     let weak = TorqueLimits { ceiling_mnm: 5.0, ..TorqueLimits::default() };
-    let refused = FeelTable::new(&BORE, &default, &played_reed(&MODEL.file, &standard), &weak);
+    let refused = FeelTable::new(&BORE, &default, &played_reed(&MODEL.file, MODEL.a4_hz, &standard), &weak);
     let message = refused.expect_err("a ceiling").to_string();
     assert!(message.contains("lower the mark") && !message.contains("strength"), "{message}");
     let slip = Settings { reed_h: 3.674_234_6, ..standard };
@@ -554,7 +559,7 @@ fn requests_a_knob_cannot_take_are_refused_with_numbers() {
     table(&FeelDesign { strength_mnm, ..default }, &standard).unwrap();
     // A low push limit refuses the falling branch of the flow law, but not the spring of the pressure law.
     let gentle = TorqueLimits { push_nm_per_rad: 0.02, ..TorqueLimits::default() };
-    let reed = played_reed(&MODEL.file, &standard);
+    let reed = played_reed(&MODEL.file, MODEL.a4_hz, &standard);
     let flow = FeelTable::new(&BORE, &default, &reed, &gentle);
     assert!(matches!(flow, Err(FeelRefused::Push { .. })));
     FeelTable::new(&BORE, &design(TorqueLaw::Pressure, 3.0), &reed, &gentle).unwrap();
@@ -633,7 +638,7 @@ fn every_allowed_setting_gives_a_feel_or_a_reason() {
 fn another_instrument_without_c5_takes_the_middle_of_its_chart() {
     let mut file = MODEL.file.clone();
     file.fingerings.retain(|fingering| fingering.written != WrittenNote(72));
-    let bore = RequirementSolver::new(&file, Air::default());
+    let bore = RequirementSolver::new(&file, Air::default(), 440.0);
     let table = FeelTable::new(
         &bore,
         &FeelDesign::default(),
@@ -644,6 +649,34 @@ fn another_instrument_without_c5_takes_the_middle_of_its_chart() {
     let (middle, all) = (table.reference().landmarks.a_on_deg, table.notes());
     let harder = all.iter().filter(|note| note.landmarks.a_on_deg > middle).count();
     assert!((harder as f64 / all.len() as f64 - 0.5).abs() < 0.05, "{harder} of {}", all.len());
+}
+
+/// A clarinet built for another A4 has shorter or longer bores, and notes and lip that go with them: what a note requires of
+/// the breath hardly changes.
+#[test]
+fn notes_require_the_same_at_another_a4() {
+    let file = InstrumentFile::built_in();
+    let required = |a4_hz: f64| {
+        let built = file.scaled(440.0 / a4_hz);
+        let reed = played_reed(&built, a4_hz, &Settings::default());
+        RequirementSolver::new(&built, Air::default(), a4_hz).with(&reed)
+    };
+    let standard = required(440.0);
+    for a4_hz in [392.0, 415.0, 466.0] {
+        let notes = required(a4_hz);
+        assert_eq!(notes.len(), standard.len());
+        let mut worst: f64 = 0.0;
+        for (note, standard) in notes.iter().zip(&standard) {
+            let (Some(note), Some(standard)) = (note, standard) else {
+                assert_eq!(note.is_some(), standard.is_some());
+                continue;
+            };
+            assert_eq!(note.gamma_own.is_some(), standard.gamma_own.is_some());
+            worst = worst.max((note.gamma_sounding / standard.gamma_sounding - 1.0).abs());
+        }
+        println!("A4 = {a4_hz} Hz: {worst:.4}");
+        assert!(worst < 0.02, "{worst}");
+    }
 }
 
 #[cfg(feature = "simulator")]

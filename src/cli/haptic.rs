@@ -10,6 +10,7 @@ use chalumeau_core::haptics::{
     FeelRefused, FeelTable, NoteFeel, NoteRequirement, PlayedReed, RequirementSolver, TorqueLimits,
 };
 use chalumeau_core::instrument::Settings;
+use chalumeau_core::instrument::concert_pitch::A4_HZ;
 use chalumeau_core::instrument::feel_inputs::played_reed;
 use chalumeau_core::reed::ReedTables;
 use clap::Args;
@@ -64,6 +65,13 @@ pub struct FeltReedArgs {
     /// Most torque allowed, mNm, 0..450
     #[arg(long, value_name = "MNM", default_value = "100", value_parser = |s: &str| within(s, 0.0, 450.0))]
     ceiling: f64,
+    #[command(flatten)]
+    reed: ReedInAirArgs,
+}
+
+/// The reed and the air that are played.
+#[derive(Args)]
+pub struct ReedInAirArgs {
     /// Embouchure: flow strength of the reference reed, 0.05..0.9
     #[arg(long, value_name = "ZETA", default_value = "0.3", value_parser = |s: &str| within_f32(s, 0.05, 0.9))]
     zeta: f32,
@@ -83,7 +91,7 @@ pub struct FeltReedArgs {
     air: AirArg,
 }
 
-impl FeltReedArgs {
+impl ReedInAirArgs {
     /// The bore in this air, and the reed as it is played on it.
     pub fn bore_and_reed(&self, file: &InstrumentFile) -> (RequirementSolver, PlayedReed) {
         let standard = Settings::default();
@@ -96,7 +104,14 @@ impl FeltReedArgs {
             coupled: self.k.is_none(),
             ..standard
         };
-        (RequirementSolver::new(file, self.air.air()), played_reed(file, &settings))
+        (RequirementSolver::new(file, self.air.air(), A4_HZ), played_reed(file, A4_HZ, &settings))
+    }
+}
+
+impl FeltReedArgs {
+    /// The bore in this air, and the reed as it is played on it.
+    pub fn bore_and_reed(&self, file: &InstrumentFile) -> (RequirementSolver, PlayedReed) {
+        self.reed.bore_and_reed(file)
     }
 
     /// The feel of every note.
@@ -128,7 +143,7 @@ impl HapticCommand {
         table.comment(format_args!(
             "{}; zeta {}, {} about {}",
             file.name,
-            self.felt.zeta,
+            self.felt.reed.zeta,
             self.felt.feel.exaggeration(),
             feel.reference().written
         ))?;

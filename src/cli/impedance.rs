@@ -102,9 +102,9 @@ pub struct ImpedanceCommand {
     air: AirArg,
     #[command(flatten)]
     instrument: InstrumentArg,
-    /// Resolution of the lattice
-    #[arg(long, value_enum, default_value_t = QualityArg::Live)]
-    quality: QualityArg,
+    /// Resolution of the lattice [default: live]
+    #[arg(long, value_enum)]
+    quality: Option<QualityArg>,
     #[command(flatten)]
     table: TableArgs,
     #[command(flatten)]
@@ -138,11 +138,17 @@ impl ImpedanceCommand {
                 steps + 1.0
             )));
         }
+        if self.model == Model::Tmm && self.quality.is_some() && !self.plot.wanted() {
+            return Err(Failure::Usage(
+                "--quality is the resolution of the lattice, and --model tmm is calculated without it; leave --quality out, or compare both models with --plot"
+                    .to_owned(),
+            ));
+        }
         let about = format!(
             "{}; transposition {} semitones, {}, {} C, reed volume {} m3, Zc {:.6e} Pa s/m3",
             file.name,
             file.transposition,
-            match (self.model, self.quality) {
+            match (self.model, self.quality()) {
                 (Model::Tmm, _) => "transfer matrices",
                 (Model::Lattice, QualityArg::Live) => "lattice at 96 kHz",
                 (Model::Lattice, QualityArg::High) => "lattice at 192 kHz",
@@ -178,6 +184,10 @@ impl ImpedanceCommand {
             Some(fingering) => self.fingering(&bore, &file, fingering, volume_m3),
             None => self.chart(&bore, &file, &notes, volume_m3),
         })
+    }
+
+    fn quality(&self) -> QualityArg {
+        self.quality.unwrap_or(QualityArg::Live)
     }
 
     /// Frequencies from first to last, and Z/Zc.
@@ -283,7 +293,7 @@ impl ImpedanceCommand {
             let right = "leave --temperature out or add --model tmm";
             return Err(Failure::Usage(format!("the lattice is made for air of 25 C; {right}")));
         }
-        Ok(Bore::Lattice(self.instrument.bore(file, 48_000, self.quality)?))
+        Ok(Bore::Lattice(self.instrument.bore(file, 48_000, self.quality())?))
     }
 }
 

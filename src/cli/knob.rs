@@ -10,8 +10,8 @@ use chalumeau_core::haptics::{FeelDesign, FeelRefused, NoteFeel, TorqueLimits};
 use chalumeau_core::instrument::{Settings, Wanted};
 use chalumeau_core::units::WrittenNote;
 use chalumeau_knob::device::{
-    HARD_CEILING_MNM, Hooks, KnobChoice, KnobLink, LinkStatus, OFFERED_CEILING_MNM, Phase, Release,
-    StateSample,
+    FIRST_CEILING_MNM, HARD_CEILING_MNM, Hooks, KnobChoice, KnobLink, LinkStatus, OFFERED_CEILING_MNM, Phase,
+    Release, StateSample,
 };
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
 use chalumeau_knob::touch::take::{TakeMarks, TakeRow};
@@ -133,7 +133,7 @@ impl KnobCommand {
         let fingering = feels.requirements().written().position(|note| note == written).unwrap_or(0);
         let design = self.feel.design(&file)?;
         let wanted = WantedFeel { feels, design, fingering, may_weaken: self.feel.may_weaken() };
-        let ceiling_mnm = self.arm.unwrap_or(100.0);
+        let ceiling_mnm = self.arm.unwrap_or(f64::from(FIRST_CEILING_MNM));
         // What is refused on any knob is refused before one is looked for.
         let (note, _) = wanted.under(&TorqueLimits { ceiling_mnm, ..TorqueLimits::default() })?;
         self.ask_again()?;

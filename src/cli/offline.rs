@@ -4,7 +4,7 @@
 //! command line. An error is the text that the command would print.
 
 use crate::cli::batch::plan::Plan;
-use crate::cli::haptic::FeltReedArgs;
+use crate::cli::haptic::{FeltReedArgs, ReedInAirArgs};
 use crate::cli::parse;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, rate};
@@ -126,7 +126,7 @@ pub fn bore_and_reed(
     pairs: &Pairs,
     instrument: &InstrumentFile,
 ) -> Result<(RequirementSolver, PlayedReed), String> {
-    Ok(read::<FeltReedArgs>(pairs)?.bore_and_reed(instrument))
+    Ok(read::<ReedInAirArgs>(pairs)?.bore_and_reed(instrument))
 }
 
 /// The rows of a plan of `chalumeau batch`, in the order of its files: for each row the names and values.
@@ -197,6 +197,9 @@ mod tests {
         }
         let said = render_job(&pairs(&[("seconds", "1")]), None, None, None).map(|_| ()).unwrap_err();
         assert!(said.contains("required"), "{said}");
+        // The feel of a knob changes no threshold.
+        let contrast = pairs(&[("contrast", "2")]);
+        assert!(bore_and_reed(&contrast, &InstrumentFile::built_in()).unwrap_err().contains("contrast"));
     }
 
     #[test]

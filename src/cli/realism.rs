@@ -16,12 +16,11 @@ use chalumeau_core::analysis::spectrum::steady_segment;
 use chalumeau_core::analysis::steady_note::{RATE_HZ, SteadyNote};
 use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
-use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
 use chalumeau_core::instrument::{Model, Reach, Settings};
 use chalumeau_core::measure::realism::{
-    CENTROID_RATIOS, Dynamic, NoteScore, REGISTERS, RecordedNote, Summary, louder_is_brighter, mean, median,
-    register, render,
+    CENTROID_RATIOS, Dynamic, HEADROOM_DB, NoteScore, REGISTERS, RecordedNote, Summary, louder_is_brighter,
+    mean, median, register, render,
 };
 use chalumeau_core::measure::shelf::Shelf;
 use chalumeau_core::parallel;
@@ -33,10 +32,6 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// Renders are this much softer, so that no peak meets the limiter; levels are given without it, dB.
-const HEADROOM_DB: f64 = 20.0;
-/// The player's dynamics for pp, mf and ff where nothing else is said.
-const DYNAMICS: [f64; 3] = [0.0, MEZZO_FORTE, 1.0];
 /// Harmonics of which the beginning is timed.
 const TIMED: [usize; 3] = [1, 3, 5];
 
@@ -189,7 +184,7 @@ impl RealismCommand {
     fn blown(&self, file: &InstrumentFile) -> Result<([f32; 3], Settings, String), Failure> {
         let base = self.preset.as_ref().map(Preset::settings);
         if self.gamma.is_empty() {
-            let dynamics = three("--dynamic", &self.dynamic, DYNAMICS)?;
+            let dynamics = three("--dynamic", &self.dynamic, Dynamic::ALL.map(Dynamic::played))?;
             let settings = self.settings.with_dynamics(base.as_ref(), file)?;
             let breaths = dynamics.map(|dynamic| breath_of_dynamic(dynamic, &settings) as f32);
             return Ok((breaths, settings, format!("dynamic {}", words(&dynamics))));

@@ -50,7 +50,7 @@ pub struct ReportCommand {
     play: ScoreArgs,
     /// A page to listen to, instead: scales from pp to ff, slurs, attacks, techniques and rooms, each with what to listen for,
     /// on any instrument
-    #[arg(long, group = "what", conflicts_with_all = ["blown", "wav", "plot_at", "preset", "scl", "seconds", "tail"])]
+    #[arg(long, group = "what", conflicts_with_all = ["blown", "wav", "plot_at", "preset", "scl", "seconds", "tail", "trim"])]
     tour: bool,
     /// HTML file to write
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
@@ -111,6 +111,7 @@ impl ReportCommand {
     }
 
     fn write_tour(&self) -> Result<(), Failure> {
+        self.play.refuse_feel("a tour is played without a knob")?;
         let job = self.play.without_score()?;
         refuse_several_players(&job)?;
         let mut page = NewFile::create(&self.out, self.force)?;

@@ -21,6 +21,7 @@ use chalumeau_core::control::midi::MidiDecoder;
 use chalumeau_core::control::parts::Parts;
 use chalumeau_core::event::{PartEvent, Timed};
 use chalumeau_core::haptics::FeelDesign;
+use chalumeau_core::instrument::key_pitches::TRIM_MOST_CENTS;
 use chalumeau_core::instrument::{BreathResponse, KeyPitches, Model, Players, Settings, Split};
 use chalumeau_core::score::Score;
 use chalumeau_core::score::breath::BreathCurve;
@@ -123,7 +124,7 @@ fn interval(text: &str) -> Result<(u8, u8), String> {
 /// A written note and its trim, cents.
 fn trim(text: &str) -> Result<(u8, f64), String> {
     let (name, cents) = text.split_once('=').ok_or("must be a note and its cents, for example E4=-12")?;
-    Ok((note(name)?, within(cents, -50.0, 50.0)?))
+    Ok((note(name)?, within(cents, -TRIM_MOST_CENTS, TRIM_MOST_CENTS)?))
 }
 
 /// Finds a preset.
@@ -214,11 +215,19 @@ impl ScoreArgs {
 
     /// Refuses flags of the knob's feel where no take is replayed: they would do nothing.
     pub fn refuse_idle_feel(&self) -> Result<(), Failure> {
+        match self.breath.replay {
+            Some(_) => Ok(()),
+            None => self.refuse_feel("only a take of a knob that is replayed has one: add --replay"),
+        }
+    }
+
+    /// Refuses flags of the knob's feel; `why` they would do nothing.
+    pub fn refuse_feel(&self, why: &str) -> Result<(), Failure> {
         match self.feel.given() {
-            Some(flag) if self.breath.replay.is_none() => Err(Failure::Usage(format!(
-                "{flag} is of the knob whose take is replayed; add --replay, or leave it out"
-            ))),
-            _ => Ok(()),
+            Some(flag) => {
+                Err(Failure::Usage(format!("{flag} is of the knob's feel, and {why}; leave it out")))
+            }
+            None => Ok(()),
         }
     }
 

@@ -13,6 +13,7 @@ use chalumeau_core::analysis::spectrum::rms_dbfs;
 use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
 use chalumeau_core::instrument::{Clarinet, Model, Reach, Settings, Tuning};
+use chalumeau_core::measure::realism::OTHER_CENTS;
 use chalumeau_core::parallel;
 use chalumeau_core::score;
 use chalumeau_core::score::Score;
@@ -30,8 +31,6 @@ const MEASURE_S: f64 = 0.6;
 
 /// Gamma where nothing else is said.
 const GAMMA_DEFAULT: f64 = 0.5;
-/// Further than this from its pitch a note is another one, cents. Wide, for breath and reeds that bend a note much.
-const OWN_CENTS: f64 = 150.0;
 /// Quieter than this is silence, dBFS without the user's gain. The softest note of pianissimo that was met has -42 dBFS; a reed
 /// through which no air flows (--A 0) moves at most as loud as -71 dBFS.
 const SILENT_DBFS: f64 = -65.0;
@@ -127,7 +126,7 @@ impl TuneCommand {
             let as_built = number(as_built.map_or(f64::NAN, |(_, cents)| cents), 3);
             match heard {
                 Some((f_hz, cents)) => {
-                    let register_ok = u8::from(cents.abs() <= OWN_CENTS);
+                    let register_ok = u8::from(cents.abs() <= OTHER_CENTS);
                     table.line(format_args!("{written},{f_hz:.5},{cents:.3},{register_ok},{as_built}"))?;
                 }
                 None => table.line(format_args!("{written},nan,nan,0,{as_built}"))?,
@@ -172,7 +171,7 @@ fn name_of(tuning: Tuning) -> &'static str {
 /// One round for the figure.
 fn round(name: &str, notes: &[WrittenNote], heard: &[Option<(f64, f64)>]) -> Round {
     let heard = heard.iter().map(|heard| match *heard {
-        Some((_, cents)) if cents.abs() <= OWN_CENTS => TunedNote::Own(cents),
+        Some((_, cents)) if cents.abs() <= OTHER_CENTS => TunedNote::Own(cents),
         Some((_, cents)) => TunedNote::Other(cents),
         None => TunedNote::Silence,
     });

@@ -7,6 +7,7 @@ use chalumeau_core::instrument::player::Attack;
 use chalumeau_core::instrument::player::response::ONSET;
 use chalumeau_core::instrument::techniques::GrowlPitch;
 use chalumeau_core::instrument::{Beyond, BreathResponse, ListeningMode, Split, Tuning};
+use chalumeau_knob::device::{FIRST_CEILING_MNM, OFFERED_CEILING_MNM};
 use chalumeau_knob::touch::study::TRIALS;
 
 use crate::parameters::{Choice, InUse, Kind, Number, Parameter, Sets, Switch, Whole};
@@ -27,8 +28,8 @@ const TECHNIQUES: &str = "Techniques";
 const PLAYERS: &str = "Players";
 const MICROPHONE: &str = "Microphone";
 
-/// Largest torque that the user can allow, mNm (`docs/protocol.md`, safety).
-const MOST_TORQUE_MNM: f32 = 250.0;
+/// Largest torque that plugin and page offer, mNm; the command line goes further after a second question.
+const MOST_TORQUE_MNM: f32 = OFFERED_CEILING_MNM as f32;
 
 /// Controllers that can drive H and k.
 const REED_MIDI: &str = "CC1, CC16, CC17, CC74 or pressure, as *H from* and *k from* select";
@@ -157,7 +158,7 @@ pub static PARAMETERS: &[Parameter] = &[
     entry("legato", BREATH, "Legato", number([5.0, 15.0], 8.0, 1, " ms"))
         .help(
             "Time in which the fingers move between slurred notes",
-            "Holes open and close over this time. In a long slur the notes between speak as well. Where the breath response is Played, slurs up over the break take half of this time, and loud leaps down into the low chalumeau 1.8 times as long.",
+            "Holes open and close over this time. In a long slur the notes between speak as well. Where the breath response is Played, slurs up into a higher register take half of this time, slurs down into a lower one nearly three times as long, and loud leaps down into the low chalumeau 1.8 times as long.",
             "The torque changes from one note's curve to the next note's.",
         )
         .sets(Sets::Number(SettingNumber::LegatoMs))
@@ -396,7 +397,7 @@ pub static PARAMETERS: &[Parameter] = &[
         .act()
         .never_restored()
         .only(InUse::WithKnob),
-    entry("ceil", KNOB, "Torque ceiling", number([10.0, MOST_TORQUE_MNM], 100.0, 0, " mNm"))
+    entry("ceil", KNOB, "Torque ceiling", number([10.0, MOST_TORQUE_MNM], FIRST_CEILING_MNM as f32, 0, " mNm"))
         .help(
             "Largest torque that you allow",
             "The knob never makes more. 100 is gentle, and 250 is the most you can ask for. A higher value takes effect at the next arming, a lower value at once.",
@@ -448,7 +449,7 @@ pub static PARAMETERS: &[Parameter] = &[
         .help(
             "Exaggerates how the torque differs between notes",
             "Does not change the sound.",
-            "Hands tell two torques apart if they differ by about 13 %. At 1, what the bore needs, only the very hardest notes do from the easiest; at 3 and 5 about half of all pairs do, most of them across the break. Below A6 a semitone within a register does not.",
+            "A hand tells two torques apart if they differ by about 13 %. At 1, which is what the bore needs, it tells only the hardest notes from the easiest. At 3 and 5 it tells about half of all pairs of notes apart, mostly across the break. Below A6 it never tells neighbouring semitones of one register apart.",
         )
         .flag("--contrast")
         .setup(),

@@ -421,7 +421,7 @@ pub fn played(written: WrittenNote, gamma: f64, settings: &Settings) -> Snapshot
     let fingering = model.fingering_for(note).unwrap();
     let open = &model.file.fingerings[fingering].open;
     let bore = feel_inputs::requirements(&model);
-    let reed = feel_inputs::played_reed(&model.file, settings);
+    let reed = feel_inputs::played_reed(&model.file, model.a4_hz, settings);
     let feel = feel_of(&bore, &reed, fingering);
     let angle_deg = feel.as_ref().ok().map(|feel| feel.map.angle_deg(f64::from(mouth_kpa) * 1e3) as f32);
     let torque_mnm = feel.as_ref().ok().zip(angle_deg).map(|(feel, deg)| {

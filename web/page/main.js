@@ -41,7 +41,7 @@ const data = await json('data.json').catch((error) => {
   throw error;
 });
 const drawing = new ClarinetDrawing(get('clarinet'));
-const meter = new Meter(data.mezzoForte);
+const meter = new Meter(data.dynamics);
 const engine = new Engine(hear);
 const hands = new Hands((message) => engine.send(message));
 const keyboard = new Keyboard(get('keyboard'), hands, breathe);

@@ -6,18 +6,18 @@ const BELOW = 0.07;
 const LEAST_KPA = 0.02;
 
 export class Meter {
-  /** `mezzoForte` is the place of mezzo-forte between pianissimo, 0, and fortissimo, 1. */
-  constructor(mezzoForte) {
+  /** `dynamics` are names and places between pianissimo, 0, and fortissimo, 1. */
+  constructor(dynamics) {
     const get = (id) => document.getElementById(id);
     [this.air, this.marks, this.words] = ['air', 'dynamics', 'breathing'].map(get);
-    this.names = [[0, 'pp'], [mezzoForte / 2, 'p'], [mezzoForte, 'mf'], [(1 + mezzoForte) / 2, 'f'], [1, 'ff']];
+    this.dynamics = dynamics;
     this.setPhysical(false);
   }
 
   /** Whether breath is pressure, as with a blowing machine: then marks say where the reed speaks and closes. */
   setPhysical(isPhysical) {
     this.isPhysical = isPhysical;
-    const marks = isPhysical ? [[0.33, 'speaks'], [0.83, 'closes']] : this.names.map(([at, name]) => [BELOW + (0.95 - BELOW) * at, name]);
+    const marks = isPhysical ? [[0.33, 'speaks'], [0.83, 'closes']] : this.dynamics.map(([name, at]) => [BELOW + (0.95 - BELOW) * at, name]);
     this.items = marks.map(([at, name]) => {
       const item = Object.assign(document.createElement('li'), { textContent: name });
       item.style.bottom = `${100 * at}%`;

@@ -18,7 +18,7 @@
 //! use chalumeau_core::units::Air;
 //!
 //! // About one second: the bore of the built-in clarinet.
-//! let bore = RequirementSolver::new(&InstrumentFile::built_in(), Air::default());
+//! let bore = RequirementSolver::new(&InstrumentFile::built_in(), Air::default(), 440.0);
 //! // Milliseconds: any reed and any design.
 //! let reed = PlayedReed::quasi_static(0.3);
 //! let design = FeelDesign { contrast: 2.0, ..FeelDesign::default() };

@@ -29,7 +29,7 @@ mod ensemble;
 pub mod feel_inputs;
 pub mod held_note;
 pub mod internal_rate;
-mod key_pitches;
+pub mod key_pitches;
 pub mod lip;
 pub mod listening;
 pub mod model;

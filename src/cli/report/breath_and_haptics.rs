@@ -4,7 +4,6 @@ use crate::cli::render_job::RenderJob;
 use crate::cli::report::{number, word};
 use chalumeau_core::haptics::torque_law::torque_mnm;
 use chalumeau_core::haptics::{FeelDesign, FeelRefused, FeelTable, NoteFeel, NoteRequirement, TorqueLimits};
-use chalumeau_core::instrument::feel_inputs::played_reed;
 use chalumeau_core::instrument::{KeyPitches, Model, Reach, Settings};
 use chalumeau_core::measure::bifurcation;
 use chalumeau_core::measure::bifurcation::SOUNDING_RMS;
@@ -57,7 +56,7 @@ impl<'a> BreathAndHaptics<'a> {
     /// Analyses the instrument (about 1 s). `near` is the written note to swell.
     pub fn new(prepared: &'a RenderJob, design: FeelDesign, near: Option<WrittenNote>) -> Self {
         let feels = InstrumentFeel::new(&prepared.model);
-        let asked = feels.requirements().with(&played_reed(&prepared.model.file, &prepared.settings));
+        let asked = feels.requirements().with(&feels.reed(&prepared.settings));
         let near = near.and_then(|near| feels.requirements().written().position(|written| written == near));
         let first = asked.iter().position(Option::is_some);
         let near = near.filter(|&near| asked[near].is_some()).or(first);

@@ -10,15 +10,10 @@ use crate::editor::snapshot::{NO_BREATH_KPA, Snapshot};
 use crate::editor::theme;
 use crate::editor::theme::Colours;
 use chalumeau_core::instrument::BreathResponse;
-use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
+use chalumeau_core::instrument::player::dynamics::NAMED;
 
 /// Part of the column below the threshold.
 const BELOW: f32 = 0.07;
-/// The dynamics with their names: from the threshold, 0, to fortissimo, 1, in equal steps of level on both sides of mezzo-forte.
-const NAMES: [(f32, &str); 5] = {
-    let mf = MEZZO_FORTE as f32;
-    [(0.0, "pp"), (0.5 * mf, "p"), (mf, "mf"), (0.5 * (1.0 + mf), "f"), (1.0, "ff")]
-};
 
 /// A mark beside the column.
 struct MeterMark {
@@ -133,15 +128,16 @@ fn played(snapshot: &Snapshot, dynamic: Option<f32>, c: &Colours) -> Reading {
     };
     let mut marks =
         vec![MeterMark { at: BELOW - 0.012, name: "speaks", colour: c.speaks, is_dynamic: false }];
-    let names = NAMES.map(|(at, name)| MeterMark { at: height(at), name, colour: c.quiet, is_dynamic: true });
+    let names =
+        NAMED.map(|(name, at)| MeterMark { at: height(at as f32), name, colour: c.quiet, is_dynamic: true });
     marks.extend(names);
     Reading { level, marks, word }
 }
 
 /// The name of the nearest dynamic.
 fn nearest(dynamic: f32) -> &'static str {
-    let distance = |of: &(f32, &str)| (of.0 - dynamic).abs();
-    NAMES.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).map_or("", |of| of.1)
+    let distance = |of: &(&str, f64)| (of.1 - f64::from(dynamic)).abs();
+    NAMED.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).map_or("", |of| of.0)
 }
 
 /// Where the breath is a pressure.
@@ -160,9 +156,10 @@ mod tests {
 
     #[test]
     fn dynamics_have_the_names_that_musicians_use() {
-        for (dynamic, name) in [(0.0, "pp"), (0.1, "pp"), (0.3, "p"), (0.6, "mf"), (0.83, "f"), (1.0, "ff")] {
+        for (dynamic, name) in [(0.0, "pp"), (0.09, "pp"), (0.28, "p"), (0.6, "mf"), (0.83, "f"), (1.0, "ff")]
+        {
             assert_eq!(nearest(dynamic), name);
         }
-        assert!(NAMES.is_sorted_by(|a, b| a.0 < b.0));
+        assert!(NAMED.is_sorted_by(|a, b| a.1 < b.1));
     }
 }

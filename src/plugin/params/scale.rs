@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::plugin::mts_esp::ReceivedTuning;
 use crate::scale_file::{self, ScaleFault};
 use chalumeau_core::instrument::KeyPitches;
+use chalumeau_core::instrument::key_pitches::TRIM_MOST_CENTS;
 
 /// Longest text that a project keeps, bytes; a scale of a thousand notes is shorter.
 const BYTES_MOST: usize = 64 << 10;
@@ -37,7 +38,7 @@ pub struct SavedScale {
 pub type Trims = BTreeMap<u8, i16>;
 
 /// Largest trim, tenths of a cent.
-pub const TRIM_MOST: i16 = 500;
+pub const TRIM_MOST: i16 = (10.0 * TRIM_MOST_CENTS) as i16;
 
 impl SavedScale {
     /// What every key plays.

@@ -6,7 +6,7 @@ use crate::plugin::instrument_loading::CurrentInstrument;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::bore::transfer_matrix::TransferMatrix;
 use chalumeau_core::haptics::{FeelDesign, FeelTable, NoteFeel, NoteRequirement, TorqueLimits};
-use chalumeau_core::instrument::{Model, Settings, feel_inputs};
+use chalumeau_core::instrument::{Model, Settings};
 use chalumeau_knob::touch::feel::InstrumentFeel;
 
 /// An instrument as the window draws it. It is there before the analysis.
@@ -81,8 +81,7 @@ impl InstrumentAnalysis {
 
     /// What a fingering requires of the breath with this reed; `None` if it does not sound.
     pub fn requirement(&self, fingering: usize, settings: &Settings) -> Option<NoteRequirement> {
-        let reed = feel_inputs::played_reed(&self.drawn.file, settings);
-        self.feels.requirements().note(fingering, &reed)
+        self.feels.requirements().note(fingering, &self.feels.reed(settings))
     }
 
     /// What the hand feels on a fingering, or why there is no feel.

@@ -19,14 +19,15 @@ mod wander;
 
 use anyhow::{Context, Result, bail, ensure};
 use chalumeau_core::analysis::steady_note::SteadyNote;
-use chalumeau_core::instrument::player::dynamics::{MEZZO_FORTE, PlayerModel};
+use chalumeau_core::instrument::player::dynamics::PlayerModel;
 use chalumeau_core::instrument::player::response::breath_of_dynamic;
 use chalumeau_core::instrument::prepare::auto_tune::Accuracy;
 use chalumeau_core::instrument::prepare::play_dynamics;
 use chalumeau_core::instrument::presence::Presence;
 use chalumeau_core::instrument::{Model, Settings};
 use chalumeau_core::measure::realism::{
-    self, CENTROID_RATIOS, Dynamic, NoteScore, ODD_UP_TO, RecordedNote, differences_db, mean, median,
+    self, CENTROID_RATIOS, Dynamic, FAIL_DB, HEADROOM_DB, NoteScore, ODD_UP_TO, RecordedNote, differences_db,
+    mean, median,
 };
 use chalumeau_core::parallel;
 use chalumeau_core::units::SoundingNote;
@@ -46,10 +47,6 @@ const COMPARED: usize = 10;
 /// How often each recorded note is played: takes differ in breath noise and *Life*. Of four takes, the errors of the best and the
 /// worst differ by 0.6 dB in the median and 4 dB at most, and their centroids by 1 and 14 %.
 const TAKES: usize = 8;
-/// Renders are this much softer, so that no peak meets the limiter, dB.
-const HEADROOM_DB: f32 = 20.0;
-/// What a note counts that the rule cannot play, dB.
-const FAIL_DB: f64 = 20.0;
 /// Mean errors that are asked for at pp, mf and ff, a little less than what counts as right. What each dB of error costs, and what each
 /// dB over these costs.
 const ASKED_DB: [f64; 3] = [3.95, 6.85, 5.9];
@@ -190,17 +187,9 @@ impl Compared {
     }
 }
 
-fn dynamic_number(dynamic: Dynamic) -> f64 {
-    match dynamic {
-        Dynamic::Pp => 0.0,
-        Dynamic::Mf => MEZZO_FORTE,
-        Dynamic::Ff => 1.0,
-    }
-}
-
 /// What a rule plays for a dynamic, with presence.
 fn played(rule: &Rule, note: &NoteSpectra, dynamic: Dynamic) -> Option<PlayedSpectrum> {
-    let (player, gains, d) = (&rule.player, Gains::of(&rule.presence, note.f0_hz), dynamic_number(dynamic));
+    let (player, gains, d) = (&rule.player, Gains::of(&rule.presence, note.f0_hz), dynamic.played());
     let loudest = loudest(player, note)?.heard(&gains);
     if dynamic == Dynamic::Ff {
         return Some(loudest);
@@ -332,13 +321,13 @@ impl Data {
             .context("not cancelled")?;
         let model = Arc::new(model);
         let settings = Settings::default();
-        let settings = Settings { gain_db: settings.gain_db - HEADROOM_DB, ..settings };
+        let settings = Settings { gain_db: settings.gain_db - HEADROOM_DB as f32, ..settings };
         let all: Vec<(usize, usize)> = (0..self.notes.len())
             .flat_map(|at| (0..self.recorded[at].len()).map(move |take| (at, take)))
             .collect();
         let score = |n: usize| {
             let recorded = &self.recorded[all[n / TAKES].0][all[n / TAKES].1];
-            let breath = breath_of_dynamic(dynamic_number(recorded.dynamic), &settings) as f32;
+            let breath = breath_of_dynamic(recorded.dynamic.played(), &settings) as f32;
             let samples = realism::render(&model, &settings, SoundingNote(recorded.midi), breath, n % TAKES);
             NoteScore::new(recorded.clone(), SteadyNote::measure(&samples))
         };

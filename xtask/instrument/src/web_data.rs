@@ -15,7 +15,7 @@ use chalumeau_core::bore::bundled::Bundled;
 use chalumeau_core::control::midi::breath::BreathFrom;
 use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::event::{Event, Timed};
-use chalumeau_core::instrument::player::dynamics::MEZZO_FORTE;
+use chalumeau_core::instrument::player::dynamics::NAMED;
 use chalumeau_core::instrument::{Preparation, Settings, Wanted};
 use chalumeau_web::drawn::drawn;
 use chalumeau_web::values;
@@ -48,7 +48,7 @@ fn text() -> Result<String> {
         .collect();
     let controls = CONTROLS.into_iter().map(control).collect::<Result<Vec<_>>>()?;
     let all = json!({
-        "mezzoForte": MEZZO_FORTE,
+        "dynamics": NAMED,
         "breathResponse": values::BREATH_RESPONSE,
         "defaults": values::list(&Settings::default()).to_vec(),
         "instruments": instruments,

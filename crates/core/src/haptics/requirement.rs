@@ -83,10 +83,11 @@ struct BoreNote {
 }
 
 impl RequirementSolver {
-    /// Analyses the bore of an instrument: about one second for 46 notes. Allocates; not for the audio thread.
-    pub fn new(file: &InstrumentFile, air: Air) -> Self {
+    /// Analyses the bore of an instrument that plays at `a4_hz`, Hz: about one second for 46 notes. Allocates; not for the
+    /// audio thread.
+    pub fn new(file: &InstrumentFile, air: Air, a4_hz: f64) -> Self {
         let matrix = TransferMatrix::new(file, air);
-        let sounding_hz = |written: WrittenNote| file.sounding(written).frequency_hz(440.0);
+        let sounding_hz = |written: WrittenNote| file.sounding(written).frequency_hz(a4_hz);
         let lowest_hz = sounding_hz(file.lowest());
         let notes = file
             .fingerings
@@ -208,7 +209,7 @@ mod tests {
     #[test]
     fn stored_admittance_is_the_bore() {
         let (file, air) = (InstrumentFile::built_in(), Air::default());
-        let (bore, solver) = (TransferMatrix::new(&file, air), RequirementSolver::new(&file, air));
+        let (bore, solver) = (TransferMatrix::new(&file, air), RequirementSolver::new(&file, air, 440.0));
         for (fingering, note) in file.fingerings.iter().zip(&solver.notes) {
             let (near_hz, _) = note.mode.as_ref().unwrap();
             for off in [0.93, 0.971, 1.0, 1.017] {

@@ -7,15 +7,17 @@ use crate::instrument::model::Model;
 use crate::instrument::settings::Settings;
 use crate::reed::Lip;
 
-/// The reed under these settings, with the law and the lip that the sound has, for every fingering of a file. Allocates.
-pub fn played_reed(file: &InstrumentFile, settings: &Settings) -> PlayedReed {
+/// The reed under these settings, with the law and the lip that the sound has, for every fingering of a file that plays at
+/// `a4_hz`, Hz. Allocates.
+pub fn played_reed(file: &InstrumentFile, a4_hz: f64, settings: &Settings) -> PlayedReed {
     let settings = settings.clamped();
-    let lowest_hz = file.lowest_hz();
+    let sounding_hz = |written| file.sounding(written).frequency_hz(a4_hz);
+    let lowest_hz = sounding_hz(file.lowest());
     let lips = file
         .fingerings
         .iter()
         .map(|fingering| {
-            let lip = embouchure(file.sounding(fingering.written).frequency_hz(440.0), lowest_hz);
+            let lip = embouchure(sounding_hz(fingering.written), lowest_hz);
             Lip { resonance_hz: lip.resonance_hz, damping: lip.damping * f64::from(settings.damping) }
         })
         .collect();
@@ -32,5 +34,5 @@ pub fn played_reed(file: &InstrumentFile, settings: &Settings) -> PlayedReed {
 /// Allocates.
 pub fn requirements(model: &Model) -> RequirementSolver {
     let rows = |fingering: usize| model.tuning.notes.get(fingering).map_or(0.0, |note| note.natural);
-    RequirementSolver::new(&model.file, model.air).with_lattice(&model.file, &model.coeffs, rows)
+    RequirementSolver::new(&model.file, model.air, model.a4_hz).with_lattice(&model.file, &model.coeffs, rows)
 }

@@ -3,6 +3,9 @@
 use crate::instrument::concert_pitch::A4_HZ;
 use crate::units::{SoundingNote, cents};
 
+/// Most by which scale and trim together move a note from equal temperament, cents: half a semitone.
+pub const TRIM_MOST_CENTS: f64 = 50.0;
+
 /// What a key plays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeyPitch {
@@ -52,7 +55,7 @@ impl KeyPitches {
     pub fn trimmed(&self, cents_of: impl Fn(SoundingNote) -> f64) -> Self {
         let trimmed = |KeyPitch { note, cents }| {
             let trim = Some(cents_of(note)).filter(|trim| trim.is_finite()).unwrap_or(0.0);
-            KeyPitch { note, cents: (cents + trim).clamp(-50.0, 50.0) }
+            KeyPitch { note, cents: (cents + trim).clamp(-TRIM_MOST_CENTS, TRIM_MOST_CENTS) }
         };
         Self(self.0.map(|key| key.map(trimmed)))
     }

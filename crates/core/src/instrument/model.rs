@@ -11,6 +11,7 @@ use crate::bore::context_fingerings::ContextFingerings;
 use crate::bore::instrument_file::{Fingering, InstrumentFile};
 use crate::bore::lattice::LatticeCoeffs;
 use crate::instrument::concert_pitch::A4_HZ;
+use crate::instrument::concert_pitch::A4_RANGE_HZ;
 use crate::instrument::key_pitches::KeyPitches;
 use crate::instrument::player::dynamics::PlayerModel;
 use crate::instrument::tuning_table::TuningTable;
@@ -83,7 +84,7 @@ pub enum BuildError {
     #[error("sample rate must lie in 1000..1536000 Hz, got {0}")]
     Rate(f64),
     /// The pitch of A4, Hz, lies outside [`A4_RANGE_HZ`](super::concert_pitch::A4_RANGE_HZ).
-    #[error("A4 must lie in 415..466 Hz, got {0}")]
+    #[error("A4 must lie in {low}..{high} Hz, got {0}", low = A4_RANGE_HZ.0, high = A4_RANGE_HZ.1)]
     A4(f64),
     /// The caller ended the preparation.
     #[error("cancelled")]

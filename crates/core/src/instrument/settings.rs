@@ -2,6 +2,7 @@
 
 use crate::event::{Fingerings, SettingNumber};
 use crate::instrument::articulation::Articulation;
+use crate::instrument::concert_pitch::A4_RANGE_HZ;
 use crate::instrument::listening::Listening;
 use crate::instrument::player::Attack;
 use crate::instrument::player::dynamics::LipShape;
@@ -394,7 +395,7 @@ impl Settings {
             reed_k: fix(self.reed_k, 0.1, 2.0, d.reed_k),
             coupled: self.coupled,
             reed_a: fix(self.reed_a, 0.0, 2.0, d.reed_a),
-            a4_hz: fix(self.a4_hz, 415.0, 466.0, d.a4_hz),
+            a4_hz: fix(self.a4_hz, A4_RANGE_HZ.0 as f32, A4_RANGE_HZ.1 as f32, d.a4_hz),
             tuning: self.tuning,
             temperature_c: fix(self.temperature_c, 10.0, 40.0, d.temperature_c),
             vent_loss: fix(self.vent_loss, 0.0, 4.0, d.vent_loss),

@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use crate::analysis::steady_note::{RATE_HZ, SECONDS, SteadyNote};
 use crate::analysis::to_f64;
+use crate::instrument::player::dynamics::MEZZO_FORTE;
 use crate::instrument::{Clarinet, Model, Players, Settings};
 use crate::score::breath::BreathCurve;
 use crate::score::{self, Score};
@@ -20,9 +21,11 @@ const RECORDED: &str = include_str!("../../data/recorded_spectra.csv");
 /// Below this level, re the strongest harmonic, recordings at pp hold noise; both sides are clipped there, dB.
 const CLIP_DB: f64 = -60.0;
 /// What a note counts that does not sound or sounds in another register, dB.
-const FAIL_DB: f64 = 20.0;
+pub const FAIL_DB: f64 = 20.0;
 /// A note further off than this is another one, cents.
-const OTHER_CENTS: f64 = 150.0;
+pub const OTHER_CENTS: f64 = 150.0;
+/// What is compared is played this much softer, so that no peak meets the limiter, dB.
+pub const HEADROOM_DB: f64 = 20.0;
 /// Range of centroid ratios that counts as right.
 pub const CENTROID_RATIOS: (f64, f64) = (0.8, 1.25);
 /// Highest sounding note of which the third harmonic is compared with the second: sounding B3.
@@ -65,6 +68,15 @@ impl Dynamic {
             Self::Pp => "pp",
             Self::Mf => "mf",
             Self::Ff => "ff",
+        }
+    }
+
+    /// The player's dynamic that is compared with it, 0..=1.
+    pub fn played(self) -> f64 {
+        match self {
+            Self::Pp => 0.0,
+            Self::Mf => MEZZO_FORTE,
+            Self::Ff => 1.0,
         }
     }
 }

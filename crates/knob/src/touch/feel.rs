@@ -2,7 +2,7 @@
 
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::{
-    AngleMap, FeelDesign, FeelRefused, FeelTable, RequirementSolver, TorqueLimits,
+    AngleMap, FeelDesign, FeelRefused, FeelTable, PlayedReed, RequirementSolver, TorqueLimits,
 };
 use chalumeau_core::instrument::feel_inputs::{played_reed, requirements};
 use chalumeau_core::instrument::player::response::ONSET;
@@ -31,6 +31,7 @@ static BUILT_IN: LazyLock<Result<Arc<InstrumentFeel>, BuildError>> =
 pub struct InstrumentFeel {
     requirements: RequirementSolver,
     file: InstrumentFile,
+    a4_hz: f64,
     /// Index of the fingering for each sounding pitch.
     fingerings: [Option<u8>; PITCHES],
 }
@@ -51,12 +52,17 @@ impl InstrumentFeel {
                 *place = u8::try_from(index).ok();
             }
         }
-        Self { requirements: requirements(model), file: file.clone(), fingerings }
+        Self { requirements: requirements(model), file: file.clone(), a4_hz: model.a4_hz, fingerings }
     }
 
     /// What the bore requires for each note.
     pub fn requirements(&self) -> &RequirementSolver {
         &self.requirements
+    }
+
+    /// The reed under these settings, as the sound has it. Allocates.
+    pub fn reed(&self, settings: &Settings) -> PlayedReed {
+        played_reed(&self.file, self.a4_hz, settings)
     }
 
     /// The feel of every note, or why the limits refuse it. Allocates; takes up to 50 ms.
@@ -66,7 +72,7 @@ impl InstrumentFeel {
         design: &FeelDesign,
         limits: &TorqueLimits,
     ) -> Result<FeelTable, FeelRefused> {
-        FeelTable::new(&self.requirements, design, &played_reed(&self.file, settings), limits)
+        FeelTable::new(&self.requirements, design, &self.reed(settings), limits)
     }
 
     /// Index of the fingering for a sounding pitch. Real-time safe.

@@ -8,6 +8,7 @@ use chalumeau_core::instrument::held_note::{HeldNote, Start};
 use chalumeau_core::instrument::player::dynamics::{LipShape, PlayerModel};
 use chalumeau_core::instrument::presence::Presence;
 use chalumeau_core::instrument::{Listening, Model};
+use chalumeau_core::measure::realism::OTHER_CENTS;
 use chalumeau_core::reed::ReedLaw;
 use chalumeau_core::reed::physical::ZETA_REFERENCE;
 use chalumeau_core::units::{SoundingNote, cents};
@@ -22,8 +23,6 @@ const OPENINGS: [(f64, f64); 6] =
     [(0.45, 0.0), (0.62, 0.0), (0.85, 0.0), (1.17, 0.4), (1.63, 0.5), (2.2, 0.5)];
 /// Time until a note is steady, and time that it is heard, s.
 const HEARD_S: (f64, f64) = (1.0, 1.3);
-/// A note further off than this is another one, cents.
-const OTHER_CENTS: f64 = 150.0;
 /// What counts as nothing, dB under the strongest harmonic.
 const SILENT_DB: f64 = -200.0;
 /// How far above the loudest point of the grid a level may be asked for, dB.

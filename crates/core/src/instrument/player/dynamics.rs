@@ -31,6 +31,9 @@ use crate::reed::physical::ZETA_REFERENCE;
 /// The dynamic of mezzo-forte. By the level of the recorded notes it would be 0.54, by their colour 0.62; both steps from
 /// here are within 2.4 dB of the recorded ones.
 pub const MEZZO_FORTE: f64 = 0.6;
+/// The names that musicians give to dynamics, at equal steps of level.
+pub const NAMED: [(&str, f64); 6] =
+    [("pp", 0.0), ("p", 0.2), ("mp", 0.4), ("mf", MEZZO_FORTE), ("f", 0.8), ("ff", 1.0)];
 /// Mouth over closing pressure below the onset of any note: 1/3 for a reed without mass, less near its resonance.
 pub const LOWEST_ONSET: f64 = 0.25;
 /// Number of dynamics at which a note's pressure and trim are known.

@@ -36,7 +36,7 @@ impl Quality {
 pub struct Wanted {
     /// The instrument's measurements and fingerings.
     pub file: InstrumentFile,
-    /// Pitch of A4, Hz, 415..=466.
+    /// Pitch of A4, Hz, within [`A4_RANGE_HZ`].
     pub a4_hz: f64,
     /// The host's sample rate, Hz, 1000..=1536000.
     pub host_rate_hz: f64,
