@@ -51,7 +51,7 @@ use crate::identity;
 use crate::parameters::InUse;
 use chalumeau_core::control::notes::Note;
 use chalumeau_core::event::Event;
-use chalumeau_core::instrument::{Channels, MOST_PLAYERS, Settings};
+use chalumeau_core::instrument::{Channels, MOST_PLAYERS, Reach, Settings};
 #[cfg(feature = "devices")]
 use chalumeau_knob::device::Release;
 use host_inputs::HostInputs;
@@ -82,6 +82,8 @@ pub struct Chalumeau {
     /// The settings that the instrument has.
     settings: Settings,
     inputs: HostInputs,
+    /// Of which keys of which instrument the inputs know whether they play.
+    keys_of: Option<(Reach, usize)>,
     microphone: Microphone,
     moved: MovedParameters,
     #[cfg(feature = "devices")]
@@ -345,6 +347,11 @@ impl Chalumeau {
             instrument.wait_for(self.params.instrument.choice.value() as u32);
         }
         instrument.receive();
+        let model = instrument.ensemble().first().model();
+        let of = Some((settings.reach, Arc::as_ptr(model).addr()));
+        if std::mem::replace(&mut self.keys_of, of) != of {
+            self.inputs.playing_keys(settings.reach.key_notes(model).playing());
+        }
         Some((settings, has_changed))
     }
 

@@ -19,13 +19,15 @@ use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::control::knob::KnobDesign;
 use chalumeau_core::control::midi::MidiDecoder;
 use chalumeau_core::control::parts::Parts;
+use chalumeau_core::control::parts::Unplayed;
 use chalumeau_core::event::{PartEvent, Timed};
 use chalumeau_core::haptics::FeelDesign;
-use chalumeau_core::instrument::key_pitches::TRIM_MOST_CENTS;
-use chalumeau_core::instrument::{BreathResponse, KeyPitches, Model, Players, Settings, Split};
+use chalumeau_core::instrument::key_pitches::{KeyPitches, TRIM_MOST_CENTS};
+use chalumeau_core::instrument::{BreathResponse, Model, Players, Settings, Split};
 use chalumeau_core::score::Score;
 use chalumeau_core::score::breath::BreathCurve;
 use chalumeau_core::score::midi_file;
+use chalumeau_core::score::midi_file::Tracks;
 use chalumeau_core::units::{SoundingNote, WrittenNote};
 use chalumeau_knob::touch::breath_from_angle::{Blower, BlownEvents, BreathMapping};
 use chalumeau_knob::touch::feel::{InstrumentFeel, NO_MOTOR};
@@ -137,6 +139,8 @@ struct Planned {
     file: InstrumentFile,
     settings: Settings,
     parts: Score<PartEvent>,
+    /// Keys of a MIDI file that play nothing.
+    unplayed: Unplayed,
     /// Of another tuning.
     keys: Option<KeyPitches>,
     /// The trim of each note by its sounding pitch, cents.
@@ -181,18 +185,18 @@ impl ScoreArgs {
         }
         warnings.extend(self.scale.and_then(|ends| left_out_of_scale(ends, &file)));
         let trims = self.trims(&file)?;
-        let mut parts = self.score(&file, &map, &mut settings)?;
+        let keys = self.scl.as_ref().map(|scl| scale_file::read(scl, self.kbm.as_deref())).transpose()?;
+        let (mut parts, unplayed) = self.score(&file, &map, keys.as_ref(), &mut settings)?;
         if let Some(curve) = &curve {
             parts = parts.blown(curve, &settings, self.rate);
         }
-        let keys = self.scl.as_ref().map(|scl| scale_file::read(scl, self.kbm.as_deref())).transpose()?;
         let take = self.breath.take()?;
-        Ok(Planned { file, settings, parts, keys, trims, take, warnings })
+        Ok(Planned { file, settings, parts, unplayed, keys, trims, take, warnings })
     }
 
     /// Reads and checks the arguments and prepares the instrument. Takes seconds for an instrument file.
     pub fn prepare(&self) -> Result<RenderJob, Failure> {
-        let Planned { file, settings, mut parts, keys, trims, take, mut warnings } = self.plan()?;
+        let Planned { file, settings, mut parts, unplayed, keys, trims, take, mut warnings } = self.plan()?;
         let mut model = self.instrument.model(file, self.rate, settings.a4_hz)?;
         if let Some(keys) = keys {
             Arc::make_mut(&mut model).keys = keys;
@@ -202,7 +206,7 @@ impl ScoreArgs {
             let keys = model.keys.trimmed(cents);
             Arc::make_mut(&mut model).keys = keys;
         }
-        warnings.extend(silent_notes(&parts.events, &model, settings.reach));
+        warnings.extend(silent_notes(&parts.events, &unplayed, &model, settings.reach));
         if let Some(take) = &take {
             parts.events = self.replayed(take, &model, &settings, &parts)?;
         }
@@ -336,10 +340,16 @@ impl ScoreArgs {
         &self,
         file: &InstrumentFile,
         map: &ControllerMap,
+        keys: Option<&KeyPitches>,
         settings: &mut Settings,
-    ) -> Result<Score<PartEvent>, Failure> {
+    ) -> Result<(Score<PartEvent>, Unplayed), Failure> {
         let links = as_links(&map.links, settings);
         let transposition = file.transposition;
+        let has_note = |note: SoundingNote| {
+            note.written(transposition).is_some_and(|note| file.fingering(note).is_some())
+        };
+        let playing =
+            settings.reach.key_notes_among(keys.unwrap_or(&KeyPitches::default()), has_note).playing();
         let (players, key_switches) = (&mut settings.players, settings.reach.key_switches);
         if self.tracks && (self.midi.is_none() || matches!(self.given, Some(Given::Notes(_)))) {
             return Err(Failure::Usage(
@@ -356,7 +366,7 @@ impl ScoreArgs {
         }
         if let Some(path) = &self.midi {
             let bytes = match &self.given {
-                Some(Given::Notes(notes)) => return Ok((&score_of(notes, self.rate)).into()),
+                Some(Given::Notes(notes)) => return Ok(((&score_of(notes, self.rate)).into(), [0; 128])),
                 Some(Given::Midi(bytes)) => bytes.clone(),
                 None => fs::read(path).map_err(|source| no_such_piece(path, source))?,
             };
@@ -371,14 +381,17 @@ impl ScoreArgs {
             set_by_map(&mut decoder, map);
             let refused = |source| Failure::MidiFile { path: path.clone(), source };
             if self.tracks {
-                let (score, count) =
-                    midi_file::read_tracks(&decoder, key_switches, &bytes, self.rate).map_err(refused)?;
+                let Tracks { score, players: count, unplayed } =
+                    midi_file::read_tracks(&decoder, (key_switches, playing), &bytes, self.rate)
+                        .map_err(refused)?;
                 *players = Players { count: count as i32, split: Split::Chords, ..*players };
-                return Ok(score);
+                return Ok((score, unplayed));
             }
             let mut parts = Parts::of(decoder, players.parts());
             parts.set_key_switches(key_switches);
-            return midi_file::read_parts(parts, &bytes, self.rate).map_err(refused);
+            parts.set_playing_keys(playing);
+            let score = midi_file::read_parts(&mut parts, &bytes, self.rate).map_err(refused)?;
+            return Ok((score, *parts.unplayed()));
         }
         if let Some((from, to)) = self.scale {
             for end in [from, to] {
@@ -390,7 +403,7 @@ impl ScoreArgs {
             }
             let seconds = self.seconds.unwrap_or(0.5);
             let scale = Score::one_after_another(&notes, transposition, seconds, self.slurred, self.rate)?;
-            return Ok((&scale).into());
+            return Ok(((&scale).into(), [0; 128]));
         }
         let seconds = self.seconds.unwrap_or(2.0);
         let sounding = match (self.written.map(WrittenNote), self.sounding.map(SoundingNote)) {
@@ -404,7 +417,7 @@ impl ScoreArgs {
         match (sounding, written) {
             (Some(sounding), Some(written)) => {
                 check_fingering(file, written)?;
-                Ok((&Score::note(sounding, seconds, self.rate)).into())
+                Ok(((&Score::note(sounding, seconds, self.rate)).into(), [0; 128]))
             }
             _ => {
                 let given = sounding.or(self.sounding.map(SoundingNote));

@@ -1,17 +1,26 @@
 //! What a user should know of notes that an instrument cannot play.
 
 use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::control::parts::Unplayed;
 use chalumeau_core::event::{Event, PartEvent, Timed};
 use chalumeau_core::instrument::{Model, Reach};
 use chalumeau_core::units::{SoundingNote, WrittenNote};
 use std::collections::BTreeSet;
 
 /// Says which notes the instrument cannot play, which stay silent.
-pub fn silent_notes(events: &[Timed<PartEvent>], model: &Model, reach: Reach) -> Vec<String> {
+pub fn silent_notes(
+    events: &[Timed<PartEvent>],
+    unplayed: &Unplayed,
+    model: &Model,
+    reach: Reach,
+) -> Vec<String> {
+    let keys = (0..128).map(SoundingNote).zip(unplayed);
+    let struck = keys.flat_map(|(key, &count)| std::iter::repeat_n(key, count as usize));
     let asked = events.iter().filter_map(|timed| match timed.event.event {
         Event::NoteOn { note, .. } => Some(note),
         _ => None,
     });
+    let asked = struck.chain(asked);
     silent_keys(&asked.collect::<Vec<_>>(), model, reach)
 }
 

@@ -238,6 +238,11 @@ impl HostInputs {
         self.translator.set_key_switches(key_switches);
     }
 
+    /// Says which keys play a note, one bit each.
+    pub fn playing_keys(&mut self, playing: u128) {
+        self.translator.set_playing_keys(playing);
+    }
+
     /// Ends all notes at the beginning of the block.
     pub fn silence(&mut self) {
         for &event in self.translator.silence() {

@@ -86,6 +86,11 @@ impl EventTranslator {
         self.midi.set_key_switches(key_switches);
     }
 
+    /// See [`Parts::set_playing_keys`].
+    pub fn set_playing_keys(&mut self, playing: u128) {
+        self.midi.set_playing_keys(playing);
+    }
+
     /// See [`Parts::set_links`].
     pub fn set_links(&mut self, links: &[Option<Link>; MOST]) {
         self.midi.set_links(links);

@@ -240,7 +240,9 @@ impl Playing {
         self.stereo.set_space(&self.settings);
         self.parts.set_count(self.settings.players.parts());
         self.parts.set_key_switches(self.settings.reach.key_switches);
-        self.blower.set_notes(self.settings.reach.key_notes(self.ensemble.first().model()));
+        let notes = self.settings.reach.key_notes(self.ensemble.first().model());
+        self.parts.set_playing_keys(notes.playing());
+        self.blower.set_notes(notes);
     }
 
     /// What the mod wheel does, by its place in [`Wheel::ALL`].

@@ -8,7 +8,7 @@ use chalumeau_core::control::key_switches::KeySwitches;
 use chalumeau_core::event::{Event, Fingerings, Technique, Timed};
 use chalumeau_core::instrument::player::PlayerState;
 use chalumeau_core::instrument::{
-    Beyond, Clarinet, GrowlPitch, Preparation, Reach, Settings, Techniques, Tract, Wanted,
+    Beyond, Clarinet, GrowlPitch, KeyPitches, Model, Preparation, Reach, Settings, Techniques, Tract, Wanted,
 };
 use chalumeau_core::units::{SoundingNote, WrittenNote, cents};
 use std::sync::Arc;
@@ -229,6 +229,95 @@ fn within_a_register_a_glissando_has_no_step() {
         let off = [(first, from), (last, to)].map(|(hz, note)| cents(hz, sounding(note).frequency_hz(440.0)));
         assert!(off.iter().all(|off| off.abs() < 10.0), "{from} {to}: {off:?}");
         assert!(step < 22.0, "{from} {to}: {step}");
+    }
+}
+
+/// A slide that is interrupted half-way: the high key is let go, so that it goes back, or another key is pressed, so that it goes on
+/// from where it is.
+#[test]
+fn an_interrupted_glissando_has_no_step() {
+    let up = |note| Event::NoteOn { note: sounding(note), velocity: 0.7 };
+    let off = |note| Event::NoteOff { note: sounding(note) };
+    for (from, to, then, last) in [
+        (60, 67, off(67), 60),
+        (52, 67, up(69), 69),
+        (52, 65, up(55), 55),
+        (67, 55, up(60), 60),
+        (72, 84, off(84), 72),
+        (84, 74, up(79), 79),
+    ] {
+        for after in [250, 1_000, 1_600] {
+            let settings = Settings { glissando_s: 2.5, ..Settings::default() };
+            let mut clarinet = playing(&settings, from, 0.6);
+            listen(&mut clarinet, 800, |_, _| {});
+            let heard = listen(&mut clarinet, 3_400 + after, |clarinet, n| match n {
+                150 => clarinet.apply(up(to)),
+                n if n == 150 + after => clarinet.apply(then),
+                _ => {}
+            });
+            let (step, _, hz, level) = way(&heard);
+            let off = cents(hz, sounding(last).frequency_hz(440.0));
+            println!(
+                "{from} to {to}, after {after} ms to {last}: step {step:.1} cents, off {off:.1}, level {level:.1?} dB"
+            );
+            assert!(off.abs() < 10.0, "{from} {to} {after} {last}: {off}");
+            assert!(step < 22.0, "{from} {to} {after} {last}: {step}");
+        }
+    }
+}
+
+/// From an alternate fingering, whose holes are not those of the chart, and between keys of another tuning.
+#[test]
+fn a_glissando_begins_at_the_fingering_and_the_pitch_that_sound() {
+    let settings = Settings { glissando_s: 2.5, ..Settings::default() };
+    let slide = |clarinet: &mut Clarinet, to: SoundingNote| {
+        listen(clarinet, 800, |_, _| {});
+        let heard = listen(clarinet, 3_200, |clarinet, n| {
+            if n == 150 {
+                clarinet.apply(Event::NoteOn { note: to, velocity: 0.7 });
+            }
+        });
+        way(&heard)
+    };
+    let model = Model::built_in(RATE_HZ).unwrap();
+    let has_alternate = |&written: &u8| {
+        model
+            .fingering_for(sounding(written))
+            .is_some_and(|fingering| model.alternates.nth(fingering, 1).is_some())
+    };
+    let written: Vec<u8> = (52..=84).filter(has_alternate).collect();
+    println!("{written:?} have alternates");
+    assert!(written.len() >= 4);
+    for from in written {
+        // Within its register.
+        let to = if matches!(from, 52..=59 | 71..=77) { from + 7 } else { from - 5 };
+        let mut clarinet = Clarinet::built_in(RATE_HZ).unwrap();
+        clarinet.set_settings(&settings);
+        clarinet.apply(Event::Breath(0.6));
+        clarinet.apply(Event::Fingerings(Fingerings::Alternate(1)));
+        clarinet.apply(Event::NoteOn { note: sounding(from), velocity: 0.7 });
+        let (step, _, last, level) = slide(&mut clarinet, sounding(to));
+        let off = cents(last, sounding(to).frequency_hz(440.0));
+        println!("alternate {from} to {to}: step {step:.1}, off {off:.1}, level {level:.1?} dB");
+        assert!(step < 30.0 && off.abs() < 10.0, "{from} {to}: {step} {off}");
+    }
+    // Even keys are 45 cents flat. Odd keys play the note below, 45 cents sharp.
+    let hz = |key: u8| {
+        SoundingNote(key & !1).frequency_hz(440.0)
+            * f64::from(if key & 1 == 0 { -45.0 } else { 45.0 } / 1_200.0).exp2()
+    };
+    let mut model = Model::clone(&Model::built_in(RATE_HZ).unwrap());
+    model.keys = KeyPitches::from_hz(|key| Some(hz(key)));
+    let model = Arc::new(model);
+    for (from, to) in [(60, 65), (61, 66), (60, 61), (61, 60)] {
+        let mut clarinet = Clarinet::new(model.clone(), RATE_HZ);
+        clarinet.set_settings(&settings);
+        clarinet.apply(Event::Breath(0.6));
+        clarinet.apply(Event::NoteOn { note: SoundingNote(from), velocity: 0.7 });
+        let (step, first, last, _) = slide(&mut clarinet, SoundingNote(to));
+        let off = [(first, from), (last, to)].map(|(heard, key)| cents(heard, hz(key)));
+        println!("key {from} to {to}: step {step:.1}, off {off:.1?}");
+        assert!(step < 22.0 && off.iter().all(|off| off.abs() < 10.0), "{from} {to}: {step} {off:?}");
     }
 }
 

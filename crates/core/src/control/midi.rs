@@ -178,7 +178,8 @@ impl MidiDecoder {
     }
 
     /// Which controllers may blow. Another choice than before begins anew: keys blow until a controller moves. Breath that belongs
-    /// to notes, and controllers that are linked to the breath, are not asked. Real-time safe.
+    /// to notes, as polyphonic pressure does, blows beside any controller and beside pressure. Controllers that are linked to the
+    /// breath are not asked. Real-time safe.
     pub fn set_breath_from(&mut self, from: BreathFrom) -> &[Event] {
         self.begin();
         if self.breath.set_from(from) {
@@ -271,6 +272,16 @@ impl MidiDecoder {
         self.said.events()
     }
 
+    /// The pedal and all keys come up. Real-time safe.
+    pub fn let_go(&mut self) -> &[Event] {
+        self.begin();
+        self.set_pedal(false);
+        let before = self.sounding();
+        self.notes.release(NoteAddress::default(), false);
+        self.hear_next(before);
+        self.said.events()
+    }
+
     /// All notes end at once, as by CC120. Real-time safe.
     pub fn silence(&mut self) -> &[Event] {
         self.begin();
@@ -283,6 +294,9 @@ impl MidiDecoder {
     pub fn express(&mut self, address: NoteAddress, expression: NoteExpression) -> &[Event] {
         self.begin();
         if let NoteExpression::Breath(unit) = expression {
+            if !self.breath.notes_may_blow() {
+                return self.said.events();
+            }
             self.has_note_breath |= unit > 0.0;
         }
         if self.notes.express(address, expression) {
@@ -536,7 +550,8 @@ impl MidiDecoder {
         let waits = place == Place::First && self.sounding().is_none();
         for event in self.links.hear(source, value) {
             if let Event::Breath(unit) = event {
-                self.linked_breath = waits.then_some(unit);
+                // A single 0 does not count: hosts send one when they begin.
+                self.linked_breath = (waits && unit > 0.0).then_some(unit);
                 if waits {
                     continue;
                 }

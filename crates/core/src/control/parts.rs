@@ -11,6 +11,7 @@
 //! - Breath and channel pressure of an MPE member channel go to the parts that play on that channel, and to a note that
 //!   begins on it later. So do linked controllers there, unless their links set what belongs to all players.
 //! - What belongs to notes goes to the parts that hold one of them. If no part does, it goes to all, whose notes may fade.
+//! - A key that plays nothing is no note: it takes no part, and slurs or ends nothing.
 //! - A [key switch](super::key_switches) is no note and chooses for all. What an MPE controller says of the finger on it goes to
 //!   none.
 //! - Everything else goes to all parts, and each takes what is for its note, as a lone player does: bends, for example.
@@ -34,6 +35,9 @@ const PRESSURE: usize = 128;
 /// Distance of a note from a part that has played none: farther than any key.
 const NEVER: u8 = 128;
 
+/// How often each key was struck that plays nothing.
+pub type Unplayed = [u32; 128];
+
 /// The state of all parts. Real-time safe, but for `new` and `default`.
 ///
 /// ```
@@ -54,6 +58,9 @@ pub struct Parts {
     latest: usize,
     origin: Option<BreathOrigin>,
     switches: SwitchKeys,
+    /// The keys that play a note, one bit each.
+    playing: u128,
+    unplayed: Unplayed,
     /// The latest value of each source on each channel, where it is for the notes of that channel.
     of_notes: Vec<[Option<u8>; SOURCES]>,
 }
@@ -81,6 +88,8 @@ impl Parts {
             latest: 0,
             origin: None,
             switches: SwitchKeys::default(),
+            playing: u128::MAX,
+            unplayed: [0; 128],
             of_notes: vec![[None; SOURCES]; 16],
         };
         parts.set_count(count);
@@ -109,7 +118,7 @@ impl Parts {
         self.decoders.len()
     }
 
-    /// Forgets everything but the number of parts and the place of the key switches.
+    /// Forgets everything but the number of parts, the place of the key switches, and which keys play.
     pub fn reset(&mut self) {
         self.begin();
         self.switches.release_all();
@@ -131,6 +140,16 @@ impl Parts {
     /// Which keys choose fingerings and are no notes. Notes that are held go on.
     pub fn set_key_switches(&mut self, key_switches: KeySwitches) {
         self.switches.set_row(key_switches);
+    }
+
+    /// Which keys play a note, one bit each from key 0; until then all. Notes that are held go on.
+    pub fn set_playing_keys(&mut self, playing: u128) {
+        self.playing = playing;
+    }
+
+    /// How often keys were struck that play nothing.
+    pub fn unplayed(&self) -> &Unplayed {
+        &self.unplayed
     }
 
     /// See [`MidiDecoder::set_breath_from`].
@@ -188,6 +207,12 @@ impl Parts {
             self.said.push(Event::Fingerings(fingerings).into());
             return &self.said;
         }
+        if self.playing >> note.key & 1 == 0 {
+            self.over.push(note);
+            let struck = &mut self.unplayed[usize::from(note.key)];
+            *struck = struck.saturating_add(1);
+            return &self.said;
+        }
         let chosen = self.part_for(note);
         self.latest = chosen;
         for part in (0..self.count()).filter(|&part| part != chosen) {
@@ -219,6 +244,12 @@ impl Parts {
     pub fn choke(&mut self, address: NoteAddress) -> &[PartEvent] {
         self.switches.release(address);
         self.tell_all(|part| part.choke(address))
+    }
+
+    /// See [`MidiDecoder::let_go`].
+    pub fn let_go(&mut self) -> &[PartEvent] {
+        self.switches.release_all();
+        self.tell_all(MidiDecoder::let_go)
     }
 
     /// See [`MidiDecoder::silence`].

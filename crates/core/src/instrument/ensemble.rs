@@ -356,6 +356,9 @@ impl Ensemble {
     pub fn render_channels(&mut self, mut out: Channels) {
         if self.is_alone() {
             self.section.arrange(&mut self.seats);
+            // Who joins later finds the same cells, however the host cuts its blocks.
+            let at = (self.seats[0].at + out.len()) % CELL;
+            self.seats.iter_mut().for_each(|seat| seat.at = at);
             return self.seats[0].clarinet.render_channels(out);
         }
         let (mut begin, samples) = (0, out.len());

@@ -92,8 +92,10 @@ impl OutputLevel {
         } else {
             out.each_moment(|| {
                 if self.gain != self.target {
-                    let step = (self.target - self.gain) * self.step;
-                    self.gain = if step.abs() < 1e-9 { self.target } else { self.gain + step };
+                    let next = self.gain + (self.target - self.gain) * self.step;
+                    // A step that no longer changes the number would never arrive.
+                    let is_there = next == self.gain || (next - self.gain).abs() < 1e-9;
+                    self.gain = if is_there { self.target } else { next };
                 }
                 self.gain
             });
@@ -134,5 +136,19 @@ mod tests {
         after.set(&Settings::default());
         let gliding = applied(&mut after);
         assert!(gliding[0] < gliding[3], "{gliding:?}");
+    }
+
+    #[test]
+    fn a_gain_arrives() {
+        for (from, to) in [(-10.0, -2.5), (0.0, -20.0), (-60.0, 24.0)] {
+            let at = |gain_db| Settings { gain_db, ..Settings::default() };
+            let mut level = OutputLevel::new(REFERENCE_RADIUS_M, 192_000.0);
+            level.set(&at(from));
+            level.settle();
+            applied(&mut level);
+            level.set(&at(to));
+            (0..40_000).for_each(|_| _ = applied(&mut level));
+            assert_eq!(level.gain, level.target, "{from} to {to} dB");
+        }
     }
 }

@@ -165,6 +165,8 @@ pub struct Player {
     bend_cents: f64,
     /// Pitch of the key over that of its note, cents.
     key_cents: f64,
+    /// How far the note that was fingered last lies from the pitch of its fingering in the chart, cents: by its key and its alternate.
+    fingered_cents: f64,
     lip_glide: LipGlide,
     onset: Onset,
     life: Life,
@@ -270,7 +272,7 @@ impl Player {
             Event::NoteOn { note, velocity } => self.note_on(note, velocity, model, voice),
             Event::NoteOff { note } => self.note_off(note, model, voice),
             Event::Choke { note } => self.choke(note, model, voice),
-            Event::Breath(level) => self.breath.set_level(level, self.settings.breath_deadband),
+            Event::Breath(level) => self.breath.set_level(level, &self.settings),
             Event::KeyPressure(pressure) => self.breath.press(pressure),
             Event::BreathFromKeys => self.breath.forget_source(),
             Event::Bend { cents } => {
@@ -420,15 +422,17 @@ impl Player {
                 from.and_then(|from| model.alternates.taken(from, self.fingers.alternate(), fingering))
             }
         };
-        let begun = self.slide.map(|slide| slide.target).or(from);
-        let slides = begun.filter(|&begun| from.is_some() && glissando_s > 0.0 && begun != fingering);
-        self.slide = slides.map(|begun| Slide::new(begun, fingering, glissando_s, model));
-        if let Some(slide) = self.slide {
-            self.fingers.aim(slide.lip(model));
-            self.posture = None;
+        let reached_cents = self.fingered_cents + self.slide.as_ref().map_or(0.0, Slide::beside_cents);
+        self.fingered_cents = self.key_cents;
+        if let Some(from) = from.filter(|_| glissando_s > 0.0)
+            && self.slide_to(fingering, from, reached_cents, model, voice)
+        {
             return;
         }
+        self.slide = None;
         self.fingers.choose(alternate);
+        let alternate = alternate.and_then(|at| model.alternates.get(at));
+        self.fingered_cents += alternate.map_or(0.0, |alternate| alternate.cents);
         self.ear.begin(false);
         if !slurred {
             return self.move_holes(fingering, 1e-3 * TONGUED_FINGERS_MS, model, voice);
@@ -455,6 +459,33 @@ impl Player {
                 self.move_holes(fingering, legato_s, model, voice);
             }
         }
+    }
+
+    /// Begins a slide from a fingering, or turns the one that is under way; false if there is no way to go. `reached_cents`: how
+    /// far the pitch now lies beside that of the fingerings.
+    #[inline(never)]
+    fn slide_to<F: Real>(
+        &mut self,
+        to: usize,
+        from: usize,
+        reached_cents: f64,
+        model: &Model,
+        voice: &mut Voice<F>,
+    ) -> bool {
+        let length_s = f64::from(self.settings.glissando_s);
+        let open = self.fingers.open_holes(model, voice.lattice_mut());
+        let slide = match self.slide {
+            Some(slide) => slide.turned_to(to, open, length_s, model),
+            None if from == to && reached_cents == self.key_cents => return false,
+            None => Slide::new(from, open, to, length_s, model),
+        };
+        let slide = slide.beginning_beside(reached_cents - self.key_cents);
+        let settles = ((slide.finger_s() / self.tick_s(model)).round() as u32).max(self.legato_ticks(model));
+        self.fingers.begin_slide(slide.fingers(), settles, model, voice.lattice_mut());
+        self.fingers.aim(slide.lip(model));
+        self.slide = Some(slide);
+        self.posture = None;
+        true
     }
 
     /// Control ticks that the fingers take between slurred notes.
@@ -602,7 +633,8 @@ impl Player {
         let hardness =
             self.breath.attack_hardness() * self.response.haste(settings.attack) / self.response.release();
         let (p_mouth, tongue) = self.tongue.tick(shaken, hardness, &context);
-        let added_cents = (self.sway.cents, self.inflection.cents());
+        let beside_cents = self.slide.as_ref().map_or(0.0, Slide::beside_cents);
+        let added_cents = (self.sway.cents, self.inflection.cents() + beside_cents);
         let has_other_speed = self.tuning.tick(fingering, gamma, added_cents, &context, model, lattice);
         let drive = Drive { p_mouth, tongue, noise: f64::from(settings.noise), reed: posture.reed };
         if has_other_speed {

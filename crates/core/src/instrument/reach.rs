@@ -49,6 +49,11 @@ impl KeyNotes {
     pub fn of(&self, key: SoundingNote) -> Option<SoundingNote> {
         self.0.get(usize::from(key.0)).copied().flatten()
     }
+
+    /// The keys that play a note, one bit each from key 0.
+    pub fn playing(&self) -> u128 {
+        (0..128).map(|key| u128::from(self.0[key].is_some()) << key).sum()
+    }
 }
 
 /// Which note a key plays.
@@ -88,7 +93,12 @@ impl Reach {
 
     /// The notes of all keys on an instrument. Real-time safe.
     pub fn key_notes(self, model: &Model) -> KeyNotes {
-        let of = |key| self.find(SoundingNote(key), &model.keys, |note| model.fingering_for(note));
+        self.key_notes_among(&model.keys, |note| model.fingering_for(note).is_some())
+    }
+
+    /// The same where `plays` knows which notes an instrument has, and `keys` what keys ask for.
+    pub fn key_notes_among(self, keys: &KeyPitches, plays: impl Fn(SoundingNote) -> bool) -> KeyNotes {
+        let of = |key| self.find(SoundingNote(key), keys, |note| plays(note).then_some(()));
         KeyNotes(std::array::from_fn(|key| {
             u8::try_from(key).ok().and_then(of).map(|(KeyPitch { note, .. }, _)| note)
         }))

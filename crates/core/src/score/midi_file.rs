@@ -2,8 +2,12 @@
 //!
 //! Tracks are merged by tick. At one tick the earlier track and the earlier message come first, so that a file always plays
 //! the same way. Tempo changes of every track count. Time is an exact fraction, and is rounded once, to the nearest sample.
-//! Notes are sounding pitches. Format 2 (independent patterns) is refused; messages other than channel messages and tempo
-//! are ignored.
+//! Notes are sounding pitches. Format 2 (independent patterns) is refused; messages other than channel messages, tempo and
+//! the end of a track are ignored.
+//!
+//! A key that is struck again before it has come up is let go first, so that both notes begin and end as written: recorded
+//! and quantised parts often overlap so. A player's own hands cannot, and [`MidiDecoder`] takes such keys as slurred. At the end
+//! of the last track, pedal and keys that are still down come up.
 //!
 //! A damaged file is refused with the byte at which reading stopped; it is not played up to there.
 //! Source: Standard MIDI Files 1.0 (RP-001, 1988).
@@ -16,7 +20,7 @@ use crate::control::parts::Parts;
 use crate::event::{Event, PartEvent, Timed};
 use crate::score::timeline::Score;
 use midly::{EventIter, MetaMessage, MidiMessage, TrackEventKind};
-pub use tracks::read_tracks;
+pub use tracks::{Tracks, read_tracks};
 
 /// Longest score, s. Sample positions stay far below the largest integer.
 const SECONDS_MAX: u32 = 6 * 3600;
@@ -164,7 +168,7 @@ impl Clock {
     }
 }
 
-/// Reads the bytes of a file as a score at the sample rate `rate`, Hz. The score ends with the last event.
+/// Reads the bytes of a file as a score at the sample rate `rate`, Hz. The score ends with its longest track.
 ///
 /// # Errors
 ///
@@ -179,22 +183,22 @@ pub fn read(bytes: &[u8], rate: u32) -> Result<Score, MidiFileError> {
 ///
 /// As [`read`].
 pub fn read_as(decoder: MidiDecoder, bytes: &[u8], rate: u32) -> Result<Score, MidiFileError> {
-    Ok((&read_parts(Parts::of(decoder, 1), bytes, rate)?).into())
+    Ok((&read_parts(&mut Parts::of(decoder, 1), bytes, rate)?).into())
 }
 
-/// As [`read`], for several players.
+/// As [`read`], for several players, whose decoders have been set up for the file.
 ///
 /// # Errors
 ///
 /// As [`read`].
-pub fn read_parts(mut parts: Parts, bytes: &[u8], rate: u32) -> Result<Score<PartEvent>, MidiFileError> {
+pub fn read_parts(parts: &mut Parts, bytes: &[u8], rate: u32) -> Result<Score<PartEvent>, MidiFileError> {
     let (mut clock, messages) = merged(bytes)?;
     let (mut events, mut tick, mut notes) = (Vec::new(), 0, 0usize);
     for message in messages {
         clock.advance(message.tick - tick);
         tick = message.tick;
         let decoded = match message.kind {
-            TrackEventKind::Midi { channel, message } => decode(&mut parts, channel.as_int(), message),
+            TrackEventKind::Midi { channel, message } => decode(parts, channel.as_int(), message),
             TrackEventKind::Meta(MetaMessage::Tempo(us)) => {
                 clock.set_tempo(us.as_int());
                 &[]
@@ -206,11 +210,17 @@ pub fn read_parts(mut parts: Parts, bytes: &[u8], rate: u32) -> Result<Score<Par
             events.push(Timed { at: clock.sample(rate)?, event });
         }
     }
-    if notes == 0 {
+    if notes == 0 && parts.unplayed().iter().all(|&count| count == 0) {
         return Err(MidiFileError::NoNotes);
     }
-    let samples = events.last().map_or(0, |e| e.at);
+    let samples = end(&clock, &events, rate);
+    events.extend(parts.let_go().iter().map(|&event| Timed { at: samples, event }));
     Ok(Score { events, samples })
+}
+
+/// Where a file ends: with its longest track, or with its last event if the track would last for more hours than can be rendered.
+fn end(clock: &Clock, events: &[Timed<PartEvent>], rate: u32) -> usize {
+    clock.sample(rate).unwrap_or_else(|_| events.last().map_or(0, |last| last.at))
 }
 
 fn decode(parts: &mut Parts, channel: u8, message: MidiMessage) -> &[PartEvent] {
@@ -276,30 +286,66 @@ fn merged(bytes: &[u8]) -> Result<(Clock, Vec<Message<'_>>), MidiFileError> {
     for together in messages.chunk_by_mut(|a, b| a.tick == b.tick) {
         end_before_beginning(together, &mut held);
     }
-    Ok((clock, messages))
+    Ok((clock, apart(messages)))
+}
+
+/// The place of a key among all keys of all channels, and whether the message strikes it or lets it go.
+fn key_of(message: &Message) -> Option<(usize, bool)> {
+    let (channel, key, is_down) = match message.kind {
+        TrackEventKind::Midi { channel, message: MidiMessage::NoteOn { key, vel } } => {
+            (channel, key, vel > 0)
+        }
+        TrackEventKind::Midi { channel, message: MidiMessage::NoteOff { key, .. } } => (channel, key, false),
+        _ => return None,
+    };
+    Some((usize::from(channel.as_int()) * 128 + usize::from(key.as_int()), is_down))
+}
+
+/// Notes of one key that overlap, apart: the earlier one ends where the later one begins, and its own end is left out. Only of keys that
+/// come up as often as they are struck; where ends are missing, it cannot be told whose they are.
+fn apart(messages: Vec<Message<'_>>) -> Vec<Message<'_>> {
+    let mut balance = [0_i32; 16 * 128];
+    let keys = messages.iter().filter_map(key_of);
+    keys.for_each(|(key, is_down)| balance[key] += if is_down { 1 } else { -1 });
+    let mut held = [0_u32; 16 * 128];
+    let mut all = Vec::with_capacity(messages.len());
+    for message in messages {
+        match key_of(&message).filter(|&(key, _)| balance[key] == 0) {
+            Some((key, true)) => {
+                if held[key] > 0
+                    && let TrackEventKind::Midi { channel, message: MidiMessage::NoteOn { key, vel } } =
+                        message.kind
+                {
+                    let up = TrackEventKind::Midi { channel, message: MidiMessage::NoteOff { key, vel } };
+                    all.push(Message { kind: up, ..message });
+                }
+                held[key] += 1;
+            }
+            Some((key, false)) => {
+                held[key] = held[key].saturating_sub(1);
+                if held[key] > 0 {
+                    continue;
+                }
+            }
+            None => {}
+        }
+        all.push(message);
+    }
+    all
 }
 
 /// Messages of one tick. A key that is held, and struck again where it ends, ends first: otherwise its end would end the new note.
 /// Files with several tracks have these two in any order. `held` says which keys are, of all channels.
 fn end_before_beginning(together: &mut [Message], held: &mut [bool; 16 * 128]) {
-    let note = |message: &Message| match message.kind {
-        TrackEventKind::Midi { channel, message: MidiMessage::NoteOn { key, vel } } => {
-            Some((usize::from(channel.as_int()) * 128 + usize::from(key.as_int()), vel > 0))
-        }
-        TrackEventKind::Midi { channel, message: MidiMessage::NoteOff { key, .. } } => {
-            Some((usize::from(channel.as_int()) * 128 + usize::from(key.as_int()), false))
-        }
-        _ => None,
-    };
     let mut at = 0;
     while at < together.len() {
-        if let Some((key, true)) = note(&together[at])
+        if let Some((key, true)) = key_of(&together[at])
             && held[key]
-            && let Some(end) = together[at..].iter().position(|message| note(message) == Some((key, false)))
+            && let Some(end) = together[at..].iter().position(|message| key_of(message) == Some((key, false)))
         {
             together[at..=at + end].rotate_right(1);
         }
-        if let Some((key, is_down)) = note(&together[at]) {
+        if let Some((key, is_down)) = key_of(&together[at]) {
             held[key] = is_down;
         }
         at += 1;
@@ -404,6 +450,56 @@ mod tests {
         let score = read(&file(0, [0, 96], &[brief]), 48_000).unwrap();
         assert!(matches!(score.events[..], [on, off] if matches!(on.event, Event::NoteOn { .. })
             && matches!(off.event, Event::NoteOff { .. })));
+    }
+
+    fn spans(bytes: &[u8]) -> Vec<(usize, usize)> {
+        let score = read(bytes, 48_000).unwrap();
+        score.note_spans(&KeyNotes::default()).iter().map(|span| (span.from, span.to)).collect()
+    }
+
+    /// Recorded and quantised parts overlap: the second note is struck a little before the first has come up.
+    #[test]
+    fn a_key_that_is_struck_again_before_it_comes_up_has_both_notes() {
+        let overlap: &[u8] =
+            &[0, 0x90, 60, 64, 96, 0x90, 60, 64, 5, 0x80, 60, 0, 91, 0x80, 60, 0, 0, 0xFF, 0x2F, 0];
+        assert_eq!(spans(&file(0, [0, 96], &[overlap])), [(0, 24_000), (24_000, 48_000)]);
+        // Three, of which the first comes up after the third has begun.
+        let three: &[u8] = &[
+            0, 0x90, 60, 64, 96, 0x90, 60, 64, 96, 0x90, 60, 64, 1, 60, 0, 1, 60, 0, 94, 60, 0, 0, 0xFF,
+            0x2F, 0,
+        ];
+        let each = [(0, 24_000), (24_000, 48_000), (48_000, 72_000)];
+        assert_eq!(spans(&file(0, [0, 96], &[three])), each);
+        // An end is missing: no note hangs.
+        let missing: &[u8] = &[0, 0x90, 60, 64, 96, 0x90, 60, 64, 96, 0x80, 60, 0, 96, 0xFF, 0x2F, 0];
+        assert_eq!(spans(&file(0, [0, 96], &[missing])).last().map(|span| span.1), Some(48_000));
+    }
+
+    #[test]
+    fn a_file_lasts_as_long_as_its_longest_track_and_nothing_is_held_at_its_end() {
+        // A note that the pedal holds, and one that never comes up.
+        let pedalled: &[u8] = &[0, 0xB0, 64, 127, 0, 0x90, 60, 64, 96, 0x80, 60, 0, 96, 0xFF, 0x2F, 0];
+        let drone: &[u8] = &[0, 0x90, 60, 64, 0x81, 0x40, 0xFF, 0x2F, 0];
+        for track in [pedalled, drone] {
+            let bytes = file(0, [0, 96], &[track]);
+            assert_eq!((spans(&bytes), read(&bytes, 48_000).unwrap().samples), (vec![(0, 48_000)], 48_000));
+            let lines =
+                read_tracks(&MidiDecoder::new(), (Default::default(), u128::MAX), &bytes, 48_000).unwrap();
+            let last = lines.score.events.last().unwrap();
+            assert!(matches!(last.event.event, Event::NoteOff { .. }) && last.at == 48_000);
+        }
+        let silence: &[u8] = &[0x83, 0x00, 0xFF, 0x2F, 0];
+        assert_eq!(read(&file(1, [0, 96], &[NOTE, silence]), 48_000).unwrap().samples, 96_000);
+    }
+
+    #[test]
+    fn keys_that_play_nothing_are_counted_and_left_out() {
+        let low: &[u8] = &[0, 0x90, 20, 64, 96, 0x80, 20, 0, 0, 0xFF, 0x2F, 0];
+        let mut parts = Parts::new(1);
+        parts.set_playing_keys(!(1 << 20));
+        let score = read_parts(&mut parts, &file(1, [0, 96], &[NOTE, low]), 48_000).unwrap();
+        assert_eq!((score.events.len(), parts.unplayed()[20], parts.unplayed()[60]), (2, 1, 0));
+        assert!(read_parts(&mut parts, &file(0, [0, 96], &[low]), 48_000).unwrap().events.is_empty());
     }
 
     #[test]

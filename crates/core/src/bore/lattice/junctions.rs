@@ -346,7 +346,12 @@ impl<F: Real, const N: usize> Holes<F, N> {
     /// Sends the hole in lane `k` to an opening, 0..=1, within `samples`.
     pub(super) fn glide_opening(&mut self, k: usize, opening: f64, samples: usize) {
         let (from, to) = (self.opening[k], F::of(opening));
-        self.glide[k] = F::of((opening - from.wide()) / samples.max(1) as f64);
+        let step = F::of((opening - from.wide()) / samples.max(1) as f64);
+        if from + step == from {
+            // Less than the last digit: it would never arrive.
+            return self.set_opening(k, opening);
+        }
+        self.glide[k] = step;
         let (low, high) = if from < to { (from, to) } else { (to, from) };
         self.range[0][k] = low;
         self.range[1][k] = high;

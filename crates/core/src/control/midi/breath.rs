@@ -128,6 +128,11 @@ pub struct BreathChoice {
 }
 
 impl BreathChoice {
+    /// Whether breath that belongs to notes is heard.
+    pub fn notes_may_blow(&self) -> bool {
+        matches!(self.from, BreathFrom::Any | BreathFrom::Only(BreathController::Pressure))
+    }
+
     /// Which controllers may blow from now on; none is heard until it moves. Whether that is another choice.
     pub fn set_from(&mut self, from: BreathFrom) -> bool {
         if self.from == from {

@@ -321,3 +321,34 @@ fn a_key_that_is_down_is_no_switch_any_more_where_the_row_has_moved() {
     assert!(said.iter().map(|(_, event)| *event).eq(decoder.pressure(2, 20).iter().copied()));
     assert!(!said.is_empty());
 }
+
+#[test]
+fn a_key_that_plays_nothing_takes_no_player_and_ends_nothing() {
+    let mut parts = Parts::new(2);
+    parts.set_playing_keys(!(1 << 40));
+    assert_eq!(chord(&mut parts, &[40, 60, 64]), [on(0, 60), on(1, 64)]);
+    assert_eq!(lift(&mut parts, &[40, 60, 64]), [off(0, 60), off(1, 64)]);
+    assert!(parts.note_on(0, 40, 100).is_empty());
+    assert_eq!(parts.over(), [Note { id: None, channel: 0, key: 40 }], "a host waits for its end");
+    // The pedal goes on holding, and a note goes on blowing.
+    let mut parts = Parts::new(1);
+    parts.set_playing_keys(!(1 << 40));
+    parts.controller(0, 64, 127);
+    parts.note_on(0, 60, 100);
+    parts.note_off(0, 60);
+    assert!(chord(&mut parts, &[40]).is_empty());
+    assert_eq!(said(parts.controller(0, 64, 0)), [off(0, 60)]);
+    parts.note_on(0, 62, 100);
+    parts.express(NoteAddress::of_key(0, 62), NoteExpression::Breath(0.5));
+    assert!(chord(&mut parts, &[40]).is_empty());
+}
+
+#[test]
+fn at_the_end_of_a_piece_pedal_and_keys_come_up() {
+    let mut parts = Parts::new(2);
+    parts.controller(0, 64, 127);
+    chord(&mut parts, &[60, 64]);
+    lift(&mut parts, &[60]);
+    assert_eq!(said(parts.let_go()), [off(0, 60), off(1, 64)]);
+    assert!(parts.let_go().is_empty());
+}

@@ -5,6 +5,7 @@
 //! pressure of it.
 
 use super::TickContext;
+use crate::instrument::settings::{BreathResponse, Settings};
 
 /// Time constant of breath that rises behind the tongue, s.
 pub const BREATH_RISE_S: f64 = 0.002;
@@ -52,11 +53,17 @@ pub struct Breath {
 
 impl Breath {
     /// A breath event, 0..=1 of full breath; not a number counts as 0. The breath follows one that leaves a band of half the
-    /// width `deadband`, at its edge: what a restless sensor does within the band is not heard. Rest is rest.
-    pub fn set_level(&mut self, level: f32, deadband: f32) {
+    /// width of the settings, at its edge: what a restless sensor does within the band is not heard. Towards the softest and the
+    /// loudest breath of the settings the band narrows to nothing, so that both stay what they are. Rest is rest.
+    pub fn set_level(&mut self, level: f32, settings: &Settings) {
         self.live = true;
         let level = f64::from(if level.is_finite() { level.clamp(0.0, 1.0) } else { 0.0 });
-        let half = 0.5 * f64::from(deadband);
+        let (softest, loudest) = match settings.breath_response {
+            BreathResponse::Played => (settings.breath_softest.into(), settings.breath_loudest.into()),
+            BreathResponse::Physical => (0.0, 1.0),
+        };
+        let half = 0.5 * f64::from(settings.breath_deadband);
+        let half = half.min(level - softest).min(loudest - level).max(0.0);
         self.level = if level > 0.0 { self.level.clamp(level - half, level + half) } else { 0.0 };
     }
 
@@ -148,30 +155,49 @@ impl Breath {
 mod tests {
     use super::*;
 
+    fn with_band(breath_deadband: f32) -> Settings {
+        Settings { breath_deadband, ..Settings::default() }
+    }
+
     #[test]
     fn what_is_restless_within_the_deadband_is_still() {
-        let mut breath = Breath::default();
-        breath.set_level(0.52, 0.04);
+        let (mut breath, band) = (Breath::default(), with_band(0.04));
+        breath.set_level(0.52, &band);
         let still = breath.level;
         for restless in [0.51, 0.485, 0.5, 0.515] {
-            breath.set_level(restless, 0.04);
+            breath.set_level(restless, &band);
             assert_eq!(breath.level, still, "{restless}");
         }
-        breath.set_level(0.6, 0.04);
+        breath.set_level(0.6, &band);
         assert!((breath.level - 0.58).abs() < 1e-6, "it follows at the edge of the band");
-        breath.set_level(0.0, 0.04);
+        breath.set_level(0.0, &band);
         assert_eq!(breath.level, 0.0, "rest is rest");
         for level in [0.1, 0.7, 1.0] {
-            breath.set_level(level, 0.0);
+            breath.set_level(level, &with_band(0.0));
             assert_eq!(breath.level, f64::from(level), "without a band");
         }
+    }
+
+    #[test]
+    fn the_softest_and_the_loudest_breath_are_reached_whatever_the_deadband() {
+        let (mut breath, band) = (Breath::default(), with_band(0.1));
+        for value in 0..=127_u8 {
+            let level = f32::from(value) / 127.0;
+            breath.set_level(level, &band);
+            if level <= band.breath_softest {
+                assert_eq!(breath.level, f64::from(level));
+            }
+        }
+        assert_eq!(breath.level, 1.0);
+        (4..127_u8).rev().for_each(|value| breath.set_level(f32::from(value) / 127.0, &band));
+        assert_eq!(breath.level, f64::from(4.0_f32 / 127.0));
     }
 
     #[test]
     fn velocity_blows_again_once_the_source_is_forgotten() {
         let mut breath = Breath::default();
         breath.set_velocity(0.7);
-        breath.set_level(0.0, 0.0);
+        breath.set_level(0.0, &Settings::default());
         assert_eq!(breath.asked(true), Asked::Level(0.0));
         breath.forget_source();
         assert_eq!(breath.asked(true), Asked::Velocity(f64::from(0.7_f32)));

@@ -22,6 +22,8 @@ pub struct Fingers {
     held: HeldHoles,
     /// A slur that is under way.
     walk: Walk,
+    /// What is left of where the holes were when a slide began.
+    settling: Settling,
 }
 
 /// Openings that replace those of the fingering.
@@ -69,6 +71,24 @@ struct Walk {
 impl Default for Walk {
     fn default() -> Self {
         Self { waits: [0; HOLES], ticks: 1, left: 0 }
+    }
+}
+
+/// Holes that a slide found elsewhere than where it begins: they go there, while it goes on.
+#[derive(Clone, Copy, Debug)]
+struct Settling {
+    /// These holes, one bit each.
+    which: u64,
+    /// How much farther open each was, -1..=1.
+    off: [f32; HOLES],
+    /// Ticks that are left, and all of them, at least 1.
+    left: u32,
+    ticks: u32,
+}
+
+impl Default for Settling {
+    fn default() -> Self {
+        Self { which: 0, off: [0.0; HOLES], left: 0, ticks: 1 }
     }
 }
 
@@ -155,18 +175,50 @@ impl Fingers {
         }
     }
 
+    /// The holes that are open now, those that are held left out: one bit each, half open or more counts.
+    pub fn open_holes<F: Real>(&self, model: &Model, lattice: &Lattice<F>) -> u64 {
+        let Some(fingering) = self.fingering else { return 0 };
+        let open = |hole: usize| {
+            let opening = match self.held.opening(hole) {
+                Some(_) => f64::from(u8::from(model.file.fingerings[fingering].open[hole])),
+                None => lattice.opening(hole),
+            };
+            u64::from(opening >= 0.5) << hole
+        };
+        (0..model.coeffs.holes().min(HOLES)).map(open).sum()
+    }
+
+    /// A slide begins here. Holes that are elsewhere go there within `ticks` control ticks while it goes on.
+    pub fn begin_slide<F: Real>(
+        &mut self,
+        between: Between,
+        ticks: u32,
+        model: &Model,
+        lattice: &Lattice<F>,
+    ) {
+        let mut settling = Settling { left: ticks.max(1), ticks: ticks.max(1), ..Settling::default() };
+        each_opening(between, self.held.which, model, |hole, opening| {
+            let off = (lattice.opening(hole) - opening) as f32;
+            settling.which |= u64::from(off != 0.0) << hole;
+            settling.off[hole] = off;
+        });
+        self.settling = settling;
+    }
+
     /// Puts the fingers where a slide has them, within one tick: the holes that change do so one after another.
-    pub fn slide<F: Real>(&self, between: Between, model: &Model, lattice: &mut Lattice<F>) {
-        let Between { from, to, way, rises } = between;
-        let changing = |hole: &usize| ((from ^ to) & !self.held.which) >> hole & 1 == 1;
-        let holes = 0..model.coeffs.holes();
-        let count = holes.clone().filter(changing).count();
-        for (n, hole) in holes.filter(changing).enumerate() {
-            // Holes are in order from the mouth.
-            let turn = if rises { count - 1 - n } else { n };
-            let own = (way * (count as f64 - 1.0 + TOGETHER) - turn as f64) / TOGETHER;
-            let own = own.clamp(0.0, 1.0);
-            lattice.glide_opening(hole, if to >> hole & 1 == 1 { own } else { 1.0 - own }, TICK);
+    pub fn slide<F: Real>(&mut self, between: Between, model: &Model, lattice: &mut Lattice<F>) {
+        let settling = &mut self.settling;
+        settling.left = settling.left.saturating_sub(1);
+        let share = f64::from(settling.left) / f64::from(settling.ticks);
+        let moving = between.from ^ between.to | settling.which;
+        each_opening(between, self.held.which, model, |hole, opening| {
+            if moving >> hole & 1 == 1 {
+                let off = share * f64::from(settling.off[hole]);
+                lattice.glide_opening(hole, (opening + off).clamp(0.0, 1.0), TICK);
+            }
+        });
+        if settling.left == 0 {
+            settling.which = 0;
         }
     }
 
@@ -239,5 +291,26 @@ impl Fingers {
             None => model.file.fingerings[fingering].open[hole],
         };
         f64::from(u8::from(open))
+    }
+}
+
+/// Where a slide has the fingers: calls `with` for every hole that is not `held` and its opening, 0..=1.
+fn each_opening(between: Between, held: u64, model: &Model, mut with: impl FnMut(usize, f64)) {
+    let Between { from, to, way, rises } = between;
+    let changes = (from ^ to) & !held;
+    let count = changes.count_ones();
+    let mut n = 0;
+    // Holes are in order from the mouth.
+    for hole in (0..model.coeffs.holes().min(HOLES)).filter(|hole| held >> hole & 1 == 0) {
+        let opens = to >> hole & 1 == 1;
+        if changes >> hole & 1 == 0 {
+            with(hole, f64::from(u8::from(opens)));
+            continue;
+        }
+        let turn = if rises { count - 1 - n } else { n };
+        n += 1;
+        let own = (way * (f64::from(count) - 1.0 + TOGETHER) - f64::from(turn)) / TOGETHER;
+        let own = own.clamp(0.0, 1.0);
+        with(hole, if opens { own } else { 1.0 - own });
     }
 }

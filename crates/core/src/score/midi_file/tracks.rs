@@ -5,10 +5,10 @@
 //! own. Key switches are no notes, and make no line. A message of no line, for example a controller in a track without notes, goes to the lines with notes on its channel,
 //! or to all if there are none.
 
-use super::{MidiFileError, decode, merged};
+use super::{MidiFileError, decode, end, merged};
 use crate::control::key_switches::KeySwitches;
 use crate::control::midi::MidiDecoder;
-use crate::control::parts::{MOST, Parts};
+use crate::control::parts::{MOST, Parts, Unplayed};
 use crate::event::{Event, PartEvent, Timed, To};
 use crate::score::timeline::Score;
 use midly::{MetaMessage, MidiMessage, TrackEventKind};
@@ -34,18 +34,29 @@ impl Line {
     }
 }
 
-/// Reads the bytes of a file as a score at the sample rate `rate`, Hz, with a player for each line, the first one first. Returns how
-/// many there are, too. Each line has a decoder that begins as `decoder`, and key switches choose for all.
+/// A file whose lines have players of their own.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tracks {
+    /// What they play.
+    pub score: Score<PartEvent>,
+    /// How many they are.
+    pub players: usize,
+    /// How often keys are struck that play nothing.
+    pub unplayed: Unplayed,
+}
+
+/// Reads the bytes of a file as a score at the sample rate `rate`, Hz, with a player for each line, the first one first. Each line has a decoder that begins as `decoder`, key switches choose for all, and `playing` are the keys that
+/// play a note, one bit each.
 ///
 /// # Errors
 ///
 /// As [`read`](super::read), and [`MidiFileError::Lines`] if there are more lines than players.
 pub fn read_tracks(
     decoder: &MidiDecoder,
-    key_switches: KeySwitches,
+    (key_switches, playing): (KeySwitches, u128),
     bytes: &[u8],
     rate: u32,
-) -> Result<(Score<PartEvent>, usize), MidiFileError> {
+) -> Result<Tracks, MidiFileError> {
     let (mut clock, messages) = merged(bytes)?;
     let noted = messages.iter().filter_map(|message| match message.kind {
         TrackEventKind::Midi { channel, message: MidiMessage::NoteOn { key, vel } } => {
@@ -55,7 +66,10 @@ pub fn read_tracks(
         _ => None,
     });
     let mut lines = lines(noted, decoder);
-    lines.iter_mut().for_each(|line| line.parts.set_key_switches(key_switches));
+    for line in &mut lines {
+        line.parts.set_key_switches(key_switches);
+        line.parts.set_playing_keys(playing);
+    }
     match lines.len() {
         0 => return Err(MidiFileError::NoNotes),
         found if found > MOST => return Err(MidiFileError::Lines { found, most: MOST }),
@@ -100,11 +114,17 @@ pub fn read_tracks(
             }
         }
     }
-    if notes == 0 {
+    let unplayed = std::array::from_fn(|key| lines.iter().map(|line| line.parts.unplayed()[key]).sum());
+    if notes == 0 && unplayed == [0; 128] {
         return Err(MidiFileError::NoNotes);
     }
-    let samples = events.last().map_or(0, |last| last.at);
-    Ok((Score { events, samples }, lines.len()))
+    let samples = end(&clock, &events, rate);
+    for (player, line) in lines.iter_mut().enumerate() {
+        let to = To::Player(player as u8);
+        let ends = line.parts.let_go().iter().map(|said| PartEvent { to, event: said.event });
+        events.extend(ends.map(|event| Timed { at: samples, event }));
+    }
+    Ok(Tracks { score: Score { events, samples }, players: lines.len(), unplayed })
 }
 
 /// The lines of notes on these tracks and channels, in the order of the file.
@@ -142,10 +162,14 @@ mod tests {
     }
 
     fn lines_of(format: u8, tracks: &[&[u8]]) -> (Vec<PartEvent>, usize) {
-        let (score, lines) =
-            read_tracks(&MidiDecoder::new(), KeySwitches::Off, &file(format, [0, 96], tracks), 48_000)
-                .unwrap();
-        (score.events.iter().map(|timed| timed.event).collect(), lines)
+        let Tracks { score, players, .. } = read_tracks(
+            &MidiDecoder::new(),
+            (KeySwitches::Off, u128::MAX),
+            &file(format, [0, 96], tracks),
+            48_000,
+        )
+        .unwrap();
+        (score.events.iter().map(|timed| timed.event).collect(), players)
     }
 
     /// Who begins which note.
@@ -176,7 +200,8 @@ mod tests {
         assert_eq!(notes(&events), [(To::Player(0), 60), (To::Player(1), 64)]);
         assert_eq!(pans(&events), [(To::Player(1), true)]);
         let bytes = file(1, [0, 96], &[&tempo, &one, &two]);
-        let (score, _) = read_tracks(&MidiDecoder::new(), KeySwitches::Off, &bytes, 48_000).unwrap();
+        let Tracks { score, .. } =
+            read_tracks(&MidiDecoder::new(), (KeySwitches::Off, u128::MAX), &bytes, 48_000).unwrap();
         assert_eq!(score.samples, 48_000, "a beat of a second");
     }
 
@@ -203,8 +228,13 @@ mod tests {
     fn more_lines_than_players_are_refused() {
         let one = track(0, 60, &[]);
         let tracks = vec![&one[..]; MOST + 1];
-        let refused = read_tracks(&MidiDecoder::new(), KeySwitches::Off, &file(1, [0, 96], &tracks), 48_000)
-            .unwrap_err();
+        let refused = read_tracks(
+            &MidiDecoder::new(),
+            (KeySwitches::Off, u128::MAX),
+            &file(1, [0, 96], &tracks),
+            48_000,
+        )
+        .unwrap_err();
         assert_eq!(refused, MidiFileError::Lines { found: 17, most: 16 });
     }
 
@@ -213,9 +243,9 @@ mod tests {
     fn key_switches_in_a_track_of_their_own_are_no_line_and_choose_for_all() {
         let tracks: [&[u8]; 3] = [&track(0, 60, &[]), &track(0, 64, &[]), &track(0, 25, &[])];
         let bytes = file(1, [0, 96], &tracks);
-        let read = |row| read_tracks(&MidiDecoder::new(), row, &bytes, 48_000).unwrap();
-        let (score, count) = read(KeySwitches::C1);
-        assert_eq!(count, 2);
+        let read = |row| read_tracks(&MidiDecoder::new(), (row, u128::MAX), &bytes, 48_000).unwrap();
+        let Tracks { score, players, .. } = read(KeySwitches::C1);
+        assert_eq!(players, 2);
         let choices: Vec<_> = score
             .events
             .iter()
@@ -223,12 +253,12 @@ mod tests {
             .map(|timed| (timed.at, timed.event.to))
             .collect();
         assert_eq!(choices, [(0, To::Player(0)), (0, To::Player(1))]);
-        let (_, count) = read(KeySwitches::Off);
-        assert_eq!(count, 3, "off, they are notes");
+        assert_eq!(read(KeySwitches::Off).players, 3, "off, they are notes");
         // Nor does it matter in which track or on which channel they are.
         let with_notes: &[u8] = &[0, 0x90, 25, 64, 0, 0x90, 60, 64, 96, 0x80, 60, 0, 0, 0xFF, 0x2F, 0];
         let bytes = file(1, [0, 96], &[with_notes, &track(1, 64, &[])]);
-        let (score, _) = read_tracks(&MidiDecoder::new(), KeySwitches::C1, &bytes, 48_000).unwrap();
+        let Tracks { score, .. } =
+            read_tracks(&MidiDecoder::new(), (KeySwitches::C1, u128::MAX), &bytes, 48_000).unwrap();
         let chosen = score.events.iter().filter(|timed| matches!(timed.event.event, Event::Fingerings(_)));
         let chosen: Vec<_> = chosen.map(|timed| timed.event.to).collect();
         assert_eq!(chosen, [To::Player(0), To::Player(1)]);

@@ -133,6 +133,11 @@ impl Crossing {
         })
     }
 
+    /// The same, in the other direction from here.
+    pub fn turned(&self) -> Self {
+        Self { rises: !self.rises, ..*self }
+    }
+
     /// One tick on the way to a place; hears the pressure in the mouthpiece. `period_s` is that of a tick on the clock of the
     /// bore. Real-time safe.
     pub fn tick(&mut self, place: f64, pressure: f64, (tick_s, period_s): (f64, f64)) {
