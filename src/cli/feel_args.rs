@@ -8,14 +8,6 @@ use chalumeau_core::units::WrittenNote;
 use chalumeau_knob::wire::message::TorqueLaw;
 use clap::{Args, ValueEnum};
 
-/// Strength without --torque, mNm: a finger feels it and holds it.
-const USUAL_MNM: f64 = 55.0;
-
-/// Exaggeration of torques and of angles, and travel, where nothing else is said.
-const USUAL_CONTRAST: f64 = 3.0;
-const USUAL_PLACE: f64 = 1.0;
-const USUAL_TRAVEL_DEG: f64 = 360.0;
-
 /// Torque laws by name.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum LawArg {
@@ -75,6 +67,7 @@ impl FeelArgs {
         if let Some(reference) = self.reference {
             check_fingering(file, WrittenNote(reference))?;
         }
+        let usual = FeelDesign::default();
         Ok(FeelDesign {
             law: match self.law.unwrap_or(LawArg::Flow) {
                 LawArg::Flow => TorqueLaw::Flow,
@@ -89,19 +82,19 @@ impl FeelArgs {
                 OrderArg::CoveredHoles => NoteOrder::CoveredHoles,
                 OrderArg::CoveredHolesReversed => NoteOrder::CoveredHolesReversed,
             },
-            strength_mnm: self.torque.unwrap_or(USUAL_MNM),
-            travel_deg: self.travel.unwrap_or(USUAL_TRAVEL_DEG),
+            strength_mnm: self.torque.unwrap_or(usual.strength_mnm),
+            travel_deg: self.travel.unwrap_or(usual.travel_deg),
             detent_mnm: self.detent,
-            ..FeelDesign::default()
+            ..usual
         })
     }
 
     fn contrast(&self) -> f64 {
-        self.contrast.unwrap_or(USUAL_CONTRAST)
+        self.contrast.unwrap_or(FeelDesign::default().contrast)
     }
 
     fn place(&self) -> f64 {
-        self.place.unwrap_or(USUAL_PLACE)
+        self.place.unwrap_or(FeelDesign::default().place)
     }
 
     /// The first of its flags that is given.

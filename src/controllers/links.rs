@@ -6,10 +6,11 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use super::map::{ControllerMap, ParameterLink};
 use crate::parameters::{PARAMETERS, Parameter};
 use chalumeau_core::control::midi::links::{Link, MOST, Source};
+use chalumeau_core::control::midi::snapshot;
 use chalumeau_core::instrument::Settings;
 
-/// Channel pressure, as the number of a controller.
-const PRESSURE: u32 = 128;
+/// Channel pressure, as the number of a controller; projects hold it.
+const PRESSURE: u32 = snapshot::PRESSURE as u32;
 /// No value was heard.
 const UNHEARD: u32 = u32::MAX;
 

@@ -18,6 +18,7 @@
 
 pub mod alterations;
 pub mod alternate_fingerings;
+mod bessel;
 pub mod bundled;
 pub mod cells;
 pub mod check;

@@ -152,6 +152,11 @@ pub fn cents(to_hz: f64, from_hz: f64) -> f64 {
     1200.0 * maths::log2(to_hz / from_hz)
 }
 
+/// A number inside its range; one that is not finite becomes the default. Real-time safe.
+pub fn fix(x: f32, low: f32, high: f32, default: f32) -> f32 {
+    if x.is_finite() { x.clamp(low, high) } else { default }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -10,9 +10,9 @@
 
 use num_complex::Complex64;
 
+use crate::bore::bessel::bessel_ratio;
 use crate::bore::instrument_file::ToneHole;
 use crate::bore::radiation::{END_CORRECTION, RESISTANCE};
-use crate::bore::transfer_matrix::bessel_ratio;
 use crate::maths;
 use crate::units::Air;
 

@@ -16,13 +16,12 @@
 //! | b, a, h: radii of hole and bore, chimney height, m | `radius_m`, `bore_radius_m`, `chimney_m` |
 //! | Z/Zc of the nominal bore | `over_zc` |
 
-mod bessel;
 mod outflow;
 mod peaks;
 mod standing;
 mod survey;
 
-pub use bessel::bessel_ratio;
+use crate::bore::bessel::bessel_ratio;
 pub use peaks::{Peak, find_peaks};
 pub use survey::Resonance;
 

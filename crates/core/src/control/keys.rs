@@ -3,7 +3,7 @@
 use crate::units::SoundingNote;
 
 /// Keys that can be held at once; more push the oldest out.
-const MOST: usize = 16;
+pub const MOST: usize = 16;
 
 /// The held keys, oldest first.
 #[derive(Clone, Copy, Debug)]

@@ -7,7 +7,7 @@
 //! Source: CLAP 1.2, `events.h`: how note events name notes, and what a host wants to hear about their ends.
 
 /// Notes that can be held at once, as many as [`Keys`](super::keys::Keys); more push the oldest out.
-pub const MOST: usize = 16;
+pub const MOST: usize = crate::control::keys::MOST;
 
 /// One note.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

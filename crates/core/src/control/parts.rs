@@ -19,6 +19,7 @@
 use crate::control::key_switches::{KeySwitches, SwitchKeys};
 use crate::control::midi::breath::BreathFrom;
 use crate::control::midi::links::{Link, Links, MOST as MOST_LINKS, Source};
+use crate::control::midi::snapshot;
 use crate::control::midi::techniques::Wheel;
 use crate::control::midi::{BREATH_LIKE, BreathOrigin, MidiDecoder};
 use crate::control::notes::{HeldNote, MOST as MOST_NOTES, Note, NoteAddress, NoteExpression};
@@ -31,7 +32,7 @@ const EVENTS: usize = 64 * MOST;
 /// Sources that a channel has: its controllers, and its pressure.
 const SOURCES: usize = PRESSURE + 1;
 /// Place of the pressure, after those of the controllers.
-const PRESSURE: usize = 128;
+const PRESSURE: usize = snapshot::PRESSURE as usize;
 /// Distance of a note from a part that has played none: farther than any key.
 const NEVER: u8 = 128;
 

@@ -1,7 +1,7 @@
 //! How a note begins and ends beside breath and tongue, and what is heard of the player's breath and of the keys: plain numbers,
 //! all off at first.
 
-use crate::instrument::settings::fix;
+use crate::units::fix;
 
 /// Most that a breath in adds to the time until silence, s.
 const BREATH_IN_S: f64 = 1.0;

@@ -1,7 +1,7 @@
 //! How many players play, and how they sit and share the notes.
 
 use crate::control::parts::MOST;
-use crate::instrument::settings::fix;
+use crate::units::fix;
 
 /// Most players of one instrument.
 pub const MOST_PLAYERS: usize = MOST;

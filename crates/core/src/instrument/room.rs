@@ -22,7 +22,7 @@ mod shoebox;
 #[cfg(test)]
 mod tests;
 
-use crate::instrument::settings::fix;
+use crate::units::fix;
 pub use room_sound::RoomSound;
 
 /// The room in which the instrument is heard.

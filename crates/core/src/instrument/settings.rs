@@ -16,6 +16,7 @@ use crate::reed::ReedLaw;
 use crate::reed::law::coupled_k;
 use crate::reed::physical::{DimensionlessReed, P_REF_PA, PhysicalReed, ZETA_REFERENCE};
 use crate::reed::strength;
+use crate::units::fix;
 
 /// Softest and loudest breath are at least this far apart.
 const LEAST_BREATH_RANGE: f32 = 0.05;
@@ -131,11 +132,6 @@ pub struct Settings {
     /// [alternate fingering](crate::bore::context_fingerings) where fewer fingers then move. Not where slurs slide. Default
     /// false.
     pub alternates: bool,
-}
-
-/// A number inside its range; one that is not finite becomes the default. Real-time safe.
-pub(super) fn fix(x: f32, low: f32, high: f32, default: f32) -> f32 {
-    if x.is_finite() { x.clamp(low, high) } else { default }
 }
 
 impl Default for Settings {

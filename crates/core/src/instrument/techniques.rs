@@ -1,6 +1,6 @@
 //! What a player does beside blowing a note: growl, flutter tongue, subtone, the vocal tract. Plain numbers, all 0 at first.
 
-use crate::instrument::settings::fix;
+use crate::units::fix;
 
 /// What the pitch of a growling voice goes by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]

@@ -7,7 +7,7 @@
 use super::sway::{SWAY_TICKS, Sway};
 use crate::dsp::white::White;
 use crate::instrument::person::Person;
-use crate::instrument::settings::fix;
+use crate::units::fix;
 
 /// Swing of the pitch at depth 1, cents either way.
 pub const DEEPEST_CENTS: f64 = 25.0;

@@ -3,8 +3,6 @@
 use crate::maths;
 use num_complex::Complex64;
 
-use super::J;
-
 /// J1(z)/J0(z) for complex z of moderate size (both parts below about 1e4), what boundary layers in tubes are made of;
 /// relative error below 1e-13 away from its poles on the real axis.
 ///
@@ -48,7 +46,7 @@ fn ratio_by_fraction(z: Complex64) -> Complex64 {
 /// For Re z >= 0, Im z <= 0, |z| >= 25.
 fn ratio_by_expansion(z: Complex64) -> Complex64 {
     // Sums of (+-j)^k a_k(order) / z^k.
-    let step = J / (8.0 * z);
+    let step = Complex64::I / (8.0 * z);
     let sums = |order: f64| {
         let (mut plus, mut minus, mut term) = (Complex64::ONE, Complex64::ONE, Complex64::ONE);
         for k in 1..30 {
@@ -64,8 +62,8 @@ fn ratio_by_expansion(z: Complex64) -> Complex64 {
     };
     let ((plus_0, minus_0), (plus_1, minus_1)) = (sums(0.0), sums(1.0));
     // exp(-2j(z - pi/4)), at most 1 in this quadrant.
-    let other = J * maths::complex::exp(-2.0 * J * z);
-    J * (other * minus_1 - plus_1) / (plus_0 + other * minus_0)
+    let other = Complex64::I * maths::complex::exp(-2.0 * Complex64::I * z);
+    Complex64::I * (other * minus_1 - plus_1) / (plus_0 + other * minus_0)
 }
 
 #[cfg(test)]
