@@ -149,6 +149,9 @@ fn title(line: &str) -> Option<String> {
     Some(format!("{name} {}", version.split(' ').next()?))
 }
 
+/// The folder of copies of crates that others wrote, at the root of the workspace.
+const COPIES: &str = "vendor";
+
 /// A package of `cargo metadata`, and whether it is one of ours.
 fn package(value: &Value) -> Option<(Package, bool)> {
     let (name, version) = (value["name"].as_str()?, value["version"].as_str()?);
@@ -160,7 +163,8 @@ fn package(value: &Value) -> Option<(Package, bool)> {
         source: format!("https://crates.io/crates/{name}/{version}"),
         folder: Path::new(value["manifest_path"].as_str()?).parent()?.to_owned(),
     };
-    Some((package, value["source"].is_null()))
+    let ours = value["source"].is_null() && !package.folder.starts_with(machine::root().join(COPIES));
+    Some((package, ours))
 }
 
 fn output(args: &[&str]) -> Result<String> {
@@ -309,6 +313,19 @@ mod tests {
     fn cargo_trees_lines_give_name_and_version() {
         assert_eq!(title("nice-vst v1.2.3 (proc-macro) (*)").as_deref(), Some("nice-vst 1.2.3"));
         assert_eq!(title(""), None);
+    }
+
+    #[test]
+    fn a_copy_of_a_crate_is_not_ours() {
+        let at = |folder: &str| {
+            let manifest = machine::root().join(folder).join("Cargo.toml");
+            let value = serde_json::json!({
+                "name": "nice-plug", "version": "0.4.2", "authors": [], "source": null, "manifest_path": manifest
+            });
+            package(&value).unwrap().1
+        };
+        assert!(at("crates/core"));
+        assert!(!at("vendor/nice-plug"));
     }
 
     fn in_folder(licence: &str, files: &[(&str, &str)]) -> (tempfile::TempDir, Package) {
