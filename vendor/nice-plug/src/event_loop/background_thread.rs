@@ -94,16 +94,21 @@ impl<T: Send + 'static, E: MainThreadExecutor<T> + 'static> WorkerThread<T, E> {
 
 impl<T, E> Drop for WorkerThread<T, E> {
     fn drop(&mut self) {
-        // The thread is shut down and joined when the handle is dropped
-        self.tasks_sender
-            .send(Message::Shutdown)
-            .expect("Failed while sending worker thread shutdown request");
-        self.join_handle
-            .take()
-            // Only possible if the WorkerThread got dropped twice, somehow?
-            .expect("Missing Worker thread JoinHandle")
-            .join()
-            .expect("Worker thread panicked");
+        // Only possible if the WorkerThread got dropped twice, somehow?
+        let Some(join_handle) = self.join_handle.take() else {
+            return;
+        };
+
+        // A task keeps its executor alive while it runs, so that this may be the worker thread
+        // itself. It ends when the sender is dropped, and it cannot wait for itself.
+        if join_handle.thread().id() == thread::current().id() {
+            return;
+        }
+
+        // The thread is shut down and joined when the handle is dropped. A thread that has
+        // panicked is gone already, which was reported when it happened.
+        let _ = self.tasks_sender.send(Message::Shutdown);
+        let _ = join_handle.join();
     }
 }
 
@@ -148,11 +153,8 @@ where
             Ok(Message::Task((task, executor))) => match executor.upgrade() {
                 Some(e) => e.execute(task, true),
                 None => {
-                    nice_trace!(
-                        "Received a new task but the executor is no longer alive, shutting down \
-                         worker"
-                    );
-                    return;
+                    // Other instances may share this thread
+                    nice_trace!("Received a new task but the executor is no longer alive");
                 }
             },
             Ok(Message::Shutdown) => return,

@@ -521,6 +521,30 @@ impl<P: Vst3Plugin> WrapperInner<P> {
         }
     }
 
+    /// Put another window, or none, in the place of the editor's window, and return the one that
+    /// was there. It should be dropped after this, as nothing may borrow the cell meanwhile. Other
+    /// threads borrow it for moments only. Returns the new window if it stays borrowed.
+    #[cfg(feature = "editor")]
+    #[allow(clippy::type_complexity)]
+    pub fn replace_editor_window(
+        &self,
+        window: Option<fragile::Fragile<SpawnedEditor<<P::Editor as Editor>::Handle>>>,
+    ) -> Result<
+        Option<fragile::Fragile<SpawnedEditor<<P::Editor as Editor>::Handle>>>,
+        Option<fragile::Fragile<SpawnedEditor<<P::Editor as Editor>::Handle>>>,
+    > {
+        let now = std::time::Instant::now();
+        loop {
+            if let Ok(mut editor_window) = self.editor_window.try_borrow_mut() {
+                return Ok(std::mem::replace(&mut *editor_window, window));
+            } else if now.elapsed() > std::time::Duration::from_secs(1) {
+                return Err(window);
+            } else {
+                std::thread::yield_now();
+            }
+        }
+    }
+
     /// Get a parameter's ID based on a `ParamPtr`. Used in the `GuiContext` implementation for the
     /// gesture checks.
     #[allow(unused)]
@@ -702,18 +726,25 @@ impl<P: Vst3Plugin> MainThreadExecutor<Task<P>> for WrapperInner<P> {
             Task::StateChanged => {
                 use nice_plug_core::editor::EditorHandle;
 
-                if let Some(editor_window) = self.editor_window.borrow().as_ref() {
-                    editor_window.get().handle.state_changed();
+                if let Ok(editor_window) = self.editor_window.try_borrow()
+                    && let Some(editor_window) = editor_window.as_ref()
+                    && let Ok(editor_window) = editor_window.try_get()
+                {
+                    editor_window.handle.state_changed();
                 }
             }
             #[cfg(feature = "editor")]
             Task::ParameterValueChanged(param_hash, normalized_value) => {
                 use nice_plug_core::editor::EditorHandle;
 
-                if let Some(editor_window) = self.editor_window.borrow().as_ref() {
+                // On Linux this may not be the main thread, and the main thread may be opening or
+                // closing the window
+                if let Ok(editor_window) = self.editor_window.try_borrow()
+                    && let Some(editor_window) = editor_window.as_ref()
+                    && let Ok(editor_window) = editor_window.try_get()
+                {
                     let param_id = &self.param_id_by_hash[&param_hash];
                     editor_window
-                        .get()
                         .handle
                         .param_value_changed(param_id, normalized_value);
                 }
@@ -750,8 +781,10 @@ impl<P: Vst3Plugin> MainThreadExecutor<Task<P>> for WrapperInner<P> {
             Task::CallMainThread => {
                 use nice_plug_core::editor::EditorHandle;
 
-                if let Some(editor_window) = self.editor_window.borrow().as_ref() {
-                    let editor_window = editor_window.get();
+                if let Ok(editor_window) = self.editor_window.try_borrow()
+                    && let Some(editor_window) = editor_window.as_ref()
+                    && let Ok(editor_window) = editor_window.try_get()
+                {
                     editor_window
                         .handle
                         .host_main_thread_callback(&editor_window.window)

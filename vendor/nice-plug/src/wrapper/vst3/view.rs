@@ -465,8 +465,8 @@ impl<P: Vst3Plugin> IPlugViewTrait for WrapperView<P> {
             return kResultFalse;
         };
 
-        let mut window = inner.editor_window.borrow_mut();
-        if window.is_none() {
+        // Spawning the editor takes a while, in which other threads may look for the window
+        if inner.editor_window.borrow().is_none() {
             let parent_handle = if unsafe { fid_matches(type_, kPlatformTypeX11EmbedWindowID) } {
                 #[allow(clippy::unnecessary_cast)]
                 let w = parent as usize as c_ulong;
@@ -568,9 +568,14 @@ impl<P: Vst3Plugin> IPlugViewTrait for WrapperView<P> {
             ) {
                 Ok(editor_window) => match editor_window.handle.show(&editor_window.window) {
                     Ok(()) => {
-                        *window = Some(Fragile::new(editor_window));
-                        inner.is_editor_open.store(true, Ordering::SeqCst);
-                        kResultOk
+                        let editor_window = Some(Fragile::new(editor_window));
+                        if inner.replace_editor_window(editor_window).is_ok() {
+                            inner.is_editor_open.store(true, Ordering::SeqCst);
+                            kResultOk
+                        } else {
+                            crate::nice_error!("Failed to keep the editor");
+                            kResultFalse
+                        }
                     }
                     Err(e) => {
                         crate::nice_error!("Failed to show editor: {}", e);
@@ -595,12 +600,19 @@ impl<P: Vst3Plugin> IPlugViewTrait for WrapperView<P> {
             return kResultFalse;
         };
 
-        let mut editor_handle = inner.editor_window.borrow_mut();
-        if editor_handle.is_some() {
+        if inner.editor_window.borrow().is_some() {
             inner.is_editor_open.store(false, Ordering::SeqCst);
-            *editor_handle = None;
-
-            kResultOk
+            // Dropping the window takes a while, in which other threads may look for it
+            match inner.replace_editor_window(None) {
+                Ok(editor_window) => {
+                    drop(editor_window);
+                    kResultOk
+                }
+                Err(_) => {
+                    crate::nice_error!("Failed to close the editor");
+                    kResultFalse
+                }
+            }
         } else {
             #[cfg(debug_assertions)]
             crate::nice_warn!("Host tried to remove the editor without an active editor");
