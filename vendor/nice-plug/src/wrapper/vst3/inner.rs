@@ -471,6 +471,14 @@ impl<P: Vst3Plugin> WrapperInner<P> {
         }
     }
 
+    /// Keep the input events for the start of the next block when there has been no block to hand
+    /// them out in: a host may flush note events just like parameter changes.
+    pub fn keep_input_note_events(&self) {
+        for event in self.input_note_events.borrow_mut().iter_mut() {
+            event.subtract_timing(event.timing());
+        }
+    }
+
     /// Posts the task to the background task queue using [`EventLoop::schedule_background()`] so it
     /// can be run in the background without blocking either the GUI or the audio thread.
     ///

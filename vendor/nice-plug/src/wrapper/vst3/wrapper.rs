@@ -1048,6 +1048,7 @@ impl<P: Vst3Plugin> IAudioProcessorTrait for Wrapper<P> {
             };
 
             process_wrapper(|| plugin.reset());
+            self.inner.input_note_events.borrow_mut().clear();
         }
 
         // We don't have any special handling for suspending and resuming plugins, yet
@@ -1360,8 +1361,8 @@ impl<P: Vst3Plugin> IAudioProcessorTrait for Wrapper<P> {
                 // before note events at the same index.
                 // The extra scope is here to make sure we release the borrow on input_events
                 {
+                    // What is in here already has not reached the plugin yet, see below
                     let mut input_note_events = self.inner.input_note_events.borrow_mut();
-                    input_note_events.clear();
 
                     block_end = total_buffer_len;
                     for event_idx in event_start_idx..process_events.len() {
@@ -1393,6 +1394,14 @@ impl<P: Vst3Plugin> IAudioProcessorTrait for Wrapper<P> {
                                 event.subtract_timing(block_start as u32);
 
                                 permit_alloc(|| {
+                                    // A host may flush events for as long as it bypasses the plugin.
+                                    // The oldest ones make room.
+                                    if is_param_flush
+                                        && input_note_events.len() == input_note_events.capacity()
+                                    {
+                                        input_note_events.pop_front();
+                                    }
+
                                     // In the rare case the host sends a very large amount of events at once, there
                                     // is not much we can do except to just accept the allocation.
                                     if input_note_events.len() == input_note_events.capacity() {
@@ -1409,6 +1418,7 @@ impl<P: Vst3Plugin> IAudioProcessorTrait for Wrapper<P> {
                 }
 
                 let result = if is_param_flush {
+                    self.inner.keep_input_note_events();
                     kResultOk
                 } else {
                     // After processing the events we now know where/if the block should be split,
@@ -1602,11 +1612,15 @@ impl<P: Vst3Plugin> IAudioProcessorTrait for Wrapper<P> {
                             let result =
                                 plugin.process(buffers.main_buffer, &mut aux, &mut context);
                             self.inner.last_process_status.store(result);
+                            drop(context);
+                            self.inner.input_note_events.borrow_mut().clear();
                             result
                         } else {
+                            self.inner.keep_input_note_events();
                             ProcessStatus::Error("Failed to acquire plugin lock")
                         }
                     } else {
+                        self.inner.keep_input_note_events();
                         ProcessStatus::Normal
                     };
 
