@@ -105,7 +105,7 @@ use crate::wrapper::clap::context::WrapperGuiContext;
 use crate::wrapper::clap::util::{read_stream, write_stream};
 use crate::wrapper::state::{self};
 use crate::wrapper::util::buffer_management::{BufferManager, ChannelPointers};
-use crate::wrapper::util::{clamp_input_event_timing, hash_param_id, process_wrapper, strlcpy};
+use crate::wrapper::util::{hash_param_id, process_wrapper, strlcpy};
 
 /// How many output parameter changes we can store in our output parameter change queue. Storing
 /// more than this many parameters at a time will cause changes to get lost.
@@ -978,8 +978,6 @@ impl<P: ClapPlugin> Wrapper<P> {
     pub unsafe fn handle_in_events(
         &self,
         in_: &clap_input_events,
-        current_sample_idx: usize,
-        total_buffer_len: usize,
     ) {
         let mut input_events = self.input_events.borrow_mut();
         input_events.clear();
@@ -988,13 +986,7 @@ impl<P: ClapPlugin> Wrapper<P> {
             let num_events = clap_call! { in_=>size(in_) };
             for event_idx in 0..num_events {
                 let event = clap_call! { in_=>get(in_, event_idx) };
-                self.handle_input_event(
-                    event,
-                    &mut input_events,
-                    None,
-                    current_sample_idx,
-                    total_buffer_len,
-                );
+                self.handle_input_event(event, &mut input_events, None, 0);
             }
         }
     }
@@ -1033,6 +1025,13 @@ impl<P: ClapPlugin> Wrapper<P> {
             return None;
         }
 
+        // Hosts should sort events by time and send none for samples that the buffer doesn't have.
+        // An event that comes too late in the list happens with the one before it, and an event
+        // after the end of the buffer at its last sample. Anything else would end in buffers that
+        // reach behind the host's.
+        let last_sample_idx = (total_buffer_len as u32).saturating_sub(1);
+        let mut time = current_sample_idx as u32;
+
         for event_idx in (resume_from_event_idx as u32)..num_events {
             unsafe {
                 let event: *const clap_event_header = clap_call! { in_=>get(in_, event_idx) };
@@ -1040,18 +1039,19 @@ impl<P: ClapPlugin> Wrapper<P> {
                     continue;
                 }
 
+                time = time.max((*event).time.min(last_sample_idx));
+
                 // Check the current event before applying it, including the first event in the
                 // buffer. A later event belongs to the next process slice.
-                if (*event).time > current_sample_idx as u32 && stop_predicate(event) {
-                    return Some(((*event).time as usize, event_idx as usize));
+                if time > current_sample_idx as u32 && stop_predicate(event) {
+                    return Some((time as usize, event_idx as usize));
                 }
 
                 self.handle_input_event(
                     event,
                     &mut input_events,
                     Some(transport_info),
-                    current_sample_idx,
-                    total_buffer_len,
+                    time - current_sample_idx as u32,
                 );
             }
         }
@@ -1144,8 +1144,9 @@ impl<P: ClapPlugin> Wrapper<P> {
         }
     }
 
-    /// Handle an incoming CLAP event. The sample index is provided to support block splitting for
-    /// sample accurate automation. `input_events` must be cleared at the start of each process block.
+    /// Handle an incoming CLAP event. `timing` is its sample index within the current slice of the
+    /// buffer, see [`handle_in_events_until()`][Self::handle_in_events_until()]. `input_events` must
+    /// be cleared at the start of each process block.
     ///
     /// To save on mutex operations when handing MIDI events, the lock guard for the input events
     /// need to be passed into this function.
@@ -1162,16 +1163,9 @@ impl<P: ClapPlugin> Wrapper<P> {
         event: *const clap_event_header,
         input_events: &mut AtomicRefMut<VecDeque<PluginNoteEvent<P>>>,
         transport_info: Option<&mut *const clap_event_transport>,
-        current_sample_idx: usize,
-        total_buffer_len: usize,
+        timing: u32,
     ) {
         let raw_event = unsafe { &*event };
-
-        // Out of bounds events are clamped to the buffer's size
-        let timing = clamp_input_event_timing(
-            raw_event.time - current_sample_idx as u32,
-            total_buffer_len as u32,
-        );
 
         let push_event = |input_events: &mut AtomicRefMut<VecDeque<PluginNoteEvent<P>>>,
                           event: PluginNoteEvent<P>| {
@@ -3313,7 +3307,7 @@ impl<P: ClapPlugin> Wrapper<P> {
 
         if !in_.is_null() {
             unsafe {
-                wrapper.handle_in_events(&*in_, 0, 0);
+                wrapper.handle_in_events(&*in_);
             }
         }
 
