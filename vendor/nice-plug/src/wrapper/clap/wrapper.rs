@@ -1772,8 +1772,6 @@ impl<P: ClapPlugin> Wrapper<P> {
                             // Also store this for later, so we can reinitialize the plugin after restoring state
                             wrapper.current_buffer_config.store(Some(buffer_config));
 
-                            wrapper.is_activated.store(true, Ordering::SeqCst);
-
                             result = true;
 
                             break;
@@ -1798,7 +1796,14 @@ impl<P: ClapPlugin> Wrapper<P> {
         }
 
         // NOTE: This needs to be dropped after the `plugin` lock to avoid deadlocks
+        //
+        // Dropping it tells the host the new latency, which CLAP allows within `activate()`. Once
+        // the plugin counts as activated that needs a restart.
         drop(activate_context);
+
+        if result {
+            wrapper.is_activated.store(true, Ordering::SeqCst);
+        }
 
         result
     }
