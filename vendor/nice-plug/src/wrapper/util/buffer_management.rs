@@ -200,10 +200,15 @@ impl BufferManager {
                             let output_channel_pointer =
                                 output_channel_pointers.ptrs.as_ptr().add(channel_idx);
 
-                            *output_slice = std::slice::from_raw_parts_mut(
-                                (*output_channel_pointer).add(sample_offset),
-                                num_samples,
-                            );
+                            // Busses that the host has deactivated may have null pointers
+                            *output_slice = if (*output_channel_pointer).is_null() {
+                                &mut []
+                            } else {
+                                std::slice::from_raw_parts_mut(
+                                    (*output_channel_pointer).add(sample_offset),
+                                    num_samples,
+                                )
+                            };
                         }
 
                         // If the caller/host should have provided buffer pointers but didn't then we
@@ -241,7 +246,9 @@ impl BufferManager {
 
                         // If the host processes the main IO out of place then the inputs need to be
                         // copied to the output buffers. Otherwise the input should already be there.
-                        if input_channel_pointer != output_channel_pointer {
+                        if input_channel_pointer.is_null() || output_slice.is_empty() {
+                            output_slice.fill(0.0);
+                        } else if input_channel_pointer != output_channel_pointer {
                             output_slice.copy_from_slice(std::slice::from_raw_parts_mut(
                                 input_channel_pointer.add(sample_offset),
                                 num_samples,
@@ -261,6 +268,17 @@ impl BufferManager {
                         }
                     });
                 }
+            }
+        }
+
+        // The same goes for all channels if there is no input
+        if self.main_input_channel_pointers.is_none() {
+            unsafe {
+                self.main_buffer.set_slices(num_samples, |output_slices| {
+                    for slice in output_slices.iter_mut() {
+                        slice.fill(0.0);
+                    }
+                });
             }
         }
 
