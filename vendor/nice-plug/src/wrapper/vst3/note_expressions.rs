@@ -107,10 +107,13 @@ impl NoteExpressionController {
         timing: u32,
         event: &NoteExpressionValueEvent,
     ) -> Option<NoteEvent<S>> {
-        // We're calling it a voice ID, VST3 (and CLAP) calls it a note ID
-        let (note_id, key, channel) = *self
-            .note_ids
+        // We're calling it a voice ID, VST3 (and CLAP) calls it a note ID. Hosts reuse them, so the
+        // latest note is searched first.
+        let (newer, older) = self.note_ids.split_at(self.note_ids_idx);
+        let (note_id, key, channel) = *newer
             .iter()
+            .rev()
+            .chain(older.iter().rev())
             .find(|(note_id, _, _)| *note_id == event.noteId)?;
 
         match event.typeId {

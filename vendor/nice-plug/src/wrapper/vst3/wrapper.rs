@@ -1747,7 +1747,13 @@ impl<P: Vst3Plugin> INoteExpressionControllerTrait for Wrapper<P> {
         // This should not be needed since they're predefined, but then again you'd think you also
         // wouldn't need to define predefined note expressions now do you?
         info.valueDesc = NoteExpressionValueDescription {
-            defaultValue: 0.5,
+            // The volume goes up to a gain of 4, see `NoteExpressionController`
+            defaultValue: if note_expression_info.type_id == note_expressions::VOLUME_EXPRESSION_ID
+            {
+                0.25
+            } else {
+                0.5
+            },
             minimum: 0.0,
             maximum: 1.0,
             stepCount: 0,
