@@ -33,6 +33,10 @@ pub trait Vst3Plugin: Plugin {
     /// truncated.
     const VST3_SUBCATEGORIES: &'static [Vst3SubCategory];
 
+    /// Tell the host which parameters the plugin itself has moved, by their string IDs and
+    /// normalized values. Called after each block that was processed for a host that listens.
+    fn take_output_parameters(&mut self, _tell: &mut dyn FnMut(&str, f32)) {}
+
     /// [`VST3_CLASS_ID`][Self::VST3_CLASS_ID`] in the correct order for the current platform so
     /// projects and presets can be shared between platforms. This should not be overridden.
     const PLATFORM_VST3_CLASS_ID: [u8; 16] = swap_vst3_uid_byte_order(Self::VST3_CLASS_ID);

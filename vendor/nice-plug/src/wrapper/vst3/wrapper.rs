@@ -47,7 +47,7 @@ use super::util::{VST3_MIDI_CHANNELS, VST3_MIDI_PARAMS_END};
 use crate::util::permit_alloc;
 use crate::wrapper::state;
 use crate::wrapper::util::buffer_management::{BufferManager, ChannelPointers};
-use crate::wrapper::util::{clamp_input_event_timing, process_wrapper};
+use crate::wrapper::util::{clamp_input_event_timing, hash_param_id, process_wrapper};
 use crate::wrapper::vst3::Vst3Plugin;
 
 #[allow(clippy::unnecessary_cast)]
@@ -1643,6 +1643,27 @@ impl<P: Vst3Plugin> IAudioProcessorTrait for Wrapper<P> {
                     block_start = block_end;
                 }
             };
+
+            // The host is told what the plugin itself has moved
+            if !is_param_flush
+                && let Some(output_changes) =
+                    unsafe { ComRef::from_raw(data.outputParameterChanges) }
+                && let Some(mut plugin) = self.inner.plugin.try_lock()
+            {
+                let last_sample_idx = total_buffer_len.saturating_sub(1) as i32;
+                plugin.take_output_parameters(&mut |param_id, normalized_value| {
+                    let param_hash = hash_param_id(param_id);
+                    let mut index = 0;
+                    let queue = unsafe {
+                        ComRef::from_raw(output_changes.addParameterData(&param_hash, &mut index))
+                    };
+                    if let Some(queue) = queue {
+                        unsafe {
+                            queue.addPoint(last_sample_idx, normalized_value as f64, &mut index)
+                        };
+                    }
+                });
+            }
 
             // After processing audio, we'll check if the editor has sent us updated plugin state.
             // We'll restore that here on the audio thread to prevent changing the values during the
