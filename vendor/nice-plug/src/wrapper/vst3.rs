@@ -20,6 +20,27 @@ pub use wrapper::Wrapper;
 
 use crate::wrapper::vst3::subcategories::Vst3SubCategory;
 
+/// What a plugin may ask of its VST3 host.
+#[derive(Clone)]
+pub struct HostRequests {
+    mark_dirty: std::sync::Arc<dyn Fn() + Send + Sync>,
+}
+
+impl HostRequests {
+    pub(crate) fn new(mark_dirty: impl Fn() + Send + Sync + 'static) -> Self {
+        Self {
+            mark_dirty: std::sync::Arc::new(mark_dirty),
+        }
+    }
+
+    /// Tell the host that the plugin's state has changed beside its parameters, so that a saved
+    /// project is no longer up to date. May be called from any thread, and is realtime-safe. The
+    /// host is told on its main thread.
+    pub fn mark_dirty(&self) {
+        (self.mark_dirty)()
+    }
+}
+
 /// Provides auxiliary metadata needed for a VST3 plugin.
 pub trait Vst3Plugin: Plugin {
     /// The unique class ID that identifies this particular plugin. You can use the
@@ -32,6 +53,9 @@ pub trait Vst3Plugin: Plugin {
     /// (`|`). This string has a limit of 127 characters, and anything longer than that will be
     /// truncated.
     const VST3_SUBCATEGORIES: &'static [Vst3SubCategory];
+
+    /// Called once, when the instance has been created.
+    fn connect(&mut self, _host: HostRequests) {}
 
     /// Tell the host which parameters the plugin itself has moved, by their string IDs and
     /// normalized values. Called after each block that was processed for a host that listens.

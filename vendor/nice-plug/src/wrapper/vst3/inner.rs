@@ -24,7 +24,10 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use try_lock::TryLock;
 #[cfg(feature = "editor")]
 use vst3::ComWrapper;
-use vst3::Steinberg::Vst::{IComponentHandler, IComponentHandlerTrait, IEventList, RestartFlags_};
+use vst3::Steinberg::Vst::{
+    IComponentHandler, IComponentHandler2, IComponentHandler2Trait, IComponentHandlerTrait,
+    IEventList, RestartFlags_,
+};
 use vst3::Steinberg::{kInvalidArgument, kResultOk, tresult};
 use vst3::{ComPtr, ComRef};
 
@@ -37,7 +40,7 @@ use crate::util::permit_alloc;
 use crate::wrapper::state;
 use crate::wrapper::util::buffer_management::BufferManager;
 use crate::wrapper::util::hash_param_id;
-use crate::wrapper::vst3::Vst3Plugin;
+use crate::wrapper::vst3::{HostRequests, Vst3Plugin};
 #[cfg(feature = "editor")]
 use crate::wrapper::vst3::context::WrapperGuiContext;
 #[cfg(feature = "editor")]
@@ -70,6 +73,9 @@ pub(crate) struct WrapperInner<P: Vst3Plugin> {
     /// The host's [`IComponentHandler`] instance, if passed through
     /// [`IEditController::set_component_handler`].
     pub component_handler: AtomicRefCell<Option<ComPtr<IComponentHandler>>>,
+
+    /// Whether the host must be told that the plugin's state has changed beside its parameters.
+    pub is_dirty: AtomicBool,
 
     /// Our own [`IPlugView`] instance.
     #[cfg(feature = "editor")]
@@ -186,6 +192,8 @@ pub enum Task<P: Plugin> {
     /// since the task will be created from the audio thread.
     #[cfg(feature = "editor")]
     ParameterValueChanged(u32, f32),
+    /// Tell the host that the plugin's state has changed beside its parameters.
+    MarkDirty,
     /// Trigger a restart with the given restart flags. This is a bit set of the flags from
     /// [`vst3::Steinberg::Vst::RestartFlags`].
     TriggerRestart(i32),
@@ -339,6 +347,7 @@ impl<P: Vst3Plugin> WrapperInner<P> {
             editor_window: Arc::new(AtomicRefCell::new(None)),
 
             component_handler: AtomicRefCell::new(None),
+            is_dirty: AtomicBool::new(false),
 
             #[cfg(feature = "editor")]
             plug_view: RwLock::new(None),
@@ -387,6 +396,19 @@ impl<P: Vst3Plugin> WrapperInner<P> {
         //        is separate from the internal COM-style reference count.
         *wrapper.event_loop.borrow_mut() =
             Some(OsEventLoop::new_and_spawn(Arc::downgrade(&wrapper)));
+
+        wrapper
+            .plugin
+            .try_lock()
+            .unwrap()
+            .connect(HostRequests::new({
+                let wrapper = Arc::downgrade(&wrapper);
+                move || {
+                    if let Some(wrapper) = wrapper.upgrade() {
+                        wrapper.mark_dirty();
+                    }
+                }
+            }));
 
         // The editor also needs to be initialized later so the Async executor can work.
 
@@ -671,6 +693,34 @@ impl<P: Vst3Plugin> WrapperInner<P> {
         crate::nice_debug_assert!(task_posted, "The task queue is full, dropping task...");
     }
 
+    /// See [`HostRequests::mark_dirty()`].
+    fn mark_dirty(&self) {
+        self.is_dirty.store(true, Ordering::SeqCst);
+        let task_posted = self.schedule_gui(Task::MarkDirty);
+        crate::nice_debug_assert!(task_posted, "The task queue is full, dropping task...");
+    }
+
+    /// Tell the host that the plugin's state has changed, if it has and if this is the main thread.
+    /// Without an `IRunLoop` tasks do not run there on Linux, and the next call of the host on its
+    /// main thread does this instead.
+    pub fn tell_dirty(&self) {
+        let is_main_thread = match &*self.event_loop.borrow() {
+            Some(event_loop) => event_loop.is_main_thread(),
+            None => false,
+        };
+        if !is_main_thread || !self.is_dirty.swap(false, Ordering::SeqCst) {
+            return;
+        }
+
+        let component_handler = self.component_handler.borrow();
+        let handler = component_handler
+            .as_ref()
+            .and_then(|handler| handler.cast::<IComponentHandler2>());
+        if let Some(handler) = handler {
+            unsafe { handler.setDirty(1) };
+        }
+    }
+
     pub fn set_latency_samples(&self, samples: u32) {
         // Only trigger a restart if it's actually needed
         let old_latency = self.current_latency.swap(samples, Ordering::SeqCst);
@@ -757,6 +807,7 @@ impl<P: Vst3Plugin> MainThreadExecutor<Task<P>> for WrapperInner<P> {
                         .param_value_changed(param_id, normalized_value);
                 }
             }
+            Task::MarkDirty => self.tell_dirty(),
             Task::TriggerRestart(flags) => match &*self.component_handler.borrow() {
                 Some(handler) => unsafe {
                     crate::nice_debug_assert!(is_gui_thread);

@@ -600,6 +600,8 @@ impl<P: Vst3Plugin> IPlugViewTrait for WrapperView<P> {
             return kResultFalse;
         };
 
+        inner.tell_dirty();
+
         if inner.editor_window.borrow().is_some() {
             inner.is_editor_open.store(false, Ordering::SeqCst);
             // Dropping the window takes a while, in which other threads may look for it

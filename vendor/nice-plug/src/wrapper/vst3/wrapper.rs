@@ -403,6 +403,8 @@ impl<P: Vst3Plugin> IComponentTrait for Wrapper<P> {
     }
 
     unsafe fn setActive(&self, state: TBool) -> tresult {
+        self.inner.tell_dirty();
+
         // We could call activate in `IAudioProcessor::setup_processing()`, but REAPER will set
         // the bus arrangements between that function and this function. So to be able to handle
         // custom channel layout overrides we need to activate here.
@@ -561,6 +563,9 @@ impl<P: Vst3Plugin> IComponentTrait for Wrapper<P> {
         check_null_ptr!(state);
 
         let state = unsafe { ComRef::from_raw(state).unwrap() };
+
+        // What has changed until here is being saved
+        self.inner.is_dirty.store(false, Ordering::SeqCst);
 
         let serialized = unsafe {
             state::serialize_json::<P>(
