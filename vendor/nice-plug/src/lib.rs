@@ -82,6 +82,9 @@
 //! There's a whole lot more to discuss, but once you understand the above you should be able to
 //! figure out the rest by reading through the examples and the API documentation. Good luck!
 
+// Cargo reports no warnings of crates from a registry, and a newer compiler may find more.
+#![allow(warnings)]
+
 pub use nice_plug_core::*;
 
 /// Everything you'll need to use nice-plug. Import this with `use nice_plug::prelude::*;`.
