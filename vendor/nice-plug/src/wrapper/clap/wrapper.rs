@@ -1978,6 +1978,15 @@ impl<P: ClapPlugin> Wrapper<P> {
                                                     .poly_mod_ids_by_hash
                                                     .contains_key(&next_event.param_id))
                                         }
+                                        // A program change may move every parameter
+                                        (CLAP_CORE_EVENT_SPACE_ID, CLAP_EVENT_MIDI)
+                                            if P::MIDI_INPUT >= MidiConfig::MidiCCs =>
+                                        {
+                                            let next_event =
+                                                &*(next_event as *const clap_event_midi);
+
+                                            next_event.data[0] & 0xF0 == 0xC0
+                                        }
                                         _ => false,
                                     }
                                 } else {
