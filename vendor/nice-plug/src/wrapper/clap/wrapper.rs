@@ -1,3 +1,4 @@
+use atomic_float::AtomicF32;
 use atomic_refcell::{AtomicRefCell, AtomicRefMut};
 use clap_sys::events::{
     CLAP_CORE_EVENT_SPACE_ID, CLAP_EVENT_IS_LIVE, CLAP_EVENT_MIDI, CLAP_EVENT_MIDI_SYSEX,
@@ -241,6 +242,8 @@ pub struct Wrapper<P: ClapPlugin> {
     /// the parameter's poly modulation ID. These IDs are then passed to the plugin, so it can
     /// quickly refer to parameter by matching on constant IDs.
     poly_mod_ids_by_hash: HashMap<u32, u32>,
+    /// The current monophonic modulation of each parameter, normalized.
+    modulation_offsets_by_hash: HashMap<u32, AtomicF32>,
     /// A queue of parameter changes and gestures that should be output in either the next process
     /// call or in the next parameter flush.
     ///
@@ -541,6 +544,10 @@ impl<P: ClapPlugin> Wrapper<P> {
             .iter()
             .map(|(_, hash, ptr, _)| (*ptr, *hash))
             .collect();
+        let modulation_offsets_by_hash: HashMap<u32, AtomicF32> = param_id_hashes_ptrs_groups
+            .iter()
+            .map(|(_, hash, _, _)| (*hash, AtomicF32::new(0.0)))
+            .collect();
         let poly_mod_ids_by_hash: HashMap<u32, u32> = param_id_hashes_ptrs_groups
             .iter()
             .filter_map(|(_, hash, ptr, _)| unsafe {
@@ -707,6 +714,7 @@ impl<P: ClapPlugin> Wrapper<P> {
             param_id_to_hash,
             param_ptr_to_hash,
             poly_mod_ids_by_hash,
+            modulation_offsets_by_hash,
             output_parameter_events: ArrayQueue::new(OUTPUT_EVENT_QUEUE_CAPACITY),
 
             host_thread_check: AtomicRefCell::new(None),
@@ -914,7 +922,22 @@ impl<P: ClapPlugin> Wrapper<P> {
                         let normalized_value = clap_plain_value as f32
                             / unsafe { param_ptr.step_count() }.unwrap_or(1) as f32;
 
-                        if unsafe { param_ptr._internal_set_normalized_value(normalized_value) } {
+                        let mut has_changed =
+                            unsafe { param_ptr._internal_set_normalized_value(normalized_value) };
+                        // While modulation holds the parameter at an end of its range, a new base
+                        // value changes nothing that can be heard. It is forgotten for that.
+                        let modulation_offset =
+                            self.modulation_offsets_by_hash[&hash].load(Ordering::Relaxed);
+                        if !has_changed && modulation_offset != 0.0 {
+                            unsafe {
+                                param_ptr._internal_modulate_value(0.0);
+                                has_changed =
+                                    param_ptr._internal_set_normalized_value(normalized_value);
+                                param_ptr._internal_modulate_value(modulation_offset);
+                            }
+                        }
+
+                        if has_changed {
                             if let Some(sample_rate) = sample_rate {
                                 unsafe { param_ptr._internal_update_smoother(sample_rate, false) };
                             }
@@ -944,6 +967,8 @@ impl<P: ClapPlugin> Wrapper<P> {
                         let normalized_delta = clap_plain_delta as f32
                             / unsafe { param_ptr.step_count() }.unwrap_or(1) as f32;
 
+                        self.modulation_offsets_by_hash[&hash]
+                            .store(normalized_delta, Ordering::Relaxed);
                         if unsafe { param_ptr._internal_modulate_value(normalized_delta) } {
                             if let Some(sample_rate) = sample_rate {
                                 unsafe { param_ptr._internal_update_smoother(sample_rate, false) };
@@ -1641,6 +1666,12 @@ impl<P: ClapPlugin> Wrapper<P> {
         //        could lead to inconsistencies. `state::deserialize_object()` normally never
         //        allocates, but if the plugin has persistent non-parameter data then its
         //        `deserialize_fields()` implementation may still allocate.
+        //
+        // The base values are set without the modulation, for the same reason as in
+        // `update_plain_value_by_hash()`.
+        for param_ptr in self.param_by_hash.values() {
+            unsafe { param_ptr._internal_modulate_value(0.0) };
+        }
         let success = permit_alloc(|| unsafe {
             state::deserialize_object::<P>(
                 state,
@@ -1649,6 +1680,10 @@ impl<P: ClapPlugin> Wrapper<P> {
                 self.current_buffer_config.load().as_ref(),
             )
         });
+        for (hash, param_ptr) in &self.param_by_hash {
+            let modulation_offset = self.modulation_offsets_by_hash[hash].load(Ordering::Relaxed);
+            unsafe { param_ptr._internal_modulate_value(modulation_offset) };
+        }
         if !success {
             crate::nice_debug_assert_failure!(
                 "Deserializing plugin state from a state object failed"
