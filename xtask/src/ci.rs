@@ -99,7 +99,7 @@ static STEPS: &[Step] = &[
     #[cfg(target_os = "linux")]
     alone("VST3's window in Ardour", ardour::test),
     // After all that builds: these load the bundle.
-    beside("VST3 in vst3-host", || machine::run(&mut host_tests(&["vst3"]))),
+    beside("VST3 in vst3-host", || machine::run(&mut host_tests(&["vst3", "vst3_rules", "vst3_raw"]))),
     beside("validators", validate::installed),
     beside("VST3 in DawDreamer", dawdreamer),
     beside("VST3 in pedalboard", pedalboard),

@@ -19,7 +19,7 @@ const PICTURES: [(&str, &str); 2] = [("window", "every_view"), ("standalone", "i
 pub fn test() -> Result<()> {
     let programs = programs()?;
     let display = Display::start()?;
-    for file in ["window", "journeys"] {
+    for file in ["window", "journeys", "vst3_raw"] {
         machine::run(&mut tests(programs, &display, file, ""))?;
     }
     machine::run(&mut tests(programs, &display, "standalone", "its_window"))

@@ -11,7 +11,7 @@ use chalumeau_core::control::key_switches::{KeySwitches, ROW};
 use chalumeau_core::event::{Event, Fingerings, Timed};
 use chalumeau_core::instrument::{Clarinet, Reach, Settings};
 use chalumeau_core::units::SoundingNote;
-use chalumeau_test_host::clap::{At, NoteExpressionType, Plugin, Say, Stereo};
+use chalumeau_test_host::clap::{At, NoteExpressionType, ParamInfoFlags, Plugin, Say, Stereo};
 use rules::plugin;
 
 const RATE: f64 = 48_000.0;
@@ -463,6 +463,74 @@ fn latency_is_the_instruments() {
             Clarinet::built_in(rate).unwrap().latency_samples(),
             "{rate} Hz"
         );
+    }
+}
+
+#[test]
+fn a_new_latency_is_told_within_the_activation_and_asks_for_no_restart() {
+    let mut plugin = plugin();
+    let quality = plugin.param("Offline quality").unwrap().id;
+    plugin.set(quality, 1.0).unwrap();
+    let mut latency = plugin.latency().unwrap();
+    for (rate, offline) in [(48_000.0, false), (48_000.0, true), (44_100.0, true), (192_000.0, false)] {
+        plugin.set_offline(offline).unwrap();
+        plugin.heard();
+        plugin.session(rate, 512, |session| session.play(&[At(0, on(60))], 2_048).unwrap()).unwrap();
+        plugin.attend();
+        let (heard, before) = (plugin.heard(), latency);
+        latency = plugin.latency().unwrap();
+        assert_eq!(heard.restarts, 0, "{rate} Hz, offline: {offline}");
+        assert_eq!(heard.latencies, u32::from(latency != before), "{rate} Hz, offline: {offline}");
+    }
+}
+
+#[test]
+fn a_program_change_begins_at_its_sample_in_a_bounce_of_any_block_size() {
+    const LENGTH: usize = 12_000;
+    let program = |at, number| At(at, Say::Midi([0xC0, number, 0]));
+    let bank = |at| At(at, Say::Midi([0xB0, 0, 0]));
+    let bounce = |said: &[At], block| {
+        let mut plugin = plugin();
+        plugin.set_offline(true).unwrap();
+        plugin.play(RATE, block, said, LENGTH).unwrap()
+    };
+    let said = [bank(0), program(0, 12), At(0, on(60)), bank(5_000), program(5_000, 29), program(9_001, 3)];
+    let whole = bounce(&said, LENGTH);
+    for block in [64, 333, 4_096] {
+        assert!(bounce(&said, block) == whole, "blocks of {block}");
+    }
+    let unchanged = bounce(&[said[2]], LENGTH);
+    let first = |other: &[f32]| whole[0].iter().zip(other).position(|(a, b)| a != b);
+    assert!(first(&unchanged[0]).unwrap() < 2_000, "from the beginning on");
+    let later = bounce(&said[..3], LENGTH);
+    assert!((5_000..6_000).contains(&first(&later[0]).unwrap()), "from its sample on");
+}
+
+#[test]
+fn a_new_value_under_modulation_that_holds_the_parameter_counts_when_that_ends() {
+    let mut plugin = plugin();
+    let modulated = ParamInfoFlags::IS_MODULATABLE;
+    let params = plugin.params().unwrap().into_iter();
+    let params: Vec<_> = params.filter(|param| param.flags.contains(modulated)).collect();
+    assert!(!params.is_empty());
+    for param in params {
+        let (id, range) = (param.id, param.max - param.min);
+        let [low, high] = [0.25, 0.75].map(|share| param.min + share * range);
+        let [low, high] = if param.flags.contains(ParamInfoFlags::IS_STEPPED) {
+            [param.min, param.max]
+        } else {
+            [low, high]
+        };
+        let mut session = plugin.activate(RATE, 512).unwrap();
+        session.play(&[At(0, Say::Set(id, low)), At(1, Say::Modulate(id, range))], 512).unwrap();
+        session.play(&[At(0, Say::Set(id, high))], 512).unwrap();
+        let held = plugin.value(id).unwrap();
+        session.play(&[At(0, Say::Modulate(id, 0.0))], 512).unwrap();
+        let after = plugin.value(id).unwrap();
+        plugin.deactivate(session);
+        for value in [held, after] {
+            assert!((value - high).abs() < 1e-4 * range, "{}: {value} for {high}", param.name);
+        }
     }
 }
 

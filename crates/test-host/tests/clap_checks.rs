@@ -1,8 +1,8 @@
 //! The checks of clap-validator 0.4.1 that `clap_rules.rs` leaves open, each under its name, with underscores.
 //!
-//! Five checks of its list have nothing to check here: the plugin has no 64-bit ports (process-audio-double-out-of-place,
-//! -in-place), no audio input that could be denormal (process-audio-denormals), and its one port is fixed
-//! (layout-audio-ports-activation, layout-configurable-audio-ports). If it grows one of these, `what_is_skipped` fails.
+//! Four checks of its list have nothing to check here: the plugin has no 64-bit ports (process-audio-double-out-of-place,
+//! -in-place), and its ports are fixed (layout-audio-ports-activation, layout-configurable-audio-ports). If it grows one of these,
+//! `what_is_skipped` fails.
 
 #[path = "support/presets.rs"]
 mod presets;
@@ -12,9 +12,11 @@ use std::time::{Duration, Instant};
 
 use chalumeau_test_host::artefacts;
 use clack_extensions::audio_ports::{AudioPortFlags, AudioPortInfoBuffer, PluginAudioPorts};
+use clack_extensions::params::{ParamInfoBuffer, PluginParams};
 use clack_host::events::event_types::*;
-use clack_host::events::{EventFlags, EventHeader};
+use clack_host::events::{EventFlags, EventHeader, Pckn};
 use clack_host::prelude::*;
+use clack_host::utils::ClapId;
 use fastrand::Rng;
 
 /// Samples of a block.
@@ -53,12 +55,23 @@ fn instance(entry: &PluginEntry) -> PluginInstance<Host> {
     PluginInstance::new(|_| Shared, |_| Main, entry, &id, &info).unwrap()
 }
 
-/// Plays `blocks` blocks at a rate: a key is pressed in the second block and released before the last one. `transport` is
-/// the transport of a block, and may say more of it. Asserts that every sample is a number, none is subnormal, and that
-/// something sounds.
+/// Plays `blocks` blocks at a rate, with nothing at the side-chain: see [`play_with`].
 #[track_caller]
-fn play(rate_hz: f64, blocks: usize, mut transport: impl FnMut(&mut EventBuffer) -> Option<TransportEvent>) {
-    let mut instance = instance(&library());
+fn play(rate_hz: f64, blocks: usize, transport: impl FnMut(&mut EventBuffer) -> Option<TransportEvent>) {
+    play_with(&mut instance(&library()), rate_hz, blocks, None, transport);
+}
+
+/// Plays `blocks` blocks at a rate: a key is pressed in the second block and released before the last one. `heard` gives the samples
+/// of the side-chain. `transport` is the transport of a block, and may say more of it. Asserts that every sample is a number, none
+/// is subnormal, and that something sounds.
+#[track_caller]
+fn play_with(
+    instance: &mut PluginInstance<Host>,
+    rate_hz: f64,
+    blocks: usize,
+    mut heard: Option<&mut dyn FnMut() -> f32>,
+    mut transport: impl FnMut(&mut EventBuffer) -> Option<TransportEvent>,
+) {
     let config = PluginAudioConfiguration {
         sample_rate: rate_hz,
         min_frames_count: 1,
@@ -86,9 +99,15 @@ fn play(rate_hz: f64, blocks: usize, mut transport: impl FnMut(&mut EventBuffer)
             channels: AudioPortBufferType::f32_output_only(channels.iter_mut().map(Vec::as_mut_slice)),
         }]);
         let mut answered = EventBuffer::new();
+        let mut given = heard.as_mut().map(|heard| (0..BLOCK).map(|_| heard()).collect::<Vec<f32>>());
+        let mut in_ports = AudioPorts::with_capacity(1, 1);
+        let input = in_ports.with_input_buffers(given.iter_mut().map(|given| AudioPortBuffer {
+            latency: 0,
+            channels: AudioPortBufferType::f32_input_only([InputChannel::variable(given)].into_iter()),
+        }));
         processor
             .process(
-                &InputAudioBuffers::empty(),
+                &input,
                 &mut out,
                 &InputEvents::from_buffer(&said),
                 &mut OutputEvents::from_buffer(&mut answered),
@@ -188,6 +207,119 @@ fn process_varying_sample_rates() {
         let blocks = (0.3 * rate_hz / BLOCK as f64) as usize + 4;
         play(rate_hz, blocks, |_| None);
     }
+}
+
+/// With the microphone on, whose side-chain is full of subnormal numbers.
+#[test]
+fn process_audio_denormals() {
+    let mut rng = Rng::with_seed(41);
+    let mut subnormal = || f32::from_bits(rng.u32(1..0x0080_0000) | rng.u32(0..2) << 31);
+    assert!(subnormal().is_subnormal());
+    let mut instance = instance(&library());
+    let (microphone, _) = param(&mut instance, "Microphone");
+    let mut is_on = false;
+    play_with(&mut instance, 48_000.0, 30, Some(&mut subnormal), |said| {
+        if !std::mem::replace(&mut is_on, true) {
+            said.push(&ParamValueEvent::new(0, microphone, Pckn::match_all(), 1.0));
+        }
+        None
+    });
+    assert_eq!(param(&mut instance, "Microphone").1, 1.0);
+}
+
+/// Plays one block of so many samples whose events are said as they are, and looks behind it: neither channel is longer.
+fn play_events(instance: &mut PluginInstance<Host>, samples: usize, said: &EventBuffer) -> [Vec<f32>; 2] {
+    /// What is behind the host's buffers.
+    const BEHIND: f32 = 7.0;
+    const ROOM: usize = 16_384;
+    let config = PluginAudioConfiguration {
+        sample_rate: 48_000.0,
+        min_frames_count: 1,
+        max_frames_count: BLOCK as u32,
+    };
+    let Ok(mut processor) = instance.activate(|_, _| (), config).unwrap().start_processing() else {
+        panic!("does not start processing")
+    };
+    let mut channels = [vec![BEHIND; samples + ROOM], vec![BEHIND; samples + ROOM]];
+    let mut ports = AudioPorts::with_capacity(2, 1);
+    let mut out = ports.with_output_buffers([AudioPortBuffer {
+        latency: 0,
+        channels: AudioPortBufferType::f32_output_only(
+            channels.iter_mut().map(|channel| &mut channel[..samples]),
+        ),
+    }]);
+    let mut answered = EventBuffer::new();
+    processor
+        .process(
+            &InputAudioBuffers::empty(),
+            &mut out,
+            &InputEvents::from_buffer(said),
+            &mut OutputEvents::from_buffer(&mut answered),
+            None,
+            None,
+        )
+        .unwrap();
+    instance.deactivate(processor.stop_processing());
+    for channel in &mut channels {
+        assert!(channel[samples..].iter().all(|x| *x == BEHIND), "something was written behind the block");
+        channel.truncate(samples);
+        assert!(channel.iter().all(|x| x.is_finite() && *x != BEHIND), "the whole block was written");
+    }
+    channels
+}
+
+/// The parameter of this name, and its value.
+fn param(instance: &mut PluginInstance<Host>, name: &str) -> (ClapId, f64) {
+    let handle = instance.plugin_handle();
+    let params: PluginParams = handle.get_extension().unwrap();
+    let mut named = (0..params.count(&handle)).filter_map(|at| {
+        let mut buffer = ParamInfoBuffer::new();
+        let info = params.get_info(&handle, at, &mut buffer)?;
+        (info.name == name.as_bytes()).then_some(info.id)
+    });
+    let id = named.next().unwrap();
+    (id, params.get_value(&handle, id).unwrap())
+}
+
+/// A host is wrong to say so; it must not be written over for that.
+#[test]
+fn events_that_a_block_has_no_sample_for_act_at_its_last() {
+    const SAMPLES: usize = 512;
+    let entry = library();
+    for at in [511, 512, 600, 4_000, u32::MAX] {
+        let mut instance = instance(&entry);
+        let (gain, _) = param(&mut instance, "Gain");
+        let mut said = EventBuffer::new();
+        said.push(&random_transport(&mut Rng::with_seed(1), at));
+        said.push(&ParamValueEvent::new(at, gain, Pckn::match_all(), 0.125));
+        said.push(&MidiEvent::new(at, 0, [0x90, 58, 100]));
+        play_events(&mut instance, SAMPLES, &said);
+        assert_eq!(param(&mut instance, "Gain").1, 0.125, "at {at}");
+    }
+}
+
+#[test]
+fn events_in_disorder_act_in_the_order_they_come() {
+    let entry = library();
+    let sound = |times: [u32; 5]| {
+        let mut instance = instance(&entry);
+        let (gain, _) = param(&mut instance, "Gain");
+        let set = |at, value| ParamValueEvent::new(at, gain, Pckn::match_all(), value);
+        let [key, first, transport, second, bend] = times;
+        let mut said = EventBuffer::new();
+        said.push(&MidiEvent::new(key, 0, [0x90, 58, 100]));
+        said.push(&set(first, 1.0));
+        said.push(&random_transport(&mut Rng::with_seed(1), transport));
+        said.push(&set(second, 0.25));
+        said.push(&MidiEvent::new(bend, 0, [0xE0, 0, 0]));
+        let sound = play_events(&mut instance, BLOCK, &said);
+        assert_eq!(param(&mut instance, "Gain").1, 0.25, "{times:?}");
+        sound
+    };
+    let in_order = sound([300, 300, 700, 700, 900]);
+    assert!(in_order[0].iter().any(|x| x.abs() > 1e-4));
+    assert!(sound([300, 100, 700, 0, 900]) == in_order);
+    assert!(sound([300, 299, 700, 301, 900]) == in_order);
 }
 
 /// A transport that is somewhere.

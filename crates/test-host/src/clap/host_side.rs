@@ -7,6 +7,7 @@ use clack_extensions::context_menu::{
     ContextMenuBuilder, ContextMenuTarget, HostContextMenu, HostContextMenuImpl,
 };
 use clack_extensions::gui::{GuiSize, HostGui, HostGuiImpl};
+use clack_extensions::latency::{HostLatency, HostLatencyImpl};
 use clack_extensions::note_name::{HostNoteName, HostNoteNameImpl};
 use clack_extensions::params::{
     HostParams, HostParamsImplMainThread, HostParamsImplShared, ParamClearFlags, ParamRescanFlags,
@@ -31,6 +32,8 @@ pub struct Shared {
 
 #[derive(Default)]
 struct Counts {
+    restarts: AtomicU32,
+    latencies: AtomicU32,
     processes: AtomicU32,
     tails: AtomicU32,
     names: AtomicU32,
@@ -40,6 +43,10 @@ struct Counts {
 /// How often the plugin has said something since this was last asked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Heard {
+    /// It must be activated anew.
+    pub restarts: u32,
+    /// Its latency has changed.
+    pub latencies: u32,
     /// It must be processed again.
     pub processes: u32,
     /// Its tail has changed.
@@ -60,6 +67,8 @@ impl Shared {
     pub(super) fn heard(&self) -> Heard {
         let take = |count: &AtomicU32| count.swap(0, Ordering::AcqRel);
         Heard {
+            restarts: take(&self.heard.restarts),
+            latencies: take(&self.heard.latencies),
             processes: take(&self.heard.processes),
             tails: take(&self.heard.tails),
             names: take(&self.heard.names),
@@ -74,7 +83,9 @@ pub struct Audio<'a>(pub(super) &'a Shared);
 pub struct Host;
 
 impl SharedHandler<'_> for Shared {
-    fn request_restart(&self) {}
+    fn request_restart(&self) {
+        self.heard.restarts.fetch_add(1, Ordering::AcqRel);
+    }
     fn request_process(&self) {
         self.heard.processes.fetch_add(1, Ordering::AcqRel);
     }
@@ -115,6 +126,12 @@ impl HostParamsImplMainThread for Main<'_> {
 
 impl HostStateImpl for Main<'_> {
     fn mark_dirty(&self) {}
+}
+
+impl HostLatencyImpl for Main<'_> {
+    fn changed(&self) {
+        self.0.heard.latencies.fetch_add(1, Ordering::AcqRel);
+    }
 }
 
 impl HostNoteNameImpl for Main<'_> {
@@ -160,6 +177,7 @@ impl HostHandlers for Host {
         builder
             .register::<HostState>()
             .register::<HostParams>()
+            .register::<HostLatency>()
             .register::<HostTail>()
             .register::<HostNoteName>()
             .register::<HostContextMenu>();

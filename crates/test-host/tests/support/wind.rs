@@ -1,4 +1,5 @@
 //! What a microphone hears: a quiet room, and somebody who blows at it, as in the core's own tests.
+#![allow(dead_code, reason = "each user takes what it needs")]
 
 pub const RATE: f64 = 48_000.0;
 pub const SECOND: usize = 48_000;
