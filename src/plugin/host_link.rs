@@ -1,8 +1,8 @@
 //! The way from the plugin's threads to its host, between the host's calls.
 //!
 //! The plugin's threads say here what a host may want to know: that the plugin rests, that a status text has changed, that
-//! the user asks for the host's own menu. The layer of a plugin format, [`clap`](crate::plugin::clap), passes it on. The
-//! framework's VST3 and standalone have no such layer: there all of this has no effect.
+//! the user asks for the host's own menu. The layer of a plugin format, [`clap`](crate::plugin::clap), passes it on. A VST3
+//! host is told only that a project is no longer as it was saved; the standalone has no such layer.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -16,6 +16,9 @@ pub trait HostCalls: Send + Sync {
     fn request_process(&self);
     /// Asks the host for a moment on its main thread, in which it is told what has changed. [any thread]
     fn request_callback(&self);
+    /// Tells the host that something has changed that is saved and no parameter, where no callback does that.
+    /// [any thread]
+    fn mark_dirty(&self) {}
 }
 
 /// What the host has tied to a parameter.
@@ -107,7 +110,10 @@ impl HostLink {
     /// Something has changed that is saved and no parameter: a project that was saved is no longer as it is.
     pub fn state_changed(&self) {
         self.states.fetch_add(1, Ordering::Relaxed);
-        self.tell();
+        if let Some(calls) = self.calls.get() {
+            calls.request_callback();
+            calls.mark_dirty();
+        }
     }
 
     /// How often that has happened; the number wraps around.

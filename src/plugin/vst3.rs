@@ -13,7 +13,9 @@ use std::sync::Arc;
 
 use nice_plug::context::gui::AsyncExecutor;
 use nice_plug::prelude::*;
+use nice_plug::wrapper::vst3::HostRequests;
 
+use super::host_link::HostCalls;
 use super::{Chalumeau, executor_of};
 use crate::identity;
 
@@ -155,6 +157,33 @@ impl<K: Kind> Plugin for Vst3<K> {
 impl<K: Kind> Vst3Plugin for Vst3<K> {
     const VST3_CLASS_ID: [u8; 16] = K::CLASS_ID;
     const VST3_SUBCATEGORIES: &'static [Vst3SubCategory] = K::CATEGORIES;
+
+    fn connect(&mut self, host: HostRequests) {
+        self.plugin.params.host.connect(Box::new(Calls(host)));
+    }
+
+    fn take_output_parameters(&mut self, tell: &mut dyn FnMut(&str, f32)) {
+        for control in self.plugin.params.moments.take_fallen() {
+            tell(control.id(), 0.0);
+        }
+    }
+}
+
+/// What a VST3 host can be told.
+struct Calls(HostRequests);
+
+impl HostCalls for Calls {
+    fn request_process(&self) {
+        // VST3 hosts always process.
+    }
+
+    fn request_callback(&self) {
+        // There is nothing that the host would be told in it.
+    }
+
+    fn mark_dirty(&self) {
+        self.0.mark_dirty();
+    }
 }
 
 mod export {

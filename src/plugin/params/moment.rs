@@ -135,7 +135,7 @@ impl ChalumeauParams {
 #[allow(unsafe_code)] // the framework's setter
 fn set_off(switch: &BoolParam) {
     // SAFETY: the setter stores atomics and calls the callback above. The framework keeps it for its wrappers because a
-    // host would not be told; `take_fallen` is how the CLAP's host is told. A VST3 host reads the value when it asks.
+    // host would not be told; `take_fallen` is how the host is told.
     unsafe { switch._internal_set_plain_value(false) };
 }
 
