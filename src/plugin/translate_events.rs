@@ -147,21 +147,32 @@ impl EventTranslator {
     }
 }
 
-/// An event as its name says. The framework's VST3 wrapper (0.4.2) confuses expression and brightness.
+/// An event as its name says. The framework's VST3 wrapper (0.4.2) confuses expression and brightness. And it guesses channel and
+/// key of an expression, for which VST3 has the note's id alone.
 pub fn untangled<S>(event: NoteEvent<S>, api: PluginApi) -> NoteEvent<S> {
-    match event {
-        NoteEvent::PolyExpression { timing, voice_id, channel, key, expression }
-            if api == PluginApi::Vst3 =>
-        {
+    let mut event = match event {
+        event if api != PluginApi::Vst3 => return event,
+        NoteEvent::PolyExpression { timing, voice_id, channel, key, expression } => {
             NoteEvent::PolyBrightness { timing, voice_id, channel, key, brightness: expression }
         }
-        NoteEvent::PolyBrightness { timing, voice_id, channel, key, brightness }
-            if api == PluginApi::Vst3 =>
-        {
+        NoteEvent::PolyBrightness { timing, voice_id, channel, key, brightness } => {
             NoteEvent::PolyExpression { timing, voice_id, channel, key, expression: brightness }
         }
         event => event,
+    };
+    match &mut event {
+        NoteEvent::PolyPressure { voice_id: VoiceID::ID(_), channel, key, .. }
+        | NoteEvent::PolyVolume { voice_id: VoiceID::ID(_), channel, key, .. }
+        | NoteEvent::PolyPan { voice_id: VoiceID::ID(_), channel, key, .. }
+        | NoteEvent::PolyTuning { voice_id: VoiceID::ID(_), channel, key, .. }
+        | NoteEvent::PolyVibrato { voice_id: VoiceID::ID(_), channel, key, .. }
+        | NoteEvent::PolyExpression { voice_id: VoiceID::ID(_), channel, key, .. }
+        | NoteEvent::PolyBrightness { voice_id: VoiceID::ID(_), channel, key, .. } => {
+            (*channel, *key) = (Channel::Wildcard, Key::Wildcard);
+        }
+        _ => {}
     }
+    event
 }
 
 /// The notes that an expression is for, and what it says.
@@ -300,6 +311,24 @@ mod tests {
             [Event::Breath(0.25)]
         );
         assert_eq!(plain(translator.translate(&untangled(express, PluginApi::Vst3), false)), []);
+    }
+
+    #[test]
+    fn an_expression_of_vst3_is_of_its_id_whatever_key_the_framework_guesses() {
+        let mut translator = EventTranslator::default();
+        let (voice_id, channel) = (VoiceID::ID(7), Channel::Number(0));
+        let on = Host::NoteOn { timing: 0, voice_id, channel, key: Key::Number(60), velocity: 0.8 };
+        translator.translate(&on, false);
+        let key = Key::Number(64);
+        let tuned = Host::PolyTuning { timing: 0, voice_id, channel, key, tuning: 0.5 };
+        let clap = untangled(tuned.clone(), PluginApi::Clap);
+        assert_eq!(plain(translator.translate(&clap, false)), [], "a CLAP host means both");
+        let vst3 = untangled(tuned, PluginApi::Vst3);
+        assert_eq!(plain(translator.translate(&vst3, false)), [Event::Bend { cents: 50.0 }]);
+        // Without an id, channel and key are all there is.
+        let voice_id = VoiceID::Wildcard;
+        let pressed = Host::PolyPressure { timing: 0, voice_id, channel, key, pressure: 0.5 };
+        assert_eq!(plain(translator.translate(&untangled(pressed, PluginApi::Vst3), false)), []);
     }
 
     #[test]
