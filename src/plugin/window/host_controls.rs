@@ -12,6 +12,7 @@ use crate::controllers::ControllerLinks;
 use crate::controllers::source_curves::SourceCurves;
 use crate::editor::controls::Mark;
 use crate::editor::{Controls, Look};
+use crate::parameters;
 use crate::plugin::host_link::MenuRequest;
 use crate::plugin::params::ChalumeauParams;
 
@@ -60,11 +61,10 @@ pub struct WithHost<'a> {
 impl HostControls {
     /// Lists these parameters.
     pub fn new(params: Arc<ChalumeauParams>) -> Self {
-        // The editor wants ids that live forever. They are a few bytes, leaked once a plugin instance.
         let all: Vec<(&'static str, ParamPtr)> = params
             .param_map()
             .into_iter()
-            .map(|(id, pointer, _)| (&*Box::leak(id.into_boxed_str()), pointer))
+            .filter_map(|(id, pointer, _)| Some((parameters::find(&id)?.id, pointer)))
             .collect();
         Self {
             ids: all.iter().map(|(id, _)| *id).collect(),
