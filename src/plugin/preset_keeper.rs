@@ -180,7 +180,10 @@ impl KeeperThread {
         match task {
             PresetTask::Read => {}
             PresetTask::Save(preset) => {
-                folder.save(&preset)?;
+                // What the user saw who pressed *Replace*.
+                let shelf = self.shared.shelf.lock().unwrap_or_else(PoisonError::into_inner).clone();
+                let shown = shelf.user.presets.iter().find(|known| known.name == preset.name.trim());
+                folder.save(&preset, shown)?;
                 self.params.set_preset_name(&preset.name);
             }
             PresetTask::Rename { old, new } => {
@@ -275,6 +278,34 @@ mod tests {
         handle.send(PresetTask::Delete("Best".to_owned()));
         assert!(!until(handle, |shelf| !shelf.is_users("Best")).is_users("Best"));
         assert_eq!(params.preset_name(), "");
+    }
+
+    #[test]
+    fn what_another_window_has_saved_is_replaced_only_by_who_has_seen_it() {
+        let (root, _, keeper) = keeper();
+        let folder = UserFolder::within(root.path());
+        let (handle, mine) = (keeper.handle(), Preset::of("Mine", |_| None));
+        let with = |shows: &str| {
+            let mut preset = mine.clone();
+            preset.shows = shows.to_owned();
+            preset
+        };
+        // By then it has read the empty folder.
+        handle.send(PresetTask::Like { name: "Any".to_owned(), is_liked: true });
+        until(handle, |shelf| shelf.is_liked("Any"));
+        folder.save(&with("Theirs."), None).unwrap();
+        handle.send(PresetTask::Save(with("Ours.")));
+        let shelf = until(handle, |shelf| shelf.notice.is_some());
+        assert!(shelf.notice.as_ref().unwrap().contains("there is a preset \"Mine\" already"));
+        assert_eq!(shelf.find("Mine").unwrap().shows, "Theirs.", "the list shows it from now on");
+        assert_eq!(folder.read().presets[0].shows, "Theirs.");
+        handle.send(PresetTask::Save(with("Ours.")));
+        let shelf = until(handle, |shelf| shelf.notice.is_none());
+        assert!(shelf.notice.is_none() && shelf.find("Mine").unwrap().shows == "Ours.");
+        folder.save(&with("Theirs again."), shelf.find("Mine")).unwrap();
+        handle.send(PresetTask::Save(with("Ours again.")));
+        until(handle, |shelf| shelf.notice.is_some());
+        assert_eq!(folder.read().presets[0].shows, "Theirs again.", "as they left it");
     }
 
     #[test]

@@ -94,13 +94,26 @@ impl UserFolder {
         files.find(|(_, read)| read.as_ref().is_ok_and(|preset| preset.name == name)).map(|(path, _)| path)
     }
 
-    /// Saves a preset; one of the same name is replaced.
-    pub fn save(&self, preset: &Preset) -> Result<(), String> {
+    /// Saves a preset. One of the same name is replaced if it is `shown`, as the user saw it who wants to replace it; any other one
+    /// was saved meanwhile, in another window.
+    ///
+    /// # Errors
+    /// A message for the user.
+    pub fn save(&self, preset: &Preset, shown: Option<&Preset>) -> Result<(), String> {
         let name = checked_name(&preset.name)?;
         if factory::find(&name).is_some() {
             return Err(format!("{name:?} is a factory preset; choose another name"));
         }
-        let path = self.find(&name).unwrap_or_else(|| self.free_path(&name));
+        let path = match self.find(&name) {
+            Some(path) if read_file(&path).ok().as_ref() != shown => {
+                return Err(format!(
+                    "there is a preset {name:?} already, saved since this list was read; save again to replace it, or choose \
+                     another name"
+                ));
+            }
+            Some(path) => path,
+            None => self.free_path(&name),
+        };
         let text = Preset { name, ..preset.clone() }.to_text();
         // What cannot be read again is not written.
         Preset::parse(&text).map_err(|reason| reason.what)?;
@@ -204,11 +217,12 @@ mod tests {
         let (_root, folder) = folder();
         assert_eq!(folder.read(), UserPresets::default());
         for name in ["My jazz", "another", "My/jazz"] {
-            folder.save(&preset(name)).unwrap();
+            folder.save(&preset(name), None).unwrap();
         }
         assert_eq!(names(&folder), ["another", "My jazz", "My/jazz"]);
         assert_eq!(folder.read().presets[1], preset("My jazz"));
-        folder.save(&Preset { shows: "New.".to_owned(), ..preset("My jazz") }).unwrap();
+        let shown = folder.read().presets.into_iter().find(|preset| preset.name == "My jazz");
+        folder.save(&Preset { shows: "New.".to_owned(), ..preset("My jazz") }, shown.as_ref()).unwrap();
         assert_eq!(names(&folder).len(), 3, "replaced");
         assert_eq!(folder.read().presets[1].shows, "New.");
         folder.set_favourite("My jazz", true).unwrap();
@@ -226,9 +240,9 @@ mod tests {
     fn names_that_are_taken_are_refused() {
         let (_root, folder) = folder();
         let taken = factory::all()[0].name.clone();
-        assert!(folder.save(&preset(&taken)).unwrap_err().contains("is a factory preset"));
-        folder.save(&preset("a")).unwrap();
-        folder.save(&preset("b")).unwrap();
+        assert!(folder.save(&preset(&taken), None).unwrap_err().contains("is a factory preset"));
+        folder.save(&preset("a"), None).unwrap();
+        folder.save(&preset("b"), None).unwrap();
         for name in ["b", &taken] {
             assert!(folder.rename("a", name).unwrap_err().contains("already"));
         }
@@ -238,7 +252,7 @@ mod tests {
     #[test]
     fn a_broken_file_is_named_with_its_line_and_left_alone() {
         let (_root, folder) = folder();
-        folder.save(&preset("good")).unwrap();
+        folder.save(&preset("good"), None).unwrap();
         let broken = "format = 1\nname = \"bad\"\n[parameters]\nlip = 9\n";
         for (name, text) in [("bad.toml", broken), ("twin.toml", preset("good").to_text().as_str())] {
             fs::write(folder.path().join(name), text).unwrap();
@@ -266,7 +280,7 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let file = root.path().join("file");
         fs::write(&file, "in the way").unwrap();
-        let said = UserFolder::within(&file).save(&preset("a")).unwrap_err();
+        let said = UserFolder::within(&file).save(&preset("a"), None).unwrap_err();
         assert!(said.starts_with("cannot write"), "{said}");
     }
 }
