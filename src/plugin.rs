@@ -3,7 +3,7 @@
 //! This module only translates: parameters to settings, the host's events to the instrument's events, one voice to two
 //! channels. Notes are sounding pitch, as everywhere outside the instrument. The sound depends on the events and
 //! their sample positions alone, not on the host's blocks, and it is what the offline renderer writes. There is one
-//! exception: when the user chooses another instrument during live playing, it comes as soon as it is ready.
+//! exception: during live playing, another instrument and the preset of a MIDI program come as soon as they are ready.
 //!
 //! - `host_inputs`: what is remembered of the host's events; `translate_events`: what they mean; `breath_sources` and
 //!   `reed_controllers`, `part_reeds`: where breath and reed changes come from
@@ -256,6 +256,13 @@ impl Chalumeau {
             [right, ..] => Channels::two(left, right),
             [] => Channels::one(left),
         };
+        // In a render a program acts from its sample on: the framework begins a block there.
+        if self.offline
+            && let Some(presets) = &self.presets
+            && let Some(program) = self.inputs.first_program(|| context.next_event())
+        {
+            presets.handle().ask(program);
+        }
         let Some((settings, has_changed)) = self.follow_settings(context) else {
             return ProcessStatus::Error("not activated");
         };

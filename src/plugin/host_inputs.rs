@@ -1,5 +1,7 @@
 //! What the plugin remembers of the host's events, and what it makes of them. Real-time safe.
 
+use std::collections::VecDeque;
+
 use nice_plug::prelude::*;
 
 use super::breath_sources::BreathSources;
@@ -26,6 +28,9 @@ const EVENTS: usize = (64 + MOST) * parts::MOST;
 /// of each part may be there before. Later ones are lost to the host, which only loses a hint.
 const ENDS: usize = 4_096 + 17 * parts::MOST;
 
+/// Events that a block can begin with: all that the wrapper keeps room for.
+const WAITING: usize = 4_096;
+
 /// Everything that is remembered of the host's events between two blocks.
 pub struct HostInputs {
     translator: EventTranslator,
@@ -41,6 +46,8 @@ pub struct HostInputs {
     ended: Vec<(u32, Note)>,
     /// The latest MIDI program change that nobody has taken yet.
     program: Option<u8>,
+    /// The host's events that were looked at before their turn.
+    waiting: VecDeque<NoteEvent<()>>,
 }
 
 impl Default for HostInputs {
@@ -56,6 +63,7 @@ impl Default for HostInputs {
             handed: 0,
             ended: Vec::with_capacity(ENDS),
             program: None,
+            waiting: VecDeque::with_capacity(WAITING),
         }
     }
 }
@@ -69,6 +77,7 @@ impl HostInputs {
         (self.handed, self.program) = (0, None);
         self.events.clear();
         self.ended.clear();
+        self.waiting.clear();
     }
 
     /// Begins a block, whose notes are split into so many parts.
@@ -108,6 +117,27 @@ impl HostInputs {
     /// The latest MIDI program change, 0..=127, once.
     pub fn take_program(&mut self) -> Option<u8> {
         self.program.take()
+    }
+
+    /// Looks among the host's events of the block's first sample for a program change, and takes the latest. All others wait for
+    /// [`next`](Self::next).
+    pub fn first_program(&mut self, mut next: impl FnMut() -> Option<NoteEvent<()>>) -> Option<u8> {
+        self.waiting.clear();
+        let mut found = None;
+        while self.waiting.len() < self.waiting.capacity()
+            && let Some(event) = next()
+        {
+            match event {
+                NoteEvent::MidiProgramChange { timing: 0, program, .. } => found = Some(program & 0x7f),
+                event => {
+                    self.waiting.push_back(event);
+                    if event.timing() > 0 {
+                        break;
+                    }
+                }
+            }
+        }
+        found
     }
 
     /// Ties controllers to settings.
@@ -164,7 +194,11 @@ impl HostInputs {
                 self.handed += 1;
                 return Some(Timed { at: self.at, event });
             }
-            let event = untangled(next()?, api);
+            let event = match self.waiting.pop_front() {
+                Some(event) => event,
+                None => next()?,
+            };
+            let event = untangled(event, api);
             learn(&event, links);
             self.take(event, drives);
         }
@@ -514,6 +548,22 @@ mod tests {
         inputs.begin_block(2);
         inputs.say_links();
         assert_eq!(growls(parted(&mut inputs, NO_REED, &[])), [(second, 1.0)]);
+    }
+
+    #[test]
+    fn a_program_at_the_beginning_is_found_behind_its_bank_and_nothing_else_is_lost() {
+        let cc = |timing, cc| NoteEvent::MidiCC { timing, channel: 0, cc, value: 0.5 };
+        let program = |timing, program| NoteEvent::MidiProgramChange { timing, channel: 0, program };
+        let said = [cc(0, 0), program(0, 3), cc(0, 32), program(0, 4), cc(5, 7), program(5, 6), cc(6, 7)];
+        let mut inputs = HostInputs::default();
+        let mut left = said.into_iter();
+        assert_eq!(inputs.first_program(|| left.next()), Some(4));
+        assert_eq!(left.len(), 2, "what comes after the first sample is not looked at");
+        let links = ControllerLinks::default();
+        let mut next = || inputs.next(|| left.next(), PluginApi::Clap, NO_REED, &links);
+        let heard: Vec<_> = std::iter::from_fn(|| next().map(|timed| timed.at)).collect();
+        assert_eq!(heard, [5, 6], "both volumes; bank numbers are no events");
+        assert_eq!((inputs.take_program(), left.len()), (Some(6), 0));
     }
 
     #[test]

@@ -2,8 +2,8 @@
 //! parameters.
 //!
 //! A program change is an event of the audio thread, which may neither lock nor allocate. It leaves the number in an atomic;
-//! the thread finds it within [`POLL`]. While a host renders a file, the next block waits for it, so that every render of
-//! the same events is the same.
+//! the thread finds it within [`POLL`]. While a host renders a file, the sample of the program change waits for it, so that every
+//! render of the same events is the same.
 
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::RecvTimeoutError;
