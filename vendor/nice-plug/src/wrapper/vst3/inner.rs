@@ -494,9 +494,15 @@ impl<P: Vst3Plugin> WrapperInner<P> {
     }
 
     /// Keep the input events for the start of the next block when there has been no block to hand
-    /// them out in: a host may flush note events just like parameter changes.
+    /// them out in: a host may flush note events just like parameter changes. It may do so for as
+    /// long as it bypasses the plugin, so the oldest events make room for those of the next block.
     pub fn keep_input_note_events(&self) {
-        for event in self.input_note_events.borrow_mut().iter_mut() {
+        let mut input_note_events = self.input_note_events.borrow_mut();
+        let excess = input_note_events
+            .len()
+            .saturating_sub(P::INPUT_EVENT_CAPACITY / 2);
+        input_note_events.drain(..excess);
+        for event in input_note_events.iter_mut() {
             event.subtract_timing(event.timing());
         }
     }

@@ -1053,7 +1053,9 @@ impl<P: Vst3Plugin> IAudioProcessorTrait for Wrapper<P> {
             };
 
             process_wrapper(|| plugin.reset());
-            self.inner.input_note_events.borrow_mut().clear();
+            if let Ok(mut input_note_events) = self.inner.input_note_events.try_borrow_mut() {
+                input_note_events.clear();
+            }
         }
 
         // We don't have any special handling for suspending and resuming plugins, yet
@@ -1399,14 +1401,6 @@ impl<P: Vst3Plugin> IAudioProcessorTrait for Wrapper<P> {
                                 event.subtract_timing(block_start as u32);
 
                                 permit_alloc(|| {
-                                    // A host may flush events for as long as it bypasses the plugin.
-                                    // The oldest ones make room.
-                                    if is_param_flush
-                                        && input_note_events.len() == input_note_events.capacity()
-                                    {
-                                        input_note_events.pop_front();
-                                    }
-
                                     // In the rare case the host sends a very large amount of events at once, there
                                     // is not much we can do except to just accept the allocation.
                                     if input_note_events.len() == input_note_events.capacity() {
