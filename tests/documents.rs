@@ -9,13 +9,13 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// All Markdown of the repository, but what is built or fetched.
+/// All Markdown of the repository, but what is built, fetched or copied from others.
 fn documents() -> Vec<(PathBuf, String)> {
     fn gather(folder: &Path, all: &mut Vec<PathBuf>) {
         for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
             let name = path.file_name().unwrap().to_string_lossy().into_owned();
             if path.is_dir() {
-                if !name.starts_with('.') && name != "target" {
+                if !name.starts_with('.') && name != "target" && name != "nice-plug" {
                     gather(&path, all);
                 }
             } else if name.ends_with(".md") {

@@ -552,7 +552,10 @@ mod tests {
 
     #[test]
     fn a_program_at_the_beginning_is_found_behind_its_bank_and_nothing_else_is_lost() {
-        let cc = |timing, cc| NoteEvent::MidiCC { timing, channel: 0, cc, value: 0.5 };
+        let cc = |timing, cc| {
+            let value = timing as f32 / 10.0;
+            NoteEvent::MidiCC { timing, channel: 0, cc, value }
+        };
         let program = |timing, program| NoteEvent::MidiProgramChange { timing, channel: 0, program };
         let said = [cc(0, 0), program(0, 3), cc(0, 32), program(0, 4), cc(5, 7), program(5, 6), cc(6, 7)];
         let mut inputs = HostInputs::default();
