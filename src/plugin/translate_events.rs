@@ -321,7 +321,7 @@ mod tests {
         translator.translate(&on, false);
         let key = Key::Number(64);
         let tuned = Host::PolyTuning { timing: 0, voice_id, channel, key, tuning: 0.5 };
-        let clap = untangled(tuned.clone(), PluginApi::Clap);
+        let clap = untangled(tuned, PluginApi::Clap);
         assert_eq!(plain(translator.translate(&clap, false)), [], "a CLAP host means both");
         let vst3 = untangled(tuned, PluginApi::Vst3);
         assert_eq!(plain(translator.translate(&vst3, false)), [Event::Bend { cents: 50.0 }]);
