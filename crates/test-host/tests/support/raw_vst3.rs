@@ -104,8 +104,7 @@ impl Raw {
                 info
             };
             let length = info.title.iter().position(|&unit| unit == 0).unwrap_or(0);
-            let title: Vec<u16> = info.title[..length].iter().map(|&unit| unit as u16).collect();
-            (String::from_utf16_lossy(&title) == name).then_some(info.id)
+            (String::from_utf16_lossy(&info.title[..length]) == name).then_some(info.id)
         };
         (0..count).find_map(named).unwrap()
     }
