@@ -18,7 +18,7 @@ use crate::output::{NewFile, resolved};
 use crate::parameters::{PARAMETERS, Parameter, Sets, Value};
 use crate::wav::{Depth, WavFile};
 use chalumeau_core::instrument::Settings;
-use chalumeau_core::measure::notes::{MeasuredNote, spread};
+use chalumeau_core::measure::notes::{MeasuredNote, Spread, spread};
 use chalumeau_figure::report::{Plate, Report as Page, ReportTable, Sound, TableCell, write};
 use clap::Args;
 use std::cell::RefCell;
@@ -153,14 +153,7 @@ impl ReportCommand {
     fn page(&self, prepared: &RenderJob, watched: &RenderSummary, sound: Sound) -> Result<Page, Failure> {
         let (file, title) = (&prepared.model.file, self.play.title());
         let mut lines = about(prepared);
-        let outcome = match spread(&watched.heard) {
-            Some((count, mean, largest)) => format!(
-                "{count} of {} notes have a pitch; from equal temperament: mean {mean:.1} cents, largest {} cents.",
-                watched.heard.len(),
-                signed(largest)
-            ),
-            None => "No note has a pitch.".to_owned(),
-        };
+        let outcome = pitches_in_words(&watched.heard);
         lines.push(outcome.clone());
         let longest = watched.heard.iter().max_by_key(|heard| heard.span.to - heard.span.from);
         let longest = longest.and_then(|heard| heard.span.note.written(file.transposition));
@@ -253,6 +246,22 @@ fn command() -> String {
 fn signed(cents: f64) -> String {
     let tenths = (10.0 * cents).round();
     if tenths == 0.0 { "0.0".to_owned() } else { format!("{:+.1}", tenths / 10.0) }
+}
+
+/// How many notes have a pitch, and how far they lie from equal temperament.
+fn pitches_in_words(heard: &[MeasuredNote]) -> String {
+    let Some(Spread { count, own, others }) = spread(heard) else { return "No note has a pitch.".to_owned() };
+    let mut words = format!("{count} of {} notes have a pitch", heard.len());
+    if let Some((mean, largest)) = own {
+        words +=
+            &format!("; from equal temperament: mean {mean:.1} cents, largest {} cents", signed(largest));
+    }
+    words += &match others {
+        Some((1, off)) => format!("; 1 sounds another note, {} cents off", signed(off)),
+        Some((several, off)) => format!("; {several} sound other notes, up to {} cents off", signed(off)),
+        None => String::new(),
+    };
+    words + "."
 }
 
 fn word(text: impl Into<String>) -> TableCell {

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use chalumeau_core::instrument::{Clarinet, KeyNotes};
-use chalumeau_core::measure::notes::{MeasuredNote, NoteMeter, spread};
+use chalumeau_core::measure::notes::{MeasuredNote, NoteMeter, Spread, spread};
 use chalumeau_core::score;
 use chalumeau_core::score::NoteSpan;
 use chalumeau_core::score::Score;
@@ -112,11 +112,19 @@ fn table(samples: &[f32], score: &Score) -> String {
         }
         text += &format!("  {level_dbfs:6.1}\n");
     }
-    let Some((count, mean, largest)) = spread(&heard) else { return text + "no note has a pitch\n" };
-    text + &format!(
-        "{count} of {} notes have a pitch; from equal temperament at A4 = {A4_HZ} Hz: mean {mean:.1} cents, largest {largest:+.1}\n",
-        heard.len()
-    )
+    let Some(Spread { count, own, others }) = spread(&heard) else {
+        return text + "no note has a pitch\n";
+    };
+    text += &format!("{count} of {} notes have a pitch", heard.len());
+    if let Some((mean, largest)) = own {
+        text += &format!(
+            "; from equal temperament at A4 = {A4_HZ} Hz: mean {mean:.1} cents, largest {largest:+.1}"
+        );
+    }
+    if let Some((others, off)) = others {
+        text += &format!("; other notes than written: {others}, up to {off:+.1} cents off");
+    }
+    text + "\n"
 }
 
 fn write_wav(path: &Path, left: &[f32], right: &[f32]) -> Result<()> {

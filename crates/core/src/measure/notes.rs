@@ -4,8 +4,9 @@
 //! steady part, after the attack or the slur and before the release. A [`NoteMeter`] keeps the samples of one note at a time,
 //! at most [`LONGEST_S`] of it.
 
-use crate::analysis::pitch::{fundamental_hz, periodicity, refine_hz};
+use crate::analysis::pitch::{fundamental_near_hz, periodicity, refine_hz};
 use crate::analysis::spectrum::rms_dbfs;
+use crate::measure::realism::OTHER_CENTS;
 use crate::score::NoteSpan;
 use crate::units::cents;
 
@@ -19,6 +20,9 @@ pub const LEAST_DBFS: f64 = -75.0;
 /// What repeats itself less than this from period to period has no pitch. Noise of a reed that is blown too softly does so by less than 0.1, also as the
 /// bore colours it; notes with much air, growl or flutter tongue by more than 0.8.
 const PERIODIC: f64 = 0.5;
+
+/// How far [`refine_hz`] finds a pitch, cents.
+const REFINED_CENTS: f64 = 50.0;
 
 /// Pitch and level of one note.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,24 +96,49 @@ impl NoteMeter {
     fn measure(&mut self, span: NoteSpan) {
         let wanted_hz = span.note.frequency_hz(self.a4_hz);
         let level_dbfs = rms_dbfs(&self.kept);
-        let pitch = || {
-            refine_hz(&self.kept, self.rate_hz, wanted_hz)
-                .or_else(|| fundamental_hz(&self.kept, self.rate_hz))
-        };
-        let hz = if level_dbfs < self.least_dbfs { None } else { pitch() };
+        let hz =
+            if level_dbfs < self.least_dbfs { None } else { pitch_hz(&self.kept, self.rate_hz, wanted_hz) };
         let hz = hz.filter(|&hz| periodicity(&self.kept, self.rate_hz, hz) >= PERIODIC);
         self.measured.push(MeasuredNote { span, hz, cents: hz.map(|hz| cents(hz, wanted_hz)), level_dbfs });
         self.kept.clear();
     }
 }
 
-/// Number of notes with a pitch, mean of the absolute deviations from equal temperament, and the largest deviation with its
-/// sign, cents. `None` if no note has a pitch.
-pub fn spread(measured: &[MeasuredNote]) -> Option<(usize, f64, f64)> {
-    let cents: Vec<f64> = measured.iter().filter_map(|note| note.cents).collect();
-    let largest = cents.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
-    let mean = cents.iter().map(|cents| cents.abs()).sum::<f64>() / cents.len() as f64;
-    Some((cents.len(), mean, largest))
+/// The pitch of a note that is to be `wanted_hz`.
+fn pitch_hz(samples: &[f64], rate_hz: f64, wanted_hz: f64) -> Option<f64> {
+    // Found without a hint first: the harmonics of an overblown note are also harmonics of the wanted one, and those of a note a
+    // twelfth too low hold it, so that refining would find what does not sound.
+    let found = fundamental_near_hz(samples, rate_hz, wanted_hz)?;
+    let is_near = cents(found, wanted_hz).abs() <= REFINED_CENTS;
+    let refined = is_near.then(|| refine_hz(samples, rate_hz, wanted_hz)).flatten();
+    Some(refined.unwrap_or(found))
+}
+
+/// How far the notes of a score lie from equal temperament.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    /// Notes with a pitch.
+    pub count: usize,
+    /// Of those within [`OTHER_CENTS`]: mean of the absolute deviations, and the largest with its sign, cents. `None` if there
+    /// is none.
+    pub own: Option<(f64, f64)>,
+    /// Those further off, which are other notes: how many, and the largest deviation with its sign, cents. `None` if there is
+    /// none.
+    pub others: Option<(usize, f64)>,
+}
+
+/// How far notes lie from equal temperament; `None` if no note has a pitch.
+pub fn spread(measured: &[MeasuredNote]) -> Option<Spread> {
+    let cents = measured.iter().filter_map(|note| note.cents);
+    let (own, others): (Vec<f64>, Vec<f64>) = cents.partition(|cents| cents.abs() <= OTHER_CENTS);
+    let largest = |of: &[f64]| of.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()));
+    let mean = |of: &[f64]| of.iter().map(|cents| cents.abs()).sum::<f64>() / of.len() as f64;
+    let count = own.len() + others.len();
+    (count > 0).then(|| Spread {
+        count,
+        own: largest(&own).map(|largest| (mean(&own), largest)),
+        others: largest(&others).map(|largest| (others.len(), largest)),
+    })
 }
 
 #[cfg(test)]
@@ -151,6 +180,51 @@ mod tests {
         assert!(heard(0.1).unwrap().abs() < 1.0);
     }
 
+    /// Harmonics of the wanted note alone, and those of a note of which it is one, are the notes that sound.
+    #[test]
+    fn what_is_overblown_or_sounds_below_is_not_in_tune() {
+        let note = SoundingNote(65);
+        let wanted_hz = note.frequency_hz(440.0);
+        let span = NoteSpan { note, from: 0, to: 48_000 };
+        let mut all = Vec::new();
+        for (times, harmonics) in [(3.0, 4), (5.0, 3), (1.0 / 3.0, 9), (1.0, 9)] {
+            let f_hz = times * wanted_hz;
+            let sample = |n: u32| {
+                let sine =
+                    |h: i32| (TAU * f64::from(h) * f_hz * f64::from(n) / 48_000.0).sin() / f64::from(h * h);
+                (0.3 * (1..=harmonics).map(sine).sum::<f64>()) as f32
+            };
+            let samples: Vec<f32> = (0..48_000).map(sample).collect();
+            let mut meter = NoteMeter::new(vec![span], 48_000.0, 440.0, 0.0);
+            meter.hear(&samples);
+            let heard = meter.finish()[0];
+            let expected = 1_200.0 * times.log2();
+            assert!((heard.cents.unwrap() - expected).abs() < 0.1, "{times}: {heard:?}");
+            all.push(heard);
+        }
+        let Spread { count, own, others } = spread(&all).unwrap();
+        let ((mean, _), (other, largest)) = (own.unwrap(), others.unwrap());
+        assert!(count == 4 && other == 3 && mean < 0.1 && (largest - 2_786.3).abs() < 0.2, "{largest}");
+        assert_eq!(spread(&all[..2]).unwrap().own, None);
+    }
+
+    /// A contrabass clarinet's lowest notes lie below what is looked for otherwise.
+    #[test]
+    fn the_lowest_notes_are_found() {
+        let note = SoundingNote(26);
+        let hz = note.frequency_hz(440.0);
+        let samples: Vec<f32> = (0..96_000)
+            .map(|n| {
+                let phase = TAU * hz * f64::from(n) / 48_000.0;
+                (0.2 * phase.sin() + 0.2 * (3.0 * phase).sin()) as f32
+            })
+            .collect();
+        let mut meter =
+            NoteMeter::new(vec![NoteSpan { note, from: 0, to: samples.len() }], 48_000.0, 440.0, 0.0);
+        meter.hear(&samples);
+        assert!(meter.finish()[0].cents.unwrap().abs() < 0.1);
+    }
+
     #[test]
     fn cents_and_levels_are_those_of_the_tones_whatever_the_blocks() {
         let (notes, samples) = tones();
@@ -165,8 +239,10 @@ mod tests {
             assert!((heard.cents.unwrap() - off).abs() < 0.1, "{heard:?}");
             assert!((heard.level_dbfs - 20.0 * (0.5 / 2f64.sqrt()).log10()).abs() < 0.02, "{heard:?}");
         }
-        let (count, mean, largest) = spread(&all[0]).unwrap();
+        let Spread { count, own, others } = spread(&all[0]).unwrap();
+        let (mean, largest) = own.unwrap();
         assert!(count == 3 && (mean - 25.0 / 3.0).abs() < 0.1 && (largest - 20.0).abs() < 0.1);
+        assert_eq!(others, None);
         assert_eq!(spread(&[]), None);
     }
 
