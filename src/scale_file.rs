@@ -1,5 +1,6 @@
 //! Scales from files in the formats of Scala (Manuel Op de Coul): `.scl` has the pitches, `.kbm` says which key plays which.
 
+use std::borrow::Cow;
 use std::fs;
 use std::io;
 use std::ops::RangeInclusive;
@@ -80,6 +81,7 @@ pub struct ScaleFault {
 /// assert!((fifth.cents - 1.955).abs() < 0.001);
 /// ```
 pub fn key_pitches(scl: &str, kbm: Option<&str>) -> Result<KeyPitches, ScaleFault> {
+    let (scl, kbm) = (&*described(without_mark(scl)), kbm.map(without_mark));
     let of_scale = |what| ScaleFault { is_of_mapping: false, what };
     let of_mapping = |what| ScaleFault { is_of_mapping: true, what };
     let scale = Scl::import(scl.as_bytes()).map_err(|error| of_scale(scl_error(&error, scl)))?;
@@ -105,6 +107,29 @@ pub fn key_pitches(scl: &str, kbm: Option<&str>) -> Result<KeyPitches, ScaleFaul
         return Err(fault("no key has a pitch that can be heard".to_owned()));
     }
     Ok(keys)
+}
+
+/// A text without the mark of its encoding, which editors put before it and which would make a line of the first comment.
+fn without_mark(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text)
+}
+
+/// A scale whose description, its first line that is no comment, is not empty. The format allows that, and the reader takes the next
+/// line for it, which is the number of notes then. The number of lines stays.
+fn described(scl: &str) -> Cow<'_, str> {
+    let is_number = |item: &str| item.parse::<u32>().is_ok();
+    if !entries(scl).next().is_some_and(|(_, item)| is_number(item)) {
+        return Cow::Borrowed(scl);
+    }
+    let mut at = 0;
+    for line in scl.split_inclusive('\n') {
+        match line.trim() {
+            "" => return Cow::Owned(format!("{}-{}", &scl[..at], &scl[at..])),
+            comment if comment.starts_with('!') => at += line.len(),
+            _ => break,
+        }
+    }
+    Cow::Borrowed(scl)
 }
 
 /// The lines that are no comments, each with its number, and what counts of it. As the reader of the format sees them.

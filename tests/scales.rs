@@ -230,6 +230,22 @@ fn damaged_files_are_told_with_their_line() {
         let said = read(b"name\n1\n2/1\n", Some(mapping)).expect_err(mapping);
         assert!(said.contains(says), "{said}");
     }
+    // Scala writes a description that is empty, and editors a mark of the encoding before the first comment.
+    let plain = read(b"name\n2\n3/2\n2/1\n", Some(kbm)).unwrap();
+    for scl in [
+        "\n2\n3/2\n2/1\n",
+        "! x.scl\r\n!\r\n  \r\n 2\r\n!\r\n 3/2\r\n 2/1\r\n",
+        "\u{feff}! x.scl\n!\n\n2\n3/2\n2/1\n",
+        "\u{feff}name\n2\n3/2\n2/1\n",
+        // An empty line before the description was always left out.
+        "\nname\n2\n3/2\n2/1\n",
+    ] {
+        let keys = read(scl.as_bytes(), Some(&format!("\u{feff}{kbm}")));
+        assert!(keys.as_ref() == Ok(&plain), "{scl:?}: {:?}", keys.err());
+    }
+    // Lines are counted as they stand in the file.
+    let said = read(b"! x\n\n2\n3/2\n2/x\n", None).expect_err("no ratio");
+    assert!(said.contains("line 5 must be a ratio"), "{said}");
     // Latin-1 in a comment is no reason to refuse a scale.
     assert!(read(b"! M\xe9taton\nname\n1\n2/1\n", Some(kbm)).is_ok());
     let missing = scale_file::read("no/such.scl".as_ref(), None).expect_err("no file").to_string();
