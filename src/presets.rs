@@ -166,6 +166,9 @@ pub fn find<'a>(name: &str, user: &'a UserPresets) -> Result<&'a Preset, String>
     let exact = all().find(|preset| preset.name == name.trim());
     let found = exact.or_else(|| all().find(|preset| preset.name.eq_ignore_ascii_case(name.trim())));
     found.ok_or_else(|| {
+        if let Some(broken) = user.broken_called(name) {
+            return format!("the preset {name:?} cannot be read: {broken}");
+        }
         let near = nearest(name, all().map(|preset| preset.name.as_str()));
         let meant = near.map_or_else(String::new, |near| format!(" did you mean {near:?}?"));
         format!("there is no preset {name:?};{meant} `chalumeau presets list` lists them all")

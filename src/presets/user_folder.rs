@@ -3,7 +3,7 @@
 //! Files appear whole or not at all. A file that is no preset is reported with its name and line, and stays as it is. The
 //! folder may be edited by hand and shared: what counts is the name inside a file, not the file's.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -37,6 +37,17 @@ pub struct UserPresets {
     pub favourites: BTreeSet<String>,
     /// Files that are no presets: which, and what to do.
     pub broken: Vec<String>,
+    /// The same by the name that the file has, and by the one in it, in lower case.
+    pub broken_names: BTreeMap<String, String>,
+}
+
+impl UserPresets {
+    /// What is wrong with the file of a preset that cannot be read, if there is one of this name.
+    pub fn broken_called(&self, name: &str) -> Option<&str> {
+        let name = name.trim().to_lowercase();
+        let found = self.broken_names.get(&name).or_else(|| self.broken_names.get(&stem(&name)));
+        found.map(String::as_str)
+    }
 }
 
 impl UserFolder {
@@ -68,7 +79,13 @@ impl UserFolder {
                     ));
                 }
                 Ok(preset) => found.presets.push(preset),
-                Err(reason) => found.broken.push(format!("{}: {reason}", path.display())),
+                Err(reason) => {
+                    let said = format!("{}: {reason}", path.display());
+                    for name in names_of_broken(&path) {
+                        found.broken_names.insert(name, said.clone());
+                    }
+                    found.broken.push(said);
+                }
             }
         }
         found.presets.sort_by_key(|preset| preset.name.to_lowercase());
@@ -166,8 +183,7 @@ impl UserFolder {
 
     /// A path that no file has: the name in plain letters, with a number if that is taken.
     fn free_path(&self, name: &str) -> PathBuf {
-        let plain = |c: char| if c.is_alphanumeric() { c.to_lowercase().next().unwrap_or(c) } else { '_' };
-        let stem: String = name.chars().map(plain).collect();
+        let stem = stem(name);
         let numbered = |n: usize| match n {
             1 => format!("{stem}.{SUFFIX}"),
             n => format!("{stem}_{n}.{SUFFIX}"),
@@ -191,9 +207,39 @@ pub fn read_file(path: &Path) -> Result<Preset, String> {
     Preset::parse(&text).map_err(|reason| reason.to_string())
 }
 
+/// A name as files have it.
+fn stem(name: &str) -> String {
+    let plain = |c: char| if c.is_alphanumeric() { c.to_lowercase().next().unwrap_or(c) } else { '_' };
+    name.chars().map(plain).collect()
+}
+
+/// By which names a user may look for a file that is no preset, in lower case: its own, and that in its line `name`.
+fn names_of_broken(path: &Path) -> Vec<String> {
+    let own = path.file_stem().map(|stem| stem.to_string_lossy().to_lowercase());
+    let text = text_file::read(path).unwrap_or_default();
+    let inside = text.lines().find_map(|line| {
+        let value = line.trim().strip_prefix("name")?.trim_start().strip_prefix('=')?;
+        Some(value.split('#').next()?.trim().trim_matches(['"', '\'']).to_lowercase())
+    });
+    own.into_iter().chain(inside).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_broken_preset_is_told_by_its_name() {
+        let (_root, folder) = folder();
+        fs::create_dir_all(folder.path()).unwrap();
+        fs::write(folder.path().join("a_b.toml"), "format = 1\nname = \"My ballad\"\nlip = 2\n").unwrap();
+        let user = folder.read();
+        for name in ["My ballad", "my Ballad ", "a_b", "A b"] {
+            let said = crate::presets::find(name, &user).unwrap_err();
+            assert!(said.contains("a_b.toml: line 3"), "{said}");
+        }
+        assert!(crate::presets::find("Other", &user).unwrap_err().contains("there is no preset"));
+    }
 
     fn folder() -> (tempfile::TempDir, UserFolder) {
         let root = tempfile::tempdir().unwrap();

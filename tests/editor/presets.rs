@@ -27,6 +27,7 @@ fn shelf() -> Arc<PresetShelf> {
         presets: vec![mine],
         favourites: BTreeSet::from(["Mine".to_owned()]),
         broken: vec!["bad.toml: line 4: there is no parameter \"lipp\"; did you mean lip?".to_owned()],
+        ..UserPresets::default()
     };
     Arc::new(PresetShelf { user, notice: None })
 }
