@@ -56,10 +56,16 @@ pub enum BreathError {
         /// The field as it stands.
         given: String,
     },
-    /// A time that is negative or not later than that of the line before.
-    #[error(
-        "line {line}: t_s must grow from line to line and start at 0 or later, got {given} after {before}"
-    )]
+    /// A first line of two words that are not the columns.
+    #[error("line {line}: the header must be t_s,gamma, got {given:?}")]
+    Header {
+        /// Line in the file.
+        line: u64,
+        /// The line as it stands.
+        given: String,
+    },
+    /// A time that is not later than that of the line before.
+    #[error("line {line}: t_s must grow from line to line, got {given} after {before}")]
     Time {
         /// Line in the file.
         line: u64,
@@ -67,6 +73,14 @@ pub enum BreathError {
         given: f64,
         /// Time of the line before, s.
         before: f64,
+    },
+    /// A first time that is negative.
+    #[error("line {line}: t_s must be at least 0, got {given}")]
+    Negative {
+        /// Line in the file.
+        line: u64,
+        /// Time of this line, s.
+        given: f64,
     },
     /// A gamma outside 0 to 3 in a file.
     #[error("line {line}: gamma must lie in 0..3 (mouth pressure over closing pressure), got {given}")]
@@ -197,17 +211,25 @@ impl BreathCurve {
             let &[t, g] = fields.as_slice() else {
                 return Err(BreathError::Columns { line, given: text.to_owned() });
             };
-            if std::mem::take(&mut first) && (t, g) == ("t_s", "gamma") {
-                continue;
+            if std::mem::take(&mut first) {
+                if (t, g) == ("t_s", "gamma") {
+                    continue;
+                }
+                if [t, g].iter().all(|field| field.parse::<f64>().is_err()) {
+                    return Err(BreathError::Header { line, given: text.to_owned() });
+                }
             }
             let number = |given: &str, column| {
                 let refused = || BreathError::Number { line, column, given: given.to_owned() };
                 given.parse::<f64>().ok().filter(|x| x.is_finite()).ok_or_else(refused)
             };
             let (t, g) = (number(t, "t_s")?, number(g, "gamma")? as f32);
-            let before = points.last().map_or(f64::NEG_INFINITY, |p| p.0);
-            if t < 0.0 || t <= before {
-                return Err(BreathError::Time { line, given: t, before: before.max(0.0) });
+            match points.last() {
+                None if t < 0.0 => return Err(BreathError::Negative { line, given: t }),
+                Some(&(before, _)) if t <= before => {
+                    return Err(BreathError::Time { line, given: t, before });
+                }
+                _ => {}
             }
             if !(0.0..=GAMMA_MAX).contains(&g) {
                 return Err(BreathError::LineGamma { line, given: g });
@@ -317,7 +339,13 @@ mod tests {
         assert!(refusal("0,0.1\n\n0,0.2\n").starts_with("line 3: t_s must grow"));
         assert!(refusal("0,0.1,7\n").starts_with("line 1: expected two columns t_s,gamma, got \"0,0.1,7\""));
         assert!(refusal("0,3.5\n").starts_with("line 1: gamma must lie in 0..3"));
-        assert!(refusal("-1,0.5\n").starts_with("line 1: t_s"));
+        assert!(refusal("-1,0.5\n").starts_with("line 1: t_s must be at least 0, got -1"));
+        assert!(refusal("0,0.5\n-1,0.5\n").starts_with("line 2: t_s must grow"));
+        let header = refusal("time,pressure\n0,0.5\n");
+        assert!(
+            header.starts_with("line 1: the header must be t_s,gamma, got \"time,pressure\""),
+            "{header}"
+        );
         assert!(refusal("0,nan\n").starts_with("line 1: gamma must be a number"));
         assert!(refusal("# nothing\n").starts_with("no data"));
     }
