@@ -70,11 +70,13 @@ impl RenderMonitor {
             .find(within)
             .map_or(PERIOD_S, |sounding| 1.0 / sounding.note.frequency_hz(a4_hz));
         let length_s = (PERIODS * period_s).clamp(MOMENT_S.0, MOMENT_S.1);
+        let pitches = soundings.iter().map(|sounding| sounding.note.frequency_hz(a4_hz));
+        let lowest_hz = pitches.fold(f64::INFINITY, f64::min);
         let internal_hz = prepared.model.coeffs.rate_hz;
         let near = ((near_s * internal_hz) as u64, ((near_s + length_s) * internal_hz) as u64);
         let internal = (seconds * internal_hz).ceil() as usize;
         Ok(Self {
-            watcher: Watcher::new(score.samples, rate_hz, COLUMNS),
+            watcher: Watcher::new(score.samples, rate_hz, COLUMNS).with_notes_from(lowest_hz),
             listener: NoteMeter::new(soundings.clone(), rate_hz, a4_hz, gain_db),
             gamma: Envelope::new(internal, COLUMNS),
             moment: ReedCloseUp {

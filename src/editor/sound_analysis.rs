@@ -42,7 +42,11 @@ impl SoundAnalysis {
         let level_db = spectrum.level_db.iter().take(count).map(|&db| (db as f32).max(FLOOR_DB)).collect();
         let bin_hz = spectrum.bin_hz as f32;
         let steady = &heard[WINDOW - latest.len()..];
-        let Some(f0_hz) = pitch::fundamental_hz(steady, rate_hz) else {
+        let f0_hz = match wanted_hz {
+            Some(wanted_hz) => pitch::fundamental_near_hz(steady, rate_hz, wanted_hz),
+            None => pitch::fundamental_hz(steady, rate_hz),
+        };
+        let Some(f0_hz) = f0_hz else {
             return Self { bin_hz, level_db, ..Self::default() };
         };
         let harmonics = spectrum::harmonic_levels_db(steady, rate_hz, f0_hz);
@@ -83,6 +87,12 @@ mod tests {
             assert!((third + 20.0).abs() < 1.0, "{third}");
             assert!(heard.harmonics_db[1] < -40.0);
         }
+    }
+
+    #[test]
+    fn the_lowest_note_of_a_contrabass_has_a_pitch() {
+        let heard = SoundAnalysis::of(&tone(36.7, 48_000.0, &[0.3, 0.0, 0.3]), 48_000.0, Some(36.71));
+        assert!((heard.f0_hz.unwrap() - 36.7).abs() < 0.1, "{:?}", heard.f0_hz);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! costs; at most three windows of samples are kept, a quarter of a second at 48 kHz. Columns of a short sound overlap, those of a long one look at
 //! one moment each: between them nothing is seen of the spectrum, but all of the outline.
 
-use crate::analysis::pitch::{TrackPoint, WINDOW_S, pitch_track};
+use crate::analysis::pitch::{LOWEST_HZ, TrackPoint, pitch_track_above, window_s};
 use crate::analysis::spectrum::power_spectrum_db;
 
 /// Highest frequency of the spectrogram, Hz: above it a clarinet has no strong partials.
@@ -83,6 +83,8 @@ pub struct Watcher {
     samples: usize,
     window: usize,
     hop: usize,
+    /// Lowest pitch that is looked for, Hz.
+    least_hz: f64,
     next_pitch: usize,
     next_column: usize,
     /// The last samples heard, the first of them sample `kept_from` of the sound.
@@ -113,12 +115,19 @@ impl Watcher {
             samples,
             window,
             hop,
+            least_hz: LOWEST_HZ,
             next_pitch: 0,
             next_column: 0,
             kept: Vec::new(),
             kept_from: 0,
             overview,
         }
+    }
+
+    /// The same for a sound with notes from `lowest_hz` on, which may lie below what is looked for otherwise.
+    pub fn with_notes_from(self, lowest_hz: f64) -> Self {
+        // Down to a little less than the note: it may be flat.
+        Self { least_hz: LOWEST_HZ.min(0.9 * lowest_hz), ..self }
     }
 
     /// Sees the next samples. Allocates.
@@ -149,16 +158,18 @@ impl Watcher {
             self.column(middle);
             self.next_column += 1;
         }
-        let window = (WINDOW_S * self.rate_hz).round() as usize;
+        let longest_s = window_s(self.least_hz);
+        let window = (longest_s * self.rate_hz).round() as usize;
         // The pitch of the end is that of the sound, not of the silence after it.
         while self.next_pitch + window <= end.min(self.samples) {
             let frame = self.part(self.next_pitch, window);
             let from_s = self.next_pitch as f64 / self.rate_hz;
-            let points = pitch_track(&frame, self.rate_hz, WINDOW_S);
+            let points = pitch_track_above(&frame, self.rate_hz, longest_s, self.least_hz);
             self.overview.track.extend(points.into_iter().map(|p| TrackPoint { t_s: p.t_s + from_s, ..p }));
             self.next_pitch += self.hop;
         }
-        let spare = (self.kept_from + self.kept.len()).saturating_sub(2 * self.window).max(self.kept_from);
+        let keeps = (2 * self.window).max(self.window + window);
+        let spare = (self.kept_from + self.kept.len()).saturating_sub(keeps).max(self.kept_from);
         self.kept.drain(..spare - self.kept_from);
         self.kept_from = spare;
     }
@@ -233,6 +244,17 @@ mod tests {
         // A look every fortieth of 2 s through 60 ms: the last whole one is at most that and half a window before the end.
         let last = overview.track.last().unwrap().t_s;
         assert!((1.92..1.97).contains(&last), "{last}");
+    }
+
+    #[test]
+    fn the_lowest_notes_have_a_pitch_where_they_are_looked_for() {
+        let tone = |n: u32| (0.3 * (TAU * 36.7 * f64::from(n) / RATE_HZ).sin()) as f32;
+        let samples: Vec<f32> = (0..96_000).map(tone).collect();
+        let mut watcher = Watcher::new(samples.len(), RATE_HZ, 40).with_notes_from(36.7);
+        samples.chunks(512).for_each(|block| watcher.see(block));
+        let track = watcher.finish().track;
+        assert!(track.len() > 30);
+        assert!(track.iter().all(|point| (point.hz.unwrap() / 36.7 - 1.0).abs() < 0.01), "{track:?}");
     }
 
     #[test]

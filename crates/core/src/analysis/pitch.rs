@@ -158,7 +158,17 @@ pub fn periodicity(samples: &[f64], rate_hz: f64, f0_hz: f64) -> f64 {
 
 /// Pitch and level every `hop_s` through windows of 60 ms (three periods of the lowest note), for plots: some cents.
 pub fn pitch_track(samples: &[f64], rate_hz: f64, hop_s: f64) -> Vec<TrackPoint> {
-    let window = (WINDOW_S * rate_hz).round() as usize;
+    pitch_track_above(samples, rate_hz, hop_s, LOWEST_HZ)
+}
+
+/// Window of a track of notes from `least_hz` on, s: as that of a [`pitch_track`], longer for lower notes.
+pub fn window_s(least_hz: f64) -> f64 {
+    WINDOW_S * (LOWEST_HZ / least_hz).max(1.0)
+}
+
+/// The same of notes from `least_hz` on, through windows of [`window_s`].
+pub fn pitch_track_above(samples: &[f64], rate_hz: f64, hop_s: f64, least_hz: f64) -> Vec<TrackPoint> {
+    let window = (window_s(least_hz) * rate_hz).round() as usize;
     let hop = (hop_s * rate_hz).max(1.0);
     (0..)
         .map(|frame| (f64::from(frame) * hop).round() as usize)
@@ -167,7 +177,7 @@ pub fn pitch_track(samples: &[f64], rate_hz: f64, hop_s: f64) -> Vec<TrackPoint>
             let frame = &samples[start..start + window];
             TrackPoint {
                 t_s: (start as f64 + 0.5 * window as f64) / rate_hz,
-                hz: coarse_hz(frame, rate_hz, LOWEST_HZ),
+                hz: coarse_hz(frame, rate_hz, least_hz.min(LOWEST_HZ)),
                 rms: rms(frame),
             }
         })

@@ -13,8 +13,9 @@ use std::sync::Arc;
 
 /// Time in which a note becomes steady, s.
 const SETTLE_S: f64 = 1.2;
-/// Time in which its period is measured, s.
+/// Time in which its period is measured, s, and in how many periods at least.
 const MEASURE_S: f64 = 0.2;
+const PERIODS: f64 = 12.0;
 
 /// One period, sampled at the internal rate. It begins at the largest pressure difference.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,7 +45,8 @@ pub fn measure(
     let settings = &Settings { breath_response: BreathResponse::Physical, ..*settings };
     clarinet.set_settings(settings);
     clarinet.reset();
-    let score = Score::note(note, SETTLE_S + MEASURE_S, rate);
+    let wanted_hz = note.frequency_hz(f64::from(settings.a4_hz));
+    let score = Score::note(note, SETTLE_S + MEASURE_S.max(PERIODS / wanted_hz), rate);
     let score = score.blown(&BreathCurve::constant(gamma), settings, rate);
     let inner_hz = clarinet.internal_rate_hz();
     let closing_pa = settings.closing_pa();
@@ -67,7 +69,7 @@ pub fn measure(
     if rms < SOUNDING_RMS * closing_pa {
         return None;
     }
-    let f_hz = pitch::fundamental_hz(&pressure, inner_hz)?;
+    let f_hz = pitch::fundamental_near_hz(&pressure, inner_hz, wanted_hz)?;
     let count = (inner_hz / f_hz).round() as usize;
     // Half a period before the end of the note, where the tongue comes back.
     let last = moments.len().checked_sub(count / 2 + 1)?;
