@@ -53,7 +53,7 @@ each note. A recorded note differs from its recorded neighbours by 2.7, 6.8 and 
 /// recordings were measured (tests/reference/clarinet_spectra_method.md). error_db is the mean distance of harmonics 2 to 10, each spectrum against its
 /// strongest harmonic and clipped at -60 dB; notes that the instrument does not have are left out; a take that does not sound, or sounds in another register, counts 20 dB. d1 to
 /// d10 are the differences, played less recorded. Noise is that between the harmonics, by bands, against the whole tone; t90 is
-/// the time in which a harmonic reaches 90 % of its level; wander is that of the steady part. Comments sum up.
+/// the time in which a harmonic reaches 90 % of its level, nan where it does not stand 10 dB above the noise beside it; wander is that of the steady part. Comments sum up.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct RealismCommand {
@@ -238,7 +238,7 @@ fn listen(recorded: &RecordedNote, samples: &[f64], take: usize) -> Heard {
     Heard {
         take,
         noise_db: f0_hz.map_or_else(Vec::new, |hz| noise_db(segment, RATE_HZ, hz, &BANDS_HZ)),
-        t90_s: TIMED.map(|harmonic| Partial::watch(samples, RATE_HZ, f0_hz?, harmonic).t90_s()),
+        t90_s: TIMED.map(|harmonic| Partial::clear_t90_s(samples, RATE_HZ, f0_hz?, harmonic)),
         wander: f0_hz.and_then(|hz| Wander::measure(segment, RATE_HZ, hz)),
         score,
     }

@@ -17,6 +17,8 @@ const PERIODS: f64 = 4.0;
 const SHORTEST_S: f64 = 0.015;
 /// Share of the steady level that counts as begun.
 const BEGUN: f64 = 0.9;
+/// A partial that stands less than this above what is beside it, dB, is noise, which has no beginning.
+const CLEAR_DB: f64 = 10.0;
 /// Bands in which a wander is measured, Hz: what a hand or lung does slowly, and what trembles.
 pub const SLOW_HZ: (f64, f64) = (0.3, 3.0);
 /// See [`SLOW_HZ`].
@@ -51,7 +53,11 @@ pub struct Wander {
 impl Partial {
     /// Watches the partial near `harmonic * f0_hz`.
     pub fn watch(samples: &[f64], rate_hz: f64, f0_hz: f64, harmonic: usize) -> Self {
-        let hz = harmonic as f64 * f0_hz;
+        Self::watch_at(samples, rate_hz, f0_hz, harmonic as f64 * f0_hz)
+    }
+
+    /// Watches `hz`, through windows for a tone of `f0_hz`.
+    fn watch_at(samples: &[f64], rate_hz: f64, f0_hz: f64, hz: f64) -> Self {
         let len = ((PERIODS / f0_hz).max(SHORTEST_S) * rate_hz).round() as usize;
         let window: Vec<f64> = cosine_window(len, &HANN).collect();
         let sum: f64 = window.iter().sum();
@@ -74,13 +80,27 @@ impl Partial {
     }
 
     /// Time from the start of the slice to 90 % of the steady amplitude, the median over the last third, s; `None` for
-    /// silence.
+    /// silence, and for what is there from the first moment.
     pub fn t90_s(&self) -> Option<f64> {
-        let steady = median(
-            self.values[self.values.len() * 2 / 3..].iter().map(|value| maths::complex::norm(*value)),
-        )?;
+        let steady = self.steady()?;
         let begun = self.values.iter().position(|value| maths::complex::norm(*value) >= BEGUN * steady)?;
-        (steady > 0.0).then_some(begun as f64 * HOP_S)
+        (steady > 0.0 && begun > 0).then_some(begun as f64 * HOP_S)
+    }
+
+    /// The same for a harmonic of a note, if it stands clear of the noise beside it, half-way to its neighbours; `None` otherwise.
+    pub fn clear_t90_s(samples: &[f64], rate_hz: f64, f0_hz: f64, harmonic: usize) -> Option<f64> {
+        let partial = Self::watch(samples, rate_hz, f0_hz, harmonic);
+        let beside =
+            |part: f64| Self::watch_at(samples, rate_hz, f0_hz, (harmonic as f64 + part) * f0_hz).steady();
+        let noise = beside(-0.5)?.max(beside(0.5)?);
+        let is_clear = partial.steady()? >= noise * maths::pow(10.0, CLEAR_DB / 20.0);
+        is_clear.then(|| partial.t90_s()).flatten()
+    }
+
+    /// Median amplitude over the last third.
+    fn steady(&self) -> Option<f64> {
+        let last = &self.values[self.values.len() * 2 / 3..];
+        median(last.iter().map(|value| maths::complex::norm(*value)))
     }
 
     /// Level, dB.
@@ -190,6 +210,24 @@ mod tests {
             // 4 % of the other band remain, from the kinks at the ends.
             assert!(outside < 0.15, "{rate} Hz: {wander:?}");
         }
+    }
+
+    /// What is there all the time, or hardly more than noise, has no beginning.
+    #[test]
+    fn what_does_not_begin_has_no_time() {
+        let rate = RATE_HZ;
+        let mut white = crate::dsp::white::White::new(3);
+        let note: Vec<f64> = (0..88_200)
+            .map(|n| {
+                let t = f64::from(n) / rate;
+                let rise = (t / 0.1).min(1.0);
+                let third = 0.02 * (TAU * 600.0 * t).sin();
+                rise * (TAU * 200.0 * t).sin() + third + 0.01 * white.next()
+            })
+            .collect();
+        let t90 = |harmonic| Partial::clear_t90_s(&note, rate, 200.0, harmonic);
+        assert!((t90(1).unwrap() - 0.08).abs() < 0.012, "{:?}", t90(1));
+        assert_eq!((t90(3), t90(5), t90(7)), (None, None, None));
     }
 
     #[test]
