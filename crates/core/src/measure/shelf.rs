@@ -5,7 +5,8 @@ use std::f64::consts::PI;
 
 /// A filter that leaves lows as they are and lifts highs.
 ///
-/// `H(s) = (1 + s/z) / (1 + s/p)` with `z = w / sqrt G`, `p = w sqrt G`, by the bilinear transform.
+/// `H(s) = (1 + s/z) / (1 + s/p)` with `z = w / sqrt G`, `p = w sqrt G`, by the bilinear transform, which is right at `w`: the
+/// middle is prewarped.
 ///
 /// ```
 /// use chalumeau_core::measure::shelf::Shelf;
@@ -26,7 +27,8 @@ impl Shelf {
     /// Filters samples at `rate_hz`, from rest.
     pub fn apply(&self, samples: &mut [f64], rate_hz: f64) {
         let root = maths::pow(10.0, self.lift_db / 40.0);
-        let turn = rate_hz / (PI * self.middle_hz);
+        let half = PI * self.middle_hz / rate_hz;
+        let turn = maths::cos(half) / maths::sin(half);
         let (zero, pole) = (turn * root, turn / root);
         let scale = 1.0 / (1.0 + pole);
         let (now, before, back) = ((1.0 + zero) * scale, (1.0 - zero) * scale, (1.0 - pole) * scale);
@@ -55,6 +57,19 @@ mod tests {
             shelf.apply(&mut sound, RATE_HZ);
             let gain_db = 20.0 * (rms(&sound) / before).log10();
             assert!((gain_db - wanted_db).abs() < 0.1, "{hz} Hz: {gain_db} dB");
+        }
+    }
+
+    #[test]
+    fn the_middle_is_in_the_middle_near_half_the_rate_too() {
+        const RATE_HZ: f64 = 44_100.0;
+        for middle_hz in [8_000.0, 15_000.0, 20_000.0] {
+            let mut sound: Vec<f64> =
+                (0..44_100).map(|n| (2.0 * PI * middle_hz * f64::from(n) / RATE_HZ).sin()).collect();
+            let before = rms(&sound);
+            Shelf { middle_hz, lift_db: 4.0 }.apply(&mut sound, RATE_HZ);
+            let gain_db = 20.0 * (rms(&sound) / before).log10();
+            assert!((gain_db - 2.0).abs() < 0.02, "{middle_hz} Hz: {gain_db} dB");
         }
     }
 }
