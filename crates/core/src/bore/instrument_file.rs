@@ -418,7 +418,8 @@ fn segments(raw: Vec<Lined<RawSegment>>, words: &Words) -> Result<Vec<BoreSegmen
                 expected: words.x_start.given(end_mm),
             });
         }
-        if segment.x_end_mm - end_mm < SHORTEST_MM {
+        // The ends of a cone of just this length may differ by a little less in their last bits.
+        if segment.x_end_mm - end_mm < SHORTEST_MM - 1e-6 {
             return Err(InstrumentError::Value {
                 place: place.to_string(),
                 field: words.x_end.name.clone(),
@@ -446,6 +447,29 @@ fn segments(raw: Vec<Lined<RawSegment>>, words: &Words) -> Result<Vec<BoreSegmen
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_cone_of_just_the_shortest_length_is_taken() {
+        for start_mm in [0.0, 123.45, 641.2, 700.3] {
+            let cones = |end_mm: f64| {
+                let cone = |from: f64, to: f64| {
+                    format!(
+                        "{{ part = \"x\", x_start_mm = {from}, x_end_mm = {to}, diameter_start_mm = 15.0, diameter_end_mm = 15.0 }}"
+                    )
+                };
+                let before = if start_mm > 0.0 { cone(0.0, start_mm) + ", " } else { String::new() };
+                let bore = format!("bore = [{before}{}, {}]\n", cone(start_mm, end_mm), cone(end_mm, 750.0));
+                InstrumentFile::parse(&format!(
+                    "name = \"x\"\ntransposition_semitones = 0\nreed_volume_mm3 = 0\n{bore}[[fingering]]\nwritten = \"E3\"\nregister = \"chalumeau\"\nmode = 1\nopen = \"\"\n"
+                ))
+            };
+            // As a user writes it: two decimals.
+            let end_mm = ((start_mm + 0.01) * 100.0_f64).round() / 100.0;
+            assert!(cones(end_mm).is_ok(), "{start_mm}: {}", cones(end_mm).unwrap_err());
+            let said = cones(start_mm + 0.009).unwrap_err().to_string();
+            assert!(said.contains("at least 0.01 mm"), "{said}");
+        }
+    }
 
     #[test]
     fn built_in_clarinet_is_a_whole_chart() {
