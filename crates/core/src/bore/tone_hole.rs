@@ -5,7 +5,8 @@
 //! `M2` in parallel with the radiation resistance `R_p`, which gives the radiated power its square-of-frequency law.
 //! A transformer neither stores nor makes energy, so any movement of the opening is safe. Lengths after Dubos et al.
 //! (1999) as openwind uses them; unflanged end 0.6133 b (Levine & Schwinger 1948). In a fast jet the outside loses
-//! `K rho v |v| / 2` (Dalmont & Nederveen 2002): a resistance proportional to the flow, refreshed every sample, and larger
+//! `K rho v |v| / 2` (Dalmont, Nederveen, Dubos, Ollivier, Meserette & te Sligte 2002, *Experimental determination of the equivalent
+//! circuit of an open side hole: linear and non linear behaviour*, Acta Acustica united with Acustica 88, 567): a resistance proportional to the flow, refreshed every sample, and larger
 //! for a hole that is only partly open.
 
 use num_complex::Complex64;
