@@ -80,6 +80,21 @@ impl PictureFile {
         }
     }
 
+    /// What to say of a bitmap in which the words of a figure are too small to read.
+    pub fn too_small_for(&self, figure: &Figure) -> Option<String> {
+        let bitmap = matches!(self.format, PictureFormat::Png | PictureFormat::Gif);
+        let size = self.size.filter(|_| bitmap)?;
+        let least = size.too_small_for(figure)?;
+        Some(format!(
+            "at {size} the words of this figure are too small to read; they can be read from {least} on"
+        ))
+    }
+
+    /// The name of the file.
+    pub fn path(&self) -> &Path {
+        self.file.path()
+    }
+
     /// Draws the figure and gives the file its name.
     pub fn draw(self, figure: &Figure) -> Result<(), PictureError> {
         let bytes = match self.format {

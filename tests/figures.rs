@@ -1,6 +1,7 @@
 //! What figures say, compared as data; and that they can be drawn.
 
 use chalumeau::picture_file::{self, PictureError, PictureFile};
+use chalumeau_figure::draw;
 use chalumeau_figure::{Axis, Direction, Figure, Layer, Line, Mark, Panel, SecondAxis};
 use std::ffi::OsStr;
 use std::fs;
@@ -42,6 +43,37 @@ fn a_figure_becomes_a_png_or_an_svg_of_its_size() {
     let refused = PictureFile::moving(&path("a.png"), true, None).err().unwrap().to_string();
     assert!(refused.contains(".gif"), "{refused}");
     assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 2, "nothing else is left");
+}
+
+/// In a small size words shrink with everything else: the curves keep their room.
+#[test]
+fn a_small_figure_is_the_same_figure() {
+    let own = draw::svg(&tall(), None).unwrap();
+    let (_, words) = own.split_once("viewBox=\"0 0 1600 1500\"").unwrap();
+    let small = draw::svg(&tall(), Some("400x400".parse().unwrap())).unwrap();
+    // 400 over 1600 is less than 400 over 1500: there is a little more room down.
+    let (head, shrunk) = small.split_once("viewBox=\"0 0 1600 1600\"").unwrap();
+    assert!(head.contains("width=\"400\" height=\"400\""), "{head}");
+    let said = |svg: &str| svg.matches("aria-label").count();
+    assert_eq!(said(words), said(shrunk));
+    // Where there is more room, words stay as they are.
+    assert!(
+        draw::svg(&tall(), Some("3200x3000".parse().unwrap())).unwrap().contains("viewBox=\"0 0 3200 3000\"")
+    );
+    let half: draw::Size = "800x750".parse().unwrap();
+    assert_eq!(half.too_small_for(&tall()), None);
+    let least = "800x500".parse::<draw::Size>().unwrap().too_small_for(&tall());
+    assert_eq!(least.unwrap().to_string(), "640x600");
+}
+
+/// As the figure of a bifurcation: three rows.
+fn tall() -> Figure {
+    let figure = Figure::new("Three rows").note("a note").size(1_600, 1_500);
+    ["rms", "shut", "gamma"].into_iter().fold(figure, |figure, name| {
+        let curve = (0..200).map(|n| (f64::from(n) / 100.0, f64::from(n * n)));
+        let panel = Panel::new(name, Axis::linear("pressure, kPa"), Axis::linear("value"));
+        figure.panel(panel.with(Line::new(name, curve)))
+    })
 }
 
 #[test]

@@ -14,7 +14,8 @@ pub struct PlotArgs {
     /// Also draw a figure: a new .png or .svg file, or .json for its data
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
-    /// Size of the figure, pixels, 400..4000 each way, for example 1600x1000 [default: depends on the figure]
+    /// Size of the figure, pixels, 400..4000 each way, for example 1600x1000 [default: depends on the figure]. In a smaller size than
+    /// its own all words shrink along
     #[arg(long, value_name = "WxH", requires = "plot")]
     plot_size: Option<Size>,
 }
@@ -52,7 +53,13 @@ impl Plot {
     /// Draws what `figure` returns, if a figure is wanted.
     pub fn draw(self, figure: impl FnOnce() -> Figure) -> Result<(), Failure> {
         match self.sheet {
-            Some(sheet) => Ok(sheet.draw(&figure())?),
+            Some(sheet) => {
+                let figure = figure();
+                if let Some(warning) = sheet.too_small_for(&figure) {
+                    say!("warning: {warning}");
+                }
+                Ok(sheet.draw(&figure)?)
+            }
             None => Ok(()),
         }
     }

@@ -17,6 +17,7 @@ use chalumeau_core::reed::physical::DimensionlessReed;
 use chalumeau_core::reed::physical::P_REF_PA;
 use chalumeau_core::units::REFERENCE_RADIUS_M;
 use chalumeau_core::units::WrittenNote;
+use chalumeau_figure::Figure;
 use chalumeau_figure::draw::Size;
 use chalumeau_figure::reed::LawFigure;
 use chalumeau_figure::reed_orbit::ReedOrbit;
@@ -236,13 +237,27 @@ impl Drawing {
         let sheets =
             wanted.iter().map(|&which| self.sheet(which, out, force)).collect::<Result<Vec<_>, _>>()?;
         let orbit = orbit.map(|play| play()).transpose()?;
+        let warn = |sheet: &PictureFile, figure: &Figure| {
+            if let Some(warning) = sheet.too_small_for(figure) {
+                say!("warning: {}: {warning}", sheet.path().display());
+            }
+        };
         for (which, sheet) in sheets {
-            match (which.kind(), &orbit) {
-                (Some(kind), _) => sheet.draw(&kind.figure()?)?,
-                (None, Some(orbit)) if which == Which::Orbit => sheet.draw(&orbit.figure())?,
-                _ => {
+            let still = match (which.kind(), &orbit) {
+                (Some(kind), _) => Some(kind.figure()?),
+                (None, Some(orbit)) if which == Which::Orbit => Some(orbit.figure()),
+                _ => None,
+            };
+            match still {
+                Some(figure) => {
+                    warn(&sheet, &figure);
+                    sheet.draw(&figure)?;
+                }
+                None => {
+                    let frames = reed_sweep(FRAMES)?;
+                    frames.iter().take(1).for_each(|figure| warn(&sheet, figure));
                     let bar = progress(FRAMES);
-                    sheet.animate(&reed_sweep(FRAMES)?, FRAME_S, || bar.inc(1))?;
+                    sheet.animate(&frames, FRAME_S, || bar.inc(1))?;
                     bar.finish_and_clear();
                 }
             }

@@ -26,6 +26,8 @@ use std::str::FromStr;
 const FINEST: u32 = 3;
 /// Up to this size; larger ones twice, to spare memory.
 const FINEST_PIXELS: u32 = 4_000_000;
+/// Smaller than so, words of a bitmap cannot be read: they are 8 pixels high here.
+const LEAST_SCALE: f64 = 0.4;
 /// Vector pictures are drawn in this part of a pixel.
 const TENTH: u32 = 10;
 
@@ -56,7 +58,7 @@ pub struct Size {
 }
 
 impl Size {
-    /// Below this no axis has room for its words.
+    /// Below this hardly anything can be told apart.
     pub const MIN: u32 = 400;
     /// Above this bitmaps no longer fit in memory with ease.
     pub const MAX: u32 = 4_000;
@@ -65,6 +67,35 @@ impl Size {
     fn of(figure: &Figure) -> Self {
         let [width, height] = figure.size.map(|pixels| pixels.clamp(Self::MIN, Self::MAX));
         Self { width, height }
+    }
+
+    /// How much smaller than in its own size everything in a figure is drawn, words among it, so that each panel keeps its room.
+    /// In a larger size nothing grows: there is more room.
+    fn scale(self, figure: &Figure) -> f64 {
+        let own = Self::of(figure);
+        let across = f64::from(self.width) / f64::from(own.width);
+        let down = f64::from(self.height) / f64::from(own.height);
+        across.min(down).min(1.0)
+    }
+
+    /// Width and height in pixels of the figure's own size, in which it is laid out.
+    fn laid_out(self, figure: &Figure) -> (f64, f64) {
+        let scale = self.scale(figure);
+        (f64::from(self.width) / scale, f64::from(self.height) / scale)
+    }
+
+    /// The size from which on the words of a figure can be read in a bitmap, if this one is smaller.
+    pub fn too_small_for(self, figure: &Figure) -> Option<Self> {
+        let own = Self::of(figure);
+        let least = |pixels: u32| ((LEAST_SCALE * f64::from(pixels)).ceil() as u32).max(Self::MIN);
+        (self.scale(figure) < LEAST_SCALE)
+            .then(|| Self { width: least(own.width), height: least(own.height) })
+    }
+}
+
+impl fmt::Display for Size {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}x{}", self.width, self.height)
     }
 }
 
@@ -151,8 +182,8 @@ fn rgb(figure: &Figure, size: Size) -> Result<Vec<u8>, DrawError> {
     let mut fine = vec![paper; (width * height * 3) as usize];
     {
         let backend = BitMapBackend::with_buffer(&mut fine, (width, height));
-        let mut canvas = Canvas::new(backend, f64::from(finer), None);
-        layout::draw(&mut canvas, figure, size)?;
+        let mut canvas = Canvas::new(backend, f64::from(finer) * size.scale(figure), None);
+        layout::draw(&mut canvas, figure, size.laid_out(figure))?;
         canvas.finish()?;
     }
     let stride = (3 * width) as usize;
@@ -195,10 +226,11 @@ pub fn svg(figure: &Figure, size: Option<Size>) -> Result<String, DrawError> {
     let size = size.unwrap_or(Size::of(figure));
     let mut drawn = String::new();
     let vector = {
-        let (width, height) = (size.width * TENTH, size.height * TENTH);
-        let backend = SVGBackend::with_string(&mut drawn, (width, height));
+        let tenths = |pixels: f64| (pixels * f64::from(TENTH)).ceil() as u32;
+        let (width, height) = size.laid_out(figure);
+        let backend = SVGBackend::with_string(&mut drawn, (tenths(width), tenths(height)));
         let mut canvas = Canvas::new(backend, f64::from(TENTH), Some(SvgParts::default()));
-        layout::draw(&mut canvas, figure, size)?;
+        layout::draw(&mut canvas, figure, (width, height))?;
         canvas.finish()?.unwrap_or_default()
     };
     // The backend's head names its size in tenths; its shapes stay in them, pictures and words are in pixels.
@@ -207,10 +239,11 @@ pub fn svg(figure: &Figure, size: Option<Size>) -> Result<String, DrawError> {
     let body = body.and_then(|body| body.rfind("</svg>").map(|end| &body[..end]));
     let body = body.ok_or_else(|| DrawError::Backend("the SVG backend wrote no <svg>".to_owned()))?;
     let (width, height) = (size.width, size.height);
+    let (wide, high) = size.laid_out(figure);
     let title = escaped(&figure.title);
     Ok(format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} \
-         {height}\">\n<title>{title}</title>\n<rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n{}<g \
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {wide} \
+         {high}\">\n<title>{title}</title>\n<rect width=\"{wide}\" height=\"{high}\" fill=\"#ffffff\"/>\n{}<g \
          transform=\"scale({})\" stroke-linejoin=\"round\" stroke-linecap=\"round\">\n{}\n</g>\n{}</svg>\n",
         vector.under,
         1.0 / f64::from(TENTH),
@@ -235,4 +268,40 @@ pub(super) fn escaped(text: &str) -> String {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Axis, Line, Panel};
+
+    /// As the figure of a bifurcation: three rows.
+    fn tall() -> Figure {
+        let figure = Figure::new("Three rows").note("a note").size(1_600, 1_500);
+        ["rms", "shut", "gamma"].into_iter().fold(figure, |figure, name| {
+            let curve = (0..200).map(|n| (f64::from(n) / 100.0, f64::from(n * n)));
+            let panel = Panel::new(name, Axis::linear("pressure, kPa"), Axis::linear("value"));
+            figure.panel(panel.with(Line::new(name, curve)))
+        })
+    }
+
+    /// Share of what is not paper in each of so many equal stripes, from the top.
+    fn ink(size: Size, stripes: usize) -> Vec<f64> {
+        let pixels = rgb(&tall(), size).unwrap();
+        let dark: Vec<f64> = pixels
+            .chunks(3 * size.width as usize)
+            .map(|row| row.chunks(3).map(|pixel| 255.0 - f64::from(pixel[1])).sum())
+            .collect();
+        let all: f64 = dark.iter().sum();
+        dark.chunks(dark.len() / stripes).take(stripes).map(|part| part.iter().sum::<f64>() / all).collect()
+    }
+
+    #[test]
+    fn every_row_of_a_small_figure_has_its_room() {
+        let (own, small) = (Size { width: 1_600, height: 1_500 }, Size { width: 432, height: 405 });
+        for (own, small) in ink(own, 15).into_iter().zip(ink(small, 15)) {
+            // A thin line is a little wider there.
+            assert!((own - small).abs() < 0.04, "{own} {small}");
+        }
+    }
 }

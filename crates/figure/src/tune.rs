@@ -77,8 +77,10 @@ fn panel(title: &str, rounds: &[Round]) -> Panel {
             notes.map(|(written, _)| (f64::from(*written), level)).collect::<Vec<_>>()
         };
         let worst = points().map(|(_, cents)| cents).filter(|cents| cents.is_finite());
-        let worst = worst.map(f64::abs).fold(0.0, f64::max);
-        let name = format!("{} (largest {worst:.1} cents)", round.name);
+        let name = match worst.map(f64::abs).reduce(f64::max) {
+            Some(worst) => format!("{} (largest {worst:.1} cents)", round.name),
+            None => format!("{} (none sounds)", round.name),
+        };
         panel = panel
             .with(Line::new(name, points()).colour(colour).dash(dash))
             .with(Points::new("", points()).colour(colour).shape(shape).size(5.5));
@@ -127,6 +129,14 @@ mod tests {
             }
         }
         assert_eq!(marks.len(), 2);
+        let names = |round: &Round| -> Vec<String> {
+            let layers = super::figure("test", "", &[], round).panels.remove(0).layers;
+            let line = |layer| if let Layer::Line(line) = layer { Some(line.name) } else { None };
+            layers.into_iter().filter_map(line).collect()
+        };
+        assert_eq!(names(&round()), ["natural (largest 2.0 cents)"]);
+        let silent = Round { name: "natural".to_owned(), notes: notes[1..3].to_vec() };
+        assert_eq!(names(&silent), ["natural (none sounds)"]);
         assert!(marks[0].0 == Shape::Cross && marks[0].1[0] == 61.0 && marks[0].1[1] > low);
         assert!(marks[1].0 == Shape::Ring && marks[1].1[0] == 62.0);
     }

@@ -11,14 +11,17 @@ use crate::draw::legend::{draw_legend, legend};
 use crate::draw::plot_area::{Extent, PlotArea};
 use crate::draw::range::range;
 use crate::draw::sizes::{BAR, GAP, LINE, MARGIN, PANEL_TITLE, SMALL, TITLE, WORDS};
-use crate::draw::{DrawError, Size, font, layer, ticks};
+use crate::draw::{DrawError, font, layer, ticks};
 use crate::palette::{INK, QUIET_INK};
 use crate::{Direction, Figure, Mark, Panel, Scale};
 use plotters_backend::DrawingBackend;
 
-/// Draws the whole figure.
-pub fn draw<B: DrawingBackend>(canvas: &mut Canvas<B>, figure: &Figure, size: Size) -> Result<(), DrawError> {
-    let (width, height) = (f64::from(size.width), f64::from(size.height));
+/// Draws the whole figure, so wide and high.
+pub fn draw<B: DrawingBackend>(
+    canvas: &mut Canvas<B>,
+    figure: &Figure,
+    (width, height): (f64, f64),
+) -> Result<(), DrawError> {
     let mut top = MARGIN;
     if !figure.title.is_empty() {
         for line in wrapped(&figure.title, TITLE, width - 2.0 * MARGIN) {
