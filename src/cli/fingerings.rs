@@ -5,10 +5,14 @@ use crate::cli::csv_table::{TableArgs, quoted};
 use crate::cli::shared_args::{AirArg, InstrumentArg, counted, note, whole};
 use chalumeau_core::bore::fingering_finder::{FingeringFinder, Found};
 use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::bore::transfer_matrix::{Peak, TransferMatrix};
 use chalumeau_core::instrument::concert_pitch::A4_HZ;
-use chalumeau_core::units::WrittenNote;
+use chalumeau_core::units::{WrittenNote, cents};
 use clap::Args;
 use std::ops::ControlFlow;
+
+/// Peaks that an instrument file may name.
+const MODES_MOST: usize = 12;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -26,7 +30,7 @@ Examples:
 /// fingers: keys and holes that the hands press, T thumb, L left, R right; empty where only the chart knows how;
 /// hz, cents: where it sounds, and how far that is from the note;
 /// gamma_on: the mouth pressure at which it begins, over the closing pressure of the reed;
-/// mode: which resonance of the bore it plays, 1 the lowest;
+/// mode: which peak of the impedance it plays, 1 the lowest, as in an instrument file;
 /// evenness_db: how far that resonance stands above the next lower one; below 0 the lower one may sound instead;
 /// empty for the lowest;
 /// cost: what the ranking goes by, less is better: cents, gamma_on, evenness and awkward grips together;
@@ -95,14 +99,16 @@ impl FingeringsCommand {
             }
             return table.finish();
         };
+        let model = TransferMatrix::new(&file, self.air.air());
         let one = |found: &Found| {
+            let mode = mode_of_file(found, &file, &model);
             format!(
                 "{},{:.1},{:+.1},{:.3},{},{},{:.2},{}",
                 quoted(&found.fingers),
                 found.f_hz,
                 found.cents,
                 found.gamma_on,
-                found.mode,
+                mode.map_or_else(String::new, |mode| mode.to_string()),
                 evenness(found),
                 found.cost,
                 quoted(&open(&file, found.grip.open))
@@ -137,6 +143,15 @@ impl FingeringsCommand {
         }
         table.finish()
     }
+}
+
+/// Which peak of the impedance a fingering plays, as instrument files count them: small ones, too, which the search leaves out.
+fn mode_of_file(found: &Found, file: &InstrumentFile, model: &TransferMatrix) -> Option<usize> {
+    let open: Vec<bool> = (0..file.holes.len()).map(|hole| found.grip.open >> hole & 1 == 1).collect();
+    let peaks = model.peaks(&open, file.reed_volume_m3, MODES_MOST);
+    let off = |peak: &Peak| cents(peak.f_hz, found.f_hz).abs();
+    let nearest = peaks.iter().enumerate().min_by(|a, b| off(a.1).total_cmp(&off(b.1)))?;
+    Some(nearest.0 + 1)
 }
 
 /// How far the resonance that plays stands above the next lower one, dB; the lowest one stands above none.
