@@ -2,6 +2,7 @@
 
 use hound::{SampleFormat, WavSpec, WavWriter};
 use std::io::{BufWriter, Seek, Write};
+use std::path::Path;
 
 /// How a sample is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,6 +100,23 @@ impl<W: Write + Seek> WavFile<W> {
     }
 }
 
+/// Whether a file is a sound of this length, s, at `rate` Hz that can be read to its last sample. The length may be off by a tenth of a
+/// millisecond, as tables have it.
+pub fn is_whole(path: &Path, seconds: f64, rate: u32) -> bool {
+    let Ok(mut reader) = hound::WavReader::open(path) else { return false };
+    let (spec, length) = (reader.spec(), reader.duration());
+    let is_long = (f64::from(length) / f64::from(rate) - seconds).abs() < 1e-4;
+    if spec.sample_rate != rate || !is_long {
+        return false;
+    }
+    let Some(last) = length.checked_sub(1) else { return true };
+    reader.seek(last).is_ok()
+        && match spec.sample_format {
+            SampleFormat::Int => reader.samples::<i32>().all(|sample| sample.is_ok()),
+            SampleFormat::Float => reader.samples::<f32>().all(|sample| sample.is_ok()),
+        }
+}
+
 /// Scales -1..=1 to integer full scale, rounds to nearest and clips.
 fn round(sample: f32, full_scale: f64) -> i32 {
     (f64::from(sample).clamp(-1.0, 1.0) * full_scale).round() as i32
@@ -154,6 +172,26 @@ mod tests {
         assert_eq!((level.peak, level.clipped), (1.5, 0));
         let samples: Vec<f32> = reader.samples().map(Result::unwrap).collect();
         assert_eq!(samples, [0.5, -1.0, 1.5, 0.0]);
+    }
+
+    #[test]
+    fn a_sound_that_is_cut_off_is_not_whole() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("x.wav");
+        for depth in [Depth::Int16, Depth::Int24, Depth::Float32] {
+            let mut file = NewFile::create(&path, true).unwrap();
+            let mut wav = WavFile::new(&mut file, 48_000, depth, 2, 480).unwrap();
+            wav.write(&[&[0.25; 480]]).unwrap();
+            wav.finish().unwrap();
+            file.keep().unwrap();
+            assert!(is_whole(&path, 0.01, 48_000), "{depth:?}");
+            assert!(!is_whole(&path, 0.011, 48_000) && !is_whole(&path, 0.01, 44_100), "{depth:?}");
+            let bytes = std::fs::read(&path).unwrap();
+            for length in [bytes.len() - 1, 100, 0] {
+                std::fs::write(&path, &bytes[..length]).unwrap();
+                assert!(!is_whole(&path, 0.01, 48_000), "{depth:?}, {length} bytes");
+            }
+        }
     }
 
     #[test]

@@ -1,18 +1,22 @@
 //! `chalumeau batch`: renders many variations of one command, and a table of what each file is: data sets.
 
+mod earlier;
+mod inputs;
 pub(super) mod plan;
 
 use crate::cli::csv_table::{CsvTable, quoted};
 use crate::cli::files;
+use crate::cli::idle_settings::{self, Idle};
 use crate::cli::render::{LIMITED, RenderCommand, Rendered};
 use crate::cli::shared_args::counted;
 use crate::cli::words::typed;
 use crate::cli::{Failure, parse};
 use chalumeau_core::instrument::side_by_side;
 use clap::{Args, Parser};
+use earlier::Earlier;
 use indicatif::{ProgressBar, ProgressStyle};
+use inputs::{INPUTS, Inputs};
 use plan::{Plan, Variation};
-use std::collections::{BTreeSet, HashMap, HashSet};
 use std::fs;
 use std::io::{self, BufWriter, ErrorKind, Write};
 use std::ops::ControlFlow;
@@ -43,7 +47,7 @@ A CSV file has the names in its first line, and one file to render in each other
 /// Render many variations into a folder, with a table of what each file is
 ///
 /// Works on all cores, and on each renders up to eight files of one instrument side by side; a file is the same as if it were rendered by itself. If it is stopped, the same command goes on where it was: files that are listed with the same arguments stay
-/// as they are. A folder with files of another plan is refused. The table, manifest.csv, has a line for each file: its arguments, length, peak and level.
+/// as they are, unless a file or a preset that they are made of has changed. A folder with files of another plan is refused. The table, manifest.csv, has a line for each file: its arguments, length, peak and level.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub struct BatchCommand {
@@ -123,18 +127,21 @@ impl BatchCommand {
         self.refuse_names()?;
         let plan = Plan::read(&self.plan).map_err(|what| self.failure(&what))?;
         let jobs = self.jobs(&plan)?;
+        let mut idle_in_all: Option<Vec<Idle>> = None;
         for job in &jobs {
-            let checked = job.render.check();
-            checked.map_err(|failure| {
+            let idle = job.render.check().map_err(|failure| {
                 self.failure(&format!("{}: {failure} (chalumeau {})", job.place, typed(&job.words)))
             })?;
+            match &mut idle_in_all {
+                Some(all) => all.retain(|one| idle.contains(one)),
+                None => idle_in_all = Some(idle),
+            }
+        }
+        if let Some(idle) = idle_settings::in_words(&idle_in_all.unwrap_or_default()) {
+            say!("warning: in every file, {idle}");
         }
         if self.dry_run {
-            let mut out = BufWriter::new(io::stdout().lock());
-            for job in &jobs {
-                writeln!(out, "chalumeau {}", typed(&job.words))?;
-            }
-            return Ok(out.flush()?);
+            return dry_run(&jobs);
         }
         fs::create_dir_all(&self.into)
             .map_err(|error| self.failure(&format!("cannot make {}: {error}", self.into.display())))?;
@@ -143,86 +150,51 @@ impl BatchCommand {
         if !self.force {
             earlier.check(&self.into, &header, &jobs)?;
         }
-        let there = if self.force { HashMap::new() } else { earlier.lines_by_arguments() };
-        let growing = self.into.join(GROWING);
-        let mut journal =
-            new_journal(&growing).map_err(|source| Failure::Batch { path: growing.clone(), source })?;
-        // In one piece: a run that is stopped leaves whole lines.
-        let mut say = |line: &str| {
-            let line = format!("{line}\n");
-            journal
-                .write_all(line.as_bytes())
-                .map_err(|source| Failure::Batch { path: growing.clone(), source })
-        };
-        say(&header)?;
+        let inputs = Inputs::read(&self.into, &jobs)?;
+        let (mut lines, changed) =
+            if self.force { (vec![None; jobs.len()], 0) } else { earlier.kept(&self.into, &jobs, &inputs) };
+        say_what_stays(lines.iter().flatten().count(), changed, jobs.len());
+        let journal = self.open_journal(&header, &jobs, &lines, &inputs)?;
+        let doubtful = render_left(&jobs, &mut lines, journal)?;
+        self.write_manifest(&header, &lines)?;
+        say!("{}: {} and {MANIFEST}", self.into.display(), counted(jobs.len(), "file"));
+        doubtful.warn();
+        if let Some(left_over) = earlier.left_over(&self.into, &jobs) {
+            say!("{left_over}");
+        }
+        Ok(())
+    }
+
+    /// The table that grows while files become ready, with those that stay.
+    fn open_journal<'a>(
+        &self,
+        header: &str,
+        jobs: &[Job],
+        lines: &[Option<String>],
+        inputs: &'a Inputs,
+    ) -> Result<Journal<'a>, Failure> {
+        let path = self.into.join(GROWING);
+        let table = new_table(&path).map_err(|source| Failure::Batch { path: path.clone(), source })?;
+        let stays = jobs.iter().zip(lines).filter(|(_, line)| line.is_some());
+        let made_of = inputs.open(&stays.map(|(job, _)| job.file.clone()).collect::<Vec<_>>())?;
+        let mut journal = Journal { path, table, inputs, made_of };
+        journal.say(header)?;
         if self.force {
             // It lists files that are about to be replaced. Without it, the same command can go on after a stop, without --force.
             let _ = fs::remove_file(self.into.join(MANIFEST));
         }
-        let mut lines = Vec::with_capacity(jobs.len());
-        for job in &jobs {
-            let kept = there.get(&job.line).filter(|_| self.into.join(&job.file).is_file());
-            if let Some(line) = kept {
-                say(line)?;
-            }
-            lines.push(kept.cloned());
-        }
-        let mut left: Vec<_> = (0..jobs.len()).filter(|&at| lines[at].is_none()).collect();
-        if left.len() < jobs.len() {
-            let are = if jobs.len() == 1 { "is" } else { "are" };
-            say!("{} of {} {are} there already", jobs.len() - left.len(), counted(jobs.len(), "file"));
-        }
-        // Those of one bore one after another: only they play side by side.
-        left.sort_by(|&one, &other| jobs[one].bore.cmp(&jobs[other].bore));
-        let bar = progress(left.len());
-        let (journal, failed) = (Mutex::new(&mut say), Mutex::new(None));
-        let doubtful = Mutex::new(Doubtful::default());
-        let made = side_by_side::each(
-            left.len(),
-            async |stand, at| {
-                let job = &jobs[left[at]];
-                let made = job.render.render_beside(stand, |_| ProgressBar::hidden()).await;
-                let line = made.and_then(|made| {
-                    let line = finished(&job.line, &made);
-                    if let Ok(mut doubtful) = doubtful.lock() {
-                        doubtful.look(&job.file, &made);
-                    }
-                    if let Ok(mut say) = journal.lock() {
-                        (*say)(&line)?;
-                    }
-                    Ok(line)
-                });
-                line.map_err(|failure| {
-                    if let Ok(mut failed) = failed.lock() {
-                        failed.get_or_insert((typed(&job.words), failure));
-                    }
-                })
-                .ok()
-            },
-            &mut |_| {
-                bar.inc(1);
-                let has_failed = failed.lock().is_ok_and(|failed| failed.is_some());
-                if has_failed { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-            },
-        );
-        bar.finish_and_clear();
-        if let Some((words, failure)) = failed.into_inner().ok().flatten() {
-            return Err(Failure::Usage(format!("chalumeau {words}: {failure}")));
-        }
-        for (at, line) in left.into_iter().zip(made.unwrap_or_default()) {
-            lines[at] = line;
-        }
-        let mut table = CsvTable::open(&self.into.join(MANIFEST), true, &header)?;
+        lines.iter().flatten().try_for_each(|line| journal.say(line))?;
+        Ok(journal)
+    }
+
+    /// The table of all files, in their order, in place of the one that grew.
+    fn write_manifest(&self, header: &str, lines: &[Option<String>]) -> Result<(), Failure> {
+        let mut table = CsvTable::open(&self.into.join(MANIFEST), true, header)?;
         for line in lines.iter().flatten() {
             table.line(format_args!("{line}"))?;
         }
         table.finish()?;
-        let _ = fs::remove_file(&growing);
-        say!("{}: {} and {MANIFEST}", self.into.display(), counted(jobs.len(), "file"));
-        doubtful.into_inner().unwrap_or_default().warn();
-        if let Some(left_over) = earlier.left_over(&self.into, &jobs) {
-            say!("{left_over}");
-        }
+        let _ = fs::remove_file(self.into.join(GROWING));
         Ok(())
     }
 
@@ -238,7 +210,7 @@ impl BatchCommand {
                 self.into.display()
             )));
         }
-        let tables = [MANIFEST, GROWING].map(|name| self.into.join(name));
+        let tables = [MANIFEST, GROWING, INPUTS].map(|name| self.into.join(name));
         files::keep_apart(
             "is the plan, and is replaced by a table of the files that are made",
             &[Some(&self.plan)],
@@ -277,104 +249,111 @@ impl BatchCommand {
     }
 }
 
-/// The tables that earlier runs left in the folder, without lines that were cut off.
-struct Earlier {
-    finished: String,
-    growing: String,
+/// Prints the commands.
+fn dry_run(jobs: &[Job]) -> Result<(), Failure> {
+    let mut out = BufWriter::new(io::stdout().lock());
+    for job in jobs {
+        writeln!(out, "chalumeau {}", typed(&job.words))?;
+    }
+    Ok(out.flush()?)
 }
 
-impl Earlier {
-    fn read(folder: &Path) -> Result<Self, Failure> {
-        let table = |name: &str| match fs::read(folder.join(name)) {
-            Ok(bytes) => {
-                let whole = bytes.iter().rposition(|&byte| byte == b'\n').map_or(0, |end| end + 1);
-                Ok(String::from_utf8_lossy(&bytes[..whole]).into_owned())
-            }
-            Err(error) if error.kind() == ErrorKind::NotFound => Ok(String::new()),
-            Err(source) => Err(Failure::Read { path: folder.join(name), source }),
-        };
-        Ok(Self { finished: table(MANIFEST)?, growing: table(GROWING)? })
+/// Says how many files stay, and how many are there and are made of something else by now.
+fn say_what_stays(stay: usize, changed: usize, all: usize) {
+    if stay > 0 {
+        let are = if all == 1 { "is" } else { "are" };
+        say!("{stay} of {} {are} there already", counted(all, "file"));
+    }
+    if changed > 0 {
+        let are = if changed == 1 { "is" } else { "are" };
+        say!(
+            "{} {are} rendered again: what they are made of has changed, or is not known",
+            counted(changed, "file")
+        );
+    }
+}
+
+/// The table of the files that are ready, in the order in which they became so, and what they were made of.
+struct Journal<'a> {
+    path: PathBuf,
+    table: fs::File,
+    inputs: &'a Inputs,
+    made_of: Option<fs::File>,
+}
+
+impl Journal<'_> {
+    /// In one piece: a run that is stopped leaves whole lines.
+    fn say(&mut self, line: &str) -> Result<(), Failure> {
+        let written = self.table.write_all(format!("{line}\n").as_bytes());
+        written.map_err(|source| Failure::Batch { path: self.path.clone(), source })
     }
 
-    /// The lines of both tables without their headers.
-    fn lines(&self) -> impl Iterator<Item = &str> {
-        [&self.finished, &self.growing].into_iter().flat_map(|text| text.lines().skip(1))
-    }
-
-    /// The lines by their beginnings: file and arguments.
-    fn lines_by_arguments(&self) -> HashMap<String, String> {
-        self.lines().map(|line| (beginning(line).to_owned(), line.to_owned())).collect()
-    }
-
-    /// Refuses a folder with files that this plan has not made and would replace.
-    fn check(&self, folder: &Path, header: &str, jobs: &[Job]) -> Result<(), Failure> {
-        let refuse = |name: &str, is: &str| {
-            Failure::Usage(format!(
-                "{} {is}; choose another folder, or add --force to render all anew",
-                folder.join(name).display()
-            ))
-        };
-        // A run whose first file failed has left a table without files.
-        if self.lines().next().is_none() && !has_numbered_files(folder) {
-            return Ok(());
+    /// A file has become ready.
+    fn made(&mut self, job: &Job, line: &str) -> Result<(), Failure> {
+        if let Some(made_of) = &mut self.made_of {
+            self.inputs.add(made_of, job)?;
         }
-        for (name, text) in [(MANIFEST, &self.finished), (GROWING, &self.growing)] {
-            if text.lines().next().is_some_and(|first| first != header) {
-                return Err(refuse(name, "is of another plan"));
-            }
-        }
-        let listed: HashMap<_, _> = self.lines().map(|line| (file_name(line), beginning(line))).collect();
-        for job in jobs {
-            match listed.get(job.file.as_str()) {
-                Some(&line) if line == job.line => {}
-                Some(_) => return Err(refuse(&job.file, "is of another plan")),
-                // A stopped run has finished files that it had no time to list.
-                None if !self.growing.is_empty() => {}
-                None if folder.join(&job.file).exists() => {
-                    return Err(refuse(&job.file, "is there and is not of this plan"));
+        self.say(line)
+    }
+}
+
+/// Renders the files of jobs that have no line, and gives them theirs.
+fn render_left(
+    jobs: &[Job],
+    lines: &mut [Option<String>],
+    journal: Journal<'_>,
+) -> Result<Doubtful, Failure> {
+    let mut left: Vec<_> = (0..jobs.len()).filter(|&at| lines[at].is_none()).collect();
+    // Those of one bore one after another: only they play side by side.
+    left.sort_by(|&one, &other| jobs[one].bore.cmp(&jobs[other].bore));
+    let bar = progress(left.len());
+    let (journal, failed) = (Mutex::new(journal), Mutex::new(None));
+    let doubtful = Mutex::new(Doubtful::default());
+    let made = side_by_side::each(
+        left.len(),
+        async |stand, at| {
+            let job = &jobs[left[at]];
+            let made = job.render.render_beside(stand, |_| ProgressBar::hidden()).await;
+            let line = made.and_then(|made| {
+                let line = finished(&job.line, &made);
+                if let Ok(mut doubtful) = doubtful.lock() {
+                    doubtful.look(&job.file, &made);
                 }
-                None => {}
-            }
-        }
-        Ok(())
+                if let Ok(mut journal) = journal.lock() {
+                    journal.made(job, &line)?;
+                }
+                Ok(line)
+            });
+            line.map_err(|failure| {
+                if let Ok(mut failed) = failed.lock() {
+                    failed.get_or_insert((typed(&job.words), failure));
+                }
+            })
+            .ok()
+        },
+        &mut |_| {
+            bar.inc(1);
+            let has_failed = failed.lock().is_ok_and(|failed| failed.is_some());
+            if has_failed { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        },
+    );
+    bar.finish_and_clear();
+    if let Some((words, failure)) = failed.into_inner().ok().flatten() {
+        return Err(Failure::Usage(format!("chalumeau {words}: {failure}")));
     }
-
-    /// Says which listed files are still there and are not of this plan.
-    fn left_over(&self, folder: &Path, jobs: &[Job]) -> Option<String> {
-        let ours: HashSet<_> = jobs.iter().map(|job| job.file.as_str()).collect();
-        let others: BTreeSet<_> = self
-            .lines()
-            .map(file_name)
-            .filter(|&name| is_numbered(name) && !ours.contains(name) && folder.join(name).is_file())
-            .collect();
-        let (first, last) = (others.first()?, others.last()?);
-        let which = if first == last { (*first).to_owned() } else { format!("{first} to {last}") };
-        Some(format!(
-            "{} holds {} of an earlier plan, which {MANIFEST} does not list: {which}",
-            folder.display(),
-            counted(others.len(), "file")
-        ))
+    for (at, line) in left.into_iter().zip(made.unwrap_or_default()) {
+        lines[at] = line;
     }
+    Ok(doubtful.into_inner().unwrap_or_default())
 }
 
-/// An empty journal in place of an earlier one. What an earlier one links to is not touched.
-fn new_journal(path: &Path) -> io::Result<fs::File> {
+/// An empty table in place of an earlier one. What an earlier one links to is not touched.
+fn new_table(path: &Path) -> io::Result<fs::File> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
         _ => {}
     }
     fs::File::create_new(path)
-}
-
-/// Whether a file is called as the batch calls its own.
-fn is_numbered(name: &str) -> bool {
-    let number = name.strip_suffix(".wav").unwrap_or_default();
-    !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())
-}
-
-fn has_numbered_files(folder: &Path) -> bool {
-    let files = fs::read_dir(folder).into_iter().flatten().flatten();
-    files.into_iter().any(|file| file.file_name().to_str().is_some_and(is_numbered))
 }
 
 /// Clap's own text without its "error: " and usage: with a list of what is missing, which stands on further lines.
@@ -383,19 +362,6 @@ fn in_one_line(error: &clap::Error) -> String {
     let lines: Vec<_> = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect();
     lines.join(" ").trim_start_matches("error: ").to_owned()
 }
-
-/// File and arguments: a line without what is known after the rendering.
-fn beginning(line: &str) -> &str {
-    line.rsplitn(MEASURED_COLUMNS + 1, ',').last().unwrap_or_default()
-}
-
-/// The first field of a line.
-fn file_name(line: &str) -> &str {
-    line.split(',').next().unwrap_or_default()
-}
-
-/// Columns of a line that are known after the rendering.
-const MEASURED_COLUMNS: usize = 4;
 
 /// The whole line of a file.
 fn finished(begin: &str, made: &Rendered) -> String {
@@ -413,136 +379,4 @@ fn progress(files: usize) -> ProgressBar {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The last columns of a table.
-    const REST: &str = "length_s,rate_hz,peak_dbfs,rms_dbfs";
-
-    fn batch(directory: &Path, plan: &str, text: &str, force: bool) -> (BatchCommand, PathBuf) {
-        let path = directory.join(plan);
-        fs::write(&path, text).unwrap();
-        let into = directory.join("set");
-        (BatchCommand { plan: path, into: into.clone(), force, dry_run: false }, into)
-    }
-
-    #[test]
-    fn a_plan_is_rendered_once_and_goes_on_where_it_was() {
-        let directory = tempfile::tempdir().unwrap();
-        let plan = "[same]\nseconds = 0.05\nno-noise = true\n[vary]\nwritten = [\"E3\", \"C4\"]\ngamma = { from = 0.4, to = 0.5, steps = 2 }\n";
-        let (command, into) = batch(directory.path(), "plan.toml", plan, false);
-        command.run().unwrap();
-        let manifest = fs::read_to_string(into.join(MANIFEST)).unwrap();
-        let lines: Vec<_> = manifest.lines().collect();
-        assert_eq!(lines[0], "file,no-noise,seconds,gamma,written,length_s,rate_hz,peak_dbfs,rms_dbfs");
-        assert_eq!(lines.len(), 5);
-        assert!(lines[2].starts_with("0002.wav,true,0.05,0.4,C4,0.0500,48000,"), "{}", lines[2]);
-        assert!(!into.join(GROWING).exists());
-        // One file is lost: only this one is rendered again.
-        let file = |name: &str| into.join(name);
-        fs::remove_file(file("0003.wav")).unwrap();
-        fs::write(file("0001.wav"), "mine").unwrap();
-        command.run().unwrap();
-        assert_eq!(fs::read(file("0001.wav")).unwrap(), b"mine");
-        assert!(fs::metadata(file("0003.wav")).unwrap().len() > 1_000);
-        assert_eq!(fs::read_to_string(file(MANIFEST)).unwrap(), manifest);
-    }
-
-    #[test]
-    fn what_this_plan_has_not_made_is_kept_unless_forced() {
-        let directory = tempfile::tempdir().unwrap();
-        let plan = "[same]\nseconds = 0.05\n[vary]\nwritten = [\"E3\", \"C4\", \"G4\"]\n";
-        let (command, into) = batch(directory.path(), "plan.toml", plan, false);
-        let file = |name: &str| into.join(name);
-        let first = "0001.wav,0.05,E3,0.0500,48000,-1.00,-2.00";
-        let with_header = |line: &str| format!("file,seconds,written,{REST}\n{line}\n");
-        // A file without a table, one that a finished table does not list, one with other arguments, and other columns.
-        for (manifest, growing, says) in [
-            (None, None, "0001.wav is there and is not of this plan; choose another folder, or add --force"),
-            (Some(with_header(&first.replace("0001", "0009"))), None, "0001.wav is there and is not"),
-            (Some(with_header(&first.replace("E3", "F3"))), None, "0001.wav is of another plan"),
-            (None, Some(with_header(&first.replace("E3", "F3"))), "0001.wav is of another plan"),
-            (Some(format!("file,written,{REST}\n")), None, "manifest.csv is of another plan"),
-            (None, Some(format!("file,written,{REST}\n")), "manifest.part.csv is of another plan"),
-        ] {
-            let _ = fs::remove_dir_all(&into);
-            fs::create_dir(&into).unwrap();
-            fs::write(file("0001.wav"), "mine").unwrap();
-            for (name, text) in [(MANIFEST, &manifest), (GROWING, &growing)] {
-                if let Some(text) = text {
-                    fs::write(file(name), text).unwrap();
-                }
-            }
-            let said = command.run().unwrap_err().to_string();
-            assert!(said.contains(says), "{said}");
-            assert_eq!(fs::read(file("0001.wav")).unwrap(), b"mine");
-            assert!(!file("0002.wav").exists());
-            assert_eq!(fs::read_to_string(file(GROWING)).ok(), growing);
-        }
-        // A stopped run goes on: its last line is cut off, and a file is not listed yet.
-        fs::write(file(GROWING), with_header(&format!("{first}\n0002.wav,0.0")).trim_end()).unwrap();
-        fs::write(file("0002.wav"), "not listed").unwrap();
-        command.run().unwrap();
-        assert_eq!(fs::read(file("0001.wav")).unwrap(), b"mine");
-        assert!(["0002.wav", "0003.wav"].iter().all(|name| fs::metadata(file(name)).unwrap().len() > 1_000));
-        // By force, a shorter plan replaces its own files and names the others.
-        let shorter = plan.replace("\"E3\", ", "");
-        let (forced, _) = batch(directory.path(), "plan.toml", &shorter, true);
-        let jobs = forced.jobs(&Plan::read(&forced.plan).unwrap()).unwrap();
-        let left_over = Earlier::read(&into).unwrap().left_over(&into, &jobs).unwrap();
-        assert!(left_over.contains("holds 1 file of an earlier plan"), "{left_over}");
-        assert!(left_over.ends_with("manifest.csv does not list: 0003.wav"), "{left_over}");
-        forced.run().unwrap();
-        assert!(fs::metadata(file("0001.wav")).unwrap().len() > 1_000);
-        assert_eq!(fs::read_to_string(file(MANIFEST)).unwrap().lines().count(), 3);
-        assert!(file("0003.wav").exists());
-    }
-
-    #[test]
-    fn a_plan_that_is_corrected_before_any_file_was_made_is_the_same_plan() {
-        let directory = tempfile::tempdir().unwrap();
-        let plan = "[vary]\nwritten = [\"E3\"]\n[same]\nseconds = 0.02\n";
-        let (command, into) = batch(directory.path(), "plan.toml", plan, false);
-        fs::create_dir(&into).unwrap();
-        fs::write(into.join(GROWING), "file,written,growl,length_s,rate_hz,peak_dbfs,rms_dbfs\n").unwrap();
-        command.run().unwrap();
-        assert!(into.join("0001.wav").exists() && !into.join(GROWING).exists());
-        // With a file that may be of that plan it is refused.
-        fs::rename(into.join(MANIFEST), into.join(GROWING)).unwrap();
-        fs::write(into.join(GROWING), "file,written,growl,length_s,rate_hz,peak_dbfs,rms_dbfs\n").unwrap();
-        let said = command.run().unwrap_err().to_string();
-        assert!(said.contains("is of another plan"), "{said}");
-    }
-
-    #[test]
-    fn mistakes_are_told_before_anything_is_rendered() {
-        let directory = tempfile::tempdir().unwrap();
-        for (name, text, says) in [
-            ("p.toml", "[vary]\nwritten = [\"H9\"]\n", "file 1"),
-            ("p.toml", "[vary]\nwritten = [\"C4\", \"C9\"]\n", "file 2: written 120 (C9) has no fingering"),
-            (
-                "p.toml",
-                "[vary]\nbreath = [\"none.csv\"]\n[same]\nwritten = \"C4\"\n",
-                "file 1: cannot read none.csv",
-            ),
-            ("p.toml", "[vary]\nwriten = [\"C4\"]\n", "written"),
-            ("p.toml", "[vary]\nout = [\"x.wav\"]\n", "out"),
-            ("p.toml", "[vary]\n", "nothing varies"),
-            ("p.toml", "[vary]\ngamma = [-1]\n", "0..3"),
-            ("p.toml", "vary = 3", "invalid type"),
-            ("r.csv", "written,gamma\nC4\n", "line 2"),
-            ("r.csv", "written,gamma\nC4,0.5\n\nC9,0.5\n", "line 4: written 120 (C9) has no fingering"),
-            (
-                "r.csv",
-                "gamma\n0.5\n0.6\n",
-                "line 2: the following required arguments were not provided: <MIDI|",
-            ),
-            ("r.csv", "", "names"),
-        ] {
-            let (command, into) = batch(directory.path(), name, text, false);
-            let said = command.run().unwrap_err().to_string();
-            assert!(said.contains(says), "{text}: {said}");
-            assert!(!into.exists());
-        }
-    }
-}
+mod tests;

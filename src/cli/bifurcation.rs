@@ -8,10 +8,11 @@ use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, note, rate, sounding, within};
 use crate::cli::silent_keys::silent_keys;
 use crate::cli::threshold::linear_threshold;
+use chalumeau_core::instrument::{Model, Settings};
 use chalumeau_core::measure::bifurcation;
 use chalumeau_core::measure::bifurcation::Transitions;
 use chalumeau_core::score::breath::{BreathCurve, GAMMA_MAX};
-use chalumeau_core::units::WrittenNote;
+use chalumeau_core::units::{SoundingNote, WrittenNote};
 use chalumeau_figure::bifurcation::Ramp;
 use clap::Args;
 
@@ -68,9 +69,7 @@ impl BifurcationCommand {
         let threshold = linear_threshold(&file, written, &settings);
         let name = file.name.clone();
         let model = self.instrument.model(file, self.rate, settings.a4_hz)?;
-        silent_keys(&[sounding], &model, settings.reach)
-            .iter()
-            .for_each(|warning| say!("warning: {warning}"));
+        refuse_silent(written, sounding, &model, &settings)?;
         let bar = progress((2.0 * self.seconds * f64::from(self.rate)) as usize);
         let found = bifurcation::measure(
             &model,
@@ -117,6 +116,21 @@ impl BifurcationCommand {
             .figure()
         })
     }
+}
+
+/// Refuses a note whose key stays silent: a table of zeros would look as if it had been measured.
+pub(super) fn refuse_silent(
+    written: WrittenNote,
+    sounding: SoundingNote,
+    model: &Model,
+    settings: &Settings,
+) -> Result<(), Failure> {
+    if silent_keys(&[sounding], model, settings.reach).is_empty() {
+        return Ok(());
+    }
+    Err(Failure::Usage(format!(
+        "the key of {written} is silent on this instrument: its fingering does not speak in tune, so there is nothing to measure"
+    )))
 }
 
 /// Gamma of every change of the note on a ramp up to `to`, for the comment in the table. What cannot be, such as the end of a

@@ -3,6 +3,7 @@
 use crate::cli::Failure;
 use crate::cli::csv_table::CsvTable;
 use crate::cli::files::{self, MaybeFile};
+use crate::cli::idle_settings::{self, Idle};
 use crate::cli::plot_args::PlotArgs;
 use crate::cli::render_job::RenderJob;
 use crate::cli::render_monitor::RenderMonitor;
@@ -12,7 +13,6 @@ use crate::output::NewFile;
 use crate::wav::{Depth, Levels, WavFile};
 use chalumeau_core::dsp::limiter::CEILING;
 use chalumeau_core::instrument::Probe;
-use chalumeau_core::instrument::listening::ListeningMode;
 use chalumeau_core::instrument::side_by_side::{self, Stand};
 use chalumeau_core::reed::physical::P_REF_PA;
 use clap::{Args, ValueEnum};
@@ -112,6 +112,9 @@ impl RenderCommand {
     pub fn run(&self) -> Result<(), Failure> {
         let rendered = self.render(progress)?;
         self.report(&rendered);
+        if let Some(idle) = idle_settings::in_words(&self.play.check().unwrap_or_default()) {
+            say!("warning: {idle}");
+        }
         if let Some(late) = self.play.too_little_breath() {
             say!("warning: {late}");
         }
@@ -138,12 +141,7 @@ impl RenderCommand {
         let RenderJob { score, rate, .. } = &prepared;
         prepared.warn();
         let several = prepared.has_several_players();
-        let channels = self.channels.unwrap_or_else(|| {
-            let settings = &prepared.settings;
-            let is_wide =
-                several || settings.room.amount > 0.0 || settings.listening.mode == ListeningMode::Position;
-            if is_wide { 2 } else { 1 }
-        });
+        let channels = self.channels.unwrap_or_else(|| prepared.usual_channels());
         if several && (self.probe.is_some() || self.plot.wanted()) {
             let inside =
                 "--probe and --plot look inside one instrument; leave them out, or --players and --tracks";
@@ -200,10 +198,20 @@ impl RenderCommand {
         Ok(Rendered { seconds: score.seconds(*rate), rate: *rate, channels, level, resets })
     }
 
-    /// Whether all that can be known without preparing the instrument is in order.
-    pub fn check(&self) -> Result<(), Failure> {
+    /// Whether all that can be known without preparing the instrument is in order. Gives back the settings that have no effect.
+    pub fn check(&self) -> Result<Vec<Idle>, Failure> {
         self.refuse_names()?;
         self.play.check()
+    }
+
+    /// The files that it is made of.
+    pub fn inputs(&self) -> impl Iterator<Item = &Path> {
+        self.play.read_files().into_iter().flatten()
+    }
+
+    /// The text of its preset.
+    pub fn preset_text(&self) -> Option<String> {
+        self.play.preset_text()
     }
 
     /// Refuses names of files that cannot be meant.

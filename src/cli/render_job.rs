@@ -4,6 +4,7 @@ use crate::cli::Failure;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::PlayedArgs;
 use chalumeau_core::event::{Event, PartEvent};
+use chalumeau_core::instrument::listening::ListeningMode;
 use chalumeau_core::instrument::side_by_side::{PlayedBeside, Stand};
 use chalumeau_core::instrument::{Clarinet, Ensemble, Model, Probe, Settings};
 use chalumeau_core::score as player;
@@ -27,6 +28,8 @@ pub struct RenderJob {
     pub rate: u32,
     /// What the user should know before it plays: notes that stay silent.
     pub warnings: Vec<String>,
+    /// Which given settings have no effect, if the caller wants to know.
+    pub idle: Option<String>,
 }
 
 impl RenderJob {
@@ -44,7 +47,15 @@ impl RenderJob {
 
     /// An instrument that is ready, with nothing to play.
     pub(super) fn to_play_later(model: Arc<Model>, settings: Settings, rate: u32) -> Self {
-        Self { model, settings, score: Score::default(), parts: Score::default(), rate, warnings: Vec::new() }
+        Self {
+            model,
+            settings,
+            score: Score::default(),
+            parts: Score::default(),
+            rate,
+            warnings: Vec::new(),
+            idle: None,
+        }
     }
 
     /// The instrument as a host has it before it plays: the settings are in place from the first sample.
@@ -61,6 +72,14 @@ impl RenderJob {
         ensemble.set_settings(&self.settings);
         ensemble.reset();
         ensemble
+    }
+
+    /// Channels where nobody says how many: two in a room, for several players and from two places, else one.
+    pub fn usual_channels(&self) -> u16 {
+        let is_wide = self.has_several_players()
+            || self.settings.room.amount > 0.0
+            || self.settings.listening.mode == ListeningMode::Position;
+        if is_wide { 2 } else { 1 }
     }
 
     /// Prints the warnings.

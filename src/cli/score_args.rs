@@ -7,6 +7,7 @@ use crate::cli::Failure;
 use crate::cli::controllers::{GivenMap, named_or_file, only_in_the_plugin, set_by_map};
 use crate::cli::feel_args::FeelArgs;
 use crate::cli::files::MaybeFile;
+use crate::cli::idle_settings::Idle;
 use crate::cli::render_job::RenderJob;
 use crate::cli::settings::SettingsArgs;
 use crate::cli::shared_args::{PlayedArgs, check_fingering, note, rate, sounding, within};
@@ -39,6 +40,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use breath_args::BreathArgs;
+pub use breath_args::BreathSource;
 use given::score_of;
 pub use given::{Given, TimedNote};
 
@@ -93,7 +95,7 @@ pub struct ScoreArgs {
     rate: u32,
 
     /// Play a preset, a factory preset or one of yours; other flags and --set change it. Its breath response counts, so
-    /// that breath is mostly a share of full breath. The feel of the knob stays that of its own flags. `chalumeau presets
+    /// that --breath and --crescendo are mostly shares of full breath; --gamma is a pressure with every preset. The feel of the knob stays that of its own flags. `chalumeau presets
     /// list` lists them
     #[arg(long, value_name = "NAME", value_parser = preset_called)]
     preset: Option<Preset>,
@@ -147,12 +149,14 @@ struct Planned {
     trims: BTreeMap<u8, f64>,
     take: Option<Take>,
     warnings: Vec<String>,
+    /// Given settings that have no effect.
+    idle: Vec<Idle>,
 }
 
 impl ScoreArgs {
-    /// Reads and checks the arguments and all files that they name.
-    pub fn check(&self) -> Result<(), Failure> {
-        self.plan().map(|_| ())
+    /// Reads and checks the arguments and all files that they name. Gives back the settings that have no effect.
+    pub fn check(&self) -> Result<Vec<Idle>, Failure> {
+        self.plan().map(|planned| planned.idle)
     }
 
     fn plan(&self) -> Result<Planned, Failure> {
@@ -166,7 +170,9 @@ impl ScoreArgs {
             map.values.iter().for_each(|(parameter, value)| parameter.set(&mut under, *value));
             base = Some(under);
         }
+        let is_pressure = self.breath.gamma.is_some() && !self.settings.is_played_chosen()?;
         let mut settings = match (&curve, &base) {
+            (Some(curve), base) if is_pressure => self.settings.blown_by(base.as_ref(), curve, &file)?,
             (Some(curve), base) => self.settings.blown_in_either(base.as_ref(), curve, &file)?,
             (None, base) if self.breath.dynamic.is_some() => {
                 self.settings.with_dynamics(base.as_ref(), &file)?
@@ -191,12 +197,18 @@ impl ScoreArgs {
             parts = parts.blown(curve, &settings, self.rate);
         }
         let take = self.breath.take()?;
-        Ok(Planned { file, settings, parts, unplayed, keys, trims, take, warnings })
+        let has_controllers = self.midi.is_some() && !matches!(self.given, Some(Given::Notes(_)));
+        // Links of a device may move anything.
+        let idle = match self.controllers {
+            Some(_) => Vec::new(),
+            None => self.settings.idle(&settings, self.breath.source(), has_controllers)?,
+        };
+        Ok(Planned { file, settings, parts, unplayed, keys, trims, take, warnings, idle })
     }
 
     /// Reads and checks the arguments and prepares the instrument. Takes seconds for an instrument file.
     pub fn prepare(&self) -> Result<RenderJob, Failure> {
-        let Planned { file, settings, mut parts, unplayed, keys, trims, take, mut warnings } = self.plan()?;
+        let Planned { file, settings, mut parts, unplayed, keys, trims, take, mut warnings, .. } = self.plan()?;
         let mut model = self.instrument.model(file, self.rate, settings.a4_hz)?;
         if let Some(keys) = keys {
             Arc::make_mut(&mut model).keys = keys;
@@ -214,7 +226,15 @@ impl ScoreArgs {
         let one_note = self.written.is_some() || self.sounding.is_some();
         let usual = if one_note { 0.0 } else { 1.0 } + settings.articulation.tail_s();
         let parts = parts.with_tail(self.tail.unwrap_or(usual), self.rate);
-        Ok(RenderJob { model, settings, score: (&parts).into(), parts, rate: self.rate, warnings })
+        Ok(RenderJob {
+            model,
+            settings,
+            score: (&parts).into(),
+            parts,
+            rate: self.rate,
+            warnings,
+            idle: None,
+        })
     }
 
     /// Refuses flags of the knob's feel where no take is replayed: they would do nothing.
@@ -241,6 +261,11 @@ impl ScoreArgs {
         let files = [&self.midi, &self.scl, &self.kbm].map(Option::as_deref);
         let own = files.into_iter().chain(self.breath.read_files());
         own.chain([controllers, self.instrument.instrument.file()]).collect()
+    }
+
+    /// The text of the preset that is played: a name may stand for another one by now.
+    pub fn preset_text(&self) -> Option<String> {
+        self.preset.as_ref().map(Preset::to_text)
     }
 
     /// Says which notes of the command line begin above all that a curve of gamma reaches. Takes some 30 ms for each note, so a batch
@@ -367,8 +392,12 @@ impl ScoreArgs {
         if let Some(path) = &self.midi {
             let bytes = match &self.given {
                 Some(Given::Notes(notes)) => return Ok(((&score_of(notes, self.rate)).into(), [0; 128])),
-                Some(Given::Midi(bytes)) => bytes.clone(),
+                Some(Given::Midi { bytes, .. }) => bytes.clone(),
                 None => fs::read(path).map_err(|source| no_such_piece(path, source))?,
+            };
+            let path = match &self.given {
+                Some(Given::Midi { path: Some(path), .. }) => path,
+                _ => path,
             };
             let mut decoder = if self.mpe { MidiDecoder::new().with_mpe() } else { MidiDecoder::new() };
             decoder.set_links(&links);

@@ -233,6 +233,11 @@ impl SettingsArgs {
         Ok(all)
     }
 
+    /// The ids of all that was given, and as what it was typed.
+    pub fn typed(&self) -> Result<Vec<(&'static str, String)>, Failure> {
+        Ok(self.given()?.into_iter().map(|given| (given.parameter.id, given.typed)).collect())
+    }
+
     fn has(&self, id: &str) -> bool {
         self.numbers.0.iter().chain(&self.set).any(|given| given.parameter.id == id)
     }
@@ -262,6 +267,11 @@ impl SettingsArgs {
     /// Whether the user has chosen how many players play, or what they do with the notes.
     pub fn players_given(&self) -> bool {
         self.players.is_some() || self.unison || self.has("player") || self.has("split")
+    }
+
+    /// Whether the user has chosen that breath is played.
+    pub fn is_played_chosen(&self) -> Result<bool, Failure> {
+        Ok(self.response()?.is_some_and(|(response, _)| response == BreathResponse::Played))
     }
 
     /// The response to breath that the user has chosen, and as what it was typed.

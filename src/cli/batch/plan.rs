@@ -171,7 +171,10 @@ impl Plan {
     /// Fails if a name is none.
     fn checked(self) -> Result<Self, String> {
         let names = Names::of::<RenderCommand>();
-        for name in &self.names {
+        for (at, name) in self.names.iter().enumerate() {
+            if self.names[..at].contains(name) {
+                return Err(format!("{name} stands twice; give each name once"));
+            }
             if OWN.contains(&name.as_str()) {
                 return Err(format!("{name} cannot be in a plan: the batch names the files itself"));
             }

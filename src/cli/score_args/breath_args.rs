@@ -20,11 +20,12 @@ pub(super) struct BreathArgs {
     /// one to the other over the whole length
     #[arg(long, value_name = "D|FROM:TO", value_parser = dynamics)]
     pub dynamic: Option<(f64, f64)>,
-    /// Constant mouth pressure over closing pressure, 0..3 [default: 0.5 unless a MIDI file plays]
+    /// Constant mouth pressure over closing pressure, 0..3, with every preset [default: 0.5 unless a MIDI file plays]. Only with
+    /// --breath-response played it is a share of full breath
     #[arg(long, value_name = "G", value_parser = |s: &str| within(s, 0.0, f64::from(GAMMA_MAX)))]
     pub gamma: Option<f64>,
     /// Mouth pressure over closing pressure over time: a CSV file t_s,gamma, or ramp:FROM:TO:SECONDS, then held, or one number.
-    /// With --breath-response played the numbers are shares of full breath, 0..1
+    /// With --breath-response played, and with most presets, the numbers are shares of full breath, 0..1
     #[arg(long, value_name = "FILE|RAMP|G")]
     pub breath: Option<String>,
     /// Mouth pressure from one gamma to another over the whole length, for example 0.4:0.9; or shares of full breath, as
@@ -37,7 +38,21 @@ pub(super) struct BreathArgs {
     pub replay: Option<PathBuf>,
 }
 
+/// What blows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BreathSource {
+    /// A take of a knob.
+    Take,
+    /// A curve, a dynamic or a MIDI file.
+    Other,
+}
+
 impl BreathArgs {
+    /// What blows.
+    pub fn source(&self) -> BreathSource {
+        if self.replay.is_some() { BreathSource::Take } else { BreathSource::Other }
+    }
+
     /// The breath over time; `None` if a take or a dynamic sets it, or nothing does and `is_midi`, which has its own.
     pub fn curve(&self, is_midi: bool) -> Result<Option<BreathCurve>, Failure> {
         if self.replay.is_some() || self.dynamic.is_some() {
@@ -90,9 +105,10 @@ impl BreathArgs {
         self.replay.as_deref().map(read_take).transpose()
     }
 
-    /// The files that are read.
+    /// The files that are read. A number and a ramp are none.
     pub fn read_files(&self) -> [Option<&Path>; 2] {
-        [self.breath.as_deref().map(Path::new), self.replay.as_deref()]
+        let is_file = |text: &&str| text.parse::<f32>().is_err() && !text.starts_with("ramp:");
+        [self.breath.as_deref().filter(is_file).map(Path::new), self.replay.as_deref()]
     }
 }
 

@@ -3,11 +3,17 @@
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::score::Score;
 use chalumeau_core::units::SoundingNote;
+use std::path::PathBuf;
 
 /// What a caller that is a program has in memory.
 pub enum Given {
     /// A standard MIDI file.
-    Midi(Vec<u8>),
+    Midi {
+        /// What is in it.
+        bytes: Vec<u8>,
+        /// Where it was read from, for messages.
+        path: Option<PathBuf>,
+    },
     /// Notes, to be played at any rate.
     Notes(Vec<TimedNote>),
 }
