@@ -152,7 +152,7 @@ pub fn bifurcation<'py>(
         wrong(format_args!("written {} sounds outside MIDI's 0..127", WrittenNote(written)))
     })?;
     let found = py.detach(|| {
-        let job = watched(|stop| offline::blown(&pairs, file, to, Some(stop)))?;
+        let job = watched(|stop| offline::blown(&pairs, file, WrittenNote(written), to, Some(stop)))?;
         // The ramp tells of its progress and cannot be asked to stop, so Ctrl-C unwinds it; it owns all that it changes.
         let each = |_| signals().unwrap_or_else(|error| resume_unwind(Box::new(error)));
         let play = || ramp::measure(&job.model, &job.settings, sounding, to as f32, seconds, job.rate, each);

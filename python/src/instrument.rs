@@ -13,6 +13,15 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 #[pyclass(frozen, module = "chalumeau._native")]
 pub struct Instrument {
     pub file: InstrumentFile,
+    /// What it was made from: a text, or the id of one that comes with the program. The same again makes the same instrument to the last
+    /// bit, which `to_toml`, rounded for readers, does not.
+    origin: Origin,
+}
+
+/// See [`Instrument::origin`].
+enum Origin {
+    Bundled(&'static str),
+    Text(String),
 }
 
 #[pymethods]
@@ -24,7 +33,7 @@ impl Instrument {
         let bundled = Bundled::named(id).ok_or_else(|| {
             wrong(format_args!("no instrument is called {id:?}; the bundled ones are {}", ids()))
         })?;
-        Ok(Self { file: bundled.file() })
+        Ok(Self { file: bundled.file(), origin: Origin::Bundled(bundled.id()) })
     }
 
     /// The ids of those that come with the program.
@@ -36,7 +45,8 @@ impl Instrument {
     /// Of the text of an instrument file, TOML.
     #[staticmethod]
     fn parse(text: &str) -> PyResult<Self> {
-        Ok(Self { file: InstrumentFile::parse(text).map_err(wrong)? })
+        let file = InstrumentFile::parse(text).map_err(wrong)?;
+        Ok(Self { file, origin: Origin::Text(text.to_owned()) })
     }
 
     /// Of the same tables and keys as a TOML file has, as JSON.
@@ -108,9 +118,13 @@ impl Instrument {
         hasher.finish()
     }
 
-    /// It travels between processes as its text.
+    /// It travels between processes as what it was made from.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
-        Ok((PyType::new::<Self>(py).getattr("parse")?, (self.file.to_toml(),)))
+        let (maker, of) = match &self.origin {
+            Origin::Bundled(id) => ("bundled", *id),
+            Origin::Text(text) => ("parse", text.as_str()),
+        };
+        Ok((PyType::new::<Self>(py).getattr(maker)?, (of.to_owned(),)))
     }
 }
 

@@ -79,5 +79,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(features::features, module)?)?;
     module.add_function(wrap_pyfunction!(rows::rows, module)?)?;
     module.add_function(wrap_pyfunction!(rows::check, module)?)?;
+    module.add_function(wrap_pyfunction!(rows::check_rendering, module)?)?;
+    module.add_function(wrap_pyfunction!(rows::preset_text, module)?)?;
     Ok(())
 }

@@ -31,3 +31,15 @@ pub fn rows(
 pub fn check(pairs: Vec<(String, String)>) -> PyResult<()> {
     offline::check(&pairs).map_err(wrong)
 }
+
+/// Fails if a rendering with these names and values cannot be played: also reads the files that they name. Prepares nothing.
+#[pyfunction]
+pub fn check_rendering(py: Python<'_>, pairs: Vec<(String, String)>) -> PyResult<()> {
+    py.detach(|| offline::check_rendering(&pairs)).map_err(wrong)
+}
+
+/// The text of a preset, by its name; of the user's own first.
+#[pyfunction]
+pub fn preset_text(name: &str) -> PyResult<String> {
+    offline::preset_text(name).map_err(wrong)
+}

@@ -2,6 +2,7 @@
 
 use crate::instrument::Instrument;
 use crate::mistakes::{signals, watched, wrong};
+use crate::render::memory;
 use chalumeau::cli::offline;
 use chalumeau_core::event::Event;
 use chalumeau_core::instrument::Clarinet;
@@ -56,6 +57,13 @@ impl Voice {
         Ok(())
     }
 
+    /// Fails if `set` would refuse these settings.
+    #[staticmethod]
+    fn check(py: Python<'_>, pairs: Vec<(String, String)>, instrument: &Instrument) -> PyResult<()> {
+        let file = &instrument.file;
+        py.detach(|| offline::settings(&pairs, file)).map(drop).map_err(wrong)
+    }
+
     fn note_on(&self, py: Python<'_>, note: u8, velocity: f32) {
         self.apply(py, Event::NoteOn { note: SoundingNote(note), velocity });
     }
@@ -100,7 +108,7 @@ impl Voice {
             )));
         }
         let out = py.detach(|| {
-            let mut out = vec![0.0; samples];
+            let mut out = memory(samples, true)?;
             self.play(&mut out)?;
             Ok::<_, PyErr>(out)
         })?;

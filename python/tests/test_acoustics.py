@@ -82,5 +82,9 @@ def test_features_of_a_synthetic_tone():
     assert found["f0_hz"] == pytest.approx(220, abs=0.05)
     assert found["harmonics_db"][0] == 0 and found["harmonics_db"][2] == pytest.approx(-20, abs=0.1)
     assert found["steady_dbfs"] == pytest.approx(10 * np.log10(0.5 * (0.25 + 0.0025)), abs=0.05)
+    low = 0.3 * np.sin(2 * np.pi * 36.7 * t) + 0.3 * np.sin(2 * np.pi * 3 * 36.7 * t)
+    assert chalumeau.features(low, near=36.7)["f0_hz"] == pytest.approx(36.7, abs=0.05)
+    with pytest.raises(ValueError, match="near must lie in"):
+        chalumeau.features(low, near=0)
     silent = chalumeau.features(np.zeros(48_000))
     assert np.isnan(silent["f0_hz"]) and silent["harmonics_db"] == []

@@ -1,6 +1,8 @@
 """Data sets: rows as the command line has them, nothing lost, nothing twice."""
 
 import csv
+import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -89,6 +91,54 @@ def test_a_file_that_has_changed_is_rendered_anew_and_levels_stand_as_they_were_
     assert "-6" in (tmp_path / "set/manifest.csv").read_text().splitlines()[1].split(",")
 
 
+def test_names_with_a_sharp_are_quoted(chalumeau_says, tmp_path):
+    plan = {"same": {"seconds": 0.05, "no-noise": True}, "vary": {"written": ["C#4", "C4"]}}
+    chalumeau.dataset(plan, tmp_path / "ours")
+    (tmp_path / "plan.csv").write_text('seconds,no-noise,written\n0.05,true,"C#4"\n0.05,true,C4\n')
+    chalumeau_says("batch", "plan.csv", "--into", "theirs", cwd=tmp_path)
+    for folder in ("ours", "theirs"):
+        lines = (tmp_path / folder / "manifest.csv").read_text().splitlines()
+        assert '"C#4"' in lines[1] and '"' not in lines[2], lines
+        # As pandas reads it with comment="#": no field outside of quotes has one.
+        assert "#" not in re.sub(r'"[^"]*"', "", lines[1])
+        assert table(tmp_path / folder)[0]["written"] == "C#4"
+
+
+def test_a_table_of_something_else_is_kept(tmp_path):
+    (tmp_path / "manifest.csv").write_text("subject,age\n")
+    with pytest.raises(ValueError, match="manifest.csv that is not of a data set"):
+        chalumeau.dataset([{"written": "C4", "seconds": 0.05}], tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["manifest.csv"]
+    assert (tmp_path / "manifest.csv").read_text() == "subject,age\n"
+
+
+def test_a_preset_that_has_changed_is_rendered_anew(tmp_path):
+    script = "import chalumeau\nprint(chalumeau.dataset([{'written': 'C4', 'seconds': 0.05, 'preset': 'Mine'}], 'set').rendered)\n"
+    presets = tmp_path / "chalumeau/presets"
+    presets.mkdir(parents=True)
+
+    def rendered(lip):
+        (presets / "mine.toml").write_text(f'format = 1\nname = "Mine"\n\n[parameters]\nlip = {lip}\n')
+        said = subprocess.run(
+            [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True,
+            env={**os.environ, "CHALUMEAU_DATA_DIR": str(tmp_path)},
+        )
+        assert said.returncode == 0, said.stderr
+        return said.stdout.strip()
+
+    assert [rendered(0.9), rendered(0.9), rendered(1.1)] == ["1", "0", "1"]
+
+
+def test_rooms_and_players_have_the_levels_of_the_command_line(chalumeau_says, tmp_path):
+    plan = '[same]\nseconds = 0.3\nwritten = "C4"\n[vary]\nroom = [0, 0.5]\nplayers = [1, 2]\n'
+    (tmp_path / "plan.toml").write_text(plan)
+    chalumeau_says("batch", "plan.toml", "--into", "theirs", cwd=tmp_path)
+    chalumeau.dataset(plan, tmp_path / "ours")
+    for name in ("peak_dbfs", "rms_dbfs"):
+        theirs, ours = ([row[name] for row in table(tmp_path / folder)] for folder in ("theirs", "ours"))
+        assert theirs == ours and len(set(ours)) == 4
+
+
 def test_a_mistake_before_the_first_file_leaves_the_folder_free(tmp_path):
     with pytest.raises(ValueError):
         chalumeau.dataset([{"written": "C1"}], tmp_path)
@@ -114,6 +164,18 @@ def test_mistakes_are_told_before_anything_is_made(tmp_path):
         ({"same": {"seconds": 1}}, "vary"),
         ({"vary": {}}, "nothing varies"),
         ({"vary": {"zeta": [0.3, 3.0], "written": ["C4"]}}, "0.05..0.9"),
+        ({"same": {"zeta": 0.3}, "vary": {"zeta": [0.2], "written": ["C4"]}}, "zeta stands twice"),
+        # What only the whole row, or a file, tells.
+        ({"vary": {"written": ["C4", "C1"]}}, "row 2 .*has no fingering"),
+        ({"same": {"written": "C4"}, "vary": {"breath": ["0.5", "none.csv"]}}, "row 2 .*none.csv"),
+        ([{"written": "C4"}, {"midi": "none.mid"}], "row 2 .*none.mid"),
+        ({"same": {"written": "C4"}, "vary": {"gamma": [0.5, 2.9], "breath-full": [6]}}, "row 2 .*kPa"),
+        ({"same": {"written": "C4"}, "vary": {"contrast": [2, 3]}}, "row 1 .*feel"),
+        ([{"written": "C4", "channels": "two"}], "channels must be a whole number, got 'two'"),
+        ([{"written": "C4", "channels": 1.9}], "channels must be a whole number"),
+        ([{"written": "C4", "channels": 3}], "channels must be 1 or 2"),
+        ([{"written": "C4", "rate": 44100.5}], "rate must be a whole number"),
+        ([{"written": "C4", "bits": 16}], "bits is of files of chalumeau batch"),
         ([], "no rows"),
     ]:
         with pytest.raises(ValueError, match=says):
@@ -129,6 +191,7 @@ def test_the_command_reports_its_throughput(tmp_path):
     first, *grown = said.stdout.splitlines()
     assert "12 rows, 12 rendered" in first and "of one core" in first
     assert [line.split()[0] for line in grown] == ["1", "2"] and "1.00 times" in grown[0]
+    assert "Warning" not in said.stderr, said.stderr
     wrong = subprocess.run([*words[:3], "none.toml", "--into", "set"], cwd=tmp_path, capture_output=True, text=True)
     assert wrong.returncode == 2 and "none.toml" in wrong.stderr
 

@@ -1,6 +1,7 @@
 """The package itself: types, documentation, examples that run."""
 
 import ast
+import copy
 import doctest
 import importlib
 import inspect
@@ -10,6 +11,7 @@ import sys
 from pathlib import Path
 
 import chalumeau
+import numpy as np
 import pytest
 from chalumeau import _native
 
@@ -52,6 +54,23 @@ def test_the_types_of_the_compiled_part_name_all_that_is_there():
 def test_instruments_travel_between_processes():
     bass = chalumeau.instrument("bass")
     assert pickle.loads(pickle.dumps(bass)) == bass
+    # A length that has more digits than a reader wants to see.
+    text = bass.to_toml().replace("reed_volume_mm3 = ", "reed_volume_mm3 = 1", 1)
+    first = next(line for line in text.splitlines() if line.startswith("chimney_mm = "))
+    fine = chalumeau.instrument(text.replace(first, f"{first}123456789", 1))
+    for again in (pickle.loads(pickle.dumps(fine)), copy.deepcopy(fine)):
+        assert again == fine and hash(again) == hash(fine)
+    assert [pickle.loads(pickle.dumps(chalumeau.instrument(id))) == chalumeau.instrument(id) for id in chalumeau.instruments()] == [True] * 5
+
+
+def test_an_instrument_is_taken_from_tables_with_numbers_of_numpy():
+    tomllib = pytest.importorskip("tomllib")
+    tables = tomllib.loads(chalumeau.instrument("b-flat").to_toml())
+    tables["reed_volume_mm3"] = np.float64(tables["reed_volume_mm3"])
+    tables["transposition_semitones"] = np.int64(tables["transposition_semitones"])
+    tables["hole"][0]["x_mm"] = np.array(tables["hole"][0]["x_mm"])
+    tables["hole"][0]["description"] = None
+    assert chalumeau.instrument(tables).length_m == chalumeau.instrument("b-flat").length_m
 
 
 def test_names_of_hosts_flags_and_ids_set_the_same():

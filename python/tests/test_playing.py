@@ -4,6 +4,7 @@ import hashlib
 import subprocess
 import threading
 import time
+import warnings
 
 import chalumeau
 import numpy as np
@@ -30,10 +31,10 @@ def test_the_melody_has_the_golden_bits(root, column, rate):
         ("--written G4 --gamma 0.55 --seconds 0.3 --zeta 0.4", dict(written="G4", gamma=0.55, zeta=0.4)),
         ("--scale E3:G3 --slurred --seconds 0.3 --no-noise", dict(scale="E3:G3", slurred=True, no_noise=True)),
         ("--written C4 --instrument bass --seconds 0.3 --set vent=2.5", dict(written=60, instrument="bass", vent=2.5)),
-        (
-            "--written C4 --seconds 0.3 --channels 2 --players 3 --unison",
-            dict(written="C4", channels=2, players=3, unison=True),
-        ),
+        ("--written C4 --seconds 0.3 --players 3 --unison", dict(written="C4", players=3, unison=True)),
+        ("--written C4 --seconds 0.3 --channels 2", dict(written="C4", channels=2)),
+        ("--written C4 --seconds 0.3 --room 0.3", dict(written="C4", room=0.3)),
+        ("--written C4 --seconds 0.3 --set heard=position", dict(written="C4", heard="Position")),
     ],
 )
 def test_a_rendering_is_that_of_the_command_line(chalumeau_says, tmp_path, words, named):
@@ -42,7 +43,7 @@ def test_a_rendering_is_that_of_the_command_line(chalumeau_says, tmp_path, words
     written = np.frombuffer(data[data.index(b"data") + 8 :], "<f4")
     samples = chalumeau.render(seconds=0.3, **named)
     assert samples.flags.c_contiguous and samples.dtype == np.float32
-    assert samples.shape == ((len(written) // 2, 2) if named.get("channels") == 2 else written.shape)
+    assert samples.shape == ((len(written) // 2, 2) if set(named) & {"channels", "players", "room", "heard"} else written.shape)
     assert (samples.ravel() == written).all() and np.abs(written).max() > 0.01
 
 
@@ -115,7 +116,67 @@ def test_a_short_name_and_its_setting_are_one():
 
 def test_a_room_on_one_channel_is_warned_of():
     with pytest.warns(UserWarning, match="channels=2"):
-        chalumeau.render(written="C4", seconds=0.1, room=0.4)
+        chalumeau.render(written="C4", seconds=0.1, room=0.4, channels=1)
+
+
+def test_settings_without_an_effect_are_warned_of():
+    with pytest.warns(UserWarning, match="--vibrato-rate has no effect"):
+        chalumeau.render(written="C4", seconds=0.05, vibrato_rate=6)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        chalumeau.render(written="C4", seconds=0.05, vibrato_rate=6, vibrato=0.5)
+        # A live clarinet may get a vibrato later.
+        chalumeau.Clarinet(vibrato_rate=6).note_on("C4")
+
+
+def test_events_are_checked_before_the_first_is_played():
+    good = [(0.0, "breath", 0.6), (0.0, "note_on", "C4")]
+    alone = chalumeau.Clarinet(noise=0).play(good, 0.2)
+    hole = chalumeau.instrument("b-flat").holes()[0][0]
+    for wrong, kind, says in [
+        ((0.5, "note_off", "C4"), ValueError, "event at 0.5 s is after the end, 0.2 s"),
+        ((0.1, "jump"), ValueError, 'no event is called \'jump\''),
+        ((0.1, "breath", 2), ValueError, "event breath at 0.1 s: breath must lie in 0..1"),
+        ((0.1, "breath"), TypeError, "share"),
+        ((0.1, "note_on", "H4"), ValueError, "event note_on at 0.1 s"),
+        ((0.1, "note_on", "C4", 2), ValueError, "velocity"),
+        ((0.1, "bend", 1e6), ValueError, "bend"),
+        ((0.1, "slap", -1), ValueError, "slap"),
+        ((0.1, "hole", "nothing", 1), ValueError, "the holes are"),
+        ((0.1, "hole", hole, 3), ValueError, "opening"),
+        ((0.1, "set", {"lip": 9}), ValueError, "0.6..1.4"),
+        ((0.1, "set", {"strenght": 2}), ValueError, "strength"),
+        ((0.1, "set", {"rate": 2}), ValueError, "rate"),
+        ((-0.1, "panic"), ValueError, "0..86400"),
+        (("soon", "panic"), TypeError, "time of an event"),
+        (3, TypeError, "an event is"),
+    ]:
+        clarinet = chalumeau.Clarinet(noise=0)
+        with pytest.raises(kind) as raised:
+            clarinet.play([*good, wrong], 0.2)
+        assert says in str(raised.value), str(raised.value)
+        # Nothing has been played: it begins as a new one does.
+        assert clarinet.settings == {"noise": 0} and clarinet.is_silent
+        assert (clarinet.play(good, 0.2) == alone).all()
+    # The end itself is a time.
+    chalumeau.Clarinet().play([(0.1, "note_on", "C4")], 0.1)
+
+
+def test_what_does_not_fit_into_memory_is_an_exception():
+    notes = [(0.0, 3_600.0, "C4")]
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (8_000_000_000, before[1]))
+    try:
+        with pytest.raises(MemoryError, match="GB of memory"):
+            chalumeau.render(notes, rate=1_536_000, channels=2)
+        with pytest.raises(MemoryError, match="GB of memory"):
+            chalumeau.Clarinet().render(80_000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
+    for from_s, seconds in [(0.0, 21_601.0), (20_000.0, 2_000.0)]:
+        with pytest.raises(ValueError, match="21600 s"):
+            chalumeau.render([(from_s, seconds, "C4")])
 
 
 def test_silent_notes_are_warned_of():
@@ -124,6 +185,8 @@ def test_silent_notes_are_warned_of():
 
 
 def test_mistakes_say_what_was_given_and_what_to_do(tmp_path):
+    text = tmp_path / "text.mid"
+    text.write_text("once upon a time")
     for make, kind, says in [
         (lambda: chalumeau.render(), ValueError, "required"),
         (lambda: chalumeau.render(written="H4"), ValueError, "a name like E3"),
@@ -131,7 +194,12 @@ def test_mistakes_say_what_was_given_and_what_to_do(tmp_path):
         (lambda: chalumeau.render(written="C4", settings={"Embouchure": "loud"}), ValueError, "zeta"),
         (lambda: chalumeau.render(written="C1"), ValueError, "written 24 (C1) has no fingering"),
         (lambda: chalumeau.render(tmp_path / "none.mid"), FileNotFoundError, "none.mid"),
-        (lambda: chalumeau.render(b"no midi"), ValueError, "MIDI"),
+        (lambda: chalumeau.render(b"no midi"), ValueError, "the given bytes"),
+        (lambda: chalumeau.render(text), ValueError, "text.mid"),
+        (lambda: chalumeau.render(written="C4", contrast=2), ValueError, "--contrast is of the knob's feel"),
+        (lambda: chalumeau.bifurcation("C#7", seconds=0.5), ValueError, "the key of C#7 is silent"),
+        (lambda: chalumeau.features(np.zeros(48_000, np.int16)), ValueError, "divide them by 32768"),
+        (lambda: chalumeau.features(np.zeros(48_000, complex)), ValueError, "real part"),
         (lambda: chalumeau.render([(0, 1)]), TypeError, "(from_s, seconds, note)"),
         (lambda: chalumeau.render(written="C4", channels=3), ValueError, "1 or 2"),
         (lambda: chalumeau.render(written="C4", rate=10), ValueError, "10"),

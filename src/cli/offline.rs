@@ -4,21 +4,24 @@
 //! command line. An error is the text that the command would print.
 
 use crate::cli::batch::plan::Plan;
+use crate::cli::bifurcation::refuse_silent;
 use crate::cli::haptic::{FeltReedArgs, ReedInAirArgs};
+use crate::cli::idle_settings;
 use crate::cli::parse;
 use crate::cli::settings::SettingsArgs;
-use crate::cli::shared_args::{PlayedArgs, rate};
+use crate::cli::shared_args::{PlayedArgs, rate, sounding};
 use crate::cli::words::Names;
 use chalumeau_core::bore::instrument_file::InstrumentFile;
 use chalumeau_core::haptics::{FeelTable, PlayedReed, RequirementSolver};
 use chalumeau_core::instrument::Settings;
 use chalumeau_core::score::breath::BreathCurve;
+use chalumeau_core::units::WrittenNote;
 use clap::{Args, Parser};
 use std::path::Path;
 
 pub use crate::cli::render_job::RenderJob;
-use crate::cli::score_args::ScoreArgs;
 pub use crate::cli::score_args::{Given, TimedNote};
+use crate::cli::score_args::{ScoreArgs, preset_called};
 pub use crate::cli::shared_args::{Stop, note};
 
 /// Names and their values.
@@ -55,6 +58,25 @@ fn read<A: Args>(pairs: &Pairs) -> Result<A, String> {
     })
 }
 
+/// The arguments of a rendering.
+fn rendering(
+    pairs: &Pairs,
+    instrument: Option<InstrumentFile>,
+    given: Option<Given>,
+    stop: Option<Stop>,
+) -> Result<ScoreArgs, String> {
+    let mut pairs = pairs.to_vec();
+    if given.is_some() {
+        // The command asks for something to play; what is given is played in its place.
+        pairs.push(("midi".to_owned(), "the given bytes".to_owned()));
+    }
+    let mut args: ScoreArgs = read(&pairs)?;
+    (args.instrument.instrument.given, args.instrument.instrument.stop) = (instrument, stop);
+    args.given = given;
+    args.refuse_idle_feel().map_err(|failure| failure.to_string())?;
+    Ok(args)
+}
+
 /// A rendering, as `chalumeau render` would play it. `instrument` and `given` are what the caller has in memory in place of
 /// files. Takes up to a minute for an instrument file that is new; ends with an error soon after `stop` says so.
 pub fn render_job(
@@ -63,15 +85,23 @@ pub fn render_job(
     given: Option<Given>,
     stop: Option<Stop>,
 ) -> Result<RenderJob, String> {
-    let mut pairs = pairs.to_vec();
-    if given.is_some() {
-        // The command asks for something to play; what is given is played in its place.
-        pairs.push(("midi".to_owned(), "given".to_owned()));
-    }
-    let mut args: ScoreArgs = read(&pairs)?;
-    (args.instrument.instrument.given, args.instrument.instrument.stop) = (instrument, stop);
-    args.given = given;
-    args.prepare().map_err(|failure| failure.to_string())
+    let args = rendering(pairs, instrument, given, stop)?;
+    let said = |failure: crate::cli::Failure| failure.to_string();
+    let idle = idle_settings::in_words(&args.check().map_err(said)?);
+    let mut job = args.prepare().map_err(said)?;
+    job.idle = idle;
+    Ok(job)
+}
+
+/// Whether all that can be known of a rendering without preparing its instrument is in order: its notes, values and files.
+pub fn check_rendering(pairs: &Pairs) -> Result<(), String> {
+    let args = rendering(pairs, None, None, None)?;
+    args.check().map(drop).map_err(|failure| failure.to_string())
+}
+
+/// The text of a preset; of the user's own first.
+pub fn preset_text(name: &str) -> Result<String, String> {
+    preset_called(name).map(|preset| preset.to_text())
 }
 
 /// Whether these names and values are arguments of `chalumeau render`. Reads no file and prepares nothing.
@@ -92,10 +122,12 @@ pub fn live(
         .map_err(|failure| failure.to_string())
 }
 
-/// The same for a breath that rises to `gamma`: a pressure, which full breath reaches.
+/// The same for a written note and a breath that rises to `gamma`: a pressure, which full breath reaches. Refuses a note whose
+/// key is silent.
 pub fn blown(
     pairs: &Pairs,
     instrument: InstrumentFile,
+    written: WrittenNote,
     gamma: f64,
     stop: Option<Stop>,
 ) -> Result<RenderJob, String> {
@@ -105,7 +137,9 @@ pub fn blown(
     args.settings.refuse_room_players_and_keys().map_err(said)?;
     let settings =
         args.settings.blown_by(None, &BreathCurve::constant(gamma as f32), &instrument).map_err(said)?;
+    let sounding = sounding(&instrument, written).map_err(said)?;
     let model = args.instrument.model(instrument, args.rate, settings.a4_hz).map_err(said)?;
+    refuse_silent(written, sounding, &model, &settings).map_err(said)?;
     Ok(RenderJob::to_play_later(model, settings, args.rate))
 }
 
@@ -197,6 +231,12 @@ mod tests {
         }
         let said = render_job(&pairs(&[("seconds", "1")]), None, None, None).map(|_| ()).unwrap_err();
         assert!(said.contains("required"), "{said}");
+        // What the command refuses is refused.
+        let said = check_rendering(&pairs(&[("written", "C4"), ("contrast", "2")])).unwrap_err();
+        assert!(said.contains("--contrast is of the knob's feel"), "{said}");
+        let damaged = Given::Midi { bytes: b"none".to_vec(), path: Some("songs/x.mid".into()) };
+        let said = render_job(&[], None, Some(damaged), None).map(|_| ()).unwrap_err();
+        assert!(said.starts_with("songs/x.mid"), "{said}");
         // The feel of a knob changes no threshold.
         let contrast = pairs(&[("contrast", "2")]);
         assert!(bore_and_reed(&contrast, &InstrumentFile::built_in()).unwrap_err().contains("contrast"));

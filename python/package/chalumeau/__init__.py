@@ -20,6 +20,9 @@ shuts the reed; ``zeta`` is the strength of the flow through it.
 233
 """
 
+import importlib
+from typing import TYPE_CHECKING, Any
+
 from chalumeau._native import Instrument, __version__
 from chalumeau.acoustics import (
     bifurcation,
@@ -33,9 +36,20 @@ from chalumeau.acoustics import (
     torque,
 )
 from chalumeau.arguments import fingerings, instrument, instruments, note, parameters, presets
-from chalumeau.datasets import dataset
 from chalumeau.measuring import measure, rows
 from chalumeau.playing import Clarinet, Note, render
+
+if TYPE_CHECKING:
+    from chalumeau.datasets import dataset
+else:
+
+    def __getattr__(name: str) -> Any:
+        # Loaded when it is asked for: ``python -m chalumeau.datasets`` runs it by itself.
+        if name in ("dataset", "datasets"):
+            module = importlib.import_module("chalumeau.datasets")
+            return module if name == "datasets" else module.dataset
+        raise AttributeError(f"module 'chalumeau' has no attribute {name!r}")
+
 
 __all__ = [
     "Clarinet",

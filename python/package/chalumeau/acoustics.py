@@ -216,8 +216,11 @@ def torque(
     return _native.torque(pairs(design), instrument_of(instrument), note(written), flat).reshape(shape)
 
 
-def features(samples: npt.ArrayLike, rate: float = 48_000) -> dict[str, Any]:
-    """Measures a note: mono samples of shape ``(samples,)``, with its beginning; only its first 4 s count.
+def features(samples: npt.ArrayLike, rate: float = 48_000, *, near: float | None = None) -> dict[str, Any]:
+    """Measures a note: mono samples of shape ``(samples,)``, full scale 1.0, with its beginning; only its first 4 s count.
+
+    Samples that are whole numbers, as 16-bit files have them, are refused: divide them by 32768. ``near`` is what the note is to be, Hz,
+    10..5000; notes below 50 Hz are found only with it.
 
     Returns ``f0_hz`` (of the steady part), ``steady_dbfs`` (its rms level), ``centroid_hz`` (power-weighted mean frequency),
     ``attack_s`` (from 10 to 90 % of the loudest moment) and ``harmonics_db``: the levels of harmonics 1 to 12 over the strongest
@@ -229,9 +232,14 @@ def features(samples: npt.ArrayLike, rate: float = 48_000) -> dict[str, Any]:
     >>> levels[1] < levels[2]    # the second harmonic is weaker than the third
     True
     """
+    kind = np.asarray(samples).dtype.kind
+    if kind in "iub" and np.size(samples):
+        raise ValueError("samples are whole numbers, and full scale is 1.0; of 16 bits, divide them by 32768")
+    if kind == "c":
+        raise ValueError("samples are complex numbers, which have no level; take their real part")
     array = _numbers(samples)[0].reshape(np.shape(samples)).astype(np.float32)
     if not np.isfinite(array).all():
         raise ValueError("samples hold NaN or infinity, which has no pitch or level; measure a part without them")
     if array.ndim != 1:
         raise ValueError(f"samples must have one dimension, got the shape {array.shape}; take one channel")
-    return _native.features(array, number("rate", rate))
+    return _native.features(array, number("rate", rate), None if near is None else number("near", near))

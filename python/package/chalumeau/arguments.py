@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import operator
 import os
 from collections.abc import Mapping
@@ -53,7 +54,7 @@ def instrument(what: InstrumentLike) -> Instrument:
     if isinstance(what, Instrument):
         return what
     if isinstance(what, Mapping):
-        return Instrument.of_json(json.dumps(what))
+        return Instrument.of_json(json.dumps(as_json("instrument", what)))
     if isinstance(what, str):
         if "\n" in what:
             return Instrument.parse(what)
@@ -133,6 +134,28 @@ def whole(name: str, value: Any) -> int:
     if not found.is_integer():
         raise ValueError(f"{name} must be a whole number, got {value}")
     return int(found)
+
+
+def whole_of(name: str, value: Any) -> int:
+    """The same, also written as a text: a field of a plan."""
+    try:
+        return whole(name, float(value) if isinstance(value, str) else value)
+    except (ValueError, OverflowError):
+        raise ValueError(f"{name} must be a whole number, got {value!r}") from None
+
+
+def as_json(place: str, value: Any) -> Any:
+    """Tables with lists and numbers as JSON has them; what is None is left out."""
+    if isinstance(value, Mapping):
+        return {name: as_json(f"{place}[{name!r}]", each) for name, each in value.items() if each is not None}
+    if isinstance(value, np.ndarray) and value.shape != ():
+        value = list(value)
+    if isinstance(value, (list, tuple, range)):
+        return [as_json(f"{place}[{at}]", each) for at, each in enumerate(value)]
+    value = plain(place, value)
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"{place} is {value}; give a finite number, or leave it out")
+    return os.fspath(value) if isinstance(value, os.PathLike) else value
 
 
 def note(what: NoteLike) -> int:

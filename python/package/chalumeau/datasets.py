@@ -10,11 +10,11 @@ it a list of dicts, `measure` is a pure function of one of them, and `dataset` m
 from __future__ import annotations
 
 import argparse
-import csv
 import hashlib
 import json
 import math
 import os
+import re
 import tempfile
 import time
 import uuid
@@ -23,8 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from chalumeau import _native
-from chalumeau.measuring import PlanLike, measure, rows
+from chalumeau.measuring import PlanLike, check, measure, rows
 from chalumeau.parquet_parts import PARQUET, Done, Part, is_there, load_parquet, parts, render_part
 
 __all__ = ["Done", "Part", "Report", "dataset", "growth", "measure", "parts", "render_part", "rows"]
@@ -34,6 +33,9 @@ MANIFEST = "manifest.csv"
 #: A hash of the rows that a folder is for.
 PLAN = "plan.sha256"
 
+
+#: What makes a field of a table a quoted one.
+_QUOTED = re.compile(r'[,"\n\r#]')
 
 #: Calls a function with each of a list, in any order, on whatever does the work.
 MapLike = Callable[[Callable[[Part], Done], Sequence[Part]], Iterable[Done]]
@@ -87,8 +89,9 @@ def dataset(
         dataset(plan, into, map=lambda _, parts: ray.get([work.remote(part) for part in parts]))
 
     Each file has some rows, ``rows_per_part``, and appears when it is whole. Whatever is stopped or dies, the same call goes
-    on where it was, and at the end every row is there once: that is checked. Rows whose files (instrument, MIDI, scale ...) have
-    changed are rendered again. A folder that holds the rows of another plan is refused.
+    on where it was, and at the end every row is there once: that is checked. Rows whose files (instrument, MIDI, scale ...) or presets have
+    changed are rendered again. All rows that are left are checked before the first is rendered. A folder that holds the rows of another plan,
+    or a manifest.csv that is of none, is refused.
 
     ``manifest.csv`` has the columns of ``chalumeau batch`` (``file``, the names of the plan, ``length_s``, ``rate_hz``,
     ``peak_dbfs``, ``rms_dbfs``) and then those of `measure`. ``file`` is the Parquet file of the row. With ``sound`` the Parquet
@@ -108,7 +111,6 @@ def dataset(
     if workers < 1:
         raise ValueError(f"workers must be at least 1, got {workers}")
     cut = parts(plan, into, sound=sound, rows_per_part=rows_per_part)
-    os.makedirs(into, exist_ok=True)
     ours = {part.file for part in cut}
     foreign = sorted(path.name for path in Path(into).glob(f"{PARQUET}/*.parquet") if f"{PARQUET}/{path.name}" not in ours)
     if foreign:
@@ -121,9 +123,12 @@ def dataset(
     # Where nothing was made, as by a plan with a mistake, another plan may begin.
     if begun != planned and is_begun:
         raise ValueError(f"{into} holds a data set of another plan; take another folder, or remove this one first")
+    if not stamp.exists() and Path(into, MANIFEST).exists():
+        raise ValueError(f"{into} holds a {MANIFEST} that is not of a data set; take another folder")
     if left:
         # A wrong name or value is told before anything is made.
         _check(left)
+        os.makedirs(into, exist_ok=True)
         growing = Path(into, f".{PLAN}.{uuid.uuid4().hex}")
         growing.write_text(planned)
         os.replace(growing, stamp)
@@ -152,17 +157,14 @@ def _digest(cut: Sequence[Part]) -> str:
 
 
 def _check(left: Sequence[Part]) -> None:
-    """Each value of each name is tried once, in the first row that has it."""
-    tried: set[tuple[str, str]] = set()
+    """Whether every row can be rendered, as far as that can be known without its instrument."""
     for part in left:
         for at, pairs in enumerate(part.rows):
-            if tried.issuperset(pairs):
-                continue
-            tried.update(pairs)
+            row = dict(pairs)
             try:
-                _native.check([(name, value) for name, value in pairs if name != "channels"])
+                check(row)
             except ValueError as error:
-                raise ValueError(f"row {part.first + at} {dict(pairs)}: {error}") from error
+                raise ValueError(f"row {part.first + at} {row}: {error}") from error
 
 
 def _in_processes(left: Sequence[Part], workers: int) -> list[Done]:
@@ -191,7 +193,6 @@ def _write_manifest(cut: Sequence[Part], into: str | os.PathLike[str]) -> int:
     expected, growing = 1, Path(into, f".{MANIFEST}.{uuid.uuid4().hex}")
     try:
         with open(growing, "w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
             for part in cut:
                 path = Path(part.into, part.file)
                 names = [name for name in parquet.read_schema(path).names if name != "samples"]
@@ -200,15 +201,21 @@ def _write_manifest(cut: Sequence[Part], into: str | os.PathLike[str]) -> int:
                     if number != expected:
                         raise RuntimeError(f"{path}: row {expected} expected, row {number} found")
                     if number == 1:
-                        writer.writerow(row)
+                        file.write(_line(row))
                     # What was asked for stands as it was written.
                     row |= dict(part.rows[number - part.first])
-                    writer.writerow(_shown(name, value) for name, value in row.items())
+                    file.write(_line(_shown(name, value) for name, value in row.items()))
                     expected += 1
         os.replace(growing, Path(into, MANIFEST))
     finally:
         growing.unlink(missing_ok=True)
     return expected - 1
+
+
+def _line(fields: Iterable[str]) -> str:
+    """A line of a table. Fields are quoted as ``chalumeau batch`` does it: also where a reader would take # for a remark, as in C#4."""
+    quoted = (field if _QUOTED.search(field) is None else '"' + field.replace('"', '""') + '"' for field in fields)
+    return ",".join(quoted) + "\n"
 
 
 def _shown(name: str, value: Any) -> str:

@@ -13,8 +13,8 @@ import numpy as np
 
 from chalumeau import _native
 from chalumeau.acoustics import features
-from chalumeau.arguments import Value, is_of_render, plain, text_of
-from chalumeau.playing import render
+from chalumeau.arguments import Value, as_json, is_of_render, pairs, text_of, whole_of
+from chalumeau.playing import played
 
 #: A plan: the path of a TOML or CSV file, the text of a TOML plan, a dict of its tables, or rows.
 PlanLike = Union[str, "os.PathLike[str]", Mapping[str, Any], Sequence[Mapping[str, Value]]]
@@ -35,7 +35,7 @@ def rows(plan: PlanLike) -> list[dict[str, str]]:
     (6, {'seconds': '0.3', 'gamma': '0.4', 'written': 'C4'})
     """
     if isinstance(plan, Mapping):
-        names, values = _native.rows(json=json.dumps(_as_json("plan", plan)))
+        names, values = _native.rows(json=json.dumps(as_json("plan", plan)))
     elif isinstance(plan, str) and "\n" in plan:
         names, values = _native.rows(text=plan)
     elif isinstance(plan, (str, os.PathLike)):
@@ -50,25 +50,35 @@ def rows(plan: PlanLike) -> list[dict[str, str]]:
     return [dict(zip(names, of_row)) for of_row in values]
 
 
-def _as_json(place: str, value: Any) -> Any:
-    """A plan with lists and numbers as JSON has them."""
-    if isinstance(value, Mapping):
-        return {name: _as_json(f"{place}[{name!r}]", each) for name, each in value.items()}
-    if isinstance(value, np.ndarray) and value.shape != ():
-        value = list(value)
-    if isinstance(value, (list, tuple, range)):
-        return [_as_json(f"{place}[{at}]", each) for at, each in enumerate(value)]
-    value = plain(place, value)
-    if isinstance(value, float) and not math.isfinite(value):
-        raise ValueError(f"{place} is {value}; give a finite number, or leave it out")
-    return os.fspath(value) if isinstance(value, os.PathLike) else value
+#: Columns of plans of ``chalumeau batch`` that are of its files.
+_OF_FILES = ("bits", "out", "force")
+
+
+def split(row: Mapping[str, Value]) -> tuple[Any, dict[str, Any], int | None, int]:
+    """What a row plays, its settings, its channels (None: as many as the command would write) and its rate."""
+    named: dict[str, Any] = {name: value for name, value in row.items() if value is not None and value != ""}
+    for own in _OF_FILES:
+        if own in named:
+            raise ValueError(f"{own} is of files of chalumeau batch; samples here are always 32-bit floats")
+    score, channels = named.pop("midi", None), named.pop("channels", None)
+    channels = None if channels is None else whole_of("channels", channels)
+    if channels not in (None, 1, 2):
+        raise ValueError(f"channels must be 1 or 2, got {channels}")
+    return score, named, channels, whole_of("rate", named.pop("rate", 48_000))
+
+
+def check(row: Mapping[str, Value]) -> None:
+    """Raises `ValueError` if a row cannot be rendered, as far as that can be known without its instrument: for notes, values, files."""
+    score, named, _, rate = split(row)
+    about = [("midi", os.fspath(score))] if score is not None else []
+    _native.check_rendering([*about, *pairs(named), ("rate", str(rate))])
 
 
 def measure(row: Mapping[str, Value], sound: bool = False) -> dict[str, Any]:
     """Renders one row and measures it: a pure function, the same on every machine.
 
     Returns the columns that ``chalumeau batch`` has, ``length_s``, ``rate_hz``, ``peak_dbfs``, ``rms_dbfs``; then those of
-    `features` (of the mean of both channels, if there are two): ``f0_hz``, ``steady_dbfs``, ``centroid_hz``, ``attack_s``,
+    `features` (of the mean of both channels, if there are two, as in a room or for several players): ``f0_hz``, ``steady_dbfs``, ``centroid_hz``, ``attack_s``,
     ``h1_db`` to ``h12_db``; and ``sha256``, of the samples as little-endian 32-bit floats. With ``sound`` the samples too.
 
     >>> import chalumeau
@@ -76,17 +86,13 @@ def measure(row: Mapping[str, Value], sound: bool = False) -> dict[str, Any]:
     >>> round(c4["f0_hz"]), c4["length_s"]
     (233, 0.5)
     """
-    named: dict[str, Any] = {name: value for name, value in row.items() if value is not None and value != ""}
-    for own in ("bits", "out", "force"):
-        if own in named:
-            raise ValueError(f"{own} is of files of chalumeau batch; samples here are always 32-bit floats")
-    score = named.pop("midi", None)
-    channels, rate = int(named.pop("channels", 1)), int(named.pop("rate", 48_000))
-    samples = render(score, settings=named, rate=rate, channels=channels)
+    score, named, channels, rate = split(row)
+    made = played(score, settings=named, rate=rate, channels=channels)
+    samples = made["samples"]
     power = float(np.mean(np.square(samples, dtype=np.float64))) if samples.size else 0.0
     peak = float(np.abs(samples).max(initial=0.0))
-    mono = samples if channels == 1 else samples.mean(axis=1, dtype=np.float32)
-    heard = features(mono, rate)
+    mono = samples if samples.ndim == 1 else samples.mean(axis=1, dtype=np.float32)
+    heard = features(mono, rate, near=made["wanted_hz"] if made["wanted_hz"] > 0 else None)
     harmonics = heard.pop("harmonics_db")
     levels = harmonics + [math.nan] * (HARMONICS - len(harmonics))
     measured = {

@@ -38,10 +38,14 @@ class Part:
 
     @property
     def digest(self) -> str:
-        """A hash of everything that the file depends on, files that rows name among it."""
+        """A hash of everything that the file depends on, files and presets that rows name among it."""
         named = sorted({value for row in self.rows for _, value in row if os.path.isfile(value)})
         files = {name: hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in named}
-        about = {**asdict(self), "into": "", "version": _native.__version__, **({"files": files} if files else {})}
+        chosen = sorted({value for row in self.rows for name, value in row if name == "preset" and value})
+        presets = {name: _native.preset_text(name) for name in chosen}
+        about = {**asdict(self), "into": "", "version": _native.__version__}
+        about |= {"files": files} if files else {}
+        about |= {"presets": presets} if presets else {}
         return hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()
 
 

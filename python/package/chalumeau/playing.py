@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, Union
 
@@ -41,7 +42,7 @@ def render(
     instrument: InstrumentLike | None = None,
     settings: Mapping[str, Value] | None = None,
     rate: int = 48_000,
-    channels: int = 1,
+    channels: int | None = None,
     players: int | None = None,
     **named: Value,
 ) -> Samples:
@@ -59,13 +60,14 @@ def render(
 
     ``instrument`` is the clarinet in B flat unless one is chosen (see `chalumeau.instrument`). The first rendering with an
     instrument of your own prepares it, up to a minute; the result is kept in your cache folder. ``rate`` is 1000..1536000 Hz.
-    ``players`` is 1..16.
+    ``players`` is 1..16. ``channels`` is 1 or 2; without it there are two in a room, for several players and from two places, else one,
+    as the command has it.
 
-    Returns float32 of shape ``(samples,)``, or ``(samples, 2)`` with ``channels=2``: the memory that was rendered into.
+    Returns float32 of shape ``(samples,)``, or ``(samples, 2)`` of two channels: the memory that was rendered into.
     Python's other threads run meanwhile.
 
-    Raises `ValueError`, with what was given and what would be right. Warns of notes that stay silent, and of a room that one channel
-    leaves out.
+    Raises `ValueError`, with what was given and what would be right, and `MemoryError` where the samples do not fit. A list of notes lasts at
+    most six hours. Warns of notes that stay silent, of settings that have no effect, and of a room that one channel leaves out.
 
     Source: ``docs/model.md`` in the repository. The reed's law is that of Wilson and Beavers (1974), the bore a lattice after
     Kelly and Lochbaum (1962), with holes after Dubos et al. (1999).
@@ -80,13 +82,29 @@ def render(
     Traceback (most recent call last):
     ValueError: no flag of render and no parameter is called "strenght"; do you mean strength?
     """
-    midi, notes = None, None
+    made = played(score, instrument=instrument, settings=settings, rate=rate, channels=channels, players=players, named=named)
+    samples: Samples = made["samples"]
+    return samples
+
+
+def played(
+    score: Score | None = None,
+    *,
+    instrument: InstrumentLike | None = None,
+    settings: Mapping[str, Value] | None = None,
+    rate: int = 48_000,
+    channels: int | None = None,
+    players: int | None = None,
+    named: Mapping[str, Value] | None = None,
+) -> dict[str, Any]:
+    """What `render` plays, with its rate and with ``wanted_hz``, the pitch that the longest note is to have."""
+    midi, path, notes = None, None, None
     if isinstance(score, (bytes, bytearray, memoryview)):
         midi = bytes(score)
     elif isinstance(score, (str, os.PathLike)):
         if score == "":
             raise ValueError('the score is an empty text; give the path of a MIDI file, or written="C4" for one note')
-        midi = Path(score).read_bytes()
+        midi, path = Path(score).read_bytes(), score
     elif score is not None:
         if not isinstance(score, Iterable):
             raise TypeError(f"a score is the path of a MIDI file, its bytes or a list of notes, not {score!r}; for one note say written={score!r}")
@@ -95,18 +113,18 @@ def render(
         pairs(settings, named, {"rate": rate, "players": players}),
         None if instrument is None else instrument_of(instrument),
         midi,
+        path,
         notes,
-        whole("channels", channels),
+        None if channels is None else whole("channels", channels),
     )
     for warning in made["warnings"]:
-        warnings.warn(warning, stacklevel=2)
+        warnings.warn(warning, stacklevel=3)
     if made["resets"]:
         warnings.warn(
             f"the calculation broke down and the instrument was reset {made['resets']} times; please report this",
-            stacklevel=2,
+            stacklevel=3,
         )
-    samples: Samples = made["samples"]
-    return samples
+    return made
 
 
 def _listed(one: Any) -> tuple[float, float, int, float]:
@@ -124,6 +142,32 @@ def _within(name: str, value: Any, low: float, high: float) -> float:
     if not low <= found <= high:
         raise ValueError(f"{name} must lie in {low}..{high}, got {value}")
     return found
+
+
+def _velocity(velocity: Any) -> float:
+    return _within("velocity", velocity, 0, 1)
+
+
+def _breath(share: Any) -> float:
+    return _within("breath", share, 0, 1)
+
+
+def _bend(cents: Any) -> float:
+    return _within("bend", cents, -2400, 2400)
+
+
+def _slap(strength: Any) -> float:
+    return _within("slap", strength, 0, 1)
+
+
+#: What checks an argument of an event, by its name.
+_CHECKS: dict[str, Callable[[Any], Any]] = {
+    "key": note,
+    "velocity": _velocity,
+    "share": _breath,
+    "cents": _bend,
+    "strength": _slap,
+}
 
 
 def _refuse_idle(settings: Mapping[str, Value] | None, named: Mapping[str, Value]) -> None:
@@ -150,6 +194,22 @@ def _set_by(name: str) -> str:
     """The id of the setting that a name sets, short names among them."""
     short = {"no_noise": "noise", "tempered": "tune", "natural": "tune"}
     return short.get(name.replace("-", "_"), setting_id(name))
+
+
+def _changed(now: dict[str, Value], settings: Mapping[str, Value] | None = None, **named: Value) -> dict[str, Value]:
+    """The settings of a live clarinet after `Clarinet.set`."""
+    _refuse_idle(settings, named)
+    changes = {**(settings or {}), **named}
+    fixed = [name for name in changes if name in ("quality", "untuned")]
+    if fixed:
+        raise ValueError(f"{fixed[0]} cannot change while a Clarinet plays; make another: Clarinet({fixed[0]}=...)")
+    changed = {_set_by(name) for name in changes}
+    wanted = {name: value for name, value in now.items() if _set_by(name) not in changed}
+    return wanted | {name: value for name, value in changes.items() if value is not None}
+
+
+#: What `Clarinet.play` plays.
+_EVENTS = ("note_on", "note_off", "breath", "bend", "slap", "hole", "panic", "set")
 
 
 class Clarinet:
@@ -224,14 +284,7 @@ class Clarinet:
         >>> clarinet.settings
         {'lip': 1.1, 'Reed strength': 4}
         """
-        _refuse_idle(settings, named)
-        changes = {**(settings or {}), **named}
-        fixed = [name for name in changes if name in ("quality", "untuned")]
-        if fixed:
-            raise ValueError(f"{fixed[0]} cannot change while a Clarinet plays; make another: Clarinet({fixed[0]}=...)")
-        changed = {_set_by(name) for name in changes}
-        wanted = {name: value for name, value in self._settings.items() if _set_by(name) not in changed}
-        wanted |= {name: value for name, value in changes.items() if value is not None}
+        wanted = _changed(self._settings, settings, **named)
         self._voice.set(pairs(wanted), self._instrument)
         self._settings = wanted
         self._silent.clear()
@@ -239,7 +292,7 @@ class Clarinet:
     def note_on(self, key: NoteLike, velocity: float = 0.8) -> None:
         """A key or fingering goes down: sounding pitch, velocity 0..1. Beside a held key it is slurred."""
         pitch = note(key)
-        self._voice.note_on(pitch, _within("velocity", velocity, 0, 1))
+        self._voice.note_on(pitch, _velocity(velocity))
         if pitch not in self._silent:
             self._silent[pitch] = _native.silent(pairs(self._settings, self._rate), self._instrument, pitch)
         for warning in self._silent[pitch]:
@@ -251,15 +304,15 @@ class Clarinet:
 
     def breath(self, share: float) -> None:
         """Breath, 0..1 of full breath. From the first one on, it blows in place of the keys' velocity."""
-        self._voice.breath(_within("breath", share, 0, 1))
+        self._voice.breath(_breath(share))
 
     def bend(self, cents: float) -> None:
         """Pitch bend, -2400..2400 cents: near the note by the lip, beyond by the size of the bore."""
-        self._voice.bend(_within("bend", cents, -2400, 2400))
+        self._voice.bend(_bend(cents))
 
     def slap(self, strength: float = 1.0) -> None:
         """The tongue slaps the reed, 0..1."""
-        self._voice.slap(_within("slap", strength, 0, 1))
+        self._voice.slap(_slap(strength))
 
     def hole(self, name: str, opening: float | None) -> None:
         """Opens one hole 0..1, whatever is fingered: half-holes, shadings. None goes back to the fingering.
@@ -270,10 +323,13 @@ class Clarinet:
         Traceback (most recent call last):
         ValueError: no hole is called 'nothing'; the holes are ...
         """
+        self._voice.hole(*self._hole(name, opening))
+
+    def _hole(self, name: str, opening: float | None) -> tuple[int, float | None]:
         names = [hole[0] for hole in self._instrument.holes()]
         if name not in names:
             raise ValueError(f"no hole is called {name!r}; the holes are {', '.join(names)}")
-        self._voice.hole(names.index(name), None if opening is None else _within("opening", opening, 0, 1))
+        return names.index(name), None if opening is None else _within("opening", opening, 0, 1)
 
     def panic(self) -> None:
         """Releases all notes and silences them at once; breath and settings stay as they were set."""
@@ -294,30 +350,64 @@ class Clarinet:
     def play(self, events: Iterable[tuple[Any, ...]], seconds: float) -> Samples:
         """Renders, with events at their times: ``(at_s, method, *arguments)``, for example ``(0.1, "note_on", "C4")``.
 
-        Times are counted from now, and rounded to whole samples.
+        Times are counted from now, up to ``seconds``, and rounded to whole samples. All events are checked before the first is played.
+
+        Raises `ValueError` or `TypeError` for an event that is none, and plays nothing then.
 
         >>> import chalumeau
         >>> events = [(0.0, "breath", 0.5), (0.0, "note_on", "C4"), (0.1, "set", {"lip": 1.1}), (0.2, "note_off", "C4")]
         >>> chalumeau.Clarinet().play(events, 0.3).shape
         (14400,)
         """
-        able = ("note_on", "note_off", "breath", "bend", "slap", "hole", "panic", "set")
-        out = np.zeros(self._samples(seconds), np.float32)
+        length = self._samples(seconds)
+        timed = self._checked(events, length, seconds)
+        out = np.zeros(length, np.float32)
         done = 0
-        for at_s, name, *arguments in sorted(events, key=lambda event: event[0]):
-            if name not in able:
-                raise ValueError(f"no event is called {name!r}; the events are {', '.join(able)}")
-            at = min(self._samples(at_s), len(out))
+        for at, name, arguments in timed:
             self._voice.render_into(out[done:at])
             getattr(self, name)(*arguments)
             done = at
         self._voice.render_into(out[done:])
         return out
 
-    def _samples(self, seconds: float) -> int:
-        seconds = number("seconds", seconds)
+    def _checked(
+        self, events: Iterable[tuple[Any, ...]], length: int, seconds: float
+    ) -> list[tuple[int, str, tuple[Any, ...]]]:
+        """Events in the order of their times, each of which can be played."""
+        timed = []
+        for event in events:
+            try:
+                at_s, name, *arguments = event
+            except (TypeError, ValueError):
+                raise TypeError(f"an event is (at_s, method, *arguments), not {event!r}") from None
+            if name not in _EVENTS:
+                raise ValueError(f"no event is called {name!r}; the events are {', '.join(_EVENTS)}")
+            at = self._samples(at_s, "the time of an event")
+            if at > length:
+                raise ValueError(f"event at {at_s} s is after the end, {seconds} s")
+            timed.append((at, name, tuple(arguments)))
+        timed.sort(key=lambda one: one[0])
+        settings = self._settings
+        for at, name, arguments in timed:
+            where = f"event {name} at {at / self.rate:g} s"
+            try:
+                given = inspect.signature(getattr(self, name)).bind(*arguments).arguments
+                if name == "set":
+                    settings = _changed(settings, *arguments)
+                    self._voice.check(pairs(settings), self._instrument)
+                elif name == "hole":
+                    self._hole(*arguments)
+                else:
+                    for argument, value in given.items():
+                        _CHECKS[argument](value)
+            except (TypeError, ValueError) as error:
+                raise type(error)(f"{where}: {error}") from error
+        return timed
+
+    def _samples(self, seconds: float, what: str = "seconds") -> int:
+        seconds = number(what, seconds)
         if not 0.0 <= seconds <= 86_400.0:
-            raise ValueError(f"seconds must lie in 0..86400, got {seconds}")
+            raise ValueError(f"{what} must lie in 0..86400, got {seconds}")
         return round(seconds * self.rate)
 
     def __repr__(self) -> str:
