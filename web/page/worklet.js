@@ -206,7 +206,7 @@ class Chalumeau extends AudioWorkletProcessor {
   }
 
   tellPicture() {
-    const picture = new Float32Array(this.module.memory.buffer, this.module.chalumeau_picture(), 11);
+    const picture = new Float32Array(this.module.memory.buffer, this.module.chalumeau_picture(), this.module.chalumeau_picture_numbers());
     this.port.postMessage({ picture: Array.from(picture), microphone: this.listening ? this.wind() : null });
     this.pictures += 1;
     if (this.hasKnob && this.pictures % STATUS_EVERY === 0) {

@@ -9,19 +9,11 @@ use serde_json::{Value, json};
 /// Places of a standing wave on its way from the reed to the bell.
 pub const PLACES: usize = 64;
 
-/// To a tenth of a millimetre.
-fn metres(length_m: f64) -> f64 {
-    (length_m * 1e4).round() / 1e4
-}
-
 /// `file` as it is written, before the scaling of its `model`. Takes a tenth of a second. Allocates.
 pub fn drawn(file: &InstrumentFile, model: &Model) -> Value {
     let bore = TransferMatrix::new(file, Air::default());
-    let bores: Vec<_> = file
-        .bore
-        .iter()
-        .map(|s| json!([s.part, metres(s.x_start_m), metres(s.x_end_m), s.r_start_m, s.r_end_m]))
-        .collect();
+    let bores: Vec<_> =
+        file.bore.iter().map(|s| json!([s.part, s.x_start_m, s.x_end_m, s.r_start_m, s.r_end_m])).collect();
     let fingerings: Vec<_> = file
         .fingerings
         .iter()

@@ -12,7 +12,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use chalumeau_core::bore::bundled::Bundled;
 
 use crate::held_knob::HeldKnob;
-use crate::playing::{MOST_FRAMES, Playing};
+use crate::playing::{MOST_FRAMES, PICTURE, Playing};
 
 /// A module in a worklet has one thread: the lock is never waited for.
 static PLAYING: Mutex<Option<Box<Playing>>> = Mutex::new(None);
@@ -136,6 +136,12 @@ pub extern "C" fn chalumeau_bend_range(semitones: u32) {
 #[unsafe(no_mangle)]
 pub extern "C" fn chalumeau_breath_from(at: u32) {
     with(|playing| playing.breath_from(at as usize));
+}
+
+/// How many numbers [`chalumeau_picture`] gives.
+#[unsafe(no_mangle)]
+pub extern "C" fn chalumeau_picture_numbers() -> u32 {
+    PICTURE as u32
 }
 
 /// Where the numbers of [`Playing::picture`] lie; null without an instrument.

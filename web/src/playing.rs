@@ -26,8 +26,27 @@ use crate::values;
 
 /// Most samples of one block: eight of an audio worklet's.
 pub const MOST_FRAMES: usize = 1_024;
-/// Numbers of a [picture](Playing::picture).
-pub const PICTURE: usize = 11;
+/// The numbers of a [picture](Playing::picture) in their order, by the names that the page knows them by. -1 where there is none:
+/// held key, sounding note and index of the fingering; mouth pressure in kPa, and the same over the closing pressure; dynamic
+/// 0..=1; peak and root mean square of the samples since the last picture; place in [`ORIGINS`]; players awake; and how often the
+/// voice was reset.
+pub const PICTURE_NAMES: [&str; 11] = [
+    "key",
+    "sounding",
+    "fingering",
+    "mouth",
+    "gamma",
+    "dynamic",
+    "peak",
+    "level",
+    "origin",
+    "awake",
+    "resets",
+];
+/// How many there are.
+pub const PICTURE: usize = PICTURE_NAMES.len();
+/// Where breath can come from, as the page says it; the first is the keys.
+pub const ORIGINS: [&str; 6] = ["", "CC2", "CC11", "channel pressure", "the note", "the knob"];
 
 /// Numbers of [what the page shows of the microphone](Playing::wind).
 pub const WIND_PICTURE: usize = 4;
@@ -330,19 +349,18 @@ impl Playing {
         &self.channels[usize::from(at == 1)]
     }
 
-    /// What the page draws, -1 where there is none: held key and sounding note, index of the fingering, mouth pressure in kPa,
-    /// the same over the closing pressure, dynamic 0..=1, peak and root mean square of the samples since the last picture, origin
-    /// of the breath (1 CC2, 2 CC11, 3 pressure, 4 a note, 5 the knob), players awake, and how often the voice was reset.
+    /// What the page draws: the numbers of [`PICTURE_NAMES`].
     pub fn picture(&mut self) -> &[f32; PICTURE] {
         let state = self.ensemble.first().player_state();
+        // By their places in `ORIGINS`.
         let origin = match self.parts.breath_origin() {
+            _ if self.is_blown => 5.0,
             None => 0.0,
             Some(BreathOrigin::Controller(BreathController::Breath)) => 1.0,
             Some(BreathOrigin::Controller(BreathController::Expression)) => 2.0,
             Some(BreathOrigin::Controller(BreathController::Pressure)) => 3.0,
             Some(_) => 4.0,
         };
-        let origin = if self.is_blown { 5.0 } else { origin };
         let (energy, samples) = std::mem::take(&mut self.energy);
         let closing_kpa = (1e-3 * self.settings.under_lip(state.lip).closing_pa()) as f32;
         self.picture = [

@@ -15,7 +15,7 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use chalumeau_core::bore::bundled::Bundled;
-use chalumeau_core::bore::instrument_file::InstrumentFile;
+use chalumeau_core::bore::instrument_file::{InstrumentError, InstrumentFile};
 use chalumeau_core::bore::moved_hole::MovedHole;
 use chalumeau_core::haptics::{FeelDesign, FeelRefused, TorqueLimits};
 use chalumeau_core::instrument::prepare::{PreparedInstrument, altered};
@@ -192,7 +192,10 @@ fn bundled(file: &InstrumentFile) -> Option<(usize, Vec<MovedHole>)> {
 }
 
 fn open(text: &str, rate_hz: f64) -> Result<Value, String> {
-    let file = InstrumentFile::parse(text).map_err(|error| error.to_string())?;
+    let file = InstrumentFile::parse(text).map_err(|error| match error {
+        InstrumentError::Syntax(error) => format!("This is not a Chalumeau instrument file (.toml). {error}"),
+        error => error.to_string(),
+    })?;
     if let Some((at, moved)) = bundled(&file) {
         return Ok(json!({ "instrument": at, "moved": moved, "name": file.name }));
     }

@@ -12,12 +12,15 @@ use chalumeau::parameters::{self, Kind, Sets};
 use chalumeau::presets::{Preset, factory};
 use chalumeau::tour;
 use chalumeau_core::bore::bundled::Bundled;
+use chalumeau_core::bore::instrument_file::{HOLE_RADIUS_M, LEAST_HOLE_X_M};
+use chalumeau_core::bore::moved_hole::LEAST_GAP_M;
 use chalumeau_core::control::midi::breath::BreathFrom;
 use chalumeau_core::control::midi::techniques::Wheel;
 use chalumeau_core::event::{Event, Timed};
 use chalumeau_core::instrument::player::dynamics::NAMED;
 use chalumeau_core::instrument::{Preparation, Settings, Wanted};
 use chalumeau_web::drawn::drawn;
+use chalumeau_web::playing::{ORIGINS, PICTURE_NAMES};
 use chalumeau_web::values;
 use serde_json::{Value, json};
 
@@ -54,8 +57,17 @@ fn text() -> Result<String> {
         "instruments": instruments,
         "presets": presets,
         "controls": controls,
+        // What a hole may be, m; not wider than the bore at its place either.
+        "holes": { "least_x": LEAST_HOLE_X_M, "gap": LEAST_GAP_M, "radius": [HOLE_RADIUS_M.0, HOLE_RADIUS_M.1] },
+        "breathFromKeys": place(&BreathFrom::ALL, |from| *from == BreathFrom::Keys)?,
+        "picture": PICTURE_NAMES,
+        "origins": ORIGINS,
     });
     Ok(all.to_string())
+}
+
+fn place<T>(all: &[T], is_it: impl Fn(&T) -> bool) -> Result<usize> {
+    all.iter().position(is_it).context("a list of the page lacks something")
 }
 
 /// The sounds of the listening page: the [tour](mod@tour), as the module's values and messages.
