@@ -12,7 +12,7 @@ mod toolchain;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use sha2::{Digest, Sha256};
 
 use crate::{instrument, licences, machine};
@@ -25,8 +25,10 @@ const PORT: u16 = 8_000;
 const VERSION: &str = "VERSION";
 /// Likewise its list of files.
 const FILES: &str = "[/* FILES */]";
-/// Large, and fetched when first needed: `LATER` of sw.js.
-const LATER: [&str; 1] = ["workshop.wasm"];
+/// Large, and fetched when first needed. Its name in the page tells its contents, so that a page of another version never gets it.
+const LATER: &str = "workshop.wasm";
+/// Who names it.
+const NAMES_LATER: [&str; 2] = ["sw.js", "workshop-worker.js"];
 
 /// `cargo xtask web [--serve [port]]`.
 pub fn run(args: &[String]) -> Result<()> {
@@ -58,9 +60,11 @@ pub fn build() -> Result<PathBuf> {
     names.extend(toolchain::build(&folder)?);
     instrument::run("web-data", &[folder.display().to_string()])?;
     names.extend(["data.json", "tour.json"].map(str::to_owned));
+    let later = name_by_contents(&folder)?;
+    names.iter_mut().filter(|name| *name == LATER).for_each(|name| name.clone_from(&later));
     names.retain(|name| name != "sw.js");
     names.sort();
-    seal(&folder, &names)?;
+    seal(&folder, &names, &later)?;
     // For those who host it; the page does not need it.
     licences::beside_page(&folder)?;
     let size: u64 =
@@ -74,17 +78,38 @@ fn copy(from: &Path, to: &Path) -> Result<()> {
     Ok(())
 }
 
+fn hexadecimal(hasher: Sha256) -> String {
+    hasher.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Gives the large file a name that changes with its contents, and returns it.
+fn name_by_contents(folder: &Path) -> Result<String> {
+    let path = folder.join(LATER);
+    let contents = fs::read(&path).with_context(|| format!("the page has no {LATER}"))?;
+    let hash = hexadecimal(Sha256::new().chain_update(contents));
+    let name = LATER.replace('.', &format!("-{hash}."));
+    fs::rename(&path, folder.join(&name))?;
+    for user in NAMES_LATER {
+        let path = folder.join(user);
+        let text = fs::read_to_string(&path).with_context(|| format!("the page has no {user}"))?;
+        let quoted = format!("'{LATER}'");
+        ensure!(text.contains(&quoted), "{user} does not name {quoted}");
+        fs::write(path, text.replace(&quoted, &format!("'{name}'")))?;
+    }
+    Ok(name)
+}
+
 /// Tells the service worker the files, and a version that changes with any of them.
-fn seal(folder: &Path, names: &[String]) -> Result<()> {
+fn seal(folder: &Path, names: &[String], later: &str) -> Result<()> {
     let mut hasher = Sha256::new();
     for name in names {
         hasher.update(name.as_bytes());
         hasher.update(fs::read(folder.join(name))?);
     }
-    let version: String = hasher.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+    let version = hexadecimal(hasher);
     let path = folder.join("sw.js");
     let text = fs::read_to_string(&path).context("the page has no sw.js")?;
-    let at_once: Vec<_> = names.iter().filter(|name| !LATER.contains(&name.as_str())).collect();
+    let at_once: Vec<_> = names.iter().filter(|name| *name != later).collect();
     let list = serde_json::to_string(&at_once)?;
     fs::write(path, text.replacen(VERSION, &version, 1).replacen(FILES, &list, 1))?;
     Ok(())

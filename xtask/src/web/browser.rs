@@ -35,7 +35,7 @@ const ESPEAK: Package = Package {
 
 /// The page's tests, in order: the module, the microphone, the page. Each is a program of Node, which gets the page's folder and
 /// one of its own.
-const TESTS: [&str; 3] = ["module.mjs", "wind.mjs", "browser.mjs"];
+const TESTS: [&str; 4] = ["module.mjs", "wind.mjs", "use.mjs", "browser.mjs"];
 
 /// Builds the page and runs its tests; installs what they need.
 pub fn test() -> Result<()> {
