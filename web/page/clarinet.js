@@ -19,6 +19,9 @@ const SLOWED_HZ = 1.5;
 /** Light over a cylinder from its upper edge to its lower edge: 1 is the colour itself. */
 const LIGHT = [[-1, 0.62], [-0.8, 0.98], [-0.5, 1.32], [-0.3, 1.16], [0, 0.96], [0.4, 0.76], [0.8, 0.56], [1, 0.46]];
 
+/** What the wave is, and the room that the name of the note takes beside it, pixels. */
+const [CAPTION, NOTE_WIDTH] = ['sound pressure in the bore', 90];
+
 const rgb = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 const lit = (colour, light) => colour.map((x) => Math.round(light > 1 ? x + (255 - x) * Math.min(1, light - 1) : x * light));
 const mix = (a, b, share) => a.map((x, n) => Math.round(x + share * (b[n] - x)));
@@ -155,7 +158,8 @@ export class ClarinetDrawing {
   }
 
   boreRadius(metres) {
-    const segment = this.file.bore.find(([, from, to]) => metres >= from && metres < to) ?? this.file.bore.at(-1);
+    // At a joint the upper part counts, as in the core.
+    const segment = this.file.bore.find(([, , to]) => metres <= to) ?? this.file.bore.at(-1);
     const [, from, to, a, b] = segment;
     return a + (b - a) * clamp((metres - from) / Math.max(1e-9, to - from), 0, 1);
   }
@@ -322,10 +326,11 @@ export class ClarinetDrawing {
     g.lineWidth = 2;
     g.lineJoin = 'round';
     g.stroke(line);
-    if (room > 70) {
+    g.font = '12px system-ui, sans-serif';
+    // Not under the name of the note.
+    if (room > 70 && this.left + 2 + g.measureText(CAPTION).width < this.width - NOTE_WIDTH) {
       g.fillStyle = css(this.c.breath);
-      g.font = '12px system-ui, sans-serif';
-      g.fillText('sound pressure in the bore', this.left + 2, 14);
+      g.fillText(CAPTION, this.left + 2, 14);
     }
   }
 

@@ -1,6 +1,7 @@
 // The main controls: what most players need, with the names of the plugin's window.
 
 import { clamp } from './names.js';
+import { hasMoved, isMain, leaveAfterPointer } from './pointers.js';
 
 /** Id of the parameter, name, and what its ends mean. */
 const NAMES = {
@@ -77,20 +78,35 @@ export class Control {
   }
 
   grab(event) {
+    if (!isMain(event) || this.isHeld) return;
     const element = this.element;
-    const begin = { x: event.clientX, y: event.clientY, share: this.share(this.value) };
+    const { value } = this;
+    let begin = null;
     const move = (now) => {
+      if (now.pointerId !== event.pointerId) return;
       // On a phone sideways scrolls.
-      const way = begin.y - now.clientY + (now.pointerType === 'mouse' ? now.clientX - begin.x : 0);
+      const isMouse = now.pointerType === 'mouse';
+      if (!begin) {
+        if (!hasMoved(now, { clientX: isMouse ? event.clientX : now.clientX, clientY: event.clientY })) return;
+        begin = { x: now.clientX, y: now.clientY, share: this.share(value) };
+      }
+      const way = begin.y - now.clientY + (isMouse ? now.clientX - begin.x : 0);
       this.change(this.of.min + clamp(begin.share + way / WAY, 0, 1) * (this.of.max - this.of.min));
     };
-    const end = () => {
-      element.removeEventListener('pointermove', move);
+    const end = (now) => {
+      if (now.pointerId !== event.pointerId) return;
+      ending.abort();
+      this.isHeld = false;
+      // The browser scrolls instead.
+      if (begin && now.type === 'pointercancel') this.change(value);
       this.says.textContent = this.ends;
+      leaveAfterPointer(element);
     };
+    this.isHeld = true;
     element.setPointerCapture(event.pointerId);
-    element.addEventListener('pointermove', move);
-    for (const type of ['pointerup', 'pointercancel']) element.addEventListener(type, end, { once: true });
+    const ending = new AbortController();
+    element.addEventListener('pointermove', move, { signal: ending.signal });
+    for (const type of ['pointerup', 'pointercancel', 'lostpointercapture']) element.addEventListener(type, end, { signal: ending.signal });
     this.says.textContent = this.text;
   }
 

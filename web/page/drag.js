@@ -1,6 +1,9 @@
 // Playing on the picture of the clarinet: left and right is the note, up and down the breath. Two fingers are two keys.
 
 import { clamp } from './names.js';
+import { isMain } from './pointers.js';
+
+const who = (pointerId) => `pointer ${pointerId} on the clarinet`;
 
 export class Drag {
   /** `notes` are those that sound, upwards; `show` gets the touches to draw. */
@@ -21,13 +24,13 @@ export class Drag {
   }
 
   down(event) {
-    if (this.isOff || this.notes.length === 0) return;
+    if (this.isOff || this.notes.length === 0 || !isMain(event)) return;
     event.preventDefault();
     this.element.setPointerCapture(event.pointerId);
     const touch = this.read(event);
     this.touches.set(event.pointerId, touch);
     this.breathe(touch.breath);
-    this.hands.press(touch.note, clamp(Math.round(127 * touch.breath), 1, 127));
+    this.press(touch, event.pointerId);
     this.show([...this.touches.values()]);
   }
 
@@ -37,8 +40,8 @@ export class Drag {
     const touch = this.read(event);
     this.touches.set(event.pointerId, touch);
     if (touch.note !== before.note) {
-      this.hands.press(touch.note, clamp(Math.round(127 * touch.breath), 1, 127));
-      this.letGo(before.note);
+      this.press(touch, event.pointerId);
+      this.hands.release(before.note, who(event.pointerId));
     }
     this.breathe(touch.breath);
     this.show([...this.touches.values()]);
@@ -53,12 +56,12 @@ export class Drag {
     const touch = this.touches.get(event.pointerId);
     if (!touch) return;
     this.touches.delete(event.pointerId);
-    this.letGo(touch.note);
+    this.hands.release(touch.note, who(event.pointerId));
     if (this.touches.size === 0) this.breathe(null);
     this.show([...this.touches.values()]);
   }
 
-  letGo(note) {
-    if (![...this.touches.values()].some((other) => other.note === note)) this.hands.release(note);
+  press({ note, breath }, pointerId) {
+    this.hands.press(note, clamp(Math.round(127 * breath), 1, 127), who(pointerId));
   }
 }

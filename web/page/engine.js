@@ -1,19 +1,47 @@
 // Sound: the audio context, the worklet with the module, the microphone.
 
+import { compiled, whySilent } from './sound.js';
+
+/** Rate for what asks before there is sound, or where there is none, Hz. */
+const USUAL_HZ = 48000;
+
 /** Sees to it that what plays is heard: from the page's loading on everything is prepared, and the first gesture starts it. */
 export class Engine {
-  /** `on` gets { picture }, { blowing }, { failed }, and whatever else the worklet tells. */
+  /** `on` gets { picture }, { blowing }, { failed }, { state: of the context }, and whatever else the worklet tells. */
   constructor(on) {
     this.on = on;
     this.instrument = 0;
     this.waiting = [];
-    // Its sample rate is needed before the module is here: what a worker prepares is for that rate.
-    this.context = new AudioContext({ latencyHint: 'interactive' });
-    this.prepared = new Promise((resolve) => (this.tellPrepared = resolve));
+    this.prepared = new Promise((resolve, reject) => Object.assign(this, { tellPrepared: resolve, tellFailed: reject }));
+    // Who waits for it is told; where nobody waits, `prepare` has told already.
+    this.prepared.catch(() => {});
+    this.trouble = whySilent();
+    if (this.trouble) return;
+    try {
+      // Its sample rate is needed before the module is here: what a worker prepares is for that rate.
+      this.context = new AudioContext({ latencyHint: 'interactive' });
+      this.context.onstatechange = () => this.on({ state: this.context.state });
+    } catch (error) {
+      this.trouble = `the browser gives no sound (${error.message})`;
+    }
   }
 
   /** Fetches and compiles the module, and makes the worklet; silent until `start`. */
   async prepare() {
+    try {
+      await this.make();
+    } catch (error) {
+      this.trouble = error.message;
+      this.waiting = [];
+      this.tellFailed(error);
+      throw error;
+    }
+    this.tellPrepared();
+    if (this.wanted) await this.start();
+  }
+
+  async make() {
+    if (this.trouble) throw Object.assign(new Error(this.trouble), { isLasting: true });
     const module = await compiled('chalumeau.wasm');
     this.volume = new GainNode(this.context, { gain: this.gain ?? 0.8 });
     this.volume.connect(this.context.destination);
@@ -31,28 +59,31 @@ export class Engine {
     this.node.connect(this.volume);
     this.waiting.forEach((message) => this.node.port.postMessage(message));
     this.waiting = [];
-    this.tellPrepared();
-    if (this.wanted) await this.start();
   }
 
-  /** Called in a gesture of the user: browsers let a page sound only then. */
+  /** Called in a gesture of the user: browsers let a page sound only then. Where they do not, this may wait for ever. */
   async start() {
     this.wanted = true;
-    if (this.context.state !== 'running') await this.context.resume();
+    if (this.context && !this.isRunning) await this.context.resume();
   }
 
   /** Switches the sound off until the next `start`. */
   rest() {
+    this.wanted = false;
     if (this.isRunning) this.context.suspend();
   }
 
   get isRunning() {
-    return this.context.state === 'running';
+    return this.context?.state === 'running';
+  }
+
+  get sampleRate() {
+    return this.context?.sampleRate ?? USUAL_HZ;
   }
 
   send(message) {
     if (this.node) this.node.port.postMessage(message);
-    else this.waiting.push(message);
+    else if (!this.trouble) this.waiting.push(message);
   }
 
   /** 0..=1; the ear hears the square. */
@@ -84,11 +115,4 @@ export class Engine {
     this.stream?.getTracks().forEach((track) => track.stop());
     [this.input, this.stream] = [null, null];
   }
-}
-
-async function compiled(address) {
-  const answer = await fetch(address);
-  if (!answer.ok) throw new Error(`${address}: ${answer.status}`);
-  // A host that calls the file something else than application/wasm must not matter.
-  return WebAssembly.compile(await answer.arrayBuffer());
 }

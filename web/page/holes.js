@@ -2,6 +2,8 @@
 // hole does is heard. Heard at once as the grid of the bore has it, and exactly when the fit is done.
 
 import { clamp } from './names.js';
+import { hasMoved, isMain, leaveAfterPointer } from './pointers.js';
+import { NotLoaded } from './workshop.js';
 
 /** Steps that can be undone. */
 const KEPT = 100;
@@ -16,35 +18,42 @@ const NEAR = 26;
 const HINT = matchMedia('(hover: none)').matches
   ? 'Drag a hole along the bore. Its width is the second number.'
   : 'Drag a hole along the bore. With Shift, up makes it wider.';
-/** Least and largest radius, and the least distance between two holes, m. */
-const [NARROWEST, WIDEST, APART] = [5e-4, 0.02, 1e-4];
 const get = (id) => document.getElementById(id);
 const bytes = (text) => new TextEncoder().encode(text);
 
 export class Holes {
-  /** `on` gets { isOpen }, and { opened: instrument } when a file has been opened. */
-  constructor(engine, workshop, drawing, drag, say, on) {
-    Object.assign(this, { engine, workshop, drawing, drag, say, on, moved: [], undo: [], chosen: null, held: null, version: 0 });
+  /** `limits` of holes are the core's, from data.json. `on` gets { isOpen }, and { opened: instrument } when a file has been opened. */
+  constructor(engine, workshop, drawing, drag, limits, say, on) {
+    Object.assign(this, { engine, workshop, drawing, drag, limits, say, on, moved: [], undo: [], chosen: null, held: null, version: 0 });
     this.canvas = get('clarinet');
     get('holes').onclick = () => this.show(!this.isOpen);
-    get('hole-done').onclick = () => this.show(false);
-    // The computer's keys are for playing again after a choice or a number.
+    get('hole-done').onclick = () => this.leave();
+    get('hole-panel').addEventListener('keydown', ({ key }) => key === 'Escape' && this.leave());
+    // The computer's keys are for playing again after a choice by the mouse, and after a number.
     get('hole').onchange = () => {
       this.choose(Number(get('hole').value));
-      get('hole').blur();
+      leaveAfterPointer(get('hole'));
     };
     for (const id of ['hole-place', 'hole-width']) {
       get(id).onchange = () => this.read();
-      get(id).onkeydown = ({ key, target }) => key === 'Enter' && target.blur();
+      // No handler that is a property: what it returns could keep the key from the field.
+      get(id).addEventListener('keydown', ({ key, target }) => key === 'Enter' && target.blur());
     }
     get('hole-undo').onclick = () => this.undo.length > 0 && this.put(this.undo.pop());
     get('hole-back').onclick = () => this.change([]);
     get('hole-save').onclick = () => this.save();
     get('hole-open').onclick = () => get('hole-file').click();
-    get('hole-file').onchange = () => this.open();
+    get('hole-file').onchange = () => {
+      const [file] = get('hole-file').files;
+      get('hole-file').value = '';
+      if (file) this.open(file);
+    };
+    // What is dropped beside would replace the page.
+    addEventListener('dragover', (event) => event.preventDefault());
+    addEventListener('drop', (event) => this.drop(event));
     this.canvas.addEventListener('pointerdown', (event) => this.isOpen && this.down(event));
-    this.canvas.addEventListener('pointermove', (event) => this.held && this.move(event));
-    for (const type of ['pointerup', 'pointercancel', 'lostpointercapture']) this.canvas.addEventListener(type, () => (this.held = null));
+    this.canvas.addEventListener('pointermove', (event) => this.move(event));
+    for (const type of ['pointerup', 'pointercancel', 'lostpointercapture']) this.canvas.addEventListener(type, (event) => this.up(event));
   }
 
   /** Another instrument: `built` is what the page knows of it, `base` what a question to the workshop names it by. */
@@ -59,7 +68,7 @@ export class Holes {
 
   /** What the sound depends on, for other questions. */
   question() {
-    return { rate: this.engine.context.sampleRate, ...this.base, moved: this.moved };
+    return { rate: this.engine.sampleRate, ...this.base, moved: this.moved };
   }
 
   get holes() {
@@ -79,6 +88,14 @@ export class Holes {
     }
     this.draw();
     this.on({ isOpen });
+  }
+
+  /** Closes the panel; who used it by keys is where they came from. */
+  leave() {
+    // A number that was not entered does not count.
+    this.draw(true);
+    this.show(false);
+    get('holes').focus();
   }
 
   choose(hole) {
@@ -105,24 +122,37 @@ export class Holes {
   down(event) {
     const box = this.canvas.getBoundingClientRect();
     const hole = this.drawing.holeAt(event.clientX - box.left, event.clientY - box.top, NEAR);
-    if (hole === null) return;
+    if (hole === null || this.held || !isMain(event)) return;
     event.preventDefault();
     this.canvas.setPointerCapture(event.pointerId);
-    this.remember();
     this.choose(hole);
-    this.held = { x: event.clientX, y: event.clientY, hole: this.holes[hole] };
+    this.held = { x: event.clientX, y: event.clientY, hole: this.holes[hole], pointerId: event.pointerId, isMoving: false };
   }
 
   move(event) {
-    const { x, y, hole } = this.held;
+    if (this.held?.pointerId !== event.pointerId) return;
+    const { x, y, hole, isMoving } = this.held;
+    if (!isMoving) {
+      // Who chooses a hole does not move it.
+      if (!hasMoved(event, { clientX: x, clientY: y })) return;
+      this.held.isMoving = true;
+      this.remember();
+    }
     const wide = event.shiftKey;
     this.set(hole.x + (wide ? 0 : (event.clientX - x) / this.drawing.scale), hole.r + (wide ? WIDER_M * (y - event.clientY) : 0));
+  }
+
+  up({ pointerId, type }) {
+    if (this.held?.pointerId !== pointerId) return;
+    const { isMoving } = this.held;
+    this.held = null;
+    if (isMoving && type === 'pointercancel') this.put(this.undo.pop());
   }
 
   read() {
     const [place, width] = ['hole-place', 'hole-width'].map((id) => Number(get(id).value));
     if (this.chosen === null) return;
-    const said = this.outside('place', place, this.room()) ?? this.outside('width', width, [2 * NARROWEST, 2 * WIDEST]);
+    const said = this.outside('place', place, this.room()) ?? this.outside('width', width, this.widths(place / 1e3));
     if (said) {
       this.draw(true);
       this.state(said);
@@ -137,7 +167,20 @@ export class Holes {
   /** Between which places the chosen hole can be, m. */
   room() {
     const { holes } = this;
-    return [(holes[this.chosen - 1]?.x ?? 0) + APART, (holes[this.chosen + 1]?.x ?? this.built.length) - APART];
+    const [above, here, below] = [-1, 0, 1].map((by) => holes[this.chosen + by]?.x);
+    const { least_x, gap } = this.limits;
+    // Where neighbours were built closer together, the hole stays between them.
+    return [Math.min(here, above === undefined ? least_x : above + gap), Math.max(here, (below ?? this.built.length) - gap)];
+  }
+
+  /** Least and greatest radius at a place: not wider than the bore, m. */
+  radii(x) {
+    const [least, most] = this.limits.radius;
+    return [least, Math.max(least, Math.min(most, this.drawing.boreRadius(x)))];
+  }
+
+  widths(x) {
+    return this.radii(x).map((radius) => 2 * radius);
   }
 
   /** What to say where a number, mm, is not in a range, m. */
@@ -160,8 +203,16 @@ export class Holes {
   /** The chosen hole at a place and with a radius, m, as far as there is room between its neighbours. */
   set(x, r) {
     const { name } = this.holes[this.chosen];
-    const moved = { name, x_m: clamp(x, ...this.room()), radius_m: clamp(r, NARROWEST, WIDEST) };
-    this.put([...this.moved.filter((other) => other.name !== name), moved]);
+    const x_m = clamp(x, ...this.room());
+    const moved = { name, x_m, radius_m: clamp(r, ...this.radii(x_m)) };
+    // In their order along the bore, whichever was touched last.
+    const place = (hole) => this.built.holes.findIndex((built) => built.name === hole.name);
+    this.put([...this.moved.filter((other) => other.name !== name), moved].sort((a, b) => place(a) - place(b)));
+  }
+
+  /** Puts all holes back where they were built, as a step that can be undone. */
+  reset() {
+    if (this.moved.length > 0) this.change([]);
   }
 
   put(moved) {
@@ -193,7 +244,7 @@ export class Holes {
       // Heard though the hole has gone on, but not where it has been put back or the instrument is another.
       if (this.moved.length > 0 && base === this.base) this.take(told, false, version === this.version);
     } catch (error) {
-      this.say(`The hole cannot be there: ${error.message}`);
+      this.fail('The hole cannot be there', error);
     }
     await new Promise((later) => setTimeout(later, EACH_MS));
     this.isAsking = false;
@@ -210,8 +261,12 @@ export class Holes {
       const told = await this.workshop.askLong({ do: 'move', fit: true, ...this.question() });
       if (version === this.version && base === this.base) this.take(told, true, true);
     } catch (error) {
-      this.say(`The bore could not be fitted: ${error.message}`);
+      this.fail('The bore could not be fitted', error);
     }
+  }
+
+  fail(what, error) {
+    this.state(error instanceof NotLoaded ? error.message : `${what}: ${error.message}`);
   }
 
   take({ file, prepared, holes }, isFitted, isLatest) {
@@ -249,10 +304,16 @@ export class Holes {
     URL.revokeObjectURL(link.href);
   }
 
-  async open() {
-    const [file] = get('hole-file').files;
-    get('hole-file').value = '';
+  drop(event) {
+    event.preventDefault();
+    const [file] = event.dataTransfer?.files ?? [];
     if (!file) return;
+    if (!this.isOpen) this.show(true);
+    if (/\.toml$/i.test(file.name)) this.open(file);
+    else this.state(`${file.name} is not opened. A Chalumeau instrument file ends in .toml.`);
+  }
+
+  async open(file) {
     const text = await file.text();
     this.state('Preparing the instrument; one of your own takes minutes …');
     try {
@@ -260,8 +321,7 @@ export class Holes {
       this.state('');
       this.on({ opened: told });
     } catch (error) {
-      this.state('');
-      this.say(`${file.name} is not opened: ${error.message}`);
+      this.state(error instanceof NotLoaded ? error.message : `${file.name} is not opened. ${error.message}`);
     }
   }
 }

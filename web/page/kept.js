@@ -24,13 +24,13 @@ export const Kept = {
     const within = (value, least, most) => typeof value === 'number' && value >= least && value <= most;
     const instrument = place(data.instruments, ({ id }) => id === state.instrument);
     const { length, holes } = data.instruments[instrument] ?? { holes: [] };
-    const fits = (hole) => holes.some(({ name }) => name === hole?.name) && within(hole.x_m, 0, length) && within(hole.radius_m, 5e-4, 0.02);
+    const fits = (hole) => holes.some(({ name }) => name === hole?.name) && within(hole.x_m, data.holes.least_x, length) && within(hole.radius_m, ...data.holes.radius);
     return {
       preset: place(data.presets, ({ name }) => name === state.preset),
       isChanged: state.isChanged === true,
       instrument,
       controls: data.controls.map((control) => [control, state.controls?.[control.id]]).filter(([{ min, max }, value]) => within(value, min, max)),
-      moved: Array.isArray(state.moved) && state.moved.every(fits) ? state.moved.map(({ name, x_m, radius_m }) => ({ name, x_m, radius_m })) : [],
+      moved: (Array.isArray(state.moved) ? state.moved : []).filter(fits).map(({ name, x_m, radius_m }) => ({ name, x_m, radius_m })),
       volume: within(state.volume, 0, 100) ? state.volume : undefined,
     };
   },

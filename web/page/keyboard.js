@@ -1,6 +1,7 @@
 // The piano keyboard: sounding pitch, with the letters of the computer's keys. A key that is slid over slurs; upwards is louder.
 
 import { clamp, isBlack, noteName } from './names.js';
+import { isMain } from './pointers.js';
 
 /** Narrowest white key of the whole keyboard, and of a part of it, pixels. */
 const [NARROWEST, NARROWEST_OF_PART] = [26, 37];
@@ -8,6 +9,8 @@ const [NARROWEST, NARROWEST_OF_PART] = [26, 37];
 const HEIGHT = 260;
 /** Breath of a touch before it moves. */
 const TOUCH = 0.62;
+
+const who = (pointerId) => `pointer ${pointerId} on the piano`;
 
 export class Keyboard {
   /** `hands` plays; `breathe` gets the breath of a touch, or null when the last touch ends. */
@@ -66,6 +69,8 @@ export class Keyboard {
       const black = isBlack(note);
       const left = width * seen.filter((white) => white < note).length;
       key.className = `key ${black ? 'black' : 'white'}`;
+      // The whole is one element with a name of its own.
+      key.setAttribute('aria-hidden', 'true');
       key.style.left = `${black ? left - 0.3 * width : left}%`;
       key.style.width = `${black ? 0.6 * width : width}%`;
       key.classList.toggle('silent', this.silent.has(note) || note < this.first || note > this.last);
@@ -98,12 +103,12 @@ export class Keyboard {
 
   down(event) {
     const note = this.noteAt(event);
-    if (note === null) return;
+    if (note === null || !isMain(event)) return;
     event.preventDefault();
     this.element.setPointerCapture(event.pointerId);
     this.touches.set(event.pointerId, { note, y: event.clientY });
     this.breathe(TOUCH);
-    this.hands.press(note, Math.round(127 * TOUCH));
+    this.hands.press(note, Math.round(127 * TOUCH), who(event.pointerId));
   }
 
   move(event) {
@@ -113,8 +118,8 @@ export class Keyboard {
     if (note !== null && note !== touch.note) {
       const before = touch.note;
       touch.note = note;
-      this.hands.press(note, Math.round(127 * TOUCH));
-      if (![...this.touches.values()].some((other) => other.note === before)) this.hands.release(before);
+      this.hands.press(note, Math.round(127 * TOUCH), who(event.pointerId));
+      this.hands.release(before, who(event.pointerId));
     }
     this.breathe(clamp(TOUCH + (touch.y - event.clientY) / HEIGHT, 0.04, 1));
   }
@@ -128,7 +133,7 @@ export class Keyboard {
     const touch = this.touches.get(event.pointerId);
     if (!touch) return;
     this.touches.delete(event.pointerId);
-    if (![...this.touches.values()].some((other) => other.note === touch.note)) this.hands.release(touch.note);
+    this.hands.release(touch.note, who(event.pointerId));
     if (this.touches.size === 0) this.breathe(null);
   }
 }

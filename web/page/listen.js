@@ -1,6 +1,7 @@
 // The listening page: each sound is made by the module when it is first asked for, much faster than it sounds, and drawn.
 
 import { json } from './names.js';
+import { compiled, whySilent } from './sound.js';
 
 /** Columns of a picture. */
 const COLUMNS = 360;
@@ -9,6 +10,8 @@ const tour = await json('tour.json').catch((error) => {
   get('trouble').textContent = `No sound: ${error.message}`;
   throw error;
 });
+const silent = whySilent();
+if (silent) get('trouble').textContent = `No sound: ${silent}.`;
 let module;
 let context;
 let playing;
@@ -42,6 +45,7 @@ function card(stop) {
 }
 
 async function toggle(stop, button, picture) {
+  if (silent) return;
   // In the gesture: a browser lets a page sound only then.
   context ??= new AudioContext({ sampleRate: tour.rate });
   context.resume();
@@ -54,6 +58,7 @@ async function toggle(stop, button, picture) {
   stop.making ??= made(stop);
   try {
     stop.sound = await stop.making;
+    get('trouble').textContent = '';
   } catch (error) {
     stop.making = undefined;
     throw error;
@@ -80,7 +85,7 @@ function end() {
 
 /** The sound, by the module in an audio worklet that need not wait for time to pass. */
 async function made({ samples, messages }) {
-  module ??= await WebAssembly.compile(await (await fetch('chalumeau.wasm')).arrayBuffer());
+  module ??= await compiled('chalumeau.wasm');
   const offline = new OfflineAudioContext(2, samples, tour.rate);
   await offline.audioWorklet.addModule('worklet.js');
   const processorOptions = { module, instrument: 0, score: { score: messages } };

@@ -5,6 +5,7 @@ import { Control } from './controls.js';
 import { Drag } from './drag.js';
 import { Engine } from './engine.js';
 import { Hands } from './hands.js';
+import { Hint } from './hint.js';
 import { Holes } from './holes.js';
 import { Keyboard } from './keyboard.js';
 import { KnobPanel } from './knob-panel.js';
@@ -12,30 +13,37 @@ import { Meter } from './meter.js';
 import { Midi } from './midi.js';
 import { Kept } from './kept.js';
 import { json, noteName } from './names.js';
+import { leaveAfterPointer } from './pointers.js';
 import { Presets } from './presets.js';
 import { Typing } from './typing.js';
+import { Update } from './update.js';
 import { Workshop } from './workshop.js';
 
-/** Places in the worklet's picture. */
-const [KEY, SOUNDING, FINGERING, MOUTH, GAMMA, DYNAMIC, PEAK, LEVEL, ORIGIN] = Array.from({ length: 9 }, (_, n) => n);
 /** Below this level nothing is heard, dBFS. */
 const SILENT_DB = -66;
 /** Range of the output's level, dBFS to full scale. */
 const LEVEL_DB = 48;
 /** Time of silence after which the sound is switched off until the next gesture, s: a page at rest costs nothing. */
 const REST_S = 120;
-/** What breath comes from, by the picture's number. */
-const ORIGINS = ['', 'CC2', 'CC11', 'channel pressure', 'the note', 'the knob'];
-const KNOB = ORIGINS.indexOf('the knob');
+/** Time in which a browser that allows it has switched the sound on, ms. */
+const WAKE_MS = 700;
+const KNOB = 'the knob';
+/** Controllers of MIDI that blow. */
+const BLOWING = ['CC2', 'CC11', 'channel pressure'];
+const LOADING = 'Loading …';
 const IDLE = 'Press a key, or drag across the clarinet. To blow, let the page hear your microphone.';
+const CHOOSE = 'Choose a note: press a key, or drag across the clarinet.';
 
-/** What was said last stays for a while, ms. */
-const SAID_MS = 6000;
 /** Least time between two notes that a screen reader is told, ms. */
 const ANNOUNCED_MS = 500;
 
 const get = (id) => document.getElementById(id);
-let [values, heldHint, holding] = [[], '', 0];
+const hint = new Hint(get('hint'), usual);
+let values = [];
+/** The sound is there; it should be on and is not. */
+let [isPrepared, isLate, waking] = [false, false, 0];
+/** What the microphone hears, and where the breath comes from, by the latest picture; whether anything has been played. */
+let [room, origin, hasPlayed] = [null, '', false];
 const data = await json('data.json').catch((error) => {
   fail(error);
   throw error;
@@ -51,7 +59,10 @@ const drag = new Drag(get('clarinet'), hands, breathe, (touches) => {
 const typing = new Typing(hands, breathe, (said) => {
   if (said.letters) keyboard.setLetters(said.letters);
   if (said.base) keyboard.show(said.base);
-  if (said.start) begin();
+  if (said.start) {
+    begin();
+    takeBreath();
+  }
   if (said.silence) {
     hands.silence();
     knob.stop();
@@ -66,7 +77,7 @@ const controls = data.controls.map((of) => new Control(of, (place, value) => {
 get('controls').append(...controls.map((control) => control.element));
 const presets = new Presets(data.presets, choose);
 const workshop = new Workshop();
-const holes = new Holes(engine, workshop, drawing, drag, say, follow);
+const holes = new Holes(engine, workshop, drawing, drag, data.holes, say, follow);
 const knob = new KnobPanel(engine, workshop, () => ({ ...holes.question(), values }), say, (plays) => {
   hands.blow(plays || blowing, instrument.transposition);
 });
@@ -80,8 +91,7 @@ data.instruments.forEach(({ name }, at) => get('instrument').append(new Option(n
 get('instrument').onchange = (event) => {
   setInstrument(Number(event.target.value));
   change();
-  // The computer's keys are for playing again.
-  event.target.blur();
+  leaveAfterPointer(event.target);
 };
 setInstrument(0);
 get('lower').onclick = () => keyboard.shift(-1);
@@ -90,9 +100,10 @@ get('volume').oninput = (event) => {
   engine.setVolume(event.target.value / 100);
   keep();
 };
+get('volume').onchange = (event) => leaveAfterPointer(event.target);
 restore();
 engine.setVolume(get('volume').value / 100);
-say();
+hint.tell();
 
 for (const type of ['pointerdown', 'pointerup', 'keydown']) addEventListener(type, begin, { capture: true });
 // What comes up elsewhere is not told.
@@ -151,19 +162,43 @@ function restore() {
 function begin() {
   lastHeard = performance.now();
   engine.start().catch(fail);
+  watch();
+}
+
+/** Says so where the sound should be on and the browser does not switch it on. */
+function watch() {
+  clearTimeout(waking);
+  const isOff = () => engine.wanted && !engine.isRunning;
+  if (isOff()) {
+    waking = setTimeout(() => {
+      isLate = isOff();
+      hint.tell();
+    }, WAKE_MS);
+  } else isLate = false;
+  hint.tell();
 }
 
 function fail(error) {
-  get('hint').classList.add('failed');
-  say(`No sound: ${String(error.message ?? error).replace(/\.$/, '')}. Reload the page to try again.`);
+  hint.fail(error);
 }
 
-function say(text = IDLE) {
-  get('hint').textContent = text;
-  if (text === IDLE) return;
-  heldHint = text;
-  clearTimeout(holding);
-  holding = setTimeout(() => (heldHint = ''), SAID_MS);
+function say(text) {
+  hint.say(text);
+}
+
+/** What the player can do. */
+function usual() {
+  if (!isPrepared) return LOADING;
+  if (isLate) {
+    return navigator.userActivation?.hasBeenActive === false
+      ? 'Click once to switch the sound on.'
+      : 'The browser does not switch the sound on. Click once; if that does not help, is there a loudspeaker?';
+  }
+  if (room?.calibrating) return 'Measuring the room for two seconds. Please be quiet …';
+  if ((room || knob.plays) && !hands.hasNote) return CHOOSE;
+  if (room) return 'Blow at the microphone. A key or a drag chooses the note.';
+  if (knob.plays) return 'Turn the knob to blow. A key or a drag chooses the note.';
+  return hasPlayed || holes.isOpen ? '' : IDLE;
 }
 
 /** Breath of hands on the screen or of arrow keys; null when they let go. The microphone's breath stays what it is. */
@@ -171,10 +206,17 @@ function breathe(breath) {
   if (blowing || (breath === null && !isTouched)) return;
   isTouched = breath !== null;
   engine.send({ breath });
+  midi.isTaken = true;
+}
+
+/** A key of the computer sounds though a wind controller was found, if nobody blows it. */
+function takeBreath() {
+  if (!midi.isTaken && BLOWING.includes(origin) && midi.rests(origin)) midi.take();
 }
 
 function setInstrument(at) {
   hands.releaseAll();
+  const before = instrument;
   instrument = data.instruments[at];
   if (engine.instrument !== at) {
     engine.instrument = at;
@@ -188,6 +230,12 @@ function setInstrument(at) {
   keyboard.setRange(first, last, silent);
   typing.setRange(first, last);
   drag.notes = [...new Set(all)].sort((a, b) => a - b).filter((note) => !silent.has(note));
+  // What is blown stays the written note, as far as this instrument has it.
+  const far = (note, other) => Math.abs(note - other);
+  hands.refinger((note) => {
+    const wanted = note + before.transposition - instrument.transposition;
+    return drag.notes.reduce((a, b) => (far(b, wanted) < far(a, wanted) ? b : a), drag.notes[0] ?? wanted);
+  });
   drawing.setInstrument(instrument);
   holes.setInstrument(instrument, instrument.own ?? { instrument: at });
   knob.update();
@@ -225,18 +273,22 @@ function open({ instrument: at, moved, name, file, prepared, drawn }) {
 
 function choose(preset) {
   const at = preset.instrument;
+  // As the preset has it, and as it was built.
   if (data.instruments[at] !== instrument) setInstrument(at);
+  else holes.reset();
   values = data.defaults.map((value, place) => preset.values[place] ?? value);
   engine.send({ values, wheel: preset.wheel, bend: preset.bend, breathFrom: preset.breathFrom });
   controls.forEach((control) => control.show(values[control.of.place]));
   meter.setPhysical(values[data.breathResponse] === 1);
   knob.update();
+  presets.show();
   isChanged = false;
   keep();
 }
 
 /** What the worklet tells. */
 function hear(message) {
+  if ('state' in message) watch();
   if (message.failed) fail(message.failed);
   if (message.taken === false) holes.refuse();
   if (message.microphoneGone && blowing) {
@@ -249,20 +301,23 @@ function hear(message) {
   dispatchEvent(new CustomEvent('chalumeau', { detail: message }));
 }
 
-let spoken = '';
 let announced = 0;
 let lastHeard = performance.now();
 
-function draw(picture, room) {
-  const level = 20 * Math.log10(picture[LEVEL] + 1e-9);
+function draw(numbers, heard) {
+  hint.pass();
+  const picture = Object.fromEntries(data.picture.map((name, at) => [name, numbers[at]]));
+  const level = 20 * Math.log10(picture.level + 1e-9);
   const sounds = level > SILENT_DB;
-  const note = picture[SOUNDING];
-  const peak = 20 * Math.log10(picture[PEAK] * (engine.gain ?? 1) + 1e-9);
+  const note = picture.sounding;
+  const peak = 20 * Math.log10(picture.peak * (engine.gain ?? 1) + 1e-9);
+  [room, origin] = [heard, data.origins[picture.origin]];
+  hasPlayed ||= hands.held.size > 0 || sounds;
   get('level').style.transform = `translateY(${(100 * Math.min(1, Math.max(0, -peak / LEVEL_DB))).toFixed(1)}%)`;
   if (sounds || blowing || knob.isConnected || hands.held.size > 0) lastHeard = performance.now();
   else if (performance.now() - lastHeard > 1000 * REST_S) engine.rest();
-  const has = note >= 0 && (sounds || picture[KEY] >= 0);
-  drawing.follow(has || sounds ? picture[FINGERING] : drawing.fingering, sounds ? level : -120, Math.min(1, picture[MOUTH] / 4));
+  const has = note >= 0 && (sounds || picture.key >= 0);
+  drawing.follow(has || sounds ? picture.fingering : drawing.fingering, sounds ? level : -120, Math.min(1, picture.mouth / 4));
   keyboard.mark(has && sounds ? note : undefined);
   if (has) {
     const written = noteName(note + instrument.transposition);
@@ -270,10 +325,11 @@ function draw(picture, room) {
     announce(sounds ? written : '');
     get('sounding').textContent = instrument.transposition === 0 ? 'written and sounding' : `written · sounds ${noteName(note)}`;
   }
-  get('written').style.opacity = sounds ? 1 : 0.45;
-  knob.follow(picture[ORIGIN] === KNOB);
-  meter.follow(picture[DYNAMIC], picture[GAMMA], picture[MOUTH]);
-  tellBreath(picture[ORIGIN], room);
+  get('written').classList.toggle('quiet', !sounds);
+  knob.follow(origin === KNOB);
+  meter.follow(picture.dynamic, picture.gamma, picture.mouth);
+  meter.say(breathing());
+  hint.tell();
 }
 
 /** Tells a screen reader the note, not oftener than twice a second. */
@@ -283,26 +339,11 @@ function announce(text) {
   get('announced').textContent = text;
 }
 
-/** Where the breath comes from, and what the microphone waits for. */
-function tellBreath(origin, room) {
-  let text = isTouched ? 'Breath: your hand' : 'Breath: keys';
-  if (origin > 0 && !isTouched) text = `Breath found: ${ORIGINS[origin]}`;
-  let hint = IDLE;
-  if (room?.calibrating) {
-    hint = 'Measuring the room for two seconds. Please be quiet …';
-    text = 'Microphone';
-  } else if (room) {
-    hint = 'Blow at the microphone. A key or a drag chooses the note.';
-    text = 'Breath: microphone';
-  } else if (knob.plays) {
-    hint = 'Turn the knob to blow. A key or a drag chooses the note.';
-  } else if (engine.isRunning && spoken) hint = '';
-  if (holes.isOpen && hint === IDLE) hint = '';
-  if (heldHint) hint = heldHint;
-  if (hint !== IDLE) spoken = hint || spoken;
-  if (hands.held.size > 0) spoken ||= ' ';
-  meter.say(text);
-  if (!get('hint').classList.contains('failed') && get('hint').textContent !== hint) get('hint').textContent = hint;
+/** Where the breath comes from. */
+function breathing() {
+  if (room) return room.calibrating ? 'Microphone' : 'Breath: microphone';
+  if (isTouched) return 'Breath: your hand';
+  return origin && !(midi.isTaken && BLOWING.includes(origin)) ? `Breath found: ${origin}` : 'Breath: keys';
 }
 
 async function toggleMicrophone() {
@@ -315,10 +356,10 @@ async function toggleMicrophone() {
   } else {
     isOpening = true;
     try {
-      await engine.start();
+      begin();
       await engine.openMicrophone();
     } catch (error) {
-      say(error.name === 'NotAllowedError' ? 'The browser was not allowed to use the microphone.' : `No microphone: ${error.message}`);
+      say(isForbidden(error) ? 'The browser was not allowed to use the microphone.' : `No microphone: ${error.message}`);
       return;
     } finally {
       isOpening = false;
@@ -330,10 +371,17 @@ async function toggleMicrophone() {
   button.classList.remove('blowing');
 }
 
+/** By the user, or by the site or the address that the page has. */
+function isForbidden({ name }) {
+  return name === 'NotAllowedError' || name === 'SecurityError';
+}
+
 get('microphone').onclick = toggleMicrophone;
 if (!navigator.mediaDevices?.getUserMedia) get('microphone').hidden = true;
 
-const midi = new Midi(hands, (message) => engine.send(message), ({ inputs, message }) => {
+const midi = new Midi(hands, (message) => engine.send(message), ({ inputs, message, gone }) => {
+  // Forgets what has been found; any device may be found anew.
+  if (gone) [data.breathFromKeys, presets.all[presets.at].breathFrom].forEach((breathFrom) => engine.send({ breathFrom }));
   if (inputs) {
     get('midi').setAttribute('aria-pressed', inputs.length > 0);
     get('midi').title = inputs.length > 0 ? inputs.join(', ') : 'No MIDI device is connected.';
@@ -341,14 +389,19 @@ const midi = new Midi(hands, (message) => engine.send(message), ({ inputs, messa
   }
   if (message) begin();
 });
-const openMidi = () => midi.open().catch(() => say('The browser was not allowed to use MIDI.'));
+const openMidi = () => midi.open().catch((error) => say(isForbidden(error) ? 'The browser was not allowed to use MIDI.' : `No MIDI: ${error.message}`));
 get('midi').onclick = openMidi;
 get('midi').hidden = !Midi.isHere;
 // Where it has been allowed before, nobody needs to ask again.
 navigator.permissions?.query({ name: 'midi' }).then(({ state }) => state === 'granted' && Midi.isHere && openMidi(), () => {});
 
-if ('serviceWorker' in navigator) navigator.serviceWorker.register('sw.js').catch(() => {});
+const update = new Update(() => (get('update').hidden = false));
+get('update').onclick = () => update.take();
 
 /** For tests. */
 globalThis.chalumeau = { engine, hands, holes, knob };
+engine.prepared.then(() => {
+  isPrepared = true;
+  watch();
+}, () => {});
 engine.prepare().catch(fail);

@@ -16,7 +16,7 @@ export class Presets {
       event.preventDefault();
       this.list.querySelector('button')?.click();
     };
-    this.dialog.onclick = (event) => event.target === this.dialog && this.dialog.close();
+    this.dialog.addEventListener('click', (event) => event.target === this.dialog && this.dialog.close());
     this.show();
   }
 

@@ -55,7 +55,7 @@ export class Typing {
       if (note < this.first || note > this.last) return;
       this.held.set(event.code, note);
       this.on({ start: true });
-      this.hands.press(note, Math.round(127 * this.breath));
+      this.hands.press(note, Math.round(127 * this.breath), event.code);
     } else if (event.code === 'KeyZ' || event.code === 'KeyX') {
       this.moveTo(this.base + (event.code === 'KeyX' ? 12 : -12));
     } else if (!onControl && (event.code === 'ArrowUp' || event.code === 'ArrowDown')) {
@@ -74,7 +74,7 @@ export class Typing {
     const note = this.held.get(code);
     if (note === undefined) return;
     this.held.delete(code);
-    if (![...this.held.values()].includes(note)) this.hands.release(note);
+    this.hands.release(note, code);
     if (this.held.size === 0) this.breathe(null);
   }
 }
